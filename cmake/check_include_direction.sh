@@ -1,0 +1,93 @@
+#!/usr/bin/env bash
+# Refuses every include in include/esokit that goes against
+#   core <- model <- design <- observer <- control <- analysis <- sim
+# usage: cmake/check_include_direction.sh [INCLUDE_DIR | --self-test]
+set -euo pipefail
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+
+check() {  # check INCLUDE_DIR
+  local include_dir=$1
+  local -a headers
+  if [[ ! -d $include_dir/esokit ]]; then
+    echo "no folder esokit in $include_dir"
+    return 1
+  fi
+  mapfile -t headers < <(cd "$include_dir" && find esokit -type f | LC_ALL=C sort)
+  if ((${#headers[@]} == 0)); then
+    echo "no headers in $include_dir/esokit"
+    return 1
+  fi
+  (cd "$include_dir" && awk '
+    BEGIN {
+      count = split("core model design observer control analysis sim", order, " ")
+      for (i = 1; i <= count; ++i) rank[order[i]] = i
+      for (i = 1; i < ARGC; ++i) {
+        known[ARGV[i]] = 1
+        split(ARGV[i], part, "/")
+        if (ARGV[i] == "esokit/esokit.hpp" || part[2] in rank) continue
+        printf "%s: not in a known folder\n", ARGV[i]
+        ++refused
+      }
+    }
+    function refuse(why) {
+      printf "%s:%d: %s: %s\n", FILENAME, FNR, why, $0
+      ++refused
+    }
+    FNR == 1 {
+      split(FILENAME, part, "/")
+      umbrella = (FILENAME == "esokit/esokit.hpp")
+      mine = (part[2] in rank) ? rank[part[2]] : 0
+    }
+    /^[ \t]*#[ \t]*include/ {
+      target = $0
+      sub(/^[ \t]*#[ \t]*include(_next)?[ \t]*/, "", target)
+      opening = substr(target, 1, 1)
+      if (opening != "<" && opening != "\"") { refuse("an include by macro hides its direction"); next }
+      target = substr(target, 2)
+      sub(/[>"].*/, "", target)
+      if (target ~ /(^|\/)\.\.?\//) { refuse("relative include"); next }
+      if (target !~ /^esokit\//) {
+        if (opening == "\"") refuse("relative include")
+        else if (target ~ /\// && target !~ /^Eigen\//) refuse("dependency other than Eigen")
+        next
+      }
+      split(target, part, "/")
+      if (!(target in known)) refuse("no such header")
+      else if (umbrella) next
+      else if (!(part[2] in rank)) refuse("a header may not include the umbrella header")
+      else if (mine && rank[part[2]] > mine) refuse("against the include direction")
+    }
+    END { exit refused > 0 }' "${headers[@]}")
+}
+
+self_test() {  # the check must be able to fail
+  local folder case line
+  folder=$(mktemp -d)
+  trap 'rm -rf "$folder"' RETURN
+  mkdir -p "$folder"/esokit/{core,model,sim}
+  echo '#include <esokit/sim/c.hpp>' >"$folder/esokit/esokit.hpp"
+  printf '#include <cmath>\n#include <Eigen/Core>\n' >"$folder/esokit/core/a.hpp"
+  echo '#include "esokit/core/a.hpp"' >"$folder/esokit/model/b.hpp"
+  echo '#include <esokit/model/b.hpp>' >"$folder/esokit/sim/c.hpp"
+  check "$folder" || { echo "self-test: a good tree is refused"; return 1; }
+  for line in '#include <esokit/sim/c.hpp>' '  # include "esokit/sim/c.hpp"' '#include "b.hpp"' \
+    '#include "../core/a.hpp"' '#include <esokit/core/../core/a.hpp>' '#include <esokit/core/x.hpp>' \
+    '#include <esokit/esokit.hpp>' '#include <boost/any.hpp>' '#include HEADER'; do
+    echo "$line" >"$folder/esokit/model/bad.hpp"
+    if check "$folder" >/dev/null; then
+      echo "self-test: not refused: $line"
+      return 1
+    fi
+  done
+  rm "$folder/esokit/model/bad.hpp"
+  touch "$folder/esokit/loose.hpp"
+  if check "$folder" >/dev/null; then
+    echo "self-test: a header outside the folders is not refused"
+    return 1
+  fi
+}
+
+case ${1:-} in
+  --self-test) self_test ;;
+  *) check "${1:-$root/include}" ;;
+esac

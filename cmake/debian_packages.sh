@@ -1,0 +1,53 @@
+# Bash library, to be sourced by the scripts that promise to work on a fresh Debian 12.
+
+# What every build needs, what each kind of program needs on top.
+ESOKIT_BUILD_PACKAGES=(g++ cmake ninja-build libeigen3-dev)
+ESOKIT_TEST_PACKAGES=(libgtest-dev libboost-dev)
+ESOKIT_BENCHMARK_PACKAGES=(libbenchmark-dev)
+# Without a font gnuplot draws figures with no text, and reports no error.
+ESOKIT_EXAMPLE_PACKAGES=(gnuplot-nox fontconfig fonts-dejavu-core)
+
+# require_packages [--no-install] package...
+# Installs the packages that are missing. With --no-install it only names them and returns 3.
+require_packages() {
+  local install=yes package state
+  local -a missing=() as_root=()
+  if [[ "${1:-}" == --no-install ]]; then
+    install=no
+    shift
+  fi
+
+  # Elsewhere the user has installed the tools by other means; CMake will say what it does not find.
+  if ! command -v dpkg-query >/dev/null 2>&1; then
+    echo "note: no Debian package tools here; taking these for installed: $*" >&2
+    return 0
+  fi
+
+  for package in "$@"; do
+    state=$(dpkg-query -W -f='${db:Status-Status} ' "$package" 2>/dev/null) || state=
+    [[ " $state" == *" installed "* ]] || missing+=("$package")
+  done
+  if ((${#missing[@]} == 0)); then
+    return 0
+  fi
+
+  if [[ $install == no ]]; then
+    echo "missing Debian packages: ${missing[*]}" >&2
+    echo "install them with: apt-get install --no-install-recommends ${missing[*]}" >&2
+    return 3
+  fi
+
+  if ((EUID != 0)); then
+    if ! command -v sudo >/dev/null 2>&1; then
+      echo "missing Debian packages: ${missing[*]}" >&2
+      echo "installing them needs root, and there is no sudo" >&2
+      return 3
+    fi
+    as_root=(sudo)
+  fi
+  echo "installing Debian packages: ${missing[*]}" >&2
+  # env, as sudo drops the variables of the caller. The index may be stale or absent (containers).
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -qq update </dev/null >&2 || return 1
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -qq install -y \
+    --no-install-recommends "${missing[@]}" </dev/null >&2 || return 1
+}
