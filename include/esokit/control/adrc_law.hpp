@@ -1,0 +1,125 @@
+/// @file
+/// The control law of active disturbance rejection control (ADRC) on an observer's estimate.
+#pragma once
+
+#include <esokit/core/combinatorics.hpp>
+#include <esokit/core/expected.hpp>
+#include <esokit/core/matrix.hpp>
+#include <esokit/core/unroll.hpp>
+#include <esokit/design/check.hpp>
+#include <optional>
+
+namespace esokit {
+
+/// u = (v - dhat) / b0 with v a state feedback; the total disturbance is cancelled, the rest is a
+/// chain of n integrators with its poles at -omega_c.
+///
+/// A function of the estimate, without state: it fits sampled and continuous observers alike.
+/// @tparam Order n
+template <int Order, Scalar S = double>
+class AdrcLaw {
+ public:
+  /// Give `controller_bandwidth` or `gains`, not both.
+  struct Config {
+    S controller_bandwidth{};                ///< omega_c, rad/s: k_i = C(n, i) omega_c^(n-i)
+    std::optional<Array<S, Order>> gains{};  ///< k_0 .. k_(n-1) on r - y, r' - y', ..
+    S input_gain{};                          ///< b0 of the plant, not zero, negative is fine
+  };
+
+  /// @return the law, or an error that names the field
+  static Expected<AdrcLaw, Error<S>> make(const Config& config) {
+    if (auto ok = check_nonzero("input_gain", config.input_gain); !ok) return ok.error();
+    if (auto ok =
+            check_representable("input_gain", config.input_gain, S(S(1.0) / config.input_gain),
+                                "has an inverse that the scalar cannot hold");
+        !ok) {
+      return ok.error();
+    }
+    AdrcLaw law;
+    law.inverse_input_gain_ = S(1.0) / config.input_gain;
+    if (config.gains) {
+      if (!all(is_finite(config.controller_bandwidth)) ||
+          all(detail::magnitude(config.controller_bandwidth) > S(0.0))) {
+        return Error<S>{"controller_bandwidth", config.controller_bandwidth,
+                        "must be left out where gains is given"};
+      }
+      for (int i = 0; i < Order; ++i) {
+        const S& gain = (*config.gains)[static_cast<std::size_t>(i)];
+        if (auto ok = check_finite("gains", gain, i); !ok) return ok.error();
+      }
+      law.gains_ = *config.gains;
+      return law;
+    }
+    if (auto ok = check_positive("controller_bandwidth", config.controller_bandwidth); !ok) {
+      return ok.error();
+    }
+    S power(1.0);
+    for (int i = Order - 1; i >= 0; --i) {
+      power = power * config.controller_bandwidth;
+      law.gains_[static_cast<std::size_t>(i)] = S(binomial(Order, i)) * power;
+    }
+    if (auto ok = check_representable("controller_bandwidth", config.controller_bandwidth,
+                                      law.gains_[0], "gives a gain that the scalar cannot hold");
+        !ok) {
+      return ok.error();
+    }
+    return law;
+  }
+
+  /// v = r^(n) + sum_i k_i (r^(i) - yhat^(i)), unit of y^(n).
+  /// @param estimate (y, .., y^(n-1), ..), at least n x 1
+  /// @param reference (r, r', .., r^(n)), n + 1 x 1
+  template <int Size>
+  [[nodiscard]] S feedback(const Vector<S, Size>& estimate,
+                           const Vector<S, Order + 1>& reference) const noexcept {
+    static_assert(Size >= Order, "esokit: the estimate must hold the plant states");
+    S v = reference(Order);
+    for (int i = 0; i < Order; ++i) {
+      v = v + gains_[static_cast<std::size_t>(i)] * (reference(i) - estimate(i));
+    }
+    return v;
+  }
+
+  /// Output-based form: u = (v - dhat) / b0.
+  /// @param estimate (y, .., y^(n-1), d, ..) of an observer with input gain b0
+  /// @param reference (r, r', .., r^(n)), n + 1 x 1
+  template <int Size>
+  [[nodiscard]] S control(const Vector<S, Size>& estimate,
+                          const Vector<S, Order + 1>& reference) const noexcept {
+    static_assert(Size > Order, "esokit: the estimate must hold the disturbance");
+    return (feedback(estimate, reference) - estimate(Order)) * inverse_input_gain_;
+  }
+
+  /// Output-based form for a reference without derivatives, r' = .. = r^(n) = 0.
+  template <int Size>
+  [[nodiscard]] S control(const Vector<S, Size>& estimate, const S& reference) const noexcept {
+    Vector<S, Order + 1> all = Vector<S, Order + 1>::Zero();
+    all(0) = reference;
+    return control(estimate, all);
+  }
+
+  /// Error-based form: u = (dhat + sum_i k_i ehat^(i)) / b0; no reference derivative is needed.
+  /// @param estimate (e, .., e^(n-1), d, ..) of an observer that is fed e = y_d - y as measurement
+  ///        and has the input gain -b0
+  template <int Size>
+  [[nodiscard]] S control_error_based(const Vector<S, Size>& estimate) const noexcept {
+    static_assert(Size > Order, "esokit: the estimate must hold the disturbance");
+    S v = estimate(Order);
+    for (int i = 0; i < Order; ++i) v = v + gains_[static_cast<std::size_t>(i)] * estimate(i);
+    return v * inverse_input_gain_;
+  }
+
+  /// k_0 .. k_(n-1).
+  [[nodiscard]] const Array<S, Order>& gains() const noexcept { return gains_; }
+
+  /// b0.
+  [[nodiscard]] S input_gain() const noexcept { return S(1.0) / inverse_input_gain_; }
+
+ private:
+  AdrcLaw() = default;
+
+  Array<S, Order> gains_{};
+  S inverse_input_gain_ = S(1.0);
+};
+
+}  // namespace esokit

@@ -1,0 +1,102 @@
+/// @file
+/// A value or the error that prevented it, without exceptions.
+#pragma once
+
+#include <cstdlib>
+#include <type_traits>
+#include <utility>
+#include <variant>
+
+namespace esokit {
+
+/// Holds either a T or an E. Checked in every build type: reading the value of an error prints the
+/// error where there is a console, and aborts.
+///
+/// A subset of C++23's std::expected under the same names, so that code can move to it.
+template <class T, class E>
+class [[nodiscard]] Expected {
+ public:
+  using value_type = T;
+  using error_type = E;
+
+  constexpr Expected(T value) : content_(std::in_place_index<0>, std::move(value)) {}
+  constexpr Expected(E error) : content_(std::in_place_index<1>, std::move(error)) {}
+
+  [[nodiscard]] constexpr bool has_value() const noexcept { return content_.index() == 0; }
+  constexpr explicit operator bool() const noexcept { return has_value(); }
+
+  /// The value; ends the program with the error as last words if there is none.
+  [[nodiscard]] constexpr T& value() & noexcept { return *checked(*this); }
+  [[nodiscard]] constexpr const T& value() const& noexcept { return *checked(*this); }
+  [[nodiscard]] constexpr T&& value() && noexcept { return std::move(*checked(*this)); }
+
+  [[nodiscard]] constexpr T& operator*() & noexcept { return value(); }
+  [[nodiscard]] constexpr const T& operator*() const& noexcept { return value(); }
+  [[nodiscard]] constexpr T&& operator*() && noexcept { return std::move(*this).value(); }
+  [[nodiscard]] constexpr T* operator->() noexcept { return checked(*this); }
+  [[nodiscard]] constexpr const T* operator->() const noexcept { return checked(*this); }
+
+  /// The error; aborts if there is none.
+  [[nodiscard]] constexpr const E& error() const noexcept {
+    const E* error = std::get_if<1>(&content_);
+    if (error == nullptr) std::abort();
+    return *error;
+  }
+
+  template <class U>
+  [[nodiscard]] constexpr T value_or(U&& fallback) const& {
+    return has_value() ? value() : static_cast<T>(std::forward<U>(fallback));
+  }
+
+  /// f(value), or the error passed on. f returns an Expected with the same error type.
+  template <class F>
+  constexpr auto and_then(F&& f) const& -> std::invoke_result_t<F, const T&> {
+    if (has_value()) return std::forward<F>(f)(value());
+    return error();
+  }
+
+ private:
+  template <class Self>
+  static constexpr auto checked(Self& self) noexcept -> decltype(std::get_if<0>(&self.content_)) {
+    auto* value = std::get_if<0>(&self.content_);
+    if (value == nullptr) {
+      if constexpr (requires(const E& e) { print_last_words(e); }) print_last_words(self.error());
+      std::abort();
+    }
+    return value;
+  }
+
+  std::variant<T, E> content_;
+};
+
+/// Success, or an error.
+template <class E>
+class [[nodiscard]] Expected<void, E> {
+ public:
+  using value_type = void;
+  using error_type = E;
+
+  constexpr Expected() noexcept = default;
+  constexpr Expected(E error) : error_(std::in_place_index<1>, std::move(error)) {}
+
+  [[nodiscard]] constexpr bool has_value() const noexcept { return error_.index() == 0; }
+  constexpr explicit operator bool() const noexcept { return has_value(); }
+
+  /// Ends the program with the error as last words if there is one.
+  constexpr void value() const noexcept {
+    if (has_value()) return;
+    if constexpr (requires(const E& e) { print_last_words(e); }) print_last_words(error());
+    std::abort();
+  }
+
+  [[nodiscard]] constexpr const E& error() const noexcept {
+    const E* error = std::get_if<1>(&error_);
+    if (error == nullptr) std::abort();
+    return *error;
+  }
+
+ private:
+  std::variant<std::monostate, E> error_;
+};
+
+}  // namespace esokit

@@ -1,0 +1,104 @@
+/// @file
+/// What a scalar must offer, and the customisation points by which SIMD packs and autodiff types
+/// join: `is_finite`, `select`, `all` and the elementary functions, all found by ADL.
+#pragma once
+
+#include <bit>
+#include <cmath>
+#include <concepts>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+
+namespace esokit {
+
+/// True for the scalars that may branch: float, double, long double.
+template <class T>
+concept PlainScalar = std::floating_point<T>;
+
+namespace detail {
+
+/// Clang with -ffinite-math-only may fold even a bit test on a parameter; a volatile copy ends what
+/// it knows about the value. GCC does not fold bit tests.
+template <class T>
+constexpr T opaque(T value) noexcept {
+#if defined(__clang__) && defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
+  if (!std::is_constant_evaluated()) {
+    const volatile T hidden = value;
+    return hidden;
+  }
+#endif
+  return value;
+}
+
+constexpr bool finite_bits(float value) noexcept {
+  return (std::bit_cast<std::uint32_t>(opaque(value)) & 0x7f800000u) != 0x7f800000u;
+}
+
+constexpr bool finite_bits(double value) noexcept {
+  constexpr std::uint64_t exponent = 0x7ff0000000000000u;
+  return (std::bit_cast<std::uint64_t>(opaque(value)) & exponent) != exponent;
+}
+
+inline bool finite_bits(long double value) noexcept {
+  constexpr int digits = std::numeric_limits<long double>::digits;
+  static_assert(digits == 53 || digits == 64 || digits == 113, "unknown long double format");
+  if constexpr (digits == 53) {
+    return finite_bits(static_cast<double>(value));
+  } else {
+    static_assert(std::endian::native == std::endian::little, "unknown long double byte order");
+    unsigned char bytes[sizeof(long double)];
+    std::memcpy(bytes, &value, sizeof value);
+    constexpr int top = digits == 64 ? 8 : 14;
+    const unsigned exponent =
+        static_cast<unsigned>(bytes[top]) | (static_cast<unsigned>(bytes[top + 1]) << 8u);
+    return (exponent & 0x7fffu) != 0x7fffu;
+  }
+}
+
+}  // namespace detail
+
+/// Neither NaN nor infinite. Tests bits, so it holds under -ffast-math too (tested: GCC 12,
+/// Clang 14). A pack overloads it in its own namespace and returns a mask.
+template <PlainScalar T>
+constexpr bool is_finite(T value) noexcept {
+  return detail::finite_bits(value);
+}
+
+/// `condition ? a : b`, element by element for packs.
+template <PlainScalar T>
+constexpr T select(bool condition, T a, T b) noexcept {
+  return condition ? a : b;
+}
+
+/// True if every lane of a mask is set; a plain scalar has one lane.
+constexpr bool all(bool condition) noexcept { return condition; }
+
+/// A scalar of the library: float, double, long double, a SIMD pack or an autodiff type.
+///
+/// Arithmetic, construction from a double, comparison (bool or mask), and by ADL
+/// `is_finite(x)`, `select(mask, a, b)`, `all(mask)`; `make` also needs `exp` and `expm1`.
+template <class T>
+concept Scalar = std::copyable<T> && requires(const T a, const T b) {
+  T(1.0);
+  T{};
+  { a + b } -> std::convertible_to<T>;
+  { a - b } -> std::convertible_to<T>;
+  { a* b } -> std::convertible_to<T>;
+  { a / b } -> std::convertible_to<T>;
+  { -a } -> std::convertible_to<T>;
+  { all(is_finite(a)) } -> std::convertible_to<bool>;
+  { all(a < b) } -> std::convertible_to<bool>;
+  { select(a < b, a, b) } -> std::convertible_to<T>;
+};
+
+namespace detail {
+
+/// A constant in the scalar type; plain scalars convert at compile time.
+template <class T>
+constexpr T constant(double value) noexcept {
+  return static_cast<T>(value);
+}
+
+}  // namespace detail
+}  // namespace esokit

@@ -1,0 +1,101 @@
+/// @file
+/// Where the poles of the estimation error go: all in one place, or any stable set.
+///
+/// A placement is what a linear observer's config names: its `Spec`, the check of it, and the gains
+/// it gives in both time domains.
+#pragma once
+
+#include <complex>
+#include <esokit/core/matrix.hpp>
+#include <esokit/design/check.hpp>
+#include <esokit/design/continuous_gain.hpp>
+#include <esokit/design/sampled_gain.hpp>
+
+namespace esokit {
+
+/// All N poles at -omega_o (at exp(-omega_o T) when sampled): the bandwidth parameterisation.
+struct EqualPoles {
+  template <int Size, Scalar S>
+  using Spec = S;  ///< omega_o, rad/s
+
+  template <int Size, Scalar S>
+  using Sampled = EqualSampledPoles<Size, S>;
+
+  template <int Size, Scalar S>
+  static Check<S> check(const char* field, const S& bandwidth, int index = -1) {
+    return check_positive(field, bandwidth, index);
+  }
+
+  template <int Size, Scalar S>
+  static EqualSampledPoles<Size, S> sample(const S& bandwidth, const S& sample_time) {
+    return EqualSampledPoles<Size, S>::from_bandwidth(bandwidth, sample_time);
+  }
+
+  template <int Size, Scalar S>
+  static Vector<S, Size> gain(const S& bandwidth) {
+    return continuous_gain<Size, S>(bandwidth);
+  }
+
+  /// A number that names the spec in an error.
+  template <int Size, Scalar S>
+  static S representative(const S& bandwidth) {
+    return bandwidth;
+  }
+};
+
+/// Any stable set of poles p_i (1/s), complex ones in conjugate pairs.
+struct PoleSet {
+  template <int Size, PlainScalar S>
+  using Spec = Array<std::complex<S>, Size>;  ///< p_i, 1/s
+
+  template <int Size, PlainScalar S>
+  using Sampled = SampledPoleSet<Size, S>;
+
+  /// @param set number of the set in an array of sets; the error then counts poles through all sets
+  template <int Size, PlainScalar S>
+  static Check<S> check(const char* field, const Spec<Size, S>& poles, int set = -1) {
+    const int first = set < 0 ? 0 : set * Size;
+    for (std::size_t i = 0; i < Size; ++i) {
+      const int index = first + static_cast<int>(i);
+      if (!is_finite(poles[i].real())) {
+        return Error<S>{field, poles[i].real(), "must have a finite real part", index};
+      }
+      if (!is_finite(poles[i].imag())) {
+        return Error<S>{field, poles[i].imag(), "must have a finite imaginary part", index};
+      }
+      if (!(poles[i].real() < S(0))) {
+        return Error<S>{field, poles[i].real(), "must have a negative real part", index};
+      }
+    }
+    for (std::size_t i = 0; i < Size; ++i) {
+      if (poles[i].imag() == S(0)) continue;
+      int balance = 0;
+      for (std::size_t j = 0; j < Size; ++j) {
+        balance += poles[j] == poles[i] ? 1 : 0;
+        balance -= poles[j] == std::conj(poles[i]) ? 1 : 0;
+      }
+      if (balance != 0) {
+        return Error<S>{field, poles[i].imag(), "is complex without its conjugate in the set",
+                        first + static_cast<int>(i)};
+      }
+    }
+    return {};
+  }
+
+  template <int Size, PlainScalar S>
+  static SampledPoleSet<Size, S> sample(const Spec<Size, S>& poles, const S& sample_time) {
+    return SampledPoleSet<Size, S>::from_continuous(poles, sample_time);
+  }
+
+  template <int Size, PlainScalar S>
+  static Vector<S, Size> gain(const Spec<Size, S>& poles) {
+    return continuous_gain<Size, S>(poles);
+  }
+
+  template <int Size, PlainScalar S>
+  static S representative(const Spec<Size, S>& poles) {
+    return poles[0].real();
+  }
+};
+
+}  // namespace esokit

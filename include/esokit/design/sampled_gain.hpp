@@ -1,0 +1,190 @@
+/// @file
+/// Gains of the sampled predictor-corrector from the poles of its estimation error.
+///
+/// With w the delay operator, a constant gain gives the innovation e = (1-w)^N / prod(1 - rho_i w)
+/// y, so the gain polynomial kappa(t) = sum_r k_r t^r (k_r scaled, t in samples) interpolates the
+/// impulse response of prod(1 - rho_i w) / (1-w)^N at t = 1, 2, .. . Written with contractions a_i
+/// = 1 - rho_i, 1 - rho_i w = a_i + rho_i (1-w), that gives
+///
+///   k_r = sum_{j>r} b_j c(j, r+1) / (j-1)!,   sum_j b_j s^j = prod_i (a_i s + rho_i)
+///
+/// (c: unsigned Stirling numbers of the first kind). For real poles in [0, 1) every term is
+/// positive: nothing cancels, and each gain is good to a few units in the last place for any
+/// omega_o T.
+#pragma once
+
+#include <cmath>
+#include <complex>
+#include <esokit/core/combinatorics.hpp>
+#include <esokit/core/matrix.hpp>
+#include <esokit/core/scalar.hpp>
+#include <esokit/model/scaled_chain.hpp>
+#include <type_traits>
+
+namespace esokit {
+
+/// Scaled gain, k_r = T^r / r! times the gain in physical units; dimensionless.
+template <int Size, Scalar S>
+using ScaledGain = Array<S, Size>;
+
+/// Coefficients b_0 .. b_N of prod_i (a_i s + rho_i).
+template <int Size, Scalar S>
+using PoleWeights = Array<S, Size + 1>;
+
+namespace detail {
+
+/// The type in which compile-time tables are kept, so that float code loads no doubles.
+template <class S>
+using TableScalar = std::conditional_t<PlainScalar<S>, S, double>;
+
+template <int Size, class T>
+constexpr Array<Array<T, Size + 1>, Size> gain_table() noexcept {
+  Array<Array<T, Size + 1>, Size> table{};
+  for (int r = 0; r < Size; ++r) {
+    for (int j = r + 1; j <= Size; ++j) {
+      table[static_cast<std::size_t>(r)][static_cast<std::size_t>(j)] =
+          static_cast<T>(unsigned_stirling_first(j, r + 1) / factorial(j - 1));
+    }
+  }
+  return table;
+}
+
+}  // namespace detail
+
+/// Current-estimator gain (correction of the predicted state), scaled.
+template <int Size, Scalar S>
+constexpr ScaledGain<Size, S> current_gain(const PoleWeights<Size, S>& weights) noexcept {
+  constexpr auto table = detail::gain_table<Size, detail::TableScalar<S>>();
+  ScaledGain<Size, S> gain{};
+  for (std::size_t r = 0; r < Size; ++r) {
+    // From the smallest term up: for small omega_o T the b_j fall quickly with j.
+    S sum = weights[Size] * S(table[r][Size]);
+    for (std::size_t j = Size - 1; j > r; --j) sum = sum + weights[j] * S(table[r][j]);
+    gain[r] = sum;
+  }
+  return gain;
+}
+
+/// Gain of the predictor form z[k+1] = Phi z[k] + Gamma u + l (y - z_1[k]), scaled: l = Phi k.
+template <int Size, Scalar S>
+constexpr ScaledGain<Size, S> predictor_gain(const PoleWeights<Size, S>& weights) noexcept {
+  ScaledGain<Size, S> gain = current_gain<Size, S>(weights);
+  for (std::size_t pass = 0; pass + 1 < Size; ++pass) {
+    for (std::size_t row = Size - 1; row-- > pass;) gain[row] = gain[row] + gain[row + 1];
+  }
+  return gain;
+}
+
+/// A scaled gain in physical units: r! / T^r k_r. @param sample_time T, s
+template <int Size, Scalar S>
+Vector<S, Size> physical_gain(const ScaledGain<Size, S>& scaled, const S& sample_time) {
+  return ScaledChain<Size - 1, S, 1>::physical(scaled, S(S(1.0) / sample_time));
+}
+
+/// A physical gain in scaled form, for a gain law written in physical units. @param sample_time T,
+/// s
+template <int Size, Scalar S>
+ScaledGain<Size, S> scaled_gain(const Vector<S, Size>& gain, const S& sample_time) {
+  return ScaledChain<Size - 1, S, 1>::scaled(gain, sample_time);
+}
+
+/// All N poles of the sampled error at rho = exp(-omega_o T), kept as the contraction 1 - rho.
+template <int Size, Scalar S>
+struct EqualSampledPoles {
+  S contraction{};  ///< a = 1 - rho, in (0, 1]
+
+  /// @param bandwidth omega_o, rad/s @param sample_time T, s
+  static EqualSampledPoles from_bandwidth(const S& bandwidth, const S& sample_time) noexcept {
+    using std::expm1;
+    return {-expm1(-(bandwidth * sample_time))};
+  }
+
+  /// The poles for `samples` sample times in one: rho^samples. No exponential; log2 steps.
+  [[nodiscard]] constexpr EqualSampledPoles power(unsigned samples) const noexcept {
+    S base = contraction;
+    S result(0.0);
+    for (; samples != 0; samples >>= 1u) {
+      // 1 - (1-a)(1-b), without the cancellation.
+      if ((samples & 1u) != 0) result = result + (S(1.0) - result) * base;
+      base = base + (S(1.0) - base) * base;
+    }
+    return {result};
+  }
+
+  [[nodiscard]] constexpr PoleWeights<Size, S> weights() const noexcept {
+    const S decay = S(1.0) - contraction;
+    PoleWeights<Size, S> weights{};
+    S power(1.0);
+    for (int j = 0; j <= Size; ++j) {
+      weights[static_cast<std::size_t>(j)] = S(binomial(Size, j)) * power;
+      power = power * contraction;
+    }
+    power = S(1.0);
+    for (int j = Size; j >= 0; --j) {
+      weights[static_cast<std::size_t>(j)] = weights[static_cast<std::size_t>(j)] * power;
+      power = power * decay;
+    }
+    return weights;
+  }
+};
+
+/// Any set of poles of the sampled error, kept as contractions 1 - rho_i. Complex poles come with
+/// their conjugates.
+template <int Size, PlainScalar S>
+struct SampledPoleSet {
+  Array<std::complex<S>, Size> contractions{};  ///< a_i = 1 - rho_i
+
+  /// From continuous-time poles p_i (1/s): rho_i = exp(p_i T).
+  static SampledPoleSet from_continuous(const Array<std::complex<S>, Size>& poles,
+                                        S sample_time) noexcept {
+    SampledPoleSet set;
+    for (std::size_t i = 0; i < Size; ++i) {
+      // 1 - e^x cos(phi) = -expm1(x) + 2 e^x sin^2(phi/2): no cancellation for small T.
+      const S x = poles[i].real() * sample_time;
+      const S phi = poles[i].imag() * sample_time;
+      const S half_sine = std::sin(phi / 2);
+      set.contractions[i] = {-std::expm1(x) + 2 * std::exp(x) * half_sine * half_sine,
+                             -std::exp(x) * std::sin(phi)};
+    }
+    return set;
+  }
+
+  /// From poles rho_i in the z-plane.
+  static SampledPoleSet from_sampled(const Array<std::complex<S>, Size>& poles) noexcept {
+    SampledPoleSet set;
+    for (std::size_t i = 0; i < Size; ++i) set.contractions[i] = S(1) - poles[i];
+    return set;
+  }
+
+  /// The poles for `samples` sample times in one: rho_i^samples.
+  [[nodiscard]] SampledPoleSet power(unsigned samples) const noexcept {
+    SampledPoleSet set;
+    for (std::size_t i = 0; i < Size; ++i) {
+      std::complex<S> base = contractions[i];
+      std::complex<S> result(0);
+      for (unsigned rest = samples; rest != 0; rest >>= 1u) {
+        if ((rest & 1u) != 0) result += (S(1) - result) * base;
+        base += (S(1) - base) * base;
+      }
+      set.contractions[i] = result;
+    }
+    return set;
+  }
+
+  [[nodiscard]] PoleWeights<Size, S> weights() const noexcept {
+    Array<std::complex<S>, Size + 1> product{};
+    product[0] = S(1);
+    for (std::size_t i = 0; i < Size; ++i) {
+      const std::complex<S> decay = S(1) - contractions[i];
+      for (std::size_t j = i + 1; j > 0; --j) {
+        product[j] = product[j] * decay + product[j - 1] * contractions[i];
+      }
+      product[0] *= decay;
+    }
+    PoleWeights<Size, S> weights{};
+    for (std::size_t j = 0; j <= Size; ++j) weights[j] = product[j].real();
+    return weights;
+  }
+};
+
+}  // namespace esokit

@@ -1,0 +1,113 @@
+/// @file
+/// The sampled chain in Nordsieck scaling, the form in which the observers compute.
+#pragma once
+
+#include <esokit/core/matrix.hpp>
+#include <esokit/core/unroll.hpp>
+#include <esokit/model/integrator_chain.hpp>
+
+namespace esokit {
+
+/// States x_r = T^r z_r / r!, the Taylor coefficients of y over one sample (Nordsieck vector).
+///
+/// In this scaling Phi is Pascal's triangle, Phi_rj = C(j, r): a prediction is N (N-1) / 2
+/// additions of small multiples (for N = 3 no multiplication at all), exact but for rounding; the
+/// gains are dimensionless and depend on omega_o T alone; and nothing overflows float for small T
+/// (an unscaled gain at T = 1e-4 s, N = 12 is 1e44).
+template <int Order, Scalar ScalarType = double, int Extension = 1>
+struct ScaledChain : ChainSize<Order, Extension> {
+  using ChainSize<Order, Extension>::size;
+  using State = Array<ScalarType, size>;
+  using Estimate = Vector<ScalarType, size>;
+
+  /// Scaled effect of a unit input: b0 T^n / n!. Times u it adds to the scaled disturbance
+  /// T^n d / n!, because the chain is driven by d + b0 u.
+  static constexpr ScalarType scaled_input_gain(const ScalarType& input_gain,
+                                                const ScalarType& sample_time) noexcept {
+    ScalarType gain = input_gain;
+    for (int i = 1; i <= Order; ++i) gain = gain * sample_time / detail::constant<ScalarType>(i);
+    return gain;
+  }
+
+  /// b0 back from the scaled input gain. @param rate 1/T, 1/s
+  static constexpr ScalarType input_gain(const ScalarType& scaled_gain,
+                                         const ScalarType& rate) noexcept {
+    return physical<Order>(scaled_gain, rate);
+  }
+
+  /// Phi x + Gamma u: one sample ahead. @param drive scaled_input_gain * u
+  [[nodiscard]] ESOKIT_INLINE static constexpr State predict(const State& x,
+                                                             const ScalarType& drive) noexcept {
+    State next;
+    const ScalarType driven = std::get<Order>(x) + drive;
+    detail::unroll<size>([&](auto row) ESOKIT_INLINE_LAMBDA {
+      ScalarType sum = std::get<row>(x);
+      detail::unroll<size - 1 - row>([&](auto k) ESOKIT_INLINE_LAMBDA {
+        constexpr int column = row + 1 + k;
+        constexpr double weight = binomial(column, row);
+        ScalarType term = std::get<column>(x);
+        if constexpr (row < Order && column == Order) term = driven;
+        if constexpr (weight == 2.0) {
+          term = term + term;
+        } else if constexpr (weight != 1.0) {
+          term = detail::constant<ScalarType>(weight) * term;
+        }
+        sum = sum + term;
+      });
+      std::get<row>(next) = sum;
+    });
+    return next;
+  }
+
+  /// y^(Row) in physical units from its scaled state. @param rate 1/T, 1/s
+  ///
+  /// Multiplied up in steps: T^-Row itself may not fit the scalar where the estimate does.
+  template <int Row>
+  [[nodiscard]] ESOKIT_INLINE static constexpr ScalarType physical(
+      const ScalarType& scaled, const ScalarType& rate) noexcept {
+    ScalarType value = scaled;
+    detail::unroll<Row>([&](auto j) ESOKIT_INLINE_LAMBDA {
+      constexpr double weight = static_cast<double>(Row - j);
+      value = value * (detail::constant<ScalarType>(weight) * rate);
+    });
+    return value;
+  }
+
+  /// All estimates (y, .., y^(n-1), d, .., d^(m-1)) in physical units. @param rate 1/T, 1/s
+  [[nodiscard]] static Estimate physical(const State& x, const ScalarType& rate) noexcept {
+    Estimate estimate;
+    detail::unroll<size>(
+        [&](auto row) { estimate(Eigen::Index{row}) = physical<row>(std::get<row>(x), rate); });
+    return estimate;
+  }
+
+  /// Scaled state from estimates in physical units. @param sample_time T, s
+  [[nodiscard]] static State scaled(const Estimate& estimate,
+                                    const ScalarType& sample_time) noexcept {
+    State x;
+    detail::unroll<size>([&](auto row) {
+      ScalarType value = estimate(Eigen::Index{row});
+      detail::unroll<row>([&](auto j) ESOKIT_INLINE_LAMBDA {
+        constexpr double weight = static_cast<double>(j + 1);
+        value = value * (sample_time / detail::constant<ScalarType>(weight));
+      });
+      std::get<row>(x) = value;
+    });
+    return x;
+  }
+
+  /// A number that is finite only if every estimate is finite in physical units: their sum, with
+  /// rates. Horner, so N - 1 multiply-adds; its value has no meaning.
+  [[nodiscard]] ESOKIT_INLINE static constexpr ScalarType finite_probe(
+      const State& x, const ScalarType& rate) noexcept {
+    ScalarType probe = std::get<size - 1>(x);
+    detail::unroll<size - 1>([&](auto k) ESOKIT_INLINE_LAMBDA {
+      constexpr int row = size - 2 - k;
+      constexpr double weight = static_cast<double>(row + 1);
+      probe = probe * (detail::constant<ScalarType>(weight) * rate) + std::get<row>(x);
+    });
+    return probe;
+  }
+};
+
+}  // namespace esokit

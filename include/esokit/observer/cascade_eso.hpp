@@ -1,0 +1,199 @@
+/// @file
+/// CascadeEso: p linear extended state observers in a row (K. Lakomy, R. Madonski, ISA Transactions
+/// 109 (2021) 1-10).
+#pragma once
+
+#include <esokit/observer/constant_gain.hpp>
+#include <esokit/observer/continuous_observer.hpp>
+#include <esokit/observer/predictor_corrector.hpp>
+#include <optional>
+
+namespace esokit {
+
+/// Config of CascadeEso by bandwidths or by a pole set per level.
+template <int Size, int Levels, Scalar S, class Placement>
+struct CascadeEsoConfig;
+
+template <int Size, int Levels, Scalar S>
+struct CascadeEsoConfig<Size, Levels, S, EqualPoles> {
+  S observer_bandwidth{};  ///< omega_o1 of level 1, rad/s
+  S bandwidth_factor{};    ///< alpha > 1: omega_oi = alpha omega_o(i-1); left out for one level
+  std::optional<Array<S, Levels>>
+      level_bandwidths{};  ///< omega_oi, rad/s, instead of the two above
+  S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
+  S sample_time{};         ///< T, s
+  int max_gap = 100;       ///< missing samples that a correction may bridge before it restarts
+};
+
+template <int Size, int Levels, PlainScalar S>
+struct CascadeEsoConfig<Size, Levels, S, PoleSet> {
+  Array<Array<std::complex<S>, Size>, Levels> level_poles{};  ///< p_i of each level, 1/s
+  S input_gain{};     ///< b0, unit of y^(n) per unit of u; not zero
+  S sample_time{};    ///< T, s
+  int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts
+};
+
+/// Config of ContinuousCascadeEso: the same without the sampling.
+template <int Size, int Levels, Scalar S, class Placement>
+struct ContinuousCascadeEsoConfig;
+
+template <int Size, int Levels, Scalar S>
+struct ContinuousCascadeEsoConfig<Size, Levels, S, EqualPoles> {
+  S observer_bandwidth{};  ///< omega_o1 of level 1, rad/s
+  S bandwidth_factor{};    ///< alpha > 1: omega_oi = alpha omega_o(i-1); left out for one level
+  std::optional<Array<S, Levels>>
+      level_bandwidths{};  ///< omega_oi, rad/s, instead of the two above
+  S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero
+};
+
+template <int Size, int Levels, PlainScalar S>
+struct ContinuousCascadeEsoConfig<Size, Levels, S, PoleSet> {
+  Array<Array<std::complex<S>, Size>, Levels> level_poles{};  ///< p_i of each level, 1/s
+  S input_gain{};  ///< b0, unit of y^(n) per unit of u; not zero
+};
+
+namespace detail {
+
+/// The pole specs of the levels, and what to call them in an error.
+template <class Spec, int Levels>
+struct LevelSpecs {
+  Array<Spec, Levels> specs{};
+  const char* field = "";
+  bool indexed = true;
+};
+
+template <class Placement, int Size, int Levels, Scalar S, class Config>
+Expected<LevelSpecs<typename Placement::template Spec<Size, S>, Levels>, Error<S>> level_specs(
+    const Config& config) {
+  using Specs = LevelSpecs<typename Placement::template Spec<Size, S>, Levels>;
+  if constexpr (requires { config.level_poles; }) {
+    return Specs{config.level_poles, "level_poles"};
+  } else {
+    const auto given = [](const S& value) {
+      return !all(is_finite(value)) || all(magnitude(value) > S(0.0));
+    };
+    if (config.level_bandwidths) {
+      constexpr const char* rule = "must be left out where level_bandwidths is given";
+      if (given(config.observer_bandwidth)) {
+        return Error<S>{"observer_bandwidth", config.observer_bandwidth, rule};
+      }
+      if (given(config.bandwidth_factor)) {
+        return Error<S>{"bandwidth_factor", config.bandwidth_factor, rule};
+      }
+      return Specs{*config.level_bandwidths, "level_bandwidths"};
+    }
+    Specs levels{{}, "observer_bandwidth", false};
+    if (auto ok = check_positive("observer_bandwidth", config.observer_bandwidth); !ok) {
+      return ok.error();
+    }
+    if (Levels > 1 || given(config.bandwidth_factor)) {
+      if (auto ok = check_above("bandwidth_factor", config.bandwidth_factor, S(1.0)); !ok) {
+        return ok.error();
+      }
+    }
+    S bandwidth = config.observer_bandwidth;
+    for (S& spec : levels.specs) {
+      spec = bandwidth;
+      bandwidth = bandwidth * config.bandwidth_factor;
+    }
+    return levels;
+  }
+}
+
+/// One law a level, each made by `make_law(field, spec, index)`.
+template <class Law, class Placement, int Size, int Levels, Scalar S, class Config, class MakeLaw>
+Expected<Array<Law, Levels>, Error<S>> level_laws(const Config& config, MakeLaw&& make_law) {
+  const auto levels = level_specs<Placement, Size, Levels, S>(config);
+  if (!levels) return levels.error();
+  // Laws have no empty state, so the array is filled by its first law and then overwritten.
+  std::optional<Array<Law, Levels>> laws;
+  for (int i = 0; i < Levels; ++i) {
+    const auto law = make_law(levels->field, levels->specs[static_cast<std::size_t>(i)],
+                              levels->indexed ? i : -1);
+    if (!law) return law.error();
+    if (!laws) {
+      laws = [&]<int... I>(std::integer_sequence<int, I...>) {
+        return Array<Law, Levels>{((void)I, *law)...};
+      }
+      (std::make_integer_sequence<int, Levels>{});
+    }
+    (*laws)[static_cast<std::size_t>(i)] = *law;
+  }
+  return *laws;
+}
+
+}  // namespace detail
+
+/// Cascade extended state observer of a plant y^(n) = d + b0 u, sampled exactly.
+///
+/// Level 1 sees the measurement, level i the corrected output of level i - 1 and u plus the
+/// disturbance found so far; equations (23), (24). Only level 1, the slowest, sees the measurement
+/// noise. States are taken from the last level, the disturbance is the sum of all levels'. Stable
+/// for every omega_oi T > 0; one level is LinearEso. Error-based use: feed e = y_d - y as the
+/// measurement and give -b0 as input_gain.
+///
+/// @tparam Order n @tparam Levels p @tparam S scalar @tparam Extension m
+/// @tparam Placement EqualPoles (config by bandwidths) or PoleSet (config by level_poles)
+template <int Order, int Levels, Scalar S = double, int Extension = 1, class Placement = EqualPoles>
+class CascadeEso
+    : public PredictorCorrector<Order, S, Extension, ConstantGain<Order + Extension, S, Placement>,
+                                Levels> {
+  using Law = ConstantGain<Order + Extension, S, Placement>;
+  using Base = PredictorCorrector<Order, S, Extension, Law, Levels>;
+
+ public:
+  using Config = CascadeEsoConfig<Base::size, Levels, S, Placement>;
+
+  /// @return the observer at rest in zero, or an error that names the field
+  static Expected<CascadeEso, Error<S>> make(const Config& config) {
+    const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
+    if (auto ok = Base::check_chain(chain); !ok) return ok.error();
+    const auto laws = detail::level_laws<Law, Placement, Base::size, Levels, S>(
+        config, [&](const char* field, const auto& spec, int index) {
+          return Law::make(field, spec, config.sample_time, index);
+        });
+    if (!laws) return laws.error();
+    return CascadeEso(chain, *laws);
+  }
+
+  /// New settings while running: the estimates of all levels are kept, a change of b0 is moved into
+  /// the disturbance of level 1. A refused config changes nothing.
+  Check<S> retune(const Config& config) {
+    auto fresh = make(config);
+    if (!fresh) return fresh.error();
+    return this->adopt(*fresh);
+  }
+
+ private:
+  CascadeEso(const ChainConfig<S>& chain, const typename Base::Laws& laws) noexcept
+      : Base(chain, laws) {}
+};
+
+/// CascadeEso as an ODE, equations (23), (24), for simulation.
+template <int Order, int Levels, Scalar S = double, int Extension = 1, class Placement = EqualPoles>
+class ContinuousCascadeEso
+    : public ContinuousObserver<Order, S, Extension,
+                                ContinuousConstantGain<Order + Extension, S, Placement>, Levels> {
+  using Law = ContinuousConstantGain<Order + Extension, S, Placement>;
+  using Base = ContinuousObserver<Order, S, Extension, Law, Levels>;
+
+ public:
+  using Config = ContinuousCascadeEsoConfig<Base::size, Levels, S, Placement>;
+
+  /// @return the observer's equations, or an error that names the field
+  static Expected<ContinuousCascadeEso, Error<S>> make(const Config& config) {
+    if (auto ok = check_nonzero("input_gain", config.input_gain); !ok) return ok.error();
+    const auto laws = detail::level_laws<Law, Placement, Base::size, Levels, S>(
+        config, [](const char* field, const auto& spec, int index) {
+          return Law::make(field, spec, index);
+        });
+    if (!laws) return laws.error();
+    return ContinuousCascadeEso(config.input_gain, *laws);
+  }
+
+ private:
+  ContinuousCascadeEso(const S& input_gain, const typename Base::Laws& laws)
+      : Base(input_gain, laws) {}
+};
+
+}  // namespace esokit

@@ -1,0 +1,90 @@
+/// @file
+/// The constant gain law of the linear observers, sampled and continuous.
+#pragma once
+
+#include <esokit/design/placement.hpp>
+#include <esokit/observer/gain_law.hpp>
+
+namespace esokit {
+
+/// Constant gain from a placement, with the gain for M T after a gap of M samples.
+template <int Size, Scalar S, class Placement = EqualPoles>
+class ConstantGain {
+ public:
+  using Spec = typename Placement::template Spec<Size, S>;
+
+  /// @param field name of the config member that `spec` came from, for the error
+  /// @param spec poles of the error, checked by the placement
+  /// @param sample_time T, s; checked by the chain
+  static Expected<ConstantGain, Error<S>> make(const char* field, const Spec& spec,
+                                               const S& sample_time, int index = -1) {
+    if (auto ok = Placement::template check<Size, S>(field, spec, index); !ok) return ok.error();
+    ConstantGain law;
+    law.poles_ = Placement::template sample<Size, S>(spec, sample_time);
+    law.gain_ = current_gain<Size, S>(law.poles_.weights());
+    // The last gain is prod(1 - rho_i) / (N-1)!, the smallest one for slow poles.
+    if (auto ok = check_representable(
+            field, Placement::template representative<Size, S>(spec), law.gain_[Size - 1],
+            "times sample_time gives a gain that the scalar cannot hold", index);
+        !ok) {
+      return ok.error();
+    }
+    return law;
+  }
+
+  [[nodiscard]] constexpr const ScaledGain<Size, S>& gain(const S&) const noexcept { return gain_; }
+
+  [[nodiscard]] constexpr const ScaledGain<Size, S>& gain_before_measurement() const noexcept {
+    return gain_;
+  }
+
+  /// Gain that puts the poles of the step over `samples` T at rho_i^samples, in the scaling of T.
+  [[nodiscard]] ScaledGain<Size, S> gap_gain(const S&, unsigned samples) const noexcept {
+    ScaledGain<Size, S> gain = current_gain<Size, S>(poles_.power(samples).weights());
+    const S rate = S(1.0) / S(static_cast<double>(samples));
+    S factor(1.0);
+    for (std::size_t r = 1; r < Size; ++r) {
+      factor = factor * rate;
+      gain[r] = gain[r] * factor;
+    }
+    return gain;
+  }
+
+ private:
+  ConstantGain() = default;
+
+  ScaledGain<Size, S> gain_{};
+  typename Placement::template Sampled<Size, S> poles_{};
+};
+
+/// Constant gain of a continuous observer, in physical units.
+template <int Size, Scalar S, class Placement = EqualPoles>
+class ContinuousConstantGain {
+ public:
+  using Spec = typename Placement::template Spec<Size, S>;
+
+  /// @param field name of the config member that `spec` came from, for the error
+  static Expected<ContinuousConstantGain, Error<S>> make(const char* field, const Spec& spec,
+                                                         int index = -1) {
+    if (auto ok = Placement::template check<Size, S>(field, spec, index); !ok) return ok.error();
+    ContinuousConstantGain law;
+    law.gain_ = Placement::template gain<Size, S>(spec);
+    if (auto ok = check_representable(field, Placement::template representative<Size, S>(spec),
+                                      law.gain_(Size - 1),
+                                      "gives a gain that the scalar cannot hold", index);
+        !ok) {
+      return ok.error();
+    }
+    return law;
+  }
+
+  /// l, N x 1, row i in 1/s^(i+1).
+  [[nodiscard]] const Vector<S, Size>& gain(const S&, const S&) const noexcept { return gain_; }
+
+ private:
+  ContinuousConstantGain() = default;
+
+  Vector<S, Size> gain_;
+};
+
+}  // namespace esokit

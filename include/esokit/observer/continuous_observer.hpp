@@ -1,0 +1,97 @@
+/// @file
+/// The continuous-time observer as an ODE, for simulation the way the papers do it.
+#pragma once
+
+#include <esokit/core/expected.hpp>
+#include <esokit/core/matrix.hpp>
+#include <esokit/core/unroll.hpp>
+#include <esokit/design/check.hpp>
+#include <esokit/model/integrator_chain.hpp>
+#include <esokit/observer/gain_law.hpp>
+
+namespace esokit {
+
+/// z' = A z + B u + l(t, e) e on a row of `Levels` chains; the definition only, the state is the
+/// caller's, to be stacked with that of a plant.
+///
+/// As in PredictorCorrector, level i holds (x_i, D_i) with D_i the sum of the disturbances of the
+/// levels 1..i; its innovation is e_1 = y - x_1, e_i = x_{i-1} - x_i (first elements).
+/// @tparam Order n @tparam Extension m @tparam Law ContinuousGainLaw @tparam Levels p
+template <int Order, Scalar S, int Extension, class Law, int Levels = 1>
+requires ContinuousGainLaw<Law, Order + Extension, S>
+class ContinuousObserver {
+ public:
+  static constexpr int order = Order;
+  static constexpr int extension = Extension;
+  static constexpr int size = ChainSize<Order, Extension>::size;
+  static constexpr int levels = Levels;
+  static constexpr int states = Levels * size;  ///< N p
+  using scalar_type = S;
+  using Estimate = Vector<S, size>;  ///< (y, .., y^(n-1), d, .., d^(m-1))
+  using State = Vector<S, states>;   ///< the levels one after the other
+  using Laws = Array<Law, Levels>;
+
+  /// @param input_gain b0 @return error if b0 is zero or not finite
+  static Expected<ContinuousObserver, Error<S>> make(const S& input_gain, const Laws& laws) {
+    if (auto ok = check_nonzero("input_gain", input_gain); !ok) return ok.error();
+    return ContinuousObserver(input_gain, laws);
+  }
+
+  /// dz/dt, N p x 1. @param t s @param y measurement @param u input
+  [[nodiscard]] State derivative(const S& t, const State& z, const S& y, const S& u) const {
+    State rate;
+    S measured = y;
+    Vector<S, Extension> found = Vector<S, Extension>::Zero();
+    for (int level = 0; level < Levels; ++level) {
+      const int first = level * size;
+      const S innovation = measured - z(first);
+      const Estimate gain = laws_[static_cast<std::size_t>(level)].gain(t, innovation);
+      for (int i = 0; i < Order; ++i) rate(first + i) = z(first + i + 1) + gain(i) * innovation;
+      rate(first + Order - 1) = rate(first + Order - 1) + input_gain_ * u;
+      for (int i = 0; i < Extension; ++i) {
+        found(i) = found(i) + gain(Order + i) * innovation;
+        const int row = first + Order + i;
+        rate(row) = i + 1 < Extension ? S(z(row + 1) + found(i)) : found(i);
+      }
+      measured = z(first);
+    }
+    return rate;
+  }
+
+  /// To be called at the start of each integration step: the one place where a switched law may
+  /// change its mode.
+  void begin_step([[maybe_unused]] const S& t, [[maybe_unused]] const State& z,
+                  [[maybe_unused]] const S& y) {
+    if constexpr (requires(Law & law) { law.begin_step(t, y); }) {
+      S measured = y;
+      for (int level = 0; level < Levels; ++level) {
+        laws_[static_cast<std::size_t>(level)].begin_step(t, measured - z(level * size));
+        measured = z(level * size);
+      }
+    }
+  }
+
+  /// (y, .., y^(n-1), d, .., d^(m-1)) from the last level.
+  [[nodiscard]] static Estimate estimate(const State& z) { return z.template tail<size>(); }
+
+  /// dhat, unit of y^(n).
+  [[nodiscard]] static S total_disturbance(const State& z) { return z(states - size + Order); }
+
+  /// State with every level at the given estimate.
+  [[nodiscard]] static State state_at(const Estimate& estimate) {
+    return estimate.template replicate<Levels, 1>();
+  }
+
+  /// b0.
+  [[nodiscard]] const S& input_gain() const noexcept { return input_gain_; }
+
+ protected:
+  ContinuousObserver(const S& input_gain, const Laws& laws)
+      : laws_(laws), input_gain_(input_gain) {}
+
+ private:
+  Laws laws_;
+  S input_gain_;
+};
+
+}  // namespace esokit

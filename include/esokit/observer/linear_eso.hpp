@@ -1,0 +1,122 @@
+/// @file
+/// LinearEso: the standard linear extended state observer (LESO); Extension > 1 is the generalised
+/// ESO (GESO).
+#pragma once
+
+#include <esokit/observer/constant_gain.hpp>
+#include <esokit/observer/continuous_observer.hpp>
+#include <esokit/observer/predictor_corrector.hpp>
+
+namespace esokit {
+
+/// Config of LinearEso by bandwidth or by poles.
+template <int Size, Scalar S, class Placement>
+struct LinearEsoConfig;
+
+template <int Size, Scalar S>
+struct LinearEsoConfig<Size, S, EqualPoles> {
+  S observer_bandwidth{};  ///< omega_o, rad/s: all poles at exp(-omega_o T)
+  S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
+  S sample_time{};         ///< T, s
+  int max_gap = 100;       ///< missing samples that a correction may bridge before it restarts
+
+  static constexpr const char* placement_field = "observer_bandwidth";
+  [[nodiscard]] const S& placement() const noexcept { return observer_bandwidth; }
+};
+
+template <int Size, PlainScalar S>
+struct LinearEsoConfig<Size, S, PoleSet> {
+  Array<std::complex<S>, Size> poles{};  ///< p_i, 1/s, left half plane, in conjugate pairs
+  S input_gain{};                        ///< b0, unit of y^(n) per unit of u; not zero
+  S sample_time{};                       ///< T, s
+  int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts
+
+  static constexpr const char* placement_field = "poles";
+  [[nodiscard]] const Array<std::complex<S>, Size>& placement() const noexcept { return poles; }
+};
+
+/// Linear extended state observer of a plant y^(n) = d + b0 u, sampled exactly.
+///
+/// Current-estimator form: the estimate after `update` uses y of the same sample. Stable for every
+/// omega_o T > 0; unbiased for disturbances that are polynomials of degree < m in time.
+/// Error-based use: feed e = y_d - y as the measurement and give -b0 as input_gain.
+///
+/// @tparam Order n, 1..8 @tparam S scalar @tparam Extension m, 1..4
+/// @tparam Placement EqualPoles (config by observer_bandwidth) or PoleSet (config by poles)
+template <int Order, Scalar S = double, int Extension = 1, class Placement = EqualPoles>
+class LinearEso : public PredictorCorrector<Order, S, Extension,
+                                            ConstantGain<Order + Extension, S, Placement>> {
+  using Law = ConstantGain<Order + Extension, S, Placement>;
+  using Base = PredictorCorrector<Order, S, Extension, Law>;
+
+ public:
+  using Config = LinearEsoConfig<Base::size, S, Placement>;
+
+  /// @return the observer at rest in zero, or an error that names the field
+  static Expected<LinearEso, Error<S>> make(const Config& config) {
+    const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
+    // The chain is checked first: the law divides by what it checks.
+    if (auto ok = Base::check_chain(chain); !ok) return ok.error();
+    auto law = Law::make(Config::placement_field, config.placement(), config.sample_time);
+    if (!law) return law.error();
+    return LinearEso(chain, *law);
+  }
+
+  /// New settings while running: the estimate is kept, a change of b0 is moved into the
+  /// disturbance. A refused config changes nothing.
+  Check<S> retune(const Config& config) {
+    auto fresh = make(config);
+    if (!fresh) return fresh.error();
+    return this->adopt(*fresh);
+  }
+
+ private:
+  LinearEso(const ChainConfig<S>& chain, const Law& law) noexcept : Base(chain, {law}) {}
+};
+
+/// Config of ContinuousLinearEso by bandwidth or by poles.
+template <int Size, Scalar S, class Placement>
+struct ContinuousLinearEsoConfig;
+
+template <int Size, Scalar S>
+struct ContinuousLinearEsoConfig<Size, S, EqualPoles> {
+  S observer_bandwidth{};  ///< omega_o, rad/s: all poles at -omega_o
+  S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero
+
+  static constexpr const char* placement_field = "observer_bandwidth";
+  [[nodiscard]] const S& placement() const noexcept { return observer_bandwidth; }
+};
+
+template <int Size, PlainScalar S>
+struct ContinuousLinearEsoConfig<Size, S, PoleSet> {
+  Array<std::complex<S>, Size> poles{};  ///< p_i, 1/s, left half plane, in conjugate pairs
+  S input_gain{};                        ///< b0, unit of y^(n) per unit of u; not zero
+
+  static constexpr const char* placement_field = "poles";
+  [[nodiscard]] const Array<std::complex<S>, Size>& placement() const noexcept { return poles; }
+};
+
+/// LinearEso as an ODE, z' = A z + B u + l (y - z_1), for simulation.
+template <int Order, Scalar S = double, int Extension = 1, class Placement = EqualPoles>
+class ContinuousLinearEso
+    : public ContinuousObserver<Order, S, Extension,
+                                ContinuousConstantGain<Order + Extension, S, Placement>> {
+  using Law = ContinuousConstantGain<Order + Extension, S, Placement>;
+  using Base = ContinuousObserver<Order, S, Extension, Law>;
+
+ public:
+  using Config = ContinuousLinearEsoConfig<Base::size, S, Placement>;
+
+  /// @return the observer's equations, or an error that names the field
+  static Expected<ContinuousLinearEso, Error<S>> make(const Config& config) {
+    if (auto ok = check_nonzero("input_gain", config.input_gain); !ok) return ok.error();
+    auto law = Law::make(Config::placement_field, config.placement());
+    if (!law) return law.error();
+    return ContinuousLinearEso(config.input_gain, *law);
+  }
+
+ private:
+  ContinuousLinearEso(const S& input_gain, const Law& law) : Base(input_gain, {law}) {}
+};
+
+}  // namespace esokit

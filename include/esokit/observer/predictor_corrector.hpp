@@ -1,0 +1,384 @@
+/// @file
+/// The sampled predictor-corrector that every observer is, written once.
+#pragma once
+
+#include <cstdint>
+#include <esokit/core/expected.hpp>
+#include <esokit/core/unroll.hpp>
+#include <esokit/design/check.hpp>
+#include <esokit/model/scaled_chain.hpp>
+#include <esokit/observer/gain_law.hpp>
+#include <esokit/observer/step_status.hpp>
+
+namespace esokit {
+
+/// What every sampled observer's config says about its chain.
+template <Scalar S>
+struct ChainConfig {
+  S input_gain{};     ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
+  S sample_time{};    ///< T, s
+  int max_gap = 100;  ///< missing samples in a row that a correction may bridge, 1 .. 65534;
+                      ///< after more it restarts from the measurement
+};
+
+/// A row of `Levels` chains with one gain law each; one level is the plain observer, more are the
+/// cascade. Level 1 is corrected by y, level i by the corrected output of level i - 1.
+///
+/// Level i keeps (x_i, D_i), its own plant states and the sum D_i of the disturbances that levels
+/// 1..i found. In these coordinates the drive b0 u + sum_{j<i} xi_{j,n+1} of the cascade is part of
+/// the level's own chain, so every level predicts alike, and what a level adds to its disturbance
+/// is added to all above it. With Levels = 1 nothing of this remains.
+///
+/// One instance belongs to one thread. No member allocates, throws or locks after `make`.
+///
+/// @tparam Order n, order of the plant @tparam Extension m, extended states
+/// @tparam Law gain law, see GainLaw @tparam Levels p
+template <int Order, Scalar S, int Extension, class Law, int Levels = 1>
+requires GainLaw<Law, Order + Extension, S>
+class PredictorCorrector {
+  static_assert(Levels >= 1, "esokit: at least one level is needed");
+
+ public:
+  using Chain = ScaledChain<Order, S, Extension>;
+  static constexpr int order = Order;
+  static constexpr int extension = Extension;
+  static constexpr int size = Chain::size;
+  static constexpr int levels = Levels;
+  using scalar_type = S;
+  using Estimate = typename Chain::Estimate;  ///< (y, .., y^(n-1), d, .., d^(m-1)), N x 1
+  using Laws = Array<Law, Levels>;
+
+  /// From chain settings and ready gain laws; the way in for a gain law of your own.
+  /// @return error for input_gain, sample_time or max_gap out of its rule
+  static Expected<PredictorCorrector, Error<S>> make(const ChainConfig<S>& config,
+                                                     const Laws& laws) {
+    if (auto ok = check_chain(config); !ok) return ok.error();
+    return PredictorCorrector(config, laws);
+  }
+
+  /// The same for one level.
+  static Expected<PredictorCorrector, Error<S>> make(const ChainConfig<S>& config,
+                                                     const Law& law) requires(Levels == 1) {
+    return make(config, Laws{law});
+  }
+
+  /// One sample: `predict(u_applied)`, then `correct(y)`.
+  /// @param y measurement at sample k
+  /// @param u_applied input that the actuator held from k - 1 to k, after its limits
+  StepStatus update(S y, S u_applied) noexcept {
+    advance_laws();
+    if constexpr (PlainScalar<S>) {
+      if (gap_ == 0) [[likely]] {
+        // One test for all: a bad y or u makes the new state non-finite. Nothing is kept then, and
+        // the guarded path finds out what it was.
+        const LevelStates predicted = predicted_levels(scaled_input_gain_ * u_applied);
+        Correction step{predicted};
+        if (correct_levels<true>(step, y, 1u) && is_finite(probe(step.states))) [[likely]] {
+          commit(step);
+          applied_input_ = u_applied;
+          return StepStatus::ok;
+        }
+      }
+    }
+    return update_guarded(y, u_applied);
+  }
+
+  /// Time update alone: one sample without a measurement, or the first half of `update`.
+  StepStatus predict(S u_applied) noexcept {
+    advance_laws();
+    return predict_guarded(u_applied);
+  }
+
+  /// Measurement update alone. After a gap it uses the gain for the time since the last correction.
+  StepStatus correct(S y) noexcept {
+    const unsigned elapsed = gap_ > 1 ? gap_ : 1u;
+    if (elapsed > max_gap_ + 1u) [[unlikely]] {
+      if (!all(is_finite(y)) || reset(y) != StepStatus::ok) return StepStatus::measurement_rejected;
+      return StepStatus::restarted;
+    }
+    Correction step{states_};
+    if constexpr (PlainScalar<S>) {
+      if (!correct_levels<false>(step, y, elapsed) || !is_finite(probe(step.states))) {
+        return StepStatus::measurement_rejected;
+      }
+      commit(step);
+      gap_ = 0;
+      return elapsed > 1 ? StepStatus::gap_bridged : StepStatus::ok;
+    } else {
+      correct_levels<false>(step, y, elapsed);
+      const auto good = is_finite(probe(step.states));
+      for (std::size_t i = 0; i < Levels; ++i) {
+        for (std::size_t r = 0; r < size; ++r) {
+          step.states[i][r] = select(good, step.states[i][r], states_[i][r]);
+        }
+        step.innovations[i] = select(good, step.innovations[i], S(0.0));
+      }
+      commit(step);
+      gap_ = 0;
+      return all(good) ? StepStatus::ok : StepStatus::measurement_rejected;
+    }
+  }
+
+  /// All estimates in physical units, after the last step.
+  [[nodiscard]] Estimate estimate() const noexcept {
+    return Chain::physical(states_.back(), rate_);
+  }
+
+  /// Estimate of y^(Row), or of d^(Row - n) for Row >= n.
+  template <int Row>
+  [[nodiscard]] constexpr S estimate() const noexcept {
+    static_assert(Row >= 0 && Row < size, "esokit: no such estimate");
+    return Chain::template physical<Row>(std::get<Row>(states_.back()), rate_);
+  }
+
+  /// Estimate of level `level` = 0 .. p - 1 of a cascade: its plant states, and the disturbance
+  /// that it and the levels below it found.
+  [[nodiscard]] Estimate level_estimate(int level) const noexcept {
+    return Chain::physical(states_[static_cast<std::size_t>(level)], rate_);
+  }
+
+  /// dhat, unit of y^(n).
+  [[nodiscard]] constexpr S total_disturbance() const noexcept { return estimate<Order>(); }
+
+  /// y - z_1 of the last correction, with the predicted z_1 (of level 1).
+  [[nodiscard]] constexpr const S& innovation() const noexcept { return innovation_; }
+
+  /// Predictions since the last correction; 0 when up to date.
+  [[nodiscard]] constexpr int missed() const noexcept { return gap_; }
+
+  /// Input that the last prediction used.
+  [[nodiscard]] constexpr const S& applied_input() const noexcept { return applied_input_; }
+
+  /// b0.
+  [[nodiscard]] constexpr S input_gain() const noexcept {
+    return Chain::input_gain(scaled_input_gain_, rate_);
+  }
+
+  /// T, s.
+  [[nodiscard]] constexpr S sample_time() const noexcept { return S(1.0) / rate_; }
+
+  /// Starts anew at (y, 0, .., 0). A y that is not finite changes nothing and is reported.
+  StepStatus reset(S y) noexcept {
+    typename Chain::State state{};
+    for (S& x : state) x = S(0.0);
+    state[0] = y;
+    return reset_scaled(state);
+  }
+
+  /// Starts anew at a given estimate, N x 1, physical units. A state that is not finite changes
+  /// nothing and is reported.
+  StepStatus reset(const Estimate& state) noexcept {
+    return reset_scaled(Chain::scaled(state, sample_time()));
+  }
+
+ protected:
+  PredictorCorrector(const ChainConfig<S>& config, const Laws& laws) noexcept
+      : laws_(laws),
+        scaled_input_gain_(Chain::scaled_input_gain(config.input_gain, config.sample_time)),
+        rate_(S(1.0) / config.sample_time),
+        max_gap_(static_cast<std::uint16_t>(config.max_gap)) {
+    for (auto& state : states_) {
+      for (S& x : state) x = S(0.0);
+    }
+  }
+
+  static Check<S> check_chain(const ChainConfig<S>& config) {
+    if (auto ok = check_nonzero("input_gain", config.input_gain); !ok) return ok;
+    if (auto ok = check_positive("sample_time", config.sample_time); !ok) return ok;
+    if (auto ok =
+            check_representable("sample_time", config.sample_time, S(S(1.0) / config.sample_time),
+                                "has an inverse that the scalar cannot hold");
+        !ok) {
+      return ok;
+    }
+    if (auto ok =
+            check_representable("input_gain", config.input_gain,
+                                Chain::scaled_input_gain(config.input_gain, config.sample_time),
+                                "times T^n / n! gives a gain that the scalar cannot hold");
+        !ok) {
+      return ok;
+    }
+    if (config.max_gap < 1 || config.max_gap > 65534) {
+      return Error<S>{"max_gap", S(static_cast<double>(config.max_gap)), "must be 1 .. 65534"};
+    }
+    return {};
+  }
+
+  /// Takes the settings of `fresh` and keeps the estimate: states are rescaled to its sample time,
+  /// and what a change of b0 no longer explains goes into the disturbance,
+  /// dhat += (b0_old - b0_new) u, so that the control does not jump.
+  Check<S> adopt(const PredictorCorrector& fresh) {
+    PredictorCorrector next = fresh;
+    const S ratio = fresh.sample_time() * rate_;
+    const bool same_time = !all(detail::magnitude(S(fresh.rate_ - rate_)) > S(0.0));
+    const S explained = (input_gain() - fresh.input_gain()) * applied_input_;
+    const S moved = Chain::scaled_input_gain(explained, fresh.sample_time());
+    const bool same_gain =
+        same_time &&
+        !all(detail::magnitude(S(fresh.scaled_input_gain_ - scaled_input_gain_)) > S(0.0));
+    for (std::size_t i = 0; i < Levels; ++i) {
+      next.states_[i] = states_[i];
+      S factor(1.0);
+      for (std::size_t r = 1; !same_time && r < size; ++r) {
+        factor = factor * ratio;
+        next.states_[i][r] = next.states_[i][r] * factor;
+      }
+      if (!same_gain) next.states_[i][Order] = next.states_[i][Order] + moved;
+    }
+    if (!all(is_finite(next.probe(next.states_)))) {
+      return Error<S>{"input_gain", fresh.input_gain(), "would make the estimate not finite"};
+    }
+    next.innovation_ = innovation_;
+    next.applied_input_ = applied_input_;
+    next.gap_ = gap_;
+    *this = next;
+    return {};
+  }
+
+ private:
+  using LevelStates = Array<typename Chain::State, Levels>;
+
+  struct Correction {
+    LevelStates states;
+    Array<S, Levels> innovations{};
+  };
+
+  ESOKIT_INLINE constexpr void advance_laws() noexcept {
+    if constexpr (requires(Law & law) { law.advance(); }) {
+      detail::unroll<Levels>([&](auto i) ESOKIT_INLINE_LAMBDA { std::get<i>(laws_).advance(); });
+    }
+  }
+
+  [[nodiscard]] ESOKIT_INLINE constexpr LevelStates predicted_levels(S drive) const noexcept {
+    LevelStates next;
+    detail::unroll<Levels>([&](auto i) ESOKIT_INLINE_LAMBDA {
+      std::get<i>(next) = Chain::predict(std::get<i>(states_), drive);
+    });
+    return next;
+  }
+
+  [[nodiscard]] ESOKIT_INLINE constexpr S probe(const LevelStates& states) const noexcept {
+    S sum = Chain::finite_probe(states[0], rate_);
+    detail::unroll<Levels - 1>([&](auto i) ESOKIT_INLINE_LAMBDA {
+      sum = sum + Chain::finite_probe(std::get<i + 1>(states), rate_);
+    });
+    return sum;
+  }
+
+  [[nodiscard]] constexpr decltype(auto) law_gain(const Law& law, const S& innovation,
+                                                  unsigned elapsed) const noexcept {
+    if constexpr (requires { law.gap_gain(innovation, elapsed); }) {
+      using Gain = ScaledGain<size, S>;
+      return elapsed > 1 ? Gain(law.gap_gain(innovation, elapsed)) : Gain(law.gain(innovation));
+    } else {
+      return law.gain(innovation);
+    }
+  }
+
+  /// Corrects `step.states` in place. False if an innovation is not finite where the law would look
+  /// at it; such a law never sees one.
+  template <bool NominalGain>
+  ESOKIT_INLINE constexpr bool correct_levels(Correction& step, S y,
+                                              unsigned elapsed) const noexcept {
+    constexpr bool law_looks = !PresetGainLaw<Law, size, S>;
+    bool fine = true;
+    S measured = y;
+    Array<S, Extension> found{};
+    detail::unroll<Levels>([&](auto level) ESOKIT_INLINE_LAMBDA {
+      auto& z = std::get<level>(step.states);
+      const S e = measured - std::get<0>(z);
+      std::get<level>(step.innovations) = e;
+      if constexpr (law_looks && PlainScalar<S>) {
+        if (!is_finite(e)) [[unlikely]] {
+          fine = false;
+          return;
+        }
+      }
+      const auto apply = [&](const ScaledGain<size, S>& k) ESOKIT_INLINE_LAMBDA {
+        detail::unroll<Order>([&](auto r) ESOKIT_INLINE_LAMBDA {
+          std::get<r>(z) = std::get<r>(z) + std::get<r>(k) * e;
+        });
+        detail::unroll<Extension>([&](auto r) ESOKIT_INLINE_LAMBDA {
+          constexpr int row = Order + r;
+          if constexpr (level == 0) {
+            std::get<r>(found) = std::get<row>(k) * e;
+          } else {
+            std::get<r>(found) = std::get<r>(found) + std::get<row>(k) * e;
+          }
+          std::get<row>(z) = std::get<row>(z) + std::get<r>(found);
+        });
+      };
+      if constexpr (NominalGain) {
+        apply(std::get<level>(laws_).gain(e));
+      } else {
+        apply(law_gain(std::get<level>(laws_), e, elapsed));
+      }
+      measured = std::get<0>(z);
+    });
+    return fine;
+  }
+
+  ESOKIT_INLINE constexpr void commit(const Correction& step) noexcept {
+    states_ = step.states;
+    innovation_ = step.innovations[0];
+    if constexpr (requires(Law & law, const S& e) { law.accept(e); }) {
+      detail::unroll<Levels>([&](auto i) ESOKIT_INLINE_LAMBDA {
+        std::get<i>(laws_).accept(std::get<i>(step.innovations));
+      });
+    }
+  }
+
+  ESOKIT_COLD StepStatus update_guarded(S y, S u_applied) noexcept {
+    const StepStatus predicted = predict_guarded(u_applied);
+    return predicted | correct(y);
+  }
+
+  StepStatus predict_guarded(S u_applied) noexcept {
+    StepStatus status = StepStatus::ok;
+    if (gap_ < 65535) ++gap_;
+    LevelStates next = predicted_levels(scaled_input_gain_ * u_applied);
+    S input = u_applied;
+    auto good = is_finite(probe(next));
+    if (!all(good)) [[unlikely]] {
+      status = StepStatus::input_rejected;
+      input = select(good, u_applied, applied_input_);
+      next = predicted_levels(scaled_input_gain_ * input);
+      good = is_finite(probe(next));
+      if (!all(good)) {
+        status |= StepStatus::prediction_dropped;
+        for (std::size_t i = 0; i < Levels; ++i) {
+          for (std::size_t r = 0; r < size; ++r) {
+            next[i][r] = select(good, next[i][r], states_[i][r]);
+          }
+        }
+      }
+    }
+    states_ = next;
+    applied_input_ = input;
+    return status;
+  }
+
+  StepStatus reset_scaled(const typename Chain::State& state) noexcept {
+    LevelStates states;
+    for (auto& level : states) level = state;
+    if (!all(is_finite(probe(states)))) return StepStatus::state_rejected;
+    states_ = states;
+    innovation_ = S(0.0);
+    gap_ = 0;
+    if constexpr (requires(Law & law) { law.reset(); }) {
+      for (Law& law : laws_) law.reset();
+    }
+    return StepStatus::ok;
+  }
+
+  LevelStates states_{};
+  Laws laws_;
+  S scaled_input_gain_;
+  S rate_;
+  S innovation_ = S(0.0);
+  S applied_input_ = S(0.0);
+  std::uint16_t gap_ = 0;
+  std::uint16_t max_gap_;
+};
+
+}  // namespace esokit

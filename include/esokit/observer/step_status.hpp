@@ -1,0 +1,35 @@
+/// @file
+/// What a step of an observer reports.
+#pragma once
+
+namespace esokit {
+
+/// Bit flags; `ok` is zero. A pack reports what happened in any of its lanes.
+enum class StepStatus : unsigned char {
+  ok = 0,
+  /// y was NaN, infinite, or so large that the estimate would not be finite: predicted only.
+  measurement_rejected = 1,
+  /// u was NaN, infinite or too large: predicted with the last good u.
+  input_rejected = 2,
+  /// Not even the last good u gave a finite prediction: the state stands still for this step.
+  prediction_dropped = 4,
+  /// Samples were missing before this correction; it used the gain for the whole gap.
+  gap_bridged = 8,
+  /// More samples than `max_gap` were missing: restarted as by reset(y).
+  restarted = 16,
+  /// The state given to a reset was not finite: nothing changed.
+  state_rejected = 32,
+};
+
+constexpr StepStatus operator|(StepStatus a, StepStatus b) noexcept {
+  return static_cast<StepStatus>(static_cast<unsigned char>(a) | static_cast<unsigned char>(b));
+}
+
+constexpr StepStatus& operator|=(StepStatus& a, StepStatus b) noexcept { return a = a | b; }
+
+/// True if `flag` is set in `status`.
+constexpr bool has(StepStatus status, StepStatus flag) noexcept {
+  return (static_cast<unsigned char>(status) & static_cast<unsigned char>(flag)) != 0;
+}
+
+}  // namespace esokit
