@@ -51,6 +51,15 @@ constexpr Check<S> check_positive(const char* field, const S& value, int index =
   return {};
 }
 
+/// Finite and zero or above.
+template <Scalar S>
+constexpr Check<S> check_not_negative(const char* field, const S& value, int index = -1) {
+  if (!all(is_finite(value)) || !all(value >= S(0.0))) {
+    return Error<S>{field, value, "must be finite and not negative", index};
+  }
+  return {};
+}
+
 /// Finite and not zero; either sign.
 template <Scalar S>
 constexpr Check<S> check_nonzero(const char* field, const S& value, int index = -1) {

@@ -128,6 +128,20 @@ struct EqualSampledPoles {
   }
 };
 
+/// Gain of one correction after `samples` sample times, scaled to one sample time: it puts the
+/// poles of the long step at rho_i^samples.
+template <int Size, Scalar S, class Poles>
+constexpr ScaledGain<Size, S> gap_gain(const Poles& poles, unsigned samples) noexcept {
+  ScaledGain<Size, S> gain = current_gain<Size, S>(poles.power(samples).weights());
+  const S rate = S(1.0) / S(static_cast<double>(samples));
+  S factor(1.0);
+  for (std::size_t r = 1; r < Size; ++r) {
+    factor = factor * rate;
+    gain[r] = gain[r] * factor;
+  }
+  return gain;
+}
+
 /// Any set of poles of the sampled error, kept as contractions 1 - rho_i. Complex poles come with
 /// their conjugates.
 template <int Size, PlainScalar S>

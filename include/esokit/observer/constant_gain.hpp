@@ -40,14 +40,7 @@ class ConstantGain {
 
   /// Gain that puts the poles of the step over `samples` T at rho_i^samples, in the scaling of T.
   [[nodiscard]] ScaledGain<Size, S> gap_gain(const S&, unsigned samples) const noexcept {
-    ScaledGain<Size, S> gain = current_gain<Size, S>(poles_.power(samples).weights());
-    const S rate = S(1.0) / S(static_cast<double>(samples));
-    S factor(1.0);
-    for (std::size_t r = 1; r < Size; ++r) {
-      factor = factor * rate;
-      gain[r] = gain[r] * factor;
-    }
-    return gain;
+    return esokit::gap_gain<Size, S>(poles_, samples);
   }
 
  private:

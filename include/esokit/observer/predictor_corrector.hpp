@@ -204,6 +204,9 @@ class PredictorCorrector {
     return {};
   }
 
+  [[nodiscard]] constexpr const Laws& laws() const noexcept { return laws_; }
+  [[nodiscard]] constexpr Laws& laws() noexcept { return laws_; }
+
   /// Takes the settings of `fresh` and keeps the estimate: states are rescaled to its sample time,
   /// and what a change of b0 no longer explains goes into the disturbance,
   /// dhat += (b0_old - b0_new) u, so that the control does not jump.

@@ -1,0 +1,136 @@
+#!/usr/bin/env bash
+# Builds and runs the examples, and shows their results on one page. See usage below.
+set -euo pipefail
+
+root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)
+build=$root/build/examples
+
+usage() {
+  cat <<'END'
+usage: examples/run.sh [--out DIR] [--no-install] [NAME...]
+
+Builds the examples, runs them (or only those named: a program or a folder of examples/), and
+writes DIR/index.html with every figure and table beside the paper's numbers.
+
+  --out DIR      where the results go (default: out/ in the repository)
+  --no-install   do not install missing Debian packages, only name them
+  --help         this text
+
+The exit code is non-zero if an example fails, that is, also if it misses a number that must
+reproduce.
+END
+}
+
+out=$root/out
+install_option=()
+wanted=()
+while (($# > 0)); do
+  case $1 in
+    --out)
+      if (($# < 2)) || [[ -z $2 ]]; then
+        echo "run.sh: --out needs a folder" >&2
+        exit 2
+      fi
+      out=$2
+      shift
+      ;;
+    --out=?*) out=${1#--out=} ;;
+    --no-install) install_option=(--no-install) ;;
+    -h | --help)
+      usage
+      exit 0
+      ;;
+    -*)
+      echo "run.sh: unknown option $1" >&2
+      usage >&2
+      exit 2
+      ;;
+    *) wanted+=("$1") ;;
+  esac
+  shift
+done
+[[ $out == /* ]] || out=$PWD/$out
+
+# Which programs: known from the sources, so that a wrong name is refused before anything is built.
+names=()
+folders=()
+for source in "$root"/examples/*/*.cpp; do
+  [[ -e $source ]] || continue
+  folder=$(basename -- "$(dirname -- "$source")")
+  [[ $folder != common ]] || continue
+  names+=("$(basename -- "$source" .cpp)")
+  folders+=("$folder")
+done
+if ((${#names[@]} == 0)); then
+  echo "run.sh: there are no examples in $root/examples" >&2
+  exit 1
+fi
+selected=()
+for want in ${wanted[@]+"${wanted[@]}"}; do
+  found=no
+  for i in "${!names[@]}"; do
+    if [[ $want == "${names[i]}" || $want == "${folders[i]}" ]]; then
+      selected+=("${names[i]}")
+      found=yes
+    fi
+  done
+  if [[ $found == no ]]; then
+    echo "run.sh: there is no example $want; there are:" >&2
+    printf '  %s\n' "${names[@]}" >&2
+    exit 2
+  fi
+done
+((${#selected[@]} > 0)) || selected=("${names[@]}")
+
+# shellcheck source=cmake/debian_packages.sh
+source "$root/cmake/debian_packages.sh"
+require_packages ${install_option[@]+"${install_option[@]}"} \
+  "${ESOKIT_BUILD_PACKAGES[@]}" "${ESOKIT_EXAMPLE_PACKAGES[@]}"
+
+seconds_since() {
+  local microseconds=$((${EPOCHREALTIME/[.,]/} - $1))
+  printf '%d.%d s' $((microseconds / 1000000)) $((microseconds / 100000 % 10))
+}
+
+echo "building the examples in $build"
+started=${EPOCHREALTIME/[.,]/}
+mkdir -p "$build"
+if ! cmake -S "$root" -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release \
+  -DCMAKE_CXX_FLAGS_RELEASE='-O2 -DNDEBUG' -DESOKIT_BUILD_EXAMPLES=ON \
+  >"$build/configure.log" 2>&1; then
+  cat "$build/configure.log" >&2
+  exit 1
+fi
+cmake --build "$build" --target "${selected[@]}" make_index
+echo "built in $(seconds_since "$started")"
+
+failed=()
+number=0
+for name in "${selected[@]}"; do
+  number=$((number + 1))
+  echo
+  echo "[$number/${#selected[@]}] $name"
+  began=${EPOCHREALTIME/[.,]/}
+  status=0
+  "$build/examples/bin/$name" --out "$out" || status=$?
+  if ((status == 0)); then
+    echo "[$number/${#selected[@]}] $name: done in $(seconds_since "$began")"
+  else
+    echo "[$number/${#selected[@]}] $name: FAILED with exit code $status after" \
+      "$(seconds_since "$began")" >&2
+    failed+=("$name")
+  fi
+done
+
+echo
+page=0
+"$build/examples/bin/make_index" --out "$out" >"$build/page.txt" || page=1
+echo "all in $(seconds_since "$started")"
+if ((${#failed[@]} > 0)); then
+  echo "failed: ${failed[*]}" >&2
+fi
+if ((page != 0)); then
+  exit 1
+fi
+echo "results: $(<"$build/page.txt")"
+((${#failed[@]} == 0))

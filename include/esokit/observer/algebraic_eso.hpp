@@ -1,0 +1,280 @@
+/// @file
+/// AlgebraicEso: the frequency-shifting-based (FSB) algebraic observer, a linear ESO whose
+/// bandwidth falls from infinity to lambda (J. Kasac, A. Pender, M. Pranjic, D. Kotarski, Asian
+/// Journal of Control 23 (2021) 2171-2184).
+#pragma once
+
+#include <cmath>
+#include <esokit/observer/algebraic_gain.hpp>
+#include <esokit/observer/continuous_observer.hpp>
+#include <esokit/observer/predictor_corrector.hpp>
+#include <optional>
+
+namespace esokit {
+
+/// Algebraic extended state observer of a plant y^(n) = d + b0 u, sampled exactly.
+///
+/// Deadbeat at first: without noise the estimate is exact from the N-th sample on, whatever the
+/// initial state, so there is no peaking. Then the bandwidth falls as mu(t) = lambda + N q /
+/// (e^{qt} - 1); once it has settled the observer is LinearEso with omega_o = lambda.
+///
+/// Right after a start the estimate follows the noise: the variance of the highest state is about
+/// sigma^2 T (2N-1)! (2N-2)! / ((N-1)!)^2 / t^(2N-1). So estimates are published only after a hold
+/// time; until then `estimate` gives what it was at the start.
+///
+/// Missing samples: among the first N they start the schedule anew (state kept); later ones are
+/// bridged with the gain that the present bandwidth has for the whole gap.
+///
+/// @tparam Order n @tparam S scalar @tparam Extension m
+template <int Order, Scalar S = double, int Extension = 1>
+class AlgebraicEso
+    : public PredictorCorrector<Order, S, Extension, AlgebraicGain<Order + Extension, S>> {
+  using Law = AlgebraicGain<Order + Extension, S>;
+  using Base = PredictorCorrector<Order, S, Extension, Law>;
+
+ public:
+  using Estimate = typename Base::Estimate;
+
+  struct Config {
+    S observer_bandwidth{};  ///< lambda, rad/s: the bandwidth that is left in the end
+    S frequency_shift{};     ///< q >= 0, rad/s: how fast it falls there; 0: as lambda + N/t
+    S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
+    S sample_time{};         ///< T, s
+    /// epsilon >= 0, s: estimates are held this long after a start. Left out it follows from the
+    /// two noise levels below, or without them is N - 1 samples: published from the first sample on
+    /// that can be exact.
+    std::optional<S> hold{};
+    S measurement_noise{};  ///< standard deviation of the noise on y, unit of y
+    S disturbance_noise{};  ///< standard deviation to be tolerated in the highest estimate, d^(m-1)
+    int start_index = 0;  ///< soft start: sample of the schedule to begin with; > 0 is not deadbeat
+    bool allow_vanishing_gain = false;  ///< lambda = 0 with q > 0: the gains go to zero, blind
+    int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts
+  };
+
+  /// @return the observer at rest in zero, or an error that names the field
+  static Expected<AlgebraicEso, Error<S>> make(const Config& config) {
+    const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
+    if (auto ok = Base::check_chain(chain); !ok) return ok.error();
+    if (auto ok = check_not_negative("observer_bandwidth", config.observer_bandwidth); !ok) {
+      return ok.error();
+    }
+    if (auto ok = check_not_negative("frequency_shift", config.frequency_shift); !ok) {
+      return ok.error();
+    }
+    if (!all(config.observer_bandwidth > S(0.0)) && all(config.frequency_shift > S(0.0)) &&
+        !config.allow_vanishing_gain) {
+      return Error<S>{"observer_bandwidth", config.observer_bandwidth,
+                      "with frequency_shift above zero lets the gains vanish; allow_vanishing_gain "
+                      "asks for it"};
+    }
+    if (config.start_index < 0 || config.start_index > 1000000) {
+      return Error<S>{"start_index", S(static_cast<double>(config.start_index)),
+                      "must be 0 .. 1000000"};
+    }
+    const auto hold = hold_samples(config);
+    if (!hold) return hold.error();
+    if (all(config.observer_bandwidth > S(0.0))) {
+      const auto settled =
+          current_gain<Base::size, S>(EqualSampledPoles<Base::size, S>::from_bandwidth(
+                                          config.observer_bandwidth, config.sample_time)
+                                          .weights());
+      if (auto ok =
+              check_representable("observer_bandwidth", config.observer_bandwidth, settled.back(),
+                                  "times sample_time gives a gain that the scalar cannot hold");
+          !ok) {
+        return ok.error();
+      }
+    }
+    const Law law(config.observer_bandwidth, config.frequency_shift, config.sample_time,
+                  static_cast<std::uint32_t>(config.start_index));
+    for (const S& gain : law.gain(S(0.0))) {
+      if (auto ok =
+              check_representable("frequency_shift", config.frequency_shift, gain,
+                                  "times sample_time gives a gain that the scalar cannot hold");
+          !ok) {
+        return ok.error();
+      }
+    }
+    return AlgebraicEso(chain, law, *hold);
+  }
+
+  /// New settings while running: the estimate and the place in the schedule are kept, a change of
+  /// b0 is moved into the disturbance. A refused config changes nothing.
+  Check<S> retune(const Config& config) {
+    auto fresh = make(config);
+    if (!fresh) return fresh.error();
+    std::get<0>(fresh->laws()).resume(age());
+    if (auto ok = this->adopt(*fresh); !ok) return ok;
+    hold_samples_ = fresh->hold_samples_;
+    return {};
+  }
+
+  /// After a known jump (of the disturbance, or of the state): the schedule begins anew, the state
+  /// is kept, and the estimates of this moment are published until the hold time is over.
+  void rearm() noexcept {
+    held_ = estimate();
+    std::get<0>(this->laws()).restart();
+  }
+
+  /// Starts anew at (y, 0, .., 0).
+  StepStatus reset(S y) noexcept { return hold_after(Base::reset(y)); }
+
+  /// Starts anew at a given estimate, N x 1.
+  StepStatus reset(const Estimate& state) noexcept { return hold_after(Base::reset(state)); }
+
+  /// All published estimates in physical units; those of the start during the hold time.
+  [[nodiscard]] Estimate estimate() const noexcept { return holding() ? held_ : Base::estimate(); }
+
+  /// Published estimate of y^(Row), or of d^(Row - n) for Row >= n.
+  template <int Row>
+  [[nodiscard]] S estimate() const noexcept {
+    return holding() ? held_(Row) : Base::template estimate<Row>();
+  }
+
+  /// Published dhat, unit of y^(n).
+  [[nodiscard]] S total_disturbance() const noexcept { return estimate<Order>(); }
+
+  /// The estimate as it is computed, held or not.
+  [[nodiscard]] Estimate raw_estimate() const noexcept { return Base::estimate(); }
+
+  /// True while the published estimates are held.
+  [[nodiscard]] bool holding() const noexcept { return age() <= hold_samples_; }
+
+  /// True once the observer has become LinearEso with bandwidth lambda.
+  [[nodiscard]] bool settled() const noexcept { return std::get<0>(this->laws()).settled(); }
+
+  /// epsilon, s.
+  [[nodiscard]] S hold() const noexcept {
+    return S(static_cast<double>(hold_samples_)) * this->sample_time();
+  }
+
+  /// Samples since the schedule began.
+  [[nodiscard]] std::uint32_t age() const noexcept { return std::get<0>(this->laws()).age(); }
+
+ private:
+  AlgebraicEso(const ChainConfig<S>& chain, const Law& law, std::uint32_t hold_samples) noexcept
+      : Base(chain, {law}), held_(Estimate::Zero()), hold_samples_(hold_samples) {}
+
+  static Expected<std::uint32_t, Error<S>> hold_samples(const Config& config) {
+    using std::ceil;
+    using std::pow;
+    constexpr int size = Base::size;
+    if (auto ok = check_not_negative("measurement_noise", config.measurement_noise); !ok) {
+      return ok.error();
+    }
+    if (auto ok = check_not_negative("disturbance_noise", config.disturbance_noise); !ok) {
+      return ok.error();
+    }
+    const bool noise = all(config.measurement_noise > S(0.0));
+    if (noise != all(config.disturbance_noise > S(0.0))) {
+      return Error<S>{noise ? "disturbance_noise" : "measurement_noise", S(0.0),
+                      "must be given together with the other noise level"};
+    }
+    S seconds(0.0);
+    if (config.hold) {
+      if (auto ok = check_not_negative("hold", *config.hold); !ok) return ok.error();
+      seconds = *config.hold;
+    } else if (noise) {
+      constexpr double factor = factorial(2 * size - 1) * factorial(2 * size - 2) /
+                                (factorial(size - 1) * factorial(size - 1));
+      const S ratio = config.measurement_noise / config.disturbance_noise;
+      seconds = pow(S(S(factor) * config.sample_time * ratio * ratio), S(1.0 / (2 * size - 1)));
+    } else {
+      return std::uint32_t{size - 1};
+    }
+    const S samples = ceil(S(seconds / config.sample_time - S(1e-3)));
+    if (!all(samples < S(1e6))) {
+      return Error<S>{config.hold ? "hold" : "measurement_noise",
+                      config.hold ? *config.hold : config.measurement_noise,
+                      "gives a hold of more than 1e6 samples"};
+    }
+    std::uint32_t count = 0;
+    if constexpr (PlainScalar<S>) {
+      count = static_cast<std::uint32_t>(samples);
+    } else {
+      while (all(S(static_cast<double>(count)) < samples)) ++count;
+    }
+    return count;
+  }
+
+  StepStatus hold_after(StepStatus status) noexcept {
+    if (status == StepStatus::ok) held_ = Base::estimate();
+    return status;
+  }
+
+  Estimate held_;
+  std::uint32_t hold_samples_;
+};
+
+/// Falling-bandwidth gain of the continuous observer: L_j(t) = C(N,j) P_j(t) with P_0 = 1,
+/// P_{j+1} = (lambda + N q v) P_j + q v (1 + v) dP_j/dv, v = 1 / (e^{qt} - 1).
+template <int Size, Scalar S>
+class ContinuousAlgebraicGain {
+ public:
+  /// @param bandwidth lambda >= 0, rad/s @param shift q >= 0, rad/s
+  ContinuousAlgebraicGain(const S& bandwidth, const S& shift)
+      : bandwidth_(bandwidth), shift_(shift) {}
+
+  /// L(t), N x 1, for t > 0 (s); infinite at t = 0.
+  [[nodiscard]] Vector<S, Size> gain(const S& t, const S&) const {
+    using std::expm1;
+    // With w = q v, which is 1/t for q = 0: P_{j+1} = (lambda + N w) P_j + w (q + w) dP_j/dw.
+    const S w = all(shift_ > S(0.0)) ? S(shift_ / expm1(S(shift_ * t))) : S(S(1.0) / t);
+    Array<S, Size + 1> polynomial{};
+    for (S& c : polynomial) c = S(0.0);
+    polynomial[0] = S(1.0);
+    Vector<S, Size> gain;
+    for (int j = 1; j <= Size; ++j) {
+      for (int r = j; r >= 0; --r) {
+        const auto i = static_cast<std::size_t>(r);
+        polynomial[i] = (bandwidth_ + S(static_cast<double>(r)) * shift_) * polynomial[i];
+        if (r > 0) {
+          polynomial[i] = polynomial[i] + S(static_cast<double>(Size + r - 1)) * polynomial[i - 1];
+        }
+      }
+      S value(0.0);
+      for (int r = j; r >= 0; --r) value = value * w + polynomial[static_cast<std::size_t>(r)];
+      gain(j - 1) = S(binomial(Size, j)) * value;
+    }
+    return gain;
+  }
+
+ private:
+  S bandwidth_;
+  S shift_;
+};
+
+/// AlgebraicEso as an ODE, z' = A z + B u + L(t) (y - z_1), for t > 0; see AlgebraicFilter for the
+/// form that is regular at t = 0.
+template <int Order, Scalar S = double, int Extension = 1>
+class ContinuousAlgebraicEso
+    : public ContinuousObserver<Order, S, Extension,
+                                ContinuousAlgebraicGain<Order + Extension, S>> {
+  using Law = ContinuousAlgebraicGain<Order + Extension, S>;
+  using Base = ContinuousObserver<Order, S, Extension, Law>;
+
+ public:
+  struct Config {
+    S observer_bandwidth{};  ///< lambda >= 0, rad/s
+    S frequency_shift{};     ///< q >= 0, rad/s
+    S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero
+  };
+
+  /// @return the observer's equations, or an error that names the field
+  static Expected<ContinuousAlgebraicEso, Error<S>> make(const Config& config) {
+    if (auto ok = check_nonzero("input_gain", config.input_gain); !ok) return ok.error();
+    if (auto ok = check_not_negative("observer_bandwidth", config.observer_bandwidth); !ok) {
+      return ok.error();
+    }
+    if (auto ok = check_not_negative("frequency_shift", config.frequency_shift); !ok) {
+      return ok.error();
+    }
+    return ContinuousAlgebraicEso(config.input_gain,
+                                  Law(config.observer_bandwidth, config.frequency_shift));
+  }
+
+ private:
+  ContinuousAlgebraicEso(const S& input_gain, const Law& law) : Base(input_gain, {law}) {}
+};
+
+}  // namespace esokit
