@@ -260,12 +260,16 @@ class PredictorCorrector {
     return next;
   }
 
+  /// Finite only if all states are finite; see ScaledChain::finite_probe. Levels are added up
+  /// first, which costs less than a probe each and hides nothing: infinities do not cancel.
   [[nodiscard]] ESOKIT_INLINE constexpr S probe(const LevelStates& states) const noexcept {
-    S sum = Chain::finite_probe(states[0], rate_);
+    typename Chain::State sum = std::get<0>(states);
     detail::unroll<Levels - 1>([&](auto i) ESOKIT_INLINE_LAMBDA {
-      sum = sum + Chain::finite_probe(std::get<i + 1>(states), rate_);
+      detail::unroll<size>([&](auto r) ESOKIT_INLINE_LAMBDA {
+        std::get<r>(sum) = std::get<r>(sum) + std::get<r>(std::get<i + 1>(states));
+      });
     });
-    return sum;
+    return Chain::finite_probe(sum, rate_);
   }
 
   [[nodiscard]] constexpr decltype(auto) law_gain(const Law& law, const S& innovation,
