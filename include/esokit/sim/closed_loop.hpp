@@ -1,0 +1,354 @@
+/// @file
+/// Closed loops of a plant, an observer and a control law, the two ways of the library:
+/// ContinuousLoop is the papers' way (one stacked ODE), SampledLoop is the deployment way.
+#pragma once
+
+#include <cmath>
+#include <concepts>
+#include <cstdint>
+#include <esokit/core/expected.hpp>
+#include <esokit/core/matrix.hpp>
+#include <esokit/design/check.hpp>
+#include <esokit/observer/step_status.hpp>
+#include <esokit/sim/plant.hpp>
+#include <esokit/sim/runge_kutta.hpp>
+#include <esokit/sim/signal.hpp>
+#include <limits>
+#include <type_traits>
+#include <utility>
+
+namespace esokit::sim {
+
+/// An observer as an ODE z' = derivative(t, z, y, u), such as ContinuousLinearEso.
+/// `begin_step(t, z, y)` is called at step boundaries, the only place where it may change its mode.
+template <class O>
+concept ContinuousObserverModel = std::copyable<O> &&
+    requires(O& observer, const O& constant, const typename O::State& z,
+             const typename O::scalar_type& s) {
+  { O::states } -> std::convertible_to<int>;
+  { constant.derivative(s, z, s, s) } -> std::same_as<typename O::State>;
+  { constant.estimate(z) } -> std::same_as<typename O::Estimate>;
+  observer.begin_step(s, z, s);
+};
+
+/// An observer as it runs in a controller: one `update(y, u_applied)` a sample.
+template <class O>
+concept SampledObserverModel = std::copyable<O> &&
+    requires(O& observer, const O& constant, const typename O::scalar_type& s) {
+  { observer.update(s, s) } -> std::same_as<StepStatus>;
+  { constant.estimate() } -> std::convertible_to<typename O::Estimate>;
+};
+
+/// Measurement noise of a simulation: `at(k)` is its value during step k, such as HeldNoise.
+template <class N, class ScalarType>
+concept NoiseSource = std::copyable<N> && requires(N& noise, std::int64_t k) {
+  { noise.at(k) } -> std::convertible_to<ScalarType>;
+};
+
+/// What the observer is fed: m(t, y, v) of the output y and the noise v.
+template <class M, class ScalarType>
+concept MeasurementMap = requires(const M& map, const ScalarType& s) {
+  { map(s, s, s) } -> std::convertible_to<ScalarType>;
+};
+
+/// u(t, estimate). It must be pure: the continuous loop calls it at times between steps.
+template <class L, class ScalarType, class Estimate>
+concept ControlFunction = requires(const L& law, const ScalarType& t, const Estimate& estimate) {
+  { law(t, estimate) } -> std::convertible_to<ScalarType>;
+};
+
+/// Output-based form: the measured output, y + v.
+struct MeasuredOutput {
+  template <PlainScalar ScalarType>
+  constexpr ScalarType operator()(ScalarType /*t*/, ScalarType y, ScalarType v) const noexcept {
+    return y + v;
+  }
+};
+
+/// Error-based form: the measured error, y_d(t) - (y + v). The observer then takes the input gain
+/// -b0. `MeasuredError{reference}`.
+template <class Reference>
+struct MeasuredError {
+  Reference reference;  ///< y_d(t), a Signal
+
+  template <PlainScalar ScalarType>
+  requires Signal<Reference, ScalarType>
+  constexpr ScalarType operator()(ScalarType t, ScalarType y, ScalarType v) const noexcept {
+    return reference(t) - (y + v);
+  }
+};
+
+template <class Reference>
+MeasuredError(Reference) -> MeasuredError<Reference>;
+
+/// No measurement noise.
+struct NoNoise {
+  constexpr int at(std::int64_t /*k*/) const noexcept { return 0; }
+};
+
+/// The loop at t = start + k step. Measurement, input and estimate belong together; the input is
+/// the one that acts from t on.
+template <Plant P, class Observer>
+struct LoopSample {
+  using ScalarType = typename P::State::Scalar;
+
+  std::int64_t index{};                    ///< k
+  ScalarType t{};                          ///< s
+  typename P::State plant_state{};         ///< x(t)
+  ScalarType output{};                     ///< y(t), without noise
+  ScalarType measurement{};                ///< what the observer was fed
+  ScalarType input{};                      ///< u
+  typename Observer::Estimate estimate{};  ///< (y, .., d, ..)
+  StepStatus status = StepStatus::ok;      ///< what a sampled observer said of its update
+};
+
+/// How a run ended.
+template <Plant P, class ObserverEnd>
+struct LoopEnd {
+  typename P::State::Scalar t{};    ///< s
+  std::int64_t steps{};             ///< steps carried out
+  typename P::State plant_state{};  ///< x(t)
+  ObserverEnd observer;             ///< its state (continuous), or the observer (sampled)
+  bool completed = true;            ///< false if the callback stopped the run
+};
+
+namespace detail {
+
+/// Finite and `part` times a whole number; that number. Both may be rounded decimals.
+template <PlainScalar ScalarType>
+Expected<std::int64_t, Error<ScalarType>> whole_multiple(const char* field, ScalarType value,
+                                                         ScalarType part, const char* rule) {
+  if (auto check = check_positive(field, value); !check) return check.error();
+  const ScalarType ratio = value / part;
+  const ScalarType whole = std::round(ratio);
+  const ScalarType decimal = static_cast<ScalarType>(1e-9);
+  const ScalarType rounding = std::numeric_limits<ScalarType>::epsilon() * ScalarType{16};
+  const ScalarType tolerance = decimal > rounding ? decimal : rounding;
+  const ScalarType most = static_cast<ScalarType>(std::int64_t{1} << 40u);
+  if (!is_finite(ratio) || !(whole >= ScalarType{1} && whole <= most) ||
+      !(std::abs(ratio - whole) <= tolerance * whole)) {
+    return Error<ScalarType>{
+        .field = field, .value = value, .rule = rule, .limit = part, .has_limit = true};
+  }
+  return static_cast<std::int64_t>(whole);
+}
+
+template <class State>
+auto check_state(const char* field, const State& state) -> Check<typename State::Scalar> {
+  for (int i = 0; i < static_cast<int>(state.size()); ++i) {
+    if (auto check = check_finite(field, state[i], i); !check) return check;
+  }
+  return {};
+}
+
+/// Calls back; true unless the callback returned false.
+template <class Callback, class Sample>
+bool keep_going(Callback& on_sample, const Sample& sample) {
+  if constexpr (std::convertible_to<std::invoke_result_t<Callback&, const Sample&>, bool>) {
+    return static_cast<bool>(on_sample(sample));
+  } else {
+    on_sample(sample);
+    return true;
+  }
+}
+
+}  // namespace detail
+
+/// The papers' way: plant and continuous observer stacked into one ODE and integrated with a fixed
+/// step. Measurement and control are functions of the running state, so they change within a step;
+/// the noise is held over it.
+///
+/// ```
+/// const ContinuousLoop loop{plant, observer, [&](double, const auto& zhat) { return .. }};
+/// auto end = loop.run({.duration = 5.0, .step = 1e-3}, [&](const auto& sample) { .. });
+/// ```
+template <Plant P, ContinuousObserverModel Observer, class Law, class Measurement = MeasuredOutput,
+          class Noise = NoNoise>
+requires ControlFunction<Law, typename P::State::Scalar, typename Observer::Estimate> &&
+    MeasurementMap<Measurement, typename P::State::Scalar> &&
+    NoiseSource<Noise, typename P::State::Scalar>
+struct ContinuousLoop {
+  using ScalarType = typename P::State::Scalar;
+  using Sample = LoopSample<P, Observer>;
+  using End = LoopEnd<P, typename Observer::State>;
+
+  struct Config {
+    ScalarType duration{};    ///< s, a whole multiple of `step`
+    ScalarType step{};        ///< s
+    ScalarType start_time{};  ///< s
+    typename P::State plant_state = P::State::Zero();
+    typename Observer::State observer_state = Observer::State::Zero();
+  };
+
+  P plant;
+  Observer observer;
+  Law law;
+  Measurement measurement{};
+  Noise noise{};
+
+  /// Runs from the config's states; equal runs give equal results. `on_sample(const Sample&)` is
+  /// called at the start of each step and at the end; if it returns a bool, false stops the run.
+  /// @return how it ended, or an error that names the field of the config
+  template <ExplicitRungeKutta Method = RungeKutta4, std::invocable<const Sample&> Callback>
+  Expected<End, Error<ScalarType>> run(const Config& config, Callback&& on_sample) const {
+    if (auto check = check_positive("step", config.step); !check) return check.error();
+    const auto steps = detail::whole_multiple("duration", config.duration, config.step,
+                                              "must be a whole multiple of step, which is");
+    if (!steps) return steps.error();
+    if (auto check = check_finite("start_time", config.start_time); !check) return check.error();
+    if (auto check = detail::check_state("plant_state", config.plant_state); !check)
+      return check.error();
+    if (auto check = detail::check_state("observer_state", config.observer_state); !check)
+      return check.error();
+
+    Observer eso = observer;
+    Noise source = noise;
+    Stacked state;
+    state << config.plant_state, config.observer_state;
+    for (std::int64_t k = 0;; ++k) {
+      const ScalarType t = config.start_time + static_cast<ScalarType>(k) * config.step;
+      const auto v = static_cast<ScalarType>(source.at(k));
+      Sample sample;
+      sample.index = k;
+      sample.t = t;
+      sample.plant_state = plant_part(state);
+      const typename Observer::State z = observer_part(state);
+      sample.output = plant.output(t, sample.plant_state);
+      sample.measurement = static_cast<ScalarType>(measurement(t, sample.output, v));
+      sample.estimate = eso.estimate(z);
+      sample.input = static_cast<ScalarType>(law(t, sample.estimate));
+      const bool stopped = !detail::keep_going(on_sample, sample);
+      if (stopped || k == *steps) return End{t, k, sample.plant_state, z, !stopped};
+
+      eso.begin_step(t, z, sample.measurement);
+      const auto rate = [&](ScalarType time, const Stacked& s) -> Stacked {
+        const typename P::State x = plant_part(s);
+        const typename Observer::State estimate = observer_part(s);
+        const auto u = static_cast<ScalarType>(law(time, eso.estimate(estimate)));
+        const auto m = static_cast<ScalarType>(measurement(time, plant.output(time, x), v));
+        Stacked result;
+        result << plant.derivative(time, x, u), eso.derivative(time, estimate, m, u);
+        return result;
+      };
+      state = sim::step<Method>(rate, t, state, config.step);
+    }
+  }
+
+ private:
+  using Stacked = Vector<ScalarType, P::states + Observer::states>;
+
+  static typename P::State plant_part(const Stacked& state) {
+    return state.template head<P::states>();
+  }
+  static typename Observer::State observer_part(const Stacked& state) {
+    return state.template tail<Observer::states>();
+  }
+};
+
+template <class P, class Observer, class Law>
+ContinuousLoop(P, Observer, Law) -> ContinuousLoop<P, Observer, Law>;
+template <class P, class Observer, class Law, class Measurement>
+ContinuousLoop(P, Observer, Law, Measurement) -> ContinuousLoop<P, Observer, Law, Measurement>;
+template <class P, class Observer, class Law, class Measurement, class Noise>
+ContinuousLoop(P, Observer, Law, Measurement, Noise)
+    -> ContinuousLoop<P, Observer, Law, Measurement, Noise>;
+
+/// The deployment way: at each sample the observer is updated with the measurement and the input
+/// that was held until now, the law is computed once, and its input is held for a sample time,
+/// over which the plant alone is integrated.
+///
+/// A law with limits returns the limited input: what it returns is what the actuator holds.
+template <Plant P, SampledObserverModel Observer, class Law, class Measurement = MeasuredOutput,
+          class Noise = NoNoise>
+requires ControlFunction<Law, typename P::State::Scalar, typename Observer::Estimate> &&
+    MeasurementMap<Measurement, typename P::State::Scalar> &&
+    NoiseSource<Noise, typename P::State::Scalar>
+struct SampledLoop {
+  using ScalarType = typename P::State::Scalar;
+  using Sample = LoopSample<P, Observer>;
+  using End = LoopEnd<P, Observer>;
+
+  struct Config {
+    ScalarType duration{};       ///< s, a whole multiple of `sample_time`
+    ScalarType sample_time{};    ///< T, s; that of the observer
+    int substeps = 1;            ///< integration steps of the plant a sample, 1 or more
+    ScalarType start_time{};     ///< s
+    ScalarType initial_input{};  ///< u that was held before the start
+    typename P::State plant_state = P::State::Zero();
+  };
+
+  P plant;
+  Observer observer;  ///< in the state it has one sample before the start
+  Law law;
+  Measurement measurement{};
+  Noise noise{};
+
+  /// As ContinuousLoop::run; `on_sample` is called once a sample and at the end, after the update.
+  /// The callback sees the samples only, not what the plant does between them.
+  template <ExplicitRungeKutta Method = RungeKutta4, std::invocable<const Sample&> Callback>
+  Expected<End, Error<ScalarType>> run(const Config& config, Callback&& on_sample) const {
+    if (auto check = check_positive("sample_time", config.sample_time); !check)
+      return check.error();
+    if constexpr (requires { observer.sample_time(); }) {
+      const ScalarType own = observer.sample_time();
+      if (!(std::abs(config.sample_time - own) <= static_cast<ScalarType>(1e-6) * own)) {
+        return Error<ScalarType>{.field = "sample_time",
+                                 .value = config.sample_time,
+                                 .rule = "must be that of the observer, which is",
+                                 .limit = own,
+                                 .has_limit = true};
+      }
+    }
+    const auto samples =
+        detail::whole_multiple("duration", config.duration, config.sample_time,
+                               "must be a whole multiple of sample_time, which is");
+    if (!samples) return samples.error();
+    if (config.substeps < 1) {
+      return Error<ScalarType>{.field = "substeps",
+                               .value = static_cast<ScalarType>(config.substeps),
+                               .rule = "must be 1 or more"};
+    }
+    if (auto check = check_finite("start_time", config.start_time); !check) return check.error();
+    if (auto check = check_finite("initial_input", config.initial_input); !check)
+      return check.error();
+    if (auto check = detail::check_state("plant_state", config.plant_state); !check)
+      return check.error();
+
+    End end{config.start_time, 0, config.plant_state, observer, true};
+    Noise source = noise;
+    const ScalarType step = config.sample_time / static_cast<ScalarType>(config.substeps);
+    ScalarType u = config.initial_input;
+    for (std::int64_t k = 0;; ++k) {
+      const ScalarType t = config.start_time + static_cast<ScalarType>(k) * config.sample_time;
+      Sample sample;
+      sample.index = k;
+      sample.t = t;
+      sample.plant_state = end.plant_state;
+      sample.output = plant.output(t, end.plant_state);
+      const auto v = static_cast<ScalarType>(source.at(k));
+      sample.measurement = static_cast<ScalarType>(measurement(t, sample.output, v));
+      sample.status = end.observer.update(sample.measurement, u);
+      sample.estimate = end.observer.estimate();
+      u = static_cast<ScalarType>(law(t, sample.estimate));
+      sample.input = u;
+      end.t = t;
+      end.steps = k;
+      end.completed = detail::keep_going(on_sample, sample);
+      if (!end.completed || k == *samples) return end;
+
+      const auto rate = [&](ScalarType time, const typename P::State& x) ->
+          typename P::State { return plant.derivative(time, x, u); };
+      end.plant_state = integrate<Method>(rate, t, end.plant_state, step, config.substeps);
+    }
+  }
+};
+
+template <class P, class Observer, class Law>
+SampledLoop(P, Observer, Law) -> SampledLoop<P, Observer, Law>;
+template <class P, class Observer, class Law, class Measurement>
+SampledLoop(P, Observer, Law, Measurement) -> SampledLoop<P, Observer, Law, Measurement>;
+template <class P, class Observer, class Law, class Measurement, class Noise>
+SampledLoop(P, Observer, Law, Measurement, Noise)
+    -> SampledLoop<P, Observer, Law, Measurement, Noise>;
+
+}  // namespace esokit::sim

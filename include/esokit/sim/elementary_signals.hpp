@@ -1,0 +1,211 @@
+/// @file
+/// Constant, step, ramp, polynomial and sine with exact derivatives.
+///
+/// A signal that begins at a time is active for t >= time, compared as written: on a grid t = k h a
+/// start of k0 h that is computed in the same way falls on its sample, a decimal one may fall one
+/// sample late.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <esokit/core/expected.hpp>
+#include <esokit/core/unroll.hpp>
+#include <esokit/design/check.hpp>
+#include <esokit/sim/signal.hpp>
+
+namespace esokit::sim {
+
+/// s(t) = value. The default is zero.
+template <PlainScalar ScalarType = double>
+class Constant {
+ public:
+  struct Config {
+    ScalarType value{};  ///< the value at all times
+  };
+
+  constexpr Constant() = default;
+
+  /// Refuses a value that is not finite.
+  static constexpr Expected<Constant, Error<ScalarType>> make(const Config& config) {
+    if (auto check = check_finite("value", config.value); !check) return check.error();
+    return Constant(config);
+  }
+
+  constexpr ScalarType operator()(ScalarType /*t*/) const noexcept { return config_.value; }
+
+  template <int Count>
+  constexpr Array<ScalarType, Count> derivatives(ScalarType /*t*/) const noexcept {
+    static_assert(Count >= 1);
+    return {config_.value};
+  }
+
+ private:
+  explicit constexpr Constant(const Config& config) : config_(config) {}
+
+  Config config_{};
+};
+
+/// s(t) = size for t >= time, else 0; its derivatives are zero.
+template <PlainScalar ScalarType = double>
+class Step {
+ public:
+  struct Config {
+    ScalarType time{};   ///< start, s
+    ScalarType size{1};  ///< height
+  };
+
+  /// Refuses members that are not finite.
+  static constexpr Expected<Step, Error<ScalarType>> make(const Config& config) {
+    if (auto check = check_finite("time", config.time); !check) return check.error();
+    if (auto check = check_finite("size", config.size); !check) return check.error();
+    return Step(config);
+  }
+
+  constexpr ScalarType operator()(ScalarType t) const noexcept {
+    return t >= config_.time ? config_.size : ScalarType{};
+  }
+
+  template <int Count>
+  constexpr Array<ScalarType, Count> derivatives(ScalarType t) const noexcept {
+    static_assert(Count >= 1);
+    return {(*this)(t)};
+  }
+
+ private:
+  explicit constexpr Step(const Config& config) : config_(config) {}
+
+  Config config_;
+};
+
+/// s(t) = slope (t - time) for t >= time, else 0.
+template <PlainScalar ScalarType = double>
+class Ramp {
+ public:
+  struct Config {
+    ScalarType time{};    ///< start, s
+    ScalarType slope{1};  ///< per second
+  };
+
+  /// Refuses members that are not finite.
+  static constexpr Expected<Ramp, Error<ScalarType>> make(const Config& config) {
+    if (auto check = check_finite("time", config.time); !check) return check.error();
+    if (auto check = check_finite("slope", config.slope); !check) return check.error();
+    return Ramp(config);
+  }
+
+  constexpr ScalarType operator()(ScalarType t) const noexcept {
+    return t >= config_.time ? config_.slope * (t - config_.time) : ScalarType{};
+  }
+
+  template <int Count>
+  constexpr Array<ScalarType, Count> derivatives(ScalarType t) const noexcept {
+    static_assert(Count >= 1);
+    Array<ScalarType, Count> result{(*this)(t)};
+    if constexpr (Count > 1) result[1] = t >= config_.time ? config_.slope : ScalarType{};
+    return result;
+  }
+
+ private:
+  explicit constexpr Ramp(const Config& config) : config_(config) {}
+
+  Config config_;
+};
+
+/// s(t) = sum_i coefficients[i] (t - origin)^i at all times.
+template <int Degree, PlainScalar ScalarType = double>
+class Polynomial {
+  static_assert(Degree >= 0);
+
+ public:
+  struct Config {
+    Array<ScalarType, Degree + 1> coefficients{};  ///< lowest power first, per s^i
+    ScalarType origin{};                           ///< time of the expansion point, s
+  };
+
+  /// Refuses members that are not finite.
+  static constexpr Expected<Polynomial, Error<ScalarType>> make(const Config& config) {
+    for (std::size_t i = 0; i < config.coefficients.size(); ++i) {
+      if (auto check = check_finite("coefficients", config.coefficients[i], static_cast<int>(i));
+          !check)
+        return check.error();
+    }
+    if (auto check = check_finite("origin", config.origin); !check) return check.error();
+    return Polynomial(config);
+  }
+
+  constexpr ScalarType operator()(ScalarType t) const noexcept { return derivatives<1>(t)[0]; }
+
+  template <int Count>
+  constexpr Array<ScalarType, Count> derivatives(ScalarType t) const noexcept {
+    static_assert(Count >= 1);
+    const ScalarType x = t - config_.origin;
+    Array<ScalarType, Count> result{};
+    for (int j = 0; j < Count && j <= Degree; ++j) {
+      ScalarType sum{};
+      for (int i = Degree; i >= j; --i) {
+        ScalarType factor{1};  // i (i-1) .. (i-j+1)
+        for (int k = 0; k < j; ++k) factor *= static_cast<ScalarType>(i - k);
+        sum = sum * x + factor * config_.coefficients[static_cast<std::size_t>(i)];
+      }
+      result[static_cast<std::size_t>(j)] = sum;
+    }
+    return result;
+  }
+
+ private:
+  explicit constexpr Polynomial(const Config& config) : config_(config) {}
+
+  Config config_;
+};
+
+/// s(t) = offset + amplitude sin(angular_frequency t + phase).
+template <PlainScalar ScalarType = double>
+class Sine {
+ public:
+  struct Config {
+    ScalarType amplitude{1};          ///< peak, in the unit of the signal
+    ScalarType angular_frequency{1};  ///< rad/s
+    ScalarType phase{};               ///< rad
+    ScalarType offset{};              ///< mean value
+  };
+
+  /// Refuses members that are not finite.
+  static constexpr Expected<Sine, Error<ScalarType>> make(const Config& config) {
+    if (auto check = check_finite("amplitude", config.amplitude); !check) return check.error();
+    if (auto check = check_finite("angular_frequency", config.angular_frequency); !check)
+      return check.error();
+    if (auto check = check_finite("phase", config.phase); !check) return check.error();
+    if (auto check = check_finite("offset", config.offset); !check) return check.error();
+    return Sine(config);
+  }
+
+  ScalarType operator()(ScalarType t) const noexcept {
+    return config_.offset +
+           config_.amplitude * std::sin(config_.angular_frequency * t + config_.phase);
+  }
+
+  template <int Count>
+  Array<ScalarType, Count> derivatives(ScalarType t) const noexcept {
+    static_assert(Count >= 1);
+    const ScalarType angle = config_.angular_frequency * t + config_.phase;
+    const ScalarType sine = std::sin(angle);
+    const ScalarType cosine = std::cos(angle);
+    const std::array<ScalarType, 4> cycle{sine, cosine, -sine, -cosine};
+    Array<ScalarType, Count> result{};
+    ScalarType scale = config_.amplitude;
+    for (std::size_t j = 0; j < result.size(); ++j) {
+      result[j] = scale * cycle[j % 4];
+      scale *= config_.angular_frequency;
+    }
+    result[0] += config_.offset;
+    return result;
+  }
+
+ private:
+  explicit constexpr Sine(const Config& config) : config_(config) {}
+
+  Config config_;
+};
+
+}  // namespace esokit::sim

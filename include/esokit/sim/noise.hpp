@@ -1,0 +1,171 @@
+/// @file
+/// Measurement noise: white per sample, and band-limited white noise held over intervals.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <esokit/core/expected.hpp>
+#include <esokit/design/check.hpp>
+#include <esokit/sim/gaussian.hpp>
+#include <limits>
+
+namespace esokit::sim {
+
+namespace detail {
+
+/// Finite and zero or above.
+template <PlainScalar ScalarType>
+constexpr Check<ScalarType> check_not_negative(const char* field, ScalarType value) {
+  if (is_finite(value) && value >= ScalarType{}) return {};
+  return Error<ScalarType>{
+      .field = field, .value = value, .rule = "must be finite and not negative"};
+}
+
+}  // namespace detail
+
+/// Independent normal numbers, one a call. Channels that shall be independent take different seeds.
+template <PlainScalar ScalarType = double>
+class WhiteNoise {
+ public:
+  struct Config {
+    ScalarType standard_deviation{};  ///< in the unit of the signal; zero is no noise
+    std::uint64_t seed = 0;           ///< any number
+  };
+
+  /// Refuses a standard deviation that is negative or not finite.
+  static Expected<WhiteNoise, Error<ScalarType>> make(const Config& config) {
+    if (auto check = detail::check_not_negative("standard_deviation", config.standard_deviation);
+        !check)
+      return check.error();
+    return WhiteNoise(config);
+  }
+
+  ScalarType next() { return standard_deviation_ * static_cast<ScalarType>(gaussian_.next()); }
+
+  /// Starts the sequence anew.
+  void reset() { gaussian_.reset(); }
+
+  ScalarType standard_deviation() const noexcept { return standard_deviation_; }
+
+ private:
+  explicit WhiteNoise(const Config& config)
+      : gaussian_(config.seed), standard_deviation_(config.standard_deviation) {}
+
+  Gaussian gaussian_;
+  ScalarType standard_deviation_;
+};
+
+/// The "band-limited white noise" of block-diagram tools: one normal number an interval of `hold`
+/// seconds, with variance power/hold, so that the spectral density at low frequency is `power`
+/// whatever the interval.
+///
+/// `next()` is called once an interval; HeldNoise does that for a simulation with smaller steps.
+template <PlainScalar ScalarType = double>
+class BandLimitedWhiteNoise {
+ public:
+  struct Config {
+    ScalarType power{};      ///< height of the two-sided power spectral density; zero is no noise
+    ScalarType hold{1};      ///< interval, s
+    std::uint64_t seed = 0;  ///< any number
+  };
+
+  /// Refuses a negative power, a hold that is not positive, and a variance beyond the scalar.
+  static Expected<BandLimitedWhiteNoise, Error<ScalarType>> make(const Config& config) {
+    if (auto check = detail::check_not_negative("power", config.power); !check)
+      return check.error();
+    if (auto check = check_positive("hold", config.hold); !check) return check.error();
+    const ScalarType variance = config.power / config.hold;
+    if (!is_finite(variance) || (config.power > ScalarType{} && variance <= ScalarType{})) {
+      return Error<ScalarType>{.field = "power",
+                               .value = config.power,
+                               .rule = "power/hold must be a number that the scalar can hold"};
+    }
+    const auto white = WhiteNoise<ScalarType>::make(
+        {.standard_deviation = std::sqrt(variance), .seed = config.seed});
+    return BandLimitedWhiteNoise(white.value());
+  }
+
+  /// The number of the next interval.
+  ScalarType next() { return white_.next(); }
+
+  /// Starts the sequence anew.
+  void reset() { white_.reset(); }
+
+  /// sqrt(power/hold).
+  ScalarType standard_deviation() const noexcept { return white_.standard_deviation(); }
+
+ private:
+  explicit BandLimitedWhiteNoise(const WhiteNoise<ScalarType>& white) : white_(white) {}
+
+  WhiteNoise<ScalarType> white_;
+};
+
+/// Band-limited white noise seen by a simulation of fixed step: at(k) is its value at t = k step.
+///
+/// Goes by the index of the step and not by time, since floor(k step / hold) is wrong by rounding
+/// at some edges of the intervals.
+template <PlainScalar ScalarType = double>
+class HeldNoise {
+ public:
+  struct Config {
+    ScalarType power{};      ///< height of the two-sided power spectral density; zero is no noise
+    ScalarType hold{1};      ///< interval of one value, s; a whole multiple of `step`
+    ScalarType step{1};      ///< step of the simulation, s
+    std::uint64_t seed = 0;  ///< any number
+  };
+
+  /// Refuses what BandLimitedWhiteNoise refuses, a step that is not positive, and a hold that is
+  /// no whole multiple of the step.
+  static Expected<HeldNoise, Error<ScalarType>> make(const Config& config) {
+    const auto noise = BandLimitedWhiteNoise<ScalarType>::make(
+        {.power = config.power, .hold = config.hold, .seed = config.seed});
+    if (!noise) return noise.error();
+    if (auto check = check_positive("step", config.step); !check) return check.error();
+    const ScalarType ratio = config.hold / config.step;
+    const ScalarType whole = std::round(ratio);
+    // Both numbers are rounded decimals: 0.01/0.001 is not 10 in every format.
+    const ScalarType epsilon = std::numeric_limits<ScalarType>::epsilon() * ScalarType{16};
+    const ScalarType decimal = static_cast<ScalarType>(1e-9);
+    const ScalarType tolerance = epsilon > decimal ? epsilon : decimal;
+    const ScalarType most = static_cast<ScalarType>(std::int64_t{1} << 31u);
+    if (!(whole >= ScalarType{1} && whole <= most &&
+          std::abs(ratio - whole) <= tolerance * whole)) {
+      return Error<ScalarType>{.field = "hold",
+                               .value = config.hold,
+                               .rule = "must be a whole multiple (1 to 2^31) of the step",
+                               .limit = config.step,
+                               .has_limit = true};
+    }
+    return HeldNoise(*noise, static_cast<std::int64_t>(whole));
+  }
+
+  /// The value during step k, which starts at t = k step; zero before step 0. It depends on k
+  /// alone; going back replays the sequence from its start, so ascending k is the fast way.
+  ScalarType at(std::int64_t k) {
+    if (k < 0) return ScalarType{};
+    const std::int64_t interval = k / steps_per_hold_;
+    if (interval + 1 < drawn_) reset();
+    for (; drawn_ <= interval; ++drawn_) value_ = noise_.next();
+    return value_;
+  }
+
+  /// Starts the sequence anew; at(k) does not change by it.
+  void reset() {
+    noise_.reset();
+    drawn_ = 0;
+  }
+
+  std::int64_t steps_per_hold() const noexcept { return steps_per_hold_; }
+  ScalarType standard_deviation() const noexcept { return noise_.standard_deviation(); }
+
+ private:
+  HeldNoise(const BandLimitedWhiteNoise<ScalarType>& noise, std::int64_t steps_per_hold)
+      : noise_(noise), steps_per_hold_(steps_per_hold) {}
+
+  BandLimitedWhiteNoise<ScalarType> noise_;
+  std::int64_t steps_per_hold_;
+  std::int64_t drawn_ = 0;
+  ScalarType value_{};
+};
+
+}  // namespace esokit::sim

@@ -1,0 +1,46 @@
+/// @file
+/// The time window of a criterion.
+#pragma once
+
+#include <esokit/core/expected.hpp>
+#include <esokit/design/check.hpp>
+#include <limits>
+
+namespace esokit::sim {
+
+/// From `start` to `end`, both included; the default is all time.
+template <PlainScalar ScalarType = double>
+class Window {
+ public:
+  struct Config {
+    ScalarType start = std::numeric_limits<ScalarType>::lowest();  ///< s
+    ScalarType end = std::numeric_limits<ScalarType>::max();       ///< s, after `start`
+  };
+
+  constexpr Window() = default;
+
+  /// Refuses members that are not finite and an end that is not after the start.
+  static constexpr Expected<Window, Error<ScalarType>> make(const Config& config) {
+    if (auto check = check_finite("start", config.start); !check) return check.error();
+    if (auto check = check_finite("end", config.end); !check) return check.error();
+    if (config.end <= config.start) {
+      return Error<ScalarType>{.field = "end",
+                               .value = config.end,
+                               .rule = "must be greater than start, which is",
+                               .limit = config.start,
+                               .has_limit = true};
+    }
+    return Window(config);
+  }
+
+  constexpr ScalarType start() const noexcept { return config_.start; }
+  constexpr ScalarType end() const noexcept { return config_.end; }
+  constexpr bool contains(ScalarType t) const noexcept { return t >= start() && t <= end(); }
+
+ private:
+  explicit constexpr Window(const Config& config) : config_(config) {}
+
+  Config config_{};
+};
+
+}  // namespace esokit::sim

@@ -1,0 +1,79 @@
+// Plants: against closed-form responses.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <esokit/sim/plant.hpp>
+#include <esokit/sim/runge_kutta.hpp>
+
+namespace {
+
+using namespace esokit;
+using namespace esokit::sim;
+
+struct UserPlant {
+  static constexpr int states = 1;
+  using State = Vector<double, 1>;
+  State derivative(double, const State& x, double u) const { return State(u - x[0]); }
+  double output(double, const State& x) const { return x[0]; }
+};
+struct NoOutput {
+  static constexpr int states = 1;
+  using State = Vector<double, 1>;
+  State derivative(double, const State& x, double u) const { return State(u - x[0]); }
+};
+struct WrongSize : UserPlant {
+  static constexpr int states = 2;
+};
+
+static_assert(Plant<UserPlant> && !Plant<NoOutput> && !Plant<WrongSize>);
+static_assert(Plant<IntegratorChainPlant<3>> && Plant<LinearPlant<2, float>>);
+static_assert(Plant<IntegratorChainPlant<2, double, Sine<>>>);
+
+template <class P>
+typename P::State run(const P& plant, typename P::State x, double u, double end) {
+  const auto rhs = [&](double t, const typename P::State& state) {
+    return plant.derivative(t, state, u);
+  };
+  return integrate(rhs, 0.0, x, end / 1000, 1000);
+}
+
+TEST(Plant, IntegratorChainUnderHeldInput) {
+  const auto plant = IntegratorChainPlant<3>::make({.input_gain = -2.0}).value();
+  const auto x = run(plant, {1.0, 2.0, 3.0}, 5.0, 2.0);
+  // Third derivative -10 throughout.
+  EXPECT_NEAR(x[0], 1 + 4 + 6 - 10 * 8.0 / 6, 1e-11);
+  EXPECT_NEAR(x[1], 2 + 6 - 20, 1e-11);
+  EXPECT_NEAR(x[2], 3 - 20, 1e-11);
+  EXPECT_EQ(plant.output(0.0, x), x[0]);
+  EXPECT_EQ(plant.total_disturbance(0.0, x), 0.0);
+}
+
+TEST(Plant, IntegratorChainWithDisturbance) {
+  const auto sine = Sine<>::make({.amplitude = 4.0, .angular_frequency = 2.0}).value();
+  const auto plant =
+      IntegratorChainPlant<2, double, Sine<>>::make({.input_gain = 1.0, .disturbance = sine})
+          .value();
+  const auto x = run(plant, {0.0, 0.0}, 0.0, 1.5);
+  EXPECT_NEAR(x[1], 2.0 * (1.0 - std::cos(3.0)), 1e-10);
+  EXPECT_NEAR(x[0], 2.0 * 1.5 - std::sin(3.0), 1e-10);
+  EXPECT_EQ(plant.total_disturbance(0.5, x), sine(0.5));
+}
+
+TEST(Plant, LinearPlantStepResponse) {
+  // y'' + 2 y' + 5 y = 10 u: poles -1 +- 2i, final value 2.
+  const auto plant = LinearPlant<2>::make({.coefficients = {5.0, 2.0}, .input_gain = 10.0}).value();
+  const auto x = run(plant, {0.0, 0.0}, 1.0, 1.0);
+  EXPECT_NEAR(x[0], 2.0 * (1.0 - std::exp(-1.0) * (std::cos(2.0) + 0.5 * std::sin(2.0))), 1e-10);
+  EXPECT_NEAR(x[1], 5.0 * std::exp(-1.0) * std::sin(2.0), 1e-10);
+  EXPECT_DOUBLE_EQ(plant.total_disturbance(0.0, {1.0, 3.0}), -5.0 - 6.0);
+}
+
+TEST(Plant, DisturbanceMayBeALambda) {
+  const auto wind = [](double t) { return t; };
+  using P = LinearPlant<1, double, decltype(wind)>;
+  const auto plant = P::make({.input_gain = 1.0, .disturbance = wind}).value();
+  EXPECT_NEAR(run(plant, P::State(1.0), 0.0, 2.0)[0], 3.0, 1e-12);
+  EXPECT_NEAR(run(plant, P::State(1.0), 1.0, 2.0)[0], 5.0, 1e-12);
+}
+
+}  // namespace
