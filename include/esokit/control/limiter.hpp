@@ -1,0 +1,92 @@
+/// @file
+/// Magnitude and rate limits of an actuator.
+#pragma once
+
+#include <esokit/core/expected.hpp>
+#include <esokit/design/check.hpp>
+#include <limits>
+
+namespace esokit {
+
+/// Limits of an actuator. Left out, a limit does not bind.
+template <Scalar S = double>
+struct Limits {
+  S lower = std::numeric_limits<S>::lowest();  ///< least u, unit of u
+  S upper = std::numeric_limits<S>::max();     ///< largest u, above lower
+  S rate = std::numeric_limits<S>::max();      ///< largest abs(du/dt), unit of u per s; positive
+};
+
+/// Holds a command within magnitude limits (asymmetric ones too) and a rate limit.
+///
+/// Both bounds of a step are worked out from the last output, so that between command and output
+/// only a minimum and a maximum remain.
+template <Scalar S = double>
+class Limiter {
+ public:
+  /// @param sample_time T, s @return error for limits that are crossed or not finite, a rate that
+  /// is not positive
+  static Expected<Limiter, Error<S>> make(const Limits<S>& limits, const S& sample_time) {
+    if (auto ok = check_positive("sample_time", sample_time); !ok) return ok.error();
+    if (auto ok = check_finite("limits.lower", limits.lower); !ok) return ok.error();
+    if (auto ok = check_finite("limits.upper", limits.upper); !ok) return ok.error();
+    if (!all(limits.lower < limits.upper)) {
+      return Error<S>{"limits.lower", limits.lower, "must be below limits.upper", -1,
+                      limits.upper,   true};
+    }
+    if (auto ok = check_positive("limits.rate", limits.rate); !ok) return ok.error();
+    return Limiter(limits, sample_time);
+  }
+
+  /// The output nearest to `command` within the limits; remembered as the last output.
+  /// @param command finite, as everything that is computed from an observer's estimate
+  constexpr S operator()(const S& command) noexcept {
+    const S output = clamp(command);
+    track(output);
+    return output;
+  }
+
+  /// What the next output would be for `command`; nothing is remembered.
+  [[nodiscard]] constexpr S clamp(const S& command) const noexcept {
+    const S above = select(command < low_, low_, command);
+    return select(high_ < above, high_, above);
+  }
+
+  /// Tells what the actuator really held; the rate limit goes on from there.
+  constexpr void track(const S& output) noexcept {
+    last_ = output;
+    low_ = max(lower_, S(output - step_));
+    high_ = min(upper_, S(output + step_));
+    // An output from outside may lie beyond a magnitude limit by more than a step.
+    low_ = min(low_, upper_);
+    high_ = max(high_, lower_);
+  }
+
+  /// The last output.
+  [[nodiscard]] constexpr const S& last() const noexcept { return last_; }
+  [[nodiscard]] constexpr const S& lower() const noexcept { return lower_; }
+  [[nodiscard]] constexpr const S& upper() const noexcept { return upper_; }
+
+ private:
+  Limiter(const Limits<S>& limits, const S& sample_time) noexcept
+      : lower_(limits.lower), upper_(limits.upper) {
+    const S step = limits.rate * sample_time;
+    const S most = std::numeric_limits<S>::max();
+    step_ = select(limits.rate < most, select(is_finite(step), step, most), most);
+    track(clamp_magnitude(S(0.0)));
+  }
+
+  static constexpr S min(const S& a, const S& b) noexcept { return select(b < a, b, a); }
+  static constexpr S max(const S& a, const S& b) noexcept { return select(a < b, b, a); }
+  [[nodiscard]] constexpr S clamp_magnitude(const S& u) const noexcept {
+    return min(max(u, lower_), upper_);
+  }
+
+  S lower_;
+  S upper_;
+  S step_{};
+  S last_{};
+  S low_{};
+  S high_{};
+};
+
+}  // namespace esokit
