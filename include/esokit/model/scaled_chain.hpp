@@ -35,18 +35,28 @@ struct ScaledChain : ChainSize<Order, Extension> {
     return physical<Order>(scaled_gain, rate);
   }
 
-  /// Phi x + Gamma u: one sample ahead. @param drive scaled_input_gain * u
-  [[nodiscard]] ESOKIT_INLINE static constexpr State predict(const State& x,
-                                                             const ScalarType& drive) noexcept {
+  /// One sample ahead: the plant rows see the disturbance and the drive, the disturbance rows only
+  /// themselves.
+  /// @param drive what drives the chain beside its own disturbance, scaled like (d, d', ..); the
+  ///        first is scaled_input_gain * u, and in a cascade what lower levels found is added
+  template <int DriveCount>
+  [[nodiscard]] ESOKIT_INLINE static constexpr State predict(
+      const State& x, const Array<ScalarType, DriveCount>& drive) noexcept {
+    static_assert(DriveCount >= 1 && DriveCount <= Extension);
     State next;
-    const ScalarType driven = std::get<Order>(x) + drive;
+    Array<ScalarType, DriveCount> driven;
+    detail::unroll<DriveCount>([&](auto r) ESOKIT_INLINE_LAMBDA {
+      std::get<r>(driven) = std::get<Order + r>(x) + std::get<r>(drive);
+    });
     detail::unroll<size>([&](auto row) ESOKIT_INLINE_LAMBDA {
       ScalarType sum = std::get<row>(x);
       detail::unroll<size - 1 - row>([&](auto k) ESOKIT_INLINE_LAMBDA {
         constexpr int column = row + 1 + k;
         constexpr double weight = binomial(column, row);
         ScalarType term = std::get<column>(x);
-        if constexpr (row < Order && column == Order) term = driven;
+        if constexpr (row < Order && column >= Order && column < Order + DriveCount) {
+          term = std::get<column - Order>(driven);
+        }
         if constexpr (weight == 2.0) {
           term = term + term;
         } else if constexpr (weight != 1.0) {

@@ -14,8 +14,8 @@ namespace esokit {
 /// z' = A z + B u + l(t, e) e on a row of `Levels` chains; the definition only, the state is the
 /// caller's, to be stacked with that of a plant.
 ///
-/// As in PredictorCorrector, level i holds (x_i, D_i) with D_i the sum of the disturbances of the
-/// levels 1..i; its innovation is e_1 = y - x_1, e_i = x_{i-1} - x_i (first elements).
+/// As in PredictorCorrector, level i is driven by u and the disturbances of the levels below it;
+/// its innovation is e_1 = y - x_1, e_i = x_{i-1} - x_i (first elements).
 /// @tparam Order n @tparam Extension m @tparam Law ContinuousGainLaw @tparam Levels p
 template <int Order, Scalar S, int Extension, class Law, int Levels = 1>
 requires ContinuousGainLaw<Law, Order + Extension, S>
@@ -41,18 +41,17 @@ class ContinuousObserver {
   [[nodiscard]] State derivative(const S& t, const State& z, const S& y, const S& u) const {
     State rate;
     S measured = y;
-    Vector<S, Extension> found = Vector<S, Extension>::Zero();
+    S drive = input_gain_ * u;
     for (int level = 0; level < Levels; ++level) {
       const int first = level * size;
       const S innovation = measured - z(first);
       const Estimate gain = laws_[static_cast<std::size_t>(level)].gain(t, innovation);
-      for (int i = 0; i < Order; ++i) rate(first + i) = z(first + i + 1) + gain(i) * innovation;
-      rate(first + Order - 1) = rate(first + Order - 1) + input_gain_ * u;
-      for (int i = 0; i < Extension; ++i) {
-        found(i) = found(i) + gain(Order + i) * innovation;
-        const int row = first + Order + i;
-        rate(row) = i + 1 < Extension ? S(z(row + 1) + found(i)) : found(i);
+      for (int i = 0; i < size; ++i) {
+        rate(first + i) = gain(i) * innovation;
+        if (i + 1 < size) rate(first + i) = rate(first + i) + z(first + i + 1);
       }
+      rate(first + Order - 1) = rate(first + Order - 1) + drive;
+      drive = drive + z(first + Order);
       measured = z(first);
     }
     return rate;
@@ -71,15 +70,30 @@ class ContinuousObserver {
     }
   }
 
-  /// (y, .., y^(n-1), d, .., d^(m-1)) from the last level.
-  [[nodiscard]] static Estimate estimate(const State& z) { return z.template tail<size>(); }
+  /// (y, .., y^(n-1), d, .., d^(m-1)): plant states of the last level, disturbance of all levels
+  /// together, equation (24) of the cascade paper.
+  [[nodiscard]] static Estimate estimate(const State& z) {
+    Estimate estimate = z.template tail<size>();
+    for (int level = 0; level + 1 < Levels; ++level) {
+      estimate.template tail<Extension>() += z.template segment<Extension>(level * size + Order);
+    }
+    return estimate;
+  }
 
   /// dhat, unit of y^(n).
-  [[nodiscard]] static S total_disturbance(const State& z) { return z(states - size + Order); }
+  [[nodiscard]] static S total_disturbance(const State& z) {
+    S sum = z(Order);
+    for (int level = 1; level < Levels; ++level) sum = sum + z(level * size + Order);
+    return sum;
+  }
 
-  /// State with every level at the given estimate.
+  /// State with every level at the given estimate; the first level holds the disturbance.
   [[nodiscard]] static State state_at(const Estimate& estimate) {
-    return estimate.template replicate<Levels, 1>();
+    State state = estimate.template replicate<Levels, 1>();
+    for (int level = 1; level < Levels; ++level) {
+      state.template segment<Extension>(level * size + Order).setZero();
+    }
+    return state;
   }
 
   /// b0.

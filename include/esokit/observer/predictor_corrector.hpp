@@ -9,6 +9,7 @@
 #include <esokit/model/scaled_chain.hpp>
 #include <esokit/observer/gain_law.hpp>
 #include <esokit/observer/step_status.hpp>
+#include <limits>
 
 namespace esokit {
 
@@ -22,12 +23,8 @@ struct ChainConfig {
 };
 
 /// A row of `Levels` chains with one gain law each; one level is the plain observer, more are the
-/// cascade. Level 1 is corrected by y, level i by the corrected output of level i - 1.
-///
-/// Level i keeps (x_i, D_i), its own plant states and the sum D_i of the disturbances that levels
-/// 1..i found. In these coordinates the drive b0 u + sum_{j<i} xi_{j,n+1} of the cascade is part of
-/// the level's own chain, so every level predicts alike, and what a level adds to its disturbance
-/// is added to all above it. With Levels = 1 nothing of this remains.
+/// cascade. Level 1 is corrected by y and driven by u, level i is corrected by the corrected output
+/// of level i - 1 and driven by u and the disturbances that the levels below it found.
 ///
 /// One instance belongs to one thread. No member allocates, throws or locks after `make`.
 ///
@@ -71,9 +68,10 @@ class PredictorCorrector {
       if (gap_ == 0) [[likely]] {
         // One test for all: a bad y or u makes the new state non-finite. Nothing is kept then, and
         // the guarded path finds out what it was.
-        const LevelStates predicted = predicted_levels(scaled_input_gain_ * u_applied);
-        Correction step{predicted};
-        if (correct_levels<true>(step, y, 1u) && is_finite(probe(step.states))) [[likely]] {
+        Correction step{predicted_levels(scaled_input_gain_ * u_applied)};
+        const bool looked = correct_levels<true>(step, y, 1u);
+        for_each_state(step.states, [](S& x) ESOKIT_INLINE_LAMBDA { detail::keep_scalar(x); });
+        if (looked && is_finite(probe(step.states))) [[likely]] {
           commit(step);
           applied_input_ = u_applied;
           return StepStatus::ok;
@@ -119,22 +117,27 @@ class PredictorCorrector {
     }
   }
 
-  /// All estimates in physical units, after the last step.
+  /// All estimates in physical units, after the last step: plant states of the last level,
+  /// disturbance of all levels together.
   [[nodiscard]] Estimate estimate() const noexcept {
-    return Chain::physical(states_.back(), rate_);
+    return Chain::physical(up_to_level<Levels - 1>(), rate_);
   }
 
   /// Estimate of y^(Row), or of d^(Row - n) for Row >= n.
   template <int Row>
   [[nodiscard]] constexpr S estimate() const noexcept {
     static_assert(Row >= 0 && Row < size, "esokit: no such estimate");
-    return Chain::template physical<Row>(std::get<Row>(states_.back()), rate_);
+    return Chain::template physical<Row>(std::get<Row>(up_to_level<Levels - 1>()), rate_);
   }
 
   /// Estimate of level `level` = 0 .. p - 1 of a cascade: its plant states, and the disturbance
-  /// that it and the levels below it found.
+  /// that it and the levels below it found. NaN throughout for any other level.
   [[nodiscard]] Estimate level_estimate(int level) const noexcept {
-    return Chain::physical(states_[static_cast<std::size_t>(level)], rate_);
+    Estimate estimate = Estimate::Constant(S(std::numeric_limits<double>::quiet_NaN()));
+    detail::unroll<Levels>([&](auto i) {
+      if (i == level) estimate = Chain::physical(up_to_level<i>(), rate_);
+    });
+    return estimate;
   }
 
   /// dhat, unit of y^(n).
@@ -226,8 +229,8 @@ class PredictorCorrector {
         factor = factor * ratio;
         next.states_[i][r] = next.states_[i][r] * factor;
       }
-      if (!same_gain) next.states_[i][Order] = next.states_[i][Order] + moved;
     }
+    if (!same_gain) next.states_[0][Order] = next.states_[0][Order] + moved;
     if (!all(is_finite(next.probe(next.states_)))) {
       return Error<S>{"input_gain", fresh.input_gain(), "would make the estimate not finite"};
     }
@@ -246,6 +249,14 @@ class PredictorCorrector {
     Array<S, Levels> innovations{};
   };
 
+  template <class Function>
+  ESOKIT_INLINE static constexpr void for_each_state(LevelStates& states, Function&& f) noexcept {
+    detail::unroll<Levels>([&](auto i) ESOKIT_INLINE_LAMBDA {
+      detail::unroll<size>([&](auto r)
+                               ESOKIT_INLINE_LAMBDA { f(std::get<r>(std::get<i>(states))); });
+    });
+  }
+
   ESOKIT_INLINE constexpr void advance_laws() noexcept {
     if constexpr (requires(Law & law) { law.advance(); }) {
       detail::unroll<Levels>([&](auto i) ESOKIT_INLINE_LAMBDA { std::get<i>(laws_).advance(); });
@@ -254,10 +265,39 @@ class PredictorCorrector {
 
   [[nodiscard]] ESOKIT_INLINE constexpr LevelStates predicted_levels(S drive) const noexcept {
     LevelStates next;
-    detail::unroll<Levels>([&](auto i) ESOKIT_INLINE_LAMBDA {
-      std::get<i>(next) = Chain::predict(std::get<i>(states_), drive);
-    });
+    std::get<0>(next) = Chain::template predict<1>(std::get<0>(states_), {drive});
+    if constexpr (Levels > 1) {
+      // What drives the next level: u, and the disturbance found so far with its derivatives.
+      Array<S, Extension> drives;
+      detail::unroll<Extension>([&](auto r) ESOKIT_INLINE_LAMBDA {
+        std::get<r>(drives) = std::get<Order + r>(std::get<0>(states_));
+      });
+      std::get<0>(drives) = std::get<0>(drives) + drive;
+      detail::unroll<Levels - 1>([&](auto below) ESOKIT_INLINE_LAMBDA {
+        constexpr int level = below + 1;
+        const auto& state = std::get<level>(states_);
+        std::get<level>(next) = Chain::template predict<Extension>(state, drives);
+        if constexpr (level + 1 < Levels) {
+          detail::unroll<Extension>([&](auto r) ESOKIT_INLINE_LAMBDA {
+            std::get<r>(drives) = std::get<Order + r>(state) + std::get<r>(drives);
+          });
+        }
+      });
+    }
     return next;
+  }
+
+  /// Scaled state of a level, with the disturbances of the levels below it added to its own.
+  template <int Level>
+  [[nodiscard]] ESOKIT_INLINE constexpr typename Chain::State up_to_level() const noexcept {
+    typename Chain::State state = std::get<Level>(states_);
+    detail::unroll<Level>([&](auto i) ESOKIT_INLINE_LAMBDA {
+      detail::unroll<Extension>([&](auto r) ESOKIT_INLINE_LAMBDA {
+        constexpr int row = Order + r;
+        std::get<row>(state) = std::get<row>(state) + std::get<row>(std::get<i>(states_));
+      });
+    });
+    return state;
   }
 
   /// Finite only if all states are finite; see ScaledChain::finite_probe. Levels are added up
@@ -290,7 +330,6 @@ class PredictorCorrector {
     constexpr bool law_looks = !PresetGainLaw<Law, size, S>;
     bool fine = true;
     S measured = y;
-    Array<S, Extension> found{};
     detail::unroll<Levels>([&](auto level) ESOKIT_INLINE_LAMBDA {
       auto& z = std::get<level>(step.states);
       const S e = measured - std::get<0>(z);
@@ -302,17 +341,8 @@ class PredictorCorrector {
         }
       }
       const auto apply = [&](const ScaledGain<size, S>& k) ESOKIT_INLINE_LAMBDA {
-        detail::unroll<Order>([&](auto r) ESOKIT_INLINE_LAMBDA {
+        detail::unroll<size>([&](auto r) ESOKIT_INLINE_LAMBDA {
           std::get<r>(z) = std::get<r>(z) + std::get<r>(k) * e;
-        });
-        detail::unroll<Extension>([&](auto r) ESOKIT_INLINE_LAMBDA {
-          constexpr int row = Order + r;
-          if constexpr (level == 0) {
-            std::get<r>(found) = std::get<row>(k) * e;
-          } else {
-            std::get<r>(found) = std::get<r>(found) + std::get<row>(k) * e;
-          }
-          std::get<row>(z) = std::get<row>(z) + std::get<r>(found);
         });
       };
       if constexpr (NominalGain) {
@@ -368,6 +398,9 @@ class PredictorCorrector {
   StepStatus reset_scaled(const typename Chain::State& state) noexcept {
     LevelStates states;
     for (auto& level : states) level = state;
+    for (std::size_t i = 1; i < Levels; ++i) {
+      for (std::size_t r = Order; r < size; ++r) states[i][r] = S(0.0);
+    }
     if (!all(is_finite(probe(states)))) return StepStatus::state_rejected;
     states_ = states;
     innovation_ = S(0.0);
