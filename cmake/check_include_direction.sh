@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Refuses every include in include/esokit that goes against
 #   core <- model <- design <- observer <- control <- analysis <- sim
+# and an umbrella header that does not include every other header.
 # usage: cmake/check_include_direction.sh [INCLUDE_DIR | --self-test]
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -38,6 +39,7 @@ check() {  # check INCLUDE_DIR
       umbrella = (FILENAME == "esokit/esokit.hpp")
       mine = (part[2] in rank) ? rank[part[2]] : 0
     }
+    umbrella && /^#include <esokit\// { brought[$0] = 1 }
     /^[ \t]*#[ \t]*include/ {
       target = $0
       sub(/^[ \t]*#[ \t]*include(_next)?[ \t]*/, "", target)
@@ -57,7 +59,14 @@ check() {  # check INCLUDE_DIR
       else if (!(part[2] in rank)) refuse("a header may not include the umbrella header")
       else if (mine && rank[part[2]] > mine) refuse("against the include direction")
     }
-    END { exit refused > 0 }' "${headers[@]}")
+    END {
+      for (i = 1; i < ARGC; ++i) {
+        if (ARGV[i] == "esokit/esokit.hpp" || ("#include <" ARGV[i] ">") in brought) continue
+        printf "esokit/esokit.hpp: does not include %s\n", ARGV[i]
+        ++refused
+      }
+      exit refused > 0
+    }' "${headers[@]}")
 }
 
 self_test() {  # the check must be able to fail
@@ -65,7 +74,7 @@ self_test() {  # the check must be able to fail
   folder=$(mktemp -d)
   trap 'rm -rf "$folder"' RETURN
   mkdir -p "$folder"/esokit/{core,model,sim}
-  echo '#include <esokit/sim/c.hpp>' >"$folder/esokit/esokit.hpp"
+  printf '#include <esokit/%s.hpp>\n' core/a model/b sim/c >"$folder/esokit/esokit.hpp"
   printf '#include <cmath>\n#include <Eigen/Core>\n' >"$folder/esokit/core/a.hpp"
   echo '#include "esokit/core/a.hpp"' >"$folder/esokit/model/b.hpp"
   echo '#include <esokit/model/b.hpp>' >"$folder/esokit/sim/c.hpp"
@@ -79,6 +88,11 @@ self_test() {  # the check must be able to fail
       return 1
     fi
   done
+  echo '#include <cmath>' >"$folder/esokit/model/bad.hpp"
+  if check "$folder" >/dev/null; then
+    echo "self-test: a header that the umbrella lacks is not refused"
+    return 1
+  fi
   rm "$folder/esokit/model/bad.hpp"
   touch "$folder/esokit/loose.hpp"
   if check "$folder" >/dev/null; then
