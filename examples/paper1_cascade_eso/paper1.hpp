@@ -1,0 +1,190 @@
+/// @file
+/// What the examples of this paper share: its name, Table 1's plant and observers, and the runs of
+/// the generic example.
+///
+/// K. Lakomy, R. Madonski, "Cascade extended state observer for active disturbance rejection
+/// control applications under measurement noise", ISA Transactions 109 (2021) 1-10,
+/// doi:10.1016/j.isatra.2020.09.007.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <esokit/control/adrc_law.hpp>
+#include <esokit/observer/cascade_eso.hpp>
+#include <esokit/sim/closed_loop.hpp>
+#include <esokit/sim/filtered_step.hpp>
+#include <esokit/sim/noise.hpp>
+#include <esokit/sim/trapezoid.hpp>
+
+#include "common/report.hpp"
+
+namespace paper1 {
+
+using esokit::Vector;
+namespace sim = esokit::sim;
+
+inline const std::string folder = "paper1_cascade_eso";
+
+inline esokit::examples::About about(std::string title, std::string description) {
+  return {.paper_title = "Cascade extended state observer",
+          .citation =
+              "K. Lakomy, R. Madonski, Cascade extended state observer for active disturbance "
+              "rejection control applications under measurement noise, ISA Transactions 109 (2021) "
+              "1-10",
+          .link = "https://doi.org/10.1016/j.isatra.2020.09.007",
+          .title = std::move(title),
+          .description = std::move(description)};
+}
+
+/// Names of the levels p = 1, 2, 3; p = 1 is the standard ESO.
+inline const std::array<std::string, 3> level_names = {"p = 1", "p = 2", "p = 3"};
+
+// ---- the generic example, Sim1A and Sim1B ----
+
+inline constexpr double duration = 5.0;                                 // T, s
+inline constexpr double nominal_gain = 1.0;                             // ghat
+inline constexpr double noise_power = 1e-9;                             // of Sim1B
+inline constexpr double noise_hold = 0.01;                              // s
+inline constexpr double level_factor = 2.0;                             // alpha
+inline constexpr std::array<double, 3> table1 = {250.0, 60.82, 33.98};  // omega_o1, rad/s
+
+/// x1' = x2,  x2' = -x1 - 2 x2 + g u + d,  g = (1 + 0.2 tanh(t - 2)) / (|x1| + 1), where d is g d*
+/// (what reproduces the paper's numbers) or d* (what its text says), d* = 5 sin(9 t) from 3.5 s.
+class GenericPlant {
+ public:
+  static constexpr int states = 2;
+  using State = Vector<double, 2>;
+
+  enum class Disturbance { through_gain, beside_gain };
+
+  explicit GenericPlant(Disturbance where = Disturbance::through_gain) : where_(where) {}
+
+  State derivative(double t, const State& x, double u) const noexcept {
+    return {x(1), acceleration(t, x, u)};
+  }
+  double output(double, const State& x) const noexcept { return x(0); }
+
+  double acceleration(double t, const State& x, double u) const noexcept {
+    const double g = (1.0 + 0.2 * std::tanh(t - 2.0)) / (std::abs(x(0)) + 1.0);
+    const double external = t >= 3.5 ? 5.0 * std::sin(9.0 * t) : 0.0;
+    const double d = where_ == Disturbance::through_gain ? g * external : external;
+    return -x(0) - 2.0 * x(1) + g * u + d;
+  }
+
+ private:
+  Disturbance where_;
+};
+
+/// The variants of the set-up that the paper's text and its numbers speak of.
+struct Setup {
+  bool error_based = true;  ///< observer driven by y_d - y; false: by y
+  double step_time = 0.2;   ///< of the reference, s
+  GenericPlant::Disturbance disturbance = GenericPlant::Disturbance::through_gain;
+};
+
+inline sim::FilteredStep<5> reference(double step_time) {
+  return sim::FilteredStep<5>::make({.time = step_time, .size = 1.0, .time_constant = 0.1}).value();
+}
+
+/// The noise of Sim1B; power 0 is Sim1A.
+inline sim::HeldNoise<> measurement_noise(double power, double step, std::uint64_t seed) {
+  return sim::HeldNoise<>::make({.power = power, .hold = noise_hold, .step = step, .seed = seed})
+      .value();
+}
+
+/// The criteria of Tables 2.
+struct Criteria {
+  double error = 0.0;     ///< 1e3 int |e| dt
+  double control = 0.0;   ///< int u^2 dt
+  double estimate = 0.0;  ///< int |z3 error| dt
+};
+
+/// The signals of Figs 3 and 4.
+struct Series {
+  std::vector<double> t, reference, output, error, control, estimate_error;
+};
+
+/// Adds up the criteria over a run, and keeps the signals if asked to.
+class Meter {
+ public:
+  explicit Meter(Series* series = nullptr) : series_(series) {}
+
+  void add(double t, double y_d, double y, double measured_error, double u, double z3_error) {
+    error_.add(t, std::abs(measured_error));
+    control_.add(t, u * u);
+    estimate_.add(t, std::abs(z3_error));
+    if (series_ == nullptr) return;
+    series_->t.push_back(t);
+    series_->reference.push_back(y_d);
+    series_->output.push_back(y);
+    series_->error.push_back(measured_error);
+    series_->control.push_back(u);
+    series_->estimate_error.push_back(z3_error);
+  }
+
+  Criteria criteria() const { return {1e3 * error_.value(), control_.value(), estimate_.value()}; }
+
+ private:
+  Series* series_;
+  sim::Trapezoid<> error_, control_, estimate_;
+};
+
+/// One run of Sim1 the paper way with a cascade of `Levels` levels, the first one at `bandwidth`.
+template <int Levels>
+Criteria run_generic(double bandwidth, double power, std::uint64_t seed, const Setup& setup = {},
+                     Series* series = nullptr, double step = 1e-3) {
+  const GenericPlant plant(setup.disturbance);
+  const auto y_d = reference(setup.step_time);
+  const auto law =
+      esokit::AdrcLaw<2>::make({.controller_bandwidth = 2.0, .input_gain = nominal_gain})
+          .value();  // gains 4, 4
+  typename esokit::ContinuousCascadeEso<2, Levels>::Config config{
+      .observer_bandwidth = bandwidth,
+      .input_gain = setup.error_based ? -nominal_gain : nominal_gain};
+  if (Levels > 1) config.bandwidth_factor = level_factor;
+  const auto observer = esokit::ContinuousCascadeEso<2, Levels>::make(config).value();
+  const auto noise = measurement_noise(power, step, seed);
+
+  Meter meter(series);
+  const auto record = [&](const auto& sample) {
+    const auto r = y_d.template derivatives<3>(sample.t);
+    const double acceleration = plant.acceleration(sample.t, sample.plant_state, sample.input);
+    // What the disturbance of the observer's chain is: e'' = D - ghat u, or y'' = D + ghat u.
+    const double total = setup.error_based ? r[2] - acceleration + nominal_gain * sample.input
+                                           : acceleration - nominal_gain * sample.input;
+    const double error = setup.error_based ? sample.measurement : r[0] - sample.measurement;
+    meter.add(sample.t, r[0], sample.output, error, sample.input, total - sample.estimate(2));
+  };
+  if (setup.error_based) {
+    const sim::ContinuousLoop loop{
+        plant, observer,
+        [&law](double, const Vector<double, 3>& e) { return law.control_error_based(e); },
+        sim::MeasuredError{y_d}, noise};
+    (void)loop.run({.duration = duration, .step = step}, record).value();
+  } else {
+    const sim::ContinuousLoop loop{plant, observer,
+                                   [&](double t, const Vector<double, 3>& z) {
+                                     const auto r = y_d.template derivatives<3>(t);
+                                     return law.control(z, Vector<double, 3>(r[0], r[1], r[2]));
+                                   },
+                                   sim::MeasuredOutput{}, noise};
+    (void)loop.run({.duration = duration, .step = step}, record).value();
+  }
+  return meter.criteria();
+}
+
+/// The same with the number of levels chosen at run time, 1 to 3.
+inline Criteria run_generic(int levels, double bandwidth, double power, std::uint64_t seed,
+                            const Setup& setup = {}, Series* series = nullptr, double step = 1e-3) {
+  if (levels == 1) return run_generic<1>(bandwidth, power, seed, setup, series, step);
+  if (levels == 2) return run_generic<2>(bandwidth, power, seed, setup, series, step);
+  return run_generic<3>(bandwidth, power, seed, setup, series, step);
+}
+
+}  // namespace paper1
