@@ -54,6 +54,8 @@ class Limiter {
   /// Tells what the actuator really held; the rate limit goes on from there.
   constexpr void track(const S& output) noexcept {
     last_ = output;
+    // Without a rate limit the bounds stand still.
+    if (!rate_limited_) return;
     low_ = max(lower_, S(output - step_));
     high_ = min(upper_, S(output + step_));
     // An output from outside may lie beyond a magnitude limit by more than a step.
@@ -68,10 +70,12 @@ class Limiter {
 
  private:
   Limiter(const Limits<S>& limits, const S& sample_time) noexcept
-      : lower_(limits.lower), upper_(limits.upper) {
-    const S step = limits.rate * sample_time;
-    const S most = std::numeric_limits<S>::max();
-    step_ = select(limits.rate < most, select(is_finite(step), step, most), most);
+      : lower_(limits.lower),
+        upper_(limits.upper),
+        step_(limits.rate * sample_time),
+        low_(limits.lower),
+        high_(limits.upper),
+        rate_limited_(!all(limits.rate >= std::numeric_limits<S>::max()) && all(is_finite(step_))) {
     track(clamp_magnitude(S(0.0)));
   }
 
@@ -83,10 +87,11 @@ class Limiter {
 
   S lower_;
   S upper_;
-  S step_{};
+  S step_;
   S last_{};
-  S low_{};
-  S high_{};
+  S low_;
+  S high_;
+  bool rate_limited_;
 };
 
 }  // namespace esokit

@@ -7,12 +7,13 @@
 
 namespace esokit {
 
-/// fal(e) = |e|^a sign(e) for |e| > delta, e / delta^(1-a) within. It is e k(|e|) with the even gain
-/// k(x) = max(x, delta)^(a-1): no division by e and no sign function.
+/// fal(e) = |e|^a sign(e) for |e| > delta, e / delta^(1-a) within. It is e k(|e|) with the even
+/// gain k(x) = max(x, delta)^(a-1): no division by e and no sign function.
 template <Scalar S>
 class Fal {
  public:
-  /// @param exponent a > 0; below 1: small errors count more @param linear_width delta > 0, unit of e
+  /// @param exponent a > 0; below 1: small errors count more @param linear_width delta > 0, unit of
+  /// e
   constexpr Fal(const S& exponent, const S& linear_width) noexcept
       : power_(exponent - S(1.0)), linear_width_(linear_width) {}
 

@@ -43,9 +43,7 @@ class Power {
   enum class Kind : unsigned char { zero, one, two, half, minus_half, general };
 
   static constexpr Kind kind_of(const S& p) noexcept {
-    const auto is = [&p](double value) {
-      return all(p >= S(value)) && all(S(value) >= p);
-    };
+    const auto is = [&p](double value) { return all(p >= S(value)) && all(S(value) >= p); };
     if (is(0.0)) return Kind::zero;
     if (is(1.0)) return Kind::one;
     if (is(2.0)) return Kind::two;

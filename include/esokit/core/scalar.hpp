@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <type_traits>
 
 namespace esokit {
 
@@ -93,6 +94,17 @@ concept Scalar = std::copyable<T> && requires(const T a, const T b) {
 };
 
 namespace detail {
+
+/// |x|, one instruction for plain scalars.
+template <class T>
+constexpr T absolute(const T& value) noexcept {
+#if defined(__GNUC__)
+  if constexpr (std::is_same_v<T, float>) return __builtin_fabsf(value);
+  if constexpr (std::is_same_v<T, double>) return __builtin_fabs(value);
+  if constexpr (std::is_same_v<T, long double>) return __builtin_fabsl(value);
+#endif
+  return select(value < T(0.0), T(-value), value);
+}
 
 /// A constant in the scalar type; plain scalars convert at compile time.
 template <class T>

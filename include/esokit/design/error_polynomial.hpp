@@ -78,7 +78,8 @@ ErrorPolynomial<Size, S> error_polynomial(const ScaledGain<Size, S>& gain, const
   return q;
 }
 
-/// A frequency scale of a gain set: the harmonic mean of its poles, exact for equal continuous ones.
+/// A frequency scale of a gain set: the harmonic mean of its poles, exact for equal continuous
+/// ones.
 template <int Size, Scalar S>
 S frequency_scale(const Vector<S, Size>& gain) {
   static_assert(Size >= 2);

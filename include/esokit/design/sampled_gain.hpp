@@ -43,7 +43,7 @@ constexpr Array<Array<T, Size + 1>, Size> gain_table() noexcept {
   for (int r = 0; r < Size; ++r) {
     for (int j = r + 1; j <= Size; ++j) {
       table[static_cast<std::size_t>(r)][static_cast<std::size_t>(j)] =
-          static_cast<T>(unsigned_stirling_first(j, r + 1) / factorial(j - 1));
+          static_cast<T>(unsigned_stirling_first(j, r + 1)) / static_cast<T>(factorial(j - 1));
     }
   }
   return table;

@@ -1,13 +1,13 @@
 /// @file
 /// Certificates for observers that change between two gain sets.
 ///
-/// The errors of two gain sets on one chain have closed loops A_1, A_2 that differ by rank one. They
-/// share a quadratic Lyapunov function, and so stay stable under any switching and any blending, iff
-/// both are stable and A_2 A_1 has no negative real eigenvalue (H. Lin, P. J. Antsaklis, IEEE
-/// Transactions on Automatic Control 54 (2009) 308-322). det(A_2 A_1 + x I) is, up to its sign, the
-/// polynomial Re[p_2(jw) p_1(-jw)] in x = w^2, p_i the characteristic polynomials: an eigenvalue -x
-/// is a root x > 0 of it. So the eigenvalue test is a test for positivity, which needs no
-/// eigenvalue solver. Sampled pairs are tested after the bilinear map.
+/// The errors of two gain sets on one chain have closed loops A_1, A_2 that differ by rank one.
+/// They share a quadratic Lyapunov function, and so stay stable under any switching and any
+/// blending, iff both are stable and A_2 A_1 has no negative real eigenvalue (H. Lin, P. J.
+/// Antsaklis, IEEE Transactions on Automatic Control 54 (2009) 308-322). det(A_2 A_1 + x I) is, up
+/// to its sign, the polynomial Re[p_2(jw) p_1(-jw)] in x = w^2, p_i the characteristic polynomials:
+/// an eigenvalue -x is a root x > 0 of it. So the eigenvalue test is a test for positivity, which
+/// needs no eigenvalue solver. Sampled pairs are tested after the bilinear map.
 #pragma once
 
 #include <cmath>
@@ -41,7 +41,7 @@ constexpr double unit_rounding() noexcept {
 /// Re[p(jw) q(-jw)] > 0 for every w, by a little more than what rounding may hide.
 template <int Size, Scalar S>
 bool same_half_plane(const ErrorPolynomial<Size, S>& p, const ErrorPolynomial<Size, S>& q) {
-  const S margin(8.0 * Size * unit_rounding<S>());
+  const S margin = constant<S>(8.0 * Size * unit_rounding<S>());
   Array<S, Size + 1> product{};
   for (S& c : product) c = S(0.0);
   for (std::size_t a = 0; a <= Size; ++a) {
@@ -125,13 +125,14 @@ template <int Size, Scalar S>
     quotient = sampled_bandwidth_ratio(Poles::from_bandwidth(shrinking, sample_time),
                                        Poles::from_bandwidth(otherwise, sample_time));
   }
-  const S limit(least_bandwidth_ratio<Size>() * (1.0 + 16.0 * detail::unit_rounding<S>()));
+  constexpr double least = least_bandwidth_ratio<Size>();
+  const S limit = detail::constant<S>(least * (1.0 + 16.0 * detail::unit_rounding<S>()));
   return all(is_finite(quotient)) && all(quotient > limit) && all(S(1.0) / quotient > limit);
 }
 
 /// The end of the certified range of rho on the side of `ratio`: below 1 the least, above 1 the
-/// largest (infinite where every rho > 1 is certified). Closed form for the ABESO, bisection for the
-/// BESO.
+/// largest (infinite where every rho > 1 is certified). Closed form for the ABESO, bisection for
+/// the BESO.
 /// @param sample_time T, s; 0 for a continuous observer
 template <int Size, PlainScalar S>
 [[nodiscard]] S certified_ratio_limit(SwitchingRule rule, const S& bandwidth, const S& ratio,

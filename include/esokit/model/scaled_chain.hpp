@@ -106,15 +106,17 @@ struct ScaledChain : ChainSize<Order, Extension> {
     return x;
   }
 
-  /// A number that is finite only if every estimate is finite in physical units: their sum, with
-  /// rates. Horner, so N - 1 multiply-adds; its value has no meaning.
+  /// A number that is finite only if every estimate is finite in physical units: the sum of their
+  /// magnitudes, so that large ones of opposite sign do not hide each other. Horner, N - 1
+  /// multiply-adds; its value has no other meaning. @param rate 1/T, 1/s
   [[nodiscard]] ESOKIT_INLINE static constexpr ScalarType finite_probe(
       const State& x, const ScalarType& rate) noexcept {
-    ScalarType probe = std::get<size - 1>(x);
+    ScalarType probe = detail::absolute(std::get<size - 1>(x));
     detail::unroll<size - 1>([&](auto k) ESOKIT_INLINE_LAMBDA {
       constexpr int row = size - 2 - k;
       constexpr double weight = static_cast<double>(row + 1);
-      probe = probe * (detail::constant<ScalarType>(weight) * rate) + std::get<row>(x);
+      probe = probe * (detail::constant<ScalarType>(weight) * rate) +
+              detail::absolute(std::get<row>(x));
     });
     return probe;
   }

@@ -87,7 +87,7 @@ class AlgebraicEso
       }
     }
     const Law law(config.observer_bandwidth, config.frequency_shift, config.sample_time,
-                  static_cast<std::uint32_t>(config.start_index));
+                  static_cast<std::uint32_t>(config.start_index), *hold);
     for (const S& gain : law.gain(S(0.0))) {
       if (auto ok =
               check_representable("frequency_shift", config.frequency_shift, gain,
@@ -120,7 +120,8 @@ class AlgebraicEso
     Estimate published = estimate();
     published(Order) =
         published(Order) + (this->input_gain() - fresh->input_gain()) * this->applied_input();
-    std::get<0>(fresh->laws()).resume(age());
+    // One that has settled stays so, and no longer knows its age.
+    std::get<0>(fresh->laws()).resume(settled() ? Law::max_index : age());
     if (auto ok = this->adopt(*fresh); !ok) return ok;
     held_ = published;
     hold_samples_ = fresh->hold_samples_;
@@ -166,7 +167,7 @@ class AlgebraicEso
     return S(static_cast<double>(hold_samples_)) * this->sample_time();
   }
 
-  /// Samples since the schedule began.
+  /// Samples since the schedule began; the count ends where it settles.
   [[nodiscard]] std::uint32_t age() const noexcept { return std::get<0>(this->laws()).age(); }
 
  private:
@@ -269,8 +270,8 @@ class ContinuousAlgebraicGain {
   ContinuousAlgebraicGain(const S& bandwidth, const S& shift)
       : bandwidth_(bandwidth), shift_(shift) {}
 
-  /// L(t), N x 1, for t > 0 (s); infinite at t = 0.
-  [[nodiscard]] Vector<S, Size> gain(const S& t, const S&) const {
+  /// P_0 .. P_N at t > 0 (s); P_j in 1/s^j. All terms are positive.
+  [[nodiscard]] Array<S, Size + 1> factors(const S& t) const {
     using std::expm1;
     // With w = q v, which is 1/t for q = 0: P_{j+1} = (lambda + N w) P_j + w (q + w) dP_j/dw.
     const auto shifting = shift_ > S(0.0);
@@ -279,7 +280,8 @@ class ContinuousAlgebraicGain {
     Array<S, Size + 1> polynomial{};
     for (S& c : polynomial) c = S(0.0);
     polynomial[0] = S(1.0);
-    Vector<S, Size> gain;
+    Array<S, Size + 1> factors{};
+    factors[0] = S(1.0);
     for (int j = 1; j <= Size; ++j) {
       for (int r = j; r >= 0; --r) {
         const auto i = static_cast<std::size_t>(r);
@@ -290,7 +292,17 @@ class ContinuousAlgebraicGain {
       }
       S value(0.0);
       for (int r = j; r >= 0; --r) value = value * w + polynomial[static_cast<std::size_t>(r)];
-      gain(j - 1) = S(binomial(Size, j)) * value;
+      factors[static_cast<std::size_t>(j)] = value;
+    }
+    return factors;
+  }
+
+  /// L(t), N x 1, for t > 0 (s); infinite at t = 0.
+  [[nodiscard]] Vector<S, Size> gain(const S& t, const S&) const {
+    const auto p = factors(t);
+    Vector<S, Size> gain;
+    for (int j = 1; j <= Size; ++j) {
+      gain(j - 1) = S(binomial(Size, j)) * p[static_cast<std::size_t>(j)];
     }
     return gain;
   }

@@ -46,12 +46,14 @@ class AlgebraicGain {
   /// @param bandwidth lambda >= 0, rad/s: the bandwidth that is left in the end
   /// @param shift q >= 0, rad/s: how fast it falls there
   /// @param start_index k0 >= 0, sample of the schedule to begin with (soft start)
-  AlgebraicGain(const S& bandwidth, const S& shift, const S& sample_time,
-                std::uint32_t start_index) noexcept
+  /// @param least_age samples that are counted before the schedule may settle
+  AlgebraicGain(const S& bandwidth, const S& shift, const S& sample_time, std::uint32_t start_index,
+                std::uint32_t least_age = 0) noexcept
       : final_poles_(EqualSampledPoles<Size, S>::from_bandwidth(bandwidth, sample_time)),
         shift_(EqualSampledPoles<Size, S>::from_bandwidth(shift, sample_time)),
         decay_(decay(shift, sample_time)),
-        start_index_(start_index) {
+        start_index_(start_index),
+        least_age_(least_age) {
     set_coefficients();
     restart();
   }
@@ -91,14 +93,15 @@ class AlgebraicGain {
   /// The bandwidth at this place in the schedule, frozen, for the whole gap.
   [[nodiscard]] ScaledGain<Size, S> gap_gain(const S&, unsigned samples) const noexcept {
     if (settled_) return esokit::gap_gain<Size, S>(final_poles_, samples);
-    // A restarted schedule is deadbeat from any state; it needs no gap.
-    if (deadbeat()) return gain_;
+    // Deadbeat for the longer step: its first gain is 1 as well, so that N samples in a row make
+    // the estimate exact all the same, and gaps that recur do not diverge.
+    if (deadbeat()) return esokit::gap_gain<Size, S>(EqualSampledPoles<Size, S>{S(1.0)}, samples);
     const S a = final_poles_.contraction;
     const S now = a + (S(1.0) - a) * (size_bracket_ * std::get<0>(ratios_u_));
     return esokit::gap_gain<Size, S>(EqualSampledPoles<Size, S>{now}, samples);
   }
 
-  /// Samples since the schedule began.
+  /// Samples since the schedule began; the count ends where it settles.
   [[nodiscard]] constexpr std::uint32_t age() const noexcept { return age_; }
 
   /// True once the gain is that of LinearEso with bandwidth lambda, to within rounding.
@@ -122,7 +125,7 @@ class AlgebraicGain {
     }
     push();
     set_gain();
-    if (all(settled_below_ >= std::get<0>(ratios_u_))) [[unlikely]] {
+    if (all(settled_below_ >= std::get<0>(ratios_u_)) && age_ > least_age_) [[unlikely]] {
       settle();
     }
   }
@@ -263,6 +266,7 @@ class AlgebraicGain {
   S power_{};                         ///< p^(i-N) of the next i
   S bracket_{};                       ///< [i-N] of the next i
   std::uint32_t start_index_;
+  std::uint32_t least_age_;
   std::uint32_t age_ = 0;
   bool pending_ = false;
   bool settled_ = false;

@@ -23,8 +23,14 @@ namespace esokit {
 /// - `gap_gain(e, samples) const`: the gain where `samples` > 1 sample times have passed since the
 ///   last correction. Without it `gain(e)` is used; a constant nominal gain makes recurring gaps
 ///   diverge, a law that follows time in `advance()` needs none.
+/// - `bears_any_innovation`, a static constant true: `gain(e)` may be asked with an e that is not
+///   finite (its answer is then not used); saves the observer a test.
 /// - `gain_before_measurement() const`: the gain of the next correction where it does not depend on
 ///   e. It must equal gain(e).
+/// - `shrinking_gain() const`, `otherwise_gain() const`, `shrinks(e) const`: the gain is one of two
+///   that are known before the measurement.
+/// - `linear_gain() const`, `factor(e) const`: the gain is factor(e) times one that is known before
+///   the measurement. These let PredictiveAdrc work ahead.
 template <class Law, int Size, class S>
 concept GainLaw = std::copyable<Law> && requires(const Law& law, const S& innovation) {
   { law.gain(innovation) }

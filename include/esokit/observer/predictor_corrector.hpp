@@ -18,7 +18,7 @@ template <Scalar S>
 struct ChainConfig {
   S input_gain{};     ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
   S sample_time{};    ///< T, s
-  int max_gap = 100;  ///< missing samples in a row that a correction may bridge, 1 .. 65534;
+  int max_gap = 100;  ///< missing samples in a row that a correction may bridge, 1 .. 65000;
                       ///< after more it restarts from the measurement
 };
 
@@ -97,6 +97,10 @@ class PredictorCorrector {
     Correction step{states_};
     if constexpr (PlainScalar<S>) {
       if (!correct_levels<false>(step, y, elapsed) || !is_finite(probe(step.states))) {
+        // An absurd but finite u can leave a prediction from which no good y leads back.
+        const bool state_is_to_blame =
+            is_finite(y) && detail::absolute(y) < detail::absolute(states_[0][0]);
+        if (state_is_to_blame && reset(y) == StepStatus::ok) return StepStatus::restarted;
         return StepStatus::measurement_rejected;
       }
       commit(step);
@@ -113,7 +117,9 @@ class PredictorCorrector {
       }
       commit(step);
       gap_ = 0;
-      return all(good) ? StepStatus::ok : StepStatus::measurement_rejected;
+      StepStatus status = elapsed > 1 ? StepStatus::gap_bridged : StepStatus::ok;
+      if (!all(good)) status |= StepStatus::measurement_rejected;
+      return status;
     }
   }
 
@@ -128,6 +134,19 @@ class PredictorCorrector {
   [[nodiscard]] constexpr S estimate() const noexcept {
     static_assert(Row >= 0 && Row < size, "esokit: no such estimate");
     return Chain::template physical<Row>(std::get<Row>(up_to_level<Levels - 1>()), rate_);
+  }
+
+  /// The same in the scaling of the chain, x_r = T^r z_r / r!, for laws that fold the factors into
+  /// their gains.
+  template <int Row>
+  [[nodiscard]] ESOKIT_INLINE constexpr S scaled_estimate() const noexcept {
+    static_assert(Row >= 0 && Row < size, "esokit: no such estimate");
+    S sum = std::get<Row>(std::get<Levels - 1>(states_));
+    if constexpr (Row >= Order) {
+      detail::unroll<Levels - 1>(
+          [&](auto i) ESOKIT_INLINE_LAMBDA { sum = sum + std::get<Row>(std::get<i>(states_)); });
+    }
+    return sum;
   }
 
   /// Estimate of level `level` = 0 .. p - 1 of a cascade: its plant states, and the disturbance
@@ -152,6 +171,66 @@ class PredictorCorrector {
   /// Input that the last prediction used.
   [[nodiscard]] constexpr const S& applied_input() const noexcept { return applied_input_; }
 
+  /// What a coming `correct(y)` will make of the estimate, in scaled states (x_r = T^r z_r / r!).
+  /// For a controller that works ahead of the measurement.
+  struct Preview {
+    typename Chain::State offset;  ///< after correct(y) the estimate will be offset + slope y
+    typename Chain::State slope;
+  };
+
+  /// Between `predict` and `correct`, for gain laws whose gain is known before the measurement.
+  [[nodiscard]] Preview preview() const noexcept requires PresetGainLaw<Law, size, S> {
+    Correction slope{};
+    for_each_state(slope.states, [](S& x) { x = S(0.0); });
+    Correction offset = slope;
+    if (restarts()) [[unlikely]] {
+      for (auto& state : slope.states) state[0] = S(1.0);
+    } else {
+      const unsigned elapsed = gap_ > 1 ? gap_ : 1u;
+      offset.states = states_;
+      correct_levels<false>(offset, S(0.0), elapsed);
+      correct_levels<false>(slope, S(1.0), elapsed);
+    }
+    return {up_to_level<Levels - 1>(offset.states), up_to_level<Levels - 1>(slope.states)};
+  }
+
+  /// The scaled gain with which a coming `correct(y)` will weigh the innovation e; after a gap that
+  /// of the gap. A gap beyond `max_gap` is none of its business: `correct` restarts then.
+  [[nodiscard]] ScaledGain<size, S> correction_gain(const S& e) const noexcept
+      requires(Levels == 1) {
+    return law_gain(std::get<0>(laws_), e, gap_ > 1 ? gap_ : 1u);
+  }
+
+  /// The gain law, for a controller that works ahead of the measurement.
+  [[nodiscard]] constexpr const Law& gain_law() const noexcept requires(Levels == 1) {
+    return std::get<0>(laws_);
+  }
+
+  /// True if so many samples are missing that the next `correct` restarts.
+  [[nodiscard]] constexpr bool restarts() const noexcept { return gap_ > max_gap_ + 1u; }
+
+  /// After `predict`, before `correct`: the actuator held `u_applied` and not what `predict` was
+  /// told. Adds Gamma (u_applied - u_told) to the prediction. A u that is bad, or would make the
+  /// prediction not finite, changes nothing and is reported.
+  StepStatus revise_input(S u_applied) noexcept {
+    const S drive = scaled_input_gain_ * (u_applied - applied_input_);
+    LevelStates next = states_;
+    for (auto& state : next) {
+      detail::unroll<Order>([&](auto r) ESOKIT_INLINE_LAMBDA {
+        constexpr double weight = binomial(Order, r);
+        std::get<r>(state) = std::get<r>(state) + detail::constant<S>(weight) * drive;
+      });
+    }
+    const auto good = is_finite(probe(next));
+    for (std::size_t i = 0; i < Levels; ++i) {
+      for (std::size_t r = 0; r < Order; ++r) {
+        states_[i][r] = select(good, next[i][r], states_[i][r]);
+      }
+    }
+    applied_input_ = select(good, u_applied, applied_input_);
+    return all(good) ? StepStatus::ok : StepStatus::input_rejected;
+  }
+
   /// b0.
   [[nodiscard]] constexpr S input_gain() const noexcept {
     return Chain::input_gain(scaled_input_gain_, rate_);
@@ -159,6 +238,13 @@ class PredictorCorrector {
 
   /// T, s.
   [[nodiscard]] constexpr S sample_time() const noexcept { return S(1.0) / rate_; }
+
+  /// Gain of the next correction of level `level` = 0 .. p - 1, scaled; for laws that know it
+  /// before the measurement.
+  [[nodiscard]] constexpr ScaledGain<size, S> level_gain(int level) const noexcept requires
+      PresetGainLaw<Law, size, S> {
+    return laws_[static_cast<std::size_t>(level)].gain_before_measurement();
+  }
 
   /// Starts anew at (y, 0, .., 0). A y that is not finite changes nothing and is reported.
   StepStatus reset(S y) noexcept {
@@ -172,6 +258,21 @@ class PredictorCorrector {
   /// nothing and is reported.
   StepStatus reset(const Estimate& state) noexcept {
     return reset_scaled(Chain::scaled(state, sample_time()));
+  }
+
+  /// Moves the origin of y: every level's z_1 grows by `offset`. For periodic quantities, whose
+  /// estimate would otherwise run away with the turns.
+  /// An offset that is not finite changes nothing.
+  constexpr void shift_output(const S& offset) noexcept {
+    const S finite = select(is_finite(offset), offset, S(0.0));
+    for (auto& state : states_) state[0] = state[0] + finite;
+  }
+
+  /// Adds `offset` (unit of y^(n)) to dhat, as a change of what else explains y^(n) asks for.
+  /// An offset that is not finite changes nothing.
+  constexpr void shift_disturbance(const S& offset) noexcept {
+    const S finite = select(is_finite(offset), offset, S(0.0));
+    states_[0][Order] = states_[0][Order] + Chain::scaled_input_gain(finite, sample_time());
   }
 
  protected:
@@ -201,8 +302,8 @@ class PredictorCorrector {
         !ok) {
       return ok;
     }
-    if (config.max_gap < 1 || config.max_gap > 65534) {
-      return Error<S>{"max_gap", S(static_cast<double>(config.max_gap)), "must be 1 .. 65534"};
+    if (config.max_gap < 1 || config.max_gap > 65000) {
+      return Error<S>{"max_gap", S(static_cast<double>(config.max_gap)), "must be 1 .. 65000"};
     }
     return {};
   }
@@ -290,26 +391,32 @@ class PredictorCorrector {
   /// Scaled state of a level, with the disturbances of the levels below it added to its own.
   template <int Level>
   [[nodiscard]] ESOKIT_INLINE constexpr typename Chain::State up_to_level() const noexcept {
-    typename Chain::State state = std::get<Level>(states_);
+    return up_to_level<Level>(states_);
+  }
+
+  template <int Level>
+  [[nodiscard]] ESOKIT_INLINE static constexpr typename Chain::State up_to_level(
+      const LevelStates& states) noexcept {
+    typename Chain::State state = std::get<Level>(states);
     detail::unroll<Level>([&](auto i) ESOKIT_INLINE_LAMBDA {
       detail::unroll<Extension>([&](auto r) ESOKIT_INLINE_LAMBDA {
         constexpr int row = Order + r;
-        std::get<row>(state) = std::get<row>(state) + std::get<row>(std::get<i>(states_));
+        std::get<row>(state) = std::get<row>(state) + std::get<row>(std::get<i>(states));
       });
     });
     return state;
   }
 
-  /// Finite only if all states are finite; see ScaledChain::finite_probe. Levels are added up
-  /// first, which costs less than a probe each and hides nothing: infinities do not cancel.
+  /// Finite only if all scaled states and the estimates in physical units are; see
+  /// ScaledChain::finite_probe. The plant states of lower levels need no probe of their own: they
+  /// are added, and infinities do not cancel.
   [[nodiscard]] ESOKIT_INLINE constexpr S probe(const LevelStates& states) const noexcept {
-    typename Chain::State sum = std::get<0>(states);
+    S sum = Chain::finite_probe(up_to_level<Levels - 1>(states), rate_);
     detail::unroll<Levels - 1>([&](auto i) ESOKIT_INLINE_LAMBDA {
-      detail::unroll<size>([&](auto r) ESOKIT_INLINE_LAMBDA {
-        std::get<r>(sum) = std::get<r>(sum) + std::get<r>(std::get<i + 1>(states));
-      });
+      detail::unroll<Order>(
+          [&](auto r) ESOKIT_INLINE_LAMBDA { sum = sum + std::get<r>(std::get<i>(states)); });
     });
-    return Chain::finite_probe(sum, rate_);
+    return sum;
   }
 
   [[nodiscard]] constexpr decltype(auto) law_gain(const Law& law, const S& innovation,
@@ -327,7 +434,9 @@ class PredictorCorrector {
   template <bool NominalGain>
   ESOKIT_INLINE constexpr bool correct_levels(Correction& step, S y,
                                               unsigned elapsed) const noexcept {
-    constexpr bool law_looks = !PresetGainLaw<Law, size, S>;
+    constexpr bool law_looks = !PresetGainLaw<Law, size, S> && !requires {
+      requires Law::bears_any_innovation;
+    };
     bool fine = true;
     S measured = y;
     detail::unroll<Levels>([&](auto level) ESOKIT_INLINE_LAMBDA {

@@ -19,6 +19,8 @@ enum class StepStatus : unsigned char {
   restarted = 16,
   /// The state given to a reset was not finite: nothing changed.
   state_rejected = 32,
+  /// y lay too far from its prediction for the observer's outlier gate: predicted only.
+  outlier_rejected = 64,
 };
 
 constexpr StepStatus operator|(StepStatus a, StepStatus b) noexcept {

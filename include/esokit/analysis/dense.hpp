@@ -1,0 +1,221 @@
+/// @file
+/// Small dense kernels in plain loops: linear equations and eigenvalues.
+///
+/// They run on the caller's storage with the size as an argument, so that one instantiation serves
+/// all sizes: Eigen's solvers of fixed size cost seconds of compile time for each (EigenSolver: 7
+/// s).
+#pragma once
+
+#include <cmath>
+#include <complex>
+#include <cstddef>
+#include <esokit/core/scalar.hpp>
+#include <utility>
+
+namespace esokit::detail {
+
+/// A column-major square or rectangle of the caller's, as Eigen stores it.
+template <class T>
+struct DenseView {
+  T* data;
+  int rows;
+  [[nodiscard]] T& operator()(int i, int j) const noexcept {
+    return data[static_cast<std::ptrdiff_t>(j) * rows + i];
+  }
+};
+
+/// out = a b, all n x n; `out` is neither of them.
+inline void multiply(const double* a, const double* b, double* out, int n) noexcept {
+  for (int j = 0; j < n; ++j) {
+    for (int i = 0; i < n; ++i) out[j * n + i] = 0.0;
+    for (int k = 0; k < n; ++k) {
+      const double factor = b[j * n + k];
+      for (int i = 0; i < n; ++i) out[j * n + i] += a[k * n + i] * factor;
+    }
+  }
+}
+
+/// out = a b', all n x n; `out` is neither of them.
+inline void multiply_transposed(const double* a, const double* b, double* out, int n) noexcept {
+  for (int i = 0; i < n * n; ++i) out[i] = 0.0;
+  for (int k = 0; k < n; ++k) {
+    for (int j = 0; j < n; ++j) {
+      const double factor = b[k * n + j];
+      for (int i = 0; i < n; ++i) out[j * n + i] += a[k * n + i] * factor;
+    }
+  }
+}
+
+/// Solves a x = b in place of b by elimination with row pivoting; `a` is overwritten. Nothing is
+/// reported of a singular a: x is not finite then, or large.
+template <class T>
+void solve_in_place(DenseView<T> a, DenseView<T> b, int columns) noexcept {
+  const int n = a.rows;
+  for (int k = 0; k < n; ++k) {
+    int pivot = k;
+    for (int i = k + 1; i < n; ++i) {
+      if (std::abs(a(i, k)) > std::abs(a(pivot, k))) pivot = i;
+    }
+    if (pivot != k) {
+      for (int j = k; j < n; ++j) std::swap(a(k, j), a(pivot, j));
+      for (int j = 0; j < columns; ++j) std::swap(b(k, j), b(pivot, j));
+    }
+    for (int i = k + 1; i < n; ++i) {
+      if (a(i, k) == T(0)) continue;
+      const T factor = a(i, k) / a(k, k);
+      for (int j = k + 1; j < n; ++j) a(i, j) -= factor * a(k, j);
+      for (int j = 0; j < columns; ++j) b(i, j) -= factor * b(k, j);
+    }
+  }
+  for (int j = 0; j < columns; ++j) {
+    for (int i = n - 1; i >= 0; --i) {
+      for (int k = i + 1; k < n; ++k) b(i, j) -= a(i, k) * b(k, j);
+      b(i, j) /= a(i, i);
+    }
+  }
+}
+
+/// Eigenvalues of the symmetric a onto its diagonal, eigenvectors into the columns of v, by Jacobi
+/// rotations.
+inline void symmetric_eigenvalues(DenseView<double> a, DenseView<double> v) noexcept {
+  const int n = a.rows;
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) v(i, j) = i == j ? 1.0 : 0.0;
+  }
+  for (int sweep = 0; sweep < 40; ++sweep) {
+    bool rotated = false;
+    for (int p = 0; p < n; ++p) {
+      for (int q = p + 1; q < n; ++q) {
+        const double off = a(p, q);
+        if (!(std::abs(off) > 1e-17 * (std::abs(a(p, p)) + std::abs(a(q, q))))) continue;
+        rotated = true;
+        const double ratio = (a(q, q) - a(p, p)) / (2.0 * off);
+        const double tangent =
+            (ratio < 0.0 ? -1.0 : 1.0) / (std::abs(ratio) + std::sqrt(1.0 + ratio * ratio));
+        const double c = 1.0 / std::sqrt(1.0 + tangent * tangent);
+        const double s = tangent * c;
+        const auto rotate = [&](double& x, double& y) {
+          const double old = x;
+          x = c * old - s * y;
+          y = s * old + c * y;
+        };
+        for (int k = 0; k < n; ++k) rotate(a(k, p), a(k, q));
+        for (int k = 0; k < n; ++k) rotate(a(p, k), a(q, k));
+        for (int k = 0; k < n; ++k) rotate(v(k, p), v(k, q));
+      }
+    }
+    if (!rotated) return;
+  }
+}
+
+/// Makes h upper Hessenberg by similarity, with elimination and pivoting.
+inline void to_hessenberg(DenseView<std::complex<double>> h) noexcept {
+  const int n = h.rows;
+  for (int m = 1; m + 1 < n; ++m) {
+    int pivot = m;
+    for (int i = m + 1; i < n; ++i) {
+      if (std::abs(h(i, m - 1)) > std::abs(h(pivot, m - 1))) pivot = i;
+    }
+    if (pivot != m) {
+      for (int j = 0; j < n; ++j) std::swap(h(m, j), h(pivot, j));
+      for (int i = 0; i < n; ++i) std::swap(h(i, m), h(i, pivot));
+    }
+    if (h(m, m - 1) == 0.0) continue;
+    for (int i = m + 1; i < n; ++i) {
+      const std::complex<double> factor = h(i, m - 1) / h(m, m - 1);
+      if (factor == 0.0) continue;
+      for (int j = 0; j < n; ++j) h(i, j) -= factor * h(m, j);
+      for (int k = 0; k < n; ++k) h(k, m) += factor * h(k, i);
+    }
+  }
+}
+
+/// Nearer one to h22 of the eigenvalues of ((h11, h12), (h21, h22)).
+inline std::complex<double> wilkinson_shift(std::complex<double> h11, std::complex<double> h12,
+                                            std::complex<double> h21,
+                                            std::complex<double> h22) noexcept {
+  const std::complex<double> half = 0.5 * (h11 - h22);
+  const std::complex<double> product = h12 * h21;
+  const std::complex<double> root = std::sqrt(half * half + product);
+  const std::complex<double> one = half + root;
+  const std::complex<double> other = half - root;
+  const std::complex<double> larger = std::abs(one) > std::abs(other) ? one : other;
+  return larger == 0.0 ? h22 : h22 - product / larger;
+}
+
+/// One QR step with a shift on rows and columns low .. high of a Hessenberg matrix, which is that
+/// of the eigenvalues alone: the rest is not updated.
+inline void qr_step(DenseView<std::complex<double>> h, int low, int high,
+                    std::complex<double> shift) noexcept {
+  using Complex = std::complex<double>;
+  // The rotation of rows k, k + 1 is applied to the columns one step later.
+  double c_before = 0.0;
+  Complex s_before = 0.0;
+  for (int i = low; i <= high; ++i) h(i, i) -= shift;
+  for (int k = low; k <= high; ++k) {
+    double c = 1.0;
+    Complex s = 0.0;
+    if (k < high) {
+      const double size = std::hypot(std::abs(h(k, k)), std::abs(h(k + 1, k)));
+      if (size > 0.0) {
+        const double diagonal = std::abs(h(k, k));
+        const Complex phase = diagonal > 0.0 ? h(k, k) / diagonal : Complex(1.0);
+        c = diagonal / size;
+        s = phase * std::conj(h(k + 1, k)) / size;
+        for (int j = k; j <= high; ++j) {
+          const Complex upper = h(k, j);
+          const Complex lower = h(k + 1, j);
+          h(k, j) = c * upper + s * lower;
+          h(k + 1, j) = -std::conj(s) * upper + c * lower;
+        }
+      }
+    }
+    if (k > low) {
+      for (int i = low; i <= k; ++i) {
+        const Complex left = h(i, k - 1);
+        const Complex right = h(i, k);
+        h(i, k - 1) = c_before * left + std::conj(s_before) * right;
+        h(i, k) = -s_before * left + c_before * right;
+      }
+    }
+    c_before = c;
+    s_before = s;
+  }
+  for (int i = low; i <= high; ++i) h(i, i) += shift;
+}
+
+/// Eigenvalues of h, which is overwritten, into `values`. False if the iteration does not end.
+inline bool eigenvalues(DenseView<std::complex<double>> h, std::complex<double>* values) noexcept {
+  const int n = h.rows;
+  double size = 0.0;
+  for (int j = 0; j < n; ++j) {
+    for (int i = 0; i < n; ++i) size += std::abs(h(i, j));
+  }
+  if (!is_finite(size)) return false;
+  to_hessenberg(h);
+  int high = n - 1;
+  int steps = 0;
+  while (high >= 0) {
+    int low = high;
+    for (; low > 0; --low) {
+      const double beside = std::abs(h(low, low)) + std::abs(h(low - 1, low - 1));
+      if (std::abs(h(low, low - 1)) <= 1e-16 * (beside > 0.0 ? beside : size)) break;
+    }
+    if (low > 0) h(low, low - 1) = 0.0;
+    if (low == high) {
+      values[high] = h(high, high);
+      --high;
+      steps = 0;
+      continue;
+    }
+    if (++steps > 200) return false;
+    std::complex<double> shift =
+        wilkinson_shift(h(high - 1, high - 1), h(high - 1, high), h(high, high - 1), h(high, high));
+    // Out of a cycle.
+    if (steps % 20 == 0) shift += std::abs(h(high, high - 1));
+    qr_step(h, low, high, shift);
+  }
+  return true;
+}
+
+}  // namespace esokit::detail

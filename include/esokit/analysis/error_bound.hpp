@@ -1,0 +1,248 @@
+/// @file
+/// Bounds on the estimation error that Lyapunov functions prove, in the form of the papers and
+/// corrected: what a proof promises for your numbers. `peak_gain` says what is true.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <esokit/analysis/lyapunov_matrix.hpp>
+#include <esokit/core/combinatorics.hpp>
+#include <esokit/observer/cascade_eso.hpp>
+#include <esokit/observer/linear_eso.hpp>
+
+namespace esokit {
+
+/// What the error comes from, by its largest size.
+struct ErrorSources {
+  double disturbance_rate = 0.0;   ///< largest abs(d^(m)), for m = 1 unit of d per s
+  double measurement_noise = 0.0;  ///< largest abs(v), unit of y
+};
+
+/// A bound on z - zhat. It lives in the scaled error zeta_i = omega^(N-i) (z_i - zhat_i), i = 1..N,
+/// for which norm(zeta(t)) <= gamma (norm(zeta(0)) e^(-rate t) + level (1 - e^(-rate t))).
+template <int Size>
+struct ErrorBound {
+  double bandwidth = 0.0;  ///< omega, rad/s
+  double gamma = 0.0;      ///< sqrt(lambda_max(P) / lambda_min(P))
+  double level = 0.0;      ///< unit of d^(m-1)
+  double rate = 0.0;       ///< 1/s
+
+  /// Bound on each abs(z_i - zhat_i) once the start is forgotten, N x 1, physical units.
+  [[nodiscard]] Vector<double, Size> ultimate() const { return unscaled(gamma * level); }
+
+  /// The same at a time t (s) after an initial error z(0) - zhat(0), N x 1.
+  [[nodiscard]] Vector<double, Size> at(double t, const Vector<double, Size>& initial) const {
+    const double decay = std::exp(-rate * t);
+    return unscaled(gamma * (scaled_norm(initial) * decay + level * (1.0 - decay)));
+  }
+
+  /// Time (s) after which the bound is within `excess` of its ultimate value, 0 if it always is.
+  /// @return error without a source of error (then it is never reached), or for excess <= 0
+  [[nodiscard]] Expected<double, Error<double>> convergence_time(
+      const Vector<double, Size>& initial, double excess = 0.1) const {
+    if (auto ok = check_positive("excess", excess); !ok) return ok.error();
+    if (!(level > 0.0)) {
+      return Error<double>{"level", level, "must be positive: a bound of zero is never reached"};
+    }
+    const double over = (scaled_norm(initial) - level) / (excess * level);
+    return over > 1.0 ? std::log(over) / rate : 0.0;
+  }
+
+  /// norm(zeta) of an error in physical units.
+  [[nodiscard]] double scaled_norm(const Vector<double, Size>& error) const {
+    double sum = 0.0;
+    for (int i = 0; i < Size; ++i) {
+      const double zeta = error(i) * std::pow(bandwidth, Size - 1 - i);
+      sum += zeta * zeta;
+    }
+    return std::sqrt(sum);
+  }
+
+ private:
+  [[nodiscard]] Vector<double, Size> unscaled(double norm) const {
+    Vector<double, Size> bound;
+    for (int i = 0; i < Size; ++i) bound(i) = norm * std::pow(bandwidth, i + 1 - Size);
+    return bound;
+  }
+};
+
+namespace detail {
+
+inline Check<double> check_sources(const ErrorSources& sources) {
+  if (auto ok = check_not_negative("disturbance_rate", sources.disturbance_rate); !ok) return ok;
+  return check_not_negative("measurement_noise", sources.measurement_noise);
+}
+
+/// kappa_i = C(N, i) factor^i: the scaled gains of poles at -factor omega.
+template <int Size>
+Vector<double, Size> binomial_gain(double factor = 1.0) {
+  Vector<double, Size> gain;
+  for (int i = 0; i < Size; ++i) gain(i) = binomial(Size, i + 1) * std::pow(factor, i + 1);
+  return gain;
+}
+
+/// H* = A - kappa c': the scaled error obeys zeta' = omega H* zeta + .. .
+template <int Size>
+Matrix<double, Size, Size> scaled_error_matrix(const Vector<double, Size>& gain) {
+  Matrix<double, Size, Size> h = Matrix<double, Size, Size>::Zero();
+  for (int i = 0; i < Size; ++i) {
+    h(i, 0) = -gain(i);
+    if (i + 1 < Size) h(i, i + 1) += 1.0;
+  }
+  return h;
+}
+
+/// From V = zeta' P zeta: V' <= -omega norm^2 + 2 norm(P) norm drive.
+template <int Size>
+ErrorBound<Size> bound_from(const LyapunovMatrix<Size>& lyapunov, double bandwidth, double drive) {
+  return {bandwidth, lyapunov.gamma(), 2.0 * lyapunov.largest * drive / bandwidth,
+          bandwidth / (2.0 * lyapunov.largest)};
+}
+
+/// Bound for an observer whose scaled gain wanders in any way between two gains.
+template <int Size>
+Expected<ErrorBound<Size>, Error<double>> bound_between(const Vector<double, Size>& gain1,
+                                                        const Vector<double, Size>& gain2,
+                                                        double bandwidth,
+                                                        const ErrorSources& sources) {
+  if (auto ok = check_positive("observer_bandwidth", bandwidth); !ok) return ok.error();
+  if (auto ok = check_sources(sources); !ok) return ok.error();
+  const std::array<Matrix<double, Size, Size>, 2> modes = {scaled_error_matrix<Size>(gain1),
+                                                           scaled_error_matrix<Size>(gain2)};
+  const auto lyapunov = common_lyapunov_matrix<Size>(modes);
+  if (!lyapunov) return lyapunov.error();
+  const double gain = std::max(gain1.norm(), gain2.norm());
+  return bound_from(
+      *lyapunov, bandwidth,
+      sources.disturbance_rate + std::pow(bandwidth, Size) * gain * sources.measurement_noise);
+}
+
+}  // namespace detail
+
+/// Bound for the continuous linear ESO: K. Lakomy, R. Madonski, ISA Transactions 109 (2021), (11),
+/// with P from (8) and the corrections: norm(kappa) for kappa_max, squared norms in (7).
+///
+///   drive = max abs(d^(m)) + omega^N norm(kappa) max abs(v),  level = 2 norm(P) drive / omega
+/// @return error for a bad config or source
+template <int Size>
+Expected<ErrorBound<Size>, Error<double>> linear_error_bound(
+    const ContinuousLinearEsoConfig<Size, double, EqualPoles>& config,
+    const ErrorSources& sources) {
+  const double w = config.observer_bandwidth;
+  if (auto ok = check_positive("observer_bandwidth", w); !ok) return ok.error();
+  if (auto ok = detail::check_sources(sources); !ok) return ok.error();
+  const Vector<double, Size> gain = detail::binomial_gain<Size>();
+  const auto lyapunov = lyapunov_matrix<Size>(detail::scaled_error_matrix<Size>(gain));
+  if (!lyapunov) return lyapunov.error();
+  return detail::bound_from(
+      *lyapunov, w,
+      sources.disturbance_rate + std::pow(w, Size) * gain.norm() * sources.measurement_noise);
+}
+
+/// Bounds for the continuous cascade ESO, one a level, each for the error of (24) with the levels
+/// up to it: (22), (30) of the same paper in corrected form. The last one is that of the estimate.
+///
+/// With z_i the estimate by the levels up to i and l_i their gains, (26) reads
+///   z~_i' = H_i z~_i + b d' + (l_i - b b' l_{i-1}) c' z~_{i-1}
+///           + sum_{j<i-1} b b' (l_{j+1} - l_j) c' z~_j - b b' l_1 v,
+/// (for m > 1: b b' the projection on all disturbance rows), so that beside d' the levels before
+/// drive level i by their bounds, with omega_j (alpha^(n+1) - 1) for j < i - 1; only level 1 has
+/// norm(kappa) omega^N at the noise. `rate` and `at` count from when the levels before have
+/// settled.
+/// @tparam Order n @return error for a bad config or source
+template <int Order, int Size, int Levels>
+Expected<Array<ErrorBound<Size>, Levels>, Error<double>> cascade_error_bounds(
+    const ContinuousCascadeEsoConfig<Size, Levels, double, EqualPoles>& config,
+    const ErrorSources& sources) {
+  static_assert(Order >= 1 && Order < Size, "esokit: the order leaves no extended state");
+  const auto levels = detail::level_specs<EqualPoles, Size, Levels, double>(config);
+  if (!levels) return levels.error();
+  if (auto ok = detail::check_sources(sources); !ok) return ok.error();
+  const Array<double, Levels>& w = levels->specs;
+  for (std::size_t i = 0; i < Levels; ++i) {
+    if (auto ok = check_positive(levels->field, w[i], static_cast<int>(i)); !ok) return ok.error();
+  }
+  const Vector<double, Size> gain = detail::binomial_gain<Size>();
+  const auto lyapunov = lyapunov_matrix<Size>(detail::scaled_error_matrix<Size>(gain));
+  if (!lyapunov) return lyapunov.error();
+
+  Array<ErrorBound<Size>, Levels> bounds{};
+  for (std::size_t i = 0; i < Levels; ++i) {
+    // A term g c' z~_j, scaled for level i: norm of omega_i^(N-r) g_r, times the bound on z~_j1.
+    const auto size_of = [&](const auto& term) {
+      double sum = 0.0;
+      for (int r = 0; r < Size; ++r) {
+        const double scaled = term(r) * std::pow(w[i], Size - 1 - r);
+        sum += scaled * scaled;
+      }
+      return std::sqrt(sum);
+    };
+    const auto row = [&](std::size_t level, int r) { return gain(r) * std::pow(w[level], r + 1); };
+    const auto disturbance = [](int r) { return r >= Order; };
+    double drive = sources.disturbance_rate;
+    drive += sources.measurement_noise *
+             size_of([&](int r) { return i == 0 || disturbance(r) ? row(0, r) : 0.0; });
+    for (std::size_t j = 0; j < i; ++j) {
+      const double before = bounds[j].ultimate()(0);
+      drive += before * size_of([&](int r) {
+                 if (j + 1 == i) return row(i, r) - (disturbance(r) ? row(j, r) : 0.0);
+                 return disturbance(r) ? row(j + 1, r) - row(j, r) : 0.0;
+               });
+    }
+    bounds[i] = detail::bound_from(*lyapunov, w[i], drive);
+  }
+  return bounds;
+}
+
+/// An observer that switches between two bandwidths: the ABESO has the factors rho and 1, the BESO
+/// rho and 1/rho.
+struct SwitchedBandwidth {
+  double observer_bandwidth{};      ///< omega, rad/s
+  double factor_while_shrinking{};  ///< delta while abs(e) shrinks
+  double factor_otherwise = 1.0;    ///< delta otherwise
+};
+
+/// Bound and convergence time for the adjustable-bandwidth ESO under any switching: S. Zhang, X.
+/// Qi, S. Yang, J. Systems Engineering and Electronics (2023), (15), (20), (21), with a P common to
+/// both modes found from the inequalities, and delta-bar = norm of the larger gain (the square root
+/// that (13) lacks).
+/// @tparam Size N @return error for a bad setting, or factors without a common P
+template <int Size>
+Expected<ErrorBound<Size>, Error<double>> switched_error_bound(const SwitchedBandwidth& setting,
+                                                               const ErrorSources& sources) {
+  if (auto ok = check_positive("factor_while_shrinking", setting.factor_while_shrinking); !ok) {
+    return ok.error();
+  }
+  if (auto ok = check_positive("factor_otherwise", setting.factor_otherwise); !ok) {
+    return ok.error();
+  }
+  return detail::bound_between<Size>(detail::binomial_gain<Size>(setting.factor_while_shrinking),
+                                     detail::binomial_gain<Size>(setting.factor_otherwise),
+                                     setting.observer_bandwidth, sources);
+}
+
+/// An observer with gains k(e) times those of the bandwidth.
+struct GainRange {
+  double observer_bandwidth{};  ///< omega_0, rad/s
+  double least{};               ///< k_min
+  double greatest{};            ///< k_max
+};
+
+/// Bound for the nonlinear higher-order ESO: A. T. Azar et al., Mathematics 10 (2022) 2261, (34),
+/// (35), under the assumption that the paper leaves out: k(e) stays within (k_min, k_max), and the
+/// two share a P. Any variation of k within them is covered.
+/// @tparam Size N @return error for a bad setting, or a range without a common P
+template <int Size>
+Expected<ErrorBound<Size>, Error<double>> nonlinear_error_bound(const GainRange& setting,
+                                                                const ErrorSources& sources) {
+  if (auto ok = check_positive("least", setting.least); !ok) return ok.error();
+  if (!is_finite(setting.greatest) || !(setting.greatest >= setting.least)) {
+    return Error<double>{"greatest", setting.greatest, "must be finite and not below least",
+                         -1,         setting.least,    true};
+  }
+  const Vector<double, Size> gain = detail::binomial_gain<Size>();
+  return detail::bound_between<Size>(setting.least * gain, setting.greatest * gain,
+                                     setting.observer_bandwidth, sources);
+}
+
+}  // namespace esokit

@@ -1,0 +1,146 @@
+/// @file
+/// Frequency responses of linear systems, logarithmic grids, and arrays ready for a Bode plot.
+#pragma once
+
+#include <cmath>
+#include <complex>
+#include <esokit/analysis/dense.hpp>
+#include <esokit/analysis/linear_system.hpp>
+#include <numbers>
+
+namespace esokit {
+
+namespace detail {
+
+/// Value of D at a frequency: i omega, or exp(i omega T) - 1 without cancellation.
+/// @param frequency rad/s @param sample_time s, 0: continuous
+inline std::complex<double> frequency_operator(double frequency, double sample_time) noexcept {
+  if (!(sample_time > 0.0)) return {0.0, frequency};
+  const double angle = frequency * sample_time;
+  const double half_sine = std::sin(0.5 * angle);
+  return {-2.0 * half_sine * half_sine, std::sin(angle)};
+}
+
+/// c (value I - a)^-1 b + d; not finite at a pole.
+template <int States, int Inputs, int Outputs>
+Matrix<std::complex<double>, Outputs, Inputs> evaluate(
+    const LinearSystem<States, Inputs, Outputs>& system, std::complex<double> value) {
+  using Complex = std::complex<double>;
+  Matrix<Complex, States, States> pencil;
+  Matrix<Complex, States, Inputs> x;
+  for (int j = 0; j < States; ++j) {
+    for (int i = 0; i < States; ++i) pencil(i, j) = -system.a(i, j);
+    pencil(j, j) += value;
+    for (int i = 0; i < Inputs; ++i) x(j, i) = system.b(j, i);
+  }
+  // A vector that is a row is stored by rows, which for a vector is the same.
+  solve_in_place(DenseView<Complex>{pencil.data(), States}, DenseView<Complex>{x.data(), States},
+                 Inputs);
+  Matrix<Complex, Outputs, Inputs> response;
+  for (int i = 0; i < Outputs; ++i) {
+    for (int j = 0; j < Inputs; ++j) {
+      Complex sum = system.d(i, j);
+      for (int k = 0; k < States; ++k) sum += system.c(i, k) * x(k, j);
+      response(i, j) = sum;
+    }
+  }
+  return response;
+}
+
+template <class MatrixType>
+bool all_finite(const MatrixType& matrix) noexcept {
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
+    for (Eigen::Index j = 0; j < matrix.cols(); ++j) {
+      const std::complex<double> value(matrix(i, j));
+      if (!is_finite(value.real()) || !is_finite(value.imag())) return false;
+    }
+  }
+  return true;
+}
+
+inline Check<double> check_frequency(double frequency, double sample_time) {
+  if (auto ok = check_not_negative("frequency", frequency); !ok) return ok;
+  const double nyquist = std::numbers::pi / sample_time;
+  if (sample_time > 0.0 && frequency > nyquist * (1.0 + 1e-12)) {
+    return Error<double>{"frequency", frequency, "must not be above the Nyquist frequency",
+                         -1,          nyquist,   true};
+  }
+  return {};
+}
+
+}  // namespace detail
+
+/// Response at one frequency, Outputs x Inputs.
+///
+/// For a sampled system the response of samples to samples; it ends at pi / T.
+/// @param frequency omega, rad/s; 0 gives the static gain
+/// @return error for a frequency that is negative, above pi / T, or a pole
+template <int States, int Inputs, int Outputs>
+Expected<Matrix<std::complex<double>, Outputs, Inputs>, Error<double>> frequency_response(
+    const LinearSystem<States, Inputs, Outputs>& system, double frequency) {
+  if (auto ok = detail::check_frequency(frequency, system.sample_time); !ok) return ok.error();
+  const Matrix<std::complex<double>, Outputs, Inputs> response =
+      detail::evaluate(system, detail::frequency_operator(frequency, system.sample_time));
+  if (!detail::all_finite(response)) {
+    return Error<double>{"frequency", frequency, "is a pole of the system"};
+  }
+  return response;
+}
+
+/// `Count` frequencies from `from` to `to`, evenly spaced in their logarithm, both ends included.
+/// @param from, to rad/s, 0 < from < to
+template <int Count>
+Expected<Array<double, Count>, Error<double>> log_grid(double from, double to) {
+  static_assert(Count >= 2, "esokit: a grid has two points or more");
+  if (auto ok = check_positive("from", from); !ok) return ok.error();
+  if (auto ok = check_above("to", to, from); !ok) return ok.error();
+  Array<double, Count> grid{};
+  const double step = std::log(to / from) / (Count - 1);
+  for (int i = 0; i < Count; ++i) grid[static_cast<std::size_t>(i)] = from * std::exp(i * step);
+  grid.back() = to;
+  return grid;
+}
+
+/// A curve ready for a Bode plot.
+template <int Count>
+struct Bode {
+  Array<double, Count> frequency{};  ///< rad/s
+  Array<double, Count> magnitude{};  ///< unit of the output per unit of the input
+  Array<double, Count> decibel{};    ///< 20 log10 of the magnitude
+  Array<double, Count> phase{};      ///< rad, without jumps; the first one in (-pi, pi]
+};
+
+/// Bode arrays of any response over a grid.
+/// @param response response(omega), an Expected<std::complex<double>, Error<double>>
+/// @return the first error of `response`
+template <std::size_t Count, class Response>
+Expected<Bode<static_cast<int>(Count)>, Error<double>> bode(const std::array<double, Count>& grid,
+                                                            Response&& response) {
+  Bode<static_cast<int>(Count)> curve;
+  curve.frequency = grid;
+  for (std::size_t i = 0; i < Count; ++i) {
+    const Expected<std::complex<double>, Error<double>> value = response(grid[i]);
+    if (!value) return value.error();
+    curve.magnitude[i] = std::abs(*value);
+    curve.decibel[i] = 20.0 * std::log10(curve.magnitude[i]);
+    curve.phase[i] = std::arg(*value);
+    if (i == 0) continue;
+    const double turns = (curve.phase[i] - curve.phase[i - 1]) / (2.0 * std::numbers::pi);
+    curve.phase[i] -= 2.0 * std::numbers::pi * std::round(turns);
+  }
+  return curve;
+}
+
+/// Bode arrays of one channel of a system.
+template <int Input, int Output, std::size_t Count, int States, int Inputs, int Outputs>
+Expected<Bode<static_cast<int>(Count)>, Error<double>> bode(
+    const LinearSystem<States, Inputs, Outputs>& system, const std::array<double, Count>& grid) {
+  const auto one = system.template channel<Input, Output>();
+  return bode(grid, [&](double w) -> Expected<std::complex<double>, Error<double>> {
+    const auto response = frequency_response(one, w);
+    if (!response) return response.error();
+    return std::complex<double>((*response)(0, 0));
+  });
+}
+
+}  // namespace esokit

@@ -1,0 +1,124 @@
+/// @file
+/// The one form in which a finished design is analysed: a small state space of fixed size.
+#pragma once
+
+#include <cmath>
+#include <esokit/core/error.hpp>
+#include <esokit/core/expected.hpp>
+#include <esokit/core/matrix.hpp>
+#include <esokit/core/unroll.hpp>
+#include <esokit/design/check.hpp>
+
+namespace esokit {
+
+/// D x = a x + b w, out = c x + d w. D is d/dt for a continuous system; for a sampled one it is the
+/// difference, D x = x[k+1] - x[k].
+///
+/// A sampled system is thus kept as A - I: for small omega T that is where its dynamics are, and A
+/// itself would lose log10(1 / (omega T)) digits of them. Inputs and outputs are in physical units,
+/// always in double; the states may be scaled.
+/// @tparam States, Inputs, Outputs sizes
+template <int States, int Inputs, int Outputs>
+struct LinearSystem {
+  static_assert(States >= 1 && Inputs >= 1 && Outputs >= 1);
+  static constexpr int states = States;
+  static constexpr int inputs = Inputs;
+  static constexpr int outputs = Outputs;
+
+  Matrix<double, States, States> a = Matrix<double, States, States>::Zero();
+  Matrix<double, States, Inputs> b = Matrix<double, States, Inputs>::Zero();
+  Matrix<double, Outputs, States> c = Matrix<double, Outputs, States>::Zero();
+  Matrix<double, Outputs, Inputs> d = Matrix<double, Outputs, Inputs>::Zero();
+  double sample_time = 0.0;                    ///< T, s; 0 for a continuous system
+  Array<const char*, Inputs> input_names{};    ///< static storage
+  Array<const char*, Outputs> output_names{};  ///< static storage
+
+  [[nodiscard]] bool sampled() const noexcept { return sample_time > 0.0; }
+
+  /// A of x' = A x or of x[k+1] = A x[k], States x States.
+  [[nodiscard]] Matrix<double, States, States> state_matrix() const {
+    if (!sampled()) return a;
+    return a + Matrix<double, States, States>::Identity();
+  }
+
+  /// The system from one input to one output.
+  template <int Input, int Output>
+  [[nodiscard]] LinearSystem<States, 1, 1> channel() const {
+    static_assert(Input >= 0 && Input < Inputs && Output >= 0 && Output < Outputs,
+                  "esokit: no such channel");
+    LinearSystem<States, 1, 1> one;
+    one.a = a;
+    one.b = b.col(Input);
+    one.c = c.row(Output);
+    one.d(0, 0) = d(Output, Input);
+    one.sample_time = sample_time;
+    one.input_names[0] = input_names[static_cast<std::size_t>(Input)];
+    one.output_names[0] = output_names[static_cast<std::size_t>(Output)];
+    return one;
+  }
+};
+
+namespace detail {
+
+/// y, y', .. and d, d', ..: names of the rows of an estimate.
+template <int Order, int Extension>
+constexpr Array<const char*, Order + Extension> estimate_names() noexcept {
+  constexpr const char* plant[] = {"yhat",     "yhat'",    "yhat''",   "yhat^(3)",
+                                   "yhat^(4)", "yhat^(5)", "yhat^(6)", "yhat^(7)"};
+  constexpr const char* disturbance[] = {"dhat",     "dhat'",    "dhat''",   "dhat^(3)",
+                                         "dhat^(4)", "dhat^(5)", "dhat^(6)", "dhat^(7)"};
+  Array<const char*, Order + Extension> names{};
+  for (int i = 0; i < Order + Extension; ++i) {
+    const int k = i < Order ? i : i - Order;
+    names[static_cast<std::size_t>(i)] = k > 7       ? "higher derivative"
+                                         : i < Order ? plant[k]
+                                                     : disturbance[k];
+  }
+  return names;
+}
+
+}  // namespace detail
+
+/// Scales the states by powers of two until rows and columns of `a` are of like size; nothing is
+/// rounded, and inputs and outputs stay as they are. States of a chain differ by omega^n.
+template <int States, int Inputs, int Outputs>
+void balance(LinearSystem<States, Inputs, Outputs>& system) noexcept {
+  for (int sweep = 0; sweep < 30; ++sweep) {
+    bool changed = false;
+    for (int i = 0; i < States; ++i) {
+      double row = 0.0;
+      double column = 0.0;
+      for (int j = 0; j < States; ++j) {
+        if (j == i) continue;
+        row += std::abs(system.a(i, j));
+        column += std::abs(system.a(j, i));
+      }
+      if (!(row > 0.0) || !(column > 0.0)) continue;
+      const double exponent = std::round(0.5 * std::log2(row / column));
+      if (!is_finite(exponent) || exponent == 0.0) continue;
+      // x_i is replaced by x_i / 2^exponent.
+      const double factor = std::exp2(exponent);
+      system.a.row(i) /= factor;
+      system.a.col(i) *= factor;
+      system.b.row(i) /= factor;
+      system.c.col(i) *= factor;
+      changed = true;
+    }
+    if (!changed) return;
+  }
+}
+
+namespace detail {
+
+template <int States, int Inputs, int Outputs>
+Check<double> check_system(const LinearSystem<States, Inputs, Outputs>& system) {
+  if (!is_finite(system.sample_time) || system.sample_time < 0.0) {
+    return Error<double>{"sample_time", system.sample_time, "must be finite and not negative"};
+  }
+  const double sum = system.a.cwiseAbs().sum() + system.b.cwiseAbs().sum() +
+                     system.c.cwiseAbs().sum() + system.d.cwiseAbs().sum();
+  return check_finite("system", sum);
+}
+
+}  // namespace detail
+}  // namespace esokit

@@ -1,0 +1,158 @@
+/// @file
+/// Walks along a loop gain in steps so short that no crossing is missed; what margins are made of.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <esokit/analysis/adrc_loop.hpp>
+#include <numbers>
+
+namespace esokit::detail {
+
+/// L = -P C of one loop at one frequency.
+template <int PlantStates, int ControllerStates>
+struct LoopGain {
+  LinearSystem<PlantStates, 1, 1> plant;            ///< u to y
+  LinearSystem<ControllerStates, 1, 1> controller;  ///< y to u
+
+  [[nodiscard]] std::complex<double> operator()(double frequency) const {
+    return at(frequency_operator(frequency, controller.sample_time));
+  }
+  /// @param value of D: i omega, or z - 1
+  [[nodiscard]] std::complex<double> at(std::complex<double> value) const {
+    return -evaluate(plant, value)(0, 0) * evaluate(controller, value)(0, 0);
+  }
+};
+
+template <class Loop>
+auto loop_gain_of(const Loop& loop) {
+  return LoopGain<Loop::Plant::states, Loop::observer_states>{
+      loop.plant().template channel<0, 0>(), loop.controller().template channel<0, 0>()};
+}
+
+/// Where a loop gain is looked at: from well below its slowest pole to pi / T, or to well above
+/// its fastest; with the frequencies of all poles, near which it may change quickly.
+template <int Count>
+struct ScanRange {
+  Array<double, Count> features{};  ///< rad/s, rising; unused ones are `to`
+  double from = 0.0;
+  double to = 0.0;
+};
+
+template <class Loop>
+auto scan_range(const Loop& loop) {
+  constexpr int poles_count = Loop::Plant::states + Loop::observer_states + Loop::states;
+  ScanRange<poles_count> range;
+  const double T = loop.plant().sample_time;
+  double slowest = std::numeric_limits<double>::max();
+  double fastest = 0.0;
+  int used = 0;
+  const auto look = [&](const auto& system, bool stable) {
+    for (const std::complex<double>& p : poles(system)) {
+      const double size = T > 0.0 ? std::abs(p) / T : std::abs(p);
+      // Integrators come out as poles of rounding size.
+      if (!stable && !(size > 1e-9 * fastest)) continue;
+      if (stable) fastest = std::max(fastest, size);
+      slowest = std::min(slowest, size);
+      range.features[static_cast<std::size_t>(used++)] =
+          T > 0.0 ? std::abs(std::arg(1.0 + p)) / T : std::abs(p.imag());
+    }
+  };
+  look(loop.closed_loop(), true);
+  look(loop.plant(), false);
+  look(loop.controller(), false);
+  range.from = 1e-3 * slowest;
+  range.to = T > 0.0 ? std::numbers::pi / T : 1e3 * fastest;
+  range.from = std::min(range.from, 1e-3 * range.to);
+  for (int i = used; i < poles_count; ++i) range.features[static_cast<std::size_t>(i)] = range.to;
+  std::sort(range.features.begin(), range.features.end());
+  return range;
+}
+
+/// Calls visit(w1, L1, w2, L2) for adjacent pieces, over which L changes by less than a fifth of
+/// its size and less than half its distance from -1.
+template <class Response, class Visit>
+void scan_piece(const Response& response, double w1, std::complex<double> l1, double w2,
+                std::complex<double> l2, int depth, Visit& visit) {
+  const double step = std::abs(l2 - l1);
+  const double size = std::min(std::abs(l1), std::abs(l2));
+  const double distance = std::min(std::abs(1.0 + l1), std::abs(1.0 + l2));
+  const bool fine =
+      step <= std::min(0.2 * size, 0.5 * distance) || std::max(std::abs(l1), std::abs(l2)) < 1e-9;
+  if (fine || depth == 0) {
+    visit(w1, l1, w2, l2);
+    return;
+  }
+  const double middle = std::sqrt(w1 * w2);
+  const std::complex<double> l = response(middle);
+  scan_piece(response, w1, l1, middle, l, depth - 1, visit);
+  scan_piece(response, middle, l, w2, l2, depth - 1, visit);
+}
+
+template <class Response, int Count, class Visit>
+void scan(const Response& response, const ScanRange<Count>& range, Visit&& visit) {
+  double w1 = range.from;
+  std::complex<double> l1 = response(w1);
+  const auto go_to = [&](double w2) {
+    // Poles that differ by rounding are one feature.
+    if (!(w2 > w1 * (1.0 + 1e-7)) || w2 > range.to) return;
+    const int pieces = 2 + static_cast<int>(std::ceil(30.0 * std::log10(w2 / w1)));
+    const double start = w1;
+    for (int i = 1; i <= pieces; ++i) {
+      const double w = i == pieces ? w2 : start * std::pow(w2 / start, double(i) / pieces);
+      const std::complex<double> l = response(w);
+      if (is_finite(l.real()) && is_finite(l.imag())) {
+        scan_piece(response, w1, l1, w, l, 14, visit);
+        w1 = w;
+        l1 = l;
+      }
+    }
+  };
+  for (const double feature : range.features) {
+    // Beside the pole, not on it: it may lie on the axis.
+    go_to(feature * (1.0 - 1e-6));
+    go_to(feature * (1.0 + 1e-6));
+  }
+  go_to(range.to);
+}
+
+/// Root of f in [low, high], whose ends have different signs, to the last digits.
+template <class Function>
+double bisect(const Function& f, double low, double high) {
+  const bool rising = f(low) < 0.0;
+  for (int i = 0; i < 200; ++i) {
+    const double middle = 0.5 * (low + high);
+    if (!(middle > low) || !(middle < high)) break;
+    ((f(middle) < 0.0) == rising ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+/// Place of the smallest f in [low, high] by golden section.
+template <class Function>
+double golden_section(const Function& f, double low, double high) {
+  constexpr double ratio = 0.6180339887498949;
+  double a = high - ratio * (high - low);
+  double b = low + ratio * (high - low);
+  double fa = f(a);
+  double fb = f(b);
+  for (int i = 0; i < 60 && high - low > 1e-12 * high; ++i) {
+    if (fa < fb) {
+      high = b;
+      b = a;
+      fb = fa;
+      a = high - ratio * (high - low);
+      fa = f(a);
+    } else {
+      low = a;
+      a = b;
+      fa = fb;
+      b = low + ratio * (high - low);
+      fb = f(b);
+    }
+  }
+  return fa < fb ? a : b;
+}
+
+}  // namespace esokit::detail

@@ -1,0 +1,158 @@
+/// @file
+/// Lyapunov equations of linear systems, by doubling (Smith's method squared).
+#pragma once
+
+#include <cmath>
+#include <esokit/analysis/dense.hpp>
+#include <esokit/analysis/linear_system.hpp>
+
+namespace esokit {
+
+namespace detail {
+
+// All matrices n x n, column-major, of the caller.
+
+/// P = sum_k A^k Q A'^k with A = I + e: P_{j+1} = P_j + A^(2^j) P_j A'^(2^j). Squaring the
+/// difference, (I + e)^2 - I = 2 e + e^2, loses no digits of slow poles. False if the sum does not
+/// end.
+/// @param e is overwritten @param p Q at first, P in the end @param work1, work2 n x n
+inline bool doubling(double* e, double* p, double* work1, double* work2, int n) noexcept {
+  for (int step = 0; step < 64; ++step) {
+    multiply(e, e, work1, n);
+    for (int i = 0; i < n * n; ++i) work1[i] += 2.0 * e[i];  // the next e
+    for (int i = 0; i < n; ++i) e[i * n + i] += 1.0;         // A^(2^step)
+    double size = 0.0;
+    for (int i = 0; i < n; ++i) {
+      double row = 0.0;
+      for (int j = 0; j < n; ++j) row += std::abs(e[j * n + i]);
+      if (!(row <= size)) size = row;
+    }
+    if (!is_finite(size)) return false;
+    multiply(e, p, work2, n);
+    for (int i = 0; i < n; ++i) {
+      for (int j = 0; j <= i; ++j) {
+        double sum = 0.0;
+        for (int k = 0; k < n; ++k) sum += work2[k * n + i] * e[k * n + j];
+        p[j * n + i] += sum;
+        if (i != j) p[i * n + j] = p[j * n + i];
+      }
+    }
+    // What is left out is size^2 times the term that was just added.
+    if (size < 1e-10) return true;
+    for (int i = 0; i < n * n; ++i) e[i] = work1[i];
+  }
+  return false;
+}
+
+/// Largest row sum of a^2, whose root is of the size of the poles.
+inline double square_size(const double* a, double* work, int n) noexcept {
+  multiply(a, a, work, n);
+  double size = 0.0;
+  for (int i = 0; i < n; ++i) {
+    double row = 0.0;
+    for (int j = 0; j < n; ++j) row += std::abs(work[j * n + i]);
+    if (!(row <= size)) size = row;
+  }
+  return size;
+}
+
+/// P into p. @param work 3 n^2
+inline bool solve_lyapunov_once(const double* a, const double* q, double* p, double* work, int n,
+                                bool sampled) noexcept {
+  double* const e = work;
+  double* const work1 = work + n * n;
+  double* const work2 = work + 2 * n * n;
+  if (sampled) {
+    for (int i = 0; i < n * n; ++i) {
+      e[i] = a[i];
+      p[i] = q[i];
+    }
+    return doubling(e, p, work1, work2, n);
+  }
+  // Cayley: with s = c (z - 1) / (z + 1) the equation is that of (cI - A)^-1 (cI + A) and
+  // 2 c (cI - A)^-1 Q (cI - A)^-T, and has the same P.
+  const double c = std::sqrt(square_size(a, work1, n));
+  if (!is_finite(c) || !(c > 0.0)) return false;
+  const auto shift = [&](double* to) {
+    for (int i = 0; i < n * n; ++i) to[i] = -a[i];
+    for (int i = 0; i < n; ++i) to[i * n + i] += c;
+  };
+  for (int i = 0; i < n * n; ++i) {
+    e[i] = 2.0 * a[i];
+    work2[i] = 2.0 * c * q[i];
+  }
+  shift(work1);
+  solve_in_place(DenseView<double>{work1, n}, DenseView<double>{e, n}, n);
+  shift(work1);
+  solve_in_place(DenseView<double>{work1, n}, DenseView<double>{work2, n}, n);
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) p[j * n + i] = work2[i * n + j];
+  }
+  shift(work1);
+  solve_in_place(DenseView<double>{work1, n}, DenseView<double>{p, n}, n);
+  return doubling(e, p, work1, work2, n);
+}
+
+/// D P + P D' [+ D P D'] + Q into `residual`, and its largest element as a share of the terms that
+/// it is made of. @param work 2 n^2
+inline double lyapunov_residual(const double* a, const double* q, const double* p, double* residual,
+                                double* work, int n, bool sampled) noexcept {
+  double* const ap = work;
+  double* const last = work + n * n;
+  multiply(a, p, ap, n);
+  multiply_transposed(ap, a, last, n);
+  double worst = 0.0;
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) {
+      double size = std::abs(q[j * n + i]);
+      for (int k = 0; k < n; ++k) {
+        size += std::abs(a[k * n + i] * p[j * n + k]) + std::abs(p[k * n + i] * a[k * n + j]);
+      }
+      double sum = q[j * n + i] + ap[j * n + i] + ap[i * n + j];
+      if (sampled) sum += last[j * n + i];
+      residual[j * n + i] = sum;
+      const double share = size > 0.0 ? std::abs(sum) / size : 0.0;
+      if (!(share <= worst)) worst = share;
+    }
+  }
+  return worst;
+}
+
+}  // namespace detail
+
+/// Solves A P + P A' + Q = 0 (continuous) or P = A P A' + Q (sampled), N x N.
+///
+/// Doubling, one step of iterative refinement, and a check of the residual against the size of its
+/// terms. About log2(1 / (1 - spectral radius)) + 6 steps of three matrix products.
+/// @param a A, or A - I for a sampled system, as LinearSystem keeps it @param q symmetric
+/// @return error if A is not stable, or the residual is above 1e-11 of its terms
+template <int N>
+Expected<Matrix<double, N, N>, Error<double>> solve_lyapunov(const Matrix<double, N, N>& a,
+                                                             const Matrix<double, N, N>& q,
+                                                             bool sampled) {
+  Matrix<double, N, N> p;
+  Matrix<double, N, N> residual;
+  Matrix<double, N, N> correction;
+  Array<double, 3 * N * N> work;
+  if (!detail::solve_lyapunov_once(a.data(), q.data(), p.data(), work.data(), N, sampled)) {
+    return Error<double>{"system", 0.0, "is not stable: the stationary covariance does not exist"};
+  }
+  const auto residual_of = [&] {
+    return detail::lyapunov_residual(a.data(), q.data(), p.data(), residual.data(), work.data(), N,
+                                     sampled);
+  };
+  residual_of();
+  if (detail::solve_lyapunov_once(a.data(), residual.data(), correction.data(), work.data(), N,
+                                  sampled)) {
+    for (int i = 0; i < N; ++i) {
+      for (int j = 0; j < N; ++j) p(i, j) += 0.5 * (correction(i, j) + correction(j, i));
+    }
+  }
+  const double share = residual_of();
+  if (!(share <= 1e-11)) {
+    return Error<double>{"system", share, "leaves a residual in the Lyapunov equation"};
+  }
+  return p;
+}
+
+}  // namespace esokit

@@ -1,0 +1,154 @@
+/// @file
+/// Stability margins of a loop: gain both ways, phase, modulus; and the range of b0 / b.
+#pragma once
+
+#include <esokit/analysis/loop_scan.hpp>
+#include <limits>
+#include <optional>
+
+namespace esokit {
+
+/// A margin and where the loop then oscillates.
+struct Margin {
+  double value = 0.0;
+  double frequency = 0.0;  ///< rad/s
+};
+
+/// The edges of stability that are nearest to the loop as it is. Any number of crossings is looked
+/// at; an error stands where there is no edge in that direction.
+struct Margins {
+  using Result = Expected<Margin, Error<double>>;
+
+  Result gain_increase;  ///< least factor > 1 on L that makes the loop oscillate
+  Result gain_decrease;  ///< greatest factor in (0, 1) on L that does
+  Result phase;          ///< least phase shift, rad, as lag or as lead
+  Result modulus;        ///< least abs(1 + L), the inverse of the peak of S
+};
+
+namespace detail {
+
+inline constexpr const char* unstable_loop_rule =
+    "must be negative: the nominal loop is not stable, it has no margins";
+
+/// Keeps the nearest edges while the loop gain is walked along.
+template <class Response>
+class MarginFinder {
+ public:
+  explicit MarginFinder(const Response& response) : response_(response) {}
+
+  void operator()(double w1, std::complex<double> l1, double w2, std::complex<double> l2) {
+    if (std::signbit(l1.imag()) != std::signbit(l2.imag()) &&
+        std::min(l1.real(), l2.real()) < 0.0) {
+      const double w = bisect([&](double x) { return response_(x).imag(); }, w1, w2);
+      const std::complex<double> l = response_(w);
+      // Across a pole on the axis the imaginary part changes its sign at infinity.
+      if (std::abs(l) < 10.0 * std::max(std::abs(l1), std::abs(l2))) real_axis(l.real(), w);
+    }
+    if ((std::abs(l1) < 1.0) != (std::abs(l2) < 1.0)) {
+      const double w = bisect([&](double x) { return std::abs(response_(x)) - 1.0; }, w1, w2);
+      const double shift = std::abs(std::arg(-response_(w)));
+      if (!phase_ || shift < phase_->value) phase_ = Margin{shift, w};
+    }
+    if (!modulus_) distance(w1, std::abs(1.0 + l1));
+    distance(w2, std::abs(1.0 + l2));
+  }
+
+  /// A place where L crosses or touches the real axis.
+  void real_axis(double l, double w) {
+    if (!(l < 0.0)) return;
+    const double factor = -1.0 / l;
+    if (factor > 1.0 && (!increase_ || factor < increase_->value)) increase_ = Margin{factor, w};
+    if (factor <= 1.0 && (!decrease_ || factor > decrease_->value)) decrease_ = Margin{factor, w};
+  }
+
+  [[nodiscard]] Margins margins() const {
+    const auto result = [](const std::optional<Margin>& margin, const char* field,
+                           const char* rule) -> Margins::Result {
+      if (margin) return *margin;
+      return Error<double>{field, 0.0, rule};
+    };
+    return {result(increase_, "gain_increase", "has no limit: no gain above one is an edge"),
+            result(decrease_, "gain_decrease", "has no limit: no gain below one is an edge"),
+            result(phase_, "phase", "has no limit: abs(L) crosses one nowhere"),
+            result(modulus_, "modulus", "does not exist")};
+  }
+
+ private:
+  void distance(double w, double value) {
+    if (!modulus_ || value < modulus_->value) modulus_ = Margin{value, w};
+    // The middle one of three is a local least: look between its neighbours.
+    if (seen_ >= 2 && last_.value <= before_.value && last_.value <= value &&
+        last_.value < 1.5 * modulus_->value) {
+      const auto size = [&](double x) { return std::abs(1.0 + response_(x)); };
+      const double least = golden_section(size, before_.frequency, w);
+      const double there = size(least);
+      if (there < modulus_->value) modulus_ = Margin{there, least};
+    }
+    before_ = last_;
+    last_ = {value, w};
+    ++seen_;
+  }
+
+  const Response& response_;
+  std::optional<Margin> increase_, decrease_, phase_, modulus_;
+  Margin before_{}, last_{};
+  long seen_ = 0;
+};
+
+}  // namespace detail
+
+/// Margins of a loop, sampled or continuous.
+///
+/// Gain and phase are changed in L = -P C: in the plant's gain, the actuator's, or anywhere else in
+/// the loop but between law and observer. A phase shift turns positive frequencies by e^(-i phi).
+/// @return error for a nominal loop that is not stable
+template <int PlantStates, class Observer>
+Expected<Margins, Error<double>> margins(const AdrcLoop<PlantStates, Observer>& loop) {
+  if (!loop.stable()) {
+    return Error<double>{"stability_abscissa", loop.stability_abscissa(),
+                         detail::unstable_loop_rule};
+  }
+  const auto response = detail::loop_gain_of(loop);
+  detail::MarginFinder finder(response);
+  detail::scan(response, detail::scan_range(loop), finder);
+  // L is real at z = -1, and at standstill.
+  if (loop.plant().sampled()) {
+    const double nyquist = std::numbers::pi / loop.plant().sample_time;
+    const std::complex<double> l = response.at(-2.0);
+    if (is_finite(l.real())) finder.real_axis(l.real(), nyquist);
+  }
+  const std::complex<double> standstill = response.at(0.0);
+  if (is_finite(standstill.real()) && std::abs(standstill) < 1e9) {
+    finder.real_axis(standstill.real(), 0.0);
+  }
+  return finder.margins();
+}
+
+/// An open interval.
+struct Range {
+  double lower = 0.0;
+  double upper = 0.0;  ///< infinity: no limit
+};
+
+/// Range of b0 / b for which the loop is stable: b0 as the controller has it, b as the plant does.
+///
+/// The loop gain depends on the two by b / b0 alone, so it does not matter which of them is wrong.
+/// @param plant_gain b of the loop's nominal plant, the factor of u in y^(n)
+/// @return error for a nominal loop that is not stable, or a b that is zero or has the other sign
+template <int PlantStates, class Observer, Scalar S>
+Expected<Range, Error<double>> input_gain_range(const AdrcLoop<PlantStates, Observer>& loop,
+                                                const AdrcLaw<Observer::order, S>& law,
+                                                double plant_gain) {
+  const auto ratio = static_cast<double>(law.input_gain()) / plant_gain;
+  if (!is_finite(ratio) || !(ratio > 0.0)) {
+    return Error<double>{"plant_gain", plant_gain, "must be finite, not zero, of the sign of b0"};
+  }
+  const auto found = margins(loop);
+  if (!found) return found.error();
+  Range range{0.0, std::numeric_limits<double>::infinity()};
+  if (found->gain_increase) range.lower = ratio / found->gain_increase->value;
+  if (found->gain_decrease) range.upper = ratio / found->gain_decrease->value;
+  return range;
+}
+
+}  // namespace esokit

@@ -1,0 +1,279 @@
+/// @file
+/// Observers as linear systems: what each estimate does with y and u, and with noise and
+/// disturbance.
+///
+/// A sampled observer is built from its gains (`level_gain`), not by probing `update`: A - I comes
+/// out without the cancellation that A - I of a probed A has. A continuous one is probed through
+/// `derivative`, each of whose entries is one product.
+#pragma once
+
+#include <concepts>
+#include <esokit/analysis/linear_system.hpp>
+#include <esokit/design/sampled_gain.hpp>
+#include <esokit/model/integrator_chain.hpp>
+
+namespace esokit {
+
+namespace detail {
+
+/// Decorators that add dynamics of their own: a delay line, a known model. Their gains do not tell
+/// all.
+template <class T>
+inline constexpr bool has_own_dynamics = requires(const T& observer) {
+  observer.delay();
+}
+|| requires(const T& observer) { observer.residual_disturbance(); };
+
+}  // namespace detail
+
+/// A sampled observer whose gain does not depend on the measurement: LinearEso, CascadeEso, a
+/// settled AlgebraicEso, an ExtendedStateFilter frozen where it is. The system is the one that the
+/// present gain makes.
+template <class T>
+concept SampledLinearObserver = !detail::has_own_dynamics<T> && requires(const T& observer) {
+  { T::order + T::extension + T::levels } -> std::convertible_to<int>;
+  observer.level_gain(0);
+  static_cast<double>(observer.input_gain());
+  static_cast<double>(observer.sample_time());
+};
+
+/// A continuous observer, linear in its state; ContinuousLinearEso, ContinuousCascadeEso.
+template <class T>
+concept ContinuousLinearObserver = requires(const T& observer, typename T::State z,
+                                            typename T::scalar_type s) {
+  { T::order + T::extension + T::levels + T::states } -> std::convertible_to<int>;
+  { observer.derivative(s, z, s, s) } -> std::convertible_to<typename T::State>;
+  static_cast<double>(observer.input_gain());
+};
+
+template <class T>
+concept LinearObserver = SampledLinearObserver<T> || ContinuousLinearObserver<T>;
+
+/// A sampled observer held in one mode: the gains of a switched or nonlinear law at one place.
+template <int Order, int Levels = 1, int Extension = 1>
+struct FrozenObserver {
+  static constexpr int order = Order;
+  static constexpr int extension = Extension;
+  static constexpr int size = ChainSize<Order, Extension>::size;
+  static constexpr int levels = Levels;
+
+  Array<ScaledGain<size, double>, Levels> gains{};  ///< current-estimator gains, scaled
+  double gain_of_input{};                           ///< b0, unit of y^(n) per unit of u
+  double time_step{};                               ///< T, s
+
+  [[nodiscard]] const ScaledGain<size, double>& level_gain(int level) const noexcept {
+    return gains[static_cast<std::size_t>(level)];
+  }
+  [[nodiscard]] double input_gain() const noexcept { return gain_of_input; }
+  [[nodiscard]] double sample_time() const noexcept { return time_step; }
+};
+
+/// A continuous gain law held in one mode, for ContinuousObserver. @tparam Size N
+template <int Size>
+struct FrozenGain {
+  Vector<double, Size> value;  ///< l, row i in 1/s^(i+1)
+  [[nodiscard]] const Vector<double, Size>& gain(double, double) const noexcept { return value; }
+};
+
+namespace detail {
+
+/// An observer in its predicted state z-, in physical units:
+///   D z- = a z- + by y + bu u,   zhat = c z- + dy y.
+/// Level i keeps its plant states and the disturbance that levels 1..i found together, so that the
+/// truth is the same for all levels.
+template <int Order, int Extension, int Levels>
+struct ObserverMatrices {
+  static constexpr int order = Order;
+  static constexpr int size = Order + Extension;
+  static constexpr int states = size * Levels;
+  Matrix<double, states, states> a = Matrix<double, states, states>::Zero();
+  Vector<double, states> by = Vector<double, states>::Zero();
+  Vector<double, states> bu = Vector<double, states>::Zero();
+  Matrix<double, size, states> c = Matrix<double, size, states>::Zero();
+  Vector<double, size> dy = Vector<double, size>::Zero();
+  double input_gain = 0.0;
+  double sample_time = 0.0;
+};
+
+template <class Observer>
+using MatricesOf = ObserverMatrices<Observer::order, Observer::extension, Observer::levels>;
+
+template <SampledLinearObserver Observer>
+MatricesOf<Observer> observer_matrices(const Observer& observer, double = 0.0) {
+  using Matrices = MatricesOf<Observer>;
+  constexpr int order = Observer::order;
+  constexpr int size = Matrices::size;
+  constexpr int states = Matrices::states;
+  using Chain = IntegratorChain<order, double, Observer::extension>;
+
+  Matrices m;
+  m.input_gain = static_cast<double>(observer.input_gain());
+  m.sample_time = static_cast<double>(observer.sample_time());
+
+  // Element by element: block expressions of each size would cost seconds to compile.
+  // `added`: what a correction adds to the levels, as rows over the predicted states and y.
+  Matrix<double, states, states> added = Matrix<double, states, states>::Zero();
+  Array<double, states> added_y{};
+  Array<double, states> measured{};
+  double measured_y = 1.0;
+  for (int level = 0; level < Observer::levels; ++level) {
+    const int first = level * size;
+    const auto scaled = observer.level_gain(level);
+    double factor = 1.0;  // r! / T^r
+    for (int r = 0; r < size; ++r) {
+      if (r > 0) factor *= r / m.sample_time;
+      const double gain = factor * static_cast<double>(scaled[static_cast<std::size_t>(r)]);
+      const bool disturbance = r >= order && level > 0;  // found by the levels before, too
+      for (int j = 0; j < states; ++j) {
+        const double innovation = measured[static_cast<std::size_t>(j)] - (j == first ? 1.0 : 0.0);
+        added(first + r, j) = gain * innovation;
+        if (disturbance) added(first + r, j) += added(first - size + r, j);
+      }
+      const auto row = static_cast<std::size_t>(first + r);
+      added_y[row] = gain * measured_y;
+      if (disturbance) added_y[row] += added_y[row - size];
+    }
+    for (int j = 0; j < states; ++j) {
+      measured[static_cast<std::size_t>(j)] = added(first, j) + (j == first ? 1.0 : 0.0);
+    }
+    measured_y = added_y[static_cast<std::size_t>(first)];
+  }
+
+  const auto phi = Chain::transition_matrix(m.sample_time);
+  const auto gamma = Chain::sampled_input_matrix(m.sample_time, m.input_gain);
+  for (int row = 0; row < states; ++row) {
+    const int first = row / size * size;
+    for (int k = row; k < first + size; ++k) {
+      const double weight = phi(row - first, k - first);
+      for (int j = 0; j < states; ++j) m.a(row, j) += weight * added(k, j);
+      if (k > row) m.a(row, k) += weight;
+      m.by(row) += weight * added_y[static_cast<std::size_t>(k)];
+    }
+    m.bu(row) = gamma(row - first);
+  }
+  for (int r = 0; r < size; ++r) {
+    const int row = states - size + r;
+    for (int j = 0; j < states; ++j) m.c(r, j) = added(row, j) + (j == row ? 1.0 : 0.0);
+    m.dy(r) = added_y[static_cast<std::size_t>(row)];
+  }
+  return m;
+}
+
+template <ContinuousLinearObserver Observer>
+requires(!SampledLinearObserver<Observer>)  //
+    MatricesOf<Observer> observer_matrices(const Observer& observer, double t = 0.0) {
+  using S = typename Observer::scalar_type;
+  using State = typename Observer::State;
+  MatricesOf<Observer> m;
+  m.input_gain = static_cast<double>(observer.input_gain());
+  const S time = static_cast<S>(t);
+  constexpr int order = Observer::order;
+  constexpr int size = MatricesOf<Observer>::size;
+  // The observer's own states hold what each level found of the disturbance; ours the sums.
+  const auto sums = [](const State& z, int row) {
+    double sum = static_cast<double>(z(row));
+    if (row % size < order) return sum;
+    for (int before = row - size; before >= 0; before -= size)
+      sum += static_cast<double>(z(before));
+    return sum;
+  };
+  const auto column = [&](const State& z, const S& y, const S& u, auto&& to) {
+    const State rate = observer.derivative(time, z, y, u);
+    for (int i = 0; i < Observer::states; ++i) to(i) = sums(rate, i);
+  };
+  for (int j = 0; j < Observer::states; ++j) {
+    State unit = State::Zero();
+    unit(j) = S(1);
+    if (j % size >= order && j + size < Observer::states) unit(j + size) = S(-1);
+    column(unit, S(0), S(0), m.a.col(j));
+    const typename Observer::Estimate estimate = Observer::estimate(unit);
+    for (int r = 0; r < size; ++r) m.c(r, j) = static_cast<double>(estimate(r));
+  }
+  const State zero = State::Zero();
+  column(zero, S(1), S(0), m.by);
+  column(zero, S(0), S(1), m.bu);
+  return m;
+}
+
+template <class Matrices, int Inputs>
+LinearSystem<Matrices::states, Inputs, Matrices::size> system_of(const Matrices& m) {
+  LinearSystem<Matrices::states, Inputs, Matrices::size> system;
+  system.a = m.a;
+  system.c = m.c;
+  system.sample_time = m.sample_time;
+  return system;
+}
+
+/// First input: y (or noise on it) times `sign`; second: a column given row by row.
+template <class System, class Matrices, class Column>
+void set_inputs(System& system, const Matrices& m, Column&& column, double sign = 1.0) {
+  for (int i = 0; i < Matrices::states; ++i) {
+    system.b(i, 0) = sign * m.by(i);
+    system.b(i, 1) = column(i);
+  }
+  for (int r = 0; r < Matrices::size; ++r) system.d(r, 0) = sign * m.dy(r);
+}
+
+}  // namespace detail
+
+/// From (y, u) to all estimates (y, .., y^(n-1), d, .., d^(m-1)); N p states.
+///
+/// Sampled: y[k] and the input u[k] that is held from k to k + 1 (what the next `update` is told),
+/// and the estimate right after the correction at k.
+/// @param t s, for a continuous observer whose gain changes with time: frozen there
+template <LinearObserver Observer>
+auto observer_system(const Observer& observer, double t = 0.0) {
+  const auto m = detail::observer_matrices(observer, t);
+  auto system = detail::system_of<detail::MatricesOf<Observer>, 2>(m);
+  detail::set_inputs(system, m, [&](int i) { return m.bu(i); });
+  system.input_names = {"y", "u"};
+  system.output_names = detail::estimate_names<Observer::order, Observer::extension>();
+  balance(system);
+  return system;
+}
+
+/// From measurement noise v and the true total disturbance d to what they make of the estimates:
+/// the errors yhat^(i) - y^(i) for rows i < n, and dhat, dhat', .. themselves.
+///
+/// The plant is y^(n) = d + b0 u with y measured as y + v; u drops out. From d to dhat the static
+/// gain is one. Sampled: d[k] is held from k to k + 1, v[k] is on y[k].
+template <LinearObserver Observer>
+auto estimation_system(const Observer& observer, double t = 0.0) {
+  const auto m = detail::observer_matrices(observer, t);
+  auto system = detail::system_of<detail::MatricesOf<Observer>, 2>(m);
+  // In zhat - (y, .., y^(n-1), 0) the disturbance enters as -u b0 does.
+  detail::set_inputs(system, m, [&](int i) { return -m.bu(i) / m.input_gain; });
+  system.input_names = {"v", "d"};
+  system.output_names = detail::estimate_names<Observer::order, Observer::extension>();
+  for (std::size_t i = 0; i < Observer::order; ++i) system.output_names[i] = "error of a state";
+  balance(system);
+  return system;
+}
+
+/// From measurement noise v and w = d^(m) to the estimation errors z - zhat, all rows: zero unless
+/// the measurement is noisy or d leaves the observer's model class. Sampled: w is held from k to
+/// k + 1.
+template <LinearObserver Observer>
+auto error_system(const Observer& observer, double t = 0.0) {
+  constexpr int size = Observer::order + Observer::extension;
+  const auto m = detail::observer_matrices(observer, t);
+  auto system = detail::system_of<detail::MatricesOf<Observer>, 2>(m);
+  Array<double, size> drive{};
+  drive.back() = 1.0;
+  if (m.sample_time > 0.0) {
+    double term = 1.0;
+    for (int i = size - 1; i >= 0; --i) {
+      term = term * m.sample_time / (size - i);
+      drive[static_cast<std::size_t>(i)] = term;
+    }
+  }
+  // The error is the truth minus the estimate: from -v as the estimate from y.
+  detail::set_inputs(
+      system, m, [&](int i) { return drive[static_cast<std::size_t>(i % size)]; }, -1.0);
+  system.input_names = {"v", "w"};
+  system.output_names = detail::estimate_names<Observer::order, Observer::extension>();
+  balance(system);
+  return system;
+}
+
+}  // namespace esokit

@@ -1,0 +1,293 @@
+/// @file
+/// Adrc: active disturbance rejection control with any observer of the library, complete with
+/// limits, start, missing samples and retuning.
+#pragma once
+
+#include <esokit/control/adrc_law.hpp>
+#include <esokit/control/control_loop.hpp>
+#include <esokit/control/scaled_law.hpp>
+#include <esokit/design/feedback_gain.hpp>
+#include <type_traits>
+
+namespace esokit {
+
+/// The observer is fed y, the law takes r and, where known, its derivatives.
+struct OutputBased {};
+
+/// The observer is fed e = r - y; what r does is part of the disturbance, and no derivative of r is
+/// needed. For a constant reference it equals the output-based form.
+struct ErrorBased {};
+
+/// Config of Adrc, of either form. Give `controller_bandwidth` or `gains`, not both.
+template <LoopObserver Observer>
+struct AdrcConfig {
+  using S = typename Observer::scalar_type;
+
+  typename Observer::Config observer{};  ///< b0 and T are in here; b0 of the plant in both forms
+  S controller_bandwidth{};              ///< omega_c, rad/s
+  std::optional<Array<S, Observer::order>> gains{};  ///< k_0 .. k_(n-1), instead of omega_c
+  TimeDomain domain = TimeDomain::continuous;        ///< where the controller's poles are placed
+  bool half_gain = false;    ///< half-gain tuning of the controller; of the observer: HalfGainEso
+  Limits<S> limits{};        ///< of the actuator
+  StartHold<S> hold{};       ///< u at first, while the observer finds the state
+  MissingRule<S> missing{};  ///< what to do when measurements stay away
+  int measurement_divider = 1;  ///< D: a measurement is due at every D-th update, the others ignore
+                                ///< y; 1 .. 1000, not above the observer's max_gap
+};
+
+/// u = (v - dhat) / b0 around an observer, within an actuator's limits.
+///
+/// Timing: `update` at sample k takes y[k] and the reference of now and returns the u to be held
+/// until k + 1. The input of k - 1 .. k, which the observer needs, is what `update` returned last,
+/// limited; where the actuator knows better, give it as `u_applied`.
+///
+/// Start: `make` stands at y = 0, u = 0. `start(y, u)` takes over a plant that stands at y under u
+/// without a bump: with the reference at y, or a tracking differentiator reset to y, the first u is
+/// that u. From manual operation, `track` the operator's u and go on with `update`; there is no
+/// step if the plant has come to rest (dhat = -b0 u) and the reference is at y.
+///
+/// Retuning (`retune`, any member of the config): the estimate and u are kept. A change of omega_o
+/// alters u by nothing while the innovation is zero; a change of b0 is moved into dhat,
+/// (b0_old - b0_new) u, so u keeps its value but for v/b0; a change of omega_c alters u by
+/// (dk_0 (r - y) - dk_1 y' ..) / b0. All three are without a step in the steady state.
+///
+/// Missing measurements: NaN or `update_without_measurement`. The observer predicts, and corrects
+/// with the gain for the whole gap; after `missing.most` in a row `mode()` says `safe` and u goes
+/// to `missing.input`.
+///
+/// A reference that is not finite keeps u where it is (in the error-based form it is a missing
+/// measurement). A u_applied that is not finite is taken for
+/// what was put out. No call allocates, throws or locks.
+///
+/// Delays, angles, a changing sample time and known plant models are the observer's affair: take
+/// DelayedInput, WrappedOutput, VariableTime or KnownModel around it; they nest.
+/// @tparam Form OutputBased or ErrorBased
+template <LoopObserver Observer, class Form = OutputBased>
+class Adrc {
+  static constexpr bool error_based = std::is_same_v<Form, ErrorBased>;
+  static_assert(error_based || std::is_same_v<Form, OutputBased>, "esokit: no such form");
+
+ public:
+  static constexpr int order = Observer::order;
+  using scalar_type = typename Observer::scalar_type;
+  using S = scalar_type;
+  using Reference = Vector<S, order + 1>;  ///< (r, r', .., r^(n))
+
+  using Config = AdrcConfig<Observer>;
+
+  /// @return the controller, or an error that names the field
+  static Expected<Adrc, Error<S>> make(const Config& config) {
+    const auto observer = Observer::make(observer_config(config));
+    if (!observer) return observer.error();
+    const auto& chain = chain_config(config.observer);
+    const auto law = make_law(config, chain.sample_time);
+    if (!law) return law.error();
+    const int gap = chain.max_gap;
+    if (config.measurement_divider > gap) {
+      return Error<S>{"measurement_divider",
+                      static_cast<S>(config.measurement_divider),
+                      "must not be above the observer's max_gap, which is",
+                      -1,
+                      static_cast<S>(gap),
+                      true};
+    }
+    const auto scaled = FastLaw::make(*law, *observer);
+    if (!scaled) return scaled.error();
+    const auto loop = Loop::make(
+        *observer, {config.limits, config.hold, config.missing, config.measurement_divider});
+    if (!loop) return loop.error();
+    return Adrc(*loop, *law, *scaled, config);
+  }
+
+  /// One sample. @param y measurement, NaN if missing @param reference r, constant
+  /// @return u to be held until the next sample, within the limits
+  S update(S y, S reference) noexcept {
+    const S r = reference;
+    return loop_.step(measured(y, r), [&]() ESOKIT_INLINE_LAMBDA { return command(r); });
+  }
+
+  /// The same where the actuator reports what it held since the last sample.
+  S update(S y, S reference, S u_applied) noexcept {
+    const S r = reference;
+    return loop_.step(measured(y, r), u_applied, [&]() ESOKIT_INLINE_LAMBDA { return command(r); });
+  }
+
+  /// With a reference that moves. @param reference (r, r', ..), any number up to n + 1 of them; the
+  /// rest counts as zero. A tracking differentiator gives such a vector. The error-based form uses
+  /// r alone.
+  template <int Count>
+  S update(S y, const Vector<S, Count>& reference) noexcept {
+    const Reference r = filled(reference);
+    return loop_.step(measured(y, r(0)), [&] { return command(r); });
+  }
+
+  template <int Count>
+  S update(S y, const Vector<S, Count>& reference, S u_applied) noexcept {
+    const Reference r = filled(reference);
+    return loop_.step(measured(y, r(0)), u_applied, [&] { return command(r); });
+  }
+
+  /// One sample whose measurement did not come.
+  S update_without_measurement(S reference) noexcept {
+    return loop_.step_without_measurement([&] { return command(reference); });
+  }
+
+  template <int Count>
+  S update_without_measurement(const Vector<S, Count>& reference) noexcept {
+    const Reference r = filled(reference);
+    return loop_.step_without_measurement([&] { return command(r); });
+  }
+
+  /// Manual operation: the observer follows, u is the operator's.
+  /// @param u_applied what the actuator held since the last sample @return the same
+  S track(S y, S reference, S u_applied) noexcept {
+    return loop_.track(measured(y, reference), u_applied);
+  }
+
+  /// Takes over a plant that stands at y under u, the reference being y too.
+  StepStatus start(S y, S u) noexcept { return start(y, u, y); }
+
+  /// Takes over a plant that stands at y under u. @param reference matters to the error-based form
+  StepStatus start(S y, S u, S reference) noexcept {
+    return loop_.start(measured(y, reference), u);
+  }
+
+  /// New settings while running. A refused config changes nothing. A hold that is running keeps its
+  /// time, a new hold time counts for nothing.
+  Check<S> retune(const Config& config) {
+    const auto fresh = make(config);
+    if (!fresh) return fresh.error();
+    Observer observer = loop_.observer();
+    if (auto ok = observer.retune(observer_config(config)); !ok) return ok;
+    loop_.adopt(fresh->loop_, observer);
+    law_ = fresh->law_;
+    fast_law_ = fresh->fast_law_;
+    spec_ = fresh->spec_;
+    return {};
+  }
+
+  /// How long the next step takes, s; for Adrc<VariableTime<..>>. The observer's gains, the rate
+  /// limit and, where placed in the sampled domain, the controller's gains follow. A length that
+  /// the observer's config does not allow is refused and changes nothing.
+  Check<S> set_step_time(const S& seconds) noexcept
+      requires(requires(Observer& o, const S& s) { o.set_step_time(s); }) {
+    if (auto ok = loop_.set_step_time(seconds); !ok) return ok;
+    if (spec_.domain == TimeDomain::sampled && spec_.bandwidth > S(0)) {
+      const auto gains = feedback_gain<order, S>(spec_, seconds);
+      if (!gains) return gains.error();
+      const auto law = Law::make({.gains = *gains, .input_gain = law_.input_gain()});
+      if (!law) return law.error();
+      law_ = *law;
+    }
+    return {};
+  }
+
+  /// The observer, for its estimates.
+  [[nodiscard]] const Observer& observer() const noexcept { return loop_.observer(); }
+  /// The observer, for what only it can do (AlgebraicEso::rearm).
+  [[nodiscard]] Observer& observer() noexcept { return loop_.observer(); }
+  /// The u that holds now, within the limits.
+  [[nodiscard]] const S& output() const noexcept { return loop_.output(); }
+  /// What the law asked for before the limits.
+  [[nodiscard]] const S& requested() const noexcept { return loop_.requested(); }
+  /// What the observer said of the last sample.
+  [[nodiscard]] StepStatus status() const noexcept { return loop_.status(); }
+  /// Whether the law, the start hold or the missing rule decides about u.
+  [[nodiscard]] LoopMode mode() const noexcept { return loop_.mode(); }
+  /// k_0 .. k_(n-1).
+  [[nodiscard]] const Array<S, order>& gains() const noexcept { return law_.gains(); }
+
+ private:
+  using Loop = ControlLoop<Observer>;
+  using Law = AdrcLaw<order, S>;
+  using FastLaw =
+      std::conditional_t<has_plain_estimate<Observer>, ScaledLaw<order, S>, NoScaledLaw>;
+  struct NoSpec {
+    constexpr NoSpec() = default;
+    constexpr explicit NoSpec(const FeedbackSpec<S>&) {}
+  };
+  static constexpr bool has_step_time = requires(Observer & o, const S& s) { o.set_step_time(s); };
+  static constexpr bool wraps = requires(const Observer& o, const S& s) { o.wrap(s); };
+
+  Adrc(const Loop& loop, const Law& law, const FastLaw& fast_law, const Config& config) noexcept
+      : loop_(loop), law_(law), fast_law_(fast_law), spec_(spec(config)) {}
+
+  static FeedbackSpec<S> spec(const Config& config) noexcept {
+    return {config.controller_bandwidth, config.domain, config.half_gain};
+  }
+
+  static typename Observer::Config observer_config(const Config& config) noexcept {
+    auto observer = config.observer;
+    // e'' = r'' - d - b0 u.
+    if constexpr (error_based)
+      chain_config(observer).input_gain = -chain_config(observer).input_gain;
+    return observer;
+  }
+
+  static Expected<Law, Error<S>> make_law(const Config& config, const S& sample_time) {
+    const S& input_gain = chain_config(config.observer).input_gain;
+    if (config.gains) {
+      if (config.half_gain) {
+        return Error<S>{"half_gain", S(1), "must be left out where gains is given"};
+      }
+      return Law::make({.controller_bandwidth = config.controller_bandwidth,
+                        .gains = config.gains,
+                        .input_gain = input_gain});
+    }
+    const auto gains = feedback_gain<order, S>(spec(config), sample_time);
+    if (!gains) return gains.error();
+    return Law::make({.gains = *gains, .input_gain = input_gain});
+  }
+
+  /// What the observer is fed.
+  [[nodiscard]] ESOKIT_INLINE S measured(S y, S reference) const noexcept {
+    if constexpr (!error_based) {
+      return y;
+    } else if constexpr (wraps) {
+      return observer().wrap(reference - y);
+    } else {
+      return reference - y;
+    }
+  }
+
+  template <int Count>
+  static Reference filled(const Vector<S, Count>& reference) noexcept {
+    static_assert(Count >= 1 && Count <= order + 1, "esokit: the reference is (r, r', .., r^(n))");
+    Reference all = Reference::Zero();
+    for (int i = 0; i < Count; ++i) all(i) = reference(i);
+    return all;
+  }
+
+  [[nodiscard]] ESOKIT_INLINE S command(S reference) const noexcept {
+    if constexpr (has_plain_estimate<Observer>) {
+      if constexpr (error_based) {
+        return fast_law_.control_error_based(observer());
+      } else {
+        S error = reference - observer().template scaled_estimate<0>();
+        if constexpr (wraps) error = observer().wrap(error);
+        return fast_law_.control(observer(), error);
+      }
+    } else {
+      return command(filled(Vector<S, 1>(reference)));
+    }
+  }
+
+  [[nodiscard]] S command(Reference reference) const noexcept {
+    const auto estimate = observer().estimate();
+    if constexpr (error_based) {
+      return law_.control_error_based(estimate);
+    } else {
+      if constexpr (wraps) {
+        reference(0) = estimate(0) + observer().wrap(reference(0) - estimate(0));
+      }
+      return law_.control(estimate, reference);
+    }
+  }
+
+  Loop loop_;
+  Law law_;
+  [[no_unique_address]] FastLaw fast_law_;
+  [[no_unique_address]] std::conditional_t<has_step_time, FeedbackSpec<S>, NoSpec> spec_;
+};
+
+}  // namespace esokit

@@ -1,0 +1,334 @@
+/// @file
+/// What every controller built on an observer has to do around its law: feed back the applied
+/// input, limit, ride through missing samples, start softly.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <esokit/control/limiter.hpp>
+#include <esokit/core/unroll.hpp>
+#include <esokit/observer/loop_observer.hpp>
+#include <optional>
+
+namespace esokit {
+
+/// u is held at a value while the observer finds the state.
+template <PlainScalar S = double>
+struct StartHold {
+  S time{};   ///< s; 0: no hold. Rounded up to whole samples
+  S input{};  ///< u meanwhile, within the limits
+};
+
+/// What happens when measurements stay away (or are NaN).
+template <PlainScalar S = double>
+struct MissingRule {
+  int most = 50;  ///< missing measurements in a row that the controller rides through
+  std::optional<S>
+      input{};        ///< u from then on, reached within the rate limit; left out: the last u
+  bool stay = false;  ///< true: until start() or reset(); false: a measurement ends it
+};
+
+/// Settings of a ControlLoop; a controller's config repeats them by name.
+template <PlainScalar S = double>
+struct LoopSettings {
+  Limits<S> limits{};
+  StartHold<S> hold{};
+  MissingRule<S> missing{};
+  int measurement_divider = 1;
+};
+
+/// What decides about the output now.
+enum class LoopMode : unsigned char {
+  running,  ///< the law
+  holding,  ///< the start hold
+  safe      ///< too many measurements are missing
+};
+
+/// An observer, an actuator's limits, and the rules for bad days. `step` runs one sample with any
+/// law; the controllers (Adrc, DisturbanceCompensator) are this and a law.
+///
+/// The input that the observer is told is the limited one, or what the actuator reports.
+template <LoopObserver Observer>
+class ControlLoop {
+ public:
+  using S = typename Observer::scalar_type;
+
+  static Expected<ControlLoop, Error<S>> make(const Observer& observer,
+                                              const LoopSettings<S>& settings) {
+    const auto limiter = Limiter<S>::make(settings.limits, observer.sample_time());
+    if (!limiter) return limiter.error();
+    if (auto ok = check_not_negative("hold.time", settings.hold.time); !ok) return ok.error();
+    if (auto ok = check_within("hold.input", settings.hold.input, settings.limits); !ok) {
+      return ok.error();
+    }
+    const S samples = std::ceil(settings.hold.time / observer.sample_time() - S(1) / S(1024));
+    if (!(samples < S(1 << 24))) {
+      return Error<S>{"hold.time", settings.hold.time, "must be below 2^24 samples"};
+    }
+    if (settings.missing.input) {
+      if (auto ok = check_within("missing.input", *settings.missing.input, settings.limits); !ok) {
+        return ok.error();
+      }
+    }
+    const int divider = settings.measurement_divider;
+    if (divider < 1 || divider > 1000) {
+      return Error<S>{"measurement_divider", static_cast<S>(divider), "must be 1 .. 1000"};
+    }
+    if (divider > 1 && !bears_regular_gaps<Observer>) {
+      return Error<S>{"measurement_divider", static_cast<S>(divider),
+                      "must be 1 for an observer that regular gaps restart"};
+    }
+    if (settings.missing.most < 0 || settings.missing.most > 65000 / divider) {
+      return Error<S>{"missing.most",
+                      static_cast<S>(settings.missing.most),
+                      "must be 0 up to 65000 samples, that is",
+                      -1,
+                      static_cast<S>(65000 / divider),
+                      true};
+    }
+    return ControlLoop(observer, *limiter, settings, static_cast<std::uint32_t>(samples));
+  }
+
+  /// One sample: the observer's update with the input that this loop put out last, then the law.
+  /// @param measured measurement at sample k; NaN: it is missing
+  /// @param law () -> S, the wanted u, computed from the new estimate
+  /// @return u for k .. k+1
+  template <class Law>
+  ESOKIT_INLINE S step(S measured, Law&& law) noexcept {
+    return step_driven(measured, limiter_.last(), law);
+  }
+
+  /// The same where the actuator reports what it held from k - 1 to k.
+  template <class Law>
+  ESOKIT_INLINE S step(S measured, S u_applied, Law&& law) noexcept {
+    report_applied(u_applied);
+    return step(measured, law);
+  }
+
+  /// The same where something else than u drives the observer's chain.
+  /// @param drive what stood in the place of u from k - 1 to k
+  template <class Law>
+  ESOKIT_INLINE S step_driven(S measured, S drive, Law&& law) noexcept {
+    if (special_) [[unlikely]] {
+      observe_specially(measured, drive);
+      return put_out(law);
+    }
+    const StepStatus status = observer_.update(measured, drive);
+    status_ = status;
+    if (status != StepStatus::ok) [[unlikely]] {
+      after_trouble(measured);
+      return put_out(law);
+    }
+    return limited(law());
+  }
+
+  /// One sample without a measurement.
+  template <class Law>
+  S step_without_measurement(Law&& law) noexcept {
+    skip_measurement(limiter_.last());
+    return put_out(law);
+  }
+
+  /// Manual operation: the observer follows, the output is the operator's.
+  /// @param u_applied what was held from k - 1 to k @return the same
+  S track(S measured, S u_applied) noexcept {
+    report_applied(u_applied);
+    if (mode_ == LoopMode::holding) set_mode(LoopMode::running);
+    observe_specially(measured, limiter_.last());
+    requested_ = limiter_.last();
+    return limiter_.last();
+  }
+
+  /// Starts in the steady state (y, u): dhat = -b0 u. Ends hold and safe mode.
+  StepStatus start(S measured, S u) noexcept {
+    if (!is_finite(u)) return StepStatus::input_rejected;
+    if (!is_finite(measured)) return StepStatus::state_rejected;
+    const StepStatus status = rest_at(measured, u);
+    if (status == StepStatus::ok) {
+      limiter_.track(u);
+      requested_ = u;
+      set_mode(LoopMode::running);
+    }
+    return status;
+  }
+
+  /// Takes the settings of `fresh`, whose observer has them already in `retuned`; state, output and
+  /// mode are kept.
+  void adopt(const ControlLoop& fresh, const Observer& retuned) noexcept {
+    const S last = limiter_.last();
+    limiter_ = fresh.limiter_;
+    limiter_.track(last);
+    observer_ = retuned;
+    hold_input_ = fresh.hold_input_;
+    safe_input_ = fresh.safe_input_;
+    missing_limit_ = fresh.missing_limit_;
+    divider_ = fresh.divider_;
+    phase_ = 0;
+    set_mode(mode_);
+    has_safe_input_ = fresh.has_safe_input_;
+    stay_safe_ = fresh.stay_safe_;
+    if constexpr (has_step_time) limits_ = fresh.limits_;
+  }
+
+  /// How long the next step takes (s), where the observer is VariableTime; the rate limit follows.
+  Check<S> set_step_time(const S& seconds) noexcept
+      requires(requires(Observer& o, const S& s) { o.set_step_time(s); }) {
+    if (auto ok = observer_.set_step_time(seconds); !ok) return ok;
+    auto limiter = Limiter<S>::make(limits_, seconds);
+    if (!limiter) return limiter.error();
+    limiter->track(limiter_.last());
+    limiter_ = *limiter;
+    return {};
+  }
+
+  [[nodiscard]] const Observer& observer() const noexcept { return observer_; }
+  [[nodiscard]] Observer& observer() noexcept { return observer_; }
+  /// The last output (limited), or what was reported as applied after it.
+  [[nodiscard]] const S& output() const noexcept { return limiter_.last(); }
+  /// What the law asked for before the limits.
+  [[nodiscard]] const S& requested() const noexcept { return requested_; }
+  /// What the observer said of the last step.
+  [[nodiscard]] StepStatus status() const noexcept { return status_; }
+  [[nodiscard]] LoopMode mode() const noexcept { return mode_; }
+  [[nodiscard]] const Limiter<S>& limiter() const noexcept { return limiter_; }
+
+ private:
+  struct Nothing {};
+  static constexpr bool has_step_time = requires(Observer & o, const S& s) { o.set_step_time(s); };
+
+  ControlLoop(const Observer& observer, const Limiter<S>& limiter, const LoopSettings<S>& settings,
+              std::uint32_t hold_samples) noexcept
+      : observer_(observer),
+        limiter_(limiter),
+        hold_input_(settings.hold.input),
+        safe_input_(settings.missing.input.value_or(S(0))),
+        hold_left_(hold_samples),
+        divider_(static_cast<std::uint16_t>(settings.measurement_divider)),
+        mode_(hold_samples > 0 ? LoopMode::holding : LoopMode::running),
+        has_safe_input_(settings.missing.input.has_value()),
+        stay_safe_(settings.missing.stay) {
+    missing_limit_ =
+        static_cast<std::uint16_t>((settings.missing.most + 1) * settings.measurement_divider);
+    if constexpr (has_step_time) limits_ = settings.limits;
+    set_mode(mode_);
+    // What stands at the actuator before the first step.
+    if (hold_samples > 0) limiter_.track(hold_input_);
+  }
+
+  static Check<S> check_within(const char* field, const S& input, const Limits<S>& limits) {
+    if (auto ok = check_finite(field, input); !ok) return ok;
+    const bool nothing_said = !(input < S(0)) && !(input > S(0));
+    if (!nothing_said && input < limits.lower) {
+      return Error<S>{field, input, "must not be below limits.lower", -1, limits.lower, true};
+    }
+    if (!nothing_said && input > limits.upper) {
+      return Error<S>{field, input, "must not be above limits.upper", -1, limits.upper, true};
+    }
+    return {};
+  }
+
+  void report_applied(S u_applied) noexcept {
+    if (is_finite(u_applied)) [[likely]]
+      limiter_.track(u_applied);
+  }
+
+  template <class Law>
+  S put_out(Law&& law) noexcept {
+    return limited(mode_ == LoopMode::running ? S(law()) : other_output());
+  }
+
+  ESOKIT_INLINE S limited(S wanted) noexcept {
+    // A bad reference, or a law that overflows: the last output stays.
+    if (!is_finite(wanted)) [[unlikely]]
+      wanted = limiter_.last();
+    requested_ = wanted;
+    return limiter_(wanted);
+  }
+
+  ESOKIT_COLD void observe_specially(S measured, S drive) noexcept {
+    if (phase_ != 0) {
+      skip_measurement(drive);
+      return;
+    }
+    phase_ = next_phase();
+    const bool as_planned = observer_.missed() == divider_ - 1;
+    status_ = observer_.update(measured, drive);
+    after_trouble(measured);
+    if (as_planned && status_ == StepStatus::gap_bridged) status_ = StepStatus::ok;
+  }
+
+  void skip_measurement(S drive) noexcept {
+    phase_ = next_phase();
+    status_ = observer_.predict(drive);
+    judge_missing();
+  }
+
+  ESOKIT_COLD void after_trouble(S measured) noexcept {
+    // After a gap too long to bridge the observer begins at rest with dhat = 0; the steady state of
+    // the present u is the better guess, and does not bump.
+    if (has(status_, StepStatus::restarted)) {
+      (void)observer_.reset(rest_state(measured, observer_.applied_input()));
+    }
+    judge_missing();
+  }
+
+  /// The observer in the steady state of an input that counts as applied for long.
+  StepStatus rest_at(S measured, S input) noexcept {
+    Observer next = observer_;
+    if constexpr (requires { next.fill_input(input); }) next.fill_input(input);
+    // Tells it the input: a later change of b0 asks for that.
+    (void)next.predict(input);
+    const StepStatus status = next.reset(rest_state(measured, input));
+    if (status == StepStatus::ok) observer_ = next;
+    return status;
+  }
+
+  [[nodiscard]] typename Observer::Estimate rest_state(S measured, S input) const noexcept {
+    typename Observer::Estimate state = Observer::Estimate::Zero();
+    state(0) = measured;
+    state(Observer::order) = -(observer_.input_gain() * input);
+    return state;
+  }
+
+  void judge_missing() noexcept {
+    if (observer_.missed() >= missing_limit_) {
+      set_mode(LoopMode::safe);
+    } else if (mode_ == LoopMode::safe && !stay_safe_ && observer_.missed() < divider_) {
+      set_mode(LoopMode::running);
+    }
+  }
+
+  [[nodiscard]] ESOKIT_COLD S other_output() noexcept {
+    if (mode_ == LoopMode::safe) return has_safe_input_ ? safe_input_ : limiter_.last();
+    // The step that uses up the hold is the last one held.
+    if (--hold_left_ == 0) set_mode(LoopMode::running);
+    return hold_input_;
+  }
+
+  void set_mode(LoopMode mode) noexcept {
+    mode_ = mode;
+    special_ = mode != LoopMode::running || divider_ != 1;
+  }
+
+  [[nodiscard]] std::uint16_t next_phase() const noexcept {
+    return static_cast<std::uint16_t>(phase_ + 1 == divider_ ? 0 : phase_ + 1);
+  }
+
+  Observer observer_;
+  Limiter<S> limiter_;
+  S requested_{};
+  S hold_input_;
+  S safe_input_;
+  std::uint32_t hold_left_;
+  std::uint16_t missing_limit_{};
+  std::uint16_t divider_;
+  std::uint16_t phase_ = 0;
+  LoopMode mode_;
+  bool special_ = false;  ///< anything but the law at every sample: one test in the hot path
+  bool has_safe_input_;
+  bool stay_safe_;
+  StepStatus status_ = StepStatus::ok;
+  [[no_unique_address]] std::conditional_t<has_step_time, Limits<S>, Nothing> limits_{};
+};
+
+}  // namespace esokit

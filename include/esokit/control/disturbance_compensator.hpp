@@ -1,0 +1,127 @@
+/// @file
+/// DisturbanceCompensator: disturbance rejection around a controller that exists already.
+#pragma once
+
+#include <esokit/control/control_loop.hpp>
+
+namespace esokit {
+
+/// u = u0 + K dhat with u0 from any controller (a PID, say) and K = -1/b0: the controller then sees
+/// a plant that is nearly y^(n) = b0 u0. The same limits, start, missing and retuning rules as
+/// Adrc.
+///
+/// A disturbance that does not come in where u does (mismatched): put the observer where it comes
+/// in, tell it with `update_driven` what drives that equation beside the disturbance (another
+/// state, in the place of u), and give the gain K that takes the estimate to u, for example
+/// -(C A^-1 B)^-1 C A^-1 B_d of the loop under u0, which removes the disturbance from y in the
+/// steady state.
+///
+/// An integrator in the wrapped controller has nothing left to do; where it already carries the
+/// disturbance, `start(y, u)` and set the controller's output to `base_output()`: the sum goes on
+/// from u without a bump. Give the controller's anti-windup `output() - compensation()` as the u0
+/// that was applied.
+template <LoopObserver Observer>
+class DisturbanceCompensator {
+ public:
+  static constexpr int order = Observer::order;
+  using scalar_type = typename Observer::scalar_type;
+  using S = scalar_type;
+
+  struct Config {
+    typename Observer::Config observer{};  ///< b0 and T are in here
+    std::optional<S> compensation_gain{};  ///< K, unit of u per unit of y^(n); left out: -1/b0
+    Limits<S> limits{};                    ///< of the actuator
+    StartHold<S> hold{};                   ///< u at first, while the observer finds the state
+    MissingRule<S> missing{};              ///< what to do when measurements stay away
+    int measurement_divider = 1;           ///< D: a measurement is due at every D-th update
+  };
+
+  /// @return the compensator, or an error that names the field
+  static Expected<DisturbanceCompensator, Error<S>> make(const Config& config) {
+    const auto observer = Observer::make(config.observer);
+    if (!observer) return observer.error();
+    S gain = S(-1) / chain_config(config.observer).input_gain;
+    if (config.compensation_gain) {
+      gain = *config.compensation_gain;
+      if (auto ok = check_finite("compensation_gain", gain); !ok) return ok.error();
+    }
+    const auto loop = Loop::make(
+        *observer, {config.limits, config.hold, config.missing, config.measurement_divider});
+    if (!loop) return loop.error();
+    return DisturbanceCompensator(*loop, gain);
+  }
+
+  /// One sample. @param y measurement, NaN if missing @param base_output u0 of the wrapped
+  /// controller @return u to be held until the next sample, within the limits
+  S update(S y, S base_output) noexcept {
+    return loop_.step(y, [&]() ESOKIT_INLINE_LAMBDA { return base_output + compensation(); });
+  }
+
+  /// The same where the actuator reports what it held since the last sample.
+  S update(S y, S base_output, S u_applied) noexcept {
+    return loop_.step(y, u_applied,
+                      [&]() ESOKIT_INLINE_LAMBDA { return base_output + compensation(); });
+  }
+
+  /// The same where the observer's equation is driven by something else than u.
+  /// @param drive what stood in the place of u since the last sample, in units of y^(n) / b0
+  S update_driven(S y, S base_output, S drive) noexcept {
+    return loop_.step_driven(y, drive, [&] { return base_output + compensation(); });
+  }
+
+  /// One sample whose measurement did not come.
+  S update_without_measurement(S base_output) noexcept {
+    return loop_.step_without_measurement([&] { return base_output + compensation(); });
+  }
+
+  /// Compensation off: the observer follows while u is someone else's.
+  /// @param u_applied what the actuator held since the last sample @return the same
+  S track(S y, S u_applied) noexcept { return loop_.track(y, u_applied); }
+
+  /// Takes over a plant that stands at y under u: dhat = -b0 u.
+  StepStatus start(S y, S u) noexcept { return loop_.start(y, u); }
+
+  /// New settings while running. A refused config changes nothing.
+  Check<S> retune(const Config& config) {
+    const auto fresh = make(config);
+    if (!fresh) return fresh.error();
+    Observer observer = loop_.observer();
+    if (auto ok = observer.retune(config.observer); !ok) return ok;
+    loop_.adopt(fresh->loop_, observer);
+    gain_ = fresh->gain_;
+    return {};
+  }
+
+  /// How long the next step takes, s; see Adrc::set_step_time.
+  Check<S> set_step_time(const S& seconds) noexcept
+      requires(requires(Observer& o, const S& s) { o.set_step_time(s); }) {
+    return loop_.set_step_time(seconds);
+  }
+
+  /// K dhat, what is added to u0.
+  [[nodiscard]] S compensation() const noexcept {
+    return gain_ * loop_.observer().total_disturbance();
+  }
+
+  /// The u0 with which u would stay what it is.
+  [[nodiscard]] S base_output() const noexcept { return loop_.output() - compensation(); }
+
+  [[nodiscard]] const Observer& observer() const noexcept { return loop_.observer(); }
+  [[nodiscard]] Observer& observer() noexcept { return loop_.observer(); }
+  /// The u that holds now, within the limits.
+  [[nodiscard]] const S& output() const noexcept { return loop_.output(); }
+  /// u0 + K dhat before the limits.
+  [[nodiscard]] const S& requested() const noexcept { return loop_.requested(); }
+  [[nodiscard]] StepStatus status() const noexcept { return loop_.status(); }
+  [[nodiscard]] LoopMode mode() const noexcept { return loop_.mode(); }
+
+ private:
+  using Loop = ControlLoop<Observer>;
+
+  DisturbanceCompensator(const Loop& loop, S gain) noexcept : loop_(loop), gain_(gain) {}
+
+  Loop loop_;
+  S gain_;
+};
+
+}  // namespace esokit

@@ -1,0 +1,261 @@
+/// @file
+/// The minimum-footprint forms of linear ADRC after Herbst (see design/filter_form.hpp): one filter
+/// of order N = n + m instead of observer and law.
+#pragma once
+
+#include <esokit/control/adrc_law.hpp>
+#include <esokit/control/limiter.hpp>
+#include <esokit/core/unroll.hpp>
+#include <esokit/design/feedback_gain.hpp>
+#include <esokit/design/filter_form.hpp>
+#include <esokit/design/placement.hpp>
+#include <esokit/observer/step_status.hpp>
+#include <limits>
+#include <optional>
+#include <type_traits>
+
+namespace esokit {
+
+/// The filter runs on z^-1, as in the literature. Its digits are lost by 1/(1-rho)^N: configs that
+/// leave fewer than three of them are refused.
+struct ShiftOperator {};
+
+/// The filter runs on delta = z - 1: N additions more, no digits lost for any omega_o T.
+struct DeltaOperator {};
+
+/// What the filter is told of u.
+struct LimitedFeedback {};    ///< the applied, limited u: the dual-feedback form
+struct UnlimitedFeedback {};  ///< its own output: the transfer-function form
+
+/// Linear ADRC (LinearEso and law with constant gains) as one filter with two feedbacks, of y and
+/// of the limited u. At sample k, with u[k-1] as it was applied:
+///
+///   s_i = p_i - m_i u,  c = s_1 - n_0 y,  u <- limited(c + k_r r),  p_i <- s_(i+1) - n_i y - d_i c
+///
+/// (DeltaOperator: + s_i). Equal to Adrc<LinearEso> in every sample, limited or not. Operations for
+/// N = n + m: 3 N + 2 multiplications, 3 N + 1 additions (4 N + 1 with DeltaOperator), N additions
+/// for the test that all is finite, and the limits; 3 N + 2 coefficients, N states. For n = 2, m =
+/// 1: 11, 10 (13), 3; 11 and 3.
+///
+/// A filter has no prediction: a bad measurement is replaced by the last good one and reported.
+/// Where samples get lost, take Adrc.
+///
+/// With UnlimitedFeedback it is the transfer-function form: the same while u is within its limits;
+/// outside, its m integrators run on: it winds up. For actuators that never saturate.
+template <int Order, PlainScalar S = double, int Extension = 1, class Operator = ShiftOperator,
+          class Feedback = LimitedFeedback, class Placement = EqualPoles>
+class DualFeedbackAdrc {
+ public:
+  static constexpr int order = Order;
+  static constexpr int size = Order + Extension;
+  using scalar_type = S;
+
+  /// Give `controller_bandwidth` or `gains`, not both.
+  struct Config {
+    typename Placement::template Spec<size, S> observer_bandwidth{};  ///< omega_o, rad/s, or poles
+    S controller_bandwidth{};                                         ///< omega_c, rad/s
+    std::optional<Array<S, Order>> gains{};                           ///< k_0 .. k_(n-1)
+    TimeDomain domain = TimeDomain::continuous;  ///< where the controller's poles are placed
+    bool half_gain = false;                      ///< half-gain tuning of the controller
+    S input_gain{};                              ///< b0, not zero, negative is fine
+    S sample_time{};                             ///< T, s
+    Limits<S> limits{};                          ///< of the actuator
+  };
+
+  /// @return the controller at rest in zero, or an error that names the field
+  static Expected<DualFeedbackAdrc, Error<S>> make(const Config& config) {
+    if (auto ok = check_nonzero("input_gain", config.input_gain); !ok) return ok.error();
+    const auto limiter = Limiter<S>::make(config.limits, config.sample_time);
+    if (!limiter) return limiter.error();
+    if (auto ok =
+            Placement::template check<size, S>("observer_bandwidth", config.observer_bandwidth);
+        !ok) {
+      return ok.error();
+    }
+    const auto gains = controller_gains(config);
+    if (!gains) return gains.error();
+    const auto poles =
+        Placement::template sample<size, S>(config.observer_bandwidth, config.sample_time);
+    Form form = delta_form<Order, size, S>(poles, *gains, config.input_gain, config.sample_time);
+    const S bandwidth = Placement::template representative<size, S>(config.observer_bandwidth);
+    // The last coefficient of D is prod(1 - rho_i).
+    if (auto ok = check_representable("observer_bandwidth", bandwidth, form.denominator[size],
+                                      "times sample_time gives a filter the scalar cannot hold");
+        !ok) {
+      return ok.error();
+    }
+    for (const S& coefficient : form.measurement) {
+      if (!is_finite(coefficient)) {
+        return Error<S>{"sample_time", config.sample_time,
+                        "gives a filter that the scalar cannot hold"};
+      }
+    }
+    if constexpr (!delta) {
+      const S unit = S(100) * std::numeric_limits<S>::epsilon();
+      if (!(unit < static_cast<S>(1e-3) * form.denominator[size])) {
+        return Error<S>{"observer_bandwidth", bandwidth,
+                        "times sample_time leaves too few digits in z; take DeltaOperator"};
+      }
+      form = shift_form<size, S>(form);
+    }
+    return DualFeedbackAdrc(form, *limiter);
+  }
+
+  /// One sample. @param y measurement @param reference r
+  /// @return u to be held until the next sample, within the limits
+  S update(S y, S reference) noexcept {
+    Step step = advance(y, limited ? limiter_.last() : wanted_);
+    step.wanted = step.control + form_.reference * reference;
+    if (!is_finite(probe(step))) [[unlikely]]
+      return update_guarded(y, reference);
+    pending_ = step.pending;
+    measured_ = y;
+    wanted_ = step.wanted;
+    status_ = StepStatus::ok;
+    return limiter_(step.wanted);
+  }
+
+  /// The same where the actuator reports what it held since the last sample. The transfer-function
+  /// form does not look at it but for the rate limit.
+  S update(S y, S reference, S u_applied) noexcept {
+    if (is_finite(u_applied)) [[likely]]
+      limiter_.track(u_applied);
+    return update(y, reference);
+  }
+
+  /// Takes over a plant that stands at y under u, the reference being y too. A y or u that is not
+  /// finite changes nothing and is reported.
+  StepStatus start(S y, S u) noexcept {
+    const S c = u - form_.reference * y;
+    States state{};
+    if constexpr (delta) {
+      state[0] = c + form_.measurement[0] * y;
+      for (std::size_t i = 1; i < size; ++i) state[i] = inflow(i, y, c) + form_.input[i] * u;
+    } else {
+      for (std::size_t i = size; i >= 1; --i) {
+        state[i - 1] = (i < size ? state[i] : S(0)) - inflow(i, y, c) - form_.input[i] * u;
+      }
+    }
+    S sum = u;
+    for (std::size_t i = 0; i < size; ++i) {
+      state[i] = state[i] + form_.input[i + 1] * u;
+      sum = sum + state[i];
+    }
+    if (!is_finite(sum)) return StepStatus::state_rejected;
+    pending_ = state;
+    measured_ = y;
+    wanted_ = u;
+    limiter_.track(u);
+    return StepStatus::ok;
+  }
+
+  /// New settings while running: starts in the steady state of the last measurement and u, as a
+  /// filter's state says nothing to another filter. No bump at rest. A refused config changes
+  /// nothing.
+  Check<S> retune(const Config& config) {
+    auto fresh = make(config);
+    if (!fresh) return fresh.error();
+    const S u = output();
+    const S y = measured_;
+    *this = *fresh;
+    (void)start(y, u);
+    return {};
+  }
+
+  /// The u that holds now, within the limits.
+  [[nodiscard]] const S& output() const noexcept { return limiter_.last(); }
+  /// What the law asked for before the limits.
+  [[nodiscard]] const S& requested() const noexcept { return wanted_; }
+  /// ok, or measurement_rejected.
+  [[nodiscard]] StepStatus status() const noexcept { return status_; }
+  /// The filter's coefficients, in z or delta.
+  [[nodiscard]] const FilterForm<size, S>& form() const noexcept { return form_; }
+
+ private:
+  using Form = FilterForm<size, S>;
+  using States = Array<S, size>;
+  static constexpr bool delta = std::is_same_v<Operator, DeltaOperator>;
+  static constexpr bool limited = std::is_same_v<Feedback, LimitedFeedback>;
+
+  struct Step {
+    States pending;  ///< the next states without the share of u
+    S control;       ///< c
+    S wanted{};
+  };
+
+  DualFeedbackAdrc(const Form& form, const Limiter<S>& limiter) noexcept
+      : form_(form), limiter_(limiter), wanted_(limiter.last()) {}
+
+  static Expected<Array<S, Order>, Error<S>> controller_gains(const Config& config) {
+    if (!config.gains) {
+      return feedback_gain<Order, S>({config.controller_bandwidth, config.domain, config.half_gain},
+                                     config.sample_time);
+    }
+    const auto law = AdrcLaw<Order, S>::make({.controller_bandwidth = config.controller_bandwidth,
+                                              .gains = config.gains,
+                                              .input_gain = config.input_gain});
+    if (!law) return law.error();
+    return law->gains();
+  }
+
+  [[nodiscard]] ESOKIT_INLINE Step advance(S y, S u) const noexcept {
+    Step step;
+    States state;
+    detail::unroll<size>([&](auto i) ESOKIT_INLINE_LAMBDA {
+      std::get<i>(state) = std::get<i>(pending_) - std::get<i + 1>(form_.input) * u;
+    });
+    step.control = std::get<0>(state) - std::get<0>(form_.measurement) * y;
+    detail::unroll<size>([&](auto i) ESOKIT_INLINE_LAMBDA {
+      S next = -(std::get<i + 1>(form_.measurement) * y +
+                 std::get<i + 1>(form_.denominator) * step.control);
+      if constexpr (i + 1 < size) next = next + std::get<i + 1>(state);
+      if constexpr (delta) next = next + std::get<i>(state);
+      std::get<i>(step.pending) = next;
+    });
+    return step;
+  }
+
+  /// n_i y + d_i c.
+  [[nodiscard]] S inflow(std::size_t i, S y, S c) const noexcept {
+    return form_.measurement[i] * y + form_.denominator[i] * c;
+  }
+
+  /// Finite only if all of the step is.
+  [[nodiscard]] ESOKIT_INLINE static S probe(const Step& step) noexcept {
+    S sum = step.wanted;
+    detail::unroll<size>([&](auto i)
+                             ESOKIT_INLINE_LAMBDA { sum = sum + std::get<i>(step.pending); });
+    return sum;
+  }
+
+  ESOKIT_COLD S update_guarded(S y, S reference) noexcept {
+    const S u = limited ? limiter_.last() : wanted_;
+    Step step = advance(y, u);
+    status_ = StepStatus::ok;
+    if (!is_finite(probe(step))) {
+      status_ = StepStatus::measurement_rejected;
+      step = advance(measured_, u);
+    } else {
+      measured_ = y;
+    }
+    if (is_finite(probe(step))) pending_ = step.pending;
+    step.wanted = step.control + form_.reference * reference;
+    wanted_ = is_finite(step.wanted) ? step.wanted : limiter_.last();
+    return limiter_(wanted_);
+  }
+
+  Form form_;
+  Limiter<S> limiter_;
+  States pending_{};
+  S measured_{};
+  S wanted_;
+  StepStatus status_ = StepStatus::ok;
+};
+
+/// The transfer-function form: winds up where u is limited.
+template <int Order, PlainScalar S = double, int Extension = 1, class Operator = ShiftOperator,
+          class Placement = EqualPoles>
+using TransferFunctionAdrc =
+    DualFeedbackAdrc<Order, S, Extension, Operator, UnlimitedFeedback, Placement>;
+
+}  // namespace esokit

@@ -1,0 +1,67 @@
+/// @file
+/// Incremental: a controller whose output is the change of u, for an actuator that integrates.
+#pragma once
+
+#include <esokit/design/check.hpp>
+#include <esokit/observer/step_status.hpp>
+
+namespace esokit {
+
+/// Puts out u[k] - u[k-1] of a controller: for stepper valves, motorised potentiometers, PLC blocks
+/// that take increments.
+///
+/// The sum of the increments is u but for a constant that nobody need know: the observer takes it
+/// for disturbance. Limits hold for the sum (counted from `start`), the rate limit for an
+/// increment. Where the actuator reports what it made of the last increment, nothing winds up.
+/// @tparam Controller such as Adrc
+template <class Controller>
+class Incremental {
+ public:
+  using scalar_type = typename Controller::scalar_type;
+  using S = scalar_type;
+  using Config = typename Controller::Config;
+
+  /// As Controller::make.
+  static Expected<Incremental, Error<S>> make(const Config& config) {
+    auto controller = Controller::make(config);
+    if (!controller) return controller.error();
+    return Incremental(*controller);
+  }
+
+  /// @return the change of u to be carried out now
+  template <class Reference>
+  S update(const S& y, const Reference& reference) noexcept {
+    const S before = controller_.output();
+    increment_ = controller_.update(y, reference) - before;
+    return increment_;
+  }
+
+  /// @param increment_applied what the actuator made of the last increment
+  template <class Reference>
+  S update(const S& y, const Reference& reference, const S& increment_applied) noexcept {
+    const S missed = increment_applied - increment_;
+    const S reported = controller_.output() + missed;
+    const S before = is_finite(missed) ? reported : controller_.output();
+    increment_ = controller_.update(y, reference, before) - before;
+    return increment_;
+  }
+
+  /// Takes over a plant that stands at y; u counts from `u`, zero if nobody knows.
+  StepStatus start(const S& y, const S& u = S(0)) noexcept {
+    increment_ = S(0);
+    return controller_.start(y, u);
+  }
+
+  /// As Controller::retune.
+  Check<S> retune(const Config& config) { return controller_.retune(config); }
+
+  [[nodiscard]] const Controller& controller() const noexcept { return controller_; }
+
+ private:
+  explicit Incremental(const Controller& controller) noexcept : controller_(controller) {}
+
+  Controller controller_;
+  S increment_{};
+};
+
+}  // namespace esokit

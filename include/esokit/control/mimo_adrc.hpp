@@ -1,0 +1,279 @@
+/// @file
+/// MimoAdrc: q channels of ADRC, decoupled by the inverse of the input matrix.
+#pragma once
+
+#include <Eigen/LU>
+#include <esokit/control/adrc_law.hpp>
+#include <esokit/control/limiter.hpp>
+#include <esokit/core/unroll.hpp>
+#include <esokit/design/feedback_gain.hpp>
+#include <esokit/observer/loop_observer.hpp>
+#include <limits>
+#include <tuple>
+#include <type_traits>
+#include <utility>
+
+namespace esokit {
+
+/// Control of y_i^(n_i) = d_i + (B0 u)_i, i = 1..q, B0 square and invertible: each channel has an
+/// observer of its own order, and u = B0^-1 (v - dhat). What B0 gets wrong, and all other coupling,
+/// is disturbance.
+///
+/// Observer i is told the applied (B0 u)_i, so limits, which are those of the q actuators, wind
+/// nothing up; while one actuator is limited the channels are coupled through B0. A channel whose
+/// measurement is NaN predicts alone, the others go on.
+/// @tparam Observers one observer type a channel, all of one scalar
+template <LoopObserver... Observers>
+class MimoAdrc {
+  using Channels = std::tuple<Observers...>;
+  using First = std::tuple_element_t<0, Channels>;
+  template <int Channel>
+  using ObserverOf = std::tuple_element_t<static_cast<std::size_t>(Channel), Channels>;
+
+ public:
+  static constexpr int channels = sizeof...(Observers);
+  using scalar_type = typename First::scalar_type;
+  using S = scalar_type;
+  using Output = Vector<S, channels>;                 ///< y, or r, or u
+  using InputMatrix = Matrix<S, channels, channels>;  ///< B0
+  static_assert((std::is_same_v<typename Observers::scalar_type, S> && ...),
+                "esokit: all channels need the same scalar");
+
+  struct Config {
+    /// One a channel; `input_gain` is left out, B0 says it, and T is the same in all.
+    std::tuple<typename Observers::Config...> observers{};
+    Array<S, channels> controller_bandwidths{};      ///< omega_c of each channel, rad/s
+    TimeDomain domain = TimeDomain::continuous;      ///< where the controllers' poles are placed
+    bool half_gain = false;                          ///< half-gain tuning of the controllers
+    InputMatrix input_matrix = InputMatrix::Zero();  ///< B0, unit of y_i^(n_i) per unit of u_j
+    /// Largest condition number of B0 that is accepted, in the 1-norm after its rows and columns
+    /// are scaled to a largest element of 1: units do not matter then.
+    S condition_limit = S(1000);
+    Array<Limits<S>, channels> limits{};  ///< of each actuator
+  };
+
+  /// @return the controller at rest in zero, or an error that names the field; for B0 with its
+  /// condition number as the value
+  static Expected<MimoAdrc, Error<S>> make(const Config& config) {
+    auto inverse = inverted(config);
+    if (!inverse) return inverse.error();
+    const S& sample_time = chain_config(std::get<0>(config.observers)).sample_time;
+    return make_channels(config, *inverse, sample_time,
+                         std::make_index_sequence<sizeof...(Observers)>{});
+  }
+
+  /// One sample. @param y q x 1, NaN where missing @param reference r, q x 1
+  /// @return u, q x 1, to be held until the next sample, within the limits
+  Output update(const Output& y, const Output& reference) noexcept {
+    Output applied;
+    for (int i = 0; i < channels; ++i) applied(i) = limiters_[static_cast<std::size_t>(i)].last();
+    const Output drive = input_matrix_ * applied;
+    Output wanted;
+    detail::unroll<channels>([&](auto i) {
+      constexpr auto channel = static_cast<std::size_t>(i);
+      constexpr int row = i;
+      auto& observer = std::get<channel>(observers_);
+      std::get<channel>(statuses_) = observer.update(y(row), drive(row));
+      wanted(row) = std::get<channel>(laws_).control(observer.estimate(), S(reference(row)));
+    });
+    return put_out(inverse_ * wanted);
+  }
+
+  /// The same where the actuators report what they held since the last sample; NaN: not known.
+  Output update(const Output& y, const Output& reference, const Output& u_applied) noexcept {
+    for (int i = 0; i < channels; ++i) {
+      if (is_finite(u_applied(i))) limiters_[static_cast<std::size_t>(i)].track(u_applied(i));
+    }
+    return update(y, reference);
+  }
+
+  /// Takes over a plant that stands at y under u: dhat = -B0 u.
+  /// @return ok, or state_rejected if something is not finite: nothing is changed then
+  StepStatus start(const Output& y, const Output& u) noexcept {
+    const Output drive = input_matrix_ * u;
+    if (!is_finite(y.sum() + drive.sum() + u.sum())) return StepStatus::state_rejected;
+    detail::unroll<channels>([&](auto i) {
+      constexpr auto channel = static_cast<std::size_t>(i);
+      constexpr int row = i;
+      using O = ObserverOf<decltype(i)::value>;
+      auto& observer = std::get<channel>(observers_);
+      // The input counts as applied, whatever a later change of B0 asks.
+      (void)observer.predict(drive(row));
+      typename O::Estimate state = O::Estimate::Zero();
+      state(0) = y(row);
+      state(O::order) = -drive(row);
+      (void)observer.reset(state);
+      limiters_[channel].track(u(row));
+    });
+    return StepStatus::ok;
+  }
+
+  /// New settings while running: estimates are kept, a change of B0 is moved into the disturbances,
+  /// dhat += (B0_old - B0_new) u. A refused config changes nothing.
+  Check<S> retune(const Config& config) {
+    auto fresh = make(config);
+    if (!fresh) return fresh.error();
+    const Output u = output();
+    const Output moved = (input_matrix_ - config.input_matrix) * u;
+    Channels observers = observers_;
+    Check<S> outcome;
+    detail::unroll<channels>([&](auto i) {
+      constexpr auto channel = static_cast<std::size_t>(i);
+      constexpr int row = i;
+      auto& observer = std::get<channel>(observers);
+      auto settings = std::get<channel>(config.observers);
+      chain_config(settings).input_gain = S(1);
+      if (outcome) outcome = observer.retune(settings);
+      observer.shift_disturbance(moved(row));
+    });
+    if (!outcome) return outcome;
+    *this = *fresh;
+    observers_ = observers;
+    for (std::size_t i = 0; i < channels; ++i) limiters_[i].track(u(static_cast<int>(i)));
+    return {};
+  }
+
+  /// The u that holds now, q x 1.
+  [[nodiscard]] Output output() const noexcept {
+    Output u;
+    for (int i = 0; i < channels; ++i) u(i) = limiters_[static_cast<std::size_t>(i)].last();
+    return u;
+  }
+
+  template <int Channel>
+  [[nodiscard]] const ObserverOf<Channel>& observer() const noexcept {
+    return std::get<static_cast<std::size_t>(Channel)>(observers_);
+  }
+
+  /// What the observer of a channel said of the last sample.
+  [[nodiscard]] StepStatus status(int channel) const noexcept {
+    return statuses_[static_cast<std::size_t>(channel)];
+  }
+
+ private:
+  using Laws = std::tuple<AdrcLaw<Observers::order, S>...>;
+
+  MimoAdrc(const Channels& observers, const Laws& laws, const Array<Limiter<S>, channels>& limiters,
+           const InputMatrix& input_matrix, const InputMatrix& inverse) noexcept
+      : observers_(observers),
+        laws_(laws),
+        limiters_(limiters),
+        input_matrix_(input_matrix),
+        inverse_(inverse) {}
+
+  Output put_out(const Output& wanted) noexcept {
+    Output u;
+    for (int i = 0; i < channels; ++i) {
+      auto& limiter = limiters_[static_cast<std::size_t>(i)];
+      // A bad reference: the last output stays.
+      u(i) = limiter(is_finite(wanted(i)) ? wanted(i) : limiter.last());
+    }
+    return u;
+  }
+
+  static Expected<InputMatrix, Error<S>> inverted(const Config& config) {
+    if (auto ok = check_above("condition_limit", config.condition_limit, S(1)); !ok) {
+      return ok.error();
+    }
+    for (int i = 0; i < channels; ++i) {
+      for (int j = 0; j < channels; ++j) {
+        if (auto ok = check_finite("input_matrix", S(config.input_matrix(i, j)), i * channels + j);
+            !ok) {
+          return ok.error();
+        }
+      }
+    }
+    InputMatrix scaled = config.input_matrix;
+    Output rows;
+    Output columns;
+    const auto scale_of = [](const S& largest) { return largest > S(0) ? S(1) / largest : S(1); };
+    for (int i = 0; i < channels; ++i) {
+      rows(i) = scale_of(scaled.row(i).cwiseAbs().maxCoeff());
+      scaled.row(i) *= rows(i);
+    }
+    for (int i = 0; i < channels; ++i) {
+      columns(i) = scale_of(scaled.col(i).cwiseAbs().maxCoeff());
+      scaled.col(i) *= columns(i);
+    }
+    const Eigen::FullPivLU<InputMatrix> lu(scaled);
+    constexpr const char* rule = "has a condition number (the value here) that must be at most";
+    if (!lu.isInvertible()) {
+      return Error<S>{"input_matrix",
+                      std::numeric_limits<S>::infinity(),
+                      rule,
+                      -1,
+                      config.condition_limit,
+                      true};
+    }
+    const InputMatrix inverse = lu.inverse();
+    const S condition = scaled.cwiseAbs().colwise().sum().maxCoeff() *
+                        inverse.cwiseAbs().colwise().sum().maxCoeff();
+    if (!is_finite(condition) || condition > config.condition_limit) {
+      return Error<S>{"input_matrix", condition, rule, -1, config.condition_limit, true};
+    }
+    return InputMatrix(columns.asDiagonal() * inverse * rows.asDiagonal());
+  }
+
+  template <std::size_t... I>
+  static Expected<MimoAdrc, Error<S>> make_channels(const Config& config,
+                                                    const InputMatrix& inverse,
+                                                    const S& sample_time,
+                                                    std::index_sequence<I...>) {
+    std::tuple<Expected<Observers, Error<S>>...> observers{make_observer<Observers>(
+        std::get<I>(config.observers), sample_time, static_cast<int>(I))...};
+    std::tuple<Expected<AdrcLaw<Observers::order, S>, Error<S>>...> laws{
+        make_law<Observers::order>(config, config.controller_bandwidths[I], sample_time)...};
+    std::tuple limiters{(static_cast<void>(I), Limiter<S>::make(config.limits[I], sample_time))...};
+    const Error<S>* error = nullptr;
+    int channel = -1;
+    const auto look = [&](const auto& outcome, std::size_t i) {
+      if (outcome || error != nullptr) return;
+      error = &outcome.error();
+      channel = static_cast<int>(i);
+    };
+    (look(std::get<I>(observers), I), ...);
+    (look(std::get<I>(laws), I), ...);
+    (look(std::get<I>(limiters), I), ...);
+    if (error != nullptr) {
+      Error<S> named = *error;
+      named.index = channel;
+      return named;
+    }
+    return MimoAdrc({*std::get<I>(observers)...}, {*std::get<I>(laws)...},
+                    {*std::get<I>(limiters)...}, config.input_matrix, inverse);
+  }
+
+  template <class Observer>
+  static Expected<Observer, Error<S>> make_observer(typename Observer::Config config,
+                                                    const S& sample_time, int) {
+    auto& chain = chain_config(config);
+    if (chain.input_gain < S(0) || chain.input_gain > S(0) || !is_finite(chain.input_gain)) {
+      return Error<S>{"input_gain", chain.input_gain, "must be left out, input_matrix says it"};
+    }
+    if (chain.sample_time < sample_time || chain.sample_time > sample_time) {
+      return Error<S>{
+          "sample_time", chain.sample_time, "must be the same in all channels, as", -1, sample_time,
+          true};
+    }
+    chain.input_gain = S(1);
+    return Observer::make(config);
+  }
+
+  template <int Order>
+  static Expected<AdrcLaw<Order, S>, Error<S>> make_law(const Config& config, const S& bandwidth,
+                                                        const S& sample_time) {
+    const auto gains =
+        feedback_gain<Order, S>({bandwidth, config.domain, config.half_gain}, sample_time);
+    if (!gains) return gains.error();
+    return AdrcLaw<Order, S>::make({.gains = *gains, .input_gain = S(1)});
+  }
+
+  Channels observers_;
+  Laws laws_;
+  Array<Limiter<S>, channels> limiters_;
+  InputMatrix input_matrix_;
+  InputMatrix inverse_;
+  Array<StepStatus, channels> statuses_{};
+};
+
+}  // namespace esokit

@@ -1,0 +1,91 @@
+/// @file
+/// Han's nonlinear state error feedback.
+#pragma once
+
+#include <esokit/core/expected.hpp>
+#include <esokit/core/fal.hpp>
+#include <esokit/core/matrix.hpp>
+#include <esokit/core/unroll.hpp>
+#include <esokit/design/check.hpp>
+#include <utility>
+
+namespace esokit {
+
+/// u = (sum_i k_i fal(r_i - z_i, a_i, delta_i) - dhat) / b0: as AdrcLaw with fal in place of the
+/// linear feedback. A function of the estimate, without state.
+/// @tparam Order n
+template <int Order, Scalar S = double>
+class NonlinearFeedback {
+ public:
+  struct Config {
+    Array<S, Order> gains = filled(S(1.0));          ///< k_i >= 0, i = 0 .. n - 1
+    Array<S, Order> exponents = filled(S(1.0));      ///< a_i > 0; 1 is linear
+    Array<S, Order> linear_widths = filled(S(1.0));  ///< delta_i > 0, unit of y^(i)
+    S input_gain{};  ///< b0 of the plant; not zero, negative is fine
+  };
+
+  /// @return the law, or an error that names the field
+  static Expected<NonlinearFeedback, Error<S>> make(const Config& config) {
+    for (int i = 0; i < Order; ++i) {
+      const auto row = static_cast<std::size_t>(i);
+      if (auto ok = check_finite("gains", config.gains[row], i); !ok) return ok.error();
+      if (auto ok = check_positive("exponents", config.exponents[row], i); !ok) return ok.error();
+      if (auto ok = check_positive("linear_widths", config.linear_widths[row], i); !ok) {
+        return ok.error();
+      }
+    }
+    if (auto ok = check_nonzero("input_gain", config.input_gain); !ok) return ok.error();
+    if (auto ok =
+            check_representable("input_gain", config.input_gain, S(S(1.0) / config.input_gain),
+                                "has an inverse that the scalar cannot hold");
+        !ok) {
+      return ok.error();
+    }
+    return NonlinearFeedback(config, std::make_integer_sequence<int, Order>{});
+  }
+
+  /// v = sum_i k_i fal(r_i - z_i), unit of y^(n).
+  /// @param estimate (y, .., y^(n-1), ..), at least n x 1
+  /// @param reference (r, .., r^(n-1)), n x 1, e.g. of a TrackingDifferentiator
+  template <int Size>
+  [[nodiscard]] S feedback(const Vector<S, Size>& estimate,
+                           const Vector<S, Order>& reference) const noexcept {
+    static_assert(Size >= Order, "esokit: the estimate must hold the plant states");
+    S v(0.0);
+    for (int i = 0; i < Order; ++i) {
+      const auto row = static_cast<std::size_t>(i);
+      v = v + gains_[row] * fal_[row](reference(i) - estimate(i));
+    }
+    return v;
+  }
+
+  /// u = (v - dhat) / b0.
+  template <int Size>
+  [[nodiscard]] S control(const Vector<S, Size>& estimate,
+                          const Vector<S, Order>& reference) const noexcept {
+    static_assert(Size > Order, "esokit: the estimate must hold the disturbance");
+    return (feedback(estimate, reference) - estimate(Order)) * inverse_input_gain_;
+  }
+
+  /// b0.
+  [[nodiscard]] S input_gain() const noexcept { return S(1.0) / inverse_input_gain_; }
+
+ private:
+  static constexpr Array<S, Order> filled(const S& value) {
+    Array<S, Order> result{};
+    for (S& x : result) x = value;
+    return result;
+  }
+
+  template <int... I>
+  NonlinearFeedback(const Config& config, std::integer_sequence<int, I...>)
+      : gains_(config.gains),
+        fal_{Fal<S>(std::get<I>(config.exponents), std::get<I>(config.linear_widths))...},
+        inverse_input_gain_(S(1.0) / config.input_gain) {}
+
+  Array<S, Order> gains_;
+  Array<Fal<S>, Order> fal_;
+  S inverse_input_gain_;
+};
+
+}  // namespace esokit

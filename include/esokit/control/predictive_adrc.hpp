@@ -1,0 +1,417 @@
+/// @file
+/// PredictiveAdrc (PADRC, and EPADRC with the extended state filter): ADRC in two phases, so that
+/// next to nothing stands between the measurement and the control (S. Shi, Z. Zeng, C. Zhao, L. Guo,
+/// P. Chen, Energies 15 (2022) 5799, (26), (51)-(53) corrected).
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <esokit/control/adrc_law.hpp>
+#include <esokit/control/limiter.hpp>
+#include <esokit/core/unroll.hpp>
+#include <esokit/observer/gain_law.hpp>
+#include <esokit/observer/step_status.hpp>
+#include <optional>
+
+namespace esokit {
+
+/// An observer whose next correction can be told before the measurement: every observer of the
+/// library itself. Decorators (WrappedOutput, KnownModel, VariableTime, DelayedInput) are not; they
+/// do something of their own with y, u or the estimate.
+template <class O>
+concept PredictableObserver = std::copyable<O> &&
+    requires(O& observer, const O& constant, const typename O::scalar_type& s,
+             const typename O::Config& config) {
+  { O::make(config) } -> std::same_as<Expected<O, Error<typename O::scalar_type>>>;
+  { observer.predict(s) } -> std::same_as<StepStatus>;
+  { observer.correct(s) } -> std::same_as<StepStatus>;
+  { observer.revise_input(s) } -> std::same_as<StepStatus>;
+  { constant.template scaled_estimate<0>() } -> std::convertible_to<typename O::scalar_type>;
+  { constant.restarts() } -> std::same_as<bool>;
+} &&(requires(const O& o) { o.preview(); } || O::levels == 1) &&
+    !requires(const typename O::Config& config) { config.observer; };
+
+/// u = (v - dhat) / b0, as AdrcLaw gives it after the observer's correction, but with the correction
+/// folded in: u_k = ubar_k - slope y_k, where ubar_k and slope are known before y_k.
+///
+/// ```
+/// const double u = controller.control(y);   // at the sample: to the actuator at once
+/// controller.prepare(next_reference);       // then the rest, any time before the next sample
+/// ```
+///
+/// `control` is a multiplication, a subtraction, a test for finiteness and the limits, for gains
+/// that are known before the measurement (constant, cascade, algebraic, ESF). A switched gain costs
+/// one `select` more, a nonlinear one its k(e), an outlier gate one comparison. `prepare` corrects
+/// the observer, predicts, and works out the next ubar. Together they do what `update` of the
+/// observer and AdrcLaw do one after the other, to within rounding.
+///
+/// The price: the reference of the next sample must be known one sample early.
+///
+/// After `make`, `start` and `reset` the observer's state stands for the prediction of the first
+/// sample; give the reference of that sample to `set_reference`.
+///
+/// Bad measurements: NaN, infinite, too large, or an outlier by the observer's gate: u follows from
+/// the prediction alone, and the sample counts as missing. A bad reference keeps the last u.
+///
+/// The actuator is taken to hold what `control` returned. Where it reports otherwise, before or
+/// after `prepare`, tell `report_applied`: the prediction is put right by Gamma (u_reported -
+/// u_assumed) before the next correction.
+///
+/// Scalars: plain ones and packs. No call but make and retune does more than multiply and add; none
+/// allocates, throws or locks.
+template <PredictableObserver Observer>
+class PredictiveAdrc {
+ public:
+  static constexpr int order = Observer::order;
+  using scalar_type = typename Observer::scalar_type;
+  using S = scalar_type;
+  using Estimate = typename Observer::Estimate;
+  using Reference = Vector<S, order + 1>;  ///< (r, r', .., r^(n))
+
+  /// Give `controller_bandwidth` or `gains`, not both.
+  struct Config {
+    typename Observer::Config observer{};    ///< b0 and T are in here
+    S controller_bandwidth{};                ///< omega_c, rad/s: k_i = C(n, i) omega_c^(n-i)
+    std::optional<Array<S, order>> gains{};  ///< k_0 .. k_(n-1)
+    Limits<S> limits{};                      ///< of the actuator
+    S start_hold{};  ///< t_u >= 0, s: u = 0 (within the limits) for so long after the start, while
+                     ///< the observer settles; rounded up to whole samples
+  };
+
+  /// @return the controller at rest, reference 0, or an error that names the field
+  static Expected<PredictiveAdrc, Error<S>> make(const Config& config) {
+    const auto observer = Observer::make(config.observer);
+    if (!observer) return observer.error();
+    const auto law = AdrcLaw<order, S>::make({.controller_bandwidth = config.controller_bandwidth,
+                                              .gains = config.gains,
+                                              .input_gain = config.observer.input_gain});
+    if (!law) return law.error();
+    const auto limiter = Limiter<S>::make(config.limits, config.observer.sample_time);
+    if (!limiter) return limiter.error();
+    const auto hold = hold_samples(config.start_hold, config.observer.sample_time);
+    if (!hold) return hold.error();
+    PredictiveAdrc controller(*observer, *law, *limiter, *hold);
+    for (const S& weight : controller.weights_) {
+      if (!all(is_finite(weight))) {
+        return Error<S>{"observer.sample_time", config.observer.sample_time,
+                        "with these gains gives a law that the scalar cannot hold"};
+      }
+    }
+    controller.arm();
+    return controller;
+  }
+
+  /// First phase, at the sample. @param y measurement @return u, within the limits
+  ESOKIT_INLINE S control(S y) noexcept {
+    measurement_ = y;
+    S raw = wanted(y);
+    if constexpr (requires { observer_.accepts(y); }) {
+      if (!observer_.accepts(y)) [[unlikely]] raw = blind_;
+    }
+    output_ = limiter_.clamp(select(usable(y, raw), raw, blind_));
+    phase_ = Phase::measured;
+    return output_;
+  }
+
+  /// First phase of a sample whose measurement did not come.
+  S control_without_measurement() noexcept {
+    output_ = limiter_.clamp(blind_);
+    phase_ = Phase::missing;
+    return output_;
+  }
+
+  /// Second phase, for a constant reference. @param next_reference r of the next sample
+  StepStatus prepare(S next_reference) noexcept {
+    Reference reference = Reference::Zero();
+    reference(0) = next_reference;
+    return prepare(reference);
+  }
+
+  /// Second phase. @param next_reference (r, r', ..) of the next sample, up to n + 1 of them, the
+  /// rest counts as zero
+  template <int Count>
+  StepStatus prepare(const Vector<S, Count>& next_reference) noexcept {
+    StepStatus status = StepStatus::ok;
+    if (phase_ == Phase::measured) status |= observer_.correct(measurement_);
+    limiter_.track(output_);
+    status |= observer_.predict(output_);
+    phase_ = Phase::prepared;
+    if (hold_left_ > 0) --hold_left_;
+    set_reference(next_reference);
+    status_ = status;
+    return status;
+  }
+
+  /// Both phases, for those who do not mind the order. @return u
+  template <class NextReference>
+  S update(S y, const NextReference& next_reference) noexcept {
+    const S u = control(y);
+    prepare(next_reference);
+    return u;
+  }
+
+  /// Another reference for the next sample, any time before it.
+  void set_reference(S next_reference) noexcept {
+    Reference reference = Reference::Zero();
+    reference(0) = next_reference;
+    set_reference(reference);
+  }
+
+  template <int Count>
+  void set_reference(const Vector<S, Count>& next_reference) noexcept {
+    static_assert(Count >= 1 && Count <= order + 1, "esokit: the reference is (r, r', .., r^(n))");
+    for (int i = 0; i <= order; ++i) {
+      reference_[static_cast<std::size_t>(i)] = i < Count ? S(next_reference(i)) : S(0.0);
+    }
+    arm();
+  }
+
+  /// What the actuator really holds since the last `control`. A number that is not finite is not
+  /// taken.
+  StepStatus report_applied(S u_applied) noexcept {
+    const auto good = is_finite(u_applied);
+    const S u = select(good, u_applied, output_);
+    StepStatus status = all(good) ? StepStatus::ok : StepStatus::input_rejected;
+    output_ = u;
+    if (phase_ == Phase::prepared) {
+      limiter_.track(u);
+      status |= observer_.revise_input(u);
+      arm();
+    }
+    return status;
+  }
+
+  /// Takes over a plant that stands at y under u, without a bump: with the reference at y the first
+  /// u is that u.
+  StepStatus start(S y, S u) noexcept {
+    Estimate state = Estimate::Zero();
+    state(0) = y;
+    state(order) = -(observer_.input_gain() * u);
+    const StepStatus status = observer_.reset(state);
+    if (status != StepStatus::ok || !all(is_finite(u))) return StepStatus::state_rejected;
+    hold_left_ = 0;
+    output_ = u;
+    limiter_.track(u);
+    phase_ = Phase::prepared;
+    set_reference(y);
+    return status;
+  }
+
+  /// Starts the observer anew at (y, 0, .., 0), and the hold with it.
+  StepStatus reset(S y) noexcept {
+    const StepStatus status = observer_.reset(y);
+    if (status != StepStatus::ok) return status;
+    hold_left_ = hold_;
+    phase_ = Phase::prepared;
+    arm();
+    return status;
+  }
+
+  /// New settings while running: the estimate and u are kept. Not between `control` and `prepare`.
+  /// A refused config changes nothing.
+  Check<S> retune(const Config& config) {
+    auto fresh = make(config);
+    if (!fresh) return fresh.error();
+    Observer observer = observer_;
+    if (auto ok = observer.retune(config.observer); !ok) return ok;
+    observer_ = observer;
+    weights_ = fresh->weights_;
+    feeds_ = fresh->feeds_;
+    rate_ = fresh->rate_;
+    law_ = fresh->law_;
+    hold_ = fresh->hold_;
+    limiter_ = fresh->limiter_;
+    limiter_.track(output_);
+    arm();
+    return {};
+  }
+
+  [[nodiscard]] const Observer& observer() const noexcept { return observer_; }
+  /// The u that holds now.
+  [[nodiscard]] const S& output() const noexcept { return output_; }
+  /// What the observer said of the last sample.
+  [[nodiscard]] StepStatus status() const noexcept { return status_; }
+  /// What the next u will be without a measurement, before the limits.
+  [[nodiscard]] const S& blind_output() const noexcept { return blind_; }
+  /// k_0 .. k_(n-1).
+  [[nodiscard]] const Array<S, order>& gains() const noexcept { return law_.gains(); }
+
+ private:
+  using Weights = Array<S, order + 1>;
+  enum class Phase : unsigned char { prepared, measured, missing };
+
+  /// The gain is known before the measurement.
+  static constexpr bool preset = requires(const Observer& o) { o.preview(); };
+  /// The gain is one of two, known before the measurement.
+  static constexpr bool switched = requires(const Observer& o, const S& e) {
+    o.gain_law().shrinks(e);
+    o.gain_law().shrinking_gain();
+    o.gain_law().otherwise_gain();
+  };
+  /// The gain is a factor k(e) times one that is known before the measurement.
+  static constexpr bool factored = requires(const Observer& o, const S& e) {
+    o.gain_law().factor(e);
+    o.gain_law().linear_gain();
+  };
+
+  PredictiveAdrc(const Observer& observer, const AdrcLaw<order, S>& law, const Limiter<S>& limiter,
+                 std::uint32_t hold) noexcept
+      : limiter_(limiter),
+        observer_(observer),
+        law_(law),
+        rate_(S(1.0) / observer.sample_time()),
+        hold_left_(hold),
+        hold_(hold) {
+    // Folded into the weights: 1/b0, and the scaling T^i / i! of the chain.
+    const S inverse = S(1.0) / law.input_gain();
+    S unit = inverse;
+    for (int i = 0; i <= order; ++i) {
+      const auto row = static_cast<std::size_t>(i);
+      if (i > 0) unit = unit * (S(static_cast<double>(i)) * rate_);
+      const S gain = i < order ? law.gains()[static_cast<std::size_t>(i % order)] : S(1.0);
+      weights_[row] = i < order ? S(gain * unit) : unit;
+      feeds_[row] = i < order ? S(gain * inverse) : inverse;
+      reference_[row] = S(0.0);
+    }
+  }
+
+  static Expected<std::uint32_t, Error<S>> hold_samples(const S& seconds, const S& sample_time) {
+    if (auto ok = check_not_negative("start_hold", seconds); !ok) return ok.error();
+    const S samples = seconds / sample_time - S(1e-3);
+    if (!all(samples < S(1e6))) {
+      return Error<S>{"start_hold", seconds, "must be 1e6 samples or less"};
+    }
+    std::uint32_t count = 0;
+    while (!all(S(static_cast<double>(count)) >= samples)) ++count;
+    return count;
+  }
+
+  /// u before the limits.
+  [[nodiscard]] ESOKIT_INLINE S wanted(const S& y) const noexcept {
+    if constexpr (preset) {
+      return offset_ - slope_ * y;
+    } else {
+      const S e = y - offset_;
+      if (general_) [[unlikely]] return wanted_in_general(y);
+      if constexpr (switched) {
+        return blind_ - select(observer_.gain_law().shrinks(e), slope_, other_slope_) * e;
+      } else if constexpr (factored) {
+        return blind_ - (slope_ * observer_.gain_law().factor(e)) * e;
+      } else {
+        if (!all(is_finite(e))) [[unlikely]] return e;  // such a law never sees one
+        return blind_ - weigh(observer_.correction_gain(e)) * e;
+      }
+    }
+  }
+
+  /// Whether the observer will take y: not if any estimate would become infinite.
+  [[nodiscard]] ESOKIT_INLINE auto usable(const S& y, [[maybe_unused]] const S& raw) const noexcept {
+    if constexpr (preset) {
+      return is_finite(S(guard_ * y));
+    } else {
+      return is_finite(raw);
+    }
+  }
+
+  /// After a gap, or where u does not depend on y.
+  [[nodiscard]] ESOKIT_COLD S wanted_in_general(const S& y) const noexcept {
+    if (settled_) return blind_;
+    if (observer_.restarts()) return feed_ - std::get<0>(weights_) * y;
+    const S e = y - offset_;
+    if (!all(is_finite(e))) return e;
+    return blind_ - weigh(observer_.correction_gain(e)) * e;
+  }
+
+  /// sum_i w_i x_i over the plant states and the disturbance.
+  template <class State>
+  [[nodiscard]] ESOKIT_INLINE S weigh(const State& x) const noexcept {
+    S sum = std::get<0>(weights_) * std::get<0>(x);
+    detail::unroll<order>([&](auto i) ESOKIT_INLINE_LAMBDA {
+      sum = sum + std::get<i + 1>(weights_) * std::get<i + 1>(x);
+    });
+    return sum;
+  }
+
+  /// Everything of the next u that does not need the measurement.
+  void arm() noexcept {
+    settled_ = false;
+    feed_ = S(0.0);
+    detail::unroll<order + 1>([&](auto i) ESOKIT_INLINE_LAMBDA {
+      feed_ = feed_ + std::get<i>(feeds_) * std::get<i>(reference_);
+    });
+    S tail(0.0);
+    detail::unroll<order>([&](auto i) ESOKIT_INLINE_LAMBDA {
+      tail = tail + std::get<i + 1>(weights_) * observer_.template scaled_estimate<i + 1>();
+    });
+    S ahead(0.0);
+    detail::unroll<order>([&](auto i) ESOKIT_INLINE_LAMBDA {
+      ahead = ahead + std::get<i + 1>(feeds_) * std::get<i + 1>(reference_);
+    });
+    blind_ = std::get<0>(weights_) *
+                 (std::get<0>(reference_) - observer_.template scaled_estimate<0>()) +
+             (ahead - tail);
+    if constexpr (preset) {
+      const auto next = observer_.preview();
+      slope_ = weigh(next.slope);
+      offset_ = feed_ - weigh(next.offset);
+      guard_ = Observer::Chain::finite_probe(next.slope, rate_);
+    } else {
+      offset_ = observer_.template scaled_estimate<0>();
+      general_ = observer_.missed() > 1;
+      if constexpr (switched) {
+        slope_ = weigh(observer_.gain_law().shrinking_gain());
+        other_slope_ = weigh(observer_.gain_law().otherwise_gain());
+      } else if constexpr (factored) {
+        slope_ = weigh(observer_.gain_law().linear_gain());
+      }
+    }
+    if constexpr (requires { observer_.holding(); }) {
+      if (observer_.holding()) [[unlikely]] {
+        // The observer publishes what it held at its start, whatever y will be.
+        Reference reference;
+        for (int i = 0; i <= order; ++i) reference(i) = reference_[static_cast<std::size_t>(i)];
+        settle_for(law_.control(observer_.estimate(), reference));
+      }
+    }
+    if (hold_left_ > 0) [[unlikely]] settle_for(S(0.0));
+    const auto good = is_finite(blind_);
+    if (!all(good)) [[unlikely]] settle_for(select(good, blind_, limiter_.last()));
+  }
+
+  /// The next u does not depend on y.
+  void settle_for(const S& u) noexcept {
+    blind_ = u;
+    settled_ = true;
+    general_ = true;
+    if constexpr (preset) {
+      offset_ = u;
+      slope_ = S(0.0);
+    }
+  }
+
+  // What `control` touches comes first.
+  S offset_{};  ///< ubar_k; where the gain depends on e, the predicted y
+  S slope_{};   ///< minus du/dy
+  S guard_{};   ///< largest factor, with units, by which y enters the estimates
+  S other_slope_{};
+  S blind_{};  ///< u without a measurement
+  Limiter<S> limiter_;
+  S measurement_{};
+  S output_{};
+  bool general_ = false;  ///< gains that depend on e: not by the short way
+  bool settled_ = false;  ///< u is blind_ whatever y
+  Phase phase_ = Phase::prepared;
+
+  Observer observer_;
+  AdrcLaw<order, S> law_;
+  Weights weights_{};    ///< of the scaled states
+  Weights feeds_{};      ///< of the reference and its derivatives
+  Weights reference_{};  ///< (r, r', .., r^(n)) of the next sample
+  S feed_{};
+  S rate_;  ///< 1/T
+  StepStatus status_ = StepStatus::ok;
+  std::uint32_t hold_left_;
+  std::uint32_t hold_;
+};
+
+}  // namespace esokit

@@ -1,0 +1,98 @@
+/// @file
+/// ScaledLaw: AdrcLaw for a reference without derivatives, with the scaling of the observer's chain
+/// and 1/b0 folded into its gains. A third of the multiplications of the law on physical estimates.
+#pragma once
+
+#include <esokit/control/adrc_law.hpp>
+#include <esokit/core/unroll.hpp>
+#include <type_traits>
+
+namespace esokit {
+
+namespace detail {
+
+template <class Class, class Result>
+Class declaring_class(Result (Class::*)() const);
+template <class Class, class Result>
+Class declaring_class(Result (Class::*)() const noexcept);
+
+}  // namespace detail
+
+/// Whether an observer's published estimate is the state of its chain. Not so where a derived class
+/// publishes another one (AlgebraicEso during its hold, KnownModel), nor where the scaling changes
+/// from step to step (VariableTime).
+template <class Observer>
+inline constexpr bool has_plain_estimate = [] {
+  if constexpr (requires(Observer & o, const typename Observer::scalar_type& s) {
+                  o.set_step_time(s);
+                }) {
+    return false;
+  } else {
+    return std::is_same_v<decltype(detail::declaring_class(&Observer::total_disturbance)),
+                          decltype(detail::declaring_class(
+                              &Observer::template scaled_estimate<Observer::order>))>;
+  }
+}();
+
+/// u = w_0 (r - y) - sum_(i>=1) w_i x_i on the scaled state x, with
+/// w_i = k_i i! / (T^i b0), w_n = n! / (T^n b0).
+template <int Order, PlainScalar S>
+class ScaledLaw {
+ public:
+  /// @param observer for its sample time; its b0 is that of the law, or minus that (error-based)
+  template <class Observer>
+  static Expected<ScaledLaw, Error<S>> make(const AdrcLaw<Order, S>& law,
+                                            const Observer& observer) {
+    const S rate = S(1) / observer.sample_time();
+    ScaledLaw scaled;
+    S unit = S(1) / law.input_gain();
+    for (int i = 0; i <= Order; ++i) {
+      if (i > 0) unit = unit * (static_cast<S>(i) * rate);
+      const auto row = static_cast<std::size_t>(i);
+      scaled.weights_[row] = i < Order ? law.gains()[row] * unit : unit;
+      if (!is_finite(scaled.weights_[row])) {
+        return Error<S>{"sample_time", observer.sample_time(),
+                        "with these gains gives a law that the scalar cannot hold"};
+      }
+    }
+    return scaled;
+  }
+
+  /// Output-based form. @param error r - y
+  template <class Observer>
+  [[nodiscard]] ESOKIT_INLINE S control(const Observer& observer, S error) const noexcept {
+    return std::get<0>(weights_) * error - tail(observer);
+  }
+
+  /// Error-based form: the same gains on the error's chain.
+  template <class Observer>
+  [[nodiscard]] ESOKIT_INLINE S control_error_based(const Observer& observer) const noexcept {
+    return std::get<0>(weights_) * observer.template scaled_estimate<0>() + tail(observer);
+  }
+
+ private:
+  ScaledLaw() = default;
+
+  /// sum_(i>=1) w_i x_i, apart from the first term so that both are worked out side by side.
+  template <class Observer>
+  [[nodiscard]] ESOKIT_INLINE S tail(const Observer& observer) const noexcept {
+    S sum = std::get<1>(weights_) * observer.template scaled_estimate<1>();
+    detail::unroll<Order - 1>([&](auto i) ESOKIT_INLINE_LAMBDA {
+      sum = sum + std::get<i + 2>(weights_) * observer.template scaled_estimate<i + 2>();
+    });
+    return sum;
+  }
+
+  Array<S, Order + 1> weights_{};
+};
+
+/// Where the law cannot be folded.
+struct NoScaledLaw {
+  template <class Law, class Observer>
+  static Expected<NoScaledLaw, Error<typename Observer::scalar_type>> make(const Law&,
+                                                                           const Observer&) {
+    return NoScaledLaw{};
+  }
+};
+
+}  // namespace esokit

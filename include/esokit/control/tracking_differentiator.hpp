@@ -1,0 +1,164 @@
+/// @file
+/// Tracking differentiators: a reference that the plant can follow, and its derivative.
+#pragma once
+
+#include <cmath>
+#include <esokit/core/expected.hpp>
+#include <esokit/core/matrix.hpp>
+#include <esokit/design/check.hpp>
+
+namespace esokit {
+
+/// Han's time-optimal control of a double integrator sampled with h, fhan(x1, x2, r, h0): brings
+/// (x1, x2) to zero in the least number of steps with |.| <= r, and without chatter.
+/// @param x1 distance @param x2 its derivative @param acceleration r > 0 @param width h0 > 0, s:
+/// the sample time h, or more to smooth
+template <PlainScalar S>
+[[nodiscard]] S fhan(S x1, S x2, S acceleration, S width) noexcept {
+  const S d = acceleration * width * width;
+  const S a0 = width * x2;
+  const S y = x1 + a0;
+  // Beyond d from the switching curve it is a square root, within it is linear.
+  const S root = std::sqrt(d * (d + S(8) * std::abs(y)));
+  const S a = std::abs(y) > d ? a0 + std::copysign((root - d) / S(2), y) : a0 + y;
+  return std::abs(a) > d ? -std::copysign(acceleration, a) : -acceleration * (a / d);
+}
+
+/// Tracking differentiator by fhan: r1 follows the reference as fast as |r1''| <= `acceleration`
+/// lets it, r2 = r1'. It is always ready to stop, so it stays r2^2 / (2R) behind a moving
+/// reference.
+template <PlainScalar S = double>
+class TrackingDifferentiator {
+ public:
+  struct Config {
+    S acceleration{};  ///< R > 0, unit of the reference / s^2
+    S sample_time{};   ///< h, s
+    S filter_time{};   ///< h0 >= h, s: smooths a noisy reference; 0: h
+  };
+
+  /// @return at rest in zero, or an error that names the field
+  static Expected<TrackingDifferentiator, Error<S>> make(const Config& config) {
+    if (auto ok = check_positive("acceleration", config.acceleration); !ok) return ok.error();
+    if (auto ok = check_positive("sample_time", config.sample_time); !ok) return ok.error();
+    if (auto ok = check_not_negative("filter_time", config.filter_time); !ok) return ok.error();
+    if (config.filter_time > S(0) && config.filter_time < config.sample_time) {
+      return Error<S>{"filter_time",
+                      config.filter_time,
+                      "must be 0 or not below sample_time, which is",
+                      -1,
+                      config.sample_time,
+                      true};
+    }
+    TrackingDifferentiator result(config);
+    if (auto ok = check_representable("acceleration", config.acceleration,
+                                      S(config.acceleration * result.width_ * result.width_),
+                                      "times the square of the sample time cannot be held");
+        !ok) {
+      return ok.error();
+    }
+    return result;
+  }
+
+  /// One sample. False, and nothing changes, if the reference is not finite or too large.
+  bool update(S reference) noexcept {
+    const S step = sample_time_ * fhan(r1_ - reference, r2_, acceleration_, width_);
+    const S r1 = r1_ + sample_time_ * r2_;
+    const S r2 = r2_ + step;
+    // An infinite reference would pass for a far one.
+    if (!is_finite(reference) || !is_finite(r1) || !is_finite(r2)) return false;
+    r1_ = r1;
+    r2_ = r2;
+    return true;
+  }
+
+  /// r1, unit of the reference.
+  [[nodiscard]] S value() const noexcept { return r1_; }
+  /// r2 = r1', unit of the reference / s.
+  [[nodiscard]] S derivative() const noexcept { return r2_; }
+  /// (r1, r2).
+  [[nodiscard]] Vector<S, 2> state() const noexcept { return {r1_, r2_}; }
+
+  /// Starts anew at rest at `value`; false, and nothing changes, if it is not finite.
+  bool reset(S value = S(0)) noexcept {
+    if (!is_finite(value)) return false;
+    r1_ = value;
+    r2_ = S(0);
+    return true;
+  }
+
+ private:
+  explicit TrackingDifferentiator(const Config& config)
+      : acceleration_(config.acceleration),
+        sample_time_(config.sample_time),
+        width_(config.filter_time > S(0) ? config.filter_time : config.sample_time) {}
+
+  S acceleration_;
+  S sample_time_;
+  S width_;
+  S r1_ = S(0);
+  S r2_ = S(0);
+};
+
+/// The differentiator by a sign function, r1' = r2, r2' = -R sign(r1 - r + r2 |r2| / (2R)): what
+/// the papers write. As an ODE for simulation, and sampled with the sign held over a sample;
+/// sampled it chatters about the reference by R h in r2, so prefer TrackingDifferentiator.
+template <PlainScalar S = double>
+class SignTrackingDifferentiator {
+ public:
+  struct Config {
+    S acceleration{};  ///< R > 0, unit of the reference / s^2
+    S sample_time{};   ///< h, s, of `update`; it may be left out where only `rate` is used
+  };
+
+  /// @return at rest in zero, or an error that names the field
+  static Expected<SignTrackingDifferentiator, Error<S>> make(const Config& config) {
+    if (auto ok = check_positive("acceleration", config.acceleration); !ok) return ok.error();
+    if (auto ok = check_not_negative("sample_time", config.sample_time); !ok) return ok.error();
+    return SignTrackingDifferentiator(config);
+  }
+
+  /// d/dt (r1, r2).
+  [[nodiscard]] Vector<S, 2> rate(const Vector<S, 2>& state, S reference) const noexcept {
+    return {state(1), acceleration(state(0), state(1), reference)};
+  }
+
+  /// One sample: exact for the acceleration held over it. False, and nothing changes, if the
+  /// reference is not finite.
+  bool update(S reference) noexcept {
+    const S a = acceleration(r1_, r2_, reference);
+    const S h = config_.sample_time;
+    const S r1 = r1_ + h * (r2_ + S(0.5) * h * a);
+    const S r2 = r2_ + h * a;
+    if (!is_finite(reference) || !is_finite(r1) || !is_finite(r2)) return false;
+    r1_ = r1;
+    r2_ = r2;
+    return true;
+  }
+
+  [[nodiscard]] S value() const noexcept { return r1_; }
+  [[nodiscard]] S derivative() const noexcept { return r2_; }
+  [[nodiscard]] Vector<S, 2> state() const noexcept { return {r1_, r2_}; }
+
+  /// Starts anew at rest at `value`; false, and nothing changes, if it is not finite.
+  bool reset(S value = S(0)) noexcept {
+    if (!is_finite(value)) return false;
+    r1_ = value;
+    r2_ = S(0);
+    return true;
+  }
+
+ private:
+  explicit SignTrackingDifferentiator(const Config& config) : config_(config) {}
+
+  [[nodiscard]] S acceleration(S r1, S r2, S reference) const noexcept {
+    const S curve = r1 - reference + r2 * std::abs(r2) / (S(2) * config_.acceleration);
+    if (curve > S(0)) return -config_.acceleration;
+    return curve < S(0) ? config_.acceleration : S(0);
+  }
+
+  Config config_;
+  S r1_ = S(0);
+  S r2_ = S(0);
+};
+
+}  // namespace esokit

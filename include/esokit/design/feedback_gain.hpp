@@ -1,0 +1,114 @@
+/// @file
+/// Feedback gains k_0 .. k_(n-1) of ADRC: poles of a chain of n integrators under
+/// v = sum_i k_i (r^(i) - y^(i)), in continuous time or exactly for a held input.
+#pragma once
+
+#include <cmath>
+#include <complex>
+#include <esokit/core/combinatorics.hpp>
+#include <esokit/core/unroll.hpp>
+#include <esokit/design/check.hpp>
+#include <esokit/design/continuous_gain.hpp>
+#include <esokit/design/half_gain.hpp>
+#include <esokit/design/sampled_gain.hpp>
+
+namespace esokit {
+
+/// The domain in which controller poles are placed.
+enum class TimeDomain : unsigned char {
+  continuous,  ///< poles at -omega_c of the continuous loop; what most of the literature does
+  sampled      ///< poles at exp(-omega_c T) under the held input; right for any omega_c T
+};
+
+/// Where a controller puts its n poles.
+template <Scalar S>
+struct FeedbackSpec {
+  S bandwidth{};                               ///< omega_c, rad/s
+  TimeDomain domain = TimeDomain::continuous;  ///< see TimeDomain
+  bool half_gain = false;                      ///< half-gain tuning of the controller
+};
+
+namespace detail {
+
+/// Gains from e_m, the elementary symmetric functions of the contractions a_i = 1 - rho_i:
+///
+///   k_r = (n-r)! / T^(n-r) sum_{i<=r} e_(n-i) s(n-i, n-r) / (n-i)!
+///
+/// (s: signed Stirling numbers of the first kind). It is Ackermann's formula written in delta =
+/// Phi - 1: the row that picks Gamma's last power is e_1^T e^A (A / (e^A - 1))^(n+1).
+template <int Order, Scalar S>
+Array<S, Order> held_input_feedback(const Array<S, Order + 1>& symmetric, const S& rate) {
+  Array<S, Order> gain{};
+  S unit(1.0);
+  for (int r = Order - 1; r >= 0; --r) {
+    unit = unit * (S(static_cast<double>(Order - r)) * rate);
+    S sum(0.0);
+    for (int i = 0; i <= r; ++i) {
+      const S weight = S(stirling_first(Order - i, Order - r) / factorial(Order - i));
+      sum = sum + weight * symmetric[static_cast<std::size_t>(Order - i)];
+    }
+    gain[static_cast<std::size_t>(r)] = unit * sum;
+  }
+  return gain;
+}
+
+}  // namespace detail
+
+/// Gains for the poles `rho_i = 1 - contractions_i` of the sampled loop under a held input.
+/// @param contractions 1 - rho_i; complex ones with their conjugates @param sample_time T, s
+template <int Order, PlainScalar S>
+Array<S, Order> sampled_feedback_gain(const Array<std::complex<S>, Order>& contractions,
+                                      const S& sample_time) {
+  Array<std::complex<S>, Order + 1> product{};
+  product[0] = S(1);
+  for (std::size_t i = 0; i < Order; ++i) {
+    for (std::size_t j = i + 1; j > 0; --j) product[j] += product[j - 1] * contractions[i];
+  }
+  Array<S, Order + 1> symmetric{};
+  for (std::size_t j = 0; j <= Order; ++j) symmetric[j] = product[j].real();
+  return detail::held_input_feedback<Order, S>(symmetric, S(1) / sample_time);
+}
+
+/// Gains for all poles at exp(-omega_c T) under a held input.
+/// @param bandwidth omega_c, rad/s @param sample_time T, s
+template <int Order, Scalar S>
+Array<S, Order> sampled_feedback_gain(const S& bandwidth, const S& sample_time) {
+  const S a = EqualSampledPoles<Order, S>::from_bandwidth(bandwidth, sample_time).contraction;
+  Array<S, Order + 1> symmetric{};
+  S power(1.0);
+  for (int j = 0; j <= Order; ++j) {
+    symmetric[static_cast<std::size_t>(j)] = S(binomial(Order, j)) * power;
+    power = power * a;
+  }
+  return detail::held_input_feedback<Order, S>(symmetric, S(S(1.0) / sample_time));
+}
+
+/// Gains for a spec. @param sample_time T, s; matters in the sampled domain only
+/// @return k_0 .. k_(n-1), or the error of a bandwidth that is not positive or too large
+template <int Order, PlainScalar S>
+Expected<Array<S, Order>, Error<S>> feedback_gain(const FeedbackSpec<S>& spec,
+                                                  const S& sample_time) {
+  if (auto ok = check_positive("controller_bandwidth", spec.bandwidth); !ok) return ok.error();
+  Array<S, Order> gain{};
+  if (spec.domain == TimeDomain::continuous) {
+    const Vector<S, Order> coefficients = continuous_gain<Order, S>(spec.bandwidth);
+    const S share = spec.half_gain ? S(0.5) : S(1);
+    for (int i = 0; i < Order; ++i) {
+      gain[static_cast<std::size_t>(i)] = share * coefficients(Order - 1 - i);
+    }
+  } else if (spec.half_gain) {
+    const auto poles = half_gain_poles<Order, S>(spec.bandwidth);
+    gain = sampled_feedback_gain<Order, S>(
+        SampledPoleSet<Order, S>::from_continuous(poles, sample_time).contractions, sample_time);
+  } else {
+    gain = sampled_feedback_gain<Order, S>(spec.bandwidth, sample_time);
+  }
+  if (auto ok = check_representable("controller_bandwidth", spec.bandwidth, gain[0],
+                                    "gives a gain that the scalar cannot hold");
+      !ok) {
+    return ok.error();
+  }
+  return gain;
+}
+
+}  // namespace esokit

@@ -1,0 +1,136 @@
+/// @file
+/// From PID gains to ADRC and back: a first guess for who has a tuned PID, and what an ADRC is in
+/// the words of who reads PIDs.
+///
+/// Continuous linear ADRC of order n is, from y to u, exactly
+///
+///   n = 1:  (K_p + K_i / s) / (tau s + 1)                            tau = 1 / M
+///   n = 2:  (K_p + K_i / s + K_d s) / (tau2 s^2 + tau1 s + 1)        tau2 = 1 / M, tau1 = (l1 +
+///   k1)/M
+///
+/// with M = l1 + k0 or l2 + k1 l1 + k0; with omega_o = kappa omega_c all gains are rational in
+/// kappa (compare G. Herbst, Control Theory and Technology 19 (2021) 19-34).
+#pragma once
+
+#include <cmath>
+#include <esokit/design/check.hpp>
+#include <limits>
+
+namespace esokit {
+
+/// u = K_p e + K_i int e + K_d e', with the denominator tau2 s^2 + tau1 s + 1.
+template <PlainScalar S = double>
+struct PidGains {
+  S proportional{};         ///< K_p, unit of u per unit of y
+  S integral{};             ///< K_i, K_p per s
+  S derivative{};           ///< K_d, K_p times s; zero for PI
+  S filter_time{};          ///< tau1, s
+  S filter_time_squared{};  ///< tau2, s^2; zero for PI
+};
+
+/// A continuous linear ADRC by its bandwidths.
+template <PlainScalar S = double>
+struct AdrcTuning {
+  S input_gain{};            ///< b0
+  S controller_bandwidth{};  ///< omega_c, rad/s
+  S observer_bandwidth{};    ///< omega_o, rad/s
+  bool exact = true;  ///< false: no ADRC has these gains; K_p and K_i are met, K_d is the nearest
+};
+
+/// Gains of the PI (Order 1) or PID (Order 2) that the ADRC is. Always exists.
+template <int Order, PlainScalar S>
+Expected<PidGains<S>, Error<S>> pid_from_adrc(const AdrcTuning<S>& tuning) {
+  static_assert(Order == 1 || Order == 2, "esokit: PID is for orders 1 and 2");
+  if (auto ok = check_nonzero("input_gain", tuning.input_gain); !ok) return ok.error();
+  if (auto ok = check_positive("controller_bandwidth", tuning.controller_bandwidth); !ok) {
+    return ok.error();
+  }
+  if (auto ok = check_positive("observer_bandwidth", tuning.observer_bandwidth); !ok) {
+    return ok.error();
+  }
+  const S c = tuning.controller_bandwidth;
+  const S o = tuning.observer_bandwidth;
+  PidGains<S> pid;
+  if constexpr (Order == 1) {
+    const S m = S(2) * o + c;
+    pid.proportional = o * (S(2) * c + o) / (tuning.input_gain * m);
+    pid.integral = c * o * o / (tuning.input_gain * m);
+    pid.filter_time = S(1) / m;
+  } else {
+    const S m = S(3) * o * o + S(6) * c * o + c * c;
+    const S front = o / (tuning.input_gain * m);
+    pid.proportional = front * o * c * (S(3) * c + S(2) * o);
+    pid.integral = front * o * o * c * c;
+    pid.derivative = front * (S(3) * c * c + S(6) * c * o + o * o);
+    pid.filter_time = (S(3) * o + S(2) * c) / m;
+    pid.filter_time_squared = S(1) / m;
+  }
+  return pid;
+}
+
+/// The ADRC whose PID gains (not filter) are the given ones.
+///
+/// PI: any `bandwidth_ratio` kappa = omega_o / omega_c will do, the given one is taken. PID: kappa
+/// follows from K_p^2 / (K_i K_d) = (2 kappa + 3)^2 / (kappa^2 + 6 kappa + 3), which for kappa >= 1
+/// runs from 2.5 to 4 (K_p^2 / (K_i K_d) = 4 is Ziegler and Nichols' T_i = 4 T_d). Below 2.5 kappa
+/// = 1 is taken, above what `bandwidth_ratio` gives that; `exact` is false then.
+/// @param bandwidth_ratio kappa of PI, largest kappa of PID; the step response wants 3 .. 10, noise
+/// wants less
+template <int Order, PlainScalar S>
+Expected<AdrcTuning<S>, Error<S>> adrc_from_pid(const PidGains<S>& pid, S bandwidth_ratio = S(10)) {
+  static_assert(Order == 1 || Order == 2, "esokit: PID is for orders 1 and 2");
+  if (auto ok = check_nonzero("proportional", pid.proportional); !ok) return ok.error();
+  if (auto ok = check_nonzero("integral", pid.integral); !ok) return ok.error();
+  const S rate = pid.integral / pid.proportional;
+  if (!(rate > S(0))) {
+    return Error<S>{"integral", pid.integral, "must have the sign of proportional"};
+  }
+  if (auto ok = check_positive("bandwidth_ratio", bandwidth_ratio); !ok) return ok.error();
+  AdrcTuning<S> tuning;
+  S kappa = bandwidth_ratio;
+  if constexpr (Order == 1) {
+    tuning.controller_bandwidth = rate * (S(2) + kappa) / kappa;
+    const S m = (S(2) * kappa + S(1)) * tuning.controller_bandwidth;
+    tuning.observer_bandwidth = kappa * tuning.controller_bandwidth;
+    tuning.input_gain = tuning.observer_bandwidth *
+                        (S(2) * tuning.controller_bandwidth + tuning.observer_bandwidth) /
+                        (pid.proportional * m);
+  } else {
+    if (auto ok = check_nonzero("derivative", pid.derivative); !ok) return ok.error();
+    const S ratio = rate * pid.derivative / pid.proportional;  // K_i K_d / K_p^2
+    if (!(ratio > S(0))) {
+      return Error<S>{"derivative", pid.derivative, "must have the sign of proportional"};
+    }
+    if (auto ok = check_above("bandwidth_ratio", bandwidth_ratio, S(1)); !ok) return ok.error();
+    // (1 - 4q) kappa^2 + (6 - 12q) kappa + (3 - 9q) = 0 with q = K_i K_d / K_p^2, its larger root.
+    const S a = S(4) * ratio - S(1);
+    const S b = S(12) * ratio - S(6);
+    const S c = S(9) * ratio - S(3);
+    S square = b * b - S(4) * a * c;
+    // At kappa = 1 it vanishes, but for rounding.
+    const S rounding = S(64) * std::numeric_limits<S>::epsilon();
+    if (square < S(0) && square > -rounding * (b * b)) square = S(0);
+    const S root = a > S(0) && square >= S(0) ? (-b + std::sqrt(square)) / (S(2) * a) : S(-1);
+    if (a > S(0) && square < S(0)) {
+      kappa = S(1);
+      tuning.exact = false;
+    } else if (!(a > S(0)) || root > bandwidth_ratio) {
+      tuning.exact = false;
+    } else {
+      kappa = root < S(1) ? S(1) : root;
+    }
+    tuning.controller_bandwidth = rate * (S(3) + S(2) * kappa) / kappa;
+    tuning.observer_bandwidth = kappa * tuning.controller_bandwidth;
+    const S m = S(3) * kappa * kappa + S(6) * kappa + S(1);
+    tuning.input_gain = tuning.controller_bandwidth * tuning.controller_bandwidth * kappa * kappa *
+                        (S(3) + S(2) * kappa) / (pid.proportional * m);
+  }
+  if (auto ok = check_representable("proportional", pid.proportional, tuning.input_gain,
+                                    "gives an input gain that the scalar cannot hold");
+      !ok) {
+    return ok.error();
+  }
+  return tuning;
+}
+
+}  // namespace esokit

@@ -1,0 +1,94 @@
+/// @file
+/// DelayedInput: an observer of a plant whose input acts a known number of samples late.
+#pragma once
+
+#include <esokit/core/unroll.hpp>
+#include <esokit/observer/loop_observer.hpp>
+
+namespace esokit {
+
+/// Feeds the observer u[k-d] instead of u[k] (bus, drive or computing delay of d sample times), so
+/// that input and output belong together and the delay is not taken for a disturbance.
+///
+/// The estimate is that of the present; what u still on its way will do is not predicted.
+/// @tparam Capacity largest d that a config may ask for; the memory is Capacity + 1 scalars
+template <LoopObserver Observer, int Capacity>
+class DelayedInput : public Observer {
+  static_assert(Capacity >= 1, "esokit: a delay line needs a capacity of at least 1");
+  using S = typename Observer::scalar_type;
+
+ public:
+  struct Config {
+    typename Observer::Config observer{};  ///< of the observer itself
+    int delay = 0;                         ///< d, samples, 0 .. Capacity
+  };
+
+  /// @return the observer with an empty (zero) delay line, or an error that names the field
+  static Expected<DelayedInput, Error<S>> make(const Config& config) {
+    if (config.delay < 0 || config.delay > Capacity) {
+      return Error<S>{"delay",
+                      static_cast<S>(config.delay),
+                      "must be 0 up to the capacity of the delay line, which is",
+                      -1,
+                      static_cast<S>(Capacity),
+                      true};
+    }
+    auto observer = Observer::make(config.observer);
+    if (!observer) return observer.error();
+    return DelayedInput(*observer, config.delay);
+  }
+
+  /// New settings while running: estimate and inputs under way are kept.
+  Check<S> retune(const Config& config) {
+    auto fresh = make(config);
+    if (!fresh) return fresh.error();
+    if (auto ok = Observer::retune(config.observer); !ok) return ok;
+    delay_ = fresh->delay_;
+    return {};
+  }
+
+  StepStatus update(S y, S u_applied) noexcept {
+    const StepStatus status = push(u_applied);
+    return status | Observer::update(y, delayed());
+  }
+
+  StepStatus predict(S u_applied) noexcept {
+    const StepStatus status = push(u_applied);
+    return status | Observer::predict(delayed());
+  }
+
+  /// As if `u` had been applied for long.
+  void fill_input(const S& u) noexcept {
+    if (!is_finite(u)) return;
+    inputs_.fill(u);
+  }
+
+  /// d, samples.
+  [[nodiscard]] int delay() const noexcept { return delay_; }
+
+ private:
+  static constexpr int length = Capacity + 1;
+
+  DelayedInput(const Observer& observer, int delay) noexcept : Observer(observer), delay_(delay) {}
+
+  /// A bad input takes the place of the last good one here already, so that it is reported now and
+  /// not d samples later.
+  StepStatus push(const S& u) noexcept {
+    const S last = inputs_[static_cast<std::size_t>(newest_)];
+    newest_ = newest_ + 1 == length ? 0 : newest_ + 1;
+    const bool good = is_finite(u);
+    inputs_[static_cast<std::size_t>(newest_)] = good ? u : last;
+    return good ? StepStatus::ok : StepStatus::input_rejected;
+  }
+
+  [[nodiscard]] const S& delayed() const noexcept {
+    const int at = newest_ - delay_;
+    return inputs_[static_cast<std::size_t>(at < 0 ? at + length : at)];
+  }
+
+  Array<S, length> inputs_{};
+  int delay_;
+  int newest_ = 0;
+};
+
+}  // namespace esokit

@@ -1,0 +1,495 @@
+/// @file
+/// ExtendedStateFilter (ESF): the extended state observer whose gain comes from noise levels instead
+/// of a bandwidth (S. Shi, Z. Zeng, C. Zhao, L. Guo, P. Chen, Energies 15 (2022) 5799).
+#pragma once
+
+#include <cmath>
+#include <concepts>
+#include <cstdint>
+#include <esokit/observer/predictor_corrector.hpp>
+#include <esokit/observer/riccati_gain.hpp>
+#include <optional>
+
+namespace esokit {
+
+/// The ESF without a model of the disturbance: its change is anything within the bounds.
+struct NoNominalModel {};
+
+/// A model fbar(x, u, t) of the total disturbance, in the unit of y^(n): x the plant states, u the
+/// input that was held, t seconds since the start or the last reset.
+template <class Model, int Order, class S>
+concept NominalModel = std::copyable<Model> &&
+    (std::same_as<Model, NoNominalModel> ||
+     requires(const Model& model, const Vector<S, Order>& x, const S& s) {
+       { model(x, s, s) } -> std::convertible_to<S>;
+     });
+
+/// Extended state filter of a plant y^(n) = d + b0 u, sampled exactly, with y measured in white
+/// noise.
+///
+/// The gain follows from R, the variance of the noise, and from Q, what the chain may do within a
+/// sample that its model does not say: for m = 1 above all the change of the disturbance. P0 speeds
+/// up the start. `covariance` is a bound of the covariance of the error (in the sense of matrices)
+/// as long as Q and R are. In a closed loop the noise drives u, and u what the disturbance does:
+/// the bound of its change has to cover that.
+///
+/// Neither minimum variance nor unbiased in general: it is a guaranteed bound. With `none` as the
+/// inflation rule it is the Kalman filter of the chain driven by white noise.
+///
+/// The state before the first measurement is that of the sample before it, as everywhere: `update`
+/// predicts first. Where the initial estimate is meant for the first sample itself, as in the
+/// paper, begin with `correct(y)`.
+///
+/// @tparam Order n @tparam S scalar @tparam Extension m
+/// @tparam Model of the disturbance, see NominalModel (m = 1 only)
+/// @tparam TableSize samples in the start table of RiccatiMode::start_table
+template <int Order, Scalar S = double, int Extension = 1, class Model = NoNominalModel,
+          int TableSize = 0>
+requires NominalModel<Model, Order, S>
+class ExtendedStateFilter
+    : public PredictorCorrector<Order, S, Extension,
+                                RiccatiGain<Order + Extension, S, TableSize>> {
+  using Law = RiccatiGain<Order + Extension, S, TableSize>;
+  using Base = PredictorCorrector<Order, S, Extension, Law>;
+  static constexpr int N = Base::size;
+  static constexpr bool has_model = !std::same_as<Model, NoNominalModel>;
+  static_assert(!has_model || Extension == 1,
+                "esokit: the nominal model is for one extended state");
+
+ public:
+  using Chain = typename Base::Chain;
+  using Estimate = typename Base::Estimate;
+  using Covariance = Matrix<S, N, N>;
+
+  struct Config {
+    S input_gain{};            ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
+    S sample_time{};           ///< T, s
+    S measurement_variance{};  ///< R >= 0, unit of y squared
+
+    /// q_r >= 0: what the estimate r may change by in a sample beyond its model, in its own unit;
+    /// for r < n what sampling neglects (zero in an exactly sampled chain), for r = n the change of
+    /// d, for m > 1 that of its derivatives. Q = bound_factor diag(q_r^2).
+    Array<S, N> disturbance_bounds{};
+    /// c: N covers N bounded errors with any correlation; the paper prints 1 in (12), 2 in (34).
+    S bound_factor{static_cast<double>(N)};
+    /// Q itself, N x N, positive semidefinite, per sample; instead of the bounds.
+    std::optional<Covariance> process_covariance{};
+    /// P0, N x N, positive semidefinite: at least the covariance of the initial error, as a matrix.
+    Covariance initial_covariance = Covariance::Zero();
+
+    InflationRule inflation_rule = InflationRule::fixed;
+    S inflation{};  ///< theta > 0 of the fixed rule
+    /// Adaptive rule: weights of the states' variances in the trace, each state taken in the unit
+    /// of y by T^r/r!. All one: the error counts by what it does to y within a sample.
+    Array<S, N> trace_weights = equal_weights();
+
+    RiccatiMode mode = RiccatiMode::recursive;
+    /// Normalised innovation squared above which y is an outlier, and a missing sample; 0: no gate.
+    /// A Gaussian innovation passes 6.63 in 1 %, 10.8 in 0.1 %, 15.1 in 0.01 % of all samples. The
+    /// gate widens with every sample that is missing, and opens after max_gap.
+    S outlier_threshold{};
+    [[no_unique_address]] Model model{};  ///< fbar
+    int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts
+
+    static constexpr Array<S, N> equal_weights() noexcept {
+      Array<S, N> weights{};
+      for (S& w : weights) w = S(1.0);
+      return weights;
+    }
+  };
+
+  /// @return the filter at rest in zero, or an error that names the field
+  static Expected<ExtendedStateFilter, Error<S>> make(const Config& config) {
+    const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
+    if (auto ok = Base::check_chain(chain); !ok) return ok.error();
+    if (auto ok = check_rule(config); !ok) return ok.error();
+    if (auto ok = check_not_negative("outlier_threshold", config.outlier_threshold); !ok) {
+      return ok.error();
+    }
+    auto settings = law_settings(config);
+    if (!settings) return settings.error();
+    Law law(*settings);
+    for (const S& k : law.gain_before_measurement()) {
+      if (!all(is_finite(k))) {
+        return Error<S>{"initial_covariance", config.initial_covariance(0, 0),
+                        "gives a gain that the scalar cannot hold"};
+      }
+    }
+    if (config.mode != RiccatiMode::recursive) {
+      if (auto ok = freeze(law, config); !ok) return ok.error();
+    }
+    return ExtendedStateFilter(chain, law, config);
+  }
+
+  /// New settings while running: estimate and covariance are kept, a change of b0 is moved into the
+  /// disturbance. A refused config changes nothing.
+  Check<S> retune(const Config& config) {
+    auto fresh = make(config);
+    if (!fresh) return fresh.error();
+    fresh->law().continue_from(law(), S(fresh->sample_time() / this->sample_time()));
+    if (auto ok = this->adopt(*fresh); !ok) return ok;
+    model_ = fresh->model_;
+    outlier_threshold_ = fresh->outlier_threshold_;
+    change_bound_ = fresh->change_bound_;
+    return {};
+  }
+
+  /// One sample: `predict(u_applied)`, then `correct(y)`.
+  StepStatus update(S y, S u_applied) noexcept {
+    if constexpr (!has_model) {
+      if (law().rests_unwatched()) [[likely]] return Base::update(y, u_applied);
+    }
+    return update_out_of_line(y, u_applied);
+  }
+
+  /// The same with the variance of this measurement's noise, R in unit of y squared. A variance
+  /// that is negative or not finite makes the measurement a missing one.
+  StepStatus update_weighted(S y, S u_applied, S measurement_variance) noexcept {
+    const StepStatus predicted = predict(u_applied);
+    return predicted | correct_weighted(y, measurement_variance);
+  }
+
+  /// Time update alone: one sample without a measurement, or the first half of `update`.
+  StepStatus predict(S u_applied) noexcept {
+    if constexpr (has_model) {
+      const Estimate before = this->estimate();
+      const StepStatus status = Base::predict(u_applied);
+      shift_by_model(before);
+      return status;
+    } else {
+      return Base::predict(u_applied);
+    }
+  }
+
+  /// Measurement update alone.
+  StepStatus correct(S y) noexcept {
+    if (!accepts(y)) return StepStatus::outlier_rejected;
+    return Base::correct(y);
+  }
+
+  /// The same with the variance of this measurement's noise.
+  StepStatus correct_weighted(S y, S measurement_variance) noexcept {
+    if (!all(is_finite(measurement_variance)) || !all(measurement_variance >= S(0.0))) {
+      return StepStatus::measurement_rejected;
+    }
+    law().set_measurement_variance(measurement_variance);
+    return correct(y);
+  }
+
+  /// False if the gate would take y for an outlier. Bad numbers are not its business.
+  [[nodiscard]] bool accepts(const S& y) const noexcept {
+    if (!gated() || this->restarts()) return true;
+    const S e = y - this->template estimate<0>();
+    if (!all(is_finite(S(e * e)))) return true;
+    return all(e * e <= outlier_threshold_ * innovation_variance());
+  }
+
+  /// Starts anew at (y, 0, .., 0) with P0.
+  StepStatus reset(S y) noexcept { return restart_clock(Base::reset(y)); }
+
+  /// Starts anew at a given estimate, N x 1, with P0.
+  StepStatus reset(const Estimate& state) noexcept { return restart_clock(Base::reset(state)); }
+
+  /// Bound of the covariance of the present estimate's error, N x N, in the units of the estimates:
+  /// after `predict` that of the prediction, after `correct` that of the correction.
+  [[nodiscard]] Covariance covariance() const noexcept {
+    Covariance p = law().covariance();
+    // In two steps from both sides: the whole factor may not fit the scalar where P does.
+    const Array<S, N> units = physical_units(S(S(1.0) / this->sample_time()));
+    for (int i = 0; i < N; ++i) {
+      for (int j = 0; j <= i; ++j) {
+        p(i, j) = p(i, j) * units[index(i)] * units[index(j)];
+        p(j, i) = p(i, j);
+      }
+    }
+    return p;
+  }
+
+  /// C P- C' + R of the last prediction, unit of y squared.
+  [[nodiscard]] S innovation_variance() const noexcept { return law().innovation_variance(); }
+
+  /// Normalised innovation squared (NIS) of the last correction: e^2 over its variance; about 1 on
+  /// average where R, Q and P0 are right, less where they are bounds.
+  [[nodiscard]] S normalised_innovation() const noexcept {
+    return this->innovation() * this->innovation() / innovation_variance();
+  }
+
+  /// theta in force.
+  [[nodiscard]] S inflation() const noexcept { return law().inflation(); }
+
+  /// Gain of the coming correction in physical units, N x 1.
+  [[nodiscard]] Estimate gain() const noexcept {
+    return physical_gain<N, S>(law().gain_before_measurement(), this->sample_time());
+  }
+
+  /// True while the recursion rests in a frozen mode.
+  [[nodiscard]] bool frozen() const noexcept { return law().stands(); }
+
+ private:
+  ExtendedStateFilter(const ChainConfig<S>& chain, const Law& law, const Config& config) noexcept
+      : Base(chain, {law}),
+        model_(config.model),
+        outlier_threshold_(config.outlier_threshold),
+        change_bound_(config.disturbance_bounds[Order]) {
+    std::get<0>(this->laws()).watch(all(config.outlier_threshold > S(0.0)));
+  }
+
+  static constexpr std::size_t index(int i) noexcept { return static_cast<std::size_t>(i); }
+
+  [[nodiscard]] bool gated() const noexcept { return law().is_watched(); }
+  [[nodiscard]] const Law& law() const noexcept { return std::get<0>(this->laws()); }
+  [[nodiscard]] Law& law() noexcept { return std::get<0>(this->laws()); }
+
+  static Check<S> check_rule(const Config& config) {
+    const bool given = !all(is_finite(config.inflation)) ||
+                       all(detail::magnitude(config.inflation) > S(0.0));
+    if (config.inflation_rule == InflationRule::fixed) {
+      if (!all(is_finite(config.inflation)) || !all(config.inflation > S(0.0))) {
+        return Error<S>{"inflation", config.inflation,
+                        "must be finite and positive; the plain Kalman filter is "
+                        "InflationRule::none"};
+      }
+      return {};
+    }
+    if (given) {
+      return Error<S>{"inflation", config.inflation,
+                      "must be left out unless inflation_rule is fixed"};
+    }
+    if (config.inflation_rule == InflationRule::adaptive) {
+      for (int i = 0; i < N; ++i) {
+        if (auto ok = check_positive("trace_weights", config.trace_weights[index(i)], i); !ok) {
+          return ok;
+        }
+      }
+    }
+    return {};
+  }
+
+  /// T^r / r! over the root of the unit, by which a state becomes one of the law's.
+  static Array<S, N> scaled_units(const S& sample_time, const S& root) {
+    Array<S, N> units{};
+    S unit = S(1.0) / root;
+    for (int r = 0; r < N; ++r) {
+      if (r > 0) unit = unit * sample_time / S(static_cast<double>(r));
+      units[index(r)] = unit;
+    }
+    return units;
+  }
+
+  /// r! / T^r.
+  static Array<S, N> physical_units(const S& rate) noexcept {
+    Array<S, N> units{};
+    S unit(1.0);
+    for (int r = 0; r < N; ++r) {
+      if (r > 0) unit = unit * (S(static_cast<double>(r)) * rate);
+      units[index(r)] = unit;
+    }
+    return units;
+  }
+
+  static Covariance scaled(const Covariance& p, const Array<S, N>& units) {
+    Covariance result;
+    for (int i = 0; i < N; ++i) {
+      for (int j = 0; j < N; ++j) result(i, j) = (p(i, j) * units[index(i)]) * units[index(j)];
+    }
+    return result;
+  }
+
+  /// Finite, symmetric, no negative variance.
+  static Check<S> check_covariance(const char* field, const Covariance& p) {
+    for (int i = 0; i < N; ++i) {
+      for (int j = 0; j < N; ++j) {
+        if (!all(is_finite(p(i, j)))) {
+          return Error<S>{field, p(i, j), "must be finite", i * N + j};
+        }
+      }
+      if (!all(p(i, i) >= S(0.0))) {
+        return Error<S>{field, p(i, i), "must be positive semidefinite", i * N + i};
+      }
+    }
+    for (int i = 0; i < N; ++i) {
+      for (int j = 0; j < i; ++j) {
+        const S difference = detail::magnitude(S(p(i, j) - p(j, i)));
+        if (!all(difference <= S(8.0) * detail::rounding<S>() * detail::magnitude(p(i, j)))) {
+          return Error<S>{field, p(i, j), "must be symmetric", i * N + j};
+        }
+      }
+    }
+    return {};
+  }
+
+  static Expected<CovarianceFactor<N, S>, Error<S>> factored(const char* field,
+                                                             const Covariance& p,
+                                                             const Array<S, N>& units) {
+    const Covariance q = scaled(p, units);
+    for (int i = 0; i < N; ++i) {
+      if (!all(p(i, i) > S(0.0))) continue;
+      // Far enough from both ends for what the recursion makes of it.
+      const S root = detail::smallest_normal<S>() / detail::rounding<S>();
+      if (!all(is_finite(q(i, i))) || !all(q(i, i) > root) || !all(q(i, i) * root < S(1e-6))) {
+        return Error<S>{field, p(i, i),
+                        "in the scaling T^2r / r!^2 and divided by R is a variance that the scalar "
+                        "cannot hold",
+                        i * N + i};
+      }
+    }
+    const auto factor = CovarianceFactor<N, S>::from_matrix(q);
+    if (!factor) {
+      return Error<S>{field, p(N - 1, N - 1), "must be positive semidefinite", N * N - 1};
+    }
+    return *factor;
+  }
+
+  static Expected<RiccatiSettings<N, S>, Error<S>> law_settings(const Config& config) {
+    using std::sqrt;
+    const S& r = config.measurement_variance;
+    if (auto ok = check_not_negative("measurement_variance", r); !ok) return ok.error();
+    if (auto ok = check_covariance("initial_covariance", config.initial_covariance); !ok) {
+      return ok.error();
+    }
+    Covariance q = Covariance::Zero();
+    if (config.process_covariance) {
+      if (auto ok = check_covariance("process_covariance", *config.process_covariance); !ok) {
+        return ok.error();
+      }
+      q = *config.process_covariance;
+    }
+    if (auto ok = check_positive("bound_factor", config.bound_factor); !ok) return ok.error();
+    bool bounded = false;
+    for (int i = 0; i < N; ++i) {
+      const S& bound = config.disturbance_bounds[index(i)];
+      if (auto ok = check_not_negative("disturbance_bounds", bound, i); !ok) return ok.error();
+      if (!all(bound > S(0.0))) continue;
+      if (config.process_covariance) {
+        return Error<S>{"disturbance_bounds", bound,
+                        "must be left out where process_covariance is given", i};
+      }
+      bounded = true;
+      // With a model the change left over is the difference of two within the bound.
+      const S whole = has_model && i == Order ? S(bound + bound) : bound;
+      q(i, i) = config.bound_factor * whole * whole;
+      if (!all(is_finite(q(i, i)))) {
+        return Error<S>{"disturbance_bounds", bound, "has a square that the scalar cannot hold", i};
+      }
+    }
+    if (has_model && !all(config.disturbance_bounds[Order] > S(0.0))) {
+      return Error<S>{"disturbance_bounds", config.disturbance_bounds[Order],
+                      "must say by how much the model may change the disturbance in a sample",
+                      Order};
+    }
+
+    // The unit of all variances: R, or without noise the largest variance there is.
+    S unit = r;
+    const Array<S, N> plain = scaled_units(config.sample_time, S(1.0));
+    bool driven = bounded;
+    for (int i = 0; i < N; ++i) {
+      driven = driven || all(q(i, i) > S(0.0));
+      if (all(r > S(0.0))) continue;
+      for (const S& variance : {q(i, i), config.initial_covariance(i, i)}) {
+        const S seen = (variance * plain[index(i)]) * plain[index(i)];
+        unit = select(unit < seen, seen, unit);
+      }
+    }
+    if (!all(r > S(0.0)) && !driven) {
+      return Error<S>{"measurement_variance", r,
+                      "must be positive where nothing disturbs the plant (all of "
+                      "disturbance_bounds or process_covariance is zero): after N exact "
+                      "measurements nothing would be left to find a gain from"};
+    }
+    if (config.inflation_rule == InflationRule::adaptive && !driven) {
+      return Error<S>{"disturbance_bounds", S(0.0),
+                      "or process_covariance must not be zero where the inflation is adaptive"};
+    }
+    const Array<S, N> units = scaled_units(config.sample_time, S(sqrt(unit)));
+    const auto start = factored("initial_covariance", config.initial_covariance, units);
+    if (!start) return start.error();
+    const auto noise = factored(
+        config.process_covariance ? "process_covariance" : "disturbance_bounds", q, units);
+    if (!noise) return noise.error();
+    return RiccatiSettings<N, S>{.start = *start,
+                                 .noise = *noise,
+                                 .measurement = r / unit,
+                                 .unit = unit,
+                                 .rule = config.inflation_rule,
+                                 .inflation = config.inflation,
+                                 .trace_weights = config.trace_weights};
+  }
+
+  static Check<S> freeze(Law& law, const Config& config) {
+    const char* field = config.process_covariance ? "process_covariance" : "disturbance_bounds";
+    const S highest = config.process_covariance ? (*config.process_covariance)(N - 1, N - 1)
+                                                : config.disturbance_bounds[N - 1];
+    if (config.mode == RiccatiMode::start_table && TableSize == 0) {
+      return Error<S>{"mode", S(0.0), "needs a filter with a TableSize above 0 for a start table"};
+    }
+    if (config.inflation_rule == InflationRule::none && !all(highest > S(0.0))) {
+      return Error<S>{field, highest,
+                      "must disturb the highest state where the gain is to be frozen without "
+                      "inflation: its limit is zero",
+                      config.process_covariance ? N * N - 1 : N - 1};
+    }
+    if (!law.freeze(config.mode)) {
+      return Error<S>{field, highest, "gives no limit gain that the scalar can hold"};
+    }
+    if constexpr (TableSize > 0) {
+      if (config.mode == RiccatiMode::start_table) {
+        for (int i = 0; i < N; ++i) {
+          const S limit = law.limit_gain()[index(i)];
+          const S last = law.last_table_gain()[index(i)];
+          if (!all(detail::magnitude(S(last - limit)) <= S(0.1) * detail::magnitude(limit))) {
+            return Error<S>{"mode", last,
+                            "has a start table too short: its last gain is more than a tenth off "
+                            "the limit",
+                            i, limit, true};
+          }
+        }
+      }
+    }
+    return {};
+  }
+
+  // On its own, so that the frozen filter's step has no call in it but at its end.
+  [[gnu::noinline]] StepStatus update_out_of_line(S y, S u_applied) noexcept {
+    if constexpr (!has_model) {
+      if (!gated()) [[likely]] return Base::update(y, u_applied);
+    }
+    const StepStatus predicted = predict(u_applied);
+    return predicted | correct(y);
+  }
+
+  StepStatus restart_clock(StepStatus status) noexcept {
+    if (has_model && status == StepStatus::ok) sample_ = 0;
+    return status;
+  }
+
+  /// d grows by sat(fbar(x+, u, t + T) - fbar(x, u, t)), (6) with the input that it leaves out.
+  void shift_by_model(const Estimate& before) noexcept {
+    if constexpr (has_model) {
+      const S time = this->sample_time();
+      const S t = S(static_cast<double>(sample_)) * time;
+      const S u = this->applied_input();
+      Vector<S, Order> x = before.template head<Order>();
+      const S now = model_(x, u, t);
+      // Ahead along the chain with fbar in place of the estimated disturbance.
+      Estimate start = before;
+      start(Order) = now;
+      const S drive = Chain::scaled_input_gain(this->input_gain(), time) * u;
+      const auto ahead =
+          Chain::template predict<1>(Chain::scaled(start, time), Array<S, 1>{drive});
+      x = Chain::physical(ahead, S(S(1.0) / time)).template head<Order>();
+      const S change = model_(x, u, S(t + time)) - now;
+      const S low = select(change < -change_bound_, S(-change_bound_), change);
+      const S limited = select(change_bound_ < low, change_bound_, low);
+      const S sum = this->total_disturbance() + limited;
+      this->shift_disturbance(select(is_finite(sum), limited, S(0.0)));
+      ++sample_;
+    }
+  }
+
+  [[no_unique_address]] Model model_;
+  S outlier_threshold_;
+  S change_bound_;
+  std::uint64_t sample_ = 0;
+};
+
+}  // namespace esokit

@@ -1,0 +1,39 @@
+/// @file
+/// HalfGainEso: LinearEso with half-gain tuning, see design/half_gain.hpp.
+#pragma once
+
+#include <esokit/design/half_gain.hpp>
+#include <esokit/observer/linear_eso.hpp>
+
+namespace esokit {
+
+template <int Size, PlainScalar S>
+struct LinearEsoConfig<Size, S, HalfGainPoles> {
+  S observer_bandwidth{};  ///< omega_o, rad/s, of the observer whose gains are halved
+  S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
+  S sample_time{};         ///< T, s
+  int max_gap = 100;       ///< missing samples that a correction may bridge before it restarts
+
+  static constexpr const char* placement_field = "observer_bandwidth";
+  [[nodiscard]] const S& placement() const noexcept { return observer_bandwidth; }
+};
+
+template <int Size, PlainScalar S>
+struct ContinuousLinearEsoConfig<Size, S, HalfGainPoles> {
+  S observer_bandwidth{};  ///< omega_o, rad/s, of the observer whose gains are halved
+  S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero
+
+  static constexpr const char* placement_field = "observer_bandwidth";
+  [[nodiscard]] const S& placement() const noexcept { return observer_bandwidth; }
+};
+
+/// LinearEso with poles at exp(s_k T), s_k those of half the continuous gains: about half the noise
+/// in u for about the same disturbance rejection.
+template <int Order, PlainScalar S = double, int Extension = 1>
+using HalfGainEso = LinearEso<Order, S, Extension, HalfGainPoles>;
+
+/// The same as an ODE, with exactly half the gains.
+template <int Order, PlainScalar S = double, int Extension = 1>
+using ContinuousHalfGainEso = ContinuousLinearEso<Order, S, Extension, HalfGainPoles>;
+
+}  // namespace esokit

@@ -1,0 +1,160 @@
+/// @file
+/// KnownModel: what is known of the plant is fed to the observer, which estimates only the rest.
+#pragma once
+
+#include <esokit/core/matrix.hpp>
+#include <esokit/core/unroll.hpp>
+#include <esokit/observer/loop_observer.hpp>
+
+namespace esokit {
+
+/// fbar = -(a_0 y + a_1 y' + .. + a_(n-1) y^(n-1)): the plant's poles are known.
+template <int Order, PlainScalar S = double>
+struct KnownPoles {
+  Array<S, Order> coefficients{};  ///< a_0 .. a_(n-1) of s^n + a_(n-1) s^(n-1) + .. + a_0
+
+  template <int Size>
+  S operator()(const Vector<S, Size>& estimate) const noexcept {
+    S sum(0);
+    for (int i = 0; i < Order; ++i) {
+      sum = sum - coefficients[static_cast<std::size_t>(i)] * estimate(i);
+    }
+    return sum;
+  }
+};
+
+/// A known part of y^(n): fbar(estimate), noexcept, in the unit of y^(n), a function of
+/// y .. y^(n-1) alone.
+template <class Model, class Observer>
+concept PlantModel = std::copyable<Model> &&
+    requires(const Model& model, const typename Observer::Estimate& estimate) {
+  { model(estimate) } -> std::convertible_to<typename Observer::scalar_type>;
+};
+
+/// Observer of y^(n) = fbar(y, ..) + d + b0 u with fbar known. The chain is driven by u + fbar/b0,
+/// fbar taken at the last estimate and held over the step, and estimates d alone.
+///
+/// Row n of `estimate`, as `total_disturbance`, is fbar + dhat: what a controller cancels, whatever
+/// part of it is known. `residual_disturbance` is dhat.
+///
+/// What fbar changes within a step stays in dhat, O(T). fbar of the estimate is part of the error's
+/// dynamics: omega_o should stay well above the poles of fbar.
+/// @tparam Model a function fbar(estimate): KnownPoles, or your own
+template <LoopObserver Observer, class Model>
+requires PlantModel<Model, Observer>
+class KnownModel : public Observer {
+  using S = typename Observer::scalar_type;
+
+ public:
+  static constexpr int order = Observer::order;
+  using Estimate = typename Observer::Estimate;
+
+  struct Config {
+    typename Observer::Config observer{};  ///< of the observer itself
+    Model model{};                         ///< fbar
+  };
+
+  static Expected<KnownModel, Error<S>> make(const Config& config) {
+    if constexpr (requires { config.model.coefficients; }) {
+      for (std::size_t i = 0; i < config.model.coefficients.size(); ++i) {
+        if (auto ok = check_finite("model.coefficients", config.model.coefficients[i],
+                                   static_cast<int>(i));
+            !ok) {
+          return ok.error();
+        }
+      }
+    }
+    auto observer = Observer::make(config.observer);
+    if (!observer) return observer.error();
+    return KnownModel(*observer, config.model);
+  }
+
+  /// New settings while running: the estimate, that is fbar + d, is kept, and what another model
+  /// explains is taken out of d; a change of b0 is moved into d as everywhere. u does not jump.
+  Check<S> retune(const Config& config) {
+    auto fresh = make(config);
+    if (!fresh) return fresh.error();
+    const S known = known_part();
+    const S fed = Observer::applied_input() - applied_input_;
+    const S gain_change = this->input_gain() - fresh->input_gain();
+    if (auto ok = Observer::retune(config.observer); !ok) return ok;
+    model_ = config.model;
+    inverse_gain_ = fresh->inverse_gain_;
+    // The observer moved (b0_old - b0_new) times all that drove it; fbar's share is not b0's.
+    const S moved = known - known_part() - gain_change * fed;
+    if (moved < S(0) || moved > S(0)) Observer::shift_disturbance(moved);
+    return {};
+  }
+
+  StepStatus update(S y, S u_applied) noexcept {
+    const S input = accepted(u_applied);
+    return report(u_applied) | Observer::update(y, input);
+  }
+
+  StepStatus predict(S u_applied) noexcept {
+    const S input = accepted(u_applied);
+    return report(u_applied) | Observer::predict(input);
+  }
+
+  StepStatus reset(S y) noexcept {
+    Estimate state = Estimate::Zero();
+    state(0) = y;
+    return Observer::reset(state);
+  }
+
+  /// Starts anew at a given estimate, whose row n is fbar + d.
+  StepStatus reset(const Estimate& state) noexcept {
+    Estimate rest = state;
+    rest(order) = state(order) - model_(state);
+    return Observer::reset(rest);
+  }
+
+  [[nodiscard]] Estimate estimate() const noexcept {
+    Estimate state = Observer::estimate();
+    state(order) = state(order) + model_(state);
+    return state;
+  }
+
+  template <int Row>
+  [[nodiscard]] S estimate() const noexcept {
+    if constexpr (Row == order) {
+      return total_disturbance();
+    } else {
+      return Observer::template estimate<Row>();
+    }
+  }
+
+  /// fbar + dhat, unit of y^(n): all that acts beside b0 u.
+  [[nodiscard]] S total_disturbance() const noexcept {
+    return known_part() + residual_disturbance();
+  }
+
+  /// dhat without what the model explains, unit of y^(n).
+  [[nodiscard]] S residual_disturbance() const noexcept { return Observer::total_disturbance(); }
+
+  /// fbar at the present estimate, unit of y^(n).
+  [[nodiscard]] S known_part() const noexcept { return model_(Observer::estimate()); }
+
+  /// Input that the last step used, without the model's share.
+  [[nodiscard]] const S& applied_input() const noexcept { return applied_input_; }
+
+ private:
+  KnownModel(const Observer& observer, const Model& model) noexcept
+      : Observer(observer), model_(model), inverse_gain_(S(1) / observer.input_gain()) {}
+
+  /// u, or the last good one, with the model's share.
+  S accepted(const S& u) noexcept {
+    if (is_finite(u)) applied_input_ = u;
+    return applied_input_ + known_part() * inverse_gain_;
+  }
+
+  static StepStatus report(const S& u) noexcept {
+    return is_finite(u) ? StepStatus::ok : StepStatus::input_rejected;
+  }
+
+  Model model_;
+  S inverse_gain_;
+  S applied_input_{};
+};
+
+}  // namespace esokit

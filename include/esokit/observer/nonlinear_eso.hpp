@@ -1,0 +1,191 @@
+/// @file
+/// NonlinearEso: the extended state observer with a nonlinear gain (NHOESO: A. T. Azar, F. A.
+/// Abdul-Majeed, H. S. Majdi et al., Mathematics 10 (2022) 2261, doi:10.3390/math10132261; with fal
+/// instead, Han's).
+#pragma once
+
+#include <esokit/observer/continuous_observer.hpp>
+#include <esokit/observer/nonlinear_gain_design.hpp>
+#include <esokit/observer/predictor_corrector.hpp>
+
+namespace esokit {
+
+/// Extended state observer of a plant y^(n) = d + b0 u whose bandwidth gains are multiplied by an
+/// even function k of the innovation.
+///
+/// A gain k(e) that varies can make the error grow although every constant k in its range is stable
+/// (N = 3: 0.15 for 3.5 / omega_o, 5 for 0.2 / omega_o, and so on). So k is kept between gain_min
+/// and gain_max, a pair for which the error decays however k varies between them (a common
+/// quadratic Lyapunov function, see design/switching_certificate.hpp). By default
+/// - gain_min is 1/2, the round number from which on, for T -> 0, every gain_max is certified, for
+///   every N; or where omega_o T is large, three quarters of the way from 1 down to the least that
+///   is certified;
+/// - gain_max is half of the way from 1 up to the largest that is certified; at that one itself the
+///   error would ring undamped, and k rises as e vanishes.
+/// A pair without the certificate, or no limits at all, has to be asked for by name.
+///
+/// k = 1 is LinearEso, bit for bit. The certificate is about samples without gaps.
+/// @tparam Order n @tparam S scalar @tparam Extension m @tparam Shape an EvenGain: PowerSumGain
+/// (the paper's g), FalGain, or a function object of your own
+template <int Order, Scalar S = double, int Extension = 2, class Shape = PowerSumGain<S>>
+requires EvenGain<Shape, S>
+class NonlinearEso
+    : public PredictorCorrector<Order, S, Extension, NonlinearGain<Order + Extension, S, Shape>> {
+  using Law = NonlinearGain<Order + Extension, S, Shape>;
+  using Base = PredictorCorrector<Order, S, Extension, Law>;
+
+ public:
+  struct Config {
+    S observer_bandwidth{};       ///< omega_o, rad/s: the poles are at exp(-omega_o T) where k = 1
+    Shape shape{};                ///< k(|e| / error_scale)
+    S error_scale = S(1.0);       ///< unit of y: what counts as an error of one
+    std::optional<S> gain_min{};  ///< k is not less
+    std::optional<S> gain_max{};  ///< k is not more
+    bool allow_uncertified_gain = false;  ///< accept limits without the certificate
+    bool unlimited = false;               ///< no limits, no certificate
+    S input_gain{};     ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
+    S sample_time{};    ///< T, s
+    int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts
+  };
+
+  using Report = NonlinearGainReport<detail::TableScalar<S>>;
+
+  /// @return the observer at rest in zero, or an error that names the field
+  static Expected<NonlinearEso, Error<S>> make(const Config& config) {
+    const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
+    if (auto ok = Base::check_chain(chain); !ok) return ok.error();
+    const auto law = make_law(config);
+    if (!law) return law.error();
+    return NonlinearEso(chain, *law);
+  }
+
+  /// What is known of a config's k: constant-k intervals, limits, and the errors at which the given
+  /// k is outside of them. Errors as `make`; it is not needed for running.
+  static Expected<Report, Error<S>> report(const Config& config) requires PlainScalar<S> {
+    const auto made = make(config);
+    if (!made) return made.error();
+    const auto poles = EqualSampledPoles<Base::size, S>::from_bandwidth(config.observer_bandwidth,
+                                                                        config.sample_time);
+    const auto gain = current_gain<Base::size, S>(poles.weights());
+    constexpr auto continuous = constant_gain_interval<Base::size>();
+    Report report;
+    report.continuous = {static_cast<S>(continuous.low), static_cast<S>(continuous.high)};
+    report.sampled = constant_gain_interval(poles);
+    report.limits = {made->gain_min(), made->gain_max()};
+    const auto& [low, high] = report.limits;
+    if (!config.unlimited && gain_range_certified<Base::size, S>(gain, low, low)) {
+      report.certified = gain_range_certified<Base::size, S>(gain, low, high);
+      report.certified_max =
+          largest_certified_gain<Base::size, S>(gain, low, low, report.sampled.high);
+    }
+    const auto k = detail::prepared(config.shape);
+    const auto within = [&k](const Interval<S>& interval) {
+      return [&k, interval](S x) {
+        const S value = k(x);
+        return value >= interval.low && value <= interval.high;
+      };
+    };
+    report.outside = detail::ranges_outside<S>(within(report.sampled), config.error_scale);
+    report.limited = detail::ranges_outside<S>(within(report.limits), config.error_scale);
+    return report;
+  }
+
+  /// New settings while running: the estimate is kept, a change of b0 is moved into the
+  /// disturbance. A refused config changes nothing.
+  Check<S> retune(const Config& config) {
+    auto fresh = make(config);
+    if (!fresh) return fresh.error();
+    return this->adopt(*fresh);
+  }
+
+  /// k for an innovation e (unit of y), within its limits.
+  [[nodiscard]] S gain_factor(const S& e) const noexcept { return law().factor(e); }
+
+  /// Limits of k in force.
+  [[nodiscard]] const S& gain_min() const noexcept { return law().gain_min(); }
+  [[nodiscard]] const S& gain_max() const noexcept { return law().gain_max(); }
+
+ private:
+  NonlinearEso(const ChainConfig<S>& chain, const Law& law) noexcept : Base(chain, {law}) {}
+
+  [[nodiscard]] const Law& law() const noexcept { return std::get<0>(this->laws()); }
+
+  static Expected<Law, Error<S>> make_law(const Config& config) {
+    constexpr int size = Base::size;
+    const auto linear =
+        Law::Linear::make("observer_bandwidth", config.observer_bandwidth, config.sample_time);
+    if (!linear) return linear.error();
+    if (auto ok = check_positive("error_scale", config.error_scale); !ok) return ok.error();
+    if (auto ok =
+            check_representable("error_scale", config.error_scale, S(S(1.0) / config.error_scale),
+                                "has an inverse that the scalar cannot hold");
+        !ok) {
+      return ok.error();
+    }
+    if (auto ok = detail::check_shape<S>(config.shape); !ok) return ok.error();
+    const auto poles =
+        EqualSampledPoles<size, S>::from_bandwidth(config.observer_bandwidth, config.sample_time);
+    const auto limits = detail::find_limits<size, S>(
+        {config.gain_min, config.gain_max, config.allow_uncertified_gain, config.unlimited},
+        linear->gain_before_measurement(), least_certified_gain(poles),
+        constant_gain_interval(poles).high);
+    if (!limits) return limits.error();
+    return Law(*linear, config.shape, config.error_scale, limits->low, limits->high);
+  }
+};
+
+/// NonlinearEso as an ODE, for simulation. By default k is kept above gain_min = 1/2, which is
+/// certified without an upper limit in continuous time (from (N-1) / (2N) on).
+template <int Order, Scalar S = double, int Extension = 2, class Shape = PowerSumGain<S>>
+requires EvenGain<Shape, S>
+class ContinuousNonlinearEso
+    : public ContinuousObserver<Order, S, Extension,
+                                ContinuousNonlinearGain<Order + Extension, S, Shape>> {
+  using Law = ContinuousNonlinearGain<Order + Extension, S, Shape>;
+  using Base = ContinuousObserver<Order, S, Extension, Law>;
+
+ public:
+  struct Config {
+    S observer_bandwidth{};               ///< omega_o, rad/s: the poles are at -omega_o where k = 1
+    Shape shape{};                        ///< k(|e| / error_scale)
+    S error_scale = S(1.0);               ///< unit of y: what counts as an error of one
+    std::optional<S> gain_min{};          ///< k is not less
+    std::optional<S> gain_max{};          ///< k is not more
+    bool allow_uncertified_gain = false;  ///< accept limits without the certificate
+    bool unlimited = false;               ///< no limits, no certificate
+    S input_gain{};                       ///< b0, unit of y^(n) per unit of u; not zero
+  };
+
+  /// @return the observer's equations, or an error that names the field
+  static Expected<ContinuousNonlinearEso, Error<S>> make(const Config& config) {
+    constexpr int size = Base::size;
+    if (auto ok = check_nonzero("input_gain", config.input_gain); !ok) return ok.error();
+    const auto linear =
+        ContinuousConstantGain<size, S>::make("observer_bandwidth", config.observer_bandwidth);
+    if (!linear) return linear.error();
+    if (auto ok = check_positive("error_scale", config.error_scale); !ok) return ok.error();
+    if (auto ok = detail::check_shape<S>(config.shape); !ok) return ok.error();
+    const Vector<S, size> gain = linear->gain(S(0.0), S(0.0));
+    detail::GainLimits<S> asked{config.gain_min, config.gain_max, config.allow_uncertified_gain,
+                                config.unlimited};
+    constexpr double free_from = unbounded_certified_gain<size>();
+    Interval<S> limits{};
+    if (!asked.unlimited && !asked.high &&
+        (!asked.low || (all(is_finite(*asked.low)) && all(*asked.low >= S(free_from))))) {
+      limits = {asked.low ? *asked.low : S(0.5),
+                S(std::numeric_limits<detail::TableScalar<S>>::max())};
+    } else {
+      constexpr double least = least_certified_gain<size>();
+      const auto found = detail::find_limits<size, S>(asked, gain, S(least), S(1e6));
+      if (!found) return found.error();
+      limits = *found;
+    }
+    return ContinuousNonlinearEso(
+        config.input_gain, Law(gain, config.shape, config.error_scale, limits.low, limits.high));
+  }
+
+ private:
+  ContinuousNonlinearEso(const S& input_gain, const Law& law) : Base(input_gain, {law}) {}
+};
+
+}  // namespace esokit

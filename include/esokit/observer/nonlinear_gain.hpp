@@ -1,0 +1,212 @@
+/// @file
+/// The nonlinear gain law: bandwidth gains times an even function k of the innovation, kept between
+/// two limits; and the functions k of the literature.
+#pragma once
+
+#include <esokit/core/fal.hpp>
+#include <esokit/core/power.hpp>
+#include <esokit/observer/constant_gain.hpp>
+#include <limits>
+
+namespace esokit {
+
+/// An even gain k(x), x = |e| / error_scale > 0: the correction is l k(x) e.
+///
+/// Any copyable function object will do. Optional, found by name: `check()` gives the error of a
+/// bad parameter, `prepared()` a function object that is quicker to call.
+template <class Shape, class S>
+concept EvenGain = std::copyable<Shape> && requires(const Shape& k, const S& x) {
+  { k(x) } -> std::convertible_to<S>;
+};
+
+/// k(x) = K_alpha x^(alpha-1) + K_beta x^beta: g(e) / e of the NHOESO paper, (10). The default is k
+/// = 1, the linear observer.
+template <Scalar S>
+struct PowerSumGain {
+  S gain_alpha = S(1.0);  ///< K_alpha >= 0
+  S alpha = S(1.0);       ///< alpha > 0; below 1: k is infinite at e = 0
+  S gain_beta = S(0.0);   ///< K_beta >= 0
+  S beta = S(1.0);        ///< beta >= 0
+
+  class Prepared {
+   public:
+    explicit constexpr Prepared(const PowerSumGain& sum) noexcept
+        : gain_alpha_(sum.gain_alpha),
+          gain_beta_(sum.gain_beta),
+          alpha_(sum.alpha - S(1.0)),
+          beta_(sum.beta) {}
+
+    [[nodiscard]] S operator()(const S& x) const noexcept {
+      return gain_alpha_ * alpha_(x) + gain_beta_ * beta_(x);
+    }
+
+   private:
+    S gain_alpha_;
+    S gain_beta_;
+    Power<S> alpha_;
+    Power<S> beta_;
+  };
+
+  [[nodiscard]] constexpr Prepared prepared() const noexcept { return Prepared(*this); }
+
+  [[nodiscard]] S operator()(const S& x) const noexcept { return prepared()(x); }
+
+  [[nodiscard]] Check<S> check() const {
+    if (auto ok = check_not_negative("shape.gain_alpha", gain_alpha); !ok) return ok;
+    if (auto ok = check_positive("shape.alpha", alpha); !ok) return ok;
+    if (auto ok = check_not_negative("shape.gain_beta", gain_beta); !ok) return ok;
+    return check_not_negative("shape.beta", beta);
+  }
+};
+
+/// k(x) = K max(x, delta)^(a-1): K fal(e) / e of Han's observers.
+template <Scalar S>
+struct FalGain {
+  S gain = S(1.0);          ///< K >= 0
+  S exponent = S(0.5);      ///< a > 0
+  S linear_width = S(1.0);  ///< delta > 0, in units of the error scale
+
+  class Prepared {
+   public:
+    explicit constexpr Prepared(const FalGain& shape) noexcept
+        : gain_(shape.gain), fal_(shape.exponent, shape.linear_width) {}
+
+    [[nodiscard]] S operator()(const S& x) const noexcept { return gain_ * fal_.gain(x); }
+
+   private:
+    S gain_;
+    Fal<S> fal_;
+  };
+
+  [[nodiscard]] constexpr Prepared prepared() const noexcept { return Prepared(*this); }
+
+  [[nodiscard]] S operator()(const S& x) const noexcept { return prepared()(x); }
+
+  [[nodiscard]] Check<S> check() const {
+    if (auto ok = check_not_negative("shape.gain", gain); !ok) return ok;
+    if (auto ok = check_positive("shape.exponent", exponent); !ok) return ok;
+    return check_positive("shape.linear_width", linear_width);
+  }
+};
+
+namespace detail {
+
+template <class Shape>
+constexpr auto prepared(const Shape& shape) noexcept {
+  if constexpr (requires { shape.prepared(); }) {
+    return shape.prepared();
+  } else {
+    return shape;
+  }
+}
+
+/// 2^exponent at compile time.
+template <class T>
+constexpr T power_of_two(int exponent) noexcept {
+  T value(1);
+  for (int i = 0; i < exponent; ++i) value = value * T(2);
+  for (int i = 0; i > exponent; --i) value = value / T(2);
+  return value;
+}
+
+/// Magnitudes below this count as this: k may be infinite at zero.
+template <Scalar S>
+constexpr S least_magnitude() noexcept {
+  // Named, so that no compiler leaves the power to the run time.
+  constexpr auto least =
+      power_of_two<TableScalar<S>>(std::numeric_limits<TableScalar<S>>::min_exponent / 3);
+  return S(least);
+}
+
+/// k(|e| / scale) between its limits; what the sampled and the continuous law have in common.
+template <Scalar S, class Shape>
+class LimitedGain {
+ public:
+  using Function = decltype(prepared(std::declval<const Shape&>()));
+
+  constexpr LimitedGain(const Shape& shape, const S& error_scale, const S& low,
+                        const S& high) noexcept
+      : function_(prepared(shape)), inverse_scale_(S(1.0) / error_scale), low_(low), high_(high) {}
+
+  [[nodiscard]] ESOKIT_INLINE constexpr S operator()(const S& e) const noexcept {
+    const S x = magnitude(e) * inverse_scale_;
+    const S k = function_(select(least_magnitude<S>() < x, x, least_magnitude<S>()));
+    // In this order a NaN ends as `high`.
+    const S from_above = select(k < high_, k, high_);
+    return select(low_ < from_above, from_above, low_);
+  }
+
+  [[nodiscard]] constexpr const S& low() const noexcept { return low_; }
+  [[nodiscard]] constexpr const S& high() const noexcept { return high_; }
+
+ private:
+  Function function_;
+  S inverse_scale_;
+  S low_;
+  S high_;
+};
+
+}  // namespace detail
+
+/// Gain law of NonlinearEso: k(|e| / error_scale) times constant bandwidth gains, k kept between
+/// `gain_min` and `gain_max`.
+///
+/// After a gap of M samples k = 1 with the linear gain for M T: limits that are certified for T
+/// need not be so for M T.
+template <int Size, Scalar S, class Shape = PowerSumGain<S>>
+requires EvenGain<Shape, S>
+class NonlinearGain {
+ public:
+  using Linear = ConstantGain<Size, S>;
+
+  constexpr NonlinearGain(const Linear& linear, const Shape& shape, const S& error_scale,
+                          const S& gain_min, const S& gain_max) noexcept
+      : linear_(linear), factor_(shape, error_scale, gain_min, gain_max) {}
+
+  [[nodiscard]] ESOKIT_INLINE constexpr ScaledGain<Size, S> gain(const S& e) const noexcept {
+    const S k = factor_(e);
+    const auto& l = linear_.gain_before_measurement();
+    ScaledGain<Size, S> result;
+    detail::unroll<Size>([&](auto r)
+                             ESOKIT_INLINE_LAMBDA { std::get<r>(result) = k * std::get<r>(l); });
+    return result;
+  }
+
+  [[nodiscard]] ScaledGain<Size, S> gap_gain(const S& e, unsigned samples) const noexcept {
+    return linear_.gap_gain(e, samples);
+  }
+
+  /// gain(e) is factor(e) times this.
+  [[nodiscard]] constexpr const ScaledGain<Size, S>& linear_gain() const noexcept {
+    return linear_.gain_before_measurement();
+  }
+
+  /// k for an innovation, within its limits.
+  [[nodiscard]] constexpr S factor(const S& e) const noexcept { return factor_(e); }
+
+  [[nodiscard]] constexpr const S& gain_min() const noexcept { return factor_.low(); }
+  [[nodiscard]] constexpr const S& gain_max() const noexcept { return factor_.high(); }
+
+ private:
+  Linear linear_;
+  detail::LimitedGain<S, Shape> factor_;
+};
+
+/// The same for a continuous observer, in physical units.
+template <int Size, Scalar S, class Shape = PowerSumGain<S>>
+requires EvenGain<Shape, S>
+class ContinuousNonlinearGain {
+ public:
+  /// @param linear l for k = 1, N x 1, row i in 1/s^(i+1)
+  ContinuousNonlinearGain(const Vector<S, Size>& linear, const Shape& shape, const S& error_scale,
+                          const S& gain_min, const S& gain_max)
+      : linear_(linear), factor_(shape, error_scale, gain_min, gain_max) {}
+
+  [[nodiscard]] Vector<S, Size> gain(const S&, const S& e) const { return linear_ * factor_(e); }
+
+ private:
+  Vector<S, Size> linear_;
+  detail::LimitedGain<S, Shape> factor_;
+};
+
+}  // namespace esokit

@@ -1,0 +1,121 @@
+/// @file
+/// VariableTime: an observer whose sample time changes from step to step.
+#pragma once
+
+#include <esokit/observer/loop_observer.hpp>
+
+namespace esokit {
+
+/// Tells the observer before each step how long it took; chain and gains follow exactly.
+///
+/// A step of another length than the last one is a retune: the observer's whole `make`, with one
+/// expm1 a level and its checks (LinearEso<2>: some thirty updates' time, 40 .. 80 ns on a desktop,
+/// see benchmarks/control). A step of the same length costs a comparison; where the length changes
+/// by less than matters, leave it. Observers whose `make` works long (AlgebraicEso designs its whole
+/// schedule, AdjustableBandwidthEso and NonlinearEso prove their certificate) are for logs, or for a
+/// rate that changes now and then. After missing samples the gain is that of the whole time since
+/// the last correction, whatever the single steps were.
+///
+/// AlgebraicEso counts samples: while its bandwidth falls it takes all samples so far as having the
+/// present length; once settled it is exact. A switched observer's gain sets follow time; its
+/// switching test compares innovations, whatever time lies between them.
+template <LoopObserver Observer>
+class VariableTime : public Observer {
+  using S = typename Observer::scalar_type;
+
+ public:
+  struct Config {
+    typename Observer::Config observer{};  ///< with the nominal sample time T
+    S ratio = S(4);                        ///< > 1: steps may take T / ratio .. T ratio
+  };
+
+  static Expected<VariableTime, Error<S>> make(const Config& config) {
+    if (auto ok = check_above("ratio", config.ratio, S(1)); !ok) return ok.error();
+    auto observer = Observer::make(config.observer);
+    if (!observer) return observer.error();
+    // All that may be asked for later must be a good config: the ends of the range are.
+    for (const S factor : {config.ratio, S(1) / config.ratio}) {
+      auto edge = config.observer;
+      chain_config(edge).sample_time = chain_config(edge).sample_time * factor;
+      if (auto ok = Observer::make(edge); !ok) return ok.error();
+    }
+    return VariableTime(*observer, config);
+  }
+
+  /// New settings while running: the estimate is kept; steps are nominal again.
+  Check<S> retune(const Config& config) {
+    auto fresh = make(config);
+    if (!fresh) return fresh.error();
+    if (auto ok = Observer::retune(config.observer); !ok) return ok;
+    config_ = config;
+    step_time_ = fresh->step_time_;
+    return {};
+  }
+
+  /// How long the next step takes (s), until it is said anew. Outside T / ratio .. T ratio it is
+  /// refused, and the last length stays.
+  Check<S> set_step_time(const S& seconds) noexcept {
+    const S nominal = chain_config(config_.observer).sample_time;
+    const S shortest = nominal / config_.ratio;
+    const S longest = nominal * config_.ratio;
+    if (!is_finite(seconds) || seconds < shortest) {
+      return Error<S>{"step_time", seconds, "must be finite and at least", -1, shortest, true};
+    }
+    if (seconds > longest) {
+      return Error<S>{"step_time", seconds, "must be at most", -1, longest, true};
+    }
+    step_time_ = seconds;
+    return {};
+  }
+
+  StepStatus update(S y, S u_applied) noexcept {
+    if (!is_current() || this->missed() != 0) [[unlikely]] {
+      const StepStatus predicted = predict(u_applied);
+      return predicted | correct(y);
+    }
+    elapsed_ = step_time_;
+    return Observer::update(y, u_applied);
+  }
+
+  StepStatus predict(S u_applied) noexcept {
+    if (!is_current()) take(step_time_);
+    elapsed_ = this->missed() == 0 ? step_time_ : elapsed_ + step_time_;
+    return Observer::predict(u_applied);
+  }
+
+  StepStatus correct(S y) noexcept {
+    // The observer bridges `missed` steps of its sample time: make that their mean.
+    const int steps = this->missed();
+    if (steps > 1) take(elapsed_ / static_cast<S>(steps));
+    return Observer::correct(y);
+  }
+
+  /// Length of the steps now, s.
+  [[nodiscard]] const S& step_time() const noexcept { return step_time_; }
+
+ private:
+  VariableTime(const Observer& observer, const Config& config) noexcept
+      : Observer(observer),
+        config_(config),
+        step_time_(chain_config(config_.observer).sample_time),
+        current_(step_time_) {}
+
+  [[nodiscard]] bool is_current() const noexcept {
+    return !(step_time_ < current_ || step_time_ > current_);
+  }
+
+  /// The ends of the range were accepted by `make`; an estimate that would overflow keeps the old
+  /// sample time, and the guarded step reports what is not finite.
+  void take(const S& seconds) noexcept {
+    auto config = config_.observer;
+    chain_config(config).sample_time = seconds;
+    if (Observer::retune(config)) current_ = seconds;
+  }
+
+  Config config_;
+  S step_time_;
+  S current_;  ///< the sample time that the observer has now
+  S elapsed_{};
+};
+
+}  // namespace esokit

@@ -1,0 +1,12 @@
+// The law suite on the observers with any stable pole set, complex pairs among them.
+#include "law_suite.hpp"
+
+namespace esokit_test {
+
+using PoleSetTypes = ::testing::Types<esokit::LinearEso<2, double, 1, esokit::PoleSet>,
+                                      esokit::LinearEso<4, double, 2, esokit::PoleSet>,
+                                      esokit::LinearEso<3, float, 1, esokit::PoleSet>,
+                                      esokit::CascadeEso<2, 2, double, 1, esokit::PoleSet>>;
+INSTANTIATE_TYPED_TEST_SUITE_P(PoleSet, ObserverLaws, PoleSetTypes);
+
+}  // namespace esokit_test
