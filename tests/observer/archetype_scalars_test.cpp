@@ -110,6 +110,7 @@ void run_pack(Packed packed, std::vector<Lane> lanes) {
         ASSERT_TRUE(same_bits(packed.estimate()(r)[i], lanes[i].estimate()(r)));
       }
     }
+    EXPECT_TRUE(std::isfinite(packed.innovation()[2])) << "what a law would be told";
     packed.reset(Four(0.5));
     for (auto& lane : lanes) lane.reset(0.5);
     Four input = draw(1);

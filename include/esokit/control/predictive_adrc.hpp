@@ -1,7 +1,7 @@
 /// @file
 /// PredictiveAdrc (PADRC, and EPADRC with the extended state filter): ADRC in two phases, so that
-/// next to nothing stands between the measurement and the control (S. Shi, Z. Zeng, C. Zhao, L. Guo,
-/// P. Chen, Energies 15 (2022) 5799, (26), (51)-(53) corrected).
+/// next to nothing stands between the measurement and the control (S. Shi, Z. Zeng, C. Zhao, L.
+/// Guo, P. Chen, Energies 15 (2022) 5799, (26), (51)-(53) corrected).
 #pragma once
 
 #include <cmath>
@@ -29,10 +29,12 @@ concept PredictableObserver = std::copyable<O> &&
   { constant.template scaled_estimate<0>() } -> std::convertible_to<typename O::scalar_type>;
   { constant.restarts() } -> std::same_as<bool>;
 } &&(requires(const O& o) { o.preview(); } || O::levels == 1) &&
-    !requires(const typename O::Config& config) { config.observer; };
+    !requires(const typename O::Config& config) {
+  config.observer;
+};
 
-/// u = (v - dhat) / b0, as AdrcLaw gives it after the observer's correction, but with the correction
-/// folded in: u_k = ubar_k - slope y_k, where ubar_k and slope are known before y_k.
+/// u = (v - dhat) / b0, as AdrcLaw gives it after the observer's correction, but with the
+/// correction folded in: u_k = ubar_k - slope y_k, where ubar_k and slope are known before y_k.
 ///
 /// ```
 /// const double u = controller.control(y);   // at the sample: to the actuator at once
@@ -106,7 +108,8 @@ class PredictiveAdrc {
     measurement_ = y;
     S raw = wanted(y);
     if constexpr (requires { observer_.accepts(y); }) {
-      if (!observer_.accepts(y)) [[unlikely]] raw = blind_;
+      if (!observer_.accepts(y)) [[unlikely]]
+        raw = blind_;
     }
     output_ = limiter_.clamp(select(usable(y, raw), raw, blind_));
     phase_ = Phase::measured;
@@ -292,20 +295,23 @@ class PredictiveAdrc {
       return offset_ - slope_ * y;
     } else {
       const S e = y - offset_;
-      if (general_) [[unlikely]] return wanted_in_general(y);
+      if (general_) [[unlikely]]
+        return wanted_in_general(y);
       if constexpr (switched) {
         return blind_ - select(observer_.gain_law().shrinks(e), slope_, other_slope_) * e;
       } else if constexpr (factored) {
         return blind_ - (slope_ * observer_.gain_law().factor(e)) * e;
       } else {
-        if (!all(is_finite(e))) [[unlikely]] return e;  // such a law never sees one
+        if (!all(is_finite(e))) [[unlikely]]
+          return e;  // such a law never sees one
         return blind_ - weigh(observer_.correction_gain(e)) * e;
       }
     }
   }
 
   /// Whether the observer will take y: not if any estimate would become infinite.
-  [[nodiscard]] ESOKIT_INLINE auto usable(const S& y, [[maybe_unused]] const S& raw) const noexcept {
+  [[nodiscard]] ESOKIT_INLINE auto usable(const S& y,
+                                          [[maybe_unused]] const S& raw) const noexcept {
     if constexpr (preset) {
       return is_finite(S(guard_ * y));
     } else {
@@ -373,9 +379,11 @@ class PredictiveAdrc {
         settle_for(law_.control(observer_.estimate(), reference));
       }
     }
-    if (hold_left_ > 0) [[unlikely]] settle_for(S(0.0));
+    if (hold_left_ > 0) [[unlikely]]
+      settle_for(S(0.0));
     const auto good = is_finite(blind_);
-    if (!all(good)) [[unlikely]] settle_for(select(good, blind_, limiter_.last()));
+    if (!all(good)) [[unlikely]]
+      settle_for(select(good, blind_, limiter_.last()));
   }
 
   /// The next u does not depend on y.

@@ -93,9 +93,8 @@ class CovarianceFactor {
   [[nodiscard]] ESOKIT_INLINE constexpr ScaledGain<Size, S> gain(const S& share) const noexcept {
     ScaledGain<Size, S> gain;
     gain[0] = share;
-    detail::repeat<Size - 1, unrolled>([&](int i) ESOKIT_INLINE_LAMBDA {
-      gain[index(i + 1)] = share * lower_[packed(i + 1, 0)];
-    });
+    detail::repeat<Size - 1, unrolled>(
+        [&](int i) ESOKIT_INLINE_LAMBDA { gain[index(i + 1)] = share * lower_[packed(i + 1, 0)]; });
     return gain;
   }
 

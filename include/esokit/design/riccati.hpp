@@ -130,8 +130,7 @@ std::optional<Matrix<S, Size, Size>> riccati_covariance(const RiccatiModel<Size,
     const S change = detail::relative_change(next_gain, gain);
     gain = next_gain;
     // Quadratic convergence ends in rounding, where changes no longer fall.
-    const bool rounding_left =
-        all(change < S(1e-3)) && !all(change < last_change * S(0.25));
+    const bool rounding_left = all(change < S(1e-3)) && !all(change < last_change * S(0.25));
     if (!all(change > S(8.0 * Size) * detail::rounding<S>()) || rounding_left) return covariance;
     last_change = change;
   }

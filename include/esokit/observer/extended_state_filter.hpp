@@ -1,6 +1,6 @@
 /// @file
-/// ExtendedStateFilter (ESF): the extended state observer whose gain comes from noise levels instead
-/// of a bandwidth (S. Shi, Z. Zeng, C. Zhao, L. Guo, P. Chen, Energies 15 (2022) 5799).
+/// ExtendedStateFilter (ESF): the extended state observer whose gain comes from noise levels
+/// instead of a bandwidth (S. Shi, Z. Zeng, C. Zhao, L. Guo, P. Chen, Energies 15 (2022) 5799).
 #pragma once
 
 #include <cmath>
@@ -47,8 +47,7 @@ template <int Order, Scalar S = double, int Extension = 1, class Model = NoNomin
           int TableSize = 0>
 requires NominalModel<Model, Order, S>
 class ExtendedStateFilter
-    : public PredictorCorrector<Order, S, Extension,
-                                RiccatiGain<Order + Extension, S, TableSize>> {
+    : public PredictorCorrector<Order, S, Extension, RiccatiGain<Order + Extension, S, TableSize>> {
   using Law = RiccatiGain<Order + Extension, S, TableSize>;
   using Base = PredictorCorrector<Order, S, Extension, Law>;
   static constexpr int N = Base::size;
@@ -137,7 +136,8 @@ class ExtendedStateFilter
   /// One sample: `predict(u_applied)`, then `correct(y)`.
   StepStatus update(S y, S u_applied) noexcept {
     if constexpr (!has_model) {
-      if (law().rests_unwatched()) [[likely]] return Base::update(y, u_applied);
+      if (law().rests_unwatched()) [[likely]]
+        return Base::update(y, u_applied);
     }
     return update_out_of_line(y, u_applied);
   }
@@ -241,8 +241,8 @@ class ExtendedStateFilter
   [[nodiscard]] Law& law() noexcept { return std::get<0>(this->laws()); }
 
   static Check<S> check_rule(const Config& config) {
-    const bool given = !all(is_finite(config.inflation)) ||
-                       all(detail::magnitude(config.inflation) > S(0.0));
+    const bool given =
+        !all(is_finite(config.inflation)) || all(detail::magnitude(config.inflation) > S(0.0));
     if (config.inflation_rule == InflationRule::fixed) {
       if (!all(is_finite(config.inflation)) || !all(config.inflation > S(0.0))) {
         return Error<S>{"inflation", config.inflation,
@@ -318,8 +318,7 @@ class ExtendedStateFilter
     return {};
   }
 
-  static Expected<CovarianceFactor<N, S>, Error<S>> factored(const char* field,
-                                                             const Covariance& p,
+  static Expected<CovarianceFactor<N, S>, Error<S>> factored(const char* field, const Covariance& p,
                                                              const Array<S, N>& units) {
     const Covariance q = scaled(p, units);
     for (int i = 0; i < N; ++i) {
@@ -403,8 +402,8 @@ class ExtendedStateFilter
     const Array<S, N> units = scaled_units(config.sample_time, S(sqrt(unit)));
     const auto start = factored("initial_covariance", config.initial_covariance, units);
     if (!start) return start.error();
-    const auto noise = factored(
-        config.process_covariance ? "process_covariance" : "disturbance_bounds", q, units);
+    const auto noise =
+        factored(config.process_covariance ? "process_covariance" : "disturbance_bounds", q, units);
     if (!noise) return noise.error();
     return RiccatiSettings<N, S>{.start = *start,
                                  .noise = *noise,
@@ -437,10 +436,13 @@ class ExtendedStateFilter
           const S limit = law.limit_gain()[index(i)];
           const S last = law.last_table_gain()[index(i)];
           if (!all(detail::magnitude(S(last - limit)) <= S(0.1) * detail::magnitude(limit))) {
-            return Error<S>{"mode", last,
+            return Error<S>{"mode",
+                            last,
                             "has a start table too short: its last gain is more than a tenth off "
                             "the limit",
-                            i, limit, true};
+                            i,
+                            limit,
+                            true};
           }
         }
       }
@@ -451,7 +453,8 @@ class ExtendedStateFilter
   // On its own, so that the frozen filter's step has no call in it but at its end.
   [[gnu::noinline]] StepStatus update_out_of_line(S y, S u_applied) noexcept {
     if constexpr (!has_model) {
-      if (!gated()) [[likely]] return Base::update(y, u_applied);
+      if (!gated()) [[likely]]
+        return Base::update(y, u_applied);
     }
     const StepStatus predicted = predict(u_applied);
     return predicted | correct(y);
@@ -474,8 +477,7 @@ class ExtendedStateFilter
       Estimate start = before;
       start(Order) = now;
       const S drive = Chain::scaled_input_gain(this->input_gain(), time) * u;
-      const auto ahead =
-          Chain::template predict<1>(Chain::scaled(start, time), Array<S, 1>{drive});
+      const auto ahead = Chain::template predict<1>(Chain::scaled(start, time), Array<S, 1>{drive});
       x = Chain::physical(ahead, S(S(1.0) / time)).template head<Order>();
       const S change = model_(x, u, S(t + time)) - now;
       const S low = select(change < -change_bound_, S(-change_bound_), change);

@@ -3,8 +3,8 @@
 /// Energies 15 (2022) 5799; W. Bai, W. Xue, Y. Huang, H. Fang, Sci. China Inf. Sci. 61 (2018)
 /// 042201).
 ///
-/// With P- a bound of the covariance of the predicted state's error, R the variance of the noise and
-/// theta > 0 the inflation, which covers that the disturbance is correlated with the error:
+/// With P- a bound of the covariance of the predicted state's error, R the variance of the noise
+/// and theta > 0 the inflation, which covers that the disturbance is correlated with the error:
 ///
 ///   s  = C P- C' + R/(1+theta),  k = P- C' / s                                    (24), corrected
 ///   P- <- (1+theta) Phi (I - k C) P- (I - k C)' Phi' + (Phi k) R (Phi k)' + (1+theta)/theta Q (11)
@@ -155,7 +155,7 @@ class RiccatiGain {
   /// Another variance of the noise, for the coming correction alone. @param variance R, unit of y
   /// squared, not negative
   constexpr void set_measurement_variance(const S& variance) noexcept {
-    note(since_ & corrected);
+    note(since_ & (corrected | gapped));
     current_measurement_ = variance / unit_;
     set_gain();
   }
@@ -175,8 +175,8 @@ class RiccatiGain {
     }
   }
 
-  /// Bound of the covariance of the present estimate's error, N x N, scaled: of the prediction after
-  /// `advance`, of the correction after `accept`.
+  /// Bound of the covariance of the present estimate's error, N x N, scaled: of the prediction
+  /// after `advance`, of the correction after `accept`.
   [[nodiscard]] Matrix<S, Size, Size> covariance() const noexcept {
     Factor factor = now_.factor;
     if ((since_ & corrected) != 0) {
@@ -210,11 +210,12 @@ class RiccatiGain {
   }
 
  private:
-  // Bits of `since_`: what happened since the last `advance`, and whether the gain stands. Together,
-  // so that a frozen filter has one test to make.
+  // Bits of `since_`: what happened since the last `advance`, and whether the gain stands.
+  // Together, so that a frozen filter has one test to make.
   static constexpr int corrected = 1;
   static constexpr int nothing_yet = 2;  ///< after a reset with a standing gain
-  static constexpr int standing = 4;     ///< above the others: see `rests`
+  static constexpr int gapped = 4;       ///< no correction before the last `advance` either
+  static constexpr int standing = 8;     ///< above the others: see `rests`
   static constexpr int watched = -128;   ///< the sign: see `rests_unwatched`
 
   ESOKIT_INLINE constexpr void note(int bits) noexcept {
@@ -234,19 +235,17 @@ class RiccatiGain {
 
   static constexpr std::size_t index(int i) noexcept { return static_cast<std::size_t>(i); }
 
-  /// Where the covariance stops growing in a gap, so that nothing overflows when the gap ends.
-  static constexpr S ceiling() noexcept {
-    using T = detail::TableScalar<S>;
-    T value(1);
-    for (int i = 0; i < std::numeric_limits<T>::max_exponent / 4 * 3; ++i) value = value * T(2);
-    return S(value);
-  }
+  /// P- / R above which a measurement tells all there is to know of y. A gap lets P- grow no
+  /// further but along the chain: more would only cost the digits in which the states differ.
+  static constexpr S ceiling() noexcept { return S(1.0) / detail::rounding<S>(); }
 
   [[gnu::noinline]] constexpr void recur() noexcept {
     const bool had_correction = (since_ & corrected) != 0;
-    note(0);
-    if (!had_correction && !all(now_.factor.variance(0) < ceiling())) [[unlikely]] return;
-    if (rule_ == InflationRule::adaptive) [[unlikely]] {
+    const bool in_gap = since_ == gapped || since_ == (gapped | watched);
+    note(had_correction ? 0 : gapped);
+    if (in_gap && !all(now_.factor.variance(0) < ceiling())) [[unlikely]] {
+      now_.factor.template advance<true>(S(1.0), Factor{});
+    } else if (rule_ == InflationRule::adaptive) [[unlikely]] {
       recur_adaptively(had_correction);
     } else {
       if (had_correction) [[likely]] {
@@ -256,7 +255,8 @@ class RiccatiGain {
     }
     current_measurement_ = measurement_;
     set_gain();
-    if (mode_ != RiccatiMode::recursive) [[unlikely]] stand_if_close();
+    if (mode_ != RiccatiMode::recursive) [[unlikely]]
+      stand_if_close();
   }
 
   /// theta^2 = tr W Q / tr W (A + K C) P- (A + K C)'. The gain of this sample was made with the
@@ -318,8 +318,8 @@ class RiccatiGain {
   }
 
   /// Back to the limit, once the covariance differs by less than a thousandth. Not once the gain
-  /// does: a nearly deadbeat gain says little about the covariance, and what a filter believes of it
-  /// decides whether recurring gaps are stable.
+  /// does: a nearly deadbeat gain says little about the covariance, and what a filter believes of
+  /// it decides whether recurring gaps are stable.
   ESOKIT_COLD constexpr void stand_if_close() noexcept {
     if (!now_.factor.near(limit_.factor, S(1e-3))) return;
     note(standing);
@@ -346,8 +346,8 @@ class RiccatiGain {
         run.set_inflation(theta);
         noise.scale(S(run.now_.growth / theta));
       }
-      const auto factor = chain_riccati<Size, S>(noise, S(measurement_ * run.now_.shrink),
-                                                 run.now_.growth);
+      const auto factor =
+          chain_riccati<Size, S>(noise, S(measurement_ * run.now_.shrink), run.now_.growth);
       if (!factor) return std::nullopt;
       run.now_.factor = *factor;
       run.set_gain();

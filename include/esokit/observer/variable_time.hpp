@@ -11,10 +11,10 @@ namespace esokit {
 /// A step of another length than the last one is a retune: the observer's whole `make`, with one
 /// expm1 a level and its checks (LinearEso<2>: some thirty updates' time, 40 .. 80 ns on a desktop,
 /// see benchmarks/control). A step of the same length costs a comparison; where the length changes
-/// by less than matters, leave it. Observers whose `make` works long (AlgebraicEso designs its whole
-/// schedule, AdjustableBandwidthEso and NonlinearEso prove their certificate) are for logs, or for a
-/// rate that changes now and then. After missing samples the gain is that of the whole time since
-/// the last correction, whatever the single steps were.
+/// by less than matters, leave it. Observers whose `make` works long (AlgebraicEso designs its
+/// whole schedule, AdjustableBandwidthEso and NonlinearEso prove their certificate) are for logs,
+/// or for a rate that changes now and then. After missing samples the gain is that of the whole
+/// time since the last correction, whatever the single steps were.
 ///
 /// AlgebraicEso counts samples: while its bandwidth falls it takes all samples so far as having the
 /// present length; once settled it is exact. A switched observer's gain sets follow time; its
