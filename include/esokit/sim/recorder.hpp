@@ -22,6 +22,22 @@
 
 namespace esokit::sim {
 
+namespace detail {
+
+/// The rule that names[i] breaks, or null.
+inline const char* broken_column_name(std::span<const std::string> names, std::size_t i) {
+  if (names[i].empty()) return "must not be empty";
+  if (names[i].find_first_of(",\"\r\n") != std::string::npos) {
+    return "must hold no comma, quote or line break";
+  }
+  for (std::size_t j = 0; j < i; ++j) {
+    if (names[j] == names[i]) return "must differ from the other names";
+  }
+  return nullptr;
+}
+
+}  // namespace detail
+
 /// Records one row a sample into memory that is taken once, in `make`.
 ///
 /// A row beyond the capacity is dropped; `record` says so, and `write_csv` fails after it has
@@ -40,7 +56,7 @@ class Recorder {
   /// the error is then the length of the name), and a capacity that is zero or beyond memory.
   static Expected<Recorder, Error<ScalarType>> make(Config config) {
     for (std::size_t i = 0; i < Columns; ++i) {
-      if (const char* rule = broken_rule(config.names, i)) {
+      if (const char* rule = detail::broken_column_name(config.names, i)) {
         return Error<ScalarType>{.field = "names",
                                  .value = static_cast<ScalarType>(config.names[i].size()),
                                  .rule = rule,
@@ -119,17 +135,6 @@ class Recorder {
 
   explicit Recorder(Config config)
       : config_(std::move(config)), data_(Columns * config_.capacity) {}
-
-  static const char* broken_rule(const Array<std::string, Columns>& names, std::size_t i) {
-    if (names[i].empty()) return "must not be empty";
-    if (names[i].find_first_of(",\"\r\n") != std::string::npos) {
-      return "must hold no comma, quote or line break";
-    }
-    for (std::size_t j = 0; j < i; ++j) {
-      if (names[j] == names[i]) return "must differ from the other names";
-    }
-    return nullptr;
-  }
 
   std::span<const ScalarType> at(std::size_t column) const noexcept {
     return {data_.data() + column * config_.capacity, rows_};
