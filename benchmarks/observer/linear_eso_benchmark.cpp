@@ -1,6 +1,7 @@
 /// @file
 /// LinearEso and CascadeEso beside hand-written code for the same maths and a dense Eigen observer.
 #include <array>
+#include <cmath>
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
@@ -28,7 +29,7 @@ struct HandWritten2 {
     const S n0 = p0 + k0 * e;
     const S n1 = p1 + k1 * e;
     const S n2 = x2 + k2 * e;
-    if (!is_finite((n2 * twice_rate + n1) * rate + n0)) return false;
+    if (!is_finite((std::abs(n2) * twice_rate + std::abs(n1)) * rate + std::abs(n0))) return false;
     x0 = n0;
     x1 = n1;
     x2 = n2;
