@@ -18,8 +18,10 @@ namespace {
 
 using namespace esokit::sim;
 
+// Named by the test as well: ctest runs the tests side by side.
 std::string temporary(const char* name) {
-  return testing::TempDir() + "/esokit_recorder_" + name + ".csv";
+  const auto* test = testing::UnitTest::GetInstance()->current_test_info();
+  return testing::TempDir() + "/esokit_recorder_" + test->name() + "_" + name + ".csv";
 }
 
 std::string read_all(const std::string& path) {
