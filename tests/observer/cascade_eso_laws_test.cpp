@@ -3,10 +3,9 @@
 
 namespace esokit_test {
 
-using CascadeTypes =
-    ::testing::Types<esokit::CascadeEso<1, 2>, esokit::CascadeEso<2, 3>,
-                     esokit::CascadeEso<4, 2, double, 2>, esokit::CascadeEso<2, 1, float>,
-                     esokit::CascadeEso<2, 2, float>, esokit::CascadeEso<3, 3, float>>;
-INSTANTIATE_TYPED_TEST_SUITE_P(CascadeEso, ObserverLaws, CascadeTypes);
+using CascadeTypes = TypeList<esokit::CascadeEso<1, 2>, esokit::CascadeEso<2, 3>,
+                              esokit::CascadeEso<4, 2, double, 2>, esokit::CascadeEso<2, 1, float>,
+                              esokit::CascadeEso<2, 2, float>, esokit::CascadeEso<3, 3, float>>;
+const bool registered = register_laws<ObserverLaws>("CascadeEso", CascadeTypes{});
 
 }  // namespace esokit_test

@@ -1,6 +1,6 @@
 /// @file
 /// The laws that every observer must obey, written once. A translation unit instantiates them for
-/// its types: `INSTANTIATE_TYPED_TEST_SUITE_P(Name, ObserverLaws, ::testing::Types<..>)`.
+/// its types: `register_laws<ObserverLaws>("Name", TypeList<..>{})`.
 /// `ObserverTraits` says which laws do not apply to a type; those are skipped with the reason.
 ///
 /// Scaled quantities are in Nordsieck scaling, x_r = T^r z_r / r!, as in the library, but computed
@@ -19,6 +19,7 @@
 #include <limits>
 #include <support/exact_plant.hpp>
 #include <support/high_precision.hpp>
+#include <support/law_registration.hpp>
 #include <support/numbers.hpp>
 #include <support/observer_traits.hpp>
 #include <vector>
@@ -977,57 +978,49 @@ struct LawsOf {
   }
 };
 
+/// The suite for `register_laws`.
 template <class Observer>
-class ObserverLaws : public ::testing::Test {};
-TYPED_TEST_SUITE_P(ObserverLaws);
-
-#define ESOKIT_LAW(law)                                                         \
-  TYPED_TEST_P(ObserverLaws, law) {                                             \
-    constexpr const char* excuse = ObserverTraits<TypeParam>::excuse(Law::law); \
-    if constexpr (excuse == nullptr) {                                          \
-      LawsOf<TypeParam>::law();                                                 \
-    } else {                                                                    \
-      GTEST_SKIP() << #law << " does not apply: " << excuse;                    \
-    }                                                                           \
+struct ObserverLaws {
+  static std::vector<NamedLaw> laws() {
+#define ESOKIT_LAW(law)                                                        \
+  [] {                                                                         \
+    constexpr const char* excuse = ObserverTraits<Observer>::excuse(Law::law); \
+    if constexpr (excuse == nullptr) {                                         \
+      return NamedLaw{#law, &LawsOf<Observer>::law};                           \
+    } else {                                                                   \
+      return NamedLaw{#law, nullptr, excuse};                                  \
+    }                                                                          \
+  }()
+    return {
+        ESOKIT_LAW(gains_equal_reference),
+        ESOKIT_LAW(polynomial_equals_reference),
+        ESOKIT_LAW(unbiased_on_own_model_class),
+        ESOKIT_LAW(bounded_and_correct),
+        ESOKIT_LAW(follows_motion),
+        ESOKIT_LAW(order_of_accuracy),
+        ESOKIT_LAW(reset_starts_anew),
+        ESOKIT_LAW(reset_refuses_bad_state),
+        ESOKIT_LAW(copies_are_independent),
+        ESOKIT_LAW(float_agrees_with_double),
+        ESOKIT_LAW(float_does_not_drift),
+        ESOKIT_LAW(no_allocation),
+        ESOKIT_LAW(update_is_predict_then_correct),
+        ESOKIT_LAW(bad_measurement_is_a_missing_one),
+        ESOKIT_LAW(bad_input_is_the_last_good_one),
+        ESOKIT_LAW(overflow_is_dropped),
+        ESOKIT_LAW(negative_input_gain),
+        ESOKIT_LAW(homogeneous),
+        ESOKIT_LAW(retune_keeps_estimate),
+        ESOKIT_LAW(retune_rebalances_input_gain),
+        ESOKIT_LAW(retune_rescales_sample_time),
+        ESOKIT_LAW(refused_retune_changes_nothing),
+        ESOKIT_LAW(gap_gain_is_that_of_longer_sample),
+        ESOKIT_LAW(recurring_gaps_are_stable),
+        ESOKIT_LAW(long_gap_restarts),
+    };
+#undef ESOKIT_LAW
   }
-
-ESOKIT_LAW(gains_equal_reference)
-ESOKIT_LAW(polynomial_equals_reference)
-ESOKIT_LAW(unbiased_on_own_model_class)
-ESOKIT_LAW(bounded_and_correct)
-ESOKIT_LAW(follows_motion)
-ESOKIT_LAW(order_of_accuracy)
-ESOKIT_LAW(reset_starts_anew)
-ESOKIT_LAW(reset_refuses_bad_state)
-ESOKIT_LAW(copies_are_independent)
-ESOKIT_LAW(float_agrees_with_double)
-ESOKIT_LAW(float_does_not_drift)
-ESOKIT_LAW(no_allocation)
-ESOKIT_LAW(update_is_predict_then_correct)
-ESOKIT_LAW(bad_measurement_is_a_missing_one)
-ESOKIT_LAW(bad_input_is_the_last_good_one)
-ESOKIT_LAW(overflow_is_dropped)
-ESOKIT_LAW(negative_input_gain)
-ESOKIT_LAW(homogeneous)
-ESOKIT_LAW(retune_keeps_estimate)
-ESOKIT_LAW(retune_rebalances_input_gain)
-ESOKIT_LAW(retune_rescales_sample_time)
-ESOKIT_LAW(refused_retune_changes_nothing)
-ESOKIT_LAW(gap_gain_is_that_of_longer_sample)
-ESOKIT_LAW(recurring_gaps_are_stable)
-ESOKIT_LAW(long_gap_restarts)
-
-REGISTER_TYPED_TEST_SUITE_P(ObserverLaws, gains_equal_reference, polynomial_equals_reference,
-                            unbiased_on_own_model_class, bounded_and_correct, follows_motion,
-                            order_of_accuracy, reset_starts_anew, reset_refuses_bad_state,
-                            copies_are_independent, float_agrees_with_double, float_does_not_drift,
-                            no_allocation, update_is_predict_then_correct,
-                            bad_measurement_is_a_missing_one, bad_input_is_the_last_good_one,
-                            overflow_is_dropped, negative_input_gain, homogeneous,
-                            retune_keeps_estimate, retune_rebalances_input_gain,
-                            retune_rescales_sample_time, refused_retune_changes_nothing,
-                            gap_gain_is_that_of_longer_sample, recurring_gaps_are_stable,
-                            long_gap_restarts);
+};
 
 }  // namespace esokit_test
 

@@ -4,9 +4,9 @@
 namespace esokit_test {
 
 using DoubleTypes =
-    ::testing::Types<esokit::LinearEso<1>, esokit::LinearEso<2>, esokit::LinearEso<3, double, 2>,
-                     esokit::LinearEso<5>, esokit::LinearEso<1, double, 4>,
-                     esokit::LinearEso<8, double, 4>, esokit::LinearEso<2, long double>>;
-INSTANTIATE_TYPED_TEST_SUITE_P(LinearEso, ObserverLaws, DoubleTypes);
+    TypeList<esokit::LinearEso<1>, esokit::LinearEso<2>, esokit::LinearEso<3, double, 2>,
+             esokit::LinearEso<5>, esokit::LinearEso<1, double, 4>, esokit::LinearEso<8, double, 4>,
+             esokit::LinearEso<2, long double>>;
+const bool registered = register_laws<ObserverLaws>("LinearEso", DoubleTypes{});
 
 }  // namespace esokit_test

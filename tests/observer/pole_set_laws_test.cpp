@@ -3,10 +3,10 @@
 
 namespace esokit_test {
 
-using PoleSetTypes = ::testing::Types<esokit::LinearEso<2, double, 1, esokit::PoleSet>,
-                                      esokit::LinearEso<4, double, 2, esokit::PoleSet>,
-                                      esokit::LinearEso<3, float, 1, esokit::PoleSet>,
-                                      esokit::CascadeEso<2, 2, double, 1, esokit::PoleSet>>;
-INSTANTIATE_TYPED_TEST_SUITE_P(PoleSet, ObserverLaws, PoleSetTypes);
+using PoleSetTypes = TypeList<esokit::LinearEso<2, double, 1, esokit::PoleSet>,
+                              esokit::LinearEso<4, double, 2, esokit::PoleSet>,
+                              esokit::LinearEso<3, float, 1, esokit::PoleSet>,
+                              esokit::CascadeEso<2, 2, double, 1, esokit::PoleSet>>;
+const bool registered = register_laws<ObserverLaws>("PoleSet", PoleSetTypes{});
 
 }  // namespace esokit_test
