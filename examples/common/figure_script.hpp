@@ -131,8 +131,9 @@ class FigureScript {
             const std::optional<double>& tick, std::string_view font = "11",
             std::string_view shift = "0,0") {
     put({"set ", which, "label ", quoted(label), which == "x" ? " offset 0,0.3" : ""});
-    put({"set ", which, "range ", range_text(range)});
+    // The scale first: a change of scale drops the end of a range that it cannot show.
     put({log ? "set" : "unset", " logscale ", which});
+    put({"set ", which, "range ", range_text(range)});
     put({"set format ", which, log ? " '10^{%L}'" : " '%h'"});
     put({"set ", which, "tics in scale 0.6,0.3 mirror ", tick ? number(*tick) : "autofreq",
          " offset ", shift, " font ',", font, "' textcolor rgb '#202020'"});
