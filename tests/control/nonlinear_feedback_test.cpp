@@ -1,0 +1,63 @@
+// The nonlinear feedback law, against the formula and against the linear law.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <esokit/control/adrc_law.hpp>
+#include <esokit/control/nonlinear_feedback.hpp>
+#include <support/numbers.hpp>
+
+namespace esokit_test {
+namespace {
+
+using esokit::NonlinearFeedback;
+using esokit::Vector;
+
+double printed_fal(double e, double a, double delta) {
+  if (std::abs(e) <= delta) return e / std::pow(delta, 1 - a);
+  return std::pow(std::abs(e), a) * (e > 0 ? 1 : -1);
+}
+
+/// u = fal(e1) + fal(e2) - z3, the law of the NHOESO paper.
+TEST(NonlinearFeedback, IsTheFormula) {
+  const auto law = NonlinearFeedback<2>::make({.gains = {1.0, 2.5},
+                                               .exponents = {1.0, 0.1},
+                                               .linear_widths = {0.021, 0.001},
+                                               .input_gain = -4})
+                       .value();
+  EXPECT_NEAR(law.input_gain(), -4, 1e-15);
+  Random random(2);
+  for (int i = 0; i < 200; ++i) {
+    const Vector<double, 4> z(random.uniform(-1, 1), random.uniform(-1, 1) * 1e-3,
+                              random.uniform(-3, 3), 7);
+    const Vector<double, 2> r(random.uniform(-1, 1), random.uniform(-1, 1) * 1e-3);
+    const double v =
+        printed_fal(r(0) - z(0), 1.0, 0.021) + 2.5 * printed_fal(r(1) - z(1), 0.1, 0.001);
+    EXPECT_NEAR(law.feedback(z, r), v, 1e-13);
+    EXPECT_NEAR(law.control(z, r), (v - z(2)) / -4, 1e-13);
+  }
+}
+
+/// Exponents of one: AdrcLaw with the same gains.
+TEST(NonlinearFeedback, ExponentOneIsLinear) {
+  const auto nonlinear = NonlinearFeedback<2>::make({.gains = {25, 10}, .input_gain = 2}).value();
+  const auto linear = esokit::AdrcLaw<2>::make({.gains = {{25, 10}}, .input_gain = 2}).value();
+  const Vector<double, 3> z(0.3, -0.7, 1.5);
+  EXPECT_DOUBLE_EQ(nonlinear.control(z, {1.0, 0.5}), linear.control(z, {1.0, 0.5, 0.0}));
+}
+
+TEST(NonlinearFeedback, RefusesByName) {
+  using Law = NonlinearFeedback<2>;
+  const auto refused = [](const Law::Config& config) {
+    const auto made = Law::make(config);
+    EXPECT_FALSE(made.has_value());
+    return std::pair<std::string, int>(made.error().field, made.error().index);
+  };
+  using P = std::pair<std::string, int>;
+  EXPECT_EQ(refused({.input_gain = 0}), P("input_gain", -1));
+  EXPECT_EQ(refused({.exponents = {1, 0}, .input_gain = 1}), P("exponents", 1));
+  EXPECT_EQ(refused({.linear_widths = {0, 1}, .input_gain = 1}), P("linear_widths", 0));
+  EXPECT_EQ(refused({.gains = {1, hidden_nan<double>()}, .input_gain = 1}), P("gains", 1));
+}
+
+}  // namespace
+}  // namespace esokit_test

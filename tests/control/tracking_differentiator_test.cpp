@@ -1,0 +1,166 @@
+// Tracking differentiators: time-optimal, without overshoot and chatter, exact at the reference.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <esokit/control/tracking_differentiator.hpp>
+#include <esokit/core/error_text.hpp>
+#include <string>
+#include <support/numbers.hpp>
+
+namespace esokit_test {
+namespace {
+
+using esokit::SignTrackingDifferentiator;
+using esokit::TrackingDifferentiator;
+
+/// fhan as Han's book prints it, with its intermediate names and signs.
+double fhan_printed(double x1, double x2, double r, double h) {
+  const auto sign = [](double x) { return x > 0 ? 1.0 : x < 0 ? -1.0 : 0.0; };
+  const double d = r * h * h;
+  const double a0 = h * x2;
+  const double y = x1 + a0;
+  const double a1 = std::sqrt(d * (d + 8 * std::abs(y)));
+  const double a2 = a0 + sign(y) * (a1 - d) / 2;
+  const double sy = (sign(y + d) - sign(y - d)) / 2;
+  const double a = (a0 + y - a2) * sy + a2;
+  const double sa = (sign(a + d) - sign(a - d)) / 2;
+  return -r * (a / d - sign(a)) * sa - r * sign(a);
+}
+
+TEST(Fhan, EqualsThePrintedForm) {
+  Random random(4);
+  for (int i = 0; i < 5000; ++i) {
+    const double r = random.log_uniform(0.1, 1e3);
+    const double h = random.log_uniform(1e-3, 0.1);
+    const double scale = r * h * h * random.log_uniform(0.01, 1e3);
+    const double x1 = random.uniform(-1, 1) * scale;
+    const double x2 = random.uniform(-1, 1) * scale / h;
+    EXPECT_NEAR(esokit::fhan(x1, x2, r, h), fhan_printed(x1, x2, r, h), 1e-9 * r);
+  }
+  EXPECT_EQ(esokit::fhan(0.0, 0.0, 2.0, 0.1), 0.0);
+}
+
+/// A unit step takes 2 sqrt(1 / R) and ends exactly on the reference; |r2'| <= R on the way.
+TEST(TrackingDifferentiator, StepIsTimeOptimalWithoutChatter) {
+  constexpr double R = 25;
+  constexpr double h = 1e-3;
+  auto td = TrackingDifferentiator<>::make({.acceleration = R, .sample_time = h}).value();
+  const double optimal = 2 * std::sqrt(1 / R);
+  double arrived = 0;
+  double last = 0;
+  for (int k = 1; k <= 2000; ++k) {
+    ASSERT_TRUE(td.update(1));
+    EXPECT_LE(std::abs(td.derivative() - last), R * h * (1 + 1e-9));
+    EXPECT_LE(td.value(), 1 + 1e-12);
+    EXPECT_GE(td.value(), -1e-15);
+    last = td.derivative();
+    if (std::abs(td.value() - 1) > 1e-9) arrived = k * h;
+  }
+  EXPECT_NEAR(arrived, optimal, 5 * h);
+  EXPECT_NEAR(td.value(), 1, 1e-12);
+  EXPECT_NEAR(td.derivative(), 0, 1e-9);
+}
+
+/// It is always ready to stop at the reference, so it stays r2^2 / (2 R) behind a moving one.
+TEST(TrackingDifferentiator, FollowsASine) {
+  constexpr double h = 1e-3;
+  constexpr double R = 200;
+  auto td = TrackingDifferentiator<>::make({.acceleration = R, .sample_time = h}).value();
+  double behind = 0;
+  for (int k = 0; k < 20000; ++k) {
+    const double t = k * h;
+    td.update(std::sin(2 * t));
+    if (t < 2) continue;
+    const double speed = 2 * std::cos(2 * t);
+    const double lag = speed * speed / (2 * R);
+    EXPECT_NEAR(td.value(), std::sin(2 * t), lag + 4 * R * h * h + 2 * h);
+    EXPECT_NEAR(td.derivative(), speed, 4 * (2 / (2 * R) + h) + 2 * R * h);
+    behind = std::max(behind, std::abs(td.value() - std::sin(2 * t)));
+  }
+  EXPECT_NEAR(behind, 4 / (2 * R), 2 * h);
+}
+
+/// A larger h0 lets less noise into the derivative.
+TEST(TrackingDifferentiator, FilterTimeSmooths) {
+  const auto roughness = [](double filter_time) {
+    auto td = TrackingDifferentiator<>::make(
+                  {.acceleration = 100, .sample_time = 1e-3, .filter_time = filter_time})
+                  .value();
+    Random random(8);
+    double sum = 0;
+    for (int k = 0; k < 5000; ++k) {
+      td.update(random.uniform(-1e-3, 1e-3));
+      sum += td.derivative() * td.derivative();
+    }
+    return std::sqrt(sum / 5000);
+  };
+  EXPECT_LT(roughness(0.02), 0.3 * roughness(0));
+}
+
+/// The paper's form by Runge-Kutta and its sampled form, against the time-optimal path.
+TEST(SignTrackingDifferentiator, ReachesTheReference) {
+  constexpr double R = 12.4;
+  constexpr double h = 1e-3;
+  auto td = SignTrackingDifferentiator<>::make({.acceleration = R, .sample_time = h}).value();
+  const double optimal = 2 * std::sqrt(1 / R);
+  for (int k = 1; k <= 1000; ++k) {
+    ASSERT_TRUE(td.update(1));
+    const double t = k * h;
+    const double path = t < optimal / 2 ? R * t * t / 2
+                        : t < optimal   ? 1 - R * (optimal - t) * (optimal - t) / 2
+                                        : 1;
+    EXPECT_NEAR(td.value(), path, 4 * R * h * optimal * 0.5 + 1e-6) << t;
+  }
+  EXPECT_NEAR(td.derivative(), 0, 2 * R * h);
+  const auto rate = td.rate({0.0, 0.5}, 1.0);
+  EXPECT_EQ(rate(0), 0.5);
+  EXPECT_EQ(rate(1), R);
+  EXPECT_EQ(td.rate({1.0, 0.5}, 1.0)(1), -R);
+  EXPECT_EQ(td.rate({1.0, 0.0}, 1.0)(1), 0.0);
+  // The switching curve: r1 - r = -r2^2 / (2 R).
+  EXPECT_EQ(td.rate({1 - 0.25 / (2 * R) - 1e-9, 0.5}, 1.0)(1), R);
+  EXPECT_EQ(td.rate({1 - 0.25 / (2 * R) + 1e-9, 0.5}, 1.0)(1), -R);
+}
+
+TEST(TrackingDifferentiator, BadReferenceChangesNothing) {
+  auto td = TrackingDifferentiator<float>::make({.acceleration = 5, .sample_time = 1e-2f}).value();
+  auto sign =
+      SignTrackingDifferentiator<float>::make({.acceleration = 5, .sample_time = 1e-2f}).value();
+  for (int k = 0; k < 10; ++k) {
+    td.update(1);
+    sign.update(1);
+  }
+  for (const float bad : {hidden_nan<float>(), hidden_infinity<float>()}) {
+    const auto before = td.state();
+    const auto sign_before = sign.state();
+    EXPECT_FALSE(td.update(bad));
+    EXPECT_FALSE(sign.update(bad));
+    EXPECT_FALSE(td.reset(bad));
+    EXPECT_FALSE(sign.reset(bad));
+    EXPECT_EQ(td.state(), before);
+    EXPECT_EQ(sign.state(), sign_before);
+  }
+  EXPECT_TRUE(td.reset(2));
+  EXPECT_EQ(td.value(), 2);
+  EXPECT_EQ(td.derivative(), 0);
+}
+
+TEST(TrackingDifferentiator, RefusesByName) {
+  const auto text = [](double R, double h, double h0) -> std::string {
+    const auto made =
+        TrackingDifferentiator<>::make({.acceleration = R, .sample_time = h, .filter_time = h0});
+    return made ? "accepted" : esokit::to_text(made.error());
+  };
+  EXPECT_EQ(text(1, 0.01, 0), "accepted");
+  EXPECT_EQ(text(1, 0.01, 0.05), "accepted");
+  EXPECT_EQ(text(0, 0.01, 0), "acceleration = 0: must be finite and positive");
+  EXPECT_EQ(text(1, -1, 0), "sample_time = -1: must be finite and positive");
+  EXPECT_EQ(text(1, 0.01, 0.001),
+            "filter_time = 0.001: must be 0 or not below sample_time, which is 0.01");
+  EXPECT_EQ(text(1, 0.01, -1), "filter_time = -1: must be finite and not negative");
+  EXPECT_FALSE(SignTrackingDifferentiator<>::make({.acceleration = -1}).has_value());
+  EXPECT_TRUE(SignTrackingDifferentiator<>::make({.acceleration = 1}).has_value());
+}
+
+}  // namespace
+}  // namespace esokit_test
