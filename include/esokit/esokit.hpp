@@ -42,6 +42,7 @@
 #include <esokit/design/check.hpp>
 #include <esokit/design/continuous_gain.hpp>
 #include <esokit/design/covariance_factor.hpp>
+#include <esokit/design/covariance_root.hpp>
 #include <esokit/design/error_polynomial.hpp>
 #include <esokit/design/feedback_gain.hpp>
 #include <esokit/design/filter_form.hpp>
@@ -70,6 +71,7 @@
 #include <esokit/observer/known_model.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/loop_observer.hpp>
+#include <esokit/observer/mimo_extended_state_filter.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/observer/nonlinear_gain.hpp>
 #include <esokit/observer/nonlinear_gain_design.hpp>

@@ -357,10 +357,14 @@ class PredictiveAdrc {
                  (std::get<0>(reference_) - observer_.template scaled_estimate<0>()) +
              (ahead - tail);
     if constexpr (preset) {
-      const auto next = observer_.preview();
-      slope_ = weigh(next.slope);
-      offset_ = feed_ - weigh(next.offset);
-      guard_ = Observer::Chain::finite_probe(next.slope, rate_);
+      if (Observer::levels > 1 || observer_.restarts()) {
+        arm_by_preview();
+      } else if constexpr (Observer::levels == 1) {
+        const auto gain = observer_.correction_gain(S(0.0));
+        slope_ = weigh(gain);
+        offset_ = blind_ + slope_ * observer_.template scaled_estimate<0>();
+        guard_ = Observer::Chain::finite_probe(gain, rate_);
+      }
     } else {
       offset_ = observer_.template scaled_estimate<0>();
       general_ = observer_.missed() > 1;
@@ -384,6 +388,14 @@ class PredictiveAdrc {
     const auto good = is_finite(blind_);
     if (!all(good)) [[unlikely]]
       settle_for(select(good, blind_, limiter_.last()));
+  }
+
+  /// Where levels correct one another, or the observer will restart.
+  void arm_by_preview() noexcept {
+    const auto next = observer_.preview();
+    slope_ = weigh(next.slope);
+    offset_ = feed_ - weigh(next.offset);
+    guard_ = Observer::Chain::finite_probe(next.slope, rate_);
   }
 
   /// The next u does not depend on y.

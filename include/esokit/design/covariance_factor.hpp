@@ -31,6 +31,40 @@ ESOKIT_INLINE constexpr void repeat(Function&& f) noexcept {
   }
 }
 
+// Products of small matrices in plain loops: Eigen's expressions cost tenths of a second of compile
+// time for each new combination of sizes, and gain nothing at these sizes.
+
+/// A B.
+template <int Rows, int Inner, int Columns, Scalar S>
+Matrix<S, Rows, Columns> product(const Matrix<S, Rows, Inner>& a,
+                                 const Matrix<S, Inner, Columns>& b) noexcept {
+  Matrix<S, Rows, Columns> result;
+  for (int i = 0; i < Rows; ++i) {
+    for (int j = 0; j < Columns; ++j) {
+      S sum = a(i, 0) * b(0, j);
+      for (int k = 1; k < Inner; ++k) sum = sum + a(i, k) * b(k, j);
+      result(i, j) = sum;
+    }
+  }
+  return result;
+}
+
+/// C + A B' w.
+template <int Rows, int Inner, int Columns, Scalar S>
+Matrix<S, Rows, Columns> plus_product_transposed(Matrix<S, Rows, Columns> c,
+                                                 const Matrix<S, Rows, Inner>& a,
+                                                 const Matrix<S, Columns, Inner>& b,
+                                                 const S& w) noexcept {
+  for (int i = 0; i < Rows; ++i) {
+    for (int j = 0; j < Columns; ++j) {
+      S sum = a(i, 0) * b(j, 0);
+      for (int k = 1; k < Inner; ++k) sum = sum + a(i, k) * b(j, k);
+      c(i, j) = c(i, j) + sum * w;
+    }
+  }
+  return c;
+}
+
 }  // namespace detail
 
 /// P = L D L', N x N, in the Nordsieck scaling of the chain (all states have the unit of y), with L
@@ -51,11 +85,18 @@ class CovarianceFactor {
     for (S& l : lower_) l = S(0.0);
   }
 
-  /// Factors a symmetric matrix; nothing if it is not positive semidefinite to within rounding.
-  /// Reads the lower triangle.
+  /// Factors a symmetric matrix; nothing if it is not positive semidefinite to within rounding,
+  /// that is, not even with its variances 8 N eps larger. Reads the lower triangle.
   static std::optional<CovarianceFactor> from_matrix(const Square& p) noexcept {
     CovarianceFactor factor;
-    return factor.set<false>(p) ? std::optional(factor) : std::nullopt;
+    if (factor.set<false>(p)) return factor;
+    // Nearly singular: rounding of one element is multiplied by what the pivots before it lack.
+    Square larger = p;
+    for (int i = 0; i < Size; ++i) {
+      if (!all(p(i, i) >= S(0.0))) return std::nullopt;
+      larger(i, i) = p(i, i) + rounding_of_factors() * p(i, i);
+    }
+    return factor.set<false>(larger) ? std::optional(factor) : std::nullopt;
   }
 
   /// The same for a matrix that is positive semidefinite but for rounding: what is not is left out.
@@ -228,10 +269,14 @@ class CovarianceFactor {
  private:
   static constexpr std::size_t index(int i) noexcept { return static_cast<std::size_t>(i); }
 
+  static constexpr S rounding_of_factors() noexcept {
+    using Limits = std::numeric_limits<detail::TableScalar<S>>;
+    return S(static_cast<detail::TableScalar<S>>(8 * Size) * Limits::epsilon());
+  }
+
   template <bool Lenient>
   bool set(const Square& p) noexcept {
-    using Limits = std::numeric_limits<detail::TableScalar<S>>;
-    const S unit(static_cast<detail::TableScalar<S>>(8 * Size) * Limits::epsilon());
+    const S unit = rounding_of_factors();
     Square rest = p;
     for (int k = 0; k < Size; ++k) {
       const S pivot = rest(k, k);

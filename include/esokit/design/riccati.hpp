@@ -85,8 +85,8 @@ template <int Size, Scalar S>
 std::optional<Matrix<S, Size, Size>> solve_stein(Matrix<S, Size, Size> f, Matrix<S, Size, Size> x) {
   constexpr int most_doublings = 64;
   for (int k = 0; k < most_doublings; ++k) {
-    const Matrix<S, Size, Size> half = f * x;
-    const Matrix<S, Size, Size> sum = x + half * f.transpose();
+    const auto half = product<Size, Size, Size, S>(f, x);
+    const auto sum = plus_product_transposed<Size, Size, Size, S>(x, half, f, S(1.0));
     bool done = true;
     for (int i = 0; i < Size; ++i) {
       if (!all(is_finite(sum(i, i)))) return std::nullopt;
@@ -94,8 +94,7 @@ std::optional<Matrix<S, Size, Size>> solve_stein(Matrix<S, Size, Size> f, Matrix
     }
     x = sum;
     if (done) return x;
-    const Matrix<S, Size, Size> square = f * f;
-    f = square;
+    f = product<Size, Size, Size, S>(f, f);
   }
   return std::nullopt;
 }
@@ -115,18 +114,25 @@ std::optional<Matrix<S, Size, Size>> riccati_covariance(const RiccatiModel<Size,
   Matrix<S, Size, Outputs> gain = start_gain;
   S last_change(std::numeric_limits<detail::TableScalar<S>>::max());
   for (int step = 0; step < most_steps; ++step) {
-    const Matrix<S, Size, Outputs> predictor = model.transition * gain;
-    const Matrix<S, Size, Size> error = (model.transition - predictor * model.output) * root;
-    const Matrix<S, Size, Outputs> spread = predictor * model.measurement;
-    const auto covariance = detail::solve_stein<Size, S>(
-        error, model.noise + (spread * predictor.transpose()) * model.inflation);
+    const auto predictor = detail::product<Size, Size, Outputs, S>(model.transition, gain);
+    auto error = detail::product<Size, Outputs, Size, S>(predictor, model.output);
+    for (int i = 0; i < Size; ++i) {
+      for (int j = 0; j < Size; ++j) error(i, j) = (model.transition(i, j) - error(i, j)) * root;
+    }
+    const auto spread = detail::product<Size, Outputs, Outputs, S>(predictor, model.measurement);
+    const auto covariance =
+        detail::solve_stein<Size, S>(error, detail::plus_product_transposed<Size, Outputs, Size, S>(
+                                                model.noise, spread, predictor, model.inflation));
     if (!covariance) return std::nullopt;
-    const Matrix<S, Outputs, Size> crossed = model.output * *covariance;
-    const Matrix<S, Outputs, Outputs> innovation =
-        crossed * model.output.transpose() + model.measurement;
+    const auto crossed = detail::product<Outputs, Size, Size, S>(model.output, *covariance);
+    const auto innovation = detail::plus_product_transposed<Outputs, Size, Outputs, S>(
+        model.measurement, crossed, model.output, S(1.0));
     const auto next = detail::solve_positive<Outputs, Size, S>(innovation, crossed);
     if (!next) return std::nullopt;
-    const Matrix<S, Size, Outputs> next_gain = next->transpose();
+    Matrix<S, Size, Outputs> next_gain;
+    for (int i = 0; i < Size; ++i) {
+      for (int j = 0; j < Outputs; ++j) next_gain(i, j) = (*next)(j, i);
+    }
     const S change = detail::relative_change(next_gain, gain);
     gain = next_gain;
     // Quadratic convergence ends in rounding, where changes no longer fall.

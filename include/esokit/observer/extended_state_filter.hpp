@@ -40,6 +40,10 @@ concept NominalModel = std::copyable<Model> &&
 /// predicts first. Where the initial estimate is meant for the first sample itself, as in the
 /// paper, begin with `correct(y)`.
 ///
+/// The current (corrected) form z = z- + k (y - C z-). The predictor form of the paper, (4) with
+/// K = -Phi k, is the same filter looked at between `predict` and `correct`: `estimate` and
+/// `covariance` are those of the prediction then, and `predictor_gain` is -K.
+///
 /// @tparam Order n @tparam S scalar @tparam Extension m
 /// @tparam Model of the disturbance, see NominalModel (m = 1 only)
 /// @tparam TableSize samples in the start table of RiccatiMode::start_table
@@ -87,7 +91,9 @@ class ExtendedStateFilter
     /// A Gaussian innovation passes 6.63 in 1 %, 10.8 in 0.1 %, 15.1 in 0.01 % of all samples. The
     /// gate widens with every sample that is missing, and opens after max_gap.
     S outlier_threshold{};
-    [[no_unique_address]] Model model{};  ///< fbar
+    /// fbar. Its change over a sample is taken with the u that `predict` was told; `revise_input`
+    /// does not ask it again.
+    [[no_unique_address]] Model model{};
     int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts
 
     static constexpr Array<S, N> equal_weights() noexcept {
@@ -113,6 +119,10 @@ class ExtendedStateFilter
         return Error<S>{"initial_covariance", config.initial_covariance(0, 0),
                         "gives a gain that the scalar cannot hold"};
       }
+    }
+    if (!law.fits()) {
+      return Error<S>{"inflation", law.inflation(),
+                      "lets the covariance grow beyond what the scalar can hold"};
     }
     if (config.mode != RiccatiMode::recursive) {
       if (auto ok = freeze(law, config); !ok) return ok.error();
@@ -220,6 +230,12 @@ class ExtendedStateFilter
   /// Gain of the coming correction in physical units, N x 1.
   [[nodiscard]] Estimate gain() const noexcept {
     return physical_gain<N, S>(law().gain_before_measurement(), this->sample_time());
+  }
+
+  /// Phi times it, -K of the predictor form (24), N x 1, physical units.
+  [[nodiscard]] Estimate predictor_gain() const noexcept {
+    const auto ahead = Chain::template predict<1>(law().gain_before_measurement(), {S(0.0)});
+    return physical_gain<N, S>(ahead, this->sample_time());
   }
 
   /// True while the recursion rests in a frozen mode.

@@ -103,6 +103,25 @@ class RiccatiGain {
     return true;
   }
 
+  /// True if the recursion stays within the scalar. What a large inflation lets it grow to is
+  /// reached within the first samples.
+  [[nodiscard]] bool fits() const noexcept {
+    RiccatiGain run = *this;
+    run.mode_ = RiccatiMode::recursive;
+    run.reset();
+    for (int k = 0; k < 8 * Size; ++k) {
+      for (int i = 0; i < Size; ++i) {
+        if (!all(is_finite(run.now_.gain[index(i)])) ||
+            !all(is_finite(run.now_.factor.variance(i)))) {
+          return false;
+        }
+      }
+      run.advance();
+      run.accept(S(0.0));
+    }
+    return true;
+  }
+
   [[nodiscard]] constexpr const Gain& gain(const S&) const noexcept { return now_.gain; }
   [[nodiscard]] constexpr const Gain& gain_before_measurement() const noexcept { return now_.gain; }
 

@@ -1,0 +1,548 @@
+/// @file
+/// MimoExtendedStateFilter: the extended state filter of several chains that share inputs and
+/// measurement noise.
+#pragma once
+
+#include <cmath>
+#include <esokit/design/covariance_root.hpp>
+#include <esokit/design/riccati.hpp>
+#include <esokit/observer/riccati_gain.hpp>
+#include <esokit/observer/step_status.hpp>
+#include <optional>
+
+namespace esokit {
+
+/// Orders n_1 .. n_p of the chains.
+template <int... Orders>
+struct ChainOrders {
+  static_assert(sizeof...(Orders) >= 1, "esokit: at least one chain is needed");
+  static_assert(((Orders >= 1) && ...), "esokit: the order of a chain must be at least 1");
+  static constexpr int count = static_cast<int>(sizeof...(Orders));
+  static constexpr int sum = (Orders + ...);
+  static constexpr Array<int, count> values{Orders...};
+};
+
+/// Extended state filter of p plants y_i^(n_i) = d_i + sum_j B0_ij u_j, sampled exactly. What the
+/// plants do to each other beside B0 is part of d_i. The noises of the measurements may be
+/// correlated (full R), and so may be Q and P0 across the chains; with all of them block diagonal
+/// it is p filters side by side.
+///
+/// A measurement that is missing (NaN, infinite, or by `correct_some`) takes its channel out of the
+/// sample; the others are used.
+///
+/// State order: chain by chain, (y_i, .., y_i^(n_i - 1), d_i, .., d_i^(m-1)).
+///
+/// @tparam Orders ChainOrders<n_1, .., n_p> @tparam Inputs q, number of inputs
+/// @tparam S plain scalar @tparam Extension m, the same for all chains
+template <class Orders, int Inputs, PlainScalar S = double, int Extension = 1>
+class MimoExtendedStateFilter {
+ public:
+  static constexpr int outputs = Orders::count;                   ///< p
+  static constexpr int inputs = Inputs;                           ///< q
+  static constexpr int size = Orders::sum + outputs * Extension;  ///< N
+  static_assert(Inputs >= 1 && Extension >= 1 && size <= 32,
+                "esokit: inputs, extension or size out of range");
+
+  using scalar_type = S;
+  using Estimate = Vector<S, size>;
+  using Output = Vector<S, outputs>;
+  using Input = Vector<S, Inputs>;
+  using Covariance = Matrix<S, size, size>;
+  using OutputCovariance = Matrix<S, outputs, outputs>;
+  using Gain = Matrix<S, size, outputs>;
+
+  struct Config {
+    Matrix<S, outputs, Inputs> input_matrix = Matrix<S, outputs, Inputs>::Zero();  ///< B0, p x q
+    S sample_time{};                                                               ///< T, s
+    OutputCovariance measurement_covariance = OutputCovariance::Zero();  ///< R, p x p, semidefinite
+    Array<S, size> disturbance_bounds{};             ///< q_r per state, as in ExtendedStateFilter
+    S bound_factor{static_cast<double>(size)};       ///< c
+    std::optional<Covariance> process_covariance{};  ///< Q, N x N, instead of the bounds
+    Covariance initial_covariance = Covariance::Zero();   ///< P0, N x N, semidefinite
+    InflationRule inflation_rule = InflationRule::fixed;  ///< fixed or none
+    S inflation{};                                        ///< theta > 0 of the fixed rule
+    RiccatiMode mode = RiccatiMode::recursive;            ///< recursive or frozen
+  };
+
+  /// @return the filter at rest in zero, or an error that names the field
+  static Expected<MimoExtendedStateFilter, Error<S>> make(const Config& config) {
+    if (auto ok = check(config); !ok) return ok.error();
+    MimoExtendedStateFilter filter(config);
+    const auto factored = [&](const char* field, const Covariance& p,
+                              CovarianceRoot<size, S>& root) -> Check<S> {
+      const auto made = CovarianceRoot<size, S>::from_matrix(scaled(p, filter.units_));
+      if (!made) {
+        return Error<S>{field, p(size - 1, size - 1), "must be finite and positive semidefinite"};
+      }
+      root = *made;
+      return {};
+    };
+    Covariance noise = Covariance::Zero();
+    if (config.process_covariance) {
+      noise = *config.process_covariance;
+    } else {
+      for (int i = 0; i < size; ++i) {
+        const S bound = config.disturbance_bounds[index(i)];
+        noise(i, i) = config.bound_factor * bound * bound;
+      }
+    }
+    if (config.inflation_rule == InflationRule::fixed) {
+      noise = noise * ((S(1) + config.inflation) / config.inflation);
+    }
+    const char* noise_field =
+        config.process_covariance ? "process_covariance" : "disturbance_bounds";
+    if (auto ok = factored("initial_covariance", config.initial_covariance, filter.start_); !ok) {
+      return ok.error();
+    }
+    if (auto ok = factored(noise_field, noise, filter.noise_); !ok) return ok.error();
+    const auto measurement = CovarianceRoot<outputs, S>::from_matrix(config.measurement_covariance);
+    if (!measurement) {
+      return Error<S>{"measurement_covariance", config.measurement_covariance(0, 0),
+                      "must be finite and positive semidefinite"};
+    }
+    filter.measurement_ = *measurement;
+    if (!(noise.trace() > S(0)) && !positive(config.measurement_covariance)) {
+      return Error<S>{"measurement_covariance", config.measurement_covariance(0, 0),
+                      "must be positive definite where nothing disturbs the plants"};
+    }
+    if (config.mode == RiccatiMode::frozen) {
+      if (!filter.freeze(noise)) {
+        return Error<S>{noise_field, noise(size - 1, size - 1),
+                        "gives no limit gain; without inflation every highest state must be "
+                        "disturbed"};
+      }
+    }
+    filter.restart();
+    return filter;
+  }
+
+  /// One sample: `predict(u_applied)`, then `correct(y)`.
+  StepStatus update(const Output& y, const Input& u_applied) noexcept {
+    const StepStatus predicted = predict(u_applied);
+    return predicted | correct(y);
+  }
+
+  /// Time update alone. A u that is bad in any element is replaced by the last good one.
+  StepStatus predict(const Input& u_applied) noexcept {
+    StepStatus status = StepStatus::ok;
+    Estimate next = ahead(u_applied);
+    if (!finite(next)) {
+      status = StepStatus::input_rejected;
+      next = ahead(input_);
+      if (!finite(next)) {
+        status |= StepStatus::prediction_dropped;
+        next = state_;
+      }
+    } else {
+      input_ = u_applied;
+    }
+    state_ = next;
+    advance_covariance();
+    return status;
+  }
+
+  /// Measurement update with all channels whose y is finite; `measurement_rejected` if any is not.
+  StepStatus correct(const Output& y) noexcept {
+    Array<bool, outputs> present{};
+    present.fill(true);
+    return correct_some(y, present);
+  }
+
+  /// Measurement update with the channels that are present (and finite).
+  StepStatus correct_some(const Output& y, const Array<bool, outputs>& present) noexcept {
+    StepStatus status = StepStatus::ok;
+    Array<bool, outputs> used = present;
+    bool all_used = true;
+    bool any_used = false;
+    Output e;
+    for (int i = 0; i < outputs; ++i) {
+      e(i) = y(i) - state_(first(i));
+      if (used[index(i)] && !is_finite(e(i))) {
+        used[index(i)] = false;
+        status = StepStatus::measurement_rejected;
+      }
+      if (!used[index(i)]) e(i) = S(0);
+      all_used = all_used && used[index(i)];
+      any_used = any_used || used[index(i)];
+    }
+    if (!any_used) return status;
+    if (!all_used) {
+      standing_ = false;
+      prepare(used);
+    }
+    const Estimate next = state_ + detail::product<size, outputs, 1, S>(gain_, e);
+    if (!finite(next)) {
+      if (!all_used) prepare_all();
+      return StepStatus::measurement_rejected;
+    }
+    state_ = next;
+    innovation_ = e;
+    corrected_ = true;
+    return status;
+  }
+
+  /// Starts anew at (y_i, 0, .., 0) with P0. A y that is not finite changes nothing.
+  StepStatus reset(const Output& y) noexcept {
+    Estimate state = Estimate::Zero();
+    for (int i = 0; i < outputs; ++i) state(first(i)) = y(i);
+    return reset(state);
+  }
+
+  /// Starts anew at a given estimate, N x 1, physical units, with P0.
+  StepStatus reset(const Estimate& state) noexcept {
+    const Estimate next = state.cwiseProduct(units_);
+    if (!finite(next)) return StepStatus::state_rejected;
+    state_ = next;
+    innovation_.setZero();
+    restart();
+    return StepStatus::ok;
+  }
+
+  /// All estimates, N x 1, physical units.
+  [[nodiscard]] Estimate estimate() const noexcept { return state_.cwiseQuotient(units_); }
+
+  /// Estimates of chain i, (n_i + m) x 1.
+  template <int I>
+  [[nodiscard]] auto chain_estimate() const noexcept {
+    constexpr int length = Orders::values[I] + Extension;
+    return Vector<S, length>(estimate().template segment<length>(first(I)));
+  }
+
+  /// d_1 .. d_p, unit of y_i^(n_i).
+  [[nodiscard]] Output total_disturbance() const noexcept {
+    const Estimate all = estimate();
+    Output d;
+    for (int i = 0; i < outputs; ++i) d(i) = all(first(i) + order_of(i));
+    return d;
+  }
+
+  /// y - C z of the last correction; zero in channels that were not used.
+  [[nodiscard]] const Output& innovation() const noexcept { return innovation_; }
+
+  /// C P- C' + R of the last prediction, p x p.
+  [[nodiscard]] OutputCovariance innovation_covariance() const noexcept {
+    const Covariance p = root_.matrix();
+    OutputCovariance s = measurement_.matrix();
+    for (int i = 0; i < outputs; ++i) {
+      for (int j = 0; j < outputs; ++j) s(i, j) += p(first(i), first(j));
+    }
+    return s;
+  }
+
+  /// e' (C P- C' + R)^-1 e of the last correction: about p on average where R, Q and P0 are right.
+  [[nodiscard]] S normalised_innovation() const noexcept {
+    const auto weighted =
+        detail::solve_positive<outputs, 1, S>(innovation_covariance(), innovation_);
+    return weighted ? innovation_.dot(*weighted) : S(0);
+  }
+
+  /// Bound of the covariance of the present estimate's error, N x N, physical units.
+  [[nodiscard]] Covariance covariance() const noexcept {
+    Covariance p = root_.matrix();
+    if (corrected_) {
+      // (I - K C) P- (I - K C)' + K R K' with R, not R / (1 + theta).
+      Covariance rest = Covariance::Identity();
+      for (int i = 0; i < outputs; ++i) rest.col(first(i)) -= gain_.col(i);
+      const auto spread =
+          detail::product<size, outputs, outputs, S>(gain_, used_measurement_.lower());
+      const auto noise = detail::plus_product_transposed<size, outputs, size, S>(
+          Covariance::Zero(), spread, spread, S(1));
+      p = detail::plus_product_transposed<size, size, size, S>(
+          noise, detail::product<size, size, size, S>(rest, p), rest, S(1));
+    }
+    const Estimate inverse = units_.cwiseInverse();
+    return scaled(p, inverse);
+  }
+
+  /// Gain of the coming correction (all channels present), N x p, physical units.
+  [[nodiscard]] Gain gain() const noexcept { return units_.cwiseInverse().asDiagonal() * gain_; }
+
+  /// True while the recursion rests in the frozen mode.
+  [[nodiscard]] bool frozen() const noexcept { return standing_; }
+
+  /// T, s.
+  [[nodiscard]] const S& sample_time() const noexcept { return sample_time_; }
+
+ private:
+  static constexpr std::size_t index(int i) noexcept { return static_cast<std::size_t>(i); }
+  static constexpr int order_of(int chain) noexcept { return Orders::values[index(chain)]; }
+
+  /// First state of a chain.
+  static constexpr int first(int chain) noexcept {
+    int begin = 0;
+    for (int i = 0; i < chain; ++i) begin += order_of(i) + Extension;
+    return begin;
+  }
+
+  explicit MimoExtendedStateFilter(const Config& config) noexcept
+      : sample_time_(config.sample_time) {
+    drive_.setZero();
+    for (int chain = 0; chain < outputs; ++chain) {
+      S unit(1);
+      for (int r = 0; r < order_of(chain) + Extension; ++r) {
+        if (r > 0) unit = unit * sample_time_ / static_cast<S>(r);
+        units_(first(chain) + r) = unit;
+        // Scaled effect of the inputs where the disturbance acts.
+        if (r == order_of(chain)) drive_.row(chain) = config.input_matrix.row(chain) * unit;
+      }
+    }
+    if (config.inflation_rule == InflationRule::fixed) growth_ = S(1) + config.inflation;
+  }
+
+  static bool finite(const Estimate& x) noexcept { return is_finite(x.sum()); }
+
+  static Covariance scaled(const Covariance& p, const Estimate& units) noexcept {
+    Covariance q;
+    for (int i = 0; i < size; ++i) {
+      for (int j = 0; j <= i; ++j) {
+        q(i, j) = (p(i, j) * units(i)) * units(j);
+        q(j, i) = q(i, j);
+      }
+    }
+    return q;
+  }
+
+  static bool positive(const OutputCovariance& r) noexcept {
+    return detail::solve_positive<outputs, 1, S>(r, Output::Zero()).has_value();
+  }
+
+  template <class Square>
+  static Check<S> check_symmetric(const char* field, const Square& p) {
+    for (int i = 0; i < p.rows(); ++i) {
+      for (int j = 0; j <= i; ++j) {
+        const int place = i * static_cast<int>(p.cols()) + j;
+        if (auto ok = check_finite(field, p(i, j), place); !ok) return ok;
+        const S difference = detail::magnitude(S(p(i, j) - p(j, i)));
+        if (!(difference <= S(8) * detail::rounding<S>() * detail::magnitude(p(i, j)))) {
+          return Error<S>{field, p(i, j), "must be symmetric", place};
+        }
+      }
+    }
+    return {};
+  }
+
+  static Check<S> check(const Config& config) {
+    if (auto ok = check_positive("sample_time", config.sample_time); !ok) return ok;
+    for (int i = 0; i < outputs; ++i) {
+      for (int j = 0; j < Inputs; ++j) {
+        if (auto ok = check_finite("input_matrix", config.input_matrix(i, j), i * Inputs + j);
+            !ok) {
+          return ok;
+        }
+      }
+    }
+    if (!(config.input_matrix.cwiseAbs().maxCoeff() > S(0))) {
+      return Error<S>{"input_matrix", S(0), "must not be zero"};
+    }
+    if (config.inflation_rule == InflationRule::adaptive) {
+      return Error<S>{"inflation_rule", S(0), "must be fixed or none for several chains"};
+    }
+    if (config.inflation_rule == InflationRule::fixed) {
+      if (!is_finite(config.inflation) || !(config.inflation > S(0))) {
+        return Error<S>{"inflation", config.inflation,
+                        "must be finite and positive; the plain Kalman filter is "
+                        "InflationRule::none"};
+      }
+    } else if (!is_finite(config.inflation) || detail::magnitude(config.inflation) > S(0)) {
+      return Error<S>{"inflation", config.inflation,
+                      "must be left out unless inflation_rule is fixed"};
+    }
+    if (config.mode == RiccatiMode::start_table) {
+      return Error<S>{"mode", S(0), "must be recursive or frozen for several chains"};
+    }
+    if (auto ok = check_positive("bound_factor", config.bound_factor); !ok) return ok;
+    for (int i = 0; i < size; ++i) {
+      const S& bound = config.disturbance_bounds[index(i)];
+      if (auto ok = check_not_negative("disturbance_bounds", bound, i); !ok) return ok;
+      if (bound > S(0) && config.process_covariance) {
+        return Error<S>{"disturbance_bounds", bound,
+                        "must be left out where process_covariance is given", i};
+      }
+    }
+    if (auto ok = check_symmetric("measurement_covariance", config.measurement_covariance); !ok) {
+      return ok;
+    }
+    if (config.process_covariance) {
+      if (auto ok = check_symmetric("process_covariance", *config.process_covariance); !ok) {
+        return ok;
+      }
+    }
+    return check_symmetric("initial_covariance", config.initial_covariance);
+  }
+
+  /// Phi x + Gamma u: every chain ahead by Pascal's triangle, as sums of neighbours.
+  [[nodiscard]] Estimate ahead(const Input& u) const noexcept {
+    Estimate x = state_;
+    for (int chain = 0; chain < outputs; ++chain) {
+      x(first(chain) + order_of(chain)) += drive_.row(chain).dot(u);
+    }
+    for (int chain = 0; chain < outputs; ++chain) {
+      const int begin = first(chain);
+      const int length = order_of(chain) + Extension;
+      for (int pass = 0; pass + 1 < length; ++pass) {
+        for (int r = length - 2; r >= pass; --r) x(begin + r) += x(begin + r + 1);
+      }
+      // The disturbance itself is not driven.
+      x(begin + order_of(chain)) -= drive_.row(chain).dot(u);
+    }
+    return x;
+  }
+
+  [[nodiscard]] static Covariance transition() noexcept {
+    Covariance phi = Covariance::Zero();
+    for (int chain = 0; chain < outputs; ++chain) {
+      for (int i = 0; i < order_of(chain) + Extension; ++i) {
+        for (int j = i; j < order_of(chain) + Extension; ++j) {
+          phi(first(chain) + i, first(chain) + j) = static_cast<S>(binomial(j, i));
+        }
+      }
+    }
+    return phi;
+  }
+
+  void advance_covariance() noexcept {
+    if (standing_) {
+      if (corrected_ || fresh_) {
+        corrected_ = false;
+        fresh_ = false;
+        return;
+      }
+      standing_ = false;
+    }
+    const bool in_gap = !corrected_ && gapped_;
+    gapped_ = !corrected_;
+    if (corrected_) root_ = posterior_;
+    corrected_ = false;
+    fresh_ = false;
+    // As in RiccatiGain: in a gap P- grows no further than a measurement can tell.
+    const bool full = in_gap && root_.largest() * root_.largest() * detail::rounding<S>() >
+                                    measurement_.largest() * measurement_.largest();
+    root_.advance(transition(), full ? S(1) : growth_, full ? CovarianceRoot<size, S>{} : noise_);
+    prepare_all();
+    if (has_limit_ && root_.near(limit_, S(1e-3))) stand();
+  }
+
+  void prepare_all() noexcept {
+    Array<bool, outputs> used{};
+    used.fill(true);
+    prepare(used);
+  }
+
+  /// Gain and corrected covariance for a measurement with these channels. One that is left out gets
+  /// a row of its own that sees nothing.
+  void prepare(const Array<bool, outputs>& used) noexcept {
+    Matrix<S, outputs, size> output = Matrix<S, outputs, size>::Zero();
+    bool all_used = true;
+    for (int i = 0; i < outputs; ++i) {
+      if (used[index(i)]) {
+        output(i, first(i)) = S(1);
+      } else {
+        all_used = false;
+      }
+    }
+    used_measurement_ = measurement_;
+    if (!all_used) {
+      OutputCovariance r = measurement_.matrix();
+      for (int i = 0; i < outputs; ++i) {
+        if (used[index(i)]) continue;
+        r.row(i).setZero();
+        r.col(i).setZero();
+        r(i, i) = S(1);
+      }
+      used_measurement_ = CovarianceRoot<outputs, S>::nearest(r);
+    }
+    auto root = used_measurement_;
+    root.scale(S(1) / std::sqrt(growth_));
+    posterior_ = root_;
+    gain_ = posterior_.correct(output, root);
+    if (all_used) return;
+    for (int i = 0; i < outputs; ++i) {
+      if (!used[index(i)]) {
+        gain_.col(i).setZero();
+        // Its row of one is no noise of the estimate.
+        used_measurement_.clear_row(i);
+      }
+    }
+  }
+
+  bool freeze(const Covariance& noise) {
+    RiccatiModel<size, outputs, S> model;
+    model.transition = transition();
+    model.noise = scaled(noise, units_);
+    model.measurement = measurement_.matrix() / growth_;
+    model.inflation = growth_;
+    model.output.setZero();
+    Gain start = Gain::Zero();
+    for (int chain = 0; chain < outputs; ++chain) {
+      model.output(chain, first(chain)) = S(1);
+      const int last = first(chain) + order_of(chain) + Extension - 1;
+      if (!(growth_ > S(1)) && !(model.noise(last, last) > S(0))) return false;
+    }
+    // All poles at zero.
+    detail::unroll<outputs>([&](auto chain) {
+      constexpr int length = Orders::values[chain] + Extension;
+      const auto k = current_gain<length, S>(EqualSampledPoles<length, S>{S(1)}.weights());
+      for (int r = 0; r < length; ++r) start(first(chain) + r, int{chain}) = k[index(r)];
+    });
+    const auto covariance = riccati_covariance<size, outputs, S>(model, start);
+    if (!covariance) return false;
+    root_ = CovarianceRoot<size, S>::nearest(*covariance);
+    // The recursion has the last word, as for a single chain.
+    constexpr int most_steps = 2000;
+    Gain last = Gain::Zero();
+    for (int step = 0; step < most_steps; ++step) {
+      prepare_all();
+      if (!gain_.allFinite()) return false;
+      const S change = (gain_ - last).cwiseAbs().maxCoeff();
+      const bool done = !(change > S(2) * detail::rounding<S>() * gain_.cwiseAbs().maxCoeff());
+      last = gain_;
+      if (done && step > 3) break;
+      root_ = posterior_;
+      root_.advance(transition(), growth_, noise_);
+    }
+    limit_ = root_;
+    has_limit_ = true;
+    return true;
+  }
+
+  void stand() noexcept {
+    root_ = limit_;
+    prepare_all();
+    standing_ = true;
+  }
+
+  void restart() noexcept {
+    corrected_ = false;
+    gapped_ = false;
+    fresh_ = has_limit_;
+    if (has_limit_) {
+      stand();
+    } else {
+      root_ = start_;
+      prepare_all();
+    }
+  }
+
+  Estimate state_ = Estimate::Zero();    ///< scaled, x_r = T^r z_r / r! chain by chain
+  Gain gain_ = Gain::Zero();             ///< of the coming correction, scaled
+  CovarianceRoot<size, S> root_{};       ///< of P-
+  CovarianceRoot<size, S> posterior_{};  ///< of what the correction will leave
+  CovarianceRoot<size, S> start_{};
+  CovarianceRoot<size, S> noise_{};
+  CovarianceRoot<size, S> limit_{};
+  CovarianceRoot<outputs, S> measurement_{};
+  CovarianceRoot<outputs, S> used_measurement_{};
+  Matrix<S, outputs, Inputs> drive_;
+  Estimate units_;  ///< T^r / r!
+  Input input_ = Input::Zero();
+  Output innovation_ = Output::Zero();
+  S sample_time_;
+  S growth_{1};  ///< 1 + theta
+  bool corrected_ = false;
+  bool fresh_ = false;  ///< nothing happened since a reset with a standing gain
+  bool gapped_ = false;
+  bool standing_ = false;
+  bool has_limit_ = false;
+};
+
+}  // namespace esokit
