@@ -195,21 +195,21 @@ class MimoAdrc {
       columns(i) = scale_of(scaled.col(i).cwiseAbs().maxCoeff());
       scaled.col(i) *= columns(i);
     }
-    const Eigen::FullPivLU<InputMatrix> lu(scaled);
-    constexpr const char* rule = "has a condition number (the value here) that must be at most";
-    if (!lu.isInvertible()) {
+    // A zero pivot makes the inverse infinite or NaN, and so its condition number.
+    const InputMatrix inverse =
+        Eigen::PartialPivLU<InputMatrix>(scaled).solve(InputMatrix::Identity());
+    S condition = scaled.cwiseAbs().colwise().sum().maxCoeff() *
+                  inverse.cwiseAbs().colwise().sum().maxCoeff();
+    if (!is_finite(S(inverse.sum())) || !is_finite(condition)) {
+      condition = std::numeric_limits<S>::infinity();
+    }
+    if (!is_finite(condition) || condition > config.condition_limit) {
       return Error<S>{"input_matrix",
-                      std::numeric_limits<S>::infinity(),
-                      rule,
+                      condition,
+                      "has a condition number (the value here) that must be at most",
                       -1,
                       config.condition_limit,
                       true};
-    }
-    const InputMatrix inverse = lu.inverse();
-    const S condition = scaled.cwiseAbs().colwise().sum().maxCoeff() *
-                        inverse.cwiseAbs().colwise().sum().maxCoeff();
-    if (!is_finite(condition) || condition > config.condition_limit) {
-      return Error<S>{"input_matrix", condition, rule, -1, config.condition_limit, true};
     }
     return InputMatrix(columns.asDiagonal() * inverse * rows.asDiagonal());
   }
