@@ -1,0 +1,123 @@
+#!/usr/bin/env bash
+# What can be tried of the packages without a network: cmake/packaging/check.sh BUILD_FOLDER
+# BUILD_FOLDER is emptied. Needs pkg-config and dpkg; the last line says what was not tried.
+set -euo pipefail
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
+work=$(realpath -m "${1:?usage: check.sh BUILD_FOLDER}")
+rm -rf "$work"
+mkdir -p "$work"
+cd "$root"
+
+version=$(sed -n 's/^project(esokit VERSION \([0-9.]*\).*/\1/p' CMakeLists.txt)
+[[ $version =~ ^[0-9]+\.[0-9]+\.[0-9]+$ ]]
+not_tried=()
+
+fail() {
+  echo "packaging: $*" >&2
+  exit 1
+}
+
+# The version is that of CMakeLists.txt everywhere (configure checks core/version.hpp).
+grep -q "\"version\": \"$version\"" cmake/packaging/vcpkg/vcpkg.json || fail "vcpkg.json: version"
+grep -q "<version>$version</version>" cmake/packaging/ros/package.xml || fail "package.xml: version"
+grep -q "^version: $version\$" CITATION.cff || fail "CITATION.cff: version"
+
+awk '/^```cpp[ \t]*$/ { inside = 1; next } /^```/ && inside { exit } inside' README.md \
+  >"$work/main.cpp"
+[[ -s $work/main.cpp ]]
+
+# --- Debian package, unpacked into a prefix; CMake and pkg-config find it there ---
+cmake -S . -B "$work/build" -G Ninja
+(cd "$work/build" && cpack -G DEB)
+deb=("$work"/build/libesokit-dev_"$version"*_all.deb)
+[[ -f ${deb[0]} ]] || fail "cpack made no all-architecture package of version $version"
+dpkg-deb --info "${deb[0]}"
+dpkg-deb -x "${deb[0]}" "$work/root"
+while IFS= read -r header; do
+  [[ -f $work/root/usr/$header ]] || fail "the package lacks $header"
+done < <(find include -name '*.hpp')
+[[ -f $work/root/usr/share/doc/libesokit-dev/copyright ]] || fail "the package has no copyright"
+
+cmake -S tests/consumer -B "$work/consumer" -G Ninja -DCONSUMER_MAIN="$work/main.cpp" \
+  -DCMAKE_PREFIX_PATH="$work/root/usr"
+cmake --build "$work/consumer"
+"$work/consumer/consumer"
+cmake -S tests/consumer -B "$work/newer" -G Ninja -DCONSUMER_MAIN="$work/main.cpp" \
+  -DCMAKE_PREFIX_PATH="$work/root/usr" -DCONSUMER_VERSION=999.0 >"$work/newer.log" 2>&1 &&
+  fail "a consumer that asks for version 999 was satisfied"
+
+export PKG_CONFIG_PATH=$work/root/usr/share/pkgconfig
+[[ $(pkg-config --modversion esokit) == "$version" ]] || fail "pkg-config: version"
+read -r -a flags < <(pkg-config --cflags esokit)
+"${CXX:-c++}" -std=c++20 "${flags[@]}" "$work/main.cpp" -o "$work/by_pkg_config"
+"$work/by_pkg_config"
+
+# --- one header ---
+mkdir -p "$work/single/esokit/observer" "$work/single/esokit/control"
+bash cmake/amalgamate.sh >"$work/single/esokit.hpp"
+if grep -n '#include <esokit/' "$work/single/esokit.hpp"; then fail "the single header includes esokit"; fi
+sed 's|#include <esokit/.*|#include "esokit.hpp"|' "$work/main.cpp" >"$work/single/main.cpp"
+# shellcheck disable=SC2046
+"${CXX:-c++}" -std=c++20 -I"$work/single" $(pkg-config --cflags eigen3) "$work/single/main.cpp" \
+  -o "$work/by_single_header"
+"$work/by_single_header"
+
+# --- vcpkg port: run with stand-ins for vcpkg's functions, which do what theirs do here ---
+cat >"$work/port.cmake" <<END
+cmake_minimum_required(VERSION 3.23)
+set(CURRENT_PACKAGES_DIR "$work/vcpkg")
+function(run)
+  execute_process(COMMAND \${ARGN} COMMAND_ERROR_IS_FATAL ANY)
+endfunction()
+function(vcpkg_cmake_configure)
+  cmake_parse_arguments(arg "" "SOURCE_PATH" "" \${ARGN})
+  run("\${CMAKE_COMMAND}" -S "\${arg_SOURCE_PATH}" -B "$work/vcpkg-build" -G Ninja)
+endfunction()
+function(vcpkg_cmake_install)
+  run("\${CMAKE_COMMAND}" --install "$work/vcpkg-build" --prefix "\${CURRENT_PACKAGES_DIR}")
+endfunction()
+function(vcpkg_cmake_config_fixup)
+  cmake_parse_arguments(arg "" "CONFIG_PATH" "" \${ARGN})
+  if(NOT EXISTS "\${CURRENT_PACKAGES_DIR}/\${arg_CONFIG_PATH}/esokitConfig.cmake")
+    message(FATAL_ERROR "no config file in \${arg_CONFIG_PATH}")
+  endif()
+  file(RENAME "\${CURRENT_PACKAGES_DIR}/\${arg_CONFIG_PATH}" "\${CURRENT_PACKAGES_DIR}/share/esokit")
+endfunction()
+function(vcpkg_fixup_pkgconfig)
+endfunction()
+function(vcpkg_install_copyright)
+  cmake_parse_arguments(arg "" "" "FILE_LIST" \${ARGN})
+  file(COPY_FILE "\${arg_FILE_LIST}" "\${CURRENT_PACKAGES_DIR}/share/esokit/copyright")
+endfunction()
+file(READ "$root/cmake/packaging/vcpkg/vcpkg.json" manifest)
+string(JSON name GET "\${manifest}" name)
+if(NOT name STREQUAL "esokit")
+  message(FATAL_ERROR "vcpkg.json names \${name}")
+endif()
+include("$root/cmake/packaging/vcpkg/portfile.cmake")
+END
+cmake -P "$work/port.cmake"
+[[ -f $work/vcpkg/share/esokit/esokitConfig.cmake && -f $work/vcpkg/share/esokit/copyright ]] ||
+  fail "the vcpkg port installs no config file or copyright"
+not_tried+=("vcpkg itself")
+
+# --- Conan recipe, ROS package file ---
+if command -v conan >/dev/null 2>&1; then
+  conan create cmake/packaging/conan --build=missing
+else
+  not_tried+=(conan)
+fi
+if command -v python3 >/dev/null 2>&1; then
+  python3 - <<'END'
+import ast, xml.etree.ElementTree as tree
+ast.parse(open("cmake/packaging/conan/conanfile.py").read())
+root = tree.parse("cmake/packaging/ros/package.xml").getroot()
+for tag in ("name", "version", "description", "maintainer", "license"):
+    assert root.find(tag).text.strip(), tag
+assert root.find("export/build_type").text == "cmake"
+END
+else
+  not_tried+=("the syntax of the Conan recipe and package.xml")
+fi
+
+echo "packages are right; not tried: $(IFS=,; echo "${not_tried[*]}")"

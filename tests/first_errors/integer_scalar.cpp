@@ -1,0 +1,4 @@
+// expect: Scalar
+#include <esokit/observer/linear_eso.hpp>
+
+auto observer = esokit::LinearEso<2, int>::make({});

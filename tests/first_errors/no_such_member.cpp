@@ -1,0 +1,5 @@
+// expect: LinearEso(<2>|Config)
+#include <esokit/observer/linear_eso.hpp>
+
+auto observer =
+    esokit::LinearEso<2>::make({.bandwidth = 50.0, .input_gain = 1.0, .sample_time = 1e-3});
