@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 #include <type_traits>
+#include <vector>
 
 namespace {
 
@@ -110,6 +111,15 @@ TEST(ErrorText, NamesFieldValueAndRule) {
   std::ostringstream out;
   out << refused << ';';
   EXPECT_EQ(out.str(), "input_gain = 0: must not be zero;");
+}
+
+TEST(Expected, ValueOfATemporaryOutlivesIt) {
+  const auto make = [] { return Expected<std::vector<int>, Error<double>>(std::vector{1, 2, 3}); };
+  int sum = 0;
+  for (const int x : make().value()) sum += x;
+  for (const int x : *make()) sum += x;
+  EXPECT_EQ(sum, 12);
+  static_assert(std::is_same_v<decltype(make().value()), std::vector<int>>);
 }
 
 }  // namespace

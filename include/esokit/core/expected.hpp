@@ -16,25 +16,34 @@ namespace esokit {
 template <class T, class E>
 class [[nodiscard]] Expected {
  public:
-  using value_type = T;
-  using error_type = E;
+  using value_type = T;  ///< type of the value
+  using error_type = E;  ///< type of the error
 
+  /// Implicit, so that `return value;` and `return error;` both do.
+  /// @{
   constexpr Expected(T value) : content_(std::in_place_index<0>, std::move(value)) {}
   constexpr Expected(E error) : content_(std::in_place_index<1>, std::move(error)) {}
+  /// @}
 
+  /// True if there is a value, false if there is an error.
+  /// @{
   [[nodiscard]] constexpr bool has_value() const noexcept { return content_.index() == 0; }
   constexpr explicit operator bool() const noexcept { return has_value(); }
+  /// @}
 
   /// The value; ends the program with the error as last words if there is none.
+  /// @{
   [[nodiscard]] constexpr T& value() & noexcept { return *checked(*this); }
   [[nodiscard]] constexpr const T& value() const& noexcept { return *checked(*this); }
-  [[nodiscard]] constexpr T&& value() && noexcept { return std::move(*checked(*this)); }
+  /// By value: `for (x : make_grid().value())` would else run over what is gone.
+  [[nodiscard]] constexpr T value() && noexcept { return std::move(*checked(*this)); }
 
   [[nodiscard]] constexpr T& operator*() & noexcept { return value(); }
   [[nodiscard]] constexpr const T& operator*() const& noexcept { return value(); }
-  [[nodiscard]] constexpr T&& operator*() && noexcept { return std::move(*this).value(); }
+  [[nodiscard]] constexpr T operator*() && noexcept { return std::move(*this).value(); }
   [[nodiscard]] constexpr T* operator->() noexcept { return checked(*this); }
   [[nodiscard]] constexpr const T* operator->() const noexcept { return checked(*this); }
+  /// @}
 
   /// The error; aborts if there is none.
   [[nodiscard]] constexpr const E& error() const noexcept {
@@ -43,6 +52,7 @@ class [[nodiscard]] Expected {
     return *error;
   }
 
+  /// The value, or `fallback` where there is none.
   template <class U>
   [[nodiscard]] constexpr T value_or(U&& fallback) const& {
     return has_value() ? value() : static_cast<T>(std::forward<U>(fallback));
@@ -73,14 +83,19 @@ class [[nodiscard]] Expected {
 template <class E>
 class [[nodiscard]] Expected<void, E> {
  public:
-  using value_type = void;
-  using error_type = E;
+  using value_type = void;  ///< success has none
+  using error_type = E;     ///< type of the error
 
+  /// Success.
   constexpr Expected() noexcept = default;
+  /// Implicit, so that `return error;` does.
   constexpr Expected(E error) : error_(std::in_place_index<1>, std::move(error)) {}
 
+  /// True for success, false if there is an error.
+  /// @{
   [[nodiscard]] constexpr bool has_value() const noexcept { return error_.index() == 0; }
   constexpr explicit operator bool() const noexcept { return has_value(); }
+  /// @}
 
   /// Ends the program with the error as last words if there is one.
   constexpr void value() const noexcept {
@@ -89,6 +104,7 @@ class [[nodiscard]] Expected<void, E> {
     std::abort();
   }
 
+  /// The error; aborts if there is none.
   [[nodiscard]] constexpr const E& error() const noexcept {
     const E* error = std::get_if<1>(&error_);
     if (error == nullptr) std::abort();
