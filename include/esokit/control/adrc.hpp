@@ -171,14 +171,16 @@ class Adrc {
   /// the observer's config does not allow is refused and changes nothing.
   Check<S> set_step_time(const S& seconds) noexcept
       requires(requires(Observer& o, const S& s) { o.set_step_time(s); }) {
-    if (auto ok = loop_.set_step_time(seconds); !ok) return ok;
-    if (spec_.domain == TimeDomain::sampled && spec_.bandwidth > S(0)) {
-      const auto gains = feedback_gain<order, S>(spec_, seconds);
-      if (!gains) return gains.error();
-      const auto law = Law::make({.gains = *gains, .input_gain = law_.input_gain()});
-      if (!law) return law.error();
-      law_ = *law;
+    const bool gains_follow = spec_.domain == TimeDomain::sampled && spec_.bandwidth > S(0);
+    if (!gains_follow || !is_finite(seconds) || !(seconds > S(0))) {
+      return loop_.set_step_time(seconds);
     }
+    const auto gains = feedback_gain<order, S>(spec_, seconds);
+    if (!gains) return gains.error();
+    const auto law = Law::make({.gains = *gains, .input_gain = law_.input_gain()});
+    if (!law) return law.error();
+    if (auto ok = loop_.set_step_time(seconds); !ok) return ok;
+    law_ = *law;
     return {};
   }
 

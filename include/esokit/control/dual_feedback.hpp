@@ -106,6 +106,9 @@ class DualFeedbackAdrc {
   S update(S y, S reference) noexcept {
     Step step = advance(y, limited ? limiter_.last() : wanted_);
     step.wanted = step.control + form_.reference * reference;
+    // Two states stored one by one and loaded as a pair by the next step would stall it.
+    detail::unroll<size>(
+        [&](auto i) ESOKIT_INLINE_LAMBDA { detail::keep_scalar(std::get<i>(step.pending)); });
     if (!is_finite(probe(step))) [[unlikely]]
       return update_guarded(y, reference);
     pending_ = step.pending;

@@ -1,0 +1,130 @@
+/// @file
+/// Controllers beside the update of the observer in them: what the loop, the law and the limits
+/// cost; Herbst's filter forms beside state space; what decorators cost.
+#include <esokit/control/adrc.hpp>
+#include <esokit/control/disturbance_compensator.hpp>
+#include <esokit/control/dual_feedback.hpp>
+#include <esokit/observer/cascade_eso.hpp>
+#include <esokit/observer/delayed_input.hpp>
+#include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/variable_time.hpp>
+#include <esokit/observer/wrapped_output.hpp>
+#include <optional>
+#include <string>
+
+#include "../support/update_patterns.hpp"
+
+namespace esokit::benchmarks {
+namespace {
+
+template <class S>
+constexpr S sample_time = static_cast<S>(1e-3);
+template <class S>
+constexpr S bandwidth = S(1000);  // so that float has the digits for the filter forms in z
+
+template <class S, int Order>
+typename LinearEso<Order, S>::Config observer_config() {
+  return {.observer_bandwidth = bandwidth<S>, .input_gain = S(2), .sample_time = sample_time<S>};
+}
+
+template <class S>
+esokit::Limits<S> magnitudes() {
+  return {.lower = S(-5), .upper = S(5)};
+}
+
+template <class S, class Observer>
+Adrc<Observer> adrc(const typename Observer::Config& observer) {
+  return Adrc<Observer>::make(
+             {.observer = observer, .controller_bandwidth = S(40), .limits = magnitudes<S>()})
+      .value();
+}
+
+/// Steps of two lengths in turn: every one is another than the last.
+template <class S>
+struct Jittering {
+  VariableTime<LinearEso<2, S>> observer;
+  bool odd = false;
+
+  StepStatus update(S y, S u) noexcept {
+    odd = !odd;
+    const S factor = static_cast<S>(odd ? 1.1 : 0.9);
+    (void)observer.set_step_time(sample_time<S> * factor);
+    return observer.update(y, u);
+  }
+};
+
+std::string against(const std::string& pattern, const std::string& name,
+                    const std::string& limit = "") {
+  return "vs " + pattern + "/" + name + limit;
+}
+
+Limits beside(const std::string& name, const std::string& limit = "") {
+  return {against("bank", name, limit), against("call", name, limit),
+          against("latency", name, limit)};
+}
+
+template <class S, int Order>
+void add_filter_forms(const std::string& scalar) {
+  const std::string size = std::to_string(Order) + "/" + scalar;
+  const auto config = [&](auto filter) {
+    using Filter = decltype(filter);
+    return typename Filter::value_type::Config{.observer_bandwidth = bandwidth<S>,
+                                               .controller_bandwidth = S(40),
+                                               .input_gain = S(2),
+                                               .sample_time = sample_time<S>,
+                                               .limits = magnitudes<S>()};
+  };
+  using Shift = DualFeedbackAdrc<Order, S>;
+  using Delta = DualFeedbackAdrc<Order, S, 1, DeltaOperator>;
+  add<S>("dual_feedback/" + size, Shift::make(config(std::optional<Shift>{})).value(),
+         beside("adrc/" + size, " < 1"));
+  add<S>("dual_feedback_delta/" + size, Delta::make(config(std::optional<Delta>{})).value(),
+         beside("adrc/" + size));
+}
+
+template <class S>
+void add_all(const std::string& scalar) {
+  const auto linear = observer_config<S, 2>();
+  add<S>("linear_eso/2/" + scalar, LinearEso<2, S>::make(linear).value());
+  add<S>("adrc/2/" + scalar, adrc<S, LinearEso<2, S>>(linear),
+         beside("linear_eso/2/" + scalar, " <= 2.0"));
+  add<S>("adrc/3/" + scalar, adrc<S, LinearEso<3, S>>(observer_config<S, 3>()));
+  add_filter_forms<S, 2>(scalar);
+  add_filter_forms<S, 3>(scalar);
+
+  const std::string baseline = "adrc/2/" + scalar;
+  add<S>("adrc_with_rate_limit/2/" + scalar,
+         Adrc<LinearEso<2, S>>::make({.observer = linear,
+                                      .controller_bandwidth = S(40),
+                                      .limits = {.lower = S(-5), .upper = S(5), .rate = S(1000)}})
+             .value(),
+         beside(baseline));
+  add<S>(
+      "compensator/2/" + scalar,
+      DisturbanceCompensator<LinearEso<2, S>>::make({.observer = linear, .limits = magnitudes<S>()})
+          .value(),
+      beside(baseline));
+  using Delayed = DelayedInput<LinearEso<2, S>, 4>;
+  add<S>("adrc_delayed_input/2/" + scalar, adrc<S, Delayed>({.observer = linear, .delay = 3}),
+         beside(baseline));
+  using Wrapped = WrappedOutput<LinearEso<2, S>>;
+  add<S>("adrc_wrapped_output/2/" + scalar, adrc<S, Wrapped>({.observer = linear, .period = S(7)}),
+         beside(baseline));
+
+  const auto variable = VariableTime<LinearEso<2, S>>::make({.observer = linear}).value();
+  add<S>("variable_time_same_step/2/" + scalar, variable, beside("linear_eso/2/" + scalar));
+  add<S>("variable_time_new_step/2/" + scalar, Jittering<S>{variable},
+         beside("linear_eso/2/" + scalar));
+}
+
+}  // namespace
+}  // namespace esokit::benchmarks
+
+int main(int argc, char** argv) {
+  esokit::benchmarks::add_all<double>("double");
+  esokit::benchmarks::add_all<float>("float");
+  benchmark::Initialize(&argc, argv);
+  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
+  benchmark::RunSpecifiedBenchmarks();
+  return 0;
+}

@@ -1,0 +1,357 @@
+// What limits, starts, retunes and lost samples do to ADRC, in numbers: a double integrator, known
+// exactly, so that every deviation is the controller's.
+//
+// Way: the deployment way; the plant is exact between samples.
+//
+// Plant      y'' = d + b0 u,  d = -3,  b0 = 2
+//
+// symbol    code          value    unit
+// b0        gain          2        1/(V s2) of y
+// T         sample_time   1e-3     s
+// omega_o   observer      80       rad/s
+// omega_c   controller    10       rad/s
+// u_max     limit         3        V (half of it goes into d)
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <cstdint>
+#include <cstdio>
+#include <string>
+#include <vector>
+
+#include <Eigen/Eigenvalues>
+
+#include <esokit/control/adrc.hpp>
+#include <esokit/model/integrator_chain.hpp>
+#include <esokit/observer/algebraic_eso.hpp>
+#include <esokit/observer/cascade_eso.hpp>
+#include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/variable_time.hpp>
+#include <esokit/sim/gaussian.hpp>
+
+#include "common/report.hpp"
+#include "control_practice/practice.hpp"
+
+using namespace esokit::examples;
+using namespace practice;
+
+namespace {
+
+constexpr double gain = 2;
+constexpr double disturbance = -3;
+constexpr double steady_input = 1.5;
+constexpr double sample_time = 1e-3;
+constexpr double observer_bandwidth = 80;
+constexpr double controller_bandwidth = 10;
+constexpr double limit = 3;
+constexpr double step_size = 10;
+
+struct Plant {
+  double y = 0, v = 0;
+  void step(double u, double dt = sample_time) {
+    const double a = disturbance + gain * u;
+    y += dt * v + dt * dt / 2 * a;
+    v += dt * a;
+  }
+};
+
+using Linear = esokit::LinearEso<2>;
+using Cascade = esokit::CascadeEso<2, 2>;
+using Algebraic = esokit::AlgebraicEso<2>;
+
+Linear::Config linear(double bandwidth = observer_bandwidth, double b0 = gain) {
+  return {.observer_bandwidth = bandwidth, .input_gain = b0, .sample_time = sample_time};
+}
+Cascade::Config cascade(double bandwidth = observer_bandwidth, double b0 = gain) {
+  return {.observer_bandwidth = bandwidth / 2,
+          .bandwidth_factor = 2,
+          .input_gain = b0,
+          .sample_time = sample_time};
+}
+Algebraic::Config algebraic(double bandwidth = observer_bandwidth, double b0 = gain) {
+  return {.observer_bandwidth = bandwidth,
+          .frequency_shift = bandwidth / 2,
+          .input_gain = b0,
+          .sample_time = sample_time};
+}
+
+// ---- wind-up
+
+struct StepRun {
+  std::vector<double> t, y, u, innovation;
+  double overshoot = 0;
+};
+
+/// The law on the true states, limited: the best that can be had.
+StepRun true_states() {
+  StepRun run;
+  Plant plant;
+  for (int k = 0; k < 8000; ++k) {
+    const double wanted = (100 * (step_size - plant.y) - 20 * plant.v - disturbance) / gain;
+    const double u = std::clamp(wanted, -limit, limit);
+    run.t.push_back(k * sample_time);
+    run.y.push_back(plant.y);
+    run.u.push_back(u);
+    run.overshoot = std::max(run.overshoot, plant.y - step_size);
+    plant.step(u);
+  }
+  return run;
+}
+
+enum class Told { applied, unlimited, nothing_limited };
+
+template <class Observer>
+StepRun step_run(const typename Observer::Config& observer, Told told) {
+  using C = esokit::Adrc<Observer>;
+  typename C::Config config{};
+  config.observer = observer;
+  config.controller_bandwidth = controller_bandwidth;
+  if (told == Told::applied) config.limits = {.lower = -limit, .upper = limit};
+  auto controller = C::make(config).value();
+  // The observer starts without knowing the disturbance.
+  StepRun run;
+  Plant plant;
+  for (int k = 0; k < 8000; ++k) {
+    double u = controller.update(plant.y, step_size);
+    run.innovation.push_back(controller.observer().innovation());
+    if (told == Told::unlimited) u = std::clamp(u, -limit, limit);
+    run.t.push_back(k * sample_time);
+    run.y.push_back(plant.y);
+    run.u.push_back(u);
+    run.overshoot = std::max(run.overshoot, plant.y - step_size);
+    plant.step(u);
+  }
+  return run;
+}
+
+template <class Observer>
+void wind_up(Report& report, const std::string& name, const typename Observer::Config& observer,
+             const StepRun& truth, std::vector<CsvRow>& rows, std::vector<StepRun>* shown) {
+  const StepRun limited = step_run<Observer>(observer, Told::applied);
+  const StepRun free = step_run<Observer>(observer, Told::nothing_limited);
+  const StepRun ignorant = step_run<Observer>(observer, Told::unlimited);
+  double worst = 0;
+  for (std::size_t k = 0; k < limited.innovation.size(); ++k) {
+    worst = std::max(worst, std::abs(limited.innovation[k] - free.innovation[k]));
+  }
+  const double percent = 100 / step_size;
+  report.expect(name, "overshoot minus that of the true states (% of the step)",
+                percent * (limited.overshoot - truth.overshoot),
+                std::abs(limited.overshoot - truth.overshoot) < 0.01 * step_size, "within 1 %");
+  report.expect(name, "innovations minus those without limits", worst, worst < 1e-9, "below 1e-9");
+  report.expect(name, "overshoot if told the unlimited u (% of the step)",
+                percent * ignorant.overshoot,
+                ignorant.overshoot > truth.overshoot + 0.1 * step_size, "clearly worse");
+  rows.push_back({name, number_text(percent * truth.overshoot, 4),
+                  number_text(percent * limited.overshoot, 4), number_text(worst, 2),
+                  number_text(percent * ignorant.overshoot, 4)});
+  if (shown != nullptr) *shown = {limited, ignorant};
+}
+
+// ---- bumps
+
+template <class Observer, class MakeConfig>
+void bumps(Report& report, const std::string& name, MakeConfig&& make_config,
+           std::vector<CsvRow>& rows) {
+  using C = esokit::Adrc<Observer>;
+  const auto config = [&](double bandwidth, double b0, double law) {
+    typename C::Config all{};
+    all.observer = make_config(bandwidth, b0);
+    all.controller_bandwidth = law;
+    all.limits = {.lower = -limit, .upper = limit};
+    return all;
+  };
+  auto controller = C::make(config(observer_bandwidth, gain, controller_bandwidth)).value();
+  Plant plant{.y = 0.7};
+  CsvRow row{name};
+  const auto note = [&](const char* what, double before) {
+    const double bump = std::abs(controller.update(plant.y, 0.7) - before) / (2 * limit);
+    report.expect(name, std::string("bump of u at ") + what + " (share of the range)", bump,
+                  bump < 1e-9, "below 1e-9");
+    row.push_back(number_text(bump, 2));
+    for (int k = 0; k < 200; ++k) {
+      plant.step(controller.output());
+      controller.update(plant.y, 0.7);
+    }
+  };
+  (void)controller.start(0.7, steady_input);
+  note("switch-on", steady_input);
+  // Away and back, so that nothing is exact any more.
+  for (int k = 0; k < 8000; ++k) {
+    controller.update(plant.y, k < 2000 ? 0.31 : 0.7);
+    plant.step(controller.output());
+  }
+  controller.retune(config(1.5 * observer_bandwidth, gain, controller_bandwidth)).value();
+  note("a change of omega_o", controller.output());
+  controller.retune(config(1.5 * observer_bandwidth, 1.4 * gain, controller_bandwidth)).value();
+  note("a change of b0", controller.output());
+  controller.retune(config(1.5 * observer_bandwidth, 1.4 * gain, 0.5 * controller_bandwidth))
+      .value();
+  note("a change of omega_c", controller.output());
+  rows.push_back(row);
+}
+
+// ---- periodic gaps
+
+template <int Order>
+double spectral_radius(double omega_t, int every, bool follow) {
+  constexpr int size = Order + 1;
+  using Chain = esokit::IntegratorChain<Order, double>;
+  auto observer = esokit::LinearEso<Order>::make(
+                      {.observer_bandwidth = omega_t, .input_gain = 1, .sample_time = 1})
+                      .value();
+  for (int i = 0; i < (follow ? every : 1); ++i) observer.predict(0);
+  observer.correct(1);
+  esokit::Matrix<double, size, size> error = esokit::Matrix<double, size, size>::Identity();
+  for (int i = 0; i < every; ++i) error = Chain::transition_matrix(1.0) * error;
+  error -= observer.estimate() * Chain::output_matrix() * error;
+  return Eigen::MatrixXd(error).eigenvalues().cwiseAbs().maxCoeff();
+}
+
+template <int Order>
+void gaps(Report& report, std::vector<CsvRow>& rows) {
+  for (const double omega_t : {0.1, 1.0, 3.0}) {
+    double largest = 0, nominal = 0;
+    int diverging = 0;
+    for (int every = 1; every <= 20; ++every) {
+      largest = std::max(largest, spectral_radius<Order>(omega_t, every, true));
+      const double radius = spectral_radius<Order>(omega_t, every, false);
+      nominal = std::max(nominal, radius);
+      diverging += radius > 1 ? 1 : 0;
+    }
+    const std::string name =
+        "N = " + std::to_string(Order + 1) + ", omega_o T = " + number_text(omega_t, 2);
+    report.expect(name, "largest spectral radius, one correction in 1 to 20", largest, largest < 1,
+                  "below 1");
+    rows.push_back(
+        {name, number_text(largest, 3), number_text(nominal, 4), std::to_string(diverging)});
+  }
+}
+
+// ---- faults at random
+
+struct Faults {
+  double missing = 0, bad = 0, jitter = 0;
+};
+
+/// RMS of r - y along a sine, in units of 1e-3.
+double tracking_error(const Faults& faults, std::uint64_t seed) {
+  constexpr double nominal = 2e-3;
+  using Observer = esokit::VariableTime<Linear>;
+  auto controller =
+      esokit::Adrc<Observer>::make({.observer = {.observer = {.observer_bandwidth = 120,
+                                                              .input_gain = gain,
+                                                              .sample_time = nominal},
+                                                 .ratio = 1.5},
+                                    .controller_bandwidth = 20,
+                                    .limits = {.lower = -60, .upper = 60}})
+          .value();
+  esokit::sim::Gaussian noise(seed), draws(seed + 100);
+  const auto happens = [&](double share) {
+    // Normal numbers through their distribution function: uniform.
+    return std::erfc(-draws.next() / std::sqrt(2.0)) / 2 < share;
+  };
+  Plant plant;
+  double t = 0, sum = 0, time = 0, dt = nominal;
+  for (int k = 0; k < 10000; ++k) {
+    controller.set_step_time(dt).value();
+    const esokit::Vector<double, 3> r(std::sin(6 * t), 6 * std::cos(6 * t), -36 * std::sin(6 * t));
+    double y = plant.y + 2e-4 * noise.next();
+    if (happens(faults.bad)) y = std::numeric_limits<double>::quiet_NaN();
+    const double u = happens(faults.missing) ? controller.update_without_measurement(r)
+                                             : controller.update(y, r);
+    if (t > 2) {
+      sum += (r(0) - plant.y) * (r(0) - plant.y) * dt;
+      time += dt;
+    }
+    const double uniform = std::erfc(-draws.next() / std::sqrt(2.0)) - 1;
+    dt = nominal * (1 + faults.jitter * uniform);
+    for (int i = 0; i < 5; ++i) {
+      plant.step(u + 2 * std::sin(9 * (t + i * dt / 5)), dt / 5);
+    }
+    t += dt;
+  }
+  return 1e3 * std::sqrt(sum / time);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Report report(argc, argv, folder, "limits_and_gaps",
+                about("Limits, starts, retunes, gaps",
+                      "A double integrator known exactly, so that every deviation is the "
+                      "controller's. Deployment way."));
+
+  const StepRun truth = true_states();
+  std::vector<CsvRow> rows;
+  std::vector<StepRun> shown;
+  wind_up<Linear>(report, "LESO", linear(), truth, rows, &shown);
+  wind_up<Cascade>(report, "cascade", cascade(), truth, rows, nullptr);
+  wind_up<Algebraic>(report, "algebraic", algebraic(), truth, rows, nullptr);
+  report.table("windup", "A step of 10 with |u| limited to 3: overshoot in % of the step",
+               {"observer", "law on the true states", "ADRC, told the applied u",
+                "its innovations minus those without limits", "ADRC, told the unlimited u"},
+               rows);
+  Figure figure("windup", {.rows = 2, .columns = 1, .panel_height = 200});
+  figure.caption(
+      "A step of 10 with |u| limited to 3. The observer that is told the applied input behaves as "
+      "the same limited law on the true states, whose overshoot the saturation alone makes.");
+  auto& output = figure.panel(0, 0).y_label("y (-)").legend(Legend::above).x_range(0, 8);
+  auto& input = figure.panel(1, 0).x_label("t (s)").y_label("u (V)").x_range(0, 8).y_range(-4, 4);
+  output.name("output");
+  input.name("input");
+  const auto draw = [&](const StepRun& run, Style style) {
+    output.line(run.t, run.y, style);
+    style.name.clear();
+    input.line(run.t, run.u, style);
+  };
+  draw(shown[1], {.name = "told the unlimited u", .color = Color::vermillion, .width = 1.3});
+  draw(shown[0], {.name = "ADRC", .color = Color::blue, .width = 2.4});
+  draw(truth, {.name = "true states", .color = Color::black, .dash = Dash::dashed, .width = 1.3});
+  report.add(figure);
+
+  rows.clear();
+  bumps<Linear>(report, "LESO", linear, rows);
+  bumps<Cascade>(report, "cascade", cascade, rows);
+  bumps<Algebraic>(report, "algebraic", algebraic, rows);
+  report.table("bumps", "Jump of u in the steady state, as a share of its range",
+               {"observer", "switch-on", "omega_o times 1.5", "b0 times 1.4", "omega_c halved"},
+               rows);
+
+  rows.clear();
+  gaps<1>(report, rows);
+  gaps<2>(report, rows);
+  gaps<3>(report, rows);
+  gaps<4>(report, rows);
+  report.table(
+      "gaps",
+      "One correction in M, M = 1 to 20: largest spectral radius of the error with the gain "
+      "for M T, and with the gain for T as most code has it",
+      {"observer", "gain for M T", "gain for T", "patterns of 20 that diverge with it"}, rows);
+
+  rows.clear();
+  const auto fault_case = [&](const char* name, const Faults& faults) {
+    std::vector<double> errors;
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) errors.push_back(tracking_error(faults, seed));
+    return std::pair(std::string(name), statistics(errors));
+  };
+  const auto clean = fault_case("no faults", {});
+  const std::vector<std::pair<std::string, Statistics>> cases = {
+      clean, fault_case("10 % of the samples missing", {.missing = 0.1}),
+      fault_case("1 % NaN", {.bad = 0.01}),
+      fault_case("sample time jitters by 20 %", {.jitter = 0.2}),
+      fault_case("all of it", {.missing = 0.1, .bad = 0.01, .jitter = 0.2})};
+  for (const auto& [name, error] : cases) {
+    const double ratio = error.mean / clean.second.mean;
+    report.expect(name, "RMS tracking error (1e-3)", error, ratio < 1.5, "below 1.5 of no faults");
+    rows.push_back(
+        {name, number_text(error.mean, 4) + " (" + number_text(error.standard_deviation, 2) + ")",
+         number_text(ratio, 4)});
+  }
+  report.table("faults",
+               "Following a sine under a sine disturbance, 2 ms, noise on y: RMS tracking error in "
+               "1e-3, mean (standard deviation) over 20 seeds",
+               {"case", "RMS error", "ratio"}, rows);
+  return report.finish();
+}

@@ -1,0 +1,87 @@
+// Bad samples under -ffast-math, where a comparison with NaN may go either way.
+#include <gtest/gtest.h>
+
+#include <esokit/control/adrc.hpp>
+#include <esokit/control/dual_feedback.hpp>
+#include <esokit/control/mimo_adrc.hpp>
+#include <esokit/observer/delayed_input.hpp>
+#include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/variable_time.hpp>
+#include <esokit/observer/wrapped_output.hpp>
+#include <support/numbers.hpp>
+
+namespace esokit_test {
+namespace {
+
+using esokit::Adrc;
+using esokit::LinearEso;
+using esokit::StepStatus;
+
+template <class S>
+typename LinearEso<2, S>::Config observer() {
+  return {.observer_bandwidth = S(60), .input_gain = S(2), .sample_time = static_cast<S>(1e-3)};
+}
+
+template <class Controller>
+void bad_samples(Controller controller) {
+  using S = typename Controller::scalar_type;
+  const S half = static_cast<S>(0.5);
+  for (int k = 0; k < 50; ++k) controller.update(half, half);
+  for (const S bad : {hidden_nan<S>(), hidden_infinity<S>(), -hidden_infinity<S>()}) {
+    S u = controller.update(bad, half);
+    EXPECT_TRUE(esokit::is_finite(u));
+    EXPECT_TRUE(esokit::has(controller.status(), StepStatus::measurement_rejected));
+    const S before = controller.output();
+    u = controller.update(half, bad);
+    EXPECT_TRUE(same_bits(u, before));
+    u = controller.update(half, half, bad);
+    EXPECT_TRUE(esokit::is_finite(u));
+    for (int k = 0; k < 5; ++k) u = controller.update(half, half);
+    EXPECT_TRUE(esokit::is_finite(u));
+    EXPECT_NE(controller.start(bad, half), StepStatus::ok);
+    EXPECT_NE(controller.start(half, bad), StepStatus::ok);
+    EXPECT_TRUE(esokit::is_finite(controller.update(half, half)));
+  }
+}
+
+template <class S>
+void all_controllers() {
+  const S ten = S(10);
+  bad_samples(Adrc<LinearEso<2, S>>::make({.observer = observer<S>(), .controller_bandwidth = ten})
+                  .value());
+  using Nested =
+      esokit::VariableTime<esokit::WrappedOutput<esokit::DelayedInput<LinearEso<2, S>, 2>>>;
+  bad_samples(Adrc<Nested>::make(
+                  {.observer = {.observer = {.observer = {.observer = observer<S>(), .delay = 1},
+                                             .period = S(7)}},
+                   .controller_bandwidth = ten})
+                  .value());
+  bad_samples(esokit::DualFeedbackAdrc<2, S, 1, esokit::DeltaOperator>::make(
+                  {.observer_bandwidth = S(60),
+                   .controller_bandwidth = ten,
+                   .input_gain = S(2),
+                   .sample_time = static_cast<S>(1e-3)})
+                  .value());
+}
+
+TEST(BadSamplesOfControllers, Double) { all_controllers<double>(); }
+TEST(BadSamplesOfControllers, Float) { all_controllers<float>(); }
+
+TEST(BadSamplesOfControllers, ConfigWithNan) {
+  const double nan = hidden_nan<double>();
+  using C = Adrc<LinearEso<2>>;
+  EXPECT_FALSE(C::make({.observer = observer<double>(), .controller_bandwidth = nan}));
+  EXPECT_FALSE(C::make(
+      {.observer = observer<double>(), .controller_bandwidth = 10, .limits = {.lower = nan}}));
+  EXPECT_FALSE(
+      C::make({.observer = observer<double>(), .controller_bandwidth = 10, .hold = {.time = nan}}));
+  EXPECT_FALSE(C::make(
+      {.observer = observer<double>(), .controller_bandwidth = 10, .missing = {.input = nan}}));
+  auto variable =
+      esokit::VariableTime<LinearEso<2>>::make({.observer = observer<double>()}).value();
+  EXPECT_FALSE(variable.set_step_time(nan));
+  EXPECT_FALSE(variable.set_step_time(hidden_infinity<double>()));
+}
+
+}  // namespace
+}  // namespace esokit_test

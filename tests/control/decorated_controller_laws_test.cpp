@@ -1,0 +1,86 @@
+// The controller law suite on decorated observers: known delay, angle, changing sample time, known
+// model, and nests of them.
+#include "controller_law_suite.hpp"
+//
+#include <esokit/observer/cascade_eso.hpp>
+#include <esokit/observer/delayed_input.hpp>
+#include <esokit/observer/known_model.hpp>
+#include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/variable_time.hpp>
+#include <esokit/observer/wrapped_output.hpp>
+
+namespace esokit_test {
+
+template <int Order, class S, int Extension>
+struct LoopTraits<esokit::LinearEso<Order, S, Extension>> {
+  static constexpr bool divides = true;
+  static typename esokit::LinearEso<Order, S, Extension>::Config config(double omega, double T,
+                                                                        double b0) {
+    return {.observer_bandwidth = static_cast<S>(omega),
+            .input_gain = static_cast<S>(b0),
+            .sample_time = static_cast<S>(T)};
+  }
+};
+
+template <int Order, int Levels, class S>
+struct LoopTraits<esokit::CascadeEso<Order, Levels, S>> {
+  static constexpr bool divides = true;
+  static typename esokit::CascadeEso<Order, Levels, S>::Config config(double omega, double T,
+                                                                      double b0) {
+    return {.observer_bandwidth = static_cast<S>(omega),
+            .bandwidth_factor = S(2),
+            .input_gain = static_cast<S>(b0),
+            .sample_time = static_cast<S>(T)};
+  }
+};
+
+// A capacity that this plant, which has no delay, leaves unused.
+template <class O, int Capacity>
+struct LoopTraits<esokit::DelayedInput<O, Capacity>> {
+  static constexpr bool divides = true;
+  static typename esokit::DelayedInput<O, Capacity>::Config config(double omega, double T,
+                                                                   double b0) {
+    return {.observer = LoopTraits<O>::config(omega, T, b0), .delay = 0};
+  }
+};
+
+// So long a period that the laws' references are not wrapped.
+template <class O>
+struct LoopTraits<esokit::WrappedOutput<O>> {
+  static constexpr bool divides = true;
+  static typename esokit::WrappedOutput<O>::Config config(double omega, double T, double b0) {
+    return {.observer = LoopTraits<O>::config(omega, T, b0),
+            .period = static_cast<typename O::scalar_type>(64)};
+  }
+};
+
+template <class O>
+struct LoopTraits<esokit::VariableTime<O>> {
+  static constexpr bool divides = true;
+  static typename esokit::VariableTime<O>::Config config(double omega, double T, double b0) {
+    return {.observer = LoopTraits<O>::config(omega, T, b0)};
+  }
+};
+
+// A model that is wrong: what it says more than the plant does is disturbance.
+template <class O>
+struct LoopTraits<esokit::KnownModel<O, esokit::KnownPoles<2>>> {
+  static constexpr bool divides = true;
+  static constexpr bool approximate = true;
+  static typename esokit::KnownModel<O, esokit::KnownPoles<2>>::Config config(double omega,
+                                                                              double T, double b0) {
+    return {.observer = LoopTraits<O>::config(omega, T, b0), .model = {{0.5, 0.25}}};
+  }
+};
+
+using esokit::LinearEso;
+using DecoratedControllers = TypeList<
+    Adrc<esokit::DelayedInput<LinearEso<2>, 3>>, Adrc<esokit::WrappedOutput<LinearEso<2>>>,
+    Adrc<esokit::WrappedOutput<esokit::CascadeEso<2, 2>>, ErrorBased>,
+    Adrc<esokit::VariableTime<LinearEso<2>>>,
+    Adrc<esokit::KnownModel<LinearEso<2>, esokit::KnownPoles<2>>>,
+    Adrc<esokit::VariableTime<esokit::WrappedOutput<esokit::DelayedInput<LinearEso<1, float>, 2>>>,
+         ErrorBased>>;
+const bool registered = register_laws<ControllerLaws>("Decorated", DecoratedControllers{});
+
+}  // namespace esokit_test

@@ -1,0 +1,291 @@
+// Herbst's forms beside the state-space form.
+#include <support/no_allocation.hpp>
+//
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <esokit/control/adrc.hpp>
+#include <esokit/control/dual_feedback.hpp>
+#include <esokit/observer/linear_eso.hpp>
+#include <limits>
+#include <type_traits>
+
+#include "loop_traits.hpp"
+
+namespace esokit_test {
+namespace {
+
+using esokit::DeltaOperator;
+using esokit::DualFeedbackAdrc;
+using esokit::LimitedFeedback;
+using esokit::LinearEso;
+using esokit::ShiftOperator;
+using esokit::UnlimitedFeedback;
+
+constexpr double period = 1e-3;
+constexpr double gain = 1.7;
+constexpr int samples = 100000;
+
+template <class S>
+esokit::Limits<S> tight() {
+  return {.lower = S(-1), .upper = static_cast<S>(0.6), .rate = S(300)};
+}
+
+/// Largest difference of what the two forms ask for, relative to the largest |u| asked for.
+template <int Order, class S, int Extension, class Operator, class Feedback>
+double difference(double omega_t, bool limited, bool closed) {
+  const S omega = static_cast<S>(omega_t / period);
+  const S b0 = static_cast<S>(gain);
+  const S T = static_cast<S>(period);
+  const esokit::Limits<S> limits = limited ? tight<S>() : esokit::Limits<S>{};
+  using Filter = DualFeedbackAdrc<Order, S, Extension, Operator, Feedback>;
+  using State = Adrc<LinearEso<Order, S, Extension>>;
+  auto filter = Filter::make({.observer_bandwidth = omega,
+                              .controller_bandwidth = omega / 5,
+                              .input_gain = b0,
+                              .sample_time = T,
+                              .limits = limits})
+                    .value();
+  auto state =
+      State::make({.observer = {.observer_bandwidth = omega, .input_gain = b0, .sample_time = T},
+                   .controller_bandwidth = omega / 5,
+                   .limits = limits})
+          .value();
+  const S start = static_cast<S>(0.2);
+  EXPECT_EQ(filter.start(start, start), StepStatus::ok);
+  EXPECT_EQ(state.start(start, start), StepStatus::ok);
+  // y and r of a size that makes u of order one.
+  const double unit = gain / std::pow(omega_t / period / 5, Order);
+  ChainPlant<Order> plant(period, gain, -gain * 0.2);
+  ChainPlant<Order> other = plant;
+  Random random(1);
+  double worst = 0;
+  double largest = 0;
+  int at_limit = 0;
+  for (int k = 0; k < samples; ++k) {
+    const double noise = 0.3 * unit * random.uniform(-1, 1);
+    const S r = static_cast<S>(0.3 * unit * random.uniform(-1, 1));
+    const S u = state.update(static_cast<S>((closed ? plant.output() : 0) + noise), r);
+    const S v = filter.update(static_cast<S>((closed ? other.output() : 0) + noise), r);
+    worst = std::max(worst, std::abs(static_cast<double>(state.requested() - filter.requested())));
+    largest = std::max(largest, std::abs(static_cast<double>(state.requested())));
+    at_limit += u != state.requested() ? 1 : 0;
+    if (closed) {
+      // Each has a plant of its own: unlimited and outside the loop its m integrators would sum up
+      // what rounding leaves.
+      plant.step(static_cast<double>(u));
+      other.step(static_cast<double>(v));
+    }
+    if (limited) {
+      EXPECT_LE(std::abs(static_cast<double>(v)), 1);
+    }
+  }
+  EXPECT_EQ(at_limit > samples / 10, limited);
+  return worst / largest;
+}
+
+template <int Size, class S>
+double bound(double omega_t) {
+  return 100 * static_cast<double>(std::numeric_limits<S>::epsilon()) /
+         std::pow(-std::expm1(-omega_t), Size);
+}
+
+template <int Order, class S, int Extension>
+void equal_to_state_space(const std::vector<double>& grid) {
+  constexpr int N = Order + Extension;
+  for (const double omega_t : grid) {
+    SCOPED_TRACE(::testing::Message()
+                 << "n = " << Order << ", m = " << Extension << ", omega T = " << omega_t);
+    const double limit = bound<N, S>(omega_t);
+    // Limited: y and u are what they are, the filter's states must be the observer's.
+    EXPECT_LE(
+        (difference<Order, S, Extension, ShiftOperator, LimitedFeedback>(omega_t, true, false)),
+        limit);
+    EXPECT_LE(
+        (difference<Order, S, Extension, ShiftOperator, LimitedFeedback>(omega_t, false, true)),
+        limit);
+    // In delta nothing is lost: the same bound without 1/(1-rho)^N, but for the 1/(1-rho) samples
+    // that it remembers.
+    const double delta_limit = bound<1, S>(omega_t);
+    EXPECT_LE(
+        (difference<Order, S, Extension, DeltaOperator, LimitedFeedback>(omega_t, true, false)),
+        delta_limit);
+    EXPECT_LE(
+        (difference<Order, S, Extension, DeltaOperator, LimitedFeedback>(omega_t, false, true)),
+        delta_limit);
+  }
+}
+
+TEST(DualFeedback, EqualsStateSpace) {
+  equal_to_state_space<1, double, 1>({0.03, 0.3, 1});
+  equal_to_state_space<2, double, 1>({0.03, 0.3, 1});
+  equal_to_state_space<3, double, 1>({0.03, 0.3, 1});
+  equal_to_state_space<2, double, 2>({0.1, 0.3});
+  equal_to_state_space<1, float, 1>({0.3, 1});
+  equal_to_state_space<2, float, 1>({0.5});
+}
+
+TEST(DualFeedback, TransferFunctionFormWindsUp) {
+  EXPECT_LE((difference<2, double, 1, ShiftOperator, UnlimitedFeedback>(0.3, false, true)),
+            (bound<3, double>(0.3)));
+  EXPECT_LE((difference<2, double, 1, DeltaOperator, UnlimitedFeedback>(0.3, false, true)),
+            (bound<1, double>(0.3)));
+  EXPECT_GT((difference<2, double, 1, DeltaOperator, UnlimitedFeedback>(0.3, true, false)), 0.1);
+}
+
+TEST(DualFeedback, TooFewDigitsAreRefused) {
+  using Shift = DualFeedbackAdrc<2, float>;
+  using Delta = DualFeedbackAdrc<2, float, 1, DeltaOperator>;
+  const Shift::Config coarse{
+      .observer_bandwidth = 400, .controller_bandwidth = 20, .input_gain = 1, .sample_time = 1e-3f};
+  EXPECT_TRUE(Shift::make(coarse).has_value());  // (1 - rho)^3 = 0.036
+  const auto refused = Shift::make(
+      {.observer_bandwidth = 20, .controller_bandwidth = 5, .input_gain = 1, .sample_time = 1e-3f});
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_STREQ(refused.error().field, "observer_bandwidth");
+  EXPECT_TRUE(Delta::make({.observer_bandwidth = 20,
+                           .controller_bandwidth = 5,
+                           .input_gain = 1,
+                           .sample_time = 1e-3f})
+                  .has_value());
+}
+
+/// The polynomials of n = 1 by hand. delta (0): D = delta^2 + 2a delta + a^2.
+TEST(DualFeedback, LiteralCoefficients) {
+  const double omega = 300, T = 1e-3, b0 = 2, k0 = 20;
+  const double a = -std::expm1(-omega * T);
+  const auto form =
+      DualFeedbackAdrc<1, double, 1, DeltaOperator>::make({.observer_bandwidth = omega,
+                                                           .controller_bandwidth = k0,
+                                                           .input_gain = b0,
+                                                           .sample_time = T})
+          .value()
+          .form();
+  EXPECT_DOUBLE_EQ(form.denominator[1], 2 * a);
+  EXPECT_DOUBLE_EQ(form.denominator[2], a * a);
+  EXPECT_DOUBLE_EQ(form.reference, k0 / b0);
+  // c = -(k0 yhat + dhat)/b0; gain k = (2a - a^2, a^2/T), l = (2a, a^2/T).
+  EXPECT_DOUBLE_EQ(form.measurement[0], (k0 * (2 * a - a * a) + a * a / T) / b0);
+  EXPECT_DOUBLE_EQ(form.measurement[1], (k0 * 2 * a + a * a / T) / b0);
+  EXPECT_DOUBLE_EQ(form.measurement[2], k0 * a * a / b0);
+  // From u to yhat (1-a)^2 b0 T per sample and to dhat -a^2 b0 u at once: m_1 = k0 T (1-a)^2 - a^2.
+  EXPECT_NEAR(form.input[1], k0 * T * (1 - a) * (1 - a) - a * a, 1e-15);
+  // D + N_u has the integrator's root.
+  EXPECT_NEAR(form.denominator[2] + form.input[2], 0, 1e-16);
+}
+
+TEST(DualFeedback, StartAndRetuneDoNotBump) {
+  const auto check = [](auto filter, auto config) {
+    EXPECT_EQ(filter.start(2.5, 0.4), StepStatus::ok);
+    EXPECT_EQ(filter.output(), 0.4);
+    ChainPlant<2> plant(period, gain, -gain * 0.4);
+    plant.set_state({2.5, 0});
+    for (int k = 0; k < 100; ++k) {
+      const double u = filter.update(plant.output(), 2.5);
+      ASSERT_NEAR(u, 0.4, 1e-9) << k;
+      plant.step(u);
+    }
+    config.observer_bandwidth = 700;
+    config.controller_bandwidth = 30;
+    config.input_gain = 2;
+    ASSERT_TRUE(filter.retune(config).has_value());
+    ASSERT_NEAR(filter.update(plant.output(), 2.5), 0.4, 1e-8);
+    config.sample_time = -1;
+    EXPECT_FALSE(filter.retune(config).has_value());
+    EXPECT_EQ(filter.start(hidden_nan<double>(), 1), StepStatus::state_rejected);
+    EXPECT_EQ(filter.start(1, hidden_nan<double>()), StepStatus::state_rejected);
+  };
+  const auto both = [&]<class Filter>(std::type_identity<Filter>) {
+    const typename Filter::Config config{.observer_bandwidth = 300,
+                                         .controller_bandwidth = 40,
+                                         .input_gain = gain,
+                                         .sample_time = period,
+                                         .limits = {.lower = -2, .upper = 2, .rate = 1000}};
+    check(Filter::make(config).value(), config);
+  };
+  both(std::type_identity<DualFeedbackAdrc<2>>{});
+  both(std::type_identity<DualFeedbackAdrc<2, double, 1, DeltaOperator>>{});
+}
+
+TEST(DualFeedback, BadSamples) {
+  auto filter = DualFeedbackAdrc<2>::make({.observer_bandwidth = 300,
+                                           .controller_bandwidth = 40,
+                                           .input_gain = gain,
+                                           .sample_time = period,
+                                           .limits = {.lower = -2, .upper = 2}})
+                    .value();
+  for (int k = 0; k < 50; ++k) filter.update(1e-3 * k, 0.04);
+  for (const double bad : {hidden_nan<double>(), hidden_infinity<double>(), huge<double>()}) {
+    auto hit = filter;
+    auto repeated = filter;
+    const double u = hit.update(bad, 0.04);
+    EXPECT_EQ(hit.status(), StepStatus::measurement_rejected);
+    EXPECT_EQ(u, repeated.update(49e-3, 0.04));
+    EXPECT_EQ(hit.update(0.05, 0.04), repeated.update(0.05, 0.04));
+    EXPECT_EQ(hit.status(), StepStatus::ok);
+    // A bad reference keeps u; the filter goes on.
+    auto lost = filter;
+    EXPECT_EQ(lost.update(0.05, bad), filter.output());
+    EXPECT_TRUE(std::isfinite(lost.update(0.05, 0.04)));
+    // A bad report is none.
+    auto told = filter;
+    auto own = filter;
+    if (!std::isfinite(bad)) {
+      EXPECT_EQ(told.update(0.05, 0.04, bad), own.update(0.05, 0.04));
+    }
+  }
+}
+
+TEST(DualFeedback, ReportedInput) {
+  using State = Adrc<LinearEso<2>>;
+  const esokit::Limits<double> limits{.lower = -2, .upper = 2};
+  auto filter = DualFeedbackAdrc<2>::make({.observer_bandwidth = 300,
+                                           .controller_bandwidth = 40,
+                                           .input_gain = gain,
+                                           .sample_time = period,
+                                           .limits = limits})
+                    .value();
+  auto state =
+      State::make(
+          {.observer = {.observer_bandwidth = 300, .input_gain = gain, .sample_time = period},
+           .controller_bandwidth = 40,
+           .limits = limits})
+          .value();
+  Random random(8);
+  for (int k = 0; k < 1000; ++k) {
+    const double y = random.uniform(-1e-3, 1e-3);
+    const double held = random.uniform(-1, 1);
+    ASSERT_NEAR(filter.update(y, 0.0, held), state.update(y, 0.0, held), 1e-9);
+  }
+}
+
+TEST(DualFeedback, NoAllocationAndNamedErrors) {
+  using Filter = DualFeedbackAdrc<2>;
+  const Filter::Config good{.observer_bandwidth = 300,
+                            .controller_bandwidth = 40,
+                            .input_gain = gain,
+                            .sample_time = period};
+  auto filter = Filter::make(good).value();
+  {
+    const NoAllocation guard;
+    for (int k = 0; k < 10; ++k) filter.update(k % 3 == 0 ? hidden_nan<double>() : 0.1, 0.1);
+    filter.start(0.1, 0.1);
+    EXPECT_EQ(guard.count(), 0);
+  }
+  const auto field = [&](auto change) {
+    auto config = good;
+    change(config);
+    const auto made = Filter::make(config);
+    return std::string(made ? "accepted" : made.error().field);
+  };
+  EXPECT_EQ(field([](auto&) {}), "accepted");
+  EXPECT_EQ(field([](auto& c) { c.observer_bandwidth = 0; }), "observer_bandwidth");
+  EXPECT_EQ(field([](auto& c) { c.controller_bandwidth = 0; }), "controller_bandwidth");
+  EXPECT_EQ(field([](auto& c) { c.gains = {{1, 1}}; }), "controller_bandwidth");
+  EXPECT_EQ(field([](auto& c) { c.input_gain = 0; }), "input_gain");
+  EXPECT_EQ(field([](auto& c) { c.sample_time = 0; }), "sample_time");
+  EXPECT_EQ(field([](auto& c) { c.limits.lower = 1, c.limits.upper = 0; }), "limits.lower");
+}
+
+}  // namespace
+}  // namespace esokit_test

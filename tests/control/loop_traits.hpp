@@ -1,0 +1,55 @@
+/// @file
+/// What the controller law suite must know of an observer, and the plant that the laws run on.
+#pragma once
+
+#include <cmath>
+#include <esokit/control/adrc.hpp>
+#include <esokit/model/integrator_chain.hpp>
+#include <limits>
+#include <support/numbers.hpp>
+
+namespace esokit_test {
+
+using esokit::Adrc;
+using esokit::ErrorBased;
+using esokit::LoopMode;
+using esokit::OutputBased;
+using esokit::StepStatus;
+
+/// To be specialised: `config(omega, T, b0)` of the observer with bandwidth omega.
+/// `divides` says whether the observer bears measurement_divider > 1.
+template <class Observer>
+struct LoopTraits;
+
+/// y^(n) = d + b0 u with constant d, exact between samples, in double whatever the controller is.
+template <int Order>
+class ChainPlant {
+ public:
+  using State = esokit::Vector<double, Order>;
+
+  ChainPlant(double sample_time, double input_gain, double disturbance)
+      : input_gain_(input_gain), disturbance_(disturbance) {
+    using Chain = esokit::IntegratorChain<Order, double>;
+    transition_ = Chain::transition_matrix(sample_time).template topLeftCorner<Order, Order>();
+    drive_ = Chain::sampled_input_matrix(sample_time, 1).template head<Order>();
+  }
+
+  void step(double u) {
+    const State next = transition_ * x_ + drive_ * (disturbance_ + input_gain_ * u);
+    x_ = next;
+  }
+
+  [[nodiscard]] double output() const { return x_(0); }
+  [[nodiscard]] const State& state() const { return x_; }
+  void set_state(const State& x) { x_ = x; }
+  void set_disturbance(double d) { disturbance_ = d; }
+
+ private:
+  esokit::Matrix<double, Order, Order> transition_;
+  State drive_;
+  State x_ = State::Zero();
+  double input_gain_;
+  double disturbance_;
+};
+
+}  // namespace esokit_test

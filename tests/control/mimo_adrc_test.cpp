@@ -1,0 +1,184 @@
+#include <support/no_allocation.hpp>
+//
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <esokit/control/mimo_adrc.hpp>
+#include <esokit/observer/cascade_eso.hpp>
+#include <esokit/observer/linear_eso.hpp>
+#include <limits>
+#include <string>
+
+#include "loop_traits.hpp"
+
+namespace esokit_test {
+namespace {
+
+using esokit::LinearEso;
+using esokit::Matrix;
+using esokit::MimoAdrc;
+using esokit::Vector;
+using Two = MimoAdrc<LinearEso<2>, LinearEso<1>>;
+
+constexpr double period = 1e-3;
+
+Two::Config base() {
+  Two::Config config{.observers = {{.observer_bandwidth = 60, .sample_time = period},
+                                   {.observer_bandwidth = 40, .sample_time = period}},
+                     .controller_bandwidths = {10, 8}};
+  config.input_matrix << 2, 1, 0.5, 3;
+  return config;
+}
+
+/// y_1'' = d_1 + (B u)_1, y_2' = d_2 + (B u)_2, exact for a held u.
+struct CoupledPlant {
+  Matrix<double, 2, 2> gain;
+  ChainPlant<2> first{period, 1, -3};
+  ChainPlant<1> second{period, 1, 2};
+
+  [[nodiscard]] Vector<double, 2> output() const { return {first.output(), second.output()}; }
+  void step(const Vector<double, 2>& u) {
+    const Vector<double, 2> drive = gain * u;
+    first.step(drive(0));
+    second.step(drive(1));
+  }
+};
+
+/// With the right B0 each channel is as if it were alone.
+TEST(MimoAdrc, ChannelsAreDecoupled) {
+  auto both = Two::make(base()).value();
+  auto alone = Adrc<LinearEso<2>>::make(
+                   {.observer = {.observer_bandwidth = 60, .input_gain = 1, .sample_time = period},
+                    .controller_bandwidth = 10})
+                   .value();
+  CoupledPlant plant{base().input_matrix};
+  ChainPlant<2> single(period, 1, -3);
+  for (int k = 0; k < 4000; ++k) {
+    // The other channel is stepped up and down meanwhile.
+    plant.step(both.update(plant.output(), {1, k % 500 < 250 ? 1 : -1}));
+    single.step(alone.update(single.output(), 1.0));
+    ASSERT_NEAR(plant.output()(0), single.output(), 1e-9) << k;
+  }
+  EXPECT_NEAR(plant.output()(0), 1, 1e-6);
+}
+
+/// A wrong B0 is disturbance.
+TEST(MimoAdrc, WrongMatrix) {
+  auto config = base();
+  config.input_matrix << 1.7, 0.6, 0.8, 3.4;
+  auto controller = Two::make(config).value();
+  CoupledPlant plant{base().input_matrix};
+  for (int k = 0; k < 8000; ++k) plant.step(controller.update(plant.output(), {1, -1}));
+  EXPECT_NEAR(plant.output()(0), 1, 1e-6);
+  EXPECT_NEAR(plant.output()(1), -1, 1e-6);
+}
+
+/// Each actuator has its limits, and the observers are told: innovations as without.
+TEST(MimoAdrc, Limits) {
+  auto limited_config = base();
+  limited_config.limits[0] = {.lower = -3, .upper = 5};
+  limited_config.limits[1] = {.lower = -4, .upper = 2, .rate = 200};
+  auto free = Two::make(base()).value();
+  auto limited = Two::make(limited_config).value();
+  CoupledPlant a{base().input_matrix};
+  CoupledPlant b = a;
+  int at_limit = 0;
+  for (int k = 0; k < 3000; ++k) {
+    a.step(free.update(a.output(), {1, -1}));
+    const Vector<double, 2> u = limited.update(b.output(), {1, -1});
+    ASSERT_GE(u(0), -3);
+    ASSERT_LE(u(0), 5);
+    ASSERT_GE(u(1), -4);
+    ASSERT_LE(u(1), 2);
+    at_limit += u(0) >= 5 || u(1) <= -4 ? 1 : 0;
+    b.step(u);
+    ASSERT_NEAR(free.observer<0>().innovation(), limited.observer<0>().innovation(), 1e-9);
+    ASSERT_NEAR(free.observer<1>().innovation(), limited.observer<1>().innovation(), 1e-9);
+  }
+  EXPECT_GT(at_limit, 20);
+  EXPECT_NEAR(b.output()(0), 1, 1e-4);
+}
+
+TEST(MimoAdrc, StartAndRetuneDoNotBump) {
+  auto controller = Two::make(base()).value();
+  CoupledPlant plant{base().input_matrix};
+  const Vector<double, 2> steady = base().input_matrix.inverse() * Vector<double, 2>(3, -2);
+  const Vector<double, 2> y(0.4, -0.2);
+  plant.first.set_state({0.4, 0});
+  plant.second.set_state(Vector<double, 1>(-0.2));
+  EXPECT_EQ(controller.start(y, steady), StepStatus::ok);
+  for (int k = 0; k < 50; ++k) {
+    const Vector<double, 2> u = controller.update(plant.output(), y);
+    ASSERT_LT((u - steady).norm(), 1e-9);
+    plant.step(u);
+  }
+  auto changed = base();
+  changed.input_matrix << 1.5, 0.2, 0.9, 2;
+  std::get<0>(changed.observers).observer_bandwidth = 90;
+  changed.controller_bandwidths = {7, 11};
+  ASSERT_TRUE(controller.retune(changed).has_value());
+  EXPECT_LT((controller.update(plant.output(), y) - steady).norm(), 1e-9);
+  changed.input_matrix.setZero();
+  EXPECT_FALSE(controller.retune(changed).has_value());
+  EXPECT_EQ(controller.start({hidden_nan<double>(), 0}, steady), StepStatus::state_rejected);
+}
+
+TEST(MimoAdrc, BadSamplesOfOneChannel) {
+  auto controller = Two::make(base()).value();
+  auto missing = controller;
+  const double nan = hidden_nan<double>();
+  controller.update({nan, 0.1}, {0, 0});
+  EXPECT_EQ(controller.status(0), StepStatus::measurement_rejected);
+  EXPECT_EQ(controller.status(1), StepStatus::ok);
+  EXPECT_EQ(controller.observer<0>().missed(), 1);
+  EXPECT_EQ(controller.observer<1>().missed(), 0);
+  const Vector<double, 2> before = controller.output();
+  EXPECT_EQ(controller.update({0, 0.1}, {nan, nan}), before);
+  EXPECT_TRUE(std::isfinite(controller.update({0, 0.1}, {0, 0}).sum()));
+  controller.update({0, 0.1}, {0, 0}, {nan, 0.5});
+  EXPECT_TRUE(std::isfinite(controller.output().sum()));
+  {
+    const NoAllocation guard;
+    missing.update({0.1, nan}, {0, 1});
+    missing.start({0, 0}, {1, 1});
+    EXPECT_EQ(guard.count(), 0);
+  }
+}
+
+TEST(MimoAdrc, BadConfigIsRefusedByName) {
+  const auto error = [](auto change) {
+    auto config = base();
+    change(config);
+    const auto made = Two::make(config);
+    return made ? esokit::Error<double>{"accepted"} : made.error();
+  };
+  using C = Two::Config;
+  EXPECT_STREQ(error([](C&) {}).field, "accepted");
+  auto singular = error([](C& c) { c.input_matrix << 1, 2, 2, 4; });
+  EXPECT_STREQ(singular.field, "input_matrix");
+  EXPECT_TRUE(std::isinf(singular.value));
+  EXPECT_STREQ(error([](C& c) { c.input_matrix.setZero(); }).field, "input_matrix");
+  auto ill = error([](C& c) { c.input_matrix << 1, 1, 1, 1.0001; });
+  EXPECT_STREQ(ill.field, "input_matrix");
+  // kappa_1 = 4.0004 * (2 / 0.0001 / ..): by hand (|a|+|c|) (|d|+|b|) / |ad - bc| ~ 4 / 1e-4.
+  EXPECT_NEAR(ill.value, 4e4, 10);
+  EXPECT_EQ(ill.limit, 1000);
+  // Units do not matter: rows and columns in other units, the same condition.
+  EXPECT_NEAR(error([](C& c) { c.input_matrix << 1e6, 1e-3, 1, 1.0001e-9; }).value, 4e4, 10);
+  EXPECT_STREQ(error([](C& c) { c.input_matrix << 2e6, 1e-3, 1, 3e-9; }).field, "accepted");
+  EXPECT_STREQ(
+      error([](C& c) { c.input_matrix(0, 1) = std::numeric_limits<double>::quiet_NaN(); }).field,
+      "input_matrix");
+  EXPECT_STREQ(error([](C& c) { c.condition_limit = 1; }).field, "condition_limit");
+  auto bandwidth = error([](C& c) { c.controller_bandwidths[1] = 0; });
+  EXPECT_STREQ(bandwidth.field, "controller_bandwidth");
+  EXPECT_EQ(bandwidth.index, 1);
+  auto gain = error([](C& c) { std::get<1>(c.observers).input_gain = 3; });
+  EXPECT_STREQ(gain.field, "input_gain");
+  EXPECT_EQ(gain.index, 1);
+  EXPECT_STREQ(error([](C& c) { std::get<1>(c.observers).sample_time = 1; }).field, "sample_time");
+  EXPECT_STREQ(error([](C& c) { c.limits[1] = {.lower = 1, .upper = 0}; }).field, "limits.lower");
+}
+
+}  // namespace
+}  // namespace esokit_test

@@ -1,0 +1,150 @@
+// Lost, bad and late samples: what they cost, and what happens without care.
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <cstdio>
+#include <esokit/control/adrc.hpp>
+#include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/variable_time.hpp>
+#include <type_traits>
+#include <utility>
+
+#include "loop_traits.hpp"
+
+namespace esokit_test {
+namespace {
+
+using esokit::LinearEso;
+using esokit::VariableTime;
+
+/// Spectral radius of the error over `every` predictions and one correction, from the chain's
+/// matrices and the gain that is read off the observer.
+template <int Order>
+double spectral_radius(double omega_t, int every, bool follow) {
+  constexpr int N = Order + 1;
+  using Chain = esokit::IntegratorChain<Order, double>;
+  auto observer =
+      LinearEso<Order>::make({.observer_bandwidth = omega_t, .input_gain = 1, .sample_time = 1})
+          .value();
+  for (int i = 0; i < (follow ? every : 1); ++i) observer.predict(0);
+  observer.correct(1);
+  const esokit::Vector<double, N> gain = observer.estimate();
+  esokit::Matrix<double, N, N> error = esokit::Matrix<double, N, N>::Identity();
+  for (int i = 0; i < every; ++i) error = Chain::transition_matrix(1.0) * error;
+  error = (esokit::Matrix<double, N, N>::Identity() - gain * Chain::output_matrix()) * error;
+  return Eigen::MatrixXd(error).eigenvalues().cwiseAbs().maxCoeff();  // one solver for all N
+}
+
+template <int Order>
+void periodic_patterns(int& diverging) {
+  for (const double omega_t : {0.1, 1.0, 3.0}) {
+    for (int every = 1; every <= 20; ++every) {
+      SCOPED_TRACE(::testing::Message()
+                   << "N = " << Order + 1 << ", omega T = " << omega_t << ", one in " << every);
+      // All poles at rho^M; as an N-fold one it is known to an N-th root of the rounding, which
+      // counts in units of the gains, (M T)^r.
+      const double rho = std::exp(-omega_t * every);
+      const double radius = spectral_radius<Order>(omega_t, every, true);
+      EXPECT_LT(radius, 1);
+      EXPECT_NEAR(radius, rho, 0.25);
+      if (spectral_radius<Order>(omega_t, every, false) > 1) ++diverging;
+    }
+  }
+}
+
+TEST(MissingSamples, EveryPeriodicPatternIsStable) {
+  int diverging = 0;
+  periodic_patterns<1>(diverging);
+  periodic_patterns<2>(diverging);
+  periodic_patterns<3>(diverging);
+  periodic_patterns<4>(diverging);
+  std::printf("with the gain of one sample time %d of the 240 patterns diverge\n", diverging);
+  EXPECT_GT(diverging, 50);
+  // The number of DESIGN.md.
+  EXPECT_NEAR(spectral_radius<2>(1, 3, false), 1.66, 0.01);
+}
+
+/// The whole controller in a loop, one measurement in M.
+TEST(MissingSamples, LoopWithOneMeasurementInM) {
+  for (const int every : {1, 2, 5, 10, 20}) {
+    auto controller =
+        Adrc<LinearEso<2>>::make(
+            {.observer = {.observer_bandwidth = 100, .input_gain = 2, .sample_time = 1e-3},
+             .controller_bandwidth = 8})
+            .value();
+    ChainPlant<2> plant(1e-3, 2, -3);
+    for (int k = 0; k < 6000; ++k) {
+      const double u = k % every == every - 1 ? controller.update(plant.output(), 1.0)
+                                              : controller.update_without_measurement(1.0);
+      plant.step(u);
+    }
+    EXPECT_NEAR(plant.output(), 1, 1e-9) << every;
+    EXPECT_EQ(controller.mode(), LoopMode::running);
+  }
+}
+
+struct Faults {
+  double missing = 0;
+  double bad = 0;
+  double jitter = 0;
+};
+
+/// RMS of r - y while following a sine under a sine disturbance, noise on y.
+double tracking_error(const Faults& faults, bool follow_time = true) {
+  constexpr double nominal = 2e-3;
+  auto controller =
+      Adrc<VariableTime<LinearEso<2>>>::make({.observer = {.observer = {.observer_bandwidth = 120,
+                                                                        .input_gain = 2,
+                                                                        .sample_time = nominal},
+                                                           .ratio = 1.5},
+                                              .controller_bandwidth = 20,
+                                              .limits = {.lower = -60, .upper = 60}})
+          .value();
+  Random random(11);
+  double t = 0, y = 0, v = 0, sum = 0, time = 0;
+  double u = 0, dt = nominal;
+  for (int k = 0; k < 20000; ++k) {
+    if (follow_time) {
+      EXPECT_TRUE(controller.set_step_time(dt).has_value());
+    }
+    const double r = std::sin(2 * t);
+    const esokit::Vector<double, 3> reference(r, 2 * std::cos(2 * t), -4 * std::sin(2 * t));
+    double measured = y + 2e-4 * random.uniform(-1, 1);
+    if (random.uniform(0, 1) < faults.bad) measured = hidden_nan<double>();
+    u = random.uniform(0, 1) < faults.missing ? controller.update_without_measurement(reference)
+                                              : controller.update(measured, reference);
+    if (t > 2) {
+      sum += (r - y) * (r - y) * dt;
+      time += dt;
+    }
+    // Euler in fine steps over a sample of its own length.
+    dt = nominal * (1 + faults.jitter * random.uniform(-1, 1));
+    for (int i = 0; i < 10; ++i) {
+      const double a = 5 * std::sin(7 * t) - 1.5 * v + 2 * u;
+      y += dt / 10 * v;
+      v += dt / 10 * a;
+      t += dt / 10;
+    }
+  }
+  return std::sqrt(sum / time);
+}
+
+TEST(MissingSamples, CostOfFaults) {
+  const double clean = tracking_error({});
+  const double missing = tracking_error({.missing = 0.1, .bad = 0, .jitter = 0});
+  const double bad = tracking_error({.missing = 0, .bad = 0.01, .jitter = 0});
+  const double jitter = tracking_error({.missing = 0, .bad = 0, .jitter = 0.2});
+  const double all = tracking_error({.missing = 0.1, .bad = 0.01, .jitter = 0.2});
+  std::printf(
+      "rms tracking error: clean %.3g, 10 %% missing %.3g, 1 %% NaN %.3g, 20 %% jitter %.3g, all "
+      "%.3g\n",
+      clean, missing, bad, jitter, all);
+  EXPECT_LT(missing, 1.5 * clean);
+  EXPECT_LT(bad, 1.1 * clean);
+  EXPECT_LT(jitter, 1.5 * clean);
+  EXPECT_LT(all, 2 * clean);
+}
+
+}  // namespace
+}  // namespace esokit_test

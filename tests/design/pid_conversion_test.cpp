@@ -1,0 +1,110 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <cmath>
+#include <complex>
+#include <esokit/design/continuous_gain.hpp>
+#include <esokit/design/pid_conversion.hpp>
+#include <esokit/model/integrator_chain.hpp>
+#include <limits>
+
+namespace {
+
+using esokit::AdrcTuning;
+using esokit::PidGains;
+
+/// The feedback -u/y of the continuous ADRC at s, from its matrices: u = -(k, 1)/b0 z,
+/// z' = (A - l C) z + B u + l y.
+template <int Order>
+std::complex<double> adrc_at(std::complex<double> s, const AdrcTuning<double>& tuning) {
+  using Chain = esokit::IntegratorChain<Order, double>;
+  constexpr int N = Order + 1;
+  using Complex = Eigen::Matrix<std::complex<double>, N, N>;
+  const esokit::Vector<double, N> l = esokit::continuous_gain<N, double>(tuning.observer_bandwidth);
+  const esokit::Vector<double, Order> k =
+      esokit::continuous_gain<Order, double>(tuning.controller_bandwidth);
+  esokit::RowVector<double, N> law;
+  for (int i = 0; i < Order; ++i) law(i) = k(Order - 1 - i) / tuning.input_gain;
+  law(Order) = 1 / tuning.input_gain;
+  const esokit::Matrix<double, N, N> closed = Chain::state_matrix() - l * Chain::output_matrix() -
+                                              Chain::input_matrix(tuning.input_gain) * law;
+  const Complex pencil = s * Complex::Identity() - closed.template cast<std::complex<double>>();
+  const Eigen::Matrix<std::complex<double>, N, 1> z =
+      pencil.inverse() * l.template cast<std::complex<double>>();
+  return (law.template cast<std::complex<double>>() * z).value();
+}
+
+std::complex<double> pid_at(std::complex<double> s, const PidGains<double>& pid) {
+  return (pid.proportional + pid.integral / s + pid.derivative * s) /
+         (1.0 + pid.filter_time * s + pid.filter_time_squared * s * s);
+}
+
+TEST(PidConversion, AdrcIsThisPidAtEveryFrequency) {
+  for (const AdrcTuning<double>& tuning :
+       {AdrcTuning<double>{2, 5, 20}, {-0.7, 12, 12}, {3, 9, 4}}) {
+    const auto one = esokit::pid_from_adrc<1>(tuning).value();
+    const auto two = esokit::pid_from_adrc<2>(tuning).value();
+    for (const double omega : {0.01, 0.3, 3.0, 40.0, 700.0}) {
+      const std::complex<double> s(0, omega);
+      const auto a1 = adrc_at<1>(s, tuning);
+      const auto a2 = adrc_at<2>(s, tuning);
+      EXPECT_LT(std::abs(pid_at(s, one) - a1), 1e-10 * std::abs(a1));
+      EXPECT_LT(std::abs(pid_at(s, two) - a2), 1e-10 * std::abs(a2));
+    }
+  }
+}
+
+TEST(PidConversion, ThereAndBack) {
+  for (const double kappa : {1.0, 1.5, 3.0, 9.9}) {
+    const AdrcTuning<double> tuning{-2, 7, 7 * kappa};
+    const auto second = esokit::adrc_from_pid<2>(esokit::pid_from_adrc<2>(tuning).value()).value();
+    EXPECT_TRUE(second.exact) << kappa;
+    // Near kappa = 1 the root is double: half the digits.
+    const double tolerance = kappa < 1.2 ? 1e-6 : 1e-10;
+    EXPECT_NEAR(second.input_gain / tuning.input_gain, 1, tolerance);
+    EXPECT_NEAR(second.controller_bandwidth / 7, 1, tolerance);
+    EXPECT_NEAR(second.observer_bandwidth / tuning.observer_bandwidth, 1, tolerance);
+    const auto first =
+        esokit::adrc_from_pid<1>(esokit::pid_from_adrc<1>(tuning).value(), kappa).value();
+    EXPECT_NEAR(first.input_gain / tuning.input_gain, 1, 1e-12);
+    EXPECT_NEAR(first.controller_bandwidth / 7, 1, 1e-12);
+    EXPECT_TRUE(first.exact);
+  }
+}
+
+/// Where no ADRC has the three gains, K_p and K_i are met and it says so.
+TEST(PidConversion, NearestWhereThereIsNone) {
+  for (const double derivative : {0.01, 0.25, 0.39, 0.41, 3.0}) {
+    const PidGains<double> pid{1, 1, derivative};
+    const auto tuning = esokit::adrc_from_pid<2>(pid).value();
+    const auto back = esokit::pid_from_adrc<2>(tuning).value();
+    EXPECT_NEAR(back.proportional, 1, 1e-12);
+    EXPECT_NEAR(back.integral, 1, 1e-12);
+    // K_p^2 / (K_i K_d) in 2.5 .. 3.245 (kappa = 10) is what there is.
+    const bool there = derivative <= 1 / 2.5 && derivative >= 163.0 / 529.0;
+    EXPECT_EQ(tuning.exact, there) << derivative;
+    if (there) {
+      EXPECT_NEAR(back.derivative, derivative, 1e-12);
+    }
+    EXPECT_GE(tuning.observer_bandwidth, tuning.controller_bandwidth * (1 - 1e-12));
+  }
+}
+
+TEST(PidConversion, RefusedByName) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_STREQ(esokit::adrc_from_pid<2>(PidGains<double>{0, 1, 1}).error().field, "proportional");
+  EXPECT_STREQ(esokit::adrc_from_pid<2>(PidGains<double>{1, -1, 1}).error().field, "integral");
+  EXPECT_STREQ(esokit::adrc_from_pid<2>(PidGains<double>{1, 1, -1}).error().field, "derivative");
+  EXPECT_STREQ(esokit::adrc_from_pid<2>(PidGains<double>{1, 1, nan}).error().field, "derivative");
+  EXPECT_STREQ(esokit::adrc_from_pid<2>(PidGains<double>{1, 1, 1}, 1.0).error().field,
+               "bandwidth_ratio");
+  EXPECT_STREQ(esokit::adrc_from_pid<1>(PidGains<double>{1, 1, 0}, nan).error().field,
+               "bandwidth_ratio");
+  EXPECT_STREQ(esokit::pid_from_adrc<1>(AdrcTuning<double>{0, 1, 1}).error().field, "input_gain");
+  EXPECT_STREQ(esokit::pid_from_adrc<1>(AdrcTuning<double>{1, 0, 1}).error().field,
+               "controller_bandwidth");
+  EXPECT_STREQ(esokit::pid_from_adrc<1>(AdrcTuning<double>{1, 1, nan}).error().field,
+               "observer_bandwidth");
+}
+
+}  // namespace

@@ -1,0 +1,263 @@
+// VariableTime, KnownModel, WrappedOutput: what the controller laws do not say.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <esokit/observer/adjustable_bandwidth_eso.hpp>
+#include <esokit/observer/algebraic_eso.hpp>
+#include <esokit/observer/cascade_eso.hpp>
+#include <esokit/observer/extended_state_filter.hpp>
+#include <esokit/observer/known_model.hpp>
+#include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/nonlinear_eso.hpp>
+#include <esokit/observer/variable_time.hpp>
+#include <esokit/observer/wrapped_output.hpp>
+#include <limits>
+#include <support/numbers.hpp>
+
+namespace esokit_test {
+namespace {
+
+using esokit::LinearEso;
+using esokit::LoopObserver;
+using esokit::StepStatus;
+using esokit::VariableTime;
+
+static_assert(LoopObserver<LinearEso<2>> && LoopObserver<esokit::CascadeEso<2, 2>>);
+static_assert(LoopObserver<esokit::AlgebraicEso<2>> && LoopObserver<esokit::NonlinearEso<2>>);
+static_assert(LoopObserver<esokit::AdjustableBandwidthEso<2>>);
+static_assert(LoopObserver<esokit::ExtendedStateFilter<2>>);
+static_assert(LoopObserver<VariableTime<esokit::WrappedOutput<LinearEso<3, float>>>>);
+static_assert(!LoopObserver<int>);
+static_assert(!esokit::bears_regular_gaps<esokit::AlgebraicEso<2>>);
+static_assert(!esokit::bears_regular_gaps<VariableTime<esokit::AlgebraicEso<2>>>);
+static_assert(esokit::bears_regular_gaps<VariableTime<LinearEso<2>>>);
+
+constexpr double nominal = 0.01;
+
+LinearEso<2>::Config settings(double T = nominal) {
+  return {.observer_bandwidth = 30, .input_gain = 2, .sample_time = T};
+}
+
+VariableTime<LinearEso<2>> variable(double ratio = 5) {
+  return VariableTime<LinearEso<2>>::make({.observer = settings(), .ratio = ratio}).value();
+}
+
+/// Steps of any length on a plant with constant disturbance: each step acts as an observer that is
+/// made for its length, from the same state.
+TEST(VariableTime, EachStepIsThatOfAnObserverOfItsLength) {
+  auto observer = variable();
+  Random random(1);
+  for (int k = 0; k < 300; ++k) {
+    const double dt = nominal * std::exp(random.uniform(-1.5, 1.5));
+    auto fresh = LinearEso<2>::make(settings(dt)).value();
+    fresh.reset(observer.estimate());
+    const double y = random.uniform(-1, 1);
+    const double u = random.uniform(-1, 1);
+    ASSERT_TRUE(observer.set_step_time(dt).has_value());
+    ASSERT_EQ(observer.update(y, u), StepStatus::ok);
+    fresh.update(y, u);
+    EXPECT_EQ(observer.step_time(), dt);
+    for (int r = 0; r < 3; ++r) {
+      ASSERT_NEAR(observer.estimate()(r), fresh.estimate()(r),
+                  1e-11 * (1 + std::abs(fresh.estimate()(r))))
+          << k << ' ' << r;
+    }
+  }
+}
+
+/// Over a gap of unequal steps the gain is that of their sum.
+TEST(VariableTime, GapOfUnequalSteps) {
+  for (const int missing : {1, 4}) {
+    auto observer = variable();
+    Random random(2);
+    esokit::Vector<double, 3> start(0.3, -2, 7);
+    observer.reset(start);
+    double total = 0;
+    const double u = 0.5;
+    for (int k = 0; k <= missing; ++k) {
+      const double dt = nominal * (k % 2 == 0 ? 0.4 : 3);
+      total += dt;
+      ASSERT_TRUE(observer.set_step_time(dt).has_value());
+      if (k < missing) {
+        observer.predict(u);
+      } else {
+        EXPECT_EQ(observer.update(1.0, u), StepStatus::gap_bridged);
+      }
+    }
+    auto slow = LinearEso<2>::make(settings(total)).value();
+    slow.reset(start);
+    slow.update(1.0, u);
+    for (int r = 0; r < 3; ++r) {
+      EXPECT_NEAR(observer.estimate()(r), slow.estimate()(r),
+                  1e-11 * (1 + std::abs(slow.estimate()(r))));
+    }
+    // And the next step is an ordinary one again.
+    ASSERT_TRUE(observer.set_step_time(nominal).has_value());
+    auto next = LinearEso<2>::make(settings()).value();
+    next.reset(observer.estimate());
+    EXPECT_EQ(observer.update(0.9, u), StepStatus::ok);
+    next.update(0.9, u);
+    EXPECT_NEAR(observer.estimate()(2), next.estimate()(2), 1e-9);
+  }
+}
+
+TEST(VariableTime, OutsideItsRatioIsRefused) {
+  auto observer = variable(2);
+  for (const double bad :
+       {0.0, -1.0, 0.0049, 0.0201, hidden_nan<double>(), hidden_infinity<double>()}) {
+    const auto refused = observer.set_step_time(bad);
+    ASSERT_FALSE(refused.has_value()) << bad;
+    EXPECT_STREQ(refused.error().field, "step_time");
+    EXPECT_EQ(observer.step_time(), nominal);
+  }
+  EXPECT_TRUE(observer.set_step_time(0.005).has_value());
+  EXPECT_TRUE(observer.set_step_time(0.02).has_value());
+  EXPECT_STREQ(
+      (VariableTime<LinearEso<2>>::make({.observer = settings(), .ratio = 1}).error().field),
+      "ratio");
+  // The same steps as the observer alone, bit for bit.
+  auto same = variable();
+  auto plain = LinearEso<2>::make(settings()).value();
+  for (int k = 0; k < 30; ++k) {
+    same.update(0.1 * k, 0.5);
+    plain.update(0.1 * k, 0.5);
+    EXPECT_TRUE(same_bits(same.total_disturbance(), plain.total_disturbance()));
+  }
+}
+
+/// Every other observer: unbiased on a double integrator with constant disturbance, whatever the
+/// steps.
+template <class Observer>
+void unbiased_with_jitter(const typename Observer::Config& config, double tolerance) {
+  auto observer = VariableTime<Observer>::make({.observer = config, .ratio = 2}).value();
+  Random random(3);
+  double y = 0.2, v = -1;
+  for (int k = 0; k < 1200; ++k) {
+    const double dt = nominal * (1 + 0.3 * random.uniform(-1, 1));
+    const double a = -3 + 2 * 0.5;
+    y += dt * v + dt * dt / 2 * a;
+    v += dt * a;
+    ASSERT_TRUE(observer.set_step_time(dt).has_value());
+    if (k % 10 == 9) {
+      observer.predict(0.5);
+    } else {
+      observer.update(y, 0.5);
+    }
+  }
+  EXPECT_NEAR(observer.total_disturbance(), -3, tolerance);
+  EXPECT_NEAR(observer.template estimate<1>(), v, tolerance);
+}
+
+TEST(VariableTime, EveryObserver) {
+  unbiased_with_jitter<LinearEso<2>>(settings(), 1e-7);
+  unbiased_with_jitter<esokit::CascadeEso<2, 2>>(
+      {.observer_bandwidth = 30, .bandwidth_factor = 2, .input_gain = 2, .sample_time = nominal},
+      1e-7);
+  unbiased_with_jitter<esokit::AlgebraicEso<2>>(
+      {.observer_bandwidth = 30, .frequency_shift = 5, .input_gain = 2, .sample_time = nominal},
+      1e-7);
+  unbiased_with_jitter<esokit::NonlinearEso<2, double, 1>>(
+      {.observer_bandwidth = 30,
+       .shape = {.gain_alpha = 0.8, .alpha = 1, .gain_beta = 0.2, .beta = 1},
+       .input_gain = 2,
+       .sample_time = nominal},
+      1e-7);
+}
+
+// ---- known model
+
+/// y'' = -4 y - 3 y' + 5 + 2 u: what is left over is the 5, the better the shorter T.
+TEST(KnownModel, EstimatesOnlyTheRest) {
+  using Known = esokit::KnownModel<LinearEso<2>, esokit::KnownPoles<2>>;
+  const auto worst_rest = [](double T, bool known) {
+    auto config = settings(T);
+    config.observer_bandwidth = 10;
+    auto model = Known::make({.observer = config, .model = {{4, 3}}}).value();
+    auto plain = LinearEso<2>::make(config).value();
+    double y = 0, v = 0, worst = 0;
+    const int count = static_cast<int>(8 / T);
+    double u = 0;
+    for (int k = 0; k < count; ++k) {
+      model.update(y, u);
+      plain.update(y, u);
+      const double t = k * T;
+      const double rest =
+          known ? model.residual_disturbance() : plain.total_disturbance() + 4 * y + 3 * v;
+      if (t > 3) worst = std::max(worst, std::abs(rest - 5));
+      EXPECT_NEAR(model.total_disturbance(), model.known_part() + model.residual_disturbance(),
+                  1e-12);
+      u = 3 * std::sin(4 * t);
+      for (int i = 0; i < 20; ++i) {
+        const double h = T / 20;
+        const double a = -4 * y - 3 * v + 5 + 2 * u;
+        y += h * v + h * h / 2 * a;
+        v += h * (a - h / 2 * (4 * v + 3 * a));
+      }
+    }
+    return worst;
+  };
+  const double coarse = worst_rest(0.004, true);
+  const double fine = worst_rest(0.002, true);
+  EXPECT_LT(fine, 0.1);
+  EXPECT_GT(worst_rest(0.002, false), 10 * fine);
+  EXPECT_NEAR(std::log2(coarse / fine), 1, 0.3);
+}
+
+TEST(KnownModel, RetuneAndResetKeepTheSum) {
+  using Known = esokit::KnownModel<LinearEso<2>, esokit::KnownPoles<2>>;
+  auto observer = Known::make({.observer = settings(), .model = {{4, 3}}}).value();
+  Random random(4);
+  for (int k = 0; k < 50; ++k) observer.update(random.uniform(-1, 1), random.uniform(-1, 1));
+  const auto before = observer.estimate();
+  const double u = observer.applied_input();
+  auto changed = settings();
+  ASSERT_TRUE(observer.retune({.observer = changed, .model = {{1, -2}}}).has_value());
+  EXPECT_NEAR(observer.total_disturbance(), before(2), 1e-9 * std::abs(before(2)) + 1e-9);
+  EXPECT_NEAR(observer.residual_disturbance(), before(2) + before(0) - 2 * before(1), 1e-6);
+  // b0: only u's share moves.
+  changed.input_gain = 5;
+  ASSERT_TRUE(observer.retune({.observer = changed, .model = {{1, -2}}}).has_value());
+  EXPECT_NEAR(observer.total_disturbance(), before(2) + (2 - 5) * u,
+              1e-9 * std::abs(before(2)) + 1e-9);
+  const esokit::Vector<double, 3> state(1, 2, 30);
+  EXPECT_EQ(observer.reset(state), StepStatus::ok);
+  EXPECT_NEAR((observer.estimate() - state).norm(), 0, 1e-9);
+  EXPECT_NEAR(observer.residual_disturbance(), 30 + 1 - 4, 1e-9);
+  EXPECT_NEAR(observer.estimate<2>(), 30, 1e-9);
+  EXPECT_EQ(observer.update(1, hidden_nan<double>()), StepStatus::input_rejected);
+  EXPECT_EQ(observer.applied_input(), u);
+  EXPECT_STREQ(
+      (Known::make({.observer = settings(), .model = {{1, hidden_nan<double>()}}}).error().field),
+      "model.coefficients");
+}
+
+// ---- angle
+
+TEST(WrappedOutput, MeasurementsInAnyBranch) {
+  using Angle = esokit::WrappedOutput<esokit::CascadeEso<2, 2>>;
+  const esokit::CascadeEso<2, 2>::Config inner{
+      .observer_bandwidth = 30, .bandwidth_factor = 2, .input_gain = 2, .sample_time = nominal};
+  auto angle = Angle::make({.observer = inner, .period = 360}).value();
+  auto plain = esokit::CascadeEso<2, 2>::make(inner).value();
+  Random random(6);
+  for (int k = 0; k < 3000; ++k) {
+    const double y = 700 * std::sin(0.003 * k) + k;
+    if (k % 50 == 20) {
+      angle.predict(0.1);
+      plain.predict(0.1);
+    } else {
+      angle.update(y + 360 * (random.index(9) - 4), 0.1);
+      plain.update(y, 0.1);
+    }
+    ASSERT_NEAR(angle.total_disturbance(), plain.total_disturbance(), 1e-6) << k;
+    ASSERT_NEAR(angle.innovation(), plain.innovation(), 1e-8);
+    ASSERT_LE(std::abs(angle.estimate<0>()), 180 + 1e-9);
+    ASSERT_NEAR(angle.wrap(angle.estimate<0>() - plain.estimate<0>()), 0, 1e-8);
+  }
+  EXPECT_EQ(angle.update(hidden_nan<double>(), 0.1), StepStatus::measurement_rejected);
+  EXPECT_EQ(angle.reset(1000.0), StepStatus::ok);
+  EXPECT_NEAR(angle.estimate<0>(), -80, 1e-9);
+}
+
+}  // namespace
+}  // namespace esokit_test
