@@ -1,0 +1,25 @@
+#!/usr/bin/env bash
+# cmake/reference.sh: writes the reference with Doxygen and prints where it is. Any warning is a
+# failure (1). Installs nothing: without Doxygen it names the Debian package (3).
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+source cmake/debian_packages.sh
+
+if ! command -v doxygen >/dev/null 2>&1; then
+  require_packages --no-install doxygen
+  echo "doxygen is not on the PATH" >&2
+  exit 3
+fi
+
+log=build/reference/warnings.log
+rm -rf build/reference
+mkdir -p build/reference
+status=0
+doxygen cmake/Doxyfile 2>"$log" || status=$?
+if ((status != 0)) || [[ -s $log ]]; then
+  cat "$log" >&2
+  echo "the reference has $(wc -l <"$log") lines of warnings" >&2
+  exit 1
+fi
+rm "$log"
+echo "$PWD/build/reference/html/index.html"
