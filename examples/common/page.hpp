@@ -148,7 +148,7 @@ class Page {
       for (const ContentItem& item : example.items) {
         if (item.kind != "not_reproduced") continue;
         explained = true;
-        put({"<li><a href=\"#", anchor(example), "\">", html_text(example.name),
+        put({"<li><a href=\"#", anchor(example), "\">", html_text(example.folder.generic_string()),
              "</a>: ", html_text(item.text), "</li>\n"});
       }
       any = any || explained;

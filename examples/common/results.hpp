@@ -107,8 +107,8 @@ inline void read_example(const std::filesystem::path& out, const std::filesystem
 
 }  // namespace detail
 
-/// All papers below `out`, in the order of their folders' names. Throws std::runtime_error with the
-/// reason if there are none or a file is not as Report writes it.
+/// All papers below `out`, in the order of their folders' names, then what is not a paper. Throws
+/// std::runtime_error with the reason if there are none or a file is not as Report writes it.
 [[nodiscard]] inline std::vector<PaperResults> read_results(const std::filesystem::path& out) {
   std::error_code error;
   if (!std::filesystem::is_directory(out, error)) {
@@ -131,6 +131,8 @@ inline void read_example(const std::filesystem::path& out, const std::filesystem
     }
     detail::read_example(out, folder, papers.back());
   }
+  std::stable_partition(papers.begin(), papers.end(),
+                        [](const PaperResults& results) { return !results.link.empty(); });
   return papers;
 }
 
