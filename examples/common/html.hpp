@@ -93,6 +93,11 @@ a { color: var(--link); }
 figure { margin: 1.2rem 0 1.6rem; }
 figure img { display: block; width: 100%; height: auto; background: #ffffff;
   border: 1px solid var(--line); border-radius: 0.4rem; }
+.thumbs { display: flex; flex-wrap: wrap; gap: 0.5rem; margin: 0.4rem 0; }
+.thumbs img { display: block; object-fit: contain; background: #ffffff;
+  border: 1px solid var(--line); border-radius: 0.3rem; }
+nav > ul { list-style: none; padding: 0; } nav > ul > li { margin: 1.2rem 0; font-weight: 600; }
+nav ul ul { font-weight: 400; }
 figcaption { font-size: 0.92rem; margin-top: 0.4rem; }
 .table { overflow-x: auto; margin: 1rem 0 1.4rem; }
 table { border-collapse: collapse; font-size: 0.92rem; font-variant-numeric: tabular-nums; }

@@ -1,9 +1,13 @@
 /// @file
-/// Writes index.html, the page of all results, into the examples' output folder.
+/// Writes index.html, the page of all results, and one page a paper into the examples' output
+/// folder.
 
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "command_line.hpp"
 #include "csv.hpp"
@@ -15,10 +19,16 @@ int main(int argc, char** argv) {
   const std::filesystem::path out =
       examples::output_folder(argc, argv, "Writes index.html from the examples' results in");
   try {
-    const std::string page = examples::Page(out).overview_with_all(examples::read_results(out));
-    if (const auto error = examples::write_text(out / "index.html", page)) {
-      std::fprintf(stderr, "make_index: %s\n", error->c_str());
-      return 1;
+    const auto papers = examples::read_results(out);
+    examples::Page page(out);
+    std::vector<std::pair<std::string, std::string>> files;
+    for (const auto& paper : papers) files.emplace_back(page.file_of(paper), page.one(paper));
+    files.emplace_back("index.html", page.overview_with_all(papers));
+    for (const auto& [name, text] : files) {
+      if (const auto error = examples::write_text(out / name, text)) {
+        std::fprintf(stderr, "make_index: %s\n", error->c_str());
+        return 1;
+      }
     }
   } catch (const std::exception& error) {
     std::fprintf(stderr, "make_index: %s\n", error.what());

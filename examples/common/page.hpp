@@ -29,12 +29,8 @@ class Page {
   explicit Page(std::filesystem::path out) : out_(std::move(out)) {}
 
   [[nodiscard]] std::string overview_with_all(const std::vector<PaperResults>& papers) {
-    html_.clear();
-    put(
-        {"<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-         "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-         "<title>esokit: papers reproduced</title>\n<style>",
-         page_style, "</style>\n</head>\n<body>\n<header>\n<h1>esokit: papers reproduced</h1>\n",
+    begin("esokit: papers reproduced");
+    put({"<h1>esokit: papers reproduced</h1>\n",
          "<p>Every figure and table below was computed by the programs in examples/, from the "
          "equations of the papers.</p>\n"});
     counts(papers);
@@ -47,11 +43,33 @@ class Page {
     return html_;
   }
 
+  /// Name of the page of one paper, beside the page of all.
+  static std::string file_of(const PaperResults& paper) { return paper.folder + ".html"; }
+
+  [[nodiscard]] std::string one(const PaperResults& paper) {
+    begin(title_of(paper) + " - esokit");
+    put({"<p><a href=\"index.html\">All results</a></p>\n"});
+    counts({paper});
+    put({"</header>\n<main>\n"});
+    section(paper);
+    put({"</main>\n</body>\n</html>\n"});
+    return html_;
+  }
+
  private:
   using Outcome = Check::Outcome;
 
   void put(std::initializer_list<std::string_view> parts) {
     for (const std::string_view part : parts) html_ += part;
+  }
+
+  void begin(const std::string& title) {
+    html_.clear();
+    put(
+        {"<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
+         "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>",
+         html_text(title), "</title>\n<style>", page_style,
+         "</style>\n</head>\n<body>\n<header>\n"});
   }
 
   static std::string anchor(const PaperResults& paper) { return html_anchor(paper.folder); }
@@ -166,7 +184,11 @@ class Page {
   void contents(const std::vector<PaperResults>& papers) {
     put({"<nav aria-label=\"Contents\">\n<ul>\n"});
     for (const PaperResults& paper : papers) {
-      put({"<li><a href=\"#", anchor(paper), "\">", html_text(title_of(paper)), "</a>\n<ul>\n"});
+      put({"<li><a href=\"#", anchor(paper), "\">", html_text(title_of(paper)),
+           "</a> <span class=\"quiet\">(<a href=\"", html_address(file_of(paper)),
+           "\">a page of its own</a>)</span>\n"});
+      thumbnails(paper);
+      put({"<ul>\n"});
       for (const ExampleResults& example : paper.examples) {
         put({"<li><a href=\"#", anchor(example), "\">", html_text(title_of(example)),
              "</a> <span class=\"quiet\">", std::to_string(example.count(Outcome::pass)), " of ",
@@ -176,6 +198,19 @@ class Page {
       put({"</ul></li>\n"});
     }
     put({"</ul>\n</nav>\n"});
+  }
+
+  void thumbnails(const PaperResults& paper) {
+    put({"<div class=\"thumbs\">\n"});
+    for (const ExampleResults& example : paper.examples) {
+      for (const ContentItem& item : example.items) {
+        if (item.kind != "figure") continue;
+        put({"<a href=\"#", anchor(example), "\"><img loading=\"lazy\" src=\"",
+             html_address(std::filesystem::path((example.folder / item.name).string() + ".png")),
+             "\" width=\"176\" height=\"116\" alt=\"", html_text(item.alt), "\"></a>\n"});
+      }
+    }
+    put({"</div>\n"});
   }
 
   // ---- papers and examples ----
