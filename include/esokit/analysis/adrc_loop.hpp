@@ -112,15 +112,16 @@ inline void assemble_loop(const LoopParts& parts) noexcept {
 template <int PlantStates, LinearObserver Observer>
 class AdrcLoop {
  public:
-  static constexpr int order = Observer::order;
-  static constexpr int size = Observer::order + Observer::extension;
-  static constexpr int observer_states = size * Observer::levels;
-  static constexpr int states = PlantStates + observer_states;
-  using Complex = std::complex<double>;
-  using Plant = NominalPlant<PlantStates>;
-  using Controller = LinearSystem<observer_states, 2, 1>;  ///< (y, r) to u
-  using Closed = LinearSystem<states, 3, 2 + size>;        ///< (r, v, d) to (y, u, zhat)
+  static constexpr int order = Observer::order;                       ///< n, order of the observer
+  static constexpr int size = Observer::order + Observer::extension;  ///< N = n + m
+  static constexpr int observer_states = size * Observer::levels;     ///< N p
+  static constexpr int states = PlantStates + observer_states;        ///< of the closed loop
+  using Complex = std::complex<double>;                               ///< a response at a frequency
+  using Plant = NominalPlant<PlantStates>;                            ///< (u, d) to y
+  using Controller = LinearSystem<observer_states, 2, 1>;             ///< (y, r) to u
+  using Closed = LinearSystem<states, 3, 2 + size>;                   ///< (r, v, d) to (y, u, zhat)
 
+  /// Closes the loop.
   /// @param plant sampled as the observer is, see `sampled_plant`; continuous for a continuous one
   /// @return error for a plant of another sample time or with a direct path, and for input gains of
   ///         observer and law that do not belong together
@@ -185,6 +186,7 @@ class AdrcLoop {
     return loop;
   }
 
+  /// (u, d) to y, sampled as the observer is.
   [[nodiscard]] const Plant& plant() const noexcept { return plant_; }
   /// (y, r) to u.
   [[nodiscard]] const Controller& controller() const noexcept { return controller_; }
@@ -198,22 +200,23 @@ class AdrcLoop {
   [[nodiscard]] double stability_abscissa() const noexcept { return abscissa_; }
 
   /// L = -P C. @param frequency rad/s, above 0; sampled: to pi / T
+  /// @return error for a frequency outside of that, or one that is a pole
   [[nodiscard]] Expected<Complex, Error<double>> loop_gain(double frequency) const {
     return at(frequency, [](Complex l, Complex, Complex) { return l; });
   }
-  /// S = 1 / (1 + L): from a disturbance at the output to y.
+  /// S = 1 / (1 + L): from a disturbance at the output to y. Errors as loop_gain.
   [[nodiscard]] Expected<Complex, Error<double>> sensitivity(double frequency) const {
     return at(frequency, [](Complex l, Complex, Complex) { return 1.0 / (1.0 + l); });
   }
-  /// T = L / (1 + L): from noise v to -y.
+  /// T = L / (1 + L): from noise v to -y. Errors as loop_gain.
   [[nodiscard]] Expected<Complex, Error<double>> complementary_sensitivity(double frequency) const {
     return at(frequency, [](Complex l, Complex, Complex) { return l / (1.0 + l); });
   }
-  /// C S: from noise v to u.
+  /// C S: from noise v to u. Errors as loop_gain.
   [[nodiscard]] Expected<Complex, Error<double>> noise_to_control(double frequency) const {
     return at(frequency, [](Complex l, Complex c, Complex) { return c / (1.0 + l); });
   }
-  /// P_d S: from a disturbance d of the plant to y.
+  /// P_d S: from a disturbance d of the plant to y. Errors as loop_gain.
   [[nodiscard]] Expected<Complex, Error<double>> disturbance_to_output(double frequency) const {
     return at(frequency, [](Complex l, Complex, Complex pd) { return pd / (1.0 + l); });
   }
@@ -242,6 +245,7 @@ class AdrcLoop {
   double abscissa_ = 0.0;
 };
 
+/// A loop, or the error that AdrcLoop::make gives.
 template <int PlantStates, class Observer>
 using AdrcLoopResult = Expected<AdrcLoop<PlantStates, Observer>, Error<double>>;
 

@@ -122,7 +122,8 @@ Expected<ErrorBound<Size>, Error<double>> bound_between(const Vector<double, Siz
 /// Bound for the continuous linear ESO: K. Lakomy, R. Madonski, ISA Transactions 109 (2021), (11),
 /// with P from (8) and the corrections: norm(kappa) for kappa_max, squared norms in (7).
 ///
-///   drive = max abs(d^(m)) + omega^N norm(kappa) max abs(v),  level = 2 norm(P) drive / omega
+///     drive = max abs(d^(m)) + omega^N norm(kappa) max abs(v),  level = 2 norm(P) drive / omega
+///
 /// @return error for a bad config or source
 template <int Size>
 Expected<ErrorBound<Size>, Error<double>> linear_error_bound(
@@ -143,8 +144,10 @@ Expected<ErrorBound<Size>, Error<double>> linear_error_bound(
 /// up to it: (22), (30) of the same paper in corrected form. The last one is that of the estimate.
 ///
 /// With z_i the estimate by the levels up to i and l_i their gains, (26) reads
-///   z~_i' = H_i z~_i + b d' + (l_i - b b' l_{i-1}) c' z~_{i-1}
-///           + sum_{j<i-1} b b' (l_{j+1} - l_j) c' z~_j - b b' l_1 v,
+///
+///     z~_i' = H_i z~_i + b d' + (l_i - b b' l_{i-1}) c' z~_{i-1}
+///             + sum_{j<i-1} b b' (l_{j+1} - l_j) c' z~_j - b b' l_1 v
+///
 /// (for m > 1: b b' the projection on all disturbance rows), so that beside d' the levels before
 /// drive level i by their bounds, with omega_j (alpha^(n+1) - 1) for j < i - 1; only level 1 has
 /// norm(kappa) omega^N at the noise. `rate` and `at` count from when the levels before have

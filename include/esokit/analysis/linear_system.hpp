@@ -21,18 +21,23 @@ namespace esokit {
 template <int States, int Inputs, int Outputs>
 struct LinearSystem {
   static_assert(States >= 1 && Inputs >= 1 && Outputs >= 1);
-  static constexpr int states = States;
-  static constexpr int inputs = Inputs;
-  static constexpr int outputs = Outputs;
+  static constexpr int states = States;    ///< length of x
+  static constexpr int inputs = Inputs;    ///< length of w
+  static constexpr int outputs = Outputs;  ///< length of out
 
+  /// A, or A - I where sampled.
   Matrix<double, States, States> a = Matrix<double, States, States>::Zero();
+  /// From w to D x.
   Matrix<double, States, Inputs> b = Matrix<double, States, Inputs>::Zero();
+  /// From x to out.
   Matrix<double, Outputs, States> c = Matrix<double, Outputs, States>::Zero();
+  /// From w to out directly.
   Matrix<double, Outputs, Inputs> d = Matrix<double, Outputs, Inputs>::Zero();
   double sample_time = 0.0;                    ///< T, s; 0 for a continuous system
   Array<const char*, Inputs> input_names{};    ///< static storage
   Array<const char*, Outputs> output_names{};  ///< static storage
 
+  /// True if it has a sample time.
   [[nodiscard]] bool sampled() const noexcept { return sample_time > 0.0; }
 
   /// A of x' = A x or of x[k+1] = A x[k], States x States.

@@ -13,9 +13,9 @@ namespace esokit {
 /// P with A'P + P A <= -I, and its extreme eigenvalues.
 template <int Size>
 struct LyapunovMatrix {
-  Matrix<double, Size, Size> p;
-  double smallest = 0.0;
-  double largest = 0.0;
+  Matrix<double, Size, Size> p;  ///< N x N, symmetric
+  double smallest = 0.0;         ///< least eigenvalue of P, above 0
+  double largest = 0.0;          ///< largest eigenvalue of P
 
   /// gamma = sqrt(largest / smallest).
   [[nodiscard]] double gamma() const { return std::sqrt(largest / smallest); }
@@ -127,6 +127,7 @@ struct Ellipsoid {
 }  // namespace detail
 
 /// P with A'P + P A = -I.
+/// @param a A, N x N, 1/s
 /// @return error if A is not stable
 template <int Size>
 Expected<LyapunovMatrix<Size>, Error<double>> lyapunov_matrix(const Matrix<double, Size, Size>& a) {
@@ -144,7 +145,8 @@ Expected<LyapunovMatrix<Size>, Error<double>> lyapunov_matrix(const Matrix<doubl
 /// The inequalities are solved by the ellipsoid method: cuts along the eigenvectors that violate
 /// them, and along the gradient of the (quasi-convex) aim. Milliseconds for N = 3, a second for
 /// N = 6.
-/// @param most bound on the entries of P; the A_i are best scaled to poles of size one
+/// @param a the A_i, each N x N @param most bound on the entries of P; the A_i are best scaled to
+///        poles of size one
 /// @return error if there is none, with what is left of the inequalities at the end
 template <int Size, std::size_t Modes>
 Expected<LyapunovMatrix<Size>, Error<double>> common_lyapunov_matrix(

@@ -10,14 +10,14 @@ namespace esokit {
 
 /// A margin and where the loop then oscillates.
 struct Margin {
-  double value = 0.0;
+  double value = 0.0;      ///< in the unit of what is asked for
   double frequency = 0.0;  ///< rad/s
 };
 
 /// The edges of stability that are nearest to the loop as it is. Any number of crossings is looked
 /// at; an error stands where there is no edge in that direction.
 struct Margins {
-  using Result = Expected<Margin, Error<double>>;
+  using Result = Expected<Margin, Error<double>>;  ///< a margin, or why there is none
 
   Result gain_increase;  ///< least factor > 1 on L that makes the loop oscillate
   Result gain_decrease;  ///< greatest factor in (0, 1) on L that does
@@ -126,13 +126,14 @@ Expected<Margins, Error<double>> margins(const AdrcLoop<PlantStates, Observer>& 
 
 /// An open interval.
 struct Range {
-  double lower = 0.0;
+  double lower = 0.0;  ///< 0: no limit
   double upper = 0.0;  ///< infinity: no limit
 };
 
 /// Range of b0 / b for which the loop is stable: b0 as the controller has it, b as the plant does.
 ///
 /// The loop gain depends on the two by b / b0 alone, so it does not matter which of them is wrong.
+/// @param law the one that the loop was made with
 /// @param plant_gain b of the loop's nominal plant, the factor of u in y^(n)
 /// @return error for a nominal loop that is not stable, or a b that is zero or has the other sign
 template <int PlantStates, class Observer, Scalar S>

@@ -46,32 +46,38 @@ concept ContinuousLinearObserver = requires(const T& observer, typename T::State
   static_cast<double>(observer.input_gain());
 };
 
+/// An observer that can be analysed as a linear system.
 template <class T>
 concept LinearObserver = SampledLinearObserver<T> || ContinuousLinearObserver<T>;
 
 /// A sampled observer held in one mode: the gains of a switched or nonlinear law at one place.
 template <int Order, int Levels = 1, int Extension = 1>
 struct FrozenObserver {
-  static constexpr int order = Order;
-  static constexpr int extension = Extension;
-  static constexpr int size = ChainSize<Order, Extension>::size;
-  static constexpr int levels = Levels;
+  static constexpr int order = Order;                             ///< n, order of the plant
+  static constexpr int extension = Extension;                     ///< m, extended states
+  static constexpr int size = ChainSize<Order, Extension>::size;  ///< N = n + m
+  static constexpr int levels = Levels;                           ///< p
 
   Array<ScaledGain<size, double>, Levels> gains{};  ///< current-estimator gains, scaled
   double gain_of_input{};                           ///< b0, unit of y^(n) per unit of u
   double time_step{};                               ///< T, s
 
+  /// The members by the names that an observer has for them.
+  /// @{
   [[nodiscard]] const ScaledGain<size, double>& level_gain(int level) const noexcept {
     return gains[static_cast<std::size_t>(level)];
   }
   [[nodiscard]] double input_gain() const noexcept { return gain_of_input; }
   [[nodiscard]] double sample_time() const noexcept { return time_step; }
+  /// @}
 };
 
 /// A continuous gain law held in one mode, for ContinuousObserver. @tparam Size N
 template <int Size>
 struct FrozenGain {
   Vector<double, Size> value;  ///< l, row i in 1/s^(i+1)
+
+  /// l, whatever the time and the innovation.
   [[nodiscard]] const Vector<double, Size>& gain(double, double) const noexcept { return value; }
 };
 
@@ -237,6 +243,7 @@ auto observer_system(const Observer& observer, double t = 0.0) {
 ///
 /// The plant is y^(n) = d + b0 u with y measured as y + v; u drops out. From d to dhat the static
 /// gain is one. Sampled: d[k] is held from k to k + 1, v[k] is on y[k].
+/// @param t s, as in observer_system
 template <LinearObserver Observer>
 auto estimation_system(const Observer& observer, double t = 0.0) {
   const auto m = detail::observer_matrices(observer, t);
@@ -253,6 +260,7 @@ auto estimation_system(const Observer& observer, double t = 0.0) {
 /// From measurement noise v and w = d^(m) to the estimation errors z - zhat, all rows: zero unless
 /// the measurement is noisy or d leaves the observer's model class. Sampled: w is held from k to
 /// k + 1.
+/// @param t s, as in observer_system
 template <LinearObserver Observer>
 auto error_system(const Observer& observer, double t = 0.0) {
   constexpr int size = Observer::order + Observer::extension;

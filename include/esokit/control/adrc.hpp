@@ -21,7 +21,7 @@ struct ErrorBased {};
 /// Config of Adrc, of either form. Give `controller_bandwidth` or `gains`, not both.
 template <LoopObserver Observer>
 struct AdrcConfig {
-  using S = typename Observer::scalar_type;
+  using S = typename Observer::scalar_type;  ///< of signals and settings
 
   typename Observer::Config observer{};  ///< b0 and T are in here; b0 of the plant in both forms
   S controller_bandwidth{};              ///< omega_c, rad/s
@@ -68,13 +68,14 @@ class Adrc {
   static_assert(error_based || std::is_same_v<Form, OutputBased>, "esokit: no such form");
 
  public:
-  static constexpr int order = Observer::order;
-  using scalar_type = typename Observer::scalar_type;
-  using S = scalar_type;
-  using Reference = Vector<S, order + 1>;  ///< (r, r', .., r^(n))
+  static constexpr int order = Observer::order;        ///< n, order of the plant
+  using scalar_type = typename Observer::scalar_type;  ///< of signals and settings
+  using S = scalar_type;                               ///< the same
+  using Reference = Vector<S, order + 1>;              ///< (r, r', .., r^(n)), n + 1 x 1
 
-  using Config = AdrcConfig<Observer>;
+  using Config = AdrcConfig<Observer>;  ///< settings of make
 
+  /// Checks the settings and does all the design work.
   /// @return the controller, or an error that names the field
   static Expected<Adrc, Error<S>> make(const Config& config) {
     const auto observer = Observer::make(observer_config(config));
@@ -121,6 +122,7 @@ class Adrc {
     return loop_.step(measured(y, r(0)), [&] { return command(r); });
   }
 
+  /// Both: a reference that moves, and what the actuator held since the last sample.
   template <int Count>
   S update(S y, const Vector<S, Count>& reference, S u_applied) noexcept {
     const Reference r = filled(reference);
@@ -132,6 +134,7 @@ class Adrc {
     return loop_.step_without_measurement([&] { return command(reference); });
   }
 
+  /// The same with a reference that moves.
   template <int Count>
   S update_without_measurement(const Vector<S, Count>& reference) noexcept {
     const Reference r = filled(reference);
@@ -148,6 +151,7 @@ class Adrc {
   StepStatus start(S y, S u) noexcept { return start(y, u, y); }
 
   /// Takes over a plant that stands at y under u. @param reference matters to the error-based form
+  /// @return ok, or input_rejected or state_rejected where u or y is not finite: nothing changes
   StepStatus start(S y, S u, S reference) noexcept {
     return loop_.start(measured(y, reference), u);
   }

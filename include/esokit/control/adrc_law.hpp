@@ -26,6 +26,7 @@ class AdrcLaw {
     S input_gain{};                          ///< b0 of the plant, not zero, negative is fine
   };
 
+  /// Checks the settings and does all the design work.
   /// @return the law, or an error that names the field
   static Expected<AdrcLaw, Error<S>> make(const Config& config) {
     if (auto ok = check_nonzero("input_gain", config.input_gain); !ok) return ok.error();
@@ -56,7 +57,9 @@ class AdrcLaw {
     S power(1.0);
     for (int i = Order - 1; i >= 0; --i) {
       power = power * config.controller_bandwidth;
-      law.gains_[static_cast<std::size_t>(i)] = S(binomial(Order, i)) * power;
+      law.gains_[static_cast<std::size_t>(i)] =
+          S(binomial_table<Order, detail::TableScalar<S>>[Order][static_cast<std::size_t>(i)]) *
+          power;
     }
     if (auto ok = check_representable("controller_bandwidth", config.controller_bandwidth,
                                       law.gains_[0], "gives a gain that the scalar cannot hold");

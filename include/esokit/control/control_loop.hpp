@@ -31,10 +31,10 @@ struct MissingRule {
 /// Settings of a ControlLoop; a controller's config repeats them by name.
 template <PlainScalar S = double>
 struct LoopSettings {
-  Limits<S> limits{};
-  StartHold<S> hold{};
-  MissingRule<S> missing{};
-  int measurement_divider = 1;
+  Limits<S> limits{};           ///< of the actuator
+  StartHold<S> hold{};          ///< u at first, while the observer finds the state
+  MissingRule<S> missing{};     ///< what to do when measurements stay away
+  int measurement_divider = 1;  ///< D: a measurement is due at every D-th step, 1 .. 1000
 };
 
 /// What decides about the output now.
@@ -51,8 +51,11 @@ enum class LoopMode : unsigned char {
 template <LoopObserver Observer>
 class ControlLoop {
  public:
-  using S = typename Observer::scalar_type;
+  using S = typename Observer::scalar_type;  ///< of signals and settings
 
+  /// Checks the settings.
+  /// @param observer as its own `make` gives it
+  /// @return the loop, with the observer in the state that it has, or an error that names the field
   static Expected<ControlLoop, Error<S>> make(const Observer& observer,
                                               const LoopSettings<S>& settings) {
     const auto limiter = Limiter<S>::make(settings.limits, observer.sample_time());
@@ -140,6 +143,7 @@ class ControlLoop {
   }
 
   /// Starts in the steady state (y, u): dhat = -b0 u. Ends hold and safe mode.
+  /// @return ok, or input_rejected or state_rejected where u or y is not finite: nothing changes
   StepStatus start(S measured, S u) noexcept {
     if (!is_finite(u)) return StepStatus::input_rejected;
     if (!is_finite(measured)) return StepStatus::state_rejected;
@@ -171,6 +175,7 @@ class ControlLoop {
   }
 
   /// How long the next step takes (s), where the observer is VariableTime; the rate limit follows.
+  /// A length that the observer refuses changes nothing.
   Check<S> set_step_time(const S& seconds) noexcept
       requires(requires(Observer& o, const S& s) { o.set_step_time(s); }) {
     if (auto ok = observer_.set_step_time(seconds); !ok) return ok;
@@ -181,7 +186,9 @@ class ControlLoop {
     return {};
   }
 
+  /// The observer, for its estimates.
   [[nodiscard]] const Observer& observer() const noexcept { return observer_; }
+  /// The observer, for what only it can do.
   [[nodiscard]] Observer& observer() noexcept { return observer_; }
   /// The last output (limited), or what was reported as applied after it.
   [[nodiscard]] const S& output() const noexcept { return limiter_.last(); }
@@ -189,7 +196,9 @@ class ControlLoop {
   [[nodiscard]] const S& requested() const noexcept { return requested_; }
   /// What the observer said of the last step.
   [[nodiscard]] StepStatus status() const noexcept { return status_; }
+  /// What decides about the output now.
   [[nodiscard]] LoopMode mode() const noexcept { return mode_; }
+  /// The limits, and the output that they last let through.
   [[nodiscard]] const Limiter<S>& limiter() const noexcept { return limiter_; }
 
  private:

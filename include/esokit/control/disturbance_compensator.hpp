@@ -23,10 +23,11 @@ namespace esokit {
 template <LoopObserver Observer>
 class DisturbanceCompensator {
  public:
-  static constexpr int order = Observer::order;
-  using scalar_type = typename Observer::scalar_type;
-  using S = scalar_type;
+  static constexpr int order = Observer::order;        ///< n, order of the plant
+  using scalar_type = typename Observer::scalar_type;  ///< of signals and settings
+  using S = scalar_type;                               ///< the same
 
+  /// Settings of make.
   struct Config {
     typename Observer::Config observer{};  ///< b0 and T are in here
     std::optional<S> compensation_gain{};  ///< K, unit of u per unit of y^(n); left out: -1/b0
@@ -36,6 +37,7 @@ class DisturbanceCompensator {
     int measurement_divider = 1;           ///< D: a measurement is due at every D-th update
   };
 
+  /// Checks the settings and does all the design work.
   /// @return the compensator, or an error that names the field
   static Expected<DisturbanceCompensator, Error<S>> make(const Config& config) {
     const auto observer = Observer::make(config.observer);
@@ -79,6 +81,7 @@ class DisturbanceCompensator {
   S track(S y, S u_applied) noexcept { return loop_.track(y, u_applied); }
 
   /// Takes over a plant that stands at y under u: dhat = -b0 u.
+  /// @return ok, or input_rejected or state_rejected where u or y is not finite: nothing changes
   StepStatus start(S y, S u) noexcept { return loop_.start(y, u); }
 
   /// New settings while running. A refused config changes nothing.
@@ -106,13 +109,17 @@ class DisturbanceCompensator {
   /// The u0 with which u would stay what it is.
   [[nodiscard]] S base_output() const noexcept { return loop_.output() - compensation(); }
 
+  /// The observer, for its estimates.
   [[nodiscard]] const Observer& observer() const noexcept { return loop_.observer(); }
+  /// The observer, for what only it can do (AlgebraicEso::rearm).
   [[nodiscard]] Observer& observer() noexcept { return loop_.observer(); }
   /// The u that holds now, within the limits.
   [[nodiscard]] const S& output() const noexcept { return loop_.output(); }
   /// u0 + K dhat before the limits.
   [[nodiscard]] const S& requested() const noexcept { return loop_.requested(); }
+  /// What the observer said of the last sample.
   [[nodiscard]] StepStatus status() const noexcept { return loop_.status(); }
+  /// Whether u0 + K dhat, the start hold or the missing rule decides about u.
   [[nodiscard]] LoopMode mode() const noexcept { return loop_.mode(); }
 
  private:

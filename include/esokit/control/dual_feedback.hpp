@@ -23,14 +23,16 @@ struct ShiftOperator {};
 /// The filter runs on delta = z - 1: N additions more, no digits lost for any omega_o T.
 struct DeltaOperator {};
 
-/// What the filter is told of u.
-struct LimitedFeedback {};    ///< the applied, limited u: the dual-feedback form
-struct UnlimitedFeedback {};  ///< its own output: the transfer-function form
+/// The filter is told the applied, limited u: the dual-feedback form.
+struct LimitedFeedback {};
+/// The filter is told its own output: the transfer-function form.
+struct UnlimitedFeedback {};
 
 /// Linear ADRC (LinearEso and law with constant gains) as one filter with two feedbacks, of y and
 /// of the limited u. At sample k, with u[k-1] as it was applied:
 ///
-///   s_i = p_i - m_i u,  c = s_1 - n_0 y,  u <- limited(c + k_r r),  p_i <- s_(i+1) - n_i y - d_i c
+///     s_i = p_i - m_i u,  c = s_1 - n_0 y,
+///     u <- limited(c + k_r r),  p_i <- s_(i+1) - n_i y - d_i c
 ///
 /// (DeltaOperator: + s_i). Equal to Adrc<LinearEso> in every sample, limited or not. Operations for
 /// N = n + m: 3 N + 2 multiplications, 3 N + 1 additions (4 N + 1 with DeltaOperator), N additions
@@ -46,9 +48,9 @@ template <int Order, PlainScalar S = double, int Extension = 1, class Operator =
           class Feedback = LimitedFeedback, class Placement = EqualPoles>
 class DualFeedbackAdrc {
  public:
-  static constexpr int order = Order;
-  static constexpr int size = Order + Extension;
-  using scalar_type = S;
+  static constexpr int order = Order;             ///< n, order of the plant
+  static constexpr int size = Order + Extension;  ///< N = n + m
+  using scalar_type = S;                          ///< of signals and settings
 
   /// Give `controller_bandwidth` or `gains`, not both.
   struct Config {
@@ -62,6 +64,7 @@ class DualFeedbackAdrc {
     Limits<S> limits{};                          ///< of the actuator
   };
 
+  /// Checks the settings and does all the design work.
   /// @return the controller at rest in zero, or an error that names the field
   static Expected<DualFeedbackAdrc, Error<S>> make(const Config& config) {
     if (auto ok = check_nonzero("input_gain", config.input_gain); !ok) return ok.error();

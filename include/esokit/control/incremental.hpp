@@ -17,9 +17,9 @@ namespace esokit {
 template <class Controller>
 class Incremental {
  public:
-  using scalar_type = typename Controller::scalar_type;
-  using S = scalar_type;
-  using Config = typename Controller::Config;
+  using scalar_type = typename Controller::scalar_type;  ///< of signals and settings
+  using S = scalar_type;                                 ///< the same
+  using Config = typename Controller::Config;            ///< settings of make
 
   /// As Controller::make.
   static Expected<Incremental, Error<S>> make(const Config& config) {
@@ -28,6 +28,7 @@ class Incremental {
     return Incremental(*controller);
   }
 
+  /// One sample. @param y measurement @param reference as the controller's `update` takes it
   /// @return the change of u to be carried out now
   template <class Reference>
   S update(const S& y, const Reference& reference) noexcept {
@@ -36,7 +37,8 @@ class Incremental {
     return increment_;
   }
 
-  /// @param increment_applied what the actuator made of the last increment
+  /// The same where the actuator reports what it did.
+  /// @param increment_applied what became of the last increment
   template <class Reference>
   S update(const S& y, const Reference& reference, const S& increment_applied) noexcept {
     const S missed = increment_applied - increment_;
@@ -47,6 +49,7 @@ class Incremental {
   }
 
   /// Takes over a plant that stands at y; u counts from `u`, zero if nobody knows.
+  /// @return as Controller::start
   StepStatus start(const S& y, const S& u = S(0)) noexcept {
     increment_ = S(0);
     return controller_.start(y, u);
@@ -55,6 +58,7 @@ class Incremental {
   /// As Controller::retune.
   Check<S> retune(const Config& config) { return controller_.retune(config); }
 
+  /// The controller, whose output is the sum of the increments.
   [[nodiscard]] const Controller& controller() const noexcept { return controller_; }
 
  private:

@@ -23,8 +23,10 @@ struct Limits {
 template <Scalar S = double>
 class Limiter {
  public:
-  /// @param sample_time T, s @return error for limits that are crossed or not finite, a rate that
-  /// is not positive
+  /// Checks the limits.
+  /// @param limits of the actuator @param sample_time T, s
+  /// @return error for limits that are crossed or not finite, or a rate or sample time that is not
+  ///         positive
   static Expected<Limiter, Error<S>> make(const Limits<S>& limits, const S& sample_time) {
     if (auto ok = check_positive("sample_time", sample_time); !ok) return ok.error();
     if (auto ok = check_finite("limits.lower", limits.lower); !ok) return ok.error();
@@ -65,8 +67,11 @@ class Limiter {
 
   /// The last output.
   [[nodiscard]] constexpr const S& last() const noexcept { return last_; }
+  /// Magnitude limits.
+  /// @{
   [[nodiscard]] constexpr const S& lower() const noexcept { return lower_; }
   [[nodiscard]] constexpr const S& upper() const noexcept { return upper_; }
+  /// @}
 
  private:
   Limiter(const Limits<S>& limits, const S& sample_time) noexcept

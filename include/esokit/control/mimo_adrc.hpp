@@ -31,14 +31,15 @@ class MimoAdrc {
   using ObserverOf = std::tuple_element_t<static_cast<std::size_t>(Channel), Channels>;
 
  public:
-  static constexpr int channels = sizeof...(Observers);
-  using scalar_type = typename First::scalar_type;
-  using S = scalar_type;
-  using Output = Vector<S, channels>;                 ///< y, or r, or u
-  using InputMatrix = Matrix<S, channels, channels>;  ///< B0
+  static constexpr int channels = sizeof...(Observers);  ///< q
+  using scalar_type = typename First::scalar_type;       ///< of signals and settings
+  using S = scalar_type;                                 ///< the same
+  using Output = Vector<S, channels>;                    ///< y, or r, or u, q x 1
+  using InputMatrix = Matrix<S, channels, channels>;     ///< B0, q x q
   static_assert((std::is_same_v<typename Observers::scalar_type, S> && ...),
                 "esokit: all channels need the same scalar");
 
+  /// Settings of make.
   struct Config {
     /// One a channel; `input_gain` is left out, B0 says it, and T is the same in all.
     std::tuple<typename Observers::Config...> observers{};
@@ -46,12 +47,14 @@ class MimoAdrc {
     TimeDomain domain = TimeDomain::continuous;      ///< where the controllers' poles are placed
     bool half_gain = false;                          ///< half-gain tuning of the controllers
     InputMatrix input_matrix = InputMatrix::Zero();  ///< B0, unit of y_i^(n_i) per unit of u_j
+
     /// Largest condition number of B0 that is accepted, in the 1-norm after its rows and columns
     /// are scaled to a largest element of 1: units do not matter then.
     S condition_limit = S(1000);
     Array<Limits<S>, channels> limits{};  ///< of each actuator
   };
 
+  /// Checks the settings and does all the design work.
   /// @return the controller at rest in zero, or an error that names the field; for B0 with its
   /// condition number as the value
   static Expected<MimoAdrc, Error<S>> make(const Config& config) {
@@ -140,6 +143,7 @@ class MimoAdrc {
     return u;
   }
 
+  /// Observer of a channel, 0 .. q - 1, for its estimates.
   template <int Channel>
   [[nodiscard]] const ObserverOf<Channel>& observer() const noexcept {
     return std::get<static_cast<std::size_t>(Channel)>(observers_);

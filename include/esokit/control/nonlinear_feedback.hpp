@@ -17,6 +17,7 @@ namespace esokit {
 template <int Order, Scalar S = double>
 class NonlinearFeedback {
  public:
+  /// Settings of make.
   struct Config {
     Array<S, Order> gains = filled(S(1.0));          ///< k_i >= 0, i = 0 .. n - 1
     Array<S, Order> exponents = filled(S(1.0));      ///< a_i > 0; 1 is linear
@@ -24,6 +25,7 @@ class NonlinearFeedback {
     S input_gain{};  ///< b0 of the plant; not zero, negative is fine
   };
 
+  /// Checks the settings and does all the design work.
   /// @return the law, or an error that names the field
   static Expected<NonlinearFeedback, Error<S>> make(const Config& config) {
     for (int i = 0; i < Order; ++i) {
@@ -60,6 +62,8 @@ class NonlinearFeedback {
   }
 
   /// u = (v - dhat) / b0.
+  /// @param estimate (y, .., y^(n-1), d, ..) of an observer with input gain b0
+  /// @param reference (r, .., r^(n-1)), n x 1
   template <int Size>
   [[nodiscard]] S control(const Vector<S, Size>& estimate,
                           const Vector<S, Order>& reference) const noexcept {

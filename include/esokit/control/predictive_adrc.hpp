@@ -64,11 +64,11 @@ concept PredictableObserver = std::copyable<O> &&
 template <PredictableObserver Observer>
 class PredictiveAdrc {
  public:
-  static constexpr int order = Observer::order;
-  using scalar_type = typename Observer::scalar_type;
-  using S = scalar_type;
-  using Estimate = typename Observer::Estimate;
-  using Reference = Vector<S, order + 1>;  ///< (r, r', .., r^(n))
+  static constexpr int order = Observer::order;        ///< n, order of the plant
+  using scalar_type = typename Observer::scalar_type;  ///< of signals and settings
+  using S = scalar_type;                               ///< the same
+  using Estimate = typename Observer::Estimate;        ///< (y, .., y^(n-1), d, ..), N x 1
+  using Reference = Vector<S, order + 1>;              ///< (r, r', .., r^(n)), n + 1 x 1
 
   /// Give `controller_bandwidth` or `gains`, not both.
   struct Config {
@@ -80,6 +80,7 @@ class PredictiveAdrc {
                      ///< the observer settles; rounded up to whole samples
   };
 
+  /// Checks the settings and does all the design work.
   /// @return the controller at rest, reference 0, or an error that names the field
   static Expected<PredictiveAdrc, Error<S>> make(const Config& config) {
     const auto observer = Observer::make(config.observer);
@@ -160,6 +161,7 @@ class PredictiveAdrc {
     set_reference(reference);
   }
 
+  /// The same with its derivatives. @param next_reference as in `prepare`
   template <int Count>
   void set_reference(const Vector<S, Count>& next_reference) noexcept {
     static_assert(Count >= 1 && Count <= order + 1, "esokit: the reference is (r, r', .., r^(n))");
@@ -229,6 +231,7 @@ class PredictiveAdrc {
     return {};
   }
 
+  /// The observer, for its estimates.
   [[nodiscard]] const Observer& observer() const noexcept { return observer_; }
   /// The u that holds now.
   [[nodiscard]] const S& output() const noexcept { return output_; }
@@ -270,7 +273,7 @@ class PredictiveAdrc {
     S unit = inverse;
     for (int i = 0; i <= order; ++i) {
       const auto row = static_cast<std::size_t>(i);
-      if (i > 0) unit = unit * (S(static_cast<double>(i)) * rate_);
+      if (i > 0) unit = unit * (detail::integer<S>(i) * rate_);
       const S gain = i < order ? law.gains()[static_cast<std::size_t>(i % order)] : S(1.0);
       weights_[row] = i < order ? S(gain * unit) : unit;
       feeds_[row] = i < order ? S(gain * inverse) : inverse;
@@ -285,7 +288,7 @@ class PredictiveAdrc {
       return Error<S>{"start_hold", seconds, "must be 1e6 samples or less"};
     }
     std::uint32_t count = 0;
-    while (!all(S(static_cast<double>(count)) >= samples)) ++count;
+    while (!all(detail::integer<S>(count) >= samples)) ++count;
     return count;
   }
 

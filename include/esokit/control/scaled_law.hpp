@@ -39,7 +39,10 @@ inline constexpr bool has_plain_estimate = [] {
 template <int Order, PlainScalar S>
 class ScaledLaw {
  public:
+  /// Folds scaling and 1/b0 into the gains.
+  /// @param law whose gains they are
   /// @param observer for its sample time; its b0 is that of the law, or minus that (error-based)
+  /// @return error for gains that the scalar cannot hold
   template <class Observer>
   static Expected<ScaledLaw, Error<S>> make(const AdrcLaw<Order, S>& law,
                                             const Observer& observer) {
@@ -88,6 +91,7 @@ class ScaledLaw {
 
 /// Where the law cannot be folded.
 struct NoScaledLaw {
+  /// Nothing; never an error.
   template <class Law, class Observer>
   static Expected<NoScaledLaw, Error<typename Observer::scalar_type>> make(const Law&,
                                                                            const Observer&) {

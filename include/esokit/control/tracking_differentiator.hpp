@@ -11,8 +11,9 @@ namespace esokit {
 
 /// Han's time-optimal control of a double integrator sampled with h, fhan(x1, x2, r, h0): brings
 /// (x1, x2) to zero in the least number of steps with |.| <= r, and without chatter.
-/// @param x1 distance @param x2 its derivative @param acceleration r > 0 @param width h0 > 0, s:
-/// the sample time h, or more to smooth
+/// @param x1 distance @param x2 its derivative @param acceleration r > 0
+/// @param width h0 > 0, s: the sample time h, or more to smooth
+/// @return the acceleration to be applied, unit of x1 / s^2
 template <PlainScalar S>
 [[nodiscard]] S fhan(S x1, S x2, S acceleration, S width) noexcept {
   const S d = acceleration * width * width;
@@ -30,12 +31,14 @@ template <PlainScalar S>
 template <PlainScalar S = double>
 class TrackingDifferentiator {
  public:
+  /// Settings of make.
   struct Config {
     S acceleration{};  ///< R > 0, unit of the reference / s^2
     S sample_time{};   ///< h, s
     S filter_time{};   ///< h0 >= h, s: smooths a noisy reference; 0: h
   };
 
+  /// Checks the settings and does all the design work.
   /// @return at rest in zero, or an error that names the field
   static Expected<TrackingDifferentiator, Error<S>> make(const Config& config) {
     if (auto ok = check_positive("acceleration", config.acceleration); !ok) return ok.error();
@@ -105,11 +108,13 @@ class TrackingDifferentiator {
 template <PlainScalar S = double>
 class SignTrackingDifferentiator {
  public:
+  /// Settings of make.
   struct Config {
     S acceleration{};  ///< R > 0, unit of the reference / s^2
     S sample_time{};   ///< h, s, of `update`; it may be left out where only `rate` is used
   };
 
+  /// Checks the settings and does all the design work.
   /// @return at rest in zero, or an error that names the field
   static Expected<SignTrackingDifferentiator, Error<S>> make(const Config& config) {
     if (auto ok = check_positive("acceleration", config.acceleration); !ok) return ok.error();
@@ -135,8 +140,11 @@ class SignTrackingDifferentiator {
     return true;
   }
 
+  /// r1, unit of the reference.
   [[nodiscard]] S value() const noexcept { return r1_; }
+  /// r2 = r1', unit of the reference / s.
   [[nodiscard]] S derivative() const noexcept { return r2_; }
+  /// (r1, r2).
   [[nodiscard]] Vector<S, 2> state() const noexcept { return {r1_, r2_}; }
 
   /// Starts anew at rest at `value`; false, and nothing changes, if it is not finite.

@@ -5,6 +5,9 @@
 /// double holds them exactly.
 #pragma once
 
+#include <array>
+#include <cstddef>
+
 namespace esokit {
 
 /// n! for n >= 0.
@@ -22,7 +25,22 @@ constexpr double binomial(int n, int k) noexcept {
   return value;
 }
 
-/// Unsigned Stirling number of the first kind: x (x+1) .. (x+n-1) = sum_k c(n, k) x^k.
+/// C(n, k) for n and k from 0 to Most, in T. Where a loop over them is not unrolled, float code
+/// would compute the doubles above while it runs; on a single-precision target in software.
+template <int Most, class T>
+inline constexpr auto binomial_table = [] {
+  constexpr auto count = static_cast<std::size_t>(Most) + 1;
+  std::array<std::array<T, count>, count> table{};
+  for (std::size_t n = 0; n < count; ++n) {
+    for (std::size_t k = 0; k < count; ++k) {
+      table[n][k] = static_cast<T>(binomial(static_cast<int>(n), static_cast<int>(k)));
+    }
+  }
+  return table;
+}();
+
+/// Unsigned Stirling number of the first kind: x (x+1) .. (x+n-1) = sum_k c(n, k) x^k. Zero outside
+/// 0 <= k <= n <= 20.
 constexpr double unsigned_stirling_first(int n, int k) noexcept {
   if (k < 0 || k > n || n > 20) return 0.0;
   double row[21] = {1.0};
@@ -33,13 +51,15 @@ constexpr double unsigned_stirling_first(int n, int k) noexcept {
   return row[k];
 }
 
-/// Signed Stirling number of the first kind: x (x-1) .. (x-n+1) = sum_k s(n, k) x^k.
+/// Signed Stirling number of the first kind: x (x-1) .. (x-n+1) = sum_k s(n, k) x^k. Zero outside
+/// 0 <= k <= n <= 20.
 constexpr double stirling_first(int n, int k) noexcept {
   const double magnitude = unsigned_stirling_first(n, k);
   return (n - k) % 2 == 0 ? magnitude : -magnitude;
 }
 
-/// Stirling number of the second kind: partitions of n things into k non-empty parts.
+/// Stirling number of the second kind: partitions of n things into k non-empty parts. Zero outside
+/// 0 <= k <= n <= 20.
 constexpr double stirling_second(int n, int k) noexcept {
   if (k < 0 || k > n || n > 20) return 0.0;
   double row[21] = {1.0};

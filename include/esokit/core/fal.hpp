@@ -12,8 +12,8 @@ namespace esokit {
 template <Scalar S>
 class Fal {
  public:
-  /// @param exponent a > 0; below 1: small errors count more @param linear_width delta > 0, unit of
-  /// e
+  /// @param exponent a > 0; below 1: small errors count more
+  /// @param linear_width delta > 0, unit of e
   constexpr Fal(const S& exponent, const S& linear_width) noexcept
       : power_(exponent - S(1.0)), linear_width_(linear_width) {}
 
@@ -33,6 +33,7 @@ class Fal {
 };
 
 /// fal(e, a, delta) for one use; keep a `Fal` where it is evaluated often.
+/// @param error e @param exponent a > 0 @param linear_width delta > 0, unit of e
 template <Scalar S>
 [[nodiscard]] S fal(const S& error, const S& exponent, const S& linear_width) noexcept {
   return Fal<S>(exponent, linear_width)(error);

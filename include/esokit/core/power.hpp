@@ -14,9 +14,11 @@ namespace esokit {
 template <Scalar S>
 class Power {
  public:
+  /// @param exponent p, any finite number
   constexpr explicit Power(const S& exponent) noexcept
       : exponent_(exponent), kind_(kind_of(exponent)) {}
 
+  /// x^p, x > 0.
   [[nodiscard]] S operator()(const S& x) const noexcept {
     using std::pow;
     using std::sqrt;
@@ -37,6 +39,7 @@ class Power {
     return pow(x, exponent_);
   }
 
+  /// p.
   [[nodiscard]] constexpr const S& exponent() const noexcept { return exponent_; }
 
  private:

@@ -11,6 +11,7 @@
 #include <limits>
 #include <type_traits>
 
+/// Extended state observers, the controllers built on them, their design and their analysis.
 namespace esokit {
 
 /// True for the scalars that may branch: float, double, long double.
@@ -110,6 +111,21 @@ constexpr T absolute(const T& value) noexcept {
 template <class T>
 constexpr T constant(double value) noexcept {
   return static_cast<T>(value);
+}
+
+/// The type in which compile-time tables are kept, so that float code loads no doubles.
+template <class S>
+using TableScalar = std::conditional_t<PlainScalar<S>, S, double>;
+
+/// A count in the scalar type. Plain scalars convert at once: by way of a double it takes two
+/// soft-float helpers on a single-precision target.
+template <class T, std::integral Count>
+constexpr T integer(Count count) noexcept {
+  if constexpr (PlainScalar<T>) {
+    return static_cast<T>(count);
+  } else {
+    return T(static_cast<double>(count));
+  }
 }
 
 }  // namespace detail

@@ -10,8 +10,16 @@
 #include <type_traits>
 #include <utility>
 
-// What a step consists of is forced inline: GCC at -O2 otherwise leaves parts of it as calls, and
-// the state goes through memory between them.
+/// @def ESOKIT_INLINE
+/// Forced inline, as all is that a step consists of: GCC at -O2 otherwise leaves parts of it as
+/// calls, and the state goes through memory between them.
+
+/// @def ESOKIT_INLINE_LAMBDA
+/// The same behind the parameters of a lambda.
+
+/// @def ESOKIT_COLD
+/// Out of line: what happens rarely shall not cost the hot path.
+
 #if defined(__GNUC__)
 #define ESOKIT_INLINE [[gnu::always_inline]] inline
 #define ESOKIT_INLINE_LAMBDA __attribute__((always_inline))

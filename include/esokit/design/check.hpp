@@ -9,7 +9,7 @@
 
 namespace esokit {
 
-/// Outcome of a check.
+/// Outcome of a check: success, or the error of the value.
 template <Scalar S>
 using Check = Expected<void, Error<S>>;
 

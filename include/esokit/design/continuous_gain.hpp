@@ -19,7 +19,8 @@ Vector<S, Size> continuous_gain(const S& bandwidth) {
   S power(1.0);
   for (int i = 1; i <= Size; ++i) {
     power = power * bandwidth;
-    gain(i - 1) = S(binomial(Size, i)) * power;
+    gain(i - 1) =
+        S(binomial_table<Size, detail::TableScalar<S>>[Size][static_cast<std::size_t>(i)]) * power;
   }
   return gain;
 }

@@ -78,8 +78,9 @@ class CovarianceFactor {
   static constexpr int below_diagonal = Size * (Size - 1) / 2;
 
  public:
-  using Square = Matrix<S, Size, Size>;
+  using Square = Matrix<S, Size, Size>;  ///< N x N
 
+  /// P = 0.
   CovarianceFactor() noexcept {
     for (S& d : variances_) d = S(0.0);
     for (S& l : lower_) l = S(0.0);
@@ -122,9 +123,10 @@ class CovarianceFactor {
 
   /// D_i, i = 0 .. N - 1; the first is the variance of the measured state.
   [[nodiscard]] constexpr const S& variance(int i) const noexcept { return variances_[index(i)]; }
+  /// Replaces D_i. @param d not negative
   constexpr void set_variance(int i, const S& d) noexcept { variances_[index(i)] = d; }
 
-  /// L_ij.
+  /// L_ij, i and j from 0 to N - 1.
   [[nodiscard]] constexpr S lower(int i, int j) const noexcept {
     if (i < j) return S(0.0);
     return i == j ? S(1.0) : lower_[packed(i, j)];
@@ -324,7 +326,7 @@ class CovarianceFactor {
 
   /// C(j, i) in the scalar of tables.
   static constexpr detail::TableScalar<S> pascal(int j, int i) noexcept {
-    return static_cast<detail::TableScalar<S>>(binomial(j, i));
+    return binomial_table<Size, detail::TableScalar<S>>[index(j)][index(i)];
   }
 
   static constexpr S inverse_of(const S& variance) noexcept {

@@ -57,7 +57,7 @@ void make_lower(Matrix<S, Rows, Columns>& a) noexcept {
 template <int Size, PlainScalar S>
 class CovarianceRoot {
  public:
-  using Square = Matrix<S, Size, Size>;
+  using Square = Matrix<S, Size, Size>;  ///< N x N
 
   /// Nothing if the matrix is not positive semidefinite to within rounding.
   static std::optional<CovarianceRoot> from_matrix(const Square& p) noexcept {
@@ -71,18 +71,23 @@ class CovarianceRoot {
     return CovarianceRoot(CovarianceFactor<Size, S>::nearest(p));
   }
 
+  /// P = 0.
   CovarianceRoot() noexcept = default;
 
+  /// S, N x N.
   [[nodiscard]] const Square& lower() const noexcept { return lower_; }
+  /// S S', N x N.
   [[nodiscard]] Square matrix() const noexcept {
     return detail::plus_product_transposed<Size, Size, Size, S>(Square::Zero(), lower_, lower_,
                                                                 S(1));
   }
+  /// Largest magnitude in S.
   [[nodiscard]] S largest() const noexcept { return lower_.cwiseAbs().maxCoeff(); }
 
   /// S times a factor.
   void scale(const S& factor) noexcept { lower_ *= factor; }
 
+  /// Makes a row of S zero: this element is known for certain, and correlated with nothing.
   void clear_row(int row) noexcept { lower_.row(row).setZero(); }
 
   /// Every element within a share of the other's, or of its row where it is small.
@@ -98,7 +103,8 @@ class CovarianceRoot {
     return true;
   }
 
-  /// P <- growth Phi P Phi' + Q.
+  /// One sample ahead: P <- growth Phi P Phi' + Q.
+  /// @param transition Phi, N x N @param growth > 0 @param noise Q
   void advance(const Square& transition, const S& growth, const CovarianceRoot& noise) noexcept {
     const Square moved = detail::product<Size, Size, Size, S>(transition, lower_);
     const S root = std::sqrt(growth);
@@ -115,8 +121,9 @@ class CovarianceRoot {
     }
   }
 
-  /// P <- P - K C P with K = P C' (C P C' + R)^-1, which is returned, N x p. Where an output is
-  /// known for certain, that is C P C' + R is zero in some direction, nothing is corrected there.
+  /// P <- P - K C P with K = P C' (C P C' + R)^-1. Where an output is known for certain, that is
+  /// C P C' + R is zero in some direction, nothing is corrected there.
+  /// @param output C, p x N @param measurement R, p x p @return K, N x p
   template <int Outputs>
   Matrix<S, Size, Outputs> correct(const Matrix<S, Outputs, Size>& output,
                                    const CovarianceRoot<Outputs, S>& measurement) noexcept {

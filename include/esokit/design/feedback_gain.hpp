@@ -25,26 +25,40 @@ template <Scalar S>
 struct FeedbackSpec {
   S bandwidth{};                               ///< omega_c, rad/s
   TimeDomain domain = TimeDomain::continuous;  ///< see TimeDomain
-  bool half_gain = false;                      ///< half-gain tuning of the controller
+  bool half_gain = false;                      ///< half the gains, see design/half_gain.hpp
 };
 
 namespace detail {
 
+/// s(n-i, n-r) / (n-i)! for i <= r < n.
+template <int Order, class T>
+constexpr Array<Array<T, Order>, Order> held_input_table() noexcept {
+  Array<Array<T, Order>, Order> table{};
+  for (int r = 0; r < Order; ++r) {
+    for (int i = 0; i <= r; ++i) {
+      table[static_cast<std::size_t>(i)][static_cast<std::size_t>(r)] =
+          static_cast<T>(stirling_first(Order - i, Order - r) / factorial(Order - i));
+    }
+  }
+  return table;
+}
+
 /// Gains from e_m, the elementary symmetric functions of the contractions a_i = 1 - rho_i:
 ///
-///   k_r = (n-r)! / T^(n-r) sum_{i<=r} e_(n-i) s(n-i, n-r) / (n-i)!
+///     k_r = (n-r)! / T^(n-r) sum_{i<=r} e_(n-i) s(n-i, n-r) / (n-i)!
 ///
 /// (s: signed Stirling numbers of the first kind). It is Ackermann's formula written in delta =
 /// Phi - 1: the row that picks Gamma's last power is e_1^T e^A (A / (e^A - 1))^(n+1).
 template <int Order, Scalar S>
 Array<S, Order> held_input_feedback(const Array<S, Order + 1>& symmetric, const S& rate) {
+  constexpr auto table = held_input_table<Order, TableScalar<S>>();
   Array<S, Order> gain{};
   S unit(1.0);
   for (int r = Order - 1; r >= 0; --r) {
-    unit = unit * (S(static_cast<double>(Order - r)) * rate);
+    unit = unit * (detail::integer<S>(Order - r) * rate);
     S sum(0.0);
     for (int i = 0; i <= r; ++i) {
-      const S weight = S(stirling_first(Order - i, Order - r) / factorial(Order - i));
+      const S weight(table[static_cast<std::size_t>(i)][static_cast<std::size_t>(r)]);
       sum = sum + weight * symmetric[static_cast<std::size_t>(Order - i)];
     }
     gain[static_cast<std::size_t>(r)] = unit * sum;
@@ -56,6 +70,7 @@ Array<S, Order> held_input_feedback(const Array<S, Order + 1>& symmetric, const 
 
 /// Gains for the poles `rho_i = 1 - contractions_i` of the sampled loop under a held input.
 /// @param contractions 1 - rho_i; complex ones with their conjugates @param sample_time T, s
+/// @return k_0 .. k_(n-1), k_i in 1/s^(n-i)
 template <int Order, PlainScalar S>
 Array<S, Order> sampled_feedback_gain(const Array<std::complex<S>, Order>& contractions,
                                       const S& sample_time) {
@@ -71,20 +86,23 @@ Array<S, Order> sampled_feedback_gain(const Array<std::complex<S>, Order>& contr
 
 /// Gains for all poles at exp(-omega_c T) under a held input.
 /// @param bandwidth omega_c, rad/s @param sample_time T, s
+/// @return k_0 .. k_(n-1), k_i in 1/s^(n-i)
 template <int Order, Scalar S>
 Array<S, Order> sampled_feedback_gain(const S& bandwidth, const S& sample_time) {
   const S a = EqualSampledPoles<Order, S>::from_bandwidth(bandwidth, sample_time).contraction;
+  constexpr auto& row = binomial_table<Order, detail::TableScalar<S>>[Order];
   Array<S, Order + 1> symmetric{};
   S power(1.0);
   for (int j = 0; j <= Order; ++j) {
-    symmetric[static_cast<std::size_t>(j)] = S(binomial(Order, j)) * power;
+    symmetric[static_cast<std::size_t>(j)] = S(row[static_cast<std::size_t>(j)]) * power;
     power = power * a;
   }
   return detail::held_input_feedback<Order, S>(symmetric, S(S(1.0) / sample_time));
 }
 
 /// Gains for a spec. @param sample_time T, s; matters in the sampled domain only
-/// @return k_0 .. k_(n-1), or the error of a bandwidth that is not positive or too large
+/// @return k_0 .. k_(n-1), k_i in 1/s^(n-i), or the error of a bandwidth that is not positive or is
+///         too large
 template <int Order, PlainScalar S>
 Expected<Array<S, Order>, Error<S>> feedback_gain(const FeedbackSpec<S>& spec,
                                                   const S& sample_time) {

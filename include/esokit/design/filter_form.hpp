@@ -7,15 +7,15 @@
 ///
 /// Observer (LinearEso, current estimator) and law together are
 ///
-///   D c = -(N_y y + N_u u),  u = limited(c + k_r r),  k_r = k_0 / b0.
+///     D c = -(N_y y + N_u u),  u = limited(c + k_r r),  k_r = k_0 / b0.
 ///
 /// With delta = z - 1, Q = P - 1 (P Pascal's triangle, the predictor of the scaled chain), l = P k
 /// the predictor gain, h the law as a row on scaled states and g the effect of a unit drive:
 ///
-///   D   = prod(delta + a_i)             = sum_j beta_j delta^(N-j)
-///   N_y = n! / (b0 T^n) sum_j nu_j delta^(N-j),  nu_0 = h k,  nu_j = h Q^(j-1) l
-///   N_u = sum_p m_p delta^(N-p),  m_p = sum_(j=1..p) beta_(p-j) h Q^(j-1) g - nu_(p-j) e_1 Q^(j-1)
-///   g
+///     D   = prod(delta + a_i)             = sum_j beta_j delta^(N-j)
+///     N_y = n! / (b0 T^n) sum_j nu_j delta^(N-j),  nu_0 = h k,  nu_j = h Q^(j-1) l
+///     N_u = sum_p m_p delta^(N-p),
+///     m_p = sum_(j=1..p) (beta_(p-j) h Q^(j-1) g - nu_(p-j) e_1 Q^(j-1) g)
 ///
 /// beta and k come from the contractions a_i = 1 - rho_i through expm1, so all coefficients are
 /// good to a few units in the last place for every omega_o T; expanding them in z costs
@@ -45,7 +45,8 @@ Array<S, Size + 1> error_coefficients(const EqualSampledPoles<Size, S>& poles) {
   Array<S, Size + 1> beta{};
   S power(1);
   for (int j = 0; j <= Size; ++j) {
-    beta[static_cast<std::size_t>(j)] = static_cast<S>(binomial(Size, j)) * power;
+    beta[static_cast<std::size_t>(j)] =
+        binomial_table<Size, S>[Size][static_cast<std::size_t>(j)] * power;
     power = power * poles.contraction;
   }
   return beta;
@@ -71,7 +72,8 @@ Array<S, Size> pascal_step(const Array<S, Size>& x) {
   for (int r = 0; r < Size; ++r) {
     S sum(0);
     for (int j = Size - 1; j > r; --j) {
-      sum = sum + static_cast<S>(binomial(j, r)) * x[static_cast<std::size_t>(j)];
+      const auto column = static_cast<std::size_t>(j);
+      sum = sum + binomial_table<Size, S>[column][static_cast<std::size_t>(r)] * x[column];
     }
     result[static_cast<std::size_t>(r)] = sum;
   }
@@ -101,7 +103,8 @@ FilterForm<Size, S> delta_form(const Poles& poles, const Array<S, Order>& gains,
   for (int r = Order - 1; r >= 0; --r) {
     unit = unit * sample_time / static_cast<S>(r + 1);
     law[static_cast<std::size_t>(r)] = gains[static_cast<std::size_t>(r)] * unit;
-    drive[static_cast<std::size_t>(r)] = static_cast<S>(binomial(Order, r));
+    drive[static_cast<std::size_t>(r)] =
+        binomial_table<Order, S>[Order][static_cast<std::size_t>(r)];
   }
   const auto weights = poles.weights();
   const Row current = current_gain<Size, S>(weights);
@@ -135,13 +138,15 @@ FilterForm<Size, S> delta_form(const Poles& poles, const Array<S, Order>& gains,
 }
 
 /// The same polynomials in z: sum_j c_j (z-1)^(N-j) multiplied out.
+/// @param delta as `delta_form` gives it
 template <int Size, PlainScalar S>
 FilterForm<Size, S> shift_form(const FilterForm<Size, S>& delta) {
   const auto expand = [](const Array<S, Size + 1>& in) {
     Array<S, Size + 1> out{};
     for (int i = 0; i <= Size; ++i) {
       for (int j = 0; j <= i; ++j) {
-        const S weight = static_cast<S>(binomial(Size - j, i - j));
+        const S weight = binomial_table<Size, S>[static_cast<std::size_t>(Size - j)]
+                                                [static_cast<std::size_t>(i - j)];
         const S term = weight * in[static_cast<std::size_t>(j)];
         auto& sum = out[static_cast<std::size_t>(i)];
         sum = (i - j) % 2 == 0 ? sum + term : sum - term;

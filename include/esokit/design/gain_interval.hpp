@@ -17,8 +17,8 @@ namespace esokit {
 /// From `low` to `high`.
 template <class S>
 struct Interval {
-  S low{};
-  S high{};
+  S low{};   ///< lower end
+  S high{};  ///< upper end, may be infinite
 };
 
 namespace detail {

@@ -5,7 +5,7 @@
 ///
 /// Half gains turn (s + omega)^N into ((s + omega)^N + s^N) / 2, whose roots are
 ///
-///   s_k = -omega/2 (1 + j cot(theta_k / 2)),  theta_k = pi (2k + 1) / N,
+///     s_k = -omega/2 (1 + j cot(theta_k / 2)),  theta_k = pi (2k + 1) / N,
 ///
 /// so it is a pole set like any other. Sampled, the poles go to exp(s_k T): stable for every
 /// omega T, which halved sampled gains are not (N = 4 loses stability at omega T = 0.88), and with
@@ -42,25 +42,28 @@ struct HalfGainPoles {
   using Spec = S;  ///< omega_o, rad/s, of the observer whose gains are halved
 
   template <int Size, PlainScalar S>
-  using Sampled = SampledPoleSet<Size, S>;
+  using Sampled = SampledPoleSet<Size, S>;  ///< what `sample` gives
 
+  /// Error of a bandwidth that is not finite or not positive.
   template <int Size, PlainScalar S>
   static Check<S> check(const char* field, const S& bandwidth, int index = -1) {
     return check_positive(field, bandwidth, index);
   }
 
+  /// Poles at exp(s_k T). @param bandwidth omega_o, rad/s @param sample_time T, s
   template <int Size, PlainScalar S>
   static SampledPoleSet<Size, S> sample(const S& bandwidth, const S& sample_time) {
     return SampledPoleSet<Size, S>::from_continuous(half_gain_poles<Size, S>(bandwidth),
                                                     sample_time);
   }
 
-  /// Exactly half of the bandwidth parameterisation's.
+  /// Exactly half of the bandwidth parameterisation's. @return l, N x 1, row i in 1/s^(i+1)
   template <int Size, PlainScalar S>
   static Vector<S, Size> gain(const S& bandwidth) {
     return continuous_gain<Size, S>(bandwidth) / S(2);
   }
 
+  /// A number that names the spec in an error.
   template <int Size, PlainScalar S>
   static S representative(const S& bandwidth) {
     return bandwidth;

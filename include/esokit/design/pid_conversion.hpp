@@ -4,9 +4,10 @@
 ///
 /// Continuous linear ADRC of order n is, from y to u, exactly
 ///
-///   n = 1:  (K_p + K_i / s) / (tau s + 1)                            tau = 1 / M
-///   n = 2:  (K_p + K_i / s + K_d s) / (tau2 s^2 + tau1 s + 1)        tau2 = 1 / M, tau1 = (l1 +
-///   k1)/M
+///     n = 1:  (K_p + K_i / s) / (tau s + 1),
+///             tau = 1 / M
+///     n = 2:  (K_p + K_i / s + K_d s) / (tau2 s^2 + tau1 s + 1),
+///             tau2 = 1 / M, tau1 = (l1 + k1) / M
 ///
 /// with M = l1 + k0 or l2 + k1 l1 + k0; with omega_o = kappa omega_c all gains are rational in
 /// kappa (compare G. Herbst, Control Theory and Technology 19 (2021) 19-34).
@@ -38,6 +39,7 @@ struct AdrcTuning {
 };
 
 /// Gains of the PI (Order 1) or PID (Order 2) that the ADRC is. Always exists.
+/// @return error for an input gain of zero, or a bandwidth that is not positive
 template <int Order, PlainScalar S>
 Expected<PidGains<S>, Error<S>> pid_from_adrc(const AdrcTuning<S>& tuning) {
   static_assert(Order == 1 || Order == 2, "esokit: PID is for orders 1 and 2");
@@ -74,8 +76,11 @@ Expected<PidGains<S>, Error<S>> pid_from_adrc(const AdrcTuning<S>& tuning) {
 /// follows from K_p^2 / (K_i K_d) = (2 kappa + 3)^2 / (kappa^2 + 6 kappa + 3), which for kappa >= 1
 /// runs from 2.5 to 4 (K_p^2 / (K_i K_d) = 4 is Ziegler and Nichols' T_i = 4 T_d). Below 2.5 kappa
 /// = 1 is taken, above what `bandwidth_ratio` gives that; `exact` is false then.
+/// @param pid gains that are not zero and of one sign; the filter is not looked at
 /// @param bandwidth_ratio kappa of PI, largest kappa of PID; the step response wants 3 .. 10, noise
-/// wants less
+///        wants less
+/// @return error for gains that are zero or of different signs, and for a ratio that is not
+///         positive (PI) or not above 1 (PID)
 template <int Order, PlainScalar S>
 Expected<AdrcTuning<S>, Error<S>> adrc_from_pid(const PidGains<S>& pid, S bandwidth_ratio = S(10)) {
   static_assert(Order == 1 || Order == 2, "esokit: PID is for orders 1 and 2");

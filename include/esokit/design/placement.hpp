@@ -19,18 +19,21 @@ struct EqualPoles {
   using Spec = S;  ///< omega_o, rad/s
 
   template <int Size, Scalar S>
-  using Sampled = EqualSampledPoles<Size, S>;
+  using Sampled = EqualSampledPoles<Size, S>;  ///< what `sample` gives
 
+  /// Error of a bandwidth that is not finite or not positive.
   template <int Size, Scalar S>
   static Check<S> check(const char* field, const S& bandwidth, int index = -1) {
     return check_positive(field, bandwidth, index);
   }
 
+  /// Poles at exp(-omega_o T). @param bandwidth omega_o, rad/s @param sample_time T, s
   template <int Size, Scalar S>
   static EqualSampledPoles<Size, S> sample(const S& bandwidth, const S& sample_time) {
     return EqualSampledPoles<Size, S>::from_bandwidth(bandwidth, sample_time);
   }
 
+  /// Gain of the continuous observer. @return l, N x 1, row i in 1/s^(i+1)
   template <int Size, Scalar S>
   static Vector<S, Size> gain(const S& bandwidth) {
     return continuous_gain<Size, S>(bandwidth);
@@ -49,8 +52,10 @@ struct PoleSet {
   using Spec = Array<std::complex<S>, Size>;  ///< p_i, 1/s
 
   template <int Size, PlainScalar S>
-  using Sampled = SampledPoleSet<Size, S>;
+  using Sampled = SampledPoleSet<Size, S>;  ///< what `sample` gives
 
+  /// Error of the first pole that is not finite, not in the left half plane, or complex without its
+  /// conjugate.
   /// @param set number of the set in an array of sets; the error then counts poles through all sets
   template <int Size, PlainScalar S>
   static Check<S> check(const char* field, const Spec<Size, S>& poles, int set = -1) {
@@ -82,16 +87,19 @@ struct PoleSet {
     return {};
   }
 
+  /// Poles at exp(p_i T). @param poles p_i, 1/s @param sample_time T, s
   template <int Size, PlainScalar S>
   static SampledPoleSet<Size, S> sample(const Spec<Size, S>& poles, const S& sample_time) {
     return SampledPoleSet<Size, S>::from_continuous(poles, sample_time);
   }
 
+  /// Gain of the continuous observer. @return l, N x 1, row i in 1/s^(i+1)
   template <int Size, PlainScalar S>
   static Vector<S, Size> gain(const Spec<Size, S>& poles) {
     return continuous_gain<Size, S>(poles);
   }
 
+  /// A number that names the spec in an error.
   template <int Size, PlainScalar S>
   static S representative(const Spec<Size, S>& poles) {
     return poles[0].real();

@@ -20,9 +20,10 @@ template <int Degree, Scalar S>
 bool positive_on_half_line(const Array<S, Degree + 1>& coefficients) {
   using Piece = Array<S, Degree + 1>;
   constexpr std::size_t depth = std::is_same_v<S, float> ? 14 : 28;
+  constexpr auto& row = binomial_table<Degree, detail::TableScalar<S>>[Degree];
   Piece piece{};
   for (std::size_t i = 0; i <= Degree; ++i) {
-    piece[i] = coefficients[i] / S(binomial(Degree, static_cast<int>(i)));
+    piece[i] = coefficients[i] / S(row[i]);
     if (!all(is_finite(piece[i]))) return false;
   }
   Array<Piece, static_cast<int>(depth)> waiting{};

@@ -1,7 +1,7 @@
 /// @file
 /// Steady state of the Riccati recursion of a filter.
 ///
-///   P- = inflation Phi P Phi' + Q,  K = P- C' (C P- C' + R)^-1,  P = (I - K C) P-
+///     P- = inflation Phi P Phi' + Q,  K = P- C' (C P- C' + R)^-1,  P = (I - K C) P-
 ///
 /// Newton's method on the gain (G. A. Hewer, 1971): the covariance of a given stable gain solves a
 /// Stein equation, which Smith's doubling sums up from positive terms, and gives the next gain. It
@@ -28,7 +28,7 @@ struct RiccatiModel {
   Matrix<S, Outputs, Size> output;          ///< C, p x N
   Matrix<S, Size, Size> noise;              ///< Q, N x N
   Matrix<S, Outputs, Outputs> measurement;  ///< R, p x p
-  S inflation{1.0};                         ///< > 0
+  S inflation{1.0};                         ///< factor on Phi P Phi', > 0
 };
 
 namespace detail {
@@ -158,7 +158,11 @@ std::optional<CovarianceFactor<Size, S>> chain_riccati(const CovarianceFactor<Si
   model.inflation = inflation;
   for (int i = 0; i < Size; ++i) {
     model.output(0, i) = S(i == 0 ? 1.0 : 0.0);
-    for (int j = 0; j < Size; ++j) model.transition(i, j) = S(binomial(j, i));
+    for (int j = 0; j < Size; ++j) {
+      model.transition(i, j) =
+          S(binomial_table<Size, detail::TableScalar<S>>[static_cast<std::size_t>(j)]
+                                                        [static_cast<std::size_t>(i)]);
+    }
   }
   if (!all(inflation > S(1.0)) && !all(model.noise(Size - 1, Size - 1) > S(0.0))) {
     return std::nullopt;

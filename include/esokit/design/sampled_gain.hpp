@@ -6,7 +6,7 @@
 /// impulse response of prod(1 - rho_i w) / (1-w)^N at t = 1, 2, .. . Written with contractions a_i
 /// = 1 - rho_i, 1 - rho_i w = a_i + rho_i (1-w), that gives
 ///
-///   k_r = sum_{j>r} b_j c(j, r+1) / (j-1)!,   sum_j b_j s^j = prod_i (a_i s + rho_i)
+///     k_r = sum_{j>r} b_j c(j, r+1) / (j-1)!,   sum_j b_j s^j = prod_i (a_i s + rho_i)
 ///
 /// (c: unsigned Stirling numbers of the first kind). For real poles in [0, 1) every term is
 /// positive: nothing cancels, and each gain is good to a few units in the last place for any
@@ -32,10 +32,6 @@ template <int Size, Scalar S>
 using PoleWeights = Array<S, Size + 1>;
 
 namespace detail {
-
-/// The type in which compile-time tables are kept, so that float code loads no doubles.
-template <class S>
-using TableScalar = std::conditional_t<PlainScalar<S>, S, double>;
 
 template <int Size, class T>
 constexpr Array<Array<T, Size + 1>, Size> gain_table() noexcept {
@@ -76,13 +72,14 @@ constexpr ScaledGain<Size, S> predictor_gain(const PoleWeights<Size, S>& weights
 }
 
 /// A scaled gain in physical units: r! / T^r k_r. @param sample_time T, s
+/// @return N x 1, row r in 1/s^r
 template <int Size, Scalar S>
 Vector<S, Size> physical_gain(const ScaledGain<Size, S>& scaled, const S& sample_time) {
   return ScaledChain<Size - 1, S, 1>::physical(scaled, S(S(1.0) / sample_time));
 }
 
-/// A physical gain in scaled form, for a gain law written in physical units. @param sample_time T,
-/// s
+/// A physical gain in scaled form, for a gain law written in physical units.
+/// @param gain N x 1, row r in 1/s^r @param sample_time T, s
 template <int Size, Scalar S>
 ScaledGain<Size, S> scaled_gain(const Vector<S, Size>& gain, const S& sample_time) {
   return ScaledChain<Size - 1, S, 1>::scaled(gain, sample_time);
@@ -93,7 +90,7 @@ template <int Size, Scalar S>
 struct EqualSampledPoles {
   S contraction{};  ///< a = 1 - rho, in (0, 1]
 
-  /// @param bandwidth omega_o, rad/s @param sample_time T, s
+  /// From the bandwidth. @param bandwidth omega_o, rad/s @param sample_time T, s
   static EqualSampledPoles from_bandwidth(const S& bandwidth, const S& sample_time) noexcept {
     using std::expm1;
     return {-expm1(-(bandwidth * sample_time))};
@@ -111,12 +108,14 @@ struct EqualSampledPoles {
     return {result};
   }
 
+  /// b_0 .. b_N, for `current_gain`.
   [[nodiscard]] constexpr PoleWeights<Size, S> weights() const noexcept {
+    constexpr auto& row = binomial_table<Size, detail::TableScalar<S>>[Size];
     const S decay = S(1.0) - contraction;
     PoleWeights<Size, S> weights{};
     S power(1.0);
     for (int j = 0; j <= Size; ++j) {
-      weights[static_cast<std::size_t>(j)] = S(binomial(Size, j)) * power;
+      weights[static_cast<std::size_t>(j)] = S(row[static_cast<std::size_t>(j)]) * power;
       power = power * contraction;
     }
     power = S(1.0);
@@ -133,7 +132,7 @@ struct EqualSampledPoles {
 template <int Size, Scalar S, class Poles>
 constexpr ScaledGain<Size, S> gap_gain(const Poles& poles, unsigned samples) noexcept {
   ScaledGain<Size, S> gain = current_gain<Size, S>(poles.power(samples).weights());
-  const S rate = S(1.0) / S(static_cast<double>(samples));
+  const S rate = S(1.0) / detail::integer<S>(samples);
   S factor(1.0);
   for (std::size_t r = 1; r < Size; ++r) {
     factor = factor * rate;
@@ -148,7 +147,7 @@ template <int Size, PlainScalar S>
 struct SampledPoleSet {
   Array<std::complex<S>, Size> contractions{};  ///< a_i = 1 - rho_i
 
-  /// From continuous-time poles p_i (1/s): rho_i = exp(p_i T).
+  /// From continuous-time poles p_i (1/s): rho_i = exp(p_i T). @param sample_time T, s
   static SampledPoleSet from_continuous(const Array<std::complex<S>, Size>& poles,
                                         S sample_time) noexcept {
     SampledPoleSet set;
@@ -185,6 +184,7 @@ struct SampledPoleSet {
     return set;
   }
 
+  /// b_0 .. b_N, for `current_gain`.
   [[nodiscard]] PoleWeights<Size, S> weights() const noexcept {
     Array<std::complex<S>, Size + 1> product{};
     product[0] = S(1);

@@ -14,9 +14,9 @@ struct ChainSize {
   static_assert(Order >= 1, "esokit: the plant order must be at least 1");
   static_assert(Extension >= 1, "esokit: at least one extended state is needed");
   static_assert(Order + Extension <= 16, "esokit: order + extension above 16 is not supported");
-  static constexpr int order = Order;
-  static constexpr int extension = Extension;
-  static constexpr int size = Order + Extension;
+  static constexpr int order = Order;             ///< n, order of the plant
+  static constexpr int extension = Extension;     ///< m, extended states
+  static constexpr int size = Order + Extension;  ///< N = n + m
 };
 
 /// Continuous and exactly sampled matrices of z = (y, y', .., y^(n-1), d, d', .., d^(m-1)).
@@ -27,8 +27,8 @@ struct ChainSize {
 template <int Order, Scalar ScalarType = double, int Extension = 1>
 struct IntegratorChain : ChainSize<Order, Extension> {
   using ChainSize<Order, Extension>::size;
-  using State = Vector<ScalarType, size>;
-  using Square = Matrix<ScalarType, size, size>;
+  using State = Vector<ScalarType, size>;         ///< z, N x 1
+  using Square = Matrix<ScalarType, size, size>;  ///< N x N
 
   /// A, N x N: ones on the first superdiagonal.
   static Square state_matrix() {
@@ -57,19 +57,19 @@ struct IntegratorChain : ChainSize<Order, Extension> {
     Square phi = Square::Identity();
     for (int i = 0; i < size; ++i) {
       for (int j = i + 1; j < size; ++j) {
-        phi(i, j) = phi(i, j - 1) * sample_time / ScalarType(static_cast<double>(j - i));
+        phi(i, j) = phi(i, j - 1) * sample_time / detail::integer<ScalarType>(j - i);
       }
     }
     return phi;
   }
 
   /// Gamma(T), N x 1: Gamma_i = b0 T^(n-i) / (n-i)! for i < n, else 0.
-  /// @param sample_time T, s
+  /// @param sample_time T, s @param input_gain b0, unit of y^(n) per unit of u
   static State sampled_input_matrix(const ScalarType& sample_time, const ScalarType& input_gain) {
     State gamma = State::Zero();
     ScalarType term = input_gain;
     for (int i = Order - 1; i >= 0; --i) {
-      term = term * sample_time / ScalarType(static_cast<double>(Order - i));
+      term = term * sample_time / detail::integer<ScalarType>(Order - i);
       gamma(i) = term;
     }
     return gamma;

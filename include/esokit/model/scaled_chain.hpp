@@ -17,8 +17,8 @@ namespace esokit {
 template <int Order, Scalar ScalarType = double, int Extension = 1>
 struct ScaledChain : ChainSize<Order, Extension> {
   using ChainSize<Order, Extension>::size;
-  using State = Array<ScalarType, size>;
-  using Estimate = Vector<ScalarType, size>;
+  using State = Array<ScalarType, size>;      ///< x, scaled, N elements
+  using Estimate = Vector<ScalarType, size>;  ///< z, physical units, N x 1
 
   /// Scaled effect of a unit input: b0 T^n / n!. Times u it adds to the scaled disturbance
   /// T^n d / n!, because the chain is driven by d + b0 u.

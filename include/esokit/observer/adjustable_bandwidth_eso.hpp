@@ -81,6 +81,7 @@ class AdjustableBandwidthEso
   using Base = PredictorCorrector<Order, S, Extension, Law>;
 
  public:
+  /// Settings of make.
   struct Config {
     S observer_bandwidth{};                     ///< omega_o, rad/s
     S bandwidth_ratio = S(1.0);                 ///< rho > 0
@@ -91,6 +92,7 @@ class AdjustableBandwidthEso
     int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts
   };
 
+  /// Checks the settings and does all the design work.
   /// @return the observer at rest in zero, or an error that names the field; for a ratio without
   /// the certificate its limit is the end of the certified range
   static Expected<AdjustableBandwidthEso, Error<S>> make(const Config& config) {
@@ -129,6 +131,7 @@ class AdjustableBandwidthEso
 };
 
 /// AdjustableBandwidthEso as an ODE, for simulation; it switches at step boundaries.
+/// @tparam Order n @tparam S scalar @tparam Extension m
 template <int Order, Scalar S = double, int Extension = 1>
 class ContinuousAdjustableBandwidthEso
     : public ContinuousObserver<Order, S, Extension, ContinuousSwitchedGain<Order + Extension, S>> {
@@ -136,6 +139,7 @@ class ContinuousAdjustableBandwidthEso
   using Base = ContinuousObserver<Order, S, Extension, Law>;
 
  public:
+  /// Settings of make.
   struct Config {
     S observer_bandwidth{};                             ///< omega_o, rad/s
     S bandwidth_ratio = S(1.0);                         ///< rho > 0
@@ -145,6 +149,7 @@ class ContinuousAdjustableBandwidthEso
     S input_gain{};  ///< b0, unit of y^(n) per unit of u; not zero
   };
 
+  /// Checks the settings and does all the design work.
   /// @return the observer's equations, or an error that names the field
   static Expected<ContinuousAdjustableBandwidthEso, Error<S>> make(const Config& config) {
     if (auto ok = check_nonzero("input_gain", config.input_gain); !ok) return ok.error();

@@ -33,13 +33,15 @@ class AlgebraicEso
   using Base = PredictorCorrector<Order, S, Extension, Law>;
 
  public:
-  using Estimate = typename Base::Estimate;
+  using Estimate = typename Base::Estimate;  ///< (y, .., y^(n-1), d, .., d^(m-1)), N x 1
 
+  /// Settings of make.
   struct Config {
     S observer_bandwidth{};  ///< lambda, rad/s: the bandwidth that is left in the end
     S frequency_shift{};     ///< q >= 0, rad/s: how fast it falls there; 0: as lambda + N/t
     S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
     S sample_time{};         ///< T, s
+
     /// epsilon >= 0, s: estimates are held this long after a start. Left out it follows from the
     /// two noise levels below, t = (sigma^2 T (2N-1)! (2N-2)! / ((N-1)!)^2 /
     /// tolerated^2)^(1/(2N-1)), and without them is N - 1 samples: published from the first sample
@@ -52,6 +54,7 @@ class AlgebraicEso
     int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts
   };
 
+  /// Checks the settings and does all the design work.
   /// @return the observer at rest in zero, or an error that names the field
   static Expected<AlgebraicEso, Error<S>> make(const Config& config) {
     const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
@@ -69,7 +72,7 @@ class AlgebraicEso
                       "asks for it"};
     }
     if (config.start_index < 0 || config.start_index > 1000000) {
-      return Error<S>{"start_index", S(static_cast<double>(config.start_index)),
+      return Error<S>{"start_index", detail::integer<S>(config.start_index),
                       "must be 0 .. 1000000"};
     }
     const auto hold = hold_samples(config);
@@ -164,7 +167,7 @@ class AlgebraicEso
 
   /// epsilon, s.
   [[nodiscard]] S hold() const noexcept {
-    return S(static_cast<double>(hold_samples_)) * this->sample_time();
+    return detail::integer<S>(hold_samples_) * this->sample_time();
   }
 
   /// Samples since the schedule began; the count ends where it settles.
@@ -212,10 +215,10 @@ class AlgebraicEso
     const S rate = S(1.0) / (count * config.sample_time);
     S ratio = level * level / count;
     for (int i = last; i > 0; --i) {
-      const S factor = S(static_cast<double>(last + i)) * rate;
+      const S factor = detail::integer<S>(last + i) * rate;
       ratio = ratio * factor * factor;
     }
-    return ratio * S(static_cast<double>(2 * last + 1));
+    return ratio * detail::integer<S>(2 * last + 1);
   }
 
   /// The smallest number of samples, `low` to 1e6, that is enough; none is an error. No logarithms
@@ -224,12 +227,12 @@ class AlgebraicEso
   static Expected<std::uint32_t, Error<S>> smallest_count(const char* field, const S& value,
                                                           std::uint32_t low, const Enough& enough) {
     std::uint32_t high = 1000000;
-    if (!enough(S(static_cast<double>(high)))) {
+    if (!enough(detail::integer<S>(high))) {
       return Error<S>{field, value, "gives a hold of more than 1e6 samples"};
     }
     while (low < high) {
       const std::uint32_t middle = (low + high) / 2;
-      if (enough(S(static_cast<double>(middle)))) {
+      if (enough(detail::integer<S>(middle))) {
         high = middle;
       } else {
         low = middle + 1;
@@ -285,9 +288,9 @@ class ContinuousAlgebraicGain {
     for (int j = 1; j <= Size; ++j) {
       for (int r = j; r >= 0; --r) {
         const auto i = static_cast<std::size_t>(r);
-        polynomial[i] = (bandwidth_ + S(static_cast<double>(r)) * shift_) * polynomial[i];
+        polynomial[i] = (bandwidth_ + detail::integer<S>(r) * shift_) * polynomial[i];
         if (r > 0) {
-          polynomial[i] = polynomial[i] + S(static_cast<double>(Size + r - 1)) * polynomial[i - 1];
+          polynomial[i] = polynomial[i] + detail::integer<S>(Size + r - 1) * polynomial[i - 1];
         }
       }
       S value(0.0);
@@ -302,7 +305,9 @@ class ContinuousAlgebraicGain {
     const auto p = factors(t);
     Vector<S, Size> gain;
     for (int j = 1; j <= Size; ++j) {
-      gain(j - 1) = S(binomial(Size, j)) * p[static_cast<std::size_t>(j)];
+      gain(j - 1) =
+          S(binomial_table<Size, detail::TableScalar<S>>[Size][static_cast<std::size_t>(j)]) *
+          p[static_cast<std::size_t>(j)];
     }
     return gain;
   }
@@ -314,6 +319,7 @@ class ContinuousAlgebraicGain {
 
 /// AlgebraicEso as an ODE, z' = A z + B u + L(t) (y - z_1), for t > 0; see AlgebraicFilter for the
 /// form that is regular at t = 0.
+/// @tparam Order n @tparam S scalar @tparam Extension m
 template <int Order, Scalar S = double, int Extension = 1>
 class ContinuousAlgebraicEso
     : public ContinuousObserver<Order, S, Extension,
@@ -322,12 +328,14 @@ class ContinuousAlgebraicEso
   using Base = ContinuousObserver<Order, S, Extension, Law>;
 
  public:
+  /// Settings of make.
   struct Config {
     S observer_bandwidth{};  ///< lambda >= 0, rad/s
     S frequency_shift{};     ///< q >= 0, rad/s
     S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero
   };
 
+  /// Checks the settings and does all the design work.
   /// @return the observer's equations, or an error that names the field
   static Expected<ContinuousAlgebraicEso, Error<S>> make(const Config& config) {
     if (auto ok = check_nonzero("input_gain", config.input_gain); !ok) return ok.error();

@@ -6,10 +6,10 @@
 /// x' = A x + b1(t) y + b2(t) u, x(0) = 0; (y, .., y^(n-1), d, .., d^(m-1)) = C(t) x, t > 0. With
 /// N = n + m, E = e^{-qt}, w = (1 - E) / q (which is t for q = 0), g = w^N, G_j = (D + lambda)^j g:
 ///
-///   A = -lambda I + (ones on the first superdiagonal)                        (35)-(40)
-///   b1_r = (-1)^{r+1} C(N,r) G_r, r = 1 .. N
-///   b2_r = b0 (-1)^{r-n} C(m,r-n) G_{r-n}, r = n .. N, else 0
-///   C_{k+1,r+1} = C(N-1-r,k-r) P_{k-r} / g, 0 <= r <= k < N                  (45)-(51)
+///     A = -lambda I + (ones on the first superdiagonal)                        (35)-(40)
+///     b1_r = (-1)^{r+1} C(N,r) G_r, r = 1 .. N
+///     b2_r = b0 (-1)^{r-n} C(m,r-n) G_{r-n}, r = n .. N, else 0
+///     C_{k+1,r+1} = C(N-1-r,k-r) P_{k-r} / g, 0 <= r <= k < N                  (45)-(51)
 ///
 /// P_j as in ContinuousAlgebraicGain: C(t) b1(t) = L(t). The paper's g is (E - 1)^N and its x is
 /// (-q)^N times the one here; without that factor, which cancels, q = 0 is regular.
@@ -30,21 +30,23 @@ namespace esokit {
 template <int Order, Scalar S = double, int Extension = 1>
 class AlgebraicFilter {
  public:
-  static constexpr int order = Order;
-  static constexpr int extension = Extension;
-  static constexpr int size = ChainSize<Order, Extension>::size;
-  static constexpr int states = size;  ///< N
-  using scalar_type = S;
-  using Estimate = Vector<S, size>;  ///< (y, .., y^(n-1), d, .., d^(m-1))
-  using State = Vector<S, size>;     ///< x
-  using Square = Matrix<S, size, size>;
+  static constexpr int order = Order;                             ///< n, order of the plant
+  static constexpr int extension = Extension;                     ///< m, extended states
+  static constexpr int size = ChainSize<Order, Extension>::size;  ///< N = n + m
+  static constexpr int states = size;                             ///< length of x
+  using scalar_type = S;                                          ///< of states and settings
+  using Estimate = Vector<S, size>;      ///< (y, .., y^(n-1), d, .., d^(m-1)), N x 1
+  using State = Vector<S, size>;         ///< x, N x 1
+  using Square = Matrix<S, size, size>;  ///< N x N
 
+  /// Settings of make.
   struct Config {
     S observer_bandwidth{};  ///< lambda >= 0, rad/s
     S frequency_shift{};     ///< q >= 0, rad/s
     S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero
   };
 
+  /// Checks the settings and does all the design work.
   /// @return the filter's equations, or an error that names the field
   static Expected<AlgebraicFilter, Error<S>> make(const Config& config) {
     if (auto ok = check_nonzero("input_gain", config.input_gain); !ok) return ok.error();
@@ -82,14 +84,17 @@ class AlgebraicFilter {
     Square c = Square::Zero();
     for (int k = 0; k < size; ++k) {
       for (int r = 0; r <= k; ++r) {
-        const S factor = S(binomial(size - 1 - r, k - r)) * p[static_cast<std::size_t>(k - r)];
+        const S factor =
+            S(binomial_table<size, detail::TableScalar<S>>[static_cast<std::size_t>(size - 1 - r)]
+                                                          [static_cast<std::size_t>(k - r)]) *
+            p[static_cast<std::size_t>(k - r)];
         c(k, r) = factor * inverse;
       }
     }
     return c;
   }
 
-  /// dx/dt, N x 1. @param t s, >= 0 @param y measurement @param u input
+  /// dx/dt, N x 1. @param t s, >= 0 @param x N x 1 @param y measurement @param u input
   [[nodiscard]] State derivative(const S& t, const State& x, const S& y, const S& u) const {
     const Weights weights = shifted_weights(t);
     const State b1 = measurement_vector(weights);
@@ -112,7 +117,10 @@ class AlgebraicFilter {
     for (int k = 0; k < size; ++k) {
       S sum(0.0);
       for (int r = 0; r <= k; ++r) {
-        const S factor = S(binomial(size - 1 - r, k - r)) * p[static_cast<std::size_t>(k - r)];
+        const S factor =
+            S(binomial_table<size, detail::TableScalar<S>>[static_cast<std::size_t>(size - 1 - r)]
+                                                          [static_cast<std::size_t>(k - r)]) *
+            p[static_cast<std::size_t>(k - r)];
         sum = sum + factor * (x(r) / g);
       }
       estimate(k) = sum;
@@ -158,7 +166,7 @@ class AlgebraicFilter {
     S front(1.0);
     for (int r = 0; r <= size; ++r) {
       basis[static_cast<std::size_t>(r)] = front * power(w, size - r);
-      front = front * decay * S(static_cast<double>(size - r));
+      front = front * decay * detail::integer<S>(size - r);
     }
     Weights coefficients{};
     for (S& c : coefficients) c = S(0.0);
@@ -169,7 +177,7 @@ class AlgebraicFilter {
       S sum(0.0);
       for (int r = j; r >= 0; --r) {
         const auto i = static_cast<std::size_t>(r);
-        S c = (config_.observer_bandwidth - S(static_cast<double>(r)) * q) * coefficients[i];
+        S c = (config_.observer_bandwidth - detail::integer<S>(r) * q) * coefficients[i];
         if (r > 0) c = c + coefficients[i - 1];
         coefficients[i] = c;
         sum = sum + c * basis[i];

@@ -8,11 +8,11 @@
 /// T}, p = e^{-qT} and [i] = (1 - p^i) / (1 - p), the weights of the gain (see
 /// design/sampled_gain.hpp) at sample k >= N - 1 are
 ///
-///   b_j = C(N,j) rho^{N-j} h_{k+1} .. h_{k+N-j} P_j,
-///   P_j = sum_r c_{j,r} u_{k+N-j+1} .. u_{k+N-j+r},
-///   u_i = p^{i-N} / [i],  h_i = [i-N] / [i],
-///   c_{j,r} = sum_i C(j,i) (1-rho)^{j-i} rho^i t_{i,r},
-///   t_{0,0} = 1,  t_{i+1,r} = (1 - p^r) t_{i,r} + [N+r-1] t_{i,r-1}.
+///     b_j = C(N,j) rho^{N-j} h_{k+1} .. h_{k+N-j} P_j,
+///     P_j = sum_r c_{j,r} u_{k+N-j+1} .. u_{k+N-j+r},
+///     u_i = p^{i-N} / [i],  h_i = [i-N] / [i],
+///     c_{j,r} = sum_i C(j,i) (1-rho)^{j-i} rho^i t_{i,r},
+///     t_{0,0} = 1,  t_{i+1,r} = (1 - p^r) t_{i,r} + [N+r-1] t_{i,r-1}.
 ///
 /// Every term is positive, and all limits (lambda -> 0, q -> 0) are regular. At k = N - 1 this is
 /// deadbeat, and so are the samples before.
@@ -58,11 +58,14 @@ class AlgebraicGain {
     restart();
   }
 
+  /// k, scaled, whatever the innovation.
+  /// @{
   [[nodiscard]] constexpr const ScaledGain<Size, S>& gain(const S&) const noexcept { return gain_; }
 
   [[nodiscard]] constexpr const ScaledGain<Size, S>& gain_before_measurement() const noexcept {
     return gain_;
   }
+  /// @}
 
   /// Next sample of the schedule. One that was not corrected among the first N breaks the deadbeat
   /// property: the schedule starts anew there.
@@ -70,8 +73,10 @@ class AlgebraicGain {
     if (!settled_) advance_schedule();
   }
 
+  /// This sample was corrected.
   constexpr void accept(const S&) noexcept { pending_ = false; }
 
+  /// As `restart`: a reset of the observer is a start.
   constexpr void reset() noexcept { restart(); }
 
   /// Begins the schedule anew; the observer's state is not touched.
@@ -147,7 +152,7 @@ class AlgebraicGain {
   [[nodiscard]] constexpr S bracket(std::uint32_t count, const S& contraction) const noexcept {
     const auto shifting = shift_.contraction > S(0.0);
     const S ratio = contraction / select(shifting, shift_.contraction, S(1.0));
-    return select(shifting, ratio, S(static_cast<double>(count)));
+    return select(shifting, ratio, detail::integer<S>(count));
   }
 
   /// Sets the registers of the next push to i - N = count, to a few units in the last place.
@@ -195,7 +200,7 @@ class AlgebraicGain {
         for (std::size_t i = step + 1; i > 0; --i) mix[i] = mix[i] * a + mix[i - 1] * rho;
         mix[0] = mix[0] * a;
       }
-      S front = S(binomial(Size, j));
+      S front(binomial_table<Size, detail::TableScalar<S>>[Size][static_cast<std::size_t>(j)]);
       for (int i = j; i < Size; ++i) front = front * rho;
       for (int r = 0; r <= j; ++r) {
         S sum(0.0);

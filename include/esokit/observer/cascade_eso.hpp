@@ -14,6 +14,7 @@ namespace esokit {
 template <int Size, int Levels, Scalar S, class Placement>
 struct CascadeEsoConfig;
 
+/// Settings of CascadeEso by bandwidths.
 template <int Size, int Levels, Scalar S>
 struct CascadeEsoConfig<Size, Levels, S, EqualPoles> {
   S observer_bandwidth{};  ///< omega_o1 of level 1, rad/s
@@ -25,6 +26,7 @@ struct CascadeEsoConfig<Size, Levels, S, EqualPoles> {
   int max_gap = 100;       ///< missing samples that a correction may bridge before it restarts
 };
 
+/// Settings of CascadeEso by poles.
 template <int Size, int Levels, PlainScalar S>
 struct CascadeEsoConfig<Size, Levels, S, PoleSet> {
   Array<Array<std::complex<S>, Size>, Levels> level_poles{};  ///< p_i of each level, 1/s
@@ -37,6 +39,7 @@ struct CascadeEsoConfig<Size, Levels, S, PoleSet> {
 template <int Size, int Levels, Scalar S, class Placement>
 struct ContinuousCascadeEsoConfig;
 
+/// Settings of ContinuousCascadeEso by bandwidths.
 template <int Size, int Levels, Scalar S>
 struct ContinuousCascadeEsoConfig<Size, Levels, S, EqualPoles> {
   S observer_bandwidth{};  ///< omega_o1 of level 1, rad/s
@@ -46,6 +49,7 @@ struct ContinuousCascadeEsoConfig<Size, Levels, S, EqualPoles> {
   S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero
 };
 
+/// Settings of ContinuousCascadeEso by poles.
 template <int Size, int Levels, PlainScalar S>
 struct ContinuousCascadeEsoConfig<Size, Levels, S, PoleSet> {
   Array<Array<std::complex<S>, Size>, Levels> level_poles{};  ///< p_i of each level, 1/s
@@ -142,8 +146,10 @@ class CascadeEso
   using Base = PredictorCorrector<Order, S, Extension, Law, Levels>;
 
  public:
+  /// Settings of make.
   using Config = CascadeEsoConfig<Base::size, Levels, S, Placement>;
 
+  /// Checks the settings and does all the design work.
   /// @return the observer at rest in zero, or an error that names the field
   static Expected<CascadeEso, Error<S>> make(const Config& config) {
     const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
@@ -170,6 +176,8 @@ class CascadeEso
 };
 
 /// CascadeEso as an ODE, equations (23), (24), for simulation.
+/// @tparam Order n @tparam Levels p @tparam S scalar @tparam Extension m
+/// @tparam Placement EqualPoles (config by bandwidths) or PoleSet (config by level_poles)
 template <int Order, int Levels, Scalar S = double, int Extension = 1, class Placement = EqualPoles>
 class ContinuousCascadeEso
     : public ContinuousObserver<Order, S, Extension,
@@ -178,8 +186,10 @@ class ContinuousCascadeEso
   using Base = ContinuousObserver<Order, S, Extension, Law, Levels>;
 
  public:
+  /// Settings of make.
   using Config = ContinuousCascadeEsoConfig<Base::size, Levels, S, Placement>;
 
+  /// Checks the settings and does all the design work.
   /// @return the observer's equations, or an error that names the field
   static Expected<ContinuousCascadeEso, Error<S>> make(const Config& config) {
     if (auto ok = check_nonzero("input_gain", config.input_gain); !ok) return ok.error();

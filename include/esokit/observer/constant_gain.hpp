@@ -11,11 +11,14 @@ namespace esokit {
 template <int Size, Scalar S, class Placement = EqualPoles>
 class ConstantGain {
  public:
-  using Spec = typename Placement::template Spec<Size, S>;
+  using Spec = typename Placement::template Spec<Size, S>;  ///< of the placement
 
+  /// The gain for a set of poles.
   /// @param field name of the config member that `spec` came from, for the error
   /// @param spec poles of the error, checked by the placement
   /// @param sample_time T, s; checked by the chain
+  /// @param index element of `field` that the error names, -1: none
+  /// @return error for a spec that the placement refuses, or a gain that the scalar cannot hold
   static Expected<ConstantGain, Error<S>> make(const char* field, const Spec& spec,
                                                const S& sample_time, int index = -1) {
     if (auto ok = Placement::template check<Size, S>(field, spec, index); !ok) return ok.error();
@@ -32,11 +35,14 @@ class ConstantGain {
     return law;
   }
 
+  /// k, scaled, whatever the innovation.
+  /// @{
   [[nodiscard]] constexpr const ScaledGain<Size, S>& gain(const S&) const noexcept { return gain_; }
 
   [[nodiscard]] constexpr const ScaledGain<Size, S>& gain_before_measurement() const noexcept {
     return gain_;
   }
+  /// @}
 
   /// Gain that puts the poles of the step over `samples` T at rho_i^samples, in the scaling of T.
   [[nodiscard]] ScaledGain<Size, S> gap_gain(const S&, unsigned samples) const noexcept {
@@ -54,9 +60,13 @@ class ConstantGain {
 template <int Size, Scalar S, class Placement = EqualPoles>
 class ContinuousConstantGain {
  public:
-  using Spec = typename Placement::template Spec<Size, S>;
+  using Spec = typename Placement::template Spec<Size, S>;  ///< of the placement
 
+  /// The gain for a set of poles.
   /// @param field name of the config member that `spec` came from, for the error
+  /// @param spec poles of the error, checked by the placement
+  /// @param index element of `field` that the error names, -1: none
+  /// @return error for a spec that the placement refuses, or a gain that the scalar cannot hold
   static Expected<ContinuousConstantGain, Error<S>> make(const char* field, const Spec& spec,
                                                          int index = -1) {
     if (auto ok = Placement::template check<Size, S>(field, spec, index); !ok) return ok.error();

@@ -21,23 +21,25 @@ template <int Order, Scalar S, int Extension, class Law, int Levels = 1>
 requires ContinuousGainLaw<Law, Order + Extension, S>
 class ContinuousObserver {
  public:
-  static constexpr int order = Order;
-  static constexpr int extension = Extension;
-  static constexpr int size = ChainSize<Order, Extension>::size;
-  static constexpr int levels = Levels;
-  static constexpr int states = Levels * size;  ///< N p
-  using scalar_type = S;
-  using Estimate = Vector<S, size>;  ///< (y, .., y^(n-1), d, .., d^(m-1))
-  using State = Vector<S, states>;   ///< the levels one after the other
-  using Laws = Array<Law, Levels>;
+  static constexpr int order = Order;                             ///< n, order of the plant
+  static constexpr int extension = Extension;                     ///< m, extended states
+  static constexpr int size = ChainSize<Order, Extension>::size;  ///< N = n + m
+  static constexpr int levels = Levels;                           ///< p
+  static constexpr int states = Levels * size;                    ///< N p
+  using scalar_type = S;                                          ///< of states and settings
+  using Estimate = Vector<S, size>;  ///< (y, .., y^(n-1), d, .., d^(m-1)), N x 1
+  using State = Vector<S, states>;   ///< the levels one after the other, N p x 1
+  using Laws = Array<Law, Levels>;   ///< one a level
 
-  /// @param input_gain b0 @return error if b0 is zero or not finite
+  /// From ready gain laws; the way in for a law of your own.
+  /// @param input_gain b0, unit of y^(n) per unit of u @param laws one a level
+  /// @return error if b0 is zero or not finite
   static Expected<ContinuousObserver, Error<S>> make(const S& input_gain, const Laws& laws) {
     if (auto ok = check_nonzero("input_gain", input_gain); !ok) return ok.error();
     return ContinuousObserver(input_gain, laws);
   }
 
-  /// dz/dt, N p x 1. @param t s @param y measurement @param u input
+  /// dz/dt, N p x 1. @param t s @param z N p x 1 @param y measurement @param u input
   [[nodiscard]] State derivative(const S& t, const State& z, const S& y, const S& u) const {
     State rate;
     S measured = y;
@@ -100,6 +102,7 @@ class ContinuousObserver {
   [[nodiscard]] const S& input_gain() const noexcept { return input_gain_; }
 
  protected:
+  /// `input_gain` is checked already.
   ContinuousObserver(const S& input_gain, const Laws& laws)
       : laws_(laws), input_gain_(input_gain) {}
 

@@ -18,11 +18,13 @@ class DelayedInput : public Observer {
   using S = typename Observer::scalar_type;
 
  public:
+  /// Settings of make.
   struct Config {
     typename Observer::Config observer{};  ///< of the observer itself
     int delay = 0;                         ///< d, samples, 0 .. Capacity
   };
 
+  /// Checks the settings and does all the design work.
   /// @return the observer with an empty (zero) delay line, or an error that names the field
   static Expected<DelayedInput, Error<S>> make(const Config& config) {
     if (config.delay < 0 || config.delay > Capacity) {
@@ -38,7 +40,8 @@ class DelayedInput : public Observer {
     return DelayedInput(*observer, config.delay);
   }
 
-  /// New settings while running: estimate and inputs under way are kept.
+  /// New settings while running: estimate and inputs under way are kept. A refused config changes
+  /// nothing.
   Check<S> retune(const Config& config) {
     auto fresh = make(config);
     if (!fresh) return fresh.error();
@@ -47,17 +50,19 @@ class DelayedInput : public Observer {
     return {};
   }
 
+  /// One sample. @param y measurement @param u_applied u[k], of now; the delay is seen to here
   StepStatus update(S y, S u_applied) noexcept {
     const StepStatus status = push(u_applied);
     return status | Observer::update(y, delayed());
   }
 
+  /// Time update alone, see PredictorCorrector::predict.
   StepStatus predict(S u_applied) noexcept {
     const StepStatus status = push(u_applied);
     return status | Observer::predict(delayed());
   }
 
-  /// As if `u` had been applied for long.
+  /// As if `u` had been applied for long. A u that is not finite changes nothing.
   void fill_input(const S& u) noexcept {
     if (!is_finite(u)) return;
     inputs_.fill(u);

@@ -60,10 +60,11 @@ class ExtendedStateFilter
                 "esokit: the nominal model is for one extended state");
 
  public:
-  using Chain = typename Base::Chain;
-  using Estimate = typename Base::Estimate;
-  using Covariance = Matrix<S, N, N>;
+  using Chain = typename Base::Chain;        ///< the sampled chain, in its scaling
+  using Estimate = typename Base::Estimate;  ///< (y, .., y^(n-1), d, .., d^(m-1)), N x 1
+  using Covariance = Matrix<S, N, N>;        ///< N x N, in the units of the estimates
 
+  /// Settings of make.
   struct Config {
     S input_gain{};            ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
     S sample_time{};           ///< T, s
@@ -80,13 +81,15 @@ class ExtendedStateFilter
     /// P0, N x N, positive semidefinite: at least the covariance of the initial error, as a matrix.
     Covariance initial_covariance = Covariance::Zero();
 
-    InflationRule inflation_rule = InflationRule::fixed;
-    S inflation{};  ///< theta > 0 of the fixed rule
+    InflationRule inflation_rule = InflationRule::fixed;  ///< how theta is chosen
+    S inflation{};                                        ///< theta > 0 of the fixed rule
+
     /// Adaptive rule: weights of the states' variances in the trace, each state taken in the unit
     /// of y by T^r/r!. All one: the error counts by what it does to y within a sample.
     Array<S, N> trace_weights = equal_weights();
 
-    RiccatiMode mode = RiccatiMode::recursive;
+    RiccatiMode mode = RiccatiMode::recursive;  ///< how the gain is obtained
+
     /// Normalised innovation squared above which y is an outlier, and a missing sample; 0: no gate.
     /// A Gaussian innovation passes 6.63 in 1 %, 10.8 in 0.1 %, 15.1 in 0.01 % of all samples. The
     /// gate widens with every sample that is missing, and opens after max_gap.
@@ -96,6 +99,7 @@ class ExtendedStateFilter
     [[no_unique_address]] Model model{};
     int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts
 
+    /// All one.
     static constexpr Array<S, N> equal_weights() noexcept {
       Array<S, N> weights{};
       for (S& w : weights) w = S(1.0);
@@ -103,6 +107,7 @@ class ExtendedStateFilter
     }
   };
 
+  /// Checks the settings and does all the design work.
   /// @return the filter at rest in zero, or an error that names the field
   static Expected<ExtendedStateFilter, Error<S>> make(const Config& config) {
     const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
@@ -286,7 +291,7 @@ class ExtendedStateFilter
     Array<S, N> units{};
     S unit = S(1.0) / root;
     for (int r = 0; r < N; ++r) {
-      if (r > 0) unit = unit * sample_time / S(static_cast<double>(r));
+      if (r > 0) unit = unit * sample_time / detail::integer<S>(r);
       units[index(r)] = unit;
     }
     return units;
@@ -297,7 +302,7 @@ class ExtendedStateFilter
     Array<S, N> units{};
     S unit(1.0);
     for (int r = 0; r < N; ++r) {
-      if (r > 0) unit = unit * (S(static_cast<double>(r)) * rate);
+      if (r > 0) unit = unit * (detail::integer<S>(r) * rate);
       units[index(r)] = unit;
     }
     return units;
@@ -485,7 +490,7 @@ class ExtendedStateFilter
   void shift_by_model(const Estimate& before) noexcept {
     if constexpr (has_model) {
       const S time = this->sample_time();
-      const S t = S(static_cast<double>(sample_)) * time;
+      const S t = detail::integer<S>(sample_) * time;
       const S u = this->applied_input();
       Vector<S, Order> x = before.template head<Order>();
       const S now = model_(x, u, t);

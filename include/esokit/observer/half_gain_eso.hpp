@@ -7,6 +7,7 @@
 
 namespace esokit {
 
+/// Settings of HalfGainEso.
 template <int Size, PlainScalar S>
 struct LinearEsoConfig<Size, S, HalfGainPoles> {
   S observer_bandwidth{};  ///< omega_o, rad/s, of the observer whose gains are halved
@@ -14,21 +15,27 @@ struct LinearEsoConfig<Size, S, HalfGainPoles> {
   S sample_time{};         ///< T, s
   int max_gap = 100;       ///< missing samples that a correction may bridge before it restarts
 
+  /// Name of what the poles are placed by, for errors.
   static constexpr const char* placement_field = "observer_bandwidth";
+  /// What the poles are placed by.
   [[nodiscard]] const S& placement() const noexcept { return observer_bandwidth; }
 };
 
+/// Settings of ContinuousHalfGainEso.
 template <int Size, PlainScalar S>
 struct ContinuousLinearEsoConfig<Size, S, HalfGainPoles> {
   S observer_bandwidth{};  ///< omega_o, rad/s, of the observer whose gains are halved
   S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero
 
+  /// Name of what the poles are placed by, for errors.
   static constexpr const char* placement_field = "observer_bandwidth";
+  /// What the poles are placed by.
   [[nodiscard]] const S& placement() const noexcept { return observer_bandwidth; }
 };
 
 /// LinearEso with poles at exp(s_k T), s_k those of half the continuous gains: about half the noise
 /// in u for about the same disturbance rejection.
+/// @tparam Order n @tparam S plain scalar @tparam Extension m
 template <int Order, PlainScalar S = double, int Extension = 1>
 using HalfGainEso = LinearEso<Order, S, Extension, HalfGainPoles>;
 

@@ -13,6 +13,7 @@ template <int Order, PlainScalar S = double>
 struct KnownPoles {
   Array<S, Order> coefficients{};  ///< a_0 .. a_(n-1) of s^n + a_(n-1) s^(n-1) + .. + a_0
 
+  /// fbar, unit of y^(n). @param estimate (y, .., y^(n-1), ..), at least n x 1
   template <int Size>
   S operator()(const Vector<S, Size>& estimate) const noexcept {
     S sum(0);
@@ -46,14 +47,17 @@ class KnownModel : public Observer {
   using S = typename Observer::scalar_type;
 
  public:
-  static constexpr int order = Observer::order;
-  using Estimate = typename Observer::Estimate;
+  static constexpr int order = Observer::order;  ///< n, order of the plant
+  using Estimate = typename Observer::Estimate;  ///< N x 1; row n is fbar + dhat
 
+  /// Settings of make.
   struct Config {
     typename Observer::Config observer{};  ///< of the observer itself
     Model model{};                         ///< fbar
   };
 
+  /// Checks the settings and does all the design work.
+  /// @return the observer at rest in zero, or an error that names the field
   static Expected<KnownModel, Error<S>> make(const Config& config) {
     if constexpr (requires { config.model.coefficients; }) {
       for (std::size_t i = 0; i < config.model.coefficients.size(); ++i) {
@@ -71,6 +75,7 @@ class KnownModel : public Observer {
 
   /// New settings while running: the estimate, that is fbar + d, is kept, and what another model
   /// explains is taken out of d; a change of b0 is moved into d as everywhere. u does not jump.
+  /// A refused config changes nothing.
   Check<S> retune(const Config& config) {
     auto fresh = make(config);
     if (!fresh) return fresh.error();
@@ -86,16 +91,20 @@ class KnownModel : public Observer {
     return {};
   }
 
+  /// One sample, see PredictorCorrector::update. `u_applied` is what the actuator held, without the
+  /// model's share.
   StepStatus update(S y, S u_applied) noexcept {
     const S input = accepted(u_applied);
     return report(u_applied) | Observer::update(y, input);
   }
 
+  /// Time update alone, see PredictorCorrector::predict.
   StepStatus predict(S u_applied) noexcept {
     const S input = accepted(u_applied);
     return report(u_applied) | Observer::predict(input);
   }
 
+  /// Starts anew at (y, 0, .., 0), with fbar + d zero.
   StepStatus reset(S y) noexcept {
     Estimate state = Estimate::Zero();
     state(0) = y;
@@ -109,12 +118,14 @@ class KnownModel : public Observer {
     return Observer::reset(rest);
   }
 
+  /// (y, .., y^(n-1), fbar + d, d', .., d^(m-1)), N x 1, physical units.
   [[nodiscard]] Estimate estimate() const noexcept {
     Estimate state = Observer::estimate();
     state(order) = state(order) + model_(state);
     return state;
   }
 
+  /// One row of it.
   template <int Row>
   [[nodiscard]] S estimate() const noexcept {
     if constexpr (Row == order) {

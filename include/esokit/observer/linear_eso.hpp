@@ -13,6 +13,7 @@ namespace esokit {
 template <int Size, Scalar S, class Placement>
 struct LinearEsoConfig;
 
+/// Settings of LinearEso by bandwidth.
 template <int Size, Scalar S>
 struct LinearEsoConfig<Size, S, EqualPoles> {
   S observer_bandwidth{};  ///< omega_o, rad/s: all poles at exp(-omega_o T)
@@ -20,10 +21,13 @@ struct LinearEsoConfig<Size, S, EqualPoles> {
   S sample_time{};         ///< T, s
   int max_gap = 100;       ///< missing samples that a correction may bridge before it restarts
 
+  /// Name of what the poles are placed by, for errors.
   static constexpr const char* placement_field = "observer_bandwidth";
+  /// What the poles are placed by.
   [[nodiscard]] const S& placement() const noexcept { return observer_bandwidth; }
 };
 
+/// Settings of LinearEso by poles.
 template <int Size, PlainScalar S>
 struct LinearEsoConfig<Size, S, PoleSet> {
   Array<std::complex<S>, Size> poles{};  ///< p_i, 1/s, left half plane, in conjugate pairs
@@ -31,7 +35,9 @@ struct LinearEsoConfig<Size, S, PoleSet> {
   S sample_time{};                       ///< T, s
   int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts
 
+  /// Name of what the poles are placed by, for errors.
   static constexpr const char* placement_field = "poles";
+  /// What the poles are placed by.
   [[nodiscard]] const Array<std::complex<S>, Size>& placement() const noexcept { return poles; }
 };
 
@@ -50,8 +56,9 @@ class LinearEso : public PredictorCorrector<Order, S, Extension,
   using Base = PredictorCorrector<Order, S, Extension, Law>;
 
  public:
-  using Config = LinearEsoConfig<Base::size, S, Placement>;
+  using Config = LinearEsoConfig<Base::size, S, Placement>;  ///< settings of make
 
+  /// Checks the settings and does all the design work.
   /// @return the observer at rest in zero, or an error that names the field
   static Expected<LinearEso, Error<S>> make(const Config& config) {
     const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
@@ -78,25 +85,33 @@ class LinearEso : public PredictorCorrector<Order, S, Extension,
 template <int Size, Scalar S, class Placement>
 struct ContinuousLinearEsoConfig;
 
+/// Settings of ContinuousLinearEso by bandwidth.
 template <int Size, Scalar S>
 struct ContinuousLinearEsoConfig<Size, S, EqualPoles> {
   S observer_bandwidth{};  ///< omega_o, rad/s: all poles at -omega_o
   S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero
 
+  /// Name of what the poles are placed by, for errors.
   static constexpr const char* placement_field = "observer_bandwidth";
+  /// What the poles are placed by.
   [[nodiscard]] const S& placement() const noexcept { return observer_bandwidth; }
 };
 
+/// Settings of ContinuousLinearEso by poles.
 template <int Size, PlainScalar S>
 struct ContinuousLinearEsoConfig<Size, S, PoleSet> {
   Array<std::complex<S>, Size> poles{};  ///< p_i, 1/s, left half plane, in conjugate pairs
   S input_gain{};                        ///< b0, unit of y^(n) per unit of u; not zero
 
+  /// Name of what the poles are placed by, for errors.
   static constexpr const char* placement_field = "poles";
+  /// What the poles are placed by.
   [[nodiscard]] const Array<std::complex<S>, Size>& placement() const noexcept { return poles; }
 };
 
 /// LinearEso as an ODE, z' = A z + B u + l (y - z_1), for simulation.
+/// @tparam Order n @tparam S scalar @tparam Extension m
+/// @tparam Placement EqualPoles (config by observer_bandwidth) or PoleSet (config by poles)
 template <int Order, Scalar S = double, int Extension = 1, class Placement = EqualPoles>
 class ContinuousLinearEso
     : public ContinuousObserver<Order, S, Extension,
@@ -105,8 +120,9 @@ class ContinuousLinearEso
   using Base = ContinuousObserver<Order, S, Extension, Law>;
 
  public:
-  using Config = ContinuousLinearEsoConfig<Base::size, S, Placement>;
+  using Config = ContinuousLinearEsoConfig<Base::size, S, Placement>;  ///< settings of make
 
+  /// Checks the settings and does all the design work.
   /// @return the observer's equations, or an error that names the field
   static Expected<ContinuousLinearEso, Error<S>> make(const Config& config) {
     if (auto ok = check_nonzero("input_gain", config.input_gain); !ok) return ok.error();

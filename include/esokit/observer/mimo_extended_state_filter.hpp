@@ -17,9 +17,9 @@ template <int... Orders>
 struct ChainOrders {
   static_assert(sizeof...(Orders) >= 1, "esokit: at least one chain is needed");
   static_assert(((Orders >= 1) && ...), "esokit: the order of a chain must be at least 1");
-  static constexpr int count = static_cast<int>(sizeof...(Orders));
-  static constexpr int sum = (Orders + ...);
-  static constexpr Array<int, count> values{Orders...};
+  static constexpr int count = static_cast<int>(sizeof...(Orders));  ///< p
+  static constexpr int sum = (Orders + ...);                         ///< n_1 + .. + n_p
+  static constexpr Array<int, count> values{Orders...};              ///< n_1 .. n_p
 };
 
 /// Extended state filter of p plants y_i^(n_i) = d_i + sum_j B0_ij u_j, sampled exactly. What the
@@ -43,14 +43,15 @@ class MimoExtendedStateFilter {
   static_assert(Inputs >= 1 && Extension >= 1 && size <= 32,
                 "esokit: inputs, extension or size out of range");
 
-  using scalar_type = S;
-  using Estimate = Vector<S, size>;
-  using Output = Vector<S, outputs>;
-  using Input = Vector<S, Inputs>;
-  using Covariance = Matrix<S, size, size>;
-  using OutputCovariance = Matrix<S, outputs, outputs>;
-  using Gain = Matrix<S, size, outputs>;
+  using scalar_type = S;                                 ///< of states and settings
+  using Estimate = Vector<S, size>;                      ///< all states, chain by chain, N x 1
+  using Output = Vector<S, outputs>;                     ///< y, p x 1
+  using Input = Vector<S, Inputs>;                       ///< u, q x 1
+  using Covariance = Matrix<S, size, size>;              ///< N x N, in the units of the estimates
+  using OutputCovariance = Matrix<S, outputs, outputs>;  ///< p x p, in the units of y
+  using Gain = Matrix<S, size, outputs>;                 ///< N x p, physical units
 
+  /// Settings of make.
   struct Config {
     Matrix<S, outputs, Inputs> input_matrix = Matrix<S, outputs, Inputs>::Zero();  ///< B0, p x q
     S sample_time{};                                                               ///< T, s
@@ -64,6 +65,7 @@ class MimoExtendedStateFilter {
     RiccatiMode mode = RiccatiMode::recursive;            ///< recursive or frozen
   };
 
+  /// Checks the settings and does all the design work.
   /// @return the filter at rest in zero, or an error that names the field
   static Expected<MimoExtendedStateFilter, Error<S>> make(const Config& config) {
     if (auto ok = check(config); !ok) return ok.error();
@@ -117,6 +119,8 @@ class MimoExtendedStateFilter {
   }
 
   /// One sample: `predict(u_applied)`, then `correct(y)`.
+  /// @param y p x 1, NaN where missing
+  /// @param u_applied q x 1, what the actuators held since the last sample
   StepStatus update(const Output& y, const Input& u_applied) noexcept {
     const StepStatus predicted = predict(u_applied);
     return predicted | correct(y);
@@ -148,7 +152,7 @@ class MimoExtendedStateFilter {
     return correct_some(y, present);
   }
 
-  /// Measurement update with the channels that are present (and finite).
+  /// Measurement update with the channels that are present (and finite). @param present p x 1
   StepStatus correct_some(const Output& y, const Array<bool, outputs>& present) noexcept {
     StepStatus status = StepStatus::ok;
     Array<bool, outputs> used = present;
@@ -393,7 +397,8 @@ class MimoExtendedStateFilter {
     for (int chain = 0; chain < outputs; ++chain) {
       for (int i = 0; i < order_of(chain) + Extension; ++i) {
         for (int j = i; j < order_of(chain) + Extension; ++j) {
-          phi(first(chain) + i, first(chain) + j) = static_cast<S>(binomial(j, i));
+          phi(first(chain) + i, first(chain) + j) =
+              binomial_table<size, S>[static_cast<std::size_t>(j)][static_cast<std::size_t>(i)];
         }
       }
     }

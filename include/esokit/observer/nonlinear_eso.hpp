@@ -25,8 +25,8 @@ namespace esokit {
 /// A pair without the certificate, or no limits at all, has to be asked for by name.
 ///
 /// k = 1 is LinearEso, bit for bit. The certificate is about samples without gaps.
-/// @tparam Order n @tparam S scalar @tparam Extension m @tparam Shape an EvenGain: PowerSumGain
-/// (the paper's g), FalGain, or a function object of your own
+/// @tparam Order n @tparam S scalar @tparam Extension m
+/// @tparam Shape an EvenGain: PowerSumGain (the paper's g), FalGain, or a function object of yours
 template <int Order, Scalar S = double, int Extension = 2, class Shape = PowerSumGain<S>>
 requires EvenGain<Shape, S>
 class NonlinearEso
@@ -35,6 +35,7 @@ class NonlinearEso
   using Base = PredictorCorrector<Order, S, Extension, Law>;
 
  public:
+  /// Settings of make.
   struct Config {
     S observer_bandwidth{};       ///< omega_o, rad/s: the poles are at exp(-omega_o T) where k = 1
     Shape shape{};                ///< k(|e| / error_scale)
@@ -48,8 +49,9 @@ class NonlinearEso
     int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts
   };
 
-  using Report = NonlinearGainReport<detail::TableScalar<S>>;
+  using Report = NonlinearGainReport<detail::TableScalar<S>>;  ///< see `report`
 
+  /// Checks the settings and does all the design work.
   /// @return the observer at rest in zero, or an error that names the field
   static Expected<NonlinearEso, Error<S>> make(const Config& config) {
     const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
@@ -102,8 +104,10 @@ class NonlinearEso
   [[nodiscard]] S gain_factor(const S& e) const noexcept { return law().factor(e); }
 
   /// Limits of k in force.
+  /// @{
   [[nodiscard]] const S& gain_min() const noexcept { return law().gain_min(); }
   [[nodiscard]] const S& gain_max() const noexcept { return law().gain_max(); }
+  /// @}
 
  private:
   NonlinearEso(const ChainConfig<S>& chain, const Law& law) noexcept : Base(chain, {law}) {}
@@ -136,6 +140,7 @@ class NonlinearEso
 
 /// NonlinearEso as an ODE, for simulation. By default k is kept above gain_min = 1/2, which is
 /// certified without an upper limit in continuous time (from (N-1) / (2N) on).
+/// @tparam Order n @tparam S scalar @tparam Extension m @tparam Shape an EvenGain
 template <int Order, Scalar S = double, int Extension = 2, class Shape = PowerSumGain<S>>
 requires EvenGain<Shape, S>
 class ContinuousNonlinearEso
@@ -145,6 +150,7 @@ class ContinuousNonlinearEso
   using Base = ContinuousObserver<Order, S, Extension, Law>;
 
  public:
+  /// Settings of make.
   struct Config {
     S observer_bandwidth{};               ///< omega_o, rad/s: the poles are at -omega_o where k = 1
     Shape shape{};                        ///< k(|e| / error_scale)
@@ -156,6 +162,7 @@ class ContinuousNonlinearEso
     S input_gain{};                       ///< b0, unit of y^(n) per unit of u; not zero
   };
 
+  /// Checks the settings and does all the design work.
   /// @return the observer's equations, or an error that names the field
   static Expected<ContinuousNonlinearEso, Error<S>> make(const Config& config) {
     constexpr int size = Base::size;

@@ -19,8 +19,8 @@ concept EvenGain = std::copyable<Shape> && requires(const Shape& k, const S& x) 
   { k(x) } -> std::convertible_to<S>;
 };
 
-/// k(x) = K_alpha x^(alpha-1) + K_beta x^beta: g(e) / e of the NHOESO paper, (10). The default is k
-/// = 1, the linear observer.
+/// k(x) = K_alpha x^(alpha-1) + K_beta x^beta: g(e) / e of the NHOESO paper, (10). The default is
+/// k = 1, the linear observer.
 template <Scalar S>
 struct PowerSumGain {
   S gain_alpha = S(1.0);  ///< K_alpha >= 0
@@ -28,14 +28,17 @@ struct PowerSumGain {
   S gain_beta = S(0.0);   ///< K_beta >= 0
   S beta = S(1.0);        ///< beta >= 0
 
+  /// k with its exponents told apart.
   class Prepared {
    public:
+    /// Copies what it needs.
     explicit constexpr Prepared(const PowerSumGain& sum) noexcept
         : gain_alpha_(sum.gain_alpha),
           gain_beta_(sum.gain_beta),
           alpha_(sum.alpha - S(1.0)),
           beta_(sum.beta) {}
 
+    /// k(x), x > 0.
     [[nodiscard]] S operator()(const S& x) const noexcept {
       return gain_alpha_ * alpha_(x) + gain_beta_ * beta_(x);
     }
@@ -47,10 +50,13 @@ struct PowerSumGain {
     Power<S> beta_;
   };
 
+  /// A function object that is quicker to call.
   [[nodiscard]] constexpr Prepared prepared() const noexcept { return Prepared(*this); }
 
+  /// k(x), x > 0.
   [[nodiscard]] S operator()(const S& x) const noexcept { return prepared()(x); }
 
+  /// Error of a parameter out of its range; `make` of the observer asks for it.
   [[nodiscard]] Check<S> check() const {
     if (auto ok = check_not_negative("shape.gain_alpha", gain_alpha); !ok) return ok;
     if (auto ok = check_positive("shape.alpha", alpha); !ok) return ok;
@@ -66,11 +72,14 @@ struct FalGain {
   S exponent = S(0.5);      ///< a > 0
   S linear_width = S(1.0);  ///< delta > 0, in units of the error scale
 
+  /// k with its exponent told apart.
   class Prepared {
    public:
+    /// Copies what it needs.
     explicit constexpr Prepared(const FalGain& shape) noexcept
         : gain_(shape.gain), fal_(shape.exponent, shape.linear_width) {}
 
+    /// k(x), x >= 0.
     [[nodiscard]] S operator()(const S& x) const noexcept { return gain_ * fal_.gain(x); }
 
    private:
@@ -78,10 +87,13 @@ struct FalGain {
     Fal<S> fal_;
   };
 
+  /// A function object that is quicker to call.
   [[nodiscard]] constexpr Prepared prepared() const noexcept { return Prepared(*this); }
 
+  /// k(x), x > 0.
   [[nodiscard]] S operator()(const S& x) const noexcept { return prepared()(x); }
 
+  /// Error of a parameter out of its range; `make` of the observer asks for it.
   [[nodiscard]] Check<S> check() const {
     if (auto ok = check_not_negative("shape.gain", gain); !ok) return ok;
     if (auto ok = check_positive("shape.exponent", exponent); !ok) return ok;
@@ -157,12 +169,15 @@ template <int Size, Scalar S, class Shape = PowerSumGain<S>>
 requires EvenGain<Shape, S>
 class NonlinearGain {
  public:
-  using Linear = ConstantGain<Size, S>;
+  using Linear = ConstantGain<Size, S>;  ///< the gain where k = 1
 
+  /// @param linear the bandwidth gains @param shape k @param error_scale > 0, unit of y
+  /// @param gain_min, gain_max limits of k
   constexpr NonlinearGain(const Linear& linear, const Shape& shape, const S& error_scale,
                           const S& gain_min, const S& gain_max) noexcept
       : linear_(linear), factor_(shape, error_scale, gain_min, gain_max) {}
 
+  /// k(e) l, scaled.
   [[nodiscard]] ESOKIT_INLINE constexpr ScaledGain<Size, S> gain(const S& e) const noexcept {
     const S k = factor_(e);
     const auto& l = linear_.gain_before_measurement();
@@ -172,6 +187,7 @@ class NonlinearGain {
     return result;
   }
 
+  /// The linear gain for the whole gap.
   [[nodiscard]] ScaledGain<Size, S> gap_gain(const S& e, unsigned samples) const noexcept {
     return linear_.gap_gain(e, samples);
   }
@@ -184,8 +200,11 @@ class NonlinearGain {
   /// k for an innovation, within its limits.
   [[nodiscard]] constexpr S factor(const S& e) const noexcept { return factor_(e); }
 
+  /// Limits of k.
+  /// @{
   [[nodiscard]] constexpr const S& gain_min() const noexcept { return factor_.low(); }
   [[nodiscard]] constexpr const S& gain_max() const noexcept { return factor_.high(); }
+  /// @}
 
  private:
   Linear linear_;
@@ -197,11 +216,13 @@ template <int Size, Scalar S, class Shape = PowerSumGain<S>>
 requires EvenGain<Shape, S>
 class ContinuousNonlinearGain {
  public:
-  /// @param linear l for k = 1, N x 1, row i in 1/s^(i+1)
+  /// @param linear l for k = 1, N x 1, row i in 1/s^(i+1) @param shape k
+  /// @param error_scale > 0, unit of y @param gain_min, gain_max limits of k
   ContinuousNonlinearGain(const Vector<S, Size>& linear, const Shape& shape, const S& error_scale,
                           const S& gain_min, const S& gain_max)
       : linear_(linear), factor_(shape, error_scale, gain_min, gain_max) {}
 
+  /// k(e) l, N x 1, row i in 1/s^(i+1).
   [[nodiscard]] Vector<S, Size> gain(const S&, const S& e) const { return linear_ * factor_(e); }
 
  private:

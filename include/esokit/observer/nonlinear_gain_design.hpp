@@ -13,10 +13,10 @@ namespace esokit {
 /// else was found as far as the test goes (2^-40 to 2^40 error scales).
 template <PlainScalar S>
 struct ErrorRanges {
-  static constexpr int most = 4;
-  Array<Interval<S>, most> range{};
-  int count = 0;
-  bool complete = true;  ///< false: there are more than `most`
+  static constexpr int most = 4;     ///< capacity
+  Array<Interval<S>, most> range{};  ///< the first `count` are valid
+  int count = 0;                     ///< ranges found, 0 .. most
+  bool complete = true;              ///< false: there are more than `most`
 };
 
 /// What `NonlinearEso::report` says of a config.
@@ -49,7 +49,7 @@ Check<S> check_shape(const Shape& shape) {
   for (int octave = -tested_octaves; octave < tested_octaves; ++octave) {
     for (int quarter = 0; quarter < 4; ++quarter) {
       const auto octave_start = power_of_two<TableScalar<S>>(octave);
-      const S x = S(octave_start) * S(1.0 + 0.25 * quarter);
+      const S x = S(octave_start) * (S(1.0) + S(0.25) * integer<S>(quarter));
       if (!all(is_finite(S(k(x))))) return Error<S>{"shape", x, rule};
     }
   }

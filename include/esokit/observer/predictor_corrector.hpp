@@ -22,6 +22,34 @@ struct ChainConfig {
                       ///< after more it restarts from the measurement
 };
 
+namespace detail {
+
+/// Of no class, so that all observers of an order share its code.
+template <int Order, Scalar S>
+Check<S> check_chain(const ChainConfig<S>& config) {
+  if (auto ok = check_nonzero("input_gain", config.input_gain); !ok) return ok;
+  if (auto ok = check_positive("sample_time", config.sample_time); !ok) return ok;
+  if (auto ok =
+          check_representable("sample_time", config.sample_time, S(S(1.0) / config.sample_time),
+                              "has an inverse that the scalar cannot hold");
+      !ok) {
+    return ok;
+  }
+  if (auto ok = check_representable(
+          "input_gain", config.input_gain,
+          ScaledChain<Order, S, 1>::scaled_input_gain(config.input_gain, config.sample_time),
+          "times T^n / n! gives a gain that the scalar cannot hold");
+      !ok) {
+    return ok;
+  }
+  if (config.max_gap < 1 || config.max_gap > 65000) {
+    return Error<S>{"max_gap", detail::integer<S>(config.max_gap), "must be 1 .. 65000"};
+  }
+  return {};
+}
+
+}  // namespace detail
+
 /// A row of `Levels` chains with one gain law each; one level is the plain observer, more are the
 /// cascade. Level 1 is corrected by y and driven by u, level i is corrected by the corrected output
 /// of level i - 1 and driven by u and the disturbances that the levels below it found.
@@ -36,14 +64,14 @@ class PredictorCorrector {
   static_assert(Levels >= 1, "esokit: at least one level is needed");
 
  public:
-  using Chain = ScaledChain<Order, S, Extension>;
-  static constexpr int order = Order;
-  static constexpr int extension = Extension;
-  static constexpr int size = Chain::size;
-  static constexpr int levels = Levels;
-  using scalar_type = S;
-  using Estimate = typename Chain::Estimate;  ///< (y, .., y^(n-1), d, .., d^(m-1)), N x 1
-  using Laws = Array<Law, Levels>;
+  using Chain = ScaledChain<Order, S, Extension>;  ///< the sampled chain, in its scaling
+  static constexpr int order = Order;              ///< n, order of the plant
+  static constexpr int extension = Extension;      ///< m, extended states
+  static constexpr int size = Chain::size;         ///< N = n + m
+  static constexpr int levels = Levels;            ///< p
+  using scalar_type = S;                           ///< of states and settings
+  using Estimate = typename Chain::Estimate;       ///< (y, .., y^(n-1), d, .., d^(m-1)), N x 1
+  using Laws = Array<Law, Levels>;                 ///< one a level
 
   /// From chain settings and ready gain laws; the way in for a gain law of your own.
   /// @return error for input_gain, sample_time or max_gap out of its rule
@@ -175,7 +203,7 @@ class PredictorCorrector {
   /// For a controller that works ahead of the measurement.
   struct Preview {
     typename Chain::State offset;  ///< after correct(y) the estimate will be offset + slope y
-    typename Chain::State slope;
+    typename Chain::State slope;   ///< its derivative by y
   };
 
   /// Between `predict` and `correct`, for gain laws whose gain is known before the measurement.
@@ -276,6 +304,7 @@ class PredictorCorrector {
   }
 
  protected:
+  /// At rest in zero; `config` is checked already.
   PredictorCorrector(const ChainConfig<S>& config, const Laws& laws) noexcept
       : laws_(laws),
         scaled_input_gain_(Chain::scaled_input_gain(config.input_gain, config.sample_time)),
@@ -286,29 +315,14 @@ class PredictorCorrector {
     }
   }
 
+  /// The rules for input_gain, sample_time and max_gap.
   static Check<S> check_chain(const ChainConfig<S>& config) {
-    if (auto ok = check_nonzero("input_gain", config.input_gain); !ok) return ok;
-    if (auto ok = check_positive("sample_time", config.sample_time); !ok) return ok;
-    if (auto ok =
-            check_representable("sample_time", config.sample_time, S(S(1.0) / config.sample_time),
-                                "has an inverse that the scalar cannot hold");
-        !ok) {
-      return ok;
-    }
-    if (auto ok =
-            check_representable("input_gain", config.input_gain,
-                                Chain::scaled_input_gain(config.input_gain, config.sample_time),
-                                "times T^n / n! gives a gain that the scalar cannot hold");
-        !ok) {
-      return ok;
-    }
-    if (config.max_gap < 1 || config.max_gap > 65000) {
-      return Error<S>{"max_gap", S(static_cast<double>(config.max_gap)), "must be 1 .. 65000"};
-    }
-    return {};
+    return detail::check_chain<Order, S>(config);
   }
 
+  /// The gain laws, for the observer that is built on this.
   [[nodiscard]] constexpr const Laws& laws() const noexcept { return laws_; }
+  /// The gain laws, to be changed.
   [[nodiscard]] constexpr Laws& laws() noexcept { return laws_; }
 
   /// Takes the settings of `fresh` and keeps the estimate: states are rescaled to its sample time,

@@ -7,6 +7,7 @@
 
 namespace esokit {
 
+/// Settings of ReducedOrderEso.
 template <int Size, Scalar S>
 struct LinearEsoConfig<Size, S, ReducedPoles> {
   S observer_bandwidth{};  ///< omega_o, rad/s: N - 1 poles at exp(-omega_o T), one at zero
@@ -14,7 +15,9 @@ struct LinearEsoConfig<Size, S, ReducedPoles> {
   S sample_time{};         ///< T, s
   int max_gap = 100;       ///< missing samples that a correction may bridge before it restarts
 
+  /// Name of what the poles are placed by, for errors.
   static constexpr const char* placement_field = "observer_bandwidth";
+  /// What the poles are placed by.
   [[nodiscard]] const S& placement() const noexcept { return observer_bandwidth; }
 };
 
@@ -24,6 +27,7 @@ struct LinearEsoConfig<Size, S, ReducedPoles> {
 /// goes through to z_1 unfiltered. After a correction z_1 is the measurement but for rounding. It
 /// is the predictor-corrector with one pole at zero, so gaps, bad samples and retuning work as
 /// everywhere; it spends a multiply-add more than an observer written for N - 1 states would.
+/// @tparam Order n @tparam S scalar @tparam Extension m
 template <int Order, Scalar S = double, int Extension = 1>
 using ReducedOrderEso = LinearEso<Order, S, Extension, ReducedPoles>;
 

@@ -6,8 +6,9 @@
 /// With P- a bound of the covariance of the predicted state's error, R the variance of the noise
 /// and theta > 0 the inflation, which covers that the disturbance is correlated with the error:
 ///
-///   s  = C P- C' + R/(1+theta),  k = P- C' / s                                    (24), corrected
-///   P- <- (1+theta) Phi (I - k C) P- (I - k C)' Phi' + (Phi k) R (Phi k)' + (1+theta)/theta Q (11)
+///     s = C P- C' + R/(1+theta),  k = P- C' / s                                (24), corrected
+///     P- <- (1+theta) Phi (I - k C) P- (I - k C)' Phi' + (Phi k) R (Phi k)'
+///           + (1+theta)/theta Q                                               (11)
 ///
 /// The paper prints the transpose of s where its inverse belongs, and in its corrected form the
 /// predictor gain Phi k where k belongs. theta = 0 has no meaning in (11): the plain Kalman filter,
@@ -41,14 +42,14 @@ enum class RiccatiMode : unsigned char {
 /// What RiccatiGain needs, all covariances in the scaling of the chain and divided by `unit`.
 template <int Size, Scalar S>
 struct RiccatiSettings {
-  CovarianceFactor<Size, S> start{};  ///< P0, of the first prediction
-  CovarianceFactor<Size, S> noise{};  ///< Q
-  S measurement{};                    ///< R
-  S unit{1.0};                        ///< what 1 stands for, unit of y squared
-  InflationRule rule = InflationRule::fixed;
-  S inflation{};                   ///< theta of the fixed rule
-  Array<S, Size> trace_weights{};  ///< of the adaptive rule
-  RiccatiMode mode = RiccatiMode::recursive;
+  CovarianceFactor<Size, S> start{};          ///< P0, of the first prediction
+  CovarianceFactor<Size, S> noise{};          ///< Q
+  S measurement{};                            ///< R
+  S unit{1.0};                                ///< what 1 stands for, unit of y squared
+  InflationRule rule = InflationRule::fixed;  ///< how theta is chosen
+  S inflation{};                              ///< theta of the fixed rule
+  Array<S, Size> trace_weights{};             ///< of the adaptive rule
+  RiccatiMode mode = RiccatiMode::recursive;  ///< how the gain is obtained
 };
 
 /// Gain law of ExtendedStateFilter. The gain is known before the measurement; a missing sample is
@@ -58,9 +59,9 @@ struct RiccatiSettings {
 template <int Size, Scalar S, int TableSize = 0>
 class RiccatiGain {
  public:
-  using Factor = CovarianceFactor<Size, S>;
-  using Settings = RiccatiSettings<Size, S>;
-  using Gain = ScaledGain<Size, S>;
+  using Factor = CovarianceFactor<Size, S>;   ///< P-, scaled
+  using Settings = RiccatiSettings<Size, S>;  ///< of the constructor
+  using Gain = ScaledGain<Size, S>;           ///< k, scaled
 
   /// The law in its recursive mode; `freeze` goes over to another.
   explicit RiccatiGain(const Settings& settings) noexcept
@@ -122,8 +123,11 @@ class RiccatiGain {
     return true;
   }
 
+  /// k of the coming correction, scaled, whatever the innovation.
+  /// @{
   [[nodiscard]] constexpr const Gain& gain(const S&) const noexcept { return now_.gain; }
   [[nodiscard]] constexpr const Gain& gain_before_measurement() const noexcept { return now_.gain; }
+  /// @}
 
   /// One sample ahead, from the corrected covariance if there was a correction.
   ESOKIT_INLINE constexpr void advance() noexcept {
@@ -137,6 +141,7 @@ class RiccatiGain {
     recur();
   }
 
+  /// The correction was carried out; the next `advance` goes on from the corrected covariance.
   ESOKIT_INLINE constexpr void accept(const S&) noexcept {
     since_ = static_cast<std::int8_t>(since_ | corrected);
   }
@@ -155,6 +160,7 @@ class RiccatiGain {
   constexpr void watch(bool on) noexcept {
     since_ = static_cast<std::int8_t>((since_ & ~watched) | (on ? watched : 0));
   }
+  /// What `watch` was told last.
   [[nodiscard]] constexpr bool is_watched() const noexcept { return since_ < 0; }
 
   /// Begins anew: from P0, or with the limit.
@@ -223,10 +229,12 @@ class RiccatiGain {
   [[nodiscard]] constexpr bool stands() const noexcept { return (since_ & standing) != 0; }
 
   /// The limit gain of the frozen modes, and the last gain of the table.
+  /// @{
   [[nodiscard]] constexpr const Gain& limit_gain() const noexcept { return limit_.gain; }
   [[nodiscard]] constexpr const Gain& last_table_gain() const noexcept requires(TableSize > 0) {
     return table_[TableSize - 1].gain;
   }
+  /// @}
 
  private:
   // Bits of `since_`: what happened since the last `advance`, and whether the gain stands.

@@ -23,11 +23,14 @@ enum class StepStatus : unsigned char {
   outlier_rejected = 64,
 };
 
+/// Both flags.
+/// @{
 constexpr StepStatus operator|(StepStatus a, StepStatus b) noexcept {
   return static_cast<StepStatus>(static_cast<unsigned char>(a) | static_cast<unsigned char>(b));
 }
 
 constexpr StepStatus& operator|=(StepStatus& a, StepStatus b) noexcept { return a = a | b; }
+/// @}
 
 /// True if `flag` is set in `status`.
 constexpr bool has(StepStatus status, StepStatus flag) noexcept {

@@ -47,14 +47,17 @@ template <int Size, Scalar S, class Placement = EqualPoles,
           SignReading Reading = SignReading::magnitude>
 class SwitchedGain {
  public:
-  using Set = ConstantGain<Size, S, Placement>;
+  using Set = ConstantGain<Size, S, Placement>;  ///< one of the two gain sets
 
   /// A NaN compares as not shrinking, so that any innovation is safe to ask with.
   static constexpr bool bears_any_innovation = true;
 
+  /// @param shrinking in force while the innovation shrinks @param otherwise else
   constexpr SwitchedGain(const Set& shrinking, const Set& otherwise) noexcept
       : sets_{otherwise, shrinking} {}
 
+  /// k for an innovation, scaled.
+  //
   // Whether an innovation shrinks is as good as random: a branch on it would cost more than the
   // rest of the update. One lane picks its set by address, a pack element by element.
   [[nodiscard]] ESOKIT_INLINE constexpr decltype(auto) gain(const S& e) const noexcept {
@@ -71,14 +74,17 @@ class SwitchedGain {
     }
   }
 
+  /// That of `otherwise` for the whole gap.
   [[nodiscard]] ScaledGain<Size, S> gap_gain(const S& e, unsigned samples) const noexcept {
     return sets_[0].gap_gain(e, samples);
   }
 
+  /// The correction was carried out: e is what the next innovation is compared with.
   ESOKIT_INLINE constexpr void accept(const S& e) noexcept {
     previous_ = detail::watched(Reading, e);
   }
 
+  /// The next innovation counts as not shrinking.
   constexpr void reset() noexcept { previous_ = detail::nothing_watched<S>(Reading); }
 
   /// Takes over what another law of this kind remembers.
@@ -90,12 +96,14 @@ class SwitchedGain {
   }
 
   /// The two gain sets, scaled.
+  /// @{
   [[nodiscard]] constexpr const ScaledGain<Size, S>& shrinking_gain() const noexcept {
     return sets_[1].gain_before_measurement();
   }
   [[nodiscard]] constexpr const ScaledGain<Size, S>& otherwise_gain() const noexcept {
     return sets_[0].gain_before_measurement();
   }
+  /// @}
 
  private:
   Array<Set, 2> sets_;  ///< otherwise, shrinking
@@ -114,12 +122,14 @@ class ContinuousSwitchedGain {
         previous_(detail::nothing_watched<S>(reading)),
         reading_(reading) {}
 
+  /// Compares e with that of the step before, and chooses the gain set of this step.
   void begin_step(const S&, const S& e) noexcept {
     const S now = detail::watched(reading_, e);
     is_shrinking_ = all(now < previous_);
     previous_ = now;
   }
 
+  /// l, N x 1, row i in 1/s^(i+1); the same over a whole step.
   [[nodiscard]] const Vector<S, Size>& gain(const S&, const S&) const noexcept {
     return is_shrinking_ ? shrinking_ : otherwise_;
   }

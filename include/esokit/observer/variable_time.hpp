@@ -24,11 +24,15 @@ class VariableTime : public Observer {
   using S = typename Observer::scalar_type;
 
  public:
+  /// Settings of make.
   struct Config {
     typename Observer::Config observer{};  ///< with the nominal sample time T
-    S ratio = S(4);                        ///< > 1: steps may take T / ratio .. T ratio
+    S ratio = S(4);                        ///< above 1: steps may take T / ratio .. T ratio
   };
 
+  /// Checks the settings and does all the design work.
+  /// @return the observer at rest in zero, or an error that names the field; the observer's config
+  /// must be good at both ends of the range
   static Expected<VariableTime, Error<S>> make(const Config& config) {
     if (auto ok = check_above("ratio", config.ratio, S(1)); !ok) return ok.error();
     auto observer = Observer::make(config.observer);
@@ -42,7 +46,8 @@ class VariableTime : public Observer {
     return VariableTime(*observer, config);
   }
 
-  /// New settings while running: the estimate is kept; steps are nominal again.
+  /// New settings while running: the estimate is kept; steps are nominal again. A refused config
+  /// changes nothing.
   Check<S> retune(const Config& config) {
     auto fresh = make(config);
     if (!fresh) return fresh.error();
@@ -68,6 +73,7 @@ class VariableTime : public Observer {
     return {};
   }
 
+  /// One sample, see PredictorCorrector::update; it took `step_time`.
   StepStatus update(S y, S u_applied) noexcept {
     if (!is_current() || this->missed() != 0) [[unlikely]] {
       const StepStatus predicted = predict(u_applied);
@@ -77,12 +83,14 @@ class VariableTime : public Observer {
     return Observer::update(y, u_applied);
   }
 
+  /// Time update alone, over `step_time`.
   StepStatus predict(S u_applied) noexcept {
     if (!is_current()) take(step_time_);
     elapsed_ = this->missed() == 0 ? step_time_ : elapsed_ + step_time_;
     return Observer::predict(u_applied);
   }
 
+  /// Measurement update alone, with the gain for all the time since the last one.
   StepStatus correct(S y) noexcept {
     // The observer bridges `missed` steps of its sample time: make that their mean.
     const int steps = this->missed();

@@ -15,11 +15,14 @@ class WrappedOutput : public Observer {
   using S = typename Observer::scalar_type;
 
  public:
+  /// Settings of make.
   struct Config {
     typename Observer::Config observer{};  ///< of the observer itself
     S period{};                            ///< of y, in its unit: 2 pi, 360
   };
 
+  /// Checks the settings and does all the design work.
+  /// @return the observer at rest in zero, or an error that names the field
   static Expected<WrappedOutput, Error<S>> make(const Config& config) {
     if (auto ok = check_positive("period", config.period); !ok) return ok.error();
     if (auto ok = check_representable("period", config.period, S(S(1) / config.period),
@@ -32,7 +35,7 @@ class WrappedOutput : public Observer {
     return WrappedOutput(*observer, config.period);
   }
 
-  /// New settings while running: the estimate is kept.
+  /// New settings while running: the estimate is kept. A refused config changes nothing.
   Check<S> retune(const Config& config) {
     auto fresh = make(config);
     if (!fresh) return fresh.error();
@@ -42,17 +45,20 @@ class WrappedOutput : public Observer {
     return {};
   }
 
+  /// One sample, see PredictorCorrector::update. @param y in any branch
   StepStatus update(S y, S u_applied) noexcept {
     const StepStatus predicted = predict(u_applied);
     return predicted | correct(y);
   }
 
+  /// Time update alone, see PredictorCorrector::predict.
   StepStatus predict(S u_applied) noexcept {
     const StepStatus status = Observer::predict(u_applied);
     recentre();
     return status;
   }
 
+  /// Measurement update alone. @param y in any branch
   StepStatus correct(S y) noexcept {
     // The innovation is that of level 1, whose z_1 the correction will subtract.
     const S predicted = Observer::level_estimate(0)(0);
@@ -61,12 +67,14 @@ class WrappedOutput : public Observer {
     return status;
   }
 
+  /// Starts anew at (y, 0, .., 0), y taken to the nearest period around zero.
   StepStatus reset(S y) noexcept {
     const StepStatus status = Observer::reset(y);
     recentre();
     return status;
   }
 
+  /// Starts anew at a given estimate, N x 1.
   StepStatus reset(const typename Observer::Estimate& state) noexcept {
     const StepStatus status = Observer::reset(state);
     recentre();
@@ -78,6 +86,7 @@ class WrappedOutput : public Observer {
     return angle - period_ * std::round(angle * inverse_period_);
   }
 
+  /// Of y, in its unit.
   [[nodiscard]] const S& period() const noexcept { return period_; }
 
  private:

@@ -59,6 +59,7 @@ concept ControlFunction = requires(const L& law, const ScalarType& t, const Esti
 
 /// Output-based form: the measured output, y + v.
 struct MeasuredOutput {
+  /// y + v.
   template <PlainScalar ScalarType>
   constexpr ScalarType operator()(ScalarType /*t*/, ScalarType y, ScalarType v) const noexcept {
     return y + v;
@@ -71,6 +72,7 @@ template <class Reference>
 struct MeasuredError {
   Reference reference;  ///< y_d(t), a Signal
 
+  /// y_d(t) - (y + v).
   template <PlainScalar ScalarType>
   requires Signal<Reference, ScalarType>
   constexpr ScalarType operator()(ScalarType t, ScalarType y, ScalarType v) const noexcept {
@@ -78,11 +80,13 @@ struct MeasuredError {
   }
 };
 
+/// MeasuredError{y_d}.
 template <class Reference>
 MeasuredError(Reference) -> MeasuredError<Reference>;
 
 /// No measurement noise.
 struct NoNoise {
+  /// Zero.
   constexpr int at(std::int64_t /*k*/) const noexcept { return 0; }
 };
 
@@ -90,7 +94,7 @@ struct NoNoise {
 /// the one that acts from t on.
 template <Plant P, class Observer>
 struct LoopSample {
-  using ScalarType = typename P::State::Scalar;
+  using ScalarType = typename P::State::Scalar;  ///< of the plant
 
   std::int64_t index{};                    ///< k
   ScalarType t{};                          ///< s
@@ -168,23 +172,24 @@ requires ControlFunction<Law, typename P::State::Scalar, typename Observer::Esti
     MeasurementMap<Measurement, typename P::State::Scalar> &&
     NoiseSource<Noise, typename P::State::Scalar>
 struct ContinuousLoop {
-  using ScalarType = typename P::State::Scalar;
-  using Sample = LoopSample<P, Observer>;
-  using End = LoopEnd<P, typename Observer::State>;
+  using ScalarType = typename P::State::Scalar;      ///< of the plant
+  using Sample = LoopSample<P, Observer>;            ///< what the callback gets
+  using End = LoopEnd<P, typename Observer::State>;  ///< what `run` returns
 
+  /// Settings of run.
   struct Config {
-    ScalarType duration{};    ///< s, a whole multiple of `step`
-    ScalarType step{};        ///< s
-    ScalarType start_time{};  ///< s
-    typename P::State plant_state = P::State::Zero();
-    typename Observer::State observer_state = Observer::State::Zero();
+    ScalarType duration{};                             ///< s, a whole multiple of `step`
+    ScalarType step{};                                 ///< s
+    ScalarType start_time{};                           ///< s
+    typename P::State plant_state = P::State::Zero();  ///< x at the start
+    typename Observer::State observer_state = Observer::State::Zero();  ///< z at the start
   };
 
-  P plant;
-  Observer observer;
-  Law law;
-  Measurement measurement{};
-  Noise noise{};
+  P plant;                    ///< copied into the loop, as all of these
+  Observer observer;          ///< its equations
+  Law law;                    ///< u(t, estimate)
+  Measurement measurement{};  ///< what the observer is fed
+  Noise noise{};              ///< v, held over a step
 
   /// Runs from the config's states; equal runs give equal results. `on_sample(const Sample&)` is
   /// called at the start of each step and at the end; if it returns a bool, false stops the run.
@@ -245,6 +250,8 @@ struct ContinuousLoop {
   }
 };
 
+/// ContinuousLoop{plant, observer, law}, where need be with measurement and noise.
+/// @{
 template <class P, class Observer, class Law>
 ContinuousLoop(P, Observer, Law) -> ContinuousLoop<P, Observer, Law>;
 template <class P, class Observer, class Law, class Measurement>
@@ -252,6 +259,7 @@ ContinuousLoop(P, Observer, Law, Measurement) -> ContinuousLoop<P, Observer, Law
 template <class P, class Observer, class Law, class Measurement, class Noise>
 ContinuousLoop(P, Observer, Law, Measurement, Noise)
     -> ContinuousLoop<P, Observer, Law, Measurement, Noise>;
+/// @}
 
 /// The deployment way: at each sample the observer is updated with the measurement and the input
 /// that was held until now, the law is computed once, and its input is held for a sample time,
@@ -264,24 +272,25 @@ requires ControlFunction<Law, typename P::State::Scalar, typename Observer::Esti
     MeasurementMap<Measurement, typename P::State::Scalar> &&
     NoiseSource<Noise, typename P::State::Scalar>
 struct SampledLoop {
-  using ScalarType = typename P::State::Scalar;
-  using Sample = LoopSample<P, Observer>;
-  using End = LoopEnd<P, Observer>;
+  using ScalarType = typename P::State::Scalar;  ///< of the plant
+  using Sample = LoopSample<P, Observer>;        ///< what the callback gets
+  using End = LoopEnd<P, Observer>;              ///< what `run` returns
 
+  /// Settings of run.
   struct Config {
     ScalarType duration{};       ///< s, a whole multiple of `sample_time`
     ScalarType sample_time{};    ///< T, s; that of the observer
     int substeps = 1;            ///< integration steps of the plant a sample, 1 or more
     ScalarType start_time{};     ///< s
     ScalarType initial_input{};  ///< u that was held before the start
-    typename P::State plant_state = P::State::Zero();
+    typename P::State plant_state = P::State::Zero();  ///< x at the start
   };
 
-  P plant;
-  Observer observer;  ///< in the state it has one sample before the start
-  Law law;
-  Measurement measurement{};
-  Noise noise{};
+  P plant;                    ///< copied into the loop, as all of these
+  Observer observer;          ///< in the state it has one sample before the start
+  Law law;                    ///< u(t, estimate), called once a sample
+  Measurement measurement{};  ///< what the observer is fed
+  Noise noise{};              ///< v, one value a sample
 
   /// As ContinuousLoop::run; `on_sample` is called once a sample and at the end, after the update.
   /// The callback sees the samples only, not what the plant does between them.
@@ -343,6 +352,8 @@ struct SampledLoop {
   }
 };
 
+/// SampledLoop{plant, observer, law}, where need be with measurement and noise.
+/// @{
 template <class P, class Observer, class Law>
 SampledLoop(P, Observer, Law) -> SampledLoop<P, Observer, Law>;
 template <class P, class Observer, class Law, class Measurement>
@@ -350,5 +361,6 @@ SampledLoop(P, Observer, Law, Measurement) -> SampledLoop<P, Observer, Law, Meas
 template <class P, class Observer, class Law, class Measurement, class Noise>
 SampledLoop(P, Observer, Law, Measurement, Noise)
     -> SampledLoop<P, Observer, Law, Measurement, Noise>;
+/// @}
 
 }  // namespace esokit::sim

@@ -14,13 +14,15 @@ namespace esokit::sim {
 /// s(t) = first(t) + second(t). An aggregate, for there is nothing to refuse: `Sum{a, b}`.
 template <class First, class Second>
 struct Sum {
-  First first;
-  Second second;
+  First first;    ///< a Signal
+  Second second;  ///< a Signal
 
+  /// s(t), t in s.
   template <PlainScalar ScalarType>
   requires Signal<First, ScalarType> && Signal<Second, ScalarType>
   constexpr ScalarType operator()(ScalarType t) const noexcept { return first(t) + second(t); }
 
+  /// (s, s', .., s^(Count-1)) at t (s).
   template <int Count, PlainScalar ScalarType>
   requires DifferentiableSignal<First, ScalarType> && DifferentiableSignal<Second, ScalarType>
   constexpr Array<ScalarType, Count> derivatives(ScalarType t) const noexcept {
@@ -31,6 +33,7 @@ struct Sum {
   }
 };
 
+/// Sum{a, b}.
 template <class First, class Second>
 Sum(First, Second) -> Sum<First, Second>;
 
@@ -40,6 +43,7 @@ template <class Inner, PlainScalar ScalarType = double>
 requires Signal<Inner, ScalarType>
 class SwitchedOn {
  public:
+  /// Settings of make.
   struct Config {
     Inner signal{};     ///< what is switched on
     ScalarType time{};  ///< when, s
@@ -51,11 +55,12 @@ class SwitchedOn {
     return SwitchedOn(std::move(config));
   }
 
+  /// s(t), t in s.
   constexpr ScalarType operator()(ScalarType t) const noexcept {
     return t >= config_.time ? config_.signal(t) : ScalarType{};
   }
 
-  /// The jumps at `time` are left out, as in every signal.
+  /// (s, s', .., s^(Count-1)) at t (s). The jumps at `time` are left out, as in every signal.
   template <int Count>
   requires DifferentiableSignal<Inner, ScalarType>
   constexpr Array<ScalarType, Count> derivatives(ScalarType t) const noexcept {

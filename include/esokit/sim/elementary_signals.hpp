@@ -20,10 +20,12 @@ namespace esokit::sim {
 template <PlainScalar ScalarType = double>
 class Constant {
  public:
+  /// Settings of make.
   struct Config {
     ScalarType value{};  ///< the value at all times
   };
 
+  /// Zero.
   constexpr Constant() = default;
 
   /// Refuses a value that is not finite.
@@ -32,8 +34,10 @@ class Constant {
     return Constant(config);
   }
 
+  /// s(t), t in s.
   constexpr ScalarType operator()(ScalarType /*t*/) const noexcept { return config_.value; }
 
+  /// (s, s', .., s^(Count-1)) at t (s).
   template <int Count>
   constexpr Array<ScalarType, Count> derivatives(ScalarType /*t*/) const noexcept {
     static_assert(Count >= 1);
@@ -50,6 +54,7 @@ class Constant {
 template <PlainScalar ScalarType = double>
 class Step {
  public:
+  /// Settings of make.
   struct Config {
     ScalarType time{};   ///< start, s
     ScalarType size{1};  ///< height
@@ -62,10 +67,12 @@ class Step {
     return Step(config);
   }
 
+  /// s(t), t in s.
   constexpr ScalarType operator()(ScalarType t) const noexcept {
     return t >= config_.time ? config_.size : ScalarType{};
   }
 
+  /// (s, s', .., s^(Count-1)) at t (s).
   template <int Count>
   constexpr Array<ScalarType, Count> derivatives(ScalarType t) const noexcept {
     static_assert(Count >= 1);
@@ -82,6 +89,7 @@ class Step {
 template <PlainScalar ScalarType = double>
 class Ramp {
  public:
+  /// Settings of make.
   struct Config {
     ScalarType time{};    ///< start, s
     ScalarType slope{1};  ///< per second
@@ -94,10 +102,12 @@ class Ramp {
     return Ramp(config);
   }
 
+  /// s(t), t in s.
   constexpr ScalarType operator()(ScalarType t) const noexcept {
     return t >= config_.time ? config_.slope * (t - config_.time) : ScalarType{};
   }
 
+  /// (s, s', .., s^(Count-1)) at t (s).
   template <int Count>
   constexpr Array<ScalarType, Count> derivatives(ScalarType t) const noexcept {
     static_assert(Count >= 1);
@@ -118,6 +128,7 @@ class Polynomial {
   static_assert(Degree >= 0);
 
  public:
+  /// Settings of make.
   struct Config {
     Array<ScalarType, Degree + 1> coefficients{};  ///< lowest power first, per s^i
     ScalarType origin{};                           ///< time of the expansion point, s
@@ -134,8 +145,10 @@ class Polynomial {
     return Polynomial(config);
   }
 
+  /// s(t), t in s.
   constexpr ScalarType operator()(ScalarType t) const noexcept { return derivatives<1>(t)[0]; }
 
+  /// (s, s', .., s^(Count-1)) at t (s).
   template <int Count>
   constexpr Array<ScalarType, Count> derivatives(ScalarType t) const noexcept {
     static_assert(Count >= 1);
@@ -163,6 +176,7 @@ class Polynomial {
 template <PlainScalar ScalarType = double>
 class Sine {
  public:
+  /// Settings of make.
   struct Config {
     ScalarType amplitude{1};          ///< peak, in the unit of the signal
     ScalarType angular_frequency{1};  ///< rad/s
@@ -180,11 +194,13 @@ class Sine {
     return Sine(config);
   }
 
+  /// s(t), t in s.
   ScalarType operator()(ScalarType t) const noexcept {
     return config_.offset +
            config_.amplitude * std::sin(config_.angular_frequency * t + config_.phase);
   }
 
+  /// (s, s', .., s^(Count-1)) at t (s).
   template <int Count>
   Array<ScalarType, Count> derivatives(ScalarType t) const noexcept {
     static_assert(Count >= 1);

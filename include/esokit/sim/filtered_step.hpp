@@ -25,6 +25,7 @@ class FilteredStep {
   static_assert(Order >= 1 && Order <= 16);
 
  public:
+  /// Settings of make.
   struct Config {
     ScalarType time{};            ///< start, s
     ScalarType size{1};           ///< final value
@@ -40,8 +41,10 @@ class FilteredStep {
     return FilteredStep(config);
   }
 
+  /// s(t), t in s.
   ScalarType operator()(ScalarType t) const noexcept { return derivatives<1>(t)[0]; }
 
+  /// (s, s', .., s^(Count-1)) at t (s), Count up to 20.
   template <int Count>
   Array<ScalarType, Count> derivatives(ScalarType t) const noexcept {
     static_assert(Count >= 1 && Count <= 20);

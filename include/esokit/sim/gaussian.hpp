@@ -16,8 +16,10 @@ namespace esokit::sim {
 /// Always drawn in double, so that a float simulation sees the same noise.
 class Gaussian {
  public:
+  /// @param seed any number; equal seeds give equal sequences
   explicit Gaussian(std::uint64_t seed) : engine_(seed), seed_(seed) {}
 
+  /// The next number.
   double next() {
     if (has_spare_) {
       has_spare_ = false;

@@ -27,6 +27,7 @@ constexpr Check<ScalarType> check_not_negative(const char* field, ScalarType val
 template <PlainScalar ScalarType = double>
 class WhiteNoise {
  public:
+  /// Settings of make.
   struct Config {
     ScalarType standard_deviation{};  ///< in the unit of the signal; zero is no noise
     std::uint64_t seed = 0;           ///< any number
@@ -40,11 +41,13 @@ class WhiteNoise {
     return WhiteNoise(config);
   }
 
+  /// The next number, in the unit of the signal.
   ScalarType next() { return standard_deviation_ * static_cast<ScalarType>(gaussian_.next()); }
 
   /// Starts the sequence anew.
   void reset() { gaussian_.reset(); }
 
+  /// In the unit of the signal.
   ScalarType standard_deviation() const noexcept { return standard_deviation_; }
 
  private:
@@ -63,6 +66,7 @@ class WhiteNoise {
 template <PlainScalar ScalarType = double>
 class BandLimitedWhiteNoise {
  public:
+  /// Settings of make.
   struct Config {
     ScalarType power{};      ///< height of the two-sided power spectral density; zero is no noise
     ScalarType hold{1};      ///< interval, s
@@ -91,7 +95,7 @@ class BandLimitedWhiteNoise {
   /// Starts the sequence anew.
   void reset() { white_.reset(); }
 
-  /// sqrt(power/hold).
+  /// sqrt(power/hold), in the unit of the signal.
   ScalarType standard_deviation() const noexcept { return white_.standard_deviation(); }
 
  private:
@@ -107,6 +111,7 @@ class BandLimitedWhiteNoise {
 template <PlainScalar ScalarType = double>
 class HeldNoise {
  public:
+  /// Settings of make.
   struct Config {
     ScalarType power{};      ///< height of the two-sided power spectral density; zero is no noise
     ScalarType hold{1};      ///< interval of one value, s; a whole multiple of `step`
@@ -155,7 +160,9 @@ class HeldNoise {
     drawn_ = 0;
   }
 
+  /// hold/step.
   std::int64_t steps_per_hold() const noexcept { return steps_per_hold_; }
+  /// sqrt(power/hold), in the unit of the signal.
   ScalarType standard_deviation() const noexcept { return noise_.standard_deviation(); }
 
  private:

@@ -20,7 +20,9 @@ struct Peak {
 template <PlainScalar ScalarType = double>
 class PeakMeter {
  public:
+  /// Over all time.
   constexpr PeakMeter() = default;
+  /// Over a window.
   explicit constexpr PeakMeter(const Window<ScalarType>& window) : window_(window) {}
 
   /// Adds a sample. False if it is not finite; there is no peak from then on.
@@ -40,6 +42,7 @@ class PeakMeter {
     return spoilt_ ? std::nullopt : peak_;
   }
 
+  /// Forgets all samples, keeps the window.
   constexpr void reset() noexcept { *this = PeakMeter(window_); }
 
  private:

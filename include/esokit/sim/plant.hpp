@@ -12,6 +12,7 @@
 #include <type_traits>
 #include <utility>
 
+/// Simulation: plants, signals, noise, integrators, closed loops, criteria.
 namespace esokit::sim {
 
 /// A system with one input and one output: x' = derivative(t, x, u), y = output(t, x).
@@ -38,9 +39,10 @@ class IntegratorChainPlant {
   static_assert(Order >= 1);
 
  public:
-  static constexpr int states = Order;
-  using State = Vector<ScalarType, states>;
+  static constexpr int states = Order;       ///< length of x
+  using State = Vector<ScalarType, states>;  ///< x
 
+  /// Settings of make.
   struct Config {
     ScalarType input_gain{1};   ///< b0, unit of y^(Order) per unit of u; not zero
     Disturbance disturbance{};  ///< d(t)
@@ -52,6 +54,7 @@ class IntegratorChainPlant {
     return IntegratorChainPlant(std::move(config));
   }
 
+  /// x'. @param t s
   State derivative(ScalarType t, const State& x, ScalarType u) const noexcept {
     State rate;
     for (int i = 0; i + 1 < states; ++i) rate[i] = x[i + 1];
@@ -59,9 +62,10 @@ class IntegratorChainPlant {
     return rate;
   }
 
+  /// y.
   ScalarType output(ScalarType /*t*/, const State& x) const noexcept { return x[0]; }
 
-  /// d(t).
+  /// d(t), unit of y^(Order).
   ScalarType total_disturbance(ScalarType t, const State& /*x*/) const noexcept {
     return config_.disturbance(t);
   }
@@ -81,9 +85,10 @@ class LinearPlant {
   static_assert(Order >= 1);
 
  public:
-  static constexpr int states = Order;
-  using State = Vector<ScalarType, states>;
+  static constexpr int states = Order;       ///< length of x
+  using State = Vector<ScalarType, states>;  ///< x
 
+  /// Settings of make.
   struct Config {
     Array<ScalarType, Order> coefficients{};  ///< a_0 .. a_{Order-1}, s^-(Order-i)
     ScalarType input_gain{1};                 ///< b, unit of y^(Order) per unit of u; not zero
@@ -101,6 +106,7 @@ class LinearPlant {
     return LinearPlant(std::move(config));
   }
 
+  /// x'. @param t s
   State derivative(ScalarType t, const State& x, ScalarType u) const noexcept {
     State rate;
     for (int i = 0; i + 1 < states; ++i) rate[i] = x[i + 1];
@@ -108,6 +114,7 @@ class LinearPlant {
     return rate;
   }
 
+  /// y.
   ScalarType output(ScalarType /*t*/, const State& x) const noexcept { return x[0]; }
 
   /// d(t) - a_0 y - .. - a_{Order-1} y^(Order-1): what an observer with b0 = b calls the total

@@ -47,6 +47,7 @@ class Recorder {
   static_assert(Columns >= 1);
 
  public:
+  /// Settings of make.
   struct Config {
     Array<std::string, Columns> names{};  ///< header of each column
     std::size_t capacity = 0;             ///< most rows
@@ -88,8 +89,11 @@ class Recorder {
     return true;
   }
 
+  /// Rows recorded.
   std::size_t rows() const noexcept { return rows_; }
+  /// Rows that came when it was full.
   std::size_t dropped() const noexcept { return dropped_; }
+  /// Header of each column.
   const Array<std::string, Columns>& names() const noexcept { return config_.names; }
 
   /// The samples of a column; valid until the recorder is gone or cleared.
@@ -115,11 +119,13 @@ class Recorder {
 
   /// Writes a header and all rows, each number in the shortest form that reads back to the same
   /// bits. The folder must exist.
+  /// @return error for a file that cannot be opened or written, or if rows were dropped
   Expected<void, FileError> write_csv(const std::string& path) const {
     return write(path, rows_, [](std::size_t i) { return i; });
   }
 
-  /// Writes the given rows only (see decimation.hpp).
+  /// Writes the given rows only (see decimation.hpp). Errors as above, and for a row that was not
+  /// recorded.
   Expected<void, FileError> write_csv(const std::string& path,
                                       std::span<const std::size_t> rows) const {
     for (const std::size_t row : rows) {

@@ -14,40 +14,52 @@ namespace esokit::sim {
 
 /// Forward Euler, order 1.
 struct Euler {
+  /// See ButcherTableau.
+  /// @{
   static constexpr int stages = 1;
   static constexpr int order = 1;
   static constexpr std::array<std::array<long double, 1>, 1> a{{{0}}};
   static constexpr std::array<long double, 1> b{1};
   static constexpr std::array<long double, 1> c{0};
+  /// @}
 };
 
 /// Explicit midpoint rule, order 2.
 struct ExplicitMidpoint {
+  /// See ButcherTableau.
+  /// @{
   static constexpr int stages = 2;
   static constexpr int order = 2;
   static constexpr std::array<std::array<long double, 2>, 2> a{{{0, 0}, {0.5L, 0}}};
   static constexpr std::array<long double, 2> b{0, 1};
   static constexpr std::array<long double, 2> c{0, 0.5L};
+  /// @}
 };
 
 /// Kutta's method of order 3.
 struct Kutta3 {
+  /// See ButcherTableau.
+  /// @{
   static constexpr int stages = 3;
   static constexpr int order = 3;
   static constexpr std::array<std::array<long double, 3>, 3> a{
       {{0, 0, 0}, {0.5L, 0, 0}, {-1, 2, 0}}};
   static constexpr std::array<long double, 3> b{1 / 6.0L, 2 / 3.0L, 1 / 6.0L};
   static constexpr std::array<long double, 3> c{0, 0.5L, 1};
+  /// @}
 };
 
 /// The classical method of order 4.
 struct RungeKutta4 {
+  /// See ButcherTableau.
+  /// @{
   static constexpr int stages = 4;
   static constexpr int order = 4;
   static constexpr std::array<std::array<long double, 4>, 4> a{
       {{0, 0, 0, 0}, {0.5L, 0, 0, 0}, {0, 0.5L, 0, 0}, {0, 0, 1, 0}}};
   static constexpr std::array<long double, 4> b{1 / 6.0L, 1 / 3.0L, 1 / 3.0L, 1 / 6.0L};
   static constexpr std::array<long double, 4> c{0, 0.5L, 0.5L, 1};
+  /// @}
 };
 
 /// A right-hand side of x' = rhs(t, x). It must return a State and no expression template, whose
@@ -132,8 +144,10 @@ template <class Method, class Rhs, class State, class ScalarType, class... Stage
 /// switches belong between steps, since a jump inside a step costs the order.
 ///
 /// @param rhs called `Method::stages` times as rhs(time, state)
-/// @param t   time at the start of the step, in seconds
-/// @param h   step, in seconds; a negative one integrates backwards
+/// @param t   time at the start of the step, s
+/// @param x   state at t
+/// @param h   step, s; a negative one integrates backwards
+/// @return the state at t + h
 template <ExplicitRungeKutta Method = RungeKutta4, class State, class ScalarType, class Rhs>
 requires RightHandSide<std::remove_reference_t<Rhs>, State, ScalarType>
 [[nodiscard]] State step(Rhs&& rhs, ScalarType t, const State& x, ScalarType h) {
@@ -141,6 +155,8 @@ requires RightHandSide<std::remove_reference_t<Rhs>, State, ScalarType>
 }
 
 /// `steps` steps from t0; the time of a step is t0 + k h, so that it does not drift.
+/// @param rhs as in `step` @param t0 s @param x state at t0 @param h step, s
+/// @return the state at t0 + steps h
 template <ExplicitRungeKutta Method = RungeKutta4, class State, PlainScalar ScalarType, class Rhs>
 requires RightHandSide<std::remove_reference_t<Rhs>, State, ScalarType>
 [[nodiscard]] State integrate(Rhs&& rhs, ScalarType t0, State x, ScalarType h, std::int64_t steps) {

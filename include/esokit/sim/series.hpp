@@ -13,11 +13,13 @@ namespace esokit::sim {
 template <PlainScalar ScalarType = double>
 class Series {
  public:
+  /// Settings of make: samples at given times.
   struct Config {
     std::span<const ScalarType> times{};   ///< s, finite, never descending
     std::span<const ScalarType> values{};  ///< finite, as many as times
   };
 
+  /// Settings of make_uniform: samples with a constant step.
   struct UniformConfig {
     ScalarType start{};                    ///< time of the first value, s
     ScalarType sample_time{1};             ///< s, positive
@@ -68,13 +70,16 @@ class Series {
     return series;
   }
 
+  /// Number of samples.
   std::size_t size() const noexcept { return values_.size(); }
 
+  /// Time of sample i < size(), s.
   ScalarType time(std::size_t i) const noexcept {
     if (!times_.empty()) return times_[i];
     return start_ + static_cast<ScalarType>(i) * sample_time_;
   }
 
+  /// Value of sample i < size().
   ScalarType value(std::size_t i) const noexcept { return values_[i]; }
 
  private:

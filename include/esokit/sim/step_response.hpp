@@ -14,6 +14,7 @@ namespace esokit::sim {
 template <PlainScalar ScalarType = double>
 class StepResponse {
  public:
+  /// Settings of make.
   struct Config {
     ScalarType initial_value{};  ///< before the step
     ScalarType final_value{1};   ///< after it; differs from the initial one
@@ -94,6 +95,7 @@ class StepResponse {
     return *rise_end_ - *rise_start_;
   }
 
+  /// Forgets all samples, keeps the settings.
   constexpr void reset() noexcept { *this = StepResponse(config_); }
 
  private:

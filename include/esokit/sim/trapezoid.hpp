@@ -13,7 +13,9 @@ namespace esokit::sim {
 template <PlainScalar ScalarType = double>
 class Trapezoid {
  public:
+  /// Over all time.
   constexpr Trapezoid() = default;
+  /// Over a window.
   explicit constexpr Trapezoid(const Window<ScalarType>& window) : window_(window) {}
 
   /// Adds a sample. False, and the sample is left out, if the time is not finite or before that of
@@ -34,6 +36,7 @@ class Trapezoid {
   /// The time that it covers, s.
   constexpr ScalarType duration() const noexcept { return duration_; }
 
+  /// Forgets all samples, keeps the window.
   constexpr void reset() noexcept { *this = Trapezoid(window_); }
 
  private:

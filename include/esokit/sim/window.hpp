@@ -12,11 +12,13 @@ namespace esokit::sim {
 template <PlainScalar ScalarType = double>
 class Window {
  public:
+  /// Settings of make.
   struct Config {
     ScalarType start = std::numeric_limits<ScalarType>::lowest();  ///< s
     ScalarType end = std::numeric_limits<ScalarType>::max();       ///< s, after `start`
   };
 
+  /// All time.
   constexpr Window() = default;
 
   /// Refuses members that are not finite and an end that is not after the start.
@@ -33,8 +35,11 @@ class Window {
     return Window(config);
   }
 
+  /// First moment, s.
   constexpr ScalarType start() const noexcept { return config_.start; }
+  /// Last moment, s.
   constexpr ScalarType end() const noexcept { return config_.end; }
+  /// True if t (s) is in it, ends included.
   constexpr bool contains(ScalarType t) const noexcept { return t >= start() && t <= end(); }
 
  private:
