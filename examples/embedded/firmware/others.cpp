@@ -1,0 +1,44 @@
+// What the image does not use, all of it in float. Compiled only: run.sh looks at what the object
+// asks the linker for. MimoAdrc is not here: its make inverts B0 by Eigen's LU, which links malloc.
+
+#include <esokit/control/adrc.hpp>
+#include <esokit/control/disturbance_compensator.hpp>
+#include <esokit/control/dual_feedback.hpp>
+#include <esokit/control/predictive_adrc.hpp>
+#include <esokit/control/tracking_differentiator.hpp>
+#include <esokit/observer/delayed_input.hpp>
+#include <esokit/observer/extended_state_filter.hpp>
+#include <esokit/observer/half_gain_eso.hpp>
+#include <esokit/observer/known_model.hpp>
+#include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/mimo_extended_state_filter.hpp>
+#include <esokit/observer/nonlinear_eso.hpp>
+#include <esokit/observer/reduced_order_eso.hpp>
+#include <esokit/observer/variable_time.hpp>
+#include <esokit/observer/wrapped_output.hpp>
+
+// All members, whether anything calls them or not.
+namespace esokit {
+
+using Observer = LinearEso<2, float>;
+using Predicting = ExtendedStateFilter<2, float>;
+
+template class LinearEso<3, float, 2>;
+template class LinearEso<2, float, 1, PoleSet>;
+template class NonlinearEso<2, float, 1, FalGain<float>>;
+template class MimoExtendedStateFilter<ChainOrders<2, 1>, 2, float>;
+
+template class Adrc<Observer, ErrorBased>;
+template class Adrc<HalfGainEso<2, float>>;
+template class Adrc<ReducedOrderEso<2, float>>;
+template class Adrc<DelayedInput<Observer, 4>>;
+template class Adrc<WrappedOutput<Observer>>;
+template class Adrc<VariableTime<Observer>>;
+template class Adrc<KnownModel<Observer, KnownPoles<2, float>>>;
+
+template class DisturbanceCompensator<Observer>;
+template class DualFeedbackAdrc<2, float>;
+template class PredictiveAdrc<Predicting>;
+template class TrackingDifferentiator<float>;
+
+}  // namespace esokit
