@@ -2,8 +2,8 @@
 //
 // usage: compare_runs [--exact] REFERENCE RUN
 //
-// With --exact the estimates of the open loop must agree bit for bit. All else (the closed loop, and
-// images with fused multiply-adds, which round less often) may differ by a share of the largest
+// With --exact the estimates of the open loop must agree bit for bit. All else (the closed loop,
+// and images with fused multiply-adds, which round less often) may differ by a share of the largest
 // magnitude that the quantity has in the run:
 // - 2e-3. A rounding of y near 1 rad, 6e-8, is 1/1700 of the sensor's noise, and the noise moves no
 //   estimate by more than its largest value; so 1/1700 and some for what comes back through the
