@@ -37,6 +37,8 @@
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/power.hpp>
 #include <esokit/core/scalar.hpp>
+#include <esokit/core/snapshot.hpp>
+#include <esokit/core/snapshot_text.hpp>
 #include <esokit/core/unroll.hpp>
 #include <esokit/core/version.hpp>
 #include <esokit/design/check.hpp>

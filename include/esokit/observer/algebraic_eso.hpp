@@ -126,7 +126,7 @@ class AlgebraicEso
     // One that has settled stays so, and no longer knows its age.
     std::get<0>(fresh->laws()).resume(settled() ? Law::max_index : age());
     if (auto ok = this->adopt(*fresh); !ok) return ok;
-    held_ = published;
+    hold(published);
     hold_samples_ = fresh->hold_samples_;
     return {};
   }
@@ -134,7 +134,7 @@ class AlgebraicEso
   /// After a known jump (of the disturbance, or of the state): the schedule begins anew, the state
   /// is kept, and the estimates of this moment are published until the hold time is over.
   void rearm() noexcept {
-    held_ = estimate();
+    hold(estimate());
     std::get<0>(this->laws()).restart();
   }
 
@@ -145,12 +145,12 @@ class AlgebraicEso
   StepStatus reset(const Estimate& state) noexcept { return hold_after(Base::reset(state)); }
 
   /// All published estimates in physical units; those of the start during the hold time.
-  [[nodiscard]] Estimate estimate() const noexcept { return holding() ? held_ : Base::estimate(); }
+  [[nodiscard]] Estimate estimate() const noexcept { return holding() ? held() : Base::estimate(); }
 
   /// Published estimate of y^(Row), or of d^(Row - n) for Row >= n.
   template <int Row>
   [[nodiscard]] S estimate() const noexcept {
-    return holding() ? held_(Row) : Base::template estimate<Row>();
+    return holding() ? std::get<Row>(held_) : Base::template estimate<Row>();
   }
 
   /// Published dhat, unit of y^(n).
@@ -175,7 +175,14 @@ class AlgebraicEso
 
  private:
   AlgebraicEso(const ChainConfig<S>& chain, const Law& law, std::uint32_t hold_samples) noexcept
-      : Base(chain, {law}), held_(Estimate::Zero()), hold_samples_(hold_samples) {}
+      : Base(chain, {law}), hold_samples_(hold_samples) {
+    hold(Estimate::Zero());
+  }
+
+  void hold(const Estimate& estimate) noexcept {
+    for (int r = 0; r < Base::size; ++r) held_[static_cast<std::size_t>(r)] = estimate(r);
+  }
+  [[nodiscard]] Estimate held() const noexcept { return Eigen::Map<const Estimate>(held_.data()); }
 
   static Expected<std::uint32_t, Error<S>> hold_samples(const Config& config) {
     constexpr int size = Base::size;
@@ -248,19 +255,19 @@ class AlgebraicEso
   }
 
   StepStatus hold_after(StepStatus status) noexcept {
-    if (status == StepStatus::ok) held_ = Base::estimate();
+    if (status == StepStatus::ok) hold(Base::estimate());
     return status;
   }
 
   /// After a restart for a long gap what was held before is too old to be published.
   ESOKIT_INLINE StepStatus hold_anew(StepStatus status) noexcept {
     if (has(status, StepStatus::restarted)) [[unlikely]] {
-      held_ = Base::estimate();
+      hold(Base::estimate());
     }
     return status;
   }
 
-  Estimate held_;
+  Array<S, Base::size> held_;
   std::uint32_t hold_samples_;
 };
 
