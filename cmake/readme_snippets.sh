@@ -1,0 +1,57 @@
+#!/usr/bin/env bash
+# Compiles every ```cpp block of the Markdown files: cmake/readme_snippets.sh [FILE.md...]
+# A block with main() stands alone; the other blocks of a file follow one another in one function,
+# after what the file declares for them in a comment: <!-- snippets: double y = 0; -->
+set -uo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 1
+compiler=${CXX:-c++}
+eigen=${EIGEN:-/usr/include/eigen3}
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+passed=0
+failed=0
+
+files=("$@")
+if ((${#files[@]} == 0)); then
+  mapfile -t files < <(find . \( -name .git -o -name build -o -name out \) -prune -o -name '*.md' -print | LC_ALL=C sort)
+fi
+
+try() {  # try SOURCE NAME
+  if "$compiler" -std=c++20 -fsyntax-only -Iinclude -isystem "$eigen" "$1" 2>"$work/errors"; then
+    passed=$((passed + 1))
+  else
+    failed=$((failed + 1))
+    echo "$2:"
+    head -n 15 "$work/errors"
+  fi
+}
+
+for file in "${files[@]}"; do
+  rm -f "$work"/block-* "$work/loose.cpp"
+  awk -v work="$work" '
+    /^[ ]*```cpp[ \t]*$/ { inside = 1; out = sprintf("%s/block-%02d.cpp", work, ++count); next }
+    /^[ ]*```/ && inside { inside = 0; close(out) }
+    inside { print > out }' "$file"
+  loose=()
+  for block in "$work"/block-*; do
+    [[ -e $block ]] || continue
+    if grep -q 'int main' "$block"; then
+      try "$block" "$file"
+    else
+      loose+=("$block")
+    fi
+  done
+  ((${#loose[@]} > 0)) || continue
+  {
+    echo "#include <cstdio>"
+    grep -hE '^ *#include' "${loose[@]}"
+    sed -n 's/^<!-- snippets-include: \(.*\) -->$/#include \1/p' "$file"
+    echo "void snippets() {"
+    sed -n 's/^<!-- snippets: \(.*\) -->$/\1/p' "$file"
+    grep -hvE '^ *#include' "${loose[@]}"
+    echo "}"
+  } >"$work/loose.cpp"
+  try "$work/loose.cpp" "$file"
+done
+echo "$passed passed, $failed failed"
+((passed > 0 && failed == 0))
