@@ -313,8 +313,10 @@ int main(int argc, char** argv) {
     const auto peak = of_setting(i + 1, &Run::peak);
     const double predicted = noise_level * std::sqrt(720.0 * step / std::pow(holds[i], 5));
     const std::string name = "FSB, lambda = 1, epsilon = " + number_text(holds[i]) + " s";
-    report.check_reference(name, "peak of the disturbance error (m/s^2)", independent_peaks[i],
-                           peak, Tolerance::deviations(3.0, peak), "independent run, one seed");
+    // Reported only: peaks scatter by half of their mean, so one seed of another program says
+    // little.
+    report.check(name, "peak of the disturbance error (m/s^2)", std::nullopt, peak, std::nullopt,
+                 "independent run, one seed: " + number_text(independent_peaks[i]));
     // The peak is about the error at epsilon: its mean of a normal number is 0.8 of its deviation,
     // and the error moves on for a while.
     report.expect(name, "peak over the formula's standard deviation", peak.mean / predicted,
