@@ -12,6 +12,7 @@
 #include <optional>
 #include <string>
 
+#include "../support/run.hpp"
 #include "../support/update_patterns.hpp"
 
 namespace esokit::benchmarks {
@@ -123,8 +124,5 @@ void add_all(const std::string& scalar) {
 int main(int argc, char** argv) {
   esokit::benchmarks::add_all<double>("double");
   esokit::benchmarks::add_all<float>("float");
-  benchmark::Initialize(&argc, argv);
-  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
-  benchmark::RunSpecifiedBenchmarks();
-  return 0;
+  return esokit::benchmarks::run(argc, argv);
 }

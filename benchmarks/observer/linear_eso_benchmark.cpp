@@ -7,6 +7,7 @@
 #include <esokit/observer/linear_eso.hpp>
 #include <string>
 
+#include "../support/run.hpp"
 #include "../support/update_patterns.hpp"
 
 namespace esokit::benchmarks {
@@ -185,8 +186,5 @@ void add_all(const std::string& scalar) {
 int main(int argc, char** argv) {
   esokit::benchmarks::add_all<double>("double");
   esokit::benchmarks::add_all<float>("float");
-  benchmark::Initialize(&argc, argv);
-  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
-  benchmark::RunSpecifiedBenchmarks();
-  return 0;
+  return esokit::benchmarks::run(argc, argv);
 }

@@ -13,6 +13,8 @@
 #include <esokit/sim/runge_kutta.hpp>
 #include <string>
 
+#include "../support/run.hpp"
+
 namespace esokit::benchmarks {
 namespace {
 
@@ -193,8 +195,5 @@ void add_all() {
 
 int main(int argc, char** argv) {
   esokit::benchmarks::add_all();
-  benchmark::Initialize(&argc, argv);
-  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
-  benchmark::RunSpecifiedBenchmarks();
-  return 0;
+  return esokit::benchmarks::run(argc, argv);
 }

@@ -2,10 +2,10 @@
 /// Small numeric helpers of the tests: seeded data, exact comparison, hidden bad values.
 #pragma once
 
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <limits>
 #include <type_traits>
 
@@ -57,44 +57,27 @@ T hidden(T value) {
   return opaque;
 }
 
-/// Quiet NaN from its bits; std::numeric_limits is of no use under -ffast-math.
+/// A number from its bits, which the compiler does not see; std::numeric_limits is of no use under
+/// -ffast-math.
 template <class T>
-T hidden_nan() {
+T hidden_from_bits(std::uint32_t single, std::uint64_t twofold) {
   if constexpr (std::is_same_v<T, float>) {
-    volatile std::uint32_t bits = 0x7fc00000u;
-    const std::uint32_t copy = bits;
-    T value;
-    std::memcpy(&value, &copy, sizeof value);
-    return value;
-  } else if constexpr (std::is_same_v<T, double>) {
-    volatile std::uint64_t bits = 0x7ff8000000000000u;
-    const std::uint64_t copy = bits;
-    T value;
-    std::memcpy(&value, &copy, sizeof value);
-    return value;
+    return std::bit_cast<float>(hidden(single));
   } else {
-    return static_cast<T>(hidden_nan<double>());
+    return static_cast<T>(std::bit_cast<double>(hidden(twofold)));
   }
 }
 
-/// Infinity from its bits.
+/// Quiet NaN.
+template <class T>
+T hidden_nan() {
+  return hidden_from_bits<T>(0x7fc00000u, 0x7ff8000000000000u);
+}
+
+/// Infinity.
 template <class T>
 T hidden_infinity() {
-  if constexpr (std::is_same_v<T, float>) {
-    volatile std::uint32_t bits = 0x7f800000u;
-    const std::uint32_t copy = bits;
-    T value;
-    std::memcpy(&value, &copy, sizeof value);
-    return value;
-  } else if constexpr (std::is_same_v<T, double>) {
-    volatile std::uint64_t bits = 0x7ff0000000000000u;
-    const std::uint64_t copy = bits;
-    T value;
-    std::memcpy(&value, &copy, sizeof value);
-    return value;
-  } else {
-    return static_cast<T>(hidden_infinity<double>());
-  }
+  return hidden_from_bits<T>(0x7f800000u, 0x7ff0000000000000u);
 }
 
 /// Finite, but too large to compute with: 3e38 in float.
