@@ -126,8 +126,8 @@ Expected<Interval<S>, Error<S>> find_limits(const GainLimits<S>& asked, const Ga
   }
   return Error<S>{"gain_min",
                   low,
-                  "is not certified for a varying gain (allow_uncertified_gain asks for it); least "
-                  "certified with gain_max = 1 is",
+                  "is not certified for a varying gain (allow_uncertified_gain asks for it); were "
+                  "gain_max 1, the least would be",
                   -1,
                   least_with_one,
                   true};
