@@ -34,6 +34,7 @@
 #include <esokit/core/error_text.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/fal.hpp>
+#include <esokit/core/linear_equations.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/power.hpp>
 #include <esokit/core/scalar.hpp>

@@ -2,6 +2,8 @@
 //
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
+
 #include <cmath>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/observer/cascade_eso.hpp>

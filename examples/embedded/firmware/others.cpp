@@ -1,9 +1,10 @@
 // What the image does not use, all of it in float. Compiled only: run.sh looks at what the object
-// asks the linker for. MimoAdrc is not here: its make inverts B0 by Eigen's LU, which links malloc.
+// asks the linker for.
 
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/dual_feedback.hpp>
+#include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/control/tracking_differentiator.hpp>
 #include <esokit/observer/delayed_input.hpp>
@@ -38,6 +39,7 @@ template class Adrc<KnownModel<Observer, KnownPoles<2, float>>>;
 
 template class DisturbanceCompensator<Observer>;
 template class DualFeedbackAdrc<2, float>;
+template class MimoAdrc<Observer, LinearEso<1, float>>;
 template class PredictiveAdrc<Predicting>;
 template class TrackingDifferentiator<float>;
 

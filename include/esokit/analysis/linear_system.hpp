@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cmath>
+#include <esokit/analysis/dense.hpp>
 #include <esokit/core/error.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/matrix.hpp>
@@ -84,33 +85,46 @@ constexpr Array<const char*, Order + Extension> estimate_names() noexcept {
 
 }  // namespace detail
 
-/// Scales the states by powers of two until rows and columns of `a` are of like size; nothing is
-/// rounded, and inputs and outputs stay as they are. States of a chain differ by omega^n.
-template <int States, int Inputs, int Outputs>
-void balance(LinearSystem<States, Inputs, Outputs>& system) noexcept {
+namespace detail {
+
+/// `balance` without the sizes in the type, for code that is compiled once. @param inputs of b
+inline void balance(DenseView<double> a, DenseView<double> b, int inputs,
+                    DenseView<double> c) noexcept {
+  const int states = a.rows;
   for (int sweep = 0; sweep < 30; ++sweep) {
     bool changed = false;
-    for (int i = 0; i < States; ++i) {
+    for (int i = 0; i < states; ++i) {
       double row = 0.0;
       double column = 0.0;
-      for (int j = 0; j < States; ++j) {
+      for (int j = 0; j < states; ++j) {
         if (j == i) continue;
-        row += std::abs(system.a(i, j));
-        column += std::abs(system.a(j, i));
+        row += std::abs(a(i, j));
+        column += std::abs(a(j, i));
       }
       if (!(row > 0.0) || !(column > 0.0)) continue;
       const double exponent = std::round(0.5 * std::log2(row / column));
       if (!is_finite(exponent) || exponent == 0.0) continue;
       // x_i is replaced by x_i / 2^exponent.
       const double factor = std::exp2(exponent);
-      system.a.row(i) /= factor;
-      system.a.col(i) *= factor;
-      system.b.row(i) /= factor;
-      system.c.col(i) *= factor;
+      for (int j = 0; j < states; ++j) a(i, j) /= factor;
+      for (int j = 0; j < states; ++j) a(j, i) *= factor;
+      for (int j = 0; j < inputs; ++j) b(i, j) /= factor;
+      for (int j = 0; j < c.rows; ++j) c(j, i) *= factor;
       changed = true;
     }
     if (!changed) return;
   }
+}
+
+}  // namespace detail
+
+/// Scales the states by powers of two until rows and columns of `a` are of like size; nothing is
+/// rounded, and inputs and outputs stay as they are. States of a chain differ by omega^n.
+template <int States, int Inputs, int Outputs>
+void balance(LinearSystem<States, Inputs, Outputs>& system) noexcept {
+  // A matrix of one row is stored by rows, which is the same.
+  detail::balance({system.a.data(), States}, {system.b.data(), States}, Inputs,
+                  {system.c.data(), Outputs});
 }
 
 namespace detail {
@@ -120,9 +134,10 @@ Check<double> check_system(const LinearSystem<States, Inputs, Outputs>& system) 
   if (!is_finite(system.sample_time) || system.sample_time < 0.0) {
     return Error<double>{"sample_time", system.sample_time, "must be finite and not negative"};
   }
-  const double sum = system.a.cwiseAbs().sum() + system.b.cwiseAbs().sum() +
-                     system.c.cwiseAbs().sum() + system.d.cwiseAbs().sum();
-  return check_finite("system", sum);
+  return check_finite("system", sum_of_magnitudes(system.a.data(), States * States) +
+                                    sum_of_magnitudes(system.b.data(), States * Inputs) +
+                                    sum_of_magnitudes(system.c.data(), Outputs * States) +
+                                    sum_of_magnitudes(system.d.data(), Outputs * Inputs));
 }
 
 }  // namespace detail

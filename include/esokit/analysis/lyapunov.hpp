@@ -21,12 +21,7 @@ inline bool doubling(double* e, double* p, double* work1, double* work2, int n) 
     multiply(e, e, work1, n);
     for (int i = 0; i < n * n; ++i) work1[i] += 2.0 * e[i];  // the next e
     for (int i = 0; i < n; ++i) e[i * n + i] += 1.0;         // A^(2^step)
-    double size = 0.0;
-    for (int i = 0; i < n; ++i) {
-      double row = 0.0;
-      for (int j = 0; j < n; ++j) row += std::abs(e[j * n + i]);
-      if (!(row <= size)) size = row;
-    }
+    const double size = row_norm(e, n);
     if (!is_finite(size)) return false;
     multiply(e, p, work2, n);
     for (int i = 0; i < n; ++i) {
@@ -47,13 +42,7 @@ inline bool doubling(double* e, double* p, double* work1, double* work2, int n) 
 /// Largest row sum of a^2, whose root is of the size of the poles.
 inline double square_size(const double* a, double* work, int n) noexcept {
   multiply(a, a, work, n);
-  double size = 0.0;
-  for (int i = 0; i < n; ++i) {
-    double row = 0.0;
-    for (int j = 0; j < n; ++j) row += std::abs(work[j * n + i]);
-    if (!(row <= size)) size = row;
-  }
-  return size;
+  return row_norm(work, n);
 }
 
 /// P into p. @param work 3 n^2

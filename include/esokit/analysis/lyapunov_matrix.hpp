@@ -155,7 +155,8 @@ Expected<LyapunovMatrix<Size>, Error<double>> common_lyapunov_matrix(
   constexpr int count = detail::triangle<Size>;
   using Square = Matrix<double, Size, Size>;
   for (const Square& mode : a) {
-    if (auto ok = check_finite("system", mode.cwiseAbs().sum()); !ok) return ok.error();
+    if (auto ok = check_finite("system", detail::sum_of_magnitudes(mode.data(), Size * Size)); !ok)
+      return ok.error();
   }
   detail::Ellipsoid<count> ellipsoid(most * std::sqrt(double(count)));
   double best = std::numeric_limits<double>::infinity();

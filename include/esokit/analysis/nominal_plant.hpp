@@ -2,7 +2,8 @@
 /// The nominal plant of a loop analysis, and its exact sampling with an input delay.
 #pragma once
 
-#include <cmath>
+#include <cstddef>
+#include <esokit/analysis/dense.hpp>
 #include <esokit/analysis/linear_system.hpp>
 
 namespace esokit {
@@ -39,24 +40,6 @@ struct CompanionPlant {
 
 namespace detail {
 
-/// exp(A) - I: Taylor series of A / 2^k, then squared k times as 2 E + E^2.
-template <int N>
-Matrix<double, N, N> exp_minus_identity(const Matrix<double, N, N>& a) {
-  const double size = a.cwiseAbs().rowwise().sum().maxCoeff();
-  int squarings = 0;
-  if (is_finite(size) && size > 0.25) squarings = static_cast<int>(std::ceil(std::log2(size))) + 2;
-  const Matrix<double, N, N> small = a * std::exp2(-squarings);
-  // With norm 1/4 the terms fall below 1e-17 by the 12th. Horner, from the smallest.
-  Matrix<double, N, N> sum = Matrix<double, N, N>::Identity();
-  for (int k = 14; k >= 2; --k) {
-    sum = (small * sum / k).eval();
-    sum.diagonal().array() += 1.0;
-  }
-  Matrix<double, N, N> e = small * sum;
-  for (int i = 0; i < squarings; ++i) e = (2.0 * e + e * e).eval();
-  return e;
-}
-
 /// exp(A t) - I and the integral of exp(A s) B over 0..t.
 template <int N, int Inputs>
 struct Held {
@@ -66,11 +49,23 @@ struct Held {
 
 template <int N, int Inputs>
 Held<N, Inputs> hold(const Matrix<double, N, N>& a, const Matrix<double, N, Inputs>& b, double t) {
-  Matrix<double, N + Inputs, N + Inputs> stacked = Matrix<double, N + Inputs, N + Inputs>::Zero();
-  stacked.template topLeftCorner<N, N>() = a * t;
-  stacked.template topRightCorner<N, Inputs>() = b * t;
-  const Matrix<double, N + Inputs, N + Inputs> e = exp_minus_identity<N + Inputs>(stacked);
-  return {e.template topLeftCorner<N, N>(), e.template topRightCorner<N, Inputs>()};
+  constexpr int size = N + Inputs;
+  Array<double, size * size> stacked{};  // ((a, b), (0, 0)), by columns
+  Array<double, 2 * size * size> work;
+  const auto entry = [&](int i, int j) -> double& {
+    return stacked[static_cast<std::size_t>(j * size + i)];
+  };
+  for (int i = 0; i < N; ++i) {
+    for (int j = 0; j < N; ++j) entry(i, j) = a(i, j) * t;
+    for (int j = 0; j < Inputs; ++j) entry(i, N + j) = b(i, j) * t;
+  }
+  exp_minus_identity(stacked.data(), work.data(), size);
+  Held<N, Inputs> held;
+  for (int i = 0; i < N; ++i) {
+    for (int j = 0; j < N; ++j) held.transition(i, j) = entry(i, j);
+    for (int j = 0; j < Inputs; ++j) held.input(i, j) = entry(i, N + j);
+  }
+  return held;
 }
 
 template <int States>
@@ -121,14 +116,19 @@ Expected<NominalPlant<States + 1>, Error<double>> sampled_plant(const NominalPla
   const auto early = detail::hold<States, 2>(plant.a, plant.b, delay);
   const auto late = detail::hold<States, 2>(plant.a, plant.b, sample_time - delay);
   NominalPlant<States + 1> sampled;
-  sampled.a.template topLeftCorner<States, States>() = whole.transition;
-  sampled.a.template topRightCorner<States, 1>() =
-      early.input.col(0) + late.transition * early.input.col(0);
+  for (int i = 0; i < States; ++i) {
+    double old_input = early.input(i, 0);  // on to the end of the sample by exp(A (T - delay))
+    for (int j = 0; j < States; ++j) {
+      old_input += late.transition(i, j) * early.input(j, 0);
+      sampled.a(i, j) = whole.transition(i, j);
+    }
+    sampled.a(i, States) = old_input;
+    sampled.b(i, 0) = late.input(i, 0);
+    sampled.b(i, 1) = whole.input(i, 1);
+    sampled.c(0, i) = plant.c(0, i);
+  }
   sampled.a(States, States) = -1.0;  // the old u is forgotten
-  sampled.b.template topLeftCorner<States, 1>() = late.input.col(0);
-  sampled.b.template topRightCorner<States, 1>() = whole.input.col(1);
   sampled.b(States, 0) = 1.0;
-  sampled.c.template leftCols<States>() = plant.c;
   sampled.sample_time = sample_time;
   sampled.input_names = plant.input_names;
   sampled.output_names = plant.output_names;

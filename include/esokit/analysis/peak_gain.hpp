@@ -4,7 +4,7 @@
 #pragma once
 
 #include <cmath>
-#include <esokit/analysis/nominal_plant.hpp>
+#include <esokit/analysis/dense.hpp>
 #include <esokit/analysis/poles.hpp>
 
 namespace esokit {
@@ -29,7 +29,9 @@ Expected<Matrix<double, Outputs, Inputs>, Error<double>> peak_gain(
     double fastest = 0.0;
     for (const std::complex<double>& p : poles(system)) fastest = std::max(fastest, std::abs(p));
     step = 0.01 / fastest;
-    advance = detail::exp_minus_identity<States>(system.a * step);
+    Array<double, 2 * States * States> work;
+    advance *= step;
+    detail::exp_minus_identity(advance.data(), work.data(), States);
   }
 
   Matrix<double, Outputs, Inputs> peak;

@@ -2,9 +2,9 @@
 /// MimoAdrc: q channels of ADRC, decoupled by the inverse of the input matrix.
 #pragma once
 
-#include <Eigen/LU>
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/control/limiter.hpp>
+#include <esokit/core/linear_equations.hpp>
 #include <esokit/core/unroll.hpp>
 #include <esokit/design/feedback_gain.hpp>
 #include <esokit/observer/loop_observer.hpp>
@@ -200,8 +200,10 @@ class MimoAdrc {
       scaled.col(i) *= columns(i);
     }
     // A zero pivot makes the inverse infinite or NaN, and so its condition number.
-    const InputMatrix inverse =
-        Eigen::PartialPivLU<InputMatrix>(scaled).solve(InputMatrix::Identity());
+    InputMatrix inverse = InputMatrix::Identity();
+    InputMatrix eliminated = scaled;
+    detail::solve_in_place(detail::DenseView<S>{eliminated.data(), channels},
+                           detail::DenseView<S>{inverse.data(), channels}, channels);
     S condition = scaled.cwiseAbs().colwise().sum().maxCoeff() *
                   inverse.cwiseAbs().colwise().sum().maxCoeff();
     if (!is_finite(S(inverse.sum())) || !is_finite(condition)) {
