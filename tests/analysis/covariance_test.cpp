@@ -21,18 +21,7 @@ namespace {
 
 using namespace esokit;
 using esokit_test::Random;
-
-#if defined(__SANITIZE_ADDRESS__)
-constexpr bool sanitized = true;
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer)
-constexpr bool sanitized = true;
-#else
-constexpr bool sanitized = false;
-#endif
-#else
-constexpr bool sanitized = false;
-#endif
+using esokit_test::sanitized;
 
 constexpr long samples = sanitized ? 200'000 : 10'000'000;
 constexpr long blocks = 100;

@@ -173,7 +173,7 @@ void stays_definite_in_float(float r, double p0, double theta) {
   const auto growth = static_cast<float>(1 + theta);
   const float s = 1 / growth;
   bool definite = true;
-  for (int k = 0; k < 1000000 && definite; ++k) {
+  for (int k = 0; k < long_run(1'000'000) && definite; ++k) {
     const float share = factor.variance(0) / (factor.variance(0) + s);
     factor.set_variance(0, share * s);
     factor.template advance<true>(growth, noise);

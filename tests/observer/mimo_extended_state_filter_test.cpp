@@ -386,7 +386,7 @@ TEST(MimoExtendedStateFilter, many_steps_in_float) {
   config.inflation = 0.5f;
   auto filter = Filter::make(config).value();
   Random random(13);
-  for (int k = 0; k < 200000; ++k) {
+  for (int k = 0; k < long_run(200'000); ++k) {
     const auto y = static_cast<float>(random.uniform(-1, 1));
     ASSERT_EQ(filter.update(Eigen::Vector2f(y, -y), Eigen::Vector2f(y, y)), StepStatus::ok);
     if (k > 20 && k % 1009 != 0) continue;

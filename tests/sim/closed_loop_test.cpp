@@ -93,7 +93,8 @@ struct ExactLoop {
     Matrix<double, size + 1, size + 1> held = Matrix<double, size + 1, size + 1>::Zero();
     held.template topLeftCorner<size, size>() = a * hold;
     held.template topRightCorner<size, 1>() = b * hold;
-    const Matrix<double, size + 1, size + 1> phi = held.exp();
+    // Of dynamic size: Eigen's exponential of a fixed size costs seconds of compile time for each.
+    const Matrix<double, size + 1, size + 1> phi = Eigen::MatrixXd(held).exp();
     Vector<double, size + 1> s = Vector<double, size + 1>::Zero();
     s(0) = 0.5;
     s(1) = -0.2;

@@ -12,6 +12,22 @@
 
 namespace esokit_test {
 
+#if defined(__SANITIZE_ADDRESS__)
+inline constexpr bool sanitized = true;
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer)
+inline constexpr bool sanitized = true;
+#else
+inline constexpr bool sanitized = false;
+#endif
+#else
+inline constexpr bool sanitized = false;
+#endif
+
+/// Steps of a long run: a fiftieth of `full` under the sanitizers, which look at each step and not
+/// at what a million of them add up to.
+constexpr int long_run(int full) { return sanitized ? full / 50 : full; }
+
 /// splitmix64: the same numbers on every platform and standard library.
 class Random {
  public:

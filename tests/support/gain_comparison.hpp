@@ -1,0 +1,27 @@
+/// @file
+/// Comparisons of the law suites with the high-precision reference. Compiled once: the many digits
+/// cost five seconds a translation unit.
+#pragma once
+
+#include <complex>
+#include <vector>
+
+namespace esokit_test {
+
+using Poles = std::vector<std::complex<long double>>;
+
+/// The smallest of the last gains prod(1 - rho) / (N-1)! of all levels.
+long double smallest_gain(const std::vector<Poles>& level_poles, long double sample_time);
+
+/// Estimates of all levels after an innovation of 1, rows up to `order` of the level's own, the
+/// rest summed over the levels. Values between `smallest` and `largest` are judged; returns how
+/// many.
+int compare_gains(const std::vector<std::vector<long double>>& estimates, int order,
+                  const std::vector<Poles>& level_poles, long double sample_time,
+                  long double tolerance, long double smallest, long double largest);
+
+/// The polynomial in z - 1 that physical gains make, against that of the poles.
+void compare_polynomial(const std::vector<long double>& gain, const Poles& poles,
+                        long double sample_time, long double tolerance);
+
+}  // namespace esokit_test
