@@ -7,10 +7,11 @@ root=$(cd -- "$folder/../.." && pwd)
 
 usage() {
   cat <<'END'
-usage: examples/embedded/run.sh [--no-install] [--self-test]
+usage: examples/embedded/run.sh [--no-install] [--self-test | --paste]
 
   --no-install   do not install missing Debian packages, only name them (status 3)
   --self-test    instead: see the checks refuse what they are there to refuse
+  --paste        instead: write firmware/pasted.hpp, the design that the host makes
   --help         this text
 
 The last line is "N passed, N failed"; the status is 0 only if nothing failed.
@@ -19,10 +20,12 @@ END
 
 no_install=()
 self_test=no
+paste=no
 for option in "$@"; do
   case $option in
     --no-install) no_install=(--no-install) ;;
     --self-test) self_test=yes ;;
+    --paste) paste=yes ;;
     -h | --help)
       usage
       exit 0
@@ -235,6 +238,14 @@ host_run() {
     "$(image firmware-host firmware_exact)" >"$out/host.txt" </dev/null
 }
 
+if [[ $paste == yes ]]; then
+  build firmware-host print_pasted
+  "$(image firmware-host print_pasted)" >"$out/pasted.hpp"
+  cp "$out/pasted.hpp" "$folder/firmware/pasted.hpp"
+  echo "written: $folder/firmware/pasted.hpp"
+  exit 0
+fi
+
 if [[ $self_test == yes ]]; then
   images=("${kinds[@]/#/violates_}")
   if host_run && build cortex-m4f firmware "${images[@]}"; then pass; else
@@ -279,8 +290,16 @@ fi
 
 started=$SECONDS
 if host_run; then pass; else
-  fail "the firmware on the host"
+  fail "the firmware on the host; is firmware/pasted.hpp of this version (run.sh --paste)?"
+  grep -m 3 -E '^(refused|astray)' "$out/host.txt" || true
   finish
+fi
+# A design that was pasted runs as the one that is made.
+if diff <(sed -n 's/^open pasted //p' "$out/host.txt") \
+  <(sed -n 's/^open ExtendedStateFilter-frozen //p' "$out/host.txt") >"$out/pasted.diff" &&
+  grep -q '^open pasted' "$out/host.txt"; then pass; else
+  fail "the pasted observer does not run as the made one (run.sh --paste writes it anew):"
+  head -n 4 "$out/pasted.diff"
 fi
 built=()
 for core in "${cores[@]}"; do

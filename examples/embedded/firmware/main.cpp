@@ -10,6 +10,7 @@
 //   done
 
 #include <esokit/control/adrc.hpp>
+#include <esokit/core/snapshot.hpp>
 #include <optional>
 
 #include "board.hpp"
@@ -17,6 +18,7 @@
 #include "designs.hpp"
 #include "interrupt.hpp"
 #include "output.hpp"
+#include "pasted.hpp"
 #include "servo.hpp"
 
 namespace firmware {
@@ -66,20 +68,31 @@ void open_loop(const char* name, Update* update, void* observer, void (*print)(L
   if (counter != nullptr) Line("count").word(name).number(last).number(most);
 }
 
-template <class Design>
-bool open_loop(const InstructionCounter* counter) {
+/// @param name of the run @param made by `make`, or of pasted words
+template <class Design, class Made>
+bool open_loop(const char* name, const Made& made, const InstructionCounter* counter) {
   using Observer = typename Design::Observer;
-  const auto made = Observer::make(Design::config());
-  if (!made) return refused(Design::name, made.error());
+  if (!made) return refused(name, made.error());
   auto& observer = open_observer<Observer>;
   observer.emplace(*made);
   const auto print = [](Line& line, const void* state) {
     const auto estimate = static_cast<const Observer*>(state)->estimate();
     for (int i = 0; i < Observer::size; ++i) line.bits(estimate(i));
   };
-  Line("size").word(Design::name).number(sizeof(Observer)).number(sizeof(esokit::Adrc<Observer>));
-  open_loop(Design::name, Design::update, &*observer, print, counter);
+  Line("size").word(name).number(sizeof(Observer)).number(sizeof(esokit::Adrc<Observer>));
+  open_loop(name, Design::update, &*observer, print, counter);
   return true;
+}
+
+template <class Design>
+bool open_loop(const InstructionCounter* counter) {
+  return open_loop<Design>(Design::name, Design::Observer::make(Design::config()), counter);
+}
+
+/// The same observer without its `make`: from the words that the host printed.
+bool open_loop_of_pasted(const InstructionCounter* counter) {
+  using Observer = FrozenFilter::Observer;
+  return open_loop<FrozenFilter>("pasted", esokit::from_snapshot<Observer>(frozen_filter), counter);
 }
 
 /// One step of a controller: u, and what else there is to print.
@@ -142,6 +155,7 @@ bool run() {
   if (board::counts()) counter.emplace();
   bool fine = run_all<Linear, Cascade, Algebraic, AdjustableBandwidth, Nonlinear, RecursiveFilter,
                       FrozenFilter>(counter ? &*counter : nullptr);
+  fine = open_loop_of_pasted(counter ? &*counter : nullptr) && fine;
   fine = run_from_interrupt() && fine;
   if (fine) Line("done");
   return fine;

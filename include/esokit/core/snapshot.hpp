@@ -3,6 +3,7 @@
 /// over a restart.
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -19,9 +20,8 @@ namespace esokit {
 /// library, and for targets that lay a T out alike: the same size is checked at compile time, the
 /// sizes of its members are not. x86-64, ARM and RISC-V agree on float types of the library.
 template <class T>
-requires(std::is_trivially_copyable_v<T> &&
-         sizeof(T) % sizeof(std::uint32_t) ==
-             0) using Snapshot = Array<std::uint32_t, sizeof(T) / sizeof(std::uint32_t) + 1>;
+requires(std::is_trivially_copyable_v<T> && sizeof(T) % sizeof(std::uint32_t) == 0)  //
+    using Snapshot = std::array<std::uint32_t, sizeof(T) / sizeof(std::uint32_t) + 1>;
 
 namespace detail {
 
