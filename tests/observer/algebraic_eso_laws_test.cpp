@@ -7,26 +7,26 @@ namespace esokit_test {
 
 /// lambda = q = omega, estimates published at once.
 template <int Order, class S, int Extension>
-struct ObserverTraits<esokit::AlgebraicEso<Order, S, Extension>> {
+struct ObserverTraits<esokit::AlgebraicEso<Order, S, Extension>>
+    : BandwidthTraits<esokit::AlgebraicEso<Order, S, Extension>,
+                      esokit::ContinuousAlgebraicEso<Order, double, Extension>> {
   using Observer = esokit::AlgebraicEso<Order, S, Extension>;
-  using Config = typename Observer::Config;
   using Continuous = esokit::ContinuousAlgebraicEso<Order, double, Extension>;
+  using Base = BandwidthTraits<Observer, Continuous>;
+  using Config = typename Observer::Config;
   template <class T>
   using Rebind = esokit::AlgebraicEso<Order, T, Extension>;
-  static constexpr const char* field = "observer_bandwidth";
-  static constexpr double slowest = 1;
-  static constexpr double fastest = 1;
 
   static Config config(double omega, double sample_time, double input_gain, int max_gap = 100) {
-    return {.observer_bandwidth = static_cast<S>(omega),
-            .frequency_shift = static_cast<S>(omega),
-            .input_gain = static_cast<S>(input_gain),
-            .sample_time = static_cast<S>(sample_time),
-            .hold = S(0),
-            .max_gap = max_gap};
+    Config config = Base::config(omega, sample_time, input_gain, max_gap);
+    config.frequency_shift = static_cast<S>(omega);
+    config.hold = S(0);
+    return config;
   }
   static typename Continuous::Config continuous_config(double omega, double input_gain) {
-    return {.observer_bandwidth = omega, .frequency_shift = omega, .input_gain = input_gain};
+    auto config = Base::continuous_config(omega, input_gain);
+    config.frequency_shift = omega;
+    return config;
   }
   /// The first sample is deadbeat, all poles at z = 0.
   static std::vector<std::vector<std::complex<long double>>> level_poles(const Config& config) {
@@ -41,7 +41,7 @@ struct ObserverTraits<esokit::AlgebraicEso<Order, S, Extension>> {
       return "the continuous chain is singular at t = 0; see TendsToTheContinuousFormWithOrderOne "
              "in algebraic_eso_test.cpp";
     }
-    return common_excuse<S, Observer::size>(law);
+    return Base::excuse(law);
   }
 };
 

@@ -7,53 +7,31 @@
 namespace esokit_test {
 
 template <int Order, class S, int Extension>
-struct ObserverTraits<esokit::LinearEso<Order, S, Extension, esokit::HalfGainPoles>> {
+struct ObserverTraits<esokit::LinearEso<Order, S, Extension, esokit::HalfGainPoles>>
+    : BandwidthTraits<esokit::HalfGainEso<Order, S, Extension>,
+                      esokit::ContinuousHalfGainEso<Order, double, Extension>> {
   using Observer = esokit::HalfGainEso<Order, S, Extension>;
-  using Config = typename Observer::Config;
-  using Continuous = esokit::ContinuousHalfGainEso<Order, double, Extension>;
   template <class T>
   using Rebind = esokit::HalfGainEso<Order, T, Extension>;
-  static constexpr const char* field = "observer_bandwidth";
   static constexpr double slowest = 0.5;
-  static constexpr double fastest = 1;
 
-  static Config config(double omega, double sample_time, double input_gain, int max_gap = 100) {
-    return {.observer_bandwidth = static_cast<S>(omega),
-            .input_gain = static_cast<S>(input_gain),
-            .sample_time = static_cast<S>(sample_time),
-            .max_gap = max_gap};
-  }
-  static typename Continuous::Config continuous_config(double omega, double input_gain) {
-    return {.observer_bandwidth = omega, .input_gain = input_gain};
-  }
-  static std::vector<std::vector<std::complex<long double>>> level_poles(const Config& config) {
+  static std::vector<std::vector<std::complex<long double>>> level_poles(
+      const typename Observer::Config& config) {
     return {widened(esokit::half_gain_poles<Observer::size, S>(config.observer_bandwidth))};
   }
-  static constexpr const char* excuse(Law law) { return common_excuse<S, Observer::size>(law); }
 };
 
 template <int Order, class S, int Extension>
-struct ObserverTraits<esokit::LinearEso<Order, S, Extension, esokit::ReducedPoles>> {
+struct ObserverTraits<esokit::LinearEso<Order, S, Extension, esokit::ReducedPoles>>
+    : BandwidthTraits<esokit::ReducedOrderEso<Order, S, Extension>,
+                      esokit::ContinuousLinearEso<Order, double, Extension>> {
   using Observer = esokit::ReducedOrderEso<Order, S, Extension>;
-  using Config = typename Observer::Config;
-  using Continuous = esokit::ContinuousLinearEso<Order, double, Extension>;
   template <class T>
   using Rebind = esokit::ReducedOrderEso<Order, T, Extension>;
-  static constexpr const char* field = "observer_bandwidth";
-  static constexpr double slowest = 1;
-  static constexpr double fastest = 1;
 
-  static Config config(double omega, double sample_time, double input_gain, int max_gap = 100) {
-    return {.observer_bandwidth = static_cast<S>(omega),
-            .input_gain = static_cast<S>(input_gain),
-            .sample_time = static_cast<S>(sample_time),
-            .max_gap = max_gap};
-  }
-  static typename Continuous::Config continuous_config(double omega, double input_gain) {
-    return {.observer_bandwidth = omega, .input_gain = input_gain};
-  }
   /// One pole at z = 0, which is s = -infinity, or so far out that nothing is left of it.
-  static std::vector<std::vector<std::complex<long double>>> level_poles(const Config& config) {
+  static std::vector<std::vector<std::complex<long double>>> level_poles(
+      const typename Observer::Config& config) {
     auto poles = equal_poles(Observer::size - 1, config.observer_bandwidth);
     poles.emplace_back(-1e30L, 0.0L);
     return {poles};

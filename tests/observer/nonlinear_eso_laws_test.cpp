@@ -6,33 +6,29 @@
 namespace esokit_test {
 
 /// k(x) = 1/2 + x/2, so that k(1) = 1. Shapes that rise towards e = 0 let rounding ring at gain_max
-/// and are tested in nonlinear_eso_test.cpp.
+/// and are tested in nonlinear_eso_test.cpp. The poles are those of k = 1: the suite looks at an
+/// innovation of one.
 template <int Order, class S, int Extension>
-struct ObserverTraits<esokit::NonlinearEso<Order, S, Extension>> {
+struct ObserverTraits<esokit::NonlinearEso<Order, S, Extension>>
+    : BandwidthTraits<esokit::NonlinearEso<Order, S, Extension>,
+                      esokit::ContinuousNonlinearEso<Order, double, Extension>> {
   using Observer = esokit::NonlinearEso<Order, S, Extension>;
-  using Config = typename Observer::Config;
   using Continuous = esokit::ContinuousNonlinearEso<Order, double, Extension>;
+  using Base = BandwidthTraits<Observer, Continuous>;
+  using Config = typename Observer::Config;
   template <class T>
   using Rebind = esokit::NonlinearEso<Order, T, Extension>;
-  static constexpr const char* field = "observer_bandwidth";
   static constexpr double slowest = 0.5;  // what is left of the bandwidth at gain_min
-  static constexpr double fastest = 1;
 
   static Config config(double omega, double sample_time, double input_gain, int max_gap = 100) {
-    return {.observer_bandwidth = static_cast<S>(omega),
-            .shape = {.gain_alpha = S(0.5), .alpha = S(1), .gain_beta = S(0.5), .beta = S(1)},
-            .input_gain = static_cast<S>(input_gain),
-            .sample_time = static_cast<S>(sample_time),
-            .max_gap = max_gap};
+    Config config = Base::config(omega, sample_time, input_gain, max_gap);
+    config.shape = {.gain_alpha = S(0.5), .alpha = S(1), .gain_beta = S(0.5), .beta = S(1)};
+    return config;
   }
   static typename Continuous::Config continuous_config(double omega, double input_gain) {
-    return {.observer_bandwidth = omega,
-            .shape = {.gain_alpha = 0.5, .alpha = 1, .gain_beta = 0.5, .beta = 1},
-            .input_gain = input_gain};
-  }
-  /// Those of k = 1, which is k(1): the suite looks at an innovation of one.
-  static std::vector<std::vector<std::complex<long double>>> level_poles(const Config& config) {
-    return {equal_poles(Observer::size, config.observer_bandwidth)};
+    auto config = Base::continuous_config(omega, input_gain);
+    config.shape = {.gain_alpha = 0.5, .alpha = 1, .gain_beta = 0.5, .beta = 1};
+    return config;
   }
   static constexpr const char* excuse(Law law) {
     switch (law) {
@@ -47,7 +43,7 @@ struct ObserverTraits<esokit::NonlinearEso<Order, S, Extension>> {
       case Law::unbiased_on_own_model_class:
         return "no setting is deadbeat, as k differs from 1; see nonlinear_eso_test.cpp";
       default:
-        return common_excuse<S, Observer::size>(law);
+        return Base::excuse(law);
     }
   }
 };

@@ -101,30 +101,44 @@ esokit::Array<std::complex<S>, Size> scaled_shape(double omega) {
   return poles;
 }
 
-template <int Order, class S, int Extension>
-struct ObserverTraits<esokit::LinearEso<Order, S, Extension>> {
-  using Observer = esokit::LinearEso<Order, S, Extension>;
+/// What is common to observers of one bandwidth, all poles at -observer_bandwidth. A traits class
+/// that inherits it adds `Rebind` and says what differs.
+template <class ObserverType, class ContinuousType>
+struct BandwidthTraits {
+  using Observer = ObserverType;
   using Config = typename Observer::Config;
-  using Continuous = esokit::ContinuousLinearEso<Order, double, Extension>;
-  template <class T>
-  using Rebind = esokit::LinearEso<Order, T, Extension>;
+  using Continuous = ContinuousType;
+  using S = typename Observer::scalar_type;
   static constexpr const char* field = "observer_bandwidth";
   static constexpr double slowest = 1;
   static constexpr double fastest = 1;
 
   static Config config(double omega, double sample_time, double input_gain, int max_gap = 100) {
-    return {.observer_bandwidth = static_cast<S>(omega),
-            .input_gain = static_cast<S>(input_gain),
-            .sample_time = static_cast<S>(sample_time),
-            .max_gap = max_gap};
+    Config config;
+    config.observer_bandwidth = static_cast<S>(omega);
+    config.input_gain = static_cast<S>(input_gain);
+    config.sample_time = static_cast<S>(sample_time);
+    config.max_gap = max_gap;
+    return config;
   }
   static typename Continuous::Config continuous_config(double omega, double input_gain) {
-    return {.observer_bandwidth = omega, .input_gain = input_gain};
+    typename Continuous::Config config;
+    config.observer_bandwidth = omega;
+    config.input_gain = input_gain;
+    return config;
   }
   static std::vector<std::vector<std::complex<long double>>> level_poles(const Config& config) {
     return {equal_poles(Observer::size, config.observer_bandwidth)};
   }
   static constexpr const char* excuse(Law law) { return common_excuse<S, Observer::size>(law); }
+};
+
+template <int Order, class S, int Extension>
+struct ObserverTraits<esokit::LinearEso<Order, S, Extension>>
+    : BandwidthTraits<esokit::LinearEso<Order, S, Extension>,
+                      esokit::ContinuousLinearEso<Order, double, Extension>> {
+  template <class T>
+  using Rebind = esokit::LinearEso<Order, T, Extension>;
 };
 
 template <int Order, class S, int Extension>
@@ -157,26 +171,26 @@ struct ObserverTraits<esokit::LinearEso<Order, S, Extension, esokit::PoleSet>> {
 inline constexpr double cascade_factor = 2;
 
 template <int Order, int Levels, class S, int Extension>
-struct ObserverTraits<esokit::CascadeEso<Order, Levels, S, Extension>> {
+struct ObserverTraits<esokit::CascadeEso<Order, Levels, S, Extension>>
+    : BandwidthTraits<esokit::CascadeEso<Order, Levels, S, Extension>,
+                      esokit::ContinuousCascadeEso<Order, Levels, double, Extension>> {
   using Observer = esokit::CascadeEso<Order, Levels, S, Extension>;
-  using Config = typename Observer::Config;
   using Continuous = esokit::ContinuousCascadeEso<Order, Levels, double, Extension>;
+  using Base = BandwidthTraits<Observer, Continuous>;
+  using Config = typename Observer::Config;
   template <class T>
   using Rebind = esokit::CascadeEso<Order, Levels, T, Extension>;
-  static constexpr const char* field = "observer_bandwidth";
-  static constexpr double slowest = 1;
   static constexpr double fastest = 1 << (Levels - 1);
 
   static Config config(double omega, double sample_time, double input_gain, int max_gap = 100) {
-    return {.observer_bandwidth = static_cast<S>(omega),
-            .bandwidth_factor = static_cast<S>(cascade_factor),
-            .input_gain = static_cast<S>(input_gain),
-            .sample_time = static_cast<S>(sample_time),
-            .max_gap = max_gap};
+    Config config = Base::config(omega, sample_time, input_gain, max_gap);
+    config.bandwidth_factor = static_cast<S>(cascade_factor);
+    return config;
   }
   static typename Continuous::Config continuous_config(double omega, double input_gain) {
-    return {
-        .observer_bandwidth = omega, .bandwidth_factor = cascade_factor, .input_gain = input_gain};
+    auto config = Base::continuous_config(omega, input_gain);
+    config.bandwidth_factor = cascade_factor;
+    return config;
   }
   static std::vector<std::vector<std::complex<long double>>> level_poles(const Config& config) {
     std::vector<std::vector<std::complex<long double>>> poles;
@@ -187,7 +201,6 @@ struct ObserverTraits<esokit::CascadeEso<Order, Levels, S, Extension>> {
     }
     return poles;
   }
-  static constexpr const char* excuse(Law law) { return common_excuse<S, Observer::size>(law); }
 };
 
 template <int Order, int Levels, class S, int Extension>
