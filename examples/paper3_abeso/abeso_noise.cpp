@@ -217,8 +217,14 @@ int main(int argc, char** argv) {
   }
   for (std::size_t w = 0; w < count; ++w) {
     for (std::size_t i = 0; i < 3; ++i) {
-      report.known_miss(case_of(abeso, bandwidths[w]), index_names[i], table6[i][w],
-                        adjustable.index(w, i), 0.02, no_convention);
+      const std::string name = case_of(abeso, bandwidths[w]);
+      if (bandwidths[w] == 6.0 && i == 2) {
+        report.check(name, index_names[i], table6[i][w], adjustable.index(w, i), std::nullopt,
+                     "within 2 %, which its neighbours are not");
+        continue;
+      }
+      report.known_miss(name, index_names[i], table6[i][w], adjustable.index(w, i), 0.02,
+                        no_convention);
     }
   }
 

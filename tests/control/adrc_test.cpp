@@ -368,7 +368,7 @@ TEST(Adrc, Angle) {
 
 // ---- retuning
 
-/// In motion, too, a change of b0 changes u by nothing but v/b0.
+/// A change of b0 moves what b0 u explained into the disturbance, in motion too.
 TEST(Adrc, RetuneOfInputGainKeepsWhatTheDisturbanceExplains) {
   auto controller = Linear::make(base()).value();
   ChainPlant<2> plant(period, 2, -3);
@@ -382,6 +382,28 @@ TEST(Adrc, RetuneOfInputGainKeepsWhatTheDisturbanceExplains) {
   const double predicted = controller.observer().total_disturbance();
   EXPECT_NEAR(predicted, before + (2 - 3) * u, 1e-9 * std::abs(before));
   EXPECT_EQ(controller.output(), u);
+}
+
+/// So u alters by no more than it changes by in a sample; without that by v (1/b0_new - 1/b0_old).
+TEST(Adrc, RetuneOfInputGainDoesNotBumpInMotion) {
+  auto settings = base();
+  settings.observer.sample_time = 1e-4;
+  auto controller = Linear::make(settings).value();
+  ChainPlant<2> plant(1e-4, 2, -3);
+  double before = 0;
+  for (int k = 0; k < 600; ++k) {
+    before = controller.output();
+    plant.step(controller.update(plant.output(), 1.0));
+  }
+  const double u = controller.output();
+  const double v = 2 * u + controller.observer().total_disturbance();
+  auto kept = controller;
+  settings.observer.input_gain = 3;
+  ASSERT_TRUE(controller.retune(settings).has_value());
+  const double step = std::abs(controller.update(plant.output(), 1.0) - u);
+  const double usual = std::abs(kept.update(plant.output(), 1.0) - u) + std::abs(u - before);
+  EXPECT_LE(step, usual);
+  EXPECT_GT(std::abs(v * (1.0 / 3 - 1.0 / 2)), 20 * usual);
 }
 
 TEST(Adrc, RetuneKeepsHoldAndSafeMode) {

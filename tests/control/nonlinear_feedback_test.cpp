@@ -57,6 +57,7 @@ TEST(NonlinearFeedback, RefusesByName) {
   EXPECT_EQ(refused({.exponents = {1, 0}, .input_gain = 1}), P("exponents", 1));
   EXPECT_EQ(refused({.linear_widths = {0, 1}, .input_gain = 1}), P("linear_widths", 0));
   EXPECT_EQ(refused({.gains = {1, hidden_nan<double>()}, .input_gain = 1}), P("gains", 1));
+  EXPECT_EQ(refused({.gains = {-1, 1}, .input_gain = 1}), P("gains", 0));
 }
 
 }  // namespace

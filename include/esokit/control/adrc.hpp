@@ -48,8 +48,9 @@ struct AdrcConfig {
 ///
 /// Retuning (`retune`, any member of the config): the estimate and u are kept. A change of omega_o
 /// alters u by nothing while the innovation is zero; a change of b0 is moved into dhat,
-/// (b0_old - b0_new) u, so u keeps its value but for v/b0; a change of omega_c alters u by
-/// (dk_0 (r - y) - dk_1 y' ..) / b0. All three are without a step in the steady state.
+/// (b0_old - b0_new) u with the u before the last sample, so u alters by no more than it changes by
+/// in a sample anyway; a change of omega_c alters u by (dk_0 (r - y) - dk_1 y' ..) / b0. All three
+/// are without a step in the steady state.
 ///
 /// Missing measurements: NaN or `update_without_measurement`. The observer predicts, and corrects
 /// with the gain for the whole gap; after `missing.most` in a row `mode()` says `safe` and u goes

@@ -178,9 +178,14 @@ class ControlLoop {
   /// A length that the observer refuses changes nothing.
   Check<S> set_step_time(const S& seconds) noexcept
       requires(requires(Observer& o, const S& s) { o.set_step_time(s); }) {
-    if (auto ok = observer_.set_step_time(seconds); !ok) return ok;
     auto limiter = Limiter<S>::make(limits_, seconds);
-    if (!limiter) return limiter.error();
+    if (!limiter) {
+      // What is wrong with the length itself is the observer's to say.
+      Observer asked = observer_;
+      if (auto ok = asked.set_step_time(seconds); !ok) return ok;
+      return limiter.error();
+    }
+    if (auto ok = observer_.set_step_time(seconds); !ok) return ok;
     limiter->track(limiter_.last());
     limiter_ = *limiter;
     return {};

@@ -30,7 +30,7 @@ class NonlinearFeedback {
   static Expected<NonlinearFeedback, Error<S>> make(const Config& config) {
     for (int i = 0; i < Order; ++i) {
       const auto row = static_cast<std::size_t>(i);
-      if (auto ok = check_finite("gains", config.gains[row], i); !ok) return ok.error();
+      if (auto ok = check_not_negative("gains", config.gains[row], i); !ok) return ok.error();
       if (auto ok = check_positive("exponents", config.exponents[row], i); !ok) return ok.error();
       if (auto ok = check_positive("linear_widths", config.linear_widths[row], i); !ok) {
         return ok.error();

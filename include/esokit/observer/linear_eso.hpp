@@ -47,7 +47,7 @@ struct LinearEsoConfig<Size, S, PoleSet> {
 /// omega_o T > 0; unbiased for disturbances that are polynomials of degree < m in time.
 /// Error-based use: feed e = y_d - y as the measurement and give -b0 as input_gain.
 ///
-/// @tparam Order n, 1..8 @tparam S scalar @tparam Extension m, 1..4
+/// @tparam Order n @tparam S scalar @tparam Extension m; n + m <= 16, tested for n to 8 and m to 4
 /// @tparam Placement EqualPoles (config by observer_bandwidth) or PoleSet (config by poles)
 template <int Order, Scalar S = double, int Extension = 1, class Placement = EqualPoles>
 class LinearEso : public PredictorCorrector<Order, S, Extension,
