@@ -101,6 +101,27 @@ TEST(VariableTime, GapOfUnequalSteps) {
   }
 }
 
+/// After a retune steps are nominal until another length is said, and then of that length.
+TEST(VariableTime, StepsFollowAfterARetune) {
+  auto observer = variable();
+  auto same = variable();
+  ASSERT_TRUE(observer.set_step_time(0.02).has_value());
+  ASSERT_TRUE(same.set_step_time(0.02).has_value());
+  observer.update(1, 0.5);
+  same.update(1, 0.5);
+  ASSERT_TRUE(observer.retune({.observer = settings(), .ratio = 5}).has_value());
+  EXPECT_EQ(observer.step_time(), nominal);
+  for (const double step : {0.02, 0.02, 0.03}) {
+    ASSERT_TRUE(observer.set_step_time(step).has_value());
+    ASSERT_TRUE(same.set_step_time(step).has_value());
+    observer.update(2, 0.5);
+    same.update(2, 0.5);
+    EXPECT_EQ(observer.sample_time(), step);
+    EXPECT_NEAR(observer.total_disturbance(), same.total_disturbance(),
+                1e-12 * std::abs(same.total_disturbance()));
+  }
+}
+
 TEST(VariableTime, OutsideItsRatioIsRefused) {
   auto observer = variable(2);
   for (const double bad :

@@ -639,7 +639,7 @@ struct LawsOf {
       EXPECT_TRUE(same_observer(hit, missing));
       EXPECT_TRUE(finite(hit));
     }
-    // Neither u nor the last good one can go on from here: the state stands still.
+    // No u can go on from here: the state stands still.
     Observer observer = make(0.5);
     Estimate state = Estimate::Zero();
     state(0) = huge<S>();
@@ -648,12 +648,12 @@ struct LawsOf {
       for (int k = 0; k < 200; ++k) {
         const StepStatus status = observer.predict(S(0));
         if (status != StepStatus::ok) {
-          EXPECT_EQ(status, StepStatus::input_rejected | StepStatus::prediction_dropped);
+          EXPECT_EQ(status, StepStatus::prediction_dropped);
         }
         ASSERT_TRUE(finite(observer));
       }
-      EXPECT_EQ(observer.missed(), 200);
-      // A good measurement still restarts it.
+      EXPECT_GE(observer.missed(), 200);
+      // A good measurement restarts it.
       EXPECT_EQ(observer.correct(S(1)), StepStatus::restarted);
       EXPECT_EQ(observer.estimate()(0), S(1));
     }

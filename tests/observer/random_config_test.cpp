@@ -297,6 +297,32 @@ TEST(IrregularGaps, DecayUpToFourStates) {
   expect_decay_under_irregular_gaps<CascadeEso<2, 3>>({0.1, 0.5, 0.8});
 }
 
+/// States of a long chain can overflow in the prediction while the estimate of y is good.
+TEST(RandomConfig, LeavesAStateThatCannotBePredicted) {
+  auto observer = esokit::LinearEso<2, float, 2>::make(
+                      {.observer_bandwidth = 0.3f, .input_gain = 1, .sample_time = 10})
+                      .value();
+  observer.update(1.7e38f, 0);
+  observer.update(-1.7e38f, 0);
+  StepStatus status{};
+  for (int k = 0; k < 100; ++k) status = observer.update(1, 0);
+  EXPECT_EQ(status, StepStatus::ok);
+  EXPECT_NEAR(observer.estimate()(0), 1, 1e-3);
+  EXPECT_NEAR(observer.total_disturbance(), 0, 1e-3);
+}
+
+/// An absurd u that dhat has come to cancel: the good u after it is not the one to refuse.
+TEST(RandomConfig, LeavesAnAbsurdInputThatTheDisturbanceCancels) {
+  auto observer = esokit::LinearEso<4, float>::make(
+                      {.observer_bandwidth = 30, .input_gain = 1, .sample_time = 0.1f})
+                      .value();
+  for (int k = 0; k < 5; ++k) observer.update(1, std::numeric_limits<float>::max());
+  StepStatus status{};
+  for (int k = 0; k < 100; ++k) status = observer.update(1, 0);
+  EXPECT_EQ(status, StepStatus::ok);
+  EXPECT_NEAR(observer.total_disturbance(), 0, 1e-3);
+}
+
 /// An absurd but finite u is taken at its word, and may carry the estimate so far away that no
 /// correction is finite any more. The restart after max_gap samples ends that.
 TEST(RandomConfigLinear, RecoversFromAnyInput) {

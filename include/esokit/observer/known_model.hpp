@@ -45,6 +45,9 @@ template <LoopObserver Observer, class Model>
 requires PlantModel<Model, Observer>
 class KnownModel : public Observer {
   using S = typename Observer::scalar_type;
+  static_assert(
+      !requires(const Observer& observer) { observer.delay(); },
+      "esokit: DelayedInput goes around KnownModel: fbar is not delayed");
 
  public:
   static constexpr int order = Observer::order;  ///< n, order of the plant

@@ -193,7 +193,8 @@ class PredictorCorrector {
   /// y - z_1 of the last correction, with the predicted z_1 (of level 1).
   [[nodiscard]] constexpr const S& innovation() const noexcept { return innovation_; }
 
-  /// Predictions since the last correction; 0 when up to date.
+  /// Predictions since the last correction; 0 when up to date; 65535 where the state was so large
+  /// that it could not be predicted: the next good y restarts the observer.
   [[nodiscard]] constexpr int missed() const noexcept { return gap_; }
 
   /// Input that the last prediction used.
@@ -359,6 +360,9 @@ class PredictorCorrector {
  private:
   using LevelStates = Array<typename Chain::State, Levels>;
 
+  /// A gap that is above every max_gap.
+  static constexpr std::uint16_t restart_due = 65535;
+
   struct Correction {
     LevelStates states;
     Array<S, Levels> innovations{};
@@ -495,17 +499,28 @@ class PredictorCorrector {
 
   StepStatus predict_guarded(S u_applied) noexcept {
     StepStatus status = StepStatus::ok;
-    if (gap_ < 65535) ++gap_;
+    if (gap_ < restart_due) ++gap_;
     LevelStates next = predicted_levels(scaled_input_gain_ * u_applied);
     S input = u_applied;
     auto good = is_finite(probe(next));
     if (!all(good)) [[unlikely]] {
+      if constexpr (PlainScalar<S>) {
+        if (is_finite(u_applied) &&
+            !(detail::absolute(u_applied) > detail::absolute(applied_input_))) {
+          // Not u is to blame, which is no larger than the one before.
+          applied_input_ = u_applied;
+          gap_ = restart_due;
+          return StepStatus::prediction_dropped;
+        }
+      }
       status = StepStatus::input_rejected;
       input = select(good, u_applied, applied_input_);
       next = predicted_levels(scaled_input_gain_ * input);
       good = is_finite(probe(next));
       if (!all(good)) {
         status |= StepStatus::prediction_dropped;
+        // It is the state that cannot be predicted, and may never be again: y starts anew.
+        if constexpr (PlainScalar<S>) gap_ = restart_due;
         for (std::size_t i = 0; i < Levels; ++i) {
           for (std::size_t r = 0; r < size; ++r) {
             next[i][r] = select(good, next[i][r], states_[i][r]);

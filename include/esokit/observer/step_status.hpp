@@ -11,11 +11,13 @@ enum class StepStatus : unsigned char {
   measurement_rejected = 1,
   /// u was NaN, infinite or too large: predicted with the last good u.
   input_rejected = 2,
-  /// Not even the last good u gave a finite prediction: the state stands still for this step.
+  /// No good u gives a finite prediction: the state stands still, and the next good y restarts it
+  /// (of a pack the lanes only stand still).
   prediction_dropped = 4,
   /// Samples were missing before this correction; it used the gain for the whole gap.
   gap_bridged = 8,
-  /// More samples than `max_gap` were missing: restarted as by reset(y).
+  /// More samples than `max_gap` were missing, or the state could not be predicted: restarted as by
+  /// reset(y).
   restarted = 16,
   /// The state given to a reset was not finite: nothing changed.
   state_rejected = 32,

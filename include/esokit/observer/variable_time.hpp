@@ -54,6 +54,7 @@ class VariableTime : public Observer {
     if (auto ok = Observer::retune(config.observer); !ok) return ok;
     config_ = config;
     step_time_ = fresh->step_time_;
+    current_ = fresh->current_;
     return {};
   }
 
