@@ -406,6 +406,24 @@ TEST(Adrc, RetuneOfInputGainDoesNotBumpInMotion) {
   EXPECT_GT(std::abs(v * (1.0 / 3 - 1.0 / 2)), 20 * usual);
 }
 
+/// The measurement stays due when it was.
+TEST(Adrc, RetuneKeepsThePhaseOfTheDivider) {
+  auto settings = base();
+  settings.measurement_divider = 5;
+  settings.missing.most = 2;
+  auto controller = Linear::make(settings).value();
+  ChainPlant<2> plant(period, 2, -3);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (int k = 0; k < 4000; ++k) {
+    if (k == 2002) {
+      ASSERT_TRUE(controller.retune(settings).has_value());
+    }
+    plant.step(controller.update(k % 5 == 0 ? plant.output() : nan, 1.0));
+    ASSERT_EQ(controller.mode(), LoopMode::running) << k;
+  }
+  EXPECT_NEAR(plant.output(), 1, 1e-6);
+}
+
 TEST(Adrc, RetuneKeepsHoldAndSafeMode) {
   auto settings = base();
   settings.hold = {.time = 5 * period, .input = 1};

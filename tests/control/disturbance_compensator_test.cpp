@@ -129,6 +129,24 @@ TEST(DisturbanceCompensator, StartTrackAndRetuneDoNotBump) {
   EXPECT_FALSE(compensator.retune(settings).has_value());
 }
 
+TEST(DisturbanceCompensator, RefusesWhatItCannotRun) {
+  auto settings = base();
+  settings.observer.max_gap = 10;
+  settings.measurement_divider = 20;  // each measurement would restart the observer
+  const auto rare = Compensator::make(settings);
+  ASSERT_FALSE(rare.has_value());
+  EXPECT_STREQ(rare.error().field, "measurement_divider");
+
+  using Single = DisturbanceCompensator<LinearEso<1, float>>;
+  const Single::Config tiny{
+      .observer = {.observer_bandwidth = 1e-3f, .input_gain = 1e-39f, .sample_time = 1e3f}};
+  const auto observer = LinearEso<1, float>::make(tiny.observer);
+  ASSERT_TRUE(observer.has_value());
+  const auto infinite = Single::make(tiny);
+  ASSERT_FALSE(infinite.has_value());
+  EXPECT_STREQ(infinite.error().field, "input_gain");
+}
+
 TEST(DisturbanceCompensator, LimitsMissingAndErrors) {
   auto settings = base();
   settings.limits = {.lower = -1, .upper = 2, .rate = 100};

@@ -5,9 +5,12 @@
 #include <Eigen/LU>
 
 #include <cmath>
+#include <esokit/control/adrc.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/observer/cascade_eso.hpp>
+#include <esokit/observer/delayed_input.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/wrapped_output.hpp>
 #include <limits>
 #include <string>
 
@@ -45,6 +48,47 @@ struct CoupledPlant {
     second.step(drive(1));
   }
 };
+
+/// Axes on a circle, and drives that reach the plant late, are what they are in Adrc.
+TEST(MimoAdrc, DecoratedChannelsAreThoseOfAdrc) {
+  using Axis = esokit::WrappedOutput<LinearEso<1>>;
+  MimoAdrc<Axis>::Config circle{
+      .observers = {{.observer = {.observer_bandwidth = 20, .sample_time = period}, .period = 360}},
+      .controller_bandwidths = {5}};
+  circle.input_matrix(0, 0) = 1;
+  auto axis = MimoAdrc<Axis>::make(circle).value();
+  using Vector1 = Vector<double, 1>;
+  // 350 and -10 degrees are one place.
+  ASSERT_EQ(axis.start(Vector1(350.0), Vector1(0.0)), esokit::StepStatus::ok);
+  EXPECT_NEAR(axis.update(Vector1(350.0), Vector1(-10.0))(0), 0, 1e-9);
+
+  using Late = esokit::DelayedInput<LinearEso<1>, 8>;
+  MimoAdrc<Late>::Config config{
+      .observers = {{.observer = {.observer_bandwidth = 20, .sample_time = period}, .delay = 5}},
+      .controller_bandwidths = {5}};
+  config.input_matrix(0, 0) = 1;
+  auto late = MimoAdrc<Late>::make(config).value();
+  ASSERT_EQ(late.start(Vector1(1.0), Vector1(5.0)), esokit::StepStatus::ok);
+  for (int k = 0; k < 20; ++k) EXPECT_NEAR(late.update(Vector1(1.0), Vector1(1.0))(0), 5, 1e-9);
+  config.input_matrix(0, 0) = 2;
+  ASSERT_TRUE(late.retune(config).has_value());
+  for (int k = 0; k < 20; ++k) EXPECT_NEAR(late.update(Vector1(1.0), Vector1(1.0))(0), 5, 1e-9);
+}
+
+/// After a gap that nothing bridges it begins in the steady state of its output, as Adrc does.
+TEST(MimoAdrc, RestartAfterALongGapDoesNotBump) {
+  auto settings = base();
+  std::get<0>(settings.observers).max_gap = 10;
+  std::get<1>(settings.observers).max_gap = 10;
+  auto controller = Two::make(settings).value();
+  const Vector<double, 2> y(1, 2);
+  const Vector<double, 2> u(3, -1);
+  ASSERT_EQ(controller.start(y, u), esokit::StepStatus::ok);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (int k = 0; k < 30; ++k) controller.update({nan, nan}, y);
+  EXPECT_LE((controller.update(y, y) - u).norm(), 1e-9);
+  EXPECT_EQ(controller.status(0), esokit::StepStatus::restarted);
+}
 
 /// With the right B0 each channel is as if it were alone.
 TEST(MimoAdrc, ChannelsAreDecoupled) {
@@ -173,7 +217,7 @@ TEST(MimoAdrc, BadConfigIsRefusedByName) {
       "input_matrix");
   EXPECT_STREQ(error([](C& c) { c.condition_limit = 1; }).field, "condition_limit");
   auto bandwidth = error([](C& c) { c.controller_bandwidths[1] = 0; });
-  EXPECT_STREQ(bandwidth.field, "controller_bandwidth");
+  EXPECT_STREQ(bandwidth.field, "controller_bandwidths");
   EXPECT_EQ(bandwidth.index, 1);
   auto gain = error([](C& c) { std::get<1>(c.observers).input_gain = 3; });
   EXPECT_STREQ(gain.field, "input_gain");

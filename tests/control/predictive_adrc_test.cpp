@@ -560,6 +560,22 @@ TEST(PredictiveAdrc, rides_through_a_long_gap) {
   EXPECT_TRUE(has(controller.prepare(1.0), StepStatus::restarted));
 }
 
+/// `start` says what stands at the actuator: a report of the same changes nothing, and a change of
+/// b0 is rebalanced with it.
+TEST(PredictiveAdrc, start_tells_the_observer_its_input) {
+  using Observer = esokit::LinearEso<1>;
+  Controller<Observer>::Config config{
+      .observer = {.observer_bandwidth = 20, .input_gain = 1, .sample_time = 0.01},
+      .controller_bandwidth = 5};
+  auto controller = Controller<Observer>::make(config).value();
+  ASSERT_EQ(controller.start(1, 5), StepStatus::ok);
+  ASSERT_EQ(controller.report_applied(5), StepStatus::ok);
+  EXPECT_EQ(controller.observer().estimate(), Eigen::Vector2d(1, -5));
+  config.observer.input_gain = 2;
+  ASSERT_TRUE(controller.retune(config).has_value());
+  EXPECT_NEAR(controller.control(1), 5, 1e-12);
+}
+
 TEST(PredictiveAdrc, retune_keeps_u) {
   auto controller = warm<Linear>(typical());
   controller.start(2.0, 1.5);

@@ -84,19 +84,11 @@ class Adrc {
     const auto& chain = chain_config(config.observer);
     const auto law = make_law(config, chain.sample_time);
     if (!law) return law.error();
-    const int gap = chain.max_gap;
-    if (config.measurement_divider > gap) {
-      return Error<S>{"measurement_divider",
-                      static_cast<S>(config.measurement_divider),
-                      "must not be above the observer's max_gap, which is",
-                      -1,
-                      static_cast<S>(gap),
-                      true};
-    }
     const auto scaled = FastLaw::make(*law, *observer);
     if (!scaled) return scaled.error();
     const auto loop = Loop::make(
-        *observer, {config.limits, config.hold, config.missing, config.measurement_divider});
+        *observer, {config.limits, config.hold, config.missing, config.measurement_divider},
+        chain.max_gap);
     if (!loop) return loop.error();
     return Adrc(*loop, *law, *scaled, config);
   }

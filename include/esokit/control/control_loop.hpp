@@ -15,7 +15,7 @@ namespace esokit {
 /// u is held at a value while the observer finds the state.
 template <PlainScalar S = double>
 struct StartHold {
-  S time{};   ///< s; 0: no hold. Rounded up to whole samples
+  S time{};   ///< s; 0: no hold. Rounded up to whole samples, of the nominal length
   S input{};  ///< u meanwhile, within the limits
 };
 
@@ -25,7 +25,7 @@ struct MissingRule {
   int most = 50;  ///< missing measurements in a row that the controller rides through
   std::optional<S>
       input{};        ///< u from then on, reached within the rate limit; left out: the last u
-  bool stay = false;  ///< true: until start() or reset(); false: a measurement ends it
+  bool stay = false;  ///< true: until start(); false: a measurement ends it
 };
 
 /// Settings of a ControlLoop; a controller's config repeats them by name.
@@ -54,10 +54,10 @@ class ControlLoop {
   using S = typename Observer::scalar_type;  ///< of signals and settings
 
   /// Checks the settings.
-  /// @param observer as its own `make` gives it
+  /// @param observer as its own `make` gives it @param max_gap of its config
   /// @return the loop, with the observer in the state that it has, or an error that names the field
   static Expected<ControlLoop, Error<S>> make(const Observer& observer,
-                                              const LoopSettings<S>& settings) {
+                                              const LoopSettings<S>& settings, int max_gap) {
     const auto limiter = Limiter<S>::make(settings.limits, observer.sample_time());
     if (!limiter) return limiter.error();
     if (auto ok = check_not_negative("hold.time", settings.hold.time); !ok) return ok.error();
@@ -76,6 +76,14 @@ class ControlLoop {
     const int divider = settings.measurement_divider;
     if (divider < 1 || divider > 1000) {
       return Error<S>{"measurement_divider", static_cast<S>(divider), "must be 1 .. 1000"};
+    }
+    if (divider > max_gap) {
+      return Error<S>{"measurement_divider",
+                      static_cast<S>(divider),
+                      "must not be above the observer's max_gap, which is",
+                      -1,
+                      static_cast<S>(max_gap),
+                      true};
     }
     if (divider > 1 && !bears_regular_gaps<Observer>) {
       return Error<S>{"measurement_divider", static_cast<S>(divider),
@@ -166,8 +174,9 @@ class ControlLoop {
     hold_input_ = fresh.hold_input_;
     safe_input_ = fresh.safe_input_;
     missing_limit_ = fresh.missing_limit_;
+    // Of another divider the next update is the one with a measurement.
+    if (divider_ != fresh.divider_) phase_ = 0;
     divider_ = fresh.divider_;
-    phase_ = 0;
     set_mode(mode_);
     has_safe_input_ = fresh.has_safe_input_;
     stay_safe_ = fresh.stay_safe_;

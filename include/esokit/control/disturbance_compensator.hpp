@@ -42,13 +42,17 @@ class DisturbanceCompensator {
   static Expected<DisturbanceCompensator, Error<S>> make(const Config& config) {
     const auto observer = Observer::make(config.observer);
     if (!observer) return observer.error();
-    S gain = S(-1) / chain_config(config.observer).input_gain;
+    const S& input_gain = chain_config(config.observer).input_gain;
+    S gain = S(-1) / input_gain;
     if (config.compensation_gain) {
       gain = *config.compensation_gain;
       if (auto ok = check_finite("compensation_gain", gain); !ok) return ok.error();
+    } else if (!is_finite(gain)) {
+      return Error<S>{"input_gain", input_gain, "has an inverse that the scalar cannot hold"};
     }
     const auto loop = Loop::make(
-        *observer, {config.limits, config.hold, config.missing, config.measurement_divider});
+        *observer, {config.limits, config.hold, config.missing, config.measurement_divider},
+        chain_config(config.observer).max_gap);
     if (!loop) return loop.error();
     return DisturbanceCompensator(*loop, gain);
   }
@@ -65,7 +69,8 @@ class DisturbanceCompensator {
                       [&]() ESOKIT_INLINE_LAMBDA { return base_output + compensation(); });
   }
 
-  /// The same where the observer's equation is driven by something else than u.
+  /// The same where the observer's equation is driven by something else than u: from `make`,
+  /// without `start` and `track`, which take u for the drive. A missing measurement is a NaN here.
   /// @param drive what stood in the place of u since the last sample, in units of y^(n) / b0
   S update_driven(S y, S base_output, S drive) noexcept {
     return loop_.step_driven(y, drive, [&] { return base_output + compensation(); });

@@ -9,6 +9,7 @@
 #include <esokit/design/feedback_gain.hpp>
 #include <esokit/observer/loop_observer.hpp>
 #include <limits>
+#include <string_view>
 #include <tuple>
 #include <type_traits>
 #include <utility>
@@ -75,9 +76,19 @@ class MimoAdrc {
     detail::unroll<channels>([&](auto i) {
       constexpr auto channel = static_cast<std::size_t>(i);
       constexpr int row = i;
+      using O = ObserverOf<decltype(i)::value>;
       auto& observer = std::get<channel>(observers_);
-      std::get<channel>(statuses_) = observer.update(y(row), drive(row));
-      wanted(row) = std::get<channel>(laws_).control(observer.estimate(), S(reference(row)));
+      const StepStatus status = observer.update(y(row), drive(row));
+      std::get<channel>(statuses_) = status;
+      // After a gap too long to bridge: the steady state of the present u does not bump.
+      if (has(status, StepStatus::restarted)) [[unlikely]] {
+        (void)observer.reset(rest_state<O>(y(row), drive(row)));
+      }
+      const auto estimate = observer.estimate();
+      S r = reference(row);
+      if constexpr (requires { observer.wrap(r); })
+        r = estimate(0) + observer.wrap(r - estimate(0));
+      wanted(row) = std::get<channel>(laws_).control(estimate, r);
     });
     return put_out(inverse_ * wanted);
   }
@@ -95,20 +106,21 @@ class MimoAdrc {
   StepStatus start(const Output& y, const Output& u) noexcept {
     const Output drive = input_matrix_ * u;
     if (!is_finite(y.sum() + drive.sum() + u.sum())) return StepStatus::state_rejected;
+    Channels observers = observers_;
+    StepStatus status = StepStatus::ok;
     detail::unroll<channels>([&](auto i) {
-      constexpr auto channel = static_cast<std::size_t>(i);
       constexpr int row = i;
       using O = ObserverOf<decltype(i)::value>;
-      auto& observer = std::get<channel>(observers_);
+      auto& observer = std::get<static_cast<std::size_t>(i)>(observers);
       // The input counts as applied, whatever a later change of B0 asks.
+      if constexpr (requires { observer.fill_input(S()); }) observer.fill_input(drive(row));
       (void)observer.predict(drive(row));
-      typename O::Estimate state = O::Estimate::Zero();
-      state(0) = y(row);
-      state(O::order) = -drive(row);
-      (void)observer.reset(state);
-      limiters_[channel].track(u(row));
+      status |= observer.reset(rest_state<O>(y(row), drive(row)));
     });
-    return StepStatus::ok;
+    if (status != StepStatus::ok) return status;
+    observers_ = observers;
+    for (int i = 0; i < channels; ++i) limiters_[static_cast<std::size_t>(i)].track(u(i));
+    return status;
   }
 
   /// New settings while running: estimates are kept, a change of B0 is moved into the disturbances,
@@ -117,7 +129,8 @@ class MimoAdrc {
     auto fresh = make(config);
     if (!fresh) return fresh.error();
     const Output u = output();
-    const Output moved = (input_matrix_ - config.input_matrix) * u;
+    const Output drive = config.input_matrix * u;
+    const Output moved = input_matrix_ * u - drive;
     Channels observers = observers_;
     Check<S> outcome;
     detail::unroll<channels>([&](auto i) {
@@ -128,6 +141,10 @@ class MimoAdrc {
       chain_config(settings).input_gain = S(1);
       if (outcome) outcome = observer.retune(settings);
       observer.shift_disturbance(moved(row));
+      // Of what is under way to the plant the new B0 makes another drive.
+      if constexpr (requires { observer.fill_input(S()); }) {
+        if (moved(row) < S(0) || moved(row) > S(0)) observer.fill_input(drive(row));
+      }
     });
     if (!outcome) return outcome;
     *this = *fresh;
@@ -164,6 +181,14 @@ class MimoAdrc {
         limiters_(limiters),
         input_matrix_(input_matrix),
         inverse_(inverse) {}
+
+  template <class Observer>
+  static typename Observer::Estimate rest_state(const S& y, const S& drive) noexcept {
+    typename Observer::Estimate state = Observer::Estimate::Zero();
+    state(0) = y;
+    state(Observer::order) = -drive;
+    return state;
+  }
 
   Output put_out(const Output& wanted) noexcept {
     Output u;
@@ -270,7 +295,13 @@ class MimoAdrc {
                                                         const S& sample_time) {
     const auto gains =
         feedback_gain<Order, S>({bandwidth, config.domain, config.half_gain}, sample_time);
-    if (!gains) return gains.error();
+    if (!gains) {
+      Error<S> named = gains.error();
+      if (std::string_view(named.field) == "controller_bandwidth") {
+        named.field = "controller_bandwidths";
+      }
+      return named;
+    }
     return AdrcLaw<Order, S>::make({.gains = *gains, .input_gain = S(1)});
   }
 

@@ -192,8 +192,12 @@ class PredictiveAdrc {
     Estimate state = Estimate::Zero();
     state(0) = y;
     state(order) = -(observer_.input_gain() * u);
-    const StepStatus status = observer_.reset(state);
+    Observer next = observer_;
+    // Tells it the input: a report of what was applied and a change of b0 ask for that.
+    (void)next.predict(u);
+    const StepStatus status = next.reset(state);
     if (status != StepStatus::ok || !all(is_finite(u))) return StepStatus::state_rejected;
+    observer_ = next;
     hold_left_ = 0;
     output_ = u;
     limiter_.track(u);
