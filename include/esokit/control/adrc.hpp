@@ -61,7 +61,8 @@ struct AdrcConfig {
 /// what was put out. No call allocates, throws or locks.
 ///
 /// Delays, angles, a changing sample time and known plant models are the observer's affair: take
-/// DelayedInput, WrappedOutput, VariableTime or KnownModel around it; they nest.
+/// DelayedInput, WrappedOutput, VariableTime or KnownModel around it; they nest, DelayedInput
+/// outside of KnownModel.
 /// @tparam Form OutputBased or ErrorBased
 template <LoopObserver Observer, class Form = OutputBased>
 class Adrc {
