@@ -60,7 +60,9 @@ TEST(MimoAdrc, DecoratedChannelsAreThoseOfAdrc) {
   using Vector1 = Vector<double, 1>;
   // 350 and -10 degrees are one place.
   ASSERT_EQ(axis.start(Vector1(350.0), Vector1(0.0)), esokit::StepStatus::ok);
-  EXPECT_NEAR(axis.update(Vector1(350.0), Vector1(-10.0))(0), 0, 1e-9);
+  for (const double reference : {350.0, -10.0, 710.0}) {
+    EXPECT_NEAR(axis.update(Vector1(350.0), Vector1(reference))(0), 0, 1e-9);
+  }
 
   using Late = esokit::DelayedInput<LinearEso<1>, 8>;
   MimoAdrc<Late>::Config config{
