@@ -81,6 +81,7 @@
 #include <esokit/observer/predictor_corrector.hpp>
 #include <esokit/observer/reduced_order_eso.hpp>
 #include <esokit/observer/riccati_gain.hpp>
+#include <esokit/observer/steady_state.hpp>
 #include <esokit/observer/step_status.hpp>
 #include <esokit/observer/switched_gain.hpp>
 #include <esokit/observer/variable_time.hpp>

@@ -83,10 +83,6 @@ constexpr Array<const char*, Order + Extension> estimate_names() noexcept {
   return names;
 }
 
-}  // namespace detail
-
-namespace detail {
-
 /// `balance` without the sizes in the type, for code that is compiled once. @param inputs of b
 inline void balance(DenseView<double> a, DenseView<double> b, int inputs,
                     DenseView<double> c) noexcept {

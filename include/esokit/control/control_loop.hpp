@@ -8,6 +8,7 @@
 #include <esokit/control/limiter.hpp>
 #include <esokit/core/unroll.hpp>
 #include <esokit/observer/loop_observer.hpp>
+#include <esokit/observer/steady_state.hpp>
 #include <optional>
 
 namespace esokit {
@@ -155,7 +156,7 @@ class ControlLoop {
   StepStatus start(S measured, S u) noexcept {
     if (!is_finite(u)) return StepStatus::input_rejected;
     if (!is_finite(measured)) return StepStatus::state_rejected;
-    const StepStatus status = rest_at(measured, u);
+    const StepStatus status = detail::start_at_rest(observer_, measured, u);
     if (status == StepStatus::ok) {
       limiter_.track(u);
       requested_ = u;
@@ -187,14 +188,9 @@ class ControlLoop {
   /// A length that the observer refuses changes nothing.
   Check<S> set_step_time(const S& seconds) noexcept
       requires(requires(Observer& o, const S& s) { o.set_step_time(s); }) {
-    auto limiter = Limiter<S>::make(limits_, seconds);
-    if (!limiter) {
-      // What is wrong with the length itself is the observer's to say.
-      Observer asked = observer_;
-      if (auto ok = asked.set_step_time(seconds); !ok) return ok;
-      return limiter.error();
-    }
     if (auto ok = observer_.set_step_time(seconds); !ok) return ok;
+    auto limiter = Limiter<S>::make(limits_, seconds);
+    if (!limiter) return limiter.error();
     limiter->track(limiter_.last());
     limiter_ = *limiter;
     return {};
@@ -290,27 +286,10 @@ class ControlLoop {
     // After a gap too long to bridge the observer begins at rest with dhat = 0; the steady state of
     // the present u is the better guess, and does not bump.
     if (has(status_, StepStatus::restarted)) {
-      (void)observer_.reset(rest_state(measured, observer_.applied_input()));
+      (void)observer_.reset(
+          detail::steady_state(observer_, measured, S(observer_.applied_input())));
     }
     judge_missing();
-  }
-
-  /// The observer in the steady state of an input that counts as applied for long.
-  StepStatus rest_at(S measured, S input) noexcept {
-    Observer next = observer_;
-    if constexpr (requires { next.fill_input(input); }) next.fill_input(input);
-    // Tells it the input: a later change of b0 asks for that.
-    (void)next.predict(input);
-    const StepStatus status = next.reset(rest_state(measured, input));
-    if (status == StepStatus::ok) observer_ = next;
-    return status;
-  }
-
-  [[nodiscard]] typename Observer::Estimate rest_state(S measured, S input) const noexcept {
-    typename Observer::Estimate state = Observer::Estimate::Zero();
-    state(0) = measured;
-    state(Observer::order) = -(observer_.input_gain() * input);
-    return state;
   }
 
   void judge_missing() noexcept {

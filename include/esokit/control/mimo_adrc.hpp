@@ -8,6 +8,7 @@
 #include <esokit/core/unroll.hpp>
 #include <esokit/design/feedback_gain.hpp>
 #include <esokit/observer/loop_observer.hpp>
+#include <esokit/observer/steady_state.hpp>
 #include <limits>
 #include <string_view>
 #include <tuple>
@@ -76,13 +77,13 @@ class MimoAdrc {
     detail::unroll<channels>([&](auto i) {
       constexpr auto channel = static_cast<std::size_t>(i);
       constexpr int row = i;
-      using O = ObserverOf<decltype(i)::value>;
       auto& observer = std::get<channel>(observers_);
       const StepStatus status = observer.update(y(row), drive(row));
       std::get<channel>(statuses_) = status;
       // After a gap too long to bridge: the steady state of the present u does not bump.
       if (has(status, StepStatus::restarted)) [[unlikely]] {
-        (void)observer.reset(rest_state<O>(y(row), drive(row)));
+        const S input = observer.applied_input();
+        (void)observer.reset(detail::steady_state(observer, S(y(row)), input));
       }
       const auto estimate = observer.estimate();
       S r = reference(row);
@@ -110,12 +111,8 @@ class MimoAdrc {
     StepStatus status = StepStatus::ok;
     detail::unroll<channels>([&](auto i) {
       constexpr int row = i;
-      using O = ObserverOf<decltype(i)::value>;
       auto& observer = std::get<static_cast<std::size_t>(i)>(observers);
-      // The input counts as applied, whatever a later change of B0 asks.
-      if constexpr (requires { observer.fill_input(S()); }) observer.fill_input(drive(row));
-      (void)observer.predict(drive(row));
-      status |= observer.reset(rest_state<O>(y(row), drive(row)));
+      status |= detail::start_at_rest(observer, S(y(row)), S(drive(row)));
     });
     if (status != StepStatus::ok) return status;
     observers_ = observers;
@@ -181,14 +178,6 @@ class MimoAdrc {
         limiters_(limiters),
         input_matrix_(input_matrix),
         inverse_(inverse) {}
-
-  template <class Observer>
-  static typename Observer::Estimate rest_state(const S& y, const S& drive) noexcept {
-    typename Observer::Estimate state = Observer::Estimate::Zero();
-    state(0) = y;
-    state(Observer::order) = -drive;
-    return state;
-  }
 
   Output put_out(const Output& wanted) noexcept {
     Output u;

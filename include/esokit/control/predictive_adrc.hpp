@@ -10,6 +10,7 @@
 #include <esokit/control/limiter.hpp>
 #include <esokit/core/unroll.hpp>
 #include <esokit/observer/gain_law.hpp>
+#include <esokit/observer/steady_state.hpp>
 #include <esokit/observer/step_status.hpp>
 #include <optional>
 
@@ -189,15 +190,8 @@ class PredictiveAdrc {
   /// Takes over a plant that stands at y under u, without a bump: with the reference at y the first
   /// u is that u.
   StepStatus start(S y, S u) noexcept {
-    Estimate state = Estimate::Zero();
-    state(0) = y;
-    state(order) = -(observer_.input_gain() * u);
-    Observer next = observer_;
-    // Tells it the input: a report of what was applied and a change of b0 ask for that.
-    (void)next.predict(u);
-    const StepStatus status = next.reset(state);
-    if (status != StepStatus::ok || !all(is_finite(u))) return StepStatus::state_rejected;
-    observer_ = next;
+    const StepStatus status = detail::start_at_rest(observer_, y, u);
+    if (status != StepStatus::ok) return StepStatus::state_rejected;
     hold_left_ = 0;
     output_ = u;
     limiter_.track(u);

@@ -95,7 +95,7 @@ class VariableTime : public Observer {
   StepStatus correct(S y) noexcept {
     // The observer bridges `missed` steps of its sample time: make that their mean.
     const int steps = this->missed();
-    if (steps > 1) take(elapsed_ / static_cast<S>(steps));
+    if (steps > 1 && !this->restarts()) take(elapsed_ / static_cast<S>(steps));
     return Observer::correct(y);
   }
 
