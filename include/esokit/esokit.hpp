@@ -41,6 +41,7 @@
 #include <esokit/core/snapshot.hpp>
 #include <esokit/core/snapshot_text.hpp>
 #include <esokit/core/unroll.hpp>
+#include <esokit/core/type_tag.hpp>
 #include <esokit/core/version.hpp>
 #include <esokit/design/check.hpp>
 #include <esokit/design/continuous_gain.hpp>

@@ -1,22 +1,34 @@
 // Snapshots: every observer and the controllers come back bit for bit and go on alike; any changed
-// word is refused; the text has the words.
+// word, any two flipped bits and another type of the same size are refused; the text has the words.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
 #include <esokit/control/adrc.hpp>
+#include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/dual_feedback.hpp>
+#include <esokit/control/incremental.hpp>
+#include <esokit/control/predictive_adrc.hpp>
 #include <esokit/core/snapshot.hpp>
 #include <esokit/core/snapshot_text.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
+#include <esokit/observer/algebraic_filter.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/delayed_input.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
+#include <esokit/observer/half_gain_eso.hpp>
+#include <esokit/observer/known_model.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
+#include <esokit/observer/reduced_order_eso.hpp>
+#include <esokit/observer/variable_time.hpp>
+#include <esokit/observer/wrapped_output.hpp>
 #include <string>
+#include <tuple>
+#include <vector>
 
 namespace {
 
@@ -49,6 +61,17 @@ void expect_same_life(Observer made) {
       const auto refused = from_snapshot<Observer>(wrong);
       ASSERT_FALSE(refused) << i;
       EXPECT_STREQ(refused.error().field, "snapshot");
+      EXPECT_STREQ(refused.error().rule,
+                   "has a wrong checksum: damaged, or of another type or version");
+    }
+  }
+  // Two signs at once: a multiplication by an odd number never mixes the highest bit.
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      Snapshot<Observer> wrong = words;
+      wrong[i] ^= 0x80000000u;
+      wrong[j] ^= 0x80000000u;
+      ASSERT_FALSE(from_snapshot<Observer>(wrong)) << i << ' ' << j;
     }
   }
 }
@@ -106,6 +129,85 @@ TEST(Snapshot, Controllers) {
            .controller_bandwidth = 10.0f,
            .limits = {.lower = -1.0f, .upper = 2.0f}})
           .value());
+}
+
+TEST(Snapshot, ChecksumIsTheStandardCrc32) {
+  // The check value of CRC-32/ISO-HDLC: of the bytes "123456789".
+  const std::uint32_t four = detail::crc32(detail::crc32_start, 0x34333231u);
+  EXPECT_EQ(~detail::crc32(detail::crc32(four, 0x38373635u), 0x39u, 1), 0xcbf43926u);
+}
+
+TEST(Snapshot, TwoFlippedBitsAnywhereAreRefused) {
+  using Observer = LinearEso<2, float>;
+  const auto words = snapshot(
+      Observer::make({.observer_bandwidth = 50.0f, .input_gain = 3.0f, .sample_time = 1e-3f})
+          .value());
+  constexpr std::size_t bits = 32 * std::tuple_size_v<Snapshot<Observer>>;
+  int passed = 0;
+  for (std::size_t i = 0; i < bits; ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      auto wrong = words;
+      wrong[i / 32] ^= 1u << (i % 32);
+      wrong[j / 32] ^= 1u << (j % 32);
+      passed += from_snapshot<Observer>(wrong) ? 1 : 0;
+    }
+  }
+  EXPECT_EQ(passed, 0);
+}
+
+TEST(Snapshot, AnotherTypeOfTheSameSizeIsRefused) {
+  using Output = Adrc<LinearEso<2, float>, OutputBased>;
+  using Error = Adrc<LinearEso<2, float>, ErrorBased>;
+  static_assert(sizeof(Output) == sizeof(Error));
+  const auto made = Output::make(
+      {.observer = {.observer_bandwidth = 50.0f, .input_gain = 3.0f, .sample_time = 1e-3f},
+       .controller_bandwidth = 10.0f});
+  EXPECT_TRUE(from_snapshot<Output>(snapshot(*made)));
+  EXPECT_FALSE(from_snapshot<Error>(snapshot(*made)));
+
+  using Plain = LinearEso<2, float>;
+  using Reduced = ReducedOrderEso<2, float>;
+  static_assert(sizeof(Plain) == sizeof(Reduced));
+  const auto plain =
+      Plain::make({.observer_bandwidth = 50.0f, .input_gain = 3.0f, .sample_time = 1e-3f});
+  EXPECT_FALSE(from_snapshot<Reduced>(snapshot(*plain)));
+  using Higher = LinearEso<1, float, 2>;
+  static_assert(sizeof(Plain) == sizeof(Higher));
+  EXPECT_FALSE(from_snapshot<Higher>(snapshot(*plain)));
+}
+
+template <class... Types>
+std::vector<std::uint32_t> tags() {
+  return {type_tag<Types>...};
+}
+
+TEST(Snapshot, EveryTypeHasATagOfItsOwn) {
+  using Eso = LinearEso<2, float>;
+  using Gain = ConstantGain<3, float>;
+  auto all =
+      tags<float, double, long double, EqualPoles, PoleSet, ReducedPoles, HalfGainPoles, Eso,
+           LinearEso<2, double>, LinearEso<3, float>, LinearEso<2, float, 2>,
+           LinearEso<1, float, 2>, LinearEso<2, float, 1, PoleSet>, ReducedOrderEso<2, float>,
+           HalfGainEso<2, float>, CascadeEso<2, 3, float>, CascadeEso<3, 2, float>,
+           AlgebraicEso<2, float>, AlgebraicFilter<2, float>, AdjustableBandwidthEso<2, float>,
+           AdjustableBandwidthEso<2, float, 1, SignReading::printed>, NonlinearEso<2, float>,
+           NonlinearEso<2, float, 2, FalGain<float>>, ExtendedStateFilter<2, float>,
+           ExtendedStateFilter<2, float, 1, NoNominalModel, 8>, DelayedInput<Eso, 3>,
+           DelayedInput<Eso, 4>, WrappedOutput<Eso>, VariableTime<Eso>,
+           KnownModel<Eso, KnownPoles<2, float>>, WrappedOutput<DelayedInput<Eso, 3>>,
+           DelayedInput<WrappedOutput<Eso>, 3>, PredictorCorrector<2, float, 1, Gain>,
+           PredictorCorrector<2, float, 1, Gain, 2>,
+           PredictorCorrector<2, float, 1, AlgebraicGain<3, float>>,
+           PredictorCorrector<2, float, 1, RiccatiGain<3, float>>,
+           PredictorCorrector<2, float, 1, SwitchedGain<3, float>>,
+           PredictorCorrector<2, float, 1, NonlinearGain<3, float>>, Adrc<Eso>,
+           Adrc<Eso, ErrorBased>, Adrc<WrappedOutput<Eso>>, PredictiveAdrc<Eso>,
+           DisturbanceCompensator<Eso>, Incremental<Adrc<Eso>>, DualFeedbackAdrc<2, float>,
+           DualFeedbackAdrc<2, float, 1, DeltaOperator>, TransferFunctionAdrc<2, float>,
+           DualFeedbackAdrc<2, float, 1, ShiftOperator, LimitedFeedback, PoleSet>>();
+  EXPECT_EQ(std::ranges::count(all, 0u), 0);
+  std::ranges::sort(all);
+  EXPECT_EQ(std::ranges::adjacent_find(all), all.end());
 }
 
 TEST(Snapshot, TextHasTheWords) {

@@ -6,6 +6,7 @@
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/control/control_loop.hpp>
 #include <esokit/control/scaled_law.hpp>
+#include <esokit/core/type_tag.hpp>
 #include <esokit/design/feedback_gain.hpp>
 #include <type_traits>
 
@@ -14,9 +15,17 @@ namespace esokit {
 /// The observer is fed y, the law takes r and, where known, its derivatives.
 struct OutputBased {};
 
+/// Told apart in snapshots.
+template <>
+inline constexpr std::uint32_t type_tag<OutputBased> = make_type_tag<>("OutputBased");
+
 /// The observer is fed e = r - y; what r does is part of the disturbance, and no derivative of r is
 /// needed. For a constant reference it equals the output-based form.
 struct ErrorBased {};
+
+/// Told apart in snapshots.
+template <>
+inline constexpr std::uint32_t type_tag<ErrorBased> = make_type_tag<>("ErrorBased");
 
 /// Config of Adrc, of either form. Give `controller_bandwidth` or `gains`, not both.
 template <LoopObserver Observer>
@@ -289,5 +298,10 @@ class Adrc {
   [[no_unique_address]] FastLaw fast_law_;
   [[no_unique_address]] std::conditional_t<has_step_time, FeedbackSpec<S>, NoSpec> spec_;
 };
+
+/// Told apart in snapshots.
+template <LoopObserver Observer, class Form>
+inline constexpr std::uint32_t type_tag<Adrc<Observer, Form>> =
+    make_type_tag<Observer, Form>("Adrc");
 
 }  // namespace esokit

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <esokit/control/control_loop.hpp>
+#include <esokit/core/type_tag.hpp>
 
 namespace esokit {
 
@@ -135,5 +136,10 @@ class DisturbanceCompensator {
   Loop loop_;
   S gain_;
 };
+
+/// Told apart in snapshots.
+template <LoopObserver Observer>
+inline constexpr std::uint32_t type_tag<DisturbanceCompensator<Observer>> =
+    make_type_tag<Observer>("DisturbanceCompensator");
 
 }  // namespace esokit

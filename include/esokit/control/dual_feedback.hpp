@@ -5,6 +5,7 @@
 
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/control/limiter.hpp>
+#include <esokit/core/type_tag.hpp>
 #include <esokit/core/unroll.hpp>
 #include <esokit/design/feedback_gain.hpp>
 #include <esokit/design/filter_form.hpp>
@@ -20,13 +21,29 @@ namespace esokit {
 /// leave fewer than three of them are refused.
 struct ShiftOperator {};
 
+/// Told apart in snapshots.
+template <>
+inline constexpr std::uint32_t type_tag<ShiftOperator> = make_type_tag<>("ShiftOperator");
+
 /// The filter runs on delta = z - 1: N additions more, no digits lost for any omega_o T.
 struct DeltaOperator {};
 
+/// Told apart in snapshots.
+template <>
+inline constexpr std::uint32_t type_tag<DeltaOperator> = make_type_tag<>("DeltaOperator");
+
 /// The filter is told the applied, limited u: the dual-feedback form.
 struct LimitedFeedback {};
+
+/// Told apart in snapshots.
+template <>
+inline constexpr std::uint32_t type_tag<LimitedFeedback> = make_type_tag<>("LimitedFeedback");
 /// The filter is told its own output: the transfer-function form.
 struct UnlimitedFeedback {};
+
+/// Told apart in snapshots.
+template <>
+inline constexpr std::uint32_t type_tag<UnlimitedFeedback> = make_type_tag<>("UnlimitedFeedback");
 
 /// Linear ADRC (LinearEso and law with constant gains) as one filter with two feedbacks, of y and
 /// of the limited u. At sample k, with u[k-1] as it was applied:
@@ -257,6 +274,12 @@ class DualFeedbackAdrc {
   S wanted_;
   StepStatus status_ = StepStatus::ok;
 };
+
+/// Told apart in snapshots.
+template <int Order, PlainScalar S, int Extension, class Operator, class Feedback, class Placement>
+inline constexpr std::uint32_t
+    type_tag<DualFeedbackAdrc<Order, S, Extension, Operator, Feedback, Placement>> =
+        make_type_tag<S, Operator, Feedback, Placement>("DualFeedbackAdrc", Order, Extension);
 
 /// The transfer-function form: winds up where u is limited.
 template <int Order, PlainScalar S = double, int Extension = 1, class Operator = ShiftOperator,

@@ -2,6 +2,7 @@
 /// Incremental: a controller whose output is the change of u, for an actuator that integrates.
 #pragma once
 
+#include <esokit/core/type_tag.hpp>
 #include <esokit/design/check.hpp>
 #include <esokit/observer/step_status.hpp>
 
@@ -67,5 +68,10 @@ class Incremental {
   Controller controller_;
   S increment_{};
 };
+
+/// Told apart in snapshots.
+template <class Controller>
+inline constexpr std::uint32_t type_tag<Incremental<Controller>> =
+    make_type_tag<Controller>("Incremental");
 
 }  // namespace esokit

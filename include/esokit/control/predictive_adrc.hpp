@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/control/limiter.hpp>
+#include <esokit/core/type_tag.hpp>
 #include <esokit/core/unroll.hpp>
 #include <esokit/observer/gain_law.hpp>
 #include <esokit/observer/steady_state.hpp>
@@ -434,5 +435,10 @@ class PredictiveAdrc {
   std::uint32_t hold_left_;
   std::uint32_t hold_;
 };
+
+/// Told apart in snapshots.
+template <PredictableObserver Observer>
+inline constexpr std::uint32_t type_tag<PredictiveAdrc<Observer>> =
+    make_type_tag<Observer>("PredictiveAdrc");
 
 }  // namespace esokit

@@ -14,6 +14,7 @@
 
 #include <cmath>
 #include <complex>
+#include <esokit/core/type_tag.hpp>
 #include <esokit/core/unroll.hpp>
 #include <esokit/design/placement.hpp>
 #include <numbers>
@@ -69,5 +70,9 @@ struct HalfGainPoles {
     return bandwidth;
   }
 };
+
+/// Told apart in snapshots.
+template <>
+inline constexpr std::uint32_t type_tag<HalfGainPoles> = make_type_tag<>("HalfGainPoles");
 
 }  // namespace esokit

@@ -7,6 +7,7 @@
 
 #include <complex>
 #include <esokit/core/matrix.hpp>
+#include <esokit/core/type_tag.hpp>
 #include <esokit/design/check.hpp>
 #include <esokit/design/continuous_gain.hpp>
 #include <esokit/design/sampled_gain.hpp>
@@ -45,6 +46,10 @@ struct EqualPoles {
     return bandwidth;
   }
 };
+
+/// Told apart in snapshots.
+template <>
+inline constexpr std::uint32_t type_tag<EqualPoles> = make_type_tag<>("EqualPoles");
 
 /// Any stable set of poles p_i (1/s), complex ones in conjugate pairs.
 struct PoleSet {
@@ -105,5 +110,9 @@ struct PoleSet {
     return poles[0].real();
   }
 };
+
+/// Told apart in snapshots.
+template <>
+inline constexpr std::uint32_t type_tag<PoleSet> = make_type_tag<>("PoleSet");
 
 }  // namespace esokit

@@ -5,6 +5,7 @@
 /// the measurement, and what is left is the observer of order N - 1 for the other states.
 #pragma once
 
+#include <esokit/core/type_tag.hpp>
 #include <esokit/design/placement.hpp>
 
 namespace esokit {
@@ -58,5 +59,9 @@ struct ReducedPoles {
     return bandwidth;
   }
 };
+
+/// Told apart in snapshots.
+template <>
+inline constexpr std::uint32_t type_tag<ReducedPoles> = make_type_tag<>("ReducedPoles");
 
 }  // namespace esokit

@@ -5,6 +5,7 @@
 /// 106742).
 #pragma once
 
+#include <esokit/core/type_tag.hpp>
 #include <esokit/design/switching_certificate.hpp>
 #include <esokit/observer/continuous_observer.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
@@ -129,6 +130,11 @@ class AdjustableBandwidthEso
   AdjustableBandwidthEso(const ChainConfig<S>& chain, const Law& law) noexcept
       : Base(chain, {law}) {}
 };
+
+/// Told apart in snapshots.
+template <int Order, Scalar S, int Extension, SignReading Reading>
+inline constexpr std::uint32_t type_tag<AdjustableBandwidthEso<Order, S, Extension, Reading>> =
+    make_type_tag<S>("AdjustableBandwidthEso", Order, Extension, Reading);
 
 /// AdjustableBandwidthEso as an ODE, for simulation; it switches at step boundaries.
 /// @tparam Order n @tparam S scalar @tparam Extension m

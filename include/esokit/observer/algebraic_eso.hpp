@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cmath>
+#include <esokit/core/type_tag.hpp>
 #include <esokit/observer/algebraic_gain.hpp>
 #include <esokit/observer/continuous_observer.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
@@ -270,6 +271,11 @@ class AlgebraicEso
   Array<S, Base::size> held_;
   std::uint32_t hold_samples_;
 };
+
+/// Told apart in snapshots.
+template <int Order, Scalar S, int Extension>
+inline constexpr std::uint32_t type_tag<AlgebraicEso<Order, S, Extension>> =
+    make_type_tag<S>("AlgebraicEso", Order, Extension);
 
 /// Falling-bandwidth gain of the continuous observer: L_j(t) = C(N,j) P_j(t) with P_0 = 1,
 /// P_{j+1} = (lambda + N q v) P_j + q v (1 + v) dP_j/dv, v = 1 / (e^{qt} - 1).

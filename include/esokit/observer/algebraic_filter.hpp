@@ -16,6 +16,7 @@
 #pragma once
 
 #include <cmath>
+#include <esokit/core/type_tag.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 
 namespace esokit {
@@ -207,5 +208,10 @@ class AlgebraicFilter {
 
   Config config_;
 };
+
+/// Told apart in snapshots.
+template <int Order, Scalar S, int Extension>
+inline constexpr std::uint32_t type_tag<AlgebraicFilter<Order, S, Extension>> =
+    make_type_tag<S>("AlgebraicFilter", Order, Extension);
 
 }  // namespace esokit

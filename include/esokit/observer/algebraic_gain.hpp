@@ -20,6 +20,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <esokit/core/type_tag.hpp>
 #include <esokit/design/check.hpp>
 #include <esokit/design/sampled_gain.hpp>
 #include <esokit/observer/gain_law.hpp>
@@ -276,5 +277,10 @@ class AlgebraicGain {
   bool pending_ = false;
   bool settled_ = false;
 };
+
+/// Told apart in snapshots.
+template <int Size, Scalar S>
+inline constexpr std::uint32_t type_tag<AlgebraicGain<Size, S>> = make_type_tag<S>("AlgebraicGain",
+                                                                                   Size);
 
 }  // namespace esokit

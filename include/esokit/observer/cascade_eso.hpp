@@ -3,6 +3,7 @@
 /// 109 (2021) 1-10).
 #pragma once
 
+#include <esokit/core/type_tag.hpp>
 #include <esokit/observer/constant_gain.hpp>
 #include <esokit/observer/continuous_observer.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
@@ -174,6 +175,11 @@ class CascadeEso
   CascadeEso(const ChainConfig<S>& chain, const typename Base::Laws& laws) noexcept
       : Base(chain, laws) {}
 };
+
+/// Told apart in snapshots.
+template <int Order, int Levels, Scalar S, int Extension, class Placement>
+inline constexpr std::uint32_t type_tag<CascadeEso<Order, Levels, S, Extension, Placement>> =
+    make_type_tag<S, Placement>("CascadeEso", Order, Levels, Extension);
 
 /// CascadeEso as an ODE, equations (23), (24), for simulation.
 /// @tparam Order n @tparam Levels p @tparam S scalar @tparam Extension m

@@ -2,6 +2,7 @@
 /// The constant gain law of the linear observers, sampled and continuous.
 #pragma once
 
+#include <esokit/core/type_tag.hpp>
 #include <esokit/design/placement.hpp>
 #include <esokit/observer/gain_law.hpp>
 
@@ -55,6 +56,11 @@ class ConstantGain {
   ScaledGain<Size, S> gain_{};
   typename Placement::template Sampled<Size, S> poles_{};
 };
+
+/// Told apart in snapshots.
+template <int Size, Scalar S, class Placement>
+inline constexpr std::uint32_t type_tag<ConstantGain<Size, S, Placement>> =
+    make_type_tag<S, Placement>("ConstantGain", Size);
 
 /// Constant gain of a continuous observer, in physical units.
 template <int Size, Scalar S, class Placement = EqualPoles>

@@ -2,6 +2,7 @@
 /// DelayedInput: an observer of a plant whose input acts a known number of samples late.
 #pragma once
 
+#include <esokit/core/type_tag.hpp>
 #include <esokit/core/unroll.hpp>
 #include <esokit/observer/loop_observer.hpp>
 
@@ -95,5 +96,10 @@ class DelayedInput : public Observer {
   int delay_;
   int newest_ = 0;
 };
+
+/// Told apart in snapshots.
+template <LoopObserver Observer, int Capacity>
+inline constexpr std::uint32_t type_tag<DelayedInput<Observer, Capacity>> =
+    make_type_tag<Observer>("DelayedInput", Capacity);
 
 }  // namespace esokit

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <concepts>
 #include <cstdint>
+#include <esokit/core/type_tag.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
 #include <esokit/observer/riccati_gain.hpp>
 #include <optional>
@@ -14,6 +15,10 @@ namespace esokit {
 
 /// The ESF without a model of the disturbance: its change is anything within the bounds.
 struct NoNominalModel {};
+
+/// Told apart in snapshots.
+template <>
+inline constexpr std::uint32_t type_tag<NoNominalModel> = make_type_tag<>("NoNominalModel");
 
 /// A model fbar(x, u, t) of the total disturbance, in the unit of y^(n): x the plant states, u the
 /// input that was held, t seconds since the start or the last reset.
@@ -514,5 +519,11 @@ class ExtendedStateFilter
   S change_bound_;
   std::uint64_t sample_ = 0;
 };
+
+/// Told apart in snapshots.
+template <int Order, Scalar S, int Extension, class Model, int TableSize>
+inline constexpr std::uint32_t
+    type_tag<ExtendedStateFilter<Order, S, Extension, Model, TableSize>> =
+        make_type_tag<S, Model>("ExtendedStateFilter", Order, Extension, TableSize);
 
 }  // namespace esokit

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <esokit/core/matrix.hpp>
+#include <esokit/core/type_tag.hpp>
 #include <esokit/core/unroll.hpp>
 #include <esokit/observer/loop_observer.hpp>
 
@@ -23,6 +24,11 @@ struct KnownPoles {
     return sum;
   }
 };
+
+/// Told apart in snapshots.
+template <int Order, PlainScalar S>
+inline constexpr std::uint32_t type_tag<KnownPoles<Order, S>> = make_type_tag<S>("KnownPoles",
+                                                                                 Order);
 
 /// A known part of y^(n): fbar(estimate), noexcept, in the unit of y^(n), a function of
 /// y .. y^(n-1) alone.
@@ -170,5 +176,10 @@ class KnownModel : public Observer {
   S inverse_gain_;
   S applied_input_{};
 };
+
+/// Told apart in snapshots.
+template <LoopObserver Observer, class Model>
+inline constexpr std::uint32_t type_tag<KnownModel<Observer, Model>> =
+    make_type_tag<Observer, Model>("KnownModel");
 
 }  // namespace esokit

@@ -3,6 +3,7 @@
 /// ESO (GESO).
 #pragma once
 
+#include <esokit/core/type_tag.hpp>
 #include <esokit/observer/constant_gain.hpp>
 #include <esokit/observer/continuous_observer.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
@@ -80,6 +81,11 @@ class LinearEso : public PredictorCorrector<Order, S, Extension,
  private:
   LinearEso(const ChainConfig<S>& chain, const Law& law) noexcept : Base(chain, {law}) {}
 };
+
+/// Told apart in snapshots.
+template <int Order, Scalar S, int Extension, class Placement>
+inline constexpr std::uint32_t type_tag<LinearEso<Order, S, Extension, Placement>> =
+    make_type_tag<S, Placement>("LinearEso", Order, Extension);
 
 /// Config of ContinuousLinearEso by bandwidth or by poles.
 template <int Size, Scalar S, class Placement>

@@ -4,6 +4,7 @@
 /// instead, Han's).
 #pragma once
 
+#include <esokit/core/type_tag.hpp>
 #include <esokit/observer/continuous_observer.hpp>
 #include <esokit/observer/nonlinear_gain_design.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
@@ -137,6 +138,11 @@ class NonlinearEso
     return Law(*linear, config.shape, config.error_scale, limits->low, limits->high);
   }
 };
+
+/// Told apart in snapshots.
+template <int Order, Scalar S, int Extension, class Shape>
+inline constexpr std::uint32_t type_tag<NonlinearEso<Order, S, Extension, Shape>> =
+    make_type_tag<S, Shape>("NonlinearEso", Order, Extension);
 
 /// NonlinearEso as an ODE, for simulation. By default k is kept above gain_min = 1/2, which is
 /// certified without an upper limit in continuous time (from (N-1) / (2N) on).

@@ -5,6 +5,7 @@
 
 #include <esokit/core/fal.hpp>
 #include <esokit/core/power.hpp>
+#include <esokit/core/type_tag.hpp>
 #include <esokit/observer/constant_gain.hpp>
 #include <limits>
 
@@ -65,6 +66,10 @@ struct PowerSumGain {
   }
 };
 
+/// Told apart in snapshots.
+template <Scalar S>
+inline constexpr std::uint32_t type_tag<PowerSumGain<S>> = make_type_tag<S>("PowerSumGain");
+
 /// k(x) = K max(x, delta)^(a-1): K fal(e) / e of Han's observers.
 template <Scalar S>
 struct FalGain {
@@ -100,6 +105,10 @@ struct FalGain {
     return check_positive("shape.linear_width", linear_width);
   }
 };
+
+/// Told apart in snapshots.
+template <Scalar S>
+inline constexpr std::uint32_t type_tag<FalGain<S>> = make_type_tag<S>("FalGain");
 
 namespace detail {
 
@@ -210,6 +219,11 @@ class NonlinearGain {
   Linear linear_;
   detail::LimitedGain<S, Shape> factor_;
 };
+
+/// Told apart in snapshots.
+template <int Size, Scalar S, class Shape>
+inline constexpr std::uint32_t type_tag<NonlinearGain<Size, S, Shape>> =
+    make_type_tag<S, Shape>("NonlinearGain", Size);
 
 /// The same for a continuous observer, in physical units.
 template <int Size, Scalar S, class Shape = PowerSumGain<S>>

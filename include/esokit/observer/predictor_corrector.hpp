@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <esokit/core/expected.hpp>
+#include <esokit/core/type_tag.hpp>
 #include <esokit/core/unroll.hpp>
 #include <esokit/design/check.hpp>
 #include <esokit/model/scaled_chain.hpp>
@@ -558,5 +559,10 @@ class PredictorCorrector {
   std::uint16_t gap_ = 0;
   std::uint16_t max_gap_;
 };
+
+/// Told apart in snapshots.
+template <int Order, Scalar S, int Extension, class Law, int Levels>
+inline constexpr std::uint32_t type_tag<PredictorCorrector<Order, S, Extension, Law, Levels>> =
+    make_type_tag<S, Law>("PredictorCorrector", Order, Extension, Levels);
 
 }  // namespace esokit

@@ -17,6 +17,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <esokit/core/type_tag.hpp>
 #include <esokit/design/covariance_factor.hpp>
 #include <esokit/design/riccati.hpp>
 #include <esokit/observer/gain_law.hpp>
@@ -416,5 +417,10 @@ class RiccatiGain {
   Point limit_{};
   Array<Point, TableSize> table_{};
 };
+
+/// Told apart in snapshots.
+template <int Size, Scalar S, int TableSize>
+inline constexpr std::uint32_t type_tag<RiccatiGain<Size, S, TableSize>> =
+    make_type_tag<S>("RiccatiGain", Size, TableSize);
 
 }  // namespace esokit

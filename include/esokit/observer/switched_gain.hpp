@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cmath>
+#include <esokit/core/type_tag.hpp>
 #include <esokit/observer/constant_gain.hpp>
 #include <limits>
 
@@ -109,6 +110,11 @@ class SwitchedGain {
   Array<Set, 2> sets_;  ///< otherwise, shrinking
   S previous_ = detail::nothing_watched<S>(Reading);
 };
+
+/// Told apart in snapshots.
+template <int Size, Scalar S, class Placement, SignReading Reading>
+inline constexpr std::uint32_t type_tag<SwitchedGain<Size, S, Placement, Reading>> =
+    make_type_tag<S, Placement>("SwitchedGain", Size, Reading);
 
 /// The same for a continuous observer; the mode changes at step boundaries only.
 template <int Size, Scalar S>

@@ -2,6 +2,7 @@
 /// VariableTime: an observer whose sample time changes from step to step.
 #pragma once
 
+#include <esokit/core/type_tag.hpp>
 #include <esokit/observer/loop_observer.hpp>
 
 namespace esokit {
@@ -126,5 +127,10 @@ class VariableTime : public Observer {
   S current_;  ///< the sample time that the observer has now
   S elapsed_{};
 };
+
+/// Told apart in snapshots.
+template <LoopObserver Observer>
+inline constexpr std::uint32_t type_tag<VariableTime<Observer>> =
+    make_type_tag<Observer>("VariableTime");
 
 }  // namespace esokit

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cmath>
+#include <esokit/core/type_tag.hpp>
 #include <esokit/observer/loop_observer.hpp>
 
 namespace esokit {
@@ -102,5 +103,10 @@ class WrappedOutput : public Observer {
   S period_;
   S inverse_period_;
 };
+
+/// Told apart in snapshots.
+template <LoopObserver Observer>
+inline constexpr std::uint32_t type_tag<WrappedOutput<Observer>> =
+    make_type_tag<Observer>("WrappedOutput");
 
 }  // namespace esokit
