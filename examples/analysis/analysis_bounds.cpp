@@ -129,6 +129,7 @@ Entry cascade_entry(double factor) {
 
 /// The adjustable-bandwidth law: rho omega while abs(e) shrinks, omega otherwise.
 struct Adjustable {
+  static constexpr esokit::ContinuousGainLawTraits traits{.begins_steps = true};
   Vector<double, 3> shrinking, otherwise;
   double before = 0.0;
   bool shrinks = false;

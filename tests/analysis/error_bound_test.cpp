@@ -201,6 +201,7 @@ TEST(ErrorBound, ThirdLevelCarriesTheCorrectedTerm) {
 /// A law that switches between two gains while it runs, by the rule of the ABESO or at random.
 template <int Size>
 struct Switching {
+  static constexpr esokit::ContinuousGainLawTraits traits{.begins_steps = true};
   Vector<double, Size> shrinking, otherwise;
   Random random{1};
   bool by_rule = true;

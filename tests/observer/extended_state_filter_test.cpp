@@ -710,7 +710,7 @@ void a_million_updates_in_float(float r, float p0) {
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < i; ++j) ASSERT_EQ(p(i, j), p(j, i)) << k;
       // What the recursion keeps is L D L', L unit lower triangular.
-      ASSERT_GT(filter.gain_law().factor().variance(i), 0) << k;
+      ASSERT_GT(filter.gain_law().covariance_factor().variance(i), 0) << k;
     }
     // And so is P multiplied out, as float rounds it.
     const Eigen::Matrix3d exact = p.cast<double>();

@@ -38,6 +38,13 @@ namespace esokit {
 template <int Size, Scalar S>
 class AlgebraicGain {
  public:
+  /// What it does beside `gain`.
+  static constexpr GainLawTraits traits{.kind = GainKind::preset,
+                                        .advances = true,
+                                        .accepts = true,
+                                        .resets = true,
+                                        .bridges_gaps = true};
+
   /// Largest start_index, and where the sample counter stops.
   static constexpr std::uint32_t max_index = 0x3fffffffu;
 

@@ -12,6 +12,8 @@ namespace esokit {
 template <int Size, Scalar S, class Placement = EqualPoles>
 class ConstantGain {
  public:
+  /// What it does beside `gain`.
+  static constexpr GainLawTraits traits{.kind = GainKind::preset, .bridges_gaps = true};
   using Spec = typename Placement::template Spec<Size, S>;  ///< of the placement
 
   /// The gain for a set of poles.

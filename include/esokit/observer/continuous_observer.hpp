@@ -63,7 +63,7 @@ class ContinuousObserver {
   /// change its mode.
   void begin_step([[maybe_unused]] const S& t, [[maybe_unused]] const State& z,
                   [[maybe_unused]] const S& y) {
-    if constexpr (requires(Law & law) { law.begin_step(t, y); }) {
+    if constexpr (detail::declared_traits<Law, ContinuousGainLawTraits>.begins_steps) {
       S measured = y;
       for (int level = 0; level < Levels; ++level) {
         laws_[static_cast<std::size_t>(level)].begin_step(t, measured - z(level * size));

@@ -11,19 +11,52 @@
 
 namespace esokit {
 
+/// What an even gain can do beside k(x): `static constexpr EvenGainTraits traits{..}` in it.
+struct EvenGainTraits {
+  bool checks = false;    ///< `check() const` gives the error of a bad parameter, a Check<S>
+  bool prepares = false;  ///< `prepared() const` gives a function object that is quicker to call
+};
+
+namespace detail {
+
+ESOKIT_MEMBER_NAME(check)
+ESOKIT_MEMBER_NAME(prepared)
+
+template <class Shape>
+inline constexpr EvenGainTraits even_gain_traits = declared_traits<Shape, EvenGainTraits>;
+
+}  // namespace detail
+
+/// `check()` is declared by `traits.checks`; or there is none.
+template <class Shape, class S>
+concept ChecksAsDeclared = detail::as_declared(
+    detail::even_gain_traits<Shape>.checks, detail::names_check<Shape>, requires(const Shape& k) {
+      { k.check() } -> std::same_as<Check<S>>;
+    });
+
+/// `prepared()` is declared by `traits.prepares`; or there is none.
+template <class Shape, class S>
+concept PreparesAsDeclared = detail::as_declared(
+    detail::even_gain_traits<Shape>.prepares, detail::names_prepared<Shape>,
+    requires(const Shape& k, const S& x) {
+      { k.prepared()(x) } -> std::convertible_to<S>;
+    });
+
 /// An even gain k(x), x = |e| / error_scale > 0: the correction is l k(x) e.
 ///
-/// Any copyable function object will do. Optional, found by name: `check()` gives the error of a
-/// bad parameter, `prepared()` a function object that is quicker to call.
+/// Any copyable function object will do; what else it can do it declares, see EvenGainTraits.
 template <class Shape, class S>
 concept EvenGain = std::copyable<Shape> && requires(const Shape& k, const S& x) {
   { k(x) } -> std::convertible_to<S>;
-};
+} && DeclaresTraits<Shape, EvenGainTraits> && ChecksAsDeclared<Shape, S> &&
+    PreparesAsDeclared<Shape, S>;
 
 /// k(x) = K_alpha x^(alpha-1) + K_beta x^beta: g(e) / e of the NHOESO paper, (10). The default is
 /// k = 1, the linear observer.
 template <Scalar S>
 struct PowerSumGain {
+  static constexpr EvenGainTraits traits{.checks = true, .prepares = true};  ///< beside k
+
   S gain_alpha = S(1.0);  ///< K_alpha >= 0
   S alpha = S(1.0);       ///< alpha > 0; below 1: k is infinite at e = 0
   S gain_beta = S(0.0);   ///< K_beta >= 0
@@ -73,6 +106,8 @@ inline constexpr std::uint32_t type_tag<PowerSumGain<S>> = make_type_tag<S>("Pow
 /// k(x) = K max(x, delta)^(a-1): K fal(e) / e of Han's observers.
 template <Scalar S>
 struct FalGain {
+  static constexpr EvenGainTraits traits{.checks = true, .prepares = true};  ///< beside k
+
   S gain = S(1.0);          ///< K >= 0
   S exponent = S(0.5);      ///< a > 0
   S linear_width = S(1.0);  ///< delta > 0, in units of the error scale
@@ -114,7 +149,7 @@ namespace detail {
 
 template <class Shape>
 constexpr auto prepared(const Shape& shape) noexcept {
-  if constexpr (requires { shape.prepared(); }) {
+  if constexpr (even_gain_traits<Shape>.prepares) {
     return shape.prepared();
   } else {
     return shape;
@@ -178,6 +213,9 @@ template <int Size, Scalar S, class Shape = PowerSumGain<S>>
 requires EvenGain<Shape, S>
 class NonlinearGain {
  public:
+  /// What it does beside `gain`.
+  static constexpr GainLawTraits traits{.kind = GainKind::factored, .bridges_gaps = true};
+
   using Linear = ConstantGain<Size, S>;  ///< the gain where k = 1
 
   /// @param linear the bandwidth gains @param shape k @param error_scale > 0, unit of y

@@ -38,7 +38,7 @@ inline constexpr int tested_octaves = 40;
 /// k finite where it is tested: at the least magnitude and at four points an octave.
 template <Scalar S, class Shape>
 Check<S> check_shape(const Shape& shape) {
-  if constexpr (requires { shape.check(); }) {
+  if constexpr (even_gain_traits<Shape>.checks) {
     if (auto ok = shape.check(); !ok) return ok.error();
   }
   const auto k = prepared(shape);

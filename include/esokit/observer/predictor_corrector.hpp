@@ -378,7 +378,7 @@ class PredictorCorrector {
   }
 
   ESOKIT_INLINE constexpr void advance_laws() noexcept {
-    if constexpr (requires(Law & law) { law.advance(); }) {
+    if constexpr (gain_law_traits<Law>.advances) {
       detail::unroll<Levels>([&](auto i) ESOKIT_INLINE_LAMBDA { std::get<i>(laws_).advance(); });
     }
   }
@@ -440,7 +440,7 @@ class PredictorCorrector {
 
   [[nodiscard]] constexpr decltype(auto) law_gain(const Law& law, const S& innovation,
                                                   unsigned elapsed) const noexcept {
-    if constexpr (requires { law.gap_gain(innovation, elapsed); }) {
+    if constexpr (gain_law_traits<Law>.bridges_gaps) {
       using Gain = ScaledGain<size, S>;
       return elapsed > 1 ? Gain(law.gap_gain(innovation, elapsed)) : Gain(law.gain(innovation));
     } else {
@@ -453,9 +453,9 @@ class PredictorCorrector {
   template <bool NominalGain>
   ESOKIT_INLINE constexpr bool correct_levels(Correction& step, S y,
                                               unsigned elapsed) const noexcept {
-    constexpr bool law_looks = !PresetGainLaw<Law, size, S> && !requires {
-      requires Law::bears_any_innovation;
-    };
+    constexpr GainLawTraits law_traits = gain_law_traits<Law>;
+    constexpr bool law_looks =
+        law_traits.kind != GainKind::preset && !law_traits.bears_any_innovation;
     bool fine = true;
     S measured = y;
     detail::unroll<Levels>([&](auto level) ESOKIT_INLINE_LAMBDA {
@@ -486,7 +486,7 @@ class PredictorCorrector {
   ESOKIT_INLINE constexpr void commit(const Correction& step) noexcept {
     states_ = step.states;
     innovation_ = step.innovations[0];
-    if constexpr (requires(Law & law, const S& e) { law.accept(e); }) {
+    if constexpr (gain_law_traits<Law>.accepts) {
       detail::unroll<Levels>([&](auto i) ESOKIT_INLINE_LAMBDA {
         std::get<i>(laws_).accept(std::get<i>(step.innovations));
       });
@@ -544,7 +544,7 @@ class PredictorCorrector {
     states_ = states;
     innovation_ = S(0.0);
     gap_ = 0;
-    if constexpr (requires(Law & law) { law.reset(); }) {
+    if constexpr (gain_law_traits<Law>.resets) {
       for (Law& law : laws_) law.reset();
     }
     return StepStatus::ok;

@@ -60,6 +60,10 @@ struct RiccatiSettings {
 template <int Size, Scalar S, int TableSize = 0>
 class RiccatiGain {
  public:
+  /// What it does beside `gain`.
+  static constexpr GainLawTraits traits{
+      .kind = GainKind::preset, .advances = true, .accepts = true, .resets = true};
+
   using Factor = CovarianceFactor<Size, S>;   ///< P-, scaled
   using Settings = RiccatiSettings<Size, S>;  ///< of the constructor
   using Gain = ScaledGain<Size, S>;           ///< k, scaled
@@ -221,7 +225,9 @@ class RiccatiGain {
   }
 
   /// P- of the last prediction, scaled and divided by the unit.
-  [[nodiscard]] constexpr const Factor& factor() const noexcept { return now_.factor; }
+  [[nodiscard]] constexpr const Factor& covariance_factor() const noexcept {
+    return now_.factor;
+  }
 
   /// theta, as the present gain is made with it.
   [[nodiscard]] constexpr const S& inflation() const noexcept { return now_.inflation; }

@@ -50,8 +50,13 @@ class SwitchedGain {
  public:
   using Set = ConstantGain<Size, S, Placement>;  ///< one of the two gain sets
 
-  /// A NaN compares as not shrinking, so that any innovation is safe to ask with.
-  static constexpr bool bears_any_innovation = true;
+  /// What it does beside `gain`. A NaN compares as not shrinking, so that any innovation is safe to
+  /// ask with.
+  static constexpr GainLawTraits traits{.kind = GainKind::switched,
+                                        .accepts = true,
+                                        .resets = true,
+                                        .bridges_gaps = true,
+                                        .bears_any_innovation = true};
 
   /// @param shrinking in force while the innovation shrinks @param otherwise else
   constexpr SwitchedGain(const Set& shrinking, const Set& otherwise) noexcept
@@ -120,6 +125,9 @@ inline constexpr std::uint32_t type_tag<SwitchedGain<Size, S, Placement, Reading
 template <int Size, Scalar S>
 class ContinuousSwitchedGain {
  public:
+  static constexpr ContinuousGainLawTraits traits{.begins_steps =
+                                                      true};  ///< what it does beside `gain`
+
   /// @param shrinking, otherwise l, N x 1, row i in 1/s^(i+1)
   ContinuousSwitchedGain(const Vector<S, Size>& shrinking, const Vector<S, Size>& otherwise,
                          SignReading reading = SignReading::magnitude)

@@ -1,0 +1,13 @@
+// expect: HasNoMisspelledHook
+#include <esokit/observer/predictor_corrector.hpp>
+
+struct Schedule {
+  esokit::ScaledGain<3, double> k{};
+  void advances() noexcept { k[0] *= 0.5; }
+  const esokit::ScaledGain<3, double>& gain(double) const noexcept { return k; }
+};
+
+auto run() {
+  return esokit::PredictorCorrector<2, double, 1, Schedule>::make(
+      {.input_gain = 1.0, .sample_time = 1e-3}, Schedule{});
+}
