@@ -280,5 +280,179 @@ TEST(WrappedOutput, MeasurementsInAnyBranch) {
   EXPECT_NEAR(angle.estimate<0>(), -80, 1e-9);
 }
 
+using Axis = esokit::WrappedOutput<LinearEso<2>>;
+
+Axis axis(double omega_T, double turn = 360) {
+  return Axis::make({.observer = {.observer_bandwidth = omega_T / nominal,
+                                  .input_gain = 2,
+                                  .sample_time = nominal},
+                     .period = turn})
+      .value();
+}
+
+double branch(double angle) { return angle - 360 * std::floor(angle / 360); }
+
+/// One bad angle, one bad u: with the innovation taken modulo the period each speed + k period / T
+/// is an equilibrium, and these find them.
+TEST(WrappedOutput, NothingButTheTruthIsAnEquilibrium) {
+  for (const double omega_T : {0.1, 0.7, 1.0, 2.0, 4.0}) {
+    for (const double speed : {0.0, 80.0, -170.0}) {  // degrees a sample
+      for (const int kind : {0, 1, 2}) {
+        auto angle = axis(omega_T);
+        double y = 120;
+        int assumed = 0;
+        for (int k = 0; k < 8500; ++k) {
+          const double bad_y = kind == 0 && k == 500 ? -149 : 0;
+          const double bad_u = kind == 1 && k == 500 ? 4e8 : kind == 2 && k == 500 ? -1e300 : 0;
+          const StepStatus status = angle.update(branch(y + bad_y), bad_u);
+          if (status != StepStatus::ok) {
+            EXPECT_EQ(status, StepStatus::turn_assumed) << k;
+            EXPECT_EQ(kind, 0);
+            ++assumed;
+          }
+          if (k < 8499) y += speed;
+        }
+        EXPECT_EQ(assumed, kind == 0 ? 2 : 0);
+        EXPECT_NEAR(angle.estimate<1>() * nominal, speed, 1e-6) << omega_T << ' ' << kind;
+        EXPECT_NEAR(angle.wrap(angle.estimate<0>() - y), 0, 1e-6) << omega_T << ' ' << kind;
+        EXPECT_NEAR(angle.total_disturbance() * nominal * nominal, 0, 1e-6);
+      }
+    }
+  }
+}
+
+/// An outlier off by less than half a turn shifts no turn: after it the estimate is that of an
+/// observer of the angle without jumps. One that fits the motion is not reported, one beside it by
+/// more than a quarter of a turn is.
+TEST(WrappedOutput, OutlierShiftsNoTurn) {
+  for (const double off : {-179.0, -91.0, -79.0, 30.0, 79.0, 91.0, 149.0, 179.0}) {
+    auto angle = axis(0.2);
+    auto plain =
+        LinearEso<2>::make({.observer_bandwidth = 20, .input_gain = 2, .sample_time = nominal})
+            .value();
+    plain.reset(5.0);
+    angle.reset(5.0);
+    for (int k = 0; k < 200; ++k) {
+      const double y = 5 + 3.0 * k + (k == 100 ? off : 0);
+      const StepStatus status = angle.update(branch(y), 0.1);
+      plain.update(y, 0.1);
+      EXPECT_EQ(has(status, StepStatus::turn_assumed), std::abs(off) > 90 && (k == 100 || k == 101))
+          << off << ' ' << k;
+    }
+    EXPECT_NEAR(angle.estimate<1>(), plain.estimate<1>(), 1e-6) << off;
+    EXPECT_NEAR(angle.total_disturbance(), plain.total_disturbance(), 1e-5) << off;
+  }
+}
+
+/// Over a gap of many turns: the motion goes on as it was.
+TEST(WrappedOutput, GapsAtSpeed) {
+  for (const int gap : {2, 7, 60}) {
+    for (const double speed : {100.0, -170.0}) {
+      auto angle = axis(0.3);
+      double y = 0;
+      for (int k = 0; k < 400; ++k) {
+        y += speed;
+        if (k > 200 && k % (gap + 5) < gap - 1) {
+          angle.predict(0);
+        } else {
+          const StepStatus status = angle.update(branch(y), 0);
+          EXPECT_FALSE(has(status, StepStatus::turn_assumed)) << k;
+        }
+        if (k > 200) {
+          ASSERT_NEAR(angle.estimate<1>() * nominal, speed, 1e-6) << k << ' ' << gap;
+        }
+      }
+    }
+  }
+}
+
+/// A measurement at every fourth sample and no other: what holds for neighbours holds for these; a
+/// wrong u leaves no other equilibrium either.
+TEST(WrappedOutput, EveryFourthSample) {
+  for (const double speed : {-40.0, 0.0, 30.0}) {
+    auto angle = axis(0.3);
+    double y = 0;
+    for (int k = 0; k < 1600; ++k) {
+      y += speed;
+      const double u = k == 400 ? 1e6 : 0;
+      if (k % 4 != 3) {
+        angle.predict(u);
+      } else {
+        angle.update(branch(y), u);
+      }
+    }
+    EXPECT_NEAR(angle.estimate<1>() * nominal, speed, 1e-6);
+    EXPECT_NEAR(angle.wrap(angle.estimate<0>() - y), 0, 1e-6);
+  }
+}
+
+/// Neighbours that stay away: the motion that they had is not taken for theirs for ever.
+TEST(WrappedOutput, MotionOfNeighboursIsForgotten) {
+  auto angle = axis(0.3);
+  double y = 0;
+  for (int k = 0; k < 100; ++k) angle.update(branch(y += 170), 0);
+  for (int k = 0; k < 1200; ++k) {
+    y += 10;
+    if (k % 4 != 3) {
+      angle.predict(0);
+    } else {
+      angle.update(branch(y), 0);
+    }
+  }
+  EXPECT_NEAR(angle.estimate<1>() * nominal, 10, 1e-6);
+}
+
+TEST(WrappedOutput, RefusedResetAndAbsurdAnglesChangeNothing) {
+  auto angle = axis(0.3);
+  for (int k = 0; k < 50; ++k) angle.update(branch(7.0 * k), 0.1);
+  const double limit = 360 / (8 * std::numeric_limits<double>::epsilon());
+  for (const double bad : {hidden_nan<double>(), hidden_infinity<double>(), 1.01 * limit, -1e300}) {
+    auto reference = angle;
+    EXPECT_EQ(reference.reset(bad), StepStatus::state_rejected);
+    EXPECT_EQ(reference.estimate(), angle.estimate());
+    EXPECT_EQ(reference.correct(bad), StepStatus::measurement_rejected);
+    EXPECT_EQ(reference.estimate(), angle.estimate());
+    for (int r = 0; r < 3; ++r) {
+      esokit::Vector<double, 3> state(1, 2, 3);
+      state(r) = bad;
+      if (r == 0 || !std::isfinite(bad)) {
+        EXPECT_EQ(reference.reset(state), StepStatus::state_rejected) << r;
+      }
+    }
+    for (int k = 50; k < 60; ++k) {
+      EXPECT_EQ(reference.update(branch(7.0 * k), 0.1), StepStatus::ok);
+    }
+    auto same = angle;
+    for (int k = 50; k < 60; ++k) same.update(branch(7.0 * k), 0.1);
+    EXPECT_EQ(reference.estimate(), same.estimate());
+  }
+  EXPECT_EQ(angle.reset(0.99 * limit), StepStatus::ok);
+  EXPECT_LE(std::abs(angle.estimate<0>()), 180);
+  // A prediction from a bad u is reported through the adapter.
+  EXPECT_EQ(angle.predict(hidden_nan<double>()), StepStatus::input_rejected);
+  EXPECT_EQ(angle.predict(0.1), StepStatus::ok);
+  EXPECT_EQ(angle.update(1.0, hidden_nan<double>()),
+            StepStatus::input_rejected | StepStatus::gap_bridged);
+}
+
+/// A retune to another period counts anew; to the same one it does not.
+TEST(WrappedOutput, RetuneOfThePeriod) {
+  auto angle = axis(0.3);
+  for (int k = 0; k < 300; ++k) angle.update(branch(40.0 * k), 0);
+  Axis::Config config{.observer = settings(), .period = 360};
+  const auto before = angle.estimate();
+  ASSERT_TRUE(angle.retune(config).has_value());
+  EXPECT_EQ(angle.estimate(), before);
+  EXPECT_EQ(angle.update(branch(40.0 * 300), 0), StepStatus::ok);
+  config.period = 100;
+  ASSERT_TRUE(angle.retune(config).has_value());
+  EXPECT_LE(std::abs(angle.estimate<0>()), 50);
+  EXPECT_NEAR(angle.estimate<1>() * nominal, 40, 1e-8);
+  EXPECT_EQ(angle.update(40.0 * 301, 0), StepStatus::ok);
+  config.period = -1;
+  EXPECT_STREQ(angle.retune(config).error().field, "period");
+  EXPECT_EQ(angle.period(), 100);
+}
+
 }  // namespace
 }  // namespace esokit_test

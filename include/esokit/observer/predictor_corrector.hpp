@@ -57,6 +57,11 @@ Check<S> check_chain(const ChainConfig<S>& config) {
 ///
 /// One instance belongs to one thread. No member allocates, throws or locks after `make`.
 ///
+/// Whatever numbers came in, good samples lead back: what is wrong of the estimate decays by
+/// e^(-omega_o T) a sample, from the largest number to rounding in 60 + 2 ln(max / epsilon) /
+/// (omega_o T) samples at most (tested with every observer and adapter: double 60 + 1500 /
+/// (omega_o T), float 60 + 210 / (omega_o T)).
+///
 /// @tparam Order n, order of the plant @tparam Extension m, extended states
 /// @tparam Law gain law, see GainLaw @tparam Levels p
 template <int Order, Scalar S, int Extension, class Law, int Levels = 1>

@@ -19,10 +19,14 @@ enum class StepStatus : unsigned char {
   /// More samples than `max_gap` were missing, or the state could not be predicted: restarted as by
   /// reset(y).
   restarted = 16,
-  /// The state given to a reset was not finite: nothing changed.
+  /// The state given to a reset was not finite, or an angle too large to tell its branch: nothing
+  /// changed.
   state_rejected = 32,
   /// y lay too far from its prediction for the observer's outlier gate: predicted only.
   outlier_rejected = 64,
+  /// An angle moved otherwise than before by more than a quarter of its period: its turn is not
+  /// sure, see WrappedOutput.
+  turn_assumed = 128,
 };
 
 /// Both flags.

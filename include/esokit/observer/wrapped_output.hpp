@@ -3,14 +3,35 @@
 #pragma once
 
 #include <cmath>
+#include <cstdint>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/observer/loop_observer.hpp>
+#include <limits>
 
 namespace esokit {
 
-/// Takes the innovation to the nearest period, so a measurement in any branch (0..2 pi, -180..180)
-/// may be fed as it comes, and keeps z_1 within half a period of zero, so that float stays exact
-/// after many turns.
+/// Counts the turns, so a measurement in any branch (0..2 pi, -180..180) may be fed as it comes,
+/// and keeps z_1 within half a period of zero, so that float stays exact after many turns.
+///
+/// Turns are counted from one measurement to the next, not from the prediction. The observer sees
+/// an angle without jumps and is what it is on one: every omega_o T will do, and nothing but the
+/// truth is an equilibrium. (With the innovation taken to the nearest period, as is often done,
+/// every y' + k period / T is one: one bad sample, and an axis at rest is seen to spin for good.)
+///
+/// What it asks of y, noise included:
+/// - between neighbouring measurements it moves by less than half a period (that of D samples,
+/// where
+///   only every D-th brings one);
+/// - the motion changes by less than a quarter of a period against the average of the last eight;
+///   over a gap it is that average, continued.
+///
+/// A measurement that breaks the second rule is taken into the turn nearest to the prediction and
+/// reported as `turn_assumed`, so that an outlier shifts no turn; after three in a row turns are
+/// counted again. Once y is good turns are counted right from the 30th measurement on, whatever was
+/// before, and from there the observer converges as it does without turns.
+///
+/// An axis that turns by more than half a period a sample cannot be told from a slower one: the
+/// actuator must not be able to bring it there.
 template <LoopObserver Observer>
 class WrappedOutput : public Observer {
   using S = typename Observer::scalar_type;
@@ -36,18 +57,27 @@ class WrappedOutput : public Observer {
     return WrappedOutput(*observer, config.period);
   }
 
-  /// New settings while running: the estimate is kept. A refused config changes nothing.
+  /// New settings while running: the estimate is kept; of another period the turns are counted
+  /// anew. A refused config changes nothing.
   Check<S> retune(const Config& config) {
     auto fresh = make(config);
     if (!fresh) return fresh.error();
     if (auto ok = Observer::retune(config.observer); !ok) return ok;
-    period_ = fresh->period_;
-    inverse_period_ = fresh->inverse_period_;
+    if (fresh->period_ < period_ || fresh->period_ > period_) {
+      period_ = fresh->period_;
+      inverse_period_ = fresh->inverse_period_;
+      count_ = Count{};
+      recentre();
+    }
     return {};
   }
 
-  /// One sample, see PredictorCorrector::update. @param y in any branch
+  /// One sample, see PredictorCorrector::update. @param y in any branch; one so large that its
+  /// rounding is an eighth of a period is rejected
   StepStatus update(S y, S u_applied) noexcept {
+    if (const Reading reading = read(y, this->missed() + 1); reading.counted) [[likely]] {
+      return keep(reading, Observer::update(reading.y + reading.turns * period_, u_applied));
+    }
     const StepStatus predicted = predict(u_applied);
     return predicted | correct(y);
   }
@@ -61,29 +91,34 @@ class WrappedOutput : public Observer {
 
   /// Measurement update alone. @param y in any branch
   StepStatus correct(S y) noexcept {
-    // The innovation is that of level 1, whose z_1 the correction will subtract.
-    const S predicted = Observer::level_estimate(0)(0);
-    const StepStatus status = Observer::correct(predicted + wrap(y - predicted));
-    recentre();
-    return status;
+    Reading reading = read(y, this->missed());
+    if (!reading.usable) return StepStatus::measurement_rejected;
+    if (!reading.counted) {
+      // The innovation is that of level 1, whose z_1 the correction will subtract.
+      const S predicted = Observer::level_estimate(0)(0);
+      reading.turns = std::round((predicted - reading.y) * inverse_period_);
+    }
+    return keep(reading, Observer::correct(reading.y + reading.turns * period_));
   }
 
-  /// Starts anew at (y, 0, .., 0), y taken to the nearest period around zero.
+  /// Starts anew at (y, 0, .., 0), y taken to the nearest period around zero. A y that `update`
+  /// would reject changes nothing and is reported.
   StepStatus reset(S y) noexcept {
-    const StepStatus status = Observer::reset(y);
-    recentre();
-    return status;
+    if (!can_be_told(y)) return StepStatus::state_rejected;
+    return begin(Observer::reset(wrap(y)));
   }
 
   /// Starts anew at a given estimate, N x 1.
   StepStatus reset(const typename Observer::Estimate& state) noexcept {
-    const StepStatus status = Observer::reset(state);
-    recentre();
-    return status;
+    if (!can_be_told(state(0))) return StepStatus::state_rejected;
+    typename Observer::Estimate wrapped = state;
+    wrapped(0) = wrap(state(0));
+    return begin(Observer::reset(wrapped));
   }
 
   /// The difference `angle` to the nearest whole period, in -period/2 .. period/2.
   [[nodiscard]] S wrap(const S& angle) const noexcept {
+    if (detail::absolute(angle) <= half_period()) return angle;
     return angle - period_ * std::round(angle * inverse_period_);
   }
 
@@ -91,17 +126,130 @@ class WrappedOutput : public Observer {
   [[nodiscard]] const S& period() const noexcept { return period_; }
 
  private:
+  /// Where the turns stand.
+  struct Count {
+    S y{};                         ///< the last measurement that was taken, wrapped
+    S turns{};                     ///< whole; y + turns periods is where the observer's z_1 belongs
+    S motion{};                    ///< of y within `samples`, average; at most half a period
+    std::uint16_t samples = none;  ///< 65535: motion is not known
+    std::uint8_t gaps = 0;         ///< measurements that came later than after `samples`, in a row
+    std::uint8_t doubts = 0;       ///< measurements with a turn_assumed in a row, 3 at most
+    bool begun = false;            ///< there is a last measurement
+  };
+
+  /// What a measurement is taken for.
+  struct Reading {
+    S y{};                 ///< wrapped
+    S turns{};             ///< if counted
+    S step{};              ///< from the last measurement, to the nearest period
+    int samples = 0;       ///< since then
+    bool usable = false;   ///< its branch can be told
+    bool fits = true;      ///< it moved as before
+    bool counted = false;  ///< false: the turn is that of the prediction
+  };
+
+  static constexpr std::uint16_t none = 65535;
+  static constexpr std::uint8_t most_doubts = 3;
+  static constexpr std::uint8_t most_gaps = 8;
+
   WrappedOutput(const Observer& observer, const S& period) noexcept
       : Observer(observer), period_(period), inverse_period_(S(1) / period) {}
 
+  [[nodiscard]] S half_period() const noexcept { return period_ * static_cast<S>(0.5); }
+
+  /// Not so where a rounding of y is an eighth of a period or more.
+  [[nodiscard]] bool can_be_told(const S& y) const noexcept {
+    constexpr S most_turns = S(1) / (S(8) * std::numeric_limits<S>::epsilon());
+    const S turns = y * inverse_period_;
+    return is_finite(turns) && detail::absolute(turns) < most_turns;
+  }
+
+  [[nodiscard]] Reading read(const S& y, int samples) const noexcept {
+    Reading reading;
+    if (!can_be_told(y)) [[unlikely]]
+      return reading;
+    reading.usable = true;
+    reading.y = wrap(y);
+    reading.samples = samples;
+    if (!count_.begun) [[unlikely]]
+      return reading;
+    const S change = reading.y - count_.y;
+    reading.step = wrap(change);
+    const S expected = expected_motion(samples);
+    const S crossed = detail::absolute(S(expected - change)) <= half_period()
+                          ? S(0)
+                          : std::round((expected - change) * inverse_period_);
+    const S motion = change + crossed * period_;
+    if (count_.samples != none) {
+      const S quarter = half_period() * static_cast<S>(0.5);
+      reading.fits = detail::absolute(motion - expected) <= quarter &&
+                     (samples > count_.samples || detail::absolute(motion) <= half_period());
+    }
+    reading.turns = count_.turns + crossed;
+    reading.counted =
+        (reading.fits || count_.doubts >= most_doubts) && is_finite(reading.turns * period_);
+    return reading;
+  }
+
+  [[nodiscard]] S expected_motion(int samples) const noexcept {
+    if (count_.samples == none || samples == 0) return S(0);
+    if (samples == count_.samples) return count_.motion;
+    return count_.motion * (static_cast<S>(samples) / static_cast<S>(count_.samples));
+  }
+
+  /// Takes over what the observer has taken.
+  StepStatus keep(const Reading& reading, StepStatus status) noexcept {
+    if (!has(status, StepStatus::measurement_rejected) &&
+        !has(status, StepStatus::outlier_rejected)) {
+      learn_motion(reading);
+      count_.y = reading.y;
+      count_.turns = reading.turns;
+      if (reading.fits) {
+        count_.doubts = 0;
+      } else {
+        if (count_.doubts < most_doubts) ++count_.doubts;
+        status |= StepStatus::turn_assumed;
+      }
+      count_.begun = true;
+    }
+    recentre();
+    return status;
+  }
+
+  void learn_motion(const Reading& reading) noexcept {
+    if (!count_.begun || reading.samples == 0) return;
+    if (reading.samples > count_.samples) {
+      // A gap. That of neighbours is not known for ever, they may not come again.
+      if (++count_.gaps >= most_gaps) count_.samples = none;
+      return;
+    }
+    count_.gaps = 0;
+    if (reading.samples < count_.samples || count_.doubts >= most_doubts) {
+      count_.motion = reading.step;
+      count_.samples = static_cast<std::uint16_t>(reading.samples);
+    } else if (reading.fits) {
+      count_.motion += (reading.step - count_.motion) * static_cast<S>(0.125);
+    }
+  }
+
+  StepStatus begin(StepStatus status) noexcept {
+    if (status == StepStatus::ok) count_ = Count{};
+    return status;
+  }
+
   void recentre() noexcept {
-    const S turns = std::round(Observer::level_estimate(Observer::levels - 1)(0) * inverse_period_);
-    if (turns < S(0) || turns > S(0)) [[unlikely]]
-      Observer::shift_output(-(turns * period_));
+    const S z = Observer::level_estimate(Observer::levels - 1)(0);
+    if (detail::absolute(z) <= half_period()) [[likely]]
+      return;
+    const S turns = std::round(z * inverse_period_);
+    if (!is_finite(turns * period_)) return;
+    Observer::shift_output(-(turns * period_));
+    count_.turns -= turns;
   }
 
   S period_;
   S inverse_period_;
+  Count count_{};
 };
 
 /// Told apart in snapshots.

@@ -1,0 +1,2 @@
+// The same with -ffast-math.
+#include "reconvergence_test.cpp"
