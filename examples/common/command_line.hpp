@@ -2,46 +2,13 @@
 /// The command line of the examples and of make_index: nothing but the output folder.
 #pragma once
 
-#include <cstdio>
-#include <cstdlib>
 #include <filesystem>
-#include <optional>
 #include <string>
 
 namespace esokit::examples {
 
 /// The folder from `[--out DIR | DIR]`, or "out". Ends the program with exit code 2 and the usage
 /// if the command line says anything else.
-[[nodiscard]] inline std::filesystem::path output_folder(int argc, char** argv,
-                                                         const std::string& what) {
-  const std::string program =
-      argc > 0 ? std::filesystem::path(argv[0]).filename().string() : std::string("example");
-  const std::string usage =
-      "usage: " + program + " [--out DIR | DIR]\n" + what + " DIR (default: out)";
-  const auto refuse = [&](const std::string& why) {
-    std::fprintf(stderr, "%s: %s\n%s\n", program.c_str(), why.c_str(), usage.c_str());
-    std::exit(2);
-  };
-  std::optional<std::string> folder;
-  for (int i = 1; i < argc; ++i) {
-    std::string argument = argv[i];
-    if (argument == "--help" || argument == "-h") {
-      std::printf("%s\n", usage.c_str());
-      std::exit(0);
-    }
-    if (argument == "--out") {
-      if (++i == argc) refuse("--out needs a folder");
-      argument = argv[i];
-    } else if (argument.starts_with("--out=")) {
-      argument.erase(0, 6);
-    } else if (argument.starts_with("-")) {
-      refuse("unknown option " + argument);
-    }
-    if (argument.empty()) refuse("the output folder is empty");
-    if (folder) refuse("more than one output folder: " + *folder + ", " + argument);
-    folder = argument;
-  }
-  return folder.value_or("out");
-}
+[[nodiscard]] std::filesystem::path output_folder(int argc, char** argv, const std::string& what);
 
 }  // namespace esokit::examples

@@ -2,12 +2,7 @@
 /// Comma-separated text as in RFC 4180: quoting, numbers, and reading back.
 #pragma once
 
-#include <array>
-#include <charconv>
-#include <cmath>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -18,98 +13,22 @@ namespace esokit::examples {
 using CsvRow = std::vector<std::string>;
 
 /// Shortest text with at most `digits` significant digits, independent of the locale.
-[[nodiscard]] inline std::string number_text(double value, int digits = 9) {
-  if (std::isnan(value)) return "nan";
-  if (std::isinf(value)) return value > 0 ? "inf" : "-inf";
-  std::array<char, 64> text{};
-  const auto result = std::to_chars(text.data(), text.data() + text.size(), value,
-                                    std::chars_format::general, digits);
-  return {text.data(), result.ptr};
-}
+[[nodiscard]] std::string number_text(double value, int digits = 9);
 
 /// One field, quoted only where it has to be.
-[[nodiscard]] inline std::string csv_field(std::string_view text) {
-  if (text.find_first_of(",\"\r\n") == std::string_view::npos) return std::string(text);
-  std::string quoted = "\"";
-  for (const char c : text) {
-    if (c == '"') quoted += '"';
-    quoted += c;
-  }
-  return quoted + '"';
-}
+[[nodiscard]] std::string csv_field(std::string_view text);
 
 /// One line with its line end.
-[[nodiscard]] inline std::string csv_line(const CsvRow& row) {
-  std::string line;
-  for (std::size_t i = 0; i < row.size(); ++i) {
-    if (i > 0) line += ',';
-    line += csv_field(row[i]);
-  }
-  return line + '\n';
-}
+[[nodiscard]] std::string csv_line(const CsvRow& row);
 
 /// Writes the whole text, or returns what went wrong.
-[[nodiscard]] inline std::optional<std::string> write_text(const std::filesystem::path& file,
-                                                           std::string_view text) {
-  std::ofstream stream(file, std::ios::binary);
-  stream.write(text.data(), static_cast<std::streamsize>(text.size()));
-  stream.close();
-  if (!stream) return "cannot write " + file.string();
-  return std::nullopt;
-}
+[[nodiscard]] std::optional<std::string> write_text(const std::filesystem::path& file,
+                                                    std::string_view text);
 
 /// The whole file; empty optional if it cannot be read.
-[[nodiscard]] inline std::optional<std::string> read_text(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) return std::nullopt;
-  std::string text{std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-  if (stream.bad()) return std::nullopt;
-  return text;
-}
+[[nodiscard]] std::optional<std::string> read_text(const std::filesystem::path& file);
 
 /// The rows of a CSV text; empty lines are left out.
-[[nodiscard]] inline std::vector<CsvRow> parse_csv(std::string_view text) {
-  std::vector<CsvRow> rows;
-  CsvRow row;
-  std::string field;
-  bool quoted = false;
-  bool row_has_content = false;
-  const auto end_row = [&] {
-    if (row_has_content) {
-      row.push_back(field);
-      rows.push_back(row);
-    }
-    row.clear();
-    field.clear();
-    row_has_content = false;
-  };
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const char c = text[i];
-    if (quoted) {
-      if (c != '"') {
-        field += c;
-      } else if (i + 1 < text.size() && text[i + 1] == '"') {
-        field += '"';
-        ++i;
-      } else {
-        quoted = false;
-      }
-    } else if (c == '"') {
-      quoted = true;
-      row_has_content = true;
-    } else if (c == ',') {
-      row.push_back(field);
-      field.clear();
-      row_has_content = true;
-    } else if (c == '\n') {
-      end_row();
-    } else if (c != '\r') {
-      field += c;
-      row_has_content = true;
-    }
-  }
-  end_row();
-  return rows;
-}
+[[nodiscard]] std::vector<CsvRow> parse_csv(std::string_view text);
 
 }  // namespace esokit::examples

@@ -7,17 +7,9 @@
 #include <numeric>
 #include <vector>
 
-namespace esokit::examples {
+#include "figure.hpp"
 
-/// Size and grid of a figure.
-struct Grid {
-  std::size_t rows = 1;
-  std::size_t columns = 1;
-  double width = 900.0;                     ///< of the whole figure, px
-  double panel_height = 190.0;              ///< of a panel's axes, px, where the row's weight is 1
-  std::vector<double> row_weights = {};     ///< heights relative to panel_height; empty: all 1
-  std::vector<double> column_weights = {};  ///< shares of the width; empty: all equal
-};
+namespace esokit::examples {
 
 namespace detail {
 

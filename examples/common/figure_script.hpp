@@ -22,6 +22,64 @@
 
 namespace esokit::examples {
 
+namespace detail {
+
+[[nodiscard]] inline std::string color_hex(Color color) {
+  switch (color) {
+    case Color::blue:
+      return "0072B2";
+    case Color::vermillion:
+      return "D55E00";
+    case Color::green:
+      return "009E73";
+    case Color::purple:
+      return "CC79A7";
+    case Color::orange:
+      return "E69F00";
+    case Color::sky:
+      return "56B4E9";
+    case Color::grey:
+      return "808080";
+    case Color::automatic:
+    case Color::black:
+      break;
+  }
+  return "000000";
+}
+
+[[nodiscard]] inline std::string dash_text(Dash dash) {
+  switch (dash) {
+    case Dash::dashed:
+      return "(9,4)";
+    case Dash::dotted:
+      return "(2,3)";
+    case Dash::dash_dotted:
+      return "(10,3,2,3)";
+    case Dash::solid:
+      break;
+  }
+  return "1";
+}
+
+[[nodiscard]] inline int marker_number(Marker marker) {
+  switch (marker) {
+    case Marker::open_circle:
+      return 6;
+    case Marker::square:
+      return 5;
+    case Marker::triangle:
+      return 9;
+    case Marker::cross:
+      return 2;
+    case Marker::dot:
+    case Marker::circle:
+      break;
+  }
+  return 7;
+}
+
+}  // namespace detail
+
 /// The script's text; the curves that it draws go to a FigureData.
 class FigureScript {
  public:

@@ -2,124 +2,34 @@
 /// Independent jobs on all cores, with progress on the console.
 #pragma once
 
-#include <unistd.h>
-
-#include <algorithm>
-#include <atomic>
-#include <chrono>
 #include <concepts>
 #include <cstddef>
-#include <cstdio>
-#include <exception>
-#include <mutex>
-#include <string>
+#include <functional>
 #include <string_view>
-#include <thread>
 #include <type_traits>
 #include <vector>
 
 namespace esokit::examples {
 
-/// Progress on stderr: one line that rewrites itself on a terminal, elsewhere a line every ten
-/// seconds, so that a CI log stays short. Safe to call from several threads.
-class Progress {
- public:
-  Progress(std::string_view label, std::size_t count)
-      : label_(label), count_(count), start_(Clock::now()), last_(start_) {}
+/// Calls job(0) .. job(count - 1) on `threads` threads (0: as many as there are cores), with the
+/// progress on stderr: one line that rewrites itself on a terminal, elsewhere a line every ten
+/// seconds, so that a CI log stays short. The first exception (by index) is rethrown.
+void for_each_parallel(std::string_view label, std::size_t count,
+                       const std::function<void(std::size_t)>& job, unsigned threads = 0);
 
-  Progress(const Progress&) = delete;
-  Progress& operator=(const Progress&) = delete;
-
-  /// One job is done.
-  void step() {
-    const std::scoped_lock lock(mutex_);
-    ++done_;
-    const auto now = Clock::now();
-    const bool due = now - last_ >= (terminal_ ? std::chrono::milliseconds(100)
-                                               : std::chrono::milliseconds(10'000));
-    if (due) {
-      last_ = now;
-      print(now);
-    }
-  }
-
-  ~Progress() {
-    // A job list that took no time is not worth a line of a log.
-    const auto now = Clock::now();
-    if (terminal_ || now - start_ >= std::chrono::seconds(1)) {
-      print(now);
-      if (terminal_) std::fputc('\n', stderr);
-    }
-  }
-
- private:
-  using Clock = std::chrono::steady_clock;
-
-  void print(Clock::time_point now) const {
-    const double elapsed = std::chrono::duration<double>(now - start_).count();
-    const auto done = static_cast<double>(done_);
-    const auto count = static_cast<double>(count_);
-    const double share = count_ == 0 ? 1.0 : done / count;
-    std::string line = "  " + label_ + ": " + std::to_string(done_) + " of " +
-                       std::to_string(count_) + ", " +
-                       std::to_string(static_cast<int>(100.0 * share)) + " %, " +
-                       std::to_string(static_cast<int>(elapsed)) + " s";
-    if (done_ > 0 && done_ < count_) {
-      line += ", about " + std::to_string(static_cast<int>(elapsed * (1.0 / share - 1.0) + 0.5)) +
-              " s left";
-    }
-    if (terminal_) {
-      std::fprintf(stderr, "\r%s\x1b[K", line.c_str());
-    } else {
-      std::fprintf(stderr, "%s\n", line.c_str());
-    }
-    std::fflush(stderr);
-  }
-
-  std::string label_;
-  std::size_t count_;
-  std::size_t done_ = 0;
-  Clock::time_point start_;
-  Clock::time_point last_;
-  std::mutex mutex_;
-  const bool terminal_ = isatty(STDERR_FILENO) != 0;
-};
-
-/// { job(0), .., job(count - 1) }, computed on `threads` threads (0: as many as there are cores).
+/// { job(0), .., job(count - 1) }, computed by for_each_parallel.
 ///
 /// The result does not depend on the number of threads as long as a job depends on its index alone:
-/// make its random seed from the index. The first exception (by index) is rethrown.
+/// make its random seed from the index.
 template <class Job>
 [[nodiscard]] auto run_parallel(std::string_view label, std::size_t count, Job job,
                                 unsigned threads = 0) {
   using Result = std::invoke_result_t<Job&, std::size_t>;
   static_assert(std::default_initializable<Result>, "a job returns a value that has a default");
   static_assert(!std::same_as<Result, bool>, "std::vector<bool> is not safe to fill in parallel");
-
   std::vector<Result> results(count);
-  std::vector<std::exception_ptr> failures(count);
-  std::atomic<std::size_t> next = 0;
-  {
-    Progress progress(label, count);
-    const auto work = [&] {
-      for (std::size_t i = next++; i < count; i = next++) {
-        try {
-          results[i] = job(i);
-        } catch (...) {
-          failures[i] = std::current_exception();
-        }
-        progress.step();
-      }
-    };
-    if (threads == 0) threads = std::max(1U, std::thread::hardware_concurrency());
-    const std::size_t helpers = std::min<std::size_t>(threads, std::max<std::size_t>(count, 1)) - 1;
-    std::vector<std::jthread> pool;
-    for (std::size_t i = 0; i < helpers; ++i) pool.emplace_back(work);
-    work();
-  }
-  for (const auto& failure : failures) {
-    if (failure) std::rethrow_exception(failure);
-  }
+  for_each_parallel(
+      label, count, [&](std::size_t i) { results[i] = job(i); }, threads);
   return results;
 }
 

@@ -21,7 +21,6 @@
 #include <esokit/observer/reduced_order_eso.hpp>
 #include <esokit/observer/variable_time.hpp>
 
-#include "common/parallel.hpp"
 #include "control_practice/log_file.hpp"
 
 namespace practice {
@@ -58,7 +57,6 @@ LogEstimates run(const typename Observer::Config& config, const LogSettings& set
   Timed observer = *made;
   LogEstimates result;
   result.columns.resize(static_cast<std::size_t>(Observer::size));
-  esokit::examples::Progress progress("observer", y.size() / 10000 + 1);
   bool started = false;
   for (std::size_t k = 0; k < y.size(); ++k) {
     if (!started) {
@@ -85,7 +83,6 @@ LogEstimates run(const typename Observer::Config& config, const LogSettings& set
       result.columns[static_cast<std::size_t>(r)].push_back(
           started ? estimate(r) : std::numeric_limits<double>::quiet_NaN());
     }
-    if (k % 10000 == 0) progress.step();
   }
   return result;
 }

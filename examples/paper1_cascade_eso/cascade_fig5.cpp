@@ -27,7 +27,7 @@
 #include <string>
 #include <vector>
 
-#include "common/contour.hpp"
+#include "common/curve.hpp"
 #include "common/parallel.hpp"
 #include "common/report.hpp"
 #include "common/statistics.hpp"
