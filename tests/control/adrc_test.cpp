@@ -541,7 +541,7 @@ TEST(Adrc, BadConfigIsRefusedByName) {
             }),
             "missing.input");
   EXPECT_EQ(field([](auto& c) { c.missing.most = -1; }), "missing.most");
-  EXPECT_EQ(field([](auto& c) { c.missing.most = 65001; }), "missing.most");
+  EXPECT_EQ(field([](auto& c) { c.missing.most = 65535; }), "missing.most");
   EXPECT_EQ(field([](auto& c) { c.measurement_divider = 0; }), "measurement_divider");
   EXPECT_EQ(field([](auto& c) { c.measurement_divider = 101; }), "measurement_divider");
 

@@ -156,6 +156,8 @@ class Adrc {
   /// Takes over a plant that stands at y under u. @param reference matters to the error-based form
   /// @return ok, or input_rejected or state_rejected where u or y is not finite: nothing changes
   StepStatus start(S y, S u, S reference) noexcept {
+    // One by one: told not to expect NaN, a compiler makes zero of y - y.
+    if (!is_finite(y) || !is_finite(reference)) return StepStatus::state_rejected;
     return loop_.start(measured(y, reference), u);
   }
 
@@ -252,10 +254,17 @@ class Adrc {
   [[nodiscard]] ESOKIT_INLINE S measured(S y, S reference) const noexcept {
     if constexpr (!error_based) {
       return y;
-    } else if constexpr (wraps) {
-      return observer().wrap(reference - y);
     } else {
-      return reference - y;
+      S e = reference - y;
+#if defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
+      // Of one and the same y the compiler makes zero, whatever it is.
+      if (!is_finite(y)) e = y;
+#endif
+      if constexpr (wraps) {
+        return observer().wrap(e);
+      } else {
+        return e;
+      }
     }
   }
 

@@ -47,6 +47,10 @@ class AdrcLaw {
       for (int i = 0; i < Order; ++i) {
         const S& gain = (*config.gains)[static_cast<std::size_t>(i)];
         if (auto ok = check_finite("gains", gain, i); !ok) return ok.error();
+        if (!all(is_finite(S(gain * law.inverse_input_gain_)))) {
+          return Error<S>{"gains", gain, "divided by input_gain is more than the scalar can hold",
+                          i};
+        }
       }
       law.gains_ = *config.gains;
       return law;
@@ -65,6 +69,12 @@ class AdrcLaw {
                                       law.gains_[0], "gives a gain that the scalar cannot hold");
         !ok) {
       return ok.error();
+    }
+    for (const S& gain : law.gains_) {
+      if (!all(is_finite(S(gain * law.inverse_input_gain_)))) {
+        return Error<S>{"controller_bandwidth", config.controller_bandwidth,
+                        "gives a gain that divided by input_gain is more than the scalar can hold"};
+      }
     }
     return law;
   }

@@ -23,7 +23,8 @@ struct StartHold {
 /// What happens when measurements stay away (or are NaN).
 template <PlainScalar S = double>
 struct MissingRule {
-  int most = 50;  ///< missing measurements in a row that the controller rides through
+  int most = 50;  ///< missing measurements in a row that the controller rides through, 0 up to
+                  ///< 65535 / measurement_divider - 1
   std::optional<S>
       input{};        ///< u from then on, reached within the rate limit; left out: the last u
   bool stay = false;  ///< true: until start(); false: a measurement ends it
@@ -90,12 +91,14 @@ class ControlLoop {
       return Error<S>{"measurement_divider", static_cast<S>(divider),
                       "must be 1 for an observer that regular gaps restart"};
     }
-    if (settings.missing.most < 0 || settings.missing.most > 65000 / divider) {
+    // The observer counts missing samples up to 65535.
+    const int most = 65535 / divider - 1;
+    if (settings.missing.most < 0 || settings.missing.most > most) {
       return Error<S>{"missing.most",
                       static_cast<S>(settings.missing.most),
-                      "must be 0 up to 65000 samples, that is",
+                      "must be 0 up to 65535 / measurement_divider - 1, that is",
                       -1,
-                      static_cast<S>(65000 / divider),
+                      static_cast<S>(most),
                       true};
     }
     return ControlLoop(observer, *limiter, settings, static_cast<std::uint32_t>(samples));
@@ -230,8 +233,9 @@ class ControlLoop {
         static_cast<std::uint16_t>((settings.missing.most + 1) * settings.measurement_divider);
     if constexpr (has_step_time) limits_ = settings.limits;
     set_mode(mode_);
-    // What stands at the actuator before the first step.
-    if (hold_samples > 0) limiter_.track(hold_input_);
+    // What stands at the actuator before the first step; of an input left out what is within the
+    // limits.
+    if (hold_samples > 0) limiter_.track(limiter_.within(hold_input_));
   }
 
   static Check<S> check_within(const char* field, const S& input, const Limits<S>& limits) {

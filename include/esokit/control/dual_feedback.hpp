@@ -174,14 +174,16 @@ class DualFeedbackAdrc {
 
   /// New settings while running: starts in the steady state of the last measurement and u, as a
   /// filter's state says nothing to another filter. No bump at rest. A refused config changes
-  /// nothing.
+  /// nothing, nor does any where the scalar cannot hold that steady state.
   Check<S> retune(const Config& config) {
     auto fresh = make(config);
     if (!fresh) return fresh.error();
-    const S u = output();
-    const S y = measured_;
+    if (fresh->start(measured_, output()) != StepStatus::ok) {
+      return Error<S>{"measurement", measured_,
+                      "of the last sample has no steady state that the scalar can hold"};
+    }
+    fresh->status_ = status_;
     *this = *fresh;
-    (void)start(y, u);
     return {};
   }
 

@@ -5,6 +5,7 @@
 #include <esokit/core/type_tag.hpp>
 #include <esokit/design/check.hpp>
 #include <esokit/observer/step_status.hpp>
+#include <limits>
 
 namespace esokit {
 
@@ -14,6 +15,8 @@ namespace esokit {
 /// The sum of the increments is u but for a constant that nobody need know: the observer takes it
 /// for disturbance. Limits hold for the sum (counted from `start`), the rate limit for an
 /// increment. Where the actuator reports what it made of the last increment, nothing winds up.
+/// An increment is the difference of two u: a limit beyond half of what the scalar holds, as one
+/// that is left out, counts as that half, and a report that leads beyond it as none.
 /// @tparam Controller such as Adrc
 template <class Controller>
 class Incremental {
@@ -24,7 +27,7 @@ class Incremental {
 
   /// As Controller::make.
   static Expected<Incremental, Error<S>> make(const Config& config) {
-    auto controller = Controller::make(config);
+    auto controller = Controller::make(halved(config));
     if (!controller) return controller.error();
     return Incremental(*controller);
   }
@@ -44,25 +47,39 @@ class Incremental {
   S update(const S& y, const Reference& reference, const S& increment_applied) noexcept {
     const S missed = increment_applied - increment_;
     const S reported = controller_.output() + missed;
-    const S before = is_finite(missed) ? reported : controller_.output();
+    const bool good = is_finite(reported) && within_half(reported);
+    const S before = good ? reported : controller_.output();
     increment_ = controller_.update(y, reference, before) - before;
     return increment_;
   }
 
   /// Takes over a plant that stands at y; u counts from `u`, zero if nobody knows.
-  /// @return as Controller::start
+  /// @return as Controller::start; input_rejected beyond half of what the scalar holds
   StepStatus start(const S& y, const S& u = S(0)) noexcept {
-    increment_ = S(0);
-    return controller_.start(y, u);
+    if (!is_finite(u) || !within_half(u)) return StepStatus::input_rejected;
+    const StepStatus status = controller_.start(y, u);
+    if (status == StepStatus::ok) increment_ = S(0);
+    return status;
   }
 
   /// As Controller::retune.
-  Check<S> retune(const Config& config) { return controller_.retune(config); }
+  Check<S> retune(const Config& config) { return controller_.retune(halved(config)); }
 
   /// The controller, whose output is the sum of the increments.
   [[nodiscard]] const Controller& controller() const noexcept { return controller_; }
 
  private:
+  static constexpr S half = std::numeric_limits<S>::max() / S(2);
+
+  static constexpr bool within_half(const S& u) noexcept { return !(u < -half) && !(u > half); }
+
+  static Config halved(Config config) {
+    auto& limits = config.limits;
+    if (is_finite(limits.lower) && limits.lower < -half) limits.lower = -half;
+    if (is_finite(limits.upper) && limits.upper > half) limits.upper = half;
+    return config;
+  }
+
   explicit Incremental(const Controller& controller) noexcept : controller_(controller) {}
 
   Controller controller_;

@@ -53,6 +53,11 @@ class Limiter {
     return select(high_ < above, high_, above);
   }
 
+  /// `u` within the magnitude limits, whatever the rate.
+  [[nodiscard]] constexpr S within(const S& u) const noexcept {
+    return min(max(u, lower_), upper_);
+  }
+
   /// Tells what the actuator really held; the rate limit goes on from there.
   constexpr void track(const S& output) noexcept {
     last_ = output;
@@ -81,14 +86,11 @@ class Limiter {
         low_(limits.lower),
         high_(limits.upper),
         rate_limited_(!all(limits.rate >= std::numeric_limits<S>::max()) && all(is_finite(step_))) {
-    track(clamp_magnitude(S(0.0)));
+    track(within(S(0.0)));
   }
 
   static constexpr S min(const S& a, const S& b) noexcept { return select(b < a, b, a); }
   static constexpr S max(const S& a, const S& b) noexcept { return select(a < b, b, a); }
-  [[nodiscard]] constexpr S clamp_magnitude(const S& u) const noexcept {
-    return min(max(u, lower_), upper_);
-  }
 
   S lower_;
   S upper_;

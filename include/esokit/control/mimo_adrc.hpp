@@ -129,6 +129,10 @@ class MimoAdrc {
     const Output drive = config.input_matrix * u;
     const Output moved = input_matrix_ * u - drive;
     Channels observers = observers_;
+    // Of a u that was reported absurdly large the scalar may not hold what it is to explain.
+    for (int i = 0; i < channels; ++i) {
+      if (!is_finite(moved(i)) || !is_finite(drive(i))) return too_large(u(i));
+    }
     Check<S> outcome;
     detail::unroll<channels>([&](auto i) {
       constexpr auto channel = static_cast<std::size_t>(i);
@@ -137,7 +141,9 @@ class MimoAdrc {
       auto settings = std::get<channel>(config.observers);
       chain_config(settings).input_gain = S(1);
       if (outcome) outcome = observer.retune(settings);
-      observer.shift_disturbance(moved(row));
+      if (outcome && observer.shift_disturbance(moved(row)) != StepStatus::ok) {
+        outcome = too_large(u(row));
+      }
       // Of what is under way to the plant the new B0 makes another drive.
       if constexpr (requires { observer.fill_input(S()); }) {
         if (moved(row) < S(0) || moved(row) > S(0)) observer.fill_input(drive(row));
@@ -178,6 +184,12 @@ class MimoAdrc {
         limiters_(limiters),
         input_matrix_(input_matrix),
         inverse_(inverse) {}
+
+  static Error<S> too_large(const S& u) {
+    return {"input_matrix", u,
+            "makes of the u that holds now (the value here) a disturbance that "
+            "the scalar cannot hold"};
+  }
 
   Output put_out(const Output& wanted) noexcept {
     Output u;

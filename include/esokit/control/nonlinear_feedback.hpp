@@ -43,7 +43,20 @@ class NonlinearFeedback {
         !ok) {
       return ok.error();
     }
-    return NonlinearFeedback(config, std::make_integer_sequence<int, Order>{});
+    const NonlinearFeedback law(config, std::make_integer_sequence<int, Order>{});
+    for (int i = 0; i < Order; ++i) {
+      const auto row = static_cast<std::size_t>(i);
+      // The steepest there is with a_i <= 1: within the linear piece.
+      const S slope = law.fal_[row].gain(S(0.0));
+      if (!all(is_finite(slope)) ||
+          !all(is_finite(S(config.gains[row] * slope * law.inverse_input_gain_)))) {
+        return Error<S>{"linear_widths", config.linear_widths[row],
+                        "with this exponent, gain and input_gain gives a slope that the scalar "
+                        "cannot hold",
+                        i};
+      }
+    }
+    return law;
   }
 
   /// v = sum_i k_i fal(r_i - z_i), unit of y^(n).

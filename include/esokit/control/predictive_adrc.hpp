@@ -262,6 +262,7 @@ class PredictiveAdrc {
   PredictiveAdrc(const Observer& observer, const AdrcLaw<order, S>& law, const Limiter<S>& limiter,
                  std::uint32_t hold) noexcept
       : limiter_(limiter),
+        output_(limiter.last()),
         observer_(observer),
         law_(law),
         rate_(S(1.0) / observer.sample_time()),
@@ -387,8 +388,9 @@ class PredictiveAdrc {
     }
     if (hold_left_ > 0) [[unlikely]]
       settle_for(S(0.0));
+    // What is not finite in here would be NaN with a measurement, and pass through the limits.
     const auto good = is_finite(blind_);
-    if (!all(good)) [[unlikely]]
+    if (!all(good) || !all(is_finite(offset_)) || !all(is_finite(slope_))) [[unlikely]]
       settle_for(select(good, blind_, limiter_.last()));
   }
 

@@ -38,8 +38,9 @@ struct AdrcTuning {
   bool exact = true;  ///< false: no ADRC has these gains; K_p and K_i are met, K_d is the nearest
 };
 
-/// Gains of the PI (Order 1) or PID (Order 2) that the ADRC is. Always exists.
-/// @return error for an input gain of zero, or a bandwidth that is not positive
+/// Gains of the PI (Order 1) or PID (Order 2) that the ADRC is.
+/// @return error for an input gain of zero, a bandwidth that is not positive, or gains that the
+///         scalar cannot hold
 template <int Order, PlainScalar S>
 Expected<PidGains<S>, Error<S>> pid_from_adrc(const AdrcTuning<S>& tuning) {
   static_assert(Order == 1 || Order == 2, "esokit: PID is for orders 1 and 2");
@@ -50,6 +51,8 @@ Expected<PidGains<S>, Error<S>> pid_from_adrc(const AdrcTuning<S>& tuning) {
   if (auto ok = check_positive("observer_bandwidth", tuning.observer_bandwidth); !ok) {
     return ok.error();
   }
+  constexpr const char* too_far =
+      "with controller_bandwidth and input_gain gives a PID that the scalar cannot hold";
   const S c = tuning.controller_bandwidth;
   const S o = tuning.observer_bandwidth;
   PidGains<S> pid;
@@ -66,6 +69,18 @@ Expected<PidGains<S>, Error<S>> pid_from_adrc(const AdrcTuning<S>& tuning) {
     pid.derivative = front * (S(3) * c * c + S(6) * c * o + o * o);
     pid.filter_time = (S(3) * o + S(2) * c) / m;
     pid.filter_time_squared = S(1) / m;
+    if (auto ok = check_representable("observer_bandwidth", o, pid.derivative, too_far); !ok) {
+      return ok.error();
+    }
+    if (auto ok = check_representable("observer_bandwidth", o, pid.filter_time_squared, too_far);
+        !ok) {
+      return ok.error();
+    }
+  }
+  for (const S& result : {pid.proportional, pid.integral, pid.filter_time}) {
+    if (auto ok = check_representable("observer_bandwidth", o, result, too_far); !ok) {
+      return ok.error();
+    }
   }
   return pid;
 }

@@ -145,7 +145,11 @@ class ExtendedStateFilter
   Check<S> retune(const Config& config) {
     auto fresh = make(config);
     if (!fresh) return fresh.error();
-    fresh->law().continue_from(law(), S(fresh->sample_time() / this->sample_time()));
+    if (!fresh->law().continue_from(law(), S(fresh->sample_time() / this->sample_time()))) {
+      return Error<S>{"measurement_variance", config.measurement_variance,
+                      "is too small, or sample_time too far from the one before, for the present "
+                      "covariance to be carried over: measure first"};
+    }
     if (auto ok = this->adopt(*fresh); !ok) return ok;
     model_ = fresh->model_;
     outlier_threshold_ = fresh->outlier_threshold_;
@@ -350,8 +354,9 @@ class ExtendedStateFilter
     for (int i = 0; i < N; ++i) {
       if (!all(p(i, i) > S(0.0))) continue;
       // Far enough from both ends for what the recursion makes of it.
-      const S root = detail::smallest_normal<S>() / detail::rounding<S>();
-      if (!all(is_finite(q(i, i))) || !all(q(i, i) > root) || !all(q(i, i) * root < S(1e-6))) {
+      const S least = detail::smallest_normal<S>() / detail::rounding<S>();
+      if (!all(is_finite(q(i, i))) || !all(q(i, i) > least) ||
+          !all(q(i, i) < detail::largest_variance<S>())) {
         return Error<S>{field, p(i, i),
                         "in the scaling T^2r / r!^2 and divided by R is a variance that the scalar "
                         "cannot hold",

@@ -88,15 +88,19 @@ class KnownModel : public Observer {
   Check<S> retune(const Config& config) {
     auto fresh = make(config);
     if (!fresh) return fresh.error();
-    const S known = known_part();
+    KnownModel next = *this;
     const S fed = Observer::applied_input() - applied_input_;
     const S gain_change = this->input_gain() - fresh->input_gain();
-    if (auto ok = Observer::retune(config.observer); !ok) return ok;
-    model_ = config.model;
-    inverse_gain_ = fresh->inverse_gain_;
+    if (auto ok = next.Observer::retune(config.observer); !ok) return ok;
+    next.model_ = config.model;
+    next.inverse_gain_ = fresh->inverse_gain_;
     // The observer moved (b0_old - b0_new) times all that drove it; fbar's share is not b0's.
-    const S moved = known - known_part() - gain_change * fed;
-    if (moved < S(0) || moved > S(0)) Observer::shift_disturbance(moved);
+    const S moved = known_part() - next.known_part() - gain_change * fed;
+    const bool some = !is_finite(moved) || moved < S(0) || moved > S(0);
+    if (some && next.Observer::shift_disturbance(moved) != StepStatus::ok) {
+      return Error<S>{"model", moved, "would make the estimate not finite"};
+    }
+    *this = next;
     return {};
   }
 
@@ -130,7 +134,7 @@ class KnownModel : public Observer {
   /// (y, .., y^(n-1), fbar + d, d', .., d^(m-1)), N x 1, physical units.
   [[nodiscard]] Estimate estimate() const noexcept {
     Estimate state = Observer::estimate();
-    state(order) = state(order) + model_(state);
+    state(order) = state(order) + known_part(state);
     return state;
   }
 
@@ -152,8 +156,9 @@ class KnownModel : public Observer {
   /// dhat without what the model explains, unit of y^(n).
   [[nodiscard]] S residual_disturbance() const noexcept { return Observer::total_disturbance(); }
 
-  /// fbar at the present estimate, unit of y^(n).
-  [[nodiscard]] S known_part() const noexcept { return model_(Observer::estimate()); }
+  /// fbar at the present estimate, unit of y^(n); zero where it, or fbar + dhat, is not finite: a
+  /// model explains nothing there.
+  [[nodiscard]] S known_part() const noexcept { return known_part(Observer::estimate()); }
 
   /// Input that the last step used, without the model's share.
   [[nodiscard]] const S& applied_input() const noexcept { return applied_input_; }
@@ -161,6 +166,12 @@ class KnownModel : public Observer {
  private:
   KnownModel(const Observer& observer, const Model& model) noexcept
       : Observer(observer), model_(model), inverse_gain_(S(1) / observer.input_gain()) {}
+
+  /// fbar at an estimate whose row n is dhat.
+  [[nodiscard]] S known_part(const Estimate& state) const noexcept {
+    const S known = model_(state);
+    return is_finite(known + state(order)) ? known : S(0);
+  }
 
   /// u, or the last good one, with the model's share.
   S accepted(const S& u) noexcept {

@@ -297,17 +297,20 @@ class PredictorCorrector {
 
   /// Moves the origin of y: every level's z_1 grows by `offset`. For periodic quantities, whose
   /// estimate would otherwise run away with the turns.
-  /// An offset that is not finite changes nothing.
-  constexpr void shift_output(const S& offset) noexcept {
-    const S finite = select(is_finite(offset), offset, S(0.0));
-    for (auto& state : states_) state[0] = state[0] + finite;
+  /// @return ok, or state_rejected where the offset, or what it would make of the estimate, is not
+  ///         finite: nothing changes
+  constexpr StepStatus shift_output(const S& offset) noexcept {
+    LevelStates next = states_;
+    for (auto& state : next) state[0] = state[0] + offset;
+    return shift_to(next);
   }
 
   /// Adds `offset` (unit of y^(n)) to dhat, as a change of what else explains y^(n) asks for.
-  /// An offset that is not finite changes nothing.
-  constexpr void shift_disturbance(const S& offset) noexcept {
-    const S finite = select(is_finite(offset), offset, S(0.0));
-    states_[0][Order] = states_[0][Order] + Chain::scaled_input_gain(finite, sample_time());
+  /// @return as `shift_output`
+  constexpr StepStatus shift_disturbance(const S& offset) noexcept {
+    LevelStates next = states_;
+    next[0][Order] = next[0][Order] + Chain::scaled_input_gain(offset, sample_time());
+    return shift_to(next);
   }
 
  protected:
@@ -382,6 +385,16 @@ class PredictorCorrector {
     });
   }
 
+  constexpr StepStatus shift_to(const LevelStates& next) noexcept {
+    const auto good = is_finite(probe(next));
+    for (std::size_t i = 0; i < Levels; ++i) {
+      for (std::size_t r = 0; r < size; ++r) {
+        states_[i][r] = select(good, next[i][r], states_[i][r]);
+      }
+    }
+    return all(good) ? StepStatus::ok : StepStatus::state_rejected;
+  }
+
   ESOKIT_INLINE constexpr void advance_laws() noexcept {
     if constexpr (gain_law_traits<Law>.advances) {
       detail::unroll<Levels>([&](auto i) ESOKIT_INLINE_LAMBDA { std::get<i>(laws_).advance(); });
@@ -431,16 +444,21 @@ class PredictorCorrector {
     return state;
   }
 
-  /// Finite only if all scaled states and the estimates in physical units are; see
-  /// ScaledChain::finite_probe. The plant states of lower levels need no probe of their own: they
-  /// are added, and infinities do not cancel.
+  /// Finite only if all scaled states and the estimates of all levels in physical units are; see
+  /// ScaledChain::finite_probe. Of the sum of the levels' magnitudes, which no sum of some of their
+  /// disturbances exceeds.
   [[nodiscard]] ESOKIT_INLINE constexpr S probe(const LevelStates& states) const noexcept {
-    S sum = Chain::finite_probe(up_to_level<Levels - 1>(states), rate_);
-    detail::unroll<Levels - 1>([&](auto i) ESOKIT_INLINE_LAMBDA {
-      detail::unroll<Order>(
-          [&](auto r) ESOKIT_INLINE_LAMBDA { sum = sum + std::get<r>(std::get<i>(states)); });
-    });
-    return sum;
+    typename Chain::State sum = std::get<Levels - 1>(states);
+    if constexpr (Levels > 1) {
+      detail::unroll<size>([&](auto r) ESOKIT_INLINE_LAMBDA {
+        S& all = std::get<r>(sum);
+        all = detail::absolute(all);
+        detail::unroll<Levels - 1>([&](auto i) ESOKIT_INLINE_LAMBDA {
+          all = all + detail::absolute(std::get<r>(std::get<i>(states)));
+        });
+      });
+    }
+    return Chain::finite_probe(sum, rate_);
   }
 
   [[nodiscard]] constexpr decltype(auto) law_gain(const Law& law, const S& innovation,

@@ -53,6 +53,17 @@ struct RiccatiSettings {
   RiccatiMode mode = RiccatiMode::recursive;  ///< how the gain is obtained
 };
 
+namespace detail {
+
+/// What a variance may be, in the unit of the law, for all that the recursion makes of it to fit
+/// the scalar.
+template <Scalar S>
+constexpr S largest_variance() noexcept {
+  return S(1e-6) * (rounding<S>() / smallest_normal<S>());
+}
+
+}  // namespace detail
+
 /// Gain law of ExtendedStateFilter. The gain is known before the measurement; a missing sample is
 /// `advance` alone, which lets the covariance grow, so no gain for gaps is needed.
 ///
@@ -186,14 +197,18 @@ class RiccatiGain {
   /// squared, not negative
   constexpr void set_measurement_variance(const S& variance) noexcept {
     note(since_ & (corrected | gapped));
-    current_measurement_ = variance / unit_;
+    // No sum with it may overflow, in the unit of y squared neither; so large it says nothing of y.
+    const S most = S(1.0) / (S(16.0) * detail::smallest_normal<S>());
+    const S held = select(variance < most, variance, most) / unit_;
+    current_measurement_ = select(held < most, held, most);
     set_gain();
   }
 
   /// Goes on from the covariance of a law with other settings. @param time_ratio T_new / T_old
-  void continue_from(const RiccatiGain& other, const S& time_ratio) noexcept {
+  /// @return false if that covariance is not one that the scalar holds in this law's unit
+  bool continue_from(const RiccatiGain& other, const S& time_ratio) noexcept {
     // From one limit to the next.
-    if (mode_ == RiccatiMode::frozen && other.stands()) return;
+    if (mode_ == RiccatiMode::frozen && other.stands()) return true;
     now_.factor = other.now_.factor;
     now_.factor.rescale(time_ratio, S(other.unit_ / unit_));
     if (rule_ == InflationRule::adaptive) set_inflation(other.now_.inflation);
@@ -203,6 +218,14 @@ class RiccatiGain {
       now_.share = other.now_.share;
       now_.rest = other.now_.rest;
     }
+    for (int i = 0; i < Size; ++i) {
+      if (!all(is_finite(now_.gain[index(i)])) ||
+          !all(now_.factor.variance(i) < detail::largest_variance<S>()) ||
+          !all(is_finite(now_.factor.variance(i)))) {
+        return false;
+      }
+    }
+    return true;
   }
 
   /// Bound of the covariance of the present estimate's error, N x N, scaled: of the prediction
@@ -336,14 +359,15 @@ class RiccatiGain {
     const S noise = current_measurement_ * now_.shrink;
     const S variance = now_.factor.variance(0);
     const S sum = variance + noise;
-    // P- and R both zero: the prediction is exact, there is nothing to correct.
+    // P- and R both zero: the prediction is exact, there is nothing to correct. Below the normal
+    // numbers the inverse would overflow.
     if constexpr (PlainScalar<S>) {
-      const bool some = sum > S(0.0);
+      const bool some = sum >= detail::smallest_normal<S>();
       const S inverse = S(1.0) / (some ? sum : S(1.0));
       now_.share = variance * inverse;
       now_.rest = some ? noise * inverse : S(1.0);
     } else {
-      const auto some = sum > S(0.0);
+      const auto some = sum >= detail::smallest_normal<S>();
       const S inverse = S(1.0) / select(some, sum, S(1.0));
       now_.share = variance * inverse;
       now_.rest = select(some, S(noise * inverse), S(1.0));

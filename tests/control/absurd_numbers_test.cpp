@@ -1,0 +1,316 @@
+// Absurd but finite numbers at the controllers: whatever comes in, u is finite and within its
+// limits, and good samples lead back.
+#include <gtest/gtest.h>
+
+#include <esokit/control/adrc.hpp>
+#include <esokit/control/disturbance_compensator.hpp>
+#include <esokit/control/dual_feedback.hpp>
+#include <esokit/control/incremental.hpp>
+#include <esokit/control/mimo_adrc.hpp>
+#include <esokit/control/nonlinear_feedback.hpp>
+#include <esokit/control/predictive_adrc.hpp>
+#include <esokit/design/pid_conversion.hpp>
+#include <esokit/observer/cascade_eso.hpp>
+#include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/nonlinear_eso.hpp>
+#include <limits>
+#include <string>
+#include <support/numbers.hpp>
+
+namespace esokit_test {
+namespace {
+
+using esokit::Adrc;
+using esokit::CascadeEso;
+using esokit::Limits;
+using esokit::LinearEso;
+using esokit::LoopMode;
+using esokit::PredictiveAdrc;
+using esokit::StepStatus;
+
+template <class Observer>
+typename Observer::Config observer_config() {
+  using S = typename Observer::scalar_type;
+  typename Observer::Config config{};
+  config.observer_bandwidth = S(50);
+  config.input_gain = S(2);
+  config.sample_time = static_cast<S>(1e-3);
+  if constexpr (requires { config.bandwidth_factor; }) config.bandwidth_factor = S(2);
+  return config;
+}
+
+template <class Controller>
+typename Controller::Config config() {
+  typename Controller::Config settings{};
+  using Observer = std::remove_cvref_t<decltype(Controller::make(settings)->observer())>;
+  settings.observer = observer_config<Observer>();
+  settings.controller_bandwidth = 10;
+  return settings;
+}
+
+// ---- missing.most
+
+/// The largest that is accepted is ridden through, of every divider; one more is refused.
+TEST(MissingMost, TheLargestIsCounted) {
+  for (const int divider : {1, 2, 559, 560, 1000}) {
+    SCOPED_TRACE(divider);
+    auto settings = config<Adrc<LinearEso<2>>>();
+    settings.observer.max_gap = 65000;
+    settings.measurement_divider = divider;
+    settings.missing.most = 65535 / divider;
+    const auto refused = Adrc<LinearEso<2>>::make(settings);
+    ASSERT_FALSE(refused.has_value());
+    EXPECT_STREQ(refused.error().field, "missing.most");
+    EXPECT_STREQ(refused.error().rule, "must be 0 up to 65535 / measurement_divider - 1, that is");
+    EXPECT_EQ(refused.error().limit, 65535 / divider - 1);
+    --settings.missing.most;
+    auto controller = Adrc<LinearEso<2>>::make(settings).value();
+    controller.update(0, 0.0);
+    for (int k = 1; k <= settings.missing.most * divider; ++k) {
+      controller.update(hidden_nan<double>(), 0.0);
+      ASSERT_EQ(controller.mode(), LoopMode::running) << k;
+    }
+    for (int k = 0; k < divider; ++k) controller.update_without_measurement(0.0);
+    EXPECT_EQ(controller.mode(), LoopMode::safe);
+  }
+}
+
+/// With nothing missing nothing is safe.
+TEST(MissingMost, MeasurementsThatComeAreNotMissing) {
+  auto settings = config<Adrc<LinearEso<2>>>();
+  settings.observer.max_gap = 65000;
+  settings.measurement_divider = 1000;
+  settings.missing.most = 64;
+  auto controller = Adrc<LinearEso<2>>::make(settings).value();
+  for (int k = 0; k < 5000; ++k) {
+    controller.update(0, 0.0);
+    ASSERT_EQ(controller.mode(), LoopMode::running) << k;
+  }
+}
+
+// ---- output() after make
+
+template <class Controller>
+void expect_output_within_limits(typename Controller::Config settings) {
+  for (const auto& [lower, upper] : {std::pair{1.0, 2.0}, std::pair{-2.0, -1.0}}) {
+    settings.limits = {.lower = lower, .upper = upper, .rate = 100};
+    const auto made = Controller::make(settings);
+    ASSERT_TRUE(made.has_value());
+    const double u = made->output();
+    EXPECT_GE(u, lower);
+    EXPECT_LE(u, upper);
+  }
+}
+
+/// Limits that exclude zero, with and without a hold whose input is left out.
+TEST(OutputAfterMake, IsWithinTheLimits) {
+  expect_output_within_limits<Adrc<LinearEso<2>>>(config<Adrc<LinearEso<2>>>());
+  auto held = config<Adrc<LinearEso<2>>>();
+  held.hold.time = 0.1;
+  expect_output_within_limits<Adrc<LinearEso<2>>>(held);
+  expect_output_within_limits<esokit::DisturbanceCompensator<LinearEso<2>>>(
+      {.observer = observer_config<LinearEso<2>>(), .hold = {.time = 0.1}});
+  expect_output_within_limits<PredictiveAdrc<LinearEso<2>>>(config<PredictiveAdrc<LinearEso<2>>>());
+  auto predictive = config<PredictiveAdrc<LinearEso<2>>>();
+  predictive.start_hold = 0.1;
+  expect_output_within_limits<PredictiveAdrc<LinearEso<2>>>(predictive);
+  expect_output_within_limits<esokit::DualFeedbackAdrc<2>>(
+      {.observer_bandwidth = 50, .controller_bandwidth = 10, .input_gain = 2, .sample_time = 1e-3});
+  using Mimo = esokit::MimoAdrc<LinearEso<1>>;
+  Mimo::Config mimo{.observers = {{.observer_bandwidth = 50, .sample_time = 1e-3}},
+                    .controller_bandwidths = {10}};
+  mimo.input_matrix << 2;
+  mimo.limits[0] = {.lower = 1, .upper = 2};
+  EXPECT_EQ(Mimo::make(mimo)->output()(0), 1);
+}
+
+// ---- PredictiveAdrc
+
+template <class Observer>
+void predictive_stays_within_limits() {
+  using S = typename Observer::scalar_type;
+  auto settings = config<PredictiveAdrc<Observer>>();
+  settings.limits = {.lower = S(-3), .upper = S(3)};
+  const S top = std::numeric_limits<S>::max();
+  for (const S absurd : {S(top / 340), S(-top / 340), S(top / 3), S(-top), std::sqrt(top)}) {
+    auto started = PredictiveAdrc<Observer>::make(settings).value();
+    (void)started.start(absurd, S(0));
+    auto corrupted = PredictiveAdrc<Observer>::make(settings).value();
+    for (int k = 0; k < 20000; ++k) {
+      const S y = k == 3 || k == 4 ? absurd : S(0);
+      for (const S u : {started.update(S(0), S(0)), corrupted.update(y, S(0))}) {
+        ASSERT_TRUE(esokit::is_finite(u)) << absurd << ", sample " << k;
+        ASSERT_LE(std::abs(u), S(3)) << absurd << ", sample " << k;
+      }
+    }
+    // All of it fades by exp(-omega_o T) a sample, what the scalar holds within 20000.
+    EXPECT_LT(std::abs(corrupted.observer().template estimate<0>()), S(1e-3)) << absurd;
+    EXPECT_LT(std::abs(started.observer().template estimate<0>()), S(1e-3)) << absurd;
+  }
+}
+
+TEST(PredictiveAdrcAbsurd, OutputStaysWithinLimits) {
+  predictive_stays_within_limits<LinearEso<2, float>>();
+  predictive_stays_within_limits<LinearEso<2, double>>();
+  predictive_stays_within_limits<LinearEso<1, float, 2>>();
+  predictive_stays_within_limits<CascadeEso<2, 3, float>>();
+  predictive_stays_within_limits<CascadeEso<2, 2, double>>();
+}
+
+// ---- Incremental
+
+TEST(IncrementalAbsurd, IncrementsAreFinite) {
+  using Incremental = esokit::Incremental<Adrc<LinearEso<2, float>>>;
+  const float top = std::numeric_limits<float>::max();
+  const auto settings = config<Adrc<LinearEso<2, float>>>();
+  auto controller = Incremental::make(settings).value();
+  float sum = 0;
+  for (int k = 0; k < 200; ++k) {
+    const float increment = controller.update(k % 2 == 0 ? 1e34f : -1e34f, 0.0f);
+    ASSERT_TRUE(esokit::is_finite(increment)) << k;
+    sum += increment;
+    ASSERT_TRUE(esokit::is_finite(sum)) << k;
+    const float reported = controller.update(0.0f, 0.0f, k % 3 == 0 ? top : -top);
+    ASSERT_TRUE(esokit::is_finite(reported)) << k;
+    ASSERT_LE(std::abs(controller.controller().output()), top / 2);
+    sum = controller.controller().output();
+  }
+  EXPECT_EQ(controller.start(0.0f, top), StepStatus::input_rejected);
+  EXPECT_EQ(controller.start(0.0f, -top), StepStatus::input_rejected);
+  EXPECT_EQ(controller.start(0.0f, top / 2), StepStatus::ok);
+  // Limits are not repaired where they are bad, nor by retune.
+  auto bad = settings;
+  bad.limits.lower = -hidden_infinity<float>();
+  EXPECT_FALSE(Incremental::make(bad).has_value());
+  EXPECT_FALSE(controller.retune(bad).has_value());
+  bad.limits.lower = hidden_nan<float>();
+  EXPECT_FALSE(Incremental::make(bad).has_value());
+  EXPECT_TRUE(controller.retune(settings).has_value());
+  EXPECT_EQ(controller.controller().output(), top / 2);
+}
+
+// ---- retune after absurd numbers
+
+TEST(DualFeedbackAbsurd, RetuneKeepsTheOutput) {
+  using Controller = esokit::DualFeedbackAdrc<2>;
+  Controller::Config settings{.observer_bandwidth = 50,
+                              .controller_bandwidth = 10,
+                              .input_gain = 2,
+                              .sample_time = 1e-3,
+                              .limits = {.lower = -3, .upper = 3}};
+  auto controller = Controller::make(settings).value();
+  controller.update(1e303, 0.0);
+  const double u = controller.output();
+  ASSERT_EQ(std::abs(u), 3);
+  settings.input_gain = 1e-4;
+  const auto refused = controller.retune(settings);
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_STREQ(refused.error().field, "measurement");
+  EXPECT_STREQ(refused.error().rule,
+               "of the last sample has no steady state that the scalar can hold");
+  EXPECT_EQ(refused.error().value, 1e303);
+  EXPECT_EQ(controller.output(), u);
+  // After a good sample it is taken.
+  controller.update(0.0, 0.0);
+  const double held = controller.output();
+  EXPECT_TRUE(controller.retune(settings).has_value());
+  EXPECT_EQ(controller.output(), held);
+}
+
+TEST(MimoAbsurd, RetuneIsRefusedOrFinite) {
+  using Mimo = esokit::MimoAdrc<LinearEso<1>, LinearEso<2>>;
+  Mimo::Config settings{.observers = {{.observer_bandwidth = 50, .sample_time = 1e-3},
+                                      {.observer_bandwidth = 50, .sample_time = 1e-3}},
+                        .controller_bandwidths = {10, 10}};
+  settings.input_matrix << 2, 1, 0, 2;
+  auto controller = Mimo::make(settings).value();
+  const double top = std::numeric_limits<double>::max();
+  (void)controller.update({0, 0}, {0, 0}, {0.9 * top, 0.9 * top});
+  for (const double scale : {1e-3, 1.0, 3.0}) {
+    auto changed = settings;
+    changed.input_matrix << 2 * scale, -scale, 0, -2 * scale;
+    auto tried = controller;
+    const auto outcome = tried.retune(changed);
+    for (int k = 0; k < 5; ++k) {
+      EXPECT_TRUE(tried.observer<0>().estimate().allFinite()) << scale;
+      EXPECT_TRUE(tried.observer<1>().estimate().allFinite()) << scale;
+      EXPECT_TRUE(tried.output().allFinite()) << scale;
+      if (!outcome) {
+        EXPECT_EQ(tried.observer<0>().estimate(), controller.observer<0>().estimate());
+        EXPECT_EQ(tried.observer<1>().estimate(), controller.observer<1>().estimate());
+        break;
+      }
+      tried.update({0, 0}, {0, 0});
+    }
+  }
+  // u is absurd, the change of B0 is not.
+  Mimo single = Mimo::make(settings).value();
+  (void)single.start({0, 0}, {1e307, 0});
+  auto changed = settings;
+  changed.input_matrix << 200, 1, 0, 2;
+  const auto refused = single.retune(changed);
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_STREQ(refused.error().field, "input_matrix");
+  EXPECT_STREQ(refused.error().rule,
+               "makes of the u that holds now (the value here) a disturbance that the scalar "
+               "cannot hold");
+  EXPECT_EQ(refused.error().value, 1e307);
+  EXPECT_DOUBLE_EQ(single.observer<0>().estimate()(1), -2e307);
+}
+
+// ---- make
+
+TEST(AbsurdSettings, LawsWhoseResultIsNotFiniteAreRefused) {
+  using Feedback = esokit::NonlinearFeedback<2, float>;
+  const auto refused =
+      Feedback::make({.exponents = {1, 0.01f}, .linear_widths = {1, 1e-44f}, .input_gain = 1});
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_STREQ(refused.error().field, "linear_widths");
+  EXPECT_EQ(refused.error().index, 1);
+  EXPECT_STREQ(refused.error().rule,
+               "with this exponent, gain and input_gain gives a slope that the scalar cannot hold");
+  EXPECT_TRUE(
+      Feedback::make({.exponents = {1, 0.01f}, .linear_widths = {1, 1e-30f}, .input_gain = 1}));
+  EXPECT_FALSE(Feedback::make({.gains = {1e30f, 1}, .input_gain = 1e-30f}));
+  EXPECT_TRUE(Feedback::make({.gains = {1e7f, 1}, .input_gain = 1e-30f}));
+
+  using Law = esokit::AdrcLaw<2, float>;
+  const auto gains = Law::make({.gains = {{1, 1e30f}}, .input_gain = 1e-30f});
+  ASSERT_FALSE(gains.has_value());
+  EXPECT_STREQ(gains.error().field, "gains");
+  EXPECT_STREQ(gains.error().rule, "divided by input_gain is more than the scalar can hold");
+  EXPECT_EQ(gains.error().index, 1);
+  EXPECT_TRUE(Law::make({.gains = {{1, 1e7f}}, .input_gain = 1e-30f}).has_value());
+  const auto bandwidth = Law::make({.controller_bandwidth = 1e6f, .input_gain = 1e-30f});
+  ASSERT_FALSE(bandwidth.has_value());
+  EXPECT_STREQ(bandwidth.error().field, "controller_bandwidth");
+  EXPECT_STREQ(bandwidth.error().rule,
+               "gives a gain that divided by input_gain is more than the scalar can hold");
+}
+
+TEST(AbsurdSettings, PidOfAnAdrcIsFinite) {
+  using esokit::pid_from_adrc;
+  for (const esokit::AdrcTuning<float> tuning :
+       {esokit::AdrcTuning<float>{1e-36f, 100, 1000}, {1, 1e20f, 1e20f}, {1, 1e-20f, 1e-20f}}) {
+    for (const auto& pid : {pid_from_adrc<1>(tuning), pid_from_adrc<2>(tuning)}) {
+      if (!pid) {
+        EXPECT_STREQ(pid.error().field, "observer_bandwidth");
+        EXPECT_STREQ(pid.error().rule,
+                     "with controller_bandwidth and input_gain gives a PID that the scalar cannot "
+                     "hold");
+        continue;
+      }
+      EXPECT_TRUE(esokit::is_finite(pid->proportional));
+      EXPECT_TRUE(esokit::is_finite(pid->integral));
+      EXPECT_TRUE(esokit::is_finite(pid->derivative));
+      EXPECT_TRUE(esokit::is_finite(pid->filter_time));
+      EXPECT_TRUE(esokit::is_finite(pid->filter_time_squared));
+      EXPECT_GT(pid->integral, 0);
+    }
+  }
+  EXPECT_FALSE(pid_from_adrc<2>(esokit::AdrcTuning<float>{1e-36f, 100, 1000}).has_value());
+  EXPECT_TRUE(pid_from_adrc<2>(esokit::AdrcTuning<float>{1e-3f, 100, 1000}).has_value());
+}
+
+}  // namespace
+}  // namespace esokit_test
