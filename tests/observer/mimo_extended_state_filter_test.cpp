@@ -374,6 +374,130 @@ TEST(MimoExtendedStateFilter, refuses_bad_configs_by_name) {
   });
 }
 
+// ---- absurd numbers, long gaps
+
+using Pair = MimoExtendedStateFilter<ChainOrders<2, 1>, 2, float>;
+
+Pair::Config pair_config() {
+  Pair::Config config;
+  config.input_matrix << 2, 0, 1, 1;
+  config.sample_time = 1e-3f;
+  config.measurement_covariance << 1e-6f, 0, 0, 1e-6f;
+  config.disturbance_bounds = {0, 0, 10, 0, 10};
+  config.initial_covariance.diagonal().setConstant(100);
+  config.inflation = 0.2f;
+  return config;
+}
+
+/// Largest y for which d can be told is 1e38 T^2 / k: more must not come in, and of the other
+/// channel nothing is lost.
+TEST(MimoExtendedStateFilter, absurd_measurements_are_rejected_alone) {
+  for (const float absurd : {1e34f, -1e34f, 3e38f, -3e38f}) {
+    for (const int channel : {0, 1}) {
+      auto filter = Pair::make(pair_config()).value();
+      Eigen::Vector2f y(0.25f, -0.5f);
+      for (int k = 0; k < 50; ++k) filter.update(y, Eigen::Vector2f::Zero());
+      Eigen::Vector2f bad = y;
+      bad(channel) = absurd;
+      for (int k = 0; k < 3; ++k) {
+        const StepStatus status = filter.update(bad, Eigen::Vector2f::Zero());
+        ASSERT_TRUE(filter.estimate().allFinite()) << absurd;
+        if (status != StepStatus::ok) {
+          EXPECT_EQ(status, StepStatus::measurement_rejected);
+          EXPECT_EQ(filter.missed(channel), k + 1);
+          EXPECT_EQ(filter.missed(1 - channel), 0);
+        }
+      }
+      for (int k = 0; k < 3000; ++k) filter.update(y, Eigen::Vector2f::Zero());
+      EXPECT_NEAR(filter.estimate()(0), 0.25f, 1e-3f) << absurd << ' ' << channel;
+      EXPECT_NEAR(filter.estimate()(3), -0.5f, 1e-3f) << absurd << ' ' << channel;
+    }
+  }
+}
+
+/// An absurd but finite u leaves states that no good y corrects, or that cannot be predicted.
+TEST(MimoExtendedStateFilter, absurd_inputs_have_a_way_back) {
+  for (const float absurd : {1e30f, 1e38f, 3e38f, -3e38f}) {
+    auto filter = Pair::make(pair_config()).value();
+    for (int k = 0; k < 6; ++k) {
+      filter.update(Eigen::Vector2f(0.25f, -0.5f), Eigen::Vector2f(absurd, absurd));
+      ASSERT_TRUE(filter.estimate().allFinite()) << absurd;
+    }
+    for (int k = 0; k < 3000; ++k) {
+      filter.update(Eigen::Vector2f(0.25f, -0.5f), Eigen::Vector2f::Zero());
+    }
+    EXPECT_NEAR(filter.estimate()(0), 0.25f, 1e-3f) << absurd;
+    EXPECT_NEAR(filter.estimate()(3), -0.5f, 1e-3f) << absurd;
+  }
+}
+
+/// One channel, both, and longer than max_gap: the covariance stays finite meanwhile.
+TEST(MimoExtendedStateFilter, long_gaps_restart_the_chain) {
+  for (const bool frozen : {false, true}) {
+    for (const int gap : {20, 21, 5000}) {
+      auto config = pair_config();
+      config.max_gap = 20;
+      if (frozen) config.mode = RiccatiMode::frozen;
+      auto filter = Pair::make(config).value();
+      auto both = filter;
+      const Eigen::Vector2f y(0.25f, -0.5f);
+      for (int k = 0; k < 50; ++k) {
+        filter.update(y, Eigen::Vector2f::Zero());
+        both.update(y, Eigen::Vector2f::Zero());
+      }
+      for (int k = 0; k < gap; ++k) {
+        filter.update(Eigen::Vector2f(hidden_nan<float>(), -0.5f), Eigen::Vector2f::Zero());
+        both.predict(Eigen::Vector2f::Zero());
+        ASSERT_TRUE(filter.covariance().allFinite() && filter.gain().allFinite()) << k;
+        ASSERT_TRUE(both.covariance().allFinite() && both.gain().allFinite()) << k;
+      }
+      EXPECT_EQ(filter.missed(0), std::min(gap, 65535));
+      EXPECT_EQ(filter.missed(1), 0);
+      const StepStatus expected = gap > 20 ? StepStatus::restarted : StepStatus::ok;
+      EXPECT_EQ(filter.update(Eigen::Vector2f(3, -0.5f), Eigen::Vector2f::Zero()), expected);
+      EXPECT_EQ(both.update(Eigen::Vector2f(3, 4), Eigen::Vector2f::Zero()), expected);
+      EXPECT_EQ(filter.missed(0), 0);
+      if (gap > 20) {
+        EXPECT_EQ(filter.estimate()(0), 3);
+        EXPECT_EQ(filter.estimate()(2), 0);
+        EXPECT_EQ(both.estimate()(3), 4);
+      }
+      for (int k = 0; k < 3000; ++k) {
+        filter.update(Eigen::Vector2f(3, -0.5f), Eigen::Vector2f::Zero());
+        both.update(Eigen::Vector2f(3, 4), Eigen::Vector2f::Zero());
+      }
+      EXPECT_EQ(filter.frozen(), frozen);
+      EXPECT_NEAR(filter.estimate()(0), 3, 1e-3f);
+      EXPECT_NEAR(filter.estimate()(3), -0.5f, 1e-3f);
+      EXPECT_NEAR(both.estimate()(3), 4, 1e-3f);
+    }
+  }
+}
+
+TEST(MimoExtendedStateFilter, refuses_what_the_scalar_cannot_hold) {
+  const auto rule = [](auto&& change) {
+    auto config = pair_config();
+    change(config);
+    const auto made = Pair::make(config);
+    return made ? std::string("accepted")
+                : std::string(made.error().field) + ": " + made.error().rule;
+  };
+  using Config = Pair::Config;
+  EXPECT_EQ(rule([](Config& c) { c.sample_time = 1e-25f; }),
+            "sample_time: to the power of a chain's highest state over its factorial is not what "
+            "the scalar can hold");
+  EXPECT_EQ(rule([](Config& c) { c.sample_time = 1e-40f; }),
+            "sample_time: has an inverse that the scalar cannot hold");
+  EXPECT_EQ(rule([](Config& c) { c.input_matrix(1, 0) = 1e-37f; }),
+            "input_matrix: times T^n / n! gives a gain that the scalar cannot hold");
+  EXPECT_EQ(rule([](Config& c) { c.max_gap = 0; }), "max_gap: must be 1 .. 65000");
+  EXPECT_EQ(rule([](Config& c) { c.max_gap = 1; }), "accepted");
+  EXPECT_EQ(rule([](Config& c) { c.max_gap = 65000; }), "accepted");
+  EXPECT_EQ(rule([](Config& c) { c.max_gap = 65001; }), "max_gap: must be 1 .. 65000");
+  EXPECT_EQ(rule([](Config& c) { c.inflation = 3e38f; }),
+            "inflation: lets the covariance grow beyond what the scalar can hold");
+}
+
 /// R = 1e-12 and P0 = 1e8 in float.
 TEST(MimoExtendedStateFilter, many_steps_in_float) {
   using Filter = MimoExtendedStateFilter<ChainOrders<2, 2>, 2, float>;

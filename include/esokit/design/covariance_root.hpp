@@ -82,7 +82,11 @@ class CovarianceRoot {
                                                                 S(1));
   }
   /// Largest magnitude in S.
-  [[nodiscard]] S largest() const noexcept { return lower_.cwiseAbs().maxCoeff(); }
+  [[nodiscard]] S largest() const noexcept { return largest(0, Size); }
+  /// The same of the rows `begin` to `end` - 1.
+  [[nodiscard]] S largest(int begin, int end) const noexcept {
+    return lower_.middleRows(begin, end - begin).cwiseAbs().maxCoeff();
+  }
 
   /// S times a factor.
   void scale(const S& factor) noexcept { lower_ *= factor; }

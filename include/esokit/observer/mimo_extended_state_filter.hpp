@@ -28,7 +28,9 @@ struct ChainOrders {
 /// it is p filters side by side.
 ///
 /// A measurement that is missing (NaN, infinite, or by `correct_some`) takes its channel out of the
-/// sample; the others are used.
+/// sample; the others are used. So does one that would make an estimate infinite. After more than
+/// `max_gap` of them in a row, or where it could not be predicted, a chain restarts from its next
+/// y.
 ///
 /// State order: chain by chain, (y_i, .., y_i^(n_i - 1), d_i, .., d_i^(m-1)).
 ///
@@ -63,6 +65,8 @@ class MimoExtendedStateFilter {
     InflationRule inflation_rule = InflationRule::fixed;  ///< fixed or none
     S inflation{};                                        ///< theta > 0 of the fixed rule
     RiccatiMode mode = RiccatiMode::recursive;            ///< recursive or frozen
+    int max_gap = 100;  ///< missing samples of a channel in a row that a correction may bridge,
+                        ///< 1 .. 65000; after more its chain restarts from the measurement
   };
 
   /// Checks the settings and does all the design work.
@@ -115,6 +119,10 @@ class MimoExtendedStateFilter {
       }
     }
     filter.restart();
+    if (!filter.fits()) {
+      return Error<S>{"inflation", config.inflation,
+                      "lets the covariance grow beyond what the scalar can hold"};
+    }
     return filter;
   }
 
@@ -126,19 +134,24 @@ class MimoExtendedStateFilter {
     return predicted | correct(y);
   }
 
-  /// Time update alone. A u that is bad in any element is replaced by the last good one.
+  /// Time update alone. A u that is bad in any element is replaced by the last good one. A chain
+  /// that cannot be predicted stands still, and its next good y restarts it.
   StepStatus predict(const Input& u_applied) noexcept {
     StepStatus status = StepStatus::ok;
+    for (int& missed : missed_) missed = missed < restart_due ? missed + 1 : restart_due;
     Estimate next = ahead(u_applied);
-    if (!finite(next)) {
+    if (finite(next) || no_larger(u_applied)) {
+      // No larger than the one before, u is not to blame.
+      input_ = u_applied;
+    } else {
       status = StepStatus::input_rejected;
       next = ahead(input_);
-      if (!finite(next)) {
-        status |= StepStatus::prediction_dropped;
-        next = state_;
-      }
-    } else {
-      input_ = u_applied;
+    }
+    for (int chain = 0; chain < outputs; ++chain) {
+      if (finite(next, chain)) continue;
+      status |= StepStatus::prediction_dropped;
+      missed_[index(chain)] = restart_due;
+      for (int r = first(chain); r < end(chain); ++r) next(r) = state_(r);
     }
     state_ = next;
     advance_covariance();
@@ -156,32 +169,56 @@ class MimoExtendedStateFilter {
   StepStatus correct_some(const Output& y, const Array<bool, outputs>& present) noexcept {
     StepStatus status = StepStatus::ok;
     Array<bool, outputs> used = present;
-    bool all_used = true;
-    bool any_used = false;
-    Output e;
+    Output e = Output::Zero();
     for (int i = 0; i < outputs; ++i) {
+      if (!used[index(i)]) continue;
       e(i) = y(i) - state_(first(i));
-      if (used[index(i)] && !is_finite(e(i))) {
-        used[index(i)] = false;
-        status = StepStatus::measurement_rejected;
+      const bool due = missed_[index(i)] > max_gap_ + 1;
+      if (is_finite(e(i)) && !due) continue;
+      used[index(i)] = false;
+      e(i) = S(0);
+      status |= due ? restart_chain(i, y(i)) : StepStatus::measurement_rejected;
+    }
+    // Where the estimate would not be finite the channel furthest from its prediction is left out,
+    // until it is.
+    bool changed = has(status, StepStatus::restarted);
+    for (int left = outputs; left > 0; --left) {
+      bool any_used = false;
+      bool all_used = true;
+      for (const bool channel : used) {
+        any_used = any_used || channel;
+        all_used = all_used && channel;
       }
-      if (!used[index(i)]) e(i) = S(0);
-      all_used = all_used && used[index(i)];
-      any_used = any_used || used[index(i)];
+      if (!any_used) break;
+      if (!all_used) {
+        standing_ = false;
+        prepare(used);
+        changed = true;
+      }
+      const Estimate next = state_ + detail::product<size, outputs, 1, S>(gain_, e);
+      if (finite(next)) {
+        state_ = next;
+        innovation_ = e;
+        corrected_ = true;
+        for (int i = 0; i < outputs; ++i) {
+          if (used[index(i)]) missed_[index(i)] = 0;
+        }
+        return status;
+      }
+      int worst = 0;
+      for (int i = 1; i < outputs; ++i) {
+        if (detail::magnitude(e(i)) > detail::magnitude(e(worst))) worst = i;
+      }
+      used[index(worst)] = false;
+      e(worst) = S(0);
+      // An absurd but finite u can leave a prediction from which no good y leads back.
+      const bool state_is_to_blame =
+          detail::magnitude(y(worst)) < detail::magnitude(state_(first(worst)));
+      status |=
+          state_is_to_blame ? restart_chain(worst, y(worst)) : StepStatus::measurement_rejected;
+      changed = true;
     }
-    if (!any_used) return status;
-    if (!all_used) {
-      standing_ = false;
-      prepare(used);
-    }
-    const Estimate next = state_ + detail::product<size, outputs, 1, S>(gain_, e);
-    if (!finite(next)) {
-      if (!all_used) prepare_all();
-      return StepStatus::measurement_rejected;
-    }
-    state_ = next;
-    innovation_ = e;
-    corrected_ = true;
+    if (changed) prepare_all();
     return status;
   }
 
@@ -198,9 +235,14 @@ class MimoExtendedStateFilter {
     if (!finite(next)) return StepStatus::state_rejected;
     state_ = next;
     innovation_.setZero();
+    missed_.fill(0);
     restart();
     return StepStatus::ok;
   }
+
+  /// Predictions since the last correction by channel i, 0 .. p - 1; 0 when up to date, 65535 where
+  /// its chain could not be predicted.
+  [[nodiscard]] int missed(int channel) const noexcept { return missed_[index(channel)]; }
 
   /// All estimates, N x 1, physical units.
   [[nodiscard]] Estimate estimate() const noexcept { return state_.cwiseQuotient(units_); }
@@ -278,8 +320,16 @@ class MimoExtendedStateFilter {
     return begin;
   }
 
+  /// One past its last.
+  static constexpr int end(int chain) noexcept {
+    return first(chain) + order_of(chain) + Extension;
+  }
+
+  /// A gap that is above every max_gap.
+  static constexpr int restart_due = 65535;
+
   explicit MimoExtendedStateFilter(const Config& config) noexcept
-      : sample_time_(config.sample_time) {
+      : sample_time_(config.sample_time), max_gap_(config.max_gap) {
     drive_.setZero();
     for (int chain = 0; chain < outputs; ++chain) {
       S unit(1);
@@ -293,7 +343,63 @@ class MimoExtendedStateFilter {
     if (config.inflation_rule == InflationRule::fixed) growth_ = S(1) + config.inflation;
   }
 
-  static bool finite(const Estimate& x) noexcept { return is_finite(x.sum()); }
+  /// Scaled states, and the estimates in physical units.
+  [[nodiscard]] bool finite(const Estimate& x, int chain) const noexcept {
+    S sum(0);
+    for (int r = first(chain); r < end(chain); ++r) {
+      const S size_of = detail::magnitude(x(r));
+      sum = sum + (size_of + size_of / units_(r));
+    }
+    return is_finite(sum);
+  }
+
+  [[nodiscard]] bool finite(const Estimate& x) const noexcept {
+    for (int chain = 0; chain < outputs; ++chain) {
+      if (!finite(x, chain)) return false;
+    }
+    return true;
+  }
+
+  [[nodiscard]] bool no_larger(const Input& u) const noexcept {
+    for (int j = 0; j < Inputs; ++j) {
+      if (!is_finite(u(j)) || detail::magnitude(u(j)) > detail::magnitude(input_(j))) return false;
+    }
+    return true;
+  }
+
+  /// True if the recursion stays within the scalar.
+  [[nodiscard]] bool fits() const {
+    MimoExtendedStateFilter run = *this;
+    for (int k = 0; k < 8 * size; ++k) {
+      if (!run.gain_.allFinite() || !is_finite(run.root_.largest())) return false;
+      run.corrected_ = true;
+      run.advance_covariance();
+    }
+    return true;
+  }
+
+  /// Chain i starts anew at (y_i, 0, .., 0) with its part of P0, or of the limit.
+  StepStatus restart_chain(int chain, const S& y) noexcept {
+    Estimate next = state_;
+    for (int r = first(chain); r < end(chain); ++r) next(r) = S(0);
+    next(first(chain)) = y;
+    if (!finite(next, chain)) return StepStatus::measurement_rejected;
+    state_ = next;
+    missed_[index(chain)] = 0;
+    Covariance p = root_.matrix();
+    const Covariance fresh = (has_limit_ ? limit_ : start_).matrix();
+    for (int r = first(chain); r < end(chain); ++r) {
+      for (int i = 0; i < size; ++i) {
+        const bool own = i >= first(chain) && i < end(chain);
+        p(r, i) = own ? fresh(r, i) : S(0);
+        p(i, r) = p(r, i);
+      }
+    }
+    root_ = CovarianceRoot<size, S>::nearest(p);
+    standing_ = false;
+    if constexpr (outputs == 1) restart();
+    return StepStatus::restarted;
+  }
 
   static Covariance scaled(const Covariance& p, const Estimate& units) noexcept {
     Covariance q;
@@ -327,11 +433,41 @@ class MimoExtendedStateFilter {
 
   static Check<S> check(const Config& config) {
     if (auto ok = check_positive("sample_time", config.sample_time); !ok) return ok;
+    if (auto ok =
+            check_representable("sample_time", config.sample_time, S(S(1) / config.sample_time),
+                                "has an inverse that the scalar cannot hold");
+        !ok) {
+      return ok;
+    }
+    if (config.max_gap < 1 || config.max_gap > 65000) {
+      return Error<S>{"max_gap", static_cast<S>(config.max_gap), "must be 1 .. 65000"};
+    }
     for (int i = 0; i < outputs; ++i) {
       for (int j = 0; j < Inputs; ++j) {
         if (auto ok = check_finite("input_matrix", config.input_matrix(i, j), i * Inputs + j);
             !ok) {
           return ok;
+        }
+      }
+      S unit(1);
+      for (int r = 1; r < order_of(i) + Extension; ++r) {
+        unit = unit * config.sample_time / static_cast<S>(r);
+        if (auto ok = check_representable("sample_time", config.sample_time, unit,
+                                          "to the power of a chain's highest state over its "
+                                          "factorial is not what the scalar can hold");
+            !ok) {
+          return ok;
+        }
+        for (int j = 0; r == order_of(i) && j < Inputs; ++j) {
+          const S& gain = config.input_matrix(i, j);
+          if (!(detail::magnitude(gain) > S(0))) continue;
+          if (auto ok = check_representable("input_matrix", gain, S(gain * unit),
+                                            "times T^n / n! gives a gain that the scalar cannot "
+                                            "hold",
+                                            i * Inputs + j);
+              !ok) {
+            return ok;
+          }
         }
       }
     }
@@ -414,15 +550,26 @@ class MimoExtendedStateFilter {
       }
       standing_ = false;
     }
-    const bool in_gap = !corrected_ && gapped_;
-    gapped_ = !corrected_;
     if (corrected_) root_ = posterior_;
     corrected_ = false;
     fresh_ = false;
-    // As in RiccatiGain: in a gap P- grows no further than a measurement can tell.
-    const bool full = in_gap && root_.largest() * root_.largest() * detail::rounding<S>() >
-                                    measurement_.largest() * measurement_.largest();
-    root_.advance(transition(), full ? S(1) : growth_, full ? CovarianceRoot<size, S>{} : noise_);
+    // As in RiccatiGain: in a gap P- of a chain grows no further than a measurement can tell.
+    Covariance phi = transition();
+    auto noise = noise_;
+    const S most = measurement_.largest() / std::sqrt(detail::rounding<S>());
+    for (int chain = 0; chain < outputs; ++chain) {
+      if (missed_[index(chain)] < 3 || !(root_.largest(first(chain), end(chain)) > most)) continue;
+      phi.block(first(chain), first(chain), end(chain) - first(chain), end(chain) - first(chain)) *=
+          S(1) / std::sqrt(growth_);
+      for (int r = first(chain); r < end(chain); ++r) noise.clear_row(r);
+      // After max_gap the chain starts anew, whatever its covariance is until then.
+      if (missed_[index(chain)] > max_gap_ + 1) {
+        for (int r = first(chain); r < end(chain); ++r) {
+          for (int j = first(chain); j < end(chain); ++j) phi(r, j) = r == j ? phi(r, r) : S(0);
+        }
+      }
+    }
+    root_.advance(phi, growth_, noise);
     prepare_all();
     if (has_limit_ && root_.near(limit_, S(1e-3))) stand();
   }
@@ -518,7 +665,6 @@ class MimoExtendedStateFilter {
 
   void restart() noexcept {
     corrected_ = false;
-    gapped_ = false;
     fresh_ = has_limit_;
     if (has_limit_) {
       stand();
@@ -543,9 +689,10 @@ class MimoExtendedStateFilter {
   Output innovation_ = Output::Zero();
   S sample_time_;
   S growth_{1};  ///< 1 + theta
+  int max_gap_;
+  Array<int, outputs> missed_{};  ///< predictions since the last correction
   bool corrected_ = false;
   bool fresh_ = false;  ///< nothing happened since a reset with a standing gain
-  bool gapped_ = false;
   bool standing_ = false;
   bool has_limit_ = false;
 };
