@@ -91,6 +91,7 @@
 #include <esokit/sim/closed_loop.hpp>
 #include <esokit/sim/combined_signals.hpp>
 #include <esokit/sim/decimation.hpp>
+#include <esokit/sim/dormand_prince.hpp>
 #include <esokit/sim/elementary_signals.hpp>
 #include <esokit/sim/file_error.hpp>
 #include <esokit/sim/filtered_step.hpp>
