@@ -183,6 +183,37 @@ TEST(VariableStep, EndIsMetAndDoesNotShortenTheNextStep) {
   EXPECT_GE(after, 0.99 * whole);
 }
 
+// exp(-t) at 1e-9: what counts is the 1 that it was, so that only stability limits the step (3.3).
+TEST(VariableStep, LargestMagnitudeIsRemembered) {
+  const auto decay = [](double, const State1& x) -> State1 { return -x; };
+  auto stepper =
+      VariableStep<State1>::make({.relative_tolerance = 1e-6, .absolute_tolerance = 1e-20}).value();
+  State1 x(1.0);
+  double t = 0.0;
+  double longest = 0.0;
+  while (t < 20.0) {
+    const double next = stepper.advance(decay, t, x, 30.0).value();
+    longest = next - t;
+    t = next;
+  }
+  EXPECT_GT(longest, 2.0);
+}
+
+// Not only to rounding: t + (end - t) is another number for some of these.
+TEST(VariableStep, EndIsMetExactly) {
+  const auto rest = [](double, const State1&) -> State1 { return State1(0.0); };
+  int rounded = 0;
+  for (int k = 1; k < 1000; ++k) {
+    auto stepper = VariableStep<State1>::make({}).value();
+    State1 x(1.0);
+    const double t = 1e-3 / k;
+    const double end = 0.01 * k;
+    rounded += t + (end - t) != end ? 1 : 0;
+    EXPECT_EQ(stepper.advance(rest, t, x, end).value(), end);
+  }
+  EXPECT_GT(rounded, 0);
+}
+
 // A jump at `end` is no harm: the next step starts anew. One inside a step is found and refused
 // until the step before it is short.
 TEST(VariableStep, JumpsOfTheRightHandSide) {

@@ -113,7 +113,6 @@ class VariableStep {
         const ScalarType proposed =
             refused ? h : h * std::min(ScalarType{5}, fraction(0.8) / fifth_root(q));
         next_ = cut && !refused ? std::max(next_, proposed) : proposed;
-        largest_ = magnitude;
         x = result;
         return cut ? end : t + h;
       }
