@@ -1,6 +1,8 @@
 #include "check.hpp"
 
 #include <algorithm>
+#include <array>
+#include <charconv>
 #include <cmath>
 
 namespace esokit::examples {
@@ -31,12 +33,12 @@ double Tolerance::difference(double reference) const {
   return std::max(absolute_, relative_ * std::abs(reference));
 }
 
-bool Check::compare(double reference, const Tolerance& limit) {
-  const double difference = std::abs(ours - reference);
-  const double allowed = limit.difference(reference);
-  if (reference != 0.0) {
-    relative_error = difference / std::abs(reference);
-    tolerance = allowed / std::abs(reference);
+bool Check::compare(double target, const Tolerance& limit) {
+  const double difference = std::abs(ours - target);
+  const double allowed = limit.difference(target);
+  if (target != 0.0) {
+    relative_error = difference / std::abs(target);
+    tolerance = allowed / std::abs(target);
   } else {
     tolerance = allowed;
   }
@@ -70,7 +72,7 @@ std::string Check::verdict() const {
     case Outcome::fail:
       return "FAILED";
     case Outcome::known_miss:
-      return "not reproduced";
+      return "missed";
     case Outcome::reported:
       break;
   }
@@ -89,6 +91,45 @@ CsvRow Check::csv_row() const {
           text(tolerance, 4),
           pass_text(),
           note};
+}
+
+namespace {
+
+constexpr std::array<std::string_view, 4> miss_texts = {
+    "printed number missed", "the text says other than what was simulated", "a claim does not hold",
+    "settings or data not published"};
+
+}  // namespace
+
+std::string shown_text(double value, std::optional<double> like) {
+  if (!std::isfinite(value) || value == 0.0) return number_text(value);
+  const double size = std::abs(value);
+  if (size < 1e-30) return value < 0.0 ? "-0 (above -1e-30)" : "0 (below 1e-30)";
+  if (size < 1e-4 || size >= 1e8) return number_text(value, 3);
+  int decimals = std::max(0, (like ? 2 : 3) - static_cast<int>(std::floor(std::log10(size))));
+  std::string of_like = like ? number_text(*like) : std::string();
+  if (!of_like.empty() && of_like.find('e') == std::string::npos) {
+    const auto point = of_like.find('.');
+    const auto printed = point == std::string::npos ? 0 : of_like.size() - point - 1;
+    decimals = std::max(static_cast<int>(printed), std::min(decimals, 6));
+  }
+  std::array<char, 64> text{};
+  const auto result = std::to_chars(text.data(), text.data() + text.size(), value,
+                                    std::chars_format::fixed, decimals);
+  return {text.data(), result.ptr};
+}
+
+std::string_view miss_text(Miss kind) { return miss_texts[static_cast<std::size_t>(kind)]; }
+
+std::optional<Miss> miss_in(std::string_view note) {
+  for (std::size_t i = 0; i < miss_texts.size(); ++i) {
+    if (note.starts_with(miss_texts[i])) return static_cast<Miss>(i);
+  }
+  return std::nullopt;
+}
+
+std::string reference_note(double reference, std::string_view source) {
+  return "reference " + number_text(reference, 6) + " (" + std::string(source) + ")";
 }
 
 }  // namespace esokit::examples

@@ -42,7 +42,8 @@ struct Check {
 
   std::string case_name;
   std::string metric;
-  std::optional<double> paper;
+  std::optional<double> paper;      ///< printed in the paper
+  std::optional<double> reference;  ///< of an own check: an independent run, a closed form
   double ours = 0.0;
   std::optional<double> deviation;  ///< standard deviation over the seeds; for the tables only
   std::optional<double> relative_error;
@@ -64,9 +65,27 @@ struct Check {
   [[nodiscard]] CsvRow csv_row() const;
 };
 
-/// Begins the note of a miss that is known, so that a reader of summary.csv can tell it from a
-/// failure: both have pass = no.
-inline constexpr std::string_view known_miss_prefix = "not reproduced";
+/// A number for a reader: as many decimals as `like` is printed with, but at least three
+/// significant digits; without it four. Only very large and very small numbers have an exponent.
+[[nodiscard]] std::string shown_text(double value, std::optional<double> like = std::nullopt);
+
+/// Kinds of "does not reproduce".
+enum class Miss {
+  printed_number,  ///< a printed number is missed, and we do not know why
+  other_reading,   ///< the text says other than what was simulated; a reading that works exists
+  claim,           ///< a claim does not hold
+  not_published    ///< settings or data that are needed are not published
+};
+
+/// A kind in words. They begin the note of a known miss, so that a reader of summary.csv can tell
+/// it from a failure: both have pass = no.
+[[nodiscard]] std::string_view miss_text(Miss kind);
+
+/// The kind whose words a note begins with.
+[[nodiscard]] std::optional<Miss> miss_in(std::string_view note);
+
+/// "reference 0.5 (an independent run)": how the note of an own check begins.
+[[nodiscard]] std::string reference_note(double reference, std::string_view source);
 
 /// The header of summary.csv.
 inline constexpr std::string_view summary_header =

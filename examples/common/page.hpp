@@ -97,7 +97,7 @@ class Page {
       case Outcome::fail:
         return "✗ failed";
       case Outcome::known_miss:
-        return "≠ not reproduced";
+        return "≠ missed";
       case Outcome::reported:
         break;
     }
@@ -330,10 +330,10 @@ class Page {
       put({"<tr><th scope=\"row\">", html_text(rows[i][0]), "</th>"});
       for (std::size_t k = 0; k < metrics; ++k) {
         const std::string& verdict = rows[i][3 + 3 * k];
-        const Outcome outcome = verdict == "ok"               ? Outcome::pass
-                                : verdict == "FAILED"         ? Outcome::fail
-                                : verdict == "not reproduced" ? Outcome::known_miss
-                                                              : Outcome::reported;
+        const Outcome outcome = verdict == "ok"       ? Outcome::pass
+                                : verdict == "FAILED" ? Outcome::fail
+                                : verdict == "missed" ? Outcome::known_miss
+                                                      : Outcome::reported;
         put({"<td>", html_text(rows[i][1 + 3 * k]), "</td><td>", html_text(rows[i][2 + 3 * k])});
         if (outcome != Outcome::reported) {
           put({" <span class=\"", class_of(outcome), "\">", mark_of(outcome), "</span>"});

@@ -1,6 +1,7 @@
 #include "report.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <system_error>
 #include <utility>
@@ -23,7 +24,7 @@ Check make_row(std::string_view case_name, std::string_view metric, const Measur
 }
 
 std::string measured_text(const Check& row) {
-  std::string text = number_text(row.ours, 5);
+  std::string text = shown_text(row.ours, row.paper ? row.paper : row.reference);
   if (row.deviation) text += " (" + number_text(*row.deviation, 2) + ")";
   return text;
 }
@@ -70,8 +71,8 @@ void Report::check(std::string_view case_name, std::string_view metric, std::opt
 
 void Report::check_reference(std::string_view case_name, std::string_view metric, double reference,
                              Measured ours, const Tolerance& tolerance, std::string_view source) {
-  Check row =
-      make_row(case_name, metric, ours, std::string(source) + ": " + number_text(reference, 6));
+  Check row = make_row(case_name, metric, ours, reference_note(reference, source));
+  row.reference = reference;
   row.outcome = row.compare(reference, tolerance) ? Check::Outcome::pass : Check::Outcome::fail;
   checks_.push_back(std::move(row));
 }
@@ -84,14 +85,15 @@ void Report::expect(std::string_view case_name, std::string_view metric, Measure
 }
 
 void Report::known_miss(std::string_view case_name, std::string_view metric, double paper,
-                        Measured ours, const Tolerance& tolerance, std::string_view reason) {
+                        Measured ours, const Tolerance& tolerance, std::string_view reason,
+                        Miss kind) {
   Check row = make_row(case_name, metric, ours, {});
   row.paper = paper;
   const bool near = row.compare(paper, tolerance);
   row.outcome = near ? Check::Outcome::pass : Check::Outcome::known_miss;
   const std::string limits = std::exchange(row.note, {});
   row.append_note(near ? "was marked as a known miss, but reproduces"
-                       : std::string(known_miss_prefix) + ": " + std::string(reason));
+                       : std::string(miss_text(kind)) + ": " + std::string(reason));
   row.append_note(limits);
   checks_.push_back(std::move(row));
 }
@@ -109,22 +111,36 @@ void Report::comparison(const std::string& name, const std::string& caption,
   collect(cases, &Check::case_name);
   collect(metrics, &Check::metric);
 
-  std::vector<CsvRow> lines(1, CsvRow{"case"});
+  const auto find = [this](const std::string& case_name, const std::string& metric) {
+    const auto row = std::find_if(checks_.begin(), checks_.end(), [&](const Check& check) {
+      return check.case_name == case_name && check.metric == metric;
+    });
+    return row == checks_.end() ? nullptr : &*row;
+  };
+  std::vector<CsvRow> lines(1 + cases.size());
+  lines[0].push_back("case");
+  for (std::size_t i = 0; i < cases.size(); ++i) lines[i + 1].push_back(cases[i]);
   for (const std::string& metric : metrics) {
-    for (const char* part : {", paper", ", ours", ", pass"}) lines[0].push_back(metric + part);
-  }
-  for (const std::string& case_name : cases) {
-    CsvRow line{case_name};
-    for (const std::string& metric : metrics) {
-      const auto row = std::find_if(checks_.begin(), checks_.end(), [&](const Check& check) {
-        return check.case_name == case_name && check.metric == metric;
-      });
-      const bool found = row != checks_.end();
-      line.push_back(found && row->paper ? number_text(*row->paper, 6) : "");
-      line.push_back(found ? measured_text(*row) : "");
-      line.push_back(found ? row->verdict() : "");
+    bool any_paper = false;
+    bool any_reference = false;
+    for (const std::string& case_name : cases) {
+      const Check* row = find(case_name, metric);
+      any_paper = any_paper || (row != nullptr && row->paper);
+      any_reference = any_reference || (row != nullptr && row->reference);
     }
-    lines.push_back(std::move(line));
+    if (any_paper) lines[0].push_back(metric + ", paper");
+    if (any_reference) lines[0].push_back(metric + ", reference");
+    for (const char* part : {", ours", ", result"}) lines[0].push_back(metric + part);
+    for (std::size_t i = 0; i < cases.size(); ++i) {
+      const Check* row = find(cases[i], metric);
+      const auto add = [&](const std::optional<double>& number) {
+        lines[i + 1].push_back(number ? number_text(*number, 6) : "");
+      };
+      if (any_paper) add(row == nullptr ? std::nullopt : row->paper);
+      if (any_reference) add(row == nullptr ? std::nullopt : row->reference);
+      lines[i + 1].push_back(row == nullptr ? "" : measured_text(*row));
+      lines[i + 1].push_back(row == nullptr ? "" : row->verdict());
+    }
   }
   write_table("comparison", name, caption, lines);
 }
@@ -139,31 +155,52 @@ void Report::add(const Figure& figure) {
   if (const auto error = figure.write(folder_)) {
     fail(*error);
   } else {
-    contents_.push_back({"figure", figure.name(), figure.caption(), figure.alt()});
+    add_content("figure", figure.name(), figure.caption(), figure.alt());
   }
 }
 
-void Report::remark(std::string_view text) {
-  contents_.push_back({"remark", "", std::string(text), ""});
+void Report::remark(std::string_view text) { add_content("remark", "", text); }
+
+void Report::not_reproduced(std::string_view text, Miss kind) {
+  add_content("not_reproduced", miss_text(kind), text);
 }
 
-void Report::not_reproduced(std::string_view text) {
-  contents_.push_back({"not_reproduced", "", std::string(text), ""});
+void Report::claim(const Claim& claim) {
+  constexpr std::array verdicts = {"holds", "holds in part", "does not hold", "not tested"};
+  add_content("claim", claim.where, claim.text, verdicts[static_cast<std::size_t>(claim.holds)],
+              claim.here, claim.figure);
+}
+
+void Report::correction(const Correction& correction) {
+  add_content("correction", correction.where, correction.printed, correction.correct,
+              correction.why);
+}
+
+void Report::additions() { add_content("additions", "", ""); }
+
+void Report::cover(std::string_view figure) { add_content("cover", figure, ""); }
+
+void Report::add_content(std::string_view kind, std::string_view name, std::string_view text,
+                         std::string_view alt, std::string_view more, std::string_view figure) {
+  contents_.push_back({std::string(kind), std::string(name), std::string(text), std::string(alt),
+                       std::string(more), std::string(figure)});
 }
 
 int Report::finish() {
   print_checks();
   std::string summary{summary_header};
   for (const Check& check : checks_) summary += csv_line(check.csv_row());
-  std::string contents = csv_line({"kind", "name", "text", "alt"});
+  std::string contents = csv_line({"kind", "name", "text", "alt", "more", "figure"});
   for (const auto& [kind, text] :
        {std::pair<const char*, const std::string&>{"paper_title", about_.paper_title},
         {"citation", about_.citation},
         {"link", about_.link},
         {"title", about_.title},
         {"description", about_.description}}) {
-    contents += csv_line({kind, "", text, ""});
+    contents += csv_line({kind, "", text, "", "", ""});
   }
+  contents += csv_line({"order", "", std::to_string(about_.order), "", "", ""});
+  if (about_.addition) contents += csv_line({"addition", "", "", "", "", ""});
   for (const CsvRow& row : contents_) contents += csv_line(row);
   write("contents.csv", contents);
   write("summary.csv", summary);
@@ -219,7 +256,7 @@ void Report::write_table(const char* kind, const std::string& name, const std::s
   for (const CsvRow& line : lines) text += csv_line(line);
   const std::string file = "table_" + name + ".csv";
   write(file, text);
-  contents_.push_back({kind, file, caption, ""});
+  add_content(kind, file, caption);
 }
 
 void Report::write(const std::string& file, std::string_view text) {

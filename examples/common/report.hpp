@@ -36,6 +36,27 @@ struct About {
   std::string link = {};         ///< the paper's DOI as an address
   std::string title = {};        ///< heading of this example
   std::string description = {};  ///< one or two sentences: what is simulated, which way it runs
+  int order = 100;               ///< place on the paper's page, as in the paper; then by name
+  bool addition = false;         ///< nothing of it is in the paper
+};
+
+/// What the paper says, and whether it holds here. `holds` is computed by the program.
+struct Claim {
+  enum class Holds { yes, partly, no, not_tested };
+
+  std::string text = {};   ///< the claim, in our words
+  std::string where = {};  ///< section, figure or table of the paper
+  Holds holds = Holds::not_tested;
+  std::string here = {};    ///< what comes out here, with its numbers
+  std::string figure = {};  ///< name of our figure or table that shows it
+};
+
+/// A printed formula that cannot be what was computed.
+struct Correction {
+  std::string where = {};    ///< number of the equation or table
+  std::string printed = {};  ///< as it stands in the paper
+  std::string correct = {};  ///< as it must be
+  std::string why = {};      ///< how one knows, with numbers
 };
 
 /// A number of ours, with its spread where it is a mean over seeds.
@@ -57,14 +78,15 @@ class Report {
   /// Where the files of this example go.
   [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
 
-  /// Our number beside the paper's. With a tolerance it must reproduce, without one it is reported
-  /// only; `paper` is std::nullopt where the paper has no number.
+  /// Our number beside the paper's printed one. With a tolerance it must reproduce, without one it
+  /// is not judged; `paper` is std::nullopt where the paper prints no number.
   void check(std::string_view case_name, std::string_view metric, std::optional<double> paper,
              Measured ours, std::optional<Tolerance> tolerance = std::nullopt,
              std::string_view note = {});
 
   /// Our number beside one that is not printed in the paper (an independent run, a closed form):
-  /// it must reproduce; the paper's column stays empty and the note holds the reference.
+  /// it must reproduce. An own check: the paper's column stays empty, and the note begins with the
+  /// reference and its source, which the page shows in a column of its own.
   void check_reference(std::string_view case_name, std::string_view metric, double reference,
                        Measured ours, const Tolerance& tolerance,
                        std::string_view source = "independent run");
@@ -73,11 +95,11 @@ class Report {
   void expect(std::string_view case_name, std::string_view metric, Measured ours, bool holds,
               std::string_view rule);
 
-  /// A number of the paper that is known not to reproduce; `reason` says why, or what was tried.
-  /// Shown as not reproduced, without failing the program. Should it reproduce after all, it
-  /// passes.
+  /// A printed number that is known to be missed; `reason` says why, or what was tried. Shown as
+  /// missed, with its kind, without failing the program. Should it be met after all, it passes.
   void known_miss(std::string_view case_name, std::string_view metric, double paper, Measured ours,
-                  const Tolerance& tolerance, std::string_view reason);
+                  const Tolerance& tolerance, std::string_view reason,
+                  Miss kind = Miss::printed_number);
 
   /// The checks so far as a table with a line a case and a column a metric, paper beside ours.
   /// `cases` and `metrics` choose and order; empty means all.
@@ -94,8 +116,19 @@ class Report {
   /// A paragraph for the page: conventions, variants, what the reader should see.
   void remark(std::string_view text);
 
-  /// Says plainly what of the paper did not reproduce; shown here and at the top of the page.
-  void not_reproduced(std::string_view text);
+  /// Says plainly what of the paper did not reproduce; shown here and at the top of its page.
+  void not_reproduced(std::string_view text, Miss kind = Miss::printed_number);
+
+  /// Shown in tables at the top of the paper's page.
+  void claim(const Claim& claim);
+  void correction(const Correction& correction);
+
+  /// All figures, tables and remarks from here on are additions of ours: they come after the
+  /// paper's own, at the end of its page.
+  void additions();
+
+  /// The figure that stands for the paper on the front page; without it the first one.
+  void cover(std::string_view figure);
 
   /// Prints the checks, writes summary.csv and contents.csv. The exit code of the program: non-zero
   /// if a number that must reproduce was missed, or a figure or file could not be written.
@@ -116,6 +149,10 @@ class Report {
   About about_;
   std::filesystem::path folder_;
   std::vector<Check> checks_;
+  void add_content(std::string_view kind, std::string_view name, std::string_view text,
+                   std::string_view alt = {}, std::string_view more = {},
+                   std::string_view figure = {});
+
   std::vector<CsvRow> contents_;
   std::vector<std::string> problems_;
 };

@@ -67,8 +67,7 @@ namespace detail {
   const std::string& pass = fields[6];
   if (pass == "yes") return Check::Outcome::pass;
   if (pass.empty()) return Check::Outcome::reported;
-  return fields[7].starts_with(known_miss_prefix) ? Check::Outcome::known_miss
-                                                  : Check::Outcome::fail;
+  return miss_in(fields[7]) ? Check::Outcome::known_miss : Check::Outcome::fail;
 }
 
 inline void read_example(const std::filesystem::path& out, const std::filesystem::path& folder,
@@ -83,7 +82,7 @@ inline void read_example(const std::filesystem::path& out, const std::filesystem
   for (std::size_t i = 1; i < summary.size(); ++i) {
     example.rows.push_back({summary[i], outcome_of(summary[i])});
   }
-  for (const CsvRow& row : read_csv(folder / "contents.csv", 4)) {
+  for (const CsvRow& row : read_csv(folder / "contents.csv", 6)) {
     const auto keep_first = [&](std::string& text) {
       if (text.empty()) text = row[2];
     };
@@ -98,7 +97,7 @@ inline void read_example(const std::filesystem::path& out, const std::filesystem
       example.title = row[2];
     } else if (row[0] == "description") {
       example.description = row[2];
-    } else {
+    } else if (row[0] != "order" && row[0] != "addition") {
       example.items.push_back({row[0], row[1], row[2], row[3]});
     }
   }

@@ -170,13 +170,22 @@ PvtolCriteria run_pvtol(const PvtolSetup& setup, std::uint64_t seed = 0,
     }
   }
 
+  // Two stages of a step share their time, the first one and the sample too.
+  double reference_time = -1.0;
+  Vector<double, 5> r_x, r_z;
+  const auto references_at = [&](double t) {
+    if (t == reference_time) return;
+    reference_time = t;
+    r_x = Vector<double, 5>(reference_x.derivatives<5>(t).data());
+    r_z = Vector<double, 5>(reference_z.derivatives<5>(t).data());
+  };
   const auto control = [&](double t, const Stacked& s) {
-    const auto channel = [&](int first, const sim::Sine<>& reference) {
-      const auto r = reference.derivatives<5>(t);
+    references_at(t);
+    const auto channel = [&](int first, const Vector<double, 5>& reference) {
       const typename Observer::State z = s.template segment<n>(first);
-      return law->control(Observer::estimate(z), Vector<double, 5>(r.data()));
+      return law->control(Observer::estimate(z), reference);
     };
-    return Pair(channel(8, reference_x), channel(8 + n, reference_z));
+    return Pair(channel(8, r_x), channel(8 + n, r_z));
   };
 
   const auto window = sim::Window<>::make({.start = pvtol_from, .end = pvtol_end}).value();
@@ -194,9 +203,7 @@ PvtolCriteria run_pvtol(const PvtolSetup& setup, std::uint64_t seed = 0,
     const Pair u = control(t, s);
     const Pair v(plant_state(6), Pvtol::actuation(plant_state, u)(1));
     const Pair d = plant.total_disturbance(t, plant_state, u);
-    const double r_x = reference_x(t);
-    const double r_z = reference_z(t);
-    const Pair e(r_x - plant_state(0) - noise(0), r_z - plant_state(2) - noise(1));
+    const Pair e(r_x(0) - plant_state(0) - noise(0), r_z(0) - plant_state(2) - noise(1));
     const Pair d_error(d(0) - Observer::total_disturbance(s.template segment<n>(8)),
                        d(1) - Observer::total_disturbance(s.template segment<n>(8 + n)));
     error.add(t, e.norm());
@@ -207,8 +214,8 @@ PvtolCriteria run_pvtol(const PvtolSetup& setup, std::uint64_t seed = 0,
     if (plant_state(6) < 0.05 && result.singular_time < 0.0) result.singular_time = t;
     if (series != nullptr) {
       series->t.push_back(t);
-      series->reference_x.push_back(r_x);
-      series->reference_z.push_back(r_z);
+      series->reference_x.push_back(r_x(0));
+      series->reference_z.push_back(r_z(0));
       series->x.push_back(plant_state(0));
       series->z.push_back(plant_state(2));
       series->error_x.push_back(e(0));
