@@ -7,6 +7,7 @@
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/delayed_input.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/outlier_gate.hpp>
 #include <esokit/observer/variable_time.hpp>
 #include <esokit/observer/wrapped_output.hpp>
 #include <optional>
@@ -111,6 +112,12 @@ void add_all(const std::string& scalar) {
   using Wrapped = WrappedOutput<LinearEso<2, S>>;
   add<S>("adrc_wrapped_output/2/" + scalar, adrc<S, Wrapped>({.observer = linear, .period = S(7)}),
          beside(baseline));
+
+  using Gate = OutlierGate<LinearEso<2, S>>;
+  add<S>("outlier_gate_off/2/" + scalar, Gate::make({.observer = linear}).value(),
+         beside("linear_eso/2/" + scalar));
+  add<S>("outlier_gate/2/" + scalar, Gate::make({.observer = linear, .threshold = S(100)}).value(),
+         beside("linear_eso/2/" + scalar));
 
   const auto variable = VariableTime<LinearEso<2, S>>::make({.observer = linear}).value();
   add<S>("variable_time_same_step/2/" + scalar, variable, beside("linear_eso/2/" + scalar));

@@ -79,6 +79,7 @@
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/observer/nonlinear_gain.hpp>
 #include <esokit/observer/nonlinear_gain_design.hpp>
+#include <esokit/observer/outlier_gate.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
 #include <esokit/observer/reduced_order_eso.hpp>
 #include <esokit/observer/riccati_gain.hpp>

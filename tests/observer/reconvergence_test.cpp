@@ -12,6 +12,7 @@
 #include <esokit/observer/known_model.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
+#include <esokit/observer/outlier_gate.hpp>
 #include <esokit/observer/variable_time.hpp>
 #include <esokit/observer/wrapped_output.hpp>
 #include <limits>
@@ -103,6 +104,14 @@ template <class O, int Capacity>
 struct Settings<DelayedInput<O, Capacity>> {
   static typename DelayedInput<O, Capacity>::Config config(double x) {
     return {.observer = Settings<O>::config(x), .delay = Capacity};
+  }
+};
+
+template <class O>
+struct Settings<OutlierGate<O>> {
+  static typename OutlierGate<O>::Config config(double x) {
+    using S = typename O::scalar_type;
+    return {.observer = Settings<O>::config(x), .threshold = S(0.5), .running_factor = S(5)};
   }
 };
 
@@ -242,11 +251,15 @@ template <class S>
 using Damped = KnownPoles<2, S>;
 
 using Observers = testing::Types<
-    LinearEso<2>, LinearEso<2, float>, CascadeEso<2, 3, float>, AlgebraicEso<2, float>,
-    AdjustableBandwidthEso<2>, NonlinearEso<2, double, 1>, ExtendedStateFilter<2>,
-    DelayedInput<LinearEso<2>, 3>, VariableTime<LinearEso<2>>,
-    KnownModel<LinearEso<2>, Damped<double>>, KnownModel<LinearEso<2, float>, Damped<float>>,
-    WrappedOutput<LinearEso<2>>, WrappedOutput<LinearEso<2, float>>, WrappedOutput<LinearEso<3>>,
+    OutlierGate<LinearEso<2>>, OutlierGate<AlgebraicEso<2, float>>,
+    OutlierGate<NonlinearEso<2, double, 1>>, OutlierGate<AdjustableBandwidthEso<2, float>>,
+    WrappedOutput<OutlierGate<CascadeEso<2, 2>>>, WrappedOutput<OutlierGate<LinearEso<2, float>>>,
+    DelayedInput<VariableTime<WrappedOutput<OutlierGate<LinearEso<2>>>>, 2>, LinearEso<2>,
+    LinearEso<2, float>, CascadeEso<2, 3, float>, AlgebraicEso<2, float>, AdjustableBandwidthEso<2>,
+    NonlinearEso<2, double, 1>, ExtendedStateFilter<2>, DelayedInput<LinearEso<2>, 3>,
+    VariableTime<LinearEso<2>>, KnownModel<LinearEso<2>, Damped<double>>,
+    KnownModel<LinearEso<2, float>, Damped<float>>, WrappedOutput<LinearEso<2>>,
+    WrappedOutput<LinearEso<2, float>>, WrappedOutput<LinearEso<3>>,
     WrappedOutput<CascadeEso<2, 3>>, WrappedOutput<CascadeEso<2, 2, float>>,
     WrappedOutput<AlgebraicEso<2>>, WrappedOutput<AlgebraicEso<2, float>>,
     WrappedOutput<AdjustableBandwidthEso<2>>, WrappedOutput<AdjustableBandwidthEso<2, float>>,

@@ -14,6 +14,7 @@
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/mimo_extended_state_filter.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
+#include <esokit/observer/outlier_gate.hpp>
 #include <esokit/observer/reduced_order_eso.hpp>
 #include <esokit/observer/variable_time.hpp>
 #include <esokit/observer/wrapped_output.hpp>
@@ -34,6 +35,7 @@ template class Adrc<HalfGainEso<2, float>>;
 template class Adrc<ReducedOrderEso<2, float>>;
 template class Adrc<DelayedInput<Observer, 4>>;
 template class Adrc<WrappedOutput<Observer>>;
+template class Adrc<WrappedOutput<OutlierGate<Observer>>>;
 template class Adrc<VariableTime<Observer>>;
 template class Adrc<KnownModel<Observer, KnownPoles<2, float>>>;
 

@@ -1,6 +1,7 @@
 /// @file
 /// What a controller asks of an observer. Every observer of the library meets it, and so do the
-/// decorators (DelayedInput, WrappedOutput, VariableTime, KnownModel), which are observers again.
+/// decorators (DelayedInput, WrappedOutput, VariableTime, KnownModel, OutlierGate), which are
+/// observers again.
 #pragma once
 
 #include <concepts>
