@@ -242,9 +242,7 @@ class WrappedOutput : public Observer {
     if (detail::absolute(z) <= half_period()) [[likely]]
       return;
     const S turns = std::round(z * inverse_period_);
-    if (!is_finite(turns * period_)) return;
-    Observer::shift_output(-(turns * period_));
-    count_.turns -= turns;
+    if (Observer::shift_output(-(turns * period_)) == StepStatus::ok) count_.turns -= turns;
   }
 
   S period_;
