@@ -30,6 +30,7 @@
 #include <esokit/control/scaled_law.hpp>
 #include <esokit/control/tracking_differentiator.hpp>
 #include <esokit/core/combinatorics.hpp>
+#include <esokit/core/declared.hpp>
 #include <esokit/core/error.hpp>
 #include <esokit/core/error_text.hpp>
 #include <esokit/core/expected.hpp>

@@ -14,10 +14,9 @@ namespace esokit {
 ///
 /// Let in is abs(y - z_1) <= M max(threshold, running_factor m), with m the running mean of
 /// abs(y - z_1) over some 64 samples, M the sample times since the last correction. The gate never
-/// stays shut: after `most_in_a_row` rejected measurements the next one is taken whatever it is,
-/// and all are until one is within the limit again. So after a true step of any size in y the
-/// observer follows it `most_in_a_row` samples late. It is open at the start and after a reset in
-/// the same way.
+/// stays shut: after `most_in_a_row` rejected measurements it opens, and takes everything until as
+/// many in a row are within the limit. So after a true step of any size in y the observer follows
+/// it `most_in_a_row` samples late. At the start and after a reset it is open in the same way.
 ///
 /// It nests with the other adapters; inside of WrappedOutput, which tells it the turn.
 /// ExtendedStateFilter has a gate of its own, which knows the variance of its innovation.
