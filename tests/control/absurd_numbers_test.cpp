@@ -61,7 +61,7 @@ TEST(MissingMost, TheLargestIsCounted) {
     const auto refused = Adrc<LinearEso<2>>::make(settings);
     ASSERT_FALSE(refused.has_value());
     EXPECT_STREQ(refused.error().field, "missing.most");
-    EXPECT_STREQ(refused.error().rule, "must be 0 up to 65535 / measurement_divider - 1, that is");
+    EXPECT_STREQ(refused.error().rule, "must be 0 up to 65535 samples, that is");
     EXPECT_EQ(refused.error().limit, 65535 / divider - 1);
     --settings.missing.most;
     auto controller = Adrc<LinearEso<2>>::make(settings).value();
@@ -275,17 +275,14 @@ TEST(AbsurdSettings, LawsWhoseResultIsNotFiniteAreRefused) {
   EXPECT_TRUE(Feedback::make({.gains = {1e7f, 1}, .input_gain = 1e-30f}));
 
   using Law = esokit::AdrcLaw<2, float>;
-  const auto gains = Law::make({.gains = {{1, 1e30f}}, .input_gain = 1e-30f});
-  ASSERT_FALSE(gains.has_value());
-  EXPECT_STREQ(gains.error().field, "gains");
-  EXPECT_STREQ(gains.error().rule, "divided by input_gain is more than the scalar can hold");
-  EXPECT_EQ(gains.error().index, 1);
+  for (const auto& law : {Law::make({.gains = {{1, 1e30f}}, .input_gain = 1e-30f}),
+                          Law::make({.controller_bandwidth = 1e6f, .input_gain = 1e-30f})}) {
+    ASSERT_FALSE(law.has_value());
+    EXPECT_STREQ(law.error().field, "input_gain");
+    EXPECT_STREQ(law.error().rule, "with these gains gives a law that the scalar cannot hold");
+  }
   EXPECT_TRUE(Law::make({.gains = {{1, 1e7f}}, .input_gain = 1e-30f}).has_value());
-  const auto bandwidth = Law::make({.controller_bandwidth = 1e6f, .input_gain = 1e-30f});
-  ASSERT_FALSE(bandwidth.has_value());
-  EXPECT_STREQ(bandwidth.error().field, "controller_bandwidth");
-  EXPECT_STREQ(bandwidth.error().rule,
-               "gives a gain that divided by input_gain is more than the scalar can hold");
+  EXPECT_TRUE(Law::make({.controller_bandwidth = 1e3f, .input_gain = 1e-30f}).has_value());
 }
 
 TEST(AbsurdSettings, PidOfAnAdrcIsFinite) {

@@ -47,33 +47,29 @@ class AdrcLaw {
       for (int i = 0; i < Order; ++i) {
         const S& gain = (*config.gains)[static_cast<std::size_t>(i)];
         if (auto ok = check_finite("gains", gain, i); !ok) return ok.error();
-        if (!all(is_finite(S(gain * law.inverse_input_gain_)))) {
-          return Error<S>{"gains", gain, "divided by input_gain is more than the scalar can hold",
-                          i};
-        }
       }
       law.gains_ = *config.gains;
-      return law;
-    }
-    if (auto ok = check_positive("controller_bandwidth", config.controller_bandwidth); !ok) {
-      return ok.error();
-    }
-    S power(1.0);
-    for (int i = Order - 1; i >= 0; --i) {
-      power = power * config.controller_bandwidth;
-      law.gains_[static_cast<std::size_t>(i)] =
-          S(binomial_table<Order, detail::TableScalar<S>>[Order][static_cast<std::size_t>(i)]) *
-          power;
-    }
-    if (auto ok = check_representable("controller_bandwidth", config.controller_bandwidth,
-                                      law.gains_[0], "gives a gain that the scalar cannot hold");
-        !ok) {
-      return ok.error();
+    } else {
+      if (auto ok = check_positive("controller_bandwidth", config.controller_bandwidth); !ok) {
+        return ok.error();
+      }
+      S power(1.0);
+      for (int i = Order - 1; i >= 0; --i) {
+        power = power * config.controller_bandwidth;
+        law.gains_[static_cast<std::size_t>(i)] =
+            S(binomial_table<Order, detail::TableScalar<S>>[Order][static_cast<std::size_t>(i)]) *
+            power;
+      }
+      if (auto ok = check_representable("controller_bandwidth", config.controller_bandwidth,
+                                        law.gains_[0], "gives a gain that the scalar cannot hold");
+          !ok) {
+        return ok.error();
+      }
     }
     for (const S& gain : law.gains_) {
       if (!all(is_finite(S(gain * law.inverse_input_gain_)))) {
-        return Error<S>{"controller_bandwidth", config.controller_bandwidth,
-                        "gives a gain that divided by input_gain is more than the scalar can hold"};
+        return Error<S>{"input_gain", config.input_gain,
+                        "with these gains gives a law that the scalar cannot hold"};
       }
     }
     return law;

@@ -39,6 +39,77 @@ struct LoopSettings {
   int measurement_divider = 1;  ///< D: a measurement is due at every D-th step, 1 .. 1000
 };
 
+namespace detail {
+
+template <PlainScalar S>
+Check<S> check_within(const char* field, const S& input, const Limits<S>& limits) {
+  if (auto ok = check_finite(field, input); !ok) return ok;
+  const bool nothing_said = !(input < S(0)) && !(input > S(0));
+  if (!nothing_said && input < limits.lower) {
+    return Error<S>{field, input, "must not be below limits.lower", -1, limits.lower, true};
+  }
+  if (!nothing_said && input > limits.upper) {
+    return Error<S>{field, input, "must not be above limits.upper", -1, limits.upper, true};
+  }
+  return {};
+}
+
+template <PlainScalar S>
+struct CheckedLoop {
+  Limiter<S> limiter;
+  std::uint32_t hold_samples;
+};
+
+/// The rules for the settings; of no class, so that the loops of all observers share its code.
+template <PlainScalar S>
+Expected<CheckedLoop<S>, Error<S>> check_loop(const LoopSettings<S>& settings, S sample_time,
+                                              int max_gap, bool bears_gaps) {
+  const auto limiter = Limiter<S>::make(settings.limits, sample_time);
+  if (!limiter) return limiter.error();
+  if (auto ok = check_not_negative("hold.time", settings.hold.time); !ok) return ok.error();
+  if (auto ok = check_within("hold.input", settings.hold.input, settings.limits); !ok) {
+    return ok.error();
+  }
+  const S samples = std::ceil(settings.hold.time / sample_time - S(1) / S(1024));
+  if (!(samples < S(1 << 24))) {
+    return Error<S>{"hold.time", settings.hold.time, "must be below 2^24 samples"};
+  }
+  if (settings.missing.input) {
+    if (auto ok = check_within("missing.input", *settings.missing.input, settings.limits); !ok) {
+      return ok.error();
+    }
+  }
+  const int divider = settings.measurement_divider;
+  if (divider < 1 || divider > 1000) {
+    return Error<S>{"measurement_divider", static_cast<S>(divider), "must be 1 .. 1000"};
+  }
+  if (divider > max_gap) {
+    return Error<S>{"measurement_divider",
+                    static_cast<S>(divider),
+                    "must not be above the observer's max_gap, which is",
+                    -1,
+                    static_cast<S>(max_gap),
+                    true};
+  }
+  if (divider > 1 && !bears_gaps) {
+    return Error<S>{"measurement_divider", static_cast<S>(divider),
+                    "must be 1 for an observer that regular gaps restart"};
+  }
+  // The observer counts missing samples up to 65535.
+  const int most = 65535 / divider - 1;
+  if (settings.missing.most < 0 || settings.missing.most > most) {
+    return Error<S>{"missing.most",
+                    static_cast<S>(settings.missing.most),
+                    "must be 0 up to 65535 samples, that is",
+                    -1,
+                    static_cast<S>(most),
+                    true};
+  }
+  return CheckedLoop<S>{*limiter, static_cast<std::uint32_t>(samples)};
+}
+
+}  // namespace detail
+
 /// What decides about the output now.
 enum class LoopMode : unsigned char {
   running,  ///< the law
@@ -60,48 +131,10 @@ class ControlLoop {
   /// @return the loop, with the observer in the state that it has, or an error that names the field
   static Expected<ControlLoop, Error<S>> make(const Observer& observer,
                                               const LoopSettings<S>& settings, int max_gap) {
-    const auto limiter = Limiter<S>::make(settings.limits, observer.sample_time());
-    if (!limiter) return limiter.error();
-    if (auto ok = check_not_negative("hold.time", settings.hold.time); !ok) return ok.error();
-    if (auto ok = check_within("hold.input", settings.hold.input, settings.limits); !ok) {
-      return ok.error();
-    }
-    const S samples = std::ceil(settings.hold.time / observer.sample_time() - S(1) / S(1024));
-    if (!(samples < S(1 << 24))) {
-      return Error<S>{"hold.time", settings.hold.time, "must be below 2^24 samples"};
-    }
-    if (settings.missing.input) {
-      if (auto ok = check_within("missing.input", *settings.missing.input, settings.limits); !ok) {
-        return ok.error();
-      }
-    }
-    const int divider = settings.measurement_divider;
-    if (divider < 1 || divider > 1000) {
-      return Error<S>{"measurement_divider", static_cast<S>(divider), "must be 1 .. 1000"};
-    }
-    if (divider > max_gap) {
-      return Error<S>{"measurement_divider",
-                      static_cast<S>(divider),
-                      "must not be above the observer's max_gap, which is",
-                      -1,
-                      static_cast<S>(max_gap),
-                      true};
-    }
-    if (divider > 1 && !bears_regular_gaps<Observer>) {
-      return Error<S>{"measurement_divider", static_cast<S>(divider),
-                      "must be 1 for an observer that regular gaps restart"};
-    }
-    // The observer counts missing samples up to 65535.
-    const int most = 65535 / divider - 1;
-    if (settings.missing.most < 0 || settings.missing.most > most) {
-      return Error<S>{"missing.most",
-                      static_cast<S>(settings.missing.most),
-                      "must be 0 up to 65535 / measurement_divider - 1, that is",
-                      -1,
-                      static_cast<S>(most),
-                      true};
-    }
-    return ControlLoop(observer, *limiter, settings, static_cast<std::uint32_t>(samples));
+    const auto checked =
+        detail::check_loop(settings, observer.sample_time(), max_gap, bears_regular_gaps<Observer>);
+    if (!checked) return checked.error();
+    return ControlLoop(observer, checked->limiter, settings, checked->hold_samples);
   }
 
   /// One sample: the observer's update with the input that this loop put out last, then the law.
@@ -236,18 +269,6 @@ class ControlLoop {
     // What stands at the actuator before the first step; of an input left out what is within the
     // limits.
     if (hold_samples > 0) limiter_.track(limiter_.within(hold_input_));
-  }
-
-  static Check<S> check_within(const char* field, const S& input, const Limits<S>& limits) {
-    if (auto ok = check_finite(field, input); !ok) return ok;
-    const bool nothing_said = !(input < S(0)) && !(input > S(0));
-    if (!nothing_said && input < limits.lower) {
-      return Error<S>{field, input, "must not be below limits.lower", -1, limits.lower, true};
-    }
-    if (!nothing_said && input > limits.upper) {
-      return Error<S>{field, input, "must not be above limits.upper", -1, limits.upper, true};
-    }
-    return {};
   }
 
   void report_applied(S u_applied) noexcept {
