@@ -91,6 +91,19 @@ reads gap.csv "${named[@]}"
 { echo t,y,u; table , | awk -F, 'NR % 7 != 3'; } >irregular.csv
 reads irregular.csv "${named[@]}"
 
+# A name of nothing but dots is no folder: nothing is written beside the other results, nor removed.
+mkdir -p out/control_practice
+echo precious | tee out/summary.csv out/contents.csv out/control_practice/summary.csv >/dev/null
+for dots in ..csv ...csv; do
+  cp plain.csv "$dots"
+  run "$dots" "${named[@]}"
+  verdict $? "$dots: $said"
+  [[ $(cat out/summary.csv out/contents.csv out/control_practice/summary.csv) == \
+    $'precious\nprecious\nprecious' && ! -e out/estimates.csv &&
+    ! -e out/control_practice/estimates.csv ]]
+  verdict $? "$dots: wrote outside of its folder: $(find out -newer "$dots")"
+done
+
 refuses "no column 'torque'; there are t, y, u" plain.csv --time t --y y --u torque
 refuses "there is no header and are 3 columns" no_header.csv --time 1 --y 2 --u 4
 sed '5s/.*/0.03,about 2,1/' plain.csv >word.csv

@@ -109,6 +109,13 @@ class Arguments {
   std::map<std::string, std::string> options_;
 };
 
+/// Name of the folder for a log. A name of nothing but dots would be the folder itself or the one
+/// above it.
+std::string folder_name(const std::filesystem::path& file) {
+  const std::string stem = file.stem().string();
+  return stem.find_first_not_of('.') == std::string::npos ? "log" + stem : stem;
+}
+
 /// A report below `out`, for an example of this name.
 Report make_report(const std::string& out, const std::string& name, const About& about) {
   std::string program = "measured_log";
@@ -154,7 +161,7 @@ int run_own_log(const Arguments& arguments) {
     }
   }
   Report report = make_report(
-      arguments.text("out", "out"), file.stem().string(),
+      arguments.text("out", "out"), folder_name(file),
       about("Log " + file.filename().string(),
             "Observer " + settings.observer + ", order " + std::to_string(settings.order) +
                 ", b0 = " + number_text(settings.input_gain, 6) +

@@ -58,7 +58,6 @@ TEST(PidConversion, ThereAndBack) {
   for (const double kappa : {1.0, 1.5, 3.0, 9.9}) {
     const AdrcTuning<double> tuning{-2, 7, 7 * kappa};
     const auto second = esokit::adrc_from_pid<2>(esokit::pid_from_adrc<2>(tuning).value()).value();
-    EXPECT_TRUE(second.exact) << kappa;
     // Near kappa = 1 the root is double: half the digits.
     const double tolerance = kappa < 1.2 ? 1e-6 : 1e-10;
     EXPECT_NEAR(second.input_gain / tuning.input_gain, 1, tolerance);
@@ -68,26 +67,45 @@ TEST(PidConversion, ThereAndBack) {
         esokit::adrc_from_pid<1>(esokit::pid_from_adrc<1>(tuning).value(), kappa).value();
     EXPECT_NEAR(first.input_gain / tuning.input_gain, 1, 1e-12);
     EXPECT_NEAR(first.controller_bandwidth / 7, 1, 1e-12);
-    EXPECT_TRUE(first.exact);
   }
 }
 
-/// Where no ADRC has the three gains, K_p and K_i are met and it says so.
-TEST(PidConversion, NearestWhereThereIsNone) {
-  for (const double derivative : {0.01, 0.25, 0.39, 0.41, 3.0}) {
-    const PidGains<double> pid{1, 1, derivative};
-    const auto tuning = esokit::adrc_from_pid<2>(pid).value();
-    const auto back = esokit::pid_from_adrc<2>(tuning).value();
-    EXPECT_NEAR(back.proportional, 1, 1e-12);
-    EXPECT_NEAR(back.integral, 1, 1e-12);
-    // K_p^2 / (K_i K_d) in 2.5 .. 3.245 (kappa = 10) is what there is.
-    const bool there = derivative <= 1 / 2.5 && derivative >= 163.0 / 529.0;
-    EXPECT_EQ(tuning.exact, there) << derivative;
-    if (there) {
-      EXPECT_NEAR(back.derivative, derivative, 1e-12);
+/// Where no ADRC has the three gains it says which K_d one has.
+TEST(PidConversion, RefusedWhereThereIsNone) {
+  for (const double ratio : {3.0, 10.0, 100.0}) {
+    // K_p^2 / (K_i K_d) at kappa = 1 and at the largest.
+    const double most = 10.0 / 25.0;
+    const double least = (ratio * ratio + 6 * ratio + 3) / ((2 * ratio + 3) * (2 * ratio + 3));
+    for (const double derivative : {0.01, 0.2, 0.999 * least, 1.001 * least, 0.399, 0.401, 3.0}) {
+      SCOPED_TRACE(::testing::Message() << derivative << ", ratio " << ratio);
+      const PidGains<double> pid{1, 1, derivative};
+      const auto tuning = esokit::adrc_from_pid<2>(pid, ratio);
+      if (derivative > least && derivative < most) {
+        ASSERT_TRUE(tuning.has_value());
+        const auto back = esokit::pid_from_adrc<2>(*tuning).value();
+        EXPECT_NEAR(back.proportional, 1, 1e-12);
+        EXPECT_NEAR(back.integral, 1, 1e-12);
+        EXPECT_NEAR(back.derivative, derivative, 1e-12);
+        EXPECT_GE(tuning->observer_bandwidth, tuning->controller_bandwidth);
+        continue;
+      }
+      ASSERT_FALSE(tuning.has_value());
+      EXPECT_STREQ(tuning.error().field, "derivative");
+      EXPECT_STREQ(tuning.error().rule,
+                   "is that of no ADRC with this proportional, integral and bandwidth_ratio; the "
+                   "nearest that is");
+      EXPECT_NEAR(tuning.error().limit, derivative < least ? least : most, 1e-12);
+      // And that one is taken.
+      const auto nearest =
+          esokit::adrc_from_pid<2>(PidGains<double>{1, 1, tuning.error().limit}, ratio);
+      ASSERT_TRUE(nearest.has_value());
+      EXPECT_NEAR(esokit::pid_from_adrc<2>(*nearest)->derivative, tuning.error().limit, 1e-7);
     }
-    EXPECT_GE(tuning.observer_bandwidth, tuning.controller_bandwidth * (1 - 1e-12));
   }
+  // A working PID that is far from every ADRC: K_d would be 8.2, and b0 wrong by as much.
+  const auto far = esokit::adrc_from_pid<2>(PidGains<double>{40, 60, 1.5});
+  ASSERT_FALSE(far.has_value());
+  EXPECT_NEAR(far.error().limit, 8.217, 1e-3);
 }
 
 TEST(PidConversion, RefusedByName) {

@@ -13,7 +13,8 @@ namespace esokit {
 /// magnitude of the impulse response. Sharp: some input of size one comes as near to it as you
 /// like.
 ///
-/// Sampled systems: to rounding. Continuous ones: by the trapezoid rule, to about 1e-4.
+/// Sampled systems: to 1e-9, where the sum is broken off. Continuous ones: by the trapezoid rule,
+/// to about 1e-4.
 /// @return error for a system that is not stable, or whose response lasts longer than 1e8 steps
 template <int States, int Inputs, int Outputs>
 Expected<Matrix<double, Outputs, Inputs>, Error<double>> peak_gain(

@@ -61,7 +61,8 @@ concept PredictableObserver = std::copyable<O> &&
 /// after `prepare`, tell `report_applied`: the prediction is put right by Gamma (u_reported -
 /// u_assumed) before the next correction.
 ///
-/// Scalars: plain ones and packs. No call but make and retune does more than multiply and add; none
+/// Scalars: plain ones and packs. No call but make and retune does more than multiply and add
+/// beside what the observer's gain law does (the division of a filter, the power of fal); none
 /// allocates, throws or locks.
 template <PredictableObserver Observer>
 class PredictiveAdrc {

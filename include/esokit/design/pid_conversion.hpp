@@ -35,7 +35,6 @@ struct AdrcTuning {
   S input_gain{};            ///< b0
   S controller_bandwidth{};  ///< omega_c, rad/s
   S observer_bandwidth{};    ///< omega_o, rad/s
-  bool exact = true;  ///< false: no ADRC has these gains; K_p and K_i are met, K_d is the nearest
 };
 
 /// Gains of the PI (Order 1) or PID (Order 2) that the ADRC is.
@@ -89,13 +88,14 @@ Expected<PidGains<S>, Error<S>> pid_from_adrc(const AdrcTuning<S>& tuning) {
 ///
 /// PI: any `bandwidth_ratio` kappa = omega_o / omega_c will do, the given one is taken. PID: kappa
 /// follows from K_p^2 / (K_i K_d) = (2 kappa + 3)^2 / (kappa^2 + 6 kappa + 3), which for kappa >= 1
-/// runs from 2.5 to 4 (K_p^2 / (K_i K_d) = 4 is Ziegler and Nichols' T_i = 4 T_d). Below 2.5 kappa
-/// = 1 is taken, above what `bandwidth_ratio` gives that; `exact` is false then.
+/// runs from 2.5 to 4 (K_p^2 / (K_i K_d) = 4 is Ziegler and Nichols' T_i = 4 T_d). Outside, and
+/// where kappa would be above `bandwidth_ratio`, no ADRC has these gains: refused, with the nearest
+/// K_d that has one as the limit. Take that only if it is near; far off, b0 is wrong by as much.
 /// @param pid gains that are not zero and of one sign; the filter is not looked at
 /// @param bandwidth_ratio kappa of PI, largest kappa of PID; the step response wants 3 .. 10, noise
 ///        wants less
-/// @return error for gains that are zero or of different signs, and for a ratio that is not
-///         positive (PI) or not above 1 (PID)
+/// @return error for gains that are zero, of different signs or of no ADRC, and for a ratio that is
+///         not positive (PI) or not above 1 (PID)
 template <int Order, PlainScalar S>
 Expected<AdrcTuning<S>, Error<S>> adrc_from_pid(const PidGains<S>& pid, S bandwidth_ratio = S(10)) {
   static_assert(Order == 1 || Order == 2, "esokit: PID is for orders 1 and 2");
@@ -131,14 +131,22 @@ Expected<AdrcTuning<S>, Error<S>> adrc_from_pid(const PidGains<S>& pid, S bandwi
     const S rounding = S(64) * std::numeric_limits<S>::epsilon();
     if (square < S(0) && square > -rounding * (b * b)) square = S(0);
     const S root = a > S(0) && square >= S(0) ? (-b + std::sqrt(square)) / (S(2) * a) : S(-1);
-    if (a > S(0) && square < S(0)) {
-      kappa = S(1);
-      tuning.exact = false;
-    } else if (!(a > S(0)) || root > bandwidth_ratio) {
-      tuning.exact = false;
-    } else {
-      kappa = root < S(1) ? S(1) : root;
+    const bool too_much = a > S(0) && square < S(0);
+    const S edge = bandwidth_ratio * (S(1) + rounding * bandwidth_ratio);
+    if (too_much || !(a > S(0)) || root > edge) {
+      kappa = too_much ? S(1) : bandwidth_ratio;
+      const S both = S(2) * kappa + S(3);
+      const S nearest = (kappa * kappa + S(6) * kappa + S(3)) / (both * both);
+      return Error<S>{
+          "derivative",
+          pid.derivative,
+          "is that of no ADRC with this proportional, integral and bandwidth_ratio; the "
+          "nearest that is",
+          -1,
+          nearest * pid.proportional / rate,
+          true};
     }
+    kappa = root < S(1) ? S(1) : root;
     tuning.controller_bandwidth = rate * (S(3) + S(2) * kappa) / kappa;
     tuning.observer_bandwidth = kappa * tuning.controller_bandwidth;
     const S m = S(3) * kappa * kappa + S(6) * kappa + S(1);
