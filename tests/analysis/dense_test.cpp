@@ -42,7 +42,7 @@ TEST(Dense, SolvesLinearEquations) {
     Matrix<Complex, 5, 5> work = a;
     Matrix<Complex, 5, 2> x = b;
     detail::solve_in_place(detail::DenseView<Complex>{work.data(), 5},
-                           detail::DenseView<Complex>{x.data(), 5}, 2);
+                           detail::DenseView<Complex>{x.data(), 5, 2});
     EXPECT_LT((a * x - b).cwiseAbs().maxCoeff(), 1e-11 * (1.0 + x.cwiseAbs().maxCoeff()));
   }
 }
@@ -68,7 +68,7 @@ TEST(Dense, EigenvaluesOfABuiltMatrix) {
     Matrix<double, 6, 6> work = s.transpose();
     Matrix<double, 6, 6> right = (s * diagonal).transpose();  // a' = s'^-1 (s diagonal)'
     detail::solve_in_place(detail::DenseView<double>{work.data(), 6},
-                           detail::DenseView<double>{right.data(), 6}, 6);
+                           detail::DenseView<double>{right.data(), 6});
     LinearSystem<6, 1, 1> system;
     system.a = right.transpose();
     const auto values = poles(system);

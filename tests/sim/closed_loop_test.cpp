@@ -121,6 +121,7 @@ double distance_to_exact(const Observer& observer, double step, const Vector<dou
   EXPECT_TRUE(end) << (end ? "" : end.error().field);
   EXPECT_TRUE(end->completed);
   EXPECT_NEAR(end->t, 1.0, 1e-12);
+  EXPECT_EQ(end->steps, std::lround(1.0 / step));
   return (end->plant_state - exact).norm();
 }
 
@@ -243,6 +244,7 @@ TEST(ContinuousLoop, CallbackMayStopTheRunAndRunsRepeat) {
   EXPECT_FALSE(stopped->completed);
   EXPECT_EQ(stopped->steps, 30);
   EXPECT_NEAR(stopped->t, 0.3, 1e-12);
+  EXPECT_EQ(stopped->steps, 30);
   const auto first = loop.run({.duration = 1.0, .step = 0.01}, ignore);
   const auto second = loop.run({.duration = 1.0, .step = 0.01}, ignore);
   EXPECT_EQ(first->plant_state, second->plant_state);

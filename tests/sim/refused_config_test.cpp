@@ -107,6 +107,12 @@ TEST(RefusedConfig, SeriesAndWindow) {
     EXPECT_EQ(refused(Series<>::make({.times = spoilt, .values = three})), "times[1]");
     EXPECT_EQ(refused(Series<>::make({.times = three, .values = spoilt})), "values[1]");
     EXPECT_EQ(refused(Series<>::make_uniform({.values = spoilt})), "values[1]");
+    const std::vector<double> first{bad, 0.0, 1.0};
+    const std::vector<double> last{0.0, 1.0, bad};
+    EXPECT_EQ(refused(Series<>::make_uniform({.values = first})), "values[0]");
+    EXPECT_EQ(refused(Series<>::make_uniform({.values = last})), "values[2]");
+    EXPECT_EQ(refused(Series<>::make({.times = first, .values = three})), "times[0]");
+    EXPECT_EQ(refused(Series<>::make({.times = three, .values = first})), "values[0]");
     EXPECT_EQ(refused(Series<>::make_uniform({.start = bad, .values = two})), "start");
     EXPECT_EQ(refused(Series<>::make_uniform({.sample_time = bad, .values = two})), "sample_time");
     EXPECT_EQ(refused(Window<>::make({.start = bad})), "start");

@@ -26,15 +26,15 @@ struct SystemView {
   template <int States, int Inputs, int Outputs>
   SystemView(LinearSystem<States, Inputs, Outputs>& system)
       : a{system.a.data(), States},
-        b{system.b.data(), States},
-        c{system.c.data(), Outputs},
-        d{system.d.data(), Outputs},
+        b{system.b.data(), States, Inputs},
+        c{system.c.data(), Outputs, States},
+        d{system.d.data(), Outputs, Inputs},
         states(States) {}  // a matrix of one row is stored by rows, which is the same
 };
 
 template <class MatrixType>
 DenseView<double> view_of(MatrixType& matrix) {
-  return {matrix.data(), static_cast<int>(matrix.rows())};
+  return {matrix.data(), static_cast<int>(matrix.rows()), static_cast<int>(matrix.cols())};
 }
 
 struct LoopParts {

@@ -34,8 +34,8 @@ Matrix<std::complex<double>, Outputs, Inputs> evaluate(
     for (int i = 0; i < Inputs; ++i) x(j, i) = system.b(j, i);
   }
   // A vector that is a row is stored by rows, which for a vector is the same.
-  solve_in_place(DenseView<Complex>{pencil.data(), States}, DenseView<Complex>{x.data(), States},
-                 Inputs);
+  solve_in_place(DenseView<Complex>{pencil.data(), States},
+                 DenseView<Complex>{x.data(), States, Inputs});
   Matrix<Complex, Outputs, Inputs> response;
   for (int i = 0; i < Outputs; ++i) {
     for (int j = 0; j < Inputs; ++j) {

@@ -83,9 +83,8 @@ constexpr Array<const char*, Order + Extension> estimate_names() noexcept {
   return names;
 }
 
-/// `balance` without the sizes in the type, for code that is compiled once. @param inputs of b
-inline void balance(DenseView<double> a, DenseView<double> b, int inputs,
-                    DenseView<double> c) noexcept {
+/// `balance` without the sizes in the type, for code that is compiled once.
+inline void balance(DenseView<double> a, DenseView<double> b, DenseView<double> c) noexcept {
   const int states = a.rows;
   for (int sweep = 0; sweep < 30; ++sweep) {
     bool changed = false;
@@ -104,7 +103,7 @@ inline void balance(DenseView<double> a, DenseView<double> b, int inputs,
       const double factor = std::exp2(exponent);
       for (int j = 0; j < states; ++j) a(i, j) /= factor;
       for (int j = 0; j < states; ++j) a(j, i) *= factor;
-      for (int j = 0; j < inputs; ++j) b(i, j) /= factor;
+      for (int j = 0; j < b.columns; ++j) b(i, j) /= factor;
       for (int j = 0; j < c.rows; ++j) c(j, i) *= factor;
       changed = true;
     }
@@ -119,8 +118,8 @@ inline void balance(DenseView<double> a, DenseView<double> b, int inputs,
 template <int States, int Inputs, int Outputs>
 void balance(LinearSystem<States, Inputs, Outputs>& system) noexcept {
   // A matrix of one row is stored by rows, which is the same.
-  detail::balance({system.a.data(), States}, {system.b.data(), States}, Inputs,
-                  {system.c.data(), Outputs});
+  detail::balance({system.a.data(), States}, {system.b.data(), States, Inputs},
+                  {system.c.data(), Outputs, States});
 }
 
 namespace detail {

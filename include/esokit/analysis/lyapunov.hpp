@@ -71,14 +71,14 @@ inline bool solve_lyapunov_once(const double* a, const double* q, double* p, dou
     work2[i] = 2.0 * c * q[i];
   }
   shift(work1);
-  solve_in_place(DenseView<double>{work1, n}, DenseView<double>{e, n}, n);
+  solve_in_place(DenseView<double>{work1, n}, DenseView<double>{e, n});
   shift(work1);
-  solve_in_place(DenseView<double>{work1, n}, DenseView<double>{work2, n}, n);
+  solve_in_place(DenseView<double>{work1, n}, DenseView<double>{work2, n});
   for (int i = 0; i < n; ++i) {
     for (int j = 0; j < n; ++j) p[j * n + i] = work2[i * n + j];
   }
   shift(work1);
-  solve_in_place(DenseView<double>{work1, n}, DenseView<double>{p, n}, n);
+  solve_in_place(DenseView<double>{work1, n}, DenseView<double>{p, n});
   return doubling(e, p, work1, work2, n);
 }
 

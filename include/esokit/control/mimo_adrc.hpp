@@ -229,7 +229,7 @@ class MimoAdrc {
     InputMatrix inverse = InputMatrix::Identity();
     InputMatrix eliminated = scaled;
     detail::solve_in_place(detail::DenseView<S>{eliminated.data(), channels},
-                           detail::DenseView<S>{inverse.data(), channels}, channels);
+                           detail::DenseView<S>{inverse.data(), channels});
     S condition = scaled.cwiseAbs().colwise().sum().maxCoeff() *
                   inverse.cwiseAbs().colwise().sum().maxCoeff();
     if (!is_finite(S(inverse.sum())) || !is_finite(condition)) {
