@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Refuses every include in include/esokit that goes against
 #   core <- model <- design <- observer <- control <- analysis <- sim
-# and an umbrella header that does not include every other header.
+# an umbrella header that does not include every other header, and a header that reaches C++20 before
+# core/language.hpp, which says that it is needed.
 # usage: cmake/check_include_direction.sh [INCLUDE_DIR | --self-test]
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -54,6 +55,7 @@ check() {  # check INCLUDE_DIR
         next
       }
       split(target, part, "/")
+      reaches[FILENAME] = 1
       if (!(target in known)) refuse("no such header")
       else if (umbrella) next
       else if (!(part[2] in rank)) refuse("a header may not include the umbrella header")
@@ -61,6 +63,10 @@ check() {  # check INCLUDE_DIR
     }
     END {
       for (i = 1; i < ARGC; ++i) {
+        if (!(ARGV[i] in reaches) && ARGV[i] !~ /^esokit\/core\/(language|version).hpp$/) {
+          printf "%s: does not include esokit/core/language.hpp\n", ARGV[i]
+          ++refused
+        }
         if (ARGV[i] == "esokit/esokit.hpp" || ("#include <" ARGV[i] ">") in brought) continue
         printf "esokit/esokit.hpp: does not include %s\n", ARGV[i]
         ++refused
@@ -74,8 +80,9 @@ self_test() {  # the check must be able to fail
   folder=$(mktemp -d)
   trap 'rm -rf "$folder"' RETURN
   mkdir -p "$folder"/esokit/{core,model,sim}
-  printf '#include <esokit/%s.hpp>\n' core/a model/b sim/c >"$folder/esokit/esokit.hpp"
-  printf '#include <cmath>\n#include <Eigen/Core>\n' >"$folder/esokit/core/a.hpp"
+  printf '#include <esokit/%s.hpp>\n' core/language core/a model/b sim/c >"$folder/esokit/esokit.hpp"
+  touch "$folder/esokit/core/language.hpp"
+  printf '#include <cmath>\n#include <Eigen/Core>\n#include <esokit/core/language.hpp>\n' >"$folder/esokit/core/a.hpp"
   echo '#include "esokit/core/a.hpp"' >"$folder/esokit/model/b.hpp"
   echo '#include <esokit/model/b.hpp>' >"$folder/esokit/sim/c.hpp"
   check "$folder" || { echo "self-test: a good tree is refused"; return 1; }
@@ -93,6 +100,12 @@ self_test() {  # the check must be able to fail
     echo "self-test: a header that the umbrella lacks is not refused"
     return 1
   fi
+  echo '#include <esokit/model/bad.hpp>' >>"$folder/esokit/esokit.hpp"
+  if check "$folder" >/dev/null; then
+    echo "self-test: a header without the language is not refused"
+    return 1
+  fi
+  sed -i '$d' "$folder/esokit/esokit.hpp"
   rm "$folder/esokit/model/bad.hpp"
   touch "$folder/esokit/loose.hpp"
   if check "$folder" >/dev/null; then

@@ -35,14 +35,16 @@
 #include <esokit/core/error_text.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/fal.hpp>
+#include <esokit/core/language.hpp>
 #include <esokit/core/linear_equations.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/power.hpp>
 #include <esokit/core/scalar.hpp>
 #include <esokit/core/snapshot.hpp>
 #include <esokit/core/snapshot_text.hpp>
-#include <esokit/core/unroll.hpp>
+#include <esokit/core/text.hpp>
 #include <esokit/core/type_tag.hpp>
+#include <esokit/core/unroll.hpp>
 #include <esokit/core/version.hpp>
 #include <esokit/design/check.hpp>
 #include <esokit/design/continuous_gain.hpp>

@@ -11,6 +11,7 @@
 #include <esokit/observer/wrapped_output.hpp>
 #include <limits>
 #include <numbers>
+#include <sstream>
 
 #include "loop_traits.hpp"
 
@@ -51,6 +52,76 @@ TEST(Adrc, IsObserverAndLaw) {
   const auto z = observer.estimate();
   const double expected = (7 + 100 * (0.5 - z(0)) + 20 * (0.25 - z(1)) - z(2)) / 2;
   EXPECT_NEAR(controller.update(y, Vector<double, 3>(0.5, 0.25, 7)), expected, 1e-6);
+}
+
+TEST(Adrc, TakesAListOfTheReferenceAndItsDerivatives) {
+  const double r = 0.5, r1 = 0.25, r2 = 7;
+  auto listed = Linear::make(base()).value();
+  auto given = Linear::make(base()).value();
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_EQ(listed.update(0.3, {r, r1, r2}), given.update(0.3, Vector<double, 3>(r, r1, r2)));
+    EXPECT_EQ(listed.update(0.3, {r, r1}), given.update(0.3, Vector<double, 2>(r, r1)));
+    EXPECT_EQ(listed.update(0.3, {r}), given.update(0.3, r));
+    EXPECT_EQ(listed.update(0.3, {r, r1, 7}, 0.1),
+              given.update(0.3, Vector<double, 3>(r, r1, 7), 0.1));
+    EXPECT_EQ(listed.update_without_measurement({r, r1}),
+              given.update_without_measurement(Vector<double, 2>(r, r1)));
+    EXPECT_NE(listed.output(), 0);
+  }
+}
+
+/// A machine of a user's: the controller is a member like any other.
+class Joint {
+ public:
+  double step(double angle) { return controller_.update(angle, 1.0); }
+  [[nodiscard]] const Linear& controller() const { return controller_; }
+
+ private:
+  Linear controller_ = Linear::make(base()).value();
+};
+
+/// One whose config comes from outside: whoever makes it sees the refusal.
+class Drive {
+ public:
+  explicit Drive(const Linear& controller) : controller_(controller) {}
+  static esokit::Expected<Drive, esokit::Error<double>> make(const Linear::Config& config) {
+    return Linear::make(config).and_then(
+        [](const Linear& c) -> esokit::Expected<Drive, esokit::Error<double>> { return Drive(c); });
+  }
+  double step(double angle) { return controller_.update(angle, 1.0); }
+
+ private:
+  Linear controller_;
+};
+
+TEST(Adrc, IsAMemberOfAClass) {
+  Joint joint;
+  auto drive = Drive::make(base()).value();
+  auto alone = Linear::make(base()).value();
+  const double u = alone.update(0.2, 1.0);
+  EXPECT_EQ(joint.step(0.2), u);
+  EXPECT_EQ(drive.step(0.2), u);
+  auto config = base();
+  config.observer.input_gain = 0;
+  EXPECT_STREQ(Drive::make(config).error().field, "input_gain");
+}
+
+TEST(Adrc, StatusAndModeHaveText) {
+  const auto text = [](auto value) { return (std::ostringstream() << value).str(); };
+  EXPECT_EQ(text(StepStatus::ok), "ok");
+  EXPECT_EQ(text(StepStatus::measurement_rejected), "measurement_rejected");
+  EXPECT_EQ(text(StepStatus::outlier_rejected), "outlier_rejected");
+  EXPECT_EQ(text(StepStatus::input_rejected | StepStatus::gap_bridged | StepStatus::restarted),
+            "input_rejected|gap_bridged|restarted");
+  EXPECT_EQ(text(static_cast<StepStatus>(255)),
+            "measurement_rejected|input_rejected|prediction_dropped|gap_bridged|restarted|"
+            "state_rejected|outlier_rejected|turn_assumed");
+  EXPECT_EQ(text(LoopMode::running), "running");
+  EXPECT_EQ(text(LoopMode::holding), "holding");
+  EXPECT_EQ(text(LoopMode::safe), "safe");
+  auto controller = Linear::make(base()).value();
+  controller.update(std::numeric_limits<double>::quiet_NaN(), 1.0);
+  EXPECT_EQ(text(controller.status()), "measurement_rejected");
 }
 
 TEST(Adrc, ErrorBasedEqualsOutputBasedForAConstantReference) {

@@ -4,6 +4,7 @@
 #include <esokit/core/error_text.hpp>
 #include <esokit/core/expected.hpp>
 #include <memory>
+#include <sstream>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -111,6 +112,37 @@ TEST(ErrorText, NamesFieldValueAndRule) {
   std::ostringstream out;
   out << refused << ';';
   EXPECT_EQ(out.str(), "input_gain = 0: must not be zero;");
+}
+
+/// Takes C strings and nothing else: what a logger of firmware may be.
+struct Logger {
+  std::string text;
+  Logger& operator<<(const char* more) {
+    text += more;
+    return *this;
+  }
+};
+
+struct Opaque {};
+
+template <class Stream, class T>
+concept Writes = requires(Stream& out, const T& value) {
+  out << value;
+};
+
+TEST(Expected, IsWrittenAsItsErrorOrItsValue) {
+  EXPECT_EQ(to_text(Result(refused)), "input_gain = 0: must not be zero");
+  EXPECT_EQ(to_text(Result(std::string("good"))), "good");
+  EXPECT_EQ(to_text(Outcome()), "ok");
+  EXPECT_EQ(to_text(Outcome(refused)), "input_gain = 0: must not be zero");
+  EXPECT_EQ(to_text(Expected<Opaque, Error<double>>(Opaque{})), "ok");
+  Logger log;
+  log << Expected<Opaque, const char*>("no memory");
+  EXPECT_EQ(log.text, "no memory");
+  static_assert(Writes<std::ostream, Result> && Writes<std::ostream, Error<float>>);
+  static_assert(!Writes<Logger, Error<double>>, "it takes no numbers");
+  static_assert(!Writes<std::ostream, Error<Opaque>>, "nobody can write its value");
+  static_assert(!Writes<int, Error<double>> && !Writes<int, Result>);
 }
 
 TEST(Expected, ValueOfATemporaryOutlivesIt) {

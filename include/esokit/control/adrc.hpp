@@ -3,6 +3,7 @@
 /// limits, start, missing samples and retuning.
 #pragma once
 
+#include <cstddef>
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/control/control_loop.hpp>
 #include <esokit/control/scaled_law.hpp>
@@ -131,6 +132,22 @@ class Adrc {
     const Reference r = filled(reference);
     return loop_.step(measured(y, r(0)), u_applied, [&] { return command(r); });
   }
+
+  /// The same by a list: `update(y, {r, r1, r2})`.
+  /// @{
+  template <std::size_t Count>
+  S update(S y, const S (&reference)[Count]) noexcept {
+    return update(y, listed(reference));
+  }
+  template <std::size_t Count>
+  S update(S y, const S (&reference)[Count], S u_applied) noexcept {
+    return update(y, listed(reference), u_applied);
+  }
+  template <std::size_t Count>
+  S update_without_measurement(const S (&reference)[Count]) noexcept {
+    return update_without_measurement(listed(reference));
+  }
+  /// @}
 
   /// One sample whose measurement did not come.
   S update_without_measurement(S reference) noexcept {
@@ -273,6 +290,13 @@ class Adrc {
     static_assert(Count >= 1 && Count <= order + 1, "esokit: the reference is (r, r', .., r^(n))");
     Reference all = Reference::Zero();
     for (int i = 0; i < Count; ++i) all(i) = reference(i);
+    return all;
+  }
+
+  template <std::size_t Count>
+  static Vector<S, static_cast<int>(Count)> listed(const S (&reference)[Count]) noexcept {
+    Vector<S, static_cast<int>(Count)> all;
+    for (std::size_t i = 0; i < Count; ++i) all(static_cast<int>(i)) = reference[i];
     return all;
   }
 

@@ -117,6 +117,17 @@ enum class LoopMode : unsigned char {
   safe      ///< too many measurements are missing
 };
 
+template <>
+inline constexpr bool has_text<LoopMode> = true;
+
+/// Writes the mode's name.
+template <class Stream>
+requires detail::WritesText<Stream> Stream& operator<<(Stream& out, LoopMode mode) {
+  constexpr const char* names[] = {"running", "holding", "safe"};
+  out << names[static_cast<int>(mode)];
+  return out;
+}
+
 /// An observer, an actuator's limits, and the rules for bad days. `step` runs one sample with any
 /// law; the controllers (Adrc, DisturbanceCompensator) are this and a law.
 ///

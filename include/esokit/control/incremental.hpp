@@ -69,7 +69,7 @@ class Incremental {
   [[nodiscard]] const Controller& controller() const noexcept { return controller_; }
 
  private:
-  static constexpr S half = std::numeric_limits<S>::max() / S(2);
+  static constexpr S half = (std::numeric_limits<S>::max)() / S(2);
 
   static constexpr bool within_half(const S& u) noexcept { return !(u < -half) && !(u > half); }
 

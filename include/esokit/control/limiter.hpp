@@ -12,8 +12,8 @@ namespace esokit {
 template <Scalar S = double>
 struct Limits {
   S lower = std::numeric_limits<S>::lowest();  ///< least u, unit of u
-  S upper = std::numeric_limits<S>::max();     ///< largest u, above lower
-  S rate = std::numeric_limits<S>::max();      ///< largest abs(du/dt), unit of u per s; positive
+  S upper = (std::numeric_limits<S>::max)();   ///< largest u, above lower
+  S rate = (std::numeric_limits<S>::max)();    ///< largest abs(du/dt), unit of u per s; positive
 };
 
 /// Holds a command within magnitude limits (asymmetric ones too) and a rate limit.
@@ -55,7 +55,7 @@ class Limiter {
 
   /// `u` within the magnitude limits, whatever the rate.
   [[nodiscard]] constexpr S within(const S& u) const noexcept {
-    return min(max(u, lower_), upper_);
+    return smaller(larger(u, lower_), upper_);
   }
 
   /// Tells what the actuator really held; the rate limit goes on from there.
@@ -63,11 +63,11 @@ class Limiter {
     last_ = output;
     // Without a rate limit the bounds stand still.
     if (!rate_limited_) return;
-    low_ = max(lower_, S(output - step_));
-    high_ = min(upper_, S(output + step_));
+    low_ = larger(lower_, S(output - step_));
+    high_ = smaller(upper_, S(output + step_));
     // An output from outside may lie beyond a magnitude limit by more than a step.
-    low_ = min(low_, upper_);
-    high_ = max(high_, lower_);
+    low_ = smaller(low_, upper_);
+    high_ = larger(high_, lower_);
   }
 
   /// The last output.
@@ -85,12 +85,13 @@ class Limiter {
         step_(limits.rate * sample_time),
         low_(limits.lower),
         high_(limits.upper),
-        rate_limited_(!all(limits.rate >= std::numeric_limits<S>::max()) && all(is_finite(step_))) {
+        rate_limited_(!all(limits.rate >= (std::numeric_limits<S>::max)()) &&
+                      all(is_finite(step_))) {
     track(within(S(0.0)));
   }
 
-  static constexpr S min(const S& a, const S& b) noexcept { return select(b < a, b, a); }
-  static constexpr S max(const S& a, const S& b) noexcept { return select(a < b, b, a); }
+  static constexpr S smaller(const S& a, const S& b) noexcept { return select(b < a, b, a); }
+  static constexpr S larger(const S& a, const S& b) noexcept { return select(a < b, b, a); }
 
   S lower_;
   S upper_;

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <concepts>
+#include <esokit/core/language.hpp>
 #include <type_traits>
 
 namespace esokit::detail {

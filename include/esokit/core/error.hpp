@@ -3,6 +3,7 @@
 #pragma once
 
 #include <esokit/core/scalar.hpp>
+#include <esokit/core/text.hpp>
 
 #if defined(__linux__) || defined(_WIN32) || defined(__APPLE__)
 #include <cstdio>
@@ -10,8 +11,8 @@
 
 namespace esokit {
 
-/// Names the field, its value and the rule that it breaks. Text is made by `to_text` in
-/// core/error_text.hpp, which firmware need not include.
+/// Names the field, its value and the rule that it breaks. Goes into any stream by <<; `to_text`
+/// and std::format are in core/error_text.hpp, which firmware need not include.
 ///
 /// The value is held in the scalar of the config: a double in here would link soft-float helpers on
 /// a single-precision target.
@@ -24,6 +25,20 @@ struct Error {
   ScalarType limit{};      ///< computed limit that belongs to the rule, if has_limit
   bool has_limit = false;  ///< whether `limit` says anything
 };
+
+template <class ScalarType>
+inline constexpr bool has_text<Error<ScalarType>> = true;
+
+/// Writes `field[index] = value: rule limit`.
+template <class Stream, class ScalarType>
+requires detail::WritesText<Stream, int, ScalarType> Stream& operator<<(
+    Stream& out, const Error<ScalarType>& error) {
+  out << error.field;
+  if (error.index >= 0) out << "[" << error.index << "]";
+  out << " = " << error.value << ": " << error.rule;
+  if (error.has_limit) out << " " << error.limit;
+  return out;
+}
 
 /// Last words before `Expected::value()` on an error ends the program; desktop systems only.
 template <class ScalarType>

@@ -1,30 +1,34 @@
 /// @file
-/// Text of an error, for programs that have a console.
+/// Text of what `has_text`, for programs that have a console: errors, results, flags.
 #pragma once
 
-#include <esokit/core/error.hpp>
-#include <ostream>
+#include <esokit/core/text.hpp>
 #include <sstream>
 #include <string>
+#include <version>
+#ifdef __cpp_lib_format
+#include <format>
+#endif
 
 namespace esokit {
 
-/// Writes `field[index] = value: rule limit`.
-template <class ScalarType>
-std::ostream& operator<<(std::ostream& out, const Error<ScalarType>& error) {
-  out << error.field;
-  if (error.index >= 0) out << '[' << error.index << ']';
-  out << " = " << error.value << ": " << error.rule;
-  if (error.has_limit) out << ' ' << error.limit;
-  return out;
-}
-
-/// The same as a string.
-template <class ScalarType>
-std::string to_text(const Error<ScalarType>& error) {
+/// What << writes, as a string.
+template <class T>
+requires has_text<T> && detail::WritesText<std::ostream, T> std::string to_text(const T& value) {
   std::ostringstream out;
-  out << error;
+  out << value;
   return out.str();
 }
 
 }  // namespace esokit
+
+#ifdef __cpp_lib_format
+/// The same for std::format, with the width and fill of a string.
+template <class T>
+requires requires(const T& value) { esokit::to_text(value); }
+struct std::formatter<T> : std::formatter<std::string> {
+  auto format(const T& value, auto& context) const {
+    return std::formatter<std::string>::format(esokit::to_text(value), context);
+  }
+};
+#endif

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdlib>
+#include <esokit/core/text.hpp>
 #include <type_traits>
 #include <utility>
 #include <variant>
@@ -114,5 +115,24 @@ class [[nodiscard]] Expected<void, E> {
  private:
   std::variant<std::monostate, E> error_;
 };
+
+template <class T, class E>
+inline constexpr bool has_text<Expected<T, E>> = true;
+
+/// Writes the error, or the value where it can be written, else `ok`.
+template <class Stream, class T, class E>
+requires detail::WritesText<Stream, E> Stream& operator<<(Stream& out,
+                                                          const Expected<T, E>& result) {
+  if (!result) {
+    out << result.error();
+  } else if constexpr (std::is_void_v<T>) {
+    out << "ok";
+  } else if constexpr (detail::WritesText<Stream, T>) {
+    out << *result;
+  } else {
+    out << "ok";
+  }
+  return out;
+}
 
 }  // namespace esokit

@@ -8,6 +8,7 @@
 #include <cassert>
 #include <cmath>
 #include <cstddef>
+#include <esokit/core/language.hpp>
 #include <utility>
 
 namespace esokit::detail {

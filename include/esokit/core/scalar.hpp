@@ -8,6 +8,7 @@
 #include <concepts>
 #include <cstdint>
 #include <cstring>
+#include <esokit/core/language.hpp>
 #include <limits>
 #include <type_traits>
 

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <esokit/core/language.hpp>
 
 namespace esokit {
 

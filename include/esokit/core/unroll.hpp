@@ -7,6 +7,7 @@
 
 #include <array>
 #include <cstddef>
+#include <esokit/core/language.hpp>
 #include <type_traits>
 #include <utility>
 

@@ -19,9 +19,9 @@ namespace detail {
 template <Scalar S>
 constexpr S smallest_normal() noexcept {
   if constexpr (std::numeric_limits<S>::is_specialized) {
-    return std::numeric_limits<S>::min();
+    return (std::numeric_limits<S>::min)();
   } else {
-    return S(std::numeric_limits<double>::min());
+    return S((std::numeric_limits<double>::min)());
   }
 }
 

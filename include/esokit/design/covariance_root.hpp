@@ -21,7 +21,7 @@ void make_lower(Matrix<S, Rows, Columns>& a) noexcept {
   for (int i = 0; i < Rows; ++i) {
     // Scaled by the largest element: squares of small roots would leave float.
     S largest(0);
-    for (int k = i; k < Columns; ++k) largest = std::max(largest, detail::magnitude(a(i, k)));
+    for (int k = i; k < Columns; ++k) largest = (std::max)(largest, detail::magnitude(a(i, k)));
     if (!(largest > S(0))) continue;
     S squares(0);
     for (int k = i; k < Columns; ++k) {

@@ -112,7 +112,7 @@ std::optional<Matrix<S, Size, Size>> riccati_covariance(const RiccatiModel<Size,
   constexpr int most_steps = 200;
   const S root = sqrt(model.inflation);
   Matrix<S, Size, Outputs> gain = start_gain;
-  S last_change(std::numeric_limits<detail::TableScalar<S>>::max());
+  S last_change((std::numeric_limits<detail::TableScalar<S>>::max)());
   for (int step = 0; step < most_steps; ++step) {
     const auto predictor = detail::product<Size, Size, Outputs, S>(model.transition, gain);
     auto error = detail::product<Size, Outputs, Size, S>(predictor, model.output);

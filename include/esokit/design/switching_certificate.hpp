@@ -153,7 +153,7 @@ template <int Size, PlainScalar S>
   // rho and 1 / rho change roles: the range is symmetric in the logarithm.
   S low = least;  // less strict when sampled than sqrt(least) in continuous time, down to zero
   S high = S(1);
-  while (low > std::numeric_limits<S>::min() * S(1e6) &&
+  while (low > (std::numeric_limits<S>::min)() * S(1e6) &&
          bandwidth_switching_certified<Size, S>(rule, bandwidth, low, sample_time)) {
     low = low * low;
   }

@@ -186,7 +186,7 @@ class ContinuousNonlinearEso
     if (!asked.unlimited && !asked.high &&
         (!asked.low || (all(is_finite(*asked.low)) && all(*asked.low >= S(free_from))))) {
       limits = {asked.low ? *asked.low : S(0.5),
-                S(std::numeric_limits<detail::TableScalar<S>>::max())};
+                S((std::numeric_limits<detail::TableScalar<S>>::max)())};
     } else {
       constexpr double least = least_certified_gain<size>();
       const auto found = detail::find_limits<size, S>(asked, gain, S(least), S(1e6));

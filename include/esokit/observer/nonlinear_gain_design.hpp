@@ -76,7 +76,7 @@ constexpr S largest(const S& a, const S& b) noexcept {
 template <int Size, Scalar S, class Gain>
 Expected<Interval<S>, Error<S>> find_limits(const GainLimits<S>& asked, const Gain& gain,
                                             const S& least_with_one, const S& ceiling) {
-  const S widest(static_cast<TableScalar<S>>(std::numeric_limits<TableScalar<S>>::max()));
+  const S widest(static_cast<TableScalar<S>>((std::numeric_limits<TableScalar<S>>::max)()));
   if (asked.low) {
     if (auto ok = check_not_negative("gain_min", *asked.low); !ok) return ok.error();
   }

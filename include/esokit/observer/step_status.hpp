@@ -2,6 +2,8 @@
 /// What a step of an observer reports.
 #pragma once
 
+#include <esokit/core/text.hpp>
+
 namespace esokit {
 
 /// Bit flags; `ok` is zero. A pack reports what happened in any of its lanes.
@@ -41,6 +43,28 @@ constexpr StepStatus& operator|=(StepStatus& a, StepStatus b) noexcept { return 
 /// True if `flag` is set in `status`.
 constexpr bool has(StepStatus status, StepStatus flag) noexcept {
   return (static_cast<unsigned char>(status) & static_cast<unsigned char>(flag)) != 0;
+}
+
+template <>
+inline constexpr bool has_text<StepStatus> = true;
+
+/// Writes all flags that are set, `measurement_rejected|gap_bridged`, or `ok`.
+template <class Stream>
+requires detail::WritesText<Stream> Stream& operator<<(Stream& out, StepStatus status) {
+  constexpr const char* names[] = {"measurement_rejected", "input_rejected", "prediction_dropped",
+                                   "gap_bridged",          "restarted",      "state_rejected",
+                                   "outlier_rejected",     "turn_assumed"};
+  if (status == StepStatus::ok) out << "ok";
+  const char* separator = "";
+  unsigned flag = 1;
+  for (const char* name : names) {
+    if (has(status, static_cast<StepStatus>(flag))) {
+      out << separator << name;
+      separator = "|";
+    }
+    flag *= 2;
+  }
+  return out;
 }
 
 }  // namespace esokit

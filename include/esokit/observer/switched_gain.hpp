@@ -24,7 +24,7 @@ template <Scalar S>
 [[nodiscard]] ESOKIT_INLINE constexpr S watched(SignReading reading, const S& e) noexcept {
   if (reading == SignReading::printed) return -e;
   if constexpr (PlainScalar<S>) {
-    return std::abs(e);
+    return (std::abs)(e);
   } else {
     return magnitude(e);
   }

@@ -96,7 +96,7 @@ class WrappedOutput : public Observer {
     if (!reading.counted) {
       // The innovation is that of level 1, whose z_1 the correction will subtract.
       const S predicted = Observer::level_estimate(0)(0);
-      reading.turns = std::round((predicted - reading.y) * inverse_period_);
+      reading.turns = (std::round)((predicted - reading.y) * inverse_period_);
     }
     return keep(reading, Observer::correct(reading.y + reading.turns * period_));
   }
@@ -119,7 +119,7 @@ class WrappedOutput : public Observer {
   /// The difference `angle` to the nearest whole period, in -period/2 .. period/2.
   [[nodiscard]] S wrap(const S& angle) const noexcept {
     if (detail::absolute(angle) <= half_period()) return angle;
-    return angle - period_ * std::round(angle * inverse_period_);
+    return angle - period_ * (std::round)(angle * inverse_period_);
   }
 
   /// Of y, in its unit.
@@ -178,7 +178,7 @@ class WrappedOutput : public Observer {
     const S expected = expected_motion(samples);
     const S crossed = detail::absolute(S(expected - change)) <= half_period()
                           ? S(0)
-                          : std::round((expected - change) * inverse_period_);
+                          : (std::round)((expected - change) * inverse_period_);
     const S motion = change + crossed * period_;
     if (count_.samples != none) {
       const S quarter = half_period() * static_cast<S>(0.5);
@@ -241,7 +241,7 @@ class WrappedOutput : public Observer {
     const S z = Observer::level_estimate(Observer::levels - 1)(0);
     if (detail::absolute(z) <= half_period()) [[likely]]
       return;
-    const S turns = std::round(z * inverse_period_);
+    const S turns = (std::round)(z * inverse_period_);
     if (Observer::shift_output(-(turns * period_)) == StepStatus::ok) count_.turns -= turns;
   }
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <concepts>
 #include <cstddef>
+#include <esokit/core/language.hpp>
 #include <iterator>
 
 namespace esokit::sim {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <esokit/core/language.hpp>
 #include <span>
 #include <vector>
 

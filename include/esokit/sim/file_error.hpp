@@ -4,6 +4,7 @@
 
 #include <cstdio>
 #include <cstring>
+#include <esokit/core/language.hpp>
 #include <string>
 
 namespace esokit::sim {

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <esokit/core/language.hpp>
 #include <random>
 
 namespace esokit::sim {
