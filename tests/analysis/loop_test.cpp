@@ -34,6 +34,12 @@ auto plant() { return CompanionPlant<2>{{3.0, 0.4}, 2.5}.system().value(); }
 template <class Loop, class Observer, class Law>
 void expect_same_run(const Loop& loop, Observer observer, Law&& control, double delay) {
   const auto& closed = loop.closed_loop();
+  EXPECT_STREQ(loop.controller().input_names[0], "y");
+  EXPECT_STREQ(loop.controller().input_names[1], "r");
+  EXPECT_STREQ(loop.controller().output_names[0], "u");
+  EXPECT_STREQ(closed.output_names[0], "y");
+  EXPECT_STREQ(closed.output_names[1], "u");
+  EXPECT_STREQ(closed.output_names[2], "yhat");
   constexpr int states = std::remove_cvref_t<decltype(closed)>::states;
   Vector<double, states> x = Vector<double, states>::Zero();
   Vector<double, 2> truth = Vector<double, 2>::Zero();
