@@ -3,33 +3,35 @@
 // S. Zhang, X. Qi, S. Yang, "An extended state observer with adjustable bandwidth for measurement
 // noise", Journal of Systems Engineering and Electronics (2023), doi:10.23919/JSEE.2023.000166.
 //
-// Way: the paper way, plant and continuous observer as one ODE, Runge-Kutta of order 4 at 10 ms;
-// the noise is held, and the observer switches, at these steps.
+// Way: plant and continuous observer as one ODE, as in the paper; a variable step (Dormand-Prince
+// 4(5), relative tolerance 1e-3) that ends at each noise value.
 //
 // Plant      x1' = x2,  x2' = (sin x1 + sin x2) / (4 pi) + d* + u,  d* = t / (4 pi) + sin(0.4 t +
 // 1)
 //            y = x1 + noise
-// Observer   z_i' = z_{i+1} + l_i e (+ u for i = 2),  l = (3 W, 3 W^2, W^3),  e = y - z_1
+// Observer   z_i' = z_{i+1} - l_i en (+ u for i = 2),  l = (3 W, 3 W^2, W^3),  en = z_1 - y
 //            LESO  W = w
-//            ABESO W = rho w while |e| shrinks, w otherwise
-//            BESO  W = rho w while |e| shrinks, w / rho otherwise
+//            ABESO W = rho w while |en| falls from one noise value to the next, w otherwise
+//            BESO  W = rho w while p / (tau p + 1) en < 0, w / rho otherwise
 // Control    u = 25 (r - z_1) - 10 z_2 - z_3
 //
 // symbol      code                 value                unit
 // w           bandwidths           4..10                rad/s
 // rho         ratio                0.7                  -
 //             noise_variance       0.001                -
-//             step                 0.01                 s
+//             hold                 0.01                 s, of a noise value
 //             duration             20                   s
 // x(0)                             (1, 1); observers 0
-// r(t)        reference            1: ours, the paper only draws it; 1 + sin t as a variant
-// J           Criteria::index      100 (1/20) int |e| dt
+// tau         filter_time          0.02                 s; fitted, the paper prints no filter
+// r(t)        reference            1 for the tables, 1 + sin t beside it; the paper only draws it
+// J           Criteria::index      100 mean(|e|) over the steps of the solver
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/parallel.hpp"
@@ -61,15 +63,41 @@ constexpr Rows table4 = {{{2.84, 2.76, 2.68, 2.59, 2.78, 2.66, 2.77},
 constexpr Rows table6 = {{{1.57, 1.50, 1.54, 1.57, 1.67, 1.72, 1.87},
                           {8.97, 8.81, 10.10, 11.03, 14.13, 15.63, 21.54},
                           {23.26, 22.67, 25.05, 28.37, 38.32, 46.61, 63.23}}};
-// An independent run of the LESO in the same set-up: J_ed.
-constexpr std::array<double, count> independent = {25.81, 26.19, 28.67, 33.46, 40.31, 48.86, 58.91};
-
 // Tables 3 and 5 as printed, w = 5, 6, 7: t_r, then peaks, of e_x, e_dx, e_d.
 using Transient = std::array<std::array<double, 3>, 3>;
 constexpr Transient table3_rise = {{{.70, .62, .50}, {.64, .52, .46}, {2.09, 1.56, 1.34}}};
 constexpr Transient table3_peak = {{{.04, .04, .05}, {.39, .43, .51}, {.53, .62, .73}}};
 constexpr Transient table5_rise = {{{.64, .51, .47}, {.57, .47, .39}, {2.22, 2.22, 2.22}}};
 constexpr Transient table5_peak = {{{.06, .06, .06}, {.61, .71, .97}, {.94, 1.26, 1.64}}};
+
+// Table 8 as printed: rise times of the ABESO at w = 7, and reductions (%) of J and t_r by the
+// ABESO.
+constexpr Three table8_rise = {.48, .41, 1.33};
+constexpr Three table8_index_over_leso = {4.89, 13.46, 15.28};
+constexpr Three table8_rise_over_leso = {4.0, 10.87, .75};
+constexpr Three table8_index_over_beso = {39.26, 60.56, 68.21};
+constexpr Three table8_rise_over_beso = {-2.13, -5.13, 40.09};
+
+// Independent runs of the LESO: J_ed as a time integral, and as a mean over the steps.
+constexpr std::array<double, count> independent_integral = {25.81, 26.19, 28.67, 33.46,
+                                                            40.31, 48.86, 58.91};
+constexpr std::array<double, count> independent_index = {25.98, 26.35, 28.83, 33.60,
+                                                         40.54, 49.06, 59.07};
+// And of the BESO: J_ed as a mean over the steps, in a like setting.
+constexpr std::array<double, count> independent_beso = {39.1,  54.7,  73.8, 95.9,
+                                                        120.4, 149.0, 180.9};
+
+// Other readings of what makes the observers switch.
+constexpr Kind beso_at_steps{
+    .name = "BESO, at steps", .watch = Watch::filtered_at_steps, .otherwise = 1.0 / ratio};
+constexpr Kind beso_innovation{
+    .name = "BESO, en", .watch = Watch::innovation, .otherwise = 1.0 / ratio};
+constexpr Kind beso_magnitude{
+    .name = "BESO, |en|", .watch = Watch::magnitude, .otherwise = 1.0 / ratio};
+constexpr Kind abeso_innovation{.name = "ABESO, en", .watch = Watch::innovation};
+constexpr Kind abeso_fitted{
+    .name = "ABESO, l1 = 3 w", .watch = Watch::magnitude, .first_gain_switches = false};
+constexpr Kind leso_at_mean{.name = "LESO at mean bandwidth"};
 
 /// All runs of an observer: [bandwidth][seed].
 struct Runs {
@@ -85,16 +113,17 @@ struct Runs {
   }
 };
 
-Runs run_all(const Kind& kind, const std::array<double, count>& at_bandwidth = bandwidths) {
+Runs run_all(const Kind& kind, const std::array<double, count>& at_bandwidth = bandwidths,
+             Reference reference = Reference::constant) {
   const auto flat = run_parallel(kind.name, count * seeds, [&](std::size_t job) {
-    return run(kind, at_bandwidth[job / seeds], 1 + job % seeds);
+    return run(kind, at_bandwidth[job / seeds], 1 + job % seeds, nullptr, reference);
   });
   Runs runs{kind, {}};
   for (std::size_t job = 0; job < flat.size(); ++job) runs.at[job / seeds].push_back(flat[job]);
   return runs;
 }
 
-/// How much better `ours` is than `base` in %, seed by seed.
+/// How much less `ours` has than `base` in %, seed by seed.
 template <class Number>
 Statistics paired_gain(const std::vector<Criteria>& ours, const std::vector<Criteria>& base,
                        Number number) {
@@ -113,28 +142,36 @@ std::string case_of(const Kind& kind, double w) {
   return std::string(kind.name) + ", w = " + number_text(w, 3);
 }
 
-Figure draw_errors(const std::string& name, const Kind& kind, const std::string& caption) {
-  Figure figure(name, {.rows = 2, .columns = 2, .panel_height = 215});
+/// What the three figures of errors share, so that they can be compared: 1.05 times the largest
+/// error of any of them, for each panel.
+Three common_scale() {
+  Three largest{};
+  for (const Kind& kind : {leso, beso, abeso}) {
+    for (std::size_t w = 1; w <= 3; ++w) {
+      Series one;
+      (void)run(kind, bandwidths[w], 1, &one);
+      for (std::size_t i = 0; i < 3; ++i) {
+        for (const double e : one.error[i]) largest[i] = std::max(largest[i], 1.05 * std::abs(e));
+      }
+    }
+  }
+  return largest;
+}
+
+Figure draw_errors(const std::string& name, const Kind& kind, const Three& scale,
+                   const std::string& caption) {
+  Figure figure(name, {.rows = 2, .columns = 2, .panel_height = 240});
   figure.caption(caption);
   std::array<Series, 3> runs;
   for (std::size_t i = 0; i < 3; ++i) (void)run(kind, bandwidths[1 + i], 1, &runs[i]);
   constexpr std::array<const char*, 3> labels = {"e_x", "e_{dx}", "e_d"};
+  constexpr std::array<const char*, 3> names = {"error_x", "error_dx", "error_d"};
   for (std::size_t i = 0; i < 3; ++i) {
-    // Room above for the two enlargements.
-    double least = 0.0;
-    double largest = 0.0;
-    for (const Series& one : runs) {
-      least = std::min(least, *std::min_element(one.error[i].begin(), one.error[i].end()));
-      largest = std::max(largest, *std::max_element(one.error[i].begin(), one.error[i].end()));
-    }
-    const double span = largest - least;
     auto& panel = figure.panel(i / 2, i % 2)
                       .x_label("t (s)")
                       .y_label(std::string(labels[i]) + " (-)")
-                      .name(std::string("error_") + (i == 0   ? "x"
-                                                     : i == 1 ? "dx"
-                                                              : "d"))
-                      .y_range(least - 0.1 * span, largest + 1.3 * span)
+                      .name(names[i])
+                      .y_range(-scale[i], scale[i])
                       .legend(Legend::above);
     constexpr std::array colors = {Color::blue, Color::green, Color::vermillion};
     for (std::size_t w = 3; w-- > 0;) {  // the noisiest first
@@ -143,19 +180,20 @@ Figure draw_errors(const std::string& name, const Kind& kind, const std::string&
           {.name = "w = " + number_text(bandwidths[1 + w], 2), .color = colors[w], .width = 1.1});
     }
     panel
-        .inset({.left = 0.16,
-                .bottom = 0.56,
-                .width = 0.3,
-                .height = 0.4,
+        .inset({.left = 0.22,
+                .bottom = 0.66,
+                .width = 0.75,
+                .height = 0.31,
                 .x = {0.0, 2.0},
                 .frame = false,
                 .connect = false})
-        .inset({.left = 0.6, .bottom = 0.56, .width = 0.37, .height = 0.4, .x = {14.0, 16.0}});
+        .inset({.left = 0.22, .bottom = 0.08, .width = 0.75, .height = 0.27, .x = {14.0, 16.0}});
   }
   figure.panel(1, 1)
       .x_label("t (s)")
       .y_label("d (-)")
       .name("disturbance")
+      .y_range(-5.0, 20.0)
       .legend(Legend::above)
       .line(runs[2].t, runs[2].estimate,
             {.name = "estimate, w = 7", .color = Color::vermillion, .width = 1.1})
@@ -164,90 +202,43 @@ Figure draw_errors(const std::string& name, const Kind& kind, const std::string&
   return figure;
 }
 
+/// A printed number beside ours: met if it is one that a single run could give. Where such runs
+/// scatter by more than the number itself, that would say nothing, and it is not judged.
+void judge(Report& report, const std::string& name, const std::string& metric, double printed,
+           const Statistics& ours, bool missed, const std::string& note) {
+  const auto tolerance = Tolerance::deviations(3.0, ours);
+  if (missed) {
+    report.known_miss(name, metric, printed, ours, tolerance, note);
+  } else if (tolerance.difference(printed) > std::abs(printed)) {
+    report.check(name, metric, printed, ours, std::nullopt,
+                 "not judged: 3 sd are more than the number");
+  } else {
+    report.check(name, metric, printed, ours, tolerance, note);
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  Report report(argc, argv, folder, "noise",
-                about("Three observers under noise (Figs 1-4, Tables 2-8)",
-                      "A second-order plant under a growing sine disturbance, controlled through "
-                      "LESO, BESO and ABESO; bandwidths 4 to 10 rad/s, " +
-                          std::to_string(seeds) +
-                          " noise seeds. Paper way: continuous observer, RK4 at 10 ms."));
+  Report report(
+      argc, argv, folder, "noise",
+      about("Three observers under noise (Figs 1-4, Tables 2-8)",
+            "A second-order plant under a growing sine disturbance, controlled through "
+            "LESO, BESO and ABESO; bandwidths 4 to 10 rad/s, " +
+                std::to_string(seeds) + " noise seeds. Continuous simulation with a variable step.",
+            1));
 
   const Runs linear = run_all(leso);
   const Runs bi = run_all(beso);
   const Runs adjustable = run_all(abeso);
-  const Runs bi_printed = run_all(beso_printed);
-  const Runs adjustable_printed = run_all(abeso_printed);
+  const Runs fitted = run_all(abeso_fitted);
   // The linear observer that has the bandwidth which the ABESO has on average.
   std::array<double, count> mean_bandwidth{};
   for (std::size_t w = 0; w < count; ++w) {
     mean_bandwidth[w] = adjustable(w, &Criteria::mean_bandwidth).mean;
   }
-  Kind at_mean = leso;
-  at_mean.name = "LESO at mean bandwidth";
-  const Runs linear_at_mean = run_all(at_mean, mean_bandwidth);
-
-  // ---- Tables 2, 4, 6
-  const std::string no_convention =
-      "384 combinations of sign, hold, step, start, weights and units were tried, and none gives "
-      "the printed BESO and ABESO";
-  for (std::size_t w = 0; w < count; ++w) {
-    const std::string name = case_of(leso, bandwidths[w]);
-    report.known_miss(name, index_names[0], table2[0][w], linear.index(w, 0), 0.02,
-                      "ours is about 0.3 lower throughout, in every convention tried");
-    if (bandwidths[w] == 8.0 || bandwidths[w] == 9.0) {
-      report.known_miss(name, index_names[1], table2[1][w], linear.index(w, 1), 0.02,
-                        "the printed column has a jump here that no run shows");
-    } else {
-      report.check(name, index_names[1], table2[1][w], linear.index(w, 1), 0.02);
-    }
-    report.check(name, index_names[2], table2[2][w], linear.index(w, 2), 0.02);
-  }
-  for (std::size_t w = 0; w < count; ++w) {
-    report.check_reference(case_of(leso, bandwidths[w]), "J_ed, second run", independent[w],
-                           linear.index(w, 2),
-                           Tolerance::deviations(3.0, linear.index(w, 2)).or_relative(0.01));
-  }
-  for (std::size_t w = 0; w < count; ++w) {
-    for (std::size_t i = 0; i < 3; ++i) {
-      report.known_miss(case_of(beso, bandwidths[w]), index_names[i], table4[i][w], bi.index(w, i),
-                        0.02, no_convention);
-    }
-  }
-  for (std::size_t w = 0; w < count; ++w) {
-    for (std::size_t i = 0; i < 3; ++i) {
-      const std::string name = case_of(abeso, bandwidths[w]);
-      if (bandwidths[w] == 6.0 && i == 2) {
-        report.check(name, index_names[i], table6[i][w], adjustable.index(w, i), std::nullopt,
-                     "within 2 %, which its neighbours are not");
-        continue;
-      }
-      report.known_miss(name, index_names[i], table6[i][w], adjustable.index(w, i), 0.02,
-                        no_convention);
-    }
-  }
-
-  // ---- Tables 3, 5, 7
-  const std::string own_definition =
-      "by our definition, see the table; by the paper's it would be another number";
-  for (std::size_t w = 1; w <= 3; ++w) {
-    for (std::size_t i = 0; i < 3; ++i) {
-      const auto rise = [i](const Criteria& c) { return c.rise[i]; };
-      const auto peak = [i](const Criteria& c) { return c.peak[i]; };
-      // The paper shows one run: it must be one that our seeds could give.
-      report.check(case_of(leso, bandwidths[w]), rise_names[i], table3_rise[i][w - 1],
-                   linear(w, rise), Tolerance::deviations(2.0, linear(w, rise)), own_definition);
-      report.check(case_of(leso, bandwidths[w]), peak_names[i], table3_peak[i][w - 1],
-                   linear(w, peak), Tolerance::deviations(2.0, linear(w, peak)), own_definition);
-      report.known_miss(case_of(beso, bandwidths[w]), rise_names[i], table5_rise[i][w - 1],
-                        bi(w, rise), 0.02, no_convention);
-      report.known_miss(case_of(beso, bandwidths[w]), peak_names[i], table5_peak[i][w - 1],
-                        bi(w, peak), 0.02, no_convention);
-      report.check(case_of(abeso, bandwidths[w]), rise_names[i], std::nullopt, adjustable(w, rise));
-      report.check(case_of(abeso, bandwidths[w]), peak_names[i], std::nullopt, adjustable(w, peak));
-    }
-  }
+  const Runs linear_at_mean = run_all(leso_at_mean, mean_bandwidth);
+  constexpr std::size_t w7 = 3;
 
   const auto cases = [](const Kind& kind, std::size_t from, std::size_t to) {
     std::vector<std::string> names;
@@ -257,198 +248,363 @@ int main(int argc, char** argv) {
   const std::vector<std::string> indexes(index_names.begin(), index_names.end());
   const std::vector<std::string> transients = {rise_names[0], rise_names[1], rise_names[2],
                                                peak_names[0], peak_names[1], peak_names[2]};
-  const std::string mean = ", mean (standard deviation) over " + std::to_string(seeds) + " seeds";
-  report.comparison("2", "Table 2: LESO, J = 100 (1/20) int |e| dt" + mean, cases(leso, 0, 6),
-                    indexes);
-  report.comparison("3", "Table 3: LESO" + mean, cases(leso, 1, 3), transients);
-  report.remark(
-      "t_r and peak in Tables 3, 5 and 7 are by our definition, the one that fits Table 3: t_r is "
-      "when the error is back in [-0.01, 0.01] after its first overshoot (e_d: after its second), "
-      "peak the largest error after t_r (e_d: after 5 s).");
-  report.comparison("4", "Table 4: BESO" + mean, cases(beso, 0, 6), indexes);
-  report.comparison("5", "Table 5: BESO" + mean, cases(beso, 1, 3), transients);
-  report.comparison("6", "Table 6: ABESO" + mean, cases(abeso, 0, 6), indexes);
-  report.comparison("7", "Table 7: ABESO (the paper's was not available to us)" + mean,
-                    cases(abeso, 1, 3), transients);
+  const std::string mean = "ours: mean (standard deviation) over " + std::to_string(seeds) +
+                           " seeds; met: within 3 standard deviations of one run, as the paper's "
+                           "numbers are of one run";
+  const std::string index_is =
+      "J = 100 mean(|error|) over the steps of the solver, 20 s. Printed: the observer's "
+      "equations, "
+      "noise variance, bandwidths, rho. ";
 
-  // ---- Table 8, and what the gain is
-  constexpr std::size_t w7 = 3;
-  const auto ed = [](const Criteria& c) { return c.index[2]; };
-  const auto ed_steady = [](const Criteria& c) { return c.steady[2]; };
-  const auto ed_transient = [](const Criteria& c) { return c.index[2] - c.steady[2]; };
-  constexpr std::array<double, 3> reduction = {4.89, 13.46, 15.28};
-  constexpr std::array<double, 3> beso_reduction = {39.26, 60.56, 68.21};
-  std::vector<CsvRow> lines;
-  for (std::size_t i = 0; i < 3; ++i) {
-    const auto number = [i](const Criteria& c) { return c.index[i]; };
-    const auto gain = paired_gain(adjustable.at[w7], linear.at[w7], number);
-    const auto over_beso = paired_gain(adjustable.at[w7], bi.at[w7], number);
-    report.known_miss("ABESO against LESO, w = 7", "less " + index_names[i] + " (%)", reduction[i],
-                      gain, 0.02, no_convention);
-    report.known_miss("ABESO against BESO, w = 7", "less " + index_names[i] + " (%)",
-                      beso_reduction[i], over_beso, 0.02, no_convention);
-    lines.push_back(
-        {index_names[i], number_text(table2[i][w7]), with_deviation(linear.index(w7, i)),
-         number_text(table4[i][w7]), with_deviation(bi.index(w7, i)), number_text(table6[i][w7]),
-         with_deviation(adjustable.index(w7, i)), number_text(reduction[i]),
-         with_deviation(gain, 3), number_text(beso_reduction[i]), with_deviation(over_beso, 3)});
+  // ---- Fig. 1
+  {
+    Series drawn, series;
+    (void)run(leso, 7.0, 1, &drawn, Reference::sine);
+    (void)run(leso, 7.0, 1, &series);
+    Figure figure("fig1", {.rows = 1, .columns = 2, .panel_height = 200});
+    figure.caption(
+        "Fig. 1: the reference and the total disturbance (LESO, w = 7). The paper draws a curve "
+        "without a formula, 1 + sin t is our guess; dashed the constant with which the tables "
+        "come out.");
+    figure.panel(0, 0)
+        .x_label("t (s)")
+        .y_label("r (-)")
+        .name("reference")
+        .y_range(-0.5, 2.5)
+        .legend(Legend::above)
+        .line(drawn.t, drawn.reference, {.name = "r = 1 + sin t"})
+        .line(series.t, series.reference, {.name = "r = 1", .dash = Dash::dashed});
+    figure.panel(0, 1)
+        .x_label("t (s)")
+        .y_label("d (-)")
+        .name("disturbance")
+        .legend(Legend::above)
+        .line(drawn.t, drawn.disturbance, {.name = "r = 1 + sin t"})
+        .line(series.t, series.disturbance, {.name = "r = 1", .dash = Dash::dashed});
+    report.add(figure);
   }
-  report.table("8", "Table 8: w = 7" + mean + "; reductions are paired, seed by seed, in %",
-               {"index", "LESO, paper", "LESO, ours", "BESO, paper", "BESO, ours", "ABESO, paper",
-                "ABESO, ours", "less than LESO, paper", "ours", "less than BESO, paper", "ours"},
-               lines);
-  const auto gain7 = paired_gain(adjustable.at[w7], linear.at[w7], ed);
-  report.check_reference("ABESO, w = 7", "J_ed, second run", 29.98, adjustable.index(w7, 2),
-                         Tolerance::deviations(3.0, adjustable.index(w7, 2)));
-  report.check_reference("ABESO against LESO, w = 7", "paired gain in J_ed (%)", 10.7, gain7,
-                         Tolerance::absolute(1.5), "independent run, 1.5 sd");
-  report.check_reference("ABESO, w = 7", "mean bandwidth (rad/s)", 5.95, mean_bandwidth[w7], 0.01);
-  report.check("BESO, w = 7", "J_ed, second run", std::nullopt, bi.index(w7, 2), std::nullopt,
-               "independent run: 49.5; we do not know why it differs by 7 %");
-  const auto printed_gain = paired_gain(adjustable_printed.at[w7], linear.at[w7], ed);
-  report.check_reference("ABESO with the printed sign, w = 7", "paired gain in J_ed (%)", -46.0,
-                         printed_gain, Tolerance::absolute(4.0));
-  report.check("BESO with the printed sign, w = 7", "J_ed", std::nullopt, bi_printed.index(w7, 2),
-               std::nullopt, "independent run: 85.7");
-  const auto steady7 = paired_gain(adjustable.at[w7], linear.at[w7], ed_steady);
-  report.expect("ABESO against LESO, w = 7", "paired gain in J_ed for t > 5 s (%)", steady7,
-                std::abs(steady7.mean) < steady7.standard_deviation,
-                "no gain but for the transient: within a standard deviation of zero");
 
-  lines.clear();
+  // ---- Tables 2 and 3, Fig. 2
+  const Three scale = common_scale();
+  const std::string errors_are =
+      "Estimation errors for w = 5, 6, 7, seed 1; enlarged the start (above) and a piece of the "
+      "steady state (below); and the disturbance with its estimate at w = 7. Figs 2 to 4 have one "
+      "scale.";
+  const std::string rise_is =
+      ". t_r and peak are fitted, the paper's words cannot be what it tabulates: t_r is when the "
+      "error is back in [-0.01, 0.01] after its first overshoot (e_d: after its second), peak the "
+      "largest error after t_r (e_d: after 5 s)";
+  for (std::size_t w = 0; w < count; ++w) {
+    const std::string name = case_of(leso, bandwidths[w]);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const bool swapped = i == 1 && (bandwidths[w] == 8.0 || bandwidths[w] == 9.0);
+      judge(report, name, index_names[i], table2[i][w], linear.index(w, i),
+            swapped && bandwidths[w] == 9.0,
+            swapped ? "Table 6 prints " + number_text(table6[1][w], 4) +
+                          " in this place, which fits: the two look exchanged"
+                    : "");
+    }
+  }
+  for (std::size_t w = 0; w < count; ++w) {
+    const auto near = [&](const Statistics& ours) { return Tolerance::deviations(1.0, ours); };
+    const auto integral = linear(w, [](const Criteria& c) { return c.integral[2]; });
+    report.check_reference(case_of(leso, bandwidths[w]), "J_ed over the steps",
+                           independent_index[w], linear.index(w, 2), near(linear.index(w, 2)));
+    report.check_reference(case_of(leso, bandwidths[w]), "J_ed as time integral",
+                           independent_integral[w], integral, near(integral));
+  }
+  for (const std::size_t w : {4U, 5U}) {
+    const auto ours = linear.index(w, 1);
+    report.expect(case_of(leso, bandwidths[w]), "J_edx, beside Table 6", ours,
+                  std::abs(ours.mean - table6[1][w]) < ours.standard_deviation,
+                  "within 1 sd of the " + number_text(table6[1][w], 4) +
+                      " that Table 6 prints for the ABESO");
+  }
+  const std::string own_definition = "by a fitted definition, see the table";
+  const auto judge_transient = [&](const Runs& runs, const Transient& rise_paper,
+                                   const Transient& peak_paper) {
+    for (std::size_t w = 1; w <= 3; ++w) {
+      for (std::size_t i = 0; i < 3; ++i) {
+        judge(report, case_of(runs.kind, bandwidths[w]), rise_names[i], rise_paper[i][w - 1],
+              runs(w, [i](const Criteria& c) { return c.rise[i]; }), false, own_definition);
+        judge(report, case_of(runs.kind, bandwidths[w]), peak_names[i], peak_paper[i][w - 1],
+              runs(w, [i](const Criteria& c) { return c.peak[i]; }), false, own_definition);
+      }
+    }
+  };
+  judge_transient(linear, table3_rise, table3_peak);
+  report.comparison("2", "Table 2: LESO. " + index_is + "Fitted: nothing; " + mean,
+                    cases(leso, 0, 6), indexes);
+  report.comparison("3", "Table 3: LESO" + rise_is + "; " + mean, cases(leso, 1, 3), transients);
+  report.add(draw_errors("fig2", leso, scale, "Fig. 2: LESO. " + errors_are));
+
+  // ---- Tables 4 and 5, Fig. 3
+  for (std::size_t w = 0; w < count; ++w) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const bool missed = w == w7 && i == 2;
+      judge(report, case_of(beso, bandwidths[w]), index_names[i], table4[i][w], bi.index(w, i),
+            missed,
+            missed ? "3.4 sd; no setting that was tried has all of Table 4 within 3"
+                   : "derivative filter of 0.02 s fitted");
+    }
+    report.check_reference(case_of(beso, bandwidths[w]), "J_ed over the steps", independent_beso[w],
+                           bi.index(w, 2), Tolerance::deviations(1.0, bi.index(w, 2)));
+  }
+  judge_transient(bi, table5_rise, table5_peak);
+  report.comparison("4",
+                    "Table 4: BESO. " + index_is +
+                        "Fitted: the switching by the sign of the derivative of en (not of |en|) "
+                        "through a filter of 0.02 s, asked in every stage of the solver; " +
+                        mean,
+                    cases(beso, 0, 6), indexes);
+  report.comparison("5", "Table 5: BESO" + rise_is + "; " + mean, cases(beso, 1, 3), transients);
+  report.add(draw_errors("fig3", beso, scale,
+                         "Fig. 3: BESO. It switches by the sign of a derivative that is mostly "
+                         "noise, which leaves a constant error. " +
+                             errors_are));
+
+  // ---- Table 6, Fig. 4, and Table 7, which we do not have
+  const std::string tried =
+      "some 10000 combinations of switching signal, filter, gains, solver and tolerances were "
+      "tried, and none gives the ABESO";
+  constexpr std::array<std::array<bool, count>, 3> missed6 = {
+      {{true, true},
+       {true, true, false, true, true, false, true},
+       {false, false, false, false, false, false, true}}};
+  for (std::size_t w = 0; w < count; ++w) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      judge(report, case_of(abeso, bandwidths[w]), index_names[i], table6[i][w],
+            adjustable.index(w, i), missed6[i][w], missed6[i][w] ? tried : "");
+    }
+  }
+  for (std::size_t w = 1; w <= 3; ++w) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto rise = adjustable(w, [i](const Criteria& c) { return c.rise[i]; });
+      const auto peak = adjustable(w, [i](const Criteria& c) { return c.peak[i]; });
+      if (w == w7) {
+        judge(report, case_of(abeso, bandwidths[w]), rise_names[i], table8_rise[i], rise, i == 1,
+              i == 1 ? "the paper's ABESO is faster than its LESO here, ours slower"
+                     : own_definition);
+      } else {
+        report.check(case_of(abeso, bandwidths[w]), rise_names[i], std::nullopt, rise);
+      }
+      report.check(case_of(abeso, bandwidths[w]), peak_names[i], std::nullopt, peak);
+    }
+  }
+  report.comparison("6",
+                    "Table 6: ABESO. " + index_is +
+                        "Fitted: |en| is compared from one noise value to the next; " + mean,
+                    cases(abeso, 0, 6), indexes);
+  report.comparison("7",
+                    "Table 7: ABESO, rise times and peaks. The paper's table was not available to "
+                    "us, its rise times at w = 7 are from Table 8; ours: mean (standard deviation)",
+                    cases(abeso, 1, 3), transients);
+  report.add(draw_errors("fig4", abeso, scale, "Fig. 4: ABESO. " + errors_are));
+
+  // ---- Table 8
+  const auto ed = [](const Criteria& c) { return c.index[2]; };
+  const auto ed_integral = [](const Criteria& c) { return c.integral[2]; };
+  const auto ed_steady = [](const Criteria& c) { return c.steady[2]; };
+  const auto ed_transient = [](const Criteria& c) { return c.integral[2] - c.steady[2]; };
+  std::vector<std::string> quantities;
+  const auto reductions = [&](const Runs& base, const Three& index_paper, const Three& rise_paper,
+                              const std::array<bool, 6>& missed) {
+    quantities.clear();
+    for (std::size_t i = 0; i < 6; ++i) {
+      const std::size_t k = i % 3;
+      const auto ours = paired_gain(adjustable.at[w7], base.at[w7], [&](const Criteria& c) {
+        return i < 3 ? c.index[k] : c.rise[k];
+      });
+      quantities.push_back("ABESO, w = 7, " + (i < 3 ? index_names[k] : rise_names[k]));
+      judge(report, quantities.back(), std::string("less than the ") + base.kind.name + " (%)",
+            i < 3 ? index_paper[k] : rise_paper[k], ours, missed[i], missed[i] ? tried : "");
+    }
+  };
+  reductions(linear, table8_index_over_leso, table8_rise_over_leso,
+             {true, true, true, false, true});
+  reductions(bi, table8_index_over_beso, table8_rise_over_beso, {false, false, false, false, true});
+  report.comparison("8",
+                    "Table 8: reductions by the ABESO at w = 7 in %, paired, seed by seed (its "
+                    "other numbers are those of Tables 2 to 6); " +
+                        mean,
+                    quantities, {"less than the LESO (%)", "less than the BESO (%)"});
+
+  // ---- the fair comparison
+  const auto& a7 = adjustable.at[w7];
+  const auto& l7 = linear.at[w7];
+  const auto by_index = paired_gain(a7, l7, ed);
+  const auto by_integral = paired_gain(a7, l7, ed_integral);
+  const auto in_steady = paired_gain(a7, l7, ed_steady);
+  const auto mean_by_integral = paired_gain(linear_at_mean.at[w7], l7, ed_integral);
+  report.check_reference("ABESO against LESO, w = 7", "less J_ed as time integral (%)", 10.7,
+                         by_integral, Tolerance::absolute(1.5), "independent run, 1.5 sd");
+  report.check_reference("ABESO, w = 7", "mean bandwidth (rad/s)", 5.95, mean_bandwidth[w7], 0.01);
+  report.expect("ABESO against LESO, w = 7", "less int |e_d| for t > 5 s (%)", in_steady,
+                std::abs(in_steady.mean) < in_steady.standard_deviation,
+                "no gain but for the transient: within a standard deviation of zero");
+  report.claim({.text = "At w = 7 the ABESO has 15 % less J_ed than the LESO",
+                .where = "Table 8",
+                .holds = by_index.mean > 12.0  ? Claim::Holds::yes
+                         : by_index.mean > 5.0 ? Claim::Holds::partly
+                                               : Claim::Holds::no,
+                .here = shown_text(by_index.mean, 15.28) + " % by the paper's index, " +
+                        shown_text(by_integral.mean, 15.28) +
+                        " % by the time integral; after 5 s " + shown_text(in_steady.mean, 15.28) +
+                        " %: all of it is the start. A LESO at the ABESO's mean bandwidth gains " +
+                        shown_text(mean_by_integral.mean, 15.28) + " %",
+                .figure = "gain"});
+  const auto smaller_index = [&](const Runs& ours, const Runs& base) {
+    std::size_t smaller = 0;
+    for (std::size_t w = 0; w < count; ++w) {
+      for (std::size_t i = 0; i < 3; ++i) {
+        smaller += ours.index(w, i).mean < base.index(w, i).mean ? 1U : 0U;
+      }
+    }
+    return smaller;
+  };
+  const std::size_t over_linear = smaller_index(adjustable, linear);
+  const std::size_t over_bi = smaller_index(adjustable, bi);
+  const auto holds_of = [](std::size_t met) {
+    return met == 3 * count ? Claim::Holds::yes : met > 0 ? Claim::Holds::partly : Claim::Holds::no;
+  };
+  report.claim({.text = "The ABESO has smaller indexes than the LESO (all but w = 10)",
+                .where = "Tables 2, 6",
+                .holds = holds_of(over_linear),
+                .here = std::to_string(over_linear) + " of 21 means are smaller; J_ex is not",
+                .figure = "gain"});
+  report.claim({.text = "The ABESO has smaller indexes than the BESO",
+                .where = "Tables 4, 6",
+                .holds = holds_of(over_bi),
+                .here = std::to_string(over_bi) + " of 21 means are smaller",
+                .figure = "gain"});
+  const auto slower = paired_gain(a7, l7, [](const Criteria& c) { return c.rise[1]; });
+  report.claim({.text = "The ABESO is as fast as the LESO, or faster",
+                .where = "Table 8, t_r",
+                .holds = slower.mean > -2.0 ? Claim::Holds::yes : Claim::Holds::no,
+                .here = "t_r of e_dx is " + shown_text(-slower.mean, 10.87) + " % longer",
+                .figure = "fig4"});
+
+  report.not_reproduced(
+      "The indexes of Tables 2, 4 and 6 are not the time integrals that the text has, but means "
+      "over the steps of a variable-step solver: six steps more near t = 0, where e_x = 1, raise "
+      "J_ex by 0.3.",
+      Miss::other_reading);
+  report.not_reproduced(
+      "Table 4 (and 5) is that of a BESO which switches by the filtered derivative of en, not of "
+      "|en|; the filter is not printed, 0.02 s is fitted.",
+      Miss::other_reading);
+  report.not_reproduced(
+      "Table 6: 8 of 21 numbers of the ABESO are missed, and with them 5 reductions of Table 8; " +
+      tried + ".");
+  report.not_reproduced(
+      "J_edx at w = 8 and 9 looks exchanged between Tables 2 and 6: Table 6's 14.13 and 15.63 are "
+      "the LESO's (" +
+      shown_text(linear.index(4, 1).mean, 14.13) + " and " +
+      shown_text(linear.index(5, 1).mean, 15.63) + " here).");
+
+  report.additions();
+  std::vector<CsvRow> lines;
   for (std::size_t w = 0; w < count; ++w) {
     const auto& a = adjustable.at[w];
     const auto& l = linear.at[w];
-    lines.push_back({number_text(bandwidths[w], 3), with_deviation(paired_gain(a, l, ed), 3),
+    const auto& m = linear_at_mean.at[w];
+    lines.push_back({number_text(bandwidths[w], 3),
+                     shown_text(100.0 * (1.0 - table6[2][w] / table2[2][w]), 15.28),
+                     with_deviation(paired_gain(a, l, ed), 3),
+                     with_deviation(paired_gain(a, l, ed_integral), 3),
                      with_deviation(paired_gain(a, l, ed_transient), 3),
                      with_deviation(paired_gain(a, l, ed_steady), 3),
                      number_text(mean_bandwidth[w], 3),
-                     with_deviation(paired_gain(linear_at_mean.at[w], l, ed), 3),
-                     with_deviation(paired_gain(linear_at_mean.at[w], l, ed_transient), 3),
-                     with_deviation(paired_gain(linear_at_mean.at[w], l, ed_steady), 3),
-                     with_deviation(paired_gain(adjustable_printed.at[w], l, ed), 3),
-                     with_deviation(paired_gain(bi.at[w], l, ed), 3),
-                     with_deviation(paired_gain(bi_printed.at[w], l, ed), 3)});
+                     with_deviation(paired_gain(m, l, ed_integral), 3),
+                     with_deviation(paired_gain(m, l, ed_transient), 3),
+                     with_deviation(paired_gain(m, l, ed_steady), 3)});
   }
   report.table("gain",
-               "Where the gain is: reduction of J_ed against the LESO of the same w in %, paired, "
-               "mean (standard deviation) over " +
+               "Where the gain is: how much less error of the disturbance the ABESO has than the "
+               "LESO of the same w, in %, paired, mean (standard deviation) over " +
                    std::to_string(seeds) +
-                   " seeds, in all and in the two parts of the run. The LESO at the ABESO's mean "
-                   "bandwidth stands beside it.",
-               {"w (rad/s)", "ABESO", "t < 5 s", "t > 5 s", "mean bandwidth", "LESO at it",
-                "t < 5 s", "t > 5 s", "ABESO, printed sign", "BESO", "BESO, printed sign"},
+                   " seeds: by the paper's index, by the time integral, and that in the two parts "
+                   "of the run. Beside it the LESO at the ABESO's mean bandwidth",
+               {"w (rad/s)", "paper", "index", "integral", "t < 5 s", "t > 5 s", "mean bandwidth",
+                "LESO at it", "t < 5 s", "t > 5 s"},
                lines);
 
-  // Both readings of the sign.
+  // Other readings of the switching.
+  const Runs bi_at_steps = run_all(beso_at_steps);
+  const Runs bi_innovation = run_all(beso_innovation);
+  const Runs bi_magnitude = run_all(beso_magnitude);
+  const Runs adjustable_innovation = run_all(abeso_innovation);
+  for (const std::size_t w : {1U, 3U}) {
+    for (const Runs* runs : {&bi, &bi_magnitude}) {
+      report.check(
+          std::string(runs->kind.name) + ", against LESO, w = " + number_text(bandwidths[w], 2),
+          "less J_ed (%)", std::nullopt, paired_gain(runs->at[w], linear.at[w], ed));
+    }
+  }
+  const auto readings = [&](const Rows& paper, const std::vector<const Runs*>& variants) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      CsvRow line{index_names[i]};
+      for (const Runs* runs : variants) {
+        std::size_t met = 0;
+        double ratio_sum = 0.0;
+        for (std::size_t w = 0; w < count; ++w) {
+          const auto ours = runs->index(w, i);
+          met += std::abs(ours.mean - paper[i][w]) <= 3.0 * ours.standard_deviation ? 1U : 0U;
+          ratio_sum += std::abs(std::log(ours.mean / paper[i][w]));
+        }
+        line.push_back(std::to_string(met) + " of 7, " + number_text(100.0 * ratio_sum / count, 2) +
+                       " %");
+      }
+      lines.push_back(line);
+    }
+  };
   lines.clear();
-  for (std::size_t w = 0; w < count; ++w) {
-    CsvRow row{number_text(bandwidths[w], 3)};
-    for (std::size_t i = 0; i < 3; ++i) {
-      row.insert(row.end(), {number_text(table4[i][w]), with_deviation(bi.index(w, i)),
-                             with_deviation(bi_printed.index(w, i))});
-    }
-    for (std::size_t i = 0; i < 3; ++i) {
-      row.insert(row.end(), {number_text(table6[i][w]), with_deviation(adjustable.index(w, i)),
-                             with_deviation(adjustable_printed.index(w, i))});
-    }
-    lines.push_back(row);
-  }
-  CsvRow readings{"w (rad/s)"};
-  for (const char* name : {"BESO ", "ABESO "}) {
-    for (const std::string& index : index_names) {
-      readings.insert(readings.end(), {name + index + ", paper", "|e|", "e"});
-    }
-  }
-  report.table(
-      "sign",
-      "Both readings of the sign: |e| is ours and the paper's text, e the printed equation" + mean,
-      readings, lines);
+  readings(table4, {&bi, &bi_at_steps, &bi_innovation, &bi_magnitude});
+  report.table("beso_readings",
+               "Table 4 by other readings of the switching: numbers met, and mean deviation from "
+               "the printed ones. Filtered derivative of en in every stage (the table's), at the "
+               "steps only, en compared from noise value to noise value, |en| so",
+               {"index", "filtered, stages", "filtered, steps", "en", "|en|"}, lines);
+  lines.clear();
+  readings(table6, {&adjustable, &fitted, &adjustable_innovation});
+  report.table("abeso_readings",
+               "Table 6 by other readings: the printed gains with |en| (the table's), l1 = 3 w in "
+               "both modes (fitted), and the sign as the equation prints it, of en",
+               {"index", "printed gains, |en|", "l1 = 3 w, |en|", "printed gains, en"}, lines);
+  const auto printed_gain = paired_gain(adjustable_innovation.at[w7], l7, ed_integral);
+  report.check_reference("ABESO with the printed sign, w = 7", "less J_ed as time integral (%)",
+                         -46.0, printed_gain, Tolerance::absolute(4.0));
+  report.correction({.where = "(4)",
+                     .printed = "delta = rho while d en / dt < 0",
+                     .correct = "delta = rho while d |en| / dt < 0",
+                     .why = "the text describes the second; with the first J_ed is " +
+                            shown_text(-printed_gain.mean, 15.28) +
+                            " % more than the LESO's at w = 7"});
 
-  report.not_reproduced(
-      "Tables 4 to 8, BESO and ABESO: no convention that we tried gives them. With the sign of "
-      "d|e|/dt (the text) the ABESO is about 10 % better than the LESO in J_ed at w = 7 (paper: 15 "
-      "%), with the printed sign of de/dt it is about 46 % worse. Table 4 is near the printed sign "
-      "in J_ed (within 8 %) and J_edx (15 %), not in J_ex.");
-  report.not_reproduced(
-      "J_ex of Table 2 comes out 0.3 lower, and J_edx is off at w = 8 and 9, in every convention "
-      "tried.");
   // The variant of the reference.
+  const Runs sine = run_all(leso, bandwidths, Reference::sine);
+  const Runs sine_adjustable = run_all(abeso, bandwidths, Reference::sine);
   lines.clear();
-  const auto sine =
-      run_parallel("LESO and ABESO, r = 1 + sin t", 2 * count * seeds, [](std::size_t job) {
-        const std::size_t w = job / seeds % count;
-        return run(job < count * seeds ? leso : abeso, bandwidths[w], 1 + job % seeds, nullptr,
-                   Reference::sine);
-      });
   for (std::size_t w = 0; w < count; ++w) {
-    const auto of = [&](std::size_t kind) {
-      const auto first = sine.begin() + static_cast<std::ptrdiff_t>((kind * count + w) * seeds);
-      return std::vector<Criteria>(first, first + seeds);
-    };
-    const auto l = of(0);
-    const auto a = of(1);
     CsvRow row{number_text(bandwidths[w], 3)};
     for (std::size_t i = 0; i < 3; ++i) {
-      row.push_back(number_text(table2[i][w]));
-      row.push_back(
-          with_deviation(statistics_of(l, [i](const Criteria& c) { return c.index[i]; })));
+      row.push_back(shown_text(table2[i][w]));
+      row.push_back(with_deviation(sine.index(w, i)));
     }
-    row.push_back(with_deviation(paired_gain(a, l, ed), 3));
+    row.push_back(with_deviation(paired_gain(sine_adjustable.at[w], sine.at[w], ed), 3));
     lines.push_back(row);
   }
   report.table("sine",
-               "Variant: the reference 1 + sin t. LESO beside Table 2, and the ABESO's paired gain",
+               "The reference 1 + sin t: LESO beside Table 2, and how much less J_ed the ABESO has",
                {"w (rad/s)", "J_ex, paper", "ours", "J_edx, paper", "ours", "J_ed, paper", "ours",
                 "ABESO: less J_ed (%)"},
                lines);
-  report.remark(
-      "The paper shows a curve of the reference, no formula. With r = 1 the J_ed of the LESO is "
-      "within 2 % of Table 2 at every bandwidth, with r = 1 + sin t it is 2.4 % low at w = 4; what "
-      "is said of the observers holds for both.");
-  report.remark(
-      "What the ABESO gains it gains in the transient at the start, where a large error shrinks "
-      "and the lower bandwidth overshoots less; for t > 5 s nothing is left. From w = 7 on a plain "
-      "LESO at the ABESO's mean bandwidth does better; below, where lag and not noise makes the "
-      "error, it does worse. With the best bandwidth for each, the ABESO (w = 5) has 8 % less J_ed "
-      "than the LESO (w = 4 to 4.25).");
-
-  // ---- figures
-  Series series;
-  Series variant;
-  (void)run(leso, 7.0, 1, &series);
-  (void)run(leso, 7.0, 1, &variant, Reference::sine);
-  Figure first("fig1", {.rows = 1, .columns = 2, .panel_height = 200});
-  first.caption(
-      "Fig. 1: the reference and the total disturbance at w = 7 (LESO); dashed the variant 1 + sin "
-      "t "
-      "of the reference.");
-  auto& references =
-      first.panel(0, 0).x_label("t (s)").y_label("r (-)").name("reference").y_range(-0.5, 2.5);
-  references.legend(Legend::above)
-      .line(series.t, series.reference, {.name = "1"})
-      .line(variant.t, variant.reference, {.name = "1 + sin t", .dash = Dash::dashed});
-  first.panel(0, 1)
-      .x_label("t (s)")
-      .y_label("d (-)")
-      .name("disturbance")
-      .legend(Legend::above)
-      .line(series.t, series.disturbance, {.name = "r = 1"})
-      .line(variant.t, variant.disturbance, {.name = "r = 1 + sin t", .dash = Dash::dashed});
-  report.add(first);
-  report.add(draw_errors("fig2", leso,
-                         "Fig. 2: LESO. Estimation errors for w = 5, 6, 7 with the start and a "
-                         "piece of the steady state enlarged, and the disturbance with its "
-                         "estimate at w = 7."));
-  report.add(draw_errors("fig3", beso, "Fig. 3: BESO, the same."));
-  report.add(draw_errors("fig4", abeso, "Fig. 4: ABESO, the same."));
 
   Figure gains("gain", {.rows = 1, .columns = 2, .panel_height = 230});
   gains.caption(
-      "Left: J_ed over the bandwidth, both readings of the sign (bands: standard deviation over "
-      "the "
-      "seeds; crosses: printed in the paper). Right: paired reduction against the LESO of the same "
-      "w, in the two parts of the run.");
+      "Left: J_ed over the bandwidth (bands: standard deviation over the seeds; crosses: printed "
+      "in the paper). Right: how much less error of the disturbance (time integral) than the LESO "
+      "of the same w, in the two parts of the run.");
   auto& left = gains.panel(0, 0).x_label("w (rad/s)").y_label("J_{ed} (10^{-2})").name("index");
   left.legend(Legend::top_left);
   const auto add = [&](const Runs& runs, Color color, Dash dash) {
@@ -464,15 +620,14 @@ int main(int argc, char** argv) {
   };
   add(linear, Color::black, Dash::solid);
   add(adjustable, Color::blue, Dash::solid);
-  add(adjustable_printed, Color::blue, Dash::dashed);
+  add(fitted, Color::blue, Dash::dashed);
   add(bi, Color::vermillion, Dash::solid);
-  add(bi_printed, Color::vermillion, Dash::dashed);
   left.points(bandwidths, table2[2], {.color = Color::black, .marker = Marker::cross});
   left.points(bandwidths, table6[2], {.color = Color::blue, .marker = Marker::cross});
   left.points(bandwidths, table4[2], {.color = Color::vermillion, .marker = Marker::cross});
   auto& right = gains.panel(0, 1)
                     .x_label("w (rad/s)")
-                    .y_label("less J_{ed} than the LESO (%)")
+                    .y_label("less error of d than the LESO (%)")
                     .name("parts")
                     .legend(Legend::bottom_right);
   right.horizontal_line(0.0);

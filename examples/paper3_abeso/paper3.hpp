@@ -16,23 +16,23 @@
 #include <vector>
 
 #include <esokit/control/adrc_law.hpp>
-#include <esokit/observer/adjustable_bandwidth_eso.hpp>
-#include <esokit/sim/closed_loop.hpp>
+#include <esokit/design/continuous_gain.hpp>
+#include <esokit/observer/continuous_observer.hpp>
+#include <esokit/sim/dormand_prince.hpp>
 #include <esokit/sim/noise.hpp>
 #include <esokit/sim/trapezoid.hpp>
+#include <esokit/sim/window.hpp>
 
 #include "common/report.hpp"
 
 namespace paper3 {
 
-using esokit::SignReading;
-using esokit::SwitchingRule;
 using esokit::Vector;
 namespace sim = esokit::sim;
 
 inline const std::string folder = "paper3_abeso";
 
-inline esokit::examples::About about(std::string title, std::string description) {
+inline esokit::examples::About about(std::string title, std::string description, int order) {
   return {.paper_title = "Adjustable-bandwidth extended state observer",
           .citation =
               "S. Zhang, X. Qi, S. Yang, An extended state observer with adjustable "
@@ -40,7 +40,8 @@ inline esokit::examples::About about(std::string title, std::string description)
               "Electronics (2023)",
           .link = "https://doi.org/10.23919/JSEE.2023.000166",
           .title = std::move(title),
-          .description = std::move(description)};
+          .description = std::move(description),
+          .order = order};
 }
 
 inline constexpr double duration = 20.0;         // s
@@ -64,8 +65,8 @@ struct ShakenPlant {
   }
 };
 
-/// Fig. 1 of the paper draws a curve, there is no formula: 1 + sin t is like it. The tables come
-/// out with the constant (with the sine J_ed of the LESO is 1.7 % low at w = 4, else the same).
+/// Fig. 1 of the paper draws a curve, there is no formula; 1 + sin t is a guess. The tables come
+/// out with the constant.
 enum class Reference { constant, sine };
 
 inline double reference_value(Reference kind, double t) {
@@ -74,10 +75,10 @@ inline double reference_value(Reference kind, double t) {
 
 /// What an observer takes for its error shrinking, with en = z_1 - y.
 enum class Watch {
-  nothing,     ///< it does not switch
-  magnitude,   ///< |en| is smaller than at the noise value before
-  innovation,  ///< en is
-  filtered,    ///< p / (tau p + 1) en is negative: asked in every stage of the solver
+  nothing,            ///< it does not switch
+  magnitude,          ///< |en| is smaller than at the noise value before
+  innovation,         ///< en is
+  filtered,           ///< p / (tau p + 1) en is negative: asked in every stage of the solver
   filtered_at_steps,  ///< the same, asked at the start of each step
 };
 
@@ -219,8 +220,7 @@ inline Criteria run(const Kind& kind, double bandwidth, std::uint64_t seed,
   v = noise.next();
   const auto hit = [&] {
     if (kind.watch == Watch::magnitude || kind.watch == Watch::innovation) {
-      const double now =
-          kind.watch == Watch::magnitude ? std::abs(innovation(s)) : innovation(s);
+      const double now = kind.watch == Watch::magnitude ? std::abs(innovation(s)) : innovation(s);
       shrinking = watched && now < *watched;
       watched = now;
     }
