@@ -64,11 +64,13 @@
 #include <esokit/design/switching_certificate.hpp>
 #include <esokit/model/integrator_chain.hpp>
 #include <esokit/model/scaled_chain.hpp>
+#include <esokit/observer/adapter.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/algebraic_filter.hpp>
 #include <esokit/observer/algebraic_gain.hpp>
 #include <esokit/observer/cascade_eso.hpp>
+#include <esokit/observer/concepts.hpp>
 #include <esokit/observer/constant_gain.hpp>
 #include <esokit/observer/continuous_observer.hpp>
 #include <esokit/observer/delayed_input.hpp>
@@ -77,7 +79,6 @@
 #include <esokit/observer/half_gain_eso.hpp>
 #include <esokit/observer/known_model.hpp>
 #include <esokit/observer/linear_eso.hpp>
-#include <esokit/observer/loop_observer.hpp>
 #include <esokit/observer/mimo_extended_state_filter.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/observer/nonlinear_gain.hpp>

@@ -281,7 +281,8 @@ struct ControllerLawsOf<Adrc<O, F>> {
       EXPECT_TRUE(same(hit, missing));
       EXPECT_EQ(hit.observer().missed(), 1);
       EXPECT_TRUE(same_bits(hit.update(S(0.1), S(0)), missing.update(S(0.1), S(0))));
-      EXPECT_TRUE(esokit::has(hit.status(), StepStatus::gap_bridged) || !Traits::divides);
+      EXPECT_TRUE(esokit::has(hit.status(), StepStatus::gap_bridged) ||
+                  !esokit::observer_traits<O>.bears_regular_gaps);
       EXPECT_TRUE(finite(hit));
     }
   }
@@ -358,7 +359,7 @@ struct ControllerLawsOf<Adrc<O, F>> {
 
   /// Only every D-th measurement is looked at, and the loop is as exact as ever.
   static void divider_takes_every_dth_measurement() {
-    if constexpr (!Traits::divides) {
+    if constexpr (!esokit::observer_traits<O>.bears_regular_gaps) {
       Config settings = config();
       settings.measurement_divider = 2;
       const auto refused = Controller::make(settings);

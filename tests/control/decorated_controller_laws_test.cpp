@@ -13,7 +13,6 @@ namespace esokit_test {
 
 template <int Order, class S, int Extension>
 struct LoopTraits<esokit::LinearEso<Order, S, Extension>> {
-  static constexpr bool divides = true;
   static typename esokit::LinearEso<Order, S, Extension>::Config config(double omega, double T,
                                                                         double b0) {
     return {.observer_bandwidth = static_cast<S>(omega),
@@ -24,7 +23,6 @@ struct LoopTraits<esokit::LinearEso<Order, S, Extension>> {
 
 template <int Order, int Levels, class S>
 struct LoopTraits<esokit::CascadeEso<Order, Levels, S>> {
-  static constexpr bool divides = true;
   static typename esokit::CascadeEso<Order, Levels, S>::Config config(double omega, double T,
                                                                       double b0) {
     return {.observer_bandwidth = static_cast<S>(omega),
@@ -37,7 +35,6 @@ struct LoopTraits<esokit::CascadeEso<Order, Levels, S>> {
 // A capacity that this plant, which has no delay, leaves unused.
 template <class O, int Capacity>
 struct LoopTraits<esokit::DelayedInput<O, Capacity>> {
-  static constexpr bool divides = true;
   static typename esokit::DelayedInput<O, Capacity>::Config config(double omega, double T,
                                                                    double b0) {
     return {.observer = LoopTraits<O>::config(omega, T, b0), .delay = 0};
@@ -47,7 +44,6 @@ struct LoopTraits<esokit::DelayedInput<O, Capacity>> {
 // So long a period that the laws' references are not wrapped.
 template <class O>
 struct LoopTraits<esokit::WrappedOutput<O>> {
-  static constexpr bool divides = true;
   static typename esokit::WrappedOutput<O>::Config config(double omega, double T, double b0) {
     return {.observer = LoopTraits<O>::config(omega, T, b0),
             .period = static_cast<typename O::scalar_type>(64)};
@@ -56,7 +52,6 @@ struct LoopTraits<esokit::WrappedOutput<O>> {
 
 template <class O>
 struct LoopTraits<esokit::VariableTime<O>> {
-  static constexpr bool divides = true;
   static typename esokit::VariableTime<O>::Config config(double omega, double T, double b0) {
     return {.observer = LoopTraits<O>::config(omega, T, b0)};
   }
@@ -65,7 +60,6 @@ struct LoopTraits<esokit::VariableTime<O>> {
 // A model that is wrong: what it says more than the plant does is disturbance.
 template <class O>
 struct LoopTraits<esokit::KnownModel<O, esokit::KnownPoles<2>>> {
-  static constexpr bool divides = true;
   static constexpr bool approximate = true;
   static typename esokit::KnownModel<O, esokit::KnownPoles<2>>::Config config(double omega,
                                                                               double T, double b0) {

@@ -10,7 +10,6 @@ namespace esokit_test {
 
 template <int Order, class S, int Extension, class Placement>
 struct LoopTraits<esokit::LinearEso<Order, S, Extension, Placement>> {
-  static constexpr bool divides = true;
   static typename esokit::LinearEso<Order, S, Extension, Placement>::Config config(double omega,
                                                                                    double T,
                                                                                    double b0) {
@@ -22,7 +21,6 @@ struct LoopTraits<esokit::LinearEso<Order, S, Extension, Placement>> {
 
 template <int Order, int Levels, class S>
 struct LoopTraits<esokit::CascadeEso<Order, Levels, S>> {
-  static constexpr bool divides = true;
   static typename esokit::CascadeEso<Order, Levels, S>::Config config(double omega, double T,
                                                                       double b0) {
     return {.observer_bandwidth = static_cast<S>(omega),

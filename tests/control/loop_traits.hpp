@@ -17,7 +17,6 @@ using esokit::OutputBased;
 using esokit::StepStatus;
 
 /// To be specialised: `config(omega, T, b0)` of the observer with bandwidth omega.
-/// `divides` says whether the observer bears measurement_divider > 1.
 template <class Observer>
 struct LoopTraits;
 

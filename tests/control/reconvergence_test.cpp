@@ -24,13 +24,12 @@ using namespace esokit;
 constexpr double sample_time = 0.01;
 constexpr double turn = 6.25;
 
-template <class Config>
+template <class S, class Config>
 void set(Config& config, double omega_T) {
-  using S = std::remove_reference_t<decltype(chain_config(config).sample_time)>;
   if constexpr (requires { config.period; }) config.period = S(turn);
   if constexpr (requires { config.threshold; }) config.threshold = S(0.5);
   if constexpr (requires { config.observer; }) {
-    set(config.observer, omega_T);
+    set<S>(config.observer, omega_T);
   } else {
     config.observer_bandwidth = static_cast<S>(omega_T / sample_time);
     if constexpr (requires { config.bandwidth_factor; }) config.bandwidth_factor = S(1.5);
@@ -76,7 +75,7 @@ TYPED_TEST(LoopReconvergence, BackAtTheReference) {
     Random random(seed);
     typename TypeParam::Config config{.controller_bandwidth = S(4),
                                       .limits = {.lower = S(-2), .upper = S(2)}};
-    set(config.observer, random.uniform(0.7, 3));
+    set<S>(config.observer, random.uniform(0.7, 3));
     auto controller = TypeParam::make(config).value();
     constexpr bool wraps = requires { controller.observer().wrap(S(0)); };
     ChainPlant<2> plant(sample_time, 1, random.uniform(-1, 1));

@@ -10,7 +10,6 @@ namespace esokit_test {
 
 template <int Order, class S, int Extension>
 struct LoopTraits<esokit::AlgebraicEso<Order, S, Extension>> {
-  static constexpr bool divides = false;  // a gap among the first samples restarts its schedule
   static typename esokit::AlgebraicEso<Order, S, Extension>::Config config(double omega, double T,
                                                                            double b0) {
     return {.observer_bandwidth = static_cast<S>(omega),
@@ -22,7 +21,6 @@ struct LoopTraits<esokit::AlgebraicEso<Order, S, Extension>> {
 
 template <int Order, class S, int Extension>
 struct LoopTraits<esokit::AdjustableBandwidthEso<Order, S, Extension>> {
-  static constexpr bool divides = true;
   static typename esokit::AdjustableBandwidthEso<Order, S, Extension>::Config config(double omega,
                                                                                      double T,
                                                                                      double b0) {
@@ -35,7 +33,6 @@ struct LoopTraits<esokit::AdjustableBandwidthEso<Order, S, Extension>> {
 
 template <int Order, class S, int Extension>
 struct LoopTraits<esokit::NonlinearEso<Order, S, Extension>> {
-  static constexpr bool divides = true;
   static typename esokit::NonlinearEso<Order, S, Extension>::Config config(double omega, double T,
                                                                            double b0) {
     return {.observer_bandwidth = static_cast<S>(omega),
@@ -47,7 +44,6 @@ struct LoopTraits<esokit::NonlinearEso<Order, S, Extension>> {
 
 template <int Order, class S>
 struct LoopTraits<esokit::ExtendedStateFilter<Order, S>> {
-  static constexpr bool divides = true;
   /// Bounds that put the limit of the gain near the bandwidth omega.
   static typename esokit::ExtendedStateFilter<Order, S>::Config config(double omega, double T,
                                                                        double b0) {

@@ -18,19 +18,8 @@ namespace esokit_test {
 namespace {
 
 using esokit::LinearEso;
-using esokit::LoopObserver;
 using esokit::StepStatus;
 using esokit::VariableTime;
-
-static_assert(LoopObserver<LinearEso<2>> && LoopObserver<esokit::CascadeEso<2, 2>>);
-static_assert(LoopObserver<esokit::AlgebraicEso<2>> && LoopObserver<esokit::NonlinearEso<2>>);
-static_assert(LoopObserver<esokit::AdjustableBandwidthEso<2>>);
-static_assert(LoopObserver<esokit::ExtendedStateFilter<2>>);
-static_assert(LoopObserver<VariableTime<esokit::WrappedOutput<LinearEso<3, float>>>>);
-static_assert(!LoopObserver<int>);
-static_assert(!esokit::bears_regular_gaps<esokit::AlgebraicEso<2>>);
-static_assert(!esokit::bears_regular_gaps<VariableTime<esokit::AlgebraicEso<2>>>);
-static_assert(esokit::bears_regular_gaps<VariableTime<LinearEso<2>>>);
 
 constexpr double nominal = 0.01;
 

@@ -26,10 +26,10 @@ using namespace esokit;
 
 constexpr double sample_time = 0.01;
 
-template <class Config>
-Config with(Config config, double omega_T) {
-  using S = decltype(chain_config(config).sample_time);
-  auto& chain = chain_config(config);
+template <class Observer>
+typename Observer::Config with(typename Observer::Config config, double omega_T) {
+  using S = typename Observer::scalar_type;
+  auto& chain = chain_config<Observer>(config);
   chain.observer_bandwidth = static_cast<S>(omega_T / sample_time);
   chain.input_gain = S(2);
   chain.sample_time = static_cast<S>(sample_time);
@@ -40,7 +40,7 @@ Config with(Config config, double omega_T) {
 template <class Observer>
 void outlier_is_a_missing_sample(typename Observer::Config config, double omega_T = 0.3) {
   using S = typename Observer::scalar_type;
-  config = with(config, omega_T);
+  config = with<Observer>(config, omega_T);
   auto gated =
       OutlierGate<Observer>::make({.observer = config, .threshold = S(0.5), .most_in_a_row = 40})
           .value();
@@ -86,7 +86,7 @@ TEST(OutlierGate, OutlierIsAMissingSample) {
 /// Inside of WrappedOutput: an axis that turns by a sixth of a turn a sample is no outlier, one
 /// that is off by half a turn, or by any number of them, is.
 TEST(OutlierGate, Angle) {
-  const auto linear = with(LinearEso<2>::Config{}, 0.3);
+  const auto linear = with<LinearEso<2>>({}, 0.3);
   auto plain = LinearEso<2>::make(linear).value();
   auto axis = WrappedOutput<OutlierGate<LinearEso<2>>>::make(
                   {.observer = {.observer = linear, .threshold = 20}, .period = 360})
@@ -114,7 +114,7 @@ TEST(OutlierGate, OpensAfterAStepOfAnySize) {
     const int most = 1 + random.index(20);
     const double omega_T = random.uniform(0.2, 2);
     auto gated =
-        OutlierGate<LinearEso<2>>::make({.observer = with(LinearEso<2>::Config{}, omega_T),
+        OutlierGate<LinearEso<2>>::make({.observer = with<LinearEso<2>>({}, omega_T),
                                          .threshold = random.log_uniform(1e-3, 1),
                                          .running_factor = random.index(2) == 0 ? 0.0 : 6.0,
                                          .most_in_a_row = most})
@@ -147,10 +147,10 @@ TEST(OutlierGate, OpensAfterAStepOfAnySize) {
 /// The limit from both sides; it widens with what is missing; noise widens it by the running mean.
 TEST(OutlierGate, Limit) {
   const auto made = [](double factor) {
-    auto gate = OutlierGate<LinearEso<2>>::make({.observer = with(LinearEso<2>::Config{}, 0.3),
-                                                 .threshold = 0.5,
-                                                 .running_factor = factor})
-                    .value();
+    auto gate =
+        OutlierGate<LinearEso<2>>::make(
+            {.observer = with<LinearEso<2>>({}, 0.3), .threshold = 0.5, .running_factor = factor})
+            .value();
     for (int k = 0; k < 5; ++k) {
       EXPECT_TRUE(gate.open());
       EXPECT_EQ(gate.update(0, 0), StepStatus::ok);
@@ -190,7 +190,7 @@ TEST(OutlierGate, Limit) {
   // What got in while it was open does not keep it open.
   auto opened =
       OutlierGate<LinearEso<2>>::make(
-          {.observer = with(LinearEso<2>::Config{}, 1.5), .threshold = 0.5, .running_factor = 5})
+          {.observer = with<LinearEso<2>>({}, 1.5), .threshold = 0.5, .running_factor = 5})
           .value();
   for (int k = 0; k < 3; ++k) EXPECT_EQ(opened.update(1e30, 0), StepStatus::ok);
   for (int k = 0; k < 300; ++k) (void)opened.update(0, 0);
@@ -201,7 +201,7 @@ TEST(OutlierGate, Limit) {
 /// Off, it is the observer, bit for bit; it can be switched on and off while running.
 TEST(OutlierGate, OffAndRetuned) {
   using Gate = OutlierGate<LinearEso<2>>;
-  const auto linear = with(LinearEso<2>::Config{}, 0.3);
+  const auto linear = with<LinearEso<2>>({}, 0.3);
   auto gate = Gate::make({.observer = linear}).value();
   auto plain = LinearEso<2>::make(linear).value();
   Random random(5);
@@ -275,7 +275,7 @@ TEST(OutlierGate, InAdrc) {
     }
     return largest;
   };
-  const auto linear = with(LinearEso<2>::Config{}, 0.5);
+  const auto linear = with<LinearEso<2>>({}, 0.5);
   using Gate = OutlierGate<LinearEso<2>>;
   EXPECT_LT(worst({.observer = linear, .threshold = 0.5}, static_cast<Gate*>(nullptr)), 1e-6);
   EXPECT_GT(worst(linear, static_cast<LinearEso<2>*>(nullptr)), 1);

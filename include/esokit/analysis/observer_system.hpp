@@ -11,31 +11,9 @@
 #include <esokit/analysis/linear_system.hpp>
 #include <esokit/design/sampled_gain.hpp>
 #include <esokit/model/integrator_chain.hpp>
+#include <esokit/observer/concepts.hpp>
 
 namespace esokit {
-
-namespace detail {
-
-/// Decorators that add dynamics of their own: a delay line, a known model. Their gains do not tell
-/// all.
-template <class T>
-inline constexpr bool has_own_dynamics = requires(const T& observer) {
-  observer.delay();
-}
-|| requires(const T& observer) { observer.residual_disturbance(); };
-
-}  // namespace detail
-
-/// A sampled observer whose gain does not depend on the measurement: LinearEso, CascadeEso, a
-/// settled AlgebraicEso, an ExtendedStateFilter frozen where it is. The system is the one that the
-/// present gain makes.
-template <class T>
-concept SampledLinearObserver = !detail::has_own_dynamics<T> && requires(const T& observer) {
-  { T::order + T::extension + T::levels } -> std::convertible_to<int>;
-  observer.level_gain(0);
-  static_cast<double>(observer.input_gain());
-  static_cast<double>(observer.sample_time());
-};
 
 /// A continuous observer, linear in its state; ContinuousLinearEso, ContinuousCascadeEso.
 template <class T>
@@ -53,10 +31,12 @@ concept LinearObserver = SampledLinearObserver<T> || ContinuousLinearObserver<T>
 /// A sampled observer held in one mode: the gains of a switched or nonlinear law at one place.
 template <int Order, int Levels = 1, int Extension = 1>
 struct FrozenObserver {
+  using scalar_type = double;                                     ///< of the gains
   static constexpr int order = Order;                             ///< n, order of the plant
   static constexpr int extension = Extension;                     ///< m, extended states
   static constexpr int size = ChainSize<Order, Extension>::size;  ///< N = n + m
   static constexpr int levels = Levels;                           ///< p
+  static constexpr ObserverTraits traits{.acts_by_gain = true};   ///< beyond that
 
   Array<ScaledGain<size, double>, Levels> gains{};  ///< current-estimator gains, scaled
   double gain_of_input{};                           ///< b0, unit of y^(n) per unit of u

@@ -92,7 +92,7 @@ class Adrc {
   static Expected<Adrc, Error<S>> make(const Config& config) {
     const auto observer = Observer::make(observer_config(config));
     if (!observer) return observer.error();
-    const auto& chain = chain_config(config.observer);
+    const auto& chain = chain_config<Observer>(config.observer);
     const auto law = make_law(config, chain.sample_time);
     if (!law) return law.error();
     const auto scaled = FastLaw::make(*law, *observer);
@@ -196,7 +196,7 @@ class Adrc {
   /// limit and, where placed in the sampled domain, the controller's gains follow. A length that
   /// the observer's config does not allow is refused and changes nothing.
   Check<S> set_step_time(const S& seconds) noexcept
-      requires(requires(Observer& o, const S& s) { o.set_step_time(s); }) {
+      requires(observer_traits<Observer>.varies_time) {
     const bool gains_follow = spec_.domain == TimeDomain::sampled && spec_.bandwidth > S(0);
     if (!gains_follow || !is_finite(seconds) || !(seconds > S(0))) {
       return loop_.set_step_time(seconds);
@@ -228,14 +228,14 @@ class Adrc {
  private:
   using Loop = ControlLoop<Observer>;
   using Law = AdrcLaw<order, S>;
-  using FastLaw =
-      std::conditional_t<has_plain_estimate<Observer>, ScaledLaw<order, S>, NoScaledLaw>;
+  using FastLaw = std::conditional_t<observer_traits<Observer>.publishes_chain, ScaledLaw<order, S>,
+                                     NoScaledLaw>;
   struct NoSpec {
     constexpr NoSpec() = default;
     constexpr explicit NoSpec(const FeedbackSpec<S>&) {}
   };
-  static constexpr bool has_step_time = requires(Observer & o, const S& s) { o.set_step_time(s); };
-  static constexpr bool wraps = requires(const Observer& o, const S& s) { o.wrap(s); };
+  static constexpr bool has_step_time = observer_traits<Observer>.varies_time;
+  static constexpr bool wraps = observer_traits<Observer>.wraps_output;
 
   Adrc(const Loop& loop, const Law& law, const FastLaw& fast_law, const Config& config) noexcept
       : loop_(loop), law_(law), fast_law_(fast_law), spec_(spec(config)) {}
@@ -248,12 +248,12 @@ class Adrc {
     auto observer = config.observer;
     // e'' = r'' - d - b0 u.
     if constexpr (error_based)
-      chain_config(observer).input_gain = -chain_config(observer).input_gain;
+      chain_config<Observer>(observer).input_gain = -chain_config<Observer>(observer).input_gain;
     return observer;
   }
 
   static Expected<Law, Error<S>> make_law(const Config& config, const S& sample_time) {
-    const S& input_gain = chain_config(config.observer).input_gain;
+    const S& input_gain = chain_config<Observer>(config.observer).input_gain;
     if (config.gains) {
       if (config.half_gain) {
         return Error<S>{"half_gain", S(1), "must be left out where gains is given"};
@@ -301,7 +301,7 @@ class Adrc {
   }
 
   [[nodiscard]] ESOKIT_INLINE S command(S reference) const noexcept {
-    if constexpr (has_plain_estimate<Observer>) {
+    if constexpr (observer_traits<Observer>.publishes_chain) {
       if constexpr (error_based) {
         return fast_law_.control_error_based(observer());
       } else {

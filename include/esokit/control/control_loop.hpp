@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <esokit/control/limiter.hpp>
 #include <esokit/core/unroll.hpp>
-#include <esokit/observer/loop_observer.hpp>
+#include <esokit/observer/concepts.hpp>
 #include <esokit/observer/steady_state.hpp>
 #include <optional>
 
@@ -142,8 +142,8 @@ class ControlLoop {
   /// @return the loop, with the observer in the state that it has, or an error that names the field
   static Expected<ControlLoop, Error<S>> make(const Observer& observer,
                                               const LoopSettings<S>& settings, int max_gap) {
-    const auto checked =
-        detail::check_loop(settings, observer.sample_time(), max_gap, bears_regular_gaps<Observer>);
+    const auto checked = detail::check_loop(settings, observer.sample_time(), max_gap,
+                                            observer_traits<Observer>.bears_regular_gaps);
     if (!checked) return checked.error();
     return ControlLoop(observer, checked->limiter, settings, checked->hold_samples);
   }
@@ -234,7 +234,7 @@ class ControlLoop {
   /// How long the next step takes (s), where the observer is VariableTime; the rate limit follows.
   /// A length that the observer refuses changes nothing.
   Check<S> set_step_time(const S& seconds) noexcept
-      requires(requires(Observer& o, const S& s) { o.set_step_time(s); }) {
+      requires(observer_traits<Observer>.varies_time) {
     if (auto ok = observer_.set_step_time(seconds); !ok) return ok;
     auto limiter = Limiter<S>::make(limits_, seconds);
     if (!limiter) return limiter.error();
@@ -260,7 +260,7 @@ class ControlLoop {
 
  private:
   struct Nothing {};
-  static constexpr bool has_step_time = requires(Observer & o, const S& s) { o.set_step_time(s); };
+  static constexpr bool has_step_time = observer_traits<Observer>.varies_time;
 
   ControlLoop(const Observer& observer, const Limiter<S>& limiter, const LoopSettings<S>& settings,
               std::uint32_t hold_samples) noexcept

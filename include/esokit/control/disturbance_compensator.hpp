@@ -43,7 +43,7 @@ class DisturbanceCompensator {
   static Expected<DisturbanceCompensator, Error<S>> make(const Config& config) {
     const auto observer = Observer::make(config.observer);
     if (!observer) return observer.error();
-    const S& input_gain = chain_config(config.observer).input_gain;
+    const S& input_gain = chain_config<Observer>(config.observer).input_gain;
     S gain = S(-1) / input_gain;
     if (config.compensation_gain) {
       gain = *config.compensation_gain;
@@ -53,7 +53,7 @@ class DisturbanceCompensator {
     }
     const auto loop = Loop::make(
         *observer, {config.limits, config.hold, config.missing, config.measurement_divider},
-        chain_config(config.observer).max_gap);
+        chain_config<Observer>(config.observer).max_gap);
     if (!loop) return loop.error();
     return DisturbanceCompensator(*loop, gain);
   }
@@ -103,7 +103,7 @@ class DisturbanceCompensator {
 
   /// How long the next step takes, s; see Adrc::set_step_time.
   Check<S> set_step_time(const S& seconds) noexcept
-      requires(requires(Observer& o, const S& s) { o.set_step_time(s); }) {
+      requires(observer_traits<Observer>.varies_time) {
     return loop_.set_step_time(seconds);
   }
 

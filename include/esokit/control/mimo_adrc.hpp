@@ -7,7 +7,7 @@
 #include <esokit/core/linear_equations.hpp>
 #include <esokit/core/unroll.hpp>
 #include <esokit/design/feedback_gain.hpp>
-#include <esokit/observer/loop_observer.hpp>
+#include <esokit/observer/concepts.hpp>
 #include <esokit/observer/steady_state.hpp>
 #include <limits>
 #include <string_view>
@@ -25,7 +25,7 @@ namespace esokit {
 /// nothing up; while one actuator is limited the channels are coupled through B0. A channel whose
 /// measurement is NaN predicts alone, the others go on.
 /// @tparam Observers one observer type a channel, all of one scalar
-template <LoopObserver... Observers>
+template <ShiftableDisturbance... Observers>
 class MimoAdrc {
   using Channels = std::tuple<Observers...>;
   using First = std::tuple_element_t<0, Channels>;
@@ -62,7 +62,7 @@ class MimoAdrc {
   static Expected<MimoAdrc, Error<S>> make(const Config& config) {
     auto inverse = inverted(config);
     if (!inverse) return inverse.error();
-    const S& sample_time = chain_config(std::get<0>(config.observers)).sample_time;
+    const S& sample_time = chain_config<First>(std::get<0>(config.observers)).sample_time;
     return make_channels(config, *inverse, sample_time,
                          std::make_index_sequence<sizeof...(Observers)>{});
   }
@@ -87,7 +87,7 @@ class MimoAdrc {
       }
       const auto estimate = observer.estimate();
       S r = reference(row);
-      if constexpr (requires { observer.wrap(r); })
+      if constexpr (observer_traits<ObserverOf<row>>.wraps_output)
         r = estimate(0) + observer.wrap(r - estimate(0));
       wanted(row) = std::get<channel>(laws_).control(estimate, r);
     });
@@ -139,13 +139,13 @@ class MimoAdrc {
       constexpr int row = i;
       auto& observer = std::get<channel>(observers);
       auto settings = std::get<channel>(config.observers);
-      chain_config(settings).input_gain = S(1);
+      chain_config<ObserverOf<row>>(settings).input_gain = S(1);
       if (outcome) outcome = observer.retune(settings);
       if (outcome && observer.shift_disturbance(moved(row)) != StepStatus::ok) {
         outcome = too_large(u(row));
       }
       // Of what is under way to the plant the new B0 makes another drive.
-      if constexpr (requires { observer.fill_input(S()); }) {
+      if constexpr (observer_traits<ObserverOf<row>>.delays_input) {
         if (moved(row) < S(0) || moved(row) > S(0)) observer.fill_input(drive(row));
       }
     });
@@ -278,7 +278,7 @@ class MimoAdrc {
   template <class Observer>
   static Expected<Observer, Error<S>> make_observer(typename Observer::Config config,
                                                     const S& sample_time, int) {
-    auto& chain = chain_config(config);
+    auto& chain = chain_config<Observer>(config);
     if (chain.input_gain < S(0) || chain.input_gain > S(0) || !is_finite(chain.input_gain)) {
       return Error<S>{"input_gain", chain.input_gain, "must be left out, input_matrix says it"};
     }

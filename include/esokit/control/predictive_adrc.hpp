@@ -10,30 +10,13 @@
 #include <esokit/control/limiter.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/core/unroll.hpp>
+#include <esokit/observer/concepts.hpp>
 #include <esokit/observer/gain_law.hpp>
 #include <esokit/observer/steady_state.hpp>
 #include <esokit/observer/step_status.hpp>
 #include <optional>
 
 namespace esokit {
-
-/// An observer whose next correction can be told before the measurement: every observer of the
-/// library itself. Decorators (WrappedOutput, KnownModel, VariableTime, DelayedInput) are not; they
-/// do something of their own with y, u or the estimate.
-template <class O>
-concept PredictableObserver = std::copyable<O> &&
-    requires(O& observer, const O& constant, const typename O::scalar_type& s,
-             const typename O::Config& config) {
-  { O::make(config) } -> std::same_as<Expected<O, Error<typename O::scalar_type>>>;
-  { observer.predict(s) } -> std::same_as<StepStatus>;
-  { observer.correct(s) } -> std::same_as<StepStatus>;
-  { observer.revise_input(s) } -> std::same_as<StepStatus>;
-  { constant.template scaled_estimate<0>() } -> std::convertible_to<typename O::scalar_type>;
-  { constant.restarts() } -> std::same_as<bool>;
-} &&(requires(const O& o) { o.preview(); } || O::levels == 1) &&
-    !requires(const typename O::Config& config) {
-  config.observer;
-};
 
 /// u = (v - dhat) / b0, as AdrcLaw gives it after the observer's correction, but with the
 /// correction folded in: u_k = ubar_k - slope y_k, where ubar_k and slope are known before y_k.
@@ -111,7 +94,7 @@ class PredictiveAdrc {
   ESOKIT_INLINE S control(S y) noexcept {
     measurement_ = y;
     S raw = wanted(y);
-    if constexpr (requires { observer_.accepts(y); }) {
+    if constexpr (observer_traits<Observer>.gates_outliers) {
       if (!observer_.accepts(y)) [[unlikely]]
         raw = blind_;
     }
@@ -246,19 +229,11 @@ class PredictiveAdrc {
   using Weights = Array<S, order + 1>;
   enum class Phase : unsigned char { prepared, measured, missing };
 
-  /// The gain is known before the measurement.
-  static constexpr bool preset = requires(const Observer& o) { o.preview(); };
-  /// The gain is one of two, known before the measurement.
-  static constexpr bool switched = requires(const Observer& o, const S& e) {
-    o.gain_law().shrinks(e);
-    o.gain_law().shrinking_gain();
-    o.gain_law().otherwise_gain();
-  };
-  /// The gain is a factor k(e) times one that is known before the measurement.
-  static constexpr bool factored = requires(const Observer& o, const S& e) {
-    o.gain_law().factor(e);
-    o.gain_law().linear_gain();
-  };
+  /// What is known of the gain before the measurement.
+  static constexpr GainKind kind = observer_traits<Observer>.gain_kind;
+  static constexpr bool preset = kind == GainKind::preset;
+  static constexpr bool switched = kind == GainKind::switched;
+  static constexpr bool factored = kind == GainKind::factored;
 
   PredictiveAdrc(const Observer& observer, const AdrcLaw<order, S>& law, const Limiter<S>& limiter,
                  std::uint32_t hold) noexcept
@@ -379,7 +354,7 @@ class PredictiveAdrc {
         slope_ = weigh(observer_.gain_law().linear_gain());
       }
     }
-    if constexpr (requires { observer_.holding(); }) {
+    if constexpr (observer_traits<Observer>.holds_estimate) {
       if (observer_.holding()) [[unlikely]] {
         // The observer publishes what it held at its start, whatever y will be.
         Reference reference;

@@ -5,34 +5,8 @@
 
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/core/unroll.hpp>
-#include <type_traits>
 
 namespace esokit {
-
-namespace detail {
-
-template <class Class, class Result>
-Class declaring_class(Result (Class::*)() const);
-template <class Class, class Result>
-Class declaring_class(Result (Class::*)() const noexcept);
-
-}  // namespace detail
-
-/// Whether an observer's published estimate is the state of its chain. Not so where a derived class
-/// publishes another one (AlgebraicEso during its hold, KnownModel), nor where the scaling changes
-/// from step to step (VariableTime).
-template <class Observer>
-inline constexpr bool has_plain_estimate = [] {
-  if constexpr (requires(Observer & o, const typename Observer::scalar_type& s) {
-                  o.set_step_time(s);
-                }) {
-    return false;
-  } else {
-    return std::is_same_v<decltype(detail::declaring_class(&Observer::total_disturbance)),
-                          decltype(detail::declaring_class(
-                              &Observer::template scaled_estimate<Observer::order>))>;
-  }
-}();
 
 /// u = w_0 (r - y) - sum_(i>=1) w_i x_i on the scaled state x, with
 /// w_i = k_i i! / (T^i b0), w_n = n! / (T^n b0).

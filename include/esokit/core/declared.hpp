@@ -40,6 +40,7 @@ struct Constant;
   };
 
 ESOKIT_MEMBER_NAME(traits)
+ESOKIT_MEMBER_NAME(check)
 
 /// What T declares, or the defaults.
 template <class T, class Traits>

@@ -36,6 +36,15 @@ class AlgebraicEso
  public:
   using Estimate = typename Base::Estimate;  ///< (y, .., y^(n-1), d, .., d^(m-1)), N x 1
 
+  /// What it is beyond LoopObserver.
+  static constexpr ObserverTraits traits = [] {
+    ObserverTraits traits = Base::traits;
+    traits.bears_regular_gaps = false;
+    traits.publishes_chain = false;
+    traits.holds_estimate = true;
+    return traits;
+  }();
+
   /// Settings of make.
   struct Config {
     S observer_bandwidth{};  ///< lambda, rad/s: the bandwidth that is left in the end

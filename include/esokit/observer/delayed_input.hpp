@@ -4,7 +4,7 @@
 
 #include <esokit/core/type_tag.hpp>
 #include <esokit/core/unroll.hpp>
-#include <esokit/observer/loop_observer.hpp>
+#include <esokit/observer/adapter.hpp>
 
 namespace esokit {
 
@@ -14,11 +14,21 @@ namespace esokit {
 /// The estimate is that of the present; what u still on its way will do is not predicted.
 /// @tparam Capacity largest d that a config may ask for; the memory is Capacity + 1 scalars
 template <LoopObserver Observer, int Capacity>
-class DelayedInput : public Observer {
+class DelayedInput : public Adapter<Observer> {
+  using Base = Adapter<Observer>;
+  using Base::observer_;
   static_assert(Capacity >= 1, "esokit: a delay line needs a capacity of at least 1");
   using S = typename Observer::scalar_type;
 
  public:
+  /// What it is beyond LoopObserver.
+  static constexpr ObserverTraits traits = [] {
+    ObserverTraits traits = Base::traits;
+    traits.delays_input = true;
+    traits.acts_by_gain = false;
+    return traits;
+  }();
+
   /// Settings of make.
   struct Config {
     typename Observer::Config observer{};  ///< of the observer itself
@@ -46,7 +56,7 @@ class DelayedInput : public Observer {
   Check<S> retune(const Config& config) {
     auto fresh = make(config);
     if (!fresh) return fresh.error();
-    if (auto ok = Observer::retune(config.observer); !ok) return ok;
+    if (auto ok = observer_.retune(config.observer); !ok) return ok;
     delay_ = fresh->delay_;
     return {};
   }
@@ -54,13 +64,24 @@ class DelayedInput : public Observer {
   /// One sample. @param y measurement @param u_applied u[k], of now; the delay is seen to here
   StepStatus update(S y, S u_applied) noexcept {
     const StepStatus status = push(u_applied);
-    return status | Observer::update(y, delayed());
+    return status | observer_.update(y, delayed());
   }
 
   /// Time update alone, see PredictorCorrector::predict.
   StepStatus predict(S u_applied) noexcept {
     const StepStatus status = push(u_applied);
-    return status | Observer::predict(delayed());
+    return status | observer_.predict(delayed());
+  }
+
+  /// Measurement update alone, see PredictorCorrector::correct.
+  StepStatus correct(S y) noexcept { return observer_.correct(y); }
+
+  /// Starts anew at (y, 0, .., 0).
+  StepStatus reset(S y) noexcept { return observer_.reset(y); }
+
+  /// Starts anew at a given estimate, N x 1.
+  StepStatus reset(const typename Observer::Estimate& state) noexcept {
+    return observer_.reset(state);
   }
 
   /// As if `u` had been applied for long. A u that is not finite changes nothing.
@@ -69,13 +90,16 @@ class DelayedInput : public Observer {
     inputs_.fill(u);
   }
 
+  /// What the observer was told is an input of d samples ago.
+  StepStatus revise_input(const S&) noexcept = delete;
+
   /// d, samples.
   [[nodiscard]] int delay() const noexcept { return delay_; }
 
  private:
   static constexpr int length = Capacity + 1;
 
-  DelayedInput(const Observer& observer, int delay) noexcept : Observer(observer), delay_(delay) {}
+  DelayedInput(const Observer& observer, int delay) noexcept : Base(observer), delay_(delay) {}
 
   /// A bad input takes the place of the last good one here already, so that it is reported now and
   /// not d samples later.

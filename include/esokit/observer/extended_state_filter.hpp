@@ -69,6 +69,14 @@ class ExtendedStateFilter
   using Estimate = typename Base::Estimate;  ///< (y, .., y^(n-1), d, .., d^(m-1)), N x 1
   using Covariance = Matrix<S, N, N>;        ///< N x N, in the units of the estimates
 
+  /// What it is beyond LoopObserver.
+  static constexpr ObserverTraits traits = [] {
+    ObserverTraits traits = Base::traits;
+    traits.acts_by_gain = !has_model;
+    traits.gates_outliers = true;
+    return traits;
+  }();
+
   /// Settings of make.
   struct Config {
     S input_gain{};            ///< b0, unit of y^(n) per unit of u; not zero, negative is fine

@@ -19,7 +19,6 @@ struct EvenGainTraits {
 
 namespace detail {
 
-ESOKIT_MEMBER_NAME(check)
 ESOKIT_MEMBER_NAME(prepared)
 
 template <class Shape>

@@ -4,7 +4,7 @@
 
 #include <cstdint>
 #include <esokit/core/type_tag.hpp>
-#include <esokit/observer/loop_observer.hpp>
+#include <esokit/observer/adapter.hpp>
 
 namespace esokit {
 
@@ -20,12 +20,14 @@ namespace esokit {
 ///
 /// It nests with the other adapters; inside of WrappedOutput, which tells it the turn.
 /// ExtendedStateFilter has a gate of its own, which knows the variance of its innovation.
-template <LoopObserver Observer>
-class OutlierGate : public Observer {
+template <LevelledObserver Observer>
+requires RestartingObserver<Observer>
+class OutlierGate : public Adapter<Observer> {
+  using Base = Adapter<Observer>;
+  using Base::observer_;
   using S = typename Observer::scalar_type;
-  static_assert(
-      !requires(const Observer& observer, const S& angle) { observer.wrap(angle); },
-      "esokit: WrappedOutput goes around OutlierGate: it counts the turns");
+  static_assert(!observer_traits<Observer>.wraps_output,
+                "esokit: WrappedOutput goes around OutlierGate: it counts the turns");
 
  public:
   /// Settings of make.
@@ -60,7 +62,7 @@ class OutlierGate : public Observer {
   Check<S> retune(const Config& config) {
     auto fresh = make(config);
     if (!fresh) return fresh.error();
-    if (auto ok = Observer::retune(config.observer); !ok) return ok;
+    if (auto ok = observer_.retune(config.observer); !ok) return ok;
     threshold_ = fresh->threshold_;
     running_factor_ = fresh->running_factor_;
     most_in_a_row_ = fresh->most_in_a_row_;
@@ -69,24 +71,30 @@ class OutlierGate : public Observer {
 
   /// One sample, see PredictorCorrector::update; `outlier_rejected` where y was taken for one.
   StepStatus update(S y, S u_applied) noexcept {
-    if (!gated()) return Observer::update(y, u_applied);
-    const StepStatus predicted = Observer::predict(u_applied);
+    if (!gated()) return observer_.update(y, u_applied);
+    const StepStatus predicted = observer_.predict(u_applied);
     return predicted | correct(y);
   }
+
+  /// Time update alone, see PredictorCorrector::predict.
+  StepStatus predict(S u_applied) noexcept { return observer_.predict(u_applied); }
 
   /// Measurement update alone.
   StepStatus correct(S y) noexcept {
     if (gated() && !lets_in(y)) return StepStatus::outlier_rejected;
-    return Observer::correct(y);
+    return observer_.correct(y);
   }
 
   /// Starts anew at (y, 0, .., 0), with the gate open.
-  StepStatus reset(S y) noexcept { return open_after(Observer::reset(y)); }
+  StepStatus reset(S y) noexcept { return open_after(observer_.reset(y)); }
 
   /// Starts anew at a given estimate, N x 1.
   StepStatus reset(const typename Observer::Estimate& state) noexcept {
-    return open_after(Observer::reset(state));
+    return open_after(observer_.reset(state));
   }
+
+  /// It would pass the gate.
+  StepStatus correct_weighted(const S&, const S&) noexcept = delete;
 
   /// Innovation up to which a measurement is let in where none is missing, unit of y.
   [[nodiscard]] S limit() const noexcept {
@@ -99,7 +107,7 @@ class OutlierGate : public Observer {
 
  private:
   OutlierGate(const Observer& observer, const Config& config) noexcept
-      : Observer(observer),
+      : Base(observer),
         threshold_(config.threshold),
         running_factor_(config.running_factor),
         most_in_a_row_(static_cast<std::uint16_t>(config.most_in_a_row)) {}
@@ -109,7 +117,7 @@ class OutlierGate : public Observer {
   /// Bad numbers are not its business, nor is a measurement that restarts the observer.
   bool lets_in(const S& y) noexcept {
     // The innovation is that of level 1, whose z_1 the correction will subtract.
-    const S innovation = y - Observer::level_estimate(0)(0);
+    const S innovation = y - observer_.level_estimate(0)(0);
     if (!is_finite(innovation)) return true;
     if (this->restarts()) {
       set_open(true);
@@ -152,7 +160,8 @@ class OutlierGate : public Observer {
 };
 
 /// Told apart in snapshots.
-template <LoopObserver Observer>
+template <LevelledObserver Observer>
+requires RestartingObserver<Observer>
 inline constexpr std::uint32_t type_tag<OutlierGate<Observer>> =
     make_type_tag<Observer>("OutlierGate");
 

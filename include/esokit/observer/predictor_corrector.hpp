@@ -8,6 +8,7 @@
 #include <esokit/core/unroll.hpp>
 #include <esokit/design/check.hpp>
 #include <esokit/model/scaled_chain.hpp>
+#include <esokit/observer/concepts.hpp>
 #include <esokit/observer/gain_law.hpp>
 #include <esokit/observer/step_status.hpp>
 #include <limits>
@@ -78,6 +79,13 @@ class PredictorCorrector {
   using scalar_type = S;                           ///< of states and settings
   using Estimate = typename Chain::Estimate;       ///< (y, .., y^(n-1), d, .., d^(m-1)), N x 1
   using Laws = Array<Law, Levels>;                 ///< one a level
+
+  /// What it is beyond LoopObserver.
+  static constexpr ObserverTraits traits{
+      .publishes_chain = true,
+      .acts_by_gain = gain_law_traits<Law>.kind == GainKind::preset,
+      .is_predictable = Levels == 1 || gain_law_traits<Law>.kind == GainKind::preset,
+      .gain_kind = gain_law_traits<Law>.kind};
 
   /// From chain settings and ready gain laws; the way in for a gain law of your own.
   /// @return error for input_gain, sample_time or max_gap out of its rule

@@ -2,7 +2,7 @@
 /// An observer in the steady state of its plant: where controllers start, and start again.
 #pragma once
 
-#include <esokit/observer/step_status.hpp>
+#include <esokit/observer/concepts.hpp>
 
 namespace esokit::detail {
 
@@ -21,7 +21,7 @@ typename Observer::Estimate steady_state(const Observer& observer, const S& y,
 template <class Observer, class S>
 StepStatus start_at_rest(Observer& observer, const S& y, const S& u) noexcept {
   Observer next = observer;
-  if constexpr (requires { next.fill_input(u); }) next.fill_input(u);
+  if constexpr (observer_traits<Observer>.delays_input) next.fill_input(u);
   // Tells it the input: a report of what was applied and a change of b0 ask for that.
   (void)next.predict(u);
   const StepStatus status = next.reset(steady_state(next, y, u));

@@ -3,7 +3,7 @@
 #pragma once
 
 #include <esokit/core/type_tag.hpp>
-#include <esokit/observer/loop_observer.hpp>
+#include <esokit/observer/adapter.hpp>
 
 namespace esokit {
 
@@ -20,11 +20,21 @@ namespace esokit {
 /// AlgebraicEso counts samples: while its bandwidth falls it takes all samples so far as having the
 /// present length; once settled it is exact. A switched observer's gain sets follow time; its
 /// switching test compares innovations, whatever time lies between them.
-template <LoopObserver Observer>
-class VariableTime : public Observer {
+template <RestartingObserver Observer>
+class VariableTime : public Adapter<Observer> {
+  using Base = Adapter<Observer>;
+  using Base::observer_;
   using S = typename Observer::scalar_type;
 
  public:
+  /// What it is beyond LoopObserver.
+  static constexpr ObserverTraits traits = [] {
+    ObserverTraits traits = Base::traits;
+    traits.varies_time = true;
+    traits.publishes_chain = false;
+    return traits;
+  }();
+
   /// Settings of make.
   struct Config {
     typename Observer::Config observer{};  ///< with the nominal sample time T
@@ -41,7 +51,7 @@ class VariableTime : public Observer {
     // All that may be asked for later must be a good config: the ends of the range are.
     for (const S factor : {config.ratio, S(1) / config.ratio}) {
       auto edge = config.observer;
-      chain_config(edge).sample_time = chain_config(edge).sample_time * factor;
+      chain_config<Observer>(edge).sample_time = chain_config<Observer>(edge).sample_time * factor;
       if (auto ok = Observer::make(edge); !ok) return ok.error();
     }
     return VariableTime(*observer, config);
@@ -52,7 +62,7 @@ class VariableTime : public Observer {
   Check<S> retune(const Config& config) {
     auto fresh = make(config);
     if (!fresh) return fresh.error();
-    if (auto ok = Observer::retune(config.observer); !ok) return ok;
+    if (auto ok = observer_.retune(config.observer); !ok) return ok;
     config_ = config;
     step_time_ = fresh->step_time_;
     current_ = fresh->current_;
@@ -62,7 +72,7 @@ class VariableTime : public Observer {
   /// How long the next step takes (s), until it is said anew. Outside T / ratio .. T ratio it is
   /// refused, and the last length stays.
   Check<S> set_step_time(const S& seconds) noexcept {
-    const S nominal = chain_config(config_.observer).sample_time;
+    const S nominal = chain_config<Observer>(config_.observer).sample_time;
     const S shortest = nominal / config_.ratio;
     const S longest = nominal * config_.ratio;
     if (!is_finite(seconds) || seconds < shortest) {
@@ -82,22 +92,37 @@ class VariableTime : public Observer {
       return predicted | correct(y);
     }
     elapsed_ = step_time_;
-    return Observer::update(y, u_applied);
+    return observer_.update(y, u_applied);
   }
 
   /// Time update alone, over `step_time`.
   StepStatus predict(S u_applied) noexcept {
     if (!is_current()) take(step_time_);
     elapsed_ = this->missed() == 0 ? step_time_ : elapsed_ + step_time_;
-    return Observer::predict(u_applied);
+    return observer_.predict(u_applied);
   }
 
   /// Measurement update alone, with the gain for all the time since the last one.
   StepStatus correct(S y) noexcept {
-    // The observer bridges `missed` steps of its sample time: make that their mean.
-    const int steps = this->missed();
-    if (steps > 1 && !this->restarts()) take(elapsed_ / static_cast<S>(steps));
-    return Observer::correct(y);
+    take_gap();
+    return observer_.correct(y);
+  }
+
+  /// The same with the variance of this measurement's noise, see ExtendedStateFilter.
+  StepStatus correct_weighted(S y, S variance) noexcept requires requires(Base& base, S s) {
+    base.correct_weighted(s, s);
+  }
+  {
+    take_gap();
+    return observer_.correct_weighted(y, variance);
+  }
+
+  /// Starts anew at (y, 0, .., 0).
+  StepStatus reset(S y) noexcept { return observer_.reset(y); }
+
+  /// Starts anew at a given estimate, N x 1.
+  StepStatus reset(const typename Observer::Estimate& state) noexcept {
+    return observer_.reset(state);
   }
 
   /// Length of the steps now, s.
@@ -105,21 +130,27 @@ class VariableTime : public Observer {
 
  private:
   VariableTime(const Observer& observer, const Config& config) noexcept
-      : Observer(observer),
+      : Base(observer),
         config_(config),
-        step_time_(chain_config(config_.observer).sample_time),
+        step_time_(chain_config<Observer>(config_.observer).sample_time),
         current_(step_time_) {}
 
   [[nodiscard]] bool is_current() const noexcept {
     return !(step_time_ < current_ || step_time_ > current_);
   }
 
+  /// The observer bridges `missed` steps of its sample time: makes that their mean.
+  void take_gap() noexcept {
+    const int steps = this->missed();
+    if (steps > 1 && !this->restarts()) take(elapsed_ / static_cast<S>(steps));
+  }
+
   /// The ends of the range were accepted by `make`; an estimate that would overflow keeps the old
   /// sample time, and the guarded step reports what is not finite.
   void take(const S& seconds) noexcept {
     auto config = config_.observer;
-    chain_config(config).sample_time = seconds;
-    if (Observer::retune(config)) current_ = seconds;
+    chain_config<Observer>(config).sample_time = seconds;
+    if (observer_.retune(config)) current_ = seconds;
   }
 
   Config config_;
@@ -129,7 +160,7 @@ class VariableTime : public Observer {
 };
 
 /// Told apart in snapshots.
-template <LoopObserver Observer>
+template <RestartingObserver Observer>
 inline constexpr std::uint32_t type_tag<VariableTime<Observer>> =
     make_type_tag<Observer>("VariableTime");
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <esokit/core/type_tag.hpp>
-#include <esokit/observer/loop_observer.hpp>
+#include <esokit/observer/adapter.hpp>
 #include <limits>
 
 namespace esokit {
@@ -32,11 +32,20 @@ namespace esokit {
 ///
 /// An axis that turns by more than half a period a sample cannot be told from a slower one: the
 /// actuator must not be able to bring it there.
-template <LoopObserver Observer>
-class WrappedOutput : public Observer {
+template <ShiftableOutput Observer>
+class WrappedOutput : public Adapter<Observer> {
+  using Base = Adapter<Observer>;
+  using Base::observer_;
   using S = typename Observer::scalar_type;
 
  public:
+  /// What it is beyond LoopObserver.
+  static constexpr ObserverTraits traits = [] {
+    ObserverTraits traits = Base::traits;
+    traits.wraps_output = true;
+    return traits;
+  }();
+
   /// Settings of make.
   struct Config {
     typename Observer::Config observer{};  ///< of the observer itself
@@ -62,7 +71,7 @@ class WrappedOutput : public Observer {
   Check<S> retune(const Config& config) {
     auto fresh = make(config);
     if (!fresh) return fresh.error();
-    if (auto ok = Observer::retune(config.observer); !ok) return ok;
+    if (auto ok = observer_.retune(config.observer); !ok) return ok;
     if (fresh->period_ < period_ || fresh->period_ > period_) {
       period_ = fresh->period_;
       inverse_period_ = fresh->inverse_period_;
@@ -76,7 +85,7 @@ class WrappedOutput : public Observer {
   /// rounding is an eighth of a period is rejected
   StepStatus update(S y, S u_applied) noexcept {
     if (const Reading reading = read(y, this->missed() + 1); reading.counted) [[likely]] {
-      return keep(reading, Observer::update(reading.y + reading.turns * period_, u_applied));
+      return keep(reading, observer_.update(reading.y + reading.turns * period_, u_applied));
     }
     const StepStatus predicted = predict(u_applied);
     return predicted | correct(y);
@@ -84,7 +93,7 @@ class WrappedOutput : public Observer {
 
   /// Time update alone, see PredictorCorrector::predict.
   StepStatus predict(S u_applied) noexcept {
-    const StepStatus status = Observer::predict(u_applied);
+    const StepStatus status = observer_.predict(u_applied);
     recentre();
     return status;
   }
@@ -95,17 +104,17 @@ class WrappedOutput : public Observer {
     if (!reading.usable) return StepStatus::measurement_rejected;
     if (!reading.counted) {
       // The innovation is that of level 1, whose z_1 the correction will subtract.
-      const S predicted = Observer::level_estimate(0)(0);
+      const S predicted = observer_.level_estimate(0)(0);
       reading.turns = (std::round)((predicted - reading.y) * inverse_period_);
     }
-    return keep(reading, Observer::correct(reading.y + reading.turns * period_));
+    return keep(reading, observer_.correct(reading.y + reading.turns * period_));
   }
 
   /// Starts anew at (y, 0, .., 0), y taken to the nearest period around zero. A y that `update`
   /// would reject changes nothing and is reported.
   StepStatus reset(S y) noexcept {
     if (!can_be_told(y)) return StepStatus::state_rejected;
-    return begin(Observer::reset(wrap(y)));
+    return begin(observer_.reset(wrap(y)));
   }
 
   /// Starts anew at a given estimate, N x 1.
@@ -113,8 +122,14 @@ class WrappedOutput : public Observer {
     if (!can_be_told(state(0))) return StepStatus::state_rejected;
     typename Observer::Estimate wrapped = state;
     wrapped(0) = wrap(state(0));
-    return begin(Observer::reset(wrapped));
+    return begin(observer_.reset(wrapped));
   }
+
+  /// The turns would no longer be those of y.
+  StepStatus shift_output(const S&) noexcept = delete;
+
+  /// Its y would not be in the right branch.
+  StepStatus correct_weighted(const S&, const S&) noexcept = delete;
 
   /// The difference `angle` to the nearest whole period, in -period/2 .. period/2.
   [[nodiscard]] S wrap(const S& angle) const noexcept {
@@ -153,7 +168,7 @@ class WrappedOutput : public Observer {
   static constexpr std::uint8_t most_gaps = 8;
 
   WrappedOutput(const Observer& observer, const S& period) noexcept
-      : Observer(observer), period_(period), inverse_period_(S(1) / period) {}
+      : Base(observer), period_(period), inverse_period_(S(1) / period) {}
 
   [[nodiscard]] S half_period() const noexcept { return period_ * static_cast<S>(0.5); }
 
@@ -238,11 +253,11 @@ class WrappedOutput : public Observer {
   }
 
   void recentre() noexcept {
-    const S z = Observer::level_estimate(Observer::levels - 1)(0);
+    const S z = observer_.level_estimate(Observer::levels - 1)(0);
     if (detail::absolute(z) <= half_period()) [[likely]]
       return;
     const S turns = (std::round)(z * inverse_period_);
-    if (Observer::shift_output(-(turns * period_)) == StepStatus::ok) count_.turns -= turns;
+    if (observer_.shift_output(-(turns * period_)) == StepStatus::ok) count_.turns -= turns;
   }
 
   S period_;
@@ -251,7 +266,7 @@ class WrappedOutput : public Observer {
 };
 
 /// Told apart in snapshots.
-template <LoopObserver Observer>
+template <ShiftableOutput Observer>
 inline constexpr std::uint32_t type_tag<WrappedOutput<Observer>> =
     make_type_tag<Observer>("WrappedOutput");
 

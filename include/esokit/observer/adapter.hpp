@@ -1,0 +1,146 @@
+/// @file
+/// What all adapters of observers have in common: they hold what they adapt, and are none.
+#pragma once
+
+#include <esokit/observer/concepts.hpp>
+
+namespace esokit {
+
+namespace detail {
+
+/// p, where an observer has it.
+template <class Observer>
+struct LevelsOf {};
+template <class Observer>
+requires requires {
+  { Observer::levels } -> std::convertible_to<int>;
+}
+struct LevelsOf<Observer> {
+  static constexpr int levels = Observer::levels;  ///< p
+};
+
+/// m, where an observer has it.
+template <class Observer>
+struct ExtensionOf {};
+template <class Observer>
+requires requires {
+  { Observer::extension } -> std::convertible_to<int>;
+}
+struct ExtensionOf<Observer> {
+  static constexpr int extension = Observer::extension;  ///< m, extended states
+};
+
+}  // namespace detail
+
+/// Base of the adapters: hands on what the observer in it answers truthfully for them all, each as
+/// far as that observer has it. An adapter adds make, retune, update, predict, correct and reset,
+/// and redefines or deletes what it has another answer to, or none.
+template <LoopObserver Observer>
+class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Observer> {
+ public:
+  using Adapted = Observer;                            ///< what is adapted
+  using scalar_type = typename Observer::scalar_type;  ///< of states and settings
+  using Estimate = typename Observer::Estimate;        ///< (y, .., y^(n-1), d, ..), N x 1
+  static constexpr int order = Observer::order;        ///< n, order of the plant
+  static constexpr int size = Observer::size;          ///< N
+
+  /// What the adapted observer declares, as far as it holds for an adapter.
+  static constexpr ObserverTraits traits = [] {
+    ObserverTraits traits = observer_traits<Observer>;
+    traits.adapts = true;
+    traits.is_predictable = false;
+    traits.gates_outliers = false;
+    traits.holds_estimate = false;
+    return traits;
+  }();
+
+  /// What is adapted, for all else that it tells.
+  [[nodiscard]] constexpr const Observer& observer() const noexcept { return observer_; }
+
+  /// Of the adapted observer, see PredictorCorrector.
+  /// @{
+  [[nodiscard]] constexpr Estimate estimate() const noexcept { return observer_.estimate(); }
+  template <int Row>
+  [[nodiscard]] constexpr scalar_type estimate() const noexcept {
+    return observer_.template estimate<Row>();
+  }
+  [[nodiscard]] constexpr scalar_type total_disturbance() const noexcept {
+    return observer_.total_disturbance();
+  }
+  [[nodiscard]] constexpr scalar_type applied_input() const noexcept {
+    return observer_.applied_input();
+  }
+  [[nodiscard]] constexpr scalar_type input_gain() const noexcept { return observer_.input_gain(); }
+  [[nodiscard]] constexpr scalar_type sample_time() const noexcept {
+    return observer_.sample_time();
+  }
+  [[nodiscard]] constexpr int missed() const noexcept { return observer_.missed(); }
+
+  [[nodiscard]] constexpr bool restarts() const noexcept requires RestartingObserver<Observer> {
+    return observer_.restarts();
+  }
+  [[nodiscard]] constexpr Estimate level_estimate(int level) const noexcept requires
+      LevelledObserver<Observer> {
+    return observer_.level_estimate(level);
+  }
+  constexpr StepStatus shift_output(const scalar_type& offset) noexcept requires
+      ShiftableOutput<Observer> {
+    return observer_.shift_output(offset);
+  }
+  constexpr StepStatus shift_disturbance(const scalar_type& offset) noexcept requires
+      ShiftableDisturbance<Observer> {
+    return observer_.shift_disturbance(offset);
+  }
+  [[nodiscard]] constexpr scalar_type innovation() const noexcept requires
+      requires(const Observer& o) {
+    o.innovation();
+  }
+  { return observer_.innovation(); }
+  template <int Row>
+  [[nodiscard]] ESOKIT_INLINE constexpr scalar_type scaled_estimate() const noexcept requires
+      requires(const Observer& o) {
+    o.template scaled_estimate<Row>();
+  }
+  { return observer_.template scaled_estimate<Row>(); }
+  [[nodiscard]] constexpr auto level_gain(int level) const noexcept requires
+      requires(const Observer& o) {
+    o.level_gain(0);
+  }
+  { return observer_.level_gain(level); }
+  StepStatus revise_input(const scalar_type& u_applied) noexcept requires
+      requires(Observer& o, const scalar_type& s) {
+    o.revise_input(s);
+  }
+  { return observer_.revise_input(u_applied); }
+  StepStatus correct_weighted(const scalar_type& y, const scalar_type& variance) noexcept requires
+      requires(Observer& o, const scalar_type& s) {
+    o.correct_weighted(s, s);
+  }
+  { return observer_.correct_weighted(y, variance); }
+  void rearm() noexcept requires requires(Observer& o) { o.rearm(); }
+  { observer_.rearm(); }
+  /// @}
+
+  /// Of an adapter in it.
+  /// @{
+  [[nodiscard]] scalar_type wrap(const scalar_type& angle) const noexcept
+      requires(observer_traits<Observer>.wraps_output) {
+    return observer_.wrap(angle);
+  }
+  void fill_input(const scalar_type& u) noexcept requires(observer_traits<Observer>.delays_input) {
+    observer_.fill_input(u);
+  }
+  Check<scalar_type> set_step_time(const scalar_type& seconds) noexcept
+      requires(observer_traits<Observer>.varies_time) {
+    return observer_.set_step_time(seconds);
+  }
+  /// @}
+
+ protected:
+  /// Holds a copy.
+  explicit constexpr Adapter(const Observer& observer) noexcept : observer_(observer) {}
+
+  [[no_unique_address]] Observer observer_;  ///< what is adapted; the padding at its end is free
+};
+
+}  // namespace esokit

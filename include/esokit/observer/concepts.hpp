@@ -1,0 +1,336 @@
+/// @file
+/// What controllers, adapters and analyses ask of an observer, one concept a need; and the traits
+/// by which an observer says what it is beyond that.
+///
+/// | concept | who needs it |
+/// |---|---|
+/// | LoopObserver | ControlLoop, Adrc, DisturbanceCompensator, DelayedInput |
+/// | RestartingObserver | VariableTime |
+/// | ShiftableOutput | WrappedOutput |
+/// | ShiftableDisturbance | KnownModel, MimoAdrc |
+/// | PredictableObserver | PredictiveAdrc |
+/// | SampledLinearObserver | analysis |
+#pragma once
+
+#include <concepts>
+#include <esokit/core/declared.hpp>
+#include <esokit/core/scalar.hpp>
+#include <esokit/design/check.hpp>
+#include <esokit/observer/gain_law.hpp>
+#include <esokit/observer/step_status.hpp>
+
+namespace esokit {
+
+/// What an observer is beyond LoopObserver: `static constexpr ObserverTraits traits{..}` in it. One
+/// that declares nothing is what the defaults say.
+struct ObserverTraits {
+  /// It keeps its bandwidth where only every D-th sample brings a measurement. AlgebraicEso does
+  /// not: a gap among its first samples starts its schedule anew.
+  bool bears_regular_gaps = true;
+
+  /// What it publishes is the state of its chain, of a sample time that stays:
+  /// `scaled_estimate<Row>() const` is T^r / r! times `estimate<Row>()`. Lets Adrc fold the factors
+  /// into its gains. Not AlgebraicEso during its hold, KnownModel, VariableTime.
+  bool publishes_chain = false;
+
+  /// Its chain and `level_gain(level) const` are all that it does with u and y. Not where a delay
+  /// or a model is added. Lets analysis make a linear system of it.
+  bool acts_by_gain = false;
+
+  /// Its next correction can be told before the measurement, see PredictableObserver.
+  bool is_predictable = false;
+  GainKind gain_kind = GainKind::general;  ///< what can be told; of a predictable one
+
+  /// It is an adapter around an observer `Adapted`; its config has that of `Adapted` as `observer`.
+  bool adapts = false;
+
+  bool wraps_output = false;  ///< y is an angle: `wrap(difference) const`
+  bool delays_input = false;  ///< u acts late: `fill_input(u)`, as if applied for long
+  bool varies_time = false;   ///< `set_step_time(seconds)`, before each step
+  bool gates_outliers =
+      false;  ///< `accepts(y) const`: false for what `correct` takes for an outlier
+  bool holds_estimate = false;  ///< `holding() const`: `estimate` is an old one for now
+};
+
+/// What an observer declares.
+template <class O>
+inline constexpr ObserverTraits observer_traits = detail::declared_traits<O, ObserverTraits>;
+
+/// The config that names `input_gain`, `sample_time` and `max_gap`: an adapter's config nests that
+/// of the observer in it as `observer`. @tparam O the observer whose config it is
+template <class O, class Config>
+constexpr auto& chain_config(Config& config) noexcept {
+  if constexpr (observer_traits<O>.adapts) {
+    return chain_config<typename O::Adapted>(config.observer);
+  } else {
+    return config;
+  }
+}
+
+namespace detail {
+
+ESOKIT_MEMBER_NAME(wrap)
+ESOKIT_MEMBER_NAME(fill_input)
+ESOKIT_MEMBER_NAME(set_step_time)
+ESOKIT_MEMBER_NAME(accepts)
+ESOKIT_MEMBER_NAME(holding)
+ESOKIT_MEMBER_FUNCTION(wraps)
+ESOKIT_MEMBER_FUNCTION(fill_inputs)
+ESOKIT_MEMBER_FUNCTION(set_sample_time)
+ESOKIT_MEMBER_FUNCTION(accept)
+ESOKIT_MEMBER_FUNCTION(rearms)
+
+template <class Class, class Result>
+Class declaring_class(Result (Class::*)() const);
+template <class Class, class Result>
+Class declaring_class(Result (Class::*)() const noexcept);
+
+/// False where a derived class overrides what its base publishes, and has not said so.
+template <class O>
+concept PublishesWhatItsChainHas = !requires {
+  declaring_class(&O::total_disturbance);
+  declaring_class(&O::template scaled_estimate<O::order>);
+}
+|| requires {
+  requires std::same_as<decltype(declaring_class(&O::total_disturbance)),
+                        decltype(declaring_class(&O::template scaled_estimate<O::order>))>;
+};
+
+// The members that go with the traits, as they have to be.
+template <class O>
+concept PublishesChain = PublishesWhatItsChainHas<O> && requires(const O& o) {
+  { o.template scaled_estimate<0>() } -> std::convertible_to<typename O::scalar_type>;
+  { o.template scaled_estimate<O::order>() } -> std::convertible_to<typename O::scalar_type>;
+};
+template <class O>
+concept ActsByGain = requires(const O& o) {
+  { O::levels } -> std::convertible_to<int>;
+  { o.level_gain(0) } -> GainOf<O::size, typename O::scalar_type>;
+};
+template <class O>
+concept Adapts = requires(typename O::Config config) {
+  typename O::Adapted;
+  { config.observer } -> std::same_as<typename O::Adapted::Config&>;
+};
+template <class O>
+concept WrapsOutput = requires(const O& o, const typename O::scalar_type& s) {
+  { o.wrap(s) } -> std::convertible_to<typename O::scalar_type>;
+};
+template <class O>
+concept DelaysInput = requires(O& o, const typename O::scalar_type& s) {
+  o.fill_input(s);
+};
+template <class O>
+concept VariesTime = requires(O& o, const typename O::scalar_type& s) {
+  { o.set_step_time(s) } -> std::same_as<Check<typename O::scalar_type>>;
+};
+template <class O>
+concept GatesOutliers = requires(const O& o, const typename O::scalar_type& s) {
+  { o.accepts(s) } -> std::same_as<bool>;
+};
+template <class O>
+concept HoldsEstimate = requires(const O& o) {
+  { o.holding() } -> std::same_as<bool>;
+};
+
+/// As `as_declared`; an adapter names what it hands on, whether what it adapts has it or not.
+template <class O>
+constexpr bool observer_as_declared(bool declared, bool named, bool right) noexcept {
+  return as_declared(declared, observer_traits<O>.adapts ? right : named, right);
+}
+
+}  // namespace detail
+
+/// `scaled_estimate<Row>() const` is there if `traits.publishes_chain` says so, and no derived
+/// class publishes something else.
+template <class O>
+concept PublishesChainAsDeclared = !observer_traits<O>.publishes_chain || detail::PublishesChain<O>;
+
+/// `levels` and `level_gain(level) const` are there if `traits.acts_by_gain` says so.
+template <class O>
+concept ActsByGainAsDeclared = !observer_traits<O>.acts_by_gain || detail::ActsByGain<O>;
+
+/// `Adapted` and `Config::observer` are there if `traits.adapts` says so.
+template <class O>
+concept AdaptsAsDeclared = !observer_traits<O>.adapts || detail::Adapts<O>;
+
+/// `wrap(difference) const` is declared by `traits.wraps_output`; or there is none.
+template <class O>
+concept WrapsOutputAsDeclared = detail::observer_as_declared<O>(observer_traits<O>.wraps_output,
+                                                                detail::names_wrap<O>,
+                                                                detail::WrapsOutput<O>);
+
+/// `fill_input(u)` is declared by `traits.delays_input`; or there is none.
+template <class O>
+concept DelaysInputAsDeclared = detail::observer_as_declared<O>(observer_traits<O>.delays_input,
+                                                                detail::names_fill_input<O>,
+                                                                detail::DelaysInput<O>);
+
+/// `set_step_time(seconds)` is declared by `traits.varies_time`; or there is none.
+template <class O>
+concept VariesTimeAsDeclared = detail::observer_as_declared<O>(observer_traits<O>.varies_time,
+                                                               detail::names_set_step_time<O>,
+                                                               detail::VariesTime<O>);
+
+/// `accepts(y) const` is declared by `traits.gates_outliers`; or there is none.
+template <class O>
+concept GatesOutliersAsDeclared = detail::observer_as_declared<O>(observer_traits<O>.gates_outliers,
+                                                                  detail::names_accepts<O>,
+                                                                  detail::GatesOutliers<O>);
+
+/// `holding() const` is declared by `traits.holds_estimate`; or there is none.
+template <class O>
+concept HoldsEstimateAsDeclared = detail::observer_as_declared<O>(observer_traits<O>.holds_estimate,
+                                                                  detail::names_holding<O>,
+                                                                  detail::HoldsEstimate<O>);
+
+/// No member function has a name that is nearly that of a hook; it would never be called.
+template <class O>
+concept HasNoMisspelledObserverHook =
+    !detail::calls_wraps<O> && !detail::calls_fill_inputs<O> && !detail::calls_set_sample_time<O> &&
+    !detail::calls_accept<O> && !detail::calls_rearms<O>;
+
+/// Everything that `traits` declares is there, and nothing that it does not declare.
+template <class O>
+concept ObserverAsDeclared = DeclaresTraits<O, ObserverTraits> && PublishesChainAsDeclared<O> &&
+    ActsByGainAsDeclared<O> && AdaptsAsDeclared<O> && WrapsOutputAsDeclared<O> &&
+    DelaysInputAsDeclared<O> && VariesTimeAsDeclared<O> && GatesOutliersAsDeclared<O> &&
+    HoldsEstimateAsDeclared<O> && HasNoMisspelledObserverHook<O>;
+
+/// A config that says b0, T and how long a gap is bridged.
+template <class Config, class S>
+concept ChainSettings = requires(Config& config) {
+  { config.input_gain } -> std::same_as<S&>;
+  { config.sample_time } -> std::same_as<S&>;
+  { config.max_gap } -> std::same_as<int&>;
+};
+
+/// A sampled observer of a plain scalar with a Config. A control loop branches on limits, modes and
+/// bad samples, which a pack cannot.
+template <class O>
+concept LoopObserver = std::copyable<O> && PlainScalar<typename O::scalar_type> &&
+    requires(O& observer, const O& constant, const typename O::scalar_type& s,
+             const typename O::Estimate& state, typename O::Config& config) {
+  requires O::order >= 1 && O::size > O::order;
+  requires std::same_as<typename O::Estimate, Vector<typename O::scalar_type, O::size>>;
+  { O::make(config) } -> std::same_as<Expected<O, Error<typename O::scalar_type>>>;
+  { observer.retune(config) } -> std::same_as<Check<typename O::scalar_type>>;
+  { observer.update(s, s) } -> std::same_as<StepStatus>;
+  { observer.predict(s) } -> std::same_as<StepStatus>;
+  { observer.correct(s) } -> std::same_as<StepStatus>;
+  { observer.reset(s) } -> std::same_as<StepStatus>;
+  { observer.reset(state) } -> std::same_as<StepStatus>;
+  { constant.estimate() } -> std::same_as<typename O::Estimate>;
+  { constant.template estimate<0>() } -> std::convertible_to<typename O::scalar_type>;
+  { constant.total_disturbance() } -> std::convertible_to<typename O::scalar_type>;
+  { constant.applied_input() } -> std::convertible_to<typename O::scalar_type>;
+  { constant.input_gain() } -> std::convertible_to<typename O::scalar_type>;
+  { constant.sample_time() } -> std::convertible_to<typename O::scalar_type>;
+  { constant.missed() } -> std::convertible_to<int>;
+} && ObserverAsDeclared<O> && requires(typename O::Config& config) {
+  { chain_config<O>(config) } -> ChainSettings<typename O::scalar_type>;
+};
+
+/// An observer that says whether so many samples are missing that the next `correct` restarts it.
+template <class O>
+concept RestartingObserver = LoopObserver<O> && requires(const O& observer) {
+  { observer.restarts() } -> std::same_as<bool>;
+};
+
+/// An observer that tells the estimate of each level as it is computed, whatever is published:
+/// `level_estimate(level)`. Level 0 sees the measurement, the last one is the estimate.
+template <class O>
+concept LevelledObserver = LoopObserver<O> && requires(const O& observer) {
+  { O::levels } -> std::convertible_to<int>;
+  { observer.level_estimate(0) } -> std::same_as<typename O::Estimate>;
+};
+
+/// A levelled observer whose y may be shifted: `shift_output(offset)` adds to it in all levels. ok,
+/// or state_rejected where the estimate would not be finite: nothing changes then.
+template <class O>
+concept ShiftableOutput = LevelledObserver<O> &&
+    requires(O& observer, const typename O::scalar_type& s) {
+  { observer.shift_output(s) } -> std::same_as<StepStatus>;
+};
+
+/// An observer whose disturbance may be shifted: `shift_disturbance(offset)` adds to dhat, where
+/// something else is to explain y^(n) from now on. Returns as `shift_output`.
+template <class O>
+concept ShiftableDisturbance = LoopObserver<O> &&
+    requires(O& observer, const typename O::scalar_type& s) {
+  { observer.shift_disturbance(s) } -> std::same_as<StepStatus>;
+};
+
+namespace detail {
+
+/// What PredictiveAdrc asks for by the kind of the gain.
+template <class O, GainKind kind>
+concept ForetellsByKind = kind == GainKind::general || requires(const O& o) {
+  requires kind == GainKind::preset;
+  { o.preview().offset } -> GainOf<O::size, typename O::scalar_type>;
+  { o.preview().slope } -> GainOf<O::size, typename O::scalar_type>;
+  {
+    O::Chain::finite_probe(o.preview().slope, o.sample_time())
+    } -> std::convertible_to<typename O::scalar_type>;
+}
+|| requires(const O& o) {
+  requires kind == GainKind::switched;
+  requires Switched < std::remove_cvref_t<decltype(o.gain_law())>, O::size,
+  typename O::scalar_type > ;
+}
+|| requires(const O& o) {
+  requires kind == GainKind::factored;
+  requires Factored < std::remove_cvref_t<decltype(o.gain_law())>, O::size,
+  typename O::scalar_type > ;
+};
+
+}  // namespace detail
+
+/// An observer whose next correction can be told before the measurement, and no adapter: those do
+/// something of their own with y, u or the estimate. Packs are welcome.
+///
+/// It declares `traits.is_predictable` and the kind of its gain, see GainKind:
+/// - with one level `correction_gain(e) const` is the scaled gain of the coming correction;
+/// - preset: `preview() const`, and `Chain::finite_probe`, see PredictorCorrector;
+/// - switched, factored: `gain_law() const` has the members of the kind;
+/// - general: nothing more; all is then worked out after the measurement.
+template <class O>
+concept PredictableObserver = std::copyable<O> && Scalar<typename O::scalar_type> &&
+    ObserverAsDeclared<O> && observer_traits<O>
+.is_predictable && !observer_traits<O>.adapts &&
+    requires(O & observer, const O& constant, const typename O::scalar_type& s,
+             const typename O::Estimate& state, typename O::Config& config) {
+  requires O::order >= 1 && O::size > O::order&& O::levels >= 1;
+  { config } -> ChainSettings<typename O::scalar_type>;
+  { O::make(config) } -> std::same_as<Expected<O, Error<typename O::scalar_type>>>;
+  { observer.retune(config) } -> std::same_as<Check<typename O::scalar_type>>;
+  { observer.predict(s) } -> std::same_as<StepStatus>;
+  { observer.correct(s) } -> std::same_as<StepStatus>;
+  { observer.revise_input(s) } -> std::same_as<StepStatus>;
+  { observer.reset(s) } -> std::same_as<StepStatus>;
+  { observer.reset(state) } -> std::same_as<StepStatus>;
+  { constant.estimate() } -> std::same_as<typename O::Estimate>;
+  { constant.template scaled_estimate<0>() } -> std::convertible_to<typename O::scalar_type>;
+  { constant.input_gain() } -> std::convertible_to<typename O::scalar_type>;
+  { constant.sample_time() } -> std::convertible_to<typename O::scalar_type>;
+  { constant.missed() } -> std::convertible_to<int>;
+  { constant.restarts() } -> std::same_as<bool>;
+}
+&&(O::levels > 1 ||
+   requires(const O& constant, const typename O::scalar_type& s) {
+     { constant.correction_gain(s) } -> detail::GainOf<O::size, typename O::scalar_type>;
+   }) &&
+    detail::ForetellsByKind<O, observer_traits<O>.gain_kind>;
+
+/// A sampled observer whose gain does not depend on the measurement: LinearEso, CascadeEso, a
+/// settled AlgebraicEso, an ExtendedStateFilter frozen where it is. The system is the one that the
+/// present gain makes.
+template <class O>
+concept SampledLinearObserver = ObserverAsDeclared<O> && observer_traits<O>
+.acts_by_gain&& requires(const O& observer) {
+  { O::order + O::extension + O::levels } -> std::convertible_to<int>;
+  static_cast<double>(observer.input_gain());
+  static_cast<double>(observer.sample_time());
+};
+
+}  // namespace esokit
