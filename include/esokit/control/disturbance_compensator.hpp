@@ -4,6 +4,7 @@
 
 #include <esokit/control/control_loop.hpp>
 #include <esokit/core/type_tag.hpp>
+#include <limits>
 
 namespace esokit {
 
@@ -61,25 +62,27 @@ class DisturbanceCompensator {
   /// One sample. @param y measurement, NaN if missing @param base_output u0 of the wrapped
   /// controller @return u to be held until the next sample, within the limits
   S update(S y, S base_output) noexcept {
-    return loop_.step(y, [&]() ESOKIT_INLINE_LAMBDA { return base_output + compensation(); });
+    return loop_.step(
+        y, [&]() ESOKIT_INLINE_LAMBDA { return base_output + unbounded_compensation(); });
   }
 
   /// The same where the actuator reports what it held since the last sample.
   S update(S y, S base_output, S u_applied) noexcept {
-    return loop_.step(y, u_applied,
-                      [&]() ESOKIT_INLINE_LAMBDA { return base_output + compensation(); });
+    return loop_.step(y, u_applied, [&]() ESOKIT_INLINE_LAMBDA {
+      return base_output + unbounded_compensation();
+    });
   }
 
   /// The same where the observer's equation is driven by something else than u: from `make`,
   /// without `start` and `track`, which take u for the drive. A missing measurement is a NaN here.
   /// @param drive what stood in the place of u since the last sample, in units of y^(n) / b0
   S update_driven(S y, S base_output, S drive) noexcept {
-    return loop_.step_driven(y, drive, [&] { return base_output + compensation(); });
+    return loop_.step_driven(y, drive, [&] { return base_output + unbounded_compensation(); });
   }
 
   /// One sample whose measurement did not come.
   S update_without_measurement(S base_output) noexcept {
-    return loop_.step_without_measurement([&] { return base_output + compensation(); });
+    return loop_.step_without_measurement([&] { return base_output + unbounded_compensation(); });
   }
 
   /// Compensation off: the observer follows while u is someone else's.
@@ -107,13 +110,11 @@ class DisturbanceCompensator {
     return loop_.set_step_time(seconds);
   }
 
-  /// K dhat, what is added to u0.
-  [[nodiscard]] S compensation() const noexcept {
-    return gain_ * loop_.observer().total_disturbance();
-  }
+  /// K dhat, what is added to u0; within what the scalar holds.
+  [[nodiscard]] S compensation() const noexcept { return bounded(unbounded_compensation()); }
 
-  /// The u0 with which u would stay what it is.
-  [[nodiscard]] S base_output() const noexcept { return loop_.output() - compensation(); }
+  /// The u0 with which u would stay what it is; within what the scalar holds.
+  [[nodiscard]] S base_output() const noexcept { return bounded(loop_.output() - compensation()); }
 
   /// The observer, for its estimates.
   [[nodiscard]] const Observer& observer() const noexcept { return loop_.observer(); }
@@ -132,6 +133,18 @@ class DisturbanceCompensator {
   using Loop = ControlLoop<Observer>;
 
   DisturbanceCompensator(const Loop& loop, S gain) noexcept : loop_(loop), gain_(gain) {}
+
+  /// In a step, which tests its sum with u0 anyway.
+  [[nodiscard]] ESOKIT_INLINE S unbounded_compensation() const noexcept {
+    return gain_ * loop_.observer().total_disturbance();
+  }
+
+  static S bounded(const S& x) noexcept {
+    if (is_finite(x)) [[likely]]
+      return x;
+    constexpr S most = std::numeric_limits<S>::max();
+    return x < S(0) ? -most : most;
+  }
 
   Loop loop_;
   S gain_;

@@ -3,6 +3,7 @@
 /// of order N = n + m instead of observer and law.
 #pragma once
 
+#include <cmath>
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/control/limiter.hpp>
 #include <esokit/core/type_tag.hpp>
@@ -191,7 +192,8 @@ class DualFeedbackAdrc {
   [[nodiscard]] const S& output() const noexcept { return limiter_.last(); }
   /// What the law asked for before the limits.
   [[nodiscard]] const S& requested() const noexcept { return wanted_; }
-  /// ok, or measurement_rejected.
+  /// ok, measurement_rejected, or restarted: in the steady state of y and u, as the state was so
+  /// large that no measurement led on.
   [[nodiscard]] StepStatus status() const noexcept { return status_; }
   /// The filter's coefficients, in z or delta.
   [[nodiscard]] const FilterForm<size, S>& form() const noexcept { return form_; }
@@ -257,11 +259,20 @@ class DualFeedbackAdrc {
     const S u = limited ? limiter_.last() : wanted_;
     Step step = advance(y, u);
     status_ = StepStatus::ok;
-    if (!is_finite(probe(step))) {
-      status_ = StepStatus::measurement_rejected;
-      step = advance(measured_, u);
-    } else {
+    if (is_finite(probe(step))) {
       measured_ = y;
+    } else {
+      const Step without = advance(measured_, u);
+      // From there the last measurement leads nowhere either, or this one is no larger.
+      const bool state_is_to_blame =
+          is_finite(y) && (!is_finite(probe(without)) || std::abs(y) <= std::abs(measured_));
+      if (state_is_to_blame && start(y, u) == StepStatus::ok) {
+        status_ = StepStatus::restarted;
+        step = advance(y, u);
+      } else {
+        status_ = StepStatus::measurement_rejected;
+        step = without;
+      }
     }
     if (is_finite(probe(step))) pending_ = step.pending;
     step.wanted = step.control + form_.reference * reference;

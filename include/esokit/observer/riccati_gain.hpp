@@ -248,9 +248,7 @@ class RiccatiGain {
   }
 
   /// P- of the last prediction, scaled and divided by the unit.
-  [[nodiscard]] constexpr const Factor& covariance_factor() const noexcept {
-    return now_.factor;
-  }
+  [[nodiscard]] constexpr const Factor& covariance_factor() const noexcept { return now_.factor; }
 
   /// theta, as the present gain is made with it.
   [[nodiscard]] constexpr const S& inflation() const noexcept { return now_.inflation; }
@@ -302,6 +300,13 @@ class RiccatiGain {
     note(had_correction ? 0 : gapped);
     if (in_gap && !all(now_.factor.variance(0) < ceiling())) [[unlikely]] {
       now_.factor.template advance<true>(S(1.0), Factor{});
+      // Without noise it still grows as samples^(2N-2), until the scalar cannot hold it. The gain
+      // is that of exact measurements by now, which a factor common to all variances does not
+      // alter.
+      const S most = ceiling() * ceiling();
+      const S variance = now_.factor.variance(0);
+      if (!all(variance < most))
+        now_.factor.scale(select(variance < most, S(1.0), S(most / variance)));
     } else if (rule_ == InflationRule::adaptive) [[unlikely]] {
       recur_adaptively(had_correction);
     } else {

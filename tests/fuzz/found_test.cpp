@@ -1,0 +1,145 @@
+// What the fuzzer found, each as the shortest calls that show it.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <esokit/control/disturbance_compensator.hpp>
+#include <esokit/control/dual_feedback.hpp>
+#include <esokit/observer/extended_state_filter.hpp>
+#include <esokit/observer/linear_eso.hpp>
+#include <limits>
+
+namespace {
+
+using esokit::has;
+using esokit::LinearEso;
+using esokit::StepStatus;
+
+template <class S>
+constexpr S largest = std::numeric_limits<S>::max();
+
+/// b0 is kept scaled by T^n / n!: one at the end of the scalar came back infinite by rounding.
+template <class S>
+void input_gain_comes_back_finite() {
+  using Observer = LinearEso<2, S>;
+  int refused = 0;
+  for (int i = 1; i < 200; ++i) {
+    typename Observer::Config config{};
+    config.sample_time = static_cast<S>(0.001 * i);
+    config.observer_bandwidth = S(1) / config.sample_time;
+    config.input_gain = largest<S>;
+    const auto made = Observer::make(config);
+    if (made) {
+      EXPECT_TRUE(std::isfinite(made->input_gain())) << i;
+    } else {
+      ++refused;
+      EXPECT_STREQ(made.error().field, "input_gain");
+      EXPECT_STREQ(made.error().rule, "is so large that it overflows by rounding");
+    }
+    config.input_gain = largest<S> * (S(1) - 32 * std::numeric_limits<S>::epsilon());
+    EXPECT_TRUE(Observer::make(config)) << i;
+  }
+  EXPECT_GT(refused, 0);
+}
+TEST(Found, InputGainComesBackFinite) {
+  input_gain_comes_back_finite<float>();
+  input_gain_comes_back_finite<double>();
+}
+
+/// K dhat and u - K dhat beyond the scalar: an anti-windup that was given them would be lost.
+TEST(Found, CompensationIsFinite) {
+  using Compensator = esokit::DisturbanceCompensator<LinearEso<2, float>>;
+  auto compensator =
+      Compensator::make(
+          {.observer = {.observer_bandwidth = 2, .input_gain = 1, .sample_time = 0.5f},
+           .compensation_gain = 3.0f})
+          .value();
+  for (const float sign : {1.0f, -1.0f}) {
+    ASSERT_EQ(compensator.start(0, sign * largest<float> / 2), StepStatus::ok);
+    EXPECT_EQ(compensator.compensation(), -sign * largest<float>);
+    EXPECT_EQ(compensator.base_output(), sign * largest<float>);
+  }
+  ASSERT_EQ(compensator.start(0, 2), StepStatus::ok);
+  EXPECT_FLOAT_EQ(compensator.compensation(), -6);
+  EXPECT_FLOAT_EQ(compensator.base_output(), 8);
+}
+
+/// A state from which no measurement leads on held the filter for good: every sample was replaced
+/// by the absurd one that had made the state.
+TEST(Found, FilterLeavesAStateThatLeadsNowhere) {
+  using Controller = esokit::DualFeedbackAdrc<1, double, 2, esokit::DeltaOperator>;
+  auto controller = Controller::make({.observer_bandwidth = 0.76714639086623826,
+                                      .controller_bandwidth = 0.18390397232617703,
+                                      .input_gain = 0.12892259702470901,
+                                      .sample_time = 0.079834541271102774})
+                        .value();
+  ASSERT_EQ(controller.start(9.7300947854319415e+307, 0), StepStatus::ok);
+  bool restarted = false;
+  for (int k = 0; k < 2000; ++k) {
+    controller.update(1.25, 1.25, 0);
+    restarted = restarted || has(controller.status(), StepStatus::restarted);
+  }
+  EXPECT_TRUE(restarted);
+  EXPECT_EQ(controller.status(), StepStatus::ok);
+  EXPECT_NEAR(controller.requested(), 0, 1e-9);
+}
+
+/// The same where the last good measurement is smaller than the new one.
+TEST(Found, FilterLeavesItForALargerMeasurementToo) {
+  using Controller = esokit::DualFeedbackAdrc<1, float>;
+  auto controller = Controller::make({.observer_bandwidth = 3,
+                                      .controller_bandwidth = 1,
+                                      .input_gain = 1,
+                                      .sample_time = 0.1f})
+                        .value();
+  ASSERT_EQ(controller.start(0, 0), StepStatus::ok);
+  for (int k = 0; k < 20; ++k) controller.update(0, 0, largest<float>);
+  for (int k = 0; k < 2000; ++k) controller.update(1.25f, 1.25f, 0);
+  EXPECT_EQ(controller.status(), StepStatus::ok);
+  EXPECT_NEAR(controller.requested(), 0, 1e-3);
+  // An absurd measurement is still one to be rejected.
+  controller.update(largest<float>, 1.25f, 0);
+  EXPECT_EQ(controller.status(), StepStatus::measurement_rejected);
+  EXPECT_NEAR(controller.requested(), 0, 1e-3);
+}
+
+/// The bound of a covariance grows in a gap as samples^(2N-2), noise or not: in float it overflowed
+/// within max_gap for seven states, and the gain was NaN with it.
+TEST(Found, FilterBridgesALongGap) {
+  using Filter = esokit::ExtendedStateFilter<6, float>;
+  Filter::Config config{.input_gain = 1,
+                        .sample_time = 1e-2f,
+                        .measurement_variance = 1e-4f,
+                        .inflation = 0.1f,
+                        .max_gap = 60000};
+  config.disturbance_bounds[6] = 1e7f;
+  auto filter = Filter::make(config).value();
+  for (int k = 0; k < 200; ++k) filter.update(1, 0);
+  for (int k = 0; k < 50000; ++k) {
+    filter.predict(0);
+    ASSERT_TRUE(filter.gain().allFinite()) << k;
+    ASSERT_TRUE(filter.covariance().allFinite()) << k;
+  }
+  EXPECT_EQ(filter.update(1, 0), StepStatus::gap_bridged);
+  for (int k = 0; k < 200; ++k) filter.update(1, 0);
+  EXPECT_NEAR(filter.estimate<0>(), 1, 1e-2);
+}
+
+/// An inflation so small that Q (1 + theta) / theta is at the end of the scalar.
+TEST(Found, FilterOfTheSmallestInflationBridgesAGap) {
+  using Filter = esokit::ExtendedStateFilter<1, float>;
+  Filter::Config config{
+      .input_gain = 1, .sample_time = 1, .measurement_variance = 0.1f, .inflation = 1.3e-37f};
+  config.disturbance_bounds = {0.07f, 0.24f};
+  const auto made = Filter::make(config);
+  if (!made) {
+    EXPECT_STREQ(made.error().field, "inflation");
+    return;
+  }
+  auto filter = *made;
+  for (int k = 0; k < 80; ++k) {
+    filter.predict(0);
+    ASSERT_TRUE(filter.gain().allFinite()) << k;
+  }
+}
+
+}  // namespace
