@@ -119,6 +119,23 @@ std::string shown_text(double value, std::optional<double> like) {
   return {text.data(), result.ptr};
 }
 
+std::string mean_text(double mean, double deviation) {
+  if (!std::isfinite(deviation) || deviation <= 0.0) return shown_text(mean);
+  // The deviation with two digits, and as many decimals for both.
+  const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(deviation))), 0, 17);
+  const auto fixed = [decimals](double value) {
+    std::array<char, 400> text{};
+    const auto result = std::to_chars(text.data(), text.data() + text.size(), value,
+                                      std::chars_format::fixed, decimals);
+    return std::string(text.data(), result.ptr);
+  };
+  return fixed(mean) + " (" + fixed(deviation) + ")";
+}
+
+std::string mean_text(const Statistics& seeds) {
+  return mean_text(seeds.mean, seeds.standard_deviation);
+}
+
 std::string_view miss_text(Miss kind) { return miss_texts[static_cast<std::size_t>(kind)]; }
 
 std::optional<Miss> miss_in(std::string_view note) {

@@ -69,6 +69,10 @@ struct Check {
 /// significant digits; without it four. Only very large and very small numbers have an exponent.
 [[nodiscard]] std::string shown_text(double value, std::optional<double> like = std::nullopt);
 
+/// "mean (deviation)", the mean with no more digits than mean something beside its scatter.
+[[nodiscard]] std::string mean_text(double mean, double deviation);
+[[nodiscard]] std::string mean_text(const Statistics& seeds);
+
 /// Kinds of "does not reproduce".
 enum class Miss {
   printed_number,  ///< a printed number is missed, and we do not know why

@@ -24,9 +24,8 @@ Check make_row(std::string_view case_name, std::string_view metric, const Measur
 }
 
 std::string measured_text(const Check& row) {
-  std::string text = shown_text(row.ours, row.paper ? row.paper : row.reference);
-  if (row.deviation) text += " (" + number_text(*row.deviation, 2) + ")";
-  return text;
+  return row.deviation ? mean_text(row.ours, *row.deviation)
+                       : shown_text(row.ours, row.paper ? row.paper : row.reference);
 }
 
 /// Letters of a UTF-8 text, which printf would pad by its bytes.

@@ -135,10 +135,6 @@ Statistics paired_gain(const std::vector<Criteria>& ours, const std::vector<Crit
   return statistics(gains);
 }
 
-std::string with_deviation(const Statistics& s, int digits = 4) {
-  return number_text(s.mean, digits) + " (" + number_text(s.standard_deviation, 2) + ")";
-}
-
 std::string case_of(const Kind& kind, double w) {
   return std::string(kind.name) + ", w = " + number_text(w, 3);
 }
@@ -505,16 +501,13 @@ int main(int argc, char** argv) {
     const auto& a = adjustable.at[w];
     const auto& l = linear.at[w];
     const auto& m = linear_at_mean.at[w];
-    lines.push_back({number_text(bandwidths[w], 3),
-                     shown_text(100.0 * (1.0 - table6[2][w] / table2[2][w]), 15.28),
-                     with_deviation(paired_gain(a, l, ed), 3),
-                     with_deviation(paired_gain(a, l, ed_integral), 3),
-                     with_deviation(paired_gain(a, l, ed_transient), 3),
-                     with_deviation(paired_gain(a, l, ed_steady), 3),
-                     number_text(mean_bandwidth[w], 3),
-                     with_deviation(paired_gain(m, l, ed_integral), 3),
-                     with_deviation(paired_gain(m, l, ed_transient), 3),
-                     with_deviation(paired_gain(m, l, ed_steady), 3)});
+    lines.push_back(
+        {number_text(bandwidths[w], 3),
+         shown_text(100.0 * (1.0 - table6[2][w] / table2[2][w]), 15.28),
+         mean_text(paired_gain(a, l, ed)), mean_text(paired_gain(a, l, ed_integral)),
+         mean_text(paired_gain(a, l, ed_transient)), mean_text(paired_gain(a, l, ed_steady)),
+         number_text(mean_bandwidth[w], 3), mean_text(paired_gain(m, l, ed_integral)),
+         mean_text(paired_gain(m, l, ed_transient)), mean_text(paired_gain(m, l, ed_steady))});
   }
   report.table("gain",
                "Where the gain is: how much less error of the disturbance the ABESO has than the "
@@ -586,9 +579,9 @@ int main(int argc, char** argv) {
     CsvRow row{number_text(bandwidths[w], 3)};
     for (std::size_t i = 0; i < 3; ++i) {
       row.push_back(shown_text(table2[i][w]));
-      row.push_back(with_deviation(sine.index(w, i)));
+      row.push_back(mean_text(sine.index(w, i)));
     }
-    row.push_back(with_deviation(paired_gain(sine_adjustable.at[w], sine.at[w], ed), 3));
+    row.push_back(mean_text(paired_gain(sine_adjustable.at[w], sine.at[w], ed)));
     lines.push_back(row);
   }
   report.table("sine",

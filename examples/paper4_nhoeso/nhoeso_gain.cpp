@@ -304,7 +304,7 @@ int main(int argc, char** argv) {
       "that "
       "range may not be: 0.15 and 5 in turn make the error grow. NonlinearEso keeps k between two "
       "limits that share a quadratic Lyapunov function, which is safe however k varies; "
-      "`report` says for which errors the given function is replaced by a limit.");
+      "report() says for which errors the given function is replaced by a limit.");
 
   Figure figure("stability", {.rows = 2, .columns = 2, .panel_height = 220});
   figure.caption(

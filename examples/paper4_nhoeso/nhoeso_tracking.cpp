@@ -117,10 +117,6 @@ Figure draw(const std::string& name, const std::string& caption, const Case& sce
   return figure;
 }
 
-std::string with_deviation(const Statistics& s) {
-  return shown_text(s.mean) + " (" + number_text(s.standard_deviation, 2) + ")";
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -176,7 +172,7 @@ int main(int argc, char** argv) {
       } else {
         report.check(c.name, names[k], std::nullopt, ours);
       }
-      line.push_back(with_deviation(ours));
+      line.push_back(mean_text(ours));
       line.push_back(shown_text(quiet.*numbers[k]));
     }
     for (std::size_t k = 0; k < 2 && c.paper; ++k) {
@@ -303,7 +299,7 @@ int main(int argc, char** argv) {
         const auto first = stepped.begin() + static_cast<std::ptrdiff_t>(
                                                  ((steps.size() - 1 - j) * scenarios + i) * few);
         line.push_back(
-            with_deviation(statistics_of(std::vector<Criteria>(first, first + few), numbers[k])));
+            mean_text(statistics_of(std::vector<Criteria>(first, first + few), numbers[k])));
       }
       lines.push_back(line);
     }
