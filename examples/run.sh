@@ -101,7 +101,7 @@ if ! cmake -S "$root" -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release \
   cat "$build/configure.log" >&2
   exit 1
 fi
-cmake --build "$build" --target "${selected[@]}" make_index
+cmake --build "$build" --target "${selected[@]}" make_index check_readme
 echo "built in $(seconds_since "$started")"
 
 failed=()

@@ -7,7 +7,7 @@
 // disturbance rejection control applications under measurement noise", ISA Transactions 109 (2021)
 // 1-10, doi:10.1016/j.isatra.2020.09.007; the comparison is ours.
 //
-// Way: the deployment way, sampled observers; exact frequency responses and variances, nothing is
+// Way: sampled, sampled observers; exact frequency responses and variances, nothing is
 // simulated.
 //
 // symbol     code            value                        unit

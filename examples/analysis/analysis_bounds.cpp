@@ -5,8 +5,8 @@
 // doi:10.23919/JSEE.2023.000166, (15), (20), (21); A. T. Azar et al., Mathematics 10 (2022) 2261,
 // doi:10.3390/math10132261, (34), (35).
 //
-// Way: the paper way, plant and continuous observer as one ODE, Runge-Kutta of order 4. The input
-// of a run is the worst one: the sign of the impulse response, backwards in time (for the
+// Way: continuous simulation, plant and continuous observer as one ODE, Runge-Kutta of order 4. The
+// input of a run is the worst one: the sign of the impulse response, backwards in time (for the
 // switched and the nonlinear observer a disturbance rate that changes its sign at random).
 //
 // symbol         code                 value       unit

@@ -4,7 +4,7 @@
 // Plant and settings: the generic example of K. Lakomy, R. Madonski, ISA Transactions 109 (2021)
 // 1-10, doi:10.1016/j.isatra.2020.09.007, with its gain g frozen at 1; the margins are ours.
 //
-// Way: the deployment way, sampled observers and a plant sampled exactly; nothing is simulated.
+// Way: sampled, sampled observers and a plant sampled exactly; nothing is simulated.
 //
 // symbol     code            value                 unit
 // plant      CompanionPlant  y'' + 2 y' + y = u    -

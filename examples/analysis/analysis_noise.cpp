@@ -4,7 +4,7 @@
 // The cascade is that of K. Lakomy, R. Madonski, ISA Transactions 109 (2021) 1-10,
 // doi:10.1016/j.isatra.2020.09.007; the numbers are ours.
 //
-// Way: the deployment way. Variances are exact (Lyapunov equation of the closed loop); runs of 1e7
+// Way: sampled. Variances are exact (Lyapunov equation of the closed loop); runs of 1e7
 // samples of the real observer and law stand beside them.
 //
 // symbol     code             value                    unit

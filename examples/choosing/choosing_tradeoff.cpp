@@ -2,7 +2,7 @@
 // estimate is off when the disturbance moves. Lower left is better; a curve is one observer with
 // all its bandwidths.
 //
-// Way: the deployment way, sampled observers. Linear ones exactly (Lyapunov equations and frequency
+// Way: sampled, sampled observers. Linear ones exactly (Lyapunov equations and frequency
 // responses; the walk of the LESO with m = 2 is simulated); the ABESO, whose gain depends on the
 // error, by simulation, noise and disturbance each alone.
 //

@@ -82,11 +82,7 @@ std::optional<std::string> Figure::write(const std::filesystem::path& folder) co
     std::filesystem::remove(file(extension), ignored);
   }
   const std::vector<Panel> panels(panels_.begin(), panels_.end());
-  for (const Panel& panel : panels) {
-    if (auto error = FigureData::publish(panel, folder / (name_ + "_" + panel.name_))) {
-      return error;
-    }
-  }
+  if (auto error = write_text(file(".csv"), FigureData::publish(panels))) return error;
   FigureData data;
   const FigureScript script(name_, title_, grid_, panels, data);
   if (auto error = write_text(file(".dat"), data.text())) return error;

@@ -34,7 +34,7 @@ struct Grid {
   std::vector<double> column_weights = {};  ///< shares of the width; empty: all equal
 };
 
-/// Panels in a grid. `write` makes NAME.png, NAME.svg, NAME_*.csv and NAME.gp with its NAME.dat.
+/// Panels in a grid. `write` makes NAME.png, NAME.svg, NAME.csv and NAME.gp with its NAME.dat.
 class Figure {
  public:
   explicit Figure(std::string name, Grid grid = {});
@@ -53,6 +53,7 @@ class Figure {
                std::size_t column_span = 1);
 
   [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] const Grid& grid() const { return grid_; }
   [[nodiscard]] const std::string& caption() const { return caption_; }
   [[nodiscard]] const std::string& alt() const { return alt_.empty() ? caption_ : alt_; }
 

@@ -1,5 +1,5 @@
 /// @file
-/// The data of a figure: CSV files for the reader, and one file of thinned curves for gnuplot.
+/// The data of a figure: a CSV file for the reader, and one file of thinned curves for gnuplot.
 #pragma once
 
 #include <algorithm>
@@ -20,7 +20,7 @@ namespace esokit::examples {
 class FigureData {
  public:
   /// Longer series are published with every k-th row.
-  static constexpr std::size_t most_csv_rows = 20'000;
+  static constexpr std::size_t most_csv_rows = 5'000;
 
   /// Adds a block and returns its index. Numbers that are not finite break a line.
   std::size_t add(const Curve& curve) {
@@ -57,63 +57,39 @@ class FigureData {
 
   [[nodiscard]] const std::string& text() const { return text_; }
 
-  /// The panel's numbers as CSV: a file for each set of series that share their x.
-  [[nodiscard]] static std::optional<std::string> publish(const Panel& panel,
-                                                          const std::filesystem::path& stem) {
-    std::vector<bool> written(panel.series_.size(), false);
-    int files = 0;
-    for (std::size_t first = 0; first < panel.series_.size(); ++first) {
-      if (written[first]) continue;
-      const auto& x = panel.series_[first].x;
-      CsvRow header{plain(panel.x_label_, "x")};
-      std::vector<const std::vector<double>*> columns{&x};
-      for (std::size_t i = first; i < panel.series_.size(); ++i) {
+  /// The numbers of all panels as one CSV text, a row a point.
+  [[nodiscard]] static std::string publish(const std::vector<Panel>& panels) {
+    std::string text = csv_line({"panel", "series", "x", "y", "z"});
+    for (const Panel& panel : panels) {
+      const auto put = [&](const std::string& series, const std::vector<double>& x,
+                           const std::vector<double>& y) {
+        const std::string start = csv_field(panel.name_) + ',' + csv_field(series) + ',';
+        const std::size_t step = (x.size() + most_csv_rows - 1) / most_csv_rows;
+        for (std::size_t i = 0; i < x.size(); i += step) {
+          text += start + number_text(x[i], 7) + ',' + number_text(y[i], 7) + ",\n";
+        }
+      };
+      for (std::size_t i = 0; i < panel.series_.size(); ++i) {
         const auto& series = panel.series_[i];
-        if (written[i] || series.x != x) continue;
-        written[i] = true;
-        const std::string fallback = plain(series.style.name, "series " + std::to_string(i + 1));
-        std::string name = series.style.column.empty() ? fallback : series.style.column;
-        if (std::find(header.begin(), header.end(), name) != header.end()) {
-          name += " " + std::to_string(i + 1);
-        }
+        const std::string& wish =
+            series.style.column.empty() ? series.style.name : series.style.column;
+        const std::string name = plain(wish, "series " + std::to_string(i + 1));
         const bool band = series.kind == Panel::Series::Kind::band;
-        header.push_back(band ? name + " low" : name);
-        columns.push_back(&series.y);
-        if (band) {
-          header.push_back(name + " high");
-          columns.push_back(&series.high);
-        }
+        put(band ? name + " low" : name, series.x, series.y);
+        if (band) put(name + " high", series.x, series.high);
       }
-      std::string text = csv_line(header);
-      const std::size_t step = (x.size() + most_csv_rows - 1) / most_csv_rows;
-      for (std::size_t row = 0; row < x.size(); row += step) {
-        CsvRow line;
-        for (const auto* column : columns) line.push_back(number_text((*column)[row]));
-        text += csv_line(line);
+      if (!panel.map_) continue;
+      const auto& map = *panel.map_;
+      const std::string start = csv_field(panel.name_) + ',' + csv_field(map.style.column) + ',';
+      for (std::size_t k = 0; k < map.z.size(); ++k) {
+        text += start + number_text(map.x[k % map.x.size()], 7) + ',' +
+                number_text(map.y[k / map.x.size()], 7) + ',' + number_text(map.z[k], 7) + '\n';
       }
-      ++files;
-      const std::string suffix = files == 1 ? ".csv" : "_" + std::to_string(files) + ".csv";
-      if (auto error = write_text(stem.string() + suffix, text)) return error;
     }
-    return publish_map(panel, stem);
+    return text;
   }
 
  private:
-  static std::optional<std::string> publish_map(const Panel& panel,
-                                                const std::filesystem::path& stem) {
-    if (!panel.map_) return std::nullopt;
-    const auto& map = *panel.map_;
-    std::string text =
-        csv_line({plain(panel.x_label_, "x"), plain(panel.y_label_, "y"), map.style.column});
-    for (std::size_t j = 0; j < map.y.size(); ++j) {
-      for (std::size_t i = 0; i < map.x.size(); ++i) {
-        text += csv_line({number_text(map.x[i]), number_text(map.y[j]),
-                          number_text(map.z[j * map.x.size() + i])});
-      }
-    }
-    return write_text(stem.string() + "_map.csv", text);
-  }
-
   /// A label without gnuplot's braces.
   static std::string plain(std::string text, const std::string& fallback) {
     std::erase_if(text, [](char c) { return c == '{' || c == '}'; });

@@ -1,5 +1,5 @@
 /// @file
-/// Writes index.html, the page of all results, and one page a paper into the examples' output
+/// Writes index.html, the front page, and one page a paper into the examples' output
 /// folder.
 
 #include <cstdio>
@@ -23,7 +23,7 @@ int main(int argc, char** argv) {
     examples::Page page(out);
     std::vector<std::pair<std::string, std::string>> files;
     for (const auto& paper : papers) files.emplace_back(page.file_of(paper), page.one(paper));
-    files.emplace_back("index.html", page.overview_with_all(papers));
+    files.emplace_back("index.html", page.overview(papers));
     for (const auto& [name, text] : files) {
       if (const auto error = examples::write_text(out / name, text)) {
         std::fprintf(stderr, "make_index: %s\n", error->c_str());

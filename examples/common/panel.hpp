@@ -40,7 +40,7 @@ class Panel {
   /// No numbers at the x axis, for a panel above one with the same axis.
   Panel& hide_x_numbers();
   Panel& legend(Legend place);
-  /// Name of the panel's data file: FIGURE_NAME.csv.
+  /// Name of the panel in the figure's data file.
   Panel& name(std::string text);
 
   /// A line through the points; x may go back and forth (a path). NaN breaks it.

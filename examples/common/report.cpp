@@ -154,8 +154,14 @@ void Report::add(const Figure& figure) {
   if (const auto error = figure.write(folder_)) {
     fail(*error);
   } else {
-    add_content("figure", figure.name(), figure.caption(), figure.alt());
+    add_content("figure", figure.name(), figure.caption(), figure.alt(),
+                std::to_string(figure.grid().rows), std::to_string(figure.grid().columns));
   }
+}
+
+void Report::diagram(const std::string& name, const std::string& caption, std::string_view svg) {
+  write(name + ".svg", svg);
+  add_content("diagram", name, caption);
 }
 
 void Report::remark(std::string_view text) { add_content("remark", "", text); }
@@ -175,7 +181,7 @@ void Report::correction(const Correction& correction) {
               correction.why);
 }
 
-void Report::additions() { add_content("additions", "", ""); }
+void Report::additions(bool on) { add_content("additions", "", on ? "on" : "off"); }
 
 void Report::cover(std::string_view figure) { add_content("cover", figure, ""); }
 

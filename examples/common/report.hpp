@@ -113,6 +113,9 @@ class Report {
   /// Writes the figure's data, draws it and shows it on the page.
   void add(const Figure& figure);
 
+  /// A drawing that is not a plot: NAME.svg with this text.
+  void diagram(const std::string& name, const std::string& caption, std::string_view svg);
+
   /// A paragraph for the page: conventions, variants, what the reader should see.
   void remark(std::string_view text);
 
@@ -123,9 +126,9 @@ class Report {
   void claim(const Claim& claim);
   void correction(const Correction& correction);
 
-  /// All figures, tables and remarks from here on are additions of ours: they come after the
-  /// paper's own, at the end of its page.
-  void additions();
+  /// All figures, tables and remarks from here on are additions of ours (or, with false, the
+  /// paper's again): they come after the paper's own, at the end of its page.
+  void additions(bool on = true);
 
   /// The figure that stands for the paper on the front page; without it the first one.
   void cover(std::string_view figure);

@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <string>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "check.hpp"
@@ -23,7 +24,8 @@ struct ResultRow {
 
 /// A figure, table or paragraph, in the order in which the example gave them.
 struct ContentItem {
-  std::string kind, name, text, alt;
+  std::string kind, name, text, alt, more, figure;
+  bool addition = false;
 };
 
 struct ExampleResults {
@@ -31,19 +33,37 @@ struct ExampleResults {
   std::filesystem::path folder;  ///< relative to the output folder
   std::string title, description;
   std::vector<ContentItem> items;
+  int order = 0;
+  bool addition = false;
   std::vector<ResultRow> rows;
-
-  [[nodiscard]] std::size_t count(Check::Outcome outcome) const {
-    return static_cast<std::size_t>(
-        std::count_if(rows.begin(), rows.end(),
-                      [outcome](const ResultRow& row) { return row.outcome == outcome; }));
-  }
 };
 
 struct PaperResults {
   std::string folder, title, citation, link;
   std::vector<ExampleResults> examples;
 };
+
+/// Printed numbers and own checks, never added up.
+struct Counts {
+  std::size_t met = 0, missed = 0, not_judged = 0, passed = 0, failed = 0;
+};
+
+[[nodiscard]] inline Counts count(const PaperResults& paper) {
+  Counts counts;
+  for (const ExampleResults& example : paper.examples) {
+    for (const ResultRow& row : example.rows) {
+      const bool printed = !row.fields[2].empty();
+      const bool judged = row.outcome != Check::Outcome::reported;
+      const bool good = row.outcome == Check::Outcome::pass;
+      if (printed) {
+        ++(!judged ? counts.not_judged : good ? counts.met : counts.missed);
+      } else if (judged) {
+        ++(good ? counts.passed : counts.failed);
+      }
+    }
+  }
+  return counts;
+}
 
 namespace detail {
 
@@ -82,6 +102,7 @@ inline void read_example(const std::filesystem::path& out, const std::filesystem
   for (std::size_t i = 1; i < summary.size(); ++i) {
     example.rows.push_back({summary[i], outcome_of(summary[i])});
   }
+  bool additions = false;
   for (const CsvRow& row : read_csv(folder / "contents.csv", 6)) {
     const auto keep_first = [&](std::string& text) {
       if (text.empty()) text = row[2];
@@ -97,11 +118,21 @@ inline void read_example(const std::filesystem::path& out, const std::filesystem
       example.title = row[2];
     } else if (row[0] == "description") {
       example.description = row[2];
-    } else if (row[0] != "order" && row[0] != "addition") {
-      example.items.push_back({row[0], row[1], row[2], row[3]});
+    } else if (row[0] == "order") {
+      example.order = std::stoi(row[2]);
+    } else if (row[0] == "addition") {
+      example.addition = true;
+    } else if (row[0] == "additions") {
+      additions = row[2] == "on";
+    } else {
+      example.items.push_back({row[0], row[1], row[2], row[3], row[4], row[5], additions});
     }
   }
-  paper.examples.push_back(std::move(example));
+  // Of what could not run, as its data are not here, there is nothing to show.
+  const bool empty = example.rows.empty() &&
+                     std::all_of(example.items.begin(), example.items.end(),
+                                 [](const ContentItem& item) { return item.kind == "remark"; });
+  if (!empty) paper.examples.push_back(std::move(example));
 }
 
 }  // namespace detail
@@ -129,6 +160,13 @@ inline void read_example(const std::filesystem::path& out, const std::filesystem
       papers.back().folder = name;
     }
     detail::read_example(out, folder, papers.back());
+  }
+  std::erase_if(papers, [](const PaperResults& paper) { return paper.examples.empty(); });
+  for (PaperResults& paper : papers) {
+    std::stable_sort(paper.examples.begin(), paper.examples.end(),
+                     [](const ExampleResults& a, const ExampleResults& b) {
+                       return std::pair(a.addition, a.order) < std::pair(b.addition, b.order);
+                     });
   }
   std::stable_partition(papers.begin(), papers.end(),
                         [](const PaperResults& results) { return !results.link.empty(); });

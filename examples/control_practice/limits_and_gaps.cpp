@@ -1,7 +1,7 @@
 // What limits, starts, retunes and lost samples do to ADRC, in numbers: a double integrator, known
 // exactly, so that every deviation is the controller's.
 //
-// Way: the deployment way; the plant is exact between samples.
+// Way: sampled; the plant is exact between samples.
 //
 // Plant      y'' = d + b0 u,  d = -3,  b0 = 2
 //
@@ -281,7 +281,7 @@ int main(int argc, char** argv) {
   Report report(argc, argv, folder, "limits_and_gaps",
                 about("Limits, starts, retunes, gaps",
                       "A double integrator known exactly, so that every deviation is the "
-                      "controller's. Deployment way."));
+                      "controller's. Sampled."));
 
   const StepRun truth = true_states();
   std::vector<CsvRow> rows;

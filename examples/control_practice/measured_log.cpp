@@ -2,7 +2,7 @@
 // figure. Without a file it runs the measured sets beside the repository (../shared/data), if they
 // are there, against what is independently known of them.
 //
-// Way: the deployment way, VariableTime<Observer>: chain and gains follow the time stamps. Missing
+// Way: sampled, VariableTime<Observer>: chain and gains follow the time stamps. Missing
 // measurements (empty fields, NaN) are predicted over, and the next correction uses the gain for
 // the whole gap. AlgebraicEso counts samples while its bandwidth falls; a switched observer
 // compares innovations whatever time lies between them.
@@ -223,10 +223,11 @@ int run_measured_sets(const Arguments& arguments) {
       arguments.text("out", "out"), "measured_log",
       about("Logs of real machines",
             "Observers over recorded measurements with irregular time stamps, against what is "
-            "independently known. Deployment way: VariableTime, gains follow the time stamps."));
+            "independently known. Sampled: VariableTime, gains follow the time stamps."));
   if (!measured_sets(report, data)) {
-    report.remark("None of the measured sets is here: nothing was run. Put them in " +
-                  data.string() + " or name their folder with --data.");
+    std::printf(
+        "none of the measured sets is here: put them in %s or name their folder with --data\n",
+        data.c_str());
   }
   return report.finish();
 }

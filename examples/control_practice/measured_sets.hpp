@@ -354,8 +354,6 @@ inline bool measured_sets(Report& report, const std::filesystem::path& data) {
       show(report, data);
     } else {
       std::printf("skipped: there is no %s\n", (data / name).c_str());
-      report.remark("Skipped: the measured set " + std::string(name) +
-                    " is not beside the repository (it is not part of it).");
     }
   };
   with("dfki_simple_pendulum", pendulum);

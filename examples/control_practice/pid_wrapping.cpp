@@ -1,7 +1,7 @@
 // An existing PID stays: the disturbance compensator is put between it and the actuator, while the
 // machine runs, without a bump.
 //
-// Way: the deployment way, 1 ms.
+// Way: sampled, 1 ms.
 //
 // Plant       y'' = -2 y' + 50 u - load(t),  |u| <= 4
 // Controller  PID (its own integrator, filter, anti-windup), the same gains throughout
@@ -112,7 +112,7 @@ int main(int argc, char** argv) {
   Report report(argc, argv, folder, "pid_wrapping",
                 about("Wrapping an existing PID",
                       "A disturbance compensator is switched on around a PID while the machine "
-                      "runs; the PID's gains stay. Deployment way, 1 ms."));
+                      "runs; the PID's gains stay. Sampled, 1 ms."));
   const Run plain = simulate(false);
   const Run wrapped = simulate(true);
   report.check("PID", "peak error after the load at 1 s", std::nullopt, plain.first_load);

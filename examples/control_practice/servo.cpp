@@ -1,7 +1,7 @@
 // A servo with friction, saturation, sensor dropouts, NaN bursts, a load step and a retune while it
 // runs: PID with anti-windup, and ADRC with three observers, side by side.
 //
-// Way: the deployment way. Each controller runs once a sample; the plant is integrated in between.
+// Way: sampled. Each controller runs once a sample; the plant is integrated in between.
 //
 // Plant       theta'' = a u - b theta' - c tanh(theta' / w_s) - load(t),  |u| <= u_max,
 //             y = theta, quantised by the encoder, with noise
@@ -220,7 +220,7 @@ int main(int argc, char** argv) {
   Report report(argc, argv, folder, "servo",
                 about("A servo on a bad day",
                       "Friction, saturation, a load step, a retune while running, lost samples and "
-                      "NaN: PID with anti-windup beside ADRC with three observers. Deployment way, "
+                      "NaN: PID with anti-windup beside ADRC with three observers. Sampled, "
                       "1 ms; mean and spread over 20 seeds of noise and faults."));
   std::vector<Run> first;
   std::vector<std::string> names;

@@ -1,7 +1,7 @@
 // Two inputs, two outputs: channels of different order, decoupled by the input matrix, limits on
 // each actuator; beside two single loops that know nothing of each other.
 //
-// Way: the deployment way, 2 ms.
+// Way: sampled, 2 ms.
 //
 // Plant    y_1'' = -y_1' + 2 u_1 + 1.4 u_2 + w_1(t),   y_2' = -2 y_2 + 1.2 u_1 + 3 u_2 + w_2(t)
 // Model    y_1'' = d_1 + (B0 u)_1,  y_2' = d_2 + (B0 u)_2,  B0 = (1.8 1.2; 1 2.6): ten to twenty
@@ -89,7 +89,7 @@ int main(int argc, char** argv) {
   Report report(argc, argv, folder, "two_by_two",
                 about("Two inputs, two outputs",
                       "A second-order and a first-order channel coupled through their inputs: "
-                      "decoupled by B0^-1, and as two single loops. Deployment way, 2 ms."));
+                      "decoupled by B0^-1, and as two single loops. Sampled, 2 ms."));
   auto mimo = Mimo::make(config()).value();
   const Run decoupled = simulate([&](const Pair& y, const Pair& r) { return mimo.update(y, r); });
 

@@ -1,11 +1,12 @@
-// Sim1A and Sim1B the deployment way: the observers as they run in a controller, sampled at 10, 1
-// and 0.1 ms, beside the paper way. An addition of ours; the paper has no such figure.
+// Sim1A and Sim1B as a sampled observer: the observers as they run in a controller, sampled at 10,
+// 1 and 0.1 ms, beside as a continuous simulation. An addition of ours; the paper has no such
+// figure.
 //
 // K. Lakomy, R. Madonski, "Cascade extended state observer for active disturbance rejection control
 // applications under measurement noise", ISA Transactions 109 (2021) 1-10,
 // doi:10.1016/j.isatra.2020.09.007.
 //
-// Way: the deployment way. At t = k T the observer is updated with the sampled error and the input
+// Way: sampled. At t = k T the observer is updated with the sampled error and the input
 // that was held since (k - 1) T, the law is computed once, and its input is held for T; the plant
 // alone is integrated, RK4 at 0.1 ms.
 //
@@ -49,7 +50,7 @@ constexpr double plant_step = 1e-4;                      // s
 constexpr std::array fine_times = {2.5e-5, 1.25e-5};  // s
 constexpr std::size_t seeds = 20;
 
-/// One run of Sim1 the deployment way.
+/// One run of Sim1 as a sampled observer.
 template <int Levels>
 Criteria run_deployed(double bandwidth, double sample_time, double power, std::uint64_t seed,
                       paper1::Series* series = nullptr) {
@@ -90,7 +91,8 @@ Criteria run_deployed(int levels, double bandwidth, double sample_time, double p
   return run_deployed<3>(bandwidth, sample_time, power, seed, series);
 }
 
-/// Greatest difference of the output from the paper way's, which has a sample every `step`.
+/// Greatest difference of the output from as a continuous simulation's, which has a sample every
+/// `step`.
 double distance(const paper1::Series& deployed, double sample_time, const paper1::Series& paper,
                 double step) {
   const auto stride = static_cast<std::size_t>(std::lround(sample_time / step));
@@ -108,12 +110,14 @@ std::string with_deviation(const Statistics& of) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  Report report(argc, argv, folder, "deployed",
-                about("Sim1A and Sim1B in a controller (our addition)",
-                      "The sampled observers at T = 10, 1 and 0.1 ms beside the paper way. "
-                      "Deployment way: exact sampled observer, input held, law once a sample."));
+  Report report(
+      argc, argv, folder, "deployed",
+      about("Sim1A and Sim1B in a controller (our addition)",
+            "The sampled observers at T = 10, 1 and 0.1 ms beside the continuous simulation: "
+            "exact sampled observer, input held, law once a sample.",
+            4, true));
 
-  std::array<std::array<paper1::Series, 4>, 3> runs;  // paper way, then the sample times
+  std::array<std::array<paper1::Series, 4>, 3> runs;  // continuous, then the sample times
   std::vector<CsvRow> lines;
   for (std::size_t p = 0; p < 3; ++p) {
     const int levels = static_cast<int>(p) + 1;
@@ -121,7 +125,7 @@ int main(int argc, char** argv) {
       lines.push_back({level_names[p] + ", " + name, number_text(c.error, 5),
                        number_text(c.control, 5), number_text(c.estimate, 4), away});
     };
-    row("paper way", run_generic(levels, table1[p], 0.0, 0, {}, &runs[p][0], plant_step), "");
+    row("continuous", run_generic(levels, table1[p], 0.0, 0, {}, &runs[p][0], plant_step), "");
     std::array<double, 3> away{};
     for (std::size_t i = 0; i < 3; ++i) {
       const double T = sample_times[i];
@@ -129,7 +133,7 @@ int main(int argc, char** argv) {
       away[i] = distance(runs[p][i + 1], T, runs[p][0], plant_step);
       const std::string name = "T = " + number_text(1e3 * T) + " ms";
       row(name, criteria, number_text(away[i], 3));
-      report.check(level_names[p] + ", " + name, "max |y - y of the paper way|", std::nullopt,
+      report.check(level_names[p] + ", " + name, "max |y - y of the continuous one|", std::nullopt,
                    away[i]);
     }
   }
@@ -152,9 +156,10 @@ int main(int argc, char** argv) {
   }
   report.table(
       "criteria",
-      "Sim1A: criteria of Table 2 the paper way and in a controller, and the greatest "
+      "Sim1A: criteria of Table 2 simulated continuously and in a controller, and the greatest "
       "difference of the output between the two",
-      {"case", "1e3 int |e| dt", "int u^2 dt", "int |z3 error| dt", "max |y - y of the paper way|"},
+      {"case", "1e3 int |e| dt", "int u^2 dt", "int |z3 error| dt",
+       "max |y - y of the continuous one|"},
       lines);
 
   // With noise: at T = 10 ms each sample has a noise value of its own.
@@ -180,16 +185,17 @@ int main(int argc, char** argv) {
 
   Figure figure("deployed", {.rows = 3, .columns = 3, .panel_height = 150});
   figure.caption(
-      "Sim1A in a controller: the sampled observers at T = 10, 1 and 0.1 ms beside the paper way, "
+      "Sim1A in a controller: the sampled observers at T = 10, 1 and 0.1 ms beside the continuous "
+      "simulation, "
       "for p = 1, 2, 3 (left to right). At 10 ms omega_o T is 2.5 for p = 1 and 1.4 for the last "
-      "level of p = 3.");
+      "level of p = 3. 1 ms and 0.1 ms lie on the continuous curve (black) almost everywhere.");
   constexpr std::array colors = {Color::black, Color::vermillion, Color::blue, Color::green};
   constexpr std::array dashes = {Dash::solid, Dash::solid, Dash::dashed, Dash::dotted};
-  const std::array<std::string, 4> names = {"paper", "10 ms", "1 ms", "0.1 ms"};
+  const std::array<std::string, 4> names = {"continuous", "10 ms", "1 ms", "0.1 ms"};
   for (std::size_t p = 0; p < 3; ++p) {
     auto& error = figure.panel(0, p).title(level_names[p]).legend(Legend::top_right);
-    auto& control = figure.panel(1, p).legend(Legend::none);
-    auto& estimate = figure.panel(2, p).legend(Legend::none).x_label("t (s)");
+    auto& control = figure.panel(1, p).legend(Legend::top_right);
+    auto& estimate = figure.panel(2, p).legend(Legend::top_right).x_label("t (s)");
     error.y_range(-0.015, 0.05).x_range(0.0, duration).hide_x_numbers();
     control.y_range(-10.0, 20.0).x_range(0.0, duration).hide_x_numbers();
     estimate.y_range(-3.0, 3.0).x_range(0.0, duration);

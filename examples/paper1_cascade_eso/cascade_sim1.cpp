@@ -4,7 +4,8 @@
 // applications under measurement noise", ISA Transactions 109 (2021) 1-10,
 // doi:10.1016/j.isatra.2020.09.007.
 //
-// Way: the paper way, plant and continuous observer as one ODE, Runge-Kutta of order 4 at 1 ms.
+// Way: continuous simulation, plant and continuous observer as one ODE, Runge-Kutta of order 4 at 1
+// ms.
 //
 // Plant      x1' = x2,  x2' = -x1 - 2 x2 + g (u + d*),  y = x1 + w
 //            g = (1 + 0.2 tanh(t - 2)) / (|x1| + 1),  d* = 5 sin(9 t) for t >= 3.5 s
@@ -39,6 +40,7 @@
 #include "common/parallel.hpp"
 #include "common/report.hpp"
 #include "common/statistics.hpp"
+#include "paper1_cascade_eso/diagrams.hpp"
 #include "paper1_cascade_eso/paper1.hpp"
 
 using namespace esokit::examples;
@@ -102,7 +104,9 @@ int main(int argc, char** argv) {
   Report report(argc, argv, folder, "sim1",
                 about("Sim1A and Sim1B: generic example (Figs 3, 4; Tables 1, 2)",
                       "A second-order plant under a sine disturbance, without (A) and with (B) "
-                      "measurement noise. Paper way: continuous observer, RK4 at 1 ms."));
+                      "measurement noise. Continuous simulation, RK4 at 1 ms.",
+                      1));
+  report.cover("fig4");
 
   // Sim1A, Sim1B's first seed for the figure, and all seeds for the table.
   std::array<paper1::Series, 3> quiet;
@@ -143,6 +147,11 @@ int main(int argc, char** argv) {
     compare(control_metric, table2_b[p].control, &Criteria::control);
     compare(estimate_metric, table2_b[p].estimate, &Criteria::estimate);
   }
+  report.diagram("diagram1", "Fig. 1: disturbance rejection with an extended state observer.",
+                 loop_diagram());
+  report.diagram("diagram2",
+                 "Fig. 2: the cascade observer. Only the slow first level sees the noise.",
+                 cascade_diagram());
   report.table("1", "Table 1: bandwidths of the levels, omega_oi = 2^(i-1) omega_o1 (rad/s)",
                {"observer", "omega_o1", "omega_o2", "omega_o3"}, bandwidths);
   report.comparison("2", "Table 2: criteria over 0..5 s; Sim1B: mean (standard deviation) over " +
@@ -161,7 +170,47 @@ int main(int argc, char** argv) {
                   "observer hands the noise on to u, the cascades do not.",
                   noisy, true));
 
+  const auto mean_b = [&](std::size_t p, double Criteria::*number) {
+    const auto first = runs.begin() + static_cast<std::ptrdiff_t>(p * seeds);
+    return statistics_of(std::vector<Criteria>(first, first + seeds), number).mean;
+  };
+  const double quiet_spread = std::max(std::abs(a[1].estimate / a[0].estimate - 1.0),
+                                       std::abs(a[2].estimate / a[0].estimate - 1.0));
+  report.claim({.text = "At the bandwidths of Table 1 the three observers estimate the disturbance "
+                        "equally well without noise.",
+                .where = "Table 2, A",
+                .holds = quiet_spread < 0.02 ? Claim::Holds::yes : Claim::Holds::no,
+                .here = "The integrals of |z3 error| differ by " +
+                        number_text(100.0 * quiet_spread, 2) + " % at most.",
+                .figure = "fig3"});
+  const auto drop = [&](double Criteria::*number) {
+    return 1.0 - std::max(mean_b(1, number), mean_b(2, number)) / mean_b(0, number);
+  };
+  const double control_drop = drop(&Criteria::control);
+  const double estimate_drop = drop(&Criteria::estimate);
+  report.claim(
+      {.text = "With measurement noise the cascades estimate better and spend less control.",
+       .where = "Table 2, B",
+       .holds = control_drop > 0.0 && estimate_drop > 0.0 ? Claim::Holds::yes : Claim::Holds::no,
+       .here = "int |z3 error| falls by " + number_text(100.0 * estimate_drop, 2) +
+               " %, int u^2 by " + number_text(100.0 * control_drop, 2) + " % or more.",
+       .figure = "fig4"});
+  report.correction({.where = "(26)",
+                     .printed = "b' d'; Gamma_ij = 0 for j < i-1",
+                     .correct = "b d'; Gamma_ij = b b'(l_{j+1} - l_j) c' for j < i-1",
+                     .why = "the printed one leaves a residual; (28) to (30) then carry "
+                            "omega_j (alpha^{n+1} - 1) instead of omega_j"});
+  report.correction({.where = "(9) to (30)",
+                     .printed = "kappa_max the largest kappa (3 for n = 2)",
+                     .correct = "the 2-norm of kappa (4.36)",
+                     .why = "the norm of the gain enters the bound"});
+  report.correction({.where = "(30), (22)",
+                     .printed = "(30): omega^{n-1}; (22), first line: no gamma",
+                     .correct = "omega^n; gamma in front",
+                     .why = "from the derivation; the bounds hold in this form (analysis_bounds)"});
+
   // The variant that the text describes.
+  report.additions();
   std::vector<CsvRow> lines;
   double least = 100.0;
   double most = 0.0;
@@ -175,9 +224,10 @@ int main(int argc, char** argv) {
     for (std::size_t p = 0; p < 3; ++p) {
       const auto ours = run_generic(static_cast<int>(p) + 1, table1[p], 0.0, 0, literal);
       const std::string name = label + level_names[p];
-      report.check(name, error_metric, table2_a[p].error, ours.error);
-      report.check(name, control_metric, table2_a[p].control, ours.control);
-      report.check(name, estimate_metric, table2_a[p].estimate, ours.estimate);
+      // Shown only: the printed numbers are judged in the set-up that they come from.
+      report.check(name, error_metric, std::nullopt, ours.error);
+      report.check(name, control_metric, std::nullopt, ours.control);
+      report.check(name, estimate_metric, std::nullopt, ours.estimate);
       const double excess = 100.0 * (ours.control / table2_a[p].control - 1.0);
       least = std::min(least, excess);
       most = std::max(most, excess);
@@ -198,8 +248,11 @@ int main(int argc, char** argv) {
   report.not_reproduced(
       "Sim1A by the letter of the text (observer driven by y, d* beside g u) gives an int u^2 that "
       "is " +
-      number_text(least, 2) + " to " + number_text(most, 2) +
-      " % above Table 2. The error-based form with d* through g gives Table 2.");
+          number_text(least, 2) + " to " + number_text(most, 2) +
+          " % above Table 2 (step at 0.2 s or at 0 s). The error-based form with d* through g "
+          "gives "
+          "Table 2.",
+      Miss::other_reading);
 
   Figure variant("literal", {.rows = 1, .columns = 2, .panel_height = 200});
   variant.caption("Sim1A, p = 2: the set-up that gives Table 2 beside the one of the text.");

@@ -31,7 +31,8 @@ namespace sim = esokit::sim;
 
 inline const std::string folder = "paper1_cascade_eso";
 
-inline esokit::examples::About about(std::string title, std::string description) {
+inline esokit::examples::About about(std::string title, std::string description, int order,
+                                     bool addition = false) {
   return {.paper_title = "Cascade extended state observer",
           .citation =
               "K. Lakomy, R. Madonski, Cascade extended state observer for active disturbance "
@@ -39,7 +40,9 @@ inline esokit::examples::About about(std::string title, std::string description)
               "1-10",
           .link = "https://doi.org/10.1016/j.isatra.2020.09.007",
           .title = std::move(title),
-          .description = std::move(description)};
+          .description = std::move(description),
+          .order = order,
+          .addition = addition};
 }
 
 /// Names of the levels p = 1, 2, 3; p = 1 is the standard ESO.
@@ -135,7 +138,8 @@ class Meter {
   sim::Trapezoid<> error_, control_, estimate_;
 };
 
-/// One run of Sim1 the paper way with a cascade of `Levels` levels, the first one at `bandwidth`.
+/// One run of Sim1 as a continuous simulation with a cascade of `Levels` levels, the first one at
+/// `bandwidth`.
 template <int Levels>
 Criteria run_generic(double bandwidth, double power, std::uint64_t seed, const Setup& setup = {},
                      Series* series = nullptr, double step = 1e-3) {

@@ -1,7 +1,7 @@
 /// @file
 /// The planar vertical take-off and landing aircraft of Sim2A and Sim2B and its closed loop, the
-/// paper way. Two channels are coupled through the aircraft, so plant and both observers are
-/// stacked here by hand; sim::ContinuousLoop does the same for one channel.
+/// simulated continuously. Two channels are coupled through the aircraft, so plant and both
+/// observers are stacked here by hand; sim::ContinuousLoop does the same for one channel.
 #pragma once
 
 #include <array>

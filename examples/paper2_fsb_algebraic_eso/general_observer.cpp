@@ -6,7 +6,7 @@
 // extended state observer design", Asian Journal of Control 23 (2021) 2171-2184,
 // doi:10.1002/asjc.2516.
 //
-// Way: the deployment way. Observers are sampled with period T, current-estimator form; the input
+// Way: sampled. Observers are sampled with period T, current-estimator form; the input
 // is held; the plant is a chain of integrators and advanced exactly.
 //
 // Plant      y^(n) = d(t) + b0 u,  d = sum_{i<m} d_i t^i / i!, and then with a term t^m / m!
@@ -165,7 +165,7 @@ void add(Page& page) {
 
   auto& panel = page.figure.panel(Extension - 1, Order - 1);
   panel.title(name).log_y().y_range(1e-14, 1e4).y_tick(1e6).x_range(0.0, shown).x_tick(1.0);
-  panel.legend(Order == 1 && Extension == 1 ? Legend::bottom_left : Legend::none);
+  panel.legend(Legend::bottom_left);
   if (Extension == 3) {
     panel.x_label("t (s)");
   } else {
@@ -199,7 +199,8 @@ int main(int argc, char** argv) {
   Report report(argc, argv, folder, "general_observer",
                 about("Any order, any number of extended states (our addition)",
                       "n = 1..4 and m = 1..3 on polynomial disturbances, error against time, "
-                      "AlgebraicEso beside LinearEso. Deployment way: sampled at 10 ms."));
+                      "AlgebraicEso beside LinearEso. Sampled observers, 10 ms.",
+                      4, true));
   report.remark(
       "Both observers start at zero, the plant does not. On a disturbance of degree below m the "
       "algebraic observer is exact from sample N - 1 = n + m - 1 on; what is left is the rounding "

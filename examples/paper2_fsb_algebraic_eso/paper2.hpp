@@ -20,7 +20,8 @@ using esokit::Vector;
 
 inline const std::string folder = "paper2_fsb_algebraic_eso";
 
-inline esokit::examples::About about(std::string title, std::string description) {
+inline esokit::examples::About about(std::string title, std::string description, int order,
+                                     bool addition = false) {
   return {.paper_title = "Frequency-shifting-based algebraic extended state observer",
           .citation =
               "J. Kasac, A. Pender, M. Pranjic, D. Kotarski, Frequency-shifting-based algebraic "
@@ -28,7 +29,9 @@ inline esokit::examples::About about(std::string title, std::string description)
               "2171-2184",
           .link = "https://doi.org/10.1002/asjc.2516",
           .title = std::move(title),
-          .description = std::move(description)};
+          .description = std::move(description),
+          .order = order,
+          .addition = addition};
 }
 
 /// The paper's observer in a ContinuousLoop: its filter, a clock, and estimates that are zero until

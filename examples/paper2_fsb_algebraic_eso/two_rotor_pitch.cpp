@@ -5,7 +5,7 @@
 // extended state observer design", Asian Journal of Control 23 (2021) 2171-2184,
 // doi:10.1002/asjc.2516, section 6.
 //
-// Way: the paper way. Plant and both observers are ODEs, RK4 at 1 ms.
+// Way: continuous simulation. Plant and both observers are ODEs, RK4 at 1 ms.
 //
 // Plant      J th'' = -m1 d1 g cos th + u,  y = th                                       (61)
 // Input      u = m1 d1 g cos th - J (kp th + kd th'), the same for both observers and known to
@@ -136,12 +136,14 @@ int main(int argc, char** argv) {
   Report report(argc, argv, folder, "two_rotor_pitch",
                 about("Two-rotor pitch rig (Figs 14-17), a stand-in",
                       "Both observers on one simulated motion of Eq. (61), in place of the paper's "
-                      "unpublished measurement. Paper way: plant and observers as ODEs, RK4 at 1 "
-                      "ms."));
+                      "unpublished measurement. Continuous simulation, RK4 at 1 "
+                      "ms.",
+                      3));
   report.not_reproduced(
       "Figs 14 to 17 show a measurement that is not published. What stands here is a simulation of "
       "Eq. (61) with an inertia (0.02 kg m^2) and an input of our choice: the observers' behaviour "
-      "may be compared with the paper's, the curves may not.");
+      "may be compared with the paper's, the curves may not.",
+      Miss::not_published);
 
   const Run linear = run(linear_observer<2>(bandwidth, 1.0 / inertia), 0.0);
   const Run shifted = run(HeldFilter<2>(bandwidth, q, 1.0 / inertia, epsilon), epsilon);

@@ -4,7 +4,7 @@
 // S. Shi, Z. Zeng, C. Zhao, L. Guo, P. Chen, "Improved Active Disturbance Rejection Control (ADRC)
 // with Extended State Filters", Energies 15 (2022) 5799, doi:10.3390/en15165799.
 //
-// Way: the deployment way; the sampled loop is linear, so it is stable if and only if the spectral
+// Way: sampled; the sampled loop is linear, so it is stable if and only if the spectral
 // radius of its step is below one. The plant is exact under an input that changes once in a sample.
 //
 // Plant      x1' = x2,  x2' = 20 x1 + 78 x2 + 230 u(t - delay)
@@ -122,7 +122,8 @@ int main(int argc, char** argv) {
   Report report(argc, argv, folder, "delay",
                 about("Delay study: PADRC beside the predictor form",
                       "Spectral radius of the linear sampled loop over observer bandwidth and "
-                      "actuator delay. Deployment way."));
+                      "actuator delay. Sampled controllers.",
+                      2, true));
 
   // How fast the observer must be.
   const double none = least_bandwidth(0.0, true);

@@ -4,7 +4,7 @@
 // S. Shi, Z. Zeng, C. Zhao, L. Guo, P. Chen, "Improved Active Disturbance Rejection Control (ADRC)
 // with Extended State Filters", Energies 15 (2022) 5799, doi:10.3390/en15165799; section 3 on P.
 //
-// Way: the deployment way, 1 ms.
+// Way: sampled, 1 ms.
 //
 // Measured by   lambda = largest eigenvalue of P^-1 E[e e'] at each sample, e the error of the
 //               corrected estimate; P is a bound as long as lambda <= 1
@@ -160,7 +160,8 @@ int main(int argc, char** argv) {
   Report report(argc, argv, folder, "consistency",
                 about("Covariance consistency: P beside the error of 400 runs",
                       "Open loop with a disturbance within its bound, and the closed loop. "
-                      "Deployment way."));
+                      "Sampled, 1 ms.",
+                      3, true));
   // Sample covariances of 400 runs: their largest eigenvalue scatters by about sqrt(2 / 400), and
   // is biased upwards by 2 sqrt(3 / 400).
   const double scatter = 1.0 + 4.0 * std::sqrt(2.0 / runs);

@@ -32,7 +32,8 @@ namespace sim = esokit::sim;
 
 inline const std::string folder = "paper5_esf_epadrc";
 
-inline esokit::examples::About about(std::string title, std::string description) {
+inline esokit::examples::About about(std::string title, std::string description, int order,
+                                     bool addition = false) {
   return {.paper_title = "Extended state filter, PADRC and EPADRC",
           .citation =
               "S. Shi, Z. Zeng, C. Zhao, L. Guo, P. Chen, Improved Active Disturbance "
@@ -40,7 +41,9 @@ inline esokit::examples::About about(std::string title, std::string description)
               "5799",
           .link = "https://doi.org/10.3390/en15165799",
           .title = std::move(title),
-          .description = std::move(description)};
+          .description = std::move(description),
+          .order = order,
+          .addition = addition};
 }
 
 // ---- section 4 ----
