@@ -151,7 +151,7 @@ TYPED_TEST(Scaled, ScalingGoesThereAndBack) {
   const double gain = TypeParam::scaled_input_gain(-7.5, t);
   EXPECT_NEAR(gain / (-7.5 * static_cast<double>(esokit_test::nordsieck(TypeParam::order, t))), 1,
               1e-14);
-  EXPECT_NEAR(TypeParam::input_gain(gain, 1 / t), -7.5, 1e-13);
+  EXPECT_NEAR(TypeParam::template physical<TypeParam::order>(gain, 1 / t), -7.5, 1e-13);
 }
 
 TYPED_TEST(Scaled, ProbeSeesEveryState) {

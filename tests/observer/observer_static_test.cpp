@@ -13,9 +13,10 @@ using esokit::CascadeEso;
 using esokit::LinearEso;
 using esokit::StepStatus;
 
-// Three states, three gains, pole, b0, 1/T, innovation, last input, two counters.
-static_assert(sizeof(LinearEso<2, float>) <= 48);
-static_assert(sizeof(LinearEso<2>) <= 96);
+// Three states, three gains, pole, b0 and its scaled form, T and 1/T, innovation, last input, two
+// counters.
+static_assert(sizeof(LinearEso<2, float>) <= 56);
+static_assert(sizeof(LinearEso<2>) <= 112);
 static_assert(sizeof(CascadeEso<2, 1, float>) == sizeof(LinearEso<2, float>));
 
 static_assert(std::is_trivially_copyable_v<LinearEso<2, float>>);

@@ -38,6 +38,7 @@ class AdrcLaw {
     }
     AdrcLaw law;
     law.inverse_input_gain_ = S(1.0) / config.input_gain;
+    law.input_gain_ = config.input_gain;
     if (config.gains) {
       if (!all(is_finite(config.controller_bandwidth)) ||
           all(detail::magnitude(config.controller_bandwidth) > S(0.0))) {
@@ -121,14 +122,15 @@ class AdrcLaw {
   /// k_0 .. k_(n-1).
   [[nodiscard]] const Array<S, Order>& gains() const noexcept { return gains_; }
 
-  /// b0.
-  [[nodiscard]] S input_gain() const noexcept { return S(1.0) / inverse_input_gain_; }
+  /// b0, as it was given.
+  [[nodiscard]] const S& input_gain() const noexcept { return input_gain_; }
 
  private:
   AdrcLaw() = default;
 
   Array<S, Order> gains_{};
   S inverse_input_gain_ = S(1.0);
+  S input_gain_ = S(1.0);
 };
 
 }  // namespace esokit

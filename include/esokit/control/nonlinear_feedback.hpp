@@ -84,8 +84,8 @@ class NonlinearFeedback {
     return (feedback(estimate, reference) - estimate(Order)) * inverse_input_gain_;
   }
 
-  /// b0.
-  [[nodiscard]] S input_gain() const noexcept { return S(1.0) / inverse_input_gain_; }
+  /// b0, as it was given.
+  [[nodiscard]] const S& input_gain() const noexcept { return input_gain_; }
 
  private:
   static constexpr Array<S, Order> filled(const S& value) {
@@ -98,11 +98,13 @@ class NonlinearFeedback {
   NonlinearFeedback(const Config& config, std::integer_sequence<int, I...>)
       : gains_(config.gains),
         fal_{Fal<S>(std::get<I>(config.exponents), std::get<I>(config.linear_widths))...},
-        inverse_input_gain_(S(1.0) / config.input_gain) {}
+        inverse_input_gain_(S(1.0) / config.input_gain),
+        input_gain_(config.input_gain) {}
 
   Array<S, Order> gains_;
   Array<Fal<S>, Order> fal_;
   S inverse_input_gain_;
+  S input_gain_;
 };
 
 }  // namespace esokit

@@ -29,12 +29,6 @@ struct ScaledChain : ChainSize<Order, Extension> {
     return gain;
   }
 
-  /// b0 back from the scaled input gain. @param rate 1/T, 1/s
-  static constexpr ScalarType input_gain(const ScalarType& scaled_gain,
-                                         const ScalarType& rate) noexcept {
-    return physical<Order>(scaled_gain, rate);
-  }
-
   /// One sample ahead: the plant rows see the disturbance and the drive, the disturbance rows only
   /// themselves.
   /// @param drive what drives the chain beside its own disturbance, scaled like (d, d', ..); the

@@ -278,13 +278,11 @@ class PredictorCorrector {
     return all(good) ? StepStatus::ok : StepStatus::input_rejected;
   }
 
-  /// b0.
-  [[nodiscard]] constexpr S input_gain() const noexcept {
-    return Chain::input_gain(scaled_input_gain_, rate_);
-  }
+  /// b0, as it was given.
+  [[nodiscard]] constexpr const S& input_gain() const noexcept { return input_gain_; }
 
-  /// T, s.
-  [[nodiscard]] constexpr S sample_time() const noexcept { return S(1.0) / rate_; }
+  /// T, s, as it was given.
+  [[nodiscard]] constexpr const S& sample_time() const noexcept { return sample_time_; }
 
   /// Gain of the next correction of level `level` = 0 .. p - 1, scaled; for laws that know it
   /// before the measurement.
@@ -331,6 +329,8 @@ class PredictorCorrector {
       : laws_(laws),
         scaled_input_gain_(Chain::scaled_input_gain(config.input_gain, config.sample_time)),
         rate_(S(1.0) / config.sample_time),
+        input_gain_(config.input_gain),
+        sample_time_(config.sample_time),
         max_gap_(static_cast<std::uint16_t>(config.max_gap)) {
     for (auto& state : states_) {
       for (S& x : state) x = S(0.0);
@@ -591,6 +591,8 @@ class PredictorCorrector {
   S rate_;
   S innovation_ = S(0.0);
   S applied_input_ = S(0.0);
+  S input_gain_;
+  S sample_time_;
   std::uint16_t gap_ = 0;
   std::uint16_t max_gap_;
 };

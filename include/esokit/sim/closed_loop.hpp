@@ -299,12 +299,13 @@ struct SampledLoop {
     if (auto check = check_positive("sample_time", config.sample_time); !check)
       return check.error();
     if constexpr (requires { observer.sample_time(); }) {
-      const ScalarType own = observer.sample_time();
-      if (!(std::abs(config.sample_time - own) <= static_cast<ScalarType>(1e-6) * own)) {
+      const auto own = observer.sample_time();
+      const auto given = static_cast<std::remove_const_t<decltype(own)>>(config.sample_time);
+      if (given < own || given > own) {
         return Error<ScalarType>{.field = "sample_time",
                                  .value = config.sample_time,
                                  .rule = "must be that of the observer, which is",
-                                 .limit = own,
+                                 .limit = static_cast<ScalarType>(own),
                                  .has_limit = true};
       }
     }

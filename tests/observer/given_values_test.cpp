@@ -1,0 +1,91 @@
+// T and b0 come back as they were given, bit for bit.
+#include <gtest/gtest.h>
+
+#include <esokit/control/adrc_law.hpp>
+#include <esokit/control/nonlinear_feedback.hpp>
+#include <esokit/observer/adjustable_bandwidth_eso.hpp>
+#include <esokit/observer/algebraic_eso.hpp>
+#include <esokit/observer/cascade_eso.hpp>
+#include <esokit/observer/delayed_input.hpp>
+#include <esokit/observer/extended_state_filter.hpp>
+#include <esokit/observer/half_gain_eso.hpp>
+#include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/variable_time.hpp>
+#include <esokit/observer/wrapped_output.hpp>
+#include <support/numbers.hpp>
+
+namespace {
+
+using esokit::chain_config;
+using esokit_test::Random;
+
+template <class Config, class S>
+void set_dynamics(Config& config, const S& bandwidth) {
+  if constexpr (requires { config.observer; }) {
+    set_dynamics(config.observer, bandwidth);
+    if constexpr (requires { config.period; }) config.period = S(360);
+  } else if constexpr (requires { config.level_bandwidths; }) {
+    config.level_bandwidths = {bandwidth, 2 * bandwidth};
+  } else if constexpr (requires { config.measurement_variance; }) {
+    config.measurement_variance = S(1);
+    config.inflation = S(1);
+    config.disturbance_bounds = {S(0.1), S(0.1), S(0.1)};
+  } else if constexpr (requires { config.observer_bandwidth; }) {
+    config.observer_bandwidth = bandwidth;
+  }
+}
+
+template <class Observer>
+class GivenValues : public ::testing::Test {};
+using Observers = ::testing::Types<
+    esokit::LinearEso<2>, esokit::LinearEso<2, float>, esokit::LinearEso<3, float, 2>,
+    esokit::CascadeEso<2, 2>, esokit::HalfGainEso<2>, esokit::AdjustableBandwidthEso<2>,
+    esokit::AdjustableBandwidthEso<2, float>, esokit::ExtendedStateFilter<2>,
+    esokit::ExtendedStateFilter<2, float>, esokit::DelayedInput<esokit::LinearEso<2>, 3>,
+    esokit::WrappedOutput<esokit::LinearEso<2, float>>, esokit::VariableTime<esokit::LinearEso<2>>>;
+TYPED_TEST_SUITE(GivenValues, Observers);
+
+TYPED_TEST(GivenValues, OfTheConfigAndOfARetune) {
+  using S = typename TypeParam::scalar_type;
+  Random random(15);
+  const auto next = [&] {
+    typename TypeParam::Config config{};
+    chain_config<TypeParam>(config).sample_time = static_cast<S>(random.log_uniform(1e-5, 1e-1));
+    chain_config<TypeParam>(config).input_gain =
+        static_cast<S>(random.log_uniform(1e-3, 1e3) * (random.index(2) == 0 ? 1 : -1));
+    set_dynamics(config, S(S(0.1) / chain_config<TypeParam>(config).sample_time));
+    return config;
+  };
+  for (int i = 0; i < 300; ++i) {
+    const auto config = next();
+    auto observer = TypeParam::make(config);
+    ASSERT_TRUE(observer.has_value()) << observer;
+    ASSERT_EQ(observer->sample_time(), chain_config<TypeParam>(config).sample_time);
+    ASSERT_EQ(observer->input_gain(), chain_config<TypeParam>(config).input_gain);
+    const auto other = next();
+    ASSERT_TRUE(observer->retune(other).has_value());
+    ASSERT_EQ(observer->sample_time(), chain_config<TypeParam>(other).sample_time);
+    ASSERT_EQ(observer->input_gain(), chain_config<TypeParam>(other).input_gain);
+  }
+}
+
+template <class S>
+void laws_give_back() {
+  Random random(16);
+  for (int i = 0; i < 1000; ++i) {
+    const auto b0 = static_cast<S>(random.log_uniform(1e-3, 1e3) * (random.index(2) == 0 ? 1 : -1));
+    const auto law = esokit::AdrcLaw<2, S>::make({.controller_bandwidth = S(10), .input_gain = b0});
+    ASSERT_EQ(law.value().input_gain(), b0);
+    const auto nonlinear = esokit::NonlinearFeedback<2, S>::make(
+        {.gains = {S(1), S(1)}, .linear_widths = {S(0.1), S(0.1)}, .input_gain = b0});
+    ASSERT_TRUE(nonlinear.has_value()) << nonlinear;
+    ASSERT_EQ(nonlinear->input_gain(), b0);
+  }
+}
+
+TEST(GivenValues, OfTheLaws) {
+  laws_give_back<double>();
+  laws_give_back<float>();
+}
+
+}  // namespace
