@@ -44,10 +44,6 @@ Check<S> check_chain(const ChainConfig<S>& config) {
       !ok) {
     return ok;
   }
-  // `input_gain()` works it out from there.
-  if (!all(is_finite(Chain::input_gain(scaled, S(S(1.0) / config.sample_time))))) {
-    return Error<S>{"input_gain", config.input_gain, "is so large that it overflows by rounding"};
-  }
   if (config.max_gap < 1 || config.max_gap > 65000) {
     return Error<S>{"max_gap", detail::integer<S>(config.max_gap), "must be 1 .. 65000"};
   }
