@@ -520,6 +520,12 @@ static_assert(!SampledLinearObserver<KnownModel<LinearEso<2>, KnownPoles<2>>>);
 static_assert(SampledLinearObserver<WrappedOutput<LinearEso<2>>>);
 static_assert(SampledLinearObserver<VariableTime<LinearEso<2>>>);
 static_assert(!SampledLinearObserver<esokit::NonlinearEso<2>>);
+struct Nominal {
+  S operator()(const esokit::Vector<S, 2>& x, S, S) const { return -x(0); }
+};
+static_assert(SampledLinearObserver<esokit::ExtendedStateFilter<2>>);
+static_assert(!SampledLinearObserver<esokit::ExtendedStateFilter<2, S, 1, Nominal>>,
+              "its gains do not tell what the model does");
 static_assert(!SampledLinearObserver<esokit::AdjustableBandwidthEso<2>>);
 
 // ---- the library's own

@@ -8,6 +8,7 @@
 #include <esokit/observer/continuous_observer.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
 #include <optional>
+#include <type_traits>
 
 namespace esokit {
 
@@ -71,7 +72,7 @@ template <class Placement, int Size, int Levels, Scalar S, class Config>
 Expected<LevelSpecs<typename Placement::template Spec<Size, S>, Levels>, Error<S>> level_specs(
     const Config& config) {
   using Specs = LevelSpecs<typename Placement::template Spec<Size, S>, Levels>;
-  if constexpr (requires { config.level_poles; }) {
+  if constexpr (std::is_same_v<Placement, PoleSet>) {
     return Specs{config.level_poles, "level_poles"};
   } else {
     const auto given = [](const S& value) {
