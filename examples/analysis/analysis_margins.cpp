@@ -47,13 +47,13 @@ LoopMargins margins_at(double bandwidth) {
   const auto loop = adrc_loop(sampled_plant(plant, sample_time).value(), observer, law).value();
   const auto all = margins(loop).value();
   const auto range = input_gain_range(loop, law, 1.0).value();
-  const auto value = [](const Margins::Result& margin) {
-    return margin ? margin->value : std::numeric_limits<double>::quiet_NaN();
+  const auto value = [](const Margin& margin) {  // nothing is drawn where there is no limit
+    return margin.limited() ? margin.value : std::numeric_limits<double>::quiet_NaN();
   };
   return {value(all.gain_increase),
           value(all.gain_decrease),
           value(all.phase) * 180.0 / std::numbers::pi,
-          value(delay_margin(loop, plant)) * 1e3,
+          value(delay_margin(loop, plant).value()) * 1e3,
           value(all.modulus),
           range.lower,
           range.upper};

@@ -77,14 +77,10 @@ inline double lag_to_minus_one(std::complex<double> l) {
   return lag < 0.0 ? lag + 2.0 * std::numbers::pi : lag;
 }
 
-inline Error<double> no_delay_limit() {
-  return {"delay", 0.0, "has no limit: abs(L) crosses one nowhere"};
-}
-
 }  // namespace detail
 
 /// Least further delay (s) between controller and plant with which a continuous loop oscillates.
-/// @return error for a loop that is not stable, is sampled, or has no limit
+/// @return infinity where there is none; error for a loop that is not stable, or is sampled
 template <int PlantStates, class Observer>
 Expected<Margin, Error<double>> delay_margin(const AdrcLoop<PlantStates, Observer>& loop) {
   if (loop.plant().sampled()) {
@@ -101,8 +97,7 @@ Expected<Margin, Error<double>> delay_margin(const AdrcLoop<PlantStates, Observe
                            const double delay = detail::lag_to_minus_one(l) / w;
                            if (!least || delay < least->value) least = Margin{delay, w};
                          });
-  if (!least) return detail::no_delay_limit();
-  return *least;
+  return least.value_or(Margin{});
 }
 
 /// The same for a sampled loop: the held input reaches the plant later by this time (s), which need
@@ -167,7 +162,7 @@ Expected<Margin, Error<double>> delay_margin(const AdrcLoop<SampledStates, Obser
     }
     before = after;
   }
-  if (!least) return detail::no_delay_limit();
+  if (!least) return Margin{};
   return Margin{least->value - present_delay, least->frequency};
 }
 

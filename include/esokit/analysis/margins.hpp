@@ -8,21 +8,23 @@
 
 namespace esokit {
 
-/// A margin and where the loop then oscillates.
+/// A margin and where the loop then oscillates. Without a limit it is infinite (a factor below one:
+/// zero), and there is no frequency.
 struct Margin {
-  double value = 0.0;      ///< in the unit of what is asked for
-  double frequency = 0.0;  ///< rad/s
+  double value = std::numeric_limits<double>::infinity();  ///< in the unit of what is asked for
+  double frequency = std::numeric_limits<double>::quiet_NaN();  ///< rad/s; NaN: no limit
+
+  /// False: however far one goes in this direction, the loop stays stable.
+  [[nodiscard]] bool limited() const noexcept { return is_finite(frequency); }
 };
 
 /// The edges of stability that are nearest to the loop as it is. Any number of crossings is looked
-/// at; an error stands where there is no edge in that direction.
+/// at.
 struct Margins {
-  using Result = Expected<Margin, Error<double>>;  ///< a margin, or why there is none
-
-  Result gain_increase;  ///< least factor > 1 on L that makes the loop oscillate
-  Result gain_decrease;  ///< greatest factor in (0, 1) on L that does
-  Result phase;          ///< least phase shift, rad, as lag or as lead
-  Result modulus;        ///< least abs(1 + L), the inverse of the peak of S
+  Margin gain_increase;  ///< least factor > 1 on L that makes the loop oscillate; else infinity
+  Margin gain_decrease;  ///< greatest factor in (0, 1) on L that does; else 0
+  Margin phase;          ///< least phase shift, rad, as lag or as lead; else infinity
+  Margin modulus;        ///< least abs(1 + L), the inverse of the peak of S
 };
 
 namespace detail {
@@ -62,15 +64,10 @@ class MarginFinder {
   }
 
   [[nodiscard]] Margins margins() const {
-    const auto result = [](const std::optional<Margin>& margin, const char* field,
-                           const char* rule) -> Margins::Result {
-      if (margin) return *margin;
-      return Error<double>{field, 0.0, rule};
-    };
-    return {result(increase_, "gain_increase", "has no limit: no gain above one is an edge"),
-            result(decrease_, "gain_decrease", "has no limit: no gain below one is an edge"),
-            result(phase_, "phase", "has no limit: abs(L) crosses one nowhere"),
-            result(modulus_, "modulus", "does not exist")};
+    Margin no_decrease;
+    no_decrease.value = 0.0;
+    return {increase_.value_or(Margin{}), decrease_.value_or(no_decrease),
+            phase_.value_or(Margin{}), modulus_.value_or(Margin{})};
   }
 
  private:
@@ -146,10 +143,8 @@ Expected<Range, Error<double>> input_gain_range(const AdrcLoop<PlantStates, Obse
   }
   const auto found = margins(loop);
   if (!found) return found.error();
-  Range range{0.0, std::numeric_limits<double>::infinity()};
-  if (found->gain_increase) range.lower = ratio / found->gain_increase->value;
-  if (found->gain_decrease) range.upper = ratio / found->gain_decrease->value;
-  return range;
+  // Where there is no limit these are 0 and infinity.
+  return Range{ratio / found->gain_increase.value, ratio / found->gain_decrease.value};
 }
 
 }  // namespace esokit
