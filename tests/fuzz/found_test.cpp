@@ -4,6 +4,7 @@
 #include <cmath>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/dual_feedback.hpp>
+#include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <limits>
@@ -132,6 +133,27 @@ TEST(Found, FilterOfTheSmallestInflationBridgesAGap) {
     filter.predict(0);
     ASSERT_TRUE(filter.gain().allFinite()) << k;
   }
+}
+
+/// What a change of b0 no longer explains went into the held dhat, infinite or not.
+TEST(Found, RetuneInTheHoldIsRefusedOrFinite) {
+  using Observer = esokit::AlgebraicEso<2, float>;
+  Observer::Config config{
+      .observer_bandwidth = 1, .input_gain = 1, .sample_time = 0.55f, .hold = 10.0f};
+  auto observer = Observer::make(config).value();
+  observer.revise_input(-1.7f);
+  config.input_gain = -1.7e38f;
+  ASSERT_TRUE(observer.retune(config));
+  observer.update(0, 1);
+  config.input_gain = 1;
+  const auto refused = observer.retune(config);
+  ASSERT_FALSE(refused);
+  EXPECT_STREQ(refused.error().field, "input_gain");
+  EXPECT_STREQ(refused.error().rule, "would make the estimate not finite");
+  EXPECT_TRUE(observer.estimate().allFinite());
+  EXPECT_TRUE(observer.holding());
+  observer.update(0, 0);
+  EXPECT_TRUE(observer.retune(config));
 }
 
 }  // namespace

@@ -117,6 +117,7 @@ enum class LoopMode : unsigned char {
   safe      ///< too many measurements are missing
 };
 
+/// Has text.
 template <>
 inline constexpr bool has_text<LoopMode> = true;
 

@@ -26,6 +26,7 @@ struct Error {
   bool has_limit = false;  ///< whether `limit` says anything
 };
 
+/// Has text.
 template <class ScalarType>
 inline constexpr bool has_text<Error<ScalarType>> = true;
 

@@ -116,6 +116,7 @@ class [[nodiscard]] Expected<void, E> {
   std::variant<std::monostate, E> error_;
 };
 
+/// Has text.
 template <class T, class E>
 inline constexpr bool has_text<Expected<T, E>> = true;
 

@@ -133,6 +133,9 @@ class AlgebraicEso
     Estimate published = estimate();
     published(Order) =
         published(Order) + (this->input_gain() - fresh->input_gain()) * this->applied_input();
+    if (!all(is_finite(published(Order)))) {
+      return Error<S>{"input_gain", fresh->input_gain(), "would make the estimate not finite"};
+    }
     // One that has settled stays so, and no longer knows its age.
     std::get<0>(fresh->laws()).resume(settled() ? Law::max_index : age());
     if (auto ok = this->adopt(*fresh); !ok) return ok;

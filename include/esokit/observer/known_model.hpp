@@ -11,7 +11,7 @@ namespace esokit {
 
 /// What a known model can do beside fbar: `static constexpr PlantModelTraits traits{..}` in it.
 struct PlantModelTraits {
-  bool checks = false;  ///< `check() const` gives the error of a bad parameter, a Check<S>
+  bool checks = false;  ///< `check() const` gives the error of a bad parameter, as a Check
 };
 
 /// fbar = -(a_0 y + a_1 y' + .. + a_(n-1) y^(n-1)): the plant's poles are known.

@@ -13,7 +13,7 @@ namespace esokit {
 
 /// What an even gain can do beside k(x): `static constexpr EvenGainTraits traits{..}` in it.
 struct EvenGainTraits {
-  bool checks = false;    ///< `check() const` gives the error of a bad parameter, a Check<S>
+  bool checks = false;    ///< `check() const` gives the error of a bad parameter, as a Check
   bool prepares = false;  ///< `prepared() const` gives a function object that is quicker to call
 };
 

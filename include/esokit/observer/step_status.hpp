@@ -45,6 +45,7 @@ constexpr bool has(StepStatus status, StepStatus flag) noexcept {
   return (static_cast<unsigned char>(status) & static_cast<unsigned char>(flag)) != 0;
 }
 
+/// Has text.
 template <>
 inline constexpr bool has_text<StepStatus> = true;
 

@@ -19,9 +19,8 @@ namespace esokit {
 /// every y' + k period / T is one: one bad sample, and an axis at rest is seen to spin for good.)
 ///
 /// What it asks of y, noise included:
-/// - between neighbouring measurements it moves by less than half a period (that of D samples,
-/// where
-///   only every D-th brings one);
+/// - between neighbouring measurements (D samples apart, where only every D-th brings one) it moves
+///   by less than half a period;
 /// - the motion changes by less than a quarter of a period against the average of the last eight;
 ///   over a gap it is that average, continued.
 ///

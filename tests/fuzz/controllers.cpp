@@ -1,0 +1,62 @@
+// Every controller, with observers of every sort of gain law and adapters; a new one joins by a
+// line.
+#include <esokit/control/adrc.hpp>
+#include <esokit/control/disturbance_compensator.hpp>
+#include <esokit/control/dual_feedback.hpp>
+#include <esokit/control/incremental.hpp>
+#include <esokit/control/mimo_adrc.hpp>
+#include <esokit/control/predictive_adrc.hpp>
+#include <esokit/observer/adjustable_bandwidth_eso.hpp>
+#include <esokit/observer/algebraic_eso.hpp>
+#include <esokit/observer/cascade_eso.hpp>
+#include <esokit/observer/delayed_input.hpp>
+#include <esokit/observer/extended_state_filter.hpp>
+#include <esokit/observer/known_model.hpp>
+#include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/nonlinear_eso.hpp>
+#include <esokit/observer/outlier_gate.hpp>
+#include <esokit/observer/variable_time.hpp>
+#include <esokit/observer/wrapped_output.hpp>
+
+#include "fuzz/driver.hpp"
+#include "fuzz/kinds.hpp"
+
+namespace fuzz {
+
+using namespace esokit;
+
+template <int Order, class S, int Extension, class Operator, class Placement>
+inline constexpr bool
+    winds_up<DualFeedbackAdrc<Order, S, Extension, Operator, UnlimitedFeedback, Placement>> = true;
+
+void add_controllers(std::vector<Kind>& kinds) {
+  KIND(Adrc<LinearEso<1, double>, ErrorBased>);
+  KIND(Adrc<WrappedOutput<LinearEso<2, float>>, ErrorBased>);
+  KIND(Adrc<VariableTime<LinearEso<2, float>>>);
+  KIND(Incremental<Adrc<LinearEso<1, float>>>);
+  KIND(DisturbanceCompensator<LinearEso<2, float>>);
+  KIND(PredictiveAdrc<CascadeEso<1, 2, double>>);
+  KIND(PredictiveAdrc<AdjustableBandwidthEso<2, float>>);
+  KIND(PredictiveAdrc<NonlinearEso<2, float, 1>>);
+  KIND(DualFeedbackAdrc<2, float>);
+  KIND(MimoAdrc<LinearEso<1, float>, LinearEso<2, float>>);
+#ifndef ESOKIT_ONE_TYPE
+  KIND(Adrc<OutlierGate<LinearEso<2, float>>>);
+  KIND(Adrc<LinearEso<2, float>>);
+  KIND(Adrc<CascadeEso<2, 2, float>>);
+  KIND(Adrc<AlgebraicEso<2, float>>);
+  KIND(Adrc<WrappedOutput<LinearEso<2, double>>>);
+  KIND(Adrc<DelayedInput<KnownModel<LinearEso<2, double>, KnownPoles<2, double>>, 3>>);
+  KIND(Adrc<ExtendedStateFilter<1, float>>);
+  KIND(DisturbanceCompensator<VariableTime<CascadeEso<1, 2, double>>>);
+  KIND(PredictiveAdrc<LinearEso<2, float>>);
+  KIND(PredictiveAdrc<ExtendedStateFilter<1, double>>);
+  KIND(PredictiveAdrc<AlgebraicEso<1, float>>);
+  KIND(DualFeedbackAdrc<1, double, 2, DeltaOperator>);
+  KIND(DualFeedbackAdrc<2, float, 1, DeltaOperator, LimitedFeedback, PoleSet>);
+  KIND(TransferFunctionAdrc<2, float>);
+  KIND(MimoAdrc<WrappedOutput<LinearEso<1, double>>, DelayedInput<LinearEso<2, double>, 3>>);
+#endif
+}
+
+}  // namespace fuzz

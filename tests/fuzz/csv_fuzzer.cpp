@@ -1,0 +1,65 @@
+// libFuzzer: any text through the CSV reader and the log reader of the examples. What they take
+// they must write and read back; what they refuse they must refuse by LogError.
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <string_view>
+
+#include "common/csv.hpp"
+#include "control_practice/log_file.hpp"
+
+namespace {
+
+void require(bool holds, const char* text) {
+  if (holds) return;
+  std::fprintf(stderr, "csv_fuzzer: %s\n", text);
+  std::abort();
+}
+
+void read_as_csv(std::string_view text) {
+  using namespace esokit::examples;
+  const auto rows = parse_csv(text);
+  std::string written;
+  for (const CsvRow& row : rows) {
+    require(!row.empty(), "a row without fields");
+    written += csv_line(row);
+  }
+  // A row of one empty field is an empty line, which counts for nothing.
+  std::vector<CsvRow> expected;
+  for (const CsvRow& row : rows) {
+    if (row.size() > 1 || !row[0].empty()) expected.push_back(row);
+  }
+  require(parse_csv(written) == expected, "what was written is read back as something else");
+}
+
+void read_as_log(std::string_view text, char separator) {
+  static const int file = memfd_create("log", 0);
+  static const std::string path = "/proc/self/fd/" + std::to_string(file);
+  require(ftruncate(file, 0) == 0, "ftruncate");
+  require(pwrite(file, text.data(), text.size(), 0) == static_cast<ssize_t>(text.size()), "pwrite");
+  try {
+    const practice::LogFile log(path, {"1", "y"}, separator);
+    require(log.rows() > 0, "a log without rows");
+    require(log.column(0).size() == log.rows() && log.column(1).size() == log.rows(), "columns");
+    for (std::size_t i = 1; i < log.rows(); ++i) require(log.line(i) > log.line(i - 1), "lines");
+    practice::check_time(path, log, log.column(0));
+    const double step = practice::median_step(log.column(0));
+    require(step > 0, "times that rise have a positive step");
+  } catch (const practice::LogError& error) {
+    require(*error.what() != '\0', "an error without text");
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::string_view text(reinterpret_cast<const char*>(data), size);
+  read_as_csv(text);
+  for (const char separator : {'\0', ' '}) read_as_log(text, separator);
+  return 0;
+}

@@ -1,0 +1,1051 @@
+/// @file
+/// The calls that a type may offer, by name, and the invariants. A type joins by a line in a list
+/// of observers.cpp, controllers.cpp or laws.cpp; a member with a new name by a line here.
+#pragma once
+
+#include <cstring>
+#include <esokit/control/control_loop.hpp>
+#include <esokit/core/snapshot.hpp>
+#include <esokit/core/unroll.hpp>
+#include <esokit/observer/step_status.hpp>
+#include <type_traits>
+
+#include "fuzz/config.hpp"
+#include "fuzz/run.hpp"
+
+namespace fuzz {
+
+using esokit::has;
+using esokit::is_finite;
+using esokit::LoopMode;
+using esokit::StepStatus;
+
+template <class T>
+concept SaysItsScalar = requires {
+  typename T::scalar_type;
+};
+
+template <class T>
+struct ScalarOf;
+template <SaysItsScalar T>
+struct ScalarOf<T> {
+  using type = typename T::scalar_type;
+};
+// Laws that are no more than their template arguments.
+template <template <class> class T, class S>
+requires(!SaysItsScalar<T<S>>) struct ScalarOf<T<S>> {
+  using type = S;
+};
+template <template <int, class> class T, int Order, class S>
+requires(!SaysItsScalar<T<Order, S>>) struct ScalarOf<T<Order, S>> {
+  using type = S;
+  static constexpr int order = Order;
+};
+
+template <class T>
+constexpr int order_of() {
+  if constexpr (requires { T::order; }) {
+    return T::order;
+  } else if constexpr (requires { ScalarOf<T>::order; }) {
+    return ScalarOf<T>::order;
+  } else {
+    return 1;
+  }
+}
+
+/// `update` takes (r, r', ..) too. A concept: Clang 14 wants every parameter of a
+/// requires-expression in a member to exist.
+template <class T>
+concept TakesReferences = requires(T& o, typename T::scalar_type s, typename T::Reference r) {
+  o.update(s, r, s);
+};
+
+/// The transfer-function form integrates what it is told, and is not told of limits: no way back.
+template <class T>
+inline constexpr bool winds_up = false;
+
+template <class T>
+class Driver {
+ public:
+  using S = typename ScalarOf<T>::type;
+  using Config = typename T::Config;
+
+  static Failure run(Episode& episode) { return Driver(episode).play(); }
+
+ private:
+  explicit Driver(Episode& episode) : episode_(episode) {}
+
+  // ------------------------------------------------------------------ the play
+  Failure play() {
+    Tape& tape = episode_.config;
+    if (episode_.random != nullptr)
+      tape.record(*episode_.random, episode_.mix);
+    else
+      tape.play();
+    Filler<S> filler(tape, order_of<T>());
+    filler.fill(config_);
+    promise_ = filler.promise;
+    calm_ = tape.plain();
+    if (episode_.random == nullptr) say("make(" + tape.text() + ")");
+    const long before = allocations();
+    auto made = T::make(config_);
+    if (allocations() != before) return "make allocates";
+    if (!made) return refusal(made.error());
+    episode_.made = true;
+    object_.emplace(*made);
+    if (Failure f = invariants()) return "after make: " + *f;
+
+    const auto& list = actions();
+    for (int k = 0;; ++k) {
+      Call* call = nullptr;
+      if (episode_.random != nullptr) {
+        if (k == episode_.length) break;
+        call = &episode_.calls.emplace_back();
+        call->action = episode_.random->index(static_cast<int>(list.size()));
+        call->tape.record(*episode_.random, episode_.call_mix);
+      } else {
+        if (k == static_cast<int>(episode_.calls.size())) break;
+        call = &episode_.calls[static_cast<std::size_t>(k)];
+        call->tape.play();
+      }
+      const Action& action = list[static_cast<std::size_t>(call->action)];
+      tape_ = &call->tape;
+      failure_.reset();
+      const T twin = *object_;
+      const std::vector<unsigned char> old = bytes(twin);
+
+      action.act(*this);
+      calm_ = calm_ && tape_->plain();
+      ++episode_.played;
+      if (episode_.random == nullptr) say(std::string(action.name) + "(" + tape_->text() + ")");
+      if (!failure_) failure_ = invariants();
+      if (!failure_ && bytes(twin) != old) failure_ = "a copy changed with the original";
+      if (failure_) return std::string(action.name) + ": " + *failure_;
+    }
+    if (episode_.recover && recoverable()) return recovery();
+    return {};
+  }
+
+  void say(std::string text) {
+    if (episode_.loud) std::fprintf(stderr, "  %s\n", text.c_str());
+    episode_.text.push_back(std::move(text));
+  }
+
+  static std::vector<unsigned char> bytes(const T& object) {
+    std::vector<unsigned char> memory(sizeof(T));
+    std::memcpy(memory.data(), static_cast<const void*>(&object), sizeof(T));
+    return memory;
+  }
+
+  template <class E>
+  static Failure refusal(const E& error) {
+    if (*error.field == '\0' || *error.rule == '\0') return "a refusal without field or rule";
+    return {};
+  }
+
+  /// One call, without allocation.
+  template <class Function>
+  auto quietly(Function&& call) {
+    const long before = allocations();
+    if constexpr (std::is_void_v<decltype(call())>) {
+      call();
+      if (allocations() != before) fail("allocates");
+    } else {
+      auto result = call();
+      if (allocations() != before) fail("allocates");
+      return result;
+    }
+  }
+  void fail(const std::string& text) {
+    if (!failure_) failure_ = text;
+  }
+
+  /// What must not change anything where it is refused.
+  template <class Function>
+  void refusable(Function&& call) {
+    const auto before = bytes(*object_);
+    const auto outcome = quietly(call);
+    bool accepted;
+    if constexpr (std::is_same_v<std::remove_const_t<decltype(outcome)>, StepStatus>) {
+      accepted = outcome == StepStatus::ok;
+    } else {
+      accepted = static_cast<bool>(outcome);
+      if constexpr (requires { outcome.error(); }) {
+        if (!outcome) {
+          if (const auto wrong = refusal(outcome.error())) fail(*wrong);
+        }
+      }
+    }
+    if (!accepted && bytes(*object_) != before) fail("refused, but something changed");
+    accepted_ = accepted;
+  }
+
+  // ------------------------------------------------------------------ invariants of steps
+  /// @param y null where none was given
+  void stepped(StepStatus status, const S* y, const S* u) {
+    const auto y_fine = y == nullptr || is_finite(*y);
+    const auto u_fine = u == nullptr || is_finite(*u);
+    if (!y_fine && !has(status, StepStatus::measurement_rejected)) fail("a bad y is not reported");
+    if (!u_fine && !has(status, StepStatus::input_rejected)) fail("a bad u is not reported");
+    if (calm_ && promise_.certain && tape_->plain()) {
+      for (const StepStatus flag : {StepStatus::measurement_rejected, StepStatus::input_rejected,
+                                    StepStatus::prediction_dropped, StepStatus::state_rejected}) {
+        if (has(status, flag)) fail("good numbers are reported as bad");
+      }
+    }
+  }
+
+  /// A controller put out u; `from` is what the actuator held before.
+  void put_out(S u, S from) {
+    if (!is_finite(u)) return fail("u is not finite");
+    check_limits(config_.limits, u, from);
+    if constexpr (requires(const T& o) {
+                    o.status();
+                    o.missed();
+                  }) {
+    }
+  }
+
+  template <class L>
+  void check_limits(const L& limits, S u, S from) {
+    if (u < limits.lower || u > limits.upper) return fail("u is outside of its limits");
+    if (from < limits.lower || from > limits.upper) return;
+    const S step = limits.rate * step_time();
+    if (limits.rate >= std::numeric_limits<S>::max() || !is_finite(step)) return;
+    const S change = u - from;
+    // Bounds are rounded sums.
+    using std::abs;
+    const S rounding = S(4) * std::numeric_limits<S>::epsilon() * (abs(u) + abs(from)) +
+                       std::numeric_limits<S>::min();
+    if (is_finite(change) &&
+        abs(change) > step * (S(1) + S(8) * std::numeric_limits<S>::epsilon()) + rounding) {
+      fail("u changes faster than its rate limit");
+    }
+  }
+
+  [[nodiscard]] S step_time() const {
+    if constexpr (requires(const T& o) { o.observer().step_time(); }) {
+      return object_->observer().step_time();
+    } else if constexpr (requires(const T& o) { o.observer().sample_time(); }) {
+      return object_->observer().sample_time();
+    } else {
+      return config_time(config_);
+    }
+  }
+  template <class C>
+  static S config_time(const C& config) {
+    if constexpr (requires { config.sample_time; }) {
+      return config.sample_time;
+    } else if constexpr (requires { config.observer; }) {
+      return config_time(config.observer);
+    } else {
+      return config_time(std::get<0>(config.observers));
+    }
+  }
+
+  // ------------------------------------------------------------------ observables
+  static bool fine(const S& x) { return is_finite(x); }
+  template <int Rows, int Columns>
+  static bool fine(const esokit::Matrix<S, Rows, Columns>& m) {
+    for (int i = 0; i < m.size(); ++i) {
+      if (!is_finite(m.data()[i])) return false;
+    }
+    return true;
+  }
+  template <std::size_t Count>
+  static bool fine(const std::array<S, Count>& values) {
+    for (const S& x : values) {
+      if (!is_finite(x)) return false;
+    }
+    return true;
+  }
+
+  template <class O>
+  static Failure finite(const O& o, bool calm) {
+// An observable by its name.
+#define FINITE(member)                                    \
+  if constexpr (requires { o.member; }) {                 \
+    if (!fine(o.member)) return #member " is not finite"; \
+  }
+    FINITE(estimate())
+    FINITE(total_disturbance())
+    FINITE(innovation())
+    FINITE(applied_input())
+    FINITE(input_gain())
+    FINITE(sample_time())
+    FINITE(raw_estimate())
+    FINITE(hold())
+    FINITE(residual_disturbance())
+    FINITE(known_part())
+    FINITE(step_time())
+    FINITE(gain())
+    FINITE(innovation_variance())
+    FINITE(output())
+    FINITE(requested())
+    FINITE(compensation())
+    FINITE(base_output())
+    FINITE(blind_output())
+    FINITE(value())
+    FINITE(derivative())
+    FINITE(state())
+    FINITE(last())
+    FINITE(gains())
+    if (calm) {
+      FINITE(covariance())
+      FINITE(limit())
+      FINITE(predictor_gain())
+      FINITE(innovation_covariance())
+      FINITE(normalised_innovation())
+    }
+#undef FINITE
+    if constexpr (requires { o.level_estimate(0); }) {
+      for (int level = 0; level < O::levels; ++level) {
+        if (!fine(o.level_estimate(level))) return "level_estimate is not finite";
+      }
+    }
+    if constexpr (requires { o.missed(); }) {
+      if (o.missed() < 0 || o.missed() > 65535) return "missed() is no count";
+    }
+    return {};
+  }
+
+  Failure invariants() {
+    if (Failure f = finite(*object_, calm_)) return f;
+    if constexpr (requires(const T& o) { o.observer().missed(); }) {
+      if (Failure f = finite(object_->observer(), calm_)) return "observer: " + *f;
+    }
+    if constexpr (requires(const T& o) { o.controller().output(); }) {
+      if (Failure f = finite(object_->controller(), calm_)) return "controller: " + *f;
+    }
+    if constexpr (requires(const T& o) { o.template observer<0>(); }) {
+      Failure f;
+      esokit::detail::unroll<T::channels>([&](auto i) {
+        if (!f) f = finite(object_->template observer<i>(), calm_);
+      });
+      if (f) return "observer: " + *f;
+    }
+    return {};
+  }
+
+  // ------------------------------------------------------------------ calls
+  struct Action {
+    const char* name;
+    void (*act)(Driver&);
+  };
+
+  S number(const Range& range = signal) { return tape_->template number<S>(range); }
+  template <class V>
+  V vector() {
+    V v;
+    for (int i = 0; i < v.size(); ++i) v(i) = number();
+    return v;
+  }
+  /// An estimate, of about the size that signals make it.
+  template <class V>
+  V state() {
+    V v;
+    for (int i = 0; i < v.size(); ++i) {
+      double size = 1;
+      for (int r = 1; r <= i % (order_of<T>() + 2); ++r) size *= r / promise_.sample_time;
+      v(i) = number({-size, size});
+    }
+    return v;
+  }
+
+  [[nodiscard]] bool measurement_due() const {
+    if constexpr (requires { config_.measurement_divider; })
+      return config_.measurement_divider == 1;
+    else
+      return true;
+  }
+
+  /// Update of a controller. @param y measurement, null if none was given
+  template <class Function>
+  void control(const S* y, const S* u_applied, Function&& call) {
+    S from = object_->output();
+    if (u_applied != nullptr && is_finite(*u_applied)) from = *u_applied;
+    const S u = quietly(call);
+    put_out(u, from);
+    if constexpr (requires(const T& o) { o.mode(); }) {
+      if (measurement_due() && y != nullptr) stepped(object_->status(), y, nullptr);
+      if constexpr (requires(const T& o) { o.observer().missed(); }) judge_mode();
+    } else if constexpr (requires(const T& o) { o.form(); }) {
+      stepped(object_->status(), y, nullptr);
+    }
+    if constexpr (requires(const T& o) { o.output(); }) {
+      if (!(object_->output() >= u && object_->output() <= u))
+        fail("output() is not what was put out");
+    }
+  }
+
+  void judge_mode() {
+    const int missed = object_->observer().missed();
+    const int divider = config_.measurement_divider;
+    const LoopMode mode = object_->mode();
+    if (missed >= (config_.missing.most + 1) * divider && mode != LoopMode::safe) {
+      fail("too many measurements are missing, and the mode is not safe");
+    }
+    if (mode == LoopMode::safe && missed < divider && !config_.missing.stay && measurement_due()) {
+      fail("measurements are there, and the mode is safe");
+    }
+  }
+
+  static const std::vector<Action>& actions() {
+    static const std::vector<Action> list = [] {
+      std::vector<Action> a;
+      // An observer's.
+      if constexpr (requires(T & o, S s) {
+                      { o.update(s, s) } -> std::same_as<StepStatus>;
+                    }) {
+        for (int weight = 0; weight < 4; ++weight) {
+          a.push_back({"update", [](Driver& d) {
+                         const S y = d.number(), u = d.number();
+                         d.stepped(d.quietly([&] { return d.object_->update(y, u); }), &y, &u);
+                       }});
+        }
+        a.push_back({"predict", [](Driver& d) {
+                       const S u = d.number();
+                       d.stepped(d.quietly([&] { return d.object_->predict(u); }), nullptr, &u);
+                     }});
+        a.push_back({"predict several times", [](Driver& d) {
+                       const int count = d.tape_->choice(130);
+                       const S u = d.number();
+                       for (int i = 0; i < count; ++i) {
+                         d.stepped(d.quietly([&] { return d.object_->predict(u); }), nullptr, &u);
+                       }
+                     }});
+        a.push_back({"correct", [](Driver& d) {
+                       const S y = d.number();
+                       const auto before = d.object_->estimate();
+                       const StepStatus status = d.quietly([&] { return d.object_->correct(y); });
+                       d.stepped(status, &y, nullptr);
+                       if (status == StepStatus::measurement_rejected ||
+                           status == StepStatus::outlier_rejected) {
+                         // VariableTime takes the mean of the steps before it looks at y: that
+                         // rounds. WrappedOutput recentres: the same angle.
+                         constexpr bool another_number = requires(T & o, S s) {
+                           o.set_step_time(s);
+                         }
+                         || requires(T & o, S s) { o.wrap(s); };
+                         if (!another_number && d.object_->estimate() != before) {
+                           d.fail("rejected, but the estimate changed");
+                         }
+                       }
+                     }});
+        a.push_back({"reset(y)", [](Driver& d) {
+                       const S y = d.number();
+                       d.refusable([&] { return d.object_->reset(y); });
+                       if (!is_finite(y) && d.accepted_) d.fail("a bad y is taken");
+                       if (d.calm_ && d.tape_->plain() && !d.accepted_)
+                         d.fail("a good y is refused");
+                     }});
+        a.push_back({"reset(state)", [](Driver& d) {
+                       const auto z = d.template state<typename T::Estimate>();
+                       d.refusable([&] { return d.object_->reset(z); });
+                       if (!fine(z) && d.accepted_) d.fail("a bad state is taken");
+                     }});
+        a.push_back({"const members", [](Driver& d) {
+                       const S x = d.number();
+                       const auto before = bytes(*d.object_);
+                       d.quietly([&] { look(*d.object_, x); });
+                       if (bytes(*d.object_) != before) d.fail("a const member changed something");
+                     }});
+      }
+      if constexpr (requires(T & o, S s) { o.revise_input(s); }) {
+        a.push_back({"revise_input", [](Driver& d) {
+                       const S u = d.number();
+                       d.refusable([&] { return d.object_->revise_input(u); });
+                     }});
+      }
+      if constexpr (requires(T & o, S s) { o.update_weighted(s, s, s); }) {
+        a.push_back({"update_weighted", [](Driver& d) {
+                       const S y = d.number(), u = d.number(), r = d.number({1e-3, 1, true});
+                       d.stepped(d.quietly([&] { return d.object_->update_weighted(y, u, r); }), &y,
+                                 &u);
+                     }});
+        a.push_back({"correct_weighted", [](Driver& d) {
+                       const S y = d.number(), r = d.number({1e-3, 1, true});
+                       d.stepped(d.quietly([&] { return d.object_->correct_weighted(y, r); }), &y,
+                                 nullptr);
+                     }});
+      }
+      if constexpr (requires(T & o) { o.rearm(); }) {
+        a.push_back({"rearm", [](Driver& d) { d.quietly([&] { d.object_->rearm(); }); }});
+      }
+      if constexpr (requires(T & o) { o.observer().rearm(); }) {
+        a.push_back({"observer().rearm",
+                     [](Driver& d) { d.quietly([&] { d.object_->observer().rearm(); }); }});
+      }
+      if constexpr (requires(T & o, S s) { o.shift_output(s); }) {
+        a.push_back({"shift_output", [](Driver& d) {
+                       const S x = d.number();
+                       d.shift(x, [&] { d.object_->shift_output(x); });
+                     }});
+        a.push_back({"shift_disturbance", [](Driver& d) {
+                       const S x = d.number();
+                       d.shift(x, [&] { d.object_->shift_disturbance(x); });
+                     }});
+      }
+      if constexpr (requires(T & o, S s) { o.fill_input(s); }) {
+        a.push_back({"fill_input", [](Driver& d) {
+                       const S x = d.number();
+                       d.shift(x, [&] { d.object_->fill_input(x); });
+                     }});
+      }
+      if constexpr (requires(T & o, S s) { o.set_step_time(s); }) {
+        a.push_back({"set_step_time", [](Driver& d) {
+                       const double t = d.promise_.sample_time;
+                       const S seconds = d.number({0.6 * t, 1.6 * t});
+                       d.refusable([&] { return d.object_->set_step_time(seconds); });
+                     }});
+      }
+      // A controller's.
+      if constexpr (requires(T & o, S s) {
+                      { o.update(s, s) } -> std::same_as<S>;
+                      o.output();
+                    }) {
+        for (int weight = 0; weight < 4; ++weight) {
+          a.push_back({"update(y, r)", [](Driver& d) {
+                         const S y = d.number(), r = d.number();
+                         d.control(&y, nullptr, [&] { return d.object_->update(y, r); });
+                       }});
+        }
+      }
+      if constexpr (requires(T & o, S s) {
+                      { o.update(s, s, s) } -> std::same_as<S>;
+                      o.output();
+                    }) {
+        for (int weight = 0; weight < 2; ++weight) {
+          a.push_back({"update(y, r, u)", [](Driver& d) {
+                         const S y = d.number(), r = d.number(), u = d.number();
+                         d.control(&y, &u, [&] { return d.object_->update(y, r, u); });
+                       }});
+        }
+      }
+      if constexpr (TakesReferences<T>) {
+        a.push_back({"update(y, references)", [](Driver& d) {
+                       const S y = d.number();
+                       const auto r = d.template state<typename T::Reference>();
+                       d.control(&y, nullptr, [&] { return d.object_->update(y, r); });
+                     }});
+        a.push_back({"update(y, references, u)", [](Driver& d) {
+                       const S y = d.number();
+                       const auto r = d.template state<typename T::Reference>();
+                       const S u = d.number();
+                       d.control(&y, &u, [&] { return d.object_->update(y, r, u); });
+                     }});
+        a.push_back({"update_without_measurement(references)", [](Driver& d) {
+                       const auto r = d.template state<typename T::Reference>();
+                       d.control(nullptr, nullptr,
+                                 [&] { return d.object_->update_without_measurement(r); });
+                     }});
+      }
+      if constexpr (requires(T & o, S s) { o.update_without_measurement(s); }) {
+        a.push_back({"update_without_measurement several times", [](Driver& d) {
+                       const int count = 1 + d.tape_->choice(80);
+                       const S r = d.number();
+                       for (int i = 0; i < count; ++i) {
+                         d.control(nullptr, nullptr,
+                                   [&] { return d.object_->update_without_measurement(r); });
+                       }
+                     }});
+      }
+      if constexpr (requires(T & o, S s) { o.update_driven(s, s, s); }) {
+        a.push_back({"update_driven", [](Driver& d) {
+                       const S y = d.number(), base = d.number(), drive = d.number();
+                       d.control(&y, nullptr,
+                                 [&] { return d.object_->update_driven(y, base, drive); });
+                     }});
+      }
+      if constexpr (requires(T & o, S s) { o.track(s, s, s); }) {
+        a.push_back({"track", [](Driver& d) {
+                       const S y = d.number(), r = d.number(), u = d.number();
+                       d.tracked(d.quietly([&] { return d.object_->track(y, r, u); }));
+                     }});
+      } else if constexpr (requires(T & o, S s) {
+                             o.track(s, s);
+                             o.compensation();
+                           }) {
+        a.push_back({"track", [](Driver& d) {
+                       const S y = d.number(), u = d.number();
+                       d.tracked(d.quietly([&] { return d.object_->track(y, u); }));
+                     }});
+      }
+      if constexpr (requires(T & o, S s) { o.start(s, s); }) {
+        a.push_back({"start(y, u)", [](Driver& d) {
+                       const S y = d.number(), u = d.number();
+                       d.refusable([&] { return d.object_->start(y, u); });
+                       if (!(is_finite(y) && is_finite(u)) && d.accepted_)
+                         d.fail("a bad start is taken");
+                     }});
+      }
+      if constexpr (requires(T & o, S s) { o.start(s, s, s); }) {
+        a.push_back({"start(y, u, r)", [](Driver& d) {
+                       const S y = d.number(), u = d.number(), r = d.number();
+                       d.refusable([&] { return d.object_->start(y, u, r); });
+                       if (!(is_finite(y) && is_finite(u)) && d.accepted_)
+                         d.fail("a bad start is taken");
+                     }});
+      }
+      if constexpr (requires(T & o, S s) {
+                      o.control(s);
+                      o.prepare(s);
+                    })
+        two_phases(a);
+      if constexpr (requires(const T& o) { o.controller(); }) increments(a);
+      if constexpr (
+          requires { T::channels; } || requires { T::outputs; })
+        several(a);
+      // Any.
+      a.push_back({"retune", [](Driver& d) {
+                     Config config{};
+                     Filler<S> filler(*d.tape_, order_of<T>());
+                     filler.fill(config);
+                     if constexpr (requires(T & o) { o.retune(config); }) {
+                       d.refusable([&] { return d.object_->retune(config); });
+                       if (d.accepted_) {
+                         d.config_ = config;
+                         // A sample time that stays: what is running goes on.
+                         filler.promise.waiting += d.promise_.waiting;
+                         d.promise_ = filler.promise;
+                       }
+                     } else {
+                       const auto made = d.quietly([&] { return T::make(config); });
+                       if (!made) {
+                         if (const auto wrong = refusal(made.error())) d.fail(*wrong);
+                       }
+                     }
+                   }});
+      if constexpr (requires(const T& o) {
+                      esokit::snapshot(o);
+                      typename T::scalar_type;
+                    }) {
+        a.push_back({"snapshot", [](Driver& d) {
+                       const auto words = esokit::snapshot(*d.object_);
+                       const auto restored = esokit::from_snapshot<T>(words);
+                       if (!restored) return d.fail("its own snapshot is refused");
+                       d.object_.emplace(*restored);
+                     }});
+      }
+      law(a);
+      return a;
+    }();
+    return list;
+  }
+
+  template <class Function>
+  void shift(const S& x, Function&& call) {
+    const auto before = bytes(*object_);
+    quietly(call);
+    if (!is_finite(x) && bytes(*object_) != before) fail("a bad number changed something");
+  }
+
+  void tracked(S u) {
+    if (!is_finite(u)) fail("u is not finite");
+  }
+
+  template <class O>
+  static void look(const O& o, const S& x) {
+    if constexpr (requires { o.wrap(x); }) (void)o.wrap(x);
+    if constexpr (requires { o.accepts(x); }) (void)o.accepts(x);
+    if constexpr (requires { o.gain_factor(x); }) (void)o.gain_factor(x);
+    if constexpr (requires { o.correction_gain(x); }) (void)o.correction_gain(x);
+    if constexpr (requires { o.preview(); }) (void)o.preview();
+    if constexpr (requires { o.level_gain(0); }) (void)o.level_gain(0);
+    if constexpr (requires { o.covariance(); }) (void)o.covariance();
+    if constexpr (requires { o.predictor_gain(); }) (void)o.predictor_gain();
+    if constexpr (requires { o.normalised_innovation(); }) (void)o.normalised_innovation();
+    if constexpr (requires { o.level_estimate(0); }) {
+      (void)o.level_estimate(-1);
+      (void)o.level_estimate(1000);
+    }
+  }
+
+  static void two_phases(std::vector<Action>& a) {
+    for (int weight = 0; weight < 3; ++weight) {
+      a.push_back({"control, prepare", [](Driver& d) {
+                     const S y = d.number(), r = d.number();
+                     const S from = d.object_->output();
+                     const S u = d.quietly([&] { return d.object_->control(y); });
+                     d.put_out(u, from);
+                     const StepStatus status = d.quietly([&] { return d.object_->prepare(r); });
+                     d.stepped(status, &y, nullptr);
+                     if (status != d.object_->status()) d.fail("status() is another one");
+                   }});
+    }
+    a.push_back({"update", [](Driver& d) {
+                   const S y = d.number(), r = d.number();
+                   const S from = d.object_->output();
+                   d.put_out(d.quietly([&] { return d.object_->update(y, r); }), from);
+                 }});
+    a.push_back({"control_without_measurement, prepare several times", [](Driver& d) {
+                   const int count = 1 + d.tape_->choice(80);
+                   const S r = d.number();
+                   for (int i = 0; i < count; ++i) {
+                     const S from = d.object_->output();
+                     d.put_out(d.quietly([&] { return d.object_->control_without_measurement(); }),
+                               from);
+                     (void)d.object_->prepare(r);
+                   }
+                 }});
+    a.push_back({"control, report_applied, prepare(references)", [](Driver& d) {
+                   const S y = d.number(), u = d.number();
+                   const auto r = d.template state<typename T::Reference>();
+                   const S from = d.object_->output();
+                   d.put_out(d.quietly([&] { return d.object_->control(y); }), from);
+                   const StepStatus reported =
+                       d.quietly([&] { return d.object_->report_applied(u); });
+                   if (!is_finite(u) && !has(reported, StepStatus::input_rejected))
+                     d.fail("a bad u is not reported");
+                   d.stepped(d.quietly([&] { return d.object_->prepare(r); }), &y, nullptr);
+                 }});
+    a.push_back({"report_applied", [](Driver& d) {
+                   const S u = d.number();
+                   (void)d.quietly([&] { return d.object_->report_applied(u); });
+                 }});
+    a.push_back({"set_reference", [](Driver& d) {
+                   const S r = d.number();
+                   d.quietly([&] { d.object_->set_reference(r); });
+                 }});
+    a.push_back({"set_reference(references)", [](Driver& d) {
+                   const auto r = d.template state<typename T::Reference>();
+                   d.quietly([&] { d.object_->set_reference(r); });
+                 }});
+    a.push_back({"reset", [](Driver& d) {
+                   const S y = d.number();
+                   d.refusable([&] { return d.object_->reset(y); });
+                 }});
+  }
+
+  static void increments(std::vector<Action>& a) {
+    const auto step = [](Driver& d, auto&& call) {
+      const S change = d.quietly(call);
+      if (!is_finite(change)) return d.fail("the increment is not finite");
+      const S u = d.object_->controller().output();
+      if (u < d.config_.limits.lower || u > d.config_.limits.upper)
+        d.fail("the sum is outside of the limits");
+    };
+    static_cast<void>(step);
+    for (int weight = 0; weight < 3; ++weight) {
+      a.push_back({"increment", [](Driver& d) {
+                     const S y = d.number(), r = d.number();
+                     const S change = d.quietly([&] { return d.object_->update(y, r); });
+                     d.incremented(change);
+                   }});
+    }
+    a.push_back({"increment, reported", [](Driver& d) {
+                   const S y = d.number(), r = d.number(), applied = d.number();
+                   const S change = d.quietly([&] { return d.object_->update(y, r, applied); });
+                   d.incremented(change);
+                 }});
+  }
+
+  void incremented(S change) {
+    if (!is_finite(change)) return fail("the increment is not finite");
+    if constexpr (requires(const T& o) { o.controller().output(); }) {
+      const S u = object_->controller().output();
+      if (u < config_.limits.lower || u > config_.limits.upper)
+        fail("the sum is outside of the limits");
+    }
+  }
+
+  static void several(std::vector<Action>& a) {
+    if constexpr (requires { T::channels; }) {
+      using V = typename T::Output;
+      a.push_back({"update", [](Driver& d) {
+                     const V y = d.template vector<V>(), r = d.template vector<V>();
+                     const V from = d.object_->output();
+                     d.all_out(y, d.quietly([&] { return d.object_->update(y, r); }), from);
+                   }});
+      a.push_back({"update, reported", [](Driver& d) {
+                     const V y = d.template vector<V>(), r = d.template vector<V>(),
+                             u = d.template vector<V>();
+                     V from = d.object_->output();
+                     for (int i = 0; i < from.size(); ++i) {
+                       if (is_finite(u(i))) from(i) = u(i);
+                     }
+                     d.all_out(y, d.quietly([&] { return d.object_->update(y, r, u); }), from);
+                   }});
+      a.push_back({"start", [](Driver& d) {
+                     const V y = d.template vector<V>(), u = d.template vector<V>();
+                     d.refusable([&] { return d.object_->start(y, u); });
+                     if (!(fine(y) && fine(u)) && d.accepted_) d.fail("a bad start is taken");
+                   }});
+    } else {
+      using Y = typename T::Output;
+      using U = typename T::Input;
+      for (int weight = 0; weight < 3; ++weight) {
+        a.push_back({"update", [](Driver& d) {
+                       const Y y = d.template vector<Y>();
+                       const U u = d.template vector<U>();
+                       d.all_seen(d.quietly([&] { return d.object_->update(y, u); }), &y, &u);
+                     }});
+      }
+      a.push_back({"predict several times", [](Driver& d) {
+                     const int count = 1 + d.tape_->choice(80);
+                     const U u = d.template vector<U>();
+                     for (int i = 0; i < count; ++i) {
+                       d.all_seen(d.quietly([&] { return d.object_->predict(u); }),
+                                  static_cast<const Y*>(nullptr), &u);
+                     }
+                   }});
+      a.push_back({"correct", [](Driver& d) {
+                     const Y y = d.template vector<Y>();
+                     d.all_seen(d.quietly([&] { return d.object_->correct(y); }), &y,
+                                static_cast<const U*>(nullptr));
+                   }});
+      a.push_back({"correct_some", [](Driver& d) {
+                     const Y y = d.template vector<Y>();
+                     esokit::Array<bool, T::outputs> present{};
+                     for (bool& each : present) each = d.tape_->once_in(2);
+                     (void)d.quietly([&] { return d.object_->correct_some(y, present); });
+                   }});
+      a.push_back({"reset(y)", [](Driver& d) {
+                     const Y y = d.template vector<Y>();
+                     d.refusable([&] { return d.object_->reset(y); });
+                     if (!fine(y) && d.accepted_) d.fail("a bad y is taken");
+                   }});
+      a.push_back({"reset(state)", [](Driver& d) {
+                     const auto z = d.template state<typename T::Estimate>();
+                     d.refusable([&] { return d.object_->reset(z); });
+                     if (!fine(z) && d.accepted_) d.fail("a bad state is taken");
+                   }});
+    }
+  }
+
+  template <class V>
+  void all_out(const V& y, const V& u, const V& from) {
+    for (int i = 0; i < u.size(); ++i) {
+      if (!is_finite(u(i))) return fail("u is not finite");
+      check_limits(config_.limits[static_cast<std::size_t>(i)], u(i), from(i));
+      const S each = y(i);
+      stepped(object_->status(i), &each, nullptr);
+    }
+  }
+  template <class Y, class U>
+  void all_seen(StepStatus status, const Y* y, const U* u) {
+    const S good(0);
+    const S bad = esokit_test::hidden_nan<S>();
+    stepped(status, y == nullptr || fine(*y) ? &good : &bad,
+            u == nullptr || fine(*u) ? &good : &bad);
+  }
+
+  // Differentiators and limiters.
+  static void law(std::vector<Action>& a) {
+    if constexpr (requires(T & o, S s) {
+                    { o.update(s) } -> std::same_as<bool>;
+                  }) {
+      for (int weight = 0; weight < 4; ++weight) {
+        a.push_back({"update", [](Driver& d) {
+                       const S r = d.number();
+                       d.refusable([&] { return d.object_->update(r); });
+                       if (!is_finite(r) && d.accepted_) d.fail("a bad reference is taken");
+                       if (d.calm_ && d.tape_->plain() && !d.accepted_)
+                         d.fail("a good reference is refused");
+                     }});
+      }
+      a.push_back({"reset", [](Driver& d) {
+                     const S r = d.number();
+                     d.refusable([&] { return d.object_->reset(r); });
+                     if (is_finite(r) != d.accepted_)
+                       d.fail("reset takes what is not finite, or refuses what is");
+                   }});
+    }
+    if constexpr (requires(const T& o, const esokit::Vector<S, order_of<T>() + 1>& z,
+                           const esokit::Vector<S, order_of<T>()>& r) {
+                    o.control(z, r);
+                    o.feedback(z, r);
+                  }) {
+      a.push_back({"control", [](Driver& d) {
+                     const auto z = d.template state<esokit::Vector<S, order_of<T>() + 1>>();
+                     const auto r = d.template state<esokit::Vector<S, order_of<T>()>>();
+                     const S u = d.quietly([&] { return d.object_->control(z, r); });
+                     if (d.calm_ && d.tape_->plain() && !is_finite(u)) d.fail("u is not finite");
+                   }});
+    }
+  }
+
+  // ------------------------------------------------------------------ the way back
+  [[nodiscard]] bool recoverable() const {
+    if (!promise_.certain) return false;
+    // Settings out of range promise nothing but to stay finite.
+    if (!episode_.config.plain()) return false;
+    for (const Call& call : episode_.calls) {
+      const auto* name = actions()[static_cast<std::size_t>(call.action)].name;
+      if (std::strcmp(name, "retune") == 0 && !call.tape.plain()) return false;
+      if (std::strcmp(name, "set_step_time") == 0 && !call.tape.plain()) return false;
+      // A variance of the measurement's noise is a setting.
+      if (std::strstr(name, "weighted") != nullptr && !call.tape.plain()) return false;
+    }
+    return true;
+  }
+
+  /// Good samples of a plant at rest. The stated number: an estimate of the largest finite size
+  /// falls as k^(N-1) rho^k; a gap and a hold may come before. Several times that, for laws that
+  /// vary.
+  [[nodiscard]] long patience() const {
+    const double decades = std::log(10.0) * (std::numeric_limits<S>::max_exponent10 + 20);
+    return static_cast<long>(500 + promise_.waiting + 12 * decades / promise_.slowest);
+  }
+
+  Failure recovery() {
+    if constexpr (
+        requires { T::channels; } || requires { T::outputs; }) {
+      return recovery_of_several();
+    } else if constexpr (requires(const T& o) { o.controller(); }) {
+      return {};  // its controller has been looked at
+    } else if constexpr (requires(T & o, S s) {
+                           { o.update(s, s) } -> std::same_as<StepStatus>;
+                         }) {
+      return settle([&](const S& y) { return object_->update(y, S(0)); },
+                    [&](const S& y) { return distance(*object_, y); });
+    } else if constexpr (requires(T & o, S s) {
+                           o.control(s);
+                           o.prepare(s);
+                         }) {
+      return settle(
+          [&](const S& y) {
+            (void)object_->control(y);
+            (void)object_->report_applied(S(0));
+            return object_->prepare(y);
+          },
+          [&](const S& y) { return distance(object_->observer(), y); });
+    } else if constexpr (requires(const T& o) {
+                           o.mode();
+                           o.observer().missed();
+                         }) {
+      if (promise_.stays_safe) (void)object_->start(S(1), S(0));
+      return settle(
+          [&](const S& y) {
+            (void)object_->update(y, y, S(0));
+            return object_->mode() == LoopMode::running ? object_->status()
+                                                        : StepStatus::prediction_dropped;
+          },
+          [&](const S& y) {
+            // The error-based form is fed r - y.
+            if constexpr (requires { object_->track(y, y, y); }) {
+              const bool by_error = object_->observer().input_gain() * config_gain(config_) < S(0);
+              return distance(object_->observer(), by_error ? S(0) : y);
+            } else {
+              return distance(object_->observer(), y);
+            }
+          });
+    } else if constexpr (requires(const T& o) { o.form(); } && !winds_up<T>) {
+      return settle(
+          [&](const S& y) {
+            (void)object_->update(y, y, S(0));
+            return object_->status();
+          },
+          [&](const S&) {
+            // What rounding of y makes of u.
+            double unit = std::abs(static_cast<double>(object_->form().reference));
+            for (const S& n : object_->form().measurement) unit += std::abs(static_cast<double>(n));
+            return std::abs(static_cast<double>(object_->requested())) / unit;
+          });
+    } else {
+      return {};
+    }
+  }
+
+  template <class C>
+  static S config_gain(const C& config) {
+    if constexpr (requires { config.input_gain; }) {
+      return config.input_gain;
+    } else {
+      return config_gain(config.observer);
+    }
+  }
+
+  /// Largest error of the estimate of a plant at rest at y, each row in the unit of y.
+  template <class O>
+  static double distance(const O& observer, const S& y) {
+    const auto z = observer.estimate();
+    double worst = 0;
+    double unit = 1;
+    for (int r = 0; r < O::size; ++r) {
+      if (r > 0) unit *= static_cast<double>(observer.sample_time()) / r;
+      double error = static_cast<double>(z(r)) - (r == 0 ? static_cast<double>(y) : 0.0);
+      if constexpr (requires { observer.wrap(y); }) {
+        if (r == 0) error = static_cast<double>(observer.wrap(static_cast<S>(error)));
+      }
+      worst = std::max(worst, std::abs(error) * unit);
+    }
+    return worst;
+  }
+
+  template <class Step, class Distance>
+  Failure settle(Step&& step, Distance&& distance) {
+    const S y(1.25);
+    const double close = std::is_same_v<S, float> ? 3e-3 : 1e-5;
+    const long most = patience();
+    int in_a_row = 0;
+    double last = 0;
+    for (long k = 0; k < most; ++k) {
+      const StepStatus status = step(y);
+      if (Failure f = invariants()) return "on the way back: " + *f;
+      last = distance(y);
+      in_a_row = status == StepStatus::ok && last < close ? in_a_row + 1 : 0;
+      if (in_a_row == 8) {
+        episode_.recovery = k;
+        return {};
+      }
+    }
+    std::array<char, 160> text{};
+    std::snprintf(text.data(), text.size(), "%ld good samples do not bring it back: off by %g",
+                  most, last);
+    return text.data();
+  }
+
+  Failure recovery_of_several() {
+    if constexpr (requires { T::channels; }) {
+      using V = typename T::Output;
+      return settle(
+          [&](const S& y) {
+            const V all = V::Constant(y);
+            (void)object_->update(all, all, V::Zero());
+            StepStatus status = StepStatus::ok;
+            for (int i = 0; i < T::channels; ++i) status |= object_->status(i);
+            return status;
+          },
+          [&](const S& y) {
+            double worst = 0;
+            esokit::detail::unroll<T::channels>([&](auto i) {
+              worst = std::max(worst, distance(object_->template observer<i>(), y));
+            });
+            return worst;
+          });
+    } else {
+      return settle(
+          [&](const S& y) { return object_->update(T::Output::Constant(y), T::Input::Zero()); },
+          [&](const S& y) {
+            double worst = 0;
+            esokit::detail::unroll<T::outputs>([&](auto i) {
+              const auto z = object_->template chain_estimate<i>();
+              double unit = 1;
+              for (int r = 0; r < z.size(); ++r) {
+                if (r > 0) unit *= static_cast<double>(object_->sample_time()) / r;
+                const double error =
+                    static_cast<double>(z(r)) - (r == 0 ? static_cast<double>(y) : 0.0);
+                worst = std::max(worst, std::abs(error) * unit);
+              }
+            });
+            return worst;
+          });
+    }
+  }
+
+  Episode& episode_;
+  Config config_{};
+  Promise promise_{};
+  std::optional<T> object_{};
+  Tape* tape_ = nullptr;
+  Failure failure_{};
+
+  bool calm_ = true;
+  bool accepted_ = false;
+};
+
+}  // namespace fuzz
+
+/// A line of a list, by the type's name.
+#define KIND(...) kinds.push_back({#__VA_ARGS__, &Driver<__VA_ARGS__>::run})

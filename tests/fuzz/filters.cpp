@@ -1,0 +1,33 @@
+// The filters, and the laws that stand alone; a new one joins by a line.
+#include <esokit/control/nonlinear_feedback.hpp>
+#include <esokit/control/tracking_differentiator.hpp>
+#include <esokit/observer/delayed_input.hpp>
+#include <esokit/observer/extended_state_filter.hpp>
+#include <esokit/observer/mimo_extended_state_filter.hpp>
+#include <esokit/observer/variable_time.hpp>
+#include <esokit/observer/wrapped_output.hpp>
+
+#include "fuzz/driver.hpp"
+#include "fuzz/kinds.hpp"
+
+namespace fuzz {
+
+using namespace esokit;
+
+void add_filters(std::vector<Kind>& kinds) {
+  KIND(ExtendedStateFilter<1, float>);
+  KIND(ExtendedStateFilter<2, float, 1, NoNominalModel, 8>);
+  KIND(MimoExtendedStateFilter<ChainOrders<1, 2>, 2, float>);
+  KIND(TrackingDifferentiator<float>);
+  KIND(SignTrackingDifferentiator<float>);
+  KIND(NonlinearFeedback<2, float>);
+#ifndef ESOKIT_ONE_TYPE
+  KIND(ExtendedStateFilter<2, double>);
+  KIND(WrappedOutput<ExtendedStateFilter<2, float>>);
+  KIND(VariableTime<DelayedInput<ExtendedStateFilter<2, double>, 2>>);
+  KIND(MimoExtendedStateFilter<ChainOrders<2, 1>, 1, double>);
+  KIND(TrackingDifferentiator<double>);
+#endif
+}
+
+}  // namespace fuzz

@@ -1,0 +1,54 @@
+// Every observer and every adapter in its nestings; a new one joins by a line.
+#include <esokit/observer/adjustable_bandwidth_eso.hpp>
+#include <esokit/observer/algebraic_eso.hpp>
+#include <esokit/observer/cascade_eso.hpp>
+#include <esokit/observer/delayed_input.hpp>
+#include <esokit/observer/half_gain_eso.hpp>
+#include <esokit/observer/known_model.hpp>
+#include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/nonlinear_eso.hpp>
+#include <esokit/observer/outlier_gate.hpp>
+#include <esokit/observer/reduced_order_eso.hpp>
+#include <esokit/observer/variable_time.hpp>
+#include <esokit/observer/wrapped_output.hpp>
+
+#include "fuzz/driver.hpp"
+#include "fuzz/kinds.hpp"
+
+namespace fuzz {
+
+using namespace esokit;
+
+void add_observers(std::vector<Kind>& kinds) {
+  KIND(LinearEso<2, double>);
+  KIND(LinearEso<3, float, 2>);
+  KIND(LinearEso<2, float, 1, PoleSet>);
+  KIND(CascadeEso<1, 2, double, 2, PoleSet>);
+  KIND(AlgebraicEso<2, float>);
+  KIND(AdjustableBandwidthEso<2, float>);
+  KIND(NonlinearEso<1, float>);
+  KIND(WrappedOutput<LinearEso<1, float>>);
+  KIND(WrappedOutput<VariableTime<DelayedInput<LinearEso<2, float>, 3>>>);
+  KIND(DelayedInput<KnownModel<WrappedOutput<CascadeEso<2, 2, double>>, KnownPoles<2, double>>, 3>);
+  KIND(OutlierGate<LinearEso<2, float>>);
+#ifndef ESOKIT_ONE_TYPE
+  KIND(WrappedOutput<OutlierGate<VariableTime<CascadeEso<2, 2, double>>>>);
+  KIND(LinearEso<1, float>);
+  KIND(LinearEso<2, long double>);
+  KIND(CascadeEso<2, 3, float>);
+  KIND(HalfGainEso<2, float>);
+  KIND(ReducedOrderEso<2, double>);
+  KIND(AlgebraicEso<1, double, 2>);
+  KIND(NonlinearEso<2, double, 1, FalGain<double>>);
+  KIND(WrappedOutput<LinearEso<2, double>>);
+  KIND(WrappedOutput<CascadeEso<2, 2, float>>);
+  KIND(WrappedOutput<AlgebraicEso<2, float>>);
+  KIND(DelayedInput<WrappedOutput<NonlinearEso<2, float, 1>>, 4>);
+  KIND(VariableTime<AdjustableBandwidthEso<1, double>>);
+  KIND(VariableTime<CascadeEso<2, 2, float>>);
+  KIND(KnownModel<LinearEso<2, float>, KnownPoles<2, float>>);
+  KIND(VariableTime<KnownModel<LinearEso<1, float>, KnownPoles<1, float>>>);
+#endif
+}
+
+}  // namespace fuzz
