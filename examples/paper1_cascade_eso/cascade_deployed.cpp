@@ -188,14 +188,16 @@ int main(int argc, char** argv) {
       "Sim1A in a controller: the sampled observers at T = 10, 1 and 0.1 ms beside the continuous "
       "simulation, "
       "for p = 1, 2, 3 (left to right). At 10 ms omega_o T is 2.5 for p = 1 and 1.4 for the last "
-      "level of p = 3. 1 ms and 0.1 ms lie on the continuous curve (black) almost everywhere.");
+      "level of p = 3. Legends as in the first row; 1 ms and 0.1 ms lie on the continuous curve "
+      "(black) almost "
+      "everywhere.");
   constexpr std::array colors = {Color::black, Color::vermillion, Color::blue, Color::green};
   constexpr std::array dashes = {Dash::solid, Dash::solid, Dash::dashed, Dash::dotted};
   const std::array<std::string, 4> names = {"continuous", "10 ms", "1 ms", "0.1 ms"};
   for (std::size_t p = 0; p < 3; ++p) {
     auto& error = figure.panel(0, p).title(level_names[p]).legend(Legend::top_right);
-    auto& control = figure.panel(1, p).legend(Legend::top_right);
-    auto& estimate = figure.panel(2, p).legend(Legend::top_right).x_label("t (s)");
+    auto& control = figure.panel(1, p).legend(Legend::none);
+    auto& estimate = figure.panel(2, p).legend(Legend::none).x_label("t (s)");
     error.y_range(-0.015, 0.05).x_range(0.0, duration).hide_x_numbers();
     control.y_range(-10.0, 20.0).x_range(0.0, duration).hide_x_numbers();
     estimate.y_range(-3.0, 3.0).x_range(0.0, duration);

@@ -196,7 +196,7 @@ int main(int argc, char** argv) {
                " %, int u^2 by " + number_text(100.0 * control_drop, 2) + " % or more.",
        .figure = "fig4"});
   report.correction({.where = "(26)",
-                     .printed = "b' d'; Gamma_ij = 0 for j < i-1",
+                     .printed = "b' in front of d'; Gamma_ij for j < i-1 (misprint)",
                      .correct = "b d'; Gamma_ij = b b'(l_{j+1} - l_j) c' for j < i-1",
                      .why = "the printed one leaves a residual; (28) to (30) then carry "
                             "omega_j (alpha^{n+1} - 1) instead of omega_j"});

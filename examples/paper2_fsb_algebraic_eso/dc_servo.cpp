@@ -204,10 +204,9 @@ int main(int argc, char** argv) {
             1));
   report.cover("fig3");
   for (const auto& [where, printed, correct] :
-       {std::array{"(11)", "-3 (s + q) u(s + q)", "-3 (s + 2q) u(s + 2q)"},
-        std::array{"(28)", "w3~ = G w1bar + G^2 w2bar + ..",
-                   "w3~ = G w1bar + G^2 w2bar + G^3 w3bar"},
-        std::array{"section 4.1", "Cbar as printed",
+       {std::array{"(11)", "the second term (misprint)", "-3 (s + 2q) u(s + 2q)"},
+        std::array{"(28)", "w3~ (misprint)", "w3~ = G w1bar + G^2 w2bar + G^3 w3bar"},
+        std::array{"section 4.1", "Cbar (misprint)",
                    "Cbar = [[-1, 0, 0], [-2 lambda, -1, 0], [-lambda^2, -lambda, -1]]"}}) {
     report.correction({.where = where,
                        .printed = printed,
@@ -301,6 +300,7 @@ int main(int argc, char** argv) {
                   std::abs(held.most[1] / run_paper(shifted, row, false).most[1] - 1.0) < 0.1,
                   "within 10 % of the continuous simulation");
   }
+  report.additions();
   report.table("deployed",
                "The same in a controller (our addition): observers sampled at 1 ms, input held. "
                "Without measurement noise there is nothing to wait for, and the default hold of "
@@ -319,6 +319,7 @@ int main(int argc, char** argv) {
   const Style desired{.name = "reference", .color = Color::black, .dash = Dash::dashed};
   const Style leso{.name = "LESO", .color = Color::vermillion};
   const Style fsb{.name = "FSB", .color = Color::blue};
+  report.additions(false);
   report.add(Drawing("fig2", "Fig 2: position." + start, "y (rad)")
                  .line(t, reference, desired)
                  .line(t, linear_drawn.y, leso)

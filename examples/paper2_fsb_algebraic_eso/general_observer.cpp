@@ -165,7 +165,7 @@ void add(Page& page) {
 
   auto& panel = page.figure.panel(Extension - 1, Order - 1);
   panel.title(name).log_y().y_range(1e-14, 1e4).y_tick(1e6).x_range(0.0, shown).x_tick(1.0);
-  panel.legend(Legend::bottom_left);
+  panel.legend(Order == 1 && Extension == 1 ? Legend::bottom_left : Legend::none);
   if (Extension == 3) {
     panel.x_label("t (s)");
   } else {

@@ -308,16 +308,16 @@ int main(int argc, char** argv) {
                 .here = "int u^2: " + shares(2),
                 .figure = "fig4"});
   report.correction({.where = "(11), (23)",
-                     .printed = "innovation variance with R, transposed",
-                     .correct = "with R/(1 + theta), inverted",
-                     .why = "from the bound's derivation"});
+                     .printed = "the innovation variance transposed",
+                     .correct = "inverted, and with R/(1 + theta)",
+                     .why = "with the transpose P explodes or settles on a wrong gain"});
   report.correction({.where = "(24)",
-                     .printed = "K = A P C'/s",
+                     .printed = "K (misprint)",
                      .correct = "K = -A P C'/s",
-                     .why = "with the printed form's sign of the innovation"});
+                     .why = "the predictor form subtracts K (y - C z)"});
   report.correction({.where = "(6), (26)",
-                     .printed = "prediction without B u; A, B of the plant",
-                     .correct = "with B u; A and B of the chain with its disturbance",
+                     .printed = "(6) without B u; (26): other A, B and l",
+                     .correct = "with B u; A and B of the chain with its disturbance, the scaled l",
                      .why = "the filter follows a driven plant"});
   report.correction({.where = "(37)-(39), (52), (53)",
                      .printed = "the predictor gain in the current form",
