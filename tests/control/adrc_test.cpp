@@ -61,7 +61,6 @@ TEST(Adrc, TakesAListOfTheReferenceAndItsDerivatives) {
   for (int k = 0; k < 3; ++k) {
     EXPECT_EQ(listed.update(0.3, {r, r1, r2}), given.update(0.3, Vector<double, 3>(r, r1, r2)));
     EXPECT_EQ(listed.update(0.3, {r, r1}), given.update(0.3, Vector<double, 2>(r, r1)));
-    EXPECT_EQ(listed.update(0.3, {r}), given.update(0.3, r));
     EXPECT_EQ(listed.update(0.3, {r, r1, 7}, 0.1),
               given.update(0.3, Vector<double, 3>(r, r1, 7), 0.1));
     EXPECT_EQ(listed.update_without_measurement({r, r1}),

@@ -142,7 +142,7 @@ class DisturbanceCompensator {
   static S bounded(const S& x) noexcept {
     if (is_finite(x)) [[likely]]
       return x;
-    constexpr S most = std::numeric_limits<S>::max();
+    constexpr S most = (std::numeric_limits<S>::max)();
     return x < S(0) ? -most : most;
   }
 

@@ -265,7 +265,7 @@ class DualFeedbackAdrc {
       const Step without = advance(measured_, u);
       // From there the last measurement leads nowhere either, or this one is no larger.
       const bool state_is_to_blame =
-          is_finite(y) && (!is_finite(probe(without)) || std::abs(y) <= std::abs(measured_));
+          is_finite(y) && (!is_finite(probe(without)) || (std::abs)(y) <= (std::abs)(measured_));
       if (state_is_to_blame && start(y, u) == StepStatus::ok) {
         status_ = StepStatus::restarted;
         step = advance(y, u);
