@@ -198,6 +198,36 @@ TEST(OutlierGate, Limit) {
   EXPECT_FALSE(opened.open());
 }
 
+/// The running scale is learned from measurements that come at every D-th sample, too.
+TEST(OutlierGate, RunningLimitWithoutNeighbours) {
+  for (const int divider : {1, 2, 5}) {
+    auto gate =
+        OutlierGate<LinearEso<2>>::make(
+            {.observer = with<LinearEso<2>>({}, 0.3), .threshold = 1e-3, .running_factor = 5})
+            .value();
+    Random random(1);
+    double sum = 0;
+    constexpr int measurements = 4000;
+    int rejected = 0;
+    for (int k = 0; k < measurements; ++k) {
+      for (int i = 1; i < divider; ++i) gate.predict(0);
+      const StepStatus status = gate.update(random.uniform(-1, 1), 0);
+      if (k < measurements / 2) continue;
+      if (has(status, StepStatus::outlier_rejected)) ++rejected;
+      sum += std::abs(gate.innovation());
+    }
+    EXPECT_EQ(rejected, 0) << divider;
+    EXPECT_FALSE(gate.open()) << divider;
+    // As in Limit.
+    EXPECT_NEAR(gate.limit(), 5 * sum / (measurements / 2), 0.5 * gate.limit()) << divider;
+    // A long gap counts as one measurement.
+    const double before = gate.limit();
+    for (int i = 0; i < 80; ++i) gate.predict(0);
+    EXPECT_EQ(gate.update(before * 70, 0), StepStatus::gap_bridged);
+    EXPECT_LE(gate.limit(), before * (1 + 4.0 / 64 + 1e-12)) << divider;
+  }
+}
+
 /// Off, it is the observer, bit for bit; it can be switched on and off while running.
 TEST(OutlierGate, OffAndRetuned) {
   using Gate = OutlierGate<LinearEso<2>>;

@@ -13,10 +13,11 @@ namespace esokit {
 /// 1e30 / (omega_o T) samples.
 ///
 /// Let in is abs(y - z_1) <= M max(threshold, running_factor m), with m the running mean of
-/// abs(y - z_1) over some 64 samples, M the sample times since the last correction. The gate never
-/// stays shut: after `most_in_a_row` rejected measurements it opens, and takes everything until as
-/// many in a row are within the limit. So after a true step of any size in y the observer follows
-/// it `most_in_a_row` samples late. At the start and after a reset it is open in the same way.
+/// abs(y - z_1) over some 64 measurements, M the sample times since the last correction (D where
+/// every D-th sample brings a measurement). The gate never stays shut: after `most_in_a_row`
+/// rejected measurements it opens, and takes everything until as many in a row are within the
+/// limit. So after a true step of any size in y the observer follows it `most_in_a_row` samples
+/// late. At the start and after a reset it is open in the same way.
 ///
 /// It nests with the other adapters; inside of WrappedOutput, which tells it the turn.
 /// ExtendedStateFilter has a gate of its own, which knows the variance of its innovation.
@@ -131,8 +132,10 @@ class OutlierGate : public Adapter<Observer> {
       ++count_;
       return false;
     }
-    // What is beyond the limit counts as the limit, so that no outlier widens the gate for long.
-    if (samples == 1) mean_ += ((fits ? distance : most) - mean_) * static_cast<S>(1.0 / 64);
+    // What is beyond the limit counts as the limit, so that no outlier and no gap widens the gate
+    // for long.
+    const S counted = distance < limit() ? distance : limit();
+    mean_ += (counted - mean_) * static_cast<S>(1.0 / 64);
     if (open_ && fits) {
       if (++count_ >= most_in_a_row_) set_open(false);
     } else {
