@@ -13,6 +13,7 @@
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
+#include <esokit/observer/wrapped_output.hpp>
 #include <limits>
 #include <string>
 #include <support/numbers.hpp>
@@ -46,6 +47,35 @@ typename Controller::Config config() {
   settings.observer = observer_config<Observer>();
   settings.controller_bandwidth = 10;
   return settings;
+}
+
+// ---- angles
+
+/// The error-based form rejects an angle without a branch, as the output-based one does.
+template <class Form>
+void rejects_angles_without_branch() {
+  using Axis = Adrc<esokit::WrappedOutput<LinearEso<2>>, Form>;
+  auto controller =
+      Axis::make({.observer = {.observer = observer_config<LinearEso<2>>(), .period = 6.25},
+                  .controller_bandwidth = 10})
+          .value();
+  for (int k = 0; k < 100; ++k) controller.update(1, 1);
+  for (const double absurd : {1e16, 1e17, -1e20, 1e100, 1e300}) {
+    auto fed = controller;
+    auto left_out = controller;
+    EXPECT_EQ(fed.update(absurd, 1), left_out.update_without_measurement(1)) << absurd;
+    EXPECT_EQ(fed.status(), StepStatus::measurement_rejected) << absurd;
+    EXPECT_EQ(fed.start(absurd, 0, 1), StepStatus::state_rejected) << absurd;
+  }
+  // Many turns away from the reference is no fault.
+  auto turned = controller;
+  EXPECT_NEAR(turned.update(1 + 1000 * 6.25, 1 - 3000 * 6.25), controller.update(1, 1), 1e-6);
+  EXPECT_EQ(turned.status(), StepStatus::ok);
+}
+
+TEST(AbsurdAngle, IsRejectedInEitherForm) {
+  rejects_angles_without_branch<esokit::OutputBased>();
+  rejects_angles_without_branch<esokit::ErrorBased>();
 }
 
 // ---- missing.most

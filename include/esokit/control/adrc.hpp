@@ -277,11 +277,7 @@ class Adrc {
       // Of one and the same y the compiler makes zero, whatever it is.
       if (!is_finite(y)) e = y;
 #endif
-      if constexpr (wraps) {
-        return observer().wrap(e);
-      } else {
-        return e;
-      }
+      return e;
     }
   }
 
