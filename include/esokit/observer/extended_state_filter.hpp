@@ -86,6 +86,9 @@ class ExtendedStateFilter
     /// q_r >= 0: what the estimate r may change by in a sample beyond its model, in its own unit;
     /// for r < n what sampling neglects (zero in an exactly sampled chain), for r = n the change of
     /// d, for m > 1 that of its derivatives. Q = bound_factor diag(q_r^2).
+    ///
+    /// n = 2 with R = 0, nothing but q_n and InflationRule::none has a pole at -1: what is wrong of
+    /// the estimate fades with 1/k only. Give y a variance, or y' a bound.
     Array<S, N> disturbance_bounds{};
     /// c: N covers N bounded errors with any correlation; the paper prints 1 in (12), 2 in (34).
     S bound_factor{static_cast<double>(N)};
