@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -57,6 +58,30 @@ inline constexpr double noise_hold = 0.01;                              // s
 inline constexpr double level_factor = 2.0;                             // alpha
 inline constexpr std::array<double, 3> table1 = {250.0, 60.82, 33.98};  // omega_o1, rad/s
 
+/// A function of time, kept at the half steps of 1 ms, the same in every run, and computed
+/// elsewhere.
+template <class Function>
+class Kept {
+ public:
+  explicit Kept(Function function) : function_(function) {
+    for (std::size_t i = 0; i < kept_.size(); ++i) {
+      const double t = static_cast<double>(i / 2) * 1e-3 + (i % 2 == 0 ? 0.0 : 0.5e-3);
+      kept_[i] = {t, function_(t)};
+    }
+  }
+  double operator()(double t) const noexcept {
+    const auto i = static_cast<std::size_t>(t * 2e3 + 0.5);
+    return i < kept_.size() && kept_[i].t == t ? kept_[i].value : function_(t);
+  }
+
+ private:
+  struct Point {
+    double t, value;
+  };
+  Function function_;
+  std::vector<Point> kept_ = std::vector<Point>(10001);
+};
+
 /// x1' = x2,  x2' = -x1 - 2 x2 + g u + d,  g = (1 + 0.2 tanh(t - 2)) / (|x1| + 1), where d is g d*
 /// (what reproduces the paper's numbers) or d* (what its text says), d* = 5 sin(9 t) from 3.5 s.
 class GenericPlant {
@@ -74,8 +99,11 @@ class GenericPlant {
   double output(double, const State& x) const noexcept { return x(0); }
 
   double acceleration(double t, const State& x, double u) const noexcept {
-    const double g = (1.0 + 0.2 * std::tanh(t - 2.0)) / (std::abs(x(0)) + 1.0);
-    const double external = t >= 3.5 ? 5.0 * std::sin(9.0 * t) : 0.0;
+    static const Kept gain([](double time) { return 1.0 + 0.2 * std::tanh(time - 2.0); });
+    static const Kept disturbance(
+        [](double time) { return time >= 3.5 ? 5.0 * std::sin(9.0 * time) : 0.0; });
+    const double g = gain(t) / (std::abs(x(0)) + 1.0);
+    const double external = disturbance(t);
     const double d = where_ == Disturbance::through_gain ? g * external : external;
     return -x(0) - 2.0 * x(1) + g * u + d;
   }
@@ -91,8 +119,21 @@ struct Setup {
   GenericPlant::Disturbance disturbance = GenericPlant::Disturbance::through_gain;
 };
 
-inline sim::FilteredStep<5> reference(double step_time) {
-  return sim::FilteredStep<5>::make({.time = step_time, .size = 1.0, .time_constant = 0.1}).value();
+/// The reference of Sim1.
+struct Reference : sim::FilteredStep<5> {
+  std::shared_ptr<const Kept<sim::FilteredStep<5>>> kept;  ///< its values
+
+  double operator()(double t) const noexcept { return (*kept)(t); }
+};
+
+inline Reference reference(double step_time) {
+  const auto make = [](double time) {
+    const auto step =
+        sim::FilteredStep<5>::make({.time = time, .size = 1.0, .time_constant = 0.1}).value();
+    return Reference{step, std::make_shared<const Kept<sim::FilteredStep<5>>>(step)};
+  };
+  static const Reference standard = make(0.2);
+  return step_time == 0.2 ? standard : make(step_time);
 }
 
 /// The noise of Sim1B; power 0 is Sim1A.
