@@ -122,6 +122,11 @@ for name in "${selected[@]}"; do
   fi
 done
 
+# The README of each folder beside its page, as text, which every browser shows.
+for folder in $(printf '%s\n' "${folders[@]}" | sort -u); do
+  [[ ! -d $out/$folder ]] || cp -- "$root/examples/$folder/README.md" "$out/$folder/README.txt"
+done
+
 echo
 page=0
 "$build/examples/bin/make_index" --out "$out" >"$build/page.txt" || page=1

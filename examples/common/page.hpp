@@ -60,8 +60,11 @@ class Page {
     if (paper.link.starts_with("https://")) {
       put({" <a href=\"", html_text(paper.link), "\">", html_text(paper.link), "</a>"});
     }
-    put({"</p>\n<p class=\"quiet\">Equations, symbols and how to choose: examples/",
-         html_text(paper.folder), "/README.md</p>\n"});
+    const std::filesystem::path readme = std::filesystem::path(paper.folder) / "README.txt";
+    const bool linked = std::filesystem::exists(out_ / readme);
+    put({"</p>\n<p class=\"quiet\">What it is, when it helps and how to choose: "});
+    if (linked) put({"<a href=\"", html_address(readme), "\">"});
+    put({"examples/", html_text(paper.folder), "/README.md", linked ? "</a>" : "", "</p>\n"});
     counts(paper);
     put(
         {"<p class=\"quiet\">Two ways to run: a <b>continuous simulation</b>, as in the papers, "
