@@ -51,7 +51,7 @@ using esokit::WrappedOutput;
 enum class Without {
   nothing,
   make,
-  retune,
+  adopt,
   update,
   predict,
   correct,
@@ -98,8 +98,8 @@ class Loop {
     if (!truth) return truth.error();
     return Loop(*truth);
   }
-  Check<S> retune(const Config& config) requires(W != Without::retune) {
-    return truth_.retune(of(config));
+  Check<S> adopt(const Loop& fresh) requires(W != Without::adopt) {
+    return truth_.adopt(fresh.truth_);
   }
   StepStatus update(S y, S u) noexcept requires(W != Without::update) {
     return truth_.update(y, u);
@@ -233,8 +233,8 @@ class Predictable {
     if (!truth) return truth.error();
     return Predictable(*truth);
   }
-  Check<S> retune(const Config& config) requires(W != Without::retune) {
-    return truth_.retune(of(config));
+  Check<S> adopt(const Predictable& fresh) requires(W != Without::adopt) {
+    return truth_.adopt(fresh.truth_);
   }
   StepStatus predict(S u) noexcept requires(W != Without::predict) { return truth_.predict(u); }
   StepStatus correct(S y) noexcept requires(W != Without::correct) { return truth_.correct(y); }
@@ -315,7 +315,7 @@ struct Gains {
 // ---- LoopObserver
 
 static_assert(LoopObserver<Loop<>>);
-static_assert(!LoopObserver<Loop<Without::make>> && !LoopObserver<Loop<Without::retune>>);
+static_assert(!LoopObserver<Loop<Without::make>> && !LoopObserver<Loop<Without::adopt>>);
 static_assert(!LoopObserver<Loop<Without::update>> && !LoopObserver<Loop<Without::predict>>);
 static_assert(!LoopObserver<Loop<Without::correct>> && !LoopObserver<Loop<Without::reset_to_y>>);
 static_assert(!LoopObserver<Loop<Without::reset_to_state>>);
@@ -358,8 +358,8 @@ struct UpdateTellsABool : Changed<UpdateTellsABool> {
 struct UpdateWithoutInput : Changed<UpdateWithoutInput> {
   StepStatus update(S) noexcept;
 };
-struct RetuneTellsABool : Changed<RetuneTellsABool> {
-  bool retune(const Config&);
+struct AdoptTellsABool : Changed<AdoptTellsABool> {
+  bool adopt(const AdoptTellsABool&);
 };
 struct MissedNotConst : Changed<MissedNotConst> {
   int missed() noexcept;
@@ -384,7 +384,7 @@ struct ConfigWithoutInputGain : Loop<> {
     int max_gap = 100;
   };
   static Expected<ConfigWithoutInputGain, Error<S>> make(const Config&);
-  Check<S> retune(const Config&);
+  Check<S> adopt(const ConfigWithoutInputGain&);
 };
 struct ConfigWithoutMaxGap : Loop<> {
   struct Config {
@@ -392,7 +392,7 @@ struct ConfigWithoutMaxGap : Loop<> {
     S sample_time{};
   };
   static Expected<ConfigWithoutMaxGap, Error<S>> make(const Config&);
-  Check<S> retune(const Config&);
+  Check<S> adopt(const ConfigWithoutMaxGap&);
 };
 struct ConfigOfAnotherScalar : Loop<> {
   struct Config {
@@ -401,12 +401,12 @@ struct ConfigOfAnotherScalar : Loop<> {
     int max_gap = 100;
   };
   static Expected<ConfigOfAnotherScalar, Error<S>> make(const Config&);
-  Check<S> retune(const Config&);
+  Check<S> adopt(const ConfigOfAnotherScalar&);
 };
 struct MakesItsBase : Loop<> {};
 static_assert(LoopObserver<Unchanged> && !LoopObserver<UpdateTellsNothing>);
 static_assert(!LoopObserver<UpdateTellsABool> && !LoopObserver<UpdateWithoutInput>);
-static_assert(!LoopObserver<RetuneTellsABool> && !LoopObserver<MissedNotConst>);
+static_assert(!LoopObserver<AdoptTellsABool> && !LoopObserver<MissedNotConst>);
 static_assert(!LoopObserver<EstimateOfAnotherSize> && !LoopObserver<NoDisturbanceRow>);
 static_assert(!LoopObserver<OrderZero> && !LoopObserver<IntegerScalar>);
 static_assert(!LoopObserver<ConfigWithoutInputGain> && !LoopObserver<ConfigWithoutMaxGap>);
@@ -494,7 +494,7 @@ static_assert(PredictableObserver<Predictable<GainKind::preset>>);
 static_assert(PredictableObserver<Predictable<GainKind::switched>>);
 static_assert(PredictableObserver<Predictable<GainKind::factored>>);
 static_assert(!LoopObserver<Predictable<GainKind::preset>>);
-static_assert(refused<Without::make> && refused<Without::retune> && refused<Without::predict>);
+static_assert(refused<Without::make> && refused<Without::adopt> && refused<Without::predict>);
 static_assert(refused<Without::correct> && refused<Without::revise_input>);
 static_assert(refused<Without::reset_to_y> && refused<Without::reset_to_state>);
 static_assert(refused<Without::estimate> && refused<Without::scaled_estimate>);

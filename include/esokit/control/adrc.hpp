@@ -180,15 +180,15 @@ class Adrc {
 
   /// New settings while running. A refused config changes nothing. A hold that is running keeps its
   /// time, a new hold time counts for nothing.
-  Check<S> retune(const Config& config) {
-    const auto fresh = make(config);
-    if (!fresh) return fresh.error();
-    Observer observer = loop_.observer();
-    if (auto ok = observer.retune(observer_config(config)); !ok) return ok;
-    loop_.adopt(fresh->loop_, observer);
-    law_ = fresh->law_;
-    fast_law_ = fresh->fast_law_;
-    spec_ = fresh->spec_;
+  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
+
+  /// The same, with the settings of `fresh`, as `make` gave it: no design work, fit for an
+  /// interrupt.
+  Check<S> adopt(const Adrc& fresh) {
+    if (auto ok = loop_.adopt(fresh.loop_); !ok) return ok;
+    law_ = fresh.law_;
+    fast_law_ = fresh.fast_law_;
+    spec_ = fresh.spec_;
     return {};
   }
 

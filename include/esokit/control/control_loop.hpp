@@ -213,13 +213,13 @@ class ControlLoop {
     return status;
   }
 
-  /// Takes the settings of `fresh`, whose observer has them already in `retuned`; state, output and
-  /// mode are kept.
-  void adopt(const ControlLoop& fresh, const Observer& retuned) noexcept {
+  /// Takes the settings of `fresh`; state, output and mode are kept. What the observer refuses
+  /// changes nothing.
+  Check<S> adopt(const ControlLoop& fresh) {
+    if (auto ok = observer_.adopt(fresh.observer_); !ok) return ok;
     const S last = limiter_.last();
     limiter_ = fresh.limiter_;
     limiter_.track(last);
-    observer_ = retuned;
     hold_input_ = fresh.hold_input_;
     safe_input_ = fresh.safe_input_;
     missing_limit_ = fresh.missing_limit_;
@@ -230,6 +230,7 @@ class ControlLoop {
     has_safe_input_ = fresh.has_safe_input_;
     stay_safe_ = fresh.stay_safe_;
     if constexpr (has_step_time) limits_ = fresh.limits_;
+    return {};
   }
 
   /// How long the next step takes (s), where the observer is VariableTime; the rate limit follows.

@@ -94,13 +94,13 @@ class DisturbanceCompensator {
   StepStatus start(S y, S u) noexcept { return loop_.start(y, u); }
 
   /// New settings while running. A refused config changes nothing.
-  Check<S> retune(const Config& config) {
-    const auto fresh = make(config);
-    if (!fresh) return fresh.error();
-    Observer observer = loop_.observer();
-    if (auto ok = observer.retune(config.observer); !ok) return ok;
-    loop_.adopt(fresh->loop_, observer);
-    gain_ = fresh->gain_;
+  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
+
+  /// The same, with the settings of `fresh`, as `make` gave it: no design work, fit for an
+  /// interrupt.
+  Check<S> adopt(const DisturbanceCompensator& fresh) {
+    if (auto ok = loop_.adopt(fresh.loop_); !ok) return ok;
+    gain_ = fresh.gain_;
     return {};
   }
 

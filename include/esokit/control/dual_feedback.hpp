@@ -176,15 +176,17 @@ class DualFeedbackAdrc {
   /// New settings while running: starts in the steady state of the last measurement and u, as a
   /// filter's state says nothing to another filter. No bump at rest. A refused config changes
   /// nothing, nor does any where the scalar cannot hold that steady state.
-  Check<S> retune(const Config& config) {
-    auto fresh = make(config);
-    if (!fresh) return fresh.error();
-    if (fresh->start(measured_, output()) != StepStatus::ok) {
+  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
+
+  /// The same, with the settings of `fresh`, as `make` gave it: no design work, fit for an
+  /// interrupt.
+  Check<S> adopt(DualFeedbackAdrc fresh) {
+    if (fresh.start(measured_, output()) != StepStatus::ok) {
       return Error<S>{"measurement", measured_,
                       "of the last sample has no steady state that the scalar can hold"};
     }
-    fresh->status_ = status_;
-    *this = *fresh;
+    fresh.status_ = status_;
+    *this = fresh;
     return {};
   }
 

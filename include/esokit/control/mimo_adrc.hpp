@@ -122,11 +122,13 @@ class MimoAdrc {
 
   /// New settings while running: estimates are kept, a change of B0 is moved into the disturbances,
   /// dhat += (B0_old - B0_new) u. A refused config changes nothing.
-  Check<S> retune(const Config& config) {
-    auto fresh = make(config);
-    if (!fresh) return fresh.error();
+  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
+
+  /// The same, with the settings of `fresh`, as `make` gave it: no design work, fit for an
+  /// interrupt.
+  Check<S> adopt(const MimoAdrc& fresh) {
     const Output u = output();
-    const Output drive = config.input_matrix * u;
+    const Output drive = fresh.input_matrix_ * u;
     const Output moved = input_matrix_ * u - drive;
     Channels observers = observers_;
     // Of a u that was reported absurdly large the scalar may not hold what it is to explain.
@@ -138,9 +140,7 @@ class MimoAdrc {
       constexpr auto channel = static_cast<std::size_t>(i);
       constexpr int row = i;
       auto& observer = std::get<channel>(observers);
-      auto settings = std::get<channel>(config.observers);
-      chain_config<ObserverOf<row>>(settings).input_gain = S(1);
-      if (outcome) outcome = observer.retune(settings);
+      if (outcome) outcome = observer.adopt(std::get<channel>(fresh.observers_));
       if (outcome && observer.shift_disturbance(moved(row)) != StepStatus::ok) {
         outcome = too_large(u(row));
       }
@@ -150,7 +150,7 @@ class MimoAdrc {
       }
     });
     if (!outcome) return outcome;
-    *this = *fresh;
+    *this = fresh;
     observers_ = observers;
     for (std::size_t i = 0; i < channels; ++i) limiters_[i].track(u(static_cast<int>(i)));
     return {};

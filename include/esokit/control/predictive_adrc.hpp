@@ -197,18 +197,18 @@ class PredictiveAdrc {
 
   /// New settings while running: the estimate and u are kept. Not between `control` and `prepare`.
   /// A refused config changes nothing.
-  Check<S> retune(const Config& config) {
-    auto fresh = make(config);
-    if (!fresh) return fresh.error();
-    Observer observer = observer_;
-    if (auto ok = observer.retune(config.observer); !ok) return ok;
-    observer_ = observer;
-    weights_ = fresh->weights_;
-    feeds_ = fresh->feeds_;
-    rate_ = fresh->rate_;
-    law_ = fresh->law_;
-    hold_ = fresh->hold_;
-    limiter_ = fresh->limiter_;
+  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
+
+  /// The same, with the settings of `fresh`, as `make` gave it: no design work, fit for an
+  /// interrupt.
+  Check<S> adopt(const PredictiveAdrc& fresh) {
+    if (auto ok = observer_.adopt(fresh.observer_); !ok) return ok;
+    weights_ = fresh.weights_;
+    feeds_ = fresh.feeds_;
+    rate_ = fresh.rate_;
+    law_ = fresh.law_;
+    hold_ = fresh.hold_;
+    limiter_ = fresh.limiter_;
     limiter_.track(output_);
     arm();
     return {};

@@ -90,4 +90,16 @@ constexpr Check<S> check_representable(const char* field, const S& value, const 
   return {};
 }
 
+namespace detail {
+
+/// `retune` of all that has `make` and `adopt`: designs once.
+template <class T>
+Check<typename T::scalar_type> retune(T& object, const typename T::Config& config) {
+  const auto fresh = T::make(config);
+  if (!fresh) return fresh.error();
+  return object.adopt(*fresh);
+}
+
+}  // namespace detail
+
 }  // namespace esokit

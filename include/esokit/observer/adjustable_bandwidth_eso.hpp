@@ -119,11 +119,12 @@ class AdjustableBandwidthEso
 
   /// New settings while running: the estimate and the innovation to compare with are kept, a change
   /// of b0 is moved into the disturbance. A refused config changes nothing.
-  Check<S> retune(const Config& config) {
-    auto fresh = make(config);
-    if (!fresh) return fresh.error();
-    std::get<0>(fresh->laws()).continue_from(std::get<0>(this->laws()));
-    return this->adopt(*fresh);
+  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
+
+  /// The same, with the settings of `fresh`, as `make` gave it: no design work.
+  Check<S> adopt(AdjustableBandwidthEso fresh) {
+    std::get<0>(fresh.laws()).continue_from(std::get<0>(this->laws()));
+    return Base::adopt(fresh);
   }
 
  private:

@@ -127,20 +127,21 @@ class AlgebraicEso
   /// are kept, a change of b0 is moved into the disturbance, in estimates that are held as well. If
   /// the new hold time is not over yet, the present estimates are held until it is. A refused
   /// config changes nothing.
-  Check<S> retune(const Config& config) {
-    auto fresh = make(config);
-    if (!fresh) return fresh.error();
+  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
+
+  /// The same, with the settings of `fresh`, as `make` gave it: no design work.
+  Check<S> adopt(AlgebraicEso fresh) {
     Estimate published = estimate();
     published(Order) =
-        published(Order) + (this->input_gain() - fresh->input_gain()) * this->applied_input();
+        published(Order) + (this->input_gain() - fresh.input_gain()) * this->applied_input();
     if (!all(is_finite(published(Order)))) {
-      return Error<S>{"input_gain", fresh->input_gain(), "would make the estimate not finite"};
+      return Error<S>{"input_gain", fresh.input_gain(), "would make the estimate not finite"};
     }
     // One that has settled stays so, and no longer knows its age.
-    std::get<0>(fresh->laws()).resume(settled() ? Law::max_index : age());
-    if (auto ok = this->adopt(*fresh); !ok) return ok;
+    std::get<0>(fresh.laws()).resume(settled() ? Law::max_index : age());
+    if (auto ok = Base::adopt(fresh); !ok) return ok;
     hold(published);
-    hold_samples_ = fresh->hold_samples_;
+    hold_samples_ = fresh.hold_samples_;
     return {};
   }
 

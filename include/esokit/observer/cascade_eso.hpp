@@ -166,11 +166,7 @@ class CascadeEso
 
   /// New settings while running: the estimates of all levels are kept, a change of b0 is moved into
   /// the disturbance of level 1. A refused config changes nothing.
-  Check<S> retune(const Config& config) {
-    auto fresh = make(config);
-    if (!fresh) return fresh.error();
-    return this->adopt(*fresh);
-  }
+  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
 
  private:
   CascadeEso(const ChainConfig<S>& chain, const typename Base::Laws& laws) noexcept

@@ -214,7 +214,7 @@ concept LoopObserver = std::copyable<O> && PlainScalar<typename O::scalar_type> 
   requires O::order >= 1 && O::size > O::order;
   requires std::same_as<typename O::Estimate, Vector<typename O::scalar_type, O::size>>;
   { O::make(config) } -> std::same_as<Expected<O, Error<typename O::scalar_type>>>;
-  { observer.retune(config) } -> std::same_as<Check<typename O::scalar_type>>;
+  { observer.adopt(constant) } -> std::same_as<Check<typename O::scalar_type>>;
   { observer.update(s, s) } -> std::same_as<StepStatus>;
   { observer.predict(s) } -> std::same_as<StepStatus>;
   { observer.correct(s) } -> std::same_as<StepStatus>;
@@ -303,7 +303,7 @@ concept PredictableObserver = std::copyable<O> && Scalar<typename O::scalar_type
   requires O::order >= 1 && O::size > O::order&& O::levels >= 1;
   { config } -> ChainSettings<typename O::scalar_type>;
   { O::make(config) } -> std::same_as<Expected<O, Error<typename O::scalar_type>>>;
-  { observer.retune(config) } -> std::same_as<Check<typename O::scalar_type>>;
+  { observer.adopt(constant) } -> std::same_as<Check<typename O::scalar_type>>;
   { observer.predict(s) } -> std::same_as<StepStatus>;
   { observer.correct(s) } -> std::same_as<StepStatus>;
   { observer.revise_input(s) } -> std::same_as<StepStatus>;

@@ -53,11 +53,12 @@ class DelayedInput : public Adapter<Observer> {
 
   /// New settings while running: estimate and inputs under way are kept. A refused config changes
   /// nothing.
-  Check<S> retune(const Config& config) {
-    auto fresh = make(config);
-    if (!fresh) return fresh.error();
-    if (auto ok = observer_.retune(config.observer); !ok) return ok;
-    delay_ = fresh->delay_;
+  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
+
+  /// The same, with the settings of `fresh`, as `make` gave it: no design work.
+  Check<S> adopt(const DelayedInput& fresh) {
+    if (auto ok = observer_.adopt(fresh.observer_); !ok) return ok;
+    delay_ = fresh.delay_;
     return {};
   }
 

@@ -153,18 +153,19 @@ class ExtendedStateFilter
 
   /// New settings while running: estimate and covariance are kept, a change of b0 is moved into the
   /// disturbance. A refused config changes nothing.
-  Check<S> retune(const Config& config) {
-    auto fresh = make(config);
-    if (!fresh) return fresh.error();
-    if (!fresh->law().continue_from(law(), S(fresh->sample_time() / this->sample_time()))) {
-      return Error<S>{"measurement_variance", config.measurement_variance,
+  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
+
+  /// The same, with the settings of `fresh`, as `make` gave it: no design work.
+  Check<S> adopt(ExtendedStateFilter fresh) {
+    if (!fresh.law().continue_from(law(), S(fresh.sample_time() / this->sample_time()))) {
+      return Error<S>{"measurement_variance", fresh.law().measurement_variance(),
                       "is too small, or sample_time too far from the one before, for the present "
                       "covariance to be carried over: measure first"};
     }
-    if (auto ok = this->adopt(*fresh); !ok) return ok;
-    model_ = fresh->model_;
-    outlier_threshold_ = fresh->outlier_threshold_;
-    change_bound_ = fresh->change_bound_;
+    if (auto ok = Base::adopt(fresh); !ok) return ok;
+    model_ = fresh.model_;
+    outlier_threshold_ = fresh.outlier_threshold_;
+    change_bound_ = fresh.change_bound_;
     return {};
   }
 

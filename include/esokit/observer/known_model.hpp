@@ -111,15 +111,16 @@ class KnownModel : public Adapter<Observer> {
   /// New settings while running: the estimate, that is fbar + d, is kept, and what another model
   /// explains is taken out of d; a change of b0 is moved into d as everywhere. u does not jump.
   /// A refused config changes nothing.
-  Check<S> retune(const Config& config) {
-    auto fresh = make(config);
-    if (!fresh) return fresh.error();
+  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
+
+  /// The same, with the settings of `fresh`, as `make` gave it: no design work.
+  Check<S> adopt(const KnownModel& fresh) {
     KnownModel next = *this;
     const S fed = observer_.applied_input() - applied_input_;
-    const S gain_change = this->input_gain() - fresh->input_gain();
-    if (auto ok = next.observer_.retune(config.observer); !ok) return ok;
-    next.model_ = config.model;
-    next.inverse_gain_ = fresh->inverse_gain_;
+    const S gain_change = this->input_gain() - fresh.input_gain();
+    if (auto ok = next.observer_.adopt(fresh.observer_); !ok) return ok;
+    next.model_ = fresh.model_;
+    next.inverse_gain_ = fresh.inverse_gain_;
     // The observer moved (b0_old - b0_new) times all that drove it; fbar's share is not b0's.
     const S moved = known_part() - next.known_part() - gain_change * fed;
     const bool some = !is_finite(moved) || moved < S(0) || moved > S(0);

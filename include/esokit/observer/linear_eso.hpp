@@ -72,11 +72,7 @@ class LinearEso : public PredictorCorrector<Order, S, Extension,
 
   /// New settings while running: the estimate is kept, a change of b0 is moved into the
   /// disturbance. A refused config changes nothing.
-  Check<S> retune(const Config& config) {
-    auto fresh = make(config);
-    if (!fresh) return fresh.error();
-    return this->adopt(*fresh);
-  }
+  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
 
  private:
   LinearEso(const ChainConfig<S>& chain, const Law& law) noexcept : Base(chain, {law}) {}

@@ -95,11 +95,7 @@ class NonlinearEso
 
   /// New settings while running: the estimate is kept, a change of b0 is moved into the
   /// disturbance. A refused config changes nothing.
-  Check<S> retune(const Config& config) {
-    auto fresh = make(config);
-    if (!fresh) return fresh.error();
-    return this->adopt(*fresh);
-  }
+  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
 
   /// k for an innovation e (unit of y), within its limits.
   [[nodiscard]] S gain_factor(const S& e) const noexcept { return law().factor(e); }

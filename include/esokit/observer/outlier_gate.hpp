@@ -60,13 +60,14 @@ class OutlierGate : public Adapter<Observer> {
   }
 
   /// New settings while running: the estimate is kept. A refused config changes nothing.
-  Check<S> retune(const Config& config) {
-    auto fresh = make(config);
-    if (!fresh) return fresh.error();
-    if (auto ok = observer_.retune(config.observer); !ok) return ok;
-    threshold_ = fresh->threshold_;
-    running_factor_ = fresh->running_factor_;
-    most_in_a_row_ = fresh->most_in_a_row_;
+  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
+
+  /// The same, with the settings of `fresh`, as `make` gave it: no design work.
+  Check<S> adopt(const OutlierGate& fresh) {
+    if (auto ok = observer_.adopt(fresh.observer_); !ok) return ok;
+    threshold_ = fresh.threshold_;
+    running_factor_ = fresh.running_factor_;
+    most_in_a_row_ = fresh.most_in_a_row_;
     return {};
   }
 

@@ -319,30 +319,6 @@ class PredictorCorrector {
     return shift_to(next);
   }
 
- protected:
-  /// At rest in zero; `config` is checked already.
-  PredictorCorrector(const ChainConfig<S>& config, const Laws& laws) noexcept
-      : laws_(laws),
-        scaled_input_gain_(Chain::scaled_input_gain(config.input_gain, config.sample_time)),
-        rate_(S(1.0) / config.sample_time),
-        input_gain_(config.input_gain),
-        sample_time_(config.sample_time),
-        max_gap_(static_cast<std::uint16_t>(config.max_gap)) {
-    for (auto& state : states_) {
-      for (S& x : state) x = S(0.0);
-    }
-  }
-
-  /// The rules for input_gain, sample_time and max_gap.
-  static Check<S> check_chain(const ChainConfig<S>& config) {
-    return detail::check_chain<Order, S>(config);
-  }
-
-  /// The gain laws, for the observer that is built on this.
-  [[nodiscard]] constexpr const Laws& laws() const noexcept { return laws_; }
-  /// The gain laws, to be changed.
-  [[nodiscard]] constexpr Laws& laws() noexcept { return laws_; }
-
   /// Takes the settings of `fresh` and keeps the estimate: states are rescaled to its sample time,
   /// and what a change of b0 no longer explains goes into the disturbance,
   /// dhat += (b0_old - b0_new) u, so that the control does not jump.
@@ -373,6 +349,30 @@ class PredictorCorrector {
     *this = next;
     return {};
   }
+
+ protected:
+  /// At rest in zero; `config` is checked already.
+  PredictorCorrector(const ChainConfig<S>& config, const Laws& laws) noexcept
+      : laws_(laws),
+        scaled_input_gain_(Chain::scaled_input_gain(config.input_gain, config.sample_time)),
+        rate_(S(1.0) / config.sample_time),
+        input_gain_(config.input_gain),
+        sample_time_(config.sample_time),
+        max_gap_(static_cast<std::uint16_t>(config.max_gap)) {
+    for (auto& state : states_) {
+      for (S& x : state) x = S(0.0);
+    }
+  }
+
+  /// The rules for input_gain, sample_time and max_gap.
+  static Check<S> check_chain(const ChainConfig<S>& config) {
+    return detail::check_chain<Order, S>(config);
+  }
+
+  /// The gain laws, for the observer that is built on this.
+  [[nodiscard]] constexpr const Laws& laws() const noexcept { return laws_; }
+  /// The gain laws, to be changed.
+  [[nodiscard]] constexpr Laws& laws() noexcept { return laws_; }
 
  private:
   using LevelStates = Array<typename Chain::State, Levels>;

@@ -204,6 +204,9 @@ class RiccatiGain {
     set_gain();
   }
 
+  /// R, unit of y squared, to a rounding.
+  [[nodiscard]] constexpr S measurement_variance() const noexcept { return measurement_ * unit_; }
+
   /// Goes on from the covariance of a law with other settings. @param time_ratio T_new / T_old
   /// @return false if that covariance is not one that the scalar holds in this law's unit
   bool continue_from(const RiccatiGain& other, const S& time_ratio) noexcept {

@@ -59,13 +59,14 @@ class VariableTime : public Adapter<Observer> {
 
   /// New settings while running: the estimate is kept; steps are nominal again. A refused config
   /// changes nothing.
-  Check<S> retune(const Config& config) {
-    auto fresh = make(config);
-    if (!fresh) return fresh.error();
-    if (auto ok = observer_.retune(config.observer); !ok) return ok;
-    config_ = config;
-    step_time_ = fresh->step_time_;
-    current_ = fresh->current_;
+  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
+
+  /// The same, with the settings of `fresh`, as `make` gave it: no design work.
+  Check<S> adopt(const VariableTime& fresh) {
+    if (auto ok = observer_.adopt(fresh.observer_); !ok) return ok;
+    config_ = fresh.config_;
+    step_time_ = fresh.step_time_;
+    current_ = fresh.current_;
     return {};
   }
 
@@ -150,7 +151,7 @@ class VariableTime : public Adapter<Observer> {
   void take(const S& seconds) noexcept {
     auto config = config_.observer;
     chain_config<Observer>(config).sample_time = seconds;
-    if (observer_.retune(config)) current_ = seconds;
+    if (detail::retune(observer_, config)) current_ = seconds;
   }
 
   Config config_;

@@ -67,13 +67,14 @@ class WrappedOutput : public Adapter<Observer> {
 
   /// New settings while running: the estimate is kept; of another period the turns are counted
   /// anew. A refused config changes nothing.
-  Check<S> retune(const Config& config) {
-    auto fresh = make(config);
-    if (!fresh) return fresh.error();
-    if (auto ok = observer_.retune(config.observer); !ok) return ok;
-    if (fresh->period_ < period_ || fresh->period_ > period_) {
-      period_ = fresh->period_;
-      inverse_period_ = fresh->inverse_period_;
+  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
+
+  /// The same, with the settings of `fresh`, as `make` gave it: no design work.
+  Check<S> adopt(const WrappedOutput& fresh) {
+    if (auto ok = observer_.adopt(fresh.observer_); !ok) return ok;
+    if (fresh.period_ < period_ || fresh.period_ > period_) {
+      period_ = fresh.period_;
+      inverse_period_ = fresh.inverse_period_;
       count_ = Count{};
       recentre();
     }
