@@ -288,8 +288,8 @@ int main(int argc, char** argv) {
           .value();
   for (const Row& row : table2) {
     const auto add = [&](const std::string& name, const Run& run) {
-      lines.push_back({row_name(row), name, number_text(run.most[0], 5),
-                       number_text(run.most[1], 5), number_text(run.most[2], 5)});
+      lines.push_back({row_name(row), name, shown_text(run.most[0]), shown_text(run.most[1]),
+                       shown_text(run.most[2])});
     };
     add("LinearEso", run_deployed(sampled_linear, row));
     const Run held = run_deployed(deployed, row);

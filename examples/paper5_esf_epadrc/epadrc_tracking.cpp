@@ -216,7 +216,7 @@ int main(int argc, char** argv) {
       for (std::size_t m = 0; m < metric_names.size(); ++m) {
         const Statistics ours = statistics_of(of_seeds, metric_names[m].number);
         all[which * kinds.size() + kind][m] = ours;
-        line.push_back(number_text(ours.mean, 4) + " (" + number_text(ours.standard_deviation, 2) +
+        line.push_back(number_text(ours.mean, 3) + " (" + number_text(ours.standard_deviation, 2) +
                        ")");
         const auto compare = [&](const Printed& reference) {
           const double relative = std::max(0.005, reference.rounding / reference.value);
