@@ -80,88 +80,83 @@ constexpr std::array<Printed, 3> step_2[] = {{{{2.143, 5e-4}, {.4057, 5e-5}, {51
 
 constexpr std::array colors = {Color::sky, Color::blue, Color::vermillion, Color::grey};
 
+struct Signal {
+  const char* label;
+  const char* name;
+  std::vector<double> Series::*values;
+};
+constexpr std::array signals = {Signal{"r (dashed), y (-)", "output", &Series::output},
+                                Signal{"r − y (-)", "error", &Series::error},
+                                Signal{"u (-)", "control", &Series::control},
+                                Signal{"error of x_1 (-)", "e1", &Series::e1},
+                                Signal{"error of x_2 (1/s)", "e2", &Series::e2},
+                                Signal{"error of f (1/s^2)", "e3", &Series::e3}};
+
+/// Six signals of three controllers: over each other without noise, one beside the other, with one
+/// scale a row, where noise would hide one behind the other.
 Figure draw(const std::string& name, const std::string& caption, Reference reference,
             double deviation) {
-  Figure figure(name, {.rows = 3, .columns = 2, .panel_height = 190});
-  figure.caption(caption);
+  constexpr std::array kinds = {Kind::adrc, Kind::padrc, Kind::epadrc, Kind::printed};
   const bool step = reference == Reference::step;
-  std::array<Series, 4> series;
-  std::array<bool, 4> bounded{};
-  for (const Kind kind : {Kind::adrc, Kind::padrc, Kind::epadrc, Kind::printed}) {
-    const auto i = static_cast<std::size_t>(kind);
-    const Metrics metrics = run(kind, reference, deviation, 1, &series[i]);
-    bounded[i] = metrics.error < 100.0;
+  const bool apart = deviation > 0.0;
+  const double end = step ? 0.4 : duration_of(reference);
+  std::array<Series, kinds.size()> series;
+  std::array<bool, kinds.size()> bounded{};
+  for (std::size_t i = 0; i < kinds.size(); ++i) {
+    bounded[i] = run(kinds[i], reference, deviation, 1, &series[i]).error < 100.0;
   }
-  struct PanelOf {
-    std::size_t row, column;
-    const char* label;
-    const char* name;
-    std::vector<double> Series::*signal;
-  };
-  const std::array<PanelOf, 6> panels = {{{0, 0, "r (dashed), y (-)", "output", &Series::output},
-                                          {0, 1, "r − y (-)", "error", &Series::error},
-                                          {1, 0, "u (-)", "control", &Series::control},
-                                          {1, 1, "error of x_1 (-)", "e1", &Series::e1},
-                                          {2, 0, "error of x_2 (1/s)", "e2", &Series::e2},
-                                          {2, 1, "error of f (1/s^2)", "e3", &Series::e3}}};
-  for (const PanelOf& description : panels) {
-    auto& panel = figure.panel(description.row, description.column)
-                      .x_label("t (s)")
-                      .y_label(description.label)
-                      .name(description.name)
-                      .x_range(0.0, step ? 0.4 : duration_of(reference))
-                      .legend(Legend::above);
-    const bool estimation = description.row == 2 || description.signal == &Series::e1;
-    if (description.signal == &Series::output) {
-      panel.line(series[0].t, series[0].reference,
-                 {.color = Color::black, .dash = Dash::dashed, .column = "r"});
-    }
+  Figure figure(name, apart ? Grid{.rows = 6, .columns = 3, .panel_height = 130}
+                            : Grid{.rows = 3, .columns = 2, .panel_height = 190});
+  figure.caption(caption);
+  for (std::size_t n = 0; n < signals.size(); ++n) {
+    const Signal& signal = signals[n];
+    const bool output = signal.values == &Series::output;
+    const bool estimation = n >= 3;
     double most = 0.0;
-    // The noisiest first, so that it does not hide the others; the printed form below them all.
-    std::array order = {Kind::printed, Kind::adrc, Kind::padrc, Kind::epadrc};
-    const auto spread = [&](Kind kind) {
-      const auto& values = series[static_cast<std::size_t>(kind)].*description.signal;
-      double sum = 0.0;
-      for (std::size_t k = 250; k < values.size(); ++k) sum += values[k] * values[k];
-      return sum;
-    };
-    if (deviation > 0.0 && (estimation || description.signal == &Series::control)) {
-      std::stable_sort(order.begin() + 1, order.end(),
-                       [&](Kind a, Kind b) { return spread(a) > spread(b); });
-    }
-    for (const Kind kind : order) {
-      const auto i = static_cast<std::size_t>(kind);
-      const auto& values = series[i].*description.signal;
-      if (kind != Kind::printed) {
-        // The first samples of the estimates are the start, not what the panel is about.
-        const std::size_t from = estimation ? 60 : 0;
-        for (std::size_t k = from; k < values.size(); ++k)
-          most = std::max(most, std::abs(values[k]));
+    for (std::size_t i = 0; i < kinds.size(); ++i) {
+      if (kinds[i] == Kind::printed) continue;
+      // In noise the first samples of the estimates are the start, not what the panel is about.
+      const auto& values = series[i].*signal.values;
+      for (std::size_t k = estimation && apart ? 60 : 0; k < values.size(); ++k) {
+        most = std::max(most, std::abs(values[k]));
       }
-      const bool noisy = deviation > 0.0 && (estimation || description.signal == &Series::control);
-      panel.line(
-          series[i].t, values,
-          {.name = kind == Kind::printed ? (bounded[i] ? "as printed" : "as printed: diverges")
-                                         : name_of(kind),
-           .color = colors[i],
-           .dash = kind == Kind::printed ? Dash::dotted : Dash::solid,
-           .width = noisy ? 0.9 : 1.5});
     }
-    const double room = 1.15 * most;
-    if (description.signal == &Series::output) {
-      if (step) {
-        panel.y_range(0.0, 24.0);
+    for (std::size_t column = 0; column < (apart ? 3u : 1u); ++column) {
+      auto& panel = (apart ? figure.panel(n, column) : figure.panel(n / 2, n % 2))
+                        .x_label("t (s)")
+                        .y_label(signal.label)
+                        .x_range(0.0, end)
+                        .legend(Legend::above);
+      panel.name(apart ? std::string(signal.name) + "_" + name_of(kinds[column]) : signal.name);
+      if (output) {
+        panel.line(series[0].t, series[0].reference,
+                   {.color = Color::black, .dash = Dash::dashed, .column = "r"});
+      }
+      // The printed form first, below the others.
+      for (const std::size_t i : {3u, 0u, 1u, 2u}) {
+        const bool printed = kinds[i] == Kind::printed;
+        if (apart && i != column && !(printed && kinds[column] == Kind::epadrc)) continue;
+        panel.line(series[i].t, series[i].*signal.values,
+                   {.name = printed ? (bounded[i] ? "as printed" : "as printed: diverges")
+                                    : name_of(kinds[i]),
+                    .color = colors[i],
+                    .dash = printed ? Dash::dotted : Dash::solid,
+                    .width = apart && n >= 2 ? 0.9 : 1.5});
+      }
+      const double room = 1.15 * most;
+      if (output) {
+        panel.y_range(step ? 0.0 : -5.0, step ? 24.0 : 5.0);
+      } else if (step && signal.values == &Series::error) {
+        panel.y_range(-5.0, 21.0);
+      } else if (step && signal.values == &Series::control) {
+        panel.y_range(-700.0, 1100.0);
       } else {
-        panel.y_range(-5.0, 5.0);
+        panel.y_range(-room, room);
       }
-    } else if (step && description.signal == &Series::error) {
-      panel.y_range(-5.0, 21.0);
-    } else {
-      panel.y_range(-room, room);
-    }
-    if (step && description.signal == &Series::control) {
-      panel.y_range(-700.0, 1100.0)
-          .inset({.left = 0.3, .bottom = 0.6, .width = 0.65, .height = 0.34, .x = {0.1, 0.4}});
+      // Behind the peak of the start.
+      if (!apart && (estimation || (step && n == 2))) {
+        panel.inset({.left = 0.3, .bottom = 0.6, .width = 0.65, .height = 0.34, .x = {0.1, end}});
+      }
     }
   }
   return figure;
@@ -344,11 +339,12 @@ int main(int argc, char** argv) {
       report.add(draw("fig" + std::to_string(number),
                       "Fig. " + std::to_string(number) + ": " + what +
                           (level > 0.0 ? ", sigma = " + number_text(level, 3) : ", no noise") +
-                          ". Output, tracking error, control, and the errors of the estimates. The "
-                          "estimates' panels are scaled to what comes after the first 60 ms. ADRC "
-                          "is in predictor "
-                          "form, one sample late. Dotted: EPADRC "
-                          "with the gains as the paper prints them, which are wrong.",
+                          ". Output, tracking error, control, and the errors of the estimates" +
+                          (level > 0.0 ? ", one column a controller, one scale a row; those of "
+                                         "the estimates are for what comes after the first 60 ms"
+                                       : "; insets: after the peak of the start") +
+                          ". ADRC is in predictor form, one sample late. Dotted: EPADRC with the "
+                          "gains as the paper prints them, which are wrong.",
                       reference, level));
       ++number;
     }
