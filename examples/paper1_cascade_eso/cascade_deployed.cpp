@@ -171,12 +171,12 @@ int main(int argc, char** argv) {
   };
   report.remark(
       "With p = 1 at 10 ms int |z3 error| dt is smaller than in the continuous "
-      "simulation, though e is larger: the estimate lags less all the way (largest error "
-      "in the sine after 3.6 s " +
+      "simulation, though e is larger: the error of the estimate is smaller nearly "
+      "throughout (the largest in the sine after 3.6 s " +
       shown_text(largest_after(runs[0][1])) + " instead of " +
       shown_text(largest_after(runs[0][0])) +
-      "), as a sampled observer corrects with the present y; the control is held for T, "
-      "and that makes e larger.");
+      "). A likely reason, not tested apart: a sampled observer corrects with the present y, "
+      "while the control is held for T.");
 
   // With noise: at T = 10 ms each sample has a noise value of its own.
   const auto noisy = run_parallel("Sim1B deployed, seeds", 9 * seeds, [](std::size_t job) {
