@@ -218,13 +218,13 @@ int main(int argc, char** argv) {
     unstable.push_back(l.unstable);
     report.check_reference(name, "least certified rho, continuous", l.closed, l.test,
                            Tolerance::absolute(1e-9), "tan^2(pi (N-1) / (4N))");
-    CsvRow line{std::to_string(i + 2), number_text(l.closed, 10), number_text(l.test, 10),
-                number_text(l.beso, 6), number_text(l.unstable, 3)};
+    CsvRow line{std::to_string(i + 2), number_text(l.closed, 4), number_text(l.test, 4),
+                number_text(l.beso, 4), number_text(l.unstable, 3)};
     for (std::size_t k = 0; k < omega_times.size(); ++k) {
       report.check_reference(name, "least certified rho, w T = " + number_text(omega_times[k], 2),
                              l.sampled_closed[k], l.sampled[k], Tolerance::absolute(1e-9),
                              "tanh(rho w T/2) / tanh(w T/2) at the limit");
-      line.push_back(number_text(l.sampled[k], 10));
+      line.push_back(number_text(l.sampled[k], 4));
     }
     report.expect(name, "largest rho with a growing periodic switching", l.unstable,
                   l.unstable < l.closed, "below the certificate's limit");
