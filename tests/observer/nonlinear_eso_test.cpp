@@ -507,6 +507,31 @@ TEST(NonlinearEso, RefusesByName) {
             }),
             "gain_max");
 
+  // Which rule it is: one names the pair, the next the certificate, the last the constant gain.
+  const auto rule_of = [&](auto change) {
+    Observer::Config config = good;
+    change(config);
+    return std::string(Observer::make(config).error().rule);
+  };
+  EXPECT_EQ(rule_of([](C& c) {
+              c.gain_min = 0.9;
+              c.gain_max = 0.8;
+            }),
+            "must not be above gain_max, which is");
+  EXPECT_EQ(rule_of([](C& c) { c.gain_min = 0.1; }).substr(0, 36),
+            "is not certified for a varying gain ");
+  EXPECT_EQ(rule_of([](C& c) { c.gain_min = 100; }),
+            "must be below what is stable for a constant gain, which is");
+  EXPECT_EQ(rule_of([](C& c) { c.gain_max = 100; }).substr(0, 36),
+            "is not certified for a varying gain ");
+  // The limit of a constant gain, from both sides.
+  C at_limit = good;
+  at_limit.gain_min = 100;
+  const double ceiling = Observer::make(at_limit).error().limit;
+  EXPECT_EQ(rule_of([&](C& c) { c.gain_min = ceiling; }),
+            "must be below what is stable for a constant gain, which is");
+  EXPECT_EQ(with([&](C& c) { c.gain_min = 0.999 * ceiling; }), "accepted");
+
   auto refused = good;
   refused.gain_max = 100;
   const auto error = Observer::make(refused).error();

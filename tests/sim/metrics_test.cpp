@@ -184,6 +184,17 @@ TEST(StepResponse, WhatDoesNotExist) {
   EXPECT_FALSE(spoilt.overshoot());
 }
 
+/// Two samples at one time are a jump; only a time before the last one is refused.
+TEST(StepResponse, TwoSamplesAtOneTime) {
+  auto response = step_response(uniform(std::vector<double>{0.0, 0.0}, 1.0), {}).value();
+  EXPECT_TRUE(response.add(1.0, 1.2));
+  EXPECT_TRUE(response.add(2.0, 1.0));
+  EXPECT_EQ(response.rise_time(), 0.0);
+  EXPECT_NEAR(*response.overshoot(), 0.2, 1e-15);
+  EXPECT_FALSE(response.add(std::nextafter(2.0, 0.0), 1.0));
+  EXPECT_FALSE(response.rise_time());
+}
+
 TEST(StepResponse, PassesOverWhatIsBeforeTheStep) {
   const std::vector<double> values{5.0, 5.0, 0.0, 1.0, 1.0};
   const auto response = step_response(uniform(values, 1.0), {.step_time = 2.0}).value();
