@@ -132,9 +132,7 @@ class Driver {
   }
 
   static std::vector<unsigned char> bytes(const T& object) {
-    std::vector<unsigned char> memory(sizeof(T));
-    std::memcpy(memory.data(), static_cast<const void*>(&object), sizeof(T));
-    return memory;
+    return memory_of(static_cast<const void*>(&object), sizeof(T));
   }
 
   template <class E>

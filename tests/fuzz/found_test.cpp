@@ -156,4 +156,36 @@ TEST(Found, RetuneInTheHoldIsRefusedOrFinite) {
   EXPECT_TRUE(observer.retune(config));
 }
 
+/// An inflation that the recursion bears at every sample, and not in gaps that recur.
+TEST(Found, FilterOfAnyInflationBearsGapsOrIsRefused) {
+  using Filter = esokit::ExtendedStateFilter<1, float>;
+  int refused = 0;
+  int taken = 0;
+  for (float inflation = 1e-6f; inflation < 1e30f; inflation *= 10) {
+    Filter::Config config{
+        .input_gain = 1, .sample_time = 0.2f, .measurement_variance = 0.7f, .inflation = inflation};
+    config.disturbance_bounds = {0.7f, 1.7f};
+    const auto made = Filter::make(config);
+    if (!made) {
+      ++refused;
+      EXPECT_STREQ(made.error().field, "inflation");
+      continue;
+    }
+    ++taken;
+    auto filter = *made;
+    for (int gap = 0; gap < 6; ++gap) {
+      for (int k = 0; k < 20; ++k) {
+        for (int i = 0; i < gap; ++i) {
+          filter.predict(0);
+          ASSERT_TRUE(filter.gain().allFinite()) << inflation << ' ' << gap;
+        }
+        filter.update(0, 0);
+        ASSERT_TRUE(filter.gain().allFinite()) << inflation << ' ' << gap;
+      }
+    }
+  }
+  EXPECT_GT(refused, 0);
+  EXPECT_GT(taken, 8);
+}
+
 }  // namespace

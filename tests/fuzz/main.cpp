@@ -19,6 +19,11 @@ namespace fuzz {
 
 long allocations() { return esokit_test::allocation_count; }
 
+std::vector<unsigned char> memory_of(const void* object, std::size_t size) {
+  const auto* first = static_cast<const unsigned char*>(object);
+  return {first, first + size};
+}
+
 namespace {
 
 struct Options {

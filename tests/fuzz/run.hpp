@@ -3,6 +3,7 @@
 /// and at last good samples, that have to bring it back.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -49,5 +50,8 @@ struct Kind {
 
 /// Of this program: operator new so far.
 long allocations();
+
+/// The bytes of an object; out of line, so that no compiler makes up its padding.
+std::vector<unsigned char> memory_of(const void* object, std::size_t size);
 
 }  // namespace fuzz

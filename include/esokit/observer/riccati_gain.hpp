@@ -121,20 +121,24 @@ class RiccatiGain {
   }
 
   /// True if the recursion stays within the scalar. What a large inflation lets it grow to is
-  /// reached within the first samples.
+  /// reached within the first samples; one above 1 also lets it grow in gaps that recur.
   [[nodiscard]] bool fits() const noexcept {
-    RiccatiGain run = *this;
-    run.mode_ = RiccatiMode::recursive;
-    run.reset();
-    for (int k = 0; k < 8 * Size; ++k) {
-      for (int i = 0; i < Size; ++i) {
-        if (!all(is_finite(run.now_.gain[index(i)])) ||
-            !all(is_finite(run.now_.factor.variance(i)))) {
-          return false;
-        }
+    const int most_missing = all(start_inflation_ <= S(1.0)) ? 0 : Size;
+    for (int missing = 0; missing <= most_missing; ++missing) {
+      RiccatiGain run = *this;
+      run.mode_ = RiccatiMode::recursive;
+      run.reset();
+      for (int k = 0; k < 8 * Size; ++k) {
+        if (!run.is_held()) return false;
+        for (int i = 0; i < missing; ++i) run.advance();
+        if (!run.is_held()) return false;
+        run.advance();
+        run.accept(S(0.0));
       }
-      run.advance();
-      run.accept(S(0.0));
+      for (int k = 0; k < 2 * most_missing; ++k) {
+        run.advance();
+        if (!run.is_held()) return false;
+      }
     }
     return true;
   }
@@ -293,6 +297,16 @@ class RiccatiGain {
 
   static constexpr std::size_t index(int i) noexcept { return static_cast<std::size_t>(i); }
 
+  /// Gain and covariance are numbers.
+  [[nodiscard]] bool is_held() const noexcept {
+    for (int i = 0; i < Size; ++i) {
+      if (!all(is_finite(now_.gain[index(i)])) || !all(is_finite(now_.factor.variance(i)))) {
+        return false;
+      }
+    }
+    return true;
+  }
+
   /// P- / R above which a measurement tells all there is to know of y. A gap lets P- grow no
   /// further but along the chain: more would only cost the digits in which the states differ.
   static constexpr S ceiling() noexcept { return S(1.0) / detail::rounding<S>(); }
@@ -306,7 +320,7 @@ class RiccatiGain {
       // Without noise it still grows as samples^(2N-2), until the scalar cannot hold it. The gain
       // is that of exact measurements by now, which a factor common to all variances does not
       // alter.
-      const S most = ceiling() * ceiling();
+      const S most = S(1024.0) * ceiling();
       const S variance = now_.factor.variance(0);
       if (!all(variance < most))
         now_.factor.scale(select(variance < most, S(1.0), S(most / variance)));
