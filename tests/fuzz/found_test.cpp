@@ -161,10 +161,10 @@ TEST(Found, FilterOfAnyInflationBearsGapsOrIsRefused) {
   using Filter = esokit::ExtendedStateFilter<1, float>;
   int refused = 0;
   int taken = 0;
-  for (float inflation = 1e-6f; inflation < 1e30f; inflation *= 10) {
+  for (float inflation = 1.3e-37f; inflation < 1e30f; inflation *= 10) {
     Filter::Config config{
         .input_gain = 1, .sample_time = 0.2f, .measurement_variance = 0.7f, .inflation = inflation};
-    config.disturbance_bounds = {0.7f, 1.7f};
+    config.disturbance_bounds = {0.7f, 12.0f};
     const auto made = Filter::make(config);
     if (!made) {
       ++refused;
@@ -173,7 +173,7 @@ TEST(Found, FilterOfAnyInflationBearsGapsOrIsRefused) {
     }
     ++taken;
     auto filter = *made;
-    for (int gap = 0; gap < 6; ++gap) {
+    for (const int gap : {0, 1, 2, 3, 4, 5, 80}) {
       for (int k = 0; k < 20; ++k) {
         for (int i = 0; i < gap; ++i) {
           filter.predict(0);

@@ -1,5 +1,6 @@
 // Plays random cases of every type until the time is out; shrinks what fails and prints it.
-// usage: fuzz [--seconds N] [--seed S] [--only NAME] [--case HEX]; seed 0: that of the clock
+// usage: fuzz [--seconds N | --cases N] [--seed S] [--only NAME] [--case HEX]; seed 0: that of the
+// clock
 #include <support/no_allocation.hpp>
 //
 #include <chrono>
@@ -28,6 +29,7 @@ namespace {
 
 struct Options {
   double seconds = 10;
+  std::uint64_t cases = 0;  ///< of each type, instead of a time: the same ones on every machine
   std::uint64_t seed = 1;
   std::string only{};
   std::optional<std::uint64_t> one_case{};
@@ -172,9 +174,10 @@ int run(const Options& options) {
         const auto seed =
             options.one_case.value_or(mixed(seed_of_all, i, (round << 16u) + within++));
         one_case(kinds[i], seed, tallies[i]);
-      } while (!options.one_case && Clock::now() < turn && within < 65536);
+      } while (!options.one_case && (options.cases > 0 ? within < options.cases
+                                                       : Clock::now() < turn && within < 65536));
     }
-    if (options.one_case || Clock::now() >= end) break;
+    if (options.one_case || options.cases > 0 || Clock::now() >= end) break;
   }
   Tally sum;
   std::size_t failures = 0;
@@ -215,6 +218,8 @@ int main(int argc, char** argv) {
     const char* value = argv[i + 1];
     if (name == "--seconds")
       options.seconds = std::strtod(value, nullptr);
+    else if (name == "--cases")
+      options.cases = std::min<std::uint64_t>(std::strtoull(value, nullptr, 10), 65536);
     else if (name == "--seed")
       options.seed = std::strtoull(value, nullptr, 10);
     else if (name == "--only")

@@ -121,9 +121,11 @@ class RiccatiGain {
   }
 
   /// True if the recursion stays within the scalar. What a large inflation lets it grow to is
-  /// reached within the first samples; one above 1 also lets it grow in gaps that recur.
+  /// reached within the first samples; one above 1, or so small that Q / theta is large, also lets
+  /// it grow in gaps.
   [[nodiscard]] bool fits() const noexcept {
-    const int most_missing = all(start_inflation_ <= S(1.0)) ? 0 : Size;
+    const bool usual = all(start_inflation_ <= S(1.0)) && all(start_inflation_ >= S(1e-6));
+    const int most_missing = usual ? 0 : Size;
     for (int missing = 0; missing <= most_missing; ++missing) {
       RiccatiGain run = *this;
       run.mode_ = RiccatiMode::recursive;
@@ -297,10 +299,11 @@ class RiccatiGain {
 
   static constexpr std::size_t index(int i) noexcept { return static_cast<std::size_t>(i); }
 
-  /// Gain and covariance are numbers.
+  /// Gain and covariance are numbers, and will be after two more samples that are missing.
   [[nodiscard]] bool is_held() const noexcept {
     for (int i = 0; i < Size; ++i) {
-      if (!all(is_finite(now_.gain[index(i)])) || !all(is_finite(now_.factor.variance(i)))) {
+      const S ahead = now_.factor.variance(i) * now_.growth * now_.growth;
+      if (!all(is_finite(now_.gain[index(i)])) || !all(is_finite(ahead))) {
         return false;
       }
     }
