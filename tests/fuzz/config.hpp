@@ -3,6 +3,8 @@
 /// controller whose members are named as the others' needs nothing here.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <optional>
 #include <tuple>
 #include <type_traits>
@@ -207,6 +209,8 @@ class Filler {
         number("disturbance_bounds", config.disturbance_bounds[i],
                {0.05 * per_sample(static_cast<int>(i)), per_sample(static_cast<int>(i)), true});
       }
+      // A filter has no bandwidth in its config; of the least bounds and the most noise it is this.
+      promise.slowest = std::min(promise.slowest, 0.05);
       covariance("process_covariance", config.process_covariance, 1);
       if (config.process_covariance) config.disturbance_bounds = {};
       covariance("initial_covariance", config.initial_covariance, 1);

@@ -216,7 +216,8 @@ class ExtendedStateFilter
   [[nodiscard]] bool accepts(const S& y) const noexcept {
     if (!gated() || this->restarts()) return true;
     const S e = y - this->template estimate<0>();
-    if (!all(is_finite(S(e * e)))) return true;
+    // A square beyond the scalar is beyond the threshold.
+    if (!all(is_finite(e))) return true;
     return all(e * e <= outlier_threshold_ * innovation_variance());
   }
 

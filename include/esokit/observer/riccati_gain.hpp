@@ -121,25 +121,28 @@ class RiccatiGain {
   }
 
   /// True if the recursion stays within the scalar. What a large inflation lets it grow to is
-  /// reached within the first samples; one above 1, or so small that Q / theta is large, also lets
-  /// it grow in gaps.
+  /// reached within the first samples; one above 1e6, or so small that Q / theta is large, also
+  /// lets it grow in gaps.
   [[nodiscard]] bool fits() const noexcept {
-    const bool usual = all(start_inflation_ <= S(1.0)) && all(start_inflation_ >= S(1e-6));
+    const bool usual = all(start_inflation_ <= S(1e6)) && all(start_inflation_ >= S(1e-6));
     const int most_missing = usual ? 0 : Size;
+    // Room for two more samples that are missing.
+    const S growth = S(1.0) + start_inflation_;
+    const S room = usual ? S(1.0) : S(growth * growth);
     for (int missing = 0; missing <= most_missing; ++missing) {
       RiccatiGain run = *this;
       run.mode_ = RiccatiMode::recursive;
       run.reset();
       for (int k = 0; k < 8 * Size; ++k) {
-        if (!run.is_held()) return false;
+        if (!run.is_held(room)) return false;
         for (int i = 0; i < missing; ++i) run.advance();
-        if (!run.is_held()) return false;
+        if (!run.is_held(room)) return false;
         run.advance();
         run.accept(S(0.0));
       }
       for (int k = 0; k < 2 * most_missing; ++k) {
         run.advance();
-        if (!run.is_held()) return false;
+        if (!run.is_held(room)) return false;
       }
     }
     return true;
@@ -299,11 +302,11 @@ class RiccatiGain {
 
   static constexpr std::size_t index(int i) noexcept { return static_cast<std::size_t>(i); }
 
-  /// Gain and covariance are numbers, and will be after two more samples that are missing.
-  [[nodiscard]] bool is_held() const noexcept {
+  /// Gain and covariance times `room` are numbers.
+  [[nodiscard]] bool is_held(const S& room) const noexcept {
     for (int i = 0; i < Size; ++i) {
-      const S ahead = now_.factor.variance(i) * now_.growth * now_.growth;
-      if (!all(is_finite(now_.gain[index(i)])) || !all(is_finite(ahead))) {
+      if (!all(is_finite(now_.gain[index(i)])) ||
+          !all(is_finite(S(now_.factor.variance(i) * room)))) {
         return false;
       }
     }
