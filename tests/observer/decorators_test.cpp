@@ -443,5 +443,42 @@ TEST(WrappedOutput, RetuneOfThePeriod) {
   EXPECT_EQ(angle.period(), 100);
 }
 
+/// A state that turns by more than the scalar holds leaves the count, and the angle that the
+/// observer is fed, without a number; the turn of such a prediction leaves no innovation.
+TEST(WrappedOutput, ComesBackFromASpeedBeyondTheScalar) {
+  using Angle = esokit::WrappedOutput<LinearEso<2>>;
+  using Cascade = esokit::WrappedOutput<esokit::CascadeEso<2, 2>>;
+  auto angle = Angle::make({.observer = {.observer_bandwidth = 4.3,
+                                         .input_gain = -1,
+                                         .sample_time = 0.65,
+                                         .max_gap = 57},
+                            .period = 6.6})
+                   .value();
+  angle.update(0, 0);
+  angle.update(0, 0);
+  ASSERT_EQ(angle.reset({0, -9.6e307, 0}), StepStatus::ok);
+  bool told = false;
+  for (int k = 0; k < 100; ++k) {
+    angle.predict(0);
+    angle.predict(0);
+    told = told || has(angle.update(0, 0), StepStatus::restarted);
+  }
+  EXPECT_TRUE(told);
+  EXPECT_NEAR(angle.estimate()(1), 0, 1e-9);
+
+  auto cascade = Cascade::make({.observer = {.observer_bandwidth = 2,
+                                             .bandwidth_factor = 2,
+                                             .input_gain = 1,
+                                             .sample_time = 0.2,
+                                             .max_gap = 200},
+                                .period = 6.5})
+                     .value();
+  cascade.update(0, 0);
+  cascade.update(0, 9.28e306);
+  for (int k = 0; k < 111; ++k) cascade.predict(0);
+  for (int k = 0; k < 1000; ++k) cascade.update(0, 0);
+  EXPECT_NEAR(cascade.estimate()(1), 0, 1e-9);
+}
+
 }  // namespace
 }  // namespace esokit_test

@@ -29,6 +29,9 @@ namespace esokit {
 /// counted again. Once y is good turns are counted right from the 30th measurement on, whatever was
 /// before, and from there the observer converges as it does without turns.
 ///
+/// A state that a good y cannot correct, or whose turns the scalar cannot hold, restarts from y and
+/// is reported as `restarted`.
+///
 /// An axis that turns by more than half a period a sample cannot be told from a slower one: the
 /// actuator must not be able to bring it there.
 template <ShiftableOutput Observer>
@@ -102,6 +105,11 @@ class WrappedOutput : public Adapter<Observer> {
   StepStatus correct(S y) noexcept {
     Reading reading = read(y, this->missed());
     if (!reading.usable) return StepStatus::measurement_rejected;
+    if (reading.fits && !is_finite(reading.turns * period_)) [[unlikely]] {
+      // The prediction has run off by more turns than the scalar holds: what it says of the turn
+      // would leave no innovation that leads back.
+      return restart(reading);
+    }
     if (!reading.counted) {
       // The innovation is that of level 1, whose z_1 the correction will subtract.
       const S predicted = observer_.level_estimate(0)(0);
@@ -212,10 +220,19 @@ class WrappedOutput : public Adapter<Observer> {
     return count_.motion * (static_cast<S>(samples) / static_cast<S>(count_.samples));
   }
 
+  StepStatus restart(const Reading& reading) noexcept {
+    return reset(reading.y) == StepStatus::ok ? StepStatus::restarted
+                                              : StepStatus::measurement_rejected;
+  }
+
   /// Takes over what the observer has taken.
   StepStatus keep(const Reading& reading, StepStatus status) noexcept {
-    if (!has(status, StepStatus::measurement_rejected) &&
-        !has(status, StepStatus::outlier_rejected)) {
+    // y can be held, so it is the state that cannot be corrected with it.
+    if (has(status, StepStatus::measurement_rejected)) [[unlikely]] {
+      const bool input = has(status, StepStatus::input_rejected);
+      return restart(reading) | (input ? StepStatus::input_rejected : StepStatus::ok);
+    }
+    if (!has(status, StepStatus::outlier_rejected)) {
       learn_motion(reading);
       count_.y = reading.y;
       count_.turns = reading.turns;
