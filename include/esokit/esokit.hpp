@@ -29,6 +29,7 @@
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/control/scaled_law.hpp>
 #include <esokit/control/tracking_differentiator.hpp>
+#include <esokit/core/check.hpp>
 #include <esokit/core/combinatorics.hpp>
 #include <esokit/core/declared.hpp>
 #include <esokit/core/error.hpp>
@@ -46,7 +47,6 @@
 #include <esokit/core/type_tag.hpp>
 #include <esokit/core/unroll.hpp>
 #include <esokit/core/version.hpp>
-#include <esokit/design/check.hpp>
 #include <esokit/design/continuous_gain.hpp>
 #include <esokit/design/covariance_factor.hpp>
 #include <esokit/design/covariance_root.hpp>

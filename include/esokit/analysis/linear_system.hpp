@@ -4,11 +4,11 @@
 
 #include <cmath>
 #include <esokit/analysis/dense.hpp>
+#include <esokit/core/check.hpp>
 #include <esokit/core/error.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/unroll.hpp>
-#include <esokit/design/check.hpp>
 
 namespace esokit {
 

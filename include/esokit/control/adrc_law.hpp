@@ -2,11 +2,11 @@
 /// The control law of active disturbance rejection control (ADRC) on an observer's estimate.
 #pragma once
 
+#include <esokit/core/check.hpp>
 #include <esokit/core/combinatorics.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/unroll.hpp>
-#include <esokit/design/check.hpp>
 #include <optional>
 
 namespace esokit {

@@ -2,8 +2,8 @@
 /// Incremental: a controller whose output is the change of u, for an actuator that integrates.
 #pragma once
 
+#include <esokit/core/check.hpp>
 #include <esokit/core/type_tag.hpp>
-#include <esokit/design/check.hpp>
 #include <esokit/observer/step_status.hpp>
 #include <limits>
 

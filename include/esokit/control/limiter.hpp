@@ -2,8 +2,8 @@
 /// Magnitude and rate limits of an actuator.
 #pragma once
 
+#include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
-#include <esokit/design/check.hpp>
 #include <limits>
 
 namespace esokit {

@@ -2,11 +2,11 @@
 /// Han's nonlinear state error feedback.
 #pragma once
 
+#include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/fal.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/unroll.hpp>
-#include <esokit/design/check.hpp>
 #include <utility>
 
 namespace esokit {

@@ -3,9 +3,9 @@
 #pragma once
 
 #include <cmath>
+#include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/matrix.hpp>
-#include <esokit/design/check.hpp>
 
 namespace esokit {
 

@@ -8,10 +8,10 @@
 /// likes too; it is as accurate, and 1.4 times faster for N = 3.
 #pragma once
 
+#include <esokit/core/check.hpp>
 #include <esokit/core/combinatorics.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/unroll.hpp>
-#include <esokit/design/check.hpp>
 #include <esokit/design/sampled_gain.hpp>
 #include <limits>
 #include <optional>

@@ -3,8 +3,8 @@
 /// sampled observers are tested alike.
 #pragma once
 
+#include <esokit/core/check.hpp>
 #include <esokit/core/matrix.hpp>
-#include <esokit/design/check.hpp>
 #include <esokit/design/sampled_gain.hpp>
 
 namespace esokit {

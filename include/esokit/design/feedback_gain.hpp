@@ -5,9 +5,9 @@
 
 #include <cmath>
 #include <complex>
+#include <esokit/core/check.hpp>
 #include <esokit/core/combinatorics.hpp>
 #include <esokit/core/unroll.hpp>
-#include <esokit/design/check.hpp>
 #include <esokit/design/continuous_gain.hpp>
 #include <esokit/design/half_gain.hpp>
 #include <esokit/design/sampled_gain.hpp>

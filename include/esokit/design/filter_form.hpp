@@ -22,8 +22,8 @@
 /// 1/(1-rho)^N of that.
 #pragma once
 
+#include <esokit/core/check.hpp>
 #include <esokit/core/combinatorics.hpp>
-#include <esokit/design/check.hpp>
 #include <esokit/design/sampled_gain.hpp>
 
 namespace esokit {

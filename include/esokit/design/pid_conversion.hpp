@@ -14,7 +14,7 @@
 #pragma once
 
 #include <cmath>
-#include <esokit/design/check.hpp>
+#include <esokit/core/check.hpp>
 #include <limits>
 
 namespace esokit {

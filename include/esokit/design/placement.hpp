@@ -6,9 +6,9 @@
 #pragma once
 
 #include <complex>
+#include <esokit/core/check.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/type_tag.hpp>
-#include <esokit/design/check.hpp>
 #include <esokit/design/continuous_gain.hpp>
 #include <esokit/design/sampled_gain.hpp>
 

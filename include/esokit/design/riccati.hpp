@@ -11,9 +11,9 @@
 #pragma once
 
 #include <cmath>
+#include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/matrix.hpp>
-#include <esokit/design/check.hpp>
 #include <esokit/design/covariance_factor.hpp>
 #include <esokit/design/sampled_gain.hpp>
 #include <limits>

@@ -20,8 +20,8 @@
 
 #include <cmath>
 #include <cstdint>
+#include <esokit/core/check.hpp>
 #include <esokit/core/type_tag.hpp>
-#include <esokit/design/check.hpp>
 #include <esokit/design/sampled_gain.hpp>
 #include <esokit/observer/gain_law.hpp>
 #include <limits>

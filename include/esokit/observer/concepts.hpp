@@ -13,9 +13,9 @@
 #pragma once
 
 #include <concepts>
+#include <esokit/core/check.hpp>
 #include <esokit/core/declared.hpp>
 #include <esokit/core/scalar.hpp>
-#include <esokit/design/check.hpp>
 #include <esokit/observer/gain_law.hpp>
 #include <esokit/observer/step_status.hpp>
 

@@ -2,10 +2,10 @@
 /// The continuous-time observer as an ODE, for simulation the way the papers do it.
 #pragma once
 
+#include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/unroll.hpp>
-#include <esokit/design/check.hpp>
 #include <esokit/model/integrator_chain.hpp>
 #include <esokit/observer/gain_law.hpp>
 

@@ -3,10 +3,10 @@
 #pragma once
 
 #include <cstdint>
+#include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/core/unroll.hpp>
-#include <esokit/design/check.hpp>
 #include <esokit/model/scaled_chain.hpp>
 #include <esokit/observer/concepts.hpp>
 #include <esokit/observer/gain_law.hpp>

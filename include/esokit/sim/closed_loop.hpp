@@ -6,9 +6,9 @@
 #include <cmath>
 #include <concepts>
 #include <cstdint>
+#include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/matrix.hpp>
-#include <esokit/design/check.hpp>
 #include <esokit/observer/step_status.hpp>
 #include <esokit/sim/plant.hpp>
 #include <esokit/sim/runge_kutta.hpp>

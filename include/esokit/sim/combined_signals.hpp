@@ -3,9 +3,9 @@
 #pragma once
 
 #include <cstddef>
+#include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/unroll.hpp>
-#include <esokit/design/check.hpp>
 #include <esokit/sim/signal.hpp>
 #include <utility>
 

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
-#include <esokit/design/check.hpp>
 #include <esokit/sim/runge_kutta.hpp>
 
 namespace esokit::sim {

@@ -9,9 +9,9 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/unroll.hpp>
-#include <esokit/design/check.hpp>
 #include <esokit/sim/signal.hpp>
 
 namespace esokit::sim {

@@ -4,10 +4,10 @@
 
 #include <cmath>
 #include <cstddef>
+#include <esokit/core/check.hpp>
 #include <esokit/core/combinatorics.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/unroll.hpp>
-#include <esokit/design/check.hpp>
 #include <esokit/sim/signal.hpp>
 #include <limits>
 

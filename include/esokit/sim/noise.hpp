@@ -4,8 +4,8 @@
 
 #include <cmath>
 #include <cstdint>
+#include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
-#include <esokit/design/check.hpp>
 #include <esokit/sim/gaussian.hpp>
 #include <limits>
 

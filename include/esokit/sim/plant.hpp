@@ -4,10 +4,10 @@
 
 #include <concepts>
 #include <cstddef>
+#include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/unroll.hpp>
-#include <esokit/design/check.hpp>
 #include <esokit/sim/signals.hpp>
 #include <type_traits>
 #include <utility>

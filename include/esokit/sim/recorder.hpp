@@ -7,10 +7,10 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdio>
+#include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/scalar.hpp>
 #include <esokit/core/unroll.hpp>
-#include <esokit/design/check.hpp>
 #include <esokit/sim/file_error.hpp>
 #include <memory>
 #include <optional>

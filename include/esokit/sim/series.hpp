@@ -3,8 +3,8 @@
 #pragma once
 
 #include <cstddef>
+#include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
-#include <esokit/design/check.hpp>
 #include <span>
 
 namespace esokit::sim {

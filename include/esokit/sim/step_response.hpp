@@ -2,8 +2,8 @@
 /// Overshoot, settling time and rise time of a response to a step.
 #pragma once
 
+#include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
-#include <esokit/design/check.hpp>
 #include <limits>
 #include <optional>
 

@@ -2,8 +2,8 @@
 /// The time window of a criterion.
 #pragma once
 
+#include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
-#include <esokit/design/check.hpp>
 #include <limits>
 
 namespace esokit::sim {

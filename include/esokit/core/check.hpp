@@ -1,0 +1,263 @@
+/// @file
+/// The rules that configs are checked against, each with its own wording.
+#pragma once
+
+#include <cstdlib>
+#include <esokit/core/error.hpp>
+#include <esokit/core/expected.hpp>
+#include <esokit/core/scalar.hpp>
+#include <esokit/core/unroll.hpp>
+#include <limits>
+
+namespace esokit {
+
+/// Outcome of a check: success, or the error of the value.
+template <Scalar S>
+using Check = Expected<void, Error<S>>;
+
+namespace detail {
+
+/// Smallest positive normal number of the scalar, or of double for types that do not say.
+template <Scalar S>
+constexpr S smallest_normal() noexcept {
+  if constexpr (std::numeric_limits<S>::is_specialized) {
+    return (std::numeric_limits<S>::min)();
+  } else {
+    return S((std::numeric_limits<double>::min)());
+  }
+}
+
+template <Scalar S>
+constexpr S magnitude(const S& value) noexcept {
+  return select(value < S(0.0), S(-value), value);
+}
+
+/// A normal number, neither infinite nor lost in the subnormals.
+template <Scalar S>
+constexpr bool normal(const S& value) {
+  return all(is_finite(value)) && all(magnitude(value) >= smallest_normal<S>());
+}
+
+}  // namespace detail
+
+/// The rules of a config, in the order in which they are read: the first one broken is the error,
+/// what comes after it changes nothing.
+///
+///     Rules<S> rules;
+///     rules.positive("sample_time", config.sample_time).finite("gains", config.gains);
+///     if (!rules) return rules.error();
+///
+/// All of them are evaluated, as a comparison costs less than a branch; what computes with a value
+/// that an earlier rule is about goes into `and_then`. A list of values, in the place of one, is
+/// checked element by element and the error has the index.
+template <Scalar S>
+class [[nodiscard]] Rules {
+ public:
+  /// True if no rule is broken so far.
+  [[nodiscard]] constexpr explicit operator bool() const noexcept { return !broken_; }
+
+  /// The first broken rule; aborts if there is none.
+  [[nodiscard]] constexpr const Error<S>& error() const noexcept {
+    if (!broken_) std::abort();
+    return error_;
+  }
+
+  /// So that a function that returns `Check` can return its rules.
+  constexpr operator Check<S>() const {
+    if (broken_) return error_;
+    return {};
+  }
+
+  // Each rule tests finiteness by bits before it compares: under -ffast-math a comparison with NaN
+  // may go either way. They are out of line, as `make` is not where time counts and firmware has
+  // every rule many times.
+
+  /// Neither NaN nor infinite.
+  ESOKIT_COLD constexpr Rules& finite(const char* field, const S& value, int index = -1) {
+    return require(all(is_finite(value)), field, value, "must be finite", index);
+  }
+
+  /// Finite and above zero.
+  ESOKIT_COLD constexpr Rules& positive(const char* field, const S& value, int index = -1) {
+    return require(all(is_finite(value)) && all(value > S(0.0)), field, value,
+                   "must be finite and positive", index);
+  }
+
+  /// Finite and zero or above.
+  ESOKIT_COLD constexpr Rules& not_negative(const char* field, const S& value, int index = -1) {
+    return require(all(is_finite(value)) && all(value >= S(0.0)), field, value,
+                   "must be finite and not negative", index);
+  }
+
+  /// Finite and not zero; either sign.
+  ESOKIT_COLD constexpr Rules& nonzero(const char* field, const S& value, int index = -1) {
+    return require(all(is_finite(value)) && all(detail::magnitude(value) > S(0.0)), field, value,
+                   "must be finite and not zero (negative is fine)", index);
+  }
+
+  /// Not zero, and neither overflowed nor subnormal as a divisor.
+  ESOKIT_COLD constexpr Rules& invertible(const char* field, const S& value, int index = -1) {
+    nonzero(field, value, index);
+    if (broken_) return *this;
+    return representable(field, value, S(S(1.0) / value),
+                         "has an inverse that the scalar cannot hold", index);
+  }
+
+  /// Finite and above a limit, which the error carries.
+  ESOKIT_COLD constexpr Rules& above(const char* field, const S& value, const S& limit) {
+    return require(all(is_finite(value)) && all(value > limit),
+                   {field, value, "must be finite and above", -1, limit, true});
+  }
+
+  /// `derived` is a normal number, neither overflowed nor lost in the subnormals; the error names
+  /// the config field that it was computed from.
+  ESOKIT_COLD constexpr Rules& representable(const char* field, const S& value, const S& derived,
+                                             const char* rule, int index = -1) {
+    return require(detail::normal(derived), field, value, rule, index);
+  }
+
+  /// As it is in a config that does not mention it: zero.
+  ESOKIT_COLD constexpr Rules& left_out(const char* field, const S& value, const char* rule) {
+    return require(all(is_finite(value)) && !all(detail::magnitude(value) > S(0.0)), field, value,
+                   rule);
+  }
+
+  /// Each element of a list.
+  /// @{
+  template <class List>
+  requires(!std::convertible_to<List, S>) constexpr Rules& finite(const char* field,
+                                                                  const List& values) {
+    return each(values, [&](const S& value, int i) { finite(field, value, i); });
+  }
+  template <class List>
+  requires(!std::convertible_to<List, S>) constexpr Rules& positive(const char* field,
+                                                                    const List& values) {
+    return each(values, [&](const S& value, int i) { positive(field, value, i); });
+  }
+  template <class List>
+  requires(!std::convertible_to<List, S>) constexpr Rules& not_negative(const char* field,
+                                                                        const List& values) {
+    return each(values, [&](const S& value, int i) { not_negative(field, value, i); });
+  }
+  /// @}
+
+  /// A rule of your own: an error of `value` unless `kept`.
+  constexpr Rules& require(bool kept, const char* field, const S& value, const char* rule,
+                           int index = -1) {
+    if (!kept) break_by(field, value, rule, index);
+    return *this;
+  }
+
+  /// The same with a limit in the error, or whatever else it says.
+  constexpr Rules& require(bool kept, const Error<S>& error) {
+    if (!kept) break_by(error);
+    return *this;
+  }
+
+  /// The rules that another function checked: `Check`, `Rules`, or an `Expected`.
+  template <class Outcome>
+  constexpr Rules& all_of(const Outcome& outcome) {
+    if (!outcome) break_by(outcome.error());
+    return *this;
+  }
+
+  /// The rules that `check()` reads once all rules before are kept.
+  template <class F>
+  constexpr Rules& and_then(const F& check) {
+    return broken_ ? *this : all_of(check());
+  }
+
+ private:
+  ESOKIT_COLD constexpr void break_by(const char* field, const S& value, const char* rule,
+                                      int index) {
+    if (!broken_) error_ = {field, value, rule, index};
+    broken_ = true;
+  }
+
+  ESOKIT_COLD constexpr void break_by(const Error<S>& error) {
+    if (!broken_) error_ = error;
+    broken_ = true;
+  }
+
+  template <class List, class F>
+  constexpr Rules& each(const List& values, const F& check) {
+    int i = 0;
+    for (const S& value : values) check(value, i++);
+    return *this;
+  }
+
+  Error<S> error_{};
+  bool broken_ = false;
+};
+
+// Each check tests finiteness by bits before it compares: under -ffast-math a comparison with NaN
+// may go either way.
+
+/// Neither NaN nor infinite.
+template <Scalar S>
+constexpr Check<S> check_finite(const char* field, const S& value, int index = -1) {
+  if (!all(is_finite(value))) return Error<S>{field, value, "must be finite", index};
+  return {};
+}
+
+/// Finite and above zero.
+template <Scalar S>
+constexpr Check<S> check_positive(const char* field, const S& value, int index = -1) {
+  if (!all(is_finite(value)) || !all(value > S(0.0))) {
+    return Error<S>{field, value, "must be finite and positive", index};
+  }
+  return {};
+}
+
+/// Finite and zero or above.
+template <Scalar S>
+constexpr Check<S> check_not_negative(const char* field, const S& value, int index = -1) {
+  if (!all(is_finite(value)) || !all(value >= S(0.0))) {
+    return Error<S>{field, value, "must be finite and not negative", index};
+  }
+  return {};
+}
+
+/// Finite and not zero; either sign.
+template <Scalar S>
+constexpr Check<S> check_nonzero(const char* field, const S& value, int index = -1) {
+  if (!all(is_finite(value)) || !all(detail::magnitude(value) > S(0.0))) {
+    return Error<S>{field, value, "must be finite and not zero (negative is fine)", index};
+  }
+  return {};
+}
+
+/// Finite and above a limit, which the error carries.
+template <Scalar S>
+constexpr Check<S> check_above(const char* field, const S& value, const S& limit) {
+  if (!all(is_finite(value)) || !all(value > limit)) {
+    return Error<S>{field, value, "must be finite and above", -1, limit, true};
+  }
+  return {};
+}
+
+/// `derived` is a normal number, neither overflowed nor lost in the subnormals; the error names the
+/// config field that it was computed from.
+template <Scalar S>
+constexpr Check<S> check_representable(const char* field, const S& value, const S& derived,
+                                       const char* rule, int index = -1) {
+  if (!all(is_finite(derived)) ||
+      !all(detail::magnitude(derived) >= detail::smallest_normal<S>())) {
+    return Error<S>{field, value, rule, index};
+  }
+  return {};
+}
+
+namespace detail {
+
+/// `retune` of all that has `make` and `adopt`: designs once.
+template <class T>
+Check<typename T::scalar_type> retune(T& object, const typename T::Config& config) {
+  const auto fresh = T::make(config);
+  if (!fresh) return fresh.error();
+  return object.adopt(*fresh);
+}
+
+}  // namespace detail
+
+}  // namespace esokit
