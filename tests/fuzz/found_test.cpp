@@ -5,8 +5,11 @@
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/dual_feedback.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
+#include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/outlier_gate.hpp>
+#include <esokit/observer/wrapped_output.hpp>
 #include <limits>
 
 namespace {
@@ -207,6 +210,27 @@ TEST(Found, FilterWithAGateComesBackFromAnyInput) {
     EXPECT_NEAR(filter.estimate()(0), 1.25f, 1e-3f) << u;
     EXPECT_NEAR(filter.total_disturbance(), 0, 1e-3f) << u;
   }
+}
+
+/// A gate around which turns were counted only between what it let in: a motion of before, that no
+/// rejected measurement could correct, and good samples went between accepted and rejected for
+/// good.
+TEST(Found, AngleWithAGateComesBack) {
+  using Angle = esokit::WrappedOutput<esokit::OutlierGate<esokit::CascadeEso<2, 2>>>;
+  auto angle = Angle::make({.observer = {.observer = {.observer_bandwidth = 31.432730180611802,
+                                                      .bandwidth_factor = 2.461588955951397,
+                                                      .input_gain = 29461,
+                                                      .sample_time = 0.014681177493137791},
+                                         .threshold = 2.8093840962100143,
+                                         .most_in_a_row = 1},
+                            .period = 6.2163995168819151})
+                   .value();
+  ASSERT_EQ(angle.reset({0, 0, 4907.3929242982693}), StepStatus::ok);
+  angle.update(-1.4685115936333686, 0);
+  for (int k = 0; k < 1000; ++k) angle.update(1.25, 0);
+  EXPECT_EQ(angle.update(1.25, 0), StepStatus::ok);
+  EXPECT_NEAR(angle.estimate()(0), 1.25, 1e-9);
+  EXPECT_NEAR(angle.total_disturbance(), 0, 1e-6);
 }
 
 }  // namespace

@@ -106,6 +106,35 @@ TEST(OutlierGate, Angle) {
   }
 }
 
+/// From any state, of an axis at any speed: where turns were counted only between the measurements
+/// that the gate let in, the two together could keep a wrong speed for good.
+TEST(OutlierGate, AngleComesBackFromAnyState) {
+  Random random(5);
+  for (int trial = 0; trial < 2000; ++trial) {
+    const double omega_T = random.uniform(0.2, 1.5);
+    const double period = random.log_uniform(0.1, 1000);
+    auto axis = WrappedOutput<OutlierGate<LinearEso<2>>>::make(
+                    {.observer = {.observer = with<LinearEso<2>>({}, omega_T),
+                                  .threshold = period * random.uniform(0.02, 1),
+                                  .most_in_a_row = 1 + random.index(8)},
+                     .period = period})
+                    .value();
+    const double speed = period * random.uniform(-0.45, 0.45);  // a sample
+    double y = 0;
+    const auto step = [&] {
+      y += speed;
+      return axis.update(y - period * std::floor(y / period), 0);
+    };
+    ASSERT_EQ(axis.reset({0, period * random.uniform(-9, 9) / sample_time,
+                          period * random.uniform(-9, 9) / (sample_time * sample_time)}),
+              StepStatus::ok);
+    for (int k = 0; k < random.index(4); ++k) (void)axis.update(period * random.uniform(0, 1), 0);
+    for (int k = 0; k < 1000; ++k) (void)step();
+    ASSERT_EQ(step(), StepStatus::ok) << trial;
+    ASSERT_NEAR(axis.estimate<1>() * sample_time / period, speed / period, 1e-9) << trial;
+  }
+}
+
 /// A true step of any size: so many samples late, no more, and then the observer follows it as one
 /// that began there would.
 TEST(OutlierGate, OpensAfterAStepOfAnySize) {

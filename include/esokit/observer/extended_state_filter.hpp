@@ -74,6 +74,7 @@ class ExtendedStateFilter
     ObserverTraits traits = Base::traits;
     traits.acts_by_gain = !has_model;
     traits.gates_outliers = true;
+    traits.rejects_outliers = true;
     return traits;
   }();
 

@@ -31,6 +31,13 @@ class OutlierGate : public Adapter<Observer> {
                 "esokit: WrappedOutput goes around OutlierGate: it counts the turns");
 
  public:
+  /// What it is beyond LoopObserver.
+  static constexpr ObserverTraits traits = [] {
+    ObserverTraits traits = Base::traits;
+    traits.rejects_outliers = true;
+    return traits;
+  }();
+
   /// Settings of make.
   struct Config {
     typename Observer::Config observer{};  ///< of the observer itself

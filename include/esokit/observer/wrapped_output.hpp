@@ -7,6 +7,7 @@
 #include <esokit/core/type_tag.hpp>
 #include <esokit/observer/adapter.hpp>
 #include <limits>
+#include <type_traits>
 
 namespace esokit {
 
@@ -31,6 +32,10 @@ namespace esokit {
 ///
 /// A state that a good y cannot correct, or whose turns the scalar cannot hold, restarts from y and
 /// is reported as `restarted`.
+///
+/// Around a gate a rejected measurement is a missing one, unless the last eight measurements and
+/// all since the gate last let one in moved as the second rule says: then it is the estimate that
+/// is wrong, and turns are counted through what the gate rejected.
 ///
 /// An axis that turns by more than half a period a sample cannot be told from a slower one: the
 /// actuator must not be able to bring it there.
@@ -78,7 +83,7 @@ class WrappedOutput : public Adapter<Observer> {
     if (fresh.period_ < period_ || fresh.period_ > period_) {
       period_ = fresh.period_;
       inverse_period_ = fresh.inverse_period_;
-      count_ = Count{};
+      forget();
       recentre();
     }
     return {};
@@ -87,7 +92,7 @@ class WrappedOutput : public Adapter<Observer> {
   /// One sample, see PredictorCorrector::update. @param y in any branch; one so large that its
   /// rounding is an eighth of a period is rejected
   StepStatus update(S y, S u_applied) noexcept {
-    if (const Reading reading = read(y, this->missed() + 1); reading.counted) [[likely]] {
+    if (const Reading reading = take(y, this->missed() + 1); reading.counted) [[likely]] {
       return keep(reading, observer_.update(reading.y + reading.turns * period_, u_applied));
     }
     const StepStatus predicted = predict(u_applied);
@@ -103,7 +108,7 @@ class WrappedOutput : public Adapter<Observer> {
 
   /// Measurement update alone. @param y in any branch
   StepStatus correct(S y) noexcept {
-    Reading reading = read(y, this->missed());
+    Reading reading = take(y, this->missed());
     if (!reading.usable) return StepStatus::measurement_rejected;
     if (reading.fits && !is_finite(reading.turns * period_)) [[unlikely]] {
       // The prediction has run off by more turns than the scalar holds: what it says of the turn
@@ -160,20 +165,33 @@ class WrappedOutput : public Adapter<Observer> {
     bool begun = false;            ///< there is a last measurement
   };
 
+  /// The same of every measurement, whatever a gate makes of it. What the gate lets in depends on
+  /// the estimate: turns that are counted between those alone may keep a wrong one for good.
+  struct Heard {
+    Count count{};
+    std::uint16_t at = 0;       ///< missed() at the last one
+    std::uint8_t steady = 0;    ///< in a row that moved as before, 255 at most
+    std::uint8_t rejected = 0;  ///< since the gate last let one in, 255 at most
+  };
+
   /// What a measurement is taken for.
   struct Reading {
     S y{};                 ///< wrapped
     S turns{};             ///< if counted
     S step{};              ///< from the last measurement, to the nearest period
     int samples = 0;       ///< since then
+    int missed = 0;        ///< samples since a measurement was let in
     bool usable = false;   ///< its branch can be told
     bool fits = true;      ///< it moved as before
     bool counted = false;  ///< false: the turn is that of the prediction
+    bool heard = false;    ///< its turn is counted through rejected ones
   };
 
   static constexpr std::uint16_t none = 65535;
   static constexpr std::uint8_t most_doubts = 3;
   static constexpr std::uint8_t most_gaps = 8;
+  static constexpr std::uint8_t enough_steady = 8;
+  static constexpr bool gated = observer_traits<Observer>.rejects_outliers;
 
   WrappedOutput(const Observer& observer, const S& period) noexcept
       : Base(observer), period_(period), inverse_period_(S(1) / period) {}
@@ -187,37 +205,54 @@ class WrappedOutput : public Adapter<Observer> {
     return is_finite(turns) && detail::absolute(turns) < most_turns;
   }
 
-  [[nodiscard]] Reading read(const S& y, int samples) const noexcept {
+  /// A measurement, `missed` samples after the last one that was let in.
+  [[nodiscard]] Reading take(const S& y, int missed) const noexcept {
+    Reading reading = read(count_, y, missed);
+    reading.missed = missed;
+    if constexpr (gated) {
+      if (heard_.rejected > 0 && heard_.steady >= enough_steady &&
+          heard_.steady >= heard_.rejected) {
+        Reading heard = read(heard_.count, y, missed - heard_.at);
+        if (!heard.fits || !heard.counted) return reading;
+        heard.missed = missed;
+        heard.heard = true;
+        return heard;
+      }
+    }
+    return reading;
+  }
+
+  [[nodiscard]] Reading read(const Count& count, const S& y, int samples) const noexcept {
     Reading reading;
     if (!can_be_told(y)) [[unlikely]]
       return reading;
     reading.usable = true;
     reading.y = wrap(y);
     reading.samples = samples;
-    if (!count_.begun) [[unlikely]]
+    if (!count.begun) [[unlikely]]
       return reading;
-    const S change = reading.y - count_.y;
+    const S change = reading.y - count.y;
     reading.step = wrap(change);
-    const S expected = expected_motion(samples);
+    const S expected = expected_motion(count, samples);
     const S crossed = detail::absolute(S(expected - change)) <= half_period()
                           ? S(0)
                           : (std::round)((expected - change) * inverse_period_);
     const S motion = change + crossed * period_;
-    if (count_.samples != none) {
+    if (count.samples != none) {
       const S quarter = half_period() * static_cast<S>(0.5);
       reading.fits = detail::absolute(motion - expected) <= quarter &&
-                     (samples > count_.samples || detail::absolute(motion) <= half_period());
+                     (samples > count.samples || detail::absolute(motion) <= half_period());
     }
-    reading.turns = count_.turns + crossed;
+    reading.turns = count.turns + crossed;
     reading.counted =
-        (reading.fits || count_.doubts >= most_doubts) && is_finite(reading.turns * period_);
+        (reading.fits || count.doubts >= most_doubts) && is_finite(reading.turns * period_);
     return reading;
   }
 
-  [[nodiscard]] S expected_motion(int samples) const noexcept {
-    if (count_.samples == none || samples == 0) return S(0);
-    if (samples == count_.samples) return count_.motion;
-    return count_.motion * (static_cast<S>(samples) / static_cast<S>(count_.samples));
+  [[nodiscard]] static S expected_motion(const Count& count, int samples) noexcept {
+    if (count.samples == none || samples == 0) return S(0);
+    if (samples == count.samples) return count.motion;
+    return count.motion * (static_cast<S>(samples) / static_cast<S>(count.samples));
   }
 
   StepStatus restart(const Reading& reading) noexcept {
@@ -232,40 +267,80 @@ class WrappedOutput : public Adapter<Observer> {
       const bool input = has(status, StepStatus::input_rejected);
       return restart(reading) | (input ? StepStatus::input_rejected : StepStatus::ok);
     }
-    if (!has(status, StepStatus::outlier_rejected)) {
-      learn_motion(reading);
-      count_.y = reading.y;
-      count_.turns = reading.turns;
-      if (reading.fits) {
-        count_.doubts = 0;
-      } else {
-        if (count_.doubts < most_doubts) ++count_.doubts;
-        status |= StepStatus::turn_assumed;
+    if constexpr (gated) {
+      if (has(status, StepStatus::outlier_rejected)) {
+        hear(reading);
+        recentre();
+        return status;
       }
-      count_.begun = true;
+    }
+    if (!reading.fits) status |= StepStatus::turn_assumed;
+    if constexpr (gated) {
+      if (!reading.heard) learn(count_, reading);
+      hear(reading);
+      // Turns count from what the observer has taken.
+      if (reading.heard) {
+        count_ = heard_.count;
+      } else {
+        heard_.count.turns = count_.turns;
+      }
+      heard_.at = 0;
+      heard_.rejected = 0;
+    } else {
+      learn(count_, reading);
     }
     recentre();
     return status;
   }
 
-  void learn_motion(const Reading& reading) noexcept {
-    if (!count_.begun || reading.samples == 0) return;
-    if (reading.samples > count_.samples) {
+  void hear(const Reading& taken) noexcept requires(gated) {
+    const Reading reading = read(heard_.count, taken.y, taken.missed - heard_.at);
+    const bool steady = reading.fits && heard_.count.samples != none;
+    heard_.steady = steady ? one_more(heard_.steady) : std::uint8_t{0};
+    heard_.rejected = one_more(heard_.rejected);
+    heard_.at = static_cast<std::uint16_t>(taken.missed);
+    learn(heard_.count, reading);
+  }
+
+  [[nodiscard]] static std::uint8_t one_more(std::uint8_t count) noexcept {
+    return static_cast<std::uint8_t>(count < 255 ? count + 1 : count);
+  }
+
+  static void learn(Count& count, const Reading& reading) noexcept {
+    learn_motion(count, reading);
+    count.y = reading.y;
+    count.turns = reading.turns;
+    if (reading.fits) {
+      count.doubts = 0;
+    } else if (count.doubts < most_doubts) {
+      ++count.doubts;
+    }
+    count.begun = true;
+  }
+
+  static void learn_motion(Count& count, const Reading& reading) noexcept {
+    if (!count.begun || reading.samples == 0) return;
+    if (reading.samples > count.samples) {
       // A gap. That of neighbours is not known for ever, they may not come again.
-      if (++count_.gaps >= most_gaps) count_.samples = none;
+      if (++count.gaps >= most_gaps) count.samples = none;
       return;
     }
-    count_.gaps = 0;
-    if (reading.samples < count_.samples || count_.doubts >= most_doubts) {
-      count_.motion = reading.step;
-      count_.samples = static_cast<std::uint16_t>(reading.samples);
+    count.gaps = 0;
+    if (reading.samples < count.samples || count.doubts >= most_doubts) {
+      count.motion = reading.step;
+      count.samples = static_cast<std::uint16_t>(reading.samples);
     } else if (reading.fits) {
-      count_.motion += (reading.step - count_.motion) * static_cast<S>(0.125);
+      count.motion += (reading.step - count.motion) * static_cast<S>(0.125);
     }
   }
 
+  void forget() noexcept {
+    count_ = Count{};
+    if constexpr (gated) heard_ = Heard{};
+  }
+
   StepStatus begin(StepStatus status) noexcept {
-    if (status == StepStatus::ok) count_ = Count{};
+    if (status == StepStatus::ok) forget();
     return status;
   }
 
@@ -274,12 +349,16 @@ class WrappedOutput : public Adapter<Observer> {
     if (detail::absolute(z) <= half_period()) [[likely]]
       return;
     const S turns = (std::round)(z * inverse_period_);
-    if (observer_.shift_output(-(turns * period_)) == StepStatus::ok) count_.turns -= turns;
+    if (observer_.shift_output(-(turns * period_)) != StepStatus::ok) return;
+    count_.turns -= turns;
+    if constexpr (gated) heard_.count.turns -= turns;
   }
 
   S period_;
   S inverse_period_;
   Count count_{};
+  struct Nothing {};
+  [[no_unique_address]] std::conditional_t<gated, Heard, Nothing> heard_{};
 };
 
 /// Told apart in snapshots.
