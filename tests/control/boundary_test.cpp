@@ -11,21 +11,13 @@
 #include <limits>
 #include <string>
 #include <support/numbers.hpp>
+#include <support/refusal.hpp>
 
 namespace esokit_test {
 namespace {
 
 using esokit::Adrc;
 using esokit::LinearEso;
-
-/// Field, element and rule of a refusal, or "accepted".
-template <class T, class E>
-std::string refusal(const esokit::Expected<T, E>& made) {
-  if (made) return "accepted";
-  const auto& error = made.error();
-  const std::string place = error.index < 0 ? "" : "[" + std::to_string(error.index) + "]";
-  return error.field + place + ": " + error.rule;
-}
 
 /// Any poles: the filter is the observer with the same poles and the law.
 TEST(Boundary, DualFeedbackWithAnyPoles) {

@@ -11,6 +11,7 @@
 #include <esokit/sim/noise.hpp>
 #include <limits>
 #include <string>
+#include <support/refusal.hpp>
 #include <unsupported/Eigen/MatrixFunctions>
 #include <vector>
 
@@ -18,6 +19,7 @@ namespace {
 
 using namespace esokit;
 using namespace esokit::sim;
+using esokit_test::refusal;
 
 constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -399,17 +401,6 @@ TEST(ClosedLoop, RunsInFloat) {
 
 // ---- refused configs ----
 
-/// `field` or `field[index]`, empty if the run was accepted.
-template <class End>
-std::string refused(const End& end) {
-  if (end) return "";
-  const auto& error = end.error();
-  EXPECT_STRNE(error.rule, "");
-  std::string name = error.field;
-  if (error.index >= 0) name += "[" + std::to_string(error.index) + "]";
-  return name;
-}
-
 TEST(ClosedLoop, RefusesBadConfigs) {
   const auto continuous =
       ContinuousLinearEso<2>::make({.observer_bandwidth = 20.0, .input_gain = -b0}).value();
@@ -417,49 +408,58 @@ TEST(ClosedLoop, RefusesBadConfigs) {
   int called = 0;
   const auto count = [&](const auto&) { ++called; };
   for (const double bad : {not_a_number, infinity, -infinity, 0.0, -1.0}) {
-    EXPECT_EQ(refused(paper.run({.duration = bad, .step = 0.1}, count)), "duration");
-    EXPECT_EQ(refused(paper.run({.duration = 1.0, .step = bad}, count)), "step");
+    EXPECT_EQ(refusal(paper.run({.duration = bad, .step = 0.1}, count)),
+              "duration: must be finite and positive");
+    EXPECT_EQ(refusal(paper.run({.duration = 1.0, .step = bad}, count)),
+              "step: must be finite and positive");
   }
-  EXPECT_EQ(refused(paper.run({.duration = 1.0, .step = 0.3}, count)), "duration");
-  EXPECT_EQ(refused(paper.run({.duration = 0.05, .step = 0.1}, count)), "duration");
-  EXPECT_EQ(refused(paper.run({.duration = 1e300, .step = 1e-300}, count)), "duration");
-  EXPECT_EQ(refused(paper.run({.duration = 1e13, .step = 1.0}, count)), "duration");
-  EXPECT_EQ(refused(paper.run({.duration = 1.0, .step = 0.1, .start_time = infinity}, count)),
-            "start_time");
+  EXPECT_EQ(refusal(paper.run({.duration = 1.0, .step = 0.3}, count)),
+            "duration: must be a whole multiple of step, which is");
+  EXPECT_EQ(refusal(paper.run({.duration = 0.05, .step = 0.1}, count)),
+            "duration: must be a whole multiple of step, which is");
+  EXPECT_EQ(refusal(paper.run({.duration = 1e300, .step = 1e-300}, count)),
+            "duration: must be a whole multiple of step, which is");
+  EXPECT_EQ(refusal(paper.run({.duration = 1e13, .step = 1.0}, count)),
+            "duration: must be a whole multiple of step, which is");
+  EXPECT_EQ(refusal(paper.run({.duration = 1.0, .step = 0.1, .start_time = infinity}, count)),
+            "start_time: must be finite");
   EXPECT_EQ(
-      refused(paper.run({.duration = 1.0, .step = 0.1, .plant_state = {0.0, not_a_number}}, count)),
-      "plant_state[1]");
-  EXPECT_EQ(refused(paper.run(
+      refusal(paper.run({.duration = 1.0, .step = 0.1, .plant_state = {0.0, not_a_number}}, count)),
+      "plant_state[1]: must be finite");
+  EXPECT_EQ(refusal(paper.run(
                 {.duration = 1.0, .step = 0.1, .observer_state = {0.0, 0.0, infinity}}, count)),
-            "observer_state[2]");
+            "observer_state[2]: must be finite");
 
   const auto eso =
       LinearEso<2>::make({.observer_bandwidth = 20.0, .input_gain = -b0, .sample_time = 0.1});
   const SampledLoop deployed{linear_plant(), *eso, error_law};
   for (const double bad : {not_a_number, infinity, -infinity, 0.0, -1.0}) {
-    EXPECT_EQ(refused(deployed.run({.duration = bad, .sample_time = 0.1}, count)), "duration");
-    EXPECT_EQ(refused(deployed.run({.duration = 1.0, .sample_time = bad}, count)), "sample_time");
+    EXPECT_EQ(refusal(deployed.run({.duration = bad, .sample_time = 0.1}, count)),
+              "duration: must be finite and positive");
+    EXPECT_EQ(refusal(deployed.run({.duration = 1.0, .sample_time = bad}, count)),
+              "sample_time: must be finite and positive");
   }
   const auto other = deployed.run({.duration = 1.0, .sample_time = 0.05}, count);
-  ASSERT_EQ(refused(other), "sample_time");
+  ASSERT_EQ(refusal(other), "sample_time: must be that of the observer, which is");
   EXPECT_NEAR(other.error().limit, 0.1, 1e-12);
-  EXPECT_EQ(refused(deployed.run({.duration = 0.25, .sample_time = 0.1}, count)), "duration");
+  EXPECT_EQ(refusal(deployed.run({.duration = 0.25, .sample_time = 0.1}, count)),
+            "duration: must be a whole multiple of sample_time, which is");
   for (const int bad : {0, -1}) {
-    EXPECT_EQ(refused(deployed.run({.duration = 1.0, .sample_time = 0.1, .substeps = bad}, count)),
-              "substeps");
+    EXPECT_EQ(refusal(deployed.run({.duration = 1.0, .sample_time = 0.1, .substeps = bad}, count)),
+              "substeps: must be 1 or more");
   }
-  EXPECT_EQ(refused(deployed.run({.duration = 1.0, .sample_time = 0.1, .start_time = not_a_number},
+  EXPECT_EQ(refusal(deployed.run({.duration = 1.0, .sample_time = 0.1, .start_time = not_a_number},
                                  count)),
-            "start_time");
-  EXPECT_EQ(refused(deployed.run({.duration = 1.0, .sample_time = 0.1, .initial_input = infinity},
+            "start_time: must be finite");
+  EXPECT_EQ(refusal(deployed.run({.duration = 1.0, .sample_time = 0.1, .initial_input = infinity},
                                  count)),
-            "initial_input");
-  EXPECT_EQ(refused(deployed.run(
+            "initial_input: must be finite");
+  EXPECT_EQ(refusal(deployed.run(
                 {.duration = 1.0, .sample_time = 0.1, .plant_state = {infinity, 0.0}}, count)),
-            "plant_state[0]");
+            "plant_state[0]: must be finite");
   EXPECT_EQ(called, 0);
-  EXPECT_EQ(refused(deployed.run({.duration = 1.0, .sample_time = 0.1}, count)), "");
-  EXPECT_EQ(refused(paper.run({.duration = 0.3, .step = 0.1}, count)), "");
+  EXPECT_EQ(refusal(deployed.run({.duration = 1.0, .sample_time = 0.1}, count)), "accepted");
+  EXPECT_EQ(refusal(paper.run({.duration = 0.3, .step = 0.1}, count)), "accepted");
   EXPECT_EQ(called, 11 + 4);
 }
 
