@@ -9,8 +9,11 @@
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/sim/closed_loop.hpp>
+#include <support/refusal.hpp>
 
 namespace {
+
+using esokit_test::refusal;
 
 using namespace esokit;
 using Complex = std::complex<double>;
@@ -157,17 +160,20 @@ TEST(AdrcLoop, TransferFunctionsAreConsistent) {
 
 TEST(AdrcLoop, RefusesWhatDoesNotBelongTogether) {
   const auto sampled = sampled_plant(plant(), T).value();
-  const auto field = [](const auto& loop) { return std::string(loop.error().field); };
+
   EXPECT_EQ(
-      field(adrc_loop(sampled_plant(plant(), 2 * T).value(), observer_with(2.0), law_with(2.0))),
-      "plant.sample_time");
-  EXPECT_EQ(field(adrc_loop(plant(), observer_with(2.0), law_with(2.0))), "plant.sample_time");
-  EXPECT_EQ(field(adrc_loop(sampled, observer_with(2.0), law_with(3.0))), "input_gain");
-  EXPECT_EQ(field(adrc_loop(sampled, observer_with(2.0), law_with(2.0), LoopForm::error_based)),
-            "input_gain");
+      refusal(adrc_loop(sampled_plant(plant(), 2 * T).value(), observer_with(2.0), law_with(2.0))),
+      "plant.sample_time: must be that of the observer, which is");
+  EXPECT_EQ(refusal(adrc_loop(plant(), observer_with(2.0), law_with(2.0))),
+            "plant.sample_time: must be that of the observer, which is");
+  EXPECT_EQ(refusal(adrc_loop(sampled, observer_with(2.0), law_with(3.0))),
+            "input_gain: of the observer must be that of the law, which is");
+  EXPECT_EQ(refusal(adrc_loop(sampled, observer_with(2.0), law_with(2.0), LoopForm::error_based)),
+            "input_gain: of the observer must be minus that of the law, which is");
   auto direct = sampled;
   direct.d(0, 0) = 1.0;
-  EXPECT_EQ(field(adrc_loop(direct, observer_with(2.0), law_with(2.0))), "plant.d");
+  EXPECT_EQ(refusal(adrc_loop(direct, observer_with(2.0), law_with(2.0))),
+            "plant.d: must be zero: y may not follow an input at once");
   EXPECT_FALSE(adrc_loop(sampled, observer_with(2.0), law_with(2.0))->loop_gain(0.0).has_value());
   EXPECT_FALSE(adrc_loop(sampled, observer_with(2.0), law_with(2.0))->loop_gain(400.0).has_value());
 }

@@ -12,6 +12,7 @@
 #include <limits>
 #include <numbers>
 #include <sstream>
+#include <support/refusal.hpp>
 
 #include "loop_traits.hpp"
 
@@ -102,7 +103,8 @@ TEST(Adrc, IsAMemberOfAClass) {
   EXPECT_EQ(drive.step(0.2), u);
   auto config = base();
   config.observer.input_gain = 0;
-  EXPECT_STREQ(Drive::make(config).error().field, "input_gain");
+  EXPECT_EQ(refusal(Drive::make(config)),
+            "input_gain: must be finite and not zero (negative is fine)");
 }
 
 TEST(Adrc, StatusAndModeHaveText) {
@@ -283,8 +285,9 @@ TEST(Adrc, GainsAndRateFollowTheSampleTime) {
   EXPECT_NEAR(controller.update(0.0, 100.0), 0.15, 1e-12);
   for (const double bad : {3 * period, 0.4 * period, 0.0, -1.0, hidden_nan<double>()}) {
     const auto refused = controller.set_step_time(bad);
-    ASSERT_FALSE(refused.has_value()) << bad;
-    EXPECT_STREQ(refused.error().field, "step_time");
+    ASSERT_EQ(refusal(refused), bad > period ? "step_time: must be at most"
+                                             : "step_time: must be finite and at least")
+        << bad;
     EXPECT_EQ(controller.gains()[0], placed(1.5 * period)[0]);
     EXPECT_EQ(controller.observer().step_time(), 1.5 * period);
   }
@@ -429,11 +432,9 @@ TEST(Adrc, Angle) {
   };
   check(OutputBased{});
   check(ErrorBased{});
-  EXPECT_STREQ(Angle::make({.observer = {.observer = base().observer, .period = 0},
-                            .controller_bandwidth = 10})
-                   .error()
-                   .field,
-               "period");
+  EXPECT_EQ(refusal(Angle::make({.observer = {.observer = base().observer, .period = 0},
+                                 .controller_bandwidth = 10})),
+            "period: must be finite and positive");
 }
 
 /// One bad angle, one bad report of u, a start two radians off: the loop ends at its reference, at
@@ -573,18 +574,26 @@ TEST(Adrc, BadConfigIsRefusedByName) {
     auto settings = base();
     change(settings);
     const auto made = Linear::make(settings);
-    return std::string(made ? "accepted" : made.error().field);
+    return refusal(made);
   };
   EXPECT_EQ(field([](auto&) {}), "accepted");
-  EXPECT_EQ(field([](auto& c) { c.limits = {.lower = 1, .upper = -1}; }), "limits.lower");
-  EXPECT_EQ(field([](auto& c) { c.limits = {.lower = 1, .upper = 1}; }), "limits.lower");
-  EXPECT_EQ(field([&](auto& c) { c.limits.upper = nan; }), "limits.upper");
-  EXPECT_EQ(field([](auto& c) { c.limits.rate = -1; }), "limits.rate");
-  EXPECT_EQ(field([](auto& c) { c.limits.rate = 0; }), "limits.rate");
-  EXPECT_EQ(field([](auto& c) { c.controller_bandwidth = 0; }), "controller_bandwidth");
-  EXPECT_EQ(field([](auto& c) { c.controller_bandwidth = -2; }), "controller_bandwidth");
-  EXPECT_EQ(field([&](auto& c) { c.controller_bandwidth = nan; }), "controller_bandwidth");
-  EXPECT_EQ(field([](auto& c) { c.gains = {{1, 2}}; }), "controller_bandwidth");
+  EXPECT_EQ(field([](auto& c) { c.limits = {.lower = 1, .upper = -1}; }),
+            "limits.lower: must be below limits.upper");
+  EXPECT_EQ(field([](auto& c) { c.limits = {.lower = 1, .upper = 1}; }),
+            "limits.lower: must be below limits.upper");
+  EXPECT_EQ(field([&](auto& c) { c.limits.upper = nan; }), "limits.upper: must be finite");
+  EXPECT_EQ(field([](auto& c) { c.limits.rate = -1; }), "limits.rate: must be finite and positive");
+  EXPECT_EQ(field([](auto& c) { c.limits.rate = 0; }), "limits.rate: must be finite and positive");
+  EXPECT_EQ(field([](auto& c) { c.controller_bandwidth = 0; }),
+            "controller_bandwidth: must be finite and positive");
+  EXPECT_EQ(field([](auto& c) { c.controller_bandwidth = -2; }),
+            "controller_bandwidth: must be finite and positive");
+  EXPECT_EQ(field([&](auto& c) { c.controller_bandwidth = nan; }),
+            "controller_bandwidth: must be finite and positive");
+  EXPECT_EQ(field([](auto& c) {
+              c.gains = {{1, 2}};
+            }),
+            "controller_bandwidth: must be left out where gains is given");
   EXPECT_EQ(field([](auto& c) {
               c.gains = {{1, 2}};
               c.controller_bandwidth = 0;
@@ -595,31 +604,36 @@ TEST(Adrc, BadConfigIsRefusedByName) {
               c.controller_bandwidth = 0;
               c.half_gain = true;
             }),
-            "half_gain");
-  EXPECT_EQ(field([](auto& c) { c.observer.input_gain = 0; }), "input_gain");
-  EXPECT_EQ(field([](auto& c) { c.observer.sample_time = 0; }), "sample_time");
-  EXPECT_EQ(field([](auto& c) { c.hold.time = -1; }), "hold.time");
-  EXPECT_EQ(field([](auto& c) { c.hold.time = 1e9; }), "hold.time");
+            "half_gain: must be left out where gains is given");
+  EXPECT_EQ(field([](auto& c) { c.observer.input_gain = 0; }),
+            "input_gain: must be finite and not zero (negative is fine)");
+  EXPECT_EQ(field([](auto& c) { c.observer.sample_time = 0; }),
+            "sample_time: must be finite and positive");
+  EXPECT_EQ(field([](auto& c) { c.hold.time = -1; }), "hold.time: must be finite and not negative");
+  EXPECT_EQ(field([](auto& c) { c.hold.time = 1e9; }), "hold.time: must be below 2^24 samples");
   EXPECT_EQ(field([](auto& c) {
               c.limits.upper = 1;
               c.hold.input = 2;
             }),
-            "hold.input");
+            "hold.input: must not be above limits.upper");
   EXPECT_EQ(field([](auto& c) {
               c.limits.lower = -1;
               c.missing.input = -2;
             }),
-            "missing.input");
-  EXPECT_EQ(field([](auto& c) { c.missing.most = -1; }), "missing.most");
-  EXPECT_EQ(field([](auto& c) { c.missing.most = 65535; }), "missing.most");
-  EXPECT_EQ(field([](auto& c) { c.measurement_divider = 0; }), "measurement_divider");
-  EXPECT_EQ(field([](auto& c) { c.measurement_divider = 101; }), "measurement_divider");
+            "missing.input: must not be below limits.lower");
+  EXPECT_EQ(field([](auto& c) { c.missing.most = -1; }),
+            "missing.most: must be 0 up to 65535 samples, that is");
+  EXPECT_EQ(field([](auto& c) { c.missing.most = 65535; }),
+            "missing.most: must be 0 up to 65535 samples, that is");
+  EXPECT_EQ(field([](auto& c) { c.measurement_divider = 0; }),
+            "measurement_divider: must be 1 .. 1000");
+  EXPECT_EQ(field([](auto& c) { c.measurement_divider = 101; }),
+            "measurement_divider: must not be above the observer's max_gap, which is");
 
   using Delayed = esokit::DelayedInput<LinearEso<2>, 4>;
   for (const int delay : {-1, 5}) {
     const auto refused = Delayed::make({.observer = base().observer, .delay = delay});
-    ASSERT_FALSE(refused.has_value());
-    EXPECT_STREQ(refused.error().field, "delay");
+    ASSERT_EQ(refusal(refused), "delay: must be 0 up to the capacity of the delay line, which is");
     EXPECT_EQ(refused.error().value, delay);
     EXPECT_EQ(refused.error().limit, 4);
   }

@@ -14,6 +14,7 @@
 #include <esokit/control/incremental.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <support/law_registration.hpp>
+#include <support/refusal.hpp>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -220,8 +221,7 @@ struct ControllerLawsOf<Adrc<O, F>> {
     Config bad = config();
     bad.controller_bandwidth = S(-1);
     const auto refused = controller.retune(bad);
-    ASSERT_FALSE(refused.has_value());
-    EXPECT_STREQ(refused.error().field, "controller_bandwidth");
+    ASSERT_EQ(refusal(refused), "controller_bandwidth: must be finite and positive");
     EXPECT_TRUE(same(controller, before));
     bad = config();
     bad.observer = Traits::config(omega_o, period, 0);
@@ -363,8 +363,7 @@ struct ControllerLawsOf<Adrc<O, F>> {
       Config settings = config();
       settings.measurement_divider = 2;
       const auto refused = Controller::make(settings);
-      ASSERT_FALSE(refused.has_value());
-      EXPECT_STREQ(refused.error().field, "measurement_divider");
+      ASSERT_EQ(refusal(refused), "measurement_divider");
     } else {
       constexpr int every = 4;
       Config settings = config();

@@ -13,6 +13,7 @@
 #include <esokit/observer/wrapped_output.hpp>
 #include <limits>
 #include <string>
+#include <support/refusal.hpp>
 
 #include "loop_traits.hpp"
 
@@ -198,34 +199,39 @@ TEST(MimoAdrc, BadConfigIsRefusedByName) {
     auto config = base();
     change(config);
     const auto made = Two::make(config);
-    return made ? esokit::Error<double>{"accepted"} : made.error();
+    return made;
   };
   using C = Two::Config;
-  EXPECT_STREQ(error([](C&) {}).field, "accepted");
+  EXPECT_EQ(refusal(error([](C&) {})), "accepted");
   auto singular = error([](C& c) { c.input_matrix << 1, 2, 2, 4; });
-  EXPECT_STREQ(singular.field, "input_matrix");
-  EXPECT_TRUE(std::isinf(singular.value));
-  EXPECT_STREQ(error([](C& c) { c.input_matrix.setZero(); }).field, "input_matrix");
+  EXPECT_EQ(refusal(singular),
+            "input_matrix: has a condition number (the value here) that must be at most");
+  EXPECT_TRUE(std::isinf(singular.error().value));
+  EXPECT_EQ(refusal(error([](C& c) { c.input_matrix.setZero(); })),
+            "input_matrix: has a condition number (the value here) that must be at most");
   auto ill = error([](C& c) { c.input_matrix << 1, 1, 1, 1.0001; });
-  EXPECT_STREQ(ill.field, "input_matrix");
+  EXPECT_EQ(refusal(ill),
+            "input_matrix: has a condition number (the value here) that must be at most");
   // kappa_1 = 4.0004 * (2 / 0.0001 / ..): by hand (|a|+|c|) (|d|+|b|) / |ad - bc| ~ 4 / 1e-4.
-  EXPECT_NEAR(ill.value, 4e4, 10);
-  EXPECT_EQ(ill.limit, 1000);
+  EXPECT_NEAR(ill.error().value, 4e4, 10);
+  EXPECT_EQ(ill.error().limit, 1000);
   // Units do not matter: rows and columns in other units, the same condition.
-  EXPECT_NEAR(error([](C& c) { c.input_matrix << 1e6, 1e-3, 1, 1.0001e-9; }).value, 4e4, 10);
-  EXPECT_STREQ(error([](C& c) { c.input_matrix << 2e6, 1e-3, 1, 3e-9; }).field, "accepted");
-  EXPECT_STREQ(
-      error([](C& c) { c.input_matrix(0, 1) = std::numeric_limits<double>::quiet_NaN(); }).field,
-      "input_matrix");
-  EXPECT_STREQ(error([](C& c) { c.condition_limit = 1; }).field, "condition_limit");
+  EXPECT_NEAR(error([](C& c) { c.input_matrix << 1e6, 1e-3, 1, 1.0001e-9; }).error().value, 4e4,
+              10);
+  EXPECT_EQ(refusal(error([](C& c) { c.input_matrix << 2e6, 1e-3, 1, 3e-9; })), "accepted");
+  EXPECT_EQ(
+      refusal(error([](C& c) { c.input_matrix(0, 1) = std::numeric_limits<double>::quiet_NaN(); })),
+      "input_matrix[1]: must be finite");
+  EXPECT_EQ(refusal(error([](C& c) { c.condition_limit = 1; })),
+            "condition_limit: must be finite and above");
   auto bandwidth = error([](C& c) { c.controller_bandwidths[1] = 0; });
-  EXPECT_STREQ(bandwidth.field, "controller_bandwidths");
-  EXPECT_EQ(bandwidth.index, 1);
+  EXPECT_EQ(refusal(bandwidth), "controller_bandwidths[1]: must be finite and positive");
   auto gain = error([](C& c) { std::get<1>(c.observers).input_gain = 3; });
-  EXPECT_STREQ(gain.field, "input_gain");
-  EXPECT_EQ(gain.index, 1);
-  EXPECT_STREQ(error([](C& c) { std::get<1>(c.observers).sample_time = 1; }).field, "sample_time");
-  EXPECT_STREQ(error([](C& c) { c.limits[1] = {.lower = 1, .upper = 0}; }).field, "limits.lower");
+  EXPECT_EQ(refusal(gain), "input_gain[1]: must be left out, input_matrix says it");
+  EXPECT_EQ(refusal(error([](C& c) { std::get<1>(c.observers).sample_time = 1; })),
+            "sample_time[1]: must be the same in all channels, as");
+  EXPECT_EQ(refusal(error([](C& c) { c.limits[1] = {.lower = 1, .upper = 0}; })),
+            "limits.lower[1]: must be below limits.upper");
 }
 
 }  // namespace

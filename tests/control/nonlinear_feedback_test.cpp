@@ -5,6 +5,7 @@
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/control/nonlinear_feedback.hpp>
 #include <support/numbers.hpp>
+#include <support/refusal.hpp>
 
 namespace esokit_test {
 namespace {
@@ -47,17 +48,17 @@ TEST(NonlinearFeedback, ExponentOneIsLinear) {
 
 TEST(NonlinearFeedback, RefusesByName) {
   using Law = NonlinearFeedback<2>;
-  const auto refused = [](const Law::Config& config) {
-    const auto made = Law::make(config);
-    EXPECT_FALSE(made.has_value());
-    return std::pair<std::string, int>(made.error().field, made.error().index);
-  };
-  using P = std::pair<std::string, int>;
-  EXPECT_EQ(refused({.input_gain = 0}), P("input_gain", -1));
-  EXPECT_EQ(refused({.exponents = {1, 0}, .input_gain = 1}), P("exponents", 1));
-  EXPECT_EQ(refused({.linear_widths = {0, 1}, .input_gain = 1}), P("linear_widths", 0));
-  EXPECT_EQ(refused({.gains = {1, hidden_nan<double>()}, .input_gain = 1}), P("gains", 1));
-  EXPECT_EQ(refused({.gains = {-1, 1}, .input_gain = 1}), P("gains", 0));
+  const auto refused = [](const Law::Config& config) { return refusal(Law::make(config)); };
+  EXPECT_EQ(refused({.input_gain = 0}),
+            "input_gain: must be finite and not zero (negative is fine)");
+  EXPECT_EQ(refused({.exponents = {1, 0}, .input_gain = 1}),
+            "exponents[1]: must be finite and positive");
+  EXPECT_EQ(refused({.linear_widths = {0, 1}, .input_gain = 1}),
+            "linear_widths[0]: must be finite and positive");
+  EXPECT_EQ(refused({.gains = {1, hidden_nan<double>()}, .input_gain = 1}),
+            "gains[1]: must be finite and not negative");
+  EXPECT_EQ(refused({.gains = {-1, 1}, .input_gain = 1}),
+            "gains[0]: must be finite and not negative");
 }
 
 }  // namespace

@@ -7,8 +7,11 @@
 #include <esokit/design/pid_conversion.hpp>
 #include <esokit/model/integrator_chain.hpp>
 #include <limits>
+#include <support/refusal.hpp>
 
 namespace {
+
+using esokit_test::refusal;
 
 using esokit::AdrcTuning;
 using esokit::PidGains;
@@ -89,11 +92,9 @@ TEST(PidConversion, RefusedWhereThereIsNone) {
         EXPECT_GE(tuning->observer_bandwidth, tuning->controller_bandwidth);
         continue;
       }
-      ASSERT_FALSE(tuning.has_value());
-      EXPECT_STREQ(tuning.error().field, "derivative");
-      EXPECT_STREQ(tuning.error().rule,
-                   "is that of no ADRC with this proportional, integral and bandwidth_ratio; the "
-                   "nearest that is");
+      ASSERT_EQ(refusal(tuning),
+                "derivative: is that of no ADRC with this proportional, integral and "
+                "bandwidth_ratio; the nearest that is");
       EXPECT_NEAR(tuning.error().limit, derivative < least ? least : most, 1e-12);
       // And that one is taken.
       const auto nearest =
@@ -110,19 +111,24 @@ TEST(PidConversion, RefusedWhereThereIsNone) {
 
 TEST(PidConversion, RefusedByName) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_STREQ(esokit::adrc_from_pid<2>(PidGains<double>{0, 1, 1}).error().field, "proportional");
-  EXPECT_STREQ(esokit::adrc_from_pid<2>(PidGains<double>{1, -1, 1}).error().field, "integral");
-  EXPECT_STREQ(esokit::adrc_from_pid<2>(PidGains<double>{1, 1, -1}).error().field, "derivative");
-  EXPECT_STREQ(esokit::adrc_from_pid<2>(PidGains<double>{1, 1, nan}).error().field, "derivative");
-  EXPECT_STREQ(esokit::adrc_from_pid<2>(PidGains<double>{1, 1, 1}, 1.0).error().field,
-               "bandwidth_ratio");
-  EXPECT_STREQ(esokit::adrc_from_pid<1>(PidGains<double>{1, 1, 0}, nan).error().field,
-               "bandwidth_ratio");
-  EXPECT_STREQ(esokit::pid_from_adrc<1>(AdrcTuning<double>{0, 1, 1}).error().field, "input_gain");
-  EXPECT_STREQ(esokit::pid_from_adrc<1>(AdrcTuning<double>{1, 0, 1}).error().field,
-               "controller_bandwidth");
-  EXPECT_STREQ(esokit::pid_from_adrc<1>(AdrcTuning<double>{1, 1, nan}).error().field,
-               "observer_bandwidth");
+  EXPECT_EQ(refusal(esokit::adrc_from_pid<2>(PidGains<double>{0, 1, 1})),
+            "proportional: must be finite and not zero (negative is fine)");
+  EXPECT_EQ(refusal(esokit::adrc_from_pid<2>(PidGains<double>{1, -1, 1})),
+            "integral: must have the sign of proportional");
+  EXPECT_EQ(refusal(esokit::adrc_from_pid<2>(PidGains<double>{1, 1, -1})),
+            "derivative: must have the sign of proportional");
+  EXPECT_EQ(refusal(esokit::adrc_from_pid<2>(PidGains<double>{1, 1, nan})),
+            "derivative: must be finite and not zero (negative is fine)");
+  EXPECT_EQ(refusal(esokit::adrc_from_pid<2>(PidGains<double>{1, 1, 1}, 1.0)),
+            "bandwidth_ratio: must be finite and above");
+  EXPECT_EQ(refusal(esokit::adrc_from_pid<1>(PidGains<double>{1, 1, 0}, nan)),
+            "bandwidth_ratio: must be finite and positive");
+  EXPECT_EQ(refusal(esokit::pid_from_adrc<1>(AdrcTuning<double>{0, 1, 1})),
+            "input_gain: must be finite and not zero (negative is fine)");
+  EXPECT_EQ(refusal(esokit::pid_from_adrc<1>(AdrcTuning<double>{1, 0, 1})),
+            "controller_bandwidth: must be finite and positive");
+  EXPECT_EQ(refusal(esokit::pid_from_adrc<1>(AdrcTuning<double>{1, 1, nan})),
+            "observer_bandwidth: must be finite and positive");
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <esokit/observer/predictor_corrector.hpp>
 #include <limits>
 #include <support/numbers.hpp>
+#include <support/refusal.hpp>
 
 namespace {
 
@@ -22,6 +23,7 @@ using esokit_test::hidden_infinity;
 using esokit_test::hidden_nan;
 using esokit_test::huge;
 using esokit_test::Random;
+using esokit_test::refusal;
 using esokit_test::same_bits;
 
 const ChainConfig<double> unit_chain{.input_gain = 1, .sample_time = 1};
@@ -426,7 +428,8 @@ TEST(ContinuousGainLaw, SeesTimeAndInnovation) {
   // e = -3
   EXPECT_EQ(observer.derivative(5.0, {4, 10}, 1.0, 0.5), (Vector<double, 2>(10 + 1 - 15, -9)));
   EXPECT_FALSE(Observer::make(0.0, {Shrinking{}}));
-  EXPECT_STREQ(Observer::make(hidden_nan<double>(), {Shrinking{}}).error().field, "input_gain");
+  EXPECT_EQ(refusal(Observer::make(hidden_nan<double>(), {Shrinking{}})),
+            "input_gain: must be finite and not zero (negative is fine)");
 }
 
 TEST(ContinuousGainLaw, ModeChangesAtStepBoundariesAlone) {

@@ -84,11 +84,19 @@ TYPED_TEST(Refused, WhatTheScalarCannotHold) {
   EXPECT_EQ(refusal(Observer::make(
                 {.observer_bandwidth = this->tiny_value, .input_gain = 1, .sample_time = S(0.01)})),
             "observer_bandwidth: times sample_time gives a gain that the scalar cannot hold");
-  // 1/T is infinite; b0 T^2 / 2 is zero; b0 T^2 / 2 is infinite.
-  EXPECT_EQ(refusal(Observer::make({.observer_bandwidth = 1,
-                                    .input_gain = 1,
-                                    .sample_time = std::numeric_limits<S>::denorm_min()})),
-            "sample_time: has an inverse that the scalar cannot hold");
+  // 1/T is infinite (of a T that -ffast-math may take for zero) or subnormal; b0 T^2 / 2 is zero or
+  // infinite.
+  for (const S bad : {std::numeric_limits<S>::denorm_min(), std::numeric_limits<S>::max()}) {
+    const auto made =
+        Observer::make({.observer_bandwidth = 1, .input_gain = 1, .sample_time = bad});
+#if defined(__FAST_MATH__)
+    if (bad < 1) {
+      EXPECT_STREQ(made.error().field, "sample_time");
+      continue;
+    }
+#endif
+    EXPECT_EQ(refusal(made), "sample_time: has an inverse that the scalar cannot hold");
+  }
   EXPECT_EQ(refusal(Observer::make({.observer_bandwidth = S(1) / this->tiny_value,
                                     .input_gain = 1,
                                     .sample_time = this->tiny_value})),

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <support/refusal.hpp>
 
 namespace esokit_test {
 
@@ -12,7 +13,7 @@ template <class Made>
 std::string refusal(const Made& made) {
   if (made) return "accepted";
   const auto& error = made.error();
-  const std::string place = error.index < 0 ? "" : "[" + std::to_string(error.index) + "]";
+  const std::string place = error.index == -1 ? "" : "[" + std::to_string(error.index) + "]";
   return error.field + place + ": " + error.rule;
 }
 
