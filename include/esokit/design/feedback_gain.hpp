@@ -106,7 +106,8 @@ Array<S, Order> sampled_feedback_gain(const S& bandwidth, const S& sample_time) 
 template <int Order, PlainScalar S>
 Expected<Array<S, Order>, Error<S>> feedback_gain(const FeedbackSpec<S>& spec,
                                                   const S& sample_time) {
-  if (auto ok = check_positive("controller_bandwidth", spec.bandwidth); !ok) return ok.error();
+  Rules<S> rules;
+  if (!rules.positive("controller_bandwidth", spec.bandwidth)) return rules.error();
   Array<S, Order> gain{};
   if (spec.domain == TimeDomain::continuous) {
     const Vector<S, Order> coefficients = continuous_gain<Order, S>(spec.bandwidth);
@@ -121,11 +122,9 @@ Expected<Array<S, Order>, Error<S>> feedback_gain(const FeedbackSpec<S>& spec,
   } else {
     gain = sampled_feedback_gain<Order, S>(spec.bandwidth, sample_time);
   }
-  if (auto ok = check_representable("controller_bandwidth", spec.bandwidth, gain[0],
-                                    "gives a gain that the scalar cannot hold");
-      !ok) {
-    return ok.error();
-  }
+  rules.representable("controller_bandwidth", spec.bandwidth, gain[0],
+                      "gives a gain that the scalar cannot hold");
+  if (!rules) return rules.error();
   return gain;
 }
 

@@ -48,7 +48,7 @@ struct HalfGainPoles {
   /// Error of a bandwidth that is not finite or not positive.
   template <int Size, PlainScalar S>
   static Check<S> check(const char* field, const S& bandwidth, int index = -1) {
-    return check_positive(field, bandwidth, index);
+    return Rules<S>{}.positive(field, bandwidth, index);
   }
 
   /// Poles at exp(s_k T). @param bandwidth omega_o, rad/s @param sample_time T, s

@@ -43,13 +43,11 @@ struct AdrcTuning {
 template <int Order, PlainScalar S>
 Expected<PidGains<S>, Error<S>> pid_from_adrc(const AdrcTuning<S>& tuning) {
   static_assert(Order == 1 || Order == 2, "esokit: PID is for orders 1 and 2");
-  if (auto ok = check_nonzero("input_gain", tuning.input_gain); !ok) return ok.error();
-  if (auto ok = check_positive("controller_bandwidth", tuning.controller_bandwidth); !ok) {
-    return ok.error();
-  }
-  if (auto ok = check_positive("observer_bandwidth", tuning.observer_bandwidth); !ok) {
-    return ok.error();
-  }
+  Rules<S> rules;
+  rules.nonzero("input_gain", tuning.input_gain)
+      .positive("controller_bandwidth", tuning.controller_bandwidth)
+      .positive("observer_bandwidth", tuning.observer_bandwidth);
+  if (!rules) return rules.error();
   constexpr const char* too_far =
       "with controller_bandwidth and input_gain gives a PID that the scalar cannot hold";
   const S c = tuning.controller_bandwidth;
@@ -68,19 +66,13 @@ Expected<PidGains<S>, Error<S>> pid_from_adrc(const AdrcTuning<S>& tuning) {
     pid.derivative = front * (S(3) * c * c + S(6) * c * o + o * o);
     pid.filter_time = (S(3) * o + S(2) * c) / m;
     pid.filter_time_squared = S(1) / m;
-    if (auto ok = check_representable("observer_bandwidth", o, pid.derivative, too_far); !ok) {
-      return ok.error();
-    }
-    if (auto ok = check_representable("observer_bandwidth", o, pid.filter_time_squared, too_far);
-        !ok) {
-      return ok.error();
-    }
+    rules.representable("observer_bandwidth", o, pid.derivative, too_far)
+        .representable("observer_bandwidth", o, pid.filter_time_squared, too_far);
   }
   for (const S& result : {pid.proportional, pid.integral, pid.filter_time}) {
-    if (auto ok = check_representable("observer_bandwidth", o, result, too_far); !ok) {
-      return ok.error();
-    }
+    rules.representable("observer_bandwidth", o, result, too_far);
   }
+  if (!rules) return rules.error();
   return pid;
 }
 
@@ -99,13 +91,13 @@ Expected<PidGains<S>, Error<S>> pid_from_adrc(const AdrcTuning<S>& tuning) {
 template <int Order, PlainScalar S>
 Expected<AdrcTuning<S>, Error<S>> adrc_from_pid(const PidGains<S>& pid, S bandwidth_ratio = S(10)) {
   static_assert(Order == 1 || Order == 2, "esokit: PID is for orders 1 and 2");
-  if (auto ok = check_nonzero("proportional", pid.proportional); !ok) return ok.error();
-  if (auto ok = check_nonzero("integral", pid.integral); !ok) return ok.error();
+  Rules<S> rules;
   const S rate = pid.integral / pid.proportional;
-  if (!(rate > S(0))) {
-    return Error<S>{"integral", pid.integral, "must have the sign of proportional"};
-  }
-  if (auto ok = check_positive("bandwidth_ratio", bandwidth_ratio); !ok) return ok.error();
+  rules.nonzero("proportional", pid.proportional)
+      .nonzero("integral", pid.integral)
+      .require(rate > S(0), "integral", pid.integral, "must have the sign of proportional")
+      .positive("bandwidth_ratio", bandwidth_ratio);
+  if (!rules) return rules.error();
   AdrcTuning<S> tuning;
   S kappa = bandwidth_ratio;
   if constexpr (Order == 1) {
@@ -116,12 +108,11 @@ Expected<AdrcTuning<S>, Error<S>> adrc_from_pid(const PidGains<S>& pid, S bandwi
                         (S(2) * tuning.controller_bandwidth + tuning.observer_bandwidth) /
                         (pid.proportional * m);
   } else {
-    if (auto ok = check_nonzero("derivative", pid.derivative); !ok) return ok.error();
     const S ratio = rate * pid.derivative / pid.proportional;  // K_i K_d / K_p^2
-    if (!(ratio > S(0))) {
-      return Error<S>{"derivative", pid.derivative, "must have the sign of proportional"};
-    }
-    if (auto ok = check_above("bandwidth_ratio", bandwidth_ratio, S(1)); !ok) return ok.error();
+    rules.nonzero("derivative", pid.derivative)
+        .require(ratio > S(0), "derivative", pid.derivative, "must have the sign of proportional")
+        .above("bandwidth_ratio", bandwidth_ratio, S(1));
+    if (!rules) return rules.error();
     // (1 - 4q) kappa^2 + (6 - 12q) kappa + (3 - 9q) = 0 with q = K_i K_d / K_p^2, its larger root.
     const S a = S(4) * ratio - S(1);
     const S b = S(12) * ratio - S(6);
@@ -153,11 +144,9 @@ Expected<AdrcTuning<S>, Error<S>> adrc_from_pid(const PidGains<S>& pid, S bandwi
     tuning.input_gain = tuning.controller_bandwidth * tuning.controller_bandwidth * kappa * kappa *
                         (S(3) + S(2) * kappa) / (pid.proportional * m);
   }
-  if (auto ok = check_representable("proportional", pid.proportional, tuning.input_gain,
-                                    "gives an input gain that the scalar cannot hold");
-      !ok) {
-    return ok.error();
-  }
+  rules.representable("proportional", pid.proportional, tuning.input_gain,
+                      "gives an input gain that the scalar cannot hold");
+  if (!rules) return rules.error();
   return tuning;
 }
 

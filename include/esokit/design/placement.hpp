@@ -25,7 +25,7 @@ struct EqualPoles {
   /// Error of a bandwidth that is not finite or not positive.
   template <int Size, Scalar S>
   static Check<S> check(const char* field, const S& bandwidth, int index = -1) {
-    return check_positive(field, bandwidth, index);
+    return Rules<S>{}.positive(field, bandwidth, index);
   }
 
   /// Poles at exp(-omega_o T). @param bandwidth omega_o, rad/s @param sample_time T, s
@@ -65,17 +65,15 @@ struct PoleSet {
   template <int Size, PlainScalar S>
   static Check<S> check(const char* field, const Spec<Size, S>& poles, int set = -1) {
     const int first = set < 0 ? 0 : set * Size;
+    Rules<S> rules;
     for (std::size_t i = 0; i < Size; ++i) {
       const int index = first + static_cast<int>(i);
-      if (!is_finite(poles[i].real())) {
-        return Error<S>{field, poles[i].real(), "must have a finite real part", index};
-      }
-      if (!is_finite(poles[i].imag())) {
-        return Error<S>{field, poles[i].imag(), "must have a finite imaginary part", index};
-      }
-      if (!(poles[i].real() < S(0))) {
-        return Error<S>{field, poles[i].real(), "must have a negative real part", index};
-      }
+      const S real = poles[i].real();
+      const S imaginary = poles[i].imag();
+      rules.require(is_finite(real), field, real, "must have a finite real part", index)
+          .require(is_finite(imaginary), field, imaginary, "must have a finite imaginary part",
+                   index)
+          .require(real < S(0), field, real, "must have a negative real part", index);
     }
     for (std::size_t i = 0; i < Size; ++i) {
       if (poles[i].imag() == S(0)) continue;
@@ -84,12 +82,10 @@ struct PoleSet {
         balance += poles[j] == poles[i] ? 1 : 0;
         balance -= poles[j] == std::conj(poles[i]) ? 1 : 0;
       }
-      if (balance != 0) {
-        return Error<S>{field, poles[i].imag(), "is complex without its conjugate in the set",
-                        first + static_cast<int>(i)};
-      }
+      rules.require(balance == 0, field, poles[i].imag(),
+                    "is complex without its conjugate in the set", first + static_cast<int>(i));
     }
-    return {};
+    return rules;
   }
 
   /// Poles at exp(p_i T). @param poles p_i, 1/s @param sample_time T, s

@@ -44,7 +44,7 @@ struct ReducedPoles {
   /// Error of a bandwidth that is not finite or not positive.
   template <int Size, Scalar S>
   static Check<S> check(const char* field, const S& bandwidth, int index = -1) {
-    return check_positive(field, bandwidth, index);
+    return Rules<S>{}.positive(field, bandwidth, index);
   }
 
   /// The poles. @param bandwidth omega_o, rad/s @param sample_time T, s
