@@ -226,7 +226,7 @@ class AdrcLoop {
 
   template <class Function>
   Expected<Complex, Error<double>> at(double frequency, Function&& function) const {
-    if (auto ok = check_positive("frequency", frequency); !ok) return ok.error();
+    if (Rules<double> rules; !rules.positive("frequency", frequency)) return rules.error();
     const auto p = frequency_response(plant_, frequency);
     if (!p) return p.error();
     const auto c = frequency_response(controller_, frequency);

@@ -16,18 +16,18 @@ template <int States, int Inputs, int Outputs>
 Expected<Matrix<double, Outputs, Outputs>, Error<double>> output_covariance(
     const LinearSystem<States, Inputs, Outputs>& system,
     const Matrix<double, Inputs, Inputs>& input) {
-  if (auto ok = detail::check_system(system); !ok) return ok.error();
+  Rules<double> rules;
+  rules.all_of(detail::check_system(system));
   for (int i = 0; i < Inputs; ++i) {
-    if (auto ok = check_not_negative("input", input(i, i), i); !ok) return ok.error();
+    rules.not_negative("input", input(i, i), i);
     for (int j = 0; j < Inputs; ++j) {
       const double value = input(i, j);
-      if (!is_finite(value) || value != input(j, i) ||
-          !(value * value <= input(i, i) * input(j, j) * (1.0 + 1e-12))) {
-        return Error<double>{"input", value, "must be a covariance: symmetric and not indefinite",
-                             i};
-      }
+      rules.require(is_finite(value) && value == input(j, i) &&
+                        value * value <= input(i, i) * input(j, j) * (1.0 + 1e-12),
+                    "input", value, "must be a covariance: symmetric and not indefinite", i);
     }
   }
+  if (!rules) return rules.error();
   // sum_ij left(r, i) middle(i, j) left(s, j)
   const auto quadratic = [](const auto& left, const auto& middle, int r, int s) {
     double sum = 0.0;
@@ -82,8 +82,10 @@ Expected<
 estimation_error_covariance(const Observer& observer, const EstimationNoise& noise,
                             double t = 0.0) {
   constexpr int size = Observer::order + Observer::extension;
-  if (auto ok = check_not_negative("measurement", noise.measurement); !ok) return ok.error();
-  if (auto ok = check_not_negative("disturbance", noise.disturbance); !ok) return ok.error();
+  Rules<double> rules;
+  rules.not_negative("measurement", noise.measurement)
+      .not_negative("disturbance", noise.disturbance);
+  if (!rules) return rules.error();
   const auto m = detail::observer_matrices(observer, t);
   LinearSystem<decltype(m)::states, size + 1, size> system;
   system.a = m.a;

@@ -112,15 +112,13 @@ Expected<Margin, Error<double>> delay_margin(const AdrcLoop<SampledStates, Obser
                                              const NominalPlant<PlantStates>& plant,
                                              double present_delay = 0.0) {
   const double T = loop.plant().sample_time;
-  if (!(T > 0.0)) {
-    return Error<double>{"plant.sample_time", T, "must be positive: this is for a sampled loop"};
-  }
-  if (auto ok = check_not_negative("present_delay", present_delay); !ok) return ok.error();
-  if (auto ok = sampled_plant(plant, T, T); !ok) return ok.error();
-  if (!loop.stable()) {
-    return Error<double>{"stability_abscissa", loop.stability_abscissa(),
-                         detail::unstable_loop_rule};
-  }
+  Rules<double> rules;
+  rules.require(T > 0.0, "plant.sample_time", T, "must be positive: this is for a sampled loop")
+      .not_negative("present_delay", present_delay)
+      .and_then([&] { return sampled_plant(plant, T, T); })
+      .require(loop.stable(), "stability_abscissa", loop.stability_abscissa(),
+               detail::unstable_loop_rule);
+  if (!rules) return rules.error();
   const detail::DelayedLoopGain<PlantStates, AdrcLoop<SampledStates, Observer>::observer_states>
       delayed{plant, loop.controller().template channel<0, 0>()};
   const auto range = detail::scan_range(loop);

@@ -40,10 +40,10 @@ struct ErrorBound {
   /// @return error without a source of error (then it is never reached), or for excess <= 0
   [[nodiscard]] Expected<double, Error<double>> convergence_time(
       const Vector<double, Size>& initial, double excess = 0.1) const {
-    if (auto ok = check_positive("excess", excess); !ok) return ok.error();
-    if (!(level > 0.0)) {
-      return Error<double>{"level", level, "must be positive: a bound of zero is never reached"};
-    }
+    Rules<double> rules;
+    rules.positive("excess", excess)
+        .require(level > 0.0, "level", level, "must be positive: a bound of zero is never reached");
+    if (!rules) return rules.error();
     const double over = (scaled_norm(initial) - level) / (excess * level);
     return over > 1.0 ? std::log(over) / rate : 0.0;
   }
@@ -69,8 +69,9 @@ struct ErrorBound {
 namespace detail {
 
 inline Check<double> check_sources(const ErrorSources& sources) {
-  if (auto ok = check_not_negative("disturbance_rate", sources.disturbance_rate); !ok) return ok;
-  return check_not_negative("measurement_noise", sources.measurement_noise);
+  return Rules<double>{}
+      .not_negative("disturbance_rate", sources.disturbance_rate)
+      .not_negative("measurement_noise", sources.measurement_noise);
 }
 
 /// kappa_i = C(N, i) factor^i: the scaled gains of poles at -factor omega.
@@ -105,8 +106,9 @@ Expected<ErrorBound<Size>, Error<double>> bound_between(const Vector<double, Siz
                                                         const Vector<double, Size>& gain2,
                                                         double bandwidth,
                                                         const ErrorSources& sources) {
-  if (auto ok = check_positive("observer_bandwidth", bandwidth); !ok) return ok.error();
-  if (auto ok = check_sources(sources); !ok) return ok.error();
+  Rules<double> rules;
+  rules.positive("observer_bandwidth", bandwidth).all_of(check_sources(sources));
+  if (!rules) return rules.error();
   const std::array<Matrix<double, Size, Size>, 2> modes = {scaled_error_matrix<Size>(gain1),
                                                            scaled_error_matrix<Size>(gain2)};
   const auto lyapunov = common_lyapunov_matrix<Size>(modes);
@@ -130,8 +132,9 @@ Expected<ErrorBound<Size>, Error<double>> linear_error_bound(
     const ContinuousLinearEsoConfig<Size, double, EqualPoles>& config,
     const ErrorSources& sources) {
   const double w = config.observer_bandwidth;
-  if (auto ok = check_positive("observer_bandwidth", w); !ok) return ok.error();
-  if (auto ok = detail::check_sources(sources); !ok) return ok.error();
+  Rules<double> rules;
+  rules.positive("observer_bandwidth", w).all_of(detail::check_sources(sources));
+  if (!rules) return rules.error();
   const Vector<double, Size> gain = detail::binomial_gain<Size>();
   const auto lyapunov = lyapunov_matrix<Size>(detail::scaled_error_matrix<Size>(gain));
   if (!lyapunov) return lyapunov.error();
@@ -160,11 +163,10 @@ Expected<Array<ErrorBound<Size>, Levels>, Error<double>> cascade_error_bounds(
   static_assert(Order >= 1 && Order < Size, "esokit: the order leaves no extended state");
   const auto levels = detail::level_specs<EqualPoles, Size, Levels, double>(config);
   if (!levels) return levels.error();
-  if (auto ok = detail::check_sources(sources); !ok) return ok.error();
   const Array<double, Levels>& w = levels->specs;
-  for (std::size_t i = 0; i < Levels; ++i) {
-    if (auto ok = check_positive(levels->field, w[i], static_cast<int>(i)); !ok) return ok.error();
-  }
+  Rules<double> rules;
+  rules.all_of(detail::check_sources(sources)).positive(levels->field, w);
+  if (!rules) return rules.error();
   const Vector<double, Size> gain = detail::binomial_gain<Size>();
   const auto lyapunov = lyapunov_matrix<Size>(detail::scaled_error_matrix<Size>(gain));
   if (!lyapunov) return lyapunov.error();
@@ -213,12 +215,10 @@ struct SwitchedBandwidth {
 template <int Size>
 Expected<ErrorBound<Size>, Error<double>> switched_error_bound(const SwitchedBandwidth& setting,
                                                                const ErrorSources& sources) {
-  if (auto ok = check_positive("factor_while_shrinking", setting.factor_while_shrinking); !ok) {
-    return ok.error();
-  }
-  if (auto ok = check_positive("factor_otherwise", setting.factor_otherwise); !ok) {
-    return ok.error();
-  }
+  Rules<double> rules;
+  rules.positive("factor_while_shrinking", setting.factor_while_shrinking)
+      .positive("factor_otherwise", setting.factor_otherwise);
+  if (!rules) return rules.error();
   return detail::bound_between<Size>(detail::binomial_gain<Size>(setting.factor_while_shrinking),
                                      detail::binomial_gain<Size>(setting.factor_otherwise),
                                      setting.observer_bandwidth, sources);
@@ -238,11 +238,12 @@ struct GainRange {
 template <int Size>
 Expected<ErrorBound<Size>, Error<double>> nonlinear_error_bound(const GainRange& setting,
                                                                 const ErrorSources& sources) {
-  if (auto ok = check_positive("least", setting.least); !ok) return ok.error();
-  if (!is_finite(setting.greatest) || !(setting.greatest >= setting.least)) {
-    return Error<double>{"greatest", setting.greatest, "must be finite and not below least",
-                         -1,         setting.least,    true};
-  }
+  Rules<double> rules;
+  rules.positive("least", setting.least)
+      .require(is_finite(setting.greatest) && setting.greatest >= setting.least,
+               {"greatest", setting.greatest, "must be finite and not below least", -1,
+                setting.least, true});
+  if (!rules) return rules.error();
   const Vector<double, Size> gain = detail::binomial_gain<Size>();
   return detail::bound_between<Size>(setting.least * gain, setting.greatest * gain,
                                      setting.observer_bandwidth, sources);

@@ -59,13 +59,12 @@ bool all_finite(const MatrixType& matrix) noexcept {
 }
 
 inline Check<double> check_frequency(double frequency, double sample_time) {
-  if (auto ok = check_not_negative("frequency", frequency); !ok) return ok;
   const double nyquist = std::numbers::pi / sample_time;
-  if (sample_time > 0.0 && frequency > nyquist * (1.0 + 1e-12)) {
-    return Error<double>{"frequency", frequency, "must not be above the Nyquist frequency",
-                         -1,          nyquist,   true};
-  }
-  return {};
+  return Rules<double>{}
+      .not_negative("frequency", frequency)
+      .require(
+          !(sample_time > 0.0 && frequency > nyquist * (1.0 + 1e-12)),
+          {"frequency", frequency, "must not be above the Nyquist frequency", -1, nyquist, true});
 }
 
 }  // namespace detail
@@ -92,8 +91,9 @@ Expected<Matrix<std::complex<double>, Outputs, Inputs>, Error<double>> frequency
 template <int Count>
 Expected<Array<double, Count>, Error<double>> log_grid(double from, double to) {
   static_assert(Count >= 2, "esokit: a grid has two points or more");
-  if (auto ok = check_positive("from", from); !ok) return ok.error();
-  if (auto ok = check_above("to", to, from); !ok) return ok.error();
+  Rules<double> rules;
+  rules.positive("from", from).above("to", to, from);
+  if (!rules) return rules.error();
   Array<double, Count> grid{};
   const double step = std::log(to / from) / (Count - 1);
   for (int i = 0; i < Count; ++i) grid[static_cast<std::size_t>(i)] = from * std::exp(i * step);

@@ -129,10 +129,10 @@ Check<double> check_system(const LinearSystem<States, Inputs, Outputs>& system) 
   if (!is_finite(system.sample_time) || system.sample_time < 0.0) {
     return Error<double>{"sample_time", system.sample_time, "must be finite and not negative"};
   }
-  return check_finite("system", sum_of_magnitudes(system.a.data(), States * States) +
-                                    sum_of_magnitudes(system.b.data(), States * Inputs) +
-                                    sum_of_magnitudes(system.c.data(), Outputs * States) +
-                                    sum_of_magnitudes(system.d.data(), Outputs * Inputs));
+  return Rules<double>{}.finite("system", sum_of_magnitudes(system.a.data(), States * States) +
+                                              sum_of_magnitudes(system.b.data(), States * Inputs) +
+                                              sum_of_magnitudes(system.c.data(), Outputs * States) +
+                                              sum_of_magnitudes(system.d.data(), Outputs * Inputs));
 }
 
 }  // namespace detail

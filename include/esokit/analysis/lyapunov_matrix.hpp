@@ -154,10 +154,11 @@ Expected<LyapunovMatrix<Size>, Error<double>> common_lyapunov_matrix(
   static_assert(Size >= 2, "esokit: two states or more");
   constexpr int count = detail::triangle<Size>;
   using Square = Matrix<double, Size, Size>;
+  Rules<double> rules;
   for (const Square& mode : a) {
-    if (auto ok = check_finite("system", detail::sum_of_magnitudes(mode.data(), Size * Size)); !ok)
-      return ok.error();
+    rules.finite("system", detail::sum_of_magnitudes(mode.data(), Size * Size));
   }
+  if (!rules) return rules.error();
   detail::Ellipsoid<count> ellipsoid(most * std::sqrt(double(count)));
   double best = std::numeric_limits<double>::infinity();
   double violation = 0.0;

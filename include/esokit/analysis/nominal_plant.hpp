@@ -21,12 +21,12 @@ struct CompanionPlant {
 
   /// The same as a system, states (y, .., y^(Order-1)).
   [[nodiscard]] Expected<NominalPlant<Order>, Error<double>> system() const {
-    if (auto ok = check_nonzero("input_gain", input_gain); !ok) return ok.error();
+    Rules<double> rules;
+    rules.nonzero("input_gain", input_gain).finite("coefficients", coefficients);
+    if (!rules) return rules.error();
     NominalPlant<Order> plant;
     for (int i = 0; i < Order; ++i) {
-      const double coefficient = coefficients[static_cast<std::size_t>(i)];
-      if (auto ok = check_finite("coefficients", coefficient, i); !ok) return ok.error();
-      plant.a(Order - 1, i) = -coefficient;
+      plant.a(Order - 1, i) = -coefficients[static_cast<std::size_t>(i)];
       if (i + 1 < Order) plant.a(i, i + 1) = 1.0;
     }
     plant.b(Order - 1, 0) = input_gain;
@@ -70,15 +70,11 @@ Held<N, Inputs> hold(const Matrix<double, N, N>& a, const Matrix<double, N, Inpu
 
 template <int States>
 Check<double> check_plant(const NominalPlant<States>& plant) {
-  if (auto ok = check_system(plant); !ok) return ok;
-  if (plant.sampled()) {
-    return Error<double>{"plant.sample_time", plant.sample_time, "must be zero: continuous"};
-  }
-  if (plant.d(0, 0) != 0.0 || plant.d(0, 1) != 0.0) {
-    return Error<double>{"plant.d", plant.d(0, 0) != 0.0 ? plant.d(0, 0) : plant.d(0, 1),
-                         "must be zero: y may not follow an input at once"};
-  }
-  return {};
+  const double direct = plant.d(0, 0) != 0.0 ? plant.d(0, 0) : plant.d(0, 1);
+  return Rules<double>{}
+      .all_of(check_system(plant))
+      .require(!plant.sampled(), "plant.sample_time", plant.sample_time, "must be zero: continuous")
+      .require(direct == 0.0, "plant.d", direct, "must be zero: y may not follow an input at once");
 }
 
 }  // namespace detail
@@ -89,8 +85,9 @@ Check<double> check_plant(const NominalPlant<States>& plant) {
 template <int States>
 Expected<NominalPlant<States>, Error<double>> sampled_plant(const NominalPlant<States>& plant,
                                                             double sample_time) {
-  if (auto ok = detail::check_plant(plant); !ok) return ok.error();
-  if (auto ok = check_positive("sample_time", sample_time); !ok) return ok.error();
+  Rules<double> rules;
+  rules.all_of(detail::check_plant(plant)).positive("sample_time", sample_time);
+  if (!rules) return rules.error();
   const auto held = detail::hold<States, 2>(plant.a, plant.b, sample_time);
   NominalPlant<States> sampled = plant;
   sampled.a = held.transition;
@@ -106,12 +103,13 @@ Expected<NominalPlant<States>, Error<double>> sampled_plant(const NominalPlant<S
 template <int States>
 Expected<NominalPlant<States + 1>, Error<double>> sampled_plant(const NominalPlant<States>& plant,
                                                                 double sample_time, double delay) {
-  if (auto ok = detail::check_plant(plant); !ok) return ok.error();
-  if (auto ok = check_positive("sample_time", sample_time); !ok) return ok.error();
-  if (auto ok = check_not_negative("delay", delay); !ok) return ok.error();
-  if (delay > sample_time) {
-    return Error<double>{"delay", delay, "must not be above sample_time", -1, sample_time, true};
-  }
+  Rules<double> rules;
+  rules.all_of(detail::check_plant(plant))
+      .positive("sample_time", sample_time)
+      .not_negative("delay", delay)
+      .require(!(delay > sample_time),
+               {"delay", delay, "must not be above sample_time", -1, sample_time, true});
+  if (!rules) return rules.error();
   const auto whole = detail::hold<States, 2>(plant.a, plant.b, sample_time);
   const auto early = detail::hold<States, 2>(plant.a, plant.b, delay);
   const auto late = detail::hold<States, 2>(plant.a, plant.b, sample_time - delay);
