@@ -29,31 +29,19 @@ class AdrcLaw {
   /// Checks the settings and does all the design work.
   /// @return the law, or an error that names the field
   static Expected<AdrcLaw, Error<S>> make(const Config& config) {
-    if (auto ok = check_nonzero("input_gain", config.input_gain); !ok) return ok.error();
-    if (auto ok =
-            check_representable("input_gain", config.input_gain, S(S(1.0) / config.input_gain),
-                                "has an inverse that the scalar cannot hold");
-        !ok) {
-      return ok.error();
-    }
+    Rules<S> rules;
+    if (!rules.invertible("input_gain", config.input_gain)) return rules.error();
     AdrcLaw law;
     law.inverse_input_gain_ = S(1.0) / config.input_gain;
     law.input_gain_ = config.input_gain;
     if (config.gains) {
-      if (!all(is_finite(config.controller_bandwidth)) ||
-          all(detail::magnitude(config.controller_bandwidth) > S(0.0))) {
-        return Error<S>{"controller_bandwidth", config.controller_bandwidth,
-                        "must be left out where gains is given"};
-      }
-      for (int i = 0; i < Order; ++i) {
-        const S& gain = (*config.gains)[static_cast<std::size_t>(i)];
-        if (auto ok = check_finite("gains", gain, i); !ok) return ok.error();
-      }
+      rules
+          .left_out("controller_bandwidth", config.controller_bandwidth,
+                    "must be left out where gains is given")
+          .finite("gains", *config.gains);
       law.gains_ = *config.gains;
     } else {
-      if (auto ok = check_positive("controller_bandwidth", config.controller_bandwidth); !ok) {
-        return ok.error();
-      }
+      rules.positive("controller_bandwidth", config.controller_bandwidth);
       S power(1.0);
       for (int i = Order - 1; i >= 0; --i) {
         power = power * config.controller_bandwidth;
@@ -61,18 +49,14 @@ class AdrcLaw {
             S(binomial_table<Order, detail::TableScalar<S>>[Order][static_cast<std::size_t>(i)]) *
             power;
       }
-      if (auto ok = check_representable("controller_bandwidth", config.controller_bandwidth,
-                                        law.gains_[0], "gives a gain that the scalar cannot hold");
-          !ok) {
-        return ok.error();
-      }
+      rules.representable("controller_bandwidth", config.controller_bandwidth, law.gains_[0],
+                          "gives a gain that the scalar cannot hold");
     }
     for (const S& gain : law.gains_) {
-      if (!all(is_finite(S(gain * law.inverse_input_gain_)))) {
-        return Error<S>{"input_gain", config.input_gain,
-                        "with these gains gives a law that the scalar cannot hold"};
-      }
+      rules.require(all(is_finite(S(gain * law.inverse_input_gain_))), "input_gain",
+                    config.input_gain, "with these gains gives a law that the scalar cannot hold");
     }
+    if (!rules) return rules.error();
     return law;
   }
 

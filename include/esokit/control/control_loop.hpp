@@ -43,15 +43,13 @@ namespace detail {
 
 template <PlainScalar S>
 Check<S> check_within(const char* field, const S& input, const Limits<S>& limits) {
-  if (auto ok = check_finite(field, input); !ok) return ok;
   const bool nothing_said = !(input < S(0)) && !(input > S(0));
-  if (!nothing_said && input < limits.lower) {
-    return Error<S>{field, input, "must not be below limits.lower", -1, limits.lower, true};
-  }
-  if (!nothing_said && input > limits.upper) {
-    return Error<S>{field, input, "must not be above limits.upper", -1, limits.upper, true};
-  }
-  return {};
+  return Rules<S>{}
+      .finite(field, input)
+      .require(nothing_said || !(input < limits.lower),
+               {field, input, "must not be below limits.lower", -1, limits.lower, true})
+      .require(nothing_said || !(input > limits.upper),
+               {field, input, "must not be above limits.upper", -1, limits.upper, true});
 }
 
 template <PlainScalar S>
@@ -66,45 +64,30 @@ Expected<CheckedLoop<S>, Error<S>> check_loop(const LoopSettings<S>& settings, S
                                               int max_gap, bool bears_gaps) {
   const auto limiter = Limiter<S>::make(settings.limits, sample_time);
   if (!limiter) return limiter.error();
-  if (auto ok = check_not_negative("hold.time", settings.hold.time); !ok) return ok.error();
-  if (auto ok = check_within("hold.input", settings.hold.input, settings.limits); !ok) {
-    return ok.error();
-  }
   const S samples = std::ceil(settings.hold.time / sample_time - S(1) / S(1024));
-  if (!(samples < S(1 << 24))) {
-    return Error<S>{"hold.time", settings.hold.time, "must be below 2^24 samples"};
-  }
-  if (settings.missing.input) {
-    if (auto ok = check_within("missing.input", *settings.missing.input, settings.limits); !ok) {
-      return ok.error();
-    }
-  }
   const int divider = settings.measurement_divider;
-  if (divider < 1 || divider > 1000) {
-    return Error<S>{"measurement_divider", static_cast<S>(divider), "must be 1 .. 1000"};
+  const auto counted = static_cast<S>(divider);
+  Rules<S> rules;
+  rules.not_negative("hold.time", settings.hold.time)
+      .all_of(check_within("hold.input", settings.hold.input, settings.limits))
+      .require(samples < S(1 << 24), "hold.time", settings.hold.time, "must be below 2^24 samples");
+  if (settings.missing.input) {
+    rules.all_of(check_within("missing.input", *settings.missing.input, settings.limits));
   }
-  if (divider > max_gap) {
-    return Error<S>{"measurement_divider",
-                    static_cast<S>(divider),
-                    "must not be above the observer's max_gap, which is",
-                    -1,
-                    static_cast<S>(max_gap),
-                    true};
-  }
-  if (divider > 1 && !bears_gaps) {
-    return Error<S>{"measurement_divider", static_cast<S>(divider),
-                    "must be 1 for an observer that regular gaps restart"};
-  }
+  rules
+      .require(1 <= divider && divider <= 1000, "measurement_divider", counted, "must be 1 .. 1000")
+      .require(divider <= max_gap, {"measurement_divider", counted,
+                                    "must not be above the observer's max_gap, which is", -1,
+                                    static_cast<S>(max_gap), true})
+      .require(divider == 1 || bears_gaps, "measurement_divider", counted,
+               "must be 1 for an observer that regular gaps restart");
+  if (!rules) return rules.error();
   // The observer counts missing samples up to 65535.
   const int most = 65535 / divider - 1;
-  if (settings.missing.most < 0 || settings.missing.most > most) {
-    return Error<S>{"missing.most",
-                    static_cast<S>(settings.missing.most),
-                    "must be 0 up to 65535 samples, that is",
-                    -1,
-                    static_cast<S>(most),
-                    true};
-  }
+  rules.require(0 <= settings.missing.most && settings.missing.most <= most,
+                {"missing.most", static_cast<S>(settings.missing.most),
+                 "must be 0 up to 65535 samples, that is", -1, static_cast<S>(most), true});
+  if (!rules) return rules.error();
   return CheckedLoop<S>{*limiter, static_cast<std::uint32_t>(samples)};
 }
 

@@ -48,7 +48,7 @@ class DisturbanceCompensator {
     S gain = S(-1) / input_gain;
     if (config.compensation_gain) {
       gain = *config.compensation_gain;
-      if (auto ok = check_finite("compensation_gain", gain); !ok) return ok.error();
+      if (Rules<S> rules; !rules.finite("compensation_gain", gain)) return rules.error();
     } else if (!is_finite(gain)) {
       return Error<S>{"input_gain", input_gain, "has an inverse that the scalar cannot hold"};
     }

@@ -85,14 +85,13 @@ class DualFeedbackAdrc {
   /// Checks the settings and does all the design work.
   /// @return the controller at rest in zero, or an error that names the field
   static Expected<DualFeedbackAdrc, Error<S>> make(const Config& config) {
-    if (auto ok = check_nonzero("input_gain", config.input_gain); !ok) return ok.error();
+    Rules<S> rules;
+    if (!rules.nonzero("input_gain", config.input_gain)) return rules.error();
     const auto limiter = Limiter<S>::make(config.limits, config.sample_time);
     if (!limiter) return limiter.error();
-    if (auto ok =
-            Placement::template check<size, S>("observer_bandwidth", config.observer_bandwidth);
-        !ok) {
-      return ok.error();
-    }
+    rules.all_of(
+        Placement::template check<size, S>("observer_bandwidth", config.observer_bandwidth));
+    if (!rules) return rules.error();
     const auto gains = controller_gains(config);
     if (!gains) return gains.error();
     const auto poles =
@@ -100,25 +99,19 @@ class DualFeedbackAdrc {
     Form form = delta_form<Order, size, S>(poles, *gains, config.input_gain, config.sample_time);
     const S bandwidth = Placement::template representative<size, S>(config.observer_bandwidth);
     // The last coefficient of D is prod(1 - rho_i).
-    if (auto ok = check_representable("observer_bandwidth", bandwidth, form.denominator[size],
-                                      "times sample_time gives a filter the scalar cannot hold");
-        !ok) {
-      return ok.error();
-    }
+    rules.representable("observer_bandwidth", bandwidth, form.denominator[size],
+                        "times sample_time gives a filter the scalar cannot hold");
     for (const S& coefficient : form.measurement) {
-      if (!is_finite(coefficient)) {
-        return Error<S>{"sample_time", config.sample_time,
-                        "gives a filter that the scalar cannot hold"};
-      }
+      rules.require(is_finite(coefficient), "sample_time", config.sample_time,
+                    "gives a filter that the scalar cannot hold");
     }
     if constexpr (!delta) {
       const S unit = S(100) * std::numeric_limits<S>::epsilon();
-      if (!(unit < static_cast<S>(1e-3) * form.denominator[size])) {
-        return Error<S>{"observer_bandwidth", bandwidth,
-                        "times sample_time leaves too few digits in z; take DeltaOperator"};
-      }
+      rules.require(unit < static_cast<S>(1e-3) * form.denominator[size], "observer_bandwidth",
+                    bandwidth, "times sample_time leaves too few digits in z; take DeltaOperator");
       form = shift_form<size, S>(form);
     }
+    if (!rules) return rules.error();
     return DualFeedbackAdrc(form, *limiter);
   }
 

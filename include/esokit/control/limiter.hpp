@@ -28,14 +28,15 @@ class Limiter {
   /// @return error for limits that are crossed or not finite, or a rate or sample time that is not
   ///         positive
   static Expected<Limiter, Error<S>> make(const Limits<S>& limits, const S& sample_time) {
-    if (auto ok = check_positive("sample_time", sample_time); !ok) return ok.error();
-    if (auto ok = check_finite("limits.lower", limits.lower); !ok) return ok.error();
-    if (auto ok = check_finite("limits.upper", limits.upper); !ok) return ok.error();
-    if (!all(limits.lower < limits.upper)) {
-      return Error<S>{"limits.lower", limits.lower, "must be below limits.upper", -1,
-                      limits.upper,   true};
-    }
-    if (auto ok = check_positive("limits.rate", limits.rate); !ok) return ok.error();
+    Rules<S> rules;
+    rules.positive("sample_time", sample_time)
+        .finite("limits.lower", limits.lower)
+        .finite("limits.upper", limits.upper)
+        .require(
+            all(limits.lower < limits.upper),
+            {"limits.lower", limits.lower, "must be below limits.upper", -1, limits.upper, true})
+        .positive("limits.rate", limits.rate);
+    if (!rules) return rules.error();
     return Limiter(limits, sample_time);
   }
 

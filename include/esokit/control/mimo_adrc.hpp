@@ -202,17 +202,14 @@ class MimoAdrc {
   }
 
   static Expected<InputMatrix, Error<S>> inverted(const Config& config) {
-    if (auto ok = check_above("condition_limit", config.condition_limit, S(1)); !ok) {
-      return ok.error();
-    }
+    Rules<S> rules;
+    rules.above("condition_limit", config.condition_limit, S(1));
     for (int i = 0; i < channels; ++i) {
       for (int j = 0; j < channels; ++j) {
-        if (auto ok = check_finite("input_matrix", S(config.input_matrix(i, j)), i * channels + j);
-            !ok) {
-          return ok.error();
-        }
+        rules.finite("input_matrix", S(config.input_matrix(i, j)), i * channels + j);
       }
     }
+    if (!rules) return rules.error();
     InputMatrix scaled = config.input_matrix;
     Output rows;
     Output columns;

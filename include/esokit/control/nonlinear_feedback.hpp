@@ -28,34 +28,26 @@ class NonlinearFeedback {
   /// Checks the settings and does all the design work.
   /// @return the law, or an error that names the field
   static Expected<NonlinearFeedback, Error<S>> make(const Config& config) {
+    Rules<S> rules;
     for (int i = 0; i < Order; ++i) {
       const auto row = static_cast<std::size_t>(i);
-      if (auto ok = check_not_negative("gains", config.gains[row], i); !ok) return ok.error();
-      if (auto ok = check_positive("exponents", config.exponents[row], i); !ok) return ok.error();
-      if (auto ok = check_positive("linear_widths", config.linear_widths[row], i); !ok) {
-        return ok.error();
-      }
+      rules.not_negative("gains", config.gains[row], i)
+          .positive("exponents", config.exponents[row], i)
+          .positive("linear_widths", config.linear_widths[row], i);
     }
-    if (auto ok = check_nonzero("input_gain", config.input_gain); !ok) return ok.error();
-    if (auto ok =
-            check_representable("input_gain", config.input_gain, S(S(1.0) / config.input_gain),
-                                "has an inverse that the scalar cannot hold");
-        !ok) {
-      return ok.error();
-    }
+    if (!rules.invertible("input_gain", config.input_gain)) return rules.error();
     const NonlinearFeedback law(config, std::make_integer_sequence<int, Order>{});
     for (int i = 0; i < Order; ++i) {
       const auto row = static_cast<std::size_t>(i);
       // The steepest there is with a_i <= 1: within the linear piece.
       const S slope = law.fal_[row].gain(S(0.0));
-      if (!all(is_finite(slope)) ||
-          !all(is_finite(S(config.gains[row] * slope * law.inverse_input_gain_)))) {
-        return Error<S>{"linear_widths", config.linear_widths[row],
-                        "with this exponent, gain and input_gain gives a slope that the scalar "
-                        "cannot hold",
-                        i};
-      }
+      rules.require(
+          all(is_finite(slope)) &&
+              all(is_finite(S(config.gains[row] * slope * law.inverse_input_gain_))),
+          "linear_widths", config.linear_widths[row],
+          "with this exponent, gain and input_gain gives a slope that the scalar cannot hold", i);
     }
+    if (!rules) return rules.error();
     return law;
   }
 

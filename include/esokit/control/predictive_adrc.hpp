@@ -258,11 +258,11 @@ class PredictiveAdrc {
   }
 
   static Expected<std::uint32_t, Error<S>> hold_samples(const S& seconds, const S& sample_time) {
-    if (auto ok = check_not_negative("start_hold", seconds); !ok) return ok.error();
     const S samples = seconds / sample_time - S(1e-3);
-    if (!all(samples < S(1e6))) {
-      return Error<S>{"start_hold", seconds, "must be 1e6 samples or less"};
-    }
+    Rules<S> rules;
+    rules.not_negative("start_hold", seconds)
+        .require(all(samples < S(1e6)), "start_hold", seconds, "must be 1e6 samples or less");
+    if (!rules) return rules.error();
     std::uint32_t count = 0;
     while (!all(detail::integer<S>(count) >= samples)) ++count;
     return count;

@@ -41,24 +41,19 @@ class TrackingDifferentiator {
   /// Checks the settings and does all the design work.
   /// @return at rest in zero, or an error that names the field
   static Expected<TrackingDifferentiator, Error<S>> make(const Config& config) {
-    if (auto ok = check_positive("acceleration", config.acceleration); !ok) return ok.error();
-    if (auto ok = check_positive("sample_time", config.sample_time); !ok) return ok.error();
-    if (auto ok = check_not_negative("filter_time", config.filter_time); !ok) return ok.error();
-    if (config.filter_time > S(0) && config.filter_time < config.sample_time) {
-      return Error<S>{"filter_time",
-                      config.filter_time,
-                      "must be 0 or not below sample_time, which is",
-                      -1,
-                      config.sample_time,
-                      true};
-    }
+    Rules<S> rules;
+    rules.positive("acceleration", config.acceleration)
+        .positive("sample_time", config.sample_time)
+        .not_negative("filter_time", config.filter_time)
+        .require(!(config.filter_time > S(0) && config.filter_time < config.sample_time),
+                 {"filter_time", config.filter_time, "must be 0 or not below sample_time, which is",
+                  -1, config.sample_time, true});
+    if (!rules) return rules.error();
     TrackingDifferentiator result(config);
-    if (auto ok = check_representable("acceleration", config.acceleration,
-                                      S(config.acceleration * result.width_ * result.width_),
-                                      "times the square of the sample time cannot be held");
-        !ok) {
-      return ok.error();
-    }
+    rules.representable("acceleration", config.acceleration,
+                        S(config.acceleration * result.width_ * result.width_),
+                        "times the square of the sample time cannot be held");
+    if (!rules) return rules.error();
     return result;
   }
 
@@ -117,8 +112,10 @@ class SignTrackingDifferentiator {
   /// Checks the settings and does all the design work.
   /// @return at rest in zero, or an error that names the field
   static Expected<SignTrackingDifferentiator, Error<S>> make(const Config& config) {
-    if (auto ok = check_positive("acceleration", config.acceleration); !ok) return ok.error();
-    if (auto ok = check_not_negative("sample_time", config.sample_time); !ok) return ok.error();
+    Rules<S> rules;
+    rules.positive("acceleration", config.acceleration)
+        .not_negative("sample_time", config.sample_time);
+    if (!rules) return rules.error();
     return SignTrackingDifferentiator(config);
   }
 
