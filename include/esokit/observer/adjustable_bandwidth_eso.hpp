@@ -27,18 +27,16 @@ template <int Size, Scalar S>
 Expected<BandwidthPair<S>, Error<S>> bandwidth_pair(const S& bandwidth, const S& ratio,
                                                     SwitchingRule rule, const S& sample_time,
                                                     bool allow_uncertified) {
-  if (auto ok = check_positive("observer_bandwidth", bandwidth); !ok) return ok.error();
-  if (auto ok = check_positive("bandwidth_ratio", ratio); !ok) return ok.error();
+  Rules<S> rules;
+  rules.positive("observer_bandwidth", bandwidth).positive("bandwidth_ratio", ratio);
+  if (!rules) return rules.error();
   const BandwidthPair<S> pair{bandwidth * ratio,
                               rule == SwitchingRule::beso ? S(bandwidth / ratio) : bandwidth};
   for (const S& product : {pair.shrinking, pair.otherwise}) {
-    if (auto ok = check_representable("bandwidth_ratio", ratio, product,
-                                      "with observer_bandwidth gives a bandwidth that the scalar "
-                                      "cannot hold");
-        !ok) {
-      return ok.error();
-    }
+    rules.representable("bandwidth_ratio", ratio, product,
+                        "with observer_bandwidth gives a bandwidth that the scalar cannot hold");
   }
+  if (!rules) return rules.error();
   if (allow_uncertified ||
       bandwidth_switching_certified<Size, S>(rule, bandwidth, ratio, sample_time)) {
     return pair;
@@ -159,7 +157,8 @@ class ContinuousAdjustableBandwidthEso
   /// Checks the settings and does all the design work.
   /// @return the observer's equations, or an error that names the field
   static Expected<ContinuousAdjustableBandwidthEso, Error<S>> make(const Config& config) {
-    if (auto ok = check_nonzero("input_gain", config.input_gain); !ok) return ok.error();
+    Rules<S> rules;
+    if (!rules.nonzero("input_gain", config.input_gain)) return rules.error();
     const auto pair = detail::bandwidth_pair<Base::size, S>(
         config.observer_bandwidth, config.bandwidth_ratio, config.rule, S(0.0),
         config.allow_uncertified_switching);
@@ -167,13 +166,10 @@ class ContinuousAdjustableBandwidthEso
     const auto shrinking = continuous_gain<Base::size, S>(pair->shrinking);
     const auto otherwise = continuous_gain<Base::size, S>(pair->otherwise);
     for (const auto& gain : {shrinking, otherwise}) {
-      if (auto ok = check_representable("observer_bandwidth", config.observer_bandwidth,
-                                        S(gain(Base::size - 1)),
-                                        "gives a gain that the scalar cannot hold");
-          !ok) {
-        return ok.error();
-      }
+      rules.representable("observer_bandwidth", config.observer_bandwidth, S(gain(Base::size - 1)),
+                          "gives a gain that the scalar cannot hold");
     }
+    if (!rules) return rules.error();
     return ContinuousAdjustableBandwidthEso(config.input_gain,
                                             Law(shrinking, otherwise, config.sign_reading));
   }

@@ -68,23 +68,18 @@ class AlgebraicEso
   /// @return the observer at rest in zero, or an error that names the field
   static Expected<AlgebraicEso, Error<S>> make(const Config& config) {
     const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
-    if (auto ok = Base::check_chain(chain); !ok) return ok.error();
-    if (auto ok = check_not_negative("observer_bandwidth", config.observer_bandwidth); !ok) {
-      return ok.error();
-    }
-    if (auto ok = check_not_negative("frequency_shift", config.frequency_shift); !ok) {
-      return ok.error();
-    }
-    if (!all(config.observer_bandwidth > S(0.0)) && all(config.frequency_shift > S(0.0)) &&
-        !config.allow_vanishing_gain) {
-      return Error<S>{"observer_bandwidth", config.observer_bandwidth,
-                      "with frequency_shift above zero lets the gains vanish; allow_vanishing_gain "
-                      "asks for it"};
-    }
-    if (config.start_index < 0 || config.start_index > 1000000) {
-      return Error<S>{"start_index", detail::integer<S>(config.start_index),
-                      "must be 0 .. 1000000"};
-    }
+    Rules<S> rules;
+    rules.all_of(Base::check_chain(chain))
+        .not_negative("observer_bandwidth", config.observer_bandwidth)
+        .not_negative("frequency_shift", config.frequency_shift)
+        .require(all(config.observer_bandwidth > S(0.0)) || !all(config.frequency_shift > S(0.0)) ||
+                     config.allow_vanishing_gain,
+                 "observer_bandwidth", config.observer_bandwidth,
+                 "with frequency_shift above zero lets the gains vanish; allow_vanishing_gain "
+                 "asks for it")
+        .require(0 <= config.start_index && config.start_index <= 1000000, "start_index",
+                 detail::integer<S>(config.start_index), "must be 0 .. 1000000");
+    if (!rules) return rules.error();
     const auto hold = hold_samples(config);
     if (!hold) return hold.error();
     if (all(config.observer_bandwidth > S(0.0))) {
@@ -92,23 +87,16 @@ class AlgebraicEso
           current_gain<Base::size, S>(EqualSampledPoles<Base::size, S>::from_bandwidth(
                                           config.observer_bandwidth, config.sample_time)
                                           .weights());
-      if (auto ok =
-              check_representable("observer_bandwidth", config.observer_bandwidth, settled.back(),
-                                  "times sample_time gives a gain that the scalar cannot hold");
-          !ok) {
-        return ok.error();
-      }
+      rules.representable("observer_bandwidth", config.observer_bandwidth, settled.back(),
+                          "times sample_time gives a gain that the scalar cannot hold");
     }
     const Law law(config.observer_bandwidth, config.frequency_shift, config.sample_time,
                   static_cast<std::uint32_t>(config.start_index), *hold);
     for (const S& gain : law.gain(S(0.0))) {
-      if (auto ok =
-              check_representable("frequency_shift", config.frequency_shift, gain,
-                                  "times sample_time gives a gain that the scalar cannot hold");
-          !ok) {
-        return ok.error();
-      }
+      rules.representable("frequency_shift", config.frequency_shift, gain,
+                          "times sample_time gives a gain that the scalar cannot hold");
     }
+    if (!rules) return rules.error();
     return AlgebraicEso(chain, law, *hold);
   }
 
@@ -200,19 +188,16 @@ class AlgebraicEso
 
   static Expected<std::uint32_t, Error<S>> hold_samples(const Config& config) {
     constexpr int size = Base::size;
-    if (auto ok = check_not_negative("measurement_noise", config.measurement_noise); !ok) {
-      return ok.error();
-    }
-    if (auto ok = check_not_negative("disturbance_noise", config.disturbance_noise); !ok) {
-      return ok.error();
-    }
+    Rules<S> rules;
+    rules.not_negative("measurement_noise", config.measurement_noise)
+        .not_negative("disturbance_noise", config.disturbance_noise);
     const bool noise = all(config.measurement_noise > S(0.0));
-    if (noise != all(config.disturbance_noise > S(0.0))) {
-      return Error<S>{noise ? "disturbance_noise" : "measurement_noise", S(0.0),
-                      "must be given together with the other noise level"};
-    }
+    rules.require(noise == all(config.disturbance_noise > S(0.0)),
+                  noise ? "disturbance_noise" : "measurement_noise", S(0.0),
+                  "must be given together with the other noise level");
+    if (config.hold) rules.not_negative("hold", *config.hold);
+    if (!rules) return rules.error();
     if (config.hold) {
-      if (auto ok = check_not_negative("hold", *config.hold); !ok) return ok.error();
       // A hold of 20.0001 samples by rounding is one of 20.
       const S samples = *config.hold / config.sample_time - S(1e-3);
       return smallest_count("hold", *config.hold, 0u,
@@ -364,13 +349,11 @@ class ContinuousAlgebraicEso
   /// Checks the settings and does all the design work.
   /// @return the observer's equations, or an error that names the field
   static Expected<ContinuousAlgebraicEso, Error<S>> make(const Config& config) {
-    if (auto ok = check_nonzero("input_gain", config.input_gain); !ok) return ok.error();
-    if (auto ok = check_not_negative("observer_bandwidth", config.observer_bandwidth); !ok) {
-      return ok.error();
-    }
-    if (auto ok = check_not_negative("frequency_shift", config.frequency_shift); !ok) {
-      return ok.error();
-    }
+    Rules<S> rules;
+    rules.nonzero("input_gain", config.input_gain)
+        .not_negative("observer_bandwidth", config.observer_bandwidth)
+        .not_negative("frequency_shift", config.frequency_shift);
+    if (!rules) return rules.error();
     return ContinuousAlgebraicEso(config.input_gain,
                                   Law(config.observer_bandwidth, config.frequency_shift));
   }

@@ -50,13 +50,11 @@ class AlgebraicFilter {
   /// Checks the settings and does all the design work.
   /// @return the filter's equations, or an error that names the field
   static Expected<AlgebraicFilter, Error<S>> make(const Config& config) {
-    if (auto ok = check_nonzero("input_gain", config.input_gain); !ok) return ok.error();
-    if (auto ok = check_not_negative("observer_bandwidth", config.observer_bandwidth); !ok) {
-      return ok.error();
-    }
-    if (auto ok = check_not_negative("frequency_shift", config.frequency_shift); !ok) {
-      return ok.error();
-    }
+    Rules<S> rules;
+    rules.nonzero("input_gain", config.input_gain)
+        .not_negative("observer_bandwidth", config.observer_bandwidth)
+        .not_negative("frequency_shift", config.frequency_shift);
+    if (!rules) return rules.error();
     return AlgebraicFilter(config);
   }
 

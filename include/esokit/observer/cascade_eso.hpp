@@ -75,28 +75,20 @@ Expected<LevelSpecs<typename Placement::template Spec<Size, S>, Levels>, Error<S
   if constexpr (std::is_same_v<Placement, PoleSet>) {
     return Specs{config.level_poles, "level_poles"};
   } else {
-    const auto given = [](const S& value) {
-      return !all(is_finite(value)) || all(magnitude(value) > S(0.0));
-    };
+    Rules<S> rules;
     if (config.level_bandwidths) {
       constexpr const char* rule = "must be left out where level_bandwidths is given";
-      if (given(config.observer_bandwidth)) {
-        return Error<S>{"observer_bandwidth", config.observer_bandwidth, rule};
-      }
-      if (given(config.bandwidth_factor)) {
-        return Error<S>{"bandwidth_factor", config.bandwidth_factor, rule};
-      }
+      rules.left_out("observer_bandwidth", config.observer_bandwidth, rule)
+          .left_out("bandwidth_factor", config.bandwidth_factor, rule);
+      if (!rules) return rules.error();
       return Specs{*config.level_bandwidths, "level_bandwidths"};
     }
     Specs levels{{}, "observer_bandwidth", false};
-    if (auto ok = check_positive("observer_bandwidth", config.observer_bandwidth); !ok) {
-      return ok.error();
+    rules.positive("observer_bandwidth", config.observer_bandwidth);
+    if (Levels > 1 || !Rules<S>{}.left_out("", config.bandwidth_factor, "")) {
+      rules.above("bandwidth_factor", config.bandwidth_factor, S(1.0));
     }
-    if (Levels > 1 || given(config.bandwidth_factor)) {
-      if (auto ok = check_above("bandwidth_factor", config.bandwidth_factor, S(1.0)); !ok) {
-        return ok.error();
-      }
-    }
+    if (!rules) return rules.error();
     S bandwidth = config.observer_bandwidth;
     for (S& spec : levels.specs) {
       spec = bandwidth;
@@ -195,7 +187,7 @@ class ContinuousCascadeEso
   /// Checks the settings and does all the design work.
   /// @return the observer's equations, or an error that names the field
   static Expected<ContinuousCascadeEso, Error<S>> make(const Config& config) {
-    if (auto ok = check_nonzero("input_gain", config.input_gain); !ok) return ok.error();
+    if (Rules<S> rules; !rules.nonzero("input_gain", config.input_gain)) return rules.error();
     const auto laws = detail::level_laws<Law, Placement, Base::size, Levels, S>(
         config, [](const char* field, const auto& spec, int index) {
           return Law::make(field, spec, index);

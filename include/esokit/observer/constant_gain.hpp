@@ -24,17 +24,17 @@ class ConstantGain {
   /// @return error for a spec that the placement refuses, or a gain that the scalar cannot hold
   static Expected<ConstantGain, Error<S>> make(const char* field, const Spec& spec,
                                                const S& sample_time, int index = -1) {
-    if (auto ok = Placement::template check<Size, S>(field, spec, index); !ok) return ok.error();
+    Rules<S> rules;
+    rules.all_of(Placement::template check<Size, S>(field, spec, index));
+    if (!rules) return rules.error();
     ConstantGain law;
     law.poles_ = Placement::template sample<Size, S>(spec, sample_time);
     law.gain_ = current_gain<Size, S>(law.poles_.weights());
     // The last gain is prod(1 - rho_i) / (N-1)!, the smallest one for slow poles.
-    if (auto ok = check_representable(
-            field, Placement::template representative<Size, S>(spec), law.gain_[Size - 1],
-            "times sample_time gives a gain that the scalar cannot hold", index);
-        !ok) {
-      return ok.error();
-    }
+    rules.representable(field, Placement::template representative<Size, S>(spec),
+                        law.gain_[Size - 1],
+                        "times sample_time gives a gain that the scalar cannot hold", index);
+    if (!rules) return rules.error();
     return law;
   }
 
@@ -77,15 +77,14 @@ class ContinuousConstantGain {
   /// @return error for a spec that the placement refuses, or a gain that the scalar cannot hold
   static Expected<ContinuousConstantGain, Error<S>> make(const char* field, const Spec& spec,
                                                          int index = -1) {
-    if (auto ok = Placement::template check<Size, S>(field, spec, index); !ok) return ok.error();
+    Rules<S> rules;
+    rules.all_of(Placement::template check<Size, S>(field, spec, index));
+    if (!rules) return rules.error();
     ContinuousConstantGain law;
     law.gain_ = Placement::template gain<Size, S>(spec);
-    if (auto ok = check_representable(field, Placement::template representative<Size, S>(spec),
-                                      law.gain_(Size - 1),
-                                      "gives a gain that the scalar cannot hold", index);
-        !ok) {
-      return ok.error();
-    }
+    rules.representable(field, Placement::template representative<Size, S>(spec),
+                        law.gain_(Size - 1), "gives a gain that the scalar cannot hold", index);
+    if (!rules) return rules.error();
     return law;
   }
 

@@ -35,7 +35,7 @@ class ContinuousObserver {
   /// @param input_gain b0, unit of y^(n) per unit of u @param laws one a level
   /// @return error if b0 is zero or not finite
   static Expected<ContinuousObserver, Error<S>> make(const S& input_gain, const Laws& laws) {
-    if (auto ok = check_nonzero("input_gain", input_gain); !ok) return ok.error();
+    if (Rules<S> rules; !rules.nonzero("input_gain", input_gain)) return rules.error();
     return ContinuousObserver(input_gain, laws);
   }
 

@@ -128,11 +128,11 @@ class ExtendedStateFilter
   /// @return the filter at rest in zero, or an error that names the field
   static Expected<ExtendedStateFilter, Error<S>> make(const Config& config) {
     const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
-    if (auto ok = Base::check_chain(chain); !ok) return ok.error();
-    if (auto ok = check_rule(config); !ok) return ok.error();
-    if (auto ok = check_not_negative("outlier_threshold", config.outlier_threshold); !ok) {
-      return ok.error();
-    }
+    Rules<S> rules;
+    rules.all_of(Base::check_chain(chain))
+        .all_of(check_rule(config))
+        .not_negative("outlier_threshold", config.outlier_threshold);
+    if (!rules) return rules.error();
     auto settings = law_settings(config);
     if (!settings) return settings.error();
     Law law(*settings);
@@ -285,28 +285,19 @@ class ExtendedStateFilter
   [[nodiscard]] Law& law() noexcept { return std::get<0>(this->laws()); }
 
   static Check<S> check_rule(const Config& config) {
-    const bool given =
-        !all(is_finite(config.inflation)) || all(detail::magnitude(config.inflation) > S(0.0));
+    Rules<S> rules;
     if (config.inflation_rule == InflationRule::fixed) {
-      if (!all(is_finite(config.inflation)) || !all(config.inflation > S(0.0))) {
-        return Error<S>{"inflation", config.inflation,
-                        "must be finite and positive; the plain Kalman filter is "
-                        "InflationRule::none"};
-      }
-      return {};
-    }
-    if (given) {
-      return Error<S>{"inflation", config.inflation,
-                      "must be left out unless inflation_rule is fixed"};
+      rules.require(all(is_finite(config.inflation)) && all(config.inflation > S(0.0)), "inflation",
+                    config.inflation,
+                    "must be finite and positive; the plain Kalman filter is InflationRule::none");
+    } else {
+      rules.left_out("inflation", config.inflation,
+                     "must be left out unless inflation_rule is fixed");
     }
     if (config.inflation_rule == InflationRule::adaptive) {
-      for (int i = 0; i < N; ++i) {
-        if (auto ok = check_positive("trace_weights", config.trace_weights[index(i)], i); !ok) {
-          return ok;
-        }
-      }
+      rules.positive("trace_weights", config.trace_weights);
     }
-    return {};
+    return rules;
   }
 
   /// T^r / r! over the root of the unit, by which a state becomes one of the law's.
@@ -341,25 +332,20 @@ class ExtendedStateFilter
 
   /// Finite, symmetric, no negative variance.
   static Check<S> check_covariance(const char* field, const Covariance& p) {
+    Rules<S> rules;
     for (int i = 0; i < N; ++i) {
-      for (int j = 0; j < N; ++j) {
-        if (!all(is_finite(p(i, j)))) {
-          return Error<S>{field, p(i, j), "must be finite", i * N + j};
-        }
-      }
-      if (!all(p(i, i) >= S(0.0))) {
-        return Error<S>{field, p(i, i), "must be positive semidefinite", i * N + i};
-      }
+      for (int j = 0; j < N; ++j) rules.finite(field, p(i, j), i * N + j);
+      rules.require(all(p(i, i) >= S(0.0)), field, p(i, i), "must be positive semidefinite",
+                    i * N + i);
     }
     for (int i = 0; i < N; ++i) {
       for (int j = 0; j < i; ++j) {
         const S difference = detail::magnitude(S(p(i, j) - p(j, i)));
-        if (!all(difference <= S(8.0) * detail::rounding<S>() * detail::magnitude(p(i, j)))) {
-          return Error<S>{field, p(i, j), "must be symmetric", i * N + j};
-        }
+        const S bound = S(8.0) * detail::rounding<S>() * detail::magnitude(p(i, j));
+        rules.require(all(difference <= bound), field, p(i, j), "must be symmetric", i * N + j);
       }
     }
-    return {};
+    return rules;
   }
 
   static Expected<CovarianceFactor<N, S>, Error<S>> factored(const char* field, const Covariance& p,
@@ -387,40 +373,34 @@ class ExtendedStateFilter
   static Expected<RiccatiSettings<N, S>, Error<S>> law_settings(const Config& config) {
     using std::sqrt;
     const S& r = config.measurement_variance;
-    if (auto ok = check_not_negative("measurement_variance", r); !ok) return ok.error();
-    if (auto ok = check_covariance("initial_covariance", config.initial_covariance); !ok) {
-      return ok.error();
-    }
+    Rules<S> rules;
+    rules.not_negative("measurement_variance", r)
+        .all_of(check_covariance("initial_covariance", config.initial_covariance));
     Covariance q = Covariance::Zero();
     if (config.process_covariance) {
-      if (auto ok = check_covariance("process_covariance", *config.process_covariance); !ok) {
-        return ok.error();
-      }
       q = *config.process_covariance;
+      rules.all_of(check_covariance("process_covariance", q));
     }
-    if (auto ok = check_positive("bound_factor", config.bound_factor); !ok) return ok.error();
+    rules.positive("bound_factor", config.bound_factor);
     bool bounded = false;
     for (int i = 0; i < N; ++i) {
       const S& bound = config.disturbance_bounds[index(i)];
-      if (auto ok = check_not_negative("disturbance_bounds", bound, i); !ok) return ok.error();
+      rules.not_negative("disturbance_bounds", bound, i);
       if (!all(bound > S(0.0))) continue;
-      if (config.process_covariance) {
-        return Error<S>{"disturbance_bounds", bound,
-                        "must be left out where process_covariance is given", i};
-      }
       bounded = true;
       // With a model the change left over is the difference of two within the bound.
       const S whole = has_model && i == Order ? S(bound + bound) : bound;
       q(i, i) = config.bound_factor * whole * whole;
-      if (!all(is_finite(q(i, i)))) {
-        return Error<S>{"disturbance_bounds", bound, "has a square that the scalar cannot hold", i};
-      }
+      rules
+          .require(!config.process_covariance, "disturbance_bounds", bound,
+                   "must be left out where process_covariance is given", i)
+          .require(all(is_finite(q(i, i))), "disturbance_bounds", bound,
+                   "has a square that the scalar cannot hold", i);
     }
-    if (has_model && !all(config.disturbance_bounds[Order] > S(0.0))) {
-      return Error<S>{"disturbance_bounds", config.disturbance_bounds[Order],
-                      "must say by how much the model may change the disturbance in a sample",
-                      Order};
-    }
+    const S& change = config.disturbance_bounds[Order];
+    rules.require(!has_model || all(change > S(0.0)), "disturbance_bounds", change,
+                  "must say by how much the model may change the disturbance in a sample", Order);
+    if (!rules) return rules.error();
 
     // The unit of all variances: R, or without noise the largest variance there is.
     S unit = r;
@@ -434,16 +414,14 @@ class ExtendedStateFilter
         unit = select(unit < seen, seen, unit);
       }
     }
-    if (!all(r > S(0.0)) && !driven) {
-      return Error<S>{"measurement_variance", r,
-                      "must be positive where nothing disturbs the plant (all of "
-                      "disturbance_bounds or process_covariance is zero): after N exact "
-                      "measurements nothing would be left to find a gain from"};
-    }
-    if (config.inflation_rule == InflationRule::adaptive && !driven) {
-      return Error<S>{"disturbance_bounds", S(0.0),
-                      "or process_covariance must not be zero where the inflation is adaptive"};
-    }
+    rules
+        .require(driven || all(r > S(0.0)), "measurement_variance", r,
+                 "must be positive where nothing disturbs the plant (all of disturbance_bounds or "
+                 "process_covariance is zero): after N exact measurements nothing would be left to "
+                 "find a gain from")
+        .require(driven || config.inflation_rule != InflationRule::adaptive, "disturbance_bounds",
+                 S(0.0), "or process_covariance must not be zero where the inflation is adaptive");
+    if (!rules) return rules.error();
     const Array<S, N> units = scaled_units(config.sample_time, S(sqrt(unit)));
     const auto start = factored("initial_covariance", config.initial_covariance, units);
     if (!start) return start.error();

@@ -23,14 +23,7 @@ struct KnownPoles {
 
   /// Error of a coefficient that is not finite; `make` of the observer asks for it.
   [[nodiscard]] Check<S> check() const {
-    for (int i = 0; i < Order; ++i) {
-      if (auto ok =
-              check_finite("model.coefficients", coefficients[static_cast<std::size_t>(i)], i);
-          !ok) {
-        return ok;
-      }
-    }
-    return {};
+    return Rules<S>{}.finite("model.coefficients", coefficients);
   }
 
   /// fbar, unit of y^(n). @param estimate (y, .., y^(n-1), ..), at least n x 1

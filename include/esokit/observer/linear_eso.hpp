@@ -127,7 +127,7 @@ class ContinuousLinearEso
   /// Checks the settings and does all the design work.
   /// @return the observer's equations, or an error that names the field
   static Expected<ContinuousLinearEso, Error<S>> make(const Config& config) {
-    if (auto ok = check_nonzero("input_gain", config.input_gain); !ok) return ok.error();
+    if (Rules<S> rules; !rules.nonzero("input_gain", config.input_gain)) return rules.error();
     auto law = Law::make(Config::placement_field, config.placement());
     if (!law) return law.error();
     return ContinuousLinearEso(config.input_gain, *law);

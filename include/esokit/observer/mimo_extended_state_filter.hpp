@@ -72,7 +72,8 @@ class MimoExtendedStateFilter {
   /// Checks the settings and does all the design work.
   /// @return the filter at rest in zero, or an error that names the field
   static Expected<MimoExtendedStateFilter, Error<S>> make(const Config& config) {
-    if (auto ok = check(config); !ok) return ok.error();
+    Rules<S> rules;
+    if (!rules.all_of(check(config))) return rules.error();
     MimoExtendedStateFilter filter(config);
     const auto factored = [&](const char* field, const Covariance& p,
                               CovarianceRoot<size, S>& root) -> Check<S> {
@@ -97,10 +98,9 @@ class MimoExtendedStateFilter {
     }
     const char* noise_field =
         config.process_covariance ? "process_covariance" : "disturbance_bounds";
-    if (auto ok = factored("initial_covariance", config.initial_covariance, filter.start_); !ok) {
-      return ok.error();
-    }
-    if (auto ok = factored(noise_field, noise, filter.noise_); !ok) return ok.error();
+    rules.all_of(factored("initial_covariance", config.initial_covariance, filter.start_))
+        .all_of(factored(noise_field, noise, filter.noise_));
+    if (!rules) return rules.error();
     const auto measurement = CovarianceRoot<outputs, S>::from_matrix(config.measurement_covariance);
     if (!measurement) {
       return Error<S>{"measurement_covariance", config.measurement_covariance(0, 0),
@@ -418,96 +418,72 @@ class MimoExtendedStateFilter {
 
   template <class Square>
   static Check<S> check_symmetric(const char* field, const Square& p) {
+    Rules<S> rules;
     for (int i = 0; i < p.rows(); ++i) {
       for (int j = 0; j <= i; ++j) {
         const int place = i * static_cast<int>(p.cols()) + j;
-        if (auto ok = check_finite(field, p(i, j), place); !ok) return ok;
         const S difference = detail::magnitude(S(p(i, j) - p(j, i)));
-        if (!(difference <= S(8) * detail::rounding<S>() * detail::magnitude(p(i, j)))) {
-          return Error<S>{field, p(i, j), "must be symmetric", place};
-        }
+        const S bound = S(8) * detail::rounding<S>() * detail::magnitude(p(i, j));
+        rules.finite(field, p(i, j), place)
+            .require(difference <= bound, field, p(i, j), "must be symmetric", place);
       }
     }
-    return {};
+    return rules;
   }
 
   static Check<S> check(const Config& config) {
-    if (auto ok = check_positive("sample_time", config.sample_time); !ok) return ok;
-    if (auto ok =
-            check_representable("sample_time", config.sample_time, S(S(1) / config.sample_time),
-                                "has an inverse that the scalar cannot hold");
-        !ok) {
-      return ok;
-    }
-    if (config.max_gap < 1 || config.max_gap > 65000) {
-      return Error<S>{"max_gap", static_cast<S>(config.max_gap), "must be 1 .. 65000"};
-    }
+    Rules<S> rules;
+    rules.positive("sample_time", config.sample_time)
+        .invertible("sample_time", config.sample_time)
+        .require(1 <= config.max_gap && config.max_gap <= 65000, "max_gap",
+                 static_cast<S>(config.max_gap), "must be 1 .. 65000");
     for (int i = 0; i < outputs; ++i) {
       for (int j = 0; j < Inputs; ++j) {
-        if (auto ok = check_finite("input_matrix", config.input_matrix(i, j), i * Inputs + j);
-            !ok) {
-          return ok;
-        }
+        rules.finite("input_matrix", config.input_matrix(i, j), i * Inputs + j);
       }
       S unit(1);
       for (int r = 1; r < order_of(i) + Extension; ++r) {
         unit = unit * config.sample_time / static_cast<S>(r);
-        if (auto ok = check_representable("sample_time", config.sample_time, unit,
-                                          "to the power of a chain's highest state over its "
-                                          "factorial is not what the scalar can hold");
-            !ok) {
-          return ok;
-        }
+        rules.representable("sample_time", config.sample_time, unit,
+                            "to the power of a chain's highest state over its factorial is not "
+                            "what the scalar can hold");
         for (int j = 0; r == order_of(i) && j < Inputs; ++j) {
           const S& gain = config.input_matrix(i, j);
           if (!(detail::magnitude(gain) > S(0))) continue;
-          if (auto ok = check_representable("input_matrix", gain, S(gain * unit),
-                                            "times T^n / n! gives a gain that the scalar cannot "
-                                            "hold",
-                                            i * Inputs + j);
-              !ok) {
-            return ok;
-          }
+          rules.representable("input_matrix", gain, S(gain * unit),
+                              "times T^n / n! gives a gain that the scalar cannot hold",
+                              i * Inputs + j);
         }
       }
     }
-    if (!(config.input_matrix.cwiseAbs().maxCoeff() > S(0))) {
-      return Error<S>{"input_matrix", S(0), "must not be zero"};
-    }
-    if (config.inflation_rule == InflationRule::adaptive) {
-      return Error<S>{"inflation_rule", S(0), "must be fixed or none for several chains"};
-    }
+    rules
+        .require(config.input_matrix.cwiseAbs().maxCoeff() > S(0), "input_matrix", S(0),
+                 "must not be zero")
+        .require(config.inflation_rule != InflationRule::adaptive, "inflation_rule", S(0),
+                 "must be fixed or none for several chains");
     if (config.inflation_rule == InflationRule::fixed) {
-      if (!is_finite(config.inflation) || !(config.inflation > S(0))) {
-        return Error<S>{"inflation", config.inflation,
-                        "must be finite and positive; the plain Kalman filter is "
-                        "InflationRule::none"};
-      }
-    } else if (!is_finite(config.inflation) || detail::magnitude(config.inflation) > S(0)) {
-      return Error<S>{"inflation", config.inflation,
-                      "must be left out unless inflation_rule is fixed"};
+      rules.require(is_finite(config.inflation) && config.inflation > S(0), "inflation",
+                    config.inflation,
+                    "must be finite and positive; the plain Kalman filter is InflationRule::none");
+    } else {
+      rules.left_out("inflation", config.inflation,
+                     "must be left out unless inflation_rule is fixed");
     }
-    if (config.mode == RiccatiMode::start_table) {
-      return Error<S>{"mode", S(0), "must be recursive or frozen for several chains"};
-    }
-    if (auto ok = check_positive("bound_factor", config.bound_factor); !ok) return ok;
+    rules
+        .require(config.mode != RiccatiMode::start_table, "mode", S(0),
+                 "must be recursive or frozen for several chains")
+        .positive("bound_factor", config.bound_factor);
     for (int i = 0; i < size; ++i) {
       const S& bound = config.disturbance_bounds[index(i)];
-      if (auto ok = check_not_negative("disturbance_bounds", bound, i); !ok) return ok;
-      if (bound > S(0) && config.process_covariance) {
-        return Error<S>{"disturbance_bounds", bound,
-                        "must be left out where process_covariance is given", i};
-      }
+      rules.not_negative("disturbance_bounds", bound, i)
+          .require(!(bound > S(0) && config.process_covariance), "disturbance_bounds", bound,
+                   "must be left out where process_covariance is given", i);
     }
-    if (auto ok = check_symmetric("measurement_covariance", config.measurement_covariance); !ok) {
-      return ok;
-    }
+    rules.all_of(check_symmetric("measurement_covariance", config.measurement_covariance));
     if (config.process_covariance) {
-      if (auto ok = check_symmetric("process_covariance", *config.process_covariance); !ok) {
-        return ok;
-      }
+      rules.all_of(check_symmetric("process_covariance", *config.process_covariance));
     }
-    return check_symmetric("initial_covariance", config.initial_covariance);
+    return rules.all_of(check_symmetric("initial_covariance", config.initial_covariance));
   }
 
   /// Phi x + Gamma u: every chain ahead by Pascal's triangle, as sums of neighbours.

@@ -116,14 +116,11 @@ class NonlinearEso
     const auto linear =
         Law::Linear::make("observer_bandwidth", config.observer_bandwidth, config.sample_time);
     if (!linear) return linear.error();
-    if (auto ok = check_positive("error_scale", config.error_scale); !ok) return ok.error();
-    if (auto ok =
-            check_representable("error_scale", config.error_scale, S(S(1.0) / config.error_scale),
-                                "has an inverse that the scalar cannot hold");
-        !ok) {
-      return ok.error();
-    }
-    if (auto ok = detail::check_shape<S>(config.shape); !ok) return ok.error();
+    Rules<S> rules;
+    rules.positive("error_scale", config.error_scale)
+        .invertible("error_scale", config.error_scale)
+        .all_of(detail::check_shape<S>(config.shape));
+    if (!rules) return rules.error();
     const auto poles =
         EqualSampledPoles<size, S>::from_bandwidth(config.observer_bandwidth, config.sample_time);
     const auto limits = detail::find_limits<size, S>(
@@ -168,12 +165,13 @@ class ContinuousNonlinearEso
   /// @return the observer's equations, or an error that names the field
   static Expected<ContinuousNonlinearEso, Error<S>> make(const Config& config) {
     constexpr int size = Base::size;
-    if (auto ok = check_nonzero("input_gain", config.input_gain); !ok) return ok.error();
+    Rules<S> rules;
+    if (!rules.nonzero("input_gain", config.input_gain)) return rules.error();
     const auto linear =
         ContinuousConstantGain<size, S>::make("observer_bandwidth", config.observer_bandwidth);
     if (!linear) return linear.error();
-    if (auto ok = check_positive("error_scale", config.error_scale); !ok) return ok.error();
-    if (auto ok = detail::check_shape<S>(config.shape); !ok) return ok.error();
+    rules.positive("error_scale", config.error_scale).all_of(detail::check_shape<S>(config.shape));
+    if (!rules) return rules.error();
     const Vector<S, size> gain = linear->gain(S(0.0), S(0.0));
     detail::GainLimits<S> asked{config.gain_min, config.gain_max, config.allow_uncertified_gain,
                                 config.unlimited};

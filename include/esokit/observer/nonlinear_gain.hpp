@@ -91,10 +91,11 @@ struct PowerSumGain {
 
   /// Error of a parameter out of its range; `make` of the observer asks for it.
   [[nodiscard]] Check<S> check() const {
-    if (auto ok = check_not_negative("shape.gain_alpha", gain_alpha); !ok) return ok;
-    if (auto ok = check_positive("shape.alpha", alpha); !ok) return ok;
-    if (auto ok = check_not_negative("shape.gain_beta", gain_beta); !ok) return ok;
-    return check_not_negative("shape.beta", beta);
+    return Rules<S>{}
+        .not_negative("shape.gain_alpha", gain_alpha)
+        .positive("shape.alpha", alpha)
+        .not_negative("shape.gain_beta", gain_beta)
+        .not_negative("shape.beta", beta);
   }
 };
 
@@ -134,9 +135,10 @@ struct FalGain {
 
   /// Error of a parameter out of its range; `make` of the observer asks for it.
   [[nodiscard]] Check<S> check() const {
-    if (auto ok = check_not_negative("shape.gain", gain); !ok) return ok;
-    if (auto ok = check_positive("shape.exponent", exponent); !ok) return ok;
-    return check_positive("shape.linear_width", linear_width);
+    return Rules<S>{}
+        .not_negative("shape.gain", gain)
+        .positive("shape.exponent", exponent)
+        .positive("shape.linear_width", linear_width);
   }
 };
 

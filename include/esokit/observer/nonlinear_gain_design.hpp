@@ -77,17 +77,14 @@ template <int Size, Scalar S, class Gain>
 Expected<Interval<S>, Error<S>> find_limits(const GainLimits<S>& asked, const Gain& gain,
                                             const S& least_with_one, const S& ceiling) {
   const S widest(static_cast<TableScalar<S>>((std::numeric_limits<TableScalar<S>>::max)()));
-  if (asked.low) {
-    if (auto ok = check_not_negative("gain_min", *asked.low); !ok) return ok.error();
-  }
-  if (asked.high) {
-    if (auto ok = check_positive("gain_max", *asked.high); !ok) return ok.error();
-  }
-  if (asked.unlimited) {
-    if (asked.low) return Error<S>{"gain_min", *asked.low, "must be left out with unlimited"};
-    if (asked.high) return Error<S>{"gain_max", *asked.high, "must be left out with unlimited"};
-    return Interval<S>{-widest, widest};
-  }
+  constexpr const char* unlimited = "must be left out with unlimited";
+  Rules<S> rules;
+  if (asked.low) rules.not_negative("gain_min", *asked.low);
+  if (asked.high) rules.positive("gain_max", *asked.high);
+  if (asked.low) rules.require(!asked.unlimited, "gain_min", *asked.low, unlimited);
+  if (asked.high) rules.require(!asked.unlimited, "gain_max", *asked.high, unlimited);
+  if (!rules) return rules.error();
+  if (asked.unlimited) return Interval<S>{-widest, widest};
   const S three_quarters_down = S(0.25) * (S(1.0) + S(3.0) * least_with_one);
   S low = largest(S(0.5), three_quarters_down);
   // A gain_max below the default gain_min is no reason to refuse it.

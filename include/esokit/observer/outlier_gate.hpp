@@ -50,17 +50,15 @@ class OutlierGate : public Adapter<Observer> {
   /// Checks the settings and does all the design work.
   /// @return the observer at rest in zero, or an error that names the field
   static Expected<OutlierGate, Error<S>> make(const Config& config) {
-    if (auto ok = check_not_negative("threshold", config.threshold); !ok) return ok.error();
-    if (auto ok = check_not_negative("running_factor", config.running_factor); !ok) {
-      return ok.error();
-    }
-    if (config.running_factor > S(0) && !(config.threshold > S(0))) {
-      return Error<S>{"threshold", config.threshold,
-                      "must be positive where running_factor is: without noise nothing would pass"};
-    }
-    if (config.most_in_a_row < 1 || config.most_in_a_row > 65000) {
-      return Error<S>{"most_in_a_row", static_cast<S>(config.most_in_a_row), "must be 1 .. 65000"};
-    }
+    Rules<S> rules;
+    rules.not_negative("threshold", config.threshold)
+        .not_negative("running_factor", config.running_factor)
+        .require(!(config.running_factor > S(0)) || config.threshold > S(0), "threshold",
+                 config.threshold,
+                 "must be positive where running_factor is: without noise nothing would pass")
+        .require(1 <= config.most_in_a_row && config.most_in_a_row <= 65000, "most_in_a_row",
+                 static_cast<S>(config.most_in_a_row), "must be 1 .. 65000");
+    if (!rules) return rules.error();
     auto observer = Observer::make(config.observer);
     if (!observer) return observer.error();
     return OutlierGate(*observer, config);

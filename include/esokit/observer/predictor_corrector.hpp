@@ -29,25 +29,16 @@ namespace detail {
 /// Of no class, so that all observers of an order share its code.
 template <int Order, Scalar S>
 Check<S> check_chain(const ChainConfig<S>& config) {
-  if (auto ok = check_nonzero("input_gain", config.input_gain); !ok) return ok;
-  if (auto ok = check_positive("sample_time", config.sample_time); !ok) return ok;
-  if (auto ok =
-          check_representable("sample_time", config.sample_time, S(S(1.0) / config.sample_time),
-                              "has an inverse that the scalar cannot hold");
-      !ok) {
-    return ok;
-  }
   using Chain = ScaledChain<Order, S, 1>;
-  const S scaled = Chain::scaled_input_gain(config.input_gain, config.sample_time);
-  if (auto ok = check_representable("input_gain", config.input_gain, scaled,
-                                    "times T^n / n! gives a gain that the scalar cannot hold");
-      !ok) {
-    return ok;
-  }
-  if (config.max_gap < 1 || config.max_gap > 65000) {
-    return Error<S>{"max_gap", detail::integer<S>(config.max_gap), "must be 1 .. 65000"};
-  }
-  return {};
+  return Rules<S>{}
+      .nonzero("input_gain", config.input_gain)
+      .positive("sample_time", config.sample_time)
+      .invertible("sample_time", config.sample_time)
+      .representable("input_gain", config.input_gain,
+                     Chain::scaled_input_gain(config.input_gain, config.sample_time),
+                     "times T^n / n! gives a gain that the scalar cannot hold")
+      .require(1 <= config.max_gap && config.max_gap <= 65000, "max_gap",
+               detail::integer<S>(config.max_gap), "must be 1 .. 65000");
 }
 
 }  // namespace detail

@@ -45,7 +45,7 @@ class VariableTime : public Adapter<Observer> {
   /// @return the observer at rest in zero, or an error that names the field; the observer's config
   /// must be good at both ends of the range
   static Expected<VariableTime, Error<S>> make(const Config& config) {
-    if (auto ok = check_above("ratio", config.ratio, S(1)); !ok) return ok.error();
+    if (Rules<S> rules; !rules.above("ratio", config.ratio, S(1))) return rules.error();
     auto observer = Observer::make(config.observer);
     if (!observer) return observer.error();
     // All that may be asked for later must be a good config: the ends of the range are.

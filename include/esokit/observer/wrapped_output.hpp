@@ -62,12 +62,9 @@ class WrappedOutput : public Adapter<Observer> {
   /// Checks the settings and does all the design work.
   /// @return the observer at rest in zero, or an error that names the field
   static Expected<WrappedOutput, Error<S>> make(const Config& config) {
-    if (auto ok = check_positive("period", config.period); !ok) return ok.error();
-    if (auto ok = check_representable("period", config.period, S(S(1) / config.period),
-                                      "has an inverse that the scalar cannot hold");
-        !ok) {
-      return ok.error();
-    }
+    Rules<S> rules;
+    rules.positive("period", config.period).invertible("period", config.period);
+    if (!rules) return rules.error();
     auto observer = Observer::make(config.observer);
     if (!observer) return observer.error();
     return WrappedOutput(*observer, config.period);
