@@ -31,12 +31,13 @@ concept ContinuousObserverModel = std::copyable<O> &&
   observer.begin_step(s, z, s);
 };
 
-/// An observer as it runs in a controller: one `update(y, u_applied)` a sample.
+/// An observer as it runs in a controller: one `update(y, u_applied)` every `sample_time()`.
 template <class O>
 concept SampledObserverModel = std::copyable<O> &&
     requires(O& observer, const O& constant, const typename O::scalar_type& s) {
   { observer.update(s, s) } -> std::same_as<StepStatus>;
   { constant.estimate() } -> std::convertible_to<typename O::Estimate>;
+  { constant.sample_time() } -> std::convertible_to<typename O::scalar_type>;
 };
 
 /// Measurement noise of a simulation: `at(k)` is its value during step k, such as HeldNoise.
@@ -122,7 +123,7 @@ namespace detail {
 template <PlainScalar ScalarType>
 Expected<std::int64_t, Error<ScalarType>> whole_multiple(const char* field, ScalarType value,
                                                          ScalarType part, const char* rule) {
-  if (auto check = check_positive(field, value); !check) return check.error();
+  if (Rules<ScalarType> rules; !rules.positive(field, value)) return rules.error();
   const ScalarType ratio = value / part;
   const ScalarType whole = std::round(ratio);
   const ScalarType decimal = static_cast<ScalarType>(1e-9);
@@ -139,10 +140,9 @@ Expected<std::int64_t, Error<ScalarType>> whole_multiple(const char* field, Scal
 
 template <class State>
 auto check_state(const char* field, const State& state) -> Check<typename State::Scalar> {
-  for (int i = 0; i < static_cast<int>(state.size()); ++i) {
-    if (auto check = check_finite(field, state[i], i); !check) return check;
-  }
-  return {};
+  Rules<typename State::Scalar> rules;
+  for (int i = 0; i < static_cast<int>(state.size()); ++i) rules.finite(field, state[i], i);
+  return rules;
 }
 
 /// Calls back; true unless the callback returned false.
@@ -196,15 +196,15 @@ struct ContinuousLoop {
   /// @return how it ended, or an error that names the field of the config
   template <ExplicitRungeKutta Method = RungeKutta4, std::invocable<const Sample&> Callback>
   Expected<End, Error<ScalarType>> run(const Config& config, Callback&& on_sample) const {
-    if (auto check = check_positive("step", config.step); !check) return check.error();
+    if (Rules<ScalarType> rules; !rules.positive("step", config.step)) return rules.error();
     const auto steps = detail::whole_multiple("duration", config.duration, config.step,
                                               "must be a whole multiple of step, which is");
     if (!steps) return steps.error();
-    if (auto check = check_finite("start_time", config.start_time); !check) return check.error();
-    if (auto check = detail::check_state("plant_state", config.plant_state); !check)
-      return check.error();
-    if (auto check = detail::check_state("observer_state", config.observer_state); !check)
-      return check.error();
+    Rules<ScalarType> rules;
+    rules.finite("start_time", config.start_time)
+        .all_of(detail::check_state("plant_state", config.plant_state))
+        .all_of(detail::check_state("observer_state", config.observer_state));
+    if (!rules) return rules.error();
 
     Observer eso = observer;
     Noise source = noise;
@@ -296,33 +296,27 @@ struct SampledLoop {
   /// The callback sees the samples only, not what the plant does between them.
   template <ExplicitRungeKutta Method = RungeKutta4, std::invocable<const Sample&> Callback>
   Expected<End, Error<ScalarType>> run(const Config& config, Callback&& on_sample) const {
-    if (auto check = check_positive("sample_time", config.sample_time); !check)
-      return check.error();
-    if constexpr (requires { observer.sample_time(); }) {
-      const auto own = observer.sample_time();
-      const auto given = static_cast<std::remove_const_t<decltype(own)>>(config.sample_time);
-      if (given < own || given > own) {
-        return Error<ScalarType>{.field = "sample_time",
-                                 .value = config.sample_time,
-                                 .rule = "must be that of the observer, which is",
-                                 .limit = static_cast<ScalarType>(own),
-                                 .has_limit = true};
-      }
-    }
+    const auto own = static_cast<typename Observer::scalar_type>(observer.sample_time());
+    const auto given = static_cast<typename Observer::scalar_type>(config.sample_time);
+    Rules<ScalarType> rules;
+    rules.positive("sample_time", config.sample_time)
+        .require(!(given < own || given > own), {.field = "sample_time",
+                                                 .value = config.sample_time,
+                                                 .rule = "must be that of the observer, which is",
+                                                 .limit = static_cast<ScalarType>(own),
+                                                 .has_limit = true});
+    if (!rules) return rules.error();
     const auto samples =
         detail::whole_multiple("duration", config.duration, config.sample_time,
                                "must be a whole multiple of sample_time, which is");
     if (!samples) return samples.error();
-    if (config.substeps < 1) {
-      return Error<ScalarType>{.field = "substeps",
-                               .value = static_cast<ScalarType>(config.substeps),
-                               .rule = "must be 1 or more"};
-    }
-    if (auto check = check_finite("start_time", config.start_time); !check) return check.error();
-    if (auto check = check_finite("initial_input", config.initial_input); !check)
-      return check.error();
-    if (auto check = detail::check_state("plant_state", config.plant_state); !check)
-      return check.error();
+    rules
+        .require(config.substeps >= 1, "substeps", static_cast<ScalarType>(config.substeps),
+                 "must be 1 or more")
+        .finite("start_time", config.start_time)
+        .finite("initial_input", config.initial_input)
+        .all_of(detail::check_state("plant_state", config.plant_state));
+    if (!rules) return rules.error();
 
     End end{config.start_time, 0, config.plant_state, observer, true};
     Noise source = noise;

@@ -51,7 +51,7 @@ class SwitchedOn {
 
   /// Refuses a time that is not finite.
   static constexpr Expected<SwitchedOn, Error<ScalarType>> make(Config config) {
-    if (auto check = check_finite("time", config.time); !check) return check.error();
+    if (Rules<ScalarType> rules; !rules.finite("time", config.time)) return rules.error();
     return SwitchedOn(std::move(config));
   }
 

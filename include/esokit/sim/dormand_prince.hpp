@@ -62,15 +62,12 @@ class VariableStep {
 
   /// Refuses tolerances that are not positive, and a relative one of 1 or more.
   static Expected<VariableStep, Error<ScalarType>> make(const Config& config) {
-    if (auto ok = check_positive("relative_tolerance", config.relative_tolerance); !ok)
-      return ok.error();
-    if (!(config.relative_tolerance < ScalarType{1})) {
-      return Error<ScalarType>{.field = "relative_tolerance",
-                               .value = config.relative_tolerance,
-                               .rule = "must be below 1"};
-    }
-    if (auto ok = check_positive("absolute_tolerance", config.absolute_tolerance); !ok)
-      return ok.error();
+    Rules<ScalarType> rules;
+    rules.positive("relative_tolerance", config.relative_tolerance)
+        .require(config.relative_tolerance < ScalarType{1}, "relative_tolerance",
+                 config.relative_tolerance, "must be below 1")
+        .positive("absolute_tolerance", config.absolute_tolerance);
+    if (!rules) return rules.error();
     return VariableStep(config);
   }
 

@@ -30,7 +30,7 @@ class Constant {
 
   /// Refuses a value that is not finite.
   static constexpr Expected<Constant, Error<ScalarType>> make(const Config& config) {
-    if (auto check = check_finite("value", config.value); !check) return check.error();
+    if (Rules<ScalarType> rules; !rules.finite("value", config.value)) return rules.error();
     return Constant(config);
   }
 
@@ -62,8 +62,9 @@ class Step {
 
   /// Refuses members that are not finite.
   static constexpr Expected<Step, Error<ScalarType>> make(const Config& config) {
-    if (auto check = check_finite("time", config.time); !check) return check.error();
-    if (auto check = check_finite("size", config.size); !check) return check.error();
+    Rules<ScalarType> rules;
+    rules.finite("time", config.time).finite("size", config.size);
+    if (!rules) return rules.error();
     return Step(config);
   }
 
@@ -97,8 +98,9 @@ class Ramp {
 
   /// Refuses members that are not finite.
   static constexpr Expected<Ramp, Error<ScalarType>> make(const Config& config) {
-    if (auto check = check_finite("time", config.time); !check) return check.error();
-    if (auto check = check_finite("slope", config.slope); !check) return check.error();
+    Rules<ScalarType> rules;
+    rules.finite("time", config.time).finite("slope", config.slope);
+    if (!rules) return rules.error();
     return Ramp(config);
   }
 
@@ -136,12 +138,9 @@ class Polynomial {
 
   /// Refuses members that are not finite.
   static constexpr Expected<Polynomial, Error<ScalarType>> make(const Config& config) {
-    for (std::size_t i = 0; i < config.coefficients.size(); ++i) {
-      if (auto check = check_finite("coefficients", config.coefficients[i], static_cast<int>(i));
-          !check)
-        return check.error();
-    }
-    if (auto check = check_finite("origin", config.origin); !check) return check.error();
+    Rules<ScalarType> rules;
+    rules.finite("coefficients", config.coefficients).finite("origin", config.origin);
+    if (!rules) return rules.error();
     return Polynomial(config);
   }
 
@@ -186,11 +185,12 @@ class Sine {
 
   /// Refuses members that are not finite.
   static constexpr Expected<Sine, Error<ScalarType>> make(const Config& config) {
-    if (auto check = check_finite("amplitude", config.amplitude); !check) return check.error();
-    if (auto check = check_finite("angular_frequency", config.angular_frequency); !check)
-      return check.error();
-    if (auto check = check_finite("phase", config.phase); !check) return check.error();
-    if (auto check = check_finite("offset", config.offset); !check) return check.error();
+    Rules<ScalarType> rules;
+    rules.finite("amplitude", config.amplitude)
+        .finite("angular_frequency", config.angular_frequency)
+        .finite("phase", config.phase)
+        .finite("offset", config.offset);
+    if (!rules) return rules.error();
     return Sine(config);
   }
 

@@ -34,10 +34,11 @@ class FilteredStep {
 
   /// Refuses members that are not finite and a time constant that is not positive.
   static constexpr Expected<FilteredStep, Error<ScalarType>> make(const Config& config) {
-    if (auto check = check_finite("time", config.time); !check) return check.error();
-    if (auto check = check_finite("size", config.size); !check) return check.error();
-    if (auto check = check_positive("time_constant", config.time_constant); !check)
-      return check.error();
+    Rules<ScalarType> rules;
+    rules.finite("time", config.time)
+        .finite("size", config.size)
+        .positive("time_constant", config.time_constant);
+    if (!rules) return rules.error();
     return FilteredStep(config);
   }
 

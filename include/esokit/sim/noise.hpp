@@ -11,18 +11,6 @@
 
 namespace esokit::sim {
 
-namespace detail {
-
-/// Finite and zero or above.
-template <PlainScalar ScalarType>
-constexpr Check<ScalarType> check_not_negative(const char* field, ScalarType value) {
-  if (is_finite(value) && value >= ScalarType{}) return {};
-  return Error<ScalarType>{
-      .field = field, .value = value, .rule = "must be finite and not negative"};
-}
-
-}  // namespace detail
-
 /// Independent normal numbers, one a call. Channels that shall be independent take different seeds.
 template <PlainScalar ScalarType = double>
 class WhiteNoise {
@@ -35,9 +23,9 @@ class WhiteNoise {
 
   /// Refuses a standard deviation that is negative or not finite.
   static Expected<WhiteNoise, Error<ScalarType>> make(const Config& config) {
-    if (auto check = detail::check_not_negative("standard_deviation", config.standard_deviation);
-        !check)
-      return check.error();
+    if (Rules<ScalarType> rules;
+        !rules.not_negative("standard_deviation", config.standard_deviation))
+      return rules.error();
     return WhiteNoise(config);
   }
 
@@ -75,9 +63,9 @@ class BandLimitedWhiteNoise {
 
   /// Refuses a negative power, a hold that is not positive, and a variance beyond the scalar.
   static Expected<BandLimitedWhiteNoise, Error<ScalarType>> make(const Config& config) {
-    if (auto check = detail::check_not_negative("power", config.power); !check)
-      return check.error();
-    if (auto check = check_positive("hold", config.hold); !check) return check.error();
+    Rules<ScalarType> rules;
+    rules.not_negative("power", config.power).positive("hold", config.hold);
+    if (!rules) return rules.error();
     const ScalarType variance = config.power / config.hold;
     if (!is_finite(variance) || (config.power > ScalarType{} && variance <= ScalarType{})) {
       return Error<ScalarType>{.field = "power",
@@ -125,7 +113,7 @@ class HeldNoise {
     const auto noise = BandLimitedWhiteNoise<ScalarType>::make(
         {.power = config.power, .hold = config.hold, .seed = config.seed});
     if (!noise) return noise.error();
-    if (auto check = check_positive("step", config.step); !check) return check.error();
+    if (Rules<ScalarType> rules; !rules.positive("step", config.step)) return rules.error();
     const ScalarType ratio = config.hold / config.step;
     const ScalarType whole = std::round(ratio);
     // Both numbers are rounded decimals: 0.01/0.001 is not 10 in every format.

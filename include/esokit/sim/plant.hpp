@@ -50,7 +50,8 @@ class IntegratorChainPlant {
 
   /// Refuses an input gain that is zero or not finite.
   static Expected<IntegratorChainPlant, Error<ScalarType>> make(Config config) {
-    if (auto check = check_nonzero("input_gain", config.input_gain); !check) return check.error();
+    if (Rules<ScalarType> rules; !rules.nonzero("input_gain", config.input_gain))
+      return rules.error();
     return IntegratorChainPlant(std::move(config));
   }
 
@@ -97,12 +98,9 @@ class LinearPlant {
 
   /// Refuses coefficients that are not finite and an input gain that is zero or not finite.
   static Expected<LinearPlant, Error<ScalarType>> make(Config config) {
-    for (std::size_t i = 0; i < config.coefficients.size(); ++i) {
-      if (auto check = check_finite("coefficients", config.coefficients[i], static_cast<int>(i));
-          !check)
-        return check.error();
-    }
-    if (auto check = check_nonzero("input_gain", config.input_gain); !check) return check.error();
+    Rules<ScalarType> rules;
+    rules.finite("coefficients", config.coefficients).nonzero("input_gain", config.input_gain);
+    if (!rules) return rules.error();
     return LinearPlant(std::move(config));
   }
 

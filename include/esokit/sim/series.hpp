@@ -29,23 +29,23 @@ class Series {
   /// Refuses sizes that differ (the value of the error is then the number of times), times that
   /// descend, and numbers that are not finite.
   static Expected<Series, Error<ScalarType>> make(const Config& config) {
-    if (config.times.size() != config.values.size()) {
-      return Error<ScalarType>{.field = "times",
-                               .value = static_cast<ScalarType>(config.times.size()),
-                               .rule = "must have as many elements as values, which has",
-                               .limit = static_cast<ScalarType>(config.values.size()),
-                               .has_limit = true};
-    }
-    for (std::size_t i = 0; i < config.times.size(); ++i) {
+    const std::size_t size = config.times.size();
+    Rules<ScalarType> rules;
+    rules.require(size == config.values.size(),
+                  {.field = "times",
+                   .value = static_cast<ScalarType>(size),
+                   .rule = "must have as many elements as values, which has",
+                   .limit = static_cast<ScalarType>(config.values.size()),
+                   .has_limit = true});
+    for (std::size_t i = 0; rules && i < size; ++i) {
       const int index = static_cast<int>(i);
-      if (auto check = check_finite("times", config.times[i], index); !check) return check.error();
-      if (auto check = check_finite("values", config.values[i], index); !check)
-        return check.error();
-      if (i > 0 && config.times[i] < config.times[i - 1]) {
-        return Error<ScalarType>{
-            .field = "times", .value = config.times[i], .rule = "must not descend", .index = index};
-      }
+      const ScalarType time = config.times[i];
+      rules.finite("times", time, index)
+          .finite("values", config.values[i], index)
+          .require(i == 0 || !(time < config.times[i - 1]), "times", time, "must not descend",
+                   index);
     }
+    if (!rules) return rules.error();
     Series series;
     series.times_ = config.times;
     series.values_ = config.values;
@@ -55,14 +55,11 @@ class Series {
   /// Values at start + i sample_time. Refuses numbers that are not finite and a sample time that is
   /// not positive.
   static Expected<Series, Error<ScalarType>> make_uniform(const UniformConfig& config) {
-    if (auto check = check_finite("start", config.start); !check) return check.error();
-    if (auto check = check_positive("sample_time", config.sample_time); !check)
-      return check.error();
-    for (std::size_t i = 0; i < config.values.size(); ++i) {
-      const int index = static_cast<int>(i);
-      if (auto check = check_finite("values", config.values[i], index); !check)
-        return check.error();
-    }
+    Rules<ScalarType> rules;
+    rules.finite("start", config.start)
+        .positive("sample_time", config.sample_time)
+        .finite("values", config.values);
+    if (!rules) return rules.error();
     Series series;
     series.values_ = config.values;
     series.start_ = config.start;

@@ -29,28 +29,30 @@ class StepResponse {
   /// Refuses members that are not finite, a step of no height or one that the scalar cannot hold,
   /// a band that is not positive, and a rise that does not go up.
   static constexpr Expected<StepResponse, Error<ScalarType>> make(const Config& config) {
-    if (auto check = check_finite("initial_value", config.initial_value); !check)
-      return check.error();
-    if (auto check = check_finite("final_value", config.final_value); !check) return check.error();
-    const ScalarType height = config.final_value - config.initial_value;
-    if (!is_finite(height) || height == ScalarType{}) {
-      return Error<ScalarType>{.field = "final_value",
-                               .value = config.final_value,
-                               .rule = "must differ, by a finite step, from initial_value",
-                               .limit = config.initial_value,
-                               .has_limit = true};
-    }
-    if (auto check = check_finite("step_time", config.step_time); !check) return check.error();
-    if (auto check = check_positive("band", config.band); !check) return check.error();
-    if (auto check = check_finite("rise_from", config.rise_from); !check) return check.error();
-    if (auto check = check_finite("rise_to", config.rise_to); !check) return check.error();
-    if (config.rise_to <= config.rise_from) {
-      return Error<ScalarType>{.field = "rise_to",
-                               .value = config.rise_to,
-                               .rule = "must be greater than rise_from, which is",
-                               .limit = config.rise_from,
-                               .has_limit = true};
-    }
+    Rules<ScalarType> rules;
+    rules.finite("initial_value", config.initial_value)
+        .finite("final_value", config.final_value)
+        .and_then([&] {
+          const ScalarType height = config.final_value - config.initial_value;
+          return Rules<ScalarType>{}.require(
+              is_finite(height) && height != ScalarType{},
+              {.field = "final_value",
+               .value = config.final_value,
+               .rule = "must differ, by a finite step, from initial_value",
+               .limit = config.initial_value,
+               .has_limit = true});
+        })
+        .finite("step_time", config.step_time)
+        .positive("band", config.band)
+        .finite("rise_from", config.rise_from)
+        .finite("rise_to", config.rise_to)
+        .require(config.rise_to > config.rise_from,
+                 {.field = "rise_to",
+                  .value = config.rise_to,
+                  .rule = "must be greater than rise_from, which is",
+                  .limit = config.rise_from,
+                  .has_limit = true});
+    if (!rules) return rules.error();
     return StepResponse(config);
   }
 

@@ -23,15 +23,15 @@ class Window {
 
   /// Refuses members that are not finite and an end that is not after the start.
   static constexpr Expected<Window, Error<ScalarType>> make(const Config& config) {
-    if (auto check = check_finite("start", config.start); !check) return check.error();
-    if (auto check = check_finite("end", config.end); !check) return check.error();
-    if (config.end <= config.start) {
-      return Error<ScalarType>{.field = "end",
-                               .value = config.end,
-                               .rule = "must be greater than start, which is",
-                               .limit = config.start,
-                               .has_limit = true};
-    }
+    Rules<ScalarType> rules;
+    rules.finite("start", config.start)
+        .finite("end", config.end)
+        .require(config.end > config.start, {.field = "end",
+                                             .value = config.end,
+                                             .rule = "must be greater than start, which is",
+                                             .limit = config.start,
+                                             .has_limit = true});
+    if (!rules) return rules.error();
     return Window(config);
   }
 
