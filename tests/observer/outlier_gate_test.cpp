@@ -284,7 +284,7 @@ TEST(OutlierGate, OffAndRetuned) {
     EXPECT_EQ(gate.estimate(), before);
   };
   for (const double bad : {-0.1, hidden_nan<double>(), hidden_infinity<double>()}) {
-    const auto number = check_not_negative<double>("x", bad).error().rule;
+    const auto number = esokit::Rules<double>{}.not_negative("x", bad).error().rule;
     refused({.observer = linear, .threshold = bad}, "threshold", number);
     refused({.observer = linear, .threshold = 1, .running_factor = bad}, "running_factor", number);
   }

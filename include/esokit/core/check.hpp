@@ -54,19 +54,13 @@ template <Scalar S>
 class [[nodiscard]] Rules {
  public:
   /// True if no rule is broken so far.
-  [[nodiscard]] constexpr explicit operator bool() const noexcept { return !broken_; }
+  [[nodiscard]] constexpr explicit operator bool() const noexcept { return outcome_.has_value(); }
 
   /// The first broken rule; aborts if there is none.
-  [[nodiscard]] constexpr const Error<S>& error() const noexcept {
-    if (!broken_) std::abort();
-    return error_;
-  }
+  [[nodiscard]] constexpr const Error<S>& error() const noexcept { return outcome_.error(); }
 
   /// So that a function that returns `Check` can return its rules.
-  constexpr operator Check<S>() const {
-    if (broken_) return error_;
-    return {};
-  }
+  constexpr operator const Check<S>&() const noexcept { return outcome_; }
 
   // Each rule tests finiteness by bits before it compares: under -ffast-math a comparison with NaN
   // may go either way. They are out of line, as `make` is not where time counts and firmware has
@@ -98,7 +92,7 @@ class [[nodiscard]] Rules {
   /// Not zero, and neither overflowed nor subnormal as a divisor.
   ESOKIT_COLD constexpr Rules& invertible(const char* field, const S& value, int index = -1) {
     nonzero(field, value, index);
-    if (broken_) return *this;
+    if (!outcome_) return *this;
     return representable(field, value, S(S(1.0) / value),
                          "has an inverse that the scalar cannot hold", index);
   }
@@ -164,19 +158,17 @@ class [[nodiscard]] Rules {
   /// The rules that `check()` reads once all rules before are kept.
   template <class F>
   constexpr Rules& and_then(const F& check) {
-    return broken_ ? *this : all_of(check());
+    return outcome_ ? all_of(check()) : *this;
   }
 
  private:
   ESOKIT_COLD constexpr void break_by(const char* field, const S& value, const char* rule,
                                       int index) {
-    if (!broken_) error_ = {field, value, rule, index};
-    broken_ = true;
+    if (outcome_) outcome_ = Error<S>{field, value, rule, index};
   }
 
   ESOKIT_COLD constexpr void break_by(const Error<S>& error) {
-    if (!broken_) error_ = error;
-    broken_ = true;
+    if (outcome_) outcome_ = error;
   }
 
   template <class List, class F>
@@ -186,67 +178,8 @@ class [[nodiscard]] Rules {
     return *this;
   }
 
-  Error<S> error_{};
-  bool broken_ = false;
+  Check<S> outcome_{};
 };
-
-// Each check tests finiteness by bits before it compares: under -ffast-math a comparison with NaN
-// may go either way.
-
-/// Neither NaN nor infinite.
-template <Scalar S>
-constexpr Check<S> check_finite(const char* field, const S& value, int index = -1) {
-  if (!all(is_finite(value))) return Error<S>{field, value, "must be finite", index};
-  return {};
-}
-
-/// Finite and above zero.
-template <Scalar S>
-constexpr Check<S> check_positive(const char* field, const S& value, int index = -1) {
-  if (!all(is_finite(value)) || !all(value > S(0.0))) {
-    return Error<S>{field, value, "must be finite and positive", index};
-  }
-  return {};
-}
-
-/// Finite and zero or above.
-template <Scalar S>
-constexpr Check<S> check_not_negative(const char* field, const S& value, int index = -1) {
-  if (!all(is_finite(value)) || !all(value >= S(0.0))) {
-    return Error<S>{field, value, "must be finite and not negative", index};
-  }
-  return {};
-}
-
-/// Finite and not zero; either sign.
-template <Scalar S>
-constexpr Check<S> check_nonzero(const char* field, const S& value, int index = -1) {
-  if (!all(is_finite(value)) || !all(detail::magnitude(value) > S(0.0))) {
-    return Error<S>{field, value, "must be finite and not zero (negative is fine)", index};
-  }
-  return {};
-}
-
-/// Finite and above a limit, which the error carries.
-template <Scalar S>
-constexpr Check<S> check_above(const char* field, const S& value, const S& limit) {
-  if (!all(is_finite(value)) || !all(value > limit)) {
-    return Error<S>{field, value, "must be finite and above", -1, limit, true};
-  }
-  return {};
-}
-
-/// `derived` is a normal number, neither overflowed nor lost in the subnormals; the error names the
-/// config field that it was computed from.
-template <Scalar S>
-constexpr Check<S> check_representable(const char* field, const S& value, const S& derived,
-                                       const char* rule, int index = -1) {
-  if (!all(is_finite(derived)) ||
-      !all(detail::magnitude(derived) >= detail::smallest_normal<S>())) {
-    return Error<S>{field, value, rule, index};
-  }
-  return {};
-}
 
 namespace detail {
 
