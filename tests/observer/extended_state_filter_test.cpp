@@ -240,6 +240,7 @@ TEST(ExtendedStateFilter, small_theta_tends_to_the_kalman_filter) {
 TEST(ExtendedStateFilter, small_theta_without_disturbance_is_the_undisturbed_kalman_filter) {
   auto plain = typical<2, double, 1>(InflationRule::none);
   plain.disturbance_bounds = {};
+  plain.allow_vanishing_gain = true;
   double last = 1;
   for (const double theta : {1e-4, 1e-6, 1e-8}) {
     auto config = typical<2, double, 1>();
@@ -842,6 +843,148 @@ TEST(ExtendedStateFilter, refuses_bad_configs_by_name) {
   config.inflation = 1e20f;
   const auto grown = ExtendedStateFilter<2, float>::make(config);
   ASSERT_EQ(refusal(grown), "inflation: lets the covariance grow beyond what the scalar can hold");
+}
+
+/// Samples until an innovation of one is 1e-6 for good.
+template <class Filter>
+int samples_to_fade(Filter filter) {
+  for (int k = 0; k < 3000; ++k) filter.update(0, 0);
+  filter.update(1, 0);
+  int last = 0;
+  for (int k = 1; k < 50000; ++k) {
+    filter.update(0, 0);
+    if (std::abs(static_cast<double>(filter.innovation())) > 1e-6) last = k;
+  }
+  return last;
+}
+
+/// A limit with a pole at -1: refused, from both sides of the stated millionth and of the stated
+/// inflation; the same times with which the accepted ones fade are in the documentation.
+template <int Order, int Extension, class S = double>
+void alternating_error_fades(int stated) {
+  SCOPED_TRACE(Order + 10 * Extension);
+  using Filter = ExtendedStateFilter<Order, S, Extension>;
+  constexpr int size = Order + Extension;
+  typename Filter::Config config{
+      .input_gain = 1, .sample_time = S(0.01), .inflation_rule = InflationRule::none};
+  config.disturbance_bounds[size - 1] = S(300);
+  if (size % 2 == 0) {
+    EXPECT_LT(samples_to_fade(Filter::make(config).value()), stated);
+    return;
+  }
+  double unit = 300;
+  for (int r = 1; r < size; ++r) unit *= 0.01 / r;
+  const double least = 1e-6 * size * unit * unit;
+  for (const auto mode : {esokit::RiccatiMode::recursive, esokit::RiccatiMode::frozen}) {
+    config.mode = mode;
+    config.measurement_variance = static_cast<S>(0.999 * least);
+    const auto refused = Filter::make(config);
+    ASSERT_FALSE(refused);
+    EXPECT_STREQ(refused.error().field, "measurement_variance");
+    EXPECT_STREQ(refused.error().rule,
+                 "leaves an error that changes sign at every sample undamped: give y' a bound, or "
+                 "y a variance of at least");
+    EXPECT_NEAR(static_cast<double>(refused.error().limit) / least, 1, 1e-5);
+    config.measurement_variance = static_cast<S>(1.001 * least);
+    const int samples = samples_to_fade(Filter::make(config).value());
+    EXPECT_LT(samples, stated);
+    EXPECT_GT(samples, 0.9 * stated);
+  }
+  // Without R: by an inflation, or a bound of y'.
+  config.measurement_variance = 0;
+  config.inflation_rule = InflationRule::fixed;
+  config.initial_covariance.diagonal().setOnes();
+  config.inflation = S(0.0099);
+  EXPECT_FALSE(Filter::make(config));
+  config.inflation = S(0.0101);
+  EXPECT_LT(samples_to_fade(Filter::make(config).value()), 1.5 * stated);
+  config.inflation_rule = InflationRule::none;
+  config.inflation = 0;
+  const double share = 16 * least / (1e4 * (1 - 16e-6));  // (T / 4)^2 of q_1^2 is seen
+  config.disturbance_bounds[1] = static_cast<S>(std::sqrt(1.01 * share / size) * 1e4);
+  EXPECT_LT(samples_to_fade(Filter::make(config).value()), 1.5 * stated);
+  config.disturbance_bounds[1] = static_cast<S>(std::sqrt(0.99 * share / size) * 1e4);
+  EXPECT_FALSE(Filter::make(config));
+}
+
+TEST(ExtendedStateFilter, alternating_error_fades_or_is_refused) {
+  alternating_error_fades<1, 1>(100);
+  alternating_error_fades<2, 1>(2000);
+  alternating_error_fades<2, 1, float>(2000);
+  alternating_error_fades<1, 2>(2000);
+  alternating_error_fades<3, 1>(100);
+  alternating_error_fades<4, 1>(4400);
+}
+
+/// A highest state that nothing disturbs: its gain tends to zero without inflation, and is zero
+/// from the first sample on where it is known for certain.
+TEST(ExtendedStateFilter, vanishing_gain_has_to_be_asked_for) {
+  using Filter = ExtendedStateFilter<2>;
+  const auto rule = [](const Filter::Config& config) {
+    const auto made = Filter::make(config);
+    return made ? std::string("accepted")
+                : std::string(made.error().field) + ": " + made.error().rule;
+  };
+  auto config = typical<2, double, 1>(InflationRule::none);
+  EXPECT_EQ(rule(config), "accepted");
+  config.disturbance_bounds[2] = 0;
+  EXPECT_EQ(rule(config),
+            "disturbance_bounds: must disturb the highest state: without inflation its gain tends "
+            "to zero (allow_vanishing_gain asks for it)");
+  auto covariance = config;
+  covariance.disturbance_bounds = {};
+  covariance.process_covariance = Eigen::Vector3d(1, 1, 0).asDiagonal();
+  EXPECT_EQ(rule(covariance).substr(0, 18), "process_covariance");
+  config.allow_vanishing_gain = true;
+  EXPECT_EQ(rule(config), "accepted");
+  auto filter = Filter::make(config).value();
+  for (int k = 0; k < 100000; ++k) filter.update(0, 0);
+  EXPECT_LT(filter.gain()(2), 0.1);
+
+  config = typical<2, double, 1>();
+  config.disturbance_bounds = {};
+  EXPECT_EQ(rule(config), "accepted");
+  config.initial_covariance(2, 2) = 0;
+  EXPECT_EQ(rule(config),
+            "initial_covariance: must leave the highest state uncertain where nothing disturbs it: "
+            "it would never be corrected (allow_vanishing_gain asks for it)");
+  // The limit is there from the start.
+  config.mode = esokit::RiccatiMode::frozen;
+  EXPECT_EQ(rule(config), "accepted");
+  config.mode = esokit::RiccatiMode::recursive;
+  config.allow_vanishing_gain = true;
+  EXPECT_EQ(rule(config), "accepted");
+}
+
+/// Variances and innovations near the ends of the scalar: what is told of them is a number.
+template <class S>
+void what_is_told_is_finite() {
+  using Filter = ExtendedStateFilter<2, S>;
+  const S largest = std::numeric_limits<S>::max();
+  int told = 0;
+  for (const S variance : {S(0), S(1), largest / 100, largest / 2, largest}) {
+    typename Filter::Config config{.input_gain = 1,
+                                   .sample_time = S(1e-3),
+                                   .measurement_variance = variance,
+                                   .inflation = S(0.5)};
+    config.disturbance_bounds = {0, 0, 300};
+    config.initial_covariance.diagonal().setOnes();
+    const auto made = Filter::make(config);
+    if (!made) continue;
+    auto filter = *made;
+    for (const S y : {S(0), S(1), std::sqrt(largest), largest / 8, S(0)}) {
+      filter.update(y, 0);
+      EXPECT_TRUE(std::isfinite(filter.normalised_innovation())) << variance << ' ' << y;
+      EXPECT_TRUE(std::isfinite(filter.innovation_variance())) << variance << ' ' << y;
+      EXPECT_TRUE(filter.covariance().allFinite()) << variance << ' ' << y;
+      if (filter.normalised_innovation() >= largest) ++told;
+    }
+  }
+  EXPECT_GT(told, 0);
+}
+TEST(ExtendedStateFilter, what_is_told_is_finite) {
+  what_is_told_is_finite<float>();
+  what_is_told_is_finite<double>();
 }
 
 TEST(ExtendedStateFilter, exact_measurements_are_allowed) {
