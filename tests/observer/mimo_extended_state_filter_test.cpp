@@ -515,6 +515,128 @@ TEST(MimoExtendedStateFilter, refuses_what_the_scalar_cannot_hold) {
             "inflation: lets the covariance grow beyond what the scalar can hold");
 }
 
+/// Exact measurements and disturbances of any size: refused, or the gain finds back. One so small
+/// that the scalar holds no square of it left a gain of zero once P0 was used up, and status ok.
+TEST(MimoExtendedStateFilter, exact_measurements_of_any_size_find_back) {
+  int accepted = 0;
+  std::string last_rule;
+  for (double bound = 1e-25; bound < 1e18; bound *= 10) {
+    auto config = pair_config();
+    config.measurement_covariance.setZero();
+    config.initial_covariance.diagonal().setConstant(static_cast<float>(bound * bound));
+    config.disturbance_bounds = {0, 0, static_cast<float>(bound), 0, static_cast<float>(bound)};
+    const auto made = Pair::make(config);
+    if (!made) {
+      last_rule = std::string(made.error().field) + ": " + made.error().rule;
+      continue;
+    }
+    ++accepted;
+    auto filter = *made;
+    for (int k = 0; k < 100; ++k) filter.update(Eigen::Vector2f(1, 2), Eigen::Vector2f::Zero());
+    for (int k = 0; k < 300; ++k) filter.update(Eigen::Vector2f(3, 5), Eigen::Vector2f::Zero());
+    EXPECT_NEAR(filter.estimate()(0), 3, 1e-5f) << bound;
+    EXPECT_NEAR(filter.estimate()(3), 5, 1e-5f) << bound;
+  }
+  EXPECT_GT(accepted, 30);
+  EXPECT_EQ(last_rule, "disturbance_bounds: has a square that the scalar cannot hold");
+}
+
+/// Chain by chain, what the filter of one output refuses as well.
+TEST(MimoExtendedStateFilter, refuses_what_has_no_way_back) {
+  const auto rule = [](auto&& change) {
+    auto config = pair_config();
+    change(config);
+    const auto made = Pair::make(config);
+    return made ? std::string("accepted")
+                : std::string(made.error().field) + ": " + made.error().rule;
+  };
+  using Config = Pair::Config;
+  const std::string exact =
+      "measurement_covariance: must be positive definite where nothing disturbs the plants";
+  EXPECT_EQ(rule([](Config& c) { c.disturbance_bounds[4] = 0; }), "accepted");
+  EXPECT_EQ(rule([](Config& c) {
+              c.disturbance_bounds[4] = 0;
+              c.measurement_covariance(1, 1) = 0;
+            }),
+            exact);
+  EXPECT_EQ(rule([](Config& c) { c.measurement_covariance(1, 1) = 0; }), "accepted");
+
+  const std::string certain =
+      "initial_covariance: must leave the highest state of a chain uncertain where nothing "
+      "disturbs it: it would never be corrected (allow_vanishing_gain asks for it)";
+  EXPECT_EQ(rule([](Config& c) {
+              c.disturbance_bounds[4] = 0;
+              c.initial_covariance(4, 4) = 0;
+            }),
+            certain);
+  EXPECT_EQ(rule([](Config& c) {
+              c.disturbance_bounds[4] = 0;
+              c.initial_covariance(4, 4) = 0;
+              c.allow_vanishing_gain = true;
+            }),
+            "accepted");
+  const std::string vanishing =
+      "disturbance_bounds: must disturb the highest state of every chain: without inflation its "
+      "gain tends to zero (allow_vanishing_gain asks for it)";
+  const auto plain = [](Config& c) {
+    c.inflation_rule = InflationRule::none;
+    c.inflation = 0;
+  };
+  EXPECT_EQ(rule([&](Config& c) { plain(c); }), "accepted");
+  EXPECT_EQ(rule([&](Config& c) {
+              plain(c);
+              c.disturbance_bounds[2] = 0;
+            }),
+            vanishing);
+  EXPECT_EQ(rule([&](Config& c) {
+              plain(c);
+              c.disturbance_bounds[2] = 0;
+              c.allow_vanishing_gain = true;
+            }),
+            "accepted");
+
+  // The chain of three states has a pole at -1 without noise; the other has not.
+  const std::string alternating =
+      "measurement_covariance: leaves an error that changes sign at every sample undamped: give y' "
+      "a bound, or y a variance of at least";
+  const float least = 1e-6f * 5 * 5e-6f * 5e-6f;  // a millionth of 5 (10 T^2 / 2)^2
+  for (const float share : {0.99f, 1.01f}) {
+    EXPECT_EQ(rule([&](Config& c) {
+                plain(c);
+                c.measurement_covariance(0, 0) = share * least;
+              }),
+              share < 1 ? alternating : "accepted");
+  }
+  EXPECT_EQ(rule([&](Config& c) {
+              plain(c);
+              c.measurement_covariance(1, 1) = 0;
+            }),
+            "accepted");
+  EXPECT_EQ(rule([](Config& c) { c.measurement_covariance(0, 0) = 0; }), "accepted");
+}
+
+/// Variances at the ends of the scalar: what is told of them is a number, what cannot be held is
+/// refused.
+TEST(MimoExtendedStateFilter, what_is_told_is_finite) {
+  int accepted = 0;
+  for (double r = 1e-38; r < 3e38; r *= 10) {
+    auto config = pair_config();
+    config.measurement_covariance.diagonal().setConstant(static_cast<float>(r));
+    const auto made = Pair::make(config);
+    if (!made) continue;
+    ++accepted;
+    auto filter = *made;
+    for (const float y : {0.0f, 1.0f, 1e19f, 3e37f, 1.0f}) {
+      filter.update(Eigen::Vector2f(y, -y), Eigen::Vector2f::Zero());
+      EXPECT_TRUE(filter.covariance().allFinite()) << r << ' ' << y;
+      EXPECT_TRUE(filter.innovation_covariance().allFinite()) << r << ' ' << y;
+      EXPECT_TRUE(std::isfinite(filter.normalised_innovation())) << r << ' ' << y;
+      EXPECT_GE(filter.normalised_innovation(), 0) << r << ' ' << y;
+    }
+  }
+  EXPECT_GT(accepted, 20);
+}
+
 /// R = 1e-12 and P0 = 1e8 in float.
 TEST(MimoExtendedStateFilter, many_steps_in_float) {
   using Filter = MimoExtendedStateFilter<ChainOrders<2, 2>, 2, float>;

@@ -143,6 +143,39 @@ std::optional<Matrix<S, Size, Size>> riccati_covariance(const RiccatiModel<Size,
   return std::nullopt;
 }
 
+/// Least R for which an error that changes sign at every sample fades, in the unit of `noise`; not
+/// positive: none is needed.
+///
+/// |p(-1)|^2 of the limit's poles is in proportion to the density of the innovations at half the
+/// sampling rate, R + |C (-I - Phi)^-1 Q^(1/2)|^2 (spectral factorisation). Where that is zero the
+/// limit has a pole at -1: a millionth of the trace of Q is asked for.
+/// @param noise Q, Nordsieck scaling
+template <int Size, Scalar S>
+S least_measurement_variance(const CovarianceFactor<Size, S>& noise) {
+  Array<S, Size> response{};
+  for (int j = 0; j < Size; ++j) {
+    S sum = j == 0 ? S(1.0) : S(0.0);
+    for (int i = 0; i < j; ++i) {
+      const auto& pascal = binomial_table<Size, detail::TableScalar<S>>;
+      sum = sum + response[static_cast<std::size_t>(i)] *
+                      S(pascal[static_cast<std::size_t>(j)][static_cast<std::size_t>(i)]);
+    }
+    response[static_cast<std::size_t>(j)] = S(-0.5) * sum;
+  }
+  S density(0.0);
+  S trace(0.0);
+  for (int k = 0; k < Size; ++k) {
+    S seen(0.0);
+    for (int i = k; i < Size; ++i) {
+      const S l = noise.lower(i, k);
+      seen = seen + response[static_cast<std::size_t>(i)] * l;
+      trace = trace + l * l * noise.variance(k);
+    }
+    density = density + seen * seen * noise.variance(k);
+  }
+  return S(1e-6) * trace - density;
+}
+
 /// Steady state for the chain of integrators in Nordsieck scaling, P- = L D L'; its gain is good to
 /// a few units in the last place.
 /// @param noise Q @param measurement R >= 0 @param inflation >= 1

@@ -408,7 +408,7 @@ class ExtendedStateFilter
       rules
           .require(!config.process_covariance, "disturbance_bounds", bound,
                    "must be left out where process_covariance is given", i)
-          .require(all(is_finite(q(i, i))), "disturbance_bounds", bound,
+          .require(detail::normal(q(i, i)), "disturbance_bounds", bound,
                    "has a square that the scalar cannot hold", i);
     }
     const S& change = config.disturbance_bounds[Order];
@@ -479,33 +479,12 @@ class ExtendedStateFilter
     return {};
   }
 
-  /// The density of the innovations at half the sampling rate: |p(-1)|^2 of the limit's poles is in
-  /// proportion to it (spectral factorisation). Where it is zero the filter has a pole at -1, and
-  /// an error that changes sign at every sample fades with 1/k only.
   static Check<S> check_alternating(const Config& config, const CovarianceFactor<N, S>& noise,
                                     const S& unit) {
-    const bool faded =
-        config.inflation_rule == InflationRule::adaptive || all(config.inflation >= S(0.01));
-    if (faded) return {};
-    // C (-I - Phi)^-1
-    Array<S, N> response{};
-    for (int j = 0; j < N; ++j) {
-      S sum = j == 0 ? S(1.0) : S(0.0);
-      for (int i = 0; i < j; ++i) sum = sum + response[index(i)] * pascal(j, i);
-      response[index(j)] = S(-0.5) * sum;
+    if (config.inflation_rule == InflationRule::adaptive || all(config.inflation >= S(0.01))) {
+      return {};
     }
-    S density(0.0);
-    S trace(0.0);
-    for (int k = 0; k < N; ++k) {
-      S seen(0.0);
-      for (int i = k; i < N; ++i) {
-        const S l = noise.lower(i, k);
-        seen = seen + response[index(i)] * l;
-        trace = trace + l * l * noise.variance(k);
-      }
-      density = density + seen * seen * noise.variance(k);
-    }
-    const S least = S(1e-6) * trace - density;
+    const S least = least_measurement_variance<N, S>(noise);
     const S& r = config.measurement_variance;
     if (all(r / unit >= least)) return {};
     return Error<S>{"measurement_variance",
@@ -515,10 +494,6 @@ class ExtendedStateFilter
                     -1,
                     S(least * unit),
                     true};
-  }
-
-  static S pascal(int n, int k) noexcept {
-    return S(binomial_table<N, detail::TableScalar<S>>[index(n)][index(k)]);
   }
 
   static Check<S> freeze(Law& law, const Config& config) {

@@ -65,6 +65,7 @@ class MimoExtendedStateFilter {
     InflationRule inflation_rule = InflationRule::fixed;  ///< fixed or none
     S inflation{};                                        ///< theta > 0 of the fixed rule
     RiccatiMode mode = RiccatiMode::recursive;            ///< recursive or frozen
+    bool allow_vanishing_gain = false;                    ///< see ExtendedStateFilter
     int max_gap = 100;  ///< missing samples of a channel in a row that a correction may bridge,
                         ///< 1 .. 65000; after more its chain restarts from the measurement
   };
@@ -74,46 +75,56 @@ class MimoExtendedStateFilter {
   static Expected<MimoExtendedStateFilter, Error<S>> make(const Config& config) {
     Rules<S> rules;
     if (!rules.all_of(check(config))) return rules.error();
-    MimoExtendedStateFilter filter(config);
-    const auto factored = [&](const char* field, const Covariance& p,
-                              CovarianceRoot<size, S>& root) -> Check<S> {
-      const auto made = CovarianceRoot<size, S>::from_matrix(scaled(p, filter.units_));
-      if (!made) {
-        return Error<S>{field, p(size - 1, size - 1), "must be finite and positive semidefinite"};
-      }
-      root = *made;
-      return {};
-    };
     Covariance noise = Covariance::Zero();
     if (config.process_covariance) {
       noise = *config.process_covariance;
     } else {
       for (int i = 0; i < size; ++i) {
         const S bound = config.disturbance_bounds[index(i)];
+        if (!(bound > S(0))) continue;
         noise(i, i) = config.bound_factor * bound * bound;
+        if (!detail::normal(noise(i, i))) {
+          return Error<S>{"disturbance_bounds", bound, "has a square that the scalar cannot hold",
+                          i};
+        }
       }
     }
     if (config.inflation_rule == InflationRule::fixed) {
       noise = noise * ((S(1) + config.inflation) / config.inflation);
     }
-    const char* noise_field =
-        config.process_covariance ? "process_covariance" : "disturbance_bounds";
+    MimoExtendedStateFilter filter(config, noise);
+    const auto factored = [&](const char* field, const Covariance& p,
+                              CovarianceRoot<size, S>& root) -> Check<S> {
+      const Covariance q = scaled(p, filter.root_units_);
+      for (int i = 0; i < size; ++i) {
+        if (p(i, i) > S(0) && !is_held(q(i, i))) return not_held(field, p(i, i), i * size + i);
+      }
+      const auto made = CovarianceRoot<size, S>::from_matrix(q);
+      if (!made) {
+        return Error<S>{field, p(size - 1, size - 1), "must be finite and positive semidefinite"};
+      }
+      root = *made;
+      return {};
+    };
     rules.all_of(factored("initial_covariance", config.initial_covariance, filter.start_))
-        .all_of(factored(noise_field, noise, filter.noise_));
+        .all_of(factored(noise_field(config), noise, filter.noise_));
+    const OutputCovariance measured = config.measurement_covariance / filter.unit_;
+    for (int i = 0; i < outputs; ++i) {
+      rules.require(!(measured(i, i) > S(0)) || is_held(measured(i, i)),
+                    not_held("measurement_covariance", config.measurement_covariance(i, i),
+                             i * outputs + i));
+    }
     if (!rules) return rules.error();
-    const auto measurement = CovarianceRoot<outputs, S>::from_matrix(config.measurement_covariance);
+    const auto measurement = CovarianceRoot<outputs, S>::from_matrix(measured);
     if (!measurement) {
       return Error<S>{"measurement_covariance", config.measurement_covariance(0, 0),
                       "must be finite and positive semidefinite"};
     }
     filter.measurement_ = *measurement;
-    if (!(noise.trace() > S(0)) && !positive(config.measurement_covariance)) {
-      return Error<S>{"measurement_covariance", config.measurement_covariance(0, 0),
-                      "must be positive definite where nothing disturbs the plants"};
-    }
+    if (auto ok = filter.check_way_back(config, noise); !ok) return ok.error();
     if (config.mode == RiccatiMode::frozen) {
       if (!filter.freeze(noise)) {
-        return Error<S>{noise_field, noise(size - 1, size - 1),
+        return Error<S>{noise_field(config), noise(size - 1, size - 1),
                         "gives no limit gain; without inflation every highest state must be "
                         "disturbed"};
       }
@@ -265,24 +276,25 @@ class MimoExtendedStateFilter {
   /// y - C z of the last correction; zero in channels that were not used.
   [[nodiscard]] const Output& innovation() const noexcept { return innovation_; }
 
-  /// C P- C' + R of the last prediction, p x p.
+  /// C P- C' + R of the last prediction, p x p. An element beyond the scalar is its largest number.
   [[nodiscard]] OutputCovariance innovation_covariance() const noexcept {
-    const Covariance p = root_.matrix();
-    OutputCovariance s = measurement_.matrix();
-    for (int i = 0; i < outputs; ++i) {
-      for (int j = 0; j < outputs; ++j) s(i, j) += p(first(i), first(j));
-    }
+    OutputCovariance s = seen_covariance() * unit_;
+    for (int i = 0; i < s.size(); ++i) s.data()[i] = detail::clipped(s.data()[i]);
     return s;
   }
 
-  /// e' (C P- C' + R)^-1 e of the last correction: about p on average where R, Q and P0 are right.
+  /// e' (C P- C' + R)^-1 e of the last correction: about p on average where R, Q and P0 are right;
+  /// the largest number where it is beyond the scalar.
   [[nodiscard]] S normalised_innovation() const noexcept {
-    const auto weighted =
-        detail::solve_positive<outputs, 1, S>(innovation_covariance(), innovation_);
-    return weighted ? innovation_.dot(*weighted) : S(0);
+    const S largest = innovation_.cwiseAbs().maxCoeff();
+    if (!(largest > S(0))) return S(0);
+    const Output e = innovation_ / largest;
+    const auto weighted = detail::solve_positive<outputs, 1, S>(seen_covariance(), e);
+    return weighted ? detail::clipped(S(largest * (largest / unit_) * e.dot(*weighted))) : S(0);
   }
 
-  /// Bound of the covariance of the present estimate's error, N x N, physical units.
+  /// Bound of the covariance of the present estimate's error, N x N, physical units. An element
+  /// beyond the scalar is its largest number.
   [[nodiscard]] Covariance covariance() const noexcept {
     Covariance p = root_.matrix();
     if (corrected_) {
@@ -296,8 +308,10 @@ class MimoExtendedStateFilter {
       p = detail::plus_product_transposed<size, size, size, S>(
           noise, detail::product<size, size, size, S>(rest, p), rest, S(1));
     }
-    const Estimate inverse = units_.cwiseInverse();
-    return scaled(p, inverse);
+    const Estimate inverse = root_units_.cwiseInverse();
+    p = scaled(p, inverse);
+    for (int i = 0; i < p.size(); ++i) p.data()[i] = detail::clipped(p.data()[i]);
+    return p;
   }
 
   /// Gain of the coming correction (all channels present), N x p, physical units.
@@ -328,7 +342,8 @@ class MimoExtendedStateFilter {
   /// A gap that is above every max_gap.
   static constexpr int restart_due = 65535;
 
-  explicit MimoExtendedStateFilter(const Config& config) noexcept
+  /// @param noise Q, inflated
+  MimoExtendedStateFilter(const Config& config, const Covariance& noise) noexcept
       : sample_time_(config.sample_time), max_gap_(config.max_gap) {
     drive_.setZero();
     for (int chain = 0; chain < outputs; ++chain) {
@@ -341,6 +356,96 @@ class MimoExtendedStateFilter {
       }
     }
     if (config.inflation_rule == InflationRule::fixed) growth_ = S(1) + config.inflation;
+    // The unit of all variances: the largest of R, or without noise the largest there is.
+    S unit = config.measurement_covariance.diagonal().maxCoeff();
+    for (int i = 0; i < size && !(config.measurement_covariance.trace() > S(0)); ++i) {
+      for (const S& variance : {noise(i, i), config.initial_covariance(i, i)}) {
+        unit = (std::max)(unit, S((variance * units_(i)) * units_(i)));
+      }
+    }
+    if (unit > S(0)) unit_ = unit;
+    root_units_ = units_ / std::sqrt(unit_);
+  }
+
+  static const char* noise_field(const Config& config) noexcept {
+    return config.process_covariance ? "process_covariance" : "disturbance_bounds";
+  }
+
+  /// Far enough from both ends for what the recursion makes of it.
+  static bool is_held(const S& variance) noexcept {
+    return is_finite(variance) && variance > detail::smallest_normal<S>() / detail::rounding<S>() &&
+           variance < detail::largest_variance<S>();
+  }
+  static Error<S> not_held(const char* field, const S& value, int place) {
+    return Error<S>{field, value,
+                    "in the scaling T^2r / r!^2 and divided by the largest R is a variance that "
+                    "the scalar cannot hold",
+                    place};
+  }
+
+  /// Chain by chain: as in ExtendedStateFilter.
+  Check<S> check_way_back(const Config& config, const Covariance& noise) const {
+    OutputCovariance exact = measurement_.matrix();
+    for (int chain = 0; chain < outputs; ++chain) {
+      bool driven = false;
+      for (int r = first(chain); r < end(chain); ++r) driven = driven || noise(r, r) > S(0);
+      if (!driven) continue;
+      exact.row(chain).setZero();
+      exact.col(chain).setZero();
+      exact(chain, chain) = S(1);
+    }
+    if (!positive(exact)) {
+      return Error<S>{"measurement_covariance", config.measurement_covariance(0, 0),
+                      "must be positive definite where nothing disturbs the plants"};
+    }
+    const bool none = config.inflation_rule == InflationRule::none;
+    for (int chain = 0; chain < outputs && !config.allow_vanishing_gain; ++chain) {
+      const int last = end(chain) - 1;
+      if (noise(last, last) > S(0)) continue;
+      if (none) {
+        return Error<S>{noise_field(config), noise(last, last),
+                        "must disturb the highest state of every chain: without inflation its gain "
+                        "tends to zero (allow_vanishing_gain asks for it)",
+                        config.process_covariance ? last * size + last : last};
+      }
+      const S& start = config.initial_covariance(last, last);
+      if (config.mode != RiccatiMode::frozen && !(start > S(0))) {
+        return Error<S>{"initial_covariance", start,
+                        "must leave the highest state of a chain uncertain where nothing disturbs "
+                        "it: it would never be corrected (allow_vanishing_gain asks for it)",
+                        last * size + last};
+      }
+    }
+    if (!none && config.inflation >= S(0.01)) return {};
+    const Covariance q = noise_.matrix();
+    Check<S> ok{};
+    detail::unroll<outputs>([&](auto chain) {
+      constexpr int length = Orders::values[chain] + Extension;
+      const Matrix<S, length, length> own =
+          q.template block<length, length>(first(chain), first(chain));
+      const S least =
+          least_measurement_variance<length, S>(CovarianceFactor<length, S>::nearest(own));
+      const S& r = config.measurement_covariance(int{chain}, int{chain});
+      if (!ok || r / unit_ >= least) return;
+      ok = Error<S>{"measurement_covariance",
+                    r,
+                    "leaves an error that changes sign at every sample undamped: give y' a bound, "
+                    "or y a variance of at least",
+                    int{chain} * outputs + int{chain},
+                    S(least * unit_),
+                    true};
+    });
+    return ok;
+  }
+
+  /// C P- C' + R, divided by the unit.
+  [[nodiscard]] OutputCovariance seen_covariance() const noexcept {
+    const Covariance p = root_.matrix();
+    OutputCovariance s = measurement_.matrix();
+    for (int i = 0; i < outputs; ++i) {
+      for (int j = 0; j < outputs; ++j) s(i, j) += p(first(i), first(j));
+    }
+    return s;
   }
 
   /// Scaled states, and the estimates in physical units.
@@ -596,7 +701,7 @@ class MimoExtendedStateFilter {
   bool freeze(const Covariance& noise) {
     RiccatiModel<size, outputs, S> model;
     model.transition = transition();
-    model.noise = scaled(noise, units_);
+    model.noise = scaled(noise, root_units_);
     model.measurement = measurement_.matrix() / growth_;
     model.inflation = growth_;
     model.output.setZero();
@@ -660,7 +765,9 @@ class MimoExtendedStateFilter {
   CovarianceRoot<outputs, S> measurement_{};
   CovarianceRoot<outputs, S> used_measurement_{};
   Matrix<S, outputs, Inputs> drive_;
-  Estimate units_;  ///< T^r / r!
+  Estimate units_;       ///< T^r / r!
+  Estimate root_units_;  ///< the same over the root of the unit: of what the roots are made
+  S unit_{1};            ///< of all variances in them, unit of y squared
   Input input_ = Input::Zero();
   Output innovation_ = Output::Zero();
   S sample_time_;
