@@ -194,6 +194,31 @@ TEST(MimoAdrc, BadSamplesOfOneChannel) {
   }
 }
 
+/// A bad reference is that channel's business: it keeps its (B0 u)_i, the other is controlled as
+/// ever.
+TEST(MimoAdrc, BadReferenceOfOneChannel) {
+  for (const double bad : {hidden_nan<double>(), hidden_infinity<double>()}) {
+    for (const int channel : {0, 1}) {
+      auto controller = Two::make(base()).value();
+      const Matrix<double, 2, 2> b0 = base().input_matrix;
+      Vector<double, 2> y(0.1, -0.2);
+      for (int k = 0; k < 5; ++k) controller.update(y, {0.3, 0.4});
+      for (int k = 0; k < 20; ++k) {
+        auto other = controller;
+        const Vector<double, 2> held = b0 * controller.output();
+        Vector<double, 2> r(0.3, 0.4);
+        const Vector<double, 2> good = b0 * other.update(y, r);
+        r(channel) = bad;
+        const Vector<double, 2> drive = b0 * controller.update(y, r);
+        ASSERT_NEAR(drive(channel), held(channel), 1e-9 * std::abs(held(channel)));
+        ASSERT_NEAR(drive(1 - channel), good(1 - channel), 1e-9 * std::abs(good(1 - channel)));
+        ASSERT_EQ(controller.status(channel), StepStatus::ok);
+        y += Vector<double, 2>(0.01, -0.01);
+      }
+    }
+  }
+}
+
 TEST(MimoAdrc, BadConfigIsRefusedByName) {
   const auto error = [](auto change) {
     auto config = base();

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/control/nonlinear_feedback.hpp>
+#include <limits>
 #include <support/numbers.hpp>
 #include <support/refusal.hpp>
 
@@ -44,6 +45,46 @@ TEST(NonlinearFeedback, ExponentOneIsLinear) {
   const auto linear = esokit::AdrcLaw<2>::make({.gains = {{25, 10}}, .input_gain = 2}).value();
   const Vector<double, 3> z(0.3, -0.7, 1.5);
   EXPECT_DOUBLE_EQ(nonlinear.control(z, {1.0, 0.5}), linear.control(z, {1.0, 0.5, 0.0}));
+}
+
+/// Of finite numbers a finite one, of the right sign; of a bad one a bad one, so that a limiter or
+/// loop can tell.
+template <class S>
+void finite_of_finite() {
+  const S largest = std::numeric_limits<S>::max();
+  for (const S exponent : {S(0.5), S(1), S(1.5), S(3), S(40)}) {
+    for (const S gain : {S(0), S(2), S(1e30)}) {
+      for (const S b0 : {S(-1), S(1e-3)}) {
+        const auto law = NonlinearFeedback<2, S>::make({.gains = {gain, gain},
+                                                        .exponents = {exponent, exponent},
+                                                        .linear_widths = {S(1), S(1)},
+                                                        .input_gain = b0})
+                             .value();
+        for (const S a : {S(0), S(-1), S(1e10), -largest, largest}) {
+          for (const S b : {S(0), S(1e10), -largest, largest}) {
+            const Vector<S, 3> z(a, b, b);
+            EXPECT_TRUE(std::isfinite(law.control(z, {-a, -b})))
+                << exponent << ' ' << a << ' ' << b;
+            EXPECT_TRUE(std::isfinite(law.feedback(z, {-b, -a})))
+                << exponent << ' ' << a << ' ' << b;
+          }
+        }
+        // Largest in the direction that reduces the error.
+        if (gain > S(0)) {
+          const Vector<S, 3> z(-largest, S(0), S(0));
+          EXPECT_GT(law.control(z, {largest, S(0)}) * b0, S(0)) << exponent;
+          EXPECT_LT(law.control(Vector<S, 3>(-z), {-largest, S(0)}) * b0, S(0)) << exponent;
+        }
+        const S bad = hidden_nan<S>();
+        EXPECT_FALSE(std::isfinite(law.control(Vector<S, 3>(S(0), S(0), S(0)), {bad, S(0)})));
+        EXPECT_FALSE(std::isfinite(law.control(Vector<S, 3>(S(0), S(0), bad), {S(0), S(0)})));
+      }
+    }
+  }
+}
+TEST(NonlinearFeedback, FiniteOfFinite) {
+  finite_of_finite<float>();
+  finite_of_finite<double>();
 }
 
 TEST(NonlinearFeedback, RefusesByName) {

@@ -8,6 +8,8 @@
 #include <optional>
 #include <tuple>
 #include <type_traits>
+#include <utility>
+#include <vector>
 
 #include "fuzz/tape.hpp"
 
@@ -26,7 +28,9 @@ struct Promise {
 template <class S>
 class Filler {
  public:
-  Filler(Tape& tape, int order) : tape_(tape), order_(order) {
+  /// @param chains lengths of the chains that the states are of, where there are several
+  Filler(Tape& tape, int order, std::vector<int> chains = {})
+      : tape_(tape), order_(order), chains_(std::move(chains)) {
     promise.sample_time = static_cast<double>(tape.number<S>({1e-4, 1, true}, "(time)"));
     // On a tape with bad numbers this one may be bad too, and only scales the others.
     if (!(promise.sample_time >= 1e-4 && promise.sample_time <= 1)) promise.sample_time = 1e-2;
@@ -52,6 +56,15 @@ class Filler {
     double unit = 1;
     for (int i = 1; i <= n; ++i) unit *= i / time();
     return unit;
+  }
+
+  /// Which derivative a state is of.
+  [[nodiscard]] int row(int state) const {
+    for (const int length : chains_) {
+      if (state < length) return state;
+      state -= length;
+    }
+    return state;
   }
 
   template <class T>
@@ -112,7 +125,8 @@ class Filler {
     for (int i = 0; i < Size; ++i) {
       for (int j = 0; j <= i; ++j) {
         const Range range = i == j ? Range{0.1, 1, true} : Range{-0.3, 0.3};
-        root(i, j) = tape_.number<T>(range, name) * static_cast<T>(std::pow(1 / time(), power * i));
+        root(i, j) =
+            tape_.number<T>(range, name) * static_cast<T>(std::pow(1 / time(), power * row(i)));
       }
     }
     p = root * root.transpose();
@@ -206,8 +220,8 @@ class Filler {
     if constexpr (requires { config.disturbance_bounds; }) {
       constexpr std::size_t states = std::tuple_size_v<decltype(config.disturbance_bounds)>;
       for (std::size_t i = 0; i < states; ++i) {
-        number("disturbance_bounds", config.disturbance_bounds[i],
-               {0.05 * per_sample(static_cast<int>(i)), per_sample(static_cast<int>(i)), true});
+        const double change = per_sample(row(static_cast<int>(i)));
+        number("disturbance_bounds", config.disturbance_bounds[i], {0.05 * change, change, true});
       }
       // A filter has no bandwidth in its config; of the least bounds and the most noise it is this.
       promise.slowest = std::min(promise.slowest, 0.05);
@@ -306,7 +320,7 @@ class Filler {
     MEMBER(compensation_gain, number(text, member, {0.1 / unit, 10 / unit, true, true}))
     MEMBER(start_hold, number(text, member, {0, 20 * T}))
     // Laws.
-    MEMBER(exponents, number(text, member, {0.3, 1}))
+    MEMBER(exponents, number(text, member, {0.3, 3}))
     MEMBER(linear_widths, number(text, member, {0.01, 1, true}))
     MEMBER(acceleration, number(text, member, {0.01 / (T * T), 1 / (T * T), true}))
     MEMBER(filter_time, number(text, member, {T, 5 * T}))
@@ -324,6 +338,7 @@ class Filler {
 
   Tape& tape_;
   int order_;
+  std::vector<int> chains_;
   bool input_matrix_says_it_ = false;
 };
 

@@ -64,6 +64,18 @@ concept TakesReferences = requires(T& o, typename T::scalar_type s, typename T::
 template <class T>
 inline constexpr bool winds_up = false;
 
+/// N of the observer, where an adapter or controller is around it.
+template <class T>
+struct Nonlinear {
+  static constexpr int size =
+      std::remove_cvref_t<decltype(std::declval<const T&>().observer())>::size;
+};
+template <class T>
+requires requires { T::size; }
+struct Nonlinear<T> {
+  static constexpr int size = T::size;
+};
+
 template <class T>
 class Driver {
  public:
@@ -82,7 +94,7 @@ class Driver {
       tape.record(*episode_.random, episode_.mix);
     else
       tape.play();
-    Filler<S> filler(tape, order_of<T>());
+    Filler<S> filler(tape, order_of<T>(), chains());
     filler.fill(config_);
     promise_ = filler.promise;
     calm_ = tape.plain();
@@ -124,6 +136,44 @@ class Driver {
     }
     if (episode_.recover && recoverable()) return recovery();
     return {};
+  }
+
+  /// Lengths of a filter's chains.
+  static std::vector<int> chains() {
+    std::vector<int> lengths;
+    if constexpr (requires(const T& o) { o.template chain_estimate<0>(); }) {
+      esokit::detail::unroll<T::outputs>([&](auto i) {
+        using Chain = decltype(std::declval<const T&>().template chain_estimate<i>());
+        lengths.push_back(Chain::RowsAtCompileTime);
+      });
+    }
+    return lengths;
+  }
+
+  /// The config that has a bandwidth.
+  template <class C>
+  static const auto& innermost(const C& config) {
+    if constexpr (requires { config.observer; }) {
+      return innermost(config.observer);
+    } else {
+      return config;
+    }
+  }
+
+  /// How far a varying gain keeps from where a constant one rings undamped, 1 / (1 - c^N) with
+  /// c = (1 + exp(-omega T)) / 2; one of a thousandth takes thousands of samples.
+  [[nodiscard]] bool far_from_ringing() const {
+    if constexpr (requires { innermost(config_).gain_max; }) {
+      const auto& nonlinear = innermost(config_);
+      if (!nonlinear.gain_max) return true;
+      const auto omega_T = static_cast<double>(nonlinear.observer_bandwidth) *
+                           static_cast<double>(nonlinear.sample_time);
+      constexpr int states = Nonlinear<T>::size;
+      const double edge = 1 / (1 - std::pow((1 + std::exp(-omega_T)) / 2, states));
+      return static_cast<double>(*nonlinear.gain_max) < 0.99 * edge;
+    } else {
+      return true;
+    }
   }
 
   void say(std::string text) {
@@ -288,12 +338,12 @@ class Driver {
     FINITE(state())
     FINITE(last())
     FINITE(gains())
+    FINITE(covariance())
+    FINITE(innovation_covariance())
+    FINITE(normalised_innovation())
     if (calm) {
-      FINITE(covariance())
       FINITE(limit())
       FINITE(predictor_gain())
-      FINITE(innovation_covariance())
-      FINITE(normalised_innovation())
     }
 #undef FINITE
     if constexpr (requires { o.level_estimate(0); }) {
@@ -597,7 +647,7 @@ class Driver {
       // Any.
       a.push_back({"retune", [](Driver& d) {
                      Config config{};
-                     Filler<S> filler(*d.tape_, order_of<T>());
+                     Filler<S> filler(*d.tape_, order_of<T>(), chains());
                      filler.fill(config);
                      if constexpr (requires(T & o) { o.retune(config); }) {
                        d.refusable([&] { return d.object_->retune(config); });
@@ -858,14 +908,14 @@ class Driver {
                      const auto z = d.template state<esokit::Vector<S, order_of<T>() + 1>>();
                      const auto r = d.template state<esokit::Vector<S, order_of<T>()>>();
                      const S u = d.quietly([&] { return d.object_->control(z, r); });
-                     if (d.calm_ && d.tape_->plain() && !is_finite(u)) d.fail("u is not finite");
+                     if (fine(z) && fine(r) && !is_finite(u)) d.fail("u is not finite");
                    }});
     }
   }
 
   // ------------------------------------------------------------------ the way back
   [[nodiscard]] bool recoverable() const {
-    if (!promise_.certain) return false;
+    if (!promise_.certain || !far_from_ringing()) return false;
     // Settings out of range promise nothing but to stay finite.
     if (!episode_.config.plain()) return false;
     for (const Call& call : episode_.calls) {

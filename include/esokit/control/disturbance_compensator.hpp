@@ -111,10 +111,14 @@ class DisturbanceCompensator {
   }
 
   /// K dhat, what is added to u0; within what the scalar holds.
-  [[nodiscard]] S compensation() const noexcept { return bounded(unbounded_compensation()); }
+  [[nodiscard]] S compensation() const noexcept {
+    return detail::clipped(unbounded_compensation());
+  }
 
   /// The u0 with which u would stay what it is; within what the scalar holds.
-  [[nodiscard]] S base_output() const noexcept { return bounded(loop_.output() - compensation()); }
+  [[nodiscard]] S base_output() const noexcept {
+    return detail::clipped(loop_.output() - compensation());
+  }
 
   /// The observer, for its estimates.
   [[nodiscard]] const Observer& observer() const noexcept { return loop_.observer(); }
@@ -137,13 +141,6 @@ class DisturbanceCompensator {
   /// In a step, which tests its sum with u0 anyway.
   [[nodiscard]] ESOKIT_INLINE S unbounded_compensation() const noexcept {
     return gain_ * loop_.observer().total_disturbance();
-  }
-
-  static S bounded(const S& x) noexcept {
-    if (is_finite(x)) [[likely]]
-      return x;
-    constexpr S most = (std::numeric_limits<S>::max)();
-    return x < S(0) ? -most : most;
   }
 
   Loop loop_;

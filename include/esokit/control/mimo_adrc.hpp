@@ -23,7 +23,8 @@ namespace esokit {
 ///
 /// Observer i is told the applied (B0 u)_i, so limits, which are those of the q actuators, wind
 /// nothing up; while one actuator is limited the channels are coupled through B0. A channel whose
-/// measurement is NaN predicts alone, the others go on.
+/// measurement is NaN predicts alone, the others go on; one whose reference is keeps its share of
+/// B0 u as it is.
 /// @tparam Observers one observer type a channel, all of one scalar
 template <ShiftableDisturbance... Observers>
 class MimoAdrc {
@@ -89,7 +90,8 @@ class MimoAdrc {
       S r = reference(row);
       if constexpr (observer_traits<ObserverOf<row>>.wraps_output)
         r = estimate(0) + observer.wrap(r - estimate(0));
-      wanted(row) = std::get<channel>(laws_).control(estimate, r);
+      const S v = std::get<channel>(laws_).control(estimate, r);
+      wanted(row) = is_finite(v) ? v : drive(row);
     });
     return put_out(inverse_ * wanted);
   }
@@ -195,7 +197,7 @@ class MimoAdrc {
     Output u;
     for (int i = 0; i < channels; ++i) {
       auto& limiter = limiters_[static_cast<std::size_t>(i)];
-      // A bad reference: the last output stays.
+      // What the scalar cannot hold: the last output stays.
       u(i) = limiter(is_finite(wanted(i)) ? wanted(i) : limiter.last());
     }
     return u;

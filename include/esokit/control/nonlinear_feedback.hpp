@@ -13,6 +13,9 @@ namespace esokit {
 
 /// u = (sum_i k_i fal(r_i - z_i, a_i, delta_i) - dhat) / b0: as AdrcLaw with fal in place of the
 /// linear feedback. A function of the estimate, without state.
+///
+/// Of finite numbers it is one: what is beyond the scalar, as a power above one of a large error
+/// may be, counts as the largest number of its sign. Limits are a Limiter's.
 /// @tparam Order n
 template <int Order, Scalar S = double>
 class NonlinearFeedback {
@@ -61,7 +64,11 @@ class NonlinearFeedback {
     S v(0.0);
     for (int i = 0; i < Order; ++i) {
       const auto row = static_cast<std::size_t>(i);
-      v = v + gains_[row] * fal_[row](reference(i) - estimate(i));
+      const S& r = reference(i);
+      const S& z = estimate(i);
+      const S error = bounded<2>(S(r - z), {r, z});
+      const S power = bounded<1>(fal_[row](error), {error});
+      v = bounded<2>(S(v + bounded<1>(S(gains_[row] * power), {power})), {v, power});
     }
     return v;
   }
@@ -73,7 +80,10 @@ class NonlinearFeedback {
   [[nodiscard]] S control(const Vector<S, Size>& estimate,
                           const Vector<S, Order>& reference) const noexcept {
     static_assert(Size > Order, "esokit: the estimate must hold the disturbance");
-    return (feedback(estimate, reference) - estimate(Order)) * inverse_input_gain_;
+    const S v = feedback(estimate, reference);
+    const S& d = estimate(Order);
+    const S wanted = bounded<2>(S(v - d), {v, d});
+    return bounded<1>(S(wanted * inverse_input_gain_), {wanted});
   }
 
   /// b0, as it was given.
@@ -84,6 +94,14 @@ class NonlinearFeedback {
     Array<S, Order> result{};
     for (S& x : result) x = value;
     return result;
+  }
+
+  /// What came of `from`: a bad number stays one.
+  template <int Count>
+  static S bounded(const S& x, const Array<S, Count>& from) noexcept {
+    S good = detail::clipped(x);
+    for (const S& number : from) good = select(is_finite(number), good, x);
+    return good;
   }
 
   template <int... I>

@@ -118,6 +118,13 @@ constexpr T constant(double value) noexcept {
 template <class S>
 using TableScalar = std::conditional_t<PlainScalar<S>, S, double>;
 
+/// x, or the largest number of its sign where it is beyond the scalar.
+template <class T>
+constexpr T clipped(const T& x) noexcept {
+  const T largest((std::numeric_limits<TableScalar<T>>::max)());
+  return select(is_finite(x), x, select(x < T(0.0), T(-largest), largest));
+}
+
 /// A count in the scalar type. Plain scalars convert at once: by way of a double it takes two
 /// soft-float helpers on a single-precision target.
 template <class T, std::integral Count>

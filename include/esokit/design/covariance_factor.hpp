@@ -31,13 +31,6 @@ ESOKIT_INLINE constexpr void repeat(Function&& f) noexcept {
   }
 }
 
-/// x, or the largest number of its sign where it is beyond the scalar.
-template <Scalar S>
-constexpr S clipped(const S& x) noexcept {
-  const S largest((std::numeric_limits<TableScalar<S>>::max)());
-  return select(is_finite(x), x, select(x < S(0.0), S(-largest), largest));
-}
-
 // Products of small matrices in plain loops: Eigen's expressions cost tenths of a second of compile
 // time for each new combination of sizes, and gain nothing at these sizes.
 
