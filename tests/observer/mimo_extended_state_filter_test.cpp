@@ -386,6 +386,7 @@ TEST(MimoExtendedStateFilter, refuses_bad_configs_by_name) {
               c.inflation = 0;
               (*c.process_covariance).row(1).setZero();
               (*c.process_covariance).col(1).setZero();
+              c.allow_vanishing_gain = true;
               c.mode = RiccatiMode::frozen;
             }),
             "process_covariance: gives no limit gain; without inflation every highest state must "
@@ -527,7 +528,7 @@ TEST(MimoExtendedStateFilter, exact_measurements_of_any_size_find_back) {
     config.disturbance_bounds = {0, 0, static_cast<float>(bound), 0, static_cast<float>(bound)};
     const auto made = Pair::make(config);
     if (!made) {
-      last_rule = std::string(made.error().field) + ": " + made.error().rule;
+      last_rule = refusal(made);
       continue;
     }
     ++accepted;
@@ -538,7 +539,7 @@ TEST(MimoExtendedStateFilter, exact_measurements_of_any_size_find_back) {
     EXPECT_NEAR(filter.estimate()(3), 5, 1e-5f) << bound;
   }
   EXPECT_GT(accepted, 30);
-  EXPECT_EQ(last_rule, "disturbance_bounds: has a square that the scalar cannot hold");
+  EXPECT_EQ(last_rule, "disturbance_bounds[2]: has a square that the scalar cannot hold");
 }
 
 /// Chain by chain, what the filter of one output refuses as well.
@@ -546,9 +547,7 @@ TEST(MimoExtendedStateFilter, refuses_what_has_no_way_back) {
   const auto rule = [](auto&& change) {
     auto config = pair_config();
     change(config);
-    const auto made = Pair::make(config);
-    return made ? std::string("accepted")
-                : std::string(made.error().field) + ": " + made.error().rule;
+    return refusal(Pair::make(config));
   };
   using Config = Pair::Config;
   const std::string exact =
@@ -562,7 +561,7 @@ TEST(MimoExtendedStateFilter, refuses_what_has_no_way_back) {
   EXPECT_EQ(rule([](Config& c) { c.measurement_covariance(1, 1) = 0; }), "accepted");
 
   const std::string certain =
-      "initial_covariance: must leave the highest state of a chain uncertain where nothing "
+      "initial_covariance[24]: must leave the highest state of a chain uncertain where nothing "
       "disturbs it: it would never be corrected (allow_vanishing_gain asks for it)";
   EXPECT_EQ(rule([](Config& c) {
               c.disturbance_bounds[4] = 0;
@@ -576,7 +575,7 @@ TEST(MimoExtendedStateFilter, refuses_what_has_no_way_back) {
             }),
             "accepted");
   const std::string vanishing =
-      "disturbance_bounds: must disturb the highest state of every chain: without inflation its "
+      "disturbance_bounds[2]: must disturb the highest state of every chain: without inflation its "
       "gain tends to zero (allow_vanishing_gain asks for it)";
   const auto plain = [](Config& c) {
     c.inflation_rule = InflationRule::none;
@@ -597,7 +596,8 @@ TEST(MimoExtendedStateFilter, refuses_what_has_no_way_back) {
 
   // The chain of three states has a pole at -1 without noise; the other has not.
   const std::string alternating =
-      "measurement_covariance: leaves an error that changes sign at every sample undamped: give y' "
+      "measurement_covariance[0]: leaves an error that changes sign at every sample undamped: give "
+      "y' "
       "a bound, or y a variance of at least";
   const float least = 1e-6f * 5 * 5e-6f * 5e-6f;  // a millionth of 5 (10 T^2 / 2)^2
   for (const float share : {0.99f, 1.01f}) {

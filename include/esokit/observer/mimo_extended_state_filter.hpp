@@ -110,9 +110,9 @@ class MimoExtendedStateFilter {
         .all_of(factored(noise_field(config), noise, filter.noise_));
     const OutputCovariance measured = config.measurement_covariance / filter.unit_;
     for (int i = 0; i < outputs; ++i) {
-      rules.require(!(measured(i, i) > S(0)) || is_held(measured(i, i)),
-                    not_held("measurement_covariance", config.measurement_covariance(i, i),
-                             i * outputs + i));
+      rules.require(
+          !(measured(i, i) > S(0)) || is_held(measured(i, i)),
+          not_held("measurement_covariance", config.measurement_covariance(i, i), i * outputs + i));
     }
     if (!rules) return rules.error();
     const auto measurement = CovarianceRoot<outputs, S>::from_matrix(measured);
