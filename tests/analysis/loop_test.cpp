@@ -170,12 +170,39 @@ TEST(AdrcLoop, RefusesWhatDoesNotBelongTogether) {
             "input_gain: of the observer must be that of the law, which is");
   EXPECT_EQ(refusal(adrc_loop(sampled, observer_with(2.0), law_with(2.0), LoopForm::error_based)),
             "input_gain: of the observer must be minus that of the law, which is");
+  // T and b0 come back as they were given, so the next number is another one.
+  const auto next = [](double x) { return std::nextafter(x, 2 * x); };
+  const auto other_time = sampled_plant(plant(), next(T)).value();
+  EXPECT_EQ(refusal(adrc_loop(other_time, observer_with(2.0), law_with(2.0))),
+            "plant.sample_time: must be that of the observer, which is");
+  EXPECT_EQ(refusal(adrc_loop(sampled, observer_with(2.0), law_with(next(2.0)))),
+            "input_gain: of the observer must be that of the law, which is");
   auto direct = sampled;
   direct.d(0, 0) = 1.0;
   EXPECT_EQ(refusal(adrc_loop(direct, observer_with(2.0), law_with(2.0))),
             "plant.d: must be zero: y may not follow an input at once");
   EXPECT_FALSE(adrc_loop(sampled, observer_with(2.0), law_with(2.0))->loop_gain(0.0).has_value());
   EXPECT_FALSE(adrc_loop(sampled, observer_with(2.0), law_with(2.0))->loop_gain(400.0).has_value());
+}
+
+/// The plant is in double whatever the observer is in.
+TEST(AdrcLoop, TakesAnObserverAndALawInFloat) {
+  const auto config = [](float time, float b0) {
+    return LinearEso<2, float>::make(
+               {.observer_bandwidth = 20.0f, .input_gain = b0, .sample_time = time})
+        .value();
+  };
+  const auto in_float = [](float b0) {
+    return AdrcLaw<2, float>::make({.controller_bandwidth = 4.0f, .input_gain = b0}).value();
+  };
+  const auto sampled = sampled_plant(plant(), T).value();
+  const auto time = static_cast<float>(T);
+  EXPECT_TRUE(adrc_loop(sampled, config(time, 0.3f), in_float(0.3f)).has_value());
+  EXPECT_TRUE(adrc_loop(sampled, config(time, 0.3f), law_with(0.3)).has_value());
+  EXPECT_EQ(refusal(adrc_loop(sampled, config(std::nextafter(time, 1.0f), 0.3f), in_float(0.3f))),
+            "plant.sample_time: must be that of the observer, which is");
+  EXPECT_EQ(refusal(adrc_loop(sampled, config(time, std::nextafter(0.3f, 1.0f)), law_with(0.3))),
+            "input_gain: of the observer must be that of the law, which is");
 }
 
 TEST(NominalPlant, IsSampledExactly) {

@@ -9,7 +9,12 @@
 #include <esokit/observer/delayed_input.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/half_gain_eso.hpp>
+#include <esokit/observer/known_model.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/mimo_extended_state_filter.hpp>
+#include <esokit/observer/nonlinear_eso.hpp>
+#include <esokit/observer/outlier_gate.hpp>
+#include <esokit/observer/reduced_order_eso.hpp>
 #include <esokit/observer/variable_time.hpp>
 #include <esokit/observer/wrapped_output.hpp>
 #include <support/numbers.hpp>
@@ -42,7 +47,12 @@ using Observers = ::testing::Types<
     esokit::CascadeEso<2, 2>, esokit::HalfGainEso<2>, esokit::AdjustableBandwidthEso<2>,
     esokit::AdjustableBandwidthEso<2, float>, esokit::ExtendedStateFilter<2>,
     esokit::ExtendedStateFilter<2, float>, esokit::DelayedInput<esokit::LinearEso<2>, 3>,
-    esokit::WrappedOutput<esokit::LinearEso<2, float>>, esokit::VariableTime<esokit::LinearEso<2>>>;
+    esokit::WrappedOutput<esokit::LinearEso<2, float>>, esokit::VariableTime<esokit::LinearEso<2>>,
+    esokit::AlgebraicEso<2>, esokit::AlgebraicEso<2, float>, esokit::NonlinearEso<2>,
+    esokit::NonlinearEso<2, float>, esokit::ReducedOrderEso<2>,
+    esokit::KnownModel<esokit::LinearEso<2>, esokit::KnownPoles<2>>,
+    esokit::KnownModel<esokit::NonlinearEso<2, float>, esokit::KnownPoles<2, float>>,
+    esokit::OutlierGate<esokit::AlgebraicEso<2>>>;
 TYPED_TEST_SUITE(GivenValues, Observers);
 
 TYPED_TEST(GivenValues, OfTheConfigAndOfARetune) {
@@ -80,6 +90,22 @@ void laws_give_back() {
         {.gains = {S(1), S(1)}, .linear_widths = {S(0.1), S(0.1)}, .input_gain = b0});
     ASSERT_TRUE(nonlinear.has_value()) << nonlinear;
     ASSERT_EQ(nonlinear->input_gain(), b0);
+  }
+}
+
+TEST(GivenValues, OfTheFilterOfSeveralOutputs) {
+  using Filter = esokit::MimoExtendedStateFilter<esokit::ChainOrders<1, 2>, 2, float>;
+  Random random(17);
+  for (int i = 0; i < 300; ++i) {
+    Filter::Config config;
+    config.sample_time = static_cast<float>(random.log_uniform(1e-5, 1e-1));
+    config.input_matrix.setIdentity();
+    config.measurement_covariance.setIdentity();
+    config.inflation = 1.0f;
+    config.disturbance_bounds.fill(0.1f);
+    const auto filter = Filter::make(config);
+    ASSERT_TRUE(filter.has_value()) << filter;
+    ASSERT_EQ(filter->sample_time(), config.sample_time);
   }
 }
 

@@ -18,6 +18,17 @@ enum class LoopForm {
 
 namespace detail {
 
+/// Whether two numbers were given as the same one, as far as the coarser of two scalars tells:
+/// 0.01 in float and in double.
+template <Scalar A, Scalar B>
+bool same_as_given(double a, double b) noexcept {
+  if constexpr (std::is_same_v<A, float> || std::is_same_v<B, float>) {
+    return static_cast<float>(a) == static_cast<float>(b);
+  } else {
+    return a == b;
+  }
+}
+
 /// A system without its sizes in the type, for code that is compiled once.
 struct SystemView {
   DenseView<double> a, b, c, d;
@@ -130,31 +141,24 @@ class AdrcLoop {
                                                 const AdrcLaw<order, S>& law,
                                                 LoopForm form = LoopForm::output_based) {
     auto m = detail::observer_matrices(observer);
-    if (auto ok = detail::check_system(plant); !ok) return ok.error();
-    if (!(std::abs(plant.sample_time - m.sample_time) <= 1e-6 * m.sample_time)) {
-      return Error<double>{"plant.sample_time",
-                           plant.sample_time,
-                           "must be that of the observer, which is",
-                           -1,
-                           m.sample_time,
-                           true};
-    }
-    if (plant.d(0, 0) != 0.0 || plant.d(0, 1) != 0.0) {
-      return Error<double>{"plant.d", plant.d(0, 0) != 0.0 ? plant.d(0, 0) : plant.d(0, 1),
-                           "must be zero: y may not follow an input at once"};
-    }
+    const double direct = plant.d(0, 0) != 0.0 ? plant.d(0, 0) : plant.d(0, 1);
     const bool error_based = form == LoopForm::error_based;
-    const double sign = error_based ? -1.0 : 1.0;
+    const double gain = error_based ? -m.input_gain : m.input_gain;
     const auto law_gain = static_cast<double>(law.input_gain());
-    if (!(std::abs(sign * m.input_gain - law_gain) <= 1e-5 * std::abs(law_gain))) {
-      return Error<double>{"input_gain",
-                           m.input_gain,
-                           error_based ? "of the observer must be minus that of the law, which is"
-                                       : "of the observer must be that of the law, which is",
-                           -1,
-                           law_gain,
-                           true};
-    }
+    using ObserverScalar = typename Observer::scalar_type;
+    Rules<double> rules;
+    rules.all_of(detail::check_system(plant))
+        .require(detail::same_as_given<ObserverScalar, double>(plant.sample_time, m.sample_time),
+                 {"plant.sample_time", plant.sample_time, "must be that of the observer, which is",
+                  -1, m.sample_time, true})
+        .require(direct == 0.0, "plant.d", direct,
+                 "must be zero: y may not follow an input at once")
+        .require(detail::same_as_given<ObserverScalar, S>(gain, law_gain),
+                 {"input_gain", m.input_gain,
+                  error_based ? "of the observer must be minus that of the law, which is"
+                              : "of the observer must be that of the law, which is",
+                  -1, law_gain, true});
+    if (!rules) return rules.error();
 
     Array<double, size> kappa{};
     for (std::size_t i = 0; i < order; ++i) {
