@@ -156,7 +156,7 @@ struct Nonlinear {
 
 CsvRow nonlinear_line(Report& report) {
   const auto bound =
-      nonlinear_error_bound<4>({.observer_bandwidth = w, .least = 0.5, .greatest = 3.0},
+      nonlinear_error_bound<4>({.observer_bandwidth = w, .gain_min = 0.5, .gain_max = 3.0},
                                {.disturbance_rate = 1.0})
           .value();
   using Observer = ContinuousObserver<order, double, 2, Nonlinear>;

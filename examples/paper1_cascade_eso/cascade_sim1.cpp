@@ -10,7 +10,7 @@
 // Plant      x1' = x2,  x2' = -x1 - 2 x2 + g (u + d*),  y = x1 + w
 //            g = (1 + 0.2 tanh(t - 2)) / (|x1| + 1),  d* = 5 sin(9 t) for t >= 3.5 s
 // Reference  y_d = unit step at 0.2 s through 1/(0.1 s + 1)^5
-// Observer   error form of (23), (24), e = y_d - y:
+// Observer   error-based form of (23), (24), e = y_d - y:
 //            xi_1' = A xi_1 - d ghat u + l_1 (e - xi_11)
 //            xi_i' = A xi_i + d (-ghat u + sum_{j<i} xi_j3) + l_i (xi_{i-1,1} - xi_i1)
 //            zhat = (xi_p1, xi_p2, sum_j xi_j3),  l_i = (3 w_i, 3 w_i^2, w_i^3),  w_i = alpha

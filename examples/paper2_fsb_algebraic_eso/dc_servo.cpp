@@ -219,7 +219,7 @@ int main(int argc, char** argv) {
       "the mean of u over an RK4 step. Columns v and d are of the estimates.");
 
   const auto linear = linear_observer<2>(bandwidth, b0);
-  const HeldFilter<2> shifted(bandwidth, q, b0, epsilon);
+  const BlankedFilter<2> shifted(bandwidth, q, b0, epsilon);
   const std::array<std::string, 3> metrics = {"max |v|", "max |d|", "max |u|"};
   Run linear_drawn;
   Run shifted_drawn;
@@ -275,7 +275,7 @@ int main(int argc, char** argv) {
                                                        .frequency_shift = q,
                                                        .input_gain = b0,
                                                        .sample_time = step,
-                                                       .hold = epsilon})
+                                                       .blanking = epsilon})
                             .value();
   const auto at_once = esokit::AlgebraicEso<2>::make({.observer_bandwidth = bandwidth,
                                                       .frequency_shift = q,
@@ -293,19 +293,20 @@ int main(int argc, char** argv) {
     };
     add("LinearEso", run_deployed(sampled_linear, row));
     const Run held = run_deployed(deployed, row);
-    add("AlgebraicEso, hold 20 ms", held);
-    add("AlgebraicEso, default hold (2 samples)", run_deployed(at_once, row));
-    // The two ways differ by about a sample: 1 ms in 20 of hold.
+    add("AlgebraicEso, blanking 20 ms", held);
+    add("AlgebraicEso, default blanking (2 samples)", run_deployed(at_once, row));
+    // The two ways differ by about a sample: 1 ms in 20 of blanking.
     report.expect(row_name(row), "deployed: max |d|", held.most[1],
                   std::abs(held.most[1] / run_paper(shifted, row, false).most[1] - 1.0) < 0.1,
                   "within 10 % of the continuous simulation");
   }
   report.additions();
-  report.table("deployed",
-               "The same in a controller (our addition): observers sampled at 1 ms, input held. "
-               "Without measurement noise there is nothing to wait for, and the default hold of "
-               "two samples does without the jump at epsilon",
-               {"case", "observer", "max |v|", "max |d|", "max |u|"}, lines);
+  report.table(
+      "deployed",
+      "The same in a controller (our addition): observers sampled at 1 ms, input held. "
+      "Without measurement noise there is nothing to wait for, and the default blanking of "
+      "two samples does without the jump at epsilon",
+      {"case", "observer", "max |v|", "max |d|", "max |u|"}, lines);
 
   // Figures, row 3 of the table.
   const std::string start = " y(0) = 0.5, y'(0) = -0.3; right: the first 0.3 s.";

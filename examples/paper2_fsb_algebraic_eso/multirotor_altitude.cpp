@@ -74,7 +74,7 @@ constexpr double noisy_duration = 20.0;                         // s
 constexpr double late = 10.0;                                   // s
 constexpr double true_disturbance = external / mass - gravity;  // m/s^2, b0 = b
 constexpr std::array bandwidths = {1.0, 2.0, 3.0, 5.0, 7.0};    // rad/s
-constexpr std::array holds = {0.02, 0.1, 0.5, 1.0};             // s
+constexpr std::array blankings = {0.02, 0.1, 0.5, 1.0};         // s
 constexpr std::size_t seeds = 20;
 
 struct Multirotor {
@@ -90,7 +90,7 @@ struct Run {
   double overshoot = 0.0;            ///< %, of the true altitude
   std::optional<double> settling{};  ///< s, 2 %
   double late_rms = 0.0;             ///< of the disturbance estimate's error, t >= 10 s
-  double peak = 0.0;                 ///< of that error, from the hold time on
+  double peak = 0.0;                 ///< of that error, from the end of the blanking on
   double control_peak = 0.0;         ///< largest |u|, N
   std::vector<double> t, z, d, u;
 
@@ -114,9 +114,9 @@ sim::HeldNoise<> measurement_noise(double level, std::uint64_t seed) {
       .value();
 }
 
-/// Fills a run from the samples of either loop. @param hold errors before it do not count
+/// Fills a run from the samples of either loop. @param blanking errors before it do not count
 template <class Loop>
-Run record(const Loop& loop, const typename Loop::Config& config, double hold, bool keep) {
+Run record(const Loop& loop, const typename Loop::Config& config, double blanking, bool keep) {
   Run run;
   auto response = sim::StepResponse<>::make({.final_value = set_point}).value();
   double squares = 0.0;
@@ -126,7 +126,7 @@ Run record(const Loop& loop, const typename Loop::Config& config, double hold, b
            [&](const auto& sample) {
              response.add(sample.t, sample.output);
              const double error = sample.estimate(2) - true_disturbance;
-             if (sample.t >= hold - 1e-9) run.peak = std::max(run.peak, std::abs(error));
+             if (sample.t >= blanking - 1e-9) run.peak = std::max(run.peak, std::abs(error));
              run.control_peak = std::max(run.control_peak, std::abs(sample.input));
              if (sample.t >= late) {
                squares += error * error;
@@ -146,20 +146,20 @@ Run record(const Loop& loop, const typename Loop::Config& config, double hold, b
 
 /// Continuous simulation.
 template <class Observer>
-Run run_paper(const Observer& observer, double b0, double time, double hold, double noise = 0.0,
+Run run_paper(const Observer& observer, double b0, double time, double blanking, double noise = 0.0,
               std::uint64_t seed = 0, bool keep = false) {
   const sim::ContinuousLoop loop{Multirotor{}, observer, law_for(b0), sim::MeasuredOutput{},
                                  measurement_noise(noise, seed)};
-  return record(loop, {.duration = time, .step = step}, hold, keep);
+  return record(loop, {.duration = time, .step = step}, blanking, keep);
 }
 
 /// The sampled observer.
 template <class Observer>
-Run run_deployed(const Observer& observer, double b0, double time, double hold, double noise,
+Run run_deployed(const Observer& observer, double b0, double time, double blanking, double noise,
                  std::uint64_t seed) {
   const sim::SampledLoop loop{Multirotor{}, observer, law_for(b0), sim::MeasuredOutput{},
                               measurement_noise(noise, seed)};
-  return record(loop, {.duration = time, .sample_time = step}, hold, false);
+  return record(loop, {.duration = time, .sample_time = step}, blanking, false);
 }
 
 std::string seconds_text(const std::optional<double>& time) {
@@ -234,8 +234,8 @@ int main(int argc, char** argv) {
       const double w = bandwidths[i];
       linear.push_back(
           run_paper(linear_observer<2>(w, one.b0), one.b0, duration, 0.0, 0.0, 0, true));
-      shifted.push_back(
-          run_paper(HeldFilter<2>(w, q, one.b0, epsilon), one.b0, duration, epsilon, 0.0, 0, true));
+      shifted.push_back(run_paper(BlankedFilter<2>(w, q, one.b0, epsilon), one.b0, duration,
+                                  epsilon, 0.0, 0, true));
       const std::string name = std::string(one.name) + ", " + number_text(w) + " rad/s";
       const auto check = [&](const std::string& observer, double reference, double ours) {
         // Whole percents, or tenths, or hundredths where it is small.
@@ -290,7 +290,7 @@ int main(int argc, char** argv) {
                lines);
 
   // ---- with noise
-  constexpr std::size_t settings = 1 + holds.size();
+  constexpr std::size_t settings = 1 + blankings.size();
   const auto noisy = run_parallel("noise, seeds", settings * seeds, [](std::size_t job) {
     const std::size_t setting = job / seeds;
     const std::uint64_t seed = 1 + job % seeds;
@@ -298,9 +298,9 @@ int main(int argc, char** argv) {
     if (setting == 0) {
       return run_paper(linear_observer<2>(7.0, b), b, noisy_duration, 0.0, noise_level, seed, keep);
     }
-    const double hold = holds[setting - 1];
-    return run_paper(HeldFilter<2>(1.0, q, b, hold), b, noisy_duration, hold, noise_level, seed,
-                     keep);
+    const double blanking = blankings[setting - 1];
+    return run_paper(BlankedFilter<2>(1.0, q, b, blanking), b, noisy_duration, blanking,
+                     noise_level, seed, keep);
   });
   const auto of_setting = [&](std::size_t setting, auto member) {
     const auto first = noisy.begin() + static_cast<std::ptrdiff_t>(setting * seeds);
@@ -320,10 +320,10 @@ int main(int argc, char** argv) {
        with_deviation(of_setting(0, &Run::control_peak)),
        with_deviation(of_setting(0, &Run::overshoot)), with_deviation(linear_rms)}};
   constexpr std::array independent_peaks = {7727.0, 387.0, 7.0, 0.9};
-  for (std::size_t i = 0; i < holds.size(); ++i) {
+  for (std::size_t i = 0; i < blankings.size(); ++i) {
     const auto peak = of_setting(i + 1, &Run::peak);
-    const double predicted = noise_level * std::sqrt(720.0 * step / std::pow(holds[i], 5));
-    const std::string name = "FSB, lambda = 1, epsilon = " + number_text(holds[i]) + " s";
+    const double predicted = noise_level * std::sqrt(720.0 * step / std::pow(blankings[i], 5));
+    const std::string name = "FSB, lambda = 1, epsilon = " + number_text(blankings[i]) + " s";
     // Reported only: peaks scatter by half of their mean, so one seed of another program says
     // little.
     report.check(name, "peak of the disturbance error (m/s^2)", std::nullopt, peak, std::nullopt,
@@ -361,7 +361,7 @@ int main(int argc, char** argv) {
                shown_text(soon_peak) + " m/s^2 right after epsilon = 0.02 s.",
        .figure = "fig10"});
 
-  // In a controller: the hold time from the noise level.
+  // In a controller: the blanking from the noise level.
   constexpr double tolerated = 1.0;  // m/s^2
   const auto deployed = esokit::AlgebraicEso<2>::make({.observer_bandwidth = 1.0,
                                                        .frequency_shift = q,
@@ -371,19 +371,20 @@ int main(int argc, char** argv) {
                                                        .disturbance_noise = tolerated})
                             .value();
   const auto sampled = run_parallel("deployed, seeds", seeds, [&](std::size_t job) {
-    return run_deployed(deployed, b, noisy_duration, deployed.hold(), noise_level, 1 + job);
+    return run_deployed(deployed, b, noisy_duration, deployed.blanking(), noise_level, 1 + job);
   });
   const auto deployed_peak = statistics_of(sampled, &Run::peak);
   report.expect("AlgebraicEso, noise levels given", "peak of the disturbance error (m/s^2)",
                 deployed_peak, deployed_peak.mean < 2.5 * tolerated,
                 "below 2.5 of the tolerated 1 m/s^2");
-  report.check("AlgebraicEso, noise levels given", "hold time (s)", std::nullopt, deployed.hold());
+  report.check("AlgebraicEso, noise levels given", "blanking (s)", std::nullopt,
+               deployed.blanking());
   report.table("deployed",
                "The same in a controller (our addition): AlgebraicEso at 1 kHz told of a noise of "
-               "0.8 m and a tolerated error of 1 m/s^2 chooses its hold time itself",
-               {"hold (s)", "peak of d error (m/s^2)", "max |u| (N)", "overshoot (%)",
+               "0.8 m and a tolerated error of 1 m/s^2 chooses its blanking itself",
+               {"blanking (s)", "peak of d error (m/s^2)", "max |u| (N)", "overshoot (%)",
                 "late rms of d (m/s^2)"},
-               {{number_text(deployed.hold(), 3), with_deviation(deployed_peak),
+               {{number_text(deployed.blanking(), 3), with_deviation(deployed_peak),
                  with_deviation(statistics_of(sampled, &Run::control_peak)),
                  with_deviation(statistics_of(sampled, &Run::overshoot)),
                  with_deviation(statistics_of(sampled, &Run::late_rms))}});

@@ -37,7 +37,7 @@ inline esokit::examples::About about(std::string title, std::string description,
 /// The paper's observer in a ContinuousLoop: its filter, a clock, and estimates that are zero until
 /// the time epsilon.
 template <int Order, int Extension = 1>
-class HeldFilter {
+class BlankedFilter {
  public:
   using Filter = esokit::AlgebraicFilter<Order, double, Extension>;
   static constexpr int size = Filter::size;
@@ -46,12 +46,12 @@ class HeldFilter {
   using Estimate = typename Filter::Estimate;
   using State = Vector<double, states>;
 
-  /// @param lambda, q rad/s @param hold epsilon, s
-  HeldFilter(double lambda, double q, double input_gain, double hold)
+  /// @param lambda, q rad/s @param blanking epsilon, s
+  BlankedFilter(double lambda, double q, double input_gain, double blanking)
       : filter_(Filter::make(
                     {.observer_bandwidth = lambda, .frequency_shift = q, .input_gain = input_gain})
                     .value()),
-        hold_(hold) {}
+        blanking_(blanking) {}
 
   State derivative(double t, const State& z, double y, double u) const {
     State rate;
@@ -63,7 +63,7 @@ class HeldFilter {
     // The clock is a sum of steps.
     constexpr double rounding = 1e-9;
     const double t = z(size);
-    if (t < hold_ - rounding) return Estimate::Zero();
+    if (t < blanking_ - rounding) return Estimate::Zero();
     return filter_.estimate(t, z.template head<size>());
   }
 
@@ -71,7 +71,7 @@ class HeldFilter {
 
  private:
   Filter filter_;
-  double hold_;
+  double blanking_;
 };
 
 /// The linear observer that the paper compares with.

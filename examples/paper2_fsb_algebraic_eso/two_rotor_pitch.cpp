@@ -151,7 +151,7 @@ int main(int argc, char** argv) {
       Miss::not_published);
 
   const Run linear = run(linear_observer<2>(bandwidth, 1.0 / inertia), 0.0);
-  const Run shifted = run(HeldFilter<2>(bandwidth, q, 1.0 / inertia, epsilon), epsilon);
+  const Run shifted = run(BlankedFilter<2>(bandwidth, q, 1.0 / inertia, epsilon), epsilon);
   const std::string source = "independent run";
   report.check_reference("LESO", "max velocity error (rad/s)", 3.15, linear.velocity_error, 0.005,
                          source);

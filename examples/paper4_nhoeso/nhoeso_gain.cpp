@@ -196,22 +196,24 @@ int main(int argc, char** argv) {
 
   // ---- where a constant gain is stable
   report.check_reference("N = 3", "least stable constant k", 1.0 / 9.0,
-                         esokit::constant_gain_interval<3>().low, Tolerance::absolute(1e-9), "1/9");
+                         esokit::constant_gain_interval<3>().lower, Tolerance::absolute(1e-9),
+                         "1/9");
   report.check_reference("N = 4", "least stable constant k", 1.0 / 5.0,
-                         esokit::constant_gain_interval<4>().low, Tolerance::absolute(1e-9), "1/5");
+                         esokit::constant_gain_interval<4>().lower, Tolerance::absolute(1e-9),
+                         "1/5");
   const auto interval = esokit::constant_gain_interval(
       esokit::EqualSampledPoles<3, double>::from_bandwidth(0.5, 1.0));
-  report.check_reference("N = 3, omega_0 T = 0.5", "least stable constant k", 0.194, interval.low,
+  report.check_reference("N = 3, omega_0 T = 0.5", "least stable constant k", 0.194, interval.lower,
                          Tolerance::absolute(5e-4), "sheet");
-  report.check_reference("N = 3, omega_0 T = 0.5", "largest stable constant k", 2.08, interval.high,
-                         Tolerance::absolute(5e-3), "sheet");
+  report.check_reference("N = 3, omega_0 T = 0.5", "largest stable constant k", 2.08,
+                         interval.upper, Tolerance::absolute(5e-3), "sheet");
   const esokit::NonlinearEso<2>::Config config{
       .observer_bandwidth = 10.0, .shape = table2_g_new, .input_gain = 1.0, .sample_time = 1e-5};
   const auto found = esokit::NonlinearEso<2>::report(config).value();
   report.check_reference("g_new, N = 4", "k(e) < 1/5 from |e| =", 9.8e-4,
-                         found.outside.range[0].low, 0.01);
+                         found.outside.range[0].lower, 0.01);
   report.check_reference("g_new, N = 4", "k(e) < 1/5 up to |e| =", 1.76,
-                         found.outside.range[0].high, 0.01);
+                         found.outside.range[0].upper, 0.01);
 
   // ---- the limit cycle
   const Curve cycle = continuous_run(true, 400.0);

@@ -36,6 +36,7 @@
 #include <esokit/core/error_text.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/fal.hpp>
+#include <esokit/core/interval.hpp>
 #include <esokit/core/language.hpp>
 #include <esokit/core/linear_equations.hpp>
 #include <esokit/core/matrix.hpp>

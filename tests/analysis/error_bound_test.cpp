@@ -313,7 +313,7 @@ TEST(ErrorBound, OfTheNonlinearObserverHolds) {
   const double w = 5.0;
   const ErrorSources sources{.disturbance_rate = 2.0, .measurement_noise = 0.02};
   const auto bound =
-      nonlinear_error_bound<N>({.observer_bandwidth = w, .least = 0.5, .greatest = 3.0}, sources)
+      nonlinear_error_bound<N>({.observer_bandwidth = w, .gain_min = 0.5, .gain_max = 3.0}, sources)
           .value();
   using Observer = ContinuousObserver<2, double, 2, Saturated<N>>;
   double tightest = 0.0;

@@ -75,14 +75,14 @@ void expect_same_run(const Loop& loop, Observer observer, Law&& control, double 
   }
 }
 
-struct OutputBased {
+struct FedOutput {
   AdrcLaw<2> law;
   [[nodiscard]] double measured(double y, double) const { return y; }
   [[nodiscard]] double input(const Vector<double, 3>& z, double r) const {
     return law.control(z, r);
   }
 };
-struct ErrorBased {
+struct FedError {
   AdrcLaw<2> law;
   [[nodiscard]] double measured(double y, double r) const { return r - y; }
   [[nodiscard]] double input(const Vector<double, 3>& z, double) const {
@@ -94,15 +94,15 @@ TEST(AdrcLoop, IsTheRunningLoop) {
   const auto loop =
       adrc_loop(sampled_plant(plant(), T).value(), observer_with(2.0), law_with(2.0)).value();
   EXPECT_TRUE(loop.stable());
-  expect_same_run(loop, observer_with(2.0), OutputBased{law_with(2.0)}, 0.0);
+  expect_same_run(loop, observer_with(2.0), FedOutput{law_with(2.0)}, 0.0);
 }
 
-TEST(AdrcLoop, IsTheRunningLoopInErrorForm) {
-  const auto loop = adrc_loop(sampled_plant(plant(), T).value(), observer_with(-2.0), law_with(2.0),
-                              LoopForm::error_based)
-                        .value();
+TEST(AdrcLoop, IsTheRunningLoopErrorBased) {
+  const auto loop =
+      adrc_loop(sampled_plant(plant(), T).value(), observer_with(-2.0), law_with(2.0), ErrorBased{})
+          .value();
   EXPECT_TRUE(loop.stable());
-  expect_same_run(loop, observer_with(-2.0), ErrorBased{law_with(2.0)}, 0.0);
+  expect_same_run(loop, observer_with(-2.0), FedError{law_with(2.0)}, 0.0);
   // The loop gain does not depend on the form.
   const auto other =
       adrc_loop(sampled_plant(plant(), T).value(), observer_with(2.0), law_with(2.0)).value();
@@ -117,7 +117,7 @@ TEST(AdrcLoop, IsTheRunningLoopWithADelay) {
     const auto loop =
         adrc_loop(sampled_plant(plant(), T, delay).value(), observer_with(2.0), law_with(2.0))
             .value();
-    expect_same_run(loop, observer_with(2.0), OutputBased{law_with(2.0)}, delay);
+    expect_same_run(loop, observer_with(2.0), FedOutput{law_with(2.0)}, delay);
   }
 }
 
@@ -168,7 +168,7 @@ TEST(AdrcLoop, RefusesWhatDoesNotBelongTogether) {
             "plant.sample_time: must be that of the observer, which is");
   EXPECT_EQ(refusal(adrc_loop(sampled, observer_with(2.0), law_with(3.0))),
             "input_gain: of the observer must be that of the law, which is");
-  EXPECT_EQ(refusal(adrc_loop(sampled, observer_with(2.0), law_with(2.0), LoopForm::error_based)),
+  EXPECT_EQ(refusal(adrc_loop(sampled, observer_with(2.0), law_with(2.0), ErrorBased{})),
             "input_gain: of the observer must be minus that of the law, which is");
   // T and b0 come back as they were given, so the next number is another one.
   const auto next = [](double x) { return std::nextafter(x, 2 * x); };

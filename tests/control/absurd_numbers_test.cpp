@@ -135,10 +135,10 @@ void expect_output_within_limits(typename Controller::Config settings) {
 TEST(OutputAfterMake, IsWithinTheLimits) {
   expect_output_within_limits<Adrc<LinearEso<2>>>(config<Adrc<LinearEso<2>>>());
   auto held = config<Adrc<LinearEso<2>>>();
-  held.hold.time = 0.1;
+  held.start_hold.time = 0.1;
   expect_output_within_limits<Adrc<LinearEso<2>>>(held);
   expect_output_within_limits<esokit::DisturbanceCompensator<LinearEso<2>>>(
-      {.observer = observer_config<LinearEso<2>>(), .hold = {.time = 0.1}});
+      {.observer = observer_config<LinearEso<2>>(), .start_hold = {.time = 0.1}});
   expect_output_within_limits<PredictiveAdrc<LinearEso<2>>>(config<PredictiveAdrc<LinearEso<2>>>());
   auto predictive = config<PredictiveAdrc<LinearEso<2>>>();
   predictive.start_hold = 0.1;

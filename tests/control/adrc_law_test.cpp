@@ -39,7 +39,7 @@ TEST(AdrcLaw, LiteralControl) {
   EXPECT_EQ(law.control(estimate, reference), -15);
   // v = 3 (4 - 1) + 5 (0 - 2) = -1; u = (-1 - 7) / -2
   EXPECT_EQ(law.control(estimate, 4.0), 4);
-  // error form: u = (7 + 3 + 10) / -2
+  // error-based: u = (7 + 3 + 10) / -2
   EXPECT_EQ(law.control_error_based(estimate), -10);
   // Any source of state estimates will do for the feedback, it need not know the disturbance.
   EXPECT_EQ(law.feedback(Vector<double, 2>(1, 2), reference), 37);
@@ -119,7 +119,7 @@ TEST(AdrcLaw, BringsThePlantToTheReference) {
 
 /// Fed with e = r - y and the input gain -b0 the error-based form is the output-based one while r
 /// is constant: z_1 = r - z_1, the other states and the disturbance change sign.
-TEST(AdrcLaw, ErrorFormEqualsOutputFormForAConstantReference) {
+TEST(AdrcLaw, ErrorBasedEqualsOutputBasedForAConstantReference) {
   const double t = 0.01;
   const double b0 = -1.7;
   const double r = 0.8;

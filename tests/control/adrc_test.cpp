@@ -70,6 +70,18 @@ TEST(Adrc, TakesAListOfTheReferenceAndItsDerivatives) {
   }
 }
 
+TEST(Adrc, IncrementalTakesAListToo) {
+  const double r = 0.5, r1 = 0.25, r2 = 7;
+  auto listed = esokit::Incremental<Linear>::make(base()).value();
+  auto given = listed;
+  for (int k = 0; k < 3; ++k) {
+    const double increment = given.update(0.3, Vector<double, 3>(r, r1, r2));
+    EXPECT_EQ(listed.update(0.3, {r, r1, r2}), increment);
+    EXPECT_NE(increment, 0);
+    EXPECT_EQ(listed.update(0.3, {r, r1}, 0.1), given.update(0.3, Vector<double, 2>(r, r1), 0.1));
+  }
+}
+
 /// A machine of a user's: the controller is a member like any other.
 class Joint {
  public:
@@ -118,7 +130,7 @@ TEST(Adrc, StatusAndModeHaveText) {
             "measurement_rejected|input_rejected|prediction_dropped|gap_bridged|restarted|"
             "state_rejected|outlier_rejected|turn_assumed");
   EXPECT_EQ(text(LoopMode::running), "running");
-  EXPECT_EQ(text(LoopMode::holding), "holding");
+  EXPECT_EQ(text(LoopMode::start_hold), "start_hold");
   EXPECT_EQ(text(LoopMode::safe), "safe");
   auto controller = Linear::make(base()).value();
   controller.update(std::numeric_limits<double>::quiet_NaN(), 1.0);
@@ -536,13 +548,13 @@ TEST(Adrc, RetuneKeepsThePhaseOfTheDivider) {
 
 TEST(Adrc, RetuneKeepsHoldAndSafeMode) {
   auto settings = base();
-  settings.hold = {.time = 5 * period, .input = 1};
+  settings.start_hold = {.time = 5 * period, .input = 1};
   settings.missing.most = 0;
   auto controller = Linear::make(settings).value();
   controller.update(0, 0.0);
   ASSERT_TRUE(controller.retune(settings).has_value());
   for (int k = 0; k < 4; ++k) {
-    EXPECT_EQ(controller.mode(), LoopMode::holding);
+    EXPECT_EQ(controller.mode(), LoopMode::start_hold);
     controller.update(0, 0.0);
   }
   EXPECT_EQ(controller.mode(), LoopMode::running);
@@ -609,13 +621,15 @@ TEST(Adrc, BadConfigIsRefusedByName) {
             "input_gain: must be finite and not zero (negative is fine)");
   EXPECT_EQ(field([](auto& c) { c.observer.sample_time = 0; }),
             "sample_time: must be finite and positive");
-  EXPECT_EQ(field([](auto& c) { c.hold.time = -1; }), "hold.time: must be finite and not negative");
-  EXPECT_EQ(field([](auto& c) { c.hold.time = 1e9; }), "hold.time: must be below 2^24 samples");
+  EXPECT_EQ(field([](auto& c) { c.start_hold.time = -1; }),
+            "start_hold.time: must be finite and not negative");
+  EXPECT_EQ(field([](auto& c) { c.start_hold.time = 1e9; }),
+            "start_hold.time: must be below 2^24 samples");
   EXPECT_EQ(field([](auto& c) {
               c.limits.upper = 1;
-              c.hold.input = 2;
+              c.start_hold.input = 2;
             }),
-            "hold.input: must not be above limits.upper");
+            "start_hold.input: must not be above limits.upper");
   EXPECT_EQ(field([](auto& c) {
               c.limits.lower = -1;
               c.missing.input = -2;

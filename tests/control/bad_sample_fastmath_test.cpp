@@ -87,8 +87,8 @@ TEST(BadSamplesOfControllers, ConfigWithNan) {
   EXPECT_FALSE(C::make({.observer = observer<double>(), .controller_bandwidth = nan}));
   EXPECT_FALSE(C::make(
       {.observer = observer<double>(), .controller_bandwidth = 10, .limits = {.lower = nan}}));
-  EXPECT_FALSE(
-      C::make({.observer = observer<double>(), .controller_bandwidth = 10, .hold = {.time = nan}}));
+  EXPECT_FALSE(C::make(
+      {.observer = observer<double>(), .controller_bandwidth = 10, .start_hold = {.time = nan}}));
   EXPECT_FALSE(C::make(
       {.observer = observer<double>(), .controller_bandwidth = 10, .missing = {.input = nan}}));
   auto variable =

@@ -55,7 +55,7 @@ TEST(Boundary, HoldAndSafeInputAtTheLimit) {
       .limits = {.lower = -1, .upper = 2}};
   const auto with = [&](double hold, double safe) {
     auto changed = config;
-    changed.hold = {.time = 0.01, .input = hold};
+    changed.start_hold = {.time = 0.01, .input = hold};
     changed.missing.input = safe;
     return refusal(Adrc<LinearEso<2>>::make(changed));
   };
@@ -63,11 +63,11 @@ TEST(Boundary, HoldAndSafeInputAtTheLimit) {
   const double below = std::nextafter(-1.0, -2.0);
   EXPECT_EQ(with(2, 2), "accepted");
   EXPECT_EQ(with(-1, -1), "accepted");
-  EXPECT_EQ(with(above, 0), "hold.input: must not be above limits.upper");
-  EXPECT_EQ(with(below, 0), "hold.input: must not be below limits.lower");
+  EXPECT_EQ(with(above, 0), "start_hold.input: must not be above limits.upper");
+  EXPECT_EQ(with(below, 0), "start_hold.input: must not be below limits.lower");
   EXPECT_EQ(with(0, above), "missing.input: must not be above limits.upper");
   EXPECT_EQ(with(0, below), "missing.input: must not be below limits.lower");
-  EXPECT_EQ(with(hidden_nan<double>(), 0), "hold.input: must be finite");
+  EXPECT_EQ(with(hidden_nan<double>(), 0), "start_hold.input: must be finite");
   EXPECT_EQ(with(0, hidden_infinity<double>()), "missing.input: must be finite");
 }
 

@@ -158,7 +158,7 @@ struct ControllerLawsOf<Adrc<O, F>> {
   static void start_does_not_bump() {
     Config settings = config();
     settings.limits = {.lower = S(-5), .upper = S(5)};
-    settings.hold = {.time = S(0.5), .input = S(-2)};
+    settings.start_hold = {.time = S(0.5), .input = S(-2)};
     Controller controller = warm(settings);
     ChainPlant<n> plant(period, gain, disturbance);
     typename ChainPlant<n>::State x = ChainPlant<n>::State::Zero();
@@ -253,12 +253,12 @@ struct ControllerLawsOf<Adrc<O, F>> {
 
   static void hold_holds() {
     Config settings = config();
-    settings.hold = {.time = s(12.5 * period), .input = s(0.25)};
+    settings.start_hold = {.time = s(12.5 * period), .input = s(0.25)};
     settings.limits = {.lower = S(-2), .upper = S(2)};
     Controller controller = make(settings);
-    EXPECT_EQ(controller.mode(), LoopMode::holding);
+    EXPECT_EQ(controller.mode(), LoopMode::start_hold);
     for (int k = 0; k < 13; ++k) {
-      EXPECT_EQ(controller.mode(), LoopMode::holding) << k;
+      EXPECT_EQ(controller.mode(), LoopMode::start_hold) << k;
       EXPECT_EQ(controller.update(S(0.5), S(4)), s(0.25)) << k;
       if (k > 0) {
         EXPECT_EQ(controller.observer().applied_input(), s(0.25)) << k;

@@ -151,7 +151,7 @@ TEST(DisturbanceCompensator, LimitsMissingAndErrors) {
   auto settings = base();
   settings.limits = {.lower = -1, .upper = 2, .rate = 100};
   settings.missing = {.most = 2, .input = 0.5};
-  settings.hold = {.time = 3 * period, .input = 0.25};
+  settings.start_hold = {.time = 3 * period, .input = 0.25};
   auto compensator = Compensator::make(settings).value();
   for (int k = 0; k < 3; ++k) EXPECT_EQ(compensator.update(0, 9.0), 0.25);
   EXPECT_NEAR(compensator.update(0, 9.0), 0.35, 1e-12);

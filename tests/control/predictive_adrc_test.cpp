@@ -201,9 +201,9 @@ TEST(PredictiveAdrc, equals_one_phase_algebraic) {
   using Observer = esokit::AlgebraicEso<2>;
   auto config = by_bandwidth<Observer>(300);
   config.frequency_shift = 100;
-  config.hold = 0.02;  // the published estimate stands still at first
+  config.blanking = 0.02;  // the published estimate stands still at first
   equals_one_phase<Observer>(config);
-  config.hold = 0.0;
+  config.blanking = 0.0;
   equals_one_phase<Observer>(config);
 }
 
@@ -512,6 +512,26 @@ TEST(PredictiveAdrc, the_reference_may_change_until_the_sample) {
   c.prepare(hidden_nan<double>());
   const double held = c.output();
   EXPECT_EQ(c.control(0.25), held);
+}
+
+TEST(PredictiveAdrc, takes_a_list_of_the_reference_and_its_derivatives) {
+  using Two = esokit::Vector<double, 2>;
+  auto listed = warm<Linear>(typical());
+  auto given = listed;
+  const double r = 0.5, r1 = 20, r2 = 300;
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_EQ(listed.update(0.1, {r, r1, r2}),
+              given.update(0.1, esokit::Vector<double, 3>(r, r1, r2)));
+    const double by_list = listed.control(0.2);
+    EXPECT_EQ(by_list, given.control(0.2));
+    EXPECT_NE(by_list, 0);
+    listed.prepare({r, r1});
+    given.prepare(Two(r, r1));
+    EXPECT_EQ(listed.control(0.15), given.control(0.15));
+    listed.set_reference({r1, r});
+    given.set_reference(Two(r1, r));
+    EXPECT_EQ(listed.control(0.15), given.control(0.15));
+  }
 }
 
 TEST(PredictiveAdrc, start_hold_keeps_u_at_zero) {

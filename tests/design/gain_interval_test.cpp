@@ -50,21 +50,22 @@ void constant_gain_ends() {
   const double low = edge(N == 2 ? -0.5 : 1e-4, 1.0, [](double k) {
     return spectral_abscissa<N>(continuous_error_matrix<N>(Column<N>(continuous<N>() * k))) < 0;
   });
-  EXPECT_NEAR(constant_gain_interval<N>().low, low, 1e-9) << N;
-  EXPECT_TRUE(std::isinf(constant_gain_interval<N>().high));
+  EXPECT_NEAR(constant_gain_interval<N>().lower, low, 1e-9) << N;
+  EXPECT_TRUE(std::isinf(constant_gain_interval<N>().upper));
   for (const double omega_t : {0.1, 0.5, 2.0, 10.0}) {
     const auto stable = [&](double k) {
       return spectral_radius<N>(sampled_error_matrix<N>(
                  esokit::multiplied<N, double>(sampled<N>(omega_t), k))) < 1;
     };
     const auto interval = constant_gain_interval(poles<N>(omega_t));
-    EXPECT_NEAR(interval.low, edge(N == 2 ? -0.5 : 1e-4, 1.0, stable), 1e-9) << N << ' ' << omega_t;
-    EXPECT_NEAR(interval.high, edge(1.0, 100.0, stable), 1e-9 * interval.high)
+    EXPECT_NEAR(interval.lower, edge(N == 2 ? -0.5 : 1e-4, 1.0, stable), 1e-9)
+        << N << ' ' << omega_t;
+    EXPECT_NEAR(interval.upper, edge(1.0, 100.0, stable), 1e-9 * interval.upper)
         << N << ' ' << omega_t;
     const double c = (1 + std::exp(-omega_t)) / 2;
-    EXPECT_NEAR(interval.high, 1 / (1 - std::pow(c, N)), 1e-12 * interval.high);
+    EXPECT_NEAR(interval.upper, 1 / (1 - std::pow(c, N)), 1e-12 * interval.upper);
     if (N > 2) {
-      EXPECT_NEAR(interval.low, 1 / (1 + std::pow(c / std::cos(pi / N), N)), 1e-12);
+      EXPECT_NEAR(interval.lower, 1 / (1 + std::pow(c / std::cos(pi / N), N)), 1e-12);
     }
   }
 }
@@ -78,12 +79,12 @@ TEST(ConstantGainInterval, EqualsEigenvalues) {
 
 /// Sheet 4: 1/9 and 1/5; N = 3, omega T = 0.5: 0.194 .. 2.08.
 TEST(ConstantGainInterval, PrintedNumbers) {
-  EXPECT_NEAR(constant_gain_interval<3>().low, 1.0 / 9.0, 1e-15);
-  EXPECT_NEAR(constant_gain_interval<4>().low, 1.0 / 5.0, 1e-15);
-  EXPECT_EQ(constant_gain_interval<2>().low, 0.0);
+  EXPECT_NEAR(constant_gain_interval<3>().lower, 1.0 / 9.0, 1e-15);
+  EXPECT_NEAR(constant_gain_interval<4>().lower, 1.0 / 5.0, 1e-15);
+  EXPECT_EQ(constant_gain_interval<2>().lower, 0.0);
   const auto interval = constant_gain_interval(poles<3>(0.5));
-  EXPECT_NEAR(interval.low, 0.194, 5e-4);
-  EXPECT_NEAR(interval.high, 2.08, 5e-3);
+  EXPECT_NEAR(interval.lower, 0.194, 5e-4);
+  EXPECT_NEAR(interval.upper, 2.08, 5e-3);
 }
 
 /// Closed forms of what is certified, against the general test.
@@ -95,7 +96,7 @@ void certified_ends() {
         edge(1e-3, 1.0, [&](double k) { return gain_range_certified<N, double>(gain, k, 1.0); });
     EXPECT_NEAR(least_certified_gain(poles<N>(omega_t)), least, 1e-9) << N << ' ' << omega_t;
     // With k_min = 1 every stable constant k above it is certified.
-    const double ceiling = constant_gain_interval(poles<N>(omega_t)).high;
+    const double ceiling = constant_gain_interval(poles<N>(omega_t)).upper;
     EXPECT_NEAR((largest_certified_gain<N, double>(gain, 1.0, 1.0, ceiling)), ceiling,
                 1e-9 * ceiling);
   }
@@ -121,7 +122,7 @@ TEST(CertifiedGain, LargestIsCertifiedAndTheNextIsNot) {
   for (const double omega_t : {0.05, 0.5, 1.5, 5.0}) {
     const auto gain = sampled<4>(omega_t);
     const double low = 1.1 * least_certified_gain(poles<4>(omega_t));
-    const double ceiling = constant_gain_interval(poles<4>(omega_t)).high;
+    const double ceiling = constant_gain_interval(poles<4>(omega_t)).upper;
     const double most = largest_certified_gain<4, double>(gain, low, std::max(low, 0.9), ceiling);
     EXPECT_TRUE((gain_range_certified<4, double>(gain, low, most)));
     EXPECT_FALSE((gain_range_certified<4, double>(gain, low, most * (1 + 1e-9))));
@@ -137,7 +138,7 @@ TEST(CertifiedGain, VaryingGainInsideTheConstantIntervalGrows) {
   const Column<3> l = continuous<3>();
   const Square<3> low = continuous_error_matrix<3>(Column<3>(l * 0.15));
   const Square<3> high = continuous_error_matrix<3>(Column<3>(l * 5));
-  EXPECT_GT(0.15, constant_gain_interval<3>().low);
+  EXPECT_GT(0.15, constant_gain_interval<3>().lower);
   EXPECT_LT(spectral_abscissa<3>(low), 0);
   EXPECT_LT(spectral_abscissa<3>(high), 0);
   EXPECT_NEAR(periodic_growth<3>(low, 3.5, high, 0.2), 0.034, 0.001);

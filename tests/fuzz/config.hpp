@@ -297,14 +297,14 @@ class Filler {
     MEMBER(domain, choice(text, member, 2))
     MEMBER(half_gain, member = tape_.once_in(5, text))
     MEMBER(limits, limits(member))
-    if constexpr (requires { config.hold.time; }) {
-      if (tape_.once_in(3, "hold")) {
-        number("hold.time", config.hold.time, {0, 20 * T});
-        number("hold.input", config.hold.input, {1.5, 2});
+    if constexpr (requires { config.start_hold.time; }) {
+      if (tape_.once_in(3, "start_hold")) {
+        number("start_hold.time", config.start_hold.time, {0, 20 * T});
+        number("start_hold.input", config.start_hold.input, {1.5, 2});
         promise.waiting += 20;
       }
     } else {
-      MEMBER(hold, number(text, member, {0, 20 * T}))
+      MEMBER(blanking, number(text, member, {0, 20 * T}))
     }
     if constexpr (requires { config.missing.most; }) {
       config.missing.most = tape_.integer(0, 40, "missing.most");
@@ -318,7 +318,9 @@ class Filler {
       }
     }
     MEMBER(compensation_gain, number(text, member, {0.1 / unit, 10 / unit, true, true}))
-    MEMBER(start_hold, number(text, member, {0, 20 * T}))
+    if constexpr (!requires { config.start_hold.time; }) {
+      MEMBER(start_hold, number(text, member, {0, 20 * T}))
+    }
     // Laws.
     MEMBER(exponents, number(text, member, {0.3, 3}))
     MEMBER(linear_widths, number(text, member, {0.01, 1, true}))

@@ -322,7 +322,7 @@ class Driver {
     FINITE(input_gain())
     FINITE(sample_time())
     FINITE(raw_estimate())
-    FINITE(hold())
+    FINITE(blanking())
     FINITE(residual_disturbance())
     FINITE(known_part())
     FINITE(step_time())

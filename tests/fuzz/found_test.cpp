@@ -142,7 +142,7 @@ TEST(Found, FilterOfTheSmallestInflationBridgesAGap) {
 TEST(Found, RetuneInTheHoldIsRefusedOrFinite) {
   using Observer = esokit::AlgebraicEso<2, float>;
   Observer::Config config{
-      .observer_bandwidth = 1, .input_gain = 1, .sample_time = 0.55f, .hold = 10.0f};
+      .observer_bandwidth = 1, .input_gain = 1, .sample_time = 0.55f, .blanking = 10.0f};
   auto observer = Observer::make(config).value();
   observer.revise_input(-1.7f);
   config.input_gain = -1.7e38f;
@@ -154,7 +154,7 @@ TEST(Found, RetuneInTheHoldIsRefusedOrFinite) {
   EXPECT_STREQ(refused.error().field, "input_gain");
   EXPECT_STREQ(refused.error().rule, "would make the estimate not finite");
   EXPECT_TRUE(observer.estimate().allFinite());
-  EXPECT_TRUE(observer.holding());
+  EXPECT_TRUE(observer.blanked());
   observer.update(0, 0);
   EXPECT_TRUE(observer.retune(config));
 }

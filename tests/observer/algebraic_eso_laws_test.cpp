@@ -20,7 +20,7 @@ struct ObserverTraits<esokit::AlgebraicEso<Order, S, Extension>>
   static Config config(double omega, double sample_time, double input_gain, int max_gap = 100) {
     Config config = Base::config(omega, sample_time, input_gain, max_gap);
     config.frequency_shift = static_cast<S>(omega);
-    config.hold = S(0);
+    config.blanking = S(0);
     return config;
   }
   static typename Continuous::Config continuous_config(double omega, double input_gain) {

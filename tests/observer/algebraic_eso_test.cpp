@@ -159,11 +159,11 @@ TEST(AlgebraicEso, InitialStateDoesNotMatter) {
   plant.z = {1.0L, -0.7L, 50.0L};
   for (int k = 0; k < 3; ++k) {
     if (k > 0) plant.step(0.0);
-    EXPECT_TRUE(observer.holding());
+    EXPECT_TRUE(observer.blanked());
     EXPECT_EQ(observer.estimate()(2), 200.0);
     observer.update(static_cast<double>(plant.z[0]), 0.0);
   }
-  EXPECT_FALSE(observer.holding());
+  EXPECT_FALSE(observer.blanked());
   EXPECT_NEAR(observer.estimate()(0), static_cast<double>(plant.z[0]), 1e-14);
   EXPECT_NEAR(observer.estimate()(1), static_cast<double>(plant.z[1]), 1e-10);
   EXPECT_NEAR(observer.estimate()(2), 50.0, 5e-7);
@@ -365,10 +365,10 @@ void lost_among_the_first(int lost, bool bad_value) {
       EXPECT_EQ(observer.age(), 1u);
     }
     if (k > lost && k < lost + size) {
-      EXPECT_TRUE(observer.holding()) << k;
+      EXPECT_TRUE(observer.blanked()) << k;
     }
     if (k < lost + size) continue;
-    EXPECT_FALSE(observer.holding()) << k;
+    EXPECT_FALSE(observer.blanked()) << k;
     for (int i = 0; i < size; ++i) {
       const auto truth = static_cast<double>(plant.z[static_cast<std::size_t>(i)]);
       const double rounding =
@@ -436,7 +436,7 @@ TEST(AlgebraicEso, RecurringGapsFromTheStartDoNotDiverge) {
 /// earlier life is not held again.
 TEST(AlgebraicEso, LongGapRestartsTheHoldWithTheMeasurement) {
   auto config = paper_config<2>();
-  config.hold = 0.01;
+  config.blanking = 0.01;
   config.max_gap = 5;
   for (const bool two_phase : {false, true}) {
     auto observer = AlgebraicEso<2>::make(config).value();
@@ -449,7 +449,7 @@ TEST(AlgebraicEso, LongGapRestartsTheHoldWithTheMeasurement) {
     } else {
       EXPECT_EQ(observer.update(2.5, 0.0), StepStatus::restarted);
     }
-    EXPECT_TRUE(observer.holding());
+    EXPECT_TRUE(observer.blanked());
     EXPECT_EQ(observer.age(), 0u);
     for (int k = 0; k < 10; ++k) {
       EXPECT_EQ(observer.estimate()(0), 2.5);
@@ -457,9 +457,9 @@ TEST(AlgebraicEso, LongGapRestartsTheHoldWithTheMeasurement) {
       EXPECT_EQ(observer.template estimate<2>(), 0.0);
       observer.update(2.6, 0.0);
     }
-    EXPECT_TRUE(observer.holding());
+    EXPECT_TRUE(observer.blanked());
     observer.update(2.6, 0.0);
-    EXPECT_FALSE(observer.holding());
+    EXPECT_FALSE(observer.blanked());
   }
 }
 
@@ -467,13 +467,13 @@ TEST(AlgebraicEso, LongGapRestartsTheHoldWithTheMeasurement) {
 
 TEST(AlgebraicEso, PublishesAfterTheHold) {
   auto config = paper_config<2>();
-  config.hold = 0.02;  // at t = k T >= 0.02, k = 20
+  config.blanking = 0.02;  // at t = k T >= 0.02, k = 20
   auto observer = AlgebraicEso<2>::make(config).value();
-  EXPECT_NEAR(observer.hold(), 0.02, 1e-15);
+  EXPECT_NEAR(observer.blanking(), 0.02, 1e-15);
   for (int k = 0; k < 40; ++k) {
     observer.update(0.5 + 1e-3 * k, 0.0);
     if (k < 20) {
-      EXPECT_TRUE(observer.holding());
+      EXPECT_TRUE(observer.blanked());
       for (int i = 0; i < 3; ++i) EXPECT_EQ(observer.estimate()(i), 0.0);
       EXPECT_EQ(observer.estimate<0>(), 0.0);
       EXPECT_EQ(observer.total_disturbance(), 0.0);
@@ -481,7 +481,7 @@ TEST(AlgebraicEso, PublishesAfterTheHold) {
         EXPECT_NEAR(observer.raw_estimate()(0), 0.5 + 1e-3 * k, 1e-12);
       }
     } else {
-      EXPECT_FALSE(observer.holding());
+      EXPECT_FALSE(observer.blanked());
       EXPECT_NEAR(observer.estimate()(1), 1.0, 1e-9);
       EXPECT_EQ(observer.estimate<1>(), observer.raw_estimate()(1));
     }
@@ -490,27 +490,28 @@ TEST(AlgebraicEso, PublishesAfterTheHold) {
 
 TEST(AlgebraicEso, HoldDefaults) {
   // N - 1 samples: published from the first sample on that can be exact.
-  EXPECT_NEAR(AlgebraicEso<2>::make(paper_config<2>()).value().hold(), 2e-3, 1e-15);
+  EXPECT_NEAR(AlgebraicEso<2>::make(paper_config<2>()).value().blanking(), 2e-3, 1e-15);
   auto config = paper_config<2>();
-  config.hold = 0;
-  EXPECT_EQ(AlgebraicEso<2>::make(config).value().hold(), 0.0);
+  config.blanking = 0;
+  EXPECT_EQ(AlgebraicEso<2>::make(config).value().blanking(), 0.0);
   // From the noise: t^5 = 720 sigma^2 T / tolerated^2. sigma = 1e-3, tolerated 1: 0.0593 s.
   config = paper_config<2>();
   config.measurement_noise = 1e-3;
   config.disturbance_noise = 1.0;
   const double seconds = std::pow(720 * 1e-6 * 1e-3, 0.2);
-  EXPECT_NEAR(AlgebraicEso<2>::make(config).value().hold(), std::ceil(seconds * 1e3) * 1e-3, 1e-12);
+  EXPECT_NEAR(AlgebraicEso<2>::make(config).value().blanking(), std::ceil(seconds * 1e3) * 1e-3,
+              1e-12);
   // Never before it can be exact, and without overflow in float.
   config.measurement_noise = 1e-15;
-  EXPECT_NEAR(AlgebraicEso<2>::make(config).value().hold(), 2e-3, 1e-15);
+  EXPECT_NEAR(AlgebraicEso<2>::make(config).value().blanking(), 2e-3, 1e-15);
   auto large = paper_config<4, float, 3>(1e-4);
   large.measurement_noise = 1e-3f;
   large.disturbance_noise = 1.0f;
   // (13! 12! / (6!)^2 sigma^2 T / tolerated^2)^(1/13)
   const double factor = factorial_of(13) * factorial_of(12) / (factorial_of(6) * factorial_of(6));
   const double long_hold = std::pow(factor * 1e-6 * 1e-4, 1.0 / 13);
-  EXPECT_NEAR(static_cast<double>(AlgebraicEso<4, float, 3>::make(large).value().hold()), long_hold,
-              2e-4);
+  EXPECT_NEAR(static_cast<double>(AlgebraicEso<4, float, 3>::make(large).value().blanking()),
+              long_hold, 2e-4);
 }
 
 /// What the default promises: after it the standard deviation of the highest estimate is about the
@@ -525,7 +526,7 @@ TEST(AlgebraicEso, HoldKeepsTheNoiseLevel) {
   constexpr int runs = 2000;
   for (int run = 0; run < runs; ++run) {
     auto observer = fresh;
-    while (observer.holding()) {
+    while (observer.blanked()) {
       // Uniform with the standard deviation sigma.
       observer.update(random.uniform(-1, 1) * 1e-3 * std::sqrt(3.0), 0.0);
     }
@@ -538,14 +539,14 @@ TEST(AlgebraicEso, HoldKeepsTheNoiseLevel) {
 /// A hold that is longer than the schedule takes to settle ends all the same.
 TEST(AlgebraicEso, HoldEndsThoughTheScheduleSettlesFirst) {
   auto config = paper_config<2>(1e-3, 60, 500);
-  config.hold = 0.3;
+  config.blanking = 0.3;
   auto observer = AlgebraicEso<2>::make(config).value();
   for (int k = 0; k < 300; ++k) {
     observer.update(1.0, 0.0);
-    ASSERT_TRUE(observer.holding()) << k;
+    ASSERT_TRUE(observer.blanked()) << k;
   }
   observer.update(1.0, 0.0);
-  EXPECT_FALSE(observer.holding());
+  EXPECT_FALSE(observer.blanked());
   EXPECT_TRUE(observer.settled());
 }
 
@@ -567,15 +568,15 @@ TEST(AlgebraicEso, RearmBeginsAnewAndHoldsWhatWasPublished) {
   plant.z[2] = -20.0L;
   const auto held = observer.estimate();
   observer.rearm();
-  EXPECT_TRUE(observer.holding());
+  EXPECT_TRUE(observer.blanked());
   EXPECT_FALSE(observer.settled());
   EXPECT_EQ(observer.age(), 0u);
   auto twin = plant;
   run(2);
-  EXPECT_TRUE(observer.holding());
+  EXPECT_TRUE(observer.blanked());
   for (int i = 0; i < 3; ++i) EXPECT_EQ(observer.estimate()(i), held(i));
   run(1);
-  EXPECT_FALSE(observer.holding());
+  EXPECT_FALSE(observer.blanked());
   EXPECT_NEAR(observer.total_disturbance(), -20.0, 1e-7);
   EXPECT_NEAR(observer.estimate()(1), static_cast<double>(plant.z[1]), 1e-9);
   // Without it the linear ESO is still far away.
@@ -588,7 +589,7 @@ TEST(AlgebraicEso, RearmBeginsAnewAndHoldsWhatWasPublished) {
 
 TEST(AlgebraicEso, ResetHoldsTheGivenState) {
   auto config = paper_config<2>();
-  config.hold = 0.005;
+  config.blanking = 0.005;
   auto observer = AlgebraicEso<2>::make(config).value();
   for (int k = 0; k < 50; ++k) observer.update(1.0, 0.0);
   EXPECT_EQ(observer.reset(4.0), StepStatus::ok);
@@ -600,7 +601,7 @@ TEST(AlgebraicEso, ResetHoldsTheGivenState) {
   for (int k = 0; k < 50; ++k) observer.update(1.0, 0.0);
   const auto before = observer.estimate();
   EXPECT_EQ(observer.reset(hidden_nan<double>()), StepStatus::state_rejected);
-  EXPECT_FALSE(observer.holding());
+  EXPECT_FALSE(observer.blanked());
   for (int i = 0; i < 3; ++i) EXPECT_EQ(observer.estimate()(i), before(i));
 }
 
@@ -612,7 +613,7 @@ TEST(AlgebraicEso, RetuneKeepsThePlaceInTheSchedule) {
   const auto before = observer.estimate();
   ASSERT_TRUE(observer.retune(paper_config<2>(1e-3, 20, 5)).has_value());
   EXPECT_EQ(observer.age(), 200u);
-  EXPECT_FALSE(observer.holding());
+  EXPECT_FALSE(observer.blanked());
   for (int i = 0; i < 3; ++i) EXPECT_EQ(observer.estimate()(i), before(i));
   // The gain is that of the new settings, 200 samples on.
   auto other = AlgebraicEso<2>::make(paper_config<2>(1e-3, 20, 5)).value();
@@ -638,9 +639,9 @@ TEST(AlgebraicEso, RetuneOfASettledOneStaysSettled) {
   for (int k = 0; k < 1000; ++k) observer.update(std::sin(0.01 * k), 0.0);
   ASSERT_TRUE(observer.settled());
   auto config = paper_config<2>(1e-3, 30, 0.1);
-  config.hold = 0.5;  // longer than its count of samples ever was
+  config.blanking = 0.5;  // longer than its count of samples ever was
   ASSERT_TRUE(observer.retune(config).has_value());
-  EXPECT_FALSE(observer.holding());
+  EXPECT_FALSE(observer.blanked());
   auto linear =
       LinearEso<2>::make({.observer_bandwidth = 30, .input_gain = input_gain, .sample_time = 1e-3})
           .value();
@@ -658,34 +659,34 @@ TEST(AlgebraicEso, RetuneOfASettledOneStaysSettled) {
 /// u must not jump, so what is held moves with b0 too.
 TEST(AlgebraicEso, RetuneRebalancesHeldEstimates) {
   auto config = paper_config<2>();
-  config.hold = 0.02;
+  config.blanking = 0.02;
   auto observer = AlgebraicEso<2>::make(config).value();
   observer.reset(esokit::Vector<double, 3>(1, 2, 3));
   observer.update(1.0, 0.7);
   config.input_gain = 5;
   ASSERT_TRUE(observer.retune(config).has_value());
-  EXPECT_TRUE(observer.holding());
+  EXPECT_TRUE(observer.blanked());
   EXPECT_NEAR(observer.total_disturbance(), 3 + (input_gain - 5) * 0.7, 1e-12);
   EXPECT_EQ(observer.estimate()(1), 2.0);
   for (int k = 1; k < 20; ++k) observer.update(1.0, 0.7);
-  EXPECT_TRUE(observer.holding());
+  EXPECT_TRUE(observer.blanked());
   observer.update(1.0, 0.7);
-  EXPECT_FALSE(observer.holding());
+  EXPECT_FALSE(observer.blanked());
 }
 
 /// A longer hold than before holds what is published now, not the start of long ago.
 TEST(AlgebraicEso, RetuneToALongerHoldDoesNotJump) {
   auto config = paper_config<2>();
-  config.hold = 0.005;
+  config.blanking = 0.005;
   auto observer = AlgebraicEso<2>::make(config).value();
   for (int k = 0; k < 50; ++k) observer.update(1.0 + 0.1 * k, 0.0);
   const auto before = observer.estimate();
-  config.hold = 0.06;
+  config.blanking = 0.06;
   ASSERT_TRUE(observer.retune(config).has_value());
-  EXPECT_TRUE(observer.holding());
+  EXPECT_TRUE(observer.blanked());
   for (int i = 0; i < 3; ++i) EXPECT_EQ(observer.estimate()(i), before(i));
   for (int k = 0; k < 11; ++k) observer.update(6.0 + 0.1 * k, 0.0);
-  EXPECT_FALSE(observer.holding());
+  EXPECT_FALSE(observer.blanked());
 }
 
 // ---- refusals
@@ -733,10 +734,12 @@ TEST(AlgebraicEso, RefusesBadConfigByName) {
        "sample_time: must be finite and positive", -1e-3},
       {changed([&](Config& c) { c.sample_time = infinity; }),
        "sample_time: must be finite and positive", infinity},
-      {changed([](Config& c) { c.hold = -0.1; }), "hold: must be finite and not negative", -0.1},
-      {changed([&](Config& c) { c.hold = nan; }), "hold: must be finite and not negative", nan},
-      {changed([](Config& c) { c.hold = 2000.0; }), "hold: gives a hold of more than 1e6 samples",
-       2000},
+      {changed([](Config& c) { c.blanking = -0.1; }), "blanking: must be finite and not negative",
+       -0.1},
+      {changed([&](Config& c) { c.blanking = nan; }), "blanking: must be finite and not negative",
+       nan},
+      {changed([](Config& c) { c.blanking = 2000.0; }),
+       "blanking: gives a blanking of more than 1e6 samples", 2000},
       {changed([](Config& c) { c.measurement_noise = -1; }),
        "measurement_noise: must be finite and not negative", -1},
       {changed([&](Config& c) { c.measurement_noise = nan; }),
@@ -751,7 +754,7 @@ TEST(AlgebraicEso, RefusesBadConfigByName) {
          c.measurement_noise = 1e9;
          c.disturbance_noise = 1e-9;
        }),
-       "measurement_noise: gives a hold of more than 1e6 samples", 1e9},
+       "measurement_noise: gives a blanking of more than 1e6 samples", 1e9},
       {changed([](Config& c) { c.start_index = -1; }), "start_index: must be 0 .. 1000000", -1},
       {changed([](Config& c) { c.start_index = 1000001; }), "start_index: must be 0 .. 1000000",
        1000001},
@@ -783,7 +786,7 @@ TEST(AlgebraicEso, RefusesBadConfigByName) {
 /// first correction is that of sample k0.
 TEST(AlgebraicEso, SoftStartIsGentler) {
   auto config = paper_config<2>(1e-3, 5, 0.1);
-  config.hold = 0;
+  config.blanking = 0;
   auto hard = AlgebraicEso<2>::make(config).value();
   config.start_index = 50;
   auto soft = AlgebraicEso<2>::make(config).value();
@@ -847,7 +850,7 @@ TEST(AlgebraicEso, PackEqualsItsLanes) {
                                      .frequency_shift = shift,
                                      .input_gain = T(input_gain),
                                      .sample_time = T(1e-3),
-                                     .hold = T(0.0)})
+                                     .blanking = T(0.0)})
         .value();
   };
   auto pack = make(S({60.0, 20.0}), S({500.0, 2.0}));
@@ -877,7 +880,7 @@ TEST(AlgebraicEso, PackEqualsItsLanes) {
                                                .measurement_noise = S({1e-4, 1e-3}),
                                                .disturbance_noise = S(1.0)})
                          .value();
-  EXPECT_NEAR(noisy.hold()[0], std::ceil(1e3 * std::pow(720 * 1e-6 * 1e-3, 0.2)) * 1e-3, 1e-12);
+  EXPECT_NEAR(noisy.blanking()[0], std::ceil(1e3 * std::pow(720 * 1e-6 * 1e-3, 0.2)) * 1e-3, 1e-12);
 }
 
 /// d dhat / d lambda, against a difference.
@@ -888,7 +891,7 @@ TEST(AlgebraicEso, DerivativeBySettings) {
                                               .frequency_shift = T(3.0),
                                               .input_gain = T(input_gain),
                                               .sample_time = T(0.01),
-                                              .hold = T(0.0)})
+                                              .blanking = T(0.0)})
                         .value();
     for (int k = 0; k < 100; ++k) observer.update(T(std::sin(0.2 * k)), T(0.3));
     return observer.total_disturbance();

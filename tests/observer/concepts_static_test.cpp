@@ -461,10 +461,11 @@ ESOKIT_OBSERVER(GateMisspelled, {}) { bool accept(S) const; };
 static_assert(LoopObserver<Gates> && !LoopObserver<GateMissing> && !LoopObserver<GateUndeclared>);
 static_assert(!LoopObserver<GateNotConst> && !LoopObserver<GateMisspelled>);
 
-ESOKIT_OBSERVER(Holds, {.holds_estimate = true}) { bool holding() const; };
-ESOKIT_OBSERVER(HoldMissing, {.holds_estimate = true}){};
-ESOKIT_OBSERVER(HoldUndeclared, {}) { bool holding() const; };
-static_assert(LoopObserver<Holds> && !LoopObserver<HoldMissing> && !LoopObserver<HoldUndeclared>);
+ESOKIT_OBSERVER(Blanks, {.blanks_estimate = true}) { bool blanked() const; };
+ESOKIT_OBSERVER(BlankedMissing, {.blanks_estimate = true}){};
+ESOKIT_OBSERVER(BlankedUndeclared, {}) { bool blanked() const; };
+static_assert(LoopObserver<Blanks> && !LoopObserver<BlankedMissing> &&
+              !LoopObserver<BlankedUndeclared>);
 
 ESOKIT_OBSERVER(ChainMissing, {.publishes_chain = true}){};
 ESOKIT_OBSERVER(GainMissing, {.acts_by_gain = true}){};

@@ -196,7 +196,7 @@ void default_limits() {
     EXPECT_GE(S(1) - least, (S(1) - low) * S(1.33)) << N << ' ' << omega_t;
     if constexpr (std::is_same_v<S, double>) {
       const S most = esokit::largest_certified_gain<N, S>(
-          gain, low, S(1), esokit::constant_gain_interval(poles).high);
+          gain, low, S(1), esokit::constant_gain_interval(poles).upper);
       EXPECT_NEAR(high - 1, (most - 1) / 2, 1e-9 * most);
     }
   }
@@ -405,26 +405,26 @@ TEST(NonlinearEso, ReportsWhereTheGivenGainIsOutside) {
   NonlinearEso<2>::Config config{
       .observer_bandwidth = 10, .shape = table2_g_new, .input_gain = 1, .sample_time = 1e-5};
   const auto report = NonlinearEso<2>::report(config).value();
-  EXPECT_NEAR(report.continuous.low, 0.2, 1e-12);
-  EXPECT_TRUE(std::isinf(report.continuous.high));
-  EXPECT_NEAR(report.sampled.low, 0.2, 1e-4);
+  EXPECT_NEAR(report.continuous.lower, 0.2, 1e-12);
+  EXPECT_TRUE(std::isinf(report.continuous.upper));
+  EXPECT_NEAR(report.sampled.lower, 0.2, 1e-4);
   EXPECT_TRUE(report.certified);
-  EXPECT_EQ(report.limits.low, 0.5);
-  EXPECT_GT(report.certified_max, report.limits.high);
+  EXPECT_EQ(report.limits.lower, 0.5);
+  EXPECT_GT(report.certified_max, report.limits.upper);
   // k(e) < 1/5 for 9.8e-4 < |e| < 1.76.
   ASSERT_GE(report.outside.count, 1);
   EXPECT_TRUE(report.outside.complete);
-  EXPECT_NEAR(report.outside.range[0].low, 9.8e-4, 1e-5);
-  EXPECT_NEAR(report.outside.range[0].high, 1.76, 0.005);
+  EXPECT_NEAR(report.outside.range[0].lower, 9.8e-4, 1e-5);
+  EXPECT_NEAR(report.outside.range[0].upper, 1.76, 0.005);
   // k(e) < 1/2 from 1e-5 (0.05 x^-0.2 = 0.5) on.
   ASSERT_GE(report.limited.count, 1);
-  EXPECT_NEAR(report.limited.range[0].low, 1e-5, 1e-9);
+  EXPECT_NEAR(report.limited.range[0].lower, 1e-5, 1e-9);
 
   // The scale moves them.
   config.error_scale = 0.01;
   const auto scaled = NonlinearEso<2>::report(config).value();
-  EXPECT_NEAR(scaled.outside.range[0].low, 9.8e-6, 1e-7);
-  EXPECT_NEAR(scaled.outside.range[0].high, 0.0176, 5e-5);
+  EXPECT_NEAR(scaled.outside.range[0].lower, 9.8e-6, 1e-7);
+  EXPECT_NEAR(scaled.outside.range[0].upper, 0.0176, 5e-5);
 
   // Outside at both ends: k too large near zero, and far out.
   config.error_scale = 1;
@@ -432,10 +432,10 @@ TEST(NonlinearEso, ReportsWhereTheGivenGainIsOutside) {
   config.sample_time = 0.02;
   const auto both = NonlinearEso<2>::report(config).value();
   ASSERT_EQ(both.outside.count, 2);
-  EXPECT_EQ(both.outside.range[0].low, 0);
-  EXPECT_TRUE(std::isinf(both.outside.range[1].high));
-  const double edge = both.outside.range[0].high;
-  EXPECT_NEAR(1 / std::sqrt(edge) + edge, both.sampled.high, 1e-5);
+  EXPECT_EQ(both.outside.range[0].lower, 0);
+  EXPECT_TRUE(std::isinf(both.outside.range[1].upper));
+  const double edge = both.outside.range[0].upper;
+  EXPECT_NEAR(1 / std::sqrt(edge) + edge, both.sampled.upper, 1e-5);
 
   // Nothing to say of k = 1.
   config.shape = {};

@@ -10,12 +10,6 @@
 
 namespace esokit {
 
-/// What the observer is fed with.
-enum class LoopForm {
-  output_based,  ///< y; u = (v - dhat) / b0, AdrcLaw::control
-  error_based    ///< r - y, with the input gain -b0; AdrcLaw::control_error_based
-};
-
 namespace detail {
 
 /// Whether two numbers were given as the same one, as far as the coarser of two scalars tells:
@@ -61,7 +55,8 @@ struct LoopParts {
   bool error_based;
 };
 
-/// u = -sign kappa zhat + rho r, where the observer sees sign (y + v), in the error form plus r.
+/// u = -sign kappa zhat + rho r, where the observer sees sign (y + v), in the error-based form plus
+/// r.
 inline void assemble_loop(const LoopParts& parts) noexcept {
   const auto& [p, c, closed, a, observer_c, by, bu, dy, kappa, size, error_based] = parts;
   const double sign = error_based ? -1.0 : 1.0;
@@ -136,13 +131,12 @@ class AdrcLoop {
   /// @param plant sampled as the observer is, see `sampled_plant`; continuous for a continuous one
   /// @return error for a plant of another sample time or with a direct path, and for input gains of
   ///         observer and law that do not belong together
-  template <Scalar S>
+  template <Scalar S, AdrcForm Form = OutputBased>
   static Expected<AdrcLoop, Error<double>> make(const Plant& plant, const Observer& observer,
-                                                const AdrcLaw<order, S>& law,
-                                                LoopForm form = LoopForm::output_based) {
+                                                const AdrcLaw<order, S>& law, Form /*form*/ = {}) {
     auto m = detail::observer_matrices(observer);
     const double direct = plant.d(0, 0) != 0.0 ? plant.d(0, 0) : plant.d(0, 1);
-    const bool error_based = form == LoopForm::error_based;
+    constexpr bool error_based = std::is_same_v<Form, ErrorBased>;
     const double gain = error_based ? -m.input_gain : m.input_gain;
     const auto law_gain = static_cast<double>(law.input_gain());
     using ObserverScalar = typename Observer::scalar_type;
@@ -254,11 +248,11 @@ template <int PlantStates, class Observer>
 using AdrcLoopResult = Expected<AdrcLoop<PlantStates, Observer>, Error<double>>;
 
 /// The loop of a plant, an observer and a law; see AdrcLoop::make.
-template <int PlantStates, LinearObserver Observer, Scalar S>
+template <int PlantStates, LinearObserver Observer, Scalar S, AdrcForm Form = OutputBased>
 AdrcLoopResult<PlantStates, Observer> adrc_loop(const NominalPlant<PlantStates>& plant,
                                                 const Observer& observer,
                                                 const AdrcLaw<Observer::order, S>& law,
-                                                LoopForm form = LoopForm::output_based) {
+                                                Form form = {}) {
   return AdrcLoop<PlantStates, Observer>::make(plant, observer, law, form);
 }
 

@@ -227,8 +227,8 @@ Expected<ErrorBound<Size>, Error<double>> switched_error_bound(const SwitchedBan
 /// An observer with gains k(e) times those of the bandwidth.
 struct GainRange {
   double observer_bandwidth{};  ///< omega_0, rad/s
-  double least{};               ///< k_min
-  double greatest{};            ///< k_max
+  double gain_min{};            ///< k_min
+  double gain_max{};            ///< k_max
 };
 
 /// Bound for the nonlinear higher-order ESO: A. T. Azar et al., Mathematics 10 (2022) 2261, (34),
@@ -239,13 +239,13 @@ template <int Size>
 Expected<ErrorBound<Size>, Error<double>> nonlinear_error_bound(const GainRange& setting,
                                                                 const ErrorSources& sources) {
   Rules<double> rules;
-  rules.positive("least", setting.least)
-      .require(is_finite(setting.greatest) && setting.greatest >= setting.least,
-               {"greatest", setting.greatest, "must be finite and not below least", -1,
-                setting.least, true});
+  rules.positive("gain_min", setting.gain_min)
+      .require(is_finite(setting.gain_max) && setting.gain_max >= setting.gain_min,
+               {"gain_max", setting.gain_max, "must be finite and not below gain_min", -1,
+                setting.gain_min, true});
   if (!rules) return rules.error();
   const Vector<double, Size> gain = detail::binomial_gain<Size>();
-  return detail::bound_between<Size>(setting.least * gain, setting.greatest * gain,
+  return detail::bound_between<Size>(setting.gain_min * gain, setting.gain_max * gain,
                                      setting.observer_bandwidth, sources);
 }
 

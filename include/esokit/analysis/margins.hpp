@@ -3,6 +3,7 @@
 #pragma once
 
 #include <esokit/analysis/loop_scan.hpp>
+#include <esokit/core/interval.hpp>
 #include <limits>
 #include <optional>
 
@@ -121,30 +122,24 @@ Expected<Margins, Error<double>> margins(const AdrcLoop<PlantStates, Observer>& 
   return finder.margins();
 }
 
-/// An open interval.
-struct Range {
-  double lower = 0.0;  ///< 0: no limit
-  double upper = 0.0;  ///< infinity: no limit
-};
-
-/// Range of b0 / b for which the loop is stable: b0 as the controller has it, b as the plant does.
+/// Range of b0 / b for which the loop is stable: b0 as the controller has it, b as the plant does;
+/// 0 and infinity where there is no limit.
 ///
 /// The loop gain depends on the two by b / b0 alone, so it does not matter which of them is wrong.
 /// @param law the one that the loop was made with
 /// @param plant_gain b of the loop's nominal plant, the factor of u in y^(n)
 /// @return error for a nominal loop that is not stable, or a b that is zero or has the other sign
 template <int PlantStates, class Observer, Scalar S>
-Expected<Range, Error<double>> input_gain_range(const AdrcLoop<PlantStates, Observer>& loop,
-                                                const AdrcLaw<Observer::order, S>& law,
-                                                double plant_gain) {
+Expected<Interval<>, Error<double>> input_gain_range(const AdrcLoop<PlantStates, Observer>& loop,
+                                                     const AdrcLaw<Observer::order, S>& law,
+                                                     double plant_gain) {
   const auto ratio = static_cast<double>(law.input_gain()) / plant_gain;
   if (!is_finite(ratio) || !(ratio > 0.0)) {
     return Error<double>{"plant_gain", plant_gain, "must be finite, not zero, of the sign of b0"};
   }
   const auto found = margins(loop);
   if (!found) return found.error();
-  // Where there is no limit these are 0 and infinity.
-  return Range{ratio / found->gain_increase.value, ratio / found->gain_decrease.value};
+  return Interval<>{ratio / found->gain_increase.value, ratio / found->gain_decrease.value};
 }
 
 }  // namespace esokit

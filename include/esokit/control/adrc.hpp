@@ -13,21 +13,6 @@
 
 namespace esokit {
 
-/// The observer is fed y, the law takes r and, where known, its derivatives.
-struct OutputBased {};
-
-/// Told apart in snapshots.
-template <>
-inline constexpr std::uint32_t type_tag<OutputBased> = make_type_tag<>("OutputBased");
-
-/// The observer is fed e = r - y; what r does is part of the disturbance, and no derivative of r is
-/// needed. For a constant reference it equals the output-based form.
-struct ErrorBased {};
-
-/// Told apart in snapshots.
-template <>
-inline constexpr std::uint32_t type_tag<ErrorBased> = make_type_tag<>("ErrorBased");
-
 /// Config of Adrc, of either form. Give `controller_bandwidth` or `gains`, not both.
 template <LoopObserver Observer>
 struct AdrcConfig {
@@ -37,10 +22,10 @@ struct AdrcConfig {
   S controller_bandwidth{};              ///< omega_c, rad/s
   std::optional<Array<S, Observer::order>> gains{};  ///< k_0 .. k_(n-1), instead of omega_c
   TimeDomain domain = TimeDomain::continuous;        ///< where the controller's poles are placed
-  bool half_gain = false;    ///< half-gain tuning of the controller; of the observer: HalfGainEso
-  Limits<S> limits{};        ///< of the actuator
-  StartHold<S> hold{};       ///< u at first, while the observer finds the state
-  MissingRule<S> missing{};  ///< what to do when measurements stay away
+  bool half_gain = false;     ///< half-gain tuning of the controller; of the observer: HalfGainEso
+  Limits<S> limits{};         ///< of the actuator
+  StartHold<S> start_hold{};  ///< u at first, while the observer finds the state
+  MissingRule<S> missing{};   ///< what to do when measurements stay away
   int measurement_divider = 1;  ///< D: a measurement is due at every D-th update, the others ignore
                                 ///< y; 1 .. 1000, not above the observer's max_gap
 };
@@ -77,7 +62,7 @@ struct AdrcConfig {
 template <LoopObserver Observer, class Form = OutputBased>
 class Adrc {
   static constexpr bool error_based = std::is_same_v<Form, ErrorBased>;
-  static_assert(error_based || std::is_same_v<Form, OutputBased>, "esokit: no such form");
+  static_assert(AdrcForm<Form>, "esokit: no such form");
 
  public:
   static constexpr int order = Observer::order;        ///< n, order of the plant
@@ -98,7 +83,7 @@ class Adrc {
     const auto scaled = FastLaw::make(*law, *observer);
     if (!scaled) return scaled.error();
     const auto loop = Loop::make(
-        *observer, {config.limits, config.hold, config.missing, config.measurement_divider},
+        *observer, {config.limits, config.start_hold, config.missing, config.measurement_divider},
         chain.max_gap);
     if (!loop) return loop.error();
     return Adrc(*loop, *law, *scaled, config);
@@ -137,15 +122,15 @@ class Adrc {
   /// @{
   template <std::size_t Count>
   S update(S y, const S (&reference)[Count]) noexcept {
-    return update(y, listed(reference));
+    return update(y, detail::listed(reference));
   }
   template <std::size_t Count>
   S update(S y, const S (&reference)[Count], S u_applied) noexcept {
-    return update(y, listed(reference), u_applied);
+    return update(y, detail::listed(reference), u_applied);
   }
   template <std::size_t Count>
   S update_without_measurement(const S (&reference)[Count]) noexcept {
-    return update_without_measurement(listed(reference));
+    return update_without_measurement(detail::listed(reference));
   }
   /// @}
 
@@ -178,8 +163,8 @@ class Adrc {
     return loop_.start(measured(y, reference), u);
   }
 
-  /// New settings while running. A refused config changes nothing. A hold that is running keeps its
-  /// time, a new hold time counts for nothing.
+  /// New settings while running. A refused config changes nothing. A start hold that is running
+  /// keeps its time, a new one counts for nothing.
   Check<S> retune(const Config& config) { return detail::retune(*this, config); }
 
   /// The same, with the settings of `fresh`, as `make` gave it: no design work, fit for an
@@ -286,13 +271,6 @@ class Adrc {
     static_assert(Count >= 1 && Count <= order + 1, "esokit: the reference is (r, r', .., r^(n))");
     Reference all = Reference::Zero();
     for (int i = 0; i < Count; ++i) all(i) = reference(i);
-    return all;
-  }
-
-  template <std::size_t Count>
-  static Vector<S, static_cast<int>(Count)> listed(const S (&reference)[Count]) noexcept {
-    Vector<S, static_cast<int>(Count)> all;
-    for (std::size_t i = 0; i < Count; ++i) all(static_cast<int>(i)) = reference[i];
     return all;
   }
 

@@ -6,10 +6,43 @@
 #include <esokit/core/combinatorics.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/matrix.hpp>
+#include <esokit/core/type_tag.hpp>
 #include <esokit/core/unroll.hpp>
 #include <optional>
+#include <type_traits>
 
 namespace esokit {
+
+/// The observer is fed y, the law takes r and, where known, its derivatives.
+struct OutputBased {};
+
+/// Told apart in snapshots.
+template <>
+inline constexpr std::uint32_t type_tag<OutputBased> = make_type_tag<>("OutputBased");
+
+/// The observer is fed e = r - y; what r does is part of the disturbance, and no derivative of r is
+/// needed. For a constant reference it equals the output-based form.
+struct ErrorBased {};
+
+/// Told apart in snapshots.
+template <>
+inline constexpr std::uint32_t type_tag<ErrorBased> = make_type_tag<>("ErrorBased");
+
+/// Which of the two: what controller and analysis take as `Form`.
+template <class Form>
+concept AdrcForm = std::is_same_v<Form, OutputBased> || std::is_same_v<Form, ErrorBased>;
+
+namespace detail {
+
+/// (r, r', ..) of a list.
+template <Scalar S, std::size_t Count>
+Vector<S, static_cast<int>(Count)> listed(const S (&reference)[Count]) noexcept {
+  Vector<S, static_cast<int>(Count)> all;
+  for (std::size_t i = 0; i < Count; ++i) all(static_cast<int>(i)) = reference[i];
+  return all;
+}
+
+}  // namespace detail
 
 /// u = (v - dhat) / b0 with v a state feedback; the total disturbance is cancelled, the rest is a
 /// chain of n integrators with its poles at -omega_c.

@@ -16,7 +16,7 @@ namespace esokit {
 /// u is held at a value while the observer finds the state.
 template <PlainScalar S = double>
 struct StartHold {
-  S time{};   ///< s; 0: no hold. Rounded up to whole samples, of the nominal length
+  S time{};   ///< s; 0: none. Rounded up to whole samples, of the nominal length
   S input{};  ///< u meanwhile, within the limits
 };
 
@@ -34,7 +34,7 @@ struct MissingRule {
 template <PlainScalar S = double>
 struct LoopSettings {
   Limits<S> limits{};           ///< of the actuator
-  StartHold<S> hold{};          ///< u at first, while the observer finds the state
+  StartHold<S> start_hold{};    ///< u at first, while the observer finds the state
   MissingRule<S> missing{};     ///< what to do when measurements stay away
   int measurement_divider = 1;  ///< D: a measurement is due at every D-th step, 1 .. 1000
 };
@@ -64,13 +64,14 @@ Expected<CheckedLoop<S>, Error<S>> check_loop(const LoopSettings<S>& settings, S
                                               int max_gap, bool bears_gaps) {
   const auto limiter = Limiter<S>::make(settings.limits, sample_time);
   if (!limiter) return limiter.error();
-  const S samples = std::ceil(settings.hold.time / sample_time - S(1) / S(1024));
+  const S samples = std::ceil(settings.start_hold.time / sample_time - S(1) / S(1024));
   const int divider = settings.measurement_divider;
   const auto counted = static_cast<S>(divider);
   Rules<S> rules;
-  rules.not_negative("hold.time", settings.hold.time)
-      .all_of(check_within("hold.input", settings.hold.input, settings.limits))
-      .require(samples < S(1 << 24), "hold.time", settings.hold.time, "must be below 2^24 samples");
+  rules.not_negative("start_hold.time", settings.start_hold.time)
+      .all_of(check_within("start_hold.input", settings.start_hold.input, settings.limits))
+      .require(samples < S(1 << 24), "start_hold.time", settings.start_hold.time,
+               "must be below 2^24 samples");
   if (settings.missing.input) {
     rules.all_of(check_within("missing.input", *settings.missing.input, settings.limits));
   }
@@ -95,9 +96,9 @@ Expected<CheckedLoop<S>, Error<S>> check_loop(const LoopSettings<S>& settings, S
 
 /// What decides about the output now.
 enum class LoopMode : unsigned char {
-  running,  ///< the law
-  holding,  ///< the start hold
-  safe      ///< too many measurements are missing
+  running,     ///< the law
+  start_hold,  ///< u stands still at first
+  safe         ///< too many measurements are missing
 };
 
 /// Has text.
@@ -107,7 +108,7 @@ inline constexpr bool has_text<LoopMode> = true;
 /// Writes the mode's name.
 template <class Stream>
 requires detail::WritesText<Stream> Stream& operator<<(Stream& out, LoopMode mode) {
-  constexpr const char* names[] = {"running", "holding", "safe"};
+  constexpr const char* names[] = {"running", "start_hold", "safe"};
   out << names[static_cast<int>(mode)];
   return out;
 }
@@ -176,13 +177,13 @@ class ControlLoop {
   /// @param u_applied what was held from k - 1 to k @return the same
   S track(S measured, S u_applied) noexcept {
     report_applied(u_applied);
-    if (mode_ == LoopMode::holding) set_mode(LoopMode::running);
+    if (mode_ == LoopMode::start_hold) set_mode(LoopMode::running);
     observe_specially(measured, limiter_.last());
     requested_ = limiter_.last();
     return limiter_.last();
   }
 
-  /// Starts in the steady state (y, u): dhat = -b0 u. Ends hold and safe mode.
+  /// Starts in the steady state (y, u): dhat = -b0 u. Ends start hold and safe mode.
   /// @return ok, or input_rejected or state_rejected where u or y is not finite: nothing changes
   StepStatus start(S measured, S u) noexcept {
     if (!is_finite(u)) return StepStatus::input_rejected;
@@ -251,11 +252,11 @@ class ControlLoop {
               std::uint32_t hold_samples) noexcept
       : observer_(observer),
         limiter_(limiter),
-        hold_input_(settings.hold.input),
+        hold_input_(settings.start_hold.input),
         safe_input_(settings.missing.input.value_or(S(0))),
         hold_left_(hold_samples),
         divider_(static_cast<std::uint16_t>(settings.measurement_divider)),
-        mode_(hold_samples > 0 ? LoopMode::holding : LoopMode::running),
+        mode_(hold_samples > 0 ? LoopMode::start_hold : LoopMode::running),
         has_safe_input_(settings.missing.input.has_value()),
         stay_safe_(settings.missing.stay) {
     missing_limit_ =

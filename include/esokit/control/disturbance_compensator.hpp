@@ -34,7 +34,7 @@ class DisturbanceCompensator {
     typename Observer::Config observer{};  ///< b0 and T are in here
     std::optional<S> compensation_gain{};  ///< K, unit of u per unit of y^(n); left out: -1/b0
     Limits<S> limits{};                    ///< of the actuator
-    StartHold<S> hold{};                   ///< u at first, while the observer finds the state
+    StartHold<S> start_hold{};             ///< u at first, while the observer finds the state
     MissingRule<S> missing{};              ///< what to do when measurements stay away
     int measurement_divider = 1;           ///< D: a measurement is due at every D-th update
   };
@@ -53,7 +53,7 @@ class DisturbanceCompensator {
       return Error<S>{"input_gain", input_gain, "has an inverse that the scalar cannot hold"};
     }
     const auto loop = Loop::make(
-        *observer, {config.limits, config.hold, config.missing, config.measurement_divider},
+        *observer, {config.limits, config.start_hold, config.missing, config.measurement_divider},
         chain_config<Observer>(config.observer).max_gap);
     if (!loop) return loop.error();
     return DisturbanceCompensator(*loop, gain);

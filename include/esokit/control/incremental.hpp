@@ -53,6 +53,18 @@ class Incremental {
     return increment_;
   }
 
+  /// The same by a list, where the controller takes one: `update(y, {r, r1, r2})`.
+  /// @{
+  template <std::size_t Count>
+  S update(const S& y, const S (&reference)[Count]) noexcept {
+    return update<S[Count]>(y, reference);
+  }
+  template <std::size_t Count>
+  S update(const S& y, const S (&reference)[Count], const S& increment_applied) noexcept {
+    return update<S[Count]>(y, reference, increment_applied);
+  }
+  /// @}
+
   /// Takes over a plant that stands at y; u counts from `u`, zero if nobody knows.
   /// @return as Controller::start; input_rejected beyond half of what the scalar holds
   StepStatus start(const S& y, const S& u = S(0)) noexcept {

@@ -140,6 +140,18 @@ class PredictiveAdrc {
     return u;
   }
 
+  /// The second phase, and both, by a list: `update(y, {r, r1, r2})`.
+  /// @{
+  template <std::size_t Count>
+  StepStatus prepare(const S (&next_reference)[Count]) noexcept {
+    return prepare(detail::listed(next_reference));
+  }
+  template <std::size_t Count>
+  S update(S y, const S (&next_reference)[Count]) noexcept {
+    return update(y, detail::listed(next_reference));
+  }
+  /// @}
+
   /// Another reference for the next sample, any time before it.
   void set_reference(S next_reference) noexcept {
     Reference reference = Reference::Zero();
@@ -155,6 +167,12 @@ class PredictiveAdrc {
       reference_[static_cast<std::size_t>(i)] = i < Count ? S(next_reference(i)) : S(0.0);
     }
     arm();
+  }
+
+  /// The same by a list.
+  template <std::size_t Count>
+  void set_reference(const S (&next_reference)[Count]) noexcept {
+    set_reference(detail::listed(next_reference));
   }
 
   /// What the actuator really holds since the last `control`. A number that is not finite is not
@@ -354,8 +372,8 @@ class PredictiveAdrc {
         slope_ = weigh(observer_.gain_law().linear_gain());
       }
     }
-    if constexpr (observer_traits<Observer>.holds_estimate) {
-      if (observer_.holding()) [[unlikely]] {
+    if constexpr (observer_traits<Observer>.blanks_estimate) {
+      if (observer_.blanked()) [[unlikely]] {
         // The observer publishes what it held at its start, whatever y will be.
         Reference reference;
         for (int i = 0; i <= order; ++i) reference(i) = reference_[static_cast<std::size_t>(i)];

@@ -8,18 +8,12 @@
 #pragma once
 
 #include <cmath>
+#include <esokit/core/interval.hpp>
 #include <esokit/design/switching_certificate.hpp>
 #include <limits>
 #include <numbers>
 
 namespace esokit {
-
-/// From `low` to `high`.
-template <class S>
-struct Interval {
-  S low{};   ///< lower end
-  S high{};  ///< upper end, may be infinite
-};
 
 namespace detail {
 

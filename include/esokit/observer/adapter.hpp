@@ -50,7 +50,7 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
     traits.adapts = true;
     traits.is_predictable = false;
     traits.gates_outliers = false;
-    traits.holds_estimate = false;
+    traits.blanks_estimate = false;
     return traits;
   }();
 

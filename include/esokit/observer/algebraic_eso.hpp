@@ -20,8 +20,8 @@ namespace esokit {
 /// (e^{qt} - 1); once it has settled the observer is LinearEso with omega_o = lambda.
 ///
 /// Right after a start the estimate follows the noise: the variance of the highest state is about
-/// sigma^2 T (2N-1)! (2N-2)! / ((N-1)!)^2 / t^(2N-1). So estimates are published only after a hold
-/// time; until then `estimate` gives what it was at the start.
+/// sigma^2 T (2N-1)! (2N-2)! / ((N-1)!)^2 / t^(2N-1). So they are blanked at first: for that time
+/// `estimate` gives what it was at the start.
 ///
 /// Missing samples: among the first N they start the schedule anew (state kept); later ones are
 /// bridged with the gain that the present bandwidth has for the whole gap.
@@ -41,7 +41,7 @@ class AlgebraicEso
     ObserverTraits traits = Base::traits;
     traits.bears_regular_gaps = false;
     traits.publishes_chain = false;
-    traits.holds_estimate = true;
+    traits.blanks_estimate = true;
     return traits;
   }();
 
@@ -52,11 +52,11 @@ class AlgebraicEso
     S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
     S sample_time{};         ///< T, s
 
-    /// epsilon >= 0, s: estimates are held this long after a start. Left out it follows from the
+    /// epsilon >= 0, s: estimates are blanked this long after a start. Left out it follows from the
     /// two noise levels below, t = (sigma^2 T (2N-1)! (2N-2)! / ((N-1)!)^2 /
     /// tolerated^2)^(1/(2N-1)), and without them is N - 1 samples: published from the first sample
     /// on that can be exact.
-    std::optional<S> hold{};
+    std::optional<S> blanking{};
     S measurement_noise{};  ///< standard deviation of the noise on y, unit of y
     S disturbance_noise{};  ///< standard deviation to be tolerated in the highest estimate, d^(m-1)
     int start_index = 0;  ///< soft start: sample of the schedule to begin with; > 0 is not deadbeat
@@ -80,8 +80,8 @@ class AlgebraicEso
         .require(0 <= config.start_index && config.start_index <= 1000000, "start_index",
                  detail::integer<S>(config.start_index), "must be 0 .. 1000000");
     if (!rules) return rules.error();
-    const auto hold = hold_samples(config);
-    if (!hold) return hold.error();
+    const auto blanking = blanking_samples(config);
+    if (!blanking) return blanking.error();
     if (all(config.observer_bandwidth > S(0.0))) {
       const auto settled =
           current_gain<Base::size, S>(EqualSampledPoles<Base::size, S>::from_bandwidth(
@@ -91,13 +91,13 @@ class AlgebraicEso
                           "times sample_time gives a gain that the scalar cannot hold");
     }
     const Law law(config.observer_bandwidth, config.frequency_shift, config.sample_time,
-                  static_cast<std::uint32_t>(config.start_index), *hold);
+                  static_cast<std::uint32_t>(config.start_index), *blanking);
     for (const S& gain : law.gain(S(0.0))) {
       rules.representable("frequency_shift", config.frequency_shift, gain,
                           "times sample_time gives a gain that the scalar cannot hold");
     }
     if (!rules) return rules.error();
-    return AlgebraicEso(chain, law, *hold);
+    return AlgebraicEso(chain, law, *blanking);
   }
 
   /// One sample, see PredictorCorrector::update.
@@ -109,11 +109,11 @@ class AlgebraicEso
   }
 
   /// Measurement update alone, see PredictorCorrector::correct.
-  StepStatus correct(S y) noexcept { return hold_anew(Base::correct(y)); }
+  StepStatus correct(S y) noexcept { return blank_anew(Base::correct(y)); }
 
   /// New settings while running: the estimate and the place in the schedule (counted in samples)
-  /// are kept, a change of b0 is moved into the disturbance, in estimates that are held as well. If
-  /// the new hold time is not over yet, the present estimates are held until it is. A refused
+  /// are kept, a change of b0 is moved into the disturbance, in blanked estimates as well. If the
+  /// new blanking is not over yet, the present estimates are published until it is. A refused
   /// config changes nothing.
   Check<S> retune(const Config& config) { return detail::retune(*this, config); }
 
@@ -128,65 +128,69 @@ class AlgebraicEso
     // One that has settled stays so, and no longer knows its age.
     std::get<0>(fresh.laws()).resume(settled() ? Law::max_index : age());
     if (auto ok = Base::adopt(fresh); !ok) return ok;
-    hold(published);
-    hold_samples_ = fresh.hold_samples_;
+    publish(published);
+    blanking_samples_ = fresh.blanking_samples_;
     return {};
   }
 
   /// After a known jump (of the disturbance, or of the state): the schedule begins anew, the state
-  /// is kept, and the estimates of this moment are published until the hold time is over.
+  /// is kept, and the estimates of this moment are published until the blanking is over.
   void rearm() noexcept {
-    hold(estimate());
+    publish(estimate());
     std::get<0>(this->laws()).restart();
   }
 
   /// Starts anew at (y, 0, .., 0).
-  StepStatus reset(S y) noexcept { return hold_after(Base::reset(y)); }
+  StepStatus reset(S y) noexcept { return blank_after(Base::reset(y)); }
 
   /// Starts anew at a given estimate, N x 1.
-  StepStatus reset(const Estimate& state) noexcept { return hold_after(Base::reset(state)); }
+  StepStatus reset(const Estimate& state) noexcept { return blank_after(Base::reset(state)); }
 
-  /// All published estimates in physical units; those of the start during the hold time.
-  [[nodiscard]] Estimate estimate() const noexcept { return holding() ? held() : Base::estimate(); }
+  /// All published estimates in physical units; those of the start while blanked.
+  [[nodiscard]] Estimate estimate() const noexcept {
+    return blanked() ? published() : Base::estimate();
+  }
 
   /// Published estimate of y^(Row), or of d^(Row - n) for Row >= n.
   template <int Row>
   [[nodiscard]] S estimate() const noexcept {
-    return holding() ? std::get<Row>(held_) : Base::template estimate<Row>();
+    return blanked() ? std::get<Row>(published_) : Base::template estimate<Row>();
   }
 
   /// Published dhat, unit of y^(n).
   [[nodiscard]] S total_disturbance() const noexcept { return estimate<Order>(); }
 
-  /// The estimate as it is computed, held or not.
+  /// The estimate as it is computed, blanked or not.
   [[nodiscard]] Estimate raw_estimate() const noexcept { return Base::estimate(); }
 
-  /// True while the published estimates are held.
-  [[nodiscard]] bool holding() const noexcept { return age() <= hold_samples_; }
+  /// True while the published estimates are those of the start.
+  [[nodiscard]] bool blanked() const noexcept { return age() <= blanking_samples_; }
 
   /// True once the observer has become LinearEso with bandwidth lambda.
   [[nodiscard]] bool settled() const noexcept { return std::get<0>(this->laws()).settled(); }
 
   /// epsilon, s.
-  [[nodiscard]] S hold() const noexcept {
-    return detail::integer<S>(hold_samples_) * this->sample_time();
+  [[nodiscard]] S blanking() const noexcept {
+    return detail::integer<S>(blanking_samples_) * this->sample_time();
   }
 
   /// Samples since the schedule began; the count ends where it settles.
   [[nodiscard]] std::uint32_t age() const noexcept { return std::get<0>(this->laws()).age(); }
 
  private:
-  AlgebraicEso(const ChainConfig<S>& chain, const Law& law, std::uint32_t hold_samples) noexcept
-      : Base(chain, {law}), hold_samples_(hold_samples) {
-    hold(Estimate::Zero());
+  AlgebraicEso(const ChainConfig<S>& chain, const Law& law, std::uint32_t blanking_samples) noexcept
+      : Base(chain, {law}), blanking_samples_(blanking_samples) {
+    publish(Estimate::Zero());
   }
 
-  void hold(const Estimate& estimate) noexcept {
-    for (int r = 0; r < Base::size; ++r) held_[static_cast<std::size_t>(r)] = estimate(r);
+  void publish(const Estimate& estimate) noexcept {
+    for (int r = 0; r < Base::size; ++r) published_[static_cast<std::size_t>(r)] = estimate(r);
   }
-  [[nodiscard]] Estimate held() const noexcept { return Eigen::Map<const Estimate>(held_.data()); }
+  [[nodiscard]] Estimate published() const noexcept {
+    return Eigen::Map<const Estimate>(published_.data());
+  }
 
-  static Expected<std::uint32_t, Error<S>> hold_samples(const Config& config) {
+  static Expected<std::uint32_t, Error<S>> blanking_samples(const Config& config) {
     constexpr int size = Base::size;
     Rules<S> rules;
     rules.not_negative("measurement_noise", config.measurement_noise)
@@ -195,12 +199,12 @@ class AlgebraicEso
     rules.require(noise == all(config.disturbance_noise > S(0.0)),
                   noise ? "disturbance_noise" : "measurement_noise", S(0.0),
                   "must be given together with the other noise level");
-    if (config.hold) rules.not_negative("hold", *config.hold);
+    if (config.blanking) rules.not_negative("blanking", *config.blanking);
     if (!rules) return rules.error();
-    if (config.hold) {
-      // A hold of 20.0001 samples by rounding is one of 20.
-      const S samples = *config.hold / config.sample_time - S(1e-3);
-      return smallest_count("hold", *config.hold, 0u,
+    if (config.blanking) {
+      // A blanking of 20.0001 samples by rounding is one of 20.
+      const S samples = *config.blanking / config.sample_time - S(1e-3);
+      return smallest_count("blanking", *config.blanking, 0u,
                             [&](const S& count) { return all(count >= samples); });
     }
     if (noise) {
@@ -234,7 +238,7 @@ class AlgebraicEso
                                                           std::uint32_t low, const Enough& enough) {
     std::uint32_t high = 1000000;
     if (!enough(detail::integer<S>(high))) {
-      return Error<S>{field, value, "gives a hold of more than 1e6 samples"};
+      return Error<S>{field, value, "gives a blanking of more than 1e6 samples"};
     }
     while (low < high) {
       const std::uint32_t middle = (low + high) / 2;
@@ -250,24 +254,24 @@ class AlgebraicEso
   // Out of line: the settled observer then costs what LinearEso does, with both in one place it
   // costs 1.3 times.
   [[gnu::noinline, gnu::flatten]] StepStatus update_running(S y, S u_applied) noexcept {
-    return hold_anew(Base::update(y, u_applied));
+    return blank_anew(Base::update(y, u_applied));
   }
 
-  StepStatus hold_after(StepStatus status) noexcept {
-    if (status == StepStatus::ok) hold(Base::estimate());
+  StepStatus blank_after(StepStatus status) noexcept {
+    if (status == StepStatus::ok) publish(Base::estimate());
     return status;
   }
 
-  /// After a restart for a long gap what was held before is too old to be published.
-  ESOKIT_INLINE StepStatus hold_anew(StepStatus status) noexcept {
+  /// After a restart for a long gap what was published before is too old to be published.
+  ESOKIT_INLINE StepStatus blank_anew(StepStatus status) noexcept {
     if (has(status, StepStatus::restarted)) [[unlikely]] {
-      hold(Base::estimate());
+      publish(Base::estimate());
     }
     return status;
   }
 
-  Array<S, Base::size> held_;
-  std::uint32_t hold_samples_;
+  Array<S, Base::size> published_;
+  std::uint32_t blanking_samples_;
 };
 
 /// Told apart in snapshots.

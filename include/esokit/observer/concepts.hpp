@@ -30,7 +30,7 @@ struct ObserverTraits {
 
   /// What it publishes is the state of its chain, of a sample time that stays:
   /// `scaled_estimate<Row>() const` is T^r / r! times `estimate<Row>()`. Lets Adrc fold the factors
-  /// into its gains. Not AlgebraicEso during its hold, KnownModel, VariableTime.
+  /// into its gains. Not AlgebraicEso while it is blanked, KnownModel, VariableTime.
   bool publishes_chain = false;
 
   /// Its chain and `level_gain(level) const` are all that it does with u and y. Not where a delay
@@ -51,7 +51,7 @@ struct ObserverTraits {
       false;  ///< `accepts(y) const`: false for what `correct` takes for an outlier
   /// Its `correct`, or that of what it adapts, may answer `outlier_rejected`.
   bool rejects_outliers = false;
-  bool holds_estimate = false;  ///< `holding() const`: `estimate` is an old one for now
+  bool blanks_estimate = false;  ///< `blanked() const`: `estimate` is an old one for now
 };
 
 /// What an observer declares.
@@ -75,7 +75,7 @@ ESOKIT_MEMBER_NAME(wrap)
 ESOKIT_MEMBER_NAME(fill_input)
 ESOKIT_MEMBER_NAME(set_step_time)
 ESOKIT_MEMBER_NAME(accepts)
-ESOKIT_MEMBER_NAME(holding)
+ESOKIT_MEMBER_NAME(blanked)
 ESOKIT_MEMBER_FUNCTION(wraps)
 ESOKIT_MEMBER_FUNCTION(fill_inputs)
 ESOKIT_MEMBER_FUNCTION(set_sample_time)
@@ -131,8 +131,8 @@ concept GatesOutliers = requires(const O& o, const typename O::scalar_type& s) {
   { o.accepts(s) } -> std::same_as<bool>;
 };
 template <class O>
-concept HoldsEstimate = requires(const O& o) {
-  { o.holding() } -> std::same_as<bool>;
+concept BlanksEstimate = requires(const O& o) {
+  { o.blanked() } -> std::same_as<bool>;
 };
 
 /// As `as_declared`; an adapter names what it hands on, whether what it adapts has it or not.
@@ -180,11 +180,10 @@ concept GatesOutliersAsDeclared = detail::observer_as_declared<O>(observer_trait
                                                                   detail::names_accepts<O>,
                                                                   detail::GatesOutliers<O>);
 
-/// `holding() const` is declared by `traits.holds_estimate`; or there is none.
+/// `blanked() const` is declared by `traits.blanks_estimate`; or there is none.
 template <class O>
-concept HoldsEstimateAsDeclared = detail::observer_as_declared<O>(observer_traits<O>.holds_estimate,
-                                                                  detail::names_holding<O>,
-                                                                  detail::HoldsEstimate<O>);
+concept BlanksEstimateAsDeclared = detail::observer_as_declared<O>(
+    observer_traits<O>.blanks_estimate, detail::names_blanked<O>, detail::BlanksEstimate<O>);
 
 /// No member function has a name that is nearly that of a hook; it would never be called.
 template <class O>
@@ -197,7 +196,7 @@ template <class O>
 concept ObserverAsDeclared = DeclaresTraits<O, ObserverTraits> && PublishesChainAsDeclared<O> &&
     ActsByGainAsDeclared<O> && AdaptsAsDeclared<O> && WrapsOutputAsDeclared<O> &&
     DelaysInputAsDeclared<O> && VariesTimeAsDeclared<O> && GatesOutliersAsDeclared<O> &&
-    HoldsEstimateAsDeclared<O> && HasNoMisspelledObserverHook<O>;
+    BlanksEstimateAsDeclared<O> && HasNoMisspelledObserverHook<O>;
 
 /// A config that says b0, T and how long a gap is bridged.
 template <class Config, class S>

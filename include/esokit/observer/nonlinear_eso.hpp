@@ -72,20 +72,20 @@ class NonlinearEso
     const auto gain = current_gain<Base::size, S>(poles.weights());
     constexpr auto continuous = constant_gain_interval<Base::size>();
     Report report;
-    report.continuous = {static_cast<S>(continuous.low), static_cast<S>(continuous.high)};
+    report.continuous = {static_cast<S>(continuous.lower), static_cast<S>(continuous.upper)};
     report.sampled = constant_gain_interval(poles);
     report.limits = {made->gain_min(), made->gain_max()};
     const auto& [low, high] = report.limits;
     if (!config.unlimited && gain_range_certified<Base::size, S>(gain, low, low)) {
       report.certified = gain_range_certified<Base::size, S>(gain, low, high);
       report.certified_max =
-          largest_certified_gain<Base::size, S>(gain, low, low, report.sampled.high);
+          largest_certified_gain<Base::size, S>(gain, low, low, report.sampled.upper);
     }
     const auto k = detail::prepared(config.shape);
     const auto within = [&k](const Interval<S>& interval) {
       return [&k, interval](S x) {
         const S value = k(x);
-        return value >= interval.low && value <= interval.high;
+        return value >= interval.lower && value <= interval.upper;
       };
     };
     report.outside = detail::ranges_outside<S>(within(report.sampled), config.error_scale);
@@ -126,9 +126,9 @@ class NonlinearEso
     const auto limits = detail::find_limits<size, S>(
         {config.gain_min, config.gain_max, config.allow_uncertified_gain, config.unlimited},
         linear->gain_before_measurement(), least_certified_gain(poles),
-        constant_gain_interval(poles).high);
+        constant_gain_interval(poles).upper);
     if (!limits) return limits.error();
-    return Law(*linear, config.shape, config.error_scale, limits->low, limits->high);
+    return Law(*linear, config.shape, config.error_scale, limits->lower, limits->upper);
   }
 };
 
@@ -177,9 +177,9 @@ class ContinuousNonlinearEso
                                 config.unlimited};
     constexpr double free_from = unbounded_certified_gain<size>();
     Interval<S> limits{};
-    if (!asked.unlimited && !asked.high &&
-        (!asked.low || (all(is_finite(*asked.low)) && all(*asked.low >= S(free_from))))) {
-      limits = {asked.low ? *asked.low : S(0.5),
+    if (!asked.unlimited && !asked.upper &&
+        (!asked.lower || (all(is_finite(*asked.lower)) && all(*asked.lower >= S(free_from))))) {
+      limits = {asked.lower ? *asked.lower : S(0.5),
                 S((std::numeric_limits<detail::TableScalar<S>>::max)())};
     } else {
       constexpr double least = least_certified_gain<size>();
@@ -188,7 +188,7 @@ class ContinuousNonlinearEso
       limits = *found;
     }
     return ContinuousNonlinearEso(
-        config.input_gain, Law(gain, config.shape, config.error_scale, limits.low, limits.high));
+        config.input_gain, Law(gain, config.shape, config.error_scale, limits.lower, limits.upper));
   }
 
  private:

@@ -193,8 +193,8 @@ class LimitedGain {
     return select(low_ < from_above, from_above, low_);
   }
 
-  [[nodiscard]] constexpr const S& low() const noexcept { return low_; }
-  [[nodiscard]] constexpr const S& high() const noexcept { return high_; }
+  [[nodiscard]] constexpr const S& lower() const noexcept { return low_; }
+  [[nodiscard]] constexpr const S& upper() const noexcept { return high_; }
 
  private:
   Function function_;
@@ -250,8 +250,8 @@ class NonlinearGain {
 
   /// Limits of k.
   /// @{
-  [[nodiscard]] constexpr const S& gain_min() const noexcept { return factor_.low(); }
-  [[nodiscard]] constexpr const S& gain_max() const noexcept { return factor_.high(); }
+  [[nodiscard]] constexpr const S& gain_min() const noexcept { return factor_.lower(); }
+  [[nodiscard]] constexpr const S& gain_max() const noexcept { return factor_.upper(); }
   /// @}
 
  private:

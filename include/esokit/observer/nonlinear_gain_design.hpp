@@ -26,7 +26,7 @@ struct NonlinearGainReport {
   Interval<S> sampled;     ///< constant k: stable for the sampled observer
   Interval<S> limits;      ///< k is kept within
   bool certified = false;  ///< any variation of k within `limits` is stable
-  S certified_max{};       ///< largest k_max that is certified with limits.low; 0 if none is
+  S certified_max{};       ///< largest k_max that is certified with limits.lower; 0 if none is
   ErrorRanges<S> outside;  ///< |e| where the given k would be outside `sampled`
   ErrorRanges<S> limited;  ///< |e| where the given k is replaced by a limit
 };
@@ -59,8 +59,8 @@ Check<S> check_shape(const Shape& shape) {
 /// The limits that a config asks for, or the default ones. See NonlinearEso.
 template <Scalar S>
 struct GainLimits {
-  std::optional<S> low{};
-  std::optional<S> high{};
+  std::optional<S> lower{};
+  std::optional<S> upper{};
   bool allow_uncertified = false;
   bool unlimited = false;
 };
@@ -79,30 +79,31 @@ Expected<Interval<S>, Error<S>> find_limits(const GainLimits<S>& asked, const Ga
   const S widest(static_cast<TableScalar<S>>((std::numeric_limits<TableScalar<S>>::max)()));
   constexpr const char* unlimited = "must be left out with unlimited";
   Rules<S> rules;
-  if (asked.low) rules.not_negative("gain_min", *asked.low);
-  if (asked.high) rules.positive("gain_max", *asked.high);
-  if (asked.low) rules.require(!asked.unlimited, "gain_min", *asked.low, unlimited);
-  if (asked.high) rules.require(!asked.unlimited, "gain_max", *asked.high, unlimited);
+  if (asked.lower) rules.not_negative("gain_min", *asked.lower);
+  if (asked.upper) rules.positive("gain_max", *asked.upper);
+  if (asked.lower) rules.require(!asked.unlimited, "gain_min", *asked.lower, unlimited);
+  if (asked.upper) rules.require(!asked.unlimited, "gain_max", *asked.upper, unlimited);
   if (!rules) return rules.error();
   if (asked.unlimited) return Interval<S>{-widest, widest};
   const S three_quarters_down = S(0.25) * (S(1.0) + S(3.0) * least_with_one);
   S low = largest(S(0.5), three_quarters_down);
   // A gain_max below the default gain_min is no reason to refuse it.
-  if (asked.high) low = select(*asked.high < low, *asked.high, low);
-  if (asked.low) low = *asked.low;
-  if (asked.high && !all(*asked.high >= low)) {
-    return Error<S>{"gain_min", low, "must not be above gain_max, which is", -1, *asked.high, true};
+  if (asked.upper) low = select(*asked.upper < low, *asked.upper, low);
+  if (asked.lower) low = *asked.lower;
+  if (asked.upper && !all(*asked.upper >= low)) {
+    return Error<S>{"gain_min", low,          "must not be above gain_max, which is",
+                    -1,         *asked.upper, true};
   }
   const S base = largest(low, S(1.0));
   const bool room = all(base < ceiling);
-  if (asked.high) {
-    if (asked.allow_uncertified || gain_range_certified<Size, S>(gain, low, *asked.high)) {
-      return Interval<S>{low, *asked.high};
+  if (asked.upper) {
+    if (asked.allow_uncertified || gain_range_certified<Size, S>(gain, low, *asked.upper)) {
+      return Interval<S>{low, *asked.upper};
     }
     // Blame gain_min where nothing from it upwards would do.
     if (gain_range_certified<Size, S>(gain, low, low)) {
       return Error<S>{"gain_max",
-                      *asked.high,
+                      *asked.upper,
                       "is not certified for a varying gain (allow_uncertified_gain asks for it); "
                       "with this gain_min the largest is",
                       -1,
@@ -157,7 +158,7 @@ ErrorRanges<S> ranges_outside(const Inside& inside, S scale) {
         }
         const auto index = static_cast<std::size_t>(found.count);
         if (is_inside) {
-          found.range[index].high = edge * scale;
+          found.range[index].upper = edge * scale;
           ++found.count;
         } else {
           found.range[index] = {edge * scale, infinite};

@@ -134,15 +134,15 @@ class RiccatiGain {
       run.mode_ = RiccatiMode::recursive;
       run.reset();
       for (int k = 0; k < 8 * Size; ++k) {
-        if (!run.is_held(room)) return false;
+        if (!run.fits(room)) return false;
         for (int i = 0; i < missing; ++i) run.advance();
-        if (!run.is_held(room)) return false;
+        if (!run.fits(room)) return false;
         run.advance();
         run.accept(S(0.0));
       }
       for (int k = 0; k < 2 * most_missing; ++k) {
         run.advance();
-        if (!run.is_held(room)) return false;
+        if (!run.fits(room)) return false;
       }
     }
     return true;
@@ -303,7 +303,7 @@ class RiccatiGain {
   static constexpr std::size_t index(int i) noexcept { return static_cast<std::size_t>(i); }
 
   /// Gain and covariance times `room` are numbers.
-  [[nodiscard]] bool is_held(const S& room) const noexcept {
+  [[nodiscard]] bool fits(const S& room) const noexcept {
     for (int i = 0; i < Size; ++i) {
       if (!all(is_finite(now_.gain[index(i)])) ||
           !all(is_finite(S(now_.factor.variance(i) * room)))) {

@@ -1,0 +1,16 @@
+/// @file
+/// A part of the number line.
+#pragma once
+
+#include <esokit/core/language.hpp>
+
+namespace esokit {
+
+/// From `lower` to `upper`.
+template <class S = double>
+struct Interval {
+  S lower{};  ///< lower end
+  S upper{};  ///< upper end, may be infinite
+};
+
+}  // namespace esokit
