@@ -64,33 +64,34 @@ class [[nodiscard]] Rules {
 
   // Each rule tests finiteness by bits before it compares: under -ffast-math a comparison with NaN
   // may go either way. They are out of line, as `make` is not where time counts and firmware has
-  // every rule many times.
+  // every rule many times; but not cold: what comes after a cold call is compiled for size.
 
   /// Neither NaN nor infinite.
-  ESOKIT_COLD constexpr Rules& finite(const char* field, const S& value, int index = -1) {
+  [[gnu::noinline]] constexpr Rules& finite(const char* field, const S& value, int index = -1) {
     return require(all(is_finite(value)), field, value, "must be finite", index);
   }
 
   /// Finite and above zero.
-  ESOKIT_COLD constexpr Rules& positive(const char* field, const S& value, int index = -1) {
+  [[gnu::noinline]] constexpr Rules& positive(const char* field, const S& value, int index = -1) {
     return require(all(is_finite(value)) && all(value > S(0.0)), field, value,
                    "must be finite and positive", index);
   }
 
   /// Finite and zero or above.
-  ESOKIT_COLD constexpr Rules& not_negative(const char* field, const S& value, int index = -1) {
+  [[gnu::noinline]] constexpr Rules& not_negative(const char* field, const S& value,
+                                                  int index = -1) {
     return require(all(is_finite(value)) && all(value >= S(0.0)), field, value,
                    "must be finite and not negative", index);
   }
 
   /// Finite and not zero; either sign.
-  ESOKIT_COLD constexpr Rules& nonzero(const char* field, const S& value, int index = -1) {
+  [[gnu::noinline]] constexpr Rules& nonzero(const char* field, const S& value, int index = -1) {
     return require(all(is_finite(value)) && all(detail::magnitude(value) > S(0.0)), field, value,
                    "must be finite and not zero (negative is fine)", index);
   }
 
   /// Not zero, and neither overflowed nor subnormal as a divisor.
-  ESOKIT_COLD constexpr Rules& invertible(const char* field, const S& value, int index = -1) {
+  [[gnu::noinline]] constexpr Rules& invertible(const char* field, const S& value, int index = -1) {
     nonzero(field, value, index);
     if (!outcome_) return *this;
     return representable(field, value, S(S(1.0) / value),
@@ -98,20 +99,21 @@ class [[nodiscard]] Rules {
   }
 
   /// Finite and above a limit, which the error carries.
-  ESOKIT_COLD constexpr Rules& above(const char* field, const S& value, const S& limit) {
+  [[gnu::noinline]] constexpr Rules& above(const char* field, const S& value, const S& limit) {
     return require(all(is_finite(value)) && all(value > limit),
                    {field, value, "must be finite and above", -1, limit, true});
   }
 
   /// `derived` is a normal number, neither overflowed nor lost in the subnormals; the error names
   /// the config field that it was computed from.
-  ESOKIT_COLD constexpr Rules& representable(const char* field, const S& value, const S& derived,
-                                             const char* rule, int index = -1) {
+  [[gnu::noinline]] constexpr Rules& representable(const char* field, const S& value,
+                                                   const S& derived, const char* rule,
+                                                   int index = -1) {
     return require(detail::normal(derived), field, value, rule, index);
   }
 
   /// As it is in a config that does not mention it: zero.
-  ESOKIT_COLD constexpr Rules& left_out(const char* field, const S& value, const char* rule) {
+  [[gnu::noinline]] constexpr Rules& left_out(const char* field, const S& value, const char* rule) {
     return require(all(is_finite(value)) && !all(detail::magnitude(value) > S(0.0)), field, value,
                    rule);
   }
