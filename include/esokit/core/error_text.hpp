@@ -1,6 +1,6 @@
 /// @file
-/// Text of what `has_text`, for programs that have a console: errors, results, flags. std::format is
-/// tested with Clang 19 and its libc++; GCC has it from 13 on, where it is not tested.
+/// Text of what `has_text`, for programs that have a console: errors, results, flags. std::format
+/// is tested with Clang 19 and its libc++; GCC has it from 13 on, where it is not tested.
 #pragma once
 
 #include <esokit/core/text.hpp>
