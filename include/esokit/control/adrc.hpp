@@ -180,8 +180,9 @@ class Adrc {
   /// How long the next step takes, s; for Adrc<VariableTime<..>>. The observer's gains, the rate
   /// limit and, where placed in the sampled domain, the controller's gains follow. A length that
   /// the observer's config does not allow is refused and changes nothing.
-  Check<S> set_step_time(const S& seconds) noexcept
-      requires(observer_traits<Observer>.varies_time) {
+  template <class O = Observer>
+  requires(observer_traits<O>.varies_time) Check<S> set_step_time(const S& seconds)
+  noexcept {
     const bool gains_follow = spec_.domain == TimeDomain::sampled && spec_.bandwidth > S(0);
     if (!gains_follow || !is_finite(seconds) || !(seconds > S(0))) {
       return loop_.set_step_time(seconds);

@@ -219,8 +219,9 @@ class ControlLoop {
 
   /// How long the next step takes (s), where the observer is VariableTime; the rate limit follows.
   /// A length that the observer refuses changes nothing.
-  Check<S> set_step_time(const S& seconds) noexcept
-      requires(observer_traits<Observer>.varies_time) {
+  template <class O = Observer>
+  requires(observer_traits<O>.varies_time) Check<S> set_step_time(const S& seconds)
+  noexcept {
     if (auto ok = observer_.set_step_time(seconds); !ok) return ok;
     auto limiter = Limiter<S>::make(limits_, seconds);
     if (!limiter) return limiter.error();

@@ -105,10 +105,9 @@ class DisturbanceCompensator {
   }
 
   /// How long the next step takes, s; see Adrc::set_step_time.
-  Check<S> set_step_time(const S& seconds) noexcept
-      requires(observer_traits<Observer>.varies_time) {
-    return loop_.set_step_time(seconds);
-  }
+  template <class O = Observer>
+  requires(observer_traits<O>.varies_time) Check<S> set_step_time(const S& seconds)
+  noexcept { return loop_.set_step_time(seconds); }
 
   /// K dhat, what is added to u0; within what the scalar holds.
   [[nodiscard]] S compensation() const noexcept {

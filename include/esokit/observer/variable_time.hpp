@@ -110,10 +110,9 @@ class VariableTime : public Adapter<Observer> {
   }
 
   /// The same with the variance of this measurement's noise, see ExtendedStateFilter.
-  StepStatus correct_weighted(S y, S variance) noexcept requires requires(Base& base, S s) {
-    base.correct_weighted(s, s);
-  }
-  {
+  template <class B = Base>
+  requires requires(B& base, S s) { base.correct_weighted(s, s); }
+  StepStatus correct_weighted(S y, S variance) noexcept {
     take_gap();
     return observer_.correct_weighted(y, variance);
   }

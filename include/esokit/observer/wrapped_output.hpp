@@ -290,13 +290,15 @@ class WrappedOutput : public Adapter<Observer> {
     return status;
   }
 
-  void hear(const Reading& taken) noexcept requires(gated) {
-    const Reading reading = read(heard_.count, taken.y, taken.missed - heard_.at);
-    const bool steady = reading.fits && heard_.count.samples != none;
-    heard_.steady = steady ? one_more(heard_.steady) : std::uint8_t{0};
-    heard_.rejected = one_more(heard_.rejected);
-    heard_.at = static_cast<std::uint16_t>(taken.missed);
-    learn(heard_.count, reading);
+  void hear(const Reading& taken) noexcept {
+    if constexpr (gated) {
+      const Reading reading = read(heard_.count, taken.y, taken.missed - heard_.at);
+      const bool steady = reading.fits && heard_.count.samples != none;
+      heard_.steady = steady ? one_more(heard_.steady) : std::uint8_t{0};
+      heard_.rejected = one_more(heard_.rejected);
+      heard_.at = static_cast<std::uint16_t>(taken.missed);
+      learn(heard_.count, reading);
+    }
   }
 
   [[nodiscard]] static std::uint8_t one_more(std::uint8_t count) noexcept {
