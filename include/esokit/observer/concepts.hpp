@@ -49,8 +49,10 @@ struct ObserverTraits {
   bool varies_time = false;   ///< `set_step_time(seconds)`, before each step
   bool gates_outliers =
       false;  ///< `accepts(y) const`: false for what `correct` takes for an outlier
+
   /// Its `correct`, or that of what it adapts, may answer `outlier_rejected`.
   bool rejects_outliers = false;
+
   bool blanks_estimate = false;  ///< `blanked() const`: `estimate` is an old one for now
 };
 
