@@ -358,9 +358,11 @@ TEST(Covariance, WhatDoesNotExistIsAnError) {
   LinearSystem<1, 1, 1> system;
   system.b(0, 0) = 1.0;
   system.c(0, 0) = 1.0;
-  EXPECT_FALSE(output_covariance(system, one).has_value());  // integrator
+  EXPECT_EQ(refusal(output_covariance(system, one)),
+            "system: is not stable: the stationary covariance does not exist");  // integrator
   system.a(0, 0) = 1e-3;
-  EXPECT_FALSE(output_covariance(system, one).has_value());
+  EXPECT_EQ(refusal(output_covariance(system, one)),
+            "system: is not stable: the stationary covariance does not exist");
   system.a(0, 0) = -1e-3;
   EXPECT_NEAR(output_covariance(system, one).value()(0, 0), 500.0, 1e-9);
   system.d(0, 0) = 1.0;
@@ -371,12 +373,13 @@ TEST(Covariance, WhatDoesNotExistIsAnError) {
   EXPECT_NEAR(output_covariance(system, one).value()(0, 0), 1.0 + 1.0 / (1.0 - 0.999 * 0.999),
               1e-9);
   system.a(0, 0) = -2.0;  // A = -1
-  EXPECT_FALSE(output_covariance(system, one).has_value());
+  EXPECT_EQ(refusal(output_covariance(system, one)),
+            "system: is not stable: the stationary covariance does not exist");
   one(0, 0) = -1.0;
   system.a(0, 0) = -1.0;
-  EXPECT_FALSE(output_covariance(system, one).has_value());
-  EXPECT_FALSE(
-      estimation_error_covariance(sampled<1, 1>(1.0, 0.1), {.measurement = -1.0}).has_value());
+  EXPECT_EQ(refusal(output_covariance(system, one)), "input[0]: must be finite and not negative");
+  EXPECT_EQ(refusal(estimation_error_covariance(sampled<1, 1>(1.0, 0.1), {.measurement = -1.0})),
+            "measurement: must be finite and not negative");
 }
 
 }  // namespace

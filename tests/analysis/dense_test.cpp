@@ -8,11 +8,14 @@
 #include <esokit/analysis/linear_system.hpp>
 #include <esokit/analysis/lyapunov.hpp>
 #include <esokit/analysis/poles.hpp>
+#include <support/refusal.hpp>
 #include <vector>
 
 #include "support/numbers.hpp"
 
 namespace {
+
+using esokit_test::refusal;
 
 using namespace esokit;
 using Complex = std::complex<double>;
@@ -168,11 +171,15 @@ TEST(Lyapunov, SolvesBothEquations) {
   EXPECT_NEAR(solve_lyapunov<1>(a, q, true).value()(0, 0) / (1.0 / (2e-9 - 1e-18)), 1.0, 1e-12);
   EXPECT_NEAR(solve_lyapunov<1>(a, q, false).value()(0, 0) / 5e8, 1.0, 1e-12);
   a(0, 0) = 0.0;
-  EXPECT_FALSE(solve_lyapunov<1>(a, q, true).has_value());
-  EXPECT_FALSE(solve_lyapunov<1>(a, q, false).has_value());
+  EXPECT_EQ(refusal(solve_lyapunov<1>(a, q, true)),
+            "system: is not stable: the stationary covariance does not exist");
+  EXPECT_EQ(refusal(solve_lyapunov<1>(a, q, false)),
+            "system: is not stable: the stationary covariance does not exist");
   a(0, 0) = std::nan("");
-  EXPECT_FALSE(solve_lyapunov<1>(a, q, true).has_value());
-  EXPECT_FALSE(solve_lyapunov<1>(a, q, false).has_value());
+  EXPECT_EQ(refusal(solve_lyapunov<1>(a, q, true)),
+            "system: is not stable: the stationary covariance does not exist");
+  EXPECT_EQ(refusal(solve_lyapunov<1>(a, q, false)),
+            "system: is not stable: the stationary covariance does not exist");
 }
 
 }  // namespace

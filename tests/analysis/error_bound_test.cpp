@@ -364,9 +364,11 @@ TEST(LyapunovMatrix, ExistsUpToTheKnownLimits) {
   // Sheet 4: k_min >= (N-1)/(2N) for any k_max.
   const ErrorSources sources{.disturbance_rate = 1.0};
   EXPECT_TRUE(nonlinear_error_bound<3>({1.0, 0.35, 1e3}, sources).has_value());
-  EXPECT_FALSE(nonlinear_error_bound<3>({1.0, 0.32, 1e3}, sources).has_value());
+  EXPECT_EQ(refusal(nonlinear_error_bound<3>({1.0, 0.32, 1e3}, sources)),
+            "system: has no Lyapunov matrix common to all modes");
   EXPECT_TRUE(nonlinear_error_bound<4>({1.0, 0.39, 1e3}, sources).has_value());
-  EXPECT_FALSE(nonlinear_error_bound<4>({1.0, 0.36, 1e3}, sources).has_value());
+  EXPECT_EQ(refusal(nonlinear_error_bound<4>({1.0, 0.36, 1e3}, sources)),
+            "system: has no Lyapunov matrix common to all modes");
 }
 
 template <int N>
@@ -396,7 +398,8 @@ TEST(LyapunovMatrix, SatisfiesItsInequalities) {
   // The solution of the equation is one of those that the inequality allows.
   const auto best = common_lyapunov_matrix<3>(std::array{fast}).value();
   EXPECT_LT(best.gamma() * best.largest, 1.001 * one.gamma() * one.largest);
-  EXPECT_FALSE(lyapunov_matrix<3>(-fast).has_value());
+  EXPECT_EQ(refusal(lyapunov_matrix<3>(-fast)),
+            "system: is not stable: the stationary covariance does not exist");
 }
 
 TEST(PeakGain, OfAnOscillatorIsKnown) {
@@ -417,7 +420,7 @@ TEST(PeakGain, OfAnOscillatorIsKnown) {
   sampled.d(0, 0) = -3.0;
   EXPECT_NEAR(peak_gain(sampled).value()(0, 0), 3.0 + 2.0 / 0.2, 1e-7);
   sampled.a(0, 0) = 0.0;
-  EXPECT_FALSE(peak_gain(sampled).has_value());
+  EXPECT_EQ(refusal(peak_gain(sampled)), "stability_abscissa: must be negative: it is not stable");
 }
 
 TEST(PeakGain, OfASampledObserverIsTheSumOfItsImpulseResponse) {
@@ -438,20 +441,27 @@ TEST(PeakGain, OfASampledObserverIsTheSumOfItsImpulseResponse) {
 TEST(ErrorBound, RefusesBadSettings) {
   const ErrorSources fine{.disturbance_rate = 1.0};
   using Linear = ContinuousLinearEso<2>::Config;
-  EXPECT_FALSE(linear_error_bound(Linear{.observer_bandwidth = 0.0}, fine).has_value());
-  EXPECT_FALSE(linear_error_bound(Linear{.observer_bandwidth = 1.0}, {.disturbance_rate = -1.0})
-                   .has_value());
-  EXPECT_FALSE(switched_error_bound<3>({1.0, 0.0, 1.0}, fine).has_value());
-  EXPECT_FALSE(switched_error_bound<3>({1.0, 0.7, std::nan("")}, fine).has_value());
-  EXPECT_FALSE(nonlinear_error_bound<3>({1.0, 0.5, 0.4}, fine).has_value());
+  EXPECT_EQ(refusal(linear_error_bound(Linear{.observer_bandwidth = 0.0}, fine)),
+            "observer_bandwidth: must be finite and positive");
+  EXPECT_EQ(
+      refusal(linear_error_bound(Linear{.observer_bandwidth = 1.0}, {.disturbance_rate = -1.0})),
+      "disturbance_rate: must be finite and not negative");
+  EXPECT_EQ(refusal(switched_error_bound<3>({1.0, 0.0, 1.0}, fine)),
+            "factor_while_shrinking: must be finite and positive");
+  EXPECT_EQ(refusal(switched_error_bound<3>({1.0, 0.7, std::nan("")}, fine)),
+            "factor_otherwise: must be finite and positive");
+  EXPECT_EQ(refusal(nonlinear_error_bound<3>({1.0, 0.5, 0.4}, fine)),
+            "greatest: must be finite and not below least");
   using Cascade = ContinuousCascadeEso<2, 2>::Config;
   const auto refused = cascade_error_bounds<2>(
       Cascade{.observer_bandwidth = 1.0, .bandwidth_factor = 0.5, .input_gain = 1.0}, fine);
   ASSERT_EQ(refusal(refused), "bandwidth_factor: must be finite and above");
   const auto bound = linear_error_bound(Linear{.observer_bandwidth = 1.0}, {}).value();
-  EXPECT_FALSE(bound.convergence_time(Vector<double, 3>::Ones()).has_value());
+  EXPECT_EQ(refusal(bound.convergence_time(Vector<double, 3>::Ones())),
+            "level: must be positive: a bound of zero is never reached");
   const auto some = linear_error_bound(Linear{.observer_bandwidth = 1.0}, fine).value();
-  EXPECT_FALSE(some.convergence_time(Vector<double, 3>::Ones(), 0.0).has_value());
+  EXPECT_EQ(refusal(some.convergence_time(Vector<double, 3>::Ones(), 0.0)),
+            "excess: must be finite and positive");
   EXPECT_EQ(some.convergence_time(Vector<double, 3>::Zero()).value(), 0.0);
 }
 

@@ -181,8 +181,10 @@ TEST(AdrcLoop, RefusesWhatDoesNotBelongTogether) {
   direct.d(0, 0) = 1.0;
   EXPECT_EQ(refusal(adrc_loop(direct, observer_with(2.0), law_with(2.0))),
             "plant.d: must be zero: y may not follow an input at once");
-  EXPECT_FALSE(adrc_loop(sampled, observer_with(2.0), law_with(2.0))->loop_gain(0.0).has_value());
-  EXPECT_FALSE(adrc_loop(sampled, observer_with(2.0), law_with(2.0))->loop_gain(400.0).has_value());
+  EXPECT_EQ(refusal(adrc_loop(sampled, observer_with(2.0), law_with(2.0))->loop_gain(0.0)),
+            "frequency: must be finite and positive");
+  EXPECT_EQ(refusal(adrc_loop(sampled, observer_with(2.0), law_with(2.0))->loop_gain(400.0)),
+            "frequency: must not be above the Nyquist frequency");
 }
 
 /// The plant is in double whatever the observer is in.
@@ -231,14 +233,17 @@ TEST(NominalPlant, IsSampledExactly) {
 }
 
 TEST(NominalPlant, RefusesBadOnes) {
-  EXPECT_FALSE((CompanionPlant<1>{{1.0}, 0.0}).system().has_value());
-  EXPECT_FALSE((CompanionPlant<1>{{std::nan("")}, 1.0}).system().has_value());
-  EXPECT_FALSE(sampled_plant(plant(), 0.0).has_value());
-  EXPECT_FALSE(sampled_plant(plant(), T, 2 * T).has_value());
-  EXPECT_FALSE(sampled_plant(plant(), T, -T).has_value());
-  EXPECT_FALSE(sampled_plant(sampled_plant(plant(), T).value(), T).has_value());
+  EXPECT_EQ(refusal((CompanionPlant<1>{{1.0}, 0.0}).system()),
+            "input_gain: must be finite and not zero (negative is fine)");
+  EXPECT_EQ(refusal((CompanionPlant<1>{{std::nan("")}, 1.0}).system()),
+            "coefficients[0]: must be finite");
+  EXPECT_EQ(refusal(sampled_plant(plant(), 0.0)), "sample_time: must be finite and positive");
+  EXPECT_EQ(refusal(sampled_plant(plant(), T, 2 * T)), "delay: must not be above sample_time");
+  EXPECT_EQ(refusal(sampled_plant(plant(), T, -T)), "delay: must be finite and not negative");
+  EXPECT_EQ(refusal(sampled_plant(sampled_plant(plant(), T).value(), T)),
+            "plant.sample_time: must be zero: continuous");
   const auto unstable = CompanionPlant<1>{{-1e6}, 1.0}.system().value();
-  EXPECT_FALSE(sampled_plant(unstable, 1.0).has_value());  // exp(1e6)
+  EXPECT_EQ(refusal(sampled_plant(unstable, 1.0)), "system: must be finite");  // exp(1e6)
 }
 
 }  // namespace

@@ -310,8 +310,10 @@ TEST(Margins, RangeOfTheInputGain) {
   EXPECT_TRUE(stable(range.lower * 1.001));
   EXPECT_TRUE(stable(range.upper * 0.999));
   EXPECT_FALSE(stable(range.upper * 1.001));
-  EXPECT_FALSE(input_gain_range(loop, law_of(5.0), 0.0).has_value());
-  EXPECT_FALSE(input_gain_range(loop, law_of(5.0), -4.0).has_value());
+  EXPECT_EQ(refusal(input_gain_range(loop, law_of(5.0), 0.0)),
+            "plant_gain: must be finite, not zero, of the sign of b0");
+  EXPECT_EQ(refusal(input_gain_range(loop, law_of(5.0), -4.0)),
+            "plant_gain: must be finite, not zero, of the sign of b0");
 }
 
 // The delay that a plant was sampled with counts, and the margin is what is left.
@@ -384,8 +386,12 @@ TEST(Margins, OfAnUnstableLoopAreAnError) {
   EXPECT_EQ(
       refusal(all),
       "stability_abscissa: must be negative: the nominal loop is not stable, it has no margins");
-  EXPECT_FALSE(delay_margin(loop, plant).has_value());
-  EXPECT_FALSE(delay_margin(loop).has_value());  // the continuous overload refuses a sampled loop
+  EXPECT_EQ(
+      refusal(delay_margin(loop, plant)),
+      "stability_abscissa: must be negative: the nominal loop is not stable, it has no margins");
+  // The continuous overload refuses a sampled loop.
+  EXPECT_EQ(refusal(delay_margin(loop)),
+            "plant.sample_time: must be zero here: a sampled loop needs its continuous plant");
 }
 
 }  // namespace

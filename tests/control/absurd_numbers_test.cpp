@@ -210,10 +210,10 @@ TEST(IncrementalAbsurd, IncrementsAreFinite) {
   // Limits are not repaired where they are bad, nor by retune.
   auto bad = settings;
   bad.limits.lower = -hidden_infinity<float>();
-  EXPECT_FALSE(Incremental::make(bad).has_value());
-  EXPECT_FALSE(controller.retune(bad).has_value());
+  EXPECT_EQ(refusal(Incremental::make(bad)), "limits.lower: must be finite");
+  EXPECT_EQ(refusal(controller.retune(bad)), "limits.lower: must be finite");
   bad.limits.lower = hidden_nan<float>();
-  EXPECT_FALSE(Incremental::make(bad).has_value());
+  EXPECT_EQ(refusal(Incremental::make(bad)), "limits.lower: must be finite");
   EXPECT_TRUE(controller.retune(settings).has_value());
   EXPECT_EQ(controller.controller().output(), top / 2);
 }
@@ -326,7 +326,9 @@ TEST(AbsurdSettings, PidOfAnAdrcIsFinite) {
       EXPECT_GT(pid->integral, 0);
     }
   }
-  EXPECT_FALSE(pid_from_adrc<2>(esokit::AdrcTuning<float>{1e-36f, 100, 1000}).has_value());
+  EXPECT_EQ(refusal(pid_from_adrc<2>(esokit::AdrcTuning<float>{1e-36f, 100, 1000})),
+            "observer_bandwidth: with controller_bandwidth and input_gain gives a PID that the "
+            "scalar cannot hold");
   EXPECT_TRUE(pid_from_adrc<2>(esokit::AdrcTuning<float>{1e-3f, 100, 1000}).has_value());
 }
 

@@ -127,7 +127,8 @@ TEST(DisturbanceCompensator, StartTrackAndRetuneDoNotBump) {
   }
   EXPECT_NEAR(compensator.update(plant.output(), compensator.base_output()), 1.5, 1e-9);
   settings.observer.input_gain = 0;
-  EXPECT_FALSE(compensator.retune(settings).has_value());
+  EXPECT_EQ(refusal(compensator.retune(settings)),
+            "input_gain: must be finite and not zero (negative is fine)");
 }
 
 TEST(DisturbanceCompensator, RefusesWhatItCannotRun) {

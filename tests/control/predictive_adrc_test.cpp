@@ -613,7 +613,8 @@ TEST(PredictiveAdrc, retune_keeps_u) {
   controller.prepare(2.0);
   const double next = controller.blind_output();
   config.controller_bandwidth = -1;
-  EXPECT_FALSE(controller.retune(config).has_value());
+  EXPECT_EQ(refusal(controller.retune(config)),
+            "controller_bandwidth: must be finite and positive");
   EXPECT_EQ(controller.blind_output(), next);
 }
 

@@ -6,6 +6,7 @@
 #include <esokit/core/error_text.hpp>
 #include <string>
 #include <support/numbers.hpp>
+#include <support/refusal.hpp>
 
 namespace esokit_test {
 namespace {
@@ -158,7 +159,8 @@ TEST(TrackingDifferentiator, RefusesByName) {
   EXPECT_EQ(text(1, 0.01, 0.001),
             "filter_time = 0.001: must be 0 or not below sample_time, which is 0.01");
   EXPECT_EQ(text(1, 0.01, -1), "filter_time = -1: must be finite and not negative");
-  EXPECT_FALSE(SignTrackingDifferentiator<>::make({.acceleration = -1}).has_value());
+  EXPECT_EQ(refusal(SignTrackingDifferentiator<>::make({.acceleration = -1})),
+            "acceleration: must be finite and positive");
   EXPECT_TRUE(SignTrackingDifferentiator<>::make({.acceleration = 1}).has_value());
 }
 

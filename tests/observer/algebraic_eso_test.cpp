@@ -770,7 +770,9 @@ TEST(AlgebraicEso, RefusesBadConfigByName) {
   }
   // What is asked for by name is given: a gain that vanishes, and growing memory.
   Config vanishing = paper_config<2>(1e-3, 0, 1);
-  EXPECT_FALSE(AlgebraicEso<2>::make(vanishing).has_value());
+  EXPECT_EQ(refusal(AlgebraicEso<2>::make(vanishing)),
+            "observer_bandwidth: with frequency_shift above zero lets the gains vanish; "
+            "allow_vanishing_gain asks for it");
   vanishing.allow_vanishing_gain = true;
   EXPECT_TRUE(AlgebraicEso<2>::make(vanishing).has_value());
   EXPECT_TRUE(AlgebraicEso<2>::make(paper_config<2>(1e-3, 0, 0)).has_value());

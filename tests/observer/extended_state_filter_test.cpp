@@ -667,7 +667,9 @@ TEST(ExtendedStateFilter, retune_keeps_estimate_and_covariance) {
   EXPECT_TRUE(filter.frozen());
   const auto rested = filter;
   config.inflation = -1;
-  EXPECT_FALSE(filter.retune(config).has_value());
+  EXPECT_EQ(
+      refusal(filter.retune(config)),
+      "inflation: must be finite and positive; the plain Kalman filter is InflationRule::none");
   EXPECT_EQ(filter.gain(), rested.gain());
 }
 

@@ -6,6 +6,7 @@
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <support/numbers.hpp>
+#include <support/refusal.hpp>
 
 namespace esokit_test {
 namespace {
@@ -23,36 +24,38 @@ void refuses() {
   using Nonlinear = esokit::NonlinearEso<2, S>;
   const S T = static_cast<S>(0.01);
   for (const S bad : {hidden_nan<S>(), hidden_infinity<S>(), S(-1), S(0)}) {
-    EXPECT_FALSE(Switched::make({.observer_bandwidth = S(50),
-                                 .bandwidth_ratio = bad,
-                                 .allow_uncertified_switching = true,
-                                 .input_gain = S(1),
-                                 .sample_time = T})
-                     .has_value());
-    EXPECT_FALSE(Nonlinear::make({.observer_bandwidth = S(50),
-                                  .shape = {.alpha = bad},
-                                  .input_gain = S(1),
-                                  .sample_time = T})
-                     .has_value());
-    EXPECT_FALSE(Nonlinear::make({.observer_bandwidth = S(50),
-                                  .gain_max = bad,
-                                  .allow_uncertified_gain = true,
-                                  .input_gain = S(1),
-                                  .sample_time = T})
-                     .has_value());
-    EXPECT_FALSE(
-        Nonlinear::make(
-            {.observer_bandwidth = S(50), .error_scale = bad, .input_gain = S(1), .sample_time = T})
-            .has_value());
+    EXPECT_EQ(refusal(Switched::make({.observer_bandwidth = S(50),
+                                      .bandwidth_ratio = bad,
+                                      .allow_uncertified_switching = true,
+                                      .input_gain = S(1),
+                                      .sample_time = T})),
+              "bandwidth_ratio: must be finite and positive");
+    EXPECT_EQ(refusal(Nonlinear::make({.observer_bandwidth = S(50),
+                                       .shape = {.alpha = bad},
+                                       .input_gain = S(1),
+                                       .sample_time = T})),
+              "shape.alpha: must be finite and positive");
+    EXPECT_EQ(refusal(Nonlinear::make({.observer_bandwidth = S(50),
+                                       .gain_max = bad,
+                                       .allow_uncertified_gain = true,
+                                       .input_gain = S(1),
+                                       .sample_time = T})),
+              "gain_max: must be finite and positive");
+    EXPECT_EQ(refusal(Nonlinear::make({.observer_bandwidth = S(50),
+                                       .error_scale = bad,
+                                       .input_gain = S(1),
+                                       .sample_time = T})),
+              "error_scale: must be finite and positive");
   }
   EXPECT_FALSE((esokit::NonlinearEso<2, S, 2, BrokenGain<S>>::make(
                     {.observer_bandwidth = S(50), .input_gain = S(1), .sample_time = T})
                     .has_value()));
-  EXPECT_FALSE(Switched::make({.observer_bandwidth = S(50),
-                               .bandwidth_ratio = static_cast<S>(0.3),
-                               .input_gain = S(1),
-                               .sample_time = T})
-                   .has_value());
+  EXPECT_EQ(refusal(Switched::make({.observer_bandwidth = S(50),
+                                    .bandwidth_ratio = static_cast<S>(0.3),
+                                    .input_gain = S(1),
+                                    .sample_time = T})),
+            "bandwidth_ratio: is not certified against every switching "
+            "(allow_uncertified_switching asks for it); must be above");
 }
 
 template <class Observer>
