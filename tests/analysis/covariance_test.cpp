@@ -375,6 +375,23 @@ TEST(Covariance, WhatDoesNotExistIsAnError) {
   system.a(0, 0) = -2.0;  // A = -1
   EXPECT_EQ(refusal(output_covariance(system, one)),
             "system: is not stable: the stationary covariance does not exist");
+  LinearSystem<1, 2, 1> two;
+  two.a(0, 0) = -1.0;
+  two.b(0, 0) = two.b(0, 1) = two.c(0, 0) = 1.0;
+  Matrix<double, 2, 2> noise;
+  for (const double across : {-2.0, 2.0}) {
+    noise << 1.0, across, across, 4.0;
+    EXPECT_NEAR(output_covariance(two, noise).value()(0, 0), 0.5 * (5.0 + 2.0 * across), 1e-12);
+    noise(0, 1) = noise(1, 0) = 1.001 * across;
+    EXPECT_EQ(refusal(output_covariance(two, noise)),
+              "input[0]: must be a covariance: symmetric and not indefinite");
+  }
+  noise << 1.0, 0.5, 0.4, 4.0;
+  EXPECT_EQ(refusal(output_covariance(two, noise)),
+            "input[0]: must be a covariance: symmetric and not indefinite");
+  noise(0, 1) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(refusal(output_covariance(two, noise)),
+            "input[0]: must be a covariance: symmetric and not indefinite");
   one(0, 0) = -1.0;
   system.a(0, 0) = -1.0;
   EXPECT_EQ(refusal(output_covariance(system, one)), "input[0]: must be finite and not negative");

@@ -12,8 +12,10 @@
 #include <esokit/analysis/observer_system.hpp>
 #include <esokit/analysis/peak_gain.hpp>
 #include <esokit/sim/runge_kutta.hpp>
+#include <limits>
 #include <numbers>
 #include <support/refusal.hpp>
+#include <utility>
 #include <vector>
 
 #include "support/numbers.hpp"
@@ -436,6 +438,18 @@ TEST(PeakGain, OfASampledObserverIsTheSumOfItsImpulseResponse) {
     sum += observer.estimate().cwiseAbs();
   }
   for (int r = 0; r < 3; ++r) EXPECT_NEAR(peak(r, 0), sum(r), 1e-7 * sum(r));
+  // w = d' of one, held over a sample: from then on d is a constant.
+  const double T = observer.sample_time();
+  ASSERT_EQ(observer.reset(Vector<double, 3>(0.0, 0.0, 0.0)), StepStatus::ok);
+  Vector<double, 3> truth(T * T * T / 6.0, T * T / 2.0, T);
+  sum.setZero();
+  for (int k = 0; k < 2000; ++k) {
+    observer.update(truth(0), 0.0);
+    sum += (truth - observer.estimate()).cwiseAbs();
+    truth(0) += T * (truth(1) + 0.5 * T * truth(2));
+    truth(1) += T * truth(2);
+  }
+  for (int r = 0; r < 3; ++r) EXPECT_NEAR(peak(r, 1), sum(r), 1e-7 * sum(r));
 }
 
 TEST(ErrorBound, RefusesBadSettings) {
@@ -450,8 +464,22 @@ TEST(ErrorBound, RefusesBadSettings) {
             "factor_while_shrinking: must be finite and positive");
   EXPECT_EQ(refusal(switched_error_bound<3>({1.0, 0.7, std::nan("")}, fine)),
             "factor_otherwise: must be finite and positive");
+  for (const double bad : {-1.0, std::nan(""), std::numeric_limits<double>::infinity()}) {
+    const std::pair<ErrorSources, const char*> sources[] = {
+        {{.disturbance_rate = bad}, "disturbance_rate: must be finite and not negative"},
+        {{.measurement_noise = bad}, "measurement_noise: must be finite and not negative"}};
+    for (const auto& [source, expected] : sources) {
+      EXPECT_EQ(refusal(linear_error_bound(Linear{.observer_bandwidth = 1.0}, source)), expected);
+      EXPECT_EQ(refusal(switched_error_bound<3>({1.0, 0.9, 1.0}, source)), expected);
+      EXPECT_EQ(refusal(nonlinear_error_bound<3>({1.0, 0.8, 1.0}, source)), expected);
+    }
+    EXPECT_EQ(refusal(switched_error_bound<3>({bad, 0.9, 1.0}, fine)),
+              "observer_bandwidth: must be finite and positive");
+    EXPECT_EQ(refusal(nonlinear_error_bound<3>({bad, 0.8, 1.0}, fine)),
+              "observer_bandwidth: must be finite and positive");
+  }
   EXPECT_EQ(refusal(nonlinear_error_bound<3>({1.0, 0.5, 0.4}, fine)),
-            "greatest: must be finite and not below least");
+            "gain_max: must be finite and not below gain_min");
   using Cascade = ContinuousCascadeEso<2, 2>::Config;
   const auto refused = cascade_error_bounds<2>(
       Cascade{.observer_bandwidth = 1.0, .bandwidth_factor = 0.5, .input_gain = 1.0}, fine);

@@ -285,6 +285,28 @@ TEST(Margins, OfAContinuousLoopByHand) {
   EXPECT_LE(all.modulus.value, least);
 }
 
+// Nothing knows what a second is: a loop that is slower by some factor has the same margins.
+TEST(Margins, OfASlowLoopAreThoseOfAFastOne) {
+  const auto all = [](double rate) {
+    const auto observer =
+        ContinuousLinearEso<1>::make({.observer_bandwidth = 10.0 * rate, .input_gain = rate})
+            .value();
+    const auto law =
+        AdrcLaw<1>::make({.controller_bandwidth = 3.0 * rate, .input_gain = rate}).value();
+    // With a lag, so that the gain has an edge; and one pole far below all others.
+    const auto plant = CompanionPlant<1>{{1e-3 * rate}, 1.3 * rate}.system().value();
+    return margins(adrc_loop(plant, observer, law).value()).value();
+  };
+  const Margins of_one = all(1.0);
+  for (const double rate : {1e-8, 1e-4, 1e4, 1e8}) {
+    const Margins other = all(rate);
+    EXPECT_NEAR(other.phase.value, of_one.phase.value, 1e-9) << rate;
+    EXPECT_NEAR(other.phase.frequency / rate, of_one.phase.frequency, 1e-9) << rate;
+    EXPECT_NEAR(other.modulus.value, of_one.modulus.value, 1e-9) << rate;
+    EXPECT_NEAR(other.modulus.frequency / rate, of_one.modulus.frequency, 1e-6) << rate;
+  }
+}
+
 // A gain that may neither rise nor fall: an unstable plant; and any b0 / b between is stable.
 TEST(Margins, RangeOfTheInputGain) {
   const double T = 0.01;
@@ -386,6 +408,12 @@ TEST(Margins, OfAnUnstableLoopAreAnError) {
   EXPECT_EQ(
       refusal(all),
       "stability_abscissa: must be negative: the nominal loop is not stable, it has no margins");
+  const auto continuous = adrc_loop(
+      plant, ContinuousLinearEso<1>::make({.observer_bandwidth = 10.0, .input_gain = 1.0}).value(),
+      AdrcLaw<1>::make({.controller_bandwidth = 3.0, .input_gain = 1.0}).value());
+  ASSERT_EQ(refusal(continuous), "accepted");
+  EXPECT_EQ(refusal(delay_margin(*continuous, plant)),
+            "plant.sample_time: must be positive: this is for a sampled loop");
   EXPECT_EQ(
       refusal(delay_margin(loop, plant)),
       "stability_abscissa: must be negative: the nominal loop is not stable, it has no margins");

@@ -283,6 +283,13 @@ TEST(MimoAbsurd, RetuneIsRefusedOrFinite) {
   EXPECT_DOUBLE_EQ(single.observer<0>().estimate()(1), -2e307);
 }
 
+/// Without a rate limit no u is out of reach, however far apart the two are.
+TEST(AbsurdNumbers, NoRateLimitIsNone) {
+  auto limiter = esokit::Limiter<double>::make({}, 1e-3).value();
+  EXPECT_EQ(limiter(1e308), 1e308);
+  EXPECT_EQ(limiter(-1e308), -1e308);
+}
+
 // ---- make
 
 TEST(AbsurdSettings, LawsWhoseResultIsNotFiniteAreRefused) {

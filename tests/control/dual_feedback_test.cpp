@@ -191,6 +191,10 @@ TEST(DualFeedback, StartAndRetuneDoNotBump) {
     config.input_gain = 2;
     ASSERT_TRUE(filter.retune(config).has_value());
     ASSERT_NEAR(filter.update(plant.output(), 2.5), 0.4, 1e-8);
+    // Right after a start, too: the steady state of that y, of which nothing was measured yet.
+    EXPECT_EQ(filter.start(-1.5, 0.4), StepStatus::ok);
+    ASSERT_TRUE(filter.retune(config).has_value());
+    ASSERT_NEAR(filter.update(-1.5, -1.5), 0.4, 1e-8);
     config.sample_time = -1;
     EXPECT_EQ(refusal(filter.retune(config)), "sample_time: must be finite and positive");
     EXPECT_EQ(filter.start(hidden_nan<double>(), 1), StepStatus::state_rejected);
@@ -291,6 +295,10 @@ TEST(DualFeedback, NoAllocationAndNamedErrors) {
   EXPECT_EQ(field([](auto& c) { c.input_gain = 0; }),
             "input_gain: must be finite and not zero (negative is fine)");
   EXPECT_EQ(field([](auto& c) { c.sample_time = 0; }), "sample_time: must be finite and positive");
+  EXPECT_EQ(field([](auto& c) { c.observer_bandwidth = 1e-110; }),
+            "observer_bandwidth: times sample_time gives a filter the scalar cannot hold");
+  EXPECT_EQ(field([](auto& c) { c.input_gain = 1e-306; }),
+            "sample_time: gives a filter that the scalar cannot hold");
   EXPECT_EQ(field([](auto& c) { c.limits.lower = 1, c.limits.upper = 0; }),
             "limits.lower: must be below limits.upper");
 }

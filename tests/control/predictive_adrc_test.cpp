@@ -551,7 +551,10 @@ TEST(PredictiveAdrc, start_hold_keeps_u_at_zero) {
 }
 
 TEST(PredictiveAdrc, takes_over_without_a_bump) {
-  auto controller = Controller<Linear>::make(typical()).value();
+  // A plant that stands needs no hold.
+  auto config = typical();
+  config.start_hold = 0.0105;
+  auto controller = Controller<Linear>::make(config).value();
   EXPECT_EQ(controller.start(3.0, 1.7), StepStatus::ok);
   for (int k = 0; k < 20; ++k) {
     EXPECT_NEAR(controller.control(3.0), 1.7, 1e-9) << k;
@@ -609,6 +612,7 @@ TEST(PredictiveAdrc, retune_keeps_u) {
   config.observer.input_gain = 300;
   config.controller_bandwidth = 50;
   ASSERT_TRUE(controller.retune(config).has_value());
+  EXPECT_EQ(controller.gains(), Controller<Linear>::make(config)->gains());
   EXPECT_NEAR(controller.control(2.0), 1.5, 1e-9);
   controller.prepare(2.0);
   const double next = controller.blind_output();

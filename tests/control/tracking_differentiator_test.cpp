@@ -161,6 +161,8 @@ TEST(TrackingDifferentiator, RefusesByName) {
   EXPECT_EQ(text(1, 0.01, -1), "filter_time = -1: must be finite and not negative");
   EXPECT_EQ(refusal(SignTrackingDifferentiator<>::make({.acceleration = -1})),
             "acceleration: must be finite and positive");
+  EXPECT_EQ(refusal(TrackingDifferentiator<>::make({.acceleration = 1e-300, .sample_time = 1e-10})),
+            "acceleration: times the square of the sample time cannot be held");
   EXPECT_TRUE(SignTrackingDifferentiator<>::make({.acceleration = 1}).has_value());
 }
 

@@ -123,6 +123,8 @@ TEST(PidConversion, RefusedByName) {
             "bandwidth_ratio: must be finite and above");
   EXPECT_EQ(refusal(esokit::adrc_from_pid<1>(PidGains<double>{1, 1, 0}, nan)),
             "bandwidth_ratio: must be finite and positive");
+  EXPECT_EQ(refusal(esokit::adrc_from_pid<1>(PidGains<double>{1e-200, 1e100, 0}, 5.0)),
+            "proportional: gives an input gain that the scalar cannot hold");
   EXPECT_EQ(refusal(esokit::pid_from_adrc<1>(AdrcTuning<double>{0, 1, 1})),
             "input_gain: must be finite and not zero (negative is fine)");
   EXPECT_EQ(refusal(esokit::pid_from_adrc<1>(AdrcTuning<double>{1, 0, 1})),

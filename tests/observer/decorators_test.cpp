@@ -112,6 +112,31 @@ TEST(VariableTime, StepsFollowAfterARetune) {
   }
 }
 
+/// The observer must be a good one at both ends of the range, from either side of either limit.
+TEST(VariableTime, BothEndsOfTheRangeAreChecked) {
+  using Observer = LinearEso<2>;
+  const auto good = [](double T) { return Observer::make(settings(T)).has_value(); };
+  /// Where `good` changes between two sample times.
+  const auto edge = [&](double inside, double outside) {
+    for (int i = 0; i < 200; ++i) {
+      const double middle = std::sqrt(inside) * std::sqrt(outside);
+      (good(middle) ? inside : outside) = middle;
+    }
+    return inside;
+  };
+  const double least = edge(nominal, 1e-300);
+  const double most = edge(nominal, 1e300);
+  ASSERT_FALSE(good(least / 1.01));
+  ASSERT_FALSE(good(most * 1.01));
+  const auto made = [](double T) {
+    return VariableTime<Observer>::make({.observer = settings(T), .ratio = 4}).has_value();
+  };
+  EXPECT_FALSE(made(3.9 * least));
+  EXPECT_TRUE(made(4.1 * least));
+  EXPECT_TRUE(made(most / 4.1));
+  EXPECT_FALSE(made(most / 3.9));
+}
+
 TEST(VariableTime, OutsideItsRatioIsRefused) {
   auto observer = variable(2);
   for (const double bad :

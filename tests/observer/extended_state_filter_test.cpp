@@ -427,6 +427,18 @@ TEST(ExtendedStateFilter, adaptive_theta_makes_the_weighted_trace_least) {
   }
 }
 
+/// Where nothing is uncertain the rule asks for an infinite theta: it gets the largest, and theta
+/// follows once there is a covariance.
+TEST(ExtendedStateFilter, adaptive_theta_of_a_known_start) {
+  auto config = typical<2, double, 1>(InflationRule::adaptive);
+  config.initial_covariance.setZero();
+  auto filter = ExtendedStateFilter<2>::make(config).value();
+  filter.predict(0);
+  EXPECT_EQ(filter.inflation(), 1e3);
+  filter.predict(0);
+  EXPECT_LT(filter.inflation(), 1e3);
+}
+
 // ---- measurements ----
 
 TEST(ExtendedStateFilter, variance_per_sample) {
@@ -828,6 +840,12 @@ TEST(ExtendedStateFilter, refuses_bad_configs_by_name) {
                 InflationRule::none),
             "disturbance_bounds[2]: must disturb the highest state where the gain is to be frozen "
             "without inflation: its limit is zero");
+  for (const double bad : {1e-170, 1e200}) {
+    EXPECT_EQ(refused([&](Config& c) { c.disturbance_bounds[1] = bad; }),
+              "disturbance_bounds[1]: has a square that the scalar cannot hold");
+  }
+  EXPECT_EQ(refused([](Config& c) { c.process_covariance = Eigen::Matrix3d::Constant(-1); }),
+            "process_covariance[0]: must be positive semidefinite");
   EXPECT_EQ(refused([](Config& c) { c.input_gain = 0; }),
             "input_gain: must be finite and not zero (negative is fine)");
   EXPECT_EQ(refused([](Config& c) { c.sample_time = 0; }),

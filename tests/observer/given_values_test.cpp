@@ -79,6 +79,12 @@ TYPED_TEST(GivenValues, OfTheConfigAndOfARetune) {
   }
 }
 
+/// The same for every observer, so that one can be put in another's place.
+TYPED_TEST(GivenValues, GapsAreBridgedUpToAHundredSamplesUnlessAskedOtherwise) {
+  typename TypeParam::Config config{};
+  EXPECT_EQ(chain_config<TypeParam>(config).max_gap, 100);
+}
+
 template <class S>
 void laws_give_back() {
   Random random(16);

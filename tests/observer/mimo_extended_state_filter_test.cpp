@@ -355,6 +355,10 @@ TEST(MimoExtendedStateFilter, refuses_bad_configs_by_name) {
               c.measurement_covariance(1, 0) = c.measurement_covariance(0, 1) = 1;
             }),
             "measurement_covariance: must be finite and positive semidefinite");
+  EXPECT_EQ(refused([](Config& c) { (*c.process_covariance)(3, 1) += 0.1; }),
+            "process_covariance[16]: must be symmetric");
+  EXPECT_EQ(refused([](Config& c) { c.initial_covariance(4, 3) += 0.1; }),
+            "initial_covariance[23]: must be symmetric");
   EXPECT_EQ(refused([&](Config& c) { (*c.process_covariance)(4, 4) = nan; }),
             "process_covariance[24]: must be finite");
   EXPECT_EQ(refused([](Config& c) { (*c.process_covariance)(4, 4) = -1; }),

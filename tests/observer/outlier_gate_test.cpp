@@ -18,6 +18,7 @@
 #include <esokit/observer/wrapped_output.hpp>
 #include <limits>
 #include <support/numbers.hpp>
+#include <support/refusal.hpp>
 
 namespace esokit_test {
 namespace {
@@ -157,6 +158,7 @@ TEST(OutlierGate, OpensAfterAStepOfAnySize) {
       ASSERT_EQ(gated.missed(), k + 1);
     }
     ASSERT_EQ(gated.update(step, 0), StepStatus::gap_bridged);
+    EXPECT_TRUE(gated.open());
     const int settling = 100 + static_cast<int>(2 * 110 / omega_T);
     // Where the error swings through zero it may shut for a while, never for longer than before.
     int in_a_row = 0;

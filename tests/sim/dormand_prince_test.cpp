@@ -9,6 +9,7 @@
 #include <esokit/sim/dormand_prince.hpp>
 #include <limits>
 #include <string>
+#include <support/refusal.hpp>
 #include <vector>
 
 namespace {
@@ -163,6 +164,13 @@ TEST(VariableStep, NextStepByItsRule) {
   double end = 0.0, rate_end = 0.0, difference = 0.0;
   theirs.do_step(system, 0.0, fourth(t[5], {})[0], t[5], end, rate_end, h, difference);
   EXPECT_NEAR(std::abs(difference), std::pow(1.25, -5), 1e-5);
+  // An error of q times what is allowed: refused, and tried again with 0.8 h / q^(1/5).
+  const double q = 16 * std::pow(1.25, -5);
+  const auto steeper = [&](double time, const State1& state) -> State1 {
+    return State1(16.0 * fourth(time, state)[0]);
+  };
+  const double shorter = stepper.advance(steeper, t[6], x, 1e9).value() - t[6];
+  EXPECT_NEAR(shorter, 0.8 * h * std::pow(q, -0.2), 1e-5 * h);
 }
 
 TEST(VariableStep, EndIsMetAndDoesNotShortenTheNextStep) {
