@@ -96,7 +96,7 @@ inline void balance(DenseView<double> a, DenseView<double> b, DenseView<double> 
         row += std::abs(a(i, j));
         column += std::abs(a(j, i));
       }
-      if (!(row > 0.0) || !(column > 0.0)) continue;
+      // Not finite where nothing couples.
       const double exponent = std::round(0.5 * std::log2(row / column));
       if (!is_finite(exponent) || exponent == 0.0) continue;
       // x_i is replaced by x_i / 2^exponent.

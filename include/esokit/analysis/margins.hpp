@@ -109,15 +109,11 @@ Expected<Margins, Error<double>> margins(const AdrcLoop<PlantStates, Observer>& 
   const auto response = detail::loop_gain_of(loop);
   detail::MarginFinder finder(response);
   detail::scan(response, detail::scan_range(loop), finder);
-  // L is real at z = -1, and at standstill.
+  // L is real at z = -1; at standstill it is infinite, as every observer integrates.
   if (loop.plant().sampled()) {
     const double nyquist = std::numbers::pi / loop.plant().sample_time;
     const std::complex<double> l = response.at(-2.0);
     if (is_finite(l.real())) finder.real_axis(l.real(), nyquist);
-  }
-  const std::complex<double> standstill = response.at(0.0);
-  if (is_finite(standstill.real()) && std::abs(standstill) < 1e9) {
-    finder.real_axis(standstill.real(), 0.0);
   }
   return finder.margins();
 }

@@ -133,16 +133,13 @@ class MimoAdrc {
     const Output drive = fresh.input_matrix_ * u;
     const Output moved = input_matrix_ * u - drive;
     Channels observers = observers_;
-    // Of a u that was reported absurdly large the scalar may not hold what it is to explain.
-    for (int i = 0; i < channels; ++i) {
-      if (!is_finite(moved(i)) || !is_finite(drive(i))) return too_large(u(i));
-    }
     Check<S> outcome;
     detail::unroll<channels>([&](auto i) {
       constexpr auto channel = static_cast<std::size_t>(i);
       constexpr int row = i;
       auto& observer = std::get<channel>(observers);
       if (outcome) outcome = observer.adopt(std::get<channel>(fresh.observers_));
+      // Of a u that was reported absurdly large the scalar may not hold what it is to explain.
       if (outcome && observer.shift_disturbance(moved(row)) != StepStatus::ok) {
         outcome = too_large(u(row));
       }

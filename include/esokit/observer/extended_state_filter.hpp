@@ -396,12 +396,10 @@ class ExtendedStateFilter
       rules.all_of(check_covariance("process_covariance", q));
     }
     rules.positive("bound_factor", config.bound_factor);
-    bool bounded = false;
     for (int i = 0; i < N; ++i) {
       const S& bound = config.disturbance_bounds[index(i)];
       rules.not_negative("disturbance_bounds", bound, i);
       if (!all(bound > S(0.0))) continue;
-      bounded = true;
       // With a model the change left over is the difference of two within the bound.
       const S whole = has_model && i == Order ? S(bound + bound) : bound;
       q(i, i) = config.bound_factor * whole * whole;
@@ -419,7 +417,7 @@ class ExtendedStateFilter
     // The unit of all variances: R, or without noise the largest variance there is.
     S unit = r;
     const Array<S, N> plain = scaled_units(config.sample_time, S(1.0));
-    bool driven = bounded;
+    bool driven = false;
     for (int i = 0; i < N; ++i) {
       driven = driven || all(q(i, i) > S(0.0));
       if (all(r > S(0.0))) continue;
