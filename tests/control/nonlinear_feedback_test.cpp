@@ -92,6 +92,10 @@ TEST(NonlinearFeedback, RefusesByName) {
   const auto refused = [](const Law::Config& config) { return refusal(Law::make(config)); };
   EXPECT_EQ(refused({.input_gain = 0}),
             "input_gain: must be finite and not zero (negative is fine)");
+  for (const double bad : {1e-310, 1.5e308}) {
+    EXPECT_EQ(refused({.input_gain = bad}),
+              "input_gain: has an inverse that the scalar cannot hold");
+  }
   EXPECT_EQ(refused({.exponents = {1, 0}, .input_gain = 1}),
             "exponents[1]: must be finite and positive");
   EXPECT_EQ(refused({.linear_widths = {0, 1}, .input_gain = 1}),

@@ -15,6 +15,25 @@ namespace esokit_test {
 using esokit::chain_riccati;
 using esokit::CovarianceFactor;
 
+/// Several right-hand sides beside each other, and what is not positive definite at each pivot.
+TEST(SolvePositive, EachColumnOfItsOwn) {
+  Eigen::Matrix3d a;
+  a << 4, 1, -2, 1, 5, 0.5, -2, 0.5, 9;
+  Eigen::Matrix<double, 3, 2> x;
+  x << 1, -7, 2, 0.5, -3, 4;
+  const auto solved = esokit::detail::solve_positive<3, 2, double>(a, a * x);
+  ASSERT_TRUE(solved.has_value());
+  EXPECT_LT((*solved - x).cwiseAbs().maxCoeff(), 1e-14);
+  for (int i = 0; i < 3; ++i) {
+    for (const double bad : {0.0, -1.0, hidden_nan<double>(), hidden_infinity<double>()}) {
+      Eigen::Matrix3d spoilt = a;
+      spoilt(i, i) = bad;
+      EXPECT_FALSE((esokit::detail::solve_positive<3, 2, double>(spoilt, a * x).has_value()))
+          << i << ' ' << bad;
+    }
+  }
+}
+
 /// Gain of the recursion on dense matrices in 100 digits, in Nordsieck scaling, run until it stands
 /// still.
 std::vector<Big> reference_limit(const std::vector<double>& q, double r, double theta) {

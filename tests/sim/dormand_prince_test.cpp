@@ -16,6 +16,7 @@ namespace {
 
 using namespace esokit;
 using namespace esokit::sim;
+using esokit_test::refusal;
 
 using State2 = Vector<double, 2>;
 using State1 = Vector<double, 1>;
@@ -290,8 +291,7 @@ TEST(VariableStep, ASolutionThatEndsIsAnError) {
     const State1 before = x;
     const auto next = stepper.advance(square, t, x, 2.0);
     if (!next) {
-      EXPECT_EQ(std::string(next.error().rule),
-                "is where the step falls below the resolution of time");
+      EXPECT_EQ(refusal(next), "t: is where the step falls below the resolution of time");
       EXPECT_NEAR(next.error().value, 1.0, 1e-2);
       EXPECT_EQ(x, before);
       return;

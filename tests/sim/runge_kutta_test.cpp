@@ -54,6 +54,24 @@ struct WrongNode : Euler {
 struct SizesDiffer : ExplicitMidpoint {
   static constexpr std::array<long double, 3> b{0, 1, 0};
 };
+// Each misses one condition of the next order and meets the other: sum b c^2 = 1/3 but not sum b a
+// c = 1/6; the other way round; of order 4 sum b c a c = 1/8 alone, sum b a a c = 1/24 alone.
+struct MissesBac : UserHeun3 {
+  static constexpr double a[3][3] = {{0, 0, 0}, {1.0 / 3, 0, 0}, {1.0 / 3, 1.0 / 3, 0}};
+};
+struct MissesBcc {
+  static constexpr int stages = 3;
+  static constexpr int order = 2;
+  static constexpr double a[3][3] = {{0, 0, 0}, {0.5, 0, 0}, {1.0 / 3, 2.0 / 3, 0}};
+  static constexpr double b[3] = {0.5, 0, 0.5};
+  static constexpr double c[3] = {0, 0.5, 1};
+};
+struct MissesBcac : RungeKutta4 {
+  static constexpr double a[4][4] = {{}, {0.5}, {0.25, 0.25}, {-0.5, -0.5, 2}};
+};
+struct MissesBaac : RungeKutta4 {
+  static constexpr double a[4][4] = {{}, {0.5}, {0, 0.5}, {0, 0.5, 0.5}};
+};
 
 static_assert(ExplicitRungeKutta<Euler> && proven_order<Euler>() == 1);
 static_assert(ExplicitRungeKutta<ExplicitMidpoint> && proven_order<ExplicitMidpoint>() == 2);
@@ -66,6 +84,8 @@ static_assert(!ExplicitRungeKutta<Kutta3ThatClaimsFour>);
 static_assert(!ExplicitRungeKutta<MissingNodes>);
 static_assert(!ExplicitRungeKutta<WrongNode>);
 static_assert(!ExplicitRungeKutta<SizesDiffer>);
+static_assert(proven_order<MissesBac>() == 2 && proven_order<MissesBcc>() == 2);
+static_assert(proven_order<MissesBcac>() == 3 && proven_order<MissesBaac>() == 3);
 
 // A lambda whose return type is an expression template would return references to the dead.
 constexpr auto returns_expression = [](double, const State2& x) { return -x; };
