@@ -2,6 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <esokit/analysis/covariance.hpp>
+#include <esokit/analysis/delay_margin.hpp>
+#include <esokit/analysis/error_bound.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/dual_feedback.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
@@ -11,12 +14,15 @@
 #include <esokit/observer/outlier_gate.hpp>
 #include <esokit/observer/wrapped_output.hpp>
 #include <limits>
+#include <string>
+#include <support/refusal.hpp>
 
 namespace {
 
 using esokit::has;
 using esokit::LinearEso;
 using esokit::StepStatus;
+using esokit_test::refusal;
 
 template <class S>
 constexpr S largest = std::numeric_limits<S>::max();
@@ -231,6 +237,59 @@ TEST(Found, AngleWithAGateComesBack) {
   EXPECT_EQ(angle.update(1.25, 0), StepStatus::ok);
   EXPECT_NEAR(angle.estimate()(0), 1.25, 1e-9);
   EXPECT_NEAR(angle.total_disturbance(), 0, 1e-6);
+}
+
+/// Answers of the analysis that were not numbers, and one that ended the program: a plant that the
+/// scalar holds sampled without a delay, and not with one.
+TEST(Found, AnalysisAnswersWithANumberOrAnError) {
+  using Observer = LinearEso<2>;
+  const auto observer =
+      Observer::make({.observer_bandwidth = 20, .input_gain = 1, .sample_time = 0.02}).value();
+  const auto law = esokit::AdrcLaw<2>::make({.controller_bandwidth = 4, .input_gain = 1}).value();
+  EXPECT_EQ(refusal(esokit::estimation_error_covariance(observer, {largest<double>, 1})),
+            "output[0]: has a covariance that the scalar cannot hold");
+  int answers = 0;
+  int errors = 0;
+  for (const double sign : {1.0, -1.0}) {
+    for (double size = 1; size < 1e308; size *= 3) {
+      for (const bool on_input : {false, true}) {
+        const esokit::CompanionPlant<2> companion{{on_input ? 1.0 : sign * size, 1},
+                                                  on_input ? sign * size : 1.0};
+        const auto plant = companion.system().value();
+        const auto sampled = esokit::sampled_plant(plant, 0.02);
+        if (!sampled) continue;
+        const auto loop = esokit::adrc_loop(*sampled, observer, law);
+        if (!loop) {
+          ++errors;
+          continue;
+        }
+        EXPECT_TRUE(std::isfinite(loop->stability_abscissa())) << size;
+        (esokit::delay_margin(*loop, plant) ? answers : errors) += 1;
+        const auto late = esokit::sampled_plant(plant, 0.02, 0.007);
+        if (!late) continue;
+        const auto late_loop = esokit::adrc_loop(*late, observer, law);
+        if (late_loop) (esokit::delay_margin(*late_loop, plant, 0.007) ? answers : errors) += 1;
+      }
+    }
+  }
+  EXPECT_GT(answers, 10);
+  EXPECT_GT(errors, 10);
+}
+
+TEST(Found, ErrorBoundsAreNumbers) {
+  const auto bound = esokit::linear_error_bound<3>({2, 1}, {5, 1e-3}).value();
+  EXPECT_TRUE(bound.convergence_time({1, 2, 3}));
+  EXPECT_EQ(refusal(bound.convergence_time({1, 2, HUGE_VAL})), "initial[2]: must be finite");
+  EXPECT_EQ(refusal(bound.convergence_time({1, largest<double>, 3})),
+            "initial: is in the scaling of the bound beyond what the scalar can hold");
+  const std::string rule =
+      "observer_bandwidth: gives with these sources a bound that the scalar cannot hold";
+  EXPECT_EQ(refusal(esokit::linear_error_bound<3>({2e-209, 1}, {0, 1e-3})), rule);
+  EXPECT_EQ(refusal(esokit::linear_error_bound<3>({2, 1}, {5, largest<double>})), rule);
+  EXPECT_EQ(refusal(esokit::switched_error_bound<3>({1e306, 0.7, 1}, {5, 1e-3})), rule);
+  EXPECT_EQ(refusal(esokit::cascade_error_bounds<2, 3, 2>(
+                {.observer_bandwidth = 1e120, .bandwidth_factor = 2, .input_gain = 1}, {5, 1e-3})),
+            rule);
 }
 
 }  // namespace

@@ -11,5 +11,6 @@ namespace fuzz {
 void add_observers(std::vector<Kind>& kinds);
 void add_filters(std::vector<Kind>& kinds);
 void add_controllers(std::vector<Kind>& kinds);
+void add_studies(std::vector<Kind>& kinds);
 
 }  // namespace fuzz

@@ -154,6 +154,7 @@ int run(const Options& options) {
   add_observers(all);
   add_filters(all);
   add_controllers(all);
+  add_studies(all);
   std::vector<Kind> kinds;
   for (Kind& kind : all) {
     if (kind.name.find(options.only) != std::string::npos) kinds.push_back(std::move(kind));

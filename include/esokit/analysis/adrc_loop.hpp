@@ -129,8 +129,9 @@ class AdrcLoop {
 
   /// Closes the loop.
   /// @param plant sampled as the observer is, see `sampled_plant`; continuous for a continuous one
-  /// @return error for a plant of another sample time or with a direct path, and for input gains of
-  ///         observer and law that do not belong together
+  /// @return error for a plant of another sample time or with a direct path, for input gains of
+  ///         observer and law that do not belong together, and for a loop that the scalar cannot
+  ///         hold
   template <Scalar S, AdrcForm Form = OutputBased>
   static Expected<AdrcLoop, Error<double>> make(const Plant& plant, const Observer& observer,
                                                 const AdrcLaw<order, S>& law, Form /*form*/ = {}) {
@@ -181,6 +182,10 @@ class AdrcLoop {
     balance(loop.plant_);
     if (auto ok = detail::check_system(closed); !ok) return ok.error();
     loop.abscissa_ = esokit::stability_abscissa(closed);
+    if (!is_finite(loop.abscissa_)) {
+      return Error<double>{"plant.b", plant.b(0, 0),
+                           "gives a closed loop whose poles the scalar cannot hold"};
+    }
     return loop;
   }
 

@@ -11,7 +11,8 @@ namespace esokit {
 /// @param input Inputs x Inputs. Sampled: covariance per sample. Continuous: two-sided spectral
 ///        density, unit^2 s (a held noise of variance s^2 and hold h has about s^2 h)
 /// @return error for an unstable system, an `input` that is no covariance, or an output to which
-///         continuous white noise comes straight (its variance is infinite)
+///         continuous white noise comes straight (its variance is infinite), or whose variance is
+///         beyond the scalar
 template <int States, int Inputs, int Outputs>
 Expected<Matrix<double, Outputs, Outputs>, Error<double>> output_covariance(
     const LinearSystem<States, Inputs, Outputs>& system,
@@ -55,6 +56,10 @@ Expected<Matrix<double, Outputs, Outputs>, Error<double>> output_covariance(
   for (int i = 0; i < Outputs; ++i) {
     for (int j = 0; j < Outputs; ++j) {
       result(i, j) = quadratic(system.c, *p, i, j) + quadratic(system.d, input, i, j);
+      if (!is_finite(result(i, j))) {
+        return Error<double>{"output", result(i, j), "has a covariance that the scalar cannot hold",
+                             i};
+      }
     }
   }
   return result;

@@ -13,11 +13,17 @@ template <int PlantStates, int ControllerStates>
 struct DelayedLoopGain {
   NominalPlant<PlantStates> plant;  ///< continuous
   LinearSystem<ControllerStates, 1, 1> controller;
+  mutable std::optional<Error<double>> refused{};  ///< the plant, with some delay
 
   /// @param fraction of a sample, 0 .. 1
   [[nodiscard]] LoopGain<PlantStates + 1, ControllerStates> with_fraction(double fraction) const {
     const double T = controller.sample_time;
-    auto late = sampled_plant(plant, T, fraction * T).value().template channel<0, 0>();
+    const auto sampled = sampled_plant(plant, T, fraction * T);
+    if (!sampled) {
+      refused = sampled.error();
+      return {};
+    }
+    auto late = sampled->template channel<0, 0>();
     balance(late);
     return {late, controller};
   }
@@ -160,6 +166,7 @@ Expected<Margin, Error<double>> delay_margin(const AdrcLoop<SampledStates, Obser
     }
     before = after;
   }
+  if (delayed.refused) return *delayed.refused;
   if (!least) return Margin{};
   return Margin{least->value - present_delay, least->frequency};
 }

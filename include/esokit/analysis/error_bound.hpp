@@ -37,14 +37,20 @@ struct ErrorBound {
   }
 
   /// Time (s) after which the bound is within `excess` of its ultimate value, 0 if it always is.
-  /// @return error without a source of error (then it is never reached), or for excess <= 0
+  /// @return error without a source of error (then it is never reached), for excess <= 0, or an
+  ///         initial error that the scalar cannot hold in the scaling
   [[nodiscard]] Expected<double, Error<double>> convergence_time(
       const Vector<double, Size>& initial, double excess = 0.1) const {
     Rules<double> rules;
     rules.positive("excess", excess)
-        .require(level > 0.0, "level", level, "must be positive: a bound of zero is never reached");
+        .require(level > 0.0, "level", level, "must be positive: a bound of zero is never reached")
+        .finite("initial", initial);
     if (!rules) return rules.error();
     const double over = (scaled_norm(initial) - level) / (excess * level);
+    if (!is_finite(over)) {
+      return Error<double>{"initial", initial.norm(),
+                           "is in the scaling of the bound beyond what the scalar can hold"};
+    }
     return over > 1.0 ? std::log(over) / rate : 0.0;
   }
 
@@ -94,10 +100,20 @@ Matrix<double, Size, Size> scaled_error_matrix(const Vector<double, Size>& gain)
 }
 
 /// From V = zeta' P zeta: V' <= -omega norm^2 + 2 norm(P) norm drive.
+/// @return error for one that the scalar cannot hold
 template <int Size>
-ErrorBound<Size> bound_from(const LyapunovMatrix<Size>& lyapunov, double bandwidth, double drive) {
-  return {bandwidth, lyapunov.gamma(), 2.0 * lyapunov.largest * drive / bandwidth,
-          bandwidth / (2.0 * lyapunov.largest)};
+Expected<ErrorBound<Size>, Error<double>> bound_from(const LyapunovMatrix<Size>& lyapunov,
+                                                     double bandwidth, double drive) {
+  const ErrorBound<Size> bound{bandwidth, lyapunov.gamma(),
+                               2.0 * lyapunov.largest * drive / bandwidth,
+                               bandwidth / (2.0 * lyapunov.largest)};
+  double sum = bound.gamma + bound.level + bound.rate;
+  for (const double each : bound.ultimate()) sum += each;
+  Rules<double> rules;
+  rules.require(is_finite(sum), "observer_bandwidth", bandwidth,
+                "gives with these sources a bound that the scalar cannot hold");
+  if (!rules) return rules.error();
+  return bound;
 }
 
 /// Bound for an observer whose scaled gain wanders in any way between two gains.
@@ -194,7 +210,9 @@ Expected<Array<ErrorBound<Size>, Levels>, Error<double>> cascade_error_bounds(
                  return disturbance(r) ? row(j + 1, r) - row(j, r) : 0.0;
                });
     }
-    bounds[i] = detail::bound_from(*lyapunov, w[i], drive);
+    const auto bound = detail::bound_from(*lyapunov, w[i], drive);
+    if (!bound) return bound.error();
+    bounds[i] = *bound;
   }
   return bounds;
 }

@@ -15,7 +15,8 @@ namespace esokit {
 ///
 /// Sampled systems: to 1e-9, where the sum is broken off. Continuous ones: by the trapezoid rule,
 /// to about 1e-4.
-/// @return error for a system that is not stable, or whose response lasts longer than 1e8 steps
+/// @return error for a system that is not stable, or whose response lasts longer than 1e8 steps or
+///         is beyond the scalar
 template <int States, int Inputs, int Outputs>
 Expected<Matrix<double, Outputs, Inputs>, Error<double>> peak_gain(
     const LinearSystem<States, Inputs, Outputs>& system) {
@@ -68,6 +69,9 @@ Expected<Matrix<double, Outputs, Inputs>, Error<double>> peak_gain(
         next(i) = sum;
       }
       x = next;
+    }
+    if (const double sum = peak.col(input).sum(); !is_finite(sum)) {
+      return Error<double>{"system", sum, "has a response that the scalar cannot hold", input};
     }
   }
   return peak;

@@ -1,0 +1,445 @@
+// What is asked of a finished design, and what simulations are made of: random arguments of the
+// analysis, of signals, noise and plants, of continuous observers, the PID conversion and the
+// limiter. An answer is a number or an error with field and rule, whatever the arguments.
+#include <bit>
+#include <esokit/esokit.hpp>
+#include <optional>
+
+#include "fuzz/config.hpp"
+#include "fuzz/kinds.hpp"
+
+namespace fuzz {
+
+using namespace esokit;
+
+namespace {
+
+template <class T>
+bool is_nan(T x) {
+  if constexpr (std::is_same_v<T, float>) {
+    return (std::bit_cast<std::uint32_t>(x) & 0x7fffffffu) > 0x7f800000u;
+  } else {
+    const auto bits = std::bit_cast<std::uint64_t>(static_cast<double>(x));
+    return (bits & 0x7fffffffffffffffu) > 0x7ff0000000000000u;
+  }
+}
+
+/// One case: draws its arguments, and keeps what does not hold.
+class Study {
+ public:
+  explicit Study(Episode& episode) : episode_(episode) {
+    if (episode.random != nullptr)
+      episode.config.record(*episode.random, episode.mix);
+    else
+      episode.config.play();
+  }
+
+  template <class S>
+  S number(const char* name, const Range& range) {
+    return episode_.config.number<S>(range, name);
+  }
+  template <class T, class S = typename T::value_type>
+  void fill(const char* name, T& values, const Range& range) {
+    for (S& x : values) x = number<S>(name, range);
+  }
+  int choice(const char* name, int count) { return episode_.config.choice(count, name); }
+  /// No argument was extreme or corrupt.
+  [[nodiscard]] bool plain() const { return episode_.config.plain(); }
+
+  /// The value of an answer; nothing if it is an error, which has to say what is wrong.
+  template <class E>
+  auto answer(const char* what, const E& outcome) {
+    using Value = std::remove_cvref_t<decltype(*outcome)>;
+    ++episode_.played;
+    const bool given = static_cast<bool>(outcome);
+    if (given) {
+      episode_.made = true;
+    } else if (*outcome.error().field == '\0' || *outcome.error().rule == '\0') {
+      fail(what, "refused without field or rule");
+    }
+    return given ? std::optional<Value>(*outcome) : std::nullopt;
+  }
+
+  template <class T>
+  void finite(const char* what, const T& value) {
+    if constexpr (std::is_floating_point_v<T>) {
+      if (!is_finite(value)) fail(what, "is not finite");
+    } else if constexpr (requires {
+                           value.real();
+                           value.imag();
+                           std::real(value);
+                         }) {
+      if (!is_finite(value.real()) || !is_finite(value.imag())) fail(what, "is not finite");
+    } else if constexpr (requires {
+                           value.data();
+                           value.size();
+                         }) {
+      for (decltype(value.size()) i = 0; i < value.size(); ++i) finite(what, value.data()[i]);
+    } else {
+      for (const auto& each : value) finite(what, each);
+    }
+  }
+  /// A limit, which may be infinite where there is none.
+  void limit(const char* what, double value) {
+    if (is_nan(value)) fail(what, "is NaN");
+  }
+  void fail(const char* what, const char* text) {
+    if (!failure_) failure_ = std::string(what) + " " + text;
+  }
+
+  Failure done() {
+    if (episode_.random == nullptr) episode_.text.push_back(episode_.config.text());
+    return failure_;
+  }
+
+ private:
+  Episode& episode_;
+  Failure failure_{};
+};
+
+// ---- analysis
+
+constexpr Range rate{0.5, 50, true};
+
+template <class System>
+void ask_system(Study& study, const System& system) {
+  // A slow one takes up to 1e8 steps.
+  const double abscissa = stability_abscissa(system);
+  double fastest = 1.0;
+  if (!system.sampled()) {
+    for (const auto& p : poles(system)) fastest = std::max(fastest, std::abs(p));
+  }
+  if (!is_finite(abscissa) || !(abscissa < 0.0) || abscissa < -1e-3 * fastest) {
+    if (const auto peaks = study.answer("peak_gain", peak_gain(system))) {
+      study.finite("peak_gain", *peaks);
+    }
+  }
+  const double w = study.number<double>("frequency", {0.1, 100, true});
+  if (const auto h = study.answer("frequency_response", frequency_response(system, w))) {
+    study.finite("frequency_response", *h);
+  }
+}
+
+template <class Loop, class Law>
+void ask_loop(Study& study, const Loop& loop, const Law& law, double b) {
+  study.finite("stability_abscissa", loop.stability_abscissa());
+  if (const auto m = study.answer("margins", margins(loop))) {
+    for (const Margin& each : {m->gain_increase, m->gain_decrease, m->phase, m->modulus}) {
+      study.limit("margins", each.value);
+      if (each.limited() && !(each.frequency >= 0.0)) study.fail("margins", "at no frequency");
+    }
+  }
+  if (const auto range = study.answer("input_gain_range", input_gain_range(loop, law, b))) {
+    study.limit("input_gain_range", range->lower);
+    study.limit("input_gain_range", range->upper);
+  }
+  const double w = study.number<double>("frequency", {0.1, 100, true});
+  for (const auto& response :
+       {loop.loop_gain(w), loop.sensitivity(w), loop.complementary_sensitivity(w),
+        loop.noise_to_control(w), loop.disturbance_to_output(w)}) {
+    if (const auto value = study.answer("response", response)) study.finite("response", *value);
+  }
+  Matrix<double, 3, 3> noise = Matrix<double, 3, 3>::Zero();
+  for (int i = 0; i < 3; ++i) noise(i, i) = study.number<double>("noise", {1e-6, 1, true});
+  if (const auto p =
+          study.answer("output_covariance", output_covariance(loop.closed_loop(), noise))) {
+    study.finite("output_covariance", *p);
+  }
+  ask_system(study, loop.closed_loop());
+  ask_system(study, loop.controller());
+}
+
+template <class Observer, class S = typename Observer::scalar_type>
+Failure loop_study(Episode& episode) {
+  Study study(episode);
+  constexpr bool sampled = requires(typename Observer::Config c) { c.sample_time; };
+  constexpr int n = Observer::order;
+  typename Observer::Config config{};
+  config.input_gain = study.number<S>("input_gain", {0.1, 10, true, true});
+  config.observer_bandwidth = study.number<S>("observer_bandwidth", {5, 200, true});
+  if constexpr (sampled) config.sample_time = study.number<S>("sample_time", {1e-3, 1e-1, true});
+  if constexpr (requires { config.bandwidth_factor; }) {
+    config.bandwidth_factor = study.number<S>("bandwidth_factor", {1.2, 3});
+  }
+  const auto made = Observer::make(config);
+  const auto observer = study.answer("observer", made);
+  const auto law_made =
+      AdrcLaw<n, S>::make({.controller_bandwidth = study.number<S>("controller_bandwidth", rate),
+                           .input_gain = config.input_gain});
+  const auto law = study.answer("law", law_made);
+  CompanionPlant<n> companion;
+  study.fill("coefficients", companion.coefficients, {-10, 10});
+  companion.input_gain =
+      study.number<double>("b", {0.5, 2, true}) * static_cast<double>(config.input_gain);
+  const auto system = companion.system();
+  const auto plant = study.answer("plant", system);
+  if (observer) {
+    const EstimationNoise noise{study.number<double>("measurement", {1e-6, 1, true}),
+                                study.number<double>("disturbance", {1e-3, 10, true})};
+    if (const auto p = study.answer("estimation_error_covariance",
+                                    estimation_error_covariance(*observer, noise))) {
+      study.finite("estimation_error_covariance", *p);
+    }
+    ask_system(study, observer_system(*observer));
+    ask_system(study, error_system(*observer));
+  }
+  if (!observer || !law || !plant) return study.done();
+  if constexpr (sampled) {
+    const auto T = static_cast<double>(config.sample_time);
+    const auto held = sampled_plant(*plant, T);
+    if (const auto sampled_one = study.answer("sampled_plant", held)) {
+      const auto loop = adrc_loop(*sampled_one, *observer, *law);
+      if (const auto closed = study.answer("adrc_loop", loop)) {
+        ask_loop(study, *closed, *law, companion.input_gain);
+        if (const auto m = study.answer("delay_margin", delay_margin(*closed, *plant))) {
+          study.limit("delay_margin", m->value);
+        }
+      }
+    }
+    const double delay = study.number<double>("delay", {0, T});
+    const auto late = sampled_plant(*plant, T, delay);
+    if (const auto sampled_one = study.answer("sampled_plant", late)) {
+      study.finite("sampled_plant", sampled_one->a);
+      const auto loop = adrc_loop(*sampled_one, *observer, *law);
+      if (const auto closed = study.answer("adrc_loop", loop)) {
+        if (const auto m = study.answer("delay_margin", delay_margin(*closed, *plant, delay))) {
+          study.limit("delay_margin", m->value);
+        }
+      }
+    }
+  } else {
+    const auto loop = adrc_loop(*plant, *observer, *law);
+    if (const auto closed = study.answer("adrc_loop", loop)) {
+      ask_loop(study, *closed, *law, companion.input_gain);
+      if (const auto m = study.answer("delay_margin", delay_margin(*closed))) {
+        study.limit("delay_margin", m->value);
+      }
+    }
+  }
+  return study.done();
+}
+
+template <int Size>
+void ask_bound(Study& study, const ErrorBound<Size>& bound) {
+  study.finite("gamma, level, rate", std::array{bound.gamma, bound.level, bound.rate});
+  study.finite("ultimate", bound.ultimate());
+  Vector<double, Size> initial;
+  for (double& x : initial) x = study.number<double>("initial", signal);
+  const double t = study.number<double>("t", {0, 10});
+  const double excess = study.number<double>("excess", {0.01, 1});
+  const auto at = bound.at(t, initial);
+  if (study.plain()) study.finite("at", at);
+  if (const auto time = study.answer("convergence_time", bound.convergence_time(initial, excess))) {
+    study.finite("convergence_time", *time);
+  }
+}
+
+Failure bound_study(Episode& episode) {
+  Study study(episode);
+  const ErrorSources sources{study.number<double>("disturbance_rate", {0, 10}),
+                             study.number<double>("measurement_noise", {0, 1e-2})};
+  const double w = study.number<double>("observer_bandwidth", rate);
+  const double factor = study.number<double>("factor", {1.2, 3});
+  const double least = study.number<double>("least", {0.4, 1});
+  const double greatest = study.number<double>("greatest", {1, 2});
+  if (const auto b = study.answer("linear", linear_error_bound<3>({w, 1.0}, sources))) {
+    ask_bound(study, *b);
+  }
+  const ContinuousCascadeEsoConfig<3, 2, double, EqualPoles> cascade{
+      .observer_bandwidth = w, .bandwidth_factor = factor, .input_gain = 1.0};
+  if (const auto b = study.answer("cascade", cascade_error_bounds<2, 3, 2>(cascade, sources))) {
+    for (const auto& level : *b) ask_bound(study, level);
+  }
+  if (const auto b =
+          study.answer("switched", switched_error_bound<3>({w, least, greatest}, sources))) {
+    ask_bound(study, *b);
+  }
+  if (const auto b =
+          study.answer("nonlinear", nonlinear_error_bound<4>({w, least, greatest}, sources))) {
+    ask_bound(study, *b);
+  }
+  return study.done();
+}
+
+// ---- continuous observers
+
+template <class Observer, class S = typename Observer::scalar_type>
+Failure continuous_study(Episode& episode) {
+  Study study(episode);
+  typename Observer::Config config{};
+  Filler<S> filler(episode.config, Observer::order);
+  filler.fill(config);
+  const auto made = Observer::make(config);
+  const auto observer = study.answer("observer", made);
+  if (!observer) return study.done();
+  auto running = *observer;
+  typename Observer::State z;
+  for (int i = 0; i < z.size(); ++i) z(i) = study.number<S>("z", signal);
+  const S t = study.number<S>("t", {0, 10});
+  const S y = study.number<S>("y", signal);
+  const S u = study.number<S>("u", signal);
+  running.begin_step(t, z, y);
+  const auto slope = running.derivative(t, z, y, u);
+  if (study.plain()) study.finite("derivative", slope);
+  return study.done();
+}
+
+// ---- signals, noise, plants
+
+template <class Signal>
+void ask_signal(Study& study, const char* what, const Expected<Signal, Error<double>>& made,
+                double t) {
+  const auto signal_of_time = study.answer(what, made);
+  if (!signal_of_time) return;
+  const auto values = signal_of_time->template derivatives<4>(t);
+  const double value = (*signal_of_time)(t);
+  if (!study.plain()) return;
+  study.finite(what, value);
+  study.finite(what, values);
+}
+
+Failure signal_study(Episode& episode) {
+  Study study(episode);
+  const double t = study.number<double>("t", {0, 10});
+  const double time = study.number<double>("time", {0, 5});
+  const double size = study.number<double>("size", signal);
+  const double tau = study.number<double>("tau", {0.1, 2});
+  const double w = study.number<double>("angular_frequency", rate);
+  ask_signal(study, "Constant", sim::Constant<>::make({size}), t);
+  ask_signal(study, "Step", sim::Step<>::make({time, size}), t);
+  ask_signal(study, "Ramp", sim::Ramp<>::make({time, size}), t);
+  ask_signal(study, "Sine", sim::Sine<>::make({size, w, tau, time}), t);
+  ask_signal(study, "FilteredStep", sim::FilteredStep<5>::make({time, size, tau}), t);
+  ask_signal(study, "Polynomial", sim::Polynomial<3>::make({{size, time, tau, w}, time}), t);
+
+  const double power = study.number<double>("power", {1e-6, 1, true});
+  const double hold = study.number<double>("hold", {0.1, 1});
+  const int multiple = 1 + study.choice("multiple", 20);
+  if (const auto made = study.answer("noise", sim::WhiteNoise<>::make({power, 3}))) {
+    auto noise = *made;
+    const double value = noise.next();
+    if (study.plain()) study.finite("WhiteNoise", value);
+  }
+  if (const auto made =
+          study.answer("noise", sim::BandLimitedWhiteNoise<>::make({power, hold, 3}))) {
+    study.finite("standard_deviation", made->standard_deviation());
+  }
+  if (const auto made =
+          study.answer("noise", sim::HeldNoise<>::make({power, hold, hold / multiple, 3}))) {
+    auto noise = *made;
+    for (const int k : {0, 3, 100, 7, -1}) {
+      const double value = noise.at(k);
+      if (study.plain()) study.finite("HeldNoise", value);
+    }
+  }
+  if (const auto plant = study.answer("plant", sim::LinearPlant<2>::make({{size, tau}, w, {}}))) {
+    const Vector<double, 2> x(time, size);
+    const auto slope = plant->derivative(t, x, tau);
+    if (study.plain()) study.finite("derivative", slope);
+  }
+  if (const auto plant = study.answer("plant", sim::IntegratorChainPlant<2>::make({w, {}}))) {
+    const auto slope = plant->derivative(t, {time, size}, tau);
+    if (study.plain()) study.finite("derivative", slope);
+  }
+  return study.done();
+}
+
+// ---- PID conversion, limiter
+
+template <int Order, class S>
+Failure pid_study(Episode& episode) {
+  Study study(episode);
+  const AdrcTuning<S> tuning{study.number<S>("input_gain", {0.1, 10, true, true}),
+                             study.number<S>("controller_bandwidth", rate),
+                             study.number<S>("observer_bandwidth", {1, 500, true})};
+  const auto finite = [&](const PidGains<S>& pid) {
+    study.finite("pid_from_adrc", std::array{pid.proportional, pid.integral, pid.derivative,
+                                             pid.filter_time, pid.filter_time_squared});
+  };
+  const auto numbers = [](const AdrcTuning<S>& t) {
+    return std::array{t.input_gain, t.controller_bandwidth, t.observer_bandwidth};
+  };
+  const S ratio = study.number<S>("bandwidth_ratio", {1.5, 20});
+  const auto pid = pid_from_adrc<Order, S>(tuning);
+  if (const auto gains = study.answer("pid_from_adrc", pid)) {
+    finite(*gains);
+    if (const auto back = study.answer("adrc_from_pid", adrc_from_pid<Order, S>(*gains, ratio))) {
+      study.finite("adrc_from_pid", numbers(*back));
+    }
+  }
+  const PidGains<S> drawn{.proportional = study.number<S>("proportional", {1, 10}),
+                          .integral = study.number<S>("integral", {0.1, 10}),
+                          .derivative = study.number<S>("derivative", {0.1, 10})};
+  const auto tuned = adrc_from_pid<Order, S>(drawn, ratio);
+  if (const auto made = study.answer("adrc_from_pid", tuned)) {
+    study.finite("adrc_from_pid", numbers(*made));
+    if (const auto gains = study.answer("pid_from_adrc", pid_from_adrc<Order, S>(*made))) {
+      finite(*gains);
+    }
+  }
+  return study.done();
+}
+
+template <class S>
+Failure limiter_study(Episode& episode) {
+  Study study(episode);
+  const S T = study.number<S>("sample_time", {1e-3, 1, true});
+  Limits<S> limits{study.number<S>("lower", {-5, 1}), study.number<S>("upper", {2, 5})};
+  if (study.choice("rate limit", 2) == 1) {
+    limits.rate = study.number<S>("rate", {1, 100, true});
+  }
+  const auto made = Limiter<S>::make(limits, T);
+  const auto first = study.answer("limiter", made);
+  if (!first) return study.done();
+  Limiter<S> limiter = *first;
+  const int calls = study.choice("calls", 20);
+  for (int i = 0; i < calls; ++i) {
+    const S command = study.number<S>("command", {-10, 10});
+    if (!is_finite(command)) continue;  // as it says
+    const S before = limiter.last();
+    if (study.choice("track", 4) == 1) {
+      limiter.track(command);
+      continue;
+    }
+    const S would_be = limiter.clamp(command);
+    const S u = limiter(command);
+    study.finite("output", u);
+    if (u < limits.lower || u > limits.upper) study.fail("output", "is outside of the limits");
+    if (would_be < u || would_be > u) study.fail("clamp", "is not what comes out");
+    const bool inside = !(before < limits.lower) && !(before > limits.upper);
+    const S step = limits.rate * T;
+    const S rounding =
+        S(8) * std::numeric_limits<S>::epsilon() * (std::abs(before) + std::abs(u) + step) +
+        std::numeric_limits<S>::min();
+    const bool limited = limits.rate < std::numeric_limits<S>::max();
+    if (limited && inside && is_finite(step) && is_finite(u - before) && is_finite(rounding) &&
+        std::abs(u - before) > step + rounding) {
+      study.fail("output", "changes faster than its rate limit");
+    }
+  }
+  return study.done();
+}
+
+}  // namespace
+
+void add_studies(std::vector<Kind>& kinds) {
+  kinds.push_back({"loop of LinearEso<2>", &loop_study<LinearEso<2>>});
+  kinds.push_back({"loop of CascadeEso<1, 2, float>", &loop_study<CascadeEso<1, 2, float>>});
+  kinds.push_back({"loop of ContinuousLinearEso<2>", &loop_study<ContinuousLinearEso<2>>});
+  kinds.push_back({"error bounds", &bound_study});
+  kinds.push_back(
+      {"ContinuousCascadeEso<2, 2>", &continuous_study<ContinuousCascadeEso<2, 2, double>>});
+  kinds.push_back(
+      {"ContinuousNonlinearEso<2, float>", &continuous_study<ContinuousNonlinearEso<2, float>>});
+  kinds.push_back({"ContinuousAdjustableBandwidthEso<2>",
+                   &continuous_study<ContinuousAdjustableBandwidthEso<2, double>>});
+  kinds.push_back(
+      {"ContinuousAlgebraicEso<2>", &continuous_study<ContinuousAlgebraicEso<2, double>>});
+  kinds.push_back({"signals, noise, plants", &signal_study});
+  kinds.push_back({"PI conversion, float", &pid_study<1, float>});
+  kinds.push_back({"PID conversion", &pid_study<2, double>});
+  kinds.push_back({"Limiter<float>", &limiter_study<float>});
+  kinds.push_back({"Limiter<double>", &limiter_study<double>});
+}
+
+}  // namespace fuzz
