@@ -14,7 +14,7 @@
 #include <support/refusal.hpp>
 #include <vector>
 
-#include "analysis/reference.hpp"
+#include "support/reference_observer.hpp"
 
 namespace {
 

@@ -16,7 +16,8 @@
 #include <support/refusal.hpp>
 #include <vector>
 
-#include "analysis/reference.hpp"
+#include "support/numbers.hpp"
+#include "support/reference_observer.hpp"
 
 namespace {
 
@@ -70,15 +71,12 @@ struct BruteLoop {
     for (Eigen::Index i = 0; i < n; ++i) {
       const auto row = static_cast<std::size_t>(i);
       for (Eigen::Index j = 0; j < n; ++j) {
-        f(i, j) = static_cast<double>(m.f[row][static_cast<std::size_t>(j)]);
+        f(i, j) = m.f[row][static_cast<std::size_t>(j)];
       }
-      g_y(i) = static_cast<double>(m.y[row]);
-      g_u(i) = static_cast<double>(m.u[row]);
-      esokit_test::BigVector unit(observer.states(), esokit_test::Big(0));
-      unit[row] = 1;
-      const auto z = observer.estimate(unit);
-      double v = static_cast<double>(z[gains.size()]);
-      for (std::size_t r = 0; r < gains.size(); ++r) v += gains[r] * static_cast<double>(z[r]);
+      g_y(i) = m.y[row];
+      g_u(i) = m.u[row];
+      double v = m.estimate[gains.size()][row];
+      for (std::size_t r = 0; r < gains.size(); ++r) v += gains[r] * m.estimate[r][row];
       law(i) = -v / b0;
     }
   }

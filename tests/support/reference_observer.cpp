@@ -1,23 +1,19 @@
-/// @file
-/// Observers as state spaces, written from the equations of the papers without the library: each
-/// level with its own disturbance, equations (23), (24) of the cascade, in many digits.
-#pragma once
+#include "support/reference_observer.hpp"
 
 #include <boost/multiprecision/cpp_bin_float.hpp>
-#include <complex>
-#include <cstddef>
-#include <vector>
+#include <utility>
 
 #include "support/high_precision.hpp"
 #include "support/numbers.hpp"
 
 namespace esokit_test {
+namespace {
 
 using BigVector = std::vector<Big>;
 using BigMatrix = std::vector<BigVector>;
 
 /// x of a x = b by elimination with row pivoting.
-inline BigVector solve(BigMatrix a, BigVector b) {
+BigVector solve(BigMatrix a, BigVector b) {
   const std::size_t n = b.size();
   for (std::size_t k = 0; k < n; ++k) {
     std::size_t pivot = k;
@@ -44,8 +40,7 @@ inline BigVector solve(BigMatrix a, BigVector b) {
 struct BigComplexVector {
   BigVector re, im;
 };
-inline BigComplexVector resolvent(const BigMatrix& a, const BigVector& b, const Big& re,
-                                  const Big& im) {
+BigComplexVector resolvent(const BigMatrix& a, const BigVector& b, const Big& re, const Big& im) {
   const std::size_t n = b.size();
   BigMatrix stacked(2 * n, BigVector(2 * n, Big(0)));
   BigVector right(2 * n, Big(0));
@@ -65,17 +60,10 @@ inline BigComplexVector resolvent(const BigMatrix& a, const BigVector& b, const 
           BigVector(x.begin() + static_cast<std::ptrdiff_t>(n), x.end())};
 }
 
-/// n, m and the bandwidths of the levels; T = 0 is the continuous observer.
-struct ReferenceObserver {
-  int order, extension;
-  std::vector<double> bandwidths;  // rad/s
-  double input_gain;
-  double sample_time;
+using Response = std::vector<std::array<std::complex<double>, 2>>;
 
-  [[nodiscard]] std::size_t size() const { return static_cast<std::size_t>(order + extension); }
-  [[nodiscard]] std::size_t levels() const { return bandwidths.size(); }
-  [[nodiscard]] std::size_t states() const { return size() * levels(); }
-
+/// The same in many digits.
+struct BigObserver : ReferenceObserver {
   /// Gains of a level in physical units.
   [[nodiscard]] BigVector gain(std::size_t level) const {
     const Big w = bandwidths[level];
@@ -155,13 +143,13 @@ struct ReferenceObserver {
   }
 
   /// The step as matrices: next = f xi + g_y y + g_u u.
-  struct Matrices {
+  struct BigMatrices {
     BigMatrix f;
     BigVector y, u;
   };
-  [[nodiscard]] Matrices matrices() const {
+  [[nodiscard]] BigMatrices exact_matrices() const {
     const std::size_t n = states();
-    Matrices m{BigMatrix(n, BigVector(n)), {}, {}};
+    BigMatrices m{BigMatrix(n, BigVector(n)), {}, {}};
     const BigVector zero(n, Big(0));
     for (std::size_t j = 0; j < n; ++j) {
       BigVector unit = zero;
@@ -178,8 +166,8 @@ struct ReferenceObserver {
   ///
   /// Sampled, xi[k] = f xi[k-1] + g_y y[k] + g_u u[k-1], so from y: z (zI - f)^-1 g_y, from u
   /// (zI - f)^-1 g_u.
-  [[nodiscard]] std::vector<std::array<std::complex<double>, 2>> response(double frequency) const {
-    const Matrices m = matrices();
+  [[nodiscard]] Response exact_response(double frequency) const {
+    const BigMatrices m = exact_matrices();
     Big re = 0;
     Big im = frequency;
     if (sample_time > 0) {
@@ -187,7 +175,7 @@ struct ReferenceObserver {
       re = cos(angle);
       im = sin(angle);
     }
-    std::vector<std::array<std::complex<double>, 2>> result(size());
+    Response result(size());
     for (int input = 0; input < 2; ++input) {
       BigComplexVector x = resolvent(m.f, input == 0 ? m.y : m.u, re, im);
       if (sample_time > 0 && input == 0) {
@@ -207,5 +195,31 @@ struct ReferenceObserver {
     return result;
   }
 };
+
+}  // namespace
+
+ReferenceObserver::Matrices ReferenceObserver::matrices() const {
+  const BigObserver exact{*this};
+  const auto m = exact.exact_matrices();
+  const std::size_t n = states();
+  const auto rounded = [](const BigVector& row) {
+    std::vector<double> result;
+    for (const Big& value : row) result.push_back(static_cast<double>(value));
+    return result;
+  };
+  Matrices result{{}, rounded(m.y), rounded(m.u), {size(), std::vector<double>(n)}};
+  for (const BigVector& row : m.f) result.f.push_back(rounded(row));
+  for (std::size_t j = 0; j < n; ++j) {
+    BigVector unit(n, Big(0));
+    unit[j] = 1;
+    const BigVector z = exact.estimate(unit);
+    for (std::size_t r = 0; r < size(); ++r) result.estimate[r][j] = static_cast<double>(z[r]);
+  }
+  return result;
+}
+
+Response ReferenceObserver::response(double frequency) const {
+  return BigObserver{*this}.exact_response(frequency);
+}
 
 }  // namespace esokit_test
