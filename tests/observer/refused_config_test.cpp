@@ -179,7 +179,9 @@ TYPED_TEST(Refused, CascadeByFactor) {
   // A factor so large that the last level is not finite.
   config = good;
   config.bandwidth_factor = std::numeric_limits<S>::max() / S(1000);
-  EXPECT_EQ(refusal(Observer::make(config)), "observer_bandwidth: must be finite and positive");
+  EXPECT_EQ(
+      refusal(Observer::make(config)),
+      "bandwidth_factor: with observer_bandwidth gives a bandwidth that the scalar cannot hold");
   // One level needs no factor, but a wrong one is wrong.
   EXPECT_EQ((refusal(CascadeEso<2, 1, S>::make(
                 {.observer_bandwidth = 50, .input_gain = 2, .sample_time = S(0.01)}))),

@@ -91,9 +91,12 @@ Expected<LevelSpecs<typename Placement::template Spec<Size, S>, Levels>, Error<S
     if (!rules) return rules.error();
     S bandwidth = config.observer_bandwidth;
     for (S& spec : levels.specs) {
+      rules.require(all(is_finite(bandwidth)), "bandwidth_factor", config.bandwidth_factor,
+                    "with observer_bandwidth gives a bandwidth that the scalar cannot hold");
       spec = bandwidth;
       bandwidth = bandwidth * config.bandwidth_factor;
     }
+    if (!rules) return rules.error();
     return levels;
   }
 }
