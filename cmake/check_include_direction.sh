@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Refuses every include in include/esokit that goes against
-#   core <- model <- design <- observer <- control <- analysis <- sim
-# an umbrella header that does not include every other header, and a header that reaches C++20 before
+#   core <- model <- design <- observer <- control <- eigen.hpp <- analysis <- sim
+# and every header from core to control, what runs in a controller, that needs Eigen or another header
+# that costs more than a controller; an umbrella header that does not include every other header, and a header that reaches C++20 before
 # core/language.hpp, which says that it is needed.
 # usage: cmake/check_include_direction.sh [INCLUDE_DIR | --self-test]
 set -euo pipefail
@@ -21,7 +22,7 @@ check() {  # check INCLUDE_DIR
   fi
   (cd "$include_dir" && awk '
     BEGIN {
-      count = split("core model design observer control analysis sim", order, " ")
+      count = split("core model design observer control eigen.hpp analysis sim", order, " ")
       for (i = 1; i <= count; ++i) rank[order[i]] = i
       for (i = 1; i < ARGC; ++i) {
         known[ARGV[i]] = 1
@@ -51,6 +52,7 @@ check() {  # check INCLUDE_DIR
       if (target ~ /(^|\/)\.\.?\//) { refuse("relative include"); next }
       if (target !~ /^esokit\//) {
         if (opening == "\"") refuse("relative include")
+        else if (target ~ /^Eigen\// && mine && mine < rank["eigen.hpp"]) refuse("Eigen where a controller runs")
         else if (target ~ /\// && target !~ /^Eigen\//) refuse("dependency other than Eigen")
         next
       }
@@ -75,26 +77,60 @@ check() {  # check INCLUDE_DIR
     }' "${headers[@]}")
 }
 
+# Included by those who want them alone: pole sets, and text for programs with a console.
+apart="esokit/design/pole_set.hpp esokit/core/error_text.hpp esokit/core/snapshot_text.hpp"
+heavy="algorithm complex deque fstream functional iomanip ios iostream istream iterator locale map memory"
+heavy+=" numeric ostream random ranges regex set span sstream string thread unordered_map vector"
+
+check_weight() {  # check_weight INCLUDE_DIR: by the compiler, which has no Eigen on its path
+  local include_dir=$1 header files file status=0
+  while IFS= read -r header; do
+    [[ " $apart " != *" $header "* ]] || continue
+    if ! files=$(echo "#include <$header>" | "${CXX:-g++}" -std=c++20 "-I$include_dir" -x c++ -M - 2>&1); then
+      grep -m 1 -E 'error|No such file' <<<"$files"
+      status=1
+      continue
+    fi
+    for file in $files; do
+      if [[ $file == */Eigen/* || $file == */c++/* && " $heavy " == *" ${file##*/} "* ]]; then
+        echo "$header: includes, itself or by another header: $file"
+        status=1
+      fi
+    done
+  done < <(cd "$include_dir" && find esokit/{core,model,design,observer,control} -name '*.hpp' | LC_ALL=C sort)
+  return "$status"
+}
+
 self_test() {  # the check must be able to fail
   local folder case line
   folder=$(mktemp -d)
   trap 'rm -rf "$folder"' RETURN
-  mkdir -p "$folder"/esokit/{core,model,sim}
+  mkdir -p "$folder"/esokit/{core,model,design,observer,control,sim}
   printf '#include <esokit/%s.hpp>\n' core/language core/a model/b sim/c >"$folder/esokit/esokit.hpp"
   touch "$folder/esokit/core/language.hpp"
-  printf '#include <cmath>\n#include <Eigen/Core>\n#include <esokit/core/language.hpp>\n' >"$folder/esokit/core/a.hpp"
+  printf '#include <cmath>\n#include <esokit/core/language.hpp>\n' >"$folder/esokit/core/a.hpp"
   echo '#include "esokit/core/a.hpp"' >"$folder/esokit/model/b.hpp"
-  echo '#include <esokit/model/b.hpp>' >"$folder/esokit/sim/c.hpp"
-  check "$folder" || { echo "self-test: a good tree is refused"; return 1; }
+  printf '#include <Eigen/Core>\n#include <esokit/model/b.hpp>\n' >"$folder/esokit/sim/c.hpp"
+  check "$folder" && check_weight "$folder" || { echo "self-test: a good tree is refused"; return 1; }
   for line in '#include <esokit/sim/c.hpp>' '  # include "esokit/sim/c.hpp"' '#include "b.hpp"' \
     '#include "../core/a.hpp"' '#include <esokit/core/../core/a.hpp>' '#include <esokit/core/x.hpp>' \
-    '#include <esokit/esokit.hpp>' '#include <boost/any.hpp>' '#include HEADER'; do
+    '#include <esokit/esokit.hpp>' '#include <boost/any.hpp>' '#include HEADER' '#include <Eigen/Core>'; do
     echo "$line" >"$folder/esokit/model/bad.hpp"
     if check "$folder" >/dev/null; then
       echo "self-test: not refused: $line"
       return 1
     fi
   done
+  for line in '#include <esokit/sim/c.hpp>' '#include <complex>' '#include <sstream>' '#include <iostream>' \
+    '#include <string>' '#include <random>'; do
+    echo "$line" >"$folder/esokit/core/bad.hpp"
+    echo '#include <esokit/core/bad.hpp>' >"$folder/esokit/model/bad.hpp"
+    if check_weight "$folder" >/dev/null; then
+      echo "self-test: not refused by its weight: $line"
+      return 1
+    fi
+  done
+  rm "$folder/esokit/core/bad.hpp"
   echo '#include <cmath>' >"$folder/esokit/model/bad.hpp"
   if check "$folder" >/dev/null; then
     echo "self-test: a header that the umbrella lacks is not refused"
@@ -116,5 +152,8 @@ self_test() {  # the check must be able to fail
 
 case ${1:-} in
   --self-test) self_test ;;
-  *) check "${1:-$root/include}" ;;
+  *)
+    check "${1:-$root/include}"
+    check_weight "${1:-$root/include}"
+    ;;
 esac

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <esokit/control/adrc_law.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <string>
@@ -67,16 +68,16 @@ struct Textbook2 {
 /// A fixed-gain observer on dense Eigen matrices, any size.
 template <class S, int Size>
 struct DenseEigen {
-  Vector<S, Size> state = Vector<S, Size>::Zero();
-  Matrix<S, Size, Size> transition;
-  Vector<S, Size> input;
-  Vector<S, Size> gain;
+  EigenMatrix<S, Size> state = EigenMatrix<S, Size>::Zero();
+  EigenMatrix<S, Size, Size> transition;
+  EigenMatrix<S, Size> input;
+  EigenMatrix<S, Size> gain;
   S innovation{}, applied_input{};
 
   bool update(S y, S u) noexcept {
-    const Vector<S, Size> predicted = transition * state + input * u;
+    const EigenMatrix<S, Size> predicted = transition * state + input * u;
     const S e = y - predicted(0);
-    const Vector<S, Size> next = predicted + gain * e;
+    const EigenMatrix<S, Size> next = predicted + gain * e;
     if (!is_finite(next.sum())) return false;
     state = next;
     innovation = e;

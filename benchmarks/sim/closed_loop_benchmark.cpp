@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <esokit/control/adrc_law.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/sim/closed_loop.hpp>
@@ -47,11 +48,11 @@ class StepCount {
 
 void integrator(benchmark::State& state) {
   StepCount count(state);
-  const auto rate = [](double, const Vector<double, 2>& s) {
-    return Vector<double, 2>(s(1), -stiffness * s(0) - damping * s(1));
+  const auto rate = [](double, const EigenMatrix<double, 2>& s) {
+    return EigenMatrix<double, 2>(s(1), -stiffness * s(0) - damping * s(1));
   };
   while (count.running()) {
-    Vector<double, 2> x(1.0, 0.0);
+    EigenMatrix<double, 2> x(1.0, 0.0);
     benchmark::DoNotOptimize(x);
     x = integrate(rate, 0.0, x, h, steps);
     benchmark::DoNotOptimize(x);

@@ -24,6 +24,7 @@
 
 #include <esokit/analysis/error_bound.hpp>
 #include <esokit/analysis/peak_gain.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/sim/gaussian.hpp>
 #include <esokit/sim/runge_kutta.hpp>
 
@@ -44,11 +45,11 @@ class Run {
  public:
   static constexpr int size = Observer::size;
   static constexpr int states = size + Observer::states;
-  using State = Vector<double, states>;
+  using State = EigenMatrix<double, states>;
 
   Run(const Observer& observer, double step) : observer_(observer), step_(step) {}
 
-  void start_at(const Vector<double, size>& z) { state_.template head<size>() = z; }
+  void start_at(const EigenMatrix<double, size>& z) { state_.template head<size>() = z; }
   void step(double rate_of_d) {
     observer_.begin_step(t_, state_.template tail<Observer::states>(), state_(0));
     const auto rate = [&](double t, const State& x) -> State {
@@ -56,7 +57,7 @@ class Run {
       for (int i = 0; i + 1 < size; ++i) derivative(i) = x(i + 1);
       derivative(size - 1) = rate_of_d;
       derivative.template tail<Observer::states>() =
-          observer_.derivative(t, x.template tail<Observer::states>(), x(0), 0.0);
+          eigen(observer_.derivative(t, x.template tail<Observer::states>(), x(0), 0.0));
       return derivative;
     };
     state_ = sim::step(rate, t_, state_, step_);
@@ -83,7 +84,7 @@ struct Trace {
 /// The run whose input is the worst for the error of dhat at its end.
 template <class Observer>
 Trace worst_run(const Observer& observer, double step, double duration,
-                const Vector<double, Observer::size>& initial) {
+                const EigenMatrix<double, Observer::size>& initial) {
   const int steps = static_cast<int>(duration / step);
   Run<Observer> impulse(observer, step);
   std::vector<double> response;
@@ -123,17 +124,17 @@ Entry cascade_entry(double factor) {
                     .back()
                     .ultimate()(order);
   entry.worst = peak_gain(error_system(observer)).value()(order, 1);
-  entry.simulated = worst_run(observer, 5e-4, 2.0, Vector<double, 3>::Zero()).last;
+  entry.simulated = worst_run(observer, 5e-4, 2.0, EigenMatrix<double, 3>::Zero()).last;
   return entry;
 }
 
 /// The adjustable-bandwidth law: rho omega while abs(e) shrinks, omega otherwise.
 struct Adjustable {
   static constexpr esokit::ContinuousGainLawTraits traits{.begins_steps = true};
-  Vector<double, 3> shrinking, otherwise;
+  EigenMatrix<double, 3> shrinking, otherwise;
   double before = 0.0;
   bool shrinks = false;
-  [[nodiscard]] const Vector<double, 3>& gain(double, double) const {
+  [[nodiscard]] const EigenMatrix<double, 3>& gain(double, double) const {
     return shrinks ? shrinking : otherwise;
   }
   void begin_step(double, double e) {
@@ -148,8 +149,8 @@ Adjustable adjustable() {
 
 /// Gains k(e) times those of the bandwidth, k between two limits: the nonlinear observer.
 struct Nonlinear {
-  Vector<double, 4> gains;
-  [[nodiscard]] Vector<double, 4> gain(double, double e) const {
+  EigenMatrix<double, 4> gains;
+  [[nodiscard]] EigenMatrix<double, 4> gain(double, double e) const {
     return std::clamp(30.0 * std::sqrt(std::abs(e)), 0.5, 3.0) * gains;
   }
 };
@@ -201,7 +202,7 @@ int main(int argc, char** argv) {
   }
 
   // From a wrong start: what the bound says over time.
-  const Vector<double, 3> initial(0.05, 1.0, 20.0);
+  const EigenMatrix<double, 3> initial(0.05, 1.0, 20.0);
   const ContinuousLinearEso<order>::Config config{.observer_bandwidth = w, .input_gain = 1.0};
   const auto linear = linear_error_bound(config, {.disturbance_rate = 1.0}).value();
   const auto observer = ContinuousLinearEso<order>::make(config).value();

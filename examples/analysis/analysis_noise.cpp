@@ -22,6 +22,7 @@
 
 #include <esokit/analysis/adrc_loop.hpp>
 #include <esokit/analysis/covariance.hpp>
+#include <esokit/eigen.hpp>
 
 #include "analysis/analysis.hpp"
 #include "common/parallel.hpp"
@@ -48,7 +49,7 @@ auto make_loop(double T) {
 template <int Order, int Levels>
 double deviation_of_control(double T) {
   const auto loop = make_loop<Order, Levels>(T);
-  Matrix<double, 3, 3> input = Matrix<double, 3, 3>::Zero();
+  EigenMatrix<double, 3, 3> input = EigenMatrix<double, 3, 3>::Zero();
   input(1, 1) = 1.0;
   return std::sqrt(output_covariance(loop.closed_loop(), input).value()(1, 1));
 }

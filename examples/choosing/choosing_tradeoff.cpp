@@ -26,6 +26,7 @@
 #include <esokit/analysis/covariance.hpp>
 #include <esokit/analysis/frequency_response.hpp>
 #include <esokit/analysis/observer_system.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
@@ -189,12 +190,12 @@ int main(int argc, char** argv) {
     config.sample_time = sample_time;
     config.measurement_variance = 1.0;
     // The walk drives y and y' within the sample as well.
-    Matrix<double, 3, 3> noise;
+    EigenMatrix<double, 3, 3> noise;
     const double t = sample_time;
     noise << t * t * t * t * t / 20, t * t * t * t / 8, t * t * t / 6, t * t * t * t / 8,
         t * t * t / 3, t * t / 2, t * t * t / 6, t * t / 2, t;
-    config.process_covariance = Matrix<double, 3, 3>(q * q * noise);
-    config.initial_covariance = Matrix<double, 3, 3>::Identity();
+    config.process_covariance = EigenMatrix<double, 3, 3>(q * q * noise);
+    config.initial_covariance = EigenMatrix<double, 3, 3>::Identity();
     config.inflation_rule = InflationRule::none;
     config.mode = RiccatiMode::frozen;
     return ExtendedStateFilter<order>::make(config).value();

@@ -23,6 +23,7 @@
 #include <Eigen/Eigenvalues>
 
 #include <esokit/control/adrc.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/model/integrator_chain.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
@@ -203,9 +204,10 @@ double spectral_radius(double omega_t, int every, bool follow) {
                       .value();
   for (int i = 0; i < (follow ? every : 1); ++i) observer.predict(0);
   observer.correct(1);
-  esokit::Matrix<double, size, size> error = esokit::Matrix<double, size, size>::Identity();
+  esokit::EigenMatrix<double, size, size> error =
+      esokit::EigenMatrix<double, size, size>::Identity();
   for (int i = 0; i < every; ++i) error = Chain::transition_matrix(1.0) * error;
-  error -= observer.estimate() * Chain::output_matrix() * error;
+  error -= eigen(observer.estimate() * Chain::output_matrix() * error);
   return Eigen::MatrixXd(error).eigenvalues().cwiseAbs().maxCoeff();
 }
 
@@ -256,7 +258,8 @@ double tracking_error(const Faults& faults, std::uint64_t seed) {
   double t = 0, sum = 0, time = 0, dt = nominal;
   for (int k = 0; k < 10000; ++k) {
     controller.set_step_time(dt).value();
-    const esokit::Vector<double, 3> r(std::sin(6 * t), 6 * std::cos(6 * t), -36 * std::sin(6 * t));
+    const esokit::EigenMatrix<double, 3> r(std::sin(6 * t), 6 * std::cos(6 * t),
+                                           -36 * std::sin(6 * t));
     double y = plant.y + 2e-4 * noise.next();
     if (happens(faults.bad)) y = std::numeric_limits<double>::quiet_NaN();
     const double u = happens(faults.missing) ? controller.update_without_measurement(r)

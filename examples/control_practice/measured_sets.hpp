@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <esokit/eigen.hpp>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -231,10 +232,11 @@ inline void acrobot(Report& report, const std::filesystem::path& data) {
         const std::size_t to = std::min(at + 150, count);
         for (std::size_t k = from; k < to; ++k) used[k] = true;
         if (largest < 0.2 || at < 100 || at + 150 > count) continue;
-        esokit::Matrix<double, 3, 3> normal = esokit::Matrix<double, 3, 3>::Zero();
-        esokit::Vector<double, 3> right = esokit::Vector<double, 3>::Zero();
+        esokit::EigenMatrix<double, 3, 3> normal = esokit::EigenMatrix<double, 3, 3>::Zero();
+        esokit::EigenMatrix<double, 3> right = esokit::EigenMatrix<double, 3>::Zero();
         for (std::size_t k = from; k < to; ++k) {
-          const esokit::Vector<double, 3> line(filtered[k], 1, static_cast<double>(k - from) / 300);
+          const esokit::EigenMatrix<double, 3> line(filtered[k], 1,
+                                                    static_cast<double>(k - from) / 300);
           normal += line * line.transpose();
           right += line * torque[k];
         }

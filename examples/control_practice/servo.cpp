@@ -36,6 +36,7 @@
 
 #include <esokit/control/adrc.hpp>
 #include <esokit/design/pid_conversion.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
@@ -69,7 +70,7 @@ constexpr int seeds = 20;
 constexpr int retune_sample = 3200;
 
 /// (r, r', r'').
-esokit::Vector<double, 3> reference(double t) {
+esokit::EigenMatrix<double, 3> reference(double t) {
   if (t < 0.1) return {0, 0, 0};
   if (t < 1.3) return {1.5, 0, 0};
   if (t < 3.5) return {-0.5, 0, 0};
@@ -110,7 +111,7 @@ struct Run {
 /// One controller as the run sees it.
 struct Controller {
   std::string name;
-  std::function<double(double, const esokit::Vector<double, 3>&)> update;
+  std::function<double(double, const esokit::EigenMatrix<double, 3>&)> update;
   std::function<void()> retune;
   std::function<double()> disturbance;
 };
@@ -128,10 +129,11 @@ Controller adrc(std::string name, std::function<typename Observer::Config(double
     return all;
   };
   auto shared = std::make_shared<C>(C::make(settings(observer)).value());
-  return {std::move(name),
-          [shared](double y, const esokit::Vector<double, 3>& r) { return shared->update(y, r); },
-          [shared, settings] { shared->retune(settings(faster_observer)).value(); },
-          [shared] { return shared->observer().total_disturbance(); }};
+  return {
+      std::move(name),
+      [shared](double y, const esokit::EigenMatrix<double, 3>& r) { return shared->update(y, r); },
+      [shared, settings] { shared->retune(settings(faster_observer)).value(); },
+      [shared] { return shared->observer().total_disturbance(); }};
 }
 
 std::vector<Controller> controllers() {
@@ -147,7 +149,8 @@ std::vector<Controller> controllers() {
                                                .upper = limit,
                                                .sample_time = sample_time});
   all.push_back(
-      {"PID", [pid](double y, const esokit::Vector<double, 3>& r) { return pid->update(y, r(0)); },
+      {"PID",
+       [pid](double y, const esokit::EigenMatrix<double, 3>& r) { return pid->update(y, r(0)); },
        [] {}, [] { return std::numeric_limits<double>::quiet_NaN(); }});
   all.push_back(adrc<esokit::LinearEso<2>>("LESO", [](double bandwidth) {
     return esokit::LinearEso<2>::Config{

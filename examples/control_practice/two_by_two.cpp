@@ -21,6 +21,7 @@
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/core/error_text.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/linear_eso.hpp>
 
 #include "common/report.hpp"
@@ -31,7 +32,7 @@ using namespace practice;
 
 namespace {
 
-using Pair = esokit::Vector<double, 2>;
+using Pair = esokit::EigenMatrix<double, 2>;
 using esokit::LinearEso;
 using Mimo = esokit::MimoAdrc<LinearEso<2>, LinearEso<1>>;
 
@@ -43,7 +44,7 @@ Mimo::Config config() {
                                       {.observer_bandwidth = 60, .sample_time = sample_time}},
                         .controller_bandwidths = {8, 10},
                         .limits = {{{.lower = -50, .upper = 50}, {.lower = -30, .upper = 30}}}};
-  settings.input_matrix << 1.8, 1.2, 1.0, 2.6;
+  settings.input_matrix = {{1.8, 1.2}, {1.0, 2.6}};
   return settings;
 }
 
@@ -124,7 +125,7 @@ int main(int argc, char** argv) {
   report.comparison("table", "Coupling with and without B0^-1");
 
   auto ill = config();
-  ill.input_matrix << 1, 1, 1, 1.001;
+  ill.input_matrix = {{1, 1}, {1, 1.001}};
   const auto refused = Mimo::make(ill);
   report.expect("ill-conditioned B0", "condition number", refused ? 0.0 : refused.error().value,
                 !refused, refused ? "accepted" : "refused: " + esokit::to_text(refused.error()));

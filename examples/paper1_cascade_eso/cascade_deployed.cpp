@@ -30,6 +30,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <esokit/eigen.hpp>
 #include <string>
 #include <vector>
 
@@ -64,7 +65,7 @@ Criteria run_deployed(double bandwidth, double sample_time, double power, std::u
 
   const sim::SampledLoop loop{
       plant, esokit::CascadeEso<2, Levels>::make(config).value(),
-      [&law](double, const Vector<double, 3>& e) { return law.control_error_based(e); },
+      [&law](double, const EigenMatrix<double, 3>& e) { return law.control_error_based(e); },
       sim::MeasuredError{y_d}, measurement_noise(power, sample_time, seed)};
   Meter meter(series);
   double held = 0.0;

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include <esokit/control/adrc_law.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/sim/closed_loop.hpp>
 #include <esokit/sim/filtered_step.hpp>
@@ -27,7 +28,7 @@
 
 namespace paper1 {
 
-using esokit::Vector;
+using esokit::EigenMatrix;
 namespace sim = esokit::sim;
 
 inline const std::string folder = "paper1_cascade_eso";
@@ -87,7 +88,7 @@ class Kept {
 class GenericPlant {
  public:
   static constexpr int states = 2;
-  using State = Vector<double, 2>;
+  using State = EigenMatrix<double, 2>;
 
   enum class Disturbance { through_gain, beside_gain };
 
@@ -209,14 +210,15 @@ Criteria run_generic(double bandwidth, double power, std::uint64_t seed, const S
   if (setup.error_based) {
     const sim::ContinuousLoop loop{
         plant, observer,
-        [&law](double, const Vector<double, 3>& e) { return law.control_error_based(e); },
+        [&law](double, const EigenMatrix<double, 3>& e) { return law.control_error_based(e); },
         sim::MeasuredError{y_d}, noise};
     (void)loop.run({.duration = duration, .step = step}, record).value();
   } else {
     const sim::ContinuousLoop loop{plant, observer,
-                                   [&](double t, const Vector<double, 3>& z) {
+                                   [&](double t, const EigenMatrix<double, 3>& z) {
                                      const auto r = y_d.template derivatives<3>(t);
-                                     return law.control(z, Vector<double, 3>(r[0], r[1], r[2]));
+                                     return law.control(z,
+                                                        EigenMatrix<double, 3>(r[0], r[1], r[2]));
                                    },
                                    sim::MeasuredOutput{}, noise};
     (void)loop.run({.duration = duration, .step = step}, record).value();

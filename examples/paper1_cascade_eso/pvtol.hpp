@@ -13,6 +13,7 @@
 #include <vector>
 
 #include <esokit/control/adrc_law.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/sim/noise.hpp>
 #include <esokit/sim/runge_kutta.hpp>
@@ -21,7 +22,7 @@
 
 namespace paper1 {
 
-using esokit::Vector;
+using esokit::EigenMatrix;
 namespace sim = esokit::sim;
 
 /// x'' = -sin th (v1 + d1),  z'' = cos th (v1 + d1) - 1,  th'' = v2 + d2, with the input of the two
@@ -29,8 +30,8 @@ namespace sim = esokit::sim;
 ///
 /// State: x, x', z, z', th, th', v1, v1'.
 struct Pvtol {
-  using State = Vector<double, 8>;
-  using Pair = Vector<double, 2>;  ///< (x, z) channels
+  using State = EigenMatrix<double, 8>;
+  using Pair = EigenMatrix<double, 2>;  ///< (x, z) channels
 
   bool wind = false;
 
@@ -79,14 +80,14 @@ struct Pvtol {
   }
 
   /// (x, x', x'', x''') and (z, ..): what the observers estimate.
-  std::array<Vector<double, 4>, 2> chain_states(double t, const State& s) const {
+  std::array<EigenMatrix<double, 4>, 2> chain_states(double t, const State& s) const {
     const double sine = std::sin(s(4));
     const double cosine = std::cos(s(4));
     const Jet wind_force = d1(t);
     const double a = s(6) + wind_force[0];
     const double a1 = s(7) + wind_force[1];
-    return {Vector<double, 4>(s(0), s(1), -sine * a, -cosine * s(5) * a - sine * a1),
-            Vector<double, 4>(s(2), s(3), cosine * a - 1.0, -sine * s(5) * a + cosine * a1)};
+    return {EigenMatrix<double, 4>(s(0), s(1), -sine * a, -cosine * s(5) * a - sine * a1),
+            EigenMatrix<double, 4>(s(2), s(3), cosine * a - 1.0, -sine * s(5) * a + cosine * a1)};
   }
 };
 
@@ -130,7 +131,7 @@ PvtolCriteria run_pvtol(const PvtolSetup& setup, std::uint64_t seed = 0,
                         PvtolSeries* series = nullptr) {
   using Observer = esokit::ContinuousCascadeEso<4, Levels>;
   constexpr int n = Observer::states;
-  using Stacked = Vector<double, 8 + 2 * n>;
+  using Stacked = EigenMatrix<double, 8 + 2 * n>;
   using Pair = Pvtol::Pair;
 
   typename Observer::Config config{.observer_bandwidth = setup.bandwidth, .input_gain = 1.0};
@@ -165,23 +166,23 @@ PvtolCriteria run_pvtol(const PvtolSetup& setup, std::uint64_t seed = 0,
     const auto truth = plant.chain_states(0.0, start.template head<8>());
     for (int channel = 0; channel < 2; ++channel) {
       typename Observer::Estimate estimate = Observer::Estimate::Zero();
-      estimate.template head<4>() = truth[static_cast<std::size_t>(channel)];
-      start.template segment<n>(8 + channel * n) = Observer::state_at(estimate);
+      eigen(estimate).template head<4>() = truth[static_cast<std::size_t>(channel)];
+      start.template segment<n>(8 + channel * n) = eigen(Observer::state_at(estimate));
     }
   }
 
   // Two stages of a step share their time, the first one and the sample too.
   double reference_time = -1.0;
-  Vector<double, 5> r_x, r_z;
+  EigenMatrix<double, 5> r_x, r_z;
   const auto references_at = [&](double t) {
     if (t == reference_time) return;
     reference_time = t;
-    r_x = Vector<double, 5>(reference_x.derivatives<5>(t).data());
-    r_z = Vector<double, 5>(reference_z.derivatives<5>(t).data());
+    r_x = EigenMatrix<double, 5>(reference_x.derivatives<5>(t).data());
+    r_z = EigenMatrix<double, 5>(reference_z.derivatives<5>(t).data());
   };
   const auto control = [&](double t, const Stacked& s) {
     references_at(t);
-    const auto channel = [&](int first, const Vector<double, 5>& reference) {
+    const auto channel = [&](int first, const EigenMatrix<double, 5>& reference) {
       const typename Observer::State z = s.template segment<n>(first);
       return law->control(Observer::estimate(z), reference);
     };
@@ -234,8 +235,8 @@ PvtolCriteria run_pvtol(const PvtolSetup& setup, std::uint64_t seed = 0,
       const typename Observer::State z_z = state.template segment<n>(8 + n);
       Stacked result_rate;
       result_rate << plant.derivative(time, state.template head<8>(), input),
-          observer.derivative(time, z_x, state(0) + noise(0), input(0)),
-          observer.derivative(time, z_z, state(2) + noise(1), input(1));
+          eigen(observer.derivative(time, z_x, state(0) + noise(0), input(0))),
+          eigen(observer.derivative(time, z_z, state(2) + noise(1), input(1)));
       return result_rate;
     };
     s = sim::step(rate, t, s, setup.step);

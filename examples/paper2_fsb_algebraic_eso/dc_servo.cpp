@@ -40,6 +40,7 @@
 #include <cmath>
 #include <cstddef>
 #include <esokit/control/adrc_law.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/sim/closed_loop.hpp>
@@ -69,7 +70,7 @@ constexpr double step = 1e-3;       // s
 /// The drive; the third state is the integral of u, from which the mean over a step is taken.
 struct Servo {
   static constexpr int states = 3;
-  using State = Vector<double, 3>;
+  using State = EigenMatrix<double, 3>;
   State derivative(double, const State& x, double u) const { return {x(1), a * x(1) + b * u, u}; }
   double output(double, const State& x) const { return x(0); }
 };
@@ -115,10 +116,10 @@ struct Run {
   }
 };
 
-double control(double t, const Vector<double, 3>& estimate) {
+double control(double t, const EigenMatrix<double, 3>& estimate) {
   static const auto law =
       esokit::AdrcLaw<2>::make({.controller_bandwidth = omega_c, .input_gain = b0}).value();
-  return law.control(estimate, Vector<double, 3>(std::sin(t), std::cos(t), -std::sin(t)));
+  return law.control(estimate, EigenMatrix<double, 3>(std::sin(t), std::cos(t), -std::sin(t)));
 }
 
 /// Continuous simulation.
@@ -130,7 +131,7 @@ Run run_paper(const Observer& observer, const Row& row, bool keep) {
   (void)loop
       .run({.duration = duration,
             .step = step,
-            .plant_state = Vector<double, 3>(row.position, row.velocity, 0.0)},
+            .plant_state = EigenMatrix<double, 3>(row.position, row.velocity, 0.0)},
            [&](const auto& sample) {
              run.add(sample, keep);
              if (sample.index > 0) {
@@ -151,7 +152,7 @@ Run run_deployed(const Observer& observer, const Row& row) {
   (void)loop
       .run({.duration = duration,
             .sample_time = step,
-            .plant_state = Vector<double, 3>(row.position, row.velocity, 0.0)},
+            .plant_state = EigenMatrix<double, 3>(row.position, row.velocity, 0.0)},
            [&](const auto& sample) {
              run.add(sample, false);
              run.most[2] = std::max(run.most[2], std::abs(sample.input));

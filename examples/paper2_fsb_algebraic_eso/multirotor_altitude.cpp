@@ -38,6 +38,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <esokit/control/adrc_law.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/sim/closed_loop.hpp>
@@ -79,7 +80,7 @@ constexpr std::size_t seeds = 20;
 
 struct Multirotor {
   static constexpr int states = 2;
-  using State = Vector<double, 2>;
+  using State = EigenMatrix<double, 2>;
   State derivative(double, const State& x, double u) const {
     return {x(1), -gravity + (external + u) / mass};
   }
@@ -103,8 +104,9 @@ struct Run {
 auto law_for(double b0) {
   const auto law =
       esokit::AdrcLaw<2>::make({.controller_bandwidth = omega_c, .input_gain = b0}).value();
-  return
-      [law](double, const Vector<double, 3>& estimate) { return law.control(estimate, set_point); };
+  return [law](double, const EigenMatrix<double, 3>& estimate) {
+    return law.control(estimate, set_point);
+  };
 }
 
 sim::HeldNoise<> measurement_noise(double level, std::uint64_t seed) {

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <array>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/algebraic_filter.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <string>
@@ -16,7 +17,7 @@
 
 namespace paper2 {
 
-using esokit::Vector;
+using esokit::EigenMatrix;
 
 inline const std::string folder = "paper2_fsb_algebraic_eso";
 
@@ -44,7 +45,7 @@ class BlankedFilter {
   static constexpr int states = size + 1;  ///< filter and clock
   using scalar_type = double;
   using Estimate = typename Filter::Estimate;
-  using State = Vector<double, states>;
+  using State = EigenMatrix<double, states>;
 
   /// @param lambda, q rad/s @param blanking epsilon, s
   BlankedFilter(double lambda, double q, double input_gain, double blanking)
@@ -55,7 +56,7 @@ class BlankedFilter {
 
   State derivative(double t, const State& z, double y, double u) const {
     State rate;
-    rate << filter_.derivative(t, z.template head<size>(), y, u), 1.0;
+    rate << eigen(filter_.derivative(t, z.template head<size>(), y, u)), 1.0;
     return rate;
   }
 

@@ -30,6 +30,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/sim/runge_kutta.hpp>
 #include <string>
@@ -58,11 +59,11 @@ constexpr double duration = 10.0;  // s
 
 double weight_torque(double angle) { return mass * arm * gravity * std::cos(angle); }
 
-double input(const Vector<double, 2>& x) {
+double input(const EigenMatrix<double, 2>& x) {
   return weight_torque(x(0)) - inertia * (omega_c * omega_c * x(0) + 2.0 * omega_c * x(1));
 }
 
-double disturbance(const Vector<double, 2>& x) { return -weight_torque(x(0)) / inertia; }
+double disturbance(const EigenMatrix<double, 2>& x) { return -weight_torque(x(0)) / inertia; }
 
 struct Run {
   double velocity_error = 0.0;     ///< largest, rad/s; of the FSB observer from epsilon on
@@ -73,22 +74,22 @@ struct Run {
 
 template <class Observer>
 Run run(const Observer& observer, double from) {
-  using State = Vector<double, 2 + Observer::states>;
+  using State = EigenMatrix<double, 2 + Observer::states>;
   Run result;
   State s = State::Zero();
   s(0) = start;
   const auto rate = [&](double t, const State& state) -> State {
-    const Vector<double, 2> x = state.template head<2>();
+    const EigenMatrix<double, 2> x = state.template head<2>();
     const typename Observer::State z = state.template tail<Observer::states>();
     const double u = input(x);
     State change;
-    change << x(1), disturbance(x) + u / inertia, observer.derivative(t, z, x(0), u);
+    change << x(1), disturbance(x) + u / inertia, esokit::eigen(observer.derivative(t, z, x(0), u));
     return change;
   };
   const auto steps = static_cast<int>(std::lround(duration / step));
   for (int k = 0; k <= steps; ++k) {
     const double t = k * step;
-    const Vector<double, 2> x = s.template head<2>();
+    const EigenMatrix<double, 2> x = s.template head<2>();
     const typename Observer::State inner = s.template tail<Observer::states>();
     const auto z = observer.estimate(inner);
     if (t >= from - 1e-9) {

@@ -27,6 +27,7 @@
 #include <esokit/analysis/poles.hpp>
 #include <esokit/design/continuous_gain.hpp>
 #include <esokit/design/switching_certificate.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 
 #include "common/parallel.hpp"
@@ -35,24 +36,24 @@
 
 using namespace esokit::examples;
 using namespace paper3;
+using esokit::EigenMatrix;
 using esokit::EqualSampledPoles;
-using esokit::Matrix;
 using esokit::SwitchingRule;
 
 namespace {
 
 /// A - l C with all poles at -bandwidth.
 template <int N>
-Matrix<double, N, N> error_matrix(double bandwidth) {
-  Matrix<double, N, N> a = esokit::IntegratorChain<N - 1>::state_matrix();
-  a.col(0) -= esokit::continuous_gain<N, double>(bandwidth);
+EigenMatrix<double, N, N> error_matrix(double bandwidth) {
+  EigenMatrix<double, N, N> a = esokit::IntegratorChain<N - 1>::state_matrix();
+  a.col(0) -= eigen(esokit::continuous_gain<N, double>(bandwidth));
   return a;
 }
 
 /// exp(A t) where A + w I is nilpotent: a finite sum.
 template <int N>
-Matrix<double, N, N> transition(double bandwidth, double t) {
-  using Square = Matrix<double, N, N>;
+EigenMatrix<double, N, N> transition(double bandwidth, double t) {
+  using Square = EigenMatrix<double, N, N>;
   const Square nilpotent = (error_matrix<N>(bandwidth) + bandwidth * Square::Identity()) * t;
   Square term = Square::Identity();
   Square sum = term;
@@ -74,7 +75,7 @@ template <int N>
 Switching worst_switching(double ratio) {
   constexpr std::size_t nodes = 60;
   std::array<double, nodes> dwell{};
-  std::vector<Matrix<double, N, N>> fast, slow;
+  std::vector<EigenMatrix<double, N, N>> fast, slow;
   for (std::size_t i = 0; i < nodes; ++i) {
     dwell[i] = 0.05 * std::pow(60.0 / 0.05, static_cast<double>(i) / (nodes - 1));
     fast.push_back(transition<N>(1.0, dwell[i]));
@@ -166,7 +167,7 @@ Curve trajectory(double ratio, const Switching& switching, double duration) {
   constexpr double step = 0.02;
   const auto fast = transition<3>(1.0, step);
   const auto slow = transition<3>(ratio, step);
-  Vector<double, 3> e(1.0, 0.0, 0.0);
+  EigenMatrix<double, 3> e(1.0, 0.0, 0.0);
   Curve curve;
   for (double t = 0.0; t < duration; t += step) {
     curve.add(t, e.norm());
@@ -185,10 +186,10 @@ Curve own_switching(double ratio, double duration) {
                                                            .input_gain = 1.0,
                                                            .sample_time = step})
                       .value();
-  (void)observer.reset(Vector<double, 3>(1.0, 0.0, 0.0));
+  (void)observer.reset(EigenMatrix<double, 3>(1.0, 0.0, 0.0));
   Curve curve;
   for (double t = 0.0; t < duration; t += step) {
-    curve.add(t, observer.estimate().norm());
+    curve.add(t, eigen(observer.estimate()).norm());
     (void)observer.update(0.0, 0.0);
   }
   return curve;

@@ -17,6 +17,7 @@
 
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/design/continuous_gain.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/continuous_observer.hpp>
 #include <esokit/sim/dormand_prince.hpp>
 #include <esokit/sim/noise.hpp>
@@ -27,7 +28,7 @@
 
 namespace paper3 {
 
-using esokit::Vector;
+using esokit::EigenMatrix;
 namespace sim = esokit::sim;
 
 inline const std::string folder = "paper3_abeso";
@@ -54,7 +55,7 @@ inline constexpr double filter_time = 0.02;      // s, of the derivative filter;
 
 /// x'' = (sin x + sin x') / (4 pi) + d* + u,  d* = t / (4 pi) + sin(0.4 t + 1).
 struct ShakenPlant {
-  using State = Vector<double, 2>;
+  using State = EigenMatrix<double, 2>;
 
   static double total_disturbance(double t, const State& x) {
     constexpr double four_pi = 4.0 * std::numbers::pi;
@@ -97,8 +98,8 @@ inline constexpr Kind abeso{.name = "ABESO", .watch = Watch::magnitude};
 
 /// z' of an observer whose gain is what it is.
 struct FixedGain {
-  Vector<double, 3> l;
-  const Vector<double, 3>& gain(double /*t*/, double /*e*/) const { return l; }
+  EigenMatrix<double, 3> l;
+  const EigenMatrix<double, 3>& gain(double /*t*/, double /*e*/) const { return l; }
 };
 using Observer = esokit::ContinuousObserver<2, double, 1, FixedGain>;
 
@@ -153,7 +154,7 @@ struct Series {
 inline Criteria run(const Kind& kind, double bandwidth, std::uint64_t seed,
                     Series* series = nullptr, Reference reference = Reference::constant) {
   const auto observer_at = [&](double factor) {
-    Vector<double, 3> l = esokit::continuous_gain<3, double>(factor * bandwidth);
+    EigenMatrix<double, 3> l = esokit::continuous_gain<3, double>(factor * bandwidth);
     if (!kind.first_gain_switches) l(0) = 3.0 * bandwidth;
     return Observer::make(1.0, {FixedGain{l}}).value();
   };
@@ -165,20 +166,20 @@ inline Criteria run(const Kind& kind, double bandwidth, std::uint64_t seed,
       sim::WhiteNoise<>::make({.standard_deviation = std::sqrt(noise_variance), .seed = seed})
           .value();
 
-  using State = Vector<double, 6>;  // x, z, filter
+  using State = EigenMatrix<double, 6>;  // x, z, filter
   const bool filters = kind.watch == Watch::filtered || kind.watch == Watch::filtered_at_steps;
   double v = 0.0;
   bool shrinking = false;
   const auto innovation = [&](const State& s) { return s(2) - (s(0) + v); };
   const auto derivative_falls = [&](const State& s) { return innovation(s) < s(5); };
   const auto rate = [&](double t, const State& s) -> State {
-    const Vector<double, 2> x = s.head<2>();
-    const Vector<double, 3> z = s.segment<3>(2);
+    const EigenMatrix<double, 2> x = s.head<2>();
+    const EigenMatrix<double, 3> z = s.segment<3>(2);
     const double u = law.control(z, reference_value(reference, t));
     const bool is_slow = kind.watch == Watch::filtered ? derivative_falls(s) : shrinking;
     State rates;
     rates << ShakenPlant::derivative(t, x, u),
-        (is_slow ? slow : fast).derivative(t, z, x(0) + v, u),
+        eigen((is_slow ? slow : fast).derivative(t, z, x(0) + v, u)),
         filters ? (innovation(s) - s(5)) / filter_time : 0.0;
     return rates;
   };

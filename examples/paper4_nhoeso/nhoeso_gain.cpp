@@ -24,13 +24,14 @@
 
 #include <esokit/design/continuous_gain.hpp>
 #include <esokit/design/gain_interval.hpp>
+#include <esokit/eigen.hpp>
 
 #include "common/report.hpp"
 #include "paper4_nhoeso/paper4.hpp"
 
 using namespace esokit::examples;
 using namespace paper4;
-using esokit::Matrix;
+using esokit::EigenMatrix;
 
 namespace {
 
@@ -43,7 +44,7 @@ Curve continuous_run(bool unlimited, double duration) {
                                                                  .unlimited = unlimited,
                                                                  .input_gain = 1.0})
                             .value();
-  using State = Vector<double, 4>;
+  using State = EigenMatrix<double, 4>;
   const auto rate = [&](double t, const State& z) -> State {
     return observer.derivative(t, z, 0.0, 0.0);
   };
@@ -66,7 +67,7 @@ double sampled_amplitude(double omega_t, bool unlimited) {
                                                  .input_gain = 1.0,
                                                  .sample_time = 1.0})
                       .value();
-  (void)observer.reset(Vector<double, 4>(1.0, 0.0, 0.0, 0.0));
+  (void)observer.reset(EigenMatrix<double, 4>(1.0, 0.0, 0.0, 0.0));
   const int samples = static_cast<int>(1000.0 / omega_t);
   double peak = 0.0;
   for (int k = 0; k < samples; ++k) {
@@ -101,20 +102,20 @@ Curve varying_gain(double low, double t_low, double high, double t_high, double 
   constexpr double step = 1e-3;
   const auto l = esokit::continuous_gain<3, double>(1.0);
   const auto matrix = [&](double k) {
-    Matrix<double, 3, 3> a = esokit::IntegratorChain<2>::state_matrix();
-    a.col(0) -= k * l;
+    EigenMatrix<double, 3, 3> a = esokit::IntegratorChain<2>::state_matrix();
+    a.col(0) -= k * eigen(l);
     return a;
   };
-  const Matrix<double, 3, 3> slow = matrix(low);
-  const Matrix<double, 3, 3> fast = matrix(high);
-  Vector<double, 3> e(1.0, 0.0, 0.0);
+  const EigenMatrix<double, 3, 3> slow = matrix(low);
+  const EigenMatrix<double, 3, 3> fast = matrix(high);
+  EigenMatrix<double, 3> e(1.0, 0.0, 0.0);
   Curve curve;
   const auto steps = static_cast<int>(duration / step);
   for (int k = 0; k <= steps; ++k) {
     const double t = k * step;
     if (k % 20 == 0) curve.add(t, e.norm());
     const bool is_low = std::fmod(t, t_low + t_high) < t_low;
-    const auto rate = [&](double, const Vector<double, 3>& x) -> Vector<double, 3> {
+    const auto rate = [&](double, const EigenMatrix<double, 3>& x) -> EigenMatrix<double, 3> {
       return (is_low ? slow : fast) * x;
     };
     e = sim::step(rate, t, e, step);

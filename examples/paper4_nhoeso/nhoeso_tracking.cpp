@@ -36,6 +36,7 @@
 #include <string>
 #include <vector>
 
+#include <esokit/eigen.hpp>
 #include <esokit/observer/linear_eso.hpp>
 
 #include "common/parallel.hpp"
@@ -51,7 +52,7 @@ namespace {
 
 constexpr std::size_t seeds = 60;
 
-using Reference = std::vector<Vector<double, 2>>;
+using Reference = std::vector<EigenMatrix<double, 2>>;
 using Run = std::function<Criteria(double variance, std::uint64_t seed, const Reference& reference,
                                    double step, Series* series)>;
 

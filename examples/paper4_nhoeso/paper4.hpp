@@ -18,6 +18,7 @@
 
 #include <esokit/control/nonlinear_feedback.hpp>
 #include <esokit/control/tracking_differentiator.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/sim/noise.hpp>
 #include <esokit/sim/runge_kutta.hpp>
@@ -27,8 +28,8 @@
 
 namespace paper4 {
 
+using esokit::EigenMatrix;
 using esokit::PowerSumGain;
-using esokit::Vector;
 namespace sim = esokit::sim;
 
 inline const std::string folder = "paper4_nhoeso";
@@ -69,10 +70,10 @@ inline const esokit::NonlinearFeedback<2>::Config fitted_law{
 
 /// x1' = x2,  x2' = 0.2 x1 + 0.1 sin x2 + w + (1 + 0.1 sin t) u,  w = e^-t cos t.
 struct UncertainPlant {
-  static double total_disturbance(double t, const Vector<double, 2>& x, double u) {
+  static double total_disturbance(double t, const EigenMatrix<double, 2>& x, double u) {
     return 0.2 * x(0) + 0.1 * std::sin(x(1)) + std::exp(-t) * std::cos(t) + 0.1 * std::sin(t) * u;
   }
-  static Vector<double, 2> derivative(double t, const Vector<double, 2>& x, double u) {
+  static EigenMatrix<double, 2> derivative(double t, const EigenMatrix<double, 2>& x, double u) {
     return {x(1), total_disturbance(t, x, u) + u};
   }
 };
@@ -81,15 +82,15 @@ struct UncertainPlant {
 inline double reference(double t) { return std::cos(0.5 * t); }
 
 /// (r1, r2) at the steps: the sign form of the tracking differentiator, integrated at 1 ms or less.
-inline std::vector<Vector<double, 2>> tracked_reference(double step) {
+inline std::vector<EigenMatrix<double, 2>> tracked_reference(double step) {
   const auto td =
       esokit::SignTrackingDifferentiator<>::make({.acceleration = acceleration}).value();
-  const auto rate = [&](double t, const Vector<double, 2>& r) -> Vector<double, 2> {
+  const auto rate = [&](double t, const EigenMatrix<double, 2>& r) -> EigenMatrix<double, 2> {
     return td.rate(r, reference(t));
   };
   const auto fine = static_cast<int>(std::ceil(step / 1e-3 - 1e-9));
   const auto steps = static_cast<int>(std::lround(duration / step));
-  std::vector<Vector<double, 2>> samples{Vector<double, 2>::Zero()};
+  std::vector<EigenMatrix<double, 2>> samples{EigenMatrix<double, 2>::Zero()};
   for (int k = 0; k < steps; ++k) {
     samples.push_back(sim::integrate(rate, k * step, samples.back(), step / fine, fine));
   }
@@ -111,14 +112,14 @@ struct Series {
 /// @param r tracked_reference(step)
 template <class Observer>
 Criteria run(const Observer& observer, double variance, std::uint64_t seed,
-             const std::vector<Vector<double, 2>>& r, double step, Series* series = nullptr) {
+             const std::vector<EigenMatrix<double, 2>>& r, double step, Series* series = nullptr) {
   using State = typename Observer::State;
   constexpr int n = Observer::states;
   const auto law = esokit::NonlinearFeedback<2>::make(fitted_law).value();
   auto noise =
       sim::WhiteNoise<>::make({.standard_deviation = std::sqrt(variance), .seed = seed}).value();
   const auto steps_per_hold = static_cast<std::size_t>(std::lround(hold / step));
-  Vector<double, 2 + n> s = Vector<double, 2 + n>::Zero();
+  EigenMatrix<double, 2 + n> s = EigenMatrix<double, 2 + n>::Zero();
   sim::Trapezoid<> itae;
   sim::Trapezoid<> isu;
   Criteria result;
@@ -129,7 +130,7 @@ Criteria run(const Observer& observer, double variance, std::uint64_t seed,
     const auto control = [&](const State& z) {
       return std::clamp(law.control(Observer::estimate(z), r[k]), -control_limit, control_limit);
     };
-    const Vector<double, 2> x = s.template head<2>();
+    const EigenMatrix<double, 2> x = s.template head<2>();
     const State z = s.template tail<n>();
     const double u = control(z);
     const double error = reference(t) - x(0);
@@ -145,11 +146,11 @@ Criteria run(const Observer& observer, double variance, std::uint64_t seed,
       series->estimate.push_back(Observer::estimate(z)(2));
       series->error.push_back(error);
     }
-    const auto rate = [&](double time, const Vector<double, 2 + n>& state) {
-      const Vector<double, 2> plant = state.template head<2>();
+    const auto rate = [&](double time, const EigenMatrix<double, 2 + n>& state) {
+      const EigenMatrix<double, 2> plant = state.template head<2>();
       const State estimate = state.template tail<n>();
       const double input = control(estimate);
-      Vector<double, 2 + n> d;
+      EigenMatrix<double, 2 + n> d;
       d << UncertainPlant::derivative(time, plant, input),
           observer.derivative(time, estimate, plant(0) + v, input);
       return d;

@@ -20,6 +20,7 @@
 // EPADRC    filter_config          limit gain for sigma = 0.001, 0.01
 
 #include <Eigen/Dense>
+#include <esokit/eigen.hpp>
 #include <string>
 #include <vector>
 
@@ -35,24 +36,25 @@ namespace {
 constexpr int most_samples = 12;  // of delay, whole samples
 
 /// The linear part of the loop: plant (2), prediction (3), inputs under way, the newest first.
-using Loop = Matrix<double, 5 + most_samples + 1, 1>;
+using Loop = EigenMatrix<double, 5 + most_samples + 1, 1>;
 
 /// x after `time` under a held input without the constant 10 of f: linear, exact to 1e-12.
-Vector<double, 2> linear_plant(const Vector<double, 2>& x, double u, double time) {
+EigenMatrix<double, 2> linear_plant(const EigenMatrix<double, 2>& x, double u, double time) {
   if (time <= 0.0) return x;
-  const Vector<double, 2> at_rest = Plant::step(Vector<double, 2>::Zero(), 0.0, time);
+  const EigenMatrix<double, 2> at_rest = Plant::step(EigenMatrix<double, 2>::Zero(), 0.0, time);
   return Plant::step(x, u, time) - at_rest;
 }
 
 /// One sample of the loop. @param delay of the actuator, s @param current PADRC; else ADRC
-Loop step(const Loop& state, const Vector<double, 3>& gain, double delay, bool current) {
-  static const Matrix<double, 3, 3> a = esokit::IntegratorChain<2>::transition_matrix(sample_time);
-  static const Vector<double, 3> b =
+Loop step(const Loop& state, const EigenMatrix<double, 3>& gain, double delay, bool current) {
+  static const EigenMatrix<double, 3, 3> a =
+      esokit::IntegratorChain<2>::transition_matrix(sample_time);
+  static const EigenMatrix<double, 3> b =
       esokit::IntegratorChain<2>::sampled_input_matrix(sample_time, input_gain);
   static const esokit::AdrcLaw<2> feedback = law();
-  Vector<double, 2> x = state.head<2>();
-  const Vector<double, 3> predicted = state.segment<3>(2);
-  const Vector<double, 3> corrected = predicted + gain * (x(0) - predicted(0));
+  EigenMatrix<double, 2> x = state.head<2>();
+  const EigenMatrix<double, 3> predicted = state.segment<3>(2);
+  const EigenMatrix<double, 3> corrected = predicted + gain * (x(0) - predicted(0));
   const double u = feedback.control(current ? corrected : predicted, 0.0);
   const auto input = [&](int age) { return age == 0 ? u : state(5 + age - 1); };
   const int whole = static_cast<int>(std::floor(delay / sample_time + 1e-9));
@@ -67,19 +69,19 @@ Loop step(const Loop& state, const Vector<double, 3>& gain, double delay, bool c
   return next;
 }
 
-double spectral_radius(const Vector<double, 3>& gain, double delay, bool current) {
+double spectral_radius(const EigenMatrix<double, 3>& gain, double delay, bool current) {
   constexpr int size = Loop::RowsAtCompileTime;
-  Matrix<double, size, size> map;
+  EigenMatrix<double, size, size> map;
   for (int i = 0; i < size; ++i) map.col(i) = step(Loop::Unit(i), gain, delay, current);
   return Eigen::EigenSolver<Eigen::MatrixXd>(map, false).eigenvalues().cwiseAbs().maxCoeff();
 }
 
-Vector<double, 3> linear_gain(double bandwidth) {
+EigenMatrix<double, 3> linear_gain(double bandwidth) {
   const auto observer = Linear::make(linear_config(bandwidth)).value();
   return esokit::physical_gain<3, double>(observer.level_gain(0), sample_time);
 }
 
-Vector<double, 3> filter_gain(double deviation) {
+EigenMatrix<double, 3> filter_gain(double deviation) {
   auto config = filter_config(deviation);
   config.mode = esokit::RiccatiMode::frozen;
   return Filter::make(config).value().gain();
@@ -97,7 +99,7 @@ double least_bandwidth(double delay, bool current) {
 }
 
 /// The largest delay under which the loop is stable, s; 0 if it is not even without.
-double delay_margin(const Vector<double, 3>& gain, bool current) {
+double delay_margin(const EigenMatrix<double, 3>& gain, bool current) {
   if (spectral_radius(gain, 0.0, current) >= 1.0) return 0.0;
   double stable = 0.0;
   const double most = (most_samples - 1) * sample_time;
@@ -172,7 +174,7 @@ int main(int argc, char** argv) {
   // The real controllers at both sides of the margin.
   const auto remains_bounded = [&](double delay) {
     Predictive<Linear> controller(linear_config(), 0.0);
-    Vector<double, 2> x(0.01, 0.0);
+    EigenMatrix<double, 2> x(0.01, 0.0);
     std::vector<double> inputs(most_samples + 1, 0.0);
     const int whole = static_cast<int>(std::floor(delay / sample_time + 1e-9));
     const double rest = delay - whole * sample_time;

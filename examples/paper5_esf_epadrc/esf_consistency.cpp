@@ -19,6 +19,7 @@
 //          runs                 400
 
 #include <Eigen/Dense>
+#include <esokit/eigen.hpp>
 #include <string>
 #include <vector>
 
@@ -32,7 +33,7 @@ using namespace paper5;
 namespace {
 
 constexpr int runs = 400;
-using Square = Matrix<double, 3, 3>;
+using Square = EigenMatrix<double, 3, 3>;
 
 /// Sum of e e' over runs, and P, at each sample; and the largest change of f in a sample.
 struct Spread {
@@ -43,7 +44,7 @@ struct Spread {
       : error(static_cast<std::size_t>(samples), Square::Zero()),
         bound(static_cast<std::size_t>(samples), Square::Zero()) {}
 
-  void add(int k, const Vector<double, 3>& e, const Square& p) {
+  void add(int k, const EigenMatrix<double, 3>& e, const Square& p) {
     error[static_cast<std::size_t>(k)] += e * e.transpose();
     bound[static_cast<std::size_t>(k)] = p;
   }
@@ -53,7 +54,7 @@ struct Spread {
 std::vector<double> ratios(const Spread& spread, int count) {
   std::vector<double> result;
   // In scaled states the generalised eigenvalue problem is well conditioned.
-  const Vector<double, 3> units(1.0, sample_time, 0.5 * sample_time * sample_time);
+  const EigenMatrix<double, 3> units(1.0, sample_time, 0.5 * sample_time * sample_time);
   for (std::size_t k = 0; k < spread.error.size(); ++k) {
     const Square e = units.asDiagonal() * (spread.error[k] / count) * units.asDiagonal();
     const Square p = units.asDiagonal() * spread.bound[k] * units.asDiagonal();
@@ -83,14 +84,14 @@ Spread open_loop(Motion motion, double deviation, double factor, std::uint64_t s
   auto filter = Filter::make(config).value();
   const auto a = esokit::IntegratorChain<2>::transition_matrix(sample_time);
   sim::Gaussian gaussian(seed);
-  Vector<double, 3> x;
+  EigenMatrix<double, 3> x;
   for (int i = 0; i < 3; ++i) {
     x(i) = std::sqrt(initial_covariance[static_cast<std::size_t>(i)]) * gaussian.next();
   }
   Spread spread(open_samples);
   for (int k = 0; k < open_samples; ++k) {
     filter.correct(x(0) + deviation * gaussian.next());
-    const Vector<double, 3> e = x - filter.estimate();
+    const EigenMatrix<double, 3> e = x - filter.estimate();
     spread.add(k, e, filter.covariance());
     x = (a * x).eval();
     if (motion == Motion::sine) {
@@ -109,12 +110,12 @@ constexpr int closed_samples = 500;
 Spread closed_loop(double deviation, double change, std::uint64_t seed) {
   Predictive<Filter> controller(filter_config(deviation, change), 0.0);
   sim::Gaussian gaussian(seed);
-  Vector<double, 2> x = Vector<double, 2>::Zero();
+  EigenMatrix<double, 2> x = EigenMatrix<double, 2>::Zero();
   Spread spread(closed_samples);
   for (int k = 0; k < closed_samples; ++k) {
     const double u =
         controller.step(x(0) + deviation * gaussian.next(), reference_at(Reference::sine, k + 1));
-    const Vector<double, 3> truth(x(0), x(1), Plant::total_disturbance(x));
+    const EigenMatrix<double, 3> truth(x(0), x(1), Plant::total_disturbance(x));
     spread.add(k, truth - controller.estimate(), controller.observer().covariance());
     x = Plant::step(x, u);
     spread.change = std::max(spread.change, std::abs(Plant::total_disturbance(x) - truth(2)));

@@ -17,6 +17,7 @@
 
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/control/predictive_adrc.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/sim/noise.hpp>
@@ -26,8 +27,7 @@
 
 namespace paper5 {
 
-using esokit::Matrix;
-using esokit::Vector;
+using esokit::EigenMatrix;
 namespace sim = esokit::sim;
 
 inline const std::string folder = "paper5_esf_epadrc";
@@ -60,15 +60,16 @@ inline constexpr std::array<double, 3> initial_covariance = {1, 1e4, 1e6};  // d
 
 /// x1' = x2, x2' = f + 230 u with f = 20 x1 + 78 x2 + 10; a pole at +78.
 struct Plant {
-  static double total_disturbance(const Vector<double, 2>& x) {
+  static double total_disturbance(const EigenMatrix<double, 2>& x) {
     return 20.0 * x(0) + 78.0 * x(1) + 10.0;
   }
-  static Vector<double, 2> derivative(const Vector<double, 2>& x, double u) {
+  static EigenMatrix<double, 2> derivative(const EigenMatrix<double, 2>& x, double u) {
     return {x(1), total_disturbance(x) + input_gain * u};
   }
   /// One sample under a held input.
-  static Vector<double, 2> step(const Vector<double, 2>& x, double u, double time = sample_time) {
-    const auto rate = [u](double, const Vector<double, 2>& state) -> Vector<double, 2> {
+  static EigenMatrix<double, 2> step(const EigenMatrix<double, 2>& x, double u,
+                                     double time = sample_time) {
+    const auto rate = [u](double, const EigenMatrix<double, 2>& state) -> EigenMatrix<double, 2> {
       return derivative(state, u);
     };
     constexpr int substeps = 4;
@@ -146,12 +147,12 @@ class PlainAdrc {
     reference_ = next_reference;
     return u;
   }
-  const Vector<double, 3>& estimate() const { return estimate_; }
+  const EigenMatrix<double, 3>& estimate() const { return estimate_; }
 
  private:
   Linear observer_ = Linear::make(linear_config()).value();
   esokit::AdrcLaw<2> law_ = law();
-  Vector<double, 3> estimate_ = Vector<double, 3>::Zero();
+  EigenMatrix<double, 3> estimate_ = EigenMatrix<double, 3>::Zero();
   double reference_;
 };
 
@@ -175,14 +176,14 @@ class Predictive {
     controller_.prepare(next_reference);
     return u;
   }
-  const Vector<double, 3>& estimate() const { return estimate_; }
+  const EigenMatrix<double, 3>& estimate() const { return estimate_; }
   /// The observer after the correction of the last step.
   const Observer& observer() const { return covariance_known_; }
 
  private:
   esokit::PredictiveAdrc<Observer> controller_;
   Observer covariance_known_ = controller_.observer();
-  Vector<double, 3> estimate_ = Vector<double, 3>::Zero();
+  EigenMatrix<double, 3> estimate_ = EigenMatrix<double, 3>::Zero();
 };
 
 /// EPADRC as the paper prints it in (37)-(39), (52), (53): the predictor gain -K = A P C' / s
@@ -206,11 +207,11 @@ class PrintedEpadrc {
   }
 
   double step(double y, double next_reference) {
-    const Vector<double, 3> k = -(a_ * p_.col(0)) / (p_(0, 0) + r_ / (1.0 + theta));
+    const EigenMatrix<double, 3> k = -(a_ * p_.col(0)) / (p_(0, 0) + r_ / (1.0 + theta));
     estimate_ = predicted_ - k * (y - predicted_(0));  // the slip: A L in place of L
     const double u = law_.control(estimate_, reference_);
     predicted_ = a_ * estimate_ + b_ * u;
-    Matrix<double, 3, 3> closed = a_;
+    EigenMatrix<double, 3, 3> closed = a_;
     closed.col(0) += k;
     p_ = ((1.0 + theta) * closed * p_ * closed.transpose() + k * r_ * k.transpose() +
           (1.0 + theta) / theta * q_)
@@ -218,16 +219,16 @@ class PrintedEpadrc {
     reference_ = next_reference;
     return u;
   }
-  const Vector<double, 3>& estimate() const { return estimate_; }
+  const EigenMatrix<double, 3>& estimate() const { return estimate_; }
 
  private:
   esokit::AdrcLaw<2> law_ = law();
   double reference_;
   double r_;
-  Matrix<double, 3, 3> a_, q_, p_;
-  Vector<double, 3> b_;
-  Vector<double, 3> predicted_ = Vector<double, 3>::Zero();
-  Vector<double, 3> estimate_ = Vector<double, 3>::Zero();
+  EigenMatrix<double, 3, 3> a_, q_, p_;
+  EigenMatrix<double, 3> b_;
+  EigenMatrix<double, 3> predicted_ = EigenMatrix<double, 3>::Zero();
+  EigenMatrix<double, 3> estimate_ = EigenMatrix<double, 3>::Zero();
 };
 
 // ---- a run ----
@@ -260,13 +261,13 @@ Metrics run(Controller controller, Reference reference, double deviation, std::u
       sim::WhiteNoise<>::make({.standard_deviation = deviation, .seed = 1000 + seed}).value();
   const int samples = static_cast<int>(std::lround(duration_of(reference) / sample_time));
   constexpr int settled = 250;
-  Vector<double, 2> x = Vector<double, 2>::Zero();
+  EigenMatrix<double, 2> x = EigenMatrix<double, 2>::Zero();
   Metrics sum;
   for (int k = 0; k < samples; ++k) {
     const double r = reference_at(reference, k);
     const double u = controller.step(x(0) + noise.next(), reference_at(reference, k + 1));
-    const Vector<double, 3> truth(x(0), x(1), Plant::total_disturbance(x));
-    const Vector<double, 3> e = truth - controller.estimate();
+    const EigenMatrix<double, 3> truth(x(0), x(1), Plant::total_disturbance(x));
+    const EigenMatrix<double, 3> e = truth - controller.estimate();
     sum.error += (r - x(0)) * (r - x(0));
     sum.absolute += std::abs(r - x(0)) * sample_time;
     sum.control += u * u * sample_time;

@@ -58,11 +58,13 @@
 #include <esokit/design/half_gain.hpp>
 #include <esokit/design/pid_conversion.hpp>
 #include <esokit/design/placement.hpp>
+#include <esokit/design/pole_set.hpp>
 #include <esokit/design/positivity.hpp>
 #include <esokit/design/reduced_order.hpp>
 #include <esokit/design/riccati.hpp>
 #include <esokit/design/sampled_gain.hpp>
 #include <esokit/design/switching_certificate.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/model/integrator_chain.hpp>
 #include <esokit/model/scaled_chain.hpp>
 #include <esokit/observer/adapter.hpp>

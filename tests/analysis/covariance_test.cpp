@@ -10,6 +10,7 @@
 #include <esokit/analysis/adrc_loop.hpp>
 #include <esokit/analysis/covariance.hpp>
 #include <esokit/analysis/frequency_response.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/linear_eso.hpp>
@@ -95,7 +96,7 @@ void monte_carlo_sampled() {
   for (long k = 0; k < samples; ++k) {
     observer.update(0.2 * white(random), 0.0);
     const auto z = observer.estimate();
-    for (std::size_t r = 0; r < size; ++r) measured[r].add(z(static_cast<Eigen::Index>(r)));
+    for (std::size_t r = 0; r < size; ++r) measured[r].add(z(static_cast<int>(r)));
   }
   for (std::size_t r = 0; r < size; ++r) {
     SCOPED_TRACE(testing::Message() << "n " << Order << ", p " << Levels << ", row " << r);
@@ -127,13 +128,13 @@ void monte_carlo_continuous() {
   const auto observer = continuous<Order, Levels>(8.0);
   using Observer = std::remove_cvref_t<decltype(observer)>;
   constexpr int states = Observer::states;
-  using State = typename Observer::State;
+  using State = EigenMatrix<double, states>;
   const double density = 4e-4;
   const auto exact = estimation_error_covariance(observer, {.measurement = density}).value();
 
   const double h = 0.01;
-  Matrix<double, states, states> left = Matrix<double, states, states>::Identity();
-  Matrix<double, states, states> right = left;
+  EigenMatrix<double, states, states> left = EigenMatrix<double, states, states>::Identity();
+  EigenMatrix<double, states, states> right = left;
   for (int j = 0; j < states; ++j) {
     const State column = observer.derivative(0.0, State::Unit(j), 0.0, 0.0);
     left.col(j) -= 0.5 * h * column;
@@ -141,7 +142,7 @@ void monte_carlo_continuous() {
   }
   const State from_y = observer.derivative(0.0, State::Zero(), 1.0, 0.0);
   // Gauss-Jordan, so that the test needs no solver of Eigen.
-  Matrix<double, states, states + 1> stacked;
+  EigenMatrix<double, states, states + 1> stacked;
   stacked << right, from_y * std::sqrt(density * h);
   for (int k = 0; k < states; ++k) {
     int pivot = k;
@@ -169,7 +170,7 @@ void monte_carlo_continuous() {
     if (k < 0) continue;
     const auto estimate = Observer::estimate(z);
     for (std::size_t r = 0; r < size; ++r) {
-      measured[r].add(estimate(static_cast<Eigen::Index>(r)));
+      measured[r].add(estimate(static_cast<int>(r)));
     }
   }
   for (std::size_t r = 0; r < size; ++r) {
@@ -301,7 +302,7 @@ TEST(Covariance, OfTheControlInAClosedLoopEqualsMonteCarlo) {
   const auto law = AdrcLaw<2>::make({.controller_bandwidth = 3.0, .input_gain = 1.0}).value();
   const auto plant = CompanionPlant<2>{{1.0, 2.0}, 1.3}.system().value();
   const auto loop = adrc_loop(sampled_plant(plant, T).value(), observer, law).value();
-  Matrix<double, 3, 3> input = Matrix<double, 3, 3>::Zero();
+  EigenMatrix<double, 3, 3> input = EigenMatrix<double, 3, 3>::Zero();
   input(1, 1) = 0.01;  // v
   input(2, 2) = 4.0;   // d, held over a sample
   const auto exact = output_covariance(loop.closed_loop(), input).value();
@@ -309,7 +310,7 @@ TEST(Covariance, OfTheControlInAClosedLoopEqualsMonteCarlo) {
   Random random(9);
   MeanSquare of_y, of_u, of_d;
   const auto a = sampled_plant(plant, T).value();
-  Vector<double, 2> x = Vector<double, 2>::Zero();
+  EigenMatrix<double, 2> x = EigenMatrix<double, 2>::Zero();
   double u = 0.0;
   for (long k = -5000; k < samples; ++k) {
     observer.update(x(0) + 0.1 * white(random), u);
@@ -328,7 +329,7 @@ TEST(Covariance, OfTheControlInAClosedLoopEqualsMonteCarlo) {
 
 // The steady filter is the Kalman filter of the chain; its own covariance is another way to ours.
 TEST(Covariance, OfAFrozenFilterIsItsRiccatiSolution) {
-  Matrix<double, 3, 3> q = Matrix<double, 3, 3>::Zero();
+  EigenMatrix<double, 3, 3> q = EigenMatrix<double, 3, 3>::Zero();
   const double T = 0.01;
   const double density = 2.0;
   for (int i = 0; i < 3; ++i) {
@@ -344,7 +345,7 @@ TEST(Covariance, OfAFrozenFilterIsItsRiccatiSolution) {
   config.measurement_variance = 1e-4;
   config.process_covariance = q;
   config.inflation_rule = InflationRule::none;
-  config.initial_covariance = Matrix<double, 3, 3>::Identity();
+  config.initial_covariance = EigenMatrix<double, 3, 3>::Identity();
   auto filter = ExtendedStateFilter<2>::make(config).value();
   for (int k = 0; k < 5000; ++k) filter.update(0.0, 0.0);
   const auto ours =
@@ -354,7 +355,7 @@ TEST(Covariance, OfAFrozenFilterIsItsRiccatiSolution) {
 }
 
 TEST(Covariance, WhatDoesNotExistIsAnError) {
-  Matrix<double, 1, 1> one = Matrix<double, 1, 1>::Constant(1.0);
+  EigenMatrix<double, 1, 1> one = EigenMatrix<double, 1, 1>::Constant(1.0);
   LinearSystem<1, 1, 1> system;
   system.b(0, 0) = 1.0;
   system.c(0, 0) = 1.0;
@@ -378,7 +379,7 @@ TEST(Covariance, WhatDoesNotExistIsAnError) {
   LinearSystem<1, 2, 1> two;
   two.a(0, 0) = -1.0;
   two.b(0, 0) = two.b(0, 1) = two.c(0, 0) = 1.0;
-  Matrix<double, 2, 2> noise;
+  EigenMatrix<double, 2, 2> noise;
   for (const double across : {-2.0, 2.0}) {
     noise << 1.0, across, across, 4.0;
     EXPECT_NEAR(output_covariance(two, noise).value()(0, 0), 0.5 * (5.0 + 2.0 * across), 1e-12);

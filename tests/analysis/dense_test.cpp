@@ -22,8 +22,8 @@ using Complex = std::complex<double>;
 using esokit_test::Random;
 
 template <int N>
-Matrix<double, N, N> random_matrix(Random& random) {
-  Matrix<double, N, N> a;
+EigenMatrix<double, N, N> random_matrix(Random& random) {
+  EigenMatrix<double, N, N> a;
   for (int i = 0; i < N; ++i) {
     for (int j = 0; j < N; ++j) a(i, j) = random.uniform(-1.0, 1.0);
   }
@@ -35,15 +35,15 @@ TEST(Dense, SolvesLinearEquations) {
   for (int trial = 0; trial < 200; ++trial) {
     const auto re = random_matrix<5>(random);
     const auto im = random_matrix<5>(random);
-    Matrix<Complex, 5, 5> a;
-    Matrix<Complex, 5, 2> b;
+    EigenMatrix<Complex, 5, 5> a;
+    EigenMatrix<Complex, 5, 2> b;
     for (int i = 0; i < 5; ++i) {
       for (int j = 0; j < 5; ++j) a(i, j) = {re(i, j), im(i, j)};
       for (int j = 0; j < 2; ++j) b(i, j) = {random.uniform(-1.0, 1.0), 0.5};
     }
     if (trial % 3 == 0) a(0, 0) = 0.0;  // needs the pivot
-    Matrix<Complex, 5, 5> work = a;
-    Matrix<Complex, 5, 2> x = b;
+    EigenMatrix<Complex, 5, 5> work = a;
+    EigenMatrix<Complex, 5, 2> x = b;
     detail::solve_in_place(detail::DenseView<Complex>{work.data(), 5},
                            detail::DenseView<Complex>{x.data(), 5, 2});
     EXPECT_LT((a * x - b).cwiseAbs().maxCoeff(), 1e-11 * (1.0 + x.cwiseAbs().maxCoeff()));
@@ -54,7 +54,7 @@ TEST(Dense, SolvesLinearEquations) {
 TEST(Dense, EigenvaluesOfABuiltMatrix) {
   Random random(2);
   for (int trial = 0; trial < 200; ++trial) {
-    Matrix<double, 6, 6> diagonal = Matrix<double, 6, 6>::Zero();
+    EigenMatrix<double, 6, 6> diagonal = EigenMatrix<double, 6, 6>::Zero();
     std::vector<Complex> expected;
     for (int i = 0; i < 6; i += 2) {
       const double re = random.uniform(-2.0, 2.0);
@@ -67,9 +67,10 @@ TEST(Dense, EigenvaluesOfABuiltMatrix) {
       expected.emplace_back(re, im);
       expected.emplace_back(other, -im);
     }
-    Matrix<double, 6, 6> s = random_matrix<6>(random) + 3.0 * Matrix<double, 6, 6>::Identity();
-    Matrix<double, 6, 6> work = s.transpose();
-    Matrix<double, 6, 6> right = (s * diagonal).transpose();  // a' = s'^-1 (s diagonal)'
+    EigenMatrix<double, 6, 6> s =
+        random_matrix<6>(random) + 3.0 * EigenMatrix<double, 6, 6>::Identity();
+    EigenMatrix<double, 6, 6> work = s.transpose();
+    EigenMatrix<double, 6, 6> right = (s * diagonal).transpose();  // a' = s'^-1 (s diagonal)'
     detail::solve_in_place(detail::DenseView<double>{work.data(), 6},
                            detail::DenseView<double>{right.data(), 6});
     LinearSystem<6, 1, 1> system;
@@ -113,13 +114,14 @@ TEST(Dense, SymmetricEigenvalues) {
   Random random(4);
   for (int trial = 0; trial < 100; ++trial) {
     const auto half = random_matrix<5>(random);
-    const Matrix<double, 5, 5> a = half + half.transpose();
-    Matrix<double, 5, 5> values = a;
-    Matrix<double, 5, 5> v;
+    const EigenMatrix<double, 5, 5> a = half + half.transpose();
+    EigenMatrix<double, 5, 5> values = a;
+    EigenMatrix<double, 5, 5> v;
     detail::symmetric_eigenvalues({values.data(), 5}, {v.data(), 5});
-    EXPECT_LT((v.transpose() * v - Matrix<double, 5, 5>::Identity()).cwiseAbs().maxCoeff(), 1e-13);
+    EXPECT_LT((v.transpose() * v - EigenMatrix<double, 5, 5>::Identity()).cwiseAbs().maxCoeff(),
+              1e-13);
     for (int i = 0; i < 5; ++i) {
-      const Vector<double, 5> residual = a * v.col(i) - values(i, i) * v.col(i);
+      const EigenMatrix<double, 5> residual = a * v.col(i) - values(i, i) * v.col(i);
       EXPECT_LT(residual.cwiseAbs().maxCoeff(), 1e-13);
     }
   }
@@ -133,8 +135,8 @@ TEST(Balance, ChangesNoTransferFunction) {
   auto scaled = system;
   balance(scaled);
   // Markov parameters c a^k b do not depend on the scaling, which is by powers of two.
-  Vector<double, 3> x = system.b;
-  Vector<double, 3> y = scaled.b;
+  EigenMatrix<double, 3> x = system.b;
+  EigenMatrix<double, 3> y = scaled.b;
   for (int k = 0; k < 5; ++k) {
     EXPECT_NEAR(scaled.c.dot(y) / system.c.dot(x), 1.0, 1e-12);
     x = system.a * x;
@@ -148,9 +150,10 @@ TEST(Lyapunov, SolvesBothEquations) {
   Random random(6);
   int solved = 0;
   for (int trial = 0; trial < 300; ++trial) {
-    Matrix<double, 4, 4> a = random_matrix<4>(random) - 0.6 * Matrix<double, 4, 4>::Identity();
+    EigenMatrix<double, 4, 4> a =
+        random_matrix<4>(random) - 0.6 * EigenMatrix<double, 4, 4>::Identity();
     const auto half = random_matrix<4>(random);
-    const Matrix<double, 4, 4> q = half * half.transpose();
+    const EigenMatrix<double, 4, 4> q = half * half.transpose();
     LinearSystem<4, 1, 1> system;
     system.a = a;
     const bool sampled = trial % 2 == 0;
@@ -160,14 +163,14 @@ TEST(Lyapunov, SolvesBothEquations) {
     ASSERT_EQ(p.has_value(), stable);
     if (!stable) continue;
     ++solved;
-    Matrix<double, 4, 4> left = a * *p + *p * a.transpose() + q;
+    EigenMatrix<double, 4, 4> left = a * *p + *p * a.transpose() + q;
     if (sampled) left += a * *p * a.transpose();
     EXPECT_LT(left.cwiseAbs().maxCoeff(), 1e-11 * p->cwiseAbs().maxCoeff());
   }
   EXPECT_GT(solved, 20);
   // Near the edge, where a wrong number of doublings would show.
-  Matrix<double, 1, 1> a = Matrix<double, 1, 1>::Constant(-1e-9);
-  const Matrix<double, 1, 1> q = Matrix<double, 1, 1>::Constant(1.0);
+  EigenMatrix<double, 1, 1> a = EigenMatrix<double, 1, 1>::Constant(-1e-9);
+  const EigenMatrix<double, 1, 1> q = EigenMatrix<double, 1, 1>::Constant(1.0);
   EXPECT_NEAR(solve_lyapunov<1>(a, q, true).value()(0, 0) / (1.0 / (2e-9 - 1e-18)), 1.0, 1e-12);
   EXPECT_NEAR(solve_lyapunov<1>(a, q, false).value()(0, 0) / 5e8, 1.0, 1e-12);
   a(0, 0) = 0.0;

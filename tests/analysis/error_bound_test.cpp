@@ -11,6 +11,7 @@
 #include <esokit/analysis/error_bound.hpp>
 #include <esokit/analysis/observer_system.hpp>
 #include <esokit/analysis/peak_gain.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/sim/runge_kutta.hpp>
 #include <limits>
 #include <numbers>
@@ -31,7 +32,7 @@ template <class Observer>
 struct Simulation {
   static constexpr int N = Observer::size;
   static constexpr int states = N + Observer::states;
-  using State = Vector<double, states>;
+  using State = EigenMatrix<double, states>;
 
   Observer observer;
   State state = State::Zero();
@@ -45,14 +46,14 @@ struct Simulation {
       for (int i = 0; i + 1 < N; ++i) derivative(i) = x(i + 1);
       derivative(N - 1) = w;
       derivative.template tail<Observer::states>() =
-          observer.derivative(time, x.template tail<Observer::states>(), x(0) + v, 0.0);
+          eigen(observer.derivative(time, x.template tail<Observer::states>(), x(0) + v, 0.0));
       return derivative;
     };
     state = sim::step(rate, t, state, step_size);
     t += step_size;
   }
-  [[nodiscard]] Vector<double, N> error() const {
-    const Vector<double, N> z = state.template head<N>();
+  [[nodiscard]] EigenMatrix<double, N> error() const {
+    const EigenMatrix<double, N> z = state.template head<N>();
     return z - Observer::estimate(state.template tail<Observer::states>());
   }
 };
@@ -64,7 +65,7 @@ struct Looseness {
 /// Error of row `row` under the worst d^(m) (or the worst noise) of size one.
 template <class Observer>
 Looseness worst_run(const Observer& observer, bool noise, int row, double fastest, double slowest,
-                    const Vector<double, Observer::size>& bound) {
+                    const EigenMatrix<double, Observer::size>& bound) {
   Simulation<Observer> impulse{observer};
   const double h = 0.04 / fastest;
   const int steps = static_cast<int>(25.0 / slowest / h);
@@ -90,8 +91,8 @@ Looseness worst_run(const Observer& observer, bool noise, int row, double fastes
 
 template <class Observer>
 void expect_below(const char* name, const Observer& observer, double fastest, double slowest,
-                  const Vector<double, Observer::size>& disturbance_bound,
-                  const Vector<double, Observer::size>& noise_bound) {
+                  const EigenMatrix<double, Observer::size>& disturbance_bound,
+                  const EigenMatrix<double, Observer::size>& noise_bound) {
   for (const bool noise : {false, true}) {
     const auto& bound = noise ? noise_bound : disturbance_bound;
     for (int row = 0; row < Observer::size; ++row) {
@@ -206,13 +207,13 @@ TEST(ErrorBound, ThirdLevelCarriesTheCorrectedTerm) {
 template <int Size>
 struct Switching {
   static constexpr esokit::ContinuousGainLawTraits traits{.begins_steps = true};
-  Vector<double, Size> shrinking, otherwise;
+  EigenMatrix<double, Size> shrinking, otherwise;
   Random random{1};
   bool by_rule = true;
   double before = 0.0;
   bool shrinks = false;
 
-  [[nodiscard]] const Vector<double, Size>& gain(double, double) const {
+  [[nodiscard]] const EigenMatrix<double, Size>& gain(double, double) const {
     return shrinks ? shrinking : otherwise;
   }
   void begin_step(double, double e) {
@@ -222,8 +223,8 @@ struct Switching {
 };
 
 template <int Size>
-Vector<double, Size> gain_of(double w) {
-  Vector<double, Size> gain;
+EigenMatrix<double, Size> gain_of(double w) {
+  EigenMatrix<double, Size> gain;
   for (int i = 0; i < Size; ++i) gain(i) = esokit_test::choose(Size, i + 1) * std::pow(w, i + 1);
   return gain;
 }
@@ -244,7 +245,7 @@ void switched_case(double rho, bool by_rule) {
     law.random = Random(static_cast<std::uint64_t>(seed));
     Simulation<Observer> run{Observer::make(1.0, {law}).value()};
     Random random(100 + static_cast<std::uint64_t>(seed));
-    Vector<double, N> initial;
+    EigenMatrix<double, N> initial;
     for (int i = 0; i < N; ++i) initial(i) = random.uniform(-1.0, 1.0) * std::pow(w, i);
     run.state.template head<N>() = initial;
     run.step_size = 2e-3;
@@ -302,9 +303,9 @@ TEST(ErrorBound, SwitchedBoundOfEqualFactorsIsALinearOne) {
 /// k(e) l of the nonlinear observer, kept in [least, greatest].
 template <int Size>
 struct Saturated {
-  Vector<double, Size> unit;
+  EigenMatrix<double, Size> unit;
   double least, greatest;
-  [[nodiscard]] Vector<double, Size> gain(double, double e) const {
+  [[nodiscard]] EigenMatrix<double, Size> gain(double, double e) const {
     const double k = 0.05 * std::pow(std::abs(e) + 1e-12, -0.4) + 20.0 * std::abs(e);
     return std::clamp(k, least, greatest) * unit;
   }
@@ -322,7 +323,7 @@ TEST(ErrorBound, OfTheNonlinearObserverHolds) {
   for (int seed = 0; seed < 20; ++seed) {
     Simulation<Observer> run{Observer::make(1.0, {Saturated<N>{gain_of<N>(w), 0.5, 3.0}}).value()};
     Random random(static_cast<std::uint64_t>(seed));
-    Vector<double, N> initial;
+    EigenMatrix<double, N> initial;
     for (int i = 0; i < N; ++i) initial(i) = random.uniform(-1.0, 1.0) * std::pow(w, i);
     run.state.template head<N>() = initial;
     run.step_size = 1e-3;
@@ -374,11 +375,11 @@ TEST(LyapunovMatrix, ExistsUpToTheKnownLimits) {
 }
 
 template <int N>
-void expect_inequality(const Matrix<double, N, N>& a, const LyapunovMatrix<N>& p) {
-  const Matrix<double, N, N> sum = a.transpose() * p.p + p.p * a;
+void expect_inequality(const EigenMatrix<double, N, N>& a, const LyapunovMatrix<N>& p) {
+  const EigenMatrix<double, N, N> sum = a.transpose() * p.p + p.p * a;
   Random random(3);
   for (int i = 0; i < 300; ++i) {
-    Vector<double, N> x;
+    EigenMatrix<double, N> x;
     for (int j = 0; j < N; ++j) x(j) = random.uniform(-1.0, 1.0);
     EXPECT_LE(x.dot(sum * x), -x.squaredNorm() * (1.0 - 1e-9));
     EXPECT_GE(x.dot(p.p * x), p.smallest * x.squaredNorm() * (1.0 - 1e-12));
@@ -394,8 +395,8 @@ TEST(LyapunovMatrix, SatisfiesItsInequalities) {
   expect_inequality<3>(fast, both);
   expect_inequality<3>(0.3 * slow + 0.7 * fast, both);
   const auto one = lyapunov_matrix<3>(fast).value();
-  const Matrix<double, 3, 3> left =
-      fast.transpose() * one.p + one.p * fast + Matrix<double, 3, 3>::Identity();
+  const EigenMatrix<double, 3, 3> left =
+      fast.transpose() * one.p + one.p * fast + EigenMatrix<double, 3, 3>::Identity();
   EXPECT_LT(left.cwiseAbs().maxCoeff(), 1e-13);
   // The solution of the equation is one of those that the inequality allows.
   const auto best = common_lyapunov_matrix<3>(std::array{fast}).value();
@@ -432,20 +433,20 @@ TEST(PeakGain, OfASampledObserverIsTheSumOfItsImpulseResponse) {
                                           .sample_time = 0.01})
                       .value();
   const auto peak = peak_gain(error_system(observer)).value();
-  Vector<double, 3> sum = Vector<double, 3>::Zero();
+  EigenMatrix<double, 3> sum = EigenMatrix<double, 3>::Zero();
   for (int k = 0; k < 2000; ++k) {
     observer.update(k == 0 ? 1.0 : 0.0, 0.0);
-    sum += observer.estimate().cwiseAbs();
+    sum += eigen(observer.estimate()).cwiseAbs();
   }
   for (int r = 0; r < 3; ++r) EXPECT_NEAR(peak(r, 0), sum(r), 1e-7 * sum(r));
   // w = d' of one, held over a sample: from then on d is a constant.
   const double T = observer.sample_time();
-  ASSERT_EQ(observer.reset(Vector<double, 3>(0.0, 0.0, 0.0)), StepStatus::ok);
-  Vector<double, 3> truth(T * T * T / 6.0, T * T / 2.0, T);
+  ASSERT_EQ(observer.reset(EigenMatrix<double, 3>(0.0, 0.0, 0.0)), StepStatus::ok);
+  EigenMatrix<double, 3> truth(T * T * T / 6.0, T * T / 2.0, T);
   sum.setZero();
   for (int k = 0; k < 2000; ++k) {
     observer.update(truth(0), 0.0);
-    sum += (truth - observer.estimate()).cwiseAbs();
+    sum += eigen((truth - observer.estimate())).cwiseAbs();
     truth(0) += T * (truth(1) + 0.5 * T * truth(2));
     truth(1) += T * truth(2);
   }
@@ -485,12 +486,12 @@ TEST(ErrorBound, RefusesBadSettings) {
       Cascade{.observer_bandwidth = 1.0, .bandwidth_factor = 0.5, .input_gain = 1.0}, fine);
   ASSERT_EQ(refusal(refused), "bandwidth_factor: must be finite and above");
   const auto bound = linear_error_bound(Linear{.observer_bandwidth = 1.0}, {}).value();
-  EXPECT_EQ(refusal(bound.convergence_time(Vector<double, 3>::Ones())),
+  EXPECT_EQ(refusal(bound.convergence_time(EigenMatrix<double, 3>::Ones())),
             "level: must be positive: a bound of zero is never reached");
   const auto some = linear_error_bound(Linear{.observer_bandwidth = 1.0}, fine).value();
-  EXPECT_EQ(refusal(some.convergence_time(Vector<double, 3>::Ones(), 0.0)),
+  EXPECT_EQ(refusal(some.convergence_time(EigenMatrix<double, 3>::Ones(), 0.0)),
             "excess: must be finite and positive");
-  EXPECT_EQ(some.convergence_time(Vector<double, 3>::Zero()).value(), 0.0);
+  EXPECT_EQ(some.convergence_time(EigenMatrix<double, 3>::Zero()).value(), 0.0);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <esokit/analysis/frequency_response.hpp>
 #include <esokit/analysis/observer_system.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
@@ -110,11 +111,12 @@ void expect_response_of_update(Observer observer, double frequency) {
   const double T = observer.sample_time();
   for (int input = 0; input < 2; ++input) {
     Observer running = observer;
-    Vector<Complex, Observer::size> sum = Vector<Complex, Observer::size>::Zero();
+    EigenMatrix<Complex, Observer::size> sum = EigenMatrix<Complex, Observer::size>::Zero();
     for (int k = 0; k < 20000; ++k) {
       // y[0] = 1 arrives with the first update, the input held from 0 to 1 with the second.
       running.update(input == 0 && k == 0 ? 1.0 : 0.0, input == 1 && k == 1 ? 1.0 : 0.0);
-      sum += running.estimate().template cast<Complex>() * std::polar(1.0, -frequency * T * k);
+      sum +=
+          eigen(running.estimate()).template cast<Complex>() * std::polar(1.0, -frequency * T * k);
     }
     for (int r = 0; r < Observer::size; ++r) {
       EXPECT_LT(std::abs(sum(r) - response(r, input)), 1e-9 * std::abs(response(r, input)))
@@ -153,12 +155,12 @@ TEST(FrequencyResponse, SystemFromGainsIsTheProbedOne) {
   auto observer = sampled<2, 1, 2>(25.0, 1e-3);
   const auto m = detail::observer_matrices(observer);
   for (int j = 0; j < 4; ++j) {
-    const Vector<double, 4> unit = Vector<double, 4>::Unit(j);
+    const EigenMatrix<double, 4> unit = EigenMatrix<double, 4>::Unit(j);
     observer.reset(unit);
     observer.correct(0.0);
-    const Vector<double, 4> corrected = observer.estimate();
+    const EigenMatrix<double, 4> corrected = observer.estimate();
     observer.predict(0.0);
-    const Vector<double, 4> next = observer.estimate();
+    const EigenMatrix<double, 4> next = observer.estimate();
     for (int i = 0; i < 4; ++i) {
       const double size = std::max(1.0, std::abs(next(i)));
       EXPECT_NEAR(corrected(i), m.c(i, j), 1e-13 * std::max(1.0, std::abs(corrected(i))));
@@ -167,9 +169,9 @@ TEST(FrequencyResponse, SystemFromGainsIsTheProbedOne) {
   }
   observer.reset(0.0);
   observer.correct(1.0);
-  const Vector<double, 4> corrected = observer.estimate();
+  const EigenMatrix<double, 4> corrected = observer.estimate();
   observer.predict(0.0);
-  const Vector<double, 4> next = observer.estimate();
+  const EigenMatrix<double, 4> next = observer.estimate();
   for (int i = 0; i < 4; ++i) {
     EXPECT_NEAR(corrected(i), m.dy(i), 1e-13 * std::abs(m.dy(i)));
     EXPECT_NEAR(next(i), m.by(i), 1e-13 * std::abs(m.by(i)));

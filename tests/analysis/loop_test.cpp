@@ -6,6 +6,7 @@
 #include <complex>
 #include <cstddef>
 #include <esokit/analysis/adrc_loop.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/sim/closed_loop.hpp>
@@ -44,14 +45,14 @@ void expect_same_run(const Loop& loop, Observer observer, Law&& control, double 
   EXPECT_STREQ(closed.output_names[1], "u");
   EXPECT_STREQ(closed.output_names[2], "yhat");
   constexpr int states = std::remove_cvref_t<decltype(closed)>::states;
-  Vector<double, states> x = Vector<double, states>::Zero();
-  Vector<double, 2> truth = Vector<double, 2>::Zero();
+  EigenMatrix<double, states> x = EigenMatrix<double, states>::Zero();
+  EigenMatrix<double, 2> truth = EigenMatrix<double, 2>::Zero();
   double u = 0.0;
   double u_before = 0.0;
   const auto p = plant();
   for (int k = 0; k < 300; ++k) {
-    const Vector<double, 3> inputs(1.0, 0.1 * std::sin(0.7 * k), k >= 100 ? 2.0 : 0.5);
-    const Vector<double, 5> outputs = closed.c * x + closed.d * inputs;
+    const EigenMatrix<double, 3> inputs(1.0, 0.1 * std::sin(0.7 * k), k >= 100 ? 2.0 : 0.5);
+    const EigenMatrix<double, 5> outputs = closed.c * x + closed.d * inputs;
 
     const double y = truth(0);
     const double r = inputs(0);
@@ -66,7 +67,7 @@ void expect_same_run(const Loop& loop, Observer observer, Law&& control, double 
     const double h = T / steps;
     for (int i = 0; i < steps; ++i) {
       const double held = (i + 0.5) * h < delay ? u_before : u;
-      const auto rate = [&](double, const Vector<double, 2>& z) -> Vector<double, 2> {
+      const auto rate = [&](double, const EigenMatrix<double, 2>& z) -> EigenMatrix<double, 2> {
         return p.a * z + p.b.col(0) * held + p.b.col(1) * inputs(2);
       };
       truth = sim::step(rate, 0.0, truth, h);
@@ -78,14 +79,14 @@ void expect_same_run(const Loop& loop, Observer observer, Law&& control, double 
 struct FedOutput {
   AdrcLaw<2> law;
   [[nodiscard]] double measured(double y, double) const { return y; }
-  [[nodiscard]] double input(const Vector<double, 3>& z, double r) const {
+  [[nodiscard]] double input(const EigenMatrix<double, 3>& z, double r) const {
     return law.control(z, r);
   }
 };
 struct FedError {
   AdrcLaw<2> law;
   [[nodiscard]] double measured(double y, double r) const { return r - y; }
-  [[nodiscard]] double input(const Vector<double, 3>& z, double) const {
+  [[nodiscard]] double input(const EigenMatrix<double, 3>& z, double) const {
     return law.control_error_based(z);
   }
 };

@@ -10,6 +10,7 @@
 #include <esokit/control/nonlinear_feedback.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/design/pid_conversion.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
@@ -148,7 +149,7 @@ TEST(OutputAfterMake, IsWithinTheLimits) {
   using Mimo = esokit::MimoAdrc<LinearEso<1>>;
   Mimo::Config mimo{.observers = {{.observer_bandwidth = 50, .sample_time = 1e-3}},
                     .controller_bandwidths = {10}};
-  mimo.input_matrix << 2;
+  mimo.input_matrix(0, 0) = 2;
   mimo.limits[0] = {.lower = 1, .upper = 2};
   EXPECT_EQ(Mimo::make(mimo)->output()(0), 1);
 }
@@ -249,19 +250,19 @@ TEST(MimoAbsurd, RetuneIsRefusedOrFinite) {
   Mimo::Config settings{.observers = {{.observer_bandwidth = 50, .sample_time = 1e-3},
                                       {.observer_bandwidth = 50, .sample_time = 1e-3}},
                         .controller_bandwidths = {10, 10}};
-  settings.input_matrix << 2, 1, 0, 2;
+  settings.input_matrix = {{2, 1}, {0, 2}};
   auto controller = Mimo::make(settings).value();
   const double top = std::numeric_limits<double>::max();
   (void)controller.update({0, 0}, {0, 0}, {0.9 * top, 0.9 * top});
   for (const double scale : {1e-3, 1.0, 3.0}) {
     auto changed = settings;
-    changed.input_matrix << 2 * scale, -scale, 0, -2 * scale;
+    changed.input_matrix = {{2 * scale, -scale}, {0, -2 * scale}};
     auto tried = controller;
     const auto outcome = tried.retune(changed);
     for (int k = 0; k < 5; ++k) {
-      EXPECT_TRUE(tried.observer<0>().estimate().allFinite()) << scale;
-      EXPECT_TRUE(tried.observer<1>().estimate().allFinite()) << scale;
-      EXPECT_TRUE(tried.output().allFinite()) << scale;
+      EXPECT_TRUE(eigen(tried.observer<0>().estimate()).allFinite()) << scale;
+      EXPECT_TRUE(eigen(tried.observer<1>().estimate()).allFinite()) << scale;
+      EXPECT_TRUE(eigen(tried.output()).allFinite()) << scale;
       if (!outcome) {
         EXPECT_EQ(tried.observer<0>().estimate(), controller.observer<0>().estimate());
         EXPECT_EQ(tried.observer<1>().estimate(), controller.observer<1>().estimate());
@@ -274,7 +275,7 @@ TEST(MimoAbsurd, RetuneIsRefusedOrFinite) {
   Mimo single = Mimo::make(settings).value();
   (void)single.start({0, 0}, {1e307, 0});
   auto changed = settings;
-  changed.input_matrix << 200, 1, 0, 2;
+  changed.input_matrix = {{200, 1}, {0, 2}};
   const auto refused = single.retune(changed);
   ASSERT_EQ(refusal(refused),
             "input_matrix: makes of the u that holds now (the value here) a disturbance that the "

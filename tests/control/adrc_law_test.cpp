@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <esokit/control/adrc_law.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <string>
@@ -12,8 +13,8 @@ namespace {
 
 using esokit::AdrcLaw;
 using esokit::Array;
+using esokit::EigenMatrix;
 using esokit::LinearEso;
-using esokit::Vector;
 using esokit_test::hidden_infinity;
 using esokit_test::hidden_nan;
 using esokit_test::refusal;
@@ -32,8 +33,8 @@ TEST(AdrcLaw, GainsFromTheBandwidth) {
 TEST(AdrcLaw, LiteralControl) {
   const auto law = AdrcLaw<2>::make({.gains = {{3, 5}}, .input_gain = -2}).value();
   EXPECT_EQ(law.input_gain(), -2);
-  const Vector<double, 4> estimate(1, 2, 7, 100);  // y, y', d, d'
-  const Vector<double, 3> reference(4, 6, 8);
+  const EigenMatrix<double, 4> estimate(1, 2, 7, 100);  // y, y', d, d'
+  const EigenMatrix<double, 3> reference(4, 6, 8);
   // v = 8 + 3 (4 - 1) + 5 (6 - 2) = 37; u = (37 - 7) / -2
   EXPECT_EQ(law.feedback(estimate, reference), 37);
   EXPECT_EQ(law.control(estimate, reference), -15);
@@ -42,7 +43,7 @@ TEST(AdrcLaw, LiteralControl) {
   // error-based: u = (7 + 3 + 10) / -2
   EXPECT_EQ(law.control_error_based(estimate), -10);
   // Any source of state estimates will do for the feedback, it need not know the disturbance.
-  EXPECT_EQ(law.feedback(Vector<double, 2>(1, 2), reference), 37);
+  EXPECT_EQ(law.feedback(EigenMatrix<double, 2>(1, 2), reference), 37);
 }
 
 template <class S>

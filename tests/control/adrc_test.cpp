@@ -5,6 +5,7 @@
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/incremental.hpp>
 #include <esokit/control/tracking_differentiator.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/delayed_input.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/variable_time.hpp>
@@ -19,9 +20,9 @@
 namespace esokit_test {
 namespace {
 
+using esokit::EigenMatrix;
 using esokit::LinearEso;
 using esokit::TimeDomain;
-using esokit::Vector;
 using Linear = Adrc<LinearEso<2>>;
 
 constexpr double period = 1e-3;
@@ -52,7 +53,7 @@ TEST(Adrc, IsObserverAndLaw) {
   observer.update(y, controller.output());
   const auto z = observer.estimate();
   const double expected = (7 + 100 * (0.5 - z(0)) + 20 * (0.25 - z(1)) - z(2)) / 2;
-  EXPECT_NEAR(controller.update(y, Vector<double, 3>(0.5, 0.25, 7)), expected, 1e-6);
+  EXPECT_NEAR(controller.update(y, EigenMatrix<double, 3>(0.5, 0.25, 7)), expected, 1e-6);
 }
 
 TEST(Adrc, TakesAListOfTheReferenceAndItsDerivatives) {
@@ -60,12 +61,13 @@ TEST(Adrc, TakesAListOfTheReferenceAndItsDerivatives) {
   auto listed = Linear::make(base()).value();
   auto given = Linear::make(base()).value();
   for (int k = 0; k < 3; ++k) {
-    EXPECT_EQ(listed.update(0.3, {r, r1, r2}), given.update(0.3, Vector<double, 3>(r, r1, r2)));
-    EXPECT_EQ(listed.update(0.3, {r, r1}), given.update(0.3, Vector<double, 2>(r, r1)));
+    EXPECT_EQ(listed.update(0.3, {r, r1, r2}),
+              given.update(0.3, EigenMatrix<double, 3>(r, r1, r2)));
+    EXPECT_EQ(listed.update(0.3, {r, r1}), given.update(0.3, EigenMatrix<double, 2>(r, r1)));
     EXPECT_EQ(listed.update(0.3, {r, r1, 7}, 0.1),
-              given.update(0.3, Vector<double, 3>(r, r1, 7), 0.1));
+              given.update(0.3, EigenMatrix<double, 3>(r, r1, 7), 0.1));
     EXPECT_EQ(listed.update_without_measurement({r, r1}),
-              given.update_without_measurement(Vector<double, 2>(r, r1)));
+              given.update_without_measurement(EigenMatrix<double, 2>(r, r1)));
     EXPECT_NE(listed.output(), 0);
   }
 }
@@ -75,10 +77,11 @@ TEST(Adrc, IncrementalTakesAListToo) {
   auto listed = esokit::Incremental<Linear>::make(base()).value();
   auto given = listed;
   for (int k = 0; k < 3; ++k) {
-    const double increment = given.update(0.3, Vector<double, 3>(r, r1, r2));
+    const double increment = given.update(0.3, EigenMatrix<double, 3>(r, r1, r2));
     EXPECT_EQ(listed.update(0.3, {r, r1, r2}), increment);
     EXPECT_NE(increment, 0);
-    EXPECT_EQ(listed.update(0.3, {r, r1}, 0.1), given.update(0.3, Vector<double, 2>(r, r1), 0.1));
+    EXPECT_EQ(listed.update(0.3, {r, r1}, 0.1),
+              given.update(0.3, EigenMatrix<double, 2>(r, r1), 0.1));
   }
 }
 

@@ -6,6 +6,7 @@
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/dual_feedback.hpp>
 #include <esokit/control/mimo_adrc.hpp>
+#include <esokit/design/pole_set.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <limits>
@@ -76,7 +77,7 @@ TEST(Boundary, BadNumberAnywhereInTheInputMatrix) {
   Mimo::Config config{.observers = {{.observer_bandwidth = 50, .sample_time = 1e-3},
                                     {.observer_bandwidth = 50, .sample_time = 1e-3}},
                       .controller_bandwidths = {10, 10}};
-  config.input_matrix << 2, 1, 0.5, 3;
+  config.input_matrix = {{2, 1}, {0.5, 3}};
   ASSERT_EQ(refusal(Mimo::make(config)), "accepted");
   for (int i = 0; i < 2; ++i) {
     for (int j = 0; j < 2; ++j) {

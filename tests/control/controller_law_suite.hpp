@@ -13,6 +13,7 @@
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/incremental.hpp>
 #include <esokit/control/mimo_adrc.hpp>
+#include <esokit/eigen.hpp>
 #include <support/law_registration.hpp>
 #include <support/refusal.hpp>
 #include <tuple>
@@ -452,7 +453,7 @@ struct ControllerLawsOf<Adrc<O, F>> {
       typename Mimo::Config settings{};
       settings.observers = {Traits::config(omega_o, period, 0)};
       settings.controller_bandwidths = {s(omega_c)};
-      settings.input_matrix << s(gain);
+      settings.input_matrix(0, 0) = s(gain);
       settings.limits = {limited().limits};
       auto mimo = Mimo::make(settings).value();
       using One = typename Mimo::Output;
@@ -476,7 +477,7 @@ struct ControllerLawsOf<Adrc<O, F>> {
         sink += controller.update(S(0.1), S(0.5));
         sink += controller.update(hidden_nan<S>(), S(0.5));
         sink += controller.update(S(0.1), S(0.5), S(0.2));
-        sink += controller.update(S(0.1), esokit::Vector<S, 2>(S(0.5), S(0.1)));
+        sink += controller.update(S(0.1), esokit::EigenMatrix<S, 2>(S(0.5), S(0.1)));
         for (int i = 0; i < 5; ++i) sink += controller.update_without_measurement(S(0.5));
         sink += controller.track(S(0.1), S(0.5), S(0.3));
         controller.start(S(0.1), S(0.2));
@@ -509,7 +510,7 @@ struct ControllerLawsOf<Adrc<O, F>> {
       const S y = s(random.uniform(-0.5, 0.5));
       const S r = s(random.uniform(-0.5, 0.5));
       const S u = a.update(y, r);
-      const S v = b.update(y, esokit::Vector<S, 2>(r, S(0)));
+      const S v = b.update(y, esokit::EigenMatrix<S, 2>(r, S(0)));
       ASSERT_NEAR(static_cast<double>(u), static_cast<double>(v),
                   16 * rounding() + 64 * epsilon * std::abs(static_cast<double>(u)));
       (void)b.observer();

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <esokit/control/adrc.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/model/integrator_chain.hpp>
 #include <limits>
 #include <support/numbers.hpp>
@@ -24,12 +25,13 @@ struct LoopTraits;
 template <int Order>
 class ChainPlant {
  public:
-  using State = esokit::Vector<double, Order>;
+  using State = esokit::EigenMatrix<double, Order>;
 
   ChainPlant(double sample_time, double input_gain, double disturbance)
       : input_gain_(input_gain), disturbance_(disturbance) {
     using Chain = esokit::IntegratorChain<Order, double>;
-    transition_ = Chain::transition_matrix(sample_time).template topLeftCorner<Order, Order>();
+    transition_ =
+        eigen(Chain::transition_matrix(sample_time)).template topLeftCorner<Order, Order>();
     drive_ = Chain::sampled_input_matrix(sample_time, 1).template head<Order>();
   }
 
@@ -44,7 +46,7 @@ class ChainPlant {
   void set_disturbance(double d) { disturbance_ = d; }
 
  private:
-  esokit::Matrix<double, Order, Order> transition_;
+  esokit::EigenMatrix<double, Order, Order> transition_;
   State drive_;
   State x_ = State::Zero();
   double input_gain_;

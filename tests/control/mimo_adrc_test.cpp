@@ -7,6 +7,7 @@
 #include <cmath>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/mimo_adrc.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/delayed_input.hpp>
 #include <esokit/observer/linear_eso.hpp>
@@ -20,10 +21,9 @@
 namespace esokit_test {
 namespace {
 
+using esokit::EigenMatrix;
 using esokit::LinearEso;
-using esokit::Matrix;
 using esokit::MimoAdrc;
-using esokit::Vector;
 using Two = MimoAdrc<LinearEso<2>, LinearEso<1>>;
 
 constexpr double period = 1e-3;
@@ -32,19 +32,19 @@ Two::Config base() {
   Two::Config config{.observers = {{.observer_bandwidth = 60, .sample_time = period},
                                    {.observer_bandwidth = 40, .sample_time = period}},
                      .controller_bandwidths = {10, 8}};
-  config.input_matrix << 2, 1, 0.5, 3;
+  config.input_matrix = {{2, 1}, {0.5, 3}};
   return config;
 }
 
 /// y_1'' = d_1 + (B u)_1, y_2' = d_2 + (B u)_2, exact for a held u.
 struct CoupledPlant {
-  Matrix<double, 2, 2> gain;
+  EigenMatrix<double, 2, 2> gain;
   ChainPlant<2> first{period, 1, -3};
   ChainPlant<1> second{period, 1, 2};
 
-  [[nodiscard]] Vector<double, 2> output() const { return {first.output(), second.output()}; }
-  void step(const Vector<double, 2>& u) {
-    const Vector<double, 2> drive = gain * u;
+  [[nodiscard]] EigenMatrix<double, 2> output() const { return {first.output(), second.output()}; }
+  void step(const EigenMatrix<double, 2>& u) {
+    const EigenMatrix<double, 2> drive = gain * u;
     first.step(drive(0));
     second.step(drive(1));
   }
@@ -58,7 +58,7 @@ TEST(MimoAdrc, DecoratedChannelsAreThoseOfAdrc) {
       .controller_bandwidths = {5}};
   circle.input_matrix(0, 0) = 1;
   auto axis = MimoAdrc<Axis>::make(circle).value();
-  using Vector1 = Vector<double, 1>;
+  using Vector1 = EigenMatrix<double, 1>;
   // 350 and -10 degrees are one place.
   ASSERT_EQ(axis.start(Vector1(350.0), Vector1(0.0)), esokit::StepStatus::ok);
   for (const double reference : {350.0, -10.0, 710.0}) {
@@ -84,12 +84,12 @@ TEST(MimoAdrc, RestartAfterALongGapDoesNotBump) {
   std::get<0>(settings.observers).max_gap = 10;
   std::get<1>(settings.observers).max_gap = 10;
   auto controller = Two::make(settings).value();
-  const Vector<double, 2> y(1, 2);
-  const Vector<double, 2> u(3, -1);
+  const EigenMatrix<double, 2> y(1, 2);
+  const EigenMatrix<double, 2> u(3, -1);
   ASSERT_EQ(controller.start(y, u), esokit::StepStatus::ok);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (int k = 0; k < 30; ++k) controller.update({nan, nan}, y);
-  EXPECT_LE((controller.update(y, y) - u).norm(), 1e-9);
+  EXPECT_LE(eigen(controller.update(y, y) - u).norm(), 1e-9);
   EXPECT_EQ(controller.status(0), esokit::StepStatus::restarted);
 }
 
@@ -104,7 +104,7 @@ TEST(MimoAdrc, ChannelsAreDecoupled) {
   ChainPlant<2> single(period, 1, -3);
   for (int k = 0; k < 4000; ++k) {
     // The other channel is stepped up and down meanwhile.
-    plant.step(both.update(plant.output(), {1, k % 500 < 250 ? 1 : -1}));
+    plant.step(both.update(plant.output(), {1, k % 500 < 250 ? 1.0 : -1.0}));
     single.step(alone.update(single.output(), 1.0));
     ASSERT_NEAR(plant.output()(0), single.output(), 1e-9) << k;
   }
@@ -114,7 +114,7 @@ TEST(MimoAdrc, ChannelsAreDecoupled) {
 /// A wrong B0 is disturbance.
 TEST(MimoAdrc, WrongMatrix) {
   auto config = base();
-  config.input_matrix << 1.7, 0.6, 0.8, 3.4;
+  config.input_matrix = {{1.7, 0.6}, {0.8, 3.4}};
   auto controller = Two::make(config).value();
   CoupledPlant plant{base().input_matrix};
   for (int k = 0; k < 8000; ++k) plant.step(controller.update(plant.output(), {1, -1}));
@@ -134,7 +134,7 @@ TEST(MimoAdrc, Limits) {
   int at_limit = 0;
   for (int k = 0; k < 3000; ++k) {
     a.step(free.update(a.output(), {1, -1}));
-    const Vector<double, 2> u = limited.update(b.output(), {1, -1});
+    const EigenMatrix<double, 2> u = limited.update(b.output(), {1, -1});
     ASSERT_GE(u(0), -3);
     ASSERT_LE(u(0), 5);
     ASSERT_GE(u(1), -4);
@@ -151,23 +151,24 @@ TEST(MimoAdrc, Limits) {
 TEST(MimoAdrc, StartAndRetuneDoNotBump) {
   auto controller = Two::make(base()).value();
   CoupledPlant plant{base().input_matrix};
-  const Vector<double, 2> steady = base().input_matrix.inverse() * Vector<double, 2>(3, -2);
-  const Vector<double, 2> y(0.4, -0.2);
+  const EigenMatrix<double, 2> steady =
+      eigen(base().input_matrix).inverse() * EigenMatrix<double, 2>(3, -2);
+  const EigenMatrix<double, 2> y(0.4, -0.2);
   plant.first.set_state({0.4, 0});
-  plant.second.set_state(Vector<double, 1>(-0.2));
+  plant.second.set_state(EigenMatrix<double, 1>(-0.2));
   EXPECT_EQ(controller.start(y, steady), StepStatus::ok);
   for (int k = 0; k < 50; ++k) {
-    const Vector<double, 2> u = controller.update(plant.output(), y);
+    const EigenMatrix<double, 2> u = controller.update(plant.output(), y);
     ASSERT_LT((u - steady).norm(), 1e-9);
     plant.step(u);
   }
   auto changed = base();
-  changed.input_matrix << 1.5, 0.2, 0.9, 2;
+  changed.input_matrix = {{1.5, 0.2}, {0.9, 2}};
   std::get<0>(changed.observers).observer_bandwidth = 90;
   changed.controller_bandwidths = {7, 11};
   ASSERT_TRUE(controller.retune(changed).has_value());
-  EXPECT_LT((controller.update(plant.output(), y) - steady).norm(), 1e-9);
-  changed.input_matrix.setZero();
+  EXPECT_LT(eigen((controller.update(plant.output(), y) - steady)).norm(), 1e-9);
+  eigen(changed.input_matrix).setZero();
   EXPECT_EQ(refusal(controller.retune(changed)),
             "input_matrix: has a condition number (the value here) that must be at most");
   EXPECT_EQ(controller.start({hidden_nan<double>(), 0}, steady), StepStatus::state_rejected);
@@ -182,7 +183,7 @@ TEST(MimoAdrc, BadSamplesOfOneChannel) {
   EXPECT_EQ(controller.status(1), StepStatus::ok);
   EXPECT_EQ(controller.observer<0>().missed(), 1);
   EXPECT_EQ(controller.observer<1>().missed(), 0);
-  const Vector<double, 2> before = controller.output();
+  const EigenMatrix<double, 2> before = controller.output();
   EXPECT_EQ(controller.update({0, 0.1}, {nan, nan}), before);
   EXPECT_TRUE(std::isfinite(controller.update({0, 0.1}, {0, 0}).sum()));
   controller.update({0, 0.1}, {0, 0}, {nan, 0.5});
@@ -201,20 +202,20 @@ TEST(MimoAdrc, BadReferenceOfOneChannel) {
   for (const double bad : {hidden_nan<double>(), hidden_infinity<double>()}) {
     for (const int channel : {0, 1}) {
       auto controller = Two::make(base()).value();
-      const Matrix<double, 2, 2> b0 = base().input_matrix;
-      Vector<double, 2> y(0.1, -0.2);
+      const EigenMatrix<double, 2, 2> b0 = base().input_matrix;
+      EigenMatrix<double, 2> y(0.1, -0.2);
       for (int k = 0; k < 5; ++k) controller.update(y, {0.3, 0.4});
       for (int k = 0; k < 20; ++k) {
         auto other = controller;
-        const Vector<double, 2> held = b0 * controller.output();
-        Vector<double, 2> r(0.3, 0.4);
-        const Vector<double, 2> good = b0 * other.update(y, r);
+        const EigenMatrix<double, 2> held = b0 * controller.output();
+        EigenMatrix<double, 2> r(0.3, 0.4);
+        const EigenMatrix<double, 2> good = b0 * other.update(y, r);
         r(channel) = bad;
-        const Vector<double, 2> drive = b0 * controller.update(y, r);
+        const EigenMatrix<double, 2> drive = b0 * controller.update(y, r);
         ASSERT_NEAR(drive(channel), held(channel), 1e-9 * std::abs(held(channel)));
         ASSERT_NEAR(drive(1 - channel), good(1 - channel), 1e-9 * std::abs(good(1 - channel)));
         ASSERT_EQ(controller.status(channel), StepStatus::ok);
-        y += Vector<double, 2>(0.01, -0.01);
+        y += EigenMatrix<double, 2>(0.01, -0.01);
       }
     }
   }
@@ -229,22 +230,26 @@ TEST(MimoAdrc, BadConfigIsRefusedByName) {
   };
   using C = Two::Config;
   EXPECT_EQ(refusal(error([](C&) {})), "accepted");
-  auto singular = error([](C& c) { c.input_matrix << 1, 2, 2, 4; });
+  auto singular = error([](C& c) { c.input_matrix = {{1, 2}, {2, 4}}; });
   EXPECT_EQ(refusal(singular),
             "input_matrix: has a condition number (the value here) that must be at most");
   EXPECT_TRUE(std::isinf(singular.error().value));
-  EXPECT_EQ(refusal(error([](C& c) { c.input_matrix.setZero(); })),
+  EXPECT_EQ(refusal(error([](C& c) { eigen(c.input_matrix).setZero(); })),
             "input_matrix: has a condition number (the value here) that must be at most");
-  auto ill = error([](C& c) { c.input_matrix << 1, 1, 1, 1.0001; });
+  auto ill = error([](C& c) { c.input_matrix = {{1, 1}, {1, 1.0001}}; });
   EXPECT_EQ(refusal(ill),
             "input_matrix: has a condition number (the value here) that must be at most");
   // kappa_1 = 4.0004 * (2 / 0.0001 / ..): by hand (|a|+|c|) (|d|+|b|) / |ad - bc| ~ 4 / 1e-4.
   EXPECT_NEAR(ill.error().value, 4e4, 10);
   EXPECT_EQ(ill.error().limit, 1000);
   // Units do not matter: rows and columns in other units, the same condition.
-  EXPECT_NEAR(error([](C& c) { c.input_matrix << 1e6, 1e-3, 1, 1.0001e-9; }).error().value, 4e4,
-              10);
-  EXPECT_EQ(refusal(error([](C& c) { c.input_matrix << 2e6, 1e-3, 1, 3e-9; })), "accepted");
+  EXPECT_NEAR(error([](C& c) {
+                c.input_matrix = {{1e6, 1e-3}, {1, 1.0001e-9}};
+              })
+                  .error()
+                  .value,
+              4e4, 10);
+  EXPECT_EQ(refusal(error([](C& c) { c.input_matrix = {{2e6, 1e-3}, {1, 3e-9}}; })), "accepted");
   EXPECT_EQ(
       refusal(error([](C& c) { c.input_matrix(0, 1) = std::numeric_limits<double>::quiet_NaN(); })),
       "input_matrix[1]: must be finite");

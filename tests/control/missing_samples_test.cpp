@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <esokit/control/adrc.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/variable_time.hpp>
 #include <type_traits>
@@ -29,10 +30,10 @@ double spectral_radius(double omega_t, int every, bool follow) {
           .value();
   for (int i = 0; i < (follow ? every : 1); ++i) observer.predict(0);
   observer.correct(1);
-  const esokit::Vector<double, N> gain = observer.estimate();
-  esokit::Matrix<double, N, N> error = esokit::Matrix<double, N, N>::Identity();
+  const esokit::EigenMatrix<double, N> gain = observer.estimate();
+  esokit::EigenMatrix<double, N, N> error = esokit::EigenMatrix<double, N, N>::Identity();
   for (int i = 0; i < every; ++i) error = Chain::transition_matrix(1.0) * error;
-  error = (esokit::Matrix<double, N, N>::Identity() - gain * Chain::output_matrix()) * error;
+  error = (esokit::EigenMatrix<double, N, N>::Identity() - gain * Chain::output_matrix()) * error;
   return Eigen::MatrixXd(error).eigenvalues().cwiseAbs().maxCoeff();  // one solver for all N
 }
 
@@ -109,7 +110,7 @@ double tracking_error(const Faults& faults, bool follow_time = true) {
       EXPECT_TRUE(controller.set_step_time(dt).has_value());
     }
     const double r = std::sin(2 * t);
-    const esokit::Vector<double, 3> reference(r, 2 * std::cos(2 * t), -4 * std::sin(2 * t));
+    const esokit::EigenMatrix<double, 3> reference(r, 2 * std::cos(2 * t), -4 * std::sin(2 * t));
     double measured = y + 2e-4 * random.uniform(-1, 1);
     if (random.uniform(0, 1) < faults.bad) measured = hidden_nan<double>();
     u = random.uniform(0, 1) < faults.missing ? controller.update_without_measurement(reference)

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/control/nonlinear_feedback.hpp>
+#include <esokit/eigen.hpp>
 #include <limits>
 #include <support/numbers.hpp>
 #include <support/refusal.hpp>
@@ -11,8 +12,8 @@
 namespace esokit_test {
 namespace {
 
+using esokit::EigenMatrix;
 using esokit::NonlinearFeedback;
-using esokit::Vector;
 
 double printed_fal(double e, double a, double delta) {
   if (std::abs(e) <= delta) return e / std::pow(delta, 1 - a);
@@ -29,9 +30,9 @@ TEST(NonlinearFeedback, IsTheFormula) {
   EXPECT_NEAR(law.input_gain(), -4, 1e-15);
   Random random(2);
   for (int i = 0; i < 200; ++i) {
-    const Vector<double, 4> z(random.uniform(-1, 1), random.uniform(-1, 1) * 1e-3,
-                              random.uniform(-3, 3), 7);
-    const Vector<double, 2> r(random.uniform(-1, 1), random.uniform(-1, 1) * 1e-3);
+    const EigenMatrix<double, 4> z(random.uniform(-1, 1), random.uniform(-1, 1) * 1e-3,
+                                   random.uniform(-3, 3), 7);
+    const EigenMatrix<double, 2> r(random.uniform(-1, 1), random.uniform(-1, 1) * 1e-3);
     const double v =
         printed_fal(r(0) - z(0), 1.0, 0.021) + 2.5 * printed_fal(r(1) - z(1), 0.1, 0.001);
     EXPECT_NEAR(law.feedback(z, r), v, 1e-13);
@@ -43,7 +44,7 @@ TEST(NonlinearFeedback, IsTheFormula) {
 TEST(NonlinearFeedback, ExponentOneIsLinear) {
   const auto nonlinear = NonlinearFeedback<2>::make({.gains = {25, 10}, .input_gain = 2}).value();
   const auto linear = esokit::AdrcLaw<2>::make({.gains = {{25, 10}}, .input_gain = 2}).value();
-  const Vector<double, 3> z(0.3, -0.7, 1.5);
+  const EigenMatrix<double, 3> z(0.3, -0.7, 1.5);
   EXPECT_DOUBLE_EQ(nonlinear.control(z, {1.0, 0.5}), linear.control(z, {1.0, 0.5, 0.0}));
 }
 
@@ -62,7 +63,7 @@ void finite_of_finite() {
                              .value();
         for (const S a : {S(0), S(-1), S(1e10), -largest, largest}) {
           for (const S b : {S(0), S(1e10), -largest, largest}) {
-            const Vector<S, 3> z(a, b, b);
+            const EigenMatrix<S, 3> z(a, b, b);
             EXPECT_TRUE(std::isfinite(law.control(z, {-a, -b})))
                 << exponent << ' ' << a << ' ' << b;
             EXPECT_TRUE(std::isfinite(law.feedback(z, {-b, -a})))
@@ -71,13 +72,13 @@ void finite_of_finite() {
         }
         // Largest in the direction that reduces the error.
         if (gain > S(0)) {
-          const Vector<S, 3> z(-largest, S(0), S(0));
+          const EigenMatrix<S, 3> z(-largest, S(0), S(0));
           EXPECT_GT(law.control(z, {largest, S(0)}) * b0, S(0)) << exponent;
-          EXPECT_LT(law.control(Vector<S, 3>(-z), {-largest, S(0)}) * b0, S(0)) << exponent;
+          EXPECT_LT(law.control(EigenMatrix<S, 3>(-z), {-largest, S(0)}) * b0, S(0)) << exponent;
         }
         const S bad = hidden_nan<S>();
-        EXPECT_FALSE(std::isfinite(law.control(Vector<S, 3>(S(0), S(0), S(0)), {bad, S(0)})));
-        EXPECT_FALSE(std::isfinite(law.control(Vector<S, 3>(S(0), S(0), bad), {S(0), S(0)})));
+        EXPECT_FALSE(std::isfinite(law.control(EigenMatrix<S, 3>(S(0), S(0), S(0)), {bad, S(0)})));
+        EXPECT_FALSE(std::isfinite(law.control(EigenMatrix<S, 3>(S(0), S(0), bad), {S(0), S(0)})));
       }
     }
   }

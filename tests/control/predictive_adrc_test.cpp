@@ -11,6 +11,7 @@
 #include <cmath>
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/control/predictive_adrc.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
@@ -47,8 +48,8 @@ LawOf<Observer> law_of(const Controller<Observer>& controller) {
 
 /// Reference signal with its derivatives, all in step with omega_c.
 template <class S, int Count>
-esokit::Vector<S, Count> reference_at(int k) {
-  esokit::Vector<S, Count> r;
+esokit::EigenMatrix<S, Count> reference_at(int k) {
+  esokit::EigenMatrix<S, Count> r;
   for (int i = 0; i < Count; ++i) {
     r(i) = static_cast<S>(0.5 * std::pow(20, i) * std::sin(20 * k * period + i * 1.5707963));
   }
@@ -498,7 +499,7 @@ TEST(PredictiveAdrc, the_reference_may_change_until_the_sample) {
   a.prepare(hidden_nan<double>());
   const double last = a.output();
   EXPECT_EQ(a.control(0.25), last);
-  b.prepare(esokit::Vector<double, 2>(0.1, hidden_infinity<double>()));
+  b.prepare(esokit::EigenMatrix<double, 2>(0.1, hidden_infinity<double>()));
   EXPECT_EQ(b.control(0.25), last);
   a.prepare(1.0);
   EXPECT_NE(a.control(0.25), last);
@@ -515,13 +516,13 @@ TEST(PredictiveAdrc, the_reference_may_change_until_the_sample) {
 }
 
 TEST(PredictiveAdrc, takes_a_list_of_the_reference_and_its_derivatives) {
-  using Two = esokit::Vector<double, 2>;
+  using Two = esokit::EigenMatrix<double, 2>;
   auto listed = warm<Linear>(typical());
   auto given = listed;
   const double r = 0.5, r1 = 20, r2 = 300;
   for (int k = 0; k < 3; ++k) {
     EXPECT_EQ(listed.update(0.1, {r, r1, r2}),
-              given.update(0.1, esokit::Vector<double, 3>(r, r1, r2)));
+              given.update(0.1, esokit::EigenMatrix<double, 3>(r, r1, r2)));
     const double by_list = listed.control(0.2);
     EXPECT_EQ(by_list, given.control(0.2));
     EXPECT_NE(by_list, 0);
@@ -662,7 +663,7 @@ TEST(PredictiveAdrc, allocates_nothing) {
     for (int k = 0; k < 20; ++k) {
       sink += controller.control(0.1) + filter.control(0.1);
       controller.prepare(1.0);
-      filter.prepare(esokit::Vector<double, 3>(1, 2, 3));
+      filter.prepare(esokit::EigenMatrix<double, 3>(1, 2, 3));
       controller.report_applied(0.3);
       sink += controller.control_without_measurement();
       controller.prepare(1.0);

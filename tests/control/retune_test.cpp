@@ -103,10 +103,10 @@ TEST(Retune, DesignsAsOftenAsMake) {
   using Two = esokit::MimoAdrc<Counted, Counted>;
   Two::Config one{.observers = {channel(first()), channel(first())},
                   .controller_bandwidths = {5, 5}};
-  one.input_matrix << 1, 0, 0, 1;
+  one.input_matrix = {{1, 0}, {0, 1}};
   Two::Config other{.observers = {channel(second()), channel(second())},
                     .controller_bandwidths = {4, 4}};
-  other.input_matrix << 2, 0, 1, 1;
+  other.input_matrix = {{2, 0}, {1, 1}};
   designs_once<Two>(one, other, 2);
 }
 

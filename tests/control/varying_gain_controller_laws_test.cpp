@@ -1,6 +1,7 @@
 // The controller law suite on the observers whose gains change.
 #include "controller_law_suite.hpp"
 //
+#include <esokit/eigen.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
@@ -53,7 +54,7 @@ struct LoopTraits<esokit::ExtendedStateFilter<Order, S>> {
     settings.measurement_variance = static_cast<S>(1e-4);
     settings.disturbance_bounds[Order] = static_cast<S>(1e-2 * std::pow(omega, Order + 1) * T / 2);
     settings.inflation = static_cast<S>(0.02);
-    settings.initial_covariance.diagonal().setConstant(S(1));
+    eigen(settings.initial_covariance).diagonal().setConstant(S(1));
     return settings;
   }
 };

@@ -13,6 +13,8 @@
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/core/snapshot.hpp>
 #include <esokit/core/snapshot_text.hpp>
+#include <esokit/design/pole_set.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/algebraic_filter.hpp>
@@ -116,7 +118,7 @@ TEST(Snapshot, FilterRecursiveAndFrozen) {
   config.measurement_variance = 1e-4f;
   config.disturbance_bounds = {0.0f, 0.0f, 10.0f};
   config.inflation = 0.5f;
-  config.initial_covariance.diagonal() << 1.0f, 1e2f, 1e4f;
+  eigen(config.initial_covariance).diagonal() << 1.0f, 1e2f, 1e4f;
   expect_same_life(Filter::make(config).value());
   config.mode = RiccatiMode::frozen;
   expect_same_life(Filter::make(config).value());

@@ -1,8 +1,10 @@
 #include <gtest/gtest.h>
+#include <esokit/design/pole_set.hpp>
 
 #include <cmath>
 #include <complex>
 #include <esokit/design/feedback_gain.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/model/integrator_chain.hpp>
 #include <limits>
 #include <support/refusal.hpp>
@@ -12,10 +14,9 @@ namespace {
 using esokit_test::refusal;
 
 using esokit::Array;
+using esokit::EigenMatrix;
 using esokit::FeedbackSpec;
-using esokit::Matrix;
 using esokit::TimeDomain;
-using esokit::Vector;
 
 constexpr double period = 0.02;
 
@@ -24,10 +25,11 @@ constexpr double period = 0.02;
 template <int Order>
 double miss(const Array<double, Order>& gain, const Array<std::complex<double>, Order>& poles) {
   using Chain = esokit::IntegratorChain<Order, double>;
-  using Complex = Matrix<std::complex<double>, Order, Order>;
-  Matrix<double, Order, Order> closed =
-      Chain::transition_matrix(period).template topLeftCorner<Order, Order>();
-  const Vector<double, Order> gamma = Chain::sampled_input_matrix(period, 1).template head<Order>();
+  using Complex = EigenMatrix<std::complex<double>, Order, Order>;
+  EigenMatrix<double, Order, Order> closed =
+      eigen(Chain::transition_matrix(period)).template topLeftCorner<Order, Order>();
+  const EigenMatrix<double, Order> gamma =
+      Chain::sampled_input_matrix(period, 1).template head<Order>();
   for (int i = 0; i < Order; ++i) closed.col(i) -= gamma * gain[static_cast<std::size_t>(i)];
   for (int i = 0; i < Order; ++i) {
     for (int j = 0; j < Order; ++j) closed(i, j) *= std::pow(period, i - j);
@@ -111,8 +113,8 @@ TEST(FeedbackGain, HalfGainPolesGiveHalfTheGains) {
     constexpr int N = decltype(size)::value;
     const double omega = 7;
     const auto poles = esokit::half_gain_poles<N, double>(omega);
-    const Vector<double, N> gain = esokit::continuous_gain<N, double>(poles);
-    const Vector<double, N> whole = esokit::continuous_gain<N, double>(omega);
+    const EigenMatrix<double, N> gain = esokit::continuous_gain<N, double>(poles);
+    const EigenMatrix<double, N> whole = esokit::continuous_gain<N, double>(omega);
     for (int i = 0; i < N; ++i) EXPECT_NEAR(gain(i) / whole(i), 0.5, 1e-12) << N << ' ' << i;
     for (const auto& pole : poles) EXPECT_DOUBLE_EQ(pole.real(), -omega / 2);
     EXPECT_TRUE((esokit::HalfGainPoles::gain<N, double>(omega) == whole / 2));

@@ -5,6 +5,7 @@
 #include <complex>
 #include <esokit/design/continuous_gain.hpp>
 #include <esokit/design/pid_conversion.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/model/integrator_chain.hpp>
 #include <limits>
 #include <support/refusal.hpp>
@@ -23,14 +24,16 @@ std::complex<double> adrc_at(std::complex<double> s, const AdrcTuning<double>& t
   using Chain = esokit::IntegratorChain<Order, double>;
   constexpr int N = Order + 1;
   using Complex = Eigen::Matrix<std::complex<double>, N, N>;
-  const esokit::Vector<double, N> l = esokit::continuous_gain<N, double>(tuning.observer_bandwidth);
-  const esokit::Vector<double, Order> k =
+  const esokit::EigenMatrix<double, N> l =
+      esokit::continuous_gain<N, double>(tuning.observer_bandwidth);
+  const esokit::EigenMatrix<double, Order> k =
       esokit::continuous_gain<Order, double>(tuning.controller_bandwidth);
-  esokit::RowVector<double, N> law;
+  esokit::EigenMatrix<double, 1, N> law;
   for (int i = 0; i < Order; ++i) law(i) = k(Order - 1 - i) / tuning.input_gain;
   law(Order) = 1 / tuning.input_gain;
-  const esokit::Matrix<double, N, N> closed = Chain::state_matrix() - l * Chain::output_matrix() -
-                                              Chain::input_matrix(tuning.input_gain) * law;
+  const esokit::EigenMatrix<double, N, N> closed = Chain::state_matrix() -
+                                                   l * Chain::output_matrix() -
+                                                   Chain::input_matrix(tuning.input_gain) * law;
   const Complex pencil = s * Complex::Identity() - closed.template cast<std::complex<double>>();
   const Eigen::Matrix<std::complex<double>, N, 1> z =
       pencil.inverse() * l.template cast<std::complex<double>>();

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <esokit/design/riccati.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <limits>
 #include <support/high_precision.hpp>
@@ -226,9 +227,9 @@ TEST(Riccati, says_when_there_is_no_limit) {
 
 TEST(Riccati, general_model_says_when_not_stabilisable) {
   esokit::RiccatiModel<2, 1, double> model;
-  model.transition << 1.2, 0, 0, 0.5;  // an unstable mode that is not measured
-  model.output << 0, 1;
-  model.noise.setIdentity();
+  model.transition = {{1.2, 0}, {0, 0.5}};  // an unstable mode that is not measured
+  model.output = {0, 1};
+  eigen(model.noise).setIdentity();
   model.measurement(0, 0) = 1;
   EXPECT_FALSE((esokit::riccati_covariance<2, 1, double>(model, Eigen::Vector2d(0, 0.1))));
 }
@@ -236,10 +237,10 @@ TEST(Riccati, general_model_says_when_not_stabilisable) {
 /// Two outputs, full R: the residual of the equation itself.
 TEST(Riccati, general_model_solves_the_equation) {
   esokit::RiccatiModel<3, 2, double> model;
-  model.transition << 1, 1, 0, 0, 1, 0, 0, 0, 1;
-  model.output << 1, 0, 0, 0, 0, 1;
+  model.transition = {{1, 1, 0}, {0, 1, 0}, {0, 0, 1}};
+  model.output = {{1, 0, 0}, {0, 0, 1}};
   model.noise = Eigen::Vector3d(0.1, 0.01, 0.5).asDiagonal();
-  model.measurement << 1, 0.3, 0.3, 2;
+  model.measurement = {{1, 0.3}, {0.3, 2}};
   model.inflation = 1.1;
   Eigen::Matrix<double, 3, 2> start;
   start << 1, 0, 1, 0, 0, 1;
@@ -253,7 +254,7 @@ TEST(Riccati, general_model_solves_the_equation) {
   const Eigen::Matrix3d next = model.inflation * model.transition * (*p - k * model.output * *p) *
                                    model.transition.transpose() +
                                model.noise;
-  EXPECT_LE((next - *p).cwiseAbs().maxCoeff(), 1e-12 * p->cwiseAbs().maxCoeff());
+  EXPECT_LE(eigen(next - *p).cwiseAbs().maxCoeff(), 1e-12 * eigen(*p).cwiseAbs().maxCoeff());
 }
 
 }  // namespace esokit_test

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <complex>
 #include <esokit/design/continuous_gain.hpp>
+#include <esokit/design/pole_set.hpp>
 #include <esokit/design/switching_certificate.hpp>
 #include <numbers>
 #include <support/numbers.hpp>

@@ -268,15 +268,13 @@ class Filler {
     if constexpr (requires { config.condition_limit; }) {
       input_matrix_says_it_ = true;
       config.input_matrix =
-          tape_.matrix<S, std::remove_reference_t<decltype(config.input_matrix)>::RowsAtCompileTime,
-                       std::remove_reference_t<decltype(config.input_matrix)>::ColsAtCompileTime>(
-              signal);
+          tape_.matrix<S, std::remove_reference_t<decltype(config.input_matrix)>::rows(),
+                       std::remove_reference_t<decltype(config.input_matrix)>::cols()>(signal);
       number("condition_limit", config.condition_limit, {100, 1000});
     } else if constexpr (requires { config.input_matrix; }) {
       config.input_matrix =
-          tape_.matrix<S, std::remove_reference_t<decltype(config.input_matrix)>::RowsAtCompileTime,
-                       std::remove_reference_t<decltype(config.input_matrix)>::ColsAtCompileTime>(
-              signal);
+          tape_.matrix<S, std::remove_reference_t<decltype(config.input_matrix)>::rows(),
+                       std::remove_reference_t<decltype(config.input_matrix)>::cols()>(signal);
     }
     MEMBER(observer, fill(member))
     MEMBER(observers, fill(member))

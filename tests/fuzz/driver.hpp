@@ -144,7 +144,7 @@ class Driver {
     if constexpr (requires(const T& o) { o.template chain_estimate<0>(); }) {
       esokit::detail::unroll<T::outputs>([&](auto i) {
         using Chain = decltype(std::declval<const T&>().template chain_estimate<i>());
-        lengths.push_back(Chain::RowsAtCompileTime);
+        lengths.push_back(Chain::rows());
       });
     }
     return lengths;

@@ -1,4 +1,5 @@
 // Every observer and every adapter in its nestings; a new one joins by a line.
+#include <esokit/design/pole_set.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>

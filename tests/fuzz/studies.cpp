@@ -2,6 +2,7 @@
 // analysis, of signals, noise and plants, of continuous observers, the PID conversion and the
 // limiter. An answer is a number or an error with field and rule, whatever the arguments.
 #include <bit>
+#include <esokit/eigen.hpp>
 #include <esokit/esokit.hpp>
 #include <optional>
 
@@ -139,7 +140,7 @@ void ask_loop(Study& study, const Loop& loop, const Law& law, double b) {
         loop.noise_to_control(w), loop.disturbance_to_output(w)}) {
     if (const auto value = study.answer("response", response)) study.finite("response", *value);
   }
-  Matrix<double, 3, 3> noise = Matrix<double, 3, 3>::Zero();
+  EigenMatrix<double, 3, 3> noise = EigenMatrix<double, 3, 3>::Zero();
   for (int i = 0; i < 3; ++i) noise(i, i) = study.number<double>("noise", {1e-6, 1, true});
   if (const auto p =
           study.answer("output_covariance", output_covariance(loop.closed_loop(), noise))) {
@@ -223,7 +224,7 @@ template <int Size>
 void ask_bound(Study& study, const ErrorBound<Size>& bound) {
   study.finite("gamma, level, rate", std::array{bound.gamma, bound.level, bound.rate});
   study.finite("ultimate", bound.ultimate());
-  Vector<double, Size> initial;
+  EigenMatrix<double, Size> initial;
   for (double& x : initial) x = study.number<double>("initial", signal);
   const double t = study.number<double>("t", {0, 10});
   const double excess = study.number<double>("excess", {0.01, 1});
@@ -333,7 +334,7 @@ Failure signal_study(Episode& episode) {
     }
   }
   if (const auto plant = study.answer("plant", sim::LinearPlant<2>::make({{size, tau}, w, {}}))) {
-    const Vector<double, 2> x(time, size);
+    const EigenMatrix<double, 2> x(time, size);
     const auto slope = plant->derivative(t, x, tau);
     if (study.plain()) study.finite("derivative", slope);
   }

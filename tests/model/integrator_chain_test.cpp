@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <esokit/eigen.hpp>
 #include <esokit/model/integrator_chain.hpp>
 #include <esokit/model/scaled_chain.hpp>
 #include <limits>
@@ -13,37 +14,36 @@
 
 namespace {
 
+using esokit::EigenMatrix;
 using esokit::IntegratorChain;
-using esokit::Matrix;
 using esokit::ScaledChain;
-using esokit::Vector;
 using esokit_test::Random;
 
 TEST(IntegratorChain, LiteralMatricesOfOrderTwo) {
   using Chain = IntegratorChain<2>;
-  Matrix<double, 3, 3> a;
+  EigenMatrix<double, 3, 3> a;
   a << 0, 1, 0, 0, 0, 1, 0, 0, 0;
   EXPECT_EQ(Chain::state_matrix(), a);
-  EXPECT_EQ(Chain::input_matrix(-3), (Vector<double, 3>(0, -3, 0)));
-  EXPECT_EQ(Chain::output_matrix(), (esokit::RowVector<double, 3>(1, 0, 0)));
+  EXPECT_EQ(Chain::input_matrix(-3), (EigenMatrix<double, 3>(0, -3, 0)));
+  EXPECT_EQ(Chain::output_matrix(), (esokit::EigenMatrix<double, 1, 3>(1, 0, 0)));
   // T = 1/2: exact in binary.
-  Matrix<double, 3, 3> phi;
+  EigenMatrix<double, 3, 3> phi;
   phi << 1, 0.5, 0.125, 0, 1, 0.5, 0, 0, 1;
   EXPECT_EQ(Chain::transition_matrix(0.5), phi);
-  EXPECT_EQ(Chain::sampled_input_matrix(0.5, -4), (Vector<double, 3>(-0.5, -2, 0)));
+  EXPECT_EQ(Chain::sampled_input_matrix(0.5, -4), (EigenMatrix<double, 3>(-0.5, -2, 0)));
 }
 
 TEST(IntegratorChain, LiteralMatricesOfOrderThreeWithTwoExtensions) {
   using Chain = IntegratorChain<3, float, 2>;
   static_assert(Chain::size == 5 && Chain::order == 3 && Chain::extension == 2);
-  Matrix<float, 5, 5> phi;
+  EigenMatrix<float, 5, 5> phi;
   const float t4 = 16.0f / 24.0f;
   const float t3 = 8.0f / 6.0f;
   phi << 1, 2, 2, t3, t4, 0, 1, 2, 2, t3, 0, 0, 1, 2, 2, 0, 0, 0, 1, 2, 0, 0, 0, 0, 1;
-  EXPECT_TRUE(Chain::transition_matrix(2.0f).isApprox(phi, 1e-7f));
-  Vector<float, 5> gamma;
+  EXPECT_TRUE(eigen(Chain::transition_matrix(2.0f)).isApprox(phi, 1e-7f));
+  EigenMatrix<float, 5> gamma;
   gamma << 3 * t3, 6, 6, 0, 0;
-  EXPECT_TRUE(Chain::sampled_input_matrix(2.0f, 3.0f).isApprox(gamma, 1e-7f));
+  EXPECT_TRUE(eigen(Chain::sampled_input_matrix(2.0f, 3.0f)).isApprox(gamma, 1e-7f));
   EXPECT_EQ(Chain::input_matrix(3.0f)(2), 3.0f);
   EXPECT_EQ(Chain::input_matrix(3.0f).sum(), 3.0f);
 }
@@ -52,14 +52,14 @@ TEST(IntegratorChain, TransitionsCompose) {
   using Chain = IntegratorChain<4, double, 2>;
   const double t = 0.3;
   const double s = 0.45;
-  EXPECT_TRUE((Chain::transition_matrix(t) * Chain::transition_matrix(s))
-                  .isApprox(Chain::transition_matrix(t + s), 1e-14));
-  EXPECT_TRUE((Chain::transition_matrix(t) * Chain::transition_matrix(-t))
-                  .isApprox(Matrix<double, 6, 6>::Identity(), 1e-14));
+  EXPECT_TRUE(eigen(Chain::transition_matrix(t) * Chain::transition_matrix(s))
+                  .isApprox(eigen(Chain::transition_matrix(t + s)), 1e-14));
+  EXPECT_TRUE(eigen(Chain::transition_matrix(t) * Chain::transition_matrix(-t))
+                  .isApprox(EigenMatrix<double, 6, 6>::Identity(), 1e-14));
   // Gamma(s + t) = Phi(t) Gamma(s) + Gamma(t).
-  EXPECT_TRUE((Chain::transition_matrix(t) * Chain::sampled_input_matrix(s, 2.5) +
-               Chain::sampled_input_matrix(t, 2.5))
-                  .isApprox(Chain::sampled_input_matrix(s + t, 2.5), 1e-14));
+  EXPECT_TRUE(eigen(Chain::transition_matrix(t) * Chain::sampled_input_matrix(s, 2.5) +
+                    Chain::sampled_input_matrix(t, 2.5))
+                  .isApprox(eigen(Chain::sampled_input_matrix(s + t, 2.5)), 1e-14));
 }
 
 template <class ChainType>
@@ -74,13 +74,13 @@ TYPED_TEST(Scaled, PredictsLikeTheMatrices) {
   using Chain = IntegratorChain<n, double, m>;
   Random random(1);
   for (const double t : {1e-3, 0.7, 40.0}) {
-    Vector<double, TypeParam::size> z;
+    EigenMatrix<double, TypeParam::size> z;
     for (int r = 0; r < TypeParam::size; ++r) {
       z(r) = random.uniform(-1, 1) / static_cast<double>(esokit_test::nordsieck(r, t));
     }
     const double b0 = -2.5;
     const double u = 0.8 / static_cast<double>(esokit_test::nordsieck(n, t));
-    const Vector<double, TypeParam::size> expected =
+    const EigenMatrix<double, TypeParam::size> expected =
         Chain::transition_matrix(t) * z + Chain::sampled_input_matrix(t, b0) * u;
     const auto next = TypeParam::template predict<1>(TypeParam::scaled(z, t),
                                                      {TypeParam::scaled_input_gain(b0, t) * u});
@@ -138,7 +138,7 @@ TYPED_TEST(Scaled, DriveActsOnThePlantStatesAlone) {
 
 TYPED_TEST(Scaled, ScalingGoesThereAndBack) {
   const double t = 3e-4;
-  Vector<double, TypeParam::size> z;
+  EigenMatrix<double, TypeParam::size> z;
   for (int r = 0; r < TypeParam::size; ++r) z(r) = r + 1.25;
   const auto x = TypeParam::scaled(z, t);
   const auto back = TypeParam::physical(x, 1 / t);
@@ -169,7 +169,7 @@ TYPED_TEST(Scaled, ProbeSeesEveryState) {
       typename TypeParam::State x{};
       x[r] = 1e306;
       EXPECT_FALSE(std::isfinite(TypeParam::finite_probe(x, 1e4))) << r;
-      EXPECT_FALSE(std::isfinite(TypeParam::physical(x, 1e4)(static_cast<Eigen::Index>(r))));
+      EXPECT_FALSE(std::isfinite(TypeParam::physical(x, 1e4)(static_cast<int>(r))));
     }
   }
 }
@@ -183,7 +183,7 @@ TEST(ScaledChain, PredictsAtCompileTime) {
 /// Float at T = 1e-4 and N = 12: T^-11 = 1e44 does not fit, the estimate does.
 TEST(ScaledChain, SurvivesSmallSampleTimesInFloat) {
   using Chain = ScaledChain<8, float, 4>;
-  Vector<float, 12> z = Vector<float, 12>::Zero();
+  EigenMatrix<float, 12> z = EigenMatrix<float, 12>::Zero();
   z(8) = 3.0f;
   const auto x = Chain::scaled(z, 1e-4f);
   EXPECT_GT(x[8], 0.0f);

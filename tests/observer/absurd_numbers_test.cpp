@@ -2,6 +2,7 @@
 // changes nothing, and good samples lead back.
 #include <gtest/gtest.h>
 
+#include <esokit/eigen.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/known_model.hpp>
@@ -39,7 +40,7 @@ void shifts_are_finite_or_nothing() {
         const StepStatus status =
             output ? observer.shift_output(offset) : observer.shift_disturbance(offset);
         for (int level = 0; level < Observer::levels; ++level) {
-          ASSERT_TRUE(observer.level_estimate(level).allFinite()) << offset;
+          ASSERT_TRUE(eigen(observer.level_estimate(level)).allFinite()) << offset;
         }
         if (status != StepStatus::ok) {
           EXPECT_EQ(status, StepStatus::state_rejected);
@@ -87,7 +88,7 @@ void levels_stay_finite() {
     const auto slow = observer.level_estimate(0);
     observer.update(slow(0) - slow(1) / S(2), S(0));
     for (int level = 0; level < 2; ++level) {
-      ASSERT_TRUE(observer.level_estimate(level).allFinite()) << "sample " << k;
+      ASSERT_TRUE(eigen(observer.level_estimate(level)).allFinite()) << "sample " << k;
     }
     if (std::abs(observer.total_disturbance()) < top / S(10)) {
       largest = std::max(largest, observer.level_estimate(0)(1));
@@ -115,7 +116,7 @@ TEST(KnownModelAbsurd, WhatTheModelSaysIsFiniteOrNothing) {
   for (const float y : {1e10f, -1e10f, 3e8f, 1e34f, -1e38f}) {
     for (int k = 0; k < 4; ++k) {
       observer.update(y, 1.0f);
-      ASSERT_TRUE(observer.estimate().allFinite()) << y;
+      ASSERT_TRUE(eigen(observer.estimate()).allFinite()) << y;
       ASSERT_TRUE(esokit::is_finite(observer.total_disturbance())) << y;
       ASSERT_TRUE(esokit::is_finite(observer.known_part())) << y;
       ASSERT_TRUE(esokit::is_finite(observer.estimate<2>())) << y;
@@ -148,7 +149,7 @@ typename ExtendedStateFilter<2, S>::Config filter_config() {
   config.measurement_variance = static_cast<S>(1e-4);
   config.disturbance_bounds = {S(0), S(0), S(10)};
   config.inflation = static_cast<S>(0.1);
-  config.initial_covariance.diagonal() << S(1), S(100), S(10000);
+  eigen(config.initial_covariance).diagonal() << S(1), S(100), S(10000);
   config.outlier_threshold = S(25);
   return config;
 }
@@ -171,10 +172,10 @@ void any_variance_is_harmless() {
         for (int k = 0; k < 3; ++k) {
           const auto before = filter.estimate();
           ASSERT_EQ(filter.update_weighted(S(0.25), S(0), variance), StepStatus::ok);
-          ASSERT_TRUE(filter.covariance().allFinite());
-          ASSERT_TRUE(filter.gain().allFinite());
+          ASSERT_TRUE(eigen(filter.covariance()).allFinite());
+          ASSERT_TRUE(eigen(filter.gain()).allFinite());
           ASSERT_TRUE(esokit::is_finite(filter.innovation_variance()));
-          ASSERT_TRUE(filter.estimate().allFinite());
+          ASSERT_TRUE(eigen(filter.estimate()).allFinite());
           if (variance > S(1e20f)) {
             // Says nothing: as if it had not come, but for the last digits.
             ASSERT_NEAR(filter.estimate()(0), before(0) + S(1e-3f) * before(1), S(1e-2f));
@@ -183,8 +184,8 @@ void any_variance_is_harmless() {
         // Every good sample is taken from then on.
         for (int k = 0; k < 200; ++k) {
           ASSERT_EQ(filter.update(S(0.25), S(0)), StepStatus::ok) << k;
-          ASSERT_TRUE(filter.covariance().allFinite());
-          ASSERT_TRUE(filter.gain().allFinite());
+          ASSERT_TRUE(eigen(filter.covariance()).allFinite());
+          ASSERT_TRUE(eigen(filter.gain()).allFinite());
         }
         EXPECT_NEAR(filter.estimate()(0), S(0.25), S(0.01));
       }
@@ -200,13 +201,13 @@ TEST(FilterVariance, AnyIsHarmless) {
 /// No measurement and P0 = 0: the least of variances has no inverse.
 TEST(FilterVariance, ZeroPriorAndTheLeastVariance) {
   auto config = filter_config<float>();
-  config.initial_covariance.setZero();
+  eigen(config.initial_covariance).setZero();
   config.outlier_threshold = 0;
   auto filter = ExtendedStateFilter<2, float>::make(config).value();
   filter.correct_weighted(1.0f, std::numeric_limits<float>::denorm_min());
-  EXPECT_TRUE(filter.gain().allFinite());
-  EXPECT_TRUE(filter.covariance().allFinite());
-  EXPECT_TRUE(filter.estimate().allFinite());
+  EXPECT_TRUE(eigen(filter.gain()).allFinite());
+  EXPECT_TRUE(eigen(filter.covariance()).allFinite());
+  EXPECT_TRUE(eigen(filter.estimate()).allFinite());
 }
 
 /// After a gap the covariance is large; in the unit of a tiny R it may be more than can be held.
@@ -215,7 +216,7 @@ void retune_to_any_variance_is_finite_or_refused() {
   using Filter = ExtendedStateFilter<2, S>;
   auto config = filter_config<S>();
   config.outlier_threshold = S(0);  // of an R below rounding the gate lets nothing through
-  config.initial_covariance.setZero();
+  eigen(config.initial_covariance).setZero();
   config.sample_time = S(0.1);
   config.disturbance_bounds[2] = S(1000);
   int refusals = 0;
@@ -232,8 +233,8 @@ void retune_to_any_variance_is_finite_or_refused() {
       if (!Filter::make(other)) continue;
       const auto before = filter;
       const auto outcome = filter.retune(other);
-      ASSERT_TRUE(filter.covariance().allFinite());
-      ASSERT_TRUE(filter.gain().allFinite());
+      ASSERT_TRUE(eigen(filter.covariance()).allFinite());
+      ASSERT_TRUE(eigen(filter.gain()).allFinite());
       if (!outcome) {
         ++refusals;
         EXPECT_EQ(refusal(outcome),
@@ -246,8 +247,8 @@ void retune_to_any_variance_is_finite_or_refused() {
       ++taken;
       for (int k = 0; k < 300; ++k) {
         filter.update(S(0.25), S(0));
-        ASSERT_TRUE(filter.covariance().allFinite()) << k;
-        ASSERT_TRUE(filter.gain().allFinite()) << k;
+        ASSERT_TRUE(eigen(filter.covariance()).allFinite()) << k;
+        ASSERT_TRUE(eigen(filter.gain()).allFinite()) << k;
       }
       EXPECT_EQ(filter.missed(), 0);
     }

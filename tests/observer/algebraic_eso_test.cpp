@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/algebraic_filter.hpp>
 #include <esokit/observer/linear_eso.hpp>
@@ -154,7 +155,7 @@ TEST(AlgebraicEso, FloatGainsDigitsAsItAverages) {
 /// Whatever the observer starts from.
 TEST(AlgebraicEso, InitialStateDoesNotMatter) {
   auto observer = AlgebraicEso<2>::make(paper_config<2>()).value();
-  observer.reset(esokit::Vector<double, 3>(3.0, -8.0, 200.0));
+  observer.reset(esokit::EigenMatrix<double, 3>(3.0, -8.0, 200.0));
   SampledPlant<2, 1> plant(1e-3, input_gain);
   plant.z = {1.0L, -0.7L, 50.0L};
   for (int k = 0; k < 3; ++k) {
@@ -440,7 +441,7 @@ TEST(AlgebraicEso, LongGapRestartsTheHoldWithTheMeasurement) {
   config.max_gap = 5;
   for (const bool two_phase : {false, true}) {
     auto observer = AlgebraicEso<2>::make(config).value();
-    observer.reset(esokit::Vector<double, 3>(7, 8, 9));
+    observer.reset(esokit::EigenMatrix<double, 3>(7, 8, 9));
     for (int k = 0; k < 100; ++k) observer.update(1.0, 0.0);
     for (int k = 0; k < 6; ++k) observer.predict(0.0);
     if (two_phase) {
@@ -618,7 +619,7 @@ TEST(AlgebraicEso, RetuneKeepsThePlaceInTheSchedule) {
   // The gain is that of the new settings, 200 samples on.
   auto other = AlgebraicEso<2>::make(paper_config<2>(1e-3, 20, 5)).value();
   for (int k = 0; k < 200; ++k) other.update(0.0, 0.0);
-  other.reset(esokit::Vector<double, 3>(0, 0, 0));
+  other.reset(esokit::EigenMatrix<double, 3>(0, 0, 0));
   auto young = other;  // age 0
   young.update(1.0, 0.0);
   const double e_before = observer.raw_estimate()(2);
@@ -661,7 +662,7 @@ TEST(AlgebraicEso, RetuneRebalancesHeldEstimates) {
   auto config = paper_config<2>();
   config.blanking = 0.02;
   auto observer = AlgebraicEso<2>::make(config).value();
-  observer.reset(esokit::Vector<double, 3>(1, 2, 3));
+  observer.reset(esokit::EigenMatrix<double, 3>(1, 2, 3));
   observer.update(1.0, 0.7);
   config.input_gain = 5;
   ASSERT_TRUE(observer.retune(config).has_value());
@@ -918,7 +919,7 @@ void tends_to_the_continuous_form() {
       esokit::AlgebraicFilter<Order, double, Extension>::make(
           {.observer_bandwidth = lambda, .frequency_shift = shift, .input_gain = input_gain})
           .value();
-  using State = esokit::Vector<double, size>;
+  using State = esokit::EigenMatrix<double, size>;
   State x = State::Zero();
   constexpr int fine = 4096;
   constexpr double h = end / fine;

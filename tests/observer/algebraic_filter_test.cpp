@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <esokit/design/continuous_gain.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/algebraic_filter.hpp>
 #include <limits>
 #include <support/high_precision.hpp>
@@ -383,15 +384,15 @@ TEST(AlgebraicFilter, DerivativeIsThatOfItsMatrices) {
   const auto filter = AlgebraicFilter<2, double, 2>::make(
                           {.observer_bandwidth = 4, .frequency_shift = 0.3, .input_gain = -1.5})
                           .value();
-  const esokit::Vector<double, 4> x(0.3, -0.2, 0.7, 1.1);
+  const esokit::EigenMatrix<double, 4> x(0.3, -0.2, 0.7, 1.1);
   for (const double t : {0.0, 0.4, 2.0}) {
-    const esokit::Vector<double, 4> expected = filter.state_matrix() * x +
-                                               filter.measurement_vector(t) * 0.6 +
-                                               filter.input_vector(t) * -0.9;
+    const esokit::EigenMatrix<double, 4> expected = filter.state_matrix() * x +
+                                                    filter.measurement_vector(t) * 0.6 +
+                                                    filter.input_vector(t) * -0.9;
     const auto rate = filter.derivative(t, x, 0.6, -0.9);
     for (int i = 0; i < 4; ++i) EXPECT_NEAR(rate(i), expected(i), 1e-14);
     if (t == 0.0) continue;
-    const esokit::Vector<double, 4> shown = filter.output_matrix(t) * x;
+    const esokit::EigenMatrix<double, 4> shown = filter.output_matrix(t) * x;
     const auto estimate = filter.estimate(t, x);
     for (int i = 0; i < 4; ++i) EXPECT_NEAR(estimate(i), shown(i), 1e-12 * std::abs(shown(i)));
   }

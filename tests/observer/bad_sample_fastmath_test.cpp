@@ -125,7 +125,7 @@ TYPED_TEST(FastMath, ResetRefusesBadState) {
     auto hit = this->warm();
     const auto before = hit;
     EXPECT_EQ(hit.reset(bad), StepStatus::state_rejected);
-    typename TypeParam::Estimate state = TypeParam::Estimate::Ones();
+    typename TypeParam::Estimate state = TypeParam::Estimate::Constant(1);
     state(1) = bad;
     EXPECT_EQ(hit.reset(state), StepStatus::state_rejected);
     this->expect_same(hit, before);

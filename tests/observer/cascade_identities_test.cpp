@@ -1,10 +1,12 @@
 // Identities of the linear observers: what equals what, and the equations of the paper written down
 // independently (K. Lakomy, R. Madonski, ISA Transactions 109 (2021), equations (23), (24)).
 #include <gtest/gtest.h>
+#include <esokit/design/pole_set.hpp>
 
 #include <cmath>
 #include <complex>
 #include <cstddef>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <support/numbers.hpp>
@@ -16,11 +18,10 @@ using esokit::Array;
 using esokit::CascadeEso;
 using esokit::ContinuousCascadeEso;
 using esokit::ContinuousLinearEso;
+using esokit::EigenMatrix;
 using esokit::LinearEso;
-using esokit::Matrix;
 using esokit::PoleSet;
 using esokit::StepStatus;
-using esokit::Vector;
 using esokit_test::Random;
 using esokit_test::same_bits;
 using Complex = std::complex<double>;
@@ -97,7 +98,7 @@ TEST(Cascade, FactorIsShorthandForLevelBandwidths) {
 }
 
 /// Gains of a level by the closed forms for N = 2, 3 in physical units, for a step of `t` seconds.
-Vector<double, 3> closed_form_gain(double omega, double t) {
+EigenMatrix<double, 3> closed_form_gain(double omega, double t) {
   const double rho = std::exp(-omega * t);
   const double a = 1 - rho;
   return {1 - rho * rho * rho, 1.5 * a * a * (1 + rho) / t, a * a * a / (t * t)};
@@ -114,13 +115,13 @@ class PaperCascade {
   }
 
   void predict(double u) {
-    Matrix<double, 3, 3> phi;
+    EigenMatrix<double, 3, 3> phi;
     phi << 1, t_, t_ * t_ / 2, 0, 1, t_, 0, 0, 1;
-    const Vector<double, 3> gamma(t_ * t_ / 2, t_, 0);
+    const EigenMatrix<double, 3> gamma(t_ * t_ / 2, t_, 0);
     double found = 0;
     for (auto& level : xi_) {
       const double own = level(2);
-      level = Vector<double, 3>(phi * level + gamma * (b0_ * u + found));
+      level = EigenMatrix<double, 3>(phi * level + gamma * (b0_ * u + found));
       found += own;
     }
     ++elapsed_;
@@ -135,7 +136,7 @@ class PaperCascade {
     elapsed_ = 0;
   }
 
-  [[nodiscard]] Vector<double, 3> estimate(std::size_t level) const {
+  [[nodiscard]] EigenMatrix<double, 3> estimate(std::size_t level) const {
     double sum = 0;
     for (std::size_t i = 0; i <= level; ++i) sum += xi_[i](2);
     return {xi_[level](0), xi_[level](1), sum};
@@ -146,7 +147,7 @@ class PaperCascade {
   double b0_;
   double t_;
   int elapsed_ = 0;
-  Array<Vector<double, 3>, Levels> xi_;
+  Array<EigenMatrix<double, 3>, Levels> xi_;
 };
 
 template <int Levels>
@@ -204,11 +205,11 @@ TEST(Cascade, ContinuousFormIsThePaperForm) {
   const auto cascade = ContinuousCascadeEso<2, 3>::make(
                            {.observer_bandwidth = 4, .bandwidth_factor = 2, .input_gain = b0})
                            .value();
-  Vector<double, 9> z;
+  EigenMatrix<double, 9> z;
   z << 0.3, -0.2, 0.9, 0.5, 0.1, -1.1, 0.8, -0.6, 0.4;
   const double y = 1.25;
   const double u = -2.5;
-  const Vector<double, 9> rate = cascade.derivative(0.0, z, y, u);
+  const EigenMatrix<double, 9> rate = cascade.derivative(0.0, z, y, u);
   const double w[] = {4, 8, 16};
   double found = 0;
   double measured = y;
@@ -226,9 +227,9 @@ TEST(Cascade, ContinuousFormIsThePaperForm) {
   EXPECT_NEAR(estimate(2), 0.9 - 1.1 + 0.4, 1e-15);
   EXPECT_NEAR(cascade.total_disturbance(z), 0.9 - 1.1 + 0.4, 1e-15);
   const auto start = cascade.state_at({1, 2, 3});
-  EXPECT_EQ(cascade.estimate(start), (Vector<double, 3>(1, 2, 3)));
+  EXPECT_EQ(cascade.estimate(start), (EigenMatrix<double, 3>(1, 2, 3)));
   // In agreement the levels do not correct each other.
-  const Vector<double, 9> calm = cascade.derivative(0.0, start, 1, -3 / b0);
+  const EigenMatrix<double, 9> calm = cascade.derivative(0.0, start, 1, -3 / b0);
   EXPECT_NEAR(calm(7), 0, 1e-14);
   EXPECT_EQ(calm(8), 0);
 }
@@ -236,14 +237,15 @@ TEST(Cascade, ContinuousFormIsThePaperForm) {
 TEST(LinearEso, ContinuousFormIsLiteral) {
   const auto eso = ContinuousLinearEso<2>::make({.observer_bandwidth = 5, .input_gain = 2}).value();
   EXPECT_EQ(eso.input_gain(), 2);
-  const Vector<double, 3> z(1, 2, 3);
+  const EigenMatrix<double, 3> z(1, 2, 3);
   // e = 0.5; l = (15, 75, 125)
-  EXPECT_EQ(eso.derivative(0.0, z, 1.5, -1.0), (Vector<double, 3>(2 + 7.5, 3 - 2 + 37.5, 62.5)));
+  EXPECT_EQ(eso.derivative(0.0, z, 1.5, -1.0),
+            (EigenMatrix<double, 3>(2 + 7.5, 3 - 2 + 37.5, 62.5)));
   const auto poles = ContinuousLinearEso<1, double, 1, PoleSet>::make(
                          {.poles = {Complex(-3, 4), Complex(-3, -4)}, .input_gain = 1})
                          .value();
   // (s^2 + 6 s + 25)
-  EXPECT_EQ(poles.derivative(0.0, {0, 0}, 1.0, 0.0), (Vector<double, 2>(6, 25)));
+  EXPECT_EQ(poles.derivative(0.0, {0, 0}, 1.0, 0.0), (EigenMatrix<double, 2>(6, 25)));
 }
 
 /// A generalised cascade and LESO (m = 2): the extended states are a chain of their own.
@@ -252,7 +254,7 @@ TEST(LinearEso, ContinuousGeneralisedForm) {
       ContinuousLinearEso<1, double, 2>::make({.observer_bandwidth = 2, .input_gain = 3}).value();
   // l = (6, 12, 8), e = -1
   EXPECT_EQ(eso.derivative(0.0, {1, 10, 100}, 0.0, 1.0),
-            (Vector<double, 3>(10 + 3 - 6, 100 - 12, -8)));
+            (EigenMatrix<double, 3>(10 + 3 - 6, 100 - 12, -8)));
 }
 
 /// z-[k+1] = Phi z-[k] + Gamma u + l (y - z-_1) runs beside predict and correct.
@@ -264,9 +266,9 @@ TEST(LinearEso, PredictorFormAndCurrentFormAgree) {
   auto eso =
       LinearEso<3>::make({.observer_bandwidth = 12, .input_gain = b0, .sample_time = t}).value();
   const auto weights = esokit::EqualSampledPoles<N, double>::from_bandwidth(12.0, t).weights();
-  const Vector<double, N> l =
+  const EigenMatrix<double, N> l =
       esokit::physical_gain<N, double>(esokit::predictor_gain<N, double>(weights), t);
-  Vector<double, N> predicted = Vector<double, N>::Zero();
+  EigenMatrix<double, N> predicted = EigenMatrix<double, N>::Zero();
   Random random(3);
   for (int k = 0; k < 200; ++k) {
     const double y = random.uniform(-1, 1);
@@ -279,8 +281,8 @@ TEST(LinearEso, PredictorFormAndCurrentFormAgree) {
     eso.correct(y);
     ASSERT_NEAR(eso.innovation(), e, 1e-12);
     eso.predict(u);
-    predicted = Vector<double, N>(Chain::transition_matrix(t) * predicted +
-                                  Chain::sampled_input_matrix(t, b0) * u + l * e);
+    predicted = EigenMatrix<double, N>(Chain::transition_matrix(t) * predicted +
+                                       Chain::sampled_input_matrix(t, b0) * u + l * e);
   }
 }
 

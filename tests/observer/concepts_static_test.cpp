@@ -789,13 +789,13 @@ TEST(ShiftableDisturbance, RunsInKnownModelAndMimoAdrc) {
     settings.input_gain = 0;
     typename esokit::MimoAdrc<O, O>::Config config{.observers = {settings, settings},
                                                    .controller_bandwidths = {5, 5}};
-    config.input_matrix << 2, 1, 0, 3;
+    config.input_matrix = {{2, 1}, {0, 3}};
     auto controller = esokit::MimoAdrc<O, O>::make(config).value();
     esokit::Vector<double, 2> u;
     for (int k = 0; k < 30; ++k) {
       u = controller.update({0.1 * k, 1 - 0.02 * k}, {1.0, 1.0});
       if (k == 20) {
-        config.input_matrix << 3, 1, 0, 2;
+        config.input_matrix = {{3, 1}, {0, 2}};
         EXPECT_TRUE(controller.retune(config));
       }
     }

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
@@ -60,7 +61,7 @@ TEST(VariableTime, GapOfUnequalSteps) {
   for (const int missing : {1, 4}) {
     auto observer = variable();
     Random random(2);
-    esokit::Vector<double, 3> start(0.3, -2, 7);
+    esokit::EigenMatrix<double, 3> start(0.3, -2, 7);
     observer.reset(start);
     double total = 0;
     const double u = 0.5;
@@ -255,9 +256,9 @@ TEST(KnownModel, RetuneAndResetKeepTheSum) {
   ASSERT_TRUE(observer.retune({.observer = changed, .model = {{1, -2}}}).has_value());
   EXPECT_NEAR(observer.total_disturbance(), before(2) + (2 - 5) * u,
               1e-9 * std::abs(before(2)) + 1e-9);
-  const esokit::Vector<double, 3> state(1, 2, 30);
+  const esokit::EigenMatrix<double, 3> state(1, 2, 30);
   EXPECT_EQ(observer.reset(state), StepStatus::ok);
-  EXPECT_NEAR((observer.estimate() - state).norm(), 0, 1e-9);
+  EXPECT_NEAR(eigen(observer.estimate() - state).norm(), 0, 1e-9);
   EXPECT_NEAR(observer.residual_disturbance(), 30 + 1 - 4, 1e-9);
   EXPECT_NEAR(observer.estimate<2>(), 30, 1e-9);
   EXPECT_EQ(observer.update(1, hidden_nan<double>()), StepStatus::input_rejected);
@@ -427,7 +428,7 @@ TEST(WrappedOutput, RefusedResetAndAbsurdAnglesChangeNothing) {
     EXPECT_EQ(reference.correct(bad), StepStatus::measurement_rejected);
     EXPECT_EQ(reference.estimate(), angle.estimate());
     for (int r = 0; r < 3; ++r) {
-      esokit::Vector<double, 3> state(1, 2, 3);
+      esokit::EigenMatrix<double, 3> state(1, 2, 3);
       state(r) = bad;
       if (r == 0 || !std::isfinite(bad)) {
         EXPECT_EQ(reference.reset(state), StepStatus::state_rejected) << r;

@@ -3,6 +3,7 @@
 // steady state.
 #include "law_suite.hpp"
 //
+#include <esokit/eigen.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 
 namespace esokit_test {
@@ -31,7 +32,7 @@ struct ObserverTraits<
                   .max_gap = max_gap};
     if constexpr (Recursive != 0) {
       config.mode = esokit::RiccatiMode::recursive;
-      config.initial_covariance = steady_covariance(config).template cast<S>();
+      config.initial_covariance = eigen(steady_covariance(config)).template cast<S>();
     }
     return config;
   }

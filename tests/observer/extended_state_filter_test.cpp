@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/sim/gaussian.hpp>
@@ -197,7 +198,7 @@ TEST(ExtendedStateFilter, limit_of_the_papers_example) {
 TEST(ExtendedStateFilter, without_disturbance_it_tends_to_the_linear_observer) {
   auto config = typical<2, double, 1>();
   config.disturbance_bounds = {};
-  config.initial_covariance.setIdentity();
+  eigen(config.initial_covariance).setIdentity();
   const auto linear =
       esokit::LinearEso<2>::make(
           {.observer_bandwidth = std::log(1.5) / period, .input_gain = b0, .sample_time = period})
@@ -431,7 +432,7 @@ TEST(ExtendedStateFilter, adaptive_theta_makes_the_weighted_trace_least) {
 /// follows once there is a covariance.
 TEST(ExtendedStateFilter, adaptive_theta_of_a_known_start) {
   auto config = typical<2, double, 1>(InflationRule::adaptive);
-  config.initial_covariance.setZero();
+  eigen(config.initial_covariance).setZero();
   auto filter = ExtendedStateFilter<2>::make(config).value();
   filter.predict(0);
   EXPECT_EQ(filter.inflation(), 1e3);
@@ -657,8 +658,8 @@ TEST(ExtendedStateFilter, retune_keeps_estimate_and_covariance) {
     other.sample_time = 2e-3;
     other.initial_covariance *= 100;
     ASSERT_TRUE(filter.retune(other).has_value());
-    EXPECT_LE((filter.estimate() - before.estimate()).cwiseAbs().maxCoeff(),
-              1e-12 * before.estimate().cwiseAbs().maxCoeff());
+    EXPECT_LE(eigen(filter.estimate() - before.estimate()).cwiseAbs().maxCoeff(),
+              1e-12 * eigen(before.estimate()).cwiseAbs().maxCoeff());
     if (predicted) {
       EXPECT_LE(covariance_distance(filter.covariance(), before.covariance()), 1e-12);
       const Eigen::Matrix3d p = before.covariance();
@@ -736,7 +737,7 @@ void a_million_updates_in_float(float r, float p0) {
     ASSERT_TRUE(positive_definite(exact)) << k;
     const Eigen::Matrix3d q = wide.covariance();
     ASSERT_LE(covariance_distance(exact, q), 1e-4) << k;
-    ASSERT_TRUE(filter.estimate().allFinite());
+    ASSERT_TRUE(eigen(filter.estimate()).allFinite());
     // A filter may go on from where another stopped.
     config.initial_covariance = p;
     const auto next = ExtendedStateFilter<2, float>::make(config);
@@ -799,7 +800,7 @@ TEST(ExtendedStateFilter, refuses_bad_configs_by_name) {
   EXPECT_EQ(
       refused([](Config& c) { c.disturbance_bounds = {}; }, InflationRule::adaptive),
       "disturbance_bounds: or process_covariance must not be zero where the inflation is adaptive");
-  const auto indefinite = [](Eigen::Matrix3d& p) {
+  const auto indefinite = [](auto& p) {
     p = Eigen::Vector3d(1, 1e4, 1e6).asDiagonal();
     p(0, 1) = p(1, 0) = 101;
   };
@@ -819,7 +820,7 @@ TEST(ExtendedStateFilter, refuses_bad_configs_by_name) {
   EXPECT_EQ(refused([](Config& c) {
               c.measurement_variance = 0;
               c.disturbance_bounds = {};
-              c.initial_covariance.setZero();
+              eigen(c.initial_covariance).setZero();
             }),
             "measurement_variance: must be positive where nothing disturbs the plant (all of "
             "disturbance_bounds or process_covariance is zero): after N exact measurements nothing "
@@ -913,7 +914,7 @@ void alternating_error_fades(int stated) {
   // Without R: by an inflation, or a bound of y'.
   config.measurement_variance = 0;
   config.inflation_rule = InflationRule::fixed;
-  config.initial_covariance.diagonal().setOnes();
+  eigen(config.initial_covariance).diagonal().setOnes();
   config.inflation = S(0.0099);
   EXPECT_FALSE(Filter::make(config));
   config.inflation = S(0.0101);
@@ -986,7 +987,7 @@ void what_is_told_is_finite() {
                                    .measurement_variance = variance,
                                    .inflation = S(0.5)};
     config.disturbance_bounds = {0, 0, 300};
-    config.initial_covariance.diagonal().setOnes();
+    eigen(config.initial_covariance).diagonal().setOnes();
     const auto made = Filter::make(config);
     if (!made) continue;
     auto filter = *made;
@@ -994,7 +995,7 @@ void what_is_told_is_finite() {
       filter.update(y, 0);
       EXPECT_TRUE(std::isfinite(filter.normalised_innovation())) << variance << ' ' << y;
       EXPECT_TRUE(std::isfinite(filter.innovation_variance())) << variance << ' ' << y;
-      EXPECT_TRUE(filter.covariance().allFinite()) << variance << ' ' << y;
+      EXPECT_TRUE(eigen(filter.covariance()).allFinite()) << variance << ' ' << y;
       if (filter.normalised_innovation() >= largest) ++told;
     }
   }
@@ -1014,7 +1015,7 @@ TEST(ExtendedStateFilter, exact_measurements_are_allowed) {
     EXPECT_NEAR(filter.estimate()(0), std::sin(0.1 * k), 1e-12);
   }
   // A start that is known exactly, too: nothing to correct at first.
-  config.initial_covariance.setZero();
+  eigen(config.initial_covariance).setZero();
   config.disturbance_bounds = {0, 0, 300};
   filter = ExtendedStateFilter<2>::make(config).value();
   EXPECT_EQ(filter.correct(1), StepStatus::ok);

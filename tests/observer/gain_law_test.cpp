@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
 #include <limits>
@@ -12,13 +13,13 @@ namespace {
 
 using esokit::Array;
 using esokit::ChainConfig;
+using esokit::EigenMatrix;
 using esokit::GainLaw;
 using esokit::has;
 using esokit::PredictorCorrector;
 using esokit::PresetGainLaw;
 using esokit::ScaledGain;
 using esokit::StepStatus;
-using esokit::Vector;
 using esokit_test::hidden_infinity;
 using esokit_test::hidden_nan;
 using esokit_test::huge;
@@ -74,7 +75,7 @@ TEST(GainLaw, NominalGainDivergesUnderRecurringGaps) {
   const auto third = [](auto& observer) {
     for (int i = 0; i < 3; ++i) observer.predict(0);
     EXPECT_EQ(observer.correct(0), StepStatus::gap_bridged);
-    return observer.estimate().norm();
+    return eigen(observer.estimate()).norm();
   };
   own.reset({1.0, 0.1, 0.1});
   linear.reset({1.0, 0.1, 0.1});
@@ -155,14 +156,14 @@ TEST(GainLaw, SwitchedLawRemembersWhatWasAccepted) {
   Open<1, double, 1, Switched> observer(unit_chain, Switched{});
   // e = 4: anything shrinks from infinity.
   observer.update(4, 0);
-  EXPECT_EQ(observer.estimate(), (Vector<double, 2>(3, 1)));
+  EXPECT_EQ(observer.estimate(), (EigenMatrix<double, 2>(3, 1)));
   // predicted 4, e = -8: grows; 4 - 4 = 0, 1 - 1 = 0.
   observer.update(-4, 0);
   EXPECT_EQ(observer.innovation(), -8);
-  EXPECT_EQ(observer.estimate(), (Vector<double, 2>(0, 0)));
+  EXPECT_EQ(observer.estimate(), (EigenMatrix<double, 2>(0, 0)));
   // e = 4 < 8: shrinks.
   observer.update(4, 0);
-  EXPECT_EQ(observer.estimate(), (Vector<double, 2>(3, 1)));
+  EXPECT_EQ(observer.estimate(), (EigenMatrix<double, 2>(3, 1)));
   EXPECT_EQ(observer.law().accepted, 3);
   // Dropped corrections leave no trace in the memory.
   const double last = observer.law().last;
@@ -213,10 +214,10 @@ TEST(GainLaw, NonlinearLawSeesTheInnovation) {
   auto observer =
       PredictorCorrector<1, double, 1, Nonlinear>::make(unit_chain, Nonlinear{}).value();
   observer.update(1, 0);
-  EXPECT_EQ(observer.estimate(), (Vector<double, 2>(0.75, 0.125)));
+  EXPECT_EQ(observer.estimate(), (EigenMatrix<double, 2>(0.75, 0.125)));
   // predicted 0.875, e = -1
   observer.update(-0.125, 0);
-  EXPECT_EQ(observer.estimate(), (Vector<double, 2>(0.875 - 0.75, 0)));
+  EXPECT_EQ(observer.estimate(), (EigenMatrix<double, 2>(0.875 - 0.75, 0)));
 }
 
 TEST(GainLaw, ALawThatLooksNeverSeesABadInnovation) {
@@ -238,8 +239,8 @@ TEST(GainLaw, ALawThatLooksNeverSeesABadInnovation) {
       two.predict(bad);
       one.correct(bad);
       two.correct(bad);
-      EXPECT_TRUE(one.estimate().allFinite());
-      EXPECT_TRUE(two.estimate().allFinite());
+      EXPECT_TRUE(eigen(one.estimate()).allFinite());
+      EXPECT_TRUE(eigen(two.estimate()).allFinite());
     }
     one.reset(0.0);
     two.reset(0.0);
@@ -252,8 +253,8 @@ TEST(GainLaw, EachLevelOfACascadeHasItsOwnLawAndInnovation) {
   Open<1, double, 1, Switched, 2> observer(unit_chain, Switched{});
   // Level 1: e = 4, to (3, 1). Level 2: e = 3, to (2.25, 0.75).
   observer.update(4, 0);
-  EXPECT_EQ(observer.level_estimate(0), (Vector<double, 2>(3, 1)));
-  EXPECT_EQ(observer.level_estimate(1), (Vector<double, 2>(2.25, 1.75)));
+  EXPECT_EQ(observer.level_estimate(0), (EigenMatrix<double, 2>(3, 1)));
+  EXPECT_EQ(observer.level_estimate(1), (EigenMatrix<double, 2>(2.25, 1.75)));
   EXPECT_EQ(observer.law(0).last, 4);
   EXPECT_EQ(observer.law(1).last, 3);
   EXPECT_EQ(observer.innovation(), 4);
@@ -367,8 +368,8 @@ static_assert(PresetGainLaw<Riccati, 2, double>);
 
 /// Against the Kalman filter of the textbook in matrices (Joseph form), missing samples and all.
 TEST(GainLaw, RiccatiLawIsTheKalmanFilter) {
-  using Matrix2 = esokit::Matrix<double, 2, 2>;
-  using Vector2 = Vector<double, 2>;
+  using Matrix2 = esokit::EigenMatrix<double, 2, 2>;
+  using Vector2 = EigenMatrix<double, 2>;
   Open<1, double, 1, Riccati> observer(unit_chain, Riccati{});
   const Riccati law;
   Matrix2 phi;
@@ -409,16 +410,16 @@ TEST(GainLaw, RiccatiLawIsTheKalmanFilter) {
 // ---- continuous laws
 
 struct Shrinking {
-  [[nodiscard]] Vector<double, 2> gain(double t, double e) const {
-    return Vector<double, 2>(t, std::abs(e));
+  [[nodiscard]] EigenMatrix<double, 2> gain(double t, double e) const {
+    return EigenMatrix<double, 2>(t, std::abs(e));
   }
 };
 struct ContinuousWithMode {
   static constexpr esokit::ContinuousGainLawTraits traits{.begins_steps = true};
   bool fast = false;
   void begin_step(double, double e) { fast = std::abs(e) > 1; }
-  [[nodiscard]] Vector<double, 2> gain(double, double) const {
-    return fast ? Vector<double, 2>(20, 100) : Vector<double, 2>(2, 1);
+  [[nodiscard]] EigenMatrix<double, 2> gain(double, double) const {
+    return fast ? EigenMatrix<double, 2>(20, 100) : EigenMatrix<double, 2>(2, 1);
   }
 };
 
@@ -426,7 +427,7 @@ TEST(ContinuousGainLaw, SeesTimeAndInnovation) {
   using Observer = esokit::ContinuousObserver<1, double, 1, Shrinking>;
   const auto observer = Observer::make(2.0, {Shrinking{}}).value();
   // e = -3
-  EXPECT_EQ(observer.derivative(5.0, {4, 10}, 1.0, 0.5), (Vector<double, 2>(10 + 1 - 15, -9)));
+  EXPECT_EQ(observer.derivative(5.0, {4, 10}, 1.0, 0.5), (EigenMatrix<double, 2>(10 + 1 - 15, -9)));
   EXPECT_FALSE(Observer::make(0.0, {Shrinking{}}));
   EXPECT_EQ(refusal(Observer::make(hidden_nan<double>(), {Shrinking{}})),
             "input_gain: must be finite and not zero (negative is fine)");
@@ -435,11 +436,11 @@ TEST(ContinuousGainLaw, SeesTimeAndInnovation) {
 TEST(ContinuousGainLaw, ModeChangesAtStepBoundariesAlone) {
   using Observer = esokit::ContinuousObserver<1, double, 1, ContinuousWithMode, 2>;
   auto observer = Observer::make(1.0, {ContinuousWithMode{}, ContinuousWithMode{}}).value();
-  const Vector<double, 4> z(0, 0, -0.5, 0);
-  const Vector<double, 4> slow = observer.derivative(0.0, z, 3.0, 0.0);
-  EXPECT_EQ(slow, (Vector<double, 4>(6, 3, 1, 0.5)));
+  const EigenMatrix<double, 4> z(0, 0, -0.5, 0);
+  const EigenMatrix<double, 4> slow = observer.derivative(0.0, z, 3.0, 0.0);
+  EXPECT_EQ(slow, (EigenMatrix<double, 4>(6, 3, 1, 0.5)));
   observer.begin_step(0.0, z, 3.0);  // e = 3 in level 1, 0.5 in level 2
-  EXPECT_EQ(observer.derivative(0.0, z, 3.0, 0.0), (Vector<double, 4>(60, 300, 1, 0.5)));
+  EXPECT_EQ(observer.derivative(0.0, z, 3.0, 0.0), (EigenMatrix<double, 4>(60, 300, 1, 0.5)));
 }
 
 }  // namespace

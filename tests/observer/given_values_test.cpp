@@ -3,6 +3,7 @@
 
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/control/nonlinear_feedback.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
@@ -105,8 +106,8 @@ TEST(GivenValues, OfTheFilterOfSeveralOutputs) {
   for (int i = 0; i < 300; ++i) {
     Filter::Config config;
     config.sample_time = static_cast<float>(random.log_uniform(1e-5, 1e-1));
-    config.input_matrix.setIdentity();
-    config.measurement_covariance.setIdentity();
+    eigen(config.input_matrix).setIdentity();
+    eigen(config.measurement_covariance).setIdentity();
     config.inflation = 1.0f;
     config.disturbance_bounds.fill(0.1f);
     const auto filter = Filter::make(config);

@@ -16,6 +16,7 @@
 #include <cmath>
 #include <cstddef>
 #include <esokit/control/adrc_law.hpp>
+#include <esokit/eigen.hpp>
 #include <limits>
 #include <support/exact_plant.hpp>
 #include <support/gain_comparison.hpp>
@@ -444,7 +445,7 @@ struct LawsOf {
       EXPECT_EQ(observer.reset(bad), StepStatus::state_rejected);
       EXPECT_TRUE(same_observer(observer, before));
       for (int r = 0; r < N; ++r) {
-        Estimate state = Estimate::Ones();
+        Estimate state = Estimate::Constant(1);
         state(r) = bad;
         EXPECT_EQ(observer.reset(state), StepStatus::state_rejected) << r;
         EXPECT_TRUE(same_observer(observer, before));
@@ -526,7 +527,7 @@ struct LawsOf {
 
   static void no_allocation() {
     Observer observer = make(0.5);
-    Estimate state = Estimate::Ones();
+    Estimate state = Estimate::Constant(1);
     const S nan = hidden_nan<S>();
     S sink = 0;
     long count = -1;
@@ -752,7 +753,7 @@ struct LawsOf {
                    {.controller_bandwidth = S(2), .input_gain = static_cast<S>(b0)})
             .value();
       };
-      esokit::Vector<S, n + 1> reference = esokit::Vector<S, n + 1>::Zero();
+      esokit::EigenMatrix<S, n + 1> reference = esokit::EigenMatrix<S, n + 1>::Zero();
       for (int i = 0; i < n; ++i) reference(i) = before.estimate()(i);
       reference(n) = static_cast<S>(gain) * u + before.total_disturbance();
       const S was = law(gain).control(before.estimate(), reference);

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/mimo_extended_state_filter.hpp>
 #include <support/dense_filter.hpp>
@@ -91,15 +92,15 @@ using Coupled = MimoExtendedStateFilter<ChainOrders<1, 2>, 2>;
 
 Coupled::Config coupled() {
   Coupled::Config config;
-  config.input_matrix << 2, 0.5, -30, 100;
+  config.input_matrix = {{2, 0.5}, {-30, 100}};
   config.sample_time = 0.01;
-  config.measurement_covariance << 1e-4, 0.8e-4, 0.8e-4, 2e-4;
+  config.measurement_covariance = {{1e-4, 0.8e-4}, {0.8e-4, 2e-4}};
   Coupled::Covariance q = Coupled::Covariance::Zero();
   q(1, 1) = 0.04;
   q(4, 4) = 9;
   q(1, 4) = q(4, 1) = 0.3;
   config.process_covariance = q;
-  config.initial_covariance.diagonal() << 1, 4, 1, 100, 1e4;
+  eigen(config.initial_covariance).diagonal() << 1, 4, 1, 100, 1e4;
   config.initial_covariance(0, 2) = config.initial_covariance(2, 0) = 0.5;
   config.inflation = 0.2;
   return config;
@@ -130,11 +131,11 @@ struct CoupledModel {
 TEST(MimoExtendedStateFilter, uncoupled_chains_are_filters_side_by_side) {
   static_assert(Coupled::size == 5);
   Coupled::Config config;
-  config.input_matrix << -3, 0, 0, 230;
+  config.input_matrix = {{-3, 0}, {0, 230}};
   config.sample_time = period;
   config.measurement_covariance = Eigen::Vector2d(1e-4, 1e-6).asDiagonal();
   config.disturbance_bounds = {0, 2, 1e-6, 1e-3, 300};
-  config.initial_covariance.diagonal() << 0.1, 10, 1, 1e4, 1e6;
+  eigen(config.initial_covariance).diagonal() << 0.1, 10, 1, 1e4, 1e6;
   config.inflation = 0.5;
   auto filter = Coupled::make(config).value();
   auto first =
@@ -215,9 +216,10 @@ TEST(MimoExtendedStateFilter, coupled_chains_follow_the_dense_equations) {
       const Eigen::Vector2d u(random.uniform(-1, 1), random.uniform(-1, 1));
       const Eigen::Matrix2d s = model.c * p * model.c.transpose() + r / (1 + theta);
       const Eigen::Matrix<double, 5, 2> l = p * model.c.transpose() * inverse(s);
-      ASSERT_LE((filter.gain() - l).cwiseAbs().maxCoeff(), 1e-9 * l.cwiseAbs().maxCoeff()) << k;
+      ASSERT_LE(eigen(filter.gain() - l).cwiseAbs().maxCoeff(), 1e-9 * l.cwiseAbs().maxCoeff())
+          << k;
       const Eigen::Matrix2d whole = model.c * p * model.c.transpose() + r;
-      ASSERT_LE((filter.innovation_covariance() - whole).cwiseAbs().maxCoeff(),
+      ASSERT_LE(eigen(filter.innovation_covariance() - whole).cwiseAbs().maxCoeff(),
                 1e-9 * whole.cwiseAbs().maxCoeff());
       filter.correct(y);
       const Eigen::Vector2d e = y - model.c * z;
@@ -287,7 +289,7 @@ TEST(MimoExtendedStateFilter, frozen_gain_is_the_limit_of_the_recursion) {
     const auto close = [&](double unit) {
       for (int i = 0; i < 5; ++i) {
         for (int j = 0; j < 2; ++j) {
-          const double scale = recursive.gain().row(i).cwiseAbs().maxCoeff();
+          const double scale = eigen(recursive.gain().row(i)).cwiseAbs().maxCoeff();
           EXPECT_NEAR(frozen.gain()(i, j), recursive.gain()(i, j), unit * scale);
         }
       }
@@ -346,7 +348,8 @@ TEST(MimoExtendedStateFilter, refuses_bad_configs_by_name) {
             "sample_time: must be finite and positive");
   EXPECT_EQ(refused([&](Config& c) { c.input_matrix(1, 0) = nan; }),
             "input_matrix[2]: must be finite");
-  EXPECT_EQ(refused([](Config& c) { c.input_matrix.setZero(); }), "input_matrix: must not be zero");
+  EXPECT_EQ(refused([](Config& c) { eigen(c.input_matrix).setZero(); }),
+            "input_matrix: must not be zero");
   EXPECT_EQ(refused([](Config& c) { c.measurement_covariance(0, 0) = -1; }),
             "measurement_covariance: must be finite and positive semidefinite");
   EXPECT_EQ(refused([](Config& c) { c.measurement_covariance(1, 0) = 0.1; }),
@@ -382,14 +385,14 @@ TEST(MimoExtendedStateFilter, refuses_bad_configs_by_name) {
             "mode: must be recursive or frozen for several chains");
   EXPECT_EQ(refused([](Config& c) {
               c.process_covariance.reset();
-              c.measurement_covariance.setZero();
+              eigen(c.measurement_covariance).setZero();
             }),
             "measurement_covariance: must be positive definite where nothing disturbs the plants");
   EXPECT_EQ(refused([](Config& c) {
               c.inflation_rule = InflationRule::none;
               c.inflation = 0;
-              (*c.process_covariance).row(1).setZero();
-              (*c.process_covariance).col(1).setZero();
+              eigen(*c.process_covariance).row(1).setZero();
+              eigen(*c.process_covariance).col(1).setZero();
               c.allow_vanishing_gain = true;
               c.mode = RiccatiMode::frozen;
             }),
@@ -403,11 +406,11 @@ using Pair = MimoExtendedStateFilter<ChainOrders<2, 1>, 2, float>;
 
 Pair::Config pair_config() {
   Pair::Config config;
-  config.input_matrix << 2, 0, 1, 1;
+  config.input_matrix = {{2, 0}, {1, 1}};
   config.sample_time = 1e-3f;
-  config.measurement_covariance << 1e-6f, 0, 0, 1e-6f;
+  config.measurement_covariance = {{1e-6f, 0}, {0, 1e-6f}};
   config.disturbance_bounds = {0, 0, 10, 0, 10};
-  config.initial_covariance.diagonal().setConstant(100);
+  eigen(config.initial_covariance).diagonal().setConstant(100);
   config.inflation = 0.2f;
   return config;
 }
@@ -424,7 +427,7 @@ TEST(MimoExtendedStateFilter, absurd_measurements_are_rejected_alone) {
       bad(channel) = absurd;
       for (int k = 0; k < 3; ++k) {
         const StepStatus status = filter.update(bad, Eigen::Vector2f::Zero());
-        ASSERT_TRUE(filter.estimate().allFinite()) << absurd;
+        ASSERT_TRUE(eigen(filter.estimate()).allFinite()) << absurd;
         if (status != StepStatus::ok) {
           EXPECT_EQ(status, StepStatus::measurement_rejected);
           EXPECT_EQ(filter.missed(channel), k + 1);
@@ -444,7 +447,7 @@ TEST(MimoExtendedStateFilter, absurd_inputs_have_a_way_back) {
     auto filter = Pair::make(pair_config()).value();
     for (int k = 0; k < 6; ++k) {
       filter.update(Eigen::Vector2f(0.25f, -0.5f), Eigen::Vector2f(absurd, absurd));
-      ASSERT_TRUE(filter.estimate().allFinite()) << absurd;
+      ASSERT_TRUE(eigen(filter.estimate()).allFinite()) << absurd;
     }
     for (int k = 0; k < 3000; ++k) {
       filter.update(Eigen::Vector2f(0.25f, -0.5f), Eigen::Vector2f::Zero());
@@ -471,8 +474,9 @@ TEST(MimoExtendedStateFilter, long_gaps_restart_the_chain) {
       for (int k = 0; k < gap; ++k) {
         filter.update(Eigen::Vector2f(hidden_nan<float>(), -0.5f), Eigen::Vector2f::Zero());
         both.predict(Eigen::Vector2f::Zero());
-        ASSERT_TRUE(filter.covariance().allFinite() && filter.gain().allFinite()) << k;
-        ASSERT_TRUE(both.covariance().allFinite() && both.gain().allFinite()) << k;
+        ASSERT_TRUE(eigen(filter.covariance()).allFinite() && eigen(filter.gain()).allFinite())
+            << k;
+        ASSERT_TRUE(eigen(both.covariance()).allFinite() && eigen(both.gain()).allFinite()) << k;
       }
       EXPECT_EQ(filter.missed(0), std::min(gap, 65535));
       EXPECT_EQ(filter.missed(1), 0);
@@ -527,8 +531,8 @@ TEST(MimoExtendedStateFilter, exact_measurements_of_any_size_find_back) {
   std::string last_rule;
   for (double bound = 1e-25; bound < 1e18; bound *= 10) {
     auto config = pair_config();
-    config.measurement_covariance.setZero();
-    config.initial_covariance.diagonal().setConstant(static_cast<float>(bound * bound));
+    eigen(config.measurement_covariance).setZero();
+    eigen(config.initial_covariance).diagonal().setConstant(static_cast<float>(bound * bound));
     config.disturbance_bounds = {0, 0, static_cast<float>(bound), 0, static_cast<float>(bound)};
     const auto made = Pair::make(config);
     if (!made) {
@@ -625,15 +629,15 @@ TEST(MimoExtendedStateFilter, what_is_told_is_finite) {
   int accepted = 0;
   for (double r = 1e-38; r < 3e38; r *= 10) {
     auto config = pair_config();
-    config.measurement_covariance.diagonal().setConstant(static_cast<float>(r));
+    eigen(config.measurement_covariance).diagonal().setConstant(static_cast<float>(r));
     const auto made = Pair::make(config);
     if (!made) continue;
     ++accepted;
     auto filter = *made;
     for (const float y : {0.0f, 1.0f, 1e19f, 3e37f, 1.0f}) {
       filter.update(Eigen::Vector2f(y, -y), Eigen::Vector2f::Zero());
-      EXPECT_TRUE(filter.covariance().allFinite()) << r << ' ' << y;
-      EXPECT_TRUE(filter.innovation_covariance().allFinite()) << r << ' ' << y;
+      EXPECT_TRUE(eigen(filter.covariance()).allFinite()) << r << ' ' << y;
+      EXPECT_TRUE(eigen(filter.innovation_covariance()).allFinite()) << r << ' ' << y;
       EXPECT_TRUE(std::isfinite(filter.normalised_innovation())) << r << ' ' << y;
       EXPECT_GE(filter.normalised_innovation(), 0) << r << ' ' << y;
     }
@@ -645,11 +649,11 @@ TEST(MimoExtendedStateFilter, what_is_told_is_finite) {
 TEST(MimoExtendedStateFilter, many_steps_in_float) {
   using Filter = MimoExtendedStateFilter<ChainOrders<2, 2>, 2, float>;
   Filter::Config config;
-  config.input_matrix.setIdentity();
+  eigen(config.input_matrix).setIdentity();
   config.sample_time = 1e-3f;
-  config.measurement_covariance << 1e-12f, 0.5e-12f, 0.5e-12f, 1e-12f;
+  config.measurement_covariance = {{1e-12f, 0.5e-12f}, {0.5e-12f, 1e-12f}};
   config.disturbance_bounds = {0, 0, 300, 0, 0, 300};
-  config.initial_covariance.diagonal().setConstant(1e8f);
+  eigen(config.initial_covariance).diagonal().setConstant(1e8f);
   config.inflation = 0.5f;
   auto filter = Filter::make(config).value();
   Random random(13);
@@ -660,7 +664,7 @@ TEST(MimoExtendedStateFilter, many_steps_in_float) {
     const auto p = filter.covariance();
     for (int i = 0; i < 6; ++i) ASSERT_GT(p(i, i), 0) << k;
     ASSERT_EQ(p, p.transpose());
-    ASSERT_TRUE(filter.gain().allFinite());
+    ASSERT_TRUE(eigen(filter.gain()).allFinite());
   }
 }
 

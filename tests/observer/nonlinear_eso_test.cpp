@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <esokit/core/error_text.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <limits>
@@ -147,7 +148,7 @@ TEST(NonlinearEso, NoInnovationNoCorrection) {
                                            .sample_time = 0.01})
                         .value();
     EXPECT_EQ(observer.update(0, 0), StepStatus::ok);
-    EXPECT_EQ(observer.estimate(), (esokit::Vector<double, 4>::Zero()));
+    EXPECT_EQ(observer.estimate(), (esokit::EigenMatrix<double, 4>::Zero()));
     EXPECT_EQ(observer.update(1e-300, 0), StepStatus::ok);
   }
 }
@@ -290,7 +291,7 @@ TEST(NonlinearEso, LimitCycleOfThePrintedParameters) {
                                            .input_gain = 1,
                                            .sample_time = T})
                         .value();
-    observer.reset(esokit::Vector<double, 4>(start, 0, 0, 0));
+    observer.reset(esokit::EigenMatrix<double, 4>(start, 0, 0, 0));
     double peak = 0;
     const int samples = static_cast<int>(1000 / omega_t);
     for (int k = 0; k < samples; ++k) {
@@ -317,7 +318,7 @@ TEST(ContinuousNonlinearEso, IsTheEquationOfThePaper) {
       ContinuousNonlinearEso<2>::make(
           {.observer_bandwidth = 50, .shape = table2_g, .unlimited = true, .input_gain = 3})
           .value();
-  const esokit::Vector<double, 4> z(0.2, -1, 5, 7);
+  const esokit::EigenMatrix<double, 4> z(0.2, -1, 5, 7);
   const double e = 0.1;
   const auto rate = observer.derivative(0, z, z(0) + e, 2);
   const double g = printed_g(table2_g, e);
@@ -376,10 +377,10 @@ TEST(NonlinearEso, TendsToTheContinuousForm) {
                                                              .gain_max = 5,
                                                              .input_gain = 1})
                                 .value();
-    esokit::Vector<double, 4> z = esokit::Vector<double, 4>::Zero();
+    esokit::EigenMatrix<double, 4> z = esokit::EigenMatrix<double, 4>::Zero();
     for (int k = 0; k < samples; ++k) {
       const double t = k * T;
-      using State = esokit::Vector<double, 4>;
+      using State = esokit::EigenMatrix<double, 4>;
       const State k1 = continuous.derivative(t, z, output(t), 0);
       const State k2 = continuous.derivative(t + T / 2, z + T / 2 * k1, output(t + T / 2), 0);
       const State k3 = continuous.derivative(t + T / 2, z + T / 2 * k2, output(t + T / 2), 0);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <control/loop_traits.hpp>
 #include <esokit/control/adrc.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
@@ -311,7 +312,7 @@ TEST(OutlierGate, OffAndRetuned) {
   EXPECT_TRUE(gate.open());
   EXPECT_EQ(gate.reset(hidden_nan<double>()), StepStatus::state_rejected);
   EXPECT_EQ(gate.update(5, 0), StepStatus::ok);
-  EXPECT_EQ(gate.reset(Vector<double, 3>(5, 0, 0)), StepStatus::ok);
+  EXPECT_EQ(gate.reset(EigenMatrix<double, 3>(5, 0, 0)), StepStatus::ok);
   EXPECT_EQ(gate.update(5, 0), StepStatus::ok);
   EXPECT_TRUE(gate.open());
   EXPECT_EQ(gate.update(5, 0), StepStatus::ok);

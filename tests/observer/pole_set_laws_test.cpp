@@ -1,6 +1,8 @@
 // The law suite on the observers with any stable pole set, complex pairs among them.
 #include "law_suite.hpp"
 
+#include <esokit/design/pole_set.hpp>
+
 namespace esokit_test {
 
 using PoleSetTypes = TypeList<esokit::LinearEso<2, double, 1, esokit::PoleSet>,

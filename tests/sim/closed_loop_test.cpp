@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <esokit/control/adrc_law.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/sim/closed_loop.hpp>
@@ -42,7 +43,7 @@ LinearPlant<2> linear_plant() {
       .value();
 }
 constexpr auto sine_reference = [](double t) { return std::sin(frequency * t); };
-constexpr auto error_law = [](double, const Vector<double, 3>& e) {
+constexpr auto error_law = [](double, const EigenMatrix<double, 3>& e) {
   return (e(2) + 4.0 * e(0) + 4.0 * e(1)) / b0;
 };
 
@@ -50,14 +51,14 @@ constexpr auto error_law = [](double, const Vector<double, 3>& e) {
 template <int Levels>
 struct ExactLoop {
   static constexpr int size = 2 + 3 * Levels + 3;
-  Matrix<double, size, size> a = Matrix<double, size, size>::Zero();
-  Vector<double, size> b = Vector<double, size>::Zero();
+  EigenMatrix<double, size, size> a = EigenMatrix<double, size, size>::Zero();
+  EigenMatrix<double, size> b = EigenMatrix<double, size>::Zero();
 
   explicit ExactLoop(const Array<double, Levels>& bandwidths) {
     constexpr int sine = 2 + 3 * Levels;
     constexpr int one = sine + 2;
     // u = (sum of the levels' disturbances + 4 e + 4 e' of the last level) / b0
-    RowVector<double, size> u = RowVector<double, size>::Zero();
+    EigenMatrix<double, 1, size> u = EigenMatrix<double, 1, size>::Zero();
     for (int i = 0; i < Levels; ++i) u(2 + 3 * i + 2) = 1.0 / b0;
     u(2 + 3 * (Levels - 1)) = 4.0 / b0;
     u(2 + 3 * (Levels - 1) + 1) = 4.0 / b0;
@@ -70,7 +71,7 @@ struct ExactLoop {
     for (int i = 0; i < Levels; ++i) {
       const int at = 2 + 3 * i;
       const double w = bandwidths[static_cast<std::size_t>(i)];
-      const Vector<double, 3> l(3.0 * w, 3.0 * w * w, w * w * w);
+      const EigenMatrix<double, 3> l(3.0 * w, 3.0 * w * w, w * w * w);
       a(at, at + 1) += 1.0;
       a(at + 1, at + 2) += 1.0;
       a.row(at + 1) += -b0 * u;
@@ -91,13 +92,13 @@ struct ExactLoop {
   }
 
   /// Plant state after the noise values were held for `hold` each.
-  Vector<double, 2> end(const std::vector<double>& noise, double hold) const {
-    Matrix<double, size + 1, size + 1> held = Matrix<double, size + 1, size + 1>::Zero();
+  EigenMatrix<double, 2> end(const std::vector<double>& noise, double hold) const {
+    EigenMatrix<double, size + 1, size + 1> held = EigenMatrix<double, size + 1, size + 1>::Zero();
     held.template topLeftCorner<size, size>() = a * hold;
     held.template topRightCorner<size, 1>() = b * hold;
     // Of dynamic size: Eigen's exponential of a fixed size costs seconds of compile time for each.
-    const Matrix<double, size + 1, size + 1> phi = Eigen::MatrixXd(held).exp();
-    Vector<double, size + 1> s = Vector<double, size + 1>::Zero();
+    const EigenMatrix<double, size + 1, size + 1> phi = Eigen::MatrixXd(held).exp();
+    EigenMatrix<double, size + 1> s = EigenMatrix<double, size + 1>::Zero();
     s(0) = 0.5;
     s(1) = -0.2;
     s(size - 2) = 1.0;  // cos 0
@@ -110,10 +111,10 @@ struct ExactLoop {
   }
 };
 
-const Vector<double, 2> start(0.5, -0.2);
+const EigenMatrix<double, 2> start(0.5, -0.2);
 
 template <class Observer>
-double distance_to_exact(const Observer& observer, double step, const Vector<double, 2>& exact,
+double distance_to_exact(const Observer& observer, double step, const EigenMatrix<double, 2>& exact,
                          double hold, double noise_power) {
   const auto noise =
       HeldNoise<>::make({.power = noise_power, .hold = hold, .step = step, .seed = 7}).value();
@@ -138,8 +139,8 @@ template <class Observer, class Exact>
 void converges_with_order_4(const Observer& observer, const Exact& exact) {
   const double hold = 0.02;
   const double power = 2e-4;  // standard deviation 0.1: the noise drives the loop
-  const Vector<double, 2> end = exact.end(noise_values(hold, power), hold);
-  const Vector<double, 2> quiet = exact.end(noise_values(hold, 0.0), hold);
+  const EigenMatrix<double, 2> end = exact.end(noise_values(hold, power), hold);
+  const EigenMatrix<double, 2> quiet = exact.end(noise_values(hold, 0.0), hold);
   EXPECT_GT((end - quiet).norm(), 1e-3);
 
   const double coarse = distance_to_exact(observer, 0.002, end, hold, power);
@@ -166,8 +167,9 @@ TEST(ContinuousLoop, OutputBasedFormStartedAtTheTruthIsTheDesignedChain) {
       {.input_gain = -2.0, .disturbance = Constant<>::make({.value = d}).value()});
   const auto eso = ContinuousLinearEso<2>::make({.observer_bandwidth = 30.0, .input_gain = -2.0});
   const auto law = AdrcLaw<2>::make({.controller_bandwidth = 3.0, .input_gain = -2.0}).value();
-  const ContinuousLoop loop{
-      *plant, *eso, [&law](double, const Vector<double, 3>& z) { return law.control(z, 0.0); }};
+  const ContinuousLoop loop{*plant, *eso, [&law](double, const EigenMatrix<double, 3>& z) {
+                              return law.control(z, 0.0);
+                            }};
   double worst = 0.0;
   const auto end = loop.run({.duration = 2.0,
                              .step = 1e-3,
@@ -191,8 +193,8 @@ TEST(ContinuousLoop, OutputBasedFormStartedAtTheTruthIsTheDesignedChain) {
 struct ProbingObserver {
   static constexpr int states = 1;
   using scalar_type = double;
-  using State = Vector<double, 1>;
-  using Estimate = Vector<double, 1>;
+  using State = EigenMatrix<double, 1>;
+  using Estimate = EigenMatrix<double, 1>;
   struct Log {
     std::vector<double> begun;
     std::vector<std::vector<double>> fed;  // measurements of the stages of each step
@@ -216,8 +218,8 @@ TEST(ContinuousLoop, StepsBeginBeforeTheirStagesAndHoldTheNoise) {
   const auto plant = IntegratorChainPlant<1>::make({}).value();
   const auto noise = HeldNoise<>::make({.power = 1.0, .hold = 0.2, .step = 0.1, .seed = 3}).value();
   const ContinuousLoop loop{plant, ProbingObserver{&log},
-                            [](double, const Vector<double, 1>&) { return 0.0; }, MeasuredOutput{},
-                            noise};
+                            [](double, const EigenMatrix<double, 1>&) { return 0.0; },
+                            MeasuredOutput{}, noise};
   std::vector<double> seen;
   const auto end = loop.run({.duration = 1.0, .step = 0.1},
                             [&](const auto& sample) { seen.push_back(sample.measurement); });
@@ -266,14 +268,14 @@ TEST(SampledLoop, EqualsTheHandWrittenLoop) {
       LinearEso<2>::make({.observer_bandwidth = 15.0, .input_gain = b0, .sample_time = T});
   const auto law = AdrcLaw<2>::make({.controller_bandwidth = 2.0, .input_gain = b0}).value();
   const auto noise = HeldNoise<>::make({.power = 1e-6, .hold = 0.1, .step = T, .seed = 5});
-  const auto control = [&law](double t, const Vector<double, 3>& z) {
+  const auto control = [&law](double t, const EigenMatrix<double, 3>& z) {
     return std::clamp(law.control(z, t < 0.5 ? 0.0 : 1.0), -1.0, 1.0);
   };
   const SampledLoop loop{*plant, *eso, control, MeasuredOutput{}, *noise};
 
   auto observer = *eso;
   auto source = *noise;
-  Vector<double, 2> x(0.1, 0.0);
+  EigenMatrix<double, 2> x(0.1, 0.0);
   double u = held_before;
   std::int64_t k = 0;
   const auto end = loop.run({.duration = 2.0,
@@ -373,10 +375,10 @@ TEST(SampledLoop, ABadSampleIsReported) {
     return t > 0.35 && t < 0.45 ? not_a_number : y;
   };
   const SampledLoop loop{IntegratorChainPlant<1>::make({}).value(), *eso,
-                         [](double, const Vector<double, 2>& z) { return -z(0); }, broken};
+                         [](double, const EigenMatrix<double, 2>& z) { return -z(0); }, broken};
   int rejected = 0;
   const auto end =
-      loop.run({.duration = 1.0, .sample_time = 0.1, .plant_state = Vector<double, 1>(1.0)},
+      loop.run({.duration = 1.0, .sample_time = 0.1, .plant_state = EigenMatrix<double, 1>(1.0)},
                [&](const auto& sample) {
                  if (has(sample.status, StepStatus::measurement_rejected)) ++rejected;
                  EXPECT_TRUE(is_finite(sample.input));
@@ -391,7 +393,7 @@ TEST(ClosedLoop, RunsInFloat) {
   const auto continuous =
       ContinuousLinearEso<1, float>::make({.observer_bandwidth = 20.0f, .input_gain = 1.0f});
   const auto plant = IntegratorChainPlant<1, float>::make({.disturbance = {}}).value();
-  const auto law = [](float, const Vector<float, 2>& z) { return 1.0f - z(0) - z(1); };
+  const auto law = [](float, const EigenMatrix<float, 2>& z) { return 1.0f - z(0) - z(1); };
   const SampledLoop sampled{plant, *eso, law};
   const ContinuousLoop paper{plant, *continuous, law};
   EXPECT_NEAR(sampled.run({.duration = 20.0f, .sample_time = 0.01f}, ignore)->plant_state(0), 1.0f,
@@ -474,7 +476,7 @@ static_assert(SampledObserverModel<CascadeEso<4, 3, float>>);
 static_assert(NoiseSource<NoNoise, double> && NoiseSource<HeldNoise<>, double>);
 static_assert(!NoiseSource<WhiteNoise<>, double>);
 static_assert(MeasurementMap<MeasuredOutput, double> && !MeasurementMap<Constant<>, double>);
-static_assert(ControlFunction<decltype(error_law), double, Vector<double, 3>>);
-static_assert(!ControlFunction<decltype(sine_reference), double, Vector<double, 3>>);
+static_assert(ControlFunction<decltype(error_law), double, EigenMatrix<double, 3>>);
+static_assert(!ControlFunction<decltype(sine_reference), double, EigenMatrix<double, 3>>);
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <boost/numeric/odeint/stepper/runge_kutta_dopri5.hpp>
 #include <cmath>
 #include <esokit/core/matrix.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/sim/dormand_prince.hpp>
 #include <limits>
 #include <string>
@@ -18,8 +19,8 @@ using namespace esokit;
 using namespace esokit::sim;
 using esokit_test::refusal;
 
-using State2 = Vector<double, 2>;
-using State1 = Vector<double, 1>;
+using State2 = EigenMatrix<double, 2>;
+using State1 = EigenMatrix<double, 1>;
 using Array2 = std::array<double, 2>;
 
 // y' = -2 t y^2 has y = 1/(1 + t^2); the second is coupled to it.
@@ -352,7 +353,7 @@ TEST(VariableStep, RefusedConfigs) {
 }
 
 TEST(VariableStep, Float) {
-  using StateF = Vector<float, 1>;
+  using StateF = EigenMatrix<float, 1>;
   auto stepper = VariableStep<StateF>::make({.relative_tolerance = 1e-4F}).value();
   StateF x(1.0F);
   float t = 0.0F;

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <esokit/eigen.hpp>
 #include <esokit/sim/plant.hpp>
 #include <esokit/sim/runge_kutta.hpp>
 
@@ -12,13 +13,13 @@ using namespace esokit::sim;
 
 struct UserPlant {
   static constexpr int states = 1;
-  using State = Vector<double, 1>;
+  using State = EigenMatrix<double, 1>;
   State derivative(double, const State& x, double u) const { return State(u - x[0]); }
   double output(double, const State& x) const { return x[0]; }
 };
 struct NoOutput {
   static constexpr int states = 1;
-  using State = Vector<double, 1>;
+  using State = EigenMatrix<double, 1>;
   State derivative(double, const State& x, double u) const { return State(u - x[0]); }
 };
 struct WrongSize : UserPlant {

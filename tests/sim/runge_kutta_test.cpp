@@ -5,6 +5,7 @@
 #include <boost/numeric/odeint/stepper/runge_kutta4.hpp>
 #include <cmath>
 #include <esokit/core/matrix.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/sim/runge_kutta.hpp>
 
 namespace {
@@ -15,7 +16,7 @@ using namespace esokit::sim;
 // x1' = x2, x2' = -2 x1 x2^2 + .. would have no closed form; this one has: with y' = -2 t y^2,
 // y(0) = 1, y = 1/(1 + t^2), coupled one way to z' = y z cos t. The second has the reference of a
 // far finer step.
-using State2 = Vector<double, 2>;
+using State2 = EigenMatrix<double, 2>;
 State2 nonlinear(double t, const State2& x) {
   return {-2.0 * t * x[0] * x[0], x[0] * x[1] * std::cos(t) - x[1] * x[1]};
 }

@@ -7,6 +7,7 @@
 #include <boost/multiprecision/cpp_bin_float.hpp>
 #include <cmath>
 #include <esokit/core/matrix.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/sim/runge_kutta.hpp>
 #include <esokit/sim/signals.hpp>
 
@@ -145,7 +146,7 @@ TEST(Signals, FilteredStepAgainstFiftyDigits) {
 TEST(Signals, FilteredStepAgainstIntegration) {
   const double tau = 0.1;
   const auto s = FilteredStep<5>::make({.time = 0.2, .time_constant = tau}).value();
-  using State = Vector<double, 5>;
+  using State = EigenMatrix<double, 5>;
   const auto filter = [tau](double /*t*/, const State& x) -> State {
     State rate;
     rate[0] = (1.0 - x[0]) / tau;

@@ -96,7 +96,7 @@ struct RecursiveFilter {
                             .measurement_variance = noise * noise,
                             .disturbance_bounds = {0.0f, 0.0f, 1.0f},
                             .inflation = 0.02f};
-    config.initial_covariance.diagonal() << 1e-4f, 1.0f, 1e3f;
+    config.initial_covariance = Observer::Covariance::Diagonal({1e-4f, 1.0f, 1e3f});
     return config;
   }
 };

@@ -7,6 +7,7 @@
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/control/tracking_differentiator.hpp>
+#include <esokit/design/pole_set.hpp>
 #include <esokit/observer/delayed_input.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/half_gain_eso.hpp>

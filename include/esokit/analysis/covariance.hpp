@@ -14,9 +14,9 @@ namespace esokit {
 ///         continuous white noise comes straight (its variance is infinite), or whose variance is
 ///         beyond the scalar
 template <int States, int Inputs, int Outputs>
-Expected<Matrix<double, Outputs, Outputs>, Error<double>> output_covariance(
+Expected<EigenMatrix<double, Outputs, Outputs>, Error<double>> output_covariance(
     const LinearSystem<States, Inputs, Outputs>& system,
-    const Matrix<double, Inputs, Inputs>& input) {
+    const EigenMatrix<double, Inputs, Inputs>& input) {
   Rules<double> rules;
   rules.all_of(detail::check_system(system));
   for (int i = 0; i < Inputs; ++i) {
@@ -46,13 +46,13 @@ Expected<Matrix<double, Outputs, Outputs>, Error<double>> output_covariance(
       }
     }
   }
-  Matrix<double, States, States> q;
+  EigenMatrix<double, States, States> q;
   for (int i = 0; i < States; ++i) {
     for (int j = 0; j < States; ++j) q(i, j) = quadratic(system.b, input, i, j);
   }
   const auto p = solve_lyapunov<States>(system.a, q, system.sampled());
   if (!p) return p.error();
-  Matrix<double, Outputs, Outputs> result;
+  EigenMatrix<double, Outputs, Outputs> result;
   for (int i = 0; i < Outputs; ++i) {
     for (int j = 0; j < Outputs; ++j) {
       result(i, j) = quadratic(system.c, *p, i, j) + quadratic(system.d, input, i, j);
@@ -81,9 +81,9 @@ struct EstimationNoise {
 /// exactly. With disturbance = 0 the variances are those of the estimates themselves.
 /// @return error for a negative noise or an observer that is not stable
 template <LinearObserver Observer>
-Expected<
-    Matrix<double, Observer::order + Observer::extension, Observer::order + Observer::extension>,
-    Error<double>>
+Expected<EigenMatrix<double, Observer::order + Observer::extension,
+                     Observer::order + Observer::extension>,
+         Error<double>>
 estimation_error_covariance(const Observer& observer, const EstimationNoise& noise,
                             double t = 0.0) {
   constexpr int size = Observer::order + Observer::extension;
@@ -102,7 +102,7 @@ estimation_error_covariance(const Observer& observer, const EstimationNoise& noi
   }
   for (int r = 0; r < size; ++r) system.d(r, 0) = -m.dy(r);
   balance(system);
-  Matrix<double, size + 1, size + 1> input = Matrix<double, size + 1, size + 1>::Zero();
+  EigenMatrix<double, size + 1, size + 1> input = EigenMatrix<double, size + 1, size + 1>::Zero();
   input(0, 0) = noise.measurement;
   if (m.sample_time > 0.0) {
     // integral of Phi(s) e_N e_N' Phi(s)' over a sample

@@ -28,10 +28,11 @@ struct ErrorBound {
   double rate = 0.0;       ///< 1/s
 
   /// Bound on each abs(z_i - zhat_i) once the start is forgotten, N x 1, physical units.
-  [[nodiscard]] Vector<double, Size> ultimate() const { return unscaled(gamma * level); }
+  [[nodiscard]] EigenMatrix<double, Size> ultimate() const { return unscaled(gamma * level); }
 
   /// The same at a time t (s) after an initial error z(0) - zhat(0), N x 1.
-  [[nodiscard]] Vector<double, Size> at(double t, const Vector<double, Size>& initial) const {
+  [[nodiscard]] EigenMatrix<double, Size> at(double t,
+                                             const EigenMatrix<double, Size>& initial) const {
     const double decay = std::exp(-rate * t);
     return unscaled(gamma * (scaled_norm(initial) * decay + level * (1.0 - decay)));
   }
@@ -40,7 +41,7 @@ struct ErrorBound {
   /// @return error without a source of error (then it is never reached), for excess <= 0, or an
   ///         initial error that the scalar cannot hold in the scaling
   [[nodiscard]] Expected<double, Error<double>> convergence_time(
-      const Vector<double, Size>& initial, double excess = 0.1) const {
+      const EigenMatrix<double, Size>& initial, double excess = 0.1) const {
     Rules<double> rules;
     rules.positive("excess", excess)
         .require(level > 0.0, "level", level, "must be positive: a bound of zero is never reached")
@@ -55,7 +56,7 @@ struct ErrorBound {
   }
 
   /// norm(zeta) of an error in physical units.
-  [[nodiscard]] double scaled_norm(const Vector<double, Size>& error) const {
+  [[nodiscard]] double scaled_norm(const EigenMatrix<double, Size>& error) const {
     double sum = 0.0;
     for (int i = 0; i < Size; ++i) {
       const double zeta = error(i) * std::pow(bandwidth, Size - 1 - i);
@@ -65,8 +66,8 @@ struct ErrorBound {
   }
 
  private:
-  [[nodiscard]] Vector<double, Size> unscaled(double norm) const {
-    Vector<double, Size> bound;
+  [[nodiscard]] EigenMatrix<double, Size> unscaled(double norm) const {
+    EigenMatrix<double, Size> bound;
     for (int i = 0; i < Size; ++i) bound(i) = norm * std::pow(bandwidth, i + 1 - Size);
     return bound;
   }
@@ -82,16 +83,16 @@ inline Check<double> check_sources(const ErrorSources& sources) {
 
 /// kappa_i = C(N, i) factor^i: the scaled gains of poles at -factor omega.
 template <int Size>
-Vector<double, Size> binomial_gain(double factor = 1.0) {
-  Vector<double, Size> gain;
+EigenMatrix<double, Size> binomial_gain(double factor = 1.0) {
+  EigenMatrix<double, Size> gain;
   for (int i = 0; i < Size; ++i) gain(i) = binomial(Size, i + 1) * std::pow(factor, i + 1);
   return gain;
 }
 
 /// H* = A - kappa c': the scaled error obeys zeta' = omega H* zeta + .. .
 template <int Size>
-Matrix<double, Size, Size> scaled_error_matrix(const Vector<double, Size>& gain) {
-  Matrix<double, Size, Size> h = Matrix<double, Size, Size>::Zero();
+EigenMatrix<double, Size, Size> scaled_error_matrix(const EigenMatrix<double, Size>& gain) {
+  EigenMatrix<double, Size, Size> h = EigenMatrix<double, Size, Size>::Zero();
   for (int i = 0; i < Size; ++i) {
     h(i, 0) = -gain(i);
     if (i + 1 < Size) h(i, i + 1) += 1.0;
@@ -118,15 +119,15 @@ Expected<ErrorBound<Size>, Error<double>> bound_from(const LyapunovMatrix<Size>&
 
 /// Bound for an observer whose scaled gain wanders in any way between two gains.
 template <int Size>
-Expected<ErrorBound<Size>, Error<double>> bound_between(const Vector<double, Size>& gain1,
-                                                        const Vector<double, Size>& gain2,
+Expected<ErrorBound<Size>, Error<double>> bound_between(const EigenMatrix<double, Size>& gain1,
+                                                        const EigenMatrix<double, Size>& gain2,
                                                         double bandwidth,
                                                         const ErrorSources& sources) {
   Rules<double> rules;
   rules.positive("observer_bandwidth", bandwidth).all_of(check_sources(sources));
   if (!rules) return rules.error();
-  const std::array<Matrix<double, Size, Size>, 2> modes = {scaled_error_matrix<Size>(gain1),
-                                                           scaled_error_matrix<Size>(gain2)};
+  const std::array<EigenMatrix<double, Size, Size>, 2> modes = {scaled_error_matrix<Size>(gain1),
+                                                                scaled_error_matrix<Size>(gain2)};
   const auto lyapunov = common_lyapunov_matrix<Size>(modes);
   if (!lyapunov) return lyapunov.error();
   const double gain = std::max(gain1.norm(), gain2.norm());
@@ -151,7 +152,7 @@ Expected<ErrorBound<Size>, Error<double>> linear_error_bound(
   Rules<double> rules;
   rules.positive("observer_bandwidth", w).all_of(detail::check_sources(sources));
   if (!rules) return rules.error();
-  const Vector<double, Size> gain = detail::binomial_gain<Size>();
+  const EigenMatrix<double, Size> gain = detail::binomial_gain<Size>();
   const auto lyapunov = lyapunov_matrix<Size>(detail::scaled_error_matrix<Size>(gain));
   if (!lyapunov) return lyapunov.error();
   return detail::bound_from(
@@ -183,7 +184,7 @@ Expected<Array<ErrorBound<Size>, Levels>, Error<double>> cascade_error_bounds(
   Rules<double> rules;
   rules.all_of(detail::check_sources(sources)).positive(levels->field, w);
   if (!rules) return rules.error();
-  const Vector<double, Size> gain = detail::binomial_gain<Size>();
+  const EigenMatrix<double, Size> gain = detail::binomial_gain<Size>();
   const auto lyapunov = lyapunov_matrix<Size>(detail::scaled_error_matrix<Size>(gain));
   if (!lyapunov) return lyapunov.error();
 
@@ -262,7 +263,7 @@ Expected<ErrorBound<Size>, Error<double>> nonlinear_error_bound(const GainRange&
                {"gain_max", setting.gain_max, "must be finite and not below gain_min", -1,
                 setting.gain_min, true});
   if (!rules) return rules.error();
-  const Vector<double, Size> gain = detail::binomial_gain<Size>();
+  const EigenMatrix<double, Size> gain = detail::binomial_gain<Size>();
   return detail::bound_between<Size>(setting.gain_min * gain, setting.gain_max * gain,
                                      setting.observer_bandwidth, sources);
 }

@@ -23,11 +23,11 @@ inline std::complex<double> frequency_operator(double frequency, double sample_t
 
 /// c (value I - a)^-1 b + d; not finite at a pole.
 template <int States, int Inputs, int Outputs>
-Matrix<std::complex<double>, Outputs, Inputs> evaluate(
+EigenMatrix<std::complex<double>, Outputs, Inputs> evaluate(
     const LinearSystem<States, Inputs, Outputs>& system, std::complex<double> value) {
   using Complex = std::complex<double>;
-  Matrix<Complex, States, States> pencil;
-  Matrix<Complex, States, Inputs> x;
+  EigenMatrix<Complex, States, States> pencil;
+  EigenMatrix<Complex, States, Inputs> x;
   for (int j = 0; j < States; ++j) {
     for (int i = 0; i < States; ++i) pencil(i, j) = -system.a(i, j);
     pencil(j, j) += value;
@@ -36,7 +36,7 @@ Matrix<std::complex<double>, Outputs, Inputs> evaluate(
   // A vector that is a row is stored by rows, which for a vector is the same.
   solve_in_place(DenseView<Complex>{pencil.data(), States},
                  DenseView<Complex>{x.data(), States, Inputs});
-  Matrix<Complex, Outputs, Inputs> response;
+  EigenMatrix<Complex, Outputs, Inputs> response;
   for (int i = 0; i < Outputs; ++i) {
     for (int j = 0; j < Inputs; ++j) {
       Complex sum = system.d(i, j);
@@ -75,10 +75,10 @@ inline Check<double> check_frequency(double frequency, double sample_time) {
 /// @param frequency omega, rad/s; 0 gives the static gain
 /// @return error for a frequency that is negative, above pi / T, or a pole
 template <int States, int Inputs, int Outputs>
-Expected<Matrix<std::complex<double>, Outputs, Inputs>, Error<double>> frequency_response(
+Expected<EigenMatrix<std::complex<double>, Outputs, Inputs>, Error<double>> frequency_response(
     const LinearSystem<States, Inputs, Outputs>& system, double frequency) {
   if (auto ok = detail::check_frequency(frequency, system.sample_time); !ok) return ok.error();
-  const Matrix<std::complex<double>, Outputs, Inputs> response =
+  const EigenMatrix<std::complex<double>, Outputs, Inputs> response =
       detail::evaluate(system, detail::frequency_operator(frequency, system.sample_time));
   if (!detail::all_finite(response)) {
     return Error<double>{"frequency", frequency, "is a pole of the system"};

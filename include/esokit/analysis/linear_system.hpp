@@ -7,8 +7,8 @@
 #include <esokit/core/check.hpp>
 #include <esokit/core/error.hpp>
 #include <esokit/core/expected.hpp>
-#include <esokit/core/matrix.hpp>
 #include <esokit/core/unroll.hpp>
+#include <esokit/eigen.hpp>
 
 namespace esokit {
 
@@ -27,13 +27,13 @@ struct LinearSystem {
   static constexpr int outputs = Outputs;  ///< length of out
 
   /// A, or A - I where sampled.
-  Matrix<double, States, States> a = Matrix<double, States, States>::Zero();
+  EigenMatrix<double, States, States> a = EigenMatrix<double, States, States>::Zero();
   /// From w to D x.
-  Matrix<double, States, Inputs> b = Matrix<double, States, Inputs>::Zero();
+  EigenMatrix<double, States, Inputs> b = EigenMatrix<double, States, Inputs>::Zero();
   /// From x to out.
-  Matrix<double, Outputs, States> c = Matrix<double, Outputs, States>::Zero();
+  EigenMatrix<double, Outputs, States> c = EigenMatrix<double, Outputs, States>::Zero();
   /// From w to out directly.
-  Matrix<double, Outputs, Inputs> d = Matrix<double, Outputs, Inputs>::Zero();
+  EigenMatrix<double, Outputs, Inputs> d = EigenMatrix<double, Outputs, Inputs>::Zero();
   double sample_time = 0.0;                    ///< T, s; 0 for a continuous system
   Array<const char*, Inputs> input_names{};    ///< static storage
   Array<const char*, Outputs> output_names{};  ///< static storage
@@ -42,9 +42,9 @@ struct LinearSystem {
   [[nodiscard]] bool sampled() const noexcept { return sample_time > 0.0; }
 
   /// A of x' = A x or of x[k+1] = A x[k], States x States.
-  [[nodiscard]] Matrix<double, States, States> state_matrix() const {
+  [[nodiscard]] EigenMatrix<double, States, States> state_matrix() const {
     if (!sampled()) return a;
-    return a + Matrix<double, States, States>::Identity();
+    return a + EigenMatrix<double, States, States>::Identity();
   }
 
   /// The system from one input to one output.

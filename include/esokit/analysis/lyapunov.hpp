@@ -116,12 +116,11 @@ inline double lyapunov_residual(const double* a, const double* q, const double* 
 /// @param a A, or A - I for a sampled system, as LinearSystem keeps it @param q symmetric
 /// @return error if A is not stable, or the residual is above 1e-11 of its terms
 template <int N>
-Expected<Matrix<double, N, N>, Error<double>> solve_lyapunov(const Matrix<double, N, N>& a,
-                                                             const Matrix<double, N, N>& q,
-                                                             bool sampled) {
-  Matrix<double, N, N> p;
-  Matrix<double, N, N> residual;
-  Matrix<double, N, N> correction;
+Expected<EigenMatrix<double, N, N>, Error<double>> solve_lyapunov(
+    const EigenMatrix<double, N, N>& a, const EigenMatrix<double, N, N>& q, bool sampled) {
+  EigenMatrix<double, N, N> p;
+  EigenMatrix<double, N, N> residual;
+  EigenMatrix<double, N, N> correction;
   Array<double, 3 * N * N> work;
   if (!detail::solve_lyapunov_once(a.data(), q.data(), p.data(), work.data(), N, sampled)) {
     return Error<double>{"system", 0.0, "is not stable: the stationary covariance does not exist"};

@@ -13,9 +13,9 @@ namespace esokit {
 /// P with A'P + P A <= -I, and its extreme eigenvalues.
 template <int Size>
 struct LyapunovMatrix {
-  Matrix<double, Size, Size> p;  ///< N x N, symmetric
-  double smallest = 0.0;         ///< least eigenvalue of P, above 0
-  double largest = 0.0;          ///< largest eigenvalue of P
+  EigenMatrix<double, Size, Size> p;  ///< N x N, symmetric
+  double smallest = 0.0;              ///< least eigenvalue of P, above 0
+  double largest = 0.0;               ///< largest eigenvalue of P
 
   /// gamma = sqrt(largest / smallest).
   [[nodiscard]] double gamma() const { return std::sqrt(largest / smallest); }
@@ -27,12 +27,12 @@ namespace detail {
 template <int Size>
 struct Extremes {
   double smallest, largest;
-  Vector<double, Size> at_smallest, at_largest;
+  EigenMatrix<double, Size> at_smallest, at_largest;
 };
 
 template <int Size>
-Extremes<Size> extremes(Matrix<double, Size, Size> a) {
-  Matrix<double, Size, Size> v;
+Extremes<Size> extremes(EigenMatrix<double, Size, Size> a) {
+  EigenMatrix<double, Size, Size> v;
   symmetric_eigenvalues({a.data(), Size}, {v.data(), Size});
   int low = 0;
   int high = 0;
@@ -50,7 +50,7 @@ Extremes<Size> extremes(Matrix<double, Size, Size> a) {
 
 template <int Size>
 Expected<LyapunovMatrix<Size>, Error<double>> with_eigenvalues(
-    const Matrix<double, Size, Size>& p) {
+    const EigenMatrix<double, Size, Size>& p) {
   const Extremes<Size> values = extremes<Size>(p);
   const LyapunovMatrix<Size> result{p, values.smallest, values.largest};
   if (!(result.smallest > 0.0)) {
@@ -64,8 +64,8 @@ template <int Size>
 constexpr int triangle = Size*(Size + 1) / 2;
 
 template <int Size>
-Matrix<double, Size, Size> from_triangle(const Array<double, triangle<Size>>& x) {
-  Matrix<double, Size, Size> p;
+EigenMatrix<double, Size, Size> from_triangle(const Array<double, triangle<Size>>& x) {
+  EigenMatrix<double, Size, Size> p;
   std::size_t k = 0;
   for (int j = 0; j < Size; ++j) {
     for (int i = 0; i <= j; ++i, ++k) {
@@ -130,9 +130,10 @@ struct Ellipsoid {
 /// @param a A, N x N, 1/s
 /// @return error if A is not stable
 template <int Size>
-Expected<LyapunovMatrix<Size>, Error<double>> lyapunov_matrix(const Matrix<double, Size, Size>& a) {
-  const Matrix<double, Size, Size> transposed = a.transpose();
-  const Matrix<double, Size, Size> identity = Matrix<double, Size, Size>::Identity();
+Expected<LyapunovMatrix<Size>, Error<double>> lyapunov_matrix(
+    const EigenMatrix<double, Size, Size>& a) {
+  const EigenMatrix<double, Size, Size> transposed = a.transpose();
+  const EigenMatrix<double, Size, Size> identity = EigenMatrix<double, Size, Size>::Identity();
   const auto p = solve_lyapunov<Size>(transposed, identity, false);
   if (!p) return p.error();
   return detail::with_eigenvalues<Size>(*p);
@@ -150,10 +151,10 @@ Expected<LyapunovMatrix<Size>, Error<double>> lyapunov_matrix(const Matrix<doubl
 /// @return error if there is none, with what is left of the inequalities at the end
 template <int Size, std::size_t Modes>
 Expected<LyapunovMatrix<Size>, Error<double>> common_lyapunov_matrix(
-    const std::array<Matrix<double, Size, Size>, Modes>& a, double most = 1e5) {
+    const std::array<EigenMatrix<double, Size, Size>, Modes>& a, double most = 1e5) {
   static_assert(Size >= 2, "esokit: two states or more");
   constexpr int count = detail::triangle<Size>;
-  using Square = Matrix<double, Size, Size>;
+  using Square = EigenMatrix<double, Size, Size>;
   Rules<double> rules;
   for (const Square& mode : a) {
     rules.finite("system", detail::sum_of_magnitudes(mode.data(), Size * Size));
@@ -167,7 +168,8 @@ Expected<LyapunovMatrix<Size>, Error<double>> common_lyapunov_matrix(
     const Square p = detail::from_triangle<Size>(ellipsoid.center);
     // d/dP of left' P right + right' P left
     Array<double, count> gradient{};
-    const auto add = [&](const Vector<double, Size>& left, const Vector<double, Size>& right) {
+    const auto add = [&](const EigenMatrix<double, Size>& left,
+                         const EigenMatrix<double, Size>& right) {
       std::size_t k = 0;
       for (int j = 0; j < Size; ++j) {
         for (int i = 0; i <= j; ++i, ++k) {
@@ -178,7 +180,7 @@ Expected<LyapunovMatrix<Size>, Error<double>> common_lyapunov_matrix(
 
     // The inequality that is violated most: v' (A'P + P A + I) v > 0.
     double excess = -std::numeric_limits<double>::infinity();
-    Vector<double, Size> v = Vector<double, Size>::Zero();
+    EigenMatrix<double, Size> v = EigenMatrix<double, Size>::Zero();
     const Square* violated = &a[0];
     for (const Square& mode : a) {
       Square sum = Square::Identity();
@@ -196,7 +198,7 @@ Expected<LyapunovMatrix<Size>, Error<double>> common_lyapunov_matrix(
     }
     violation = excess;
     if (excess > 0.0) {
-      Vector<double, Size> moved = Vector<double, Size>::Zero();
+      EigenMatrix<double, Size> moved = EigenMatrix<double, Size>::Zero();
       for (int i = 0; i < Size; ++i) {
         for (int k = 0; k < Size; ++k) moved(i) += (*violated)(i, k) * v(k);
       }

@@ -43,12 +43,13 @@ namespace detail {
 /// exp(A t) - I and the integral of exp(A s) B over 0..t.
 template <int N, int Inputs>
 struct Held {
-  Matrix<double, N, N> transition;
-  Matrix<double, N, Inputs> input;
+  EigenMatrix<double, N, N> transition;
+  EigenMatrix<double, N, Inputs> input;
 };
 
 template <int N, int Inputs>
-Held<N, Inputs> hold(const Matrix<double, N, N>& a, const Matrix<double, N, Inputs>& b, double t) {
+Held<N, Inputs> hold(const EigenMatrix<double, N, N>& a, const EigenMatrix<double, N, Inputs>& b,
+                     double t) {
   constexpr int size = N + Inputs;
   Array<double, size * size> stacked{};  // ((a, b), (0, 0)), by columns
   Array<double, 2 * size * size> work;

@@ -55,10 +55,12 @@ struct FrozenObserver {
 /// A continuous gain law held in one mode, for ContinuousObserver. @tparam Size N
 template <int Size>
 struct FrozenGain {
-  Vector<double, Size> value;  ///< l, row i in 1/s^(i+1)
+  EigenMatrix<double, Size> value;  ///< l, row i in 1/s^(i+1)
 
   /// l, whatever the time and the innovation.
-  [[nodiscard]] const Vector<double, Size>& gain(double, double) const noexcept { return value; }
+  [[nodiscard]] const EigenMatrix<double, Size>& gain(double, double) const noexcept {
+    return value;
+  }
 };
 
 namespace detail {
@@ -72,11 +74,11 @@ struct ObserverMatrices {
   static constexpr int order = Order;
   static constexpr int size = Order + Extension;
   static constexpr int states = size * Levels;
-  Matrix<double, states, states> a = Matrix<double, states, states>::Zero();
-  Vector<double, states> by = Vector<double, states>::Zero();
-  Vector<double, states> bu = Vector<double, states>::Zero();
-  Matrix<double, size, states> c = Matrix<double, size, states>::Zero();
-  Vector<double, size> dy = Vector<double, size>::Zero();
+  EigenMatrix<double, states, states> a = EigenMatrix<double, states, states>::Zero();
+  EigenMatrix<double, states> by = EigenMatrix<double, states>::Zero();
+  EigenMatrix<double, states> bu = EigenMatrix<double, states>::Zero();
+  EigenMatrix<double, size, states> c = EigenMatrix<double, size, states>::Zero();
+  EigenMatrix<double, size> dy = EigenMatrix<double, size>::Zero();
   double input_gain = 0.0;
   double sample_time = 0.0;
 };
@@ -98,7 +100,7 @@ MatricesOf<Observer> observer_matrices(const Observer& observer, double = 0.0) {
 
   // Element by element: block expressions of each size would cost seconds to compile.
   // `added`: what a correction adds to the levels, as rows over the predicted states and y.
-  Matrix<double, states, states> added = Matrix<double, states, states>::Zero();
+  EigenMatrix<double, states, states> added = EigenMatrix<double, states, states>::Zero();
   Array<double, states> added_y{};
   Array<double, states> measured{};
   double measured_y = 1.0;

@@ -18,7 +18,7 @@ namespace esokit {
 /// @return error for a system that is not stable, or whose response lasts longer than 1e8 steps or
 ///         is beyond the scalar
 template <int States, int Inputs, int Outputs>
-Expected<Matrix<double, Outputs, Inputs>, Error<double>> peak_gain(
+Expected<EigenMatrix<double, Outputs, Inputs>, Error<double>> peak_gain(
     const LinearSystem<States, Inputs, Outputs>& system) {
   if (auto ok = detail::check_system(system); !ok) return ok.error();
   const double abscissa = stability_abscissa(system);
@@ -26,7 +26,7 @@ Expected<Matrix<double, Outputs, Inputs>, Error<double>> peak_gain(
     return Error<double>{"stability_abscissa", abscissa, "must be negative: it is not stable"};
   }
   double step = 1.0;
-  Matrix<double, States, States> advance = system.a;
+  EigenMatrix<double, States, States> advance = system.a;
   if (!system.sampled()) {
     double fastest = 0.0;
     for (const std::complex<double>& p : poles(system)) fastest = std::max(fastest, std::abs(p));
@@ -36,10 +36,10 @@ Expected<Matrix<double, Outputs, Inputs>, Error<double>> peak_gain(
     detail::exp_minus_identity(advance.data(), work.data(), States);
   }
 
-  Matrix<double, Outputs, Inputs> peak;
+  EigenMatrix<double, Outputs, Inputs> peak;
   for (int input = 0; input < Inputs; ++input) {
     for (int r = 0; r < Outputs; ++r) peak(r, input) = std::abs(system.d(r, input));
-    Vector<double, States> x;
+    EigenMatrix<double, States> x;
     for (int i = 0; i < States; ++i) x(i) = system.b(i, input);
     long k = 0;
     for (;; ++k) {
@@ -62,7 +62,7 @@ Expected<Matrix<double, Outputs, Inputs>, Error<double>> peak_gain(
       if (k > 100'000'000L) {
         return Error<double>{"stability_abscissa", abscissa, "is too slow for the sum to end"};
       }
-      Vector<double, States> next;
+      EigenMatrix<double, States> next;
       for (int i = 0; i < States; ++i) {
         double sum = x(i);
         for (int j = 0; j < States; ++j) sum += advance(i, j) * x(j);

@@ -14,13 +14,14 @@ namespace esokit {
 /// Poles: eigenvalues of A for a continuous system (1/s); for a sampled one z - 1, which keeps the
 /// digits of slow poles. N poles in one place come out spread by about eps^(1/N) of their size.
 template <int States, int Inputs, int Outputs>
-Vector<std::complex<double>, States> poles(const LinearSystem<States, Inputs, Outputs>& system) {
+EigenMatrix<std::complex<double>, States> poles(
+    const LinearSystem<States, Inputs, Outputs>& system) {
   using Complex = std::complex<double>;
-  Matrix<Complex, States, States> work;
+  EigenMatrix<Complex, States, States> work;
   for (int j = 0; j < States; ++j) {
     for (int i = 0; i < States; ++i) work(i, j) = system.a(i, j);
   }
-  Vector<Complex, States> values;
+  EigenMatrix<Complex, States> values;
   if (!detail::eigenvalues({work.data(), States}, values.data())) {
     values.setConstant(std::numeric_limits<double>::quiet_NaN());
   }

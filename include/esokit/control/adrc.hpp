@@ -105,15 +105,15 @@ class Adrc {
   /// With a reference that moves. @param reference (r, r', ..), any number up to n + 1 of them; the
   /// rest counts as zero. A tracking differentiator gives such a vector. The error-based form uses
   /// r alone.
-  template <int Count>
-  S update(S y, const Vector<S, Count>& reference) noexcept {
+  template <detail::VectorOf<S> Given>
+  S update(S y, const Given& reference) noexcept {
     const Reference r = filled(reference);
     return loop_.step(measured(y, r(0)), [&] { return command(r); });
   }
 
   /// Both: a reference that moves, and what the actuator held since the last sample.
-  template <int Count>
-  S update(S y, const Vector<S, Count>& reference, S u_applied) noexcept {
+  template <detail::VectorOf<S> Given>
+  S update(S y, const Given& reference, S u_applied) noexcept {
     const Reference r = filled(reference);
     return loop_.step(measured(y, r(0)), u_applied, [&] { return command(r); });
   }
@@ -140,8 +140,8 @@ class Adrc {
   }
 
   /// The same with a reference that moves.
-  template <int Count>
-  S update_without_measurement(const Vector<S, Count>& reference) noexcept {
+  template <detail::VectorOf<S> Given>
+  S update_without_measurement(const Given& reference) noexcept {
     const Reference r = filled(reference);
     return loop_.step_without_measurement([&] { return command(r); });
   }
@@ -267,8 +267,10 @@ class Adrc {
     }
   }
 
-  template <int Count>
-  static Reference filled(const Vector<S, Count>& reference) noexcept {
+  template <class Given>
+  static Reference filled(const Given& given) noexcept {
+    constexpr int Count = detail::vector_size<Given>;
+    const Vector<S, Count>& reference = given;
     static_assert(Count >= 1 && Count <= order + 1, "esokit: the reference is (r, r', .., r^(n))");
     Reference all = Reference::Zero();
     for (int i = 0; i < Count; ++i) all(i) = reference(i);

@@ -94,11 +94,13 @@ class AdrcLaw {
   }
 
   /// v = r^(n) + sum_i k_i (r^(i) - yhat^(i)), unit of y^(n).
-  /// @param estimate (y, .., y^(n-1), ..), at least n x 1
+  /// @param given (y, .., y^(n-1), ..), at least n x 1
   /// @param reference (r, r', .., r^(n)), n + 1 x 1
-  template <int Size>
-  [[nodiscard]] S feedback(const Vector<S, Size>& estimate,
+  template <detail::VectorOf<S> Estimate>
+  [[nodiscard]] S feedback(const Estimate& given,
                            const Vector<S, Order + 1>& reference) const noexcept {
+    constexpr int Size = detail::vector_size<Estimate>;
+    const Vector<S, Size>& estimate = given;
     static_assert(Size >= Order, "esokit: the estimate must hold the plant states");
     S v = reference(Order);
     for (int i = 0; i < Order; ++i) {
@@ -108,28 +110,32 @@ class AdrcLaw {
   }
 
   /// Output-based form: u = (v - dhat) / b0.
-  /// @param estimate (y, .., y^(n-1), d, ..) of an observer with input gain b0
+  /// @param given (y, .., y^(n-1), d, ..) of an observer with input gain b0
   /// @param reference (r, r', .., r^(n)), n + 1 x 1
-  template <int Size>
-  [[nodiscard]] S control(const Vector<S, Size>& estimate,
+  template <detail::VectorOf<S> Estimate>
+  [[nodiscard]] S control(const Estimate& given,
                           const Vector<S, Order + 1>& reference) const noexcept {
+    constexpr int Size = detail::vector_size<Estimate>;
+    const Vector<S, Size>& estimate = given;
     static_assert(Size > Order, "esokit: the estimate must hold the disturbance");
     return (feedback(estimate, reference) - estimate(Order)) * inverse_input_gain_;
   }
 
   /// Output-based form for a reference without derivatives, r' = .. = r^(n) = 0.
-  template <int Size>
-  [[nodiscard]] S control(const Vector<S, Size>& estimate, const S& reference) const noexcept {
+  template <detail::VectorOf<S> Estimate>
+  [[nodiscard]] S control(const Estimate& given, const S& reference) const noexcept {
     Vector<S, Order + 1> all = Vector<S, Order + 1>::Zero();
     all(0) = reference;
-    return control(estimate, all);
+    return control(given, all);
   }
 
   /// Error-based form: u = (dhat + sum_i k_i ehat^(i)) / b0; no reference derivative is needed.
-  /// @param estimate (e, .., e^(n-1), d, ..) of an observer that is fed e = y_d - y as measurement
+  /// @param given (e, .., e^(n-1), d, ..) of an observer that is fed e = y_d - y as measurement
   ///        and has the input gain -b0
-  template <int Size>
-  [[nodiscard]] S control_error_based(const Vector<S, Size>& estimate) const noexcept {
+  template <detail::VectorOf<S> Estimate>
+  [[nodiscard]] S control_error_based(const Estimate& given) const noexcept {
+    constexpr int Size = detail::vector_size<Estimate>;
+    const Vector<S, Size>& estimate = given;
     static_assert(Size > Order, "esokit: the estimate must hold the disturbance");
     S v = estimate(Order);
     for (int i = 0; i < Order; ++i) v = v + gains_[static_cast<std::size_t>(i)] * estimate(i);

@@ -214,21 +214,20 @@ class MimoAdrc {
     Output columns;
     const auto scale_of = [](const S& largest) { return largest > S(0) ? S(1) / largest : S(1); };
     for (int i = 0; i < channels; ++i) {
-      rows(i) = scale_of(scaled.row(i).cwiseAbs().maxCoeff());
-      scaled.row(i) *= rows(i);
+      rows(i) = scale_of(detail::largest_magnitude(scaled.row(i)));
+      for (int j = 0; j < channels; ++j) scaled(i, j) *= rows(i);
     }
     for (int i = 0; i < channels; ++i) {
-      columns(i) = scale_of(scaled.col(i).cwiseAbs().maxCoeff());
-      scaled.col(i) *= columns(i);
+      columns(i) = scale_of(detail::largest_magnitude(scaled.col(i)));
+      for (int j = 0; j < channels; ++j) scaled(j, i) *= columns(i);
     }
     // A zero pivot makes the inverse infinite or NaN, and so its condition number.
     InputMatrix inverse = InputMatrix::Identity();
     InputMatrix eliminated = scaled;
     detail::solve_in_place(detail::DenseView<S>{eliminated.data(), channels},
                            detail::DenseView<S>{inverse.data(), channels});
-    S condition = scaled.cwiseAbs().colwise().sum().maxCoeff() *
-                  inverse.cwiseAbs().colwise().sum().maxCoeff();
-    if (!is_finite(S(inverse.sum())) || !is_finite(condition)) {
+    S condition = column_norm(scaled) * column_norm(inverse);
+    if (!is_finite(inverse.sum()) || !is_finite(condition)) {
       condition = std::numeric_limits<S>::infinity();
     }
     if (!is_finite(condition) || condition > config.condition_limit) {
@@ -239,7 +238,21 @@ class MimoAdrc {
                       config.condition_limit,
                       true};
     }
-    return InputMatrix(columns.asDiagonal() * inverse * rows.asDiagonal());
+    for (int i = 0; i < channels; ++i) {
+      for (int j = 0; j < channels; ++j) inverse(i, j) = columns(i) * inverse(i, j) * rows(j);
+    }
+    return inverse;
+  }
+
+  /// The largest sum of the magnitudes in a column.
+  static S column_norm(const InputMatrix& matrix) noexcept {
+    S norm(0);
+    for (int j = 0; j < channels; ++j) {
+      S sum(0);
+      for (int i = 0; i < channels; ++i) sum += detail::magnitude(matrix(i, j));
+      norm = detail::larger(norm, sum);
+    }
+    return norm;
   }
 
   template <std::size_t... I>

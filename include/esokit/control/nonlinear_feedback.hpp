@@ -55,11 +55,13 @@ class NonlinearFeedback {
   }
 
   /// v = sum_i k_i fal(r_i - z_i), unit of y^(n).
-  /// @param estimate (y, .., y^(n-1), ..), at least n x 1
+  /// @param given (y, .., y^(n-1), ..), at least n x 1
   /// @param reference (r, .., r^(n-1)), n x 1, e.g. of a TrackingDifferentiator
-  template <int Size>
-  [[nodiscard]] S feedback(const Vector<S, Size>& estimate,
+  template <detail::VectorOf<S> Estimate>
+  [[nodiscard]] S feedback(const Estimate& given,
                            const Vector<S, Order>& reference) const noexcept {
+    constexpr int Size = detail::vector_size<Estimate>;
+    const Vector<S, Size>& estimate = given;
     static_assert(Size >= Order, "esokit: the estimate must hold the plant states");
     S v(0.0);
     for (int i = 0; i < Order; ++i) {
@@ -74,11 +76,12 @@ class NonlinearFeedback {
   }
 
   /// u = (v - dhat) / b0.
-  /// @param estimate (y, .., y^(n-1), d, ..) of an observer with input gain b0
+  /// @param given (y, .., y^(n-1), d, ..) of an observer with input gain b0
   /// @param reference (r, .., r^(n-1)), n x 1
-  template <int Size>
-  [[nodiscard]] S control(const Vector<S, Size>& estimate,
-                          const Vector<S, Order>& reference) const noexcept {
+  template <detail::VectorOf<S> Estimate>
+  [[nodiscard]] S control(const Estimate& given, const Vector<S, Order>& reference) const noexcept {
+    constexpr int Size = detail::vector_size<Estimate>;
+    const Vector<S, Size>& estimate = given;
     static_assert(Size > Order, "esokit: the estimate must hold the disturbance");
     const S v = feedback(estimate, reference);
     const S& d = estimate(Order);

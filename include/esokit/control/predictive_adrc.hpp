@@ -119,8 +119,8 @@ class PredictiveAdrc {
 
   /// Second phase. @param next_reference (r, r', ..) of the next sample, up to n + 1 of them, the
   /// rest counts as zero
-  template <int Count>
-  StepStatus prepare(const Vector<S, Count>& next_reference) noexcept {
+  template <detail::VectorOf<S> Given>
+  StepStatus prepare(const Given& next_reference) noexcept {
     StepStatus status = StepStatus::ok;
     if (phase_ == Phase::measured) status |= observer_.correct(measurement_);
     limiter_.track(output_);
@@ -159,9 +159,11 @@ class PredictiveAdrc {
     set_reference(reference);
   }
 
-  /// The same with its derivatives. @param next_reference as in `prepare`
-  template <int Count>
-  void set_reference(const Vector<S, Count>& next_reference) noexcept {
+  /// The same with its derivatives. @param given as in `prepare`
+  template <detail::VectorOf<S> Given>
+  void set_reference(const Given& given) noexcept {
+    constexpr int Count = detail::vector_size<Given>;
+    const Vector<S, Count>& next_reference = given;
     static_assert(Count >= 1 && Count <= order + 1, "esokit: the reference is (r, r', .., r^(n))");
     for (int i = 0; i <= order; ++i) {
       reference_[static_cast<std::size_t>(i)] = i < Count ? S(next_reference(i)) : S(0.0);

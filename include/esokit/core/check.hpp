@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <esokit/core/error.hpp>
 #include <esokit/core/expected.hpp>
+#include <esokit/core/matrix.hpp>
 #include <esokit/core/scalar.hpp>
 #include <esokit/core/unroll.hpp>
 #include <limits>
@@ -30,6 +31,28 @@ constexpr S smallest_normal() noexcept {
 template <Scalar S>
 constexpr S magnitude(const S& value) noexcept {
   return select(value < S(0.0), S(-value), value);
+}
+
+/// The larger of two, or the one that is not finite. Without <algorithm>, which takes longer to
+/// compile than a controller.
+template <PlainScalar S>
+constexpr S larger(const S& a, const S& b) noexcept {
+  return is_finite(a) && (!is_finite(b) || a < b) ? b : a;
+}
+
+template <PlainScalar S, int Rows, int Columns>
+constexpr S largest_magnitude(const Matrix<S, Rows, Columns>& matrix) noexcept {
+  S largest(0);
+  for (const S& element : matrix) largest = larger(largest, magnitude(element));
+  return largest;
+}
+
+template <PlainScalar S, int Rows, int Columns>
+constexpr bool all_finite(const Matrix<S, Rows, Columns>& matrix) noexcept {
+  for (const S& element : matrix) {
+    if (!is_finite(element)) return false;
+  }
+  return true;
 }
 
 /// A normal number, neither infinite nor lost in the subnormals.

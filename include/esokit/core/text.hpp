@@ -15,10 +15,10 @@ inline constexpr bool has_text = false;
 
 namespace detail {
 
-/// A stream, or a logger of the user's.
+/// A stream, or a logger of the user's; none of ours is one.
 template <class Stream, class... Values>
-concept WritesText = std::is_class_v<Stream> &&
-    requires(Stream& out, const char* text, const Values&... values) {
+concept WritesText = std::is_class_v<Stream> && !has_text<Stream> &&
+                     requires(Stream & out, const char* text, const Values&... values) {
   out << text;
   (out << ... << values);
 };

@@ -2,7 +2,6 @@
 /// Gains of the continuous observer from the poles of its estimation error.
 #pragma once
 
-#include <complex>
 #include <esokit/core/combinatorics.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/scalar.hpp>
@@ -22,21 +21,6 @@ Vector<S, Size> continuous_gain(const S& bandwidth) {
     gain(i - 1) =
         S(binomial_table<Size, detail::TableScalar<S>>[Size][static_cast<std::size_t>(i)]) * power;
   }
-  return gain;
-}
-
-/// Coefficients of prod_i (s - p_i) below s^N: poles of the error at p_i.
-/// @param poles 1/s; complex ones with their conjugates
-/// @return N x 1, row i in 1/s^i
-template <int Size, PlainScalar S>
-Vector<S, Size> continuous_gain(const Array<std::complex<S>, Size>& poles) {
-  Array<std::complex<S>, Size + 1> coefficients{};
-  coefficients[0] = S(1);
-  for (std::size_t i = 0; i < Size; ++i) {
-    for (std::size_t j = i + 1; j > 0; --j) coefficients[j] -= poles[i] * coefficients[j - 1];
-  }
-  Vector<S, Size> gain;
-  for (int i = 0; i < Size; ++i) gain(i) = coefficients[static_cast<std::size_t>(i) + 1].real();
   return gain;
 }
 

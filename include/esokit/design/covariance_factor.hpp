@@ -31,24 +31,6 @@ ESOKIT_INLINE constexpr void repeat(Function&& f) noexcept {
   }
 }
 
-// Products of small matrices in plain loops: Eigen's expressions cost tenths of a second of compile
-// time for each new combination of sizes, and gain nothing at these sizes.
-
-/// A B.
-template <int Rows, int Inner, int Columns, Scalar S>
-Matrix<S, Rows, Columns> product(const Matrix<S, Rows, Inner>& a,
-                                 const Matrix<S, Inner, Columns>& b) noexcept {
-  Matrix<S, Rows, Columns> result;
-  for (int i = 0; i < Rows; ++i) {
-    for (int j = 0; j < Columns; ++j) {
-      S sum = a(i, 0) * b(0, j);
-      for (int k = 1; k < Inner; ++k) sum = sum + a(i, k) * b(k, j);
-      result(i, j) = sum;
-    }
-  }
-  return result;
-}
-
 /// C + A B' w.
 template <int Rows, int Inner, int Columns, Scalar S>
 Matrix<S, Rows, Columns> plus_product_transposed(Matrix<S, Rows, Columns> c,

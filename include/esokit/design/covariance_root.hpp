@@ -3,7 +3,6 @@
 /// forms by Householder reflections.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <esokit/core/matrix.hpp>
 #include <esokit/design/covariance_factor.hpp>
@@ -21,7 +20,10 @@ void make_lower(Matrix<S, Rows, Columns>& a) noexcept {
   for (int i = 0; i < Rows; ++i) {
     // Scaled by the largest element: squares of small roots would leave float.
     S largest(0);
-    for (int k = i; k < Columns; ++k) largest = (std::max)(largest, detail::magnitude(a(i, k)));
+    for (int k = i; k < Columns; ++k) {
+      const S size = detail::magnitude(a(i, k));
+      largest = largest < size ? size : largest;
+    }
     if (!(largest > S(0))) continue;
     S squares(0);
     for (int k = i; k < Columns; ++k) {
@@ -85,19 +87,23 @@ class CovarianceRoot {
   [[nodiscard]] S largest() const noexcept { return largest(0, Size); }
   /// The same of the rows `begin` to `end` - 1.
   [[nodiscard]] S largest(int begin, int end) const noexcept {
-    return lower_.middleRows(begin, end - begin).cwiseAbs().maxCoeff();
+    S most(0);
+    for (int i = begin; i < end; ++i) most = detail::larger(most, largest_of_row(i));
+    return most;
   }
 
   /// S times a factor.
   void scale(const S& factor) noexcept { lower_ *= factor; }
 
   /// Makes a row of S zero: this element is known for certain, and correlated with nothing.
-  void clear_row(int row) noexcept { lower_.row(row).setZero(); }
+  void clear_row(int row) noexcept {
+    for (int j = 0; j < Size; ++j) lower_(row, j) = S(0);
+  }
 
   /// Every element within a share of the other's, or of its row where it is small.
   [[nodiscard]] bool near(const CovarianceRoot& other, const S& share) const noexcept {
     for (int i = 0; i < Size; ++i) {
-      const S row = other.lower_.row(i).cwiseAbs().maxCoeff();
+      const S row = other.largest_of_row(i);
       for (int j = 0; j <= i; ++j) {
         const S difference = detail::magnitude(S(lower_(i, j) - other.lower_(i, j)));
         const S size = i == j ? other.lower_(i, j) : row;
@@ -110,7 +116,7 @@ class CovarianceRoot {
   /// One sample ahead: P <- growth Phi P Phi' + Q.
   /// @param transition Phi, N x N @param growth > 0 @param noise Q
   void advance(const Square& transition, const S& growth, const CovarianceRoot& noise) noexcept {
-    const Square moved = detail::product<Size, Size, Size, S>(transition, lower_);
+    const Square moved = transition * lower_;
     const S root = std::sqrt(growth);
     Matrix<S, Size, 2 * Size> array;
     for (int i = 0; i < Size; ++i) {
@@ -132,7 +138,7 @@ class CovarianceRoot {
   Matrix<S, Size, Outputs> correct(const Matrix<S, Outputs, Size>& output,
                                    const CovarianceRoot<Outputs, S>& measurement) noexcept {
     constexpr int both = Outputs + Size;
-    const Matrix<S, Outputs, Size> seen = detail::product<Outputs, Size, Size, S>(output, lower_);
+    const Matrix<S, Outputs, Size> seen = output * lower_;
     Matrix<S, both, both> array = Matrix<S, both, both>::Zero();
     for (int i = 0; i < both; ++i) {
       for (int j = 0; j < both; ++j) {
@@ -165,7 +171,11 @@ class CovarianceRoot {
     }
   }
 
-  Square lower_ = Square::Zero();
+  [[nodiscard]] S largest_of_row(int i) const noexcept {
+    return detail::largest_magnitude(lower_.row(i));
+  }
+
+  Square lower_;
 };
 
 }  // namespace esokit

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <cmath>
-#include <complex>
 #include <esokit/core/check.hpp>
 #include <esokit/core/combinatorics.hpp>
 #include <esokit/core/unroll.hpp>
@@ -68,36 +67,13 @@ Array<S, Order> held_input_feedback(const Array<S, Order + 1>& symmetric, const 
 
 }  // namespace detail
 
-/// Gains for the poles `rho_i = 1 - contractions_i` of the sampled loop under a held input.
-/// @param contractions 1 - rho_i; complex ones with their conjugates @param sample_time T, s
-/// @return k_0 .. k_(n-1), k_i in 1/s^(n-i)
-template <int Order, PlainScalar S>
-Array<S, Order> sampled_feedback_gain(const Array<std::complex<S>, Order>& contractions,
-                                      const S& sample_time) {
-  Array<std::complex<S>, Order + 1> product{};
-  product[0] = S(1);
-  for (std::size_t i = 0; i < Order; ++i) {
-    for (std::size_t j = i + 1; j > 0; --j) product[j] += product[j - 1] * contractions[i];
-  }
-  Array<S, Order + 1> symmetric{};
-  for (std::size_t j = 0; j <= Order; ++j) symmetric[j] = product[j].real();
-  return detail::held_input_feedback<Order, S>(symmetric, S(1) / sample_time);
-}
-
 /// Gains for all poles at exp(-omega_c T) under a held input.
 /// @param bandwidth omega_c, rad/s @param sample_time T, s
 /// @return k_0 .. k_(n-1), k_i in 1/s^(n-i)
 template <int Order, Scalar S>
 Array<S, Order> sampled_feedback_gain(const S& bandwidth, const S& sample_time) {
-  const S a = EqualSampledPoles<Order, S>::from_bandwidth(bandwidth, sample_time).contraction;
-  constexpr auto& row = binomial_table<Order, detail::TableScalar<S>>[Order];
-  Array<S, Order + 1> symmetric{};
-  S power(1.0);
-  for (int j = 0; j <= Order; ++j) {
-    symmetric[static_cast<std::size_t>(j)] = S(row[static_cast<std::size_t>(j)]) * power;
-    power = power * a;
-  }
-  return detail::held_input_feedback<Order, S>(symmetric, S(S(1.0) / sample_time));
+  const auto poles = EqualSampledPoles<Order, S>::from_bandwidth(bandwidth, sample_time);
+  return detail::held_input_feedback<Order, S>(poles.symmetric(), S(S(1.0) / sample_time));
 }
 
 /// Gains for a spec. @param sample_time T, s; matters in the sampled domain only
@@ -116,9 +92,8 @@ Expected<Array<S, Order>, Error<S>> feedback_gain(const FeedbackSpec<S>& spec,
       gain[static_cast<std::size_t>(i)] = share * coefficients(Order - 1 - i);
     }
   } else if (spec.half_gain) {
-    const auto poles = half_gain_poles<Order, S>(spec.bandwidth);
-    gain = sampled_feedback_gain<Order, S>(
-        SampledPoleSet<Order, S>::from_continuous(poles, sample_time).contractions, sample_time);
+    const auto poles = HalfGainPoles::sample<Order, S>(spec.bandwidth, sample_time);
+    gain = detail::held_input_feedback<Order, S>(poles.symmetric(), S(1) / sample_time);
   } else {
     gain = sampled_feedback_gain<Order, S>(spec.bandwidth, sample_time);
   }

@@ -39,32 +39,6 @@ struct FilterForm {
 
 namespace detail {
 
-/// prod(delta + a) of equal poles: C(N,j) a^j.
-template <int Size, PlainScalar S>
-Array<S, Size + 1> error_coefficients(const EqualSampledPoles<Size, S>& poles) {
-  Array<S, Size + 1> beta{};
-  S power(1);
-  for (int j = 0; j <= Size; ++j) {
-    beta[static_cast<std::size_t>(j)] =
-        binomial_table<Size, S>[Size][static_cast<std::size_t>(j)] * power;
-    power = power * poles.contraction;
-  }
-  return beta;
-}
-
-/// prod(delta + a_i) of any poles.
-template <int Size, PlainScalar S>
-Array<S, Size + 1> error_coefficients(const SampledPoleSet<Size, S>& poles) {
-  Array<std::complex<S>, Size + 1> product{};
-  product[0] = S(1);
-  for (std::size_t i = 0; i < Size; ++i) {
-    for (std::size_t j = i + 1; j > 0; --j) product[j] += product[j - 1] * poles.contractions[i];
-  }
-  Array<S, Size + 1> beta{};
-  for (std::size_t j = 0; j <= Size; ++j) beta[j] = product[j].real();
-  return beta;
-}
-
 /// Q x, Q_rj = C(j, r) for j > r.
 template <int Size, PlainScalar S>
 Array<S, Size> pascal_step(const Array<S, Size>& x) {
@@ -111,7 +85,7 @@ FilterForm<Size, S> delta_form(const Poles& poles, const Array<S, Order>& gains,
   Row predictor = predictor_gain<Size, S>(weights);
 
   FilterForm<Size, S> form;
-  form.denominator = detail::error_coefficients<Size, S>(poles);
+  form.denominator = poles.symmetric();
   Array<S, Size + 1> nu{};
   Array<S, Size + 1> from_law{};
   Array<S, Size + 1> from_output{};

@@ -39,12 +39,11 @@ constexpr S rounding() noexcept {
 }
 
 /// Largest relative change of the elements that count.
-template <class A, class B>
-typename A::Scalar relative_change(const A& now, const B& before) {
-  using S = typename A::Scalar;
+template <int Rows, int Columns, Scalar S>
+S relative_change(const Matrix<S, Rows, Columns>& now, const Matrix<S, Rows, Columns>& before) {
   S worst(0.0);
-  for (int i = 0; i < now.rows(); ++i) {
-    for (int j = 0; j < now.cols(); ++j) {
+  for (int i = 0; i < Rows; ++i) {
+    for (int j = 0; j < Columns; ++j) {
       const S size = magnitude(now(i, j));
       if (!all(size > S(0.0))) continue;
       const S change = magnitude(S(now(i, j) - before(i, j))) / size;
@@ -85,7 +84,7 @@ template <int Size, Scalar S>
 std::optional<Matrix<S, Size, Size>> solve_stein(Matrix<S, Size, Size> f, Matrix<S, Size, Size> x) {
   constexpr int most_doublings = 64;
   for (int k = 0; k < most_doublings; ++k) {
-    const auto half = product<Size, Size, Size, S>(f, x);
+    const auto half = f * x;
     const auto sum = plus_product_transposed<Size, Size, Size, S>(x, half, f, S(1.0));
     bool done = true;
     for (int i = 0; i < Size; ++i) {
@@ -94,7 +93,7 @@ std::optional<Matrix<S, Size, Size>> solve_stein(Matrix<S, Size, Size> f, Matrix
     }
     x = sum;
     if (done) return x;
-    f = product<Size, Size, Size, S>(f, f);
+    f = f * f;
   }
   return std::nullopt;
 }
@@ -114,17 +113,17 @@ std::optional<Matrix<S, Size, Size>> riccati_covariance(const RiccatiModel<Size,
   Matrix<S, Size, Outputs> gain = start_gain;
   S last_change((std::numeric_limits<detail::TableScalar<S>>::max)());
   for (int step = 0; step < most_steps; ++step) {
-    const auto predictor = detail::product<Size, Size, Outputs, S>(model.transition, gain);
-    auto error = detail::product<Size, Outputs, Size, S>(predictor, model.output);
+    const auto predictor = model.transition * gain;
+    auto error = predictor * model.output;
     for (int i = 0; i < Size; ++i) {
       for (int j = 0; j < Size; ++j) error(i, j) = (model.transition(i, j) - error(i, j)) * root;
     }
-    const auto spread = detail::product<Size, Outputs, Outputs, S>(predictor, model.measurement);
+    const auto spread = predictor * model.measurement;
     const auto covariance =
         detail::solve_stein<Size, S>(error, detail::plus_product_transposed<Size, Outputs, Size, S>(
                                                 model.noise, spread, predictor, model.inflation));
     if (!covariance) return std::nullopt;
-    const auto crossed = detail::product<Outputs, Size, Size, S>(model.output, *covariance);
+    const auto crossed = model.output * *covariance;
     const auto innovation = detail::plus_product_transposed<Outputs, Size, Outputs, S>(
         model.measurement, crossed, model.output, S(1.0));
     const auto next = detail::solve_positive<Outputs, Size, S>(innovation, crossed);

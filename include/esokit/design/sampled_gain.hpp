@@ -14,7 +14,6 @@
 #pragma once
 
 #include <cmath>
-#include <complex>
 #include <esokit/core/combinatorics.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/scalar.hpp>
@@ -85,6 +84,25 @@ ScaledGain<Size, S> scaled_gain(const Vector<S, Size>& gain, const S& sample_tim
   return ScaledChain<Size - 1, S, 1>::scaled(gain, sample_time);
 }
 
+namespace detail {
+
+/// A number of the complex plane, without <complex>.
+template <PlainScalar S>
+struct Contraction {
+  S real{};
+  S imaginary{};
+};
+
+/// 1 - rho of rho = e^(x + j phi).
+template <PlainScalar S>
+Contraction<S> contraction(const S& x, const S& phi) noexcept {
+  // 1 - e^x cos(phi) = -expm1(x) + 2 e^x sin^2(phi/2): no cancellation for small T.
+  const S half_sine = std::sin(phi / 2);
+  return {-std::expm1(x) + 2 * std::exp(x) * half_sine * half_sine, -std::exp(x) * std::sin(phi)};
+}
+
+}  // namespace detail
+
 /// All N poles of the sampled error at rho = exp(-omega_o T), kept as the contraction 1 - rho.
 template <int Size, Scalar S>
 struct EqualSampledPoles {
@@ -108,17 +126,23 @@ struct EqualSampledPoles {
     return {result};
   }
 
-  /// b_0 .. b_N, for `current_gain`.
-  [[nodiscard]] constexpr PoleWeights<Size, S> weights() const noexcept {
+  /// beta_0 .. beta_N of prod_i (delta + a_i) = sum_j beta_j delta^(N-j).
+  [[nodiscard]] constexpr Array<S, Size + 1> symmetric() const noexcept {
     constexpr auto& row = binomial_table<Size, detail::TableScalar<S>>[Size];
-    const S decay = S(1.0) - contraction;
-    PoleWeights<Size, S> weights{};
+    Array<S, Size + 1> beta{};
     S power(1.0);
     for (int j = 0; j <= Size; ++j) {
-      weights[static_cast<std::size_t>(j)] = S(row[static_cast<std::size_t>(j)]) * power;
+      beta[static_cast<std::size_t>(j)] = S(row[static_cast<std::size_t>(j)]) * power;
       power = power * contraction;
     }
-    power = S(1.0);
+    return beta;
+  }
+
+  /// b_0 .. b_N, for `current_gain`.
+  [[nodiscard]] constexpr PoleWeights<Size, S> weights() const noexcept {
+    const S decay = S(1.0) - contraction;
+    PoleWeights<Size, S> weights = symmetric();
+    S power(1.0);
     for (int j = Size; j >= 0; --j) {
       weights[static_cast<std::size_t>(j)] = weights[static_cast<std::size_t>(j)] * power;
       power = power * decay;
@@ -140,65 +164,5 @@ constexpr ScaledGain<Size, S> gap_gain(const Poles& poles, unsigned samples) noe
   }
   return gain;
 }
-
-/// Any set of poles of the sampled error, kept as contractions 1 - rho_i. Complex poles come with
-/// their conjugates.
-template <int Size, PlainScalar S>
-struct SampledPoleSet {
-  Array<std::complex<S>, Size> contractions{};  ///< a_i = 1 - rho_i
-
-  /// From continuous-time poles p_i (1/s): rho_i = exp(p_i T). @param sample_time T, s
-  static SampledPoleSet from_continuous(const Array<std::complex<S>, Size>& poles,
-                                        S sample_time) noexcept {
-    SampledPoleSet set;
-    for (std::size_t i = 0; i < Size; ++i) {
-      // 1 - e^x cos(phi) = -expm1(x) + 2 e^x sin^2(phi/2): no cancellation for small T.
-      const S x = poles[i].real() * sample_time;
-      const S phi = poles[i].imag() * sample_time;
-      const S half_sine = std::sin(phi / 2);
-      set.contractions[i] = {-std::expm1(x) + 2 * std::exp(x) * half_sine * half_sine,
-                             -std::exp(x) * std::sin(phi)};
-    }
-    return set;
-  }
-
-  /// From poles rho_i in the z-plane.
-  static SampledPoleSet from_sampled(const Array<std::complex<S>, Size>& poles) noexcept {
-    SampledPoleSet set;
-    for (std::size_t i = 0; i < Size; ++i) set.contractions[i] = S(1) - poles[i];
-    return set;
-  }
-
-  /// The poles for `samples` sample times in one: rho_i^samples.
-  [[nodiscard]] SampledPoleSet power(unsigned samples) const noexcept {
-    SampledPoleSet set;
-    for (std::size_t i = 0; i < Size; ++i) {
-      std::complex<S> base = contractions[i];
-      std::complex<S> result(0);
-      for (unsigned rest = samples; rest != 0; rest >>= 1u) {
-        if ((rest & 1u) != 0) result += (S(1) - result) * base;
-        base += (S(1) - base) * base;
-      }
-      set.contractions[i] = result;
-    }
-    return set;
-  }
-
-  /// b_0 .. b_N, for `current_gain`.
-  [[nodiscard]] PoleWeights<Size, S> weights() const noexcept {
-    Array<std::complex<S>, Size + 1> product{};
-    product[0] = S(1);
-    for (std::size_t i = 0; i < Size; ++i) {
-      const std::complex<S> decay = S(1) - contractions[i];
-      for (std::size_t j = i + 1; j > 0; --j) {
-        product[j] = product[j] * decay + product[j - 1] * contractions[i];
-      }
-      product[0] *= decay;
-    }
-    PoleWeights<Size, S> weights{};
-    for (std::size_t j = 0; j <= Size; ++j) weights[j] = product[j].real();
-    return weights;
-  }
-};
 
 }  // namespace esokit

@@ -81,7 +81,7 @@ struct ScaledChain : ChainSize<Order, Extension> {
   [[nodiscard]] static Estimate physical(const State& x, const ScalarType& rate) noexcept {
     Estimate estimate;
     detail::unroll<size>(
-        [&](auto row) { estimate(Eigen::Index{row}) = physical<row>(std::get<row>(x), rate); });
+        [&](auto row) { estimate(int{row}) = physical<row>(std::get<row>(x), rate); });
     return estimate;
   }
 
@@ -90,7 +90,7 @@ struct ScaledChain : ChainSize<Order, Extension> {
                                     const ScalarType& sample_time) noexcept {
     State x;
     detail::unroll<size>([&](auto row) {
-      ScalarType value = estimate(Eigen::Index{row});
+      ScalarType value = estimate(int{row});
       detail::unroll<row>([&](auto j) ESOKIT_INLINE_LAMBDA {
         constexpr double weight = static_cast<double>(j + 1);
         value = value * (sample_time / detail::constant<ScalarType>(weight));

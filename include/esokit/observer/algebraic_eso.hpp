@@ -187,7 +187,9 @@ class AlgebraicEso
     for (int r = 0; r < Base::size; ++r) published_[static_cast<std::size_t>(r)] = estimate(r);
   }
   [[nodiscard]] Estimate published() const noexcept {
-    return Eigen::Map<const Estimate>(published_.data());
+    Estimate estimate;
+    for (int r = 0; r < Base::size; ++r) estimate(r) = published_[static_cast<std::size_t>(r)];
+    return estimate;
   }
 
   static Expected<std::uint32_t, Error<S>> blanking_samples(const Config& config) {

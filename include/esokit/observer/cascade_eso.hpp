@@ -29,9 +29,10 @@ struct CascadeEsoConfig<Size, Levels, S, EqualPoles> {
 };
 
 /// Settings of CascadeEso by poles.
-template <int Size, int Levels, PlainScalar S>
-struct CascadeEsoConfig<Size, Levels, S, PoleSet> {
-  Array<Array<std::complex<S>, Size>, Levels> level_poles{};  ///< p_i of each level, 1/s
+template <int Size, int Levels, Scalar S, ListsPoles Placement>
+struct CascadeEsoConfig<Size, Levels, S, Placement> {
+  Array<typename Placement::template Spec<Size, S>, Levels>
+      level_poles{};  ///< p_i of each level, 1/s
   S input_gain{};     ///< b0, unit of y^(n) per unit of u; not zero
   S sample_time{};    ///< T, s
   int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts
@@ -52,10 +53,11 @@ struct ContinuousCascadeEsoConfig<Size, Levels, S, EqualPoles> {
 };
 
 /// Settings of ContinuousCascadeEso by poles.
-template <int Size, int Levels, PlainScalar S>
-struct ContinuousCascadeEsoConfig<Size, Levels, S, PoleSet> {
-  Array<Array<std::complex<S>, Size>, Levels> level_poles{};  ///< p_i of each level, 1/s
-  S input_gain{};  ///< b0, unit of y^(n) per unit of u; not zero
+template <int Size, int Levels, Scalar S, ListsPoles Placement>
+struct ContinuousCascadeEsoConfig<Size, Levels, S, Placement> {
+  Array<typename Placement::template Spec<Size, S>, Levels>
+      level_poles{};  ///< p_i of each level, 1/s
+  S input_gain{};     ///< b0, unit of y^(n) per unit of u; not zero
 };
 
 namespace detail {
@@ -72,7 +74,7 @@ template <class Placement, int Size, int Levels, Scalar S, class Config>
 Expected<LevelSpecs<typename Placement::template Spec<Size, S>, Levels>, Error<S>> level_specs(
     const Config& config) {
   using Specs = LevelSpecs<typename Placement::template Spec<Size, S>, Levels>;
-  if constexpr (std::is_same_v<Placement, PoleSet>) {
+  if constexpr (ListsPoles<Placement>) {
     return Specs{config.level_poles, "level_poles"};
   } else {
     Rules<S> rules;
@@ -134,7 +136,8 @@ Expected<Array<Law, Levels>, Error<S>> level_laws(const Config& config, MakeLaw&
 /// measurement and give -b0 as input_gain.
 ///
 /// @tparam Order n @tparam Levels p @tparam S scalar @tparam Extension m
-/// @tparam Placement EqualPoles (config by bandwidths) or PoleSet (config by level_poles)
+/// @tparam Placement EqualPoles (config by bandwidths) or PoleSet (config by level_poles;
+/// design/pole_set.hpp)
 template <int Order, int Levels, Scalar S = double, int Extension = 1, class Placement = EqualPoles>
 class CascadeEso
     : public PredictorCorrector<Order, S, Extension, ConstantGain<Order + Extension, S, Placement>,
@@ -175,7 +178,8 @@ inline constexpr std::uint32_t type_tag<CascadeEso<Order, Levels, S, Extension, 
 
 /// CascadeEso as an ODE, equations (23), (24), for simulation.
 /// @tparam Order n @tparam Levels p @tparam S scalar @tparam Extension m
-/// @tparam Placement EqualPoles (config by bandwidths) or PoleSet (config by level_poles)
+/// @tparam Placement EqualPoles (config by bandwidths) or PoleSet (config by level_poles;
+/// design/pole_set.hpp)
 template <int Order, int Levels, Scalar S = double, int Extension = 1, class Placement = EqualPoles>
 class ContinuousCascadeEso
     : public ContinuousObserver<Order, S, Extension,

@@ -75,9 +75,9 @@ class ContinuousObserver {
   /// (y, .., y^(n-1), d, .., d^(m-1)): plant states of the last level, disturbance of all levels
   /// together, equation (24) of the cascade paper.
   [[nodiscard]] static Estimate estimate(const State& z) {
-    Estimate estimate = z.template tail<size>();
+    Estimate estimate = z.template segment<size>(states - size);
     for (int level = 0; level + 1 < Levels; ++level) {
-      estimate.template tail<Extension>() += z.template segment<Extension>(level * size + Order);
+      for (int i = Order; i < size; ++i) estimate(i) = estimate(i) + z(level * size + i);
     }
     return estimate;
   }
@@ -91,9 +91,10 @@ class ContinuousObserver {
 
   /// State with every level at the given estimate; the first level holds the disturbance.
   [[nodiscard]] static State state_at(const Estimate& estimate) {
-    State state = estimate.template replicate<Levels, 1>();
-    for (int level = 1; level < Levels; ++level) {
-      state.template segment<Extension>(level * size + Order).setZero();
+    State state;
+    for (int level = 0; level < Levels; ++level) {
+      const int given = level == 0 ? size : Order;
+      for (int i = 0; i < given; ++i) state(level * size + i) = estimate(i);
     }
     return state;
   }

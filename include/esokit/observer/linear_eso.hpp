@@ -29,17 +29,19 @@ struct LinearEsoConfig<Size, S, EqualPoles> {
 };
 
 /// Settings of LinearEso by poles.
-template <int Size, PlainScalar S>
-struct LinearEsoConfig<Size, S, PoleSet> {
-  Array<std::complex<S>, Size> poles{};  ///< p_i, 1/s, left half plane, in conjugate pairs
-  S input_gain{};                        ///< b0, unit of y^(n) per unit of u; not zero
-  S sample_time{};                       ///< T, s
+template <int Size, Scalar S, ListsPoles Placement>
+struct LinearEsoConfig<Size, S, Placement> {
+  using Poles = typename Placement::template Spec<Size, S>;  ///< one a row of the gain
+
+  Poles poles{};      ///< p_i, 1/s, left half plane, in conjugate pairs
+  S input_gain{};     ///< b0, unit of y^(n) per unit of u; not zero
+  S sample_time{};    ///< T, s
   int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts
 
   /// Name of what the poles are placed by, for errors.
   static constexpr const char* placement_field = "poles";
   /// What the poles are placed by.
-  [[nodiscard]] const Array<std::complex<S>, Size>& placement() const noexcept { return poles; }
+  [[nodiscard]] const Poles& placement() const noexcept { return poles; }
 };
 
 /// Linear extended state observer of a plant y^(n) = d + b0 u, sampled exactly.
@@ -49,7 +51,8 @@ struct LinearEsoConfig<Size, S, PoleSet> {
 /// Error-based use: feed e = y_d - y as the measurement and give -b0 as input_gain.
 ///
 /// @tparam Order n @tparam S scalar @tparam Extension m; n + m <= 16, tested for n to 8 and m to 4
-/// @tparam Placement EqualPoles (config by observer_bandwidth) or PoleSet (config by poles)
+/// @tparam Placement EqualPoles (config by observer_bandwidth) or PoleSet (config by poles;
+/// design/pole_set.hpp)
 template <int Order, Scalar S = double, int Extension = 1, class Placement = EqualPoles>
 class LinearEso : public PredictorCorrector<Order, S, Extension,
                                             ConstantGain<Order + Extension, S, Placement>> {
@@ -100,20 +103,23 @@ struct ContinuousLinearEsoConfig<Size, S, EqualPoles> {
 };
 
 /// Settings of ContinuousLinearEso by poles.
-template <int Size, PlainScalar S>
-struct ContinuousLinearEsoConfig<Size, S, PoleSet> {
-  Array<std::complex<S>, Size> poles{};  ///< p_i, 1/s, left half plane, in conjugate pairs
-  S input_gain{};                        ///< b0, unit of y^(n) per unit of u; not zero
+template <int Size, Scalar S, ListsPoles Placement>
+struct ContinuousLinearEsoConfig<Size, S, Placement> {
+  using Poles = typename Placement::template Spec<Size, S>;  ///< one a row of the gain
+
+  Poles poles{};   ///< p_i, 1/s, left half plane, in conjugate pairs
+  S input_gain{};  ///< b0, unit of y^(n) per unit of u; not zero
 
   /// Name of what the poles are placed by, for errors.
   static constexpr const char* placement_field = "poles";
   /// What the poles are placed by.
-  [[nodiscard]] const Array<std::complex<S>, Size>& placement() const noexcept { return poles; }
+  [[nodiscard]] const Poles& placement() const noexcept { return poles; }
 };
 
 /// LinearEso as an ODE, z' = A z + B u + l (y - z_1), for simulation.
 /// @tparam Order n @tparam S scalar @tparam Extension m
-/// @tparam Placement EqualPoles (config by observer_bandwidth) or PoleSet (config by poles)
+/// @tparam Placement EqualPoles (config by observer_bandwidth) or PoleSet (config by poles;
+/// design/pole_set.hpp)
 template <int Order, Scalar S = double, int Extension = 1, class Placement = EqualPoles>
 class ContinuousLinearEso
     : public ContinuousObserver<Order, S, Extension,

@@ -206,7 +206,7 @@ class MimoExtendedStateFilter {
         prepare(used);
         changed = true;
       }
-      const Estimate next = state_ + detail::product<size, outputs, 1, S>(gain_, e);
+      const Estimate next = state_ + gain_ * e;
       if (finite(next)) {
         state_ = next;
         innovation_ = e;
@@ -242,10 +242,11 @@ class MimoExtendedStateFilter {
 
   /// Starts anew at a given estimate, N x 1, physical units, with P0.
   StepStatus reset(const Estimate& state) noexcept {
-    const Estimate next = state.cwiseProduct(units_);
+    Estimate next;
+    for (int r = 0; r < size; ++r) next(r) = state(r) * units_(r);
     if (!finite(next)) return StepStatus::state_rejected;
     state_ = next;
-    innovation_.setZero();
+    innovation_ = Output::Zero();
     missed_.fill(0);
     restart();
     return StepStatus::ok;
@@ -256,13 +257,17 @@ class MimoExtendedStateFilter {
   [[nodiscard]] int missed(int channel) const noexcept { return missed_[index(channel)]; }
 
   /// All estimates, N x 1, physical units.
-  [[nodiscard]] Estimate estimate() const noexcept { return state_.cwiseQuotient(units_); }
+  [[nodiscard]] Estimate estimate() const noexcept {
+    Estimate z;
+    for (int r = 0; r < size; ++r) z(r) = state_(r) / units_(r);
+    return z;
+  }
 
   /// Estimates of chain i, (n_i + m) x 1.
   template <int I>
   [[nodiscard]] auto chain_estimate() const noexcept {
     constexpr int length = Orders::values[I] + Extension;
-    return Vector<S, length>(estimate().template segment<length>(first(I)));
+    return estimate().template segment<length>(first(I));
   }
 
   /// d_1 .. d_p, unit of y_i^(n_i).
@@ -286,7 +291,7 @@ class MimoExtendedStateFilter {
   /// e' (C P- C' + R)^-1 e of the last correction: about p on average where R, Q and P0 are right;
   /// the largest number where it is beyond the scalar.
   [[nodiscard]] S normalised_innovation() const noexcept {
-    const S largest = innovation_.cwiseAbs().maxCoeff();
+    const S largest = detail::largest_magnitude(innovation_);
     if (!(largest > S(0))) return S(0);
     const Output e = innovation_ / largest;
     const auto weighted = detail::solve_positive<outputs, 1, S>(seen_covariance(), e);
@@ -300,22 +305,28 @@ class MimoExtendedStateFilter {
     if (corrected_) {
       // (I - K C) P- (I - K C)' + K R K' with R, not R / (1 + theta).
       Covariance rest = Covariance::Identity();
-      for (int i = 0; i < outputs; ++i) rest.col(first(i)) -= gain_.col(i);
-      const auto spread =
-          detail::product<size, outputs, outputs, S>(gain_, used_measurement_.lower());
+      for (int i = 0; i < outputs; ++i) {
+        for (int r = 0; r < size; ++r) rest(r, first(i)) -= gain_(r, i);
+      }
+      const auto spread = gain_ * used_measurement_.lower();
       const auto noise = detail::plus_product_transposed<size, outputs, size, S>(
           Covariance::Zero(), spread, spread, S(1));
-      p = detail::plus_product_transposed<size, size, size, S>(
-          noise, detail::product<size, size, size, S>(rest, p), rest, S(1));
+      p = detail::plus_product_transposed<size, size, size, S>(noise, rest * p, rest, S(1));
     }
-    const Estimate inverse = root_units_.cwiseInverse();
-    p = scaled(p, inverse);
+    p = scaled(p, inverse(root_units_));
     for (int i = 0; i < p.size(); ++i) p.data()[i] = detail::clipped(p.data()[i]);
     return p;
   }
 
   /// Gain of the coming correction (all channels present), N x p, physical units.
-  [[nodiscard]] Gain gain() const noexcept { return units_.cwiseInverse().asDiagonal() * gain_; }
+  [[nodiscard]] Gain gain() const noexcept {
+    const Estimate rate = inverse(units_);
+    Gain gain = gain_;
+    for (int r = 0; r < size; ++r) {
+      for (int i = 0; i < outputs; ++i) gain(r, i) = rate(r) * gain(r, i);
+    }
+    return gain;
+  }
 
   /// True while the recursion rests in the frozen mode.
   [[nodiscard]] bool frozen() const noexcept { return standing_; }
@@ -345,22 +356,25 @@ class MimoExtendedStateFilter {
   /// @param noise Q, inflated
   MimoExtendedStateFilter(const Config& config, const Covariance& noise) noexcept
       : sample_time_(config.sample_time), max_gap_(config.max_gap) {
-    drive_.setZero();
     for (int chain = 0; chain < outputs; ++chain) {
       S unit(1);
       for (int r = 0; r < order_of(chain) + Extension; ++r) {
         if (r > 0) unit = unit * sample_time_ / static_cast<S>(r);
         units_(first(chain) + r) = unit;
         // Scaled effect of the inputs where the disturbance acts.
-        if (r == order_of(chain)) drive_.row(chain) = config.input_matrix.row(chain) * unit;
+        if (r != order_of(chain)) continue;
+        for (int j = 0; j < Inputs; ++j) drive_(chain, j) = config.input_matrix(chain, j) * unit;
       }
     }
     if (config.inflation_rule == InflationRule::fixed) growth_ = S(1) + config.inflation;
     // The unit of all variances: the largest of R, or without noise the largest there is.
-    S unit = config.measurement_covariance.diagonal().maxCoeff();
+    S unit = config.measurement_covariance(0, 0);
+    for (int i = 1; i < outputs; ++i) {
+      unit = detail::larger(unit, config.measurement_covariance(i, i));
+    }
     for (int i = 0; i < size && !(config.measurement_covariance.trace() > S(0)); ++i) {
       for (const S& variance : {noise(i, i), config.initial_covariance(i, i)}) {
-        unit = (std::max)(unit, S((variance * units_(i)) * units_(i)));
+        unit = detail::larger(unit, S((variance * units_(i)) * units_(i)));
       }
     }
     if (unit > S(0)) unit_ = unit;
@@ -390,8 +404,7 @@ class MimoExtendedStateFilter {
       bool driven = false;
       for (int r = first(chain); r < end(chain); ++r) driven = driven || noise(r, r) > S(0);
       if (!driven) continue;
-      exact.row(chain).setZero();
-      exact.col(chain).setZero();
+      for (int j = 0; j < outputs; ++j) exact(chain, j) = exact(j, chain) = S(0);
       exact(chain, chain) = S(1);
     }
     if (!positive(exact)) {
@@ -421,8 +434,10 @@ class MimoExtendedStateFilter {
     Check<S> ok{};
     detail::unroll<outputs>([&](auto chain) {
       constexpr int length = Orders::values[chain] + Extension;
-      const Matrix<S, length, length> own =
-          q.template block<length, length>(first(chain), first(chain));
+      Matrix<S, length, length> own;
+      for (int i = 0; i < length; ++i) {
+        for (int j = 0; j < length; ++j) own(i, j) = q(first(chain) + i, first(chain) + j);
+      }
       const S least =
           least_measurement_variance<length, S>(CovarianceFactor<length, S>::nearest(own));
       const S& r = config.measurement_covariance(int{chain}, int{chain});
@@ -446,6 +461,12 @@ class MimoExtendedStateFilter {
       for (int j = 0; j < outputs; ++j) s(i, j) += p(first(i), first(j));
     }
     return s;
+  }
+
+  static Estimate inverse(const Estimate& units) noexcept {
+    Estimate result;
+    for (int r = 0; r < size; ++r) result(r) = S(1) / units(r);
+    return result;
   }
 
   /// Scaled states, and the estimates in physical units.
@@ -476,7 +497,7 @@ class MimoExtendedStateFilter {
   [[nodiscard]] bool fits() const {
     MimoExtendedStateFilter run = *this;
     for (int k = 0; k < 8 * size; ++k) {
-      if (!run.gain_.allFinite() || !is_finite(run.root_.largest())) return false;
+      if (!detail::all_finite(run.gain_) || !is_finite(run.root_.largest())) return false;
       run.corrected_ = true;
       run.advance_covariance();
     }
@@ -562,7 +583,7 @@ class MimoExtendedStateFilter {
       }
     }
     rules
-        .require(config.input_matrix.cwiseAbs().maxCoeff() > S(0), "input_matrix", S(0),
+        .require(detail::largest_magnitude(config.input_matrix) > S(0), "input_matrix", S(0),
                  "must not be zero")
         .require(config.inflation_rule != InflationRule::adaptive, "inflation_rule", S(0),
                  "must be fixed or none for several chains");
@@ -595,7 +616,7 @@ class MimoExtendedStateFilter {
   [[nodiscard]] Estimate ahead(const Input& u) const noexcept {
     Estimate x = state_;
     for (int chain = 0; chain < outputs; ++chain) {
-      x(first(chain) + order_of(chain)) += drive_.row(chain).dot(u);
+      x(first(chain) + order_of(chain)) += S(drive_.row(chain) * u);
     }
     for (int chain = 0; chain < outputs; ++chain) {
       const int begin = first(chain);
@@ -604,7 +625,7 @@ class MimoExtendedStateFilter {
         for (int r = length - 2; r >= pass; --r) x(begin + r) += x(begin + r + 1);
       }
       // The disturbance itself is not driven.
-      x(begin + order_of(chain)) -= drive_.row(chain).dot(u);
+      x(begin + order_of(chain)) -= S(drive_.row(chain) * u);
     }
     return x;
   }
@@ -640,8 +661,10 @@ class MimoExtendedStateFilter {
     const S most = measurement_.largest() / std::sqrt(detail::rounding<S>());
     for (int chain = 0; chain < outputs; ++chain) {
       if (missed_[index(chain)] < 3 || !(root_.largest(first(chain), end(chain)) > most)) continue;
-      phi.block(first(chain), first(chain), end(chain) - first(chain), end(chain) - first(chain)) *=
-          S(1) / std::sqrt(growth_);
+      const S still = S(1) / std::sqrt(growth_);
+      for (int r = first(chain); r < end(chain); ++r) {
+        for (int j = first(chain); j < end(chain); ++j) phi(r, j) *= still;
+      }
       for (int r = first(chain); r < end(chain); ++r) noise.clear_row(r);
       // After max_gap the chain starts anew, whatever its covariance is until then.
       if (missed_[index(chain)] > max_gap_ + 1) {
@@ -678,8 +701,7 @@ class MimoExtendedStateFilter {
       OutputCovariance r = measurement_.matrix();
       for (int i = 0; i < outputs; ++i) {
         if (used[index(i)]) continue;
-        r.row(i).setZero();
-        r.col(i).setZero();
+        for (int j = 0; j < outputs; ++j) r(i, j) = r(j, i) = S(0);
         r(i, i) = S(1);
       }
       used_measurement_ = CovarianceRoot<outputs, S>::nearest(r);
@@ -691,7 +713,7 @@ class MimoExtendedStateFilter {
     if (all_used) return;
     for (int i = 0; i < outputs; ++i) {
       if (!used[index(i)]) {
-        gain_.col(i).setZero();
+        for (int r = 0; r < size; ++r) gain_(r, i) = S(0);
         // Its row of one is no noise of the estimate.
         used_measurement_.clear_row(i);
       }
@@ -704,7 +726,6 @@ class MimoExtendedStateFilter {
     model.noise = scaled(noise, root_units_);
     model.measurement = measurement_.matrix() / growth_;
     model.inflation = growth_;
-    model.output.setZero();
     Gain start = Gain::Zero();
     for (int chain = 0; chain < outputs; ++chain) {
       model.output(chain, first(chain)) = S(1);
@@ -725,9 +746,9 @@ class MimoExtendedStateFilter {
     Gain last = Gain::Zero();
     for (int step = 0; step < most_steps; ++step) {
       prepare_all();
-      if (!gain_.allFinite()) return false;
-      const S change = (gain_ - last).cwiseAbs().maxCoeff();
-      const bool done = !(change > S(2) * detail::rounding<S>() * gain_.cwiseAbs().maxCoeff());
+      if (!detail::all_finite(gain_)) return false;
+      const S change = detail::largest_magnitude(gain_ - last);
+      const bool done = !(change > S(2) * detail::rounding<S>() * detail::largest_magnitude(gain_));
       last = gain_;
       if (done && step > 3) break;
       root_ = posterior_;

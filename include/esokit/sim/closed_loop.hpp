@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
-#include <esokit/core/matrix.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/step_status.hpp>
 #include <esokit/sim/plant.hpp>
 #include <esokit/sim/runge_kutta.hpp>
@@ -139,10 +139,11 @@ Expected<std::int64_t, Error<ScalarType>> whole_multiple(const char* field, Scal
 }
 
 template <class State>
-auto check_state(const char* field, const State& state) -> Check<typename State::Scalar> {
-  Rules<typename State::Scalar> rules;
+auto check_state(const char* field, const State& state) {
+  using S = std::remove_cvref_t<decltype(state[0])>;
+  Rules<S> rules;
   for (int i = 0; i < static_cast<int>(state.size()); ++i) rules.finite(field, state[i], i);
-  return rules;
+  return Check<S>(rules);
 }
 
 /// Calls back; true unless the callback returned false.
@@ -208,8 +209,7 @@ struct ContinuousLoop {
 
     Observer eso = observer;
     Noise source = noise;
-    Stacked state;
-    state << config.plant_state, config.observer_state;
+    Stacked state = stacked(config.plant_state, config.observer_state);
     for (std::int64_t k = 0;; ++k) {
       const ScalarType t = config.start_time + static_cast<ScalarType>(k) * config.step;
       const auto v = static_cast<ScalarType>(source.at(k));
@@ -231,17 +231,21 @@ struct ContinuousLoop {
         const typename Observer::State estimate = observer_part(s);
         const auto u = static_cast<ScalarType>(law(time, eso.estimate(estimate)));
         const auto m = static_cast<ScalarType>(measurement(time, plant.output(time, x), v));
-        Stacked result;
-        result << plant.derivative(time, x, u), eso.derivative(time, estimate, m, u);
-        return result;
+        return stacked(plant.derivative(time, x, u), eso.derivative(time, estimate, m, u));
       };
       state = sim::step<Method>(rate, t, state, config.step);
     }
   }
 
  private:
-  using Stacked = Vector<ScalarType, P::states + Observer::states>;
+  using Stacked = EigenMatrix<ScalarType, P::states + Observer::states>;
 
+  static Stacked stacked(const typename P::State& x, const typename Observer::State& z) {
+    Stacked state;
+    state.template head<P::states>() = x;
+    for (int i = 0; i < Observer::states; ++i) state(P::states + i) = z(i);
+    return state;
+  }
   static typename P::State plant_part(const Stacked& state) {
     return state.template head<P::states>();
   }

@@ -6,8 +6,8 @@
 #include <cstddef>
 #include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
-#include <esokit/core/matrix.hpp>
 #include <esokit/core/unroll.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/sim/signals.hpp>
 #include <type_traits>
 #include <utility>
@@ -25,7 +25,7 @@ concept Plant = requires(const P& plant, const typename P::State& x,
                          const typename P::State::Scalar& scalar) {
   { P::states } -> std::convertible_to<int>;
   requires P::states >= 1;
-  requires std::same_as<typename P::State, Vector<typename P::State::Scalar, P::states>>;
+  requires std::same_as<typename P::State, EigenMatrix<typename P::State::Scalar, P::states>>;
   { plant.derivative(scalar, x, scalar) } -> std::same_as<typename P::State>;
   { plant.output(scalar, x) } -> std::same_as<typename P::State::Scalar>;
 };
@@ -39,8 +39,8 @@ class IntegratorChainPlant {
   static_assert(Order >= 1);
 
  public:
-  static constexpr int states = Order;       ///< length of x
-  using State = Vector<ScalarType, states>;  ///< x
+  static constexpr int states = Order;            ///< length of x
+  using State = EigenMatrix<ScalarType, states>;  ///< x
 
   /// Settings of make.
   struct Config {
@@ -86,8 +86,8 @@ class LinearPlant {
   static_assert(Order >= 1);
 
  public:
-  static constexpr int states = Order;       ///< length of x
-  using State = Vector<ScalarType, states>;  ///< x
+  static constexpr int states = Order;            ///< length of x
+  using State = EigenMatrix<ScalarType, states>;  ///< x
 
   /// Settings of make.
   struct Config {
