@@ -257,6 +257,28 @@ void retune_to_any_variance_is_finite_or_refused() {
   EXPECT_GT(taken, 10);
 }
 
+/// Each state counts: here the variance of y alone is beyond the scalar in the unit of the new R,
+/// the others are known exactly.
+TEST(FilterVariance, OneThatCannotBeCarriedOverIsEnough) {
+  using Filter = esokit::ExtendedStateFilter<2>;
+  Filter::Config config{
+      .input_gain = 1, .sample_time = 1e-3, .measurement_variance = 1, .inflation = 0.1};
+  config.initial_covariance.setZero();
+  config.initial_covariance(0, 0) = 1e10;
+  config.allow_vanishing_gain = true;
+  for (const double variance : {1e-270, 1e-280}) {
+    auto filter = Filter::make(config).value();
+    auto other = config;
+    other.measurement_variance = variance;
+    other.initial_covariance.setZero();
+    EXPECT_EQ(refusal(filter.retune(other)),
+              variance > 1e-275 ? "accepted"
+                                : "measurement_variance: is too small, or sample_time too far from "
+                                  "the one before, for the present covariance to be carried over: "
+                                  "measure first");
+  }
+}
+
 TEST(FilterVariance, RetuneToAnyIsFiniteOrRefused) {
   retune_to_any_variance_is_finite_or_refused<float>();
   retune_to_any_variance_is_finite_or_refused<double>();
