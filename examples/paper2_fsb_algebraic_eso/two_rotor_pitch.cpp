@@ -83,7 +83,8 @@ Run run(const Observer& observer, double from) {
     const typename Observer::State z = state.template tail<Observer::states>();
     const double u = input(x);
     State change;
-    change << x(1), disturbance(x) + u / inertia, esokit::eigen(observer.derivative(t, z, x(0), u));
+    const esokit::EigenMatrix<double, Observer::states> rate = observer.derivative(t, z, x(0), u);
+    change << x(1), disturbance(x) + u / inertia, rate;
     return change;
   };
   const auto steps = static_cast<int>(std::lround(duration / step));
