@@ -83,8 +83,9 @@ Run run(const Observer& observer, double from) {
     const typename Observer::State z = state.template tail<Observer::states>();
     const double u = input(x);
     State change;
-    const esokit::EigenMatrix<double, Observer::states> rate = observer.derivative(t, z, x(0), u);
-    change << x(1), disturbance(x) + u / inertia, rate;
+    const esokit::EigenMatrix<double, Observer::states> estimate_rate =
+        observer.derivative(t, z, x(0), u);
+    change << x(1), disturbance(x) + u / inertia, estimate_rate;
     return change;
   };
   const auto steps = static_cast<int>(std::lround(duration / step));
