@@ -249,7 +249,7 @@ class MimoAdrc {
     S norm(0);
     for (int j = 0; j < channels; ++j) {
       S sum(0);
-      for (int i = 0; i < channels; ++i) sum += detail::magnitude(matrix(i, j));
+      for (int i = 0; i < channels; ++i) sum += detail::absolute(matrix(i, j));
       norm = detail::larger(norm, sum);
     }
     return norm;

@@ -28,11 +28,6 @@ constexpr S smallest_normal() noexcept {
   }
 }
 
-template <Scalar S>
-constexpr S magnitude(const S& value) noexcept {
-  return select(value < S(0.0), S(-value), value);
-}
-
 /// The larger of two, or the one that is not finite. Without <algorithm>, which takes longer to
 /// compile than a controller.
 template <PlainScalar S>
@@ -43,7 +38,7 @@ constexpr S larger(const S& a, const S& b) noexcept {
 template <PlainScalar S, int Rows, int Columns>
 constexpr S largest_magnitude(const Matrix<S, Rows, Columns>& matrix) noexcept {
   S largest(0);
-  for (const S& element : matrix) largest = larger(largest, magnitude(element));
+  for (const S& element : matrix) largest = larger(largest, absolute(element));
   return largest;
 }
 
@@ -58,7 +53,7 @@ constexpr bool all_finite(const Matrix<S, Rows, Columns>& matrix) noexcept {
 /// A normal number, neither infinite nor lost in the subnormals.
 template <Scalar S>
 constexpr bool normal(const S& value) {
-  return all(is_finite(value)) && all(magnitude(value) >= smallest_normal<S>());
+  return all(is_finite(value)) && all(absolute(value) >= smallest_normal<S>());
 }
 
 }  // namespace detail
@@ -109,7 +104,7 @@ class [[nodiscard]] Rules {
 
   /// Finite and not zero; either sign.
   [[gnu::noinline]] constexpr Rules& nonzero(const char* field, const S& value, int index = -1) {
-    return require(all(is_finite(value)) && all(detail::magnitude(value) > S(0.0)), field, value,
+    return require(all(is_finite(value)) && all(detail::absolute(value) > S(0.0)), field, value,
                    "must be finite and not zero (negative is fine)", index);
   }
 
@@ -137,7 +132,7 @@ class [[nodiscard]] Rules {
 
   /// As it is in a config that does not mention it: zero.
   [[gnu::noinline]] constexpr Rules& left_out(const char* field, const S& value, const char* rule) {
-    return require(all(is_finite(value)) && !all(detail::magnitude(value) > S(0.0)), field, value,
+    return require(all(is_finite(value)) && !all(detail::absolute(value) > S(0.0)), field, value,
                    rule);
   }
 

@@ -198,7 +198,7 @@ class CovarianceFactor {
   /// True if L is the identity.
   [[nodiscard]] constexpr bool diagonal() const noexcept {
     for (const S& l : lower_) {
-      if (all(detail::magnitude(l) > S(0.0))) return false;
+      if (all(detail::absolute(l) > S(0.0))) return false;
     }
     return true;
   }
@@ -220,7 +220,7 @@ class CovarianceFactor {
   /// Every D_i and L_ij within a share of the other's.
   [[nodiscard]] constexpr bool near(const CovarianceFactor& other, const S& share) const noexcept {
     const auto close = [&share](const S& a, const S& b) {
-      return all(detail::magnitude(S(a - b)) <= share * detail::magnitude(b));
+      return all(detail::absolute(S(a - b)) <= share * detail::absolute(b));
     };
     for (std::size_t i = 0; i < variances_.size(); ++i) {
       if (!close(variances_[i], other.variances_[i])) return false;

@@ -21,7 +21,7 @@ void make_lower(Matrix<S, Rows, Columns>& a) noexcept {
     // Scaled by the largest element: squares of small roots would leave float.
     S largest(0);
     for (int k = i; k < Columns; ++k) {
-      const S size = detail::magnitude(a(i, k));
+      const S size = detail::absolute(a(i, k));
       largest = largest < size ? size : largest;
     }
     if (!(largest > S(0))) continue;
@@ -47,7 +47,7 @@ void make_lower(Matrix<S, Rows, Columns>& a) noexcept {
     }
     // The sign of a column is free: a positive diagonal.
     const S sign = diagonal < S(0) ? S(-1) : S(1);
-    a(i, i) = detail::magnitude(diagonal);
+    a(i, i) = detail::absolute(diagonal);
     for (int row = i + 1; row < Rows; ++row) a(row, i) *= sign;
     for (int k = i + 1; k < Columns; ++k) a(i, k) = S(0);
   }
@@ -105,7 +105,7 @@ class CovarianceRoot {
     for (int i = 0; i < Size; ++i) {
       const S row = other.largest_of_row(i);
       for (int j = 0; j <= i; ++j) {
-        const S difference = detail::magnitude(S(lower_(i, j) - other.lower_(i, j)));
+        const S difference = detail::absolute(S(lower_(i, j) - other.lower_(i, j)));
         const S size = i == j ? other.lower_(i, j) : row;
         if (!(difference <= share * size)) return false;
       }

@@ -44,9 +44,9 @@ S relative_change(const Matrix<S, Rows, Columns>& now, const Matrix<S, Rows, Col
   S worst(0.0);
   for (int i = 0; i < Rows; ++i) {
     for (int j = 0; j < Columns; ++j) {
-      const S size = magnitude(now(i, j));
+      const S size = absolute(now(i, j));
       if (!all(size > S(0.0))) continue;
-      const S change = magnitude(S(now(i, j) - before(i, j))) / size;
+      const S change = absolute(S(now(i, j) - before(i, j))) / size;
       worst = select(worst < change, change, worst);
     }
   }
@@ -223,7 +223,7 @@ std::optional<CovarianceFactor<Size, S>> chain_riccati(const CovarianceFactor<Si
     const auto next = factor.gain(S(factor.variance(0) / sum));
     change = S(0.0);
     for (std::size_t i = 0; i < Size; ++i) {
-      const S moved = detail::magnitude(S(next[i] - gain[i])) / detail::magnitude(next[i]);
+      const S moved = detail::absolute(S(next[i] - gain[i])) / detail::absolute(next[i]);
       change = select(change < moved, moved, change);
     }
     if (!all(is_finite(change))) return std::nullopt;

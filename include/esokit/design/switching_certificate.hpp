@@ -51,7 +51,7 @@ bool same_half_plane(const ErrorPolynomial<Size, S>& p, const ErrorPolynomial<Si
       const std::size_t power = (a + b) / 2;
       const bool positive = (a + 3 * b) % 4 == 0;
       const S signed_term = positive ? term : S(-term);
-      product[power] = product[power] + signed_term - margin * magnitude(term);
+      product[power] = product[power] + signed_term - margin * absolute(term);
     }
   }
   return positive_on_half_line<Size, S>(product);

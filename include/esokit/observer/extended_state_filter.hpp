@@ -262,8 +262,8 @@ class ExtendedStateFilter
   /// is beyond the scalar.
   [[nodiscard]] S normalised_innovation() const noexcept {
     const S& e = this->innovation();
-    return select(detail::magnitude(e) > S(0.0),
-                  detail::clipped(S(e * (e / innovation_variance()))), S(0.0));
+    return select(detail::absolute(e) > S(0.0), detail::clipped(S(e * (e / innovation_variance()))),
+                  S(0.0));
   }
 
   /// theta in force.
@@ -354,8 +354,8 @@ class ExtendedStateFilter
     }
     for (int i = 0; i < N; ++i) {
       for (int j = 0; j < i; ++j) {
-        const S difference = detail::magnitude(S(p(i, j) - p(j, i)));
-        const S bound = S(8.0) * detail::rounding<S>() * detail::magnitude(p(i, j));
+        const S difference = detail::absolute(S(p(i, j) - p(j, i)));
+        const S bound = S(8.0) * detail::rounding<S>() * detail::absolute(p(i, j));
         rules.require(all(difference <= bound), field, p(i, j), "must be symmetric", i * N + j);
       }
     }
@@ -515,7 +515,7 @@ class ExtendedStateFilter
         for (int i = 0; i < N; ++i) {
           const S limit = law.limit_gain()[index(i)];
           const S last = law.last_table_gain()[index(i)];
-          if (!all(detail::magnitude(S(last - limit)) <= S(0.1) * detail::magnitude(limit))) {
+          if (!all(detail::absolute(S(last - limit)) <= S(0.1) * detail::absolute(limit))) {
             return Error<S>{"mode",
                             last,
                             "has a start table too short: its last gain is more than a tenth off "

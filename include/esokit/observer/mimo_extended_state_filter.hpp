@@ -218,13 +218,13 @@ class MimoExtendedStateFilter {
       }
       int worst = 0;
       for (int i = 1; i < outputs; ++i) {
-        if (detail::magnitude(e(i)) > detail::magnitude(e(worst))) worst = i;
+        if (detail::absolute(e(i)) > detail::absolute(e(worst))) worst = i;
       }
       used[index(worst)] = false;
       e(worst) = S(0);
       // An absurd but finite u can leave a prediction from which no good y leads back.
       const bool state_is_to_blame =
-          detail::magnitude(y(worst)) < detail::magnitude(state_(first(worst)));
+          detail::absolute(y(worst)) < detail::absolute(state_(first(worst)));
       status |=
           state_is_to_blame ? restart_chain(worst, y(worst)) : StepStatus::measurement_rejected;
       changed = true;
@@ -473,7 +473,7 @@ class MimoExtendedStateFilter {
   [[nodiscard]] bool finite(const Estimate& x, int chain) const noexcept {
     S sum(0);
     for (int r = first(chain); r < end(chain); ++r) {
-      const S size_of = detail::magnitude(x(r));
+      const S size_of = detail::absolute(x(r));
       sum = sum + (size_of + size_of / units_(r));
     }
     return is_finite(sum);
@@ -488,7 +488,7 @@ class MimoExtendedStateFilter {
 
   [[nodiscard]] bool no_larger(const Input& u) const noexcept {
     for (int j = 0; j < Inputs; ++j) {
-      if (!is_finite(u(j)) || detail::magnitude(u(j)) > detail::magnitude(input_(j))) return false;
+      if (!is_finite(u(j)) || detail::absolute(u(j)) > detail::absolute(input_(j))) return false;
     }
     return true;
   }
@@ -548,8 +548,8 @@ class MimoExtendedStateFilter {
     for (int i = 0; i < p.rows(); ++i) {
       for (int j = 0; j <= i; ++j) {
         const int place = i * static_cast<int>(p.cols()) + j;
-        const S difference = detail::magnitude(S(p(i, j) - p(j, i)));
-        const S bound = S(8) * detail::rounding<S>() * detail::magnitude(p(i, j));
+        const S difference = detail::absolute(S(p(i, j) - p(j, i)));
+        const S bound = S(8) * detail::rounding<S>() * detail::absolute(p(i, j));
         rules.finite(field, p(i, j), place)
             .require(difference <= bound, field, p(i, j), "must be symmetric", place);
       }
@@ -575,7 +575,7 @@ class MimoExtendedStateFilter {
                             "what the scalar can hold");
         for (int j = 0; r == order_of(i) && j < Inputs; ++j) {
           const S& gain = config.input_matrix(i, j);
-          if (!(detail::magnitude(gain) > S(0))) continue;
+          if (!(detail::absolute(gain) > S(0))) continue;
           rules.representable("input_matrix", gain, S(gain * unit),
                               "times T^n / n! gives a gain that the scalar cannot hold",
                               i * Inputs + j);

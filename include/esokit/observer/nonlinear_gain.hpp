@@ -186,7 +186,7 @@ class LimitedGain {
       : function_(prepared(shape)), inverse_scale_(S(1.0) / error_scale), low_(low), high_(high) {}
 
   [[nodiscard]] ESOKIT_INLINE constexpr S operator()(const S& e) const noexcept {
-    const S x = magnitude(e) * inverse_scale_;
+    const S x = absolute(e) * inverse_scale_;
     const S k = function_(select(least_magnitude<S>() < x, x, least_magnitude<S>()));
     // In this order a NaN ends as `high`.
     const S from_above = select(k < high_, k, high_);

@@ -316,12 +316,12 @@ class PredictorCorrector {
   Check<S> adopt(const PredictorCorrector& fresh) {
     PredictorCorrector next = fresh;
     const S ratio = fresh.sample_time() * rate_;
-    const bool same_time = !all(detail::magnitude(S(fresh.rate_ - rate_)) > S(0.0));
+    const bool same_time = !all(detail::absolute(S(fresh.rate_ - rate_)) > S(0.0));
     const S explained = (input_gain() - fresh.input_gain()) * applied_input_;
     const S moved = Chain::scaled_input_gain(explained, fresh.sample_time());
     const bool same_gain =
         same_time &&
-        !all(detail::magnitude(S(fresh.scaled_input_gain_ - scaled_input_gain_)) > S(0.0));
+        !all(detail::absolute(S(fresh.scaled_input_gain_ - scaled_input_gain_)) > S(0.0));
     for (std::size_t i = 0; i < Levels; ++i) {
       next.states_[i] = states_[i];
       S factor(1.0);

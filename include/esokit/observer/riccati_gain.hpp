@@ -449,7 +449,7 @@ class RiccatiGain {
       RiccatiGain next = run;
       next.accept(S(0.0));
       next.recur();
-      const S change = detail::magnitude(S(next.inflation() - theta));
+      const S change = detail::absolute(S(next.inflation() - theta));
       if (all(change <= S(1e3) * detail::rounding<S>() * theta)) return run.now_;
       theta = next.inflation();
     }

@@ -26,7 +26,7 @@ template <Scalar S>
   if constexpr (PlainScalar<S>) {
     return (std::abs)(e);
   } else {
-    return magnitude(e);
+    return absolute(e);
   }
 }
 
