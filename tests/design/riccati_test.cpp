@@ -24,7 +24,7 @@ TEST(SolvePositive, EachColumnOfItsOwn) {
   x << 1, -7, 2, 0.5, -3, 4;
   const auto solved = esokit::detail::solve_positive<3, 2, double>(a, a * x);
   ASSERT_TRUE(solved.has_value());
-  EXPECT_LT((*solved - x).cwiseAbs().maxCoeff(), 1e-14);
+  EXPECT_LT((Eigen::Matrix<double, 3, 2>(*solved) - x).cwiseAbs().maxCoeff(), 1e-14);
   for (int i = 0; i < 3; ++i) {
     for (const double bad : {0.0, -1.0, hidden_nan<double>(), hidden_infinity<double>()}) {
       Eigen::Matrix3d spoilt = a;
