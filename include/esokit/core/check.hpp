@@ -203,6 +203,46 @@ class [[nodiscard]] Rules {
 
 namespace detail {
 
+/// The error of lane `i`, as the error of the pack.
+template <Scalar S>
+Error<S> in_lane(const Error<LaneScalar<S>>& error, int i) {
+  Error<S> all{error.field, {}, error.rule, error.index, {}, error.has_limit, i};
+  all.value[i] = error.value;
+  all.limit[i] = error.limit;
+  return all;
+}
+
+/// `make` of an X of packs: each lane is designed as one of the plain scalar.
+template <class X>
+Expected<X, Error<typename X::scalar_type>> make_lanes(const typename X::Config& config) {
+  using S = typename X::scalar_type;
+  using Plain = typename X::template with_scalar<LaneScalar<S>>;
+  X all = blank<X>();
+  for (int i = 0; i < lane_count<S>; ++i) {
+    typename Plain::Config one{};
+    copy_lane<false>(config, one, i);
+    const auto lane = Plain::make(one);
+    if (!lane) return in_lane<S>(lane.error(), i);
+    copy_lane<true>(all, *lane, i);
+  }
+  return all;
+}
+
+/// `adopt` of an X of packs: all lanes or none.
+template <class X>
+Check<typename X::scalar_type> adopt_lanes(X& object, const X& fresh) {
+  using S = typename X::scalar_type;
+  using Plain = typename X::template with_scalar<LaneScalar<S>>;
+  X next = object;
+  for (int i = 0; i < lane_count<S>; ++i) {
+    Plain lane = get_lane<Plain>(object, i);
+    if (auto ok = lane.adopt(get_lane<Plain>(fresh, i)); !ok) return in_lane<S>(ok.error(), i);
+    copy_lane<true>(next, lane, i);
+  }
+  object = next;
+  return {};
+}
+
 /// `retune` of all that has `make` and `adopt`: designs once.
 template <class T>
 Check<typename T::scalar_type> retune(T& object, const typename T::Config& config) {

@@ -2,7 +2,7 @@
 /// The error of a refused configuration: which field, which value, which rule.
 #pragma once
 
-#include <esokit/core/scalar.hpp>
+#include <esokit/core/lanes.hpp>
 #include <esokit/core/text.hpp>
 
 #if defined(__linux__) || defined(_WIN32) || defined(__APPLE__)
@@ -24,20 +24,36 @@ struct Error {
   int index = -1;          ///< element of an array member, -1 for a scalar member
   ScalarType limit{};      ///< computed limit that belongs to the rule, if has_limit
   bool has_limit = false;  ///< whether `limit` says anything
+  int lane = -1;           ///< of a pack: whose value, -1 for a plain scalar
 };
 
 /// Has text.
 template <class ScalarType>
 inline constexpr bool has_text<Error<ScalarType>> = true;
 
-/// Writes `field[index] = value: rule limit`.
+namespace detail {
+
+/// The value of the lane that an error is about.
+template <class ScalarType>
+constexpr const auto& value_in_lane(const ScalarType& value, [[maybe_unused]] int lane) noexcept {
+  if constexpr (lane_count < ScalarType >> 1) {
+    return value[lane < 0 ? 0 : lane];
+  } else {
+    return value;
+  }
+}
+
+}  // namespace detail
+
+/// Writes `field[index] = value: rule limit`, and which lane.
 template <class Stream, class ScalarType>
-requires detail::WritesText<Stream, int, ScalarType> Stream& operator<<(
+requires detail::WritesText<Stream, int, LaneScalar<ScalarType>> Stream& operator<<(
     Stream& out, const Error<ScalarType>& error) {
   out << error.field;
   if (error.index >= 0) out << "[" << error.index << "]";
-  out << " = " << error.value << ": " << error.rule;
-  if (error.has_limit) out << " " << error.limit;
+  out << " = " << detail::value_in_lane(error.value, error.lane) << ": " << error.rule;
+  if (error.has_limit) out << " " << detail::value_in_lane(error.limit, error.lane);
+  if (error.lane >= 0) out << " (lane " << error.lane << ")";
   return out;
 }
 
@@ -45,11 +61,16 @@ requires detail::WritesText<Stream, int, ScalarType> Stream& operator<<(
 template <class ScalarType>
 void print_last_words([[maybe_unused]] const Error<ScalarType>& error) noexcept {
 #if defined(__linux__) || defined(_WIN32) || defined(__APPLE__)
-  if constexpr (PlainScalar<ScalarType>) {
+  if constexpr (PlainScalar<LaneScalar<ScalarType>>) {
     std::fprintf(stderr, "esokit: %s", error.field);
     if (error.index >= 0) std::fprintf(stderr, "[%d]", error.index);
-    std::fprintf(stderr, " = %Lg: %s", static_cast<long double>(error.value), error.rule);
-    if (error.has_limit) std::fprintf(stderr, " %Lg", static_cast<long double>(error.limit));
+    std::fprintf(stderr, " = %Lg: %s",
+                 static_cast<long double>(detail::value_in_lane(error.value, error.lane)),
+                 error.rule);
+    if (error.has_limit)
+      std::fprintf(stderr, " %Lg",
+                   static_cast<long double>(detail::value_in_lane(error.limit, error.lane)));
+    if (error.lane >= 0) std::fprintf(stderr, " (lane %d)", error.lane);
     std::fprintf(stderr, " (value() was called on a refused config)\n");
   }
 #endif

@@ -97,15 +97,21 @@ concept Scalar = std::copyable<T> && requires(const T a, const T b) {
 
 namespace detail {
 
-/// |x|, one instruction for plain scalars.
+/// |x|, one instruction for plain scalars and packs.
+template <class T>
+struct Absolute {
+  static constexpr T of(const T& value) noexcept {
+#if defined(__GNUC__)
+    if constexpr (std::is_same_v<T, float>) return __builtin_fabsf(value);
+    if constexpr (std::is_same_v<T, double>) return __builtin_fabs(value);
+    if constexpr (std::is_same_v<T, long double>) return __builtin_fabsl(value);
+#endif
+    return select(value < T(0.0), T(-value), value);
+  }
+};
 template <class T>
 constexpr T absolute(const T& value) noexcept {
-#if defined(__GNUC__)
-  if constexpr (std::is_same_v<T, float>) return __builtin_fabsf(value);
-  if constexpr (std::is_same_v<T, double>) return __builtin_fabs(value);
-  if constexpr (std::is_same_v<T, long double>) return __builtin_fabsl(value);
-#endif
-  return select(value < T(0.0), T(-value), value);
+  return Absolute<T>::of(value);
 }
 
 /// A constant in the scalar type; plain scalars convert at compile time.

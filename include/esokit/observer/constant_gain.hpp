@@ -2,6 +2,7 @@
 /// The constant gain law of the linear observers, sampled and continuous.
 #pragma once
 
+#include <esokit/core/lanes.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/design/placement.hpp>
 #include <esokit/observer/gain_law.hpp>
@@ -14,7 +15,9 @@ class ConstantGain {
  public:
   /// What it does beside `gain`.
   static constexpr GainLawTraits traits{.kind = GainKind::preset, .bridges_gaps = true};
-  using Spec = typename Placement::template Spec<Size, S>;  ///< of the placement
+  using Spec = typename Placement::template Spec<Size, LaneScalar<S>>;  ///< of the placement
+  template <class T>
+  using with_scalar = ConstantGain<Size, T, Placement>;  ///< the same of another scalar
 
   /// The gain for a set of poles.
   /// @param field name of the config member that `spec` came from, for the error
@@ -23,7 +26,8 @@ class ConstantGain {
   /// @param index element of `field` that the error names, -1: none
   /// @return error for a spec that the placement refuses, or a gain that the scalar cannot hold
   static Expected<ConstantGain, Error<S>> make(const char* field, const Spec& spec,
-                                               const S& sample_time, int index = -1) {
+                                               const S& sample_time,
+                                               int index = -1) requires(!PackScalar<S>) {
     Rules<S> rules;
     rules.all_of(Placement::template check<Size, S>(field, spec, index));
     if (!rules) return rules.error();
@@ -49,14 +53,25 @@ class ConstantGain {
 
   /// Gain that puts the poles of the step over `samples` T at rho_i^samples, in the scaling of T.
   [[nodiscard]] ScaledGain<Size, S> gap_gain(const S&, unsigned samples) const noexcept {
-    return esokit::gap_gain<Size, S>(poles_, samples);
+    if constexpr (PackScalar<S>) {
+      ScaledGain<Size, S> all;
+      for (int i = 0; i < lane_count<S>; ++i) {
+        detail::copy_lane<true>(all, esokit::gap_gain<Size, LaneScalar<S>>(poles_[i], samples), i);
+      }
+      return all;
+    } else {
+      return esokit::gap_gain<Size, S>(poles_, samples);
+    }
   }
 
  private:
+  friend struct detail::LaneAccess;
+  static constexpr auto fields(auto& o) noexcept { return std::tie(o.gain_, o.poles_); }
+
   ConstantGain() = default;
 
   ScaledGain<Size, S> gain_{};
-  typename Placement::template Sampled<Size, S> poles_{};
+  Lanes<typename Placement::template Sampled<Size, LaneScalar<S>>, S> poles_{};
 };
 
 /// Told apart in snapshots.

@@ -26,6 +26,11 @@ struct LinearEsoConfig<Size, S, EqualPoles> {
   static constexpr const char* placement_field = "observer_bandwidth";
   /// What the poles are placed by.
   [[nodiscard]] const S& placement() const noexcept { return observer_bandwidth; }
+  /// @cond
+  static constexpr auto fields(auto& c) noexcept {
+    return std::tie(c.observer_bandwidth, c.input_gain, c.sample_time, c.max_gap);
+  }
+  /// @endcond
 };
 
 /// Settings of LinearEso by poles.
@@ -61,16 +66,22 @@ class LinearEso : public PredictorCorrector<Order, S, Extension,
 
  public:
   using Config = LinearEsoConfig<Base::size, S, Placement>;  ///< settings of make
+  template <class T>
+  using with_scalar = LinearEso<Order, T, Extension, Placement>;  ///< the same of another scalar
 
   /// Checks the settings and does all the design work.
   /// @return the observer at rest in zero, or an error that names the field
   static Expected<LinearEso, Error<S>> make(const Config& config) {
-    const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
-    // The chain is checked first: the law divides by what it checks.
-    if (auto ok = Base::check_chain(chain); !ok) return ok.error();
-    auto law = Law::make(Config::placement_field, config.placement(), config.sample_time);
-    if (!law) return law.error();
-    return LinearEso(chain, *law);
+    if constexpr (PackScalar<S>) {
+      return detail::make_lanes<LinearEso>(config);
+    } else {
+      const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
+      // The chain is checked first: the law divides by what it checks.
+      if (auto ok = Base::check_chain(chain); !ok) return ok.error();
+      auto law = Law::make(Config::placement_field, config.placement(), config.sample_time);
+      if (!law) return law.error();
+      return LinearEso(chain, *law);
+    }
   }
 
   /// New settings while running: the estimate is kept, a change of b0 is moved into the

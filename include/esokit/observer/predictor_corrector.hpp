@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
+#include <esokit/core/lanes.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/core/unroll.hpp>
 #include <esokit/model/scaled_chain.hpp>
@@ -70,6 +71,12 @@ class PredictorCorrector {
   using scalar_type = S;                           ///< of states and settings
   using Estimate = typename Chain::Estimate;       ///< (y, .., y^(n-1), d, .., d^(m-1)), N x 1
   using Laws = Array<Law, Levels>;                 ///< one a level
+  using Status = StatusOf<S>;                      ///< StepStatus, of a pack one a lane
+
+  /// The same of another scalar.
+  template <class T>
+  using with_scalar =
+      PredictorCorrector<Order, T, Extension, typename Law::template with_scalar<T>, Levels>;
 
   /// What it is beyond LoopObserver.
   static constexpr ObserverTraits traits{
@@ -95,40 +102,48 @@ class PredictorCorrector {
   /// One sample: `predict(u_applied)`, then `correct(y)`.
   /// @param y measurement at sample k
   /// @param u_applied input that the actuator held from k - 1 to k, after its limits
-  StepStatus update(S y, S u_applied) noexcept {
+  Status update(S y, S u_applied) noexcept {
     advance_laws();
-    if constexpr (PlainScalar<S>) {
-      if (gap_ == 0) [[likely]] {
-        // One test for all: a bad y or u makes the new state non-finite. Nothing is kept then, and
-        // the guarded path finds out what it was.
-        Correction step{predicted_levels(scaled_input_gain_ * u_applied)};
-        const bool looked = correct_levels<true>(step, y, 1u);
-        for_each_state(step.states, [](S& x) ESOKIT_INLINE_LAMBDA { detail::keep_scalar(x); });
-        if (looked && is_finite(probe(step.states))) [[likely]] {
-          commit(step);
-          applied_input_ = u_applied;
-          return StepStatus::ok;
-        }
+    if (gap_ == 0) [[likely]] {
+      // One test for all: a bad y or u makes the new state non-finite. Nothing is kept then, and
+      // the guarded path finds out what it was.
+      Correction step{predicted_levels(scaled_input_gain_ * u_applied)};
+      const bool looked = correct_levels<true>(step, y, 1u);
+      for_each_state(step.states, [](S& x) ESOKIT_INLINE_LAMBDA { detail::keep_scalar(x); });
+      if (looked && all(is_finite(probe(step.states)))) [[likely]] {
+        commit(step);
+        applied_input_ = u_applied;
+        return StepStatus::ok;
       }
     }
     return update_guarded(y, u_applied);
   }
 
   /// Time update alone: one sample without a measurement, or the first half of `update`.
-  StepStatus predict(S u_applied) noexcept {
+  Status predict(S u_applied) noexcept {
     advance_laws();
     return predict_guarded(u_applied);
   }
 
   /// Measurement update alone. After a gap it uses the gain for the time since the last correction.
-  StepStatus correct(S y) noexcept {
-    const unsigned elapsed = gap_ > 1 ? gap_ : 1u;
-    if (elapsed > max_gap_ + 1u) [[unlikely]] {
-      if (!all(is_finite(y)) || reset(y) != StepStatus::ok) return StepStatus::measurement_rejected;
-      return StepStatus::restarted;
-    }
-    Correction step{states_};
-    if constexpr (PlainScalar<S>) {
+  Status correct(S y) noexcept {
+    if constexpr (PackScalar<S>) {
+      if (gap_ == 1 || gap_ == 0) [[likely]] {
+        Correction step{states_};
+        if (correct_levels<true>(step, y, 1u) && all(is_finite(probe(step.states)))) [[likely]] {
+          commit(step);
+          gap_ = 0;
+          return StepStatus::ok;
+        }
+      }
+      return each_lane([&](Plain& lane, int i) { return lane.correct(y[i]); });
+    } else {
+      const unsigned elapsed = gap_ > 1 ? gap_ : 1u;
+      if (elapsed > max_gap_ + 1u) [[unlikely]] {
+        if (!is_finite(y) || reset(y) != StepStatus::ok) return StepStatus::measurement_rejected;
+        return StepStatus::restarted;
+      }
+      Correction step{states_};
       if (!correct_levels<false>(step, y, elapsed) || !is_finite(probe(step.states))) {
         // An absurd but finite u can leave a prediction from which no good y leads back.
         const bool state_is_to_blame =
@@ -139,20 +154,6 @@ class PredictorCorrector {
       commit(step);
       gap_ = 0;
       return elapsed > 1 ? StepStatus::gap_bridged : StepStatus::ok;
-    } else {
-      correct_levels<false>(step, y, elapsed);
-      const auto good = is_finite(probe(step.states));
-      for (std::size_t i = 0; i < Levels; ++i) {
-        for (std::size_t r = 0; r < size; ++r) {
-          step.states[i][r] = select(good, step.states[i][r], states_[i][r]);
-        }
-        step.innovations[i] = select(good, step.innovations[i], S(0.0));
-      }
-      commit(step);
-      gap_ = 0;
-      StepStatus status = elapsed > 1 ? StepStatus::gap_bridged : StepStatus::ok;
-      if (!all(good)) status |= StepStatus::measurement_rejected;
-      return status;
     }
   }
 
@@ -200,7 +201,15 @@ class PredictorCorrector {
 
   /// Predictions since the last correction; 0 when up to date; 65535 where the state was so large
   /// that it could not be predicted: the next good y restarts the observer.
-  [[nodiscard]] constexpr int missed() const noexcept { return gap_; }
+  [[nodiscard]] constexpr Lanes<int, S> missed() const noexcept {
+    if constexpr (PackScalar<S>) {
+      Lanes<int, S> missed;
+      for (int i = 0; i < lane_count<S>; ++i) missed[i] = gap_[i];
+      return missed;
+    } else {
+      return gap_;
+    }
+  }
 
   /// Input that the last prediction used.
   [[nodiscard]] constexpr const S& applied_input() const noexcept { return applied_input_; }
@@ -214,16 +223,26 @@ class PredictorCorrector {
 
   /// Between `predict` and `correct`, for gain laws whose gain is known before the measurement.
   [[nodiscard]] Preview preview() const noexcept requires PresetGainLaw<Law, size, S> {
+    if constexpr (PackScalar<S>) {
+      if (!(gap_ == 1 || gap_ == 0)) {
+        Preview all;
+        for (int i = 0; i < lane_count<S>; ++i) {
+          const auto lane = detail::get_lane<Plain>(*this, i).preview();
+          detail::copy_lane<true>(all.offset, lane.offset, i);
+          detail::copy_lane<true>(all.slope, lane.slope, i);
+        }
+        return all;
+      }
+    }
     Correction slope{};
     for_each_state(slope.states, [](S& x) { x = S(0.0); });
     Correction offset = slope;
-    if (restarts()) [[unlikely]] {
+    if (due_to_restart()) [[unlikely]] {
       for (auto& state : slope.states) state[0] = S(1.0);
     } else {
-      const unsigned elapsed = gap_ > 1 ? gap_ : 1u;
       offset.states = states_;
-      correct_levels<false>(offset, S(0.0), elapsed);
-      correct_levels<false>(slope, S(1.0), elapsed);
+      correct_levels<false>(offset, S(0.0), elapsed());
+      correct_levels<false>(slope, S(1.0), elapsed());
     }
     return {up_to_level<Levels - 1>(offset.states), up_to_level<Levels - 1>(slope.states)};
   }
@@ -232,7 +251,16 @@ class PredictorCorrector {
   /// of the gap. A gap beyond `max_gap` is none of its business: `correct` restarts then.
   [[nodiscard]] ScaledGain<size, S> correction_gain(const S& e) const noexcept
       requires(Levels == 1) {
-    return law_gain(std::get<0>(laws_), e, gap_ > 1 ? gap_ : 1u);
+    if constexpr (PackScalar<S>) {
+      if (!(gap_ == 1 || gap_ == 0)) {
+        ScaledGain<size, S> gain;
+        for (int i = 0; i < lane_count<S>; ++i) {
+          detail::copy_lane<true>(gain, detail::get_lane<Plain>(*this, i).correction_gain(e[i]), i);
+        }
+        return gain;
+      }
+    }
+    return law_gain(std::get<0>(laws_), e, elapsed());
   }
 
   /// The gain law, for a controller that works ahead of the measurement.
@@ -241,12 +269,20 @@ class PredictorCorrector {
   }
 
   /// True if so many samples are missing that the next `correct` restarts.
-  [[nodiscard]] constexpr bool restarts() const noexcept { return gap_ > max_gap_ + 1u; }
+  [[nodiscard]] constexpr Lanes<bool, S> restarts() const noexcept {
+    if constexpr (PackScalar<S>) {
+      Lanes<bool, S> due;
+      for (int i = 0; i < lane_count<S>; ++i) due[i] = gap_[i] > max_gap_ + 1u;
+      return due;
+    } else {
+      return gap_ > max_gap_ + 1u;
+    }
+  }
 
   /// After `predict`, before `correct`: the actuator held `u_applied` and not what `predict` was
   /// told. Adds Gamma (u_applied - u_told) to the prediction. A u that is bad, or would make the
   /// prediction not finite, changes nothing and is reported.
-  StepStatus revise_input(S u_applied) noexcept {
+  Status revise_input(S u_applied) noexcept {
     const S drive = scaled_input_gain_ * (u_applied - applied_input_);
     LevelStates next = states_;
     for (auto& state : next) {
@@ -255,14 +291,16 @@ class PredictorCorrector {
         std::get<r>(state) = std::get<r>(state) + detail::constant<S>(weight) * drive;
       });
     }
-    const auto good = is_finite(probe(next));
-    for (std::size_t i = 0; i < Levels; ++i) {
-      for (std::size_t r = 0; r < Order; ++r) {
-        states_[i][r] = select(good, next[i][r], states_[i][r]);
+    if (!all(is_finite(probe(next)))) [[unlikely]] {
+      if constexpr (PackScalar<S>) {
+        return each_lane([&](Plain& lane, int i) { return lane.revise_input(u_applied[i]); });
+      } else {
+        return StepStatus::input_rejected;
       }
     }
-    applied_input_ = select(good, u_applied, applied_input_);
-    return all(good) ? StepStatus::ok : StepStatus::input_rejected;
+    states_ = next;
+    applied_input_ = u_applied;
+    return StepStatus::ok;
   }
 
   /// b0, as it was given.
@@ -279,7 +317,7 @@ class PredictorCorrector {
   }
 
   /// Starts anew at (y, 0, .., 0). A y that is not finite changes nothing and is reported.
-  StepStatus reset(S y) noexcept {
+  Status reset(S y) noexcept {
     typename Chain::State state{};
     for (S& x : state) x = S(0.0);
     state[0] = y;
@@ -288,7 +326,7 @@ class PredictorCorrector {
 
   /// Starts anew at a given estimate, N x 1, physical units. A state that is not finite changes
   /// nothing and is reported.
-  StepStatus reset(const Estimate& state) noexcept {
+  Status reset(const Estimate& state) noexcept {
     return reset_scaled(Chain::scaled(state, sample_time()));
   }
 
@@ -296,7 +334,7 @@ class PredictorCorrector {
   /// estimate would otherwise run away with the turns.
   /// @return ok, or state_rejected where the offset, or what it would make of the estimate, is not
   ///         finite: nothing changes
-  constexpr StepStatus shift_output(const S& offset) noexcept {
+  constexpr Status shift_output(const S& offset) noexcept {
     LevelStates next = states_;
     for (auto& state : next) state[0] = state[0] + offset;
     return shift_to(next);
@@ -304,7 +342,7 @@ class PredictorCorrector {
 
   /// Adds `offset` (unit of y^(n)) to dhat, as a change of what else explains y^(n) asks for.
   /// @return as `shift_output`
-  constexpr StepStatus shift_disturbance(const S& offset) noexcept {
+  constexpr Status shift_disturbance(const S& offset) noexcept {
     LevelStates next = states_;
     next[0][Order] = next[0][Order] + Chain::scaled_input_gain(offset, sample_time());
     return shift_to(next);
@@ -314,6 +352,7 @@ class PredictorCorrector {
   /// and what a change of b0 no longer explains goes into the disturbance,
   /// dhat += (b0_old - b0_new) u, so that the control does not jump.
   Check<S> adopt(const PredictorCorrector& fresh) {
+    if constexpr (PackScalar<S>) return detail::adopt_lanes(*this, fresh);
     PredictorCorrector next = fresh;
     const S ratio = fresh.sample_time() * rate_;
     const bool same_time = !all(detail::absolute(S(fresh.rate_ - rate_)) > S(0.0));
@@ -366,7 +405,13 @@ class PredictorCorrector {
   [[nodiscard]] constexpr Laws& laws() noexcept { return laws_; }
 
  private:
+  friend struct detail::LaneAccess;
+  template <int OtherOrder, Scalar OtherS, int OtherExtension, class OtherLaw, int OtherLevels>
+  requires GainLaw<OtherLaw, OtherOrder + OtherExtension, OtherS>
+  friend class PredictorCorrector;
+
   using LevelStates = Array<typename Chain::State, Levels>;
+  using Plain = detail::PlainTwin<PredictorCorrector, S>;  ///< a lane
 
   /// A gap that is above every max_gap.
   static constexpr std::uint16_t restart_due = 65535;
@@ -384,14 +429,49 @@ class PredictorCorrector {
     });
   }
 
-  constexpr StepStatus shift_to(const LevelStates& next) noexcept {
-    const auto good = is_finite(probe(next));
-    for (std::size_t i = 0; i < Levels; ++i) {
-      for (std::size_t r = 0; r < size; ++r) {
-        states_[i][r] = select(good, next[i][r], states_[i][r]);
+  static constexpr auto fields(auto& o) noexcept {
+    return std::tie(o.states_, o.laws_, o.scaled_input_gain_, o.rate_, o.innovation_,
+                    o.applied_input_, o.input_gain_, o.sample_time_, o.gap_, o.max_gap_);
+  }
+
+  /// `step` with the observer of each lane.
+  template <class Step>
+  ESOKIT_COLD constexpr Status each_lane(Step&& step) noexcept {
+    Status status{};
+    detail::for_each_lane<Plain>(*this, [&](Plain& lane, int i) { status[i] = step(lane, i); });
+    return status;
+  }
+
+  constexpr Status shift_to(const LevelStates& next) noexcept {
+    if (!all(is_finite(probe(next)))) [[unlikely]] {
+      if constexpr (PackScalar<S>) {
+        return each_lane([&](Plain& lane, int i) {
+          auto lane_next = lane.states_;
+          detail::copy_lane<false>(next, lane_next, i);
+          return lane.shift_to(lane_next);
+        });
+      } else {
+        return StepStatus::state_rejected;
       }
     }
-    return all(good) ? StepStatus::ok : StepStatus::state_rejected;
+    states_ = next;
+    return StepStatus::ok;
+  }
+
+  /// Samples that the next correction bridges; of a pack whose lanes agree.
+  [[nodiscard]] constexpr unsigned elapsed() const noexcept {
+    if constexpr (PackScalar<S>) {
+      return 1u;
+    } else {
+      return gap_ > 1 ? gap_ : 1u;
+    }
+  }
+  [[nodiscard]] constexpr bool due_to_restart() const noexcept {
+    if constexpr (PackScalar<S>) {
+      return false;
+    } else {
+      return restarts();
+    }
   }
 
   ESOKIT_INLINE constexpr void advance_laws() noexcept {
@@ -484,8 +564,8 @@ class PredictorCorrector {
       auto& z = std::get<level>(step.states);
       const S e = measured - std::get<0>(z);
       std::get<level>(step.innovations) = e;
-      if constexpr (law_looks && PlainScalar<S>) {
-        if (!is_finite(e)) [[unlikely]] {
+      if constexpr (law_looks) {
+        if (!all(is_finite(e))) [[unlikely]] {
           fine = false;
           return;
         }
@@ -515,48 +595,71 @@ class PredictorCorrector {
     }
   }
 
-  ESOKIT_COLD StepStatus update_guarded(S y, S u_applied) noexcept {
-    const StepStatus predicted = predict_guarded(u_applied);
-    return predicted | correct(y);
+  ESOKIT_COLD Status update_guarded(S y, S u_applied) noexcept {
+    if constexpr (PackScalar<S>) {
+      return each_lane([&](Plain& lane, int i) { return lane.update_guarded(y[i], u_applied[i]); });
+    } else {
+      const StepStatus predicted = predict_guarded(u_applied);
+      return predicted | correct(y);
+    }
   }
 
-  StepStatus predict_guarded(S u_applied) noexcept {
-    StepStatus status = StepStatus::ok;
-    if (gap_ < restart_due) ++gap_;
-    LevelStates next = predicted_levels(scaled_input_gain_ * u_applied);
-    S input = u_applied;
-    auto good = is_finite(probe(next));
-    if (!all(good)) [[unlikely]] {
-      if constexpr (PlainScalar<S>) {
-        if (is_finite(u_applied) &&
-            !(detail::absolute(u_applied) > detail::absolute(applied_input_))) {
-          // Not u is to blame, which is no larger than the one before.
-          applied_input_ = u_applied;
-          gap_ = restart_due;
-          return StepStatus::prediction_dropped;
-        }
-      }
-      status = StepStatus::input_rejected;
-      input = select(good, u_applied, applied_input_);
-      next = predicted_levels(scaled_input_gain_ * input);
-      good = is_finite(probe(next));
-      if (!all(good)) {
-        status |= StepStatus::prediction_dropped;
-        // It is the state that cannot be predicted, and may never be again: y starts anew.
-        if constexpr (PlainScalar<S>) gap_ = restart_due;
-        for (std::size_t i = 0; i < Levels; ++i) {
-          for (std::size_t r = 0; r < size; ++r) {
-            next[i][r] = select(good, next[i][r], states_[i][r]);
-          }
-        }
+  Status predict_guarded(S u_applied) noexcept {
+    const LevelStates next = predicted_levels(scaled_input_gain_ * u_applied);
+    if (!all(is_finite(probe(next)))) [[unlikely]] {
+      if constexpr (PackScalar<S>) {
+        return each_lane([&](Plain& lane, int i) { return lane.predict_rejecting(u_applied[i]); });
+      } else {
+        return predict_rejecting(u_applied);
       }
     }
+    count_missed();
     states_ = next;
-    applied_input_ = input;
-    return status;
+    applied_input_ = u_applied;
+    return StepStatus::ok;
   }
 
-  StepStatus reset_scaled(const typename Chain::State& state) noexcept {
+  constexpr void count_missed() noexcept {
+    if constexpr (PackScalar<S>) {
+      for (std::uint16_t& gap : gap_.values) gap += gap < restart_due ? 1 : 0;
+    } else {
+      if (gap_ < restart_due) ++gap_;
+    }
+  }
+
+  /// Where u or the state is so large that the prediction is not finite.
+  ESOKIT_COLD StepStatus predict_rejecting(S u_applied) noexcept requires(!PackScalar<S>) {
+    LevelStates next = predicted_levels(scaled_input_gain_ * u_applied);
+    count_missed();
+    if (is_finite(probe(next))) {  // of a pack whose other lane it was
+      states_ = next;
+      applied_input_ = u_applied;
+      return StepStatus::ok;
+    }
+    if (is_finite(u_applied) && !(detail::absolute(u_applied) > detail::absolute(applied_input_))) {
+      // Not u is to blame, which is no larger than the one before.
+      applied_input_ = u_applied;
+      gap_ = restart_due;
+      return StepStatus::prediction_dropped;
+    }
+    next = predicted_levels(scaled_input_gain_ * applied_input_);
+    if (!is_finite(probe(next))) {
+      // It is the state that cannot be predicted, and may never be again: y starts anew.
+      gap_ = restart_due;
+      return StepStatus::input_rejected | StepStatus::prediction_dropped;
+    }
+    states_ = next;
+    return StepStatus::input_rejected;
+  }
+
+  Status reset_scaled(const typename Chain::State& state) noexcept {
+    if constexpr (PackScalar<S>) {
+      return each_lane([&](Plain& lane, int i) {
+        auto lane_state = lane.states_[0];
+        detail::copy_lane<false>(state, lane_state, i);
+        return lane.reset_scaled(lane_state);
+      });
+    }
     LevelStates states;
     for (auto& level : states) level = state;
     for (std::size_t i = 1; i < Levels; ++i) {
@@ -580,7 +683,7 @@ class PredictorCorrector {
   S applied_input_ = S(0.0);
   S input_gain_;
   S sample_time_;
-  std::uint16_t gap_ = 0;
+  Lanes<std::uint16_t, S> gap_{};
   std::uint16_t max_gap_;
 };
 

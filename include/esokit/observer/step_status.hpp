@@ -2,19 +2,19 @@
 /// What a step of an observer reports.
 #pragma once
 
+#include <esokit/core/lanes.hpp>
 #include <esokit/core/text.hpp>
 
 namespace esokit {
 
-/// Bit flags; `ok` is zero. A pack reports what happened in any of its lanes.
+/// Bit flags; `ok` is zero. A step of packs reports one a lane, `StatusOf`.
 enum class StepStatus : unsigned char {
   ok = 0,
   /// y was NaN, infinite, or so large that the estimate would not be finite: predicted only.
   measurement_rejected = 1,
   /// u was NaN, infinite or too large: predicted with the last good u.
   input_rejected = 2,
-  /// No good u gives a finite prediction: the state stands still, and the next good y restarts it
-  /// (of a pack the lanes only stand still).
+  /// No good u gives a finite prediction: the state stands still, and the next good y restarts it.
   prediction_dropped = 4,
   /// Samples were missing before this correction; it used the gain for the whole gap.
   gap_bridged = 8,
@@ -44,6 +44,29 @@ constexpr StepStatus& operator|=(StepStatus& a, StepStatus b) noexcept { return 
 constexpr bool has(StepStatus status, StepStatus flag) noexcept {
   return (static_cast<unsigned char>(status) & static_cast<unsigned char>(flag)) != 0;
 }
+
+/// What a step of scalar S reports: a status, of a pack one a lane.
+template <class S>
+using StatusOf = Lanes<StepStatus, S>;
+
+/// Lane by lane, and true if `flag` is set in any.
+/// @{
+template <int Count>
+constexpr PerLane<StepStatus, Count> operator|(const PerLane<StepStatus, Count>& a,
+                                               const PerLane<StepStatus, Count>& b) noexcept {
+  PerLane<StepStatus, Count> both;
+  for (int i = 0; i < Count; ++i) both[i] = a[i] | b[i];
+  return both;
+}
+
+template <int Count>
+constexpr bool has(const PerLane<StepStatus, Count>& status, StepStatus flag) noexcept {
+  for (const StepStatus lane : status.values) {
+    if (has(lane, flag)) return true;
+  }
+  return false;
+}
+/// @}
 
 /// Has text.
 template <>

@@ -1,0 +1,200 @@
+/// @file
+/// The lanes of a pack, and of what is made of packs: how an observer of packs is told apart into
+/// plain ones and put together again.
+///
+/// Where all lanes are well an observer of packs computes with packs. Where one is not (a bad
+/// sample, a gap, a restart) each lane goes through the observer of the plain scalar: what happens
+/// then is written once, and the lanes are its equals by construction.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <esokit/core/declared.hpp>
+#include <esokit/core/scalar.hpp>
+#include <esokit/core/unroll.hpp>
+#include <optional>
+#include <tuple>
+#include <type_traits>
+#include <utility>
+
+namespace esokit {
+
+/// Numbers in a scalar: one, or those of a pack, which specialises it and has `x[i]`, i = 0 ..
+/// count - 1.
+template <class T>
+inline constexpr int lane_count = 1;
+
+/// A scalar of several numbers.
+template <class S>
+concept PackScalar = Scalar<S> && lane_count<S> >
+1 && requires(S x, const S& constant) {
+  requires std::floating_point<std::remove_cvref_t<decltype(constant[0])>>;
+  x[0] = constant[0];
+};
+
+namespace detail {
+
+template <class S>
+struct LaneScalarOf {
+  using type = S;
+};
+template <PackScalar S>
+struct LaneScalarOf<S> {
+  using type = std::remove_cvref_t<decltype(std::declval<const S&>()[0])>;
+};
+
+}  // namespace detail
+
+/// The scalar of a lane: double of a pack of doubles.
+template <class S>
+using LaneScalar = typename detail::LaneScalarOf<S>::type;
+
+/// Something that is no number, one a lane.
+template <class T, int Count>
+struct PerLane {
+  Array<T, Count> values{};  ///< of lane 0, 1, ..
+
+  constexpr PerLane() noexcept = default;
+  /// The same in every lane.
+  constexpr PerLane(T value) noexcept { values.fill(value); }
+
+  /// Of a lane.
+  /// @{
+  [[nodiscard]] constexpr T& operator[](int lane) noexcept {
+    return values[static_cast<std::size_t>(lane)];
+  }
+  [[nodiscard]] constexpr const T& operator[](int lane) const noexcept {
+    return values[static_cast<std::size_t>(lane)];
+  }
+  /// @}
+
+  /// In every lane.
+  ESOKIT_INLINE friend constexpr bool operator==(const PerLane& a, const PerLane& b) noexcept {
+    if constexpr (std::has_unique_object_representations_v<PerLane>) {
+      // In words: compilers call memcmp for an array.
+      constexpr std::size_t size = sizeof(PerLane);
+      using Word = std::conditional_t<
+          size % 8 == 0, std::uint64_t,
+          std::conditional_t<size % 4 == 0, std::uint32_t,
+                             std::conditional_t<size % 2 == 0, std::uint16_t, std::uint8_t>>>;
+      using Words = std::array<Word, size / sizeof(Word)>;
+      const auto of_a = std::bit_cast<Words>(a);
+      const auto of_b = std::bit_cast<Words>(b);
+      Word differs = 0;
+      for (std::size_t i = 0; i < of_a.size(); ++i) {
+        differs = static_cast<Word>(differs | (of_a[i] ^ of_b[i]));
+      }
+      return differs == 0;
+    } else {
+      return a.values == b.values;
+    }
+  }
+};
+
+/// A T for each lane of S: T itself where there is one.
+template <class T, class S>
+using Lanes = std::conditional_t<lane_count<S> == 1, T, PerLane<T, lane_count<S>>>;
+
+namespace detail {
+
+/// How a class lets its lanes be told apart: it has `with_scalar<T>`, itself of another scalar, and
+/// `fields(object)`, a tie of all that it holds, private for this friend.
+struct LaneAccess {
+  template <class Object>
+  static constexpr bool has_fields = requires(Object& object) {
+    std::remove_const_t<Object>::fields(object);
+  };
+  template <class Object>
+  static constexpr auto fields(Object& object) noexcept {
+    return std::remove_const_t<Object>::fields(object);
+  }
+};
+
+template <class T>
+struct IsArray : std::false_type {};
+template <class T, std::size_t Count>
+struct IsArray<std::array<T, Count>> : std::true_type {};
+template <class T>
+struct IsOptional : std::false_type {};
+template <class T>
+struct IsOptional<std::optional<T>> : std::true_type {};
+
+/// Copies lane `i` of `packed` to `plain`, or back (`Back`). What is no pack and not per lane is
+/// common to all.
+template <bool Back, class Packed, class Plain>
+constexpr void copy_lane(Packed& packed, Plain& plain, int i) noexcept {
+  if constexpr (std::is_same_v<std::remove_const_t<Packed>, std::remove_const_t<Plain>>) {
+    if constexpr (Back) {
+      packed = plain;
+    } else {
+      plain = packed;
+    }
+  } else if constexpr (IsArray<std::remove_const_t<Packed>>::value) {
+    for (std::size_t k = 0; k < packed.size(); ++k) copy_lane<Back>(packed[k], plain[k], i);
+  } else if constexpr (IsOptional<std::remove_const_t<Packed>>::value) {
+    if constexpr (!Back) {
+      if (!packed) {
+        plain.reset();
+      } else {
+        plain.emplace();
+        copy_lane<Back>(*packed, *plain, i);
+      }
+    }
+  } else if constexpr (LaneAccess::has_fields<Packed>) {
+    auto of_packed = LaneAccess::fields(packed);
+    auto of_plain = LaneAccess::fields(plain);
+    constexpr auto count = std::tuple_size_v<decltype(of_packed)>;
+    static_assert(count == std::tuple_size_v<decltype(of_plain)>);
+    [&]<std::size_t... K>(std::index_sequence<K...>) {
+      (copy_lane<Back>(std::get<K>(of_packed), std::get<K>(of_plain), i), ...);
+    }
+    (std::make_index_sequence<count>{});
+  } else if constexpr (Back) {
+    packed[i] = plain;
+  } else {
+    plain = packed[i];
+  }
+}
+
+template <class Object, class S>
+struct PlainTwinOf {
+  using type = Object;
+};
+template <class Object, PackScalar S>
+struct PlainTwinOf<Object, S> {
+  using type = typename Object::template with_scalar<LaneScalar<S>>;
+};
+
+/// What a lane of an Object of S is; of a plain scalar the Object itself.
+template <class Object, class S>
+using PlainTwin = typename PlainTwinOf<Object, S>::type;
+
+/// An object whose fields are yet to be filled.
+template <class T>
+constexpr T blank() noexcept {
+  static_assert(std::is_trivially_copyable_v<T>);
+  return std::bit_cast<T>(std::array<unsigned char, sizeof(T)>{});
+}
+
+/// Lane `i` of an observer, law or controller of packs, as one of the plain scalar.
+template <class Plain, class Packed>
+[[nodiscard]] constexpr Plain get_lane(const Packed& packed, int i) noexcept {
+  auto plain = blank<Plain>();
+  copy_lane<false>(packed, plain, i);
+  return plain;
+}
+
+/// Calls f(plain, i) for each lane of `packed` and puts `plain` back.
+template <class Plain, class Packed, class Function>
+constexpr void for_each_lane(Packed& packed, Function&& f) noexcept {
+  for (int i = 0; i < lane_count<typename Packed::scalar_type>; ++i) {
+    Plain plain = get_lane<Plain>(packed, i);
+    f(plain, i);
+    copy_lane<true>(packed, plain, i);
+  }
+}
+
+}  // namespace detail
+}  // namespace esokit

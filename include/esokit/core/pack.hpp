@@ -1,0 +1,314 @@
+/// @file
+/// Pack: several floats or doubles that are worked on at once, as one scalar of the library.
+#pragma once
+
+#include <bit>
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <esokit/core/lanes.hpp>
+#include <esokit/core/scalar.hpp>
+#include <initializer_list>
+
+namespace esokit {
+
+namespace detail {
+
+/// Bytes of the vector registers that the compiler may use.
+inline constexpr int register_bytes =
+#if defined(__AVX512F__)
+    64;
+#elif defined(__AVX__)
+    32;
+#else
+    16;
+#endif
+
+/// Numbers in one register.
+template <class S>
+inline constexpr int register_lanes = register_bytes / static_cast<int>(sizeof(S));
+
+/// `Count` numbers in as many registers as they need, in the compilers' vector types. A vector type
+/// wider than a register would go from function to function by other rules (-Wpsabi).
+template <class S, int Count>
+struct Registers {
+  typedef S Register __attribute__((vector_size(sizeof(S) * Count)));
+
+  // A vector may be looked at as what it consists of, with both compilers.
+  [[nodiscard]] S& operator[](int lane) noexcept { return reinterpret_cast<S*>(&value)[lane]; }
+  [[nodiscard]] const S& operator[](int lane) const noexcept {
+    return reinterpret_cast<const S*>(&value)[lane];
+  }
+
+  /// f of the registers of all `from`, one after the other.
+  template <class Function, class... From>
+  ESOKIT_INLINE static constexpr Registers each(Function&& f, const From&... from) noexcept {
+    return {Register(f(from.value...))};
+  }
+
+  /// All registers by `or` in one.
+  [[nodiscard]] ESOKIT_INLINE constexpr Register any() const noexcept { return value; }
+
+  Register value;
+};
+
+// In halves and not as an array, which GCC 12 keeps in memory.
+template <class S, int Count>
+requires(Count > register_lanes<S>) struct Registers<S, Count> {
+  using Half = Registers<S, Count / 2>;
+  using Register = typename Half::Register;
+
+  [[nodiscard]] S& operator[](int lane) noexcept {
+    return lane < Count / 2 ? low[lane] : high[lane - Count / 2];
+  }
+  [[nodiscard]] const S& operator[](int lane) const noexcept {
+    return lane < Count / 2 ? low[lane] : high[lane - Count / 2];
+  }
+  template <class Function, class... From>
+  ESOKIT_INLINE static constexpr Registers each(Function&& f, const From&... from) noexcept {
+    return {Half::each(f, from.low...), Half::each(f, from.high...)};
+  }
+  [[nodiscard]] ESOKIT_INLINE constexpr Register any() const noexcept {
+    return low.any() | high.any();
+  }
+
+  Half low;
+  Half high;
+};
+
+template <class S>
+using BitsOf = std::conditional_t<sizeof(S) == 4, std::int32_t, std::int64_t>;
+
+/// True if no bit of a register is set.
+template <class Bits>
+ESOKIT_INLINE constexpr bool no_bits(const Bits& bits) noexcept {
+  constexpr int words = sizeof(Bits) / sizeof(std::int64_t);
+  if constexpr (words < 2) {
+    using Word = std::conditional_t<words == 1, std::uint64_t, std::uint32_t>;
+    return std::bit_cast<Word>(bits) == 0;
+  } else {
+    // By subscript: an array of the words would go through memory.
+    const auto word = std::bit_cast<typename Registers<std::int64_t, words>::Register>(bits);
+#if defined(__AVX__)
+    if constexpr (words == 4) {
+      if (!std::is_constant_evaluated()) {
+        typedef long long Words __attribute__((vector_size(32)));
+        return __builtin_ia32_ptestz256(std::bit_cast<Words>(word), std::bit_cast<Words>(word)) !=
+               0;
+      }
+    }
+#endif
+    std::int64_t any = 0;
+    unroll<words>([&](auto i) ESOKIT_INLINE_LAMBDA { any |= word[int{i}]; });
+    return any == 0;
+  }
+}
+
+}  // namespace detail
+
+/// Lanes that fill one vector register of the target that is compiled for: 4 doubles with AVX2.
+template <std::floating_point S>
+inline constexpr int default_lanes = detail::register_lanes<S>;
+
+/// What a comparison of packs says, lane by lane.
+template <class S, int Count>
+class PackMask {
+  using Bits = detail::Registers<detail::BitsOf<S>, Count>;
+  using Register = typename Bits::Register;
+
+ public:
+  /// @cond
+  ESOKIT_INLINE constexpr explicit PackMask(const Bits& bits) noexcept : bits_(bits) {}
+  [[nodiscard]] ESOKIT_INLINE constexpr const Bits& bits() const noexcept { return bits_; }
+  /// @endcond
+
+  /// Whether it holds in a lane.
+  [[nodiscard]] bool operator[](int lane) const noexcept { return bits_[lane] != 0; }
+
+  /// Lane by lane.
+  /// @{
+  ESOKIT_INLINE friend constexpr PackMask operator&&(const PackMask& a,
+                                                     const PackMask& b) noexcept {
+    return PackMask(
+        Bits::each([](auto x, auto y) ESOKIT_INLINE_LAMBDA { return x & y; }, a.bits_, b.bits_));
+  }
+  ESOKIT_INLINE friend constexpr PackMask operator||(const PackMask& a,
+                                                     const PackMask& b) noexcept {
+    return PackMask(
+        Bits::each([](auto x, auto y) ESOKIT_INLINE_LAMBDA { return x | y; }, a.bits_, b.bits_));
+  }
+  ESOKIT_INLINE friend constexpr PackMask operator!(const PackMask& a) noexcept {
+    return PackMask(Bits::each([](auto x) ESOKIT_INLINE_LAMBDA { return ~x; }, a.bits_));
+  }
+  /// @}
+
+  /// True if it holds in every lane.
+  ESOKIT_INLINE friend constexpr bool all(const PackMask& mask) noexcept {
+    return detail::no_bits((!mask).bits_.any());
+  }
+
+ private:
+  Bits bits_;
+};
+
+/// `Count` floats or doubles, one of each of as many plants: a scalar of the library whose
+/// arithmetic is done on all lanes at once.
+///
+/// An observer or controller of packs is that many of the plain scalar, bit for bit (where the
+/// compiler contracts no products and sums, -ffp-contract=off), with settings, faults, gaps and
+/// status of each lane its own.
+/// @tparam S float or double @tparam Count a power of two; more than `default_lanes` take several
+///         registers, less leave a part of one idle
+template <std::floating_point S, int Count = default_lanes<S>>
+class Pack {
+  static_assert(std::same_as<S, float> || std::same_as<S, double>,
+                "esokit: a pack is made of float or double");
+  static_assert(Count >= 2 && Count <= 64 && std::has_single_bit(static_cast<unsigned>(Count)),
+                "esokit: a pack has 2, 4, 8, .. 64 lanes");
+
+  using Values = detail::Registers<S, Count>;
+  using Bits = detail::Registers<detail::BitsOf<S>, Count>;
+  using Register = typename Values::Register;
+  using BitRegister = typename Bits::Register;
+
+ public:
+  using value_type = S;                ///< of a lane
+  using Mask = PackMask<S, Count>;     ///< what a comparison gives
+  static constexpr int lanes = Count;  ///< numbers in it
+
+  /// Zero.
+  constexpr Pack() noexcept : Pack(0.0) {}
+  /// The same number in every lane.
+  ESOKIT_INLINE constexpr explicit Pack(double value) noexcept
+      : values_(Values::each(
+            [value]() ESOKIT_INLINE_LAMBDA { return Register{} + static_cast<S>(value); })) {}
+  /// One number a lane.
+  constexpr Pack(const Array<S, Count>& values) noexcept : values_(std::bit_cast<Values>(values)) {}
+
+  /// The number of a lane.
+  /// @{
+  [[nodiscard]] S& operator[](int lane) noexcept { return values_[lane]; }
+  [[nodiscard]] const S& operator[](int lane) const noexcept { return values_[lane]; }
+  /// @}
+
+  /// Lane by lane.
+  /// @{
+  ESOKIT_INLINE friend constexpr Pack operator+(const Pack& a, const Pack& b) noexcept {
+    return each([](auto x, auto y) ESOKIT_INLINE_LAMBDA { return x + y; }, a, b);
+  }
+  ESOKIT_INLINE friend constexpr Pack operator-(const Pack& a, const Pack& b) noexcept {
+    return each([](auto x, auto y) ESOKIT_INLINE_LAMBDA { return x - y; }, a, b);
+  }
+  ESOKIT_INLINE friend constexpr Pack operator*(const Pack& a, const Pack& b) noexcept {
+    return each([](auto x, auto y) ESOKIT_INLINE_LAMBDA { return x * y; }, a, b);
+  }
+  ESOKIT_INLINE friend constexpr Pack operator/(const Pack& a, const Pack& b) noexcept {
+    return each([](auto x, auto y) ESOKIT_INLINE_LAMBDA { return x / y; }, a, b);
+  }
+  ESOKIT_INLINE friend constexpr Pack operator-(const Pack& a) noexcept {
+    return each([](auto x) ESOKIT_INLINE_LAMBDA { return -x; }, a);
+  }
+  ESOKIT_INLINE friend constexpr Mask operator<(const Pack& a, const Pack& b) noexcept {
+    return test([](auto x, auto y) ESOKIT_INLINE_LAMBDA { return x < y; }, a, b);
+  }
+  ESOKIT_INLINE friend constexpr Mask operator>(const Pack& a, const Pack& b) noexcept {
+    return test([](auto x, auto y) ESOKIT_INLINE_LAMBDA { return x > y; }, a, b);
+  }
+  ESOKIT_INLINE friend constexpr Mask operator<=(const Pack& a, const Pack& b) noexcept {
+    return test([](auto x, auto y) ESOKIT_INLINE_LAMBDA { return x <= y; }, a, b);
+  }
+  ESOKIT_INLINE friend constexpr Mask operator>=(const Pack& a, const Pack& b) noexcept {
+    return test([](auto x, auto y) ESOKIT_INLINE_LAMBDA { return x >= y; }, a, b);
+  }
+  /// @}
+
+  /// `mask ? a : b`, lane by lane.
+  ESOKIT_INLINE friend constexpr Pack select(const Mask& mask, const Pack& a,
+                                             const Pack& b) noexcept {
+    return Pack(FromRegisters{}, Values::each(
+                                     [](auto m, auto x, auto y) ESOKIT_INLINE_LAMBDA {
+                                       return std::bit_cast<Register>(
+                                           BitRegister((std::bit_cast<BitRegister>(x) & m) |
+                                                       (std::bit_cast<BitRegister>(y) & ~m)));
+                                     },
+                                     mask.bits(), a.values_, b.values_));
+  }
+
+  /// Neither NaN nor infinite, by bits: under -ffast-math too.
+  ESOKIT_INLINE friend constexpr Mask is_finite(const Pack& a) noexcept {
+    [[maybe_unused]] constexpr auto exponent =
+        std::bit_cast<detail::BitsOf<S>>(std::numeric_limits<S>::infinity());
+    Pack looked_at = a;
+#if defined(__clang__) && defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
+    if (!std::is_constant_evaluated()) asm("" : "+m"(looked_at));  // see detail::opaque
+#endif
+    return test(
+        [](auto x)
+            ESOKIT_INLINE_LAMBDA { return (std::bit_cast<BitRegister>(x) & exponent) != exponent; },
+        looked_at);
+  }
+
+  /// abs(a), lane by lane.
+  [[nodiscard]] ESOKIT_INLINE constexpr Pack magnitude() const noexcept {
+    [[maybe_unused]] constexpr auto rest = (std::numeric_limits<detail::BitsOf<S>>::max)();
+    return each(
+        [](auto x) ESOKIT_INLINE_LAMBDA {
+          return std::bit_cast<Register>(BitRegister(std::bit_cast<BitRegister>(x) & rest));
+        },
+        *this);
+  }
+
+  /// Lane by lane, as the functions of the standard library.
+  /// @{
+  friend Pack exp(const Pack& x) noexcept {
+    return lane_by_lane([](S a) { return std::exp(a); }, x);
+  }
+  friend Pack expm1(const Pack& x) noexcept {
+    return lane_by_lane([](S a) { return std::expm1(a); }, x);
+  }
+  friend Pack sqrt(const Pack& x) noexcept {
+    return lane_by_lane([](S a) { return std::sqrt(a); }, x);
+  }
+  friend Pack pow(const Pack& x, const Pack& p) noexcept {
+    return lane_by_lane([](S a, S b) { return std::pow(a, b); }, x, p);
+  }
+  /// @}
+
+ private:
+  struct FromRegisters {};
+  ESOKIT_INLINE constexpr Pack(FromRegisters, const Values& values) noexcept : values_(values) {}
+
+  template <class Function, class... Packs>
+  ESOKIT_INLINE static constexpr Pack each(Function&& f, const Packs&... packs) noexcept {
+    return Pack(FromRegisters{}, Values::each(f, packs.values_...));
+  }
+  template <class Function, class... Packs>
+  ESOKIT_INLINE static constexpr Mask test(Function&& f, const Packs&... packs) noexcept {
+    return Mask(Bits::each(f, packs.values_...));
+  }
+  template <class Function, class... Packs>
+  static Pack lane_by_lane(Function&& f, const Packs&... packs) noexcept {
+    Pack result;
+    for (int i = 0; i < Count; ++i) result[i] = f(packs[i]...);
+    return result;
+  }
+
+  Values values_;
+};
+
+/// Its lanes.
+template <class S, int Count>
+inline constexpr int lane_count<Pack<S, Count>> = Count;
+
+namespace detail {
+
+template <class S, int Count>
+struct Absolute<Pack<S, Count>> {
+  ESOKIT_INLINE static constexpr Pack<S, Count> of(const Pack<S, Count>& value) noexcept {
+    return value.magnitude();
+  }
+};
+
+}  // namespace detail
+}  // namespace esokit
