@@ -37,9 +37,11 @@
 #include <esokit/core/expected.hpp>
 #include <esokit/core/fal.hpp>
 #include <esokit/core/interval.hpp>
+#include <esokit/core/lanes.hpp>
 #include <esokit/core/language.hpp>
 #include <esokit/core/linear_equations.hpp>
 #include <esokit/core/matrix.hpp>
+#include <esokit/core/pack.hpp>
 #include <esokit/core/power.hpp>
 #include <esokit/core/scalar.hpp>
 #include <esokit/core/snapshot.hpp>

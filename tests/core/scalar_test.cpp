@@ -50,6 +50,30 @@ static_assert(!Scalar<Almost<3>>, "no comparison");
 static_assert(!Scalar<Almost<4>>, "no is_finite");
 static_assert(!Scalar<Almost<5>>, "no select");
 
+/// A comparison of several numbers, of which nothing says how many.
+struct Undeclared : Almost<0> {
+  using Almost<0>::Almost;
+  Undeclared() = default;
+  Undeclared(Almost<0> one) : Almost<0>(one) {}
+  struct Mask {};
+  friend Mask operator<(Undeclared, Undeclared) { return {}; }
+  friend Mask is_finite(Undeclared) { return {}; }
+  friend bool all(Mask) { return true; }
+  friend Undeclared select(Mask, Undeclared a, Undeclared) { return a; }
+};
+/// It says so, and has no numbers to be taken out.
+struct WithoutNumbers : Undeclared {
+  using Undeclared::Undeclared;
+};
+
+}  // namespace
+template <>
+inline constexpr int esokit::lane_count<WithoutNumbers> = 2;
+namespace {
+
+static_assert(!Scalar<Undeclared>, "a scalar whose comparison is a mask has to declare its lanes");
+static_assert(!Scalar<WithoutNumbers>, "and to give the number of each");
+
 struct MoveOnly : Almost<0> {
   using Almost<0>::Almost;
   MoveOnly(const MoveOnly&) = delete;

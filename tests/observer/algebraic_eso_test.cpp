@@ -15,7 +15,6 @@
 #include <support/algebraic_reference.hpp>
 #include <support/dual.hpp>
 #include <support/numbers.hpp>
-#include <support/pack.hpp>
 #include <support/refusal.hpp>
 #include <utility>
 #include <vector>
@@ -844,48 +843,6 @@ TEST(AlgebraicEso, FloatIsStableThroughSevenStates) {
   float_is_stable<4, 3>();
 }
 
-/// Each lane of a pack is an observer of its own, also where one settles before the other.
-TEST(AlgebraicEso, PackEqualsItsLanes) {
-  using S = Pack<double, 2>;
-  const auto make = [](const auto& bandwidth, const auto& shift) {
-    using T = std::remove_cvref_t<decltype(bandwidth)>;
-    return AlgebraicEso<2, T>::make({.observer_bandwidth = bandwidth,
-                                     .frequency_shift = shift,
-                                     .input_gain = T(input_gain),
-                                     .sample_time = T(1e-3),
-                                     .blanking = T(0.0)})
-        .value();
-  };
-  auto pack = make(S({60.0, 20.0}), S({500.0, 2.0}));
-  auto first = make(60.0, 500.0);
-  auto second = make(20.0, 2.0);
-  Random random(41);
-  for (int k = 0; k < 2000; ++k) {
-    const double y0 = random.uniform(-1, 1);
-    const double y1 = random.uniform(-1, 1);
-    pack.update(S({y0, y1}), S(0.3));
-    first.update(y0, 0.3);
-    second.update(y1, 0.3);
-    for (int i = 0; i < 3; ++i) {
-      const double scale = std::pow(1e3, i);
-      ASSERT_NEAR(pack.raw_estimate()(i)[0], first.raw_estimate()(i), 1e-12 * scale) << k;
-      ASSERT_NEAR(pack.raw_estimate()(i)[1], second.raw_estimate()(i), 1e-12 * scale) << k;
-    }
-  }
-  EXPECT_TRUE(first.settled());
-  EXPECT_FALSE(second.settled());
-  EXPECT_FALSE(pack.settled());
-  // Holds come from the worst lane.
-  const auto noisy = AlgebraicEso<2, S>::make({.observer_bandwidth = S(60.0),
-                                               .frequency_shift = S(0.1),
-                                               .input_gain = S(input_gain),
-                                               .sample_time = S(1e-3),
-                                               .measurement_noise = S({1e-4, 1e-3}),
-                                               .disturbance_noise = S(1.0)})
-                         .value();
-  EXPECT_NEAR(noisy.blanking()[0], std::ceil(1e3 * std::pow(720 * 1e-6 * 1e-3, 0.2)) * 1e-3, 1e-12);
-}
-
 /// d dhat / d lambda, against a difference.
 TEST(AlgebraicEso, DerivativeBySettings) {
   const auto run = [](const auto& lambda) {
@@ -986,6 +943,26 @@ TEST(AlgebraicEso, BoundedAndCorrectForEveryBandwidth) {
       }
     }
   }
+}
+
+/// Settled, and driven until the state cannot be predicted: the restart at y is published, and not
+/// what was held at the start.
+TEST(AlgebraicEso, PublishesTheRestartOfASettledObserver) {
+  auto eso = AlgebraicEso<2>::make({.observer_bandwidth = 0.5,
+                                    .frequency_shift = 500,
+                                    .input_gain = 1,
+                                    .sample_time = 0.01,
+                                    .blanking = 0.05})
+                 .value();
+  for (int k = 0; k < 20000 && !eso.settled(); ++k) eso.update(0.25, 0);
+  ASSERT_TRUE(eso.settled());
+  StepStatus status = StepStatus::ok;
+  for (int k = 0; k < 1000 && !has(status, StepStatus::restarted); ++k) {
+    ASSERT_TRUE(eso.settled());
+    status = eso.update(0.5, 1e308);
+  }
+  ASSERT_TRUE(has(status, StepStatus::restarted));
+  EXPECT_EQ(eso.estimate()(0), 0.5);
 }
 
 }  // namespace

@@ -31,8 +31,14 @@ class Pack {
   explicit Pack(double value) { lane_.fill(static_cast<T>(value)); }
   explicit Pack(const esokit::Array<T, Width>& lanes) : lane_(lanes) {}
 
-  T& operator[](std::size_t i) { return lane_[i]; }
-  const T& operator[](std::size_t i) const { return lane_[i]; }
+  template <class Index>
+  T& operator[](Index i) {
+    return lane_[static_cast<std::size_t>(i)];
+  }
+  template <class Index>
+  const T& operator[](Index i) const {
+    return lane_[static_cast<std::size_t>(i)];
+  }
 
   friend Pack operator+(const Pack& a, const Pack& b) {
     return each(a, b, [](T x, T y) { return x + y; });
@@ -90,3 +96,6 @@ class Pack {
 };
 
 }  // namespace esokit_test
+
+template <class T, int Width>
+inline constexpr int esokit::lane_count<esokit_test::Pack<T, Width>> = Width;

@@ -28,6 +28,13 @@ struct AdrcConfig {
   MissingRule<S> missing{};   ///< what to do when measurements stay away
   int measurement_divider = 1;  ///< D: a measurement is due at every D-th update, the others ignore
                                 ///< y; 1 .. 1000, not above the observer's max_gap
+
+  /// @cond
+  static constexpr auto fields(auto& c) noexcept {
+    return std::tie(c.observer, c.controller_bandwidth, c.gains, c.domain, c.half_gain, c.limits,
+                    c.start_hold, c.missing, c.measurement_divider);
+  }
+  /// @endcond
 };
 
 /// u = (v - dhat) / b0 around an observer, within an actuator's limits.
@@ -71,22 +78,18 @@ class Adrc {
   using Reference = Vector<S, order + 1>;              ///< (r, r', .., r^(n)), n + 1 x 1
 
   using Config = AdrcConfig<Observer>;  ///< settings of make
+  using Status = StatusOf<S>;           ///< StepStatus, of a pack one a lane
+  template <class T>
+  using with_scalar = Adrc<detail::WithScalar<Observer, T>, Form>;  ///< the same of another scalar
 
   /// Checks the settings and does all the design work.
   /// @return the controller, or an error that names the field
   static Expected<Adrc, Error<S>> make(const Config& config) {
-    const auto observer = Observer::make(observer_config(config));
-    if (!observer) return observer.error();
-    const auto& chain = chain_config<Observer>(config.observer);
-    const auto law = make_law(config, chain.sample_time);
-    if (!law) return law.error();
-    const auto scaled = FastLaw::make(*law, *observer);
-    if (!scaled) return scaled.error();
-    const auto loop = Loop::make(
-        *observer, {config.limits, config.start_hold, config.missing, config.measurement_divider},
-        chain.max_gap);
-    if (!loop) return loop.error();
-    return Adrc(*loop, *law, *scaled, config);
+    if constexpr (PackScalar<S>) {
+      return detail::make_lanes<Adrc>(config);
+    } else {
+      return make_one(config);
+    }
   }
 
   /// One sample. @param y measurement, NaN if missing @param reference r, constant
@@ -153,14 +156,22 @@ class Adrc {
   }
 
   /// Takes over a plant that stands at y under u, the reference being y too.
-  StepStatus start(S y, S u) noexcept { return start(y, u, y); }
+  Status start(S y, S u) noexcept { return start(y, u, y); }
 
   /// Takes over a plant that stands at y under u. @param reference matters to the error-based form
   /// @return ok, or input_rejected or state_rejected where u or y is not finite: nothing changes
-  StepStatus start(S y, S u, S reference) noexcept {
-    // One by one: told not to expect NaN, a compiler makes zero of y - y.
-    if (!is_finite(y) || !is_finite(reference)) return StepStatus::state_rejected;
-    return loop_.start(measured(y, reference), u);
+  Status start(S y, S u, S reference) noexcept {
+    if constexpr (PackScalar<S>) {
+      using Plain = detail::PlainTwin<Adrc, S>;
+      Status status{};
+      detail::for_each_lane<Plain>(
+          *this, [&](Plain& lane, int i) { status[i] = lane.start(y[i], u[i], reference[i]); });
+      return status;
+    } else {
+      // One by one: told not to expect NaN, a compiler makes zero of y - y.
+      if (!is_finite(y) || !is_finite(reference)) return StepStatus::state_rejected;
+      return loop_.start(measured(y, reference), u);
+    }
   }
 
   /// New settings while running. A refused config changes nothing. A start hold that is running
@@ -170,6 +181,7 @@ class Adrc {
   /// The same, with the settings of `fresh`, as `make` gave it: no design work, fit for an
   /// interrupt.
   Check<S> adopt(const Adrc& fresh) {
+    if constexpr (PackScalar<S>) return detail::adopt_lanes(*this, fresh);
     if (auto ok = loop_.adopt(fresh.loop_); !ok) return ok;
     law_ = fresh.law_;
     fast_law_ = fresh.fast_law_;
@@ -205,13 +217,33 @@ class Adrc {
   /// What the law asked for before the limits.
   [[nodiscard]] const S& requested() const noexcept { return loop_.requested(); }
   /// What the observer said of the last sample.
-  [[nodiscard]] StepStatus status() const noexcept { return loop_.status(); }
+  [[nodiscard]] Status status() const noexcept { return loop_.status(); }
   /// Whether the law, the start hold or the missing rule decides about u.
-  [[nodiscard]] LoopMode mode() const noexcept { return loop_.mode(); }
+  [[nodiscard]] Lanes<LoopMode, S> mode() const noexcept { return loop_.mode(); }
   /// k_0 .. k_(n-1).
   [[nodiscard]] const Array<S, order>& gains() const noexcept { return law_.gains(); }
 
  private:
+  friend struct detail::LaneAccess;
+  static constexpr auto fields(auto& o) noexcept {
+    return std::tie(o.loop_, o.law_, o.fast_law_, o.spec_);
+  }
+
+  static Expected<Adrc, Error<S>> make_one(const Config& config) {
+    const auto observer = Observer::make(observer_config(config));
+    if (!observer) return observer.error();
+    const auto& chain = chain_config<Observer>(config.observer);
+    const auto law = make_law(config, chain.sample_time);
+    if (!law) return law.error();
+    const auto scaled = FastLaw::make(*law, *observer);
+    if (!scaled) return scaled.error();
+    const auto loop = Loop::make(
+        *observer, {config.limits, config.start_hold, config.missing, config.measurement_divider},
+        chain.max_gap);
+    if (!loop) return loop.error();
+    return Adrc(*loop, *law, *scaled, config);
+  }
+
   using Loop = ControlLoop<Observer>;
   using Law = AdrcLaw<order, S>;
   using FastLaw = std::conditional_t<observer_traits<Observer>.publishes_chain, ScaledLaw<order, S>,
@@ -261,7 +293,7 @@ class Adrc {
       S e = reference - y;
 #if defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
       // Of one and the same y the compiler makes zero, whatever it is.
-      if (!is_finite(y)) e = y;
+      e = select(is_finite(y), e, y);
 #endif
       return e;
     }

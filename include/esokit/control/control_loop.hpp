@@ -14,29 +14,46 @@
 namespace esokit {
 
 /// u is held at a value while the observer finds the state.
-template <PlainScalar S = double>
+template <Scalar S = double>
 struct StartHold {
   S time{};   ///< s; 0: none. Rounded up to whole samples, of the nominal length
   S input{};  ///< u meanwhile, within the limits
+
+  /// @cond
+  static constexpr auto fields(auto& hold) noexcept { return std::tie(hold.time, hold.input); }
+  /// @endcond
 };
 
 /// What happens when measurements stay away (or are NaN).
-template <PlainScalar S = double>
+template <Scalar S = double>
 struct MissingRule {
   int most = 50;  ///< missing measurements in a row that the controller rides through, 0 up to
                   ///< 65535 / measurement_divider - 1
   std::optional<S>
       input{};        ///< u from then on, reached within the rate limit; left out: the last u
   bool stay = false;  ///< true: until start(); false: a measurement ends it
+
+  /// @cond
+  static constexpr auto fields(auto& rule) noexcept {
+    return std::tie(rule.most, rule.input, rule.stay);
+  }
+  /// @endcond
 };
 
 /// Settings of a ControlLoop; a controller's config repeats them by name.
-template <PlainScalar S = double>
+template <Scalar S = double>
 struct LoopSettings {
   Limits<S> limits{};           ///< of the actuator
   StartHold<S> start_hold{};    ///< u at first, while the observer finds the state
   MissingRule<S> missing{};     ///< what to do when measurements stay away
   int measurement_divider = 1;  ///< D: a measurement is due at every D-th step, 1 .. 1000
+
+  /// @cond
+  static constexpr auto fields(auto& settings) noexcept {
+    return std::tie(settings.limits, settings.start_hold, settings.missing,
+                    settings.measurement_divider);
+  }
+  /// @endcond
 };
 
 namespace detail {
@@ -121,16 +138,27 @@ template <LoopObserver Observer>
 class ControlLoop {
  public:
   using S = typename Observer::scalar_type;  ///< of signals and settings
+  using scalar_type = S;                     ///< the same
+  using Status = StatusOf<S>;                ///< StepStatus, of a pack one a lane
+  template <class T>
+  using with_scalar = ControlLoop<detail::WithScalar<Observer, T>>;  ///< the same of another scalar
 
   /// Checks the settings.
   /// @param observer as its own `make` gives it @param max_gap of its config
   /// @return the loop, with the observer in the state that it has, or an error that names the field
   static Expected<ControlLoop, Error<S>> make(const Observer& observer,
                                               const LoopSettings<S>& settings, int max_gap) {
-    const auto checked = detail::check_loop(settings, observer.sample_time(), max_gap,
-                                            observer_traits<Observer>.bears_regular_gaps);
-    if (!checked) return checked.error();
-    return ControlLoop(observer, checked->limiter, settings, checked->hold_samples);
+    if constexpr (PackScalar<S>) {
+      return detail::make_lanes<ControlLoop>([&](int i) {
+        return Plain::make(detail::get_lane<PlainObserver>(observer, i),
+                           detail::get_lane<LoopSettings<LaneScalar<S>>>(settings, i), max_gap);
+      });
+    } else {
+      const auto checked = detail::check_loop(settings, observer.sample_time(), max_gap,
+                                              observer_traits<Observer>.bears_regular_gaps);
+      if (!checked) return checked.error();
+      return ControlLoop(observer, checked->limiter, settings, checked->hold_samples);
+    }
   }
 
   /// One sample: the observer's update with the input that this loop put out last, then the law.
@@ -153,11 +181,11 @@ class ControlLoop {
   /// @param drive what stood in the place of u from k - 1 to k
   template <class Law>
   ESOKIT_INLINE S step_driven(S measured, S drive, Law&& law) noexcept {
-    if (special_) [[unlikely]] {
+    if (special_ != false) [[unlikely]] {
       observe_specially(measured, drive);
       return put_out(law);
     }
-    const StepStatus status = observer_.update(measured, drive);
+    const Status status = observer_.update(measured, drive);
     status_ = status;
     if (status != StepStatus::ok) [[unlikely]] {
       after_trouble(measured);
@@ -177,7 +205,9 @@ class ControlLoop {
   /// @param u_applied what was held from k - 1 to k @return the same
   S track(S measured, S u_applied) noexcept {
     report_applied(u_applied);
-    if (mode_ == LoopMode::start_hold) set_mode(LoopMode::running);
+    for (int i = 0; i < lanes; ++i) {
+      if (mode(i) == LoopMode::start_hold) set_mode(LoopMode::running, i);
+    }
     observe_specially(measured, limiter_.last());
     requested_ = limiter_.last();
     return limiter_.last();
@@ -185,21 +215,29 @@ class ControlLoop {
 
   /// Starts in the steady state (y, u): dhat = -b0 u. Ends start hold and safe mode.
   /// @return ok, or input_rejected or state_rejected where u or y is not finite: nothing changes
-  StepStatus start(S measured, S u) noexcept {
-    if (!is_finite(u)) return StepStatus::input_rejected;
-    if (!is_finite(measured)) return StepStatus::state_rejected;
-    const StepStatus status = detail::start_at_rest(observer_, measured, u);
-    if (status == StepStatus::ok) {
-      limiter_.track(u);
-      requested_ = u;
-      set_mode(LoopMode::running);
+  Status start(S measured, S u) noexcept {
+    if constexpr (PackScalar<S>) {
+      Status status{};
+      detail::for_each_lane<Plain>(
+          *this, [&](Plain& lane, int i) { status[i] = lane.start(measured[i], u[i]); });
+      return status;
+    } else {
+      if (!is_finite(u)) return StepStatus::input_rejected;
+      if (!is_finite(measured)) return StepStatus::state_rejected;
+      const StepStatus status = detail::start_at_rest(observer_, measured, u);
+      if (status == StepStatus::ok) {
+        limiter_.track(u);
+        requested_ = u;
+        set_mode(LoopMode::running);
+      }
+      return status;
     }
-    return status;
   }
 
   /// Takes the settings of `fresh`; state, output and mode are kept. What the observer refuses
   /// changes nothing.
   Check<S> adopt(const ControlLoop& fresh) {
+    if constexpr (PackScalar<S>) return detail::adopt_lanes(*this, fresh);
     if (auto ok = observer_.adopt(fresh.observer_); !ok) return ok;
     const S last = limiter_.last();
     limiter_ = fresh.limiter_;
@@ -210,7 +248,7 @@ class ControlLoop {
     // Of another divider the next update is the one with a measurement.
     if (divider_ != fresh.divider_) phase_ = 0;
     divider_ = fresh.divider_;
-    set_mode(mode_);
+    set_mode(detail::of_lane(mode_, 0));
     has_safe_input_ = fresh.has_safe_input_;
     stay_safe_ = fresh.stay_safe_;
     if constexpr (has_step_time) limits_ = fresh.limits_;
@@ -239,15 +277,27 @@ class ControlLoop {
   /// What the law asked for before the limits.
   [[nodiscard]] const S& requested() const noexcept { return requested_; }
   /// What the observer said of the last step.
-  [[nodiscard]] StepStatus status() const noexcept { return status_; }
+  [[nodiscard]] Status status() const noexcept { return status_; }
   /// What decides about the output now.
-  [[nodiscard]] LoopMode mode() const noexcept { return mode_; }
+  [[nodiscard]] Lanes<LoopMode, S> mode() const noexcept { return mode_; }
   /// The limits, and the output that they last let through.
   [[nodiscard]] const Limiter<S>& limiter() const noexcept { return limiter_; }
 
  private:
+  template <LoopObserver Other>
+  friend class ControlLoop;
+  friend struct detail::LaneAccess;
   struct Nothing {};
   static constexpr bool has_step_time = observer_traits<Observer>.varies_time;
+  static constexpr int lanes = lane_count<S>;
+  using PlainObserver = detail::PlainTwin<Observer, S>;  ///< that of a lane
+  using Plain = detail::PlainTwin<ControlLoop, S>;       ///< a lane
+
+  static constexpr auto fields(auto& o) noexcept {
+    return std::tie(o.observer_, o.limiter_, o.requested_, o.hold_input_, o.safe_input_,
+                    o.hold_left_, o.missing_limit_, o.divider_, o.phase_, o.mode_, o.special_,
+                    o.has_safe_input_, o.stay_safe_, o.status_, o.limits_);
+  }
 
   ControlLoop(const Observer& observer, const Limiter<S>& limiter, const LoopSettings<S>& settings,
               std::uint32_t hold_samples) noexcept
@@ -263,26 +313,40 @@ class ControlLoop {
     missing_limit_ =
         static_cast<std::uint16_t>((settings.missing.most + 1) * settings.measurement_divider);
     if constexpr (has_step_time) limits_ = settings.limits;
-    set_mode(mode_);
+    set_mode(detail::of_lane(mode_, 0));
     // What stands at the actuator before the first step; of an input left out what is within the
     // limits.
     if (hold_samples > 0) limiter_.track(limiter_.within(hold_input_));
   }
 
   void report_applied(S u_applied) noexcept {
-    if (is_finite(u_applied)) [[likely]]
-      limiter_.track(u_applied);
+    if constexpr (PackScalar<S>) {
+      limiter_.track(select(is_finite(u_applied), u_applied, limiter_.last()));
+    } else {
+      if (is_finite(u_applied)) [[likely]]
+        limiter_.track(u_applied);
+    }
   }
 
   template <class Law>
   S put_out(Law&& law) noexcept {
-    return limited(mode_ == LoopMode::running ? S(law()) : other_output());
+    if constexpr (PackScalar<S>) {
+      S wanted = law();
+      if (mode_ != LoopMode::running) {
+        for (int i = 0; i < lanes; ++i) {
+          if (mode_[i] != LoopMode::running) wanted[i] = other_output(i);
+        }
+      }
+      return limited(wanted);
+    } else {
+      return limited(mode_ == LoopMode::running ? S(law()) : other_output(0));
+    }
   }
 
   ESOKIT_INLINE S limited(S wanted) noexcept {
     // A bad reference, or a law that overflows: the last output stays.
-    if (!is_finite(wanted)) [[unlikely]]
-      wanted = limiter_.last();
+    if (const auto good = is_finite(wanted); !all(good)) [[unlikely]]
+      wanted = select(good, wanted, limiter_.last());
     requested_ = wanted;
     return limiter_(wanted);
   }
@@ -293,10 +357,14 @@ class ControlLoop {
       return;
     }
     phase_ = next_phase();
-    const bool as_planned = observer_.missed() == divider_ - 1;
+    const Lanes<int, S> missed = observer_.missed();
     status_ = observer_.update(measured, drive);
     after_trouble(measured);
-    if (as_planned && status_ == StepStatus::gap_bridged) status_ = StepStatus::ok;
+    for (int i = 0; i < lanes; ++i) {
+      const bool as_planned = detail::of_lane(missed, i) == divider_ - 1;
+      StepStatus& status = detail::of_lane(status_, i);
+      if (as_planned && status == StepStatus::gap_bridged) status = StepStatus::ok;
+    }
   }
 
   void skip_measurement(S drive) noexcept {
@@ -309,30 +377,50 @@ class ControlLoop {
     // After a gap too long to bridge the observer begins at rest with dhat = 0; the steady state of
     // the present u is the better guess, and does not bump.
     if (has(status_, StepStatus::restarted)) {
-      (void)observer_.reset(
-          detail::steady_state(observer_, measured, S(observer_.applied_input())));
+      if constexpr (PackScalar<S>) {
+        detail::for_each_lane<PlainObserver>(observer_, [&](PlainObserver& lane, int i) {
+          if (has(status_[i], StepStatus::restarted)) reset_to_rest(lane, measured[i]);
+        });
+      } else {
+        reset_to_rest(observer_, measured);
+      }
     }
     judge_missing();
   }
 
+  template <class O>
+  static void reset_to_rest(O& observer, const LaneScalar<S>& measured) noexcept {
+    using One = LaneScalar<S>;
+    (void)observer.reset(detail::steady_state(observer, measured, One(observer.applied_input())));
+  }
+
   void judge_missing() noexcept {
-    if (observer_.missed() >= missing_limit_) {
-      set_mode(LoopMode::safe);
-    } else if (mode_ == LoopMode::safe && !stay_safe_ && observer_.missed() < divider_) {
-      set_mode(LoopMode::running);
+    const Lanes<int, S> all_missed = observer_.missed();
+    for (int i = 0; i < lanes; ++i) {
+      const int missed = detail::of_lane(all_missed, i);
+      if (missed >= missing_limit_) {
+        set_mode(LoopMode::safe, i);
+      } else if (mode(i) == LoopMode::safe && !stay_safe_ && missed < divider_) {
+        set_mode(LoopMode::running, i);
+      }
     }
   }
 
-  [[nodiscard]] ESOKIT_COLD S other_output() noexcept {
-    if (mode_ == LoopMode::safe) return has_safe_input_ ? safe_input_ : limiter_.last();
+  /// Of lane `i` where the law does not decide.
+  [[nodiscard]] ESOKIT_COLD LaneScalar<S> other_output(int i) noexcept {
+    if (mode(i) == LoopMode::safe) {
+      return detail::number_of_lane(has_safe_input_ ? safe_input_ : limiter_.last(), i);
+    }
     // The step that uses up the hold is the last one held.
-    if (--hold_left_ == 0) set_mode(LoopMode::running);
-    return hold_input_;
+    if (--detail::of_lane(hold_left_, i) == 0) set_mode(LoopMode::running, i);
+    return detail::number_of_lane(hold_input_, i);
   }
 
-  void set_mode(LoopMode mode) noexcept {
-    mode_ = mode;
-    special_ = mode != LoopMode::running || divider_ != 1;
+  [[nodiscard]] LoopMode mode(int i) const noexcept { return detail::of_lane(mode_, i); }
+
+  void set_mode(LoopMode mode, int i = 0) noexcept {
+    detail::of_lane(mode_, i) = mode;
+    detail::of_lane(special_, i) = mode != LoopMode::running || divider_ != 1;
   }
 
   [[nodiscard]] std::uint16_t next_phase() const noexcept {
@@ -344,15 +432,16 @@ class ControlLoop {
   S requested_{};
   S hold_input_;
   S safe_input_;
-  std::uint32_t hold_left_;
+  Lanes<std::uint32_t, S> hold_left_;
   std::uint16_t missing_limit_{};
   std::uint16_t divider_;
   std::uint16_t phase_ = 0;
-  LoopMode mode_;
-  bool special_ = false;  ///< anything but the law at every sample: one test in the hot path
+  Lanes<LoopMode, S> mode_;
+  /// Anything but the law at every sample: one test in the hot path.
+  Lanes<bool, S> special_{false};
   bool has_safe_input_;
   bool stay_safe_;
-  StepStatus status_ = StepStatus::ok;
+  Status status_ = StepStatus::ok;
   [[no_unique_address]] std::conditional_t<has_step_time, Limits<S>, Nothing> limits_{};
 };
 

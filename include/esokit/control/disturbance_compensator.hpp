@@ -37,26 +37,26 @@ class DisturbanceCompensator {
     StartHold<S> start_hold{};             ///< u at first, while the observer finds the state
     MissingRule<S> missing{};              ///< what to do when measurements stay away
     int measurement_divider = 1;           ///< D: a measurement is due at every D-th update
+
+    /// @cond
+    static constexpr auto fields(auto& c) noexcept {
+      return std::tie(c.observer, c.compensation_gain, c.limits, c.start_hold, c.missing,
+                      c.measurement_divider);
+    }
+    /// @endcond
   };
+  template <class T>
+  using with_scalar =
+      DisturbanceCompensator<detail::WithScalar<Observer, T>>;  ///< the same of another scalar
 
   /// Checks the settings and does all the design work.
   /// @return the compensator, or an error that names the field
   static Expected<DisturbanceCompensator, Error<S>> make(const Config& config) {
-    const auto observer = Observer::make(config.observer);
-    if (!observer) return observer.error();
-    const S& input_gain = chain_config<Observer>(config.observer).input_gain;
-    S gain = S(-1) / input_gain;
-    if (config.compensation_gain) {
-      gain = *config.compensation_gain;
-      if (Rules<S> rules; !rules.finite("compensation_gain", gain)) return rules.error();
-    } else if (!is_finite(gain)) {
-      return Error<S>{"input_gain", input_gain, "has an inverse that the scalar cannot hold"};
+    if constexpr (PackScalar<S>) {
+      return detail::make_lanes<DisturbanceCompensator>(config);
+    } else {
+      return make_one(config);
     }
-    const auto loop = Loop::make(
-        *observer, {config.limits, config.start_hold, config.missing, config.measurement_divider},
-        chain_config<Observer>(config.observer).max_gap);
-    if (!loop) return loop.error();
-    return DisturbanceCompensator(*loop, gain);
   }
 
   /// One sample. @param y measurement, NaN if missing @param base_output u0 of the wrapped
@@ -91,7 +91,7 @@ class DisturbanceCompensator {
 
   /// Takes over a plant that stands at y under u: dhat = -b0 u.
   /// @return ok, or input_rejected or state_rejected where u or y is not finite: nothing changes
-  StepStatus start(S y, S u) noexcept { return loop_.start(y, u); }
+  StatusOf<S> start(S y, S u) noexcept { return loop_.start(y, u); }
 
   /// New settings while running. A refused config changes nothing.
   Check<S> retune(const Config& config) { return detail::retune(*this, config); }
@@ -99,6 +99,7 @@ class DisturbanceCompensator {
   /// The same, with the settings of `fresh`, as `make` gave it: no design work, fit for an
   /// interrupt.
   Check<S> adopt(const DisturbanceCompensator& fresh) {
+    if constexpr (PackScalar<S>) return detail::adopt_lanes(*this, fresh);
     if (auto ok = loop_.adopt(fresh.loop_); !ok) return ok;
     gain_ = fresh.gain_;
     return {};
@@ -128,11 +129,32 @@ class DisturbanceCompensator {
   /// u0 + K dhat before the limits.
   [[nodiscard]] const S& requested() const noexcept { return loop_.requested(); }
   /// What the observer said of the last sample.
-  [[nodiscard]] StepStatus status() const noexcept { return loop_.status(); }
+  [[nodiscard]] StatusOf<S> status() const noexcept { return loop_.status(); }
   /// Whether u0 + K dhat, the start hold or the missing rule decides about u.
-  [[nodiscard]] LoopMode mode() const noexcept { return loop_.mode(); }
+  [[nodiscard]] Lanes<LoopMode, S> mode() const noexcept { return loop_.mode(); }
 
  private:
+  friend struct detail::LaneAccess;
+  static constexpr auto fields(auto& o) noexcept { return std::tie(o.loop_, o.gain_); }
+
+  static Expected<DisturbanceCompensator, Error<S>> make_one(const Config& config) {
+    const auto observer = Observer::make(config.observer);
+    if (!observer) return observer.error();
+    const S& input_gain = chain_config<Observer>(config.observer).input_gain;
+    S gain = S(-1) / input_gain;
+    if (config.compensation_gain) {
+      gain = *config.compensation_gain;
+      if (Rules<S> rules; !rules.finite("compensation_gain", gain)) return rules.error();
+    } else if (!is_finite(gain)) {
+      return Error<S>{"input_gain", input_gain, "has an inverse that the scalar cannot hold"};
+    }
+    const auto loop = Loop::make(
+        *observer, {config.limits, config.start_hold, config.missing, config.measurement_divider},
+        chain_config<Observer>(config.observer).max_gap);
+    if (!loop) return loop.error();
+    return DisturbanceCompensator(*loop, gain);
+  }
+
   using Loop = ControlLoop<Observer>;
 
   DisturbanceCompensator(const Loop& loop, S gain) noexcept : loop_(loop), gain_(gain) {}

@@ -11,9 +11,16 @@ namespace esokit {
 /// Limits of an actuator. Left out, a limit does not bind.
 template <Scalar S = double>
 struct Limits {
-  S lower = std::numeric_limits<S>::lowest();  ///< least u, unit of u
-  S upper = (std::numeric_limits<S>::max)();   ///< largest u, above lower
-  S rate = (std::numeric_limits<S>::max)();    ///< largest abs(du/dt), unit of u per s; positive
+  S lower = S(std::numeric_limits<LaneScalar<S>>::lowest());  ///< least u, unit of u
+  S upper = S((std::numeric_limits<LaneScalar<S>>::max)());   ///< largest u, above lower
+  /// Largest abs(du/dt), unit of u per s; positive.
+  S rate = S((std::numeric_limits<LaneScalar<S>>::max)());
+
+  /// @cond
+  static constexpr auto fields(auto& limits) noexcept {
+    return std::tie(limits.lower, limits.upper, limits.rate);
+  }
+  /// @endcond
 };
 
 /// Holds a command within magnitude limits (asymmetric ones too) and a rate limit.
@@ -23,21 +30,23 @@ struct Limits {
 template <Scalar S = double>
 class Limiter {
  public:
+  using scalar_type = S;  ///< of u
+  template <class T>
+  using with_scalar = Limiter<T>;  ///< the same of another scalar
+
   /// Checks the limits.
   /// @param limits of the actuator @param sample_time T, s
   /// @return error for limits that are crossed or not finite, or a rate or sample time that is not
   ///         positive
   static Expected<Limiter, Error<S>> make(const Limits<S>& limits, const S& sample_time) {
-    Rules<S> rules;
-    rules.positive("sample_time", sample_time)
-        .finite("limits.lower", limits.lower)
-        .finite("limits.upper", limits.upper)
-        .require(
-            all(limits.lower < limits.upper),
-            {"limits.lower", limits.lower, "must be below limits.upper", -1, limits.upper, true})
-        .positive("limits.rate", limits.rate);
-    if (!rules) return rules.error();
-    return Limiter(limits, sample_time);
+    if constexpr (PackScalar<S>) {
+      return detail::make_lanes<Limiter>([&](int i) {
+        return Limiter<LaneScalar<S>>::make(detail::get_lane<Limits<LaneScalar<S>>>(limits, i),
+                                            sample_time[i]);
+      });
+    } else {
+      return make_one(limits, sample_time);
+    }
   }
 
   /// The output nearest to `command` within the limits; remembered as the last output.
@@ -63,7 +72,7 @@ class Limiter {
   constexpr void track(const S& output) noexcept {
     last_ = output;
     // Without a rate limit the bounds stand still.
-    if (!rate_limited_) return;
+    if (rate_limited_ == false) return;
     low_ = larger(lower_, S(output - step_));
     high_ = smaller(upper_, S(output + step_));
     // An output from outside may lie beyond a magnitude limit by more than a step.
@@ -80,14 +89,36 @@ class Limiter {
   /// @}
 
  private:
+  friend struct detail::LaneAccess;
+  template <Scalar Other>
+  friend class Limiter;
+
+  static constexpr auto fields(auto& o) noexcept {
+    return std::tie(o.lower_, o.upper_, o.step_, o.last_, o.low_, o.high_, o.rate_limited_);
+  }
+
+  static Expected<Limiter, Error<S>> make_one(const Limits<S>& limits, const S& sample_time) {
+    Rules<S> rules;
+    rules.positive("sample_time", sample_time)
+        .finite("limits.lower", limits.lower)
+        .finite("limits.upper", limits.upper)
+        .require(
+            all(limits.lower < limits.upper),
+            {"limits.lower", limits.lower, "must be below limits.upper", -1, limits.upper, true})
+        .positive("limits.rate", limits.rate);
+    if (!rules) return rules.error();
+    return Limiter(limits, sample_time);
+  }
+
   Limiter(const Limits<S>& limits, const S& sample_time) noexcept
       : lower_(limits.lower),
         upper_(limits.upper),
         step_(limits.rate * sample_time),
         low_(limits.lower),
         high_(limits.upper),
-        rate_limited_(!all(limits.rate >= (std::numeric_limits<S>::max)()) &&
-                      all(is_finite(step_))) {
+        rate_limited_(!all(limits.rate >= Limits<S>{}.rate) && all(is_finite(step_))) {
+    // So that in a pack it binds as little as if it were not there.
+    if (rate_limited_ == false) step_ = S(std::numeric_limits<LaneScalar<S>>::infinity());
     track(within(S(0.0)));
   }
 
@@ -100,7 +131,7 @@ class Limiter {
   S last_{};
   S low_;
   S high_;
-  bool rate_limited_;
+  Lanes<bool, S> rate_limited_;
 };
 
 }  // namespace esokit

@@ -39,6 +39,7 @@ class MimoAdrc {
   using S = scalar_type;                                 ///< the same
   using Output = Vector<S, channels>;                    ///< y, or r, or u, q x 1
   using InputMatrix = Matrix<S, channels, channels>;     ///< B0, q x q
+  static_assert(PlainScalar<S>, "esokit: MimoAdrc is of plain scalars: take one for each lane");
   static_assert((std::is_same_v<typename Observers::scalar_type, S> && ...),
                 "esokit: all channels need the same scalar");
 

@@ -44,11 +44,14 @@ namespace esokit {
 /// after `prepare`, tell `report_applied`: the prediction is put right by Gamma (u_reported -
 /// u_assumed) before the next correction.
 ///
-/// Scalars: plain ones and packs. No call but make and retune does more than multiply and add
+/// Plain scalars. No call but make and retune does more than multiply and add
 /// beside what the observer's gain law does (the division of a filter, the power of fal); none
 /// allocates, throws or locks.
 template <PredictableObserver Observer>
 class PredictiveAdrc {
+  static_assert(lane_count<typename Observer::scalar_type> == 1,
+                "esokit: PredictiveAdrc is of plain scalars: take one for each lane of a pack");
+
  public:
   static constexpr int order = Observer::order;        ///< n, order of the plant
   using scalar_type = typename Observer::scalar_type;  ///< of signals and settings

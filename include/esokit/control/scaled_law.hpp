@@ -10,9 +10,13 @@ namespace esokit {
 
 /// u = w_0 (r - y) - sum_(i>=1) w_i x_i on the scaled state x, with
 /// w_i = k_i i! / (T^i b0), w_n = n! / (T^n b0).
-template <int Order, PlainScalar S>
+template <int Order, Scalar S>
 class ScaledLaw {
  public:
+  using scalar_type = S;  ///< of signals and settings
+  template <class T>
+  using with_scalar = ScaledLaw<Order, T>;  ///< the same of another scalar
+
   /// Folds scaling and 1/b0 into the gains.
   /// @param law whose gains they are
   /// @param observer for its sample time; its b0 is that of the law, or minus that (error-based)
@@ -20,19 +24,28 @@ class ScaledLaw {
   template <class Observer>
   static Expected<ScaledLaw, Error<S>> make(const AdrcLaw<Order, S>& law,
                                             const Observer& observer) {
-    const S rate = S(1) / observer.sample_time();
-    ScaledLaw scaled;
-    S unit = S(1) / law.input_gain();
-    for (int i = 0; i <= Order; ++i) {
-      if (i > 0) unit = unit * (static_cast<S>(i) * rate);
-      const auto row = static_cast<std::size_t>(i);
-      scaled.weights_[row] = i < Order ? law.gains()[row] * unit : unit;
-      if (!is_finite(scaled.weights_[row])) {
-        return Error<S>{"sample_time", observer.sample_time(),
-                        "with these gains gives a law that the scalar cannot hold"};
+    if constexpr (PackScalar<S>) {
+      using One = LaneScalar<S>;
+      return detail::make_lanes<ScaledLaw>([&](int i) {
+        return ScaledLaw<Order, One>::make(
+            detail::get_lane<AdrcLaw<Order, One>>(law, i),
+            detail::get_lane<detail::PlainTwin<Observer, S>>(observer, i));
+      });
+    } else {
+      const S rate = S(1) / observer.sample_time();
+      ScaledLaw scaled;
+      S unit = S(1) / law.input_gain();
+      for (int i = 0; i <= Order; ++i) {
+        if (i > 0) unit = unit * (static_cast<S>(i) * rate);
+        const auto row = static_cast<std::size_t>(i);
+        scaled.weights_[row] = i < Order ? law.gains()[row] * unit : unit;
+        if (!is_finite(scaled.weights_[row])) {
+          return Error<S>{"sample_time", observer.sample_time(),
+                          "with these gains gives a law that the scalar cannot hold"};
+        }
       }
+      return scaled;
     }
-    return scaled;
   }
 
   /// Output-based form. @param error r - y
@@ -48,6 +61,9 @@ class ScaledLaw {
   }
 
  private:
+  friend struct detail::LaneAccess;
+  static constexpr auto fields(auto& o) noexcept { return std::tie(o.weights_); }
+
   ScaledLaw() = default;
 
   /// sum_(i>=1) w_i x_i, apart from the first term so that both are worked out side by side.

@@ -2,6 +2,7 @@
 /// The rules that configs are checked against, each with its own wording.
 #pragma once
 
+#include <concepts>
 #include <cstdlib>
 #include <esokit/core/error.hpp>
 #include <esokit/core/expected.hpp>
@@ -18,14 +19,10 @@ using Check = Expected<void, Error<S>>;
 
 namespace detail {
 
-/// Smallest positive normal number of the scalar, or of double for types that do not say.
+/// Smallest positive normal number of the scalar, of double for autodiff types.
 template <Scalar S>
 constexpr S smallest_normal() noexcept {
-  if constexpr (std::numeric_limits<S>::is_specialized) {
-    return (std::numeric_limits<S>::min)();
-  } else {
-    return S((std::numeric_limits<double>::min)());
-  }
+  return S((std::numeric_limits<TableScalar<S>>::min)());
 }
 
 /// The larger of two, or the one that is not finite. Without <algorithm>, which takes longer to
@@ -212,20 +209,29 @@ Error<S> in_lane(const Error<LaneScalar<S>>& error, int i) {
   return all;
 }
 
-/// `make` of an X of packs: each lane is designed as one of the plain scalar.
-template <class X>
-Expected<X, Error<typename X::scalar_type>> make_lanes(const typename X::Config& config) {
+/// An X of packs, of which `make(i)` designs lane i as one of the plain scalar.
+template <class X, class Make>
+requires std::invocable<Make, int> Expected<X, Error<typename X::scalar_type>> make_lanes(
+    const Make& make) {
   using S = typename X::scalar_type;
-  using Plain = typename X::template with_scalar<LaneScalar<S>>;
   X all = blank<X>();
   for (int i = 0; i < lane_count<S>; ++i) {
-    typename Plain::Config one{};
-    copy_lane<false>(config, one, i);
-    const auto lane = Plain::make(one);
+    const auto lane = make(i);
     if (!lane) return in_lane<S>(lane.error(), i);
-    copy_lane<true>(all, *lane, i);
+    set_lane(all, *lane, i);
   }
   return all;
+}
+
+/// `make` of an X of packs.
+template <class X>
+Expected<X, Error<typename X::scalar_type>> make_lanes(const typename X::Config& config) {
+  using Plain = PlainTwin<X, typename X::scalar_type>;
+  return make_lanes<X>([&](int i) {
+    typename Plain::Config one{};
+    copy_lane<false>(config, one, i);
+    return Plain::make(one);
+  });
 }
 
 /// `adopt` of an X of packs: all lanes or none.
@@ -237,7 +243,7 @@ Check<typename X::scalar_type> adopt_lanes(X& object, const X& fresh) {
   for (int i = 0; i < lane_count<S>; ++i) {
     Plain lane = get_lane<Plain>(object, i);
     if (auto ok = lane.adopt(get_lane<Plain>(fresh, i)); !ok) return in_lane<S>(ok.error(), i);
-    copy_lane<true>(next, lane, i);
+    set_lane(next, lane, i);
   }
   object = next;
   return {};

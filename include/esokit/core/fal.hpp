@@ -28,6 +28,9 @@ class Fal {
   }
 
  private:
+  friend struct detail::LaneAccess;
+  static constexpr auto fields(auto& o) noexcept { return std::tie(o.power_, o.linear_width_); }
+
   Power<S> power_;
   S linear_width_;
 };

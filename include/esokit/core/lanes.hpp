@@ -21,36 +21,6 @@
 
 namespace esokit {
 
-/// Numbers in a scalar: one, or those of a pack, which specialises it and has `x[i]`, i = 0 ..
-/// count - 1.
-template <class T>
-inline constexpr int lane_count = 1;
-
-/// A scalar of several numbers.
-template <class S>
-concept PackScalar = Scalar<S> && lane_count<S> >
-1 && requires(S x, const S& constant) {
-  requires std::floating_point<std::remove_cvref_t<decltype(constant[0])>>;
-  x[0] = constant[0];
-};
-
-namespace detail {
-
-template <class S>
-struct LaneScalarOf {
-  using type = S;
-};
-template <PackScalar S>
-struct LaneScalarOf<S> {
-  using type = std::remove_cvref_t<decltype(std::declval<const S&>()[0])>;
-};
-
-}  // namespace detail
-
-/// The scalar of a lane: double of a pack of doubles.
-template <class S>
-using LaneScalar = typename detail::LaneScalarOf<S>::type;
-
 /// Something that is no number, one a lane.
 template <class T, int Count>
 struct PerLane {
@@ -70,7 +40,7 @@ struct PerLane {
   }
   /// @}
 
-  /// In every lane.
+  /// Whether they are the same in every lane.
   ESOKIT_INLINE friend constexpr bool operator==(const PerLane& a, const PerLane& b) noexcept {
     if constexpr (std::has_unique_object_representations_v<PerLane>) {
       // In words: compilers call memcmp for an array.
@@ -125,7 +95,9 @@ struct IsOptional<std::optional<T>> : std::true_type {};
 /// common to all.
 template <bool Back, class Packed, class Plain>
 constexpr void copy_lane(Packed& packed, Plain& plain, int i) noexcept {
-  if constexpr (std::is_same_v<std::remove_const_t<Packed>, std::remove_const_t<Plain>>) {
+  if constexpr (std::is_empty_v<Packed>) {
+    // Nothing to copy; it may be of a type of its own in each.
+  } else if constexpr (std::is_same_v<std::remove_const_t<Packed>, std::remove_const_t<Plain>>) {
     if constexpr (Back) {
       packed = plain;
     } else {
@@ -158,18 +130,62 @@ constexpr void copy_lane(Packed& packed, Plain& plain, int i) noexcept {
   }
 }
 
+/// Lane `i` of `packed` becomes `plain`.
+template <class Packed, class Plain>
+constexpr void set_lane(Packed& packed, const Plain& plain, int i) noexcept {
+  copy_lane<true>(packed, plain, i);
+}
+
+/// The same of another scalar.
+template <class Object, class T>
+struct WithScalarOf {
+  static_assert(
+      requires { typename Object::template with_scalar<T>; },
+      "esokit: what is to work with packs says by `template <class T> using with_scalar` "
+      "what it is for another scalar, and by `fields(object)` what it holds");
+  using type = typename Object::template with_scalar<T>;
+};
+template <class Object, class T>
+using WithScalar = typename WithScalarOf<Object, T>::type;
+
 template <class Object, class S>
 struct PlainTwinOf {
   using type = Object;
 };
 template <class Object, PackScalar S>
 struct PlainTwinOf<Object, S> {
-  using type = typename Object::template with_scalar<LaneScalar<S>>;
+  using type = WithScalar<Object, LaneScalar<S>>;
 };
 
 /// What a lane of an Object of S is; of a plain scalar the Object itself.
 template <class Object, class S>
 using PlainTwin = typename PlainTwinOf<Object, S>::type;
+
+/// What belongs to lane `i`: of a PerLane its element, of a plain scalar's the thing itself.
+/// @{
+template <class T>
+[[nodiscard]] constexpr T& of_lane(T& one, int) noexcept {
+  return one;
+}
+template <class T, int Count>
+[[nodiscard]] constexpr T& of_lane(PerLane<T, Count>& each, int i) noexcept {
+  return each[i];
+}
+template <class T, int Count>
+[[nodiscard]] constexpr const T& of_lane(const PerLane<T, Count>& each, int i) noexcept {
+  return each[i];
+}
+/// The number of lane `i`.
+template <Scalar S>
+[[nodiscard]] constexpr LaneScalar<S> number_of_lane(const S& numbers,
+                                                     [[maybe_unused]] int i) noexcept {
+  if constexpr (PackScalar<S>) {
+    return numbers[i];
+  } else {
+    return numbers;
+  }
+}
+/// @}
 
 /// An object whose fields are yet to be filled.
 template <class T>
@@ -192,7 +208,7 @@ constexpr void for_each_lane(Packed& packed, Function&& f) noexcept {
   for (int i = 0; i < lane_count<typename Packed::scalar_type>; ++i) {
     Plain plain = get_lane<Plain>(packed, i);
     f(plain, i);
-    copy_lane<true>(packed, plain, i);
+    set_lane(packed, plain, i);
   }
 }
 

@@ -239,9 +239,13 @@ class Pack {
   ESOKIT_INLINE friend constexpr Mask is_finite(const Pack& a) noexcept {
     [[maybe_unused]] constexpr auto exponent =
         std::bit_cast<detail::BitsOf<S>>(std::numeric_limits<S>::infinity());
+    if (std::is_constant_evaluated()) {  // GCC 12 folds no `and` of vectors
+      return Mask(
+          by_bits<Bits>(a, [&](auto bits) { return (bits & exponent) != exponent ? -1 : 0; }));
+    }
     Pack looked_at = a;
 #if defined(__clang__) && defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
-    if (!std::is_constant_evaluated()) asm("" : "+m"(looked_at));  // see detail::opaque
+    asm("" : "+m"(looked_at));  // see detail::opaque
 #endif
     return test(
         [](auto x)
@@ -252,6 +256,9 @@ class Pack {
   /// abs(a), lane by lane.
   [[nodiscard]] ESOKIT_INLINE constexpr Pack magnitude() const noexcept {
     [[maybe_unused]] constexpr auto rest = (std::numeric_limits<detail::BitsOf<S>>::max)();
+    if (std::is_constant_evaluated()) {
+      return Pack(FromRegisters{}, by_bits<Values>(*this, [&](auto bits) { return bits & rest; }));
+    }
     return each(
         [](auto x) ESOKIT_INLINE_LAMBDA {
           return std::bit_cast<Register>(BitRegister(std::bit_cast<BitRegister>(x) & rest));
@@ -277,6 +284,15 @@ class Pack {
 
  private:
   struct FromRegisters {};
+
+  /// f of the bits of each lane, at compile time.
+  template <class To, class Function>
+  static constexpr To by_bits(const Pack& a, Function&& f) noexcept {
+    auto bits = std::bit_cast<Array<detail::BitsOf<S>, Count>>(a.values_);
+    for (auto& lane : bits) lane = f(lane);
+    return std::bit_cast<To>(bits);
+  }
+
   ESOKIT_INLINE constexpr Pack(FromRegisters, const Values& values) noexcept : values_(values) {}
 
   template <class Function, class... Packs>

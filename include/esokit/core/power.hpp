@@ -3,26 +3,75 @@
 #pragma once
 
 #include <cmath>
+#include <esokit/core/lanes.hpp>
 #include <esokit/core/scalar.hpp>
 
 namespace esokit {
 
+namespace detail {
+
+/// Exponents that need no `pow`, and the rest.
+enum class PowerKind : unsigned char { zero, one, two, half, minus_half, general };
+
+template <Scalar S>
+constexpr PowerKind power_kind(const S& p) noexcept {
+  const auto is = [&p](double value) { return all(p >= S(value)) && all(S(value) >= p); };
+  if (is(0.0)) return PowerKind::zero;
+  if (is(1.0)) return PowerKind::one;
+  if (is(2.0)) return PowerKind::two;
+  if (is(0.5)) return PowerKind::half;
+  if (is(-0.5)) return PowerKind::minus_half;
+  return PowerKind::general;
+}
+
+}  // namespace detail
+
 /// x -> x^p for x > 0. The exponents -1/2, 0, 1/2, 1 and 2 are told apart at construction and need
-/// no `pow`. For packs an exponent counts as one of these if it is that in all lanes.
+/// no `pow`; in a pack lane by lane, and it is quickest where the lanes are of one kind.
 ///
 /// Packs and autodiff types supply `pow(x, p)` and `sqrt(x)` by ADL.
 template <Scalar S>
 class Power {
  public:
   /// @param exponent p, any finite number
-  constexpr explicit Power(const S& exponent) noexcept
-      : exponent_(exponent), kind_(kind_of(exponent)) {}
+  constexpr explicit Power(const S& exponent) noexcept : exponent_(exponent) {
+    if constexpr (PackScalar<S>) {
+      for (int i = 0; i < lane_count<S>; ++i) {
+        kind_[i] = detail::power_kind(LaneScalar<S>(exponent[i]));
+      }
+    } else {
+      kind_ = detail::power_kind(exponent);
+    }
+  }
 
   /// x^p, x > 0.
   [[nodiscard]] S operator()(const S& x) const noexcept {
+    if constexpr (PackScalar<S>) {
+      if (!(kind_ == kind_[0])) [[unlikely]] {
+        S each = x;
+        for (int i = 0; i < lane_count<S>; ++i) {
+          each[i] = detail::get_lane<Power<LaneScalar<S>>>(*this, i)(x[i]);
+        }
+        return each;
+      }
+      return raised(x, kind_[0]);
+    } else {
+      return raised(x, kind_);
+    }
+  }
+
+  /// p.
+  [[nodiscard]] constexpr const S& exponent() const noexcept { return exponent_; }
+
+ private:
+  using Kind = detail::PowerKind;
+  friend struct detail::LaneAccess;
+  static constexpr auto fields(auto& o) noexcept { return std::tie(o.exponent_, o.kind_); }
+
+  [[nodiscard]] S raised(const S& x, Kind kind) const noexcept {
     using std::pow;
     using std::sqrt;
-    switch (kind_) {
+    switch (kind) {
       case Kind::zero:
         return S(1.0);
       case Kind::one:
@@ -39,24 +88,8 @@ class Power {
     return pow(x, exponent_);
   }
 
-  /// p.
-  [[nodiscard]] constexpr const S& exponent() const noexcept { return exponent_; }
-
- private:
-  enum class Kind : unsigned char { zero, one, two, half, minus_half, general };
-
-  static constexpr Kind kind_of(const S& p) noexcept {
-    const auto is = [&p](double value) { return all(p >= S(value)) && all(S(value) >= p); };
-    if (is(0.0)) return Kind::zero;
-    if (is(1.0)) return Kind::one;
-    if (is(2.0)) return Kind::two;
-    if (is(0.5)) return Kind::half;
-    if (is(-0.5)) return Kind::minus_half;
-    return Kind::general;
-  }
-
   S exponent_;
-  Kind kind_;
+  Lanes<Kind, S> kind_{};
 };
 
 }  // namespace esokit

@@ -11,6 +11,7 @@
 #include <esokit/core/language.hpp>
 #include <limits>
 #include <type_traits>
+#include <utility>
 
 /// Extended state observers, the controllers built on them, their design and their analysis.
 namespace esokit {
@@ -77,10 +78,30 @@ constexpr T select(bool condition, T a, T b) noexcept {
 /// True if every lane of a mask is set; a plain scalar has one lane.
 constexpr bool all(bool condition) noexcept { return condition; }
 
+/// Numbers in a scalar: one, or those of a pack, which specialises it and has `x[i]`, i = 0 ..
+/// count - 1.
+template <class T>
+inline constexpr int lane_count = 1;
+
+/// A comparison gives a bool; or it gives a mask, and the pack says by `lane_count` how many
+/// numbers it holds.
+template <class T>
+concept DeclaresItsLanes =
+    std::convertible_to<decltype(std::declval<const T&>() < std::declval<const T&>()), bool> ||
+    requires(T x, const T& constant) {
+  requires(lane_count<T> > 1);
+  requires std::floating_point<std::remove_cvref_t<decltype(constant[0])>>;
+  x[0] = constant[0];
+};
+
 /// A scalar of the library: float, double, long double, a SIMD pack or an autodiff type.
 ///
 /// Arithmetic, construction from a double, comparison (bool or mask), and by ADL
 /// `is_finite(x)`, `select(mask, a, b)`, `all(mask)`; `make` also needs `exp` and `expm1`.
+///
+/// A pack, whose comparisons give a mask, also specialises `lane_count` and gives its numbers as
+/// `x[i]`: where one lane is not well, the library takes them out one by one. `Pack` is one, ready
+/// made.
 template <class T>
 concept Scalar = std::copyable<T> && requires(const T a, const T b) {
   T(1.0);
@@ -93,7 +114,28 @@ concept Scalar = std::copyable<T> && requires(const T a, const T b) {
   { all(is_finite(a)) } -> std::convertible_to<bool>;
   { all(a < b) } -> std::convertible_to<bool>;
   { select(a < b, a, b) } -> std::convertible_to<T>;
+} && DeclaresItsLanes<T>;
+
+/// A scalar of several numbers.
+template <class S>
+concept PackScalar = Scalar<S> &&(lane_count<S> > 1);
+
+namespace detail {
+
+template <class S>
+struct LaneScalarOf {
+  using type = S;
 };
+template <PackScalar S>
+struct LaneScalarOf<S> {
+  using type = std::remove_cvref_t<decltype(std::declval<const S&>()[0])>;
+};
+
+}  // namespace detail
+
+/// The scalar of a lane: double of a pack of doubles.
+template <class S>
+using LaneScalar = typename detail::LaneScalarOf<S>::type;
 
 namespace detail {
 
@@ -122,7 +164,7 @@ constexpr T constant(double value) noexcept {
 
 /// The type in which compile-time tables are kept, so that float code loads no doubles.
 template <class S>
-using TableScalar = std::conditional_t<PlainScalar<S>, S, double>;
+using TableScalar = std::conditional_t<PlainScalar<LaneScalar<S>>, LaneScalar<S>, double>;
 
 /// x, or the largest number of its sign where it is beyond the scalar.
 template <class T>

@@ -18,6 +18,7 @@
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/scalar.hpp>
 #include <esokit/model/scaled_chain.hpp>
+#include <tuple>
 #include <type_traits>
 
 namespace esokit {
@@ -149,6 +150,10 @@ struct EqualSampledPoles {
     }
     return weights;
   }
+
+  /// @cond
+  static constexpr auto fields(auto& poles) noexcept { return std::tie(poles.contraction); }
+  /// @endcond
 };
 
 /// Gain of one correction after `samples` sample times, scaled to one sample time: it puts the

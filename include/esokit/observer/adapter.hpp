@@ -37,6 +37,9 @@ struct ExtensionOf<Observer> {
 /// and redefines or deletes what it has another answer to, or none.
 template <LoopObserver Observer>
 class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Observer> {
+  static_assert(PlainScalar<typename Observer::scalar_type>,
+                "esokit: adapters are of plain scalars: take an adapter for each lane of a pack");
+
  public:
   using Adapted = Observer;                            ///< what is adapted
   using scalar_type = typename Observer::scalar_type;  ///< of states and settings

@@ -89,12 +89,42 @@ class AdjustableBandwidthEso
     S input_gain{};     ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
     S sample_time{};    ///< T, s
     int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts
+
+    /// @cond
+    static constexpr auto fields(auto& c) noexcept {
+      return std::tie(c.observer_bandwidth, c.bandwidth_ratio, c.rule,
+                      c.allow_uncertified_switching, c.input_gain, c.sample_time, c.max_gap);
+    }
+    /// @endcond
   };
+  template <class T>
+  using with_scalar =
+      AdjustableBandwidthEso<Order, T, Extension, Reading>;  ///< the same of another scalar
 
   /// Checks the settings and does all the design work.
   /// @return the observer at rest in zero, or an error that names the field; for a ratio without
   /// the certificate its limit is the end of the certified range
   static Expected<AdjustableBandwidthEso, Error<S>> make(const Config& config) {
+    if constexpr (PackScalar<S>) {
+      return detail::make_lanes<AdjustableBandwidthEso>(config);
+    } else {
+      return make_one(config);
+    }
+  }
+
+  /// New settings while running: the estimate and the innovation to compare with are kept, a change
+  /// of b0 is moved into the disturbance. A refused config changes nothing.
+  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
+
+  /// The same, with the settings of `fresh`, as `make` gave it: no design work.
+  Check<S> adopt(AdjustableBandwidthEso fresh) {
+    if constexpr (PackScalar<S>) return detail::adopt_lanes(*this, fresh);
+    std::get<0>(fresh.laws()).continue_from(std::get<0>(this->laws()));
+    return Base::adopt(fresh);
+  }
+
+ private:
+  static Expected<AdjustableBandwidthEso, Error<S>> make_one(const Config& config) {
     const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
     if (auto ok = Base::check_chain(chain); !ok) return ok.error();
     const auto pair = detail::bandwidth_pair<Base::size, S>(
@@ -115,17 +145,6 @@ class AdjustableBandwidthEso
     return AdjustableBandwidthEso(chain, Law(*shrinking, *otherwise));
   }
 
-  /// New settings while running: the estimate and the innovation to compare with are kept, a change
-  /// of b0 is moved into the disturbance. A refused config changes nothing.
-  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
-
-  /// The same, with the settings of `fresh`, as `make` gave it: no design work.
-  Check<S> adopt(AdjustableBandwidthEso fresh) {
-    std::get<0>(fresh.laws()).continue_from(std::get<0>(this->laws()));
-    return Base::adopt(fresh);
-  }
-
- private:
   AdjustableBandwidthEso(const ChainConfig<S>& chain, const Law& law) noexcept
       : Base(chain, {law}) {}
 };

@@ -35,6 +35,9 @@ class AlgebraicEso
 
  public:
   using Estimate = typename Base::Estimate;  ///< (y, .., y^(n-1), d, .., d^(m-1)), N x 1
+  using Status = typename Base::Status;      ///< StepStatus, of a pack one a lane
+  template <class T>
+  using with_scalar = AlgebraicEso<Order, T, Extension>;  ///< the same of another scalar
 
   /// What it is beyond LoopObserver.
   static constexpr ObserverTraits traits = [] {
@@ -62,11 +65,147 @@ class AlgebraicEso
     int start_index = 0;  ///< soft start: sample of the schedule to begin with; > 0 is not deadbeat
     bool allow_vanishing_gain = false;  ///< lambda = 0 with q > 0: the gains go to zero, blind
     int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts
+
+    /// @cond
+    static constexpr auto fields(auto& c) noexcept {
+      return std::tie(c.observer_bandwidth, c.frequency_shift, c.input_gain, c.sample_time,
+                      c.blanking, c.measurement_noise, c.disturbance_noise, c.start_index,
+                      c.allow_vanishing_gain, c.max_gap);
+    }
+    /// @endcond
   };
 
   /// Checks the settings and does all the design work.
   /// @return the observer at rest in zero, or an error that names the field
   static Expected<AlgebraicEso, Error<S>> make(const Config& config) {
+    if constexpr (PackScalar<S>) {
+      return detail::make_lanes<AlgebraicEso>(config);
+    } else {
+      return make_one(config);
+    }
+  }
+
+  /// One sample, see PredictorCorrector::update.
+  [[gnu::flatten]] Status update(S y, S u_applied) noexcept {
+    if (settled() == true && this->missed() == 0) [[likely]] {
+      const Status status = Base::update(y, u_applied);
+      if (status != StepStatus::ok) [[unlikely]]
+        return after_trouble(status);
+      return status;
+    }
+    return update_running(y, u_applied);
+  }
+
+  /// Measurement update alone, see PredictorCorrector::correct.
+  Status correct(S y) noexcept { return blank_anew(Base::correct(y)); }
+
+  /// New settings while running: the estimate and the place in the schedule (counted in samples)
+  /// are kept, a change of b0 is moved into the disturbance, in blanked estimates as well. If
+  /// the new blanking is not over yet, the present estimates are published until it is. A refused
+  /// config changes nothing.
+  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
+
+  /// The same, with the settings of `fresh`, as `make` gave it: no design work.
+  Check<S> adopt(AlgebraicEso fresh) {
+    if constexpr (PackScalar<S>) {
+      return detail::adopt_lanes(*this, fresh);
+    } else {
+      Estimate published = estimate();
+      published(Order) =
+          published(Order) + (this->input_gain() - fresh.input_gain()) * this->applied_input();
+      if (!all(is_finite(published(Order)))) {
+        return Error<S>{"input_gain", fresh.input_gain(), "would make the estimate not finite"};
+      }
+      // One that has settled stays so, and no longer knows its age.
+      std::get<0>(fresh.laws()).resume(settled() ? Law::max_index : age());
+      if (auto ok = Base::adopt(fresh); !ok) return ok;
+      publish(published);
+      blanking_samples_ = fresh.blanking_samples_;
+      return {};
+    }
+  }
+
+  /// After a known jump (of the disturbance, or of the state): the schedule begins anew, the state
+  /// is kept, and the estimates of this moment are published until the blanking is over.
+  void rearm() noexcept {
+    publish(estimate());
+    std::get<0>(this->laws()).restart();
+  }
+
+  /// Starts anew at (y, 0, .., 0).
+  Status reset(S y) noexcept { return blank_after(Base::reset(y)); }
+
+  /// Starts anew at a given estimate, N x 1.
+  Status reset(const Estimate& state) noexcept { return blank_after(Base::reset(state)); }
+
+  /// All published estimates in physical units; those of the start while blanked.
+  [[nodiscard]] Estimate estimate() const noexcept {
+    const auto blanked_now = blanked();
+    if (blanked_now == true) return published();
+    Estimate estimate = Base::estimate();
+    if constexpr (PackScalar<S>) {
+      if (blanked_now == false) return estimate;
+      for (int r = 0; r < Base::size; ++r) estimate(r) = published_row(r, estimate(r), blanked_now);
+    }
+    return estimate;
+  }
+
+  /// Published estimate of y^(Row), or of d^(Row - n) for Row >= n.
+  template <int Row>
+  [[nodiscard]] S estimate() const noexcept {
+    if constexpr (PackScalar<S>) {
+      return published_row(Row, Base::template estimate<Row>(), blanked());
+    } else {
+      return blanked() ? std::get<Row>(published_) : Base::template estimate<Row>();
+    }
+  }
+
+  /// Published dhat, unit of y^(n).
+  [[nodiscard]] S total_disturbance() const noexcept { return estimate<Order>(); }
+
+  /// The estimate as it is computed, blanked or not.
+  [[nodiscard]] Estimate raw_estimate() const noexcept { return Base::estimate(); }
+
+  /// True while the published estimates are those of the start.
+  [[nodiscard]] Lanes<bool, S> blanked() const noexcept {
+    if constexpr (PackScalar<S>) {
+      const auto age = this->age();
+      Lanes<bool, S> blanked;
+      for (int i = 0; i < lane_count<S>; ++i) blanked[i] = age[i] <= blanking_samples_[i];
+      return blanked;
+    } else {
+      return age() <= blanking_samples_;
+    }
+  }
+
+  /// True once the observer has become LinearEso with bandwidth lambda.
+  [[nodiscard]] Lanes<bool, S> settled() const noexcept {
+    return std::get<0>(this->laws()).settled();
+  }
+
+  /// epsilon, s.
+  [[nodiscard]] S blanking() const noexcept {
+    if constexpr (PackScalar<S>) {
+      S samples(0.0);
+      for (int i = 0; i < lane_count<S>; ++i) {
+        samples[i] = static_cast<LaneScalar<S>>(blanking_samples_[i]);
+      }
+      return samples * this->sample_time();
+    } else {
+      return detail::integer<S>(blanking_samples_) * this->sample_time();
+    }
+  }
+
+  /// Samples since the schedule began; the count ends where it settles.
+  [[nodiscard]] typename Law::Count age() const noexcept { return std::get<0>(this->laws()).age(); }
+
+ private:
+  friend struct detail::LaneAccess;
+  static constexpr auto fields(auto& o) noexcept {
+    return std::tuple_cat(Base::fields(o), std::tie(o.published_, o.blanking_samples_));
+  }
+
+  static Expected<AlgebraicEso, Error<S>> make_one(const Config& config) {
     const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
     Rules<S> rules;
     rules.all_of(Base::check_chain(chain))
@@ -100,84 +239,6 @@ class AlgebraicEso
     return AlgebraicEso(chain, law, *blanking);
   }
 
-  /// One sample, see PredictorCorrector::update.
-  [[gnu::flatten]] StepStatus update(S y, S u_applied) noexcept {
-    if (settled() && this->missed() == 0) [[likely]] {
-      return Base::update(y, u_applied);
-    }
-    return update_running(y, u_applied);
-  }
-
-  /// Measurement update alone, see PredictorCorrector::correct.
-  StepStatus correct(S y) noexcept { return blank_anew(Base::correct(y)); }
-
-  /// New settings while running: the estimate and the place in the schedule (counted in samples)
-  /// are kept, a change of b0 is moved into the disturbance, in blanked estimates as well. If the
-  /// new blanking is not over yet, the present estimates are published until it is. A refused
-  /// config changes nothing.
-  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
-
-  /// The same, with the settings of `fresh`, as `make` gave it: no design work.
-  Check<S> adopt(AlgebraicEso fresh) {
-    Estimate published = estimate();
-    published(Order) =
-        published(Order) + (this->input_gain() - fresh.input_gain()) * this->applied_input();
-    if (!all(is_finite(published(Order)))) {
-      return Error<S>{"input_gain", fresh.input_gain(), "would make the estimate not finite"};
-    }
-    // One that has settled stays so, and no longer knows its age.
-    std::get<0>(fresh.laws()).resume(settled() ? Law::max_index : age());
-    if (auto ok = Base::adopt(fresh); !ok) return ok;
-    publish(published);
-    blanking_samples_ = fresh.blanking_samples_;
-    return {};
-  }
-
-  /// After a known jump (of the disturbance, or of the state): the schedule begins anew, the state
-  /// is kept, and the estimates of this moment are published until the blanking is over.
-  void rearm() noexcept {
-    publish(estimate());
-    std::get<0>(this->laws()).restart();
-  }
-
-  /// Starts anew at (y, 0, .., 0).
-  StepStatus reset(S y) noexcept { return blank_after(Base::reset(y)); }
-
-  /// Starts anew at a given estimate, N x 1.
-  StepStatus reset(const Estimate& state) noexcept { return blank_after(Base::reset(state)); }
-
-  /// All published estimates in physical units; those of the start while blanked.
-  [[nodiscard]] Estimate estimate() const noexcept {
-    return blanked() ? published() : Base::estimate();
-  }
-
-  /// Published estimate of y^(Row), or of d^(Row - n) for Row >= n.
-  template <int Row>
-  [[nodiscard]] S estimate() const noexcept {
-    return blanked() ? std::get<Row>(published_) : Base::template estimate<Row>();
-  }
-
-  /// Published dhat, unit of y^(n).
-  [[nodiscard]] S total_disturbance() const noexcept { return estimate<Order>(); }
-
-  /// The estimate as it is computed, blanked or not.
-  [[nodiscard]] Estimate raw_estimate() const noexcept { return Base::estimate(); }
-
-  /// True while the published estimates are those of the start.
-  [[nodiscard]] bool blanked() const noexcept { return age() <= blanking_samples_; }
-
-  /// True once the observer has become LinearEso with bandwidth lambda.
-  [[nodiscard]] bool settled() const noexcept { return std::get<0>(this->laws()).settled(); }
-
-  /// epsilon, s.
-  [[nodiscard]] S blanking() const noexcept {
-    return detail::integer<S>(blanking_samples_) * this->sample_time();
-  }
-
-  /// Samples since the schedule began; the count ends where it settles.
-  [[nodiscard]] std::uint32_t age() const noexcept { return std::get<0>(this->laws()).age(); }
-
- private:
   AlgebraicEso(const ChainConfig<S>& chain, const Law& law, std::uint32_t blanking_samples) noexcept
       : Base(chain, {law}), blanking_samples_(blanking_samples) {
     publish(Estimate::Zero());
@@ -255,25 +316,54 @@ class AlgebraicEso
 
   // Out of line: the settled observer then costs what LinearEso does, with both in one place it
   // costs 1.3 times.
-  [[gnu::noinline, gnu::flatten]] StepStatus update_running(S y, S u_applied) noexcept {
+  [[gnu::noinline, gnu::flatten]] Status update_running(S y, S u_applied) noexcept {
     return blank_anew(Base::update(y, u_applied));
   }
 
-  StepStatus blank_after(StepStatus status) noexcept {
-    if (status == StepStatus::ok) publish(Base::estimate());
+  ESOKIT_COLD Status after_trouble(const Status& status) noexcept { return blank_anew(status); }
+
+  Status blank_after(const Status& status) noexcept {
+    if constexpr (PackScalar<S>) {
+      publish_where([&](int i) { return status[i] == StepStatus::ok; });
+    } else {
+      if (status == StepStatus::ok) publish(Base::estimate());
+    }
     return status;
   }
 
+  /// Of a pack: publishes the present estimates in the lanes for which it is asked.
+  template <class Where>
+  void publish_where(const Where& where) noexcept {
+    const Estimate now = Base::estimate();
+    for (int i = 0; i < lane_count<S>; ++i) {
+      if (!where(i)) continue;
+      for (int r = 0; r < Base::size; ++r) published_[static_cast<std::size_t>(r)][i] = now(r)[i];
+    }
+  }
+
+  // Of packs alone, a template: Clang 14 instantiates the members of a class all.
+  template <class Mask>
+  [[nodiscard]] S published_row(int row, S computed, const Mask& blanked_now) const noexcept {
+    for (int i = 0; i < lane_count<S>; ++i) {
+      if (blanked_now[i]) computed[i] = published_[static_cast<std::size_t>(row)][i];
+    }
+    return computed;
+  }
+
   /// After a restart for a long gap what was published before is too old to be published.
-  ESOKIT_INLINE StepStatus blank_anew(StepStatus status) noexcept {
+  ESOKIT_INLINE Status blank_anew(const Status& status) noexcept {
     if (has(status, StepStatus::restarted)) [[unlikely]] {
-      publish(Base::estimate());
+      if constexpr (PackScalar<S>) {
+        publish_where([&](int i) { return has(status[i], StepStatus::restarted); });
+      } else {
+        publish(Base::estimate());
+      }
     }
     return status;
   }
 
   Array<S, Base::size> published_;
-  std::uint32_t blanking_samples_;
+  typename Law::Count blanking_samples_;
 };
 
 /// Told apart in snapshots.

@@ -21,6 +21,7 @@
 #include <cmath>
 #include <cstdint>
 #include <esokit/core/check.hpp>
+#include <esokit/core/lanes.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/design/sampled_gain.hpp>
 #include <esokit/observer/gain_law.hpp>
@@ -37,6 +38,9 @@ namespace esokit {
 /// 30 short multiplication steps more.
 template <int Size, Scalar S>
 class AlgebraicGain {
+  template <int OtherSize, Scalar OtherS>
+  friend class AlgebraicGain;
+
  public:
   /// What it does beside `gain`.
   static constexpr GainLawTraits traits{.kind = GainKind::preset,
@@ -44,6 +48,11 @@ class AlgebraicGain {
                                         .accepts = true,
                                         .resets = true,
                                         .bridges_gaps = true};
+
+  using scalar_type = S;  ///< of gains
+  template <class T>
+  using with_scalar = AlgebraicGain<Size, T>;  ///< the same of another scalar
+  using Count = Lanes<std::uint32_t, S>;       ///< samples, of a pack of each lane
 
   /// Largest start_index, and where the sample counter stops.
   static constexpr std::uint32_t max_index = 0x3fffffffu;
@@ -56,7 +65,7 @@ class AlgebraicGain {
   /// @param start_index k0 >= 0, sample of the schedule to begin with (soft start)
   /// @param least_age samples that are counted before the schedule may settle
   AlgebraicGain(const S& bandwidth, const S& shift, const S& sample_time, std::uint32_t start_index,
-                std::uint32_t least_age = 0) noexcept
+                const Count& least_age = 0) noexcept
       : final_poles_(EqualSampledPoles<Size, S>::from_bandwidth(bandwidth, sample_time)),
         shift_(EqualSampledPoles<Size, S>::from_bandwidth(shift, sample_time)),
         decay_(decay(shift, sample_time)),
@@ -78,7 +87,17 @@ class AlgebraicGain {
   /// Next sample of the schedule. One that was not corrected among the first N breaks the deadbeat
   /// property: the schedule starts anew there.
   ESOKIT_INLINE constexpr void advance() noexcept {
-    if (!settled_) advance_schedule();
+    if constexpr (PackScalar<S>) {
+      if (settled_ == true) [[likely]]
+        return;
+      if (!together()) [[unlikely]] {
+        advance_apart();
+        return;
+      }
+      advance_schedule();
+    } else {
+      if (!settled_) advance_schedule();
+    }
   }
 
   /// This sample was corrected.
@@ -105,46 +124,84 @@ class AlgebraicGain {
 
   /// The bandwidth at this place in the schedule, frozen, for the whole gap.
   [[nodiscard]] ScaledGain<Size, S> gap_gain(const S&, unsigned samples) const noexcept {
-    if (settled_) return esokit::gap_gain<Size, S>(final_poles_, samples);
-    // Deadbeat for the longer step: its first gain is 1 as well, so that N samples in a row make
-    // the estimate exact all the same, and gaps that recur do not diverge.
-    if (deadbeat()) return esokit::gap_gain<Size, S>(EqualSampledPoles<Size, S>{S(1.0)}, samples);
-    const S a = final_poles_.contraction;
-    const S now = a + (S(1.0) - a) * (size_bracket_ * std::get<0>(ratios_u_));
-    return esokit::gap_gain<Size, S>(EqualSampledPoles<Size, S>{now}, samples);
+    if constexpr (PackScalar<S>) {
+      ScaledGain<Size, S> all;
+      for (int i = 0; i < lane_count<S>; ++i) {
+        using One = LaneScalar<S>;
+        detail::set_lane(all, detail::get_lane<Plain>(*this, i).gap_gain(One(0), samples), i);
+      }
+      return all;
+    } else {
+      if (settled_) return esokit::gap_gain<Size, S>(final_poles_, samples);
+      // Deadbeat for the longer step: its first gain is 1 as well, so that N samples in a row make
+      // the estimate exact all the same, and gaps that recur do not diverge.
+      if (deadbeat()) return esokit::gap_gain<Size, S>(EqualSampledPoles<Size, S>{S(1.0)}, samples);
+      const S a = final_poles_.contraction;
+      const S now = a + (S(1.0) - a) * (size_bracket_ * std::get<0>(ratios_u_));
+      return esokit::gap_gain<Size, S>(EqualSampledPoles<Size, S>{now}, samples);
+    }
   }
 
   /// Samples since the schedule began; the count ends where it settles.
-  [[nodiscard]] constexpr std::uint32_t age() const noexcept { return age_; }
+  [[nodiscard]] constexpr Count age() const noexcept { return age_; }
 
   /// True once the gain is that of LinearEso with bandwidth lambda, to within rounding.
-  [[nodiscard]] constexpr bool settled() const noexcept { return settled_; }
+  [[nodiscard]] constexpr Lanes<bool, S> settled() const noexcept { return settled_; }
 
  private:
+  friend struct detail::LaneAccess;
+  using Plain = detail::PlainTwin<AlgebraicGain, S>;  ///< a lane
+
+  static constexpr auto fields(auto& o) noexcept {
+    return std::tie(o.gain_, o.coefficients_, o.ratios_u_, o.ratios_h_, o.final_poles_, o.shift_,
+                    o.decay_, o.size_bracket_, o.settled_below_, o.power_, o.bracket_,
+                    o.start_index_, o.least_age_, o.age_, o.pending_, o.settled_);
+  }
+
+  /// The lanes of a pack are at the same place, so that one recursion does for all.
+  template <class = S>
+  [[nodiscard]] constexpr bool together() const noexcept {
+    return age_ == age_[0] && pending_ == pending_[0] && settled_ == false;
+  }
+  template <class = S>
+  ESOKIT_COLD constexpr void advance_apart() noexcept {
+    detail::for_each_lane<Plain>(*this, [](Plain& lane, int) { lane.advance(); });
+  }
+  /// Of all lanes that are together.
+  [[nodiscard]] constexpr std::uint32_t common_age() const noexcept {
+    return detail::of_lane(age_, 0);
+  }
+
   static S decay(const S& shift, const S& sample_time) noexcept {
     using std::exp;
     return exp(-(shift * sample_time));
   }
 
   constexpr void advance_schedule() noexcept {
-    if (pending_ && deadbeat()) [[unlikely]] {
+    if (detail::of_lane(pending_, 0) && deadbeat()) [[unlikely]] {
       restart();
     }
     pending_ = true;
-    if (age_ < max_index) ++age_;
+    if (common_age() < max_index) age_ = common_age() + 1;
     if (deadbeat()) return;
-    if (age_ % anchor_interval == 0) [[unlikely]] {
-      anchor(start_index_ + age_ - 1);
+    if (common_age() % anchor_interval == 0) [[unlikely]] {
+      anchor(start_index_ + common_age() - 1);
     }
     push();
     set_gain();
-    if (all(settled_below_ >= std::get<0>(ratios_u_)) && age_ > least_age_) [[unlikely]] {
-      settle();
+    if constexpr (PackScalar<S>) {
+      if (!all(std::get<0>(ratios_u_) > settled_below_)) [[unlikely]]
+        settle_lanes();
+    } else {
+      if (all(settled_below_ >= std::get<0>(ratios_u_)) && age_ > least_age_) [[unlikely]]
+        settle();
     }
   }
 
   /// True up to sample N - 1 of the schedule.
-  [[nodiscard]] constexpr bool deadbeat() const noexcept { return start_index_ + age_ <= Size; }
+  [[nodiscard]] constexpr bool deadbeat() const noexcept {
+    return start_index_ + common_age() <= Size;
+  }
 
   static constexpr int coefficient_count = Size * (Size + 3) / 2;
 
@@ -267,6 +324,17 @@ class AlgebraicGain {
     gain_ = current_gain<Size, S>(final_poles_.weights());
   }
 
+  // Of packs alone, a template: Clang 14 instantiates the members of a class all.
+  template <class = S>
+  ESOKIT_COLD void settle_lanes() noexcept {
+    for (int i = 0; i < lane_count<S>; ++i) {
+      if (!(settled_below_[i] >= std::get<0>(ratios_u_)[i]) || age_[i] <= least_age_[i]) continue;
+      Plain lane = detail::get_lane<Plain>(*this, i);
+      lane.settle();
+      detail::set_lane(*this, lane, i);
+    }
+  }
+
   ScaledGain<Size, S> gain_{};
   Array<S, coefficient_count> coefficients_{};
   Array<S, Size> ratios_u_{};  ///< u_i, i = k + 1 .. k + N
@@ -279,10 +347,10 @@ class AlgebraicGain {
   S power_{};                         ///< p^(i-N) of the next i
   S bracket_{};                       ///< [i-N] of the next i
   std::uint32_t start_index_;
-  std::uint32_t least_age_;
-  std::uint32_t age_ = 0;
-  bool pending_ = false;
-  bool settled_ = false;
+  Count least_age_;
+  Count age_{0};
+  Lanes<bool, S> pending_{false};
+  Lanes<bool, S> settled_{false};
 };
 
 /// Told apart in snapshots.

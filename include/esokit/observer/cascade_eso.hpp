@@ -26,16 +26,29 @@ struct CascadeEsoConfig<Size, Levels, S, EqualPoles> {
   S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
   S sample_time{};         ///< T, s
   int max_gap = 100;       ///< missing samples that a correction may bridge before it restarts
+
+  /// @cond
+  static constexpr auto fields(auto& c) noexcept {
+    return std::tie(c.observer_bandwidth, c.bandwidth_factor, c.level_bandwidths, c.input_gain,
+                    c.sample_time, c.max_gap);
+  }
+  /// @endcond
 };
 
 /// Settings of CascadeEso by poles.
 template <int Size, int Levels, Scalar S, ListsPoles Placement>
 struct CascadeEsoConfig<Size, Levels, S, Placement> {
-  Array<typename Placement::template Spec<Size, S>, Levels>
-      level_poles{};  ///< p_i of each level, 1/s
+  /// p_i of each level, 1/s; of a pack those of all lanes
+  Array<typename Placement::template Spec<Size, LaneScalar<S>>, Levels> level_poles{};
   S input_gain{};     ///< b0, unit of y^(n) per unit of u; not zero
   S sample_time{};    ///< T, s
   int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts
+
+  /// @cond
+  static constexpr auto fields(auto& c) noexcept {
+    return std::tie(c.level_poles, c.input_gain, c.sample_time, c.max_gap);
+  }
+  /// @endcond
 };
 
 /// Config of ContinuousCascadeEso: the same without the sampling.
@@ -148,18 +161,25 @@ class CascadeEso
  public:
   /// Settings of make.
   using Config = CascadeEsoConfig<Base::size, Levels, S, Placement>;
+  template <class T>
+  using with_scalar =
+      CascadeEso<Order, Levels, T, Extension, Placement>;  ///< the same of another scalar
 
   /// Checks the settings and does all the design work.
   /// @return the observer at rest in zero, or an error that names the field
   static Expected<CascadeEso, Error<S>> make(const Config& config) {
-    const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
-    if (auto ok = Base::check_chain(chain); !ok) return ok.error();
-    const auto laws = detail::level_laws<Law, Placement, Base::size, Levels, S>(
-        config, [&](const char* field, const auto& spec, int index) {
-          return Law::make(field, spec, config.sample_time, index);
-        });
-    if (!laws) return laws.error();
-    return CascadeEso(chain, *laws);
+    if constexpr (PackScalar<S>) {
+      return detail::make_lanes<CascadeEso>(config);
+    } else {
+      const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
+      if (auto ok = Base::check_chain(chain); !ok) return ok.error();
+      const auto laws = detail::level_laws<Law, Placement, Base::size, Levels, S>(
+          config, [&](const char* field, const auto& spec, int index) {
+            return Law::make(field, spec, config.sample_time, index);
+          });
+      if (!laws) return laws.error();
+      return CascadeEso(chain, *laws);
+    }
   }
 
   /// New settings while running: the estimates of all levels are kept, a change of b0 is moved into

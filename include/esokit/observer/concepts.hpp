@@ -15,6 +15,7 @@
 #include <concepts>
 #include <esokit/core/check.hpp>
 #include <esokit/core/declared.hpp>
+#include <esokit/core/lanes.hpp>
 #include <esokit/core/scalar.hpp>
 #include <esokit/observer/gain_law.hpp>
 #include <esokit/observer/step_status.hpp>
@@ -130,11 +131,11 @@ concept VariesTime = requires(O& o, const typename O::scalar_type& s) {
 };
 template <class O>
 concept GatesOutliers = requires(const O& o, const typename O::scalar_type& s) {
-  { o.accepts(s) } -> std::same_as<bool>;
+  { o.accepts(s) } -> std::same_as<Lanes<bool, typename O::scalar_type>>;
 };
 template <class O>
 concept BlanksEstimate = requires(const O& o) {
-  { o.blanked() } -> std::same_as<bool>;
+  { o.blanked() } -> std::same_as<Lanes<bool, typename O::scalar_type>>;
 };
 
 /// As `as_declared`; an adapter names what it hands on, whether what it adapts has it or not.
@@ -208,28 +209,28 @@ concept ChainSettings = requires(Config& config) {
   { config.max_gap } -> std::same_as<int&>;
 };
 
-/// A sampled observer of a plain scalar with a Config. A control loop branches on limits, modes and
-/// bad samples, which a pack cannot.
+/// A sampled observer of a plain scalar or of packs, with a Config. What is no number it tells of
+/// each lane: Lanes<..>, StatusOf.
 template <class O>
-concept LoopObserver = std::copyable<O> && PlainScalar<typename O::scalar_type> &&
+concept LoopObserver = std::copyable<O> && PlainScalar<LaneScalar<typename O::scalar_type>> &&
     requires(O& observer, const O& constant, const typename O::scalar_type& s,
              const typename O::Estimate& state, typename O::Config& config) {
   requires O::order >= 1 && O::size > O::order;
   requires std::same_as<typename O::Estimate, Vector<typename O::scalar_type, O::size>>;
   { O::make(config) } -> std::same_as<Expected<O, Error<typename O::scalar_type>>>;
   { observer.adopt(constant) } -> std::same_as<Check<typename O::scalar_type>>;
-  { observer.update(s, s) } -> std::same_as<StepStatus>;
-  { observer.predict(s) } -> std::same_as<StepStatus>;
-  { observer.correct(s) } -> std::same_as<StepStatus>;
-  { observer.reset(s) } -> std::same_as<StepStatus>;
-  { observer.reset(state) } -> std::same_as<StepStatus>;
+  { observer.update(s, s) } -> std::same_as<StatusOf<typename O::scalar_type>>;
+  { observer.predict(s) } -> std::same_as<StatusOf<typename O::scalar_type>>;
+  { observer.correct(s) } -> std::same_as<StatusOf<typename O::scalar_type>>;
+  { observer.reset(s) } -> std::same_as<StatusOf<typename O::scalar_type>>;
+  { observer.reset(state) } -> std::same_as<StatusOf<typename O::scalar_type>>;
   { constant.estimate() } -> std::same_as<typename O::Estimate>;
   { constant.template estimate<0>() } -> std::convertible_to<typename O::scalar_type>;
   { constant.total_disturbance() } -> std::convertible_to<typename O::scalar_type>;
   { constant.applied_input() } -> std::convertible_to<typename O::scalar_type>;
   { constant.input_gain() } -> std::convertible_to<typename O::scalar_type>;
   { constant.sample_time() } -> std::convertible_to<typename O::scalar_type>;
-  { constant.missed() } -> std::convertible_to<int>;
+  { constant.missed() } -> std::convertible_to<Lanes<int, typename O::scalar_type>>;
 } && ObserverAsDeclared<O> && requires(typename O::Config& config) {
   { chain_config<O>(config) } -> ChainSettings<typename O::scalar_type>;
 };
@@ -237,7 +238,7 @@ concept LoopObserver = std::copyable<O> && PlainScalar<typename O::scalar_type> 
 /// An observer that says whether so many samples are missing that the next `correct` restarts it.
 template <class O>
 concept RestartingObserver = LoopObserver<O> && requires(const O& observer) {
-  { observer.restarts() } -> std::same_as<bool>;
+  { observer.restarts() } -> std::same_as<Lanes<bool, typename O::scalar_type>>;
 };
 
 /// An observer that tells the estimate of each level as it is computed, whatever is published:
@@ -253,7 +254,7 @@ concept LevelledObserver = LoopObserver<O> && requires(const O& observer) {
 template <class O>
 concept ShiftableOutput = LevelledObserver<O> &&
     requires(O& observer, const typename O::scalar_type& s) {
-  { observer.shift_output(s) } -> std::same_as<StepStatus>;
+  { observer.shift_output(s) } -> std::same_as<StatusOf<typename O::scalar_type>>;
 };
 
 /// An observer whose disturbance may be shifted: `shift_disturbance(offset)` adds to dhat, where
@@ -261,7 +262,7 @@ concept ShiftableOutput = LevelledObserver<O> &&
 template <class O>
 concept ShiftableDisturbance = LoopObserver<O> &&
     requires(O& observer, const typename O::scalar_type& s) {
-  { observer.shift_disturbance(s) } -> std::same_as<StepStatus>;
+  { observer.shift_disturbance(s) } -> std::same_as<StatusOf<typename O::scalar_type>>;
 };
 
 namespace detail {
@@ -307,17 +308,17 @@ concept PredictableObserver = std::copyable<O> && Scalar<typename O::scalar_type
   { config } -> ChainSettings<typename O::scalar_type>;
   { O::make(config) } -> std::same_as<Expected<O, Error<typename O::scalar_type>>>;
   { observer.adopt(constant) } -> std::same_as<Check<typename O::scalar_type>>;
-  { observer.predict(s) } -> std::same_as<StepStatus>;
-  { observer.correct(s) } -> std::same_as<StepStatus>;
-  { observer.revise_input(s) } -> std::same_as<StepStatus>;
-  { observer.reset(s) } -> std::same_as<StepStatus>;
-  { observer.reset(state) } -> std::same_as<StepStatus>;
+  { observer.predict(s) } -> std::same_as<StatusOf<typename O::scalar_type>>;
+  { observer.correct(s) } -> std::same_as<StatusOf<typename O::scalar_type>>;
+  { observer.revise_input(s) } -> std::same_as<StatusOf<typename O::scalar_type>>;
+  { observer.reset(s) } -> std::same_as<StatusOf<typename O::scalar_type>>;
+  { observer.reset(state) } -> std::same_as<StatusOf<typename O::scalar_type>>;
   { constant.estimate() } -> std::same_as<typename O::Estimate>;
   { constant.template scaled_estimate<0>() } -> std::convertible_to<typename O::scalar_type>;
   { constant.input_gain() } -> std::convertible_to<typename O::scalar_type>;
   { constant.sample_time() } -> std::convertible_to<typename O::scalar_type>;
-  { constant.missed() } -> std::convertible_to<int>;
-  { constant.restarts() } -> std::same_as<bool>;
+  { constant.missed() } -> std::convertible_to<Lanes<int, typename O::scalar_type>>;
+  { constant.restarts() } -> std::same_as<Lanes<bool, typename O::scalar_type>>;
 }
 &&(O::levels > 1 ||
    requires(const O& constant, const typename O::scalar_type& s) {

@@ -56,7 +56,7 @@ class ConstantGain {
     if constexpr (PackScalar<S>) {
       ScaledGain<Size, S> all;
       for (int i = 0; i < lane_count<S>; ++i) {
-        detail::copy_lane<true>(all, esokit::gap_gain<Size, LaneScalar<S>>(poles_[i], samples), i);
+        detail::set_lane(all, esokit::gap_gain<Size, LaneScalar<S>>(poles_[i], samples), i);
       }
       return all;
     } else {

@@ -8,7 +8,7 @@
 namespace esokit {
 
 /// Settings of HalfGainEso.
-template <int Size, PlainScalar S>
+template <int Size, Scalar S>
 struct LinearEsoConfig<Size, S, HalfGainPoles> {
   S observer_bandwidth{};  ///< omega_o, rad/s, of the observer whose gains are halved
   S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
@@ -19,6 +19,11 @@ struct LinearEsoConfig<Size, S, HalfGainPoles> {
   static constexpr const char* placement_field = "observer_bandwidth";
   /// What the poles are placed by.
   [[nodiscard]] const S& placement() const noexcept { return observer_bandwidth; }
+  /// @cond
+  static constexpr auto fields(auto& c) noexcept {
+    return std::tie(c.observer_bandwidth, c.input_gain, c.sample_time, c.max_gap);
+  }
+  /// @endcond
 };
 
 /// Settings of ContinuousHalfGainEso.
@@ -35,8 +40,8 @@ struct ContinuousLinearEsoConfig<Size, S, HalfGainPoles> {
 
 /// LinearEso with poles at exp(s_k T), s_k those of half the continuous gains: about half the noise
 /// in u for about the same disturbance rejection.
-/// @tparam Order n @tparam S plain scalar @tparam Extension m
-template <int Order, PlainScalar S = double, int Extension = 1>
+/// @tparam Order n @tparam S a plain scalar or a pack @tparam Extension m
+template <int Order, Scalar S = double, int Extension = 1>
 using HalfGainEso = LinearEso<Order, S, Extension, HalfGainPoles>;
 
 /// The same as an ODE, with exactly half the gains.

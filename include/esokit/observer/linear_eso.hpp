@@ -36,9 +36,9 @@ struct LinearEsoConfig<Size, S, EqualPoles> {
 /// Settings of LinearEso by poles.
 template <int Size, Scalar S, ListsPoles Placement>
 struct LinearEsoConfig<Size, S, Placement> {
-  using Poles = typename Placement::template Spec<Size, S>;  ///< one a row of the gain
+  using Poles = typename Placement::template Spec<Size, LaneScalar<S>>;  ///< one a row of the gain
 
-  Poles poles{};      ///< p_i, 1/s, left half plane, in conjugate pairs
+  Poles poles{};      ///< p_i, 1/s, left half plane, in conjugate pairs; of a pack of all lanes
   S input_gain{};     ///< b0, unit of y^(n) per unit of u; not zero
   S sample_time{};    ///< T, s
   int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts
@@ -47,6 +47,11 @@ struct LinearEsoConfig<Size, S, Placement> {
   static constexpr const char* placement_field = "poles";
   /// What the poles are placed by.
   [[nodiscard]] const Poles& placement() const noexcept { return poles; }
+  /// @cond
+  static constexpr auto fields(auto& c) noexcept {
+    return std::tie(c.poles, c.input_gain, c.sample_time, c.max_gap);
+  }
+  /// @endcond
 };
 
 /// Linear extended state observer of a plant y^(n) = d + b0 u, sampled exactly.

@@ -48,18 +48,34 @@ class NonlinearEso
     S input_gain{};     ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
     S sample_time{};    ///< T, s
     int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts
+
+    /// @cond
+    static constexpr auto fields(auto& c) noexcept {
+      return std::tie(c.observer_bandwidth, c.shape, c.error_scale, c.gain_min, c.gain_max,
+                      c.allow_uncertified_gain, c.unlimited, c.input_gain, c.sample_time,
+                      c.max_gap);
+    }
+    /// @endcond
   };
+  template <class T>
+  using with_scalar =
+      NonlinearEso<Order, T, Extension,
+                   typename detail::ShapeWithScalar<Shape, T>::type>;  ///< of another scalar
 
   using Report = NonlinearGainReport<detail::TableScalar<S>>;  ///< see `report`
 
   /// Checks the settings and does all the design work.
   /// @return the observer at rest in zero, or an error that names the field
   static Expected<NonlinearEso, Error<S>> make(const Config& config) {
-    const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
-    if (auto ok = Base::check_chain(chain); !ok) return ok.error();
-    const auto law = make_law(config);
-    if (!law) return law.error();
-    return NonlinearEso(chain, *law);
+    if constexpr (PackScalar<S>) {
+      return detail::make_lanes<NonlinearEso>(config);
+    } else {
+      const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
+      if (auto ok = Base::check_chain(chain); !ok) return ok.error();
+      const auto law = make_law(config);
+      if (!law) return law.error();
+      return NonlinearEso(chain, *law);
+    }
   }
 
   /// What is known of a config's k: constant-k intervals, limits, and the errors at which the given

@@ -24,6 +24,17 @@ ESOKIT_MEMBER_NAME(prepared)
 template <class Shape>
 inline constexpr EvenGainTraits even_gain_traits = declared_traits<Shape, EvenGainTraits>;
 
+/// The same even gain of another scalar; one that is a template of no scalar is its own.
+template <class Shape, class T>
+struct ShapeWithScalar {
+  using type = Shape;
+};
+template <class Shape, class T>
+requires requires { typename Shape::template with_scalar<T>; }
+struct ShapeWithScalar<Shape, T> {
+  using type = typename Shape::template with_scalar<T>;
+};
+
 }  // namespace detail
 
 /// `check()` is declared by `traits.checks`; or there is none.
@@ -55,6 +66,8 @@ concept EvenGain = std::copyable<Shape> && requires(const Shape& k, const S& x) 
 template <Scalar S>
 struct PowerSumGain {
   static constexpr EvenGainTraits traits{.checks = true, .prepares = true};  ///< beside k
+  template <class T>
+  using with_scalar = PowerSumGain<T>;  ///< the same of another scalar
 
   S gain_alpha = S(1.0);  ///< K_alpha >= 0
   S alpha = S(1.0);       ///< alpha > 0; below 1: k is infinite at e = 0
@@ -77,6 +90,11 @@ struct PowerSumGain {
     }
 
    private:
+    friend struct detail::LaneAccess;
+    static constexpr auto fields(auto& o) noexcept {
+      return std::tie(o.gain_alpha_, o.gain_beta_, o.alpha_, o.beta_);
+    }
+
     S gain_alpha_;
     S gain_beta_;
     Power<S> alpha_;
@@ -97,6 +115,12 @@ struct PowerSumGain {
         .not_negative("shape.gain_beta", gain_beta)
         .not_negative("shape.beta", beta);
   }
+
+  /// @cond
+  static constexpr auto fields(auto& k) noexcept {
+    return std::tie(k.gain_alpha, k.alpha, k.gain_beta, k.beta);
+  }
+  /// @endcond
 };
 
 /// Told apart in snapshots.
@@ -107,6 +131,8 @@ inline constexpr std::uint32_t type_tag<PowerSumGain<S>> = make_type_tag<S>("Pow
 template <Scalar S>
 struct FalGain {
   static constexpr EvenGainTraits traits{.checks = true, .prepares = true};  ///< beside k
+  template <class T>
+  using with_scalar = FalGain<T>;  ///< the same of another scalar
 
   S gain = S(1.0);          ///< K >= 0
   S exponent = S(0.5);      ///< a > 0
@@ -123,6 +149,9 @@ struct FalGain {
     [[nodiscard]] S operator()(const S& x) const noexcept { return gain_ * fal_.gain(x); }
 
    private:
+    friend struct detail::LaneAccess;
+    static constexpr auto fields(auto& o) noexcept { return std::tie(o.gain_, o.fal_); }
+
     S gain_;
     Fal<S> fal_;
   };
@@ -140,6 +169,12 @@ struct FalGain {
         .positive("shape.exponent", exponent)
         .positive("shape.linear_width", linear_width);
   }
+
+  /// @cond
+  static constexpr auto fields(auto& k) noexcept {
+    return std::tie(k.gain, k.exponent, k.linear_width);
+  }
+  /// @endcond
 };
 
 /// Told apart in snapshots.
@@ -197,6 +232,11 @@ class LimitedGain {
   [[nodiscard]] constexpr const S& upper() const noexcept { return high_; }
 
  private:
+  friend struct LaneAccess;
+  static constexpr auto fields(auto& o) noexcept {
+    return std::tie(o.function_, o.inverse_scale_, o.low_, o.high_);
+  }
+
   Function function_;
   S inverse_scale_;
   S low_;
@@ -218,6 +258,10 @@ class NonlinearGain {
   static constexpr GainLawTraits traits{.kind = GainKind::factored, .bridges_gaps = true};
 
   using Linear = ConstantGain<Size, S>;  ///< the gain where k = 1
+  template <class T>
+  using with_scalar =
+      NonlinearGain<Size, T,
+                    typename detail::ShapeWithScalar<Shape, T>::type>;  ///< of another scalar
 
   /// @param linear the bandwidth gains @param shape k @param error_scale > 0, unit of y
   /// @param gain_min, gain_max limits of k
@@ -255,6 +299,9 @@ class NonlinearGain {
   /// @}
 
  private:
+  friend struct detail::LaneAccess;
+  static constexpr auto fields(auto& o) noexcept { return std::tie(o.linear_, o.factor_); }
+
   Linear linear_;
   detail::LimitedGain<S, Shape> factor_;
 };

@@ -19,6 +19,11 @@ struct LinearEsoConfig<Size, S, ReducedPoles> {
   static constexpr const char* placement_field = "observer_bandwidth";
   /// What the poles are placed by.
   [[nodiscard]] const S& placement() const noexcept { return observer_bandwidth; }
+  /// @cond
+  static constexpr auto fields(auto& c) noexcept {
+    return std::tie(c.observer_bandwidth, c.input_gain, c.sample_time, c.max_gap);
+  }
+  /// @endcond
 };
 
 /// Reduced-order extended state observer of a plant y^(n) = d + b0 u, sampled exactly.

@@ -49,6 +49,8 @@ template <int Size, Scalar S, class Placement = EqualPoles,
 class SwitchedGain {
  public:
   using Set = ConstantGain<Size, S, Placement>;  ///< one of the two gain sets
+  template <class T>
+  using with_scalar = SwitchedGain<Size, T, Placement, Reading>;  ///< the same of another scalar
 
   /// What it does beside `gain`. A NaN compares as not shrinking, so that any innovation is safe to
   /// ask with.
@@ -112,6 +114,9 @@ class SwitchedGain {
   /// @}
 
  private:
+  friend struct detail::LaneAccess;
+  static constexpr auto fields(auto& o) noexcept { return std::tie(o.sets_, o.previous_); }
+
   Array<Set, 2> sets_;  ///< otherwise, shrinking
   S previous_ = detail::nothing_watched<S>(Reading);
 };

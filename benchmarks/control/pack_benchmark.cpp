@@ -1,0 +1,172 @@
+/// @file
+/// Banks of observers and controllers in packs, beside the same in scalars and beside pack code
+/// written by hand with the same check; and what one bad lane a pack costs. Times are of a lane.
+/// Packs are for AVX: run it with --flags "-O2 -march=x86-64-v3" too.
+#include <cstddef>
+#include <esokit/control/adrc.hpp>
+#include <esokit/core/pack.hpp>
+#include <esokit/observer/cascade_eso.hpp>
+#include <esokit/observer/linear_eso.hpp>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "../support/run.hpp"
+
+namespace esokit::benchmarks {
+namespace {
+
+/// What one writes by hand for n = 2 on the scaled chain, for any scalar.
+template <class S>
+struct HandWritten2 {
+  S x0{}, x1{}, x2{};
+  S k0, k1, k2, scaled_input_gain, rate, twice_rate;
+  S innovation{}, applied_input{};
+  bool good = true;
+
+  ESOKIT_INLINE void update(const S& y, const S& u) noexcept {
+    const S driven = x2 + scaled_input_gain * u;
+    const S half_way = x1 + driven;
+    const S p0 = x0 + half_way;
+    const S p1 = half_way + driven;
+    const S e = y - p0;
+    const S n0 = p0 + k0 * e;
+    const S n1 = p1 + k1 * e;
+    const S n2 = x2 + k2 * e;
+    using detail::absolute;
+    if (!all(is_finite(S((absolute(n2) * twice_rate + absolute(n1)) * rate + absolute(n0))))) {
+      good = false;
+      return;
+    }
+    x0 = n0;
+    x1 = n1;
+    x2 = n2;
+    innovation = e;
+    applied_input = u;
+  }
+};
+
+template <class S>
+struct Settings {
+  S bandwidth{60.0};
+  S input_gain{2.0};
+  S sample_time = S(1e-3);
+};
+
+template <class S>
+HandWritten2<S> hand_written() {
+  using One = LaneScalar<S>;
+  const auto gain =
+      current_gain<3, One>(EqualSampledPoles<3, One>::from_bandwidth(60, One(1e-3)).weights());
+  return {.k0 = S(static_cast<double>(gain[0])),
+          .k1 = S(static_cast<double>(gain[1])),
+          .k2 = S(static_cast<double>(gain[2])),
+          .scaled_input_gain = S(1e-6),
+          .rate = S(1e3),
+          .twice_rate = S(2e3)};
+}
+
+template <class S>
+LinearEso<2, S> linear() {
+  const Settings<S> s;
+  return LinearEso<2, S>::make({.observer_bandwidth = s.bandwidth,
+                                .input_gain = s.input_gain,
+                                .sample_time = s.sample_time})
+      .value();
+}
+
+template <class S>
+CascadeEso<2, 3, S> cascade() {
+  const Settings<S> s;
+  return CascadeEso<2, 3, S>::make({.observer_bandwidth = s.bandwidth,
+                                    .bandwidth_factor = S(2.0),
+                                    .input_gain = s.input_gain,
+                                    .sample_time = s.sample_time})
+      .value();
+}
+
+template <class S>
+Adrc<LinearEso<2, S>> adrc() {
+  const Settings<S> s;
+  return Adrc<LinearEso<2, S>>::make({.observer = {.observer_bandwidth = s.bandwidth,
+                                                   .input_gain = s.input_gain,
+                                                   .sample_time = s.sample_time},
+                                      .controller_bandwidth = S(5.0),
+                                      .limits = {S(-1e3), S(1e3), S(1e5)}})
+      .value();
+}
+
+/// `lanes` observers (a controller takes a reference in the place of u), one after the other.
+template <class S, class Observer>
+void bank(benchmark::State& state, const Observer& observer, std::size_t lanes, bool one_bad,
+          const std::string& label) {
+  constexpr std::size_t width = lane_count<S>;
+  using One = LaneScalar<S>;
+  std::vector<Observer> observers(lanes / width, observer);
+  std::vector<S> y(observers.size(), S(0.3));
+  std::vector<S> u(observers.size(), S(0.1));
+  if (one_bad) {
+    // The first of as many lanes as a pack of doubles with AVX has.
+    for (std::size_t i = 0; i < lanes; i += static_cast<std::size_t>(default_lanes<One>)) {
+      if constexpr (PackScalar<S>) {
+        y[i / width][static_cast<int>(i % width)] = std::numeric_limits<One>::quiet_NaN();
+      } else {
+        y[i] = std::numeric_limits<One>::quiet_NaN();
+      }
+    }
+  }
+  benchmark::DoNotOptimize(y.data());
+  benchmark::DoNotOptimize(u.data());
+  while (state.KeepRunningBatch(static_cast<benchmark::IterationCount>(lanes))) {
+    for (std::size_t i = 0; i < observers.size(); ++i) (void)observers[i].update(y[i], u[i]);
+    benchmark::DoNotOptimize(observers.data());
+    benchmark::ClobberMemory();
+  }
+  state.SetLabel(label);
+}
+
+template <class S, class Observer>
+void add(const std::string& name, const Observer& observer, std::size_t lanes, bool one_bad,
+         const std::string& label) {
+  benchmark::RegisterBenchmark(name.c_str(), [=](benchmark::State& state) {
+    bank<S>(state, observer, lanes, one_bad, label);
+  });
+}
+
+template <class One>
+void add_all(const std::string& scalar) {
+  using P = Pack<One>;
+  for (const std::size_t lanes : {std::size_t{64}, std::size_t{512}}) {
+    const std::string bank = "bank" + std::to_string(lanes) + "/";
+    const auto beside = [&](const std::string& what, const std::string& more) {
+      return "vs " + bank + what + "/" + scalar + " <= 1.0" + more;
+    };
+    const std::string hand = bank + "hand_written/2/pack_of_" + scalar;
+    add<P>(hand, hand_written<P>(), lanes, false, "");
+    add<One>(bank + "linear_eso/2/" + scalar, linear<One>(), lanes, false, "");
+    add<P>(bank + "linear_eso/2/pack_of_" + scalar, linear<P>(), lanes, false,
+           beside("linear_eso/2", "; vs " + hand + (lanes == 64 ? " <= 1.10" : " <= 1.25")));
+    add<One>(bank + "cascade_eso/2x3/" + scalar, cascade<One>(), lanes, false, "");
+    add<P>(bank + "cascade_eso/2x3/pack_of_" + scalar, cascade<P>(), lanes, false,
+           beside("cascade_eso/2x3", ""));
+    add<One>(bank + "adrc/2/" + scalar, adrc<One>(), lanes, false, "");
+    add<P>(bank + "adrc/2/pack_of_" + scalar, adrc<P>(), lanes, false, beside("adrc/2", ""));
+  }
+  const std::string bad = "one_bad_lane/";
+  const auto bad_label = [&](const std::string& what) {
+    return "vs " + bad + what + "/" + scalar + "; vs bank64/" + what + "/" + scalar;
+  };
+  add<One>(bad + "linear_eso/2/" + scalar, linear<One>(), 64, true, "");
+  add<P>(bad + "linear_eso/2/pack_of_" + scalar, linear<P>(), 64, true, bad_label("linear_eso/2"));
+  add<One>(bad + "adrc/2/" + scalar, adrc<One>(), 64, true, "");
+  add<P>(bad + "adrc/2/pack_of_" + scalar, adrc<P>(), 64, true, bad_label("adrc/2"));
+}
+
+}  // namespace
+}  // namespace esokit::benchmarks
+
+int main(int argc, char** argv) {
+  esokit::benchmarks::add_all<double>("double");
+  esokit::benchmarks::add_all<float>("float");
+  return esokit::benchmarks::run(argc, argv);
+}

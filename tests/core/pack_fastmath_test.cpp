@@ -1,0 +1,2 @@
+// The same with -ffast-math.
+#include "pack_test.cpp"

@@ -1,0 +1,37 @@
+// `make` of AdjustableBandwidthEso and NonlinearEso allocates nothing.
+#include <support/no_allocation.hpp>
+//
+#include <gtest/gtest.h>
+
+#include <esokit/observer/adjustable_bandwidth_eso.hpp>
+#include <esokit/observer/nonlinear_eso.hpp>
+
+namespace esokit_test {
+
+namespace {
+
+TEST(SwitchedObservers, MakeAllocatesNothing) {
+  bool made = true;
+  long count = -1;
+  {
+    const NoAllocation guard;
+    made = esokit::AdjustableBandwidthEso<2>::make({.observer_bandwidth = 50,
+                                                    .bandwidth_ratio = 0.7,
+                                                    .rule = esokit::SwitchingRule::beso,
+                                                    .input_gain = 1,
+                                                    .sample_time = 0.01})
+               .has_value();
+    made = made && esokit::NonlinearEso<6, float>::make(
+                       {.observer_bandwidth = 50, .input_gain = 1, .sample_time = 0.01f})
+                       .has_value();
+    made = made && esokit::NonlinearEso<2>::report(
+                       {.observer_bandwidth = 50, .input_gain = 1, .sample_time = 0.01})
+                       .has_value();
+    count = guard.count();
+  }
+  EXPECT_TRUE(made);
+  EXPECT_EQ(count, 0);
+}
+
+}  // namespace
+}  // namespace esokit_test
