@@ -5,10 +5,11 @@
 #include <cstdint>
 #include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
+#include <esokit/core/kernels.hpp>
 #include <esokit/core/lanes.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/core/unroll.hpp>
-#include <esokit/model/scaled_chain.hpp>
+#include <esokit/model/chain_model.hpp>
 #include <esokit/observer/concepts.hpp>
 #include <esokit/observer/gain_law.hpp>
 #include <esokit/observer/step_status.hpp>
@@ -57,7 +58,9 @@ Check<S> check_chain(const ChainConfig<S>& config) {
 ///
 /// @tparam Order n, order of the plant @tparam Extension m, extended states
 /// @tparam Law gain law, see GainLaw @tparam Levels p
-template <int Order, Scalar S, int Extension, class Law, int Levels = 1>
+/// @tparam Model what is known of the plant, see ChainModel
+template <int Order, Scalar S, int Extension, class Law, int Levels = 1,
+          class Model = ChainModel<Order, S, Extension>>
 requires GainLaw<Law, Order + Extension, S>
 class PredictorCorrector {
   static_assert(Levels >= 1, "esokit: at least one level is needed");
@@ -66,16 +69,18 @@ class PredictorCorrector {
   using Chain = ScaledChain<Order, S, Extension>;  ///< the sampled chain, in its scaling
   static constexpr int order = Order;              ///< n, order of the plant
   static constexpr int extension = Extension;      ///< m, extended states
-  static constexpr int size = Chain::size;         ///< N = n + m
+  static constexpr int size = Model::size;         ///< N
   static constexpr int levels = Levels;            ///< p
   using scalar_type = S;                           ///< of states and settings
-  using Estimate = typename Chain::Estimate;       ///< (y, .., y^(n-1), d, .., d^(m-1)), N x 1
+  using Estimate = typename Model::Estimate;       ///< (y, .., y^(n-1), d, .., d^(m-1)), N x 1
+  using State = typename Model::State;             ///< scaled, N elements
   using Laws = Array<Law, Levels>;                 ///< one a level
   using Status = StatusOf<S>;                      ///< StepStatus, of a pack one a lane
 
   /// The same of another scalar.
   template <class T>
-  using with_scalar = PredictorCorrector<Order, T, Extension, detail::WithScalar<Law, T>, Levels>;
+  using with_scalar = PredictorCorrector<Order, T, Extension, detail::WithScalar<Law, T>, Levels,
+                                         detail::WithScalar<Model, T>>;
 
   /// What it is beyond LoopObserver.
   static constexpr ObserverTraits traits{
@@ -157,14 +162,14 @@ class PredictorCorrector {
   /// All estimates in physical units, after the last step: plant states of the last level,
   /// disturbance of all levels together.
   [[nodiscard]] Estimate estimate() const noexcept {
-    return Chain::physical(up_to_level<Levels - 1>(), rate_);
+    return model_.physical(up_to_level<Levels - 1>());
   }
 
   /// Estimate of y^(Row), or of d^(Row - n) for Row >= n.
   template <int Row>
   [[nodiscard]] constexpr S estimate() const noexcept {
     static_assert(Row >= 0 && Row < size, "esokit: no such estimate");
-    return Chain::template physical<Row>(std::get<Row>(up_to_level<Levels - 1>()), rate_);
+    return model_.template physical<Row>(up_to_level<Levels - 1>());
   }
 
   /// The same in the scaling of the chain, x_r = T^r z_r / r!, for laws that fold the factors into
@@ -185,7 +190,7 @@ class PredictorCorrector {
   [[nodiscard]] Estimate level_estimate(int level) const noexcept {
     Estimate estimate = Estimate::Constant(S(std::numeric_limits<double>::quiet_NaN()));
     detail::unroll<Levels>([&](auto i) {
-      if (i == level) estimate = Chain::physical(up_to_level<i>(), rate_);
+      if (i == level) estimate = model_.physical(up_to_level<i>());
     });
     return estimate;
   }
@@ -214,8 +219,8 @@ class PredictorCorrector {
   /// What a coming `correct(y)` will make of the estimate, in scaled states (x_r = T^r z_r / r!).
   /// For a controller that works ahead of the measurement.
   struct Preview {
-    typename Chain::State offset;  ///< after correct(y) the estimate will be offset + slope y
-    typename Chain::State slope;   ///< its derivative by y
+    State offset;  ///< after correct(y) the estimate will be offset + slope y
+    State slope;   ///< its derivative by y
   };
 
   /// Between `predict` and `correct`, for gain laws whose gain is known before the measurement.
@@ -232,7 +237,7 @@ class PredictorCorrector {
       }
     }
     Correction slope{};
-    for_each_state(slope.states, [](S& x) { x = S(0.0); });
+    for (State& state : slope.states) state.fill(S(0.0));
     Correction offset = slope;
     if (due_to_restart()) [[unlikely]] {
       for (auto& state : slope.states) state[0] = S(1.0);
@@ -280,14 +285,8 @@ class PredictorCorrector {
   /// told. Adds Gamma (u_applied - u_told) to the prediction. A u that is bad, or would make the
   /// prediction not finite, changes nothing and is reported.
   Status revise_input(S u_applied) noexcept {
-    const S drive = scaled_input_gain_ * (u_applied - applied_input_);
     LevelStates next = states_;
-    for (auto& state : next) {
-      detail::unroll<Order>([&](auto r) ESOKIT_INLINE_LAMBDA {
-        constexpr double weight = binomial(Order, r);
-        std::get<r>(state) = std::get<r>(state) + detail::constant<S>(weight) * drive;
-      });
-    }
+    for (auto& state : next) state = model_.add_input(state, S(u_applied - applied_input_));
     if (!all(is_finite(probe(next)))) [[unlikely]] {
       if constexpr (PackScalar<S>) {
         return each_lane([&](Plain& lane, int i) { return lane.revise_input(u_applied[i]); });
@@ -301,10 +300,13 @@ class PredictorCorrector {
   }
 
   /// b0, as it was given.
-  [[nodiscard]] constexpr const S& input_gain() const noexcept { return input_gain_; }
+  [[nodiscard]] constexpr const S& input_gain() const noexcept { return model_.input_gain(); }
 
   /// T, s, as it was given.
-  [[nodiscard]] constexpr const S& sample_time() const noexcept { return sample_time_; }
+  [[nodiscard]] constexpr const S& sample_time() const noexcept { return model_.sample_time(); }
+
+  /// What is known of the plant.
+  [[nodiscard]] constexpr const Model& model() const noexcept { return model_; }
 
   /// Gain of the next correction of level `level` = 0 .. p - 1, scaled; for laws that know it
   /// before the measurement.
@@ -315,7 +317,7 @@ class PredictorCorrector {
 
   /// Starts anew at (y, 0, .., 0). A y that is not finite changes nothing and is reported.
   Status reset(S y) noexcept {
-    typename Chain::State state{};
+    State state{};
     for (S& x : state) x = S(0.0);
     state[0] = y;
     return reset_scaled(state);
@@ -323,9 +325,7 @@ class PredictorCorrector {
 
   /// Starts anew at a given estimate, N x 1, physical units. A state that is not finite changes
   /// nothing and is reported.
-  Status reset(const Estimate& state) noexcept {
-    return reset_scaled(Chain::scaled(state, sample_time()));
-  }
+  Status reset(const Estimate& state) noexcept { return reset_scaled(model_.scaled(state)); }
 
   /// Moves the origin of y: every level's z_1 grows by `offset`. For periodic quantities, whose
   /// estimate would otherwise run away with the turns.
@@ -341,7 +341,7 @@ class PredictorCorrector {
   /// @return as `shift_output`
   constexpr Status shift_disturbance(const S& offset) noexcept {
     LevelStates next = states_;
-    next[0][Order] = next[0][Order] + Chain::scaled_input_gain(offset, sample_time());
+    next[0][Order] = next[0][Order] + model_.scaled_disturbance(offset);
     return shift_to(next);
   }
 
@@ -351,22 +351,13 @@ class PredictorCorrector {
   Check<S> adopt(const PredictorCorrector& fresh) {
     if constexpr (PackScalar<S>) return detail::adopt_lanes(*this, fresh);
     PredictorCorrector next = fresh;
-    const S ratio = fresh.sample_time() * rate_;
-    const bool same_time = !all(detail::absolute(S(fresh.rate_ - rate_)) > S(0.0));
-    const S explained = (input_gain() - fresh.input_gain()) * applied_input_;
-    const S moved = Chain::scaled_input_gain(explained, fresh.sample_time());
-    const bool same_gain =
-        same_time &&
-        !all(detail::absolute(S(fresh.scaled_input_gain_ - scaled_input_gain_)) > S(0.0));
     for (std::size_t i = 0; i < Levels; ++i) {
-      next.states_[i] = states_[i];
-      S factor(1.0);
-      for (std::size_t r = 1; !same_time && r < size; ++r) {
-        factor = factor * ratio;
-        next.states_[i][r] = next.states_[i][r] * factor;
-      }
+      next.states_[i] = next.model_.rescaled(states_[i], model_);
     }
-    if (!same_gain) next.states_[0][Order] = next.states_[0][Order] + moved;
+    if (!next.model_.same_drive(model_)) {
+      const S explained = (input_gain() - fresh.input_gain()) * applied_input_;
+      next.states_[0][Order] = next.states_[0][Order] + next.model_.scaled_disturbance(explained);
+    }
     if (!all(is_finite(next.probe(next.states_)))) {
       return Error<S>{"input_gain", fresh.input_gain(), "would make the estimate not finite"};
     }
@@ -381,10 +372,7 @@ class PredictorCorrector {
   /// At rest in zero; `config` is checked already.
   PredictorCorrector(const ChainConfig<S>& config, const Laws& laws) noexcept
       : laws_(laws),
-        scaled_input_gain_(Chain::scaled_input_gain(config.input_gain, config.sample_time)),
-        rate_(S(1.0) / config.sample_time),
-        input_gain_(config.input_gain),
-        sample_time_(config.sample_time),
+        model_(config.input_gain, config.sample_time),
         max_gap_(static_cast<std::uint16_t>(config.max_gap)) {
     for (auto& state : states_) {
       for (S& x : state) x = S(0.0);
@@ -403,17 +391,18 @@ class PredictorCorrector {
 
   /// All that it holds, for what is built on it, see detail::LaneAccess.
   static constexpr auto fields(auto& o) noexcept {
-    return std::tie(o.states_, o.laws_, o.scaled_input_gain_, o.rate_, o.innovation_,
-                    o.applied_input_, o.input_gain_, o.sample_time_, o.gap_, o.max_gap_);
+    return std::tie(o.states_, o.laws_, o.model_, o.innovation_, o.applied_input_, o.gap_,
+                    o.max_gap_);
   }
 
  private:
   friend struct detail::LaneAccess;
-  template <int OtherOrder, Scalar OtherS, int OtherExtension, class OtherLaw, int OtherLevels>
+  template <int OtherOrder, Scalar OtherS, int OtherExtension, class OtherLaw, int OtherLevels,
+            class OtherModel>
   requires GainLaw<OtherLaw, OtherOrder + OtherExtension, OtherS>
   friend class PredictorCorrector;
 
-  using LevelStates = Array<typename Chain::State, Levels>;
+  using LevelStates = Array<State, Levels>;
   using Plain = detail::PlainTwin<PredictorCorrector, S>;  ///< a lane
 
   /// A gap that is above every max_gap.
@@ -424,12 +413,6 @@ class PredictorCorrector {
     Array<S, Levels> innovations{};
   };
 
-  template <class Function>
-  ESOKIT_INLINE static constexpr void for_each_state(LevelStates& states, Function&& f) noexcept {
-    detail::unroll<Levels>([&](auto i) ESOKIT_INLINE_LAMBDA {
-      detail::unroll<size>([&](auto r)
-                               ESOKIT_INLINE_LAMBDA { f(std::get<r>(std::get<i>(states))); });
-    });
   }
 
   /// `step` with the observer of each lane.
@@ -478,25 +461,16 @@ class PredictorCorrector {
     }
   }
 
-  [[nodiscard]] ESOKIT_INLINE constexpr LevelStates predicted_levels(S drive) const noexcept {
+  [[nodiscard]] ESOKIT_INLINE constexpr LevelStates predicted_levels(const S& u) const noexcept {
     LevelStates next;
-    std::get<0>(next) = Chain::template predict<1>(std::get<0>(states_), {drive});
+    const auto drive = model_.drive(u);
+    std::get<0>(next) = model_.predict(std::get<0>(states_), drive);
     if constexpr (Levels > 1) {
-      // What drives the next level: u, and the disturbance found so far with its derivatives.
-      Array<S, Extension> drives;
-      detail::unroll<Extension>([&](auto r) ESOKIT_INLINE_LAMBDA {
-        std::get<r>(drives) = std::get<Order + r>(std::get<0>(states_));
-      });
-      std::get<0>(drives) = std::get<0>(drives) + drive;
+      auto joined = model_.joined(drive, std::get<0>(states_));
       detail::unroll<Levels - 1>([&](auto below) ESOKIT_INLINE_LAMBDA {
         constexpr int level = below + 1;
-        const auto& state = std::get<level>(states_);
-        std::get<level>(next) = Chain::template predict<Extension>(state, drives);
-        if constexpr (level + 1 < Levels) {
-          detail::unroll<Extension>([&](auto r) ESOKIT_INLINE_LAMBDA {
-            std::get<r>(drives) = std::get<Order + r>(state) + std::get<r>(drives);
-          });
-        }
+        std::get<level>(next) = model_.predict(std::get<level>(states_), joined);
+        if constexpr (level + 1 < Levels) joined = model_.joined(joined, std::get<level>(states_));
       });
     }
     return next;
@@ -504,19 +478,16 @@ class PredictorCorrector {
 
   /// Scaled state of a level, with the disturbances of the levels below it added to its own.
   template <int Level>
-  [[nodiscard]] ESOKIT_INLINE constexpr typename Chain::State up_to_level() const noexcept {
+  [[nodiscard]] ESOKIT_INLINE constexpr State up_to_level() const noexcept {
     return up_to_level<Level>(states_);
   }
 
   template <int Level>
-  [[nodiscard]] ESOKIT_INLINE static constexpr typename Chain::State up_to_level(
+  [[nodiscard]] ESOKIT_INLINE static constexpr State up_to_level(
       const LevelStates& states) noexcept {
-    typename Chain::State state = std::get<Level>(states);
+    State state = std::get<Level>(states);
     detail::unroll<Level>([&](auto i) ESOKIT_INLINE_LAMBDA {
-      detail::unroll<Extension>([&](auto r) ESOKIT_INLINE_LAMBDA {
-        constexpr int row = Order + r;
-        std::get<row>(state) = std::get<row>(state) + std::get<row>(std::get<i>(states));
-      });
+      detail::add_rows<Order, size - Order>(state, std::get<i>(states));
     });
     return state;
   }
@@ -525,17 +496,14 @@ class PredictorCorrector {
   /// ScaledChain::finite_probe. Of the sum of the levels' magnitudes, which no sum of some of their
   /// disturbances exceeds.
   [[nodiscard]] ESOKIT_INLINE constexpr S probe(const LevelStates& states) const noexcept {
-    typename Chain::State sum = std::get<Levels - 1>(states);
-    if constexpr (Levels > 1) {
-      detail::unroll<size>([&](auto r) ESOKIT_INLINE_LAMBDA {
-        S& all = std::get<r>(sum);
-        all = detail::absolute(all);
-        detail::unroll<Levels - 1>([&](auto i) ESOKIT_INLINE_LAMBDA {
-          all = all + detail::absolute(std::get<r>(std::get<i>(states)));
-        });
-      });
+    if constexpr (Levels == 1) {
+      return model_.finite_probe(std::get<0>(states));
+    } else {
+      State sum = detail::magnitudes(std::get<Levels - 1>(states));
+      detail::unroll<Levels - 1>(
+          [&](auto i) ESOKIT_INLINE_LAMBDA { detail::add_magnitudes(sum, std::get<i>(states)); });
+      return model_.finite_probe(sum);
     }
-    return Chain::finite_probe(sum, rate_);
   }
 
   [[nodiscard]] constexpr decltype(auto) law_gain(const Law& law, const S& innovation,
@@ -568,15 +536,10 @@ class PredictorCorrector {
           return;
         }
       }
-      const auto apply = [&](const ScaledGain<size, S>& k) ESOKIT_INLINE_LAMBDA {
-        detail::unroll<size>([&](auto r) ESOKIT_INLINE_LAMBDA {
-          std::get<r>(z) = std::get<r>(z) + std::get<r>(k) * e;
-        });
-      };
       if constexpr (NominalGain) {
-        apply(std::get<level>(laws_).gain(e));
+        z = detail::add_scaled(z, std::get<level>(laws_).gain(e), e);
       } else {
-        apply(law_gain(std::get<level>(laws_), e, elapsed));
+        z = detail::add_scaled(z, law_gain(std::get<level>(laws_), e, elapsed), e);
       }
       measured = std::get<0>(z);
     });
@@ -598,9 +561,10 @@ class PredictorCorrector {
     if (gap_ == 0) [[likely]] {
       // One test for all: a bad y or u makes the new state non-finite. Nothing is kept then, and
       // the guarded path finds out what it was.
-      Correction step{predicted_levels(scaled_input_gain_ * u_applied)};
+      Correction step{predicted_levels(u_applied)};
       const bool looked = correct_levels<true>(step, y, 1u);
-      for_each_state(step.states, [](S& x) ESOKIT_INLINE_LAMBDA { detail::keep_scalar(x); });
+      detail::unroll<Levels>(
+          [&](auto i) ESOKIT_INLINE_LAMBDA { detail::keep_scalars(std::get<i>(step.states)); });
       if (looked && all(is_finite(probe(step.states)))) [[likely]] {
         commit(step);
         applied_input_ = u_applied;
@@ -621,7 +585,7 @@ class PredictorCorrector {
   }
 
   Status predict_guarded(S u_applied) noexcept {
-    const LevelStates next = predicted_levels(scaled_input_gain_ * u_applied);
+    const LevelStates next = predicted_levels(u_applied);
     if (!all(is_finite(probe(next)))) [[unlikely]] {
       if constexpr (PackScalar<S>) {
         return each_lane([&](Plain& lane, int i) { return lane.predict_rejecting(u_applied[i]); });
@@ -647,7 +611,7 @@ class PredictorCorrector {
 
   /// Where u or the state is so large that the prediction is not finite.
   ESOKIT_COLD StepStatus predict_rejecting(S u_applied) noexcept requires(!PackScalar<S>) {
-    LevelStates next = predicted_levels(scaled_input_gain_ * u_applied);
+    LevelStates next = predicted_levels(u_applied);
     count_missed();
     if (is_finite(probe(next))) {  // of a pack whose other lane it was
       states_ = next;
@@ -660,7 +624,7 @@ class PredictorCorrector {
       gap_ = restart_due;
       return StepStatus::prediction_dropped;
     }
-    next = predicted_levels(scaled_input_gain_ * applied_input_);
+    next = predicted_levels(applied_input_);
     if (!is_finite(probe(next))) {
       // It is the state that cannot be predicted, and may never be again: y starts anew.
       gap_ = restart_due;
@@ -670,7 +634,7 @@ class PredictorCorrector {
     return StepStatus::input_rejected;
   }
 
-  Status reset_scaled(const typename Chain::State& state) noexcept {
+  Status reset_scaled(const State& state) noexcept {
     if constexpr (PackScalar<S>) {
       return each_lane([&](Plain& lane, int i) {
         auto lane_state = lane.states_[0];
@@ -695,19 +659,17 @@ class PredictorCorrector {
 
   LevelStates states_{};
   Laws laws_;
-  S scaled_input_gain_;
-  S rate_;
+  Model model_;
   S innovation_ = S(0.0);
   S applied_input_ = S(0.0);
-  S input_gain_;
-  S sample_time_;
   Lanes<std::uint16_t, S> gap_{};
   std::uint16_t max_gap_;
 };
 
 /// Told apart in snapshots.
-template <int Order, Scalar S, int Extension, class Law, int Levels>
-inline constexpr std::uint32_t type_tag<PredictorCorrector<Order, S, Extension, Law, Levels>> =
-    make_type_tag<S, Law>("PredictorCorrector", Order, Extension, Levels);
+template <int Order, Scalar S, int Extension, class Law, int Levels, class Model>
+inline constexpr std::uint32_t
+    type_tag<PredictorCorrector<Order, S, Extension, Law, Levels, Model>> =
+        make_type_tag<S, Law, Model>("PredictorCorrector", Order, Extension, Levels);
 
 }  // namespace esokit

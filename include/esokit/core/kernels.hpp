@@ -1,0 +1,56 @@
+/// @file
+/// The vector operations that a step of an observer consists of, unrolled when compiling: all that
+/// is hard to read for the sake of speed is here, so that a step reads like its equation.
+#pragma once
+
+#include <esokit/core/scalar.hpp>
+#include <esokit/core/unroll.hpp>
+
+namespace esokit::detail {
+
+/// x + k e, element by element: a correction.
+template <class S, std::size_t Size>
+[[nodiscard]] ESOKIT_INLINE constexpr std::array<S, Size> add_scaled(const std::array<S, Size>& x,
+                                                                     const std::array<S, Size>& k,
+                                                                     const S& e) noexcept {
+  std::array<S, Size> sum;
+  unroll<Size>(
+      [&](auto r) ESOKIT_INLINE_LAMBDA { std::get<r>(sum) = std::get<r>(x) + std::get<r>(k) * e; });
+  return sum;
+}
+
+/// Adds the elements of `x` from `First` on to those of `sum`, `Count` of them.
+template <int First, int Count, class S, std::size_t Size>
+ESOKIT_INLINE constexpr void add_rows(std::array<S, Size>& sum,
+                                      const std::array<S, Size>& x) noexcept {
+  unroll<Count>([&](auto r) ESOKIT_INLINE_LAMBDA {
+    std::get<First + r>(sum) = std::get<First + r>(sum) + std::get<First + r>(x);
+  });
+}
+
+/// sum + |x|, element by element.
+template <class S, std::size_t Size>
+ESOKIT_INLINE constexpr void add_magnitudes(std::array<S, Size>& sum,
+                                            const std::array<S, Size>& x) noexcept {
+  unroll<Size>([&](auto r) ESOKIT_INLINE_LAMBDA {
+    std::get<r>(sum) = std::get<r>(sum) + absolute(std::get<r>(x));
+  });
+}
+
+/// The magnitudes of all elements.
+template <class S, std::size_t Size>
+[[nodiscard]] ESOKIT_INLINE constexpr std::array<S, Size> magnitudes(
+    const std::array<S, Size>& x) noexcept {
+  std::array<S, Size> result;
+  unroll<Size>([&](auto r)
+                   ESOKIT_INLINE_LAMBDA { std::get<r>(result) = absolute(std::get<r>(x)); });
+  return result;
+}
+
+/// Keeps the vectoriser off all elements, see keep_scalar.
+template <class S, std::size_t Size>
+ESOKIT_INLINE constexpr void keep_scalars(std::array<S, Size>& x) noexcept {
+  unroll<Size>([&](auto r) ESOKIT_INLINE_LAMBDA { keep_scalar(std::get<r>(x)); });
+}
+
+}  // namespace esokit::detail

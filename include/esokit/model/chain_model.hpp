@@ -1,0 +1,147 @@
+/// @file
+/// ChainModel: the chain of integrators as the model of an observer, what is known where nothing
+/// more is known; and the concept of a model.
+#pragma once
+
+#include <concepts>
+#include <esokit/core/kernels.hpp>
+#include <esokit/core/lanes.hpp>
+#include <esokit/model/scaled_chain.hpp>
+#include <tuple>
+
+namespace esokit {
+
+/// The model y^(n) = d + b0 u with d^(m) = 0, sampled at T: what an observer predicts with.
+///
+/// States are those of ScaledChain.
+template <int Order, Scalar S = double, int Extension = 1>
+class ChainModel : public ChainSize<Order, Extension> {
+  using Chain = ScaledChain<Order, S, Extension>;
+
+ public:
+  using State = typename Chain::State;        ///< x, scaled, N elements
+  using Estimate = typename Chain::Estimate;  ///< z, physical units, N x 1
+  template <class T>
+  using with_scalar = ChainModel<Order, T, Extension>;  ///< the same of another scalar
+
+  /// @param input_gain b0 @param sample_time T, s; both checked
+  constexpr ChainModel(const S& input_gain, const S& sample_time) noexcept
+      : scaled_input_gain_(Chain::scaled_input_gain(input_gain, sample_time)),
+        rate_(S(1.0) / sample_time),
+        input_gain_(input_gain),
+        sample_time_(sample_time) {}
+
+  /// b0, as it was given.
+  [[nodiscard]] constexpr const S& input_gain() const noexcept { return input_gain_; }
+  /// T, s, as it was given.
+  [[nodiscard]] constexpr const S& sample_time() const noexcept { return sample_time_; }
+
+  /// What u, held over the sample, is to the chain: a part of its disturbance, scaled.
+  [[nodiscard]] ESOKIT_INLINE constexpr S drive(const S& u) const noexcept {
+    return scaled_input_gain_ * u;
+  }
+
+  /// `drive`, and with it the disturbance that x has found with its derivatives: what drives the
+  /// next level of a cascade.
+  /// @{
+  [[nodiscard]] ESOKIT_INLINE static constexpr Array<S, Extension> joined(const S& drive,
+                                                                          const State& x) noexcept {
+    Array<S, Extension> all;
+    detail::unroll<Extension>(
+        [&](auto r) ESOKIT_INLINE_LAMBDA { std::get<r>(all) = std::get<Order + r>(x); });
+    std::get<0>(all) = std::get<0>(all) + drive;
+    return all;
+  }
+  [[nodiscard]] ESOKIT_INLINE static constexpr Array<S, Extension> joined(
+      const Array<S, Extension>& drive, const State& x) noexcept {
+    Array<S, Extension> all;
+    detail::unroll<Extension>([&](auto r) ESOKIT_INLINE_LAMBDA {
+      std::get<r>(all) = std::get<Order + r>(x) + std::get<r>(drive);
+    });
+    return all;
+  }
+  /// @}
+
+  /// x one sample ahead: Phi x + Gamma u. @param drive of u, or joined
+  /// @{
+  [[nodiscard]] ESOKIT_INLINE constexpr State predict(const State& x,
+                                                      const S& drive) const noexcept {
+    return Chain::template predict<1>(x, {drive});
+  }
+  [[nodiscard]] ESOKIT_INLINE constexpr State predict(
+      const State& x, const Array<S, Extension>& drive) const noexcept {
+    return Chain::template predict<Extension>(x, drive);
+  }
+  /// @}
+
+  /// x + Gamma u.
+  [[nodiscard]] ESOKIT_INLINE constexpr State add_input(const State& x, const S& u) const noexcept {
+    const S of_u = drive(u);
+    State sum = x;
+    detail::unroll<Order>([&](auto r) ESOKIT_INLINE_LAMBDA {
+      constexpr double weight = binomial(Order, r);
+      std::get<r>(sum) = std::get<r>(sum) + detail::constant<S>(weight) * of_u;
+    });
+    return sum;
+  }
+
+  /// The estimates in physical units.
+  [[nodiscard]] constexpr Estimate physical(const State& x) const noexcept {
+    return Chain::physical(x, rate_);
+  }
+  /// One of them.
+  template <int Row>
+  [[nodiscard]] ESOKIT_INLINE constexpr S physical(const State& x) const noexcept {
+    return Chain::template physical<Row>(std::get<Row>(x), rate_);
+  }
+  /// The state from estimates in physical units.
+  [[nodiscard]] constexpr State scaled(const Estimate& estimate) const noexcept {
+    return Chain::scaled(estimate, sample_time_);
+  }
+
+  /// d as it is scaled in the state. @param disturbance unit of y^(n)
+  [[nodiscard]] constexpr S scaled_disturbance(const S& disturbance) const noexcept {
+    return Chain::scaled_input_gain(disturbance, sample_time_);
+  }
+
+  /// A number that is finite only if all estimates are, see ScaledChain::finite_probe.
+  [[nodiscard]] ESOKIT_INLINE constexpr S finite_probe(const State& x) const noexcept {
+    return Chain::finite_probe(x, rate_);
+  }
+
+  /// A state of the model `before` in the scaling of this one.
+  [[nodiscard]] constexpr State rescaled(const State& x, const ChainModel& before) const noexcept {
+    if (same_time(before)) return x;
+    const S ratio = sample_time_ * before.rate_;
+    State next = x;
+    S factor(1.0);
+    for (std::size_t r = 1; r < next.size(); ++r) {
+      factor = factor * ratio;
+      next[r] = next[r] * factor;
+    }
+    return next;
+  }
+
+  /// True if u does the same in both.
+  [[nodiscard]] constexpr bool same_drive(const ChainModel& other) const noexcept {
+    return same_time(other) &&
+           !all(detail::magnitude(S(scaled_input_gain_ - other.scaled_input_gain_)) > S(0.0));
+  }
+
+ private:
+  friend struct detail::LaneAccess;
+  static constexpr auto fields(auto& o) noexcept {
+    return std::tie(o.scaled_input_gain_, o.rate_, o.input_gain_, o.sample_time_);
+  }
+
+  [[nodiscard]] constexpr bool same_time(const ChainModel& other) const noexcept {
+    return !all(detail::magnitude(S(rate_ - other.rate_)) > S(0.0));
+  }
+
+  S scaled_input_gain_;
+  S rate_;  ///< 1/T
+  S input_gain_;
+  S sample_time_;
+};
+
+}  // namespace esokit
