@@ -13,8 +13,8 @@
 
 namespace esokit_test {
 
-using esokit::chain_riccati;
 using esokit::CovarianceFactor;
+using esokit::steady_covariance;
 
 /// Several right-hand sides beside each other, and what is not positive definite at each pivot.
 TEST(SolvePositive, EachColumnOfItsOwn) {
@@ -88,7 +88,7 @@ esokit::ScaledGain<Size, S> limit_gain(const std::vector<double>& q, double r, d
     noise.set_variance(i, static_cast<S>(q[static_cast<std::size_t>(i)] * inflated));
   }
   const auto factor =
-      chain_riccati<Size, S>(noise, static_cast<S>(r / (1 + theta)), static_cast<S>(1 + theta));
+      steady_covariance<Size, S>(noise, static_cast<S>(r / (1 + theta)), static_cast<S>(1 + theta));
   EXPECT_TRUE(factor.has_value());
   if (!factor) return {};
   const S d = factor->variance(0);
@@ -197,7 +197,7 @@ TEST(Riccati, limit_without_noise_is_deadbeat_like) {
 template <int Size>
 void without_disturbance_it_is_the_linear_observer() {
   for (const double theta : {0.02, 0.3, 2.0, 100.0}) {
-    const auto factor = chain_riccati<Size, double>({}, 1 / (1 + theta), 1 + theta);
+    const auto factor = steady_covariance<Size, double>({}, 1 / (1 + theta), 1 + theta);
     ASSERT_TRUE(factor.has_value());
     const double d = factor->variance(0);
     const auto gain = factor->gain(d / (d + 1 / (1 + theta)));
@@ -218,11 +218,11 @@ TEST(Riccati, without_disturbance_it_is_the_linear_observer) {
 
 TEST(Riccati, says_when_there_is_no_limit) {
   CovarianceFactor<3, double> noise;
-  EXPECT_FALSE((chain_riccati<3, double>(noise, 1.0, 1.0)));  // the gain goes to zero
-  noise.set_variance(1, 1.0);                                 // the highest state is not reached
-  EXPECT_FALSE((chain_riccati<3, double>(noise, 1.0, 1.0)));
+  EXPECT_FALSE((steady_covariance<3, double>(noise, 1.0, 1.0)));  // the gain goes to zero
+  noise.set_variance(1, 1.0);  // the highest state is not reached
+  EXPECT_FALSE((steady_covariance<3, double>(noise, 1.0, 1.0)));
   noise = {};
-  EXPECT_FALSE((chain_riccati<3, double>(noise, 0.0, 1.5)));  // Q = R = 0
+  EXPECT_FALSE((steady_covariance<3, double>(noise, 0.0, 1.5)));  // Q = R = 0
 }
 
 TEST(Riccati, general_model_says_when_not_stabilisable) {

@@ -61,6 +61,7 @@ enum class Without {
   estimate_of_row,
   total_disturbance,
   applied_input,
+  rest,
   input_gain,
   sample_time,
   missed,
@@ -121,6 +122,7 @@ class Loop {
   S applied_input() const noexcept requires(W != Without::applied_input) {
     return truth_.applied_input();
   }
+  Estimate rest(S y, S u) const noexcept requires(W != Without::rest) { return truth_.rest(y, u); }
   S input_gain() const noexcept requires(W != Without::input_gain) { return truth_.input_gain(); }
   S sample_time() const noexcept requires(W != Without::sample_time) {
     return truth_.sample_time();
@@ -222,12 +224,6 @@ class Predictable {
   using scalar_type = S;
   using Estimate = esokit::Vector<S, 3>;
   using Config = Loop<>::Config;
-  struct Chain {
-    static S finite_probe(const esokit::Array<S, 3>& x, S rate) noexcept {
-      return Truth::Chain::finite_probe(x, rate);
-    }
-  };
-
   static Expected<Predictable, Error<S>> make(const Config& config) requires(W != Without::make) {
     const auto truth = Truth::make(of(config));
     if (!truth) return truth.error();
@@ -250,6 +246,8 @@ class Predictable {
   S scaled_estimate() const noexcept requires(W != Without::scaled_estimate) {
     return truth_.scaled_estimate<Row>();
   }
+  Estimate rest(S y, S u) const noexcept requires(W != Without::rest) { return truth_.rest(y, u); }
+  S finite_probe(const esokit::Array<S, 3>& x) const noexcept { return truth_.finite_probe(x); }
   S input_gain() const noexcept requires(W != Without::input_gain) { return truth_.input_gain(); }
   S sample_time() const noexcept requires(W != Without::sample_time) {
     return truth_.sample_time();
@@ -323,6 +321,7 @@ static_assert(!LoopObserver<Loop<Without::estimate>>);
 static_assert(!LoopObserver<Loop<Without::estimate_of_row>>);
 static_assert(!LoopObserver<Loop<Without::total_disturbance>>);
 static_assert(!LoopObserver<Loop<Without::applied_input>>);
+static_assert(!LoopObserver<Loop<Without::rest>>);
 static_assert(!LoopObserver<Loop<Without::input_gain>>);
 static_assert(!LoopObserver<Loop<Without::sample_time>> && !LoopObserver<Loop<Without::missed>>);
 // An archetype is no more than its concept.

@@ -11,6 +11,7 @@
 #include <esokit/analysis/linear_system.hpp>
 #include <esokit/design/sampled_gain.hpp>
 #include <esokit/model/integrator_chain.hpp>
+#include <esokit/model/sampled_model.hpp>
 #include <esokit/observer/concepts.hpp>
 
 namespace esokit {
@@ -83,6 +84,47 @@ struct ObserverMatrices {
   double sample_time = 0.0;
 };
 
+/// Phi - I, Gamma, and what a unit of the scaled states is, in physical units.
+template <int Size>
+struct SampledMatrices {
+  Matrix<double, Size, Size> step;
+  Vector<double, Size> gamma;
+  Vector<double, Size> units;
+};
+
+/// In double, whatever the scalar of the observer.
+template <SampledLinearObserver Observer>
+SampledMatrices<Observer::size> sampled_matrices(const Observer& observer) {
+  constexpr int size = Observer::size;
+  const auto& model = observer.model();
+  using Model = std::remove_cvref_t<decltype(model)>;
+  using S = typename Observer::scalar_type;
+  const double time = static_cast<double>(observer.sample_time());
+  SampledMatrices<size> m;
+  if constexpr (model_traits<Model>.is_chain) {
+    using Chain = IntegratorChain<Observer::order, double, Observer::extension>;
+    m.step = Chain::transition_matrix(time);
+    for (int i = 0; i < size; ++i) m.step(i, i) = 0.0;
+    m.gamma = Chain::sampled_input_matrix(time, static_cast<double>(observer.input_gain()));
+    m.units(0) = 1.0;
+    for (int r = 1; r < size; ++r) m.units(r) = m.units(r - 1) * r / time;
+  } else {
+    typename Model::State ones;
+    ones.fill(S(1));
+    const auto units = model.physical(ones);
+    const auto gamma = model.physical(model.add_input(typename Model::State{}, S(1)));
+    const auto step = model.increment();
+    for (int i = 0; i < size; ++i) m.units(i) = static_cast<double>(units(i));
+    for (int i = 0; i < size; ++i) {
+      m.gamma(i) = static_cast<double>(gamma(i));
+      for (int j = 0; j < size; ++j) {
+        m.step(i, j) = static_cast<double>(step(i, j)) * m.units(i) / m.units(j);
+      }
+    }
+  }
+  return m;
+}
+
 template <class Observer>
 using MatricesOf = ObserverMatrices<Observer::order, Observer::extension, Observer::levels>;
 
@@ -92,9 +134,9 @@ MatricesOf<Observer> observer_matrices(const Observer& observer, double = 0.0) {
   constexpr int order = Observer::order;
   constexpr int size = Matrices::size;
   constexpr int states = Matrices::states;
-  using Chain = IntegratorChain<order, double, Observer::extension>;
 
   Matrices m;
+  const auto sampled = sampled_matrices(observer);
   m.input_gain = static_cast<double>(observer.input_gain());
   m.sample_time = static_cast<double>(observer.sample_time());
 
@@ -107,10 +149,9 @@ MatricesOf<Observer> observer_matrices(const Observer& observer, double = 0.0) {
   for (int level = 0; level < Observer::levels; ++level) {
     const int first = level * size;
     const auto scaled = observer.level_gain(level);
-    double factor = 1.0;  // r! / T^r
     for (int r = 0; r < size; ++r) {
-      if (r > 0) factor *= r / m.sample_time;
-      const double gain = factor * static_cast<double>(scaled[static_cast<std::size_t>(r)]);
+      const double gain =
+          sampled.units(r) * static_cast<double>(scaled[static_cast<std::size_t>(r)]);
       const bool disturbance = r >= order && level > 0;  // found by the levels before, too
       for (int j = 0; j < states; ++j) {
         const double innovation = measured[static_cast<std::size_t>(j)] - (j == first ? 1.0 : 0.0);
@@ -127,17 +168,16 @@ MatricesOf<Observer> observer_matrices(const Observer& observer, double = 0.0) {
     measured_y = added_y[static_cast<std::size_t>(first)];
   }
 
-  const auto phi = Chain::transition_matrix(m.sample_time);
-  const auto gamma = Chain::sampled_input_matrix(m.sample_time, m.input_gain);
   for (int row = 0; row < states; ++row) {
     const int first = row / size * size;
-    for (int k = row; k < first + size; ++k) {
-      const double weight = phi(row - first, k - first);
+    for (int k = first; k < first + size; ++k) {
+      const double step = sampled.step(row - first, k - first);
+      const double weight = step + (k == row ? 1.0 : 0.0);
       for (int j = 0; j < states; ++j) m.a(row, j) += weight * added(k, j);
-      if (k > row) m.a(row, k) += weight;
+      m.a(row, k) += step;
       m.by(row) += weight * added_y[static_cast<std::size_t>(k)];
     }
-    m.bu(row) = gamma(row - first);
+    m.bu(row) = sampled.gamma(row - first);
   }
   for (int r = 0; r < size; ++r) {
     const int row = states - size + r;
@@ -245,6 +285,12 @@ auto estimation_system(const Observer& observer, double t = 0.0) {
 /// @param t s, as in observer_system
 template <LinearObserver Observer>
 auto error_system(const Observer& observer, double t = 0.0) {
+  if constexpr (SampledLinearObserver<Observer>) {
+    static_assert(
+        model_traits<std::remove_cvref_t<decltype(observer.model())>>.is_chain,
+        "esokit: the error's system is driven by d^(m), which only a chain of integrators "
+        "has; use estimation_system");
+  }
   constexpr int size = Observer::order + Observer::extension;
   const auto m = detail::observer_matrices(observer, t);
   auto system = detail::system_of<detail::MatricesOf<Observer>, 2>(m);

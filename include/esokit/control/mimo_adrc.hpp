@@ -85,7 +85,7 @@ class MimoAdrc {
       // After a gap too long to bridge: the steady state of the present u does not bump.
       if (has(status, StepStatus::restarted)) [[unlikely]] {
         const S input = observer.applied_input();
-        (void)observer.reset(detail::steady_state(observer, S(y(row)), input));
+        (void)observer.reset(observer.rest(S(y(row)), input));
       }
       const auto estimate = observer.estimate();
       S r = reference(row);

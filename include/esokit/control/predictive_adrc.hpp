@@ -365,7 +365,7 @@ class PredictiveAdrc {
         const auto gain = observer_.correction_gain(S(0.0));
         slope_ = weigh(gain);
         offset_ = blind_ + slope_ * observer_.template scaled_estimate<0>();
-        guard_ = Observer::Chain::finite_probe(gain, rate_);
+        guard_ = observer_.finite_probe(gain);
       }
     } else {
       offset_ = observer_.template scaled_estimate<0>();
@@ -398,7 +398,7 @@ class PredictiveAdrc {
     const auto next = observer_.preview();
     slope_ = weigh(next.slope);
     offset_ = feed_ - weigh(next.offset);
-    guard_ = Observer::Chain::finite_probe(next.slope, rate_);
+    guard_ = observer_.finite_probe(next.slope);
   }
 
   /// The next u does not depend on y.

@@ -49,6 +49,39 @@ Matrix<S, Rows, Columns> plus_product_transposed(Matrix<S, Rows, Columns> c,
 
 }  // namespace detail
 
+/// Phi of the chain in Nordsieck scaling: known when compiling.
+struct PascalTransition {};
+
+/// Phi of any other model.
+template <int Size, Scalar S>
+struct MatrixTransition {
+  Matrix<S, Size, Size> phi;   ///< N x N, scaled
+  Array<int, Size> degrees{};  ///< state r is in units of T^degree
+
+  /// Of a model.
+  template <class Model>
+  static MatrixTransition of(const Model& model) noexcept {
+    MatrixTransition transition{model.increment(), {}};
+    for (int i = 0; i < Size; ++i) {
+      transition.phi(i, i) = transition.phi(i, i) + S(1.0);
+      transition.degrees[static_cast<std::size_t>(i)] = model.degree(i);
+    }
+    return transition;
+  }
+
+  /// As a model has them, see SampledModel.
+  /// @{
+  [[nodiscard]] Matrix<S, Size, Size> increment() const noexcept {
+    Matrix<S, Size, Size> step = phi;
+    for (int i = 0; i < Size; ++i) step(i, i) = step(i, i) - S(1.0);
+    return step;
+  }
+  [[nodiscard]] int degree(int row) const noexcept {
+    return degrees[static_cast<std::size_t>(row)];
+  }
+  /// @}
+};
+
 /// P = L D L', N x N, in the Nordsieck scaling of the chain (all states have the unit of y), with L
 /// unit lower triangular and D diagonal, not negative.
 ///
@@ -124,10 +157,11 @@ class CovarianceFactor {
   }
 
   /// One sample ahead: P <- inflation Phi P Phi' + Q.
-  /// @param inflation > 0 @param noise Q, in the same scaling
+  /// @param inflation > 0 @param noise Q, in the same scaling @param transition Phi
   /// @tparam DiagonalNoise Q is diagonal, which saves a tenth
-  template <bool DiagonalNoise = false>
-  ESOKIT_INLINE constexpr void advance(const S& inflation, const CovarianceFactor& noise) noexcept {
+  template <bool DiagonalNoise = false, class Transition = PascalTransition>
+  ESOKIT_INLINE constexpr void advance(const S& inflation, const CovarianceFactor& noise,
+                                       const Transition& transition = {}) noexcept {
     // Rows of [Phi L, L_Q] with the weights [inflation D, D_Q], made orthogonal one by one. Of the
     // right half only what is below the diagonal is kept, negated; the diagonal is one.
     Array<S, Size> weights;
@@ -136,7 +170,7 @@ class CovarianceFactor {
     detail::repeat<Size, unrolled>([&](int k) ESOKIT_INLINE_LAMBDA {
       weights[index(k)] = inflation * variances_[index(k)];
       detail::repeat<Size, unrolled>([&](int i) ESOKIT_INLINE_LAMBDA {
-        rows[index(i)][index(k)] = transported(i, k);
+        rows[index(i)][index(k)] = transported(transition, i, k);
         if constexpr (!DiagonalNoise) {
           if (k < i) noise_rows[index(i)][index(k)] = -noise.lower_[packed(i, k)];
         }
@@ -204,12 +238,14 @@ class CovarianceFactor {
   }
 
   /// sum_i w_i (Phi P Phi')_ii.
-  [[nodiscard]] constexpr S transported_trace(const Array<S, Size>& weights) const noexcept {
+  template <class Transition = PascalTransition>
+  [[nodiscard]] constexpr S transported_trace(const Array<S, Size>& weights,
+                                              const Transition& transition = {}) const noexcept {
     S sum(0.0);
     detail::repeat<Size, unrolled>([&](int i) ESOKIT_INLINE_LAMBDA {
       S diagonal(0.0);
       detail::repeat<Size, unrolled>([&](int k) ESOKIT_INLINE_LAMBDA {
-        const S x = transported(i, k);
+        const S x = transported(transition, i, k);
         diagonal = diagonal + x * x * variances_[index(k)];
       });
       sum = sum + weights[index(i)] * diagonal;
@@ -236,16 +272,19 @@ class CovarianceFactor {
     for (S& d : variances_) d = d * factor;
   }
 
-  /// The same covariance in other units: state i times `unit`^i, all variances times `factor`.
-  constexpr void rescale(const S& unit, const S& factor) noexcept {
+  /// The same covariance in other units: state i times `unit`^degree, all variances times `factor`.
+  template <class Transition = PascalTransition>
+  constexpr void rescale(const S& unit, const S& factor,
+                         const Transition& transition = {}) noexcept {
     for (int i = 0; i < Size; ++i) {
       S scale = factor;
-      for (int k = 0; k < i; ++k) scale = scale * unit * unit;
+      for (int k = 0; k < degree(transition, i); ++k) scale = scale * unit * unit;
       variances_[index(i)] = variances_[index(i)] * scale;
-      S ratio = unit;
+      S ratio(1.0);
+      int reached = degree(transition, i);
       for (int j = i + 1; j < Size; ++j) {
+        for (; reached < degree(transition, j); ++reached) ratio = ratio * unit;
         lower_[packed(j, i)] = lower_[packed(j, i)] * ratio;
-        ratio = ratio * unit;
       }
     }
   }
@@ -294,8 +333,22 @@ class CovarianceFactor {
     return index(j * (2 * Size - j - 1) / 2 + i - j - 1);
   }
 
-  /// (Phi L)_ik = sum_j C(j, i) L_jk.
-  [[nodiscard]] ESOKIT_INLINE constexpr S transported(int i, int k) const noexcept {
+  static constexpr int degree(const PascalTransition&, int i) noexcept { return i; }
+  static constexpr int degree(const MatrixTransition<Size, S>& transition, int i) noexcept {
+    return transition.degree(i);
+  }
+
+  /// (Phi L)_ik.
+  [[nodiscard]] constexpr S transported(const MatrixTransition<Size, S>& transition, int i,
+                                        int k) const noexcept {
+    S sum = transition.phi(i, k);
+    for (int j = k + 1; j < Size; ++j) sum = sum + transition.phi(i, j) * lower_[packed(j, k)];
+    return sum;
+  }
+
+  /// The same for the chain: sum_j C(j, i) L_jk.
+  [[nodiscard]] ESOKIT_INLINE constexpr S transported(const PascalTransition&, int i,
+                                                      int k) const noexcept {
     // Not from zero: adding a zero costs an addition.
     S sum = k < i ? lower_[packed(i, k)] : S(pascal(k, i));
     detail::repeat<Size, unrolled>([&](int j) ESOKIT_INLINE_LAMBDA {

@@ -15,7 +15,9 @@
 #include <esokit/core/expected.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/design/covariance_factor.hpp>
+#include <esokit/design/model_placement.hpp>
 #include <esokit/design/sampled_gain.hpp>
+#include <esokit/model/chain_model.hpp>
 #include <limits>
 #include <optional>
 
@@ -142,25 +144,43 @@ std::optional<Matrix<S, Size, Size>> riccati_covariance(const RiccatiModel<Size,
   return std::nullopt;
 }
 
+namespace detail {
+
+/// Phi, and a gain that puts all poles at zero.
+template <int Size, Scalar S>
+std::pair<Matrix<S, Size, Size>, ScaledGain<Size, S>> deadbeat(const PascalTransition&) {
+  using Chain = ChainModel<Size - 1, S, 1>;
+  return {MatrixTransition<Size, S>::of(Chain(S(1.0), S(1.0))).phi,
+          current_gain<Size, S>(EqualSampledPoles<Size, S>{S(1.0)}.weights())};
+}
+template <int Size, Scalar S>
+std::pair<Matrix<S, Size, Size>, ScaledGain<Size, S>> deadbeat(
+    const MatrixTransition<Size, S>& transition) {
+  return {transition.phi,
+          placed_gain(transition, pole_factors(EqualSampledPoles<Size, S>{S(1.0)}))};
+}
+
+}  // namespace detail
+
 /// Least R for which an error that changes sign at every sample fades, in the unit of `noise`; not
 /// positive: none is needed.
 ///
 /// |p(-1)|^2 of the limit's poles is in proportion to the density of the innovations at half the
 /// sampling rate, R + |C (-I - Phi)^-1 Q^(1/2)|^2 (spectral factorisation). Where that is zero the
 /// limit has a pole at -1: a millionth of the trace of Q is asked for.
-/// @param noise Q, Nordsieck scaling
-template <int Size, Scalar S>
-S least_measurement_variance(const CovarianceFactor<Size, S>& noise) {
-  Array<S, Size> response{};
-  for (int j = 0; j < Size; ++j) {
-    S sum = j == 0 ? S(1.0) : S(0.0);
-    for (int i = 0; i < j; ++i) {
-      const auto& pascal = binomial_table<Size, detail::TableScalar<S>>;
-      sum = sum + response[static_cast<std::size_t>(i)] *
-                      S(pascal[static_cast<std::size_t>(j)][static_cast<std::size_t>(i)]);
-    }
-    response[static_cast<std::size_t>(j)] = S(-0.5) * sum;
+/// @param noise Q, scaled @param transition Phi
+template <int Size, Scalar S, class Transition = PascalTransition>
+S least_measurement_variance(const CovarianceFactor<Size, S>& noise,
+                             const Transition& transition = {}) {
+  const auto phi = detail::deadbeat<Size, S>(transition).first;
+  Matrix<S, Size, Size> system;  // (-I - Phi)'
+  Array<S, Size> response{};     // C (-I - Phi)^-1
+  for (int i = 0; i < Size; ++i) {
+    response[static_cast<std::size_t>(i)] = S(i == 0 ? 1.0 : 0.0);
+    for (int j = 0; j < Size; ++j) system(i, j) = -phi(j, i) - S(i == j ? 1.0 : 0.0);
   }
+  detail::solve_in_place(detail::DenseView<S>{system.data(), Size},
+                         detail::DenseView<S>{response.data(), Size, 1});
   S density(0.0);
   S trace(0.0);
   for (int k = 0; k < Size; ++k) {
@@ -175,31 +195,26 @@ S least_measurement_variance(const CovarianceFactor<Size, S>& noise) {
   return S(1e-6) * trace - density;
 }
 
-/// Steady state for the chain of integrators in Nordsieck scaling, P- = L D L'; its gain is good to
-/// a few units in the last place.
-/// @param noise Q @param measurement R >= 0 @param inflation >= 1
+/// Steady state for the chain of integrators in Nordsieck scaling, or another model whose first
+/// state is measured, P- = L D L'; its gain is good to a few units in the last place.
+/// @param noise Q @param measurement R >= 0 @param inflation >= 1 @param transition Phi
 /// @return nothing if there is none: inflation = 1 where nothing drives the highest state, or
 ///         Q = R = 0
-template <int Size, Scalar S>
-std::optional<CovarianceFactor<Size, S>> chain_riccati(const CovarianceFactor<Size, S>& noise,
-                                                       const S& measurement, const S& inflation) {
+template <int Size, Scalar S, class Transition = PascalTransition>
+std::optional<CovarianceFactor<Size, S>> steady_covariance(const CovarianceFactor<Size, S>& noise,
+                                                           const S& measurement, const S& inflation,
+                                                           const Transition& transition = {}) {
   using Vec = Matrix<S, Size, 1>;
+  const auto [phi, deadbeat] = detail::deadbeat<Size, S>(transition);
   RiccatiModel<Size, 1, S> model;
+  model.transition = phi;
   model.noise = noise.matrix();
   model.measurement(0, 0) = measurement;
   model.inflation = inflation;
-  for (int i = 0; i < Size; ++i) {
-    model.output(0, i) = S(i == 0 ? 1.0 : 0.0);
-    for (int j = 0; j < Size; ++j) {
-      model.transition(i, j) =
-          S(binomial_table<Size, detail::TableScalar<S>>[static_cast<std::size_t>(j)]
-                                                        [static_cast<std::size_t>(i)]);
-    }
-  }
+  for (int i = 0; i < Size; ++i) model.output(0, i) = S(i == 0 ? 1.0 : 0.0);
   if (!all(inflation > S(1.0)) && !all(model.noise(Size - 1, Size - 1) > S(0.0))) {
     return std::nullopt;
   }
-  const auto deadbeat = current_gain<Size, S>(EqualSampledPoles<Size, S>{S(1.0)}.weights());
   Vec start;
   for (int i = 0; i < Size; ++i) start(i) = deadbeat[static_cast<std::size_t>(i)];
   const auto covariance = riccati_covariance<Size, 1, S>(model, start);
@@ -231,7 +246,7 @@ std::optional<CovarianceFactor<Size, S>> chain_riccati(const CovarianceFactor<Si
     quiet = all(change <= S(2.0) * detail::rounding<S>()) ? quiet + 1 : 0;
     if (quiet == 4) break;
     factor.set_variance(0, S(factor.variance(0) * (measurement / sum)));
-    factor.advance(inflation, noise);
+    factor.advance(inflation, noise, transition);
   }
   if (!all(change <= S(64.0) * detail::rounding<S>())) return std::nullopt;
   return factor;

@@ -1,11 +1,11 @@
 /// @file
 /// ChainModel: the chain of integrators as the model of an observer, what is known where nothing
-/// more is known; and the concept of a model.
+/// more is known.
 #pragma once
 
-#include <concepts>
 #include <esokit/core/kernels.hpp>
 #include <esokit/core/lanes.hpp>
+#include <esokit/model/sampled_model.hpp>
 #include <esokit/model/scaled_chain.hpp>
 #include <tuple>
 
@@ -17,8 +17,12 @@ namespace esokit {
 template <int Order, Scalar S = double, int Extension = 1>
 class ChainModel : public ChainSize<Order, Extension> {
   using Chain = ScaledChain<Order, S, Extension>;
+  static constexpr int N = ChainSize<Order, Extension>::size;
 
  public:
+  static constexpr ModelTraits traits{.is_chain = true, .shifts_output = true};  ///< what it is
+  using Settings = NoModelSettings;                                              ///< of make
+
   using State = typename Chain::State;        ///< x, scaled, N elements
   using Estimate = typename Chain::Estimate;  ///< z, physical units, N x 1
   template <class T>
@@ -121,6 +125,28 @@ class ChainModel : public ChainSize<Order, Extension> {
     }
     return next;
   }
+
+  /// (y, 0, .., 0, -b0 u, 0, ..).
+  [[nodiscard]] constexpr Estimate rest(const S& y, const S& u) const noexcept {
+    Estimate state = Estimate::Zero();
+    state(0) = y;
+    state(Order) = -(input_gain_ * u);
+    return state;
+  }
+
+  /// Phi - I: Pascal's triangle without its diagonal.
+  [[nodiscard]] static constexpr Matrix<S, N, N> increment() noexcept {
+    Matrix<S, N, N> step = Matrix<S, N, N>::Zero();
+    for (int i = 0; i < N; ++i) {
+      for (int j = i + 1; j < N; ++j) {
+        step(i, j) = S(binomial_table<N, detail::TableScalar<S>>[static_cast<std::size_t>(j)]
+                                                                [static_cast<std::size_t>(i)]);
+      }
+    }
+    return step;
+  }
+  /// r: each state is a derivative more.
+  [[nodiscard]] static constexpr int degree(int row) noexcept { return row; }
 
   /// True if u does the same in both.
   [[nodiscard]] constexpr bool same_drive(const ChainModel& other) const noexcept {

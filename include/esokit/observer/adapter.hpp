@@ -78,6 +78,9 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
     return observer_.sample_time();
   }
   [[nodiscard]] constexpr int missed() const noexcept { return observer_.missed(); }
+  [[nodiscard]] constexpr Estimate rest(const scalar_type& y, const scalar_type& u) const noexcept {
+    return observer_.rest(y, u);
+  }
 
   [[nodiscard]] constexpr bool restarts() const noexcept requires RestartingObserver<Observer> {
     return observer_.restarts();
@@ -105,6 +108,10 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
     o.template scaled_estimate<Row>();
   }
   { return observer_.template scaled_estimate<Row>(); }
+  [[nodiscard]] constexpr const auto& model() const noexcept requires requires(const Observer& o) {
+    o.model();
+  }
+  { return observer_.model(); }
   [[nodiscard]] constexpr auto level_gain(int level) const noexcept requires
       requires(const Observer& o) {
     o.level_gain(0);

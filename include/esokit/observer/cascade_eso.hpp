@@ -13,7 +13,8 @@
 namespace esokit {
 
 /// Config of CascadeEso by bandwidths or by a pole set per level.
-template <int Size, int Levels, Scalar S, class Placement>
+/// @tparam Settings of a model other than the chain
+template <int Size, int Levels, Scalar S, class Placement, class Settings = NoModelSettings>
 struct CascadeEsoConfig;
 
 /// Settings of CascadeEso by bandwidths.
@@ -33,6 +34,22 @@ struct CascadeEsoConfig<Size, Levels, S, EqualPoles> {
                     c.sample_time, c.max_gap);
   }
   /// @endcond
+};
+
+/// Settings of CascadeEso by bandwidths, with a model of the plant.
+template <int Size, int Levels, Scalar S, class Settings>
+requires(!std::same_as<Settings, NoModelSettings>)  //
+    struct CascadeEsoConfig<Size, Levels, S, EqualPoles, Settings> {
+  S observer_bandwidth{};  ///< omega_o1 of level 1, rad/s
+  S bandwidth_factor{};    ///< alpha > 1: omega_oi = alpha omega_o(i-1); left out for one level
+  std::optional<Array<S, Levels>>
+      level_bandwidths{};  ///< omega_oi, rad/s, instead of the two above
+  S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
+  S sample_time{};         ///< T, s
+  Settings model{};        ///< what is known of the plant
+  /// Missing samples that a correction may bridge before it restarts; fewer where the model says so
+  /// (`max_gap()`).
+  int max_gap = 100;
 };
 
 /// Settings of CascadeEso by poles.
@@ -151,19 +168,22 @@ Expected<Array<Law, Levels>, Error<S>> level_laws(const Config& config, MakeLaw&
 /// @tparam Order n @tparam Levels p @tparam S scalar @tparam Extension m
 /// @tparam Placement EqualPoles (config by bandwidths) or PoleSet (config by level_poles;
 /// design/pole_set.hpp)
-template <int Order, int Levels, Scalar S = double, int Extension = 1, class Placement = EqualPoles>
-class CascadeEso
-    : public PredictorCorrector<Order, S, Extension, ConstantGain<Order + Extension, S, Placement>,
-                                Levels> {
-  using Law = ConstantGain<Order + Extension, S, Placement>;
-  using Base = PredictorCorrector<Order, S, Extension, Law, Levels>;
+/// @tparam Model what is known of the plant
+template <int Order, int Levels, Scalar S = double, int Extension = 1, class Placement = EqualPoles,
+          class Model = ChainModel<Order, S, Extension>>
+class CascadeEso : public PredictorCorrector<Order, S, Extension,
+                                             ConstantGainOf<Model, Order + Extension, S, Placement>,
+                                             Levels, Model> {
+  using Law = ConstantGainOf<Model, Order + Extension, S, Placement>;
+  using Base = PredictorCorrector<Order, S, Extension, Law, Levels, Model>;
 
  public:
   /// Settings of make.
-  using Config = CascadeEsoConfig<Base::size, Levels, S, Placement>;
+  using Config = CascadeEsoConfig<Base::size, Levels, S, Placement, typename Model::Settings>;
+  /// The same of another scalar.
   template <class T>
   using with_scalar =
-      CascadeEso<Order, Levels, T, Extension, Placement>;  ///< the same of another scalar
+      CascadeEso<Order, Levels, T, Extension, Placement, detail::WithScalar<Model, T>>;
 
   /// Checks the settings and does all the design work.
   /// @return the observer at rest in zero, or an error that names the field
@@ -173,12 +193,16 @@ class CascadeEso
     } else {
       const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
       if (auto ok = Base::check_chain(chain); !ok) return ok.error();
+      const auto model = detail::make_model<Model>(config);
+      if (!model) return model.error();
       const auto laws = detail::level_laws<Law, Placement, Base::size, Levels, S>(
           config, [&](const char* field, const auto& spec, int index) {
-            return Law::make(field, spec, config.sample_time, index);
+            return Law::make(field, spec, *model, index);
           });
       if (!laws) return laws.error();
-      return CascadeEso(chain, *laws);
+      int max_gap = config.max_gap;
+      for (const Law& law : *laws) max_gap = law.longest_gap(max_gap);
+      return CascadeEso(*model, *laws, max_gap);
     }
   }
 
@@ -187,14 +211,14 @@ class CascadeEso
   Check<S> retune(const Config& config) { return detail::retune(*this, config); }
 
  private:
-  CascadeEso(const ChainConfig<S>& chain, const typename Base::Laws& laws) noexcept
-      : Base(chain, laws) {}
+  CascadeEso(const Model& model, const typename Base::Laws& laws, int max_gap) noexcept
+      : Base(model, laws, max_gap) {}
 };
 
 /// Told apart in snapshots.
-template <int Order, int Levels, Scalar S, int Extension, class Placement>
-inline constexpr std::uint32_t type_tag<CascadeEso<Order, Levels, S, Extension, Placement>> =
-    make_type_tag<S, Placement>("CascadeEso", Order, Levels, Extension);
+template <int Order, int Levels, Scalar S, int Extension, class Placement, class Model>
+inline constexpr std::uint32_t type_tag<CascadeEso<Order, Levels, S, Extension, Placement, Model>> =
+    make_type_tag<S, Placement, Model>("CascadeEso", Order, Levels, Extension);
 
 /// CascadeEso as an ODE, equations (23), (24), for simulation.
 /// @tparam Order n @tparam Levels p @tparam S scalar @tparam Extension m

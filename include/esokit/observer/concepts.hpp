@@ -228,6 +228,7 @@ concept LoopObserver = std::copyable<O> && PlainScalar<LaneScalar<typename O::sc
   { constant.template estimate<0>() } -> std::convertible_to<typename O::scalar_type>;
   { constant.total_disturbance() } -> std::convertible_to<typename O::scalar_type>;
   { constant.applied_input() } -> std::convertible_to<typename O::scalar_type>;
+  { constant.rest(s, s) } -> std::same_as<typename O::Estimate>;
   { constant.input_gain() } -> std::convertible_to<typename O::scalar_type>;
   { constant.sample_time() } -> std::convertible_to<typename O::scalar_type>;
   { constant.missed() } -> std::convertible_to<Lanes<int, typename O::scalar_type>>;
@@ -273,9 +274,7 @@ concept ForetellsByKind = kind == GainKind::general || requires(const O& o) {
   requires kind == GainKind::preset;
   { o.preview().offset } -> GainOf<O::size, typename O::scalar_type>;
   { o.preview().slope } -> GainOf<O::size, typename O::scalar_type>;
-  {
-    O::Chain::finite_probe(o.preview().slope, o.sample_time())
-    } -> std::convertible_to<typename O::scalar_type>;
+  { o.finite_probe(o.preview().slope) } -> std::convertible_to<typename O::scalar_type>;
 }
 || requires(const O& o) {
   requires kind == GainKind::switched;
@@ -295,7 +294,7 @@ concept ForetellsByKind = kind == GainKind::general || requires(const O& o) {
 ///
 /// It declares `traits.is_predictable` and the kind of its gain, see GainKind:
 /// - with one level `correction_gain(e) const` is the scaled gain of the coming correction;
-/// - preset: `preview() const`, and `Chain::finite_probe`, see PredictorCorrector;
+/// - preset: `preview() const`, and `finite_probe(x) const`, see PredictorCorrector;
 /// - switched, factored: `gain_law() const` has the members of the kind;
 /// - general: nothing more; all is then worked out after the measurement.
 template <class O>
@@ -315,6 +314,7 @@ concept PredictableObserver = std::copyable<O> && Scalar<typename O::scalar_type
   { observer.reset(state) } -> std::same_as<StatusOf<typename O::scalar_type>>;
   { constant.estimate() } -> std::same_as<typename O::Estimate>;
   { constant.template scaled_estimate<0>() } -> std::convertible_to<typename O::scalar_type>;
+  { constant.rest(s, s) } -> std::same_as<typename O::Estimate>;
   { constant.input_gain() } -> std::convertible_to<typename O::scalar_type>;
   { constant.sample_time() } -> std::convertible_to<typename O::scalar_type>;
   { constant.missed() } -> std::convertible_to<Lanes<int, typename O::scalar_type>>;
@@ -335,6 +335,7 @@ concept SampledLinearObserver = ObserverAsDeclared<O> && observer_traits<O>
   { O::order + O::extension + O::levels } -> std::convertible_to<int>;
   static_cast<double>(observer.input_gain());
   static_cast<double>(observer.sample_time());
+  observer.model().increment();
 };
 
 }  // namespace esokit

@@ -5,6 +5,7 @@
 #include <esokit/core/lanes.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/design/placement.hpp>
+#include <esokit/model/chain_model.hpp>
 #include <esokit/observer/gain_law.hpp>
 
 namespace esokit {
@@ -22,9 +23,17 @@ class ConstantGain {
   /// The gain for a set of poles.
   /// @param field name of the config member that `spec` came from, for the error
   /// @param spec poles of the error, checked by the placement
-  /// @param sample_time T, s; checked by the chain
+  /// @param sample_time T, s; checked by the chain, or a chain that has it
   /// @param index element of `field` that the error names, -1: none
   /// @return error for a spec that the placement refuses, or a gain that the scalar cannot hold
+  /// @{
+  template <class Chain>
+  static Expected<ConstantGain, Error<S>> make(const char* field, const Spec& spec,
+                                               const Chain& chain,
+                                               int index = -1) requires requires {
+    chain.sample_time();
+  }
+  { return make(field, spec, chain.sample_time(), index); }
   static Expected<ConstantGain, Error<S>> make(const char* field, const Spec& spec,
                                                const S& sample_time,
                                                int index = -1) requires(!PackScalar<S>) {
@@ -41,6 +50,11 @@ class ConstantGain {
     if (!rules) return rules.error();
     return law;
   }
+
+  /// @}
+
+  /// Any gap that is asked for.
+  [[nodiscard]] static constexpr int longest_gap(int asked) noexcept { return asked; }
 
   /// k, scaled, whatever the innovation.
   /// @{
@@ -73,6 +87,30 @@ class ConstantGain {
   ScaledGain<Size, S> gain_{};
   Lanes<typename Placement::template Sampled<Size, LaneScalar<S>>, S> poles_{};
 };
+
+template <int Size, Scalar S, class Placement = EqualPoles, int MostBridged = 16>
+class ModelGain;  // observer/model_gain.hpp, to be included with a model other than the chain
+
+/// The constant gain law for a model: by formula for the chain.
+template <class Model, int Size, Scalar S, class Placement>
+using ConstantGainOf =
+    std::conditional_t<model_traits<Model>.is_chain, ConstantGain<Size, S, Placement>,
+                       ModelGain<Size, S, Placement>>;
+
+namespace detail {
+
+/// The model of a checked config.
+template <class Model, class Config>
+auto make_model(const Config& config) {
+  using S = std::remove_cvref_t<decltype(config.input_gain)>;
+  if constexpr (model_traits<Model>.is_chain) {
+    return Expected<Model, Error<S>>(Model(config.input_gain, config.sample_time));
+  } else {
+    return Model::make(config.model, config.input_gain, config.sample_time);
+  }
+}
+
+}  // namespace detail
 
 /// Told apart in snapshots.
 template <int Size, Scalar S, class Placement>

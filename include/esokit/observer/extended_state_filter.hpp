@@ -52,17 +52,22 @@ concept NominalModel = std::copyable<Model> &&
 /// @tparam Order n @tparam S scalar @tparam Extension m
 /// @tparam Model of the disturbance, see NominalModel (m = 1 only)
 /// @tparam TableSize samples in the start table of RiccatiMode::start_table
+/// @tparam PlantModel what is known of the plant, see SampledModel
 template <int Order, Scalar S = double, int Extension = 1, class Model = NoNominalModel,
-          int TableSize = 0>
+          int TableSize = 0, class PlantModel = ChainModel<Order, S, Extension>>
 requires NominalModel<Model, Order, S>
 class ExtendedStateFilter
-    : public PredictorCorrector<Order, S, Extension, RiccatiGain<Order + Extension, S, TableSize>> {
-  using Law = RiccatiGain<Order + Extension, S, TableSize>;
-  using Base = PredictorCorrector<Order, S, Extension, Law>;
+    : public PredictorCorrector<
+          Order, S, Extension,
+          RiccatiGain<Order + Extension, S, TableSize, detail::TransitionOf<PlantModel, S>>, 1,
+          PlantModel> {
+  using Transition = detail::TransitionOf<PlantModel, S>;
+  using Law = RiccatiGain<Order + Extension, S, TableSize, Transition>;
+  using Base = PredictorCorrector<Order, S, Extension, Law, 1, PlantModel>;
   static constexpr int N = Base::size;
   static constexpr bool has_model = !std::same_as<Model, NoNominalModel>;
-  static_assert(!has_model || Extension == 1,
-                "esokit: the nominal model is for one extended state");
+  static_assert(!has_model || (Extension == 1 && model_traits<PlantModel>.is_chain),
+                "esokit: the nominal model is for the chain and one extended state");
 
  public:
   using Chain = typename Base::Chain;        ///< the sampled chain, in its scaling
@@ -121,6 +126,8 @@ class ExtendedStateFilter
     /// fbar. Its change over a sample is taken with the u that `predict` was told; `revise_input`
     /// does not ask it again.
     [[no_unique_address]] Model model{};
+    /// What is known of the plant.
+    [[no_unique_address]] typename PlantModel::Settings plant_model{};
     int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts
 
     /// All one.
@@ -140,9 +147,11 @@ class ExtendedStateFilter
         .all_of(check_rule(config))
         .not_negative("outlier_threshold", config.outlier_threshold);
     if (!rules) return rules.error();
-    auto settings = law_settings(config);
+    const auto plant = plant_model(config);
+    if (!plant) return plant.error();
+    auto settings = law_settings(config, *plant);
     if (!settings) return settings.error();
-    Law law(*settings);
+    Law law(*settings, detail::transition_of<S>(*plant));
     for (const S& k : law.gain_before_measurement()) {
       if (!all(is_finite(k))) {
         return Error<S>{"initial_covariance", config.initial_covariance(0, 0),
@@ -156,7 +165,7 @@ class ExtendedStateFilter
     if (config.mode != RiccatiMode::recursive) {
       if (auto ok = freeze(law, config); !ok) return ok.error();
     }
-    return ExtendedStateFilter(chain, law, config);
+    return ExtendedStateFilter(*plant, law, config);
   }
 
   /// New settings while running: estimate and covariance are kept, a change of b0 is moved into the
@@ -241,7 +250,7 @@ class ExtendedStateFilter
   [[nodiscard]] Covariance covariance() const noexcept {
     Covariance p = law().covariance();
     // In two steps from both sides: the whole factor may not fit the scalar where P does.
-    const Array<S, N> units = physical_units(S(S(1.0) / this->sample_time()));
+    const Array<S, N> units = physical_units(this->model());
     for (int i = 0; i < N; ++i) {
       for (int j = 0; j <= i; ++j) {
         p(i, j) = detail::clipped(S(p(i, j) * units[index(i)] * units[index(j)]));
@@ -271,21 +280,21 @@ class ExtendedStateFilter
 
   /// Gain of the coming correction in physical units, N x 1.
   [[nodiscard]] Estimate gain() const noexcept {
-    return physical_gain<N, S>(law().gain_before_measurement(), this->sample_time());
+    return this->model().physical(law().gain_before_measurement());
   }
 
   /// Phi times it, -K of the predictor form (24), N x 1, physical units.
   [[nodiscard]] Estimate predictor_gain() const noexcept {
-    const auto ahead = Chain::template predict<1>(law().gain_before_measurement(), {S(0.0)});
-    return physical_gain<N, S>(ahead, this->sample_time());
+    const PlantModel& plant = this->model();
+    return plant.physical(plant.predict(law().gain_before_measurement(), plant.drive(S(0.0))));
   }
 
   /// True while the recursion rests in a frozen mode.
   [[nodiscard]] bool frozen() const noexcept { return law().stands(); }
 
  private:
-  ExtendedStateFilter(const ChainConfig<S>& chain, const Law& law, const Config& config) noexcept
-      : Base(chain, {law}),
+  ExtendedStateFilter(const PlantModel& plant, const Law& law, const Config& config) noexcept
+      : Base(plant, {law}, config.max_gap),
         model_(config.model),
         outlier_threshold_(config.outlier_threshold),
         change_bound_(config.disturbance_bounds[Order]) {
@@ -314,25 +323,21 @@ class ExtendedStateFilter
     return rules;
   }
 
-  /// T^r / r! over the root of the unit, by which a state becomes one of the law's.
-  static Array<S, N> scaled_units(const S& sample_time, const S& root) {
-    Array<S, N> units{};
-    S unit = S(1.0) / root;
-    for (int r = 0; r < N; ++r) {
-      if (r > 0) unit = unit * sample_time / detail::integer<S>(r);
-      units[index(r)] = unit;
-    }
-    return units;
+  /// What makes a state of the law of one in physical units, T^r / r! of the chain, over the root
+  /// of the unit.
+  static Array<S, N> scaled_units(const PlantModel& plant, const S& root) {
+    Estimate ones;
+    for (int r = 0; r < N; ++r) ones(r) = S(1.0) / root;
+    return plant.scaled(ones);
   }
 
-  /// r! / T^r.
-  static Array<S, N> physical_units(const S& rate) noexcept {
-    Array<S, N> units{};
-    S unit(1.0);
-    for (int r = 0; r < N; ++r) {
-      if (r > 0) unit = unit * (detail::integer<S>(r) * rate);
-      units[index(r)] = unit;
-    }
+  /// The inverse, without the root.
+  static Array<S, N> physical_units(const PlantModel& plant) noexcept {
+    typename PlantModel::State ones;
+    ones.fill(S(1.0));
+    const Estimate physical = plant.physical(ones);
+    Array<S, N> units;
+    for (int r = 0; r < N; ++r) units[index(r)] = physical(r);
     return units;
   }
 
@@ -384,7 +389,16 @@ class ExtendedStateFilter
     return *factor;
   }
 
-  static Expected<RiccatiSettings<N, S>, Error<S>> law_settings(const Config& config) {
+  static Expected<PlantModel, Error<S>> plant_model(const Config& config) {
+    if constexpr (model_traits<PlantModel>.is_chain) {
+      return PlantModel(config.input_gain, config.sample_time);
+    } else {
+      return PlantModel::make(config.plant_model, config.input_gain, config.sample_time);
+    }
+  }
+
+  static Expected<RiccatiSettings<N, S>, Error<S>> law_settings(const Config& config,
+                                                                const PlantModel& plant) {
     using std::sqrt;
     const S& r = config.measurement_variance;
     Rules<S> rules;
@@ -416,7 +430,7 @@ class ExtendedStateFilter
 
     // The unit of all variances: R, or without noise the largest variance there is.
     S unit = r;
-    const Array<S, N> plain = scaled_units(config.sample_time, S(1.0));
+    const Array<S, N> plain = scaled_units(plant, S(1.0));
     bool driven = false;
     for (int i = 0; i < N; ++i) {
       driven = driven || all(q(i, i) > S(0.0));
@@ -435,12 +449,12 @@ class ExtendedStateFilter
                  S(0.0), "or process_covariance must not be zero where the inflation is adaptive")
         .all_of(check_way_back(config, q));
     if (!rules) return rules.error();
-    const Array<S, N> units = scaled_units(config.sample_time, S(sqrt(unit)));
+    const Array<S, N> units = scaled_units(plant, S(sqrt(unit)));
     const auto start = factored("initial_covariance", config.initial_covariance, units);
     if (!start) return start.error();
     const auto noise = factored(noise_field(config), q, units);
     if (!noise) return noise.error();
-    if (auto ok = check_alternating(config, *noise, unit); !ok) return ok.error();
+    if (auto ok = check_alternating(config, *noise, unit, plant); !ok) return ok.error();
     return RiccatiSettings<N, S>{.start = *start,
                                  .noise = *noise,
                                  .measurement = r / unit,
@@ -478,11 +492,11 @@ class ExtendedStateFilter
   }
 
   static Check<S> check_alternating(const Config& config, const CovarianceFactor<N, S>& noise,
-                                    const S& unit) {
+                                    const S& unit, const PlantModel& plant) {
     if (config.inflation_rule == InflationRule::adaptive || all(config.inflation >= S(0.01))) {
       return {};
     }
-    const S least = least_measurement_variance<N, S>(noise);
+    const S least = least_measurement_variance<N, S>(noise, detail::transition_of<S>(plant));
     const S& r = config.measurement_variance;
     if (all(r / unit >= least)) return {};
     return Error<S>{"measurement_variance",
@@ -575,9 +589,9 @@ class ExtendedStateFilter
 };
 
 /// Told apart in snapshots.
-template <int Order, Scalar S, int Extension, class Model, int TableSize>
+template <int Order, Scalar S, int Extension, class Model, int TableSize, class PlantModel>
 inline constexpr std::uint32_t
-    type_tag<ExtendedStateFilter<Order, S, Extension, Model, TableSize>> =
-        make_type_tag<S, Model>("ExtendedStateFilter", Order, Extension, TableSize);
+    type_tag<ExtendedStateFilter<Order, S, Extension, Model, TableSize, PlantModel>> =
+        make_type_tag<S, Model, PlantModel>("ExtendedStateFilter", Order, Extension, TableSize);
 
 }  // namespace esokit

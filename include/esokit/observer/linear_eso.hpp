@@ -11,7 +11,8 @@
 namespace esokit {
 
 /// Config of LinearEso by bandwidth or by poles.
-template <int Size, Scalar S, class Placement>
+/// @tparam Settings of a model other than the chain
+template <int Size, Scalar S, class Placement, class Settings = NoModelSettings>
 struct LinearEsoConfig;
 
 /// Settings of LinearEso by bandwidth.
@@ -31,6 +32,24 @@ struct LinearEsoConfig<Size, S, EqualPoles> {
     return std::tie(c.observer_bandwidth, c.input_gain, c.sample_time, c.max_gap);
   }
   /// @endcond
+};
+
+/// Settings of LinearEso by bandwidth, with a model of the plant.
+template <int Size, Scalar S, class Settings>
+requires(!std::same_as<Settings, NoModelSettings>)  //
+    struct LinearEsoConfig<Size, S, EqualPoles, Settings> {
+  S observer_bandwidth{};  ///< omega_o, rad/s: all poles at exp(-omega_o T)
+  S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
+  S sample_time{};         ///< T, s
+  Settings model{};        ///< what is known of the plant
+  /// Missing samples that a correction may bridge before it restarts; fewer where the model says so
+  /// (`max_gap()`).
+  int max_gap = 100;
+
+  /// Name of what the poles are placed by, for errors.
+  static constexpr const char* placement_field = "observer_bandwidth";
+  /// What the poles are placed by.
+  [[nodiscard]] const S& placement() const noexcept { return observer_bandwidth; }
 };
 
 /// Settings of LinearEso by poles.
@@ -63,16 +82,21 @@ struct LinearEsoConfig<Size, S, Placement> {
 /// @tparam Order n @tparam S scalar @tparam Extension m; n + m <= 16, tested for n to 8 and m to 4
 /// @tparam Placement EqualPoles (config by observer_bandwidth) or PoleSet (config by poles;
 /// design/pole_set.hpp)
-template <int Order, Scalar S = double, int Extension = 1, class Placement = EqualPoles>
-class LinearEso : public PredictorCorrector<Order, S, Extension,
-                                            ConstantGain<Order + Extension, S, Placement>> {
-  using Law = ConstantGain<Order + Extension, S, Placement>;
-  using Base = PredictorCorrector<Order, S, Extension, Law>;
+/// @tparam Model what is known of the plant
+template <int Order, Scalar S = double, int Extension = 1, class Placement = EqualPoles,
+          class Model = ChainModel<Order, S, Extension>>
+class LinearEso
+    : public PredictorCorrector<Order, S, Extension,
+                                ConstantGainOf<Model, Order + Extension, S, Placement>, 1, Model> {
+  using Law = ConstantGainOf<Model, Order + Extension, S, Placement>;
+  using Base = PredictorCorrector<Order, S, Extension, Law, 1, Model>;
 
  public:
-  using Config = LinearEsoConfig<Base::size, S, Placement>;  ///< settings of make
+  /// Settings of make.
+  using Config = LinearEsoConfig<Base::size, S, Placement, typename Model::Settings>;
+  /// The same of another scalar.
   template <class T>
-  using with_scalar = LinearEso<Order, T, Extension, Placement>;  ///< the same of another scalar
+  using with_scalar = LinearEso<Order, T, Extension, Placement, detail::WithScalar<Model, T>>;
 
   /// Checks the settings and does all the design work.
   /// @return the observer at rest in zero, or an error that names the field
@@ -83,9 +107,11 @@ class LinearEso : public PredictorCorrector<Order, S, Extension,
       const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
       // The chain is checked first: the law divides by what it checks.
       if (auto ok = Base::check_chain(chain); !ok) return ok.error();
-      auto law = Law::make(Config::placement_field, config.placement(), config.sample_time);
+      const auto model = detail::make_model<Model>(config);
+      if (!model) return model.error();
+      const auto law = Law::make(Config::placement_field, config.placement(), *model);
       if (!law) return law.error();
-      return LinearEso(chain, *law);
+      return LinearEso(*model, *law, law->longest_gap(config.max_gap));
     }
   }
 
@@ -94,13 +120,14 @@ class LinearEso : public PredictorCorrector<Order, S, Extension,
   Check<S> retune(const Config& config) { return detail::retune(*this, config); }
 
  private:
-  LinearEso(const ChainConfig<S>& chain, const Law& law) noexcept : Base(chain, {law}) {}
+  LinearEso(const Model& model, const Law& law, int max_gap) noexcept
+      : Base(model, {law}, max_gap) {}
 };
 
 /// Told apart in snapshots.
-template <int Order, Scalar S, int Extension, class Placement>
-inline constexpr std::uint32_t type_tag<LinearEso<Order, S, Extension, Placement>> =
-    make_type_tag<S, Placement>("LinearEso", Order, Extension);
+template <int Order, Scalar S, int Extension, class Placement, class Model>
+inline constexpr std::uint32_t type_tag<LinearEso<Order, S, Extension, Placement, Model>> =
+    make_type_tag<S, Placement, Model>("LinearEso", Order, Extension);
 
 /// Config of ContinuousLinearEso by bandwidth or by poles.
 template <int Size, Scalar S, class Placement>

@@ -61,7 +61,7 @@ Check<S> check_chain(const ChainConfig<S>& config) {
 /// @tparam Model what is known of the plant, see ChainModel
 template <int Order, Scalar S, int Extension, class Law, int Levels = 1,
           class Model = ChainModel<Order, S, Extension>>
-requires GainLaw<Law, Order + Extension, S>
+requires GainLaw<Law, Order + Extension, S> && SampledModel<Model, S>
 class PredictorCorrector {
   static_assert(Levels >= 1, "esokit: at least one level is needed");
 
@@ -305,6 +305,10 @@ class PredictorCorrector {
   /// T, s, as it was given.
   [[nodiscard]] constexpr const S& sample_time() const noexcept { return model_.sample_time(); }
 
+  /// Missing samples that a correction bridges before it restarts: as given, or what the model
+  /// allows.
+  [[nodiscard]] constexpr int max_gap() const noexcept { return max_gap_; }
+
   /// What is known of the plant.
   [[nodiscard]] constexpr const Model& model() const noexcept { return model_; }
 
@@ -313,6 +317,16 @@ class PredictorCorrector {
   [[nodiscard]] constexpr ScaledGain<size, S> level_gain(int level) const noexcept requires
       PresetGainLaw<Law, size, S> {
     return laws_[static_cast<std::size_t>(level)].gain_before_measurement();
+  }
+
+  /// The estimate of a plant that stands at y under u, physical units: where controllers start.
+  [[nodiscard]] constexpr Estimate rest(const S& y, const S& u) const noexcept {
+    return model_.rest(y, u);
+  }
+
+  /// A number that is finite only if the estimate that x stands for is. @param x scaled
+  [[nodiscard]] constexpr S finite_probe(const State& x) const noexcept {
+    return model_.finite_probe(x);
   }
 
   /// Starts anew at (y, 0, .., 0). A y that is not finite changes nothing and is reported.
@@ -331,7 +345,8 @@ class PredictorCorrector {
   /// estimate would otherwise run away with the turns.
   /// @return ok, or state_rejected where the offset, or what it would make of the estimate, is not
   ///         finite: nothing changes
-  constexpr Status shift_output(const S& offset) noexcept {
+  constexpr Status shift_output(const S& offset) noexcept
+      requires(model_traits<Model>.shifts_output) {
     LevelStates next = states_;
     for (auto& state : next) state[0] = state[0] + offset;
     return shift_to(next);
@@ -370,10 +385,13 @@ class PredictorCorrector {
 
  protected:
   /// At rest in zero; `config` is checked already.
-  PredictorCorrector(const ChainConfig<S>& config, const Laws& laws) noexcept
-      : laws_(laws),
-        model_(config.input_gain, config.sample_time),
-        max_gap_(static_cast<std::uint16_t>(config.max_gap)) {
+  PredictorCorrector(const ChainConfig<S>& config, const Laws& laws) noexcept requires
+      std::same_as<Model, ChainModel<Order, S, Extension>>
+      : PredictorCorrector(Model(config.input_gain, config.sample_time), laws, config.max_gap) {}
+
+  /// The same with a model that `make` of its own has checked.
+  PredictorCorrector(const Model& model, const Laws& laws, int max_gap) noexcept
+      : laws_(laws), model_(model), max_gap_(static_cast<std::uint16_t>(max_gap)) {
     for (auto& state : states_) {
       for (S& x : state) x = S(0.0);
     }
@@ -399,7 +417,8 @@ class PredictorCorrector {
   friend struct detail::LaneAccess;
   template <int OtherOrder, Scalar OtherS, int OtherExtension, class OtherLaw, int OtherLevels,
             class OtherModel>
-  requires GainLaw<OtherLaw, OtherOrder + OtherExtension, OtherS>
+  requires GainLaw<OtherLaw, OtherOrder + OtherExtension, OtherS> &&
+      SampledModel<OtherModel, OtherS>
   friend class PredictorCorrector;
 
   using LevelStates = Array<State, Levels>;
@@ -412,8 +431,6 @@ class PredictorCorrector {
     LevelStates states;
     Array<S, Levels> innovations{};
   };
-
-  }
 
   /// `step` with the observer of each lane.
   template <class Step>

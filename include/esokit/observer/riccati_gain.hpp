@@ -26,6 +26,23 @@
 
 namespace esokit {
 
+namespace detail {
+
+/// Phi as the law keeps it.
+template <class Model, class S>
+using TransitionOf = std::conditional_t<model_traits<Model>.is_chain, PascalTransition,
+                                        MatrixTransition<Model::size, S>>;
+template <class S, class Model>
+TransitionOf<Model, S> transition_of(const Model& model) {
+  if constexpr (model_traits<Model>.is_chain) {
+    return {};
+  } else {
+    return MatrixTransition<Model::size, S>::of(model);
+  }
+}
+
+}  // namespace detail
+
 /// How the inflation theta is chosen.
 enum class InflationRule : unsigned char {
   fixed,     ///< theta > 0 as given
@@ -68,7 +85,8 @@ constexpr S largest_variance() noexcept {
 /// `advance` alone, which lets the covariance grow, so no gain for gaps is needed.
 ///
 /// @tparam TableSize gains in the start table
-template <int Size, Scalar S, int TableSize = 0>
+/// @tparam Transition Phi of the model
+template <int Size, Scalar S, int TableSize = 0, class Transition = PascalTransition>
 class RiccatiGain {
  public:
   /// What it does beside `gain`.
@@ -80,8 +98,9 @@ class RiccatiGain {
   using Gain = ScaledGain<Size, S>;           ///< k, scaled
 
   /// The law in its recursive mode; `freeze` goes over to another.
-  explicit RiccatiGain(const Settings& settings) noexcept
-      : measurement_(settings.measurement),
+  explicit RiccatiGain(const Settings& settings, const Transition& transition = {}) noexcept
+      : transition_(transition),
+        measurement_(settings.measurement),
         start_(settings.start),
         noise_(settings.noise),
         unit_(settings.unit),
@@ -222,7 +241,7 @@ class RiccatiGain {
     // From one limit to the next.
     if (mode_ == RiccatiMode::frozen && other.stands()) return true;
     now_.factor = other.now_.factor;
-    now_.factor.rescale(time_ratio, S(other.unit_ / unit_));
+    now_.factor.rescale(time_ratio, S(other.unit_ / unit_), transition_);
     if (rule_ == InflationRule::adaptive) set_inflation(other.now_.inflation);
     set_gain();
     note(other.since_ & corrected);
@@ -322,7 +341,7 @@ class RiccatiGain {
     const bool in_gap = since_ == gapped || since_ == (gapped | watched);
     note(had_correction ? 0 : gapped);
     if (in_gap && !all(now_.factor.variance(0) < ceiling())) [[unlikely]] {
-      now_.factor.template advance<true>(S(1.0), Factor{});
+      now_.factor.template advance<true>(S(1.0), Factor{}, transition_);
       // Without noise it still grows as samples^(2N-2), until the scalar cannot hold it. The gain
       // is that of exact measurements by now, which a factor common to all variances does not
       // alter.
@@ -350,7 +369,7 @@ class RiccatiGain {
     using std::sqrt;
     const S before = now_.factor.variance(0);
     if (had_correction) now_.factor.set_variance(0, S(before * now_.rest * now_.rest));
-    const S trace = now_.factor.transported_trace(trace_weights_);
+    const S trace = now_.factor.transported_trace(trace_weights_, transition_);
     // Bounded: P- = 0 asks for an infinite theta, a P- that grows without bound for zero.
     const S most = S(1e3);
     const S least = S(1e-6);
@@ -371,9 +390,9 @@ class RiccatiGain {
 
   ESOKIT_INLINE constexpr void advance_factor(const Factor& noise) noexcept {
     if (diagonal_noise_) [[likely]] {
-      now_.factor.template advance<true>(now_.growth, noise);
+      now_.factor.template advance<true>(now_.growth, noise, transition_);
     } else {
-      now_.factor.template advance<false>(now_.growth, noise);
+      now_.factor.template advance<false>(now_.growth, noise, transition_);
     }
   }
 
@@ -432,15 +451,16 @@ class RiccatiGain {
         run.set_inflation(theta);
         noise.scale(S(run.now_.growth / theta));
       }
-      const auto factor =
-          chain_riccati<Size, S>(noise, S(measurement_ * run.now_.shrink), run.now_.growth);
+      const auto factor = steady_covariance<Size, S>(noise, S(measurement_ * run.now_.shrink),
+                                                     run.now_.growth, transition_);
       if (!factor) return std::nullopt;
       run.now_.factor = *factor;
       run.set_gain();
       for (const S& k : run.now_.gain) {
         if (!all(is_finite(k))) return std::nullopt;
       }
-      if (rule_ == InflationRule::fixed && !all(noise_trace_ > S(0.0))) {
+      if (std::is_same_v<Transition, PascalTransition> && rule_ == InflationRule::fixed &&
+          !all(noise_trace_ > S(0.0))) {
         // Nothing disturbs the plant: all poles at 1/(1+theta), known exactly.
         const EqualSampledPoles<Size, S> poles{run.now_.inflation * run.now_.shrink};
         run.now_.gain = current_gain<Size, S>(poles.weights());
@@ -463,6 +483,7 @@ class RiccatiGain {
   std::uint16_t place_ = 0;  ///< next one of the table; one past the limit: done
   S current_measurement_{};  ///< R of the coming correction
 
+  [[no_unique_address]] Transition transition_;
   S measurement_;
   Factor start_;
   Factor noise_;  ///< Q, for the fixed rule times (1+theta)/theta
@@ -477,8 +498,8 @@ class RiccatiGain {
 };
 
 /// Told apart in snapshots.
-template <int Size, Scalar S, int TableSize>
-inline constexpr std::uint32_t type_tag<RiccatiGain<Size, S, TableSize>> =
+template <int Size, Scalar S, int TableSize, class Transition>
+inline constexpr std::uint32_t type_tag<RiccatiGain<Size, S, TableSize, Transition>> =
     make_type_tag<S>("RiccatiGain", Size, TableSize);
 
 }  // namespace esokit

@@ -6,16 +6,6 @@
 
 namespace esokit::detail {
 
-/// (y, 0, .., -b0 u, 0, ..), N x 1, physical units: y stays where it is under u.
-template <class Observer, class S>
-typename Observer::Estimate steady_state(const Observer& observer, const S& y,
-                                         const S& u) noexcept {
-  typename Observer::Estimate state = Observer::Estimate::Zero();
-  state(0) = y;
-  state(Observer::order) = -(observer.input_gain() * u);
-  return state;
-}
-
 /// Puts the observer there, as if u had been applied for long.
 /// @return ok, or state_rejected if something is not finite: nothing changes then
 template <class Observer, class S>
@@ -24,7 +14,7 @@ StepStatus start_at_rest(Observer& observer, const S& y, const S& u) noexcept {
   if constexpr (observer_traits<Observer>.delays_input) next.fill_input(u);
   // Tells it the input: a report of what was applied and a change of b0 ask for that.
   (void)next.predict(u);
-  const StepStatus status = next.reset(steady_state(next, y, u));
+  const StepStatus status = next.reset(next.rest(y, u));
   if (status == StepStatus::ok) observer = next;
   return status;
 }

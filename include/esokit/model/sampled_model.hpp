@@ -1,0 +1,75 @@
+/// @file
+/// What a model of the plant has to be for an observer to predict with it.
+#pragma once
+
+#include <concepts>
+#include <esokit/core/declared.hpp>
+#include <esokit/core/error.hpp>
+#include <esokit/core/expected.hpp>
+#include <esokit/core/matrix.hpp>
+#include <esokit/core/scalar.hpp>
+#include <esokit/core/unroll.hpp>
+
+namespace esokit {
+
+/// What a model is beyond SampledModel: `static constexpr ModelTraits traits{..}` in it.
+struct ModelTraits {
+  /// It is the chain of integrators and nothing else: gains by formula, any gap bridged by the gain
+  /// for the longer step, certificates, error bounds, filter forms. Others are placed numerically,
+  /// and bridge gaps by a gain that stays bounded, see ModelGain.
+  bool is_chain = false;
+
+  /// y may be counted from elsewhere: a constant added to y is a solution of the plant, too. Not
+  /// with a known pole elsewhere than at zero.
+  bool shifts_output = false;
+};
+
+/// What a model declares.
+template <class Model>
+inline constexpr ModelTraits model_traits = detail::declared_traits<Model, ModelTraits>;
+
+/// Nothing to be set.
+struct NoModelSettings {};
+
+/// A model of plant and disturbance, exact for an input that is held over the sample.
+///
+/// Its states x, N of them, are scaled so that a state has the size of what it does to y within a
+/// sample: row r < n is T^r / r! times y^(r), row n is T^n / n! times the total disturbance (the
+/// sum of all that the law has to cancel), the rest is the model's own. `estimate` has the same
+/// rows in physical units, so that laws read what they need without knowing the model.
+/// - `drive(u)`, `predict(x, drive)`: Phi x + Gamma u; `joined(drive, x)`: with the disturbance of
+///   x, for the next level of a cascade; `add_input(x, u)`: x + Gamma u
+/// - `physical(x)`, `physical<Row>(x)`, `scaled(estimate)`, `rescaled(x, before)`: from the model
+///   that was in force before; `scaled_disturbance(d)`, `same_drive(before)`
+/// - `finite_probe(x)`: finite only if all estimates are
+/// - `rest(y, u)`: the estimate of a plant that stands at y under u
+/// - `increment()`: Phi - I, N x N, for the design, its states r smaller by a^degree(r) where all
+///   poles are within a of z = 1
+template <class Model, class S>
+concept SampledModel = std::copyable<Model> && DeclaresTraits<Model, ModelTraits> &&
+    requires(const Model& model, const S& s, const typename Model::State& x,
+             const typename Model::Estimate& z) {
+  requires std::same_as<typename Model::State, Array<S, Model::size>>;
+  requires std::same_as<typename Model::Estimate, Vector<S, Model::size>>;
+  requires Model::size == Model::order + Model::extension;
+  { model.input_gain() } -> std::convertible_to<S>;
+  { model.sample_time() } -> std::convertible_to<S>;
+  { model.predict(x, model.drive(s)) } -> std::same_as<typename Model::State>;
+  { model.predict(x, model.joined(model.drive(s), x)) } -> std::same_as<typename Model::State>;
+  {
+    model.predict(x, model.joined(model.joined(model.drive(s), x), x))
+    } -> std::same_as<typename Model::State>;
+  { model.add_input(x, s) } -> std::same_as<typename Model::State>;
+  { model.physical(x) } -> std::same_as<typename Model::Estimate>;
+  { model.template physical<0>(x) } -> std::convertible_to<S>;
+  { model.scaled(z) } -> std::same_as<typename Model::State>;
+  { model.rescaled(x, model) } -> std::same_as<typename Model::State>;
+  { model.scaled_disturbance(s) } -> std::convertible_to<S>;
+  { model.same_drive(model) } -> std::same_as<bool>;
+  { model.finite_probe(x) } -> std::convertible_to<S>;
+  { model.rest(s, s) } -> std::same_as<typename Model::Estimate>;
+  { model.increment() } -> std::same_as<Matrix<S, Model::size, Model::size>>;
+  { Model::degree(0) } -> std::same_as<int>;
+};
+
+}  // namespace esokit
