@@ -109,13 +109,7 @@ class ModelGain {
   }
 
   /// (I + A)(I + B) - I.
-  static Square joined(const Square& a, const Square& b) {
-    Square result = detail::product<Size, Size, Size, S>(a, b);
-    for (int i = 0; i < Size; ++i) {
-      for (int j = 0; j < Size; ++j) result(i, j) = result(i, j) + (a(i, j) + b(i, j));
-    }
-    return result;
-  }
+  static Square joined(const Square& a, const Square& b) { return a * b + (a + b); }
 
   /// The largest magnitude of an element; infinite where one is not finite.
   static S largest(const Square& a) {
@@ -152,10 +146,8 @@ class ModelGain {
       if (!all(size > detail::smallest_normal<S>())) return S(1e3);  // all poles at zero
       radius = radius + share * log(size);
       share = share * S(0.5);
-      for (int i = 0; i < Size; ++i) {
-        for (int j = 0; j < Size; ++j) a(i, j) = a(i, j) / size;
-      }
-      a = detail::product<Size, Size, Size, S>(a, a);
+      a = a / size;
+      a = a * a;
     }
     return -radius;
   }
@@ -184,8 +176,8 @@ class ModelGain {
     Square p = *noise;
     Square over = step;  // Phi^M - I
     for (int samples = 2; samples <= MostBridged; ++samples) {
-      p = detail::product<Size, Size, Size, S>(phi, p);
-      p = detail::plus_product_transposed<Size, Size, Size, S>(Square::Zero(), p, phi, S(1.0));
+      p = detail::plus_product_transposed<Size, Size, Size, S>(Square::Zero(), phi * p, phi,
+                                                               S(1.0));
       over = joined(over, step);
       auto& gain = gains_[static_cast<std::size_t>(samples - 1)];
       for (int i = 0; i < Size; ++i) {
