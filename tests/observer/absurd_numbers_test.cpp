@@ -263,14 +263,13 @@ TEST(FilterVariance, OneThatCannotBeCarriedOverIsEnough) {
   using Filter = esokit::ExtendedStateFilter<2>;
   Filter::Config config{
       .input_gain = 1, .sample_time = 1e-3, .measurement_variance = 1, .inflation = 0.1};
-  config.initial_covariance.setZero();
   config.initial_covariance(0, 0) = 1e10;
   config.allow_vanishing_gain = true;
   for (const double variance : {1e-270, 1e-280}) {
     auto filter = Filter::make(config).value();
     auto other = config;
     other.measurement_variance = variance;
-    other.initial_covariance.setZero();
+    other.initial_covariance = Filter::Covariance::Zero();
     EXPECT_EQ(refusal(filter.retune(other)),
               variance > 1e-275 ? "accepted"
                                 : "measurement_variance: is too small, or sample_time too far from "

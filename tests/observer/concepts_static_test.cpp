@@ -75,6 +75,7 @@ enum class Without {
   preview,
   gain_law,
   level_gain,
+  model,
 };
 
 using S = double;
@@ -308,6 +309,7 @@ struct Gains {
   }
   S input_gain() const requires(W != Without::input_gain) { return truth.input_gain(); }
   S sample_time() const requires(W != Without::sample_time) { return truth.sample_time(); }
+  const auto& model() const requires(W != Without::model) { return truth.model(); }
 };
 
 // ---- LoopObserver
@@ -513,6 +515,7 @@ static_assert(!PredictableObserver<KnownModel<LinearEso<2>, KnownPoles<2>>>);
 
 static_assert(SampledLinearObserver<Gains<>>);
 static_assert(!SampledLinearObserver<Gains<Without::level_gain>>);
+static_assert(!SampledLinearObserver<Gains<Without::model>>);
 static_assert(!SampledLinearObserver<Gains<Without::input_gain>>);
 static_assert(!SampledLinearObserver<Gains<Without::sample_time>>);
 static_assert(!SampledLinearObserver<DelayedInput<LinearEso<2>, 2>>);

@@ -151,7 +151,7 @@ class ChainModel : public ChainSize<Order, Extension> {
   /// True if u does the same in both.
   [[nodiscard]] constexpr bool same_drive(const ChainModel& other) const noexcept {
     return same_time(other) &&
-           !all(detail::magnitude(S(scaled_input_gain_ - other.scaled_input_gain_)) > S(0.0));
+           !all(detail::absolute(S(scaled_input_gain_ - other.scaled_input_gain_)) > S(0.0));
   }
 
  private:
@@ -161,7 +161,7 @@ class ChainModel : public ChainSize<Order, Extension> {
   }
 
   [[nodiscard]] constexpr bool same_time(const ChainModel& other) const noexcept {
-    return !all(detail::magnitude(S(rate_ - other.rate_)) > S(0.0));
+    return !all(detail::absolute(S(rate_ - other.rate_)) > S(0.0));
   }
 
   S scaled_input_gain_;
