@@ -37,6 +37,7 @@
 #include <esokit/core/expected.hpp>
 #include <esokit/core/fal.hpp>
 #include <esokit/core/interval.hpp>
+#include <esokit/core/kernels.hpp>
 #include <esokit/core/lanes.hpp>
 #include <esokit/core/language.hpp>
 #include <esokit/core/linear_equations.hpp>
@@ -58,6 +59,7 @@
 #include <esokit/design/filter_form.hpp>
 #include <esokit/design/gain_interval.hpp>
 #include <esokit/design/half_gain.hpp>
+#include <esokit/design/model_placement.hpp>
 #include <esokit/design/pid_conversion.hpp>
 #include <esokit/design/placement.hpp>
 #include <esokit/design/pole_set.hpp>
@@ -67,7 +69,9 @@
 #include <esokit/design/sampled_gain.hpp>
 #include <esokit/design/switching_certificate.hpp>
 #include <esokit/eigen.hpp>
+#include <esokit/model/chain_model.hpp>
 #include <esokit/model/integrator_chain.hpp>
+#include <esokit/model/sampled_model.hpp>
 #include <esokit/model/scaled_chain.hpp>
 #include <esokit/observer/adapter.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
@@ -85,6 +89,7 @@
 #include <esokit/observer/known_model.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/mimo_extended_state_filter.hpp>
+#include <esokit/observer/model_gain.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/observer/nonlinear_gain.hpp>
 #include <esokit/observer/nonlinear_gain_design.hpp>

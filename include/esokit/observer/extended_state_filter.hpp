@@ -87,7 +87,7 @@ class ExtendedStateFilter
   struct Config {
     S input_gain{};            ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
     S sample_time{};           ///< T, s
-    S measurement_variance{};  ///< R >= 0, unit of y squared
+    S measurement_variance{};  ///< R >= 0, unit of y squared; 0: y is believed at once, whatever P0
 
     /// q_r >= 0: what the estimate r may change by in a sample beyond its model, in its own unit;
     /// for r < n what sampling neglects (zero in an exactly sampled chain), for r = n the change of

@@ -118,6 +118,7 @@ class RiccatiGain {
         noise_trace_ = noise_trace_ + trace_weights_[index(i)] * l * l * noise_.variance(k);
       }
     }
+    if (!all(measurement_ > S(0.0))) leave_exact_start();
     reset();
   }
 
@@ -335,6 +336,20 @@ class RiccatiGain {
   /// P- / R above which a measurement tells all there is to know of y. A gap lets P- grow no
   /// further but along the chain: more would only cost the digits in which the states differ.
   static constexpr S ceiling() noexcept { return S(1.0) / detail::rounding<S>(); }
+
+  /// Exact measurements of a state that is known exactly: the recursion has a fixed point at which
+  /// the estimate inverts the chain, and diverges (n = 3: by 3.7 a sample). It is not a stable one,
+  /// and rounding leaves it, but not where nothing is rounded.
+  void leave_exact_start() noexcept {
+    S largest(0.0);
+    for (int i = 0; i < Size; ++i) {
+      largest = select(largest < noise_.variance(i), noise_.variance(i), largest);
+    }
+    const S least = largest * detail::rounding<S>();
+    for (int i = 0; i < Size; ++i) {
+      start_.set_variance(i, select(start_.variance(i) < least, least, start_.variance(i)));
+    }
+  }
 
   [[gnu::noinline]] constexpr void recur() noexcept {
     const bool had_correction = (since_ & corrected) != 0;
