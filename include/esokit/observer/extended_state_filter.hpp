@@ -22,6 +22,10 @@ inline constexpr std::uint32_t type_tag<NoNominalModel> = make_type_tag<>("NoNom
 
 /// A model fbar(x, u, t) of the total disturbance, in the unit of y^(n): x the plant states, u the
 /// input that was held, t seconds since the start or the last reset.
+///
+/// What fbar does to d closes a loop within the filter, which its gains have to stabilise: with
+/// gains slower than fbar's own dynamics the estimate cycles within the bound of the change (T =
+/// 0.8 s, fbar = -0.5 y, q_n T^2 / sqrt(R) = 0.03).
 template <class Model, int Order, class S>
 concept NominalModel = std::copyable<Model> &&
     (std::same_as<Model, NoNominalModel> ||
