@@ -152,7 +152,7 @@ Criteria run(const Observer& observer, double variance, std::uint64_t seed,
       const double input = control(estimate);
       EigenMatrix<double, 2 + n> d;
       d << UncertainPlant::derivative(time, plant, input),
-          observer.derivative(time, estimate, plant(0) + v, input);
+          eigen(observer.derivative(time, estimate, plant(0) + v, input));
       return d;
     };
     s = sim::step(rate, t, s, step);

@@ -93,7 +93,7 @@ Spread open_loop(Motion motion, double deviation, double factor, std::uint64_t s
     filter.correct(x(0) + deviation * gaussian.next());
     const EigenMatrix<double, 3> e = x - filter.estimate();
     spread.add(k, e, filter.covariance());
-    x = (a * x).eval();
+    x = (eigen(a) * x).eval();
     if (motion == Motion::sine) {
       const double w = 2.0 * 3.14159265358979323846 * 5.0;  // rad/s
       x(2) += disturbance_change * std::cos(w * k * sample_time);

@@ -56,10 +56,10 @@ struct Undeclared : Almost<0> {
   Undeclared() = default;
   Undeclared(Almost<0> one) : Almost<0>(one) {}
   struct Mask {};
-  friend Mask operator<(Undeclared, Undeclared) { return {}; }
-  friend Mask is_finite(Undeclared) { return {}; }
-  friend bool all(Mask) { return true; }
-  friend Undeclared select(Mask, Undeclared a, Undeclared) { return a; }
+  [[maybe_unused]] friend Mask operator<(Undeclared, Undeclared) { return {}; }
+  [[maybe_unused]] friend Mask is_finite(Undeclared) { return {}; }
+  [[maybe_unused]] friend bool all(Mask) { return true; }
+  [[maybe_unused]] friend Undeclared select(Mask, Undeclared a, Undeclared) { return a; }
 };
 /// It says so, and has no numbers to be taken out.
 struct WithoutNumbers : Undeclared {

@@ -13,8 +13,8 @@ template <Scalar S = double>
 struct Limits {
   S lower = S(std::numeric_limits<LaneScalar<S>>::lowest());  ///< least u, unit of u
   S upper = S((std::numeric_limits<LaneScalar<S>>::max)());   ///< largest u, above lower
-  /// Largest abs(du/dt), unit of u per s; positive.
-  S rate = S((std::numeric_limits<LaneScalar<S>>::max)());
+  S rate =
+      S((std::numeric_limits<LaneScalar<S>>::max)());  ///< largest abs(du/dt), unit of u per s, > 0
 
   /// @cond
   static constexpr auto fields(auto& limits) noexcept {

@@ -212,7 +212,7 @@ class Matrix : public detail::MatrixBase<ScalarType, Rows, Columns> {
   }
   /// @}
 
-  /// @name Sizes
+  /// Sizes.
   /// @{
   static constexpr int rows() noexcept { return Rows; }
   static constexpr int cols() noexcept { return Columns; }

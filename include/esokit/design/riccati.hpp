@@ -17,7 +17,6 @@
 #include <esokit/design/covariance_factor.hpp>
 #include <esokit/design/model_placement.hpp>
 #include <esokit/design/sampled_gain.hpp>
-#include <esokit/model/chain_model.hpp>
 #include <limits>
 #include <optional>
 
@@ -146,18 +145,58 @@ std::optional<Matrix<S, Size, Size>> riccati_covariance(const RiccatiModel<Size,
 
 namespace detail {
 
-/// Phi, and a gain that puts all poles at zero.
+/// Phi.
 template <int Size, Scalar S>
-std::pair<Matrix<S, Size, Size>, ScaledGain<Size, S>> deadbeat(const PascalTransition&) {
-  using Chain = ChainModel<Size - 1, S, 1>;
-  return {MatrixTransition<Size, S>::of(Chain(S(1.0), S(1.0))).phi,
-          current_gain<Size, S>(EqualSampledPoles<Size, S>{S(1.0)}.weights())};
+void set_transition(Matrix<S, Size, Size>& phi, const PascalTransition&) {
+  for (int i = 0; i < Size; ++i) {
+    for (int j = 0; j < Size; ++j) {
+      phi(i, j) = S(binomial_table<Size, TableScalar<S>>[static_cast<std::size_t>(j)]
+                                                        [static_cast<std::size_t>(i)]);
+    }
+  }
 }
 template <int Size, Scalar S>
-std::pair<Matrix<S, Size, Size>, ScaledGain<Size, S>> deadbeat(
-    const MatrixTransition<Size, S>& transition) {
-  return {transition.phi,
-          placed_gain(transition, pole_factors(EqualSampledPoles<Size, S>{S(1.0)}))};
+void set_transition(Matrix<S, Size, Size>& phi, const MatrixTransition<Size, S>& transition) {
+  phi = transition.phi;
+}
+
+/// A gain that puts all poles at zero.
+template <int Size, Scalar S>
+ScaledGain<Size, S> deadbeat_gain(const PascalTransition&) {
+  return current_gain<Size, S>(EqualSampledPoles<Size, S>{S(1.0)}.weights());
+}
+template <int Size, Scalar S>
+ScaledGain<Size, S> deadbeat_gain(const MatrixTransition<Size, S>& transition) {
+  return placed_gain(transition, pole_factors(EqualSampledPoles<Size, S>{S(1.0)}));
+}
+
+/// C (-I - Phi)^-1; Phi of the chain is upper triangular.
+template <int Size, Scalar S>
+Array<S, Size> alternating_response(const PascalTransition&) {
+  Array<S, Size> response{};
+  for (int j = 0; j < Size; ++j) {
+    S sum = j == 0 ? S(1.0) : S(0.0);
+    for (int i = 0; i < j; ++i) {
+      const auto& pascal = binomial_table<Size, detail::TableScalar<S>>;
+      sum = sum + response[static_cast<std::size_t>(i)] *
+                      S(pascal[static_cast<std::size_t>(j)][static_cast<std::size_t>(i)]);
+    }
+    response[static_cast<std::size_t>(j)] = S(-0.5) * sum;
+  }
+  return response;
+}
+template <int Size, Scalar S>
+Array<S, Size> alternating_response(const MatrixTransition<Size, S>& transition) {
+  Matrix<S, Size, Size> system;  // (-I - Phi)'
+  Array<S, Size> response{};
+  for (int i = 0; i < Size; ++i) {
+    response[static_cast<std::size_t>(i)] = S(i == 0 ? 1.0 : 0.0);
+    for (int j = 0; j < Size; ++j) {
+      system(i, j) = -transition.phi(j, i) - S(i == j ? 1.0 : 0.0);
+    }
+  }
+  solve_in_place(DenseView<S>{system.data(), Size}, DenseView<S>{response.data(), Size, 1});
+  return response;
 }
 
 }  // namespace detail
@@ -172,15 +211,7 @@ std::pair<Matrix<S, Size, Size>, ScaledGain<Size, S>> deadbeat(
 template <int Size, Scalar S, class Transition = PascalTransition>
 S least_measurement_variance(const CovarianceFactor<Size, S>& noise,
                              const Transition& transition = {}) {
-  const auto phi = detail::deadbeat<Size, S>(transition).first;
-  Matrix<S, Size, Size> system;  // (-I - Phi)'
-  Array<S, Size> response{};     // C (-I - Phi)^-1
-  for (int i = 0; i < Size; ++i) {
-    response[static_cast<std::size_t>(i)] = S(i == 0 ? 1.0 : 0.0);
-    for (int j = 0; j < Size; ++j) system(i, j) = -phi(j, i) - S(i == j ? 1.0 : 0.0);
-  }
-  detail::solve_in_place(detail::DenseView<S>{system.data(), Size},
-                         detail::DenseView<S>{response.data(), Size, 1});
+  const auto response = detail::alternating_response<Size, S>(transition);
   S density(0.0);
   S trace(0.0);
   for (int k = 0; k < Size; ++k) {
@@ -205,9 +236,9 @@ std::optional<CovarianceFactor<Size, S>> steady_covariance(const CovarianceFacto
                                                            const S& measurement, const S& inflation,
                                                            const Transition& transition = {}) {
   using Vec = Matrix<S, Size, 1>;
-  const auto [phi, deadbeat] = detail::deadbeat<Size, S>(transition);
+  const auto deadbeat = detail::deadbeat_gain<Size, S>(transition);
   RiccatiModel<Size, 1, S> model;
-  model.transition = phi;
+  detail::set_transition(model.transition, transition);
   model.noise = noise.matrix();
   model.measurement(0, 0) = measurement;
   model.inflation = inflation;

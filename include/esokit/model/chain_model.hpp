@@ -15,16 +15,20 @@ namespace esokit {
 ///
 /// States are those of ScaledChain.
 template <int Order, Scalar S = double, int Extension = 1>
-class ChainModel : public ChainSize<Order, Extension> {
+class ChainModel {
   using Chain = ScaledChain<Order, S, Extension>;
-  static constexpr int N = ChainSize<Order, Extension>::size;
+  static constexpr int N = Order + Extension;
 
  public:
+  static constexpr int order = Order;          ///< n, order of the plant
+  static constexpr int extension = Extension;  ///< m, extended states
+  static constexpr int size = N;               ///< N = n + m
+
   static constexpr ModelTraits traits{.is_chain = true, .shifts_output = true};  ///< what it is
   using Settings = NoModelSettings;                                              ///< of make
 
-  using State = typename Chain::State;        ///< x, scaled, N elements
-  using Estimate = typename Chain::Estimate;  ///< z, physical units, N x 1
+  using State = Array<S, N>;      ///< x, scaled, N elements
+  using Estimate = Vector<S, N>;  ///< z, physical units, N x 1
   template <class T>
   using with_scalar = ChainModel<Order, T, Extension>;  ///< the same of another scalar
 

@@ -47,9 +47,8 @@ requires(!std::same_as<Settings, NoModelSettings>)  //
   S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
   S sample_time{};         ///< T, s
   Settings model{};        ///< what is known of the plant
-  /// Missing samples that a correction may bridge before it restarts; fewer where the model says so
-  /// (`max_gap()`).
-  int max_gap = 100;
+  int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts; fewer
+                      ///< where the model says so, see `max_gap()`
 };
 
 /// Settings of CascadeEso by poles.
@@ -193,7 +192,8 @@ class CascadeEso : public PredictorCorrector<Order, S, Extension,
     } else {
       const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
       if (auto ok = Base::check_chain(chain); !ok) return ok.error();
-      const auto model = detail::make_model<Model>(config);
+      const auto model = detail::make_model<Model>(
+          config, [](const auto& c) -> const auto& { return c.model; });
       if (!model) return model.error();
       const auto laws = detail::level_laws<Law, Placement, Base::size, Levels, S>(
           config, [&](const char* field, const auto& spec, int index) {

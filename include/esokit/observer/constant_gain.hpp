@@ -20,13 +20,7 @@ class ConstantGain {
   template <class T>
   using with_scalar = ConstantGain<Size, T, Placement>;  ///< the same of another scalar
 
-  /// The gain for a set of poles.
-  /// @param field name of the config member that `spec` came from, for the error
-  /// @param spec poles of the error, checked by the placement
-  /// @param sample_time T, s; checked by the chain, or a chain that has it
-  /// @param index element of `field` that the error names, -1: none
-  /// @return error for a spec that the placement refuses, or a gain that the scalar cannot hold
-  /// @{
+  /// As below, for the sample time of a chain.
   template <class Chain>
   static Expected<ConstantGain, Error<S>> make(const char* field, const Spec& spec,
                                                const Chain& chain,
@@ -34,6 +28,13 @@ class ConstantGain {
     chain.sample_time();
   }
   { return make(field, spec, chain.sample_time(), index); }
+
+  /// The gain for a set of poles.
+  /// @param field name of the config member that `spec` came from, for the error
+  /// @param spec poles of the error, checked by the placement
+  /// @param sample_time T, s; checked by the chain
+  /// @param index element of `field` that the error names, -1: none
+  /// @return error for a spec that the placement refuses, or a gain that the scalar cannot hold
   static Expected<ConstantGain, Error<S>> make(const char* field, const Spec& spec,
                                                const S& sample_time,
                                                int index = -1) requires(!PackScalar<S>) {
@@ -50,8 +51,6 @@ class ConstantGain {
     if (!rules) return rules.error();
     return law;
   }
-
-  /// @}
 
   /// Any gap that is asked for.
   [[nodiscard]] static constexpr int longest_gap(int asked) noexcept { return asked; }
@@ -99,14 +98,23 @@ using ConstantGainOf =
 
 namespace detail {
 
-/// The model of a checked config.
-template <class Model, class Config>
-auto make_model(const Config& config) {
+/// An Expected that is no error: costs nothing.
+template <class T, class S>
+struct Certain {
+  T value;
+  constexpr explicit operator bool() const noexcept { return true; }
+  constexpr const T& operator*() const noexcept { return value; }
+  [[nodiscard]] constexpr Error<S> error() const noexcept { return {}; }
+};
+
+/// The model of a checked config. @param settings of a config, where the model is no chain
+template <class Model, class Config, class Settings>
+auto make_model(const Config& config, [[maybe_unused]] Settings&& settings) {
   using S = std::remove_cvref_t<decltype(config.input_gain)>;
   if constexpr (model_traits<Model>.is_chain) {
-    return Expected<Model, Error<S>>(Model(config.input_gain, config.sample_time));
+    return Certain<Model, S>{Model(config.input_gain, config.sample_time)};
   } else {
-    return Model::make(config.model, config.input_gain, config.sample_time);
+    return Model::make(settings(config), config.input_gain, config.sample_time);
   }
 }
 

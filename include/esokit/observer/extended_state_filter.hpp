@@ -7,6 +7,7 @@
 #include <concepts>
 #include <cstdint>
 #include <esokit/core/type_tag.hpp>
+#include <esokit/observer/constant_gain.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
 #include <esokit/observer/riccati_gain.hpp>
 #include <optional>
@@ -151,7 +152,8 @@ class ExtendedStateFilter
         .all_of(check_rule(config))
         .not_negative("outlier_threshold", config.outlier_threshold);
     if (!rules) return rules.error();
-    const auto plant = plant_model(config);
+    const auto plant = detail::make_model<PlantModel>(
+        config, [](const auto& c) -> const auto& { return c.plant_model; });
     if (!plant) return plant.error();
     auto settings = law_settings(config, *plant);
     if (!settings) return settings.error();
@@ -393,14 +395,6 @@ class ExtendedStateFilter
     return *factor;
   }
 
-  static Expected<PlantModel, Error<S>> plant_model(const Config& config) {
-    if constexpr (model_traits<PlantModel>.is_chain) {
-      return PlantModel(config.input_gain, config.sample_time);
-    } else {
-      return PlantModel::make(config.plant_model, config.input_gain, config.sample_time);
-    }
-  }
-
   static Expected<RiccatiSettings<N, S>, Error<S>> law_settings(const Config& config,
                                                                 const PlantModel& plant) {
     using std::sqrt;
@@ -446,9 +440,7 @@ class ExtendedStateFilter
     }
     rules
         .require(driven || all(r > S(0.0)), "measurement_variance", r,
-                 "must be positive where nothing disturbs the plant (all of disturbance_bounds or "
-                 "process_covariance is zero): after N exact measurements nothing would be left to "
-                 "find a gain from")
+                 "must be positive where nothing disturbs the plant")
         .require(driven || config.inflation_rule != InflationRule::adaptive, "disturbance_bounds",
                  S(0.0), "or process_covariance must not be zero where the inflation is adaptive")
         .all_of(check_way_back(config, q));
@@ -488,8 +480,8 @@ class ExtendedStateFilter
     const S& start = config.initial_covariance(N - 1, N - 1);
     if (config.mode != RiccatiMode::frozen && !all(start > S(0.0))) {
       return Error<S>{"initial_covariance", start,
-                      "must leave the highest state uncertain where nothing disturbs it: it would "
-                      "never be corrected (allow_vanishing_gain asks for it)",
+                      "must leave the highest state uncertain where nothing disturbs it "
+                      "(allow_vanishing_gain asks for it)",
                       N * N - 1};
     }
     return {};

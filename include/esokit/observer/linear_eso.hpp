@@ -42,9 +42,8 @@ requires(!std::same_as<Settings, NoModelSettings>)  //
   S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
   S sample_time{};         ///< T, s
   Settings model{};        ///< what is known of the plant
-  /// Missing samples that a correction may bridge before it restarts; fewer where the model says so
-  /// (`max_gap()`).
-  int max_gap = 100;
+  int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts; fewer
+                      ///< where the model says so, see `max_gap()`
 
   /// Name of what the poles are placed by, for errors.
   static constexpr const char* placement_field = "observer_bandwidth";
@@ -107,7 +106,8 @@ class LinearEso
       const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
       // The chain is checked first: the law divides by what it checks.
       if (auto ok = Base::check_chain(chain); !ok) return ok.error();
-      const auto model = detail::make_model<Model>(config);
+      const auto model = detail::make_model<Model>(
+          config, [](const auto& c) -> const auto& { return c.model; });
       if (!model) return model.error();
       const auto law = Law::make(Config::placement_field, config.placement(), *model);
       if (!law) return law.error();

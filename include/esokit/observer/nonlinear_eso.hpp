@@ -123,7 +123,8 @@ class NonlinearEso
   /// @}
 
  private:
-  NonlinearEso(const ChainConfig<S>& chain, const Law& law) noexcept : Base(chain, {law}) {}
+  ESOKIT_INLINE NonlinearEso(const ChainConfig<S>& chain, const Law& law) noexcept
+      : Base(chain, {law}) {}
 
   [[nodiscard]] const Law& law() const noexcept { return std::get<0>(this->laws()); }
 

@@ -106,20 +106,19 @@ class PredictorCorrector {
   /// One sample: `predict(u_applied)`, then `correct(y)`.
   /// @param y measurement at sample k
   /// @param u_applied input that the actuator held from k - 1 to k, after its limits
-  /// @{
   Status update(S y, S u_applied) noexcept requires(!PackScalar<S>) {
     advance_laws();
     return update_advanced(y, u_applied);
   }
 
-  // A call has a frame aligned for vectors, which costs a third of the step. A template, or Clang
-  // 14 instantiates both in an explicit instantiation.
+  /// The same of packs.
+  // In line, as a call has a frame aligned for vectors, which costs a third of the step. A
+  // template, or Clang 14 instantiates both in an explicit instantiation.
   template <class T = S>
   ESOKIT_INLINE Status update(S y, S u_applied) noexcept requires PackScalar<T> {
     advance_laws();
     return update_advanced(y, u_applied);
   }
-  /// @}
 
   /// Time update alone: one sample without a measurement, or the first half of `update`.
   Status predict(S u_applied) noexcept {
@@ -162,7 +161,11 @@ class PredictorCorrector {
   /// All estimates in physical units, after the last step: plant states of the last level,
   /// disturbance of all levels together.
   [[nodiscard]] Estimate estimate() const noexcept {
-    return model_.physical(up_to_level<Levels - 1>());
+    if constexpr (Levels == 1) {
+      return model_.physical(std::get<0>(states_));
+    } else {
+      return model_.physical(up_to_level<Levels - 1>());
+    }
   }
 
   /// Estimate of y^(Row), or of d^(Row - n) for Row >= n.
@@ -387,14 +390,16 @@ class PredictorCorrector {
   /// At rest in zero; `config` is checked already.
   PredictorCorrector(const ChainConfig<S>& config, const Laws& laws) noexcept requires
       std::same_as<Model, ChainModel<Order, S, Extension>>
-      : PredictorCorrector(Model(config.input_gain, config.sample_time), laws, config.max_gap) {}
+      : laws_(laws),
+        model_(config.input_gain, config.sample_time),
+        max_gap_(static_cast<std::uint16_t>(config.max_gap)) {
+    for (State& state : states_) state.fill(S(0.0));
+  }
 
   /// The same with a model that `make` of its own has checked.
   PredictorCorrector(const Model& model, const Laws& laws, int max_gap) noexcept
       : laws_(laws), model_(model), max_gap_(static_cast<std::uint16_t>(max_gap)) {
-    for (auto& state : states_) {
-      for (S& x : state) x = S(0.0);
-    }
+    for (State& state : states_) state.fill(S(0.0));
   }
 
   /// The rules for input_gain, sample_time and max_gap.

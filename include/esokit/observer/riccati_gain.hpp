@@ -292,7 +292,7 @@ class RiccatiGain {
   /// @{
   [[nodiscard]] constexpr const Gain& limit_gain() const noexcept { return limit_.gain; }
   [[nodiscard]] constexpr const Gain& last_table_gain() const noexcept requires(TableSize > 0) {
-    return table_[TableSize - 1].gain;
+    return table_.back().gain;
   }
   /// @}
 
@@ -341,13 +341,9 @@ class RiccatiGain {
   /// the estimate inverts the chain, and diverges (n = 3: by 3.7 a sample). It is not a stable one,
   /// and rounding leaves it, but not where nothing is rounded.
   void leave_exact_start() noexcept {
-    S largest(0.0);
+    const S least = detail::rounding<S>();  // without R the unit is the largest variance
     for (int i = 0; i < Size; ++i) {
-      largest = select(largest < noise_.variance(i), noise_.variance(i), largest);
-    }
-    const S least = largest * detail::rounding<S>();
-    for (int i = 0; i < Size; ++i) {
-      start_.set_variance(i, select(start_.variance(i) < least, least, start_.variance(i)));
+      if (!all(start_.variance(i) > least)) start_.set_variance(i, least);
     }
   }
 
