@@ -88,11 +88,13 @@ TYPED_TEST(PackOf, CalculatesLaneByLane) {
         exp(a), [](auto x) { return std::exp(x); }, a);
     this->expect_lanes(
         expm1(a), [](auto x) { return std::expm1(x); }, a);
+// With -ffast-math division is by a reciprocal, which is not the same in vectors, and a root or a
+// power of x * x need not be worked out at all.
+#if !defined(__FAST_MATH__)
     this->expect_lanes(
         sqrt(a * a), [](auto x) { return std::sqrt(x * x); }, a);
     this->expect_lanes(
         pow(a * a, b), [](auto x, auto y) { return std::pow(x * x, y); }, a, b);
-#if !defined(__FAST_MATH__)  // by a reciprocal, which is not the same in vectors
     this->expect_lanes(
         a / b, [](auto x, auto y) { return x / y; }, a, b);
 #endif

@@ -20,6 +20,7 @@
 #include <esokit/core/type_tag.hpp>
 #include <esokit/design/covariance_factor.hpp>
 #include <esokit/design/riccati.hpp>
+#include <esokit/model/sampled_model.hpp>
 #include <esokit/observer/gain_law.hpp>
 #include <limits>
 #include <optional>
