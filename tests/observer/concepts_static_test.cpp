@@ -62,6 +62,7 @@ enum class Without {
   total_disturbance,
   applied_input,
   rest,
+  max_gap,
   input_gain,
   sample_time,
   missed,
@@ -129,6 +130,7 @@ class Loop {
     return truth_.sample_time();
   }
   int missed() const noexcept requires(W != Without::missed) { return truth_.missed(); }
+  int max_gap() const noexcept requires(W != Without::max_gap) { return truth_.max_gap(); }
 
  protected:
   explicit Loop(const Truth& truth) noexcept : truth_(truth) {}
@@ -323,7 +325,7 @@ static_assert(!LoopObserver<Loop<Without::estimate>>);
 static_assert(!LoopObserver<Loop<Without::estimate_of_row>>);
 static_assert(!LoopObserver<Loop<Without::total_disturbance>>);
 static_assert(!LoopObserver<Loop<Without::applied_input>>);
-static_assert(!LoopObserver<Loop<Without::rest>>);
+static_assert(!LoopObserver<Loop<Without::rest>> && !LoopObserver<Loop<Without::max_gap>>);
 static_assert(!LoopObserver<Loop<Without::input_gain>>);
 static_assert(!LoopObserver<Loop<Without::sample_time>> && !LoopObserver<Loop<Without::missed>>);
 // An archetype is no more than its concept.

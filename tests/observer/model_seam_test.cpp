@@ -13,6 +13,7 @@
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/model_gain.hpp>
 #include <esokit/observer/wrapped_output.hpp>
+#include <limits>
 #include <random>
 #include <vector>
 
@@ -424,6 +425,42 @@ TEST(ResonatorModel, TheFilterIsTheKalmanFilterOfTheAugmentedModel) {
   }
 }
 
+TEST(ResonatorModel, RetuningTheFilterKeepsItsCovariance) {
+  auto filter = ResonatorFilter::make(filter_config(RiccatiMode::recursive)).value();
+  for (int k = 1; k < 20; ++k) (void)filter.update(Swinging::y(k * kT), 0.0);
+  const auto before = filter.covariance();
+  auto other = filter_config(RiccatiMode::recursive);
+  other.sample_time = 2.5 * kT;
+  ASSERT_TRUE(filter.retune(other));
+  const auto after = filter.covariance();
+  for (int i = 0; i < 5; ++i) {
+    for (int j = 0; j < 5; ++j) {
+      EXPECT_NEAR(after(i, j), before(i, j), 1e-9 * std::sqrt(before(i, i) * before(j, j)))
+          << i << ", " << j;
+    }
+  }
+}
+
+/// What R is asked for where errors may change sign at every sample: the chain's formula and that
+/// of any model.
+TEST(ModelRiccati, LeastMeasurementVarianceOfAChainEqualsTheFormula) {
+  using Factor = esokit::CovarianceFactor<4, double>;
+  const ChainModel<3> chain(1.0, kT);
+  std::mt19937 random(5);
+  std::normal_distribution<> normal;
+  for (int k = 0; k < 20; ++k) {
+    Factor::Square root;
+    for (int i = 0; i < 4; ++i) {
+      for (int j = 0; j < 4; ++j) root(i, j) = k % 2 == 0 || i == j ? normal(random) : 0.0;
+    }
+    const auto noise = Factor::from_matrix(root * root.transpose()).value();
+    const double formula = esokit::least_measurement_variance<4, double>(noise);
+    const double general = esokit::least_measurement_variance<4, double>(
+        noise, esokit::MatrixTransition<4, double>::of(chain));
+    EXPECT_NEAR(general, formula, 1e-12 * (1 + std::abs(formula)));
+  }
+}
+
 // ---- Gaps.
 
 /// Largest error of the estimate over the last samples, in units of what y would be over a sample;
@@ -507,6 +544,65 @@ TEST(ModelGain, AGapShorterThanTheModelAllowsIsKept) {
   EXPECT_EQ(observer.max_gap(), 3);
 }
 
+/// Finite garbage of any size in y and u, gaps and restarts; then good samples of a plant at rest.
+template <class Observer>
+void finds_back(const Observer& fresh, int samples) {
+  using S = typename Observer::scalar_type;
+  std::mt19937 random(11);
+  std::uniform_real_distribution<> share(0, 1);
+  const auto absurd = [&] {
+    const double size = share(random) * 2 * std::numeric_limits<S>::max_exponent10 -
+                        std::numeric_limits<S>::max_exponent10;
+    return static_cast<S>((share(random) - 0.5) * std::pow(10.0, size));
+  };
+  for (int run = 0; run < 40; ++run) {
+    auto observer = fresh;
+    for (int k = 0; k < 30; ++k) {
+      const double what = share(random);
+      if (what < 0.6) {
+        (void)observer.update(absurd(), absurd());
+      } else if (what < 0.9) {
+        (void)observer.predict(absurd());
+      } else {
+        (void)observer.reset(absurd());
+      }
+      const auto z = observer.estimate();
+      for (int i = 0; i < Observer::size; ++i) ASSERT_TRUE(esokit::is_finite(z(i)));
+    }
+    for (int k = 0; k < samples; ++k) (void)observer.update(S(2), S(0));
+    const auto state = observer.model().scaled(observer.estimate());
+    EXPECT_NEAR(static_cast<double>(state[0]), 2.0, 1e-3) << run;
+    for (std::size_t i = 1; i < state.size(); ++i) {
+      EXPECT_LT(std::abs(static_cast<double>(state[i])), 1e-3) << run << ", " << i;
+    }
+  }
+}
+
+TEST(ResonatorModel, FindsBackFromGarbage) {
+  // From the largest number to 1e-3: ln(1e312) / (omega_o T) = 7200 samples of a single pole.
+  finds_back(ResonatorEso<2>::make(
+                 {.observer_bandwidth = 100.0, .input_gain = 1.0, .sample_time = kT, .model = {kW}})
+                 .value(),
+             12000);
+  finds_back(ResonatorEso<2, float>::make({.observer_bandwidth = 200.0F,
+                                           .input_gain = 1.0F,
+                                           .sample_time = 1e-3F,
+                                           .model = {314.0F}})
+                 .value(),
+             2000);
+  using Cascade = CascadeEso<2, 3, double, 3, EqualPoles, Resonator>;
+  finds_back(Cascade::make({.observer_bandwidth = 100.0,
+                            .bandwidth_factor = 2.0,
+                            .input_gain = 1.0,
+                            .sample_time = kT,
+                            .model = {kW}})
+                 .value(),
+             12000);
+  for (const RiccatiMode mode : {RiccatiMode::recursive, RiccatiMode::frozen}) {
+    finds_back(ResonatorFilter::make(filter_config(mode)).value(), 12000);
+  }
+}
+
 // ---- On top: retuning, preview, controller, adapter, analysis.
 
 TEST(ResonatorModel, RetuningKeepsEstimateAndControl) {
@@ -577,6 +673,22 @@ TEST(ResonatorModel, AdrcCancelsALoadThatSwings) {
   // does to y within a period, and the hold's delay adds as much again.
   EXPECT_LT(with, 3 / (kW * kW) * kT * kW);
   EXPECT_GT(without, 0.5 * 3 / (kW * kW));
+}
+
+// A divider that the observer would take for a gap to restart after, at every measurement.
+TEST(ResonatorModel, AdrcRefusesADividerBeyondWhatTheModelBears) {
+  using Controller = Adrc<ResonatorEso<2>>;
+  Controller::Config config{.observer = {.observer_bandwidth = 100.0,
+                                         .input_gain = 1.0,
+                                         .sample_time = kT,
+                                         .model = {kW}},
+                            .controller_bandwidth = 20.0};
+  const int most = ResonatorEso<2>::make(config.observer).value().max_gap();
+  config.measurement_divider = most;
+  EXPECT_TRUE(Controller::make(config));
+  config.measurement_divider = most + 1;
+  EXPECT_EQ(refusal(Controller::make(config)),
+            "measurement_divider: must not be above the observer's max_gap, which is");
 }
 
 TEST(ResonatorModel, AnAngleIsWrapped) {

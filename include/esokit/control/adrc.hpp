@@ -232,14 +232,12 @@ class Adrc {
   static Expected<Adrc, Error<S>> make_one(const Config& config) {
     const auto observer = Observer::make(observer_config(config));
     if (!observer) return observer.error();
-    const auto& chain = chain_config<Observer>(config.observer);
-    const auto law = make_law(config, chain.sample_time);
+    const auto law = make_law(config, chain_config<Observer>(config.observer).sample_time);
     if (!law) return law.error();
     const auto scaled = FastLaw::make(*law, *observer);
     if (!scaled) return scaled.error();
     const auto loop = Loop::make(
-        *observer, {config.limits, config.start_hold, config.missing, config.measurement_divider},
-        chain.max_gap);
+        *observer, {config.limits, config.start_hold, config.missing, config.measurement_divider});
     if (!loop) return loop.error();
     return Adrc(*loop, *law, *scaled, config);
   }

@@ -144,17 +144,17 @@ class ControlLoop {
   using with_scalar = ControlLoop<detail::WithScalar<Observer, T>>;  ///< the same of another scalar
 
   /// Checks the settings.
-  /// @param observer as its own `make` gives it @param max_gap of its config
+  /// @param observer as its own `make` gives it
   /// @return the loop, with the observer in the state that it has, or an error that names the field
   static Expected<ControlLoop, Error<S>> make(const Observer& observer,
-                                              const LoopSettings<S>& settings, int max_gap) {
+                                              const LoopSettings<S>& settings) {
     if constexpr (PackScalar<S>) {
       return detail::make_lanes<ControlLoop>([&](int i) {
         return Plain::make(detail::get_lane<PlainObserver>(observer, i),
-                           detail::get_lane<LoopSettings<LaneScalar<S>>>(settings, i), max_gap);
+                           detail::get_lane<LoopSettings<LaneScalar<S>>>(settings, i));
       });
     } else {
-      const auto checked = detail::check_loop(settings, observer.sample_time(), max_gap,
+      const auto checked = detail::check_loop(settings, observer.sample_time(), observer.max_gap(),
                                               observer_traits<Observer>.bears_regular_gaps);
       if (!checked) return checked.error();
       return ControlLoop(observer, checked->limiter, settings, checked->hold_samples);

@@ -149,8 +149,7 @@ class DisturbanceCompensator {
       return Error<S>{"input_gain", input_gain, "has an inverse that the scalar cannot hold"};
     }
     const auto loop = Loop::make(
-        *observer, {config.limits, config.start_hold, config.missing, config.measurement_divider},
-        chain_config<Observer>(config.observer).max_gap);
+        *observer, {config.limits, config.start_hold, config.missing, config.measurement_divider});
     if (!loop) return loop.error();
     return DisturbanceCompensator(*loop, gain);
   }

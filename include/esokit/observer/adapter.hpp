@@ -78,6 +78,7 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
     return observer_.sample_time();
   }
   [[nodiscard]] constexpr int missed() const noexcept { return observer_.missed(); }
+  [[nodiscard]] constexpr int max_gap() const noexcept { return observer_.max_gap(); }
   [[nodiscard]] constexpr Estimate rest(const scalar_type& y, const scalar_type& u) const noexcept {
     return observer_.rest(y, u);
   }

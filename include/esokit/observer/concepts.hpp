@@ -232,6 +232,7 @@ concept LoopObserver = std::copyable<O> && PlainScalar<LaneScalar<typename O::sc
   { constant.input_gain() } -> std::convertible_to<typename O::scalar_type>;
   { constant.sample_time() } -> std::convertible_to<typename O::scalar_type>;
   { constant.missed() } -> std::convertible_to<Lanes<int, typename O::scalar_type>>;
+  { constant.max_gap() } -> std::convertible_to<int>;
 } && ObserverAsDeclared<O> && requires(typename O::Config& config) {
   { chain_config<O>(config) } -> ChainSettings<typename O::scalar_type>;
 };

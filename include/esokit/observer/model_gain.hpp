@@ -176,8 +176,7 @@ class ModelGain {
     Square p = *noise;
     Square over = step;  // Phi^M - I
     for (int samples = 2; samples <= MostBridged; ++samples) {
-      p = detail::plus_product_transposed<Size, Size, Size, S>(Square::Zero(), phi * p, phi,
-                                                               S(1.0));
+      p = phi * p * phi.transpose();
       over = joined(over, step);
       auto& gain = gains_[static_cast<std::size_t>(samples - 1)];
       for (int i = 0; i < Size; ++i) {
