@@ -480,7 +480,7 @@ double error_after(Observer observer, Missing&& missing, int samples) {
 }
 
 TEST(ModelGain, EveryRecurringGapThatIsBridgedLetsErrorsDecay) {
-  for (const double bandwidth : {50.0, 100.0, 200.0, 400.0}) {
+  for (const double bandwidth : {50.0, 400.0}) {
     for (const double w : {31.4, 314.0}) {
       const auto observer =
           ResonatorEso<2>::make(
