@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Refuses every include in include/esokit that goes against
-#   core <- model <- design <- observer <- control <- eigen.hpp <- analysis <- sim
+#   core <- math <- model <- gain <- observer <- adapter <- control <- eigen.hpp <- sim <- analysis
 # and every header from core to control, what runs in a controller, that needs Eigen or another header
 # that costs more than a controller; an umbrella header that does not include every other header, and a header that reaches C++20 before
 # core/language.hpp, which says that it is needed.
@@ -22,7 +22,7 @@ check() {  # check INCLUDE_DIR
   fi
   (cd "$include_dir" && awk '
     BEGIN {
-      count = split("core model design observer control eigen.hpp analysis sim", order, " ")
+      count = split("core math model gain observer adapter control eigen.hpp sim analysis", order, " ")
       for (i = 1; i <= count; ++i) rank[order[i]] = i
       for (i = 1; i < ARGC; ++i) {
         known[ARGV[i]] = 1
@@ -78,7 +78,7 @@ check() {  # check INCLUDE_DIR
 }
 
 # Included by those who want them alone: pole sets, and text for programs with a console.
-apart="esokit/design/pole_set.hpp esokit/core/error_text.hpp esokit/core/snapshot_text.hpp"
+apart="esokit/gain/pole_set.hpp esokit/core/error_text.hpp esokit/core/snapshot_text.hpp"
 heavy="algorithm complex deque fstream functional iomanip ios iostream istream iterator locale map memory"
 heavy+=" numeric ostream random ranges regex set span sstream string thread unordered_map vector"
 
@@ -97,7 +97,7 @@ check_weight() {  # check_weight INCLUDE_DIR: by the compiler, which has no Eige
         status=1
       fi
     done
-  done < <(cd "$include_dir" && find esokit/{core,model,design,observer,control} -name '*.hpp' | LC_ALL=C sort)
+  done < <(cd "$include_dir" && find esokit/{core,math,model,gain,observer,adapter,control} -name '*.hpp' | LC_ALL=C sort)
   return "$status"
 }
 
@@ -105,7 +105,7 @@ self_test() {  # the check must be able to fail
   local folder case line
   folder=$(mktemp -d)
   trap 'rm -rf "$folder"' RETURN
-  mkdir -p "$folder"/esokit/{core,model,design,observer,control,sim}
+  mkdir -p "$folder"/esokit/{core,math,model,gain,observer,adapter,control,sim}
   printf '#include <esokit/%s.hpp>\n' core/language core/a model/b sim/c >"$folder/esokit/esokit.hpp"
   touch "$folder/esokit/core/language.hpp"
   printf '#include <cmath>\n#include <esokit/core/language.hpp>\n' >"$folder/esokit/core/a.hpp"

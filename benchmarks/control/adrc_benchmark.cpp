@@ -1,15 +1,15 @@
 /// @file
 /// Controllers beside the update of the observer in them: what the loop, the law and the limits
 /// cost; Herbst's filter forms beside state space; what decorators cost.
+#include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/outlier_gate.hpp>
+#include <esokit/adapter/variable_time.hpp>
+#include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/dual_feedback.hpp>
 #include <esokit/observer/cascade_eso.hpp>
-#include <esokit/observer/delayed_input.hpp>
 #include <esokit/observer/linear_eso.hpp>
-#include <esokit/observer/outlier_gate.hpp>
-#include <esokit/observer/variable_time.hpp>
-#include <esokit/observer/wrapped_output.hpp>
 #include <optional>
 #include <string>
 

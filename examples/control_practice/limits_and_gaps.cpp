@@ -22,13 +22,13 @@
 
 #include <Eigen/Eigenvalues>
 
+#include <esokit/adapter/variable_time.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/model/integrator_chain.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
-#include <esokit/observer/variable_time.hpp>
 #include <esokit/sim/gaussian.hpp>
 
 #include "common/report.hpp"

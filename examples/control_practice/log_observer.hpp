@@ -11,6 +11,7 @@
 #include <type_traits>
 #include <vector>
 
+#include <esokit/adapter/variable_time.hpp>
 #include <esokit/core/error_text.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
@@ -19,7 +20,6 @@
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/observer/reduced_order_eso.hpp>
-#include <esokit/observer/variable_time.hpp>
 
 #include "control_practice/log_file.hpp"
 

@@ -6,7 +6,7 @@
 // Plant       theta'' = a u - b theta' - c tanh(theta' / w_s) - load(t),  |u| <= u_max,
 //             y = theta, quantised by the encoder, with noise
 // Controllers u = (v - dhat) / b0 with b0 below the true a by a fifth;
-//             PID: the gains that the LESO's ADRC has as a PID (design/pid_conversion.hpp)
+//             PID: the gains that the LESO's ADRC has as a PID (control/pid_conversion.hpp)
 //
 // symbol    code               value       unit
 // a         true_gain          80          rad/s2 per V
@@ -35,7 +35,7 @@
 #include <vector>
 
 #include <esokit/control/adrc.hpp>
-#include <esokit/design/pid_conversion.hpp>
+#include <esokit/control/pid_conversion.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>

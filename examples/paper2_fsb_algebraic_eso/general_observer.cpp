@@ -29,7 +29,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <esokit/core/combinatorics.hpp>
+#include <esokit/math/combinatorics.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <limits>

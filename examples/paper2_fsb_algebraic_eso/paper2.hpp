@@ -7,8 +7,8 @@
 #pragma once
 
 #include <array>
+#include <esokit/control/algebraic_filter.hpp>
 #include <esokit/eigen.hpp>
-#include <esokit/observer/algebraic_filter.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <string>
 #include <utility>

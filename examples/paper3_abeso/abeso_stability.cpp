@@ -25,9 +25,9 @@
 #include <vector>
 
 #include <esokit/analysis/poles.hpp>
-#include <esokit/design/continuous_gain.hpp>
-#include <esokit/design/switching_certificate.hpp>
 #include <esokit/eigen.hpp>
+#include <esokit/gain/continuous_gain.hpp>
+#include <esokit/gain/switching_certificate.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 
 #include "common/parallel.hpp"

@@ -16,8 +16,8 @@
 #include <vector>
 
 #include <esokit/control/adrc_law.hpp>
-#include <esokit/design/continuous_gain.hpp>
 #include <esokit/eigen.hpp>
+#include <esokit/gain/continuous_gain.hpp>
 #include <esokit/observer/continuous_observer.hpp>
 #include <esokit/sim/dormand_prince.hpp>
 #include <esokit/sim/noise.hpp>

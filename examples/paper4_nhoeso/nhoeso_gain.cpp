@@ -22,9 +22,9 @@
 #include <string>
 #include <vector>
 
-#include <esokit/design/continuous_gain.hpp>
-#include <esokit/design/gain_interval.hpp>
 #include <esokit/eigen.hpp>
+#include <esokit/gain/continuous_gain.hpp>
+#include <esokit/gain/gain_interval.hpp>
 
 #include "common/report.hpp"
 #include "paper4_nhoeso/paper4.hpp"

@@ -2,19 +2,19 @@
 // limits, and good samples lead back.
 #include <gtest/gtest.h>
 
+#include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/dual_feedback.hpp>
 #include <esokit/control/incremental.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/nonlinear_feedback.hpp>
+#include <esokit/control/pid_conversion.hpp>
 #include <esokit/control/predictive_adrc.hpp>
-#include <esokit/design/pid_conversion.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
-#include <esokit/observer/wrapped_output.hpp>
 #include <limits>
 #include <string>
 #include <support/numbers.hpp>

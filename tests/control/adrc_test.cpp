@@ -2,14 +2,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/variable_time.hpp>
+#include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/incremental.hpp>
 #include <esokit/control/tracking_differentiator.hpp>
 #include <esokit/eigen.hpp>
-#include <esokit/observer/delayed_input.hpp>
 #include <esokit/observer/linear_eso.hpp>
-#include <esokit/observer/variable_time.hpp>
-#include <esokit/observer/wrapped_output.hpp>
 #include <limits>
 #include <numbers>
 #include <sstream>

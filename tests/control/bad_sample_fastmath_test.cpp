@@ -1,13 +1,13 @@
 // Bad samples under -ffast-math, where a comparison with NaN may go either way.
 #include <gtest/gtest.h>
 
+#include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/variable_time.hpp>
+#include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/dual_feedback.hpp>
 #include <esokit/control/mimo_adrc.hpp>
-#include <esokit/observer/delayed_input.hpp>
 #include <esokit/observer/linear_eso.hpp>
-#include <esokit/observer/variable_time.hpp>
-#include <esokit/observer/wrapped_output.hpp>
 #include <support/numbers.hpp>
 
 namespace esokit_test {

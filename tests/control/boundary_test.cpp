@@ -6,7 +6,7 @@
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/dual_feedback.hpp>
 #include <esokit/control/mimo_adrc.hpp>
-#include <esokit/design/pole_set.hpp>
+#include <esokit/gain/pole_set.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <limits>

@@ -2,12 +2,12 @@
 // model, and nests of them.
 #include "controller_law_suite.hpp"
 //
+#include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/known_model.hpp>
+#include <esokit/adapter/variable_time.hpp>
+#include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/observer/cascade_eso.hpp>
-#include <esokit/observer/delayed_input.hpp>
-#include <esokit/observer/known_model.hpp>
 #include <esokit/observer/linear_eso.hpp>
-#include <esokit/observer/variable_time.hpp>
-#include <esokit/observer/wrapped_output.hpp>
 
 namespace esokit_test {
 

@@ -5,13 +5,13 @@
 #include <Eigen/LU>
 
 #include <cmath>
+#include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/observer/cascade_eso.hpp>
-#include <esokit/observer/delayed_input.hpp>
 #include <esokit/observer/linear_eso.hpp>
-#include <esokit/observer/wrapped_output.hpp>
 #include <limits>
 #include <string>
 #include <support/refusal.hpp>

@@ -4,10 +4,10 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 #include <cstdio>
+#include <esokit/adapter/variable_time.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/observer/linear_eso.hpp>
-#include <esokit/observer/variable_time.hpp>
 #include <type_traits>
 #include <utility>
 

@@ -1,5 +1,5 @@
 // expect: (cannot bind|invalid initiali[sz]ation|non-const lvalue reference).*LinearEso
-#include <esokit/observer/delayed_input.hpp>
+#include <esokit/adapter/delayed_input.hpp>
 #include <esokit/observer/linear_eso.hpp>
 
 void run(esokit::DelayedInput<esokit::LinearEso<2>, 3>& delayed) {

@@ -7,7 +7,7 @@
 #include <esokit/control/control_loop.hpp>
 #include <esokit/core/snapshot.hpp>
 #include <esokit/core/unroll.hpp>
-#include <esokit/observer/step_status.hpp>
+#include <esokit/gain/step_status.hpp>
 #include <type_traits>
 
 #include "fuzz/config.hpp"

@@ -1,11 +1,11 @@
 // The filters, and the laws that stand alone; a new one joins by a line.
+#include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/variable_time.hpp>
+#include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/nonlinear_feedback.hpp>
 #include <esokit/control/tracking_differentiator.hpp>
-#include <esokit/observer/delayed_input.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/mimo_extended_state_filter.hpp>
-#include <esokit/observer/variable_time.hpp>
-#include <esokit/observer/wrapped_output.hpp>
 
 #include "fuzz/driver.hpp"
 #include "fuzz/kinds.hpp"

@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <esokit/adapter/outlier_gate.hpp>
+#include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/analysis/covariance.hpp>
 #include <esokit/analysis/delay_margin.hpp>
 #include <esokit/analysis/error_bound.hpp>
@@ -12,8 +14,6 @@
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/linear_eso.hpp>
-#include <esokit/observer/outlier_gate.hpp>
-#include <esokit/observer/wrapped_output.hpp>
 #include <limits>
 #include <string>
 #include <support/refusal.hpp>

@@ -1,17 +1,17 @@
 // Every observer and every adapter in its nestings; a new one joins by a line.
-#include <esokit/design/pole_set.hpp>
+#include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/known_model.hpp>
+#include <esokit/adapter/outlier_gate.hpp>
+#include <esokit/adapter/variable_time.hpp>
+#include <esokit/adapter/wrapped_output.hpp>
+#include <esokit/gain/pole_set.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
-#include <esokit/observer/delayed_input.hpp>
 #include <esokit/observer/half_gain_eso.hpp>
-#include <esokit/observer/known_model.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
-#include <esokit/observer/outlier_gate.hpp>
 #include <esokit/observer/reduced_order_eso.hpp>
-#include <esokit/observer/variable_time.hpp>
-#include <esokit/observer/wrapped_output.hpp>
 
 #include "fuzz/driver.hpp"
 #include "fuzz/kinds.hpp"

@@ -2,10 +2,10 @@
 // changes nothing, and good samples lead back.
 #include <gtest/gtest.h>
 
+#include <esokit/adapter/known_model.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
-#include <esokit/observer/known_model.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/mimo_extended_state_filter.hpp>
 #include <limits>

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <esokit/control/algebraic_filter.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
-#include <esokit/observer/algebraic_filter.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <limits>
 #include <string>

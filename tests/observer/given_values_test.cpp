@@ -1,23 +1,23 @@
 // T and b0 come back as they were given, bit for bit.
 #include <gtest/gtest.h>
 
+#include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/known_model.hpp>
+#include <esokit/adapter/outlier_gate.hpp>
+#include <esokit/adapter/variable_time.hpp>
+#include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/control/nonlinear_feedback.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
-#include <esokit/observer/delayed_input.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/half_gain_eso.hpp>
-#include <esokit/observer/known_model.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/mimo_extended_state_filter.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
-#include <esokit/observer/outlier_gate.hpp>
 #include <esokit/observer/reduced_order_eso.hpp>
-#include <esokit/observer/variable_time.hpp>
-#include <esokit/observer/wrapped_output.hpp>
 #include <support/numbers.hpp>
 
 namespace {

@@ -1,7 +1,7 @@
 // The law suite on HalfGainEso and ReducedOrderEso, and what they are for.
 #include "law_suite.hpp"
 //
-#include <esokit/design/pole_set.hpp>
+#include <esokit/gain/pole_set.hpp>
 #include <esokit/observer/half_gain_eso.hpp>
 #include <esokit/observer/reduced_order_eso.hpp>
 

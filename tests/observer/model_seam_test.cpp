@@ -5,14 +5,14 @@
 #include <Eigen/Dense>
 #include <cmath>
 #include <complex>
+#include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/analysis/frequency_response.hpp>
 #include <esokit/analysis/observer_system.hpp>
 #include <esokit/control/adrc.hpp>
+#include <esokit/gain/model_gain.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/linear_eso.hpp>
-#include <esokit/observer/model_gain.hpp>
-#include <esokit/observer/wrapped_output.hpp>
 #include <limits>
 #include <random>
 #include <vector>

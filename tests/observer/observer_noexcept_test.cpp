@@ -3,7 +3,7 @@
 #include <complex>
 #include <cstdio>
 #include <esokit/control/adrc_law.hpp>
-#include <esokit/design/pole_set.hpp>
+#include <esokit/gain/pole_set.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <limits>

@@ -1,7 +1,7 @@
 // The law suite on the observers with any stable pole set, complex pairs among them.
 #include "law_suite.hpp"
 
-#include <esokit/design/pole_set.hpp>
+#include <esokit/gain/pole_set.hpp>
 
 namespace esokit_test {
 

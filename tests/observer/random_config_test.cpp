@@ -1,6 +1,6 @@
 // Seeded mass test over random configs and random data, good and bad.
 #include <gtest/gtest.h>
-#include <esokit/design/pole_set.hpp>
+#include <esokit/gain/pole_set.hpp>
 
 #include <algorithm>
 #include <cmath>

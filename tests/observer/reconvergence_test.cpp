@@ -4,17 +4,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/known_model.hpp>
+#include <esokit/adapter/outlier_gate.hpp>
+#include <esokit/adapter/variable_time.hpp>
+#include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
-#include <esokit/observer/delayed_input.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
-#include <esokit/observer/known_model.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
-#include <esokit/observer/outlier_gate.hpp>
-#include <esokit/observer/variable_time.hpp>
-#include <esokit/observer/wrapped_output.hpp>
 #include <limits>
 #include <support/numbers.hpp>
 

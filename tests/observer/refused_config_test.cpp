@@ -6,7 +6,7 @@
 #include <complex>
 #include <cstddef>
 #include <esokit/core/error_text.hpp>
-#include <esokit/design/pole_set.hpp>
+#include <esokit/gain/pole_set.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <limits>

@@ -5,7 +5,7 @@
 
 #include <cmath>
 #include <complex>
-#include <esokit/design/pole_set.hpp>
+#include <esokit/gain/pole_set.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <type_traits>

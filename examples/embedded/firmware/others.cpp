@@ -1,24 +1,24 @@
 // What the image does not use, all of it in float. Compiled only: run.sh looks at what the object
 // asks the linker for.
 
+#include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/known_model.hpp>
+#include <esokit/adapter/outlier_gate.hpp>
+#include <esokit/adapter/variable_time.hpp>
+#include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/dual_feedback.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/control/tracking_differentiator.hpp>
-#include <esokit/design/pole_set.hpp>
-#include <esokit/observer/delayed_input.hpp>
+#include <esokit/gain/pole_set.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/half_gain_eso.hpp>
-#include <esokit/observer/known_model.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/mimo_extended_state_filter.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
-#include <esokit/observer/outlier_gate.hpp>
 #include <esokit/observer/reduced_order_eso.hpp>
-#include <esokit/observer/variable_time.hpp>
-#include <esokit/observer/wrapped_output.hpp>
 
 // All members, whether anything calls them or not.
 namespace esokit {

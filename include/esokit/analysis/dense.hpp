@@ -8,8 +8,8 @@
 
 #include <cmath>
 #include <complex>
-#include <esokit/core/linear_equations.hpp>
 #include <esokit/core/scalar.hpp>
+#include <esokit/math/linear_equations.hpp>
 #include <utility>
 
 namespace esokit::detail {

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <esokit/analysis/lyapunov_matrix.hpp>
-#include <esokit/core/combinatorics.hpp>
+#include <esokit/math/combinatorics.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 

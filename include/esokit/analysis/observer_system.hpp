@@ -9,7 +9,7 @@
 
 #include <concepts>
 #include <esokit/analysis/linear_system.hpp>
-#include <esokit/design/sampled_gain.hpp>
+#include <esokit/gain/sampled_gain.hpp>
 #include <esokit/model/integrator_chain.hpp>
 #include <esokit/model/sampled_model.hpp>
 #include <esokit/observer/concepts.hpp>

@@ -8,7 +8,7 @@
 #include <esokit/control/control_loop.hpp>
 #include <esokit/control/scaled_law.hpp>
 #include <esokit/core/type_tag.hpp>
-#include <esokit/design/feedback_gain.hpp>
+#include <esokit/gain/feedback_gain.hpp>
 #include <type_traits>
 
 namespace esokit {

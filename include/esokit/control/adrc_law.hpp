@@ -3,11 +3,11 @@
 #pragma once
 
 #include <esokit/core/check.hpp>
-#include <esokit/core/combinatorics.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/core/unroll.hpp>
+#include <esokit/math/combinatorics.hpp>
 #include <optional>
 #include <type_traits>
 

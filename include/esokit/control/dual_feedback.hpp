@@ -1,17 +1,17 @@
 /// @file
-/// The minimum-footprint forms of linear ADRC after Herbst (see design/filter_form.hpp): one filter
-/// of order N = n + m instead of observer and law.
+/// The minimum-footprint forms of linear ADRC after Herbst (see control/filter_form.hpp): one
+/// filter of order N = n + m instead of observer and law.
 #pragma once
 
 #include <cmath>
 #include <esokit/control/adrc_law.hpp>
+#include <esokit/control/filter_form.hpp>
 #include <esokit/control/limiter.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/core/unroll.hpp>
-#include <esokit/design/feedback_gain.hpp>
-#include <esokit/design/filter_form.hpp>
-#include <esokit/design/placement.hpp>
-#include <esokit/observer/step_status.hpp>
+#include <esokit/gain/feedback_gain.hpp>
+#include <esokit/gain/placement.hpp>
+#include <esokit/gain/step_status.hpp>
 #include <limits>
 #include <optional>
 #include <type_traits>

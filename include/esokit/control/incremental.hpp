@@ -4,7 +4,7 @@
 
 #include <esokit/core/check.hpp>
 #include <esokit/core/type_tag.hpp>
-#include <esokit/observer/step_status.hpp>
+#include <esokit/gain/step_status.hpp>
 #include <limits>
 
 namespace esokit {

@@ -4,9 +4,9 @@
 
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/control/limiter.hpp>
-#include <esokit/core/linear_equations.hpp>
 #include <esokit/core/unroll.hpp>
-#include <esokit/design/feedback_gain.hpp>
+#include <esokit/gain/feedback_gain.hpp>
+#include <esokit/math/linear_equations.hpp>
 #include <esokit/observer/concepts.hpp>
 #include <esokit/observer/steady_state.hpp>
 #include <limits>

@@ -4,9 +4,9 @@
 
 #include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
-#include <esokit/core/fal.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/unroll.hpp>
+#include <esokit/math/fal.hpp>
 #include <utility>
 
 namespace esokit {

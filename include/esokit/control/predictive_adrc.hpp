@@ -10,10 +10,10 @@
 #include <esokit/control/limiter.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/core/unroll.hpp>
+#include <esokit/gain/gain_law.hpp>
+#include <esokit/gain/step_status.hpp>
 #include <esokit/observer/concepts.hpp>
-#include <esokit/observer/gain_law.hpp>
 #include <esokit/observer/steady_state.hpp>
-#include <esokit/observer/step_status.hpp>
 #include <optional>
 
 namespace esokit {

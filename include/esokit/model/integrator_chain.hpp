@@ -2,9 +2,9 @@
 /// The chain of integrators behind every observer, in physical units.
 #pragma once
 
-#include <esokit/core/combinatorics.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/scalar.hpp>
+#include <esokit/math/combinatorics.hpp>
 
 namespace esokit {
 

@@ -6,10 +6,10 @@
 #pragma once
 
 #include <esokit/core/type_tag.hpp>
-#include <esokit/design/switching_certificate.hpp>
+#include <esokit/gain/switched_gain.hpp>
+#include <esokit/gain/switching_certificate.hpp>
 #include <esokit/observer/continuous_observer.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
-#include <esokit/observer/switched_gain.hpp>
 
 namespace esokit {
 

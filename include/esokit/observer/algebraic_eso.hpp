@@ -6,7 +6,7 @@
 
 #include <cmath>
 #include <esokit/core/type_tag.hpp>
-#include <esokit/observer/algebraic_gain.hpp>
+#include <esokit/gain/algebraic_gain.hpp>
 #include <esokit/observer/continuous_observer.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
 #include <optional>

@@ -4,7 +4,7 @@
 #pragma once
 
 #include <esokit/core/type_tag.hpp>
-#include <esokit/observer/constant_gain.hpp>
+#include <esokit/gain/constant_gain.hpp>
 #include <esokit/observer/continuous_observer.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
 #include <optional>
@@ -166,7 +166,7 @@ Expected<Array<Law, Levels>, Error<S>> level_laws(const Config& config, MakeLaw&
 ///
 /// @tparam Order n @tparam Levels p @tparam S scalar @tparam Extension m
 /// @tparam Placement EqualPoles (config by bandwidths) or PoleSet (config by level_poles;
-/// design/pole_set.hpp)
+/// gain/pole_set.hpp)
 /// @tparam Model what is known of the plant
 template <int Order, int Levels, Scalar S = double, int Extension = 1, class Placement = EqualPoles,
           class Model = ChainModel<Order, S, Extension>>
@@ -223,7 +223,7 @@ inline constexpr std::uint32_t type_tag<CascadeEso<Order, Levels, S, Extension, 
 /// CascadeEso as an ODE, equations (23), (24), for simulation.
 /// @tparam Order n @tparam Levels p @tparam S scalar @tparam Extension m
 /// @tparam Placement EqualPoles (config by bandwidths) or PoleSet (config by level_poles;
-/// design/pole_set.hpp)
+/// gain/pole_set.hpp)
 template <int Order, int Levels, Scalar S = double, int Extension = 1, class Placement = EqualPoles>
 class ContinuousCascadeEso
     : public ContinuousObserver<Order, S, Extension,

@@ -17,8 +17,8 @@
 #include <esokit/core/declared.hpp>
 #include <esokit/core/lanes.hpp>
 #include <esokit/core/scalar.hpp>
-#include <esokit/observer/gain_law.hpp>
-#include <esokit/observer/step_status.hpp>
+#include <esokit/gain/gain_law.hpp>
+#include <esokit/gain/step_status.hpp>
 
 namespace esokit {
 

@@ -6,8 +6,8 @@
 #include <esokit/core/expected.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/unroll.hpp>
+#include <esokit/gain/gain_law.hpp>
 #include <esokit/model/integrator_chain.hpp>
-#include <esokit/observer/gain_law.hpp>
 
 namespace esokit {
 

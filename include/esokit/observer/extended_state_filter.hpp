@@ -7,9 +7,9 @@
 #include <concepts>
 #include <cstdint>
 #include <esokit/core/type_tag.hpp>
-#include <esokit/observer/constant_gain.hpp>
+#include <esokit/gain/constant_gain.hpp>
+#include <esokit/gain/riccati_gain.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
-#include <esokit/observer/riccati_gain.hpp>
 #include <optional>
 
 namespace esokit {

@@ -1,8 +1,8 @@
 /// @file
-/// HalfGainEso: LinearEso with half-gain tuning, see design/half_gain.hpp.
+/// HalfGainEso: LinearEso with half-gain tuning, see gain/half_gain.hpp.
 #pragma once
 
-#include <esokit/design/half_gain.hpp>
+#include <esokit/gain/half_gain.hpp>
 #include <esokit/observer/linear_eso.hpp>
 
 namespace esokit {

@@ -4,7 +4,7 @@
 #pragma once
 
 #include <esokit/core/type_tag.hpp>
-#include <esokit/observer/constant_gain.hpp>
+#include <esokit/gain/constant_gain.hpp>
 #include <esokit/observer/continuous_observer.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
 
@@ -80,7 +80,7 @@ struct LinearEsoConfig<Size, S, Placement> {
 ///
 /// @tparam Order n @tparam S scalar @tparam Extension m; n + m <= 16, tested for n to 8 and m to 4
 /// @tparam Placement EqualPoles (config by observer_bandwidth) or PoleSet (config by poles;
-/// design/pole_set.hpp)
+/// gain/pole_set.hpp)
 /// @tparam Model what is known of the plant
 template <int Order, Scalar S = double, int Extension = 1, class Placement = EqualPoles,
           class Model = ChainModel<Order, S, Extension>>
@@ -162,7 +162,7 @@ struct ContinuousLinearEsoConfig<Size, S, Placement> {
 /// LinearEso as an ODE, z' = A z + B u + l (y - z_1), for simulation.
 /// @tparam Order n @tparam S scalar @tparam Extension m
 /// @tparam Placement EqualPoles (config by observer_bandwidth) or PoleSet (config by poles;
-/// design/pole_set.hpp)
+/// gain/pole_set.hpp)
 template <int Order, Scalar S = double, int Extension = 1, class Placement = EqualPoles>
 class ContinuousLinearEso
     : public ContinuousObserver<Order, S, Extension,

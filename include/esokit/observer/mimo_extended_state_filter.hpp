@@ -4,10 +4,10 @@
 #pragma once
 
 #include <cmath>
-#include <esokit/design/covariance_root.hpp>
-#include <esokit/design/riccati.hpp>
-#include <esokit/observer/riccati_gain.hpp>
-#include <esokit/observer/step_status.hpp>
+#include <esokit/gain/covariance_root.hpp>
+#include <esokit/gain/riccati.hpp>
+#include <esokit/gain/riccati_gain.hpp>
+#include <esokit/gain/step_status.hpp>
 #include <optional>
 
 namespace esokit {

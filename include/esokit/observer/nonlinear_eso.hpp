@@ -5,8 +5,8 @@
 #pragma once
 
 #include <esokit/core/type_tag.hpp>
+#include <esokit/gain/nonlinear_gain_design.hpp>
 #include <esokit/observer/continuous_observer.hpp>
-#include <esokit/observer/nonlinear_gain_design.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
 
 namespace esokit {
@@ -17,7 +17,7 @@ namespace esokit {
 /// A gain k(e) that varies can make the error grow although every constant k in its range is stable
 /// (N = 3: 0.15 for 3.5 / omega_o, 5 for 0.2 / omega_o, and so on). So k is kept between gain_min
 /// and gain_max, a pair for which the error decays however k varies between them (a common
-/// quadratic Lyapunov function, see design/switching_certificate.hpp). By default
+/// quadratic Lyapunov function, see gain/switching_certificate.hpp). By default
 /// - gain_min is 1/2, the round number from which on, for T -> 0, every gain_max is certified, for
 ///   every N; or where omega_o T is large, three quarters of the way from 1 down to the least that
 ///   is certified;

@@ -9,10 +9,10 @@
 #include <esokit/core/lanes.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/core/unroll.hpp>
+#include <esokit/gain/gain_law.hpp>
+#include <esokit/gain/step_status.hpp>
 #include <esokit/model/chain_model.hpp>
 #include <esokit/observer/concepts.hpp>
-#include <esokit/observer/gain_law.hpp>
-#include <esokit/observer/step_status.hpp>
 #include <limits>
 
 namespace esokit {

@@ -2,7 +2,7 @@
 /// ReducedOrderEso: a linear ESO that takes the measurement as it is and estimates only the rest.
 #pragma once
 
-#include <esokit/design/reduced_order.hpp>
+#include <esokit/gain/reduced_order.hpp>
 #include <esokit/observer/linear_eso.hpp>
 
 namespace esokit {

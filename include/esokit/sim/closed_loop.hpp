@@ -9,7 +9,7 @@
 #include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/eigen.hpp>
-#include <esokit/observer/step_status.hpp>
+#include <esokit/gain/step_status.hpp>
 #include <esokit/sim/plant.hpp>
 #include <esokit/sim/runge_kutta.hpp>
 #include <esokit/sim/signal.hpp>

@@ -1,0 +1,130 @@
+/// @file
+/// DelayedInput: an observer of a plant whose input acts a known number of samples late.
+#pragma once
+
+#include <esokit/adapter/adapter.hpp>
+#include <esokit/core/type_tag.hpp>
+#include <esokit/core/unroll.hpp>
+
+namespace esokit {
+
+/// Feeds the observer u[k-d] instead of u[k] (bus, drive or computing delay of d sample times), so
+/// that input and output belong together and the delay is not taken for a disturbance.
+///
+/// The estimate is that of the present; what u still on its way will do is not predicted.
+/// @tparam Capacity largest d that a config may ask for; the memory is Capacity + 1 scalars
+template <LoopObserver Observer, int Capacity>
+class DelayedInput : public Adapter<Observer> {
+  using Base = Adapter<Observer>;
+  using Base::observer_;
+  static_assert(Capacity >= 1, "esokit: a delay line needs a capacity of at least 1");
+  using S = typename Observer::scalar_type;
+
+ public:
+  /// What it is beyond LoopObserver.
+  static constexpr ObserverTraits traits = [] {
+    ObserverTraits traits = Base::traits;
+    traits.delays_input = true;
+    traits.acts_by_gain = false;
+    return traits;
+  }();
+
+  /// Settings of make.
+  struct Config {
+    typename Observer::Config observer{};  ///< of the observer itself
+    int delay = 0;                         ///< d, samples, 0 .. Capacity
+  };
+
+  /// Checks the settings and does all the design work.
+  /// @return the observer with an empty (zero) delay line, or an error that names the field
+  static Expected<DelayedInput, Error<S>> make(const Config& config) {
+    if (config.delay < 0 || config.delay > Capacity) {
+      return Error<S>{"delay",
+                      static_cast<S>(config.delay),
+                      "must be 0 up to the capacity of the delay line, which is",
+                      -1,
+                      static_cast<S>(Capacity),
+                      true};
+    }
+    auto observer = Observer::make(config.observer);
+    if (!observer) return observer.error();
+    return DelayedInput(*observer, config.delay);
+  }
+
+  /// New settings while running: estimate and inputs under way are kept. A refused config changes
+  /// nothing.
+  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
+
+  /// The same, with the settings of `fresh`, as `make` gave it: no design work.
+  Check<S> adopt(const DelayedInput& fresh) {
+    if (auto ok = observer_.adopt(fresh.observer_); !ok) return ok;
+    delay_ = fresh.delay_;
+    return {};
+  }
+
+  /// One sample. @param y measurement @param u_applied u[k], of now; the delay is seen to here
+  StepStatus update(S y, S u_applied) noexcept {
+    const StepStatus status = push(u_applied);
+    return status | observer_.update(y, delayed());
+  }
+
+  /// Time update alone, see PredictorCorrector::predict.
+  StepStatus predict(S u_applied) noexcept {
+    const StepStatus status = push(u_applied);
+    return status | observer_.predict(delayed());
+  }
+
+  /// Measurement update alone, see PredictorCorrector::correct.
+  StepStatus correct(S y) noexcept { return observer_.correct(y); }
+
+  /// Starts anew at (y, 0, .., 0).
+  StepStatus reset(S y) noexcept { return observer_.reset(y); }
+
+  /// Starts anew at a given estimate, N x 1.
+  StepStatus reset(const typename Observer::Estimate& state) noexcept {
+    return observer_.reset(state);
+  }
+
+  /// As if `u` had been applied for long. A u that is not finite changes nothing.
+  void fill_input(const S& u) noexcept {
+    if (!is_finite(u)) return;
+    inputs_.fill(u);
+  }
+
+  /// What the observer was told is an input of d samples ago.
+  StepStatus revise_input(const S&) noexcept = delete;
+
+  /// d, samples.
+  [[nodiscard]] int delay() const noexcept { return delay_; }
+
+ private:
+  static constexpr int length = Capacity + 1;
+
+  DelayedInput(const Observer& observer, int delay) noexcept : Base(observer), delay_(delay) {}
+
+  /// A bad input takes the place of the last good one here already, so that it is reported now and
+  /// not d samples later.
+  StepStatus push(const S& u) noexcept {
+    const S last = inputs_[static_cast<std::size_t>(newest_)];
+    newest_ = newest_ + 1 == length ? 0 : newest_ + 1;
+    const bool good = is_finite(u);
+    inputs_[static_cast<std::size_t>(newest_)] = good ? u : last;
+    return good ? StepStatus::ok : StepStatus::input_rejected;
+  }
+
+  [[nodiscard]] const S& delayed() const noexcept {
+    const int at = newest_ - delay_;
+    return inputs_[static_cast<std::size_t>(at < 0 ? at + length : at)];
+  }
+
+  Array<S, length> inputs_{};
+  int delay_;
+  int newest_ = 0;
+};
+
+/// Told apart in snapshots.
+template <LoopObserver Observer, int Capacity>
+inline constexpr std::uint32_t type_tag<DelayedInput<Observer, Capacity>> =
+    make_type_tag<Observer>("DelayedInput", Capacity);
+
+}  // namespace esokit

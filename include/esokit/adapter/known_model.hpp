@@ -1,0 +1,234 @@
+/// @file
+/// KnownModel: what is known of the plant is fed to the observer, which estimates only the rest.
+#pragma once
+
+#include <esokit/adapter/adapter.hpp>
+#include <esokit/core/matrix.hpp>
+#include <esokit/core/type_tag.hpp>
+#include <esokit/core/unroll.hpp>
+
+namespace esokit {
+
+/// What a known model can do beside fbar: `static constexpr PlantModelTraits traits{..}` in it.
+struct PlantModelTraits {
+  bool checks = false;  ///< `check() const` gives the error of a bad parameter, as a Check
+};
+
+/// fbar = -(a_0 y + a_1 y' + .. + a_(n-1) y^(n-1)): the plant's poles are known.
+template <int Order, PlainScalar S = double>
+struct KnownPoles {
+  static constexpr PlantModelTraits traits{.checks = true};  ///< what it can do beside fbar
+
+  Array<S, Order> coefficients{};  ///< a_0 .. a_(n-1) of s^n + a_(n-1) s^(n-1) + .. + a_0
+
+  /// Error of a coefficient that is not finite; `make` of the observer asks for it.
+  [[nodiscard]] Check<S> check() const {
+    return Rules<S>{}.finite("model.coefficients", coefficients);
+  }
+
+  /// fbar, unit of y^(n). @param estimate (y, .., y^(n-1), ..), at least n x 1
+  template <int Size>
+  S operator()(const Vector<S, Size>& estimate) const noexcept {
+    S sum(0);
+    for (int i = 0; i < Order; ++i) {
+      sum = sum - coefficients[static_cast<std::size_t>(i)] * estimate(i);
+    }
+    return sum;
+  }
+};
+
+/// Told apart in snapshots.
+template <int Order, PlainScalar S>
+inline constexpr std::uint32_t type_tag<KnownPoles<Order, S>> = make_type_tag<S>("KnownPoles",
+                                                                                 Order);
+
+/// A known part of y^(n): fbar(estimate), noexcept, in the unit of y^(n), a function of
+/// y .. y^(n-1) alone. What else it can do it declares, see PlantModelTraits.
+template <class Model, class Observer>
+concept PlantModel = std::copyable<Model> &&
+    requires(const Model& model, const typename Observer::Estimate& estimate) {
+  { model(estimate) } -> std::convertible_to<typename Observer::scalar_type>;
+} && DeclaresTraits<Model, PlantModelTraits> && detail::as_declared(
+    detail::declared_traits<Model, PlantModelTraits>.checks, detail::names_check<Model>,
+    requires(const Model& model) {
+      { model.check() } -> std::same_as<Check<typename Observer::scalar_type>>;
+    });
+
+/// Observer of y^(n) = fbar(y, ..) + d + b0 u with fbar known. The chain is driven by u + fbar/b0,
+/// fbar taken at the last estimate and held over the step, and estimates d alone.
+///
+/// Row n of `estimate`, as `total_disturbance`, is fbar + dhat: what a controller cancels, whatever
+/// part of it is known. `residual_disturbance` is dhat.
+///
+/// What fbar changes within a step stays in dhat, O(T). fbar of the estimate is part of the error's
+/// dynamics: omega_o should stay well above the poles of fbar.
+/// @tparam Model a function fbar(estimate): KnownPoles, or your own
+template <ShiftableDisturbance Observer, class Model>
+requires PlantModel<Model, Observer>
+class KnownModel : public Adapter<Observer> {
+  using Base = Adapter<Observer>;
+  using Base::observer_;
+  using S = typename Observer::scalar_type;
+  static_assert(!observer_traits<Observer>.delays_input,
+                "esokit: DelayedInput goes around KnownModel: fbar is not delayed");
+
+ public:
+  using Base::order;
+  using typename Base::Estimate;
+
+  /// What it is beyond LoopObserver.
+  static constexpr ObserverTraits traits = [] {
+    ObserverTraits traits = Base::traits;
+    traits.publishes_chain = false;
+    traits.acts_by_gain = false;
+    return traits;
+  }();
+
+  /// Settings of make.
+  struct Config {
+    typename Observer::Config observer{};  ///< of the observer itself
+    Model model{};                         ///< fbar
+  };
+
+  /// Checks the settings and does all the design work.
+  /// @return the observer at rest in zero, or an error that names the field
+  static Expected<KnownModel, Error<S>> make(const Config& config) {
+    if constexpr (detail::declared_traits<Model, PlantModelTraits>.checks) {
+      if (auto ok = config.model.check(); !ok) return ok.error();
+    }
+    auto observer = Observer::make(config.observer);
+    if (!observer) return observer.error();
+    return KnownModel(*observer, config.model);
+  }
+
+  /// New settings while running: the estimate, that is fbar + d, is kept, and what another model
+  /// explains is taken out of d; a change of b0 is moved into d as everywhere. u does not jump.
+  /// A refused config changes nothing.
+  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
+
+  /// The same, with the settings of `fresh`, as `make` gave it: no design work.
+  Check<S> adopt(const KnownModel& fresh) {
+    KnownModel next = *this;
+    const S fed = observer_.applied_input() - applied_input_;
+    const S gain_change = this->input_gain() - fresh.input_gain();
+    if (auto ok = next.observer_.adopt(fresh.observer_); !ok) return ok;
+    next.model_ = fresh.model_;
+    next.inverse_gain_ = fresh.inverse_gain_;
+    // The observer moved (b0_old - b0_new) times all that drove it; fbar's share is not b0's.
+    const S moved = known_part() - next.known_part() - gain_change * fed;
+    const bool some = !is_finite(moved) || moved < S(0) || moved > S(0);
+    if (some && next.observer_.shift_disturbance(moved) != StepStatus::ok) {
+      return Error<S>{"model", moved, "would make the estimate not finite"};
+    }
+    *this = next;
+    return {};
+  }
+
+  /// One sample, see PredictorCorrector::update. `u_applied` is what the actuator held, without the
+  /// model's share.
+  StepStatus update(S y, S u_applied) noexcept {
+    const S input = accepted(u_applied);
+    return report(u_applied) | observer_.update(y, input);
+  }
+
+  /// Time update alone, see PredictorCorrector::predict.
+  StepStatus predict(S u_applied) noexcept {
+    const S input = accepted(u_applied);
+    return report(u_applied) | observer_.predict(input);
+  }
+
+  /// Measurement update alone, see PredictorCorrector::correct.
+  StepStatus correct(S y) noexcept { return observer_.correct(y); }
+
+  /// Starts anew at (y, 0, .., 0), with fbar + d zero.
+  StepStatus reset(S y) noexcept {
+    Estimate state = Estimate::Zero();
+    state(0) = y;
+    return observer_.reset(state);
+  }
+
+  /// Starts anew at a given estimate, whose row n is fbar + d.
+  StepStatus reset(const Estimate& state) noexcept {
+    Estimate rest = state;
+    rest(order) = state(order) - model_(state);
+    return observer_.reset(rest);
+  }
+
+  /// (y, .., y^(n-1), fbar + d, d', .., d^(m-1)), N x 1, physical units.
+  [[nodiscard]] Estimate estimate() const noexcept {
+    Estimate state = observer_.estimate();
+    state(order) = state(order) + known_part(state);
+    return state;
+  }
+
+  /// One row of it.
+  template <int Row>
+  [[nodiscard]] S estimate() const noexcept {
+    if constexpr (Row == order) {
+      return total_disturbance();
+    } else {
+      return observer_.template estimate<Row>();
+    }
+  }
+
+  /// fbar + dhat, unit of y^(n): all that acts beside b0 u.
+  [[nodiscard]] S total_disturbance() const noexcept {
+    return known_part() + residual_disturbance();
+  }
+
+  /// Estimate of level `level`, its row n with fbar of that level's estimate.
+  [[nodiscard]] Estimate level_estimate(int level) const noexcept requires
+      LevelledObserver<Observer> {
+    Estimate state = observer_.level_estimate(level);
+    state(order) = state(order) + known_part(state);
+    return state;
+  }
+
+  /// The chain of the observer has dhat in it, not fbar + dhat.
+  template <int Row>
+  S scaled_estimate() const noexcept = delete;
+
+  /// fbar's share would be lost.
+  StepStatus revise_input(const S&) noexcept = delete;
+
+  /// dhat without what the model explains, unit of y^(n).
+  [[nodiscard]] S residual_disturbance() const noexcept { return observer_.total_disturbance(); }
+
+  /// fbar at the present estimate, unit of y^(n); zero where it, or fbar + dhat, is not finite: a
+  /// model explains nothing there.
+  [[nodiscard]] S known_part() const noexcept { return known_part(observer_.estimate()); }
+
+  /// Input that the last step used, without the model's share.
+  [[nodiscard]] const S& applied_input() const noexcept { return applied_input_; }
+
+ private:
+  KnownModel(const Observer& observer, const Model& model) noexcept
+      : Base(observer), model_(model), inverse_gain_(S(1) / observer.input_gain()) {}
+
+  /// fbar at an estimate whose row n is dhat.
+  [[nodiscard]] S known_part(const Estimate& state) const noexcept {
+    const S known = model_(state);
+    return is_finite(known + state(order)) ? known : S(0);
+  }
+
+  /// u, or the last good one, with the model's share.
+  S accepted(const S& u) noexcept {
+    if (is_finite(u)) applied_input_ = u;
+    return applied_input_ + known_part() * inverse_gain_;
+  }
+
+  static StepStatus report(const S& u) noexcept {
+    return is_finite(u) ? StepStatus::ok : StepStatus::input_rejected;
+  }
+
+  Model model_;
+  S inverse_gain_;
+  S applied_input_{};
+};
+
+/// Told apart in snapshots.
+template <ShiftableDisturbance Observer, class Model>
+inline constexpr std::uint32_t type_tag<KnownModel<Observer, Model>> =
+    make_type_tag<Observer, Model>("KnownModel");
+
+}  // namespace esokit

@@ -1,0 +1,177 @@
+/// @file
+/// OutlierGate: a finite outlier is a missing sample, for any observer.
+#pragma once
+
+#include <cstdint>
+#include <esokit/adapter/adapter.hpp>
+#include <esokit/core/type_tag.hpp>
+
+namespace esokit {
+
+/// Rejects a measurement whose innovation is too large: the observer only predicts, and the next
+/// correction uses the gain for the gap. Without it one y of 1e30 spoils a linear observer for ln
+/// 1e30 / (omega_o T) samples.
+///
+/// Let in is abs(y - z_1) <= M max(threshold, running_factor m), with m the running mean of
+/// abs(y - z_1) over some 64 measurements, M the sample times since the last correction (D where
+/// every D-th sample brings a measurement). The gate never stays shut: after `most_in_a_row`
+/// rejected measurements it opens, and takes everything until as many in a row are within the
+/// limit. So after a true step of any size in y the observer follows it `most_in_a_row` samples
+/// late. At the start and after a reset it is open in the same way.
+///
+/// It nests with the other adapters; inside of WrappedOutput, which tells it the turn.
+/// ExtendedStateFilter has a gate of its own, which knows the variance of its innovation.
+template <LevelledObserver Observer>
+requires RestartingObserver<Observer>
+class OutlierGate : public Adapter<Observer> {
+  using Base = Adapter<Observer>;
+  using Base::observer_;
+  using S = typename Observer::scalar_type;
+  static_assert(!observer_traits<Observer>.wraps_output,
+                "esokit: WrappedOutput goes around OutlierGate: it counts the turns");
+
+ public:
+  /// What it is beyond LoopObserver.
+  static constexpr ObserverTraits traits = [] {
+    ObserverTraits traits = Base::traits;
+    traits.rejects_outliers = true;
+    return traits;
+  }();
+
+  /// Settings of make.
+  struct Config {
+    typename Observer::Config observer{};  ///< of the observer itself
+    S threshold{};          ///< unit of y: an innovation up to this is no outlier; 0: no gate
+    S running_factor{};     ///< nor is one up to this times the running mean of abs(innovation)
+                            ///< (0.8 standard deviations where Gaussian); 0: the threshold alone
+    int most_in_a_row = 5;  ///< outliers in a row that are rejected, 1 .. 65000
+  };
+
+  /// Checks the settings and does all the design work.
+  /// @return the observer at rest in zero, or an error that names the field
+  static Expected<OutlierGate, Error<S>> make(const Config& config) {
+    Rules<S> rules;
+    rules.not_negative("threshold", config.threshold)
+        .not_negative("running_factor", config.running_factor)
+        .require(!(config.running_factor > S(0)) || config.threshold > S(0), "threshold",
+                 config.threshold,
+                 "must be positive where running_factor is: without noise nothing would pass")
+        .require(1 <= config.most_in_a_row && config.most_in_a_row <= 65000, "most_in_a_row",
+                 static_cast<S>(config.most_in_a_row), "must be 1 .. 65000");
+    if (!rules) return rules.error();
+    auto observer = Observer::make(config.observer);
+    if (!observer) return observer.error();
+    return OutlierGate(*observer, config);
+  }
+
+  /// New settings while running: the estimate is kept. A refused config changes nothing.
+  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
+
+  /// The same, with the settings of `fresh`, as `make` gave it: no design work.
+  Check<S> adopt(const OutlierGate& fresh) {
+    if (auto ok = observer_.adopt(fresh.observer_); !ok) return ok;
+    threshold_ = fresh.threshold_;
+    running_factor_ = fresh.running_factor_;
+    most_in_a_row_ = fresh.most_in_a_row_;
+    return {};
+  }
+
+  /// One sample, see PredictorCorrector::update; `outlier_rejected` where y was taken for one.
+  StepStatus update(S y, S u_applied) noexcept {
+    if (!gated()) return observer_.update(y, u_applied);
+    const StepStatus predicted = observer_.predict(u_applied);
+    return predicted | correct(y);
+  }
+
+  /// Time update alone, see PredictorCorrector::predict.
+  StepStatus predict(S u_applied) noexcept { return observer_.predict(u_applied); }
+
+  /// Measurement update alone.
+  StepStatus correct(S y) noexcept {
+    if (gated() && !lets_in(y)) return StepStatus::outlier_rejected;
+    return observer_.correct(y);
+  }
+
+  /// Starts anew at (y, 0, .., 0), with the gate open.
+  StepStatus reset(S y) noexcept { return open_after(observer_.reset(y)); }
+
+  /// Starts anew at a given estimate, N x 1.
+  StepStatus reset(const typename Observer::Estimate& state) noexcept {
+    return open_after(observer_.reset(state));
+  }
+
+  /// It would pass the gate.
+  StepStatus correct_weighted(const S&, const S&) noexcept = delete;
+
+  /// Innovation up to which a measurement is let in where none is missing, unit of y.
+  [[nodiscard]] S limit() const noexcept {
+    const S running = running_factor_ * mean_;
+    return running > threshold_ ? running : threshold_;
+  }
+
+  /// True while every measurement is let in: at the start, and after too many outliers in a row.
+  [[nodiscard]] bool open() const noexcept { return open_; }
+
+ private:
+  OutlierGate(const Observer& observer, const Config& config) noexcept
+      : Base(observer),
+        threshold_(config.threshold),
+        running_factor_(config.running_factor),
+        most_in_a_row_(static_cast<std::uint16_t>(config.most_in_a_row)) {}
+
+  [[nodiscard]] bool gated() const noexcept { return threshold_ > S(0); }
+
+  /// Bad numbers are not its business, nor is a measurement that restarts the observer.
+  bool lets_in(const S& y) noexcept {
+    // The innovation is that of level 1, whose z_1 the correction will subtract.
+    const S innovation = y - observer_.level_estimate(0)(0);
+    if (!is_finite(innovation)) return true;
+    if (this->restarts()) {
+      set_open(true);
+      return true;
+    }
+    const int samples = this->missed() > 1 ? this->missed() : 1;
+    const S distance = detail::absolute(innovation);
+    const S most = limit() * static_cast<S>(samples);
+    const bool fits = distance <= most;
+    if (!fits && !open_ && count_ < most_in_a_row_) {
+      ++count_;
+      return false;
+    }
+    // What is beyond the limit counts as the limit, so that no outlier and no gap widens the gate
+    // for long.
+    const S counted = distance < limit() ? distance : limit();
+    mean_ += (counted - mean_) * static_cast<S>(1.0 / 64);
+    if (open_ && fits) {
+      if (++count_ >= most_in_a_row_) set_open(false);
+    } else {
+      set_open(open_ || !fits);
+    }
+    return true;
+  }
+
+  void set_open(bool open) noexcept {
+    open_ = open;
+    count_ = 0;
+  }
+
+  StepStatus open_after(StepStatus status) noexcept {
+    if (status == StepStatus::ok) set_open(true);
+    return status;
+  }
+
+  S threshold_;
+  S running_factor_;
+  S mean_{};  ///< of abs(innovation)
+  std::uint16_t most_in_a_row_;
+  std::uint16_t count_ = 0;  ///< in a row: rejected while shut, within the limit while open
+  bool open_ = true;
+};
+
+/// Told apart in snapshots.
+template <LevelledObserver Observer>
+requires RestartingObserver<Observer>
+inline constexpr std::uint32_t type_tag<OutlierGate<Observer>> =
+    make_type_tag<Observer>("OutlierGate");
+
+}  // namespace esokit

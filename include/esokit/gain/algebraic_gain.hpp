@@ -1,0 +1,361 @@
+/// @file
+/// The falling-bandwidth gain law of the frequency-shifting-based (FSB) algebraic observer (J.
+/// Kasac, A. Pender, M. Pranjic, D. Kotarski, Asian Journal of Control 23 (2021) 2171-2184),
+/// sampled exactly and for any order and any number of extended states.
+///
+/// In continuous time the error obeys (D + mu(t))^N e_1 = d^(m), mu(t) = lambda + N q / (e^{qt} -
+/// 1): poles that come from minus infinity and settle at -lambda. Sampled, with rho = e^{-lambda
+/// T}, p = e^{-qT} and [i] = (1 - p^i) / (1 - p), the weights of the gain (see
+/// gain/sampled_gain.hpp) at sample k >= N - 1 are
+///
+///     b_j = C(N,j) rho^{N-j} h_{k+1} .. h_{k+N-j} P_j,
+///     P_j = sum_r c_{j,r} u_{k+N-j+1} .. u_{k+N-j+r},
+///     u_i = p^{i-N} / [i],  h_i = [i-N] / [i],
+///     c_{j,r} = sum_i C(j,i) (1-rho)^{j-i} rho^i t_{i,r},
+///     t_{0,0} = 1,  t_{i+1,r} = (1 - p^r) t_{i,r} + [N+r-1] t_{i,r-1}.
+///
+/// Every term is positive, and all limits (lambda -> 0, q -> 0) are regular. At k = N - 1 this is
+/// deadbeat, and so are the samples before.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <esokit/core/check.hpp>
+#include <esokit/core/lanes.hpp>
+#include <esokit/core/type_tag.hpp>
+#include <esokit/gain/gain_law.hpp>
+#include <esokit/gain/sampled_gain.hpp>
+#include <limits>
+
+namespace esokit {
+
+/// Gain law of AlgebraicEso. Gains advance by recursion: one division a sample, no exponential;
+/// once the schedule has settled to within rounding they are constant.
+///
+/// Samples are counted in an integer, from which p^i and [i] are set anew every `anchor_interval`
+/// samples: a recursion alone would collect its rounding (a float one at q = 0 would stand still
+/// at i = 2^24, one with qT = 1e-8 would be 1 % off after 1e6 samples). Such an update takes up to
+/// 30 short multiplication steps more.
+template <int Size, Scalar S>
+class AlgebraicGain {
+  template <int OtherSize, Scalar OtherS>
+  friend class AlgebraicGain;
+
+ public:
+  /// What it does beside `gain`.
+  static constexpr GainLawTraits traits{.kind = GainKind::preset,
+                                        .advances = true,
+                                        .accepts = true,
+                                        .resets = true,
+                                        .bridges_gaps = true};
+
+  using scalar_type = S;  ///< of gains
+  template <class T>
+  using with_scalar = AlgebraicGain<Size, T>;  ///< the same of another scalar
+  using Count = Lanes<std::uint32_t, S>;       ///< samples, of a pack of each lane
+
+  /// Largest start_index, and where the sample counter stops.
+  static constexpr std::uint32_t max_index = 0x3fffffffu;
+
+  /// Samples between two anchors, a power of two.
+  static constexpr std::uint32_t anchor_interval = 256;
+
+  /// @param bandwidth lambda >= 0, rad/s: the bandwidth that is left in the end
+  /// @param shift q >= 0, rad/s: how fast it falls there
+  /// @param start_index k0 >= 0, sample of the schedule to begin with (soft start)
+  /// @param least_age samples that are counted before the schedule may settle
+  AlgebraicGain(const S& bandwidth, const S& shift, const S& sample_time, std::uint32_t start_index,
+                const Count& least_age = 0) noexcept
+      : final_poles_(EqualSampledPoles<Size, S>::from_bandwidth(bandwidth, sample_time)),
+        shift_(EqualSampledPoles<Size, S>::from_bandwidth(shift, sample_time)),
+        decay_(decay(shift, sample_time)),
+        start_index_(start_index),
+        least_age_(least_age) {
+    set_coefficients();
+    restart();
+  }
+
+  /// k, scaled, whatever the innovation.
+  /// @{
+  [[nodiscard]] constexpr const ScaledGain<Size, S>& gain(const S&) const noexcept { return gain_; }
+
+  [[nodiscard]] constexpr const ScaledGain<Size, S>& gain_before_measurement() const noexcept {
+    return gain_;
+  }
+  /// @}
+
+  /// Next sample of the schedule. One that was not corrected among the first N breaks the deadbeat
+  /// property: the schedule starts anew there.
+  ESOKIT_INLINE constexpr void advance() noexcept {
+    if constexpr (PackScalar<S>) {
+      if (settled_ == true) [[likely]]
+        return;
+      if (!together()) [[unlikely]] {
+        advance_apart();
+        return;
+      }
+      advance_schedule();
+    } else {
+      if (!settled_) advance_schedule();
+    }
+  }
+
+  /// This sample was corrected.
+  constexpr void accept(const S&) noexcept { pending_ = false; }
+
+  /// As `restart`: a reset of the observer is a start.
+  constexpr void reset() noexcept { restart(); }
+
+  /// Begins the schedule anew; the observer's state is not touched.
+  constexpr void restart() noexcept { resume(0); }
+
+  /// Goes to the place in the schedule that is reached after `age` samples.
+  constexpr void resume(std::uint32_t age) noexcept {
+    age_ = age;
+    pending_ = false;
+    settled_ = false;
+    // At rest the registers hold i = k + 1 .. k + N of the last sample k; deadbeat up to k = N - 1.
+    const std::uint32_t next = start_index_ + age;
+    const std::uint32_t first = next > Size ? next - Size : 0u;
+    anchor(first);
+    for (int i = 0; i < Size; ++i) push();
+    set_gain();
+  }
+
+  /// The bandwidth at this place in the schedule, frozen, for the whole gap.
+  [[nodiscard]] ScaledGain<Size, S> gap_gain(const S&, unsigned samples) const noexcept {
+    if constexpr (PackScalar<S>) {
+      ScaledGain<Size, S> all;
+      for (int i = 0; i < lane_count<S>; ++i) {
+        using One = LaneScalar<S>;
+        detail::set_lane(all, detail::get_lane<Plain>(*this, i).gap_gain(One(0), samples), i);
+      }
+      return all;
+    } else {
+      if (settled_) return esokit::gap_gain<Size, S>(final_poles_, samples);
+      // Deadbeat for the longer step: its first gain is 1 as well, so that N samples in a row make
+      // the estimate exact all the same, and gaps that recur do not diverge.
+      if (deadbeat()) return esokit::gap_gain<Size, S>(EqualSampledPoles<Size, S>{S(1.0)}, samples);
+      const S a = final_poles_.contraction;
+      const S now = a + (S(1.0) - a) * (size_bracket_ * std::get<0>(ratios_u_));
+      return esokit::gap_gain<Size, S>(EqualSampledPoles<Size, S>{now}, samples);
+    }
+  }
+
+  /// Samples since the schedule began; the count ends where it settles.
+  [[nodiscard]] constexpr Count age() const noexcept { return age_; }
+
+  /// True once the gain is that of LinearEso with bandwidth lambda, to within rounding.
+  [[nodiscard]] constexpr Lanes<bool, S> settled() const noexcept { return settled_; }
+
+ private:
+  friend struct detail::LaneAccess;
+  using Plain = detail::PlainTwin<AlgebraicGain, S>;  ///< a lane
+
+  static constexpr auto fields(auto& o) noexcept {
+    return std::tie(o.gain_, o.coefficients_, o.ratios_u_, o.ratios_h_, o.final_poles_, o.shift_,
+                    o.decay_, o.size_bracket_, o.settled_below_, o.power_, o.bracket_,
+                    o.start_index_, o.least_age_, o.age_, o.pending_, o.settled_);
+  }
+
+  /// The lanes of a pack are at the same place, so that one recursion does for all.
+  template <class = S>
+  [[nodiscard]] constexpr bool together() const noexcept {
+    return age_ == age_[0] && pending_ == pending_[0] && settled_ == false;
+  }
+  template <class = S>
+  ESOKIT_COLD constexpr void advance_apart() noexcept {
+    detail::for_each_lane<Plain>(*this, [](Plain& lane, int) { lane.advance(); });
+  }
+  /// Of all lanes that are together.
+  [[nodiscard]] constexpr std::uint32_t common_age() const noexcept {
+    return detail::of_lane(age_, 0);
+  }
+
+  static S decay(const S& shift, const S& sample_time) noexcept {
+    using std::exp;
+    return exp(-(shift * sample_time));
+  }
+
+  constexpr void advance_schedule() noexcept {
+    if (detail::of_lane(pending_, 0) && deadbeat()) [[unlikely]] {
+      restart();
+    }
+    pending_ = true;
+    if (common_age() < max_index) age_ = common_age() + 1;
+    if (deadbeat()) return;
+    if (common_age() % anchor_interval == 0) [[unlikely]] {
+      anchor(start_index_ + common_age() - 1);
+    }
+    push();
+    set_gain();
+    if constexpr (PackScalar<S>) {
+      if (!all(std::get<0>(ratios_u_) > settled_below_)) [[unlikely]]
+        settle_lanes();
+    } else {
+      if (all(settled_below_ >= std::get<0>(ratios_u_)) && age_ > least_age_) [[unlikely]]
+        settle();
+    }
+  }
+
+  /// True up to sample N - 1 of the schedule.
+  [[nodiscard]] constexpr bool deadbeat() const noexcept {
+    return start_index_ + common_age() <= Size;
+  }
+
+  static constexpr int coefficient_count = Size * (Size + 3) / 2;
+
+  /// c_{j,0} of the j-th row, j = 1 .. N, in the packed triangle.
+  static constexpr int row_start(int j) noexcept { return (j - 1) * (j + 2) / 2; }
+
+  /// [count] = 1 + p + .. + p^(count-1).
+  [[nodiscard]] constexpr S bracket(std::uint32_t count) const noexcept {
+    return bracket(count, shift_.power(count).contraction);
+  }
+
+  /// The same from 1 - p^count.
+  [[nodiscard]] constexpr S bracket(std::uint32_t count, const S& contraction) const noexcept {
+    const auto shifting = shift_.contraction > S(0.0);
+    const S ratio = contraction / select(shifting, shift_.contraction, S(1.0));
+    return select(shifting, ratio, detail::integer<S>(count));
+  }
+
+  /// Sets the registers of the next push to i - N = count, to a few units in the last place.
+  ESOKIT_COLD constexpr void anchor(std::uint32_t count) noexcept {
+    // p^c and 1 - p^c side by side: each is found from the other where that cancels nothing.
+    S power(1.0);
+    S contraction(0.0);
+    S base_power = decay_;
+    S base_contraction = shift_.contraction;
+    for (std::uint32_t rest = count; rest != 0; rest >>= 1u) {
+      if ((rest & 1u) != 0) {
+        contraction = contraction + power * base_contraction;
+        power = power * base_power;
+      }
+      base_contraction = base_contraction + base_power * base_contraction;
+      base_power = select(base_contraction < S(0.5), S(S(1.0) - base_contraction),
+                          S(base_power * base_power));
+    }
+    power_ = power;
+    bracket_ = bracket(count, contraction);
+  }
+
+  constexpr void set_coefficients() noexcept {
+    constexpr auto rows = static_cast<std::size_t>(Size + 1);
+    std::array<std::array<S, rows>, rows> t{};
+    for (auto& row : t) {
+      for (S& x : row) x = S(0.0);
+    }
+    t[0][0] = S(1.0);
+    for (std::size_t i = 0; i + 1 < rows; ++i) {
+      for (std::size_t r = 0; r <= i + 1; ++r) {
+        const auto count = static_cast<std::uint32_t>(r);
+        t[i + 1][r] = shift_.power(count).contraction * t[i][r];
+        if (r > 0) t[i + 1][r] = t[i + 1][r] + bracket(Size + count - 1) * t[i][r - 1];
+      }
+    }
+    const S a = final_poles_.contraction;
+    const S rho = S(1.0) - a;
+    for (int j = 1; j <= Size; ++j) {
+      // C(j,i) a^(j-i) rho^i of all i at once.
+      Array<S, Size + 1> mix{};
+      for (S& x : mix) x = S(0.0);
+      mix[0] = S(1.0);
+      for (std::size_t step = 0; step < static_cast<std::size_t>(j); ++step) {
+        for (std::size_t i = step + 1; i > 0; --i) mix[i] = mix[i] * a + mix[i - 1] * rho;
+        mix[0] = mix[0] * a;
+      }
+      S front(binomial_table<Size, detail::TableScalar<S>>[Size][static_cast<std::size_t>(j)]);
+      for (int i = j; i < Size; ++i) front = front * rho;
+      for (int r = 0; r <= j; ++r) {
+        S sum(0.0);
+        for (int i = r; i <= j; ++i) {
+          const auto row = static_cast<std::size_t>(i);
+          sum = sum + mix[row] * t[row][static_cast<std::size_t>(r)];
+        }
+        coefficients_[static_cast<std::size_t>(row_start(j) + r)] = front * sum;
+      }
+    }
+    size_bracket_ = bracket(Size);
+    // Below this u the terms with r >= 1 and 1 - h = [N] u are lost in the rounding of the first.
+    constexpr detail::TableScalar<S> unit =
+        std::numeric_limits<detail::TableScalar<S>>::epsilon() / 4;
+    settled_below_ = S(unit / Size) / size_bracket_;
+    for (int j = 1; j <= Size; ++j) {
+      const S ratio = S(unit) * coefficients_[static_cast<std::size_t>(row_start(j))] /
+                      coefficients_[static_cast<std::size_t>(row_start(j) + 1)];
+      settled_below_ = select(ratio < settled_below_, ratio, settled_below_);
+    }
+  }
+
+  /// Shifts i on by one in the registers: the newest u_i and h_i.
+  ESOKIT_INLINE constexpr void push() noexcept {
+    const S inverse = S(1.0) / (bracket_ + size_bracket_ * power_);
+    detail::unroll<Size - 1>([&](auto i) ESOKIT_INLINE_LAMBDA {
+      std::get<i>(ratios_u_) = std::get<i + 1>(ratios_u_);
+      std::get<i>(ratios_h_) = std::get<i + 1>(ratios_h_);
+    });
+    std::get<Size - 1>(ratios_u_) = power_ * inverse;
+    std::get<Size - 1>(ratios_h_) = bracket_ * inverse;
+    bracket_ = bracket_ + power_;
+    power_ = power_ * decay_;
+  }
+
+  ESOKIT_INLINE constexpr void set_gain() noexcept {
+    PoleWeights<Size, S> weights{};
+    S remaining(1.0);
+    detail::unroll<Size>([&](auto below) ESOKIT_INLINE_LAMBDA {
+      constexpr int j = Size - below;
+      // Horner in the u_i, the newest of them innermost.
+      S nested = std::get<row_start(j) + j>(coefficients_);
+      detail::unroll<j>([&](auto s) ESOKIT_INLINE_LAMBDA {
+        constexpr int r = j - 1 - s;
+        nested =
+            std::get<row_start(j) + r>(coefficients_) + std::get<Size - j + r>(ratios_u_) * nested;
+      });
+      std::get<j>(weights) = remaining * nested;
+      remaining = remaining * std::get<below>(ratios_h_);
+    });
+    gain_ = current_gain<Size, S>(weights);
+  }
+
+  ESOKIT_COLD void settle() noexcept {
+    settled_ = true;
+    gain_ = current_gain<Size, S>(final_poles_.weights());
+  }
+
+  // Of packs alone, a template: Clang 14 instantiates the members of a class all.
+  template <class = S>
+  ESOKIT_COLD void settle_lanes() noexcept {
+    for (int i = 0; i < lane_count<S>; ++i) {
+      if (!(settled_below_[i] >= std::get<0>(ratios_u_)[i]) || age_[i] <= least_age_[i]) continue;
+      Plain lane = detail::get_lane<Plain>(*this, i);
+      lane.settle();
+      detail::set_lane(*this, lane, i);
+    }
+  }
+
+  ScaledGain<Size, S> gain_{};
+  Array<S, coefficient_count> coefficients_{};
+  Array<S, Size> ratios_u_{};  ///< u_i, i = k + 1 .. k + N
+  Array<S, Size> ratios_h_{};  ///< h_i, the same
+  EqualSampledPoles<Size, S> final_poles_;
+  EqualSampledPoles<Size, S> shift_;  ///< 1 - p
+  S decay_;                           ///< p
+  S size_bracket_{};                  ///< [N]
+  S settled_below_{};                 ///< largest u at which the schedule counts as settled
+  S power_{};                         ///< p^(i-N) of the next i
+  S bracket_{};                       ///< [i-N] of the next i
+  std::uint32_t start_index_;
+  Count least_age_;
+  Count age_{0};
+  Lanes<bool, S> pending_{false};
+  Lanes<bool, S> settled_{false};
+};
+
+/// Told apart in snapshots.
+template <int Size, Scalar S>
+inline constexpr std::uint32_t type_tag<AlgebraicGain<Size, S>> = make_type_tag<S>("AlgebraicGain",
+                                                                                   Size);
+
+}  // namespace esokit

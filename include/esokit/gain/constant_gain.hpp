@@ -1,0 +1,161 @@
+/// @file
+/// The constant gain law of the linear observers, sampled and continuous.
+#pragma once
+
+#include <esokit/core/lanes.hpp>
+#include <esokit/core/type_tag.hpp>
+#include <esokit/gain/gain_law.hpp>
+#include <esokit/gain/placement.hpp>
+#include <esokit/model/chain_model.hpp>
+
+namespace esokit {
+
+/// Constant gain from a placement, with the gain for M T after a gap of M samples.
+template <int Size, Scalar S, class Placement = EqualPoles>
+class ConstantGain {
+ public:
+  /// What it does beside `gain`.
+  static constexpr GainLawTraits traits{.kind = GainKind::preset, .bridges_gaps = true};
+  using Spec = typename Placement::template Spec<Size, LaneScalar<S>>;  ///< of the placement
+  template <class T>
+  using with_scalar = ConstantGain<Size, T, Placement>;  ///< the same of another scalar
+
+  /// As below, for the sample time of a chain.
+  template <class Chain>
+  static Expected<ConstantGain, Error<S>> make(const char* field, const Spec& spec,
+                                               const Chain& chain,
+                                               int index = -1) requires requires {
+    chain.sample_time();
+  }
+  { return make(field, spec, chain.sample_time(), index); }
+
+  /// The gain for a set of poles.
+  /// @param field name of the config member that `spec` came from, for the error
+  /// @param spec poles of the error, checked by the placement
+  /// @param sample_time T, s; checked by the chain
+  /// @param index element of `field` that the error names, -1: none
+  /// @return error for a spec that the placement refuses, or a gain that the scalar cannot hold
+  static Expected<ConstantGain, Error<S>> make(const char* field, const Spec& spec,
+                                               const S& sample_time,
+                                               int index = -1) requires(!PackScalar<S>) {
+    Rules<S> rules;
+    rules.all_of(Placement::template check<Size, S>(field, spec, index));
+    if (!rules) return rules.error();
+    ConstantGain law;
+    law.poles_ = Placement::template sample<Size, S>(spec, sample_time);
+    law.gain_ = current_gain<Size, S>(law.poles_.weights());
+    // The last gain is prod(1 - rho_i) / (N-1)!, the smallest one for slow poles.
+    rules.representable(field, Placement::template representative<Size, S>(spec),
+                        law.gain_[Size - 1],
+                        "times sample_time gives a gain that the scalar cannot hold", index);
+    if (!rules) return rules.error();
+    return law;
+  }
+
+  /// Any gap that is asked for.
+  [[nodiscard]] static constexpr int longest_gap(int asked) noexcept { return asked; }
+
+  /// k, scaled, whatever the innovation.
+  /// @{
+  [[nodiscard]] constexpr const ScaledGain<Size, S>& gain(const S&) const noexcept { return gain_; }
+
+  [[nodiscard]] constexpr const ScaledGain<Size, S>& gain_before_measurement() const noexcept {
+    return gain_;
+  }
+  /// @}
+
+  /// Gain that puts the poles of the step over `samples` T at rho_i^samples, in the scaling of T.
+  [[nodiscard]] ScaledGain<Size, S> gap_gain(const S&, unsigned samples) const noexcept {
+    if constexpr (PackScalar<S>) {
+      ScaledGain<Size, S> all;
+      for (int i = 0; i < lane_count<S>; ++i) {
+        detail::set_lane(all, esokit::gap_gain<Size, LaneScalar<S>>(poles_[i], samples), i);
+      }
+      return all;
+    } else {
+      return esokit::gap_gain<Size, S>(poles_, samples);
+    }
+  }
+
+ private:
+  friend struct detail::LaneAccess;
+  static constexpr auto fields(auto& o) noexcept { return std::tie(o.gain_, o.poles_); }
+
+  ConstantGain() = default;
+
+  ScaledGain<Size, S> gain_{};
+  Lanes<typename Placement::template Sampled<Size, LaneScalar<S>>, S> poles_{};
+};
+
+template <int Size, Scalar S, class Placement = EqualPoles, int MostBridged = 16>
+class ModelGain;  // gain/model_gain.hpp, to be included with a model other than the chain
+
+/// The constant gain law for a model: by formula for the chain.
+template <class Model, int Size, Scalar S, class Placement>
+using ConstantGainOf =
+    std::conditional_t<model_traits<Model>.is_chain, ConstantGain<Size, S, Placement>,
+                       ModelGain<Size, S, Placement>>;
+
+namespace detail {
+
+/// An Expected that is no error: costs nothing.
+template <class T, class S>
+struct Certain {
+  T value;
+  constexpr explicit operator bool() const noexcept { return true; }
+  constexpr const T& operator*() const noexcept { return value; }
+  [[nodiscard]] constexpr Error<S> error() const noexcept { return {}; }
+};
+
+/// The model of a checked config. @param settings of a config, where the model is no chain
+template <class Model, class Config, class Settings>
+auto make_model(const Config& config, [[maybe_unused]] Settings&& settings) {
+  using S = std::remove_cvref_t<decltype(config.input_gain)>;
+  if constexpr (model_traits<Model>.is_chain) {
+    return Certain<Model, S>{Model(config.input_gain, config.sample_time)};
+  } else {
+    return Model::make(settings(config), config.input_gain, config.sample_time);
+  }
+}
+
+}  // namespace detail
+
+/// Told apart in snapshots.
+template <int Size, Scalar S, class Placement>
+inline constexpr std::uint32_t type_tag<ConstantGain<Size, S, Placement>> =
+    make_type_tag<S, Placement>("ConstantGain", Size);
+
+/// Constant gain of a continuous observer, in physical units.
+template <int Size, Scalar S, class Placement = EqualPoles>
+class ContinuousConstantGain {
+ public:
+  using Spec = typename Placement::template Spec<Size, S>;  ///< of the placement
+
+  /// The gain for a set of poles.
+  /// @param field name of the config member that `spec` came from, for the error
+  /// @param spec poles of the error, checked by the placement
+  /// @param index element of `field` that the error names, -1: none
+  /// @return error for a spec that the placement refuses, or a gain that the scalar cannot hold
+  static Expected<ContinuousConstantGain, Error<S>> make(const char* field, const Spec& spec,
+                                                         int index = -1) {
+    Rules<S> rules;
+    rules.all_of(Placement::template check<Size, S>(field, spec, index));
+    if (!rules) return rules.error();
+    ContinuousConstantGain law;
+    law.gain_ = Placement::template gain<Size, S>(spec);
+    rules.representable(field, Placement::template representative<Size, S>(spec),
+                        law.gain_(Size - 1), "gives a gain that the scalar cannot hold", index);
+    if (!rules) return rules.error();
+    return law;
+  }
+
+  /// l, N x 1, row i in 1/s^(i+1).
+  [[nodiscard]] const Vector<S, Size>& gain(const S&, const S&) const noexcept { return gain_; }
+
+ private:
+  ContinuousConstantGain() = default;
+
+  Vector<S, Size> gain_;
+};
+
+}  // namespace esokit

@@ -1,0 +1,380 @@
+/// @file
+/// An error covariance of the chain in square-root form, P = L D L'.
+///
+/// Nothing is ever subtracted from a variance: the measurement update scales one of them, the time
+/// update adds squares up (modified weighted Gram-Schmidt, C. L. Thornton). So P stays symmetric
+/// and positive semidefinite in float, where the plain and the Joseph form do not. Beside the array
+/// form with square roots this one needs N divisions a step and no root, which an autodiff scalar
+/// likes too; it is as accurate, and 1.4 times faster for N = 3.
+#pragma once
+
+#include <esokit/core/check.hpp>
+#include <esokit/core/matrix.hpp>
+#include <esokit/core/unroll.hpp>
+#include <esokit/gain/sampled_gain.hpp>
+#include <esokit/math/combinatorics.hpp>
+#include <limits>
+#include <optional>
+#include <type_traits>
+
+namespace esokit {
+
+namespace detail {
+
+/// f(0), .., f(Count - 1): unrolled where that pays, a loop for the large sizes.
+template <int Count, bool Unrolled, class Function>
+ESOKIT_INLINE constexpr void repeat(Function&& f) noexcept {
+  if constexpr (Unrolled) {
+    unroll<Count>([&](auto i) ESOKIT_INLINE_LAMBDA { f(static_cast<int>(i)); });
+  } else {
+    for (int i = 0; i < Count; ++i) f(i);
+  }
+}
+
+/// C + A B' w.
+template <int Rows, int Inner, int Columns, Scalar S>
+Matrix<S, Rows, Columns> plus_product_transposed(Matrix<S, Rows, Columns> c,
+                                                 const Matrix<S, Rows, Inner>& a,
+                                                 const Matrix<S, Columns, Inner>& b,
+                                                 const S& w) noexcept {
+  for (int i = 0; i < Rows; ++i) {
+    for (int j = 0; j < Columns; ++j) {
+      S sum = a(i, 0) * b(j, 0);
+      for (int k = 1; k < Inner; ++k) sum = sum + a(i, k) * b(j, k);
+      c(i, j) = c(i, j) + sum * w;
+    }
+  }
+  return c;
+}
+
+}  // namespace detail
+
+/// Phi of the chain in Nordsieck scaling: known when compiling.
+struct PascalTransition {};
+
+/// Phi of any other model.
+template <int Size, Scalar S>
+struct MatrixTransition {
+  Matrix<S, Size, Size> phi;   ///< N x N, scaled
+  Array<int, Size> degrees{};  ///< state r is in units of T^degree
+
+  /// Of a model.
+  template <class Model>
+  static MatrixTransition of(const Model& model) noexcept {
+    MatrixTransition transition{model.increment(), {}};
+    for (int i = 0; i < Size; ++i) {
+      transition.phi(i, i) = transition.phi(i, i) + S(1.0);
+      transition.degrees[static_cast<std::size_t>(i)] = model.degree(i);
+    }
+    return transition;
+  }
+
+  /// As a model has them, see SampledModel.
+  /// @{
+  [[nodiscard]] Matrix<S, Size, Size> increment() const noexcept {
+    Matrix<S, Size, Size> step = phi;
+    for (int i = 0; i < Size; ++i) step(i, i) = step(i, i) - S(1.0);
+    return step;
+  }
+  [[nodiscard]] int degree(int row) const noexcept {
+    return degrees[static_cast<std::size_t>(row)];
+  }
+  /// @}
+};
+
+/// P = L D L', N x N, in the Nordsieck scaling of the chain (all states have the unit of y), with L
+/// unit lower triangular and D diagonal, not negative.
+///
+/// The first state is the measured one, so the first column of L is the direction of the gain and a
+/// measurement changes nothing but D_1: P C' = D_1 l_1, and C l_i = 0 for i > 1.
+template <int Size, Scalar S>
+class CovarianceFactor {
+  static constexpr bool unrolled = Size <= 5;
+  static constexpr int below_diagonal = Size * (Size - 1) / 2;
+
+ public:
+  using Square = Matrix<S, Size, Size>;  ///< N x N
+
+  /// P = 0.
+  CovarianceFactor() noexcept {
+    for (S& d : variances_) d = S(0.0);
+    for (S& l : lower_) l = S(0.0);
+  }
+
+  /// Factors a symmetric matrix; nothing if it is not positive semidefinite to within rounding,
+  /// that is, not even with its variances 8 N eps larger. Reads the lower triangle.
+  static std::optional<CovarianceFactor> from_matrix(const Square& p) noexcept {
+    CovarianceFactor factor;
+    if (factor.set<false>(p)) return factor;
+    // Nearly singular: rounding of one element is multiplied by what the pivots before it lack.
+    Square larger = p;
+    for (int i = 0; i < Size; ++i) {
+      if (!all(p(i, i) >= S(0.0))) return std::nullopt;
+      larger(i, i) = p(i, i) + rounding_of_factors() * p(i, i);
+    }
+    return factor.set<false>(larger) ? std::optional(factor) : std::nullopt;
+  }
+
+  /// The same for a matrix that is positive semidefinite but for rounding: what is not is left out.
+  static CovarianceFactor nearest(const Square& p) noexcept {
+    CovarianceFactor factor;
+    factor.set<true>(p);
+    return factor;
+  }
+
+  /// L D L', N x N.
+  [[nodiscard]] Square matrix() const noexcept {
+    Square p;
+    for (int i = 0; i < Size; ++i) {
+      for (int j = 0; j <= i; ++j) {
+        S sum(0.0);
+        for (int k = 0; k <= j; ++k) sum = sum + lower(i, k) * lower(j, k) * variance(k);
+        p(i, j) = sum;
+        p(j, i) = sum;
+      }
+    }
+    return p;
+  }
+
+  /// D_i, i = 0 .. N - 1; the first is the variance of the measured state.
+  [[nodiscard]] constexpr const S& variance(int i) const noexcept { return variances_[index(i)]; }
+  /// Replaces D_i. @param d not negative
+  constexpr void set_variance(int i, const S& d) noexcept { variances_[index(i)] = d; }
+
+  /// L_ij, i and j from 0 to N - 1.
+  [[nodiscard]] constexpr S lower(int i, int j) const noexcept {
+    if (i < j) return S(0.0);
+    return i == j ? S(1.0) : lower_[packed(i, j)];
+  }
+
+  /// The gain k = share l_1, share = D_1 / (D_1 + r).
+  [[nodiscard]] ESOKIT_INLINE constexpr ScaledGain<Size, S> gain(const S& share) const noexcept {
+    ScaledGain<Size, S> gain;
+    gain[0] = share;
+    detail::repeat<Size - 1, unrolled>(
+        [&](int i) ESOKIT_INLINE_LAMBDA { gain[index(i + 1)] = share * lower_[packed(i + 1, 0)]; });
+    return gain;
+  }
+
+  /// One sample ahead: P <- inflation Phi P Phi' + Q.
+  /// @param inflation > 0 @param noise Q, in the same scaling @param transition Phi
+  /// @tparam DiagonalNoise Q is diagonal, which saves a tenth
+  template <bool DiagonalNoise = false, class Transition = PascalTransition>
+  ESOKIT_INLINE constexpr void advance(const S& inflation, const CovarianceFactor& noise,
+                                       const Transition& transition = {}) noexcept {
+    // Rows of [Phi L, L_Q] with the weights [inflation D, D_Q], made orthogonal one by one. Of the
+    // right half only what is below the diagonal is kept, negated; the diagonal is one.
+    Array<S, Size> weights;
+    Array<Array<S, Size>, Size> rows;
+    Array<Array<S, Size>, Size> noise_rows;
+    detail::repeat<Size, unrolled>([&](int k) ESOKIT_INLINE_LAMBDA {
+      weights[index(k)] = inflation * variances_[index(k)];
+      detail::repeat<Size, unrolled>([&](int i) ESOKIT_INLINE_LAMBDA {
+        rows[index(i)][index(k)] = transported(transition, i, k);
+        if constexpr (!DiagonalNoise) {
+          if (k < i) noise_rows[index(i)][index(k)] = -noise.lower_[packed(i, k)];
+        }
+      });
+    });
+    detail::repeat<Size, unrolled>([&](int i) ESOKIT_INLINE_LAMBDA {
+      const auto& row = rows[index(i)];
+      const auto& noise_row = noise_rows[index(i)];
+      Array<S, Size> weighted;
+      Array<S, Size> noise_weighted;
+      // Two sums side by side, the one whose terms are late on its own: it is latency that counts.
+      S early = noise.variances_[index(i)];
+      S late = S(0.0);
+      detail::repeat<Size, unrolled>([&](int k) ESOKIT_INLINE_LAMBDA {
+        weighted[index(k)] = weights[index(k)] * row[index(k)];
+        const S term = weighted[index(k)] * row[index(k)];
+        late = k == 0 ? term : S(late + term);
+        if (k < i) {
+          noise_weighted[index(k)] = noise.variances_[index(k)] * noise_row[index(k)];
+          early = early + noise_weighted[index(k)] * noise_row[index(k)];
+        }
+      });
+      const S variance = early + late;
+      variances_[index(i)] = variance;
+      if (i == Size - 1) return;
+      const S inverse = inverse_of(variance);
+      detail::repeat<Size, unrolled>([&](int j) ESOKIT_INLINE_LAMBDA {
+        if (j <= i) return;
+        auto& other = rows[index(j)];
+        auto& noise_other = noise_rows[index(j)];
+        S product = weighted[0] * other[0];
+        S noise_product = S(0.0);
+        detail::repeat<Size, unrolled>([&](int k) ESOKIT_INLINE_LAMBDA {
+          if (k > 0) product = product + weighted[index(k)] * other[index(k)];
+          if (k >= i) return;
+          const S term = noise_weighted[index(k)] * noise_other[index(k)];
+          noise_product = k == 0 ? term : S(noise_product + term);
+        });
+        if constexpr (!DiagonalNoise) {
+          const S term = noise.variances_[index(i)] * noise_other[index(i)];
+          noise_product = i == 0 ? S(-term) : S(noise_product - term);
+        }
+        if (!DiagonalNoise || i > 0) product = product + noise_product;
+        const S l = product * inverse;
+        lower_[packed(j, i)] = l;
+        detail::repeat<Size, unrolled>([&](int k) ESOKIT_INLINE_LAMBDA {
+          other[index(k)] = other[index(k)] - l * row[index(k)];
+          if (k < i) noise_other[index(k)] = noise_other[index(k)] - l * noise_row[index(k)];
+        });
+        if constexpr (DiagonalNoise) {
+          noise_other[index(i)] = l;
+        } else {
+          noise_other[index(i)] = noise_other[index(i)] + l;
+        }
+      });
+    });
+  }
+
+  /// True if L is the identity.
+  [[nodiscard]] constexpr bool diagonal() const noexcept {
+    for (const S& l : lower_) {
+      if (all(detail::absolute(l) > S(0.0))) return false;
+    }
+    return true;
+  }
+
+  /// sum_i w_i (Phi P Phi')_ii.
+  template <class Transition = PascalTransition>
+  [[nodiscard]] constexpr S transported_trace(const Array<S, Size>& weights,
+                                              const Transition& transition = {}) const noexcept {
+    S sum(0.0);
+    detail::repeat<Size, unrolled>([&](int i) ESOKIT_INLINE_LAMBDA {
+      S diagonal(0.0);
+      detail::repeat<Size, unrolled>([&](int k) ESOKIT_INLINE_LAMBDA {
+        const S x = transported(transition, i, k);
+        diagonal = diagonal + x * x * variances_[index(k)];
+      });
+      sum = sum + weights[index(i)] * diagonal;
+    });
+    return sum;
+  }
+
+  /// Every D_i and L_ij within a share of the other's.
+  [[nodiscard]] constexpr bool near(const CovarianceFactor& other, const S& share) const noexcept {
+    const auto close = [&share](const S& a, const S& b) {
+      return all(detail::absolute(S(a - b)) <= share * detail::absolute(b));
+    };
+    for (std::size_t i = 0; i < variances_.size(); ++i) {
+      if (!close(variances_[i], other.variances_[i])) return false;
+    }
+    for (std::size_t i = 0; i < lower_.size(); ++i) {
+      if (!close(lower_[i], other.lower_[i])) return false;
+    }
+    return true;
+  }
+
+  /// P times a factor.
+  constexpr void scale(const S& factor) noexcept {
+    for (S& d : variances_) d = d * factor;
+  }
+
+  /// The same covariance in other units: state i times `unit`^degree, all variances times `factor`.
+  template <class Transition = PascalTransition>
+  constexpr void rescale(const S& unit, const S& factor,
+                         const Transition& transition = {}) noexcept {
+    for (int i = 0; i < Size; ++i) {
+      S scale = factor;
+      for (int k = 0; k < degree(transition, i); ++k) scale = scale * unit * unit;
+      variances_[index(i)] = variances_[index(i)] * scale;
+      S ratio(1.0);
+      int reached = degree(transition, i);
+      for (int j = i + 1; j < Size; ++j) {
+        for (; reached < degree(transition, j); ++reached) ratio = ratio * unit;
+        lower_[packed(j, i)] = lower_[packed(j, i)] * ratio;
+      }
+    }
+  }
+
+ private:
+  static constexpr std::size_t index(int i) noexcept { return static_cast<std::size_t>(i); }
+
+  static constexpr S rounding_of_factors() noexcept {
+    using Limits = std::numeric_limits<detail::TableScalar<S>>;
+    return S(static_cast<detail::TableScalar<S>>(8 * Size) * Limits::epsilon());
+  }
+
+  template <bool Lenient>
+  bool set(const Square& p) noexcept {
+    const S unit = rounding_of_factors();
+    Square rest = p;
+    for (int k = 0; k < Size; ++k) {
+      const S pivot = rest(k, k);
+      if (!all(is_finite(p(k, k))) || !all(p(k, k) >= S(0.0))) return false;
+      // A pivot of nothing but rounding: the state is a combination of those before it, and all
+      // that is left of its column must be rounding too.
+      const bool lost = !all(pivot > unit * p(k, k));
+      if (!Lenient && !all(pivot >= -(unit * p(k, k)))) return false;
+      variances_[index(k)] = lost ? S(0.0) : pivot;
+      for (int j = k + 1; j < Size; ++j) {
+        if (!all(is_finite(rest(j, k)))) return false;
+        const S ratio = lost ? S(0.0) : S(rest(j, k) / pivot);
+        if (!Lenient && lost) {
+          // Compared as correlations: the states may differ by many orders.
+          const S bound = S(2.0) * unit * p(j, j);
+          if (!all(rest(j, k) * rest(j, k) <= (unit * p(k, k)) * (S(2.0) * bound))) return false;
+        }
+        lower_[packed(j, k)] = ratio;
+      }
+      for (int j = k + 1; j < Size; ++j) {
+        for (int i = k + 1; i <= j; ++i) {
+          rest(j, i) = rest(j, i) - lower(j, k) * lower(i, k) * variances_[index(k)];
+        }
+      }
+    }
+    return true;
+  }
+
+  /// Place of L_ij, i > j, column by column.
+  static constexpr std::size_t packed(int i, int j) noexcept {
+    return index(j * (2 * Size - j - 1) / 2 + i - j - 1);
+  }
+
+  static constexpr int degree(const PascalTransition&, int i) noexcept { return i; }
+  static constexpr int degree(const MatrixTransition<Size, S>& transition, int i) noexcept {
+    return transition.degree(i);
+  }
+
+  /// (Phi L)_ik.
+  [[nodiscard]] constexpr S transported(const MatrixTransition<Size, S>& transition, int i,
+                                        int k) const noexcept {
+    S sum = transition.phi(i, k);
+    for (int j = k + 1; j < Size; ++j) sum = sum + transition.phi(i, j) * lower_[packed(j, k)];
+    return sum;
+  }
+
+  /// The same for the chain: sum_j C(j, i) L_jk.
+  [[nodiscard]] ESOKIT_INLINE constexpr S transported(const PascalTransition&, int i,
+                                                      int k) const noexcept {
+    // Not from zero: adding a zero costs an addition.
+    S sum = k < i ? lower_[packed(i, k)] : S(pascal(k, i));
+    detail::repeat<Size, unrolled>([&](int j) ESOKIT_INLINE_LAMBDA {
+      if (j <= i || j <= k) return;
+      const S& l = lower_[packed(j, k)];
+      sum = sum + (pascal(j, i) == 1 ? l : pascal(j, i) == 2 ? S(l + l) : S(S(pascal(j, i)) * l));
+    });
+    return sum;
+  }
+
+  /// C(j, i) in the scalar of tables.
+  static constexpr detail::TableScalar<S> pascal(int j, int i) noexcept {
+    return binomial_table<Size, detail::TableScalar<S>>[index(j)][index(i)];
+  }
+
+  static constexpr S inverse_of(const S& variance) noexcept {
+    if constexpr (PlainScalar<S>) {
+      return variance > S(0.0) ? S(1.0) / variance : S(0.0);
+    } else {
+      const auto some = variance > S(0.0);
+      return select(some, S(S(1.0) / select(some, variance, S(1.0))), S(0.0));
+    }
+  }
+
+  Array<S, Size> variances_;
+  Array<S, below_diagonal> lower_;
+};
+
+}  // namespace esokit

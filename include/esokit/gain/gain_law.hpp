@@ -1,0 +1,218 @@
+/// @file
+/// The seam between the observers: what a gain law is.
+#pragma once
+
+#include <concepts>
+#include <esokit/core/declared.hpp>
+#include <esokit/core/scalar.hpp>
+#include <esokit/gain/sampled_gain.hpp>
+#include <utility>
+
+namespace esokit {
+
+/// How the gain depends on the innovation e: what can be known of it before the measurement.
+enum class GainKind : unsigned char {
+  /// In any way. The observer asks with finite e alone, see `bears_any_innovation`.
+  general,
+  /// Not at all: `gain_before_measurement() const` is the gain of the next correction.
+  preset,
+  /// It is one of two: `shrinking_gain() const` where `shrinks(e) const`, else `otherwise_gain()
+  /// const`. `shrinks` is asked with any e.
+  switched,
+  /// It is `factor(e) const` times `linear_gain() const`. `factor` is asked with any e.
+  factored,
+};
+
+/// What a gain law can do beside `gain(e)`: `static constexpr GainLawTraits traits{..}` in it. One
+/// that does nothing more declares nothing. All hooks are noexcept.
+struct GainLawTraits {
+  GainKind kind = GainKind::general;  ///< its members must equal gain(e)
+
+  /// `advance()`: one sample time has passed (schedules, Riccati time update). Called in every
+  /// predict, whether a measurement follows or not.
+  bool advances = false;
+
+  /// `accept(e)`: the correction with innovation e was carried out (switching memory, Riccati
+  /// measurement update).
+  bool accepts = false;
+
+  /// `reset()`: forget all history.
+  bool resets = false;
+
+  /// `gap_gain(e, samples) const`: the gain where `samples` (unsigned) > 1 sample times have passed
+  /// since the last correction. Without it `gain(e)` is used; a constant nominal gain makes
+  /// recurring gaps diverge, a law that follows time in `advance()` needs none.
+  bool bridges_gaps = false;
+
+  /// `gain(e)` may be asked with an e that is not finite (its answer is then not used); saves the
+  /// observer a test.
+  bool bears_any_innovation = false;
+};
+
+/// What a gain law declares.
+template <class Law>
+inline constexpr GainLawTraits gain_law_traits = detail::declared_traits<Law, GainLawTraits>;
+
+namespace detail {
+
+ESOKIT_MEMBER_NAME(advance)
+ESOKIT_MEMBER_NAME(accept)
+ESOKIT_MEMBER_NAME(reset)
+ESOKIT_MEMBER_NAME(gap_gain)
+ESOKIT_MEMBER_NAME(bears_any_innovation)
+ESOKIT_MEMBER_NAME(gain_before_measurement)
+ESOKIT_MEMBER_NAME(shrinking_gain)
+ESOKIT_MEMBER_NAME(otherwise_gain)
+ESOKIT_MEMBER_NAME(shrinks)
+ESOKIT_MEMBER_NAME(linear_gain)
+ESOKIT_MEMBER_NAME(factor)
+ESOKIT_MEMBER_FUNCTION(advances)
+ESOKIT_MEMBER_FUNCTION(accepts)
+ESOKIT_MEMBER_FUNCTION(accepted)
+ESOKIT_MEMBER_FUNCTION(resets)
+ESOKIT_MEMBER_FUNCTION(bridge_gap)
+ESOKIT_MEMBER_FUNCTION(gain_for_gap)
+ESOKIT_MEMBER_FUNCTION(preset_gain)
+ESOKIT_MEMBER_FUNCTION(shrink)
+ESOKIT_MEMBER_FUNCTION(factors)
+
+template <class Gain, int Size, class S>
+concept GainOf = std::convertible_to<Gain, ScaledGain<Size, S>>;
+
+// The hooks as they have to be.
+template <class Law>
+concept Advances = noexcept(std::declval<Law&>().advance());
+template <class Law, class S>
+concept Accepts = noexcept(std::declval<Law&>().accept(std::declval<const S&>()));
+template <class Law>
+concept Resets = noexcept(std::declval<Law&>().reset());
+template <class Law, int Size, class S>
+concept BridgesGaps = requires(const Law& law, const S& e, unsigned samples) {
+  { law.gap_gain(e, samples) } -> GainOf<Size, S>;
+  requires noexcept(law.gap_gain(e, samples));
+};
+template <class Law, int Size, class S>
+concept Preset = requires(const Law& law) {
+  { law.gain_before_measurement() } -> GainOf<Size, S>;
+  requires noexcept(law.gain_before_measurement());
+};
+template <class Law, int Size, class S>
+concept Switched = requires(const Law& law, const S& e) {
+  { law.shrinking_gain() } -> GainOf<Size, S>;
+  { law.otherwise_gain() } -> GainOf<Size, S>;
+  { select(law.shrinks(e), e, e) } -> std::convertible_to<S>;
+  requires noexcept(law.shrinking_gain())&& noexcept(law.otherwise_gain());
+  requires noexcept(law.shrinks(e));
+};
+template <class Law, int Size, class S>
+concept Factored = requires(const Law& law, const S& e) {
+  { law.linear_gain() } -> GainOf<Size, S>;
+  { law.factor(e) } -> std::convertible_to<S>;
+  requires noexcept(law.linear_gain())&& noexcept(law.factor(e));
+};
+
+}  // namespace detail
+
+/// `advance()` is noexcept and declared by `traits.advances`; or there is none.
+template <class Law>
+concept AdvancesAsDeclared = detail::as_declared(gain_law_traits<Law>.advances,
+                                                 detail::names_advance<Law>, detail::Advances<Law>);
+
+/// `accept(e)` is noexcept and declared by `traits.accepts`; or there is none.
+template <class Law, class S>
+concept AcceptsAsDeclared = detail::as_declared(gain_law_traits<Law>.accepts,
+                                                detail::names_accept<Law>, detail::Accepts<Law, S>);
+
+/// `reset()` is noexcept and declared by `traits.resets`; or there is none.
+template <class Law>
+concept ResetsAsDeclared = detail::as_declared(gain_law_traits<Law>.resets,
+                                               detail::names_reset<Law>, detail::Resets<Law>);
+
+/// `gap_gain(e, samples) const` is noexcept and declared by `traits.bridges_gaps`; or there is
+/// none.
+template <class Law, int Size, class S>
+concept BridgesGapsAsDeclared = detail::as_declared(gain_law_traits<Law>.bridges_gaps,
+                                                    detail::names_gap_gain<Law>,
+                                                    detail::BridgesGaps<Law, Size, S>);
+
+/// `gain_before_measurement() const` is noexcept and declared by `traits.kind`; or there is none.
+template <class Law, int Size, class S>
+concept PresetAsDeclared = detail::as_declared(gain_law_traits<Law>.kind == GainKind::preset,
+                                               detail::names_gain_before_measurement<Law>,
+                                               detail::Preset<Law, Size, S>);
+
+/// `shrinks(e) const`, `shrinking_gain() const` and `otherwise_gain() const` are noexcept and
+/// declared by `traits.kind`; or there is none of them.
+template <class Law, int Size, class S>
+concept SwitchedAsDeclared = detail::as_declared(gain_law_traits<Law>.kind == GainKind::switched,
+                                                 detail::names_shrinks<Law> ||
+                                                     detail::names_shrinking_gain<Law> ||
+                                                     detail::names_otherwise_gain<Law>,
+                                                 detail::Switched<Law, Size, S>);
+
+/// `factor(e) const` and `linear_gain() const` are noexcept and declared by `traits.kind`; or there
+/// is none of them.
+template <class Law, int Size, class S>
+concept FactoredAsDeclared = detail::as_declared(gain_law_traits<Law>.kind == GainKind::factored,
+                                                 detail::names_factor<Law> ||
+                                                     detail::names_linear_gain<Law>,
+                                                 detail::Factored<Law, Size, S>);
+
+/// No member function has a name that is nearly that of a hook; it would never be called.
+template <class Law>
+concept HasNoMisspelledHook =
+    !detail::calls_advances<Law> && !detail::calls_accepts<Law> && !detail::calls_accepted<Law> &&
+    !detail::calls_resets<Law> && !detail::calls_bridge_gap<Law> &&
+    !detail::calls_gain_for_gap<Law> && !detail::calls_preset_gain<Law> &&
+    !detail::calls_shrink<Law> && !detail::calls_factors<Law> &&
+    // Was a constant of the law; is declared in `traits` now.
+    !detail::names_bears_any_innovation<Law>;
+
+/// A gain law of the sampled predictor-corrector: the only thing that differs between observers.
+///
+/// Required: `gain(e) const noexcept`, the scaled gain k (k_r = T^r / r! times the physical gain;
+/// `scaled_gain` converts) for the innovation e = y - z_1, predicted z_1. Pure: the correction may
+/// yet be dropped. All else is declared, see GainLawTraits; a hook that is named and not declared,
+/// declared and not there, or has another signature, makes it none.
+template <class Law, int Size, class S>
+concept GainLaw = std::copyable<Law> && requires(const Law& law, const S& innovation) {
+  { law.gain(innovation) }
+  noexcept->std::convertible_to<ScaledGain<Size, S>>;
+} && DeclaresTraits<Law, GainLawTraits> && AdvancesAsDeclared<Law> && AcceptsAsDeclared<Law, S> &&
+    ResetsAsDeclared<Law> && BridgesGapsAsDeclared<Law, Size, S> &&
+    PresetAsDeclared<Law, Size, S> && SwitchedAsDeclared<Law, Size, S> &&
+    FactoredAsDeclared<Law, Size, S> && HasNoMisspelledHook<Law>;
+
+/// A gain law whose gain is known before the measurement.
+template <class Law, int Size, class S>
+concept PresetGainLaw = GainLaw<Law, Size, S> && gain_law_traits<Law>
+.kind == GainKind::preset;
+
+/// What a gain law of a continuous observer can do beside `gain(t, e)`: `static constexpr
+/// ContinuousGainLawTraits traits{..}` in it.
+struct ContinuousGainLawTraits {
+  /// `begin_step(t, e)`, called at step boundaries of a simulation; the only place where a switched
+  /// law may change its mode.
+  bool begins_steps = false;
+};
+
+namespace detail {
+
+ESOKIT_MEMBER_NAME(begin_step)
+
+}  // namespace detail
+
+/// `begin_step(t, e)` is declared by `traits.begins_steps`; or there is none.
+template <class Law, class S>
+concept BeginsStepsAsDeclared = detail::as_declared(
+    detail::declared_traits<Law, ContinuousGainLawTraits>.begins_steps,
+    detail::names_begin_step<Law>, requires(Law& law, const S& x) { law.begin_step(x, x); });
+
+/// A gain law of a continuous observer: `gain(t, e) const` in physical units, N x 1. All else is
+/// declared, see ContinuousGainLawTraits.
+template <class Law, int Size, class S>
+concept ContinuousGainLaw = std::copyable<Law> && requires(const Law& law, const S& x) {
+  { law.gain(x, x) } -> std::convertible_to<Vector<S, Size>>;
+} && DeclaresTraits<Law, ContinuousGainLawTraits> && BeginsStepsAsDeclared<Law, S>;
+
+}  // namespace esokit

@@ -1,0 +1,199 @@
+/// @file
+/// The constant gain law for models other than the chain, with gains for gaps that stay bounded.
+#pragma once
+
+#include <cmath>
+#include <esokit/core/type_tag.hpp>
+#include <esokit/gain/constant_gain.hpp>
+#include <esokit/gain/gain_law.hpp>
+#include <esokit/gain/model_placement.hpp>
+#include <esokit/gain/placement.hpp>
+#include <esokit/gain/riccati.hpp>
+#include <esokit/model/sampled_model.hpp>
+
+namespace esokit {
+
+/// Constant gain for a model, placed numerically.
+///
+/// The gain that places the poles for M T, by which the chain bridges a gap, is of no use to what
+/// swings: seen at every M-th sample a resonator is nearly a constant, and the gain grows without
+/// bound (50 Hz at 1 ms: 1e5 after 10 missing samples). After a gap this law weighs y as a Kalman
+/// filter would whose covariance was that of the noise in the estimate, and has grown by the gap:
+///
+///     k_M = P_M C' / (C P_M C' + R),  P_M = Phi^(M-1) P_1 Phi^(M-1)',  R = 1
+///
+/// which is bounded, and goes to that of exact measurements. Bridged is up to the last M for which
+/// this M and all before it, each recurring for ever, let errors decay, by at least a hundredth of
+/// what a sample without a gap does; the observer restarts beyond.
+/// @tparam MostBridged gaps to be considered; each costs N numbers
+template <int Size, Scalar S, class Placement, int MostBridged>
+class ModelGain {
+ public:
+  /// What it does beside `gain`.
+  static constexpr GainLawTraits traits{.kind = GainKind::preset, .bridges_gaps = true};
+  using Spec = typename Placement::template Spec<Size, S>;  ///< of the placement
+
+  /// The gain for a set of poles.
+  /// @param field name of the config member that `spec` came from, for the error
+  /// @param spec poles of the error, checked by the placement @param model to be observed
+  /// @param index element of `field` that the error names, -1: none
+  /// @return error for a spec that the placement refuses, or poles that rounding would make slower
+  ///         than half of what was asked for
+  template <SampledModel<S> Model>
+  static Expected<ModelGain, Error<S>> make(const char* field, const Spec& spec, const Model& model,
+                                            int index = -1) {
+    if (auto ok = Placement::template check<Size, S>(field, spec, index); !ok) return ok.error();
+    const auto poles = pole_factors(Placement::template sample<Size, S>(spec, model.sample_time()));
+    ModelGain law;
+    law.gains_[0] = placed_gain(model, poles);
+    const Square step = model.increment();
+    const auto units = detail::degree_units<Size>(model, poles.unit);
+    // Rounding spreads N equal poles by its N-th root: N = 8 in double by a third where the model
+    // swings at three times the bandwidth. Where little is left after a sample that is of no
+    // account.
+    const S wanted = slowest(poles);
+    const S got = decay(corrected(step, law.gains_[0]), units);
+    if (!all(got >= S(0.5) * wanted) && !all(got >= S(2.3))) {
+      return Error<S>{field, Placement::template representative<Size, S>(spec),
+                      "gives poles that the scalar cannot place for this model", index};
+    }
+    law.find_gap_gains(step, units, S(S(0.01) * got));
+    return law;
+  }
+
+  /// k, scaled, whatever the innovation.
+  /// @{
+  [[nodiscard]] constexpr const ScaledGain<Size, S>& gain(const S&) const noexcept {
+    return gains_[0];
+  }
+  [[nodiscard]] constexpr const ScaledGain<Size, S>& gain_before_measurement() const noexcept {
+    return gains_[0];
+  }
+  /// @}
+
+  /// k_M.
+  [[nodiscard]] constexpr ScaledGain<Size, S> gap_gain(const S&, unsigned samples) const noexcept {
+    return gains_[samples < MostBridged ? samples - 1 : MostBridged - 1];
+  }
+
+  /// The largest number of missing samples that is bridged, of those that are asked for.
+  [[nodiscard]] constexpr int longest_gap(int asked) const noexcept {
+    return asked < longest_step_ ? asked : longest_step_ - 1;
+  }
+
+ private:
+  using Square = Matrix<S, Size, Size>;
+  ModelGain() = default;
+
+  /// -ln of a pole: omega_o T.
+  static S slowest(const PoleFactors<Size, S>& poles) {
+    using std::log;
+    const S left = S(1.0) - poles.unit;
+    return left > detail::smallest_normal<S>() ? S(-log(left)) : S(1e3);
+  }
+
+  // Matrices near I are kept without it: Phi - I has all its digits, Phi has not.
+
+  /// (I - k C) Phi - I from Phi - I.
+  static Square corrected(Square step, const ScaledGain<Size, S>& gain) {
+    Array<S, Size> output{};  // C Phi
+    for (std::size_t j = 0; j < Size; ++j) output[j] = step(0, static_cast<int>(j));
+    output[0] = output[0] + S(1.0);
+    for (std::size_t i = 0; i < Size; ++i) {
+      for (std::size_t j = 0; j < Size; ++j) {
+        S& x = step(static_cast<int>(i), static_cast<int>(j));
+        x = x - gain[i] * output[j];
+      }
+    }
+    return step;
+  }
+
+  /// (I + A)(I + B) - I.
+  static Square joined(const Square& a, const Square& b) { return a * b + (a + b); }
+
+  /// The largest magnitude of an element; infinite where one is not finite.
+  static S largest(const Square& a) {
+    S most(0.0);
+    for (int i = 0; i < Size; ++i) {
+      for (int j = 0; j < Size; ++j) {
+        if (!all(is_finite(a(i, j)))) return S(std::numeric_limits<double>::infinity());
+        const S size = detail::absolute(a(i, j));
+        most = select(most < size, size, most);
+      }
+    }
+    return most;
+  }
+
+  /// -ln of the largest pole of I + A, by its powers; -1 where they are not finite.
+  /// @param units a^degree, in which its elements are of one size
+  static S decay(Square a, const Array<S, Size>& units) {
+    using std::log;
+    for (std::size_t i = 0; i < Size; ++i) {
+      for (std::size_t j = 0; j < Size; ++j) {
+        S& x = a(static_cast<int>(i), static_cast<int>(j));
+        x = x * (units[j] / units[i]);
+      }
+    }
+    S share(1.0);
+    for (; all(largest(a) < S(0.25)) && all(share > S(1e-12)); share = share * S(0.5)) {
+      a = joined(a, a);
+    }
+    for (int i = 0; i < Size; ++i) a(i, i) = a(i, i) + S(1.0);
+    S radius(0.0);
+    for (int squaring = 0; squaring < 40; ++squaring) {
+      const S size = largest(a);
+      if (!all(is_finite(size))) return S(-1.0);
+      if (!all(size > detail::smallest_normal<S>())) return S(1e3);  // all poles at zero
+      radius = radius + share * log(size);
+      share = share * S(0.5);
+      a = a / size;
+      a = a * a;
+    }
+    return -radius;
+  }
+
+  void find_gap_gains(const Square& step, const Array<S, Size>& units, const S& least_decay) {
+    // P_1, that of noise alone with the gain k: P_1 = A P_1 A' + (Phi k) (Phi k)', A = Phi (I -
+    // kC).
+    Square phi = step;
+    for (int i = 0; i < Size; ++i) phi(i, i) = phi(i, i) + S(1.0);
+    Array<S, Size> ahead{};
+    for (int i = 0; i < Size; ++i) {
+      S sum(0.0);
+      for (int j = 0; j < Size; ++j) sum = sum + phi(i, j) * gains_[0][static_cast<std::size_t>(j)];
+      ahead[static_cast<std::size_t>(i)] = sum;
+    }
+    Square spread;
+    Square predictor = phi;
+    for (int i = 0; i < Size; ++i) {
+      for (int j = 0; j < Size; ++j) {
+        spread(i, j) = ahead[static_cast<std::size_t>(i)] * ahead[static_cast<std::size_t>(j)];
+      }
+      predictor(i, 0) = predictor(i, 0) - ahead[static_cast<std::size_t>(i)];
+    }
+    const auto noise = detail::solve_stein<Size, S>(predictor, spread);
+    if (!noise) return;
+    Square p = *noise;
+    Square over = step;  // Phi^M - I
+    for (int samples = 2; samples <= MostBridged; ++samples) {
+      p = phi * p * phi.transpose();
+      over = joined(over, step);
+      auto& gain = gains_[static_cast<std::size_t>(samples - 1)];
+      for (int i = 0; i < Size; ++i) {
+        gain[static_cast<std::size_t>(i)] = p(i, 0) / (p(0, 0) + S(1.0));
+      }
+      if (!all(decay(corrected(over, gain), units) > least_decay)) return;
+      longest_step_ = samples;
+    }
+  }
+
+  Array<ScaledGain<Size, S>, MostBridged> gains_{};
+  int longest_step_ = 1;
+};
+
+/// Told apart in snapshots.
+template <int Size, Scalar S, class Placement, int MostBridged>
+inline constexpr std::uint32_t type_tag<ModelGain<Size, S, Placement, MostBridged>> =
+    make_type_tag<S, Placement>("ModelGain", Size, MostBridged);
+
+}  // namespace esokit

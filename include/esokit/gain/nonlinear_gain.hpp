@@ -1,0 +1,333 @@
+/// @file
+/// The nonlinear gain law: bandwidth gains times an even function k of the innovation, kept between
+/// two limits; and the functions k of the literature.
+#pragma once
+
+#include <esokit/core/type_tag.hpp>
+#include <esokit/gain/constant_gain.hpp>
+#include <esokit/math/fal.hpp>
+#include <esokit/math/power.hpp>
+#include <limits>
+
+namespace esokit {
+
+/// What an even gain can do beside k(x): `static constexpr EvenGainTraits traits{..}` in it.
+struct EvenGainTraits {
+  bool checks = false;    ///< `check() const` gives the error of a bad parameter, as a Check
+  bool prepares = false;  ///< `prepared() const` gives a function object that is quicker to call
+};
+
+namespace detail {
+
+ESOKIT_MEMBER_NAME(prepared)
+
+template <class Shape>
+inline constexpr EvenGainTraits even_gain_traits = declared_traits<Shape, EvenGainTraits>;
+
+/// The same even gain of another scalar; one that is a template of no scalar is its own.
+template <class Shape, class T>
+struct ShapeWithScalar {
+  using type = Shape;
+};
+template <class Shape, class T>
+requires requires { typename Shape::template with_scalar<T>; }
+struct ShapeWithScalar<Shape, T> {
+  using type = typename Shape::template with_scalar<T>;
+};
+
+}  // namespace detail
+
+/// `check()` is declared by `traits.checks`; or there is none.
+template <class Shape, class S>
+concept ChecksAsDeclared = detail::as_declared(
+    detail::even_gain_traits<Shape>.checks, detail::names_check<Shape>, requires(const Shape& k) {
+      { k.check() } -> std::same_as<Check<S>>;
+    });
+
+/// `prepared()` is declared by `traits.prepares`; or there is none.
+template <class Shape, class S>
+concept PreparesAsDeclared = detail::as_declared(
+    detail::even_gain_traits<Shape>.prepares, detail::names_prepared<Shape>,
+    requires(const Shape& k, const S& x) {
+      { k.prepared()(x) } -> std::convertible_to<S>;
+    });
+
+/// An even gain k(x), x = |e| / error_scale > 0: the correction is l k(x) e.
+///
+/// Any copyable function object will do; what else it can do it declares, see EvenGainTraits.
+template <class Shape, class S>
+concept EvenGain = std::copyable<Shape> && requires(const Shape& k, const S& x) {
+  { k(x) } -> std::convertible_to<S>;
+} && DeclaresTraits<Shape, EvenGainTraits> && ChecksAsDeclared<Shape, S> &&
+    PreparesAsDeclared<Shape, S>;
+
+/// k(x) = K_alpha x^(alpha-1) + K_beta x^beta: g(e) / e of the NHOESO paper, (10). The default is
+/// k = 1, the linear observer.
+template <Scalar S>
+struct PowerSumGain {
+  static constexpr EvenGainTraits traits{.checks = true, .prepares = true};  ///< beside k
+  template <class T>
+  using with_scalar = PowerSumGain<T>;  ///< the same of another scalar
+
+  S gain_alpha = S(1.0);  ///< K_alpha >= 0
+  S alpha = S(1.0);       ///< alpha > 0; below 1: k is infinite at e = 0
+  S gain_beta = S(0.0);   ///< K_beta >= 0
+  S beta = S(1.0);        ///< beta >= 0
+
+  /// k with its exponents told apart.
+  class Prepared {
+   public:
+    /// Copies what it needs.
+    explicit constexpr Prepared(const PowerSumGain& sum) noexcept
+        : gain_alpha_(sum.gain_alpha),
+          gain_beta_(sum.gain_beta),
+          alpha_(sum.alpha - S(1.0)),
+          beta_(sum.beta) {}
+
+    /// k(x), x > 0.
+    [[nodiscard]] S operator()(const S& x) const noexcept {
+      return gain_alpha_ * alpha_(x) + gain_beta_ * beta_(x);
+    }
+
+   private:
+    friend struct detail::LaneAccess;
+    static constexpr auto fields(auto& o) noexcept {
+      return std::tie(o.gain_alpha_, o.gain_beta_, o.alpha_, o.beta_);
+    }
+
+    S gain_alpha_;
+    S gain_beta_;
+    Power<S> alpha_;
+    Power<S> beta_;
+  };
+
+  /// A function object that is quicker to call.
+  [[nodiscard]] constexpr Prepared prepared() const noexcept { return Prepared(*this); }
+
+  /// k(x), x > 0.
+  [[nodiscard]] S operator()(const S& x) const noexcept { return prepared()(x); }
+
+  /// Error of a parameter out of its range; `make` of the observer asks for it.
+  [[nodiscard]] Check<S> check() const {
+    return Rules<S>{}
+        .not_negative("shape.gain_alpha", gain_alpha)
+        .positive("shape.alpha", alpha)
+        .not_negative("shape.gain_beta", gain_beta)
+        .not_negative("shape.beta", beta);
+  }
+
+  /// @cond
+  static constexpr auto fields(auto& k) noexcept {
+    return std::tie(k.gain_alpha, k.alpha, k.gain_beta, k.beta);
+  }
+  /// @endcond
+};
+
+/// Told apart in snapshots.
+template <Scalar S>
+inline constexpr std::uint32_t type_tag<PowerSumGain<S>> = make_type_tag<S>("PowerSumGain");
+
+/// k(x) = K max(x, delta)^(a-1): K fal(e) / e of Han's observers.
+template <Scalar S>
+struct FalGain {
+  static constexpr EvenGainTraits traits{.checks = true, .prepares = true};  ///< beside k
+  template <class T>
+  using with_scalar = FalGain<T>;  ///< the same of another scalar
+
+  S gain = S(1.0);          ///< K >= 0
+  S exponent = S(0.5);      ///< a > 0
+  S linear_width = S(1.0);  ///< delta > 0, in units of the error scale
+
+  /// k with its exponent told apart.
+  class Prepared {
+   public:
+    /// Copies what it needs.
+    explicit constexpr Prepared(const FalGain& shape) noexcept
+        : gain_(shape.gain), fal_(shape.exponent, shape.linear_width) {}
+
+    /// k(x), x >= 0.
+    [[nodiscard]] S operator()(const S& x) const noexcept { return gain_ * fal_.gain(x); }
+
+   private:
+    friend struct detail::LaneAccess;
+    static constexpr auto fields(auto& o) noexcept { return std::tie(o.gain_, o.fal_); }
+
+    S gain_;
+    Fal<S> fal_;
+  };
+
+  /// A function object that is quicker to call.
+  [[nodiscard]] constexpr Prepared prepared() const noexcept { return Prepared(*this); }
+
+  /// k(x), x > 0.
+  [[nodiscard]] S operator()(const S& x) const noexcept { return prepared()(x); }
+
+  /// Error of a parameter out of its range; `make` of the observer asks for it.
+  [[nodiscard]] Check<S> check() const {
+    return Rules<S>{}
+        .not_negative("shape.gain", gain)
+        .positive("shape.exponent", exponent)
+        .positive("shape.linear_width", linear_width);
+  }
+
+  /// @cond
+  static constexpr auto fields(auto& k) noexcept {
+    return std::tie(k.gain, k.exponent, k.linear_width);
+  }
+  /// @endcond
+};
+
+/// Told apart in snapshots.
+template <Scalar S>
+inline constexpr std::uint32_t type_tag<FalGain<S>> = make_type_tag<S>("FalGain");
+
+namespace detail {
+
+template <class Shape>
+constexpr auto prepared(const Shape& shape) noexcept {
+  if constexpr (even_gain_traits<Shape>.prepares) {
+    return shape.prepared();
+  } else {
+    return shape;
+  }
+}
+
+/// 2^exponent at compile time.
+template <class T>
+constexpr T power_of_two(int exponent) noexcept {
+  T value(1);
+  for (int i = 0; i < exponent; ++i) value = value * T(2);
+  for (int i = 0; i > exponent; --i) value = value / T(2);
+  return value;
+}
+
+/// Magnitudes below this count as this: k may be infinite at zero.
+template <Scalar S>
+constexpr S least_magnitude() noexcept {
+  // Named, so that no compiler leaves the power to the run time.
+  constexpr auto least =
+      power_of_two<TableScalar<S>>(std::numeric_limits<TableScalar<S>>::min_exponent / 3);
+  return S(least);
+}
+
+/// k(|e| / scale) between its limits; what the sampled and the continuous law have in common.
+template <Scalar S, class Shape>
+class LimitedGain {
+ public:
+  using Function = decltype(prepared(std::declval<const Shape&>()));
+
+  constexpr LimitedGain(const Shape& shape, const S& error_scale, const S& low,
+                        const S& high) noexcept
+      : function_(prepared(shape)), inverse_scale_(S(1.0) / error_scale), low_(low), high_(high) {}
+
+  [[nodiscard]] ESOKIT_INLINE constexpr S operator()(const S& e) const noexcept {
+    const S x = absolute(e) * inverse_scale_;
+    const S k = function_(select(least_magnitude<S>() < x, x, least_magnitude<S>()));
+    // In this order a NaN ends as `high`.
+    const S from_above = select(k < high_, k, high_);
+    return select(low_ < from_above, from_above, low_);
+  }
+
+  [[nodiscard]] constexpr const S& lower() const noexcept { return low_; }
+  [[nodiscard]] constexpr const S& upper() const noexcept { return high_; }
+
+ private:
+  friend struct LaneAccess;
+  static constexpr auto fields(auto& o) noexcept {
+    return std::tie(o.function_, o.inverse_scale_, o.low_, o.high_);
+  }
+
+  Function function_;
+  S inverse_scale_;
+  S low_;
+  S high_;
+};
+
+}  // namespace detail
+
+/// Gain law of NonlinearEso: k(|e| / error_scale) times constant bandwidth gains, k kept between
+/// `gain_min` and `gain_max`.
+///
+/// After a gap of M samples k = 1 with the linear gain for M T: limits that are certified for T
+/// need not be so for M T.
+template <int Size, Scalar S, class Shape = PowerSumGain<S>>
+requires EvenGain<Shape, S>
+class NonlinearGain {
+ public:
+  /// What it does beside `gain`.
+  static constexpr GainLawTraits traits{.kind = GainKind::factored, .bridges_gaps = true};
+
+  using Linear = ConstantGain<Size, S>;  ///< the gain where k = 1
+  template <class T>
+  using with_scalar =
+      NonlinearGain<Size, T,
+                    typename detail::ShapeWithScalar<Shape, T>::type>;  ///< of another scalar
+
+  /// @param linear the bandwidth gains @param shape k @param error_scale > 0, unit of y
+  /// @param gain_min, gain_max limits of k
+  constexpr NonlinearGain(const Linear& linear, const Shape& shape, const S& error_scale,
+                          const S& gain_min, const S& gain_max) noexcept
+      : linear_(linear), factor_(shape, error_scale, gain_min, gain_max) {}
+
+  /// k(e) l, scaled.
+  [[nodiscard]] ESOKIT_INLINE constexpr ScaledGain<Size, S> gain(const S& e) const noexcept {
+    const S k = factor_(e);
+    const auto& l = linear_.gain_before_measurement();
+    ScaledGain<Size, S> result;
+    detail::unroll<Size>([&](auto r)
+                             ESOKIT_INLINE_LAMBDA { std::get<r>(result) = k * std::get<r>(l); });
+    return result;
+  }
+
+  /// The linear gain for the whole gap.
+  [[nodiscard]] ScaledGain<Size, S> gap_gain(const S& e, unsigned samples) const noexcept {
+    return linear_.gap_gain(e, samples);
+  }
+
+  /// gain(e) is factor(e) times this.
+  [[nodiscard]] constexpr const ScaledGain<Size, S>& linear_gain() const noexcept {
+    return linear_.gain_before_measurement();
+  }
+
+  /// k for an innovation, within its limits.
+  [[nodiscard]] constexpr S factor(const S& e) const noexcept { return factor_(e); }
+
+  /// Limits of k.
+  /// @{
+  [[nodiscard]] constexpr const S& gain_min() const noexcept { return factor_.lower(); }
+  [[nodiscard]] constexpr const S& gain_max() const noexcept { return factor_.upper(); }
+  /// @}
+
+ private:
+  friend struct detail::LaneAccess;
+  static constexpr auto fields(auto& o) noexcept { return std::tie(o.linear_, o.factor_); }
+
+  Linear linear_;
+  detail::LimitedGain<S, Shape> factor_;
+};
+
+/// Told apart in snapshots.
+template <int Size, Scalar S, class Shape>
+inline constexpr std::uint32_t type_tag<NonlinearGain<Size, S, Shape>> =
+    make_type_tag<S, Shape>("NonlinearGain", Size);
+
+/// The same for a continuous observer, in physical units.
+template <int Size, Scalar S, class Shape = PowerSumGain<S>>
+requires EvenGain<Shape, S>
+class ContinuousNonlinearGain {
+ public:
+  /// @param linear l for k = 1, N x 1, row i in 1/s^(i+1) @param shape k
+  /// @param error_scale > 0, unit of y @param gain_min, gain_max limits of k
+  ContinuousNonlinearGain(const Vector<S, Size>& linear, const Shape& shape, const S& error_scale,
+                          const S& gain_min, const S& gain_max)
+      : linear_(linear), factor_(shape, error_scale, gain_min, gain_max) {}
+
+  /// k(e) l, N x 1, row i in 1/s^(i+1).
+  [[nodiscard]] Vector<S, Size> gain(const S&, const S& e) const { return linear_ * factor_(e); }
+
+ private:
+  Vector<S, Size> linear_;
+  detail::LimitedGain<S, Shape> factor_;
+};
+
+}  // namespace esokit

@@ -1,0 +1,189 @@
+/// @file
+/// Any stable set of poles as a placement, complex ones in conjugate pairs; to be included by those
+/// who place by `PoleSet`: the header `complex` takes half as long to compile as a controller.
+#pragma once
+
+#include <cmath>
+#include <complex>
+#include <esokit/core/check.hpp>
+#include <esokit/core/matrix.hpp>
+#include <esokit/core/type_tag.hpp>
+#include <esokit/gain/continuous_gain.hpp>
+#include <esokit/gain/feedback_gain.hpp>
+#include <esokit/gain/half_gain.hpp>
+#include <esokit/gain/placement.hpp>
+#include <esokit/gain/sampled_gain.hpp>
+
+namespace esokit {
+
+/// Any set of poles of the sampled error, kept as contractions 1 - rho_i. Complex poles come with
+/// their conjugates.
+template <int Size, PlainScalar S>
+struct SampledPoleSet {
+  Array<std::complex<S>, Size> contractions{};  ///< a_i = 1 - rho_i
+
+  /// From continuous-time poles p_i (1/s): rho_i = exp(p_i T). @param sample_time T, s
+  static SampledPoleSet from_continuous(const Array<std::complex<S>, Size>& poles,
+                                        S sample_time) noexcept {
+    SampledPoleSet set;
+    for (std::size_t i = 0; i < Size; ++i) {
+      const auto a =
+          detail::contraction(S(poles[i].real() * sample_time), S(poles[i].imag() * sample_time));
+      set.contractions[i] = {a.real, a.imaginary};
+    }
+    return set;
+  }
+
+  /// From poles rho_i in the z-plane.
+  static SampledPoleSet from_sampled(const Array<std::complex<S>, Size>& poles) noexcept {
+    SampledPoleSet set;
+    for (std::size_t i = 0; i < Size; ++i) set.contractions[i] = S(1) - poles[i];
+    return set;
+  }
+
+  /// The poles for `samples` sample times in one: rho_i^samples.
+  [[nodiscard]] SampledPoleSet power(unsigned samples) const noexcept {
+    SampledPoleSet set;
+    for (std::size_t i = 0; i < Size; ++i) {
+      std::complex<S> base = contractions[i];
+      std::complex<S> result(0);
+      for (unsigned rest = samples; rest != 0; rest >>= 1u) {
+        if ((rest & 1u) != 0) result += (S(1) - result) * base;
+        base += (S(1) - base) * base;
+      }
+      set.contractions[i] = result;
+    }
+    return set;
+  }
+
+  /// beta_0 .. beta_N of prod_i (delta + a_i) = sum_j beta_j delta^(N-j).
+  [[nodiscard]] Array<S, Size + 1> symmetric() const noexcept {
+    Array<std::complex<S>, Size + 1> product{};
+    product[0] = S(1);
+    for (std::size_t i = 0; i < Size; ++i) {
+      for (std::size_t j = i + 1; j > 0; --j) product[j] += product[j - 1] * contractions[i];
+    }
+    Array<S, Size + 1> beta{};
+    for (std::size_t j = 0; j <= Size; ++j) beta[j] = product[j].real();
+    return beta;
+  }
+
+  /// b_0 .. b_N, for `current_gain`.
+  [[nodiscard]] PoleWeights<Size, S> weights() const noexcept {
+    Array<std::complex<S>, Size + 1> product{};
+    product[0] = S(1);
+    for (std::size_t i = 0; i < Size; ++i) {
+      const std::complex<S> decay = S(1) - contractions[i];
+      for (std::size_t j = i + 1; j > 0; --j) {
+        product[j] = product[j] * decay + product[j - 1] * contractions[i];
+      }
+      product[0] *= decay;
+    }
+    PoleWeights<Size, S> weights{};
+    for (std::size_t j = 0; j <= Size; ++j) weights[j] = product[j].real();
+    return weights;
+  }
+};
+
+/// Coefficients of prod_i (s - p_i) below s^N: poles of the error at p_i.
+/// @param poles 1/s; complex ones with their conjugates
+/// @return N x 1, row i in 1/s^i
+template <int Size, PlainScalar S>
+Vector<S, Size> continuous_gain(const Array<std::complex<S>, Size>& poles) {
+  Array<std::complex<S>, Size + 1> coefficients{};
+  coefficients[0] = S(1);
+  for (std::size_t i = 0; i < Size; ++i) {
+    for (std::size_t j = i + 1; j > 0; --j) coefficients[j] -= poles[i] * coefficients[j - 1];
+  }
+  Vector<S, Size> gain;
+  for (int i = 0; i < Size; ++i) gain(i) = coefficients[static_cast<std::size_t>(i) + 1].real();
+  return gain;
+}
+
+/// Any stable set of poles p_i (1/s), complex ones in conjugate pairs.
+struct PoleSet {
+  static constexpr bool lists_poles = true;  ///< a config names them `poles`
+
+  template <int Size, PlainScalar S>
+  using Spec = Array<std::complex<S>, Size>;  ///< p_i, 1/s
+
+  template <int Size, PlainScalar S>
+  using Sampled = SampledPoleSet<Size, S>;  ///< what `sample` gives
+
+  /// Error of the first pole that is not finite, not in the left half plane, or complex without its
+  /// conjugate.
+  /// @param set number of the set in an array of sets; the error then counts poles through all sets
+  template <int Size, PlainScalar S>
+  static Check<S> check(const char* field, const Spec<Size, S>& poles, int set = -1) {
+    const int first = set < 0 ? 0 : set * Size;
+    Rules<S> rules;
+    for (std::size_t i = 0; i < Size; ++i) {
+      const int index = first + static_cast<int>(i);
+      const S real = poles[i].real();
+      const S imaginary = poles[i].imag();
+      rules.require(is_finite(real), field, real, "must have a finite real part", index)
+          .require(is_finite(imaginary), field, imaginary, "must have a finite imaginary part",
+                   index)
+          .require(real < S(0), field, real, "must have a negative real part", index);
+    }
+    for (std::size_t i = 0; i < Size; ++i) {
+      if (poles[i].imag() == S(0)) continue;
+      int balance = 0;
+      for (std::size_t j = 0; j < Size; ++j) {
+        balance += poles[j] == poles[i] ? 1 : 0;
+        balance -= poles[j] == std::conj(poles[i]) ? 1 : 0;
+      }
+      rules.require(balance == 0, field, poles[i].imag(),
+                    "is complex without its conjugate in the set", first + static_cast<int>(i));
+    }
+    return rules;
+  }
+
+  /// Poles at exp(p_i T). @param poles p_i, 1/s @param sample_time T, s
+  template <int Size, PlainScalar S>
+  static SampledPoleSet<Size, S> sample(const Spec<Size, S>& poles, const S& sample_time) {
+    return SampledPoleSet<Size, S>::from_continuous(poles, sample_time);
+  }
+
+  /// Gain of the continuous observer. @return l, N x 1, row i in 1/s^(i+1)
+  template <int Size, PlainScalar S>
+  static Vector<S, Size> gain(const Spec<Size, S>& poles) {
+    return continuous_gain<Size, S>(poles);
+  }
+
+  /// A number that names the spec in an error.
+  template <int Size, PlainScalar S>
+  static S representative(const Spec<Size, S>& poles) {
+    return poles[0].real();
+  }
+};
+
+/// Told apart in snapshots.
+template <>
+inline constexpr std::uint32_t type_tag<PoleSet> = make_type_tag<>("PoleSet");
+
+/// Gains for the poles `rho_i = 1 - contractions_i` of the sampled loop under a held input.
+/// @param contractions 1 - rho_i; complex ones with their conjugates @param sample_time T, s
+/// @return k_0 .. k_(n-1), k_i in 1/s^(n-i)
+template <int Order, PlainScalar S>
+Array<S, Order> sampled_feedback_gain(const Array<std::complex<S>, Order>& contractions,
+                                      const S& sample_time) {
+  const SampledPoleSet<Order, S> poles{contractions};
+  return detail::held_input_feedback<Order, S>(poles.symmetric(), S(1) / sample_time);
+}
+
+/// The poles that half the gains of the bandwidth parameterisation have, see gain/half_gain.hpp:
+/// s_k, 1/s, in conjugate pairs. @param bandwidth omega, rad/s
+template <int Size, PlainScalar S>
+Array<std::complex<S>, Size> half_gain_poles(const S& bandwidth) {
+  Array<std::complex<S>, Size> poles{};
+  for (int k = 0; 2 * k < Size; ++k) {
+    const std::complex<S> pole(-bandwidth / S(2),
+                               detail::half_gain_imaginary<Size, S>(bandwidth, k));
+    poles[static_cast<std::size_t>(k)] = pole;
+    poles[static_cast<std::size_t>(Size - 1 - k)] = std::conj(pole);
+  }
+  return poles;
+}
+
+}  // namespace esokit

@@ -1,0 +1,286 @@
+/// @file
+/// Steady state of the Riccati recursion of a filter.
+///
+///     P- = inflation Phi P Phi' + Q,  K = P- C' (C P- C' + R)^-1,  P = (I - K C) P-
+///
+/// Newton's method on the gain (G. A. Hewer, 1971): the covariance of a given stable gain solves a
+/// Stein equation, which Smith's doubling sums up from positive terms, and gives the next gain. It
+/// starts from a gain that puts all poles at zero, which a chain of integrators always has, and
+/// converges quadratically to the only stabilising solution wherever there is one. (The doubling
+/// algorithm SDA finds the least solution instead, which for Q = 0 and inflation > 1 is zero.)
+#pragma once
+
+#include <cmath>
+#include <esokit/core/check.hpp>
+#include <esokit/core/expected.hpp>
+#include <esokit/core/matrix.hpp>
+#include <esokit/gain/covariance_factor.hpp>
+#include <esokit/gain/model_placement.hpp>
+#include <esokit/gain/sampled_gain.hpp>
+#include <limits>
+#include <optional>
+
+namespace esokit {
+
+/// A filter's model, N states, p outputs.
+template <int Size, int Outputs, Scalar S>
+struct RiccatiModel {
+  Matrix<S, Size, Size> transition;         ///< Phi, N x N
+  Matrix<S, Outputs, Size> output;          ///< C, p x N
+  Matrix<S, Size, Size> noise;              ///< Q, N x N
+  Matrix<S, Outputs, Outputs> measurement;  ///< R, p x p
+  S inflation{1.0};                         ///< factor on Phi P Phi', > 0
+};
+
+namespace detail {
+
+template <Scalar S>
+constexpr S rounding() noexcept {
+  return S(std::numeric_limits<TableScalar<S>>::epsilon());
+}
+
+/// Largest relative change of the elements that count.
+template <int Rows, int Columns, Scalar S>
+S relative_change(const Matrix<S, Rows, Columns>& now, const Matrix<S, Rows, Columns>& before) {
+  S worst(0.0);
+  for (int i = 0; i < Rows; ++i) {
+    for (int j = 0; j < Columns; ++j) {
+      const S size = absolute(now(i, j));
+      if (!all(size > S(0.0))) continue;
+      const S change = absolute(S(now(i, j) - before(i, j))) / size;
+      worst = select(worst < change, change, worst);
+    }
+  }
+  return worst;
+}
+
+/// A^-1 B for a symmetric positive definite A by Cholesky; nothing if A is not.
+template <int Size, int Columns, Scalar S>
+std::optional<Matrix<S, Size, Columns>> solve_positive(const Matrix<S, Size, Size>& a,
+                                                       Matrix<S, Size, Columns> b) {
+  Matrix<S, Size, Size> l = a;  // unit lower, the pivots on its diagonal
+  for (int k = 0; k < Size; ++k) {
+    if (!all(is_finite(l(k, k))) || !all(l(k, k) > S(0.0))) return std::nullopt;
+    for (int i = k + 1; i < Size; ++i) {
+      const S factor = l(i, k) / l(k, k);
+      for (int j = k + 1; j <= i; ++j) l(i, j) = l(i, j) - factor * l(j, k);
+    }
+    for (int i = k + 1; i < Size; ++i) l(i, k) = l(i, k) / l(k, k);
+  }
+  for (int c = 0; c < Columns; ++c) {
+    for (int i = 0; i < Size; ++i) {
+      for (int k = 0; k < i; ++k) b(i, c) = b(i, c) - l(i, k) * b(k, c);
+    }
+    for (int i = Size - 1; i >= 0; --i) {
+      b(i, c) = b(i, c) / l(i, i);
+      for (int k = i + 1; k < Size; ++k) b(i, c) = b(i, c) - l(k, i) * b(k, c);
+    }
+  }
+  return b;
+}
+
+/// X = F X F' + W for a stable F: Smith's doubling, 2^k terms of the sum after k steps. Nothing if
+/// F is not stable.
+template <int Size, Scalar S>
+std::optional<Matrix<S, Size, Size>> solve_stein(Matrix<S, Size, Size> f, Matrix<S, Size, Size> x) {
+  constexpr int most_doublings = 64;
+  for (int k = 0; k < most_doublings; ++k) {
+    const auto half = f * x;
+    const auto sum = plus_product_transposed<Size, Size, Size, S>(x, half, f, S(1.0));
+    bool done = true;
+    for (int i = 0; i < Size; ++i) {
+      if (!all(is_finite(sum(i, i)))) return std::nullopt;
+      if (!all(sum(i, i) - x(i, i) <= rounding<S>() * sum(i, i))) done = false;
+    }
+    x = sum;
+    if (done) return x;
+    f = f * f;
+  }
+  return std::nullopt;
+}
+
+}  // namespace detail
+
+/// Predicted covariance P- of the steady state, N x N.
+/// @param start_gain K, N x p, for which inflation^(1/2) (Phi - Phi K C) is stable
+/// @return nothing if `start_gain` is not stabilising, or there is no stabilising solution (a mode
+///         on the unit circle that the noise does not reach)
+template <int Size, int Outputs, Scalar S>
+std::optional<Matrix<S, Size, Size>> riccati_covariance(const RiccatiModel<Size, Outputs, S>& model,
+                                                        Matrix<S, Size, Outputs> start_gain) {
+  using std::sqrt;
+  constexpr int most_steps = 200;
+  const S root = sqrt(model.inflation);
+  Matrix<S, Size, Outputs> gain = start_gain;
+  S last_change((std::numeric_limits<detail::TableScalar<S>>::max)());
+  for (int step = 0; step < most_steps; ++step) {
+    const auto predictor = model.transition * gain;
+    auto error = predictor * model.output;
+    for (int i = 0; i < Size; ++i) {
+      for (int j = 0; j < Size; ++j) error(i, j) = (model.transition(i, j) - error(i, j)) * root;
+    }
+    const auto spread = predictor * model.measurement;
+    const auto covariance =
+        detail::solve_stein<Size, S>(error, detail::plus_product_transposed<Size, Outputs, Size, S>(
+                                                model.noise, spread, predictor, model.inflation));
+    if (!covariance) return std::nullopt;
+    const auto crossed = model.output * *covariance;
+    const auto innovation = detail::plus_product_transposed<Outputs, Size, Outputs, S>(
+        model.measurement, crossed, model.output, S(1.0));
+    const auto next = detail::solve_positive<Outputs, Size, S>(innovation, crossed);
+    if (!next) return std::nullopt;
+    Matrix<S, Size, Outputs> next_gain;
+    for (int i = 0; i < Size; ++i) {
+      for (int j = 0; j < Outputs; ++j) next_gain(i, j) = (*next)(j, i);
+    }
+    const S change = detail::relative_change(next_gain, gain);
+    gain = next_gain;
+    // Quadratic convergence ends in rounding, where changes no longer fall.
+    const bool rounding_left = all(change < S(1e-3)) && !all(change < last_change * S(0.25));
+    if (!all(change > S(8.0 * Size) * detail::rounding<S>()) || rounding_left) return covariance;
+    last_change = change;
+  }
+  return std::nullopt;
+}
+
+namespace detail {
+
+/// Phi.
+template <int Size, Scalar S>
+void set_transition(Matrix<S, Size, Size>& phi, const PascalTransition&) {
+  for (int i = 0; i < Size; ++i) {
+    for (int j = 0; j < Size; ++j) {
+      phi(i, j) = S(binomial_table<Size, TableScalar<S>>[static_cast<std::size_t>(j)]
+                                                        [static_cast<std::size_t>(i)]);
+    }
+  }
+}
+template <int Size, Scalar S>
+void set_transition(Matrix<S, Size, Size>& phi, const MatrixTransition<Size, S>& transition) {
+  phi = transition.phi;
+}
+
+/// A gain that puts all poles at zero.
+template <int Size, Scalar S>
+ScaledGain<Size, S> deadbeat_gain(const PascalTransition&) {
+  return current_gain<Size, S>(EqualSampledPoles<Size, S>{S(1.0)}.weights());
+}
+template <int Size, Scalar S>
+ScaledGain<Size, S> deadbeat_gain(const MatrixTransition<Size, S>& transition) {
+  return placed_gain(transition, pole_factors(EqualSampledPoles<Size, S>{S(1.0)}));
+}
+
+/// C (-I - Phi)^-1; Phi of the chain is upper triangular.
+template <int Size, Scalar S>
+Array<S, Size> alternating_response(const PascalTransition&) {
+  Array<S, Size> response{};
+  for (int j = 0; j < Size; ++j) {
+    S sum = j == 0 ? S(1.0) : S(0.0);
+    for (int i = 0; i < j; ++i) {
+      const auto& pascal = binomial_table<Size, detail::TableScalar<S>>;
+      sum = sum + response[static_cast<std::size_t>(i)] *
+                      S(pascal[static_cast<std::size_t>(j)][static_cast<std::size_t>(i)]);
+    }
+    response[static_cast<std::size_t>(j)] = S(-0.5) * sum;
+  }
+  return response;
+}
+template <int Size, Scalar S>
+Array<S, Size> alternating_response(const MatrixTransition<Size, S>& transition) {
+  Matrix<S, Size, Size> system;  // (-I - Phi)'
+  Array<S, Size> response{};
+  for (int i = 0; i < Size; ++i) {
+    response[static_cast<std::size_t>(i)] = S(i == 0 ? 1.0 : 0.0);
+    for (int j = 0; j < Size; ++j) {
+      system(i, j) = -transition.phi(j, i) - S(i == j ? 1.0 : 0.0);
+    }
+  }
+  solve_in_place(DenseView<S>{system.data(), Size}, DenseView<S>{response.data(), Size, 1});
+  return response;
+}
+
+}  // namespace detail
+
+/// Least R for which an error that changes sign at every sample fades, in the unit of `noise`; not
+/// positive: none is needed.
+///
+/// |p(-1)|^2 of the limit's poles is in proportion to the density of the innovations at half the
+/// sampling rate, R + |C (-I - Phi)^-1 Q^(1/2)|^2 (spectral factorisation). Where that is zero the
+/// limit has a pole at -1: a millionth of the trace of Q is asked for.
+/// @param noise Q, scaled @param transition Phi
+template <int Size, Scalar S, class Transition = PascalTransition>
+S least_measurement_variance(const CovarianceFactor<Size, S>& noise,
+                             const Transition& transition = {}) {
+  const auto response = detail::alternating_response<Size, S>(transition);
+  S density(0.0);
+  S trace(0.0);
+  for (int k = 0; k < Size; ++k) {
+    S seen(0.0);
+    for (int i = k; i < Size; ++i) {
+      const S l = noise.lower(i, k);
+      seen = seen + response[static_cast<std::size_t>(i)] * l;
+      trace = trace + l * l * noise.variance(k);
+    }
+    density = density + seen * seen * noise.variance(k);
+  }
+  return S(1e-6) * trace - density;
+}
+
+/// Steady state for the chain of integrators in Nordsieck scaling, or another model whose first
+/// state is measured, P- = L D L'; its gain is good to a few units in the last place.
+/// @param noise Q @param measurement R >= 0 @param inflation >= 1 @param transition Phi
+/// @return nothing if there is none: inflation = 1 where nothing drives the highest state, or
+///         Q = R = 0
+template <int Size, Scalar S, class Transition = PascalTransition>
+std::optional<CovarianceFactor<Size, S>> steady_covariance(const CovarianceFactor<Size, S>& noise,
+                                                           const S& measurement, const S& inflation,
+                                                           const Transition& transition = {}) {
+  using Vec = Matrix<S, Size, 1>;
+  const auto deadbeat = detail::deadbeat_gain<Size, S>(transition);
+  RiccatiModel<Size, 1, S> model;
+  detail::set_transition(model.transition, transition);
+  model.noise = noise.matrix();
+  model.measurement(0, 0) = measurement;
+  model.inflation = inflation;
+  for (int i = 0; i < Size; ++i) model.output(0, i) = S(i == 0 ? 1.0 : 0.0);
+  if (!all(inflation > S(1.0)) && !all(model.noise(Size - 1, Size - 1) > S(0.0))) {
+    return std::nullopt;
+  }
+  Vec start;
+  for (int i = 0; i < Size; ++i) start(i) = deadbeat[static_cast<std::size_t>(i)];
+  const auto covariance = riccati_covariance<Size, 1, S>(model, start);
+
+  // The recursion itself is more accurate than the sums above, whose small variances drown in the
+  // rounding of the large ones: it has the last word. Where poles near zero leave those sums no
+  // digits at all (float, N = 6) it begins elsewhere, as it is quick then.
+  constexpr int most_steps = 4000;
+  CovarianceFactor<Size, S> factor;
+  if (covariance) {
+    factor = CovarianceFactor<Size, S>::nearest(*covariance);
+  } else {
+    for (int i = 0; i < Size; ++i) factor.set_variance(i, S(model.noise.trace() + measurement));
+  }
+  ScaledGain<Size, S> gain{};
+  int quiet = 0;
+  S change(1.0);
+  for (int step = 0; step < most_steps && quiet < 4; ++step) {
+    const S sum = factor.variance(0) + measurement;
+    if (!all(sum > S(0.0)) || !all(is_finite(sum))) return std::nullopt;
+    const auto next = factor.gain(S(factor.variance(0) / sum));
+    change = S(0.0);
+    for (std::size_t i = 0; i < Size; ++i) {
+      const S moved = detail::absolute(S(next[i] - gain[i])) / detail::absolute(next[i]);
+      change = select(change < moved, moved, change);
+    }
+    if (!all(is_finite(change))) return std::nullopt;
+    gain = next;
+    quiet = all(change <= S(2.0) * detail::rounding<S>()) ? quiet + 1 : 0;
+    if (quiet == 4) break;
+    factor.set_variance(0, S(factor.variance(0) * (measurement / sum)));
+    factor.advance(inflation, noise, transition);
+  }
+  if (!all(change <= S(64.0) * detail::rounding<S>())) return std::nullopt;
+  return factor;
+}
+
+}  // namespace esokit

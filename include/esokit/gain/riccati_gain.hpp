@@ -1,0 +1,517 @@
+/// @file
+/// The Riccati gain law of the extended state filter (S. Shi, Z. Zeng, C. Zhao, L. Guo, P. Chen,
+/// Energies 15 (2022) 5799; W. Bai, W. Xue, Y. Huang, H. Fang, Sci. China Inf. Sci. 61 (2018)
+/// 042201).
+///
+/// With P- a bound of the covariance of the predicted state's error, R the variance of the noise
+/// and theta > 0 the inflation, which covers that the disturbance is correlated with the error:
+///
+///     s = C P- C' + R/(1+theta),  k = P- C' / s                                (24), corrected
+///     P- <- (1+theta) Phi (I - k C) P- (I - k C)' Phi' + (Phi k) R (Phi k)'
+///           + (1+theta)/theta Q                                               (11)
+///
+/// The paper prints the transpose of s where its inverse belongs, and in its corrected form the
+/// predictor gain Phi k where k belongs. theta = 0 has no meaning in (11): the plain Kalman filter,
+/// inflation 1 and noise Q, is a rule of its own.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <esokit/core/type_tag.hpp>
+#include <esokit/gain/covariance_factor.hpp>
+#include <esokit/gain/gain_law.hpp>
+#include <esokit/gain/riccati.hpp>
+#include <esokit/model/sampled_model.hpp>
+#include <limits>
+#include <optional>
+
+namespace esokit {
+
+namespace detail {
+
+/// Phi as the law keeps it.
+template <class Model, class S>
+using TransitionOf = std::conditional_t<model_traits<Model>.is_chain, PascalTransition,
+                                        MatrixTransition<Model::size, S>>;
+template <class S, class Model>
+TransitionOf<Model, S> transition_of(const Model& model) {
+  if constexpr (model_traits<Model>.is_chain) {
+    return {};
+  } else {
+    return MatrixTransition<Model::size, S>::of(model);
+  }
+}
+
+}  // namespace detail
+
+/// How the inflation theta is chosen.
+enum class InflationRule : unsigned char {
+  fixed,     ///< theta > 0 as given
+  adaptive,  ///< at every sample the theta that makes the (weighted) trace of the bound least
+  none,      ///< the plain Kalman filter
+};
+
+/// How the gain is obtained.
+enum class RiccatiMode : unsigned char {
+  recursive,    ///< by the recursion, at every sample
+  frozen,       ///< its limit, found in make; after missing samples the recursion brings it back
+  start_table,  ///< the first gains, from P0, out of a table; then the limit
+};
+
+/// What RiccatiGain needs, all covariances in the scaling of the chain and divided by `unit`.
+template <int Size, Scalar S>
+struct RiccatiSettings {
+  CovarianceFactor<Size, S> start{};          ///< P0, of the first prediction
+  CovarianceFactor<Size, S> noise{};          ///< Q
+  S measurement{};                            ///< R
+  S unit{1.0};                                ///< what 1 stands for, unit of y squared
+  InflationRule rule = InflationRule::fixed;  ///< how theta is chosen
+  S inflation{};                              ///< theta of the fixed rule
+  Array<S, Size> trace_weights{};             ///< of the adaptive rule
+  RiccatiMode mode = RiccatiMode::recursive;  ///< how the gain is obtained
+};
+
+namespace detail {
+
+/// What a variance may be, in the unit of the law, for all that the recursion makes of it to fit
+/// the scalar.
+template <Scalar S>
+constexpr S largest_variance() noexcept {
+  return S(1e-6) * (rounding<S>() / smallest_normal<S>());
+}
+
+}  // namespace detail
+
+/// Gain law of ExtendedStateFilter. The gain is known before the measurement; a missing sample is
+/// `advance` alone, which lets the covariance grow, so no gain for gaps is needed.
+///
+/// @tparam TableSize gains in the start table
+/// @tparam Transition Phi of the model
+template <int Size, Scalar S, int TableSize = 0, class Transition = PascalTransition>
+class RiccatiGain {
+ public:
+  /// What it does beside `gain`.
+  static constexpr GainLawTraits traits{
+      .kind = GainKind::preset, .advances = true, .accepts = true, .resets = true};
+
+  using Factor = CovarianceFactor<Size, S>;   ///< P-, scaled
+  using Settings = RiccatiSettings<Size, S>;  ///< of the constructor
+  using Gain = ScaledGain<Size, S>;           ///< k, scaled
+
+  /// The law in its recursive mode; `freeze` goes over to another.
+  explicit RiccatiGain(const Settings& settings, const Transition& transition = {}) noexcept
+      : transition_(transition),
+        measurement_(settings.measurement),
+        start_(settings.start),
+        noise_(settings.noise),
+        unit_(settings.unit),
+        trace_weights_(settings.trace_weights),
+        rule_(settings.rule),
+        diagonal_noise_(settings.noise.diagonal()) {
+    if (rule_ == InflationRule::fixed) {
+      start_inflation_ = settings.inflation;
+      noise_.scale(S((S(1.0) + settings.inflation) / settings.inflation));
+    }
+    noise_trace_ = S(0.0);
+    for (int i = 0; i < Size; ++i) {
+      for (int k = 0; k <= i; ++k) {
+        const S l = noise_.lower(i, k);
+        noise_trace_ = noise_trace_ + trace_weights_[index(i)] * l * l * noise_.variance(k);
+      }
+    }
+    if (!all(measurement_ > S(0.0))) leave_exact_start();
+    reset();
+  }
+
+  /// Works out the limit and the table, and goes over to `mode`. False if there is no limit.
+  bool freeze(RiccatiMode mode) {
+    const auto limit = find_limit();
+    if (!limit) return false;
+    limit_ = *limit;
+    RiccatiGain run = *this;
+    run.mode_ = RiccatiMode::recursive;
+    run.reset();
+    for (Point& point : table_) {
+      run.advance();
+      point = run.now_;
+      run.accept(S(0.0));
+    }
+    mode_ = mode;
+    reset();
+    return true;
+  }
+
+  /// True if the recursion stays within the scalar. What a large inflation lets it grow to is
+  /// reached within the first samples; one above 1e6, or so small that Q / theta is large, also
+  /// lets it grow in gaps.
+  [[nodiscard]] bool fits() const noexcept {
+    const bool usual = all(start_inflation_ <= S(1e6)) && all(start_inflation_ >= S(1e-6));
+    const int most_missing = usual ? 0 : Size;
+    // Room for two more samples that are missing.
+    const S growth = S(1.0) + start_inflation_;
+    const S room = usual ? S(1.0) : S(growth * growth);
+    for (int missing = 0; missing <= most_missing; ++missing) {
+      RiccatiGain run = *this;
+      run.mode_ = RiccatiMode::recursive;
+      run.reset();
+      for (int k = 0; k < 8 * Size; ++k) {
+        if (!run.fits(room)) return false;
+        for (int i = 0; i < missing; ++i) run.advance();
+        if (!run.fits(room)) return false;
+        run.advance();
+        run.accept(S(0.0));
+      }
+      for (int k = 0; k < 2 * most_missing; ++k) {
+        run.advance();
+        if (!run.fits(room)) return false;
+      }
+    }
+    return true;
+  }
+
+  /// k of the coming correction, scaled, whatever the innovation.
+  /// @{
+  [[nodiscard]] constexpr const Gain& gain(const S&) const noexcept { return now_.gain; }
+  [[nodiscard]] constexpr const Gain& gain_before_measurement() const noexcept { return now_.gain; }
+  /// @}
+
+  /// One sample ahead, from the corrected covariance if there was a correction.
+  ESOKIT_INLINE constexpr void advance() noexcept {
+    if (rests()) [[likely]] {
+      note(standing);
+      if constexpr (TableSize > 0) {
+        if (place_ <= TableSize) next_of_table();
+      }
+      return;
+    }
+    recur();
+  }
+
+  /// The correction was carried out; the next `advance` goes on from the corrected covariance.
+  ESOKIT_INLINE constexpr void accept(const S&) noexcept {
+    since_ = static_cast<std::int8_t>(since_ | corrected);
+  }
+
+  /// True if the next `advance` has nothing to work out: the gain stands, and no sample is missing.
+  [[nodiscard]] ESOKIT_INLINE constexpr bool rests() const noexcept {
+    return (since_ & ~watched) > standing;
+  }
+
+  /// The same, and nobody wants to look at the measurement first: one test for both.
+  [[nodiscard]] ESOKIT_INLINE constexpr bool rests_unwatched() const noexcept {
+    return since_ > standing;
+  }
+
+  /// The observer looks at every measurement before it is used (an outlier gate).
+  constexpr void watch(bool on) noexcept {
+    since_ = static_cast<std::int8_t>((since_ & ~watched) | (on ? watched : 0));
+  }
+  /// What `watch` was told last.
+  [[nodiscard]] constexpr bool is_watched() const noexcept { return since_ < 0; }
+
+  /// Begins anew: from P0, or with the limit.
+  constexpr void reset() noexcept {
+    note(mode_ != RiccatiMode::recursive ? standing | nothing_yet : 0);
+    place_ = mode_ == RiccatiMode::start_table ? 0 : TableSize + 1;
+    current_measurement_ = measurement_;
+    if (mode_ == RiccatiMode::frozen) {
+      now_ = limit_;
+    } else {
+      now_.factor = start_;
+      set_inflation(start_inflation_);
+      set_gain();
+    }
+  }
+
+  /// Another variance of the noise, for the coming correction alone. @param variance R, unit of y
+  /// squared, not negative
+  constexpr void set_measurement_variance(const S& variance) noexcept {
+    note(since_ & (corrected | gapped));
+    // No sum with it may overflow, in the unit of y squared neither; so large it says nothing of y.
+    const S most = S(1.0) / (S(16.0) * detail::smallest_normal<S>());
+    const S held = select(variance < most, variance, most) / unit_;
+    current_measurement_ = select(held < most, held, most);
+    set_gain();
+  }
+
+  /// R, unit of y squared, to a rounding.
+  [[nodiscard]] constexpr S measurement_variance() const noexcept { return measurement_ * unit_; }
+
+  /// Goes on from the covariance of a law with other settings. @param time_ratio T_new / T_old
+  /// @return false if that covariance is not one that the scalar holds in this law's unit
+  bool continue_from(const RiccatiGain& other, const S& time_ratio) noexcept {
+    // From one limit to the next.
+    if (mode_ == RiccatiMode::frozen && other.stands()) return true;
+    now_.factor = other.now_.factor;
+    now_.factor.rescale(time_ratio, S(other.unit_ / unit_), transition_);
+    if (rule_ == InflationRule::adaptive) set_inflation(other.now_.inflation);
+    set_gain();
+    note(other.since_ & corrected);
+    if ((since_ & corrected) != 0) {
+      now_.share = other.now_.share;
+      now_.rest = other.now_.rest;
+    }
+    for (int i = 0; i < Size; ++i) {
+      if (!all(is_finite(now_.gain[index(i)])) ||
+          !all(now_.factor.variance(i) < detail::largest_variance<S>()) ||
+          !all(is_finite(now_.factor.variance(i)))) {
+        return false;
+      }
+    }
+    return true;
+  }
+
+  /// Bound of the covariance of the present estimate's error, N x N, scaled: of the prediction
+  /// after `advance`, of the correction after `accept`.
+  [[nodiscard]] Matrix<S, Size, Size> covariance() const noexcept {
+    Factor factor = now_.factor;
+    if ((since_ & corrected) != 0) {
+      // (I - k C) P- (I - k C)' + k R k'. The recursion goes on with R/(1+theta) in place of R, as
+      // its inflation is not meant for the noise.
+      factor.set_variance(0, S(factor.variance(0) * now_.rest * now_.rest +
+                               now_.share * now_.share * current_measurement_));
+    }
+    return factor.matrix() * unit_;
+  }
+
+  /// C P- C' + R of the last prediction, unit of y squared: what the square of the innovation is
+  /// measured by.
+  [[nodiscard]] constexpr S innovation_variance() const noexcept {
+    return (now_.factor.variance(0) + current_measurement_) * unit_;
+  }
+
+  /// P- of the last prediction, scaled and divided by the unit.
+  [[nodiscard]] constexpr const Factor& covariance_factor() const noexcept { return now_.factor; }
+
+  /// theta, as the present gain is made with it.
+  [[nodiscard]] constexpr const S& inflation() const noexcept { return now_.inflation; }
+
+  /// True while the recursion rests: the gain is the limit, or out of the table.
+  [[nodiscard]] constexpr bool stands() const noexcept { return (since_ & standing) != 0; }
+
+  /// The limit gain of the frozen modes, and the last gain of the table.
+  /// @{
+  [[nodiscard]] constexpr const Gain& limit_gain() const noexcept { return limit_.gain; }
+  [[nodiscard]] constexpr const Gain& last_table_gain() const noexcept requires(TableSize > 0) {
+    return table_.back().gain;
+  }
+  /// @}
+
+ private:
+  // Bits of `since_`: what happened since the last `advance`, and whether the gain stands.
+  // Together, so that a frozen filter has one test to make.
+  static constexpr int corrected = 1;
+  static constexpr int nothing_yet = 2;  ///< after a reset with a standing gain
+  static constexpr int gapped = 4;       ///< no correction before the last `advance` either
+  static constexpr int standing = 8;     ///< above the others: see `rests`
+  static constexpr int watched = -128;   ///< the sign: see `rests_unwatched`
+
+  ESOKIT_INLINE constexpr void note(int bits) noexcept {
+    since_ = static_cast<std::int8_t>((since_ & watched) | bits);
+  }
+
+  /// A gain and the covariance that it belongs to.
+  struct Point {
+    Gain gain{};
+    Factor factor{};  ///< P-
+    S share{};        ///< k_1 = C P- C' / s
+    S rest{1.0};      ///< 1 - k_1
+    S inflation{};    ///< theta
+    S growth{1.0};    ///< 1 + theta
+    S shrink{1.0};    ///< 1 / (1 + theta)
+  };
+
+  static constexpr std::size_t index(int i) noexcept { return static_cast<std::size_t>(i); }
+
+  /// Gain and covariance times `room` are numbers.
+  [[nodiscard]] bool fits(const S& room) const noexcept {
+    for (int i = 0; i < Size; ++i) {
+      if (!all(is_finite(now_.gain[index(i)])) ||
+          !all(is_finite(S(now_.factor.variance(i) * room)))) {
+        return false;
+      }
+    }
+    return true;
+  }
+
+  /// P- / R above which a measurement tells all there is to know of y. A gap lets P- grow no
+  /// further but along the chain: more would only cost the digits in which the states differ.
+  static constexpr S ceiling() noexcept { return S(1.0) / detail::rounding<S>(); }
+
+  /// Exact measurements of a state that is known exactly: the recursion has a fixed point at which
+  /// the estimate inverts the chain, and diverges (n = 3: by 3.7 a sample). It is not a stable one,
+  /// and rounding leaves it, but not where nothing is rounded.
+  void leave_exact_start() noexcept {
+    const S least = detail::rounding<S>();  // without R the unit is the largest variance
+    for (int i = 0; i < Size; ++i) {
+      if (!all(start_.variance(i) > least)) start_.set_variance(i, least);
+    }
+  }
+
+  [[gnu::noinline]] constexpr void recur() noexcept {
+    const bool had_correction = (since_ & corrected) != 0;
+    const bool in_gap = since_ == gapped || since_ == (gapped | watched);
+    note(had_correction ? 0 : gapped);
+    if (in_gap && !all(now_.factor.variance(0) < ceiling())) [[unlikely]] {
+      now_.factor.template advance<true>(S(1.0), Factor{}, transition_);
+      // Without noise it still grows as samples^(2N-2), until the scalar cannot hold it. The gain
+      // is that of exact measurements by now, which a factor common to all variances does not
+      // alter.
+      const S most = S(1024.0) * ceiling();
+      const S variance = now_.factor.variance(0);
+      if (!all(variance < most))
+        now_.factor.scale(select(variance < most, S(1.0), S(most / variance)));
+    } else if (rule_ == InflationRule::adaptive) [[unlikely]] {
+      recur_adaptively(had_correction);
+    } else {
+      if (had_correction) [[likely]] {
+        now_.factor.set_variance(0, S(now_.factor.variance(0) * now_.rest));
+      }
+      advance_factor(noise_);
+    }
+    current_measurement_ = measurement_;
+    set_gain();
+    if (mode_ != RiccatiMode::recursive) [[unlikely]]
+      stand_if_close();
+  }
+
+  /// theta^2 = tr W Q / tr W (A + K C) P- (A + K C)'. The gain of this sample was made with the
+  /// theta before: the two depend on each other, and the bound holds for any gain.
+  ESOKIT_COLD constexpr void recur_adaptively(bool had_correction) noexcept {
+    using std::sqrt;
+    const S before = now_.factor.variance(0);
+    if (had_correction) now_.factor.set_variance(0, S(before * now_.rest * now_.rest));
+    const S trace = now_.factor.transported_trace(trace_weights_, transition_);
+    // Bounded: P- = 0 asks for an infinite theta, a P- that grows without bound for zero.
+    const S most = S(1e3);
+    const S least = S(1e-6);
+    const auto some = trace > S(0.0);
+    S theta = sqrt(S(noise_trace_ / select(some, trace, S(1.0))));
+    theta = select(some, theta, most);
+    theta = select(theta < most, theta, most);
+    theta = select(theta > least, theta, least);
+    set_inflation(theta);
+    if (had_correction) {
+      const S spread = now_.share * now_.share * (current_measurement_ * now_.shrink);
+      now_.factor.set_variance(0, S(now_.factor.variance(0) + spread));
+    }
+    Factor noise = noise_;
+    noise.scale(S(now_.growth / theta));
+    advance_factor(noise);
+  }
+
+  ESOKIT_INLINE constexpr void advance_factor(const Factor& noise) noexcept {
+    if (diagonal_noise_) [[likely]] {
+      now_.factor.template advance<true>(now_.growth, noise, transition_);
+    } else {
+      now_.factor.template advance<false>(now_.growth, noise, transition_);
+    }
+  }
+
+  constexpr void set_inflation(const S& theta) noexcept {
+    now_.inflation = theta;
+    now_.growth = S(1.0) + theta;
+    now_.shrink = S(1.0) / now_.growth;
+  }
+
+  ESOKIT_INLINE constexpr void set_gain() noexcept {
+    const S noise = current_measurement_ * now_.shrink;
+    const S variance = now_.factor.variance(0);
+    const S sum = variance + noise;
+    // P- and R both zero: the prediction is exact, there is nothing to correct. Below the normal
+    // numbers the inverse would overflow.
+    if constexpr (PlainScalar<S>) {
+      const bool some = sum >= detail::smallest_normal<S>();
+      const S inverse = S(1.0) / (some ? sum : S(1.0));
+      now_.share = variance * inverse;
+      now_.rest = some ? noise * inverse : S(1.0);
+    } else {
+      const auto some = sum >= detail::smallest_normal<S>();
+      const S inverse = S(1.0) / select(some, sum, S(1.0));
+      now_.share = variance * inverse;
+      now_.rest = select(some, S(noise * inverse), S(1.0));
+    }
+    now_.gain = now_.factor.gain(now_.share);
+  }
+
+  /// Back to the limit, once the covariance differs by less than a thousandth. Not once the gain
+  /// does: a nearly deadbeat gain says little about the covariance, and what a filter believes of
+  /// it decides whether recurring gaps are stable.
+  ESOKIT_COLD constexpr void stand_if_close() noexcept {
+    if (!now_.factor.near(limit_.factor, S(1e-3))) return;
+    note(standing);
+    place_ = TableSize + 1;
+    now_ = limit_;
+  }
+
+  constexpr void next_of_table() noexcept {
+    now_ = place_ < TableSize ? table_[place_] : limit_;
+    ++place_;
+  }
+
+  [[nodiscard]] std::optional<Point> find_limit() const {
+    RiccatiGain run = *this;
+    run.mode_ = RiccatiMode::recursive;
+    run.reset();
+    // theta and the limit that it leads to depend on each other: repeated until they agree.
+    const bool adaptive = rule_ == InflationRule::adaptive;
+    const int rounds = adaptive ? 500 : 1;
+    S theta(1.0);
+    for (int round = 0; round < rounds; ++round) {
+      Factor noise = noise_;
+      if (adaptive) {
+        run.set_inflation(theta);
+        noise.scale(S(run.now_.growth / theta));
+      }
+      const auto factor = steady_covariance<Size, S>(noise, S(measurement_ * run.now_.shrink),
+                                                     run.now_.growth, transition_);
+      if (!factor) return std::nullopt;
+      run.now_.factor = *factor;
+      run.set_gain();
+      for (const S& k : run.now_.gain) {
+        if (!all(is_finite(k))) return std::nullopt;
+      }
+      if (std::is_same_v<Transition, PascalTransition> && rule_ == InflationRule::fixed &&
+          !all(noise_trace_ > S(0.0))) {
+        // Nothing disturbs the plant: all poles at 1/(1+theta), known exactly.
+        const EqualSampledPoles<Size, S> poles{run.now_.inflation * run.now_.shrink};
+        run.now_.gain = current_gain<Size, S>(poles.weights());
+      }
+      if (!adaptive) return run.now_;
+      RiccatiGain next = run;
+      next.accept(S(0.0));
+      next.recur();
+      const S change = detail::absolute(S(next.inflation() - theta));
+      if (all(change <= S(1e3) * detail::rounding<S>() * theta)) return run.now_;
+      theta = next.inflation();
+    }
+    return std::nullopt;
+  }
+
+  // What a step touches comes first.
+  Point now_{};
+  std::int8_t since_ = 0;
+  RiccatiMode mode_ = RiccatiMode::recursive;
+  std::uint16_t place_ = 0;  ///< next one of the table; one past the limit: done
+  S current_measurement_{};  ///< R of the coming correction
+
+  [[no_unique_address]] Transition transition_;
+  S measurement_;
+  Factor start_;
+  Factor noise_;  ///< Q, for the fixed rule times (1+theta)/theta
+  S start_inflation_{};
+  S unit_;
+  S noise_trace_{};
+  Array<S, Size> trace_weights_;
+  InflationRule rule_;
+  bool diagonal_noise_;
+  Point limit_{};
+  Array<Point, TableSize> table_{};
+};
+
+/// Told apart in snapshots.
+template <int Size, Scalar S, int TableSize, class Transition>
+inline constexpr std::uint32_t type_tag<RiccatiGain<Size, S, TableSize, Transition>> =
+    make_type_tag<S>("RiccatiGain", Size, TableSize);
+
+}  // namespace esokit

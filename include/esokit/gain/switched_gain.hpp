@@ -1,0 +1,164 @@
+/// @file
+/// The switched gain law: two constant gain sets, chosen at each sample by whether the innovation
+/// shrinks.
+#pragma once
+
+#include <cmath>
+#include <esokit/core/type_tag.hpp>
+#include <esokit/gain/constant_gain.hpp>
+#include <limits>
+
+namespace esokit {
+
+/// What "the error shrinks" means. The equation of the ABESO paper prints the sign of the error's
+/// derivative; its text, and what improves on the linear observer, is that of its magnitude.
+enum class SignReading : unsigned char {
+  magnitude,  ///< |e| is smaller than at the sample before: the working one
+  printed,    ///< xhat_1 - y is smaller than at the sample before, whatever its sign
+};
+
+namespace detail {
+
+/// The number whose fall counts as shrinking.
+template <Scalar S>
+[[nodiscard]] ESOKIT_INLINE constexpr S watched(SignReading reading, const S& e) noexcept {
+  if (reading == SignReading::printed) return -e;
+  if constexpr (PlainScalar<S>) {
+    return (std::abs)(e);
+  } else {
+    return absolute(e);
+  }
+}
+
+/// What no innovation falls below: the next one counts as not shrinking.
+template <Scalar S>
+[[nodiscard]] constexpr S nothing_watched(SignReading reading) noexcept {
+  using Limits = std::numeric_limits<TableScalar<S>>;
+  return reading == SignReading::printed ? S(Limits::lowest()) : S(0.0);
+}
+
+}  // namespace detail
+
+/// Gain law of AdjustableBandwidthEso: gain set `shrinking` while the innovation shrinks, else
+/// `otherwise`. The first innovation counts as not shrinking.
+///
+/// After a gap the comparison with the innovation before it means nothing: the gap gain of
+/// `otherwise` is used.
+template <int Size, Scalar S, class Placement = EqualPoles,
+          SignReading Reading = SignReading::magnitude>
+class SwitchedGain {
+ public:
+  using Set = ConstantGain<Size, S, Placement>;  ///< one of the two gain sets
+  template <class T>
+  using with_scalar = SwitchedGain<Size, T, Placement, Reading>;  ///< the same of another scalar
+
+  /// What it does beside `gain`. A NaN compares as not shrinking, so that any innovation is safe to
+  /// ask with.
+  static constexpr GainLawTraits traits{.kind = GainKind::switched,
+                                        .accepts = true,
+                                        .resets = true,
+                                        .bridges_gaps = true,
+                                        .bears_any_innovation = true};
+
+  /// @param shrinking in force while the innovation shrinks @param otherwise else
+  constexpr SwitchedGain(const Set& shrinking, const Set& otherwise) noexcept
+      : sets_{otherwise, shrinking} {}
+
+  /// k for an innovation, scaled.
+  //
+  // Whether an innovation shrinks is as good as random: a branch on it would cost more than the
+  // rest of the update. One lane picks its set by address, a pack element by element.
+  [[nodiscard]] ESOKIT_INLINE constexpr decltype(auto) gain(const S& e) const noexcept {
+    const auto is_shrinking = shrinks(e);
+    if constexpr (PlainScalar<S>) {
+      return sets_[static_cast<std::size_t>(is_shrinking)].gain(e);
+    } else {
+      ScaledGain<Size, S> chosen;
+      detail::unroll<Size>([&](auto r) ESOKIT_INLINE_LAMBDA {
+        std::get<r>(chosen) =
+            select(is_shrinking, std::get<r>(shrinking_gain()), std::get<r>(otherwise_gain()));
+      });
+      return chosen;
+    }
+  }
+
+  /// That of `otherwise` for the whole gap.
+  [[nodiscard]] ScaledGain<Size, S> gap_gain(const S& e, unsigned samples) const noexcept {
+    return sets_[0].gap_gain(e, samples);
+  }
+
+  /// The correction was carried out: e is what the next innovation is compared with.
+  ESOKIT_INLINE constexpr void accept(const S& e) noexcept {
+    previous_ = detail::watched(Reading, e);
+  }
+
+  /// The next innovation counts as not shrinking.
+  constexpr void reset() noexcept { previous_ = detail::nothing_watched<S>(Reading); }
+
+  /// Takes over what another law of this kind remembers.
+  constexpr void continue_from(const SwitchedGain& other) noexcept { previous_ = other.previous_; }
+
+  /// True (per lane) if gain(e) is `shrinking_gain`, else it is `otherwise_gain`.
+  [[nodiscard]] ESOKIT_INLINE constexpr auto shrinks(const S& e) const noexcept {
+    return detail::watched(Reading, e) < previous_;
+  }
+
+  /// The two gain sets, scaled.
+  /// @{
+  [[nodiscard]] constexpr const ScaledGain<Size, S>& shrinking_gain() const noexcept {
+    return sets_[1].gain_before_measurement();
+  }
+  [[nodiscard]] constexpr const ScaledGain<Size, S>& otherwise_gain() const noexcept {
+    return sets_[0].gain_before_measurement();
+  }
+  /// @}
+
+ private:
+  friend struct detail::LaneAccess;
+  static constexpr auto fields(auto& o) noexcept { return std::tie(o.sets_, o.previous_); }
+
+  Array<Set, 2> sets_;  ///< otherwise, shrinking
+  S previous_ = detail::nothing_watched<S>(Reading);
+};
+
+/// Told apart in snapshots.
+template <int Size, Scalar S, class Placement, SignReading Reading>
+inline constexpr std::uint32_t type_tag<SwitchedGain<Size, S, Placement, Reading>> =
+    make_type_tag<S, Placement>("SwitchedGain", Size, Reading);
+
+/// The same for a continuous observer; the mode changes at step boundaries only.
+template <int Size, Scalar S>
+class ContinuousSwitchedGain {
+ public:
+  static constexpr ContinuousGainLawTraits traits{.begins_steps =
+                                                      true};  ///< what it does beside `gain`
+
+  /// @param shrinking, otherwise l, N x 1, row i in 1/s^(i+1)
+  ContinuousSwitchedGain(const Vector<S, Size>& shrinking, const Vector<S, Size>& otherwise,
+                         SignReading reading = SignReading::magnitude)
+      : shrinking_(shrinking),
+        otherwise_(otherwise),
+        previous_(detail::nothing_watched<S>(reading)),
+        reading_(reading) {}
+
+  /// Compares e with that of the step before, and chooses the gain set of this step.
+  void begin_step(const S&, const S& e) noexcept {
+    const S now = detail::watched(reading_, e);
+    is_shrinking_ = all(now < previous_);
+    previous_ = now;
+  }
+
+  /// l, N x 1, row i in 1/s^(i+1); the same over a whole step.
+  [[nodiscard]] const Vector<S, Size>& gain(const S&, const S&) const noexcept {
+    return is_shrinking_ ? shrinking_ : otherwise_;
+  }
+
+ private:
+  Vector<S, Size> shrinking_;
+  Vector<S, Size> otherwise_;
+  S previous_;
+  SignReading reading_;
+  bool is_shrinking_ = false;
+};
+
+}  // namespace esokit

@@ -1,0 +1,168 @@
+/// @file
+/// Certificates for observers that change between two gain sets.
+///
+/// The errors of two gain sets on one chain have closed loops A_1, A_2 that differ by rank one.
+/// They share a quadratic Lyapunov function, and so stay stable under any switching and any
+/// blending, iff both are stable and A_2 A_1 has no negative real eigenvalue (H. Lin, P. J.
+/// Antsaklis, IEEE Transactions on Automatic Control 54 (2009) 308-322). det(A_2 A_1 + x I) is, up
+/// to its sign, the polynomial Re[p_2(jw) p_1(-jw)] in x = w^2, p_i the characteristic polynomials:
+/// an eigenvalue -x is a root x > 0 of it. So the eigenvalue test is a test for positivity, which
+/// needs no eigenvalue solver. Sampled pairs are tested after the bilinear map.
+#pragma once
+
+#include <cmath>
+#include <esokit/gain/error_polynomial.hpp>
+#include <esokit/gain/placement.hpp>
+#include <esokit/math/positivity.hpp>
+#include <limits>
+#include <numbers>
+
+namespace esokit {
+
+namespace detail {
+
+/// sin(x) for |x| <= pi, at compile time.
+constexpr double constexpr_sine(double x) noexcept {
+  double term = x;
+  double sum = 0.0;
+  for (int i = 1; i < 40; i += 2) {
+    sum += term;
+    term *= -x * x / ((i + 1) * (i + 2));
+  }
+  return sum;
+}
+
+/// Smallest spacing of the scalar's numbers around one.
+template <Scalar S>
+constexpr double unit_rounding() noexcept {
+  return static_cast<double>(std::numeric_limits<TableScalar<S>>::epsilon());
+}
+
+/// Re[p(jw) q(-jw)] > 0 for every w, by a little more than what rounding may hide.
+template <int Size, Scalar S>
+bool same_half_plane(const ErrorPolynomial<Size, S>& p, const ErrorPolynomial<Size, S>& q) {
+  const S margin = constant<S>(8.0 * Size * unit_rounding<S>());
+  Array<S, Size + 1> product{};
+  for (S& c : product) c = S(0.0);
+  for (std::size_t a = 0; a <= Size; ++a) {
+    for (std::size_t b = a % 2; b <= Size; b += 2) {
+      const S term = p[a] * q[b];
+      // j^a (-j)^b = j^(a-b), a - b even.
+      const std::size_t power = (a + b) / 2;
+      const bool positive = (a + 3 * b) % 4 == 0;
+      const S signed_term = positive ? term : S(-term);
+      product[power] = product[power] + signed_term - margin * absolute(term);
+    }
+  }
+  return positive_on_half_line<Size, S>(product);
+}
+
+template <int Size, Scalar S, class Gain>
+bool certified_pair(const Gain& first, const Gain& second) {
+  const S unit = S(0.5) * (frequency_scale<Size, S>(first) + frequency_scale<Size, S>(second));
+  if (!all(is_finite(unit)) || !all(unit > S(0.0))) return false;
+  const auto p = error_polynomial<Size, S>(first, unit);
+  const auto q = error_polynomial<Size, S>(second, unit);
+  // Positive all along the axis, the two have as many roots to its right: one test tells of both.
+  return is_hurwitz<Size, S>(p) && same_half_plane<Size, S>(p, q);
+}
+
+}  // namespace detail
+
+/// Whether the errors of two continuous gain sets share a quadratic Lyapunov function. Then every
+/// l(t) on the segment between them is stable, however it varies.
+/// @param first, second l, N x 1, row i in 1/s^(i+1)
+template <int Size, Scalar S>
+[[nodiscard]] bool switching_certified(const Vector<S, Size>& first,
+                                       const Vector<S, Size>& second) {
+  return detail::certified_pair<Size, S>(first, second);
+}
+
+/// The same for two gain sets of one sampled observer.
+/// @param first, second scaled current-estimator gains
+template <int Size, Scalar S>
+[[nodiscard]] bool switching_certified(const ScaledGain<Size, S>& first,
+                                       const ScaledGain<Size, S>& second) {
+  return detail::certified_pair<Size, S>(first, second);
+}
+
+/// tan^2(pi (N-1) / (4N)): two continuous gain sets with all poles at -w and at -rho w, rho < 1,
+/// share a quadratic Lyapunov function iff rho is above it. 0.1716, 0.3333, 0.4465, 0.5279 for N =
+/// 2 .. 5.
+template <int Size>
+constexpr double least_bandwidth_ratio() noexcept {
+  // tan^2(pi/4 - x/2) = (1 - sin x) / (1 + sin x)
+  const double sine = detail::constexpr_sine(std::numbers::pi / (2 * Size));
+  return (1.0 - sine) / (1.0 + sine);
+}
+
+/// What takes the place of the bandwidth ratio for sampled gain sets with equal poles:
+/// tanh(w_1 T/2) / tanh(w_2 T/2), to be compared with least_bandwidth_ratio.
+template <int Size, Scalar S>
+S sampled_bandwidth_ratio(const EqualSampledPoles<Size, S>& first,
+                          const EqualSampledPoles<Size, S>& second) {
+  // tanh(w T/2) = (1 - rho) / (1 + rho) = a / (2 - a).
+  return first.contraction * (S(2.0) - second.contraction) /
+         (second.contraction * (S(2.0) - first.contraction));
+}
+
+/// Which two bandwidths an observer switches between.
+enum class SwitchingRule : unsigned char {
+  abeso,  ///< rho w while the innovation shrinks, w otherwise
+  beso,   ///< rho w while the innovation shrinks, w / rho otherwise
+};
+
+/// Whether the two bandwidths of a rule are certified: the closed form for poles in one place.
+/// @param sample_time T, s; 0 for a continuous observer
+template <int Size, Scalar S>
+[[nodiscard]] bool bandwidth_switching_certified(SwitchingRule rule, const S& bandwidth,
+                                                 const S& ratio, const S& sample_time) {
+  const S shrinking = bandwidth * ratio;
+  const S otherwise = rule == SwitchingRule::beso ? S(bandwidth / ratio) : bandwidth;
+  S quotient = shrinking / otherwise;
+  if (all(sample_time > S(0.0))) {
+    using Poles = EqualSampledPoles<Size, S>;
+    quotient = sampled_bandwidth_ratio(Poles::from_bandwidth(shrinking, sample_time),
+                                       Poles::from_bandwidth(otherwise, sample_time));
+  }
+  constexpr double least = least_bandwidth_ratio<Size>();
+  const S limit = detail::constant<S>(least * (1.0 + 16.0 * detail::unit_rounding<S>()));
+  return all(is_finite(quotient)) && all(quotient > limit) && all(S(1.0) / quotient > limit);
+}
+
+/// The end of the certified range of rho on the side of `ratio`: below 1 the least, above 1 the
+/// largest (infinite where every rho > 1 is certified). Closed form for the ABESO, bisection for
+/// the BESO.
+/// @param sample_time T, s; 0 for a continuous observer
+template <int Size, PlainScalar S>
+[[nodiscard]] S certified_ratio_limit(SwitchingRule rule, const S& bandwidth, const S& ratio,
+                                      const S& sample_time) {
+  const S least = static_cast<S>(least_bandwidth_ratio<Size>());
+  const bool above = ratio > S(1);
+  const S x = bandwidth * sample_time;
+  if (!(x > S(0))) {
+    const S end = rule == SwitchingRule::beso ? std::sqrt(least) : least;
+    return above ? S(1) / end : end;
+  }
+  if (rule == SwitchingRule::abeso) {
+    const S here = std::tanh(x / S(2));
+    const S t = above ? here / least : here * least;
+    if (!(t < S(1))) return std::numeric_limits<S>::infinity();
+    return std::log1p(S(2) * t / (S(1) - t)) / x;
+  }
+  // rho and 1 / rho change roles: the range is symmetric in the logarithm.
+  S low = least;  // less strict when sampled than sqrt(least) in continuous time, down to zero
+  S high = S(1);
+  while (low > (std::numeric_limits<S>::min)() * S(1e6) &&
+         bandwidth_switching_certified<Size, S>(rule, bandwidth, low, sample_time)) {
+    low = low * low;
+  }
+  for (int i = 0; i < std::numeric_limits<S>::digits + 8; ++i) {
+    const S middle = S(0.5) * (low + high);
+    (bandwidth_switching_certified<Size, S>(rule, bandwidth, middle, sample_time) ? high : low) =
+        middle;
+  }
+  return above ? S(1) / high : high;
+}
+
+}  // namespace esokit

@@ -1,0 +1,199 @@
+// CovarianceFactor: factors, the two updates against dense matrices, and what float makes of them.
+#include <gtest/gtest.h>
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <esokit/eigen.hpp>
+#include <esokit/gain/covariance_factor.hpp>
+#include <limits>
+#include <support/numbers.hpp>
+
+namespace esokit_test {
+
+using esokit::CovarianceFactor;
+
+template <int N>
+Eigen::Matrix<double, N, N> random_covariance(Random& random, int rank = N) {
+  Eigen::Matrix<double, N, N> p = Eigen::Matrix<double, N, N>::Zero();
+  for (int k = 0; k < rank; ++k) {
+    Eigen::Matrix<double, N, 1> v;
+    for (int i = 0; i < N; ++i) v(i) = random.uniform(-1, 1) * std::pow(10.0, -i);
+    p += v * v.transpose();
+  }
+  return p;
+}
+
+template <int N>
+Eigen::Matrix<double, N, N> pascal() {
+  Eigen::Matrix<double, N, N> phi = Eigen::Matrix<double, N, N>::Zero();
+  for (int i = 0; i < N; ++i) {
+    for (int j = i; j < N; ++j) phi(i, j) = choose(j, i);
+  }
+  return phi;
+}
+
+/// Largest difference of correlations: the states differ by orders of magnitude.
+template <class A, class B>
+double distance(const A& a, const B& b) {
+  double worst = 0;
+  for (int i = 0; i < a.rows(); ++i) {
+    for (int j = 0; j < a.cols(); ++j) {
+      worst = std::max(worst, std::abs(a(i, j) - b(i, j)) / std::sqrt(b(i, i) * b(j, j)));
+    }
+  }
+  return worst;
+}
+
+template <int N>
+void updates_equal_dense() {
+  Random random(3);
+  constexpr double unit = 200 * N * std::numeric_limits<double>::epsilon();
+  for (int run = 0; run < 50; ++run) {
+    const auto p = random_covariance<N>(random);
+    const bool diagonal = run % 2 == 0;
+    Eigen::Matrix<double, N, N> q = random_covariance<N>(random);
+    if (diagonal) q = q.diagonal().asDiagonal();
+    auto factor = CovarianceFactor<N, double>::from_matrix(p).value();
+    const auto noise = CovarianceFactor<N, double>::from_matrix(q).value();
+    EXPECT_EQ(noise.diagonal(), diagonal);
+    EXPECT_LE(distance(factor.matrix(), p), unit);
+
+    const double r = random.log_uniform(1e-4, 1);
+    const Eigen::Matrix<double, N, 1> gain = p.col(0) / (p(0, 0) + r);
+    const double share = factor.variance(0) / (factor.variance(0) + r);
+    const auto k = factor.gain(share);
+    for (int i = 0; i < N; ++i) {
+      EXPECT_NEAR(k[static_cast<std::size_t>(i)], gain(i), unit * std::abs(gain(i)) + unit * 1e-9);
+    }
+    factor.set_variance(0, share * r);
+    const Eigen::Matrix<double, N, N> corrected = p - gain * p.row(0);
+    const auto measured = factor.matrix();
+    for (int i = 0; i < N; ++i) {
+      for (int j = 0; j < N; ++j) {
+        EXPECT_NEAR(measured(i, j), corrected(i, j), 10 * unit * std::sqrt(p(i, i) * p(j, j)));
+      }
+    }
+
+    const double inflation = random.uniform(1, 2);
+    Eigen::Matrix<double, N, N> ahead = pascal<N>() * measured * pascal<N>().transpose();
+    ahead = ahead * inflation + q;
+    auto other = factor;
+    factor.template advance<false>(inflation, noise);
+    EXPECT_LE(distance(factor.matrix(), ahead), unit);
+    if (diagonal) {
+      other.template advance<true>(inflation, noise);
+      EXPECT_LE(distance(other.matrix(), ahead), unit);
+    }
+
+    esokit::Array<double, N> weights;
+    double trace = 0;
+    const Eigen::Matrix<double, N, N> moved = pascal<N>() * ahead * pascal<N>().transpose();
+    for (int i = 0; i < N; ++i) {
+      weights[static_cast<std::size_t>(i)] = random.uniform(0.1, 3);
+      trace += weights[static_cast<std::size_t>(i)] * moved(i, i);
+    }
+    EXPECT_NEAR(factor.transported_trace(weights), trace, unit * trace);
+  }
+}
+
+TEST(CovarianceFactor, updates_equal_dense_matrices) {
+  updates_equal_dense<2>();
+  updates_equal_dense<3>();
+  updates_equal_dense<4>();
+  updates_equal_dense<6>();  // not unrolled
+}
+
+TEST(CovarianceFactor, takes_semidefinite_matrices) {
+  Random random(5);
+  for (int rank = 0; rank <= 4; ++rank) {
+    const auto p = random_covariance<4>(random, rank);
+    const auto factor = CovarianceFactor<4, double>::from_matrix(p);
+    ASSERT_TRUE(factor.has_value()) << rank;
+    EXPECT_TRUE(eigen(factor->matrix() - p).cwiseAbs().maxCoeff() <= 1e-14) << rank;
+    for (int i = 0; i < 4; ++i) EXPECT_GE(factor->variance(i), 0);
+  }
+}
+
+/// Nearly singular matrices, rounded to float: what is lost is within the rounding.
+TEST(CovarianceFactor, takes_nearly_singular_matrices_of_float) {
+  Random random(6);
+  for (int run = 0; run < 2000; ++run) {
+    const double least = random.log_uniform(1e-9, 1e-3);
+    Eigen::Matrix4d p = random_covariance<4>(random, 1 + run % 3);
+    p.diagonal() *= 1 + least;
+    const Eigen::Matrix4f rounded = p.cast<float>();
+    const auto factor = CovarianceFactor<4, float>::from_matrix(rounded);
+    ASSERT_TRUE(factor.has_value()) << run;
+    const Eigen::Matrix4d back = eigen(factor->matrix()).cast<double>();
+    EXPECT_LE(distance(back, p), 100 * 1.2e-7) << run;
+  }
+}
+
+TEST(CovarianceFactor, refuses_indefinite_matrices) {
+  Eigen::Matrix3d p = Eigen::Matrix3d::Identity();
+  p(1, 0) = p(0, 1) = 1.001;
+  EXPECT_FALSE((CovarianceFactor<3, double>::from_matrix(p)));
+  p = Eigen::Matrix3d::Identity();
+  p(2, 2) = -1e-9;
+  EXPECT_FALSE((CovarianceFactor<3, double>::from_matrix(p)));
+  p = Eigen::Matrix3d::Zero();
+  p(1, 1) = 1;
+  p(1, 0) = p(0, 1) = 1e-3;  // correlated with a state that has no variance
+  EXPECT_FALSE((CovarianceFactor<3, double>::from_matrix(p)));
+  p = Eigen::Matrix3d::Identity();
+  p(1, 0) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE((CovarianceFactor<3, double>::from_matrix(p)));
+}
+
+TEST(CovarianceFactor, rescales_units) {
+  Random random(7);
+  const auto p = random_covariance<3>(random);
+  auto factor = CovarianceFactor<3, double>::from_matrix(p).value();
+  factor.rescale(0.1, 5);
+  Eigen::Vector3d units(1, 0.1, 0.01);
+  const Eigen::Matrix3d expected = 5 * units.asDiagonal() * p * units.asDiagonal();
+  EXPECT_LE(distance(factor.matrix(), expected), 1e-13);
+}
+
+/// A factor in float for which the plain and the Joseph update are known to fail: R = 1e-12,
+/// P0 = 1e8, or both.
+template <int N>
+void stays_definite_in_float(float r, double p0, double theta) {
+  using Factor = CovarianceFactor<N, float>;
+  Factor factor;
+  Factor noise;
+  double unit = 1;
+  for (int i = 0; i < N; ++i) {
+    if (i > 0) unit *= 1e-3 / i;
+    factor.set_variance(i, static_cast<float>(p0 * unit * unit / static_cast<double>(r)));
+    const double q = i + 1 < N ? 0 : 300 * std::pow(1000.0, N - 3);
+    noise.set_variance(i, static_cast<float>(q * q * unit * unit / static_cast<double>(r) *
+                                             (theta > 0 ? (1 + theta) / theta : 1)));
+  }
+  const auto growth = static_cast<float>(1 + theta);
+  const float s = 1 / growth;
+  bool definite = true;
+  for (int k = 0; k < long_run(1'000'000) && definite; ++k) {
+    const float share = factor.variance(0) / (factor.variance(0) + s);
+    factor.set_variance(0, share * s);
+    factor.template advance<true>(growth, noise);
+    for (int i = 0; i < N; ++i) {
+      definite = definite && std::isfinite(factor.variance(i)) && factor.variance(i) > 0;
+    }
+    ASSERT_TRUE(definite) << "N = " << N << ", step " << k;
+  }
+  const auto p = factor.matrix();
+  EXPECT_EQ(p, p.transpose());
+}
+
+TEST(CovarianceFactor, a_million_steps_in_float) {
+  for (const auto& [r, p0] : {std::pair{1e-12f, 1.0}, {1e-12f, 1e8}, {1e-4f, 1e8}}) {
+    stays_definite_in_float<2>(r, p0, 0.5);
+    stays_definite_in_float<3>(r, p0, 0.5);
+    stays_definite_in_float<3>(r, p0, 0);
+    stays_definite_in_float<5>(r, p0, 0.02);
+  }
+}
+
+}  // namespace esokit_test

@@ -1,0 +1,341 @@
+// Sampled gains against a reference of 100 digits, against closed forms, and by what they are for:
+// the poles of the error.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <cstddef>
+#include <esokit/eigen.hpp>
+#include <esokit/gain/continuous_gain.hpp>
+#include <esokit/gain/placement.hpp>
+#include <esokit/gain/pole_set.hpp>
+#include <esokit/gain/sampled_gain.hpp>
+#include <limits>
+#include <support/high_precision.hpp>
+#include <support/numbers.hpp>
+#include <utility>
+#include <vector>
+
+// The references compute in long double on purpose; the library above is still checked.
+#pragma GCC diagnostic ignored "-Wdouble-promotion"
+
+namespace {
+
+using esokit::Array;
+using esokit::current_gain;
+using esokit::EqualSampledPoles;
+using esokit::predictor_gain;
+using esokit::SampledPoleSet;
+using esokit::ScaledGain;
+using esokit_test::Big;
+using esokit_test::Poles;
+using esokit_test::Random;
+using Complex = std::complex<double>;
+
+/// Calls f<N>() for N = 2 .. 12, all sizes of order 1 .. 8 with extension 1 .. 4.
+template <class F>
+void for_all_sizes(F&& f) {
+  [&]<int... I>(std::integer_sequence<int, I...>) {
+    (f(std::integral_constant<int, I + 2>{}), ...);
+  }
+  (std::make_integer_sequence<int, 11>{});
+}
+
+const std::vector<double> omega_t_grid{1e-4, 3e-4, 1e-3, 1e-2, 0.05, 0.1, 0.3, 0.5, 1,
+                                       1.7,  3,    6,    10,   15,   20,  36,  50};
+
+std::vector<Big> reference_polynomial(std::size_t size, double omega_t) {
+  return esokit_test::reference_polynomial(Poles(size, -static_cast<long double>(omega_t)), 1.0L);
+}
+
+/// beta_j = Delta^(j-1) kappa(1) of a gain, in 100 digits.
+std::vector<Big> polynomial_of(const std::vector<Big>& gain) {
+  std::vector<Big> kappa;
+  for (std::size_t t = 1; t <= gain.size(); ++t) {
+    Big sum = 0;
+    Big power = 1;
+    for (const Big& k : gain) {
+      sum += k * power;
+      power *= Big(t);
+    }
+    kappa.push_back(sum);
+  }
+  std::vector<Big> beta{Big(1)};
+  while (!kappa.empty()) {
+    beta.push_back(kappa[0]);
+    for (std::size_t t = 0; t + 1 < kappa.size(); ++t) kappa[t] = kappa[t + 1] - kappa[t];
+    kappa.pop_back();
+  }
+  return beta;
+}
+
+template <class Gain>
+std::vector<Big> widened(const Gain& gain) {
+  std::vector<Big> wide;
+  for (const auto k : gain) wide.emplace_back(k);
+  return wide;
+}
+
+void expect_close(const std::vector<Big>& values, const std::vector<Big>& expected,
+                  double tolerance, const char* name) {
+  ASSERT_EQ(values.size(), expected.size());
+  for (std::size_t r = 0; r < values.size(); ++r) {
+    EXPECT_LE(static_cast<double>(abs(values[r] / expected[r] - 1)), tolerance) << name << ' ' << r;
+  }
+}
+
+/// k, l and the characteristic polynomial of one design; too small gains are refused elsewhere.
+void expect_exact(const std::vector<Big>& k, const std::vector<Big>& l, double omega_t,
+                  double smallest, double tolerance) {
+  const auto beta = reference_polynomial(k.size(), omega_t);
+  const auto reference = esokit_test::reference_current_gain(beta);
+  if (reference.back() < Big(smallest)) return;
+  expect_close(k, reference, tolerance, "k");
+  expect_close(l, esokit_test::reference_predictor_gain(beta), tolerance, "l");
+  expect_close(polynomial_of(k), beta, tolerance, "beta");
+}
+
+template <class S>
+void expect_equal_pole_gains_exact(double tolerance) {
+  for_all_sizes([&](auto size) {
+    constexpr int N = size;
+    for (const double omega_t : omega_t_grid) {
+      SCOPED_TRACE(::testing::Message() << "N " << N << " omega_o T " << omega_t);
+      const auto weights =
+          EqualSampledPoles<N, S>::from_bandwidth(static_cast<S>(omega_t), S(1)).weights();
+      expect_exact(widened(current_gain<N, S>(weights)), widened(predictor_gain<N, S>(weights)),
+                   static_cast<double>(static_cast<S>(omega_t)),
+                   static_cast<double>(std::max<long double>(std::numeric_limits<S>::min(),
+                                                             std::numeric_limits<double>::min())),
+                   tolerance);
+    }
+  });
+}
+
+TEST(SampledGain, EqualPolesInDoubleTo1em12) { expect_equal_pole_gains_exact<double>(1e-12); }
+
+/// a is good to 2 units in the last place, its powers and the sum to 5 N more.
+TEST(SampledGain, EqualPolesInDoubleToRounding) {
+  expect_equal_pole_gains_exact<double>(100 * std::numeric_limits<double>::epsilon());
+}
+TEST(SampledGain, EqualPolesInFloatToRounding) {
+  expect_equal_pole_gains_exact<float>(100 *
+                                       static_cast<double>(std::numeric_limits<float>::epsilon()));
+}
+TEST(SampledGain, EqualPolesInLongDoubleToRounding) {
+  expect_equal_pole_gains_exact<long double>(
+      static_cast<double>(100 * std::numeric_limits<long double>::epsilon()));
+}
+
+TEST(SampledGain, ReferenceAgreesWithTheClosedForms) {
+  for (const double omega_t : omega_t_grid) {
+    const Big rho = exp(-Big(omega_t));
+    const Big a = 1 - rho;
+    const auto two = esokit_test::reference_current_gain(reference_polynomial(2, omega_t));
+    EXPECT_LT(abs(two[0] / (1 - rho * rho) - 1), Big(1e-60));
+    EXPECT_LT(abs(two[1] / (a * a) - 1), Big(1e-60));
+    const auto three = esokit_test::reference_current_gain(reference_polynomial(3, omega_t));
+    EXPECT_LT(abs(three[0] / (1 - rho * rho * rho) - 1), Big(1e-60));
+    EXPECT_LT(abs(three[1] / (Big(3) / 2 * a * a * (1 + rho)) - 1), Big(1e-60));
+    EXPECT_LT(abs(three[2] / (a * a * a / 2) - 1), Big(1e-60));
+  }
+}
+
+/// k = (1 - rho^3, 3/2 (1-rho)^2 (1+rho) / T, (1-rho)^3 / T^2), and l = Phi k.
+TEST(SampledGain, ClosedFormForThreeStates) {
+  const double t = 0.02;
+  for (const double omega : {1.0, 40.0, 300.0}) {
+    const double rho = std::exp(-omega * t);
+    const auto weights = EqualSampledPoles<3, double>::from_bandwidth(omega, t).weights();
+    const auto k = esokit::physical_gain<3, double>(current_gain<3, double>(weights), t);
+    EXPECT_NEAR(k(0) / (1 - rho * rho * rho), 1, 1e-13);
+    EXPECT_NEAR(k(1) / (1.5 * (1 - rho) * (1 - rho) * (1 + rho) / t), 1, 1e-13);
+    EXPECT_NEAR(k(2) / ((1 - rho) * (1 - rho) * (1 - rho) / (t * t)), 1, 1e-12);
+    const auto l = esokit::physical_gain<3, double>(predictor_gain<3, double>(weights), t);
+    EXPECT_NEAR(l(0) / (3 * (1 - rho)), 1, 1e-13);
+    EXPECT_NEAR(l(1) / (k(1) + t * k(2)), 1, 1e-13);
+    EXPECT_NEAR(l(2) / k(2), 1, 1e-13);
+    const auto back = esokit::scaled_gain<3, double>(k, t);
+    for (std::size_t r = 0; r < 3; ++r) {
+      EXPECT_NEAR(back[r] / (current_gain<3, double>(weights)[r]), 1, 1e-14);
+    }
+  }
+}
+
+/// All poles in the origin: k_r = c(N, r+1) / (N-1)!. For N = 3: 1, 3/2, 1/2.
+TEST(SampledGain, DeadbeatIsPolynomialInterpolation) {
+  const auto deadbeat = SampledPoleSet<3, double>::from_sampled({0.0, 0.0, 0.0});
+  EXPECT_EQ((current_gain<3, double>(deadbeat.weights())), (ScaledGain<3, double>{1, 1.5, 0.5}));
+  EXPECT_EQ((predictor_gain<3, double>(deadbeat.weights())), (ScaledGain<3, double>{3, 2.5, 0.5}));
+}
+
+/// (I - k C) Phi.
+Eigen::MatrixXd error_matrix(const std::vector<double>& k) {
+  const auto size = static_cast<Eigen::Index>(k.size());
+  Eigen::MatrixXd phi = Eigen::MatrixXd::Zero(size, size);
+  Eigen::MatrixXd reset = Eigen::MatrixXd::Identity(size, size);
+  for (Eigen::Index r = 0; r < size; ++r) {
+    for (Eigen::Index c = r; c < size; ++c) {
+      phi(r, c) = esokit_test::choose(static_cast<int>(c), static_cast<int>(r));
+    }
+    reset(r, 0) -= k[static_cast<std::size_t>(r)];
+  }
+  return reset * phi;
+}
+
+/// Norm of prod(F - rho_i I) over the product of the norms; complex ones in pairs.
+double cayley_hamilton(const std::vector<double>& k, const std::vector<Complex>& poles) {
+  const Eigen::MatrixXd f = error_matrix(k);
+  const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(f.rows(), f.cols());
+  Eigen::MatrixXd product = one;
+  double scale = 1;
+  for (const Complex& rho : poles) {
+    if (rho.imag() < 0) continue;
+    const Eigen::MatrixXd factor =
+        rho.imag() > 0 ? Eigen::MatrixXd(f * f - 2 * rho.real() * f + std::norm(rho) * one)
+                       : Eigen::MatrixXd(f - rho.real() * one);
+    product = product * factor;
+    scale *= factor.norm();
+  }
+  return product.norm() / scale;
+}
+
+/// Without any formula for gains: the error matrix satisfies the polynomial of the poles that were
+/// asked for (Cayley-Hamilton), and no other.
+TEST(SampledGain, PutsThePolesWhereTheyWereAsked) {
+  for_all_sizes([](auto size) {
+    constexpr int N = size;
+    if constexpr (N <= 8) {
+      for (const double omega_t : {0.2, 0.5, 1.0, 3.0, 20.0}) {
+        const auto k = current_gain<N, double>(
+            EqualSampledPoles<N, double>::from_bandwidth(omega_t, 1).weights());
+        const std::vector<double> gain(k.begin(), k.end());
+        const std::vector<Complex> poles(N, std::exp(-omega_t));
+        EXPECT_LT(cayley_hamilton(gain, poles), 1e-13) << N << ' ' << omega_t;
+      }
+    }
+  });
+  const Complex p(-0.7, 1.1);
+  const Complex q(-1.6, 0.4);
+  const Array<Complex, 5> poles{p, q, -0.9, std::conj(q), std::conj(p)};
+  const auto k =
+      current_gain<5, double>(SampledPoleSet<5, double>::from_continuous(poles, 1).weights());
+  const std::vector<double> gain(k.begin(), k.end());
+  std::vector<Complex> sampled;
+  for (const Complex& pole : poles) sampled.push_back(std::exp(pole));
+  EXPECT_LT(cayley_hamilton(gain, sampled), 1e-13);
+  sampled[2] = 0.5;
+  EXPECT_GT(cayley_hamilton(gain, sampled), 1e-7);
+}
+
+/// Random stable sets. Complex poles may let the terms of a gain cancel, so the error is measured
+/// against the sum of their magnitudes.
+TEST(SampledGain, PoleSetsAgainstTheReference) {
+  Random random(17);
+  for (int trial = 0; trial < 60; ++trial) {
+    const double t = random.log_uniform(1e-4, 2);
+    constexpr int N = 7;
+    const int pairs = random.index(4);
+    Array<Complex, N> poles;
+    std::size_t i = 0;
+    for (; i < static_cast<std::size_t>(2 * pairs); i += 2) {
+      poles[i] = Complex(-random.log_uniform(0.1, 10), random.uniform(-3, 3));
+      poles[i + 1] = std::conj(poles[i]);
+    }
+    for (; i < N; ++i) poles[i] = -random.log_uniform(0.1, 10);
+    Poles wide;
+    for (const Complex& pole : poles) wide.emplace_back(pole.real(), pole.imag());
+    const auto beta = esokit_test::reference_polynomial(wide, t);
+    const auto reference = esokit_test::reference_current_gain(beta);
+    const auto weights = SampledPoleSet<N, double>::from_continuous(poles, t).weights();
+    const auto k = current_gain<N, double>(weights);
+    for (std::size_t r = 0; r < N; ++r) {
+      double terms = 0;
+      for (std::size_t j = r + 1; j <= N; ++j) {
+        terms += std::abs(weights[j]) *
+                 esokit::unsigned_stirling_first(static_cast<int>(j), static_cast<int>(r) + 1) /
+                 esokit::factorial(static_cast<int>(j) - 1);
+      }
+      EXPECT_LE(static_cast<double>(abs(Big(k[r]) - reference[r])), 1e-12 * terms) << trial;
+      if (pairs == 0) {
+        EXPECT_LE(esokit_test::relative_error(k[r], reference[r]), 1e-12) << trial;
+      }
+    }
+    // The last gain is prod(1 - rho_i) / (N-1)!: nothing cancels there.
+    EXPECT_LE(esokit_test::relative_error(k[N - 1], reference[N - 1]), 1e-12) << trial;
+  }
+}
+
+TEST(SampledGain, EqualPoleSetIsTheBandwidthForm) {
+  for (const double omega_t : omega_t_grid) {
+    Array<Complex, 4> poles;
+    poles.fill(-omega_t);
+    const auto set = SampledPoleSet<4, double>::from_continuous(poles, 1).weights();
+    const auto equal = EqualSampledPoles<4, double>::from_bandwidth(omega_t, 1).weights();
+    for (std::size_t r = 0; r < 4; ++r) {
+      EXPECT_NEAR((current_gain<4, double>(set)[r]) / (current_gain<4, double>(equal)[r]), 1,
+                  1e-14);
+    }
+  }
+}
+
+TEST(SampledGain, ContinuousAndSampledPolesMeet) {
+  const Array<Complex, 3> poles{Complex(-1, 2), Complex(-1, -2), -0.5};
+  Array<Complex, 3> sampled;
+  for (std::size_t i = 0; i < 3; ++i) sampled[i] = std::exp(poles[i] * 0.3);
+  const auto a = SampledPoleSet<3, double>::from_continuous(poles, 0.3);
+  const auto b = SampledPoleSet<3, double>::from_sampled(sampled);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_NEAR(std::abs(a.contractions[i] - b.contractions[i]), 0, 1e-15);
+  }
+}
+
+TEST(SampledGain, PowerIsTheLongerSample) {
+  const double eps = std::numeric_limits<double>::epsilon();
+  for (const double omega_t : {1e-4, 0.01, 0.3, 1.0, 3.0}) {
+    for (const unsigned samples : {1u, 2u, 3u, 4u, 7u, 20u, 100u, 65535u}) {
+      const double expected = -std::expm1(-omega_t * samples);
+      EXPECT_NEAR(
+          (EqualSampledPoles<3, double>::from_bandwidth(omega_t, 1).power(samples).contraction) /
+              expected,
+          1, 40 * eps)
+          << omega_t << ' ' << samples;
+      const Complex pole(-omega_t, 0.6 * omega_t);
+      const auto set =
+          SampledPoleSet<2, double>::from_continuous({pole, std::conj(pole)}, 1).power(samples);
+      const Complex wanted = 1.0 - std::exp(pole * static_cast<double>(samples));
+      // The reference itself cancels for small arguments.
+      EXPECT_NEAR(std::abs(set.contractions[0] - wanted), 0, 100 * eps) << samples;
+      EXPECT_EQ(set.contractions[1], std::conj(set.contractions[0]));
+    }
+    // Small ones without that: 1 - rho^M.
+    EXPECT_EQ((EqualSampledPoles<3, double>{0.25}.power(2).contraction), 0.4375);
+    EXPECT_EQ((EqualSampledPoles<3, double>{0.5}.power(3).contraction), 0.875);
+    EXPECT_EQ((EqualSampledPoles<3, double>{0.5}.power(1).contraction), 0.5);
+  }
+}
+
+/// Physical gain / T tends to the continuous gain, to first order.
+TEST(SampledGain, TendsToTheContinuousGain) {
+  constexpr double omega = 3;
+  const auto continuous = esokit::continuous_gain<4>(omega);
+  const auto deviation = [&](double t) {
+    const auto poles = EqualSampledPoles<4, double>::from_bandwidth(omega, t);
+    const auto k = esokit::physical_gain<4, double>(current_gain<4, double>(poles.weights()), t);
+    return eigen(k / t - continuous).cwiseQuotient(eigen(continuous)).norm();
+  };
+  EXPECT_LT(deviation(1e-4), 2e-3);
+  EXPECT_NEAR(std::log2(deviation(2e-3) / deviation(1e-3)), 1, 0.02);
+}
+
+TEST(SampledGain, IsAvailableAtCompileTime) {
+  constexpr EqualSampledPoles<2, float> half{0.5f};
+  constexpr auto k = current_gain<2, float>(half.weights());
+  static_assert(k[0] == 0.75f && k[1] == 0.25f);
+  static_assert(half.power(2).contraction == 0.75f);
+  constexpr auto l = predictor_gain<2, float>(half.weights());
+  static_assert(l[0] == 1.0f && l[1] == 0.25f);
+}
+
+}  // namespace
