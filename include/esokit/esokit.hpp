@@ -105,17 +105,14 @@
 #include <esokit/sim/butcher_tableau.hpp>
 #include <esokit/sim/closed_loop.hpp>
 #include <esokit/sim/combined_signals.hpp>
-#include <esokit/sim/decimation.hpp>
 #include <esokit/sim/dormand_prince.hpp>
 #include <esokit/sim/elementary_signals.hpp>
-#include <esokit/sim/file_error.hpp>
 #include <esokit/sim/filtered_step.hpp>
 #include <esokit/sim/gaussian.hpp>
 #include <esokit/sim/metrics.hpp>
 #include <esokit/sim/noise.hpp>
 #include <esokit/sim/peak.hpp>
 #include <esokit/sim/plant.hpp>
-#include <esokit/sim/recorder.hpp>
 #include <esokit/sim/runge_kutta.hpp>
 #include <esokit/sim/series.hpp>
 #include <esokit/sim/signal.hpp>

@@ -308,10 +308,8 @@ Failure signal_study(Episode& episode) {
   const double w = study.number<double>("angular_frequency", rate);
   ask_signal(study, "Constant", sim::Constant<>::make({size}), t);
   ask_signal(study, "Step", sim::Step<>::make({time, size}), t);
-  ask_signal(study, "Ramp", sim::Ramp<>::make({time, size}), t);
   ask_signal(study, "Sine", sim::Sine<>::make({size, w, tau, time}), t);
   ask_signal(study, "FilteredStep", sim::FilteredStep<5>::make({time, size, tau}), t);
-  ask_signal(study, "Polynomial", sim::Polynomial<3>::make({{size, time, tau, w}, time}), t);
 
   const double power = study.number<double>("power", {1e-6, 1, true});
   const double hold = study.number<double>("hold", {0.1, 1});

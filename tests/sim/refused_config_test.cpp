@@ -4,7 +4,6 @@
 #include <esokit/sim/metrics.hpp>
 #include <esokit/sim/noise.hpp>
 #include <esokit/sim/plant.hpp>
-#include <esokit/sim/recorder.hpp>
 #include <esokit/sim/signals.hpp>
 #include <limits>
 #include <string>
@@ -25,11 +24,6 @@ TEST(RefusedConfig, Signals) {
     EXPECT_EQ(refusal(Constant<>::make({.value = bad})), "value: must be finite");
     EXPECT_EQ(refusal(Step<>::make({.time = bad})), "time: must be finite");
     EXPECT_EQ(refusal(Step<>::make({.size = bad})), "size: must be finite");
-    EXPECT_EQ(refusal(Ramp<>::make({.time = bad})), "time: must be finite");
-    EXPECT_EQ(refusal(Ramp<>::make({.slope = bad})), "slope: must be finite");
-    EXPECT_EQ(refusal(Polynomial<2>::make({.coefficients = {1, 2, bad}})),
-              "coefficients[2]: must be finite");
-    EXPECT_EQ(refusal(Polynomial<2>::make({.origin = bad})), "origin: must be finite");
     EXPECT_EQ(refusal(Sine<>::make({.amplitude = bad})), "amplitude: must be finite");
     EXPECT_EQ(refusal(Sine<>::make({.angular_frequency = bad})),
               "angular_frequency: must be finite");
@@ -39,7 +33,6 @@ TEST(RefusedConfig, Signals) {
     EXPECT_EQ(refusal(FilteredStep<2>::make({.size = bad})), "size: must be finite");
     EXPECT_EQ(refusal(FilteredStep<2>::make({.time_constant = bad})),
               "time_constant: must be finite and positive");
-    EXPECT_EQ(refusal(SwitchedOn<Constant<>>::make({.time = bad})), "time: must be finite");
   }
   EXPECT_EQ(refusal(FilteredStep<2>::make({.time_constant = 0.0})),
             "time_constant: must be finite and positive");
@@ -93,21 +86,6 @@ TEST(RefusedConfig, Plants) {
   EXPECT_EQ(refusal(LinearPlant<2>::make({.coefficients = {infinity, 1.0}})),
             "coefficients[0]: must be finite");
   EXPECT_EQ(refusal(IntegratorChainPlant<2>::make({.input_gain = -1.0})), "accepted");
-}
-
-TEST(RefusedConfig, Recorder) {
-  EXPECT_EQ(refusal(Recorder<2>::make({.names = {"a", "b"}})),
-            "capacity: must be at least 1 and at most");
-  EXPECT_EQ(refusal(Recorder<2>::make({.names = {"a", "b"}, .capacity = SIZE_MAX})),
-            "capacity: must be at least 1 and at most");
-  EXPECT_EQ(refusal(Recorder<2>::make({.names = {"a"}, .capacity = 1})),
-            "names[1]: must not be empty");
-  EXPECT_EQ(refusal(Recorder<2>::make({.names = {"a", "a"}, .capacity = 1})),
-            "names[1]: must differ from the other names");
-  for (const char* bad : {"a,b", "a\"", "a\nb", "a\r"}) {
-    EXPECT_EQ(refusal(Recorder<2>::make({.names = {bad, "b"}, .capacity = 1})),
-              "names[0]: must hold no comma, quote or line break");
-  }
 }
 
 TEST(RefusedConfig, SeriesAndWindow) {

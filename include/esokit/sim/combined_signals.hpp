@@ -1,13 +1,10 @@
 /// @file
-/// Signals made of signals: a sum, and one that is switched on.
+/// The sum of two signals.
 #pragma once
 
 #include <cstddef>
-#include <esokit/core/check.hpp>
-#include <esokit/core/expected.hpp>
 #include <esokit/core/unroll.hpp>
 #include <esokit/sim/signal.hpp>
-#include <utility>
 
 namespace esokit::sim {
 
@@ -36,42 +33,5 @@ struct Sum {
 /// Sum{a, b}.
 template <class First, class Second>
 Sum(First, Second) -> Sum<First, Second>;
-
-/// s(t) = signal(t) for t >= time, else 0. The time of the inner signal is not shifted:
-/// `5 sin(9 t) from t = 3.5` starts in the middle of its wave.
-template <class Inner, PlainScalar ScalarType = double>
-requires Signal<Inner, ScalarType>
-class SwitchedOn {
- public:
-  /// Settings of make.
-  struct Config {
-    Inner signal{};     ///< what is switched on
-    ScalarType time{};  ///< when, s
-  };
-
-  /// Refuses a time that is not finite.
-  static constexpr Expected<SwitchedOn, Error<ScalarType>> make(Config config) {
-    if (Rules<ScalarType> rules; !rules.finite("time", config.time)) return rules.error();
-    return SwitchedOn(std::move(config));
-  }
-
-  /// s(t), t in s.
-  constexpr ScalarType operator()(ScalarType t) const noexcept {
-    return t >= config_.time ? config_.signal(t) : ScalarType{};
-  }
-
-  /// (s, s', .., s^(Count-1)) at t (s). The jumps at `time` are left out, as in every signal.
-  template <int Count>
-  requires DifferentiableSignal<Inner, ScalarType>
-  constexpr Array<ScalarType, Count> derivatives(ScalarType t) const noexcept {
-    if (t >= config_.time) return config_.signal.template derivatives<Count>(t);
-    return {};
-  }
-
- private:
-  explicit constexpr SwitchedOn(Config config) : config_(std::move(config)) {}
-
-  Config config_;
-};
 
 }  // namespace esokit::sim

@@ -1,5 +1,5 @@
 /// @file
-/// Constant, step, ramp, polynomial and sine with exact derivatives.
+/// Constant, step and sine with exact derivatives.
 ///
 /// A signal that begins at a time is active for t >= time, compared as written: on a grid t = k h a
 /// start of k0 h that is computed in the same way falls on its sample, a decimal one may fall one
@@ -82,91 +82,6 @@ class Step {
 
  private:
   explicit constexpr Step(const Config& config) : config_(config) {}
-
-  Config config_;
-};
-
-/// s(t) = slope (t - time) for t >= time, else 0.
-template <PlainScalar ScalarType = double>
-class Ramp {
- public:
-  /// Settings of make.
-  struct Config {
-    ScalarType time{};    ///< start, s
-    ScalarType slope{1};  ///< per second
-  };
-
-  /// Refuses members that are not finite.
-  static constexpr Expected<Ramp, Error<ScalarType>> make(const Config& config) {
-    Rules<ScalarType> rules;
-    rules.finite("time", config.time).finite("slope", config.slope);
-    if (!rules) return rules.error();
-    return Ramp(config);
-  }
-
-  /// s(t), t in s.
-  constexpr ScalarType operator()(ScalarType t) const noexcept {
-    return t >= config_.time ? config_.slope * (t - config_.time) : ScalarType{};
-  }
-
-  /// (s, s', .., s^(Count-1)) at t (s).
-  template <int Count>
-  constexpr Array<ScalarType, Count> derivatives(ScalarType t) const noexcept {
-    static_assert(Count >= 1);
-    Array<ScalarType, Count> result{(*this)(t)};
-    if constexpr (Count > 1) result[1] = t >= config_.time ? config_.slope : ScalarType{};
-    return result;
-  }
-
- private:
-  explicit constexpr Ramp(const Config& config) : config_(config) {}
-
-  Config config_;
-};
-
-/// s(t) = sum_i coefficients[i] (t - origin)^i at all times.
-template <int Degree, PlainScalar ScalarType = double>
-class Polynomial {
-  static_assert(Degree >= 0);
-
- public:
-  /// Settings of make.
-  struct Config {
-    Array<ScalarType, Degree + 1> coefficients{};  ///< lowest power first, per s^i
-    ScalarType origin{};                           ///< time of the expansion point, s
-  };
-
-  /// Refuses members that are not finite.
-  static constexpr Expected<Polynomial, Error<ScalarType>> make(const Config& config) {
-    Rules<ScalarType> rules;
-    rules.finite("coefficients", config.coefficients).finite("origin", config.origin);
-    if (!rules) return rules.error();
-    return Polynomial(config);
-  }
-
-  /// s(t), t in s.
-  constexpr ScalarType operator()(ScalarType t) const noexcept { return derivatives<1>(t)[0]; }
-
-  /// (s, s', .., s^(Count-1)) at t (s).
-  template <int Count>
-  constexpr Array<ScalarType, Count> derivatives(ScalarType t) const noexcept {
-    static_assert(Count >= 1);
-    const ScalarType x = t - config_.origin;
-    Array<ScalarType, Count> result{};
-    for (int j = 0; j < Count && j <= Degree; ++j) {
-      ScalarType sum{};
-      for (int i = Degree; i >= j; --i) {
-        ScalarType factor{1};  // i (i-1) .. (i-j+1)
-        for (int k = 0; k < j; ++k) factor *= static_cast<ScalarType>(i - k);
-        sum = sum * x + factor * config_.coefficients[static_cast<std::size_t>(i)];
-      }
-      result[static_cast<std::size_t>(j)] = sum;
-    }
-    return result;
-  }
-
- private:
-  explicit constexpr Polynomial(const Config& config) : config_(config) {}
 
   Config config_;
 };

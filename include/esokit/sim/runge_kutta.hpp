@@ -12,43 +12,6 @@
 
 namespace esokit::sim {
 
-/// Forward Euler, order 1.
-struct Euler {
-  /// See ButcherTableau.
-  /// @{
-  static constexpr int stages = 1;
-  static constexpr int order = 1;
-  static constexpr std::array<std::array<long double, 1>, 1> a{{{0}}};
-  static constexpr std::array<long double, 1> b{1};
-  static constexpr std::array<long double, 1> c{0};
-  /// @}
-};
-
-/// Explicit midpoint rule, order 2.
-struct ExplicitMidpoint {
-  /// See ButcherTableau.
-  /// @{
-  static constexpr int stages = 2;
-  static constexpr int order = 2;
-  static constexpr std::array<std::array<long double, 2>, 2> a{{{0, 0}, {0.5L, 0}}};
-  static constexpr std::array<long double, 2> b{0, 1};
-  static constexpr std::array<long double, 2> c{0, 0.5L};
-  /// @}
-};
-
-/// Kutta's method of order 3.
-struct Kutta3 {
-  /// See ButcherTableau.
-  /// @{
-  static constexpr int stages = 3;
-  static constexpr int order = 3;
-  static constexpr std::array<std::array<long double, 3>, 3> a{
-      {{0, 0, 0}, {0.5L, 0, 0}, {-1, 2, 0}}};
-  static constexpr std::array<long double, 3> b{1 / 6.0L, 2 / 3.0L, 1 / 6.0L};
-  static constexpr std::array<long double, 3> c{0, 0.5L, 1};
-  /// @}
-};
-
 /// The classical method of order 4.
 struct RungeKutta4 {
   /// See ButcherTableau.
