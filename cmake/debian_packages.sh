@@ -5,7 +5,8 @@ ESOKIT_BUILD_PACKAGES=(g++ cmake ninja-build libeigen3-dev)
 ESOKIT_TEST_PACKAGES=(libgtest-dev libboost-dev)
 ESOKIT_BENCHMARK_PACKAGES=(libbenchmark-dev)
 # Without a font gnuplot draws figures with no text, and reports no error.
-ESOKIT_EXAMPLE_PACKAGES=(gnuplot-nox fontconfig fonts-dejavu-core)
+# Python makes the pages and checks the numbers of the READMEs.
+ESOKIT_EXAMPLE_PACKAGES=(gnuplot-nox fontconfig fonts-dejavu-core python3)
 # picolibc is the C library of the RISC-V compiler; its C++ headers are those of libstdc++-arm-none-eabi.
 ESOKIT_FIRMWARE_PACKAGES=(gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib
   gcc-riscv64-unknown-elf picolibc-riscv64-unknown-elf qemu-system-arm qemu-system-misc)

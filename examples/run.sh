@@ -101,7 +101,7 @@ if ! cmake -S "$root" -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release \
   cat "$build/configure.log" >&2
   exit 1
 fi
-cmake --build "$build" --target "${selected[@]}" make_index check_readme
+cmake --build "$build" --target "${selected[@]}"
 echo "built in $(seconds_since "$started")"
 
 failed=()
@@ -129,7 +129,7 @@ done
 
 echo
 page=0
-"$build/examples/bin/make_index" --out "$out" >"$build/page.txt" || page=1
+"$root/examples/common/make_page.py" "$out" >"$build/page.txt" || page=1
 echo "all in $(seconds_since "$started")"
 if ((${#failed[@]} > 0)); then
   echo "failed: ${failed[*]}" >&2

@@ -52,48 +52,4 @@ std::optional<std::string> read_text(const std::filesystem::path& file) {
   return text;
 }
 
-std::vector<CsvRow> parse_csv(std::string_view text) {
-  std::vector<CsvRow> rows;
-  CsvRow row;
-  std::string field;
-  bool quoted = false;
-  bool row_has_content = false;
-  const auto end_row = [&] {
-    if (row_has_content) {
-      row.push_back(field);
-      rows.push_back(row);
-    }
-    row.clear();
-    field.clear();
-    row_has_content = false;
-  };
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const char c = text[i];
-    if (quoted) {
-      if (c != '"') {
-        field += c;
-      } else if (i + 1 < text.size() && text[i + 1] == '"') {
-        field += '"';
-        ++i;
-      } else {
-        quoted = false;
-      }
-    } else if (c == '"') {
-      quoted = true;
-      row_has_content = true;
-    } else if (c == ',') {
-      row.push_back(field);
-      field.clear();
-      row_has_content = true;
-    } else if (c == '\n') {
-      end_row();
-    } else if (c != '\r') {
-      field += c;
-      row_has_content = true;
-    }
-  }
-  end_row();
-  return rows;
-}
-
 }  // namespace esokit::examples

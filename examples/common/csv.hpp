@@ -1,5 +1,5 @@
 /// @file
-/// Comma-separated text as in RFC 4180: quoting, numbers, and reading back.
+/// Comma-separated text as in RFC 4180: quoting and numbers.
 #pragma once
 
 #include <filesystem>
@@ -27,8 +27,5 @@ using CsvRow = std::vector<std::string>;
 
 /// The whole file; empty optional if it cannot be read.
 [[nodiscard]] std::optional<std::string> read_text(const std::filesystem::path& file);
-
-/// The rows of a CSV text; empty lines are left out.
-[[nodiscard]] std::vector<CsvRow> parse_csv(std::string_view text);
 
 }  // namespace esokit::examples

@@ -1,0 +1,392 @@
+#!/usr/bin/env python3
+"""Shows what the examples wrote below OUT: index.html, the front page, and one page a paper.
+
+usage: make_page.py OUT
+
+Reads the summary.csv, contents.csv and table_*.csv that Report writes (report.hpp); the look of the
+pages is page.html beside this file. Loads nothing from elsewhere.
+"""
+
+import csv
+import html
+import itertools
+import math
+import re
+import string
+import sys
+from pathlib import Path
+from urllib.parse import quote
+
+SUMMARY = ["case", "metric", "paper", "ours", "relative_error", "tolerance", "pass", "note"]
+CONTENTS = ["kind", "name", "text", "alt", "more", "figure"]
+MISSES = ("printed number missed", "the text says other than what was simulated",
+          "a claim does not hold", "settings or data not published")  # miss_text in check.cpp
+WIDEST = 10  # columns of a table, then it is split
+
+
+# ---- what was written ----
+
+def read_csv(file, header=None):
+    with open(file, newline="", encoding="utf-8") as stream:
+        rows = [row for row in csv.reader(stream, strict=True) if row]
+    if not rows or header and rows[0] != header:
+        raise ValueError(f"{file}: the header is not as Report writes it")
+    if any(len(row) != len(rows[0]) for row in rows):
+        raise ValueError(f"{file}: a row has more or fewer fields than the header")
+    return rows
+
+
+class Row:
+    """One row of a summary.csv; `outcome` is one of the classes of page.html."""
+
+    def __init__(self, fields):
+        (self.case, self.metric, self.paper, self.ours, self.error, self.tolerance, passed,
+         self.note) = fields
+        self.miss = next((miss for miss in MISSES if self.note.startswith(miss)), None)
+        self.outcome = ("pass" if passed == "yes" else "reported" if not passed else
+                        "known_miss" if self.miss else "fail")
+
+    def mark(self):
+        return {"pass": "✓ met" if self.paper else "✓ passed", "fail": "✗ failed",
+                "known_miss": "≠ missed",
+                "reported": "not judged" if self.paper else "shown"}[self.outcome]
+
+    def reference(self):
+        """The number of a note that reference_note (check.cpp) began."""
+        return self.note.split(" ")[1] if self.note.startswith("reference ") else ""
+
+
+class Item:
+    """A figure, table or paragraph, in the order in which the example gave them."""
+
+    def __init__(self, fields, addition):
+        self.kind, self.name, self.text, self.alt, self.more, self.figure = fields
+        self.addition = addition
+
+
+class Example:
+    def __init__(self, out, folder):
+        self.name, self.folder = folder.name, folder.relative_to(out)
+        self.rows = [Row(row) for row in read_csv(folder / "summary.csv", SUMMARY)[1:]]
+        self.about, self.items, additions = {}, [], False
+        for row in read_csv(folder / "contents.csv", CONTENTS)[1:]:
+            if row[0] in ("paper_title", "citation", "link", "title", "description", "order",
+                          "addition"):
+                self.about[row[0]] = row[2]
+            elif row[0] == "additions":
+                additions = row[2] == "on"
+            else:
+                self.items.append(Item(row, additions))
+        self.addition = "addition" in self.about
+        self.has_additions = self.addition or any(item.addition for item in self.items)
+        self.title = self.about["title"] or self.name
+        self.anchor = re.sub("[^A-Za-z0-9_-]", "-", self.folder.as_posix())
+
+    def empty(self):
+        """What could not run, as its data are not here, has nothing to show."""
+        return not self.rows and all(item.kind == "remark" for item in self.items)
+
+
+class Paper:
+    def __init__(self, folder, examples):
+        self.folder = folder
+        self.examples = sorted(examples, key=lambda one: (one.addition, int(one.about["order"])))
+        first = {key: next((one.about[key] for one in examples if one.about[key]), "")
+                 for key in ("paper_title", "citation", "link")}
+        self.title = first["paper_title"] or folder
+        self.citation, self.link = first["citation"], first["link"]
+        self.page = quote(folder + ".html")
+
+    def items(self, kind):
+        return [(one, item) for one in self.examples for item in one.items if item.kind == kind]
+
+
+def read_results(out):
+    """All papers in the order of their folders' names, then what is not a paper."""
+    folders = sorted(file.parent for file in out.rglob("summary.csv"))
+    if not folders:
+        raise ValueError(f"no summary.csv below {out}: run an example first")
+    papers = []
+    for folder, group in itertools.groupby(folders, lambda one: one.parent):
+        examples = [one for one in (Example(out, one) for one in group) if not one.empty()]
+        if examples:
+            papers.append(Paper(folder.relative_to(out).as_posix(), examples))
+    return sorted(papers, key=lambda paper: not paper.link)
+
+
+# ---- pieces of a page ----
+
+esc = html.escape
+
+
+def shown(text):
+    """A number for a reader, as shown_text (check.cpp) writes it."""
+    try:
+        value = float(text)
+    except ValueError:
+        return text
+    size = abs(value)
+    if not math.isfinite(value) or value == 0:
+        return f"{value:.9g}"
+    if size < 1e-30:
+        return "-0 (above -1e-30)" if value < 0 else "0 (below 1e-30)"
+    if size < 1e-4 or size >= 1e8:
+        return f"{value:.3g}"
+    return f"{value:.{max(0, 3 - math.floor(math.log10(size)))}f}"
+
+
+def percent(share):
+    return f"{100 * float(share):.3g} %" if share else ""
+
+
+def png_size(file):
+    """Width and height, so that the page does not jump while it loads."""
+    head = file.read_bytes()[16:24]
+    return int.from_bytes(head[:4], "big"), int.from_bytes(head[4:], "big")
+
+
+def counts(paper):
+    """Printed numbers and own checks, never added up."""
+    rows = [row for one in paper.examples for row in one.rows]
+
+    def count(printed, *outcomes):
+        return sum(bool(row.paper) == printed and row.outcome in outcomes for row in rows)
+
+    def group(words, *numbers):
+        if not any(number for number, _, _ in numbers):
+            return ""
+        return (f"<span>{words}:" + "".join(
+            f' <span class="{kind if number else "reported"}">{number} {name}</span>'
+            for number, name, kind in numbers) + "</span>\n")
+
+    text = group("Printed numbers", (count(True, "pass"), "met,", "pass"),
+                 (count(True, "known_miss", "fail"), "missed,", "known_miss"),
+                 (count(True, "reported"), "not judged", "reported"))
+    text += group("Own checks", (count(False, "pass"), "passed,", "pass"),
+                  (count(False, "known_miss", "fail"), "failed", "fail"))
+    return ('<p class="counts">' +
+            (text or '<span class="reported">Nothing is compared here.</span>') + "</p>\n")
+
+
+def table(caption, headings, rows, text=False):
+    """`rows` hold finished cells, with their td or th."""
+    head = "".join(f'<th class="text" scope="col">{esc(heading)}</th>' if text else
+                   f'<th scope="col">{esc(heading)}</th>' for heading in headings)
+    body = "".join(f"<tr>{''.join(row)}</tr>\n" for row in rows)
+    return (f'<figure class="tab"><figcaption>{esc(caption)}</figcaption>'
+            f'<div class="table" tabindex="0"><table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n'
+            f"{body}</tbody></table></div></figure>\n")
+
+
+def cell(text, kind=""):
+    return f'<td class="{kind}">{esc(text)}</td>' if kind else f"<td>{esc(text)}</td>"
+
+
+def boxed(heading, items, kind=""):
+    if not items:
+        return ""
+    return (f'<section class="plainly{kind}">\n{heading}\n<ul>\n' +
+            "".join(f"<li>{item}</li>\n" for item in items) + "</ul>\n</section>\n")
+
+
+# ---- parts of a paper's page ----
+
+def failures(paper, page=""):
+    return boxed("<h2>Failed</h2>", [
+        f'<a href="{page}#{one.anchor}">{esc(one.name)}</a>: {esc(row.case)}, {esc(row.metric)}: '
+        f'ours {esc(shown(row.ours))}. <span class="quiet">{esc(row.note)}</span>'
+        for one in paper.examples for row in one.rows if row.outcome == "fail"], " failed")
+
+
+def misses(paper):
+    items = []
+    for one in paper.examples:
+        said = [(item.name or MISSES[0], esc(item.text)) for item in one.items
+                if item.kind == "not_reproduced"]
+        # Where the example says it in words, its rows need not be listed one by one up here.
+        said = said or [(row.miss, f"{esc(row.case)}, {esc(row.metric)}: paper {esc(row.paper)}, "
+                         f"ours {esc(shown(row.ours))}.")
+                        for row in one.rows if row.outcome == "known_miss"]
+        items += [f'<b>{kind}:</b> {text} <a href="#{one.anchor}">{esc(one.name)}</a>'
+                  for kind, text in said]
+    return boxed('<h2 id="misses">What does not reproduce</h2>', items)
+
+
+def claims(paper):
+    kinds = {"holds": "pass", "not tested": "reported"}
+    rows = [(cell(item.text, "text"), cell(item.name, "text narrow"),
+             f'<td class="text"><b class="{kinds.get(item.alt, "known_miss")}">{esc(item.alt)}.</b> '
+             f"{esc(item.more)}</td>",
+             f'<td class="text narrow"><a href="#{one.anchor}">{esc(item.figure or one.name)}</a></td>')
+            for one, item in paper.items("claim")]
+    return rows and table("What the paper claims, and whether it holds here",
+                          ["claim", "in the paper", "here", "shown in"], rows, True) or ""
+
+
+def corrections(paper):
+    rows = [(cell(item.name, "text narrow"), cell(item.text, "text"), cell(item.alt, "text"),
+             cell(item.more, "text")) for _, item in paper.items("correction")]
+    return rows and table("Corrections of printed formulas",
+                          ["where", "printed", "correct", "how one knows"], rows, True) or ""
+
+
+def figure(out, example, item):
+    width, height = png_size(out / example.folder / (item.name + ".png"))
+    stem = quote((example.folder / item.name).as_posix())
+    return (f'<figure>\n<a href="{stem}.svg"><img loading="lazy" src="{stem}.png" '
+            f'width="{width // 2}" height="{height // 2}" alt="{esc(item.alt)}"></a>\n'
+            f'<figcaption>{esc(item.text)}<br>\n<a href="{stem}.svg">SVG</a> · '
+            f'<a href="{stem}.gp">gnuplot script</a> · <a href="{stem}.csv">data</a>'
+            "</figcaption>\n</figure>\n")
+
+
+def shown_table(out, example, item):
+    """A comparison's verdicts become marks behind our numbers; one that is too wide for a window is
+    split between metrics."""
+    rows = read_csv(out / example.folder / item.name)
+    compared = item.kind == "comparison"
+    marks = {"ok": ' <span class="pass" title="met">✓</span>',
+             "FAILED": ' <span class="fail">✗ failed</span>',
+             "missed": ' <span class="known_miss">≠ missed</span>'}
+    # A metric's columns stay together; (column, column of its verdict).
+    metrics, metric = [], []
+    for c in range(1, len(rows[0])):
+        if compared and rows[0][c].endswith(", result"):
+            metric[-1] = (metric[-1][0], c)
+        else:
+            metric.append((c, None))
+        if not compared or rows[0][c].endswith(", result"):
+            metrics.append(metric)
+            metric = []
+    parts = [[]]
+    for metric in metrics:
+        width = sum(1 + (verdict is not None) for _, verdict in parts[-1] + metric)
+        if parts[-1] and width > WIDEST:
+            parts.append([])
+        parts[-1] += metric
+    text = ""
+    for part in parts:
+        body = [[f'<th scope="row">{esc(row[0])}</th>'] +
+                [f"<td>{esc(row[c])}{marks.get(row[v], '') if v else ''}</td>" for c, v in part]
+                for row in rows[1:]]
+        text += table(item.text + (" (continued)" if text else ""),
+                      [rows[0][0]] + [rows[0][c] for c, _ in part], body)
+    return text
+
+
+def article(out, example, items, later=False):
+    text = (f'<article id="{example.anchor}{"-additions" if later else ""}">\n'
+            f'<h3>{esc(example.title)}{": additions" if later else ""} '
+            f'<span class="quiet">{esc(example.name)}</span></h3>\n')
+    if not later and example.about["description"]:
+        text += f"<p>{esc(example.about['description'])}</p>\n"
+    for item in items:
+        if item.kind == "figure":
+            text += figure(out, example, item)
+        elif item.kind in ("table", "comparison"):
+            text += shown_table(out, example, item)
+        elif item.kind == "diagram":
+            text += (f'<figure><img src="{quote((example.folder / item.name).as_posix())}.svg" '
+                     f'alt="{esc(item.text)}"><figcaption>{esc(item.text)}</figcaption></figure>\n')
+        elif item.kind == "remark":
+            text += f"<p>{esc(item.text)}</p>\n"
+    return text + "</article>\n"
+
+
+def all_checks(example):
+    if not example.rows:
+        return ""
+    # Without a relative error the tolerance is absolute.
+    rows = [(cell(row.case, "text"), cell(row.metric, "text"), cell(row.paper),
+             cell(row.reference()), cell(shown(row.ours)), cell(percent(row.error)),
+             cell(percent(row.tolerance) if row.error else row.tolerance),
+             cell(row.mark(), row.outcome), cell(row.note, "text")) for row in example.rows]
+    file = quote((example.folder / "summary.csv").as_posix())
+    return (f"<details>\n<summary>{esc(example.title)}: {len(rows)} rows "
+            f'(<a href="{file}">summary.csv</a>)</summary>\n' +
+            table("", ["case", "metric", "paper", "reference", "ours", "error", "tolerance",
+                       "result", "note"], rows) + "</details>\n")
+
+
+# ---- pages ----
+
+def cover(out, paper):
+    """The top left panel of the paper's cover figure."""
+    wanted = next((item.name for _, item in paper.items("cover")), None)
+    for one, item in paper.items("figure"):
+        if wanted in (None, item.name):
+            file = one.folder / (item.name + ".png")
+            width, height = png_size(out / file)
+            return (f'<svg role="img" aria-label="{esc(item.alt)}" viewBox="0 0 '
+                    f'{width // int(item.figure)} {height // int(item.more)}"><image '
+                    f'href="{quote(file.as_posix())}" width="{width}" height="{height}"/></svg>\n')
+    return ""
+
+
+def overview(out, papers):
+    header = """<h1>esokit: papers reproduced</h1>
+<p>Every figure and table was computed by the programs in examples/, from the equations \
+of the papers. A <b>printed number</b> stands in a paper: it is met, missed, or not \
+judged (where no tolerance can be given). An <b>own check</b> compares with a formula or \
+an independent run, or demands what must hold; it passes or fails. The two are never \
+added up.</p>
+"""
+    cards = "".join(f'<li><a href="{paper.page}">{cover(out, paper)}<b>{esc(paper.title)}</b></a>\n'
+                    f"{counts(paper)}</li>\n" for paper in papers)
+    return header, ("".join(failures(paper, paper.page) for paper in papers) +
+                    f'<ul class="cards">\n{cards}</ul>\n')
+
+
+def one_paper(out, paper):
+    header = f'<p><a href="index.html">All results</a></p>\n<h1>{esc(paper.title)}</h1>\n'
+    header += f'<p class="quiet">{esc(paper.citation)}'
+    if paper.link.startswith("https://"):
+        header += f' <a href="{esc(paper.link)}">{esc(paper.link)}</a>'
+    readme = f"examples/{esc(paper.folder)}/README.md"
+    if (out / paper.folder / "README.txt").exists():
+        readme = f'<a href="{quote(paper.folder)}/README.txt">{readme}</a>'
+    header += ('</p>\n<p class="quiet">What it is, when it helps and how to choose: '
+               f"{readme}</p>\n{counts(paper)}")
+    header += ('<p class="quiet">Two ways to run: a <b>continuous simulation</b>, as in the papers, '
+               "integrates plant and observer as one differential equation; a <b>sampled "
+               "observer</b> runs once a sample, as it does in a controller.</p>\n")
+
+    main = failures(paper) + claims(paper) + misses(paper) + corrections(paper)
+    main += '<nav aria-label="Contents">\n<ul>\n'
+    for one in paper.examples:
+        own = ' <span class="quiet">(own addition)</span>' if one.addition and paper.link else ""
+        main += f'<li><a href="#{one.anchor}">{esc(one.title)}</a>{own}</li>\n'
+    main += "</ul>\n</nav>\n"
+    for one in paper.examples:
+        if not one.addition:
+            main += article(out, one, [item for item in one.items if not item.addition])
+    later = [one for one in paper.examples if one.has_additions]
+    if later and paper.link:
+        main += '<h2 id="additions">Own additions</h2>\n'
+    for one in later:
+        main += article(out, one, [item for item in one.items if one.addition or item.addition],
+                        not one.addition)
+    main += '<h2 id="numbers">All numbers, with tolerances</h2>\n'
+    return header, main + "".join(all_checks(one) for one in paper.examples)
+
+
+def main():
+    if len(sys.argv) != 2:
+        sys.exit("usage: make_page.py OUT")
+    out = Path(sys.argv[1])
+    page = string.Template((Path(__file__).parent / "page.html").read_text(encoding="utf-8"))
+    try:
+        papers = read_results(out)
+        files = {paper.folder: (paper.title + " - esokit", *one_paper(out, paper))
+                 for paper in papers}
+        files["index"] = ("esokit: papers reproduced", *overview(out, papers))
+        for name, (title, header, content) in files.items():
+            text = page.substitute(title=esc(title), header=header, main=content)
+            (out / (name + ".html")).write_text(text, encoding="utf-8")
+    except (OSError, ValueError, KeyError, csv.Error) as error:
+        sys.exit(f"make_page.py: {error}")
+    print((out / "index.html").resolve())
+
+
+if __name__ == "__main__":
+    main()
