@@ -29,7 +29,11 @@ constexpr double damping = 0.5;
 constexpr double stiffness = 2.0;
 
 // y'' = -2 y - 0.5 y' + u
-auto plant() { return LinearPlant<2>::make({.coefficients = {stiffness, damping}}).value(); }
+auto plant() {
+  return DisturbedPlant<2>::make(
+             {.plant = LinearPlant<2>::chain({.coefficients = {stiffness, damping}}).value()})
+      .value();
+}
 
 auto law() {
   return AdrcLaw<2>::make({.controller_bandwidth = control_bandwidth, .input_gain = 1.0}).value();

@@ -83,10 +83,12 @@
 #include <esokit/math/combinatorics.hpp>
 #include <esokit/math/fal.hpp>
 #include <esokit/math/linear_equations.hpp>
+#include <esokit/math/matrix_exponential.hpp>
 #include <esokit/math/positivity.hpp>
 #include <esokit/math/power.hpp>
 #include <esokit/model/chain_model.hpp>
 #include <esokit/model/integrator_chain.hpp>
+#include <esokit/model/linear_plant.hpp>
 #include <esokit/model/sampled_model.hpp>
 #include <esokit/model/scaled_chain.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>

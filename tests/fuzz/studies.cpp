@@ -299,6 +299,20 @@ void ask_signal(Study& study, const char* what, const Expected<Signal, Error<dou
   study.finite(what, values);
 }
 
+/// What a plant makes of an actuator, a sensor and a while of held input.
+template <int States>
+void ask_plant(Study& study, const LinearPlant<States>& plant, double time) {
+  for (const auto& wrapped : {with_lag(plant, time), with_sensor(plant, time)}) {
+    if (!study.answer("with", wrapped)) continue;
+    study.finite("input_gain", std::array{wrapped->input_gain()});
+    if (const auto held = study.answer("held_plant", held_plant(*wrapped, time))) {
+      study.finite("increment", held->increment);
+      study.finite("input", held->input);
+      study.finite("disturbance", held->disturbance);
+    }
+  }
+}
+
 Failure signal_study(Episode& episode) {
   Study study(episode);
   const double t = study.number<double>("t", {0, 10});
@@ -331,14 +345,16 @@ Failure signal_study(Episode& episode) {
       if (study.plain()) study.finite("HeldNoise", value);
     }
   }
-  if (const auto plant = study.answer("plant", sim::LinearPlant<2>::make({{size, tau}, w, {}}))) {
-    const EigenMatrix<double, 2> x(time, size);
-    const auto slope = plant->derivative(t, x, tau);
-    if (study.plain()) study.finite("derivative", slope);
+  if (const auto plant = study.answer("chain", LinearPlant<2>::chain({{size, tau}, w, 0.0}))) {
+    ask_plant(study, *plant, tau);
+    if (const auto disturbed = study.answer("disturbed", sim::DisturbedPlant<2>::make({*plant}))) {
+      const auto slope = disturbed->derivative(t, {time, size}, tau);
+      if (study.plain()) study.finite("derivative", slope);
+    }
   }
-  if (const auto plant = study.answer("plant", sim::IntegratorChainPlant<2>::make({w, {}}))) {
-    const auto slope = plant->derivative(t, {time, size}, tau);
-    if (study.plain()) study.finite("derivative", slope);
+  if (const auto plant = study.answer(
+          "transfer_function", LinearPlant<2>::transfer_function({{w, size}, {time, t}, tau}))) {
+    ask_plant(study, *plant, tau);
   }
   return study.done();
 }

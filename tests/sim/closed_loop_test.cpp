@@ -36,11 +36,15 @@ constexpr double b0 = 1.2;
 constexpr double frequency = 3.0;
 constexpr double offset = 0.7;
 
-LinearPlant<2> linear_plant() {
-  return LinearPlant<2>::make({.coefficients = {2.0, 0.5},
-                               .input_gain = plant_gain,
-                               .disturbance = Constant<>::make({.value = offset}).value()})
+/// y^(n) + a_(n-1) y^(n-1) + .. + a_0 y = b0 u + d
+template <int Order, class S = double>
+DisturbedPlant<Order, S> disturbed(const typename LinearPlant<Order, S>::Chain& chain, S d = 0) {
+  return DisturbedPlant<Order, S>::make({.plant = LinearPlant<Order, S>::chain(chain).value(),
+                                         .disturbance = Constant<S>::make({.value = d}).value()})
       .value();
+}
+DisturbedPlant<2> linear_plant() {
+  return disturbed<2>({.coefficients = {2.0, 0.5}, .input_gain = plant_gain}, offset);
 }
 constexpr auto sine_reference = [](double t) { return std::sin(frequency * t); };
 constexpr auto error_law = [](double, const EigenMatrix<double, 3>& e) {
@@ -163,13 +167,11 @@ TEST(ContinuousLoop, CascadeConvergesToTheExactSolution) {
 
 TEST(ContinuousLoop, OutputBasedFormStartedAtTheTruthIsTheDesignedChain) {
   const double d = -0.4;
-  const auto plant = IntegratorChainPlant<2>::make(
-      {.input_gain = -2.0, .disturbance = Constant<>::make({.value = d}).value()});
+  const auto plant = disturbed<2>({.input_gain = -2.0}, d);
   const auto eso = ContinuousLinearEso<2>::make({.observer_bandwidth = 30.0, .input_gain = -2.0});
   const auto law = AdrcLaw<2>::make({.controller_bandwidth = 3.0, .input_gain = -2.0}).value();
-  const ContinuousLoop loop{*plant, *eso, [&law](double, const EigenMatrix<double, 3>& z) {
-                              return law.control(z, 0.0);
-                            }};
+  const ContinuousLoop loop{
+      plant, *eso, [&law](double, const EigenMatrix<double, 3>& z) { return law.control(z, 0.0); }};
   double worst = 0.0;
   const auto end = loop.run({.duration = 2.0,
                              .step = 1e-3,
@@ -215,7 +217,7 @@ struct ProbingObserver {
 
 TEST(ContinuousLoop, StepsBeginBeforeTheirStagesAndHoldTheNoise) {
   ProbingObserver::Log log;
-  const auto plant = IntegratorChainPlant<1>::make({}).value();
+  const auto plant = disturbed<1>({});
   const auto noise = HeldNoise<>::make({.power = 1.0, .hold = 0.2, .step = 0.1, .seed = 3}).value();
   const ContinuousLoop loop{plant, ProbingObserver{&log},
                             [](double, const EigenMatrix<double, 1>&) { return 0.0; },
@@ -262,8 +264,7 @@ TEST(SampledLoop, EqualsTheHandWrittenLoop) {
   const double T = 0.05;
   const double d = 0.6;
   const double held_before = 0.3;
-  const auto plant = IntegratorChainPlant<2>::make(
-      {.input_gain = b0, .disturbance = Constant<>::make({.value = d}).value()});
+  const auto plant = disturbed<2>({.input_gain = b0}, d);
   const auto eso =
       LinearEso<2>::make({.observer_bandwidth = 15.0, .input_gain = b0, .sample_time = T});
   const auto law = AdrcLaw<2>::make({.controller_bandwidth = 2.0, .input_gain = b0}).value();
@@ -271,7 +272,7 @@ TEST(SampledLoop, EqualsTheHandWrittenLoop) {
   const auto control = [&law](double t, const EigenMatrix<double, 3>& z) {
     return std::clamp(law.control(z, t < 0.5 ? 0.0 : 1.0), -1.0, 1.0);
   };
-  const SampledLoop loop{*plant, *eso, control, MeasuredOutput{}, *noise};
+  const SampledLoop loop{plant, *eso, control, MeasuredOutput{}, *noise};
 
   auto observer = *eso;
   auto source = *noise;
@@ -374,7 +375,7 @@ TEST(SampledLoop, ABadSampleIsReported) {
   const auto broken = [](double t, double y, double) {
     return t > 0.35 && t < 0.45 ? not_a_number : y;
   };
-  const SampledLoop loop{IntegratorChainPlant<1>::make({}).value(), *eso,
+  const SampledLoop loop{disturbed<1>({}), *eso,
                          [](double, const EigenMatrix<double, 2>& z) { return -z(0); }, broken};
   int rejected = 0;
   const auto end =
@@ -392,7 +393,7 @@ TEST(ClosedLoop, RunsInFloat) {
       {.observer_bandwidth = 20.0f, .input_gain = 1.0f, .sample_time = 0.01f});
   const auto continuous =
       ContinuousLinearEso<1, float>::make({.observer_bandwidth = 20.0f, .input_gain = 1.0f});
-  const auto plant = IntegratorChainPlant<1, float>::make({.disturbance = {}}).value();
+  const auto plant = disturbed<1, float>({});
   const auto law = [](float, const EigenMatrix<float, 2>& z) { return 1.0f - z(0) - z(1); };
   const SampledLoop sampled{plant, *eso, law};
   const ContinuousLoop paper{plant, *continuous, law};

@@ -27,8 +27,7 @@ struct WrongSize : UserPlant {
 };
 
 static_assert(Plant<UserPlant> && !Plant<NoOutput> && !Plant<WrongSize>);
-static_assert(Plant<IntegratorChainPlant<3>> && Plant<LinearPlant<2, float>>);
-static_assert(Plant<IntegratorChainPlant<2, double, Sine<>>>);
+static_assert(Plant<DisturbedPlant<2, float>> && Plant<DisturbedPlant<2, double, Sine<>>>);
 
 template <class P>
 typename P::State run(const P& plant, typename P::State x, double u, double end) {
@@ -38,43 +37,44 @@ typename P::State run(const P& plant, typename P::State x, double u, double end)
   return integrate(rhs, 0.0, x, end / 1000, 1000);
 }
 
+/// y^(n) + a_(n-1) y^(n-1) + .. + a_0 y = b0 u + d(t)
+template <int Order, class Disturbance = Constant<>>
+auto disturbed(const typename LinearPlant<Order>::Chain& chain, Disturbance d = {}) {
+  return DisturbedPlant<Order, double, Disturbance>::make(
+             {.plant = LinearPlant<Order>::chain(chain).value(), .disturbance = d})
+      .value();
+}
+
 TEST(Plant, IntegratorChainUnderHeldInput) {
-  const auto plant = IntegratorChainPlant<3>::make({.input_gain = -2.0}).value();
+  const auto plant = disturbed<3>({.input_gain = -2.0});
   const auto x = run(plant, {1.0, 2.0, 3.0}, 5.0, 2.0);
   // Third derivative -10 throughout.
   EXPECT_NEAR(x[0], 1 + 4 + 6 - 10 * 8.0 / 6, 1e-11);
   EXPECT_NEAR(x[1], 2 + 6 - 20, 1e-11);
   EXPECT_NEAR(x[2], 3 - 20, 1e-11);
   EXPECT_EQ(plant.output(0.0, x), x[0]);
-  EXPECT_EQ(plant.total_disturbance(0.0, x), 0.0);
 }
 
-TEST(Plant, IntegratorChainWithDisturbance) {
+TEST(Plant, DisturbanceIsOfTheHighestDerivative) {
   const auto sine = Sine<>::make({.amplitude = 4.0, .angular_frequency = 2.0}).value();
-  const auto plant =
-      IntegratorChainPlant<2, double, Sine<>>::make({.input_gain = 1.0, .disturbance = sine})
-          .value();
-  const auto x = run(plant, {0.0, 0.0}, 0.0, 1.5);
+  const auto x = run(disturbed<2>({.input_gain = 5.0}, sine), {0.0, 0.0}, 0.0, 1.5);
   EXPECT_NEAR(x[1], 2.0 * (1.0 - std::cos(3.0)), 1e-10);
   EXPECT_NEAR(x[0], 2.0 * 1.5 - std::sin(3.0), 1e-10);
-  EXPECT_EQ(plant.total_disturbance(0.5, x), sine(0.5));
 }
 
-TEST(Plant, LinearPlantStepResponse) {
+TEST(Plant, StepResponse) {
   // y'' + 2 y' + 5 y = 10 u: poles -1 +- 2i, final value 2.
-  const auto plant = LinearPlant<2>::make({.coefficients = {5.0, 2.0}, .input_gain = 10.0}).value();
+  const auto plant = disturbed<2>({.coefficients = {5.0, 2.0}, .input_gain = 10.0});
   const auto x = run(plant, {0.0, 0.0}, 1.0, 1.0);
   EXPECT_NEAR(x[0], 2.0 * (1.0 - std::exp(-1.0) * (std::cos(2.0) + 0.5 * std::sin(2.0))), 1e-10);
   EXPECT_NEAR(x[1], 5.0 * std::exp(-1.0) * std::sin(2.0), 1e-10);
-  EXPECT_DOUBLE_EQ(plant.total_disturbance(0.0, {1.0, 3.0}), -5.0 - 6.0);
 }
 
 TEST(Plant, DisturbanceMayBeALambda) {
-  const auto wind = [](double t) { return t; };
-  using P = LinearPlant<1, double, decltype(wind)>;
-  const auto plant = P::make({.input_gain = 1.0, .disturbance = wind}).value();
-  EXPECT_NEAR(run(plant, P::State(1.0), 0.0, 2.0)[0], 3.0, 1e-12);
-  EXPECT_NEAR(run(plant, P::State(1.0), 1.0, 2.0)[0], 5.0, 1e-12);
+  const auto plant = disturbed<1>({}, [](double t) { return t; });
+  using State = EigenMatrix<double, 1>;
+  EXPECT_NEAR(run(plant, State(1.0), 0.0, 2.0)[0], 3.0, 1e-12);
+  EXPECT_NEAR(run(plant, State(1.0), 1.0, 2.0)[0], 5.0, 1e-12);
 }
 
 }  // namespace

@@ -13,12 +13,15 @@ using namespace esokit::sim;
 template <class T>
 bool plant_follows_its_filter() {
   // (0.5 s + 1)^2 as a plant, and as a closed form.
+  using Linear = esokit::LinearPlant<2, T>;
+  using P = DisturbedPlant<2, T>;
   const auto plant =
-      LinearPlant<2, T>::make({.coefficients = {T(4), T(4)}, .input_gain = T(4)}).value();
+      P::make({.plant = Linear::chain({.coefficients = {T(4), T(4)}, .input_gain = T(4)}).value()})
+          .value();
   const auto exact = FilteredStep<2, T>::make({.time_constant = T(0.5)}).value();
   auto noise = HeldNoise<T>::make({.power = T(0), .hold = T(0.01), .step = T(0.005)}).value();
   auto response = StepResponse<T>::make({}).value();
-  using State = typename LinearPlant<2, T>::State;
+  using State = typename P::State;
   State x = State::Zero();
   const T h = T(0.005);
   const auto rhs = [&](T t, const State& state) { return plant.derivative(t, state, T(1)); };

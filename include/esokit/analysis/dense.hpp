@@ -1,5 +1,5 @@
 /// @file
-/// Small dense kernels in plain loops: products, eigenvalues, the matrix exponential.
+/// Small dense kernels in plain loops: products and eigenvalues.
 ///
 /// They run on the caller's storage with the size as an argument, so that one instantiation serves
 /// all sizes: Eigen's solvers of fixed size cost seconds of compile time for each (EigenSolver: 7
@@ -10,20 +10,10 @@
 #include <complex>
 #include <esokit/core/scalar.hpp>
 #include <esokit/math/linear_equations.hpp>
+#include <esokit/math/matrix_exponential.hpp>
 #include <utility>
 
 namespace esokit::detail {
-
-/// out = a b, all n x n; `out` is neither of them.
-inline void multiply(const double* a, const double* b, double* out, int n) noexcept {
-  for (int j = 0; j < n; ++j) {
-    for (int i = 0; i < n; ++i) out[j * n + i] = 0.0;
-    for (int k = 0; k < n; ++k) {
-      const double factor = b[j * n + k];
-      for (int i = 0; i < n; ++i) out[j * n + i] += a[k * n + i] * factor;
-    }
-  }
-}
 
 /// out = a b', all n x n; `out` is neither of them.
 inline void multiply_transposed(const double* a, const double* b, double* out, int n) noexcept {
@@ -41,43 +31,6 @@ inline double sum_of_magnitudes(const double* values, int count) noexcept {
   double sum = 0.0;
   for (int i = 0; i < count; ++i) sum += std::abs(values[i]);
   return sum;
-}
-
-/// Largest sum of magnitudes of a row of a, n x n: the norm that goes with the largest component.
-inline double row_norm(const double* a, int n) noexcept {
-  double largest = 0.0;
-  for (int i = 0; i < n; ++i) {
-    double row = 0.0;
-    for (int j = 0; j < n; ++j) row += std::abs(a[j * n + i]);
-    if (!(row <= largest)) largest = row;  // a NaN stays
-  }
-  return largest;
-}
-
-/// exp(a) - I in place: Taylor series of a / 2^k, then squared k times as 2 E + E^2.
-/// @param a n x n @param work 2 n^2 numbers
-inline void exp_minus_identity(double* a, double* work, int n) noexcept {
-  double* const sum = work;
-  double* const product = work + n * n;
-  const double size = row_norm(a, n);
-  int squarings = 0;
-  if (is_finite(size) && size > 0.25) squarings = static_cast<int>(std::ceil(std::log2(size))) + 2;
-  const double scale = std::exp2(-squarings);
-  for (int i = 0; i < n * n; ++i) a[i] *= scale;
-  // With norm 1/4 the terms fall below 1e-17 by the 12th. Horner, from the smallest.
-  for (int i = 0; i < n * n; ++i) sum[i] = 0.0;
-  for (int i = 0; i < n; ++i) sum[i * n + i] = 1.0;
-  for (int k = 14; k >= 2; --k) {
-    multiply(a, sum, product, n);
-    for (int i = 0; i < n * n; ++i) sum[i] = product[i] / k;
-    for (int i = 0; i < n; ++i) sum[i * n + i] += 1.0;
-  }
-  multiply(a, sum, product, n);
-  for (int i = 0; i < n * n; ++i) a[i] = product[i];
-  for (int i = 0; i < squarings; ++i) {
-    multiply(a, a, product, n);
-    for (int j = 0; j < n * n; ++j) a[j] = 2.0 * a[j] + product[j];
-  }
 }
 
 /// Eigenvalues of the symmetric a onto its diagonal, eigenvectors into the columns of v, by Jacobi

@@ -1,13 +1,12 @@
 /// @file
-/// What a plant is, and linear plants with a disturbance.
+/// What a plant of the continuous simulation is, and a linear one with a disturbance.
 #pragma once
 
 #include <concepts>
-#include <cstddef>
 #include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
-#include <esokit/core/unroll.hpp>
 #include <esokit/eigen.hpp>
+#include <esokit/model/linear_plant.hpp>
 #include <esokit/sim/signals.hpp>
 #include <type_traits>
 #include <utility>
@@ -30,103 +29,56 @@ concept Plant = requires(const P& plant, const typename P::State& x,
   { plant.output(scalar, x) } -> std::same_as<typename P::State::Scalar>;
 };
 
-/// y^(Order) = d(t) + b0 u, with x = (y, y', .., y^(Order-1)).
+/// A linear plant with a disturbance d(t), for the continuous simulation.
 ///
-/// @tparam Disturbance a Signal, d(t) in the unit of y^(Order)
-template <int Order, PlainScalar ScalarType = double, class Disturbance = Constant<ScalarType>>
+/// @tparam Disturbance a Signal, d(t) in the unit that E of the plant takes: of a chain y^(n), of a
+///         transfer function that of u
+template <int States, PlainScalar ScalarType = double, class Disturbance = Constant<ScalarType>>
 requires Signal<Disturbance, ScalarType>
-class IntegratorChainPlant {
-  static_assert(Order >= 1);
-
+class DisturbedPlant {
  public:
-  static constexpr int states = Order;            ///< length of x
-  using State = EigenMatrix<ScalarType, states>;  ///< x
+  static constexpr int states = States;            ///< length of x
+  using State = EigenMatrix<ScalarType, states>;   ///< x
+  using Linear = LinearPlant<States, ScalarType>;  ///< the plant
 
   /// Settings of make.
   struct Config {
-    ScalarType input_gain{1};   ///< b0, unit of y^(Order) per unit of u; not zero
+    Linear plant{};             ///< without dead time, which an ODE cannot have
     Disturbance disturbance{};  ///< d(t)
   };
 
-  /// Refuses an input gain that is zero or not finite.
-  static Expected<IntegratorChainPlant, Error<ScalarType>> make(Config config) {
-    if (Rules<ScalarType> rules; !rules.nonzero("input_gain", config.input_gain))
-      return rules.error();
-    return IntegratorChainPlant(std::move(config));
-  }
-
-  /// x'. @param t s
-  State derivative(ScalarType t, const State& x, ScalarType u) const noexcept {
-    State rate;
-    for (int i = 0; i + 1 < states; ++i) rate[i] = x[i + 1];
-    rate[states - 1] = total_disturbance(t, x) + config_.input_gain * u;
-    return rate;
-  }
-
-  /// y.
-  ScalarType output(ScalarType /*t*/, const State& x) const noexcept { return x[0]; }
-
-  /// d(t), unit of y^(Order).
-  ScalarType total_disturbance(ScalarType t, const State& /*x*/) const noexcept {
-    return config_.disturbance(t);
-  }
-
- private:
-  explicit IntegratorChainPlant(Config config) : config_(std::move(config)) {}
-
-  Config config_;
-};
-
-/// y^(Order) + a_{Order-1} y^(Order-1) + .. + a_0 y = b u + d(t), with x = (y, .., y^(Order-1)).
-///
-/// @tparam Disturbance a Signal, d(t) in the unit of y^(Order)
-template <int Order, PlainScalar ScalarType = double, class Disturbance = Constant<ScalarType>>
-requires Signal<Disturbance, ScalarType>
-class LinearPlant {
-  static_assert(Order >= 1);
-
- public:
-  static constexpr int states = Order;            ///< length of x
-  using State = EigenMatrix<ScalarType, states>;  ///< x
-
-  /// Settings of make.
-  struct Config {
-    Array<ScalarType, Order> coefficients{};  ///< a_0 .. a_{Order-1}, s^-(Order-i)
-    ScalarType input_gain{1};                 ///< b, unit of y^(Order) per unit of u; not zero
-    Disturbance disturbance{};                ///< d(t)
-  };
-
-  /// Refuses coefficients that are not finite and an input gain that is zero or not finite.
-  static Expected<LinearPlant, Error<ScalarType>> make(Config config) {
+  /// Refuses a plant that its `check` refuses, and one with a dead time.
+  static Expected<DisturbedPlant, Error<ScalarType>> make(Config config) {
     Rules<ScalarType> rules;
-    rules.finite("coefficients", config.coefficients).nonzero("input_gain", config.input_gain);
+    rules.all_of(config.plant.check())
+        .left_out("plant.dead_time", config.plant.dead_time,
+                  "must be zero in a continuous simulation");
     if (!rules) return rules.error();
-    return LinearPlant(std::move(config));
+    return DisturbedPlant(std::move(config));
   }
 
   /// x'. @param t s
   State derivative(ScalarType t, const State& x, ScalarType u) const noexcept {
+    const Linear& plant = config_.plant;
+    const ScalarType d = config_.disturbance(t);
     State rate;
-    for (int i = 0; i + 1 < states; ++i) rate[i] = x[i + 1];
-    rate[states - 1] = total_disturbance(t, x) + config_.input_gain * u;
+    for (int i = 0; i < states; ++i) {
+      ScalarType sum = plant.b(i) * u + plant.e(i) * d;
+      for (int j = 0; j < states; ++j) sum += plant.a(i, j) * x[j];
+      rate[i] = sum;
+    }
     return rate;
   }
 
   /// y.
-  ScalarType output(ScalarType /*t*/, const State& x) const noexcept { return x[0]; }
-
-  /// d(t) - a_0 y - .. - a_{Order-1} y^(Order-1): what an observer with b0 = b calls the total
-  /// disturbance.
-  ScalarType total_disturbance(ScalarType t, const State& x) const noexcept {
-    ScalarType sum = config_.disturbance(t);
-    for (int i = 0; i < states; ++i) {
-      sum -= config_.coefficients[static_cast<std::size_t>(i)] * x[i];
-    }
+  ScalarType output(ScalarType /*t*/, const State& x) const noexcept {
+    ScalarType sum(0);
+    for (int j = 0; j < states; ++j) sum += config_.plant.c(j) * x[j];
     return sum;
   }
 
  private:
-  explicit LinearPlant(Config config) : config_(std::move(config)) {}
+  explicit DisturbedPlant(Config config) : config_(std::move(config)) {}
 
   Config config_;
 };

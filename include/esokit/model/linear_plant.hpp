@@ -1,0 +1,373 @@
+/// @file
+/// LinearPlant: the one linear plant. It is simulated, analysed and known by observers.
+#pragma once
+
+#include <esokit/core/check.hpp>
+#include <esokit/core/expected.hpp>
+#include <esokit/core/lanes.hpp>
+#include <esokit/core/matrix.hpp>
+#include <esokit/core/unroll.hpp>
+#include <esokit/math/matrix_exponential.hpp>
+#include <limits>
+
+namespace esokit {
+
+/// x' = A x + B u(t - dead_time) + E d,  y = C x.
+///
+/// An aggregate, so that it can be written down as it is; what is typed in is better made by one of
+/// the four, which say what is wrong with it:
+///
+///     chain({.coefficients = {5, 2}, .input_gain = 10})           // y'' + 2 y' + 5 y = 10 u + d
+///     transfer_function({.numerator = {3, 1}, .denominator = {5, 2}})  // (s + 3)/(s^2 + 2 s + 5)
+///     state_space({.a = {{0, 1}, {-5, -2}}, .b = {0, 10}, .c = {1, 0}})
+///
+/// and `with_lag`, `with_sensor`, `with_dead_time`, which put an actuator, a sensor or a delay
+/// around a plant that is there.
+/// @tparam States length of x @tparam Inputs, Outputs lengths of u and y; d has one entry an input
+template <int States, Scalar ScalarType = double, int Inputs = 1, int Outputs = 1>
+struct LinearPlant {
+  static_assert(States >= 1 && Inputs >= 1 && Outputs >= 1);
+
+  static constexpr int states = States;    ///< length of x
+  static constexpr int inputs = Inputs;    ///< length of u, and of d
+  static constexpr int outputs = Outputs;  ///< length of y
+  /// One input, one output: what ADRC with one observer is for.
+  static constexpr bool single = Inputs == 1 && Outputs == 1;
+
+  using scalar_type = ScalarType;              ///< of all its numbers
+  using State = Vector<ScalarType, States>;    ///< x
+  using Input = Vector<ScalarType, Inputs>;    ///< u, or d
+  using Output = Vector<ScalarType, Outputs>;  ///< y
+
+  Matrix<ScalarType, States, States> a{};   ///< A, 1/s
+  Matrix<ScalarType, States, Inputs> b{};   ///< B
+  Matrix<ScalarType, Outputs, States> c{};  ///< C
+  /// E: where the disturbance enters; as u does, and in the unit of u, if nothing else is said.
+  Matrix<ScalarType, States, Inputs> e = b;
+  ScalarType dead_time{};  ///< s, from u to the plant; d is not delayed
+
+  /// Settings of `chain`.
+  struct Chain {
+    Array<ScalarType, States> coefficients{};  ///< a_0 .. a_(n-1), unit of a_i: s^-(n-i)
+    ScalarType input_gain{1.0};  ///< b0, unit of y^(n) per unit of u; not zero, either sign
+    ScalarType dead_time{};      ///< s
+  };
+
+  /// Settings of `transfer_function`.
+  struct TransferFunction {
+    Array<ScalarType, States> numerator{};    ///< b_0 .. b_(n-1), not all zero
+    Array<ScalarType, States> denominator{};  ///< a_0 .. a_(n-1); s^n has the coefficient 1
+    ScalarType dead_time{};                   ///< s
+  };
+
+  /// n integrations from u to y with what feeds back on the way, as ADRC sees a plant:
+  ///
+  ///     y^(n) + a_(n-1) y^(n-1) + .. + a_0 y = b0 u(t - dead_time) + d
+  ///
+  /// x = (y, y', .., y^(n-1)), and d is in the unit of y^(n).
+  static constexpr Expected<LinearPlant, Error<ScalarType>> chain(
+      const Chain& config) requires single {
+    Rules<ScalarType> rules;
+    rules.nonzero("input_gain", config.input_gain)
+        .finite("coefficients", config.coefficients)
+        .not_negative("dead_time", config.dead_time);
+    if (!rules) return rules.error();
+    LinearPlant plant = companion(config.coefficients, config.dead_time);
+    plant.b(States - 1) = config.input_gain;
+    plant.e(States - 1) = ScalarType(1.0);
+    return plant;
+  }
+
+  /// From u to y
+  ///
+  ///     (b_(n-1) s^(n-1) + .. + b_0) / (s^n + a_(n-1) s^(n-1) + .. + a_0) e^(-s dead_time)
+  ///
+  /// with d added to u. The first state is y; without zeros x = (y, y', .., y^(n-1)).
+  static constexpr Expected<LinearPlant, Error<ScalarType>> transfer_function(
+      const TransferFunction& config) requires single {
+    Rules<ScalarType> rules;
+    rules.finite("numerator", config.numerator)
+        .finite("denominator", config.denominator)
+        .not_negative("dead_time", config.dead_time);
+    if (!rules) return rules.error();
+    LinearPlant plant = companion(config.denominator, config.dead_time);
+    // Row k of B is what an impulse of u makes of y^(k): b_(n-1-k) less what feeds back.
+    bool any = false;
+    for (int k = 0; k < States; ++k) {
+      ScalarType row = config.numerator[static_cast<std::size_t>(States - 1 - k)];
+      any = any || !all(!(detail::absolute(row) > ScalarType(0.0)));
+      for (int j = 0; j < k; ++j) {
+        row = row - config.denominator[static_cast<std::size_t>(States - k + j)] * plant.b(j);
+      }
+      rules.require(all(is_finite(row)), "numerator", row,
+                    "gives, with this denominator, a state that the scalar cannot hold",
+                    States - 1 - k);
+      plant.b(k) = row;
+    }
+    rules.require(any, "numerator", config.numerator[0], "must not be zero throughout", 0);
+    if (!rules) return rules.error();
+    plant.e = plant.b;
+    return plant;
+  }
+
+  /// The plant as it is listed, after `check`.
+  static constexpr Expected<LinearPlant, Error<ScalarType>> state_space(const LinearPlant& plant) {
+    if (const auto ok = plant.check(); !ok) return ok.error();
+    return plant;
+  }
+
+  /// Error of a number that is not finite, of a negative dead time, and of an output that no input
+  /// reaches. The index is that of the element, by columns; of an output its number.
+  [[nodiscard]] constexpr Check<ScalarType> check() const {
+    Rules<ScalarType> rules;
+    rules.finite("a", a).finite("b", b).finite("c", c).finite("e", e).not_negative("dead_time",
+                                                                                   dead_time);
+    for (int i = 0; i < Outputs && rules; ++i) {
+      rules.require(relative_degree(i) > 0, "c", c(i, 0), "is of an output that no input reaches",
+                    i);
+    }
+    return rules;
+  }
+
+  /// x'. @param u as it arrives, dead_time later than it was sent
+  [[nodiscard]] constexpr State derivative(const State& x, const Input& u,
+                                           const Input& d = Input()) const noexcept {
+    State rate;
+    detail::unroll<States>([&](auto i) ESOKIT_INLINE_LAMBDA {
+      ScalarType sum = a(i, 0) * x(0);
+      detail::unroll<States - 1>([&](auto j)
+                                     ESOKIT_INLINE_LAMBDA { sum = sum + a(i, j + 1) * x(j + 1); });
+      detail::unroll<Inputs>(
+          [&](auto j) ESOKIT_INLINE_LAMBDA { sum = sum + (b(i, j) * u(j) + e(i, j) * d(j)); });
+      rate(i) = sum;
+    });
+    return rate;
+  }
+
+  /// y.
+  [[nodiscard]] constexpr Output output(const State& x) const noexcept {
+    Output y;
+    detail::unroll<Outputs>([&](auto i) ESOKIT_INLINE_LAMBDA {
+      ScalarType sum = c(i, 0) * x(0);
+      detail::unroll<States - 1>([&](auto j)
+                                     ESOKIT_INLINE_LAMBDA { sum = sum + c(i, j + 1) * x(j + 1); });
+      y(i) = sum;
+    });
+    return y;
+  }
+
+  /// n of ADRC: which derivative of the output is the first one that an input changes at once; 0 if
+  /// none does. What rounding may have left of a zero counts as one.
+  [[nodiscard]] constexpr int relative_degree(int output = 0) const noexcept {
+    return first_gain(output).degree;
+  }
+
+  /// b0 of ADRC: what a unit of u adds to the derivative of order relative_degree(). Of several
+  /// channels a matrix, Outputs x Inputs: the input_matrix of MimoAdrc.
+  [[nodiscard]] constexpr auto input_gain() const noexcept {
+    if constexpr (single) {
+      return first_gain(0).gain(0);
+    } else {
+      Matrix<ScalarType, Outputs, Inputs> gains;
+      for (int i = 0; i < Outputs; ++i) {
+        const auto row = first_gain(i).gain;
+        for (int j = 0; j < Inputs; ++j) gains(i, j) = row(j);
+      }
+      return gains;
+    }
+  }
+
+  /// a_0 .. a_(n-1) of det(s I - A) = s^n + a_(n-1) s^(n-1) + .. + a_0: the plant's poles, as
+  /// `chain` and KnownPoles take them.
+  [[nodiscard]] constexpr Array<ScalarType, States> coefficients() const noexcept {
+    Array<ScalarType, States> all{};
+    auto power = Matrix<ScalarType, States, States>::Identity();  // Faddeev and LeVerrier
+    for (int k = 1; k <= States; ++k) {
+      power = a * power;
+      const ScalarType next = -power.trace() / detail::integer<ScalarType>(k);
+      all[static_cast<std::size_t>(States - k)] = next;
+      for (int i = 0; i < States; ++i) power(i, i) = power(i, i) + next;
+    }
+    return all;
+  }
+
+ private:
+  struct Reached {
+    int degree;
+    RowVector<ScalarType, Inputs> gain;
+  };
+
+  /// A and C of the states (y, y', .., y^(n-1)).
+  static constexpr LinearPlant companion(const Array<ScalarType, States>& coefficients,
+                                         const ScalarType& dead_time) noexcept {
+    LinearPlant plant;
+    for (int i = 0; i < States; ++i) {
+      if (i + 1 < States) plant.a(i, i + 1) = ScalarType(1.0);
+      plant.a(States - 1, i) = -coefficients[static_cast<std::size_t>(i)];
+    }
+    plant.c(0, 0) = ScalarType(1.0);
+    plant.dead_time = dead_time;
+    return plant;
+  }
+
+  /// The first of C B, C A B, C A^2 B, .. that is more than the rounding of its sums.
+  [[nodiscard]] constexpr Reached first_gain(int output) const noexcept {
+    using Table = detail::TableScalar<ScalarType>;
+    RowVector<ScalarType, States> row = c.row(output);
+    RowVector<ScalarType, States> magnitude = magnitudes(row);
+    for (int degree = 1; degree <= States; ++degree) {
+      const auto gain = row * b;
+      const auto size = magnitude * magnitudes(b);
+      const ScalarType rounding(std::numeric_limits<Table>::epsilon() *
+                                static_cast<Table>(2 * States * degree));
+      for (int j = 0; j < Inputs; ++j) {
+        if (!all(detail::absolute(gain(j)) <= rounding * size(j))) return {degree, gain};
+      }
+      row = row * a;
+      magnitude = magnitude * magnitudes(a);
+    }
+    return {0, {}};
+  }
+
+  template <int Rows, int Columns>
+  static constexpr Matrix<ScalarType, Rows, Columns> magnitudes(
+      Matrix<ScalarType, Rows, Columns> matrix) noexcept {
+    for (ScalarType& element : matrix) element = detail::absolute(element);
+    return matrix;
+  }
+};
+
+/// The plant behind an actuator of first order, time_constant u_a' + u_a = u, one for each input.
+/// d enters behind it, as a load does. The new states come last: u_a.
+/// @param time_constant s
+template <int States, Scalar S, int Inputs, int Outputs>
+constexpr Expected<LinearPlant<States + Inputs, S, Inputs, Outputs>, Error<S>> with_lag(
+    const LinearPlant<States, S, Inputs, Outputs>& plant, const S& time_constant) {
+  Rules<S> rules;
+  rules.all_of(plant.check())
+      .positive("time_constant", time_constant)
+      .invertible("time_constant", time_constant);
+  if (!rules) return rules.error();
+  LinearPlant<States + Inputs, S, Inputs, Outputs> lagged;
+  lagged.dead_time = plant.dead_time;
+  for (int i = 0; i < States; ++i) {
+    for (int j = 0; j < States; ++j) lagged.a(i, j) = plant.a(i, j);
+    for (int j = 0; j < Inputs; ++j) {
+      lagged.a(i, States + j) = plant.b(i, j);
+      lagged.e(i, j) = plant.e(i, j);
+    }
+    for (int j = 0; j < Outputs; ++j) lagged.c(j, i) = plant.c(j, i);
+  }
+  for (int j = 0; j < Inputs; ++j) {
+    lagged.b(States + j, j) = S(1.0) / time_constant;
+    lagged.a(States + j, States + j) = -lagged.b(States + j, j);
+  }
+  if (const auto ok = lagged.check(); !ok) return ok.error();
+  return lagged;
+}
+
+/// The plant seen by a sensor of first order, time_constant y_s' + y_s = y, one for each output.
+/// The new states come last: y_s, which are the outputs now.
+/// @param time_constant s
+template <int States, Scalar S, int Inputs, int Outputs>
+constexpr Expected<LinearPlant<States + Outputs, S, Inputs, Outputs>, Error<S>> with_sensor(
+    const LinearPlant<States, S, Inputs, Outputs>& plant, const S& time_constant) {
+  Rules<S> rules;
+  rules.all_of(plant.check())
+      .positive("time_constant", time_constant)
+      .invertible("time_constant", time_constant);
+  if (!rules) return rules.error();
+  LinearPlant<States + Outputs, S, Inputs, Outputs> seen;
+  seen.dead_time = plant.dead_time;
+  for (int i = 0; i < States; ++i) {
+    for (int j = 0; j < States; ++j) seen.a(i, j) = plant.a(i, j);
+    for (int j = 0; j < Inputs; ++j) {
+      seen.b(i, j) = plant.b(i, j);
+      seen.e(i, j) = plant.e(i, j);
+    }
+  }
+  const S rate = S(1.0) / time_constant;
+  for (int j = 0; j < Outputs; ++j) {
+    for (int i = 0; i < States; ++i) seen.a(States + j, i) = plant.c(j, i) * rate;
+    seen.a(States + j, States + j) = -rate;
+    seen.c(j, States + j) = S(1.0);
+  }
+  if (const auto ok = seen.check(); !ok) return ok.error();
+  return seen;
+}
+
+/// The plant with so much more dead time. @param dead_time s, zero or more
+template <int States, Scalar S, int Inputs, int Outputs>
+constexpr Expected<LinearPlant<States, S, Inputs, Outputs>, Error<S>> with_dead_time(
+    const LinearPlant<States, S, Inputs, Outputs>& plant, const S& dead_time) {
+  Rules<S> rules;
+  rules.all_of(plant.check()).not_negative("dead_time", dead_time);
+  if (!rules) return rules.error();
+  auto late = plant;
+  late.dead_time = late.dead_time + dead_time;
+  if (const auto ok = late.check(); !ok) return ok.error();
+  return late;
+}
+
+/// What a while under held inputs does to the state of a plant: x + increment x + input u +
+/// disturbance d. Exact.
+///
+/// The increment, exp(A t) - I, is kept instead of exp(A t), which for a short while has the digits
+/// of the dynamics behind those of I.
+template <int States, Scalar S = double, int Inputs = 1>
+struct HeldPlant {
+  Matrix<S, States, States> increment{};    ///< exp(A t) - I
+  Matrix<S, States, Inputs> input{};        ///< the integral of exp(A s) B over 0 .. t
+  Matrix<S, States, Inputs> disturbance{};  ///< the integral of exp(A s) E over 0 .. t
+};
+
+/// The plant over `duration`, u (as it arrives: without the dead time) and d held.
+/// @param duration s, zero or more
+/// @return error for a plant that `check` refuses and for a result that the scalar cannot hold
+template <int States, Scalar S, int Inputs, int Outputs>
+requires PlainScalar<LaneScalar<S>>
+constexpr Expected<HeldPlant<States, S, Inputs>, Error<S>> held_plant(
+    const LinearPlant<States, S, Inputs, Outputs>& plant, const S& duration) {
+  using Lane = LaneScalar<S>;
+  Rules<S> rules;
+  rules.all_of(plant.check()).not_negative("duration", duration);
+  if (!rules) return rules.error();
+  constexpr int size = States + 2 * Inputs;
+  HeldPlant<States, S, Inputs> held;
+  for (int lane = 0; lane < lane_count<S>; ++lane) {
+    Array<Lane, size * size> stacked{};  // ((A, B, E), (0, 0, 0)), by columns
+    Array<Lane, 2 * size * size> work{};
+    const auto entry = [&](int i, int j) -> Lane& {
+      return stacked[static_cast<std::size_t>(j * size + i)];
+    };
+    const Lane time = detail::number_of_lane(duration, lane);
+    for (int i = 0; i < States; ++i) {
+      for (int j = 0; j < States; ++j)
+        entry(i, j) = detail::number_of_lane(plant.a(i, j), lane) * time;
+      for (int j = 0; j < Inputs; ++j) {
+        entry(i, States + j) = detail::number_of_lane(plant.b(i, j), lane) * time;
+        entry(i, States + Inputs + j) = detail::number_of_lane(plant.e(i, j), lane) * time;
+      }
+    }
+    detail::exp_minus_identity(stacked.data(), work.data(), size);
+    for (int i = 0; i < States; ++i) {
+      for (int j = 0; j < States; ++j) detail::set_lane(held.increment(i, j), entry(i, j), lane);
+      for (int j = 0; j < Inputs; ++j) {
+        detail::set_lane(held.input(i, j), entry(i, States + j), lane);
+        detail::set_lane(held.disturbance(i, j), entry(i, States + Inputs + j), lane);
+      }
+    }
+  }
+  const auto fits = [&](const auto& matrix) {
+    for (const S& element : matrix) {
+      if (!all(is_finite(element))) return false;
+    }
+    return true;
+  };
+  rules.require(fits(held.increment) && fits(held.input) && fits(held.disturbance), "duration",
+                duration, "is so long that the scalar cannot hold what the plant does in it");
+  if (!rules) return rules.error();
+  return held;
+}
+
+}  // namespace esokit
