@@ -45,6 +45,7 @@
 #include <esokit/core/expected.hpp>
 #include <esokit/core/interval.hpp>
 #include <esokit/core/kernels.hpp>
+#include <esokit/core/lane_by_lane.hpp>
 #include <esokit/core/lanes.hpp>
 #include <esokit/core/language.hpp>
 #include <esokit/core/matrix.hpp>

@@ -6,7 +6,6 @@
 #include <esokit/gain/error_polynomial.hpp>
 #include <esokit/math/positivity.hpp>
 #include <support/numbers.hpp>
-#include <support/pack.hpp>
 #include <vector>
 
 namespace esokit_test {
@@ -72,17 +71,6 @@ TEST(PositiveOnHalfLine, AgreesWithScan) {
 }
 
 /// A pack is positive if all its lanes are.
-TEST(PositiveOnHalfLine, Packs) {
-  using P = Pack<double, 2>;
-  const auto both = [](double first, double second) {
-    std::array<P, 3> c{P(1.0), P(std::array<double, 2>{first, second}), P(1.0)};
-    return positive_on_half_line<2, P>(c);
-  };
-  EXPECT_TRUE(both(-1.9, -1.5));
-  EXPECT_FALSE(both(-1.9, -2.1));
-  EXPECT_FALSE(both(-2.1, -1.9));
-}
-
 TEST(IsHurwitz, AgreesWithRoots) {
   Random random(9);
   int stable = 0;

@@ -2,6 +2,7 @@
 /// What all adapters of observers have in common: they hold what they adapt, and are none.
 #pragma once
 
+#include <esokit/core/lane_by_lane.hpp>
 #include <esokit/observer/concepts.hpp>
 
 namespace esokit {
@@ -38,7 +39,7 @@ struct ExtensionOf<Observer> {
 template <LoopObserver Observer>
 class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Observer> {
   static_assert(PlainScalar<typename Observer::scalar_type>,
-                "esokit: adapters are of plain scalars: take an adapter for each lane of a pack");
+                "esokit: an adapter of packs is a PackAdapter: so many of plain scalars");
 
  public:
   using Adapted = Observer;                            ///< what is adapted
@@ -152,6 +153,30 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
   explicit constexpr Adapter(const Observer& observer) noexcept : observer_(observer) {}
 
   [[no_unique_address]] Observer observer_;  ///< what is adapted; the padding at its end is free
+};
+
+/// Base of the adapters of packs: an adapter branches on what is measured, so it goes lane by lane.
+/// @tparam Self the adapter of packs @tparam Plain of a lane @tparam Settings its Config
+template <class Self, class Plain, LoopObserver Observer, class Settings>
+class PackAdapter : public LaneByLane<Self, Plain, typename Observer::scalar_type, Settings>,
+                    public detail::LevelsOf<Observer>,
+                    public detail::ExtensionOf<Observer> {
+  using Base = LaneByLane<Self, Plain, typename Observer::scalar_type, Settings>;
+
+ public:
+  using Adapted = Observer;                                ///< what is adapted
+  using Estimate = typename Observer::Estimate;            ///< (y, .., y^(n-1), d, ..), N x 1
+  static constexpr int order = Observer::order;            ///< n, order of the plant
+  static constexpr int size = Observer::size;              ///< N
+  static constexpr ObserverTraits traits = Plain::traits;  ///< what it is beyond LoopObserver
+
+  using Base::Base;
+
+  /// What is adapted, put together from the lanes.
+  [[nodiscard]] Observer observer() const noexcept {
+    return this->template gathered<Observer>(
+        [](const Plain& lane) -> const auto& { return lane.observer(); });
+  }
 };
 
 }  // namespace esokit

@@ -8,6 +8,19 @@
 
 namespace esokit {
 
+/// Config of DelayedInput.
+template <LoopObserver Observer>
+struct DelayedInputConfig {
+  using S = typename Observer::scalar_type;  ///< of signals and settings
+
+  typename Observer::Config observer{};  ///< of the observer itself
+  int delay = 0;                         ///< d, samples, 0 .. Capacity
+
+  /// @cond
+  static constexpr auto fields(auto& c) noexcept { return std::tie(c.observer, c.delay); }
+  /// @endcond
+};
+
 /// Feeds the observer u[k-d] instead of u[k] (bus, drive or computing delay of d sample times), so
 /// that input and output belong together and the delay is not taken for a disturbance.
 ///
@@ -29,11 +42,7 @@ class DelayedInput : public Adapter<Observer> {
     return traits;
   }();
 
-  /// Settings of make.
-  struct Config {
-    typename Observer::Config observer{};  ///< of the observer itself
-    int delay = 0;                         ///< d, samples, 0 .. Capacity
-  };
+  using Config = DelayedInputConfig<Observer>;  ///< settings of make
 
   /// Checks the settings and does all the design work.
   /// @return the observer with an empty (zero) delay line, or an error that names the field
@@ -120,6 +129,20 @@ class DelayedInput : public Adapter<Observer> {
   Array<S, length> inputs_{};
   int delay_;
   int newest_ = 0;
+};
+
+/// The same of packs, lane by lane.
+template <LoopObserver Observer, int Capacity>
+requires PackScalar<typename Observer::scalar_type>
+class DelayedInput<Observer, Capacity>
+    : public PackAdapter<DelayedInput<Observer, Capacity>,
+                         DelayedInput<detail::LaneOf<Observer>, Capacity>, Observer,
+                         DelayedInputConfig<Observer>> {
+ public:
+  using DelayedInput::PackAdapter::PackAdapter;
+  template <class T>
+  using with_scalar =
+      DelayedInput<detail::WithScalar<Observer, T>, Capacity>;  ///< the same of another scalar
 };
 
 /// Told apart in snapshots.

@@ -15,11 +15,17 @@ struct PlantModelTraits {
 };
 
 /// fbar = -(a_0 y + a_1 y' + .. + a_(n-1) y^(n-1)): the plant's poles are known.
-template <int Order, PlainScalar S = double>
+template <int Order, Scalar S = double>
 struct KnownPoles {
   static constexpr PlantModelTraits traits{.checks = true};  ///< what it can do beside fbar
+  template <class T>
+  using with_scalar = KnownPoles<Order, T>;  ///< the same of another scalar
 
   Array<S, Order> coefficients{};  ///< a_0 .. a_(n-1) of s^n + a_(n-1) s^(n-1) + .. + a_0
+
+  /// @cond
+  static constexpr auto fields(auto& m) noexcept { return std::tie(m.coefficients); }
+  /// @endcond
 
   /// Error of a coefficient that is not finite; `make` of the observer asks for it.
   [[nodiscard]] Check<S> check() const {
@@ -29,7 +35,7 @@ struct KnownPoles {
   /// fbar, unit of y^(n). @param estimate (y, .., y^(n-1), ..), at least n x 1
   template <int Size>
   S operator()(const Vector<S, Size>& estimate) const noexcept {
-    S sum(0);
+    S sum(0.0);
     for (int i = 0; i < Order; ++i) {
       sum = sum - coefficients[static_cast<std::size_t>(i)] * estimate(i);
     }
@@ -38,7 +44,7 @@ struct KnownPoles {
 };
 
 /// Told apart in snapshots.
-template <int Order, PlainScalar S>
+template <int Order, Scalar S>
 inline constexpr std::uint32_t type_tag<KnownPoles<Order, S>> = make_type_tag<S>("KnownPoles",
                                                                                  Order);
 
@@ -53,6 +59,19 @@ concept PlantModel = std::copyable<Model> &&
     requires(const Model& model) {
       { model.check() } -> std::same_as<Check<typename Observer::scalar_type>>;
     });
+
+/// Config of KnownModel.
+template <LoopObserver Observer, class Model>
+struct KnownModelConfig {
+  using S = typename Observer::scalar_type;  ///< of signals and settings
+
+  typename Observer::Config observer{};  ///< of the observer itself
+  Model model{};                         ///< fbar
+
+  /// @cond
+  static constexpr auto fields(auto& c) noexcept { return std::tie(c.observer, c.model); }
+  /// @endcond
+};
 
 /// Observer of y^(n) = fbar(y, ..) + d + b0 u with fbar known. The chain is driven by u + fbar/b0,
 /// fbar taken at the last estimate and held over the step, and estimates d alone.
@@ -84,11 +103,7 @@ class KnownModel : public Adapter<Observer> {
     return traits;
   }();
 
-  /// Settings of make.
-  struct Config {
-    typename Observer::Config observer{};  ///< of the observer itself
-    Model model{};                         ///< fbar
-  };
+  using Config = KnownModelConfig<Observer, Model>;  ///< settings of make
 
   /// Checks the settings and does all the design work.
   /// @return the observer at rest in zero, or an error that names the field
@@ -224,6 +239,23 @@ class KnownModel : public Adapter<Observer> {
   Model model_;
   S inverse_gain_;
   S applied_input_{};
+};
+
+/// The same of packs, lane by lane.
+template <ShiftableDisturbance Observer, class Model>
+requires PlantModel<Model, Observer> && PackScalar<typename Observer::scalar_type>
+class KnownModel<Observer, Model>
+    : public PackAdapter<KnownModel<Observer, Model>,
+                         KnownModel<detail::LaneOf<Observer>,
+                                    typename detail::ForScalar<
+                                        Model, LaneScalar<typename Observer::scalar_type>>::type>,
+                         Observer, KnownModelConfig<Observer, Model>> {
+ public:
+  using KnownModel::PackAdapter::PackAdapter;
+  template <class T>
+  using with_scalar =
+      KnownModel<detail::WithScalar<Observer, T>,
+                 typename detail::ForScalar<Model, T>::type>;  ///< the same of another scalar
 };
 
 /// Told apart in snapshots.

@@ -8,6 +8,24 @@
 
 namespace esokit {
 
+/// Config of OutlierGate.
+template <LoopObserver Observer>
+struct OutlierGateConfig {
+  using S = typename Observer::scalar_type;  ///< of signals and settings
+
+  typename Observer::Config observer{};  ///< of the observer itself
+  S threshold{};          ///< unit of y: an innovation up to this is no outlier; 0: no gate
+  S running_factor{};     ///< nor is one up to this times the running mean of abs(innovation)
+                          ///< (0.8 standard deviations where Gaussian); 0: the threshold alone
+  int most_in_a_row = 5;  ///< outliers in a row that are rejected, 1 .. 65000
+
+  /// @cond
+  static constexpr auto fields(auto& c) noexcept {
+    return std::tie(c.observer, c.threshold, c.running_factor, c.most_in_a_row);
+  }
+  /// @endcond
+};
+
 /// Rejects a measurement whose innovation is too large: the observer only predicts, and the next
 /// correction uses the gain for the gap. Without it one y of 1e30 spoils a linear observer for ln
 /// 1e30 / (omega_o T) samples.
@@ -38,14 +56,7 @@ class OutlierGate : public Adapter<Observer> {
     return traits;
   }();
 
-  /// Settings of make.
-  struct Config {
-    typename Observer::Config observer{};  ///< of the observer itself
-    S threshold{};          ///< unit of y: an innovation up to this is no outlier; 0: no gate
-    S running_factor{};     ///< nor is one up to this times the running mean of abs(innovation)
-                            ///< (0.8 standard deviations where Gaussian); 0: the threshold alone
-    int most_in_a_row = 5;  ///< outliers in a row that are rejected, 1 .. 65000
-  };
+  using Config = OutlierGateConfig<Observer>;  ///< settings of make
 
   /// Checks the settings and does all the design work.
   /// @return the observer at rest in zero, or an error that names the field
@@ -166,6 +177,18 @@ class OutlierGate : public Adapter<Observer> {
   std::uint16_t most_in_a_row_;
   std::uint16_t count_ = 0;  ///< in a row: rejected while shut, within the limit while open
   bool open_ = true;
+};
+
+/// The same of packs, lane by lane.
+template <LevelledObserver Observer>
+requires RestartingObserver<Observer> && PackScalar<typename Observer::scalar_type>
+class OutlierGate<Observer>
+    : public PackAdapter<OutlierGate<Observer>, OutlierGate<detail::LaneOf<Observer>>, Observer,
+                         OutlierGateConfig<Observer>> {
+ public:
+  using OutlierGate::PackAdapter::PackAdapter;
+  template <class T>
+  using with_scalar = OutlierGate<detail::WithScalar<Observer, T>>;  ///< the same of another scalar
 };
 
 /// Told apart in snapshots.

@@ -7,6 +7,19 @@
 
 namespace esokit {
 
+/// Config of VariableTime.
+template <LoopObserver Observer>
+struct VariableTimeConfig {
+  using S = typename Observer::scalar_type;  ///< of signals and settings
+
+  typename Observer::Config observer{};  ///< with the nominal sample time T
+  S ratio = S(4);                        ///< above 1: steps may take T / ratio .. T ratio
+
+  /// @cond
+  static constexpr auto fields(auto& c) noexcept { return std::tie(c.observer, c.ratio); }
+  /// @endcond
+};
+
 /// Tells the observer before each step how long it took; chain and gains follow exactly.
 ///
 /// A step of another length than the last one is a retune: the observer's whole `make`, with one
@@ -35,11 +48,7 @@ class VariableTime : public Adapter<Observer> {
     return traits;
   }();
 
-  /// Settings of make.
-  struct Config {
-    typename Observer::Config observer{};  ///< with the nominal sample time T
-    S ratio = S(4);                        ///< above 1: steps may take T / ratio .. T ratio
-  };
+  using Config = VariableTimeConfig<Observer>;  ///< settings of make
 
   /// Checks the settings and does all the design work.
   /// @return the observer at rest in zero, or an error that names the field; the observer's config
@@ -157,6 +166,19 @@ class VariableTime : public Adapter<Observer> {
   S step_time_;
   S current_;  ///< the sample time that the observer has now
   S elapsed_{};
+};
+
+/// The same of packs, lane by lane.
+template <RestartingObserver Observer>
+requires PackScalar<typename Observer::scalar_type>
+class VariableTime<Observer>
+    : public PackAdapter<VariableTime<Observer>, VariableTime<detail::LaneOf<Observer>>, Observer,
+                         VariableTimeConfig<Observer>> {
+ public:
+  using VariableTime::PackAdapter::PackAdapter;
+  template <class T>
+  using with_scalar =
+      VariableTime<detail::WithScalar<Observer, T>>;  ///< the same of another scalar
 };
 
 /// Told apart in snapshots.

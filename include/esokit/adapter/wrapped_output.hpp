@@ -11,6 +11,19 @@
 
 namespace esokit {
 
+/// Config of WrappedOutput.
+template <LoopObserver Observer>
+struct WrappedOutputConfig {
+  using S = typename Observer::scalar_type;  ///< of signals and settings
+
+  typename Observer::Config observer{};  ///< of the observer itself
+  S period{};                            ///< of y, in its unit: 2 pi, 360
+
+  /// @cond
+  static constexpr auto fields(auto& c) noexcept { return std::tie(c.observer, c.period); }
+  /// @endcond
+};
+
 /// Counts the turns, so a measurement in any branch (0..2 pi, -180..180) may be fed as it comes,
 /// and keeps z_1 within half a period of zero, so that float stays exact after many turns.
 ///
@@ -53,11 +66,7 @@ class WrappedOutput : public Adapter<Observer> {
     return traits;
   }();
 
-  /// Settings of make.
-  struct Config {
-    typename Observer::Config observer{};  ///< of the observer itself
-    S period{};                            ///< of y, in its unit: 2 pi, 360
-  };
+  using Config = WrappedOutputConfig<Observer>;  ///< settings of make
 
   /// Checks the settings and does all the design work.
   /// @return the observer at rest in zero, or an error that names the field
@@ -358,6 +367,19 @@ class WrappedOutput : public Adapter<Observer> {
   Count count_{};
   struct Nothing {};
   [[no_unique_address]] std::conditional_t<gated, Heard, Nothing> heard_{};
+};
+
+/// The same of packs, lane by lane.
+template <ShiftableOutput Observer>
+requires PackScalar<typename Observer::scalar_type>
+class WrappedOutput<Observer>
+    : public PackAdapter<WrappedOutput<Observer>, WrappedOutput<detail::LaneOf<Observer>>, Observer,
+                         WrappedOutputConfig<Observer>> {
+ public:
+  using WrappedOutput::PackAdapter::PackAdapter;
+  template <class T>
+  using with_scalar =
+      WrappedOutput<detail::WithScalar<Observer, T>>;  ///< the same of another scalar
 };
 
 /// Told apart in snapshots.

@@ -7,6 +7,7 @@
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/control/control_loop.hpp>
 #include <esokit/control/scaled_law.hpp>
+#include <esokit/core/lane_by_lane.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/feedback_gain.hpp>
 #include <type_traits>
@@ -337,6 +338,26 @@ class Adrc {
   Law law_;
   [[no_unique_address]] FastLaw fast_law_;
   [[no_unique_address]] std::conditional_t<has_step_time, FeedbackSpec<S>, NoSpec> spec_;
+};
+
+/// The same with an observer that goes lane by lane.
+template <LoopObserver Observer, class Form>
+requires detail::goes_lane_by_lane<Observer>
+class Adrc<Observer, Form>
+    : public LaneByLane<Adrc<Observer, Form>, Adrc<detail::LaneOf<Observer>, Form>,
+                        typename Observer::scalar_type, AdrcConfig<Observer>> {
+ public:
+  static constexpr int order = Observer::order;  ///< n, order of the plant
+  template <class T>
+  using with_scalar = Adrc<detail::WithScalar<Observer, T>, Form>;  ///< the same of another scalar
+
+  using Adrc::LaneByLane::LaneByLane;
+
+  /// The observer, put together from the lanes.
+  [[nodiscard]] Observer observer() const noexcept {
+    return this->template gathered<Observer>(
+        [](const auto& lane) -> const auto& { return lane.observer(); });
+  }
 };
 
 /// Told apart in snapshots.

@@ -32,18 +32,6 @@ inline constexpr std::uint32_t type_tag<ErrorBased> = make_type_tag<>("ErrorBase
 template <class Form>
 concept AdrcForm = std::is_same_v<Form, OutputBased> || std::is_same_v<Form, ErrorBased>;
 
-namespace detail {
-
-/// (r, r', ..) of a list.
-template <Scalar S, std::size_t Count>
-Vector<S, static_cast<int>(Count)> listed(const S (&reference)[Count]) noexcept {
-  Vector<S, static_cast<int>(Count)> all;
-  for (std::size_t i = 0; i < Count; ++i) all(static_cast<int>(i)) = reference[i];
-  return all;
-}
-
-}  // namespace detail
-
 /// u = (v - dhat) / b0 with v a state feedback; the total disturbance is cancelled, the rest is a
 /// chain of n integrators with its poles at -omega_c.
 ///

@@ -3,10 +3,31 @@
 #pragma once
 
 #include <esokit/control/control_loop.hpp>
+#include <esokit/core/lane_by_lane.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <limits>
 
 namespace esokit {
+
+/// Config of DisturbanceCompensator.
+template <LoopObserver Observer>
+struct DisturbanceCompensatorConfig {
+  using S = typename Observer::scalar_type;  ///< of signals and settings
+
+  typename Observer::Config observer{};  ///< b0 and T are in here
+  std::optional<S> compensation_gain{};  ///< K, unit of u per unit of y^(n); left out: -1/b0
+  Limits<S> limits{};                    ///< of the actuator
+  StartHold<S> start_hold{};             ///< u at first, while the observer finds the state
+  MissingRule<S> missing{};              ///< what to do when measurements stay away
+  int measurement_divider = 1;           ///< D: a measurement is due at every D-th update
+
+  /// @cond
+  static constexpr auto fields(auto& c) noexcept {
+    return std::tie(c.observer, c.compensation_gain, c.limits, c.start_hold, c.missing,
+                    c.measurement_divider);
+  }
+  /// @endcond
+};
 
 /// u = u0 + K dhat with u0 from any controller (a PID, say) and K = -1/b0: the controller then sees
 /// a plant that is nearly y^(n) = b0 u0. The same limits, start, missing and retuning rules as
@@ -29,22 +50,7 @@ class DisturbanceCompensator {
   using scalar_type = typename Observer::scalar_type;  ///< of signals and settings
   using S = scalar_type;                               ///< the same
 
-  /// Settings of make.
-  struct Config {
-    typename Observer::Config observer{};  ///< b0 and T are in here
-    std::optional<S> compensation_gain{};  ///< K, unit of u per unit of y^(n); left out: -1/b0
-    Limits<S> limits{};                    ///< of the actuator
-    StartHold<S> start_hold{};             ///< u at first, while the observer finds the state
-    MissingRule<S> missing{};              ///< what to do when measurements stay away
-    int measurement_divider = 1;           ///< D: a measurement is due at every D-th update
-
-    /// @cond
-    static constexpr auto fields(auto& c) noexcept {
-      return std::tie(c.observer, c.compensation_gain, c.limits, c.start_hold, c.missing,
-                      c.measurement_divider);
-    }
-    /// @endcond
-  };
+  using Config = DisturbanceCompensatorConfig<Observer>;  ///< settings of make
   template <class T>
   using with_scalar =
       DisturbanceCompensator<detail::WithScalar<Observer, T>>;  ///< the same of another scalar
@@ -165,6 +171,20 @@ class DisturbanceCompensator {
 
   Loop loop_;
   S gain_;
+};
+
+/// The same around an observer that goes lane by lane.
+template <LoopObserver Observer>
+requires detail::goes_lane_by_lane<Observer>
+class DisturbanceCompensator<Observer>
+    : public LaneByLane<DisturbanceCompensator<Observer>,
+                        DisturbanceCompensator<detail::LaneOf<Observer>>,
+                        typename Observer::scalar_type, DisturbanceCompensatorConfig<Observer>> {
+ public:
+  using DisturbanceCompensator::LaneByLane::LaneByLane;
+  template <class T>
+  using with_scalar =
+      DisturbanceCompensator<detail::WithScalar<Observer, T>>;  ///< the same of another scalar
 };
 
 /// Told apart in snapshots.

@@ -62,7 +62,7 @@ inline constexpr std::uint32_t type_tag<UnlimitedFeedback> = make_type_tag<>("Un
 ///
 /// With UnlimitedFeedback it is the transfer-function form: the same while u is within its limits;
 /// outside, its m integrators run on: it winds up. For actuators that never saturate.
-template <int Order, PlainScalar S = double, int Extension = 1, class Operator = ShiftOperator,
+template <int Order, Scalar S = double, int Extension = 1, class Operator = ShiftOperator,
           class Feedback = LimitedFeedback, class Placement = EqualPoles>
 class DualFeedbackAdrc {
  public:
@@ -80,11 +80,127 @@ class DualFeedbackAdrc {
     S input_gain{};                              ///< b0, not zero, negative is fine
     S sample_time{};                             ///< T, s
     Limits<S> limits{};                          ///< of the actuator
+
+    /// @cond
+    static constexpr auto fields(auto& c) noexcept {
+      return std::tie(c.observer_bandwidth, c.controller_bandwidth, c.gains, c.domain, c.half_gain,
+                      c.input_gain, c.sample_time, c.limits);
+    }
+    /// @endcond
   };
+  using Status = StatusOf<S>;  ///< StepStatus, of a pack one a lane
+  template <class T>
+  using with_scalar = DualFeedbackAdrc<Order, T, Extension, Operator, Feedback,
+                                       Placement>;  ///< the same of another scalar
 
   /// Checks the settings and does all the design work.
   /// @return the controller at rest in zero, or an error that names the field
   static Expected<DualFeedbackAdrc, Error<S>> make(const Config& config) {
+    if constexpr (PackScalar<S>) {
+      return detail::make_lanes<DualFeedbackAdrc>(config);
+    } else {
+      return make_one(config);
+    }
+  }
+
+  /// One sample. @param y measurement @param reference r
+  /// @return u to be held until the next sample, within the limits
+  S update(S y, S reference) noexcept {
+    Step step = advance(y, limited ? limiter_.last() : wanted_);
+    step.wanted = step.control + form_.reference * reference;
+    // Two states stored one by one and loaded as a pair by the next step would stall it.
+    detail::unroll<size>(
+        [&](auto i) ESOKIT_INLINE_LAMBDA { detail::keep_scalar(std::get<i>(step.pending)); });
+    if (!all(is_finite(probe(step)))) [[unlikely]] {
+      if constexpr (PackScalar<S>) {
+        S u(0.0);
+        detail::for_each_lane<Plain>(
+            *this, [&](Plain& lane, int l) { u[l] = lane.update(y[l], reference[l]); });
+        return u;
+      } else {
+        return update_guarded(y, reference);
+      }
+    }
+    pending_ = step.pending;
+    measured_ = y;
+    wanted_ = step.wanted;
+    status_ = StepStatus::ok;
+    return limiter_(step.wanted);
+  }
+
+  /// The same where the actuator reports what it held since the last sample. The transfer-function
+  /// form does not look at it but for the rate limit.
+  S update(S y, S reference, S u_applied) noexcept {
+    const auto good = is_finite(u_applied);
+    limiter_.track(select(good, u_applied, limiter_.last()));
+    return update(y, reference);
+  }
+
+  /// Takes over a plant that stands at y under u, the reference being y too. A y or u that is not
+  /// finite changes nothing and is reported.
+  Status start(S y, S u) noexcept {
+    if constexpr (PackScalar<S>) {
+      Status status{};
+      detail::for_each_lane<Plain>(*this,
+                                   [&](Plain& lane, int l) { status[l] = lane.start(y[l], u[l]); });
+      return status;
+    } else {
+      return start_one(y, u);
+    }
+  }
+
+  /// New settings while running: starts in the steady state of the last measurement and u, as a
+  /// filter's state says nothing to another filter. No bump at rest. A refused config changes
+  /// nothing, nor does any where the scalar cannot hold that steady state.
+  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
+
+  /// The same, with the settings of `fresh`, as `make` gave it: no design work, fit for an
+  /// interrupt.
+  Check<S> adopt(DualFeedbackAdrc fresh) {
+    if constexpr (PackScalar<S>) return detail::adopt_lanes(*this, fresh);
+    if (fresh.start(measured_, output()) != StepStatus::ok) {
+      return Error<S>{"measurement", measured_,
+                      "of the last sample has no steady state that the scalar can hold"};
+    }
+    fresh.status_ = status_;
+    *this = fresh;
+    return {};
+  }
+
+  /// The u that holds now, within the limits.
+  [[nodiscard]] const S& output() const noexcept { return limiter_.last(); }
+  /// What the law asked for before the limits.
+  [[nodiscard]] const S& requested() const noexcept { return wanted_; }
+  /// ok, measurement_rejected, or restarted: in the steady state of y and u, as the state was so
+  /// large that no measurement led on.
+  [[nodiscard]] Status status() const noexcept { return status_; }
+  /// The filter's coefficients, in z or delta.
+  [[nodiscard]] const FilterForm<size, S>& form() const noexcept { return form_; }
+
+ private:
+  friend struct detail::LaneAccess;
+  template <int OtherOrder, Scalar Other, int OtherExtension, class OtherOperator,
+            class OtherFeedback, class OtherPlacement>
+  friend class DualFeedbackAdrc;
+  static constexpr auto fields(auto& o) noexcept {
+    return std::tie(o.form_, o.limiter_, o.pending_, o.measured_, o.wanted_, o.status_);
+  }
+  using Plain = detail::PlainTwin<DualFeedbackAdrc, S>;  ///< a lane
+  using Form = FilterForm<size, S>;
+  using States = Array<S, size>;
+  static constexpr bool delta = std::is_same_v<Operator, DeltaOperator>;
+  static constexpr bool limited = std::is_same_v<Feedback, LimitedFeedback>;
+
+  struct Step {
+    States pending;  ///< the next states without the share of u
+    S control;       ///< c
+    S wanted{};
+  };
+
+  DualFeedbackAdrc(const Form& form, const Limiter<S>& limiter) noexcept
+      : form_(form), limiter_(limiter), wanted_(limiter.last()) {}
+
+  static Expected<DualFeedbackAdrc, Error<S>> make_one(const Config& config) {
     Rules<S> rules;
     if (!rules.nonzero("input_gain", config.input_gain)) return rules.error();
     const auto limiter = Limiter<S>::make(config.limits, config.sample_time);
@@ -115,34 +231,7 @@ class DualFeedbackAdrc {
     return DualFeedbackAdrc(form, *limiter);
   }
 
-  /// One sample. @param y measurement @param reference r
-  /// @return u to be held until the next sample, within the limits
-  S update(S y, S reference) noexcept {
-    Step step = advance(y, limited ? limiter_.last() : wanted_);
-    step.wanted = step.control + form_.reference * reference;
-    // Two states stored one by one and loaded as a pair by the next step would stall it.
-    detail::unroll<size>(
-        [&](auto i) ESOKIT_INLINE_LAMBDA { detail::keep_scalar(std::get<i>(step.pending)); });
-    if (!is_finite(probe(step))) [[unlikely]]
-      return update_guarded(y, reference);
-    pending_ = step.pending;
-    measured_ = y;
-    wanted_ = step.wanted;
-    status_ = StepStatus::ok;
-    return limiter_(step.wanted);
-  }
-
-  /// The same where the actuator reports what it held since the last sample. The transfer-function
-  /// form does not look at it but for the rate limit.
-  S update(S y, S reference, S u_applied) noexcept {
-    if (is_finite(u_applied)) [[likely]]
-      limiter_.track(u_applied);
-    return update(y, reference);
-  }
-
-  /// Takes over a plant that stands at y under u, the reference being y too. A y or u that is not
-  /// finite changes nothing and is reported.
-  StepStatus start(S y, S u) noexcept {
+  StepStatus start_one(S y, S u) noexcept {
     const S c = u - form_.reference * y;
     States state{};
     if constexpr (delta) {
@@ -165,48 +254,6 @@ class DualFeedbackAdrc {
     limiter_.track(u);
     return StepStatus::ok;
   }
-
-  /// New settings while running: starts in the steady state of the last measurement and u, as a
-  /// filter's state says nothing to another filter. No bump at rest. A refused config changes
-  /// nothing, nor does any where the scalar cannot hold that steady state.
-  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
-
-  /// The same, with the settings of `fresh`, as `make` gave it: no design work, fit for an
-  /// interrupt.
-  Check<S> adopt(DualFeedbackAdrc fresh) {
-    if (fresh.start(measured_, output()) != StepStatus::ok) {
-      return Error<S>{"measurement", measured_,
-                      "of the last sample has no steady state that the scalar can hold"};
-    }
-    fresh.status_ = status_;
-    *this = fresh;
-    return {};
-  }
-
-  /// The u that holds now, within the limits.
-  [[nodiscard]] const S& output() const noexcept { return limiter_.last(); }
-  /// What the law asked for before the limits.
-  [[nodiscard]] const S& requested() const noexcept { return wanted_; }
-  /// ok, measurement_rejected, or restarted: in the steady state of y and u, as the state was so
-  /// large that no measurement led on.
-  [[nodiscard]] StepStatus status() const noexcept { return status_; }
-  /// The filter's coefficients, in z or delta.
-  [[nodiscard]] const FilterForm<size, S>& form() const noexcept { return form_; }
-
- private:
-  using Form = FilterForm<size, S>;
-  using States = Array<S, size>;
-  static constexpr bool delta = std::is_same_v<Operator, DeltaOperator>;
-  static constexpr bool limited = std::is_same_v<Feedback, LimitedFeedback>;
-
-  struct Step {
-    States pending;  ///< the next states without the share of u
-    S control;       ///< c
-    S wanted{};
-  };
-
-  DualFeedbackAdrc(const Form& form, const Limiter<S>& limiter) noexcept
-      : form_(form), limiter_(limiter), wanted_(limiter.last()) {}
 
   static Expected<Array<S, Order>, Error<S>> controller_gains(const Config& config) {
     if (!config.gains) {
@@ -278,19 +325,19 @@ class DualFeedbackAdrc {
   Form form_;
   Limiter<S> limiter_;
   States pending_{};
-  S measured_{};
+  S measured_ = S(0.0);
   S wanted_;
-  StepStatus status_ = StepStatus::ok;
+  Status status_ = StepStatus::ok;
 };
 
 /// Told apart in snapshots.
-template <int Order, PlainScalar S, int Extension, class Operator, class Feedback, class Placement>
+template <int Order, Scalar S, int Extension, class Operator, class Feedback, class Placement>
 inline constexpr std::uint32_t
     type_tag<DualFeedbackAdrc<Order, S, Extension, Operator, Feedback, Placement>> =
         make_type_tag<S, Operator, Feedback, Placement>("DualFeedbackAdrc", Order, Extension);
 
 /// The transfer-function form: winds up where u is limited.
-template <int Order, PlainScalar S = double, int Extension = 1, class Operator = ShiftOperator,
+template <int Order, Scalar S = double, int Extension = 1, class Operator = ShiftOperator,
           class Placement = EqualPoles>
 using TransferFunctionAdrc =
     DualFeedbackAdrc<Order, S, Extension, Operator, UnlimitedFeedback, Placement>;

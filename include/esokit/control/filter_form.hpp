@@ -25,16 +25,23 @@
 #include <esokit/core/check.hpp>
 #include <esokit/gain/sampled_gain.hpp>
 #include <esokit/math/combinatorics.hpp>
+#include <tuple>
 
 namespace esokit {
 
 /// Coefficients in descending powers, of delta or of z; index 0 belongs to the N-th power.
-template <int Size, PlainScalar S>
+template <int Size, Scalar S>
 struct FilterForm {
   Array<S, Size + 1> denominator{};  ///< D, monic
   Array<S, Size + 1> measurement{};  ///< N_y, unit of u per unit of y
   Array<S, Size + 1> input{};        ///< N_u, the first is zero
   S reference{};                     ///< k_r, unit of u per unit of y
+
+  /// @cond
+  static constexpr auto fields(auto& f) noexcept {
+    return std::tie(f.denominator, f.measurement, f.input, f.reference);
+  }
+  /// @endcond
 };
 
 namespace detail {

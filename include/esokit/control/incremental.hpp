@@ -3,6 +3,7 @@
 #pragma once
 
 #include <esokit/core/check.hpp>
+#include <esokit/core/lanes.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/step_status.hpp>
 #include <limits>
@@ -24,6 +25,9 @@ class Incremental {
   using scalar_type = typename Controller::scalar_type;  ///< of signals and settings
   using S = scalar_type;                                 ///< the same
   using Config = typename Controller::Config;            ///< settings of make
+  using Status = StatusOf<S>;                            ///< StepStatus, of a pack one a lane
+  template <class T>
+  using with_scalar = Incremental<detail::WithScalar<Controller, T>>;  ///< of another scalar
 
   /// As Controller::make.
   static Expected<Incremental, Error<S>> make(const Config& config) {
@@ -47,8 +51,8 @@ class Incremental {
   S update(const S& y, const Reference& reference, const S& increment_applied) noexcept {
     const S missed = increment_applied - increment_;
     const S reported = controller_.output() + missed;
-    const bool good = is_finite(reported) && within_half(reported);
-    const S before = good ? reported : controller_.output();
+    const auto good = is_finite(reported) && within_half(reported);
+    const S before = select(good, reported, S(controller_.output()));
     increment_ = controller_.update(y, reference, before) - before;
     return increment_;
   }
@@ -67,11 +71,23 @@ class Incremental {
 
   /// Takes over a plant that stands at y; u counts from `u`, zero if nobody knows.
   /// @return as Controller::start; input_rejected beyond half of what the scalar holds
-  StepStatus start(const S& y, const S& u = S(0)) noexcept {
-    if (!is_finite(u) || !within_half(u)) return StepStatus::input_rejected;
-    const StepStatus status = controller_.start(y, u);
-    if (status == StepStatus::ok) increment_ = S(0);
-    return status;
+  Status start(const S& y, const S& u = S(0.0)) noexcept {
+    const auto good = is_finite(u) && within_half(u);
+    if constexpr (PackScalar<S>) {
+      // Of another u the controller tells, and changes nothing.
+      const S none(std::numeric_limits<LaneScalar<S>>::quiet_NaN());
+      Status status = controller_.start(y, select(good, u, none));
+      for (int i = 0; i < lane_count<S>; ++i) {
+        if (!good[i]) status[i] = StepStatus::input_rejected;
+        if (status[i] == StepStatus::ok) increment_[i] = 0;
+      }
+      return status;
+    } else {
+      if (!good) return StepStatus::input_rejected;
+      const StepStatus status = controller_.start(y, u);
+      if (status == StepStatus::ok) increment_ = S(0.0);
+      return status;
+    }
   }
 
   /// As Controller::retune.
@@ -81,21 +97,25 @@ class Incremental {
   [[nodiscard]] const Controller& controller() const noexcept { return controller_; }
 
  private:
-  static constexpr S half = (std::numeric_limits<S>::max)() / S(2);
+  friend struct detail::LaneAccess;
+  static constexpr auto fields(auto& o) noexcept { return std::tie(o.controller_, o.increment_); }
 
-  static constexpr bool within_half(const S& u) noexcept { return !(u < -half) && !(u > half); }
+  static S half() noexcept { return S((std::numeric_limits<LaneScalar<S>>::max)() / 2); }
+
+  static auto within_half(const S& u) noexcept { return !(u < -half()) && !(u > half()); }
 
   static Config halved(Config config) {
     auto& limits = config.limits;
-    if (is_finite(limits.lower) && limits.lower < -half) limits.lower = -half;
-    if (is_finite(limits.upper) && limits.upper > half) limits.upper = half;
+    limits.lower =
+        select(is_finite(limits.lower) && limits.lower < -half(), S(-half()), limits.lower);
+    limits.upper = select(is_finite(limits.upper) && limits.upper > half(), half(), limits.upper);
     return config;
   }
 
   explicit Incremental(const Controller& controller) noexcept : controller_(controller) {}
 
   Controller controller_;
-  S increment_{};
+  S increment_ = S(0.0);
 };
 
 /// Told apart in snapshots.

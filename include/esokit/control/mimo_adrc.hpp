@@ -4,6 +4,7 @@
 
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/control/limiter.hpp>
+#include <esokit/core/lane_by_lane.hpp>
 #include <esokit/core/unroll.hpp>
 #include <esokit/gain/feedback_gain.hpp>
 #include <esokit/math/linear_equations.hpp>
@@ -16,6 +17,34 @@
 #include <utility>
 
 namespace esokit {
+
+/// Config of MimoAdrc.
+template <ShiftableDisturbance... Observers>
+struct MimoAdrcConfig {
+  static constexpr int channels = sizeof...(Observers);  ///< q
+  using S =
+      typename std::tuple_element_t<0, std::tuple<Observers...>>::scalar_type;  ///< of signals
+  using InputMatrix = Matrix<S, channels, channels>;                            ///< B0, q x q
+
+  /// One a channel; `input_gain` is left out, B0 says it, and T is the same in all.
+  std::tuple<typename Observers::Config...> observers{};
+  Array<S, channels> controller_bandwidths{};      ///< omega_c of each channel, rad/s
+  TimeDomain domain = TimeDomain::continuous;      ///< where the controllers' poles are placed
+  bool half_gain = false;                          ///< half-gain tuning of the controllers
+  InputMatrix input_matrix = InputMatrix::Zero();  ///< B0, unit of y_i^(n_i) per unit of u_j
+
+  /// Largest condition number of B0 that is accepted, in the 1-norm after its rows and columns
+  /// are scaled to a largest element of 1: units do not matter then.
+  S condition_limit = S(1000);
+  Array<Limits<S>, channels> limits{};  ///< of each actuator
+
+  /// @cond
+  static constexpr auto fields(auto& c) noexcept {
+    return std::tie(c.observers, c.controller_bandwidths, c.domain, c.half_gain, c.input_matrix,
+                    c.condition_limit, c.limits);
+  }
+  /// @endcond
+};
 
 /// Control of y_i^(n_i) = d_i + (B0 u)_i, i = 1..q, B0 square and invertible: each channel has an
 /// observer of its own order, and u = B0^-1 (v - dhat). What B0 gets wrong, and all other coupling,
@@ -39,24 +68,10 @@ class MimoAdrc {
   using S = scalar_type;                                 ///< the same
   using Output = Vector<S, channels>;                    ///< y, or r, or u, q x 1
   using InputMatrix = Matrix<S, channels, channels>;     ///< B0, q x q
-  static_assert(PlainScalar<S>, "esokit: MimoAdrc is of plain scalars: take one for each lane");
   static_assert((std::is_same_v<typename Observers::scalar_type, S> && ...),
                 "esokit: all channels need the same scalar");
 
-  /// Settings of make.
-  struct Config {
-    /// One a channel; `input_gain` is left out, B0 says it, and T is the same in all.
-    std::tuple<typename Observers::Config...> observers{};
-    Array<S, channels> controller_bandwidths{};      ///< omega_c of each channel, rad/s
-    TimeDomain domain = TimeDomain::continuous;      ///< where the controllers' poles are placed
-    bool half_gain = false;                          ///< half-gain tuning of the controllers
-    InputMatrix input_matrix = InputMatrix::Zero();  ///< B0, unit of y_i^(n_i) per unit of u_j
-
-    /// Largest condition number of B0 that is accepted, in the 1-norm after its rows and columns
-    /// are scaled to a largest element of 1: units do not matter then.
-    S condition_limit = S(1000);
-    Array<Limits<S>, channels> limits{};  ///< of each actuator
-  };
+  using Config = MimoAdrcConfig<Observers...>;  ///< settings of make
 
   /// Checks the settings and does all the design work.
   /// @return the controller at rest in zero, or an error that names the field; for B0 with its
@@ -322,6 +337,46 @@ class MimoAdrc {
   InputMatrix input_matrix_;
   InputMatrix inverse_;
   Array<StepStatus, channels> statuses_{};
+};
+
+/// The same of packs, lane by lane.
+template <ShiftableDisturbance First, ShiftableDisturbance... Rest>
+requires PackScalar<typename First::scalar_type>
+class MimoAdrc<First, Rest...>
+    : public LaneByLane<
+          MimoAdrc<First, Rest...>, MimoAdrc<detail::LaneOf<First>, detail::LaneOf<Rest>...>,
+          typename MimoAdrcConfig<First, Rest...>::S, MimoAdrcConfig<First, Rest...>> {
+  using Base = typename MimoAdrc::LaneByLane;
+
+ public:
+  static constexpr int channels = 1 + sizeof...(Rest);   ///< q
+  using S = typename MimoAdrcConfig<First, Rest...>::S;  ///< of signals and settings
+  using Output = Vector<S, channels>;                    ///< y, or r, or u, q x 1
+  template <class T>
+  using with_scalar = MimoAdrc<detail::WithScalar<First, T>,
+                               detail::WithScalar<Rest, T>...>;  ///< of another scalar
+
+  using Base::Base;
+
+  /// As of plain scalars.
+  /// @{
+  Output update(const Output& y, const Output& reference) noexcept {
+    return Base::update(y, reference);
+  }
+  Output update(const Output& y, const Output& reference, const Output& u_applied) noexcept {
+    return Base::update(y, reference, u_applied);
+  }
+  StatusOf<S> start(const Output& y, const Output& u) noexcept { return Base::start(y, u); }
+  /// @}
+
+  /// Observer of a channel, put together from the lanes.
+  template <int Channel>
+  [[nodiscard]] auto observer() const noexcept {
+    using Observer =
+        std::tuple_element_t<static_cast<std::size_t>(Channel), std::tuple<First, Rest...>>;
+    return this->template gathered<Observer>(
+        [](const auto& lane) -> const auto& { return lane.template observer<Channel>(); });
+  }
 };
 
 }  // namespace esokit

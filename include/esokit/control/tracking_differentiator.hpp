@@ -5,6 +5,7 @@
 #include <cmath>
 #include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
+#include <esokit/core/lane_by_lane.hpp>
 #include <esokit/core/matrix.hpp>
 
 namespace esokit {
@@ -25,18 +26,27 @@ template <PlainScalar S>
   return (std::abs)(a) > d ? -std::copysign(acceleration, a) : -acceleration * (a / d);
 }
 
+/// Config of TrackingDifferentiator.
+template <Scalar S>
+struct TrackingDifferentiatorConfig {
+  S acceleration{};  ///< R > 0, unit of the reference / s^2
+  S sample_time{};   ///< h, s
+  S filter_time{};   ///< h0 >= h, s: smooths a noisy reference; 0: h
+
+  /// @cond
+  static constexpr auto fields(auto& c) noexcept {
+    return std::tie(c.acceleration, c.sample_time, c.filter_time);
+  }
+  /// @endcond
+};
+
 /// Tracking differentiator by fhan: r1 follows the reference as fast as |r1''| <= `acceleration`
 /// lets it, r2 = r1'. It is always ready to stop, so it stays r2^2 / (2R) behind a moving
 /// reference.
-template <PlainScalar S = double>
+template <Scalar S = double>
 class TrackingDifferentiator {
  public:
-  /// Settings of make.
-  struct Config {
-    S acceleration{};  ///< R > 0, unit of the reference / s^2
-    S sample_time{};   ///< h, s
-    S filter_time{};   ///< h0 >= h, s: smooths a noisy reference; 0: h
-  };
+  using Config = TrackingDifferentiatorConfig<S>;  ///< settings of make
 
   /// Checks the settings and does all the design work.
   /// @return at rest in zero, or an error that names the field
@@ -97,17 +107,35 @@ class TrackingDifferentiator {
   S r2_ = S(0);
 };
 
+/// The same of packs, lane by lane: half of its time is a root.
+template <PackScalar S>
+class TrackingDifferentiator<S>
+    : public LaneByLane<TrackingDifferentiator<S>, TrackingDifferentiator<LaneScalar<S>>, S,
+                        TrackingDifferentiatorConfig<S>> {
+ public:
+  using TrackingDifferentiator::LaneByLane::LaneByLane;
+  template <class T>
+  using with_scalar = TrackingDifferentiator<T>;  ///< the same of another scalar
+};
+
+/// Config of SignTrackingDifferentiator.
+template <Scalar S>
+struct SignTrackingDifferentiatorConfig {
+  S acceleration{};  ///< R > 0, unit of the reference / s^2
+  S sample_time{};   ///< h, s, of `update`; it may be left out where only `rate` is used
+
+  /// @cond
+  static constexpr auto fields(auto& c) noexcept { return std::tie(c.acceleration, c.sample_time); }
+  /// @endcond
+};
+
 /// The differentiator by a sign function, r1' = r2, r2' = -R sign(r1 - r + r2 |r2| / (2R)): what
 /// the papers write. As an ODE for simulation, and sampled with the sign held over a sample;
 /// sampled it chatters about the reference by R h in r2, so prefer TrackingDifferentiator.
-template <PlainScalar S = double>
+template <Scalar S = double>
 class SignTrackingDifferentiator {
  public:
-  /// Settings of make.
-  struct Config {
-    S acceleration{};  ///< R > 0, unit of the reference / s^2
-    S sample_time{};   ///< h, s, of `update`; it may be left out where only `rate` is used
-  };
+  using Config = SignTrackingDifferentiatorConfig<S>;  ///< settings of make
 
   /// Checks the settings and does all the design work.
   /// @return at rest in zero, or an error that names the field
@@ -164,6 +192,17 @@ class SignTrackingDifferentiator {
   Config config_;
   S r1_ = S(0);
   S r2_ = S(0);
+};
+
+/// The same of packs, lane by lane.
+template <PackScalar S>
+class SignTrackingDifferentiator<S>
+    : public LaneByLane<SignTrackingDifferentiator<S>, SignTrackingDifferentiator<LaneScalar<S>>, S,
+                        SignTrackingDifferentiatorConfig<S>> {
+ public:
+  using SignTrackingDifferentiator::LaneByLane::LaneByLane;
+  template <class T>
+  using with_scalar = SignTrackingDifferentiator<T>;  ///< the same of another scalar
 };
 
 }  // namespace esokit

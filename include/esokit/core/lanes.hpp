@@ -82,10 +82,15 @@ struct LaneAccess {
   }
 };
 
+/// A std::array or a Matrix.
 template <class T>
-struct IsArray : std::false_type {};
-template <class T, std::size_t Count>
-struct IsArray<std::array<T, Count>> : std::true_type {};
+concept HoldsElements = requires(T& elements) {
+  elements.data()[elements.size() - 1];
+};
+template <class T>
+struct IsTuple : std::false_type {};
+template <class... T>
+struct IsTuple<std::tuple<T...>> : std::true_type {};
 template <class T>
 struct IsOptional : std::false_type {};
 template <class T>
@@ -103,8 +108,10 @@ constexpr void copy_lane(Packed& packed, Plain& plain, int i) noexcept {
     } else {
       plain = packed;
     }
-  } else if constexpr (IsArray<std::remove_const_t<Packed>>::value) {
-    for (std::size_t k = 0; k < packed.size(); ++k) copy_lane<Back>(packed[k], plain[k], i);
+  } else if constexpr (HoldsElements<Packed>) {
+    for (decltype(packed.size()) k = 0; k < packed.size(); ++k) {
+      copy_lane<Back>(packed.data()[k], plain.data()[k], i);
+    }
   } else if constexpr (IsOptional<std::remove_const_t<Packed>>::value) {
     if constexpr (!Back) {
       if (!packed) {
@@ -114,15 +121,17 @@ constexpr void copy_lane(Packed& packed, Plain& plain, int i) noexcept {
         copy_lane<Back>(*packed, *plain, i);
       }
     }
+  } else if constexpr (IsTuple<std::remove_const_t<Packed>>::value) {
+    constexpr auto count = std::tuple_size_v<std::remove_const_t<Packed>>;
+    static_assert(count == std::tuple_size_v<std::remove_const_t<Plain>>);
+    [&]<std::size_t... K>(std::index_sequence<K...>) {
+      (copy_lane<Back>(std::get<K>(packed), std::get<K>(plain), i), ...);
+    }
+    (std::make_index_sequence<count>{});
   } else if constexpr (LaneAccess::has_fields<Packed>) {
     auto of_packed = LaneAccess::fields(packed);
     auto of_plain = LaneAccess::fields(plain);
-    constexpr auto count = std::tuple_size_v<decltype(of_packed)>;
-    static_assert(count == std::tuple_size_v<decltype(of_plain)>);
-    [&]<std::size_t... K>(std::index_sequence<K...>) {
-      (copy_lane<Back>(std::get<K>(of_packed), std::get<K>(of_plain), i), ...);
-    }
-    (std::make_index_sequence<count>{});
+    copy_lane<Back>(of_packed, of_plain, i);
   } else if constexpr (Back) {
     packed[i] = plain;
   } else {
@@ -160,6 +169,23 @@ struct PlainTwinOf<Object, S> {
 /// What a lane of an Object of S is; of a plain scalar the Object itself.
 template <class Object, class S>
 using PlainTwin = typename PlainTwinOf<Object, S>::type;
+
+/// The same of an observer or controller.
+template <class Object>
+using LaneOf = PlainTwin<Object, typename Object::scalar_type>;
+
+/// A model or gain function of another scalar; one that does not say what that is serves any.
+/// @{
+template <class Function, class T>
+struct ForScalar {
+  using type = Function;
+};
+template <class Function, class T>
+requires requires { typename Function::template with_scalar<T>; }
+struct ForScalar<Function, T> {
+  using type = typename Function::template with_scalar<T>;
+};
+/// @}
 
 /// What belongs to lane `i`: of a PerLane its element, of a plain scalar's the thing itself.
 /// @{

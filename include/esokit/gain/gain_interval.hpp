@@ -109,7 +109,7 @@ template <int Size, Scalar S>
 }
 
 /// Largest k_max in (base, ceiling) that is certified with `low`, by bisection; `base` if even that
-/// fails. A pack gets one point of the way for all its lanes.
+/// fails.
 /// @param gain a ScaledGain, or the gain vector of a continuous observer
 template <int Size, Scalar S, class Gain>
 [[nodiscard]] S largest_certified_gain(const Gain& gain, const S& low, const S& base,
@@ -119,7 +119,7 @@ template <int Size, Scalar S, class Gain>
   S step(1.0);
   for (int i = 0; i <= steps; ++i) {
     const S candidate = reached + step;
-    if (!all(candidate > S(1.0)) &&
+    if (!(candidate > S(1.0)) &&
         gain_range_certified<Size, S>(gain, low, S(base + candidate * (ceiling - base)))) {
       reached = candidate;
     }

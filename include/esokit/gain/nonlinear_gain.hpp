@@ -24,17 +24,6 @@ ESOKIT_MEMBER_NAME(prepared)
 template <class Shape>
 inline constexpr EvenGainTraits even_gain_traits = declared_traits<Shape, EvenGainTraits>;
 
-/// The same even gain of another scalar; one that is a template of no scalar is its own.
-template <class Shape, class T>
-struct ShapeWithScalar {
-  using type = Shape;
-};
-template <class Shape, class T>
-requires requires { typename Shape::template with_scalar<T>; }
-struct ShapeWithScalar<Shape, T> {
-  using type = typename Shape::template with_scalar<T>;
-};
-
 }  // namespace detail
 
 /// `check()` is declared by `traits.checks`; or there is none.
@@ -260,8 +249,7 @@ class NonlinearGain {
   using Linear = ConstantGain<Size, S>;  ///< the gain where k = 1
   template <class T>
   using with_scalar =
-      NonlinearGain<Size, T,
-                    typename detail::ShapeWithScalar<Shape, T>::type>;  ///< of another scalar
+      NonlinearGain<Size, T, typename detail::ForScalar<Shape, T>::type>;  ///< of another scalar
 
   /// @param linear the bandwidth gains @param shape k @param error_scale > 0, unit of y
   /// @param gain_min, gain_max limits of k

@@ -43,14 +43,14 @@ Check<S> check_shape(const Shape& shape) {
   }
   const auto k = prepared(shape);
   constexpr const char* rule = "is a magnitude (in error scales) at which the gain is not finite";
-  if (!all(is_finite(S(k(least_magnitude<S>()))))) {
+  if (!is_finite(S(k(least_magnitude<S>())))) {
     return Error<S>{"shape", least_magnitude<S>(), rule};
   }
   for (int octave = -tested_octaves; octave < tested_octaves; ++octave) {
     for (int quarter = 0; quarter < 4; ++quarter) {
       const auto octave_start = power_of_two<TableScalar<S>>(octave);
       const S x = S(octave_start) * (S(1.0) + S(0.25) * integer<S>(quarter));
-      if (!all(is_finite(S(k(x))))) return Error<S>{"shape", x, rule};
+      if (!is_finite(S(k(x)))) return Error<S>{"shape", x, rule};
     }
   }
   return {};
@@ -90,12 +90,12 @@ Expected<Interval<S>, Error<S>> find_limits(const GainLimits<S>& asked, const Ga
   // A gain_max below the default gain_min is no reason to refuse it.
   if (asked.upper) low = select(*asked.upper < low, *asked.upper, low);
   if (asked.lower) low = *asked.lower;
-  if (asked.upper && !all(*asked.upper >= low)) {
+  if (asked.upper && !(*asked.upper >= low)) {
     return Error<S>{"gain_min", low,          "must not be above gain_max, which is",
                     -1,         *asked.upper, true};
   }
   const S base = largest(low, S(1.0));
-  const bool room = all(base < ceiling);
+  const bool room = base < ceiling;
   if (asked.upper) {
     if (asked.allow_uncertified || gain_range_certified<Size, S>(gain, low, *asked.upper)) {
       return Interval<S>{low, *asked.upper};
@@ -117,7 +117,7 @@ Expected<Interval<S>, Error<S>> find_limits(const GainLimits<S>& asked, const Ga
   } else if (asked.allow_uncertified) {
     return Error<S>{"gain_max", S(0.0), "must be given where gain_min is not certified"};
   }
-  if (!all(low < ceiling)) {
+  if (!(low < ceiling)) {
     return Error<S>{
         "gain_min", low,     "must be below what is stable for a constant gain, which is",
         -1,         ceiling, true};

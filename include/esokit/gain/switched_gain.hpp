@@ -144,7 +144,7 @@ class ContinuousSwitchedGain {
   /// Compares e with that of the step before, and chooses the gain set of this step.
   void begin_step(const S&, const S& e) noexcept {
     const S now = detail::watched(reading_, e);
-    is_shrinking_ = all(now < previous_);
+    is_shrinking_ = now < previous_;
     previous_ = now;
   }
 

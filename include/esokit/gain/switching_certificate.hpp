@@ -60,7 +60,7 @@ bool same_half_plane(const ErrorPolynomial<Size, S>& p, const ErrorPolynomial<Si
 template <int Size, Scalar S, class Gain>
 bool certified_pair(const Gain& first, const Gain& second) {
   const S unit = S(0.5) * (frequency_scale<Size, S>(first) + frequency_scale<Size, S>(second));
-  if (!all(is_finite(unit)) || !all(unit > S(0.0))) return false;
+  if (!is_finite(unit) || !(unit > S(0.0))) return false;
   const auto p = error_polynomial<Size, S>(first, unit);
   const auto q = error_polynomial<Size, S>(second, unit);
   // Positive all along the axis, the two have as many roots to its right: one test tells of both.
@@ -120,14 +120,14 @@ template <int Size, Scalar S>
   const S shrinking = bandwidth * ratio;
   const S otherwise = rule == SwitchingRule::beso ? S(bandwidth / ratio) : bandwidth;
   S quotient = shrinking / otherwise;
-  if (all(sample_time > S(0.0))) {
+  if (sample_time > S(0.0)) {
     using Poles = EqualSampledPoles<Size, S>;
     quotient = sampled_bandwidth_ratio(Poles::from_bandwidth(shrinking, sample_time),
                                        Poles::from_bandwidth(otherwise, sample_time));
   }
   constexpr double least = least_bandwidth_ratio<Size>();
   const S limit = detail::constant<S>(least * (1.0 + 16.0 * detail::unit_rounding<S>()));
-  return all(is_finite(quotient)) && all(quotient > limit) && all(S(1.0) / quotient > limit);
+  return is_finite(quotient) && quotient > limit && S(1.0) / quotient > limit;
 }
 
 /// The end of the certified range of rho on the side of `ratio`: below 1 the least, above 1 the

@@ -24,16 +24,16 @@ bool positive_on_half_line(const Array<S, Degree + 1>& coefficients) {
   Piece piece{};
   for (std::size_t i = 0; i <= Degree; ++i) {
     piece[i] = coefficients[i] / S(row[i]);
-    if (!all(is_finite(piece[i]))) return false;
+    if (!is_finite(piece[i])) return false;
   }
   Array<Piece, static_cast<int>(depth)> waiting{};
   Array<std::size_t, static_cast<int>(depth)> level{};
   std::size_t count = 0;
   std::size_t here = 0;
   for (;;) {
-    if (!all(piece[0] > S(0.0)) || !all(piece[Degree] > S(0.0))) return false;
+    if (!(piece[0] > S(0.0)) || !(piece[Degree] > S(0.0))) return false;
     bool proved = true;
-    for (const S& c : piece) proved = proved && all(c > S(0.0));
+    for (const S& c : piece) proved = proved && c > S(0.0);
     if (proved) {
       if (count == 0) return true;
       --count;

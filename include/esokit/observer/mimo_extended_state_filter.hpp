@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cmath>
+#include <esokit/core/lane_by_lane.hpp>
 #include <esokit/gain/covariance_root.hpp>
 #include <esokit/gain/riccati.hpp>
 #include <esokit/gain/riccati_gain.hpp>
@@ -22,6 +23,37 @@ struct ChainOrders {
   static constexpr Array<int, count> values{Orders...};              ///< n_1 .. n_p
 };
 
+/// Config of MimoExtendedStateFilter.
+template <class Orders, int Inputs, Scalar S, int Extension>
+struct MimoExtendedStateFilterConfig {
+  static constexpr int outputs = Orders::count;                   ///< p
+  static constexpr int size = Orders::sum + outputs * Extension;  ///< N
+  using Covariance = Matrix<S, size, size>;                       ///< N x N
+  using OutputCovariance = Matrix<S, outputs, outputs>;           ///< p x p
+
+  Matrix<S, outputs, Inputs> input_matrix = Matrix<S, outputs, Inputs>::Zero();  ///< B0, p x q
+  S sample_time{};                                                               ///< T, s
+  OutputCovariance measurement_covariance = OutputCovariance::Zero();  ///< R, p x p, semidefinite
+  Array<S, size> disturbance_bounds{};                 ///< q_r per state, as in ExtendedStateFilter
+  S bound_factor{static_cast<double>(size)};           ///< c
+  std::optional<Covariance> process_covariance{};      ///< Q, N x N, instead of the bounds
+  Covariance initial_covariance = Covariance::Zero();  ///< P0, N x N, semidefinite
+  InflationRule inflation_rule = InflationRule::fixed;  ///< fixed or none
+  S inflation{};                                        ///< theta > 0 of the fixed rule
+  RiccatiMode mode = RiccatiMode::recursive;            ///< recursive or frozen
+  bool allow_vanishing_gain = false;                    ///< see ExtendedStateFilter
+  int max_gap = 100;  ///< missing samples of a channel in a row that a correction may bridge,
+                      ///< 1 .. 65000; after more its chain restarts from the measurement
+
+  /// @cond
+  static constexpr auto fields(auto& c) noexcept {
+    return std::tie(c.input_matrix, c.sample_time, c.measurement_covariance, c.disturbance_bounds,
+                    c.bound_factor, c.process_covariance, c.initial_covariance, c.inflation_rule,
+                    c.inflation, c.mode, c.allow_vanishing_gain, c.max_gap);
+  }
+  /// @endcond
+};
+
 /// Extended state filter of p plants y_i^(n_i) = d_i + sum_j B0_ij u_j, sampled exactly. What the
 /// plants do to each other beside B0 is part of d_i. The noises of the measurements may be
 /// correlated (full R), and so may be Q and P0 across the chains; with all of them block diagonal
@@ -35,8 +67,8 @@ struct ChainOrders {
 /// State order: chain by chain, (y_i, .., y_i^(n_i - 1), d_i, .., d_i^(m-1)).
 ///
 /// @tparam Orders ChainOrders<n_1, .., n_p> @tparam Inputs q, number of inputs
-/// @tparam S plain scalar @tparam Extension m, the same for all chains
-template <class Orders, int Inputs, PlainScalar S = double, int Extension = 1>
+/// @tparam S scalar @tparam Extension m, the same for all chains
+template <class Orders, int Inputs, Scalar S = double, int Extension = 1>
 class MimoExtendedStateFilter {
  public:
   static constexpr int outputs = Orders::count;                   ///< p
@@ -53,22 +85,7 @@ class MimoExtendedStateFilter {
   using OutputCovariance = Matrix<S, outputs, outputs>;  ///< p x p, in the units of y
   using Gain = Matrix<S, size, outputs>;                 ///< N x p, physical units
 
-  /// Settings of make.
-  struct Config {
-    Matrix<S, outputs, Inputs> input_matrix = Matrix<S, outputs, Inputs>::Zero();  ///< B0, p x q
-    S sample_time{};                                                               ///< T, s
-    OutputCovariance measurement_covariance = OutputCovariance::Zero();  ///< R, p x p, semidefinite
-    Array<S, size> disturbance_bounds{};             ///< q_r per state, as in ExtendedStateFilter
-    S bound_factor{static_cast<double>(size)};       ///< c
-    std::optional<Covariance> process_covariance{};  ///< Q, N x N, instead of the bounds
-    Covariance initial_covariance = Covariance::Zero();   ///< P0, N x N, semidefinite
-    InflationRule inflation_rule = InflationRule::fixed;  ///< fixed or none
-    S inflation{};                                        ///< theta > 0 of the fixed rule
-    RiccatiMode mode = RiccatiMode::recursive;            ///< recursive or frozen
-    bool allow_vanishing_gain = false;                    ///< see ExtendedStateFilter
-    int max_gap = 100;  ///< missing samples of a channel in a row that a correction may bridge,
-                        ///< 1 .. 65000; after more its chain restarts from the measurement
-  };
+  using Config = MimoExtendedStateFilterConfig<Orders, Inputs, S, Extension>;  ///< settings of make
 
   /// Checks the settings and does all the design work.
   /// @return the filter at rest in zero, or an error that names the field
@@ -799,6 +816,32 @@ class MimoExtendedStateFilter {
   bool fresh_ = false;  ///< nothing happened since a reset with a standing gain
   bool standing_ = false;
   bool has_limit_ = false;
+};
+
+/// The same of packs, lane by lane: it takes channels in and out as they come.
+template <class Orders, int Inputs, PackScalar S, int Extension>
+class MimoExtendedStateFilter<Orders, Inputs, S, Extension>
+    : public LaneByLane<MimoExtendedStateFilter<Orders, Inputs, S, Extension>,
+                        MimoExtendedStateFilter<Orders, Inputs, LaneScalar<S>, Extension>, S,
+                        MimoExtendedStateFilterConfig<Orders, Inputs, S, Extension>> {
+  using Base = typename MimoExtendedStateFilter::LaneByLane;
+
+ public:
+  using Output = Vector<S, Orders::count>;  ///< y, p x 1
+  using Input = Vector<S, Inputs>;          ///< u, q x 1
+  template <class T>
+  using with_scalar = MimoExtendedStateFilter<Orders, Inputs, T, Extension>;  ///< of another scalar
+
+  using Base::Base;
+
+  /// As of plain scalars.
+  /// @{
+  StatusOf<S> update(const Output& y, const Input& u_applied) noexcept {
+    return Base::update(y, u_applied);
+  }
+  StatusOf<S> predict(const Input& u_applied) noexcept { return Base::predict(u_applied); }
+  StatusOf<S> correct(const Output& y) noexcept { return Base::correct(y); }
+  /// @}
 };
 
 }  // namespace esokit

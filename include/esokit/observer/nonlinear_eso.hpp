@@ -60,7 +60,7 @@ class NonlinearEso
   template <class T>
   using with_scalar =
       NonlinearEso<Order, T, Extension,
-                   typename detail::ShapeWithScalar<Shape, T>::type>;  ///< of another scalar
+                   typename detail::ForScalar<Shape, T>::type>;  ///< of another scalar
 
   using Report = NonlinearGainReport<detail::TableScalar<S>>;  ///< see `report`
 
@@ -195,7 +195,7 @@ class ContinuousNonlinearEso
     constexpr double free_from = unbounded_certified_gain<size>();
     Interval<S> limits{};
     if (!asked.unlimited && !asked.upper &&
-        (!asked.lower || (all(is_finite(*asked.lower)) && all(*asked.lower >= S(free_from))))) {
+        (!asked.lower || (is_finite(*asked.lower) && *asked.lower >= S(free_from)))) {
       limits = {asked.lower ? *asked.lower : S(0.5),
                 S((std::numeric_limits<detail::TableScalar<S>>::max)())};
     } else {
