@@ -101,6 +101,7 @@
 #include <esokit/observer/half_gain_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/mimo_extended_state_filter.hpp>
+#include <esokit/observer/named_observer.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
 #include <esokit/observer/reduced_order_eso.hpp>

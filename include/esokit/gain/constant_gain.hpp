@@ -52,9 +52,6 @@ class ConstantGain {
     return law;
   }
 
-  /// Any gap that is asked for.
-  [[nodiscard]] static constexpr int longest_gap(int asked) noexcept { return asked; }
-
   /// k, scaled, whatever the innovation.
   /// @{
   [[nodiscard]] constexpr const ScaledGain<Size, S>& gain(const S&) const noexcept { return gain_; }
@@ -107,14 +104,26 @@ struct Certain {
   [[nodiscard]] constexpr Error<S> error() const noexcept { return {}; }
 };
 
-/// The model of a checked config. @param settings of a config, where the model is no chain
-template <class Model, class Config, class Settings>
-auto make_model(const Config& config, [[maybe_unused]] Settings&& settings) {
+/// The model of a checked config.
+template <class Model, class Config>
+auto make_model(const Config& config) {
   using S = std::remove_cvref_t<decltype(config.input_gain)>;
   if constexpr (model_traits<Model>.is_chain) {
     return Certain<Model, S>{Model(config.input_gain, config.sample_time)};
+  } else if constexpr (requires { config.plant_model; }) {
+    return Model::make(config.plant_model, config.input_gain, config.sample_time);
   } else {
-    return Model::make(settings(config), config.input_gain, config.sample_time);
+    return Model::make(config.model, config.input_gain, config.sample_time);
+  }
+}
+
+/// The law that a config asks for by bandwidth or by poles. @param chain to be sampled, if it is
+template <class Law, class Config, class... Chain>
+auto placed_law(const Config& config, const Chain&... chain) {
+  if constexpr (requires { config.poles; }) {
+    return Law::make("poles", config.poles, chain...);
+  } else {
+    return Law::make("observer_bandwidth", config.observer_bandwidth, chain...);
   }
 }
 

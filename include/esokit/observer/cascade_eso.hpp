@@ -6,74 +6,55 @@
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/constant_gain.hpp>
 #include <esokit/observer/continuous_observer.hpp>
+#include <esokit/observer/named_observer.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
 #include <optional>
 #include <type_traits>
 
 namespace esokit {
 
-/// Config of CascadeEso by bandwidths or by a pole set per level.
+/// Settings of CascadeEso by bandwidths.
 /// @tparam Settings of a model other than the chain
 template <int Size, int Levels, Scalar S, class Placement, class Settings = NoModelSettings>
-struct CascadeEsoConfig;
-
-/// Settings of CascadeEso by bandwidths.
-template <int Size, int Levels, Scalar S>
-struct CascadeEsoConfig<Size, Levels, S, EqualPoles> {
+struct CascadeEsoConfig {
   S observer_bandwidth{};  ///< omega_o1 of level 1, rad/s
   S bandwidth_factor{};    ///< alpha > 1: omega_oi = alpha omega_o(i-1); left out for one level
   std::optional<Array<S, Levels>>
       level_bandwidths{};  ///< omega_oi, rad/s, instead of the two above
   S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
   S sample_time{};         ///< T, s
-  int max_gap = 100;       ///< missing samples that a correction may bridge before it restarts
+  [[no_unique_address]] Settings model{};  ///< what is known of the plant
+  int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts; fewer
+                      ///< where the model says so, see `max_gap()`
 
   /// @cond
   static constexpr auto fields(auto& c) noexcept {
     return std::tie(c.observer_bandwidth, c.bandwidth_factor, c.level_bandwidths, c.input_gain,
-                    c.sample_time, c.max_gap);
+                    c.sample_time, c.model, c.max_gap);
   }
   /// @endcond
-};
-
-/// Settings of CascadeEso by bandwidths, with a model of the plant.
-template <int Size, int Levels, Scalar S, class Settings>
-requires(!std::same_as<Settings, NoModelSettings>)  //
-    struct CascadeEsoConfig<Size, Levels, S, EqualPoles, Settings> {
-  S observer_bandwidth{};  ///< omega_o1 of level 1, rad/s
-  S bandwidth_factor{};    ///< alpha > 1: omega_oi = alpha omega_o(i-1); left out for one level
-  std::optional<Array<S, Levels>>
-      level_bandwidths{};  ///< omega_oi, rad/s, instead of the two above
-  S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
-  S sample_time{};         ///< T, s
-  Settings model{};        ///< what is known of the plant
-  int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts; fewer
-                      ///< where the model says so, see `max_gap()`
 };
 
 /// Settings of CascadeEso by poles.
-template <int Size, int Levels, Scalar S, ListsPoles Placement>
-struct CascadeEsoConfig<Size, Levels, S, Placement> {
+template <int Size, int Levels, Scalar S, ListsPoles Placement, class Settings>
+struct CascadeEsoConfig<Size, Levels, S, Placement, Settings> {
   /// p_i of each level, 1/s; of a pack those of all lanes
   Array<typename Placement::template Spec<Size, LaneScalar<S>>, Levels> level_poles{};
-  S input_gain{};     ///< b0, unit of y^(n) per unit of u; not zero
-  S sample_time{};    ///< T, s
-  int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts
+  S input_gain{};                          ///< b0, unit of y^(n) per unit of u; not zero
+  S sample_time{};                         ///< T, s
+  [[no_unique_address]] Settings model{};  ///< what is known of the plant
+  int max_gap = 100;                       ///< as by bandwidths
 
   /// @cond
   static constexpr auto fields(auto& c) noexcept {
-    return std::tie(c.level_poles, c.input_gain, c.sample_time, c.max_gap);
+    return std::tie(c.level_poles, c.input_gain, c.sample_time, c.model, c.max_gap);
   }
   /// @endcond
 };
 
-/// Config of ContinuousCascadeEso: the same without the sampling.
-template <int Size, int Levels, Scalar S, class Placement>
-struct ContinuousCascadeEsoConfig;
-
 /// Settings of ContinuousCascadeEso by bandwidths.
-template <int Size, int Levels, Scalar S>
-struct ContinuousCascadeEsoConfig<Size, Levels, S, EqualPoles> {
+template <int Size, int Levels, Scalar S, class Placement>
+struct ContinuousCascadeEsoConfig {
   S observer_bandwidth{};  ///< omega_o1 of level 1, rad/s
   S bandwidth_factor{};    ///< alpha > 1: omega_oi = alpha omega_o(i-1); left out for one level
   std::optional<Array<S, Levels>>
@@ -170,49 +151,31 @@ Expected<Array<Law, Levels>, Error<S>> level_laws(const Config& config, MakeLaw&
 /// @tparam Model what is known of the plant
 template <int Order, int Levels, Scalar S = double, int Extension = 1, class Placement = EqualPoles,
           class Model = ChainModel<Order, S, Extension>>
-class CascadeEso : public PredictorCorrector<Order, S, Extension,
-                                             ConstantGainOf<Model, Order + Extension, S, Placement>,
-                                             Levels, Model> {
-  using Law = ConstantGainOf<Model, Order + Extension, S, Placement>;
-  using Base = PredictorCorrector<Order, S, Extension, Law, Levels, Model>;
+class CascadeEso : public NamedObserver<
+                       CascadeEso<Order, Levels, S, Extension, Placement, Model>,
+                       PredictorCorrector<Order, S, Extension,
+                                          ConstantGainOf<Model, Order + Extension, S, Placement>,
+                                          Levels, Model>> {
+  using Shell = typename CascadeEso::NamedObserver;
+  friend Shell;
+  using Shell::Shell;
 
  public:
   /// Settings of make.
-  using Config = CascadeEsoConfig<Base::size, Levels, S, Placement, typename Model::Settings>;
+  using Config =
+      CascadeEsoConfig<Order + Extension, Levels, S, Placement, typename Model::Settings>;
   /// The same of another scalar.
   template <class T>
   using with_scalar =
       CascadeEso<Order, Levels, T, Extension, Placement, detail::WithScalar<Model, T>>;
 
-  /// Checks the settings and does all the design work.
-  /// @return the observer at rest in zero, or an error that names the field
-  static Expected<CascadeEso, Error<S>> make(const Config& config) {
-    if constexpr (PackScalar<S>) {
-      return detail::make_lanes<CascadeEso>(config);
-    } else {
-      const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
-      if (auto ok = Base::check_chain(chain); !ok) return ok.error();
-      const auto model = detail::make_model<Model>(
-          config, [](const auto& c) -> const auto& { return c.model; });
-      if (!model) return model.error();
-      const auto laws = detail::level_laws<Law, Placement, Base::size, Levels, S>(
-          config, [&](const char* field, const auto& spec, int index) {
-            return Law::make(field, spec, *model, index);
-          });
-      if (!laws) return laws.error();
-      int max_gap = config.max_gap;
-      for (const Law& law : *laws) max_gap = law.longest_gap(max_gap);
-      return CascadeEso(*model, *laws, max_gap);
-    }
-  }
-
-  /// New settings while running: the estimates of all levels are kept, a change of b0 is moved into
-  /// the disturbance of level 1. A refused config changes nothing.
-  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
-
  private:
-  CascadeEso(const Model& model, const typename Base::Laws& laws, int max_gap) noexcept
-      : Base(model, laws, max_gap) {}
+  static auto design(const Config& config, const Model& model) {
+    return detail::level_laws<typename Shell::Law, Placement, Order + Extension, Levels, S>(
+        config, [&](const char* field, const auto& spec, int index) {
+          return Shell::Law::make(field, spec, model, index);
+        });
+  }
 };
 
 /// Told apart in snapshots.
@@ -226,30 +189,25 @@ inline constexpr std::uint32_t type_tag<CascadeEso<Order, Levels, S, Extension, 
 /// gain/pole_set.hpp)
 template <int Order, int Levels, Scalar S = double, int Extension = 1, class Placement = EqualPoles>
 class ContinuousCascadeEso
-    : public ContinuousObserver<Order, S, Extension,
-                                ContinuousConstantGain<Order + Extension, S, Placement>, Levels> {
-  using Law = ContinuousConstantGain<Order + Extension, S, Placement>;
-  using Base = ContinuousObserver<Order, S, Extension, Law, Levels>;
+    : public NamedObserver<
+          ContinuousCascadeEso<Order, Levels, S, Extension, Placement>,
+          ContinuousObserver<Order, S, Extension,
+                             ContinuousConstantGain<Order + Extension, S, Placement>, Levels>> {
+  using Shell = typename ContinuousCascadeEso::NamedObserver;
+  friend Shell;
+  using Shell::Shell;
 
  public:
   /// Settings of make.
-  using Config = ContinuousCascadeEsoConfig<Base::size, Levels, S, Placement>;
-
-  /// Checks the settings and does all the design work.
-  /// @return the observer's equations, or an error that names the field
-  static Expected<ContinuousCascadeEso, Error<S>> make(const Config& config) {
-    if (Rules<S> rules; !rules.nonzero("input_gain", config.input_gain)) return rules.error();
-    const auto laws = detail::level_laws<Law, Placement, Base::size, Levels, S>(
-        config, [](const char* field, const auto& spec, int index) {
-          return Law::make(field, spec, index);
-        });
-    if (!laws) return laws.error();
-    return ContinuousCascadeEso(config.input_gain, *laws);
-  }
+  using Config = ContinuousCascadeEsoConfig<Order + Extension, Levels, S, Placement>;
 
  private:
-  ContinuousCascadeEso(const S& input_gain, const typename Base::Laws& laws)
-      : Base(input_gain, laws) {}
+  static auto design(const Config& config) {
+    return detail::level_laws<typename Shell::Law, Placement, Order + Extension, Levels, S>(
+        config, [](const char* field, const auto& spec, int index) {
+          return Shell::Law::make(field, spec, index);
+        });
+  }
 };
 
 }  // namespace esokit

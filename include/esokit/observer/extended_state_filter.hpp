@@ -152,8 +152,7 @@ class ExtendedStateFilter
         .all_of(check_rule(config))
         .not_negative("outlier_threshold", config.outlier_threshold);
     if (!rules) return rules.error();
-    const auto plant = detail::make_model<PlantModel>(
-        config, [](const auto& c) -> const auto& { return c.plant_model; });
+    const auto plant = detail::make_model<PlantModel>(config);
     if (!plant) return plant.error();
     auto settings = law_settings(config, *plant);
     if (!settings) return settings.error();

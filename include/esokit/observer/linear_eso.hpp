@@ -6,68 +6,42 @@
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/constant_gain.hpp>
 #include <esokit/observer/continuous_observer.hpp>
+#include <esokit/observer/named_observer.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
 
 namespace esokit {
 
-/// Config of LinearEso by bandwidth or by poles.
+/// Settings of LinearEso by bandwidth, as the placement reads it.
 /// @tparam Settings of a model other than the chain
 template <int Size, Scalar S, class Placement, class Settings = NoModelSettings>
-struct LinearEsoConfig;
-
-/// Settings of LinearEso by bandwidth.
-template <int Size, Scalar S>
-struct LinearEsoConfig<Size, S, EqualPoles> {
-  S observer_bandwidth{};  ///< omega_o, rad/s: all poles at exp(-omega_o T)
+struct LinearEsoConfig {
+  S observer_bandwidth{};  ///< omega_o, rad/s: all poles at exp(-omega_o T), or see the placement
   S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
   S sample_time{};         ///< T, s
-  int max_gap = 100;       ///< missing samples that a correction may bridge before it restarts
+  [[no_unique_address]] Settings model{};  ///< what is known of the plant
+  int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts; fewer
+                      ///< where the model says so, see `max_gap()`
 
-  /// Name of what the poles are placed by, for errors.
-  static constexpr const char* placement_field = "observer_bandwidth";
-  /// What the poles are placed by.
-  [[nodiscard]] const S& placement() const noexcept { return observer_bandwidth; }
   /// @cond
   static constexpr auto fields(auto& c) noexcept {
-    return std::tie(c.observer_bandwidth, c.input_gain, c.sample_time, c.max_gap);
+    return std::tie(c.observer_bandwidth, c.input_gain, c.sample_time, c.model, c.max_gap);
   }
   /// @endcond
 };
 
-/// Settings of LinearEso by bandwidth, with a model of the plant.
-template <int Size, Scalar S, class Settings>
-requires(!std::same_as<Settings, NoModelSettings>)  //
-    struct LinearEsoConfig<Size, S, EqualPoles, Settings> {
-  S observer_bandwidth{};  ///< omega_o, rad/s: all poles at exp(-omega_o T)
-  S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
-  S sample_time{};         ///< T, s
-  Settings model{};        ///< what is known of the plant
-  int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts; fewer
-                      ///< where the model says so, see `max_gap()`
-
-  /// Name of what the poles are placed by, for errors.
-  static constexpr const char* placement_field = "observer_bandwidth";
-  /// What the poles are placed by.
-  [[nodiscard]] const S& placement() const noexcept { return observer_bandwidth; }
-};
-
 /// Settings of LinearEso by poles.
-template <int Size, Scalar S, ListsPoles Placement>
-struct LinearEsoConfig<Size, S, Placement> {
-  using Poles = typename Placement::template Spec<Size, LaneScalar<S>>;  ///< one a row of the gain
+template <int Size, Scalar S, ListsPoles Placement, class Settings>
+struct LinearEsoConfig<Size, S, Placement, Settings> {
+  /// p_i, 1/s, left half plane, in conjugate pairs, one a row of the gain; of a pack of all lanes
+  typename Placement::template Spec<Size, LaneScalar<S>> poles{};
+  S input_gain{};                          ///< b0, unit of y^(n) per unit of u; not zero
+  S sample_time{};                         ///< T, s
+  [[no_unique_address]] Settings model{};  ///< what is known of the plant
+  int max_gap = 100;                       ///< as by bandwidth
 
-  Poles poles{};      ///< p_i, 1/s, left half plane, in conjugate pairs; of a pack of all lanes
-  S input_gain{};     ///< b0, unit of y^(n) per unit of u; not zero
-  S sample_time{};    ///< T, s
-  int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts
-
-  /// Name of what the poles are placed by, for errors.
-  static constexpr const char* placement_field = "poles";
-  /// What the poles are placed by.
-  [[nodiscard]] const Poles& placement() const noexcept { return poles; }
   /// @cond
   static constexpr auto fields(auto& c) noexcept {
-    return std::tie(c.poles, c.input_gain, c.sample_time, c.max_gap);
+    return std::tie(c.poles, c.input_gain, c.sample_time, c.model, c.max_gap);
   }
   /// @endcond
 };
@@ -85,43 +59,25 @@ struct LinearEsoConfig<Size, S, Placement> {
 template <int Order, Scalar S = double, int Extension = 1, class Placement = EqualPoles,
           class Model = ChainModel<Order, S, Extension>>
 class LinearEso
-    : public PredictorCorrector<Order, S, Extension,
-                                ConstantGainOf<Model, Order + Extension, S, Placement>, 1, Model> {
-  using Law = ConstantGainOf<Model, Order + Extension, S, Placement>;
-  using Base = PredictorCorrector<Order, S, Extension, Law, 1, Model>;
+    : public NamedObserver<
+          LinearEso<Order, S, Extension, Placement, Model>,
+          PredictorCorrector<Order, S, Extension,
+                             ConstantGainOf<Model, Order + Extension, S, Placement>, 1, Model>> {
+  using Shell = typename LinearEso::NamedObserver;
+  friend Shell;
+  using Shell::Shell;
 
  public:
   /// Settings of make.
-  using Config = LinearEsoConfig<Base::size, S, Placement, typename Model::Settings>;
+  using Config = LinearEsoConfig<Order + Extension, S, Placement, typename Model::Settings>;
   /// The same of another scalar.
   template <class T>
   using with_scalar = LinearEso<Order, T, Extension, Placement, detail::WithScalar<Model, T>>;
 
-  /// Checks the settings and does all the design work.
-  /// @return the observer at rest in zero, or an error that names the field
-  static Expected<LinearEso, Error<S>> make(const Config& config) {
-    if constexpr (PackScalar<S>) {
-      return detail::make_lanes<LinearEso>(config);
-    } else {
-      const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
-      // The chain is checked first: the law divides by what it checks.
-      if (auto ok = Base::check_chain(chain); !ok) return ok.error();
-      const auto model = detail::make_model<Model>(
-          config, [](const auto& c) -> const auto& { return c.model; });
-      if (!model) return model.error();
-      const auto law = Law::make(Config::placement_field, config.placement(), *model);
-      if (!law) return law.error();
-      return LinearEso(*model, *law, law->longest_gap(config.max_gap));
-    }
-  }
-
-  /// New settings while running: the estimate is kept, a change of b0 is moved into the
-  /// disturbance. A refused config changes nothing.
-  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
-
  private:
-  LinearEso(const Model& model, const Law& law, int max_gap) noexcept
-      : Base(model, {law}, max_gap) {}
+  static auto design(const Config& config, const Model& model) {
+    return detail::placed_law<typename Shell::Law>(config, model);
+  }
 };
 
 /// Told apart in snapshots.
@@ -129,61 +85,40 @@ template <int Order, Scalar S, int Extension, class Placement, class Model>
 inline constexpr std::uint32_t type_tag<LinearEso<Order, S, Extension, Placement, Model>> =
     make_type_tag<S, Placement, Model>("LinearEso", Order, Extension);
 
-/// Config of ContinuousLinearEso by bandwidth or by poles.
-template <int Size, Scalar S, class Placement>
-struct ContinuousLinearEsoConfig;
-
 /// Settings of ContinuousLinearEso by bandwidth.
-template <int Size, Scalar S>
-struct ContinuousLinearEsoConfig<Size, S, EqualPoles> {
-  S observer_bandwidth{};  ///< omega_o, rad/s: all poles at -omega_o
+template <int Size, Scalar S, class Placement>
+struct ContinuousLinearEsoConfig {
+  S observer_bandwidth{};  ///< omega_o, rad/s: all poles at -omega_o, or see the placement
   S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero
-
-  /// Name of what the poles are placed by, for errors.
-  static constexpr const char* placement_field = "observer_bandwidth";
-  /// What the poles are placed by.
-  [[nodiscard]] const S& placement() const noexcept { return observer_bandwidth; }
 };
 
 /// Settings of ContinuousLinearEso by poles.
 template <int Size, Scalar S, ListsPoles Placement>
 struct ContinuousLinearEsoConfig<Size, S, Placement> {
-  using Poles = typename Placement::template Spec<Size, S>;  ///< one a row of the gain
-
-  Poles poles{};   ///< p_i, 1/s, left half plane, in conjugate pairs
+  /// p_i, 1/s, left half plane, in conjugate pairs, one a row of the gain
+  typename Placement::template Spec<Size, S> poles{};
   S input_gain{};  ///< b0, unit of y^(n) per unit of u; not zero
-
-  /// Name of what the poles are placed by, for errors.
-  static constexpr const char* placement_field = "poles";
-  /// What the poles are placed by.
-  [[nodiscard]] const Poles& placement() const noexcept { return poles; }
 };
 
 /// LinearEso as an ODE, z' = A z + B u + l (y - z_1), for simulation.
-/// @tparam Order n @tparam S scalar @tparam Extension m
-/// @tparam Placement EqualPoles (config by observer_bandwidth) or PoleSet (config by poles;
-/// gain/pole_set.hpp)
+/// @tparam Order n @tparam S scalar @tparam Extension m @tparam Placement as of LinearEso
 template <int Order, Scalar S = double, int Extension = 1, class Placement = EqualPoles>
 class ContinuousLinearEso
-    : public ContinuousObserver<Order, S, Extension,
-                                ContinuousConstantGain<Order + Extension, S, Placement>> {
-  using Law = ContinuousConstantGain<Order + Extension, S, Placement>;
-  using Base = ContinuousObserver<Order, S, Extension, Law>;
+    : public NamedObserver<
+          ContinuousLinearEso<Order, S, Extension, Placement>,
+          ContinuousObserver<Order, S, Extension,
+                             ContinuousConstantGain<Order + Extension, S, Placement>>> {
+  using Shell = typename ContinuousLinearEso::NamedObserver;
+  friend Shell;
+  using Shell::Shell;
 
  public:
-  using Config = ContinuousLinearEsoConfig<Base::size, S, Placement>;  ///< settings of make
-
-  /// Checks the settings and does all the design work.
-  /// @return the observer's equations, or an error that names the field
-  static Expected<ContinuousLinearEso, Error<S>> make(const Config& config) {
-    if (Rules<S> rules; !rules.nonzero("input_gain", config.input_gain)) return rules.error();
-    auto law = Law::make(Config::placement_field, config.placement());
-    if (!law) return law.error();
-    return ContinuousLinearEso(config.input_gain, *law);
-  }
+  using Config = ContinuousLinearEsoConfig<Order + Extension, S, Placement>;  ///< settings of make
 
  private:
-  ContinuousLinearEso(const S& input_gain, const Law& law) : Base(input_gain, {law}) {}
+  static auto design(const Config& config) {
+    return detail::placed_law<typename Shell::Law>(config);
+  }
 };
 
 }  // namespace esokit

@@ -67,6 +67,7 @@ class PredictorCorrector {
 
  public:
   using Chain = ScaledChain<Order, S, Extension>;  ///< the sampled chain, in its scaling
+  using PlantModel = Model;                        ///< what is known of the plant
   static constexpr int order = Order;              ///< n, order of the plant
   static constexpr int extension = Extension;      ///< m, extended states
   static constexpr int size = Model::size;         ///< N

@@ -1,0 +1,100 @@
+/// @file
+/// NamedObserver: what all observers with a name do around their config and their gain laws, in
+/// both time domains.
+#pragma once
+
+#include <esokit/core/check.hpp>
+#include <esokit/core/expected.hpp>
+#include <esokit/core/scalar.hpp>
+#include <esokit/gain/constant_gain.hpp>
+#include <type_traits>
+
+namespace esokit {
+
+/// Base of the observers with a name: `make`, and `retune` of a sampled one.
+///
+/// A name is a model, a law, a config and a page of docs. An observer of your own is
+///
+///     template <int Order, Scalar S = double>
+///     class MyEso : public NamedObserver<MyEso<Order, S>,
+///                                        PredictorCorrector<Order, S, 1, MyGain<Order + 1, S>>> {
+///      public:
+///       struct Config {
+///         S observer_bandwidth{};
+///         S input_gain{};
+///         S sample_time{};
+///         int max_gap = 100;
+///       };
+///       using MyEso::NamedObserver::NamedObserver;
+///       static auto design(const Config& config, const auto& model) {
+///         return MyGain<Order + 1, S>::make(config.observer_bandwidth, model.sample_time());
+///       }
+///     };
+///
+/// `design` gives the gain law, of a cascade all of them, as an Expected; it is asked once b0, T
+/// and max_gap are good, and of a continuous observer (`Base` a ContinuousObserver) with the config
+/// alone. For packs it also says `with_scalar` and, in its config, `fields`.
+/// @tparam Self the observer itself @tparam Base PredictorCorrector or ContinuousObserver
+template <class Self, class Base>
+class NamedObserver : public Base {
+  using S = typename Base::scalar_type;
+  static constexpr bool sampled = requires { typename Base::Status; };
+
+ public:
+  /// Checks the settings and does all the design work.
+  /// @return the observer, a sampled one at rest in zero, or an error that names the field
+  template <class O = Self>
+  static Expected<Self, Error<S>> make(const typename O::Config& config) {
+    if constexpr (sampled && PackScalar<S>) {
+      return detail::make_lanes<Self>(config);
+    } else {
+      return O::make_one(config);
+    }
+  }
+
+  /// New settings while running: the estimate is kept, of all levels, a change of b0 is moved into
+  /// the disturbance (of level 1). A refused config changes nothing.
+  template <class O = Self>
+  requires sampled Check<S> retune(const typename O::Config& config) {
+    return detail::retune(static_cast<Self&>(*this), config);
+  }
+
+ protected:
+  using Laws = typename Base::Laws;       ///< one a level
+  using Law = typename Laws::value_type;  ///< what `design` gives
+
+  /// From what is checked already: as the constructor of `Base`.
+  template <class... Parts>
+  explicit NamedObserver(const Parts&... parts) noexcept : Base(parts...) {}
+
+  /// `make` of a plain scalar; an observer that is more than its laws has its own.
+  template <class O = Self>
+  static Expected<Self, Error<S>> make_one(const typename O::Config& config) {
+    if constexpr (!sampled) {
+      if (Rules<S> rules; !rules.nonzero("input_gain", config.input_gain)) return rules.error();
+      const auto laws = O::design(config);
+      if (!laws) return laws.error();
+      return Self(config.input_gain, all_levels(*laws));
+    } else {
+      // The chain is checked first: laws divide by what it checks.
+      if (auto ok = Base::check_chain({config.input_gain, config.sample_time, config.max_gap}); !ok)
+        return ok.error();
+      using Model = typename Base::PlantModel;
+      const auto model = detail::make_model<Model>(config);
+      if (!model) return model.error();
+      const auto laws = O::design(config, *model);
+      if (!laws) return laws.error();
+      int max_gap = config.max_gap;
+      if constexpr (!model_traits<Model>.is_chain) {
+        for (const Law& law : all_levels(*laws)) max_gap = law.longest_gap(max_gap);
+      }
+      return Self(*model, all_levels(*laws), max_gap);
+    }
+  }
+
+ private:
+  static constexpr const Laws& all_levels(const Laws& laws) noexcept { return laws; }
+  static constexpr Laws all_levels(const Law& law) noexcept { return {law}; }
+};
+
+}  // namespace esokit
