@@ -145,6 +145,9 @@ class AlgebraicGain {
   /// Samples since the schedule began; the count ends where it settles.
   [[nodiscard]] constexpr Count age() const noexcept { return age_; }
 
+  /// Samples that are counted before the schedule may settle.
+  [[nodiscard]] constexpr const Count& least_age() const noexcept { return least_age_; }
+
   /// True once the gain is that of LinearEso with bandwidth lambda, to within rounding.
   [[nodiscard]] constexpr Lanes<bool, S> settled() const noexcept { return settled_; }
 
@@ -357,5 +360,58 @@ class AlgebraicGain {
 template <int Size, Scalar S>
 inline constexpr std::uint32_t type_tag<AlgebraicGain<Size, S>> = make_type_tag<S>("AlgebraicGain",
                                                                                    Size);
+
+/// Falling-bandwidth gain of the continuous observer: L_j(t) = C(N,j) P_j(t) with P_0 = 1,
+/// P_{j+1} = (lambda + N q v) P_j + q v (1 + v) dP_j/dv, v = 1 / (e^{qt} - 1).
+template <int Size, Scalar S>
+class ContinuousAlgebraicGain {
+ public:
+  /// @param bandwidth lambda >= 0, rad/s @param shift q >= 0, rad/s
+  ContinuousAlgebraicGain(const S& bandwidth, const S& shift)
+      : bandwidth_(bandwidth), shift_(shift) {}
+
+  /// P_0 .. P_N at t > 0 (s); P_j in 1/s^j. All terms are positive.
+  [[nodiscard]] Array<S, Size + 1> factors(const S& t) const {
+    using std::expm1;
+    // With w = q v, which is 1/t for q = 0: P_{j+1} = (lambda + N w) P_j + w (q + w) dP_j/dw.
+    const auto shifting = shift_ > S(0.0);
+    const S growth = select(shifting, S(expm1(S(shift_ * t))), t);
+    const S w = select(shifting, shift_, S(1.0)) / growth;
+    Array<S, Size + 1> polynomial{};
+    for (S& c : polynomial) c = S(0.0);
+    polynomial[0] = S(1.0);
+    Array<S, Size + 1> factors{};
+    factors[0] = S(1.0);
+    for (int j = 1; j <= Size; ++j) {
+      for (int r = j; r >= 0; --r) {
+        const auto i = static_cast<std::size_t>(r);
+        polynomial[i] = (bandwidth_ + detail::integer<S>(r) * shift_) * polynomial[i];
+        if (r > 0) {
+          polynomial[i] = polynomial[i] + detail::integer<S>(Size + r - 1) * polynomial[i - 1];
+        }
+      }
+      S value(0.0);
+      for (int r = j; r >= 0; --r) value = value * w + polynomial[static_cast<std::size_t>(r)];
+      factors[static_cast<std::size_t>(j)] = value;
+    }
+    return factors;
+  }
+
+  /// L(t), N x 1, for t > 0 (s); infinite at t = 0.
+  [[nodiscard]] Vector<S, Size> gain(const S& t, const S&) const {
+    const auto p = factors(t);
+    Vector<S, Size> gain;
+    for (int j = 1; j <= Size; ++j) {
+      gain(j - 1) =
+          S(binomial_table<Size, detail::TableScalar<S>>[Size][static_cast<std::size_t>(j)]) *
+          p[static_cast<std::size_t>(j)];
+    }
+    return gain;
+  }
+
+ private:
+  S bandwidth_;
+  S shift_;
+};
 
 }  // namespace esokit

@@ -11,6 +11,8 @@
 #pragma once
 
 #include <cmath>
+#include <esokit/core/check.hpp>
+#include <esokit/core/expected.hpp>
 #include <esokit/gain/error_polynomial.hpp>
 #include <esokit/gain/placement.hpp>
 #include <esokit/math/positivity.hpp>
@@ -164,5 +166,51 @@ template <int Size, PlainScalar S>
   }
   return above ? S(1) / high : high;
 }
+
+namespace detail {
+
+/// The two bandwidths of a rule, or why there are none.
+template <Scalar S>
+struct BandwidthPair {
+  S shrinking{};
+  S otherwise{};
+};
+
+/// @param sample_time T, s; 0 for a continuous observer
+template <int Size, Scalar S>
+Expected<BandwidthPair<S>, Error<S>> bandwidth_pair(const S& bandwidth, const S& ratio,
+                                                    SwitchingRule rule, const S& sample_time,
+                                                    bool allow_uncertified) {
+  Rules<S> rules;
+  rules.positive("observer_bandwidth", bandwidth).positive("bandwidth_ratio", ratio);
+  if (!rules) return rules.error();
+  const BandwidthPair<S> pair{bandwidth * ratio,
+                              rule == SwitchingRule::beso ? S(bandwidth / ratio) : bandwidth};
+  for (const S& product : {pair.shrinking, pair.otherwise}) {
+    rules.representable("bandwidth_ratio", ratio, product,
+                        "with observer_bandwidth gives a bandwidth that the scalar cannot hold");
+  }
+  if (!rules) return rules.error();
+  if (allow_uncertified ||
+      bandwidth_switching_certified<Size, S>(rule, bandwidth, ratio, sample_time)) {
+    return pair;
+  }
+  constexpr const char* below =
+      "is not certified against every switching (allow_uncertified_switching asks for it); must be "
+      "above";
+  constexpr const char* above =
+      "is not certified against every switching (allow_uncertified_switching asks for it); must be "
+      "below";
+  if constexpr (PlainScalar<S>) {
+    const S limit = certified_ratio_limit<Size, S>(rule, bandwidth, ratio, sample_time);
+    return Error<S>{"bandwidth_ratio", ratio, ratio < S(1) ? below : above, -1, limit, true};
+  } else {
+    return Error<S>{"bandwidth_ratio", ratio,
+                    "is not certified against every switching (allow_uncertified_switching asks "
+                    "for it)"};
+  }
+}
+
+}  // namespace detail
 
 }  // namespace esokit

@@ -9,55 +9,10 @@
 #include <esokit/gain/switched_gain.hpp>
 #include <esokit/gain/switching_certificate.hpp>
 #include <esokit/observer/continuous_observer.hpp>
+#include <esokit/observer/named_observer.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
 
 namespace esokit {
-
-namespace detail {
-
-/// The two bandwidths of a rule, or why there are none.
-template <Scalar S>
-struct BandwidthPair {
-  S shrinking{};
-  S otherwise{};
-};
-
-/// @param sample_time T, s; 0 for a continuous observer
-template <int Size, Scalar S>
-Expected<BandwidthPair<S>, Error<S>> bandwidth_pair(const S& bandwidth, const S& ratio,
-                                                    SwitchingRule rule, const S& sample_time,
-                                                    bool allow_uncertified) {
-  Rules<S> rules;
-  rules.positive("observer_bandwidth", bandwidth).positive("bandwidth_ratio", ratio);
-  if (!rules) return rules.error();
-  const BandwidthPair<S> pair{bandwidth * ratio,
-                              rule == SwitchingRule::beso ? S(bandwidth / ratio) : bandwidth};
-  for (const S& product : {pair.shrinking, pair.otherwise}) {
-    rules.representable("bandwidth_ratio", ratio, product,
-                        "with observer_bandwidth gives a bandwidth that the scalar cannot hold");
-  }
-  if (!rules) return rules.error();
-  if (allow_uncertified ||
-      bandwidth_switching_certified<Size, S>(rule, bandwidth, ratio, sample_time)) {
-    return pair;
-  }
-  constexpr const char* below =
-      "is not certified against every switching (allow_uncertified_switching asks for it); must be "
-      "above";
-  constexpr const char* above =
-      "is not certified against every switching (allow_uncertified_switching asks for it); must be "
-      "below";
-  if constexpr (PlainScalar<S>) {
-    const S limit = certified_ratio_limit<Size, S>(rule, bandwidth, ratio, sample_time);
-    return Error<S>{"bandwidth_ratio", ratio, ratio < S(1) ? below : above, -1, limit, true};
-  } else {
-    return Error<S>{"bandwidth_ratio", ratio,
-                    "is not certified against every switching (allow_uncertified_switching asks "
-                    "for it)"};
-  }
-}
-
-}  // namespace detail
 
 /// Extended state observer of a plant y^(n) = d + b0 u whose bandwidth is rho omega_o while the
 /// innovation shrinks and omega_o (or, by the BESO rule, omega_o / rho) otherwise.
@@ -74,10 +29,14 @@ Expected<BandwidthPair<S>, Error<S>> bandwidth_pair(const S& bandwidth, const S&
 template <int Order, Scalar S = double, int Extension = 1,
           SignReading Reading = SignReading::magnitude>
 class AdjustableBandwidthEso
-    : public PredictorCorrector<Order, S, Extension,
-                                SwitchedGain<Order + Extension, S, EqualPoles, Reading>> {
-  using Law = SwitchedGain<Order + Extension, S, EqualPoles, Reading>;
-  using Base = PredictorCorrector<Order, S, Extension, Law>;
+    : public NamedObserver<
+          AdjustableBandwidthEso<Order, S, Extension, Reading>,
+          PredictorCorrector<Order, S, Extension,
+                             SwitchedGain<Order + Extension, S, EqualPoles, Reading>>> {
+  using Shell = typename AdjustableBandwidthEso::NamedObserver;
+  friend Shell;
+  using Shell::Shell;
+  using Law = typename Shell::Law;
 
  public:
   /// Settings of make.
@@ -101,33 +60,18 @@ class AdjustableBandwidthEso
   using with_scalar =
       AdjustableBandwidthEso<Order, T, Extension, Reading>;  ///< the same of another scalar
 
-  /// Checks the settings and does all the design work.
-  /// @return the observer at rest in zero, or an error that names the field; for a ratio without
-  /// the certificate its limit is the end of the certified range
-  static Expected<AdjustableBandwidthEso, Error<S>> make(const Config& config) {
-    if constexpr (PackScalar<S>) {
-      return detail::make_lanes<AdjustableBandwidthEso>(config);
-    } else {
-      return make_one(config);
-    }
-  }
-
-  /// New settings while running: the estimate and the innovation to compare with are kept, a change
-  /// of b0 is moved into the disturbance. A refused config changes nothing.
-  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
-
-  /// The same, with the settings of `fresh`, as `make` gave it: no design work.
+  /// Takes the settings of `fresh`, as `make` gave it, and keeps the estimate and the innovation to
+  /// compare with: no design work.
   Check<S> adopt(AdjustableBandwidthEso fresh) {
     if constexpr (PackScalar<S>) return detail::adopt_lanes(*this, fresh);
     std::get<0>(fresh.laws()).continue_from(std::get<0>(this->laws()));
-    return Base::adopt(fresh);
+    return Shell::adopt(fresh);
   }
 
  private:
-  static Expected<AdjustableBandwidthEso, Error<S>> make_one(const Config& config) {
-    const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
-    if (auto ok = Base::check_chain(chain); !ok) return ok.error();
-    const auto pair = detail::bandwidth_pair<Base::size, S>(
+  // For a ratio without the certificate the error's limit is the end of the certified range.
+  static Expected<Law, Error<S>> design(const Config& config, const typename Shell::PlantModel&) {
+    const auto pair = detail::bandwidth_pair<Order + Extension, S>(
         config.observer_bandwidth, config.bandwidth_ratio, config.rule, config.sample_time,
         config.allow_uncertified_switching);
     if (!pair) return pair.error();
@@ -142,11 +86,8 @@ class AdjustableBandwidthEso
     const auto shrinking = Set::make("", pair->shrinking, config.sample_time);
     const auto otherwise = Set::make("", pair->otherwise, config.sample_time);
     if (!shrinking || !otherwise) return Error<S>{"bandwidth_ratio", config.bandwidth_ratio, rule};
-    return AdjustableBandwidthEso(chain, Law(*shrinking, *otherwise));
+    return Law(*shrinking, *otherwise);
   }
-
-  AdjustableBandwidthEso(const ChainConfig<S>& chain, const Law& law) noexcept
-      : Base(chain, {law}) {}
 };
 
 /// Told apart in snapshots.
@@ -158,9 +99,13 @@ inline constexpr std::uint32_t type_tag<AdjustableBandwidthEso<Order, S, Extensi
 /// @tparam Order n @tparam S scalar @tparam Extension m
 template <int Order, Scalar S = double, int Extension = 1>
 class ContinuousAdjustableBandwidthEso
-    : public ContinuousObserver<Order, S, Extension, ContinuousSwitchedGain<Order + Extension, S>> {
-  using Law = ContinuousSwitchedGain<Order + Extension, S>;
-  using Base = ContinuousObserver<Order, S, Extension, Law>;
+    : public NamedObserver<
+          ContinuousAdjustableBandwidthEso<Order, S, Extension>,
+          ContinuousObserver<Order, S, Extension, ContinuousSwitchedGain<Order + Extension, S>>> {
+  using Shell = typename ContinuousAdjustableBandwidthEso::NamedObserver;
+  friend Shell;
+  using Shell::Shell;
+  using Law = typename Shell::Law;
 
  public:
   /// Settings of make.
@@ -173,28 +118,23 @@ class ContinuousAdjustableBandwidthEso
     S input_gain{};  ///< b0, unit of y^(n) per unit of u; not zero
   };
 
-  /// Checks the settings and does all the design work.
-  /// @return the observer's equations, or an error that names the field
-  static Expected<ContinuousAdjustableBandwidthEso, Error<S>> make(const Config& config) {
-    Rules<S> rules;
-    if (!rules.nonzero("input_gain", config.input_gain)) return rules.error();
-    const auto pair = detail::bandwidth_pair<Base::size, S>(
-        config.observer_bandwidth, config.bandwidth_ratio, config.rule, S(0.0),
-        config.allow_uncertified_switching);
+ private:
+  static Expected<Law, Error<S>> design(const Config& config) {
+    constexpr int size = Order + Extension;
+    const auto pair =
+        detail::bandwidth_pair<size, S>(config.observer_bandwidth, config.bandwidth_ratio,
+                                        config.rule, S(0.0), config.allow_uncertified_switching);
     if (!pair) return pair.error();
-    const auto shrinking = continuous_gain<Base::size, S>(pair->shrinking);
-    const auto otherwise = continuous_gain<Base::size, S>(pair->otherwise);
+    const auto shrinking = continuous_gain<size, S>(pair->shrinking);
+    const auto otherwise = continuous_gain<size, S>(pair->otherwise);
+    Rules<S> rules;
     for (const auto& gain : {shrinking, otherwise}) {
-      rules.representable("observer_bandwidth", config.observer_bandwidth, S(gain(Base::size - 1)),
+      rules.representable("observer_bandwidth", config.observer_bandwidth, S(gain(size - 1)),
                           "gives a gain that the scalar cannot hold");
     }
     if (!rules) return rules.error();
-    return ContinuousAdjustableBandwidthEso(config.input_gain,
-                                            Law(shrinking, otherwise, config.sign_reading));
+    return Law(shrinking, otherwise, config.sign_reading);
   }
-
- private:
-  ContinuousAdjustableBandwidthEso(const S& input_gain, const Law& law) : Base(input_gain, {law}) {}
 };
 
 }  // namespace esokit

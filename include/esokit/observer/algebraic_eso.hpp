@@ -4,10 +4,10 @@
 /// Journal of Control 23 (2021) 2171-2184).
 #pragma once
 
-#include <cmath>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/algebraic_gain.hpp>
 #include <esokit/observer/continuous_observer.hpp>
+#include <esokit/observer/named_observer.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
 #include <optional>
 
@@ -29,9 +29,14 @@ namespace esokit {
 /// @tparam Order n @tparam S scalar @tparam Extension m
 template <int Order, Scalar S = double, int Extension = 1>
 class AlgebraicEso
-    : public PredictorCorrector<Order, S, Extension, AlgebraicGain<Order + Extension, S>> {
-  using Law = AlgebraicGain<Order + Extension, S>;
-  using Base = PredictorCorrector<Order, S, Extension, Law>;
+    : public NamedObserver<
+          AlgebraicEso<Order, S, Extension>,
+          PredictorCorrector<Order, S, Extension, AlgebraicGain<Order + Extension, S>>> {
+  using Base = typename AlgebraicEso::NamedObserver;
+  friend Base;
+  using Base::Base;
+  using Law = typename Base::Law;
+  static constexpr int N = Order + Extension;
 
  public:
   using Estimate = typename Base::Estimate;  ///< (y, .., y^(n-1), d, .., d^(m-1)), N x 1
@@ -75,16 +80,6 @@ class AlgebraicEso
     /// @endcond
   };
 
-  /// Checks the settings and does all the design work.
-  /// @return the observer at rest in zero, or an error that names the field
-  static Expected<AlgebraicEso, Error<S>> make(const Config& config) {
-    if constexpr (PackScalar<S>) {
-      return detail::make_lanes<AlgebraicEso>(config);
-    } else {
-      return make_one(config);
-    }
-  }
-
   /// One sample, see PredictorCorrector::update.
   [[gnu::flatten]] Status update(S y, S u_applied) noexcept {
     if (settled() == true && this->missed() == 0) [[likely]] {
@@ -99,13 +94,10 @@ class AlgebraicEso
   /// Measurement update alone, see PredictorCorrector::correct.
   Status correct(S y) noexcept { return blank_anew(Base::correct(y)); }
 
-  /// New settings while running: the estimate and the place in the schedule (counted in samples)
-  /// are kept, a change of b0 is moved into the disturbance, in blanked estimates as well. If
-  /// the new blanking is not over yet, the present estimates are published until it is. A refused
-  /// config changes nothing.
-  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
-
-  /// The same, with the settings of `fresh`, as `make` gave it: no design work.
+  /// Takes the settings of `fresh`, as `make` gave it, with no design work; so does `retune`. The
+  /// estimate and the place in the schedule (counted in samples) are kept, a change of b0 is moved
+  /// into the disturbance, in blanked estimates as well. If the new blanking is not over yet, the
+  /// present estimates are published until it is.
   Check<S> adopt(AlgebraicEso fresh) {
     if constexpr (PackScalar<S>) {
       return detail::adopt_lanes(*this, fresh);
@@ -117,10 +109,9 @@ class AlgebraicEso
         return Error<S>{"input_gain", fresh.input_gain(), "would make the estimate not finite"};
       }
       // One that has settled stays so, and no longer knows its age.
-      std::get<0>(fresh.laws()).resume(settled() ? Law::max_index : age());
+      fresh.law().resume(settled() ? Law::max_index : age());
       if (auto ok = Base::adopt(fresh); !ok) return ok;
       publish(published);
-      blanking_samples_ = fresh.blanking_samples_;
       return {};
     }
   }
@@ -129,7 +120,7 @@ class AlgebraicEso
   /// is kept, and the estimates of this moment are published until the blanking is over.
   void rearm() noexcept {
     publish(estimate());
-    std::get<0>(this->laws()).restart();
+    law().restart();
   }
 
   /// Starts anew at (y, 0, .., 0).
@@ -145,7 +136,7 @@ class AlgebraicEso
     Estimate estimate = Base::estimate();
     if constexpr (PackScalar<S>) {
       if (blanked_now == false) return estimate;
-      for (int r = 0; r < Base::size; ++r) estimate(r) = published_row(r, estimate(r), blanked_now);
+      for (int r = 0; r < N; ++r) estimate(r) = published_row(r, estimate(r), blanked_now);
     }
     return estimate;
   }
@@ -170,46 +161,46 @@ class AlgebraicEso
   [[nodiscard]] Lanes<bool, S> blanked() const noexcept {
     if constexpr (PackScalar<S>) {
       const auto age = this->age();
+      const auto least = law().least_age();
       Lanes<bool, S> blanked;
-      for (int i = 0; i < lane_count<S>; ++i) blanked[i] = age[i] <= blanking_samples_[i];
+      for (int i = 0; i < lane_count<S>; ++i) blanked[i] = age[i] <= least[i];
       return blanked;
     } else {
-      return age() <= blanking_samples_;
+      return age() <= law().least_age();
     }
   }
 
   /// True once the observer has become LinearEso with bandwidth lambda.
-  [[nodiscard]] Lanes<bool, S> settled() const noexcept {
-    return std::get<0>(this->laws()).settled();
-  }
+  [[nodiscard]] Lanes<bool, S> settled() const noexcept { return law().settled(); }
 
   /// epsilon, s.
   [[nodiscard]] S blanking() const noexcept {
     if constexpr (PackScalar<S>) {
       S samples(0.0);
       for (int i = 0; i < lane_count<S>; ++i) {
-        samples[i] = static_cast<LaneScalar<S>>(blanking_samples_[i]);
+        samples[i] = static_cast<LaneScalar<S>>(law().least_age()[i]);
       }
       return samples * this->sample_time();
     } else {
-      return detail::integer<S>(blanking_samples_) * this->sample_time();
+      return detail::integer<S>(law().least_age()) * this->sample_time();
     }
   }
 
   /// Samples since the schedule began; the count ends where it settles.
-  [[nodiscard]] typename Law::Count age() const noexcept { return std::get<0>(this->laws()).age(); }
+  [[nodiscard]] typename Law::Count age() const noexcept { return law().age(); }
 
  private:
   friend struct detail::LaneAccess;
   static constexpr auto fields(auto& o) noexcept {
-    return std::tuple_cat(Base::fields(o), std::tie(o.published_, o.blanking_samples_));
+    return std::tuple_cat(Base::fields(o), std::tie(o.published_));
   }
 
-  static Expected<AlgebraicEso, Error<S>> make_one(const Config& config) {
-    const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
+  [[nodiscard]] const Law& law() const noexcept { return std::get<0>(this->laws()); }
+  [[nodiscard]] Law& law() noexcept { return std::get<0>(this->laws()); }
+
+  static Expected<Law, Error<S>> design(const Config& config, const typename Base::PlantModel&) {
     Rules<S> rules;
-    rules.all_of(Base::check_chain(chain))
-        .not_negative("observer_bandwidth", config.observer_bandwidth)
+    rules.not_negative("observer_bandwidth", config.observer_bandwidth)
         .not_negative("frequency_shift", config.frequency_shift)
         .require(all(config.observer_bandwidth > S(0.0)) || !all(config.frequency_shift > S(0.0)) ||
                      config.allow_vanishing_gain,
@@ -222,10 +213,9 @@ class AlgebraicEso
     const auto blanking = blanking_samples(config);
     if (!blanking) return blanking.error();
     if (all(config.observer_bandwidth > S(0.0))) {
-      const auto settled =
-          current_gain<Base::size, S>(EqualSampledPoles<Base::size, S>::from_bandwidth(
-                                          config.observer_bandwidth, config.sample_time)
-                                          .weights());
+      const auto settled = current_gain<N, S>(
+          EqualSampledPoles<N, S>::from_bandwidth(config.observer_bandwidth, config.sample_time)
+              .weights());
       rules.representable("observer_bandwidth", config.observer_bandwidth, settled.back(),
                           "times sample_time gives a gain that the scalar cannot hold");
     }
@@ -236,25 +226,19 @@ class AlgebraicEso
                           "times sample_time gives a gain that the scalar cannot hold");
     }
     if (!rules) return rules.error();
-    return AlgebraicEso(chain, law, *blanking);
-  }
-
-  AlgebraicEso(const ChainConfig<S>& chain, const Law& law, std::uint32_t blanking_samples) noexcept
-      : Base(chain, {law}), blanking_samples_(blanking_samples) {
-    publish(Estimate::Zero());
+    return law;
   }
 
   void publish(const Estimate& estimate) noexcept {
-    for (int r = 0; r < Base::size; ++r) published_[static_cast<std::size_t>(r)] = estimate(r);
+    for (int r = 0; r < N; ++r) published_[static_cast<std::size_t>(r)] = estimate(r);
   }
   [[nodiscard]] Estimate published() const noexcept {
     Estimate estimate;
-    for (int r = 0; r < Base::size; ++r) estimate(r) = published_[static_cast<std::size_t>(r)];
+    for (int r = 0; r < N; ++r) estimate(r) = published_[static_cast<std::size_t>(r)];
     return estimate;
   }
 
   static Expected<std::uint32_t, Error<S>> blanking_samples(const Config& config) {
-    constexpr int size = Base::size;
     Rules<S> rules;
     rules.not_negative("measurement_noise", config.measurement_noise)
         .not_negative("disturbance_noise", config.disturbance_noise);
@@ -272,10 +256,10 @@ class AlgebraicEso
     }
     if (noise) {
       return smallest_count(
-          "measurement_noise", config.measurement_noise, std::uint32_t{size - 1},
+          "measurement_noise", config.measurement_noise, std::uint32_t{N - 1},
           [&](const S& count) { return all(S(1.0) >= noise_ratio(config, count)); });
     }
-    return std::uint32_t{size - 1};
+    return std::uint32_t{N - 1};
   }
 
   /// Variance of the highest estimate after `count` samples over the one that is tolerated:
@@ -283,7 +267,7 @@ class AlgebraicEso
   /// prod_{i=1..N-1} (N-1+i)^2. In this order it overflows or vanishes only where the answer is
   /// clear.
   static S noise_ratio(const Config& config, const S& count) {
-    constexpr int last = Base::size - 1;
+    constexpr int last = N - 1;
     const S level = config.measurement_noise / config.disturbance_noise;
     const S rate = S(1.0) / (count * config.sample_time);
     S ratio = level * level / count;
@@ -337,7 +321,7 @@ class AlgebraicEso
     const Estimate now = Base::estimate();
     for (int i = 0; i < lane_count<S>; ++i) {
       if (!where(i)) continue;
-      for (int r = 0; r < Base::size; ++r) published_[static_cast<std::size_t>(r)][i] = now(r)[i];
+      for (int r = 0; r < N; ++r) published_[static_cast<std::size_t>(r)][i] = now(r)[i];
     }
   }
 
@@ -362,8 +346,11 @@ class AlgebraicEso
     return status;
   }
 
-  Array<S, Base::size> published_;
-  typename Law::Count blanking_samples_;
+  Array<S, N> published_ = [] {
+    Array<S, N> zero;
+    zero.fill(S(0.0));
+    return zero;
+  }();
 };
 
 /// Told apart in snapshots.
@@ -371,68 +358,17 @@ template <int Order, Scalar S, int Extension>
 inline constexpr std::uint32_t type_tag<AlgebraicEso<Order, S, Extension>> =
     make_type_tag<S>("AlgebraicEso", Order, Extension);
 
-/// Falling-bandwidth gain of the continuous observer: L_j(t) = C(N,j) P_j(t) with P_0 = 1,
-/// P_{j+1} = (lambda + N q v) P_j + q v (1 + v) dP_j/dv, v = 1 / (e^{qt} - 1).
-template <int Size, Scalar S>
-class ContinuousAlgebraicGain {
- public:
-  /// @param bandwidth lambda >= 0, rad/s @param shift q >= 0, rad/s
-  ContinuousAlgebraicGain(const S& bandwidth, const S& shift)
-      : bandwidth_(bandwidth), shift_(shift) {}
-
-  /// P_0 .. P_N at t > 0 (s); P_j in 1/s^j. All terms are positive.
-  [[nodiscard]] Array<S, Size + 1> factors(const S& t) const {
-    using std::expm1;
-    // With w = q v, which is 1/t for q = 0: P_{j+1} = (lambda + N w) P_j + w (q + w) dP_j/dw.
-    const auto shifting = shift_ > S(0.0);
-    const S growth = select(shifting, S(expm1(S(shift_ * t))), t);
-    const S w = select(shifting, shift_, S(1.0)) / growth;
-    Array<S, Size + 1> polynomial{};
-    for (S& c : polynomial) c = S(0.0);
-    polynomial[0] = S(1.0);
-    Array<S, Size + 1> factors{};
-    factors[0] = S(1.0);
-    for (int j = 1; j <= Size; ++j) {
-      for (int r = j; r >= 0; --r) {
-        const auto i = static_cast<std::size_t>(r);
-        polynomial[i] = (bandwidth_ + detail::integer<S>(r) * shift_) * polynomial[i];
-        if (r > 0) {
-          polynomial[i] = polynomial[i] + detail::integer<S>(Size + r - 1) * polynomial[i - 1];
-        }
-      }
-      S value(0.0);
-      for (int r = j; r >= 0; --r) value = value * w + polynomial[static_cast<std::size_t>(r)];
-      factors[static_cast<std::size_t>(j)] = value;
-    }
-    return factors;
-  }
-
-  /// L(t), N x 1, for t > 0 (s); infinite at t = 0.
-  [[nodiscard]] Vector<S, Size> gain(const S& t, const S&) const {
-    const auto p = factors(t);
-    Vector<S, Size> gain;
-    for (int j = 1; j <= Size; ++j) {
-      gain(j - 1) =
-          S(binomial_table<Size, detail::TableScalar<S>>[Size][static_cast<std::size_t>(j)]) *
-          p[static_cast<std::size_t>(j)];
-    }
-    return gain;
-  }
-
- private:
-  S bandwidth_;
-  S shift_;
-};
-
 /// AlgebraicEso as an ODE, z' = A z + B u + L(t) (y - z_1), for t > 0; see AlgebraicFilter for the
 /// form that is regular at t = 0.
 /// @tparam Order n @tparam S scalar @tparam Extension m
 template <int Order, Scalar S = double, int Extension = 1>
 class ContinuousAlgebraicEso
-    : public ContinuousObserver<Order, S, Extension,
-                                ContinuousAlgebraicGain<Order + Extension, S>> {
-  using Law = ContinuousAlgebraicGain<Order + Extension, S>;
-  using Base = ContinuousObserver<Order, S, Extension, Law>;
+    : public NamedObserver<
+          ContinuousAlgebraicEso<Order, S, Extension>,
+          ContinuousObserver<Order, S, Extension, ContinuousAlgebraicGain<Order + Extension, S>>> {
+  using Shell = typename ContinuousAlgebraicEso::NamedObserver;
+  friend Shell;
+  using Shell::Shell;
 
  public:
   /// Settings of make.
@@ -442,20 +378,14 @@ class ContinuousAlgebraicEso
     S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero
   };
 
-  /// Checks the settings and does all the design work.
-  /// @return the observer's equations, or an error that names the field
-  static Expected<ContinuousAlgebraicEso, Error<S>> make(const Config& config) {
+ private:
+  static Expected<typename Shell::Law, Error<S>> design(const Config& config) {
     Rules<S> rules;
-    rules.nonzero("input_gain", config.input_gain)
-        .not_negative("observer_bandwidth", config.observer_bandwidth)
+    rules.not_negative("observer_bandwidth", config.observer_bandwidth)
         .not_negative("frequency_shift", config.frequency_shift);
     if (!rules) return rules.error();
-    return ContinuousAlgebraicEso(config.input_gain,
-                                  Law(config.observer_bandwidth, config.frequency_shift));
+    return typename Shell::Law(config.observer_bandwidth, config.frequency_shift);
   }
-
- private:
-  ContinuousAlgebraicEso(const S& input_gain, const Law& law) : Base(input_gain, {law}) {}
 };
 
 }  // namespace esokit

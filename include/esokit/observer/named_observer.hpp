@@ -37,15 +37,16 @@ namespace esokit {
 /// @tparam Self the observer itself @tparam Base PredictorCorrector or ContinuousObserver
 template <class Self, class Base>
 class NamedObserver : public Base {
-  using S = typename Base::scalar_type;
   static constexpr bool sampled = requires { typename Base::Status; };
 
  public:
+  using scalar_type = typename Base::scalar_type;  ///< of states and settings
+
   /// Checks the settings and does all the design work.
   /// @return the observer, a sampled one at rest in zero, or an error that names the field
   template <class O = Self>
-  static Expected<Self, Error<S>> make(const typename O::Config& config) {
-    if constexpr (sampled && PackScalar<S>) {
+  static Expected<Self, Error<scalar_type>> make(const typename O::Config& config) {
+    if constexpr (sampled && PackScalar<scalar_type>) {
       return detail::make_lanes<Self>(config);
     } else {
       return O::make_one(config);
@@ -55,7 +56,7 @@ class NamedObserver : public Base {
   /// New settings while running: the estimate is kept, of all levels, a change of b0 is moved into
   /// the disturbance (of level 1). A refused config changes nothing.
   template <class O = Self>
-  requires sampled Check<S> retune(const typename O::Config& config) {
+  requires sampled Check<scalar_type> retune(const typename O::Config& config) {
     return detail::retune(static_cast<Self&>(*this), config);
   }
 
@@ -64,14 +65,15 @@ class NamedObserver : public Base {
   using Law = typename Laws::value_type;  ///< what `design` gives
 
   /// From what is checked already: as the constructor of `Base`.
-  template <class... Parts>
-  explicit NamedObserver(const Parts&... parts) noexcept : Base(parts...) {}
+  template <class First, class... Parts>
+  NamedObserver(const First& first, const Parts&... parts) noexcept : Base(first, parts...) {}
 
   /// `make` of a plain scalar; an observer that is more than its laws has its own.
   template <class O = Self>
-  static Expected<Self, Error<S>> make_one(const typename O::Config& config) {
+  static Expected<Self, Error<scalar_type>> make_one(const typename O::Config& config) {
     if constexpr (!sampled) {
-      if (Rules<S> rules; !rules.nonzero("input_gain", config.input_gain)) return rules.error();
+      if (Rules<scalar_type> rules; !rules.nonzero("input_gain", config.input_gain))
+        return rules.error();
       const auto laws = O::design(config);
       if (!laws) return laws.error();
       return Self(config.input_gain, all_levels(*laws));

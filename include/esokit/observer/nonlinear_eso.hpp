@@ -7,6 +7,7 @@
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/nonlinear_gain_design.hpp>
 #include <esokit/observer/continuous_observer.hpp>
+#include <esokit/observer/named_observer.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
 
 namespace esokit {
@@ -31,9 +32,14 @@ namespace esokit {
 template <int Order, Scalar S = double, int Extension = 2, class Shape = PowerSumGain<S>>
 requires EvenGain<Shape, S>
 class NonlinearEso
-    : public PredictorCorrector<Order, S, Extension, NonlinearGain<Order + Extension, S, Shape>> {
-  using Law = NonlinearGain<Order + Extension, S, Shape>;
-  using Base = PredictorCorrector<Order, S, Extension, Law>;
+    : public NamedObserver<
+          NonlinearEso<Order, S, Extension, Shape>,
+          PredictorCorrector<Order, S, Extension, NonlinearGain<Order + Extension, S, Shape>>> {
+  using Shell = typename NonlinearEso::NamedObserver;
+  friend Shell;
+  using Shell::Shell;
+  using Law = typename Shell::Law;
+  static constexpr int N = Order + Extension;
 
  public:
   /// Settings of make.
@@ -64,38 +70,23 @@ class NonlinearEso
 
   using Report = NonlinearGainReport<detail::TableScalar<S>>;  ///< see `report`
 
-  /// Checks the settings and does all the design work.
-  /// @return the observer at rest in zero, or an error that names the field
-  static Expected<NonlinearEso, Error<S>> make(const Config& config) {
-    if constexpr (PackScalar<S>) {
-      return detail::make_lanes<NonlinearEso>(config);
-    } else {
-      const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
-      if (auto ok = Base::check_chain(chain); !ok) return ok.error();
-      const auto law = make_law(config);
-      if (!law) return law.error();
-      return NonlinearEso(chain, *law);
-    }
-  }
-
   /// What is known of a config's k: constant-k intervals, limits, and the errors at which the given
   /// k is outside of them. Errors as `make`; it is not needed for running.
   static Expected<Report, Error<S>> report(const Config& config) requires PlainScalar<S> {
-    const auto made = make(config);
+    const auto made = NonlinearEso::make(config);
     if (!made) return made.error();
-    const auto poles = EqualSampledPoles<Base::size, S>::from_bandwidth(config.observer_bandwidth,
-                                                                        config.sample_time);
-    const auto gain = current_gain<Base::size, S>(poles.weights());
-    constexpr auto continuous = constant_gain_interval<Base::size>();
+    const auto poles =
+        EqualSampledPoles<N, S>::from_bandwidth(config.observer_bandwidth, config.sample_time);
+    const auto gain = current_gain<N, S>(poles.weights());
+    constexpr auto continuous = constant_gain_interval<N>();
     Report report;
     report.continuous = {static_cast<S>(continuous.lower), static_cast<S>(continuous.upper)};
     report.sampled = constant_gain_interval(poles);
     report.limits = {made->gain_min(), made->gain_max()};
     const auto& [low, high] = report.limits;
-    if (!config.unlimited && gain_range_certified<Base::size, S>(gain, low, low)) {
-      report.certified = gain_range_certified<Base::size, S>(gain, low, high);
-      report.certified_max =
-          largest_certified_gain<Base::size, S>(gain, low, low, report.sampled.upper);
+    if (!config.unlimited && gain_range_certified<N, S>(gain, low, low)) {
+      report.certified = gain_range_certified<N, S>(gain, low, high);
+      report.certified_max = largest_certified_gain<N, S>(gain, low, low, report.sampled.upper);
     }
     const auto k = detail::prepared(config.shape);
     const auto within = [&k](const Interval<S>& interval) {
@@ -109,10 +100,6 @@ class NonlinearEso
     return report;
   }
 
-  /// New settings while running: the estimate is kept, a change of b0 is moved into the
-  /// disturbance. A refused config changes nothing.
-  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
-
   /// k for an innovation e (unit of y), within its limits.
   [[nodiscard]] S gain_factor(const S& e) const noexcept { return law().factor(e); }
 
@@ -123,13 +110,9 @@ class NonlinearEso
   /// @}
 
  private:
-  ESOKIT_INLINE NonlinearEso(const ChainConfig<S>& chain, const Law& law) noexcept
-      : Base(chain, {law}) {}
-
   [[nodiscard]] const Law& law() const noexcept { return std::get<0>(this->laws()); }
 
-  static Expected<Law, Error<S>> make_law(const Config& config) {
-    constexpr int size = Base::size;
+  static Expected<Law, Error<S>> design(const Config& config, const typename Shell::PlantModel&) {
     const auto linear =
         Law::Linear::make("observer_bandwidth", config.observer_bandwidth, config.sample_time);
     if (!linear) return linear.error();
@@ -139,8 +122,8 @@ class NonlinearEso
         .all_of(detail::check_shape<S>(config.shape));
     if (!rules) return rules.error();
     const auto poles =
-        EqualSampledPoles<size, S>::from_bandwidth(config.observer_bandwidth, config.sample_time);
-    const auto limits = detail::find_limits<size, S>(
+        EqualSampledPoles<N, S>::from_bandwidth(config.observer_bandwidth, config.sample_time);
+    const auto limits = detail::find_limits<N, S>(
         {config.gain_min, config.gain_max, config.allow_uncertified_gain, config.unlimited},
         linear->gain_before_measurement(), least_certified_gain(poles),
         constant_gain_interval(poles).upper);
@@ -160,10 +143,14 @@ inline constexpr std::uint32_t type_tag<NonlinearEso<Order, S, Extension, Shape>
 template <int Order, Scalar S = double, int Extension = 2, class Shape = PowerSumGain<S>>
 requires EvenGain<Shape, S>
 class ContinuousNonlinearEso
-    : public ContinuousObserver<Order, S, Extension,
-                                ContinuousNonlinearGain<Order + Extension, S, Shape>> {
-  using Law = ContinuousNonlinearGain<Order + Extension, S, Shape>;
-  using Base = ContinuousObserver<Order, S, Extension, Law>;
+    : public NamedObserver<
+          ContinuousNonlinearEso<Order, S, Extension, Shape>,
+          ContinuousObserver<Order, S, Extension,
+                             ContinuousNonlinearGain<Order + Extension, S, Shape>>> {
+  using Shell = typename ContinuousNonlinearEso::NamedObserver;
+  friend Shell;
+  using Shell::Shell;
+  using Law = typename Shell::Law;
 
  public:
   /// Settings of make.
@@ -178,15 +165,13 @@ class ContinuousNonlinearEso
     S input_gain{};                       ///< b0, unit of y^(n) per unit of u; not zero
   };
 
-  /// Checks the settings and does all the design work.
-  /// @return the observer's equations, or an error that names the field
-  static Expected<ContinuousNonlinearEso, Error<S>> make(const Config& config) {
-    constexpr int size = Base::size;
-    Rules<S> rules;
-    if (!rules.nonzero("input_gain", config.input_gain)) return rules.error();
+ private:
+  static Expected<Law, Error<S>> design(const Config& config) {
+    constexpr int size = Order + Extension;
     const auto linear =
         ContinuousConstantGain<size, S>::make("observer_bandwidth", config.observer_bandwidth);
     if (!linear) return linear.error();
+    Rules<S> rules;
     rules.positive("error_scale", config.error_scale).all_of(detail::check_shape<S>(config.shape));
     if (!rules) return rules.error();
     const Vector<S, size> gain = linear->gain(S(0.0), S(0.0));
@@ -204,12 +189,8 @@ class ContinuousNonlinearEso
       if (!found) return found.error();
       limits = *found;
     }
-    return ContinuousNonlinearEso(
-        config.input_gain, Law(gain, config.shape, config.error_scale, limits.lower, limits.upper));
+    return Law(gain, config.shape, config.error_scale, limits.lower, limits.upper);
   }
-
- private:
-  ContinuousNonlinearEso(const S& input_gain, const Law& law) : Base(input_gain, {law}) {}
 };
 
 }  // namespace esokit
