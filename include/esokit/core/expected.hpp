@@ -22,8 +22,9 @@ class [[nodiscard]] Expected {
 
   /// Implicit, so that `return value;` and `return error;` both do.
   /// @{
-  constexpr Expected(T value) : content_(std::in_place_index<0>, std::move(value)) {}
-  constexpr Expected(E error) : content_(std::in_place_index<1>, std::move(error)) {}
+  constexpr Expected(const T& value) : content_(std::in_place_index<0>, value) {}
+  constexpr Expected(T&& value) : content_(std::in_place_index<0>, std::move(value)) {}
+  constexpr Expected(const E& error) : content_(std::in_place_index<1>, error) {}
   /// @}
 
   /// True if there is a value, false if there is an error.

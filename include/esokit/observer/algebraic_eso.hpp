@@ -219,9 +219,10 @@ class AlgebraicEso
       rules.representable("observer_bandwidth", config.observer_bandwidth, settled.back(),
                           "times sample_time gives a gain that the scalar cannot hold");
     }
-    const Law law(config.observer_bandwidth, config.frequency_shift, config.sample_time,
-                  static_cast<std::uint32_t>(config.start_index), *blanking);
-    for (const S& gain : law.gain(S(0.0))) {
+    const Expected<Law, Error<S>> law(
+        Law(config.observer_bandwidth, config.frequency_shift, config.sample_time,
+            static_cast<std::uint32_t>(config.start_index), *blanking));
+    for (const S& gain : law->gain(S(0.0))) {
       rules.representable("frequency_shift", config.frequency_shift, gain,
                           "times sample_time gives a gain that the scalar cannot hold");
     }

@@ -103,9 +103,10 @@ class ContinuousObserver {
   [[nodiscard]] const S& input_gain() const noexcept { return input_gain_; }
 
  protected:
-  /// `input_gain` is checked already.
-  ContinuousObserver(const S& input_gain, const Laws& laws)
-      : laws_(laws), input_gain_(input_gain) {}
+  /// `input_gain` is checked already. @param laws or the law of one level
+  template <class Given>
+  ContinuousObserver(const S& input_gain, const Given& laws)
+      : laws_{laws}, input_gain_(input_gain) {}
 
  private:
   Laws laws_;

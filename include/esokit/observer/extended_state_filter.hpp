@@ -299,7 +299,7 @@ class ExtendedStateFilter
 
  private:
   ExtendedStateFilter(const PlantModel& plant, const Law& law, const Config& config) noexcept
-      : Base(plant, {law}, config.max_gap),
+      : Base(plant, law, config.max_gap),
         model_(config.model),
         outlier_threshold_(config.outlier_threshold),
         change_bound_(config.disturbance_bounds[Order]) {

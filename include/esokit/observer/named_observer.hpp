@@ -46,10 +46,28 @@ class NamedObserver : public Base {
   /// @return the observer, a sampled one at rest in zero, or an error that names the field
   template <class O = Self>
   static Expected<Self, Error<scalar_type>> make(const typename O::Config& config) {
-    if constexpr (sampled && PackScalar<scalar_type>) {
+    if constexpr (!sampled) {
+      if (Rules<scalar_type> rules; !rules.nonzero("input_gain", config.input_gain))
+        return rules.error();
+      const auto laws = O::design(config);
+      if (!laws) return laws.error();
+      return Self(config.input_gain, *laws);
+    } else if constexpr (PackScalar<scalar_type>) {
       return detail::make_lanes<Self>(config);
     } else {
-      return O::make_one(config);
+      using Model = typename Base::PlantModel;
+      // The chain is checked first: laws divide by what it checks.
+      if (auto ok = Base::check_chain({config.input_gain, config.sample_time, config.max_gap}); !ok)
+        return ok.error();
+      const auto model = detail::make_model<Model>(config);
+      if (!model) return model.error();
+      const auto laws = O::design(config, *model);
+      if (!laws) return laws.error();
+      int max_gap = config.max_gap;
+      if constexpr (!model_traits<Model>.is_chain) {
+        for (const Law& law : Laws{*laws}) max_gap = law.longest_gap(max_gap);
+      }
+      return Self(*model, *laws, max_gap);
     }
   }
 
@@ -67,36 +85,6 @@ class NamedObserver : public Base {
   /// From what is checked already: as the constructor of `Base`.
   template <class First, class... Parts>
   NamedObserver(const First& first, const Parts&... parts) noexcept : Base(first, parts...) {}
-
-  /// `make` of a plain scalar; an observer that is more than its laws has its own.
-  template <class O = Self>
-  static Expected<Self, Error<scalar_type>> make_one(const typename O::Config& config) {
-    if constexpr (!sampled) {
-      if (Rules<scalar_type> rules; !rules.nonzero("input_gain", config.input_gain))
-        return rules.error();
-      const auto laws = O::design(config);
-      if (!laws) return laws.error();
-      return Self(config.input_gain, all_levels(*laws));
-    } else {
-      // The chain is checked first: laws divide by what it checks.
-      if (auto ok = Base::check_chain({config.input_gain, config.sample_time, config.max_gap}); !ok)
-        return ok.error();
-      using Model = typename Base::PlantModel;
-      const auto model = detail::make_model<Model>(config);
-      if (!model) return model.error();
-      const auto laws = O::design(config, *model);
-      if (!laws) return laws.error();
-      int max_gap = config.max_gap;
-      if constexpr (!model_traits<Model>.is_chain) {
-        for (const Law& law : all_levels(*laws)) max_gap = law.longest_gap(max_gap);
-      }
-      return Self(*model, all_levels(*laws), max_gap);
-    }
-  }
-
- private:
-  static constexpr const Laws& all_levels(const Laws& laws) noexcept { return laws; }
-  static constexpr Laws all_levels(const Law& law) noexcept { return {law}; }
 };
 
 }  // namespace esokit

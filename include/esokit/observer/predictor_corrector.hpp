@@ -63,8 +63,6 @@ template <int Order, Scalar S, int Extension, class Law, int Levels = 1,
           class Model = ChainModel<Order, S, Extension>>
 requires GainLaw<Law, Order + Extension, S> && SampledModel<Model, S>
 class PredictorCorrector {
-  static_assert(Levels >= 1, "esokit: at least one level is needed");
-
  public:
   using Chain = ScaledChain<Order, S, Extension>;  ///< the sampled chain, in its scaling
   using PlantModel = Model;                        ///< what is known of the plant
@@ -397,9 +395,10 @@ class PredictorCorrector {
     for (State& state : states_) state.fill(S(0.0));
   }
 
-  /// The same with a model that `make` of its own has checked.
-  PredictorCorrector(const Model& model, const Laws& laws, int max_gap) noexcept
-      : laws_(laws), model_(model), max_gap_(static_cast<std::uint16_t>(max_gap)) {
+  /// The same with a model that `make` of its own has checked. @param laws or the law of one level
+  template <class Given>
+  PredictorCorrector(const Model& model, const Given& laws, int max_gap) noexcept
+      : laws_{laws}, model_(model), max_gap_(static_cast<std::uint16_t>(max_gap)) {
     for (State& state : states_) state.fill(S(0.0));
   }
 
@@ -687,6 +686,9 @@ class PredictorCorrector {
   S applied_input_ = S(0.0);
   Lanes<std::uint16_t, S> gap_{};
   std::uint16_t max_gap_;
+
+  // Last: what comes after it would be missing in whatever is built on this.
+  static_assert(Levels >= 1, "esokit: at least one level is needed");
 };
 
 /// Told apart in snapshots.
