@@ -36,7 +36,7 @@ class Thing {
  private:
   friend struct esokit::detail::LaneAccess;
   static constexpr auto fields(auto& o) noexcept {
-    return std::tie(o.number, o.numbers, o.count, o.maybe, o.nothing, o.common);
+    return esokit::detail::tie(o.number, o.numbers, o.count, o.maybe, o.nothing, o.common);
   }
 };
 

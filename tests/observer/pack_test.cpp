@@ -250,7 +250,11 @@ class Packs : public ::testing::Test {
     expect_equal(packed, lanes);
   }
 
-  void update(const Scalar& y, const Scalar& u) {
+  // Out of line, as each inlines the update of the pack: it is what takes long to compile here.
+  [[gnu::noinline]] auto update_packed(const Scalar& y, const Scalar& u) {
+    return packed.update(y, u);
+  }
+  [[gnu::noinline]] void update(const Scalar& y, const Scalar& u) {
     both([](auto& o, const auto& y_of, const auto& u_of) { return o.update(y_of, u_of); }, y, u);
   }
 
@@ -268,15 +272,18 @@ class Packs : public ::testing::Test {
   StepStatus flags{};  ///< all that were met
 };
 
-// The last is an archetype: what the concept names and nothing more.
+// With more lanes than a register has those whose steps differ, the others share them. The last are
+// of an archetype: what the concept names and nothing more.
 template <class... Kinds>
 #ifdef ESOKIT_ONE_TYPE
 using Cases = ::testing::Types<Of<Kinds, esokit::Pack<float>>..., Of<Cascade, Pack<float, 3>>>;
 #else
 using Cases =
     ::testing::Types<Of<Kinds, esokit::Pack<double>>..., Of<Kinds, esokit::Pack<float>>...,
-                     Of<Kinds, esokit::Pack<double, 8>>..., Of<Linear, Pack<double, 4>>,
-                     Of<Cascade, Pack<float, 3>>>;
+                     Of<Linear, esokit::Pack<double, 8>>, Of<Cascade, esokit::Pack<double, 8>>,
+                     Of<AdjustableBandwidth, esokit::Pack<double, 8>>,
+                     Of<PowerSum, esokit::Pack<double, 8>>, Of<Algebraic, esokit::Pack<double, 8>>,
+                     Of<Linear, Pack<double, 4>>, Of<Cascade, Pack<float, 3>>>;
 #endif
 using All = Cases<Linear, ByPoles, HalfGain, Reduced, Cascade, CascadeByLevels, AdjustableBandwidth,
                   PowerSum, FalShape, OwnShape, Algebraic>;
@@ -353,13 +360,13 @@ TYPED_TEST(Packs, KeepOneLanesTroubleInIt) {
     for (int k = 0; k < 3; ++k) {
       S y(0.25);
       y[bad] = k == 1 ? hidden_infinity<One>() : hidden_nan<One>();
-      const auto status = this->packed.update(y, S(0.5));
+      const auto status = this->update_packed(y, S(0.5));
       for (int i = 0; i < lane_count<S>; ++i) {
         EXPECT_EQ(has(status[i], StepStatus::measurement_rejected), i == bad);
         EXPECT_EQ(this->packed.missed()[i] > 0, i == bad);
       }
     }
-    this->packed.update(S(0.25), S(0.5));
+    this->update_packed(S(0.25), S(0.5));
   }
 }
 

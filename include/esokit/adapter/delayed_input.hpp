@@ -17,7 +17,7 @@ struct DelayedInputConfig {
   int delay = 0;                         ///< d, samples, 0 .. Capacity
 
   /// @cond
-  static constexpr auto fields(auto& c) noexcept { return std::tie(c.observer, c.delay); }
+  static constexpr auto fields(auto& c) noexcept { return detail::tie(c.observer, c.delay); }
   /// @endcond
 };
 

@@ -24,7 +24,7 @@ struct KnownPoles {
   Array<S, Order> coefficients{};  ///< a_0 .. a_(n-1) of s^n + a_(n-1) s^(n-1) + .. + a_0
 
   /// @cond
-  static constexpr auto fields(auto& m) noexcept { return std::tie(m.coefficients); }
+  static constexpr auto fields(auto& m) noexcept { return detail::tie(m.coefficients); }
   /// @endcond
 
   /// Error of a coefficient that is not finite; `make` of the observer asks for it.
@@ -69,7 +69,7 @@ struct KnownModelConfig {
   Model model{};                         ///< fbar
 
   /// @cond
-  static constexpr auto fields(auto& c) noexcept { return std::tie(c.observer, c.model); }
+  static constexpr auto fields(auto& c) noexcept { return detail::tie(c.observer, c.model); }
   /// @endcond
 };
 

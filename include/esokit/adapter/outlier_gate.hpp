@@ -21,7 +21,7 @@ struct OutlierGateConfig {
 
   /// @cond
   static constexpr auto fields(auto& c) noexcept {
-    return std::tie(c.observer, c.threshold, c.running_factor, c.most_in_a_row);
+    return detail::tie(c.observer, c.threshold, c.running_factor, c.most_in_a_row);
   }
   /// @endcond
 };

@@ -16,7 +16,7 @@ struct VariableTimeConfig {
   S ratio = S(4);                        ///< above 1: steps may take T / ratio .. T ratio
 
   /// @cond
-  static constexpr auto fields(auto& c) noexcept { return std::tie(c.observer, c.ratio); }
+  static constexpr auto fields(auto& c) noexcept { return detail::tie(c.observer, c.ratio); }
   /// @endcond
 };
 

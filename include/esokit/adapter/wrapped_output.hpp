@@ -20,7 +20,7 @@ struct WrappedOutputConfig {
   S period{};                            ///< of y, in its unit: 2 pi, 360
 
   /// @cond
-  static constexpr auto fields(auto& c) noexcept { return std::tie(c.observer, c.period); }
+  static constexpr auto fields(auto& c) noexcept { return detail::tie(c.observer, c.period); }
   /// @endcond
 };
 

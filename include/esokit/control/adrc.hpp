@@ -32,8 +32,8 @@ struct AdrcConfig {
 
   /// @cond
   static constexpr auto fields(auto& c) noexcept {
-    return std::tie(c.observer, c.controller_bandwidth, c.gains, c.domain, c.half_gain, c.limits,
-                    c.start_hold, c.missing, c.measurement_divider);
+    return detail::tie(c.observer, c.controller_bandwidth, c.gains, c.domain, c.half_gain, c.limits,
+                       c.start_hold, c.missing, c.measurement_divider);
   }
   /// @endcond
 };
@@ -227,7 +227,7 @@ class Adrc {
  private:
   friend struct detail::LaneAccess;
   static constexpr auto fields(auto& o) noexcept {
-    return std::tie(o.loop_, o.law_, o.fast_law_, o.spec_);
+    return detail::tie(o.loop_, o.law_, o.fast_law_, o.spec_);
   }
 
   static Expected<Adrc, Error<S>> make_one(const Config& config) {

@@ -48,7 +48,7 @@ class AdrcLaw {
 
     /// @cond
     static constexpr auto fields(auto& c) noexcept {
-      return std::tie(c.controller_bandwidth, c.gains, c.input_gain);
+      return detail::tie(c.controller_bandwidth, c.gains, c.input_gain);
     }
     /// @endcond
   };
@@ -124,7 +124,7 @@ class AdrcLaw {
  private:
   friend struct detail::LaneAccess;
   static constexpr auto fields(auto& o) noexcept {
-    return std::tie(o.gains_, o.inverse_input_gain_, o.input_gain_);
+    return detail::tie(o.gains_, o.inverse_input_gain_, o.input_gain_);
   }
 
   static Expected<AdrcLaw, Error<S>> make_one(const Config& config) {

@@ -20,7 +20,7 @@ struct StartHold {
   S input{};  ///< u meanwhile, within the limits
 
   /// @cond
-  static constexpr auto fields(auto& hold) noexcept { return std::tie(hold.time, hold.input); }
+  static constexpr auto fields(auto& hold) noexcept { return detail::tie(hold.time, hold.input); }
   /// @endcond
 };
 
@@ -35,7 +35,7 @@ struct MissingRule {
 
   /// @cond
   static constexpr auto fields(auto& rule) noexcept {
-    return std::tie(rule.most, rule.input, rule.stay);
+    return detail::tie(rule.most, rule.input, rule.stay);
   }
   /// @endcond
 };
@@ -50,8 +50,8 @@ struct LoopSettings {
 
   /// @cond
   static constexpr auto fields(auto& settings) noexcept {
-    return std::tie(settings.limits, settings.start_hold, settings.missing,
-                    settings.measurement_divider);
+    return detail::tie(settings.limits, settings.start_hold, settings.missing,
+                       settings.measurement_divider);
   }
   /// @endcond
 };
@@ -294,9 +294,9 @@ class ControlLoop {
   using Plain = detail::PlainTwin<ControlLoop, S>;       ///< a lane
 
   static constexpr auto fields(auto& o) noexcept {
-    return std::tie(o.observer_, o.limiter_, o.requested_, o.hold_input_, o.safe_input_,
-                    o.hold_left_, o.missing_limit_, o.divider_, o.phase_, o.mode_, o.special_,
-                    o.has_safe_input_, o.stay_safe_, o.status_, o.limits_);
+    return detail::tie(o.observer_, o.limiter_, o.requested_, o.hold_input_, o.safe_input_,
+                       o.hold_left_, o.missing_limit_, o.divider_, o.phase_, o.mode_, o.special_,
+                       o.has_safe_input_, o.stay_safe_, o.status_, o.limits_);
   }
 
   ControlLoop(const Observer& observer, const Limiter<S>& limiter, const LoopSettings<S>& settings,

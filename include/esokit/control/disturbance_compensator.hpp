@@ -23,8 +23,8 @@ struct DisturbanceCompensatorConfig {
 
   /// @cond
   static constexpr auto fields(auto& c) noexcept {
-    return std::tie(c.observer, c.compensation_gain, c.limits, c.start_hold, c.missing,
-                    c.measurement_divider);
+    return detail::tie(c.observer, c.compensation_gain, c.limits, c.start_hold, c.missing,
+                       c.measurement_divider);
   }
   /// @endcond
 };
@@ -141,7 +141,7 @@ class DisturbanceCompensator {
 
  private:
   friend struct detail::LaneAccess;
-  static constexpr auto fields(auto& o) noexcept { return std::tie(o.loop_, o.gain_); }
+  static constexpr auto fields(auto& o) noexcept { return detail::tie(o.loop_, o.gain_); }
 
   static Expected<DisturbanceCompensator, Error<S>> make_one(const Config& config) {
     const auto observer = Observer::make(config.observer);

@@ -83,8 +83,8 @@ class DualFeedbackAdrc {
 
     /// @cond
     static constexpr auto fields(auto& c) noexcept {
-      return std::tie(c.observer_bandwidth, c.controller_bandwidth, c.gains, c.domain, c.half_gain,
-                      c.input_gain, c.sample_time, c.limits);
+      return detail::tie(c.observer_bandwidth, c.controller_bandwidth, c.gains, c.domain,
+                         c.half_gain, c.input_gain, c.sample_time, c.limits);
     }
     /// @endcond
   };
@@ -183,7 +183,7 @@ class DualFeedbackAdrc {
             class OtherFeedback, class OtherPlacement>
   friend class DualFeedbackAdrc;
   static constexpr auto fields(auto& o) noexcept {
-    return std::tie(o.form_, o.limiter_, o.pending_, o.measured_, o.wanted_, o.status_);
+    return detail::tie(o.form_, o.limiter_, o.pending_, o.measured_, o.wanted_, o.status_);
   }
   using Plain = detail::PlainTwin<DualFeedbackAdrc, S>;  ///< a lane
   using Form = FilterForm<size, S>;

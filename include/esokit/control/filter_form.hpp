@@ -39,7 +39,7 @@ struct FilterForm {
 
   /// @cond
   static constexpr auto fields(auto& f) noexcept {
-    return std::tie(f.denominator, f.measurement, f.input, f.reference);
+    return detail::tie(f.denominator, f.measurement, f.input, f.reference);
   }
   /// @endcond
 };

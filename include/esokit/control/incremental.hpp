@@ -98,7 +98,9 @@ class Incremental {
 
  private:
   friend struct detail::LaneAccess;
-  static constexpr auto fields(auto& o) noexcept { return std::tie(o.controller_, o.increment_); }
+  static constexpr auto fields(auto& o) noexcept {
+    return detail::tie(o.controller_, o.increment_);
+  }
 
   static S half() noexcept { return S((std::numeric_limits<LaneScalar<S>>::max)() / 2); }
 

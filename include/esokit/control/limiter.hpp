@@ -18,7 +18,7 @@ struct Limits {
 
   /// @cond
   static constexpr auto fields(auto& limits) noexcept {
-    return std::tie(limits.lower, limits.upper, limits.rate);
+    return detail::tie(limits.lower, limits.upper, limits.rate);
   }
   /// @endcond
 };
@@ -94,7 +94,7 @@ class Limiter {
   friend class Limiter;
 
   static constexpr auto fields(auto& o) noexcept {
-    return std::tie(o.lower_, o.upper_, o.step_, o.last_, o.low_, o.high_, o.rate_limited_);
+    return detail::tie(o.lower_, o.upper_, o.step_, o.last_, o.low_, o.high_, o.rate_limited_);
   }
 
   static Expected<Limiter, Error<S>> make_one(const Limits<S>& limits, const S& sample_time) {

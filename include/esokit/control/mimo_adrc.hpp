@@ -40,8 +40,8 @@ struct MimoAdrcConfig {
 
   /// @cond
   static constexpr auto fields(auto& c) noexcept {
-    return std::tie(c.observers, c.controller_bandwidths, c.domain, c.half_gain, c.input_matrix,
-                    c.condition_limit, c.limits);
+    return detail::tie(c.observers, c.controller_bandwidths, c.domain, c.half_gain, c.input_matrix,
+                       c.condition_limit, c.limits);
   }
   /// @endcond
 };

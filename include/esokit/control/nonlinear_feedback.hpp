@@ -29,7 +29,7 @@ class NonlinearFeedback {
 
     /// @cond
     static constexpr auto fields(auto& c) noexcept {
-      return std::tie(c.gains, c.exponents, c.linear_widths, c.input_gain);
+      return detail::tie(c.gains, c.exponents, c.linear_widths, c.input_gain);
     }
     /// @endcond
   };
@@ -88,7 +88,7 @@ class NonlinearFeedback {
  private:
   friend struct detail::LaneAccess;
   static constexpr auto fields(auto& o) noexcept {
-    return std::tie(o.gains_, o.fal_, o.inverse_input_gain_, o.input_gain_);
+    return detail::tie(o.gains_, o.fal_, o.inverse_input_gain_, o.input_gain_);
   }
 
   static Expected<NonlinearFeedback, Error<S>> make_one(const Config& config) {

@@ -62,7 +62,7 @@ class ScaledLaw {
 
  private:
   friend struct detail::LaneAccess;
-  static constexpr auto fields(auto& o) noexcept { return std::tie(o.weights_); }
+  static constexpr auto fields(auto& o) noexcept { return detail::tie(o.weights_); }
 
   ScaledLaw() = default;
 

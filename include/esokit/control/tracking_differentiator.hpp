@@ -35,7 +35,7 @@ struct TrackingDifferentiatorConfig {
 
   /// @cond
   static constexpr auto fields(auto& c) noexcept {
-    return std::tie(c.acceleration, c.sample_time, c.filter_time);
+    return detail::tie(c.acceleration, c.sample_time, c.filter_time);
   }
   /// @endcond
 };
@@ -125,7 +125,9 @@ struct SignTrackingDifferentiatorConfig {
   S sample_time{};   ///< h, s, of `update`; it may be left out where only `rate` is used
 
   /// @cond
-  static constexpr auto fields(auto& c) noexcept { return std::tie(c.acceleration, c.sample_time); }
+  static constexpr auto fields(auto& c) noexcept {
+    return detail::tie(c.acceleration, c.sample_time);
+  }
   /// @endcond
 };
 

@@ -69,6 +69,31 @@ using Lanes = std::conditional_t<lane_count<S> == 1, T, PerLane<T, lane_count<S>
 
 namespace detail {
 
+/// References to fields. Not std::tie: a tuple takes many times as long to compile, and every class
+/// that works with packs has one.
+/// @{
+template <int Index, class T>
+struct TiedField {
+  T& field;
+};
+template <class Indices, class... T>
+struct TiedFields;
+template <int... I, class... T>
+struct TiedFields<std::integer_sequence<int, I...>, T...> : TiedField<I, T>... {};
+template <class... T>
+using Tied = TiedFields<std::make_integer_sequence<int, static_cast<int>(sizeof...(T))>, T...>;
+template <class... T>
+constexpr Tied<T...> tie(T&... fields) noexcept {
+  return {{fields}...};
+}
+/// @}
+
+/// Lane `i` of all fields, see copy_lane.
+template <bool Back, int... I, class... T, class... U>
+constexpr void copy_fields(const TiedFields<std::integer_sequence<int, I...>, T...>& packed,
+                           const TiedFields<std::integer_sequence<int, I...>, U...>& plain,
+                           int i) noexcept;
+
 /// How a class lets its lanes be told apart: it has `with_scalar<T>`, itself of another scalar, and
 /// `fields(object)`, a tie of all that it holds, private for this friend.
 struct LaneAccess {
@@ -129,14 +154,21 @@ constexpr void copy_lane(Packed& packed, Plain& plain, int i) noexcept {
     }
     (std::make_index_sequence<count>{});
   } else if constexpr (LaneAccess::has_fields<Packed>) {
-    auto of_packed = LaneAccess::fields(packed);
-    auto of_plain = LaneAccess::fields(plain);
-    copy_lane<Back>(of_packed, of_plain, i);
+    copy_fields<Back>(LaneAccess::fields(packed), LaneAccess::fields(plain), i);
   } else if constexpr (Back) {
     packed[i] = plain;
   } else {
     plain = packed[i];
   }
+}
+
+template <bool Back, int... I, class... T, class... U>
+constexpr void copy_fields(const TiedFields<std::integer_sequence<int, I...>, T...>& packed,
+                           const TiedFields<std::integer_sequence<int, I...>, U...>& plain,
+                           int i) noexcept {
+  (copy_lane<Back>(static_cast<const TiedField<I, T>&>(packed).field,
+                   static_cast<const TiedField<I, U>&>(plain).field, i),
+   ...);
 }
 
 /// Lane `i` of `packed` becomes `plain`.

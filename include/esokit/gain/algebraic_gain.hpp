@@ -156,9 +156,9 @@ class AlgebraicGain {
   using Plain = detail::PlainTwin<AlgebraicGain, S>;  ///< a lane
 
   static constexpr auto fields(auto& o) noexcept {
-    return std::tie(o.gain_, o.coefficients_, o.ratios_u_, o.ratios_h_, o.final_poles_, o.shift_,
-                    o.decay_, o.size_bracket_, o.settled_below_, o.power_, o.bracket_,
-                    o.start_index_, o.least_age_, o.age_, o.pending_, o.settled_);
+    return detail::tie(o.gain_, o.coefficients_, o.ratios_u_, o.ratios_h_, o.final_poles_, o.shift_,
+                       o.decay_, o.size_bracket_, o.settled_below_, o.power_, o.bracket_,
+                       o.start_index_, o.least_age_, o.age_, o.pending_, o.settled_);
   }
 
   /// The lanes of a pack are at the same place, so that one recursion does for all.

@@ -76,7 +76,7 @@ class ConstantGain {
 
  private:
   friend struct detail::LaneAccess;
-  static constexpr auto fields(auto& o) noexcept { return std::tie(o.gain_, o.poles_); }
+  static constexpr auto fields(auto& o) noexcept { return detail::tie(o.gain_, o.poles_); }
 
   ConstantGain() = default;
 

@@ -162,71 +162,15 @@ class CovarianceFactor {
   template <bool DiagonalNoise = false, class Transition = PascalTransition>
   ESOKIT_INLINE constexpr void advance(const S& inflation, const CovarianceFactor& noise,
                                        const Transition& transition = {}) noexcept {
-    // Rows of [Phi L, L_Q] with the weights [inflation D, D_Q], made orthogonal one by one. Of the
-    // right half only what is below the diagonal is kept, negated; the diagonal is one.
-    Array<S, Size> weights;
-    Array<Array<S, Size>, Size> rows;
-    Array<Array<S, Size>, Size> noise_rows;
-    detail::repeat<Size, unrolled>([&](int k) ESOKIT_INLINE_LAMBDA {
-      weights[index(k)] = inflation * variances_[index(k)];
-      detail::repeat<Size, unrolled>([&](int i) ESOKIT_INLINE_LAMBDA {
-        rows[index(i)][index(k)] = transported(transition, i, k);
-        if constexpr (!DiagonalNoise) {
-          if (k < i) noise_rows[index(i)][index(k)] = -noise.lower_[packed(i, k)];
-        }
-      });
-    });
-    detail::repeat<Size, unrolled>([&](int i) ESOKIT_INLINE_LAMBDA {
-      const auto& row = rows[index(i)];
-      const auto& noise_row = noise_rows[index(i)];
-      Array<S, Size> weighted;
-      Array<S, Size> noise_weighted;
-      // Two sums side by side, the one whose terms are late on its own: it is latency that counts.
-      S early = noise.variances_[index(i)];
-      S late = S(0.0);
-      detail::repeat<Size, unrolled>([&](int k) ESOKIT_INLINE_LAMBDA {
-        weighted[index(k)] = weights[index(k)] * row[index(k)];
-        const S term = weighted[index(k)] * row[index(k)];
-        late = k == 0 ? term : S(late + term);
-        if (k < i) {
-          noise_weighted[index(k)] = noise.variances_[index(k)] * noise_row[index(k)];
-          early = early + noise_weighted[index(k)] * noise_row[index(k)];
-        }
-      });
-      const S variance = early + late;
-      variances_[index(i)] = variance;
-      if (i == Size - 1) return;
-      const S inverse = inverse_of(variance);
-      detail::repeat<Size, unrolled>([&](int j) ESOKIT_INLINE_LAMBDA {
-        if (j <= i) return;
-        auto& other = rows[index(j)];
-        auto& noise_other = noise_rows[index(j)];
-        S product = weighted[0] * other[0];
-        S noise_product = S(0.0);
-        detail::repeat<Size, unrolled>([&](int k) ESOKIT_INLINE_LAMBDA {
-          if (k > 0) product = product + weighted[index(k)] * other[index(k)];
-          if (k >= i) return;
-          const S term = noise_weighted[index(k)] * noise_other[index(k)];
-          noise_product = k == 0 ? term : S(noise_product + term);
-        });
-        if constexpr (!DiagonalNoise) {
-          const S term = noise.variances_[index(i)] * noise_other[index(i)];
-          noise_product = i == 0 ? S(-term) : S(noise_product - term);
-        }
-        if (!DiagonalNoise || i > 0) product = product + noise_product;
-        const S l = product * inverse;
-        lower_[packed(j, i)] = l;
-        detail::repeat<Size, unrolled>([&](int k) ESOKIT_INLINE_LAMBDA {
-          other[index(k)] = other[index(k)] - l * row[index(k)];
-          if (k < i) noise_other[index(k)] = noise_other[index(k)] - l * noise_row[index(k)];
-        });
-        if constexpr (DiagonalNoise) {
-          noise_other[index(i)] = l;
-        } else {
-          noise_other[index(i)] = noise_other[index(i)] + l;
-        }
-      });
-    });
+    advance_by<DiagonalNoise, unrolled>(inflation, noise, transition);
+  }
+
+  /// The same in loops, for where it is not called at every sample: unrolled it is a large part of
+  /// what a filter takes to compile.
+  template <class Transition = PascalTransition>
+  [[gnu::noinline]] constexpr void advance_seldom(const S& inflation, const CovarianceFactor& noise,
+                                                  const Transition& transition = {}) noexcept {
+    advance_by<false, false>(inflation, noise, transition);
   }
 
   /// True if L is the identity.
@@ -245,7 +189,7 @@ class CovarianceFactor {
     detail::repeat<Size, unrolled>([&](int i) ESOKIT_INLINE_LAMBDA {
       S diagonal(0.0);
       detail::repeat<Size, unrolled>([&](int k) ESOKIT_INLINE_LAMBDA {
-        const S x = transported(transition, i, k);
+        const S x = transported<unrolled>(transition, i, k);
         diagonal = diagonal + x * x * variances_[index(k)];
       });
       sum = sum + weights[index(i)] * diagonal;
@@ -290,6 +234,76 @@ class CovarianceFactor {
   }
 
  private:
+  template <bool DiagonalNoise, bool Unrolled, class Transition>
+  ESOKIT_INLINE constexpr void advance_by(const S& inflation, const CovarianceFactor& noise,
+                                          const Transition& transition) noexcept {
+    // Rows of [Phi L, L_Q] with the weights [inflation D, D_Q], made orthogonal one by one. Of the
+    // right half only what is below the diagonal is kept, negated; the diagonal is one.
+    Array<S, Size> weights;
+    Array<Array<S, Size>, Size> rows;
+    Array<Array<S, Size>, Size> noise_rows;
+    detail::repeat<Size, Unrolled>([&](int k) ESOKIT_INLINE_LAMBDA {
+      weights[index(k)] = inflation * variances_[index(k)];
+      detail::repeat<Size, Unrolled>([&](int i) ESOKIT_INLINE_LAMBDA {
+        rows[index(i)][index(k)] = transported<Unrolled>(transition, i, k);
+        if constexpr (!DiagonalNoise) {
+          if (k < i) noise_rows[index(i)][index(k)] = -noise.lower_[packed(i, k)];
+        }
+      });
+    });
+    detail::repeat<Size, Unrolled>([&](int i) ESOKIT_INLINE_LAMBDA {
+      const auto& row = rows[index(i)];
+      const auto& noise_row = noise_rows[index(i)];
+      Array<S, Size> weighted;
+      Array<S, Size> noise_weighted;
+      // Two sums side by side, the one whose terms are late on its own: it is latency that counts.
+      S early = noise.variances_[index(i)];
+      S late = S(0.0);
+      detail::repeat<Size, Unrolled>([&](int k) ESOKIT_INLINE_LAMBDA {
+        weighted[index(k)] = weights[index(k)] * row[index(k)];
+        const S term = weighted[index(k)] * row[index(k)];
+        late = k == 0 ? term : S(late + term);
+        if (k < i) {
+          noise_weighted[index(k)] = noise.variances_[index(k)] * noise_row[index(k)];
+          early = early + noise_weighted[index(k)] * noise_row[index(k)];
+        }
+      });
+      const S variance = early + late;
+      variances_[index(i)] = variance;
+      if (i == Size - 1) return;
+      const S inverse = inverse_of(variance);
+      detail::repeat<Size, Unrolled>([&](int j) ESOKIT_INLINE_LAMBDA {
+        if (j <= i) return;
+        auto& other = rows[index(j)];
+        auto& noise_other = noise_rows[index(j)];
+        S product = weighted[0] * other[0];
+        S noise_product = S(0.0);
+        detail::repeat<Size, Unrolled>([&](int k) ESOKIT_INLINE_LAMBDA {
+          if (k > 0) product = product + weighted[index(k)] * other[index(k)];
+          if (k >= i) return;
+          const S term = noise_weighted[index(k)] * noise_other[index(k)];
+          noise_product = k == 0 ? term : S(noise_product + term);
+        });
+        if constexpr (!DiagonalNoise) {
+          const S term = noise.variances_[index(i)] * noise_other[index(i)];
+          noise_product = i == 0 ? S(-term) : S(noise_product - term);
+        }
+        if (!DiagonalNoise || i > 0) product = product + noise_product;
+        const S l = product * inverse;
+        lower_[packed(j, i)] = l;
+        detail::repeat<Size, Unrolled>([&](int k) ESOKIT_INLINE_LAMBDA {
+          other[index(k)] = other[index(k)] - l * row[index(k)];
+          if (k < i) noise_other[index(k)] = noise_other[index(k)] - l * noise_row[index(k)];
+        });
+        if constexpr (DiagonalNoise) {
+          noise_other[index(i)] = l;
+        } else {
+          noise_other[index(i)] = noise_other[index(i)] + l;
+        }
+      });
+    });
+  }
+
   static constexpr std::size_t index(int i) noexcept { return static_cast<std::size_t>(i); }
 
   static constexpr S rounding_of_factors() noexcept {
@@ -339,6 +353,7 @@ class CovarianceFactor {
   }
 
   /// (Phi L)_ik.
+  template <bool Unrolled>
   [[nodiscard]] constexpr S transported(const MatrixTransition<Size, S>& transition, int i,
                                         int k) const noexcept {
     S sum = transition.phi(i, k);
@@ -347,11 +362,12 @@ class CovarianceFactor {
   }
 
   /// The same for the chain: sum_j C(j, i) L_jk.
+  template <bool Unrolled>
   [[nodiscard]] ESOKIT_INLINE constexpr S transported(const PascalTransition&, int i,
                                                       int k) const noexcept {
     // Not from zero: adding a zero costs an addition.
     S sum = k < i ? lower_[packed(i, k)] : S(pascal(k, i));
-    detail::repeat<Size, unrolled>([&](int j) ESOKIT_INLINE_LAMBDA {
+    detail::repeat<Size, Unrolled>([&](int j) ESOKIT_INLINE_LAMBDA {
       if (j <= i || j <= k) return;
       const S& l = lower_[packed(j, k)];
       sum = sum + (pascal(j, i) == 1 ? l : pascal(j, i) == 2 ? S(l + l) : S(S(pascal(j, i)) * l));

@@ -81,7 +81,7 @@ struct PowerSumGain {
    private:
     friend struct detail::LaneAccess;
     static constexpr auto fields(auto& o) noexcept {
-      return std::tie(o.gain_alpha_, o.gain_beta_, o.alpha_, o.beta_);
+      return detail::tie(o.gain_alpha_, o.gain_beta_, o.alpha_, o.beta_);
     }
 
     S gain_alpha_;
@@ -107,7 +107,7 @@ struct PowerSumGain {
 
   /// @cond
   static constexpr auto fields(auto& k) noexcept {
-    return std::tie(k.gain_alpha, k.alpha, k.gain_beta, k.beta);
+    return detail::tie(k.gain_alpha, k.alpha, k.gain_beta, k.beta);
   }
   /// @endcond
 };
@@ -139,7 +139,7 @@ struct FalGain {
 
    private:
     friend struct detail::LaneAccess;
-    static constexpr auto fields(auto& o) noexcept { return std::tie(o.gain_, o.fal_); }
+    static constexpr auto fields(auto& o) noexcept { return detail::tie(o.gain_, o.fal_); }
 
     S gain_;
     Fal<S> fal_;
@@ -161,7 +161,7 @@ struct FalGain {
 
   /// @cond
   static constexpr auto fields(auto& k) noexcept {
-    return std::tie(k.gain, k.exponent, k.linear_width);
+    return detail::tie(k.gain, k.exponent, k.linear_width);
   }
   /// @endcond
 };
@@ -223,7 +223,7 @@ class LimitedGain {
  private:
   friend struct LaneAccess;
   static constexpr auto fields(auto& o) noexcept {
-    return std::tie(o.function_, o.inverse_scale_, o.low_, o.high_);
+    return detail::tie(o.function_, o.inverse_scale_, o.low_, o.high_);
   }
 
   Function function_;
@@ -288,7 +288,7 @@ class NonlinearGain {
 
  private:
   friend struct detail::LaneAccess;
-  static constexpr auto fields(auto& o) noexcept { return std::tie(o.linear_, o.factor_); }
+  static constexpr auto fields(auto& o) noexcept { return detail::tie(o.linear_, o.factor_); }
 
   Linear linear_;
   detail::LimitedGain<S, Shape> factor_;

@@ -277,7 +277,7 @@ std::optional<CovarianceFactor<Size, S>> steady_covariance(const CovarianceFacto
     quiet = all(change <= S(2.0) * detail::rounding<S>()) ? quiet + 1 : 0;
     if (quiet == 4) break;
     factor.set_variance(0, S(factor.variance(0) * (measurement / sum)));
-    factor.advance(inflation, noise, transition);
+    factor.advance_seldom(inflation, noise, transition);
   }
   if (!all(change <= S(64.0) * detail::rounding<S>())) return std::nullopt;
   return factor;

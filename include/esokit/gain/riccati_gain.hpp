@@ -353,7 +353,7 @@ class RiccatiGain {
     const bool in_gap = since_ == gapped || since_ == (gapped | watched);
     note(had_correction ? 0 : gapped);
     if (in_gap && !all(now_.factor.variance(0) < ceiling())) [[unlikely]] {
-      now_.factor.template advance<true>(S(1.0), Factor{}, transition_);
+      now_.factor.advance_seldom(S(1.0), Factor{}, transition_);
       // Without noise it still grows as samples^(2N-2), until the scalar cannot hold it. The gain
       // is that of exact measurements by now, which a factor common to all variances does not
       // alter.
@@ -361,13 +361,20 @@ class RiccatiGain {
       const S variance = now_.factor.variance(0);
       if (!all(variance < most))
         now_.factor.scale(select(variance < most, S(1.0), S(most / variance)));
-    } else if (rule_ == InflationRule::adaptive) [[unlikely]] {
-      recur_adaptively(had_correction);
     } else {
-      if (had_correction) [[likely]] {
+      Factor scaled;
+      const Factor* noise = &noise_;
+      if (rule_ == InflationRule::adaptive) [[unlikely]] {
+        scaled = adapt(had_correction);
+        noise = &scaled;
+      } else if (had_correction) [[likely]] {
         now_.factor.set_variance(0, S(now_.factor.variance(0) * now_.rest));
       }
-      advance_factor(noise_);
+      if (diagonal_noise_) [[likely]] {
+        now_.factor.template advance<true>(now_.growth, *noise, transition_);
+      } else {
+        now_.factor.template advance<false>(now_.growth, *noise, transition_);
+      }
     }
     current_measurement_ = measurement_;
     set_gain();
@@ -375,9 +382,10 @@ class RiccatiGain {
       stand_if_close();
   }
 
-  /// theta^2 = tr W Q / tr W (A + K C) P- (A + K C)'. The gain of this sample was made with the
-  /// theta before: the two depend on each other, and the bound holds for any gain.
-  ESOKIT_COLD constexpr void recur_adaptively(bool had_correction) noexcept {
+  /// Sets theta^2 = tr W Q / tr W (A + K C) P- (A + K C)' and what is to be advanced; the noise
+  /// that goes with it. The gain of this sample was made with the theta before: the two depend on
+  /// each other, and the bound holds for any gain.
+  ESOKIT_COLD constexpr Factor adapt(bool had_correction) noexcept {
     using std::sqrt;
     const S before = now_.factor.variance(0);
     if (had_correction) now_.factor.set_variance(0, S(before * now_.rest * now_.rest));
@@ -397,15 +405,7 @@ class RiccatiGain {
     }
     Factor noise = noise_;
     noise.scale(S(now_.growth / theta));
-    advance_factor(noise);
-  }
-
-  ESOKIT_INLINE constexpr void advance_factor(const Factor& noise) noexcept {
-    if (diagonal_noise_) [[likely]] {
-      now_.factor.template advance<true>(now_.growth, noise, transition_);
-    } else {
-      now_.factor.template advance<false>(now_.growth, noise, transition_);
-    }
+    return noise;
   }
 
   constexpr void set_inflation(const S& theta) noexcept {

@@ -18,7 +18,6 @@
 #include <esokit/core/scalar.hpp>
 #include <esokit/math/combinatorics.hpp>
 #include <esokit/model/scaled_chain.hpp>
-#include <tuple>
 #include <type_traits>
 
 namespace esokit {
@@ -152,7 +151,7 @@ struct EqualSampledPoles {
   }
 
   /// @cond
-  static constexpr auto fields(auto& poles) noexcept { return std::tie(poles.contraction); }
+  static constexpr auto fields(auto& poles) noexcept { return detail::tie(poles.contraction); }
   /// @endcond
 };
 

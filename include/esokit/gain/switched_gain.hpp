@@ -115,7 +115,7 @@ class SwitchedGain {
 
  private:
   friend struct detail::LaneAccess;
-  static constexpr auto fields(auto& o) noexcept { return std::tie(o.sets_, o.previous_); }
+  static constexpr auto fields(auto& o) noexcept { return detail::tie(o.sets_, o.previous_); }
 
   Array<Set, 2> sets_;  ///< otherwise, shrinking
   S previous_ = detail::nothing_watched<S>(Reading);

@@ -29,7 +29,7 @@ class Fal {
 
  private:
   friend struct detail::LaneAccess;
-  static constexpr auto fields(auto& o) noexcept { return std::tie(o.power_, o.linear_width_); }
+  static constexpr auto fields(auto& o) noexcept { return detail::tie(o.power_, o.linear_width_); }
 
   Power<S> power_;
   S linear_width_;

@@ -7,7 +7,6 @@
 #include <esokit/core/lanes.hpp>
 #include <esokit/model/sampled_model.hpp>
 #include <esokit/model/scaled_chain.hpp>
-#include <tuple>
 
 namespace esokit {
 
@@ -161,7 +160,7 @@ class ChainModel {
  private:
   friend struct detail::LaneAccess;
   static constexpr auto fields(auto& o) noexcept {
-    return std::tie(o.scaled_input_gain_, o.rate_, o.input_gain_, o.sample_time_);
+    return detail::tie(o.scaled_input_gain_, o.rate_, o.input_gain_, o.sample_time_);
   }
 
   [[nodiscard]] constexpr bool same_time(const ChainModel& other) const noexcept {

@@ -51,8 +51,8 @@ class AdjustableBandwidthEso
 
     /// @cond
     static constexpr auto fields(auto& c) noexcept {
-      return std::tie(c.observer_bandwidth, c.bandwidth_ratio, c.rule,
-                      c.allow_uncertified_switching, c.input_gain, c.sample_time, c.max_gap);
+      return detail::tie(c.observer_bandwidth, c.bandwidth_ratio, c.rule,
+                         c.allow_uncertified_switching, c.input_gain, c.sample_time, c.max_gap);
     }
     /// @endcond
   };

@@ -73,9 +73,9 @@ class AlgebraicEso
 
     /// @cond
     static constexpr auto fields(auto& c) noexcept {
-      return std::tie(c.observer_bandwidth, c.frequency_shift, c.input_gain, c.sample_time,
-                      c.blanking, c.measurement_noise, c.disturbance_noise, c.start_index,
-                      c.allow_vanishing_gain, c.max_gap);
+      return detail::tie(c.observer_bandwidth, c.frequency_shift, c.input_gain, c.sample_time,
+                         c.blanking, c.measurement_noise, c.disturbance_noise, c.start_index,
+                         c.allow_vanishing_gain, c.max_gap);
     }
     /// @endcond
   };
@@ -192,7 +192,9 @@ class AlgebraicEso
  private:
   friend struct detail::LaneAccess;
   static constexpr auto fields(auto& o) noexcept {
-    return std::tuple_cat(Base::fields(o), std::tie(o.published_));
+    using BaseOf =
+        std::conditional_t<std::is_const_v<std::remove_reference_t<decltype(o)>>, const Base, Base>;
+    return detail::tie(static_cast<BaseOf&>(o), o.published_);
   }
 
   [[nodiscard]] const Law& law() const noexcept { return std::get<0>(this->laws()); }

@@ -29,8 +29,8 @@ struct CascadeEsoConfig {
 
   /// @cond
   static constexpr auto fields(auto& c) noexcept {
-    return std::tie(c.observer_bandwidth, c.bandwidth_factor, c.level_bandwidths, c.input_gain,
-                    c.sample_time, c.model, c.max_gap);
+    return detail::tie(c.observer_bandwidth, c.bandwidth_factor, c.level_bandwidths, c.input_gain,
+                       c.sample_time, c.model, c.max_gap);
   }
   /// @endcond
 };
@@ -47,7 +47,7 @@ struct CascadeEsoConfig<Size, Levels, S, Placement, Settings> {
 
   /// @cond
   static constexpr auto fields(auto& c) noexcept {
-    return std::tie(c.level_poles, c.input_gain, c.sample_time, c.model, c.max_gap);
+    return detail::tie(c.level_poles, c.input_gain, c.sample_time, c.model, c.max_gap);
   }
   /// @endcond
 };

@@ -24,7 +24,7 @@ struct LinearEsoConfig {
 
   /// @cond
   static constexpr auto fields(auto& c) noexcept {
-    return std::tie(c.observer_bandwidth, c.input_gain, c.sample_time, c.model, c.max_gap);
+    return detail::tie(c.observer_bandwidth, c.input_gain, c.sample_time, c.model, c.max_gap);
   }
   /// @endcond
 };
@@ -41,7 +41,7 @@ struct LinearEsoConfig<Size, S, Placement, Settings> {
 
   /// @cond
   static constexpr auto fields(auto& c) noexcept {
-    return std::tie(c.poles, c.input_gain, c.sample_time, c.model, c.max_gap);
+    return detail::tie(c.poles, c.input_gain, c.sample_time, c.model, c.max_gap);
   }
   /// @endcond
 };

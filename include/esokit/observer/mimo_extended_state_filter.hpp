@@ -47,9 +47,10 @@ struct MimoExtendedStateFilterConfig {
 
   /// @cond
   static constexpr auto fields(auto& c) noexcept {
-    return std::tie(c.input_matrix, c.sample_time, c.measurement_covariance, c.disturbance_bounds,
-                    c.bound_factor, c.process_covariance, c.initial_covariance, c.inflation_rule,
-                    c.inflation, c.mode, c.allow_vanishing_gain, c.max_gap);
+    return detail::tie(c.input_matrix, c.sample_time, c.measurement_covariance,
+                       c.disturbance_bounds, c.bound_factor, c.process_covariance,
+                       c.initial_covariance, c.inflation_rule, c.inflation, c.mode,
+                       c.allow_vanishing_gain, c.max_gap);
   }
   /// @endcond
 };

@@ -57,9 +57,9 @@ class NonlinearEso
 
     /// @cond
     static constexpr auto fields(auto& c) noexcept {
-      return std::tie(c.observer_bandwidth, c.shape, c.error_scale, c.gain_min, c.gain_max,
-                      c.allow_uncertified_gain, c.unlimited, c.input_gain, c.sample_time,
-                      c.max_gap);
+      return detail::tie(c.observer_bandwidth, c.shape, c.error_scale, c.gain_min, c.gain_max,
+                         c.allow_uncertified_gain, c.unlimited, c.input_gain, c.sample_time,
+                         c.max_gap);
     }
     /// @endcond
   };

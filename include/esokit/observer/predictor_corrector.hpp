@@ -414,8 +414,8 @@ class PredictorCorrector {
 
   /// All that it holds, for what is built on it, see detail::LaneAccess.
   static constexpr auto fields(auto& o) noexcept {
-    return std::tie(o.states_, o.laws_, o.model_, o.innovation_, o.applied_input_, o.gap_,
-                    o.max_gap_);
+    return detail::tie(o.states_, o.laws_, o.model_, o.innovation_, o.applied_input_, o.gap_,
+                       o.max_gap_);
   }
 
  private:
