@@ -87,7 +87,9 @@
 #include <esokit/math/matrix_exponential.hpp>
 #include <esokit/math/positivity.hpp>
 #include <esokit/math/power.hpp>
+#include <esokit/model/augmented_model.hpp>
 #include <esokit/model/chain_model.hpp>
+#include <esokit/model/corrected_part.hpp>
 #include <esokit/model/integrator_chain.hpp>
 #include <esokit/model/linear_plant.hpp>
 #include <esokit/model/sampled_model.hpp>
@@ -101,6 +103,7 @@
 #include <esokit/observer/half_gain_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/mimo_extended_state_filter.hpp>
+#include <esokit/observer/model_eso.hpp>
 #include <esokit/observer/named_observer.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/observer/predictor_corrector.hpp>

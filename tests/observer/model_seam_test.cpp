@@ -82,6 +82,7 @@ ESOKIT_TEST_WITHOUT(finite_probe);
 ESOKIT_TEST_WITHOUT(rest);
 ESOKIT_TEST_WITHOUT(increment);
 ESOKIT_TEST_WITHOUT(degree);
+ESOKIT_TEST_WITHOUT(state_of_row);
 struct TraitsOfAnotherType : Resonator {
   static constexpr int traits = 1;
 };

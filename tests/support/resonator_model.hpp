@@ -17,7 +17,7 @@ class ResonatorModel {
   using Chain = esokit::ScaledChain<Order, S, 1>;
 
  public:
-  static constexpr esokit::ModelTraits traits{.shifts_output = true};
+  static constexpr esokit::ModelTraits traits{.shifts_output = true, .adds_levels = true};
   static constexpr int order = Order;
   static constexpr int extension = 3;
   static constexpr int size = Order + 3;
@@ -128,6 +128,7 @@ class ResonatorModel {
     step(Order + 2, Order + 2) = cosine_less_one_;
     return step;
   }
+  [[nodiscard]] static constexpr int state_of_row(int row) noexcept { return row; }
   [[nodiscard]] static constexpr int degree(int row) noexcept { return row < Order ? row : Order; }
 
  private:

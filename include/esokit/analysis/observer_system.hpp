@@ -89,8 +89,19 @@ template <int Size>
 struct SampledMatrices {
   Matrix<double, Size, Size> step;
   Vector<double, Size> gamma;
-  Vector<double, Size> units;
+  Vector<double, Size> units;  ///< of state s
 };
+
+/// Where row `row` of the estimate is among the states.
+template <class Observer>
+constexpr int state_of_row(int row) noexcept {
+  if constexpr (SampledLinearObserver<Observer>) {
+    using Model = std::remove_cvref_t<decltype(std::declval<const Observer&>().model())>;
+    return Model::state_of_row(row);
+  } else {
+    return row;
+  }
+}
 
 /// In double, whatever the scalar of the observer.
 template <SampledLinearObserver Observer>
@@ -114,9 +125,11 @@ SampledMatrices<Observer::size> sampled_matrices(const Observer& observer) {
     const auto units = model.physical(ones);
     const auto gamma = model.physical(model.add_input(typename Model::State{}, S(1)));
     const auto step = model.increment();
-    for (int i = 0; i < size; ++i) m.units(i) = static_cast<double>(units(i));
+    for (int row = 0; row < size; ++row) {
+      m.units(Model::state_of_row(row)) = static_cast<double>(units(row));
+      m.gamma(Model::state_of_row(row)) = static_cast<double>(gamma(row));
+    }
     for (int i = 0; i < size; ++i) {
-      m.gamma(i) = static_cast<double>(gamma(i));
       for (int j = 0; j < size; ++j) {
         m.step(i, j) = static_cast<double>(step(i, j)) * m.units(i) / m.units(j);
       }
@@ -180,7 +193,7 @@ MatricesOf<Observer> observer_matrices(const Observer& observer, double = 0.0) {
     m.bu(row) = sampled.gamma(row - first);
   }
   for (int r = 0; r < size; ++r) {
-    const int row = states - size + r;
+    const int row = states - size + state_of_row<Observer>(r);
     for (int j = 0; j < states; ++j) m.c(r, j) = added(row, j) + (j == row ? 1.0 : 0.0);
     m.dy(r) = added_y[static_cast<std::size_t>(row)];
   }

@@ -233,7 +233,7 @@ class Adrc {
   static Expected<Adrc, Error<S>> make_one(const Config& config) {
     const auto observer = Observer::make(observer_config(config));
     if (!observer) return observer.error();
-    const auto law = make_law(config, chain_config<Observer>(config.observer).sample_time);
+    const auto law = make_law(config, *observer);
     if (!law) return law.error();
     const auto scaled = FastLaw::make(*law, *observer);
     if (!scaled) return scaled.error();
@@ -269,8 +269,10 @@ class Adrc {
     return observer;
   }
 
-  static Expected<Law, Error<S>> make_law(const Config& config, const S& sample_time) {
-    const S& input_gain = chain_config<Observer>(config.observer).input_gain;
+  static Expected<Law, Error<S>> make_law(const Config& config, const Observer& observer) {
+    // That of a model with an actuator is b0 / tau.
+    const S input_gain = error_based ? S(-observer.input_gain()) : S(observer.input_gain());
+    const S sample_time = observer.sample_time();
     if (config.gains) {
       if (config.half_gain) {
         return Error<S>{"half_gain", S(1), "must be left out where gains is given"};

@@ -146,7 +146,7 @@ class DisturbanceCompensator {
   static Expected<DisturbanceCompensator, Error<S>> make_one(const Config& config) {
     const auto observer = Observer::make(config.observer);
     if (!observer) return observer.error();
-    const S& input_gain = chain_config<Observer>(config.observer).input_gain;
+    const S input_gain = observer->input_gain();
     S gain = S(-1) / input_gain;
     if (config.compensation_gain) {
       gain = *config.compensation_gain;

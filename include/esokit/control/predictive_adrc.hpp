@@ -76,7 +76,7 @@ class PredictiveAdrc {
     if (!observer) return observer.error();
     const auto law = AdrcLaw<order, S>::make({.controller_bandwidth = config.controller_bandwidth,
                                               .gains = config.gains,
-                                              .input_gain = config.observer.input_gain});
+                                              .input_gain = observer->input_gain()});
     if (!law) return law.error();
     const auto limiter = Limiter<S>::make(config.limits, config.observer.sample_time);
     if (!limiter) return limiter.error();

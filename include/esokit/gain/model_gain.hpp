@@ -13,7 +13,137 @@
 
 namespace esokit {
 
-/// Constant gain for a model, placed numerically.
+namespace detail {
+
+/// The gains of a part that is observed by itself: after one sample, and after each gap.
+template <int Size, Scalar S, int MostBridged>
+struct PartDesign {
+  Array<ScaledGain<Size, S>, MostBridged> gains{};
+  int longest_step = 0;  ///< samples from correction to correction; 0: poles cannot be placed
+
+  PartDesign(const Matrix<S, Size, Size>& step, const Array<S, Size>& output,
+             const Array<int, Size>& degrees, const PoleFactors<Size, S>& poles) {
+    gains[0] = placed_gain(step, output, degrees, poles);
+    const auto units = degree_units<Size>(degrees, poles.unit);
+    // Rounding spreads N equal poles by its N-th root: N = 8 in double by a third where the model
+    // swings at three times the bandwidth. Where little is left after a sample that is of no
+    // account.
+    const S got = decay(corrected(step, output, gains[0]), units);
+    if (!all(got >= S(0.5) * poles.decay) && !all(got >= S(2.3))) return;
+    longest_step = 1;
+    find_gap_gains(step, output, units, S(S(0.01) * got));
+  }
+
+ private:
+  using Square = Matrix<S, Size, Size>;
+
+  // Matrices near I are kept without it: Phi - I has all its digits, Phi has not.
+
+  /// (I - k C) Phi - I from Phi - I.
+  static Square corrected(Square step, const Array<S, Size>& output,
+                          const ScaledGain<Size, S>& gain) {
+    const auto ahead = output_ahead<Size>(output, step);  // C Phi
+    for (std::size_t i = 0; i < Size; ++i) {
+      for (std::size_t j = 0; j < Size; ++j) {
+        S& x = step(static_cast<int>(i), static_cast<int>(j));
+        x = x - gain[i] * ahead[j];
+      }
+    }
+    return step;
+  }
+
+  /// (I + A)(I + B) - I.
+  static Square joined(const Square& a, const Square& b) { return a * b + (a + b); }
+
+  /// The largest magnitude of an element; infinite where one is not finite.
+  static S largest(const Square& a) {
+    S most(0.0);
+    for (int i = 0; i < Size; ++i) {
+      for (int j = 0; j < Size; ++j) {
+        if (!all(is_finite(a(i, j)))) return S(std::numeric_limits<double>::infinity());
+        const S size = absolute(a(i, j));
+        most = select(most < size, size, most);
+      }
+    }
+    return most;
+  }
+
+  /// -ln of the largest pole of I + A, by its powers; -1 where they are not finite.
+  /// @param units a^degree, in which its elements are of one size
+  static S decay(Square a, const Array<S, Size>& units) {
+    using std::log;
+    for (std::size_t i = 0; i < Size; ++i) {
+      for (std::size_t j = 0; j < Size; ++j) {
+        S& x = a(static_cast<int>(i), static_cast<int>(j));
+        x = x * (units[j] / units[i]);
+      }
+    }
+    S share(1.0);
+    for (; all(largest(a) < S(0.25)) && all(share > S(1e-12)); share = share * S(0.5)) {
+      a = joined(a, a);
+    }
+    for (int i = 0; i < Size; ++i) a(i, i) = a(i, i) + S(1.0);
+    S radius(0.0);
+    for (int squaring = 0; squaring < 40; ++squaring) {
+      const S size = largest(a);
+      if (!all(is_finite(size))) return S(-1.0);
+      if (!all(size > smallest_normal<S>())) return S(1e3);  // all poles at zero
+      radius = radius + share * log(size);
+      share = share * S(0.5);
+      a = a / size;
+      a = a * a;
+    }
+    return -radius;
+  }
+
+  void find_gap_gains(const Square& step, const Array<S, Size>& output, const Array<S, Size>& units,
+                      const S& least_decay) {
+    // P_1, that of noise alone with the gain k: P_1 = A P_1 A' + (Phi k) (Phi k)', A = Phi (I -
+    // kC).
+    Square phi = step;
+    for (int i = 0; i < Size; ++i) phi(i, i) = phi(i, i) + S(1.0);
+    Array<S, Size> ahead{};
+    for (int i = 0; i < Size; ++i) {
+      S sum(0.0);
+      for (int j = 0; j < Size; ++j) sum = sum + phi(i, j) * gains[0][static_cast<std::size_t>(j)];
+      ahead[static_cast<std::size_t>(i)] = sum;
+    }
+    Square spread;
+    Square predictor = phi;
+    for (int i = 0; i < Size; ++i) {
+      for (int j = 0; j < Size; ++j) {
+        spread(i, j) = ahead[static_cast<std::size_t>(i)] * ahead[static_cast<std::size_t>(j)];
+        predictor(i, j) = predictor(i, j) -
+                          ahead[static_cast<std::size_t>(i)] * output[static_cast<std::size_t>(j)];
+      }
+    }
+    const auto noise = solve_stein<Size, S>(predictor, spread);
+    if (!noise) return;
+    Square p = *noise;
+    Square over = step;  // Phi^M - I
+    for (int samples = 2; samples <= MostBridged; ++samples) {
+      p = phi * p * phi.transpose();
+      over = joined(over, step);
+      auto& gain = gains[static_cast<std::size_t>(samples - 1)];
+      S innovation(1.0);
+      for (std::size_t i = 0; i < Size; ++i) {
+        gain[i] = S(0.0);
+        for (std::size_t j = 0; j < Size; ++j) {
+          gain[i] = gain[i] + p(static_cast<int>(i), static_cast<int>(j)) * output[j];
+        }
+        innovation = innovation + output[i] * gain[i];
+      }
+      for (S& k : gain) k = k / innovation;
+      if (!all(decay(corrected(over, output, gain), units) > least_decay)) return;
+      longest_step = samples;
+    }
+  }
+};
+
+}  // namespace detail
+
+/// Constant gain for a model, placed numerically; of a model that says what of it is corrected
+/// (CorrectedPart) for that part, with the poles that it places itself.
 ///
 /// The gain that places the poles for M T, by which the chain bridges a gap, is of no use to what
 /// swings: seen at every M-th sample a resonator is nearly a constant, and the gain grows without
@@ -43,22 +173,44 @@ class ModelGain {
   static Expected<ModelGain, Error<S>> make(const char* field, const Spec& spec, const Model& model,
                                             int index = -1) {
     if (auto ok = Placement::template check<Size, S>(field, spec, index); !ok) return ok.error();
-    const auto poles = pole_factors(Placement::template sample<Size, S>(spec, model.sample_time()));
+    const S named = Placement::template representative<Size, S>(spec);
     ModelGain law;
-    law.gains_[0] = placed_gain(model, poles);
-    const Square step = model.increment();
-    const auto units = detail::degree_units<Size>(model, poles.unit);
-    // Rounding spreads N equal poles by its N-th root: N = 8 in double by a third where the model
-    // swings at three times the bandwidth. Where little is left after a sample that is of no
-    // account.
-    const S wanted = slowest(poles);
-    const S got = decay(corrected(step, law.gains_[0]), units);
-    if (!all(got >= S(0.5) * wanted) && !all(got >= S(2.3))) {
-      return Error<S>{field, Placement::template representative<Size, S>(spec),
-                      "gives poles that the scalar cannot place for this model", index};
+    // What the part's gains are to the whole.
+    const auto take = [&](const auto& part, const auto& poles) -> Expected<ModelGain, Error<S>> {
+      const auto design = designed(part, poles);
+      if (design.longest_step == 0) {
+        return Error<S>{field, named, "gives poles that the scalar cannot place for this model",
+                        index};
+      }
+      for (std::size_t gap = 0; gap < MostBridged; ++gap) {
+        for (int i = 0; i < Size; ++i) {
+          S sum(0.0);
+          for (std::size_t j = 0; j < design.gains[gap].size(); ++j) {
+            sum = sum + part.whole(i, static_cast<int>(j)) * design.gains[gap][j];
+          }
+          law.gains_[gap][static_cast<std::size_t>(i)] = sum;
+        }
+      }
+      law.longest_step_ = design.longest_step;
+      return law;
+    };
+    const S& time = model.sample_time();
+    if constexpr (model_traits<Model>.corrects_part && !ListsPoles<Placement>) {
+      return model.with_corrected_part(named, [&](const auto& part) {
+        using Part = std::remove_cvref_t<decltype(part)>;
+        constexpr int pairs = Part::own_pairs;
+        constexpr int placed = Part::size - 2 * pairs;
+        Array<detail::Contraction<S>, pairs> own{};
+        for (std::size_t i = 0; i < own.size(); ++i) {
+          own[i] = detail::contraction(S(part.pairs[i][0] * time), S(part.pairs[i][1] * time));
+        }
+        return take(
+            part, with_pairs(pole_factors(Placement::template sample<placed, S>(spec, time)), own));
+      });
+    } else {
+      return take(corrected_whole(model),
+                  pole_factors(Placement::template sample<Size, S>(spec, time)));
     }
-    law.find_gap_gains(step, units, S(S(0.01) * got));
-    return law;
   }
 
   /// k, scaled, whatever the innovation.
@@ -82,109 +234,12 @@ class ModelGain {
   }
 
  private:
-  using Square = Matrix<S, Size, Size>;
   ModelGain() = default;
 
-  /// -ln of a pole: omega_o T.
-  static S slowest(const PoleFactors<Size, S>& poles) {
-    using std::log;
-    const S left = S(1.0) - poles.unit;
-    return left > detail::smallest_normal<S>() ? S(-log(left)) : S(1e3);
-  }
-
-  // Matrices near I are kept without it: Phi - I has all its digits, Phi has not.
-
-  /// (I - k C) Phi - I from Phi - I.
-  static Square corrected(Square step, const ScaledGain<Size, S>& gain) {
-    Array<S, Size> output{};  // C Phi
-    for (std::size_t j = 0; j < Size; ++j) output[j] = step(0, static_cast<int>(j));
-    output[0] = output[0] + S(1.0);
-    for (std::size_t i = 0; i < Size; ++i) {
-      for (std::size_t j = 0; j < Size; ++j) {
-        S& x = step(static_cast<int>(i), static_cast<int>(j));
-        x = x - gain[i] * output[j];
-      }
-    }
-    return step;
-  }
-
-  /// (I + A)(I + B) - I.
-  static Square joined(const Square& a, const Square& b) { return a * b + (a + b); }
-
-  /// The largest magnitude of an element; infinite where one is not finite.
-  static S largest(const Square& a) {
-    S most(0.0);
-    for (int i = 0; i < Size; ++i) {
-      for (int j = 0; j < Size; ++j) {
-        if (!all(is_finite(a(i, j)))) return S(std::numeric_limits<double>::infinity());
-        const S size = detail::absolute(a(i, j));
-        most = select(most < size, size, most);
-      }
-    }
-    return most;
-  }
-
-  /// -ln of the largest pole of I + A, by its powers; -1 where they are not finite.
-  /// @param units a^degree, in which its elements are of one size
-  static S decay(Square a, const Array<S, Size>& units) {
-    using std::log;
-    for (std::size_t i = 0; i < Size; ++i) {
-      for (std::size_t j = 0; j < Size; ++j) {
-        S& x = a(static_cast<int>(i), static_cast<int>(j));
-        x = x * (units[j] / units[i]);
-      }
-    }
-    S share(1.0);
-    for (; all(largest(a) < S(0.25)) && all(share > S(1e-12)); share = share * S(0.5)) {
-      a = joined(a, a);
-    }
-    for (int i = 0; i < Size; ++i) a(i, i) = a(i, i) + S(1.0);
-    S radius(0.0);
-    for (int squaring = 0; squaring < 40; ++squaring) {
-      const S size = largest(a);
-      if (!all(is_finite(size))) return S(-1.0);
-      if (!all(size > detail::smallest_normal<S>())) return S(1e3);  // all poles at zero
-      radius = radius + share * log(size);
-      share = share * S(0.5);
-      a = a / size;
-      a = a * a;
-    }
-    return -radius;
-  }
-
-  void find_gap_gains(const Square& step, const Array<S, Size>& units, const S& least_decay) {
-    // P_1, that of noise alone with the gain k: P_1 = A P_1 A' + (Phi k) (Phi k)', A = Phi (I -
-    // kC).
-    Square phi = step;
-    for (int i = 0; i < Size; ++i) phi(i, i) = phi(i, i) + S(1.0);
-    Array<S, Size> ahead{};
-    for (int i = 0; i < Size; ++i) {
-      S sum(0.0);
-      for (int j = 0; j < Size; ++j) sum = sum + phi(i, j) * gains_[0][static_cast<std::size_t>(j)];
-      ahead[static_cast<std::size_t>(i)] = sum;
-    }
-    Square spread;
-    Square predictor = phi;
-    for (int i = 0; i < Size; ++i) {
-      for (int j = 0; j < Size; ++j) {
-        spread(i, j) = ahead[static_cast<std::size_t>(i)] * ahead[static_cast<std::size_t>(j)];
-      }
-      predictor(i, 0) = predictor(i, 0) - ahead[static_cast<std::size_t>(i)];
-    }
-    const auto noise = detail::solve_stein<Size, S>(predictor, spread);
-    if (!noise) return;
-    Square p = *noise;
-    Square over = step;  // Phi^M - I
-    for (int samples = 2; samples <= MostBridged; ++samples) {
-      p = phi * p * phi.transpose();
-      over = joined(over, step);
-      auto& gain = gains_[static_cast<std::size_t>(samples - 1)];
-      for (int i = 0; i < Size; ++i) {
-        gain[static_cast<std::size_t>(i)] = p(i, 0) / (p(0, 0) + S(1.0));
-      }
-      if (!all(decay(corrected(over, gain), units) > least_decay)) return;
-      longest_step_ = samples;
-    }
+  template <int Part, int Pairs>
+  static detail::PartDesign<Part, S, MostBridged> designed(
+      const CorrectedPart<Part, Size, Pairs, S>& part, const PoleFactors<Part, S>& poles) {
+    return {part.step, part.output, part.degrees, poles};
   }
 
   Array<ScaledGain<Size, S>, MostBridged> gains_{};

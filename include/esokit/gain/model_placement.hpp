@@ -9,8 +9,10 @@
 
 #include <cmath>
 #include <esokit/core/matrix.hpp>
+#include <esokit/gain/half_gain.hpp>
 #include <esokit/gain/sampled_gain.hpp>
 #include <esokit/math/linear_equations.hpp>
+#include <esokit/model/corrected_part.hpp>
 
 namespace esokit {
 
@@ -19,48 +21,118 @@ namespace esokit {
 template <int Size, Scalar S>
 struct PoleFactors {
   S unit{};                          ///< a, the largest of all abs(z_i - 1)
+  S decay{};                         ///< -ln of the largest abs(z_i)
   Array<S, Size / 2 + 1> sum{};      ///< of the pairs; what is not used is zero
   Array<S, Size / 2 + 1> product{};  ///< of the pairs
   S last{};                          ///< of the one left
 };
+
+namespace detail {
+
+/// -ln(1 - a), a from 0 to 1; where nothing is left, a large number.
+template <Scalar S>
+S decay_of(const S& contraction) {
+  using std::log;
+  const S left = S(1.0) - contraction;
+  return left > smallest_normal<S>() ? S(-log(left)) : S(1e3);
+}
+
+}  // namespace detail
 
 /// All poles at 1 - a.
 template <int Size, Scalar S>
 PoleFactors<Size, S> pole_factors(const EqualSampledPoles<Size, S>& poles) noexcept {
   PoleFactors<Size, S> factors;
   factors.unit = poles.contraction;
+  factors.decay = detail::decay_of(poles.contraction);
   factors.sum.fill(S(2.0));
   factors.product.fill(S(1.0));
   factors.last = S(1.0);
   return factors;
 }
 
+/// Pairs of conjugate poles, `First` of them given otherwise: all of `factors` and these.
+/// @param pairs 1 - rho of one of each pair
+template <int Size, std::size_t Count, PlainScalar S>
+PoleFactors<Size + 2 * static_cast<int>(Count), S> with_pairs(
+    const PoleFactors<Size, S>& factors, const std::array<detail::Contraction<S>, Count>& pairs) {
+  PoleFactors<Size + 2 * static_cast<int>(Count), S> all;
+  all.unit = factors.unit;
+  all.decay = factors.decay;
+  for (const auto& a : pairs) all.unit = (std::max)(all.unit, std::hypot(a.real, a.imaginary));
+  const S shrink = factors.unit / all.unit;
+  for (std::size_t i = 0; i < Size / 2; ++i) {
+    all.sum[i] = factors.sum[i] * shrink;
+    all.product[i] = factors.product[i] * shrink * shrink;
+  }
+  all.last = factors.last * shrink;
+  for (std::size_t i = 0; i < Count; ++i) {
+    const S real = pairs[i].real / all.unit;
+    const S imaginary = pairs[i].imaginary / all.unit;
+    all.sum[Size / 2 + i] = real + real;
+    all.product[Size / 2 + i] = real * real + imaginary * imaginary;
+    // abs(rho)^2 = 1 - (2 Re a - abs(a)^2).
+    const S lost = pairs[i].real * (S(2) - pairs[i].real) - pairs[i].imaginary * pairs[i].imaginary;
+    all.decay = (std::min)(all.decay, detail::decay_of(lost) / S(2));
+  }
+  return all;
+}
+
+/// Pairs, and a real one where N is odd.
+template <int Size, PlainScalar S>
+PoleFactors<Size, S> pole_factors(const SampledPolePairs<Size, S>& poles) noexcept {
+  PoleFactors<Size % 2, S> real;
+  real.unit = S(0);
+  real.decay = S(1e3);
+  if constexpr (Size % 2 != 0) {
+    real.unit = poles.pairs[Size / 2].real;
+    real.decay = detail::decay_of(real.unit);
+    real.last = S(1);
+  }
+  Array<detail::Contraction<S>, Size / 2> pairs{};
+  for (std::size_t i = 0; i < Size / 2; ++i) pairs[i] = poles.pairs[i];
+  return with_pairs(real, pairs);
+}
+
 namespace detail {
 
 /// a^degree of each state.
-template <int Size, class Model, Scalar S>
-Array<S, Size> degree_units(const Model& model, const S& a) noexcept {
+template <int Size, Scalar S>
+Array<S, Size> degree_units(const Array<int, Size>& degrees, const S& a) noexcept {
   Array<S, Size> units{};
-  for (int i = 0; i < Size; ++i) {
+  for (std::size_t i = 0; i < Size; ++i) {
     S power(1.0);
-    for (int k = 0; k < model.degree(i); ++k) power = power * a;
-    units[static_cast<std::size_t>(i)] = power;
+    for (int k = 0; k < degrees[i]; ++k) power = power * a;
+    units[i] = power;
   }
   return units;
 }
 
+/// C (I + A).
+template <int Size, Scalar S>
+Array<S, Size> output_ahead(const Array<S, Size>& output, const Matrix<S, Size, Size>& a) noexcept {
+  Array<S, Size> ahead = output;
+  for (int j = 0; j < Size; ++j) {
+    S& sum = ahead[static_cast<std::size_t>(j)];
+    for (int i = 0; i < Size; ++i) sum = sum + output[static_cast<std::size_t>(i)] * a(i, j);
+  }
+  return ahead;
+}
+
 }  // namespace detail
 
-/// The gain k of the correction z = z- + k (y - z-_1), scaled, that puts the poles of
+/// The gain k of the correction z = z- + k (y - C z-), scaled, that puts the poles of
 /// (I - k C) Phi there.
-/// @param model for Phi @param poles wanted
+/// @param step Phi - I @param output C @param degrees of the states @param poles wanted
 /// @return not finite where y does not tell all states
-template <class Model, int Size, Scalar S>
-ScaledGain<Size, S> placed_gain(const Model& model, const PoleFactors<Size, S>& poles) noexcept {
+template <int Size, Scalar S>
+ScaledGain<Size, S> placed_gain(const Matrix<S, Size, Size>& step, const Array<S, Size>& output,
+                                const Array<int, Size>& degrees,
+                                const PoleFactors<Size, S>& poles) noexcept {
   using Square = Matrix<S, Size, Size>;
   const S& a = poles.unit;
-  const auto unit = detail::degree_units<Size>(model, a);
-  Square f = model.increment();
+  const auto unit = detail::degree_units<Size>(degrees, a);
+  Square f = step;
   for (int i = 0; i < Size; ++i) {
     for (int j = 0; j < Size; ++j) {
       // In this order nothing overflows on the way.
@@ -69,7 +141,13 @@ ScaledGain<Size, S> placed_gain(const Model& model, const PoleFactors<Size, S>& 
   }
   // C Phi F^i, i = 0 .. N - 1, and the vector that it takes to (0, .., 0, 1).
   Square seen;
-  for (int j = 0; j < Size; ++j) seen(0, j) = S(j == 0 ? 1.0 : 0.0) + a * f(0, j);
+  Array<S, Size> ahead = output;
+  for (std::size_t j = 0; j < Size; ++j) ahead[j] = ahead[j] * unit[j];
+  for (int j = 0; j < Size; ++j) {
+    S sum(0.0);
+    for (int i = 0; i < Size; ++i) sum = sum + ahead[static_cast<std::size_t>(i)] * f(i, j);
+    seen(0, j) = ahead[static_cast<std::size_t>(j)] + a * sum;
+  }
   for (int i = 1; i < Size; ++i) {
     for (int j = 0; j < Size; ++j) {
       S sum(0.0);

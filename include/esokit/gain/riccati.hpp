@@ -167,7 +167,11 @@ ScaledGain<Size, S> deadbeat_gain(const PascalTransition&) {
 }
 template <int Size, Scalar S>
 ScaledGain<Size, S> deadbeat_gain(const MatrixTransition<Size, S>& transition) {
-  return placed_gain(transition, pole_factors(EqualSampledPoles<Size, S>{S(1.0)}));
+  Array<S, Size> output{};
+  output.fill(S(0.0));
+  output[0] = S(1.0);
+  return placed_gain(transition.increment(), output, transition.degrees,
+                     pole_factors(EqualSampledPoles<Size, S>{S(1.0)}));
 }
 
 /// C (-I - Phi)^-1; Phi of the chain is upper triangular.

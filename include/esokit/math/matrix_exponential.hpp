@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cmath>
+#include <esokit/core/matrix.hpp>
 #include <esokit/core/scalar.hpp>
 
 namespace esokit::detail {
@@ -59,6 +60,15 @@ constexpr void exp_minus_identity(T* a, T* work, int n) noexcept {
     multiply(a, a, product, n);
     for (int j = 0; j < n * n; ++j) a[j] = T(2) * a[j] + product[j];
   }
+}
+
+/// exp(a) - I. In units that keep its elements of one size: below 1e-13 of the largest, with
+/// squarings for norms to 2e4.
+template <PlainScalar T, int Size>
+constexpr Matrix<T, Size, Size> exp_minus_identity(Matrix<T, Size, Size> a) noexcept {
+  std::array<T, static_cast<std::size_t>(2 * Size * Size)> work{};
+  exp_minus_identity(a.data(), work.data(), Size);
+  return a;
 }
 
 }  // namespace esokit::detail

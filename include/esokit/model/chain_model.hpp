@@ -23,8 +23,9 @@ class ChainModel {
   static constexpr int extension = Extension;  ///< m, extended states
   static constexpr int size = N;               ///< N = n + m
 
-  static constexpr ModelTraits traits{.is_chain = true, .shifts_output = true};  ///< what it is
-  using Settings = NoModelSettings;                                              ///< of make
+  static constexpr ModelTraits traits{
+      .is_chain = true, .shifts_output = true, .adds_levels = true};  ///< what it is
+  using Settings = NoModelSettings;                                   ///< of make
 
   using State = Array<S, N>;      ///< x, scaled, N elements
   using Estimate = Vector<S, N>;  ///< z, physical units, N x 1
@@ -148,6 +149,8 @@ class ChainModel {
     }
     return step;
   }
+  /// Row r is state r.
+  [[nodiscard]] static constexpr int state_of_row(int row) noexcept { return row; }
   /// r: each state is a derivative more.
   [[nodiscard]] static constexpr int degree(int row) noexcept { return row; }
 

@@ -22,6 +22,14 @@ struct ModelTraits {
   /// y may be counted from elsewhere: a constant added to y is a solution of the plant, too. Not
   /// with a known pole elsewhere than at zero.
   bool shifts_output = false;
+
+  /// Its disturbance has rows of its own, from `order` on, so that what two levels of a cascade
+  /// have found adds up. Not where row `order` also holds what is known of plant or actuator.
+  bool adds_levels = false;
+
+  /// `with_corrected_part(..)` says what of it a gain corrects, and which poles are its own to
+  /// place; see CorrectedPart. Otherwise all is corrected.
+  bool corrects_part = false;
 };
 
 /// What a model declares.
@@ -43,6 +51,9 @@ struct NoModelSettings {};
 ///   that was in force before; `scaled_disturbance(d)`, `same_drive(before)`
 /// - `finite_probe(x)`: finite only if all estimates are
 /// - `rest(y, u)`: the estimate of a plant that stands at y under u
+/// - `state_of_row(r)`: where row r of the estimate is among the states; state 0 is what is
+/// measured
+///   (row 0 but for a sensor's lag)
 /// - `increment()`: Phi - I, N x N, for the design, its states r smaller by a^degree(r) where all
 ///   poles are within a of z = 1
 template <class Model, class S>
@@ -70,6 +81,7 @@ concept SampledModel = std::copyable<Model> && DeclaresTraits<Model, ModelTraits
   { model.rest(s, s) } -> std::same_as<typename Model::Estimate>;
   { model.increment() } -> std::same_as<Matrix<S, Model::size, Model::size>>;
   { Model::degree(0) } -> std::same_as<int>;
+  { Model::state_of_row(0) } -> std::same_as<int>;
 };
 
 }  // namespace esokit

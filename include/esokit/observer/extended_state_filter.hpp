@@ -237,7 +237,7 @@ class ExtendedStateFilter
   /// False if the gate would take y for an outlier. Bad numbers are not its business.
   [[nodiscard]] bool accepts(const S& y) const noexcept {
     if (!gated() || this->restarts()) return true;
-    const S e = y - this->template estimate<0>();
+    const S e = y - this->predicted_measurement();
     // A square beyond the scalar is beyond the threshold.
     if (!all(is_finite(e))) return true;
     return all(e * e <= outlier_threshold_ * innovation_variance());
@@ -253,12 +253,14 @@ class ExtendedStateFilter
   /// after `predict` that of the prediction, after `correct` that of the correction. An element
   /// beyond the scalar is its largest number.
   [[nodiscard]] Covariance covariance() const noexcept {
-    Covariance p = law().covariance();
+    const Covariance of_states = law().covariance();
     // In two steps from both sides: the whole factor may not fit the scalar where P does.
     const Array<S, N> units = physical_units(this->model());
+    Covariance p;
     for (int i = 0; i < N; ++i) {
       for (int j = 0; j <= i; ++j) {
-        p(i, j) = detail::clipped(S(p(i, j) * units[index(i)] * units[index(j)]));
+        const S& scaled = of_states(PlantModel::state_of_row(i), PlantModel::state_of_row(j));
+        p(i, j) = detail::clipped(S(scaled * units[index(i)] * units[index(j)]));
         p(j, i) = p(i, j);
       }
     }
@@ -349,7 +351,10 @@ class ExtendedStateFilter
   static Covariance scaled(const Covariance& p, const Array<S, N>& units) {
     Covariance result;
     for (int i = 0; i < N; ++i) {
-      for (int j = 0; j < N; ++j) result(i, j) = (p(i, j) * units[index(i)]) * units[index(j)];
+      for (int j = 0; j < N; ++j) {
+        S& state = result(PlantModel::state_of_row(i), PlantModel::state_of_row(j));
+        state = (p(i, j) * units[index(i)]) * units[index(j)];
+      }
     }
     return result;
   }
@@ -375,16 +380,17 @@ class ExtendedStateFilter
   static Expected<CovarianceFactor<N, S>, Error<S>> factored(const char* field, const Covariance& p,
                                                              const Array<S, N>& units) {
     const Covariance q = scaled(p, units);
-    for (int i = 0; i < N; ++i) {
-      if (!all(p(i, i) > S(0.0))) continue;
+    for (int row = 0; row < N; ++row) {
+      if (!all(p(row, row) > S(0.0))) continue;
+      const int i = PlantModel::state_of_row(row);
       // Far enough from both ends for what the recursion makes of it.
       const S least = detail::smallest_normal<S>() / detail::rounding<S>();
       if (!all(is_finite(q(i, i))) || !all(q(i, i) > least) ||
           !all(q(i, i) < detail::largest_variance<S>())) {
-        return Error<S>{field, p(i, i),
+        return Error<S>{field, p(row, row),
                         "in the scaling T^2r / r!^2 and divided by R is a variance that the scalar "
                         "cannot hold",
-                        i * N + i};
+                        row * N + row};
       }
     }
     const auto factor = CovarianceFactor<N, S>::from_matrix(q);
@@ -469,6 +475,9 @@ class ExtendedStateFilter
   /// What is known for certain is never corrected, what is never disturbed ever less.
   static Check<S> check_way_back(const Config& config, const Covariance& q) {
     const S& highest = q(N - 1, N - 1);
+    // Of a model put together which state that is depends on its parts: an actuator that is known
+    // is not disturbed.
+    if (model_traits<PlantModel>.corrects_part) return {};
     if (config.allow_vanishing_gain || all(highest > S(0.0))) return {};
     if (config.inflation_rule == InflationRule::none) {
       return Error<S>{noise_field(config), highest,
@@ -510,7 +519,8 @@ class ExtendedStateFilter
     if (config.mode == RiccatiMode::start_table && TableSize == 0) {
       return Error<S>{"mode", S(0.0), "needs a filter with a TableSize above 0 for a start table"};
     }
-    if (config.inflation_rule == InflationRule::none && !all(highest > S(0.0))) {
+    if (!model_traits<PlantModel>.corrects_part && config.inflation_rule == InflationRule::none &&
+        !all(highest > S(0.0))) {
       return Error<S>{field, highest,
                       "must disturb the highest state where the gain is to be frozen without "
                       "inflation: its limit is zero",

@@ -63,6 +63,10 @@ template <int Order, Scalar S, int Extension, class Law, int Levels = 1,
           class Model = ChainModel<Order, S, Extension>>
 requires GainLaw<Law, Order + Extension, S> && SampledModel<Model, S>
 class PredictorCorrector {
+  static_assert(Levels == 1 || model_traits<Model>.adds_levels,
+                "esokit: a cascade takes a model whose disturbance has rows of its own: without "
+                "known plant poles, actuator or sensor");
+
  public:
   using Chain = ScaledChain<Order, S, Extension>;  ///< the sampled chain, in its scaling
   using PlantModel = Model;                        ///< what is known of the plant
@@ -179,10 +183,11 @@ class PredictorCorrector {
   template <int Row>
   [[nodiscard]] ESOKIT_INLINE constexpr S scaled_estimate() const noexcept {
     static_assert(Row >= 0 && Row < size, "esokit: no such estimate");
-    S sum = std::get<Row>(std::get<Levels - 1>(states_));
+    constexpr int state = Model::state_of_row(Row);
+    S sum = std::get<state>(std::get<Levels - 1>(states_));
     if constexpr (Row >= Order) {
       detail::unroll<Levels - 1>(
-          [&](auto i) ESOKIT_INLINE_LAMBDA { sum = sum + std::get<Row>(std::get<i>(states_)); });
+          [&](auto i) ESOKIT_INLINE_LAMBDA { sum = sum + std::get<state>(std::get<i>(states_)); });
     }
     return sum;
   }
@@ -199,6 +204,11 @@ class PredictorCorrector {
 
   /// dhat, unit of y^(n).
   [[nodiscard]] constexpr S total_disturbance() const noexcept { return estimate<Order>(); }
+
+  /// What the next measurement is expected to be.
+  [[nodiscard]] constexpr const S& predicted_measurement() const noexcept {
+    return std::get<0>(states_[0]);
+  }
 
   /// y - z_1 of the last correction, with the predicted z_1 (of level 1).
   [[nodiscard]] constexpr const S& innovation() const noexcept { return innovation_; }
@@ -242,7 +252,7 @@ class PredictorCorrector {
     for (State& state : slope.states) state.fill(S(0.0));
     Correction offset = slope;
     if (due_to_restart()) [[unlikely]] {
-      for (auto& state : slope.states) state[0] = S(1.0);
+      for (auto& state : slope.states) state = standing(S(1.0));
     } else {
       offset.states = states_;
       correct_levels<false>(offset, S(0.0), elapsed());
@@ -332,12 +342,7 @@ class PredictorCorrector {
   }
 
   /// Starts anew at (y, 0, .., 0). A y that is not finite changes nothing and is reported.
-  Status reset(S y) noexcept {
-    State state{};
-    for (S& x : state) x = S(0.0);
-    state[0] = y;
-    return reset_scaled(state);
-  }
+  Status reset(S y) noexcept { return reset_scaled(standing(y)); }
 
   /// Starts anew at a given estimate, N x 1, physical units. A state that is not finite changes
   /// nothing and is reported.
@@ -358,7 +363,8 @@ class PredictorCorrector {
   /// @return as `shift_output`
   constexpr Status shift_disturbance(const S& offset) noexcept {
     LevelStates next = states_;
-    next[0][Order] = next[0][Order] + model_.scaled_disturbance(offset);
+    S& disturbance = next[0][disturbance_state];
+    disturbance = disturbance + model_.scaled_disturbance(offset);
     return shift_to(next);
   }
 
@@ -373,7 +379,8 @@ class PredictorCorrector {
     }
     if (!next.model_.same_drive(model_)) {
       const S explained = (input_gain() - fresh.input_gain()) * applied_input_;
-      next.states_[0][Order] = next.states_[0][Order] + next.model_.scaled_disturbance(explained);
+      S& disturbance = next.states_[0][disturbance_state];
+      disturbance = disturbance + next.model_.scaled_disturbance(explained);
     }
     if (!all(is_finite(next.probe(next.states_)))) {
       return Error<S>{"input_gain", fresh.input_gain(), "would make the estimate not finite"};
@@ -428,6 +435,18 @@ class PredictorCorrector {
 
   using LevelStates = Array<State, Levels>;
   using Plain = detail::PlainTwin<PredictorCorrector, S>;  ///< a lane
+
+  /// Where the total disturbance is.
+  static constexpr auto disturbance_state = static_cast<std::size_t>(Model::state_of_row(Order));
+
+  /// The state of (y, 0, .., 0), as the sensor would show it.
+  [[nodiscard]] static constexpr State standing(const S& y) noexcept {
+    State state{};
+    state.fill(S(0.0));
+    std::get<0>(state) = y;
+    std::get<Model::state_of_row(0)>(state) = y;
+    return state;
+  }
 
   /// A gap that is above every max_gap.
   static constexpr std::uint16_t restart_due = 65535;

@@ -1,0 +1,757 @@
+/// @file
+/// AugmentedModel: plant, actuator, sensor and disturbances put together from what is known of
+/// each.
+#pragma once
+
+#include <cmath>
+#include <esokit/core/check.hpp>
+#include <esokit/core/expected.hpp>
+#include <esokit/core/type_tag.hpp>
+#include <esokit/core/unroll.hpp>
+#include <esokit/math/combinatorics.hpp>
+#include <esokit/math/linear_equations.hpp>
+#include <esokit/math/matrix_exponential.hpp>
+#include <esokit/model/corrected_part.hpp>
+#include <esokit/model/sampled_model.hpp>
+#include <limits>
+
+namespace esokit {
+
+/// What is known of the plant: which parts a model has. Their numbers are in its Settings.
+struct ModelParts {
+  int order = 1;             ///< n: the plant is y^(n) = -a_(n-1) y^(n-1) - .. - a_0 y + d + b0 v
+  bool plant_poles = false;  ///< a_0 .. a_(n-1) are known; false: they are zero, a chain
+  int actuator = 0;          ///< order of the lag from u to v: 0 (v = u), 1 or 2
+  int sensor = 0;            ///< order of the lag from y to what is measured: 0, 1 or 2
+  int constants = 1;         ///< m: the disturbance has m integrators, at least one
+  int resonators = 0;        ///< and so many sines of known frequency
+  int leaky = 0;             ///< and so many that fade, each with a time constant
+};
+
+namespace detail {
+
+/// The order that a law sees: the actuator's lag comes on top.
+constexpr int law_order(const ModelParts& parts) noexcept { return parts.order + parts.actuator; }
+constexpr int model_size(const ModelParts& parts) noexcept {
+  return parts.sensor + law_order(parts) + parts.constants + 2 * parts.resonators + parts.leaky;
+}
+
+/// A state is T^degree / degree! times what it is in physical units.
+constexpr int model_degree(const ModelParts& parts, int state) noexcept {
+  if (state < parts.sensor) return 0;
+  const int row = state - parts.sensor;
+  const int order = law_order(parts);
+  if (row <= order) return row;
+  return row < order + parts.constants ? parts.order + row - order : parts.order;
+}
+constexpr int highest_degree(const ModelParts& parts) noexcept {
+  int highest = 0;
+  for (int i = 0; i < model_size(parts); ++i) {
+    const int degree = model_degree(parts, i);
+    highest = highest < degree ? degree : highest;
+  }
+  return highest;
+}
+
+/// Which elements of Phi - I, and in the last column of Gamma, can differ from zero; and where they
+/// are kept, row by row.
+template <int Size>
+struct ModelPattern {
+  Array<Array<bool, Size + 1>, Size> couples{};
+  Array<Array<int, Size + 1>, Size> place{};
+  int kept = 0;
+};
+
+template <ModelParts Parts>
+constexpr auto make_model_pattern() noexcept {
+  constexpr auto size = static_cast<std::size_t>(model_size(Parts));
+  constexpr auto lf = static_cast<std::size_t>(Parts.sensor);
+  constexpr auto n = static_cast<std::size_t>(Parts.order);
+  constexpr auto la = static_cast<std::size_t>(Parts.actuator);
+  constexpr auto m = static_cast<std::size_t>(Parts.constants);
+  constexpr std::size_t order = n + la;
+  constexpr std::size_t d = lf + order;
+  constexpr std::size_t first_leaky = d + m + 2 * static_cast<std::size_t>(Parts.resonators);
+  ModelPattern<static_cast<int>(size)> all{};
+  auto& p = all.couples;
+  // Of A and B.
+  for (std::size_t i = 0; i < lf; ++i) {
+    for (std::size_t j = 0; j <= lf; ++j) p[i][j] = true;
+  }
+  for (std::size_t r = 0; r < order; ++r) p[lf + r][lf + r + 1] = true;
+  p[d - 1][size] = true;
+  for (std::size_t i = Parts.plant_poles ? 0 : n; i < order; ++i) p[d][lf + i + 1] = true;
+  if (Parts.plant_poles || la > 0) p[d][size] = true;
+  for (std::size_t j = d + 1; j < size; ++j) p[d][j] = j >= d + m || j <= d + la + 1;
+  for (std::size_t i = 1; i + 1 < m; ++i) p[d + i][d + i + 1] = true;
+  for (std::size_t q = d + m; q < first_leaky; q += 2) {
+    p[q][q] = p[q][q + 1] = p[q + 1][q] = p[q + 1][q + 1] = true;
+  }
+  for (std::size_t j = first_leaky; j < size; ++j) p[j][j] = true;
+  // Of their powers.
+  for (std::size_t k = 0; k < size; ++k) {
+    for (std::size_t i = 0; i < size; ++i) {
+      for (std::size_t j = 0; j <= size; ++j) p[i][j] = p[i][j] || (p[i][k] && p[k][j]);
+    }
+  }
+  for (std::size_t i = 0; i < size; ++i) {
+    for (std::size_t j = 0; j <= size; ++j) {
+      all.place[i][j] = all.kept;
+      if (p[i][j]) ++all.kept;
+    }
+  }
+  return all;
+}
+template <ModelParts Parts>
+inline constexpr auto model_pattern = make_model_pattern<Parts>();
+
+/// a! / b!.
+template <PlainScalar S>
+constexpr S factorial_ratio(int a, int b) noexcept {
+  S ratio(1);
+  for (int j = b + 1; j <= a; ++j) ratio = ratio * static_cast<S>(j);
+  for (int j = a + 1; j <= b; ++j) ratio = ratio / static_cast<S>(j);
+  return ratio;
+}
+
+}  // namespace detail
+
+/// A lag by which an actuator or a sensor follows; of order 0 nothing.
+template <int Order, PlainScalar S>
+struct Lag {};
+
+/// tau v' = u - v.
+template <PlainScalar S>
+struct Lag<1, S> {
+  S time_constant{};  ///< tau, s
+};
+
+/// v'' = w^2 (u - v) - 2 zeta w v'.
+template <PlainScalar S>
+struct Lag<2, S> {
+  S frequency{};  ///< w, rad/s
+  S damping = 1;  ///< zeta; 1: two equal time constants 1 / w
+
+  /// Of two time constants, s.
+  static Lag of_time_constants(const S& first, const S& second) noexcept {
+    const S root = std::sqrt(first * second);
+    return {S(1) / root, (first + second) / (S(2) * root)};
+  }
+};
+
+/// A disturbance that swings at a known frequency.
+template <PlainScalar S>
+struct Resonance {
+  S frequency{};          ///< w0, rad/s
+  S damping = 0;          ///< of the swing, 0 up to 1
+  S capture_bandwidth{};  ///< s, rad/s: its poles go to -s +- j w0. Left out: w0. More captures it
+                          ///< faster, and with more error in its frequency, at more noise
+};
+
+/// Plant, actuator, sensor and disturbance as one model, sampled exactly:
+///
+///     plant      y^(n) = -a_(n-1) y^(n-1) - .. - a_0 y + d + b0 v
+///     actuator   v follows u by a lag
+///     sensor     what is measured follows y by a lag
+///     d          a constant (or polynomial), sines, and what fades
+///
+/// With an actuator the model is of order n + its order, as the law has to be: y^(n+1) = D + b u
+/// with b = b0 / tau. `estimate` has (y, .., y^(order-1), D, ..), D all that a law cancels, so that
+/// any law works with it and omega_c keeps its meaning; then d', .. of more than one integrator,
+/// each sine q with q' / w, what fades, and last what is measured (with a sensor of order 2 its
+/// derivative / w).
+///
+/// Poles: the actuator is simulated from u alone and never corrected, its poles stay its own; a
+/// sensor that is faster than omega_o keeps its own too; those of a sine go to -s +- j w0; all
+/// others to exp(-omega_o T).
+template <ModelParts Parts, PlainScalar S = double>
+class AugmentedModel {
+  static constexpr int n = Parts.order;
+  static constexpr int la = Parts.actuator;
+  static constexpr int lf = Parts.sensor;
+  static constexpr int m = Parts.constants;
+  static_assert(n >= 1, "esokit: the plant order must be at least 1");
+  static_assert(m >= 1, "esokit: at least one extended state is needed");
+  static_assert(la >= 0 && la <= 2 && lf >= 0 && lf <= 2, "esokit: a lag has order 0, 1 or 2");
+  static_assert(Parts.resonators >= 0 && Parts.leaky >= 0, "esokit: a number of parts below zero");
+
+ public:
+  static constexpr ModelParts parts = Parts;              ///< what is known
+  static constexpr int order = detail::law_order(Parts);  ///< of the law
+  static constexpr int size = detail::model_size(Parts);  ///< N
+  static constexpr int extension = size - order;          ///< all beside the plant's rows
+  static constexpr int measured_rows = lf;                ///< of the sensor, see SampledModel
+
+  /// What it is.
+  static constexpr ModelTraits traits{
+      .shifts_output = !Parts.plant_poles && lf == 0,
+      .adds_levels = !Parts.plant_poles && lf == 0 && la == 0,
+      .corrects_part = true,
+  };
+
+  using State = Array<S, size>;      ///< x, scaled, N elements
+  using Estimate = Vector<S, size>;  ///< z, physical units, N x 1
+  template <class T>
+  using with_scalar = AugmentedModel<Parts, T>;  ///< the same of another scalar
+
+  /// The numbers of the parts, in this order; those of a part that is not there are empty.
+  struct Settings {
+    Array<S, Parts.plant_poles ? n : 0> plant{};         ///< a_0 .. a_(n-1), 1/s^(n-i)
+    Lag<la, S> actuator{};                               ///< from u to v
+    Lag<lf, S> sensor{};                                 ///< from y to what is measured
+    Array<Resonance<S>, Parts.resonators> resonators{};  ///< the sines
+    Array<S, Parts.leaky> leaky{};                       ///< time constants of what fades, s
+  };
+
+  /// Checks the settings and samples the model.
+  /// @param settings what is known @param input_gain b0, unit of y^(n) per unit of v
+  /// @param sample_time T, s; both checked
+  /// @return the model, or an error that names the field
+  static Expected<AugmentedModel, Error<S>> make(const Settings& settings, const S& input_gain,
+                                                 const S& sample_time) {
+    Rules<S> rules;
+    rules.all_of(check(settings, sample_time));
+    if (!rules) return rules.error();
+    const AugmentedModel model(settings, input_gain, sample_time);
+    rules.representable("input_gain", input_gain, model.scaled_input_gain_,
+                        "with this model gives a gain that the scalar cannot hold");
+    for (const S& x : model.step_) {
+      rules.require(is_finite(x), "model", x, "gives a transition that the scalar cannot hold");
+    }
+    if (!rules) return rules.error();
+    return model;
+  }
+
+  /// b: y^(order) = D + b u. b0, as it was given, where the actuator has no lag.
+  [[nodiscard]] constexpr const S& input_gain() const noexcept { return input_gain_; }
+  /// T, s, as it was given.
+  [[nodiscard]] constexpr const S& sample_time() const noexcept { return sample_time_; }
+  /// As they were given.
+  [[nodiscard]] constexpr const Settings& settings() const noexcept { return settings_; }
+
+  /// What drives a step: u.
+  [[nodiscard]] ESOKIT_INLINE constexpr S drive(const S& u) const noexcept { return u; }
+
+  /// u, and the disturbance that the levels before have found.
+  struct Joined {
+    S u;                              ///< as `drive`
+    Array<S, extension> disturbance;  ///< rows from `order` on
+  };
+  /// The same with the disturbance of x: what drives the next level of a cascade.
+  /// @{
+  [[nodiscard]] ESOKIT_INLINE static constexpr Joined joined(const S& drive,
+                                                             const State& x) noexcept {
+    return joined(Joined{drive, {}}, x);
+  }
+  [[nodiscard]] ESOKIT_INLINE static constexpr Joined joined(Joined drive,
+                                                             const State& x) noexcept {
+    detail::unroll<extension>([&](auto r) ESOKIT_INLINE_LAMBDA {
+      std::get<r>(drive.disturbance) = std::get<r>(drive.disturbance) + std::get<order + r>(x);
+    });
+    return drive;
+  }
+  /// @}
+
+  /// x one sample ahead: Phi x + Gamma u; what is zero of Phi - I whatever the numbers is left out.
+  [[nodiscard]] ESOKIT_INLINE constexpr State predict(const State& x, const S& u) const noexcept {
+    State next = x;
+    detail::unroll<size>([&](auto i) ESOKIT_INLINE_LAMBDA {
+      S sum = std::get<i>(x);
+      detail::unroll<size>([&](auto j) ESOKIT_INLINE_LAMBDA {
+        if constexpr (couples(i, j)) sum = sum + std::get<place(i, j)>(step_) * std::get<j>(x);
+      });
+      if constexpr (couples(i, size)) sum = sum + std::get<place(i, size)>(step_) * u;
+      std::get<i>(next) = sum;
+    });
+    return next;
+  }
+  /// The same for a level of a cascade: what it is driven by acts on the plant and is not its own.
+  [[nodiscard]] ESOKIT_INLINE constexpr State predict(const State& x,
+                                                      const Joined& drive) const noexcept {
+    State all = x;
+    detail::unroll<extension>([&](auto r) ESOKIT_INLINE_LAMBDA {
+      std::get<order + r>(all) = std::get<order + r>(all) + std::get<r>(drive.disturbance);
+    });
+    const State plant = predict(all, drive.u);
+    State next = predict(x, S(0));
+    detail::unroll<order>([&](auto r)
+                              ESOKIT_INLINE_LAMBDA { std::get<r>(next) = std::get<r>(plant); });
+    return next;
+  }
+
+  /// x + Gamma u.
+  [[nodiscard]] ESOKIT_INLINE constexpr State add_input(const State& x, const S& u) const noexcept {
+    State sum = x;
+    detail::unroll<size>([&](auto i) ESOKIT_INLINE_LAMBDA {
+      if constexpr (couples(i, size)) {
+        std::get<i>(sum) = std::get<i>(sum) + std::get<place(i, size)>(step_) * u;
+      }
+    });
+    return sum;
+  }
+
+  /// Where row `row` of the estimate is among the states: those of the sensor come first.
+  [[nodiscard]] static constexpr int state_of_row(int row) noexcept {
+    return row + lf < size ? row + lf : row + lf - size;
+  }
+
+  /// The estimates in physical units.
+  [[nodiscard]] constexpr Estimate physical(const State& x) const noexcept {
+    Estimate z;
+    detail::unroll<size>([&](auto row) { z(int{row}) = physical<row>(x); });
+    return z;
+  }
+  /// One of them.
+  template <int Row>
+  [[nodiscard]] ESOKIT_INLINE constexpr S physical(const State& x) const noexcept {
+    constexpr int state = state_of_row(Row);
+    S value = std::get<state>(x);
+    // In steps: T^-degree itself may not fit the scalar where the estimate does.
+    detail::unroll<degree(state)>([&](auto j) ESOKIT_INLINE_LAMBDA {
+      constexpr double weight = degree(state) - j;
+      value = value * (detail::constant<S>(weight) * rate_);
+    });
+    return value;
+  }
+  /// The state from estimates in physical units.
+  [[nodiscard]] constexpr State scaled(const Estimate& z) const noexcept {
+    State x{};
+    for (int row = 0; row < size; ++row) {
+      const int state = state_of_row(row);
+      S value = z(row);
+      for (int j = 1; j <= degree(state); ++j) value = value * (sample_time_ / static_cast<S>(j));
+      x[static_cast<std::size_t>(state)] = value;
+    }
+    return x;
+  }
+  /// D as it is scaled in the state. @param disturbance unit of y^(order)
+  [[nodiscard]] constexpr S scaled_disturbance(const S& disturbance) const noexcept {
+    S value = disturbance;
+    for (int j = 1; j <= order; ++j) value = value * (sample_time_ / static_cast<S>(j));
+    return value;
+  }
+
+  /// A number that is finite only if all estimates are.
+  [[nodiscard]] ESOKIT_INLINE constexpr S finite_probe(const State& x) const noexcept {
+    constexpr int highest = detail::highest_degree(Parts);
+    S probe(0);
+    detail::unroll<highest + 1>([&](auto k) ESOKIT_INLINE_LAMBDA {
+      constexpr int now = highest - k;
+      if constexpr (now < highest) {
+        constexpr double weight = now + 1;
+        probe = probe * (detail::constant<S>(weight) * rate_);
+      }
+      detail::unroll<size>([&](auto i) ESOKIT_INLINE_LAMBDA {
+        if constexpr (degree(i) == now) probe = probe + detail::absolute(std::get<i>(x));
+      });
+    });
+    return probe;
+  }
+
+  /// A state of the model `before` as the same estimate of this one.
+  [[nodiscard]] constexpr State rescaled(const State& x,
+                                         const AugmentedModel& before) const noexcept {
+    if (!(sample_time_ < before.sample_time_) && !(sample_time_ > before.sample_time_)) return x;
+    return scaled(before.physical(x));
+  }
+
+  /// The estimate of a plant that stands at y under u.
+  [[nodiscard]] constexpr Estimate rest(const S& y, const S& u) const noexcept {
+    Estimate z = Estimate::Zero();
+    z(0) = y;
+    z(order) = -(input_gain_ * u);
+    if constexpr (lf > 0) z(size - lf) = y;
+    return z;
+  }
+
+  /// Phi - I.
+  [[nodiscard]] constexpr Matrix<S, size, size> increment() const noexcept {
+    Matrix<S, size, size> step = Matrix<S, size, size>::Zero();
+    for (int i = 0; i < size; ++i) {
+      for (int j = 0; j < size; ++j) {
+        if (couples(i, j)) step(i, j) = step_[static_cast<std::size_t>(place(i, j))];
+      }
+    }
+    return step;
+  }
+  /// A state is T^degree / degree! times what it is in physical units.
+  [[nodiscard]] static constexpr int degree(int state) noexcept {
+    return detail::model_degree(Parts, state);
+  }
+
+  /// True if u does the same in both.
+  [[nodiscard]] constexpr bool same_drive(const AugmentedModel& other) const noexcept {
+    const S change = detail::absolute(S(scaled_input_gain_ - other.scaled_input_gain_)) +
+                     detail::absolute(S(rate_ - other.rate_));
+    return !(change > S(0));
+  }
+
+  /// @name The parts of an estimate
+  /// @{
+  /// What is measured, as the sensor would show y.
+  [[nodiscard]] static constexpr S measured(const Estimate& z) noexcept {
+    return z(lf > 0 ? size - lf : 0);
+  }
+  /// A sine by its size and where it is: q = amplitude sin(phase).
+  struct Swing {
+    S amplitude;  ///< unit of y^(n)
+    S phase;      ///< rad
+  };
+  /// The sine of a resonator. @param resonator 0 .. k - 1
+  [[nodiscard]] static Swing swing(const Estimate& z, int resonator) noexcept
+      requires(Parts.resonators > 0) {
+    const S q = z(order + m + 2 * resonator);
+    const S r = z(order + m + 2 * resonator + 1);
+    return {std::hypot(q, r), std::atan2(q, r)};
+  }
+  /// What fades. @param part 0 .. l - 1
+  [[nodiscard]] static constexpr S fading(const Estimate& z, int part) noexcept
+      requires(Parts.leaky > 0) {
+    return z(order + m + 2 * Parts.resonators + part);
+  }
+  /// The constant part of d, unit of y^(n): what is left of D without the plant, the actuator and
+  /// the other parts.
+  [[nodiscard]] S constant(const Estimate& z) const noexcept {
+    const auto x = scaled(z);
+    const auto lag = scaled_lag(settings_.actuator, sample_time_);
+    const auto alpha = denominator(settings_, sample_time_);
+    const auto found = detail::factorial_ratio<S>(order, n);
+    // act(s) d = D + sum_i alpha_i y^(i), in units of T^n / n!.
+    S sum = x[lf + order] * found;
+    for (int i = 0; i < order; ++i) {
+      sum = sum + alpha[static_cast<std::size_t>(i)] * x[static_cast<std::size_t>(lf + i)] *
+                      detail::factorial_ratio<S>(i, n);
+    }
+    const auto others = others_filtered(settings_, sample_time_, 0);
+    for (int j = lf + order + 1; j < size; ++j) {
+      sum = sum - others[static_cast<std::size_t>(j)] * x[static_cast<std::size_t>(j)];
+    }
+    sum = sum / lag[0];
+    for (int j = n; j > 0; --j) sum = sum * (static_cast<S>(j) * rate_);
+    return sum;
+  }
+  /// @}
+
+  /// Calls `design(part)` with the CorrectedPart and returns what it returns.
+  /// @param bandwidth omega_o, rad/s: a sensor that is faster keeps its own poles
+  template <class Design>
+  auto with_corrected_part(const S& bandwidth, const Design& design) const {
+    if constexpr (lf > 0) {
+      if (sensor_rate(settings_.sensor) > bandwidth) {
+        return design(corrected_part<without(true, true)>());
+      }
+    }
+    return design(corrected_part<without(true, false)>());
+  }
+
+ private:
+  template <ModelParts Other, PlainScalar T>
+  friend class AugmentedModel;
+
+  static constexpr ModelParts without(bool actuator, bool sensor) noexcept {
+    ModelParts less = Parts;
+    if (actuator) less.actuator = 0;
+    if (sensor) less.sensor = 0;
+    return less;
+  }
+
+  static constexpr const auto& pattern = detail::model_pattern<Parts>;
+  static constexpr bool couples(int i, int j) noexcept {
+    return pattern.couples[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
+  }
+  static constexpr int place(int i, int j) noexcept {
+    return pattern.place[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
+  }
+
+  // ---- The rates, in units of T and of the scaled states.
+
+  static constexpr S number(int i) noexcept { return static_cast<S>(i); }
+
+  /// T^l times a_0 .. a_(l-1) of the lag's denominator s^l + .., and one.
+  /// @{
+  static Array<S, 1> scaled_lag(const Lag<0, S>&, const S&) noexcept { return {S(1)}; }
+  static Array<S, 2> scaled_lag(const Lag<1, S>& lag, const S& time) noexcept {
+    return {time / lag.time_constant, S(1)};
+  }
+  static Array<S, 3> scaled_lag(const Lag<2, S>& lag, const S& time) noexcept {
+    const S angle = lag.frequency * time;
+    return {angle * angle, S(2) * lag.damping * angle, S(1)};
+  }
+  /// @}
+  static S sensor_rate(const Lag<1, S>& lag) noexcept { return S(1) / lag.time_constant; }
+  static S sensor_rate(const Lag<2, S>& lag) noexcept { return lag.frequency; }
+
+  /// T^(order-i) alpha_i of plant times actuator, s^order + sum_i alpha_i s^i.
+  static Array<S, order + 1> denominator(const Settings& settings, const S& time) noexcept {
+    Array<S, order + 1> alpha{};
+    const auto lag = scaled_lag(settings.actuator, time);
+    for (std::size_t j = 0; j < lag.size(); ++j) alpha[n + j] = lag[j];
+    if constexpr (Parts.plant_poles) {
+      S power = time;
+      for (int i = n - 1; i >= 0; --i) {
+        const S a = settings.plant[static_cast<std::size_t>(i)] * power;
+        for (std::size_t j = 0; j < lag.size(); ++j) {
+          S& sum = alpha[static_cast<std::size_t>(i) + j];
+          sum = sum + a * lag[j];
+        }
+        power = power * time;
+      }
+    }
+    return alpha;
+  }
+
+  /// act(s) s^derivative of d without its constant, as a row over the states, in units of T^n / n!.
+  static State others_filtered(const Settings& settings, const S& time, int derivative) noexcept {
+    State row{};
+    row.fill(S(0));
+    const auto lag = scaled_lag(settings.actuator, time);
+    const int d = lf + order;
+    for (int k = 0; k <= la; ++k) {
+      const int i = k + derivative;  // d^(i)
+      if (i >= 1 && i < m) {
+        row[static_cast<std::size_t>(d + i)] =
+            lag[static_cast<std::size_t>(k)] * detail::factorial_ratio<S>(n + i, n);
+      }
+    }
+    for (int c = 0; c < Parts.resonators; ++c) {
+      const auto& resonance = settings.resonators[static_cast<std::size_t>(c)];
+      const S w = resonance.frequency * time;
+      S q(1);
+      S r(0);
+      for (int k = 0; k <= la + derivative; ++k) {
+        if (k >= derivative) {
+          const S weight = lag[static_cast<std::size_t>(k - derivative)];
+          S& of_q = row[static_cast<std::size_t>(d + m + 2 * c)];
+          S& of_r = row[static_cast<std::size_t>(d + m + 2 * c + 1)];
+          of_q = of_q + weight * q;
+          of_r = of_r + weight * r;
+        }
+        const S next_r = w * q - S(2) * resonance.damping * w * r;
+        q = -(w * r);
+        r = next_r;
+      }
+    }
+    for (int c = 0; c < Parts.leaky; ++c) {
+      const S rate = -time / settings.leaky[static_cast<std::size_t>(c)];
+      S power(1);
+      for (int k = 0; k <= la + derivative; ++k) {
+        if (k >= derivative) {
+          S& of_it = row[static_cast<std::size_t>(d + m + 2 * Parts.resonators + c)];
+          of_it = of_it + lag[static_cast<std::size_t>(k - derivative)] * power;
+        }
+        power = power * rate;
+      }
+    }
+    return row;
+  }
+
+  /// T A, and in the last column T B of a u whose scaled effect b T^order / order! is one.
+  static Matrix<S, size + 1, size + 1> rates(const Settings& settings, const S& time) noexcept {
+    auto a = Matrix<S, size + 1, size + 1>::Zero();
+    if constexpr (lf > 0) {
+      const auto lag = scaled_lag(settings.sensor, time);
+      if constexpr (lf == 1) {
+        a(0, 0) = -lag[0];
+        a(0, 1) = lag[0];
+      } else {
+        const S angle = settings.sensor.frequency * time;
+        a(0, 1) = angle;
+        a(1, 0) = -angle;
+        a(1, 1) = -lag[1];
+        a(1, 2) = angle;
+      }
+    }
+    const int d = lf + order;
+    for (int r = 0; r < order; ++r) a(lf + r, lf + r + 1) = number(r + 1);
+    a(d - 1, size) = number(order);
+    const auto alpha = denominator(settings, time);
+    for (int i = 0; i < order; ++i) {
+      a(d, lf + i + 1) =
+          -alpha[static_cast<std::size_t>(i)] * detail::factorial_ratio<S>(i + 1, order);
+    }
+    a(d, size) = -alpha[order - 1];
+    const State others = others_filtered(settings, time, 1);
+    for (int j = d + 1; j < size; ++j)
+      a(d, j) = others[static_cast<std::size_t>(j)] * detail::factorial_ratio<S>(n, order);
+    for (int i = 1; i + 1 < m; ++i) a(d + i, d + i + 1) = number(n + i + 1);
+    for (int c = 0; c < Parts.resonators; ++c) {
+      const auto& resonance = settings.resonators[static_cast<std::size_t>(c)];
+      const S w = resonance.frequency * time;
+      const int q = d + m + 2 * c;
+      a(q, q + 1) = w;
+      a(q + 1, q) = -w;
+      a(q + 1, q + 1) = S(-2) * resonance.damping * w;
+    }
+    for (int c = 0; c < Parts.leaky; ++c) {
+      const int j = d + m + 2 * Parts.resonators + c;
+      a(j, j) = -time / settings.leaky[static_cast<std::size_t>(c)];
+    }
+    return a;
+  }
+
+  // ---- Rules.
+
+  static void check_lag(Rules<S>&, const char*, const char*, const Lag<0, S>&, const S&) {}
+  static void check_lag(Rules<S>& rules, const char* field, const char*, const Lag<1, S>& lag,
+                        const S& time) {
+    rules.positive(field, lag.time_constant)
+        .require(lag.time_constant * S(100) >= time, field, lag.time_constant,
+                 "must be at least a hundredth of sample_time");
+  }
+  static void check_lag(Rules<S>& rules, const char* field, const char* damping,
+                        const Lag<2, S>& lag, const S& time) {
+    rules.positive(field, lag.frequency)
+        .positive(damping, lag.damping)
+        .require(lag.frequency * time <= S(100), field, lag.frequency,
+                 "must be at most a hundred times the sample rate")
+        .require(lag.damping * lag.frequency * time <= S(100), damping, lag.damping,
+                 "gives a time constant below a hundredth of sample_time");
+  }
+
+  static Check<S> check(const Settings& settings, const S& time) {
+    Rules<S> rules;
+    rules.finite("model.plant", settings.plant);
+    check_lag(rules, la == 1 ? "model.actuator.time_constant" : "model.actuator.frequency",
+              "model.actuator.damping", settings.actuator, time);
+    check_lag(rules, lf == 1 ? "model.sensor.time_constant" : "model.sensor.frequency",
+              "model.sensor.damping", settings.sensor, time);
+    for (int c = 0; c < Parts.resonators; ++c) {
+      const auto& resonance = settings.resonators[static_cast<std::size_t>(c)];
+      rules.positive("model.resonators.frequency", resonance.frequency, c)
+          .require(resonance.frequency * time < S(3.1), "model.resonators.frequency",
+                   resonance.frequency, "must be below half the sample rate", c)
+          .require(
+              is_finite(resonance.damping) && resonance.damping >= S(0) && resonance.damping < S(1),
+              "model.resonators.damping", resonance.damping, "must be 0 or above, below 1", c)
+          .not_negative("model.resonators.capture_bandwidth", resonance.capture_bandwidth, c);
+      for (int before = 0; before < c; ++before) {
+        const S& other = settings.resonators[static_cast<std::size_t>(before)].frequency;
+        rules.require(
+            detail::absolute(S(resonance.frequency - other)) > S(1e-3) * resonance.frequency,
+            {"model.resonators.frequency", resonance.frequency,
+             "must differ by a thousandth of itself from", c, other, true});
+      }
+    }
+    for (int c = 0; c < Parts.leaky; ++c) {
+      const S& tau = settings.leaky[static_cast<std::size_t>(c)];
+      rules.positive("model.leaky", tau, c)
+          .require(tau * S(100) >= time, "model.leaky", tau,
+                   "must be at least a hundredth of sample_time", c);
+      for (int before = 0; before < c; ++before) {
+        const S& other = settings.leaky[static_cast<std::size_t>(before)];
+        rules.require(
+            detail::absolute(S(tau - other)) > S(1e-3) * tau,
+            {"model.leaky", tau, "must differ by a thousandth of itself from", c, other, true});
+      }
+    }
+    return rules;
+  }
+
+  // ---- What is corrected.
+
+  template <ModelParts Less>
+  auto corrected_part() const {
+    using Part = AugmentedModel<Less, S>;
+    constexpr int part_size = Part::size;
+    constexpr int part_lf = Part::lf;
+    constexpr int part_d = part_lf + n;
+    typename Part::Settings less{};
+    less.plant = settings_.plant;
+    if constexpr (part_lf > 0) less.sensor = settings_.sensor;
+    less.resonators = settings_.resonators;
+    less.leaky = settings_.leaky;
+    const auto with_input = Part::rates(less, sample_time_);
+    Matrix<S, part_size, part_size> rates;
+    for (int i = 0; i < part_size; ++i) {
+      for (int j = 0; j < part_size; ++j) rates(i, j) = with_input(i, j);
+    }
+
+    CorrectedPart<part_size, size, Parts.resonators, S> part;
+    part.step = detail::exp_minus_identity(rates);
+    for (int i = 0; i < part_size; ++i) part.degrees[static_cast<std::size_t>(i)] = Part::degree(i);
+    part.output.fill(S(0));
+    part.whole = Matrix<S, size, part_size>::Zero();
+    // The actuator's error is zero and stays it: u and v drop out of y^(n), y^(n+1), ..
+    RowVector<S, part_size> derivative = RowVector<S, part_size>::Zero();
+    derivative(part_d) = S(1);
+    for (int r = 0; r < n; ++r) part.whole(lf + r, part_lf + r) = S(1);
+    for (int r = n; r <= order; ++r) {
+      for (int j = 0; j < part_size; ++j) part.whole(lf + r, j) = derivative(j);
+      derivative = derivative * rates / number(r + 1);
+    }
+    for (int i = 1; i < extension - lf; ++i) part.whole(lf + order + i, part_d + i) = S(1);
+    if constexpr (part_lf == lf) {
+      part.output[0] = S(1);
+      for (int i = 0; i < lf; ++i) part.whole(i, i) = S(1);
+    } else {
+      // The sensor's error is what it makes of the others': f = g x with g A + rate g = rate C.
+      const auto lag = scaled_lag(settings_.sensor, sample_time_);
+      Matrix<S, part_size, part_size> shows = Matrix<S, part_size, part_size>::Identity();
+      if constexpr (lf == 1) {
+        shows += rates / lag[0];
+      } else {
+        shows += rates * (lag[1] / lag[0]) + rates * rates / lag[0];
+      }
+      auto transposed = shows.transpose();
+      part.output[0] = S(1);
+      detail::solve_in_place(detail::DenseView<S>{transposed.data(), part_size},
+                             detail::DenseView<S>{part.output.data(), part_size, 1});
+      RowVector<S, part_size> shown;
+      for (int j = 0; j < part_size; ++j) {
+        shown(j) = part.output[static_cast<std::size_t>(j)];
+        part.whole(0, j) = shown(j);
+      }
+      if constexpr (lf == 2) {
+        const RowVector<S, part_size> slope =
+            shown * rates / (settings_.sensor.frequency * sample_time_);
+        for (int j = 0; j < part_size; ++j) part.whole(1, j) = slope(j);
+      }
+    }
+    for (std::size_t c = 0; c < Parts.resonators; ++c) {
+      const auto& resonance = settings_.resonators[c];
+      const bool given = resonance.capture_bandwidth > S(0);
+      part.pairs[c] = {-(given ? resonance.capture_bandwidth : resonance.frequency),
+                       resonance.frequency};
+    }
+    return part;
+  }
+
+  AugmentedModel(const Settings& settings, const S& input_gain, const S& sample_time) noexcept
+      : settings_(settings),
+        rate_(S(1) / sample_time),
+        input_gain_(input_gain),
+        sample_time_(sample_time) {
+    const auto lag = scaled_lag(settings.actuator, sample_time);
+    if constexpr (la > 0) {
+      input_gain_ = input_gain_ * lag[0];
+      for (int i = 0; i < la; ++i) input_gain_ = input_gain_ * rate_;
+    }
+    scaled_input_gain_ = input_gain * lag[0];
+    for (int j = 1; j <= order; ++j) {
+      scaled_input_gain_ = scaled_input_gain_ * (j <= n ? sample_time : S(1)) / number(j);
+    }
+    const auto all = detail::exp_minus_identity(rates(settings, sample_time));
+    for (int i = 0; i < size; ++i) {
+      for (int j = 0; j <= size; ++j) {
+        if (!couples(i, j)) continue;
+        step_[static_cast<std::size_t>(place(i, j))] =
+            j < size ? all(i, j) : all(i, j) * scaled_input_gain_;
+      }
+    }
+  }
+
+  Array<S, pattern.kept> step_{};  ///< Phi - I and Gamma, what is not zero
+  Settings settings_;
+  S rate_;  ///< 1/T
+  S input_gain_;
+  S sample_time_;
+  S scaled_input_gain_{};  ///< b T^order / order!
+};
+
+/// Told apart in snapshots.
+template <ModelParts Parts, PlainScalar S>
+inline constexpr std::uint32_t type_tag<AugmentedModel<Parts, S>> =
+    make_type_tag<S>("AugmentedModel", Parts.order, Parts.plant_poles, Parts.actuator, Parts.sensor,
+                     Parts.constants, Parts.resonators, Parts.leaky);
+
+}  // namespace esokit

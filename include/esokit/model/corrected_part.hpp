@@ -1,0 +1,42 @@
+/// @file
+/// What of a model a measurement corrects, for the design of its gain.
+#pragma once
+
+#include <esokit/core/matrix.hpp>
+#include <esokit/core/scalar.hpp>
+
+namespace esokit {
+
+/// A part of a model that is observed by itself, and what its correction is to the whole: what a
+/// model that declares `ModelTraits::corrects_part` gives the design of a gain.
+///
+/// What is known and stable need not be corrected: an actuator is simulated from u.
+/// @tparam Size states of the part @tparam Whole states of the model @tparam Pairs poles that the
+/// model places itself
+template <int Size, int Whole, int Pairs, Scalar S>
+struct CorrectedPart {
+  static constexpr int size = Size;        ///< states of the part
+  static constexpr int own_pairs = Pairs;  ///< poles that the model places
+
+  Matrix<S, Size, Size> step;         ///< Phi - I, scaled as the states of a model are
+  Array<S, Size> output{};            ///< C: what of the measurement the states are
+  Array<int, Size> degrees{};         ///< see SampledModel: a state is smaller by a^degree
+  Matrix<S, Whole, Size> whole;       ///< takes a correction of the part to that of the model
+  Array<Array<S, 2>, Pairs> pairs{};  ///< real and imaginary part of a pair of poles, 1/s
+};
+
+/// All of a model is corrected, and the placement places all poles.
+template <class Model>
+auto corrected_whole(const Model& model) {
+  constexpr int size = Model::size;
+  using S = std::remove_cvref_t<decltype(model.sample_time())>;
+  CorrectedPart<size, size, 0, S> all;
+  all.step = model.increment();
+  all.output.fill(S(0.0));
+  all.output[0] = S(1.0);
+  for (int i = 0; i < size; ++i) all.degrees[static_cast<std::size_t>(i)] = model.degree(i);
+  all.whole = Matrix<S, size, size>::Identity();
+  return all;
+}
+
+}  // namespace esokit
