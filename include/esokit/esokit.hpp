@@ -81,6 +81,11 @@
 #include <esokit/gain/step_status.hpp>
 #include <esokit/gain/switched_gain.hpp>
 #include <esokit/gain/switching_certificate.hpp>
+#include <esokit/identify/fit.hpp>
+#include <esokit/identify/identify.hpp>
+#include <esokit/identify/intervals.hpp>
+#include <esokit/identify/log.hpp>
+#include <esokit/identify/plateau.hpp>
 #include <esokit/math/combinatorics.hpp>
 #include <esokit/math/fal.hpp>
 #include <esokit/math/linear_equations.hpp>

@@ -1,0 +1,551 @@
+/// @file
+/// The innovations fit: a chain of integrators behind a lag and a dead time, from a log.
+///
+///     y^(n) + a y^(n-1) = b0 v(t - L) + sum_j theta_j r_j + d,   tau v' + v = u,   d^(m) = noise
+///
+/// For given bandwidth w (disturbance over noise), tau, L and a the innovations of the Kalman
+/// filter of this model are linear in b0 and theta, which therefore come in closed form; w, L +
+/// tau, tau's share and a by Levenberg and Marquardt on the innovations. In steady state the
+/// likelihood is largest where the mean square of the innovations is least (Ljung, System
+/// Identification, 2nd ed., sec. 7.4). The filter starts from a diffuse state, at the first row and
+/// after each gap.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <esokit/math/linear_equations.hpp>
+#include <esokit/math/matrix_exponential.hpp>
+#include <limits>
+#include <span>
+#include <vector>
+
+namespace esokit {
+
+/// Rows at one sample time, as the fit takes them.
+struct FitData {
+  double sample_time = 0.0;            ///< T, s
+  std::vector<double> u;               ///< input, held from its row to the next
+  std::vector<double> y;               ///< output, measured at its row
+  std::vector<std::size_t> starts{0};  ///< first rows of pieces without a gap
+  /// What acts where the disturbance acts, each as long as y: friction, a load that is known.
+  std::vector<std::vector<double>> columns{};
+  int averaged =
+      1;  ///< rows of the log in each of these; above 1 the input goes straight between them
+};
+
+/// Which model is fitted.
+struct FitModel {
+  int order = 2;      ///< n, 1 to 3
+  int extension = 1;  ///< m, 1 or 2
+  bool pole = true;   ///< whether a may differ from zero
+};
+
+/// The parameters in which the innovations are not linear.
+struct FitPoint {
+  double bandwidth =
+      0.0;  ///< w, rad/s: w^(2 (n + m)) is the disturbance's intensity over the noise's
+  double latency = 0.0;    ///< tau + L, s
+  double lag_share = 0.5;  ///< tau / (tau + L)
+  double pole = 0.0;       ///< a, 1/s
+
+  [[nodiscard]] double lag() const { return latency * lag_share; }                ///< tau, s
+  [[nodiscard]] double dead_time() const { return latency * (1.0 - lag_share); }  ///< L, s
+};
+
+/// A fitted model.
+struct Fit {
+  FitPoint at{};                 ///< parameters that the innovations are not linear in
+  std::vector<double> linear{};  ///< b0, then one number a column
+  double mean_square = 0.0;      ///< of the innovations, y's unit squared
+  double noise = 0.0;            ///< standard deviation of the measurement noise
+  double disturbance = 0.0;      ///< intensity of d^(m): its increments' variance over time
+  std::size_t rows = 0;          ///< innovations that count
+  bool converged = false;        ///< whether the last step was small
+  [[nodiscard]] double input_gain() const { return linear.empty() ? 0.0 : linear[0]; }  ///< b0
+};
+
+/// Least and largest of what is fitted.
+struct FitBounds {
+  double bandwidth_min = 0.0, bandwidth_max = 0.0;  ///< rad/s
+  double latency_min = 0.0, latency_max = 0.0;      ///< s
+  double pole_latency = 0.5;  ///< largest a (tau + L): beyond, pole and lag swap
+};
+
+namespace detail {
+
+/// Solves the normal equations in place of `right`, with columns scaled to one; a column of zeros
+/// gets zero.
+inline void solve_normal(std::vector<double> matrix, std::vector<double>& right, int n) {
+  std::vector<double> scale(static_cast<std::size_t>(n));
+  const auto at = [n](int i, int j) { return static_cast<std::size_t>(j * n + i); };
+  for (int i = 0; i < n; ++i) {
+    const double diagonal = matrix[at(i, i)];
+    scale[static_cast<std::size_t>(i)] = diagonal > 0.0 ? 1.0 / std::sqrt(diagonal) : 0.0;
+  }
+  for (int j = 0; j < n; ++j) {
+    for (int i = 0; i < n; ++i) {
+      matrix[at(i, j)] *= scale[static_cast<std::size_t>(i)] * scale[static_cast<std::size_t>(j)];
+    }
+    // Two columns that are the same to ten digits share the effect instead of dividing by zero.
+    matrix[at(j, j)] += scale[static_cast<std::size_t>(j)] > 0.0 ? 1e-10 : 1.0;
+    right[static_cast<std::size_t>(j)] *= scale[static_cast<std::size_t>(j)];
+  }
+  solve_in_place<double>({matrix.data(), n}, {right.data(), n, 1});
+  for (int i = 0; i < n; ++i)
+    right[static_cast<std::size_t>(i)] *= scale[static_cast<std::size_t>(i)];
+}
+
+/// The Kalman filter of one point: transition, input weights, gains from a diffuse start on.
+template <int States>
+struct InnovationsFilter {
+  static constexpr int N = States;
+  using Vector = std::array<double, static_cast<std::size_t>(N)>;
+
+  std::array<Vector, static_cast<std::size_t>(N)> phi{};  // [row][column]
+  Vector lag{}, previous{}, current{}, next{};            // from v, u of three rows to x
+  double lag_decay = 0.0, lag_previous = 0.0, lag_current = 0.0, lag_next = 0.0;
+  Vector column{};  // from a column to x
+  std::ptrdiff_t delay = 0;
+  std::vector<Vector> gains{};    // until steady
+  std::vector<double> weights{};  // sqrt(steady variance / variance)
+  double steady_variance = 1.0;   // of an innovation, over that of the noise
+
+  static InnovationsFilter make(const FitData& data, const FitModel& model, const FitPoint& point) {
+    InnovationsFilter f;
+    const double T = data.sample_time;
+    const double w = point.bandwidth;
+    const int n = model.order;
+    // States are y^(i) / w^i, so that the entries are of one size.
+    const double tau = std::max(point.lag(), 0.05 * T);
+    double dead = std::max(point.latency - tau, 0.0);
+    if (data.averaged > 1) dead += 0.5 * T / data.averaged;
+    f.delay = static_cast<std::ptrdiff_t>(std::floor(dead / T));
+    const double fraction = dead - static_cast<double>(f.delay) * T;
+    constexpr int M = N + 3;  // x, v, u, slope of u
+    using Square = std::array<double, static_cast<std::size_t>(M * M)>;
+    const auto at = [](int i, int j) { return static_cast<std::size_t>(j * M + i); };
+    const auto transition = [&](double h) {
+      Square a{};
+      for (int i = 0; i + 1 < N; ++i) a[at(i, i + 1)] = w * h;
+      a[at(n - 1, n - 1)] = -point.pole * h;
+      a[at(n - 1, N)] = h / std::pow(w, n - 1);
+      a[at(N, N)] = -h / tau;
+      a[at(N, N + 1)] = h / tau;
+      a[at(N + 1, N + 2)] = h;
+      std::array<double, static_cast<std::size_t>(2 * M * M)> work{};
+      exp_minus_identity(a.data(), work.data(), M);
+      for (int i = 0; i < M; ++i) a[at(i, i)] += 1.0;
+      return a;
+    };
+    const Square first = transition(fraction);
+    const Square second = transition(T - fraction);
+    Square whole{};
+    multiply(second.data(), first.data(), whole.data(), M);
+    for (int i = 0; i < N; ++i) {
+      for (int j = 0; j < N; ++j) {
+        f.phi[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)] = whole[at(i, j)];
+      }
+    }
+    // The input as seen over one row: u of the row before until `fraction`, then the row's own.
+    const bool straight = data.averaged > 1;
+    std::array<double, static_cast<std::size_t>(M)> weight{};
+    const auto weigh = [&](int which) {  // 0 previous, 1 current, 2 next
+      double start1 = which == 0 ? 1.0 : 0.0, slope1 = 0.0;
+      double start2 = which == 1 ? 1.0 : 0.0, slope2 = 0.0;
+      if (straight) {
+        if (which == 0) start1 = fraction / T, slope1 = -1.0 / T;
+        if (which == 1) start1 = 1.0 - fraction / T, slope1 = 1.0 / T, slope2 = -1.0 / T;
+        if (which == 2) slope2 = 1.0 / T;
+      }
+      for (int i = 0; i <= N; ++i) {
+        double sum = second[at(i, N + 1)] * start2 + second[at(i, N + 2)] * slope2;
+        for (int j = 0; j <= N; ++j) {
+          sum += second[at(i, j)] * (first[at(j, N + 1)] * start1 + first[at(j, N + 2)] * slope1);
+        }
+        weight[static_cast<std::size_t>(i)] = sum;
+      }
+    };
+    const auto take = [&](Vector& x, double& v) {
+      for (int i = 0; i < N; ++i)
+        x[static_cast<std::size_t>(i)] = weight[static_cast<std::size_t>(i)];
+      v = weight[static_cast<std::size_t>(N)];
+    };
+    weigh(0);
+    take(f.previous, f.lag_previous);
+    weigh(1);
+    take(f.current, f.lag_current);
+    weigh(2);
+    take(f.next, f.lag_next);
+    for (int i = 0; i < N; ++i) f.lag[static_cast<std::size_t>(i)] = whole[at(i, N)];
+    f.lag_decay = whole[at(N, N)];
+    // A column acts as the disturbance does.
+    for (int i = 0; i < n; ++i) {
+      f.column[static_cast<std::size_t>(i)] =
+          f.phi[static_cast<std::size_t>(i)][static_cast<std::size_t>(n)] / std::pow(w, n);
+    }
+    f.find_gains(w * w * T * T, data.y.size());
+    return f;
+  }
+
+  /// Riccati recursion for noise of variance one; the last state takes a step of variance q a row.
+  void find_gains(double q, std::size_t most) {
+    std::array<Vector, static_cast<std::size_t>(N)> p{};
+    for (int i = 0; i < N; ++i) p[static_cast<std::size_t>(i)][static_cast<std::size_t>(i)] = 1e8;
+    std::vector<double> variances;
+    Vector before{};
+    const double small = 1e-9 * std::sqrt(q);
+    while (gains.size() < most) {
+      const double s = p[0][0] + 1.0;
+      Vector k{};
+      for (std::size_t i = 0; i < k.size(); ++i) k[i] = p[i][0] / s;
+      double change = 0.0;
+      for (std::size_t i = 0; i < k.size(); ++i) {
+        change = std::max(change, std::abs(k[i] - before[i]) / (std::abs(k[i]) + 1e-300));
+      }
+      before = k;
+      gains.push_back(k);
+      variances.push_back(s);
+      if (gains.size() > static_cast<std::size_t>(2 * N) && change < small) break;
+      // p = phi (p - k k' s) phi' + q
+      std::array<Vector, static_cast<std::size_t>(N)> a{};
+      for (std::size_t i = 1; i < k.size(); ++i) {
+        for (std::size_t j = 1; j < k.size(); ++j) p[i][j] -= k[i] * k[j] * s;
+      }
+      // p - p^2 / (p + 1) as it stands would lose what is left of it.
+      for (std::size_t i = 0; i < k.size(); ++i) p[0][i] = p[i][0] = k[i];
+      for (std::size_t i = 0; i < k.size(); ++i) {
+        for (std::size_t j = 0; j < k.size(); ++j) {
+          double sum = 0.0;
+          for (std::size_t l = i; l < k.size(); ++l) sum += phi[i][l] * p[l][j];
+          a[i][j] = sum;
+        }
+      }
+      for (std::size_t i = 0; i < k.size(); ++i) {
+        for (std::size_t j = i; j < k.size(); ++j) {
+          double sum = 0.0;
+          for (std::size_t l = j; l < k.size(); ++l) sum += a[i][l] * phi[j][l];
+          p[i][j] = sum;
+          p[j][i] = sum;
+        }
+      }
+      p[k.size() - 1][k.size() - 1] += q;
+    }
+    steady_variance = variances.back();
+    weights.reserve(variances.size());
+    for (const double s : variances) weights.push_back(std::sqrt(steady_variance / s));
+    for (std::size_t i = 0; i < std::min<std::size_t>(weights.size(), N); ++i) weights[i] = 0.0;
+  }
+
+  /// Innovations of what `output(k)` measures while `input(k)` and `column_at(k)` act, into out.
+  /// The first `lead` rows of a piece only fill the lag and the dead time, whose past is not known.
+  template <class Output, class Input, class Column>
+  void run(const FitData& data, std::ptrdiff_t lead, const Output& output, const Input& input,
+           const Column& column_at, double* out) const {
+    for (std::size_t piece = 0; piece < data.starts.size(); ++piece) {
+      const auto from = static_cast<std::ptrdiff_t>(data.starts[piece]);
+      const auto to = static_cast<std::ptrdiff_t>(
+          piece + 1 < data.starts.size() ? data.starts[piece + 1] : data.y.size());
+      const auto u = [&](std::ptrdiff_t k) { return input(std::clamp(k, from, to - 1)); };
+      double v = u(from);
+      double u_before = v, u_now = v;
+      const std::ptrdiff_t begin = std::min(from + lead, to);
+      for (std::ptrdiff_t k = from; k < begin; ++k) {
+        out[k] = 0.0;
+        const double u_next = u(k - delay + 1);
+        v = lag_decay * v + lag_previous * u_before + lag_current * u_now + lag_next * u_next;
+        u_before = u_now;
+        u_now = u_next;
+      }
+      if (begin == to) continue;
+      Vector x{};
+      x[0] = output(begin);
+      double r_now = column_at(begin);
+      const std::size_t steady = gains.size() - 1;
+      for (std::ptrdiff_t k = begin; k < to; ++k) {
+        const std::size_t i = std::min(static_cast<std::size_t>(k - begin), steady);
+        const Vector& gain = gains[i];
+        const double e = output(k) - x[0];
+        out[k] = e * weights[i];
+        for (std::size_t j = 0; j < gain.size(); ++j) x[j] += gain[j] * e;
+        const double u_next = u(k - delay + 1);
+        const double r_next = column_at(std::min(k + 1, to - 1));
+        const double r = 0.5 * (r_now + r_next);
+        Vector moved{};
+        for (std::size_t j = 0; j < moved.size(); ++j) {
+          double sum = lag[j] * v + previous[j] * u_before + current[j] * u_now + next[j] * u_next +
+                       column[j] * r;
+          for (std::size_t l = j; l < moved.size(); ++l) sum += phi[j][l] * x[l];
+          moved[j] = sum;
+        }
+        x = moved;
+        v = lag_decay * v + lag_previous * u_before + lag_current * u_now + lag_next * u_next;
+        u_before = u_now;
+        u_now = u_next;
+        r_now = r_next;
+      }
+    }
+  }
+};
+
+}  // namespace detail
+
+/// The innovations of one log under one kind of model, and the fit that makes them least.
+///
+/// Holds a reference to the data.
+class InnovationsFit {
+ public:
+  InnovationsFit(const FitData& data, const FitModel& model, const FitBounds& bounds)
+      : data_(data),
+        model_(model),
+        bounds_(bounds),
+        lead_(static_cast<std::ptrdiff_t>(std::ceil(bounds.latency_max / data.sample_time))) {
+    for (std::size_t piece = 0; piece < data.starts.size(); ++piece) {
+      const std::size_t to =
+          piece + 1 < data.starts.size() ? data.starts[piece + 1] : data.y.size();
+      const std::size_t blind =
+          data.starts[piece] + static_cast<std::size_t>(lead_ + model.order + model.extension);
+      if (to > blind) rows_ += to - blind;
+    }
+  }
+
+  /// b0 and the columns' numbers in closed form, everything else as given.
+  [[nodiscard]] Fit at(const FitPoint& point) {
+    Fit fit;
+    fit.at = point;
+    with_filter(point, [&](const auto& filter) { solve_linear(filter, fit); });
+    return fit;
+  }
+
+  /// The least of the innovations near `start`. @param with_bandwidth false: w stays
+  [[nodiscard]] Fit minimise(const FitPoint& start, bool with_bandwidth, int steps = 25) {
+    Fit best = at(inside(start));
+    double damping = 1e-3;
+    for (int step = 0; step < steps; ++step) {
+      const auto [jacobian, free] = sensitivities(best, with_bandwidth);
+      const int count = static_cast<int>(free.size());
+      if (count == 0) return best;
+      const int all = static_cast<int>(jacobian.size());
+      std::vector<double> normal, right;
+      normal_equations(jacobian, residual_, normal, right);
+      bool better = false;
+      while (damping < 1e8) {
+        std::vector<double> damped = normal;
+        for (int i = 0; i < all; ++i)
+          damped[static_cast<std::size_t>(i * all + i)] *= 1.0 + (i < count ? damping : 0.0);
+        std::vector<double> change = right;
+        detail::solve_normal(damped, change, all);
+        std::array<double, 4> move{};
+        for (int i = 0; i < count; ++i) {
+          const int which = free[static_cast<std::size_t>(i)];
+          move[static_cast<std::size_t>(which)] = std::clamp(
+              -change[static_cast<std::size_t>(i)], -longest_step[static_cast<std::size_t>(which)],
+              longest_step[static_cast<std::size_t>(which)]);
+        }
+        const FitPoint trial_point = moved(best.at, move);
+        std::swap(residual_, kept_residual_);
+        std::swap(columns_, kept_columns_);
+        const Fit trial = at(trial_point);
+        if (trial.mean_square < best.mean_square) {
+          const double gain = 1.0 - trial.mean_square / best.mean_square;
+          best = trial;
+          damping = std::max(damping * 0.2, 1e-9);
+          better = true;
+          // A hundredth of what moves the likelihood by one.
+          if (gain * static_cast<double>(best.rows) < 0.02) best.converged = true;
+          break;
+        }
+        std::swap(residual_, kept_residual_);
+        std::swap(columns_, kept_columns_);
+        damping *= 8.0;
+      }
+      if (!better) best.converged = true;
+      if (best.converged) break;
+    }
+    return best;
+  }
+
+  /// Derivatives of the innovations by the free parameters, then by the linear ones, and which
+  /// parameters are free: 0 log w, 1 log(tau + L), 2 share squared, 3 a (tau + L).
+  struct Sensitivities {
+    std::vector<std::vector<double>> columns;
+    std::vector<int> free;
+  };
+
+  /// At a fit that `at` or `minimise` gave last. Parameters at a bound are not free.
+  [[nodiscard]] Sensitivities sensitivities(const Fit& fit, bool with_bandwidth) {
+    Sensitivities result;
+    std::array<bool, 4> wanted = {with_bandwidth, true, true, model_.pole};
+    const std::vector<double> base = residual_;
+    for (int i = 0; i < 4; ++i) {
+      if (!wanted[static_cast<std::size_t>(i)]) continue;
+      std::array<double, 4> move{};
+      double step = small_step[static_cast<std::size_t>(i)];
+      move[static_cast<std::size_t>(i)] = step;
+      FitPoint beside = moved(fit.at, move);
+      if (same(beside, fit.at)) {
+        step = -step;
+        move[static_cast<std::size_t>(i)] = step;
+        beside = moved(fit.at, move);
+        if (same(beside, fit.at)) continue;
+      }
+      std::vector<double> residual(data_.y.size());
+      with_filter(beside,
+                  [&](const auto& filter) { run_whole(filter, fit.linear, residual.data()); });
+      for (std::size_t k = 0; k < residual.size(); ++k)
+        residual[k] = (residual[k] - base[k]) / step;
+      result.columns.push_back(std::move(residual));
+      result.free.push_back(i);
+    }
+    for (std::size_t c = 1; c < columns_.size(); ++c) result.columns.push_back(columns_[c]);
+    return result;
+  }
+
+  /// Innovations of the fit that `at` or `minimise` gave last; zero where the start is not known.
+  [[nodiscard]] const std::vector<double>& residual() const { return residual_; }
+
+  /// Whether a parameter has come to an end of its range.
+  [[nodiscard]] bool at_bound(const FitPoint& p) const {
+    return p.latency >= bounds_.latency_max * 0.999 ||
+           (model_.pole && std::abs(p.pole) * p.latency >= bounds_.pole_latency * 0.999);
+  }
+
+  /// The point within bounds.
+  [[nodiscard]] FitPoint inside(FitPoint p) const {
+    p.bandwidth = std::clamp(p.bandwidth, bounds_.bandwidth_min, bounds_.bandwidth_max);
+    p.latency = std::clamp(p.latency, bounds_.latency_min, bounds_.latency_max);
+    p.lag_share = std::clamp(p.lag_share, std::min(0.1 * data_.sample_time / p.latency, 1.0), 1.0);
+    const double most = bounds_.pole_latency / p.latency;
+    p.pole = model_.pole ? std::clamp(p.pole, -0.1 * most, most) : 0.0;
+    return p;
+  }
+
+  [[nodiscard]] const FitData& data() const { return data_; }        ///< what it was made of
+  [[nodiscard]] const FitModel& model() const { return model_; }     ///< what it was made of
+  [[nodiscard]] const FitBounds& bounds() const { return bounds_; }  ///< what it was made of
+
+  /// J'J and J'r of rows [from, to).
+  static void normal_equations(std::span<const std::vector<double>> jacobian,
+                               const std::vector<double>& residual, std::vector<double>& normal,
+                               std::vector<double>& right, std::size_t from = 0,
+                               std::size_t to = std::numeric_limits<std::size_t>::max()) {
+    const std::size_t n = jacobian.size();
+    to = std::min(to, residual.size());
+    normal.assign(n * n, 0.0);
+    right.assign(n, 0.0);
+    for (std::size_t i = 0; i < n; ++i) {
+      const double* a = jacobian[i].data();
+      for (std::size_t j = i; j < n; ++j) {
+        const double* b = jacobian[j].data();
+        double sum = 0.0;
+        for (std::size_t k = from; k < to; ++k) sum += a[k] * b[k];
+        normal[j * n + i] = normal[i * n + j] = sum;
+      }
+      double sum = 0.0;
+      for (std::size_t k = from; k < to; ++k) sum += a[k] * residual[k];
+      right[i] = sum;
+    }
+  }
+
+ private:
+  static constexpr std::array<double, 4> longest_step = {1.0, 0.7, 0.4, 0.2};
+  static constexpr std::array<double, 4> small_step = {1e-4, 1e-4, 1e-4, 1e-4};
+
+  static bool same(const FitPoint& a, const FitPoint& b) {
+    return a.bandwidth == b.bandwidth && a.latency == b.latency && a.lag_share == b.lag_share &&
+           a.pole == b.pole;
+  }
+
+  [[nodiscard]] FitPoint moved(FitPoint p, const std::array<double, 4>& move) const {
+    const double product = p.pole * p.latency;
+    const FitPoint before = p;
+    p.bandwidth *= std::exp(move[0]);
+    p.latency *= std::exp(move[1]);
+    // Lag in exchange for dead time shows by its square: from no lag at all there would be no way.
+    if (move[2] != 0.0) p.lag_share = std::sqrt(std::max(p.lag_share * p.lag_share + move[2], 0.0));
+    if (move[1] != 0.0 || move[3] != 0.0) p.pole = (product + move[3]) / p.latency;
+    p = inside(p);
+    if (move[1] == 0.0 && move[3] == 0.0) p.pole = before.pole;
+    return p;
+  }
+
+  template <class F>
+  void with_filter(const FitPoint& point, const F& use) const {
+    switch (model_.order + model_.extension) {
+      case 2:
+        return use(detail::InnovationsFilter<2>::make(data_, model_, point));
+      case 3:
+        return use(detail::InnovationsFilter<3>::make(data_, model_, point));
+      case 4:
+        return use(detail::InnovationsFilter<4>::make(data_, model_, point));
+      default:
+        return use(detail::InnovationsFilter<5>::make(data_, model_, point));
+    }
+  }
+
+  template <class Filter>
+  void run_whole(const Filter& filter, const std::vector<double>& linear, double* out) const {
+    const double b0 = linear[0];
+    combined_.assign(data_.y.size(), 0.0);
+    for (std::size_t c = 0; c < data_.columns.size(); ++c) {
+      for (std::size_t k = 0; k < combined_.size(); ++k) {
+        combined_[k] += linear[c + 1] * data_.columns[c][k];
+      }
+    }
+    filter.run(
+        data_, lead_, [&](std::ptrdiff_t k) { return data_.y[static_cast<std::size_t>(k)]; },
+        [&](std::ptrdiff_t k) { return b0 * data_.u[static_cast<std::size_t>(k)]; },
+        [&](std::ptrdiff_t k) { return combined_[static_cast<std::size_t>(k)]; }, out);
+  }
+
+  template <class Filter>
+  void solve_linear(const Filter& filter, Fit& fit) {
+    const std::size_t rows = data_.y.size();
+    const std::size_t count = 2 + data_.columns.size();
+    columns_.resize(count);
+    for (auto& column : columns_) column.resize(rows);
+    const auto nothing = [](std::ptrdiff_t) { return 0.0; };
+    filter.run(
+        data_, lead_, [&](std::ptrdiff_t k) { return data_.y[static_cast<std::size_t>(k)]; },
+        nothing, nothing, columns_[0].data());
+    filter.run(
+        data_, lead_, nothing,
+        [&](std::ptrdiff_t k) { return data_.u[static_cast<std::size_t>(k)]; }, nothing,
+        columns_[1].data());
+    for (std::size_t c = 0; c < data_.columns.size(); ++c) {
+      filter.run(
+          data_, lead_, nothing, nothing,
+          [&](std::ptrdiff_t k) { return data_.columns[c][static_cast<std::size_t>(k)]; },
+          columns_[c + 2].data());
+    }
+    std::vector<double> normal;
+    normal_equations(std::span(columns_).subspan(1), columns_[0], normal, fit.linear);
+    for (double& value : fit.linear) value = -value;
+    detail::solve_normal(normal, fit.linear, static_cast<int>(count) - 1);
+    residual_ = columns_[0];
+    for (std::size_t c = 1; c < count; ++c) {
+      for (std::size_t k = 0; k < rows; ++k) residual_[k] += fit.linear[c - 1] * columns_[c][k];
+    }
+    double sum = 0.0;
+    for (const double e : residual_) sum += e * e;
+    fit.rows = std::max<std::size_t>(rows_, 1);
+    fit.mean_square = sum / static_cast<double>(fit.rows);
+    const double variance = fit.mean_square / filter.steady_variance;
+    fit.noise = std::sqrt(variance);
+    fit.disturbance = variance * data_.sample_time * std::pow(fit.at.bandwidth, 2 * Filter::N);
+  }
+
+  const FitData& data_;
+  FitModel model_;
+  FitBounds bounds_;
+  std::ptrdiff_t lead_;
+  std::size_t rows_ = 0;                        // innovations that count
+  std::vector<std::vector<double>> columns_{};  // of y, u, and the data's columns
+  std::vector<double> residual_{};
+  std::vector<std::vector<double>> kept_columns_{};
+  std::vector<double> kept_residual_{};
+  mutable std::vector<double> combined_{};
+};
+
+}  // namespace esokit

@@ -1,0 +1,280 @@
+/// @file
+/// A log as it was recorded, what is found of it before anything is fitted, and its rows at one
+/// sample time.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <esokit/core/check.hpp>
+#include <esokit/core/error.hpp>
+#include <esokit/core/expected.hpp>
+#include <esokit/identify/fit.hpp>
+#include <vector>
+
+namespace esokit {
+
+/// Columns of a log. A row that is missing or not finite in u or y is left out.
+struct Log {
+  std::vector<double> time{};  ///< stamps, s, from anywhere (since 1970, too); may be empty
+  std::vector<double> u{};     ///< input that the actuator held from its row to the next
+  std::vector<double> y{};     ///< output
+  double sample_time = 0.0;    ///< T, s, where there are no stamps
+  /// Clock jitter where there are no stamps, standard deviation, s.
+  double jitter = 0.0;
+  /// What else acts where the disturbance acts (sin y of a pendulum, a known load): each as long as
+  /// y.
+  std::vector<std::vector<double>> columns{};
+};
+
+/// What a log shows by itself.
+struct LogReport {
+  std::size_t rows = 0;       ///< in the log
+  std::size_t rejected = 0;   ///< with a number that is not finite
+  std::size_t outliers = 0;   ///< single rows of y off by more than their neighbours allow
+  std::size_t missing = 0;    ///< that the stamps say should be there
+  std::size_t pieces = 1;     ///< parts between gaps too long to bridge
+  double sample_time = 0.0;   ///< T: the mean step without gaps, s
+  double jitter = 0.0;        ///< standard deviation of the steps without gaps, s
+  double duration = 0.0;      ///< s
+  double quantisation = 0.0;  ///< step of y, 0 where it has none that shows
+  double saturated = 0.0;     ///< share of rows with u at its largest or least
+};
+
+/// Rows at one sample time, and the report on the log.
+struct PreparedLog {
+  FitData data{};
+  LogReport report{};
+};
+
+namespace detail {
+
+inline double median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// The step of which all values are multiples but for the digits that they were written with; 0 if
+/// there is none.
+inline double quantisation_step(const std::vector<double>& y) {
+  std::vector<double> values = y;
+  std::sort(values.begin(), values.end());
+  const double range = values.back() - values.front();
+  if (!(range > 0.0)) return 0.0;
+  std::vector<double> differences;
+  for (std::size_t i = 1; i < values.size(); ++i) {
+    const double difference = values[i] - values[i - 1];
+    if (difference > 1e-7 * range) differences.push_back(difference);
+  }
+  if (differences.empty()) return 0.0;
+  // White noise gives as many values as rows; an encoder gives the same few again and again.
+  if (differences.size() > values.size() / 2) return 0.0;
+  double step = *std::min_element(differences.begin(), differences.end());
+  // Rounding to decimal digits makes the least difference a little short or long.
+  for (int pass = 0; pass < 3; ++pass) {
+    double sum = 0.0, count = 0.0;
+    for (const double difference : differences) {
+      const double multiple = std::round(difference / step);
+      if (multiple >= 1.0 && multiple <= 3.0) sum += difference, count += multiple;
+    }
+    if (count > 0.0) step = sum / count;
+  }
+  std::size_t fits = 0;
+  for (const double difference : differences) {
+    const double multiple = difference / step;
+    if (std::abs(multiple - std::round(multiple)) < 0.15) ++fits;
+  }
+  return fits * 10 >= differences.size() * 9 ? step : 0.0;
+}
+
+}  // namespace detail
+
+/// Checks a log and brings it to one sample time. Where the stamps jitter by more than 2 % of T, y
+/// is read between its rows on a straight line and u is what the actuator held on average.
+[[nodiscard]] inline Expected<PreparedLog, Error<double>> prepare(const Log& log) {
+  using E = Error<double>;
+  const std::size_t count = log.y.size();
+  const auto size = [](std::size_t n) { return static_cast<double>(n); };
+  if (log.u.size() != count)
+    return E{"u", size(log.u.size()), "must have as many rows as y:", -1, size(count), true};
+  if (!log.time.empty() && log.time.size() != count) {
+    return E{"time", size(log.time.size()), "must have as many rows as y, or none:",
+             -1,     size(count),           true};
+  }
+  for (std::size_t c = 0; c < log.columns.size(); ++c) {
+    if (log.columns[c].size() != count) {
+      return E{"columns",
+               size(log.columns[c].size()),
+               "must have as many rows as y:",
+               static_cast<int>(c),
+               size(count),
+               true};
+    }
+  }
+  Rules<double> rules;
+  if (log.time.empty()) rules.positive("sample_time", log.sample_time);
+  rules.not_negative("jitter", log.jitter);
+  if (!rules) return rules.error();
+  PreparedLog prepared;
+  LogReport& report = prepared.report;
+  report.rows = count;
+  std::vector<std::size_t> good;
+  for (std::size_t k = 0; k < count; ++k) {
+    bool finite =
+        is_finite(log.u[k]) && is_finite(log.y[k]) && (log.time.empty() || is_finite(log.time[k]));
+    for (const auto& column : log.columns) finite = finite && is_finite(column[k]);
+    if (finite) good.push_back(k);
+  }
+  report.rejected = count - good.size();
+  if (good.size() < 200)
+    return E{"rows", size(good.size()), "that can be read are too few: record at least", -1, 200.0,
+             true};
+  // Stamps since 1970 lose nothing but their start.
+  std::vector<double> time, u, y;
+  std::vector<std::vector<double>> columns(log.columns.size());
+  for (const std::size_t k : good) {
+    time.push_back(log.time.empty() ? size(k) * log.sample_time : log.time[k] - log.time[good[0]]);
+    u.push_back(log.u[k]);
+    y.push_back(log.y[k]);
+    for (std::size_t c = 0; c < columns.size(); ++c) columns[c].push_back(log.columns[c][k]);
+  }
+  std::vector<double> steps;
+  for (std::size_t k = 1; k < time.size(); ++k) {
+    if (!(time[k] > time[k - 1])) {
+      return E{"time", time[k], "does not rise", static_cast<int>(good[k])};
+    }
+    steps.push_back(time[k] - time[k - 1]);
+  }
+  const double middle = detail::median(steps);
+  double sum = 0.0, square = 0.0, regular = 0.0;
+  for (const double step : steps) {
+    if (step < 1.6 * middle) sum += step, regular += 1.0;
+  }
+  const double T = log.time.empty() ? log.sample_time : sum / regular;
+  for (const double step : steps) {
+    if (step < 1.6 * middle) square += (step - T) * (step - T);
+  }
+  report.sample_time = T;
+  report.jitter = log.time.empty() ? log.jitter : std::sqrt(square / regular);
+  report.duration = time.back();
+  // A single row that neither side agrees with.
+  std::vector<double> jumps;
+  for (std::size_t k = 1; k + 1 < y.size(); ++k) {
+    jumps.push_back(std::abs(y[k] - 0.5 * (y[k - 1] + y[k + 1])));
+  }
+  std::vector<double> sorted = jumps;
+  const auto tail = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() * 99 / 100);
+  std::nth_element(sorted.begin(), tail, sorted.end());
+  const double usual = *tail;
+  std::vector<bool> outlier(y.size(), false);
+  for (std::size_t k = 2; k + 2 < y.size(); ++k) {
+    const double jump = jumps[k - 1];
+    if (usual > 0.0 && jump > 8.0 * usual && std::abs(y[k + 1] - y[k - 1]) < 0.2 * jump) {
+      outlier[k] = true;
+      ++report.outliers;
+    }
+  }
+  for (std::size_t k = 1; k + 1 < y.size(); ++k) {
+    if (outlier[k]) y[k] = 0.5 * (y[k - 1] + y[k + 1]);
+  }
+  const auto [least, largest] = std::minmax_element(u.begin(), u.end());
+  const double reach = 1e-6 * (*largest - *least);
+  std::size_t ends = 0;
+  for (const double value : u) {
+    if (value <= *least + reach || value >= *largest - reach) ++ends;
+  }
+  report.saturated = size(ends) / size(u.size());
+  report.quantisation = detail::quantisation_step(y);
+
+  FitData& data = prepared.data;
+  data.sample_time = T;
+  data.starts.clear();
+  data.columns.resize(columns.size());
+  constexpr double longest_bridge = 5.5;  // rows
+  std::size_t from = 0;
+  while (from < time.size()) {
+    std::size_t to = from + 1;
+    while (to < time.size() && time[to] - time[to - 1] < longest_bridge * T) ++to;
+    const std::size_t rows = to - from;
+    bool uniform = report.jitter < 0.02 * T;
+    for (std::size_t k = from + 1; k < to; ++k)
+      uniform = uniform && time[k] - time[k - 1] < 1.6 * T;
+    if (rows >= 50) {
+      data.starts.push_back(data.y.size());
+      if (uniform) {
+        data.u.insert(data.u.end(), u.begin() + static_cast<std::ptrdiff_t>(from),
+                      u.begin() + static_cast<std::ptrdiff_t>(to));
+        data.y.insert(data.y.end(), y.begin() + static_cast<std::ptrdiff_t>(from),
+                      y.begin() + static_cast<std::ptrdiff_t>(to));
+        for (std::size_t c = 0; c < columns.size(); ++c) {
+          data.columns[c].insert(data.columns[c].end(),
+                                 columns[c].begin() + static_cast<std::ptrdiff_t>(from),
+                                 columns[c].begin() + static_cast<std::ptrdiff_t>(to));
+        }
+      } else {
+        std::size_t k = from;
+        const auto grid = static_cast<std::size_t>(std::lround((time[to - 1] - time[from]) / T));
+        report.missing += grid + 1 > rows ? grid + 1 - rows : 0;
+        for (std::size_t g = 0; g < grid; ++g) {
+          const double t = time[from] + size(g) * T;
+          while (k + 2 < to && time[k + 1] <= t) ++k;
+          const double share = std::clamp((t - time[k]) / (time[k + 1] - time[k]), 0.0, 1.0);
+          data.y.push_back(y[k] + share * (y[k + 1] - y[k]));
+          for (std::size_t c = 0; c < columns.size(); ++c) {
+            data.columns[c].push_back(columns[c][k] + share * (columns[c][k + 1] - columns[c][k]));
+          }
+          double held = 0.0, at = t;
+          for (std::size_t j = k; at < t + T; ++j) {
+            const double end = j + 1 < to ? std::min(time[j + 1], t + T) : t + T;
+            held += u[std::min(j, to - 1)] * std::max(end - at, 0.0);
+            at = std::max(end, at);
+          }
+          data.u.push_back(held / T);
+        }
+      }
+    }
+    if (to < time.size())
+      report.missing += static_cast<std::size_t>(std::lround((time[to] - time[to - 1]) / T) - 1);
+    from = to;
+  }
+  report.pieces = data.starts.size();
+  if (data.y.size() < 200)
+    return E{"rows",
+             size(data.y.size()),
+             "between gaps are too few: record without gaps at least",
+             -1,
+             200.0,
+             true};
+  return prepared;
+}
+
+/// Means of `fold` rows each; what a piece has beyond a multiple is left out.
+[[nodiscard]] inline FitData averaged(const FitData& data, int fold) {
+  if (fold <= 1) return data;
+  FitData out;
+  out.sample_time = data.sample_time * fold;
+  out.averaged = data.averaged * fold;
+  out.starts.clear();
+  out.columns.resize(data.columns.size());
+  const auto by = static_cast<std::size_t>(fold);
+  for (std::size_t piece = 0; piece < data.starts.size(); ++piece) {
+    const std::size_t to = piece + 1 < data.starts.size() ? data.starts[piece + 1] : data.y.size();
+    out.starts.push_back(out.y.size());
+    for (std::size_t k = data.starts[piece]; k + by <= to; k += by) {
+      const auto mean = [&](const std::vector<double>& values) {
+        double sum = 0.0;
+        for (std::size_t i = 0; i < by; ++i) sum += values[k + i];
+        return sum / fold;
+      };
+      out.u.push_back(mean(data.u));
+      out.y.push_back(mean(data.y));
+      for (std::size_t c = 0; c < data.columns.size(); ++c)
+        out.columns[c].push_back(mean(data.columns[c]));
+    }
+  }
+  return out;
+}
+
+}  // namespace esokit

@@ -1,0 +1,220 @@
+// The innovations fit against a dense Kalman filter of numpy and scipy (expm, lstsq), and against
+// plants that are known.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstddef>
+#include <esokit/identify/fit.hpp>
+#include <vector>
+
+namespace {
+
+using esokit::Fit;
+using esokit::FitBounds;
+using esokit::FitData;
+using esokit::FitModel;
+using esokit::FitPoint;
+using esokit::InnovationsFit;
+
+constexpr double T = 0.004;
+
+// Numbers without a plant behind them: what is compared is arithmetic.
+FitData formula(std::size_t rows, bool with_column) {
+  FitData data;
+  data.sample_time = T;
+  std::vector<double> column;
+  for (std::size_t i = 0; i < rows; ++i) {
+    const auto k = static_cast<double>(i);
+    data.u.push_back(std::sin(0.05 * k) + (std::sin(0.013 * k + 0.3) > 0 ? 0.5 : -0.5));
+    data.y.push_back(0.8 * std::sin(0.031 * k + 0.2) + 0.1 * std::cos(0.17 * k) +
+                     0.001 * std::sin(k * k));
+    column.push_back(std::cos(0.023 * k));
+  }
+  if (with_column) data.columns.push_back(column);
+  return data;
+}
+
+struct Reference {
+  FitModel model;
+  FitPoint point;
+  std::vector<std::size_t> starts;
+  bool column;
+  int averaged;
+  std::vector<double> linear;
+  double mean_square, noise;
+  std::size_t rows;
+};
+
+// The filter starts at the row of the longest latency, 15 rows here.
+TEST(InnovationsFit, IsTheKalmanFilterOfNumpy) {
+  const std::vector<Reference> references = {{{1, 1, true},
+                                              {25, 0.013, 0.6, 0},
+                                              {0},
+                                              false,
+                                              1,
+                                              {0.6604762641307567},
+                                              0.008443089674325856,
+                                              0.08561082112525026,
+                                              1183},
+                                             {{2, 1, true},
+                                              {40, 0.011, 0.3, 3},
+                                              {0, 500},
+                                              true,
+                                              1,
+                                              {-5.2536353760185985, -21.380148111837397},
+                                              0.0038379548629954565,
+                                              0.053101103431319005,
+                                              1164},
+                                             {{2, 2, true},
+                                              {30, 0.006, 1, 0},
+                                              {0},
+                                              false,
+                                              1,
+                                              {2.6359608288525216},
+                                              0.0063039204354839486,
+                                              0.06787555429243632,
+                                              1181},
+                                             {{3, 1, true},
+                                              {50, 0.02, 0.5, 1},
+                                              {0},
+                                              false,
+                                              1,
+                                              {-1848.82690325331},
+                                              0.0017407359577604174,
+                                              0.03219161175395408,
+                                              1181},
+                                             {{2, 1, true},
+                                              {40, 0.011, 0.3, 3},
+                                              {0},
+                                              true,
+                                              4,
+                                              {-0.9103390041657009, -9.526047991700446},
+                                              0.003955964773622312,
+                                              0.05391130220779034,
+                                              1182}};
+  for (const Reference& reference : references) {
+    FitData data = formula(1200, reference.column);
+    data.starts = reference.starts;
+    data.averaged = reference.averaged;
+    InnovationsFit fit(data, reference.model, {1, 200, 1e-4, 15 * T - 1e-9, 0.5});
+    const Fit found = fit.at(reference.point);
+    SCOPED_TRACE(reference.linear[0]);
+    ASSERT_EQ(found.linear.size(), reference.linear.size());
+    // The diffuse start, of variance 1e8, makes rounding 1e8 times as large; gains are taken for
+    // steady once they change by 1e-9 of the bandwidth, which is 1e-7 here.
+    for (std::size_t i = 0; i < found.linear.size(); ++i) {
+      EXPECT_NEAR(found.linear[i] / reference.linear[i], 1, 1e-6);
+    }
+    EXPECT_NEAR(found.mean_square / reference.mean_square, 1, 1e-6);
+    EXPECT_NEAR(found.noise / reference.noise, 1, 1e-6);
+    EXPECT_EQ(found.rows, reference.rows);
+  }
+}
+
+// y'' + a y' = b0 v(t - L), 40 steps a row, a square wave of u.
+FitData second_order(double b0, double tau, double dead, double a, double noise) {
+  FitData data;
+  data.sample_time = T;
+  constexpr int steps = 40;
+  constexpr double h = T / steps;
+  const auto line = static_cast<std::size_t>(std::lround(dead / h));
+  std::vector<double> sent;
+  double v = 0, x0 = 0, x1 = 0;
+  for (int k = 0; k < 3000; ++k) {
+    const double t = k * T;
+    const double u =
+        std::sin(3 * t) + 0.6 * (std::sin(7.3 * t) > 0 ? 1 : -1) + 0.4 * std::sin(23 * t);
+    data.u.push_back(u);
+    data.y.push_back(x0 + noise * std::sin(static_cast<double>(k) * k));
+    for (int i = 0; i < steps; ++i) {
+      sent.push_back(u);
+      const double delayed = sent.size() > line ? sent[sent.size() - 1 - line] : 0.0;
+      const double next = delayed + (v - delayed) * std::exp(-h / tau);
+      const double middle = 0.5 * (v + next);
+      const double speed = x1;
+      x1 += h * (b0 * middle - a * x1);
+      x0 += 0.5 * h * (speed + x1);
+      v = next;
+    }
+  }
+  return data;
+}
+
+TEST(InnovationsFit, FindsThePlantThatMadeTheLog) {
+  const FitData data = second_order(80, 0.015, 0.0062, 2, 1e-4);
+  InnovationsFit fit(data, {2, 1, true}, {0.5, 300, 1e-4, 0.3, 0.5});
+  // From three times too slow and from too fast.
+  for (const double latency : {0.06, 0.004}) {
+    const Fit found = fit.minimise({20, latency, 0.4, 0}, true, 60);
+    EXPECT_TRUE(found.converged);
+    // The simulation's own steps leave 1e-4 (h = 0.1 ms), the noise of 1e-4 less.
+    EXPECT_NEAR(found.linear[0], 80, 0.4);
+    EXPECT_NEAR(found.at.lag(), 0.015, 2e-4);
+    EXPECT_NEAR(found.at.dead_time(), 0.0062, 2e-4);
+    EXPECT_NEAR(found.at.pole, 2, 0.02);
+    EXPECT_NEAR(found.noise, 1e-4 / std::sqrt(2.0), 1e-5);
+  }
+}
+
+// Averaging must not move the dead time: the mean input is taken at the right instant.
+TEST(InnovationsFit, AveragedRowsGiveTheSameDeadTime) {
+  const FitData raw = second_order(80, 0.015, 0.0062, 0, 1e-4);
+  for (const int fold : {2, 4}) {
+    FitData data;
+    data.sample_time = fold * T;
+    data.averaged = fold;
+    for (std::size_t k = 0; k + static_cast<std::size_t>(fold) <= raw.y.size();
+         k += static_cast<std::size_t>(fold)) {
+      double u = 0, y = 0;
+      for (std::size_t i = 0; i < static_cast<std::size_t>(fold); ++i) {
+        u += raw.u[k + i] / fold;
+        y += raw.y[k + i] / fold;
+      }
+      data.u.push_back(u);
+      data.y.push_back(y);
+    }
+    InnovationsFit fit(data, {2, 1, false}, {0.5, 60, 1e-4, 0.3, 0.5});
+    const Fit found = fit.minimise({20, 0.03, 0.5, 0}, true, 60);
+    EXPECT_NEAR(found.linear[0], 80, 0.8) << fold;
+    // A straight line between mean inputs loses what is of second order in a row.
+    const double lost = fold * T * fold * T / (12 * 0.015);
+    EXPECT_NEAR(found.at.latency, 0.0212, lost) << fold;
+  }
+}
+
+TEST(InnovationsFit, AColumnOfZerosChangesNothing) {
+  FitData data = formula(1200, false);
+  InnovationsFit plain(data, {1, 1, true}, {1, 200, 1e-4, 0.06, 0.5});
+  const Fit without = plain.at({25, 0.013, 0.6, 0});
+  FitData more = data;
+  more.columns.emplace_back(1200, 0.0);
+  InnovationsFit fit(more, {1, 1, true}, {1, 200, 1e-4, 0.06, 0.5});
+  const Fit with = fit.at({25, 0.013, 0.6, 0});
+  ASSERT_EQ(with.linear.size(), 2u);
+  EXPECT_EQ(with.linear[1], 0.0);
+  EXPECT_NEAR(with.linear[0], without.linear[0], 1e-9);
+}
+
+TEST(InnovationsFit, KeepsItsParametersWithinBounds) {
+  FitData data = formula(1200, false);
+  const FitBounds bounds{5, 50, 0.002, 0.05, 0.5};
+  InnovationsFit fit(data, {2, 1, true}, bounds);
+  const FitPoint wild = fit.inside({1e9, 1e9, 7, 1e9});
+  EXPECT_EQ(wild.bandwidth, 50);
+  EXPECT_EQ(wild.latency, 0.05);
+  EXPECT_EQ(wild.lag_share, 1);
+  EXPECT_NEAR(wild.pole * wild.latency, 0.5, 1e-12);
+  EXPECT_TRUE(fit.at_bound(wild));
+  const FitPoint small = fit.inside({0, 0, -1, -1e9});
+  EXPECT_EQ(small.bandwidth, 5);
+  EXPECT_EQ(small.latency, 0.002);
+  EXPECT_GT(small.lag_share, 0);
+  EXPECT_NEAR(small.pole * small.latency, -0.05, 1e-12);
+  const Fit found = fit.minimise(wild, true);
+  EXPECT_GE(found.at.bandwidth, 5);
+  EXPECT_LE(found.at.bandwidth, 50);
+  EXPECT_LE(found.at.latency, 0.05);
+}
+
+}  // namespace

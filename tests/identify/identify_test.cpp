@@ -1,0 +1,326 @@
+// From a log to a model: the plant that made the log, each refusal, bad numbers anywhere.
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstring>
+#include <esokit/identify/identify.hpp>
+#include <esokit/sim/gaussian.hpp>
+#include <limits>
+#include <vector>
+
+namespace {
+
+using esokit::Identified;
+using esokit::IdentifyOptions;
+using esokit::Log;
+
+constexpr double T = 0.004;
+constexpr double b0 = 50, tau = 0.02, dead = 0.004, noise = 1e-3;
+
+// y'' = b0 v(t - L) + friction + drift, P and D around it, steps of the reference.
+Log closed_loop(double excitation, std::uint64_t seed = 3, int rows = 3000) {
+  esokit::sim::Gaussian gaussian(seed);
+  Log log;
+  log.sample_time = T;
+  constexpr int steps = 40;
+  constexpr double h = T / steps;
+  std::vector<double> sent;
+  const auto line = static_cast<std::size_t>(std::lround(dead / h));
+  double v = 0, x0 = 0, x1 = 0, filtered = 0, walk = 0;
+  for (int k = 0; k < rows; ++k) {
+    const double reference =
+        excitation * ((k / 180) % 2 == 0 ? 1 : -1) * (1 + 0.5 * ((k / 420) % 3));
+    const double y = x0 + noise * gaussian.next();
+    const double before = filtered;
+    filtered += 0.15 * (y - filtered);
+    const double u = (30 * (reference - y) - 9 * (filtered - before) / T) / b0;
+    log.u.push_back(u);
+    log.y.push_back(y);
+    walk += 0.05 * gaussian.next();
+    for (int i = 0; i < steps; ++i) {
+      sent.push_back(u);
+      const double delayed = sent.size() > line ? sent[sent.size() - 1 - line] : 0.0;
+      v = delayed + (v - delayed) * std::exp(-h / tau);
+      x1 += h * (b0 * v - 2.0 * std::tanh(x1 / 0.05) + walk);
+      x0 += h * x1;
+    }
+  }
+  return log;
+}
+
+IdentifyOptions quick() {
+  IdentifyOptions options;
+  options.orders = {2};
+  options.averaged = 1;
+  return options;
+}
+
+TEST(Identify, FindsTheModelThatMadeTheLog) {
+  const Log log = closed_loop(1);
+  IdentifyOptions options;
+  options.averaged = 1;
+  double heard = 0;
+  options.progress = [&](double share) {
+    EXPECT_GE(share, heard);
+    heard = share;
+  };
+  const auto found = esokit::identify(log, options);
+  ASSERT_TRUE(found) << found.error().field << " " << found.error().rule;
+  EXPECT_EQ(heard, 1);
+  EXPECT_EQ(found->order, 2);
+  EXPECT_LT(std::abs(found->input_gain.value - b0), found->input_gain.half_width);
+  EXPECT_LT(found->input_gain.share(), 0.1);
+  EXPECT_NEAR(found->latency.value, tau + dead, 2e-3);
+  EXPECT_NEAR(found->noise.value, noise, 0.05 * noise);
+  EXPECT_NEAR(found->friction.value, 2, 0.4);
+  EXPECT_EQ(found->log.rows, 3000u);
+  ASSERT_EQ(found->orders.size(), 3u);
+  EXPECT_LT(found->orders[1].criterion, found->orders[0].criterion);
+  EXPECT_LE(found->plateau.from, found->plateau.to);
+
+  // It goes on as a plant.
+  const auto plant = found->plant<2>();
+  ASSERT_TRUE(plant);
+  EXPECT_EQ(plant->relative_degree(), 3);
+  EXPECT_NEAR(plant->input_gain(), found->input_gain.value / found->lag.value, 1e-9 * b0 / tau);
+  EXPECT_EQ(plant->dead_time, found->dead_time.value);
+  const auto wrong = found->plant<1>();
+  ASSERT_FALSE(wrong);
+  EXPECT_STREQ(wrong.error().field, "order");
+}
+
+// Stamps since 1970, with jitter that they tell, missing rows and a long gap.
+TEST(Identify, StampsMayJitterAndRowsMayBeMissing) {
+  const Log clean = closed_loop(1);
+  Log log;
+  for (std::size_t k = 0; k < clean.y.size(); ++k) {
+    if (k % 97 == 5 || (k > 1500 && k < 1540)) continue;
+    log.time.push_back(1.7e9 + static_cast<double>(k) * T);
+    log.u.push_back(clean.u[k]);
+    log.y.push_back(clean.y[k]);
+  }
+  const auto found = esokit::study(log, quick());
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->log.pieces, 2u);
+  // 31 of the rows by 97 (one of them in the gap) and 39 in the gap.
+  EXPECT_EQ(found->log.missing, clean.y.size() - log.y.size());
+  EXPECT_NEAR(found->log.sample_time, T, 1e-6 * T + 1e-9);
+  EXPECT_NEAR(found->input_gain.value, b0, 0.1 * b0);
+}
+
+TEST(Identify, RefusesALogWithoutExcitation) {
+  for (const std::uint64_t seed : {1u, 2u, 3u}) {
+    const auto found = esokit::identify(closed_loop(0, seed), quick());
+    ASSERT_FALSE(found) << seed;
+  }
+  Log still = closed_loop(1);
+  for (double& u : still.u) u = 0.25;
+  auto found = esokit::identify(still, quick());
+  ASSERT_FALSE(found);
+  EXPECT_STREQ(found.error().field, "u");
+  EXPECT_EQ(found.error().value, 0.25);
+  Log pinned = closed_loop(1);
+  for (double& y : pinned.y) y = 3;
+  found = esokit::identify(pinned, quick());
+  ASSERT_FALSE(found);
+  EXPECT_STREQ(found.error().field, "y");
+}
+
+// Each rule from both sides, on a study whose numbers are put there.
+TEST(Judge, RefusesByName) {
+  const Log log = closed_loop(1, 3, 400);
+  Log stamped = log;
+  stamped.time.resize(1);
+  Identified good;
+  good.input_gain = {50, 2};
+  good.plateau.points.resize(3);
+  good.plateau.spread = 0.1;
+  good.excitation = 0.01;
+  good.correlation = 0.1;
+  good.friction_shift = 3;
+  good.log.sample_time = T;
+  good.log.jitter = 0.05 * T;
+  good.log.saturated = 1;
+  ASSERT_TRUE(esokit::judge(good, log));
+  const auto field = [&](const Identified& found, const Log& of,
+                         const IdentifyOptions& options = {}) {
+    const auto verdict = esokit::judge(found, of, options);
+    return verdict ? "" : verdict.error().field;
+  };
+  Identified bad = good;
+  bad.log.jitter = 0.0501 * T;
+  EXPECT_STREQ(field(bad, log), "jitter");
+  EXPECT_STREQ(field(bad, stamped), "");
+  IdentifyOptions commanded;
+  commanded.applied = false;
+  EXPECT_STREQ(field(good, log, commanded), "saturated");
+  bad = good;
+  bad.log.saturated = 0.49;
+  EXPECT_STREQ(field(bad, log, commanded), "");
+  bad = good;
+  bad.excitation = 0.151;
+  EXPECT_STREQ(field(bad, log), "excitation");
+  bad.excitation = 0.149;
+  EXPECT_STREQ(field(bad, log), "");
+  bad.plateau.points.resize(2);
+  EXPECT_STREQ(field(bad, log), "excitation");
+  bad = good;
+  bad.correlation = 0.101;
+  EXPECT_STREQ(field(bad, log), "correlation");
+  bad = good;
+  bad.at_bound = true;
+  EXPECT_STREQ(field(bad, log), "latency");
+  bad = good;
+  bad.plateau.spread = 0.101;
+  EXPECT_STREQ(field(bad, log), "plateau");
+  bad = good;
+  bad.friction_shift = 3.01;
+  EXPECT_STREQ(field(bad, log), "friction_shift");
+  bad = good;
+  bad.input_gain.half_width = 5.01;
+  EXPECT_STREQ(field(bad, log), "interval");
+  bad.input_gain.half_width = 4.99;
+  EXPECT_STREQ(field(bad, log), "");
+  // A number that is none is no reason to trust.
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (double* value : {&bad.excitation, &bad.correlation, &bad.plateau.spread, &bad.friction_shift,
+                        &bad.input_gain.half_width, &bad.log.jitter}) {
+    bad = good;
+    *value = nan;
+    EXPECT_STRNE(field(bad, log), "");
+  }
+}
+
+TEST(PrepareLog, RefusesWhatCannotBeRead) {
+  const Log log = closed_loop(1, 3, 400);
+  const auto rule = [](const Log& bad, const char* field) {
+    const auto prepared = esokit::prepare(bad);
+    ASSERT_FALSE(prepared) << field;
+    EXPECT_STREQ(prepared.error().field, field);
+  };
+  Log bad = log;
+  bad.u.pop_back();
+  rule(bad, "u");
+  bad = log;
+  bad.time.resize(5);
+  rule(bad, "time");
+  bad = log;
+  bad.columns.push_back({1, 2});
+  rule(bad, "columns");
+  for (const double value : {0.0, -T, std::numeric_limits<double>::quiet_NaN(),
+                             std::numeric_limits<double>::infinity()}) {
+    bad = log;
+    bad.sample_time = value;
+    rule(bad, "sample_time");
+  }
+  bad = log;
+  bad.jitter = -1;
+  rule(bad, "jitter");
+  bad = log;
+  bad.u.resize(199);
+  bad.y.resize(199);
+  rule(bad, "rows");
+  bad.u.push_back(1);
+  bad.y.push_back(1);
+  EXPECT_TRUE(esokit::prepare(bad));
+  bad = log;
+  for (int k = 0; k < 400; ++k) bad.time.push_back(k < 300 ? k * T : 299 * T);
+  const auto back = esokit::prepare(bad);
+  ASSERT_FALSE(back);
+  EXPECT_STREQ(back.error().rule, "does not rise");
+  EXPECT_EQ(back.error().index, 300);
+}
+
+// A number that is none, in any column and at any place of the log, costs its row and nothing else.
+TEST(PrepareLog, BadNumbersCostTheirRow) {
+  Log log = closed_loop(1, 3, 400);
+  for (int k = 0; k < 400; ++k) log.time.push_back(5 + k * T);
+  log.columns.push_back(log.y);
+  const auto clean = esokit::prepare(log);
+  ASSERT_TRUE(clean);
+  for (const double value :
+       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(),
+        -std::numeric_limits<double>::infinity()}) {
+    for (const std::size_t at :
+         {std::size_t{0}, std::size_t{1}, std::size_t{200}, std::size_t{399}}) {
+      for (int column = 0; column < 4; ++column) {
+        Log bad = log;
+        (column == 0   ? bad.time
+         : column == 1 ? bad.u
+         : column == 2 ? bad.y
+                       : bad.columns[0])[at] = value;
+        const auto prepared = esokit::prepare(bad);
+        ASSERT_TRUE(prepared);
+        EXPECT_EQ(prepared->report.rejected, 1u);
+        for (const double y : prepared->data.y) ASSERT_TRUE(std::isfinite(y));
+        for (const double u : prepared->data.u) ASSERT_TRUE(std::isfinite(u));
+        EXPECT_NEAR(prepared->report.sample_time, T, 1e-12);
+      }
+    }
+  }
+}
+
+TEST(PrepareLog, TellsOutliersFromMotion) {
+  Log log = closed_loop(1, 3, 400);
+  EXPECT_EQ(esokit::prepare(log)->report.outliers, 0u);
+  log.y[150] += 50;
+  const auto prepared = esokit::prepare(log);
+  EXPECT_EQ(prepared->report.outliers, 1u);
+  EXPECT_NEAR(prepared->data.y[150], log.y[149], 0.1);
+}
+
+// An encoder's step is found, also written with few digits; noise has none.
+TEST(PrepareLog, TellsQuantisationFromNoise) {
+  Log log = closed_loop(1, 3, 1000);
+  EXPECT_EQ(esokit::prepare(log)->report.quantisation, 0);
+  for (double& y : log.y) y = std::round(y / 0.0123) * 0.0123;
+  EXPECT_NEAR(esokit::prepare(log)->report.quantisation, 0.0123, 1e-9);
+  for (double& y : log.y) y = std::round(y * 1e4) / 1e4;
+  EXPECT_NEAR(esokit::prepare(log)->report.quantisation, 0.0123, 1e-4);
+}
+
+// Jitter that the stamps tell is taken out: a ramp stays one, a held input keeps its area.
+TEST(PrepareLog, BringsJitteryStampsToOneSampleTime) {
+  Log log;
+  esokit::sim::Gaussian gaussian(4);
+  double t = 100;
+  double area = 0;
+  for (int k = 0; k < 1000; ++k) {
+    log.time.push_back(t);
+    log.y.push_back(3 + 2 * (t - 100));
+    log.u.push_back(k % 7);
+    const double step = T * (1 + 0.15 * std::tanh(gaussian.next()));
+    if (k < 999) area += step * (k % 7);
+    t += step;
+  }
+  const auto prepared = esokit::prepare(log);
+  ASSERT_TRUE(prepared);
+  EXPECT_GT(prepared->report.jitter, 0.05 * T);
+  const auto& data = prepared->data;
+  double found = 0;
+  for (std::size_t k = 0; k < data.y.size(); ++k) {
+    EXPECT_NEAR(data.y[k], 3 + 2 * static_cast<double>(k) * data.sample_time, 1e-9);
+    found += data.u[k] * data.sample_time;
+  }
+  // The last row and what is left of a row are not in it.
+  EXPECT_NEAR(found, area, 2 * 6 * T);
+}
+
+TEST(Study, RefusesBadOptions) {
+  const Log log = closed_loop(1, 3, 400);
+  IdentifyOptions options = quick();
+  options.orders = {};
+  EXPECT_STREQ(esokit::study(log, options).error().field, "orders");
+  for (const int order : {0, 4}) {
+    options.orders = {order};
+    EXPECT_STREQ(esokit::study(log, options).error().field, "orders");
+  }
+  options = quick();
+  options.averaged = 16;
+  EXPECT_STREQ(esokit::study(log, options).error().field, "averaged");
+}
+
+}  // namespace
