@@ -96,18 +96,9 @@ struct SampledPolePairs {
 };
 
 /// Placement of an observer with half the gains of the bandwidth parameterisation.
-struct HalfGainPoles {
-  template <int Size, PlainScalar S>
-  using Spec = S;  ///< omega_o, rad/s, of the observer whose gains are halved
-
+struct HalfGainPoles : BandwidthPlacement {
   template <int Size, PlainScalar S>
   using Sampled = SampledPolePairs<Size, S>;  ///< what `sample` gives
-
-  /// Error of a bandwidth that is not finite or not positive.
-  template <int Size, PlainScalar S>
-  static Check<S> check(const char* field, const S& bandwidth, int index = -1) {
-    return Rules<S>{}.positive(field, bandwidth, index);
-  }
 
   /// Poles at exp(s_k T). @param bandwidth omega_o, rad/s @param sample_time T, s
   template <int Size, PlainScalar S>
@@ -125,12 +116,6 @@ struct HalfGainPoles {
   template <int Size, PlainScalar S>
   static Vector<S, Size> gain(const S& bandwidth) {
     return continuous_gain<Size, S>(bandwidth) / S(2);
-  }
-
-  /// A number that names the spec in an error.
-  template <int Size, PlainScalar S>
-  static S representative(const S& bandwidth) {
-    return bandwidth;
   }
 };
 

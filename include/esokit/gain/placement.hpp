@@ -14,19 +14,29 @@
 
 namespace esokit {
 
-/// All N poles at -omega_o (at exp(-omega_o T) when sampled): the bandwidth parameterisation.
-struct EqualPoles {
+/// What the placements by a bandwidth have in common; each adds `Sampled` and `sample`, and `gain`
+/// where there is a continuous one.
+struct BandwidthPlacement {
   template <int Size, Scalar S>
   using Spec = S;  ///< omega_o, rad/s
-
-  template <int Size, Scalar S>
-  using Sampled = EqualSampledPoles<Size, S>;  ///< what `sample` gives
 
   /// Error of a bandwidth that is not finite or not positive.
   template <int Size, Scalar S>
   static Check<S> check(const char* field, const S& bandwidth, int index = -1) {
     return Rules<S>{}.positive(field, bandwidth, index);
   }
+
+  /// A number that names the spec in an error.
+  template <int Size, Scalar S>
+  static S representative(const S& bandwidth) {
+    return bandwidth;
+  }
+};
+
+/// All N poles at -omega_o (at exp(-omega_o T) when sampled): the bandwidth parameterisation.
+struct EqualPoles : BandwidthPlacement {
+  template <int Size, Scalar S>
+  using Sampled = EqualSampledPoles<Size, S>;  ///< what `sample` gives
 
   /// Poles at exp(-omega_o T). @param bandwidth omega_o, rad/s @param sample_time T, s
   template <int Size, Scalar S>
@@ -38,12 +48,6 @@ struct EqualPoles {
   template <int Size, Scalar S>
   static Vector<S, Size> gain(const S& bandwidth) {
     return continuous_gain<Size, S>(bandwidth);
-  }
-
-  /// A number that names the spec in an error.
-  template <int Size, Scalar S>
-  static S representative(const S& bandwidth) {
-    return bandwidth;
   }
 };
 

@@ -34,29 +34,14 @@ struct ReducedSampledPoles {
 
 /// Placement of a reduced-order observer: N - 1 poles at exp(-omega_o T), one at zero. For sampled
 /// observers; there is no continuous gain of the kind.
-struct ReducedPoles {
-  template <int Size, Scalar S>
-  using Spec = S;  ///< omega_o, rad/s
-
+struct ReducedPoles : BandwidthPlacement {
   template <int Size, Scalar S>
   using Sampled = ReducedSampledPoles<Size, S>;  ///< what `sample` gives
-
-  /// Error of a bandwidth that is not finite or not positive.
-  template <int Size, Scalar S>
-  static Check<S> check(const char* field, const S& bandwidth, int index = -1) {
-    return Rules<S>{}.positive(field, bandwidth, index);
-  }
 
   /// The poles. @param bandwidth omega_o, rad/s @param sample_time T, s
   template <int Size, Scalar S>
   static ReducedSampledPoles<Size, S> sample(const S& bandwidth, const S& sample_time) {
     return {EqualSampledPoles<Size - 1, S>::from_bandwidth(bandwidth, sample_time)};
-  }
-
-  /// A number that names the spec in an error.
-  template <int Size, Scalar S>
-  static S representative(const S& bandwidth) {
-    return bandwidth;
   }
 };
 
