@@ -62,7 +62,6 @@
 #include <esokit/gain/constant_gain.hpp>
 #include <esokit/gain/continuous_gain.hpp>
 #include <esokit/gain/covariance_factor.hpp>
-#include <esokit/gain/covariance_root.hpp>
 #include <esokit/gain/error_polynomial.hpp>
 #include <esokit/gain/feedback_gain.hpp>
 #include <esokit/gain/gain_interval.hpp>

@@ -36,7 +36,6 @@ template class Limiter<double>;
 template class Fal<double>;
 template class ControlLoop<LinearEso<2>>;
 template class CovarianceFactor<3, double>;
-template class CovarianceRoot<3, double>;
 template class RiccatiGain<3, double>;
 
 }  // namespace esokit

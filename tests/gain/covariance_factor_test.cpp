@@ -104,6 +104,52 @@ TEST(CovarianceFactor, updates_equal_dense_matrices) {
   updates_equal_dense<6>();  // not unrolled
 }
 
+/// A measurement of any combination of the states, with noise and without.
+TEST(CovarianceFactor, correction_by_any_row_equals_dense) {
+  constexpr int N = 4;
+  Random random(9);
+  constexpr double unit = 200 * N * std::numeric_limits<double>::epsilon();
+  for (int run = 0; run < 60; ++run) {
+    const auto p = random_covariance<N>(random, run % 3 == 0 ? 2 : N);
+    const double r = run % 2 == 0 ? 0 : random.log_uniform(1e-4, 1);
+    auto factor = CovarianceFactor<N, double>::nearest(p);
+    Eigen::RowVector4d c;
+    esokit::Array<double, N> output{};
+    for (int i = 0; i < N; ++i) {
+      c(i) = i == run % N ? 0 : random.uniform(-1, 1);
+      output[static_cast<std::size_t>(i)] = c(i);
+    }
+    const double variance = c * p * c.transpose() + r;
+    const Eigen::Vector4d gain = p * c.transpose() / variance;
+    const auto k = factor.correct(output, r);
+    const Eigen::Matrix4d corrected = p - gain * c * p;
+    const auto left = factor.matrix();
+    const double loss = 1 + p.trace() / variance;  // digits that the dense gain loses
+    for (int i = 0; i < N; ++i) {
+      const double size = std::sqrt(p(i, i));
+      EXPECT_NEAR(k[static_cast<std::size_t>(i)], gain(i),
+                  loss * unit * size / std::sqrt(variance));
+      EXPECT_GE(factor.variance(i), 0);
+      for (int j = 0; j < N; ++j) {
+        EXPECT_NEAR(left(i, j), corrected(i, j), loss * unit * size * std::sqrt(p(j, j)));
+      }
+    }
+  }
+}
+
+/// Nothing is corrected where neither the noise nor the states leave anything open.
+TEST(CovarianceFactor, what_is_known_for_certain_is_not_corrected) {
+  for (const double r : {0.0, std::numeric_limits<double>::denorm_min()}) {
+    Eigen::Matrix3d p = Eigen::Matrix3d::Zero();
+    p(2, 2) = 4;
+    auto factor = CovarianceFactor<3, double>::from_matrix(p).value();
+    for (const double k : factor.correct({1, 2, 0}, r)) EXPECT_EQ(k, 0);
+    EXPECT_EQ(factor.matrix()(2, 2), 4);
+    EXPECT_EQ(factor.correct({1, 0, 2}, r)[2], 0.5);
+    EXPECT_EQ(factor.matrix()(2, 2), 0);
+  }
+}
+
 TEST(CovarianceFactor, takes_semidefinite_matrices) {
   Random random(5);
   for (int rank = 0; rank <= 4; ++rank) {

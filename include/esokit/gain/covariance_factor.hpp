@@ -156,6 +156,36 @@ class CovarianceFactor {
     return gain;
   }
 
+  /// P <- P - k c P for a measurement c x with noise of variance r (G. J. Bierman, 1977), where c
+  /// is not the first state alone. What is known for certain is not corrected.
+  /// @param output c, N elements @return k = P c' / (c P c' + r), N elements
+  Array<S, Size> correct(const Array<S, Size>& output, const S& noise) noexcept {
+    Array<S, Size> gain;
+    gain.fill(S(0.0));
+    S sum = noise;
+    S inverse = inverse_of_normal(sum);
+    for (int j = Size - 1; j >= 0; --j) {
+      S seen = output[index(j)];
+      for (int i = j + 1; i < Size; ++i) seen = seen + lower(i, j) * output[index(i)];
+      const S spread = variances_[index(j)] * seen;
+      const S share = inverse * seen;
+      for (int i = j + 1; i < Size; ++i) {
+        S& l = lower_[packed(i, j)];
+        const S old = l;
+        l = old - gain[index(i)] * share;
+        gain[index(i)] = gain[index(i)] + old * spread;
+      }
+      gain[index(j)] = spread;
+      const S before = sum;
+      sum = before + spread * seen;
+      inverse = inverse_of_normal(sum);
+      const auto some = inverse > S(0.0);
+      variances_[index(j)] = variances_[index(j)] * select(some, S(before * inverse), S(1.0));
+    }
+    for (S& k : gain) k = k * inverse;
+    return gain;
+  }
+
   /// One sample ahead: P <- inflation Phi P Phi' + Q.
   /// @param inflation > 0 @param noise Q, in the same scaling @param transition Phi
   /// @tparam DiagonalNoise Q is diagonal, which saves a tenth
@@ -378,6 +408,12 @@ class CovarianceFactor {
   /// C(j, i) in the scalar of tables.
   static constexpr detail::TableScalar<S> pascal(int j, int i) noexcept {
     return binomial_table<Size, detail::TableScalar<S>>[index(j)][index(i)];
+  }
+
+  /// Zero for what has no inverse.
+  static constexpr S inverse_of_normal(const S& x) noexcept {
+    const auto some = x >= detail::smallest_normal<S>();
+    return select(some, S(S(1.0) / select(some, x, S(1.0))), S(0.0));
   }
 
   static constexpr S inverse_of(const S& variance) noexcept {

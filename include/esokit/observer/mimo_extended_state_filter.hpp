@@ -5,7 +5,7 @@
 
 #include <cmath>
 #include <esokit/core/lane_by_lane.hpp>
-#include <esokit/gain/covariance_root.hpp>
+#include <esokit/gain/covariance_factor.hpp>
 #include <esokit/gain/riccati.hpp>
 #include <esokit/gain/riccati_gain.hpp>
 #include <esokit/gain/step_status.hpp>
@@ -111,17 +111,16 @@ class MimoExtendedStateFilter {
       noise = noise * ((S(1) + config.inflation) / config.inflation);
     }
     MimoExtendedStateFilter filter(config, noise);
-    const auto factored = [&](const char* field, const Covariance& p,
-                              CovarianceRoot<size, S>& root) -> Check<S> {
+    const auto factored = [&](const char* field, const Covariance& p, Factor& factor) -> Check<S> {
       const Covariance q = scaled(p, filter.root_units_);
       for (int i = 0; i < size; ++i) {
         if (p(i, i) > S(0) && !is_held(q(i, i))) return not_held(field, p(i, i), i * size + i);
       }
-      const auto made = CovarianceRoot<size, S>::from_matrix(q);
+      const auto made = Factor::from_matrix(q);
       if (!made) {
         return Error<S>{field, p(size - 1, size - 1), "must be finite and positive semidefinite"};
       }
-      root = *made;
+      factor = *made;
       return {};
     };
     rules.all_of(factored("initial_covariance", config.initial_covariance, filter.start_))
@@ -133,7 +132,7 @@ class MimoExtendedStateFilter {
           not_held("measurement_covariance", config.measurement_covariance(i, i), i * outputs + i));
     }
     if (!rules) return rules.error();
-    const auto measurement = CovarianceRoot<outputs, S>::from_matrix(measured);
+    const auto measurement = CovarianceFactor<outputs, S>::from_matrix(measured);
     if (!measurement) {
       return Error<S>{"measurement_covariance", config.measurement_covariance(0, 0),
                       "must be finite and positive semidefinite"};
@@ -319,16 +318,17 @@ class MimoExtendedStateFilter {
   /// Bound of the covariance of the present estimate's error, N x N, physical units. An element
   /// beyond the scalar is its largest number.
   [[nodiscard]] Covariance covariance() const noexcept {
-    Covariance p = root_.matrix();
+    Covariance p = factor_.matrix();
     if (corrected_) {
       // (I - K C) P- (I - K C)' + K R K' with R, not R / (1 + theta).
       Covariance rest = Covariance::Identity();
       for (int i = 0; i < outputs; ++i) {
         for (int r = 0; r < size; ++r) rest(r, first(i)) -= gain_(r, i);
       }
-      const auto spread = gain_ * used_measurement_.lower();
+      // Of a channel that was left out the gain is zero.
+      const auto spread = gain_ * used_measurement_.matrix();
       const auto noise = detail::plus_product_transposed<size, outputs, size, S>(
-          Covariance::Zero(), spread, spread, S(1));
+          Covariance::Zero(), spread, gain_, S(1));
       p = detail::plus_product_transposed<size, size, size, S>(noise, rest * p, rest, S(1));
     }
     p = scaled(p, inverse(root_units_));
@@ -353,6 +353,9 @@ class MimoExtendedStateFilter {
   [[nodiscard]] const S& sample_time() const noexcept { return sample_time_; }
 
  private:
+  using Factor = CovarianceFactor<size, S>;
+  using Transition = MatrixTransition<size, S>;
+
   static constexpr std::size_t index(int i) noexcept { return static_cast<std::size_t>(i); }
   static constexpr int order_of(int chain) noexcept { return Orders::values[index(chain)]; }
 
@@ -473,7 +476,7 @@ class MimoExtendedStateFilter {
 
   /// C P- C' + R, divided by the unit.
   [[nodiscard]] OutputCovariance seen_covariance() const noexcept {
-    const Covariance p = root_.matrix();
+    const Covariance p = factor_.matrix();
     OutputCovariance s = measurement_.matrix();
     for (int i = 0; i < outputs; ++i) {
       for (int j = 0; j < outputs; ++j) s(i, j) += p(first(i), first(j));
@@ -515,7 +518,7 @@ class MimoExtendedStateFilter {
   [[nodiscard]] bool fits() const {
     MimoExtendedStateFilter run = *this;
     for (int k = 0; k < 8 * size; ++k) {
-      if (!detail::all_finite(run.gain_) || !is_finite(run.root_.largest())) return false;
+      if (!detail::all_finite(run.gain_) || !detail::all_finite(run.factor_.matrix())) return false;
       run.corrected_ = true;
       run.advance_covariance();
     }
@@ -530,7 +533,7 @@ class MimoExtendedStateFilter {
     if (!finite(next, chain)) return StepStatus::measurement_rejected;
     state_ = next;
     missed_[index(chain)] = 0;
-    Covariance p = root_.matrix();
+    Covariance p = factor_.matrix();
     const Covariance fresh = (has_limit_ ? limit_ : start_).matrix();
     for (int r = first(chain); r < end(chain); ++r) {
       for (int i = 0; i < size; ++i) {
@@ -539,7 +542,7 @@ class MimoExtendedStateFilter {
         p(i, r) = p(r, i);
       }
     }
-    root_ = CovarianceRoot<size, S>::nearest(p);
+    factor_ = Factor::nearest(p);
     standing_ = false;
     if constexpr (outputs == 1) restart();
     return StepStatus::restarted;
@@ -670,20 +673,23 @@ class MimoExtendedStateFilter {
       }
       standing_ = false;
     }
-    if (corrected_) root_ = posterior_;
+    if (corrected_) factor_ = posterior_;
     corrected_ = false;
     fresh_ = false;
     // As in RiccatiGain: in a gap P- of a chain grows no further than a measurement can tell.
-    Covariance phi = transition();
-    auto noise = noise_;
-    const S most = measurement_.largest() / std::sqrt(detail::rounding<S>());
+    Transition step{transition(), {}};
+    Covariance& phi = step.phi;
+    Covariance held;  // Q of what still grows
+    bool any_held = false;
     for (int chain = 0; chain < outputs; ++chain) {
-      if (missed_[index(chain)] < 3 || !(root_.largest(first(chain), end(chain)) > most)) continue;
+      if (missed_[index(chain)] < 3 || !tells_nothing(chain)) continue;
+      if (!any_held) held = noise_.matrix();
+      any_held = true;
       const S still = S(1) / std::sqrt(growth_);
       for (int r = first(chain); r < end(chain); ++r) {
         for (int j = first(chain); j < end(chain); ++j) phi(r, j) *= still;
+        for (int j = 0; j < size; ++j) held(r, j) = held(j, r) = S(0);
       }
-      for (int r = first(chain); r < end(chain); ++r) noise.clear_row(r);
       // After max_gap the chain starts anew, whatever its covariance is until then.
       if (missed_[index(chain)] > max_gap_ + 1) {
         for (int r = first(chain); r < end(chain); ++r) {
@@ -691,9 +697,20 @@ class MimoExtendedStateFilter {
         }
       }
     }
-    root_.advance(phi, growth_, noise);
+    factor_.advance(growth_, any_held ? Factor::nearest(held) : noise_, step);
     prepare_all();
-    if (has_limit_ && root_.near(limit_, S(1e-3))) stand();
+    if (has_limit_ && factor_.near(limit_, S(1e-3))) stand();
+  }
+
+  /// P- of the chain is so large beside R that a measurement tells all there is to know.
+  [[nodiscard]] bool tells_nothing(int chain) const noexcept {
+    const Covariance p = factor_.matrix();
+    const OutputCovariance r = measurement_.matrix();
+    S variance(0);
+    S noise(0);
+    for (int i = first(chain); i < end(chain); ++i) variance = detail::larger(variance, p(i, i));
+    for (int i = 0; i < outputs; ++i) noise = detail::larger(noise, r(i, i));
+    return variance > noise / detail::rounding<S>();
   }
 
   void prepare_all() noexcept {
@@ -702,40 +719,43 @@ class MimoExtendedStateFilter {
     prepare(used);
   }
 
-  /// Gain and corrected covariance for a measurement with these channels. One that is left out gets
-  /// a row of its own that sees nothing.
+  /// Gain and corrected covariance for a measurement with these channels, one after the other: with
+  /// R = L D L' the rows of L^-1 y are measurements whose noises are independent, of variances D.
   void prepare(const Array<bool, outputs>& used) noexcept {
-    Matrix<S, outputs, size> output = Matrix<S, outputs, size>::Zero();
-    bool all_used = true;
-    for (int i = 0; i < outputs; ++i) {
-      if (used[index(i)]) {
-        output(i, first(i)) = S(1);
-      } else {
-        all_used = false;
-      }
-    }
     used_measurement_ = measurement_;
+    bool all_used = true;
+    for (const bool channel : used) all_used = all_used && channel;
     if (!all_used) {
       OutputCovariance r = measurement_.matrix();
       for (int i = 0; i < outputs; ++i) {
         if (used[index(i)]) continue;
         for (int j = 0; j < outputs; ++j) r(i, j) = r(j, i) = S(0);
-        r(i, i) = S(1);
       }
-      used_measurement_ = CovarianceRoot<outputs, S>::nearest(r);
+      used_measurement_ = CovarianceFactor<outputs, S>::nearest(r);
     }
-    auto root = used_measurement_;
-    root.scale(S(1) / std::sqrt(growth_));
-    posterior_ = root_;
-    gain_ = posterior_.correct(output, root);
-    if (all_used) return;
+    // L^-1, row by row.
+    OutputCovariance apart = OutputCovariance::Identity();
     for (int i = 0; i < outputs; ++i) {
-      if (!used[index(i)]) {
-        for (int r = 0; r < size; ++r) gain_(r, i) = S(0);
-        // Its row of one is no noise of the estimate.
-        used_measurement_.clear_row(i);
+      for (int k = 0; k < i; ++k) {
+        for (int j = 0; j <= k; ++j) apart(i, j) -= used_measurement_.lower(i, k) * apart(k, j);
       }
     }
+    posterior_ = factor_;
+    Gain gain = Gain::Zero();  // of L^-1 y
+    for (int i = 0; i < outputs; ++i) {
+      if (!used[index(i)]) continue;
+      Array<S, size> output{};
+      for (int j = 0; j <= i; ++j) output[index(first(j))] = apart(i, j);
+      const auto k = posterior_.correct(output, S(used_measurement_.variance(i) / growth_));
+      // What the channels before have already explained of it.
+      for (int j = 0; j < i; ++j) {
+        S explained(0);
+        for (int l = 0; l <= i; ++l) explained += apart(i, l) * gain(first(l), j);
+        for (int r = 0; r < size; ++r) gain(r, j) -= k[index(r)] * explained;
+      }
+      for (int r = 0; r < size; ++r) gain(r, i) = k[index(r)];
+    }
+    gain_ = gain * apart;
   }
 
   bool freeze(const Covariance& noise) {
@@ -758,7 +778,7 @@ class MimoExtendedStateFilter {
     });
     const auto covariance = riccati_covariance<size, outputs, S>(model, start);
     if (!covariance) return false;
-    root_ = CovarianceRoot<size, S>::nearest(*covariance);
+    factor_ = Factor::nearest(*covariance);
     // The recursion has the last word, as for a single chain.
     constexpr int most_steps = 2000;
     Gain last = Gain::Zero();
@@ -769,16 +789,16 @@ class MimoExtendedStateFilter {
       const bool done = !(change > S(2) * detail::rounding<S>() * detail::largest_magnitude(gain_));
       last = gain_;
       if (done && step > 3) break;
-      root_ = posterior_;
-      root_.advance(transition(), growth_, noise_);
+      factor_ = posterior_;
+      factor_.advance(growth_, noise_, Transition{transition(), {}});
     }
-    limit_ = root_;
+    limit_ = factor_;
     has_limit_ = true;
     return true;
   }
 
   void stand() noexcept {
-    root_ = limit_;
+    factor_ = limit_;
     prepare_all();
     standing_ = true;
   }
@@ -789,20 +809,20 @@ class MimoExtendedStateFilter {
     if (has_limit_) {
       stand();
     } else {
-      root_ = start_;
+      factor_ = start_;
       prepare_all();
     }
   }
 
-  Estimate state_ = Estimate::Zero();    ///< scaled, x_r = T^r z_r / r! chain by chain
-  Gain gain_ = Gain::Zero();             ///< of the coming correction, scaled
-  CovarianceRoot<size, S> root_{};       ///< of P-
-  CovarianceRoot<size, S> posterior_{};  ///< of what the correction will leave
-  CovarianceRoot<size, S> start_{};
-  CovarianceRoot<size, S> noise_{};
-  CovarianceRoot<size, S> limit_{};
-  CovarianceRoot<outputs, S> measurement_{};
-  CovarianceRoot<outputs, S> used_measurement_{};
+  Estimate state_ = Estimate::Zero();  ///< scaled, x_r = T^r z_r / r! chain by chain
+  Gain gain_ = Gain::Zero();           ///< of the coming correction, scaled
+  Factor factor_{};                    ///< of P-
+  Factor posterior_{};                 ///< of what the correction will leave
+  Factor start_{};
+  Factor noise_{};
+  Factor limit_{};
+  CovarianceFactor<outputs, S> measurement_{};
+  CovarianceFactor<outputs, S> used_measurement_{};
   Matrix<S, outputs, Inputs> drive_;
   Estimate units_;       ///< T^r / r!
   Estimate root_units_;  ///< the same over the root of the unit: of what the roots are made
