@@ -12,6 +12,7 @@
 
 #include <esokit/analysis/frequency_response.hpp>
 #include <esokit/analysis/observer_system.hpp>
+#include <esokit/control/adrc.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 
 #include "common/report.hpp"
@@ -37,13 +38,28 @@ inline constexpr double level_factor = 2.0;  ///< alpha
 
 /// A sampled observer with b0 = 1; one level is the standard LESO.
 template <int Order, int Levels>
-CascadeEso<Order, Levels> observer_with(double bandwidth, double sample_time) {
+typename CascadeEso<Order, Levels>::Config observer_config(double bandwidth, double sample_time) {
   typename CascadeEso<Order, Levels>::Config config;
   config.observer_bandwidth = bandwidth;
   config.bandwidth_factor = Levels > 1 ? level_factor : 0.0;
   config.input_gain = 1.0;
   config.sample_time = sample_time;
-  return CascadeEso<Order, Levels>::make(config).value();
+  return config;
+}
+template <int Order, int Levels>
+CascadeEso<Order, Levels> observer_with(double bandwidth, double sample_time) {
+  return CascadeEso<Order, Levels>::make(observer_config<Order, Levels>(bandwidth, sample_time))
+      .value();
+}
+
+/// The controller around it.
+template <int Order, int Levels>
+Adrc<CascadeEso<Order, Levels>> controller_with(double bandwidth, double sample_time,
+                                                double control) {
+  return Adrc<CascadeEso<Order, Levels>>::make(
+             {.observer = observer_config<Order, Levels>(bandwidth, sample_time),
+              .controller_bandwidth = control})
+      .value();
 }
 
 /// From d to dhat at a frequency.

@@ -7,7 +7,7 @@
 // Way: sampled, sampled observers and a plant sampled exactly; nothing is simulated.
 //
 // symbol     code            value                 unit
-// plant      CompanionPlant  y'' + 2 y' + y = u    -
+// plant      LinearPlant     y'' + 2 y' + y = u    -
 // ghat       input_gain      1                     -
 // omega_c    control         2 (gains 4, 4)        rad/s
 // omega_o1   grid            4 .. 400              rad/s
@@ -41,19 +41,17 @@ struct LoopMargins {
 
 template <int Levels>
 LoopMargins margins_at(double bandwidth) {
-  const auto plant = CompanionPlant<2>{{1.0, 2.0}, 1.0}.system().value();
-  const auto observer = observer_with<2, Levels>(bandwidth, sample_time);
-  const auto law = AdrcLaw<2>::make({.controller_bandwidth = control, .input_gain = 1.0}).value();
-  const auto loop = adrc_loop(sampled_plant(plant, sample_time).value(), observer, law).value();
-  const auto all = margins(loop).value();
-  const auto range = input_gain_range(loop, law, 1.0).value();
+  const auto plant = LinearPlant<2>::chain({.coefficients = {1.0, 2.0}}).value();
+  const auto loop = closed_loop(plant, controller_with<2, Levels>(bandwidth, sample_time, control));
+  const auto all = margins(*loop).value();
+  const auto range = input_gain_range(*loop).value();
   const auto value = [](const Margin& margin) {  // nothing is drawn where there is no limit
     return margin.limited() ? margin.value : std::numeric_limits<double>::quiet_NaN();
   };
   return {value(all.gain_increase),
           value(all.gain_decrease),
           value(all.phase) * 180.0 / std::numbers::pi,
-          value(delay_margin(loop, plant).value()) * 1e3,
+          value(delay_margin(*loop).value()) * 1e3,
           value(all.modulus),
           range.lower,
           range.upper};

@@ -20,9 +20,7 @@
 #include <cstdint>
 #include <numbers>
 
-#include <esokit/analysis/adrc_loop.hpp>
-#include <esokit/analysis/covariance.hpp>
-#include <esokit/eigen.hpp>
+#include <esokit/analysis/loop_noise.hpp>
 
 #include "analysis/analysis.hpp"
 #include "common/parallel.hpp"
@@ -38,20 +36,19 @@ constexpr double sample_time = 1e-3;
 constexpr long samples = 10'000'000;
 
 template <int Order, int Levels>
-auto make_loop(double T) {
-  const double bandwidth = bandwidth_for<Order, Levels>(wanted, T);
-  const auto observer = observer_with<Order, Levels>(bandwidth, T);
-  const auto law = AdrcLaw<Order>::make({.controller_bandwidth = control, .input_gain = 1.0});
-  const auto plant = CompanionPlant<Order>{{}, 1.0}.system().value();
-  return adrc_loop(sampled_plant(plant, T).value(), observer, *law).value();
+auto controller_at(double T) {
+  return controller_with<Order, Levels>(bandwidth_for<Order, Levels>(wanted, T), T, control);
+}
+
+template <int Order>
+LinearPlant<Order> chain() {
+  return LinearPlant<Order>::chain({}).value();
 }
 
 template <int Order, int Levels>
 double deviation_of_control(double T) {
-  const auto loop = make_loop<Order, Levels>(T);
-  EigenMatrix<double, 3, 3> input = EigenMatrix<double, 3, 3>::Zero();
-  input(1, 1) = 1.0;
-  return std::sqrt(output_covariance(loop.closed_loop(), input).value()(1, 1));
+  const auto all = noise(chain<Order>(), controller_at<Order, Levels>(T), {.measurement = {1.0}});
+  return all->control[0];
 }
 
 /// White, variance 1 (uniform: a variance asks for no more), and fast: splitmix64.
@@ -78,9 +75,7 @@ struct Measurement {
 
 template <int Order, int Levels>
 Measurement run(std::uint64_t seed) {
-  const double bandwidth = bandwidth_for<Order, Levels>(wanted, sample_time);
-  auto observer = observer_with<Order, Levels>(bandwidth, sample_time);
-  const auto law = AdrcLaw<Order>::make({.controller_bandwidth = control, .input_gain = 1.0});
+  auto controller = controller_at<Order, Levels>(sample_time);
   White white(seed);
   // The chain of integrators, sampled: Taylor terms of the held input.
   constexpr std::size_t n = Order;
@@ -89,8 +84,7 @@ Measurement run(std::uint64_t seed) {
   std::vector<double> blocks;
   double sum = 0.0;
   for (long k = -10'000; k < samples; ++k) {
-    observer.update(x[0] + white.next(), u);
-    u = law->control(observer.estimate(), 0.0);
+    u = controller.update(x[0] + white.next(), 0.0);
     std::array<double, n> next{};
     for (std::size_t r = 0; r < n; ++r) {
       double term = 1.0;
@@ -123,7 +117,7 @@ std::array<double, 4> by_levels(double T) {
 
 template <int Levels>
 std::vector<double> over_frequency(const Array<double, 300>& grid) {
-  const auto loop = make_loop<2, Levels>(sample_time);
+  const auto loop = closed_loop(chain<2>(), controller_at<2, Levels>(sample_time)).value();
   const auto curve = bode(grid, [&](double w) { return loop.noise_to_control(w); }).value();
   return {curve.magnitude.begin(), curve.magnitude.end()};
 }

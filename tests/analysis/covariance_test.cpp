@@ -7,7 +7,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <esokit/analysis/adrc_loop.hpp>
 #include <esokit/analysis/covariance.hpp>
 #include <esokit/analysis/frequency_response.hpp>
 #include <esokit/eigen.hpp>
@@ -294,37 +293,6 @@ TEST(Covariance, OfARandomWalkDisturbanceEqualsMonteCarlo) {
     SCOPED_TRACE(testing::Message() << "row " << r);
     expect_within(measured[r], exact(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(r)));
   }
-}
-
-TEST(Covariance, OfTheControlInAClosedLoopEqualsMonteCarlo) {
-  const double T = 0.01;
-  auto observer = sampled<2, 2>(15.0, T);
-  const auto law = AdrcLaw<2>::make({.controller_bandwidth = 3.0, .input_gain = 1.0}).value();
-  const auto plant = CompanionPlant<2>{{1.0, 2.0}, 1.3}.system().value();
-  const auto loop = adrc_loop(sampled_plant(plant, T).value(), observer, law).value();
-  EigenMatrix<double, 3, 3> input = EigenMatrix<double, 3, 3>::Zero();
-  input(1, 1) = 0.01;  // v
-  input(2, 2) = 4.0;   // d, held over a sample
-  const auto exact = output_covariance(loop.closed_loop(), input).value();
-
-  Random random(9);
-  MeanSquare of_y, of_u, of_d;
-  const auto a = sampled_plant(plant, T).value();
-  EigenMatrix<double, 2> x = EigenMatrix<double, 2>::Zero();
-  double u = 0.0;
-  for (long k = -5000; k < samples; ++k) {
-    observer.update(x(0) + 0.1 * white(random), u);
-    u = law.control(observer.estimate(), 0.0);
-    if (k >= 0) {
-      of_y.add(x(0));
-      of_u.add(u);
-      of_d.add(observer.total_disturbance());
-    }
-    x += a.a * x + a.b.col(0) * u + a.b.col(1) * (2.0 * white(random));
-  }
-  expect_within(of_y, exact(0, 0));
-  expect_within(of_u, exact(1, 1));
-  expect_within(of_d, exact(4, 4));
 }
 
 // The steady filter is the Kalman filter of the chain; its own covariance is another way to ours.

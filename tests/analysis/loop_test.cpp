@@ -1,128 +1,222 @@
-// The closed loop against a run of the real observer and law, and its transfer functions against
-// their definitions.
+// The closed loop against a run of the real controller on a plant that is integrated in small
+// steps, and its transfer functions against their definitions.
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <complex>
 #include <cstddef>
-#include <esokit/analysis/adrc_loop.hpp>
-#include <esokit/eigen.hpp>
+#include <esokit/analysis/loop.hpp>
+#include <esokit/analysis/loop_noise.hpp>
+#include <esokit/analysis/loop_response.hpp>
+#include <esokit/analysis/peak_gain.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
-#include <esokit/sim/closed_loop.hpp>
+#include <limits>
+#include <numbers>
 #include <support/refusal.hpp>
+#include <vector>
+
+#include "support/numbers.hpp"
 
 namespace {
 
+using esokit_test::Random;
 using esokit_test::refusal;
 
 using namespace esokit;
 using Complex = std::complex<double>;
+using Plant = LinearPlant<2>;
+using Observer = CascadeEso<2, 2>;
 
 constexpr double T = 0.01;
 
-auto observer_with(double b0) {
-  return CascadeEso<2, 2>::make({.observer_bandwidth = 20.0,
-                                 .bandwidth_factor = 2.0,
-                                 .input_gain = b0,
-                                 .sample_time = T})
+Plant plant(double dead_time = 0.0) {
+  return Plant::chain({.coefficients = {3.0, 0.4}, .input_gain = 2.5, .dead_time = dead_time})
       .value();
 }
-auto law_with(double b0) {
-  return AdrcLaw<2>::make({.controller_bandwidth = 4.0, .input_gain = b0}).value();
+template <class Form = OutputBased>
+Adrc<Observer, Form> controller(double sample_time = T) {
+  return Adrc<Observer, Form>::make({.observer = {.observer_bandwidth = 20.0,
+                                                  .bandwidth_factor = 2.0,
+                                                  .input_gain = 2.0,
+                                                  .sample_time = sample_time},
+                                     .controller_bandwidth = 4.0})
+      .value();
 }
-auto plant() { return CompanionPlant<2>{{3.0, 0.4}, 2.5}.system().value(); }
 
-/// x[k+1] - x[k] of a system's model, beside a run of the real thing. The plant is integrated by
-/// small Runge-Kutta steps, so that neither sampling nor loop algebra is shared.
-template <class Loop, class Observer, class Law>
-void expect_same_run(const Loop& loop, Observer observer, Law&& control, double delay) {
-  const auto& closed = loop.closed_loop();
-  EXPECT_STREQ(loop.controller().input_names[0], "y");
-  EXPECT_STREQ(loop.controller().input_names[1], "r");
-  EXPECT_STREQ(loop.controller().output_names[0], "u");
-  EXPECT_STREQ(closed.output_names[0], "y");
-  EXPECT_STREQ(closed.output_names[1], "u");
-  EXPECT_STREQ(closed.output_names[2], "yhat");
-  constexpr int states = std::remove_cvref_t<decltype(closed)>::states;
-  EigenMatrix<double, states> x = EigenMatrix<double, states>::Zero();
-  EigenMatrix<double, 2> truth = EigenMatrix<double, 2>::Zero();
-  double u = 0.0;
-  double u_before = 0.0;
-  const auto p = plant();
-  for (int k = 0; k < 300; ++k) {
-    const EigenMatrix<double, 3> inputs(1.0, 0.1 * std::sin(0.7 * k), k >= 100 ? 2.0 : 0.5);
-    const EigenMatrix<double, 5> outputs = closed.c * x + closed.d * inputs;
+/// A plant under u(t - dead_time), by the classical Runge-Kutta method in small steps: neither the
+/// sampling nor the algebra of the loop is shared.
+template <int States, int Channels>
+struct SteppedPlant {
+  using Linear = LinearPlant<States, double, Channels, Channels>;
+  Linear plant;
+  typename Linear::State x{};
+  std::vector<typename Linear::Input> sent{};
 
-    const double y = truth(0);
-    const double r = inputs(0);
-    observer.update(control.measured(y + inputs(1), r), u);
-    u_before = u;
-    u = control.input(observer.estimate(), r);
-    EXPECT_NEAR(outputs(0), y, 1e-9);
-    EXPECT_NEAR(outputs(1), u, 1e-8);
-    for (int i = 0; i < 3; ++i) EXPECT_NEAR(outputs(2 + i), observer.estimate()(i), 1e-8);
-
-    const int steps = 200;
+  void hold(const typename Linear::Input& u, const typename Linear::Input& d) {
+    sent.push_back(u);
+    const int steps = 200;  // dead times of the tests are multiples of a step
     const double h = T / steps;
-    for (int i = 0; i < steps; ++i) {
-      const double held = (i + 0.5) * h < delay ? u_before : u;
-      const auto rate = [&](double, const EigenMatrix<double, 2>& z) -> EigenMatrix<double, 2> {
-        return p.a * z + p.b.col(0) * held + p.b.col(1) * inputs(2);
-      };
-      truth = sim::step(rate, 0.0, truth, h);
+    const auto late = static_cast<long>(std::lround(plant.dead_time / h));
+    const long start = static_cast<long>(sent.size() - 1) * steps;
+    for (long i = 0; i < steps; ++i) {
+      const long at = start + i - late;
+      const auto held =
+          at < 0 ? typename Linear::Input{} : sent[static_cast<std::size_t>(at / steps)];
+      const auto k1 = plant.derivative(x, held, d);
+      const auto k2 = plant.derivative(x + 0.5 * h * k1, held, d);
+      const auto k3 = plant.derivative(x + 0.5 * h * k2, held, d);
+      const auto k4 = plant.derivative(x + h * k3, held, d);
+      x = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
     }
-    x += closed.a * x + closed.b * inputs;
-  }
-}
-
-struct FedOutput {
-  AdrcLaw<2> law;
-  [[nodiscard]] double measured(double y, double) const { return y; }
-  [[nodiscard]] double input(const EigenMatrix<double, 3>& z, double r) const {
-    return law.control(z, r);
-  }
-};
-struct FedError {
-  AdrcLaw<2> law;
-  [[nodiscard]] double measured(double y, double r) const { return r - y; }
-  [[nodiscard]] double input(const EigenMatrix<double, 3>& z, double) const {
-    return law.control_error_based(z);
   }
 };
 
-TEST(AdrcLoop, IsTheRunningLoop) {
-  const auto loop =
-      adrc_loop(sampled_plant(plant(), T).value(), observer_with(2.0), law_with(2.0)).value();
-  EXPECT_TRUE(loop.stable());
-  expect_same_run(loop, observer_with(2.0), FedOutput{law_with(2.0)}, 0.0);
+Plant::Input one(double value) { return Plant::Input(value); }
+
+/// x of a loop's system, one sample on; out of it.
+struct Model {
+  DynamicSystem system;
+  std::vector<double> x = std::vector<double>(static_cast<std::size_t>(system.a.rows()));
+
+  std::vector<double> step(const std::vector<double>& w) {
+    const auto times = [](const DynamicMatrix<double>& m, const std::vector<double>& v) {
+      std::vector<double> out(static_cast<std::size_t>(m.rows()));
+      for (int i = 0; i < m.rows(); ++i) {
+        for (int j = 0; j < m.cols(); ++j) {
+          out[static_cast<std::size_t>(i)] += m(i, j) * v[static_cast<std::size_t>(j)];
+        }
+      }
+      return out;
+    };
+    const auto from_x = times(system.c, x);
+    auto out = times(system.d, w);
+    for (std::size_t i = 0; i < out.size(); ++i) out[i] += from_x[i];
+    const auto rate = times(system.a, x);
+    const auto driven = times(system.b, w);
+    for (std::size_t i = 0; i < x.size(); ++i) x[i] += rate[i] + driven[i];
+    return out;
+  }
+};
+
+template <class Form>
+void expect_same_run(double dead_time) {
+  SCOPED_TRACE(dead_time);
+  auto real = controller<Form>();
+  const auto loop = closed_loop(plant(dead_time), real).value();
+  EXPECT_EQ(loop.sample_time(), T);
+  EXPECT_EQ(loop.input_gain(), 2.0);
+  EXPECT_EQ(loop.stable(), dead_time < 2.1 * T);
+  Model model{loop.system()};
+  SteppedPlant<2, 1> run{plant(dead_time)};
+  for (int k = 0; k < 300; ++k) {
+    const double r = 1.0;
+    const double v = 0.1 * std::sin(0.7 * k);
+    const double d = k >= 100 ? 2.0 : 0.5;
+    const auto outputs = model.step({r, v, d});
+    const double y = run.x(0);
+    const double u = real.update(y + v, r);
+    ASSERT_NEAR(outputs[0], y, 1e-9);
+    ASSERT_NEAR(outputs[1], u, 1e-8);
+    for (int i = 0; i < 3; ++i) {
+      ASSERT_NEAR(outputs[static_cast<std::size_t>(2 + i)], real.observer().estimate()(i), 1e-8);
+    }
+    run.hold(one(u), one(d));
+  }
 }
 
-TEST(AdrcLoop, IsTheRunningLoopErrorBased) {
-  const auto loop =
-      adrc_loop(sampled_plant(plant(), T).value(), observer_with(-2.0), law_with(2.0), ErrorBased{})
-          .value();
-  EXPECT_TRUE(loop.stable());
-  expect_same_run(loop, observer_with(-2.0), FedError{law_with(2.0)}, 0.0);
+TEST(Loop, IsTheRunningLoop) {
+  for (const double dead_time : {0.0, 0.25 * T, T, 2.0 * T, 2.3 * T}) {
+    expect_same_run<OutputBased>(dead_time);
+  }
+  expect_same_run<ErrorBased>(0.0);
   // The loop gain does not depend on the form.
-  const auto other =
-      adrc_loop(sampled_plant(plant(), T).value(), observer_with(2.0), law_with(2.0)).value();
+  const auto one = closed_loop(plant(), controller<OutputBased>()).value();
+  const auto other = closed_loop(plant(), controller<ErrorBased>()).value();
   for (const double w : {0.5, 8.0, 200.0}) {
-    const Complex l = loop.loop_gain(w).value();
+    const Complex l = one.loop_gain(w).value();
     EXPECT_LT(std::abs(l - other.loop_gain(w).value()), 1e-11 * std::abs(l));
   }
 }
 
-TEST(AdrcLoop, IsTheRunningLoopWithADelay) {
-  for (const double delay : {0.25 * T, T}) {
-    const auto loop =
-        adrc_loop(sampled_plant(plant(), T, delay).value(), observer_with(2.0), law_with(2.0))
-            .value();
-    expect_same_run(loop, observer_with(2.0), FedOutput{law_with(2.0)}, delay);
+/// Two masses that pull at each other, behind a coupled input.
+LinearPlant<4, double, 2, 2> coupled(double coupling, double dead_time = 0.0) {
+  LinearPlant<4, double, 2, 2> two;
+  two.a = {{0.0, 1.0, 0.0, 0.0},
+           {-3.0, -0.4, coupling, 0.0},
+           {0.0, 0.0, 0.0, 1.0},
+           {coupling, 0.0, -5.0, -0.6}};
+  two.b = {{0.0, 0.0}, {2.5, 0.3}, {0.0, 0.0}, {-0.6, 1.8}};
+  two.e = {{0.0, 0.0}, {1.0, 0.0}, {0.0, 0.0}, {0.0, 1.0}};
+  two.c = {{1.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 1.0, 0.0}};
+  two.dead_time = dead_time;
+  return two;
+}
+using Two = MimoAdrc<LinearEso<2>, LinearEso<2>>;
+Two two_channels(const Matrix<double, 2, 2>& input_matrix) {
+  Two::Config config;
+  std::get<0>(config.observers) = {.observer_bandwidth = 20.0, .sample_time = T};
+  std::get<1>(config.observers) = {.observer_bandwidth = 25.0, .sample_time = T};
+  config.controller_bandwidths = {4.0, 5.0};
+  config.input_matrix = input_matrix;
+  return Two::make(config).value();
+}
+
+TEST(Loop, OfSeveralChannelsIsTheRunningLoop) {
+  auto real = two_channels({{2.0, 0.5}, {-0.4, 2.0}});
+  const auto two = coupled(1.5, 1.4 * T);
+  const auto loop = closed_loop(two, real).value();
+  EXPECT_TRUE(loop.stable());
+  EXPECT_EQ(loop.channels(), 2);
+  Model model{loop.system()};
+  SteppedPlant<4, 2> run{two};
+  for (int k = 0; k < 200; ++k) {
+    const double v = 0.1 * std::sin(0.7 * k);
+    const double d = k >= 100 ? 2.0 : 0.5;
+    const auto out = model.step({1.0, -0.5, v, 0.0, 0.0, d});
+    const auto y = two.output(run.x);
+    const auto u = real.update({y(0) + v, y(1)}, {1.0, -0.5});
+    for (std::size_t i = 0; i < 2; ++i) {
+      ASSERT_NEAR(out[i], y(static_cast<int>(i)), 1e-9);
+      ASSERT_NEAR(out[2 + i], u(static_cast<int>(i)), 1e-8);
+    }
+    for (std::size_t i = 0; i < 3; ++i) {
+      ASSERT_NEAR(out[4 + i], real.observer<0>().estimate()(static_cast<int>(i)), 1e-8);
+      ASSERT_NEAR(out[7 + i], real.observer<1>().estimate()(static_cast<int>(i)), 1e-8);
+    }
+    run.hold({u(0), u(1)}, {0.0, d});
   }
 }
 
-template <class Loop>
+/// The system's response by elimination in long double.
+std::vector<Complex> evaluated(const DynamicSystem& system, double w, int input) {
+  using Long = std::complex<long double>;
+  const int n = system.a.rows();
+  const Long angle(0.0L, static_cast<long double>(w) * system.sample_time);
+  const Long value =
+      system.sample_time > 0.0 ? std::exp(angle) - 1.0L : Long(0.0L, static_cast<long double>(w));
+  std::vector<Long> pencil(static_cast<std::size_t>(n * n));
+  std::vector<Long> x(static_cast<std::size_t>(n));
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) {
+      pencil[static_cast<std::size_t>(j * n + i)] =
+          (i == j ? value : Long(0.0L)) - static_cast<long double>(system.a(i, j));
+    }
+    x[static_cast<std::size_t>(i)] = static_cast<long double>(system.b(i, input));
+  }
+  esokit::detail::solve_in_place(esokit::detail::DenseView<Long>{pencil.data(), n},
+                                 esokit::detail::DenseView<Long>{x.data(), n, 1});
+  std::vector<Complex> out;
+  for (int i = 0; i < system.c.rows(); ++i) {
+    Long sum = static_cast<long double>(system.d(i, input));
+    for (int j = 0; j < n; ++j) {
+      sum += static_cast<long double>(system.c(i, j)) * x[static_cast<std::size_t>(j)];
+    }
+    out.emplace_back(static_cast<double>(sum.real()), static_cast<double>(sum.imag()));
+  }
+  return out;
+}
+
 void expect_consistent(const Loop& loop) {
   for (const double w : {0.3, 3.0, 20.0, 150.0}) {
     const Complex l = loop.loop_gain(w).value();
@@ -130,121 +224,348 @@ void expect_consistent(const Loop& loop) {
     const Complex t = loop.complementary_sensitivity(w).value();
     EXPECT_LT(std::abs(s + t - 1.0), 1e-12);
     EXPECT_LT(std::abs(s * (1.0 + l) - 1.0), 1e-12);
+    EXPECT_NEAR(loop.largest_sensitivity(w).value(), std::abs(s), 1e-12 * std::abs(s));
     // The same from the state space of the closed loop: v to y is -T, v to u is C S, d to y P_d S.
-    const auto closed = frequency_response(loop.closed_loop(), w).value();
-    EXPECT_LT(std::abs(closed(0, 1) + t), 1e-9 * std::abs(t));
+    const auto of_noise = evaluated(loop.system(), w, 1);
+    const auto of_disturbance = evaluated(loop.system(), w, 2);
+    EXPECT_LT(std::abs(of_noise[0] + t), 1e-9 * std::abs(t));
     const Complex noise = loop.noise_to_control(w).value();
-    EXPECT_LT(std::abs(closed(1, 1) - noise), 1e-9 * std::abs(noise));
+    EXPECT_LT(std::abs(of_noise[1] - noise), 1e-9 * std::abs(noise));
     const Complex disturbance = loop.disturbance_to_output(w).value();
-    EXPECT_LT(std::abs(closed(0, 2) - disturbance), 1e-9 * std::abs(disturbance));
-    const auto p = frequency_response(loop.plant(), w).value();
-    EXPECT_LT(std::abs(noise * p(0, 0) + t), 1e-9 * std::abs(t));
+    EXPECT_LT(std::abs(of_disturbance[0] - disturbance), 1e-9 * std::abs(disturbance));
   }
   // Integral action: reference followed, disturbance rejected, at standstill.
-  const auto still = frequency_response(loop.closed_loop(), 0.0).value();
-  EXPECT_NEAR(still(0, 0).real(), 1.0, 1e-10);
-  EXPECT_NEAR(std::abs(still(0, 2)), 0.0, 1e-10);
+  EXPECT_NEAR(evaluated(loop.system(), 0.0, 0)[0].real(), 1.0, 1e-10);
+  EXPECT_NEAR(std::abs(evaluated(loop.system(), 0.0, 2)[0]), 0.0, 1e-10);
 }
 
-TEST(AdrcLoop, TransferFunctionsAreConsistent) {
-  expect_consistent(
-      adrc_loop(sampled_plant(plant(), T).value(), observer_with(2.0), law_with(2.0)).value());
-  expect_consistent(
-      adrc_loop(sampled_plant(plant(), T, 0.6 * T).value(), observer_with(2.0), law_with(2.0))
-          .value());
-  const auto continuous =
+auto continuous_parts() {
+  return ObserverWithLaw{
       ContinuousCascadeEso<2, 3>::make(
           {.observer_bandwidth = 10.0, .bandwidth_factor = 2.0, .input_gain = 2.0})
-          .value();
-  expect_consistent(adrc_loop(plant(), continuous, law_with(2.0)).value());
+          .value(),
+      AdrcLaw<2>::make({.controller_bandwidth = 4.0, .input_gain = 2.0}).value()};
 }
 
-TEST(AdrcLoop, RefusesWhatDoesNotBelongTogether) {
-  const auto sampled = sampled_plant(plant(), T).value();
+TEST(Loop, TransferFunctionsAreConsistent) {
+  expect_consistent(closed_loop(plant(), controller()).value());
+  expect_consistent(closed_loop(plant(0.6 * T), controller()).value());
+  expect_consistent(closed_loop(plant(3.0 * T), controller()).value());
+  expect_consistent(closed_loop(plant(), continuous_parts()).value());
+}
 
-  EXPECT_EQ(
-      refusal(adrc_loop(sampled_plant(plant(), 2 * T).value(), observer_with(2.0), law_with(2.0))),
-      "plant.sample_time: must be that of the observer, which is");
-  EXPECT_EQ(refusal(adrc_loop(plant(), observer_with(2.0), law_with(2.0))),
-            "plant.sample_time: must be that of the observer, which is");
-  EXPECT_EQ(refusal(adrc_loop(sampled, observer_with(2.0), law_with(3.0))),
-            "input_gain: of the observer must be that of the law, which is");
-  EXPECT_EQ(refusal(adrc_loop(sampled, observer_with(2.0), law_with(2.0), ErrorBased{})),
-            "input_gain: of the observer must be minus that of the law, which is");
-  // T and b0 come back as they were given, so the next number is another one.
-  const auto next = [](double x) { return std::nextafter(x, 2 * x); };
-  const auto other_time = sampled_plant(plant(), next(T)).value();
-  EXPECT_EQ(refusal(adrc_loop(other_time, observer_with(2.0), law_with(2.0))),
-            "plant.sample_time: must be that of the observer, which is");
-  EXPECT_EQ(refusal(adrc_loop(sampled, observer_with(2.0), law_with(next(2.0)))),
-            "input_gain: of the observer must be that of the law, which is");
-  auto direct = sampled;
-  direct.d(0, 0) = 1.0;
-  EXPECT_EQ(refusal(adrc_loop(direct, observer_with(2.0), law_with(2.0))),
-            "plant.d: must be zero: y may not follow an input at once");
-  EXPECT_EQ(refusal(adrc_loop(sampled, observer_with(2.0), law_with(2.0))->loop_gain(0.0)),
-            "frequency: must be finite and positive");
-  EXPECT_EQ(refusal(adrc_loop(sampled, observer_with(2.0), law_with(2.0))->loop_gain(400.0)),
+// Two channels that know nothing of each other are two loops.
+TEST(Loop, OfTwoChannelsApartIsTwoLoops) {
+  auto apart = coupled(0.0, 0.6 * T);
+  apart.b = {{0.0, 0.0}, {2.5, 0.0}, {0.0, 0.0}, {0.0, 1.8}};
+  const auto both = closed_loop(apart, two_channels({{2.0, 0.0}, {0.0, 2.0}})).value();
+  const auto alone = [](double spring, double damper, double b, double wo, double wc) {
+    const auto one =
+        Plant::chain({.coefficients = {spring, damper}, .input_gain = b, .dead_time = 0.6 * T});
+    const auto adrc = Adrc<LinearEso<2>>::make(
+        {.observer = {.observer_bandwidth = wo, .input_gain = 2.0, .sample_time = T},
+         .controller_bandwidth = wc});
+    return closed_loop(one.value(), adrc.value()).value();
+  };
+  const auto first = alone(3.0, 0.4, 2.5, 20.0, 4.0);
+  const auto second = alone(5.0, 0.6, 1.8, 25.0, 5.0);
+  for (const double w : {0.5, 5.0, 40.0, 300.0}) {
+    const Complex l1 = first.loop_gain(w).value();
+    const Complex l2 = second.loop_gain(w).value();
+    EXPECT_LT(std::abs(both.loop_gain(w, 0).value() - l1), 1e-11 * std::abs(l1));
+    EXPECT_LT(std::abs(both.loop_gain(w, 1).value() - l2), 1e-11 * std::abs(l2));
+    const double s =
+        std::max(std::abs(first.sensitivity(w).value()), std::abs(second.sensitivity(w).value()));
+    EXPECT_NEAR(both.largest_sensitivity(w).value(), s, 1e-11 * s);
+    EXPECT_EQ(std::abs(both.noise_to_control(w, 0, 1).value()), 0.0);
+    EXPECT_EQ(std::abs(both.disturbance_to_output(w, 1, 0).value()), 0.0);
+  }
+}
+
+/// u = -K y, K a full matrix: a controller whose loop is written down by hand.
+struct Static {
+  Matrix<double, 2, 2> gain;
+};
+LinearController linear_controller(const Static& controller) {
+  LinearController form(0, 2, 0, T);
+  for (int i = 0; i < 2; ++i) {
+    for (int j = 0; j < 2; ++j) {
+      form.y_to_u(i, j) = -controller.gain(i, j);
+      form.r_to_u(i, j) = controller.gain(i, j);
+    }
+  }
+  return form;
+}
+
+TEST(Loop, OfCoupledChannelsByHand) {
+  // Two integrators: y1' = u1 + d1, y2' = u2 + d2, sampled y+ = y + T u, so P = T / (z - 1).
+  LinearPlant<2, double, 2, 2> integrators;
+  integrators.b = {{1.0, 0.0}, {0.0, 1.0}};
+  integrators.c = integrators.b;
+  integrators.e = integrators.b;
+  const Static gain{{{8.0, 3.0}, {-2.0, 5.0}}};
+  const auto loop = closed_loop(integrators, gain).value();
+  for (const double w : {1.0, 10.0, 100.0}) {
+    const Complex p = T / (std::polar(1.0, w * T) - 1.0);
+    // L = P K; channel 1 with channel 2 closed: l_11 - l_12 l_21 / (1 + l_22)
+    const Complex first = 8.0 * p + 6.0 * p * p / (1.0 + 5.0 * p);
+    const Complex second = 5.0 * p + 6.0 * p * p / (1.0 + 8.0 * p);
+    EXPECT_LT(std::abs(loop.loop_gain(w, 0).value() - first), 1e-13 * std::abs(first));
+    EXPECT_LT(std::abs(loop.loop_gain(w, 1).value() - second), 1e-13 * std::abs(second));
+    // S = (I + P K)^-1; its singular values from the trace and determinant of S^H S.
+    const Complex a = 1.0 + 8.0 * p;
+    const Complex b = 3.0 * p;
+    const Complex c = -2.0 * p;
+    const Complex d = 1.0 + 5.0 * p;
+    const Complex determinant = a * d - b * c;
+    const double trace =
+        (std::norm(a) + std::norm(b) + std::norm(c) + std::norm(d)) / std::norm(determinant);
+    const double product = 1.0 / std::norm(determinant);
+    const double largest = std::sqrt(0.5 * trace + std::sqrt(0.25 * trace * trace - product));
+    EXPECT_NEAR(loop.largest_sensitivity(w).value(), largest, 1e-12 * largest);
+    // From noise on y2 to u1: -(K S)_12, S_12 = -b / det, S_22 = a / det
+    const Complex noise = -(8.0 * -b + 3.0 * a) / determinant;
+    EXPECT_LT(std::abs(loop.noise_to_control(w, 0, 1).value() - noise), 1e-12 * std::abs(noise));
+    // From d1 to y2: p S_21
+    const Complex disturbance = p * -c / determinant;
+    EXPECT_LT(std::abs(loop.disturbance_to_output(w, 1, 0).value() - disturbance),
+              1e-12 * std::abs(disturbance));
+  }
+}
+
+TEST(Loop, IsOfAFloatController) {
+  const auto in_float = Adrc<LinearEso<2, float>>::make(
+      {.observer = {.observer_bandwidth = 20.0f, .input_gain = 2.0f, .sample_time = 0.01f},
+       .controller_bandwidth = 4.0f});
+  const auto in_double = Adrc<LinearEso<2>>::make(
+      {.observer = {.observer_bandwidth = 20.0, .input_gain = 2.0, .sample_time = 0.01},
+       .controller_bandwidth = 4.0});
+  const auto one = closed_loop(plant(), in_float.value()).value();
+  const auto other = closed_loop(plant(), in_double.value()).value();
+  for (const double w : {0.5, 5.0, 40.0}) {
+    const Complex l = other.loop_gain(w).value();
+    EXPECT_LT(std::abs(one.loop_gain(w).value() - l), 1e-4 * std::abs(l));
+    EXPECT_GT(std::abs(one.loop_gain(w).value() - l), 0.0);
+  }
+  // A plant in float, too.
+  const auto single = LinearPlant<2, float>::chain({.coefficients = {3.0f, 0.5f}}).value();
+  EXPECT_TRUE(closed_loop(single, in_double.value()).has_value());
+}
+
+TEST(Loop, RefusesWhatDoesNotBelongTogether) {
+  const auto adrc = controller();
+  EXPECT_EQ(refusal(closed_loop(coupled(0.0), adrc)),
+            "plant.inputs: must be the channels of the controller, that is");
+  LinearPlant<2, double, 1, 2> seen_twice;
+  seen_twice.b = {{0.0}, {1.0}};
+  seen_twice.c = {{1.0, 0.0}, {0.0, 1.0}};
+  seen_twice.a = {{0.0, 1.0}, {0.0, 0.0}};
+  EXPECT_EQ(refusal(closed_loop(seen_twice, adrc)),
+            "plant.outputs: must be the channels of the controller, that is");
+  // Dead time: up to 1000 samples, none with a continuous controller.
+  EXPECT_TRUE(closed_loop(plant(T), adrc).has_value());
+  EXPECT_EQ(refusal(closed_loop(plant(1000.5 * T), adrc)),
+            "plant.dead_time: must not be above 1000 samples");
+  EXPECT_EQ(refusal(closed_loop(plant(1e-9), continuous_parts())),
+            "plant.dead_time: must be zero with a continuous controller");
+  auto bad = plant();
+  bad.a(0, 1) = std::nan("");
+  EXPECT_EQ(refusal(closed_loop(bad, adrc)), "a[2]: must be finite");
+  const auto unstable = LinearPlant<1>::chain({.coefficients = {-1e6}}).value();  // exp(1e4)
+  const auto first = Adrc<LinearEso<1>>::make(
+      {.observer = {.observer_bandwidth = 20.0, .input_gain = 2.0, .sample_time = T},
+       .controller_bandwidth = 4.0});
+  EXPECT_EQ(refusal(closed_loop(unstable, first.value())), "system: must be finite");
+
+  const auto loop = closed_loop(plant(), adrc).value();
+  EXPECT_EQ(refusal(loop.loop_gain(0.0)), "frequency: must be finite and positive");
+  EXPECT_TRUE(loop.loop_gain(std::numbers::pi / T).has_value());
+  EXPECT_EQ(refusal(loop.loop_gain(1.0001 * std::numbers::pi / T)),
             "frequency: must not be above the Nyquist frequency");
+  for (const int channel : {-1, 1}) {
+    EXPECT_EQ(refusal(loop.loop_gain(1.0, channel)),
+              "channel: must be 0 up to the channels less one, that is");
+    EXPECT_EQ(refusal(loop.noise_to_control(1.0, 0, channel)),
+              "channel: must be 0 up to the channels less one, that is");
+    EXPECT_EQ(refusal(loop.disturbance_to_output(1.0, channel)),
+              "channel: must be 0 up to the channels less one, that is");
+  }
+  LinearController odd = linear_controller(adrc).value();
+  for (auto* matrix : {&odd.a, &odd.from_y, &odd.from_r, &odd.from_u, &odd.to_u, &odd.y_to_u,
+                       &odd.r_to_u, &odd.to_estimate, &odd.y_to_estimate, &odd.r_to_estimate}) {
+    const double before = (*matrix)(0, 0);
+    (*matrix)(0, 0) = std::numeric_limits<double>::infinity();
+    EXPECT_EQ(refusal(closed_loop(plant(), odd)), "controller: must be finite");
+    (*matrix)(0, 0) = before;
+  }
+  EXPECT_TRUE(closed_loop(plant(), odd).has_value());
+  odd.sample_time = -T;
+  EXPECT_EQ(refusal(closed_loop(plant(), odd)),
+            "controller.sample_time: must be finite and not negative");
 }
 
-/// The plant is in double whatever the observer is in.
-TEST(AdrcLoop, TakesAnObserverAndALawInFloat) {
-  const auto config = [](float time, float b0) {
-    return LinearEso<2, float>::make(
-               {.observer_bandwidth = 20.0f, .input_gain = b0, .sample_time = time})
-        .value();
+// ---- noise
+
+TEST(LoopNoise, IsWhatARunOfTheControllerHas) {
+  auto real = controller();
+  const auto found =
+      noise(plant(0.3 * T), real, {.measurement = {0.1}, .disturbance = {2.0}}).value();
+  // The sum of squares of the responses to each sample of noise, by the real controller and the
+  // plant in small steps: independent of the Lyapunov equation and of the loop's matrices.
+  const auto power = [&](double v0, double d0) {
+    auto adrc = controller();
+    SteppedPlant<2, 1> run{plant(0.3 * T)};
+    std::vector<double> sums(5);
+    for (int k = 0; k < 1500; ++k) {
+      const double y = run.x(0);
+      const double u = adrc.update(y + (k == 0 ? v0 : 0.0), 0.0);
+      const auto estimate = adrc.observer().estimate();
+      const std::vector<double> now = {y, u, estimate(0), estimate(1), estimate(2)};
+      for (std::size_t i = 0; i < 5; ++i) sums[i] += now[i] * now[i];
+      run.hold(one(u), one(k == 0 ? d0 : 0.0));
+    }
+    return sums;
   };
-  const auto in_float = [](float b0) {
-    return AdrcLaw<2, float>::make({.controller_bandwidth = 4.0f, .input_gain = b0}).value();
+  const auto of_v = power(0.1, 0.0);
+  const auto of_d = power(0.0, 2.0);
+  const auto expect = [&](double deviation, std::size_t i) {
+    EXPECT_NEAR(deviation, std::sqrt(of_v[i] + of_d[i]), 1e-6 * deviation);
   };
-  const auto sampled = sampled_plant(plant(), T).value();
-  const auto time = static_cast<float>(T);
-  EXPECT_TRUE(adrc_loop(sampled, config(time, 0.3f), in_float(0.3f)).has_value());
-  EXPECT_TRUE(adrc_loop(sampled, config(time, 0.3f), law_with(0.3)).has_value());
-  EXPECT_EQ(refusal(adrc_loop(sampled, config(std::nextafter(time, 1.0f), 0.3f), in_float(0.3f))),
-            "plant.sample_time: must be that of the observer, which is");
-  EXPECT_EQ(refusal(adrc_loop(sampled, config(time, std::nextafter(0.3f, 1.0f)), law_with(0.3))),
-            "input_gain: of the observer must be that of the law, which is");
+  ASSERT_EQ(found.output.size(), 1u);
+  ASSERT_EQ(found.control.size(), 1u);
+  ASSERT_EQ(found.estimates.size(), 3u);
+  expect(found.output[0], 0);
+  expect(found.control[0], 1);
+  for (std::size_t i = 0; i < 3; ++i) expect(found.estimates[i], 2 + i);
+  // What is left out is zero.
+  EXPECT_NEAR(noise(plant(0.3 * T), real, {.measurement = {0.1}})->control[0], std::sqrt(of_v[1]),
+              1e-6);
+  EXPECT_EQ(noise(plant(), real, {})->control[0], 0.0);
 }
 
-TEST(NominalPlant, IsSampledExactly) {
-  // y'' = -w^2 y + u: cosine and sine.
-  const double w = 30.0;
-  const auto oscillator = CompanionPlant<2>{{w * w, 0.0}, 2.0}.system().value();
-  const auto s = sampled_plant(oscillator, 0.05).value();
-  const double c = std::cos(w * 0.05);
-  EXPECT_NEAR(s.a(0, 0), c - 1.0, 1e-13);
-  EXPECT_NEAR(s.a(0, 1), std::sin(w * 0.05) / w, 1e-14);
-  EXPECT_NEAR(s.a(1, 0), -std::sin(w * 0.05) * w, 1e-11);
-  EXPECT_NEAR(s.b(0, 0), 2.0 * (1.0 - c) / (w * w), 1e-15);
-  EXPECT_NEAR(s.b(1, 1), std::sin(w * 0.05) / w, 1e-14);
-  // A fast pole: exp(-500) - 1 = -1, and a slow one keeps its digits.
-  const auto lag = CompanionPlant<1>{{1e-9}, 1.0}.system().value();
-  EXPECT_NEAR(sampled_plant(lag, 1e-3).value().a(0, 0) / std::expm1(-1e-12), 1.0, 1e-14);
-  const auto fast = CompanionPlant<1>{{5e5}, 1.0}.system().value();
-  EXPECT_NEAR(sampled_plant(fast, 1e-3).value().a(0, 0), -1.0, 1e-12);
-  // A delay of a whole sample is the old input alone, one of none the new one.
-  const auto late = sampled_plant(oscillator, 0.05, 0.05).value();
-  EXPECT_NEAR(late.b(0, 0), 0.0, 1e-18);
-  EXPECT_NEAR(late.a(0, 2), s.b(0, 0), 1e-15);
-  const auto prompt = sampled_plant(oscillator, 0.05, 0.0).value();
-  EXPECT_NEAR(prompt.b(1, 0), s.b(1, 0), 1e-15);
-  EXPECT_EQ(prompt.a(0, 2), 0.0);
+TEST(LoopNoise, RefusesByRule) {
+  const auto adrc = controller();
+  EXPECT_EQ(refusal(noise(plant(), adrc, {.measurement = {-0.1}})),
+            "measurement[0]: must be finite and not negative");
+  EXPECT_EQ(refusal(noise(plant(), adrc, {.disturbance = {std::nan("")}})),
+            "disturbance[0]: must be finite and not negative");
+  EXPECT_EQ(refusal(noise(plant(), adrc, {.measurement = {0.1, 0.1}})),
+            "measurement: must have at most");
+  EXPECT_EQ(refusal(noise(plant(), adrc, {.disturbance = {0.1, 0.1}})),
+            "disturbance: must have at most");
+  auto wrong = plant();
+  wrong.b = {0.0, -2.5};
+  EXPECT_EQ(refusal(noise(wrong, adrc, {.measurement = {0.1}})),
+            "stability_abscissa: must be negative: a loop that is not stable has no steady state");
+  // C of a continuous ADRC is strictly proper: white noise gives u a variance; by hand for n = 1.
+  const double wo = 10.0;
+  const double wc = 3.0;
+  const auto parts = ObserverWithLaw{
+      ContinuousLinearEso<1>::make({.observer_bandwidth = wo, .input_gain = 1.0}).value(),
+      AdrcLaw<1>::make({.controller_bandwidth = wc, .input_gain = 1.0}).value()};
+  const auto integrator = LinearPlant<1>::chain({}).value();
+  const auto still = noise(integrator, parts, {.measurement = {1.0}}).value();
+  // u / v = -s (b1 s + b0) / ((s + wc)(s + wo)^2) with b1 = 2 wo wc + wo^2, b0 = wc wo^2, and the
+  // variance of (c2 s^2 + c1 s) / (s^3 + a2 s^2 + a1 s + a0): (c2^2 a0 a1 + c1^2 a0) / (2 a0 (a1 a2
+  // - a0))
+  const double c2 = 2.0 * wo * wc + wo * wo;
+  const double c1 = wc * wo * wo;
+  const double a2 = wc + 2.0 * wo;
+  const double a1 = wo * wo + 2.0 * wo * wc;
+  const double a0 = wc * wo * wo;
+  const double variance = (c2 * c2 * a0 * a1 + c1 * c1 * a0) / (2.0 * a0 * (a1 * a2 - a0));
+  EXPECT_NEAR(still.control[0], std::sqrt(variance), 1e-10 * std::sqrt(variance));
 }
 
-TEST(NominalPlant, RefusesBadOnes) {
-  EXPECT_EQ(refusal((CompanionPlant<1>{{1.0}, 0.0}).system()),
-            "input_gain: must be finite and not zero (negative is fine)");
-  EXPECT_EQ(refusal((CompanionPlant<1>{{std::nan("")}, 1.0}).system()),
-            "coefficients[0]: must be finite");
-  EXPECT_EQ(refusal(sampled_plant(plant(), 0.0)), "sample_time: must be finite and positive");
-  EXPECT_EQ(refusal(sampled_plant(plant(), T, 2 * T)), "delay: must not be above sample_time");
-  EXPECT_EQ(refusal(sampled_plant(plant(), T, -T)), "delay: must be finite and not negative");
-  EXPECT_EQ(refusal(sampled_plant(sampled_plant(plant(), T).value(), T)),
-            "plant.sample_time: must be zero: continuous");
-  const auto unstable = CompanionPlant<1>{{-1e6}, 1.0}.system().value();
-  EXPECT_EQ(refusal(sampled_plant(unstable, 1.0)), "system: must be finite");  // exp(1e6)
+// What else is asked of any linear system.
+TEST(Loop, HasASystemForAllElse) {
+  const auto loop = closed_loop(plant(0.3 * T), controller()).value();
+  const DynamicSystem& system = loop.system();
+  // The largest y that d of size one can bring about: the sum of the magnitudes of its response.
+  const auto peaks = peak_gain(system).value();
+  Model model{system};
+  double sum = 0.0;
+  for (int k = 0; k < 3000; ++k) sum += std::abs(model.step({0.0, 0.0, k == 0 ? 1.0 : 0.0})[0]);
+  EXPECT_NEAR(peaks(0, 2), sum, 1e-8 * sum);
+  const auto response = frequency_response(system, 3.0).value();
+  EXPECT_LT(std::abs(response(1, 1) - evaluated(system, 3.0, 1)[1]),
+            1e-9 * std::abs(response(1, 1)));
+  EXPECT_EQ(refusal(frequency_response(system, -1.0)),
+            "frequency: must be finite and not negative");
+  EXPECT_NEAR(stability_abscissa(system), loop.stability_abscissa(), 1e-15);
+  EXPECT_EQ(poles(system).size(), static_cast<std::size_t>(system.a.rows()));
+  // Noise that reaches two places at once.
+  DynamicMatrix<double> input(3, 3);
+  input(1, 1) = 0.01;
+  input(2, 2) = 4.0;
+  input(1, 2) = input(2, 1) = 0.1;
+  const auto together = output_covariance(system, input).value();
+  input(1, 2) = input(2, 1) = 0.0;
+  const auto apart = noise(loop, {.measurement = {0.1}, .disturbance = {2.0}}).value();
+  EXPECT_NEAR(std::sqrt(output_covariance(system, input).value()(1, 1)), apart.control[0], 1e-12);
+  EXPECT_GT(std::abs(together(1, 1) - apart.control[0] * apart.control[0]), 1e-3);
+  input(1, 2) = 0.1;
+  EXPECT_EQ(refusal(output_covariance(system, input)),
+            "input[1]: must be a covariance: symmetric and not indefinite");
+  EXPECT_EQ(refusal(output_covariance(system, DynamicMatrix<double>(2, 2))),
+            "input: must have a row and a column for each input, that is");
+}
+
+// ---- responses
+
+TEST(LoopResponse, IsWhatARunOfTheControllerDoes) {
+  for (const bool load : {false, true}) {
+    auto adrc = controller();
+    const LoopStep step{.duration = 1.0, .height = 3.0};
+    const auto found = load ? load_response(plant(0.3 * T), adrc, step).value()
+                            : reference_response(plant(0.3 * T), adrc, step).value();
+    ASSERT_EQ(found.time.size(), 101u);
+    SteppedPlant<2, 1> run{plant(0.3 * T)};
+    for (std::size_t k = 0; k <= 100; ++k) {
+      const double y = run.x(0);
+      const double u = adrc.update(y, load ? 0.0 : 3.0);
+      ASSERT_NEAR(found.time[k], static_cast<double>(k) * T, 1e-12);
+      ASSERT_NEAR(found.output[0][k], y, 1e-9);
+      ASSERT_NEAR(found.control[0][k], u, 1e-8);
+      ASSERT_NEAR(found.estimates[2][k], adrc.observer().estimate()(2), 1e-7);
+      run.hold(one(u), one(load ? 3.0 : 0.0));
+    }
+  }
+  // Of a continuous loop: a first-order lag, 1 - e^(-t).
+  LinearController proportional(0, 1, 0, 0.0);
+  proportional.y_to_u(0, 0) = -1.0;
+  proportional.r_to_u(0, 0) = 1.0;
+  const auto lag = reference_response(LinearPlant<1>::chain({}).value(), proportional,
+                                      {.duration = 2.0, .sample_time = 0.5})
+                       .value();
+  ASSERT_EQ(lag.time.size(), 5u);
+  for (std::size_t k = 0; k < 5; ++k) {
+    EXPECT_NEAR(lag.output[0][k], -std::expm1(-lag.time[k]), 1e-14);
+  }
+}
+
+TEST(LoopResponse, RefusesByRule) {
+  const auto adrc = controller();
+  EXPECT_EQ(refusal(reference_response(plant(), adrc, {})),
+            "duration: must be finite and positive");
+  EXPECT_EQ(refusal(reference_response(plant(), adrc, {.duration = 1e7 * T})),
+            "duration: must be below 1e7 samples");
+  auto wrong = plant();
+  wrong.b = {0.0, -2.5};
+  EXPECT_EQ(refusal(reference_response(wrong, adrc, {.duration = 1e4 * T})),
+            "duration: gives a response that the scalar cannot hold: the loop is not stable");
+  for (const int channel : {-1, 1}) {
+    EXPECT_EQ(refusal(reference_response(plant(), adrc, {.duration = 1.0, .channel = channel})),
+              "channel: must be one that the loop has");
+    EXPECT_EQ(refusal(load_response(plant(), adrc, {.duration = 1.0, .channel = channel})),
+              "channel: must be one that the loop has");
+  }
+  EXPECT_EQ(refusal(load_response(plant(), adrc, {.duration = 1.0, .height = std::nan("")})),
+            "height: must be finite");
+  EXPECT_EQ(refusal(load_response(plant(), adrc, {.duration = 1.0, .sample_time = T})),
+            "sample_time: must be left out: the loop has one");
+  EXPECT_EQ(refusal(load_response(plant(), continuous_parts(), {.duration = 1.0})),
+            "sample_time: must be finite and positive");
 }
 
 }  // namespace

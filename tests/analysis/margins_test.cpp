@@ -9,8 +9,11 @@
 #include <cstdio>
 #include <esokit/analysis/delay_margin.hpp>
 #include <esokit/analysis/margins.hpp>
+#include <esokit/analysis/worst_case.hpp>
+#include <esokit/eigen.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <support/refusal.hpp>
@@ -121,27 +124,36 @@ struct Counts {
 
 /// A plant of `Order` with parallel resonances: y = rigid + sum of modes.
 template <int PlantStates, int Order>
-NominalPlant<PlantStates> random_plant(Random& random, double speed, double gain) {
-  CompanionPlant<Order> rigid;
+LinearPlant<PlantStates> random_plant(Random& random, double speed, double gain) {
+  typename LinearPlant<Order>::Chain rigid;
   rigid.input_gain = gain;
   for (std::size_t i = 0; i < Order; ++i) {
     rigid.coefficients[i] =
         random.uniform(-0.2, 2.0) * std::pow(speed, static_cast<double>(Order) - double(i));
   }
-  const auto core = rigid.system().value();
-  NominalPlant<PlantStates> plant;
-  plant.a.template topLeftCorner<Order, Order>() = core.a;
-  plant.b.template topRows<Order>() = core.b;
-  plant.c.template leftCols<Order>() = core.c;
+  const auto core = LinearPlant<Order>::chain(rigid).value();
+  LinearPlant<PlantStates> plant;
+  for (int i = 0; i < Order; ++i) {
+    for (int j = 0; j < Order; ++j) plant.a(i, j) = core.a(i, j);
+    plant.b(i) = core.b(i);
+    plant.c(0, i) = core.c(0, i);
+  }
   for (int i = Order; i < PlantStates; i += 2) {
     const double w = speed * random.log_uniform(2.0, 60.0);
     plant.a(i, i + 1) = 1.0;
     plant.a(i + 1, i) = -w * w;
     plant.a(i + 1, i + 1) = -2.0 * random.log_uniform(2e-3, 0.3) * w;
-    plant.b(i + 1, 0) = gain * random.uniform(-0.5, 1.0) * std::pow(speed, 2 - Order);
+    plant.b(i + 1) = gain * random.uniform(-0.5, 1.0) * std::pow(speed, 2 - Order);
     plant.c(0, i) = 1.0;
   }
   return plant;
+}
+
+template <int States>
+void take(BruteLoop& brute, const LinearPlant<States>& plant) {
+  brute.a = eigen(plant.a);
+  brute.b = eigen(plant.b);
+  brute.c = eigen(plant.c);
 }
 
 template <int Order, int Levels, int PlantStates>
@@ -159,17 +171,16 @@ void check_random_loops(int wanted, std::uint64_t seed, Counts& counts) {
     config.bandwidth_factor = Levels > 1 ? 2.0 : 0.0;
     config.input_gain = b0;
     config.sample_time = T;
-    const auto observer = CascadeEso<Order, Levels>::make(config).value();
-    const auto law = AdrcLaw<Order>::make({.controller_bandwidth = wc, .input_gain = b0}).value();
+    const auto controller =
+        Adrc<CascadeEso<Order, Levels>>::make({.observer = config, .controller_bandwidth = wc})
+            .value();
     const auto plant = random_plant<PlantStates, Order>(random, wc, b);
-    const auto loop = adrc_loop(sampled_plant(plant, T).value(), observer, law).value();
+    const auto loop = closed_loop(plant, controller).value();
 
     ReferenceObserver reference{Order, 1, {wo}, b0, T};
     for (int i = 1; i < Levels; ++i) reference.bandwidths.push_back(wo * std::pow(2.0, i));
-    BruteLoop brute(reference, {law.gains().begin(), law.gains().end()}, b0);
-    brute.a = plant.a;
-    brute.b = plant.b.col(0);
-    brute.c = plant.c;
+    BruteLoop brute(reference, {controller.gains().begin(), controller.gains().end()}, b0);
+    take(brute, plant);
     const double radius = brute.radius(1.0, 0.0);
     // N poles in one place come out spread by eps^(1/N) of their distance from 1.
     EXPECT_NEAR(radius - 1.0, loop.stability_abscissa(), 1e-3 * wo * T);
@@ -218,7 +229,7 @@ void check_random_loops(int wanted, std::uint64_t seed, Counts& counts) {
     EXPECT_NEAR(std::abs(loop.sensitivity(all->modulus.frequency).value()) * all->modulus.value,
                 1.0, 1e-9);
 
-    const auto delay = delay_margin(loop, plant);
+    const auto delay = delay_margin(loop);
     ASSERT_TRUE(delay.has_value());
     if (delay->value < 60.0 * T) {
       ++counts.delays;
@@ -246,17 +257,28 @@ TEST(Margins, OfRandomLoopsEqualBruteForce) {
   EXPECT_GT(counts.delays, 60);
 }
 
+auto continuous(double observer_bandwidth, double controller_bandwidth, double b0 = 1.0) {
+  return ObserverWithLaw{
+      ContinuousLinearEso<1>::make({.observer_bandwidth = observer_bandwidth, .input_gain = b0})
+          .value(),
+      AdrcLaw<1>::make({.controller_bandwidth = controller_bandwidth, .input_gain = b0}).value()};
+}
+template <int Order>
+auto adrc(double observer_bandwidth, double controller_bandwidth, double b0, double sample_time) {
+  return Adrc<LinearEso<Order>>::make({.observer = {.observer_bandwidth = observer_bandwidth,
+                                                    .input_gain = b0,
+                                                    .sample_time = sample_time},
+                                       .controller_bandwidth = controller_bandwidth})
+      .value();
+}
+
 // Closed loops whose edges are known: s^2 + g (2 s + 1) with a lag has its phase by hand.
 TEST(Margins, OfAContinuousLoopByHand) {
   // n = 1, plant y' = u: with k = omega_c the loop is L = (l_1 k + l_2) s + k l_2 over
   // s (s + l_1 + k) s for l = (2 w, w^2).
   const double k = 3.0;
   const double w = 10.0;
-  const auto observer =
-      ContinuousLinearEso<1>::make({.observer_bandwidth = w, .input_gain = 1.0}).value();
-  const auto law = AdrcLaw<1>::make({.controller_bandwidth = k, .input_gain = 1.0}).value();
-  const auto plant = CompanionPlant<1>{{0.0}, 1.0}.system().value();
-  const auto loop = adrc_loop(plant, observer, law).value();
+  const auto loop = closed_loop(LinearPlant<1>::chain({}).value(), continuous(w, k)).value();
   const auto by_hand = [&](double x) {
     const Complex s(0.0, x);
     const double l1 = 2.0 * w;
@@ -286,14 +308,10 @@ TEST(Margins, OfAContinuousLoopByHand) {
 // Nothing knows what a second is: a loop that is slower by some factor has the same margins.
 TEST(Margins, OfASlowLoopAreThoseOfAFastOne) {
   const auto all = [](double rate) {
-    const auto observer =
-        ContinuousLinearEso<1>::make({.observer_bandwidth = 10.0 * rate, .input_gain = rate})
-            .value();
-    const auto law =
-        AdrcLaw<1>::make({.controller_bandwidth = 3.0 * rate, .input_gain = rate}).value();
     // With a lag, so that the gain has an edge; and one pole far below all others.
-    const auto plant = CompanionPlant<1>{{1e-3 * rate}, 1.3 * rate}.system().value();
-    return margins(adrc_loop(plant, observer, law).value()).value();
+    const auto plant =
+        LinearPlant<1>::chain({.coefficients = {1e-3 * rate}, .input_gain = 1.3 * rate}).value();
+    return margins(plant, continuous(10.0 * rate, 3.0 * rate, rate)).value();
   };
   const Margins of_one = all(1.0);
   for (const double rate : {1e-8, 1e-4, 1e4, 1e8}) {
@@ -305,74 +323,291 @@ TEST(Margins, OfASlowLoopAreThoseOfAFastOne) {
   }
 }
 
-// A gain that may neither rise nor fall: an unstable plant; and any b0 / b between is stable.
+// A gain that may neither rise nor fall: an unstable plant; and any b0 between is stable.
 TEST(Margins, RangeOfTheInputGain) {
   const double T = 0.01;
-  const auto plant = CompanionPlant<2>{{-30.0, 0.5}, 4.0}.system().value();
-  const auto sampled = sampled_plant(plant, T).value();
-  const auto observer_of = [&](double b0) {
-    return LinearEso<2>::make({.observer_bandwidth = 40.0, .input_gain = b0, .sample_time = T})
-        .value();
-  };
-  const auto law_of = [](double b0) {
-    return AdrcLaw<2>::make({.controller_bandwidth = 8.0, .input_gain = b0}).value();
-  };
-  const auto loop = adrc_loop(sampled, observer_of(5.0), law_of(5.0)).value();
-  const auto range = input_gain_range(loop, law_of(5.0), 4.0).value();
-  EXPECT_GT(range.lower, 0.1);
-  EXPECT_LT(range.lower, 1.25);
-  EXPECT_GT(range.upper, 1.25);
-  EXPECT_LT(range.upper, 50.0);
-  const auto stable = [&](double ratio) {
-    return adrc_loop(sampled, observer_of(4.0 * ratio), law_of(4.0 * ratio)).value().stable();
-  };
-  EXPECT_FALSE(stable(range.lower * 0.999));
-  EXPECT_TRUE(stable(range.lower * 1.001));
-  EXPECT_TRUE(stable(range.upper * 0.999));
-  EXPECT_FALSE(stable(range.upper * 1.001));
-  EXPECT_EQ(refusal(input_gain_range(loop, law_of(5.0), 0.0)),
-            "plant_gain: must be finite, not zero, of the sign of b0");
-  EXPECT_EQ(refusal(input_gain_range(loop, law_of(5.0), -4.0)),
-            "plant_gain: must be finite, not zero, of the sign of b0");
+  for (const double sign : {1.0, -1.0}) {
+    const auto plant =
+        LinearPlant<2>::chain({.coefficients = {-30.0, 0.5}, .input_gain = sign * 4.0}).value();
+    const auto range = input_gain_range(plant, adrc<2>(40.0, 8.0, sign * 5.0, T)).value();
+    const double weakest = sign > 0.0 ? range.upper : range.lower;
+    const double strongest = sign > 0.0 ? range.lower : range.upper;
+    EXPECT_LT(range.lower, range.upper);
+    EXPECT_GT(sign * strongest, 0.4);
+    EXPECT_LT(sign * strongest, 5.0);
+    EXPECT_GT(sign * weakest, 5.0);
+    EXPECT_LT(sign * weakest, 200.0);
+    const auto stable = [&](double b0) {
+      return closed_loop(plant, adrc<2>(40.0, 8.0, b0, T)).value().stable();
+    };
+    EXPECT_FALSE(stable(strongest * 0.999));
+    EXPECT_TRUE(stable(strongest * 1.001));
+    EXPECT_TRUE(stable(weakest * 0.999));
+    EXPECT_FALSE(stable(weakest * 1.001));
+  }
+  // Of a controller that has none, or whose u does not go with it.
+  const auto compensator = DisturbanceCompensator<LinearEso<1>>::make(
+      {.observer = {.observer_bandwidth = 20.0, .input_gain = 1.0, .sample_time = T}});
+  EXPECT_EQ(refusal(input_gain_range(LinearPlant<1>::chain({.coefficients = {1.0}}).value(),
+                                     compensator.value())),
+            "input_gain: must be one by which all of u is divided: this controller has none; see "
+            "gain_increase and gain_decrease of its margins");
 }
 
-// The delay that a plant was sampled with counts, and the margin is what is left.
+// The dead time that a plant has counts, and the margin is what is left.
 TEST(Margins, DelayMarginCountsThePresentDelay) {
   const double T = 0.01;
-  const auto plant = CompanionPlant<2>{{1.0, 2.0}, 1.0}.system().value();
-  const auto observer =
-      LinearEso<2>::make({.observer_bandwidth = 30.0, .input_gain = 1.0, .sample_time = T}).value();
-  const auto law = AdrcLaw<2>::make({.controller_bandwidth = 5.0, .input_gain = 1.0}).value();
-  const auto without = adrc_loop(sampled_plant(plant, T).value(), observer, law).value();
-  const auto whole = delay_margin(without, plant).value();
+  const auto plant = LinearPlant<2>::chain({.coefficients = {1.0, 2.0}}).value();
+  const auto controller = adrc<2>(30.0, 5.0, 1.0, T);
+  const auto whole = delay_margin(plant, controller).value();
   EXPECT_GT(whole.value, 2.0 * T);
-  for (const double delay : {0.0, 0.3 * T, T}) {
-    const auto loop = adrc_loop(sampled_plant(plant, T, delay).value(), observer, law).value();
-    const auto left = delay_margin(loop, plant, delay).value();
+  for (const double delay : {0.0, 0.3 * T, T, 1.7 * T}) {
+    const auto left = delay_margin(with_dead_time(plant, delay).value(), controller).value();
     EXPECT_NEAR(left.value + delay, whole.value, 1e-12);
     EXPECT_NEAR(left.frequency, whole.frequency, 1e-9);
   }
+  const auto at = [&](double delay) {
+    return closed_loop(with_dead_time(plant, delay).value(), controller)->stable();
+  };
+  EXPECT_TRUE(at(0.9999 * whole.value));
+  EXPECT_FALSE(at(1.0001 * whole.value));
 }
 
 // At a sample time that is long for the observer the loop may fail at half the sampling rate.
 TEST(Margins, AtHalfTheSamplingRate) {
   const double T = 0.2;
-  const auto plant = CompanionPlant<1>{{0.0}, 1.0}.system().value();
-  const auto observer =
-      LinearEso<1>::make({.observer_bandwidth = 60.0, .input_gain = 1.0, .sample_time = T}).value();
-  const auto law = AdrcLaw<1>::make({.controller_bandwidth = 5.0, .input_gain = 1.0}).value();
-  const auto loop = adrc_loop(sampled_plant(plant, T).value(), observer, law).value();
+  const auto plant = LinearPlant<1>::chain({}).value();
+  const auto loop = closed_loop(plant, adrc<1>(60.0, 5.0, 1.0, T)).value();
   ASSERT_TRUE(loop.stable());
   const auto all = margins(loop).value();
   EXPECT_NEAR(all.gain_increase.frequency, std::numbers::pi / T, 1e-9);
   BruteLoop brute(ReferenceObserver{1, 1, {60.0}, 1.0, T}, {5.0}, 1.0);
-  brute.a = plant.a;
-  brute.b = plant.b.col(0);
-  brute.c = plant.c;
+  take(brute, plant);
   EXPECT_NEAR(brute.radius(all.gain_increase.value, 0.0), 1.0, 1e-6);
-  const auto delay = delay_margin(loop, plant).value();
+  const auto delay = delay_margin(loop).value();
   EXPECT_NEAR(brute.radius(1.0, delay.value), 1.0, 1e-6);
   for (int i = 1; i <= 30; ++i) EXPECT_LT(brute.radius(1.0, 0.99 * delay.value * i / 30), 1.0);
+}
+
+// ---- the object itself, on a plant whose gain or delay is just short of the edge and just beyond
+
+/// How much larger the loop is in its second half than in its first, for a factor on one input.
+template <int States, int Channels>
+double growth(const LinearPlant<States, double, Channels, Channels>& plant, double sample_time,
+              const std::function<std::vector<double>(const std::vector<double>&)>& control,
+              int channel, double factor) {
+  const auto held = held_plant(plant, sample_time).value();
+  Vector<double, States> x;
+  x(0) = 1.0;
+  double first = 0.0;
+  double second = 0.0;
+  const int samples = 6000;
+  for (int k = 0; k < samples; ++k) {
+    const auto y = plant.output(x);
+    const auto u = control({y.begin(), y.end()});
+    Vector<double, Channels> input;
+    for (int i = 0; i < Channels; ++i) input(i) = u[static_cast<std::size_t>(i)];
+    input(channel) *= factor;
+    x = x + held.increment * x + held.input * input;
+    (k < samples / 2 ? first : second) += y(0) * y(0);
+  }
+  return second / first;
+}
+
+TEST(Margins, AtTheEdgeTheRealControllerOscillates) {
+  const double T = 0.01;
+  const auto plant =
+      with_lag(LinearPlant<2>::chain({.coefficients = {3.0, 0.4}, .input_gain = 2.5}).value(), 0.02)
+          .value();
+  const auto expect_edge = [&](const Loop& loop, auto&& fresh) {
+    const auto all = margins(loop).value();
+    ASSERT_TRUE(all.gain_increase.limited());
+    const double edge = all.gain_increase.value;
+    const auto grows = [&](double factor) {
+      // The controller is told what it put out: the factor is the plant's.
+      auto controller = fresh();
+      return growth<3, 1>(
+          plant, T, [&](const std::vector<double>& y) { return std::vector{controller(y[0])}; }, 0,
+          factor);
+    };
+    EXPECT_LT(grows(0.98 * edge), 1.0);
+    EXPECT_GT(grows(1.02 * edge), 1.0);
+  };
+  const LinearEso<2>::Config config{
+      .observer_bandwidth = 20.0, .input_gain = 2.5, .sample_time = T};
+  const auto of = [&](const auto& made) {
+    expect_edge(closed_loop(plant, made).value(), [&] {
+      return [controller = made](double y) mutable { return controller.update(y, 0.0); };
+    });
+  };
+  of(adrc<2>(20.0, 4.0, 2.5, T));
+  of(Adrc<LinearEso<2>, ErrorBased>::make({.observer = config, .controller_bandwidth = 4.0})
+         .value());
+  of(Adrc<DelayedInput<LinearEso<2>, 2>>::make(
+         {.observer = {.observer = config, .delay = 2}, .controller_bandwidth = 4.0})
+         .value());
+  of(Adrc<KnownModel<LinearEso<2>, KnownPoles<2>>>::make(
+         {.observer = {.observer = config, .model = {{3.0, 0.4}}}, .controller_bandwidth = 4.0})
+         .value());
+  of(PredictiveAdrc<LinearEso<2>>::make({.observer = config, .controller_bandwidth = 4.0}).value());
+  const DualFeedbackAdrc<2>::Config filter{
+      .observer_bandwidth = 20.0, .controller_bandwidth = 4.0, .input_gain = 2.5, .sample_time = T};
+  const auto dual = DualFeedbackAdrc<2>::make(filter).value();
+  expect_edge(closed_loop(plant, linear_controller(dual, filter)).value(), [&] {
+    return [controller = dual](double y) mutable { return controller.update(y, 0.0); };
+  });
+}
+
+// One actuator of two, the other one as it is.
+TEST(Margins, OfOneChannelOfTwo) {
+  const double T = 0.01;
+  LinearPlant<4, double, 2, 2> plant;
+  plant.a = {
+      {0.0, 1.0, 0.0, 0.0}, {-3.0, -0.4, 1.5, 0.0}, {0.0, 0.0, 0.0, 1.0}, {1.5, 0.0, -5.0, -0.6}};
+  plant.b = {{0.0, 0.0}, {2.5, 0.3}, {0.0, 0.0}, {-0.6, 1.8}};
+  plant.e = plant.b;
+  plant.c = {{1.0, 0.0, 0.0, 0.0}, {0.0, 0.0, 1.0, 0.0}};
+  using Two = MimoAdrc<LinearEso<2>, LinearEso<2>>;
+  Two::Config config;
+  std::get<0>(config.observers) = {.observer_bandwidth = 40.0, .sample_time = T};
+  std::get<1>(config.observers) = {.observer_bandwidth = 50.0, .sample_time = T};
+  config.controller_bandwidths = {6.0, 7.0};
+  config.input_matrix = {{2.5, 0.3}, {-0.6, 1.8}};
+  const auto controller = Two::make(config).value();
+  const auto loop = closed_loop(plant, controller).value();
+  ASSERT_TRUE(loop.stable());
+  double modulus = 1.0;
+  for (const int channel : {0, 1}) {
+    const auto all = margins(plant, controller, channel).value();
+    ASSERT_TRUE(all.gain_increase.limited());
+    const double edge = all.gain_increase.value;
+    const auto grows = [&](double factor) {
+      auto real = controller;
+      return growth<4, 2>(
+          plant, T,
+          [&](const std::vector<double>& y) {
+            const Vector<double, 2> measured(y[0], y[1]);
+            const auto u = real.update(measured, Vector<double, 2>());
+            return std::vector{u(0), u(1)};
+          },
+          channel, factor);
+    };
+    EXPECT_LT(grows(0.98 * edge), 1.0);
+    EXPECT_GT(grows(1.02 * edge), 1.0);
+    const auto delay = delay_margin(plant, controller, channel).value();
+    EXPECT_NEAR(std::abs(loop.loop_gain(delay.frequency, channel).value()), 1.0, 0.1);
+    modulus = std::min(modulus, all.modulus.value);
+  }
+  // Both at once: less than that of the worse one, and the same delay edge as a common dead time.
+  const auto peak = sensitivity_peak(loop).value();
+  double dense = 0.0;
+  for (int i = 0; i < 20000; ++i) {
+    const double w = std::numbers::pi / T * std::pow(10.0, -4.0 * i / 19999);
+    dense = std::max(dense, loop.largest_sensitivity(w).value());
+  }
+  EXPECT_GE(peak.value, dense * (1.0 - 1e-9));
+  EXPECT_NEAR(peak.value, dense, 1e-4 * dense);
+  EXPECT_GT(peak.value, 1.0 / modulus * 0.9);
+  for (const int channel : {-1, 2}) {
+    EXPECT_EQ(refusal(margins(loop, channel)),
+              "channel: must be 0 up to the channels less one, that is");
+    EXPECT_EQ(refusal(delay_margin(loop, channel)),
+              "channel: must be 0 up to the channels less one, that is");
+  }
+}
+
+// Of one channel the peak is the inverse of the modulus margin.
+TEST(Margins, PeakOfTheSensitivity) {
+  const auto loop = closed_loop(LinearPlant<2>::chain({.coefficients = {1.0, 2.0}}).value(),
+                                adrc<2>(30.0, 5.0, 1.0, 0.01))
+                        .value();
+  const auto all = margins(loop).value();
+  const auto peak = sensitivity_peak(loop).value();
+  EXPECT_NEAR(peak.value * all.modulus.value, 1.0, 1e-12);
+  EXPECT_NEAR(peak.frequency, all.modulus.frequency, 1e-5 * peak.frequency);
+}
+
+// ---- worst case
+
+TEST(WorstCase, IsTheWorstOfADenseGrid) {
+  const auto controller = adrc<2>(60.0, 8.0, 50.0, 1e-3);
+  const auto plant_of = [](const Array<double, 2>& p) {
+    return LinearPlant<2>::chain(
+        {.coefficients = {0.0, p[1]}, .input_gain = p[0], .dead_time = 1e-3});
+  };
+  const std::array<Interval<>, 2> box{{{25.0, 100.0}, {0.0, 5.0}}};
+  const auto worst = worst_case(plant_of, box, controller, {.points = 3, .halvings = 6}).value();
+  EXPECT_TRUE(worst.stable());
+  const double infinite = std::numeric_limits<double>::infinity();
+  double abscissa = -infinite;
+  double modulus = infinite;
+  double increase = infinite;
+  double decrease = 0.0;
+  double phase = infinite;
+  double delay = infinite;
+  for (int i = 0; i <= 12; ++i) {
+    for (int j = 0; j <= 12; ++j) {
+      const auto loop =
+          closed_loop(plant_of({25.0 + 75.0 * i / 12, 5.0 * j / 12}).value(), controller).value();
+      const auto m = margins(loop).value();
+      abscissa = std::max(abscissa, loop.stability_abscissa());
+      modulus = std::min(modulus, m.modulus.value);
+      increase = std::min(increase, m.gain_increase.value);
+      decrease = std::max(decrease, m.gain_decrease.value);
+      phase = std::min(phase, m.phase.value);
+      delay = std::min(delay, delay_margin(loop).value().value);
+    }
+  }
+  // The search may find what the dense grid misses, never the other way round but for its last
+  // step.
+  EXPECT_GT(worst.stability_abscissa.value, abscissa - 1e-4 * std::abs(abscissa));
+  EXPECT_LT(worst.modulus.value, modulus * (1.0 + 1e-4));
+  EXPECT_LT(worst.gain_increase.value, increase * (1.0 + 1e-4));
+  EXPECT_GE(worst.gain_decrease.value, decrease * (1.0 - 1e-4));
+  EXPECT_LT(worst.phase.value, phase * (1.0 + 1e-4));
+  EXPECT_LT(worst.delay.value, delay * (1.0 + 1e-4));
+  // Each is that of the plant that is named.
+  const auto at = [&](const auto& found) {
+    return closed_loop(*plant_of(found.parameters), controller).value();
+  };
+  EXPECT_EQ(margins(at(worst.modulus))->modulus.value, worst.modulus.value);
+  EXPECT_EQ(margins(at(worst.phase))->phase.value, worst.phase.value);
+  EXPECT_EQ(delay_margin(at(worst.delay))->value, worst.delay.value);
+  EXPECT_EQ(at(worst.stability_abscissa).stability_abscissa(), worst.stability_abscissa.value);
+}
+
+TEST(WorstCase, FindsAnUnstablePlantAndRefusesByRule) {
+  const auto controller = adrc<1>(60.0, 8.0, 1.0, 1e-2);
+  // Stable at both ends of the first range, not between: found by the grid's third point.
+  const auto hidden = [](const Array<double, 1>& p) {
+    return LinearPlant<1>::chain({.input_gain = std::abs(p[0] - 0.5) < 0.2 ? -1.0 : 1.0});
+  };
+  const auto worst =
+      worst_case(hidden, std::array<Interval<>, 1>{{{0.0, 1.0}}}, controller).value();
+  EXPECT_FALSE(worst.stable());
+  EXPECT_NEAR(worst.stability_abscissa.parameters[0], 0.5, 0.2);
+  EXPECT_EQ(worst.modulus.value, 0.0);
+  EXPECT_EQ(worst.gain_increase.value, 1.0);
+  EXPECT_EQ(worst.gain_decrease.value, 1.0);
+  EXPECT_EQ(worst.phase.value, 0.0);
+  EXPECT_EQ(worst.delay.value, 0.0);
+
+  const auto of = [&](Interval<> range, WorstCaseSearch search = {}) {
+    const auto plant_of = [](const Array<double, 1>& p) {
+      return LinearPlant<1>::chain({.input_gain = p[0]});
+    };
+    return refusal(worst_case(plant_of, std::array{range}, controller, search));
+  };
+  EXPECT_EQ(of({0.5, 2.0}), "accepted");
+  EXPECT_EQ(of({0.5, 0.5}), "accepted");
+  EXPECT_EQ(of({2.0, 0.5}), "ranges[0]: must not end below their start");
+  EXPECT_EQ(of({std::nan(""), 0.5}), "ranges[0]: must be finite");
+  EXPECT_EQ(of({0.5, std::numeric_limits<double>::infinity()}), "ranges[0]: must be finite");
+  EXPECT_EQ(of({0.0, 2.0}), "input_gain: must be finite and not zero (negative is fine)");
+  EXPECT_EQ(of({0.5, 2.0}, {.points = 1}), "points: must be 2 .. 1000");
+  EXPECT_EQ(of({0.5, 2.0}, {.points = 1001}), "points: must be 2 .. 1000");
+  EXPECT_EQ(of({0.5, 2.0}, {.halvings = -1}), "halvings: must be 0 .. 100");
+  EXPECT_EQ(of({0.5, 2.0}, {.halvings = 101}), "halvings: must be 0 .. 100");
 }
 
 /// abs(L) < 1 everywhere, which no loop with a disturbance estimate has: by hand.
@@ -394,30 +629,17 @@ TEST(Margins, WithoutAnEdgeAreInfinite) {
 }
 
 TEST(Margins, OfAnUnstableLoopAreAnError) {
-  const double T = 0.01;
-  const auto plant = CompanionPlant<2>{{1.0, 2.0}, -1.0}.system().value();  // wrong sign
-  const auto observer =
-      LinearEso<2>::make({.observer_bandwidth = 30.0, .input_gain = 1.0, .sample_time = T}).value();
-  const auto law = AdrcLaw<2>::make({.controller_bandwidth = 5.0, .input_gain = 1.0}).value();
-  const auto loop = adrc_loop(sampled_plant(plant, T).value(), observer, law).value();
+  const auto plant = LinearPlant<2>::chain({.coefficients = {1.0, 2.0}, .input_gain = -1.0})
+                         .value();  // wrong sign
+  const auto controller = adrc<2>(30.0, 5.0, 1.0, 0.01);
+  const auto loop = closed_loop(plant, controller).value();
   EXPECT_FALSE(loop.stable());
-  const auto all = margins(loop);
-  ASSERT_FALSE(all.has_value());
-  EXPECT_EQ(
-      refusal(all),
-      "stability_abscissa: must be negative: the nominal loop is not stable, it has no margins");
-  const auto continuous = adrc_loop(
-      plant, ContinuousLinearEso<1>::make({.observer_bandwidth = 10.0, .input_gain = 1.0}).value(),
-      AdrcLaw<1>::make({.controller_bandwidth = 3.0, .input_gain = 1.0}).value());
-  ASSERT_EQ(refusal(continuous), "accepted");
-  EXPECT_EQ(refusal(delay_margin(*continuous, plant)),
-            "plant.sample_time: must be positive: this is for a sampled loop");
-  EXPECT_EQ(
-      refusal(delay_margin(loop, plant)),
-      "stability_abscissa: must be negative: the nominal loop is not stable, it has no margins");
-  // The continuous overload refuses a sampled loop.
-  EXPECT_EQ(refusal(delay_margin(loop)),
-            "plant.sample_time: must be zero here: a sampled loop needs its continuous plant");
+  constexpr const char* rule =
+      "stability_abscissa: must be negative: the nominal loop is not stable, it has no margins";
+  EXPECT_EQ(refusal(margins(plant, controller)), rule);
+  EXPECT_EQ(refusal(delay_margin(plant, controller)), rule);
+  EXPECT_EQ(refusal(input_gain_range(plant, controller)), rule);
+  EXPECT_EQ(refusal(sensitivity_peak(loop)), rule);
 }
 
 }  // namespace

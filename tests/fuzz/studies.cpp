@@ -102,27 +102,31 @@ class Study {
 
 constexpr Range rate{0.5, 50, true};
 
+template <class MatrixType>
+int size_of(const MatrixType& matrix) {
+  return static_cast<int>(matrix.rows() * matrix.cols());
+}
+
 template <class System>
 void ask_system(Study& study, const System& system) {
   // A slow one takes up to 1e8 steps.
   const double abscissa = stability_abscissa(system);
   double fastest = 1.0;
-  if (!system.sampled()) {
+  if (!(system.sample_time > 0.0)) {
     for (const auto& p : poles(system)) fastest = std::max(fastest, std::abs(p));
   }
   if (!is_finite(abscissa) || !(abscissa < 0.0) || abscissa < -1e-3 * fastest) {
     if (const auto peaks = study.answer("peak_gain", peak_gain(system))) {
-      study.finite("peak_gain", *peaks);
+      study.finite("peak_gain", detail::sum_of_magnitudes(peaks->data(), size_of(*peaks)));
     }
   }
   const double w = study.number<double>("frequency", {0.1, 100, true});
   if (const auto h = study.answer("frequency_response", frequency_response(system, w))) {
-    study.finite("frequency_response", *h);
+    for (int i = 0; i < size_of(*h); ++i) study.finite("frequency_response", h->data()[i]);
   }
 }
 
-template <class Loop, class Law>
-void ask_loop(Study& study, const Loop& loop, const Law& law, double b) {
+void ask_loop(Study& study, const Loop& loop) {
   study.finite("stability_abscissa", loop.stability_abscissa());
   if (const auto m = study.answer("margins", margins(loop))) {
     for (const Margin& each : {m->gain_increase, m->gain_decrease, m->phase, m->modulus}) {
@@ -130,7 +134,7 @@ void ask_loop(Study& study, const Loop& loop, const Law& law, double b) {
       if (each.limited() && !(each.frequency >= 0.0)) study.fail("margins", "at no frequency");
     }
   }
-  if (const auto range = study.answer("input_gain_range", input_gain_range(loop, law, b))) {
+  if (const auto range = study.answer("input_gain_range", input_gain_range(loop))) {
     study.limit("input_gain_range", range->lower);
     study.limit("input_gain_range", range->upper);
   }
@@ -140,14 +144,30 @@ void ask_loop(Study& study, const Loop& loop, const Law& law, double b) {
         loop.noise_to_control(w), loop.disturbance_to_output(w)}) {
     if (const auto value = study.answer("response", response)) study.finite("response", *value);
   }
-  EigenMatrix<double, 3, 3> noise = EigenMatrix<double, 3, 3>::Zero();
-  for (int i = 0; i < 3; ++i) noise(i, i) = study.number<double>("noise", {1e-6, 1, true});
-  if (const auto p =
-          study.answer("output_covariance", output_covariance(loop.closed_loop(), noise))) {
-    study.finite("output_covariance", *p);
+  if (const auto peak = study.answer("sensitivity_peak", sensitivity_peak(loop))) {
+    study.limit("sensitivity_peak", peak->value);
   }
-  ask_system(study, loop.closed_loop());
-  ask_system(study, loop.controller());
+  if (const auto m = study.answer("delay_margin", delay_margin(loop))) {
+    study.limit("delay_margin", m->value);
+  }
+  const LoopNoise of{{study.number<double>("noise", {1e-6, 1, true})},
+                     {study.number<double>("noise", {1e-6, 1, true})}};
+  if (const auto found = study.answer("noise", noise(loop, of))) {
+    study.finite("noise", found->output);
+    study.finite("noise", found->control);
+    study.finite("noise", found->estimates);
+  }
+  const LoopStep step{.duration = study.number<double>("duration", {1e-2, 1, true}),
+                      .sample_time = loop.sample_time() > 0.0 ? 0.0 : 1e-2};
+  if (step.duration < 10.0) {
+    for (const auto& made : {reference_response(loop, step), load_response(loop, step)}) {
+      if (const auto response = study.answer("response", made)) {
+        study.finite("response", response->output[0]);
+        study.finite("response", response->control[0]);
+      }
+    }
+  }
+  ask_system(study, loop.system());
 }
 
 template <class Observer, class S = typename Observer::scalar_type>
@@ -168,12 +188,15 @@ Failure loop_study(Episode& episode) {
       AdrcLaw<n, S>::make({.controller_bandwidth = study.number<S>("controller_bandwidth", rate),
                            .input_gain = config.input_gain});
   const auto law = study.answer("law", law_made);
-  CompanionPlant<n> companion;
-  study.fill("coefficients", companion.coefficients, {-10, 10});
-  companion.input_gain =
+  typename LinearPlant<n>::Chain chain;
+  study.fill("coefficients", chain.coefficients, {-10, 10});
+  chain.input_gain =
       study.number<double>("b", {0.5, 2, true}) * static_cast<double>(config.input_gain);
-  const auto system = companion.system();
-  const auto plant = study.answer("plant", system);
+  if constexpr (sampled) {
+    chain.dead_time =
+        study.number<double>("dead_time", {0, 2.5}) * static_cast<double>(config.sample_time);
+  }
+  const auto plant = study.answer("plant", LinearPlant<n>::chain(chain));
   if (observer) {
     const EstimationNoise noise{study.number<double>("measurement", {1e-6, 1, true}),
                                 study.number<double>("disturbance", {1e-3, 10, true})};
@@ -185,38 +208,8 @@ Failure loop_study(Episode& episode) {
     ask_system(study, error_system(*observer));
   }
   if (!observer || !law || !plant) return study.done();
-  if constexpr (sampled) {
-    const auto T = static_cast<double>(config.sample_time);
-    const auto held = sampled_plant(*plant, T);
-    if (const auto sampled_one = study.answer("sampled_plant", held)) {
-      const auto loop = adrc_loop(*sampled_one, *observer, *law);
-      if (const auto closed = study.answer("adrc_loop", loop)) {
-        ask_loop(study, *closed, *law, companion.input_gain);
-        if (const auto m = study.answer("delay_margin", delay_margin(*closed, *plant))) {
-          study.limit("delay_margin", m->value);
-        }
-      }
-    }
-    const double delay = study.number<double>("delay", {0, T});
-    const auto late = sampled_plant(*plant, T, delay);
-    if (const auto sampled_one = study.answer("sampled_plant", late)) {
-      study.finite("sampled_plant", sampled_one->a);
-      const auto loop = adrc_loop(*sampled_one, *observer, *law);
-      if (const auto closed = study.answer("adrc_loop", loop)) {
-        if (const auto m = study.answer("delay_margin", delay_margin(*closed, *plant, delay))) {
-          study.limit("delay_margin", m->value);
-        }
-      }
-    }
-  } else {
-    const auto loop = adrc_loop(*plant, *observer, *law);
-    if (const auto closed = study.answer("adrc_loop", loop)) {
-      ask_loop(study, *closed, *law, companion.input_gain);
-      if (const auto m = study.answer("delay_margin", delay_margin(*closed))) {
-        study.limit("delay_margin", m->value);
-      }
-    }
-  }
+  const auto loop = closed_loop(*plant, ObserverWithLaw{*observer, *law});
+  if (const auto closed = study.answer("closed_loop", loop)) ask_loop(study, *closed);
   return study.done();
 }
 

@@ -11,13 +11,15 @@ namespace esokit {
 
 /// What a known model can do beside fbar: `static constexpr PlantModelTraits traits{..}` in it.
 struct PlantModelTraits {
-  bool checks = false;  ///< `check() const` gives the error of a bad parameter, as a Check
+  bool checks = false;     ///< `check() const` gives the error of a bad parameter, as a Check
+  bool is_linear = false;  ///< fbar is a sum of multiples of y .. y^(n-1): it can be analysed
 };
 
 /// fbar = -(a_0 y + a_1 y' + .. + a_(n-1) y^(n-1)): the plant's poles are known.
 template <int Order, Scalar S = double>
 struct KnownPoles {
-  static constexpr PlantModelTraits traits{.checks = true};  ///< what it can do beside fbar
+  static constexpr PlantModelTraits traits{.checks = true,
+                                           .is_linear = true};  ///< what it can do beside fbar
   template <class T>
   using with_scalar = KnownPoles<Order, T>;  ///< the same of another scalar
 
@@ -208,6 +210,9 @@ class KnownModel : public Adapter<Observer> {
 
   /// dhat without what the model explains, unit of y^(n).
   [[nodiscard]] S residual_disturbance() const noexcept { return observer_.total_disturbance(); }
+
+  /// fbar.
+  [[nodiscard]] const Model& known_model() const noexcept { return model_; }
 
   /// fbar at the present estimate, unit of y^(n); zero where it, or fbar + dhat, is not finite: a
   /// model explains nothing there.

@@ -7,6 +7,63 @@
 
 namespace esokit {
 
+namespace detail {
+
+/// sum_ij left(r, i) middle(i, j) left(s, j)
+inline double quadratic(const DenseView<const double>& left, const DenseView<const double>& middle,
+                        int r, int s) noexcept {
+  double sum = 0.0;
+  for (int i = 0; i < middle.rows; ++i) {
+    for (int j = 0; j < middle.columns; ++j) sum += left(r, i) * middle(i, j) * left(s, j);
+  }
+  return sum;
+}
+
+/// `output_covariance` on the caller's storage. @param work 7 n^2
+inline Check<double> output_covariance(const SystemView& system,
+                                       const DenseView<const double>& input,
+                                       const DenseView<double>& result, double* work) {
+  const int n = system.states();
+  Rules<double> rules;
+  rules.all_of(check_system(system));
+  for (int i = 0; i < input.rows; ++i) {
+    rules.not_negative("input", input(i, i), i);
+    for (int j = 0; j < input.rows; ++j) {
+      const double value = input(i, j);
+      rules.require(is_finite(value) && value == input(j, i) &&
+                        value * value <= input(i, i) * input(j, j) * (1.0 + 1e-12),
+                    "input", value, "must be a covariance: symmetric and not indefinite", i);
+    }
+  }
+  if (!rules) return rules.error();
+  if (!system.sampled()) {
+    for (int i = 0; i < system.outputs(); ++i) {
+      const double direct = quadratic(system.d, input, i, i);
+      rules.require(!(direct > 0.0), "output", direct,
+                    "sees continuous white noise directly: its variance is infinite", i);
+    }
+    if (!rules) return rules.error();
+  }
+  double* const p = work + n * n;
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) work[j * n + i] = quadratic(system.b, input, i, j);
+  }
+  if (auto ok = solve_lyapunov(system.a.data, work, p, work + 2 * n * n, n, system.sampled());
+      !ok) {
+    return ok;
+  }
+  for (int i = 0; i < system.outputs(); ++i) {
+    for (int j = 0; j < system.outputs(); ++j) {
+      result(i, j) = quadratic(system.c, {p, n}, i, j) + quadratic(system.d, input, i, j);
+      rules.require(is_finite(result(i, j)), "output", result(i, j),
+                    "has a covariance that the scalar cannot hold", i);
+    }
+  }
+  return rules;
+}
+
+}  // namespace detail
+
 /// Covariance of all outputs, Outputs x Outputs, for white noise on the inputs.
 /// @param input Inputs x Inputs. Sampled: covariance per sample. Continuous: two-sided spectral
 ///        density, unit^2 s (a held noise of variance s^2 and hold h has about s^2 h)
@@ -17,50 +74,34 @@ template <int States, int Inputs, int Outputs>
 Expected<EigenMatrix<double, Outputs, Outputs>, Error<double>> output_covariance(
     const LinearSystem<States, Inputs, Outputs>& system,
     const EigenMatrix<double, Inputs, Inputs>& input) {
-  Rules<double> rules;
-  rules.all_of(detail::check_system(system));
-  for (int i = 0; i < Inputs; ++i) {
-    rules.not_negative("input", input(i, i), i);
-    for (int j = 0; j < Inputs; ++j) {
-      const double value = input(i, j);
-      rules.require(is_finite(value) && value == input(j, i) &&
-                        value * value <= input(i, i) * input(j, j) * (1.0 + 1e-12),
-                    "input", value, "must be a covariance: symmetric and not indefinite", i);
-    }
-  }
-  if (!rules) return rules.error();
-  // sum_ij left(r, i) middle(i, j) left(s, j)
-  const auto quadratic = [](const auto& left, const auto& middle, int r, int s) {
-    double sum = 0.0;
-    for (Eigen::Index i = 0; i < middle.rows(); ++i) {
-      for (Eigen::Index j = 0; j < middle.cols(); ++j)
-        sum += left(r, i) * middle(i, j) * left(s, j);
-    }
-    return sum;
-  };
-  if (!system.sampled()) {
-    for (int i = 0; i < Outputs; ++i) {
-      if (const double direct = quadratic(system.d, input, i, i); direct > 0.0) {
-        return Error<double>{"output", direct,
-                             "sees continuous white noise directly: its variance is infinite", i};
-      }
-    }
-  }
-  EigenMatrix<double, States, States> q;
-  for (int i = 0; i < States; ++i) {
-    for (int j = 0; j < States; ++j) q(i, j) = quadratic(system.b, input, i, j);
-  }
-  const auto p = solve_lyapunov<States>(system.a, q, system.sampled());
-  if (!p) return p.error();
   EigenMatrix<double, Outputs, Outputs> result;
-  for (int i = 0; i < Outputs; ++i) {
-    for (int j = 0; j < Outputs; ++j) {
-      result(i, j) = quadratic(system.c, *p, i, j) + quadratic(system.d, input, i, j);
-      if (!is_finite(result(i, j))) {
-        return Error<double>{"output", result(i, j), "has a covariance that the scalar cannot hold",
-                             i};
-      }
-    }
+  Array<double, 7 * States * States> work;
+  if (const auto ok = detail::output_covariance(detail::view_of(system), {input.data(), Inputs},
+                                                {result.data(), Outputs}, work.data());
+      !ok) {
+    return ok.error();
+  }
+  return result;
+}
+
+/// The same of a system whose sizes are known at run time.
+inline Expected<DynamicMatrix<double>, Error<double>> output_covariance(
+    const DynamicSystem& system, const DynamicMatrix<double>& input) {
+  const int n = system.a.rows();
+  if (input.rows() != system.b.cols() || input.cols() != system.b.cols()) {
+    return Error<double>{"input",
+                         static_cast<double>(input.rows()),
+                         "must have a row and a column for each input, that is",
+                         -1,
+                         static_cast<double>(system.b.cols()),
+                         true};
+  }
+  DynamicMatrix<double> result(system.c.rows(), system.c.rows());
+  DynamicMatrix<double> work(n, 7 * n);
+  if (const auto ok = detail::output_covariance(
+          detail::view_of(system), {input.data(), input.rows()}, result.view(), work.data());
+      !ok) {
+    return ok.error();
   }
   return result;
 }

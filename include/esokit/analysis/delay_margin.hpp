@@ -8,24 +8,21 @@ namespace esokit {
 
 namespace detail {
 
-/// Sampled loop gain with any delay of u: whole samples as z^-M, the rest inside a sample.
-template <int PlantStates, int ControllerStates>
+/// Sampled loop gain with any delay of one input: whole samples as z^-M, the rest inside a sample.
 struct DelayedLoopGain {
-  NominalPlant<PlantStates> plant;  ///< continuous
-  LinearSystem<ControllerStates, 1, 1> controller;
-  mutable std::optional<Error<double>> refused{};  ///< the plant, with some delay
+  DensePlant plant;  ///< continuous
+  LinearController controller;
+  int channel;
+  mutable bool overflows = false;  ///< the scalar cannot hold the plant with some delay
 
   /// @param fraction of a sample, 0 .. 1
-  [[nodiscard]] LoopGain<PlantStates + 1, ControllerStates> with_fraction(double fraction) const {
-    const double T = controller.sample_time;
-    const auto sampled = sampled_plant(plant, T, fraction * T);
-    if (!sampled) {
-      refused = sampled.error();
-      return {};
-    }
-    auto late = sampled->template channel<0, 0>();
-    balance(late);
-    return {late, controller};
+  [[nodiscard]] LoopGain with_fraction(double fraction) const {
+    DensePlant late = plant;
+    late.dead_time[static_cast<std::size_t>(channel)] = fraction * controller.sample_time;
+    LoopGain gain{sampled_plant(late, controller.sample_time), controller, channel};
+    const double size = sum_of_magnitudes(gain.plant.now) + sum_of_magnitudes(gain.plant.before);
+    if (!is_finite(size)) overflows = true;
+    return gain;
   }
 
   /// log(-L) at a frequency (rad/s) and delay (s): zero where the loop oscillates.
@@ -38,9 +35,8 @@ struct DelayedLoopGain {
 };
 
 /// Newton's method for log(-L) = 0 from a frequency and a delay near by.
-template <int PlantStates, int ControllerStates>
-std::optional<Margin> refine_delay(const DelayedLoopGain<PlantStates, ControllerStates>& loop,
-                                   double frequency, double delay) {
+inline std::optional<Margin> refine_delay(const DelayedLoopGain& loop, double frequency,
+                                          double delay) {
   const double T = loop.controller.sample_time;
   const double nyquist = std::numbers::pi / T;
   for (int i = 0; i < 40; ++i) {
@@ -67,8 +63,8 @@ std::optional<Margin> refine_delay(const DelayedLoopGain<PlantStates, Controller
 }
 
 /// Calls visit(w, L) where abs(L) is one.
-template <class Response, int Count, class Visit>
-void gain_crossings(const Response& response, const ScanRange<Count>& range, Visit&& visit) {
+template <class Response, class Visit>
+void gain_crossings(const Response& response, const ScanRange& range, Visit&& visit) {
   scan(response, range,
        [&](double w1, std::complex<double> l1, double w2, std::complex<double> l2) {
          if ((std::abs(l1) < 1.0) == (std::abs(l2) < 1.0)) return;
@@ -83,52 +79,36 @@ inline double lag_to_minus_one(std::complex<double> l) {
   return lag < 0.0 ? lag + 2.0 * std::numbers::pi : lag;
 }
 
-}  // namespace detail
-
-/// Least further delay (s) between controller and plant with which a continuous loop oscillates.
-/// @return infinity where there is none; error for a loop that is not stable, or is sampled
-template <int PlantStates, class Observer>
-Expected<Margin, Error<double>> delay_margin(const AdrcLoop<PlantStates, Observer>& loop) {
-  if (loop.plant().sampled()) {
-    return Error<double>{"plant.sample_time", loop.plant().sample_time,
-                         "must be zero here: a sampled loop needs its continuous plant"};
-  }
-  if (!loop.stable()) {
-    return Error<double>{"stability_abscissa", loop.stability_abscissa(),
-                         detail::unstable_loop_rule};
-  }
+/// In a continuous loop a delay is a phase shift.
+inline Margin continuous_delay_margin(const Loop& loop, int channel) {
   std::optional<Margin> least;
-  detail::gain_crossings(detail::loop_gain_of(loop), detail::scan_range(loop),
-                         [&](double w, std::complex<double> l) {
-                           const double delay = detail::lag_to_minus_one(l) / w;
-                           if (!least || delay < least->value) least = Margin{delay, w};
-                         });
+  gain_crossings(loop_gain_of(loop, channel), scan_range(loop, channel),
+                 [&](double w, std::complex<double> l) {
+                   const double delay = lag_to_minus_one(l) / w;
+                   if (!least || delay < least->value) least = Margin{delay, w};
+                 });
   return least.value_or(Margin{});
 }
 
-/// The same for a sampled loop: the held input reaches the plant later by this time (s), which need
-/// not be a whole number of samples.
-///
-/// Between samples a delay is no mere phase shift e^(-i omega tau): the edge is found on the plant
-/// sampled with that delay.
-/// @param plant the continuous plant that the loop's was sampled from
-/// @param present_delay s, the delay that the loop's plant was sampled with
-template <int PlantStates, int SampledStates, class Observer>
-Expected<Margin, Error<double>> delay_margin(const AdrcLoop<SampledStates, Observer>& loop,
-                                             const NominalPlant<PlantStates>& plant,
-                                             double present_delay = 0.0) {
-  const double T = loop.plant().sample_time;
+}  // namespace detail
+
+/// Least further delay (s) of one u with which the loop oscillates; the dead time that the plant
+/// has is there already. It need not be a whole number of samples: between samples a delay is no
+/// mere phase shift e^(-i omega tau), and the edge is found on the plant sampled with that delay.
+/// @param channel 0 .. q - 1
+/// @return infinity where there is none; error for a loop that is not stable, or no such channel
+inline Expected<Margin, Error<double>> delay_margin(const Loop& loop, int channel = 0) {
   Rules<double> rules;
-  rules.require(T > 0.0, "plant.sample_time", T, "must be positive: this is for a sampled loop")
-      .not_negative("present_delay", present_delay)
-      .and_then([&] { return sampled_plant(plant, T, T); })
+  rules.all_of(loop.check_channel("channel", channel))
       .require(loop.stable(), "stability_abscissa", loop.stability_abscissa(),
                detail::unstable_loop_rule);
   if (!rules) return rules.error();
-  const detail::DelayedLoopGain<PlantStates, AdrcLoop<SampledStates, Observer>::observer_states>
-      delayed{plant, loop.controller().template channel<0, 0>()};
-  const auto range = detail::scan_range(loop);
-  const double behind = present_delay * (1.0 + 1e-12) + 1e-12 * T;
+  const double T = loop.sample_time();
+  if (!(T > 0.0)) return detail::continuous_delay_margin(loop, channel);
+  const double present = loop.continuous_plant().dead_time[static_cast<std::size_t>(channel)];
+  const detail::DelayedLoopGain delayed{loop.continuous_plant(), loop.controller(), channel};
+  const auto range = detail::scan_range(loop, channel);
+  const double behind = present * (1.0 + 1e-12) + 1e-12 * T;
   std::optional<Margin> least;
   const auto offer = [&](const Margin& edge) {
     if (edge.value > behind && (!least || edge.value < least->value)) least = edge;
@@ -166,9 +146,21 @@ Expected<Margin, Error<double>> delay_margin(const AdrcLoop<SampledStates, Obser
     }
     before = after;
   }
-  if (delayed.refused) return *delayed.refused;
+  if (delayed.overflows) {
+    return Error<double>{"plant.dead_time", present,
+                         "and any more give a sampled plant that the scalar cannot hold"};
+  }
   if (!least) return Margin{};
-  return Margin{least->value - present_delay, least->frequency};
+  return Margin{least->value - present, least->frequency};
+}
+
+/// That of the loop of a plant and a controller, see `closed_loop`.
+template <int States, Scalar S, int Inputs, int Outputs, class Controller>
+Expected<Margin, Error<double>> delay_margin(const LinearPlant<States, S, Inputs, Outputs>& plant,
+                                             const Controller& controller, int channel = 0) {
+  const auto loop = closed_loop(plant, controller);
+  if (!loop) return loop.error();
+  return delay_margin(*loop, channel);
 }
 
 }  // namespace esokit

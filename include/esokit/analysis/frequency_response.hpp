@@ -7,6 +7,7 @@
 #include <esokit/analysis/dense.hpp>
 #include <esokit/analysis/linear_system.hpp>
 #include <numbers>
+#include <utility>
 
 namespace esokit {
 
@@ -47,10 +48,47 @@ EigenMatrix<std::complex<double>, Outputs, Inputs> evaluate(
   return response;
 }
 
+using ComplexMatrix = DynamicMatrix<std::complex<double>>;
+
+/// (value I - a)^-1 b.
+inline ComplexMatrix resolvent(const DynamicMatrix<double>& a, std::complex<double> value,
+                               ComplexMatrix b) {
+  ComplexMatrix pencil(a.rows(), a.rows());
+  for (int j = 0; j < a.rows(); ++j) {
+    for (int i = 0; i < a.rows(); ++i) pencil(i, j) = -a(i, j);
+    pencil(j, j) += value;
+  }
+  solve_in_place(pencil.view(), b.view());
+  return b;
+}
+
+/// c x
+inline ComplexMatrix seen(const DynamicMatrix<double>& c, const ComplexMatrix& x) {
+  ComplexMatrix out(c.rows(), x.cols());
+  for (int j = 0; j < x.cols(); ++j) {
+    for (int k = 0; k < c.cols(); ++k) {
+      for (int i = 0; i < c.rows(); ++i) out(i, j) += c(i, k) * x(k, j);
+    }
+  }
+  return out;
+}
+
+inline ComplexMatrix evaluate(const DynamicSystem& system, std::complex<double> value) {
+  ComplexMatrix b(system.b.rows(), system.b.cols());
+  for (int j = 0; j < b.cols(); ++j) {
+    for (int i = 0; i < b.rows(); ++i) b(i, j) = system.b(i, j);
+  }
+  ComplexMatrix out = seen(system.c, resolvent(system.a, value, std::move(b)));
+  for (int j = 0; j < out.cols(); ++j) {
+    for (int i = 0; i < out.rows(); ++i) out(i, j) += system.d(i, j);
+  }
+  return out;
+}
+
 template <class MatrixType>
 bool all_finite(const MatrixType& matrix) noexcept {
-  for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
-    for (Eigen::Index j = 0; j < matrix.cols(); ++j) {
+  for (int i = 0; i < matrix.rows(); ++i) {
+    for (int j = 0; j < matrix.cols(); ++j) {
       const std::complex<double> value(matrix(i, j));
       if (!is_finite(value.real()) || !is_finite(value.imag())) return false;
     }
@@ -79,6 +117,18 @@ Expected<EigenMatrix<std::complex<double>, Outputs, Inputs>, Error<double>> freq
     const LinearSystem<States, Inputs, Outputs>& system, double frequency) {
   if (auto ok = detail::check_frequency(frequency, system.sample_time); !ok) return ok.error();
   const EigenMatrix<std::complex<double>, Outputs, Inputs> response =
+      detail::evaluate(system, detail::frequency_operator(frequency, system.sample_time));
+  if (!detail::all_finite(response)) {
+    return Error<double>{"frequency", frequency, "is a pole of the system"};
+  }
+  return response;
+}
+
+/// The same of a system whose sizes are known at run time.
+inline Expected<DynamicMatrix<std::complex<double>>, Error<double>> frequency_response(
+    const DynamicSystem& system, double frequency) {
+  if (auto ok = detail::check_frequency(frequency, system.sample_time); !ok) return ok.error();
+  auto response =
       detail::evaluate(system, detail::frequency_operator(frequency, system.sample_time));
   if (!detail::all_finite(response)) {
     return Error<double>{"frequency", frequency, "is a pole of the system"};

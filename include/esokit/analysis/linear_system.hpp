@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <esokit/analysis/dense.hpp>
+#include <esokit/analysis/dynamic_matrix.hpp>
 #include <esokit/core/check.hpp>
 #include <esokit/core/error.hpp>
 #include <esokit/core/expected.hpp>
@@ -62,6 +63,15 @@ struct LinearSystem {
     one.output_names[0] = output_names[static_cast<std::size_t>(Output)];
     return one;
   }
+};
+
+/// D x = a x + b w, out = c x + d w, of sizes known at run time; else as LinearSystem.
+struct DynamicSystem {
+  DynamicMatrix<double> a;   ///< A, or A - I where sampled
+  DynamicMatrix<double> b;   ///< from w to D x
+  DynamicMatrix<double> c;   ///< from x to out
+  DynamicMatrix<double> d;   ///< from w to out directly
+  double sample_time = 0.0;  ///< T, s; 0 for a continuous system
 };
 
 namespace detail {
@@ -124,15 +134,53 @@ void balance(LinearSystem<States, Inputs, Outputs>& system) noexcept {
 
 namespace detail {
 
+/// A system without its sizes in the type, for code that is compiled once.
+struct SystemView {
+  DenseView<const double> a, b, c, d;
+  double sample_time;
+
+  [[nodiscard]] bool sampled() const noexcept { return sample_time > 0.0; }
+  [[nodiscard]] int states() const noexcept { return a.rows; }
+  [[nodiscard]] int inputs() const noexcept { return b.columns; }
+  [[nodiscard]] int outputs() const noexcept { return c.rows; }
+};
+
 template <int States, int Inputs, int Outputs>
-Check<double> check_system(const LinearSystem<States, Inputs, Outputs>& system) {
+SystemView view_of(const LinearSystem<States, Inputs, Outputs>& system) noexcept {
+  // A matrix of one row is stored by rows, which is the same.
+  return {{system.a.data(), States},
+          {system.b.data(), States, Inputs},
+          {system.c.data(), Outputs, States},
+          {system.d.data(), Outputs, Inputs},
+          system.sample_time};
+}
+
+inline SystemView view_of(const DynamicSystem& system) noexcept {
+  const auto part = [](const DynamicMatrix<double>& matrix) {
+    return DenseView<const double>{matrix.data(), matrix.rows(), matrix.cols()};
+  };
+  return {part(system.a), part(system.b), part(system.c), part(system.d), system.sample_time};
+}
+
+inline double sum_of_magnitudes(const DynamicMatrix<double>& matrix) noexcept {
+  return sum_of_magnitudes(matrix.data(), matrix.rows() * matrix.cols());
+}
+
+inline Check<double> check_system(const SystemView& system) {
+  Rules<double> rules;
   if (!is_finite(system.sample_time) || system.sample_time < 0.0) {
     return Error<double>{"sample_time", system.sample_time, "must be finite and not negative"};
   }
-  return Rules<double>{}.finite("system", sum_of_magnitudes(system.a.data(), States * States) +
-                                              sum_of_magnitudes(system.b.data(), States * Inputs) +
-                                              sum_of_magnitudes(system.c.data(), Outputs * States) +
-                                              sum_of_magnitudes(system.d.data(), Outputs * Inputs));
+  double sum = 0.0;
+  for (const auto& part : {system.a, system.b, system.c, system.d}) {
+    sum += sum_of_magnitudes(part.data, part.rows * part.columns);
+  }
+  return rules.finite("system", sum);
+}
+
+template <int States, int Inputs, int Outputs>
+Check<double> check_system(const LinearSystem<States, Inputs, Outputs>& system) {
+  return check_system(view_of(system));
 }
 
 }  // namespace detail

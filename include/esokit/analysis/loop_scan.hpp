@@ -5,67 +5,64 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <esokit/analysis/adrc_loop.hpp>
+#include <esokit/analysis/loop.hpp>
+#include <limits>
 #include <numbers>
+#include <vector>
 
 namespace esokit::detail {
 
-/// L = -P C of one loop at one frequency.
-template <int PlantStates, int ControllerStates>
+/// L = -P C of one channel.
 struct LoopGain {
-  LinearSystem<PlantStates, 1, 1> plant;            ///< u to y
-  LinearSystem<ControllerStates, 1, 1> controller;  ///< y to u
+  SampledPlant plant;
+  LinearController controller;  ///< told of its own u
+  int channel;
 
   [[nodiscard]] std::complex<double> operator()(double frequency) const {
     return at(frequency_operator(frequency, controller.sample_time));
   }
   /// @param value of D: i omega, or z - 1
   [[nodiscard]] std::complex<double> at(std::complex<double> value) const {
-    return -evaluate(plant, value)(0, 0) * evaluate(controller, value)(0, 0);
+    return loop_gain_of_channel(response(plant, value), response(controller, value), channel);
   }
 };
 
-template <class Loop>
-auto loop_gain_of(const Loop& loop) {
-  return LoopGain<Loop::Plant::states, Loop::observer_states>{
-      loop.plant().template channel<0, 0>(), loop.controller().template channel<0, 0>()};
+inline LoopGain loop_gain_of(const Loop& loop, int channel) {
+  return {loop.plant(), loop.controller(), channel};
 }
 
 /// Where a loop gain is looked at: from well below its slowest pole to pi / T, or to well above
 /// its fastest; with the frequencies of all poles, near which it may change quickly.
-template <int Count>
 struct ScanRange {
-  Array<double, Count> features{};  ///< rad/s, rising; unused ones are `to`
+  std::vector<double> features;  ///< rad/s, rising
   double from = 0.0;
   double to = 0.0;
 };
 
-template <class Loop>
-auto scan_range(const Loop& loop) {
-  constexpr int poles_count = Loop::Plant::states + Loop::observer_states + Loop::states;
-  ScanRange<poles_count> range;
-  const double T = loop.plant().sample_time;
+inline ScanRange scan_range(const Loop& loop, int channel) {
+  ScanRange range;
+  const double T = loop.sample_time();
   double slowest = std::numeric_limits<double>::max();
   double fastest = 0.0;
-  int used = 0;
-  const auto look = [&](const auto& system, bool stable) {
-    for (const std::complex<double>& p : poles(system)) {
+  const auto look = [&](const std::vector<std::complex<double>>& poles, bool stable) {
+    for (const std::complex<double>& p : poles) {
       const double size = T > 0.0 ? std::abs(p) / T : std::abs(p);
       // Integrators come out as poles of rounding size.
       if (!stable && !(size > 1e-9 * fastest)) continue;
       if (stable) fastest = std::max(fastest, size);
       slowest = std::min(slowest, size);
-      range.features[static_cast<std::size_t>(used++)] =
-          T > 0.0 ? std::abs(std::arg(1.0 + p)) / T : std::abs(p.imag());
+      range.features.push_back(T > 0.0 ? std::abs(std::arg(1.0 + p)) / T : std::abs(p.imag()));
     }
   };
-  look(loop.closed_loop(), true);
-  look(loop.plant(), false);
-  look(loop.controller(), false);
+  look(loop.poles(), true);
+  look(poles_of(loop.plant().a), false);
+  look(poles_of(loop.controller().a), false);
+  if (loop.channels() > 1) {
+    look(poles_of(closed_system(loop.plant(), loop.controller(), channel).a), false);
+  }
   range.from = 1e-3 * slowest;
   range.to = T > 0.0 ? std::numbers::pi / T : 1e3 * fastest;
   range.from = std::min(range.from, 1e-3 * range.to);
-  for (int i = used; i < poles_count; ++i) range.features[static_cast<std::size_t>(i)] = range.to;
   std::sort(range.features.begin(), range.features.end());
   return range;
 }
@@ -90,8 +87,8 @@ void scan_piece(const Response& response, double w1, std::complex<double> l1, do
   scan_piece(response, middle, l, w2, l2, depth - 1, visit);
 }
 
-template <class Response, int Count, class Visit>
-void scan(const Response& response, const ScanRange<Count>& range, Visit&& visit) {
+template <class Response, class Visit>
+void scan(const Response& response, const ScanRange& range, Visit&& visit) {
   double w1 = range.from;
   std::complex<double> l1 = response(w1);
   const auto go_to = [&](double w2) {

@@ -107,6 +107,27 @@ inline double lyapunov_residual(const double* a, const double* q, const double* 
   return worst;
 }
 
+/// `solve_lyapunov` on the caller's storage. @param p is written @param work 5 n^2
+inline Check<double> solve_lyapunov(const double* a, const double* q, double* p, double* work,
+                                    int n, bool sampled) {
+  double* const residual = work + 3 * n * n;
+  double* const correction = work + 4 * n * n;
+  if (!solve_lyapunov_once(a, q, p, work, n, sampled)) {
+    return Error<double>{"system", 0.0, "is not stable: the stationary covariance does not exist"};
+  }
+  lyapunov_residual(a, q, p, residual, work, n, sampled);
+  if (solve_lyapunov_once(a, residual, correction, work, n, sampled)) {
+    for (int i = 0; i < n; ++i) {
+      for (int j = 0; j < n; ++j) {
+        p[j * n + i] += 0.5 * (correction[j * n + i] + correction[i * n + j]);
+      }
+    }
+  }
+  const double share = lyapunov_residual(a, q, p, residual, work, n, sampled);
+  return Rules<double>{}.require(share <= 1e-11, "system", share,
+                                 "leaves a residual in the Lyapunov equation");
+}
+
 }  // namespace detail
 
 /// Solves A P + P A' + Q = 0 (continuous) or P = A P A' + Q (sampled), N x N.
@@ -119,26 +140,10 @@ template <int N>
 Expected<EigenMatrix<double, N, N>, Error<double>> solve_lyapunov(
     const EigenMatrix<double, N, N>& a, const EigenMatrix<double, N, N>& q, bool sampled) {
   EigenMatrix<double, N, N> p;
-  EigenMatrix<double, N, N> residual;
-  EigenMatrix<double, N, N> correction;
-  Array<double, 3 * N * N> work;
-  if (!detail::solve_lyapunov_once(a.data(), q.data(), p.data(), work.data(), N, sampled)) {
-    return Error<double>{"system", 0.0, "is not stable: the stationary covariance does not exist"};
-  }
-  const auto residual_of = [&] {
-    return detail::lyapunov_residual(a.data(), q.data(), p.data(), residual.data(), work.data(), N,
-                                     sampled);
-  };
-  residual_of();
-  if (detail::solve_lyapunov_once(a.data(), residual.data(), correction.data(), work.data(), N,
-                                  sampled)) {
-    for (int i = 0; i < N; ++i) {
-      for (int j = 0; j < N; ++j) p(i, j) += 0.5 * (correction(i, j) + correction(j, i));
-    }
-  }
-  const double share = residual_of();
-  if (!(share <= 1e-11)) {
-    return Error<double>{"system", share, "leaves a residual in the Lyapunov equation"};
+  Array<double, 5 * N * N> work;
+  if (const auto ok = detail::solve_lyapunov(a.data(), q.data(), p.data(), work.data(), N, sampled);
+      !ok) {
+    return ok.error();
   }
   return p;
 }

@@ -33,6 +33,36 @@ namespace detail {
 inline constexpr const char* unstable_loop_rule =
     "must be negative: the nominal loop is not stable, it has no margins";
 
+/// Keeps the least of a function of the frequency that is walked along.
+class LeastDistance {
+ public:
+  /// @param size the function @param value it at w
+  template <class Size>
+  void operator()(const Size& size, double w, double value) {
+    if (!least_ || value < least_->value) least_ = Margin{value, w};
+    // The middle one of three is a local least: look between its neighbours.
+    if (seen_ >= 2 && last_.value <= before_.value && last_.value <= value &&
+        last_.value < 1.5 * least_->value) {
+      const double place = golden_section(size, before_.frequency, w);
+      const double there = size(place);
+      if (there < least_->value) least_ = Margin{there, place};
+    }
+    before_ = last_;
+    last_ = {value, w};
+    ++seen_;
+  }
+
+  /// The next frequency has nothing to do with the last.
+  void restart() noexcept { seen_ = 0; }
+
+  [[nodiscard]] const std::optional<Margin>& found() const noexcept { return least_; }
+
+ private:
+  std::optional<Margin> least_;
+  Margin before_{}, last_{};
+  long seen_ = 0;
+};
+
 /// Keeps the nearest edges while the loop gain is walked along.
 template <class Response>
 class MarginFinder {
@@ -52,8 +82,9 @@ class MarginFinder {
       const double shift = std::abs(std::arg(-response_(w)));
       if (!phase_ || shift < phase_->value) phase_ = Margin{shift, w};
     }
-    if (!modulus_) distance(w1, std::abs(1.0 + l1));
-    distance(w2, std::abs(1.0 + l2));
+    const auto size = [&](double x) { return std::abs(1.0 + response_(x)); };
+    if (!modulus_.found()) modulus_(size, w1, std::abs(1.0 + l1));
+    modulus_(size, w2, std::abs(1.0 + l2));
   }
 
   /// A place where L crosses or touches the real axis.
@@ -68,74 +99,104 @@ class MarginFinder {
     Margin no_decrease;
     no_decrease.value = 0.0;
     return {increase_.value_or(Margin{}), decrease_.value_or(no_decrease),
-            phase_.value_or(Margin{}), modulus_.value_or(Margin{})};
+            phase_.value_or(Margin{}), modulus_.found().value_or(Margin{})};
   }
 
  private:
-  void distance(double w, double value) {
-    if (!modulus_ || value < modulus_->value) modulus_ = Margin{value, w};
-    // The middle one of three is a local least: look between its neighbours.
-    if (seen_ >= 2 && last_.value <= before_.value && last_.value <= value &&
-        last_.value < 1.5 * modulus_->value) {
-      const auto size = [&](double x) { return std::abs(1.0 + response_(x)); };
-      const double least = golden_section(size, before_.frequency, w);
-      const double there = size(least);
-      if (there < modulus_->value) modulus_ = Margin{there, least};
-    }
-    before_ = last_;
-    last_ = {value, w};
-    ++seen_;
-  }
-
   const Response& response_;
-  std::optional<Margin> increase_, decrease_, phase_, modulus_;
-  Margin before_{}, last_{};
-  long seen_ = 0;
+  std::optional<Margin> increase_, decrease_, phase_;
+  LeastDistance modulus_;
 };
 
 }  // namespace detail
 
-/// Margins of a loop, sampled or continuous.
+/// Margins of a loop at one actuator, sampled or continuous; the other channels stay closed.
 ///
 /// Gain and phase are changed in L = -P C: in the plant's gain, the actuator's, or anywhere else in
 /// the loop but between law and observer. A phase shift turns positive frequencies by e^(-i phi).
-/// @return error for a nominal loop that is not stable
-template <int PlantStates, class Observer>
-Expected<Margins, Error<double>> margins(const AdrcLoop<PlantStates, Observer>& loop) {
-  if (!loop.stable()) {
-    return Error<double>{"stability_abscissa", loop.stability_abscissa(),
-                         detail::unstable_loop_rule};
-  }
-  const auto response = detail::loop_gain_of(loop);
+/// @param channel 0 .. q - 1
+/// @return error for a nominal loop that is not stable, or no such channel
+inline Expected<Margins, Error<double>> margins(const Loop& loop, int channel = 0) {
+  Rules<double> rules;
+  rules.all_of(loop.check_channel("channel", channel))
+      .require(loop.stable(), "stability_abscissa", loop.stability_abscissa(),
+               detail::unstable_loop_rule);
+  if (!rules) return rules.error();
+  const auto response = detail::loop_gain_of(loop, channel);
   detail::MarginFinder finder(response);
-  detail::scan(response, detail::scan_range(loop), finder);
+  detail::scan(response, detail::scan_range(loop, channel), finder);
   // L is real at z = -1; at standstill it is infinite, as every observer integrates.
-  if (loop.plant().sampled()) {
-    const double nyquist = std::numbers::pi / loop.plant().sample_time;
+  if (loop.sample_time() > 0.0) {
+    const double nyquist = std::numbers::pi / loop.sample_time();
     const std::complex<double> l = response.at(-2.0);
     if (is_finite(l.real())) finder.real_axis(l.real(), nyquist);
   }
   return finder.margins();
 }
 
-/// Range of b0 / b for which the loop is stable: b0 as the controller has it, b as the plant does;
-/// 0 and infinity where there is no limit.
+/// Those of the loop of a plant and a controller, see `closed_loop`.
+template <int States, Scalar S, int Inputs, int Outputs, class Controller>
+Expected<Margins, Error<double>> margins(const LinearPlant<States, S, Inputs, Outputs>& plant,
+                                         const Controller& controller, int channel = 0) {
+  const auto loop = closed_loop(plant, controller);
+  if (!loop) return loop.error();
+  return margins(*loop, channel);
+}
+
+/// Range of b0 with which the controller would hold this plant stable, the rest of its design as it
+/// is; infinity where there is no limit.
 ///
-/// The loop gain depends on the two by b / b0 alone, so it does not matter which of them is wrong.
-/// @param law the one that the loop was made with
-/// @param plant_gain b of the loop's nominal plant, the factor of u in y^(n)
-/// @return error for a nominal loop that is not stable, or a b that is zero or has the other sign
-template <int PlantStates, class Observer, Scalar S>
-Expected<Interval<>, Error<double>> input_gain_range(const AdrcLoop<PlantStates, Observer>& loop,
-                                                     const AdrcLaw<Observer::order, S>& law,
-                                                     double plant_gain) {
-  const auto ratio = static_cast<double>(law.input_gain()) / plant_gain;
-  if (!is_finite(ratio) || !(ratio > 0.0)) {
-    return Error<double>{"plant_gain", plant_gain, "must be finite, not zero, of the sign of b0"};
+/// The loop gain depends on b0 and the plant's own b by b / b0 alone: divided by b it is the range
+/// of b0 / b, and the plant's gain may be b0 / upper .. b0 / lower times what it is here.
+/// @return error for a nominal loop that is not stable, and a controller whose u does not go with
+///         1 / b0 (a compensator, several channels)
+inline Expected<Interval<>, Error<double>> input_gain_range(const Loop& loop) {
+  const double b0 = loop.input_gain();
+  Rules<double> rules;
+  rules.nonzero("input_gain", b0);
+  if (!rules) {
+    return Error<double>{"input_gain", b0,
+                         "must be one by which all of u is divided: this controller has none; see "
+                         "gain_increase and gain_decrease of its margins"};
   }
   const auto found = margins(loop);
   if (!found) return found.error();
-  return Interval<>{ratio / found->gain_increase.value, ratio / found->gain_decrease.value};
+  const double one = b0 / found->gain_increase.value;
+  const double other = b0 / found->gain_decrease.value;
+  return b0 > 0.0 ? Interval<>{one, other} : Interval<>{other, one};
+}
+
+/// That of the loop of a plant and a controller, see `closed_loop`.
+template <int States, Scalar S, class Controller>
+Expected<Interval<>, Error<double>> input_gain_range(const LinearPlant<States, S>& plant,
+                                                     const Controller& controller) {
+  const auto loop = closed_loop(plant, controller);
+  if (!loop) return loop.error();
+  return input_gain_range(*loop);
+}
+
+/// Largest singular value of the sensitivity over all frequencies, and where: by how much a
+/// disturbance at the outputs is enlarged at most. Of one channel the inverse of the modulus
+/// margin. See Loop::largest_sensitivity.
+/// @return error for a loop that is not stable
+inline Expected<Margin, Error<double>> sensitivity_peak(const Loop& loop) {
+  if (!loop.stable()) {
+    return Error<double>{"stability_abscissa", loop.stability_abscissa(),
+                         detail::unstable_loop_rule};
+  }
+  const auto size = [&](double w) {
+    return 1.0 / loop.sensitivity_at(detail::frequency_operator(w, loop.sample_time()));
+  };
+  detail::LeastDistance least;
+  const auto look = [&](double w1, std::complex<double>, double w2, std::complex<double>) {
+    least(size, w1, size(w1));
+    least(size, w2, size(w2));
+  };
+  for (int channel = 0; channel < loop.channels(); ++channel) {
+    detail::scan(detail::loop_gain_of(loop, channel), detail::scan_range(loop, channel), look);
+    least.restart();
+  }
+  return Margin{1.0 / least.found()->value, least.found()->frequency};
 }
 
 }  // namespace esokit

@@ -10,6 +10,7 @@
 #include <concepts>
 #include <esokit/analysis/linear_system.hpp>
 #include <esokit/gain/sampled_gain.hpp>
+#include <esokit/model/chain_model.hpp>
 #include <esokit/model/integrator_chain.hpp>
 #include <esokit/model/sampled_model.hpp>
 #include <esokit/observer/concepts.hpp>
@@ -50,6 +51,9 @@ struct FrozenObserver {
   }
   [[nodiscard]] double input_gain() const noexcept { return gain_of_input; }
   [[nodiscard]] double sample_time() const noexcept { return time_step; }
+  [[nodiscard]] ChainModel<Order, double, Extension> model() const noexcept {
+    return {gain_of_input, time_step};
+  }
   /// @}
 };
 

@@ -9,6 +9,68 @@
 
 namespace esokit {
 
+namespace detail {
+
+/// `peak_gain` on the caller's storage. @param fastest largest size of a pole, of a continuous one
+/// @param work 3 n^2 + 2 n
+inline Check<double> peak_gain(const SystemView& system, double abscissa, double fastest,
+                               const DenseView<double>& peak, double* work) {
+  if (auto ok = check_system(system); !ok) return ok;
+  if (!(abscissa < 0.0)) {
+    return Error<double>{"stability_abscissa", abscissa, "must be negative: it is not stable"};
+  }
+  const int n = system.states();
+  double* const advance = work;
+  double* const x = work + 3 * n * n;
+  double* const next = x + n;
+  for (int i = 0; i < n * n; ++i) advance[i] = system.a.data[i];
+  double step = 1.0;
+  if (!system.sampled()) {
+    step = 0.01 / fastest;
+    for (int i = 0; i < n * n; ++i) advance[i] *= step;
+    exp_minus_identity(advance, work + n * n, n);
+  }
+  for (int input = 0; input < system.inputs(); ++input) {
+    for (int r = 0; r < system.outputs(); ++r) peak(r, input) = std::abs(system.d(r, input));
+    for (int i = 0; i < n; ++i) x[i] = system.b(i, input);
+    for (long k = 0;; ++k) {
+      // The trapezoid rule counts the first value half; a sampled sum counts it whole.
+      const double weight = system.sampled() || k > 0 ? step : 0.5 * step;
+      bool ended = true;
+      for (int r = 0; r < system.outputs(); ++r) {
+        double response = 0.0;
+        double size = 0.0;
+        for (int i = 0; i < n; ++i) {
+          response += system.c(r, i) * x[i];
+          size += std::abs(system.c(r, i) * x[i]);
+        }
+        peak(r, input) += weight * std::abs(response);
+        // Relative to the end of a geometric sum.
+        const double slowest = system.sampled() ? -abscissa : -abscissa * step;
+        if (size * step > 1e-9 * slowest * peak(r, input)) ended = false;
+      }
+      if (ended && k > 2 * n) break;
+      if (k > 100'000'000L) {
+        return Error<double>{"stability_abscissa", abscissa, "is too slow for the sum to end"};
+      }
+      for (int i = 0; i < n; ++i) {
+        double sum = x[i];
+        for (int j = 0; j < n; ++j) sum += advance[j * n + i] * x[j];
+        next[i] = sum;
+      }
+      for (int i = 0; i < n; ++i) x[i] = next[i];
+    }
+    double sum = 0.0;
+    for (int r = 0; r < system.outputs(); ++r) sum += peak(r, input);
+    if (!is_finite(sum)) {
+      return Error<double>{"system", sum, "has a response that the scalar cannot hold", input};
+    }
+  }
+  return {};
+}
+
+}  // namespace detail
+
 /// Peak of each output for an input of size one, Outputs x Inputs: the sum (integral) of the
 /// magnitude of the impulse response. Sharp: some input of size one comes as near to it as you
 /// like.
@@ -20,59 +82,28 @@ namespace esokit {
 template <int States, int Inputs, int Outputs>
 Expected<EigenMatrix<double, Outputs, Inputs>, Error<double>> peak_gain(
     const LinearSystem<States, Inputs, Outputs>& system) {
-  if (auto ok = detail::check_system(system); !ok) return ok.error();
-  const double abscissa = stability_abscissa(system);
-  if (!(abscissa < 0.0)) {
-    return Error<double>{"stability_abscissa", abscissa, "must be negative: it is not stable"};
-  }
-  double step = 1.0;
-  EigenMatrix<double, States, States> advance = system.a;
-  if (!system.sampled()) {
-    double fastest = 0.0;
-    for (const std::complex<double>& p : poles(system)) fastest = std::max(fastest, std::abs(p));
-    step = 0.01 / fastest;
-    Array<double, 2 * States * States> work;
-    advance *= step;
-    detail::exp_minus_identity(advance.data(), work.data(), States);
-  }
-
+  double fastest = 0.0;
+  for (const std::complex<double>& p : poles(system)) fastest = std::max(fastest, std::abs(p));
   EigenMatrix<double, Outputs, Inputs> peak;
-  for (int input = 0; input < Inputs; ++input) {
-    for (int r = 0; r < Outputs; ++r) peak(r, input) = std::abs(system.d(r, input));
-    EigenMatrix<double, States> x;
-    for (int i = 0; i < States; ++i) x(i) = system.b(i, input);
-    long k = 0;
-    for (;; ++k) {
-      // The trapezoid rule counts the first value half; a sampled sum counts it whole.
-      const double weight = system.sampled() || k > 0 ? step : 0.5 * step;
-      bool ended = true;
-      for (int r = 0; r < Outputs; ++r) {
-        double response = 0.0;
-        double size = 0.0;
-        for (int i = 0; i < States; ++i) {
-          response += system.c(r, i) * x(i);
-          size += std::abs(system.c(r, i) * x(i));
-        }
-        peak(r, input) += weight * std::abs(response);
-        // Relative to the end of a geometric sum.
-        const double slowest = system.sampled() ? -abscissa : -abscissa * step;
-        if (size * step > 1e-9 * slowest * peak(r, input)) ended = false;
-      }
-      if (ended && k > 2 * States) break;
-      if (k > 100'000'000L) {
-        return Error<double>{"stability_abscissa", abscissa, "is too slow for the sum to end"};
-      }
-      EigenMatrix<double, States> next;
-      for (int i = 0; i < States; ++i) {
-        double sum = x(i);
-        for (int j = 0; j < States; ++j) sum += advance(i, j) * x(j);
-        next(i) = sum;
-      }
-      x = next;
-    }
-    if (const double sum = peak.col(input).sum(); !is_finite(sum)) {
-      return Error<double>{"system", sum, "has a response that the scalar cannot hold", input};
-    }
+  Array<double, 3 * States * States + 2 * States> work;
+  if (const auto ok = detail::peak_gain(detail::view_of(system), stability_abscissa(system),
+                                        fastest, {peak.data(), Outputs, Inputs}, work.data());
+      !ok) {
+    return ok.error();
+  }
+  return peak;
+}
+
+/// The same of a system whose sizes are known at run time.
+inline Expected<DynamicMatrix<double>, Error<double>> peak_gain(const DynamicSystem& system) {
+  double fastest = 0.0;
+  for (const std::complex<double>& p : poles(system)) fastest = std::max(fastest, std::abs(p));
+  DynamicMatrix<double> peak(system.c.rows(), system.b.cols());
+  DynamicMatrix<double> work(system.a.rows(), 3 * system.a.rows() + 2);
+  if (const auto ok = detail::peak_gain(detail::view_of(system), stability_abscissa(system),
+                                        fastest, peak.view(), work.data());
+      !ok) {
+    return ok.error();
   }
   return peak;
 }

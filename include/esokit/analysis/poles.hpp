@@ -8,8 +8,41 @@
 #include <esokit/analysis/dense.hpp>
 #include <esokit/analysis/linear_system.hpp>
 #include <limits>
+#include <vector>
 
 namespace esokit {
+
+namespace detail {
+
+/// How far the worst of some poles is on the stable side, as stability_abscissa says.
+inline double worst_pole(const std::complex<double>* poles, std::size_t count,
+                         bool sampled) noexcept {
+  double worst = -std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::complex<double> p = poles[i];
+    // |1 + p| - 1 = (2 Re p + |p|^2) / (|1 + p| + 1)
+    const double excess =
+        sampled ? (2.0 * p.real() + std::norm(p)) / (std::abs(1.0 + p) + 1.0) : p.real();
+    if (!is_finite(excess)) return std::numeric_limits<double>::infinity();
+    worst = std::max(worst, excess);
+  }
+  return worst;
+}
+
+/// Poles of a matrix as LinearSystem keeps it; not finite if they cannot be found.
+inline std::vector<std::complex<double>> poles_of(const DynamicMatrix<double>& a) {
+  DynamicMatrix<std::complex<double>> work(a.rows(), a.rows());
+  for (int j = 0; j < a.rows(); ++j) {
+    for (int i = 0; i < a.rows(); ++i) work(i, j) = a(i, j);
+  }
+  std::vector<std::complex<double>> values(static_cast<std::size_t>(a.rows()));
+  if (!eigenvalues(work.view(), values.data())) {
+    for (auto& value : values) value = std::numeric_limits<double>::quiet_NaN();
+  }
+  return values;
+}
+
+}  // namespace detail
 
 /// Poles: eigenvalues of A for a continuous system (1/s); for a sampled one z - 1, which keeps the
 /// digits of slow poles. N poles in one place come out spread by about eps^(1/N) of their size.
@@ -32,15 +65,8 @@ EigenMatrix<std::complex<double>, States> poles(
 /// or for a sampled system the largest |z| - 1.
 template <int States, int Inputs, int Outputs>
 double stability_abscissa(const LinearSystem<States, Inputs, Outputs>& system) {
-  double worst = -std::numeric_limits<double>::infinity();
-  for (const std::complex<double>& p : poles(system)) {
-    // |1 + p| - 1 = (2 Re p + |p|^2) / (|1 + p| + 1)
-    const double excess =
-        system.sampled() ? (2.0 * p.real() + std::norm(p)) / (std::abs(1.0 + p) + 1.0) : p.real();
-    if (!is_finite(excess)) return std::numeric_limits<double>::infinity();
-    worst = std::max(worst, excess);
-  }
-  return worst;
+  const auto values = poles(system);
+  return detail::worst_pole(values.data(), States, system.sampled());
 }
 
 /// Largest |z| of a sampled system.
@@ -48,5 +74,16 @@ template <int States, int Inputs, int Outputs>
 double spectral_radius(const LinearSystem<States, Inputs, Outputs>& system) {
   return 1.0 + stability_abscissa(system);
 }
+
+/// Those of a system whose sizes are known at run time.
+/// @{
+inline std::vector<std::complex<double>> poles(const DynamicSystem& system) {
+  return detail::poles_of(system.a);
+}
+inline double stability_abscissa(const DynamicSystem& system) {
+  const auto values = poles(system);
+  return detail::worst_pole(values.data(), values.size(), system.sample_time > 0.0);
+}
+/// @}
 
 }  // namespace esokit

@@ -223,6 +223,8 @@ class Adrc {
   [[nodiscard]] Lanes<LoopMode, S> mode() const noexcept { return loop_.mode(); }
   /// k_0 .. k_(n-1).
   [[nodiscard]] const Array<S, order>& gains() const noexcept { return law_.gains(); }
+  /// D: a measurement is due at every D-th update.
+  [[nodiscard]] int measurement_divider() const noexcept { return loop_.measurement_divider(); }
 
  private:
   friend struct detail::LaneAccess;

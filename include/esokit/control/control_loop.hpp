@@ -280,6 +280,8 @@ class ControlLoop {
   [[nodiscard]] Status status() const noexcept { return status_; }
   /// What decides about the output now.
   [[nodiscard]] Lanes<LoopMode, S> mode() const noexcept { return mode_; }
+  /// D: a measurement is due at every D-th step.
+  [[nodiscard]] int measurement_divider() const noexcept { return divider_; }
   /// The limits, and the output that they last let through.
   [[nodiscard]] const Limiter<S>& limiter() const noexcept { return limiter_; }
 

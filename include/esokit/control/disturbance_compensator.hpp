@@ -130,6 +130,10 @@ class DisturbanceCompensator {
   [[nodiscard]] const Observer& observer() const noexcept { return loop_.observer(); }
   /// The observer, for what only it can do (AlgebraicEso::rearm).
   [[nodiscard]] Observer& observer() noexcept { return loop_.observer(); }
+  /// K, unit of u per unit of y^(n).
+  [[nodiscard]] const S& compensation_gain() const noexcept { return gain_; }
+  /// D: a measurement is due at every D-th update.
+  [[nodiscard]] int measurement_divider() const noexcept { return loop_.measurement_divider(); }
   /// The u that holds now, within the limits.
   [[nodiscard]] const S& output() const noexcept { return loop_.output(); }
   /// u0 + K dhat before the limits.

@@ -184,6 +184,18 @@ class MimoAdrc {
     return std::get<static_cast<std::size_t>(Channel)>(observers_);
   }
 
+  /// k_0 .. k_(n-1) of a channel, 0 .. q - 1.
+  template <int Channel>
+  [[nodiscard]] const Array<S, ObserverOf<Channel>::order>& gains() const noexcept {
+    return std::get<static_cast<std::size_t>(Channel)>(laws_).gains();
+  }
+
+  /// B0, and its inverse as it is used.
+  /// @{
+  [[nodiscard]] const InputMatrix& input_matrix() const noexcept { return input_matrix_; }
+  [[nodiscard]] const InputMatrix& decoupling() const noexcept { return inverse_; }
+  /// @}
+
   /// What the observer of a channel said of the last sample.
   [[nodiscard]] StepStatus status(int channel) const noexcept {
     return statuses_[static_cast<std::size_t>(channel)];

@@ -1,0 +1,547 @@
+/// @file
+/// The loop of a plant and a controller: what is asked of a finished design is asked of this.
+#pragma once
+
+#include <cmath>
+#include <complex>
+#include <cstddef>
+#include <esokit/analysis/controllers.hpp>
+#include <esokit/analysis/dynamic_matrix.hpp>
+#include <esokit/analysis/frequency_response.hpp>
+#include <esokit/analysis/linear_controller.hpp>
+#include <esokit/analysis/poles.hpp>
+#include <esokit/model/linear_plant.hpp>
+#include <numbers>
+#include <optional>
+#include <utility>
+#include <vector>
+
+namespace esokit {
+
+namespace detail {
+
+/// Whole samples of dead time that a loop is made with; more is refused.
+inline constexpr double most_whole_samples = 1000.0;
+
+/// A LinearPlant in double without its sizes in the type.
+struct DensePlant {
+  DynamicMatrix<double> a, b, c, e;
+  std::vector<double> dead_time;  ///< s, of each input
+};
+
+template <int States, Scalar S, int Inputs, int Outputs>
+DensePlant dense_plant(const LinearPlant<States, S, Inputs, Outputs>& plant) {
+  return {dynamic_copy(plant.a, States, States), dynamic_copy(plant.b, States, Inputs),
+          dynamic_copy(plant.c, Outputs, States), dynamic_copy(plant.e, States, Inputs),
+          std::vector<double>(Inputs, static_cast<double>(plant.dead_time))};
+}
+
+/// exp(A t) - I and the integral of exp(A s) B over 0..t.
+struct HeldFor {
+  DynamicMatrix<double> increment, input;
+};
+
+inline HeldFor held_for(const DynamicMatrix<double>& a, const DynamicMatrix<double>& b, double t) {
+  const int n = a.rows();
+  DynamicMatrix<double> stacked(n + b.cols(), n + b.cols());  // ((a, b), (0, 0))
+  add(stacked, 0, 0, a, t);
+  add(stacked, 0, n, b, t);
+  DynamicMatrix<double> work(n + b.cols(), 2 * (n + b.cols()));
+  exp_minus_identity(stacked.data(), work.data(), n + b.cols());
+  HeldFor held{DynamicMatrix<double>(n, n), DynamicMatrix<double>(n, b.cols())};
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) held.increment(i, j) = stacked(i, j);
+    for (int j = 0; j < b.cols(); ++j) held.input(i, j) = stacked(i, n + j);
+  }
+  return held;
+}
+
+/// A plant at the sample times: D x = a x + now u[k - whole] + before u[k - whole - 1] + e d,
+/// `whole` of each input its own. A continuous one has `now` alone.
+struct SampledPlant {
+  DynamicMatrix<double> a, now, before, e, c;
+  std::vector<int> whole;
+  double sample_time = 0.0;
+
+  /// How many inputs of the past it has to remember.
+  [[nodiscard]] int remembered(int input) const {
+    for (int i = 0; i < a.rows(); ++i) {
+      if (before(i, input) != 0.0) return whole[static_cast<std::size_t>(input)] + 1;
+    }
+    return whole[static_cast<std::size_t>(input)];
+  }
+};
+
+/// Column `input` of a sampled plant for a dead time of its own.
+inline void set_input(SampledPlant& sampled, const DensePlant& plant, int input, double dead_time) {
+  const double T = sampled.sample_time;
+  const int n = plant.a.rows();
+  DynamicMatrix<double> b(n, 1);
+  for (int i = 0; i < n; ++i) b(i, 0) = plant.b(i, input);
+  double whole = std::floor(dead_time / T);
+  double rest = dead_time - whole * T;
+  // A whole number of samples but for the rounding of T.
+  const double rounding = 1e-12 * (dead_time + T);
+  if (rest > T - rounding) whole += 1.0;
+  if (rest > T - rounding || rest < rounding) rest = 0.0;
+  sampled.whole[static_cast<std::size_t>(input)] = static_cast<int>(whole);
+  const HeldFor late = held_for(plant.a, b, T - rest);
+  const HeldFor early = held_for(plant.a, b, rest);
+  // On to the end of the sample by exp(A (T - rest)).
+  auto old = product(late.increment, early.input);
+  add(old, 0, 0, early.input);
+  for (int i = 0; i < n; ++i) {
+    sampled.now(i, input) = late.input(i, 0);
+    sampled.before(i, input) = old(i, 0);
+  }
+}
+
+inline SampledPlant sampled_plant(const DensePlant& plant, double sample_time) {
+  SampledPlant sampled{plant.a,    plant.b, DynamicMatrix<double>(plant.b.rows(), plant.b.cols()),
+                       plant.e,    plant.c, std::vector<int>(plant.dead_time.size()),
+                       sample_time};
+  if (sample_time > 0.0) {
+    const HeldFor held = held_for(plant.a, plant.e, sample_time);
+    sampled.a = held.increment;
+    sampled.e = held.input;
+    for (int j = 0; j < plant.b.cols(); ++j) {
+      set_input(sampled, plant, j, plant.dead_time[static_cast<std::size_t>(j)]);
+    }
+  }
+  // States of like size: nothing is rounded.
+  const int n = plant.a.rows();
+  const int q = plant.b.cols();
+  DynamicMatrix<double> inputs(n, 2 * q + plant.e.cols());
+  add(inputs, 0, 0, sampled.now);
+  add(inputs, 0, q, sampled.before);
+  add(inputs, 0, 2 * q, sampled.e);
+  balance(sampled.a.view(), inputs.view(), sampled.c.view());
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < q; ++j) {
+      sampled.now(i, j) = inputs(i, j);
+      sampled.before(i, j) = inputs(i, q + j);
+    }
+    for (int j = 0; j < plant.e.cols(); ++j) sampled.e(i, j) = inputs(i, 2 * q + j);
+  }
+  return sampled;
+}
+
+/// The same with the inputs of the past as states.
+inline DynamicSystem with_memory(const SampledPlant& plant) {
+  const int n = plant.a.rows();
+  const int q = plant.now.cols();
+  int states = n;
+  for (int j = 0; j < q; ++j) states += plant.remembered(j);
+  DynamicSystem all{DynamicMatrix<double>(states, states),
+                    DynamicMatrix<double>(states, q),
+                    DynamicMatrix<double>(plant.c.rows(), states),
+                    {},
+                    plant.sample_time};
+  add(all.a, 0, 0, plant.a);
+  add(all.c, 0, 0, plant.c);
+  int first = n;
+  for (int j = 0; j < q; ++j) {
+    const int count = plant.remembered(j);
+    const int whole = plant.whole[static_cast<std::size_t>(j)];
+    for (int k = 0; k < count; ++k) {
+      all.a(first + k, first + k) = -1.0;
+      if (k > 0) all.a(first + k, first + k - 1) = 1.0;
+    }
+    if (count > 0) all.b(first, j) = 1.0;
+    // u[k - i] is state first + i - 1.
+    for (int i = 0; i < n; ++i) {
+      if (whole == 0) {
+        all.b(i, j) += plant.now(i, j);
+      } else {
+        all.a(i, first + whole - 1) += plant.now(i, j);
+      }
+      if (count > whole) all.a(i, first + whole) += plant.before(i, j);
+    }
+    first += count;
+  }
+  return all;
+}
+
+/// u to y at a value of D (i omega, or z - 1). @param disturbance d to y instead
+inline ComplexMatrix response(const SampledPlant& plant, std::complex<double> value,
+                              bool disturbance = false) {
+  const int n = plant.a.rows();
+  if (disturbance) {
+    ComplexMatrix e(n, plant.e.cols());
+    for (int j = 0; j < e.cols(); ++j) {
+      for (int i = 0; i < n; ++i) e(i, j) = plant.e(i, j);
+    }
+    return seen(plant.c, resolvent(plant.a, value, std::move(e)));
+  }
+  const int q = plant.now.cols();
+  ComplexMatrix b(n, q);
+  for (int j = 0; j < q; ++j) {
+    const bool remembers = plant.remembered(j) > 0;
+    const std::complex<double> back = remembers ? 1.0 / (1.0 + value) : 0.0;
+    const std::complex<double> whole =
+        remembers ? std::pow(back, plant.whole[static_cast<std::size_t>(j)]) : 1.0;
+    for (int i = 0; i < n; ++i) {
+      b(i, j) = plant.now(i, j);
+      if (remembers) b(i, j) = whole * (b(i, j) + back * plant.before(i, j));
+    }
+  }
+  return seen(plant.c, resolvent(plant.a, value, std::move(b)));
+}
+
+/// y to u. @param controller told of its own u
+inline ComplexMatrix response(const LinearController& controller, std::complex<double> value) {
+  ComplexMatrix b(controller.states(), controller.channels());
+  for (int j = 0; j < b.cols(); ++j) {
+    for (int i = 0; i < b.rows(); ++i) b(i, j) = controller.from_y(i, j);
+  }
+  ComplexMatrix u = seen(controller.to_u, resolvent(controller.a, value, std::move(b)));
+  for (int j = 0; j < u.cols(); ++j) {
+    for (int i = 0; i < u.rows(); ++i) u(i, j) += controller.y_to_u(i, j);
+  }
+  return u;
+}
+
+inline void balance(LinearController& c) {
+  const int n = c.states();
+  const int q = c.channels();
+  DynamicMatrix<double> b(n, 2 * q);
+  add(b, 0, 0, c.from_y);
+  add(b, 0, q, c.from_r);
+  DynamicMatrix<double> outputs(q + c.estimates(), n);
+  add(outputs, 0, 0, c.to_u);
+  add(outputs, q, 0, c.to_estimate);
+  balance(c.a.view(), b.view(), outputs.view());
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < q; ++j) {
+      c.from_y(i, j) = b(i, j);
+      c.from_r(i, j) = b(i, q + j);
+      c.to_u(j, i) = outputs(j, i);
+    }
+    for (int j = 0; j < c.estimates(); ++j) c.to_estimate(j, i) = outputs(q + j, i);
+  }
+}
+
+/// The loop (r, v, d) to (y, u, zhat). @param open this channel's u does not reach the plant; -1:
+/// all do @param controller told of its own u
+inline DynamicSystem closed_system(const SampledPlant& sampled, const LinearController& controller,
+                                   int open = -1) {
+  const DynamicSystem plant = with_memory(sampled);
+  const LinearController& c = controller;
+  const int n = plant.a.rows();
+  const int m = c.states();
+  const int q = c.channels();
+  const int disturbances = sampled.e.cols();
+  DynamicMatrix<double> b = plant.b;
+  if (open >= 0) {
+    for (int i = 0; i < n; ++i) b(i, open) = 0.0;
+  }
+  DynamicSystem closed{
+      DynamicMatrix<double>(n + m, n + m), DynamicMatrix<double>(n + m, 2 * q + disturbances),
+      DynamicMatrix<double>(2 * q + c.estimates(), n + m),
+      DynamicMatrix<double>(2 * q + c.estimates(), 2 * q + disturbances), plant.sample_time};
+  const auto through = product(b, c.y_to_u);
+  add(closed.a, 0, 0, plant.a);
+  add(closed.a, 0, 0, product(through, plant.c));
+  add(closed.a, 0, n, product(b, c.to_u));
+  add(closed.a, n, 0, product(c.from_y, plant.c));
+  add(closed.a, n, n, c.a);
+  add(closed.b, 0, 0, product(b, c.r_to_u));
+  add(closed.b, 0, q, through);
+  add(closed.b, 0, 2 * q, sampled.e);
+  add(closed.b, n, 0, c.from_r);
+  add(closed.b, n, q, c.from_y);
+  add(closed.c, 0, 0, plant.c);
+  add(closed.c, q, 0, product(c.y_to_u, plant.c));
+  add(closed.c, q, n, c.to_u);
+  add(closed.c, 2 * q, 0, product(c.y_to_estimate, plant.c));
+  add(closed.c, 2 * q, n, c.to_estimate);
+  add(closed.d, q, 0, c.r_to_u);
+  add(closed.d, q, q, c.y_to_u);
+  add(closed.d, 2 * q, 0, c.r_to_estimate);
+  add(closed.d, 2 * q, q, c.y_to_estimate);
+  balance(closed.a.view(), closed.b.view(), closed.c.view());
+  return closed;
+}
+
+/// (I + factor g) in place of g; g is square.
+inline ComplexMatrix identity_plus(const ComplexMatrix& g, double factor = 1.0) {
+  ComplexMatrix out(g.rows(), g.rows());
+  for (int j = 0; j < g.rows(); ++j) {
+    for (int i = 0; i < g.rows(); ++i) out(i, j) = factor * g(i, j);
+    out(j, j) += 1.0;
+  }
+  return out;
+}
+
+/// Loop gain of one channel with the others closed, of L = -C P at the plant's inputs.
+inline std::complex<double> loop_gain_of_channel(const ComplexMatrix& plant,
+                                                 const ComplexMatrix& controller, int channel) {
+  ComplexMatrix l = product(controller, plant);
+  const int q = l.rows();
+  for (int j = 0; j < q; ++j) {
+    for (int i = 0; i < q; ++i) l(i, j) = -l(i, j);
+  }
+  if (q == 1) return l(0, 0);
+  // l_ii - l_io (I + l_oo)^-1 l_oi, o: the others
+  const auto other = [&](int i) { return i < channel ? i : i + 1; };
+  ComplexMatrix others(q - 1, q - 1);
+  ComplexMatrix into(q - 1, 1);
+  for (int i = 0; i < q - 1; ++i) {
+    for (int j = 0; j < q - 1; ++j) others(i, j) = l(other(i), other(j));
+    others(i, i) += 1.0;
+    into(i, 0) = l(other(i), channel);
+  }
+  solve_in_place(others.view(), into.view());
+  std::complex<double> gain = l(channel, channel);
+  for (int i = 0; i < q - 1; ++i) gain -= l(channel, other(i)) * into(i, 0);
+  return gain;
+}
+
+/// Largest singular value.
+inline double largest_singular_value(const ComplexMatrix& matrix) {
+  const int n = matrix.cols();
+  if (n == 1 && matrix.rows() == 1) return std::abs(matrix(0, 0));
+  ComplexMatrix square(n, n);
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) {
+      for (int k = 0; k < matrix.rows(); ++k) {
+        square(i, j) += std::conj(matrix(k, i)) * matrix(k, j);
+      }
+    }
+  }
+  std::vector<std::complex<double>> values(static_cast<std::size_t>(n));
+  if (!eigenvalues(square.view(), values.data())) return std::numeric_limits<double>::quiet_NaN();
+  double largest = 0.0;
+  for (const auto& value : values) largest = std::max(largest, value.real());
+  return std::sqrt(largest);
+}
+
+}  // namespace detail
+
+/// Loop of a plant y = P (u, d) and a controller u = C (y + v, r), of q channels.
+///
+/// Sampled: y[k] is measured and u[k] set in the same moment; computing time is dead time of the
+/// plant. The loop is opened at the plant's input, behind the path by which the controller is told
+/// u: L = -P C, for one channel the others stay closed. r is a reference without derivatives; d is
+/// held from k to k + 1.
+class Loop {
+ public:
+  using Complex = std::complex<double>;  ///< a response at a frequency
+
+  /// Closes the loop; better by `closed_loop`.
+  /// @return error for a plant with other channels than the controller, one that the scalar cannot
+  ///         hold, and a dead time that a loop cannot have
+  static Expected<Loop, Error<double>> make(detail::DensePlant plant, LinearController controller) {
+    const double T = controller.sample_time;
+    const int q = controller.channels();
+    Rules<double> rules;
+    rules.not_negative("controller.sample_time", T)
+        .require(plant.b.cols() == q, {"plant.inputs", static_cast<double>(plant.b.cols()),
+                                       "must be the channels of the controller, that is", -1,
+                                       static_cast<double>(q), true})
+        .require(plant.c.rows() == q, {"plant.outputs", static_cast<double>(plant.c.rows()),
+                                       "must be the channels of the controller, that is", -1,
+                                       static_cast<double>(q), true});
+    for (const auto* matrix : {&plant.a, &plant.b, &plant.c, &plant.e}) {
+      rules.finite("plant", detail::sum_of_magnitudes(*matrix));
+    }
+    for (const auto* matrix :
+         {&controller.a, &controller.from_y, &controller.from_r, &controller.from_u,
+          &controller.to_u, &controller.y_to_u, &controller.r_to_u, &controller.to_estimate,
+          &controller.y_to_estimate, &controller.r_to_estimate}) {
+      rules.finite("controller", detail::sum_of_magnitudes(*matrix));
+    }
+    for (const double dead_time : plant.dead_time) {
+      rules.not_negative("plant.dead_time", dead_time)
+          .require(T > 0.0 || !(dead_time > 0.0), "plant.dead_time", dead_time,
+                   "must be zero with a continuous controller")
+          .require(!(T > 0.0) || dead_time <= detail::most_whole_samples * T, "plant.dead_time",
+                   dead_time, "must not be above 1000 samples");
+    }
+    if (!rules) return rules.error();
+    Loop loop;
+    loop.continuous_ = std::move(plant);
+    loop.input_gain_ = controller.input_gain;
+    loop.controller_ = detail::closed_upon_itself(controller);
+    detail::balance(loop.controller_);
+    loop.plant_ = detail::sampled_plant(loop.continuous_, T);
+    loop.system_ = detail::closed_system(loop.plant_, loop.controller_);
+    const DynamicSystem& closed = loop.system_;
+    for (const auto* matrix : {&closed.a, &closed.b, &closed.c, &closed.d}) {
+      rules.finite("system", detail::sum_of_magnitudes(*matrix));
+    }
+    if (!rules) return rules.error();
+    loop.poles_ = detail::poles_of(closed.a);
+    loop.abscissa_ = detail::worst_pole(loop.poles_.data(), loop.poles_.size(), T > 0.0);
+    if (!is_finite(loop.abscissa_)) {
+      return Error<double>{"plant.b", loop.continuous_.b(0, 0),
+                           "gives a closed loop whose poles the scalar cannot hold"};
+    }
+    return loop;
+  }
+
+  /// q.
+  [[nodiscard]] int channels() const noexcept { return controller_.channels(); }
+  /// T, s; 0 for a continuous loop.
+  [[nodiscard]] double sample_time() const noexcept { return system_.sample_time; }
+  /// (r, v, d) to (y, u, zhat), q columns and rows of each, d and zhat as many as there are.
+  [[nodiscard]] const DynamicSystem& system() const noexcept { return system_; }
+  /// b0 of the controller, 0 if it has none.
+  [[nodiscard]] double input_gain() const noexcept { return input_gain_; }
+
+  /// True if all poles of the closed loop are stable.
+  [[nodiscard]] bool stable() const noexcept { return abscissa_ < 0.0; }
+  /// As esokit::stability_abscissa of the closed loop: negative is stable.
+  [[nodiscard]] double stability_abscissa() const noexcept { return abscissa_; }
+  /// Of the closed loop; sampled: z - 1.
+  [[nodiscard]] const std::vector<Complex>& poles() const noexcept { return poles_; }
+
+  /// L at one actuator, the other channels closed. @param frequency rad/s, above 0; sampled: to
+  /// pi / T @return error for a frequency outside of that, one that is a pole, or no such channel
+  [[nodiscard]] Expected<Complex, Error<double>> loop_gain(double frequency,
+                                                           int channel = 0) const {
+    return at(frequency, channel, channel, [&](Complex value) {
+      return detail::loop_gain_of_channel(detail::response(plant_, value),
+                                          detail::response(controller_, value), channel);
+    });
+  }
+  /// S = 1 / (1 + L): from a disturbance at an actuator to what reaches the plant; of one channel
+  /// also from a disturbance at the output to y. Errors as loop_gain.
+  [[nodiscard]] Expected<Complex, Error<double>> sensitivity(double frequency,
+                                                             int channel = 0) const {
+    return of_gain(frequency, channel, [](Complex l) { return 1.0 / (1.0 + l); });
+  }
+  /// T = L / (1 + L): of one channel from noise v to -y. Errors as loop_gain.
+  [[nodiscard]] Expected<Complex, Error<double>> complementary_sensitivity(double frequency,
+                                                                           int channel = 0) const {
+    return of_gain(frequency, channel, [](Complex l) { return l / (1.0 + l); });
+  }
+  /// From noise on one measurement to one u. Errors as loop_gain.
+  [[nodiscard]] Expected<Complex, Error<double>> noise_to_control(double frequency, int control = 0,
+                                                                  int measurement = 0) const {
+    return at(frequency, control, measurement, [&](Complex value) {
+      // u = C (v + P u)
+      auto c = detail::response(controller_, value);
+      auto inner = detail::identity_plus(detail::product(c, detail::response(plant_, value)), -1.0);
+      detail::solve_in_place(inner.view(), c.view());
+      return Complex(c(control, measurement));
+    });
+  }
+  /// From a disturbance of the plant to one y. Errors as loop_gain.
+  [[nodiscard]] Expected<Complex, Error<double>> disturbance_to_output(double frequency,
+                                                                       int output = 0,
+                                                                       int disturbance = 0) const {
+    return at(frequency, output, disturbance, [&](Complex value) {
+      auto y = detail::response(plant_, value, true);
+      auto inner = output_return(value);
+      detail::solve_in_place(inner.view(), y.view());
+      return Complex(y(output, disturbance));
+    });
+  }
+  /// Largest singular value of the sensitivity (I - P C)^-1: how much a disturbance at the outputs
+  /// is enlarged at most, in any direction. It knows the units of y: compare outputs of like size.
+  /// Errors as loop_gain.
+  [[nodiscard]] Expected<double, Error<double>> largest_sensitivity(double frequency) const {
+    double largest = 0.0;
+    const auto found = at(frequency, 0, 0, [&](Complex value) {
+      largest = sensitivity_at(value);
+      return Complex(largest);
+    });
+    if (!found) return found.error();
+    return largest;
+  }
+
+  /// @cond
+  [[nodiscard]] const detail::DensePlant& continuous_plant() const noexcept { return continuous_; }
+  [[nodiscard]] const detail::SampledPlant& plant() const noexcept { return plant_; }
+  [[nodiscard]] const LinearController& controller() const noexcept { return controller_; }
+  [[nodiscard]] double sensitivity_at(Complex value) const {
+    auto inner = output_return(value);
+    auto identity = detail::ComplexMatrix(channels(), channels());
+    for (int i = 0; i < channels(); ++i) identity(i, i) = 1.0;
+    detail::solve_in_place(inner.view(), identity.view());
+    return detail::largest_singular_value(identity);
+  }
+  [[nodiscard]] Check<double> check_channel(const char* field, int channel) const {
+    return Rules<double>{}.require(
+        0 <= channel && channel < channels(),
+        {field, static_cast<double>(channel), "must be 0 up to the channels less one, that is", -1,
+         static_cast<double>(channels() - 1), true});
+  }
+  /// @endcond
+
+ private:
+  Loop() = default;
+
+  /// I - P C
+  [[nodiscard]] detail::ComplexMatrix output_return(Complex value) const {
+    return detail::identity_plus(
+        detail::product(detail::response(plant_, value), detail::response(controller_, value)),
+        -1.0);
+  }
+
+  template <class Function>
+  Expected<Complex, Error<double>> at(double frequency, int row, int column,
+                                      Function&& function) const {
+    Rules<double> rules;
+    rules.positive("frequency", frequency)
+        .all_of(detail::check_frequency(frequency, sample_time()))
+        .all_of(check_channel("channel", row))
+        .all_of(check_channel("channel", column));
+    if (!rules) return rules.error();
+    const Complex value = function(detail::frequency_operator(frequency, sample_time()));
+    if (!is_finite(value.real()) || !is_finite(value.imag())) {
+      return Error<double>{"frequency", frequency, "is a pole of the closed loop"};
+    }
+    return value;
+  }
+
+  template <class Function>
+  Expected<Complex, Error<double>> of_gain(double frequency, int channel,
+                                           Function&& function) const {
+    const auto l = loop_gain(frequency, channel);
+    if (!l) return l.error();
+    const Complex value = function(*l);
+    if (!is_finite(value.real()) || !is_finite(value.imag())) {
+      return Error<double>{"frequency", frequency, "is a pole of the closed loop"};
+    }
+    return value;
+  }
+
+  detail::DensePlant continuous_;
+  detail::SampledPlant plant_;
+  LinearController controller_;  ///< told of its own u
+  DynamicSystem system_;
+  std::vector<Complex> poles_;
+  double abscissa_ = 0.0;
+  double input_gain_ = 0.0;
+};
+
+/// A loop, or why there is none.
+using LoopResult = Expected<Loop, Error<double>>;
+
+/// The loop of a plant and a controller, the same object that runs. The plant is continuous, and
+/// sampled exactly here, with any dead time.
+/// @return errors of Loop::make, and of a controller that is not the same in every sample
+template <int States, Scalar S, int Inputs, int Outputs, class Controller>
+LoopResult closed_loop(const LinearPlant<States, S, Inputs, Outputs>& plant,
+                       const Controller& controller) {
+  static_assert(AnalysedController<Controller>,
+                "esokit: the analysis takes linear controllers: an observer with a nonlinear or "
+                "switched gain is held in one of its modes by FrozenObserver and "
+                "ObserverWithLaw; a filter form by linear_controller(form, config); a controller "
+                "of yours says what it is by a function linear_controller beside it");
+  if constexpr (AnalysedController<Controller>) {
+    if (const auto ok = plant.check(); !ok) {
+      const auto& error = ok.error();
+      return Error<double>{error.field, static_cast<double>(error.value), error.rule, error.index};
+    }
+    const Expected<LinearController, Error<double>> linear = linear_controller(controller);
+    if (!linear) return linear.error();
+    return Loop::make(detail::dense_plant(plant), *linear);
+  } else {
+    return Error<double>{};
+  }
+}
+
+}  // namespace esokit

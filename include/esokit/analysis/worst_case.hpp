@@ -1,0 +1,181 @@
+/// @file
+/// The worst that a controller meets among stated plants.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <esokit/analysis/delay_margin.hpp>
+#include <functional>
+#include <vector>
+
+namespace esokit {
+
+/// A worst value and the parameters of the plant at which it was found.
+template <std::size_t Count>
+struct Worst {
+  double value = 0.0;                 ///< in the unit of what is asked for
+  Array<double, Count> parameters{};  ///< of the plant
+};
+
+/// What was found among the plants, each value at a plant of its own. Without a stable loop at
+/// every plant there are no margins: they are what Margins says of an edge that is reached, modulus
+/// 0.
+template <std::size_t Count>
+struct WorstCase {
+  Worst<Count> stability_abscissa;  ///< the largest: negative, and every loop was stable
+  Worst<Count> modulus;             ///< least abs(1 + L)
+  Worst<Count> gain_increase;       ///< least factor > 1 on L that makes a loop oscillate
+  Worst<Count> gain_decrease;       ///< greatest factor below 1 that does
+  Worst<Count> phase;               ///< least phase shift, rad
+  Worst<Count> delay;               ///< least further delay, s
+
+  /// True if every loop that was looked at is stable.
+  [[nodiscard]] bool stable() const noexcept { return stability_abscissa.value < 0.0; }
+};
+
+namespace detail {
+
+/// What is compared of one plant, the larger the worse: abscissa, and margins with their sign.
+using Badness = std::array<double, 6>;
+
+inline Expected<Badness, Error<double>> badness_of(const LoopResult& loop) {
+  if (!loop) return loop.error();
+  const double abscissa = loop->stability_abscissa();
+  if (!loop->stable()) return Badness{abscissa, 0.0, -1.0, 1.0, 0.0, 0.0};
+  Badness worst{
+      abscissa, -std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity(),
+      0.0,      -std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+  const auto take = [&](std::size_t i, double value) { worst[i] = std::max(worst[i], value); };
+  for (int channel = 0; channel < loop->channels(); ++channel) {
+    const auto m = margins(*loop, channel);
+    if (!m) return m.error();
+    const auto delay = delay_margin(*loop, channel);
+    if (!delay) return delay.error();
+    take(1, -m->modulus.value);
+    take(2, -m->gain_increase.value);
+    take(3, m->gain_decrease.value);
+    take(4, -m->phase.value);
+    take(5, -delay->value);
+  }
+  return worst;
+}
+
+struct Found {
+  Badness value;
+  std::array<std::vector<double>, 6> at;
+};
+
+/// Every point of a grid over the ranges, then from the worst of each kind in steps that halve.
+inline Expected<Found, Error<double>> worst_of(
+    const std::function<Expected<Badness, Error<double>>(const std::vector<double>&)>& look,
+    const std::vector<Interval<>>& ranges, int points, int halvings) {
+  const std::size_t count = ranges.size();
+  std::optional<Found> found;
+  const auto offer = [&](const std::vector<double>& at) -> Check<double> {
+    const auto bad = look(at);
+    if (!bad) return bad.error();
+    if (!found) {
+      found = Found{*bad, {}};
+      found->at.fill(at);
+    }
+    for (std::size_t i = 0; i < bad->size(); ++i) {
+      if ((*bad)[i] <= found->value[i]) continue;
+      found->value[i] = (*bad)[i];
+      found->at[i] = at;
+    }
+    return {};
+  };
+  std::vector<int> index(count);
+  for (bool more = true; more;) {
+    std::vector<double> at(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const double share = static_cast<double>(index[i]) / (points - 1);
+      at[i] = ranges[i].lower + share * (ranges[i].upper - ranges[i].lower);
+    }
+    if (auto ok = offer(at); !ok) return ok.error();
+    more = false;
+    for (std::size_t i = 0; i < count && !more; ++i) {
+      more = ++index[i] < points;
+      if (!more) index[i] = 0;
+    }
+  }
+  for (std::size_t kind = 0; kind < found->at.size(); ++kind) {
+    double share = 0.5 / (points - 1);
+    for (int step = 0; step < halvings; ++step) {
+      const double before = found->value[kind];
+      for (std::size_t i = 0; i < count; ++i) {
+        for (const double sign : {-1.0, 1.0}) {
+          std::vector<double> at = found->at[kind];
+          at[i] = std::clamp(at[i] + sign * share * (ranges[i].upper - ranges[i].lower),
+                             ranges[i].lower, ranges[i].upper);
+          if (auto ok = offer(at); !ok) return ok.error();
+        }
+      }
+      if (!(found->value[kind] > before)) share *= 0.5;
+    }
+  }
+  return *found;
+}
+
+}  // namespace detail
+
+/// How thoroughly the plants are looked at.
+struct WorstCaseSearch {
+  int points = 5;    ///< of each parameter, ends included; points^parameters loops
+  int halvings = 6;  ///< of the steps of the search from the worst of them, for each kind; may be 0
+};
+
+/// The worst margins over a box of plants: every point of a grid, and from the worst ones a search
+/// in steps that halve. No proof: what lies between the points may be worse by what margins change
+/// there.
+/// @param plant_of the plant of an Array<double, Count> of parameters: a LinearPlant, or an
+/// Expected
+///        of one @param ranges of the parameters
+/// @return error for an empty range, and that of the first plant that makes no loop
+template <class PlantOf, std::size_t Count, class Controller>
+Expected<WorstCase<Count>, Error<double>> worst_case(PlantOf&& plant_of,
+                                                     const std::array<Interval<>, Count>& ranges,
+                                                     const Controller& controller,
+                                                     const WorstCaseSearch& search = {}) {
+  Rules<double> rules;
+  rules
+      .require(2 <= search.points && search.points <= 1000, "points", search.points,
+               "must be 2 .. 1000")
+      .require(0 <= search.halvings && search.halvings <= 100, "halvings", search.halvings,
+               "must be 0 .. 100");
+  for (std::size_t i = 0; i < Count; ++i) {
+    const auto index = static_cast<int>(i);
+    rules.finite("ranges", ranges[i].lower, index)
+        .finite("ranges", ranges[i].upper, index)
+        .require(!(ranges[i].lower > ranges[i].upper), "ranges", ranges[i].lower,
+                 "must not end below their start", index);
+  }
+  if (!rules) return rules.error();
+  const auto look = [&](const std::vector<double>& at) -> Expected<detail::Badness, Error<double>> {
+    Array<double, Count> parameters{};
+    for (std::size_t i = 0; i < Count; ++i) parameters[i] = at[i];
+    const auto plant = plant_of(std::as_const(parameters));
+    if constexpr (requires { plant.error(); }) {
+      if (!plant) {
+        const auto& error = plant.error();
+        return Error<double>{error.field, static_cast<double>(error.value), error.rule,
+                             error.index};
+      }
+      return detail::badness_of(closed_loop(*plant, controller));
+    } else {
+      return detail::badness_of(closed_loop(plant, controller));
+    }
+  };
+  const auto found =
+      detail::worst_of(look, {ranges.begin(), ranges.end()}, search.points, search.halvings);
+  if (!found) return found.error();
+  const auto take = [&](std::size_t kind, double sign) {
+    Worst<Count> worst{sign * found->value[kind], {}};
+    for (std::size_t i = 0; i < Count; ++i) worst.parameters[i] = found->at[kind][i];
+    return worst;
+  };
+  return WorstCase<Count>{take(0, 1.0), take(1, -1.0), take(2, -1.0),
+                          take(3, 1.0), take(4, -1.0), take(5, -1.0)};
+}
+
+}  // namespace esokit
