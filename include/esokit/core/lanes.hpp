@@ -233,6 +233,17 @@ template <class T, int Count>
 [[nodiscard]] constexpr const T& of_lane(const PerLane<T, Count>& each, int i) noexcept {
   return each[i];
 }
+/// value = f(value), of a PerLane in each lane.
+/// @{
+template <class T, class Function>
+constexpr void change_lanes(T& value, Function&& f) noexcept {
+  value = f(value);
+}
+template <class T, int Count, class Function>
+constexpr void change_lanes(PerLane<T, Count>& each, Function&& f) noexcept {
+  for (T& value : each.values) value = f(value);
+}
+/// @}
 /// The number of lane `i`.
 template <Scalar S>
 [[nodiscard]] constexpr LaneScalar<S> number_of_lane(const S& numbers,

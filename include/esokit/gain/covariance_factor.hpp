@@ -9,6 +9,7 @@
 #pragma once
 
 #include <esokit/core/check.hpp>
+#include <esokit/core/lanes.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/unroll.hpp>
 #include <esokit/gain/sampled_gain.hpp>
@@ -57,6 +58,12 @@ template <int Size, Scalar S>
 struct MatrixTransition {
   Matrix<S, Size, Size> phi;   ///< N x N, scaled
   Array<int, Size> degrees{};  ///< state r is in units of T^degree
+
+  template <class T>
+  using with_scalar = MatrixTransition<Size, T>;  ///< the same of another scalar
+  /// @cond
+  static constexpr auto fields(auto& t) noexcept { return detail::tie(t.phi, t.degrees); }
+  /// @endcond
 
   /// Of a model.
   template <class Model>
@@ -264,6 +271,9 @@ class CovarianceFactor {
   }
 
  private:
+  friend struct detail::LaneAccess;
+  static constexpr auto fields(auto& o) noexcept { return detail::tie(o.variances_, o.lower_); }
+
   template <bool DiagonalNoise, bool Unrolled, class Transition>
   ESOKIT_INLINE constexpr void advance_by(const S& inflation, const CovarianceFactor& noise,
                                           const Transition& transition) noexcept {

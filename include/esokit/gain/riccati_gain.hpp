@@ -97,6 +97,11 @@ class RiccatiGain {
   using Factor = CovarianceFactor<Size, S>;   ///< P-, scaled
   using Settings = RiccatiSettings<Size, S>;  ///< of the constructor
   using Gain = ScaledGain<Size, S>;           ///< k, scaled
+  using scalar_type = S;                      ///< of gains and covariances
+  template <class T>
+  using with_scalar =
+      RiccatiGain<Size, T, TableSize,
+                  typename detail::ForScalar<Transition, T>::type>;  ///< of another scalar
 
   /// The law in its recursive mode; `freeze` goes over to another.
   explicit RiccatiGain(const Settings& settings, const Transition& transition = {}) noexcept
@@ -176,7 +181,21 @@ class RiccatiGain {
   /// @}
 
   /// One sample ahead, from the corrected covariance if there was a correction.
-  ESOKIT_INLINE constexpr void advance() noexcept {
+  ESOKIT_INLINE constexpr void advance() noexcept requires PackScalar<S> {
+    // Each lane as the others, and as it usually is: at once.
+    const int bits = since_[0] & ~watched;
+    if (since_ == since_[0] && bits > standing && (TableSize == 0 || place_ == done)) [[likely]] {
+      note(standing);
+    } else if (since_ == since_[0] && bits == corrected && mode_ == RiccatiMode::recursive &&
+               rule_ != InflationRule::adaptive && diagonal_noise_ == diagonal_noise_[0]) {
+      note(0);
+      recur_from_correction();
+    } else {
+      detail::for_each_lane<Plain>(*this, [](Plain& lane, int) { lane.advance(); });
+    }
+  }
+  /// The same of a plain scalar.
+  ESOKIT_INLINE constexpr void advance() noexcept requires(!PackScalar<S>) {
     if (rests()) [[likely]] {
       note(standing);
       if constexpr (TableSize > 0) {
@@ -189,7 +208,8 @@ class RiccatiGain {
 
   /// The correction was carried out; the next `advance` goes on from the corrected covariance.
   ESOKIT_INLINE constexpr void accept(const S&) noexcept {
-    since_ = static_cast<std::int8_t>(since_ | corrected);
+    detail::change_lanes(since_,
+                         [](int bits) { return static_cast<std::int8_t>(bits | corrected); });
   }
 
   /// True if the next `advance` has nothing to work out: the gain stands, and no sample is missing.
@@ -202,6 +222,13 @@ class RiccatiGain {
     return since_ > standing;
   }
 
+  /// True if any lane of a pack is watched.
+  [[nodiscard]] constexpr bool any_watched() const noexcept requires PackScalar<S> {
+    int any = 0;
+    for (const std::int8_t bits : since_.values) any |= bits;
+    return any < 0;
+  }
+
   /// The observer looks at every measurement before it is used (an outlier gate).
   constexpr void watch(bool on) noexcept {
     since_ = static_cast<std::int8_t>((since_ & ~watched) | (on ? watched : 0));
@@ -212,7 +239,7 @@ class RiccatiGain {
   /// Begins anew: from P0, or with the limit.
   constexpr void reset() noexcept {
     note(mode_ != RiccatiMode::recursive ? standing | nothing_yet : 0);
-    place_ = mode_ == RiccatiMode::start_table ? 0 : TableSize + 1;
+    place_ = mode_ == RiccatiMode::start_table ? std::uint16_t{0} : done;
     current_measurement_ = measurement_;
     if (mode_ == RiccatiMode::frozen) {
       now_ = limit_;
@@ -264,14 +291,15 @@ class RiccatiGain {
   /// Bound of the covariance of the present estimate's error, N x N, scaled: of the prediction
   /// after `advance`, of the correction after `accept`.
   [[nodiscard]] Matrix<S, Size, Size> covariance() const noexcept {
-    Factor factor = now_.factor;
-    if ((since_ & corrected) != 0) {
-      // (I - k C) P- (I - k C)' + k R k'. The recursion goes on with R/(1+theta) in place of R, as
-      // its inflation is not meant for the noise.
-      factor.set_variance(0, S(factor.variance(0) * now_.rest * now_.rest +
-                               now_.share * now_.share * current_measurement_));
+    if constexpr (PackScalar<S>) {
+      Matrix<S, Size, Size> all;
+      for (int i = 0; i < lane_count<S>; ++i) {
+        detail::set_lane(all, detail::get_lane<Plain>(*this, i).covariance(), i);
+      }
+      return all;
+    } else {
+      return covariance_of_one();
     }
-    return factor.matrix() * unit_;
   }
 
   /// C P- C' + R of the last prediction, unit of y squared: what the square of the innovation is
@@ -287,7 +315,13 @@ class RiccatiGain {
   [[nodiscard]] constexpr const S& inflation() const noexcept { return now_.inflation; }
 
   /// True while the recursion rests: the gain is the limit, or out of the table.
-  [[nodiscard]] constexpr bool stands() const noexcept { return (since_ & standing) != 0; }
+  [[nodiscard]] constexpr Lanes<bool, S> stands() const noexcept {
+    Lanes<bool, S> all{};
+    for (int i = 0; i < lane_count<S>; ++i) {
+      detail::of_lane(all, i) = (detail::of_lane(since_, i) & standing) != 0;
+    }
+    return all;
+  }
 
   /// The limit gain of the frozen modes, and the last gain of the table.
   /// @{
@@ -298,16 +332,29 @@ class RiccatiGain {
   /// @}
 
  private:
+  friend struct detail::LaneAccess;
+  static constexpr auto fields(auto& o) noexcept {
+    return detail::tie(o.now_, o.since_, o.mode_, o.place_, o.current_measurement_, o.transition_,
+                       o.measurement_, o.start_, o.noise_, o.start_inflation_, o.unit_,
+                       o.noise_trace_, o.trace_weights_, o.rule_, o.diagonal_noise_, o.limit_,
+                       o.table_);
+  }
+  using Plain = detail::PlainTwin<RiccatiGain, S>;  ///< a lane
+  template <int OtherSize, Scalar Other, int OtherTable, class OtherTransition>
+  friend class RiccatiGain;
+
   // Bits of `since_`: what happened since the last `advance`, and whether the gain stands.
   // Together, so that a frozen filter has one test to make.
   static constexpr int corrected = 1;
   static constexpr int nothing_yet = 2;  ///< after a reset with a standing gain
   static constexpr int gapped = 4;       ///< no correction before the last `advance` either
-  static constexpr int standing = 8;     ///< above the others: see `rests`
-  static constexpr int watched = -128;   ///< the sign: see `rests_unwatched`
+  static constexpr std::uint16_t done = TableSize + 1;  ///< of `place_`
+  static constexpr int standing = 8;                    ///< above the others: see `rests`
+  static constexpr int watched = -128;                  ///< the sign: see `rests_unwatched`
 
   ESOKIT_INLINE constexpr void note(int bits) noexcept {
-    since_ = static_cast<std::int8_t>((since_ & watched) | bits);
+    detail::change_lanes(since_,
+                         [=](int old) { return static_cast<std::int8_t>((old & watched) | bits); });
   }
 
   /// A gain and the covariance that it belongs to.
@@ -319,9 +366,24 @@ class RiccatiGain {
     S inflation{};    ///< theta
     S growth{1.0};    ///< 1 + theta
     S shrink{1.0};    ///< 1 / (1 + theta)
+
+    static constexpr auto fields(auto& p) noexcept {
+      return detail::tie(p.gain, p.factor, p.share, p.rest, p.inflation, p.growth, p.shrink);
+    }
   };
 
   static constexpr std::size_t index(int i) noexcept { return static_cast<std::size_t>(i); }
+
+  [[nodiscard]] Matrix<S, Size, Size> covariance_of_one() const noexcept {
+    Factor factor = now_.factor;
+    if ((since_ & corrected) != 0) {
+      // (I - k C) P- (I - k C)' + k R k'. The recursion goes on with R/(1+theta) in place of R, as
+      // its inflation is not meant for the noise.
+      factor.set_variance(0, S(factor.variance(0) * now_.rest * now_.rest +
+                               now_.share * now_.share * current_measurement_));
+    }
+    return factor.matrix() * unit_;
+  }
 
   /// Gain and covariance times `room` are numbers.
   [[nodiscard]] bool fits(const S& room) const noexcept {
@@ -370,16 +432,20 @@ class RiccatiGain {
       } else if (had_correction) [[likely]] {
         now_.factor.set_variance(0, S(now_.factor.variance(0) * now_.rest));
       }
-      if (diagonal_noise_) [[likely]] {
-        now_.factor.template advance<true>(now_.growth, *noise, transition_);
-      } else {
-        now_.factor.template advance<false>(now_.growth, *noise, transition_);
-      }
+      advance_factor(*noise);
     }
     current_measurement_ = measurement_;
     set_gain();
     if (mode_ != RiccatiMode::recursive) [[unlikely]]
       stand_if_close();
+  }
+
+  /// What `recur` comes to after a correction.
+  [[gnu::noinline]] constexpr void recur_from_correction() noexcept {
+    now_.factor.set_variance(0, S(now_.factor.variance(0) * now_.rest));
+    advance_factor(noise_);
+    current_measurement_ = measurement_;
+    set_gain();
   }
 
   /// Sets theta^2 = tr W Q / tr W (A + K C) P- (A + K C)' and what is to be advanced; the noise
@@ -406,6 +472,14 @@ class RiccatiGain {
     Factor noise = noise_;
     noise.scale(S(now_.growth / theta));
     return noise;
+  }
+
+  ESOKIT_INLINE constexpr void advance_factor(const Factor& noise) noexcept {
+    if (detail::of_lane(diagonal_noise_, 0)) [[likely]] {
+      now_.factor.template advance<true>(now_.growth, noise, transition_);
+    } else {
+      now_.factor.template advance<false>(now_.growth, noise, transition_);
+    }
   }
 
   constexpr void set_inflation(const S& theta) noexcept {
@@ -440,7 +514,7 @@ class RiccatiGain {
   ESOKIT_COLD constexpr void stand_if_close() noexcept {
     if (!now_.factor.near(limit_.factor, S(1e-3))) return;
     note(standing);
-    place_ = TableSize + 1;
+    place_ = done;
     now_ = limit_;
   }
 
@@ -490,10 +564,10 @@ class RiccatiGain {
 
   // What a step touches comes first.
   Point now_{};
-  std::int8_t since_ = 0;
+  Lanes<std::int8_t, S> since_{};
   RiccatiMode mode_ = RiccatiMode::recursive;
-  std::uint16_t place_ = 0;  ///< next one of the table; one past the limit: done
-  S current_measurement_{};  ///< R of the coming correction
+  Lanes<std::uint16_t, S> place_{};  ///< next one of the table; one past the limit: done
+  S current_measurement_{};          ///< R of the coming correction
 
   [[no_unique_address]] Transition transition_;
   S measurement_;
@@ -504,7 +578,7 @@ class RiccatiGain {
   S noise_trace_{};
   Array<S, Size> trace_weights_;
   InflationRule rule_;
-  bool diagonal_noise_;
+  Lanes<bool, S> diagonal_noise_;
   Point limit_{};
   Array<Point, TableSize> table_{};
 };

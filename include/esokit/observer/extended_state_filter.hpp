@@ -60,7 +60,7 @@ concept NominalModel = std::copyable<Model> &&
 /// @tparam PlantModel what is known of the plant, see SampledModel
 template <int Order, Scalar S = double, int Extension = 1, class Model = NoNominalModel,
           int TableSize = 0, class PlantModel = ChainModel<Order, S, Extension>>
-requires NominalModel<Model, Order, S>
+requires NominalModel<Model, Order, LaneScalar<S>>
 class ExtendedStateFilter
     : public PredictorCorrector<
           Order, S, Extension,
@@ -135,6 +135,15 @@ class ExtendedStateFilter
     [[no_unique_address]] typename PlantModel::Settings plant_model{};
     int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts
 
+    /// @cond
+    static constexpr auto fields(auto& c) noexcept {
+      return detail::tie(c.input_gain, c.sample_time, c.measurement_variance, c.disturbance_bounds,
+                         c.bound_factor, c.process_covariance, c.initial_covariance,
+                         c.inflation_rule, c.inflation, c.allow_vanishing_gain, c.trace_weights,
+                         c.mode, c.outlier_threshold, c.model, c.plant_model, c.max_gap);
+    }
+    /// @endcond
+
     /// All one.
     static constexpr Array<S, N> equal_weights() noexcept {
       Array<S, N> weights{};
@@ -143,34 +152,20 @@ class ExtendedStateFilter
     }
   };
 
+  using Status = StatusOf<S>;  ///< StepStatus, of a pack one a lane
+  template <class T>
+  using with_scalar =
+      ExtendedStateFilter<Order, T, Extension, typename detail::ForScalar<Model, T>::type,
+                          TableSize, detail::WithScalar<PlantModel, T>>;  ///< of another scalar
+
   /// Checks the settings and does all the design work.
   /// @return the filter at rest in zero, or an error that names the field
   static Expected<ExtendedStateFilter, Error<S>> make(const Config& config) {
-    const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
-    Rules<S> rules;
-    rules.all_of(Base::check_chain(chain))
-        .all_of(check_rule(config))
-        .not_negative("outlier_threshold", config.outlier_threshold);
-    if (!rules) return rules.error();
-    const auto plant = detail::make_model<PlantModel>(config);
-    if (!plant) return plant.error();
-    auto settings = law_settings(config, *plant);
-    if (!settings) return settings.error();
-    Law law(*settings, detail::transition_of<S>(*plant));
-    for (const S& k : law.gain_before_measurement()) {
-      if (!all(is_finite(k))) {
-        return Error<S>{"initial_covariance", config.initial_covariance(0, 0),
-                        "gives a gain that the scalar cannot hold"};
-      }
+    if constexpr (PackScalar<S>) {
+      return detail::make_lanes<ExtendedStateFilter>(config);
+    } else {
+      return make_one(config);
     }
-    if (!law.fits()) {
-      return Error<S>{"inflation", law.inflation(),
-                      "lets the covariance grow beyond what the scalar can hold"};
-    }
-    if (config.mode != RiccatiMode::recursive) {
-      if (auto ok = freeze(law, config); !ok) return ok.error();
-    }
-    return ExtendedStateFilter(*plant, law, config);
   }
 
   /// New settings while running: estimate and covariance are kept, a change of b0 is moved into the
@@ -178,76 +173,107 @@ class ExtendedStateFilter
   Check<S> retune(const Config& config) { return detail::retune(*this, config); }
 
   /// The same, with the settings of `fresh`, as `make` gave it: no design work.
-  Check<S> adopt(ExtendedStateFilter fresh) {
+  Check<S> adopt(ExtendedStateFilter fresh) requires PackScalar<S> {
+    return detail::adopt_lanes(*this, fresh);
+  }
+  /// The same of a plain scalar.
+  Check<S> adopt(ExtendedStateFilter fresh) requires(!PackScalar<S>) {
     if (!fresh.law().continue_from(law(), S(fresh.sample_time() / this->sample_time()))) {
       return Error<S>{"measurement_variance", fresh.law().measurement_variance(),
                       "is too small, or sample_time too far from the one before, for the present "
                       "covariance to be carried over: measure first"};
     }
     if (auto ok = Base::adopt(fresh); !ok) return ok;
-    model_ = fresh.model_;
+    nominal_model_ = fresh.nominal_model_;
     outlier_threshold_ = fresh.outlier_threshold_;
     change_bound_ = fresh.change_bound_;
     return {};
   }
 
   /// One sample: `predict(u_applied)`, then `correct(y)`.
-  StepStatus update(S y, S u_applied) noexcept {
-    if constexpr (!has_model) {
-      if (law().rests_unwatched()) [[likely]]
+  Status update(S y, S u_applied) noexcept {
+    if constexpr (PackScalar<S>) {
+      if (usual()) [[likely]]
         return Base::update(y, u_applied);
+      return each_lane([&](Plain& lane, int i) { return lane.update(y[i], u_applied[i]); });
+    } else {
+      if constexpr (!has_model) {
+        if (law().rests_unwatched()) [[likely]]
+          return Base::update(y, u_applied);
+      }
+      return update_out_of_line(y, u_applied);
     }
-    return update_out_of_line(y, u_applied);
   }
 
   /// The same with the variance of this measurement's noise, R in unit of y squared. A variance
   /// that is negative or not finite makes the measurement a missing one.
-  StepStatus update_weighted(S y, S u_applied, S measurement_variance) noexcept {
-    const StepStatus predicted = predict(u_applied);
+  Status update_weighted(S y, S u_applied, S measurement_variance) noexcept {
+    const Status predicted = predict(u_applied);
     return predicted | correct_weighted(y, measurement_variance);
   }
 
   /// Time update alone: one sample without a measurement, or the first half of `update`.
-  StepStatus predict(S u_applied) noexcept {
-    if constexpr (has_model) {
+  Status predict(S u_applied) noexcept {
+    if constexpr (!has_model) {
+      return Base::predict(u_applied);
+    } else if constexpr (PackScalar<S>) {
+      return each_lane([&](Plain& lane, int i) { return lane.predict(u_applied[i]); });
+    } else {
       const Estimate before = this->estimate();
       const StepStatus status = Base::predict(u_applied);
       shift_by_model(before);
       return status;
-    } else {
-      return Base::predict(u_applied);
     }
   }
 
   /// Measurement update alone.
-  StepStatus correct(S y) noexcept {
-    if (!accepts(y)) return StepStatus::outlier_rejected;
+  Status correct(S y) noexcept {
+    if constexpr (PackScalar<S>) {
+      if (law().any_watched()) {
+        return each_lane([&](Plain& lane, int i) { return lane.correct(y[i]); });
+      }
+    } else if (!accepts(y)) {
+      return StepStatus::outlier_rejected;
+    }
     return Base::correct(y);
   }
 
   /// The same with the variance of this measurement's noise.
-  StepStatus correct_weighted(S y, S measurement_variance) noexcept {
-    if (!all(is_finite(measurement_variance)) || !all(measurement_variance >= S(0.0))) {
-      return StepStatus::measurement_rejected;
+  Status correct_weighted(S y, S measurement_variance) noexcept {
+    if constexpr (PackScalar<S>) {
+      return each_lane(
+          [&](Plain& lane, int i) { return lane.correct_weighted(y[i], measurement_variance[i]); });
+    } else {
+      if (!all(is_finite(measurement_variance)) || !all(measurement_variance >= S(0.0))) {
+        return StepStatus::measurement_rejected;
+      }
+      law().set_measurement_variance(measurement_variance);
+      return correct(y);
     }
-    law().set_measurement_variance(measurement_variance);
-    return correct(y);
   }
 
   /// False if the gate would take y for an outlier. Bad numbers are not its business.
-  [[nodiscard]] bool accepts(const S& y) const noexcept {
-    if (!gated() || this->restarts()) return true;
-    const S e = y - this->predicted_measurement();
-    // A square beyond the scalar is beyond the threshold.
-    if (!all(is_finite(e))) return true;
-    return all(e * e <= outlier_threshold_ * innovation_variance());
+  [[nodiscard]] Lanes<bool, S> accepts(const S& y) const noexcept {
+    if constexpr (PackScalar<S>) {
+      Lanes<bool, S> in;
+      for (int i = 0; i < lane_count<S>; ++i) {
+        in[i] = detail::get_lane<Plain>(*this, i).accepts(y[i]);
+      }
+      return in;
+    } else {
+      if (!gated() || this->restarts()) return true;
+      const S e = y - this->predicted_measurement();
+      // A square beyond the scalar is beyond the threshold.
+      if (!all(is_finite(e))) return true;
+      return all(e * e <= outlier_threshold_ * innovation_variance());
+    }
   }
 
   /// Starts anew at (y, 0, .., 0) with P0.
-  StepStatus reset(S y) noexcept { return restart_clock(Base::reset(y)); }
+  Status reset(S y) noexcept { return restart_clock(Base::reset(y)); }
 
   /// Starts anew at a given estimate, N x 1, with P0.
-  StepStatus reset(const Estimate& state) noexcept { return restart_clock(Base::reset(state)); }
+  Status reset(const Estimate& state) noexcept { return restart_clock(Base::reset(state)); }
 
   /// Bound of the covariance of the present estimate's error, N x N, in the units of the estimates:
   /// after `predict` that of the prediction, after `correct` that of the correction. An element
@@ -297,12 +323,60 @@ class ExtendedStateFilter
   }
 
   /// True while the recursion rests in a frozen mode.
-  [[nodiscard]] bool frozen() const noexcept { return law().stands(); }
+  [[nodiscard]] Lanes<bool, S> frozen() const noexcept { return law().stands(); }
 
  private:
+  friend struct detail::LaneAccess;
+  static constexpr auto fields(auto& o) noexcept {
+    using BaseOf =
+        std::conditional_t<std::is_const_v<std::remove_reference_t<decltype(o)>>, const Base, Base>;
+    return detail::tie(static_cast<BaseOf&>(o), o.nominal_model_, o.outlier_threshold_,
+                       o.change_bound_, o.sample_);
+  }
+  using Plain = detail::PlainTwin<ExtendedStateFilter, S>;  ///< a lane
+
+  /// `step` with the filter of each lane.
+  template <class Step>
+  ESOKIT_COLD Status each_lane(Step&& step) noexcept {
+    Status status{};
+    detail::for_each_lane<Plain>(*this, [&](Plain& lane, int i) { status[i] = step(lane, i); });
+    return status;
+  }
+
+  /// No lane has anything to do beside the predictor-corrector's step.
+  [[nodiscard]] bool usual() const noexcept { return !has_model && !law().any_watched(); }
+
+  static Expected<ExtendedStateFilter, Error<S>> make_one(const Config& config) {
+    const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
+    Rules<S> rules;
+    rules.all_of(Base::check_chain(chain))
+        .all_of(check_rule(config))
+        .not_negative("outlier_threshold", config.outlier_threshold);
+    if (!rules) return rules.error();
+    const auto plant = detail::make_model<PlantModel>(config);
+    if (!plant) return plant.error();
+    auto settings = law_settings(config, *plant);
+    if (!settings) return settings.error();
+    Law law(*settings, detail::transition_of<S>(*plant));
+    for (const S& k : law.gain_before_measurement()) {
+      if (!all(is_finite(k))) {
+        return Error<S>{"initial_covariance", config.initial_covariance(0, 0),
+                        "gives a gain that the scalar cannot hold"};
+      }
+    }
+    if (!law.fits()) {
+      return Error<S>{"inflation", law.inflation(),
+                      "lets the covariance grow beyond what the scalar can hold"};
+    }
+    if (config.mode != RiccatiMode::recursive) {
+      if (auto ok = freeze(law, config); !ok) return ok.error();
+    }
+    return ExtendedStateFilter(*plant, law, config);
+  }
+
   ExtendedStateFilter(const PlantModel& plant, const Law& law, const Config& config) noexcept
       : Base(plant, law, config.max_gap),
-        model_(config.model),
+        nominal_model_(config.model),
         outlier_threshold_(config.outlier_threshold),
         change_bound_(config.disturbance_bounds[Order]) {
     std::get<0>(this->laws()).watch(all(config.outlier_threshold > S(0.0)));
@@ -559,8 +633,11 @@ class ExtendedStateFilter
     return predicted | correct(y);
   }
 
-  StepStatus restart_clock(StepStatus status) noexcept {
-    if (has_model && status == StepStatus::ok) sample_ = 0;
+  Status restart_clock(Status status) noexcept {
+    for (int i = 0; i < lane_count<S>; ++i) {
+      if (has_model && detail::of_lane(status, i) == StepStatus::ok)
+        detail::of_lane(sample_, i) = 0;
+    }
     return status;
   }
 
@@ -571,14 +648,14 @@ class ExtendedStateFilter
       const S t = detail::integer<S>(sample_) * time;
       const S u = this->applied_input();
       Vector<S, Order> x = before.template head<Order>();
-      const S now = model_(x, u, t);
+      const S now = nominal_model_(x, u, t);
       // Ahead along the chain with fbar in place of the estimated disturbance.
       Estimate start = before;
       start(Order) = now;
       const S drive = Chain::scaled_input_gain(this->input_gain(), time) * u;
       const auto ahead = Chain::template predict<1>(Chain::scaled(start, time), Array<S, 1>{drive});
       x = Chain::physical(ahead, S(S(1.0) / time)).template head<Order>();
-      const S change = model_(x, u, S(t + time)) - now;
+      const S change = nominal_model_(x, u, S(t + time)) - now;
       const S low = select(change < -change_bound_, S(-change_bound_), change);
       const S limited = select(change_bound_ < low, change_bound_, low);
       const S sum = this->total_disturbance() + limited;
@@ -587,10 +664,10 @@ class ExtendedStateFilter
     }
   }
 
-  [[no_unique_address]] Model model_;
+  [[no_unique_address]] Model nominal_model_;
   S outlier_threshold_;
   S change_bound_;
-  std::uint64_t sample_ = 0;
+  Lanes<std::uint64_t, S> sample_{};
 };
 
 /// Told apart in snapshots.
