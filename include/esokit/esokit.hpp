@@ -82,6 +82,7 @@
 #include <esokit/gain/riccati.hpp>
 #include <esokit/gain/riccati_gain.hpp>
 #include <esokit/gain/sampled_gain.hpp>
+#include <esokit/gain/scheduled_gain.hpp>
 #include <esokit/gain/step_status.hpp>
 #include <esokit/gain/switched_gain.hpp>
 #include <esokit/gain/switching_certificate.hpp>

@@ -91,6 +91,10 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
       LevelledObserver<Observer> {
     return observer_.level_estimate(level);
   }
+  [[nodiscard]] constexpr const auto& predicted_measurement() const noexcept
+      requires(!observer_traits<Observer>.measures_first_row) {
+    return observer_.predicted_measurement();
+  }
   constexpr StepStatus shift_output(const scalar_type& offset) noexcept requires
       ShiftableOutput<Observer> {
     return observer_.shift_output(offset);

@@ -132,10 +132,18 @@ class OutlierGate : public Adapter<Observer> {
 
   [[nodiscard]] bool gated() const noexcept { return threshold_ > S(0); }
 
+  [[nodiscard]] S expected() const noexcept {
+    if constexpr (observer_traits<Observer>.measures_first_row) {
+      return observer_.level_estimate(0)(0);
+    } else {
+      return observer_.predicted_measurement();
+    }
+  }
+
   /// Bad numbers are not its business, nor is a measurement that restarts the observer.
   bool lets_in(const S& y) noexcept {
     // The innovation is that of level 1, whose z_1 the correction will subtract.
-    const S innovation = y - observer_.level_estimate(0)(0);
+    const S innovation = y - expected();
     if (!is_finite(innovation)) return true;
     if (this->restarts()) {
       set_open(true);

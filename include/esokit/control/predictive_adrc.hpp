@@ -255,6 +255,11 @@ class PredictiveAdrc {
   /// What is known of the gain before the measurement.
   static constexpr GainKind kind = observer_traits<Observer>.gain_kind;
   static constexpr bool preset = kind == GainKind::preset;
+  static constexpr bool measures_first_row = observer_traits<Observer>.measures_first_row;
+  static_assert(
+      preset || measures_first_row,
+      "esokit: with a sensor's lag in the model PredictiveAdrc takes gains that are known "
+      "before the measurement");
   static constexpr bool switched = kind == GainKind::switched;
   static constexpr bool factored = kind == GainKind::factored;
 
@@ -359,7 +364,7 @@ class PredictiveAdrc {
                  (std::get<0>(reference_) - observer_.template scaled_estimate<0>()) +
              (ahead - tail);
     if constexpr (preset) {
-      if (Observer::levels > 1 || observer_.restarts()) {
+      if (Observer::levels > 1 || !measures_first_row || observer_.restarts()) {
         arm_by_preview();
       } else if constexpr (Observer::levels == 1) {
         const auto gain = observer_.correction_gain(S(0.0));

@@ -87,11 +87,15 @@ class ConstantGain {
 template <int Size, Scalar S, class Placement = EqualPoles, int MostBridged = 16>
 class ModelGain;  // gain/model_gain.hpp, to be included with a model other than the chain
 
+template <int Size, Scalar S, class Placement = EqualPoles, int Count = 9, int MostBridged = 16>
+class ScheduledGain;  // gain/scheduled_gain.hpp, with a model that follows a speed
+
 /// The constant gain law for a model: by formula for the chain.
 template <class Model, int Size, Scalar S, class Placement>
-using ConstantGainOf =
-    std::conditional_t<model_traits<Model>.is_chain, ConstantGain<Size, S, Placement>,
-                       ModelGain<Size, S, Placement>>;
+using ConstantGainOf = std::conditional_t<
+    model_traits<Model>.is_chain, ConstantGain<Size, S, Placement>,
+    std::conditional_t<model_traits<Model>.follows_speed, ScheduledGain<Size, S, Placement>,
+                       ModelGain<Size, S, Placement>>>;
 
 namespace detail {
 

@@ -21,6 +21,14 @@ struct PartDesign {
   Array<ScaledGain<Size, S>, MostBridged> gains{};
   int longest_step = 0;  ///< samples from correction to correction; 0: poles cannot be placed
 
+  /// True if with this gain every error decays.
+  static bool decays(const Matrix<S, Size, Size>& step, const Array<S, Size>& output,
+                     const ScaledGain<Size, S>& gain) {
+    Array<S, Size> units{};
+    units.fill(S(1.0));
+    return all(decay(corrected(step, output, gain), units) > S(0.0));
+  }
+
   PartDesign(const Matrix<S, Size, Size>& step, const Array<S, Size>& output,
              const Array<int, Size>& degrees, const PoleFactors<Size, S>& poles) {
     gains[0] = placed_gain(step, output, degrees, poles);
@@ -211,6 +219,13 @@ class ModelGain {
       return take(corrected_whole(model),
                   pole_factors(Placement::template sample<Size, S>(spec, time)));
     }
+  }
+
+  /// True if with this gain every error of the model decays.
+  template <class Model>
+  [[nodiscard]] static bool decays(const Model& model, const ScaledGain<Size, S>& gain) {
+    const auto all = corrected_whole(model);
+    return detail::PartDesign<Size, S, 1>::decays(all.step, all.output, gain);
   }
 
   /// k, scaled, whatever the innovation.

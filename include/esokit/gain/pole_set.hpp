@@ -11,6 +11,7 @@
 #include <esokit/gain/continuous_gain.hpp>
 #include <esokit/gain/feedback_gain.hpp>
 #include <esokit/gain/half_gain.hpp>
+#include <esokit/gain/model_placement.hpp>
 #include <esokit/gain/placement.hpp>
 #include <esokit/gain/sampled_gain.hpp>
 
@@ -98,6 +99,36 @@ Vector<S, Size> continuous_gain(const Array<std::complex<S>, Size>& poles) {
   Vector<S, Size> gain;
   for (int i = 0; i < Size; ++i) gain(i) = coefficients[static_cast<std::size_t>(i) + 1].real();
   return gain;
+}
+
+/// Conjugate ones as pairs; two real ones make a pair, too.
+template <int Size, PlainScalar S>
+PoleFactors<Size, S> pole_factors(const SampledPoleSet<Size, S>& poles) noexcept {
+  PoleFactors<Size, S> factors;
+  factors.decay = S(1e3);
+  for (const auto& a : poles.contractions) factors.unit = (std::max)(factors.unit, std::abs(a));
+  std::size_t pair = 0;
+  bool waits = false;
+  S real{};
+  for (const auto& a : poles.contractions) {
+    const std::complex<S> x = a / factors.unit;
+    // abs(rho)^2 = 1 - (2 Re a - abs(a)^2).
+    const S lost = a.real() * (S(2) - a.real()) - a.imag() * a.imag();
+    factors.decay = (std::min)(factors.decay, detail::decay_of(lost) / S(2));
+    if (a.imag() > S(0)) {
+      factors.sum[pair] = S(2) * x.real();
+      factors.product[pair++] = std::norm(x);
+    } else if (!(a.imag() < S(0))) {
+      if (waits) {
+        factors.sum[pair] = real + x.real();
+        factors.product[pair++] = real * x.real();
+      }
+      real = x.real();
+      waits = !waits;
+    }
+  }
+  if (waits) factors.last = real;
+  return factors;
 }
 
 /// Any stable set of poles p_i (1/s), complex ones in conjugate pairs.

@@ -234,7 +234,7 @@ S least_measurement_variance(const CovarianceFactor<Size, S>& noise,
 /// state is measured, P- = L D L'; its gain is good to a few units in the last place.
 /// @param noise Q @param measurement R >= 0 @param inflation >= 1 @param transition Phi
 /// @return nothing if there is none: inflation = 1 where nothing drives the highest state, or
-///         Q = R = 0
+///         Q = R = 0; of another model also where nothing disturbs a state that fades by itself
 template <int Size, Scalar S, class Transition = PascalTransition>
 std::optional<CovarianceFactor<Size, S>> steady_covariance(const CovarianceFactor<Size, S>& noise,
                                                            const S& measurement, const S& inflation,
@@ -247,7 +247,9 @@ std::optional<CovarianceFactor<Size, S>> steady_covariance(const CovarianceFacto
   model.measurement(0, 0) = measurement;
   model.inflation = inflation;
   for (int i = 0; i < Size; ++i) model.output(0, i) = S(i == 0 ? 1.0 : 0.0);
-  if (!all(inflation > S(1.0)) && !all(model.noise(Size - 1, Size - 1) > S(0.0))) {
+  // Of another model the recursion below finds out: no gain that tends to zero comes to rest.
+  if (std::is_same_v<Transition, PascalTransition> && !all(inflation > S(1.0)) &&
+      !all(model.noise(Size - 1, Size - 1) > S(0.0))) {
     return std::nullopt;
   }
   Vec start;

@@ -19,13 +19,15 @@ namespace esokit {
 
 /// What is known of the plant: which parts a model has. Their numbers are in its Settings.
 struct ModelParts {
-  int order = 1;             ///< n: the plant is y^(n) = -a_(n-1) y^(n-1) - .. - a_0 y + d + b0 v
-  bool plant_poles = false;  ///< a_0 .. a_(n-1) are known; false: they are zero, a chain
-  int actuator = 0;          ///< order of the lag from u to v: 0 (v = u), 1 or 2
-  int sensor = 0;            ///< order of the lag from y to what is measured: 0, 1 or 2
-  int constants = 1;         ///< m: the disturbance has m integrators, at least one
-  int resonators = 0;        ///< and so many sines of known frequency
-  int leaky = 0;             ///< and so many that fade, each with a time constant
+  int order = 1;               ///< n: the plant is y^(n) = -a_(n-1) y^(n-1) - .. - a_0 y + d + b0 v
+  bool plant_poles = false;    ///< a_0 .. a_(n-1) are known; false: they are zero, a chain
+  int actuator = 0;            ///< order of the lag from u to v: 0 (v = u), 1 or 2
+  int sensor = 0;              ///< order of the lag from y to what is measured: 0, 1 or 2
+  int constants = 1;           ///< m: the disturbance has m integrators, at least one
+  int resonators = 0;          ///< and so many sines of known frequency
+  int leaky = 0;               ///< and so many that fade, each with a time constant
+  bool follows_speed = false;  ///< the frequencies of the resonators change while running, all by
+                               ///< one factor
 };
 
 namespace detail {
@@ -148,6 +150,15 @@ struct Resonance {
                           ///< faster, and with more error in its frequency, at more noise
 };
 
+/// How far the frequencies may go from what they are given as, as factors.
+template <bool Follows, PlainScalar S>
+struct SpeedRange {};
+template <PlainScalar S>
+struct SpeedRange<true, S> {
+  S lowest{};   ///< above 0, 1 at most
+  S highest{};  ///< 1 or more
+};
+
 /// Plant, actuator, sensor and disturbance as one model, sampled exactly:
 ///
 ///     plant      y^(n) = -a_(n-1) y^(n-1) - .. - a_0 y + d + b0 v
@@ -187,6 +198,7 @@ class AugmentedModel {
       .shifts_output = !Parts.plant_poles && lf == 0,
       .adds_levels = !Parts.plant_poles && lf == 0 && la == 0,
       .corrects_part = true,
+      .follows_speed = Parts.follows_speed,
   };
 
   using State = Array<S, size>;      ///< x, scaled, N elements
@@ -201,6 +213,7 @@ class AugmentedModel {
     Lag<lf, S> sensor{};                                 ///< from y to what is measured
     Array<Resonance<S>, Parts.resonators> resonators{};  ///< the sines
     Array<S, Parts.leaky> leaky{};                       ///< time constants of what fades, s
+    SpeedRange<Parts.follows_speed, S> speed{};          ///< of the resonators
   };
 
   /// Checks the settings and samples the model.
@@ -379,6 +392,15 @@ class AugmentedModel {
     return detail::model_degree(Parts, state);
   }
 
+  /// The same with all frequencies of the resonators times `factor`; exact, and as much work as a
+  /// matrix exponential: some 16 products of N x N.
+  [[nodiscard]] AugmentedModel at_speed(const S& factor) const noexcept {
+    AugmentedModel other = *this;
+    other.speed_ = factor;
+    other.sample();
+    return other;
+  }
+
   /// True if u does the same in both.
   [[nodiscard]] constexpr bool same_drive(const AugmentedModel& other) const noexcept {
     const S change = detail::absolute(S(scaled_input_gain_ - other.scaled_input_gain_)) +
@@ -422,7 +444,7 @@ class AugmentedModel {
       sum = sum + alpha[static_cast<std::size_t>(i)] * x[static_cast<std::size_t>(lf + i)] *
                       detail::factorial_ratio<S>(i, n);
     }
-    const auto others = others_filtered(settings_, sample_time_, 0);
+    const auto others = others_filtered(present(), sample_time_, 0);
     for (int j = lf + order + 1; j < size; ++j) {
       sum = sum - others[static_cast<std::size_t>(j)] * x[static_cast<std::size_t>(j)];
     }
@@ -632,6 +654,17 @@ class AugmentedModel {
              "must differ by a thousandth of itself from", c, other, true});
       }
     }
+    if constexpr (Parts.follows_speed) {
+      const auto& [lowest, highest] = settings.speed;
+      rules.positive("model.speed.lowest", lowest)
+          .positive("model.speed.highest", highest)
+          .require(lowest <= S(1), "model.speed.lowest", lowest, "must be 1 at most")
+          .require(highest >= S(1), "model.speed.highest", highest, "must be 1 or more");
+      for (const auto& resonance : settings.resonators) {
+        rules.require(highest * resonance.frequency * time < S(3.1), "model.speed.highest", highest,
+                      "takes a resonator to half the sample rate");
+      }
+    }
     for (int c = 0; c < Parts.leaky; ++c) {
       const S& tau = settings.leaky[static_cast<std::size_t>(c)];
       rules.positive("model.leaky", tau, c)
@@ -658,7 +691,7 @@ class AugmentedModel {
     typename Part::Settings less{};
     less.plant = settings_.plant;
     if constexpr (part_lf > 0) less.sensor = settings_.sensor;
-    less.resonators = settings_.resonators;
+    less.resonators = present().resonators;
     less.leaky = settings_.leaky;
     const auto with_input = Part::rates(less, sample_time_);
     Matrix<S, part_size, part_size> rates;
@@ -708,7 +741,7 @@ class AugmentedModel {
       }
     }
     for (std::size_t c = 0; c < Parts.resonators; ++c) {
-      const auto& resonance = settings_.resonators[c];
+      const auto& resonance = less.resonators[c];
       const bool given = resonance.capture_bandwidth > S(0);
       part.pairs[c] = {-(given ? resonance.capture_bandwidth : resonance.frequency),
                        resonance.frequency};
@@ -730,7 +763,18 @@ class AugmentedModel {
     for (int j = 1; j <= order; ++j) {
       scaled_input_gain_ = scaled_input_gain_ * (j <= n ? sample_time : S(1)) / number(j);
     }
-    const auto all = detail::exp_minus_identity(rates(settings, sample_time));
+    sample();
+  }
+
+  /// With the frequencies of now.
+  [[nodiscard]] Settings present() const noexcept {
+    Settings now = settings_;
+    for (auto& resonance : now.resonators) resonance.frequency = resonance.frequency * speed_;
+    return now;
+  }
+
+  void sample() noexcept {
+    const auto all = detail::exp_minus_identity(rates(present(), sample_time_));
     for (int i = 0; i < size; ++i) {
       for (int j = 0; j <= size; ++j) {
         if (!couples(i, j)) continue;
@@ -742,7 +786,8 @@ class AugmentedModel {
 
   Array<S, pattern.kept> step_{};  ///< Phi - I and Gamma, what is not zero
   Settings settings_;
-  S rate_;  ///< 1/T
+  S speed_ = S(1);  ///< factor of the frequencies
+  S rate_;          ///< 1/T
   S input_gain_;
   S sample_time_;
   S scaled_input_gain_{};  ///< b T^order / order!
@@ -752,6 +797,6 @@ class AugmentedModel {
 template <ModelParts Parts, PlainScalar S>
 inline constexpr std::uint32_t type_tag<AugmentedModel<Parts, S>> =
     make_type_tag<S>("AugmentedModel", Parts.order, Parts.plant_poles, Parts.actuator, Parts.sensor,
-                     Parts.constants, Parts.resonators, Parts.leaky);
+                     Parts.constants, Parts.resonators, Parts.leaky, Parts.follows_speed);
 
 }  // namespace esokit

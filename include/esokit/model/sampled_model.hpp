@@ -30,6 +30,9 @@ struct ModelTraits {
   /// `with_corrected_part(..)` says what of it a gain corrects, and which poles are its own to
   /// place; see CorrectedPart. Otherwise all is corrected.
   bool corrects_part = false;
+
+  /// `at_speed(factor)` is the same with its swings that much faster, see ScheduledGain.
+  bool follows_speed = false;
 };
 
 /// What a model declares.

@@ -42,6 +42,9 @@ struct ObserverTraits {
   bool is_predictable = false;
   GainKind gain_kind = GainKind::general;  ///< what can be told; of a predictable one
 
+  /// What is measured is row 0 of the estimate; false where a sensor lags behind it.
+  bool measures_first_row = true;
+
   /// It is an adapter around an observer `Adapted`; its config has that of `Adapted` as `observer`.
   bool adapts = false;
 

@@ -409,7 +409,10 @@ class ExtendedStateFilter
   static Array<S, N> scaled_units(const PlantModel& plant, const S& root) {
     Estimate ones;
     for (int r = 0; r < N; ++r) ones(r) = S(1.0) / root;
-    return plant.scaled(ones);
+    const auto states = plant.scaled(ones);
+    Array<S, N> units;
+    for (int r = 0; r < N; ++r) units[index(r)] = states[index(PlantModel::state_of_row(r))];
+    return units;
   }
 
   /// The inverse, without the root.

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <esokit/gain/model_gain.hpp>
+#include <esokit/gain/scheduled_gain.hpp>
 #include <esokit/model/augmented_model.hpp>
 #include <esokit/observer/linear_eso.hpp>
 

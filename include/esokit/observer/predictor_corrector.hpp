@@ -90,7 +90,8 @@ class PredictorCorrector {
       .publishes_chain = true,
       .acts_by_gain = gain_law_traits<Law>.kind == GainKind::preset,
       .is_predictable = Levels == 1 || gain_law_traits<Law>.kind == GainKind::preset,
-      .gain_kind = gain_law_traits<Law>.kind};
+      .gain_kind = gain_law_traits<Law>.kind,
+      .measures_first_row = Model::state_of_row(0) == 0};
 
   /// From chain settings and ready gain laws; the way in for a gain law of your own.
   /// @return error for input_gain, sample_time or max_gap out of its rule
@@ -258,7 +259,8 @@ class PredictorCorrector {
       correct_levels<false>(offset, S(0.0), elapsed());
       correct_levels<false>(slope, S(1.0), elapsed());
     }
-    return {up_to_level<Levels - 1>(offset.states), up_to_level<Levels - 1>(slope.states)};
+    return {by_rows(up_to_level<Levels - 1>(offset.states)),
+            by_rows(up_to_level<Levels - 1>(slope.states))};
   }
 
   /// The scaled gain with which a coming `correct(y)` will weigh the innovation e; after a gap that
@@ -324,6 +326,21 @@ class PredictorCorrector {
   /// What is known of the plant.
   [[nodiscard]] constexpr const Model& model() const noexcept { return model_; }
 
+  /// From the next step on the swings of the model are `factor` times as fast as they were given:
+  /// Phi exactly, the gain from the table that `make` has made. The estimate is kept, and with it
+  /// where each swing is. Bounded work without design; for speeds that change slowly against the
+  /// slowest pole. After a retune the factor is 1 again.
+  /// @return error for a factor outside of the range in the settings: nothing changes then
+  Check<S> set_speed(const S& factor) noexcept requires(model_traits<Model>.follows_speed) {
+    Laws laws = laws_;
+    for (Law& law : laws) {
+      if (auto ok = law.set_speed(factor); !ok) return ok;
+    }
+    laws_ = laws;
+    model_ = model_.at_speed(factor);
+    return {};
+  }
+
   /// Gain of the next correction of level `level` = 0 .. p - 1, scaled; for laws that know it
   /// before the measurement.
   [[nodiscard]] constexpr ScaledGain<size, S> level_gain(int level) const noexcept requires
@@ -336,9 +353,18 @@ class PredictorCorrector {
     return model_.rest(y, u);
   }
 
-  /// A number that is finite only if the estimate that x stands for is. @param x scaled
+  /// A number that is finite only if the estimate that x stands for is. @param x scaled, row by row
   [[nodiscard]] constexpr S finite_probe(const State& x) const noexcept {
-    return model_.finite_probe(x);
+    if constexpr (traits.measures_first_row) {
+      return model_.finite_probe(x);
+    } else {
+      State states{};
+      for (int row = 0; row < size; ++row) {
+        states[static_cast<std::size_t>(Model::state_of_row(row))] =
+            x[static_cast<std::size_t>(row)];
+      }
+      return model_.finite_probe(states);
+    }
   }
 
   /// Starts anew at (y, 0, .., 0). A y that is not finite changes nothing and is reported.
@@ -435,6 +461,19 @@ class PredictorCorrector {
 
   using LevelStates = Array<State, Levels>;
   using Plain = detail::PlainTwin<PredictorCorrector, S>;  ///< a lane
+
+  /// As `scaled_estimate` has them.
+  [[nodiscard]] ESOKIT_INLINE static constexpr State by_rows(const State& states) noexcept {
+    if constexpr (traits.measures_first_row) {
+      return states;
+    } else {
+      State rows{};
+      detail::unroll<size>([&](auto row) ESOKIT_INLINE_LAMBDA {
+        std::get<row>(rows) = std::get<Model::state_of_row(row)>(states);
+      });
+      return rows;
+    }
+  }
 
   /// Where the total disturbance is.
   static constexpr auto disturbance_state = static_cast<std::size_t>(Model::state_of_row(Order));
