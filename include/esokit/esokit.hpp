@@ -32,6 +32,7 @@
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/control/algebraic_filter.hpp>
 #include <esokit/control/control_loop.hpp>
+#include <esokit/control/controller.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/dual_feedback.hpp>
 #include <esokit/control/filter_form.hpp>
@@ -126,10 +127,14 @@
 #include <esokit/sim/elementary_signals.hpp>
 #include <esokit/sim/filtered_step.hpp>
 #include <esokit/sim/gaussian.hpp>
+#include <esokit/sim/loop_steps.hpp>
 #include <esokit/sim/metrics.hpp>
 #include <esokit/sim/noise.hpp>
 #include <esokit/sim/peak.hpp>
 #include <esokit/sim/plant.hpp>
+#include <esokit/sim/recording.hpp>
+#include <esokit/sim/run.hpp>
+#include <esokit/sim/run_signal.hpp>
 #include <esokit/sim/runge_kutta.hpp>
 #include <esokit/sim/series.hpp>
 #include <esokit/sim/signal.hpp>

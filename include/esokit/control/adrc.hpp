@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/control/control_loop.hpp>
+#include <esokit/control/controller.hpp>
 #include <esokit/control/scaled_law.hpp>
 #include <esokit/core/lane_by_lane.hpp>
 #include <esokit/core/type_tag.hpp>
@@ -77,6 +78,12 @@ class Adrc {
   using scalar_type = typename Observer::scalar_type;  ///< of signals and settings
   using S = scalar_type;                               ///< the same
   using Reference = Vector<S, order + 1>;              ///< (r, r', .., r^(n)), n + 1 x 1
+
+  /// What it is beyond `update(y, reference)`.
+  static constexpr ControllerTraits traits{.takes_derivatives = true,
+                                           .knows_sample_time = true,
+                                           .varies_time = observer_traits<Observer>.varies_time,
+                                           .observes = true};
 
   using Config = AdrcConfig<Observer>;  ///< settings of make
   using Status = StatusOf<S>;           ///< StepStatus, of a pack one a lane
@@ -213,6 +220,8 @@ class Adrc {
   [[nodiscard]] const Observer& observer() const noexcept { return loop_.observer(); }
   /// The observer, for what only it can do (AlgebraicEso::rearm).
   [[nodiscard]] Observer& observer() noexcept { return loop_.observer(); }
+  /// T, s.
+  [[nodiscard]] S sample_time() const noexcept { return loop_.observer().sample_time(); }
   /// The u that holds now, within the limits.
   [[nodiscard]] const S& output() const noexcept { return loop_.output(); }
   /// What the law asked for before the limits.

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <esokit/control/control_loop.hpp>
+#include <esokit/control/controller.hpp>
 #include <esokit/core/lane_by_lane.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <limits>
@@ -49,6 +50,11 @@ class DisturbanceCompensator {
   static constexpr int order = Observer::order;        ///< n, order of the plant
   using scalar_type = typename Observer::scalar_type;  ///< of signals and settings
   using S = scalar_type;                               ///< the same
+
+  /// What it is beyond `update(y, base_output)`.
+  static constexpr ControllerTraits traits{.knows_sample_time = true,
+                                           .varies_time = observer_traits<Observer>.varies_time,
+                                           .observes = true};
 
   using Config = DisturbanceCompensatorConfig<Observer>;  ///< settings of make
   template <class T>
@@ -134,6 +140,8 @@ class DisturbanceCompensator {
   [[nodiscard]] const S& compensation_gain() const noexcept { return gain_; }
   /// D: a measurement is due at every D-th update.
   [[nodiscard]] int measurement_divider() const noexcept { return loop_.measurement_divider(); }
+  /// T, s.
+  [[nodiscard]] S sample_time() const noexcept { return loop_.observer().sample_time(); }
   /// The u that holds now, within the limits.
   [[nodiscard]] const S& output() const noexcept { return loop_.output(); }
   /// u0 + K dhat before the limits.

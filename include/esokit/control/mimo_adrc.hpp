@@ -3,6 +3,7 @@
 #pragma once
 
 #include <esokit/control/adrc_law.hpp>
+#include <esokit/control/controller.hpp>
 #include <esokit/control/limiter.hpp>
 #include <esokit/core/lane_by_lane.hpp>
 #include <esokit/core/unroll.hpp>
@@ -70,6 +71,9 @@ class MimoAdrc {
   using InputMatrix = Matrix<S, channels, channels>;     ///< B0, q x q
   static_assert((std::is_same_v<typename Observers::scalar_type, S> && ...),
                 "esokit: all channels need the same scalar");
+
+  /// What it is beyond `update(y, reference)`.
+  static constexpr ControllerTraits traits{.knows_sample_time = true};
 
   using Config = MimoAdrcConfig<Observers...>;  ///< settings of make
 
@@ -171,6 +175,8 @@ class MimoAdrc {
     return {};
   }
 
+  /// T of all channels, s.
+  [[nodiscard]] S sample_time() const noexcept { return observer<0>().sample_time(); }
   /// The u that holds now, q x 1.
   [[nodiscard]] Output output() const noexcept {
     Output u;

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <esokit/control/adrc_law.hpp>
+#include <esokit/control/controller.hpp>
 #include <esokit/control/limiter.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/core/unroll.hpp>
@@ -58,6 +59,10 @@ class PredictiveAdrc {
   using S = scalar_type;                               ///< the same
   using Estimate = typename Observer::Estimate;        ///< (y, .., y^(n-1), d, ..), N x 1
   using Reference = Vector<S, order + 1>;              ///< (r, r', .., r^(n)), n + 1 x 1
+
+  /// What it is beyond `update(y, reference)`.
+  static constexpr ControllerTraits traits{
+      .two_phases = true, .takes_derivatives = true, .knows_sample_time = true, .observes = true};
 
   /// Give `controller_bandwidth` or `gains`, not both.
   struct Config {
@@ -239,6 +244,8 @@ class PredictiveAdrc {
 
   /// The observer, for its estimates.
   [[nodiscard]] const Observer& observer() const noexcept { return observer_; }
+  /// T, s.
+  [[nodiscard]] S sample_time() const noexcept { return observer_.sample_time(); }
   /// The u that holds now.
   [[nodiscard]] const S& output() const noexcept { return output_; }
   /// What the observer said of the last sample.

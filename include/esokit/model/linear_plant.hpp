@@ -319,6 +319,23 @@ struct HeldPlant {
   Matrix<S, States, States> increment{};    ///< exp(A t) - I
   Matrix<S, States, Inputs> input{};        ///< the integral of exp(A s) B over 0 .. t
   Matrix<S, States, Inputs> disturbance{};  ///< the integral of exp(A s) E over 0 .. t
+
+  /// x when the while is over. u, which is known last, comes in last.
+  [[nodiscard]] ESOKIT_INLINE constexpr Vector<S, States> advanced(
+      const Vector<S, States>& x, const Vector<S, Inputs>& u,
+      const Vector<S, Inputs>& d) const noexcept {
+    Vector<S, States> next;
+    detail::unroll<States>([&](auto i) ESOKIT_INLINE_LAMBDA {
+      S sum = x(i);
+      detail::unroll<States>([&](auto j)
+                                 ESOKIT_INLINE_LAMBDA { sum = sum + increment(i, j) * x(j); });
+      detail::unroll<Inputs>([&](auto j)
+                                 ESOKIT_INLINE_LAMBDA { sum = sum + disturbance(i, j) * d(j); });
+      detail::unroll<Inputs>([&](auto j) ESOKIT_INLINE_LAMBDA { sum = sum + input(i, j) * u(j); });
+      next(i) = sum;
+    });
+    return next;
+  }
 };
 
 /// The plant over `duration`, u (as it arrives: without the dead time) and d held.

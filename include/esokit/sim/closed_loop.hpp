@@ -10,6 +10,7 @@
 #include <esokit/core/expected.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/gain/step_status.hpp>
+#include <esokit/sim/loop_steps.hpp>
 #include <esokit/sim/plant.hpp>
 #include <esokit/sim/runge_kutta.hpp>
 #include <esokit/sim/signal.hpp>
@@ -119,42 +120,12 @@ struct LoopEnd {
 
 namespace detail {
 
-/// Finite and `part` times a whole number; that number. Both may be rounded decimals.
-template <PlainScalar ScalarType>
-Expected<std::int64_t, Error<ScalarType>> whole_multiple(const char* field, ScalarType value,
-                                                         ScalarType part, const char* rule) {
-  if (Rules<ScalarType> rules; !rules.positive(field, value)) return rules.error();
-  const ScalarType ratio = value / part;
-  const ScalarType whole = std::round(ratio);
-  const ScalarType decimal = static_cast<ScalarType>(1e-9);
-  const ScalarType rounding = std::numeric_limits<ScalarType>::epsilon() * ScalarType{16};
-  const ScalarType tolerance = decimal > rounding ? decimal : rounding;
-  const ScalarType most = static_cast<ScalarType>(std::int64_t{1} << 40u);
-  if (!is_finite(ratio) || !(whole >= ScalarType{1} && whole <= most) ||
-      !(std::abs(ratio - whole) <= tolerance * whole)) {
-    return Error<ScalarType>{
-        .field = field, .value = value, .rule = rule, .limit = part, .has_limit = true};
-  }
-  return static_cast<std::int64_t>(whole);
-}
-
 template <class State>
 auto check_state(const char* field, const State& state) {
   using S = std::remove_cvref_t<decltype(state[0])>;
   Rules<S> rules;
   for (int i = 0; i < static_cast<int>(state.size()); ++i) rules.finite(field, state[i], i);
   return Check<S>(rules);
-}
-
-/// Calls back; true unless the callback returned false.
-template <class Callback, class Sample>
-bool keep_going(Callback& on_sample, const Sample& sample) {
-  if constexpr (std::convertible_to<std::invoke_result_t<Callback&, const Sample&>, bool>) {
-    return static_cast<bool>(on_sample(sample));
-  } else {
-    on_sample(sample);
-    return true;
-  }
 }
 
 }  // namespace detail

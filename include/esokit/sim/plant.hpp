@@ -1,10 +1,12 @@
 /// @file
-/// What a plant of the continuous simulation is, and a linear one with a disturbance.
+/// What a plant of a simulation is: of the continuous one, with a disturbance; a nonlinear one.
 #pragma once
 
 #include <concepts>
 #include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
+#include <esokit/core/lanes.hpp>
+#include <esokit/core/matrix.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/model/linear_plant.hpp>
 #include <esokit/sim/signals.hpp>
@@ -13,6 +15,10 @@
 
 /// Simulation: plants, signals, noise, integrators, closed loops, criteria.
 namespace esokit::sim {
+
+/// A number, or a vector of several.
+template <class ScalarType, int Size>
+using ScalarOrVector = std::conditional_t<Size == 1, ScalarType, Vector<ScalarType, Size>>;
 
 /// A system with one input and one output: x' = derivative(t, x, u), y = output(t, x).
 ///
@@ -82,5 +88,62 @@ class DisturbedPlant {
 
   Config config_;
 };
+
+/// A plant of its equations: x' = f(t, x, u), y = h(t, x). Made by `nonlinear_plant`.
+template <int States, class ScalarType, int Inputs, int Outputs, class F, class H>
+struct NonlinearPlant {
+  static constexpr int states = States;                ///< length of x
+  static constexpr int inputs = Inputs;                ///< length of u
+  static constexpr int outputs = Outputs;              ///< length of y
+  using scalar_type = ScalarType;                      ///< of x, u and y
+  using State = Vector<ScalarType, States>;            ///< x
+  using Input = ScalarOrVector<ScalarType, Inputs>;    ///< u: a number if it is one
+  using Output = ScalarOrVector<ScalarType, Outputs>;  ///< y: a number if it is one
+  using Time = LaneScalar<ScalarType>;                 ///< t, s
+
+  F f;  ///< x' = f(t, x, u)
+  H h;  ///< y = h(t, x)
+
+  /// x'. @param t s
+  State derivative(const Time& t, const State& x, const Input& u) const { return f(t, x, u); }
+  /// y. @param t s
+  Output output(const Time& t, const State& x) const { return h(t, x); }
+};
+
+/// The first states, as many as there are outputs.
+template <class Output>
+struct FirstStates {
+  /// y.
+  template <class Time, class State>
+  Output operator()(const Time& /*t*/, const State& x) const {
+    if constexpr (std::convertible_to<decltype(x(0)), Output>) {
+      return x(0);
+    } else {
+      return x.template head<Output::rows()>();
+    }
+  }
+};
+
+/// A plant of functions: a pendulum is
+///
+///     nonlinear_plant<2>([](double, const Vector<double, 2>& x, double u) {
+///       return Vector<double, 2>{x(1), -9.81 * std::sin(x(0)) + u};
+///     });
+///
+/// y is the first state, or what `h(t, x)` gives. t is absolute time, s; both functions are pure:
+/// an integrator calls them at times between samples. What jumps in f costs accuracy unless it does
+/// so between steps: a load that is switched on is better given to the simulation as its
+/// disturbance.
+/// @{
+template <int States, Scalar ScalarType = double, int Inputs = 1, int Outputs = 1, class F, class H>
+NonlinearPlant<States, ScalarType, Inputs, Outputs, F, H> nonlinear_plant(F f, H h) {
+  return {std::move(f), std::move(h)};
+}
+template <int States, Scalar ScalarType = double, int Inputs = 1, int Outputs = 1, class F>
+auto nonlinear_plant(F f) {
+  using H = FirstStates<ScalarOrVector<ScalarType, Outputs>>;
+  return nonlinear_plant<States, ScalarType, Inputs, Outputs>(std::move(f), H{});
+}
+/// @}
 
 }  // namespace esokit::sim

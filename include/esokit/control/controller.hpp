@@ -1,0 +1,97 @@
+/// @file
+/// What a controller has to offer for the rest of the house (a simulation, say) to drive it.
+#pragma once
+
+#include <concepts>
+#include <esokit/core/check.hpp>
+#include <esokit/core/declared.hpp>
+#include <esokit/core/matrix.hpp>
+#include <esokit/core/scalar.hpp>
+#include <type_traits>
+
+namespace esokit {
+
+/// What a controller is beyond `u = controller(y, reference)`: `static constexpr ControllerTraits
+/// traits{..}` in it. One that declares nothing is what the defaults say.
+struct ControllerTraits {
+  /// u is `control(y)`; `prepare(next_reference)` comes after it, and `set_reference(reference)`
+  /// before the first sample. See PredictiveAdrc.
+  bool two_phases = false;
+
+  /// The reference may be a vector (r, r', .., r^(n)), n = `order`.
+  bool takes_derivatives = false;
+
+  bool knows_sample_time = false;  ///< `sample_time() const`, s
+  bool varies_time = false;        ///< `set_step_time(seconds)`, before each step
+  bool observes = false;  ///< `observer() const`, with `total_disturbance()`; one for all channels
+};
+
+/// What a controller declares.
+template <class C>
+inline constexpr ControllerTraits controller_traits = detail::declared_traits<C, ControllerTraits>;
+
+namespace detail {
+
+/// u of the sample with the measurement y.
+template <class C, class Y, class Reference>
+ESOKIT_INLINE constexpr decltype(auto) command(C& controller, const Y& y,
+                                               [[maybe_unused]] const Reference& reference) {
+  if constexpr (controller_traits<C>.two_phases) {
+    return controller.control(y);
+  } else if constexpr (std::invocable<C&, const Y&, const Reference&>) {
+    return controller(y, reference);
+  } else {
+    return controller.update(y, reference);
+  }
+}
+
+template <class C, class Y, class Reference, class U>
+concept Commands = requires(C& controller, const Y& y, const Reference& reference) {
+  { controller(y, reference) } -> std::convertible_to<U>;
+}
+|| requires(C& controller, const Y& y, const Reference& reference) {
+  { controller.update(y, reference) } -> std::convertible_to<U>;
+};
+
+template <class C, class Y, class Reference, class U>
+concept CommandsInTwoPhases = requires(C& controller, const Y& y, const Reference& reference) {
+  { controller.control(y) } -> std::convertible_to<U>;
+  controller.prepare(reference);
+  controller.set_reference(reference);
+};
+
+template <class C, class Reference>
+using WithDerivatives = Vector<Reference, C::order + 1>;
+
+}  // namespace detail
+
+/// A controller of plants with the measurement Y and the input U (numbers, or vectors of several
+/// channels): `controller(y, reference)`, a lambda for one, or `controller.update(y, reference)`,
+/// called once a sample, gives u until the next one. y is NaN where a measurement is missing.
+///
+/// Copyable: a simulation drives a copy. What else it can do it declares, see ControllerTraits.
+template <class C, class Y, class U = Y, class Reference = Y>
+concept Controller =
+    std::copy_constructible<C> && DeclaresTraits<C, ControllerTraits> &&
+    (controller_traits<C>.two_phases
+         ? detail::CommandsInTwoPhases<C, Y, Reference, U>
+         : detail::Commands<
+               C, Y, Reference,
+               U>)&&(!controller_traits<C>.takes_derivatives ||
+                     (controller_traits<C>.two_phases
+                          ? detail::CommandsInTwoPhases<C, Y, detail::WithDerivatives<C, Reference>,
+                                                        U>
+                          : detail::Commands<C, Y, detail::WithDerivatives<C, Reference>, U>)) &&
+    (!controller_traits<C>.knows_sample_time ||
+     requires(const C& controller) {
+       { controller.sample_time() } -> std::convertible_to<typename C::scalar_type>;
+     }) &&
+    (!controller_traits<C>.varies_time ||
+     requires(C & controller, const typename C::scalar_type& seconds) {
+       { controller.set_step_time(seconds) } -> std::same_as<Check<typename C::scalar_type>>;
+     }) &&
+    (!controller_traits<C>.observes || requires(const C& controller) {
+      { controller.observer().total_disturbance() } -> std::convertible_to<typename C::scalar_type>;
+    });
+
+}  // namespace esokit

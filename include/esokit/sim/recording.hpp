@@ -1,0 +1,187 @@
+/// @file
+/// What a run gives: its samples, its end, and the record of them to draw or to write.
+#pragma once
+
+#include <charconv>
+#include <cstddef>
+#include <cstdint>
+#include <esokit/control/controller.hpp>
+#include <esokit/core/lanes.hpp>
+#include <esokit/sim/plant.hpp>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+namespace esokit::sim {
+
+namespace detail {
+
+template <class P>
+struct PlantScalarOf {
+  using type = typename P::State::Scalar;
+};
+template <class P>
+requires requires { typename P::scalar_type; }
+struct PlantScalarOf<P> {
+  using type = typename P::scalar_type;
+};
+
+template <class P>
+constexpr int inputs_of() {
+  if constexpr (requires { P::inputs; }) return P::inputs;
+  return 1;
+}
+template <class P>
+constexpr int outputs_of() {
+  if constexpr (requires { P::outputs; }) return P::outputs;
+  return 1;
+}
+
+/// The scalar that a controller computes in; one that does not say it takes that of the plant.
+template <class C, class PlantScalar>
+struct ControllerScalarOf {
+  using type = PlantScalar;
+};
+template <class C, class PlantScalar>
+requires requires { typename C::scalar_type; }
+struct ControllerScalarOf<C, PlantScalar> {
+  using type = typename C::scalar_type;
+};
+
+}  // namespace detail
+
+/// What a run is made of: the types that go with a plant and a controller.
+template <class P, class C>
+struct RunTypes {
+  using S = typename detail::PlantScalarOf<P>::type;                         ///< of the plant
+  using ControllerScalar = typename detail::ControllerScalarOf<C, S>::type;  ///< of the controller
+  using Time = LaneScalar<S>;                                                ///< s
+  static constexpr int inputs = detail::inputs_of<P>();                      ///< length of u
+  static constexpr int outputs = detail::outputs_of<P>();                    ///< length of y
+  using State = typename P::State;                                           ///< x
+  using Input = ScalarOrVector<S, inputs>;                                   ///< u: a number if one
+  using Output = ScalarOrVector<S, outputs>;                                 ///< y: a number if one
+  /// (r, r', ..) of a controller that takes derivatives, else one for each output.
+  static constexpr bool derivatives = controller_traits<C>.takes_derivatives && outputs == 1;
+  /// Numbers of a reference.
+  static constexpr int references = [] {
+    if constexpr (derivatives) {
+      return C::order + 1;
+    } else {
+      return outputs;
+    }
+  }();
+};
+
+/// What the callback of a run gets once a sample, after the controller.
+template <class P, class C>
+struct RunSample {
+  using Types = RunTypes<P, C>;  ///< of the numbers
+
+  std::int64_t index{};                  ///< k
+  typename Types::Time t{};              ///< s
+  typename Types::State state{};         ///< x
+  typename Types::Output output{};       ///< y
+  typename Types::Output measurement{};  ///< what the controller was given; NaN: missing
+  typename Types::Output reference{};    ///< r, without its derivatives
+  typename Types::Input input{};         ///< u until the next sample
+};
+
+/// How a run ended.
+template <class P, class C>
+struct RunEnd {
+  using Types = RunTypes<P, C>;  ///< of the numbers
+
+  typename Types::Time time{};    ///< s, after the last sample has passed
+  std::int64_t samples{};         ///< how often the controller ran
+  typename Types::State state{};  ///< x then
+  C controller;                   ///< as it was left
+  bool completed = true;          ///< false if the callback stopped the run
+};
+
+/// The samples of a run, a column for each signal: `output` is a vector of numbers, of several
+/// channels an array of vectors.
+template <class P, class C>
+struct RunRecord {
+  using Types = RunTypes<P, C>;       ///< of the numbers
+  using S = typename Types::S;        ///< of the plant
+  using Time = typename Types::Time;  ///< s
+  /// Of a signal of `Count` numbers.
+  template <int Count>
+  using Column = std::conditional_t<Count == 1, std::vector<S>, Array<std::vector<S>, Count>>;
+
+  std::vector<Time> t;                 ///< s
+  Column<Types::outputs> output;       ///< y
+  Column<Types::outputs> measurement;  ///< what the controller was given; NaN: missing
+  Column<Types::outputs> reference;    ///< r
+  Column<Types::inputs> input;         ///< u from this sample to the next
+  /// dhat after the sample, in the unit of y^(n); empty where the controller has no observer.
+  std::vector<S> total_disturbance;
+
+  /// One sample more.
+  void add(const RunSample<P, C>& sample, const C& controller) {
+    t.push_back(sample.t);
+    append(output, sample.output);
+    append(measurement, sample.measurement);
+    append(reference, sample.reference);
+    append(input, sample.input);
+    if constexpr (controller_traits<C>.observes) {
+      total_disturbance.push_back(static_cast<S>(controller.observer().total_disturbance()));
+    }
+  }
+
+  /// A table with a line of names: t, y, measurement, reference, u, total_disturbance; of several
+  /// channels y1, y2, ..; numbers with all their digits. `std::ofstream("run.csv") << run.csv()`.
+  [[nodiscard]] std::string csv() const requires PlainScalar<S> {
+    std::string text = "t";
+    std::vector<const std::vector<S>*> columns;
+    const auto name = [&](const char* signal, const auto& column) {
+      if constexpr (std::is_same_v<std::remove_cvref_t<decltype(column)>, std::vector<S>>) {
+        if (column.size() != t.size()) return;
+        (text += ",") += signal;
+        columns.push_back(&column);
+      } else {
+        for (std::size_t i = 0; i < column.size(); ++i) {
+          ((text += ",") += signal) += std::to_string(i + 1);
+          columns.push_back(&column[i]);
+        }
+      }
+    };
+    name("y", output);
+    name("measurement", measurement);
+    name("reference", reference);
+    name("u", input);
+    name("total_disturbance", total_disturbance);
+    for (std::size_t k = 0; k < t.size(); ++k) {
+      number((text += "\n"), t[k]);
+      for (const auto* column : columns) number((text += ","), (*column)[k]);
+    }
+    return text += "\n";
+  }
+
+ private:
+  template <class Column, class Value>
+  static void append(Column& column, const Value& value) {
+    if constexpr (std::is_same_v<Column, std::vector<S>>) {
+      column.push_back(value);
+    } else {
+      for (std::size_t i = 0; i < column.size(); ++i) {
+        column[i].push_back(value(static_cast<int>(i)));
+      }
+    }
+  }
+
+  static void number(std::string& text, const S& value) {
+    char digits[64];
+    const auto end = std::to_chars(digits, digits + sizeof digits, value).ptr;
+    text.append(digits, end);
+  }
+};
+
+/// A run with the record of its samples.
+template <class P, class C>
+struct Recording : RunEnd<P, C>, RunRecord<P, C> {
+  using Types = RunTypes<P, C>;  ///< of the numbers
+};
+
+}  // namespace esokit::sim

@@ -1,0 +1,643 @@
+/// @file
+/// run(plant, controller, config): the sampled loop of a plant and a controller as deployed.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <esokit/control/controller.hpp>
+#include <esokit/core/check.hpp>
+#include <esokit/core/expected.hpp>
+#include <esokit/core/lanes.hpp>
+#include <esokit/sim/gaussian.hpp>
+#include <esokit/sim/loop_steps.hpp>
+#include <esokit/sim/plant.hpp>
+#include <esokit/sim/recording.hpp>
+#include <esokit/sim/run_signal.hpp>
+#include <esokit/sim/runge_kutta.hpp>
+#include <limits>
+#include <optional>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace esokit::sim {
+
+namespace detail {
+
+template <class P>
+inline constexpr bool is_linear_plant = false;
+template <int States, class S, int Inputs, int Outputs>
+inline constexpr bool is_linear_plant<LinearPlant<States, S, Inputs, Outputs>> = true;
+
+/// A number or a vector in another scalar.
+template <class To, class From>
+ESOKIT_INLINE auto in_scalar(const From& from) {
+  constexpr int size = esokit::detail::vector_size<From>;
+  if constexpr (size == 0) {
+    return static_cast<To>(from);
+  } else {
+    Vector<To, size> to;
+    for (int i = 0; i < size; ++i) to(i) = static_cast<To>(from(i));
+    return to;
+  }
+}
+
+/// The numbers of a number, a vector or a state.
+template <class T>
+constexpr bool finite_throughout(const T& value) noexcept {
+  if constexpr (requires { all(is_finite(value)); }) {
+    return all(is_finite(value));
+  } else {
+    for (int i = 0; i < static_cast<int>(value.size()); ++i) {
+      if (!all(is_finite(value[i]))) return false;
+    }
+    return true;
+  }
+}
+
+/// f(number) of each of them.
+template <class T, class F>
+void each_number(T& value, const F& f) {
+  if constexpr (std::is_invocable_v<const F&, T&>) {
+    f(value);
+  } else {
+    for (int i = 0; i < static_cast<int>(value.size()); ++i) f(value[i]);
+  }
+}
+
+}  // namespace detail
+
+/// A linear plant; or a plant of functions with `derivative(t, x, u)` and `output(t, x)`, its State
+/// added and scaled as a vector.
+template <class P>
+concept SampledPlant = std::copy_constructible<P> &&
+    (detail::is_linear_plant<P> ||
+     requires(
+         const P& plant, const typename P::State& x,
+         const LaneScalar<typename detail::PlantScalarOf<P>::type>& t,
+         const ScalarOrVector<typename detail::PlantScalarOf<P>::type, detail::inputs_of<P>()>& u) {
+       { P::states } -> std::convertible_to<int>;
+       { plant.derivative(t, x, u) } -> std::same_as<typename P::State>;
+       {
+         plant.output(t, x)
+         } -> std::convertible_to<
+             ScalarOrVector<typename detail::PlantScalarOf<P>::type, detail::outputs_of<P>()>>;
+     });
+
+/// A controller that fits a plant, the measurement and the reference in the controller's scalar.
+template <class C, class P>
+concept ControllerOf =
+    Controller<C,
+               ScalarOrVector<typename RunTypes<P, C>::ControllerScalar, RunTypes<P, C>::outputs>,
+               ScalarOrVector<typename RunTypes<P, C>::ControllerScalar, RunTypes<P, C>::inputs>>;
+
+/// Settings of `run`; all but `duration` may be left out.
+template <class P, class C>
+struct RunConfig {
+  using Types = RunTypes<P, C>;           ///< of the numbers
+  using Time = typename Types::Time;      ///< s
+  using Input = typename Types::Input;    ///< u
+  using Output = typename Types::Output;  ///< y
+
+  Time duration{};     ///< s, a whole multiple of the sample time
+  Time sample_time{};  ///< T, s; left out: that of the controller, which it must be if it has one
+
+  /// r, a number or a function of t: of a controller that takes them with derivatives, (r, r', ..)
+  RunSignal<typename Types::S, Types::references, Types::derivatives> reference{};
+
+  /// d, a number or a function of t, held over a step of integration. It comes in by E of a linear
+  /// plant, and beside u in others.
+  RunSignal<typename Types::S, Types::inputs> disturbance{};
+
+  Output noise{};  ///< of the measurement: standard deviation, normal, white
+  /// What the sensor makes of (t, y), noise in it: quantised, late, or NaN, that is missing.
+  std::function<Output(const Time&, const Output&)> sensor{};
+  Time missing{};  ///< share of the samples that get lost at random, 0 .. 1
+
+  /// Samples come early or late: each takes (1 + jitter r) T with r random in -1 .. 1; 0 .. 0.9
+  Time jitter{};
+  /// Or as the function says: s from sample k to the next, 0.1 T .. 10 T.
+  std::function<Time(std::int64_t)> step_time{};
+  std::uint64_t seed = 1;  ///< of noise, missing and jitter: equal seeds, equal runs
+
+  Time dead_time{};   ///< s that u takes to the plant, beside the plant's own dead time
+  int substeps = 1;   ///< steps of integration a sample; one is exact of a linear plant but for d
+  Time start_time{};  ///< t of the first sample, s
+  Input initial_input{};                               ///< u that was held before it
+  typename Types::State state = Types::State::Zero();  ///< x at the start
+};
+
+namespace detail {
+
+/// A part of a sample in which the input that arrives at the plant stands still.
+template <class Time>
+struct Stretch {
+  Time start;   ///< s from the sample on
+  Time length;  ///< s
+  int age;      ///< of the input, samples: 0 is the newest
+};
+
+/// The stretches of a sample of length `whole`: it is cut at the steps of integration and where,
+/// dead_time late, another input arrives. A cut within rounding of another one is the same.
+/// @param arrival (age) -> when the input of that age arrives, s from the sample on
+template <class Time, class Arrival>
+void cut_sample(std::vector<Stretch<Time>>& stretches, const Time& whole, int substeps,
+                const Arrival& arrival) {
+  const Time rounding = whole * std::max(Time(1e-9), 16 * std::numeric_limits<Time>::epsilon());
+  stretches.clear();
+  int age = 0;
+  while (arrival(age) > rounding) ++age;
+  Time from(0);
+  for (int i = 1; i <= substeps;) {
+    const Time grid =
+        i == substeps ? whole : whole * static_cast<Time>(i) / static_cast<Time>(substeps);
+    const bool another = age > 0 && arrival(age - 1) < grid - rounding;
+    const Time to = another ? arrival(age - 1) : grid;
+    if (to - from > rounding) {
+      stretches.push_back({from, to - from, age});
+      from = to;
+    }
+    if (!another) ++i;
+    if (i <= substeps && age > 0 && arrival(age - 1) <= to + rounding) --age;
+  }
+}
+
+/// The inputs that are on their way to the plant.
+template <class Input>
+class InputQueue {
+ public:
+  InputQueue(int length, const Input& before)
+      : inputs_(static_cast<std::size_t>(length) + 1, before) {}
+
+  void push(const Input& u) {
+    newest_ = newest_ + 1 == inputs_.size() ? 0 : newest_ + 1;
+    inputs_[newest_] = u;
+  }
+  /// @param age samples: 0 is the one pushed last
+  const Input& operator[](int age) const {
+    const auto back = static_cast<std::size_t>(age);
+    return inputs_[newest_ >= back ? newest_ - back : newest_ + inputs_.size() - back];
+  }
+
+ private:
+  std::vector<Input> inputs_;
+  std::size_t newest_ = 0;
+};
+
+/// An error in the scalar of time: of a pack that of its lane.
+template <class Time, class From>
+Error<Time> as_error(const Error<From>& error) {
+  return {error.field,
+          static_cast<Time>(esokit::detail::value_in_lane(error.value, error.lane)),
+          error.rule,
+          error.index,
+          static_cast<Time>(esokit::detail::value_in_lane(error.limit, error.lane)),
+          error.has_limit,
+          error.lane};
+}
+
+/// T, if it is one that the run can have.
+template <class P, class C>
+Expected<typename RunTypes<P, C>::Time, Error<typename RunTypes<P, C>::Time>> run_sample_time(
+    const C& controller, const RunConfig<P, C>& config) {
+  using Time = typename RunTypes<P, C>::Time;
+  Time given = config.sample_time;
+  Rules<Time> rules;
+  if constexpr (controller_traits<C>.knows_sample_time) {
+    const auto own = controller.sample_time();
+    using Own = std::remove_cvref_t<decltype(own)>;
+    using OwnTime = LaneScalar<Own>;
+    rules.not_negative("sample_time", given);
+    if (!rules) return rules.error();
+    if (!(given > Time(0))) given = static_cast<Time>(esokit::detail::number_of_lane(own, 0));
+    for (int i = 0; i < lane_count<Own>; ++i) {
+      const OwnTime in_lane = esokit::detail::number_of_lane(own, i);
+      const auto asked = static_cast<OwnTime>(given);
+      rules.require(!(asked < in_lane || asked > in_lane),
+                    {"sample_time", given, "must be that of the controller, which is", -1,
+                     static_cast<Time>(in_lane), true});
+    }
+  }
+  rules.positive("sample_time", given);
+  if (!rules) return rules.error();
+  return given;
+}
+
+/// The plant over one stretch.
+template <class P>
+class PlantStep {
+  using Time = LaneScalar<typename PlantScalarOf<P>::type>;
+
+ public:
+  static Expected<PlantStep, Error<Time>> make(const P& plant, const Time& length) {
+    return PlantStep(plant, length);
+  }
+
+  template <class Input, class Disturbance>
+  ESOKIT_INLINE typename P::State operator()(const Time& t, const typename P::State& x,
+                                             const Input& u, const Disturbance& d) const {
+    Input sum = u;
+    if constexpr (esokit::detail::vector_size<Input> == 0) {
+      sum = sum + d(0);
+    } else {
+      sum += d;
+    }
+    const auto rate = [&](const Time& time, const typename P::State& state) {
+      return plant_->derivative(time, state, sum);
+    };
+    return sim::step(rate, t, x, length_);
+  }
+
+ private:
+  PlantStep(const P& plant, const Time& length) : plant_(&plant), length_(length) {}
+
+  const P* plant_;
+  Time length_;
+};
+
+/// A linear plant: exact.
+template <int States, class S, int Inputs, int Outputs>
+class PlantStep<LinearPlant<States, S, Inputs, Outputs>> {
+  using P = LinearPlant<States, S, Inputs, Outputs>;
+  using Time = LaneScalar<S>;
+
+ public:
+  static Expected<PlantStep, Error<Time>> make(const P& plant, const Time& length) {
+    const auto held = held_plant(plant, S(length));
+    if (!held) return as_error<Time>(held.error());
+    return PlantStep(*held);
+  }
+
+  template <class Input>
+  ESOKIT_INLINE typename P::State operator()(const Time&, const typename P::State& x,
+                                             const Input& u, const Vector<S, Inputs>& d) const {
+    return held_.advanced(x, Vector<S, Inputs>(u), d);
+  }
+
+ private:
+  explicit PlantStep(const HeldPlant<States, S, Inputs>& held) : held_(held) {}
+
+  HeldPlant<States, S, Inputs> held_;
+};
+
+/// Noise, losses and jitter of a run, each with its own random numbers, so that one does not change
+/// the others.
+template <class P, class C>
+class RunChance {
+  using Types = RunTypes<P, C>;
+  using S = typename Types::S;
+  using Time = typename Types::Time;
+  using Output = typename Types::Output;
+
+ public:
+  explicit RunChance(const RunConfig<P, C>& config) : config_(config) {
+    bool noisy = false;
+    each_number(config.noise,
+                [&](const S& deviation) { noisy = noisy || !all(deviation <= S(0.0)); });
+    if (noisy) noise_.emplace(config.seed);
+    if (config.missing > Time(0)) losses_.emplace(config.seed + 1);
+    if (config.jitter > Time(0)) jitter_.emplace(config.seed + 2);
+  }
+
+  /// What the controller is given of y.
+  ESOKIT_INLINE Output measured(Time t, Output y) {
+    if (!noise_ && !losses_ && !config_.sensor) return y;
+    return disturbed(t, y);
+  }
+
+  /// From this sample to the next, s.
+  Time step_time(std::int64_t k, const Time& sample_time) {
+    if (config_.step_time) return config_.step_time(k);
+    const auto share = static_cast<Time>(2.0 * jitter_->uniform() - 1.0);
+    return sample_time * (Time(1) + config_.jitter * share);
+  }
+
+ private:
+  ESOKIT_COLD Output disturbed(Time t, Output y) {
+    Output measured = y;
+    if (noise_) {
+      Output noise = config_.noise;
+      each_number(noise, [&](S& deviation) {
+        for (int i = 0; i < lane_count<S>; ++i) {
+          esokit::detail::set_lane(
+              deviation,
+              esokit::detail::number_of_lane(deviation, i) * static_cast<Time>(noise_->next()), i);
+        }
+      });
+      measured = measured + noise;
+    }
+    if (config_.sensor) measured = config_.sensor(t, measured);
+    if (losses_) {
+      bool lost[static_cast<std::size_t>(lane_count<S>)];
+      for (bool& one : lost) one = losses_->uniform() < static_cast<double>(config_.missing);
+      each_number(measured, [&](S& number) {
+        for (int i = 0; i < lane_count<S>; ++i) {
+          if (lost[i]) esokit::detail::set_lane(number, std::numeric_limits<Time>::quiet_NaN(), i);
+        }
+      });
+    }
+    return measured;
+  }
+
+  const RunConfig<P, C>& config_;
+  std::optional<Gaussian> noise_, losses_, jitter_;
+};
+
+/// A run whose settings are checked.
+template <class P, class C>
+class Run {
+  using Types = RunTypes<P, C>;
+  using S = typename Types::S;
+  using Own = typename Types::ControllerScalar;
+  using Time = typename Types::Time;
+  using Input = typename Types::Input;
+  using Output = typename Types::Output;
+  using Reference = Vector<S, Types::references>;
+  using Outcome = Expected<RunEnd<P, C>, Error<Time>>;
+
+ public:
+  Run(const P& plant, const RunConfig<P, C>& config, Time sample_time, Time dead_time,
+      std::int64_t samples)
+      : plant_(plant),
+        config_(config),
+        sample_time_(sample_time),
+        dead_time_(dead_time),
+        samples_(samples),
+        even_(!config.step_time && !(config.jitter > Time(0))),
+        oldest_(static_cast<int>(std::ceil(dead_time / shortest())) + 1),
+        inputs_(oldest_, config.initial_input),
+        lengths_(even_ ? 0 : oldest_, sample_time),
+        chance_(config) {
+    if constexpr (is_linear_plant<P> && Types::outputs == 1) {
+      for (int i = 0; i < P::states; ++i) {
+        const S from_first = plant.c(i) - S(i == 0 ? 1.0 : 0.0);
+        first_ = first_ && all(esokit::detail::absolute(from_first) <= S(0.0));
+      }
+    }
+  }
+
+  template <class Callback>
+  Outcome operator()(const C& controller, Callback& on_sample) {
+    if (!even_) return drive<false, false>(controller, on_sample);
+    if (auto ok = cut(sample_time_); !ok) {
+      Error<Time> error = ok.error();
+      error.field = "sample_time";
+      return error;
+    }
+    if (steps_.size() > 1 || stretches_[0].age > 0)
+      return drive<true, false>(controller, on_sample);
+    return drive<true, true>(controller, on_sample);
+  }
+
+ private:
+  /// The shortest sample that there may be.
+  [[nodiscard]] Time shortest() const { return even_ ? sample_time_ : sample_time_ / Time(10); }
+
+  /// The stretches of a sample that takes so long.
+  Check<Time> cut(const Time& whole) {
+    cut_sample(stretches_, whole, config_.substeps, [&](int age) {
+      Time arrival = dead_time_;
+      if (even_) return arrival - static_cast<Time>(age) * sample_time_;
+      for (int i = 0; i < age; ++i) arrival -= lengths_[i];
+      return arrival;
+    });
+    steps_.clear();
+    for (const auto& stretch : stretches_) {
+      const auto step = PlantStep<P>::make(plant_, stretch.length);
+      if (!step) return step.error();
+      steps_.push_back(*step);
+    }
+    return {};
+  }
+
+  ESOKIT_INLINE Output output(const Time& t, const typename P::State& x) const {
+    if constexpr (is_linear_plant<P>) {
+      if constexpr (Types::outputs == 1) {
+        if (first_) return x(0);
+      }
+      return plant_.output(x);
+    } else {
+      return plant_.output(t, x);
+    }
+  }
+
+  /// Calls use(r), with derivatives where there are some.
+  template <class Use>
+  ESOKIT_INLINE void with(const Reference& reference, const Use& use) const {
+    if constexpr (Types::references == 1) {
+      use(in_scalar<Own>(reference(0)));
+    } else if constexpr (Types::derivatives) {
+      if (config_.reference.plain()) {
+        use(in_scalar<Own>(reference(0)));
+      } else {
+        use(in_scalar<Own>(reference));
+      }
+    } else {
+      use(in_scalar<Own>(reference));
+    }
+  }
+
+  /// @tparam Even all samples are as long @tparam Direct each is one stretch under its own u
+  template <bool Even, bool Direct, class Callback>
+  [[gnu::noinline]] Outcome drive(C controller, Callback& on_sample) {
+    constexpr bool channels = Types::references > 1 && !Types::derivatives;
+    // What is used in every sample is held here, where the compiler sees that nothing changes it.
+    auto x = config_.state;
+    Time t = config_.start_time;
+    Time passed = sample_time_;  // since the sample before
+    Reference reference = config_.reference(t);
+    const auto direct = [&] {
+      if constexpr (Direct) {
+        return steps_[0];
+      } else {
+        return nullptr;
+      }
+    }();
+    if constexpr (controller_traits<C>.two_phases) {
+      with(reference, [&](const auto& r) { controller.set_reference(r); });
+    }
+    for (std::int64_t k = 0;; ++k) {
+      const Output y = output(t, x);
+      const Output measurement = chance_.measured(t, y);
+      if constexpr (!Even && controller_traits<C>.varies_time) {
+        if (const auto ok = controller.set_step_time(Own(passed)); !ok) {
+          return as_error<Time>(ok.error());
+        }
+      }
+      Input u;
+      with(reference, [&](const auto& r) ESOKIT_INLINE_LAMBDA {
+        using Wanted = ScalarOrVector<Own, Types::inputs>;
+        u = in_scalar<S>(static_cast<Wanted>(
+            esokit::detail::command(controller, in_scalar<Own>(measurement), r)));
+      });
+      if (!finite_throughout(u)) [[unlikely]] {
+        return Error<Time>{"controller", t, "gave an input that is not finite at this time"};
+      }
+      Time end = config_.start_time + static_cast<Time>(k + 1) * sample_time_;
+      if constexpr (!Even) {
+        passed = chance_.step_time(k, sample_time_);
+        if (!is_finite(passed) || passed < shortest() || passed > sample_time_ * Time(10)) {
+          return Error<Time>{
+              "step_time", passed,       "must be 0.1 .. 10 times sample_time, which is",
+              -1,          sample_time_, true};
+        }
+        end = t + passed;
+      }
+      RunSample<P, C> sample{k, t, x, y, measurement, {}, u};
+      if constexpr (channels) {
+        sample.reference = reference;
+      } else {
+        sample.reference = reference(0);
+      }
+      reference = config_.reference(end);
+      if constexpr (controller_traits<C>.two_phases) {
+        with(reference, [&](const auto& r) { (void)controller.prepare(r); });
+      }
+      if (!keep_going(on_sample, std::as_const(sample), controller)) {
+        return RunEnd<P, C>{t, k + 1, x, std::move(controller), false};
+      }
+
+      bool good = true;
+      if constexpr (Direct) {
+        const auto d = config_.disturbance(t);
+        good = finite_throughout(d);
+        x = direct(t, x, u, d);
+      } else {
+        inputs_.push(u);
+        if constexpr (!Even) {
+          if (auto ok = cut(passed); !ok) return ok.error();
+          lengths_.push(passed);
+        }
+        for (std::size_t i = 0; i < stretches_.size(); ++i) {
+          const Time start = t + stretches_[i].start;
+          const auto d = config_.disturbance(start);
+          good = good && finite_throughout(d);
+          x = steps_[i](start, x, inputs_[stretches_[i].age], d);
+        }
+      }
+      if (!good) [[unlikely]] {
+        return Error<Time>{"disturbance", t, "is not finite in the sample at this time"};
+      }
+      if (!finite_throughout(x)) [[unlikely]] {
+        return Error<Time>{"plant", t,
+                           "has a state that is not finite after the sample at this time"};
+      }
+      t = end;
+      if (k + 1 == samples_) return RunEnd<P, C>{t, k + 1, x, std::move(controller), true};
+    }
+  }
+
+  const P& plant_;
+  const RunConfig<P, C>& config_;
+  Time sample_time_, dead_time_;
+  std::int64_t samples_;
+  bool even_;
+  int oldest_;  ///< age of an input, samples
+  bool first_ =
+      false;  ///< y is the first state of a linear plant, which then is not to be computed
+  InputQueue<Input> inputs_;
+  InputQueue<Time> lengths_;
+  RunChance<P, C> chance_;
+  std::vector<Stretch<Time>> stretches_;
+  std::vector<PlantStep<P>> steps_;  ///< one a stretch
+};
+
+}  // namespace detail
+
+/// Drives a plant by a controller as it is deployed: at each sample the controller is given the
+/// measurement and the reference, and the u that it returns is held until the next one.
+///
+///     auto run = sim::run(plant, controller, {.duration = 2.0, .reference = 1.0, .noise = 1e-3});
+///
+/// A linear plant is sampled exactly, others are integrated (Runge-Kutta of order 4, `substeps` a
+/// sample). All that switches does so between steps; the continuous simulation of papers is
+/// ContinuousLoop, and the two are never mixed.
+///
+/// The controller is a copy; it is left in what is returned. Its limits are its own: u is what it
+/// says.
+/// @param plant LinearPlant, nonlinear_plant(..), or a type with `derivative` and `output`
+/// @param controller any controller of esokit, or your own `u = controller(y, reference)`, a lambda
+///        for one; y is NaN where a measurement is missing
+/// @param on_sample called once a sample with a RunSample, after the controller, and with the
+///        controller itself if it takes a second argument (to retune it, say); false stops the run
+/// @return how it ended; or an error that names the field of the config, or `plant`, `controller`,
+///         `disturbance` or `sensor` with the time at which its number was not finite
+template <SampledPlant P, class C, class Callback>
+requires ControllerOf<C, P> Expected<RunEnd<P, C>, Error<typename RunTypes<P, C>::Time>> run(
+    const P& plant, C controller, const std::type_identity_t<RunConfig<P, C>>& config,
+    Callback&& on_sample) {
+  using Types = RunTypes<P, C>;
+  using S = typename Types::S;
+  using Time = typename Types::Time;
+  using Own = typename Types::ControllerScalar;
+
+  const auto sample_time = detail::run_sample_time<P, C>(controller, config);
+  if (!sample_time) return sample_time.error();
+  const Time T = *sample_time;
+  const auto coarser = std::max(static_cast<Time>(std::numeric_limits<LaneScalar<Own>>::epsilon()),
+                                std::numeric_limits<Time>::epsilon());
+  const auto samples = detail::whole_multiple(
+      "duration", config.duration, T, "must be a whole multiple of sample_time, which is", coarser);
+  if (!samples) return samples.error();
+  Rules<Time> rules;
+  const auto numbers_of = [&](const char* field, const auto& numbers, auto rule) {
+    int index = 0;
+    const bool several = esokit::detail::vector_size<std::remove_cvref_t<decltype(numbers)>> > 1;
+    detail::each_number(numbers, [&](const S& number) {
+      for (int i = 0; i < lane_count<S>; ++i) {
+        (rules.*rule)(field, esokit::detail::number_of_lane(number, i), several ? index : -1);
+      }
+      ++index;
+    });
+  };
+  using Rule = Rules<Time>& (Rules<Time>::*)(const char*, const Time&, int);
+  const Rule finite = &Rules<Time>::finite, not_negative = &Rules<Time>::not_negative;
+  if (config.reference.constant()) numbers_of("reference", config.reference(Time(0)), finite);
+  if (config.disturbance.constant()) numbers_of("disturbance", config.disturbance(Time(0)), finite);
+  numbers_of("noise", config.noise, not_negative);
+  rules.not_negative("missing", config.missing)
+      .require(!(config.missing > Time(1)), "missing", config.missing, "must not be above 1")
+      .not_negative("jitter", config.jitter)
+      .require(!(config.jitter > Time(0.9)), "jitter", config.jitter, "must not be above 0.9")
+      .not_negative("dead_time", config.dead_time)
+      .require(config.substeps >= 1 && config.substeps <= 1000000, "substeps",
+               static_cast<Time>(config.substeps), "must be 1 .. 1000000")
+      .finite("start_time", config.start_time);
+  numbers_of("initial_input", config.initial_input, finite);
+  numbers_of("state", config.state, finite);
+  Time dead_time = config.dead_time;
+  if constexpr (detail::is_linear_plant<P>) {
+    if (const auto ok = plant.check(); rules && !ok) {
+      return detail::as_error<Time>(ok.error());
+    }
+    const Time first = esokit::detail::number_of_lane(plant.dead_time, 0);
+    for (int i = 1; i < lane_count<S>; ++i) {
+      const Time other = esokit::detail::number_of_lane(plant.dead_time, i);
+      rules.require(!(other < first || other > first), "dead_time", other,
+                    "must be the same in all lanes");
+    }
+    dead_time += first;
+  }
+  const bool even = !(config.jitter > Time(0)) && !config.step_time;
+  const Time shortest = even ? T : T / Time(10);
+  rules.require(dead_time / shortest < Time(1e6), "dead_time", dead_time,
+                "must be below 1e6 samples (1e5 where they jitter)");
+  if (!rules) return rules.error();
+
+  detail::Run<P, C> driven(plant, config, T, dead_time, *samples);
+  return driven(controller, on_sample);
+}
+
+/// The same, recorded.
+template <SampledPlant P, class C>
+requires ControllerOf<C, P> Expected<Recording<P, C>, Error<typename RunTypes<P, C>::Time>> run(
+    const P& plant, C controller, const std::type_identity_t<RunConfig<P, C>>& config) {
+  RunRecord<P, C> record;
+  auto end = run(plant, std::move(controller), config,
+                 [&](const auto& sample, const C& now) { record.add(sample, now); });
+  if (!end) return end.error();
+  return Recording<P, C>{std::move(*end), std::move(record)};
+}
+
+}  // namespace esokit::sim

@@ -1,0 +1,97 @@
+/// @file
+/// What a run is given as a number or as a function of time: reference and disturbance.
+#pragma once
+
+#include <concepts>
+#include <esokit/core/lanes.hpp>
+#include <esokit/core/matrix.hpp>
+#include <esokit/sim/signal.hpp>
+#include <functional>
+#include <type_traits>
+#include <utility>
+
+namespace esokit::sim {
+
+namespace detail {
+
+/// What a function of time gives: a number, or a vector of at most so many.
+template <class Value, class ScalarType, int Count>
+concept SignalValue = std::convertible_to<Value, ScalarType> ||
+    (esokit::detail::vector_size<std::remove_cvref_t<Value>> >= 1 &&
+     esokit::detail::vector_size<std::remove_cvref_t<Value>> <= Count);
+
+}  // namespace detail
+
+/// A constant or a function of t (s), `Count` numbers.
+///
+/// With `Derivatives` they are (s, s', ..): a plain number stands for (s, 0, ..), a vector may be
+/// shorter, and a signal of sim that knows its derivatives gives them. Without, they are channels.
+template <Scalar ScalarType, int Count, bool Derivatives = false>
+class RunSignal {
+  template <class Value>
+  static constexpr bool fits = detail::SignalValue<Value, ScalarType, Count> &&
+                               (Derivatives || Count == 1 ||
+                                esokit::detail::vector_size<std::remove_cvref_t<Value>> == Count);
+
+ public:
+  using Time = LaneScalar<ScalarType>;      ///< t, s
+  using Value = Vector<ScalarType, Count>;  ///< what it gives
+
+  /// Zero.
+  RunSignal() = default;
+
+  /// A constant.
+  RunSignal(const ScalarType& value) requires(Derivatives || Count == 1) { constant_(0) = value; }
+  /// A constant.
+  RunSignal(const Value& value) requires(Count > 1) : constant_(value), plain_(false) {}
+
+  /// f(t).
+  template <class F>
+  requires std::invocable<const F&, Time> RunSignal(F f)
+      : plain_(std::convertible_to<std::invoke_result_t<const F&, Time>, ScalarType>) {
+    using Result = std::invoke_result_t<const F&, Time>;
+    static_assert(fits<Result>,
+                  "esokit: the function gives a number, or as many as there are channels, or no "
+                  "more derivatives than the controller takes");
+    if constexpr (Derivatives && Count > 1 && DifferentiableSignal<F, Time> &&
+                  std::same_as<ScalarType, Time>) {
+      plain_ = false;
+      function_ = [f = std::move(f)](const Time& t) {
+        const auto all = f.template derivatives<Count>(t);
+        Value value;
+        for (int i = 0; i < Count; ++i) value(i) = all[static_cast<std::size_t>(i)];
+        return value;
+      };
+    } else {
+      function_ = [f = std::move(f)](const Time& t) {
+        Value value;
+        if constexpr (std::convertible_to<Result, ScalarType>) {
+          value(0) = static_cast<ScalarType>(f(t));
+        } else {
+          const auto given = f(t);
+          for (int i = 0; i < esokit::detail::vector_size<std::remove_cvref_t<Result>>; ++i) {
+            value(i) = static_cast<ScalarType>(given(i));
+          }
+        }
+        return value;
+      };
+    }
+  }
+
+  /// Its numbers at t.
+  [[nodiscard]] Value operator()(const Time& t) const {
+    return function_ ? function_(t) : constant_;
+  }
+
+  /// True if it gives one number, whose derivatives, if any, count as zero.
+  [[nodiscard]] bool plain() const noexcept { return plain_; }
+  /// True if it is no function.
+  [[nodiscard]] bool constant() const noexcept { return !function_; }
+
+ private:
+  Value constant_{};
+  std::function<Value(const Time&)> function_;
+  bool plain_ = true;
+};
+
+}  // namespace esokit::sim
