@@ -26,6 +26,37 @@ template <PlainScalar S>
   return (std::abs)(a) > d ? -std::copysign(acceleration, a) : -acceleration * (a / d);
 }
 
+namespace detail {
+
+/// What differentiators tell of their state.
+template <PlainScalar S>
+class DifferentiatorState {
+ public:
+  /// r1, unit of the reference.
+  [[nodiscard]] S value() const noexcept { return r1_; }
+  /// r2 = r1', unit of the reference / s.
+  [[nodiscard]] S derivative() const noexcept { return r2_; }
+  /// (r1, r2).
+  [[nodiscard]] Vector<S, 2> state() const noexcept { return {r1_, r2_}; }
+
+  /// Starts anew at rest at `value`; false, and nothing changes, if it is not finite.
+  bool reset(S value = S(0)) noexcept { return move_to(value, S(0)); }
+
+ protected:
+  /// False, and nothing changes, if one of them is not finite.
+  bool move_to(S r1, S r2) noexcept {
+    if (!is_finite(r1) || !is_finite(r2)) return false;
+    r1_ = r1;
+    r2_ = r2;
+    return true;
+  }
+
+  S r1_ = S(0);
+  S r2_ = S(0);
+};
+
+}  // namespace detail
+
 /// Config of TrackingDifferentiator.
 template <Scalar S>
 struct TrackingDifferentiatorConfig {
@@ -44,7 +75,11 @@ struct TrackingDifferentiatorConfig {
 /// lets it, r2 = r1'. It is always ready to stop, so it stays r2^2 / (2R) behind a moving
 /// reference.
 template <Scalar S = double>
-class TrackingDifferentiator {
+class TrackingDifferentiator : public detail::DifferentiatorState<S> {
+  using State = detail::DifferentiatorState<S>;
+  using State::r1_;
+  using State::r2_;
+
  public:
   using Config = TrackingDifferentiatorConfig<S>;  ///< settings of make
 
@@ -70,28 +105,8 @@ class TrackingDifferentiator {
   /// One sample. False, and nothing changes, if the reference is not finite or too large.
   bool update(S reference) noexcept {
     const S step = sample_time_ * fhan(r1_ - reference, r2_, acceleration_, width_);
-    const S r1 = r1_ + sample_time_ * r2_;
-    const S r2 = r2_ + step;
     // An infinite reference would pass for a far one.
-    if (!is_finite(reference) || !is_finite(r1) || !is_finite(r2)) return false;
-    r1_ = r1;
-    r2_ = r2;
-    return true;
-  }
-
-  /// r1, unit of the reference.
-  [[nodiscard]] S value() const noexcept { return r1_; }
-  /// r2 = r1', unit of the reference / s.
-  [[nodiscard]] S derivative() const noexcept { return r2_; }
-  /// (r1, r2).
-  [[nodiscard]] Vector<S, 2> state() const noexcept { return {r1_, r2_}; }
-
-  /// Starts anew at rest at `value`; false, and nothing changes, if it is not finite.
-  bool reset(S value = S(0)) noexcept {
-    if (!is_finite(value)) return false;
-    r1_ = value;
-    r2_ = S(0);
-    return true;
+    return is_finite(reference) && State::move_to(r1_ + sample_time_ * r2_, r2_ + step);
   }
 
  private:
@@ -103,8 +118,6 @@ class TrackingDifferentiator {
   S acceleration_;
   S sample_time_;
   S width_;
-  S r1_ = S(0);
-  S r2_ = S(0);
 };
 
 /// The same of packs, lane by lane: half of its time is a root.
@@ -135,7 +148,11 @@ struct SignTrackingDifferentiatorConfig {
 /// the papers write. As an ODE for simulation, and sampled with the sign held over a sample;
 /// sampled it chatters about the reference by R h in r2, so prefer TrackingDifferentiator.
 template <Scalar S = double>
-class SignTrackingDifferentiator {
+class SignTrackingDifferentiator : public detail::DifferentiatorState<S> {
+  using State = detail::DifferentiatorState<S>;
+  using State::r1_;
+  using State::r2_;
+
  public:
   using Config = SignTrackingDifferentiatorConfig<S>;  ///< settings of make
 
@@ -159,27 +176,7 @@ class SignTrackingDifferentiator {
   bool update(S reference) noexcept {
     const S a = acceleration(r1_, r2_, reference);
     const S h = config_.sample_time;
-    const S r1 = r1_ + h * (r2_ + S(0.5) * h * a);
-    const S r2 = r2_ + h * a;
-    if (!is_finite(reference) || !is_finite(r1) || !is_finite(r2)) return false;
-    r1_ = r1;
-    r2_ = r2;
-    return true;
-  }
-
-  /// r1, unit of the reference.
-  [[nodiscard]] S value() const noexcept { return r1_; }
-  /// r2 = r1', unit of the reference / s.
-  [[nodiscard]] S derivative() const noexcept { return r2_; }
-  /// (r1, r2).
-  [[nodiscard]] Vector<S, 2> state() const noexcept { return {r1_, r2_}; }
-
-  /// Starts anew at rest at `value`; false, and nothing changes, if it is not finite.
-  bool reset(S value = S(0)) noexcept {
-    if (!is_finite(value)) return false;
-    r1_ = value;
-    r2_ = S(0);
-    return true;
+    return is_finite(reference) && State::move_to(r1_ + h * (r2_ + S(0.5) * h * a), r2_ + h * a);
   }
 
  private:
@@ -192,8 +189,6 @@ class SignTrackingDifferentiator {
   }
 
   Config config_;
-  S r1_ = S(0);
-  S r2_ = S(0);
 };
 
 /// The same of packs, lane by lane.
