@@ -75,6 +75,7 @@
 #include <esokit/gain/half_gain.hpp>
 #include <esokit/gain/model_gain.hpp>
 #include <esokit/gain/model_placement.hpp>
+#include <esokit/gain/noise_settings.hpp>
 #include <esokit/gain/nonlinear_gain.hpp>
 #include <esokit/gain/nonlinear_gain_design.hpp>
 #include <esokit/gain/placement.hpp>

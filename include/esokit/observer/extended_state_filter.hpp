@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/constant_gain.hpp>
+#include <esokit/gain/noise_settings.hpp>
 #include <esokit/gain/riccati_gain.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
 #include <optional>
@@ -390,14 +391,7 @@ class ExtendedStateFilter
 
   static Check<S> check_rule(const Config& config) {
     Rules<S> rules;
-    if (config.inflation_rule == InflationRule::fixed) {
-      rules.require(all(is_finite(config.inflation)) && all(config.inflation > S(0.0)), "inflation",
-                    config.inflation,
-                    "must be finite and positive; the plain Kalman filter is InflationRule::none");
-    } else {
-      rules.left_out("inflation", config.inflation,
-                     "must be left out unless inflation_rule is fixed");
-    }
+    rules.all_of(detail::check_inflation<S>(config));
     if (config.inflation_rule == InflationRule::adaptive) {
       rules.positive("trace_weights", config.trace_weights);
     }
@@ -425,84 +419,20 @@ class ExtendedStateFilter
     return units;
   }
 
-  static Covariance scaled(const Covariance& p, const Array<S, N>& units) {
-    Covariance result;
-    for (int i = 0; i < N; ++i) {
-      for (int j = 0; j < N; ++j) {
-        S& state = result(PlantModel::state_of_row(i), PlantModel::state_of_row(j));
-        state = (p(i, j) * units[index(i)]) * units[index(j)];
-      }
-    }
-    return result;
-  }
-
-  /// Finite, symmetric, no negative variance.
-  static Check<S> check_covariance(const char* field, const Covariance& p) {
-    Rules<S> rules;
-    for (int i = 0; i < N; ++i) {
-      for (int j = 0; j < N; ++j) rules.finite(field, p(i, j), i * N + j);
-      rules.require(all(p(i, i) >= S(0.0)), field, p(i, i), "must be positive semidefinite",
-                    i * N + i);
-    }
-    for (int i = 0; i < N; ++i) {
-      for (int j = 0; j < i; ++j) {
-        const S difference = detail::absolute(S(p(i, j) - p(j, i)));
-        const S bound = S(8.0) * detail::rounding<S>() * detail::absolute(p(i, j));
-        rules.require(all(difference <= bound), field, p(i, j), "must be symmetric", i * N + j);
-      }
-    }
-    return rules;
-  }
-
-  static Expected<CovarianceFactor<N, S>, Error<S>> factored(const char* field, const Covariance& p,
-                                                             const Array<S, N>& units) {
-    const Covariance q = scaled(p, units);
-    for (int row = 0; row < N; ++row) {
-      if (!all(p(row, row) > S(0.0))) continue;
-      const int i = PlantModel::state_of_row(row);
-      // Far enough from both ends for what the recursion makes of it.
-      const S least = detail::smallest_normal<S>() / detail::rounding<S>();
-      if (!all(is_finite(q(i, i))) || !all(q(i, i) > least) ||
-          !all(q(i, i) < detail::largest_variance<S>())) {
-        return Error<S>{field, p(row, row),
-                        "in the scaling T^2r / r!^2 and divided by R is a variance that the scalar "
-                        "cannot hold",
-                        row * N + row};
-      }
-    }
-    const auto factor = CovarianceFactor<N, S>::from_matrix(q);
-    if (!factor) {
-      return Error<S>{field, p(N - 1, N - 1), "must be positive semidefinite", N * N - 1};
-    }
-    return *factor;
-  }
-
   static Expected<RiccatiSettings<N, S>, Error<S>> law_settings(const Config& config,
                                                                 const PlantModel& plant) {
     using std::sqrt;
     const S& r = config.measurement_variance;
     Rules<S> rules;
     rules.not_negative("measurement_variance", r)
-        .all_of(check_covariance("initial_covariance", config.initial_covariance));
+        .all_of(detail::check_covariance("initial_covariance", config.initial_covariance, true));
     Covariance q = Covariance::Zero();
     if (config.process_covariance) {
       q = *config.process_covariance;
-      rules.all_of(check_covariance("process_covariance", q));
+      rules.all_of(detail::check_covariance("process_covariance", q, true));
     }
-    rules.positive("bound_factor", config.bound_factor);
-    for (int i = 0; i < N; ++i) {
-      const S& bound = config.disturbance_bounds[index(i)];
-      rules.not_negative("disturbance_bounds", bound, i);
-      if (!all(bound > S(0.0))) continue;
-      // With a model the change left over is the difference of two within the bound.
-      const S whole = has_model && i == Order ? S(bound + bound) : bound;
-      q(i, i) = config.bound_factor * whole * whole;
-      rules
-          .require(!config.process_covariance, "disturbance_bounds", bound,
-                   "must be left out where process_covariance is given", i)
-          .require(detail::normal(q(i, i)), "disturbance_bounds", bound,
-                   "has a square that the scalar cannot hold", i);
-    }
+    // With a model the change left over is the difference of two within the bound.
+    rules.all_of(detail::add_bounds(config, q, has_model ? Order : -1));
     const S& change = config.disturbance_bounds[Order];
     rules.require(!has_model || all(change > S(0.0)), "disturbance_bounds", change,
                   "must say by how much the model may change the disturbance in a sample", Order);
@@ -528,9 +458,15 @@ class ExtendedStateFilter
         .all_of(check_way_back(config, q));
     if (!rules) return rules.error();
     const Array<S, N> units = scaled_units(plant, S(sqrt(unit)));
-    const auto start = factored("initial_covariance", config.initial_covariance, units);
+    const auto factored = [&units](const char* field, const Covariance& p) {
+      return detail::factored<N, S>(
+          field, p, units.data(),
+          "in the scaling T^2r / r!^2 and divided by R is a variance that the scalar cannot hold",
+          "must be positive semidefinite", N * N - 1);
+    };
+    const auto start = factored("initial_covariance", config.initial_covariance);
     if (!start) return start.error();
-    const auto noise = factored(noise_field(config), q, units);
+    const auto noise = factored(detail::noise_field(config), q);
     if (!noise) return noise.error();
     if (auto ok = check_alternating(config, *noise, unit, plant); !ok) return ok.error();
     return RiccatiSettings<N, S>{.start = *start,
@@ -542,9 +478,6 @@ class ExtendedStateFilter
                                  .trace_weights = config.trace_weights};
   }
 
-  static const char* noise_field(const Config& config) noexcept {
-    return config.process_covariance ? "process_covariance" : "disturbance_bounds";
-  }
   static int place_of_highest(const Config& config) noexcept {
     return config.process_covariance ? N * N - 1 : N - 1;
   }
@@ -557,7 +490,7 @@ class ExtendedStateFilter
     if (model_traits<PlantModel>.corrects_part) return {};
     if (config.allow_vanishing_gain || all(highest > S(0.0))) return {};
     if (config.inflation_rule == InflationRule::none) {
-      return Error<S>{noise_field(config), highest,
+      return Error<S>{detail::noise_field(config), highest,
                       "must disturb the highest state: without inflation its gain tends to zero "
                       "(allow_vanishing_gain asks for it)",
                       place_of_highest(config)};
@@ -580,17 +513,11 @@ class ExtendedStateFilter
     const S least = least_measurement_variance<N, S>(noise, detail::transition_of<S>(plant));
     const S& r = config.measurement_variance;
     if (all(r / unit >= least)) return {};
-    return Error<S>{"measurement_variance",
-                    r,
-                    "leaves an error that changes sign at every sample undamped: give y' a bound, "
-                    "or y a variance of at least",
-                    -1,
-                    S(least * unit),
-                    true};
+    return detail::alternating("measurement_variance", r, -1, S(least * unit));
   }
 
   static Check<S> freeze(Law& law, const Config& config) {
-    const char* field = noise_field(config);
+    const char* field = detail::noise_field(config);
     const S highest = config.process_covariance ? (*config.process_covariance)(N - 1, N - 1)
                                                 : config.disturbance_bounds[N - 1];
     if (config.mode == RiccatiMode::start_table && TableSize == 0) {

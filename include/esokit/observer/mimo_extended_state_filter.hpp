@@ -6,6 +6,7 @@
 #include <cmath>
 #include <esokit/core/lane_by_lane.hpp>
 #include <esokit/gain/covariance_factor.hpp>
+#include <esokit/gain/noise_settings.hpp>
 #include <esokit/gain/riccati.hpp>
 #include <esokit/gain/riccati_gain.hpp>
 #include <esokit/gain/step_status.hpp>
@@ -92,56 +93,39 @@ class MimoExtendedStateFilter {
   /// @return the filter at rest in zero, or an error that names the field
   static Expected<MimoExtendedStateFilter, Error<S>> make(const Config& config) {
     Rules<S> rules;
-    if (!rules.all_of(check(config))) return rules.error();
-    Covariance noise = Covariance::Zero();
-    if (config.process_covariance) {
-      noise = *config.process_covariance;
-    } else {
-      for (int i = 0; i < size; ++i) {
-        const S bound = config.disturbance_bounds[index(i)];
-        if (!(bound > S(0))) continue;
-        noise(i, i) = config.bound_factor * bound * bound;
-        if (!detail::normal(noise(i, i))) {
-          return Error<S>{"disturbance_bounds", bound, "has a square that the scalar cannot hold",
-                          i};
-        }
-      }
-    }
+    Covariance noise = config.process_covariance.value_or(Covariance::Zero());
+    rules.all_of(check(config)).all_of(detail::add_bounds(config, noise));
+    if (!rules) return rules.error();
     if (config.inflation_rule == InflationRule::fixed) {
       noise = noise * ((S(1) + config.inflation) / config.inflation);
     }
     MimoExtendedStateFilter filter(config, noise);
     const auto factored = [&](const char* field, const Covariance& p, Factor& factor) -> Check<S> {
-      const Covariance q = scaled(p, filter.root_units_);
-      for (int i = 0; i < size; ++i) {
-        if (p(i, i) > S(0) && !is_held(q(i, i))) return not_held(field, p(i, i), i * size + i);
-      }
-      const auto made = Factor::from_matrix(q);
-      if (!made) {
-        return Error<S>{field, p(size - 1, size - 1), "must be finite and positive semidefinite"};
-      }
+      const auto made = detail::factored<size, S>(field, p, filter.root_units_.data(), not_held,
+                                                  not_semidefinite, -1);
+      if (!made) return made.error();
       factor = *made;
       return {};
     };
     rules.all_of(factored("initial_covariance", config.initial_covariance, filter.start_))
-        .all_of(factored(noise_field(config), noise, filter.noise_));
+        .all_of(factored(detail::noise_field(config), noise, filter.noise_));
     const OutputCovariance measured = config.measurement_covariance / filter.unit_;
     for (int i = 0; i < outputs; ++i) {
-      rules.require(
-          !(measured(i, i) > S(0)) || is_held(measured(i, i)),
-          not_held("measurement_covariance", config.measurement_covariance(i, i), i * outputs + i));
+      rules.require(!(measured(i, i) > S(0)) || detail::is_held(measured(i, i)),
+                    "measurement_covariance", config.measurement_covariance(i, i), not_held,
+                    i * outputs + i);
     }
     if (!rules) return rules.error();
     const auto measurement = CovarianceFactor<outputs, S>::from_matrix(measured);
     if (!measurement) {
       return Error<S>{"measurement_covariance", config.measurement_covariance(0, 0),
-                      "must be finite and positive semidefinite"};
+                      not_semidefinite};
     }
     filter.measurement_ = *measurement;
     if (auto ok = filter.check_way_back(config, noise); !ok) return ok.error();
     if (config.mode == RiccatiMode::frozen) {
       if (!filter.freeze(noise)) {
-        return Error<S>{noise_field(config), noise(size - 1, size - 1),
+        return Error<S>{detail::noise_field(config), noise(size - 1, size - 1),
                         "gives no limit gain; without inflation every highest state must be "
                         "disturbed"};
       }
@@ -331,7 +315,7 @@ class MimoExtendedStateFilter {
           Covariance::Zero(), spread, gain_, S(1));
       p = detail::plus_product_transposed<size, size, size, S>(noise, rest * p, rest, S(1));
     }
-    p = scaled(p, inverse(root_units_));
+    p = detail::in_units(p, inverse(root_units_).data());
     for (int i = 0; i < p.size(); ++i) p.data()[i] = detail::clipped(p.data()[i]);
     return p;
   }
@@ -402,21 +386,11 @@ class MimoExtendedStateFilter {
     root_units_ = units_ / std::sqrt(unit_);
   }
 
-  static const char* noise_field(const Config& config) noexcept {
-    return config.process_covariance ? "process_covariance" : "disturbance_bounds";
-  }
-
-  /// Far enough from both ends for what the recursion makes of it.
-  static bool is_held(const S& variance) noexcept {
-    return is_finite(variance) && variance > detail::smallest_normal<S>() / detail::rounding<S>() &&
-           variance < detail::largest_variance<S>();
-  }
-  static Error<S> not_held(const char* field, const S& value, int place) {
-    return Error<S>{field, value,
-                    "in the scaling T^2r / r!^2 and divided by the largest R is a variance that "
-                    "the scalar cannot hold",
-                    place};
-  }
+  static constexpr const char* not_held =
+      "in the scaling T^2r / r!^2 and divided by the largest R is a variance that the scalar "
+      "cannot "
+      "hold";
+  static constexpr const char* not_semidefinite = "must be finite and positive semidefinite";
 
   /// Chain by chain: as in ExtendedStateFilter.
   Check<S> check_way_back(const Config& config, const Covariance& noise) const {
@@ -437,7 +411,7 @@ class MimoExtendedStateFilter {
       const int last = end(chain) - 1;
       if (noise(last, last) > S(0)) continue;
       if (none) {
-        return Error<S>{noise_field(config), noise(last, last),
+        return Error<S>{detail::noise_field(config), noise(last, last),
                         "must disturb the highest state of every chain: without inflation its gain "
                         "tends to zero (allow_vanishing_gain asks for it)",
                         config.process_covariance ? last * size + last : last};
@@ -463,13 +437,8 @@ class MimoExtendedStateFilter {
           least_measurement_variance<length, S>(CovarianceFactor<length, S>::nearest(own));
       const S& r = config.measurement_covariance(int{chain}, int{chain});
       if (!ok || r / unit_ >= least) return;
-      ok = Error<S>{"measurement_covariance",
-                    r,
-                    "leaves an error that changes sign at every sample undamped: give y' a bound, "
-                    "or y a variance of at least",
-                    int{chain} * outputs + int{chain},
-                    S(least * unit_),
-                    true};
+      ok = detail::alternating("measurement_covariance", r, int{chain} * outputs + int{chain},
+                               S(least * unit_));
     });
     return ok;
   }
@@ -548,34 +517,8 @@ class MimoExtendedStateFilter {
     return StepStatus::restarted;
   }
 
-  static Covariance scaled(const Covariance& p, const Estimate& units) noexcept {
-    Covariance q;
-    for (int i = 0; i < size; ++i) {
-      for (int j = 0; j <= i; ++j) {
-        q(i, j) = (p(i, j) * units(i)) * units(j);
-        q(j, i) = q(i, j);
-      }
-    }
-    return q;
-  }
-
   static bool positive(const OutputCovariance& r) noexcept {
     return detail::solve_positive<outputs, 1, S>(r, Output::Zero()).has_value();
-  }
-
-  template <class Square>
-  static Check<S> check_symmetric(const char* field, const Square& p) {
-    Rules<S> rules;
-    for (int i = 0; i < p.rows(); ++i) {
-      for (int j = 0; j <= i; ++j) {
-        const int place = i * static_cast<int>(p.cols()) + j;
-        const S difference = detail::absolute(S(p(i, j) - p(j, i)));
-        const S bound = S(8) * detail::rounding<S>() * detail::absolute(p(i, j));
-        rules.finite(field, p(i, j), place)
-            .require(difference <= bound, field, p(i, j), "must be symmetric", place);
-      }
-    }
-    return rules;
   }
 
   static Check<S> check(const Config& config) {
@@ -608,29 +551,17 @@ class MimoExtendedStateFilter {
                  "must not be zero")
         .require(config.inflation_rule != InflationRule::adaptive, "inflation_rule", S(0),
                  "must be fixed or none for several chains");
-    if (config.inflation_rule == InflationRule::fixed) {
-      rules.require(is_finite(config.inflation) && config.inflation > S(0), "inflation",
-                    config.inflation,
-                    "must be finite and positive; the plain Kalman filter is InflationRule::none");
-    } else {
-      rules.left_out("inflation", config.inflation,
-                     "must be left out unless inflation_rule is fixed");
-    }
-    rules
+    rules.all_of(detail::check_inflation<S>(config))
         .require(config.mode != RiccatiMode::start_table, "mode", S(0),
-                 "must be recursive or frozen for several chains")
-        .positive("bound_factor", config.bound_factor);
-    for (int i = 0; i < size; ++i) {
-      const S& bound = config.disturbance_bounds[index(i)];
-      rules.not_negative("disturbance_bounds", bound, i)
-          .require(!(bound > S(0) && config.process_covariance), "disturbance_bounds", bound,
-                   "must be left out where process_covariance is given", i);
-    }
-    rules.all_of(check_symmetric("measurement_covariance", config.measurement_covariance));
+                 "must be recursive or frozen for several chains");
+    rules.all_of(
+        detail::check_covariance("measurement_covariance", config.measurement_covariance, false));
     if (config.process_covariance) {
-      rules.all_of(check_symmetric("process_covariance", *config.process_covariance));
+      rules.all_of(
+          detail::check_covariance("process_covariance", *config.process_covariance, false));
     }
-    return rules.all_of(check_symmetric("initial_covariance", config.initial_covariance));
+    return rules.all_of(
+        detail::check_covariance("initial_covariance", config.initial_covariance, false));
   }
 
   /// Phi x + Gamma u: every chain ahead by Pascal's triangle, as sums of neighbours.
@@ -761,7 +692,7 @@ class MimoExtendedStateFilter {
   bool freeze(const Covariance& noise) {
     RiccatiModel<size, outputs, S> model;
     model.transition = transition();
-    model.noise = scaled(noise, root_units_);
+    model.noise = detail::in_units(noise, root_units_.data());
     model.measurement = measurement_.matrix() / growth_;
     model.inflation = growth_;
     Gain start = Gain::Zero();
