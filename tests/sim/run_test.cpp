@@ -207,394 +207,387 @@ TEST(Run, OfAFloatControllerComputesInFloat) {
                    .limits = {.lower = -2, .upper = 2}})
           .value();
   auto hand = controller;
-  EXPECT_EQ(
-      by_run(controller),
-      by_hand([&](int, double y,
-                  double r) {
-    return double { hand.update(static_cast<float>(y), static_cast<float>(r)); },
-              500));
-    // The controller's own T, which is not the double's.
-    EXPECT_EQ(sim::run(servo(), controller, {.duration = 1.0})->samples, 500);
+  const auto narrow = [&](int, double y, double r) -> double {
+    const float u = hand.update(static_cast<float>(y), static_cast<float>(r));
+    return static_cast<double>(u);
+  };
+  EXPECT_EQ(by_run(controller), by_hand(narrow, 500));
+  // The controller's own T, which is not the double's.
+  EXPECT_EQ(sim::run(servo(), controller, {.duration = 1.0})->samples, 500);
 }
 
 // ---- nonlinear plants ----
 
 TEST(Run, IntegratesANonlinearPlantWithOrderFour) {
-    // A stiff linear plant as a function: the exact run is the reference.
-    const auto plant = LinearPlant<2>::transfer_function(
-        {.numerator = {5000}, .denominator = {5000, 20}, .dead_time = 0.004});
-    const auto function = sim::nonlinear_plant<2>([](double, const State& x, double u) {
-      return State{x(1), -5000 * x(0) - 20 * x(1) + 5000 * u};
-    });
-    const auto law = [](double y, double r) { return r - 0.3 * y; };
-    const auto exact = sim::run(
-        *plant, law,
-        {.duration = 0.2, .sample_time = 0.01, .reference = step, .disturbance = [](double t) {
-           return 3 * step(t);
-         }});
-    double before = 0;
-    for (const int substeps : {2, 4, 8}) {
-      const auto run = sim::run(function, law,
-                                {.duration = 0.2,
-                                 .sample_time = 0.01,
-                                 .reference = step,
-                                 .disturbance = [](double t) { return 3 * step(t); },
-                                 .dead_time = 0.004,
-                                 .substeps = substeps});
-      const double error = std::abs(run->state(0) - exact->state(0));
-      if (before > 0) {
-        EXPECT_NEAR(before / error, 16.0, 4.0) << substeps;
-      }
-      EXPECT_LT(error, 0.02);
-      before = error;
+  // A stiff linear plant as a function: the exact run is the reference.
+  const auto plant = LinearPlant<2>::transfer_function(
+      {.numerator = {5000}, .denominator = {5000, 20}, .dead_time = 0.004});
+  const auto function = sim::nonlinear_plant<2>([](double, const State& x, double u) {
+    return State{x(1), -5000 * x(0) - 20 * x(1) + 5000 * u};
+  });
+  const auto law = [](double y, double r) { return r - 0.3 * y; };
+  const auto exact = sim::run(
+      *plant, law,
+      {.duration = 0.2, .sample_time = 0.01, .reference = step, .disturbance = [](double t) {
+         return 3 * step(t);
+       }});
+  double before = 0;
+  for (const int substeps : {2, 4, 8}) {
+    const auto run = sim::run(function, law,
+                              {.duration = 0.2,
+                               .sample_time = 0.01,
+                               .reference = step,
+                               .disturbance = [](double t) { return 3 * step(t); },
+                               .dead_time = 0.004,
+                               .substeps = substeps});
+    const double error = std::abs(run->state(0) - exact->state(0));
+    if (before > 0) {
+      EXPECT_NEAR(before / error, 16.0, 4.0) << substeps;
     }
+    EXPECT_LT(error, 0.02);
+    before = error;
+  }
 }
 
 /// A plant of the continuous simulation, with states of Eigen's.
 struct Pendulum {
-    static constexpr int states = 2;
-    using State = EigenMatrix<double, 2>;
-    State derivative(double, const State& x, double u) const {
-      return State(x(1), -9.81 * std::sin(x(0)) + u);
-    }
-    double output(double, const State& x) const { return x(0); }
+  static constexpr int states = 2;
+  using State = EigenMatrix<double, 2>;
+  State derivative(double, const State& x, double u) const {
+    return State(x(1), -9.81 * std::sin(x(0)) + u);
+  }
+  double output(double, const State& x) const { return x(0); }
 };
 
 TEST(Run, TakesAPlantOfTheContinuousSimulationAndOneWithTwoInputs) {
-    const auto law = [](double y, double r) { return 30 * (r - y); };
-    const auto function = sim::nonlinear_plant<2>([](double, const State& x, double u) {
-      return State{x(1), -9.81 * std::sin(x(0)) + u};
-    });
-    const auto twice = sim::nonlinear_plant<2, double, 2, 2>(
-        [](double, const State& x, const Pair& u) {
-          return State{x(1), -9.81 * std::sin(x(0)) + u(0) - u(1)};
-        },
-        [](double, const State& x) { return x; });
-    const auto split = [](const Pair& y, const Pair& r) { return Pair{30 * r(0), 30 * y(0)}; };
-    const auto one =
-        sim::run(Pendulum{}, law, {.duration = 0.5, .sample_time = 0.01, .reference = 1});
-    const auto two =
-        sim::run(function, law, {.duration = 0.5, .sample_time = 0.01, .reference = 1});
-    const auto three =
-        sim::run(twice, split, {.duration = 0.5, .sample_time = 0.01, .reference = Pair{1, 0}});
-    EXPECT_EQ(one->output, two->output);
-    for (std::size_t k = 0; k < 50; ++k) EXPECT_NEAR(three->output[0][k], two->output[k], 1e-13);
-    EXPECT_GT(one->output.back(), 0.5);
+  const auto law = [](double y, double r) { return 30 * (r - y); };
+  const auto function = sim::nonlinear_plant<2>([](double, const State& x, double u) {
+    return State{x(1), -9.81 * std::sin(x(0)) + u};
+  });
+  const auto twice = sim::nonlinear_plant<2, double, 2, 2>(
+      [](double, const State& x, const Pair& u) {
+        return State{x(1), -9.81 * std::sin(x(0)) + u(0) - u(1)};
+      },
+      [](double, const State& x) { return x; });
+  const auto split = [](const Pair& y, const Pair& r) { return Pair{30 * r(0), 30 * y(0)}; };
+  const auto one =
+      sim::run(Pendulum{}, law, {.duration = 0.5, .sample_time = 0.01, .reference = 1});
+  const auto two = sim::run(function, law, {.duration = 0.5, .sample_time = 0.01, .reference = 1});
+  const auto three =
+      sim::run(twice, split, {.duration = 0.5, .sample_time = 0.01, .reference = Pair{1, 0}});
+  EXPECT_EQ(one->output, two->output);
+  for (std::size_t k = 0; k < 50; ++k) EXPECT_NEAR(three->output[0][k], two->output[k], 1e-13);
+  EXPECT_GT(one->output.back(), 0.5);
 }
 
 // ---- dead time ----
 
 TEST(Run, DelaysTheInputByWholeSamplesAndParts) {
-    for (const double late : {0.0, 0.3, 1.0, 2.0, 2.7}) {
-      // The last inputs, newest first; the oldest acts until its successor arrives.
-      const auto recorded = sim::run(
-          servo(late * T), adrc(),
-          {.duration = 200 * T, .reference = 1.0, .disturbance = -30.0, .initial_input = 0.5});
-      auto hand = adrc();
-      std::vector<double> u(5, 0.5);
-      State x;
-      const int whole = static_cast<int>(late);
-      const double part = late - whole;
+  for (const double late : {0.0, 0.3, 1.0, 2.0, 2.7}) {
+    // The last inputs, newest first; the oldest acts until its successor arrives.
+    const auto recorded = sim::run(
+        servo(late * T), adrc(),
+        {.duration = 200 * T, .reference = 1.0, .disturbance = -30.0, .initial_input = 0.5});
+    auto hand = adrc();
+    std::vector<double> u(5, 0.5);
+    State x;
+    const int whole = static_cast<int>(late);
+    const double part = late - whole;
+    for (std::size_t k = 0; k < 200; ++k) {
+      ASSERT_NEAR(recorded->output[k], x(0), 1e-12) << late << " " << k;
+      u.insert(u.begin(), hand.update(x(0), 1.0));
+      if (part > 0) x = advance(x, u[static_cast<std::size_t>(whole + 1)], -30.0, part * T);
+      x = advance(x, u[static_cast<std::size_t>(whole)], -30.0, (1 - part) * T);
+    }
+    // Of the config it is the same, and both add up.
+    for (const double share : {0.0, 0.4}) {
+      const auto other = sim::run(servo(share * late * T), adrc(),
+                                  {.duration = 200 * T,
+                                   .reference = 1.0,
+                                   .disturbance = -30.0,
+                                   .dead_time = (1 - share) * late * T,
+                                   .substeps = 3,
+                                   .initial_input = 0.5});
       for (std::size_t k = 0; k < 200; ++k) {
-        ASSERT_NEAR(recorded->output[k], x(0), 1e-12) << late << " " << k;
-        u.insert(u.begin(), hand.update(x(0), 1.0));
-        if (part > 0) x = advance(x, u[static_cast<std::size_t>(whole + 1)], -30.0, part * T);
-        x = advance(x, u[static_cast<std::size_t>(whole)], -30.0, (1 - part) * T);
-      }
-      // Of the config it is the same, and both add up.
-      for (const double share : {0.0, 0.4}) {
-        const auto other = sim::run(servo(share * late * T), adrc(),
-                                    {.duration = 200 * T,
-                                     .reference = 1.0,
-                                     .disturbance = -30.0,
-                                     .dead_time = (1 - share) * late * T,
-                                     .substeps = 3,
-                                     .initial_input = 0.5});
-        for (std::size_t k = 0; k < 200; ++k) {
-          ASSERT_NEAR(recorded->output[k], other->output[k], 1e-12);
-        }
+        ASSERT_NEAR(recorded->output[k], other->output[k], 1e-12);
       }
     }
+  }
 }
 
 // ---- noise, gaps, jitter ----
 
 TEST(Run, LosesSamplesAsTheSensorSays) {
-    const auto sensor = [](double t, double y) {
-      return t > 0.6 && t < 0.7 ? not_a_number : y + 1e-3;
-    };
-    std::vector<LoopMode> modes;
-    const auto end = sim::run(
-        servo(), adrc(),
-        {.duration = 1.0, .reference = step, .disturbance = load, .sensor = sensor},
-        [&](const auto&, const Adrc<Eso>& controller) { modes.push_back(controller.mode()); });
-    auto hand = adrc();
-    State x;
-    int safe = 0;
-    for (std::size_t k = 0; k < 500; ++k) {
-      const double t = static_cast<double>(k) * T;
-      x = advance(x, hand.update(sensor(t, x(0)), step(t)), load(t));
-      ASSERT_EQ(modes[k], hand.mode());
-      safe += modes[k] == LoopMode::safe ? 1 : 0;
-      if (modes[k] == LoopMode::safe) {
-        EXPECT_EQ(hand.output(), 0.25);
-      }
+  const auto sensor = [](double t, double y) {
+    return t > 0.6 && t < 0.7 ? not_a_number : y + 1e-3;
+  };
+  std::vector<LoopMode> modes;
+  const auto end = sim::run(
+      servo(), adrc(), {.duration = 1.0, .reference = step, .disturbance = load, .sensor = sensor},
+      [&](const auto&, const Adrc<Eso>& controller) { modes.push_back(controller.mode()); });
+  auto hand = adrc();
+  State x;
+  int safe = 0;
+  for (std::size_t k = 0; k < 500; ++k) {
+    const double t = static_cast<double>(k) * T;
+    x = advance(x, hand.update(sensor(t, x(0)), step(t)), load(t));
+    ASSERT_EQ(modes[k], hand.mode());
+    safe += modes[k] == LoopMode::safe ? 1 : 0;
+    if (modes[k] == LoopMode::safe) {
+      EXPECT_EQ(hand.output(), 0.25);
     }
-    EXPECT_EQ(end->state, x);
-    EXPECT_GT(safe, 20);
+  }
+  EXPECT_EQ(end->state, x);
+  EXPECT_GT(safe, 20);
 }
 
 TEST(Run, DrawsNoiseAndLossesApart) {
-    const sim::RunConfig<LinearPlant<2>, Adrc<Eso>> config{
-        .duration = 40.0, .reference = 1.0, .noise = 0.01, .missing = 0.2, .seed = 5};
-    const auto run = sim::run(servo(), adrc(), config).value();
-    auto without = config;
-    without.missing = 0;
-    const auto whole = sim::run(servo(), adrc(), without).value();
-    double sum = 0, square = 0;
-    int lost = 0;
-    sim::Gaussian noise(5);
-    for (std::size_t k = 0; k < run.t.size(); ++k) {
-      const double v = whole.measurement[k] - whole.output[k];
-      EXPECT_NEAR(v, 0.01 * noise.next(), 1e-15);
-      sum += v;
-      square += v * v;
-      if (is_finite(run.measurement[k])) {
-        EXPECT_NEAR(run.measurement[k] - run.output[k], v, 1e-15);
-      } else {
-        ++lost;
-      }
+  const sim::RunConfig<LinearPlant<2>, Adrc<Eso>> config{
+      .duration = 40.0, .reference = 1.0, .noise = 0.01, .missing = 0.2, .seed = 5};
+  const auto run = sim::run(servo(), adrc(), config).value();
+  auto without = config;
+  without.missing = 0;
+  const auto whole = sim::run(servo(), adrc(), without).value();
+  double sum = 0, square = 0;
+  int lost = 0;
+  sim::Gaussian noise(5);
+  for (std::size_t k = 0; k < run.t.size(); ++k) {
+    const double v = whole.measurement[k] - whole.output[k];
+    EXPECT_NEAR(v, 0.01 * noise.next(), 1e-15);
+    sum += v;
+    square += v * v;
+    if (is_finite(run.measurement[k])) {
+      EXPECT_NEAR(run.measurement[k] - run.output[k], v, 1e-15);
+    } else {
+      ++lost;
     }
-    const double count = static_cast<double>(run.t.size());
-    EXPECT_NEAR(sum / count, 0.0, 4 * 0.01 / std::sqrt(count));
-    EXPECT_NEAR(square / count, 1e-4, 4 * 1e-4 * std::sqrt(2 / count));
-    EXPECT_NEAR(lost / count, 0.2, 4 * std::sqrt(0.16 / count));
-    // Equal seeds, equal runs; others, others.
-    EXPECT_EQ(sim::run(servo(), adrc(), config)->input, run.input);
-    without = config;
-    without.seed = 6;
-    EXPECT_NE(sim::run(servo(), adrc(), without)->input, run.input);
+  }
+  const double count = static_cast<double>(run.t.size());
+  EXPECT_NEAR(sum / count, 0.0, 4 * 0.01 / std::sqrt(count));
+  EXPECT_NEAR(square / count, 1e-4, 4 * 1e-4 * std::sqrt(2 / count));
+  EXPECT_NEAR(lost / count, 0.2, 4 * std::sqrt(0.16 / count));
+  // Equal seeds, equal runs; others, others.
+  EXPECT_EQ(sim::run(servo(), adrc(), config)->input, run.input);
+  without = config;
+  without.seed = 6;
+  EXPECT_NE(sim::run(servo(), adrc(), without)->input, run.input);
 }
 
 TEST(Run, TellsAControllerThatAsksHowLongAStepTook) {
-    using Varying = Adrc<VariableTime<Eso>>;
-    const auto controller =
-        Varying::make(
-            {.observer = {.observer = settings().observer, .ratio = 2}, .controller_bandwidth = 8})
-            .value();
-    const auto length = [](std::int64_t k) {
-      return T * (1 + 0.3 * std::sin(0.7 * static_cast<double>(k)));
-    };
-    for (const double late : {0.0, 1.6}) {
-      const auto recorded = sim::run(servo(late * T), controller,
-                                     {.duration = 300 * T, .reference = 1.0, .step_time = length})
-                                .value();
-      auto hand = controller;
-      State x;
-      double t = 0, passed = T;
-      std::vector<double> u, sent;  // every input and when it was sent
-      for (std::size_t k = 0; k < 300; ++k) {
-        ASSERT_NEAR(recorded.t[k], t, 1e-12);
-        ASSERT_NEAR(recorded.output[k], x(0), 1e-11);
-        hand.set_step_time(passed).value();
-        u.push_back(hand.update(x(0), 1.0));
-        sent.push_back(t);
-        passed = length(static_cast<std::int64_t>(k));
-        // Cut where an input arrives.
-        double from = t, acting = 0;
-        for (std::size_t j = 0; j <= k; ++j) {
-          const double arrival = sent[j] + late * T;
-          if (arrival > t && arrival < t + passed) {
-            x = advance(x, acting, 0.0, arrival - from);
-            from = arrival;
-          }
-          if (arrival < t + passed) acting = u[j];
+  using Varying = Adrc<VariableTime<Eso>>;
+  const auto controller = Varying::make({.observer = {.observer = settings().observer, .ratio = 2},
+                                         .controller_bandwidth = 8})
+                              .value();
+  const auto length = [](std::int64_t k) {
+    return T * (1 + 0.3 * std::sin(0.7 * static_cast<double>(k)));
+  };
+  for (const double late : {0.0, 1.6}) {
+    const auto recorded = sim::run(servo(late * T), controller,
+                                   {.duration = 300 * T, .reference = 1.0, .step_time = length})
+                              .value();
+    auto hand = controller;
+    State x;
+    double t = 0, passed = T;
+    std::vector<double> u, sent;  // every input and when it was sent
+    for (std::size_t k = 0; k < 300; ++k) {
+      ASSERT_NEAR(recorded.t[k], t, 1e-12);
+      ASSERT_NEAR(recorded.output[k], x(0), 1e-11);
+      hand.set_step_time(passed).value();
+      u.push_back(hand.update(x(0), 1.0));
+      sent.push_back(t);
+      passed = length(static_cast<std::int64_t>(k));
+      // Cut where an input arrives.
+      double from = t, acting = 0;
+      for (std::size_t j = 0; j <= k; ++j) {
+        const double arrival = sent[j] + late * T;
+        if (arrival > t && arrival < t + passed) {
+          x = advance(x, acting, 0.0, arrival - from);
+          from = arrival;
         }
-        x = advance(x, acting, 0.0, t + passed - from);
-        t += passed;
+        if (arrival < t + passed) acting = u[j];
       }
-      EXPECT_NEAR(recorded.time, t, 1e-12);
+      x = advance(x, acting, 0.0, t + passed - from);
+      t += passed;
     }
-    // At random: within the share, and both sides of T.
-    const auto random = sim::run(servo(), controller, {.duration = 300 * T, .jitter = 0.5}).value();
-    double least = 1, most = 0;
-    for (std::size_t k = 1; k < 300; ++k) {
-      least = std::min(least, random.t[k] - random.t[k - 1]);
-      most = std::max(most, random.t[k] - random.t[k - 1]);
-    }
-    EXPECT_GT(least, 0.499 * T);
-    EXPECT_LT(least, 0.55 * T);
-    EXPECT_LT(most, 1.501 * T);
-    EXPECT_GT(most, 1.45 * T);
-    // A step that the observer cannot take.
-    const auto refused = sim::run(servo(), controller, {.duration = 300 * T, .jitter = 0.9});
-    EXPECT_EQ(refusal(refused), "step_time: must be finite and at least");
+    EXPECT_NEAR(recorded.time, t, 1e-12);
+  }
+  // At random: within the share, and both sides of T.
+  const auto random = sim::run(servo(), controller, {.duration = 300 * T, .jitter = 0.5}).value();
+  double least = 1, most = 0;
+  for (std::size_t k = 1; k < 300; ++k) {
+    least = std::min(least, random.t[k] - random.t[k - 1]);
+    most = std::max(most, random.t[k] - random.t[k - 1]);
+  }
+  EXPECT_GT(least, 0.499 * T);
+  EXPECT_LT(least, 0.55 * T);
+  EXPECT_LT(most, 1.501 * T);
+  EXPECT_GT(most, 1.45 * T);
+  // A step that the observer cannot take.
+  const auto refused = sim::run(servo(), controller, {.duration = 300 * T, .jitter = 0.9});
+  EXPECT_EQ(refusal(refused), "step_time: must be finite and at least");
 }
 
 // ---- what comes back ----
 
 TEST(Run, LeavesTheControllerAloneAndReturnsItsCopy) {
-    const auto controller = adrc();
-    const auto run =
-        sim::run(servo(), controller, {.duration = 1.0, .reference = 1.0, .disturbance = -30.0});
-    EXPECT_EQ(controller.output(), 0.0);
-    EXPECT_EQ(run->controller.output(), run->input.back());
-    EXPECT_EQ(run->samples, 500);
-    EXPECT_EQ(run->time, 1.0);
-    EXPECT_TRUE(run->completed);
-    EXPECT_EQ(run->t.front(), 0.0);
-    EXPECT_EQ(run->t.back(), 499 * T);
-    EXPECT_EQ(run->total_disturbance.back(), run->controller.observer().total_disturbance());
-    const auto later = sim::run(servo(), controller, {.duration = 1.0, .start_time = 3.0});
-    EXPECT_EQ(later->t.front(), 3.0);
-    EXPECT_EQ(later->time, 4.0);
+  const auto controller = adrc();
+  const auto run =
+      sim::run(servo(), controller, {.duration = 1.0, .reference = 1.0, .disturbance = -30.0});
+  EXPECT_EQ(controller.output(), 0.0);
+  EXPECT_EQ(run->controller.output(), run->input.back());
+  EXPECT_EQ(run->samples, 500);
+  EXPECT_EQ(run->time, 1.0);
+  EXPECT_TRUE(run->completed);
+  EXPECT_EQ(run->t.front(), 0.0);
+  EXPECT_EQ(run->t.back(), 499 * T);
+  EXPECT_EQ(run->total_disturbance.back(), run->controller.observer().total_disturbance());
+  const auto later = sim::run(servo(), controller, {.duration = 1.0, .start_time = 3.0});
+  EXPECT_EQ(later->t.front(), 3.0);
+  EXPECT_EQ(later->time, 4.0);
 }
 
 TEST(Run, CallsBackAndStops) {
-    // A retune while it runs, and an end when it has settled.
-    auto faster = settings();
-    faster.observer.observer_bandwidth = 120;
-    std::vector<std::int64_t> seen;
-    const auto end = sim::run(servo(), adrc(), {.duration = 2.0, .reference = 1.0},
-                              [&](const auto& sample, Adrc<Eso>& controller) {
-                                seen.push_back(sample.index);
-                                if (sample.index == 50) controller.retune(faster).value();
-                                return sample.t < 0.5;
-                              });
-    EXPECT_FALSE(end->completed);
-    EXPECT_EQ(end->samples, 251);
-    EXPECT_EQ(seen.size(), 251u);
-    EXPECT_EQ(end->time, 0.5);
-    auto hand = adrc();
-    State x;
-    for (int k = 0; k <= 250; ++k) {
-      if (k > 0) x = advance(x, hand.output(), 0.0);
-      hand.update(x(0), 1.0);
-      if (k == 50) hand.retune(faster).value();
-    }
-    EXPECT_EQ(end->state, x);
-    EXPECT_EQ(end->controller.output(), hand.output());
+  // A retune while it runs, and an end when it has settled.
+  auto faster = settings();
+  faster.observer.observer_bandwidth = 120;
+  std::vector<std::int64_t> seen;
+  const auto end = sim::run(servo(), adrc(), {.duration = 2.0, .reference = 1.0},
+                            [&](const auto& sample, Adrc<Eso>& controller) {
+                              seen.push_back(sample.index);
+                              if (sample.index == 50) controller.retune(faster).value();
+                              return sample.t < 0.5;
+                            });
+  EXPECT_FALSE(end->completed);
+  EXPECT_EQ(end->samples, 251);
+  EXPECT_EQ(seen.size(), 251u);
+  EXPECT_EQ(end->time, 0.5);
+  auto hand = adrc();
+  State x;
+  for (int k = 0; k <= 250; ++k) {
+    if (k > 0) x = advance(x, hand.output(), 0.0);
+    hand.update(x(0), 1.0);
+    if (k == 50) hand.retune(faster).value();
+  }
+  EXPECT_EQ(end->state, x);
+  EXPECT_EQ(end->controller.output(), hand.output());
 }
 
 TEST(Run, IsWrittenWithAllDigits) {
-    const auto run =
-        sim::run(servo(), adrc(), {.duration = 3 * T, .reference = 1.0, .noise = 0.1}).value();
-    const std::string text = run.csv();
-    EXPECT_EQ(text.substr(0, text.find('\n')), "t,y,measurement,reference,u,total_disturbance");
-    const char* at = text.c_str() + text.find('\n');
-    for (std::size_t k = 0; k < 3; ++k) {
-      for (const double expected : {run.t[k], run.output[k], run.measurement[k], run.reference[k],
-                                    run.input[k], run.total_disturbance[k]}) {
-        char* end = nullptr;
-        EXPECT_EQ(std::strtod(at + 1, &end), expected);
-        at = end;
-      }
+  const auto run =
+      sim::run(servo(), adrc(), {.duration = 3 * T, .reference = 1.0, .noise = 0.1}).value();
+  const std::string text = run.csv();
+  EXPECT_EQ(text.substr(0, text.find('\n')), "t,y,measurement,reference,u,total_disturbance");
+  const char* at = text.c_str() + text.find('\n');
+  for (std::size_t k = 0; k < 3; ++k) {
+    for (const double expected : {run.t[k], run.output[k], run.measurement[k], run.reference[k],
+                                  run.input[k], run.total_disturbance[k]}) {
+      char* end = nullptr;
+      EXPECT_EQ(std::strtod(at + 1, &end), expected);
+      at = end;
     }
-    EXPECT_STREQ(at, "\n");
+  }
+  EXPECT_STREQ(at, "\n");
 }
 
 TEST(Run, OfPacksIsThatOfEachLane) {
-    using Two = Pack<double, 2>;
-    const auto plants = LinearPlant<2, Two>::chain(
-        {.coefficients = {Two({7, 5}), Two({3, 1})}, .input_gain = Two({50, 45})});
-    const auto of = [](auto b, auto omega) {
-      using S = decltype(b);
-      return Adrc<LinearEso<2, S>>::make(
-                 {.observer = {.observer_bandwidth = omega, .input_gain = b, .sample_time = S(T)},
-                  .controller_bandwidth = S(8.0),
-                  .limits = {.lower = S(-2.0), .upper = S(2.0)}})
-          .value();
-    };
-    const auto both = sim::run(*plants, of(Two({40, 50}), Two({80, 60})),
-                               {.duration = 1.0, .reference = Two(1.0), .disturbance = Two(-30.0)});
-    for (int lane = 0; lane < 2; ++lane) {
-      const bool first = lane == 0;
-      const auto plant =
-          LinearPlant<2>::chain({.coefficients = {first ? 7.0 : 5.0, first ? 3.0 : 1.0},
-                                 .input_gain = first ? 50.0 : 45.0});
-      const auto one = sim::run(*plant, of(first ? 40.0 : 50.0, first ? 80.0 : 60.0),
-                                {.duration = 1.0, .reference = 1.0, .disturbance = -30.0});
-      for (std::size_t k = 0; k < 500; ++k) {
-        ASSERT_EQ(both->output[k][lane], one->output[k]);
-        ASSERT_EQ(both->input[k][lane], one->input[k]);
-      }
+  using Two = Pack<double, 2>;
+  const auto plants = LinearPlant<2, Two>::chain(
+      {.coefficients = {Two({7, 5}), Two({3, 1})}, .input_gain = Two({50, 45})});
+  const auto of = [](auto b, auto omega) {
+    using S = decltype(b);
+    return Adrc<LinearEso<2, S>>::make(
+               {.observer = {.observer_bandwidth = omega, .input_gain = b, .sample_time = S(T)},
+                .controller_bandwidth = S(8.0),
+                .limits = {.lower = S(-2.0), .upper = S(2.0)}})
+        .value();
+  };
+  const auto both = sim::run(*plants, of(Two({40, 50}), Two({80, 60})),
+                             {.duration = 1.0, .reference = Two(1.0), .disturbance = Two(-30.0)});
+  for (int lane = 0; lane < 2; ++lane) {
+    const bool first = lane == 0;
+    const auto plant =
+        LinearPlant<2>::chain({.coefficients = {first ? 7.0 : 5.0, first ? 3.0 : 1.0},
+                               .input_gain = first ? 50.0 : 45.0});
+    const auto one = sim::run(*plant, of(first ? 40.0 : 50.0, first ? 80.0 : 60.0),
+                              {.duration = 1.0, .reference = 1.0, .disturbance = -30.0});
+    for (std::size_t k = 0; k < 500; ++k) {
+      ASSERT_EQ(both->output[k][lane], one->output[k]);
+      ASSERT_EQ(both->input[k][lane], one->input[k]);
     }
+  }
 }
 
 // ---- refused ----
 
 TEST(Run, RefusesBadSettings) {
-    using Config = sim::RunConfig<LinearPlant<2>, Adrc<Eso>>;
-    const auto said = [](const Config& config) {
-      return refusal(sim::run(servo(), adrc(), config));
-    };
-    for (const double bad : {not_a_number, infinity, -infinity}) {
-      EXPECT_EQ(said({.duration = 1.0, .sample_time = bad}),
-                "sample_time: must be finite and not negative");
-      EXPECT_EQ(said({.duration = bad}), "duration: must be finite and positive");
-      EXPECT_EQ(said({.duration = 1.0, .reference = bad}), "reference[0]: must be finite");
-      EXPECT_EQ(said({.duration = 1.0, .disturbance = bad}), "disturbance: must be finite");
-      EXPECT_EQ(said({.duration = 1.0, .noise = bad}), "noise: must be finite and not negative");
-      EXPECT_EQ(said({.duration = 1.0, .missing = bad}),
-                "missing: must be finite and not negative");
-      EXPECT_EQ(said({.duration = 1.0, .jitter = bad}), "jitter: must be finite and not negative");
-      EXPECT_EQ(said({.duration = 1.0, .dead_time = bad}),
-                "dead_time: must be finite and not negative");
-      EXPECT_EQ(said({.duration = 1.0, .start_time = bad}), "start_time: must be finite");
-      EXPECT_EQ(said({.duration = 1.0, .initial_input = bad}), "initial_input: must be finite");
-      EXPECT_EQ(said({.duration = 1.0, .state = {bad, 0}}), "state[0]: must be finite");
-      EXPECT_EQ(said({.duration = 1.0, .state = {0, bad}}), "state[1]: must be finite");
-      auto plant = servo();
-      plant.a(1, 0) = bad;
-      EXPECT_EQ(refusal(sim::run(plant, adrc(), {.duration = 1.0})), "a[1]: must be finite");
-      // A function: at the time at which it gives it.
-      const auto later = [bad](double t) { return t < 0.5 ? 0.0 : bad; };
-      const auto d = sim::run(servo(), adrc(), {.duration = 1.0, .disturbance = later});
-      EXPECT_EQ(refusal(d), "disturbance: is not finite in the sample at this time");
-      EXPECT_EQ(d.error().value, 0.5);
-      const auto u = sim::run(servo(), [&](double, double r) { return r; },
-                              {.duration = 1.0, .sample_time = T, .reference = later});
-      EXPECT_EQ(refusal(u), "controller: gave an input that is not finite at this time");
-      EXPECT_EQ(u.error().value, 0.5);
-      const auto x =
-          sim::run(sim::nonlinear_plant<1>([&](double t, const Vector<double, 1>&, double) {
-                     return Vector<double, 1>(t > 0.51 ? bad : 0.0);
-                   }),
-                   [](double, double) { return 0.0; }, {.duration = 1.0, .sample_time = 0.01});
-      EXPECT_EQ(refusal(x), "plant: has a state that is not finite after the sample at this time");
-      EXPECT_NEAR(x.error().value, 0.51, 1e-9);
-      // Adrc keeps u under such a reference, as it promises.
-      EXPECT_EQ(said({.duration = 1.0, .reference = later}), "accepted");
-      EXPECT_EQ(said({.duration = 1.0, .step_time = [bad](std::int64_t) { return bad; }}),
-                "step_time: must be 0.1 .. 10 times sample_time, which is");
-    }
-    EXPECT_EQ(said({}), "duration: must be finite and positive");
-    EXPECT_EQ(said({.duration = 1.0, .sample_time = 1.001 * T}),
-              "sample_time: must be that of the controller, which is");
-    EXPECT_EQ(said({.duration = 1.0, .sample_time = T}), "accepted");
-    EXPECT_EQ(said({.duration = 1.0007}),
-              "duration: must be a whole multiple of sample_time, which is");
-    EXPECT_EQ(said({.duration = 1.0, .noise = -1e-9}), "noise: must be finite and not negative");
-    EXPECT_EQ(said({.duration = 1.0, .missing = 1.0}), "accepted");
-    EXPECT_EQ(said({.duration = 1.0, .missing = 1.0001}), "missing: must not be above 1");
-    EXPECT_EQ(said({.duration = 1.0, .jitter = 0.9}), "accepted");
-    EXPECT_EQ(said({.duration = 1.0, .jitter = 0.91}), "jitter: must not be above 0.9");
-    EXPECT_EQ(said({.duration = 1.0, .dead_time = 1000001 * T}),
-              "dead_time: must be below 1e6 samples (1e5 where they jitter)");
-    for (const int bad : {0, -1, 1000001}) {
-      EXPECT_EQ(said({.duration = 1.0, .substeps = bad}), "substeps: must be 1 .. 1000000");
-    }
-    for (const double share : {0.099, 10.01}) {
-      EXPECT_EQ(said({.duration = 1.0, .step_time = [share](std::int64_t) { return share * T; }}),
-                "step_time: must be 0.1 .. 10 times sample_time, which is");
-    }
-    // One's own controller has no T to fall back on.
-    const auto own = [](double y, double r) { return r - y; };
-    EXPECT_EQ(refusal(sim::run(servo(), own, {.duration = 1.0})),
-              "sample_time: must be finite and positive");
-    const auto unstable = LinearPlant<1>::chain({.coefficients = {-1000.0}}).value();
-    EXPECT_EQ(refusal(sim::run(unstable, own, {.duration = 2.0, .sample_time = 1.0})),
-              "sample_time: is so long that the scalar cannot hold what the plant does in it");
+  using Config = sim::RunConfig<LinearPlant<2>, Adrc<Eso>>;
+  const auto said = [](const Config& config) { return refusal(sim::run(servo(), adrc(), config)); };
+  for (const double bad : {not_a_number, infinity, -infinity}) {
+    EXPECT_EQ(said({.duration = 1.0, .sample_time = bad}),
+              "sample_time: must be finite and not negative");
+    EXPECT_EQ(said({.duration = bad}), "duration: must be finite and positive");
+    EXPECT_EQ(said({.duration = 1.0, .reference = bad}), "reference[0]: must be finite");
+    EXPECT_EQ(said({.duration = 1.0, .disturbance = bad}), "disturbance: must be finite");
+    EXPECT_EQ(said({.duration = 1.0, .noise = bad}), "noise: must be finite and not negative");
+    EXPECT_EQ(said({.duration = 1.0, .missing = bad}), "missing: must be finite and not negative");
+    EXPECT_EQ(said({.duration = 1.0, .jitter = bad}), "jitter: must be finite and not negative");
+    EXPECT_EQ(said({.duration = 1.0, .dead_time = bad}),
+              "dead_time: must be finite and not negative");
+    EXPECT_EQ(said({.duration = 1.0, .start_time = bad}), "start_time: must be finite");
+    EXPECT_EQ(said({.duration = 1.0, .initial_input = bad}), "initial_input: must be finite");
+    EXPECT_EQ(said({.duration = 1.0, .state = {bad, 0}}), "state[0]: must be finite");
+    EXPECT_EQ(said({.duration = 1.0, .state = {0, bad}}), "state[1]: must be finite");
+    auto plant = servo();
+    plant.a(1, 0) = bad;
+    EXPECT_EQ(refusal(sim::run(plant, adrc(), {.duration = 1.0})), "a[1]: must be finite");
+    // A function: at the time at which it gives it.
+    const auto later = [bad](double t) { return t < 0.5 ? 0.0 : bad; };
+    const auto d = sim::run(servo(), adrc(), {.duration = 1.0, .disturbance = later});
+    EXPECT_EQ(refusal(d), "disturbance: is not finite in the sample at this time");
+    EXPECT_EQ(d.error().value, 0.5);
+    const auto u = sim::run(servo(), [&](double, double r) { return r; },
+                            {.duration = 1.0, .sample_time = T, .reference = later});
+    EXPECT_EQ(refusal(u), "controller: gave an input that is not finite at this time");
+    EXPECT_EQ(u.error().value, 0.5);
+    const auto x =
+        sim::run(sim::nonlinear_plant<1>([&](double t, const Vector<double, 1>&, double) {
+                   return Vector<double, 1>(t > 0.51 ? bad : 0.0);
+                 }),
+                 [](double, double) { return 0.0; }, {.duration = 1.0, .sample_time = 0.01});
+    EXPECT_EQ(refusal(x), "plant: has a state that is not finite after the sample at this time");
+    EXPECT_NEAR(x.error().value, 0.51, 1e-9);
+    // Adrc keeps u under such a reference, as it promises.
+    EXPECT_EQ(said({.duration = 1.0, .reference = later}), "accepted");
+    EXPECT_EQ(said({.duration = 1.0, .step_time = [bad](std::int64_t) { return bad; }}),
+              "step_time: must be 0.1 .. 10 times sample_time, which is");
+  }
+  EXPECT_EQ(said({}), "duration: must be finite and positive");
+  EXPECT_EQ(said({.duration = 1.0, .sample_time = 1.001 * T}),
+            "sample_time: must be that of the controller, which is");
+  EXPECT_EQ(said({.duration = 1.0, .sample_time = T}), "accepted");
+  EXPECT_EQ(said({.duration = 1.0007}),
+            "duration: must be a whole multiple of sample_time, which is");
+  EXPECT_EQ(said({.duration = 1.0, .noise = -1e-9}), "noise: must be finite and not negative");
+  EXPECT_EQ(said({.duration = 1.0, .missing = 1.0}), "accepted");
+  EXPECT_EQ(said({.duration = 1.0, .missing = 1.0001}), "missing: must not be above 1");
+  EXPECT_EQ(said({.duration = 1.0, .jitter = 0.9}), "accepted");
+  EXPECT_EQ(said({.duration = 1.0, .jitter = 0.91}), "jitter: must not be above 0.9");
+  EXPECT_EQ(said({.duration = 1.0, .dead_time = 1000001 * T}),
+            "dead_time: must be below 1e6 samples (1e5 where they jitter)");
+  for (const int bad : {0, -1, 1000001}) {
+    EXPECT_EQ(said({.duration = 1.0, .substeps = bad}), "substeps: must be 1 .. 1000000");
+  }
+  for (const double share : {0.099, 10.01}) {
+    EXPECT_EQ(said({.duration = 1.0, .step_time = [share](std::int64_t) { return share * T; }}),
+              "step_time: must be 0.1 .. 10 times sample_time, which is");
+  }
+  // One's own controller has no T to fall back on.
+  const auto own = [](double y, double r) { return r - y; };
+  EXPECT_EQ(refusal(sim::run(servo(), own, {.duration = 1.0})),
+            "sample_time: must be finite and positive");
+  const auto unstable = LinearPlant<1>::chain({.coefficients = {-1000.0}}).value();
+  EXPECT_EQ(refusal(sim::run(unstable, own, {.duration = 2.0, .sample_time = 1.0})),
+            "sample_time: is so long that the scalar cannot hold what the plant does in it");
 }
 
 }  // namespace
