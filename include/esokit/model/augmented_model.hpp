@@ -55,11 +55,12 @@ constexpr int highest_degree(const ModelParts& parts) noexcept {
   return highest;
 }
 
-/// Which elements of Phi - I, and in the last column of Gamma, can differ from zero; and where they
-/// are kept, row by row.
+/// Which elements of Phi - I, and in the last column of Gamma, can differ from zero, which are
+/// known when compiling, and where the others are kept, row by row.
 template <int Size>
 struct ModelPattern {
   Array<Array<bool, Size + 1>, Size> couples{};
+  Array<Array<int, Size + 1>, Size> chain{};  ///< those of a chain: binomials; else 0
   Array<Array<int, Size + 1>, Size> place{};
   int kept = 0;
 };
@@ -99,7 +100,13 @@ constexpr auto make_model_pattern() noexcept {
   for (std::size_t i = 0; i < size; ++i) {
     for (std::size_t j = 0; j <= size; ++j) {
       all.place[i][j] = all.kept;
-      if (p[i][j]) ++all.kept;
+      // Plant without poles of its own, and its integrated disturbance.
+      const std::size_t last = la == 0 ? d + m - 1 : lf + n - 1;
+      if (p[i][j] && !Parts.plant_poles && i >= lf && j <= last) {
+        all.chain[i][j] =
+            static_cast<int>(binomial(static_cast<int>(j - lf), static_cast<int>(i - lf)));
+      }
+      if (p[i][j] && all.chain[i][j] == 0) ++all.kept;
     }
   }
   return all;
@@ -271,7 +278,14 @@ class AugmentedModel {
     detail::unroll<size>([&](auto i) ESOKIT_INLINE_LAMBDA {
       S sum = std::get<i>(x);
       detail::unroll<size>([&](auto j) ESOKIT_INLINE_LAMBDA {
-        if constexpr (couples(i, j)) sum = sum + std::get<place(i, j)>(step_) * std::get<j>(x);
+        if constexpr (of_chain(i, j) == 1) {
+          sum = sum + std::get<j>(x);
+        } else if constexpr (of_chain(i, j) > 1) {
+          constexpr double binomial = of_chain(i, j);
+          sum = sum + detail::constant<S>(binomial) * std::get<j>(x);
+        } else if constexpr (couples(i, j)) {
+          sum = sum + std::get<place(i, j)>(step_) * std::get<j>(x);
+        }
       });
       if constexpr (couples(i, size)) sum = sum + std::get<place(i, size)>(step_) * u;
       std::get<i>(next) = sum;
@@ -347,7 +361,12 @@ class AugmentedModel {
   /// A number that is finite only if all estimates are.
   [[nodiscard]] ESOKIT_INLINE constexpr S finite_probe(const State& x) const noexcept {
     constexpr int highest = detail::highest_degree(Parts);
-    S probe(0);
+    constexpr int first = [] {
+      int state = 0;
+      while (detail::model_degree(Parts, state) != detail::highest_degree(Parts)) ++state;
+      return state;
+    }();
+    S probe = detail::absolute(std::get<first>(x));
     detail::unroll<highest + 1>([&](auto k) ESOKIT_INLINE_LAMBDA {
       constexpr int now = highest - k;
       if constexpr (now < highest) {
@@ -355,7 +374,9 @@ class AugmentedModel {
         probe = probe * (detail::constant<S>(weight) * rate_);
       }
       detail::unroll<size>([&](auto i) ESOKIT_INLINE_LAMBDA {
-        if constexpr (degree(i) == now) probe = probe + detail::absolute(std::get<i>(x));
+        if constexpr (degree(i) == now && i != first) {
+          probe = probe + detail::absolute(std::get<i>(x));
+        }
       });
     });
     return probe;
@@ -382,7 +403,11 @@ class AugmentedModel {
     Matrix<S, size, size> step = Matrix<S, size, size>::Zero();
     for (int i = 0; i < size; ++i) {
       for (int j = 0; j < size; ++j) {
-        if (couples(i, j)) step(i, j) = step_[static_cast<std::size_t>(place(i, j))];
+        if (of_chain(i, j) > 0) {
+          step(i, j) = number(of_chain(i, j));
+        } else if (couples(i, j)) {
+          step(i, j) = step_[static_cast<std::size_t>(place(i, j))];
+        }
       }
     }
     return step;
@@ -480,6 +505,9 @@ class AugmentedModel {
   static constexpr const auto& pattern = detail::model_pattern<Parts>;
   static constexpr bool couples(int i, int j) noexcept {
     return pattern.couples[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
+  }
+  static constexpr int of_chain(int i, int j) noexcept {
+    return pattern.chain[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
   }
   static constexpr int place(int i, int j) noexcept {
     return pattern.place[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
@@ -777,7 +805,7 @@ class AugmentedModel {
     const auto all = detail::exp_minus_identity(rates(present(), sample_time_));
     for (int i = 0; i < size; ++i) {
       for (int j = 0; j <= size; ++j) {
-        if (!couples(i, j)) continue;
+        if (!couples(i, j) || of_chain(i, j) > 0) continue;
         step_[static_cast<std::size_t>(place(i, j))] =
             j < size ? all(i, j) : all(i, j) * scaled_input_gain_;
       }
