@@ -1,9 +1,7 @@
 /// @file
-/// Comma-separated text as in RFC 4180: quoting and numbers.
+/// Numbers and comma-separated text as in RFC 4180.
 #pragma once
 
-#include <filesystem>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -21,11 +19,7 @@ using CsvRow = std::vector<std::string>;
 /// One line with its line end.
 [[nodiscard]] std::string csv_line(const CsvRow& row);
 
-/// Writes the whole text, or returns what went wrong.
-[[nodiscard]] std::optional<std::string> write_text(const std::filesystem::path& file,
-                                                    std::string_view text);
-
-/// The whole file; empty optional if it cannot be read.
-[[nodiscard]] std::optional<std::string> read_text(const std::filesystem::path& file);
+/// Writes the whole text; false if that failed.
+[[nodiscard]] bool write_text(const std::string& file, std::string_view text);
 
 }  // namespace esokit::examples

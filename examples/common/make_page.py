@@ -14,14 +14,17 @@ import math
 import re
 import string
 import sys
+from collections import namedtuple
 from pathlib import Path
 from urllib.parse import quote
 
 SUMMARY = ["case", "metric", "paper", "ours", "relative_error", "tolerance", "pass", "note"]
 CONTENTS = ["kind", "name", "text", "alt", "more", "figure"]
 MISSES = ("printed number missed", "the text says other than what was simulated",
-          "a claim does not hold", "settings or data not published")  # miss_text in check.cpp
+          "a claim does not hold", "settings or data not published")  # miss_texts in report.cpp
 WIDEST = 10  # columns of a table, then it is split
+Row = namedtuple("Row", "case metric paper ours error tolerance passed note outcome miss")
+Item = namedtuple("Item", CONTENTS + ["addition"])
 
 
 # ---- what was written ----
@@ -29,73 +32,45 @@ WIDEST = 10  # columns of a table, then it is split
 def read_csv(file, header=None):
     with open(file, newline="", encoding="utf-8") as stream:
         rows = [row for row in csv.reader(stream, strict=True) if row]
-    if not rows or header and rows[0] != header:
-        raise ValueError(f"{file}: the header is not as Report writes it")
-    if any(len(row) != len(rows[0]) for row in rows):
-        raise ValueError(f"{file}: a row has more or fewer fields than the header")
+    if not rows or header and rows[0] != header or any(len(row) != len(rows[0]) for row in rows):
+        raise ValueError(f"{file} is not as Report writes it")
     return rows
 
 
-class Row:
-    """One row of a summary.csv; `outcome` is one of the classes of page.html."""
-
-    def __init__(self, fields):
-        (self.case, self.metric, self.paper, self.ours, self.error, self.tolerance, passed,
-         self.note) = fields
-        self.miss = next((miss for miss in MISSES if self.note.startswith(miss)), None)
-        self.outcome = ("pass" if passed == "yes" else "reported" if not passed else
-                        "known_miss" if self.miss else "fail")
-
-    def mark(self):
-        return {"pass": "✓ met" if self.paper else "✓ passed", "fail": "✗ failed",
-                "known_miss": "≠ missed",
-                "reported": "not judged" if self.paper else "shown"}[self.outcome]
-
-    def reference(self):
-        """The number of a note that reference_note (check.cpp) began."""
-        return self.note.split(" ")[1] if self.note.startswith("reference ") else ""
-
-
-class Item:
-    """A figure, table or paragraph, in the order in which the example gave them."""
-
-    def __init__(self, fields, addition):
-        self.kind, self.name, self.text, self.alt, self.more, self.figure = fields
-        self.addition = addition
+def judged(fields):
+    """A row of a summary.csv; its outcome is one of the classes of page.html."""
+    miss = next((miss for miss in MISSES if fields[7].startswith(miss)), None)
+    return Row(*fields, {"yes": "pass", "": "reported"}.get(
+        fields[6], "known_miss" if miss else "fail"), miss)
 
 
 class Example:
     def __init__(self, out, folder):
         self.name, self.folder = folder.name, folder.relative_to(out)
-        self.rows = [Row(row) for row in read_csv(folder / "summary.csv", SUMMARY)[1:]]
+        self.rows = [judged(row) for row in read_csv(folder / "summary.csv", SUMMARY)[1:]]
         self.about, self.items, additions = {}, [], False
         for row in read_csv(folder / "contents.csv", CONTENTS)[1:]:
-            if row[0] in ("paper_title", "citation", "link", "title", "description", "order",
-                          "addition"):
-                self.about[row[0]] = row[2]
-            elif row[0] == "additions":
+            if row[0] == "additions":
                 additions = row[2] == "on"
+            elif row[0] in ("paper_title", "citation", "link", "title", "description", "order",
+                            "addition"):
+                self.about[row[0]] = row[2]
             else:
-                self.items.append(Item(row, additions))
+                self.items.append(Item(*row, additions))
         self.addition = "addition" in self.about
         self.has_additions = self.addition or any(item.addition for item in self.items)
         self.title = self.about["title"] or self.name
         self.anchor = re.sub("[^A-Za-z0-9_-]", "-", self.folder.as_posix())
 
-    def empty(self):
-        """What could not run, as its data are not here, has nothing to show."""
-        return not self.rows and all(item.kind == "remark" for item in self.items)
-
 
 class Paper:
     def __init__(self, folder, examples):
-        self.folder = folder
+        self.folder, self.page = folder, quote(folder + ".html")
         self.examples = sorted(examples, key=lambda one: (one.addition, int(one.about["order"])))
-        first = {key: next((one.about[key] for one in examples if one.about[key]), "")
-                 for key in ("paper_title", "citation", "link")}
-        self.title = first["paper_title"] or folder
-        self.citation, self.link = first["citation"], first["link"]
-        self.page = quote(folder + ".html")
+        title, self.citation, self.link = (
+            next((one.about[key] for one in examples if one.about[key]), "")
+            for key in ("paper_title", "citation", "link"))
+        self.title = title or folder
 
     def items(self, kind):
         return [(one, item) for one in self.examples for item in one.items if item.kind == kind]
@@ -108,7 +83,10 @@ def read_results(out):
         raise ValueError(f"no summary.csv below {out}: run an example first")
     papers = []
     for folder, group in itertools.groupby(folders, lambda one: one.parent):
-        examples = [one for one in (Example(out, one) for one in group) if not one.empty()]
+        examples = [Example(out, one) for one in group]
+        # What could not run, as its data are not here, has nothing to show.
+        examples = [one for one in examples
+                    if one.rows or any(item.kind != "remark" for item in one.items)]
         if examples:
             papers.append(Paper(folder.relative_to(out).as_posix(), examples))
     return sorted(papers, key=lambda paper: not paper.link)
@@ -120,7 +98,7 @@ esc = html.escape
 
 
 def shown(text):
-    """A number for a reader, as shown_text (check.cpp) writes it."""
+    """A number for a reader, as shown_text (report.cpp) writes it."""
     try:
         value = float(text)
     except ValueError:
@@ -149,21 +127,18 @@ def counts(paper):
     """Printed numbers and own checks, never added up."""
     rows = [row for one in paper.examples for row in one.rows]
 
-    def count(printed, *outcomes):
-        return sum(bool(row.paper) == printed and row.outcome in outcomes for row in rows)
-
-    def group(words, *numbers):
-        if not any(number for number, _, _ in numbers):
-            return ""
-        return (f"<span>{words}:" + "".join(
-            f' <span class="{kind if number else "reported"}">{number} {name}</span>'
-            for number, name, kind in numbers) + "</span>\n")
-
-    text = group("Printed numbers", (count(True, "pass"), "met,", "pass"),
-                 (count(True, "known_miss", "fail"), "missed,", "known_miss"),
-                 (count(True, "reported"), "not judged", "reported"))
-    text += group("Own checks", (count(False, "pass"), "passed,", "pass"),
-                  (count(False, "known_miss", "fail"), "failed", "fail"))
+    text = ""
+    for words, printed, kinds in (
+            ("Printed numbers", True, {"pass": "met,", "known_miss": "missed,",
+                                       "reported": "not judged"}),
+            ("Own checks", False, {"pass": "passed,", "fail": "failed"})):
+        outcomes = [{"fail": "known_miss"}.get(row.outcome, row.outcome) if printed else row.outcome
+                    for row in rows if bool(row.paper) == printed]
+        numbers = [(outcomes.count(kind), name, kind) for kind, name in kinds.items()]
+        if any(number for number, _, _ in numbers):
+            text += f"<span>{words}:" + "".join(
+                f' <span class="{kind if number else "reported"}">{number} {name}</span>'
+                for number, name, kind in numbers) + "</span>\n"
     return ('<p class="counts">' +
             (text or '<span class="reported">Nothing is compared here.</span>') + "</p>\n")
 
@@ -248,29 +223,20 @@ def shown_table(out, example, item):
     marks = {"ok": ' <span class="pass" title="met">✓</span>',
              "FAILED": ' <span class="fail">✗ failed</span>',
              "missed": ' <span class="known_miss">≠ missed</span>'}
-    # A metric's columns stay together; (column, column of its verdict).
-    metrics, metric = [], []
-    for c in range(1, len(rows[0])):
-        if compared and rows[0][c].endswith(", result"):
-            metric[-1] = (metric[-1][0], c)
-        else:
-            metric.append((c, None))
-        if not compared or rows[0][c].endswith(", result"):
-            metrics.append(metric)
-            metric = []
-    parts = [[]]
-    for metric in metrics:
-        width = sum(1 + (verdict is not None) for _, verdict in parts[-1] + metric)
-        if parts[-1] and width > WIDEST:
-            parts.append([])
-        parts[-1] += metric
-    text = ""
-    for part in parts:
+    count = len(rows[0])
+    verdicts = [compared and heading.endswith(", result") for heading in rows[0]] + [False]
+    ends = [c + 1 for c in range(1, count) if not compared or verdicts[c]]
+    text, start = "", 1
+    while start < count:
+        ahead = [end for end in ends if end > start]
+        stop = max([end for end in ahead if end - start <= WIDEST] or ahead[:1])
+        shown_columns = [c for c in range(start, stop) if not verdicts[c]]
         body = [[f'<th scope="row">{esc(row[0])}</th>'] +
-                [f"<td>{esc(row[c])}{marks.get(row[v], '') if v else ''}</td>" for c, v in part]
-                for row in rows[1:]]
+                [f"<td>{esc(row[c])}{marks.get(row[c + 1], '') if verdicts[c + 1] else ''}</td>"
+                 for c in shown_columns] for row in rows[1:]]
         text += table(item.text + (" (continued)" if text else ""),
-                      [rows[0][0]] + [rows[0][c] for c, _ in part], body)
+                      [rows[0][0]] + [rows[0][c] for c in shown_columns], body)
+        start = stop
     return text
 
 
@@ -296,11 +262,15 @@ def article(out, example, items, later=False):
 def all_checks(example):
     if not example.rows:
         return ""
+    marks = {"pass": ("✓ met", "✓ passed"), "fail": ("✗ failed",) * 2,
+             "known_miss": ("≠ missed",) * 2, "reported": ("not judged", "shown")}
     # Without a relative error the tolerance is absolute.
     rows = [(cell(row.case, "text"), cell(row.metric, "text"), cell(row.paper),
-             cell(row.reference()), cell(shown(row.ours)), cell(percent(row.error)),
+             cell(row.note.split(" ")[1] if row.note.startswith("reference ") else ""),
+             cell(shown(row.ours)), cell(percent(row.error)),
              cell(percent(row.tolerance) if row.error else row.tolerance),
-             cell(row.mark(), row.outcome), cell(row.note, "text")) for row in example.rows]
+             cell(marks[row.outcome][not row.paper], row.outcome), cell(row.note, "text"))
+            for row in example.rows]
     file = quote((example.folder / "summary.csv").as_posix())
     return (f"<details>\n<summary>{esc(example.title)}: {len(rows)} rows "
             f'(<a href="{file}">summary.csv</a>)</summary>\n' +

@@ -16,16 +16,14 @@
 /// ```
 #pragma once
 
-#include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "check.hpp"
 #include "csv.hpp"
 #include "figure.hpp"
-#include "statistics.hpp"
 
 namespace esokit::examples {
 
@@ -59,6 +57,38 @@ struct Correction {
   std::string why = {};      ///< how one knows, with numbers
 };
 
+/// Kinds of "does not reproduce".
+enum class Miss {
+  printed_number,  ///< a printed number is missed, and we do not know why
+  other_reading,   ///< the text says other than what was simulated; a reading that works exists
+  claim,           ///< a claim does not hold
+  not_published    ///< settings or data that are needed are not published
+};
+
+/// Mean and spread of one number over the seeds.
+struct Statistics {
+  std::size_t count = 0;
+  double mean = 0.0;
+  double standard_deviation = 0.0;  ///< of the sample: divided by count - 1; 0 for one value
+  double standard_error = 0.0;      ///< of the mean
+};
+[[nodiscard]] Statistics statistics(const std::vector<double>& values);
+
+/// Of the number that `number` takes out of every run, e.g. `statistics_of(runs, &Run::error)`.
+template <class Runs, class Number>
+[[nodiscard]] Statistics statistics_of(const Runs& runs, Number number) {
+  std::vector<double> values;
+  for (const auto& run : runs) values.push_back(static_cast<double>(std::invoke(number, run)));
+  return statistics(values);
+}
+
+/// A number for a reader: as many decimals as `like` is printed with, but at least three
+/// significant digits; without it four. Only very large and very small numbers have an exponent.
+[[nodiscard]] std::string shown_text(double value, std::optional<double> like = std::nullopt);
+
+/// "mean (deviation)", the mean with no more digits than mean something beside its scatter.
+[[nodiscard]] std::string mean_text(const Statistics& seeds);
+
 /// A number of ours, with its spread where it is a mean over seeds.
 struct Measured {
   Measured(double number) : value(number) {}
@@ -66,6 +96,20 @@ struct Measured {
 
   double value;
   std::optional<double> deviation;
+};
+
+/// How far a number may be from the paper's. A plain number is a relative tolerance.
+struct Tolerance {
+  Tolerance(double share) : relative(share) {}
+  [[nodiscard]] static Tolerance absolute(double largest_difference);
+  /// Within `factor` standard deviations of the seeds.
+  [[nodiscard]] static Tolerance deviations(double factor, const Statistics& seeds);
+  /// This tolerance or a relative one, whichever is the wider.
+  [[nodiscard]] Tolerance or_relative(double share) const;
+
+  double relative = 0.0;
+  double difference = 0.0;  ///< the absolute part
+  std::string rule = {};    ///< in words; empty for a plain relative tolerance
 };
 
 /// One example's results. Console output and files; nothing throws, what fails shows in finish().
@@ -76,29 +120,35 @@ class Report {
   Report(int argc, char** argv, const std::string& paper, const std::string& example, About about);
 
   /// Where the files of this example go.
-  [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
+  [[nodiscard]] const std::string& folder() const { return folder_; }
 
   /// Our number beside the paper's printed one. With a tolerance it must reproduce, without one it
   /// is not judged; `paper` is std::nullopt where the paper prints no number.
   void check(std::string_view case_name, std::string_view metric, std::optional<double> paper,
-             Measured ours, std::optional<Tolerance> tolerance = std::nullopt,
+             const Measured& ours, const std::optional<Tolerance>& tolerance = std::nullopt,
              std::string_view note = {});
+
+  /// A printed number of one run is met if a single run of ours could give it: within three
+  /// standard deviations. Where those are more than the number itself, that would say nothing, and
+  /// it is not judged. `missed`: known to be missed, `note` says why.
+  void check_single_run(std::string_view case_name, std::string_view metric, double printed,
+                        const Statistics& ours, std::string_view note, bool missed = false);
 
   /// Our number beside one that is not printed in the paper (an independent run, a closed form):
   /// it must reproduce. An own check: the paper's column stays empty, and the note begins with the
   /// reference and its source, which the page shows in a column of its own.
   void check_reference(std::string_view case_name, std::string_view metric, double reference,
-                       Measured ours, const Tolerance& tolerance,
+                       const Measured& ours, const Tolerance& tolerance,
                        std::string_view source = "independent run");
 
   /// A statement about our number that must hold; `rule` says it in words ("diverges").
-  void expect(std::string_view case_name, std::string_view metric, Measured ours, bool holds,
+  void expect(std::string_view case_name, std::string_view metric, const Measured& ours, bool holds,
               std::string_view rule);
 
   /// A printed number that is known to be missed; `reason` says why, or what was tried. Shown as
   /// missed, with its kind, without failing the program. Should it be met after all, it passes.
-  void known_miss(std::string_view case_name, std::string_view metric, double paper, Measured ours,
-                  const Tolerance& tolerance, std::string_view reason,
+  void known_miss(std::string_view case_name, std::string_view metric, double paper,
+                  const Measured& ours, const Tolerance& tolerance, std::string_view reason,
                   Miss kind = Miss::printed_number);
 
   /// The checks so far as a table with a line a case and a column a metric, paper beside ours.
@@ -112,51 +162,57 @@ class Report {
 
   /// Writes the figure's data, draws it and shows it on the page.
   void add(const Figure& figure);
-
   /// A drawing that is not a plot: NAME.svg with this text.
   void diagram(const std::string& name, const std::string& caption, std::string_view svg);
-
   /// A paragraph for the page: conventions, variants, what the reader should see.
-  void remark(std::string_view text);
-
-  /// Says plainly what of the paper did not reproduce; shown here and at the top of its page.
-  void not_reproduced(std::string_view text, Miss kind = Miss::printed_number);
-
+  void remark(const std::string& text);
+  /// Says plainly what of the paper did not reproduce; shown at the top of its page.
+  void not_reproduced(const std::string& text, Miss kind = Miss::printed_number);
   /// Shown in tables at the top of the paper's page.
   void claim(const Claim& claim);
   void correction(const Correction& correction);
-
   /// All figures, tables and remarks from here on are additions of ours (or, with false, the
   /// paper's again): they come after the paper's own, at the end of its page.
   void additions(bool on = true);
-
   /// The figure that stands for the paper on the front page; without it the first one.
-  void cover(std::string_view figure);
+  void cover(const std::string& figure);
 
   /// Prints the checks, writes summary.csv and contents.csv. The exit code of the program: non-zero
   /// if a number that must reproduce was missed, or a figure or file could not be written.
   [[nodiscard]] int finish();
 
  private:
-  void print_checks() const;
+  /// One row of summary.csv.
+  struct Check {
+    enum class Outcome { reported, pass, fail, known_miss };
 
+    std::string case_name, metric;
+    Measured ours;
+    std::string note;
+    std::optional<double> paper = {};      ///< printed in the paper
+    std::optional<double> reference = {};  ///< of an own check
+    Outcome outcome = Outcome::reported;
+    std::optional<double> relative_error = {};
+    std::optional<double> tolerance = {};  ///< relative; absolute where there is no relative error
+
+    bool compare(double target, const Tolerance& limit);
+    void append_note(const std::string& text);
+    [[nodiscard]] std::string ours_text() const;
+    [[nodiscard]] std::string verdict() const;
+  };
+
+  Check& begin(std::string_view case_name, std::string_view metric, const Measured& ours,
+               std::string_view note);
   void write_table(const char* kind, const std::string& name, const std::string& caption,
                    const std::vector<CsvRow>& lines);
-
   void write(const std::string& file, std::string_view text);
-
   /// Said at once, as the run may still be long, and again at the end.
-  void fail(std::string problem);
+  void fail(const std::string& problem);
 
-  std::string name_;
+  std::string name_, folder_;
   About about_;
-  std::filesystem::path folder_;
   std::vector<Check> checks_;
-  void add_content(std::string_view kind, std::string_view name, std::string_view text,
-                   std::string_view alt = {}, std::string_view more = {},
-                   std::string_view figure = {});
-
-  std::vector<CsvRow> contents_;
+  std::vector<CsvRow> contents_;  ///< kind, name, text, alt, more, figure
   std::vector<std::string> problems_;
 };
 

@@ -177,8 +177,8 @@ int run_own_log(const Arguments& arguments) {
     for (const auto& column : estimates.columns) text += ',' + number_text(column[k], 12);
     text += '\n';
   }
-  if (const auto error = write_text(report.folder() / "estimates.csv", text))
-    throw LogError(*error);
+  const std::string written = report.folder() + "/estimates.csv";
+  if (!write_text(written, text)) throw LogError("cannot write " + written);
 
   Figure figure("estimates", {.rows = 2 + (settings.order > 1 ? 1U : 0U), .panel_height = 170});
   figure.caption("Measurement, estimates and total disturbance.");
@@ -210,7 +210,7 @@ int run_own_log(const Arguments& arguments) {
                static_cast<double>(estimates.inputs));
   report.check("log", "gaps too long to bridge, restarts", std::nullopt,
                static_cast<double>(estimates.restarts));
-  std::printf("%s\n", (report.folder() / "estimates.csv").c_str());
+  std::printf("%s\n", written.c_str());
   return report.finish();
 }
 

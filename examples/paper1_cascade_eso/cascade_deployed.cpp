@@ -36,7 +36,6 @@
 
 #include "common/parallel.hpp"
 #include "common/report.hpp"
-#include "common/statistics.hpp"
 #include "paper1_cascade_eso/paper1.hpp"
 
 using namespace esokit::examples;

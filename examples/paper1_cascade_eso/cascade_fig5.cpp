@@ -28,10 +28,9 @@
 #include <string>
 #include <vector>
 
-#include "common/curve.hpp"
+#include "common/figure.hpp"
 #include "common/parallel.hpp"
 #include "common/report.hpp"
-#include "common/statistics.hpp"
 #include "paper1_cascade_eso/paper1.hpp"
 
 using namespace esokit::examples;
@@ -193,8 +192,6 @@ int main(int argc, char** argv) {
       "a panel end where 95 % of its map lie.");
   for (std::size_t row = 0; row < maps.size(); ++row) {
     const Map& map = maps[row];
-    const Curve equal = contour(quiet[map.x].bandwidth, quiet[map.y].bandwidth,
-                                difference(quiet[map.x], quiet[map.y]), 0.0);
     for (const bool with_noise : {false, true}) {
       const auto& curves = with_noise ? noisy : quiet;
       auto z = difference(curves[map.x], curves[map.y]);
@@ -211,15 +208,13 @@ int main(int argc, char** argv) {
           .x_range(grid[map.x].from, grid[map.x].to)
           .y_range(grid[map.y].from, grid[map.y].to)
           .legend(Legend::none)
-          .map(curves[map.x].bandwidth, curves[map.y].bandwidth, z,
-               {.palette = Palette::diverging,
-                .range = {-most, most},
-                .smooth = true,
-                .column = map.title})
-          .line(equal, {.name = "equal without noise",
-                        .color = Color::black,
-                        .dash = Dash::dashed,
-                        .width = 2.0})
+          .map(curves[map.x].bandwidth, curves[map.y].bandwidth, z, most, {.column = map.title})
+          .contour(quiet[map.x].bandwidth, quiet[map.y].bandwidth,
+                   difference(quiet[map.x], quiet[map.y]),
+                   {.name = "equal without noise",
+                    .color = Color::black,
+                    .dash = Dash::dashed,
+                    .width = 2.0})
           .points(
               {table1[map.x]}, {table1[map.y]},
               {.name = "Table 1", .color = Color::black, .marker = Marker::circle, .size = 1.3});

@@ -39,7 +39,6 @@
 
 #include "common/parallel.hpp"
 #include "common/report.hpp"
-#include "common/statistics.hpp"
 #include "paper1_cascade_eso/diagrams.hpp"
 #include "paper1_cascade_eso/paper1.hpp"
 

@@ -41,7 +41,6 @@
 
 #include "common/parallel.hpp"
 #include "common/report.hpp"
-#include "common/statistics.hpp"
 #include "paper1_cascade_eso/paper1.hpp"
 #include "paper1_cascade_eso/pvtol.hpp"
 
@@ -124,9 +123,10 @@ Figure draw_tracking(const std::string& name, const std::string& caption,
     position.line(runs[p].t, runs[p].z, style);
   }
   const double lap = 2.0 * std::numbers::pi / 0.75;
-  path.equal_axes().line(cut(runs[0].reference_x, runs[0].t, 0.0, lap),
-                         cut(runs[0].reference_z, runs[0].t, 0.0, lap), reference);
-  path.x_range(-1.1, 1.1).y_range(-0.1, 1.6).legend(Legend::bottom_left);
+  path.line(cut(runs[0].reference_x, runs[0].t, 0.0, lap),
+            cut(runs[0].reference_z, runs[0].t, 0.0, lap), reference);
+  // About the same length for a metre of x and of z.
+  path.x_range(-1.42, 1.42).y_range(-0.1, 1.6).legend(Legend::bottom_left);
   position.line(runs[0].t, runs[0].reference_x, reference);
   position.line(runs[0].t, runs[0].reference_z,
                 {.color = Color::black, .dash = Dash::dashed, .column = "reference z"});

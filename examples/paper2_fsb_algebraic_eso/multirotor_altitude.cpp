@@ -50,7 +50,6 @@
 
 #include "common/parallel.hpp"
 #include "common/report.hpp"
-#include "common/statistics.hpp"
 #include "paper2_fsb_algebraic_eso/paper2.hpp"
 
 using namespace esokit::examples;

@@ -36,8 +36,6 @@
 
 #include "common/parallel.hpp"
 #include "common/report.hpp"
-#include "common/single_run.hpp"
-#include "common/statistics.hpp"
 #include "paper3_abeso/paper3.hpp"
 
 using namespace esokit::examples;
@@ -280,11 +278,11 @@ int main(int argc, char** argv) {
     const std::string name = case_of(leso, bandwidths[w]);
     for (std::size_t i = 0; i < 3; ++i) {
       const bool swapped = i == 1 && (bandwidths[w] == 8.0 || bandwidths[w] == 9.0);
-      check_single_run(report, name, index_names[i], table2[i][w], linear.index(w, i),
-                       swapped ? "Table 6 prints " + number_text(table6[1][w], 4) +
-                                     " in this place, which fits: the two look exchanged"
-                               : "",
-                       swapped && bandwidths[w] == 9.0);
+      report.check_single_run(name, index_names[i], table2[i][w], linear.index(w, i),
+                              swapped ? "Table 6 prints " + number_text(table6[1][w], 4) +
+                                            " in this place, which fits: the two look exchanged"
+                                      : "",
+                              swapped && bandwidths[w] == 9.0);
     }
   }
   for (std::size_t w = 0; w < count; ++w) {
@@ -307,12 +305,12 @@ int main(int argc, char** argv) {
                                    const Transient& peak_paper) {
     for (std::size_t w = 1; w <= 3; ++w) {
       for (std::size_t i = 0; i < 3; ++i) {
-        check_single_run(report, case_of(runs.kind, bandwidths[w]), rise_names[i],
-                         rise_paper[i][w - 1],
-                         runs(w, [i](const Criteria& c) { return c.rise[i]; }), own_definition);
-        check_single_run(report, case_of(runs.kind, bandwidths[w]), peak_names[i],
-                         peak_paper[i][w - 1],
-                         runs(w, [i](const Criteria& c) { return c.peak[i]; }), own_definition);
+        report.check_single_run(
+            case_of(runs.kind, bandwidths[w]), rise_names[i], rise_paper[i][w - 1],
+            runs(w, [i](const Criteria& c) { return c.rise[i]; }), own_definition);
+        report.check_single_run(
+            case_of(runs.kind, bandwidths[w]), peak_names[i], peak_paper[i][w - 1],
+            runs(w, [i](const Criteria& c) { return c.peak[i]; }), own_definition);
       }
     }
   };
@@ -328,11 +326,11 @@ int main(int argc, char** argv) {
   for (std::size_t w = 0; w < count; ++w) {
     for (std::size_t i = 0; i < 3; ++i) {
       const bool missed = w == w7 && i == 2;
-      check_single_run(report, case_of(beso, bandwidths[w]), index_names[i], table4[i][w],
-                       bi.index(w, i),
-                       missed ? "3.4 sd; no setting that was tried has all of Table 4 within 3"
-                              : "derivative filter of 0.02 s fitted",
-                       missed);
+      report.check_single_run(
+          case_of(beso, bandwidths[w]), index_names[i], table4[i][w], bi.index(w, i),
+          missed ? "3.4 sd; no setting that was tried has all of Table 4 within 3"
+                 : "derivative filter of 0.02 s fitted",
+          missed);
     }
     report.check_reference(case_of(beso, bandwidths[w]), "J_ed over the steps", independent_beso[w],
                            bi.index(w, 2), Tolerance::deviations(1.0, bi.index(w, 2)));
@@ -361,8 +359,8 @@ int main(int argc, char** argv) {
        {false, false, false, false, false, false, true}}};
   for (std::size_t w = 0; w < count; ++w) {
     for (std::size_t i = 0; i < 3; ++i) {
-      check_single_run(report, case_of(abeso, bandwidths[w]), index_names[i], table6[i][w],
-                       adjustable.index(w, i), missed6[i][w] ? tried : "", missed6[i][w]);
+      report.check_single_run(case_of(abeso, bandwidths[w]), index_names[i], table6[i][w],
+                              adjustable.index(w, i), missed6[i][w] ? tried : "", missed6[i][w]);
     }
   }
   for (std::size_t w = 1; w <= 3; ++w) {
@@ -370,8 +368,8 @@ int main(int argc, char** argv) {
       const auto rise = adjustable(w, [i](const Criteria& c) { return c.rise[i]; });
       const auto peak = adjustable(w, [i](const Criteria& c) { return c.peak[i]; });
       if (w == w7) {
-        check_single_run(
-            report, case_of(abeso, bandwidths[w]), rise_names[i], table8_rise[i], rise,
+        report.check_single_run(
+            case_of(abeso, bandwidths[w]), rise_names[i], table8_rise[i], rise,
             i == 1 ? "the paper's ABESO is faster than its LESO here, ours slower" : own_definition,
             i == 1);
       } else {
@@ -408,8 +406,8 @@ int main(int argc, char** argv) {
         return i < 3 ? c.index[k] : c.rise[k];
       });
       quantities.push_back("ABESO, w = 7, " + (i < 3 ? index_names[k] : rise_names[k]));
-      check_single_run(
-          report, quantities.back(), std::string("less than the ") + base.kind.name + " (%)",
+      report.check_single_run(
+          quantities.back(), std::string("less than the ") + base.kind.name + " (%)",
           i < 3 ? index_paper[k] : rise_paper[k], ours, missed[i] ? tried : "", missed[i]);
     }
   };

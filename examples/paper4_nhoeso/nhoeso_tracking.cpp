@@ -41,8 +41,6 @@
 
 #include "common/parallel.hpp"
 #include "common/report.hpp"
-#include "common/single_run.hpp"
-#include "common/statistics.hpp"
 #include "paper4_nhoeso/paper4.hpp"
 
 using namespace esokit::examples;
@@ -168,8 +166,8 @@ int main(int argc, char** argv) {
     for (std::size_t k = 0; k < 2; ++k) {
       const auto ours = statistics_of(own, numbers[k]);
       if (c.paper) {
-        check_single_run(report, c.name, names[k], (*c.paper)[k], ours,
-                         "in a setting of 17 quantities fitted to the 6 numbers");
+        report.check_single_run(c.name, names[k], (*c.paper)[k], ours,
+                                "in a setting of 17 quantities fitted to the 6 numbers");
       } else {
         report.check(c.name, names[k], std::nullopt, ours);
       }

@@ -39,7 +39,6 @@
 
 #include "common/parallel.hpp"
 #include "common/report.hpp"
-#include "common/statistics.hpp"
 #include "paper5_esf_epadrc/paper5.hpp"
 
 using namespace esokit::examples;
