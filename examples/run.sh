@@ -57,7 +57,7 @@ folders=()
 for source in "$root"/examples/*/*.cpp; do
   [[ -e $source ]] || continue
   folder=$(basename -- "$(dirname -- "$source")")
-  [[ $folder != common ]] || continue
+  [[ $folder != common && $folder != start ]] || continue
   names+=("$(basename -- "$source" .cpp)")
   folders+=("$folder")
 done
