@@ -160,7 +160,9 @@ bool Figure::write(const std::string& folder) const {
                                       std::to_string(grid_.columns), text_of(grid_.panel_height)});
   for (const Panel& panel : panels_) {
     description += panel.description_;
-    for (const auto& [curve, more, column] : panel.series_) {
+    for (const auto& series : panel.series_) {
+      const auto& curve = series.curve;
+      const auto& more = series.more;
       if (curve.x.empty() || curve.x.size() != curve.y.size() ||
           (!more.empty() && more.size() != curve.size())) {
         std::fprintf(stderr, "figure %s, panel %s: columns of no or different lengths\n",
@@ -185,11 +187,11 @@ bool Figure::write(const std::string& folder) const {
       }
       // gnuplot counts series: one without a row would shift all that follow.
       if (std::none_of(curve.y.begin(), curve.y.end(), [](double y) { return std::isfinite(y); })) {
-        numbers += csv_line({panel.name_, column, "nan", "nan", ""});
+        numbers += csv_line({panel.name_, series.column, "nan", "nan", ""});
       }
       for (const std::size_t i : kept) {
         if (std::isfinite(curve.x[i]) && std::isfinite(curve.y[i])) {
-          numbers += csv_field(panel.name_) + ',' + csv_field(column) + ',' +
+          numbers += csv_field(panel.name_) + ',' + csv_field(series.column) + ',' +
                      number_text(curve.x[i], 7) + ',' + number_text(curve.y[i], 7) + ',' +
                      (more.empty() ? "" : number_text(more[i], 7));
         }
