@@ -4,9 +4,6 @@
 /// `register_laws<ControllerLaws>("Name", TypeList<Adrc<..>, ..>{})`.
 #pragma once
 
-// First: it must come before Eigen.
-#include <support/no_allocation.hpp>
-//
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -15,6 +12,7 @@
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/eigen.hpp>
 #include <support/law_registration.hpp>
+#include <support/no_allocation.hpp>
 #include <support/refusal.hpp>
 #include <tuple>
 #include <utility>

@@ -1,7 +1,6 @@
 // PredictiveAdrc: equal to the observer's update followed by AdrcLaw, for every observer; bad
 // samples, late reports, the start; and the paper's scaled-state form.
 
-// First: it must come before Eigen.
 #include <support/no_allocation.hpp>
 //
 #include <gtest/gtest.h>

@@ -7,9 +7,6 @@
 /// here from the physical estimates.
 #pragma once
 
-// First: it must come before Eigen.
-#include <support/no_allocation.hpp>
-//
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,6 +18,7 @@
 #include <support/exact_plant.hpp>
 #include <support/gain_comparison.hpp>
 #include <support/law_registration.hpp>
+#include <support/no_allocation.hpp>
 #include <support/numbers.hpp>
 #include <support/observer_traits.hpp>
 #include <support/refusal.hpp>

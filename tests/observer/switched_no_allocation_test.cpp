@@ -3,12 +3,20 @@
 //
 #include <gtest/gtest.h>
 
+#include <Eigen/Core>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
 
 namespace esokit_test {
 
 namespace {
+
+TEST(NoAllocation, CountsWhatEigenAllocates) {
+  const NoAllocation guard;
+  const Eigen::VectorXd vector = Eigen::VectorXd::Ones(guard.count() == 0 ? 100 : 1);
+  EXPECT_EQ(vector.sum(), 100);
+  EXPECT_EQ(guard.count(), 1);
+}
 
 TEST(SwitchedObservers, MakeAllocatesNothing) {
   bool made = true;

@@ -1,27 +1,17 @@
 /// @file
-/// Counts every operator new of the program and arms Eigen's allocation guard, in release builds
-/// too. Include it first, and in one translation unit of a program only: it replaces the operators.
+/// Counts every operator new of the program, and every malloc of its own code (that is Eigen's
+/// way). In one translation unit of a program only: it replaces the operators, and the program has
+/// to be linked with esokit_count_allocations (tests/CMakeLists.txt), which sends malloc here.
 #pragma once
-
-#ifdef EIGEN_CORE_H
-#error "support/no_allocation.hpp must come before Eigen"
-#endif
 
 #include <atomic>
 #include <cstddef>
-#include <cstdio>
 #include <cstdlib>
 #include <new>
 
 namespace esokit_test {
 
 inline std::atomic<long> allocation_count{0};
-
-inline void eigen_assertion(bool holds, const char* text) {
-  if (holds) return;
-  std::fprintf(stderr, "Eigen: %s\n", text);
-  std::abort();
-}
 
 inline void* counted_allocation(std::size_t size, std::size_t alignment) {
   ++allocation_count;
@@ -33,10 +23,18 @@ inline void* counted_allocation(std::size_t size, std::size_t alignment) {
 
 }  // namespace esokit_test
 
-// Eigen's guard works through its assertion, which NDEBUG would remove.
-#define EIGEN_RUNTIME_NO_MALLOC
-#define eigen_assert(...) \
-  ::esokit_test::eigen_assertion(static_cast<bool>(__VA_ARGS__), #__VA_ARGS__)
+extern "C" {
+void* __real_malloc(std::size_t size);
+void* __wrap_malloc(std::size_t size) {
+  ++esokit_test::allocation_count;
+  return __real_malloc(size);
+}
+void* __real_realloc(void* memory, std::size_t size);
+void* __wrap_realloc(void* memory, std::size_t size) {
+  ++esokit_test::allocation_count;
+  return __real_realloc(memory, size);
+}
+}
 
 // Not inlined: GCC warns where it sees one half of a replaced pair.
 [[gnu::noinline]] void* operator new(std::size_t size) {
@@ -54,22 +52,15 @@ inline void* counted_allocation(std::size_t size, std::size_t alignment) {
   std::free(memory);
 }
 
-#include <Eigen/Core>
-
 namespace esokit_test {
 
-/// While it lives, an allocation by Eigen aborts; `count()` says how many others there were.
+/// `count()` says how many allocations there were since it was made.
 class NoAllocation {
  public:
-  NoAllocation() : before_(allocation_count) { Eigen::internal::set_is_malloc_allowed(false); }
-  ~NoAllocation() { Eigen::internal::set_is_malloc_allowed(true); }
-  NoAllocation(const NoAllocation&) = delete;
-  NoAllocation& operator=(const NoAllocation&) = delete;
-
   [[nodiscard]] long count() const { return allocation_count - before_; }
 
  private:
-  long before_;
+  long before_ = allocation_count;
 };
 
 }  // namespace esokit_test
