@@ -15,8 +15,11 @@
 #include <esokit/control/incremental.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/nonlinear_feedback.hpp>
+#include <esokit/control/predictive_adrc.hpp>
 #include <esokit/control/tracking_differentiator.hpp>
 #include <esokit/core/pack.hpp>
+#include <esokit/observer/adjustable_bandwidth_eso.hpp>
+#include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/mimo_extended_state_filter.hpp>
 #include <string>
@@ -104,6 +107,27 @@ struct Compensating {
     typename Type<T>::Config config{};
     config.observer = GatedAngle::config<T>(lane, again);
     config.compensation_gain = set<T>(lane, again, 0.5);
+    return config;
+  }
+};
+
+/// Of a gain that is known before, one of two, and one that is a function of e.
+template <template <class> class Observer>
+struct Predictive {
+  template <class T>
+  using Type = esokit::PredictiveAdrc<Observer<T>>;
+  template <class T>
+  static typename Type<T>::Config config(int lane, bool again) {
+    typename Type<T>::Config config{};
+    if constexpr (requires { config.observer.bandwidth_factor; }) {
+      config.observer.bandwidth_factor = T(2.0);
+    }
+    config.observer.observer_bandwidth = set<T>(lane, again, 30);
+    config.observer.input_gain = set<T>(lane, again, -2);
+    config.observer.sample_time = set<T>(lane, false, 0.01);
+    config.controller_bandwidth = set<T>(lane, again, 5);
+    config.limits = {set<T>(lane, again, -40), set<T>(lane, again, 30), T(1e3)};
+    config.start_hold = set<T>(lane, false, 0.05);
     return config;
   }
 };
@@ -295,6 +319,28 @@ TEST(LaneByLane, DisturbanceCompensator) {
     const auto u = c.update(x[0], x[1]);
     return std::tuple(u, c.output(), c.status(), c.mode());
   });
+}
+
+template <class T>
+using Cascaded = esokit::CascadeEso<1, 2, T>;
+template <class T>
+using Switching = esokit::AdjustableBandwidthEso<1, T>;
+
+const auto predict_control = [](auto& c, const auto& x, int k) {
+  if (k % 113 == 50) (void)c.start(x[0], x[1]);
+  if (k % 113 == 90) (void)c.reset(x[0]);
+  const auto u = k % 11 == 7 ? c.control_without_measurement() : c.control(x[0]);
+  if (k % 5 == 2) (void)c.report_applied(x[3]);
+  const auto status = k % 13 == 5 ? c.prepare({x[1], x[2]}) : c.prepare(x[1]);
+  if (k % 7 == 1) (void)c.report_applied(x[3]);
+  if (k % 17 == 3) c.set_reference(x[2]);
+  return std::tuple(u, status, c.output(), c.blind_output(), c.status(), c.gains(),
+                    c.observer().estimate());
+};
+
+TEST(LaneByLane, PredictiveAdrc) {
+  expect_lanes<Predictive<Cascaded>>(predict_control);
+  expect_lanes<Predictive<Switching>>(predict_control);
 }
 
 TEST(LaneByLane, MimoAdrc) {

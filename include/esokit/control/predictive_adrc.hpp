@@ -9,6 +9,7 @@
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/control/controller.hpp>
 #include <esokit/control/limiter.hpp>
+#include <esokit/core/lane_by_lane.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/core/unroll.hpp>
 #include <esokit/gain/gain_law.hpp>
@@ -18,6 +19,26 @@
 #include <optional>
 
 namespace esokit {
+
+/// Config of PredictiveAdrc. Give `controller_bandwidth` or `gains`, not both.
+template <PredictableObserver Observer>
+struct PredictiveAdrcConfig {
+  using S = typename Observer::scalar_type;      ///< of signals and settings
+  static constexpr int order = Observer::order;  ///< n, order of the plant
+
+  typename Observer::Config observer{};    ///< b0 and T are in here
+  S controller_bandwidth{};                ///< omega_c, rad/s: k_i = C(n, i) omega_c^(n-i)
+  std::optional<Array<S, order>> gains{};  ///< k_0 .. k_(n-1)
+  Limits<S> limits{};                      ///< of the actuator
+  S start_hold{};  ///< t_u >= 0, s: u = 0 (within the limits) for so long after the start, while
+                   ///< the observer settles; rounded up to whole samples
+
+  /// @cond
+  static constexpr auto fields(auto& c) noexcept {
+    return detail::tie(c.observer, c.controller_bandwidth, c.gains, c.limits, c.start_hold);
+  }
+  /// @endcond
+};
 
 /// u = (v - dhat) / b0, as AdrcLaw gives it after the observer's correction, but with the
 /// correction folded in: u_k = ubar_k - slope y_k, where ubar_k and slope are known before y_k.
@@ -45,14 +66,11 @@ namespace esokit {
 /// after `prepare`, tell `report_applied`: the prediction is put right by Gamma (u_reported -
 /// u_assumed) before the next correction.
 ///
-/// Plain scalars. No call but make and retune does more than multiply and add
+/// No call but make and retune does more than multiply and add
 /// beside what the observer's gain law does (the division of a filter, the power of fal); none
 /// allocates, throws or locks.
 template <PredictableObserver Observer>
 class PredictiveAdrc {
-  static_assert(lane_count<typename Observer::scalar_type> == 1,
-                "esokit: PredictiveAdrc is of plain scalars: take one for each lane of a pack");
-
  public:
   static constexpr int order = Observer::order;        ///< n, order of the plant
   using scalar_type = typename Observer::scalar_type;  ///< of signals and settings
@@ -64,15 +82,7 @@ class PredictiveAdrc {
   static constexpr ControllerTraits traits{
       .two_phases = true, .takes_derivatives = true, .knows_sample_time = true, .observes = true};
 
-  /// Give `controller_bandwidth` or `gains`, not both.
-  struct Config {
-    typename Observer::Config observer{};    ///< b0 and T are in here
-    S controller_bandwidth{};                ///< omega_c, rad/s: k_i = C(n, i) omega_c^(n-i)
-    std::optional<Array<S, order>> gains{};  ///< k_0 .. k_(n-1)
-    Limits<S> limits{};                      ///< of the actuator
-    S start_hold{};  ///< t_u >= 0, s: u = 0 (within the limits) for so long after the start, while
-                     ///< the observer settles; rounded up to whole samples
-  };
+  using Config = PredictiveAdrcConfig<Observer>;  ///< settings of make
 
   /// Checks the settings and does all the design work.
   /// @return the controller at rest, reference 0, or an error that names the field
@@ -447,6 +457,26 @@ class PredictiveAdrc {
   StepStatus status_ = StepStatus::ok;
   std::uint32_t hold_left_;
   std::uint32_t hold_;
+};
+
+/// The same of packs, lane by lane.
+template <PredictableObserver Observer>
+requires PackScalar<typename Observer::scalar_type>
+class PredictiveAdrc<Observer>
+    : public LaneByLane<PredictiveAdrc<Observer>, PredictiveAdrc<detail::LaneOf<Observer>>,
+                        typename Observer::scalar_type, PredictiveAdrcConfig<Observer>> {
+ public:
+  static constexpr int order = Observer::order;  ///< n, order of the plant
+  template <class T>
+  using with_scalar = PredictiveAdrc<detail::WithScalar<Observer, T>>;  ///< of another scalar
+
+  using PredictiveAdrc::LaneByLane::LaneByLane;
+
+  /// The observer, put together from the lanes.
+  [[nodiscard]] Observer observer() const noexcept {
+    return this->template gathered<Observer>(
+        [](const auto& lane) -> const auto& { return lane.observer(); });
+  }
 };
 
 /// Told apart in snapshots.

@@ -8,6 +8,16 @@
 
 namespace esokit::detail {
 
+/// to = from. GCC copies a pack of several registers in pieces of its own, through memory.
+template <class S>
+ESOKIT_INLINE constexpr void assign(S& to, const S& from) noexcept {
+  if constexpr (requires { to.assign(from); }) {
+    to.assign(from);
+  } else {
+    to = from;
+  }
+}
+
 /// x + k e, element by element: a correction.
 template <class S, std::size_t Size>
 [[nodiscard]] ESOKIT_INLINE constexpr std::array<S, Size> add_scaled(const std::array<S, Size>& x,

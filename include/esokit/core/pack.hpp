@@ -47,8 +47,10 @@ struct Registers {
     return {Register(f(from.value...))};
   }
 
-  /// All registers by `or` in one.
-  [[nodiscard]] ESOKIT_INLINE constexpr Register any() const noexcept { return value; }
+  /// All registers by `and` in one.
+  [[nodiscard]] ESOKIT_INLINE constexpr Register every() const noexcept { return value; }
+
+  ESOKIT_INLINE constexpr void assign(const Registers& from) noexcept { value = from.value; }
 
   Register value;
 };
@@ -69,8 +71,12 @@ requires(Count > register_lanes<S>) struct Registers<S, Count> {
   ESOKIT_INLINE static constexpr Registers each(Function&& f, const From&... from) noexcept {
     return {Half::each(f, from.low...), Half::each(f, from.high...)};
   }
-  [[nodiscard]] ESOKIT_INLINE constexpr Register any() const noexcept {
-    return low.any() | high.any();
+  [[nodiscard]] ESOKIT_INLINE constexpr Register every() const noexcept {
+    return low.every() & high.every();
+  }
+  ESOKIT_INLINE constexpr void assign(const Registers& from) noexcept {
+    low.assign(from.low);
+    high.assign(from.high);
   }
 
   Half low;
@@ -80,13 +86,13 @@ requires(Count > register_lanes<S>) struct Registers<S, Count> {
 template <class S>
 using BitsOf = std::conditional_t<sizeof(S) == 4, std::int32_t, std::int64_t>;
 
-/// True if no bit of a register is set.
+/// True if all bits of a register are set.
 template <class Bits>
-ESOKIT_INLINE constexpr bool no_bits(const Bits& bits) noexcept {
+ESOKIT_INLINE constexpr bool all_bits(const Bits& bits) noexcept {
   constexpr int words = sizeof(Bits) / sizeof(std::int64_t);
   if constexpr (words < 2) {
     using Word = std::conditional_t<words == 1, std::uint64_t, std::uint32_t>;
-    return std::bit_cast<Word>(bits) == 0;
+    return std::bit_cast<Word>(bits) == static_cast<Word>(-1);
   } else {
     // By subscript: an array of the words would go through memory.
     const auto word = std::bit_cast<typename Registers<std::int64_t, words>::Register>(bits);
@@ -94,14 +100,13 @@ ESOKIT_INLINE constexpr bool no_bits(const Bits& bits) noexcept {
     if constexpr (words == 4) {
       if (!std::is_constant_evaluated()) {
         typedef long long Words __attribute__((vector_size(32)));
-        return __builtin_ia32_ptestz256(std::bit_cast<Words>(word), std::bit_cast<Words>(word)) !=
-               0;
+        return __builtin_ia32_ptestc256(std::bit_cast<Words>(word), Words{-1, -1, -1, -1}) != 0;
       }
     }
 #endif
-    std::int64_t any = 0;
-    unroll<words>([&](auto i) ESOKIT_INLINE_LAMBDA { any |= word[int{i}]; });
-    return any == 0;
+    std::int64_t every = -1;
+    unroll<words>([&](auto i) ESOKIT_INLINE_LAMBDA { every &= word[int{i}]; });
+    return every == -1;
   }
 }
 
@@ -145,7 +150,7 @@ class PackMask {
 
   /// True if it holds in every lane.
   ESOKIT_INLINE friend constexpr bool all(const PackMask& mask) noexcept {
-    return detail::no_bits((!mask).bits_.any());
+    return detail::all_bits(mask.bits_.every());
   }
 
  private:
@@ -185,6 +190,9 @@ class Pack {
             [value]() ESOKIT_INLINE_LAMBDA { return Register{} + static_cast<S>(value); })) {}
   /// One number a lane.
   constexpr Pack(const Array<S, Count>& values) noexcept : values_(std::bit_cast<Values>(values)) {}
+
+  /// *this = from, register by register.
+  ESOKIT_INLINE constexpr void assign(const Pack& from) noexcept { values_.assign(from.values_); }
 
   /// The number of a lane.
   /// @{
@@ -243,14 +251,24 @@ class Pack {
       return Mask(
           by_bits<Bits>(a, [&](auto bits) { return (bits & exponent) != exponent ? -1 : 0; }));
     }
+#if defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
     Pack looked_at = a;
-#if defined(__clang__) && defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
+#if defined(__clang__)
     asm("" : "+m"(looked_at));  // see detail::opaque
 #endif
     return test(
         [](auto x)
             ESOKIT_INLINE_LAMBDA { return (std::bit_cast<BitRegister>(x) & exponent) != exponent; },
         looked_at);
+#else
+    // Zero of a finite number, else NaN: needs no constants, which GCC loads anew for each pack.
+    return test(
+        [](auto x) ESOKIT_INLINE_LAMBDA {
+          const auto zero = x - x;
+          return zero == zero;
+        },
+        a);
+#endif
   }
 
   /// abs(a), lane by lane.

@@ -119,7 +119,7 @@ class PredictorCorrector {
   // In line, as a call has a frame aligned for vectors, which costs a third of the step. A
   // template, or Clang 14 instantiates both in an explicit instantiation.
   template <class T = S>
-  ESOKIT_INLINE Status update(S y, S u_applied) noexcept requires PackScalar<T> {
+  ESOKIT_INLINE Status update(const S& y, const S& u_applied) noexcept requires PackScalar<T> {
     advance_laws();
     return update_advanced(y, u_applied);
   }
@@ -490,9 +490,14 @@ class PredictorCorrector {
   /// A gap that is above every max_gap.
   static constexpr std::uint16_t restart_due = 65535;
 
+  struct Nothing {};
   struct Correction {
     LevelStates states;
-    Array<S, Levels> innovations{};
+    S innovation{};  ///< of level 1
+    // Of all levels where the laws are told. Apart: what nobody reads would be stored.
+    [[no_unique_address]] std::conditional_t<gain_law_traits<Law>.accepts, Array<S, Levels>,
+                                             Nothing>
+        innovations{};
   };
 
   /// `step` with the observer of each lane.
@@ -609,7 +614,8 @@ class PredictorCorrector {
     detail::unroll<Levels>([&](auto level) ESOKIT_INLINE_LAMBDA {
       auto& z = std::get<level>(step.states);
       const S e = measured - std::get<0>(z);
-      std::get<level>(step.innovations) = e;
+      if constexpr (level == 0) detail::assign(step.innovation, e);
+      if constexpr (law_traits.accepts) std::get<level>(step.innovations) = e;
       if constexpr (law_looks) {
         if (!all(is_finite(e))) [[unlikely]] {
           fine = false;
@@ -628,7 +634,7 @@ class PredictorCorrector {
 
   ESOKIT_INLINE constexpr void commit(const Correction& step) noexcept {
     states_ = step.states;
-    innovation_ = step.innovations[0];
+    detail::assign(innovation_, step.innovation);
     if constexpr (gain_law_traits<Law>.accepts) {
       detail::unroll<Levels>([&](auto i) ESOKIT_INLINE_LAMBDA {
         std::get<i>(laws_).accept(std::get<i>(step.innovations));
@@ -637,7 +643,7 @@ class PredictorCorrector {
   }
 
   /// `update` where the laws have advanced.
-  ESOKIT_INLINE Status update_advanced(S y, S u_applied) noexcept {
+  ESOKIT_INLINE Status update_advanced(const S& y, const S& u_applied) noexcept {
     if (gap_ == 0) [[likely]] {
       // One test for all: a bad y or u makes the new state non-finite. Nothing is kept then, and
       // the guarded path finds out what it was.
@@ -654,7 +660,9 @@ class PredictorCorrector {
     return update_guarded(y, u_applied);
   }
 
-  ESOKIT_COLD Status update_guarded(S y, S u_applied) noexcept {
+  // A pack by reference: by value each step would keep it in memory for this call.
+  using Given = std::conditional_t<PackScalar<S>, const S&, S>;
+  ESOKIT_COLD Status update_guarded(Given y, Given u_applied) noexcept {
     if constexpr (PackScalar<S>) {
       return each_lane(
           [&](Plain& lane, int i) { return lane.update_advanced(y[i], u_applied[i]); });
