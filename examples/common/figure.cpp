@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
-#include <cstdlib>
 #include <limits>
 #include <set>
 
@@ -202,6 +202,7 @@ bool Figure::write(const std::string& folder) const {
   const std::string file = folder + "/" + name_ + ".csv";
   if (!write_text(file, numbers)) return false;
   std::fflush(nullptr);
+  std::signal(SIGPIPE, SIG_IGN);  // where there is no Python: pclose says so
   std::FILE* pipe = popen(ESOKIT_DRAW_FIGURE, "w");
   if (pipe == nullptr) return false;
   std::fwrite(description.data(), 1, description.size(), pipe);
