@@ -144,7 +144,9 @@ def counts(paper):
 
 
 def table(caption, headings, rows, text=False):
-    """`rows` hold finished cells, with their td or th."""
+    """`rows` hold finished cells, with their td or th; no table without them."""
+    if not rows:
+        return ""
     head = "".join(f'<th class="text" scope="col">{esc(heading)}</th>' if text else
                    f'<th scope="col">{esc(heading)}</th>' for heading in headings)
     body = "".join(f"<tr>{''.join(row)}</tr>\n" for row in rows)
@@ -189,20 +191,20 @@ def misses(paper):
 
 def claims(paper):
     kinds = {"holds": "pass", "not tested": "reported"}
-    rows = [(cell(item.text, "text"), cell(item.name, "text narrow"),
-             f'<td class="text"><b class="{kinds.get(item.alt, "known_miss")}">{esc(item.alt)}.</b> '
-             f"{esc(item.more)}</td>",
-             f'<td class="text narrow"><a href="#{one.anchor}">{esc(item.figure or one.name)}</a></td>')
-            for one, item in paper.items("claim")]
-    return rows and table("What the paper claims, and whether it holds here",
-                          ["claim", "in the paper", "here", "shown in"], rows, True) or ""
+    return table("What the paper claims, and whether it holds here",
+                 ["claim", "in the paper", "here", "shown in"], [
+        (cell(item.text, "text"), cell(item.name, "text narrow"),
+         f'<td class="text"><b class="{kinds.get(item.alt, "known_miss")}">{esc(item.alt)}.</b> '
+         f"{esc(item.more)}</td>",
+         f'<td class="text narrow"><a href="#{one.anchor}">{esc(item.figure or one.name)}</a></td>')
+        for one, item in paper.items("claim")], True)
 
 
 def corrections(paper):
-    rows = [(cell(item.name, "text narrow"), cell(item.text, "text"), cell(item.alt, "text"),
-             cell(item.more, "text")) for _, item in paper.items("correction")]
-    return rows and table("Corrections of printed formulas",
-                          ["where", "printed", "correct", "how one knows"], rows, True) or ""
+    return table("Corrections of printed formulas",
+                 ["where", "printed", "correct", "how one knows"], [
+        (cell(item.name, "text narrow"), cell(item.text, "text"), cell(item.alt, "text"),
+         cell(item.more, "text")) for _, item in paper.items("correction")], True)
 
 
 def figure(out, example, item):
@@ -260,8 +262,6 @@ def article(out, example, items, later=False):
 
 
 def all_checks(example):
-    if not example.rows:
-        return ""
     marks = {"pass": ("✓ met", "✓ passed"), "fail": ("✗ failed",) * 2,
              "known_miss": ("≠ missed",) * 2, "reported": ("not judged", "shown")}
     # Without a relative error the tolerance is absolute.
@@ -337,7 +337,8 @@ def one_paper(out, paper):
         main += article(out, one, [item for item in one.items if one.addition or item.addition],
                         not one.addition)
     main += '<h2 id="numbers">All numbers, with tolerances</h2>\n'
-    return header, main + "".join(all_checks(one) for one in paper.examples)
+    return header, main + "".join(
+        all_checks(one) for one in paper.examples if one.rows)
 
 
 def main():
