@@ -1,0 +1,259 @@
+// A drive whose cogging torque swings with its speed, and a plant with ripple of a known frequency:
+// the resonators in the model, their price, and what is left where the frequency is wrong.
+//
+// Way: sampled. The observer sees a double integrator on which the load acts; what dhat is off by
+// is what a law leaves of the load. The speed is known (that of the shaft) and is told each sample.
+//
+// Load   d = a_1 sin(phi) + a_2 sin(2 phi + 1),  phi' = w(t)   (cogging)
+//
+// symbol   code         value      unit
+// T        sample_time  0.001      s
+// omega_o  observer     60         rad/s
+// w        speed        40 .. 160  rad/s, up in 4 s and down again
+// a_1,a_2  -            2, 1       rad/s^2
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <complex>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include <esokit/analysis/covariance.hpp>
+#include <esokit/analysis/frequency_response.hpp>
+#include <esokit/observer/model_eso.hpp>
+#include <esokit/sim/gaussian.hpp>
+
+#include "common/report.hpp"
+#include "models/models.hpp"
+
+using namespace esokit;
+using namespace esokit::examples;
+using namespace models;
+
+namespace {
+
+constexpr double observer = 60.0;
+constexpr double design_speed = 80.0;
+
+using Chain = LinearEso<2>;
+using Fixed = ModelEso<ModelParts{.order = 2, .resonators = 2}>;
+using Following = ModelEso<ModelParts{.order = 2, .resonators = 2, .follows_speed = true}>;
+using Ripple = ModelEso<ModelParts{.order = 2, .resonators = 1}>;
+
+double load(double angle) { return 2 * std::sin(angle) + std::sin(2 * angle + 1); }
+
+/// w, from 40 up to 160 rad/s and down again.
+double speed(double t) { return 100 - 60 * std::cos(2 * std::numbers::pi * t / 8); }
+
+struct Tracked {
+  std::vector<double> t, off;
+  double rms = 0;
+};
+
+/// A double integrator under the load, `tell(observer, w)` before each sample.
+template <class Observer, class Tell>
+Tracked tracked(Observer eso, double noise, const Tell& tell) {
+  Tracked result;
+  sim::Gaussian gaussian(3);
+  double y = 0, rate = 0, angle = 0, sum = 0;
+  int count = 0;
+  for (int k = 0; k < 8000; ++k) {
+    const double t = k * sample_time;
+    tell(eso, speed(t));
+    constexpr int fine = 10;
+    constexpr double h = sample_time / fine;
+    for (int i = 0; i < fine; ++i) {
+      const double turn = h * speed(t + i * h);
+      const double a = load(angle), b = load(angle + turn / 2), c = load(angle + turn);
+      y += rate * h + h * h / 6 * (a + 2 * b);
+      rate += h / 6 * (a + 4 * b + c);
+      angle += turn;
+    }
+    // The drive's own integrals of the load grow: taken off, as a loop would do, from both.
+    (void)eso.update(y + noise * gaussian.next(), 0.0);
+    const double off = eso.total_disturbance() - load(angle);
+    if (k >= 1000) {
+      sum += off * off;
+      ++count;
+    }
+    if (k % 4 == 0) {
+      result.t.push_back(t);
+      result.off.push_back(off);
+    }
+  }
+  result.rms = std::sqrt(sum / count);
+  return result;
+}
+
+template <class Eso>
+typename Eso::Config config_of() {
+  return {.observer_bandwidth = observer,
+          .input_gain = 1.0,
+          .sample_time = sample_time,
+          .model = {.resonators = {{{design_speed}, {2 * design_speed}}}}};
+}
+
+void cogging(Report& report) {
+  auto config = config_of<Following>();
+  config.model.speed = {0.4, 2.2};
+  const auto following = Following::make(config).value();
+  const auto nothing = [](auto&, double) {};
+  const auto told = [](double wrong) {
+    return [wrong](Following& eso, double w) { (void)eso.set_speed(wrong * w / design_speed); };
+  };
+  const auto chain =
+      Chain::make({.observer_bandwidth = observer, .input_gain = 1.0, .sample_time = sample_time})
+          .value();
+  const auto fixed = Fixed::make(config_of<Fixed>()).value();
+  std::vector<CsvRow> lines;
+  const auto show = [&](const char* name, const auto& eso, const auto& tell) {
+    const Tracked exact = tracked(eso, 0.0, tell);
+    const Tracked noisy = tracked(eso, 1e-5, tell);
+    lines.push_back(
+        {name, number_text(exact.rms, 2),
+         number_text(std::sqrt(std::max(0.0, noisy.rms * noisy.rms - exact.rms * exact.rms)), 2)});
+    return exact;
+  };
+  const Tracked none = show("no model of it", chain, nothing);
+  const Tracked middle = show("resonators at the middle speed", fixed, nothing);
+  const Tracked right = show("resonators that follow the speed", following, told(1.0));
+  const Tracked wrong = show("the speed told 5 % too high", following, told(1.05));
+  const Tracked far = show("the speed told 30 % too high", following, told(1.3));
+  const double size = std::sqrt(2.5);
+  report.expect("cogging", "share of the load left, no model", none.rms / size,
+                none.rms > 0.3 * size, "above 0.3");
+  report.expect("cogging", "share of the load left, following", right.rms / size,
+                right.rms < 0.1 * size, "below 0.1");
+  report.expect("cogging", "5 % wrong, of that without a model", wrong.rms / none.rms,
+                wrong.rms < none.rms, "still better");
+  report.expect("cogging", "30 % wrong, of that without a model", far.rms / none.rms,
+                far.rms > 0.3 * none.rms, "most of the gain is gone");
+  Figure figure("cogging", {.rows = 1, .columns = 1, .panel_height = 260});
+  figure.caption(
+      "What dhat is off by while the speed goes from 40 to 160 rad/s and back in 8 s, the cogging "
+      "torque of the shaft's angle and its second harmonic with it. omega_o = 60 rad/s.");
+  figure.panel(0, 0)
+      .x_label("t (s)")
+      .y_label("dhat − d (rad/s^2)")
+      .legend(Legend::above)
+      .name("off")
+      .line(none.t, none.off, {.name = "no model", .color = Color::grey, .width = 0.8})
+      .line(middle.t, middle.off, {.name = "middle speed", .color = Color::orange, .width = 0.8})
+      .line(right.t, right.off, {.name = "following", .color = Color::blue, .width = 1.2});
+  report.add(figure);
+  report.table("cogging",
+               "RMS of dhat - d after 1 s: what the motion leaves, and what noise of 10 "
+               "urad on the angle adds",
+               {"observer", "motion (rad/s2)", "noise (rad/s2)"}, lines);
+}
+
+/// sd of dhat for noise of 1 on y.
+template <class Observer>
+double noise_of(const Observer& eso) {
+  const auto system = observer_system(eso).template channel<0, 2>();
+  const EigenMatrix<double, 1, 1> one = EigenMatrix<double, 1, 1>::Identity();
+  const auto covariance = output_covariance(system, one);
+  return std::sqrt((*covariance)(0, 0));
+}
+
+/// |1 - dhat / d| for a sine of w. The analysis holds d over a sample, which is half a sample late.
+template <class Observer>
+double left_over(const Observer& eso, double w) {
+  const auto system = estimation_system(eso).template channel<1, 2>();
+  const auto early = std::polar(1.0, w * sample_time / 2);
+  return std::abs(1.0 - early * frequency_response(system, w).value()(0, 0));
+}
+
+Ripple ripple_eso(double w, double capture) {
+  return Ripple::make({.observer_bandwidth = observer,
+                       .input_gain = 1.0,
+                       .sample_time = sample_time,
+                       .model = {.resonators = {{{w, 0.0, capture}}}}})
+      .value();
+}
+
+void ripple(Report& report) {
+  const auto chain =
+      Chain::make({.observer_bandwidth = observer, .input_gain = 1.0, .sample_time = sample_time})
+          .value();
+  const double quiet = noise_of(chain);
+  std::vector<CsvRow> lines;
+  for (const double share : {1 / 10.0, 1 / 5.0, 1 / 3.0, 1.0, 3.0}) {
+    const double w = share * observer;
+    const auto eso = ripple_eso(w, 0);
+    // A chain that is as noisy.
+    double low = observer, high = 20 * observer;
+    const auto faster = [&](double bandwidth) {
+      return Chain::make(
+                 {.observer_bandwidth = bandwidth, .input_gain = 1.0, .sample_time = sample_time})
+          .value();
+    };
+    for (int i = 0; i < 50; ++i) {
+      const double middle = std::sqrt(low * high);
+      (noise_of(faster(middle)) < noise_of(eso) ? low : high) = middle;
+    }
+    const double beside = left_over(eso, 1.02 * w);
+    lines.push_back({number_text(w, 3), number_text(noise_of(eso) / quiet, 2),
+                     number_text(left_over(eso, w), 1), number_text(100 * beside, 2),
+                     number_text(100 * left_over(eso, 1.3 * w), 2),
+                     number_text(100 * left_over(chain, w), 2),
+                     number_text(100 * left_over(faster(low), w), 2)});
+    const std::string name = "ripple at omega_o times " + number_text(share, 2);
+    // The held sine is smaller by (w T)^2 / 24.
+    const double hold = w * sample_time * w * sample_time / 24;
+    report.expect(name, "left over at its frequency", left_over(eso, w),
+                  left_over(eso, w) < 1.1 * hold, "no more than the hold's (w T)^2 / 24");
+    if (share > 0.34) continue;
+    report.expect(name, "left over 2 % beside it", beside, beside < 0.032, "about 3 % at most");
+    report.expect(name, "noise of dhat, of the chain's", noise_of(eso) / quiet,
+                  noise_of(eso) < 3.3 * quiet, "3.2 at most");
+  }
+  report.table(
+      "ripple",
+      "A resonator with s = w0 beside the chain, omega_o = 60 rad/s: noise of dhat, and what is "
+      "left of a sine at, 2 % and 30 % beside the frequency it was made for",
+      {"w0 (rad/s)", "noise, chain = 1", "left at w0", "2 % beside (%)", "30 % beside (%)",
+       "chain (%)", "chain of equal noise (%)"},
+      lines);
+
+  Figure figure("ripple", {.rows = 1, .columns = 1, .panel_height = 260});
+  figure.caption(
+      "What is left of a disturbance, over its frequency: a resonator at 30 rad/s with capture "
+      "bandwidths of a third, one and three times w0, beside the chain. Wider forgives more and "
+      "lets more noise through.");
+  auto& panel = figure.panel(0, 0);
+  panel.log_x().log_y().x_label("w (rad/s)").y_label("abs(1 − dhat/d)").name("left");
+  panel.legend(Legend::bottom_right).y_range(1e-3, 3.0);
+  const auto grid = log_grid<161>(3.0, 300.0).value();
+  const auto curve = [&](const auto& eso) {
+    std::vector<double> left;
+    for (const double w : grid) left.push_back(left_over(eso, w));
+    return left;
+  };
+  const std::vector<double> at(grid.begin(), grid.end());
+  constexpr std::array colors = {Color::sky, Color::blue, Color::green};
+  std::size_t i = 0;
+  for (const double factor : {1.0 / 3, 1.0, 3.0}) {
+    const auto eso = ripple_eso(30, 30 * factor);
+    panel.line(at, curve(eso),
+               {.name = "s = " + number_text(factor, 2) + " w0, noise " +
+                        number_text(noise_of(eso) / quiet, 2),
+                .color = colors[i++]});
+  }
+  panel.line(at, curve(chain), {.name = "chain, noise 1", .color = Color::vermillion});
+  report.add(figure);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Report report(argc, argv, "models", "swing",
+                about("Cogging and ripple",
+                      "Disturbances that swing: with the speed of a shaft, and at a known "
+                      "frequency."));
+  cogging(report);
+  ripple(report);
+  return report.finish();
+}
