@@ -87,7 +87,8 @@ class Panel:
 class Figure:
     def __init__(self, rows):
         _, self.folder, self.name, self.title, lines, columns, height = next(rows)
-        self.panels, blocks = [], iter(range(1, 10000))  # block 0 is the CSV's heading
+        self.panels, self.series = [], []
+        blocks = iter(range(1, 10000))  # block 0 is the CSV's heading
         for key, *values in rows:
             if key == "panel":
                 self.panels.append(Panel(*values))
@@ -226,10 +227,11 @@ class Figure:
 
     def zoom(self, panel, inset):
         """The ends of what an inset shows, and its box."""
-        text = (Path(self.folder) / (self.name + ".csv")).read_text(encoding="utf-8")
-        series = text.split("\n\n\n")
+        if not self.series:
+            file = Path(self.folder) / (self.name + ".csv")
+            self.series = file.read_text(encoding="utf-8").split("\n\n\n")
         shown = [float(row[3]) for one in panel.drawn if one.block
-                 for row in csv.reader(series[one.block].splitlines())
+                 for row in csv.reader(self.series[one.block].splitlines())
                  if row and inset.x_from <= float(row[2]) <= inset.x_to]
         spare = 0.06 * max(max(shown) - min(shown), 1e-12)
         left, bottom, right, top = panel.box

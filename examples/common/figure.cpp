@@ -19,8 +19,8 @@ std::string text_of(std::optional<double> value) { return value ? text_of(*value
 /// Adds about `most` of the rows, so that the curve looks the same: of each part the lowest and the
 /// highest, so that noise keeps its envelope, those farthest left and right, and where a gap
 /// starts.
-void keep(std::set<std::size_t>& kept, const Curve& curve, const std::vector<std::size_t>& rows) {
-  constexpr std::size_t most = 4'000;
+void keep(std::set<std::size_t>& kept, const Curve& curve, const std::vector<std::size_t>& rows,
+          std::size_t most) {
   const std::size_t parts = rows.size() <= most ? rows.size() : most / 4;
   for (std::size_t part = 0; part < parts; ++part) {
     std::optional<std::array<std::size_t, 4>> ends;
@@ -158,6 +158,10 @@ bool Figure::write(const std::string& folder) const {
   std::string numbers = "panel,series,x,y,z\n";
   std::string description = csv_line({"figure", folder, name_, title_, std::to_string(grid_.rows),
                                       std::to_string(grid_.columns), text_of(grid_.panel_height)});
+  // Many curves have small panels.
+  std::size_t count = 1;
+  for (const Panel& panel : panels_) count += panel.series_.size();
+  const std::size_t most = std::clamp<std::size_t>(60'000 / count, 1'200, 4'000);
   for (const Panel& panel : panels_) {
     description += panel.description_;
     for (const auto& series : panel.series_) {
@@ -175,7 +179,7 @@ bool Figure::write(const std::string& folder) const {
       std::set<std::size_t> kept(all.begin(), all.end());
       if (more.empty()) {
         kept.clear();
-        keep(kept, curve, all);
+        keep(kept, curve, all, most);
       }
       for (const Range& zoom : panel.zooms_) {
         auto rows = all;
@@ -183,7 +187,7 @@ bool Figure::write(const std::string& folder) const {
           return curve.x[i] < zoom.from.value_or(curve.x[i]) ||
                  curve.x[i] > zoom.to.value_or(curve.x[i]);
         });
-        keep(kept, curve, rows);
+        keep(kept, curve, rows, most);
       }
       // gnuplot counts series: one without a row would shift all that follow.
       if (std::none_of(curve.y.begin(), curve.y.end(), [](double y) { return std::isfinite(y); })) {
