@@ -17,6 +17,7 @@
 #include <complex>
 #include <cstdint>
 #include <cstdio>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -30,12 +31,14 @@
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/sim/gaussian.hpp>
+#include <esokit/sim/run.hpp>
 
 #include "common/report.hpp"
 #include "control_practice/practice.hpp"
 
 using namespace esokit::examples;
 using namespace practice;
+namespace sim = esokit::sim;
 
 namespace {
 
@@ -48,14 +51,13 @@ constexpr double controller_bandwidth = 10;
 constexpr double limit = 3;
 constexpr double step_size = 10;
 
-struct Plant {
-  double y = 0, v = 0;
-  void step(double u, double dt = sample_time) {
-    const double a = disturbance + gain * u;
-    y += dt * v + dt * dt / 2 * a;
-    v += dt * a;
-  }
-};
+using State = esokit::Vector<double, 2>;
+
+constexpr esokit::LinearPlant<2> plant{
+    .a = {{0, 1}, {0, 0}}, .b = {0, gain}, .c = {1, 0}, .e = {0, 1}};
+/// The same with all states measured.
+constexpr esokit::LinearPlant<2, double, 1, 2> open_plant{
+    .a = plant.a, .b = plant.b, .c = {{1, 0}, {0, 1}}, .e = plant.e};
 
 using Linear = esokit::LinearEso<2>;
 using Cascade = esokit::CascadeEso<2, 2>;
@@ -84,20 +86,34 @@ struct StepRun {
   double overshoot = 0;
 };
 
+/// A step from rest; the observer, where there is one, starts without knowing the disturbance.
+template <class P, class C, class Reference>
+StepRun step_run(const P& of, const C& controller, const Reference& step) {
+  StepRun run;
+  const auto look = [&](const auto& sample, const C& now) {
+    run.t.push_back(sample.t);
+    run.y.push_back(sample.state(0));
+    run.u.push_back(sample.input);
+    run.overshoot = std::max(run.overshoot, sample.state(0) - step_size);
+    if constexpr (esokit::controller_traits<C>.observes) {
+      run.innovation.push_back(now.observer().innovation());
+    }
+  };
+  (void)sim::run(
+      of, controller,
+      {.duration = 8.0, .sample_time = sample_time, .reference = step, .disturbance = disturbance},
+      look)
+      .value();
+  return run;
+}
+
 /// The law on the true states, limited: the best that can be had.
 StepRun true_states() {
-  StepRun run;
-  Plant plant;
-  for (int k = 0; k < 8000; ++k) {
-    const double wanted = (100 * (step_size - plant.y) - 20 * plant.v - disturbance) / gain;
-    const double u = std::clamp(wanted, -limit, limit);
-    run.t.push_back(k * sample_time);
-    run.y.push_back(plant.y);
-    run.u.push_back(u);
-    run.overshoot = std::max(run.overshoot, plant.y - step_size);
-    plant.step(u);
-  }
-  return run;
+  const auto law = [](const State& x, const State& r) {
+    const double wanted = (100 * (r(0) - x(0)) - 20 * x(1) - disturbance) / gain;
+    return std::clamp(wanted, -limit, limit);
+  };
+  return step_run(open_plant, law, State{step_size, 0});
 }
 
 enum class Told { applied, unlimited, nothing_limited };
@@ -109,21 +125,12 @@ StepRun step_run(const typename Observer::Config& observer, Told told) {
   config.observer = observer;
   config.controller_bandwidth = controller_bandwidth;
   if (told == Told::applied) config.limits = {.lower = -limit, .upper = limit};
-  auto controller = C::make(config).value();
-  // The observer starts without knowing the disturbance.
-  StepRun run;
-  Plant plant;
-  for (int k = 0; k < 8000; ++k) {
-    double u = controller.update(plant.y, step_size);
-    run.innovation.push_back(controller.observer().innovation());
-    if (told == Told::unlimited) u = std::clamp(u, -limit, limit);
-    run.t.push_back(k * sample_time);
-    run.y.push_back(plant.y);
-    run.u.push_back(u);
-    run.overshoot = std::max(run.overshoot, plant.y - step_size);
-    plant.step(u);
-  }
-  return run;
+  const auto controller = C::make(config).value();
+  if (told != Told::unlimited) return step_run(plant, controller, step_size);
+  const auto ignorant = [c = controller](double y, double r) mutable {
+    return std::clamp(c.update(y, r), -limit, limit);
+  };
+  return step_run(plant, ignorant, step_size);
 }
 
 template <class Observer>
@@ -164,25 +171,30 @@ void bumps(Report& report, const std::string& name, MakeConfig&& make_config,
     return all;
   };
   auto controller = C::make(config(observer_bandwidth, gain, controller_bandwidth)).value();
-  Plant plant{.y = 0.7};
+  State state{0.7, 0};
+  /// Goes on from where it is. @return the first u
+  const auto drive = [&](double duration, auto reference) {
+    const auto end = sim::run(plant, controller,
+                              {.duration = duration,
+                               .reference = reference,
+                               .disturbance = disturbance,
+                               .state = state})
+                         .value();
+    controller = end.controller;
+    state = end.state;
+    return end.input.front();
+  };
   CsvRow row{name};
   const auto note = [&](const char* what, double before) {
-    const double bump = std::abs(controller.update(plant.y, 0.7) - before) / (2 * limit);
+    const double bump = std::abs(drive(0.2, 0.7) - before) / (2 * limit);
     report.expect(name, std::string("bump of u at ") + what + " (share of the range)", bump,
                   bump < 1e-9, "below 1e-9");
     row.push_back(number_text(bump, 2));
-    for (int k = 0; k < 200; ++k) {
-      plant.step(controller.output());
-      controller.update(plant.y, 0.7);
-    }
   };
   (void)controller.start(0.7, steady_input);
   note("switch-on", steady_input);
   // Away and back, so that nothing is exact any more.
-  for (int k = 0; k < 8000; ++k) {
-    controller.update(plant.y, k < 2000 ? 0.31 : 0.7);
-    plant.step(controller.output());
-  }
+  drive(8.0, [](double t) { return t < 2 ? 0.31 : 0.7; });
   controller.retune(config(1.5 * observer_bandwidth, gain, controller_bandwidth)).value();
   note("a change of omega_o", controller.output());
   controller.retune(config(1.5 * observer_bandwidth, 1.4 * gain, controller_bandwidth)).value();
@@ -254,26 +266,33 @@ double tracking_error(const Faults& faults, std::uint64_t seed) {
     // Normal numbers through their distribution function: uniform.
     return std::erfc(-draws.next() / std::sqrt(2.0)) / 2 < share;
   };
-  Plant plant;
-  double t = 0, sum = 0, time = 0, dt = nominal;
-  for (int k = 0; k < 10000; ++k) {
-    controller.set_step_time(dt).value();
-    const esokit::EigenMatrix<double, 3> r(std::sin(6 * t), 6 * std::cos(6 * t),
-                                           -36 * std::sin(6 * t));
-    double y = plant.y + 2e-4 * noise.next();
-    if (happens(faults.bad)) y = std::numeric_limits<double>::quiet_NaN();
-    const double u = happens(faults.missing) ? controller.update_without_measurement(r)
-                                             : controller.update(y, r);
-    if (t > 2) {
-      sum += (r(0) - plant.y) * (r(0) - plant.y) * dt;
-      time += dt;
-    }
+  const auto reference = [](double t) {
+    return esokit::Vector<double, 3>{std::sin(6 * t), 6 * std::cos(6 * t), -36 * std::sin(6 * t)};
+  };
+  const auto sensor = [&](double, double y) {
+    const double measured = y + 2e-4 * noise.next();
+    const bool bad = happens(faults.bad), missing = happens(faults.missing);
+    return bad || missing ? std::numeric_limits<double>::quiet_NaN() : measured;
+  };
+  const auto step_time = [&](std::int64_t) {
     const double uniform = std::erfc(-draws.next() / std::sqrt(2.0)) - 1;
-    dt = nominal * (1 + faults.jitter * uniform);
-    for (int i = 0; i < 5; ++i) {
-      plant.step(u + 2 * std::sin(9 * (t + i * dt / 5)), dt / 5);
-    }
-    t += dt;
+    return nominal * (1 + faults.jitter * uniform);
+  };
+  const auto run =
+      sim::run(plant, controller,
+               {.duration = 10000 * nominal,
+                .reference = reference,
+                .disturbance = [](double t) { return disturbance + 2 * gain * std::sin(9 * t); },
+                .sensor = sensor,
+                .step_time = step_time,
+                .substeps = 5})
+          .value();
+  double sum = 0, time = 0;
+  for (std::size_t k = 1; k < run.t.size(); ++k) {
+    if (run.t[k] <= 2) continue;
+    const double passed = run.t[k] - run.t[k - 1], error = run.reference[k] - run.output[k];
+    sum += error * error * passed;
+    time += passed;
   }
   return 1e3 * std::sqrt(sum / time);
 }

@@ -24,6 +24,7 @@
 
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <esokit/sim/run.hpp>
 
 #include "common/report.hpp"
 #include "control_practice/pid.hpp"
@@ -39,9 +40,9 @@ constexpr double observer = 60;
 constexpr double sample_time = 1e-3;
 constexpr double limit = 4;
 constexpr double switch_on = 2.5;
-constexpr int samples = 6000;
+constexpr int switched_on = 2500;  ///< the sample
 
-double load(double t) { return t < 1 ? 0 : t < 4 ? 40 : 80; }
+double load(double t) { return t < 1 ? 0 : t < 4 ? -40 : -80; }
 
 struct Run {
   std::vector<double> t, y, u, base;
@@ -67,41 +68,45 @@ Run simulate(bool wrap) {
   pid.start(1, 1, 0);
   (void)compensator.start(1, 0);
   Run run;
-  double y = 1, v = 0, u = 0;
-  for (int k = 0; k < samples; ++k) {
-    const double t = k * sample_time;
+  double u = 0;
+  const auto controller = [&](double y, double r) {
+    const auto since = static_cast<int>(run.base.size()) - switched_on;
     const double before = u;
     double base = 0;
-    if (!wrap || t < switch_on) {
+    if (!wrap || since < 0) {
       (void)compensator.track(y, u);
-      base = u = pid.update(y, 1);
+      base = u = pid.update(y, r);
+    } else if (since == 0) {
+      // The PID gives up what the compensator brings.
+      (void)compensator.track(y, u);
+      base = compensator.base_output();
+      pid.start(y, r, base);
     } else {
-      if (t < switch_on + sample_time / 2) {
-        // The PID gives up what the compensator brings.
-        (void)compensator.track(y, u);
-        pid.start(y, 1, compensator.base_output());
-        base = compensator.base_output();
-      } else {
-        base = pid.update(y, 1);
-        u = compensator.update(y, base);
-        // What was applied of u0: for the PID's anti-windup.
-        pid.applied(u - compensator.compensation());
-      }
-      if (t < switch_on + 1.5 * sample_time) run.bump = std::max(run.bump, std::abs(u - before));
+      base = pid.update(y, r);
+      u = compensator.update(y, base);
+      // What was applied of u0: for the PID's anti-windup.
+      pid.applied(u - compensator.compensation());
     }
-    run.t.push_back(t);
-    run.y.push_back(y);
-    run.u.push_back(u);
+    if (since == 0 || since == 1) run.bump = std::max(run.bump, std::abs(u - before));
     run.base.push_back(base);
-    const double error = std::abs(1 - y);
+    return u;
+  };
+  const auto plant =
+      esokit::LinearPlant<2>::chain({.coefficients = {0, 2}, .input_gain = nominal_gain}).value();
+  const auto recorded = esokit::sim::run(plant, controller,
+                                         {.duration = 6.0,
+                                          .sample_time = sample_time,
+                                          .reference = 1.0,
+                                          .disturbance = load,
+                                          .state = {1, 0}})
+                            .value();
+  run.t = recorded.t;
+  run.y = recorded.output;
+  run.u = recorded.input;
+  for (std::size_t k = 0; k < run.t.size(); ++k) {
+    const double t = run.t[k], error = std::abs(1 - run.y[k]);
     if (t >= 1 && t < 2.4) run.first_load = std::max(run.first_load, error);
     if (t >= 4) run.second_load = std::max(run.second_load, error);
-    for (int i = 0; i < 10; ++i) {
-      const double h = sample_time / 10;
-      const double a = -2 * v + nominal_gain * u - load(t + i * h);
-      y += h * v + h * h / 2 * a;
-      v += h * a;
-    }
   }
   return run;
 }

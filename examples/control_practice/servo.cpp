@@ -36,11 +36,11 @@
 
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/pid_conversion.hpp>
-#include <esokit/eigen.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/sim/gaussian.hpp>
+#include <esokit/sim/run.hpp>
 
 #include "common/report.hpp"
 #include "control_practice/pid.hpp"
@@ -64,27 +64,27 @@ constexpr double observer = 150;
 constexpr double faster_observer = 220;
 constexpr double encoder = 2 * 3.14159265358979 / 16384;
 constexpr double noise = 1e-4;
-constexpr int samples = 6000;
-constexpr int substeps = 20;
+constexpr int substeps = 4;
 constexpr int seeds = 20;
 constexpr int retune_sample = 3200;
 
-/// (r, r', r'').
-esokit::EigenMatrix<double, 3> reference(double t) {
+using Reference = esokit::Vector<double, 3>;  ///< (r, r', r'')
+
+Reference reference(double t) {
   if (t < 0.1) return {0, 0, 0};
   if (t < 1.3) return {1.5, 0, 0};
   if (t < 3.5) return {-0.5, 0, 0};
   const double phase = 9 * (t - 3.5);
   return {-0.5 + 0.4 * std::sin(phase), 3.6 * std::cos(phase), -32.4 * std::sin(phase)};
 }
-double load(double t) { return t >= 2.5 && t < 5.0 ? load_size : 0.0; }
+double load(double t) { return t >= 2.5 && t < 5.0 ? -load_size / true_gain : 0.0; }  // of u
 
 /// Which measurements come, the same for all controllers.
 class Sensor {
  public:
   Sensor(std::uint64_t seed, bool faulty) : noise_(seed), faults_(seed + 1000), faulty_(faulty) {}
 
-  double measure(double t, double angle) {
+  double operator()(double t, double angle) {
     const double exact = angle + noise * noise_.next();
     const double draw = faults_.next();  // normal: |draw| > 1.645 in 10 %, > 1.96 in 5 %
     const bool lost = (t >= 3.6 && t < 4.6 && std::abs(draw) > 1.645) || (t >= 4.0 && t < 4.04);
@@ -110,10 +110,16 @@ struct Run {
 
 /// One controller as the run sees it.
 struct Controller {
+  static constexpr int order = 2;
+  static constexpr esokit::ControllerTraits traits{.takes_derivatives = true};
+
   std::string name;
-  std::function<double(double, const esokit::EigenMatrix<double, 3>&)> update;
+  std::function<double(double, const Reference&)> command;
   std::function<void()> retune;
   std::function<double()> disturbance;
+
+  double update(double y, const Reference& r) { return command(y, r); }
+  double update(double y, double r) { return command(y, {r, 0, 0}); }
 };
 
 template <class Observer>
@@ -129,11 +135,9 @@ Controller adrc(std::string name, std::function<typename Observer::Config(double
     return all;
   };
   auto shared = std::make_shared<C>(C::make(settings(observer)).value());
-  return {
-      std::move(name),
-      [shared](double y, const esokit::EigenMatrix<double, 3>& r) { return shared->update(y, r); },
-      [shared, settings] { shared->retune(settings(faster_observer)).value(); },
-      [shared] { return shared->observer().total_disturbance(); }};
+  return {std::move(name), [shared](double y, const Reference& r) { return shared->update(y, r); },
+          [shared, settings] { shared->retune(settings(faster_observer)).value(); },
+          [shared] { return shared->observer().total_disturbance(); }};
 }
 
 std::vector<Controller> controllers() {
@@ -148,10 +152,8 @@ std::vector<Controller> controllers() {
                                                .lower = -limit,
                                                .upper = limit,
                                                .sample_time = sample_time});
-  all.push_back(
-      {"PID",
-       [pid](double y, const esokit::EigenMatrix<double, 3>& r) { return pid->update(y, r(0)); },
-       [] {}, [] { return std::numeric_limits<double>::quiet_NaN(); }});
+  all.push_back({"PID", [pid](double y, const Reference& r) { return pid->update(y, r(0)); }, [] {},
+                 [] { return std::numeric_limits<double>::quiet_NaN(); }});
   all.push_back(adrc<esokit::LinearEso<2>>("LESO", [](double bandwidth) {
     return esokit::LinearEso<2>::Config{
         .observer_bandwidth = bandwidth, .input_gain = nominal_gain, .sample_time = sample_time};
@@ -173,23 +175,28 @@ std::vector<Controller> controllers() {
   return all;
 }
 
+/// The servo but for the load, which comes in as a disturbance of the voltage.
+const auto plant =
+    esokit::sim::nonlinear_plant<2>([](double, const esokit::Vector<double, 2>& x, double u) {
+      return esokit::Vector<double, 2>{
+          x(1), true_gain * u - viscous * x(1) - coulomb * std::tanh(x(1) / stribeck)};
+    });
+
 /// @param clean the same run without faults; nullptr: this is it
-Run simulate(Controller c, std::uint64_t seed, const Run* clean = nullptr) {
+Run simulate(const Controller& driven, std::uint64_t seed, const Run* clean = nullptr) {
   Run run;
   Sensor sensor(seed, clean != nullptr);
-  double angle = 0, speed = 0, last = 0, activity = 0, squares = 0;
+  double last = 0, activity = 0, squares = 0;
   int active = 0, faulty = 0;
-  for (int k = 0; k < samples; ++k) {
-    const double t = k * sample_time;
-    const auto r = reference(t);
-    if (k == retune_sample) c.retune();
-    const double u = c.update(sensor.measure(t, angle), r);
-    if (k == retune_sample) run.retune_bump = std::abs(u - last);
+  const auto look = [&](const auto& sample, Controller& c) {
+    const double t = sample.t, angle = sample.output, u = sample.input;
+    if (sample.index + 1 == retune_sample) c.retune();
+    if (sample.index == retune_sample) run.retune_bump = std::abs(u - last);
     run.t.push_back(t);
     run.angle.push_back(angle);
     run.input.push_back(u);
     run.found.push_back(c.disturbance());
-    const double error = std::abs(r(0) - angle);
+    const double error = std::abs(sample.reference - angle);
     if (t < 1.3) run.first_overshoot = std::max(run.first_overshoot, 100 * (angle / 1.5 - 1));
     if (t < 2.5) run.step_error += error * sample_time;
     if (t >= 2.5 && t < 3.2) run.load_error = std::max(run.load_error, error);
@@ -198,20 +205,21 @@ Run simulate(Controller c, std::uint64_t seed, const Run* clean = nullptr) {
       ++active;
     }
     if (clean != nullptr && t >= 3.6 && t < 5.0) {
-      const double change = angle - clean->angle[static_cast<std::size_t>(k)];
+      const double change = angle - clean->angle[static_cast<std::size_t>(sample.index)];
       squares += change * change;
       ++faulty;
     }
     last = u;
-    const double applied = std::clamp(u, -limit, limit);
-    const double h = sample_time / substeps;
-    for (int i = 0; i < substeps; ++i) {
-      const double acceleration = true_gain * applied - viscous * speed -
-                                  coulomb * std::tanh(speed / stribeck) - load(t + i * h);
-      angle += h * speed + h * h / 2 * acceleration;
-      speed += h * acceleration;
-    }
-  }
+  };
+  (void)esokit::sim::run(plant, driven,
+                         {.duration = 6.0,
+                          .sample_time = sample_time,
+                          .reference = reference,
+                          .disturbance = load,
+                          .sensor = std::ref(sensor),
+                          .substeps = substeps},
+                         look)
+      .value();
   run.activity = std::sqrt(activity / active);
   if (faulty > 0) run.fault_error = std::sqrt(squares / faulty);
   return run;

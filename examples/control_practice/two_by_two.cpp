@@ -21,8 +21,8 @@
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/core/error_text.hpp>
-#include <esokit/eigen.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <esokit/sim/run.hpp>
 
 #include "common/report.hpp"
 #include "control_practice/practice.hpp"
@@ -32,12 +32,11 @@ using namespace practice;
 
 namespace {
 
-using Pair = esokit::EigenMatrix<double, 2>;
+using Pair = esokit::Vector<double, 2>;
 using esokit::LinearEso;
 using Mimo = esokit::MimoAdrc<LinearEso<2>, LinearEso<1>>;
 
 constexpr double sample_time = 2e-3;
-constexpr int samples = 3000;
 
 Mimo::Config config() {
   Mimo::Config settings{.observers = {{.observer_bandwidth = 80, .sample_time = sample_time},
@@ -48,38 +47,42 @@ Mimo::Config config() {
   return settings;
 }
 
+using Plant = esokit::LinearPlant<3, double, 2, 2>;
+
+constexpr Plant plant{.a = {{0, 1, 0}, {0, -1, 0}, {0, 0, -2}},
+                      .b = {{0, 0}, {2, 1.4}, {1.2, 3}},
+                      .c = {{1, 0, 0}, {0, 0, 1}},
+                      .e = {{0, 0}, {1, 0}, {0, 1}}};
+
 struct Run {
-  std::vector<double> t, y1, y2, u1, u2;
+  std::vector<double> t;
+  esokit::Array<std::vector<double>, 2> y, u;
   double crossed_to_1 = 0;  ///< what the step of y_2 at 2 s does to y_1
   double crossed_to_2 = 0;  ///< what the step of y_1 at 0.5 s does to y_2
   double final_error = 0;
 };
 
-template <class Update>
-Run simulate(Update&& update) {
-  Run run;
-  double y1 = 0, v1 = 0, y2 = 0;
-  for (int k = 0; k < samples; ++k) {
-    const double t = k * sample_time;
-    const Pair reference(t < 0.5 ? 0 : 1, t < 2 ? 0 : 1);
-    const Pair u = update(Pair(y1, y2), reference);
-    run.t.push_back(t);
-    run.y1.push_back(y1);
-    run.y2.push_back(y2);
-    run.u1.push_back(u(0));
-    run.u2.push_back(u(1));
+template <class C>
+Run simulate(const C& controller) {
+  const auto recorded =
+      esokit::sim::run(plant, controller,
+                       {.duration = 6.0,
+                        .sample_time = sample_time,
+                        .reference =
+                            [](double t) {
+                              return Pair{t < 0.5 ? 0.0 : 1.0, t < 2 ? 0.0 : 1.0};
+                            },
+                        .disturbance =
+                            [](double t) {
+                              return Pair{t >= 3 ? -4.0 : 0.0, t >= 4.5 ? 5.0 : 0.0};
+                            }})
+          .value();
+  Run run{recorded.t, recorded.output, recorded.input};
+  for (std::size_t k = 0; k < run.t.size(); ++k) {
+    const double t = run.t[k], y1 = run.y[0][k], y2 = run.y[1][k];
     if (t < 2) run.crossed_to_2 = std::max(run.crossed_to_2, std::abs(y2));
     if (t >= 2 && t < 3) run.crossed_to_1 = std::max(run.crossed_to_1, std::abs(y1 - 1));
     run.final_error = std::max(std::abs(y1 - 1), std::abs(y2 - 1));
-    for (int i = 0; i < 10; ++i) {
-      const double h = sample_time / 10;
-      const double w1 = t >= 3 ? -4 : 0;
-      const double w2 = t >= 4.5 ? 5 : 0;
-      const double a = -v1 + 2 * u(0) + 1.4 * u(1) + w1;
-      y1 += h * v1 + h * h / 2 * a;
-      v1 += h * a;
-      y2 += h * (-2 * y2 + 1.2 * u(0) + 3 * u(1) + w2);
-    }
   }
   return run;
 }
@@ -91,8 +94,7 @@ int main(int argc, char** argv) {
                 about("Two inputs, two outputs",
                       "A second-order and a first-order channel coupled through their inputs: "
                       "decoupled by B0^-1, and as two single loops. Sampled, 2 ms."));
-  auto mimo = Mimo::make(config()).value();
-  const Run decoupled = simulate([&](const Pair& y, const Pair& r) { return mimo.update(y, r); });
+  const Run decoupled = simulate(Mimo::make(config()).value());
 
   const auto matrix = config().input_matrix;
   auto first = esokit::Adrc<LinearEso<2>>::make({.observer = {.observer_bandwidth = 80,
@@ -108,7 +110,7 @@ int main(int argc, char** argv) {
                                                   .limits = {.lower = -30, .upper = 30}})
                     .value();
   const Run single = simulate([&](const Pair& y, const Pair& r) {
-    return Pair(first.update(y(0), r(0)), second.update(y(1), r(1)));
+    return Pair{first.update(y(0), r(0)), second.update(y(1), r(1))};
   });
 
   for (const auto& [name, run] :
@@ -141,10 +143,10 @@ int main(int argc, char** argv) {
   const auto draw = [&](const Run& run, const Style& style) {
     Style quiet = style;
     quiet.name.clear();
-    y1.line(run.t, run.y1, style);
-    y2.line(run.t, run.y2, quiet);
-    u1.line(run.t, run.u1, quiet);
-    u2.line(run.t, run.u2, quiet);
+    y1.line(run.t, run.y[0], style);
+    y2.line(run.t, run.y[1], quiet);
+    u1.line(run.t, run.u[0], quiet);
+    u2.line(run.t, run.u[1], quiet);
   };
   draw(single, {.name = "two single loops", .color = Color::grey});
   draw(decoupled, {.name = "decoupled", .color = Color::blue});

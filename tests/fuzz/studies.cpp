@@ -430,6 +430,51 @@ Failure limiter_study(Episode& episode) {
 
 }  // namespace
 
+// ---- the sampled loop
+
+Failure run_study(Episode& episode) {
+  Study study(episode);
+  using Controller = Adrc<VariableTime<LinearEso<2>>>;
+  const double T = study.number<double>("sample_time", {1e-3, 1e-1, true});
+  const double w = study.number<double>("observer_bandwidth", {5, 200, true});
+  const double b = study.number<double>("input_gain", {0.1, 10, true, true});
+  const auto made = Controller::make(
+      {.observer = {.observer = {.observer_bandwidth = w, .input_gain = b, .sample_time = T},
+                    .ratio = study.number<double>("ratio", {1, 3})},
+       .controller_bandwidth = w / 5,
+       .limits = {.lower = -10, .upper = 10}});
+  const auto controller = study.answer("controller", made);
+  const auto chain = LinearPlant<2>::chain(
+      {{study.number<double>("a0", {-1, 10}), study.number<double>("a1", {-1, 10})},
+       b,
+       study.number<double>("plant.dead_time", {0, 0.2})});
+  const auto plant = study.answer("plant", chain);
+  if (!controller || !plant) return study.done();
+  const int samples = 1 + study.choice("samples", 200);
+  const sim::RunConfig<LinearPlant<2>, Controller> config{
+      .duration =
+          study.choice("whole", 8) == 0 ? study.number<double>("duration", {0, 1}) : samples * T,
+      .reference = study.number<double>("reference", signal),
+      .disturbance = study.number<double>("disturbance", signal),
+      .noise = study.number<double>("noise", {0, 1}),
+      .missing = study.number<double>("missing", {0, 1}),
+      .jitter = study.choice("even", 2) == 0 ? 0.0 : study.number<double>("jitter", {0, 0.5}),
+      .dead_time = study.number<double>("dead_time", {0, 0.1}),
+      .substeps = study.choice("substeps", 4),
+      .state = {study.number<double>("y", signal), study.number<double>("y'", signal)}};
+  if (!(config.duration / T < 1e4)) return study.done();
+  const auto run = sim::run(*plant, *controller, config);
+  if (const auto recording = study.answer("run", run)) {
+    study.finite("output", recording->output);
+    study.finite("total_disturbance", recording->total_disturbance);
+    study.finite("state", recording->state);
+    for (const double u : recording->input) {
+      if (!(u >= -10 && u <= 10)) study.fail("run", "put out an input beyond the limits");
+    }
+  }
+  return study.done();
+}
+
 void add_studies(std::vector<Kind>& kinds) {
   kinds.push_back({"loop of LinearEso<2>", &loop_study<LinearEso<2>>});
   kinds.push_back({"loop of CascadeEso<1, 2, float>", &loop_study<CascadeEso<1, 2, float>>});
@@ -444,6 +489,7 @@ void add_studies(std::vector<Kind>& kinds) {
   kinds.push_back(
       {"ContinuousAlgebraicEso<2>", &continuous_study<ContinuousAlgebraicEso<2, double>>});
   kinds.push_back({"signals, noise, plants", &signal_study});
+  kinds.push_back({"run", &run_study});
   kinds.push_back({"PI conversion, float", &pid_study<1, float>});
   kinds.push_back({"PID conversion", &pid_study<2, double>});
   kinds.push_back({"Limiter<float>", &limiter_study<float>});

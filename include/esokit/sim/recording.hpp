@@ -17,13 +17,16 @@ namespace esokit::sim {
 namespace detail {
 
 template <class P>
-struct PlantScalarOf {
-  using type = typename P::State::Scalar;
-};
+struct PlantScalarOf {};
 template <class P>
 requires requires { typename P::scalar_type; }
 struct PlantScalarOf<P> {
   using type = typename P::scalar_type;
+};
+template <class P>
+requires requires { typename P::State::Scalar; }
+struct PlantScalarOf<P> {
+  using type = typename P::State::Scalar;
 };
 
 template <class P>

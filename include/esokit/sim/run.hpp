@@ -138,28 +138,35 @@ struct Stretch {
   int age;      ///< of the input, samples: 0 is the newest
 };
 
+/// What is no longer than this is none.
+template <class Time>
+Time rounding_of(const Time& sample_time) {
+  return sample_time * std::max(Time(1e-9), 16 * std::numeric_limits<Time>::epsilon());
+}
+
 /// The stretches of a sample of length `whole`: it is cut at the steps of integration and where,
 /// dead_time late, another input arrives. A cut within rounding of another one is the same.
-/// @param arrival (age) -> when the input of that age arrives, s from the sample on
-template <class Time, class Arrival>
+/// @param arrivals when the input of age 0, 1, .. arrives, s from the sample on; the last one has
+///        arrived already
+template <class Time>
 void cut_sample(std::vector<Stretch<Time>>& stretches, const Time& whole, int substeps,
-                const Arrival& arrival) {
-  const Time rounding = whole * std::max(Time(1e-9), 16 * std::numeric_limits<Time>::epsilon());
+                const std::vector<Time>& arrivals) {
+  const Time rounding = rounding_of(whole);
   stretches.clear();
-  int age = 0;
-  while (arrival(age) > rounding) ++age;
+  int age = static_cast<int>(arrivals.size()) - 1;
   Time from(0);
   for (int i = 1; i <= substeps;) {
     const Time grid =
         i == substeps ? whole : whole * static_cast<Time>(i) / static_cast<Time>(substeps);
-    const bool another = age > 0 && arrival(age - 1) < grid - rounding;
-    const Time to = another ? arrival(age - 1) : grid;
+    const Time next = age > 0 ? arrivals[static_cast<std::size_t>(age - 1)] : whole;
+    const bool another = age > 0 && next < grid - rounding;
+    const Time to = another ? next : grid;
     if (to - from > rounding) {
       stretches.push_back({from, to - from, age});
       from = to;
     }
     if (!another) ++i;
-    if (i <= substeps && age > 0 && arrival(age - 1) <= to + rounding) --age;
+    if (i <= substeps && age > 0 && next <= to + rounding) --age;
   }
 }
 
@@ -396,12 +403,12 @@ class Run {
 
   /// The stretches of a sample that takes so long.
   Check<Time> cut(const Time& whole) {
-    cut_sample(stretches_, whole, config_.substeps, [&](int age) {
-      Time arrival = dead_time_;
-      if (even_) return arrival - static_cast<Time>(age) * sample_time_;
-      for (int i = 0; i < age; ++i) arrival -= lengths_[i];
-      return arrival;
-    });
+    arrivals_.assign(1, dead_time_);
+    for (int age = 0; arrivals_.back() > rounding_of(whole); ++age) {
+      arrivals_.push_back(even_ ? dead_time_ - static_cast<Time>(age + 1) * sample_time_
+                                : arrivals_.back() - lengths_[age]);
+    }
+    cut_sample(stretches_, whole, config_.substeps, arrivals_);
     steps_.clear();
     for (const auto& stretch : stretches_) {
       const auto step = PlantStep<P>::make(plant_, stretch.length);
@@ -539,6 +546,7 @@ class Run {
   InputQueue<Input> inputs_;
   InputQueue<Time> lengths_;
   RunChance<P, C> chance_;
+  std::vector<Time> arrivals_;
   std::vector<Stretch<Time>> stretches_;
   std::vector<PlantStep<P>> steps_;  ///< one a stretch
 };

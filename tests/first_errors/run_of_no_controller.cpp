@@ -1,0 +1,5 @@
+// expect: ControllerOf|Controller<|Commands
+#include <esokit/sim/run.hpp>
+
+const auto plant = esokit::LinearPlant<1>::chain({}).value();
+auto run = esokit::sim::run(plant, [](double y) { return -y; }, {.duration = 1.0});
