@@ -14,6 +14,7 @@
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/half_gain_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/model_eso.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/observer/reduced_order_eso.hpp>
 #include <functional>
@@ -162,6 +163,21 @@ TEST(LinearController, OfEveryObserver) {
   swinging.sample_time = T;
   swinging.model.frequency = 7.0;
   expect_adrc<Resonator>(swinging, 1e-10);
+}
+
+TEST(LinearController, OfAModelOfSensorActuatorAndSwing) {
+  constexpr ModelParts parts{
+      .order = 1, .plant_poles = true, .actuator = 1, .sensor = 2, .resonators = 1};
+  using Eso = ModelEso<parts>;
+  Eso::Config config;
+  config.observer_bandwidth = 20.0;
+  config.input_gain = 2.5;
+  config.sample_time = T;
+  config.model.plant = {1.5};
+  config.model.actuator.time_constant = 0.05;
+  config.model.sensor.frequency = 150.0;
+  config.model.resonators[0].frequency = 7.0;
+  expect_adrc<Eso>(config, 1e-9);
 }
 
 TEST(LinearController, OfAGainThatHasSettled) {

@@ -104,8 +104,10 @@ struct ObserverWithLaw {
   Law law;            ///< AdrcLaw with b0
   Form form{};        ///< what the observer is fed with
 };
+/// Fed with y.
 template <class Observer, class Law>
 ObserverWithLaw(Observer, Law) -> ObserverWithLaw<Observer, Law, OutputBased>;
+/// Fed with what is said.
 template <class Observer, class Law, class Form>
 ObserverWithLaw(Observer, Law, Form) -> ObserverWithLaw<Observer, Law, Form>;
 
@@ -116,6 +118,7 @@ struct Compensated {
   Compensator compensator;  ///< adds K dhat
   Base base;                ///< puts out u0
 };
+/// Of copies.
 template <class Compensator, class Base>
 Compensated(Compensator, Base) -> Compensated<Compensator, Base>;
 

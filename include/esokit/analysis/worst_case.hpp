@@ -5,7 +5,8 @@
 #include <algorithm>
 #include <cstddef>
 #include <esokit/analysis/delay_margin.hpp>
-#include <functional>
+#include <limits>
+#include <utility>
 #include <vector>
 
 namespace esokit {
@@ -38,13 +39,14 @@ namespace detail {
 /// What is compared of one plant, the larger the worse: abscissa, and margins with their sign.
 using Badness = std::array<double, 6>;
 
-inline Expected<Badness, Error<double>> badness_of(const LoopResult& loop) {
+/// @param worst is written
+inline Check<double> judge(const LoopResult& loop, Badness& worst) {
   if (!loop) return loop.error();
   const double abscissa = loop->stability_abscissa();
-  if (!loop->stable()) return Badness{abscissa, 0.0, -1.0, 1.0, 0.0, 0.0};
-  Badness worst{
-      abscissa, -std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity(),
-      0.0,      -std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+  worst = {abscissa, 0.0, -1.0, 1.0, 0.0, 0.0};
+  if (!loop->stable()) return {};
+  constexpr double none = -std::numeric_limits<double>::infinity();
+  worst = {abscissa, none, none, 0.0, none, none};
   const auto take = [&](std::size_t i, double value) { worst[i] = std::max(worst[i], value); };
   for (int channel = 0; channel < loop->channels(); ++channel) {
     const auto m = margins(*loop, channel);
@@ -57,31 +59,32 @@ inline Expected<Badness, Error<double>> badness_of(const LoopResult& loop) {
     take(4, -m->phase.value);
     take(5, -delay->value);
   }
-  return worst;
+  return {};
 }
 
+/// The worst of each kind so far, and where.
 struct Found {
-  Badness value;
-  std::array<std::vector<double>, 6> at;
+  Badness value{};
+  std::array<std::vector<double>, 6> at{};
+};
+
+/// What is looked at: `look(study, parameters, worst)`, see `judge`.
+struct PlantStudy {
+  const void* study;
+  Check<double> (*look)(const void*, const std::vector<double>&, Badness&);
 };
 
 /// Every point of a grid over the ranges, then from the worst of each kind in steps that halve.
-inline Expected<Found, Error<double>> worst_of(
-    const std::function<Expected<Badness, Error<double>>(const std::vector<double>&)>& look,
-    const std::vector<Interval<>>& ranges, int points, int halvings) {
+inline Check<double> find_worst(const PlantStudy& plants, const std::vector<Interval<>>& ranges,
+                                int points, int halvings, Found& found) {
   const std::size_t count = ranges.size();
-  std::optional<Found> found;
   const auto offer = [&](const std::vector<double>& at) -> Check<double> {
-    const auto bad = look(at);
-    if (!bad) return bad.error();
-    if (!found) {
-      found = Found{*bad, {}};
-      found->at.fill(at);
-    }
-    for (std::size_t i = 0; i < bad->size(); ++i) {
-      if ((*bad)[i] <= found->value[i]) continue;
-      found->value[i] = (*bad)[i];
-      found->at[i] = at;
+    Badness bad{};
+    if (auto ok = plants.look(plants.study, at, bad); !ok) return ok;
+    for (std::size_t i = 0; i < bad.size(); ++i) {
+      if (!found.at[i].empty() && bad[i] <= found.value[i]) continue;
+      found.value[i] = bad[i];
+      found.at[i] = at;
     }
     return {};
   };
@@ -92,29 +95,29 @@ inline Expected<Found, Error<double>> worst_of(
       const double share = static_cast<double>(index[i]) / (points - 1);
       at[i] = ranges[i].lower + share * (ranges[i].upper - ranges[i].lower);
     }
-    if (auto ok = offer(at); !ok) return ok.error();
+    if (auto ok = offer(at); !ok) return ok;
     more = false;
     for (std::size_t i = 0; i < count && !more; ++i) {
       more = ++index[i] < points;
       if (!more) index[i] = 0;
     }
   }
-  for (std::size_t kind = 0; kind < found->at.size(); ++kind) {
+  for (std::size_t kind = 0; kind < found.at.size(); ++kind) {
     double share = 0.5 / (points - 1);
     for (int step = 0; step < halvings; ++step) {
-      const double before = found->value[kind];
+      const double before = found.value[kind];
       for (std::size_t i = 0; i < count; ++i) {
         for (const double sign : {-1.0, 1.0}) {
-          std::vector<double> at = found->at[kind];
+          std::vector<double> at = found.at[kind];
           at[i] = std::clamp(at[i] + sign * share * (ranges[i].upper - ranges[i].lower),
                              ranges[i].lower, ranges[i].upper);
-          if (auto ok = offer(at); !ok) return ok.error();
+          if (auto ok = offer(at); !ok) return ok;
         }
       }
-      if (!(found->value[kind] > before)) share *= 0.5;
+      if (!(found.value[kind] > before)) share *= 0.5;
     }
   }
-  return *found;
+  return {};
 }
 
 }  // namespace detail
@@ -151,7 +154,7 @@ Expected<WorstCase<Count>, Error<double>> worst_case(PlantOf&& plant_of,
                  "must not end below their start", index);
   }
   if (!rules) return rules.error();
-  const auto look = [&](const std::vector<double>& at) -> Expected<detail::Badness, Error<double>> {
+  const auto look = [&](const std::vector<double>& at, detail::Badness& worst) -> Check<double> {
     Array<double, Count> parameters{};
     for (std::size_t i = 0; i < Count; ++i) parameters[i] = at[i];
     const auto plant = plant_of(std::as_const(parameters));
@@ -161,17 +164,25 @@ Expected<WorstCase<Count>, Error<double>> worst_case(PlantOf&& plant_of,
         return Error<double>{error.field, static_cast<double>(error.value), error.rule,
                              error.index};
       }
-      return detail::badness_of(closed_loop(*plant, controller));
+      return detail::judge(closed_loop(*plant, controller), worst);
     } else {
-      return detail::badness_of(closed_loop(plant, controller));
+      return detail::judge(closed_loop(plant, controller), worst);
     }
   };
-  const auto found =
-      detail::worst_of(look, {ranges.begin(), ranges.end()}, search.points, search.halvings);
-  if (!found) return found.error();
+  using Look = decltype(look);
+  const detail::PlantStudy plants{
+      &look, [](const void* study, const std::vector<double>& at, detail::Badness& worst) {
+        return (*static_cast<const Look*>(study))(at, worst);
+      }};
+  detail::Found found;
+  if (auto ok = detail::find_worst(plants, {ranges.begin(), ranges.end()}, search.points,
+                                   search.halvings, found);
+      !ok) {
+    return ok.error();
+  }
   const auto take = [&](std::size_t kind, double sign) {
-    Worst<Count> worst{sign * found->value[kind], {}};
-    for (std::size_t i = 0; i < Count; ++i) worst.parameters[i] = found->at[kind][i];
+    Worst<Count> worst{sign * found.value[kind], {}};
+    for (std::size_t i = 0; i < Count; ++i) worst.parameters[i] = found.at[kind][i];
     return worst;
   };
   return WorstCase<Count>{take(0, 1.0), take(1, -1.0), take(2, -1.0),
