@@ -159,6 +159,56 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
   [[no_unique_address]] Observer observer_;  ///< what is adapted; the padding at its end is free
 };
 
+/// Base of the adapters with a config: `make`, `retune`, `adopt`, and what the observer in it does
+/// as it is. An adapter says `check(config)`, a Check, takes `(observer, config)` to be made, and
+/// takes over what it holds itself by `take(fresh)`.
+/// @tparam Self the adapter @tparam Settings its Config
+template <class Self, LoopObserver Observer, class Settings>
+class NamedAdapter : public Adapter<Observer> {
+  using Base = Adapter<Observer>;
+
+ public:
+  using Config = Settings;                         ///< settings of make
+  using scalar_type = typename Base::scalar_type;  ///< of states and settings
+  using Estimate = typename Base::Estimate;        ///< (y, .., y^(n-1), d, ..), N x 1
+
+  /// Checks the settings and does all the design work.
+  /// @return the adapter, its observer at rest in zero, or an error that names the field
+  static Expected<Self, Error<scalar_type>> make(const Config& config) {
+    if (Check<scalar_type> ok = Self::check(config); !ok) return ok.error();
+    const auto observer = Observer::make(config.observer);
+    if (!observer) return observer.error();
+    return Self(*observer, config);
+  }
+
+  /// New settings while running: the estimate is kept. A refused config changes nothing.
+  Check<scalar_type> retune(const Config& config) {
+    return detail::retune(static_cast<Self&>(*this), config);
+  }
+
+  /// The same, with the settings of `fresh`, as `make` gave it: no design work.
+  Check<scalar_type> adopt(const Self& fresh) {
+    if (auto ok = this->observer_.adopt(fresh.observer_); !ok) return ok;
+    static_cast<Self&>(*this).take(fresh);
+    return {};
+  }
+
+  /// Time update alone, see PredictorCorrector::predict.
+  StepStatus predict(scalar_type u_applied) noexcept { return this->observer_.predict(u_applied); }
+
+  /// Measurement update alone, see PredictorCorrector::correct.
+  StepStatus correct(scalar_type y) noexcept { return this->observer_.correct(y); }
+
+  /// Starts anew at (y, 0, .., 0).
+  StepStatus reset(scalar_type y) noexcept { return this->observer_.reset(y); }
+
+  /// Starts anew at a given estimate, N x 1.
+  StepStatus reset(const Estimate& state) noexcept { return this->observer_.reset(state); }
+
+ protected:
+  using Base::Base;
+};
+
 /// Base of the adapters of packs: an adapter branches on what is measured, so it goes lane by lane.
 /// @tparam Self the adapter of packs @tparam Plain of a lane @tparam Settings its Config
 template <class Self, class Plain, LoopObserver Observer, class Settings>

@@ -27,8 +27,10 @@ struct DelayedInputConfig {
 /// The estimate is that of the present; what u still on its way will do is not predicted.
 /// @tparam Capacity largest d that a config may ask for; the memory is Capacity + 1 scalars
 template <LoopObserver Observer, int Capacity>
-class DelayedInput : public Adapter<Observer> {
-  using Base = Adapter<Observer>;
+class DelayedInput : public NamedAdapter<DelayedInput<Observer, Capacity>, Observer,
+                                         DelayedInputConfig<Observer>> {
+  using Base = NamedAdapter<DelayedInput, Observer, DelayedInputConfig<Observer>>;
+  friend Base;
   using Base::observer_;
   static_assert(Capacity >= 1, "esokit: a delay line needs a capacity of at least 1");
   using S = typename Observer::scalar_type;
@@ -42,35 +44,6 @@ class DelayedInput : public Adapter<Observer> {
     return traits;
   }();
 
-  using Config = DelayedInputConfig<Observer>;  ///< settings of make
-
-  /// Checks the settings and does all the design work.
-  /// @return the observer with an empty (zero) delay line, or an error that names the field
-  static Expected<DelayedInput, Error<S>> make(const Config& config) {
-    if (config.delay < 0 || config.delay > Capacity) {
-      return Error<S>{"delay",
-                      static_cast<S>(config.delay),
-                      "must be 0 up to the capacity of the delay line, which is",
-                      -1,
-                      static_cast<S>(Capacity),
-                      true};
-    }
-    auto observer = Observer::make(config.observer);
-    if (!observer) return observer.error();
-    return DelayedInput(*observer, config.delay);
-  }
-
-  /// New settings while running: estimate and inputs under way are kept. A refused config changes
-  /// nothing.
-  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
-
-  /// The same, with the settings of `fresh`, as `make` gave it: no design work.
-  Check<S> adopt(const DelayedInput& fresh) {
-    if (auto ok = observer_.adopt(fresh.observer_); !ok) return ok;
-    delay_ = fresh.delay_;
-    return {};
-  }
-
   /// One sample. @param y measurement @param u_applied u[k], of now; the delay is seen to here
   StepStatus update(S y, S u_applied) noexcept {
     const StepStatus status = push(u_applied);
@@ -81,17 +54,6 @@ class DelayedInput : public Adapter<Observer> {
   StepStatus predict(S u_applied) noexcept {
     const StepStatus status = push(u_applied);
     return status | observer_.predict(delayed());
-  }
-
-  /// Measurement update alone, see PredictorCorrector::correct.
-  StepStatus correct(S y) noexcept { return observer_.correct(y); }
-
-  /// Starts anew at (y, 0, .., 0).
-  StepStatus reset(S y) noexcept { return observer_.reset(y); }
-
-  /// Starts anew at a given estimate, N x 1.
-  StepStatus reset(const typename Observer::Estimate& state) noexcept {
-    return observer_.reset(state);
   }
 
   /// As if `u` had been applied for long. A u that is not finite changes nothing.
@@ -109,7 +71,18 @@ class DelayedInput : public Adapter<Observer> {
  private:
   static constexpr int length = Capacity + 1;
 
-  DelayedInput(const Observer& observer, int delay) noexcept : Base(observer), delay_(delay) {}
+  DelayedInput(const Observer& observer, const DelayedInputConfig<Observer>& config) noexcept
+      : Base(observer), delay_(config.delay) {}
+
+  static Check<S> check(const DelayedInputConfig<Observer>& config) {
+    return Rules<S>{}.require(0 <= config.delay && config.delay <= Capacity,
+                              {"delay", static_cast<S>(config.delay),
+                               "must be 0 up to the capacity of the delay line, which is", -1,
+                               static_cast<S>(Capacity), true});
+  }
+
+  /// The inputs under way are kept.
+  void take(const DelayedInput& fresh) noexcept { delay_ = fresh.delay_; }
 
   /// A bad input takes the place of the last good one here already, so that it is reported now and
   /// not d samples later.

@@ -86,8 +86,10 @@ struct KnownModelConfig {
 /// @tparam Model a function fbar(estimate): KnownPoles, or your own
 template <ShiftableDisturbance Observer, class Model>
 requires PlantModel<Model, Observer>
-class KnownModel : public Adapter<Observer> {
-  using Base = Adapter<Observer>;
+class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
+                                       KnownModelConfig<Observer, Model>> {
+  using Base = NamedAdapter<KnownModel, Observer, KnownModelConfig<Observer, Model>>;
+  friend Base;
   using Base::observer_;
   using S = typename Observer::scalar_type;
   static_assert(!observer_traits<Observer>.delays_input,
@@ -105,25 +107,9 @@ class KnownModel : public Adapter<Observer> {
     return traits;
   }();
 
-  using Config = KnownModelConfig<Observer, Model>;  ///< settings of make
-
-  /// Checks the settings and does all the design work.
-  /// @return the observer at rest in zero, or an error that names the field
-  static Expected<KnownModel, Error<S>> make(const Config& config) {
-    if constexpr (detail::declared_traits<Model, PlantModelTraits>.checks) {
-      if (auto ok = config.model.check(); !ok) return ok.error();
-    }
-    auto observer = Observer::make(config.observer);
-    if (!observer) return observer.error();
-    return KnownModel(*observer, config.model);
-  }
-
-  /// New settings while running: the estimate, that is fbar + d, is kept, and what another model
-  /// explains is taken out of d; a change of b0 is moved into d as everywhere. u does not jump.
-  /// A refused config changes nothing.
-  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
-
-  /// The same, with the settings of `fresh`, as `make` gave it: no design work.
+  /// Takes the settings of `fresh`, as `make` gave it, with no design work; so does `retune`. The
+  /// estimate, that is fbar + d, is kept, and what another model explains is taken out of d; a
+  /// change of b0 is moved into d as everywhere. u does not jump.
   Check<S> adopt(const KnownModel& fresh) {
     KnownModel next = *this;
     const S fed = observer_.applied_input() - applied_input_;
@@ -153,9 +139,6 @@ class KnownModel : public Adapter<Observer> {
     const S input = accepted(u_applied);
     return report(u_applied) | observer_.predict(input);
   }
-
-  /// Measurement update alone, see PredictorCorrector::correct.
-  StepStatus correct(S y) noexcept { return observer_.correct(y); }
 
   /// Starts anew at (y, 0, .., 0), with fbar + d zero.
   StepStatus reset(S y) noexcept {
@@ -222,8 +205,16 @@ class KnownModel : public Adapter<Observer> {
   [[nodiscard]] const S& applied_input() const noexcept { return applied_input_; }
 
  private:
-  KnownModel(const Observer& observer, const Model& model) noexcept
-      : Base(observer), model_(model), inverse_gain_(S(1) / observer.input_gain()) {}
+  KnownModel(const Observer& observer, const KnownModelConfig<Observer, Model>& config) noexcept
+      : Base(observer), model_(config.model), inverse_gain_(S(1) / observer.input_gain()) {}
+
+  static Check<S> check(const KnownModelConfig<Observer, Model>& config) {
+    if constexpr (detail::declared_traits<Model, PlantModelTraits>.checks) {
+      return config.model.check();
+    } else {
+      return {};
+    }
+  }
 
   /// fbar at an estimate whose row n is dhat.
   [[nodiscard]] S known_part(const Estimate& state) const noexcept {

@@ -41,8 +41,10 @@ struct OutlierGateConfig {
 /// ExtendedStateFilter has a gate of its own, which knows the variance of its innovation.
 template <LevelledObserver Observer>
 requires RestartingObserver<Observer>
-class OutlierGate : public Adapter<Observer> {
-  using Base = Adapter<Observer>;
+class OutlierGate
+    : public NamedAdapter<OutlierGate<Observer>, Observer, OutlierGateConfig<Observer>> {
+  using Base = NamedAdapter<OutlierGate, Observer, OutlierGateConfig<Observer>>;
+  friend Base;
   using Base::observer_;
   using S = typename Observer::scalar_type;
   static_assert(!observer_traits<Observer>.wraps_output,
@@ -56,46 +58,12 @@ class OutlierGate : public Adapter<Observer> {
     return traits;
   }();
 
-  using Config = OutlierGateConfig<Observer>;  ///< settings of make
-
-  /// Checks the settings and does all the design work.
-  /// @return the observer at rest in zero, or an error that names the field
-  static Expected<OutlierGate, Error<S>> make(const Config& config) {
-    Rules<S> rules;
-    rules.not_negative("threshold", config.threshold)
-        .not_negative("running_factor", config.running_factor)
-        .require(!(config.running_factor > S(0)) || config.threshold > S(0), "threshold",
-                 config.threshold,
-                 "must be positive where running_factor is: without noise nothing would pass")
-        .require(1 <= config.most_in_a_row && config.most_in_a_row <= 65000, "most_in_a_row",
-                 static_cast<S>(config.most_in_a_row), "must be 1 .. 65000");
-    if (!rules) return rules.error();
-    auto observer = Observer::make(config.observer);
-    if (!observer) return observer.error();
-    return OutlierGate(*observer, config);
-  }
-
-  /// New settings while running: the estimate is kept. A refused config changes nothing.
-  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
-
-  /// The same, with the settings of `fresh`, as `make` gave it: no design work.
-  Check<S> adopt(const OutlierGate& fresh) {
-    if (auto ok = observer_.adopt(fresh.observer_); !ok) return ok;
-    threshold_ = fresh.threshold_;
-    running_factor_ = fresh.running_factor_;
-    most_in_a_row_ = fresh.most_in_a_row_;
-    return {};
-  }
-
   /// One sample, see PredictorCorrector::update; `outlier_rejected` where y was taken for one.
   StepStatus update(S y, S u_applied) noexcept {
     if (!gated()) return observer_.update(y, u_applied);
     const StepStatus predicted = observer_.predict(u_applied);
     return predicted | correct(y);
   }
-
-  /// Time update alone, see PredictorCorrector::predict.
-  StepStatus predict(S u_applied) noexcept { return observer_.predict(u_applied); }
 
   /// Measurement update alone.
   StepStatus correct(S y) noexcept {
@@ -124,11 +92,28 @@ class OutlierGate : public Adapter<Observer> {
   [[nodiscard]] bool open() const noexcept { return open_; }
 
  private:
-  OutlierGate(const Observer& observer, const Config& config) noexcept
+  OutlierGate(const Observer& observer, const OutlierGateConfig<Observer>& config) noexcept
       : Base(observer),
         threshold_(config.threshold),
         running_factor_(config.running_factor),
         most_in_a_row_(static_cast<std::uint16_t>(config.most_in_a_row)) {}
+
+  static Check<S> check(const OutlierGateConfig<Observer>& config) {
+    return Rules<S>{}
+        .not_negative("threshold", config.threshold)
+        .not_negative("running_factor", config.running_factor)
+        .require(!(config.running_factor > S(0)) || config.threshold > S(0), "threshold",
+                 config.threshold,
+                 "must be positive where running_factor is: without noise nothing would pass")
+        .require(1 <= config.most_in_a_row && config.most_in_a_row <= 65000, "most_in_a_row",
+                 static_cast<S>(config.most_in_a_row), "must be 1 .. 65000");
+  }
+
+  void take(const OutlierGate& fresh) noexcept {
+    threshold_ = fresh.threshold_;
+    running_factor_ = fresh.running_factor_;
+    most_in_a_row_ = fresh.most_in_a_row_;
+  }
 
   [[nodiscard]] bool gated() const noexcept { return threshold_ > S(0); }
 

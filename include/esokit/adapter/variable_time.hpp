@@ -34,8 +34,10 @@ struct VariableTimeConfig {
 /// present length; once settled it is exact. A switched observer's gain sets follow time; its
 /// switching test compares innovations, whatever time lies between them.
 template <RestartingObserver Observer>
-class VariableTime : public Adapter<Observer> {
-  using Base = Adapter<Observer>;
+class VariableTime
+    : public NamedAdapter<VariableTime<Observer>, Observer, VariableTimeConfig<Observer>> {
+  using Base = NamedAdapter<VariableTime, Observer, VariableTimeConfig<Observer>>;
+  friend Base;
   using Base::observer_;
   using S = typename Observer::scalar_type;
 
@@ -48,7 +50,7 @@ class VariableTime : public Adapter<Observer> {
     return traits;
   }();
 
-  using Config = VariableTimeConfig<Observer>;  ///< settings of make
+  using typename Base::Config;
 
   /// Checks the settings and does all the design work.
   /// @return the observer at rest in zero, or an error that names the field; the observer's config
@@ -64,19 +66,6 @@ class VariableTime : public Adapter<Observer> {
       if (auto ok = Observer::make(edge); !ok) return ok.error();
     }
     return VariableTime(*observer, config);
-  }
-
-  /// New settings while running: the estimate is kept; steps are nominal again. A refused config
-  /// changes nothing.
-  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
-
-  /// The same, with the settings of `fresh`, as `make` gave it: no design work.
-  Check<S> adopt(const VariableTime& fresh) {
-    if (auto ok = observer_.adopt(fresh.observer_); !ok) return ok;
-    config_ = fresh.config_;
-    step_time_ = fresh.step_time_;
-    current_ = fresh.current_;
-    return {};
   }
 
   /// How long the next step takes (s), until it is said anew. Outside T / ratio .. T ratio it is
@@ -126,14 +115,6 @@ class VariableTime : public Adapter<Observer> {
     return observer_.correct_weighted(y, variance);
   }
 
-  /// Starts anew at (y, 0, .., 0).
-  StepStatus reset(S y) noexcept { return observer_.reset(y); }
-
-  /// Starts anew at a given estimate, N x 1.
-  StepStatus reset(const typename Observer::Estimate& state) noexcept {
-    return observer_.reset(state);
-  }
-
   /// Length of the steps now, s.
   [[nodiscard]] const S& step_time() const noexcept { return step_time_; }
 
@@ -143,6 +124,13 @@ class VariableTime : public Adapter<Observer> {
         config_(config),
         step_time_(chain_config<Observer>(config_.observer).sample_time),
         current_(step_time_) {}
+
+  /// Steps are nominal again.
+  void take(const VariableTime& fresh) noexcept {
+    config_ = fresh.config_;
+    step_time_ = fresh.step_time_;
+    current_ = fresh.current_;
+  }
 
   [[nodiscard]] bool is_current() const noexcept {
     return !(step_time_ < current_ || step_time_ > current_);

@@ -53,8 +53,10 @@ struct WrappedOutputConfig {
 /// An axis that turns by more than half a period a sample cannot be told from a slower one: the
 /// actuator must not be able to bring it there.
 template <ShiftableOutput Observer>
-class WrappedOutput : public Adapter<Observer> {
-  using Base = Adapter<Observer>;
+class WrappedOutput
+    : public NamedAdapter<WrappedOutput<Observer>, Observer, WrappedOutputConfig<Observer>> {
+  using Base = NamedAdapter<WrappedOutput, Observer, WrappedOutputConfig<Observer>>;
+  friend Base;
   using Base::observer_;
   using S = typename Observer::scalar_type;
 
@@ -65,35 +67,6 @@ class WrappedOutput : public Adapter<Observer> {
     traits.wraps_output = true;
     return traits;
   }();
-
-  using Config = WrappedOutputConfig<Observer>;  ///< settings of make
-
-  /// Checks the settings and does all the design work.
-  /// @return the observer at rest in zero, or an error that names the field
-  static Expected<WrappedOutput, Error<S>> make(const Config& config) {
-    Rules<S> rules;
-    rules.positive("period", config.period).invertible("period", config.period);
-    if (!rules) return rules.error();
-    auto observer = Observer::make(config.observer);
-    if (!observer) return observer.error();
-    return WrappedOutput(*observer, config.period);
-  }
-
-  /// New settings while running: the estimate is kept; of another period the turns are counted
-  /// anew. A refused config changes nothing.
-  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
-
-  /// The same, with the settings of `fresh`, as `make` gave it: no design work.
-  Check<S> adopt(const WrappedOutput& fresh) {
-    if (auto ok = observer_.adopt(fresh.observer_); !ok) return ok;
-    if (fresh.period_ < period_ || fresh.period_ > period_) {
-      period_ = fresh.period_;
-      inverse_period_ = fresh.inverse_period_;
-      forget();
-      recentre();
-    }
-    return {};
-  }
 
   /// One sample, see PredictorCorrector::update. @param y in any branch; one so large that its
   /// rounding is an eighth of a period is rejected
@@ -199,8 +172,21 @@ class WrappedOutput : public Adapter<Observer> {
   static constexpr std::uint8_t enough_steady = 8;
   static constexpr bool gated = observer_traits<Observer>.rejects_outliers;
 
-  WrappedOutput(const Observer& observer, const S& period) noexcept
-      : Base(observer), period_(period), inverse_period_(S(1) / period) {}
+  WrappedOutput(const Observer& observer, const WrappedOutputConfig<Observer>& config) noexcept
+      : Base(observer), period_(config.period), inverse_period_(S(1) / config.period) {}
+
+  static Check<S> check(const WrappedOutputConfig<Observer>& config) {
+    return Rules<S>{}.positive("period", config.period).invertible("period", config.period);
+  }
+
+  /// Of another period the turns are counted anew.
+  void take(const WrappedOutput& fresh) noexcept {
+    if (!(fresh.period_ < period_ || fresh.period_ > period_)) return;
+    period_ = fresh.period_;
+    inverse_period_ = fresh.inverse_period_;
+    forget();
+    recentre();
+  }
 
   [[nodiscard]] S half_period() const noexcept { return period_ * static_cast<S>(0.5); }
 
