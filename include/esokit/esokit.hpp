@@ -65,6 +65,7 @@
 #include <esokit/core/version.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/gain/algebraic_gain.hpp>
+#include <esokit/gain/algebraic_gain_design.hpp>
 #include <esokit/gain/constant_gain.hpp>
 #include <esokit/gain/continuous_gain.hpp>
 #include <esokit/gain/covariance_factor.hpp>

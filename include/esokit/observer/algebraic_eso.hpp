@@ -5,7 +5,7 @@
 #pragma once
 
 #include <esokit/core/type_tag.hpp>
-#include <esokit/gain/algebraic_gain.hpp>
+#include <esokit/gain/algebraic_gain_design.hpp>
 #include <esokit/observer/continuous_observer.hpp>
 #include <esokit/observer/named_observer.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
@@ -201,35 +201,7 @@ class AlgebraicEso
   [[nodiscard]] Law& law() noexcept { return std::get<0>(this->laws()); }
 
   static Expected<Law, Error<S>> design(const Config& config, const typename Base::PlantModel&) {
-    Rules<S> rules;
-    rules.not_negative("observer_bandwidth", config.observer_bandwidth)
-        .not_negative("frequency_shift", config.frequency_shift)
-        .require(all(config.observer_bandwidth > S(0.0)) || !all(config.frequency_shift > S(0.0)) ||
-                     config.allow_vanishing_gain,
-                 "observer_bandwidth", config.observer_bandwidth,
-                 "with frequency_shift above zero lets the gains vanish; allow_vanishing_gain "
-                 "asks for it")
-        .require(0 <= config.start_index && config.start_index <= 1000000, "start_index",
-                 detail::integer<S>(config.start_index), "must be 0 .. 1000000");
-    if (!rules) return rules.error();
-    const auto blanking = blanking_samples(config);
-    if (!blanking) return blanking.error();
-    if (all(config.observer_bandwidth > S(0.0))) {
-      const auto settled = current_gain<N, S>(
-          EqualSampledPoles<N, S>::from_bandwidth(config.observer_bandwidth, config.sample_time)
-              .weights());
-      rules.representable("observer_bandwidth", config.observer_bandwidth, settled.back(),
-                          "times sample_time gives a gain that the scalar cannot hold");
-    }
-    const Expected<Law, Error<S>> law(
-        Law(config.observer_bandwidth, config.frequency_shift, config.sample_time,
-            static_cast<std::uint32_t>(config.start_index), *blanking));
-    for (const S& gain : law->gain(S(0.0))) {
-      rules.representable("frequency_shift", config.frequency_shift, gain,
-                          "times sample_time gives a gain that the scalar cannot hold");
-    }
-    if (!rules) return rules.error();
-    return law;
+    return detail::design_algebraic_gain<N, S>(config);
   }
 
   void publish(const Estimate& estimate) noexcept {
@@ -239,66 +211,6 @@ class AlgebraicEso
     Estimate estimate;
     for (int r = 0; r < N; ++r) estimate(r) = published_[static_cast<std::size_t>(r)];
     return estimate;
-  }
-
-  static Expected<std::uint32_t, Error<S>> blanking_samples(const Config& config) {
-    Rules<S> rules;
-    rules.not_negative("measurement_noise", config.measurement_noise)
-        .not_negative("disturbance_noise", config.disturbance_noise);
-    const bool noise = all(config.measurement_noise > S(0.0));
-    rules.require(noise == all(config.disturbance_noise > S(0.0)),
-                  noise ? "disturbance_noise" : "measurement_noise", S(0.0),
-                  "must be given together with the other noise level");
-    if (config.blanking) rules.not_negative("blanking", *config.blanking);
-    if (!rules) return rules.error();
-    if (config.blanking) {
-      // A blanking of 20.0001 samples by rounding is one of 20.
-      const S samples = *config.blanking / config.sample_time - S(1e-3);
-      return smallest_count("blanking", *config.blanking, 0u,
-                            [&](const S& count) { return all(count >= samples); });
-    }
-    if (noise) {
-      return smallest_count(
-          "measurement_noise", config.measurement_noise, std::uint32_t{N - 1},
-          [&](const S& count) { return all(S(1.0) >= noise_ratio(config, count)); });
-    }
-    return std::uint32_t{N - 1};
-  }
-
-  /// Variance of the highest estimate after `count` samples over the one that is tolerated:
-  /// (sigma / tolerated)^2 F / (count (count T)^(2N-2)), F = (2N-1)! (2N-2)! / ((N-1)!)^2 = (2N-1)
-  /// prod_{i=1..N-1} (N-1+i)^2. In this order it overflows or vanishes only where the answer is
-  /// clear.
-  static S noise_ratio(const Config& config, const S& count) {
-    constexpr int last = N - 1;
-    const S level = config.measurement_noise / config.disturbance_noise;
-    const S rate = S(1.0) / (count * config.sample_time);
-    S ratio = level * level / count;
-    for (int i = last; i > 0; --i) {
-      const S factor = detail::integer<S>(last + i) * rate;
-      ratio = ratio * factor * factor;
-    }
-    return ratio * detail::integer<S>(2 * last + 1);
-  }
-
-  /// The smallest number of samples, `low` to 1e6, that is enough; none is an error. No logarithms
-  /// or roots, so it serves every scalar.
-  template <class Enough>
-  static Expected<std::uint32_t, Error<S>> smallest_count(const char* field, const S& value,
-                                                          std::uint32_t low, const Enough& enough) {
-    std::uint32_t high = 1000000;
-    if (!enough(detail::integer<S>(high))) {
-      return Error<S>{field, value, "gives a blanking of more than 1e6 samples"};
-    }
-    while (low < high) {
-      const std::uint32_t middle = (low + high) / 2;
-      if (enough(detail::integer<S>(middle))) {
-        high = middle;
-      } else {
-        low = middle + 1;
-      }
-    }
-    return high;
   }
 
   // Out of line: the settled observer then costs what LinearEso does, with both in one place it
