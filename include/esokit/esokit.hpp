@@ -84,6 +84,7 @@
 #include <esokit/gain/reduced_order.hpp>
 #include <esokit/gain/riccati.hpp>
 #include <esokit/gain/riccati_gain.hpp>
+#include <esokit/gain/riccati_gain_design.hpp>
 #include <esokit/gain/sampled_gain.hpp>
 #include <esokit/gain/scheduled_gain.hpp>
 #include <esokit/gain/step_status.hpp>

@@ -25,6 +25,12 @@ constexpr S smallest_normal() noexcept {
   return S((std::numeric_limits<TableScalar<S>>::min)());
 }
 
+/// Spacing of the scalar's numbers above one.
+template <Scalar S>
+constexpr S rounding() noexcept {
+  return S(std::numeric_limits<TableScalar<S>>::epsilon());
+}
+
 /// The larger of two, or the one that is not finite. Without <algorithm>, which takes longer to
 /// compile than a controller.
 template <PlainScalar S>

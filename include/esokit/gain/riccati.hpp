@@ -34,11 +34,6 @@ struct RiccatiModel {
 
 namespace detail {
 
-template <Scalar S>
-constexpr S rounding() noexcept {
-  return S(std::numeric_limits<TableScalar<S>>::epsilon());
-}
-
 /// Largest relative change of the elements that count.
 template <int Rows, int Columns, Scalar S>
 S relative_change(const Matrix<S, Rows, Columns>& now, const Matrix<S, Rows, Columns>& before) {

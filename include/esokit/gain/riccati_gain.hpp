@@ -20,7 +20,6 @@
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/covariance_factor.hpp>
 #include <esokit/gain/gain_law.hpp>
-#include <esokit/gain/riccati.hpp>
 #include <esokit/model/sampled_model.hpp>
 #include <limits>
 #include <optional>
@@ -128,51 +127,14 @@ class RiccatiGain {
     reset();
   }
 
-  /// Works out the limit and the table, and goes over to `mode`. False if there is no limit.
-  bool freeze(RiccatiMode mode) {
-    const auto limit = find_limit();
-    if (!limit) return false;
-    limit_ = *limit;
-    RiccatiGain run = *this;
-    run.mode_ = RiccatiMode::recursive;
-    run.reset();
-    for (Point& point : table_) {
-      run.advance();
-      point = run.now_;
-      run.accept(S(0.0));
-    }
-    mode_ = mode;
-    reset();
-    return true;
-  }
+  /// Works out the limit and the table, and goes over to `mode`. False if there is no limit. This
+  /// and `fits` are design: gain/riccati_gain_design.hpp has them.
+  bool freeze(RiccatiMode mode);
 
   /// True if the recursion stays within the scalar. What a large inflation lets it grow to is
   /// reached within the first samples; one above 1e6, or so small that Q / theta is large, also
   /// lets it grow in gaps.
-  [[nodiscard]] bool fits() const noexcept {
-    const bool usual = all(start_inflation_ <= S(1e6)) && all(start_inflation_ >= S(1e-6));
-    const int most_missing = usual ? 0 : Size;
-    // Room for two more samples that are missing.
-    const S growth = S(1.0) + start_inflation_;
-    const S room = usual ? S(1.0) : S(growth * growth);
-    for (int missing = 0; missing <= most_missing; ++missing) {
-      RiccatiGain run = *this;
-      run.mode_ = RiccatiMode::recursive;
-      run.reset();
-      for (int k = 0; k < 8 * Size; ++k) {
-        if (!run.fits(room)) return false;
-        for (int i = 0; i < missing; ++i) run.advance();
-        if (!run.fits(room)) return false;
-        run.advance();
-        run.accept(S(0.0));
-      }
-      for (int k = 0; k < 2 * most_missing; ++k) {
-        run.advance();
-        if (!run.fits(room)) return false;
-      }
-    }
-    return true;
-  }
+  [[nodiscard]] bool fits() const noexcept;
 
   /// k of the coming correction, scaled, whatever the innovation.
   /// @{
@@ -181,29 +143,29 @@ class RiccatiGain {
   /// @}
 
   /// One sample ahead, from the corrected covariance if there was a correction.
-  ESOKIT_INLINE constexpr void advance() noexcept requires PackScalar<S> {
-    // Each lane as the others, and as it usually is: at once.
-    const int bits = since_[0] & ~watched;
-    if (since_ == since_[0] && bits > standing && (TableSize == 0 || place_ == done)) [[likely]] {
-      note(standing);
-    } else if (since_ == since_[0] && bits == corrected && mode_ == RiccatiMode::recursive &&
-               rule_ != InflationRule::adaptive && diagonal_noise_ == diagonal_noise_[0]) {
-      note(0);
-      recur_from_correction();
-    } else {
-      detail::for_each_lane<Plain>(*this, [](Plain& lane, int) { lane.advance(); });
-    }
-  }
-  /// The same of a plain scalar.
-  ESOKIT_INLINE constexpr void advance() noexcept requires(!PackScalar<S>) {
-    if (rests()) [[likely]] {
-      note(standing);
-      if constexpr (TableSize > 0) {
-        if (place_ <= TableSize) next_of_table();
+  ESOKIT_INLINE constexpr void advance() noexcept {
+    if constexpr (PackScalar<S>) {
+      // Each lane as the others, and as it usually is: at once.
+      const int bits = since_[0] & ~watched;
+      if (since_ == since_[0] && bits > standing && (TableSize == 0 || place_ == done)) [[likely]] {
+        note(standing);
+      } else if (since_ == since_[0] && bits == corrected && mode_ == RiccatiMode::recursive &&
+                 rule_ != InflationRule::adaptive && diagonal_noise_ == diagonal_noise_[0]) {
+        note(0);
+        recur_from_correction();
+      } else {
+        detail::for_each_lane<Plain>(*this, [](Plain& lane, int) { lane.advance(); });
       }
-      return;
+    } else {
+      if (rests()) [[likely]] {
+        note(standing);
+        if constexpr (TableSize > 0) {
+          if (place_ <= TableSize) next_of_table();
+        }
+        return;
+      }
+      recur();
     }
-    recur();
   }
 
   /// The correction was carried out; the next `advance` goes on from the corrected covariance.
@@ -222,10 +184,10 @@ class RiccatiGain {
     return since_ > standing;
   }
 
-  /// True if any lane of a pack is watched.
-  [[nodiscard]] constexpr bool any_watched() const noexcept requires PackScalar<S> {
+  /// True if any lane is watched.
+  [[nodiscard]] constexpr bool any_watched() const noexcept {
     int any = 0;
-    for (const std::int8_t bits : since_.values) any |= bits;
+    for (int i = 0; i < lane_count<S>; ++i) any |= detail::of_lane(since_, i);
     return any < 0;
   }
 
@@ -386,15 +348,7 @@ class RiccatiGain {
   }
 
   /// Gain and covariance times `room` are numbers.
-  [[nodiscard]] bool fits(const S& room) const noexcept {
-    for (int i = 0; i < Size; ++i) {
-      if (!all(is_finite(now_.gain[index(i)])) ||
-          !all(is_finite(S(now_.factor.variance(i) * room)))) {
-        return false;
-      }
-    }
-    return true;
-  }
+  [[nodiscard]] bool fits(const S& room) const noexcept;
 
   /// P- / R above which a measurement tells all there is to know of y. A gap lets P- grow no
   /// further but along the chain: more would only cost the digits in which the states differ.
@@ -523,44 +477,7 @@ class RiccatiGain {
     ++place_;
   }
 
-  [[nodiscard]] std::optional<Point> find_limit() const {
-    RiccatiGain run = *this;
-    run.mode_ = RiccatiMode::recursive;
-    run.reset();
-    // theta and the limit that it leads to depend on each other: repeated until they agree.
-    const bool adaptive = rule_ == InflationRule::adaptive;
-    const int rounds = adaptive ? 500 : 1;
-    S theta(1.0);
-    for (int round = 0; round < rounds; ++round) {
-      Factor noise = noise_;
-      if (adaptive) {
-        run.set_inflation(theta);
-        noise.scale(S(run.now_.growth / theta));
-      }
-      const auto factor = steady_covariance<Size, S>(noise, S(measurement_ * run.now_.shrink),
-                                                     run.now_.growth, transition_);
-      if (!factor) return std::nullopt;
-      run.now_.factor = *factor;
-      run.set_gain();
-      for (const S& k : run.now_.gain) {
-        if (!all(is_finite(k))) return std::nullopt;
-      }
-      if (std::is_same_v<Transition, PascalTransition> && rule_ == InflationRule::fixed &&
-          !all(noise_trace_ > S(0.0))) {
-        // Nothing disturbs the plant: all poles at 1/(1+theta), known exactly.
-        const EqualSampledPoles<Size, S> poles{run.now_.inflation * run.now_.shrink};
-        run.now_.gain = current_gain<Size, S>(poles.weights());
-      }
-      if (!adaptive) return run.now_;
-      RiccatiGain next = run;
-      next.accept(S(0.0));
-      next.recur();
-      const S change = detail::absolute(S(next.inflation() - theta));
-      if (all(change <= S(1e3) * detail::rounding<S>() * theta)) return run.now_;
-      theta = next.inflation();
-    }
-    return std::nullopt;
-  }
+  [[nodiscard]] std::optional<Point> find_limit() const;
 
   // What a step touches comes first.
   Point now_{};

@@ -9,7 +9,7 @@
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/constant_gain.hpp>
 #include <esokit/gain/noise_settings.hpp>
-#include <esokit/gain/riccati_gain.hpp>
+#include <esokit/gain/riccati_gain_design.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
 #include <optional>
 
@@ -174,21 +174,21 @@ class ExtendedStateFilter
   Check<S> retune(const Config& config) { return detail::retune(*this, config); }
 
   /// The same, with the settings of `fresh`, as `make` gave it: no design work.
-  Check<S> adopt(ExtendedStateFilter fresh) requires PackScalar<S> {
-    return detail::adopt_lanes(*this, fresh);
-  }
-  /// The same of a plain scalar.
-  Check<S> adopt(ExtendedStateFilter fresh) requires(!PackScalar<S>) {
-    if (!fresh.law().continue_from(law(), S(fresh.sample_time() / this->sample_time()))) {
-      return Error<S>{"measurement_variance", fresh.law().measurement_variance(),
-                      "is too small, or sample_time too far from the one before, for the present "
-                      "covariance to be carried over: measure first"};
+  Check<S> adopt(ExtendedStateFilter fresh) {
+    if constexpr (PackScalar<S>) {
+      return detail::adopt_lanes(*this, fresh);
+    } else {
+      if (!fresh.law().continue_from(law(), S(fresh.sample_time() / this->sample_time()))) {
+        return Error<S>{"measurement_variance", fresh.law().measurement_variance(),
+                        "is too small, or sample_time too far from the one before, for the present "
+                        "covariance to be carried over: measure first"};
+      }
+      if (auto ok = Base::adopt(fresh); !ok) return ok;
+      nominal_model_ = fresh.nominal_model_;
+      outlier_threshold_ = fresh.outlier_threshold_;
+      change_bound_ = fresh.change_bound_;
+      return {};
     }
-    if (auto ok = Base::adopt(fresh); !ok) return ok;
-    nominal_model_ = fresh.nominal_model_;
-    outlier_threshold_ = fresh.outlier_threshold_;
-    change_bound_ = fresh.change_bound_;
-    return {};
   }
 
   /// One sample: `predict(u_applied)`, then `correct(y)`.
