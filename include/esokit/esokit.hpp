@@ -71,6 +71,7 @@
 #include <esokit/gain/covariance_factor.hpp>
 #include <esokit/gain/error_polynomial.hpp>
 #include <esokit/gain/feedback_gain.hpp>
+#include <esokit/gain/filter_design.hpp>
 #include <esokit/gain/gain_interval.hpp>
 #include <esokit/gain/gain_law.hpp>
 #include <esokit/gain/half_gain.hpp>

@@ -93,10 +93,11 @@ class RiccatiGain {
   static constexpr GainLawTraits traits{
       .kind = GainKind::preset, .advances = true, .accepts = true, .resets = true};
 
-  using Factor = CovarianceFactor<Size, S>;   ///< P-, scaled
-  using Settings = RiccatiSettings<Size, S>;  ///< of the constructor
-  using Gain = ScaledGain<Size, S>;           ///< k, scaled
-  using scalar_type = S;                      ///< of gains and covariances
+  using Factor = CovarianceFactor<Size, S>;     ///< P-, scaled
+  using Settings = RiccatiSettings<Size, S>;    ///< of the constructor
+  using Gain = ScaledGain<Size, S>;             ///< k, scaled
+  using scalar_type = S;                        ///< of gains and covariances
+  static constexpr int table_size = TableSize;  ///< gains in the start table
   template <class T>
   using with_scalar =
       RiccatiGain<Size, T, TableSize,

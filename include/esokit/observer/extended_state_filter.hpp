@@ -8,8 +8,9 @@
 #include <cstdint>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/constant_gain.hpp>
-#include <esokit/gain/noise_settings.hpp>
-#include <esokit/gain/riccati_gain_design.hpp>
+#include <esokit/gain/filter_design.hpp>
+#include <esokit/gain/riccati_gain.hpp>
+#include <esokit/observer/named_observer.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
 #include <optional>
 
@@ -63,13 +64,14 @@ template <int Order, Scalar S = double, int Extension = 1, class Model = NoNomin
           int TableSize = 0, class PlantModel = ChainModel<Order, S, Extension>>
 requires NominalModel<Model, Order, LaneScalar<S>>
 class ExtendedStateFilter
-    : public PredictorCorrector<
-          Order, S, Extension,
-          RiccatiGain<Order + Extension, S, TableSize, detail::TransitionOf<PlantModel, S>>, 1,
-          PlantModel> {
-  using Transition = detail::TransitionOf<PlantModel, S>;
-  using Law = RiccatiGain<Order + Extension, S, TableSize, Transition>;
-  using Base = PredictorCorrector<Order, S, Extension, Law, 1, PlantModel>;
+    : public NamedObserver<ExtendedStateFilter<Order, S, Extension, Model, TableSize, PlantModel>,
+                           PredictorCorrector<Order, S, Extension,
+                                              RiccatiGain<Order + Extension, S, TableSize,
+                                                          detail::TransitionOf<PlantModel, S>>,
+                                              1, PlantModel>> {
+  using Base = typename ExtendedStateFilter::NamedObserver;
+  friend Base;
+  using Law = typename Base::Law;
   static constexpr int N = Base::size;
   static constexpr bool has_model = !std::same_as<Model, NoNominalModel>;
   static_assert(!has_model || (Extension == 1 && model_traits<PlantModel>.is_chain),
@@ -159,21 +161,8 @@ class ExtendedStateFilter
       ExtendedStateFilter<Order, T, Extension, typename detail::ForScalar<Model, T>::type,
                           TableSize, detail::WithScalar<PlantModel, T>>;  ///< of another scalar
 
-  /// Checks the settings and does all the design work.
-  /// @return the filter at rest in zero, or an error that names the field
-  static Expected<ExtendedStateFilter, Error<S>> make(const Config& config) {
-    if constexpr (PackScalar<S>) {
-      return detail::make_lanes<ExtendedStateFilter>(config);
-    } else {
-      return make_one(config);
-    }
-  }
-
-  /// New settings while running: estimate and covariance are kept, a change of b0 is moved into the
-  /// disturbance. A refused config changes nothing.
-  Check<S> retune(const Config& config) { return detail::retune(*this, config); }
-
-  /// The same, with the settings of `fresh`, as `make` gave it: no design work.
+  /// Takes the settings of `fresh`, as `make` gave it, with no design work; so does `retune`.
+  /// Estimate and covariance are kept, a change of b0 is moved into the disturbance.
   Check<S> adopt(ExtendedStateFilter fresh) {
     if constexpr (PackScalar<S>) {
       return detail::adopt_lanes(*this, fresh);
@@ -347,40 +336,17 @@ class ExtendedStateFilter
   /// No lane has anything to do beside the predictor-corrector's step.
   [[nodiscard]] bool usual() const noexcept { return !has_model && !law().any_watched(); }
 
-  static Expected<ExtendedStateFilter, Error<S>> make_one(const Config& config) {
-    const ChainConfig<S> chain{config.input_gain, config.sample_time, config.max_gap};
-    Rules<S> rules;
-    rules.all_of(Base::check_chain(chain))
-        .all_of(check_rule(config))
-        .not_negative("outlier_threshold", config.outlier_threshold);
-    if (!rules) return rules.error();
-    const auto plant = detail::make_model<PlantModel>(config);
-    if (!plant) return plant.error();
-    auto settings = law_settings(config, *plant);
-    if (!settings) return settings.error();
-    Law law(*settings, detail::transition_of<S>(*plant));
-    for (const S& k : law.gain_before_measurement()) {
-      if (!all(is_finite(k))) {
-        return Error<S>{"initial_covariance", config.initial_covariance(0, 0),
-                        "gives a gain that the scalar cannot hold"};
-      }
-    }
-    if (!law.fits()) {
-      return Error<S>{"inflation", law.inflation(),
-                      "lets the covariance grow beyond what the scalar can hold"};
-    }
-    if (config.mode != RiccatiMode::recursive) {
-      if (auto ok = freeze(law, config); !ok) return ok.error();
-    }
-    return ExtendedStateFilter(*plant, law, config);
-  }
-
-  ExtendedStateFilter(const PlantModel& plant, const Law& law, const Config& config) noexcept
-      : Base(plant, law, config.max_gap),
+  ExtendedStateFilter(const Config& config, const PlantModel& plant, const Law& law,
+                      int max_gap) noexcept
+      : Base(config, plant, law, max_gap),
         nominal_model_(config.model),
         outlier_threshold_(config.outlier_threshold),
         change_bound_(config.disturbance_bounds[Order]) {
     std::get<0>(this->laws()).watch(all(config.outlier_threshold > S(0.0)));
+  }
+
+  static Expected<Law, Error<S>> design(const Config& config, const PlantModel& plant) {
+    return detail::FilterDesign<Law, PlantModel, has_model>::make(config, plant);
   }
 
   static constexpr std::size_t index(int i) noexcept { return static_cast<std::size_t>(i); }
@@ -389,27 +355,7 @@ class ExtendedStateFilter
   [[nodiscard]] const Law& law() const noexcept { return std::get<0>(this->laws()); }
   [[nodiscard]] Law& law() noexcept { return std::get<0>(this->laws()); }
 
-  static Check<S> check_rule(const Config& config) {
-    Rules<S> rules;
-    rules.all_of(detail::check_inflation<S>(config));
-    if (config.inflation_rule == InflationRule::adaptive) {
-      rules.positive("trace_weights", config.trace_weights);
-    }
-    return rules;
-  }
-
-  /// What makes a state of the law of one in physical units, T^r / r! of the chain, over the root
-  /// of the unit.
-  static Array<S, N> scaled_units(const PlantModel& plant, const S& root) {
-    Estimate ones;
-    for (int r = 0; r < N; ++r) ones(r) = S(1.0) / root;
-    const auto states = plant.scaled(ones);
-    Array<S, N> units;
-    for (int r = 0; r < N; ++r) units[index(r)] = states[index(PlantModel::state_of_row(r))];
-    return units;
-  }
-
-  /// The inverse, without the root.
+  /// What makes a state of the model of one in its scaling one in physical units.
   static Array<S, N> physical_units(const PlantModel& plant) noexcept {
     typename PlantModel::State ones;
     ones.fill(S(1.0));
@@ -417,140 +363,6 @@ class ExtendedStateFilter
     Array<S, N> units;
     for (int r = 0; r < N; ++r) units[index(r)] = physical(r);
     return units;
-  }
-
-  static Expected<RiccatiSettings<N, S>, Error<S>> law_settings(const Config& config,
-                                                                const PlantModel& plant) {
-    using std::sqrt;
-    const S& r = config.measurement_variance;
-    Rules<S> rules;
-    rules.not_negative("measurement_variance", r)
-        .all_of(detail::check_covariance("initial_covariance", config.initial_covariance, true));
-    Covariance q = Covariance::Zero();
-    if (config.process_covariance) {
-      q = *config.process_covariance;
-      rules.all_of(detail::check_covariance("process_covariance", q, true));
-    }
-    // With a model the change left over is the difference of two within the bound.
-    rules.all_of(detail::add_bounds(config, q, has_model ? Order : -1));
-    const S& change = config.disturbance_bounds[Order];
-    rules.require(!has_model || all(change > S(0.0)), "disturbance_bounds", change,
-                  "must say by how much the model may change the disturbance in a sample", Order);
-    if (!rules) return rules.error();
-
-    // The unit of all variances: R, or without noise the largest variance there is.
-    S unit = r;
-    const Array<S, N> plain = scaled_units(plant, S(1.0));
-    bool driven = false;
-    for (int i = 0; i < N; ++i) {
-      driven = driven || all(q(i, i) > S(0.0));
-      if (all(r > S(0.0))) continue;
-      for (const S& variance : {q(i, i), config.initial_covariance(i, i)}) {
-        const S seen = (variance * plain[index(i)]) * plain[index(i)];
-        unit = select(unit < seen, seen, unit);
-      }
-    }
-    rules
-        .require(driven || all(r > S(0.0)), "measurement_variance", r,
-                 "must be positive where nothing disturbs the plant")
-        .require(driven || config.inflation_rule != InflationRule::adaptive, "disturbance_bounds",
-                 S(0.0), "or process_covariance must not be zero where the inflation is adaptive")
-        .all_of(check_way_back(config, q));
-    if (!rules) return rules.error();
-    const Array<S, N> units = scaled_units(plant, S(sqrt(unit)));
-    const auto factored = [&units](const char* field, const Covariance& p) {
-      return detail::factored<N, S>(
-          field, p, units.data(),
-          "in the scaling T^2r / r!^2 and divided by R is a variance that the scalar cannot hold",
-          "must be positive semidefinite", N * N - 1);
-    };
-    const auto start = factored("initial_covariance", config.initial_covariance);
-    if (!start) return start.error();
-    const auto noise = factored(detail::noise_field(config), q);
-    if (!noise) return noise.error();
-    if (auto ok = check_alternating(config, *noise, unit, plant); !ok) return ok.error();
-    return RiccatiSettings<N, S>{.start = *start,
-                                 .noise = *noise,
-                                 .measurement = r / unit,
-                                 .unit = unit,
-                                 .rule = config.inflation_rule,
-                                 .inflation = config.inflation,
-                                 .trace_weights = config.trace_weights};
-  }
-
-  static int place_of_highest(const Config& config) noexcept {
-    return config.process_covariance ? N * N - 1 : N - 1;
-  }
-
-  /// What is known for certain is never corrected, what is never disturbed ever less.
-  static Check<S> check_way_back(const Config& config, const Covariance& q) {
-    const S& highest = q(N - 1, N - 1);
-    // Of a model put together which state that is depends on its parts: an actuator that is known
-    // is not disturbed.
-    if (model_traits<PlantModel>.corrects_part) return {};
-    if (config.allow_vanishing_gain || all(highest > S(0.0))) return {};
-    if (config.inflation_rule == InflationRule::none) {
-      return Error<S>{detail::noise_field(config), highest,
-                      "must disturb the highest state: without inflation its gain tends to zero "
-                      "(allow_vanishing_gain asks for it)",
-                      place_of_highest(config)};
-    }
-    const S& start = config.initial_covariance(N - 1, N - 1);
-    if (config.mode != RiccatiMode::frozen && !all(start > S(0.0))) {
-      return Error<S>{"initial_covariance", start,
-                      "must leave the highest state uncertain where nothing disturbs it "
-                      "(allow_vanishing_gain asks for it)",
-                      N * N - 1};
-    }
-    return {};
-  }
-
-  static Check<S> check_alternating(const Config& config, const CovarianceFactor<N, S>& noise,
-                                    const S& unit, const PlantModel& plant) {
-    if (config.inflation_rule == InflationRule::adaptive || all(config.inflation >= S(0.01))) {
-      return {};
-    }
-    const S least = least_measurement_variance<N, S>(noise, detail::transition_of<S>(plant));
-    const S& r = config.measurement_variance;
-    if (all(r / unit >= least)) return {};
-    return detail::alternating("measurement_variance", r, -1, S(least * unit));
-  }
-
-  static Check<S> freeze(Law& law, const Config& config) {
-    const char* field = detail::noise_field(config);
-    const S highest = config.process_covariance ? (*config.process_covariance)(N - 1, N - 1)
-                                                : config.disturbance_bounds[N - 1];
-    if (config.mode == RiccatiMode::start_table && TableSize == 0) {
-      return Error<S>{"mode", S(0.0), "needs a filter with a TableSize above 0 for a start table"};
-    }
-    if (!model_traits<PlantModel>.corrects_part && config.inflation_rule == InflationRule::none &&
-        !all(highest > S(0.0))) {
-      return Error<S>{field, highest,
-                      "must disturb the highest state where the gain is to be frozen without "
-                      "inflation: its limit is zero",
-                      place_of_highest(config)};
-    }
-    if (!law.freeze(config.mode)) {
-      return Error<S>{field, highest, "gives no limit gain that the scalar can hold"};
-    }
-    if constexpr (TableSize > 0) {
-      if (config.mode == RiccatiMode::start_table) {
-        for (int i = 0; i < N; ++i) {
-          const S limit = law.limit_gain()[index(i)];
-          const S last = law.last_table_gain()[index(i)];
-          if (!all(detail::absolute(S(last - limit)) <= S(0.1) * detail::absolute(limit))) {
-            return Error<S>{"mode",
-                            last,
-                            "has a start table too short: its last gain is more than a tenth off "
-                            "the limit",
-                            i,
-                            limit,
-                            true};
-          }
-        }
-      }
-    }
-    return {};
   }
 
   // On its own, so that the frozen filter's step has no call in it but at its end.

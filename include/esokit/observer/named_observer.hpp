@@ -51,7 +51,7 @@ class NamedObserver : public Base {
         return rules.error();
       const auto laws = O::design(config);
       if (!laws) return laws.error();
-      return Self(config.input_gain, *laws);
+      return Self(config, config.input_gain, *laws);
     } else if constexpr (PackScalar<scalar_type>) {
       return detail::make_lanes<Self>(config);
     } else {
@@ -67,7 +67,7 @@ class NamedObserver : public Base {
       if constexpr (!model_traits<Model>.is_chain) {
         for (const Law& law : Laws{*laws}) max_gap = law.longest_gap(max_gap);
       }
-      return Self(*model, *laws, max_gap);
+      return Self(config, *model, *laws, max_gap);
     }
   }
 
@@ -82,9 +82,10 @@ class NamedObserver : public Base {
   using Laws = typename Base::Laws;       ///< one a level
   using Law = typename Laws::value_type;  ///< what `design` gives
 
-  /// From what is checked already: as the constructor of `Base`.
-  template <class First, class... Parts>
-  NamedObserver(const First& first, const Parts&... parts) noexcept : Base(first, parts...) {}
+  /// From what is checked already: the config, for an observer that is more than its laws, then as
+  /// the constructor of `Base`.
+  template <class Config, class... Parts>
+  NamedObserver(const Config&, const Parts&... parts) noexcept : Base(parts...) {}
 };
 
 }  // namespace esokit
