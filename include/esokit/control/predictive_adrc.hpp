@@ -9,9 +9,9 @@
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/control/controller.hpp>
 #include <esokit/control/limiter.hpp>
+#include <esokit/core/kernels.hpp>
 #include <esokit/core/lane_by_lane.hpp>
 #include <esokit/core/type_tag.hpp>
-#include <esokit/core/unroll.hpp>
 #include <esokit/gain/gain_law.hpp>
 #include <esokit/gain/step_status.hpp>
 #include <esokit/observer/concepts.hpp>
@@ -346,7 +346,7 @@ class PredictiveAdrc {
   /// After a gap, or where u does not depend on y.
   [[nodiscard]] ESOKIT_COLD S wanted_in_general(const S& y) const noexcept {
     if (settled_) return blind_;
-    if (observer_.restarts()) return feed_ - std::get<0>(weights_) * y;
+    if (observer_.restarts()) return feed_ - weights_[0] * y;
     const S e = y - offset_;
     if (!all(is_finite(e))) return e;
     return blind_ - weigh(observer_.correction_gain(e)) * e;
@@ -355,31 +355,17 @@ class PredictiveAdrc {
   /// sum_i w_i x_i over the plant states and the disturbance.
   template <class State>
   [[nodiscard]] ESOKIT_INLINE S weigh(const State& x) const noexcept {
-    S sum = std::get<0>(weights_) * std::get<0>(x);
-    detail::unroll<order>([&](auto i) ESOKIT_INLINE_LAMBDA {
-      sum = sum + std::get<i + 1>(weights_) * std::get<i + 1>(x);
-    });
-    return sum;
+    return detail::weighed<0, order + 1>(weights_, x);
   }
 
   /// Everything of the next u that does not need the measurement.
   void arm() noexcept {
     settled_ = false;
-    feed_ = S(0.0);
-    detail::unroll<order + 1>([&](auto i) ESOKIT_INLINE_LAMBDA {
-      feed_ = feed_ + std::get<i>(feeds_) * std::get<i>(reference_);
-    });
-    S tail(0.0);
-    detail::unroll<order>([&](auto i) ESOKIT_INLINE_LAMBDA {
-      tail = tail + std::get<i + 1>(weights_) * observer_.template scaled_estimate<i + 1>();
-    });
-    S ahead(0.0);
-    detail::unroll<order>([&](auto i) ESOKIT_INLINE_LAMBDA {
-      ahead = ahead + std::get<i + 1>(feeds_) * std::get<i + 1>(reference_);
-    });
-    blind_ = std::get<0>(weights_) *
-                 (std::get<0>(reference_) - observer_.template scaled_estimate<0>()) +
-             (ahead - tail);
+    feed_ = detail::weighed<0, order + 1>(feeds_, reference_);
+    const S tail = detail::weighed_estimates<1, order>(weights_, observer_);
+    const S ahead = detail::weighed<1, order>(feeds_, reference_);
+    blind_ =
+        weights_[0] * (reference_[0] - observer_.template scaled_estimate<0>()) + (ahead - tail);
     if constexpr (preset) {
       if (Observer::levels > 1 || !measures_first_row || observer_.restarts()) {
         arm_by_preview();

@@ -4,7 +4,7 @@
 #pragma once
 
 #include <esokit/control/adrc_law.hpp>
-#include <esokit/core/unroll.hpp>
+#include <esokit/core/kernels.hpp>
 
 namespace esokit {
 
@@ -51,13 +51,13 @@ class ScaledLaw {
   /// Output-based form. @param error r - y
   template <class Observer>
   [[nodiscard]] ESOKIT_INLINE S control(const Observer& observer, S error) const noexcept {
-    return std::get<0>(weights_) * error - tail(observer);
+    return weights_[0] * error - tail(observer);
   }
 
   /// Error-based form: the same gains on the error's chain.
   template <class Observer>
   [[nodiscard]] ESOKIT_INLINE S control_error_based(const Observer& observer) const noexcept {
-    return std::get<0>(weights_) * observer.template scaled_estimate<0>() + tail(observer);
+    return weights_[0] * observer.template scaled_estimate<0>() + tail(observer);
   }
 
  private:
@@ -69,11 +69,7 @@ class ScaledLaw {
   /// sum_(i>=1) w_i x_i, apart from the first term so that both are worked out side by side.
   template <class Observer>
   [[nodiscard]] ESOKIT_INLINE S tail(const Observer& observer) const noexcept {
-    S sum = std::get<1>(weights_) * observer.template scaled_estimate<1>();
-    detail::unroll<Order - 1>([&](auto i) ESOKIT_INLINE_LAMBDA {
-      sum = sum + std::get<i + 2>(weights_) * observer.template scaled_estimate<i + 2>();
-    });
-    return sum;
+    return detail::weighed_estimates<1, Order>(weights_, observer);
   }
 
   Array<S, Order + 1> weights_{};

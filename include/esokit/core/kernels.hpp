@@ -29,6 +29,45 @@ template <class S, std::size_t Size>
   return sum;
 }
 
+/// x - k e with the elements of k from `First` on.
+template <int First, class S, std::size_t Size, std::size_t Count>
+[[nodiscard]] ESOKIT_INLINE constexpr std::array<S, Size> subtract_scaled(
+    const std::array<S, Size>& x, const std::array<S, Count>& k, const S& e) noexcept {
+  std::array<S, Size> rest;
+  unroll<Size>([&](auto r) ESOKIT_INLINE_LAMBDA {
+    std::get<r>(rest) = std::get<r>(x) - std::get<First + r>(k) * e;
+  });
+  return rest;
+}
+
+/// sum_i w_i x_i of `Count` elements from `First` on.
+template <int First, int Count, class W, class X>
+[[nodiscard]] ESOKIT_INLINE constexpr auto weighed(const W& w, const X& x) noexcept {
+  typename W::value_type sum = std::get<First>(w) * std::get<First>(x);
+  unroll<Count - 1>([&](auto i) ESOKIT_INLINE_LAMBDA {
+    sum = sum + std::get<First + i + 1>(w) * std::get<First + i + 1>(x);
+  });
+  return sum;
+}
+
+/// The same of an observer's scaled estimates.
+template <int First, int Count, class W, class Observer>
+[[nodiscard]] ESOKIT_INLINE constexpr auto weighed_estimates(const W& w,
+                                                             const Observer& observer) noexcept {
+  typename W::value_type sum = std::get<First>(w) * observer.template scaled_estimate<First>();
+  unroll<Count - 1>([&](auto i) ESOKIT_INLINE_LAMBDA {
+    sum = sum + std::get<First + i + 1>(w) * observer.template scaled_estimate<First + i + 1>();
+  });
+  return sum;
+}
+
+/// sum + x_1 + x_2 + ..
+template <class S, std::size_t Size>
+[[nodiscard]] ESOKIT_INLINE constexpr S plus_all(S sum, const std::array<S, Size>& x) noexcept {
+  unroll<Size>([&](auto r) ESOKIT_INLINE_LAMBDA { sum = sum + std::get<r>(x); });
+  return sum;
+}
+
 /// Adds the elements of `x` from `First` on to those of `sum`, `Count` of them.
 template <int First, int Count, class S, std::size_t Size>
 ESOKIT_INLINE constexpr void add_rows(std::array<S, Size>& sum,
@@ -58,9 +97,13 @@ template <class S, std::size_t Size>
 }
 
 /// Keeps the vectoriser off all elements, see keep_scalar.
+template <class S>
+ESOKIT_INLINE constexpr void keep_scalars(S& x) noexcept {
+  keep_scalar(x);
+}
 template <class S, std::size_t Size>
 ESOKIT_INLINE constexpr void keep_scalars(std::array<S, Size>& x) noexcept {
-  unroll<Size>([&](auto r) ESOKIT_INLINE_LAMBDA { keep_scalar(std::get<r>(x)); });
+  unroll<Size>([&](auto r) ESOKIT_INLINE_LAMBDA { keep_scalars(std::get<r>(x)); });
 }
 
 }  // namespace esokit::detail

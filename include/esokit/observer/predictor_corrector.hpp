@@ -166,7 +166,7 @@ class PredictorCorrector {
   /// disturbance of all levels together.
   [[nodiscard]] Estimate estimate() const noexcept {
     if constexpr (Levels == 1) {
-      return model_.physical(std::get<0>(states_));
+      return model_.physical(states_[0]);
     } else {
       return model_.physical(up_to_level<Levels - 1>());
     }
@@ -185,10 +185,10 @@ class PredictorCorrector {
   [[nodiscard]] ESOKIT_INLINE constexpr S scaled_estimate() const noexcept {
     static_assert(Row >= 0 && Row < size, "esokit: no such estimate");
     constexpr int state = Model::state_of_row(Row);
-    S sum = std::get<state>(std::get<Levels - 1>(states_));
+    S sum = std::get<state>(states_[Levels - 1]);
     if constexpr (Row >= Order) {
       detail::unroll<Levels - 1>(
-          [&](auto i) ESOKIT_INLINE_LAMBDA { sum = sum + std::get<state>(std::get<i>(states_)); });
+          [&](auto i) ESOKIT_INLINE_LAMBDA { sum = sum + std::get<state>(states_[i]); });
     }
     return sum;
   }
@@ -207,9 +207,7 @@ class PredictorCorrector {
   [[nodiscard]] constexpr S total_disturbance() const noexcept { return estimate<Order>(); }
 
   /// What the next measurement is expected to be.
-  [[nodiscard]] constexpr const S& predicted_measurement() const noexcept {
-    return std::get<0>(states_[0]);
-  }
+  [[nodiscard]] constexpr const S& predicted_measurement() const noexcept { return states_[0][0]; }
 
   /// y - z_1 of the last correction, with the predicted z_1 (of level 1).
   [[nodiscard]] constexpr const S& innovation() const noexcept { return innovation_; }
@@ -276,12 +274,12 @@ class PredictorCorrector {
         return gain;
       }
     }
-    return law_gain(std::get<0>(laws_), e, elapsed());
+    return law_gain(laws_[0], e, elapsed());
   }
 
   /// The gain law, for a controller that works ahead of the measurement.
   [[nodiscard]] constexpr const Law& gain_law() const noexcept requires(Levels == 1) {
-    return std::get<0>(laws_);
+    return laws_[0];
   }
 
   /// True if so many samples are missing that the next `correct` restarts.
@@ -482,7 +480,7 @@ class PredictorCorrector {
   [[nodiscard]] static constexpr State standing(const S& y) noexcept {
     State state{};
     state.fill(S(0.0));
-    std::get<0>(state) = y;
+    state[0] = y;
     std::get<Model::state_of_row(0)>(state) = y;
     return state;
   }
@@ -542,20 +540,20 @@ class PredictorCorrector {
 
   ESOKIT_INLINE constexpr void advance_laws() noexcept {
     if constexpr (gain_law_traits<Law>.advances) {
-      detail::unroll<Levels>([&](auto i) ESOKIT_INLINE_LAMBDA { std::get<i>(laws_).advance(); });
+      detail::unroll<Levels>([&](auto i) ESOKIT_INLINE_LAMBDA { laws_[i].advance(); });
     }
   }
 
   [[nodiscard]] ESOKIT_INLINE constexpr LevelStates predicted_levels(const S& u) const noexcept {
     LevelStates next;
     const auto drive = model_.drive(u);
-    std::get<0>(next) = model_.predict(std::get<0>(states_), drive);
+    next[0] = model_.predict(states_[0], drive);
     if constexpr (Levels > 1) {
-      auto joined = model_.joined(drive, std::get<0>(states_));
+      auto joined = model_.joined(drive, states_[0]);
       detail::unroll<Levels - 1>([&](auto below) ESOKIT_INLINE_LAMBDA {
         constexpr int level = below + 1;
-        std::get<level>(next) = model_.predict(std::get<level>(states_), joined);
-        if constexpr (level + 1 < Levels) joined = model_.joined(joined, std::get<level>(states_));
+        next[level] = model_.predict(states_[level], joined);
+        if constexpr (level + 1 < Levels) joined = model_.joined(joined, states_[level]);
       });
     }
     return next;
@@ -570,9 +568,9 @@ class PredictorCorrector {
   template <int Level>
   [[nodiscard]] ESOKIT_INLINE static constexpr State up_to_level(
       const LevelStates& states) noexcept {
-    State state = std::get<Level>(states);
+    State state = states[Level];
     detail::unroll<Level>([&](auto i) ESOKIT_INLINE_LAMBDA {
-      detail::add_rows<Order, size - Order>(state, std::get<i>(states));
+      detail::add_rows<Order, size - Order>(state, states[i]);
     });
     return state;
   }
@@ -582,11 +580,11 @@ class PredictorCorrector {
   /// disturbances exceeds.
   [[nodiscard]] ESOKIT_INLINE constexpr S probe(const LevelStates& states) const noexcept {
     if constexpr (Levels == 1) {
-      return model_.finite_probe(std::get<0>(states));
+      return model_.finite_probe(states[0]);
     } else {
-      State sum = detail::magnitudes(std::get<Levels - 1>(states));
+      State sum = detail::magnitudes(states[Levels - 1]);
       detail::unroll<Levels - 1>(
-          [&](auto i) ESOKIT_INLINE_LAMBDA { detail::add_magnitudes(sum, std::get<i>(states)); });
+          [&](auto i) ESOKIT_INLINE_LAMBDA { detail::add_magnitudes(sum, states[i]); });
       return model_.finite_probe(sum);
     }
   }
@@ -612,10 +610,10 @@ class PredictorCorrector {
     bool fine = true;
     S measured = y;
     detail::unroll<Levels>([&](auto level) ESOKIT_INLINE_LAMBDA {
-      auto& z = std::get<level>(step.states);
-      const S e = measured - std::get<0>(z);
+      auto& z = step.states[level];
+      const S e = measured - z[0];
       if constexpr (level == 0) detail::assign(step.innovation, e);
-      if constexpr (law_traits.accepts) std::get<level>(step.innovations) = e;
+      if constexpr (law_traits.accepts) step.innovations[level] = e;
       if constexpr (law_looks) {
         if (!all(is_finite(e))) [[unlikely]] {
           fine = false;
@@ -623,11 +621,11 @@ class PredictorCorrector {
         }
       }
       if constexpr (NominalGain) {
-        z = detail::add_scaled(z, std::get<level>(laws_).gain(e), e);
+        z = detail::add_scaled(z, laws_[level].gain(e), e);
       } else {
-        z = detail::add_scaled(z, law_gain(std::get<level>(laws_), e, elapsed), e);
+        z = detail::add_scaled(z, law_gain(laws_[level], e, elapsed), e);
       }
-      measured = std::get<0>(z);
+      measured = z[0];
     });
     return fine;
   }
@@ -636,9 +634,8 @@ class PredictorCorrector {
     states_ = step.states;
     detail::assign(innovation_, step.innovation);
     if constexpr (gain_law_traits<Law>.accepts) {
-      detail::unroll<Levels>([&](auto i) ESOKIT_INLINE_LAMBDA {
-        std::get<i>(laws_).accept(std::get<i>(step.innovations));
-      });
+      detail::unroll<Levels>([&](auto i)
+                                 ESOKIT_INLINE_LAMBDA { laws_[i].accept(step.innovations[i]); });
     }
   }
 
@@ -649,8 +646,7 @@ class PredictorCorrector {
       // the guarded path finds out what it was.
       Correction step{predicted_levels(u_applied)};
       const bool looked = correct_levels<true>(step, y, 1u);
-      detail::unroll<Levels>(
-          [&](auto i) ESOKIT_INLINE_LAMBDA { detail::keep_scalars(std::get<i>(step.states)); });
+      detail::keep_scalars(step.states);
       if (looked && all(is_finite(probe(step.states)))) [[likely]] {
         commit(step);
         applied_input_ = u_applied;
