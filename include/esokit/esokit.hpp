@@ -11,8 +11,8 @@
 #include <esokit/analysis/controllers.hpp>
 #include <esokit/analysis/covariance.hpp>
 #include <esokit/analysis/delay_margin.hpp>
-#include <esokit/analysis/dense.hpp>
 #include <esokit/analysis/dynamic_matrix.hpp>
+#include <esokit/analysis/eigenvalues.hpp>
 #include <esokit/analysis/error_bound.hpp>
 #include <esokit/analysis/frequency_response.hpp>
 #include <esokit/analysis/linear_controller.hpp>
@@ -97,9 +97,8 @@
 #include <esokit/identify/log.hpp>
 #include <esokit/identify/plateau.hpp>
 #include <esokit/math/combinatorics.hpp>
+#include <esokit/math/dense.hpp>
 #include <esokit/math/fal.hpp>
-#include <esokit/math/linear_equations.hpp>
-#include <esokit/math/matrix_exponential.hpp>
 #include <esokit/math/positivity.hpp>
 #include <esokit/math/power.hpp>
 #include <esokit/model/augmented_model.hpp>

@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <esokit/analysis/dense.hpp>
+#include <esokit/analysis/eigenvalues.hpp>
 #include <stdexcept>
 
 namespace esokit_test {

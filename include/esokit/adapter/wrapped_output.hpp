@@ -192,7 +192,7 @@ class WrappedOutput
 
   /// Not so where a rounding of y is an eighth of a period or more.
   [[nodiscard]] bool can_be_told(const S& y) const noexcept {
-    constexpr S most_turns = S(1) / (S(8) * std::numeric_limits<S>::epsilon());
+    constexpr S most_turns = S(1) / (S(8) * detail::rounding<S>());
     const S turns = y * inverse_period_;
     return is_finite(turns) && detail::absolute(turns) < most_turns;
   }

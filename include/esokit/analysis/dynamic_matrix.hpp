@@ -5,7 +5,7 @@
 
 #include <cassert>
 #include <cstddef>
-#include <esokit/math/linear_equations.hpp>
+#include <esokit/math/dense.hpp>
 #include <vector>
 
 namespace esokit {

@@ -4,8 +4,8 @@
 
 #include <cmath>
 #include <complex>
-#include <esokit/analysis/dense.hpp>
 #include <esokit/analysis/linear_system.hpp>
+#include <esokit/math/dense.hpp>
 #include <numbers>
 #include <utility>
 

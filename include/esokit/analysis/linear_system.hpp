@@ -3,13 +3,13 @@
 #pragma once
 
 #include <cmath>
-#include <esokit/analysis/dense.hpp>
 #include <esokit/analysis/dynamic_matrix.hpp>
 #include <esokit/core/check.hpp>
 #include <esokit/core/error.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/unroll.hpp>
 #include <esokit/eigen.hpp>
+#include <esokit/math/dense.hpp>
 
 namespace esokit {
 

@@ -3,41 +3,14 @@
 #pragma once
 
 #include <cmath>
-#include <esokit/analysis/dense.hpp>
 #include <esokit/analysis/linear_system.hpp>
+#include <esokit/math/dense.hpp>
 
 namespace esokit {
 
 namespace detail {
 
 // All matrices n x n, column-major, of the caller.
-
-/// P = sum_k A^k Q A'^k with A = I + e: P_{j+1} = P_j + A^(2^j) P_j A'^(2^j). Squaring the
-/// difference, (I + e)^2 - I = 2 e + e^2, loses no digits of slow poles. False if the sum does not
-/// end.
-/// @param e is overwritten @param p Q at first, P in the end @param work1, work2 n x n
-inline bool doubling(double* e, double* p, double* work1, double* work2, int n) noexcept {
-  for (int step = 0; step < 64; ++step) {
-    multiply(e, e, work1, n);
-    for (int i = 0; i < n * n; ++i) work1[i] += 2.0 * e[i];  // the next e
-    for (int i = 0; i < n; ++i) e[i * n + i] += 1.0;         // A^(2^step)
-    const double size = row_norm(e, n);
-    if (!is_finite(size)) return false;
-    multiply(e, p, work2, n);
-    for (int i = 0; i < n; ++i) {
-      for (int j = 0; j <= i; ++j) {
-        double sum = 0.0;
-        for (int k = 0; k < n; ++k) sum += work2[k * n + i] * e[k * n + j];
-        p[j * n + i] += sum;
-        if (i != j) p[i * n + j] = p[j * n + i];
-      }
-    }
-    // What is left out is size^2 times the term that was just added.
-    if (size < 1e-10) return true;
-    for (int i = 0; i < n * n; ++i) e[i] = work1[i];
-  }
-  return false;
-}
 
 /// Largest row sum of a^2, whose root is of the size of the poles.
 inline double square_size(const double* a, double* work, int n) noexcept {
@@ -56,7 +29,7 @@ inline bool solve_lyapunov_once(const double* a, const double* q, double* p, dou
       e[i] = a[i];
       p[i] = q[i];
     }
-    return doubling(e, p, work1, work2, n);
+    return sum_by_doubling(e, p, work1, work2, n);
   }
   // Cayley: with s = c (z - 1) / (z + 1) the equation is that of (cI - A)^-1 (cI + A) and
   // 2 c (cI - A)^-1 Q (cI - A)^-T, and has the same P.
@@ -79,7 +52,7 @@ inline bool solve_lyapunov_once(const double* a, const double* q, double* p, dou
   }
   shift(work1);
   solve_in_place(DenseView<double>{work1, n}, DenseView<double>{p, n});
-  return doubling(e, p, work1, work2, n);
+  return sum_by_doubling(e, p, work1, work2, n);
 }
 
 /// D P + P D' [+ D P D'] + Q into `residual`, and its largest element as a share of the terms that
@@ -93,14 +66,14 @@ inline double lyapunov_residual(const double* a, const double* q, const double* 
   double worst = 0.0;
   for (int i = 0; i < n; ++i) {
     for (int j = 0; j < n; ++j) {
-      double size = std::abs(q[j * n + i]);
+      double size = absolute(q[j * n + i]);
       for (int k = 0; k < n; ++k) {
-        size += std::abs(a[k * n + i] * p[j * n + k]) + std::abs(p[k * n + i] * a[k * n + j]);
+        size += absolute(a[k * n + i] * p[j * n + k]) + absolute(p[k * n + i] * a[k * n + j]);
       }
       double sum = q[j * n + i] + ap[j * n + i] + ap[i * n + j];
       if (sampled) sum += last[j * n + i];
       residual[j * n + i] = sum;
-      const double share = size > 0.0 ? std::abs(sum) / size : 0.0;
+      const double share = size > 0.0 ? absolute(sum) / size : 0.0;
       if (!(share <= worst)) worst = share;
     }
   }

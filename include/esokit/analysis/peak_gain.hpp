@@ -4,8 +4,8 @@
 #pragma once
 
 #include <cmath>
-#include <esokit/analysis/dense.hpp>
 #include <esokit/analysis/poles.hpp>
+#include <esokit/math/dense.hpp>
 
 namespace esokit {
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <esokit/analysis/dense.hpp>
+#include <esokit/analysis/eigenvalues.hpp>
 #include <esokit/analysis/linear_system.hpp>
 #include <limits>
 #include <vector>

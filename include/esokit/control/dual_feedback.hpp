@@ -7,6 +7,7 @@
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/control/filter_form.hpp>
 #include <esokit/control/limiter.hpp>
+#include <esokit/core/kernels.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/core/unroll.hpp>
 #include <esokit/gain/feedback_gain.hpp>
@@ -109,8 +110,7 @@ class DualFeedbackAdrc {
     Step step = advance(y, limited ? limiter_.last() : wanted_);
     step.wanted = step.control + form_.reference * reference;
     // Two states stored one by one and loaded as a pair by the next step would stall it.
-    detail::unroll<size>(
-        [&](auto i) ESOKIT_INLINE_LAMBDA { detail::keep_scalar(std::get<i>(step.pending)); });
+    detail::keep_scalars(step.pending);
     if (!all(is_finite(probe(step)))) [[unlikely]] {
       if constexpr (PackScalar<S>) {
         S u(0.0);
@@ -222,7 +222,7 @@ class DualFeedbackAdrc {
                     "gives a filter that the scalar cannot hold");
     }
     if constexpr (!delta) {
-      const S unit = S(100) * std::numeric_limits<S>::epsilon();
+      const S unit = S(100) * detail::rounding<S>();
       rules.require(unit < static_cast<S>(1e-3) * form.denominator[size], "observer_bandwidth",
                     bandwidth, "times sample_time leaves too few digits in z; take DeltaOperator");
       form = shift_form<size, S>(form);
@@ -269,11 +269,8 @@ class DualFeedbackAdrc {
 
   [[nodiscard]] ESOKIT_INLINE Step advance(S y, S u) const noexcept {
     Step step;
-    States state;
-    detail::unroll<size>([&](auto i) ESOKIT_INLINE_LAMBDA {
-      std::get<i>(state) = std::get<i>(pending_) - std::get<i + 1>(form_.input) * u;
-    });
-    step.control = std::get<0>(state) - std::get<0>(form_.measurement) * y;
+    const States state = detail::subtract_scaled<1>(pending_, form_.input, u);
+    step.control = state[0] - form_.measurement[0] * y;
     detail::unroll<size>([&](auto i) ESOKIT_INLINE_LAMBDA {
       S next = -(std::get<i + 1>(form_.measurement) * y +
                  std::get<i + 1>(form_.denominator) * step.control);
@@ -291,10 +288,7 @@ class DualFeedbackAdrc {
 
   /// Finite only if all of the step is.
   [[nodiscard]] ESOKIT_INLINE static S probe(const Step& step) noexcept {
-    S sum = step.wanted;
-    detail::unroll<size>([&](auto i)
-                             ESOKIT_INLINE_LAMBDA { sum = sum + std::get<i>(step.pending); });
-    return sum;
+    return detail::plus_all(step.wanted, step.pending);
   }
 
   ESOKIT_COLD S update_guarded(S y, S reference) noexcept {
@@ -307,7 +301,8 @@ class DualFeedbackAdrc {
       const Step without = advance(measured_, u);
       // From there the last measurement leads nowhere either, or this one is no larger.
       const bool state_is_to_blame =
-          is_finite(y) && (!is_finite(probe(without)) || (std::abs)(y) <= (std::abs)(measured_));
+          is_finite(y) &&
+          (!is_finite(probe(without)) || detail::absolute(y) <= detail::absolute(measured_));
       if (state_is_to_blame && start(y, u) == StepStatus::ok) {
         status_ = StepStatus::restarted;
         step = advance(y, u);

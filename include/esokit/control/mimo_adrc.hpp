@@ -8,7 +8,7 @@
 #include <esokit/core/lane_by_lane.hpp>
 #include <esokit/core/unroll.hpp>
 #include <esokit/gain/feedback_gain.hpp>
-#include <esokit/math/linear_equations.hpp>
+#include <esokit/math/dense.hpp>
 #include <esokit/observer/concepts.hpp>
 #include <esokit/observer/steady_state.hpp>
 #include <limits>

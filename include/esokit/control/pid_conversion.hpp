@@ -119,7 +119,7 @@ Expected<AdrcTuning<S>, Error<S>> adrc_from_pid(const PidGains<S>& pid, S bandwi
     const S c = S(9) * ratio - S(3);
     S square = b * b - S(4) * a * c;
     // At kappa = 1 it vanishes, but for rounding.
-    const S rounding = S(64) * std::numeric_limits<S>::epsilon();
+    const S rounding = S(64) * detail::rounding<S>();
     if (square < S(0) && square > -rounding * (b * b)) square = S(0);
     const S root = a > S(0) && square >= S(0) ? (-b + std::sqrt(square)) / (S(2) * a) : S(-1);
     const bool too_much = a > S(0) && square < S(0);

@@ -21,9 +21,9 @@ template <PlainScalar S>
   const S a0 = width * x2;
   const S y = x1 + a0;
   // Beyond d from the switching curve it is a square root, within it is linear.
-  const S root = std::sqrt(d * (d + S(8) * (std::abs)(y)));
-  const S a = (std::abs)(y) > d ? a0 + std::copysign((root - d) / S(2), y) : a0 + y;
-  return (std::abs)(a) > d ? -std::copysign(acceleration, a) : -acceleration * (a / d);
+  const S root = std::sqrt(d * (d + S(8) * detail::absolute(y)));
+  const S a = detail::absolute(y) > d ? a0 + std::copysign((root - d) / S(2), y) : a0 + y;
+  return detail::absolute(a) > d ? -std::copysign(acceleration, a) : -acceleration * (a / d);
 }
 
 namespace detail {
@@ -183,7 +183,7 @@ class SignTrackingDifferentiator : public detail::DifferentiatorState<S> {
   explicit SignTrackingDifferentiator(const Config& config) : config_(config) {}
 
   [[nodiscard]] S acceleration(S r1, S r2, S reference) const noexcept {
-    const S curve = r1 - reference + r2 * (std::abs)(r2) / (S(2) * config_.acceleration);
+    const S curve = r1 - reference + r2 * detail::absolute(r2) / (S(2) * config_.acceleration);
     if (curve > S(0)) return -config_.acceleration;
     return curve < S(0) ? config_.acceleration : S(0);
   }

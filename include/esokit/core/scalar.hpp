@@ -139,20 +139,24 @@ using LaneScalar = typename detail::LaneScalarOf<S>::type;
 
 namespace detail {
 
-/// |x|, one instruction for plain scalars and packs.
+/// |x|, one instruction for plain scalars and packs; a complex number brings `abs` by ADL.
 template <class T>
 struct Absolute {
-  static constexpr T of(const T& value) noexcept {
+  static constexpr auto of(const T& value) noexcept {
 #if defined(__GNUC__)
     if constexpr (std::is_same_v<T, float>) return __builtin_fabsf(value);
     if constexpr (std::is_same_v<T, double>) return __builtin_fabs(value);
     if constexpr (std::is_same_v<T, long double>) return __builtin_fabsl(value);
 #endif
-    return select(value < T(0.0), T(-value), value);
+    if constexpr (requires { value < value; }) {
+      return select(value < T(0.0), T(-value), value);
+    } else {
+      return abs(value);
+    }
   }
 };
 template <class T>
-constexpr T absolute(const T& value) noexcept {
+constexpr auto absolute(const T& value) noexcept {
   return Absolute<T>::of(value);
 }
 
@@ -165,6 +169,12 @@ constexpr T constant(double value) noexcept {
 /// The type in which compile-time tables are kept, so that float code loads no doubles.
 template <class S>
 using TableScalar = std::conditional_t<PlainScalar<LaneScalar<S>>, LaneScalar<S>, double>;
+
+/// Smallest spacing of the scalar's numbers around one.
+template <class S>
+constexpr S rounding() noexcept {
+  return S(std::numeric_limits<TableScalar<S>>::epsilon());
+}
 
 /// x, or the largest number of its sign where it is beyond the scalar.
 template <class T>

@@ -281,8 +281,7 @@ class AlgebraicGain {
     }
     size_bracket_ = bracket(Size);
     // Below this u the terms with r >= 1 and 1 - h = [N] u are lost in the rounding of the first.
-    constexpr detail::TableScalar<S> unit =
-        std::numeric_limits<detail::TableScalar<S>>::epsilon() / 4;
+    constexpr detail::TableScalar<S> unit = detail::rounding<detail::TableScalar<S>>() / 4;
     settled_below_ = S(unit / Size) / size_bracket_;
     for (int j = 1; j <= Size; ++j) {
       const S ratio = S(unit) * coefficients_[static_cast<std::size_t>(row_start(j))] /

@@ -32,22 +32,6 @@ ESOKIT_INLINE constexpr void repeat(Function&& f) noexcept {
   }
 }
 
-/// C + A B' w.
-template <int Rows, int Inner, int Columns, Scalar S>
-Matrix<S, Rows, Columns> plus_product_transposed(Matrix<S, Rows, Columns> c,
-                                                 const Matrix<S, Rows, Inner>& a,
-                                                 const Matrix<S, Columns, Inner>& b,
-                                                 const S& w) noexcept {
-  for (int i = 0; i < Rows; ++i) {
-    for (int j = 0; j < Columns; ++j) {
-      S sum = a(i, 0) * b(j, 0);
-      for (int k = 1; k < Inner; ++k) sum = sum + a(i, k) * b(j, k);
-      c(i, j) = c(i, j) + sum * w;
-    }
-  }
-  return c;
-}
-
 }  // namespace detail
 
 /// Phi of the chain in Nordsieck scaling: known when compiling.
@@ -347,8 +331,7 @@ class CovarianceFactor {
   static constexpr std::size_t index(int i) noexcept { return static_cast<std::size_t>(i); }
 
   static constexpr S rounding_of_factors() noexcept {
-    using Limits = std::numeric_limits<detail::TableScalar<S>>;
-    return S(static_cast<detail::TableScalar<S>>(8 * Size) * Limits::epsilon());
+    return S(8.0 * Size) * detail::rounding<S>();
   }
 
   template <bool Lenient>

@@ -11,7 +11,7 @@
 #include <esokit/core/matrix.hpp>
 #include <esokit/gain/half_gain.hpp>
 #include <esokit/gain/sampled_gain.hpp>
-#include <esokit/math/linear_equations.hpp>
+#include <esokit/math/dense.hpp>
 #include <esokit/model/corrected_part.hpp>
 
 namespace esokit {

@@ -17,6 +17,7 @@
 #include <esokit/gain/covariance_factor.hpp>
 #include <esokit/gain/model_placement.hpp>
 #include <esokit/gain/sampled_gain.hpp>
+#include <esokit/math/dense.hpp>
 #include <limits>
 #include <optional>
 
@@ -47,51 +48,6 @@ S relative_change(const Matrix<S, Rows, Columns>& now, const Matrix<S, Rows, Col
     }
   }
   return worst;
-}
-
-/// A^-1 B for a symmetric positive definite A by Cholesky; nothing if A is not.
-template <int Size, int Columns, Scalar S>
-std::optional<Matrix<S, Size, Columns>> solve_positive(const Matrix<S, Size, Size>& a,
-                                                       Matrix<S, Size, Columns> b) {
-  Matrix<S, Size, Size> l = a;  // unit lower, the pivots on its diagonal
-  for (int k = 0; k < Size; ++k) {
-    if (!all(is_finite(l(k, k))) || !all(l(k, k) > S(0.0))) return std::nullopt;
-    for (int i = k + 1; i < Size; ++i) {
-      const S factor = l(i, k) / l(k, k);
-      for (int j = k + 1; j <= i; ++j) l(i, j) = l(i, j) - factor * l(j, k);
-    }
-    for (int i = k + 1; i < Size; ++i) l(i, k) = l(i, k) / l(k, k);
-  }
-  for (int c = 0; c < Columns; ++c) {
-    for (int i = 0; i < Size; ++i) {
-      for (int k = 0; k < i; ++k) b(i, c) = b(i, c) - l(i, k) * b(k, c);
-    }
-    for (int i = Size - 1; i >= 0; --i) {
-      b(i, c) = b(i, c) / l(i, i);
-      for (int k = i + 1; k < Size; ++k) b(i, c) = b(i, c) - l(k, i) * b(k, c);
-    }
-  }
-  return b;
-}
-
-/// X = F X F' + W for a stable F: Smith's doubling, 2^k terms of the sum after k steps. Nothing if
-/// F is not stable.
-template <int Size, Scalar S>
-std::optional<Matrix<S, Size, Size>> solve_stein(Matrix<S, Size, Size> f, Matrix<S, Size, Size> x) {
-  constexpr int most_doublings = 64;
-  for (int k = 0; k < most_doublings; ++k) {
-    const auto half = f * x;
-    const auto sum = plus_product_transposed<Size, Size, Size, S>(x, half, f, S(1.0));
-    bool done = true;
-    for (int i = 0; i < Size; ++i) {
-      if (!all(is_finite(sum(i, i)))) return std::nullopt;
-      if (!all(sum(i, i) - x(i, i) <= rounding<S>() * sum(i, i))) done = false;
-    }
-    x = sum;
-    if (done) return x;
-    f = f * f;
-  }
-  return std::nullopt;
 }
 
 }  // namespace detail

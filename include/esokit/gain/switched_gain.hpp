@@ -23,11 +23,7 @@ namespace detail {
 template <Scalar S>
 [[nodiscard]] ESOKIT_INLINE constexpr S watched(SignReading reading, const S& e) noexcept {
   if (reading == SignReading::printed) return -e;
-  if constexpr (PlainScalar<S>) {
-    return (std::abs)(e);
-  } else {
-    return absolute(e);
-  }
+  return absolute(e);
 }
 
 /// What no innovation falls below: the next one counts as not shrinking.

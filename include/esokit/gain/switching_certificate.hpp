@@ -34,16 +34,10 @@ constexpr double constexpr_sine(double x) noexcept {
   return sum;
 }
 
-/// Smallest spacing of the scalar's numbers around one.
-template <Scalar S>
-constexpr double unit_rounding() noexcept {
-  return static_cast<double>(std::numeric_limits<TableScalar<S>>::epsilon());
-}
-
 /// Re[p(jw) q(-jw)] > 0 for every w, by a little more than what rounding may hide.
 template <int Size, Scalar S>
 bool same_half_plane(const ErrorPolynomial<Size, S>& p, const ErrorPolynomial<Size, S>& q) {
-  const S margin = constant<S>(8.0 * Size * unit_rounding<S>());
+  const S margin = S(8.0 * Size) * rounding<S>();
   Array<S, Size + 1> product{};
   for (S& c : product) c = S(0.0);
   for (std::size_t a = 0; a <= Size; ++a) {
@@ -128,7 +122,8 @@ template <int Size, Scalar S>
                                        Poles::from_bandwidth(otherwise, sample_time));
   }
   constexpr double least = least_bandwidth_ratio<Size>();
-  const S limit = detail::constant<S>(least * (1.0 + 16.0 * detail::unit_rounding<S>()));
+  const S limit = detail::constant<S>(
+      least * (1.0 + 16.0 * static_cast<double>(detail::rounding<detail::TableScalar<S>>())));
   return is_finite(quotient) && quotient > limit && S(1.0) / quotient > limit;
 }
 

@@ -15,8 +15,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <esokit/math/linear_equations.hpp>
-#include <esokit/math/matrix_exponential.hpp>
+#include <esokit/math/dense.hpp>
 #include <limits>
 #include <span>
 #include <vector>

@@ -9,8 +9,7 @@
 #include <esokit/core/type_tag.hpp>
 #include <esokit/core/unroll.hpp>
 #include <esokit/math/combinatorics.hpp>
-#include <esokit/math/linear_equations.hpp>
-#include <esokit/math/matrix_exponential.hpp>
+#include <esokit/math/dense.hpp>
 #include <esokit/model/corrected_part.hpp>
 #include <esokit/model/sampled_model.hpp>
 #include <limits>

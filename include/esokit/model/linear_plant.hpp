@@ -7,7 +7,7 @@
 #include <esokit/core/lanes.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/unroll.hpp>
-#include <esokit/math/matrix_exponential.hpp>
+#include <esokit/math/dense.hpp>
 #include <limits>
 
 namespace esokit {

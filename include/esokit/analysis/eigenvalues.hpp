@@ -1,70 +1,15 @@
 /// @file
-/// Small dense kernels in plain loops: products and eigenvalues.
-///
-/// They run on the caller's storage with the size as an argument, so that one instantiation serves
-/// all sizes: Eigen's solvers of fixed size cost seconds of compile time for each (EigenSolver: 7
-/// s).
+/// Eigenvalues of a complex matrix, by the QR algorithm on the caller's storage, see
+/// math/dense.hpp.
 #pragma once
 
 #include <cmath>
 #include <complex>
 #include <esokit/core/scalar.hpp>
-#include <esokit/math/linear_equations.hpp>
-#include <esokit/math/matrix_exponential.hpp>
+#include <esokit/math/dense.hpp>
 #include <utility>
 
 namespace esokit::detail {
-
-/// out = a b', all n x n; `out` is neither of them.
-inline void multiply_transposed(const double* a, const double* b, double* out, int n) noexcept {
-  for (int i = 0; i < n * n; ++i) out[i] = 0.0;
-  for (int k = 0; k < n; ++k) {
-    for (int j = 0; j < n; ++j) {
-      const double factor = b[k * n + j];
-      for (int i = 0; i < n; ++i) out[j * n + i] += a[k * n + i] * factor;
-    }
-  }
-}
-
-/// Sum of the magnitudes of `count` numbers; not finite if one of them is not.
-inline double sum_of_magnitudes(const double* values, int count) noexcept {
-  double sum = 0.0;
-  for (int i = 0; i < count; ++i) sum += std::abs(values[i]);
-  return sum;
-}
-
-/// Eigenvalues of the symmetric a onto its diagonal, eigenvectors into the columns of v, by Jacobi
-/// rotations.
-inline void symmetric_eigenvalues(DenseView<double> a, DenseView<double> v) noexcept {
-  const int n = a.rows;
-  for (int i = 0; i < n; ++i) {
-    for (int j = 0; j < n; ++j) v(i, j) = i == j ? 1.0 : 0.0;
-  }
-  for (int sweep = 0; sweep < 40; ++sweep) {
-    bool rotated = false;
-    for (int p = 0; p < n; ++p) {
-      for (int q = p + 1; q < n; ++q) {
-        const double off = a(p, q);
-        if (!(std::abs(off) > 1e-17 * (std::abs(a(p, p)) + std::abs(a(q, q))))) continue;
-        rotated = true;
-        const double ratio = (a(q, q) - a(p, p)) / (2.0 * off);
-        const double tangent =
-            (ratio < 0.0 ? -1.0 : 1.0) / (std::abs(ratio) + std::sqrt(1.0 + ratio * ratio));
-        const double c = 1.0 / std::sqrt(1.0 + tangent * tangent);
-        const double s = tangent * c;
-        const auto rotate = [&](double& x, double& y) {
-          const double old = x;
-          x = c * old - s * y;
-          y = s * old + c * y;
-        };
-        for (int k = 0; k < n; ++k) rotate(a(k, p), a(k, q));
-        for (int k = 0; k < n; ++k) rotate(a(p, k), a(q, k));
-        for (int k = 0; k < n; ++k) rotate(v(k, p), v(k, q));
-      }
-    }
-    if (!rotated) return;
-  }
-}
 
 /// Makes h upper Hessenberg by similarity, with elimination and pivoting.
 inline void to_hessenberg(DenseView<std::complex<double>> h) noexcept {

@@ -1,0 +1,258 @@
+/// @file
+/// Small dense kernels: linear equations, factors, sums by doubling, the exponential, symmetric
+/// eigenvalues. All that needs a matrix uses these.
+///
+/// In plain loops on the caller's storage, column by column, with the size as an argument: one
+/// instantiation serves all sizes. Eigen's decompositions of fixed size cost seconds of compile
+/// time for each (EigenSolver: 7 s), and link malloc for their blocked products, which they never
+/// run at these sizes.
+#pragma once
+
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+#include <esokit/core/matrix.hpp>
+#include <esokit/core/scalar.hpp>
+#include <esokit/core/unroll.hpp>
+#include <optional>
+#include <utility>
+
+namespace esokit::detail {
+
+/// A column-major square or rectangle of the caller's, as Eigen stores it.
+template <class T>
+struct DenseView {
+  T* data;
+  int rows;
+  int columns = rows;
+  [[nodiscard]] T& operator()(int i, int j) const noexcept {
+    assert(i >= 0 && i < rows && j >= 0 && j < columns);
+    return data[static_cast<std::ptrdiff_t>(j) * rows + i];
+  }
+};
+
+/// Solves a x = b in place of b by elimination with row pivoting; `a` is overwritten. Nothing is
+/// reported of a singular a: x is not finite then, or large.
+template <class T>
+void solve_in_place(DenseView<T> a, DenseView<T> b) noexcept {
+  const int n = a.rows;
+  for (int k = 0; k < n; ++k) {
+    int pivot = k;
+    for (int i = k + 1; i < n; ++i) {
+      if (absolute(a(i, k)) > absolute(a(pivot, k))) pivot = i;
+    }
+    if (pivot != k) {
+      for (int j = k; j < n; ++j) std::swap(a(k, j), a(pivot, j));
+      for (int j = 0; j < b.columns; ++j) std::swap(b(k, j), b(pivot, j));
+    }
+    for (int i = k + 1; i < n; ++i) {
+      if (a(i, k) == T(0)) continue;
+      const T factor = a(i, k) / a(k, k);
+      for (int j = k + 1; j < n; ++j) a(i, j) -= factor * a(k, j);
+      for (int j = 0; j < b.columns; ++j) b(i, j) -= factor * b(k, j);
+    }
+  }
+  for (int j = 0; j < b.columns; ++j) {
+    for (int i = n - 1; i >= 0; --i) {
+      for (int k = i + 1; k < n; ++k) b(i, j) -= a(i, k) * b(k, j);
+      b(i, j) /= a(i, i);
+    }
+  }
+}
+
+/// A^-1 B for a symmetric positive definite A by Cholesky; nothing if A is not.
+template <int Size, int Columns, Scalar S>
+std::optional<Matrix<S, Size, Columns>> solve_positive(const Matrix<S, Size, Size>& a,
+                                                       Matrix<S, Size, Columns> b) {
+  Matrix<S, Size, Size> l = a;  // unit lower, the pivots on its diagonal
+  for (int k = 0; k < Size; ++k) {
+    if (!all(is_finite(l(k, k))) || !all(l(k, k) > S(0.0))) return std::nullopt;
+    for (int i = k + 1; i < Size; ++i) {
+      const S factor = l(i, k) / l(k, k);
+      for (int j = k + 1; j <= i; ++j) l(i, j) = l(i, j) - factor * l(j, k);
+    }
+    for (int i = k + 1; i < Size; ++i) l(i, k) = l(i, k) / l(k, k);
+  }
+  for (int c = 0; c < Columns; ++c) {
+    for (int i = 0; i < Size; ++i) {
+      for (int k = 0; k < i; ++k) b(i, c) = b(i, c) - l(i, k) * b(k, c);
+    }
+    for (int i = Size - 1; i >= 0; --i) {
+      b(i, c) = b(i, c) / l(i, i);
+      for (int k = i + 1; k < Size; ++k) b(i, c) = b(i, c) - l(k, i) * b(k, c);
+    }
+  }
+  return b;
+}
+
+/// C + A B' w.
+template <int Rows, int Inner, int Columns, Scalar S>
+Matrix<S, Rows, Columns> plus_product_transposed(Matrix<S, Rows, Columns> c,
+                                                 const Matrix<S, Rows, Inner>& a,
+                                                 const Matrix<S, Columns, Inner>& b,
+                                                 const S& w) noexcept {
+  for (int i = 0; i < Rows; ++i) {
+    for (int j = 0; j < Columns; ++j) {
+      S sum = a(i, 0) * b(j, 0);
+      for (int k = 1; k < Inner; ++k) sum = sum + a(i, k) * b(j, k);
+      c(i, j) = c(i, j) + sum * w;
+    }
+  }
+  return c;
+}
+
+/// out = a b, all n x n, stored by columns; `out` is neither of them.
+template <class T>
+constexpr void multiply(const T* a, const T* b, T* out, int n) noexcept {
+  for (int j = 0; j < n; ++j) {
+    for (int i = 0; i < n; ++i) out[j * n + i] = T(0.0);
+    for (int k = 0; k < n; ++k) {
+      const T factor = b[j * n + k];
+      for (int i = 0; i < n; ++i) out[j * n + i] = out[j * n + i] + a[k * n + i] * factor;
+    }
+  }
+}
+
+/// out = a b', all n x n; `out` is neither of them.
+template <class T>
+constexpr void multiply_transposed(const T* a, const T* b, T* out, int n) noexcept {
+  for (int i = 0; i < n * n; ++i) out[i] = T(0.0);
+  for (int k = 0; k < n; ++k) {
+    for (int j = 0; j < n; ++j) {
+      const T factor = b[k * n + j];
+      for (int i = 0; i < n; ++i) out[j * n + i] = out[j * n + i] + a[k * n + i] * factor;
+    }
+  }
+}
+
+/// Largest sum of magnitudes of a row of a, n x n: the norm that goes with the largest component.
+template <class T>
+constexpr T row_norm(const T* a, int n) noexcept {
+  T largest(0.0);
+  for (int i = 0; i < n; ++i) {
+    T row(0.0);
+    for (int j = 0; j < n; ++j) row = row + absolute(a[j * n + i]);
+    if (!(row <= largest)) largest = row;  // a NaN stays
+  }
+  return largest;
+}
+
+/// Sum of the magnitudes of `count` numbers; not finite if one of them is not.
+template <class T>
+constexpr T sum_of_magnitudes(const T* values, int count) noexcept {
+  T sum(0.0);
+  for (int i = 0; i < count; ++i) sum = sum + absolute(values[i]);
+  return sum;
+}
+
+/// P = sum_k A^k Q A'^k with A = I + e, that is P = A P A' + Q, by doubling (Smith's method
+/// squared): P_{j+1} = P_j + A^(2^j) P_j A'^(2^j). Squaring the difference, (I + e)^2 - I = 2 e +
+/// e^2, loses no digits of slow poles. False if the sum does not end.
+/// @param e n x n, is overwritten @param p Q at first, P in the end @param work1, work2 n x n
+template <class T>
+bool sum_by_doubling(T* e, T* p, T* work1, T* work2, int n) noexcept {
+  for (int step = 0; step < 64; ++step) {
+    multiply(e, e, work1, n);
+    for (int i = 0; i < n * n; ++i) work1[i] = work1[i] + T(2.0) * e[i];  // the next e
+    for (int i = 0; i < n; ++i) e[i * n + i] = e[i * n + i] + T(1.0);     // A^(2^step)
+    const T size = row_norm(e, n);
+    if (!is_finite(size)) return false;
+    multiply(e, p, work2, n);
+    for (int i = 0; i < n; ++i) {
+      for (int j = 0; j <= i; ++j) {
+        T sum(0.0);
+        for (int k = 0; k < n; ++k) sum = sum + work2[k * n + i] * e[k * n + j];
+        p[j * n + i] = p[j * n + i] + sum;
+        if (i != j) p[i * n + j] = p[j * n + i];
+      }
+    }
+    // What is left out is size^2 times the term that was just added.
+    if (size * size < T(1e-4) * rounding<T>()) return is_finite(sum_of_magnitudes(p, n * n));
+    for (int i = 0; i < n * n; ++i) e[i] = work1[i];
+  }
+  return false;
+}
+
+/// X = F X F' + W for a stable F, X being W at first; nothing if F is not stable.
+template <int Size, Scalar S>
+std::optional<Matrix<S, Size, Size>> solve_stein(Matrix<S, Size, Size> f, Matrix<S, Size, Size> x) {
+  for (int i = 0; i < Size; ++i) f(i, i) = f(i, i) - S(1.0);
+  Array<S, 2 * Size * Size> work;
+  if (!sum_by_doubling(f.data(), x.data(), work.data(), work.data() + Size * Size, Size)) {
+    return std::nullopt;
+  }
+  return x;
+}
+
+/// exp(a) - I in place: Taylor series of a / 2^k, then squared k times as 2 E + E^2. Of an a that
+/// is not finite, or too large, nothing is finite.
+/// @param a n x n @param work 2 n^2 numbers
+template <PlainScalar T>
+constexpr void exp_minus_identity(T* a, T* work, int n) noexcept {
+  T* const sum = work;
+  T* const product = work + n * n;
+  int squarings = 0;
+  T scale(1);
+  if (const T size = row_norm(a, n); is_finite(size)) {
+    for (; size * scale > T(0.25); scale *= T(0.5)) ++squarings;
+  }
+  for (int i = 0; i < n * n; ++i) a[i] *= scale;
+  // With norm 1/4 the terms fall below 1e-17 by the 12th. Horner, from the smallest.
+  for (int i = 0; i < n * n; ++i) sum[i] = T(0);
+  for (int i = 0; i < n; ++i) sum[i * n + i] = T(1);
+  for (int k = 14; k >= 2; --k) {
+    multiply(a, sum, product, n);
+    for (int i = 0; i < n * n; ++i) sum[i] = product[i] / static_cast<T>(k);
+    for (int i = 0; i < n; ++i) sum[i * n + i] += T(1);
+  }
+  multiply(a, sum, product, n);
+  for (int i = 0; i < n * n; ++i) a[i] = product[i];
+  for (int i = 0; i < squarings; ++i) {
+    multiply(a, a, product, n);
+    for (int j = 0; j < n * n; ++j) a[j] = T(2) * a[j] + product[j];
+  }
+}
+
+/// exp(a) - I. In units that keep its elements of one size: below 1e-13 of the largest, with
+/// squarings for norms to 2e4.
+template <PlainScalar T, int Size>
+constexpr Matrix<T, Size, Size> exp_minus_identity(Matrix<T, Size, Size> a) noexcept {
+  std::array<T, static_cast<std::size_t>(2 * Size * Size)> work{};
+  exp_minus_identity(a.data(), work.data(), Size);
+  return a;
+}
+
+/// Eigenvalues of the symmetric a onto its diagonal, eigenvectors into the columns of v, by Jacobi
+/// rotations.
+inline void symmetric_eigenvalues(DenseView<double> a, DenseView<double> v) noexcept {
+  const int n = a.rows;
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j) v(i, j) = i == j ? 1.0 : 0.0;
+  }
+  for (int sweep = 0; sweep < 40; ++sweep) {
+    bool rotated = false;
+    for (int p = 0; p < n; ++p) {
+      for (int q = p + 1; q < n; ++q) {
+        const double off = a(p, q);
+        if (!(absolute(off) > 1e-17 * (absolute(a(p, p)) + absolute(a(q, q))))) continue;
+        rotated = true;
+        const double ratio = (a(q, q) - a(p, p)) / (2.0 * off);
+        const double tangent =
+            (ratio < 0.0 ? -1.0 : 1.0) / (absolute(ratio) + std::sqrt(1.0 + ratio * ratio));
+        const double c = 1.0 / std::sqrt(1.0 + tangent * tangent);
+        const double s = tangent * c;
+        const auto rotate = [&](double& x, double& y) {
+          const double old = x;
+          x = c * old - s * y;
+          y = s * old + c * y;
+        };
+        for (int k = 0; k < n; ++k) rotate(a(k, p), a(k, q));
+        for (int k = 0; k < n; ++k) rotate(a(p, k), a(q, k));
+        for (int k = 0; k < n; ++k) rotate(v(k, p), v(k, q));
+      }
+    }
+    if (!rotated) return;
+  }
+}
+
+}  // namespace esokit::detail
