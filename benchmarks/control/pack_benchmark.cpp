@@ -3,9 +3,11 @@
 /// written by hand with the same check; and what one bad lane a pack costs. Times are of a lane.
 /// Packs are for AVX: run it with --flags "-O2 -march=x86-64-v3" too.
 #include <cstddef>
+#include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/core/pack.hpp>
 #include <esokit/observer/cascade_eso.hpp>
+#include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <limits>
 #include <string>
@@ -86,6 +88,31 @@ CascadeEso<2, 3, S> cascade() {
 }
 
 template <class S>
+ExtendedStateFilter<2, S> filter(RiccatiMode mode) {
+  const Settings<S> s;
+  return ExtendedStateFilter<2, S>::make({.input_gain = s.input_gain,
+                                          .sample_time = s.sample_time,
+                                          .measurement_variance = S(1e-4),
+                                          .disturbance_bounds = {S(0.0), S(0.0), S(1.0)},
+                                          .inflation = S(0.01),
+                                          .mode = mode})
+      .value();
+}
+
+/// Lane by lane.
+template <class S>
+Adrc<WrappedOutput<LinearEso<2, S>>> angle() {
+  const Settings<S> s;
+  return Adrc<WrappedOutput<LinearEso<2, S>>>::make(
+             {.observer = {.observer = {.observer_bandwidth = s.bandwidth,
+                                        .input_gain = s.input_gain,
+                                        .sample_time = s.sample_time},
+                           .period = S(6.25)},
+              .controller_bandwidth = S(5.0)})
+      .value();
+}
+
+template <class S>
 Adrc<LinearEso<2, S>> adrc() {
   const Settings<S> s;
   return Adrc<LinearEso<2, S>>::make({.observer = {.observer_bandwidth = s.bandwidth,
@@ -152,6 +179,18 @@ void add_all(const std::string& scalar) {
     add<One>(bank + "adrc/2/" + scalar, adrc<One>(), lanes, false, "");
     add<P>(bank + "adrc/2/pack_of_" + scalar, adrc<P>(), lanes, false, beside("adrc/2", ""));
   }
+  // One of each that works on all lanes in its own way, and what goes lane by lane.
+  const auto both = [&](const std::string& name, const auto& plain, const auto& packed,
+                        const std::string& limit) {
+    add<One>("bank64/" + name + "/" + scalar, plain, 64, false, "");
+    add<P>("bank64/" + name + "/pack_of_" + scalar, packed, 64, false,
+           "vs bank64/" + name + "/" + scalar + limit);
+  };
+  for (const bool frozen : {false, true}) {
+    const auto mode = frozen ? RiccatiMode::frozen : RiccatiMode::recursive;
+    both(frozen ? "frozen_filter/2" : "filter/2", filter<One>(mode), filter<P>(mode), " <= 1.0");
+  }
+  both("adrc_of_angle/2", angle<One>(), angle<P>(), "");
   const std::string bad = "one_bad_lane/";
   const auto bad_label = [&](const std::string& what) {
     return "vs " + bad + what + "/" + scalar + "; vs bank64/" + what + "/" + scalar;

@@ -159,14 +159,13 @@ class LaneByLane : public detail::GoesLaneByLane {
   }
 
   /// A lane, for all else that it can do.
-  /// @{
   [[nodiscard]] constexpr Plain& operator[](int lane) noexcept {
     return lanes_[static_cast<std::size_t>(lane)];
   }
+  /// The same, to look at.
   [[nodiscard]] constexpr const Plain& operator[](int lane) const noexcept {
     return lanes_[static_cast<std::size_t>(lane)];
   }
-  /// @}
 
   /// As of a `Plain`.
   /// @{
@@ -230,28 +229,30 @@ class LaneByLane : public detail::GoesLaneByLane {
   /// @}
 
   /// As of a `Plain`, with a list in the place of a vector.
-  /// @{
   template <std::size_t Count, class... Given>
   auto update(const S& y, const S (&reference)[Count], const Given&... given) noexcept {
     return update(y, detail::listed(reference), given...);
   }
+  /// As of a `Plain`, with a list in the place of a vector.
   template <std::size_t Count>
   auto update_without_measurement(const S (&reference)[Count]) noexcept {
     return update_without_measurement(detail::listed(reference));
   }
+  /// As of a `Plain`, with a list in the place of a vector.
   template <std::size_t Count>
   auto prepare(const S (&reference)[Count]) noexcept {
     return prepare(detail::listed(reference));
   }
+  /// As of a `Plain`, with a list in the place of a vector.
   template <std::size_t Count>
   void set_reference(const S (&reference)[Count]) noexcept {
     set_reference(detail::listed(reference));
   }
+  /// As of a `Plain`, with a list in the place of a vector.
   template <std::size_t Count>
   auto reset(const S (&state)[Count]) noexcept {
     return reset(detail::listed(state));
   }
-  /// @}
 
   /// For the next step of each lane; all of them or none.
   template <class P = Plain>
@@ -262,14 +263,13 @@ class LaneByLane : public detail::GoesLaneByLane {
   }
 
   /// Common to all lanes.
-  /// @{
   [[nodiscard]] int max_gap() const noexcept requires requires(const Plain& lane) {
     lane.max_gap();
   }
   { return lanes_[0].max_gap(); }
+  /// Common to all lanes.
   [[nodiscard]] int delay() const noexcept requires requires(const Plain& lane) { lane.delay(); }
   { return lanes_[0].delay(); }
-  /// @}
 
  protected:
   /// f(lane, i) of each lane, put together.

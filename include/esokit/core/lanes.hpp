@@ -233,15 +233,26 @@ template <class T, int Count>
 [[nodiscard]] constexpr const T& of_lane(const PerLane<T, Count>& each, int i) noexcept {
   return each[i];
 }
-/// value = f(value), of a PerLane in each lane.
+/// bits = (bits & keep) | set, of a PerLane in each lane: all lanes in one word.
 /// @{
-template <class T, class Function>
-constexpr void change_lanes(T& value, Function&& f) noexcept {
-  value = f(value);
+constexpr void set_bits(std::int8_t& bits, int keep, int set) noexcept {
+  bits = static_cast<std::int8_t>((bits & keep) | set);
 }
-template <class T, int Count, class Function>
-constexpr void change_lanes(PerLane<T, Count>& each, Function&& f) noexcept {
-  for (T& value : each.values) value = f(value);
+template <int Count>
+constexpr void set_bits(PerLane<std::int8_t, Count>& each, int keep, int set) noexcept {
+  if constexpr (Count == 2 || Count == 4 || Count == 8) {
+    using Word = std::conditional_t<Count == 8, std::uint64_t,
+                                    std::conditional_t<Count == 4, std::uint32_t, std::uint16_t>>;
+    constexpr auto ones = static_cast<Word>(0x0101010101010101u);
+    const auto all = [](int bits) {
+      return static_cast<Word>(ones * static_cast<Word>(bits & 255));
+    };
+    const auto word = std::bit_cast<Word>(each.values);
+    each.values =
+        std::bit_cast<Array<std::int8_t, Count>>(static_cast<Word>((word & all(keep)) | all(set)));
+  } else {
+    for (std::int8_t& bits : each.values) set_bits(bits, keep, set);
+  }
 }
 /// @}
 /// The number of lane `i`.

@@ -171,8 +171,7 @@ class RiccatiGain {
 
   /// The correction was carried out; the next `advance` goes on from the corrected covariance.
   ESOKIT_INLINE constexpr void accept(const S&) noexcept {
-    detail::change_lanes(since_,
-                         [](int bits) { return static_cast<std::int8_t>(bits | corrected); });
+    detail::set_bits(since_, -1, corrected);
   }
 
   /// True if the next `advance` has nothing to work out: the gain stands, and no sample is missing.
@@ -187,9 +186,9 @@ class RiccatiGain {
 
   /// True if any lane is watched.
   [[nodiscard]] constexpr bool any_watched() const noexcept {
-    int any = 0;
-    for (int i = 0; i < lane_count<S>; ++i) any |= detail::of_lane(since_, i);
-    return any < 0;
+    auto all = since_;
+    detail::set_bits(all, watched, 0);
+    return !(all == std::int8_t{0});
   }
 
   /// The observer looks at every measurement before it is used (an outlier gate).
@@ -315,10 +314,7 @@ class RiccatiGain {
   static constexpr int standing = 8;                    ///< above the others: see `rests`
   static constexpr int watched = -128;                  ///< the sign: see `rests_unwatched`
 
-  ESOKIT_INLINE constexpr void note(int bits) noexcept {
-    detail::change_lanes(since_,
-                         [=](int old) { return static_cast<std::int8_t>((old & watched) | bits); });
-  }
+  ESOKIT_INLINE constexpr void note(int bits) noexcept { detail::set_bits(since_, watched, bits); }
 
   /// A gain and the covariance that it belongs to.
   struct Point {
