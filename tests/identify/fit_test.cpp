@@ -102,7 +102,8 @@ TEST(InnovationsFit, IsTheKalmanFilterOfNumpy) {
     SCOPED_TRACE(reference.linear[0]);
     ASSERT_EQ(found.linear.size(), reference.linear.size());
     // The diffuse start, of variance 1e8, makes rounding 1e8 times as large; gains are taken for
-    // steady once they change by 1e-9 of the bandwidth, which is 1e-7 here.
+    // steady once they change by 1e-9
+    // of w T a row.
     for (std::size_t i = 0; i < found.linear.size(); ++i) {
       EXPECT_NEAR(found.linear[i] / reference.linear[i], 1, 1e-6);
     }

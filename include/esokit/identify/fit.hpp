@@ -17,7 +17,9 @@
 #include <cstddef>
 #include <esokit/math/dense.hpp>
 #include <limits>
+#include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace esokit {
@@ -96,6 +98,26 @@ inline void solve_normal(std::vector<double> matrix, std::vector<double>& right,
     right[static_cast<std::size_t>(i)] *= scale[static_cast<std::size_t>(i)];
 }
 
+/// Sum of a[k] b[k], in four sums so that one addition need not wait for the other.
+inline double dot(const double* a, const double* b, std::size_t count) noexcept {
+  std::array<double, 4> sums{};
+  std::size_t k = 0;
+  for (; k + 4 <= count; k += 4) {
+    for (std::size_t i = 0; i < 4; ++i) sums[i] += a[k + i] * b[k + i];
+  }
+  for (; k < count; ++k) sums[0] += a[k] * b[k];
+  return (sums[0] + sums[1]) + (sums[2] + sums[3]);
+}
+
+/// What the Riccati recursion gives; it depends on w and a alone.
+struct GainTable {
+  double bandwidth = 0.0;
+  double pole = 0.0;
+  std::vector<double> gains{};    // so many a row as there are states, until steady
+  std::vector<double> weights{};  // sqrt(steady variance / variance)
+  double steady_variance = 1.0;   // of an innovation, over that of the noise
+};
+
 /// The Kalman filter of one point: transition, input weights, gains from a diffuse start on.
 template <int States>
 struct InnovationsFilter {
@@ -107,11 +129,11 @@ struct InnovationsFilter {
   double lag_decay = 0.0, lag_previous = 0.0, lag_current = 0.0, lag_next = 0.0;
   Vector column{};  // from a column to x
   std::ptrdiff_t delay = 0;
-  std::vector<Vector> gains{};    // until steady
-  std::vector<double> weights{};  // sqrt(steady variance / variance)
-  double steady_variance = 1.0;   // of an innovation, over that of the noise
+  std::shared_ptr<const GainTable> table{};
 
-  static InnovationsFilter make(const FitData& data, const FitModel& model, const FitPoint& point) {
+  /// @param cached gains of the filter before, taken if they are the same; gets the new ones
+  static InnovationsFilter make(const FitData& data, const FitModel& model, const FitPoint& point,
+                                std::shared_ptr<const GainTable>& cached) {
     InnovationsFilter f;
     const double T = data.sample_time;
     const double w = point.bandwidth;
@@ -184,18 +206,25 @@ struct InnovationsFilter {
       f.column[static_cast<std::size_t>(i)] =
           f.phi[static_cast<std::size_t>(i)][static_cast<std::size_t>(n)] / std::pow(w, n);
     }
-    f.find_gains(w * w * T * T, data.y.size());
+    if (cached == nullptr || cached->bandwidth != w || cached->pole != point.pole) {
+      auto fresh = std::make_shared<GainTable>();
+      fresh->bandwidth = w;
+      fresh->pole = point.pole;
+      f.find_gains(w * w * T * T, data.y.size(), *fresh);
+      cached = std::move(fresh);
+    }
+    f.table = cached;
     return f;
   }
 
   /// Riccati recursion for noise of variance one; the last state takes a step of variance q a row.
-  void find_gains(double q, std::size_t most) {
+  void find_gains(double q, std::size_t most, GainTable& found) const {
     std::array<Vector, static_cast<std::size_t>(N)> p{};
     for (int i = 0; i < N; ++i) p[static_cast<std::size_t>(i)][static_cast<std::size_t>(i)] = 1e8;
     std::vector<double> variances;
     Vector before{};
     const double small = 1e-9 * std::sqrt(q);
-    while (gains.size() < most) {
+    while (variances.size() < most) {
       const double s = p[0][0] + 1.0;
       Vector k{};
       for (std::size_t i = 0; i < k.size(); ++i) k[i] = p[i][0] / s;
@@ -204,9 +233,9 @@ struct InnovationsFilter {
         change = std::max(change, std::abs(k[i] - before[i]) / (std::abs(k[i]) + 1e-300));
       }
       before = k;
-      gains.push_back(k);
+      found.gains.insert(found.gains.end(), k.begin(), k.end());
       variances.push_back(s);
-      if (gains.size() > static_cast<std::size_t>(2 * N) && change < small) break;
+      if (variances.size() > static_cast<std::size_t>(2 * N) && change < small) break;
       // p = phi (p - k k' s) phi' + q
       std::array<Vector, static_cast<std::size_t>(N)> a{};
       for (std::size_t i = 1; i < k.size(); ++i) {
@@ -231,58 +260,75 @@ struct InnovationsFilter {
       }
       p[k.size() - 1][k.size() - 1] += q;
     }
-    steady_variance = variances.back();
-    weights.reserve(variances.size());
-    for (const double s : variances) weights.push_back(std::sqrt(steady_variance / s));
-    for (std::size_t i = 0; i < std::min<std::size_t>(weights.size(), N); ++i) weights[i] = 0.0;
+    found.steady_variance = variances.back();
+    for (const double s : variances) found.weights.push_back(std::sqrt(variances.back() / s));
+    for (std::size_t i = 0; i < std::min<std::size_t>(variances.size(), N); ++i) {
+      found.weights[i] = 0.0;
+    }
   }
 
-  /// Innovations of what `output(k)` measures while `input(k)` and `column_at(k)` act, into out.
+  /// Innovations of y while b0 u and the columns act: of each alone (one output a column: y, u, the
+  /// data's columns), or of all together.
+  ///
   /// The first `lead` rows of a piece only fill the lag and the dead time, whose past is not known.
-  template <class Output, class Input, class Column>
+  /// @tparam Runs how many innovations; `output(k)`, `input(k)`, `column(k)` say what run r sees
+  template <int Runs, class Output, class Input, class Column>
   void run(const FitData& data, std::ptrdiff_t lead, const Output& output, const Input& input,
-           const Column& column_at, double* out) const {
+           const Column& column_at,
+           const std::array<double*, static_cast<std::size_t>(Runs)>& out) const {
+    const std::size_t steady = table->weights.size() - 1;
     for (std::size_t piece = 0; piece < data.starts.size(); ++piece) {
       const auto from = static_cast<std::ptrdiff_t>(data.starts[piece]);
       const auto to = static_cast<std::ptrdiff_t>(
           piece + 1 < data.starts.size() ? data.starts[piece + 1] : data.y.size());
-      const auto u = [&](std::ptrdiff_t k) { return input(std::clamp(k, from, to - 1)); };
+      const auto u = [&](std::ptrdiff_t k) {
+        return data.u[static_cast<std::size_t>(std::clamp(k, from, to - 1))];
+      };
       double v = u(from);
       double u_before = v, u_now = v;
       const std::ptrdiff_t begin = std::min(from + lead, to);
       for (std::ptrdiff_t k = from; k < begin; ++k) {
-        out[k] = 0.0;
+        for (double* const to_run : out) to_run[k] = 0.0;
         const double u_next = u(k - delay + 1);
         v = lag_decay * v + lag_previous * u_before + lag_current * u_now + lag_next * u_next;
         u_before = u_now;
         u_now = u_next;
       }
       if (begin == to) continue;
-      Vector x{};
-      x[0] = output(begin);
-      double r_now = column_at(begin);
-      const std::size_t steady = gains.size() - 1;
+      std::array<Vector, static_cast<std::size_t>(Runs)> x{};
+      std::array<double, static_cast<std::size_t>(Runs)> r_now{};
+      for (std::size_t run = 0; run < x.size(); ++run) {
+        x[run][0] = output(run, begin);
+        r_now[run] = column_at(run, begin);
+      }
       for (std::ptrdiff_t k = begin; k < to; ++k) {
-        const std::size_t i = std::min(static_cast<std::size_t>(k - begin), steady);
-        const Vector& gain = gains[i];
-        const double e = output(k) - x[0];
-        out[k] = e * weights[i];
-        for (std::size_t j = 0; j < gain.size(); ++j) x[j] += gain[j] * e;
+        const std::size_t row = std::min(static_cast<std::size_t>(k - begin), steady);
+        const double* const gain = table->gains.data() + row * static_cast<std::size_t>(N);
+        const double weight = table->weights[row];
         const double u_next = u(k - delay + 1);
-        const double r_next = column_at(std::min(k + 1, to - 1));
-        const double r = 0.5 * (r_now + r_next);
-        Vector moved{};
-        for (std::size_t j = 0; j < moved.size(); ++j) {
-          double sum = lag[j] * v + previous[j] * u_before + current[j] * u_now + next[j] * u_next +
-                       column[j] * r;
-          for (std::size_t l = j; l < moved.size(); ++l) sum += phi[j][l] * x[l];
-          moved[j] = sum;
+        const std::ptrdiff_t after = std::min(k + 1, to - 1);
+        Vector pushed;
+        for (std::size_t j = 0; j < pushed.size(); ++j) {
+          pushed[j] = lag[j] * v + previous[j] * u_before + current[j] * u_now + next[j] * u_next;
         }
-        x = moved;
+        for (std::size_t run = 0; run < x.size(); ++run) {
+          Vector& state = x[run];
+          const double e = output(run, k) - state[0];
+          out[run][k] = e * weight;
+          for (std::size_t j = 0; j < state.size(); ++j) state[j] += gain[j] * e;
+          const double r_next = column_at(run, after);
+          const double r = 0.5 * (r_now[run] + r_next);
+          const double b = input(run);
+          r_now[run] = r_next;
+          for (std::size_t j = 0; j < state.size(); ++j) {
+            double sum = b * pushed[j] + column[j] * r;
+            for (std::size_t l = j; l < state.size(); ++l) sum += phi[j][l] * state[l];
+            state[j] = sum;
+          }
+        }
         v = lag_decay * v + lag_previous * u_before + lag_current * u_now + lag_next * u_next;
         u_before = u_now;
         u_now = u_next;
-        r_now = r_next;
       }
     }
   }
@@ -433,17 +479,13 @@ class InnovationsFit {
     to = std::min(to, residual.size());
     normal.assign(n * n, 0.0);
     right.assign(n, 0.0);
+    const std::size_t count = to - from;
     for (std::size_t i = 0; i < n; ++i) {
-      const double* a = jacobian[i].data();
+      const double* const a = jacobian[i].data() + from;
       for (std::size_t j = i; j < n; ++j) {
-        const double* b = jacobian[j].data();
-        double sum = 0.0;
-        for (std::size_t k = from; k < to; ++k) sum += a[k] * b[k];
-        normal[j * n + i] = normal[i * n + j] = sum;
+        normal[j * n + i] = normal[i * n + j] = detail::dot(a, jacobian[j].data() + from, count);
       }
-      double sum = 0.0;
-      for (std::size_t k = from; k < to; ++k) sum += a[k] * residual[k];
-      right[i] = sum;
+      right[i] = detail::dot(a, residual.data() + from, count);
     }
   }
 
@@ -473,13 +515,13 @@ class InnovationsFit {
   void with_filter(const FitPoint& point, const F& use) const {
     switch (model_.order + model_.extension) {
       case 2:
-        return use(detail::InnovationsFilter<2>::make(data_, model_, point));
+        return use(detail::InnovationsFilter<2>::make(data_, model_, point, cached_));
       case 3:
-        return use(detail::InnovationsFilter<3>::make(data_, model_, point));
+        return use(detail::InnovationsFilter<3>::make(data_, model_, point, cached_));
       case 4:
-        return use(detail::InnovationsFilter<4>::make(data_, model_, point));
+        return use(detail::InnovationsFilter<4>::make(data_, model_, point, cached_));
       default:
-        return use(detail::InnovationsFilter<5>::make(data_, model_, point));
+        return use(detail::InnovationsFilter<5>::make(data_, model_, point, cached_));
     }
   }
 
@@ -492,10 +534,12 @@ class InnovationsFit {
         combined_[k] += linear[c + 1] * data_.columns[c][k];
       }
     }
-    filter.run(
-        data_, lead_, [&](std::ptrdiff_t k) { return data_.y[static_cast<std::size_t>(k)]; },
-        [&](std::ptrdiff_t k) { return b0 * data_.u[static_cast<std::size_t>(k)]; },
-        [&](std::ptrdiff_t k) { return combined_[static_cast<std::size_t>(k)]; }, out);
+    filter.template run<1>(
+        data_, lead_,
+        [&](std::size_t, std::ptrdiff_t k) { return data_.y[static_cast<std::size_t>(k)]; },
+        [&](std::size_t) { return b0; },
+        [&](std::size_t, std::ptrdiff_t k) { return combined_[static_cast<std::size_t>(k)]; },
+        {out});
   }
 
   template <class Filter>
@@ -504,19 +548,22 @@ class InnovationsFit {
     const std::size_t count = 2 + data_.columns.size();
     columns_.resize(count);
     for (auto& column : columns_) column.resize(rows);
-    const auto nothing = [](std::ptrdiff_t) { return 0.0; };
-    filter.run(
-        data_, lead_, [&](std::ptrdiff_t k) { return data_.y[static_cast<std::size_t>(k)]; },
-        nothing, nothing, columns_[0].data());
-    filter.run(
-        data_, lead_, nothing,
-        [&](std::ptrdiff_t k) { return data_.u[static_cast<std::size_t>(k)]; }, nothing,
-        columns_[1].data());
+    // y and u side by side, as a processor can work on both at once.
+    filter.template run<2>(
+        data_, lead_,
+        [&](std::size_t run, std::ptrdiff_t k) {
+          return run == 0 ? data_.y[static_cast<std::size_t>(k)] : 0.0;
+        },
+        [](std::size_t run) { return run == 1 ? 1.0 : 0.0; },
+        [](std::size_t, std::ptrdiff_t) { return 0.0; }, {columns_[0].data(), columns_[1].data()});
     for (std::size_t c = 0; c < data_.columns.size(); ++c) {
-      filter.run(
-          data_, lead_, nothing, nothing,
-          [&](std::ptrdiff_t k) { return data_.columns[c][static_cast<std::size_t>(k)]; },
-          columns_[c + 2].data());
+      filter.template run<1>(
+          data_, lead_, [](std::size_t, std::ptrdiff_t) { return 0.0; },
+          [](std::size_t) { return 0.0; },
+          [&](std::size_t, std::ptrdiff_t k) {
+            return data_.columns[c][static_cast<std::size_t>(k)];
+          },
+          {columns_[c + 2].data()});
     }
     std::vector<double> normal;
     normal_equations(std::span(columns_).subspan(1), columns_[0], normal, fit.linear);
@@ -526,11 +573,10 @@ class InnovationsFit {
     for (std::size_t c = 1; c < count; ++c) {
       for (std::size_t k = 0; k < rows; ++k) residual_[k] += fit.linear[c - 1] * columns_[c][k];
     }
-    double sum = 0.0;
-    for (const double e : residual_) sum += e * e;
+    const double sum = detail::dot(residual_.data(), residual_.data(), rows);
     fit.rows = std::max<std::size_t>(rows_, 1);
     fit.mean_square = sum / static_cast<double>(fit.rows);
-    const double variance = fit.mean_square / filter.steady_variance;
+    const double variance = fit.mean_square / filter.table->steady_variance;
     fit.noise = std::sqrt(variance);
     fit.disturbance = variance * data_.sample_time * std::pow(fit.at.bandwidth, 2 * Filter::N);
   }
@@ -545,6 +591,7 @@ class InnovationsFit {
   std::vector<std::vector<double>> kept_columns_{};
   std::vector<double> kept_residual_{};
   mutable std::vector<double> combined_{};
+  mutable std::shared_ptr<const detail::GainTable> cached_{};
 };
 
 }  // namespace esokit

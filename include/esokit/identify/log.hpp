@@ -30,6 +30,7 @@ struct Log {
 /// What a log shows by itself.
 struct LogReport {
   std::size_t rows = 0;       ///< in the log
+  std::size_t used = 0;       ///< rows that were fitted
   std::size_t rejected = 0;   ///< with a number that is not finite
   std::size_t outliers = 0;   ///< single rows of y off by more than their neighbours allow
   std::size_t missing = 0;    ///< that the stamps say should be there
@@ -248,6 +249,38 @@ inline double quantisation_step(const std::vector<double>& y) {
              200.0,
              true};
   return prepared;
+}
+
+/// Twenty stretches, evenly spread, of together `most` rows; the data as they are if they have no
+/// more.
+[[nodiscard]] inline FitData excerpt(const FitData& data, std::size_t most) {
+  if (data.y.size() <= most) return data;
+  constexpr std::size_t stretches = 20;
+  const std::size_t length = std::max<std::size_t>(most / stretches, 50);
+  FitData out;
+  out.sample_time = data.sample_time;
+  out.averaged = data.averaged;
+  out.starts.clear();
+  out.columns.resize(data.columns.size());
+  std::size_t piece = 0;
+  for (std::size_t s = 0; s < stretches; ++s) {
+    const std::size_t from = data.y.size() / stretches * s;
+    while (piece + 1 < data.starts.size() && data.starts[piece + 1] <= from) ++piece;
+    out.starts.push_back(out.y.size());
+    std::size_t next = piece + 1;
+    for (std::size_t k = from; k < std::min(from + length, data.y.size()); ++k) {
+      if (next < data.starts.size() && data.starts[next] == k) {
+        if (k > from) out.starts.push_back(out.y.size());
+        ++next;
+      }
+      out.u.push_back(data.u[k]);
+      out.y.push_back(data.y[k]);
+      for (std::size_t c = 0; c < data.columns.size(); ++c) {
+        out.columns[c].push_back(data.columns[c][k]);
+      }
+    }
+  }
+  return out;
 }
 
 /// Means of `fold` rows each; what a piece has beyond a multiple is left out.

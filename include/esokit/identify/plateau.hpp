@@ -52,10 +52,7 @@ struct Plateau {
       // From a bound the next fit would not come back.
       if (!here.at_bound) point = here.fit.at;
       point.bandwidth = here.fit.at.bandwidth * factor;
-      const double share = here.errors.linear[0] / std::abs(here.fit.linear[0]);
       found.push_back(std::move(here));
-      // Nothing beyond is better known.
-      if (share > 0.5) break;
     }
     return found;
   };
