@@ -2,6 +2,7 @@
 // changes nothing, and good samples lead back.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <esokit/adapter/known_model.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/observer/cascade_eso.hpp>
@@ -281,6 +282,45 @@ TEST(FilterVariance, OneThatCannotBeCarriedOverIsEnough) {
 TEST(FilterVariance, RetuneToAnyIsFiniteOrRefused) {
   retune_to_any_variance_is_finite_or_refused<float>();
   retune_to_any_variance_is_finite_or_refused<double>();
+}
+
+// ---- sample times
+
+/// The quick test of an update knows the square of a state, not what 1/T makes of it: where that
+/// could overflow it may not be relied upon.
+template <class Observer>
+void is_finite_at_any_rate() {
+  int taken = 0;
+  int refused = 0;
+  for (int rate = 0; rate <= 150; rate += 5) {
+    typename Observer::Config config{};
+    config.sample_time = std::pow(10.0, -rate);
+    config.observer_bandwidth = 0.5 / config.sample_time;
+    config.input_gain = 1;
+    if constexpr (requires { config.bandwidth_factor; }) config.bandwidth_factor = 2;
+    const auto made = Observer::make(config);
+    if (!made) continue;
+    for (int size = 0; size <= 300; size += 10) {
+      auto observer = made.value();
+      auto halves = observer;
+      const double y = std::pow(10.0, size);
+      const StepStatus status = observer.update(y, 0);
+      for (int level = 0; level < Observer::levels; ++level) {
+        ASSERT_TRUE(eigen(observer.level_estimate(level)).allFinite()) << rate << ", " << size;
+      }
+      const StepStatus predicted = halves.predict(0);
+      EXPECT_EQ(status, predicted | halves.correct(y)) << rate << ", " << size;
+      EXPECT_EQ(observer.estimate(), halves.estimate());
+      ++(status == StepStatus::ok ? taken : refused);
+    }
+  }
+  EXPECT_GT(taken, 100);
+  EXPECT_GT(refused, 100);
+}
+
+TEST(Update, IsFiniteAtAnyRate) {
+  is_finite_at_any_rate<LinearEso<2>>();
+  is_finite_at_any_rate<CascadeEso<2, 3>>();
 }
 
 }  // namespace

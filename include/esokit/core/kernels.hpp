@@ -86,6 +86,15 @@ ESOKIT_INLINE constexpr void add_magnitudes(std::array<S, Size>& sum,
   });
 }
 
+/// The sum of the squares of all elements.
+template <class S, std::size_t Size>
+[[nodiscard]] ESOKIT_INLINE constexpr S sum_of_squares(const std::array<S, Size>& x) noexcept {
+  S sum = std::get<0>(x) * std::get<0>(x);
+  unroll<Size - 1>(
+      [&](auto r) ESOKIT_INLINE_LAMBDA { sum = sum + std::get<r + 1>(x) * std::get<r + 1>(x); });
+  return sum;
+}
+
 /// The magnitudes of all elements.
 template <class S, std::size_t Size>
 [[nodiscard]] ESOKIT_INLINE constexpr std::array<S, Size> magnitudes(

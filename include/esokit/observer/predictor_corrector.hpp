@@ -424,6 +424,7 @@ class PredictorCorrector {
         model_(config.input_gain, config.sample_time),
         max_gap_(static_cast<std::uint16_t>(config.max_gap)) {
     for (State& state : states_) state.fill(S(0.0));
+    look_at_squares();
   }
 
   /// The same with a model that `make` of its own has checked. @param laws or the law of one level
@@ -431,6 +432,7 @@ class PredictorCorrector {
   PredictorCorrector(const Model& model, const Given& laws, int max_gap) noexcept
       : laws_{laws}, model_(model), max_gap_(static_cast<std::uint16_t>(max_gap)) {
     for (State& state : states_) state.fill(S(0.0));
+    look_at_squares();
   }
 
   /// The rules for input_gain, sample_time and max_gap.
@@ -589,6 +591,46 @@ class PredictorCorrector {
     }
   }
 
+  /// Where the sum of all squares is finite, so is the probe, if 1/T is not absurdly large:
+  /// cheaper, as a square has no sign and no weight. A float of one level has no room for the flag.
+  static constexpr bool has_squares =
+      PlainScalar<S> && model_traits<Model>.is_chain && (Levels > 1 || sizeof(S) > sizeof(float));
+  struct NoFlag {};
+
+  /// States up to the root of the largest number are finite in physical units, all levels together.
+  constexpr void look_at_squares() noexcept {
+    if constexpr (has_squares) {
+      S root(1.0);
+      for (int i = 1; i < std::numeric_limits<S>::max_exponent / 2; ++i) root = root * S(2.0);
+      State ones;
+      ones.fill(S(1.0));
+      const S most = model_.finite_probe(ones) * S(Levels);
+      squares_suffice_ = is_finite(most) && most < root;
+    }
+  }
+
+  /// True only if `probe` is finite; false may be wrong.
+  [[nodiscard]] ESOKIT_INLINE constexpr bool surely_finite(
+      const LevelStates& states) const noexcept {
+    if constexpr (has_squares) {
+      S sum = detail::sum_of_squares(std::get<0>(states));
+      detail::unroll<Levels - 1>([&](auto i) ESOKIT_INLINE_LAMBDA {
+        sum = sum + detail::sum_of_squares(std::get<i + 1>(states));
+      });
+      return is_finite(sum);
+    } else {
+      return all(is_finite(probe(states)));
+    }
+  }
+
+  [[nodiscard]] ESOKIT_INLINE constexpr bool may_be_quick() const noexcept {
+    if constexpr (has_squares) {
+      return gap_ == 0 && squares_suffice_;
+    } else {
+      return gap_ == 0;
+    }
+  }
+
   [[nodiscard]] constexpr decltype(auto) law_gain(const Law& law, const S& innovation,
                                                   unsigned elapsed) const noexcept {
     if constexpr (gain_law_traits<Law>.bridges_gaps) {
@@ -641,13 +683,13 @@ class PredictorCorrector {
 
   /// `update` where the laws have advanced.
   ESOKIT_INLINE Status update_advanced(const S& y, const S& u_applied) noexcept {
-    if (gap_ == 0) [[likely]] {
+    if (may_be_quick()) [[likely]] {
       // One test for all: a bad y or u makes the new state non-finite. Nothing is kept then, and
-      // the guarded path finds out what it was.
+      // the guarded path finds out what it was, or that it was only large.
       Correction step{predicted_levels(u_applied)};
       const bool looked = correct_levels<true>(step, y, 1u);
       detail::keep_scalars(step.states);
-      if (looked && all(is_finite(probe(step.states)))) [[likely]] {
+      if (looked && surely_finite(step.states)) [[likely]] {
         commit(step);
         applied_input_ = u_applied;
         return StepStatus::ok;
@@ -748,6 +790,7 @@ class PredictorCorrector {
   S applied_input_ = S(0.0);
   Lanes<std::uint16_t, S> gap_{};
   std::uint16_t max_gap_;
+  [[no_unique_address]] std::conditional_t<has_squares, bool, NoFlag> squares_suffice_{};
 
   // Last: what comes after it would be missing in whatever is built on this.
   static_assert(Levels >= 1, "esokit: at least one level is needed");
