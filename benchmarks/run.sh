@@ -1,15 +1,13 @@
 #!/usr/bin/env bash
-# Builds and runs the benchmarks, prints times and ratios. See usage below.
+# Builds and runs the benchmarks, prints a table of ratios. See usage below.
 #
 # What is compared with what is written in the label of a benchmark:
 #
 #   state.SetLabel("vs hand_written/2/double <= 1.10; vs dense_eigen/2/double < 1");
 #
 # prints the ratio of this benchmark's time to that of each benchmark named (its full name, in the
-# same program), and whether it keeps the limit; the limit may be left out ("vs NAME").
-#
-# Times are CPU times. Each benchmark runs several times, in random order with the others; the ratio
-# is of the least times, which a busy machine disturbs least. The median is printed beside.
+# same program), and whether it keeps the limit; the limit may be left out ("vs NAME"). How the times are
+# taken: below, and benchmarks/table.py.
 set -euo pipefail
 
 root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)
@@ -19,8 +17,9 @@ usage() {
 usage: benchmarks/run.sh [--no-install] [--strict] [--cxx COMPILER] [--flags FLAGS]
                          [google-benchmark options]
 
-Builds every benchmark program, runs it, and prints the times and the ratios to the baselines.
-Google Benchmark's JSON output stays in the build folder, in results/.
+Builds every benchmark program, runs it, and prints the times and the ratios to the baselines, at the
+end the limits that are missed. The same as JSON, results/table.json, and Google Benchmark's output
+stay in the build folder.
 
   --no-install   do not install missing Debian packages, only name them
   --strict       non-zero exit code if a ratio misses its limit
@@ -102,110 +101,6 @@ if ((${#programs[@]} == 0)); then
   exit 1
 fi
 
-# Columns of the CSV: name, iterations, real_time, cpu_time, time_unit, bytes_per_second,
-# items_per_second, label, ...; the header names them, and only name and label are quoted.
-# shellcheck disable=SC2016
-table='
-function split_csv(line, fields,    count, i, c, text, quoted) {
-  count = 0; text = ""; quoted = 0
-  for (i = 1; i <= length(line); ++i) {
-    c = substr(line, i, 1)
-    if (c == "\"") {
-      if (quoted && substr(line, i + 1, 1) == "\"") { text = text c; ++i }
-      else quoted = !quoted
-    } else if (c == "," && !quoted) { fields[++count] = text; text = "" }
-    else text = text c
-  }
-  fields[++count] = text
-  return count
-}
-function trimmed(text) { gsub(/^[ \t]+|[ \t]+$/, "", text); return text }
-function median(name,    n, i, j, swap, values) {
-  n = runs[name]
-  for (i = 1; i <= n; ++i) values[i] = time[name, i]
-  for (i = 2; i <= n; ++i)
-    for (j = i; j > 1 && values[j - 1] > values[j]; --j) {
-      swap = values[j]; values[j] = values[j - 1]; values[j - 1] = swap
-    }
-  return n % 2 ? values[(n + 1) / 2] : (values[n / 2] + values[n / 2 + 1]) / 2
-}
-function pad(text, width) { while (length(text) < width) text = text " "; return text }
-{ sub(/\r$/, "") }
-!started {
-  if ($0 ~ /^name,iterations,/) {
-    started = 1
-    n = split_csv($0, heading)
-    for (i = 1; i <= n; ++i) column[heading[i]] = i
-  }
-  next
-}
-{
-  for (i in field) delete field[i]
-  if (split_csv($0, field) < column["time_unit"]) next
-  name = field[column["name"]]
-  if (name ~ /_(mean|median|stddev|cv|min|max)$/) next
-  sub(/\/repeats:[0-9]+/, "", name)
-  if (field[column["error_occurred"]] == "true") {
-    print "error: " name ": " field[column["error_message"]]
-    errors = 1
-    next
-  }
-  unit = field[column["time_unit"]]
-  factor = unit == "s" ? 1e9 : unit == "ms" ? 1e6 : unit == "us" ? 1e3 : 1
-  nanoseconds = field[column["cpu_time"]] * factor
-  if (!(name in runs)) { order[++total] = name; least[name] = nanoseconds }
-  time[name, ++runs[name]] = nanoseconds
-  if (nanoseconds < least[name]) least[name] = nanoseconds
-  rate = field[column["items_per_second"]]
-  if (rate != "" && rate + 0 > most_rate[name]) most_rate[name] = rate + 0
-  label[name] = field[column["label"]]
-}
-END {
-  if (total == 0) { print "  no benchmark ran"; exit errors ? 3 : 0 }
-  width = 9
-  for (i = 1; i <= total; ++i) if (length(order[i]) > width) width = length(order[i])
-  printf "  %s  %12s  %12s  %14s\n", pad("benchmark", width), "least (ns)", "median (ns)", "items/s"
-  for (i = 1; i <= total; ++i) {
-    name = order[i]
-    rate = most_rate[name] > 0 ? sprintf("%14.4g", most_rate[name]) : ""
-    line = sprintf("  %s  %12.2f  %12.2f  %s", pad(name, width), least[name], median(name), rate)
-    sub(/ +$/, "", line)
-    print line
-  }
-  for (i = 1; i <= total; ++i) {
-    name = order[i]
-    parts = split(label[name], part, ";")
-    for (k = 1; k <= parts; ++k) {
-      text = trimmed(part[k])
-      if (text !~ /^vs /) continue
-      sub(/^vs +/, "", text)
-      limit = ""; sign = ""
-      if (match(text, / +<=? *[0-9.]+$/)) {
-        limit = substr(text, RSTART)
-        text = substr(text, 1, RSTART - 1)
-        sign = limit ~ /<=/ ? "<=" : "<"
-        gsub(/[ <=]/, "", limit)
-      }
-      if (!ratios++) printf "\n  ratios of the least times\n"
-      if (!(text in least)) {
-        # A filter leaves baselines out; without one, the label is wrong.
-        printf "  %s  %7s  to %s, which did not run\n", pad(name, width), "-", text
-        if (!filtered) errors = 1
-        continue
-      }
-      ratio = least[name] / least[text]
-      verdict = ""
-      if (limit != "") {
-        ok = sign == "<=" ? ratio <= limit + 0 : ratio < limit + 0
-        verdict = "  (" (ok ? "ok" : "OVER") ", limit " sign " " limit ")"
-        if (!ok) ++over
-      }
-      printf "  %s  %7.3f  of %s%s\n", pad(name, width), ratio, text, verdict
-    }
-  }
-  exit errors ? 3 : over ? 4 : 0
-}'
-
 filtered=0
 for argument in ${passed_on[@]+"${passed_on[@]}"}; do
   case $argument in
@@ -217,30 +112,32 @@ for argument in ${passed_on[@]+"${passed_on[@]}"}; do
   esac
 done
 
+# Short bursts of all benchmarks of a program in random order, in processes of their own: a busy
+# machine disturbs some bursts of each, and where a process puts its memory differs.
+processes=5
 result=0
+rm -f "$build"/results/*.json
 for program in "${programs[@]}"; do
   name=$(basename -- "$program")
-  echo
-  echo "$name"
-  csv=$build/results/$name.csv
-  status=0
-  # Later options win, so the user's come last.
-  "$program" --benchmark_repetitions=9 --benchmark_min_time=0.05 \
-    --benchmark_enable_random_interleaving=true \
-    ${passed_on[@]+"${passed_on[@]}"} --benchmark_format=csv --benchmark_out_format=json \
-    --benchmark_out="$build/results/$name.json" >"$csv" 2>"$build/results/$name.log" || status=$?
-  if ((status != 0)); then
-    cat "$build/results/$name.log" >&2
-    echo "run.sh: $name failed with exit code $status" >&2
-    result=1
-    continue
-  fi
-  verdict=0
-  awk -v filtered="$filtered" "$table" "$csv" || verdict=$?
-  case $verdict in
-    0) ;;
-    4) [[ $strict == no ]] || result=1 ;;
-    *) result=1 ;;
-  esac
+  for ((process = 1; process <= processes; ++process)); do
+    # Later options win, so the user's come last.
+    if ! "$program" --benchmark_repetitions=200 --benchmark_min_time=0.00006 \
+      --benchmark_enable_random_interleaving=true ${passed_on[@]+"${passed_on[@]}"} \
+      --benchmark_out_format=json --benchmark_out="$build/results/$name.$process.json" \
+      >/dev/null 2>"$build/results/$name.log"; then
+      cat "$build/results/$name.log" >&2
+      echo "run.sh: $name failed" >&2
+      result=1
+    fi
+  done
 done
+compiler_name=$("$(sed -n 's/^CMAKE_CXX_COMPILER:[A-Z]*=//p' "$build/CMakeCache.txt")" --version | head -n 1)
+verdict=0
+python3 "$root/benchmarks/table.py" "$build/results" "$compiler_name" "${flags:--O2} -DNDEBUG" \
+  "$filtered" || verdict=$?
+case $verdict in
+  0) ;;
+  4) [[ $strict == no ]] || result=1 ;;
+  *) result=1 ;;
+esac
 exit "$result"

@@ -3,9 +3,9 @@
 # What every build needs, what each kind of program needs on top.
 ESOKIT_BUILD_PACKAGES=(g++ cmake ninja-build libeigen3-dev)
 ESOKIT_TEST_PACKAGES=(libgtest-dev libboost-dev)
-ESOKIT_BENCHMARK_PACKAGES=(libbenchmark-dev)
+ESOKIT_BENCHMARK_PACKAGES=(libbenchmark-dev python3)
 # Without a font gnuplot draws figures with no text, and reports no error.
-# Python makes the pages and checks the numbers of the READMEs.
+# Python makes the pages and tables and checks the numbers of the READMEs.
 ESOKIT_EXAMPLE_PACKAGES=(gnuplot-nox fontconfig fonts-dejavu-core python3)
 # picolibc is the C library of the RISC-V compiler; its C++ headers are those of libstdc++-arm-none-eabi.
 ESOKIT_FIRMWARE_PACKAGES=(gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib

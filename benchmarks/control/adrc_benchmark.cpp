@@ -41,6 +41,25 @@ Adrc<Observer> adrc(const typename Observer::Config& observer) {
       .value();
 }
 
+/// What ADRC would replace: PID with a filtered derivative, limits and clamping, no other check.
+template <class S>
+struct Pid {
+  S proportional, integral, derivative, decay, lower, upper;
+  S sum{}, filtered{}, last{};
+
+  S update(S y, S r) noexcept {
+    const S e = r - y;
+    const S slope = derivative * (e - last);
+    filtered = decay * filtered + slope;
+    last = e;
+    const S wanted = proportional * e + sum + filtered;
+    const S u = wanted < lower ? lower : wanted > upper ? upper : wanted;
+    const S step = integral * e;
+    if (wanted == u || (wanted > u) != (step > S(0))) sum += step;
+    return u;
+  }
+};
+
 /// Steps of two lengths in turn: every one is another than the last.
 template <class S>
 struct Jittering {
@@ -88,8 +107,17 @@ template <class S>
 void add_all(const std::string& scalar) {
   const auto linear = observer_config<S, 2>();
   add<S>("linear_eso/2/" + scalar, LinearEso<2, S>::make(linear).value());
-  add<S>("adrc/2/" + scalar, adrc<S, LinearEso<2, S>>(linear),
-         beside("linear_eso/2/" + scalar, " <= 2.0"));
+  add<S>("pid/" + scalar, Pid<S>{.proportional = S(40),
+                                 .integral = static_cast<S>(0.05),
+                                 .derivative = S(500),
+                                 .decay = static_cast<S>(0.9),
+                                 .lower = S(-5),
+                                 .upper = S(5)});
+  Limits beside_both = beside("linear_eso/2/" + scalar, " <= 2.0");
+  beside_both.bank += "; " + against("bank", "pid/" + scalar);
+  beside_both.out_of_line += "; " + against("call", "pid/" + scalar);
+  beside_both.latency += "; " + against("latency", "pid/" + scalar);
+  add<S>("adrc/2/" + scalar, adrc<S, LinearEso<2, S>>(linear), beside_both);
   add<S>("adrc/3/" + scalar, adrc<S, LinearEso<3, S>>(observer_config<S, 3>()));
   add_filter_forms<S, 2>(scalar);
   add_filter_forms<S, 3>(scalar);

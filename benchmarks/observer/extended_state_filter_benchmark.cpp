@@ -1,6 +1,8 @@
 /// @file
-/// ExtendedStateFilter beside LinearEso of the same size: with the recursion at every sample, and
-/// with the frozen gain.
+/// ExtendedStateFilter beside LinearEso of the same size and a Kalman filter on dense matrices:
+/// with the recursion at every sample, and with the frozen gain.
+#include <esokit/eigen.hpp>
+#include <esokit/model/integrator_chain.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <string>
@@ -10,6 +12,26 @@
 
 namespace esokit::benchmarks {
 namespace {
+
+/// What one writes with Eigen: x and P dense, the textbook's equations.
+template <class S, int Size>
+struct DenseKalman {
+  using Square = EigenMatrix<S, Size, Size>;
+  EigenMatrix<S, Size> state = EigenMatrix<S, Size>::Zero();
+  Square covariance;
+  Square transition;
+  Square noise;
+  EigenMatrix<S, Size> input;
+  S measurement;
+
+  void update(S y, S u) noexcept {
+    const EigenMatrix<S, Size> predicted = transition * state + input * u;
+    const Square spread = transition * covariance * transition.transpose() + noise;
+    const EigenMatrix<S, Size> gain = spread.col(0) / (spread(0, 0) + measurement);
+    state = predicted + gain * (y - predicted(0));
+    covariance = spread - gain * spread.row(0);
+  }
+};
 
 template <class S>
 constexpr S input_gain = S(2);
@@ -50,6 +72,23 @@ ExtendedStateFilter<Order, S> filter(RiccatiMode mode, InflationRule rule, bool 
 }
 
 template <class S, int Order>
+DenseKalman<S, Order + 1> kalman() {
+  using Chain = IntegratorChain<Order, S>;
+  DenseKalman<S, Order + 1> filter;
+  filter.transition = Chain::transition_matrix(sample_time<S>);
+  filter.input = Chain::sampled_input_matrix(sample_time<S>, input_gain<S>);
+  filter.measurement = static_cast<S>(1e-6);
+  filter.noise.setZero();
+  S bound = static_cast<S>(1e-6);
+  for (int i = 0; i <= Order; ++i) {
+    filter.noise(i, i) = bound * bound;
+    bound *= S(1000);
+  }
+  filter.covariance = filter.noise * S(1e6);
+  return filter;
+}
+
+template <class S, int Order>
 void add_order(const std::string& scalar, const Limits& recursive, const Limits& frozen) {
   const std::string size = "/" + std::to_string(Order) + "/" + scalar;
   const auto against_linear = [&](const Limits& limits) {
@@ -58,9 +97,16 @@ void add_order(const std::string& scalar, const Limits& recursive, const Limits&
                                       "vs latency/linear_eso" + size + limits.latency};
   };
   add<S>("linear_eso" + size, linear<S, Order>());
+  add<S>("kalman_dense_eigen" + size, kalman<S, Order>());
+  const auto and_kalman = [&](Limits limits) {
+    limits.bank += "; vs bank/kalman_dense_eigen" + size;
+    limits.out_of_line += "; vs call/kalman_dense_eigen" + size;
+    limits.latency += "; vs latency/kalman_dense_eigen" + size;
+    return limits;
+  };
   add<S>("esf_recursive" + size,
          filter<S, Order>(RiccatiMode::recursive, InflationRule::fixed, false),
-         against_linear(recursive));
+         and_kalman(against_linear(recursive)));
   add<S>("esf_recursive_full_noise" + size,
          filter<S, Order>(RiccatiMode::recursive, InflationRule::fixed, true), against_linear({}));
   add<S>("esf_adaptive" + size,
