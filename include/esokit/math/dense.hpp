@@ -167,7 +167,7 @@ bool sum_by_doubling(T* e, T* p, T* work1, T* work2, int n) noexcept {
       }
     }
     // What is left out is size^2 times the term that was just added.
-    if (size * size < T(1e-4) * rounding<T>()) return is_finite(sum_of_magnitudes(p, n * n));
+    if (size * size < T(1e-4) * rounding<T>()) return is_finite(row_norm(p, n));
     for (int i = 0; i < n * n; ++i) e[i] = work1[i];
   }
   return false;
