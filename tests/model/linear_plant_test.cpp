@@ -231,6 +231,14 @@ TEST(LinearPlant, RefusesByFieldAndRule) {
   }
   EXPECT_EQ(refusal(with_lag(*servo, 1e-310)),
             "time_constant: has an inverse that the scalar cannot hold");
+  const auto strong = LinearPlant<1>::chain({.input_gain = 1e300}).value();
+  EXPECT_EQ(refusal(with_lag(strong, 1e-7)), "accepted");
+  EXPECT_EQ(refusal(with_lag(strong, 1e-10)),
+            "time_constant: gives a plant that the scalar cannot hold");
+  EXPECT_EQ(refusal(with_sensor(strong, 1e-10)),
+            "time_constant: gives a plant that the scalar cannot hold");
+  EXPECT_EQ(refusal(P::state_space({.a = {{0, 1e200}, {0, 0}}, .b = {0, 1e200}, .c = {1, 0}})),
+            "b: gives an input gain (the value here) that the scalar cannot hold");
   EXPECT_EQ(refusal(P::transfer_function({})), "numerator[0]: must not be zero throughout");
   EXPECT_EQ(refusal(P::transfer_function({.numerator = {1, 1e200}, .denominator = {0, 1e200}})),
             "numerator[0]: gives, with this denominator, a state that the scalar cannot hold");

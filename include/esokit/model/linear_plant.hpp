@@ -31,6 +31,7 @@ struct LinearPlant {
   static constexpr int states = States;    ///< length of x
   static constexpr int inputs = Inputs;    ///< length of u, and of d
   static constexpr int outputs = Outputs;  ///< length of y
+
   /// One input, one output: what ADRC with one observer is for.
   static constexpr bool single = Inputs == 1 && Outputs == 1;
 
@@ -42,6 +43,7 @@ struct LinearPlant {
   Matrix<ScalarType, States, States> a{};   ///< A, 1/s
   Matrix<ScalarType, States, Inputs> b{};   ///< B
   Matrix<ScalarType, Outputs, States> c{};  ///< C
+
   /// E: where the disturbance enters; as u does, and in the unit of u, if nothing else is said.
   Matrix<ScalarType, States, Inputs> e = b;
   ScalarType dead_time{};  ///< s, from u to the plant; d is not delayed
@@ -116,15 +118,20 @@ struct LinearPlant {
     return plant;
   }
 
-  /// Error of a number that is not finite, of a negative dead time, and of an output that no input
-  /// reaches. The index is that of the element, by columns; of an output its number.
+  /// Error of a number that is not finite, of a negative dead time, of an output that no input
+  /// reaches, and of an input gain that the scalar cannot hold. The index is that of the element,
+  /// by columns; of an output its number.
   [[nodiscard]] constexpr Check<ScalarType> check() const {
     Rules<ScalarType> rules;
     rules.finite("a", a).finite("b", b).finite("c", c).finite("e", e).not_negative("dead_time",
                                                                                    dead_time);
     for (int i = 0; i < Outputs && rules; ++i) {
-      rules.require(relative_degree(i) > 0, "c", c(i, 0), "is of an output that no input reaches",
-                    i);
+      const Reached reached = first_gain(i);
+      rules.require(reached.degree > 0, "c", c(i, 0), "is of an output that no input reaches", i);
+      for (const ScalarType& gain : reached.gain) {
+        rules.require(all(is_finite(gain)), "b", gain,
+                      "gives an input gain (the value here) that the scalar cannot hold");
+      }
     }
     return rules;
   }
@@ -221,7 +228,8 @@ struct LinearPlant {
       const ScalarType rounding(std::numeric_limits<Table>::epsilon() *
                                 static_cast<Table>(2 * States * degree));
       for (int j = 0; j < Inputs; ++j) {
-        if (!all(detail::absolute(gain(j)) <= rounding * size(j))) return {degree, gain};
+        const bool lost = !all(is_finite(gain(j)));
+        if (lost || !all(detail::absolute(gain(j)) <= rounding * size(j))) return {degree, gain};
       }
       row = row * a;
       magnitude = magnitude * magnitudes(a);
@@ -262,7 +270,9 @@ constexpr Expected<LinearPlant<States + Inputs, S, Inputs, Outputs>, Error<S>> w
     lagged.b(States + j, j) = S(1.0) / time_constant;
     lagged.a(States + j, States + j) = -lagged.b(States + j, j);
   }
-  if (const auto ok = lagged.check(); !ok) return ok.error();
+  rules.require(lagged.check().has_value(), "time_constant", time_constant,
+                "gives a plant that the scalar cannot hold");
+  if (!rules) return rules.error();
   return lagged;
 }
 
@@ -292,7 +302,9 @@ constexpr Expected<LinearPlant<States + Outputs, S, Inputs, Outputs>, Error<S>> 
     seen.a(States + j, States + j) = -rate;
     seen.c(j, States + j) = S(1.0);
   }
-  if (const auto ok = seen.check(); !ok) return ok.error();
+  rules.require(seen.check().has_value(), "time_constant", time_constant,
+                "gives a plant that the scalar cannot hold");
+  if (!rules) return rules.error();
   return seen;
 }
 

@@ -64,6 +64,7 @@ struct RunTypes {
   using State = typename P::State;                                           ///< x
   using Input = ScalarOrVector<S, inputs>;                                   ///< u: a number if one
   using Output = ScalarOrVector<S, outputs>;                                 ///< y: a number if one
+
   /// (r, r', ..) of a controller that takes derivatives, else one for each output.
   static constexpr bool derivatives = controller_traits<C>.takes_derivatives && outputs == 1;
   /// Numbers of a reference.
@@ -109,6 +110,7 @@ struct RunRecord {
   using Types = RunTypes<P, C>;       ///< of the numbers
   using S = typename Types::S;        ///< of the plant
   using Time = typename Types::Time;  ///< s
+
   /// Of a signal of `Count` numbers.
   template <int Count>
   using Column = std::conditional_t<Count == 1, std::vector<S>, Array<std::vector<S>, Count>>;
@@ -118,6 +120,7 @@ struct RunRecord {
   Column<Types::outputs> measurement;  ///< what the controller was given; NaN: missing
   Column<Types::outputs> reference;    ///< r
   Column<Types::inputs> input;         ///< u from this sample to the next
+
   /// dhat after the sample, in the unit of y^(n); empty where the controller has no observer.
   std::vector<S> total_disturbance;
 

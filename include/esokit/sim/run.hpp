@@ -111,6 +111,7 @@ struct RunConfig {
   RunSignal<typename Types::S, Types::inputs> disturbance{};
 
   Output noise{};  ///< of the measurement: standard deviation, normal, white
+
   /// What the sensor makes of (t, y), noise in it: quantised, late, or NaN, that is missing.
   std::function<Output(const Time&, const Output&)> sensor{};
   Time missing{};  ///< share of the samples that get lost at random, 0 .. 1
