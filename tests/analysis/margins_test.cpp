@@ -498,6 +498,12 @@ TEST(Margins, OfOneChannelOfTwo) {
     EXPECT_NEAR(std::abs(loop.loop_gain(delay.frequency, channel).value()), 1.0, 0.1);
     modulus = std::min(modulus, all.modulus.value);
   }
+  // The worst case is that of the worse channel.
+  const auto as_it_is = [&](const Array<double, 1>&) { return plant; };
+  const auto worst =
+      worst_case(as_it_is, std::array<Interval<>, 1>{}, controller, {.points = 2, .halvings = 0})
+          .value();
+  EXPECT_EQ(worst.modulus.value, modulus);
   // Both at once: less than that of the worse one, and the same delay edge as a common dead time.
   const auto peak = sensitivity_peak(loop).value();
   double dense = 0.0;
