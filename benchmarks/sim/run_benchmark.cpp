@@ -123,17 +123,17 @@ void recorded(benchmark::State& state) {
         plant, made, {.duration = samples * T, .reference = reference, .disturbance = load});
     benchmark::DoNotOptimize(recording);
   }
-  state.SetLabel("vs recorded/hand_written");
+  state.SetLabel("vs recorded/hand_written <= 1.2");
 }
 
 void add_all() {
   benchmark::RegisterBenchmark("linear/hand_written", linear_by_hand<false>);
   benchmark::RegisterBenchmark("linear/run", [](benchmark::State& state) {
-    by_run(state, linear(), load, "vs linear/hand_written");
+    by_run(state, linear(), load, "vs linear/hand_written <= 1.2");
   });
   benchmark::RegisterBenchmark("nonlinear/hand_written", nonlinear_by_hand);
   benchmark::RegisterBenchmark("nonlinear/run", [](benchmark::State& state) {
-    by_run(state, nonlinear(), load / 50, "vs nonlinear/hand_written");
+    by_run(state, nonlinear(), load / 50, "vs nonlinear/hand_written <= 1.2");
   });
   benchmark::RegisterBenchmark("recorded/hand_written", linear_by_hand<true>);
   benchmark::RegisterBenchmark("recorded/run", recorded);
