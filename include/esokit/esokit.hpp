@@ -106,6 +106,8 @@
 #include <esokit/model/corrected_part.hpp>
 #include <esokit/model/integrator_chain.hpp>
 #include <esokit/model/linear_plant.hpp>
+#include <esokit/model/matrix_model.hpp>
+#include <esokit/model/plant_model.hpp>
 #include <esokit/model/sampled_model.hpp>
 #include <esokit/model/scaled_chain.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>

@@ -167,6 +167,31 @@ class Filler {
     }
   }
 
+  /// The numbers of an AugmentedModel's parts.
+  template <class Settings>
+  void parts(Settings& model) {
+    const auto T = time();
+    const auto lag = [&](auto& part, const char* name) {
+      if constexpr (requires { part.time_constant; }) {
+        number(name, part.time_constant, {T, 50 * T, true});
+      } else if constexpr (requires { part.frequency; }) {
+        number(name, part.frequency, {0.02 / T, 1 / T, true});
+      }
+    };
+    lag(model.actuator, "model.actuator");
+    lag(model.sensor, "model.sensor");
+    for (std::size_t i = 0; i < model.plant.size(); ++i) {
+      const double slow = std::pow(0.01 / T, static_cast<int>(model.plant.size() - i));
+      number("model.plant", model.plant[i], {-slow, slow});
+    }
+    for (auto& resonance : model.resonators) {
+      number("model.resonators", resonance.frequency, {0.02 / T, 0.5 / T, true});
+    }
+    for (auto& tau : model.leaky) number("model.leaky", tau, {20 * T, 500 * T, true});
+    // What is open loop, or captures by its frequency, decays by that.
+    promise.slowest = std::min(promise.slowest, 0.02);
+  }
+
   template <class Config>
   void fill_members(Config& config) {
     const auto T = time();
@@ -264,6 +289,7 @@ class Filler {
         number("model.coefficients", config.model.coefficients[i], {-slow, slow});
       }
     }
+    if constexpr (requires { config.model.resonators; }) parts(config.model);
     // Controllers. B0 says what input_gain would.
     if constexpr (requires { config.condition_limit; }) {
       input_matrix_says_it_ = true;

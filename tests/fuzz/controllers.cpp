@@ -17,6 +17,7 @@
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/model_eso.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
 
 #include "fuzz/driver.hpp"
@@ -44,6 +45,7 @@ void add_controllers(std::vector<Kind>& kinds) {
 #ifndef ESOKIT_ONE_TYPE
   KIND(Adrc<OutlierGate<LinearEso<2, float>>>);
   KIND(Adrc<LinearEso<2, float>>);
+  KIND(Adrc<ModelEso<ModelParts{.order = 1, .plant_poles = true, .actuator = 1}, double>>);
   KIND(Adrc<CascadeEso<2, 2, float>>);
   KIND(Adrc<AlgebraicEso<2, float>>);
   KIND(Adrc<WrappedOutput<LinearEso<2, double>>>);

@@ -1008,11 +1008,12 @@ class Driver {
   template <class O>
   static double distance(const O& observer, const S& y) {
     const auto z = observer.estimate();
+    const auto rest = observer.rest(y, S(0));
     double worst = 0;
     double unit = 1;
     for (int r = 0; r < O::size; ++r) {
       if (r > 0) unit *= static_cast<double>(observer.sample_time()) / r;
-      double error = static_cast<double>(z(r)) - (r == 0 ? static_cast<double>(y) : 0.0);
+      double error = static_cast<double>(z(r)) - static_cast<double>(rest(r));
       if constexpr (requires { observer.wrap(y); }) {
         if (r == 0) error = static_cast<double>(observer.wrap(static_cast<S>(error)));
       }

@@ -10,6 +10,7 @@
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/half_gain_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/model_eso.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/observer/reduced_order_eso.hpp>
 
@@ -32,6 +33,7 @@ void add_observers(std::vector<Kind>& kinds) {
   KIND(WrappedOutput<VariableTime<DelayedInput<LinearEso<2, float>, 3>>>);
   KIND(DelayedInput<KnownModel<WrappedOutput<CascadeEso<2, 2, double>>, KnownPoles<2, double>>, 3>);
   KIND(OutlierGate<LinearEso<2, float>>);
+  KIND(ModelEso<ModelParts{.order = 1, .actuator = 1, .sensor = 1, .resonators = 1}, float>);
 #ifndef ESOKIT_ONE_TYPE
   KIND(WrappedOutput<OutlierGate<VariableTime<CascadeEso<2, 2, double>>>>);
   KIND(LinearEso<1, float>);

@@ -285,6 +285,11 @@ auto observer_system(const Observer& observer, double t = 0.0) {
 /// @param t s, as in observer_system
 template <LinearObserver Observer>
 auto estimation_system(const Observer& observer, double t = 0.0) {
+  if constexpr (SampledLinearObserver<Observer>) {
+    static_assert(model_traits<std::remove_cvref_t<decltype(observer.model())>>.adds_levels,
+                  "esokit: with a lag or known poles d does not act as u does; use "
+                  "observer_system");
+  }
   const auto m = detail::observer_matrices(observer, t);
   auto system = detail::system_of<detail::MatricesOf<Observer>, 2>(m);
   // In zhat - (y, .., y^(n-1), 0) the disturbance enters as -u b0 does.

@@ -11,6 +11,7 @@
 #include <esokit/math/combinatorics.hpp>
 #include <esokit/math/dense.hpp>
 #include <esokit/model/corrected_part.hpp>
+#include <esokit/model/matrix_model.hpp>
 #include <esokit/model/sampled_model.hpp>
 #include <limits>
 
@@ -45,25 +46,6 @@ constexpr int model_degree(const ModelParts& parts, int state) noexcept {
   if (row <= order) return row;
   return row < order + parts.constants ? parts.order + row - order : parts.order;
 }
-constexpr int highest_degree(const ModelParts& parts) noexcept {
-  int highest = 0;
-  for (int i = 0; i < model_size(parts); ++i) {
-    const int degree = model_degree(parts, i);
-    highest = highest < degree ? degree : highest;
-  }
-  return highest;
-}
-
-/// Which elements of Phi - I, and in the last column of Gamma, can differ from zero, which are
-/// known when compiling, and where the others are kept, row by row.
-template <int Size>
-struct ModelPattern {
-  Array<Array<bool, Size + 1>, Size> couples{};
-  Array<Array<int, Size + 1>, Size> chain{};  ///< those of a chain: binomials; else 0
-  Array<Array<int, Size + 1>, Size> place{};
-  int kept = 0;
-};
-
 template <ModelParts Parts>
 constexpr auto make_model_pattern() noexcept {
   constexpr auto size = static_cast<std::size_t>(model_size(Parts));
@@ -113,6 +95,16 @@ constexpr auto make_model_pattern() noexcept {
 template <ModelParts Parts>
 inline constexpr auto model_pattern = make_model_pattern<Parts>();
 
+/// What MatrixModel asks for.
+template <ModelParts Parts>
+struct PartsShape {
+  static constexpr int order = law_order(Parts);
+  static constexpr int size = model_size(Parts);
+  static constexpr int measured_rows = Parts.sensor;
+  static constexpr int degree(int state) noexcept { return model_degree(Parts, state); }
+  static constexpr const auto& pattern = model_pattern<Parts>;
+};
+
 /// a! / b!.
 template <PlainScalar S>
 constexpr S factorial_ratio(int a, int b) noexcept {
@@ -159,6 +151,7 @@ struct Resonance {
 /// How far the frequencies may go from what they are given as, as factors.
 template <bool Follows, PlainScalar S>
 struct SpeedRange {};
+/// As factors.
 template <PlainScalar S>
 struct SpeedRange<true, S> {
   S lowest{};   ///< above 0, 1 at most
@@ -182,7 +175,13 @@ struct SpeedRange<true, S> {
 /// sensor that is faster than omega_o keeps its own too; those of a sine go to -s +- j w0; all
 /// others to exp(-omega_o T).
 template <ModelParts Parts, PlainScalar S = double>
-class AugmentedModel {
+class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
+  using Base = MatrixModel<detail::PartsShape<Parts>, S>;
+  using Base::couples;
+  using Base::input_gain_;
+  using Base::rate_;
+  using Base::sample_time_;
+  using Base::scaled_input_gain_;
   static constexpr int n = Parts.order;
   static constexpr int la = Parts.actuator;
   static constexpr int lf = Parts.sensor;
@@ -193,11 +192,13 @@ class AugmentedModel {
   static_assert(Parts.resonators >= 0 && Parts.leaky >= 0, "esokit: a number of parts below zero");
 
  public:
-  static constexpr ModelParts parts = Parts;              ///< what is known
-  static constexpr int order = detail::law_order(Parts);  ///< of the law
-  static constexpr int size = detail::model_size(Parts);  ///< N
-  static constexpr int extension = size - order;          ///< all beside the plant's rows
-  static constexpr int measured_rows = lf;                ///< of the sensor, see SampledModel
+  static constexpr ModelParts parts = Parts;  ///< what is known
+  using Base::degree;
+  using Base::extension;
+  using Base::order;
+  using Base::size;
+  using typename Base::Estimate;
+  using typename Base::State;
 
   /// What it is.
   static constexpr ModelTraits traits{
@@ -207,8 +208,6 @@ class AugmentedModel {
       .follows_speed = Parts.follows_speed,
   };
 
-  using State = Array<S, size>;      ///< x, scaled, N elements
-  using Estimate = Vector<S, size>;  ///< z, physical units, N x 1
   template <class T>
   using with_scalar = AugmentedModel<Parts, T>;  ///< the same of another scalar
 
@@ -232,8 +231,10 @@ class AugmentedModel {
     rules.all_of(check(settings, sample_time));
     if (!rules) return rules.error();
     const AugmentedModel model(settings, input_gain, sample_time);
-    rules.representable("input_gain", input_gain, model.scaled_input_gain_,
-                        "with this model gives a gain that the scalar cannot hold");
+    for (const S& gain : {model.scaled_input_gain_, model.input_gain_}) {
+      rules.representable("input_gain", input_gain, gain,
+                          "with this model gives a gain that the scalar cannot hold");
+    }
     for (const S& x : model.step_) {
       rules.require(is_finite(x), "model", x, "gives a transition that the scalar cannot hold");
     }
@@ -241,152 +242,8 @@ class AugmentedModel {
     return model;
   }
 
-  /// b: y^(order) = D + b u. b0, as it was given, where the actuator has no lag.
-  [[nodiscard]] constexpr const S& input_gain() const noexcept { return input_gain_; }
-  /// T, s, as it was given.
-  [[nodiscard]] constexpr const S& sample_time() const noexcept { return sample_time_; }
   /// As they were given.
   [[nodiscard]] constexpr const Settings& settings() const noexcept { return settings_; }
-
-  /// What drives a step: u.
-  [[nodiscard]] ESOKIT_INLINE constexpr S drive(const S& u) const noexcept { return u; }
-
-  /// u, and the disturbance that the levels before have found.
-  struct Joined {
-    S u;                              ///< as `drive`
-    Array<S, extension> disturbance;  ///< rows from `order` on
-  };
-  /// The same with the disturbance of x: what drives the next level of a cascade.
-  /// @{
-  [[nodiscard]] ESOKIT_INLINE static constexpr Joined joined(const S& drive,
-                                                             const State& x) noexcept {
-    return joined(Joined{drive, {}}, x);
-  }
-  [[nodiscard]] ESOKIT_INLINE static constexpr Joined joined(Joined drive,
-                                                             const State& x) noexcept {
-    detail::unroll<extension>([&](auto r) ESOKIT_INLINE_LAMBDA {
-      std::get<r>(drive.disturbance) = std::get<r>(drive.disturbance) + std::get<order + r>(x);
-    });
-    return drive;
-  }
-  /// @}
-
-  /// x one sample ahead: Phi x + Gamma u; what is zero of Phi - I whatever the numbers is left out.
-  [[nodiscard]] ESOKIT_INLINE constexpr State predict(const State& x, const S& u) const noexcept {
-    State next = x;
-    detail::unroll<size>([&](auto i) ESOKIT_INLINE_LAMBDA {
-      S sum = std::get<i>(x);
-      detail::unroll<size>([&](auto j) ESOKIT_INLINE_LAMBDA {
-        if constexpr (of_chain(i, j) == 1) {
-          sum = sum + std::get<j>(x);
-        } else if constexpr (of_chain(i, j) > 1) {
-          constexpr double binomial = of_chain(i, j);
-          sum = sum + detail::constant<S>(binomial) * std::get<j>(x);
-        } else if constexpr (couples(i, j)) {
-          sum = sum + std::get<place(i, j)>(step_) * std::get<j>(x);
-        }
-      });
-      if constexpr (couples(i, size)) sum = sum + std::get<place(i, size)>(step_) * u;
-      std::get<i>(next) = sum;
-    });
-    return next;
-  }
-  /// The same for a level of a cascade: what it is driven by acts on the plant and is not its own.
-  [[nodiscard]] ESOKIT_INLINE constexpr State predict(const State& x,
-                                                      const Joined& drive) const noexcept {
-    State all = x;
-    detail::unroll<extension>([&](auto r) ESOKIT_INLINE_LAMBDA {
-      std::get<order + r>(all) = std::get<order + r>(all) + std::get<r>(drive.disturbance);
-    });
-    const State plant = predict(all, drive.u);
-    State next = predict(x, S(0));
-    detail::unroll<order>([&](auto r)
-                              ESOKIT_INLINE_LAMBDA { std::get<r>(next) = std::get<r>(plant); });
-    return next;
-  }
-
-  /// x + Gamma u.
-  [[nodiscard]] ESOKIT_INLINE constexpr State add_input(const State& x, const S& u) const noexcept {
-    State sum = x;
-    detail::unroll<size>([&](auto i) ESOKIT_INLINE_LAMBDA {
-      if constexpr (couples(i, size)) {
-        std::get<i>(sum) = std::get<i>(sum) + std::get<place(i, size)>(step_) * u;
-      }
-    });
-    return sum;
-  }
-
-  /// Where row `row` of the estimate is among the states: those of the sensor come first.
-  [[nodiscard]] static constexpr int state_of_row(int row) noexcept {
-    return row + lf < size ? row + lf : row + lf - size;
-  }
-
-  /// The estimates in physical units.
-  [[nodiscard]] constexpr Estimate physical(const State& x) const noexcept {
-    Estimate z;
-    detail::unroll<size>([&](auto row) { z(int{row}) = physical<row>(x); });
-    return z;
-  }
-  /// One of them.
-  template <int Row>
-  [[nodiscard]] ESOKIT_INLINE constexpr S physical(const State& x) const noexcept {
-    constexpr int state = state_of_row(Row);
-    S value = std::get<state>(x);
-    // In steps: T^-degree itself may not fit the scalar where the estimate does.
-    detail::unroll<degree(state)>([&](auto j) ESOKIT_INLINE_LAMBDA {
-      constexpr double weight = degree(state) - j;
-      value = value * (detail::constant<S>(weight) * rate_);
-    });
-    return value;
-  }
-  /// The state from estimates in physical units.
-  [[nodiscard]] constexpr State scaled(const Estimate& z) const noexcept {
-    State x{};
-    for (int row = 0; row < size; ++row) {
-      const int state = state_of_row(row);
-      S value = z(row);
-      for (int j = 1; j <= degree(state); ++j) value = value * (sample_time_ / static_cast<S>(j));
-      x[static_cast<std::size_t>(state)] = value;
-    }
-    return x;
-  }
-  /// D as it is scaled in the state. @param disturbance unit of y^(order)
-  [[nodiscard]] constexpr S scaled_disturbance(const S& disturbance) const noexcept {
-    S value = disturbance;
-    for (int j = 1; j <= order; ++j) value = value * (sample_time_ / static_cast<S>(j));
-    return value;
-  }
-
-  /// A number that is finite only if all estimates are.
-  [[nodiscard]] ESOKIT_INLINE constexpr S finite_probe(const State& x) const noexcept {
-    constexpr int highest = detail::highest_degree(Parts);
-    constexpr int first = [] {
-      int state = 0;
-      while (detail::model_degree(Parts, state) != detail::highest_degree(Parts)) ++state;
-      return state;
-    }();
-    S probe = detail::absolute(std::get<first>(x));
-    detail::unroll<highest + 1>([&](auto k) ESOKIT_INLINE_LAMBDA {
-      constexpr int now = highest - k;
-      if constexpr (now < highest) {
-        constexpr double weight = now + 1;
-        probe = probe * (detail::constant<S>(weight) * rate_);
-      }
-      detail::unroll<size>([&](auto i) ESOKIT_INLINE_LAMBDA {
-        if constexpr (degree(i) == now && i != first) {
-          probe = probe + detail::absolute(std::get<i>(x));
-        }
-      });
-    });
-    return probe;
-  }
-
-  /// A state of the model `before` as the same estimate of this one.
-  [[nodiscard]] constexpr State rescaled(const State& x,
-                                         const AugmentedModel& before) const noexcept {
-    if (!(sample_time_ < before.sample_time_) && !(sample_time_ > before.sample_time_)) return x;
-    return scaled(before.physical(x));
-  }
 
   /// The estimate of a plant that stands at y under u.
   [[nodiscard]] constexpr Estimate rest(const S& y, const S& u) const noexcept {
@@ -397,25 +254,6 @@ class AugmentedModel {
     return z;
   }
 
-  /// Phi - I.
-  [[nodiscard]] constexpr Matrix<S, size, size> increment() const noexcept {
-    Matrix<S, size, size> step = Matrix<S, size, size>::Zero();
-    for (int i = 0; i < size; ++i) {
-      for (int j = 0; j < size; ++j) {
-        if (of_chain(i, j) > 0) {
-          step(i, j) = number(of_chain(i, j));
-        } else if (couples(i, j)) {
-          step(i, j) = step_[static_cast<std::size_t>(place(i, j))];
-        }
-      }
-    }
-    return step;
-  }
-  /// A state is T^degree / degree! times what it is in physical units.
-  [[nodiscard]] static constexpr int degree(int state) noexcept {
-    return detail::model_degree(Parts, state);
-  }
-
   /// The same with all frequencies of the resonators times `factor`; exact, and as much work as a
   /// matrix exponential: some 16 products of N x N.
   [[nodiscard]] AugmentedModel at_speed(const S& factor) const noexcept {
@@ -423,13 +261,6 @@ class AugmentedModel {
     other.speed_ = factor;
     other.sample();
     return other;
-  }
-
-  /// True if u does the same in both.
-  [[nodiscard]] constexpr bool same_drive(const AugmentedModel& other) const noexcept {
-    const S change = detail::absolute(S(scaled_input_gain_ - other.scaled_input_gain_)) +
-                     detail::absolute(S(rate_ - other.rate_));
-    return !(change > S(0));
   }
 
   /// @name The parts of an estimate
@@ -443,14 +274,14 @@ class AugmentedModel {
     S amplitude;  ///< unit of y^(n)
     S phase;      ///< rad
   };
-  /// The sine of a resonator. @param resonator 0 .. k - 1
+  /// The sine of resonator 0 .. k - 1.
   [[nodiscard]] static Swing swing(const Estimate& z, int resonator) noexcept
       requires(Parts.resonators > 0) {
     const S q = z(order + m + 2 * resonator);
     const S r = z(order + m + 2 * resonator + 1);
     return {std::hypot(q, r), std::atan2(q, r)};
   }
-  /// What fades. @param part 0 .. l - 1
+  /// What fades, part 0 .. l - 1.
   [[nodiscard]] static constexpr S fading(const Estimate& z, int part) noexcept
       requires(Parts.leaky > 0) {
     return z(order + m + 2 * Parts.resonators + part);
@@ -458,7 +289,7 @@ class AugmentedModel {
   /// The constant part of d, unit of y^(n): what is left of D without the plant, the actuator and
   /// the other parts.
   [[nodiscard]] S constant(const Estimate& z) const noexcept {
-    const auto x = scaled(z);
+    const auto x = this->scaled(z);
     const auto lag = scaled_lag(settings_.actuator, sample_time_);
     const auto alpha = denominator(settings_, sample_time_);
     const auto found = detail::factorial_ratio<S>(order, n);
@@ -499,17 +330,6 @@ class AugmentedModel {
     if (actuator) less.actuator = 0;
     if (sensor) less.sensor = 0;
     return less;
-  }
-
-  static constexpr const auto& pattern = detail::model_pattern<Parts>;
-  static constexpr bool couples(int i, int j) noexcept {
-    return pattern.couples[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
-  }
-  static constexpr int of_chain(int i, int j) noexcept {
-    return pattern.chain[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
-  }
-  static constexpr int place(int i, int j) noexcept {
-    return pattern.place[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
   }
 
   // ---- The rates, in units of T and of the scaled states.
@@ -777,10 +597,7 @@ class AugmentedModel {
   }
 
   AugmentedModel(const Settings& settings, const S& input_gain, const S& sample_time) noexcept
-      : settings_(settings),
-        rate_(S(1) / sample_time),
-        input_gain_(input_gain),
-        sample_time_(sample_time) {
+      : Base(input_gain, sample_time), settings_(settings) {
     const auto lag = scaled_lag(settings.actuator, sample_time);
     if constexpr (la > 0) {
       input_gain_ = input_gain_ * lag[0];
@@ -802,22 +619,11 @@ class AugmentedModel {
 
   void sample() noexcept {
     const auto all = detail::exp_minus_identity(rates(present(), sample_time_));
-    for (int i = 0; i < size; ++i) {
-      for (int j = 0; j <= size; ++j) {
-        if (!couples(i, j) || of_chain(i, j) > 0) continue;
-        step_[static_cast<std::size_t>(place(i, j))] =
-            j < size ? all(i, j) : all(i, j) * scaled_input_gain_;
-      }
-    }
+    this->set_step(all);
   }
 
-  Array<S, pattern.kept> step_{};  ///< Phi - I and Gamma, what is not zero
   Settings settings_;
   S speed_ = S(1);  ///< factor of the frequencies
-  S rate_;          ///< 1/T
-  S input_gain_;
-  S sample_time_;
-  S scaled_input_gain_{};  ///< b T^order / order!
 };
 
 /// Told apart in snapshots.

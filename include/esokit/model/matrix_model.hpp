@@ -1,0 +1,246 @@
+/// @file
+/// MatrixModel: what the models have in common that are given by Phi and Gamma.
+#pragma once
+
+#include <esokit/core/matrix.hpp>
+#include <esokit/core/unroll.hpp>
+#include <esokit/model/sampled_model.hpp>
+
+namespace esokit {
+
+namespace detail {
+
+/// Which elements of Phi - I, and in the last column of Gamma, can differ from zero, which are
+/// known when compiling, and where the others are kept, row by row.
+template <int Size>
+struct ModelPattern {
+  Array<Array<bool, Size + 1>, Size> couples{};
+  Array<Array<int, Size + 1>, Size> chain{};  ///< those of a chain: binomials; else 0
+  Array<Array<int, Size + 1>, Size> place{};
+  int kept = 0;
+};
+
+}  // namespace detail
+
+/// The members of a SampledModel, of elements of Phi - I and Gamma of which those that are zero
+/// whatever the numbers are left out. The states are the rows of the estimate, scaled, in another
+/// order: first those of a sensor.
+/// @tparam Shape `order`, `size`, `measured_rows` (states before y), `degree(state)`, and
+/// `pattern`, a detail::ModelPattern
+template <class Shape, PlainScalar S>
+class MatrixModel {
+ public:
+  static constexpr int order = Shape::order;                  ///< of the law
+  static constexpr int size = Shape::size;                    ///< N
+  static constexpr int extension = size - order;              ///< all beside the plant's rows
+  static constexpr int measured_rows = Shape::measured_rows;  ///< states of a sensor
+
+  using State = Array<S, size>;      ///< x, scaled, N elements
+  using Estimate = Vector<S, size>;  ///< z, physical units, N x 1
+
+  /// b: y^(order) = D + b u. b0, as it was given, where the actuator has no lag.
+  [[nodiscard]] constexpr const S& input_gain() const noexcept { return input_gain_; }
+  /// T, s, as it was given.
+  [[nodiscard]] constexpr const S& sample_time() const noexcept { return sample_time_; }
+  /// What drives a step: u.
+  [[nodiscard]] ESOKIT_INLINE constexpr S drive(const S& u) const noexcept { return u; }
+
+  /// u, and the disturbance that the levels before have found.
+  struct Joined {
+    S u;                              ///< as `drive`
+    Array<S, extension> disturbance;  ///< rows from `order` on
+  };
+  /// The same with the disturbance of x: what drives the next level of a cascade.
+  /// @{
+  [[nodiscard]] ESOKIT_INLINE static constexpr Joined joined(const S& drive,
+                                                             const State& x) noexcept {
+    return joined(Joined{drive, {}}, x);
+  }
+  [[nodiscard]] ESOKIT_INLINE static constexpr Joined joined(Joined drive,
+                                                             const State& x) noexcept {
+    detail::unroll<extension>([&](auto r) ESOKIT_INLINE_LAMBDA {
+      std::get<r>(drive.disturbance) = std::get<r>(drive.disturbance) + std::get<order + r>(x);
+    });
+    return drive;
+  }
+  /// @}
+
+  /// x one sample ahead: Phi x + Gamma u; what is zero of Phi - I whatever the numbers is left out.
+  [[nodiscard]] ESOKIT_INLINE constexpr State predict(const State& x, const S& u) const noexcept {
+    State next = x;
+    detail::unroll<size>([&](auto i) ESOKIT_INLINE_LAMBDA {
+      S sum = std::get<i>(x);
+      detail::unroll<size>([&](auto j) ESOKIT_INLINE_LAMBDA {
+        if constexpr (of_chain(i, j) == 1) {
+          sum = sum + std::get<j>(x);
+        } else if constexpr (of_chain(i, j) > 1) {
+          constexpr double binomial = of_chain(i, j);
+          sum = sum + detail::constant<S>(binomial) * std::get<j>(x);
+        } else if constexpr (couples(i, j)) {
+          sum = sum + std::get<place(i, j)>(step_) * std::get<j>(x);
+        }
+      });
+      if constexpr (couples(i, size)) sum = sum + std::get<place(i, size)>(step_) * u;
+      std::get<i>(next) = sum;
+    });
+    return next;
+  }
+  /// The same for a level of a cascade: what it is driven by acts on the plant and is not its own.
+  [[nodiscard]] ESOKIT_INLINE constexpr State predict(const State& x,
+                                                      const Joined& drive) const noexcept {
+    State all = x;
+    detail::unroll<extension>([&](auto r) ESOKIT_INLINE_LAMBDA {
+      std::get<order + r>(all) = std::get<order + r>(all) + std::get<r>(drive.disturbance);
+    });
+    const State plant = predict(all, drive.u);
+    State next = predict(x, S(0));
+    detail::unroll<order>([&](auto r)
+                              ESOKIT_INLINE_LAMBDA { std::get<r>(next) = std::get<r>(plant); });
+    return next;
+  }
+
+  /// x + Gamma u.
+  [[nodiscard]] ESOKIT_INLINE constexpr State add_input(const State& x, const S& u) const noexcept {
+    State sum = x;
+    detail::unroll<size>([&](auto i) ESOKIT_INLINE_LAMBDA {
+      if constexpr (couples(i, size)) {
+        std::get<i>(sum) = std::get<i>(sum) + std::get<place(i, size)>(step_) * u;
+      }
+    });
+    return sum;
+  }
+
+  /// Where row `row` of the estimate is among the states: those of the sensor come first.
+  [[nodiscard]] static constexpr int state_of_row(int row) noexcept {
+    return row + measured_rows < size ? row + measured_rows : row + measured_rows - size;
+  }
+
+  /// The estimates in physical units.
+  [[nodiscard]] constexpr Estimate physical(const State& x) const noexcept {
+    Estimate z;
+    detail::unroll<size>([&](auto row) { z(int{row}) = physical<row>(x); });
+    return z;
+  }
+  /// One of them.
+  template <int Row>
+  [[nodiscard]] ESOKIT_INLINE constexpr S physical(const State& x) const noexcept {
+    constexpr int state = state_of_row(Row);
+    S value = std::get<state>(x);
+    // In steps: T^-degree itsemeasured_rows may not fit the scalar where the estimate does.
+    detail::unroll<degree(state)>([&](auto j) ESOKIT_INLINE_LAMBDA {
+      constexpr double weight = degree(state) - j;
+      value = value * (detail::constant<S>(weight) * rate_);
+    });
+    return value;
+  }
+  /// The state from estimates in physical units.
+  [[nodiscard]] constexpr State scaled(const Estimate& z) const noexcept {
+    State x{};
+    for (int row = 0; row < size; ++row) {
+      const int state = state_of_row(row);
+      S value = z(row);
+      for (int j = 1; j <= degree(state); ++j) value = value * (sample_time_ / static_cast<S>(j));
+      x[static_cast<std::size_t>(state)] = value;
+    }
+    return x;
+  }
+  /// D as it is scaled in the state. @param disturbance unit of y^(order)
+  [[nodiscard]] constexpr S scaled_disturbance(const S& disturbance) const noexcept {
+    S value = disturbance;
+    for (int j = 1; j <= order; ++j) value = value * (sample_time_ / static_cast<S>(j));
+    return value;
+  }
+
+  /// A number that is finite only if all estimates are.
+  [[nodiscard]] ESOKIT_INLINE constexpr S finite_probe(const State& x) const noexcept {
+    constexpr int first = [] {
+      int state = 0;
+      for (int i = 0; i < size; ++i) {
+        if (Shape::degree(i) > Shape::degree(state)) state = i;
+      }
+      return state;
+    }();
+    constexpr int highest = degree(first);
+    S probe = detail::absolute(std::get<first>(x));
+    detail::unroll<highest + 1>([&](auto k) ESOKIT_INLINE_LAMBDA {
+      constexpr int now = highest - k;
+      if constexpr (now < highest) {
+        constexpr double weight = now + 1;
+        probe = probe * (detail::constant<S>(weight) * rate_);
+      }
+      detail::unroll<size>([&](auto i) ESOKIT_INLINE_LAMBDA {
+        if constexpr (degree(i) == now && i != first) {
+          probe = probe + detail::absolute(std::get<i>(x));
+        }
+      });
+    });
+    return probe;
+  }
+
+  /// A state of the model `before` as the same estimate of this one.
+  [[nodiscard]] constexpr State rescaled(const State& x, const MatrixModel& before) const noexcept {
+    if (!(sample_time_ < before.sample_time_) && !(sample_time_ > before.sample_time_)) return x;
+    return scaled(before.physical(x));
+  }
+
+  /// Phi - I.
+  [[nodiscard]] constexpr Matrix<S, size, size> increment() const noexcept {
+    Matrix<S, size, size> step = Matrix<S, size, size>::Zero();
+    for (int i = 0; i < size; ++i) {
+      for (int j = 0; j < size; ++j) {
+        if (of_chain(i, j) > 0) {
+          step(i, j) = static_cast<S>(of_chain(i, j));
+        } else if (couples(i, j)) {
+          step(i, j) = step_[static_cast<std::size_t>(place(i, j))];
+        }
+      }
+    }
+    return step;
+  }
+  /// A state is T^degree / degree! times what it is in physical units.
+  [[nodiscard]] static constexpr int degree(int state) noexcept { return Shape::degree(state); }
+
+  /// True if u does the same in both.
+  [[nodiscard]] constexpr bool same_drive(const MatrixModel& other) const noexcept {
+    const S change = detail::absolute(S(scaled_input_gain_ - other.scaled_input_gain_)) +
+                     detail::absolute(S(rate_ - other.rate_));
+    return !(change > S(0));
+  }
+
+ protected:
+  /// @param input_gain b @param sample_time T, s
+  MatrixModel(const S& input_gain, const S& sample_time) noexcept
+      : rate_(S(1) / sample_time), input_gain_(input_gain), sample_time_(sample_time) {}
+
+  /// @param all Phi - I, and as last column Gamma of a u whose scaled effect b T^order / order! is
+  /// one
+  void set_step(const Matrix<S, size + 1, size + 1>& all) noexcept {
+    for (int i = 0; i < size; ++i) {
+      for (int j = 0; j <= size; ++j) {
+        if (!couples(i, j) || of_chain(i, j) > 0) continue;
+        step_[static_cast<std::size_t>(place(i, j))] =
+            j < size ? all(i, j) : all(i, j) * scaled_input_gain_;
+      }
+    }
+  }
+
+  static constexpr const auto& pattern = Shape::pattern;  ///< what is kept
+  /// Whether an element of Phi - I or (column N) Gamma is not zero.
+  static constexpr bool couples(int i, int j) noexcept {
+    return pattern.couples[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
+  }
+  static constexpr int of_chain(int i, int j) noexcept {
+    return pattern.chain[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
+  }
+  static constexpr int place(int i, int j) noexcept {
+    return pattern.place[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
+  }
+
+  Array<S, pattern.kept> step_{};  ///< Phi - I and Gamma, what is not zero
+  S rate_;                         ///< 1/T
+  S input_gain_;                   ///< b
+  S sample_time_;                  ///< T, s
+  S scaled_input_gain_{};          ///< b T^order / order!
+};
+
+}  // namespace esokit
