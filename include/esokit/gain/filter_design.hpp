@@ -107,8 +107,17 @@ class FilterDesign {
     if (!rules) return rules.error();
     const Array<S, N> units = scaled_units(plant, S(sqrt(unit)));
     const auto in_law = [&units](const char* field, const Covariance& p) {
+      // The config is by rows of the estimate; the law has the model's states.
+      Covariance of_states;
+      Array<S, N> units_of_states;
+      for (int i = 0; i < N; ++i) {
+        units_of_states[index(PlantModel::state_of_row(i))] = units[index(i)];
+        for (int j = 0; j < N; ++j) {
+          of_states(PlantModel::state_of_row(i), PlantModel::state_of_row(j)) = p(i, j);
+        }
+      }
       return factored<N, S>(
-          field, p, units.data(),
+          field, of_states, units_of_states.data(),
           "in the scaling T^2r / r!^2 and divided by R is a variance that the scalar cannot hold",
           "must be positive semidefinite", N * N - 1);
     };

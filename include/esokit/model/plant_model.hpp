@@ -7,8 +7,7 @@
 #include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/type_tag.hpp>
-#include <esokit/math/linear_equations.hpp>
-#include <esokit/math/matrix_exponential.hpp>
+#include <esokit/math/dense.hpp>
 #include <esokit/model/linear_plant.hpp>
 #include <esokit/model/matrix_model.hpp>
 #include <limits>
