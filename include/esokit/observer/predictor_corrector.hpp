@@ -705,6 +705,16 @@ class PredictorCorrector {
       return each_lane(
           [&](Plain& lane, int i) { return lane.update_advanced(y[i], u_applied[i]); });
     } else {
+      if constexpr (has_squares) {
+        if (gap_ == 0) {  // only too large for its squares, perhaps
+          Correction step{predicted_levels(u_applied)};
+          if (correct_levels<true>(step, y, 1u) && is_finite(probe(step.states))) {
+            commit(step);
+            applied_input_ = u_applied;
+            return StepStatus::ok;
+          }
+        }
+      }
       const StepStatus predicted = predict_guarded(u_applied);
       return predicted | correct(y);
     }
