@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <esokit/identify/identify.hpp>
 #include <esokit/sim/gaussian.hpp>
@@ -307,6 +308,86 @@ TEST(PrepareLog, BringsJitteryStampsToOneSampleTime) {
   }
   // The last row and what is left of a row are not in it.
   EXPECT_NEAR(found, area, 2 * 6 * T);
+}
+
+// A long log is read in twenty stretches, none across a gap.
+TEST(PrepareLog, ReadsALongLogInStretches) {
+  esokit::FitData data;
+  data.sample_time = T;
+  data.columns.resize(1);
+  for (int k = 0; k < 10000; ++k) {
+    data.u.push_back(k);
+    data.y.push_back(2 * k);
+    data.columns[0].push_back(3 * k);
+  }
+  data.starts = {0, 1030, 4000};
+  EXPECT_EQ(esokit::excerpt(data, 10000).y.size(), 10000u);
+  const auto part = esokit::excerpt(data, 2000);
+  ASSERT_EQ(part.y.size(), 2000u);
+  // 20 stretches of 100 rows from every 500th; the third has the gap at 1030, the ninth begins at
+  // the one at 4000.
+  ASSERT_EQ(part.starts.size(), 21u);
+  EXPECT_EQ(part.starts[2], 200u);
+  EXPECT_EQ(part.starts[3], 230u);
+  EXPECT_EQ(part.starts[9], 800u);
+  EXPECT_EQ(part.u[230], 1030);
+  EXPECT_EQ(part.y[230], 2060);
+  EXPECT_EQ(part.columns[0][230], 3090);
+}
+
+TEST(PrepareLog, AveragesWithinPieces) {
+  esokit::FitData data;
+  data.sample_time = T;
+  for (int k = 0; k < 11; ++k) {
+    data.u.push_back(k);
+    data.y.push_back(k * k);
+  }
+  data.starts = {0, 5};
+  const auto means = esokit::averaged(data, 4);
+  EXPECT_EQ(means.sample_time, 4 * T);
+  EXPECT_EQ(means.averaged, 4);
+  ASSERT_EQ(means.u.size(), 2u);
+  EXPECT_EQ(means.starts, (std::vector<std::size_t>{0, 1}));
+  EXPECT_EQ(means.u[0], 1.5);
+  EXPECT_EQ(means.u[1], 6.5);
+  EXPECT_EQ(means.y[1], (25 + 36 + 49 + 64) / 4.0);
+}
+
+// Tables: 2.093 for 19, 2.262 for 9.
+TEST(Intervals, StudentsT) {
+  EXPECT_NEAR(esokit::student_95(19), 2.0930, 5e-4);
+  EXPECT_NEAR(esokit::student_95(9), 2.2622, 5e-3);
+}
+
+// For a mean of white noise the jackknife is the standard error; here b0 is read off innovations
+// that are nearly white, over seeds as it says itself.
+TEST(Intervals, TheJackknifeIsTheSpreadOverSeeds) {
+  double mean = 0, square = 0, error = 0;
+  constexpr int seeds = 40;
+  for (int seed = 0; seed < seeds; ++seed) {
+    // y' = 2 u + walk, white noise.
+    esokit::sim::Gaussian gaussian(static_cast<std::uint64_t>(seed));
+    esokit::FitData data;
+    data.sample_time = T;
+    double y = 0, walk = 0;
+    for (int k = 0; k < 2000; ++k) {
+      const double u = std::sin(0.07 * k) + (k / 60 % 2 == 0 ? 1 : -1);
+      data.u.push_back(u);
+      data.y.push_back(y + 0.01 * gaussian.next());
+      y += T * (2 * u + walk);
+      walk += 0.05 * gaussian.next();
+    }
+    esokit::InnovationsFit fit(data, {1, 1, false}, {1, 300, 1e-4, 0.03, 0.5});
+    const esokit::Fit found = fit.minimise({10, 1e-3, 0.5, 0}, true);
+    const double b = found.linear[0];
+    mean += b / seeds;
+    square += b * b / seeds;
+    error += esokit::jackknife(fit, found, true).linear[0] / seeds;
+  }
+  const double spread = std::sqrt((square - mean * mean) * seeds / (seeds - 1));
+  EXPECT_NEAR(mean, 2, 4 * spread / std::sqrt(seeds));
+  // A spread over 40 seeds is known to 11 %: three times that.
+  EXPECT_NEAR(error / spread, 1, 0.34);
 }
 
 TEST(Study, RefusesBadOptions) {

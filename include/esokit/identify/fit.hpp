@@ -30,6 +30,7 @@ struct FitData {
   std::vector<double> u;               ///< input, held from its row to the next
   std::vector<double> y;               ///< output, measured at its row
   std::vector<std::size_t> starts{0};  ///< first rows of pieces without a gap
+
   /// What acts where the disturbance acts, each as long as y: friction, a load that is known.
   std::vector<std::vector<double>> columns{};
   int averaged =
@@ -69,8 +70,10 @@ struct Fit {
 
 /// Least and largest of what is fitted.
 struct FitBounds {
-  double bandwidth_min = 0.0, bandwidth_max = 0.0;  ///< rad/s
-  double latency_min = 0.0, latency_max = 0.0;      ///< s
+  double bandwidth_min = 0.0;  ///< of w, rad/s
+  double bandwidth_max = 0.0;  ///< of w, rad/s
+  double latency_min = 0.0;    ///< of tau + L, s
+  double latency_max = 0.0;  ///< of tau + L, s; so many rows of a piece only fill lag and dead time
   double pole_latency = 0.5;  ///< largest a (tau + L): beyond, pole and lag swap
 };
 
@@ -341,6 +344,7 @@ struct InnovationsFilter {
 /// Holds a reference to the data.
 class InnovationsFit {
  public:
+  /// Of `data`, which must outlive it.
   InnovationsFit(const FitData& data, const FitModel& model, const FitBounds& bounds)
       : data_(data),
         model_(model),
@@ -414,8 +418,8 @@ class InnovationsFit {
   /// Derivatives of the innovations by the free parameters, then by the linear ones, and which
   /// parameters are free: 0 log w, 1 log(tau + L), 2 share squared, 3 a (tau + L).
   struct Sensitivities {
-    std::vector<std::vector<double>> columns;
-    std::vector<int> free;
+    std::vector<std::vector<double>> columns;  ///< one a parameter, each as long as the log
+    std::vector<int> free;                     ///< which parameters the first of them belong to
   };
 
   /// At a fit that `at` or `minimise` gave last. Parameters at a bound are not free.

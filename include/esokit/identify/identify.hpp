@@ -27,6 +27,7 @@ struct IdentifyOptions {
   bool pole = true;                  ///< whether a known pole is looked for
   int averaged = 0;                  ///< rows to average; 0: chosen from the innovations
   std::size_t rows_max = 60000;      ///< of a longer log so many rows are used, evenly spread
+
   /// Whether u is what the actuator held. A command beyond the limits is not.
   bool applied = true;
   double interval_max = 0.1;     ///< widest half interval of b0, share of b0
@@ -39,8 +40,8 @@ struct IdentifyOptions {
 
 /// The best fit of one order.
 struct OrderFit {
-  FitModel model{};
-  Fit fit{};
+  FitModel model{};             ///< n, m and whether it has a pole
+  Fit fit{};                    ///< where the innovations are least
   double friction_scale = 0.0;  ///< v_s, 0 without friction
   double criterion = 0.0;       ///< rows log(mean square) + parameters log(rows): the least wins
   double correlation = 0.0;     ///< largest of the innovations' over lags 1 to 20
@@ -277,6 +278,7 @@ inline constexpr double interval_widening = 1.6;
   std::vector<OrderFit> best_orders;
   const OrderFit* best = nullptr;
   double best_correlation = std::numeric_limits<double>::infinity();
+  double raw_noise = 0.0;
   for (const int fold : folds) {
     FitData rows = averaged(raw, fold);
     if (rows.y.size() < 200) break;
@@ -287,6 +289,7 @@ inline constexpr double interval_widening = 1.6;
         orders.begin(), orders.end(),
         [](const OrderFit& a, const OrderFit& b) { return a.criterion < b.criterion; });
     const std::size_t index = static_cast<std::size_t>(winner - orders.begin());
+    if (fold == 1 && winner->correlation < 0.3) raw_noise = winner->fit.noise;
     // Averaging costs what is fast: only if it helps a lot.
     if (winner->correlation < options.correlation_max ||
         winner->correlation < 0.5 * best_correlation) {
@@ -321,6 +324,11 @@ inline constexpr double interval_widening = 1.6;
   const double rows_averaged = std::sqrt(static_cast<double>(result.averaged));
   const double t = student_95(19);
   result.noise = {likely.noise * rows_averaged, t * likely_errors.noise * rows_averaged};
+  // Means tell noise from what else is fast less well than the rows do, if those are nearly white.
+  if (result.averaged > 1 && raw_noise > 0.0) {
+    result.noise.half_width *= raw_noise / result.noise.value;
+    result.noise.value = raw_noise;
+  }
   result.plateau = find_plateau(fit, likely);
   if (options.progress) options.progress(0.9);
   if (result.plateau.points.size() < 3) {

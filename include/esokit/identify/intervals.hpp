@@ -21,6 +21,7 @@ struct Estimate {
   double half_width = 0.0;  ///< the interval is value - half_width .. value + half_width
   [[nodiscard]] double low() const { return value - half_width; }   ///< lower end
   [[nodiscard]] double high() const { return value + half_width; }  ///< upper end
+
   /// Half width over magnitude.
   [[nodiscard]] double share() const { return half_width / std::abs(value); }
 };

@@ -20,6 +20,7 @@ struct Log {
   std::vector<double> u{};     ///< input that the actuator held from its row to the next
   std::vector<double> y{};     ///< output
   double sample_time = 0.0;    ///< T, s, where there are no stamps
+
   /// Clock jitter where there are no stamps, standard deviation, s.
   double jitter = 0.0;
   /// What else acts where the disturbance acts (sin y of a pendulum, a known load): each as long as
@@ -44,8 +45,8 @@ struct LogReport {
 
 /// Rows at one sample time, and the report on the log.
 struct PreparedLog {
-  FitData data{};
-  LogReport report{};
+  FitData data{};      ///< what is fitted
+  LogReport report{};  ///< what was found on the way
 };
 
 namespace detail {

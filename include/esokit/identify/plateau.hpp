@@ -19,8 +19,8 @@ namespace esokit {
 
 /// The fit at one bandwidth.
 struct PlateauPoint {
-  Fit fit{};
-  FitErrors errors{};
+  Fit fit{};              ///< with w as given
+  FitErrors errors{};     ///< of the fit
   bool at_bound = false;  ///< a parameter came to the end of its range
 };
 
