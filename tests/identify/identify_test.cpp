@@ -116,6 +116,7 @@ TEST(Identify, RefusesALogWithoutExcitation) {
   for (const std::uint64_t seed : {1u, 2u, 3u}) {
     const auto found = esokit::identify(closed_loop(0, seed), quick());
     ASSERT_FALSE(found) << seed;
+    EXPECT_STREQ(found.error().field, "own_input");
   }
   Log still = closed_loop(1);
   for (double& u : still.u) u = 0.25;
@@ -162,6 +163,11 @@ TEST(Judge, RefusesByName) {
   bad.log.saturated = 0.49;
   EXPECT_STREQ(field(bad, log, commanded), "");
   bad = good;
+  bad.own_input = 0.9e-5;
+  EXPECT_STREQ(field(bad, log), "own_input");
+  bad.own_input = 1.1e-5;
+  EXPECT_STREQ(field(bad, log), "");
+  bad = good;
   bad.excitation = 0.151;
   EXPECT_STREQ(field(bad, log), "excitation");
   bad.excitation = 0.149;
@@ -187,8 +193,8 @@ TEST(Judge, RefusesByName) {
   EXPECT_STREQ(field(bad, log), "");
   // A number that is none is no reason to trust.
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  for (double* value : {&bad.excitation, &bad.correlation, &bad.plateau.spread, &bad.friction_shift,
-                        &bad.input_gain.half_width, &bad.log.jitter}) {
+  for (double* value : {&bad.own_input, &bad.excitation, &bad.correlation, &bad.plateau.spread,
+                        &bad.friction_shift, &bad.input_gain.half_width, &bad.log.jitter}) {
     bad = good;
     *value = nan;
     EXPECT_STRNE(field(bad, log), "");

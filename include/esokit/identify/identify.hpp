@@ -66,6 +66,7 @@ struct Identified {
   int averaged = 1;                ///< rows of the log that were averaged
   bool at_bound = false;           ///< a parameter came to the end of its range at the plateau
   double excitation = 0;           ///< standard error of b0 over b0 where it is least
+  double own_input = 1;            ///< share of u that y and the row before do not explain
   LogReport log{};                 ///< what the log shows by itself
   Plateau plateau{};               ///< b0 over the bandwidth
   std::vector<OrderFit> orders{};  ///< each order's best fit, by order
@@ -101,6 +102,37 @@ inline double innovations_correlation(const std::vector<double>& e) {
     largest = std::max(largest, std::abs(sum / square));
   }
   return largest;
+}
+
+/// Share of u that a law of y_k, y_(k-1), u_(k-1) does not explain: 0 where u is a controller's and
+/// its reference never moves.
+inline double own_input(const FitData& data) {
+  const std::size_t rows = data.u.size();
+  std::vector<std::vector<double>> columns(4, std::vector<double>(rows, 0.0));
+  std::vector<double> right(rows, 0.0);
+  double mean_u = 0.0, mean_y = 0.0;
+  for (std::size_t k = 0; k < rows; ++k) {
+    mean_u += data.u[k] / static_cast<double>(rows);
+    mean_y += data.y[k] / static_cast<double>(rows);
+  }
+  for (std::size_t k = 1; k < rows; ++k) {
+    right[k] = data.u[k] - mean_u;
+    columns[0][k] = 1.0;
+    columns[1][k] = data.y[k] - mean_y;
+    columns[2][k] = data.y[k - 1] - data.y[k];
+    columns[3][k] = data.u[k - 1] - mean_u;
+  }
+  std::vector<double> normal, law;
+  InnovationsFit::normal_equations(columns, right, normal, law);
+  solve_normal(normal, law, 4);
+  double left = 0.0, all = 0.0;
+  for (std::size_t k = 1; k < rows; ++k) {
+    double rest = right[k];
+    for (std::size_t c = 0; c < 4; ++c) rest -= law[c] * columns[c][k];
+    left += rest * rest;
+    all += right[k] * right[k];
+  }
+  return std::sqrt(left / all);
 }
 
 /// Slope (derivative 1) or value (0) of a parabola through 2 half + 1 rows, at each row.
@@ -272,6 +304,7 @@ inline constexpr double interval_widening = 1.6;
   const auto [lowest, highest] = std::minmax_element(raw.y.begin(), raw.y.end());
   if (!(*highest > *lowest))
     return E{"y", *lowest, "never changes: record a log in which the output moves"};
+  result.own_input = detail::own_input(raw);
   std::vector<int> folds = {1, 4, 8, 16};
   if (options.averaged > 0) folds = {options.averaged};
   FitData data;
@@ -401,6 +434,9 @@ inline constexpr double interval_widening = 1.6;
                 "of T without stamps is above 0.05: record the time of each row");
   rules.require(options.applied || found.log.saturated < 0.5, "saturated", found.log.saturated,
                 "of the rows have u at its limits: record what the actuator held");
+  rules.require(found.own_input > 1e-5, "own_input", found.own_input,
+                "of u is not a law of y alone: nothing from outside excites the loop; record a "
+                "reference that moves");
   const bool excited = found.plateau.points.size() >= 3 && found.excitation < 0.15;
   rules.require(
       excited, "excitation", found.plateau.points.size() >= 3 ? found.excitation : 1.0,
