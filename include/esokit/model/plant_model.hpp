@@ -169,7 +169,8 @@ class LinearPlantModel : public MatrixModel<detail::DenseShape<Order, States + C
     const S unit = this->scaled_disturbance(S(1));
     int row = Order + 1;
     for (int j = 0; j < N; ++j) {
-      if (!taken[static_cast<std::size_t>(j)]) rows(row++, j) = unit;
+      // Fewer pivots than rows, where they depend on each other: no inverse then, and no make.
+      if (!taken[static_cast<std::size_t>(j)] && row < N) rows(row++, j) = unit;
     }
 
     // rows (e^A - I) rows^-1 from behind: rows' X' = (rows E)'.
