@@ -106,7 +106,7 @@ template <int Size, PlainScalar S>
 PoleFactors<Size, S> pole_factors(const SampledPoleSet<Size, S>& poles) noexcept {
   PoleFactors<Size, S> factors;
   factors.decay = S(1e3);
-  for (const auto& a : poles.contractions) factors.unit = (std::max)(factors.unit, std::abs(a));
+  for (const auto& a : poles.contractions) factors.unit = (std::max)(factors.unit, (std::abs)(a));
   std::size_t pair = 0;
   bool waits = false;
   S real{};

@@ -14,6 +14,7 @@
 #pragma once
 
 #include <cmath>
+#include <esokit/core/lanes.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/scalar.hpp>
 #include <esokit/math/combinatorics.hpp>
