@@ -4,6 +4,7 @@
 
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/scalar.hpp>
+#include <esokit/core/unroll.hpp>
 
 namespace esokit {
 
