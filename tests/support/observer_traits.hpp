@@ -51,6 +51,11 @@ enum class Law {
 /// - `field`: config member that sets the poles, as an error names it
 /// - `level_poles(config)`: continuous poles of the error, level by level, 1/s
 /// - `slowest`, `fastest`: the range of abs(Re p) / omega over all levels
+/// - `degree(r)`: estimate r is scaled by T^degree / degree!; left out where that is r, as of a
+/// chain
+/// - `unknown_amplitude(config, nu)`: of what has to be estimated while y = sin(nu t) without
+/// input,
+///   unit of y^(n); left out where that is y^(n)
 /// - `excuse(law)`: nullptr, or why the law does not apply
 template <class Observer>
 struct ObserverTraits;

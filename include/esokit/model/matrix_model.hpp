@@ -126,7 +126,7 @@ class MatrixModel {
   [[nodiscard]] ESOKIT_INLINE constexpr S physical(const State& x) const noexcept {
     constexpr int state = state_of_row(Row);
     S value = std::get<state>(x);
-    // In steps: T^-degree itsemeasured_rows may not fit the scalar where the estimate does.
+    // In steps: T^-degree itself may not fit the scalar where the estimate does.
     detail::unroll<degree(state)>([&](auto j) ESOKIT_INLINE_LAMBDA {
       constexpr double weight = degree(state) - j;
       value = value * (detail::constant<S>(weight) * rate_);
