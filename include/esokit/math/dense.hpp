@@ -147,7 +147,7 @@ constexpr T sum_of_magnitudes(const T* values, int count) noexcept {
 
 /// P = sum_k A^k Q A'^k with A = I + e, that is P = A P A' + Q, by doubling (Smith's method
 /// squared): P_{j+1} = P_j + A^(2^j) P_j A'^(2^j). Squaring the difference, (I + e)^2 - I = 2 e +
-/// e^2, loses no digits of slow poles. False if the sum does not end.
+/// e^2, loses no digits of slow poles. False if the sum does not end; P may be beyond the scalar.
 /// @param e n x n, is overwritten @param p Q at first, P in the end @param work1, work2 n x n
 template <class T>
 bool sum_by_doubling(T* e, T* p, T* work1, T* work2, int n) noexcept {
@@ -167,13 +167,14 @@ bool sum_by_doubling(T* e, T* p, T* work1, T* work2, int n) noexcept {
       }
     }
     // What is left out is size^2 times the term that was just added.
-    if (size * size < T(1e-4) * rounding<T>()) return is_finite(row_norm(p, n));
+    if (size * size < T(1e-4) * rounding<T>()) return true;
     for (int i = 0; i < n * n; ++i) e[i] = work1[i];
   }
   return false;
 }
 
-/// X = F X F' + W for a stable F, X being W at first; nothing if F is not stable.
+/// X = F X F' + W for a stable F, X being W at first; nothing if F is not stable, or if the scalar
+/// cannot hold X.
 template <int Size, Scalar S>
 std::optional<Matrix<S, Size, Size>> solve_stein(Matrix<S, Size, Size> f, Matrix<S, Size, Size> x) {
   for (int i = 0; i < Size; ++i) f(i, i) = f(i, i) - S(1.0);
@@ -181,6 +182,7 @@ std::optional<Matrix<S, Size, Size>> solve_stein(Matrix<S, Size, Size> f, Matrix
   if (!sum_by_doubling(f.data(), x.data(), work.data(), work.data() + Size * Size, Size)) {
     return std::nullopt;
   }
+  if (!is_finite(row_norm(x.data(), Size))) return std::nullopt;
   return x;
 }
 
