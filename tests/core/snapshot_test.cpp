@@ -20,6 +20,7 @@
 #include <esokit/core/snapshot_text.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/gain/pole_set.hpp>
+#include <esokit/model/augmented_model.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
@@ -35,6 +36,12 @@
 namespace {
 
 using namespace esokit;
+
+/// A model in a filter, and another of as many states.
+using SwingModel = AugmentedModel<ModelParts{.order = 2, .resonators = 1}, float>;
+using SwingFilter = ExtendedStateFilter<2, float, 3, NoNominalModel, 0, SwingModel>;
+using SensorModel = AugmentedModel<ModelParts{.order = 2, .sensor = 2}, float>;
+using SensorFilter = ExtendedStateFilter<2, float, 3, NoNominalModel, 0, SensorModel>;
 
 template <class Observer>
 void expect_same_life(Observer made) {
@@ -122,6 +129,22 @@ TEST(Snapshot, FilterRecursiveAndFrozen) {
   expect_same_life(Filter::make(config).value());
   config.mode = RiccatiMode::frozen;
   expect_same_life(Filter::make(config).value());
+
+  SwingFilter::Config swing;
+  swing.input_gain = 3.0f;
+  swing.sample_time = 1e-2f;
+  swing.measurement_variance = 1e-4f;
+  swing.disturbance_bounds = {0.0f, 0.0f, 10.0f, 1.0f, 1.0f};
+  swing.inflation = 0.5f;
+  swing.plant_model.resonators[0].frequency = 20.0f;
+  eigen(swing.initial_covariance).diagonal() << 1.0f, 1e2f, 1e4f, 1e4f, 1e4f;
+  expect_same_life(SwingFilter::make(swing).value());
+  swing.mode = RiccatiMode::frozen;
+  const auto frozen = SwingFilter::make(swing).value();
+  expect_same_life(frozen);
+  // Words of another model, as large.
+  static_assert(sizeof(SensorFilter) == sizeof(SwingFilter));
+  EXPECT_FALSE(from_snapshot<SensorFilter>(snapshot(frozen)));
 }
 
 TEST(Snapshot, Controllers) {
@@ -194,11 +217,11 @@ TEST(Snapshot, EveryTypeHasATagOfItsOwn) {
            AlgebraicEso<2, float>, AlgebraicFilter<2, float>, AdjustableBandwidthEso<2, float>,
            AdjustableBandwidthEso<2, float, 1, SignReading::printed>, NonlinearEso<2, float>,
            NonlinearEso<2, float, 2, FalGain<float>>, ExtendedStateFilter<2, float>,
-           ExtendedStateFilter<2, float, 1, NoNominalModel, 8>, DelayedInput<Eso, 3>,
-           DelayedInput<Eso, 4>, WrappedOutput<Eso>, VariableTime<Eso>,
-           KnownModel<Eso, KnownPoles<2, float>>, WrappedOutput<DelayedInput<Eso, 3>>,
-           DelayedInput<WrappedOutput<Eso>, 3>, PredictorCorrector<2, float, 1, Gain>,
-           PredictorCorrector<2, float, 1, Gain, 2>,
+           ExtendedStateFilter<2, float, 1, NoNominalModel, 8>, SwingModel, SensorModel,
+           SwingFilter, SensorFilter, DelayedInput<Eso, 3>, DelayedInput<Eso, 4>,
+           WrappedOutput<Eso>, VariableTime<Eso>, KnownModel<Eso, KnownPoles<2, float>>,
+           WrappedOutput<DelayedInput<Eso, 3>>, DelayedInput<WrappedOutput<Eso>, 3>,
+           PredictorCorrector<2, float, 1, Gain>, PredictorCorrector<2, float, 1, Gain, 2>,
            PredictorCorrector<2, float, 1, AlgebraicGain<3, float>>,
            PredictorCorrector<2, float, 1, RiccatiGain<3, float>>,
            PredictorCorrector<2, float, 1, SwitchedGain<3, float>>,
