@@ -1,4 +1,4 @@
-// ADRC on a servo within its limits: a step, then a load that the controller knows nothing of.
+// ADRC on a servo within its limits: a step, then a load unknown to the controller.
 #include <cmath>
 #include <cstdio>
 #include <esokit/sim/run.hpp>
