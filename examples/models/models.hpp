@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cmath>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -78,9 +79,11 @@ inline std::string or_unstable(double number, int digits) {
   return std::isnan(number) ? "unstable" : number_text(number, digits);
 }
 
-/// What a loop costs: u's standard deviation for noise of 1 on y, and its margins.
+/// What a loop costs: u's standard deviation for noise of 1 on y, and its margins. NaN where the
+/// loop is not stable and has none.
 struct Price {
-  double noise = NAN, modulus = NAN, delay = NAN;
+  static constexpr double none = std::numeric_limits<double>::quiet_NaN();
+  double noise = none, modulus = none, delay = none;
 };
 template <class Plant, class Controller>
 Price price_of(const Plant& plant, const Controller& controller) {

@@ -159,12 +159,12 @@ void gyro_filter(Report& report) {
       "The rate itself after a load step, gyro filter of 5 ms: both loops bear 5 ms more delay. "
       "With the filter in the model the observer may be twice as fast, and the load moves the rate "
       "half as far; what is estimated is the rate, not what the filter shows of it.");
-  for (const auto& [lag, low, high, ratio] :
+  for (const auto& [tau, low, high, ratio] :
        {std::array{0.002, 174.0, 238.0, 1.4}, std::array{0.005, 132.0, 264.0, 2.0},
         std::array{0.010, 100.0, 264.0, 2.6}}) {
-    const double tau = lag;
+    const double lag = tau;
     const auto ignoring = [](double w) { return plain(w / 2, w); };
-    const auto knowing = [&](double w) { return gyro(w, tau); };
+    const auto knowing = [&](double w) { return gyro(w, lag); };
     const double ignored = highest_bandwidth(lag, delay, ignoring);
     const double known = highest_bandwidth(lag, delay, knowing);
     const std::string name = "gyro filter " + number_text(1000 * lag, 2) + " ms";
