@@ -94,10 +94,13 @@ void scan(const Response& response, const ScanRange& range, Visit&& visit) {
   const auto go_to = [&](double w2) {
     // Poles that differ by rounding are one feature.
     if (!(w2 > w1 * (1.0 + 1e-7)) || w2 > range.to) return;
-    const int pieces = 2 + static_cast<int>(std::ceil(30.0 * std::log10(w2 / w1)));
     const double start = w1;
+    // By its root, as the quotient of what the scalar holds may be beyond it.
+    const double root = std::sqrt(w2) / std::sqrt(start);
+    const int pieces = 2 + static_cast<int>(std::ceil(60.0 * std::log10(root)));
     for (int i = 1; i <= pieces; ++i) {
-      const double w = i == pieces ? w2 : start * std::pow(w2 / start, double(i) / pieces);
+      const double part = std::pow(root, double(i) / pieces);
+      const double w = i == pieces ? w2 : start * part * part;
       const std::complex<double> l = response(w);
       if (is_finite(l.real()) && is_finite(l.imag())) {
         scan_piece(response, w1, l1, w, l, 14, visit);

@@ -225,13 +225,16 @@ class MatrixModel {
   }
 
   static constexpr const auto& pattern = Shape::pattern;  ///< what is kept
+
   /// Whether an element of Phi - I or (column N) Gamma is not zero.
   static constexpr bool couples(int i, int j) noexcept {
     return pattern.couples[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
   }
+  /// What of an element is the chain's own, known when compiling.
   static constexpr int of_chain(int i, int j) noexcept {
     return pattern.chain[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
   }
+  /// Where among the kept ones an element is.
   static constexpr int place(int i, int j) noexcept {
     return pattern.place[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
   }

@@ -46,7 +46,11 @@ class NamedObserver : public Base {
   /// @return the observer, a sampled one at rest in zero, or an error that names the field
   template <class O = Self>
   static Expected<Self, Error<scalar_type>> make(const typename O::Config& config) {
-    if constexpr (!sampled) {
+    if constexpr (Base::order < 1) {
+      // Nothing else is instantiated: what follows from it would hide the sentence.
+      static_assert(Base::order >= 1, "esokit: the plant order must be at least 1");
+      return Error<scalar_type>{};
+    } else if constexpr (!sampled) {
       if (Rules<scalar_type> rules; !rules.nonzero("input_gain", config.input_gain))
         return rules.error();
       const auto laws = O::design(config);
