@@ -282,6 +282,20 @@ TEST(Found, AnalysisAnswersWithANumberOrAnError) {
   EXPECT_GT(errors, 10);
 }
 
+TEST(Found, MarginsOfAPlantWithNextToNoGainAreNumbers) {
+  const auto observer =
+      esokit::ContinuousLinearEso<2>::make({.observer_bandwidth = 12, .input_gain = 3}).value();
+  const auto law = esokit::AdrcLaw<2>::make({.controller_bandwidth = 7, .input_gain = 3}).value();
+  for (const double b : {1e-300, 1e-310, 1e-320}) {
+    const auto plant =
+        esokit::LinearPlant<2>::chain({.coefficients = {0.007, 4.9}, .input_gain = b});
+    const auto found = margins(plant.value(), esokit::ObserverWithLaw{observer, law});
+    ASSERT_TRUE(found) << b;
+    EXPECT_NEAR(found->modulus.value, 1.0, 1e-9) << b;
+    EXPECT_FALSE(std::isnan(found->phase.value) || std::isnan(found->gain_increase.value)) << b;
+  }
+}
+
 TEST(Found, ErrorBoundsAreNumbers) {
   const auto bound = esokit::linear_error_bound<3>({2, 1}, {5, 1e-3}).value();
   EXPECT_TRUE(bound.convergence_time({1, 2, 3}));

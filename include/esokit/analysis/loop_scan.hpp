@@ -62,7 +62,7 @@ inline ScanRange scan_range(const Loop& loop, int channel) {
   }
   range.from = 1e-3 * slowest;
   range.to = T > 0.0 ? std::numbers::pi / T : 1e3 * fastest;
-  range.from = std::min(range.from, 1e-3 * range.to);
+  range.from = std::max(std::min(range.from, 1e-3 * range.to), std::numeric_limits<double>::min());
   std::sort(range.features.begin(), range.features.end());
   return range;
 }
@@ -103,7 +103,9 @@ void scan(const Response& response, const ScanRange& range, Visit&& visit) {
       const double w = i == pieces ? w2 : start * part * part;
       const std::complex<double> l = response(w);
       if (is_finite(l.real()) && is_finite(l.imag())) {
-        scan_piece(response, w1, l1, w, l, 14, visit);
+        if (is_finite(l1.real()) && is_finite(l1.imag())) {
+          scan_piece(response, w1, l1, w, l, 14, visit);
+        }
         w1 = w;
         l1 = l;
       }
