@@ -402,6 +402,17 @@ TEST(PackOfANonlinearFeedback, IsItsLanes) {
   EXPECT_STREQ(refused.error().field, "exponents");
 }
 
+TEST(LaneByLane, AdoptsEachLaneFromItsOwn) {
+  auto adopting = GatedAngle::Type<S>::make(GatedAngle::config<S>(0, false)).value();
+  const auto fresh = GatedAngle::Type<S>::make(GatedAngle::config<S>(0, true)).value();
+  ASSERT_TRUE(adopting.adopt(fresh));
+  for (int i = 0; i < lane_count<S>; ++i) {
+    EXPECT_NE(fresh[i].period(), fresh[1 - i].period());
+    EXPECT_EQ(adopting[i].period(), fresh[i].period());
+    EXPECT_EQ(adopting[i].input_gain(), fresh[i].input_gain());
+  }
+}
+
 TEST(LaneByLane, NamesTheLaneOfAnError) {
   auto config = GatedAngle::config<S>(0, false);
   auto made = GatedAngle::Type<S>::make(config);

@@ -35,6 +35,25 @@ TEST(SolvePositive, EachColumnOfItsOwn) {
   }
 }
 
+/// x = f x f + w has the solution w / (1 - f^2); summed to the last digits, and a sum that the
+/// scalar cannot hold, or that does not end, is none.
+TEST(SolveStein, SumsToTheLastDigits) {
+  const auto solved = [](double f, double w) {
+    return esokit::detail::solve_stein<1, double>(esokit::Matrix<double, 1, 1>(f),
+                                                  esokit::Matrix<double, 1, 1>(w));
+  };
+  for (const double f : {0.0, 0.5, -0.9, 0.99, 0.9999}) {
+    const double x = 3.0 / ((1.0 - f) * (1.0 + f));
+    ASSERT_TRUE(solved(f, 3.0)) << f;
+    // The difference to one is what is squared: 1 - f has its digits.
+    EXPECT_NEAR((*solved(f, 3.0))(0), x, 32 * std::numeric_limits<double>::epsilon() * x) << f;
+  }
+  EXPECT_FALSE(solved(1.0, 3.0));
+  EXPECT_FALSE(solved(-1.01, 3.0));
+  EXPECT_TRUE(solved(0.5, 1e308));
+  EXPECT_FALSE(solved(0.9, 1e308));
+}
+
 /// Gain of the recursion on dense matrices in 100 digits, in Nordsieck scaling, run until it stands
 /// still.
 std::vector<Big> reference_limit(const std::vector<double>& q, double r, double theta) {

@@ -245,35 +245,54 @@ struct LinearPlant {
   }
 };
 
+namespace detail {
+
+/// The plant with `More` states of first order behind its own; `connect(bigger, rate)` wires them.
+template <int More, int States, Scalar S, int Inputs, int Outputs, class Connect>
+constexpr Expected<LinearPlant<States + More, S, Inputs, Outputs>, Error<S>> with_first_order(
+    const LinearPlant<States, S, Inputs, Outputs>& plant, const S& time_constant,
+    const Connect& connect) {
+  Rules<S> rules;
+  rules.all_of(plant.check())
+      .positive("time_constant", time_constant)
+      .invertible("time_constant", time_constant);
+  if (!rules) return rules.error();
+  LinearPlant<States + More, S, Inputs, Outputs> bigger;
+  bigger.dead_time = plant.dead_time;
+  for (int i = 0; i < States; ++i) {
+    for (int j = 0; j < States; ++j) bigger.a(i, j) = plant.a(i, j);
+    for (int j = 0; j < Inputs; ++j) {
+      bigger.b(i, j) = plant.b(i, j);
+      bigger.e(i, j) = plant.e(i, j);
+    }
+    for (int j = 0; j < Outputs; ++j) bigger.c(j, i) = plant.c(j, i);
+  }
+  const S rate = S(1.0) / time_constant;
+  for (int j = States; j < States + More; ++j) bigger.a(j, j) = -rate;
+  connect(bigger, rate);
+  rules.require(bigger.check().has_value(), "time_constant", time_constant,
+                "gives a plant that the scalar cannot hold");
+  if (!rules) return rules.error();
+  return bigger;
+}
+
+}  // namespace detail
+
 /// The plant behind an actuator of first order, time_constant u_a' + u_a = u, one for each input.
 /// d enters behind it, as a load does. The new states come last: u_a.
 /// @param time_constant s
 template <int States, Scalar S, int Inputs, int Outputs>
 constexpr Expected<LinearPlant<States + Inputs, S, Inputs, Outputs>, Error<S>> with_lag(
     const LinearPlant<States, S, Inputs, Outputs>& plant, const S& time_constant) {
-  Rules<S> rules;
-  rules.all_of(plant.check())
-      .positive("time_constant", time_constant)
-      .invertible("time_constant", time_constant);
-  if (!rules) return rules.error();
-  LinearPlant<States + Inputs, S, Inputs, Outputs> lagged;
-  lagged.dead_time = plant.dead_time;
-  for (int i = 0; i < States; ++i) {
-    for (int j = 0; j < States; ++j) lagged.a(i, j) = plant.a(i, j);
+  return detail::with_first_order<Inputs>(plant, time_constant, [](auto& p, const S& rate) {
     for (int j = 0; j < Inputs; ++j) {
-      lagged.a(i, States + j) = plant.b(i, j);
-      lagged.e(i, j) = plant.e(i, j);
+      for (int i = 0; i < States; ++i) {
+        p.a(i, States + j) = p.b(i, j);
+        p.b(i, j) = S(0.0);
+      }
+      p.b(States + j, j) = rate;
     }
-    for (int j = 0; j < Outputs; ++j) lagged.c(j, i) = plant.c(j, i);
-  }
-  for (int j = 0; j < Inputs; ++j) {
-    lagged.b(States + j, j) = S(1.0) / time_constant;
-    lagged.a(States + j, States + j) = -lagged.b(States + j, j);
-  }
-  rules.require(lagged.check().has_value(), "time_constant", time_constant,
-                "gives a plant that the scalar cannot hold");
-  if (!rules) return rules.error();
-  return lagged;
+  });
 }
 
 /// The plant seen by a sensor of first order, time_constant y_s' + y_s = y, one for each output.
@@ -282,30 +301,15 @@ constexpr Expected<LinearPlant<States + Inputs, S, Inputs, Outputs>, Error<S>> w
 template <int States, Scalar S, int Inputs, int Outputs>
 constexpr Expected<LinearPlant<States + Outputs, S, Inputs, Outputs>, Error<S>> with_sensor(
     const LinearPlant<States, S, Inputs, Outputs>& plant, const S& time_constant) {
-  Rules<S> rules;
-  rules.all_of(plant.check())
-      .positive("time_constant", time_constant)
-      .invertible("time_constant", time_constant);
-  if (!rules) return rules.error();
-  LinearPlant<States + Outputs, S, Inputs, Outputs> seen;
-  seen.dead_time = plant.dead_time;
-  for (int i = 0; i < States; ++i) {
-    for (int j = 0; j < States; ++j) seen.a(i, j) = plant.a(i, j);
-    for (int j = 0; j < Inputs; ++j) {
-      seen.b(i, j) = plant.b(i, j);
-      seen.e(i, j) = plant.e(i, j);
+  return detail::with_first_order<Outputs>(plant, time_constant, [](auto& p, const S& rate) {
+    for (int j = 0; j < Outputs; ++j) {
+      for (int i = 0; i < States; ++i) {
+        p.a(States + j, i) = p.c(j, i) * rate;
+        p.c(j, i) = S(0.0);
+      }
+      p.c(j, States + j) = S(1.0);
     }
-  }
-  const S rate = S(1.0) / time_constant;
-  for (int j = 0; j < Outputs; ++j) {
-    for (int i = 0; i < States; ++i) seen.a(States + j, i) = plant.c(j, i) * rate;
-    seen.a(States + j, States + j) = -rate;
-    seen.c(j, States + j) = S(1.0);
-  }
-  rules.require(seen.check().has_value(), "time_constant", time_constant,
-                "gives a plant that the scalar cannot hold");
-  if (!rules) return rules.error();
-  return seen;
+  });
 }
 
 /// The plant with so much more dead time. @param dead_time s, zero or more
