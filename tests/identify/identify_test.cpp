@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -10,6 +11,8 @@
 #include <esokit/identify/identify.hpp>
 #include <esokit/sim/gaussian.hpp>
 #include <limits>
+#include <string>
+#include <utility>
 #include <vector>
 
 namespace {
@@ -139,6 +142,7 @@ TEST(Judge, RefusesByName) {
   Identified good;
   good.input_gain = {50, 2};
   good.plateau.points.resize(3);
+  good.plateau.middle = 1;
   good.plateau.spread = 0.1;
   good.excitation = 0.01;
   good.correlation = 0.1;
@@ -172,7 +176,7 @@ TEST(Judge, RefusesByName) {
   EXPECT_STREQ(field(bad, log), "excitation");
   bad.excitation = 0.149;
   EXPECT_STREQ(field(bad, log), "");
-  bad.plateau.points.resize(2);
+  bad.plateau.middle = 0;
   EXPECT_STREQ(field(bad, log), "excitation");
   bad = good;
   bad.correlation = 0.101;
@@ -239,6 +243,70 @@ TEST(PrepareLog, RefusesWhatCannotBeRead) {
   ASSERT_FALSE(back);
   EXPECT_STREQ(back.error().rule, "does not rise");
   EXPECT_EQ(back.error().index, 300);
+}
+
+TEST(PrepareLog, RefusesUnitsOfWhichAFitCannotTakeSquares) {
+  Log log = closed_loop(1, 3, 400);
+  log.columns.push_back(log.y);
+  const auto said = [](const Log& bad) -> std::string {
+    const auto prepared = esokit::prepare(bad);
+    return prepared ? "accepted"
+                    : std::string(prepared.error().field) + ": " + prepared.error().rule;
+  };
+  const char* const large = "is too large: write it in another unit";
+  const char* const little = "is all that it changes by: write it in another unit";
+  for (int which = 0; which < 3; ++which) {
+    const std::string field = which == 0 ? "u: " : which == 1 ? "y: " : "columns: ";
+    Log bad = log;
+    auto& values = which == 0 ? bad.u : which == 1 ? bad.y : bad.columns[0];
+    for (const double sign : {1.0, -1.0}) {
+      values[7] = sign * 1e60;
+      EXPECT_EQ(said(bad), "accepted");
+      values[7] = sign * 1.001e60;
+      EXPECT_EQ(said(bad), field + large);
+      values[7] = sign * std::numeric_limits<double>::max();
+      EXPECT_EQ(said(bad), field + large);
+    }
+    std::fill(values.begin(), values.end(), 0.0);
+    EXPECT_EQ(said(bad), "accepted");  // that it never changes is for the study to say
+    values[9] = 1.001e-60;
+    EXPECT_EQ(said(bad), "accepted");
+    values[9] = 0.999e-60;
+    EXPECT_EQ(said(bad), field + little);
+  }
+  for (const auto& [time, good] : {std::pair{1e-12, true}, std::pair{0.99e-12, false},
+                                   std::pair{1e12, true}, std::pair{1.01e12, false}}) {
+    Log slow = log;
+    slow.sample_time = time;
+    EXPECT_EQ(said(slow), good ? "accepted" : "sample_time: must be between 1e-12 s and 1e12 s");
+  }
+  // Stamps to the ends of the scalar, whose difference is beyond it.
+  for (int k = 0; k < 400; ++k) log.time.push_back(1.7e308 * (k / 199.5 - 1));
+  EXPECT_EQ(said(log), "time: does not rise");
+  // A gap of ages is a gap, however many rows it lacks.
+  for (std::size_t k = 0; k < 400; ++k) log.time[k] = static_cast<double>(k) * T;
+  log.time[399] = 1e300;
+  ASSERT_TRUE(esokit::prepare(log));
+  EXPECT_EQ(esokit::prepare(log)->report.missing, 1000000000000000u);
+}
+
+// What is too large for squares, and what leaves no three bandwidths to compare.
+TEST(Fit, WithoutAStepStaysWhereItIs) {
+  esokit::FitData data;
+  data.sample_time = T;
+  for (int k = 0; k < 300; ++k) {
+    data.u.push_back(k % 20 < 10 ? 1e200 : -1e200);
+    data.y.push_back(k % 30 < 15 ? 1e200 : -1e200);
+  }
+  const esokit::FitBounds bounds{5.0, 300.0, 0.05 * T, 20 * T, 0.5};
+  esokit::InnovationsFit fit(data, {2, 1, true}, bounds);
+  const auto found = fit.minimise({50.0, 3 * T, 0.7, 0.0}, true);
+  EXPECT_EQ(found.at.bandwidth, 50.0);
+  EXPECT_EQ(found.at.latency, 3 * T);
+  const auto plateau = esokit::find_plateau(fit, found);
+  EXPECT_GT(plateau.points.size(), 3u);
+  EXPECT_EQ(plateau.middle, 0u);
+  EXPECT_EQ(plateau.spread, std::numeric_limits<double>::infinity());
 }
 
 // A number that is none, in any column and at any place of the log, costs its row and nothing else.

@@ -386,12 +386,15 @@ class InnovationsFit {
         std::vector<double> change = right;
         detail::solve_normal(damped, change, all);
         std::array<double, 4> move{};
+        bool finite = true;
         for (int i = 0; i < count; ++i) {
+          finite = finite && is_finite(change[static_cast<std::size_t>(i)]);
           const int which = free[static_cast<std::size_t>(i)];
           move[static_cast<std::size_t>(which)] = std::clamp(
               -change[static_cast<std::size_t>(i)], -longest_step[static_cast<std::size_t>(which)],
               longest_step[static_cast<std::size_t>(which)]);
         }
+        if (!finite) break;  // more damping would not make it a step
         const FitPoint trial_point = moved(best.at, move);
         std::swap(residual_, kept_residual_);
         std::swap(columns_, kept_columns_);

@@ -364,7 +364,7 @@ inline constexpr double interval_widening = 1.6;
   }
   result.plateau = find_plateau(fit, likely);
   if (options.progress) options.progress(0.9);
-  if (result.plateau.points.size() < 3) {
+  if (result.plateau.middle == 0) {
     result.input_gain = {likely.linear[0], std::numeric_limits<double>::infinity()};
     return result;
   }
@@ -437,9 +437,9 @@ inline constexpr double interval_widening = 1.6;
   rules.require(found.own_input > 1e-5, "own_input", found.own_input,
                 "of u is not a law of y alone: nothing from outside excites the loop; record a "
                 "reference that moves");
-  const bool excited = found.plateau.points.size() >= 3 && found.excitation < 0.15;
+  const bool excited = found.plateau.middle > 0 && found.excitation < 0.15;
   rules.require(
-      excited, "excitation", found.plateau.points.size() >= 3 ? found.excitation : 1.0,
+      excited, "excitation", found.plateau.middle > 0 ? found.excitation : 1.0,
       "is the least error of b0, and too large: u hardly shows in y; record steps or a sweep");
   if (!rules) return rules;
   rules.require(found.correlation <= options.correlation_max,

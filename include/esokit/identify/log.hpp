@@ -149,12 +149,28 @@ inline double quantisation_step(const std::vector<double>& y) {
     }
     steps.push_back(time[k] - time[k - 1]);
   }
+  // Within these the squares, and the powers of T, of any model are numbers.
+  const auto size_fits = [&](const char* field, const std::vector<double>& values, int index = -1) {
+    const auto [low, high] = std::minmax_element(values.begin(), values.end());
+    const double largest = std::max(-*low, *high);
+    rules.require(largest <= 1e60, field, largest, "is too large: write it in another unit", index)
+        .require(!(*high > *low) || *high - *low >= 1e-60, field, *high - *low,
+                 "is all that it changes by: write it in another unit", index);
+  };
+  size_fits("u", u);
+  size_fits("y", y);
+  for (std::size_t c = 0; c < columns.size(); ++c) {
+    size_fits("columns", columns[c], static_cast<int>(c));
+  }
+  if (!rules) return rules.error();
   const double middle = detail::median(steps);
   double sum = 0.0, square = 0.0, regular = 0.0;
   for (const double step : steps) {
     if (step < 1.6 * middle) sum += step, regular += 1.0;
   }
   const double T = log.time.empty() ? log.sample_time : sum / regular;
+  rules.require(T >= 1e-12 && T <= 1e12, "sample_time", T, "must be between 1e-12 s and 1e12 s");
+  if (!rules) return rules.error();
   for (const double step : steps) {
     if (step < 1.6 * middle) square += (step - T) * (step - T);
   }
@@ -237,8 +253,10 @@ inline double quantisation_step(const std::vector<double>& y) {
         }
       }
     }
-    if (to < time.size())
-      report.missing += static_cast<std::size_t>(std::lround((time[to] - time[to - 1]) / T) - 1);
+    if (to < time.size()) {
+      const double rows_between = std::round((time[to] - time[to - 1]) / T) - 1.0;
+      report.missing += static_cast<std::size_t>(std::min(rows_between, 1e15));
+    }
     from = to;
   }
   report.pieces = data.starts.size();

@@ -27,11 +27,11 @@ struct PlateauPoint {
 /// Fits over the bandwidth, and where they agree.
 struct Plateau {
   std::vector<PlateauPoint> points{};  ///< by rising bandwidth, a factor of sqrt(2) apart
-  std::size_t middle = 0;              ///< of the three neighbours that agree best
-  double spread = 0.0;  ///< of b0 over those three, largest less least over the middle
-  double error = 0.0;   ///< standard error of b0 there
-  double from = 0.0;    ///< rad/s: b0 stays within the tolerance down to here
-  double to = 0.0;      ///< and up to here
+  std::size_t middle = 0;  ///< of the three neighbours that agree best; 0: there are none
+  double spread = 0.0;     ///< of b0 over those three, largest less least over the middle
+  double error = 0.0;      ///< standard error of b0 there
+  double from = 0.0;       ///< rad/s: b0 stays within the tolerance down to here
+  double to = 0.0;         ///< and up to here
 };
 
 /// Fits at bandwidths around that of `best`.
@@ -78,7 +78,7 @@ struct Plateau {
       plateau.error = plateau.points[i].errors.linear[0];
     }
   }
-  if (plateau.points.size() < 3) {
+  if (plateau.middle == 0) {
     plateau.spread = std::numeric_limits<double>::infinity();
     return plateau;
   }
