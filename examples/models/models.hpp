@@ -40,7 +40,7 @@ inline esokit::examples::About about(std::string title, std::string description)
 struct Step {
   std::vector<double> t, y, u;
   double overshoot = 0;  ///< %
-  double rise = 0;       ///< from 0.1 to 0.9, s
+  double rise = 0;       ///< until it first is at 0.9, s
 };
 
 template <class Plant, class Controller>
@@ -59,7 +59,7 @@ Step step_of(const Plant& plant, const Controller& controller, double duration =
     return duration;
   };
   for (const double y : step.y) step.overshoot = std::max(step.overshoot, 100 * (y - 1));
-  step.rise = crossing(0.9) - crossing(0.1);
+  step.rise = crossing(0.9);
   return step;
 }
 

@@ -22,6 +22,7 @@
 
 #include <esokit/analysis/covariance.hpp>
 #include <esokit/analysis/frequency_response.hpp>
+#include <esokit/gain/pole_set.hpp>
 #include <esokit/observer/model_eso.hpp>
 #include <esokit/sim/gaussian.hpp>
 
@@ -174,32 +175,56 @@ Ripple ripple_eso(double w, double capture) {
       .value();
 }
 
+Chain chain_eso(double bandwidth) {
+  return Chain::make(
+             {.observer_bandwidth = bandwidth, .input_gain = 1.0, .sample_time = sample_time})
+      .value();
+}
+
+/// A chain that lets so much noise into dhat.
+Chain chain_of_noise(double noise) {
+  double low = observer, high = 20 * observer;
+  for (int i = 0; i < 50; ++i) {
+    const double middle = std::sqrt(low * high);
+    (noise_of(chain_eso(middle)) < noise ? low : high) = middle;
+  }
+  return chain_eso(low);
+}
+
+/// A resonator with all poles at omega_o: what more noise buys.
+auto all_poles_at(double omega_o, double w) {
+  using Poles = ModelEso<ModelParts{.order = 2, .resonators = 1}, double, PoleSet>;
+  Poles::Config config{
+      .input_gain = 1.0, .sample_time = sample_time, .model = {.resonators = {{{w}}}}};
+  for (auto& pole : config.poles) pole = -omega_o;
+  return Poles::make(config).value();
+}
+
 void ripple(Report& report) {
-  const auto chain =
-      Chain::make({.observer_bandwidth = observer, .input_gain = 1.0, .sample_time = sample_time})
-          .value();
+  const Chain chain = chain_eso(observer);
   const double quiet = noise_of(chain);
+  for (const auto& [share, decibel] :
+       {std::array{10.0, 50.0}, std::array{5.0, 39.0}, std::array{3.0, 31.0}}) {
+    const double w = observer / share;
+    const auto eso = all_poles_at(observer, w);
+    const std::string name = "all poles at omega_o, ripple at omega_o / " + number_text(share, 2);
+    report.check_reference(name, "2 % beside, below a chain of equal noise (dB)", decibel,
+                           20 * std::log10(left_over(chain_of_noise(noise_of(eso)), 1.02 * w) /
+                                           left_over(eso, 1.02 * w)),
+                           Tolerance::absolute(1));
+    report.expect(name, "noise of dhat, of the chain's", noise_of(eso) / quiet,
+                  noise_of(eso) > 7 * quiet && noise_of(eso) < 9 * quiet, "about eight: the price");
+  }
   std::vector<CsvRow> lines;
   for (const double share : {1 / 10.0, 1 / 5.0, 1 / 3.0, 1.0, 3.0}) {
     const double w = share * observer;
     const auto eso = ripple_eso(w, 0);
-    // A chain that is as noisy.
-    double low = observer, high = 20 * observer;
-    const auto faster = [&](double bandwidth) {
-      return Chain::make(
-                 {.observer_bandwidth = bandwidth, .input_gain = 1.0, .sample_time = sample_time})
-          .value();
-    };
-    for (int i = 0; i < 50; ++i) {
-      const double middle = std::sqrt(low * high);
-      (noise_of(faster(middle)) < noise_of(eso) ? low : high) = middle;
-    }
     const double beside = left_over(eso, 1.02 * w);
     lines.push_back({number_text(w, 3), number_text(noise_of(eso) / quiet, 2),
                      number_text(left_over(eso, w), 1), number_text(100 * beside, 2),
                      number_text(100 * left_over(eso, 1.3 * w), 2),
                      number_text(100 * left_over(chain, w), 2),
-                     number_text(100 * left_over(faster(low), w), 2)});
+                     number_text(100 * left_over(chain_of_noise(noise_of(eso)), w), 2)});
     const std::string name = "ripple at omega_o times " + number_text(share, 2);
     // The held sine is smaller by (w T)^2 / 24.
     const double hold = w * sample_time * w * sample_time / 24;

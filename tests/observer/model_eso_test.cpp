@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
@@ -220,6 +222,64 @@ TEST(ModelCascade, ASwingIsFoundByTheLevelsTogether) {
     if (k > 2000) {
       ASSERT_NEAR(cascade.total_disturbance(), 3 + 2 * std::sin(90 * t), 1e-7) << k;
     }
+  }
+}
+
+// ---- What a swing that is known gains.
+
+/// sd of dhat for noise of 1 on y: of the response to one sample of it.
+template <class Observer>
+double noise_of(Observer observer) {
+  double squares = 0;
+  for (int k = 0; k < 3000; ++k) {
+    (void)observer.update(k == 100 ? 1.0 : 0.0, 0.0);
+    squares += observer.total_disturbance() * observer.total_disturbance();
+  }
+  return std::sqrt(squares);
+}
+
+/// The largest dhat - d once it has settled, d = sin(w t) on a double integrator.
+template <class Observer>
+double left_of_a_sine(Observer observer, double w) {
+  const int period = static_cast<int>(2 * std::acos(-1.0) / (w * kT)) + 1;
+  const int settled = 3000;
+  double worst = 0;
+  for (int k = 0; k < settled + period; ++k) {
+    const double d = std::sin(w * k * kT);
+    (void)observer.update(-d / (w * w), 0.0);
+    if (k >= settled) worst = std::max(worst, std::abs(observer.total_disturbance() - d));
+  }
+  return worst;
+}
+
+// 2 % beside the frequency, all poles at omega_o, against a chain that lets as much noise into
+// dhat. numpy with 60-digit gains, by frequency response and Lyapunov equation, has 50.27, 38.90
+// and 31.53 dB above the frequency, and the same noise.
+TEST(ModelSwing, BesideItsFrequencyItIsFarBelowAChainOfEqualNoise) {
+  const double bandwidth = 60;
+  using Poles = ModelEso<swing_parts, double, esokit::PoleSet>;
+  const auto chain = [](double omega_o) {
+    return LinearEso<2>::make({.observer_bandwidth = omega_o, .input_gain = 1.0, .sample_time = kT})
+        .value();
+  };
+  for (const auto& [share, noise, decibel] :
+       {std::array{10.0, 8.40, 50.27}, {5.0, 8.27, 38.90}, {3.0, 7.95, 31.53}}) {
+    const double w = bandwidth / share;
+    Poles::Config config{.input_gain = 1.0, .sample_time = kT, .model = {.resonators = {{{w}}}}};
+    for (auto& pole : config.poles) pole = {-bandwidth, 0.0};
+    const auto swing = Poles::make(config).value();
+    const double sd = noise_of(swing);
+    EXPECT_NEAR(sd / noise_of(chain(bandwidth)), noise, 0.005) << share;
+    double low = bandwidth, high = 10 * bandwidth;
+    for (int i = 0; i < 30; ++i) {
+      const double middle = std::sqrt(low * high);
+      (noise_of(chain(middle)) < sd ? low : high) = middle;
+    }
+    const double gained =
+        20 * std::log10(left_of_a_sine(chain(low), 1.02 * w) / left_of_a_sine(swing, 1.02 * w));
+    EXPECT_NEAR(gained, decibel, 0.02) << share;
+    EXPECT_GE(gained, 30.0) << share;
+    EXPECT_LT(left_of_a_sine(swing, w), 1e-9) << share;
   }
 }
 
