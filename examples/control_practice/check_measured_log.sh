@@ -77,6 +77,18 @@ reads no_header.csv --time 1 --y 2 --u 3
 reads no_header.csv --y 2 --u 3 --sample-time 0.01
 { echo 't;y;u'; table ';'; } >semicolons.csv
 reads semicolons.csv "${named[@]}"
+{ echo 't|y|u'; table '|'; } >bars.csv
+reads bars.csv "${named[@]}"
+{ echo 't;y;u'; table ';' | tr . ,; } >decimal_commas.csv
+reads decimal_commas.csv "${named[@]}"
+{ echo '# logged by hand'; echo t,y,u; echo s,m,N; echo '// units above'; table ,; } >comments.csv
+reads comments.csv "${named[@]}"
+{ echo '% t y u'; table ' '; } >named_in_comment.csv
+reads named_in_comment.csv "${named[@]}"
+{ echo /clock/t,/joint_states/joint1/position,/joint_states/joint1/effort; table ,; } >topics.csv
+reads topics.csv --time t --y position --u /joint_states/joint1/effort
+{ echo t,y,u; table ,; printf 4.01,2; } >cut.csv
+reads cut.csv "${named[@]}"
 { printf 't\ty\tu\n'; table '\t'; } >tabs.csv
 reads tabs.csv "${named[@]}"
 reads tabs.csv "${named[@]}" --separator tab
@@ -104,6 +116,8 @@ for dots in ..csv ...csv; do
   verdict $? "$dots: wrote outside of its folder: $(find out -newer "$dots")"
 done
 
+{ echo t,/a/position,/b/position; table ,; } >two.csv
+refuses "'position' is /a/position and /b/position" two.csv --time t --y position --u 3
 refuses "no column 'torque'; there are t, y, u" plain.csv --time t --y y --u torque
 refuses "there is no header and are 3 columns" no_header.csv --time 1 --y 2 --u 4
 sed '5s/.*/0.03,about 2,1/' plain.csv >word.csv

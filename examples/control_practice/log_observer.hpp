@@ -21,9 +21,14 @@
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/observer/reduced_order_eso.hpp>
 
-#include "control_practice/log_file.hpp"
+#include "common/log_file.hpp"
 
 namespace practice {
+
+using esokit::examples::check_time;
+using esokit::examples::LogError;
+using esokit::examples::LogFile;
+using esokit::examples::median_step;
 
 /// How the observer is set.
 struct LogSettings {

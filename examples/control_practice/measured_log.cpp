@@ -19,8 +19,8 @@
 #include <string>
 #include <vector>
 
+#include "common/log_file.hpp"
 #include "common/report.hpp"
-#include "control_practice/log_file.hpp"
 #include "control_practice/log_observer.hpp"
 #include "control_practice/measured_sets.hpp"
 #include "control_practice/practice.hpp"
@@ -149,7 +149,7 @@ int run_own_log(const Arguments& arguments) {
   std::vector<double> time;
   if (timed) {
     time = log.column(2);
-    check_time(file, log, time);
+    check_time(log, time);
   }
   settings.sample_time =
       arguments.has("sample-time") ? arguments.number("sample-time") : median_step(time);

@@ -105,7 +105,7 @@ inline void pendulum(Report& report, const std::filesystem::path& data) {
   for (const Run& run : runs) {
     const auto file = data / "dfki_simple_pendulum" / (std::string(run.name) + ".csv");
     const LogFile log(file, {"t_s", "u_Nm", "y_rad"});
-    check_time(file, log, log.column(0));
+    check_time(log, log.column(0));
     LogSettings settings{
         .order = 2, .input_gain = 1 / inertia, .bandwidth = omega, .sample_time = run.sample_time};
     const auto estimates = run_observer(settings, log.column(0), log.column(2), log.column(1));
@@ -174,7 +174,7 @@ inline void acrobot(Report& report, const std::filesystem::path& data) {
     const LogFile log(file, {"t_s", "u1_Nm", "u2_Nm", "y1_rad", "y2_rad", "v1_rad_s", "v2_rad_s",
                              "pert1_Nm", "pert2_Nm"});
     const auto& time = log.column(0);
-    check_time(file, log, time);
+    check_time(log, time);
     const std::size_t count = log.rows();
     std::array<std::vector<double>, 2> known;
     std::vector<std::array<double, 3>> mass;
@@ -265,7 +265,7 @@ inline void acrobot(Report& report, const std::filesystem::path& data) {
 inline void tclab(Report& report, const std::filesystem::path& data) {
   const auto file = data / "tclab_energy_balance" / "tclab.csv";
   const LogFile log(file, {"t_s", "Q1_pct", "Q2_pct", "T1_degC", "T2_degC"});
-  check_time(file, log, log.column(0));
+  check_time(log, log.column(0));
   constexpr double area = 10e-4, facing = 2e-4, emissivity = 0.9, sigma = 5.67e-8, zero = 273.15;
   constexpr double capacity = 2;  // m c_p, J/K
   const LogSettings settings{

@@ -14,14 +14,13 @@
 
 #include <esokit/identify/identify.hpp>
 
+#include "common/log_file.hpp"
 #include "common/report.hpp"
-#include "control_practice/log_file.hpp"
 
 using namespace esokit::examples;
 using esokit::Identified;
 using esokit::IdentifyOptions;
 using esokit::Log;
-using practice::LogFile;
 
 namespace {
 

@@ -21,8 +21,8 @@
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/observer/model_eso.hpp>
 
+#include "common/log_file.hpp"
 #include "common/report.hpp"
-#include "control_practice/log_file.hpp"
 #include "models/models.hpp"
 
 using namespace esokit;
@@ -44,7 +44,7 @@ struct Log {
 };
 
 Log read(const std::filesystem::path& file, bool pitch) {
-  const practice::LogFile log(file, {"t_s", pitch ? "gy_dps" : "gx_dps", "m1", "m2", "m3", "m4"});
+  const LogFile log(file, {"t_s", pitch ? "gy_dps" : "gx_dps", "m1", "m2", "m3", "m4"});
   Log all;
   all.t = log.column(0);
   const double sign[4] = {-1, pitch ? 1.0 : -1.0, 1, pitch ? -1.0 : 1.0};

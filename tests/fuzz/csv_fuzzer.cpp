@@ -10,7 +10,7 @@
 #include <string>
 #include <string_view>
 
-#include "control_practice/log_file.hpp"
+#include "common/log_file.hpp"
 
 namespace {
 
@@ -26,14 +26,14 @@ void read_as_log(std::string_view text, char separator) {
   require(ftruncate(file, 0) == 0, "ftruncate");
   require(pwrite(file, text.data(), text.size(), 0) == static_cast<ssize_t>(text.size()), "pwrite");
   try {
-    const practice::LogFile log(path, {"1", "y"}, separator);
+    const esokit::examples::LogFile log(path, {"1", "y"}, separator);
     require(log.rows() > 0, "a log without rows");
     require(log.column(0).size() == log.rows() && log.column(1).size() == log.rows(), "columns");
     for (std::size_t i = 1; i < log.rows(); ++i) require(log.line(i) > log.line(i - 1), "lines");
-    practice::check_time(path, log, log.column(0));
-    const double step = practice::median_step(log.column(0));
+    esokit::examples::check_time(log, log.column(0));
+    const double step = esokit::examples::median_step(log.column(0));
     require(step > 0, "times that rise have a positive step");
-  } catch (const practice::LogError& error) {
+  } catch (const esokit::examples::LogError& error) {
     require(*error.what() != '\0', "an error without text");
   }
 }
