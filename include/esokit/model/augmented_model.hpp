@@ -78,11 +78,14 @@ constexpr auto make_model_pattern() noexcept {
       for (std::size_t j = 0; j <= size; ++j) p[i][j] = p[i][j] || (p[i][k] && p[k][j]);
     }
   }
+  // y^(order) = D + b u, and in D' the two come together, too: u does what D does.
+  all.driven = static_cast<int>(d);
   for (std::size_t i = 0; i < size; ++i) {
-    for (std::size_t j = 0; j <= size; ++j) {
+    for (std::size_t j = 0; j < size; ++j) {
       all.place[i][j] = all.kept;
-      // Plant without poles of its own, and its integrated disturbance.
-      const std::size_t last = la == 0 ? d + m - 1 : lf + n - 1;
+      // Plant without poles of its own, and its integrated disturbance; behind an actuator y^(n)
+      // stays as it is where nothing else acts.
+      const std::size_t last = la == 0 ? d + m - 1 : lf + n;
       if (p[i][j] && !Parts.plant_poles && i >= lf && j <= last) {
         all.chain[i][j] =
             static_cast<int>(binomial(static_cast<int>(j - lf), static_cast<int>(i - lf)));

@@ -18,6 +18,8 @@ struct ModelPattern {
   Array<Array<int, Size + 1>, Size> chain{};  ///< those of a chain: binomials; else 0
   Array<Array<int, Size + 1>, Size> place{};
   int kept = 0;
+  int driven = -1;  ///< the state to which u adds, scaled as it is: Gamma is its column of Phi - I
+                    ///< and is not kept; -1: none
 };
 
 }  // namespace detail
@@ -68,19 +70,15 @@ class MatrixModel {
   /// x one sample ahead: Phi x + Gamma u; what is zero of Phi - I whatever the numbers is left out.
   [[nodiscard]] ESOKIT_INLINE constexpr State predict(const State& x, const S& u) const noexcept {
     State next = x;
+    State acting = x;
+    if constexpr (driven >= 0) {
+      std::get<driven>(acting) = std::get<driven>(x) + scaled_input_gain_ * u;
+    }
     detail::unroll<size>([&](auto i) ESOKIT_INLINE_LAMBDA {
       S sum = std::get<i>(x);
-      detail::unroll<size>([&](auto j) ESOKIT_INLINE_LAMBDA {
-        if constexpr (of_chain(i, j) == 1) {
-          sum = sum + std::get<j>(x);
-        } else if constexpr (of_chain(i, j) > 1) {
-          constexpr double binomial = of_chain(i, j);
-          sum = sum + detail::constant<S>(binomial) * std::get<j>(x);
-        } else if constexpr (couples(i, j)) {
-          sum = sum + std::get<place(i, j)>(step_) * std::get<j>(x);
-        }
-      });
-      if constexpr (couples(i, size)) sum = sum + std::get<place(i, size)>(step_) * u;
+      detail::unroll<size>(
+          [&](auto j) ESOKIT_INLINE_LAMBDA { sum = plus_element<i, j>(sum, std::get<j>(acting)); });
+      if constexpr (driven < 0) sum = plus_element<i, size>(sum, u);
       std::get<i>(next) = sum;
     });
     return next;
@@ -102,10 +100,10 @@ class MatrixModel {
   /// x + Gamma u.
   [[nodiscard]] ESOKIT_INLINE constexpr State add_input(const State& x, const S& u) const noexcept {
     State sum = x;
+    constexpr int column = driven >= 0 ? driven : size;
+    const S amount = driven >= 0 ? scaled_input_gain_ * u : u;
     detail::unroll<size>([&](auto i) ESOKIT_INLINE_LAMBDA {
-      if constexpr (couples(i, size)) {
-        std::get<i>(sum) = std::get<i>(sum) + std::get<place(i, size)>(step_) * u;
-      }
+      std::get<i>(sum) = plus_element<i, column>(std::get<i>(sum), amount);
     });
     return sum;
   }
@@ -213,10 +211,10 @@ class MatrixModel {
       : rate_(S(1) / sample_time), input_gain_(input_gain), sample_time_(sample_time) {}
 
   /// @param all Phi - I, and as last column Gamma of a u whose scaled effect b T^order / order! is
-  /// one
+  /// one (not read where u adds to a state)
   void set_step(const Matrix<S, size + 1, size + 1>& all) noexcept {
     for (int i = 0; i < size; ++i) {
-      for (int j = 0; j <= size; ++j) {
+      for (int j = 0; j < size + (driven < 0 ? 1 : 0); ++j) {
         if (!couples(i, j) || of_chain(i, j) > 0) continue;
         step_[static_cast<std::size_t>(place(i, j))] =
             j < size ? all(i, j) : all(i, j) * scaled_input_gain_;
@@ -225,6 +223,7 @@ class MatrixModel {
   }
 
   static constexpr const auto& pattern = Shape::pattern;  ///< what is kept
+  static constexpr int driven = pattern.driven;           ///< the state to which u adds, or -1
 
   /// Whether an element of Phi - I or (column N) Gamma is not zero.
   static constexpr bool couples(int i, int j) noexcept {
@@ -237,6 +236,22 @@ class MatrixModel {
   /// Where among the kept ones an element is.
   static constexpr int place(int i, int j) noexcept {
     return pattern.place[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
+  }
+
+  /// sum + an element of Phi - I, or (column N) of Gamma, times `value`.
+  template <int Row, int Column>
+  [[nodiscard]] ESOKIT_INLINE constexpr S plus_element(const S& sum,
+                                                       const S& value) const noexcept {
+    if constexpr (of_chain(Row, Column) == 1) {
+      return sum + value;
+    } else if constexpr (of_chain(Row, Column) > 1) {
+      constexpr double binomial = of_chain(Row, Column);
+      return sum + detail::constant<S>(binomial) * value;
+    } else if constexpr (couples(Row, Column)) {
+      return sum + std::get<place(Row, Column)>(step_) * value;
+    } else {
+      return sum;
+    }
   }
 
   Array<S, pattern.kept> step_{};  ///< Phi - I and Gamma, what is not zero
