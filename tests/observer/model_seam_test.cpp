@@ -70,7 +70,6 @@ static_assert(!SampledModel<Resonator, float>);
 ESOKIT_TEST_WITHOUT(input_gain);
 ESOKIT_TEST_WITHOUT(sample_time);
 ESOKIT_TEST_WITHOUT(drive);
-ESOKIT_TEST_WITHOUT(joined);
 ESOKIT_TEST_WITHOUT(predict);
 ESOKIT_TEST_WITHOUT(add_input);
 ESOKIT_TEST_WITHOUT(physical);

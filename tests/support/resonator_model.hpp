@@ -23,7 +23,6 @@ class ResonatorModel {
   static constexpr int size = Order + 3;
   using State = esokit::Array<S, size>;
   using Estimate = esokit::Vector<S, size>;
-  using Drive = esokit::Array<S, 3>;
   template <class T>
   using with_scalar = ResonatorModel<Order, T>;
   struct Settings {
@@ -45,22 +44,13 @@ class ResonatorModel {
   [[nodiscard]] const S& sample_time() const noexcept { return sample_time_; }
 
   [[nodiscard]] S drive(const S& u) const noexcept { return scaled_input_gain_ * u; }
-  [[nodiscard]] static Drive joined(const S& drive, const State& x) noexcept {
-    return {x[Order] + drive, x[Order + 1], x[Order + 2]};
-  }
-  [[nodiscard]] static Drive joined(const Drive& drive, const State& x) noexcept {
-    return {x[Order] + drive[0], x[Order + 1] + drive[1], x[Order + 2] + drive[2]};
-  }
 
   [[nodiscard]] State predict(const State& x, const S& drive) const noexcept {
-    return predict(x, Drive{drive, S(0.0), S(0.0)});
-  }
-  [[nodiscard]] State predict(const State& x, const Drive& drive) const noexcept {
-    const S q = x[Order + 1] + drive[1];
-    const S r = x[Order + 2] + drive[2];
+    const S q = x[Order + 1];
+    const S r = x[Order + 2];
     esokit::Array<S, Order + 1> plant{};
     for (std::size_t i = 0; i <= Order; ++i) plant[i] = x[i];
-    const auto ahead = Chain::template predict<1>(plant, {drive[0]});
+    const auto ahead = Chain::template predict<1>(plant, {drive});
     State next{};
     for (std::size_t i = 0; i < Order; ++i) {
       next[i] = ahead[i] + of_q_[i] * q + of_r_[i] * r;

@@ -95,9 +95,7 @@ class WrappedOutput
       return restart(reading);
     }
     if (!reading.counted) {
-      // The innovation is that of level 1, whose z_1 the correction will subtract.
-      const S predicted = observer_.level_estimate(0)(0);
-      reading.turns = (std::round)((predicted - reading.y) * inverse_period_);
+      reading.turns = (std::round)((predicted() - reading.y) * inverse_period_);
     }
     return keep(reading, observer_.correct(reading.y + reading.turns * period_));
   }
@@ -152,6 +150,15 @@ class WrappedOutput
     std::uint8_t steady = 0;    ///< in a row that moved as before, 255 at most
     std::uint8_t rejected = 0;  ///< since the gate last let one in, 255 at most
   };
+
+  /// What the correction will subtract from the measurement: of level 1, as a sensor shows it.
+  [[nodiscard]] S predicted() const noexcept {
+    if constexpr (observer_traits<Observer>.measures_first_row) {
+      return observer_.level_estimate(0)(0);
+    } else {
+      return observer_.predicted_measurement();
+    }
+  }
 
   /// What a measurement is taken for.
   struct Reading {

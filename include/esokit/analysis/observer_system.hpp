@@ -7,6 +7,7 @@
 /// `derivative`, each of whose entries is one product.
 #pragma once
 
+#include <cmath>
 #include <concepts>
 #include <esokit/analysis/linear_system.hpp>
 #include <esokit/gain/sampled_gain.hpp>
@@ -94,6 +95,8 @@ struct SampledMatrices {
   Matrix<double, Size, Size> step;
   Vector<double, Size> gamma;
   Vector<double, Size> units;  ///< of state s
+  /// What of a correction is the disturbance's, from state to state.
+  Matrix<double, Size, Size> disturbance = Matrix<double, Size, Size>::Zero();
 };
 
 /// Where row `row` of the estimate is among the states.
@@ -139,6 +142,21 @@ SampledMatrices<Observer::size> sampled_matrices(const Observer& observer) {
       }
     }
   }
+  if constexpr (Observer::levels > 1) {
+    for (int j = 0; j < size; ++j) {
+      if constexpr (model_traits<Model>.tells_disturbance) {
+        typename Model::State unit{};
+        unit[static_cast<std::size_t>(j)] = S(1);
+        const auto part = model.disturbance_part(unit);
+        for (int i = 0; i < size; ++i) {
+          m.disturbance(i, j) =
+              static_cast<double>(part[static_cast<std::size_t>(i)]) * m.units(i) / m.units(j);
+        }
+      } else if (j >= Observer::order) {
+        m.disturbance(j, j) = 1.0;
+      }
+    }
+  }
   return m;
 }
 
@@ -148,7 +166,6 @@ using MatricesOf = ObserverMatrices<Observer::order, Observer::extension, Observ
 template <SampledLinearObserver Observer>
 MatricesOf<Observer> observer_matrices(const Observer& observer, double = 0.0) {
   using Matrices = MatricesOf<Observer>;
-  constexpr int order = Observer::order;
   constexpr int size = Matrices::size;
   constexpr int states = Matrices::states;
 
@@ -169,15 +186,25 @@ MatricesOf<Observer> observer_matrices(const Observer& observer, double = 0.0) {
     for (int r = 0; r < size; ++r) {
       const double gain =
           sampled.units(r) * static_cast<double>(scaled[static_cast<std::size_t>(r)]);
-      const bool disturbance = r >= order && level > 0;  // found by the levels before, too
       for (int j = 0; j < states; ++j) {
         const double innovation = measured[static_cast<std::size_t>(j)] - (j == first ? 1.0 : 0.0);
         added(first + r, j) = gain * innovation;
-        if (disturbance) added(first + r, j) += added(first - size + r, j);
       }
       const auto row = static_cast<std::size_t>(first + r);
       added_y[row] = gain * measured_y;
-      if (disturbance) added_y[row] += added_y[row - size];
+    }
+    if (level > 0) {  // what the levels before have found of the disturbance, too
+      for (int r = 0; r < size; ++r) {
+        for (int q = 0; q < size; ++q) {
+          const double share = sampled.disturbance(r, q);
+          if (!(std::abs(share) > 0.0)) continue;
+          for (int j = 0; j < states; ++j) {
+            added(first + r, j) += share * added(first - size + q, j);
+          }
+          added_y[static_cast<std::size_t>(first + r)] +=
+              share * added_y[static_cast<std::size_t>(first - size + q)];
+        }
+      }
     }
     for (int j = 0; j < states; ++j) {
       measured[static_cast<std::size_t>(j)] = added(first, j) + (j == first ? 1.0 : 0.0);

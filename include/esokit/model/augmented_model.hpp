@@ -205,8 +205,9 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
 
   /// What it is.
   static constexpr ModelTraits traits{
-      .shifts_output = !Parts.plant_poles && lf == 0,
+      .shifts_output = true,
       .adds_levels = !Parts.plant_poles && lf == 0 && la == 0,
+      .tells_disturbance = true,
       .corrects_part = true,
       .follows_speed = Parts.follows_speed,
   };
@@ -255,6 +256,37 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
     z(order) = -(input_gain_ * u);
     if constexpr (lf > 0) z(size - lf) = y;
     return z;
+  }
+
+  /// What of a correction is the disturbance's, and the actuator's where that is corrected: all
+  /// but what the plant's own y .. y^(n-1) are, and make of the rows behind them.
+  [[nodiscard]] ESOKIT_INLINE constexpr State disturbance_part(const State& x) const noexcept {
+    State part = x;
+    detail::unroll<lf + n>([&](auto r) ESOKIT_INLINE_LAMBDA { std::get<r>(part) = S(0); });
+    if constexpr (Parts.plant_poles) {
+      Array<S, n> poles{};  // T^(n-i) a_i
+      S power = sample_time_;
+      detail::unroll<n>([&](auto i) ESOKIT_INLINE_LAMBDA {
+        std::get<n - 1 - i>(poles) = std::get<n - 1 - i>(settings_.plant) * power;
+        power = power * sample_time_;
+      });
+      // y^(n) = -sum a_i y^(i) and its derivatives, as rows over y .. y^(n-1).
+      Array<S, n> row{};
+      std::get<n - 1>(row) = S(1);
+      detail::unroll<la + 1>([&](auto k) ESOKIT_INLINE_LAMBDA {
+        const S last = std::get<n - 1>(row);
+        S& of_plant = std::get<lf + n + k>(part);
+        Array<S, n> next{};
+        detail::unroll<n>([&](auto i) ESOKIT_INLINE_LAMBDA {
+          S& weight = std::get<i>(next);
+          weight = -(last * std::get<i>(poles));
+          if constexpr (i > 0) weight = weight + std::get<i - 1>(row);
+          of_plant = of_plant - weight * detail::factorial_ratio<S>(i, n + k) * std::get<lf + i>(x);
+        });
+        row = next;
+      });
+    }
+    return part;
   }
 
   /// The same with all frequencies of the resonators times `factor`; exact, and as much work as a

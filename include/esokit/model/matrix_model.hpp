@@ -47,26 +47,6 @@ class MatrixModel {
   /// What drives a step: u.
   [[nodiscard]] ESOKIT_INLINE constexpr S drive(const S& u) const noexcept { return u; }
 
-  /// u, and the disturbance that the levels before have found.
-  struct Joined {
-    S u;                              ///< as `drive`
-    Array<S, extension> disturbance;  ///< rows from `order` on
-  };
-  /// The same with the disturbance of x: what drives the next level of a cascade.
-  /// @{
-  [[nodiscard]] ESOKIT_INLINE static constexpr Joined joined(const S& drive,
-                                                             const State& x) noexcept {
-    return joined(Joined{drive, {}}, x);
-  }
-  [[nodiscard]] ESOKIT_INLINE static constexpr Joined joined(Joined drive,
-                                                             const State& x) noexcept {
-    detail::unroll<extension>([&](auto r) ESOKIT_INLINE_LAMBDA {
-      std::get<r>(drive.disturbance) = std::get<r>(drive.disturbance) + std::get<order + r>(x);
-    });
-    return drive;
-  }
-  /// @}
-
   /// x one sample ahead: Phi x + Gamma u; what is zero of Phi - I whatever the numbers is left out.
   [[nodiscard]] ESOKIT_INLINE constexpr State predict(const State& x, const S& u) const noexcept {
     State next = x;
@@ -81,19 +61,6 @@ class MatrixModel {
       if constexpr (driven < 0) sum = plus_element<i, size>(sum, u);
       std::get<i>(next) = sum;
     });
-    return next;
-  }
-  /// The same for a level of a cascade: what it is driven by acts on the plant and is not its own.
-  [[nodiscard]] ESOKIT_INLINE constexpr State predict(const State& x,
-                                                      const Joined& drive) const noexcept {
-    State all = x;
-    detail::unroll<extension>([&](auto r) ESOKIT_INLINE_LAMBDA {
-      std::get<order + r>(all) = std::get<order + r>(all) + std::get<r>(drive.disturbance);
-    });
-    const State plant = predict(all, drive.u);
-    State next = predict(x, S(0));
-    detail::unroll<order>([&](auto r)
-                              ESOKIT_INLINE_LAMBDA { std::get<r>(next) = std::get<r>(plant); });
     return next;
   }
 

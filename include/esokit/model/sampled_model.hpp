@@ -19,13 +19,17 @@ struct ModelTraits {
   /// and bridge gaps by a gain that stays bounded, see ModelGain.
   bool is_chain = false;
 
-  /// y may be counted from elsewhere: a constant added to y is a solution of the plant, too. Not
-  /// with a known pole elsewhere than at zero.
+  /// y may be counted from elsewhere: a constant added to y, with D as it is, is a solution, too.
+  /// Known poles do no harm where the disturbance has a constant that takes it up.
   bool shifts_output = false;
 
   /// Its disturbance has rows of its own, from `order` on, so that what two levels of a cascade
   /// have found adds up. Not where row `order` also holds what is known of plant or actuator.
   bool adds_levels = false;
+
+  /// `disturbance_part(x)` is what of a correction x is the disturbance's and not the plant's, for
+  /// a cascade of what does not add up.
+  bool tells_disturbance = false;
 
   /// `with_corrected_part(..)` says what of it a gain corrects, and which poles are its own to
   /// place; see CorrectedPart. Otherwise all is corrected.
@@ -48,8 +52,7 @@ struct NoModelSettings {};
 /// sample: row r < n is T^r / r! times y^(r), row n is T^n / n! times the total disturbance (the
 /// sum of all that the law has to cancel), the rest is the model's own. `estimate` has the same
 /// rows in physical units, so that laws read what they need without knowing the model.
-/// - `drive(u)`, `predict(x, drive)`: Phi x + Gamma u; `joined(drive, x)`: with the disturbance of
-///   x, for the next level of a cascade; `add_input(x, u)`: x + Gamma u
+/// - `drive(u)`, `predict(x, drive)`: Phi x + Gamma u; `add_input(x, u)`: x + Gamma u
 /// - `physical(x)`, `physical<Row>(x)`, `scaled(estimate)`, `rescaled(x, before)`: from the model
 ///   that was in force before; `scaled_disturbance(d)`, `same_drive(before)`
 /// - `finite_probe(x)`: finite only if all estimates are
@@ -69,10 +72,6 @@ concept SampledModel = std::copyable<Model> && DeclaresTraits<Model, ModelTraits
   { model.input_gain() } -> std::convertible_to<S>;
   { model.sample_time() } -> std::convertible_to<S>;
   { model.predict(x, model.drive(s)) } -> std::same_as<typename Model::State>;
-  { model.predict(x, model.joined(model.drive(s), x)) } -> std::same_as<typename Model::State>;
-  {
-    model.predict(x, model.joined(model.joined(model.drive(s), x), x))
-    } -> std::same_as<typename Model::State>;
   { model.add_input(x, s) } -> std::same_as<typename Model::State>;
   { model.physical(x) } -> std::same_as<typename Model::Estimate>;
   { model.template physical<0>(x) } -> std::convertible_to<S>;

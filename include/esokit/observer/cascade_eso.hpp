@@ -145,7 +145,14 @@ Expected<Array<Law, Levels>, Error<S>> level_laws(const Config& config, MakeLaw&
 /// for every omega_oi T > 0; one level is LinearEso. Error-based use: feed e = y_d - y as the
 /// measurement and give -b0 as input_gain.
 ///
-/// @tparam Order n @tparam Levels p @tparam S scalar @tparam Extension m
+/// With a model every level has plant, actuator and sensor: each sees y as the sensor shows it, the
+/// actuator runs open loop in all. Noise is then passed on as by a cascade of chains, less than by
+/// one level of the last bandwidth. Each level has the resonators, too, with the same capture
+/// bandwidth: a swing 2 % beside its frequency leaves a third to a tenth of the error that one
+/// level of the last bandwidth leaves, at 1.1 to 1.4 times its noise.
+///
+/// @tparam Order n, with a model that of the law @tparam Levels p @tparam S scalar
+/// @tparam Extension m, with a model `Model::extension`
 /// @tparam Placement EqualPoles (config by bandwidths) or PoleSet (config by level_poles;
 /// gain/pole_set.hpp)
 /// @tparam Model what is known of the plant

@@ -1,10 +1,11 @@
 /// @file
-/// The linear observer and the filter with a model put together from parts.
+/// The linear observer and the cascade with a model put together from parts.
 #pragma once
 
 #include <esokit/gain/model_gain.hpp>
 #include <esokit/gain/scheduled_gain.hpp>
 #include <esokit/model/augmented_model.hpp>
+#include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 
 namespace esokit {
@@ -19,5 +20,11 @@ namespace esokit {
 template <ModelParts Parts, PlainScalar S = double, class Placement = EqualPoles>
 using ModelEso = LinearEso<AugmentedModel<Parts, S>::order, S, AugmentedModel<Parts, S>::extension,
                            Placement, AugmentedModel<Parts, S>>;
+
+/// CascadeEso that knows the same.
+template <ModelParts Parts, int Levels, PlainScalar S = double, class Placement = EqualPoles>
+using ModelCascadeEso =
+    CascadeEso<AugmentedModel<Parts, S>::order, Levels, S, AugmentedModel<Parts, S>::extension,
+               Placement, AugmentedModel<Parts, S>>;
 
 }  // namespace esokit

@@ -63,9 +63,10 @@ template <int Order, Scalar S, int Extension, class Law, int Levels = 1,
           class Model = ChainModel<Order, S, Extension>>
 requires GainLaw<Law, Order + Extension, S> && SampledModel<Model, S>
 class PredictorCorrector {
-  static_assert(Levels == 1 || model_traits<Model>.adds_levels,
-                "esokit: a cascade takes a model whose disturbance has rows of its own: without "
-                "known plant poles, actuator or sensor");
+  static_assert(Levels == 1 || model_traits<Model>.adds_levels ||
+                    model_traits<Model>.tells_disturbance,
+                "esokit: a cascade takes a model that tells the disturbance from the plant: "
+                "ModelTraits::adds_levels or tells_disturbance");
 
  public:
   using Chain = ScaledChain<Order, S, Extension>;  ///< the sampled chain, in its scaling
@@ -186,7 +187,7 @@ class PredictorCorrector {
     static_assert(Row >= 0 && Row < size, "esokit: no such estimate");
     constexpr int state = Model::state_of_row(Row);
     S sum = std::get<state>(states_[Levels - 1]);
-    if constexpr (Row >= Order) {
+    if constexpr (Row >= Order && adds_up) {
       detail::unroll<Levels - 1>(
           [&](auto i) ESOKIT_INLINE_LAMBDA { sum = sum + std::get<state>(states_[i]); });
     }
@@ -378,8 +379,12 @@ class PredictorCorrector {
   ///         finite: nothing changes
   constexpr Status shift_output(const S& offset) noexcept
       requires(model_traits<Model>.shifts_output) {
+    constexpr auto y = static_cast<std::size_t>(Model::state_of_row(0));
     LevelStates next = states_;
-    for (auto& state : next) state[0] = state[0] + offset;
+    for (auto& state : next) {
+      state[0] = state[0] + offset;
+      if constexpr (y > 0) state[y] = state[y] + offset;
+    }
     return shift_to(next);
   }
 
@@ -387,8 +392,7 @@ class PredictorCorrector {
   /// @return as `shift_output`
   constexpr Status shift_disturbance(const S& offset) noexcept {
     LevelStates next = states_;
-    S& disturbance = next[0][disturbance_state];
-    disturbance = disturbance + model_.scaled_disturbance(offset);
+    add_disturbance(next, model_.scaled_disturbance(offset));
     return shift_to(next);
   }
 
@@ -403,8 +407,7 @@ class PredictorCorrector {
     }
     if (!next.model_.same_drive(model_)) {
       const S explained = (input_gain() - fresh.input_gain()) * applied_input_;
-      S& disturbance = next.states_[0][disturbance_state];
-      disturbance = disturbance + next.model_.scaled_disturbance(explained);
+      add_disturbance(next.states_, next.model_.scaled_disturbance(explained));
     }
     if (!all(is_finite(next.probe(next.states_)))) {
       return Error<S>{"input_gain", fresh.input_gain(), "would make the estimate not finite"};
@@ -475,8 +478,30 @@ class PredictorCorrector {
     }
   }
 
-  /// Where the total disturbance is.
-  static constexpr auto disturbance_state = static_cast<std::size_t>(Model::state_of_row(Order));
+  /// What the levels keep. Of the chain, level i what it has found beyond those below it, driven by
+  /// what those have: the fewest operations. Of other models, where the disturbance has no rows of
+  /// its own, each level all of its estimate, with what those below it correct of the disturbance:
+  /// of the chain the same.
+  static constexpr bool adds_up = Levels > 1 && model_traits<Model>.is_chain;
+
+  /// To the total disturbance of all levels.
+  static constexpr void add_disturbance(LevelStates& states, const S& scaled) noexcept {
+    constexpr auto state = static_cast<std::size_t>(Model::state_of_row(Order));
+    for (std::size_t i = 0; i < (adds_up ? 1 : Levels); ++i) {
+      states[i][state] = states[i][state] + scaled;
+    }
+  }
+
+  /// What of a correction is the disturbance's.
+  [[nodiscard]] ESOKIT_INLINE constexpr State disturbance_part(const State& x) const noexcept {
+    if constexpr (model_traits<Model>.tells_disturbance) {
+      return model_.disturbance_part(x);
+    } else {
+      State part = x;
+      detail::unroll<Order>([&](auto r) ESOKIT_INLINE_LAMBDA { std::get<r>(part) = S(0.0); });
+      return part;
+    }
+  }
 
   /// The state of (y, 0, .., 0), as the sensor would show it.
   [[nodiscard]] static constexpr State standing(const S& y) noexcept {
@@ -550,7 +575,11 @@ class PredictorCorrector {
     LevelStates next;
     const auto drive = model_.drive(u);
     next[0] = model_.predict(states_[0], drive);
-    if constexpr (Levels > 1) {
+    if constexpr (!adds_up) {
+      detail::unroll<Levels - 1>([&](auto i) ESOKIT_INLINE_LAMBDA {
+        next[i + 1] = model_.predict(states_[i + 1], drive);
+      });
+    } else {
       auto joined = model_.joined(drive, states_[0]);
       detail::unroll<Levels - 1>([&](auto below) ESOKIT_INLINE_LAMBDA {
         constexpr int level = below + 1;
@@ -571,9 +600,11 @@ class PredictorCorrector {
   [[nodiscard]] ESOKIT_INLINE static constexpr State up_to_level(
       const LevelStates& states) noexcept {
     State state = states[Level];
-    detail::unroll<Level>([&](auto i) ESOKIT_INLINE_LAMBDA {
-      detail::add_rows<Order, size - Order>(state, states[i]);
-    });
+    if constexpr (adds_up) {
+      detail::unroll<Level>([&](auto i) ESOKIT_INLINE_LAMBDA {
+        detail::add_rows<Order, size - Order>(state, states[i]);
+      });
+    }
     return state;
   }
 
@@ -651,6 +682,7 @@ class PredictorCorrector {
         law_traits.kind != GainKind::preset && !law_traits.bears_any_innovation;
     bool fine = true;
     S measured = y;
+    std::conditional_t<Levels == 1 || adds_up, Nothing, State> found{};
     detail::unroll<Levels>([&](auto level) ESOKIT_INLINE_LAMBDA {
       auto& z = step.states[level];
       const S e = measured - z[0];
@@ -663,13 +695,26 @@ class PredictorCorrector {
         }
       }
       if constexpr (NominalGain) {
-        z = detail::add_scaled(z, laws_[level].gain(e), e);
+        correct_level(z, laws_[level].gain(e), e, found);
       } else {
-        z = detail::add_scaled(z, law_gain(laws_[level], e, elapsed), e);
+        correct_level(z, law_gain(laws_[level], e, elapsed), e, found);
       }
       measured = z[0];
     });
     return fine;
+  }
+
+  /// @param found what the levels so far have corrected of the disturbance
+  template <class Gain, class Found>
+  ESOKIT_INLINE constexpr void correct_level(State& z, const Gain& gain, const S& e,
+                                             [[maybe_unused]] Found& found) const noexcept {
+    if constexpr (std::is_same_v<Found, Nothing>) {
+      z = detail::add_scaled(z, gain, e);
+    } else {
+      const State step = detail::add_scaled(found, gain, e);
+      z = detail::add_scaled(z, step, S(1.0));
+      found = disturbance_part(step);
+    }
   }
 
   ESOKIT_INLINE constexpr void commit(const Correction& step) noexcept {
@@ -780,7 +825,7 @@ class PredictorCorrector {
     }
     LevelStates states;
     for (auto& level : states) level = state;
-    for (std::size_t i = 1; i < Levels; ++i) {
+    for (std::size_t i = 1; i < Levels && adds_up; ++i) {
       for (std::size_t r = Order; r < size; ++r) states[i][r] = S(0.0);
     }
     if (!all(is_finite(probe(states)))) return StepStatus::state_rejected;
