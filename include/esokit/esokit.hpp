@@ -96,6 +96,7 @@
 #include <esokit/identify/intervals.hpp>
 #include <esokit/identify/log.hpp>
 #include <esokit/identify/plateau.hpp>
+#include <esokit/identify/spectrum.hpp>
 #include <esokit/math/combinatorics.hpp>
 #include <esokit/math/dense.hpp>
 #include <esokit/math/fal.hpp>

@@ -8,8 +8,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <esokit/analysis/margins.hpp>
+#include <esokit/control/adrc.hpp>
 #include <esokit/identify/identify.hpp>
 #include <esokit/sim/gaussian.hpp>
+#include <esokit/sim/run.hpp>
 #include <limits>
 #include <string>
 #include <utility>
@@ -94,6 +97,54 @@ TEST(Identify, FindsTheModelThatMadeTheLog) {
   const auto wrong = found->plant<1>();
   ASSERT_FALSE(wrong);
   EXPECT_STREQ(wrong.error().field, "order");
+}
+
+// What was found goes into an observer, and the plant into simulation and analysis, in a call each.
+TEST(Identified, GoesStraightIntoAnObserverSimulationAndAnalysis) {
+  Identified found;
+  found.order = 2;
+  found.input_gain = {b0, 1};
+  found.lag = {tau, 1e-3};
+  found.dead_time = {2.4 * T, 1e-3};
+  found.pole = {1.5, 0.1};
+  found.sinusoids = {{{30, 0.1}, {2, 0.1}}, {{70, 0.1}, {1, 0.1}}};
+  constexpr esokit::ModelParts parts{
+      .order = 2, .plant_poles = true, .actuator = 1, .resonators = 2};
+  const auto config = found.observer<parts>(40, T);
+  ASSERT_TRUE(config);
+  EXPECT_EQ(config->input_gain, b0);
+  EXPECT_EQ(config->sample_time, T);
+  EXPECT_EQ(config->observer_bandwidth, 40);
+  EXPECT_EQ(config->model.actuator.time_constant, tau);
+  EXPECT_EQ(config->model.plant[0], 0);
+  EXPECT_EQ(config->model.plant[1], 1.5);
+  EXPECT_EQ(config->model.resonators[0].frequency, 30);
+  EXPECT_EQ(config->model.resonators[1].frequency, 70);
+  EXPECT_TRUE(esokit::ModelEso<parts>::make(*config));
+  EXPECT_EQ(found.delay(T), 2);
+  EXPECT_EQ(found.delay(1e-3), 10);
+  constexpr esokit::ModelParts chain{.order = 2, .actuator = 1};
+  const auto controller =
+      esokit::Adrc<esokit::ModelEso<chain>>::make(
+          {.observer = *found.observer<chain>(40, T), .controller_bandwidth = 6})
+          .value();
+  const auto machine = found.plant<2>().value();
+  const auto run =
+      esokit::sim::run(machine, controller, {.duration = 4.0, .reference = 1.0}).value();
+  EXPECT_NEAR(run.output.back(), 1, 1e-3);
+  EXPECT_GT(esokit::margins(machine, controller)->phase.value, 0.5);
+
+  const auto rule = [](const auto& refused) {
+    return refused ? std::string("accepted")
+                   : std::string(refused.error().field) + ": " + refused.error().rule;
+  };
+  EXPECT_EQ(rule(found.model<esokit::ModelParts{.order = 1}>()),
+            "order: is not the one that is asked for:");
+  EXPECT_EQ(rule(found.observer<esokit::ModelParts{.order = 3}>(40, T)),
+            "order: is not the one that is asked for:");
+  found.sinusoids.pop_back();
+  EXPECT_EQ(rule(found.model<parts>()),
+            "sinusoids: were found, fewer than the resonators that are asked for:");
 }
 
 // Stamps since 1970, with jitter that they tell, missing rows and a long gap.
@@ -355,6 +406,15 @@ TEST(PrepareLog, TellsQuantisationFromNoise) {
   EXPECT_NEAR(esokit::prepare(log)->report.quantisation, 0.0123, 1e-9);
   for (double& y : log.y) y = std::round(y * 1e4) / 1e4;
   EXPECT_NEAR(esokit::prepare(log)->report.quantisation, 0.0123, 1e-4);
+  // So fine that hardly a value comes twice.
+  Log fine;
+  fine.sample_time = T;
+  esokit::sim::Gaussian gaussian(6);
+  for (int k = 0; k < 1000; ++k) {
+    fine.u.push_back(k % 7);
+    fine.y.push_back(std::round(20000 * gaussian.next()) * 1e-5);
+  }
+  EXPECT_NEAR(esokit::prepare(fine)->report.quantisation, 1e-5, 1e-10);
 }
 
 // Jitter that the stamps tell is taken out: a ramp stays one, a held input keeps its area.
@@ -431,6 +491,57 @@ TEST(PrepareLog, AveragesWithinPieces) {
 TEST(Intervals, StudentsT) {
   EXPECT_NEAR(esokit::student_95(19), 2.0930, 5e-4);
   EXPECT_NEAR(esokit::student_95(9), 2.2622, 5e-3);
+}
+
+// Power of white noise is its variance at each frequency, of a sine that of its bin.
+TEST(Spectrum, WhiteNoiseGivesItsVariance) {
+  esokit::sim::Gaussian gaussian(8);
+  std::vector<double> white(40000);
+  for (double& value : white) value = 3 * gaussian.next();
+  std::vector<double> power(17, 0.0);
+  double count = 0;
+  esokit::each_spectrum(white, {0, 1000}, 10, 32, [&](const std::vector<double>& p) {
+    for (std::size_t j = 0; j < power.size(); ++j) power[j] += p[j];
+    ++count;
+  });
+  // 990 and 38990 rows in stretches of 32 that overlap by half.
+  EXPECT_EQ(count, 60 + 2435);
+  // Four standard errors of so many that share a third; at both ends of half the freedom.
+  for (const double p : power) EXPECT_NEAR(p / count, 9, 9 * 4 * std::sqrt(2 * 1.4 / count));
+  for (std::size_t k = 0; k < white.size(); ++k) {
+    white[k] = std::cos(2 * 3.14159265358979323846 * 5 / 32 * static_cast<double>(k));
+  }
+  esokit::each_spectrum(white, {0}, 0, 32, [&](const std::vector<double>& p) {
+    // (sum of the window / 2)^2 over the sum of its squares: 64 / 12, and a quarter beside it.
+    EXPECT_NEAR(p[5], 64.0 / 12, 1e-9);
+    EXPECT_NEAR(p[4], 16.0 / 12, 1e-9);
+    EXPECT_NEAR(p[7], 0, 1e-9);
+  });
+}
+
+// What friction does now and then, and a mode that is slower, is no noise.
+TEST(NoiseFloor, IsTheNoiseBesideBursts) {
+  esokit::sim::Gaussian gaussian(5);
+  esokit::FitData data;
+  data.sample_time = T;
+  double y = 0;
+  for (int k = 0; k < 6000; ++k) {
+    const double u = std::sin(0.07 * k) + (k / 60 % 2 == 0 ? 1 : -1);
+    const double burst = k % 500 < 10 ? 0.3 * gaussian.next() : 0;
+    data.u.push_back(u);
+    data.y.push_back(y + 0.01 * gaussian.next() + burst);
+    y += T * (2 * u + std::sin(0.02 * k));
+  }
+  esokit::InnovationsFit fit(data, {1, 1, false}, {1, 300, 1e-4, 0.03, 0.5});
+  const esokit::Fit found = fit.at({5, 1e-3, 0.5, 0});
+  const esokit::Estimate floor = fit.noise_floor(found);
+  // Bursts of 30 times the noise in a fiftieth of the rows quadruple the mean.
+  EXPECT_GT(found.noise, 0.04);
+  EXPECT_NEAR(floor.value, 0.01, 0.01 * 0.05);
+  EXPECT_LT(std::abs(floor.value - 0.01), 2 * floor.half_width);
+  EXPECT_LT(floor.half_width, 0.001);
+  // At the largest w all frequencies are the disturbance's.
+  EXPECT_EQ(fit.noise_floor(fit.at({300, 1e-3, 0.5, 0})).value, 0);
 }
 
 // For a mean of white noise the jackknife is the standard error; here b0 is read off innovations

@@ -12,7 +12,9 @@
 #include <esokit/identify/intervals.hpp>
 #include <esokit/identify/log.hpp>
 #include <esokit/identify/plateau.hpp>
+#include <esokit/model/augmented_model.hpp>
 #include <esokit/model/linear_plant.hpp>
+#include <esokit/observer/model_eso.hpp>
 #include <functional>
 #include <limits>
 #include <utility>
@@ -45,6 +47,13 @@ struct OrderFit {
   double friction_scale = 0.0;  ///< v_s, 0 without friction
   double criterion = 0.0;       ///< rows log(mean square) + parameters log(rows): the least wins
   double correlation = 0.0;     ///< largest of the innovations' over lags 1 to 20
+  Estimate noise{};             ///< as fast innovations have it, y's unit; 0: not known
+};
+
+/// A disturbance that swings at one frequency.
+struct Sinusoid {
+  Estimate frequency{};  ///< rad/s
+  Estimate amplitude{};  ///< unit of y^(n), where the disturbance acts
 };
 
 /// A model with error bars, and what it rests on.
@@ -60,6 +69,7 @@ struct Identified {
   Estimate noise{};                 ///< standard deviation of the measurement noise, y's unit
   double disturbance = 0;           ///< intensity of d^(m): variance of its increments over time
   std::vector<Estimate> columns{};  ///< numbers of the log's own columns
+  std::vector<Sinusoid> sinusoids{};  ///< in the disturbance, the largest first
   double friction_shift =
       0;  ///< by how much b0 differs between friction scales, standard errors of b0
   double correlation = 0;          ///< of the innovations, largest over lags 1 to 20
@@ -86,6 +96,57 @@ struct Identified {
     const auto rigid = LinearPlant<Order>::chain(chain);
     if (!rigid) return rigid.error();
     return with_lag(*rigid, lag.value);
+  }
+
+  /// What was found, as the settings of a model of these parts: the lag as its actuator, the pole
+  /// as its plant_poles, the largest sinusoids as its resonators. A part that is not asked for is
+  /// left to the disturbance.
+  /// @tparam Parts of the order that was found, without a sensor, which a log does not tell from an
+  /// actuator
+  template <ModelParts Parts>
+  [[nodiscard]] Expected<typename AugmentedModel<Parts>::Settings, Error<double>> model() const {
+    static_assert(Parts.actuator <= 1, "esokit: identify finds a lag of first order");
+    static_assert(Parts.sensor == 0 && Parts.leaky == 0 && !Parts.follows_speed,
+                  "esokit: identify finds no sensor, nothing that fades and no speed");
+    Rules<double> rules;
+    rules.require(order == Parts.order,
+                  {"order", static_cast<double>(order), "is not the one that is asked for:", -1,
+                   static_cast<double>(Parts.order), true});
+    const auto swings = static_cast<std::size_t>(Parts.resonators);
+    rules.require(sinusoids.size() >= swings,
+                  {"sinusoids", static_cast<double>(sinusoids.size()),
+                   "were found, fewer than the resonators that are asked for:", -1,
+                   static_cast<double>(Parts.resonators), true});
+    if (!rules) return rules.error();
+    typename AugmentedModel<Parts>::Settings settings;
+    if constexpr (Parts.plant_poles) settings.plant[Parts.order - 1] = pole.value;
+    if constexpr (Parts.actuator == 1) settings.actuator.time_constant = lag.value;
+    if constexpr (Parts.resonators > 0) {
+      for (std::size_t i = 0; i < swings; ++i) {
+        settings.resonators[i].frequency = sinusoids[i].frequency.value;
+      }
+    }
+    return settings;
+  }
+
+  /// The config of a ModelEso with what was found.
+  /// @param observer_bandwidth rad/s @param sample_time s, of the loop it is for
+  template <ModelParts Parts>
+  [[nodiscard]] Expected<typename ModelEso<Parts>::Config, Error<double>> observer(
+      double observer_bandwidth, double sample_time) const {
+    const auto settings = model<Parts>();
+    if (!settings) return settings.error();
+    typename ModelEso<Parts>::Config config;
+    config.observer_bandwidth = observer_bandwidth;
+    config.input_gain = input_gain.value;
+    config.sample_time = sample_time;
+    config.model = *settings;
+    return config;
+  }
+
+  /// The dead time in samples, as DelayedInput takes it. @param sample_time s
+  [[nodiscard]] int delay(double sample_time) const {
+    return static_cast<int>(std::lround(dead_time.value / sample_time));
   }
 };
 
@@ -166,13 +227,22 @@ inline double rms(const std::vector<double>& values) {
   return std::sqrt(sum / static_cast<double>(std::max<std::size_t>(values.size(), 1)));
 }
 
+/// Scales of friction that are tried, as shares of the rms of the speed.
+constexpr double friction_scales[] = {0.01, 0.02, 0.04, 0.08, 0.16, 0.32};
+
 /// Speed that friction goes by: y' of order 2, y of order 1; smoothed until the noise in it is a
 /// fiftieth, over no more than the latency.
 inline std::vector<double> friction_speed(const FitData& data, int order, double noise,
                                           double latency) {
   const double T = data.sample_time;
   const int longest = std::clamp(static_cast<int>(latency / T), 2, 200);
-  if (order == 1) return smoothed(data, std::min(longest, 3), 0);
+  if (order == 1) {
+    // Until the noise is a tenth of what the least scale turns around in.
+    int half = 0;
+    const double turn = 0.1 * friction_scales[0] * rms(data.y);
+    while (half < std::min(longest, 3) && noise / std::sqrt(2.0 * half + 1.0) > turn) ++half;
+    return smoothed(data, half, 0);
+  }
   int half = 2;
   std::vector<double> speed = smoothed(data, half, 1);
   const double size = rms(speed);
@@ -228,8 +298,6 @@ inline double criterion(const Fit& fit, int parameters) {
   return rows * std::log(fit.mean_square) + parameters * std::log(rows);
 }
 
-constexpr double friction_scales[] = {0.01, 0.02, 0.04, 0.08, 0.16, 0.32};
-
 /// The best fit of one order, with friction where it helps.
 inline OrderFit fit_order(const FitData& data, const IdentifyOptions& options, int order) {
   const FitBounds bounds = fit_bounds(data);
@@ -238,8 +306,10 @@ inline OrderFit fit_order(const FitData& data, const IdentifyOptions& options, i
   const int columns = static_cast<int>(data.columns.size());
   InnovationsFit plain(data, result.model, bounds);
   result.fit = best_fit(plain);
+  (void)plain.at(result.fit.at);  // its innovations, not those of the last start
   result.criterion = criterion(result.fit, 5 + columns);
   result.correlation = innovations_correlation(plain.residual());
+  result.noise = plain.noise_floor(result.fit);
   if (!options.friction || order > 2) return result;
   const auto speed = friction_speed(data, order, result.fit.noise, result.fit.at.latency);
   const double size = rms(speed);
@@ -249,11 +319,17 @@ inline OrderFit fit_order(const FitData& data, const IdentifyOptions& options, i
   // Friction moves the other parameters, and they the scale: twice.
   for (int pass = 0; pass < 2; ++pass) {
     double least = std::numeric_limits<double>::infinity();
-    for (const double share : friction_scales) {
-      const FitData rubbed = with_friction(data, speed, share * size);
+    const auto attempt = [&](double scale) {
+      const FitData rubbed = with_friction(data, speed, scale);
       InnovationsFit fit(rubbed, result.model, bounds);
       const double square = fit.at(best.at).mean_square;
-      if (square < least) least = square, best_scale = share * size;
+      if (square < least) least = square, best_scale = scale;
+    };
+    for (const double share : friction_scales) attempt(share * size);
+    for (double factor = std::sqrt(2.0); factor > 1.05; factor = std::sqrt(factor)) {
+      const double middle = best_scale;
+      attempt(middle * factor);
+      attempt(middle / factor);
     }
     const FitData rubbed = with_friction(data, speed, best_scale);
     InnovationsFit fit(rubbed, result.model, bounds);
@@ -272,6 +348,7 @@ inline OrderFit fit_order(const FitData& data, const IdentifyOptions& options, i
     // The residual is that of the last fit.
     (void)fit.at(found.at);
     result.correlation = innovations_correlation(fit.residual());
+    result.noise = fit.noise_floor(result.fit);
   }
   return result;
 }
@@ -311,7 +388,7 @@ inline constexpr double interval_widening = 1.6;
   std::vector<OrderFit> best_orders;
   const OrderFit* best = nullptr;
   double best_correlation = std::numeric_limits<double>::infinity();
-  double raw_noise = 0.0;
+  Estimate raw_noise;
   for (const int fold : folds) {
     FitData rows = averaged(raw, fold);
     if (rows.y.size() < 200) break;
@@ -322,7 +399,7 @@ inline constexpr double interval_widening = 1.6;
         orders.begin(), orders.end(),
         [](const OrderFit& a, const OrderFit& b) { return a.criterion < b.criterion; });
     const std::size_t index = static_cast<std::size_t>(winner - orders.begin());
-    if (fold == 1 && winner->correlation < 0.3) raw_noise = winner->fit.noise;
+    if (fold == 1 && winner->correlation < 0.3) raw_noise = winner->noise;
     // Averaging costs what is fast: only if it helps a lot.
     if (winner->correlation < options.correlation_max ||
         winner->correlation < 0.5 * best_correlation) {
@@ -357,10 +434,16 @@ inline constexpr double interval_widening = 1.6;
   const double rows_averaged = std::sqrt(static_cast<double>(result.averaged));
   const double t = student_95(19);
   result.noise = {likely.noise * rows_averaged, t * likely_errors.noise * rows_averaged};
-  // Means tell noise from what else is fast less well than the rows do, if those are nearly white.
-  if (result.averaged > 1 && raw_noise > 0.0) {
-    result.noise.half_width *= raw_noise / result.noise.value;
-    result.noise.value = raw_noise;
+  // Rows that are nearly white tell the noise where nothing else is as fast.
+  if (raw_noise.value > 0.0) {
+    result.noise = {raw_noise.value,
+                    std::max(raw_noise.half_width, result.noise.share() * raw_noise.value)};
+  }
+  // An encoder rounds, and at rest does not show it.
+  const double rounding = result.log.quantisation / std::sqrt(12.0);
+  if (result.noise.low() < rounding) {
+    result.noise.half_width = std::max(result.noise.high() - rounding, result.noise.half_width);
+    result.noise.value = rounding;
   }
   result.plateau = find_plateau(fit, likely);
   if (options.progress) options.progress(0.9);

@@ -15,17 +15,6 @@
 
 namespace esokit {
 
-/// A number and how far it may be off, 95 %.
-struct Estimate {
-  double value = 0.0;       ///< best guess
-  double half_width = 0.0;  ///< the interval is value - half_width .. value + half_width
-  [[nodiscard]] double low() const { return value - half_width; }   ///< lower end
-  [[nodiscard]] double high() const { return value + half_width; }  ///< upper end
-
-  /// Half width over magnitude.
-  [[nodiscard]] double share() const { return half_width / std::abs(value); }
-};
-
 /// Standard errors of a fit.
 struct FitErrors {
   double bandwidth = 0.0;        ///< rad/s; 0 where w was given

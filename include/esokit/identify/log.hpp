@@ -71,8 +71,6 @@ inline double quantisation_step(const std::vector<double>& y) {
     if (difference > 1e-7 * range) differences.push_back(difference);
   }
   if (differences.empty()) return 0.0;
-  // White noise gives as many values as rows; an encoder gives the same few again and again.
-  if (differences.size() > values.size() / 2) return 0.0;
   double step = *std::min_element(differences.begin(), differences.end());
   // Rounding to decimal digits makes the least difference a little short or long.
   for (int pass = 0; pass < 3; ++pass) {

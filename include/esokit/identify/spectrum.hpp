@@ -1,0 +1,72 @@
+/// @file
+/// Power over frequency of a residual that may have gaps.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <cstddef>
+#include <esokit/core/language.hpp>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+namespace esokit {
+
+namespace detail {
+
+/// Fourier transform in place; the size is a power of two.
+inline void transform(std::vector<std::complex<double>>& x) {
+  const std::size_t n = x.size();
+  for (std::size_t i = 1, j = 0; i < n; ++i) {
+    std::size_t bit = n / 2;
+    for (; (j & bit) != 0; bit /= 2) j ^= bit;
+    j ^= bit;
+    if (i < j) std::swap(x[i], x[j]);
+  }
+  for (std::size_t length = 2; length <= n; length *= 2) {
+    const std::size_t half = length / 2;
+    for (std::size_t k = 0; k < half; ++k) {
+      const double angle =
+          -2.0 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(length);
+      const std::complex<double> turn(std::cos(angle), std::sin(angle));
+      for (std::size_t i = k; i < n; i += length) {
+        const std::complex<double> odd = x[i + half] * turn;
+        x[i + half] = x[i] - odd;
+        x[i] += odd;
+      }
+    }
+  }
+}
+
+}  // namespace detail
+
+/// Calls `use(power)` for each stretch of `length` rows (a power of two); stretches overlap by half
+/// and rise and fall as a cosine, as Welch has them. `power` is at j / (length / 2) of half the
+/// sample rate, j = 0 .. length / 2; of white noise each is its variance on average.
+/// @param starts first rows of pieces without a gap @param lead rows at the start of each that do
+/// not count
+template <class Use>
+void each_spectrum(const std::vector<double>& values, const std::vector<std::size_t>& starts,
+                   std::size_t lead, std::size_t length, const Use& use) {
+  std::vector<double> window(length), power(length / 2 + 1);
+  double square = 0.0;
+  for (std::size_t k = 0; k < length; ++k) {
+    const double phase =
+        2.0 * std::numbers::pi * (static_cast<double>(k) + 0.5) / static_cast<double>(length);
+    window[k] = 0.5 - 0.5 * std::cos(phase);
+    square += window[k] * window[k];
+  }
+  std::vector<std::complex<double>> x(length);
+  for (std::size_t piece = 0; piece < starts.size(); ++piece) {
+    const std::size_t to = piece + 1 < starts.size() ? starts[piece + 1] : values.size();
+    for (std::size_t from = starts[piece] + lead; from + length <= to; from += length / 2) {
+      for (std::size_t k = 0; k < length; ++k) x[k] = window[k] * values[from + k];
+      detail::transform(x);
+      for (std::size_t j = 0; j < power.size(); ++j) power[j] = std::norm(x[j]) / square;
+      use(std::as_const(power));
+    }
+  }
+}
+
+}  // namespace esokit
