@@ -12,23 +12,11 @@
 #include <esokit/math/dense.hpp>
 #include <esokit/model/corrected_part.hpp>
 #include <esokit/model/matrix_model.hpp>
+#include <esokit/model/model_parts.hpp>
 #include <esokit/model/sampled_model.hpp>
 #include <limits>
 
 namespace esokit {
-
-/// What is known of the plant: which parts a model has. Their numbers are in its Settings.
-struct ModelParts {
-  int order = 1;               ///< n: the plant is y^(n) = -a_(n-1) y^(n-1) - .. - a_0 y + d + b0 v
-  bool plant_poles = false;    ///< a_0 .. a_(n-1) are known; false: they are zero, a chain
-  int actuator = 0;            ///< order of the lag from u to v: 0 (v = u), 1 or 2
-  int sensor = 0;              ///< order of the lag from y to what is measured: 0, 1 or 2
-  int constants = 1;           ///< m: the disturbance has m integrators, at least one
-  int resonators = 0;          ///< and so many sines of known frequency
-  int leaky = 0;               ///< and so many that fade, each with a time constant
-  bool follows_speed = false;  ///< the frequencies of the resonators change while running, all by
-                               ///< one factor
-};
 
 namespace detail {
 
@@ -118,38 +106,6 @@ constexpr S factorial_ratio(int a, int b) noexcept {
 }
 
 }  // namespace detail
-
-/// A lag by which an actuator or a sensor follows; of order 0 nothing.
-template <int Order, PlainScalar S>
-struct Lag {};
-
-/// tau v' = u - v.
-template <PlainScalar S>
-struct Lag<1, S> {
-  S time_constant{};  ///< tau, s
-};
-
-/// v'' = w^2 (u - v) - 2 zeta w v'.
-template <PlainScalar S>
-struct Lag<2, S> {
-  S frequency{};  ///< w, rad/s
-  S damping = 1;  ///< zeta; 1: two equal time constants 1 / w
-
-  /// Of two time constants, s.
-  static Lag of_time_constants(const S& first, const S& second) noexcept {
-    const S root = std::sqrt(first * second);
-    return {S(1) / root, (first + second) / (S(2) * root)};
-  }
-};
-
-/// A disturbance that swings at a known frequency.
-template <PlainScalar S>
-struct Resonance {
-  S frequency{};          ///< w0, rad/s
-  S damping = 0;          ///< of the swing, 0 up to 1
-  S capture_bandwidth{};  ///< s, rad/s: its poles go to -s +- j w0. Left out: w0. More captures it
-                          ///< faster, and with more error in its frequency, at more noise
-};
 
 /// How far the frequencies may go from what they are given as, as factors.
 template <bool Follows, PlainScalar S>
@@ -304,11 +260,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   [[nodiscard]] static constexpr S measured(const Estimate& z) noexcept {
     return z(lf > 0 ? size - lf : 0);
   }
-  /// A sine by its size and where it is: q = amplitude sin(phase).
-  struct Swing {
-    S amplitude;  ///< unit of y^(n)
-    S phase;      ///< rad
-  };
+  using Swing = esokit::Swing<S>;  ///< a sine by its size and where it is
   /// The sine of resonator 0 .. k - 1.
   [[nodiscard]] static Swing swing(const Estimate& z, int resonator) noexcept
       requires(Parts.resonators > 0) {
@@ -325,7 +277,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   /// the other parts.
   [[nodiscard]] S constant(const Estimate& z) const noexcept {
     const auto x = this->scaled(z);
-    const auto lag = scaled_lag(settings_.actuator, sample_time_);
+    const auto lag = detail::scaled_lag(settings_.actuator, sample_time_);
     const auto alpha = denominator(settings_, sample_time_);
     const auto found = detail::factorial_ratio<S>(order, n);
     // act(s) d = D + sum_i alpha_i y^(i), in units of T^n / n!.
@@ -349,7 +301,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   template <class Design>
   auto with_corrected_part(const S& bandwidth, const Design& design) const {
     if constexpr (lf > 0) {
-      if (sensor_rate(settings_.sensor) > bandwidth) {
+      if (detail::sensor_rate(settings_.sensor) > bandwidth) {
         return design(corrected_part<without(true, true)>());
       }
     }
@@ -371,24 +323,10 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
 
   static constexpr S number(int i) noexcept { return static_cast<S>(i); }
 
-  /// T^l times a_0 .. a_(l-1) of the lag's denominator s^l + .., and one.
-  /// @{
-  static Array<S, 1> scaled_lag(const Lag<0, S>&, const S&) noexcept { return {S(1)}; }
-  static Array<S, 2> scaled_lag(const Lag<1, S>& lag, const S& time) noexcept {
-    return {time / lag.time_constant, S(1)};
-  }
-  static Array<S, 3> scaled_lag(const Lag<2, S>& lag, const S& time) noexcept {
-    const S angle = lag.frequency * time;
-    return {angle * angle, S(2) * lag.damping * angle, S(1)};
-  }
-  /// @}
-  static S sensor_rate(const Lag<1, S>& lag) noexcept { return S(1) / lag.time_constant; }
-  static S sensor_rate(const Lag<2, S>& lag) noexcept { return lag.frequency; }
-
   /// T^(order-i) alpha_i of plant times actuator, s^order + sum_i alpha_i s^i.
   static Array<S, order + 1> denominator(const Settings& settings, const S& time) noexcept {
     Array<S, order + 1> alpha{};
-    const auto lag = scaled_lag(settings.actuator, time);
+    const auto lag = detail::scaled_lag(settings.actuator, time);
     for (std::size_t j = 0; j < lag.size(); ++j) alpha[n + j] = lag[j];
     if constexpr (Parts.plant_poles) {
       S power = time;
@@ -408,7 +346,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   static State others_filtered(const Settings& settings, const S& time, int derivative) noexcept {
     State row{};
     row.fill(S(0));
-    const auto lag = scaled_lag(settings.actuator, time);
+    const auto lag = detail::scaled_lag(settings.actuator, time);
     const int d = lf + order;
     for (int k = 0; k <= la; ++k) {
       const int i = k + derivative;  // d^(i)
@@ -452,19 +390,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   /// T A, and in the last column T B of a u whose scaled effect b T^order / order! is one.
   static Matrix<S, size + 1, size + 1> rates(const Settings& settings, const S& time) noexcept {
     auto a = Matrix<S, size + 1, size + 1>::Zero();
-    if constexpr (lf > 0) {
-      const auto lag = scaled_lag(settings.sensor, time);
-      if constexpr (lf == 1) {
-        a(0, 0) = -lag[0];
-        a(0, 1) = lag[0];
-      } else {
-        const S angle = settings.sensor.frequency * time;
-        a(0, 1) = angle;
-        a(1, 0) = -angle;
-        a(1, 1) = -lag[1];
-        a(1, 2) = angle;
-      }
-    }
+    detail::set_sensor_rates(a, settings.sensor, time);
     const int d = lf + order;
     for (int r = 0; r < order; ++r) a(lf + r, lf + r + 1) = number(r + 1);
     a(d - 1, size) = number(order);
@@ -478,64 +404,19 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
     for (int j = d + 1; j < size; ++j)
       a(d, j) = others[static_cast<std::size_t>(j)] * detail::factorial_ratio<S>(n, order);
     for (int i = 1; i + 1 < m; ++i) a(d + i, d + i + 1) = number(n + i + 1);
-    for (int c = 0; c < Parts.resonators; ++c) {
-      const auto& resonance = settings.resonators[static_cast<std::size_t>(c)];
-      const S w = resonance.frequency * time;
-      const int q = d + m + 2 * c;
-      a(q, q + 1) = w;
-      a(q + 1, q) = -w;
-      a(q + 1, q + 1) = S(-2) * resonance.damping * w;
-    }
-    for (int c = 0; c < Parts.leaky; ++c) {
-      const int j = d + m + 2 * Parts.resonators + c;
-      a(j, j) = -time / settings.leaky[static_cast<std::size_t>(c)];
-    }
+    detail::set_swing_rates(a, d + m, settings.resonators, settings.leaky, time);
     return a;
   }
 
   // ---- Rules.
 
-  static void check_lag(Rules<S>&, const char*, const char*, const Lag<0, S>&, const S&) {}
-  static void check_lag(Rules<S>& rules, const char* field, const char*, const Lag<1, S>& lag,
-                        const S& time) {
-    rules.positive(field, lag.time_constant)
-        .require(lag.time_constant * S(100) >= time, field, lag.time_constant,
-                 "must be at least a hundredth of sample_time");
-  }
-  static void check_lag(Rules<S>& rules, const char* field, const char* damping,
-                        const Lag<2, S>& lag, const S& time) {
-    rules.positive(field, lag.frequency)
-        .positive(damping, lag.damping)
-        .require(lag.frequency * time <= S(100), field, lag.frequency,
-                 "must be at most a hundred times the sample rate")
-        .require(lag.damping * lag.frequency * time <= S(100), damping, lag.damping,
-                 "gives a time constant below a hundredth of sample_time");
-  }
-
   static Check<S> check(const Settings& settings, const S& time) {
     Rules<S> rules;
     rules.finite("model.plant", settings.plant);
-    check_lag(rules, la == 1 ? "model.actuator.time_constant" : "model.actuator.frequency",
-              "model.actuator.damping", settings.actuator, time);
-    check_lag(rules, lf == 1 ? "model.sensor.time_constant" : "model.sensor.frequency",
-              "model.sensor.damping", settings.sensor, time);
-    for (int c = 0; c < Parts.resonators; ++c) {
-      const auto& resonance = settings.resonators[static_cast<std::size_t>(c)];
-      rules.positive("model.resonators.frequency", resonance.frequency, c)
-          .require(resonance.frequency * time < S(3.1), "model.resonators.frequency",
-                   resonance.frequency, "must be below half the sample rate", c)
-          .require(
-              is_finite(resonance.damping) && resonance.damping >= S(0) && resonance.damping < S(1),
-              "model.resonators.damping", resonance.damping, "must be 0 or above, below 1", c)
-          .not_negative("model.resonators.capture_bandwidth", resonance.capture_bandwidth, c);
-      for (int before = 0; before < c; ++before) {
-        const S& other = settings.resonators[static_cast<std::size_t>(before)].frequency;
-        rules.require(
-            detail::absolute(S(resonance.frequency - other)) > S(1e-3) * resonance.frequency,
-            {"model.resonators.frequency", resonance.frequency,
-             "must differ by a thousandth of itself from", c, other, true});
-      }
-    }
+    detail::check_lag(rules, la == 1 ? "model.actuator.time_constant" : "model.actuator.frequency",
+                      "model.actuator.damping", settings.actuator, time);
+    detail::check_sensor(rules, settings.sensor, time);
+    detail::check_resonators(rules, settings.resonators, time);
     if constexpr (Parts.follows_speed) {
       const auto& [lowest, highest] = settings.speed;
       rules.positive("model.speed.lowest", lowest)
@@ -547,18 +428,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
                       "takes a resonator to half the sample rate");
       }
     }
-    for (int c = 0; c < Parts.leaky; ++c) {
-      const S& tau = settings.leaky[static_cast<std::size_t>(c)];
-      rules.positive("model.leaky", tau, c)
-          .require(tau * S(100) >= time, "model.leaky", tau,
-                   "must be at least a hundredth of sample_time", c);
-      for (int before = 0; before < c; ++before) {
-        const S& other = settings.leaky[static_cast<std::size_t>(before)];
-        rules.require(
-            detail::absolute(S(tau - other)) > S(1e-3) * tau,
-            {"model.leaky", tau, "must differ by a thousandth of itself from", c, other, true});
-      }
-    }
+    detail::check_leaky(rules, settings.leaky, time);
     return rules;
   }
 
@@ -599,41 +469,20 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
       part.output[0] = S(1);
       for (int i = 0; i < lf; ++i) part.whole(i, i) = S(1);
     } else {
-      // The sensor's error is what it makes of the others': f = g x with g A + rate g = rate C.
-      const auto lag = scaled_lag(settings_.sensor, sample_time_);
-      Matrix<S, part_size, part_size> shows = Matrix<S, part_size, part_size>::Identity();
-      if constexpr (lf == 1) {
-        shows += rates / lag[0];
-      } else {
-        shows += rates * (lag[1] / lag[0]) + rates * rates / lag[0];
-      }
-      auto transposed = shows.transpose();
-      part.output[0] = S(1);
-      detail::solve_in_place(detail::DenseView<S>{transposed.data(), part_size},
-                             detail::DenseView<S>{part.output.data(), part_size, 1});
-      RowVector<S, part_size> shown;
+      // The sensor's error is what it makes of the others'.
+      const auto shown = detail::shown_by_sensor(settings_.sensor, sample_time_, rates);
       for (int j = 0; j < part_size; ++j) {
-        shown(j) = part.output[static_cast<std::size_t>(j)];
-        part.whole(0, j) = shown(j);
-      }
-      if constexpr (lf == 2) {
-        const RowVector<S, part_size> slope =
-            shown * rates / (settings_.sensor.frequency * sample_time_);
-        for (int j = 0; j < part_size; ++j) part.whole(1, j) = slope(j);
+        part.output[static_cast<std::size_t>(j)] = shown(0, j);
+        for (int i = 0; i < lf; ++i) part.whole(i, j) = shown(i, j);
       }
     }
-    for (std::size_t c = 0; c < Parts.resonators; ++c) {
-      const auto& resonance = less.resonators[c];
-      const bool given = resonance.capture_bandwidth > S(0);
-      part.pairs[c] = {-(given ? resonance.capture_bandwidth : resonance.frequency),
-                       resonance.frequency};
-    }
+    part.pairs = detail::own_pairs(less.resonators);
     return part;
   }
 
   AugmentedModel(const Settings& settings, const S& input_gain, const S& sample_time) noexcept
       : Base(input_gain, sample_time), settings_(settings) {
-    const auto lag = scaled_lag(settings.actuator, sample_time);
+    const auto lag = detail::scaled_lag(settings.actuator, sample_time);
     if constexpr (la > 0) {
       input_gain_ = input_gain_ * lag[0];
       for (int i = 0; i < la; ++i) input_gain_ = input_gain_ * rate_;

@@ -1,0 +1,250 @@
+/// @file
+/// What a model can be put together from: lags of actuator and sensor, and disturbances that stay,
+/// swing or fade. AugmentedModel and LinearPlantModel share it.
+#pragma once
+
+#include <cmath>
+#include <esokit/core/check.hpp>
+#include <esokit/core/matrix.hpp>
+#include <esokit/core/scalar.hpp>
+#include <esokit/math/dense.hpp>
+
+namespace esokit {
+
+/// What is known of the plant: which parts a model has. Their numbers are in its Settings.
+struct ModelParts {
+  int order = 1;               ///< n: the plant is y^(n) = -a_(n-1) y^(n-1) - .. - a_0 y + d + b0 v
+  bool plant_poles = false;    ///< a_0 .. a_(n-1) are known; false: they are zero, a chain
+  int actuator = 0;            ///< order of the lag from u to v: 0 (v = u), 1 or 2
+  int sensor = 0;              ///< order of the lag from y to what is measured: 0, 1 or 2
+  int constants = 1;           ///< m: the disturbance has m integrators, at least one
+  int resonators = 0;          ///< and so many sines of known frequency
+  int leaky = 0;               ///< and so many that fade, each with a time constant
+  bool follows_speed = false;  ///< the frequencies of the resonators change while running, all by
+                               ///< one factor
+};
+
+/// A lag by which an actuator or a sensor follows; of order 0 nothing.
+template <int Order, PlainScalar S>
+struct Lag {};
+
+/// tau v' = u - v.
+template <PlainScalar S>
+struct Lag<1, S> {
+  S time_constant{};  ///< tau, s
+};
+
+/// v'' = w^2 (u - v) - 2 zeta w v'.
+template <PlainScalar S>
+struct Lag<2, S> {
+  S frequency{};  ///< w, rad/s
+  S damping = 1;  ///< zeta; 1: two equal time constants 1 / w
+
+  /// Of two time constants, s.
+  static Lag of_time_constants(const S& first, const S& second) noexcept {
+    const S root = std::sqrt(first * second);
+    return {S(1) / root, (first + second) / (S(2) * root)};
+  }
+};
+
+/// A disturbance that swings at a known frequency.
+template <PlainScalar S>
+struct Resonance {
+  S frequency{};          ///< w0, rad/s
+  S damping = 0;          ///< of the swing, 0 up to 1
+  S capture_bandwidth{};  ///< s, rad/s: its poles go to -s +- j w0. Left out: w0. More captures it
+                          ///< faster, and with more error in its frequency, at more noise
+};
+
+/// A sine by its size and where it is: q = amplitude sin(phase).
+template <PlainScalar S>
+struct Swing {
+  S amplitude;  ///< unit of the disturbance
+  S phase;      ///< rad
+};
+
+namespace detail {
+
+/// Elements of the disturbance: its integrators, two a resonator, and what fades.
+constexpr int disturbance_size(const ModelParts& parts) noexcept {
+  return parts.constants + 2 * parts.resonators + parts.leaky;
+}
+
+/// T^l times a_0 .. a_(l-1) of the lag's denominator s^l + .., and one.
+/// @{
+template <PlainScalar S>
+Array<S, 1> scaled_lag(const Lag<0, S>&, const S&) noexcept {
+  return {S(1)};
+}
+template <PlainScalar S>
+Array<S, 2> scaled_lag(const Lag<1, S>& lag, const S& time) noexcept {
+  return {time / lag.time_constant, S(1)};
+}
+template <PlainScalar S>
+Array<S, 3> scaled_lag(const Lag<2, S>& lag, const S& time) noexcept {
+  const S angle = lag.frequency * time;
+  return {angle * angle, S(2) * lag.damping * angle, S(1)};
+}
+/// @}
+
+/// How fast a sensor is, 1/s.
+/// @{
+template <PlainScalar S>
+S sensor_rate(const Lag<1, S>& lag) noexcept {
+  return S(1) / lag.time_constant;
+}
+template <PlainScalar S>
+S sensor_rate(const Lag<2, S>& lag) noexcept {
+  return lag.frequency;
+}
+/// @}
+
+/// T A of a sensor that is the first states, of what follows behind it: y is state `Order`.
+template <int Order, PlainScalar S, int Rows, int Columns>
+void set_sensor_rates(Matrix<S, Rows, Columns>& a, const Lag<Order, S>& sensor, const S& time) {
+  if constexpr (Order == 1) {
+    a(0, 1) = scaled_lag(sensor, time)[0];
+    a(0, 0) = -a(0, 1);
+  } else if constexpr (Order == 2) {
+    const S angle = sensor.frequency * time;
+    a(0, 1) = angle;
+    a(1, 0) = -angle;
+    a(1, 1) = -scaled_lag(sensor, time)[1];
+    a(1, 2) = angle;
+  }
+}
+
+/// T A of resonators, two states each, and of what fades, one each, from state `first` on.
+template <PlainScalar S, int Rows, int Columns, std::size_t Swings, std::size_t Leaks>
+void set_swing_rates(Matrix<S, Rows, Columns>& a, int first,
+                     const std::array<Resonance<S>, Swings>& resonators,
+                     const std::array<S, Leaks>& leaky, const S& time) {
+  int q = first;
+  for (const auto& resonance : resonators) {
+    const S w = resonance.frequency * time;
+    a(q, q + 1) = w;
+    a(q + 1, q) = -w;
+    a(q + 1, q + 1) = S(-2) * resonance.damping * w;
+    q += 2;
+  }
+  for (const S& tau : leaky) {
+    a(q, q) = -time / tau;
+    ++q;
+  }
+}
+
+/// What a sensor's states are where their errors are only what they make of those of the plant,
+/// whose first state is y: f = g x with g A + rate g = rate C, and of order 2 f' / w.
+/// @param rates T A of the plant
+template <int Order, PlainScalar S, int Size>
+Matrix<S, Order, Size> shown_by_sensor(const Lag<Order, S>& sensor, const S& time,
+                                       const Matrix<S, Size, Size>& rates) {
+  const auto lag = scaled_lag(sensor, time);
+  Matrix<S, Size, Size> shows = Matrix<S, Size, Size>::Identity();
+  if constexpr (Order == 1) {
+    shows += rates / lag[0];
+  } else {
+    shows += rates * (lag[1] / lag[0]) + rates * rates / lag[0];
+  }
+  auto transposed = shows.transpose();
+  Array<S, Size> output{};
+  output.fill(S(0));
+  output[0] = S(1);
+  solve_in_place(DenseView<S>{transposed.data(), Size}, DenseView<S>{output.data(), Size, 1});
+  Matrix<S, Order, Size> shown;
+  for (int j = 0; j < Size; ++j) shown(0, j) = output[static_cast<std::size_t>(j)];
+  if constexpr (Order == 2) {
+    for (int j = 0; j < Size; ++j) {
+      S slope(0);
+      for (int i = 0; i < Size; ++i) slope = slope + shown(0, i) * rates(i, j);
+      shown(1, j) = slope / (sensor.frequency * time);
+    }
+  }
+  return shown;
+}
+
+/// Real and imaginary part of the poles that the resonators ask for, 1/s.
+template <PlainScalar S, std::size_t Swings>
+Array<Array<S, 2>, static_cast<int>(Swings)> own_pairs(
+    const std::array<Resonance<S>, Swings>& resonators) {
+  Array<Array<S, 2>, static_cast<int>(Swings)> pairs{};
+  for (std::size_t c = 0; c < Swings; ++c) {
+    const auto& resonance = resonators[c];
+    const bool given = resonance.capture_bandwidth > S(0);
+    pairs[c] = {-(given ? resonance.capture_bandwidth : resonance.frequency), resonance.frequency};
+  }
+  return pairs;
+}
+
+// ---- Rules.
+
+/// @{
+template <PlainScalar S>
+void check_lag(Rules<S>&, const char*, const char*, const Lag<0, S>&, const S&) {}
+template <PlainScalar S>
+void check_lag(Rules<S>& rules, const char* field, const char*, const Lag<1, S>& lag,
+               const S& time) {
+  rules.positive(field, lag.time_constant)
+      .require(lag.time_constant * S(100) >= time, field, lag.time_constant,
+               "must be at least a hundredth of sample_time");
+}
+template <PlainScalar S>
+void check_lag(Rules<S>& rules, const char* field, const char* damping, const Lag<2, S>& lag,
+               const S& time) {
+  rules.positive(field, lag.frequency)
+      .positive(damping, lag.damping)
+      .require(lag.frequency * time <= S(100), field, lag.frequency,
+               "must be at most a hundred times the sample rate")
+      .require(lag.damping * lag.frequency * time <= S(100), damping, lag.damping,
+               "gives a time constant below a hundredth of sample_time");
+}
+/// @}
+
+template <int Order, PlainScalar S>
+void check_sensor(Rules<S>& rules, const Lag<Order, S>& sensor, const S& time) {
+  check_lag(rules, Order == 1 ? "model.sensor.time_constant" : "model.sensor.frequency",
+            "model.sensor.damping", sensor, time);
+}
+
+template <PlainScalar S, std::size_t Swings>
+void check_resonators(Rules<S>& rules, const std::array<Resonance<S>, Swings>& resonators,
+                      const S& time) {
+  for (std::size_t i = 0; i < Swings; ++i) {
+    const auto& resonance = resonators[i];
+    const auto c = static_cast<int>(i);
+    rules.positive("model.resonators.frequency", resonance.frequency, c)
+        .require(resonance.frequency * time < S(3.1), "model.resonators.frequency",
+                 resonance.frequency, "must be below half the sample rate", c)
+        .require(
+            is_finite(resonance.damping) && resonance.damping >= S(0) && resonance.damping < S(1),
+            "model.resonators.damping", resonance.damping, "must be 0 or above, below 1", c)
+        .not_negative("model.resonators.capture_bandwidth", resonance.capture_bandwidth, c);
+    for (std::size_t before = 0; before < i; ++before) {
+      const S& other = resonators[before].frequency;
+      rules.require(absolute(S(resonance.frequency - other)) > S(1e-3) * resonance.frequency,
+                    {"model.resonators.frequency", resonance.frequency,
+                     "must differ by a thousandth of itself from", c, other, true});
+    }
+  }
+}
+
+template <PlainScalar S, std::size_t Leaks>
+void check_leaky(Rules<S>& rules, const std::array<S, Leaks>& leaky, const S& time) {
+  for (std::size_t i = 0; i < Leaks; ++i) {
+    const S& tau = leaky[i];
+    const auto c = static_cast<int>(i);
+    rules.positive("model.leaky", tau, c)
+        .require(tau * S(100) >= time, "model.leaky", tau,
+                 "must be at least a hundredth of sample_time", c);
+    for (std::size_t before = 0; before < i; ++before) {
+      const S& other = leaky[before];
+      rules.require(
+          absolute(S(tau - other)) > S(1e-3) * tau,
+          {"model.leaky", tau, "must differ by a thousandth of itself from", c, other, true});
+    }
+  }
+}
+
+}  // namespace detail
+
+}  // namespace esokit
