@@ -35,6 +35,7 @@
 #include <esokit/control/controller.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/dual_feedback.hpp>
+#include <esokit/control/experiment.hpp>
 #include <esokit/control/filter_form.hpp>
 #include <esokit/control/incremental.hpp>
 #include <esokit/control/limiter.hpp>

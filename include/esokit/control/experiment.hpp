@@ -1,0 +1,495 @@
+/// @file
+/// Experiment: a relay or steps on the real machine, within limits, for b0, latency and a log.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <esokit/control/limiter.hpp>
+#include <esokit/core/check.hpp>
+#include <esokit/core/expected.hpp>
+
+namespace esokit {
+
+/// What moves the machine.
+enum class Excitation : unsigned char {
+  relay,  ///< u0 + A until y has risen by the hysteresis, u0 - A until it has fallen by it, ..
+  steps   ///< u0 + A and u0 - A in turns of `half_period`, the first one half as long
+};
+
+/// Config of Experiment.
+template <PlainScalar S = double>
+struct ExperimentConfig {
+  S sample_time{};                            ///< T, s
+  Excitation excitation = Excitation::relay;  ///< relay: nothing of the machine need be known
+  S input{};           ///< u0, unit of u: what holds the machine where the experiment begins
+  S amplitude{};       ///< A, unit of u; negative where more u lowers y
+  S hysteresis{};      ///< relay: unit of y, a few times the noise; left out with steps
+  S lead{};            ///< relay, order 2: s, some five times lag and dead time; else left out
+  S half_period{};     ///< steps: s, at least 8 samples; left out with a relay
+  S rest{};            ///< s with u0 before, in which y0 is found; 0: y0 is the first y
+  S travel{};          ///< largest abs(y - y0), unit of y; beyond it the experiment stops
+  S time_limit{};      ///< longest time of all, s
+  S hand_over{};       ///< s: the relay or the steps go on so long after the last cycle measured
+  int cycles = 8;      ///< measured, after two to settle; even, 6 .. 200
+  Limits<S> limits{};  ///< of the actuator; u0 - A and u0 + A must be within
+
+  /// @cond
+  static constexpr auto fields(auto& c) noexcept {
+    return detail::tie(c.sample_time, c.excitation, c.input, c.amplitude, c.hysteresis, c.lead,
+                       c.half_period, c.rest, c.travel, c.time_limit, c.hand_over, c.cycles,
+                       c.limits);
+  }
+  /// @endcond
+};
+
+/// Where an experiment is.
+enum class ExperimentPhase : unsigned char {
+  rest,       ///< u0, y0 is being found
+  settling,   ///< the first two cycles
+  measuring,  ///< the cycles that count
+  hand_over,  ///< the result is there; u goes on, for the observer of the controller that follows
+  done,       ///< u0
+  aborted     ///< u0; `reason` says why
+};
+
+/// Has text.
+template <>
+inline constexpr bool has_text<ExperimentPhase> = true;
+
+/// Writes the phase's name.
+template <class Stream>
+requires detail::WritesText<Stream> Stream& operator<<(Stream& out, ExperimentPhase phase) {
+  constexpr const char* names[] = {"rest", "settling", "measuring", "hand_over", "done", "aborted"};
+  out << names[static_cast<int>(phase)];
+  return out;
+}
+
+/// Why an experiment was aborted.
+enum class AbortReason : unsigned char {
+  none,        ///< it was not
+  travel,      ///< y went further than `travel`
+  time_limit,  ///< it took longer: the relay does not switch, or switches slowly
+  bad_sample,  ///< y or the reported u was not finite
+  stopped      ///< by `stop`
+};
+
+/// Has text.
+template <>
+inline constexpr bool has_text<AbortReason> = true;
+
+/// Writes the reason.
+template <class Stream>
+requires detail::WritesText<Stream> Stream& operator<<(Stream& out, AbortReason reason) {
+  constexpr const char* names[] = {"none", "travel", "time_limit", "bad_sample", "stopped"};
+  out << names[static_cast<int>(reason)];
+  return out;
+}
+
+/// What an experiment found, for y^(n) = b0 v(t - L) + d, tau v' + v = u.
+template <PlainScalar S>
+struct ExperimentResult {
+  S input_gain{};             ///< b0
+  S input_gain_half_width{};  ///< 95 %, of this model: friction and damping are not in it
+  S least{};                  ///< abs(b0) if all of the latency were dead time
+  S largest{};                ///< abs(b0) if all of it were lag
+  S latency{};                ///< lag and dead time together, s
+  S frequency{};              ///< at which it was found, rad/s
+  int windows{};              ///< of two cycles each, of which the interval is made
+};
+
+/// A row of the log: y, and the u that was held from then to the next row.
+template <PlainScalar S>
+struct ExperimentRow {
+  S time{};  ///< s since the first sample
+  S u{};     ///< held from here on
+  S y{};     ///< measured
+};
+
+/// Moves a machine with a relay or with steps around an operating point, stops by itself, and says
+/// what b0 and latency are; `update` at each sample, as with a controller.
+///
+/// Way: of each two cycles the complex sums of the n-th differences of y and of u, weighted with
+/// w = 1 - cos(theta) and the harmonics 1 and 3 of the cycle,
+///
+///     H_m = sum w e^(-j m 2 theta) D^n y / (T^n sum w e^(-j m 2 theta) u),   m = 1, 3
+///
+/// As w and its slope begin and end at zero and a constant d has no part in them, H is b0 e^(-j w
+/// L) / (1 + j w tau) at the frequency of the cycle whatever the machine does before and after: no
+/// describing function. abs(H_3 / H_1) tells lag from dead time, the angle of H_3 how far this
+/// model of the machine is wrong, the scatter of the H how far noise goes; all three are in the
+/// interval. What is not: with n = 2, Coulomb friction of 10, 20, 30 % of b0 A makes b0 read 2, 6,
+/// 11 % low and the latency short; a d that rises by r a second all the time shifts H by r P / (12
+/// A), P being the time of a cycle. `identify` of the log tells them apart.
+///
+/// A relay on a machine of order 2 without damping has no cycle without `lead`: it switches on
+/// y + 3 (y - f), f being y behind a lag of a quarter of `lead`.
+///
+/// Hand-over: from phase `hand_over` on the result is there; make the controller, lead it with
+/// `track(y, reference, u)` while the experiment still moves the machine, and go on with its
+/// `update` at phase `done`: its first u is that of its law. `examples/identify` shows it.
+/// @tparam Order n, 1 or 2
+template <int Order, PlainScalar S = double>
+class Experiment {
+  static_assert(Order == 1 || Order == 2, "esokit: an experiment is of order 1 or 2");
+
+ public:
+  static constexpr int order = Order;  ///< n
+  using scalar_type = S;               ///< of signals and settings
+  using Config = ExperimentConfig<S>;  ///< settings of make
+  using Result = ExperimentResult<S>;  ///< what is found
+  template <class T>
+  using with_scalar = Experiment<Order, T>;  ///< the same of another scalar
+
+  /// Checks the settings. @return the experiment before its first sample, or an error
+  static Expected<Experiment, Error<S>> make(const Config& config) {
+    const bool relay = config.excitation == Excitation::relay;
+    const S T = config.sample_time;
+    const int cycles = config.cycles;
+    Rules<S> rules;
+    rules.positive("sample_time", T)
+        .finite("input", config.input)
+        .nonzero("amplitude", config.amplitude)
+        .not_negative("rest", config.rest)
+        .positive("travel", config.travel)
+        .positive("time_limit", config.time_limit)
+        .not_negative("hand_over", config.hand_over)
+        .require(6 <= cycles && cycles <= 200 && cycles % 2 == 0, "cycles", static_cast<S>(cycles),
+                 "must be even, 6 .. 200");
+    if (relay) {
+      rules.positive("hysteresis", config.hysteresis)
+          .require(
+              !(config.hysteresis >= config.travel),
+              {"hysteresis", config.hysteresis, "must be below travel", -1, config.travel, true})
+          .left_out("half_period", config.half_period, "must be left out with a relay");
+    } else {
+      rules.left_out("hysteresis", config.hysteresis, "must be left out with steps")
+          .positive("half_period", config.half_period);
+    }
+    if (relay && Order == 2) {
+      rules.positive("lead", config.lead);
+    } else {
+      rules.left_out("lead", config.lead, "is for a relay of order 2: must be left out");
+    }
+    if (!rules) return rules.error();
+    const auto limiter = Limiter<S>::make(config.limits, T);
+    if (!limiter) return limiter.error();
+    const S high = config.input + detail::absolute(config.amplitude);
+    const S low = config.input - detail::absolute(config.amplitude);
+    const S samples = config.time_limit / T;
+    rules
+        .require(is_finite(high) && !(high > config.limits.upper),
+                 {"amplitude", config.amplitude, "leads beyond limits.upper with input", -1,
+                  config.limits.upper, true})
+        .require(is_finite(low) && !(low < config.limits.lower),
+                 {"amplitude", config.amplitude, "leads beyond limits.lower with input", -1,
+                  config.limits.lower, true})
+        .require(is_finite(samples) && samples < S(1 << 24), "time_limit", config.time_limit,
+                 "must be below 2^24 samples")
+        .require(config.rest < config.time_limit,
+                 {"rest", config.rest, "must be below time_limit", -1, config.time_limit, true})
+        .require(config.hand_over < config.time_limit,
+                 {"hand_over", config.hand_over, "must be below time_limit", -1, config.time_limit,
+                  true});
+    if (!rules) return rules.error();
+    if (!relay) {
+      rules
+          .require(config.half_period < config.time_limit,
+                   {"half_period", config.half_period, "must be below time_limit", -1,
+                    config.time_limit, true})
+          .require((std::round)(config.half_period / T) >= S(8), "half_period", config.half_period,
+                   "must be at least 8 samples");
+    }
+    const S power = Order == 1 ? T : S(T * T);
+    rules.representable("sample_time", T, power, "has a power that the scalar cannot hold");
+    if (!rules) return rules.error();
+    return Experiment(config);
+  }
+
+  /// One sample. @param y measurement @return u to be held until the next sample
+  S update(S y) noexcept { return update(y, held_); }
+
+  /// The same where the actuator reports what it held since the last sample.
+  S update(S y, S u_applied) noexcept {
+    if (finished()) return held_ = config_.input;
+    if (!is_finite(y) || !is_finite(u_applied)) return abort(AbortReason::bad_sample);
+    if (count_ > 0) last_row_ = {S(count_ - 1) * config_.sample_time, u_applied, y_[0]};
+    const S from_rest = y - rest_;
+    if (count_ == 0) {
+      rest_ = y;
+    } else if (!is_finite(from_rest) || detail::absolute(from_rest) > config_.travel) {
+      return abort(is_finite(from_rest) ? AbortReason::travel : AbortReason::bad_sample);
+    }
+    if (count_ >= limit_samples_) return abort(AbortReason::time_limit);
+    ++count_;
+    if (count_ > 1 && phase_ == ExperimentPhase::measuring) add(y, u_applied);
+    y_[1] = y_[0];
+    y_[0] = y;
+    u_last_ = u_applied;
+    return held_ = next(y);
+  }
+
+  /// Ends it: u0 from now on.
+  S stop() noexcept { return finished() ? held_ : abort(AbortReason::stopped); }
+
+  /// b0 and latency, once phase `hand_over` or `done` is reached.
+  [[nodiscard]] Expected<Result, Error<S>> result() const noexcept {
+    using E = Error<S>;
+    // An abort while handing over takes nothing back.
+    if (2 * windows_ < config_.cycles)
+      return E{"phase", S(static_cast<int>(phase_)), "of the experiment is before its result"};
+    if (least_window_ < 48)
+      return E{"cycle",
+               S(least_window_) / S(2),
+               "is the shortest in samples, and must be at least",
+               -1,
+               S(24),
+               true};
+    const S sign = config_.amplitude < S(0) ? S(-1) : S(1);
+    const Complex one{sign * first_.mean.re, sign * first_.mean.im};
+    const Complex three{sign * third_.mean.re, sign * third_.mean.im};
+    const S size = magnitude(one);
+    if (!is_finite(size) || !is_finite(third_.square) || !(size > S(0)))
+      return E{"input_gain", size, "is not a number that can be used"};
+    const S angle = std::atan2(-one.im, one.re);
+    if (!(angle > S(0)) || angle > S(1.5)) {
+      return E{"latency", angle / frequency_,
+               "does not fit: friction or damping is too large for this amplitude, or order, or "
+               "the sign of amplitude, is another"};
+    }
+    // (1 + x^2) / (1 + 9 x^2) is the square of abs(H_3 / H_1) for x = w tau.
+    const S longest = std::tan(angle) * std::tan(angle);
+    const auto square_of_lag = [longest](S ratio) {
+      const S below = S(9) * ratio * ratio - S(1);
+      const S x = below > S(0) ? (S(1) - ratio * ratio) / below : longest;
+      return x < S(0) ? S(0) : x > longest ? longest : x;
+    };
+    const S ratio = magnitude(three) / size;
+    const S square = square_of_lag(ratio);
+    const S x = std::sqrt(square);
+    const S dead = angle - std::atan(x);
+    const S expected = S(3) * dead + std::atan(S(3) * x);
+    const S c = std::cos(expected), s = std::sin(expected);
+    const S misfit =
+        detail::absolute(std::atan2(three.re * s + three.im * c, three.re * c - three.im * s));
+    const S scatter = student() * third_.error() / (ratio * size);
+    S share = std::sqrt(misfit * misfit + scatter * scatter);
+    // A third harmonic that u does not have, or that noise hides, says nothing.
+    if (!is_finite(share) || share > S(1)) share = S(1);
+    const auto gain = [&](S r) { return size * std::sqrt(S(1) + square_of_lag(r)); };
+    const S middle = gain(ratio);
+    const S down = middle - gain(ratio * (S(1) + share));
+    const S up = gain(ratio * (S(1) - share)) - middle;
+    const S split = down > up ? down : up;
+    const S repeat = student() * first_.error() * middle / size;
+    Result found;
+    found.input_gain = sign * middle;
+    found.input_gain_half_width = std::sqrt(split * split + repeat * repeat);
+    found.least = size;
+    found.largest = size * std::sqrt(S(1) + longest);
+    found.latency = (dead + x) / frequency_;
+    found.frequency = frequency_;
+    found.windows = windows_;
+    return found;
+  }
+
+  /// Where it is.
+  [[nodiscard]] ExperimentPhase phase() const noexcept { return phase_; }
+  /// Why it was aborted.
+  [[nodiscard]] AbortReason reason() const noexcept { return reason_; }
+  /// Done or aborted: u is u0.
+  [[nodiscard]] bool finished() const noexcept {
+    return phase_ == ExperimentPhase::done || phase_ == ExperimentPhase::aborted;
+  }
+  /// The u that holds now.
+  [[nodiscard]] S output() const noexcept { return held_; }
+  /// y0: mean of y in the rest.
+  [[nodiscard]] S rest_output() const noexcept { return rest_; }
+  /// T, s.
+  [[nodiscard]] S sample_time() const noexcept { return config_.sample_time; }
+  /// Samples so far.
+  [[nodiscard]] std::int32_t samples() const noexcept { return count_; }
+  /// The row before this sample, complete now that the u applied since is known; from the second
+  /// sample on. Collected they are a log for `identify`.
+  [[nodiscard]] const ExperimentRow<S>& row() const noexcept { return last_row_; }
+
+ private:
+  friend struct detail::LaneAccess;
+  struct Complex {
+    S re{}, im{};
+  };
+
+  /// Mean and scatter, one by one.
+  struct Spread {
+    Complex mean{};
+    S square{};
+    int count = 0;
+    void add(Complex value) noexcept {
+      ++count;
+      const Complex before{value.re - mean.re, value.im - mean.im};
+      mean.re += before.re / S(count);
+      mean.im += before.im / S(count);
+      square += before.re * (value.re - mean.re) + before.im * (value.im - mean.im);
+    }
+    /// Standard error of the mean.
+    [[nodiscard]] S error() const noexcept {
+      return std::sqrt((square > S(0) ? square : S(0)) / S(count * (count - 1)));
+    }
+  };
+
+  /// Sums over two cycles.
+  struct Sums {
+    Complex y{}, u{};
+    void add(S weight, S c, S s, S difference, S input) noexcept {
+      y.re += weight * c * difference;
+      y.im -= weight * s * difference;
+      u.re += weight * c * input;
+      u.im -= weight * s * input;
+    }
+    [[nodiscard]] Complex ratio(S power) const noexcept {
+      const S square = power * (u.re * u.re + u.im * u.im);
+      return {(y.re * u.re + y.im * u.im) / square, (y.im * u.re - y.re * u.im) / square};
+    }
+  };
+
+  explicit Experiment(const Config& config) noexcept
+      : config_(config),
+        rest_samples_(to_samples(config.rest)),
+        limit_samples_(to_samples(config.time_limit)),
+        half_samples_(to_samples(config.half_period)),
+        hand_over_samples_(to_samples(config.hand_over)),
+        held_(config.input) {
+    if (config.lead > S(0)) follow_ = -std::expm1(S(-4) * config.sample_time / config.lead);
+  }
+
+  [[nodiscard]] std::int32_t to_samples(S seconds) const noexcept {
+    return static_cast<std::int32_t>((std::round)(seconds / config_.sample_time));
+  }
+
+  static S magnitude(const Complex& z) noexcept { return std::hypot(z.re, z.im); }
+
+  /// Of the 95 % interval of a mean of `windows_` numbers.
+  [[nodiscard]] S student() const noexcept {
+    constexpr float table[] = {4.303f, 3.182f, 2.776f, 2.571f, 2.447f, 2.365f, 2.306f, 2.262f};
+    return windows_ <= 10 ? static_cast<S>(table[windows_ - 3]) : static_cast<S>(2.228f);
+  }
+
+  S abort(AbortReason reason) noexcept {
+    phase_ = ExperimentPhase::aborted;
+    reason_ = reason;
+    return held_ = config_.input;
+  }
+
+  /// A sample of the window.
+  void add(S y, S u_applied) noexcept {
+    if (window_ == 0) return;
+    const S weight = S(1) - turn_.re;
+    const S c2 = turn_.re * turn_.re - turn_.im * turn_.im, s2 = S(2) * turn_.re * turn_.im;
+    const S c4 = c2 * c2 - s2 * s2, s4 = S(2) * c2 * s2;
+    S difference = y - y_[0];
+    S input = u_applied - config_.input;
+    if constexpr (Order == 2) {
+      difference -= y_[0] - y_[1];
+      input = (input + (u_last_ - config_.input)) / S(2);
+    }
+    sums_[0].add(weight, c2, s2, difference, input);
+    sums_[1].add(weight, c2 * c4 - s2 * s4, s2 * c4 + c2 * s4, difference, input);
+    const Complex next{turn_.re * step_.re - turn_.im * step_.im,
+                       turn_.re * step_.im + turn_.im * step_.re};
+    // What rounding makes of its length.
+    const S length = S(1.5) - (next.re * next.re + next.im * next.im) / S(2);
+    turn_ = {next.re * length, next.im * length};
+    if (--left_ == 0) close_window();
+  }
+
+  void open_window(std::int32_t samples) noexcept {
+    window_ = left_ = samples;
+    const S angle = S(6.283185307179586L) / S(samples);
+    step_ = {std::cos(angle), std::sin(angle)};
+    turn_ = {S(1), S(0)};
+    sums_[0] = sums_[1] = {};
+    if (least_window_ == 0 || samples < least_window_) least_window_ = samples;
+  }
+
+  void close_window() noexcept {
+    const S T = config_.sample_time;
+    const S power = Order == 1 ? T : S(T * T);
+    first_.add(sums_[0].ratio(power));
+    third_.add(sums_[1].ratio(power));
+    ++windows_;
+    frequency_ +=
+        (S(12.566370614359172L) / (S(window_) * T) - frequency_) / static_cast<S>(windows_);
+    window_ = 0;
+    if (2 * windows_ >= config_.cycles) {
+      phase_ = ExperimentPhase::hand_over;
+      phase_start_ = count_;
+    }
+  }
+
+  /// Of this sample on.
+  S next(S y) noexcept {
+    if (phase_ == ExperimentPhase::rest) {
+      rest_ += (y - rest_) / S(count_);
+      if (count_ <= rest_samples_) return config_.input;
+      phase_ = ExperimentPhase::settling;
+      lagging_ = y - rest_;
+      side_ = true;
+      switched_ = count_ - half_samples_ / 2;
+      return moved();
+    }
+    if (phase_ == ExperimentPhase::hand_over && count_ - phase_start_ >= hand_over_samples_) {
+      phase_ = ExperimentPhase::done;
+      return config_.input;
+    }
+    if (switches(y - rest_)) {
+      side_ = !side_;
+      const bool up = side_;
+      const std::int32_t cycle = count_ - up_;
+      switched_ = count_;
+      if (up) {
+        up_ = count_;
+        ++cycles_;
+        // The first to settle have no cycle before them.
+        if (phase_ == ExperimentPhase::settling && cycles_ > 2) phase_ = ExperimentPhase::measuring;
+        if (phase_ == ExperimentPhase::measuring && window_ == 0) open_window(2 * cycle);
+      }
+    }
+    return moved();
+  }
+
+  [[nodiscard]] bool switches(S deviation) noexcept {
+    if (config_.excitation == Excitation::steps) return count_ - switched_ >= half_samples_;
+    S seen = deviation;
+    if constexpr (Order == 2) {
+      lagging_ += follow_ * (deviation - lagging_);
+      seen += S(3) * (deviation - lagging_);
+    }
+    // By amplitude < 0 a side of u moves y the other way, which is in `side_` already.
+    return side_ ? seen > config_.hysteresis : seen < -config_.hysteresis;
+  }
+
+  [[nodiscard]] S moved() const noexcept {
+    return side_ ? config_.input + config_.amplitude : config_.input - config_.amplitude;
+  }
+
+  Config config_;
+  std::int32_t rest_samples_, limit_samples_, half_samples_, hand_over_samples_;
+  S follow_{};
+  S held_;
+  S u_last_{};
+  S rest_{};
+  S lagging_{};
+  S y_[2]{};
+  ExperimentRow<S> last_row_{};
+  Complex turn_{}, step_{};
+  Sums sums_[2]{};
+  Spread first_{}, third_{};
+  S frequency_{};
+  std::int32_t count_ = 0, switched_ = 0, up_ = 0, phase_start_ = 0;
+  std::int32_t window_ = 0, left_ = 0, least_window_ = 0;
+  int cycles_ = 0, windows_ = 0;
+  bool side_ = true;
+  ExperimentPhase phase_ = ExperimentPhase::rest;
+  AbortReason reason_ = AbortReason::none;
+};
+
+}  // namespace esokit
