@@ -131,12 +131,14 @@
 #include <esokit/sim/butcher_tableau.hpp>
 #include <esokit/sim/closed_loop.hpp>
 #include <esokit/sim/combined_signals.hpp>
+#include <esokit/sim/counted_gaussian.hpp>
 #include <esokit/sim/dormand_prince.hpp>
 #include <esokit/sim/elementary_signals.hpp>
 #include <esokit/sim/filtered_step.hpp>
 #include <esokit/sim/gaussian.hpp>
 #include <esokit/sim/loop_steps.hpp>
 #include <esokit/sim/metrics.hpp>
+#include <esokit/sim/monte_carlo.hpp>
 #include <esokit/sim/noise.hpp>
 #include <esokit/sim/peak.hpp>
 #include <esokit/sim/plant.hpp>
@@ -147,6 +149,7 @@
 #include <esokit/sim/series.hpp>
 #include <esokit/sim/signal.hpp>
 #include <esokit/sim/signals.hpp>
+#include <esokit/sim/statistics.hpp>
 #include <esokit/sim/step_response.hpp>
 #include <esokit/sim/trapezoid.hpp>
 #include <esokit/sim/window.hpp>

@@ -217,6 +217,11 @@ requires requires { typename Function::template with_scalar<T>; }
 struct ForScalar<Function, T> {
   using type = typename Function::template with_scalar<T>;
 };
+/// Whether it can be one of another scalar: it holds nothing, or says what it is then.
+template <class Function>
+inline constexpr bool has_other_scalars = std::is_empty_v<Function> || requires {
+  typename Function::template with_scalar<float>;
+};
 /// @}
 
 /// What belongs to lane `i`: of a PerLane its element, of a plain scalar's the thing itself.

@@ -39,6 +39,8 @@ struct LinearPlant {
   using State = Vector<ScalarType, States>;    ///< x
   using Input = Vector<ScalarType, Inputs>;    ///< u, or d
   using Output = Vector<ScalarType, Outputs>;  ///< y
+  template <class T>
+  using with_scalar = LinearPlant<States, T, Inputs, Outputs>;  ///< the same of another scalar
 
   Matrix<ScalarType, States, States> a{};   ///< A, 1/s
   Matrix<ScalarType, States, Inputs> b{};   ///< B
@@ -197,6 +199,12 @@ struct LinearPlant {
     }
     return all;
   }
+
+  /// @cond
+  static constexpr auto fields(auto& plant) noexcept {
+    return detail::tie(plant.a, plant.b, plant.c, plant.e, plant.dead_time);
+  }
+  /// @endcond
 
  private:
   struct Reached {

@@ -101,18 +101,52 @@ struct NonlinearPlant {
   using Output = ScalarOrVector<ScalarType, Outputs>;  ///< y: a number if it is one
   using Time = LaneScalar<ScalarType>;                 ///< t, s
 
+  /// The same of another scalar. Functions that hold numbers have a `with_scalar`, and `fields`, of
+  /// their own; others take any scalar.
+  template <class T>
+  requires(esokit::detail::has_other_scalars<F>&&
+               esokit::detail::has_other_scalars<H>) using with_scalar =
+      NonlinearPlant<States, T, Inputs, Outputs, typename esokit::detail::ForScalar<F, T>::type,
+                     typename esokit::detail::ForScalar<H, T>::type>;
+
   F f;  ///< x' = f(t, x, u)
   H h;  ///< y = h(t, x)
 
   /// x'. @param t s
-  State derivative(const Time& t, const State& x, const Input& u) const { return f(t, x, u); }
+  State derivative(const Time& t, const State& x, const Input& u)
+      const requires std::is_invocable_v<const F&, const Time&, const State&, const Input&> {
+    return f(t, x, u);
+  }
   /// y. @param t s
   Output output(const Time& t, const State& x) const { return h(t, x); }
+
+  /// @cond
+  static constexpr auto fields(auto& plant) noexcept {
+    return esokit::detail::tie(plant.f, plant.h);
+  }
+  /// @endcond
 };
+
+namespace detail {
+/// The output of a plant of another scalar.
+template <class Output, class T>
+struct OutputIn {
+  using type = T;
+};
+template <class S, int Size, class T>
+struct OutputIn<Vector<S, Size>, T> {
+  using type = Vector<T, Size>;
+};
+}  // namespace detail
 
 /// The first states, as many as there are outputs.
 template <class Output>
 struct FirstStates {
+  /// @cond
+  template <class T>
+  using with_scalar = FirstStates<typename detail::OutputIn<Output, T>::type>;
+  /// @endcond
+
   /// y.
   template <class Time, class State>
   Output operator()(const Time& /*t*/, const State& x) const {

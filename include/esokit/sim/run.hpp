@@ -9,6 +9,7 @@
 #include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/lanes.hpp>
+#include <esokit/sim/counted_gaussian.hpp>
 #include <esokit/sim/gaussian.hpp>
 #include <esokit/sim/loop_steps.hpp>
 #include <esokit/sim/plant.hpp>
@@ -121,6 +122,11 @@ struct RunConfig {
   /// Or as the function says: s from sample k to the next, 0.1 T .. 10 T.
   std::function<Time(std::int64_t)> step_time{};
   std::uint64_t seed = 1;  ///< of noise, missing and jitter: equal seeds, equal runs
+
+  /// Which of many runs under one seed this is: its chance is then drawn by counter, as that of run
+  /// `number` of a MonteCarlo, and of packs lane i is run number + i. Left out: one sequence,
+  /// handed out to the lanes in turn. Packs with a number do not jitter: lanes have one time.
+  std::optional<std::uint64_t> number{};
 
   Time dead_time{};   ///< s that u takes to the plant, beside the plant's own dead time
   int substeps = 1;   ///< steps of integration a sample; one is exact of a linear plant but for d
@@ -303,27 +309,49 @@ class RunChance {
     bool noisy = false;
     each_number(config.noise,
                 [&](const S& deviation) { noisy = noisy || !all(deviation <= S(0.0)); });
-    if (noisy) noise_.emplace(config.seed);
-    if (config.missing > Time(0)) losses_.emplace(config.seed + 1);
-    if (config.jitter > Time(0)) jitter_.emplace(config.seed + 2);
+    if (config.number) {
+      const auto counted = [&](RandomStream stream, int index = 0) {
+        return CountedGaussian<S>(config.seed, stream, *config.number, index);
+      };
+      for (int i = 0; noisy && i < Types::outputs; ++i) {
+        counted_noise_.push_back(counted(RandomStream::noise, i));
+      }
+      if (config.missing > Time(0)) counted_losses_.emplace(counted(RandomStream::losses));
+      if (config.jitter > Time(0)) counted_jitter_.emplace(counted(RandomStream::jitter));
+    } else {
+      if (noisy) noise_.emplace(config.seed);
+      if (config.missing > Time(0)) losses_.emplace(config.seed + 1);
+      if (config.jitter > Time(0)) jitter_.emplace(config.seed + 2);
+    }
+    quiet_ = !noisy && !(config.missing > Time(0)) && !config.sensor;
   }
 
   /// What the controller is given of y.
   ESOKIT_INLINE Output measured(Time t, Output y) {
-    if (!noise_ && !losses_ && !config_.sensor) return y;
+    if (quiet_) return y;
     return disturbed(t, y);
   }
 
   /// From this sample to the next, s.
   Time step_time(std::int64_t k, const Time& sample_time) {
     if (config_.step_time) return config_.step_time(k);
-    const auto share = static_cast<Time>(2.0 * jitter_->uniform() - 1.0);
+    const double uniform =
+        counted_jitter_
+            ? static_cast<double>(esokit::detail::number_of_lane(counted_jitter_->uniform(), 0))
+            : jitter_->uniform();
+    const auto share = static_cast<Time>(2.0 * uniform - 1.0);
     return sample_time * (Time(1) + config_.jitter * share);
   }
 
  private:
   ESOKIT_COLD Output disturbed(Time t, Output y) {
     Output measured = y;
+    if (!counted_noise_.empty()) {
+      Output noise = config_.noise;
+      auto random = counted_noise_.begin();
+      each_number(noise, [&](S& deviation) { deviation = deviation * (random++)->next(); });
+      measured = measured + noise;
+    }
     if (noise_) {
       Output noise = config_.noise;
       each_number(noise, [&](S& deviation) {
@@ -336,20 +364,33 @@ class RunChance {
       measured = measured + noise;
     }
     if (config_.sensor) measured = config_.sensor(t, measured);
-    if (losses_) {
-      bool lost[static_cast<std::size_t>(lane_count<S>)];
-      for (bool& one : lost) one = losses_->uniform() < static_cast<double>(config_.missing);
-      each_number(measured, [&](S& number) {
-        for (int i = 0; i < lane_count<S>; ++i) {
-          if (lost[i]) esokit::detail::set_lane(number, std::numeric_limits<Time>::quiet_NaN(), i);
-        }
-      });
-    }
+    if (losses_ || counted_losses_) lose(measured);
     return measured;
   }
 
+  void lose(Output& measured) {
+    const auto missing = static_cast<double>(config_.missing);
+    bool lost[static_cast<std::size_t>(lane_count<S>)];
+    if (losses_) {
+      for (bool& one : lost) one = losses_->uniform() < missing;
+    } else {
+      const S uniform = counted_losses_->uniform();
+      for (int i = 0; i < lane_count<S>; ++i) {
+        lost[i] = static_cast<double>(esokit::detail::number_of_lane(uniform, i)) < missing;
+      }
+    }
+    each_number(measured, [&](S& number) {
+      for (int i = 0; i < lane_count<S>; ++i) {
+        if (lost[i]) esokit::detail::set_lane(number, std::numeric_limits<Time>::quiet_NaN(), i);
+      }
+    });
+  }
+
   const RunConfig<P, C>& config_;
+  bool quiet_ = false;
   std::optional<Gaussian> noise_, losses_, jitter_;
+  std::vector<CountedGaussian<S>> counted_noise_;  ///< one an output
+  std::optional<CountedGaussian<S>> counted_losses_, counted_jitter_;
 };
 
 /// A run whose settings are checked.
@@ -609,6 +650,8 @@ requires ControllerOf<C, P> Expected<RunEnd<P, C>, Error<typename RunTypes<P, C>
       .require(!(config.missing > Time(1)), "missing", config.missing, "must not be above 1")
       .not_negative("jitter", config.jitter)
       .require(!(config.jitter > Time(0.9)), "jitter", config.jitter, "must not be above 0.9")
+      .require(lane_count<S> == 1 || !config.number || !(config.jitter > Time(0)), "jitter",
+               config.jitter, "must be left out where packs run by number")
       .not_negative("dead_time", config.dead_time)
       .require(config.substeps >= 1 && config.substeps <= 1000000, "substeps",
                static_cast<Time>(config.substeps), "must be 1 .. 1000000")

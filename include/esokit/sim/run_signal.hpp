@@ -78,6 +78,26 @@ class RunSignal {
     }
   }
 
+  /// Of packs what a plain one is, the same in every lane.
+  template <Scalar Plain>
+  requires(lane_count<ScalarType> > 1 && std::same_as<Plain, LaneScalar<ScalarType>>)
+      RunSignal(const RunSignal<Plain, Count, Derivatives>& plain)
+      : plain_(plain.plain()) {
+    const auto all_lanes = [plain](const Time& t) {
+      const auto numbers = plain(t);
+      Value value;
+      for (int i = 0; i < Count; ++i) {
+        for (int lane = 0; lane < lane_count<ScalarType>; ++lane) value(i)[lane] = numbers(i);
+      }
+      return value;
+    };
+    if (plain.constant()) {
+      constant_ = all_lanes(Time(0));
+    } else {
+      function_ = all_lanes;
+    }
+  }
+
   /// Its numbers at t.
   [[nodiscard]] Value operator()(const Time& t) const {
     return function_ ? function_(t) : constant_;

@@ -50,6 +50,16 @@ constexpr ScalarType scaled(long double weight, ScalarType h) {
   return weight == 1 ? h : coefficient<ScalarType>(weight) * h;
 }
 
+/// A number of time as what a state can be multiplied by: of packs it is the same in each lane.
+template <class State, class ScalarType>
+constexpr auto factor(const ScalarType& number) {
+  if constexpr (requires { requires(lane_count<typename State::value_type> > 1); }) {
+    return typename State::value_type(static_cast<double>(number));
+  } else {
+    return number;
+  }
+}
+
 /// Weight of stage J in the row `Stage` of the tableau; the row `stages` holds the result weights.
 template <class Method, int Stage, int J>
 constexpr long double weight_of() {
@@ -76,7 +86,8 @@ template <class Method, int Stage, int J, class State, class ScalarType, class S
   if constexpr (weight == 0) {
     return advanced<Method, Stage, J + 1, State>(h, sum, rest...);
   } else {
-    return advanced<Method, Stage, J + 1, State>(h, sum + scaled(weight, h) * first, rest...);
+    return advanced<Method, Stage, J + 1, State>(h, sum + factor<State>(scaled(weight, h)) * first,
+                                                 rest...);
   }
 }
 

@@ -1,0 +1,630 @@
+/// @file
+/// monte_carlo(plant, controller, config, vary): a loop, run with other chance and other plants as
+/// often as you like, on all cores and in the lanes of packs.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <concepts>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <esokit/core/check.hpp>
+#include <esokit/core/expected.hpp>
+#include <esokit/core/lanes.hpp>
+#include <esokit/core/pack.hpp>
+#include <esokit/sim/counted_gaussian.hpp>
+#include <esokit/sim/run.hpp>
+#include <esokit/sim/statistics.hpp>
+#include <functional>
+#include <limits>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <tuple>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace esokit::sim {
+
+/// The vector instructions that this was compiled for; packs are as wide as they allow.
+inline constexpr const char* instruction_set =
+#if defined(__AVX512F__)
+    "AVX-512";
+#elif defined(__AVX2__)
+    "AVX2";
+#elif defined(__AVX__)
+    "AVX";
+#elif defined(__SSE2__)
+    "SSE2";
+#elif defined(__ARM_NEON)
+    "NEON";
+#else
+    "none";
+#endif
+
+/// The random numbers by which a run differs from others: a function of seed and run alone.
+class Draw {
+ public:
+  /// @param seed of all runs
+  Draw(std::uint64_t seed, std::int64_t run) noexcept
+      : random_(seed, RandomStream::variation, static_cast<std::uint64_t>(run)), run_(run) {}
+
+  /// Mean 0, variance 1.
+  double normal() noexcept { return random_.next(); }
+  /// Between two numbers, all alike.
+  double uniform(double low, double high) noexcept {
+    return low + (high - low) * random_.uniform();
+  }
+  /// Between two positive numbers, all ratios alike: a factor of 2 is as likely as one of 1/2.
+  double uniform_ratio(double low, double high) noexcept {
+    return low * std::exp(std::log(high / low) * random_.uniform());
+  }
+  /// Which run, 0, 1, ..
+  [[nodiscard]] std::int64_t run() const noexcept { return run_; }
+
+ private:
+  CountedGaussian<double> random_;
+  std::int64_t run_;
+};
+
+/// What may differ from run to run, beside chance.
+template <class P, class C>
+struct Trial {
+  P plant;                                ///< with dead time the same in all for speed
+  C controller;                           ///< designed anew, retuned or as it was
+  typename RunTypes<P, C>::State state;   ///< x at the start
+  typename RunTypes<P, C>::Output noise;  ///< of the measurement, standard deviation
+};
+
+/// Nothing but chance.
+struct NoVariation {
+  /// Leaves all as it is.
+  template <class T>
+  void operator()(T&, Draw&) const noexcept {}
+};
+
+/// Which samples a Measure looks at, and what its number has to keep.
+struct MeasureOptions {
+  double from = 0.0;                                       ///< s of the loop, first sample
+  double to = std::numeric_limits<double>::infinity();     ///< s, last sample
+  double limit = std::numeric_limits<double>::infinity();  ///< what the number must not be above
+};
+
+/// A number of a run, made of `of(sample)` or `of(sample, controller)` at its samples.
+///
+/// A function of any scalar: packs of runs go through it too. Made by `largest`, `average`,
+/// `root_mean_square`, `final_value` and `settling_time`.
+template <class Reduce, class F>
+struct Measure {
+  std::string name;        ///< what it is
+  F of;                    ///< of a sample
+  MeasureOptions options;  ///< window and limit
+  Reduce reduce{};         ///< how numbers of samples become one
+};
+
+namespace detail {
+
+struct Largest {
+  template <class S>
+  static S start() {
+    return S(std::numeric_limits<LaneScalar<S>>::lowest());
+  }
+  template <class S>
+  ESOKIT_INLINE void add(S& sum, const S& value, const LaneScalar<S>&) const {
+    sum = select(sum < value, value, sum);
+  }
+  static double end(double sum, double) { return sum; }
+};
+struct Average {
+  template <class S>
+  static S start() {
+    return S(0.0);
+  }
+  template <class S>
+  ESOKIT_INLINE void add(S& sum, const S& value, const LaneScalar<S>&) const {
+    sum = sum + value;
+  }
+  static double end(double sum, double samples) { return sum / samples; }
+};
+struct RootMeanSquare : Average {
+  template <class S>
+  ESOKIT_INLINE void add(S& sum, const S& value, const LaneScalar<S>&) const {
+    sum = sum + value * value;
+  }
+  static double end(double sum, double samples) { return std::sqrt(sum / samples); }
+};
+struct FinalValue : Average {
+  template <class S>
+  ESOKIT_INLINE void add(S& sum, const S& value, const LaneScalar<S>&) const {
+    sum = value;
+  }
+  static double end(double sum, double) { return sum; }
+};
+struct SettlingTime : FinalValue {
+  template <class S>
+  ESOKIT_INLINE void add(S& sum, const S& value, const LaneScalar<S>& passed) const {
+    sum = select(esokit::detail::absolute(value) > S(band), S(static_cast<double>(passed)), sum);
+  }
+  double band;
+};
+
+/// The types of `Lanes` runs at once.
+template <class P, class C, int Lanes>
+struct InPacks {
+  static constexpr bool possible = false;
+};
+template <class P, class C, int Lanes>
+requires(Lanes > 1 && esokit::detail::LaneAccess::has_fields<P> &&
+         esokit::detail::LaneAccess::has_fields<C> && requires {
+           typename P::template with_scalar<Pack<typename RunTypes<P, C>::S, Lanes>>;
+           typename C::template with_scalar<Pack<typename RunTypes<P, C>::S, Lanes>>;
+           requires std::same_as < typename RunTypes<P, C>::S,
+           typename C::scalar_type > ;
+         }) struct InPacks<P, C, Lanes> {
+  using S = Pack<typename RunTypes<P, C>::S, Lanes>;
+  using Plant = typename P::template with_scalar<S>;
+  using Control = typename C::template with_scalar<S>;
+  static constexpr bool possible = [] {
+    if constexpr (SampledPlant<Plant>) {
+      return ControllerOf<Control, Plant> && std::is_trivially_copyable_v<Control>;
+    } else {
+      return false;
+    }
+  }();
+};
+
+}  // namespace detail
+
+/// The largest of(sample) of a run: of `s.output - s.reference` its overshoot.
+template <class F>
+Measure<detail::Largest, F> largest(std::string name, F of, MeasureOptions options = {}) {
+  return {std::move(name), std::move(of), options};
+}
+/// The mean of of(sample) over a run's samples.
+template <class F>
+Measure<detail::Average, F> average(std::string name, F of, MeasureOptions options = {}) {
+  return {std::move(name), std::move(of), options};
+}
+/// The root of the mean square of of(sample).
+template <class F>
+Measure<detail::RootMeanSquare, F> root_mean_square(std::string name, F of,
+                                                    MeasureOptions options = {}) {
+  return {std::move(name), std::move(of), options};
+}
+/// of(sample) of the last sample.
+template <class F>
+Measure<detail::FinalValue, F> final_value(std::string name, F of, MeasureOptions options = {}) {
+  return {std::move(name), std::move(of), options};
+}
+/// When abs(of(sample)) was above `band` for the last time, s after `options.from`.
+template <class F>
+Measure<detail::SettlingTime, F> settling_time(std::string name, F of, double band,
+                                               MeasureOptions options = {}) {
+  return {std::move(name), std::move(of), options, {{}, band}};
+}
+
+/// A run that gave no numbers.
+template <class Time>
+struct FailedRun {
+  std::int64_t run = 0;  ///< which
+  Error<Time> error{};   ///< of the variation, or of the loop: a state that is no number, say
+};
+
+/// Settings of `monte_carlo`.
+template <class P, class C>
+struct MonteCarloConfig {
+  using Time = typename RunTypes<P, C>::Time;  ///< of times
+
+  std::int64_t runs{};     ///< how many, 1 or more
+  RunConfig<P, C> loop{};  ///< of every run, with the seed of them all; its `number` is left out
+  int threads = 0;         ///< 0: one a core
+
+  /// Called now and then with the runs that are done, 0 .. runs - 1 of them; false stops.
+  std::function<bool(std::int64_t done)> progress{};
+
+  /// Called with the numbers of each run, in the order of the runs, from one thread at a time; of a
+  /// run that failed they are NaN.
+  std::function<void(std::int64_t run, std::span<const double> numbers)> on_run{};
+};
+
+/// What came out.
+template <class Time>
+struct MonteCarloOutcome {
+  std::int64_t runs = 0;               ///< done: the first so many, where it was stopped
+  std::int64_t failed = 0;             ///< that gave no numbers; they are in no statistics
+  FailedRun<Time> first_failure{};     ///< the first of them
+  std::vector<RunStatistics> numbers;  ///< of each Measure
+  bool completed = true;               ///< false if it was stopped
+  int threads = 1;                     ///< that it ran on
+  int lanes = 1;                       ///< runs at once on each
+
+  /// Of all runs, the share that kept the limit of a number; a run that failed did not.
+  [[nodiscard]] double share_kept(std::size_t number) const {
+    return static_cast<double>(numbers[number].kept()) / static_cast<double>(runs);
+  }
+};
+
+/// Many runs of a loop. See monte_carlo.
+template <SampledPlant P, class C, class Vary = NoVariation>
+requires ControllerOf<C, P>
+class MonteCarlo {
+ public:
+  using Types = RunTypes<P, C>;             ///< of the numbers
+  using Time = typename Types::Time;        ///< s
+  using Config = MonteCarloConfig<P, C>;    ///< settings
+  using Outcome = MonteCarloOutcome<Time>;  ///< what comes out
+
+  /// Runs that are handed out to a thread at once.
+  static constexpr std::int64_t block = 256;
+
+  /// Nothing is run yet.
+  MonteCarlo(P plant, C controller, Config config, Vary vary)
+      : plant_(std::move(plant)),
+        controller_(std::move(controller)),
+        config_(std::move(config)),
+        vary_(std::move(vary)) {}
+
+  /// What a run differs by; an error where `vary` gave one.
+  [[nodiscard]] Expected<Trial<P, C>, Error<Time>> trial(std::int64_t run) const {
+    Trial<P, C> one{plant_, controller_, config_.loop.state, config_.loop.noise};
+    Draw draw(config_.loop.seed, run);
+    using Answer = std::invoke_result_t<const Vary&, Trial<P, C>&, Draw&>;
+    if constexpr (std::is_void_v<Answer>) {
+      vary_(one, draw);
+    } else {
+      if (const auto ok = vary_(one, draw); !ok) return detail::as_error<Time>(ok.error());
+    }
+    return one;
+  }
+
+  /// The settings by which sim::run repeats a run, with the plant and controller of its trial.
+  [[nodiscard]] RunConfig<P, C> settings(std::int64_t run, const Trial<P, C>& trial) const {
+    RunConfig<P, C> loop = config_.loop;
+    set(loop, run, trial.state, trial.noise);
+    return loop;
+  }
+
+  /// One of the runs again, recorded: the worst, say.
+  [[nodiscard]] Expected<Recording<P, C>, Error<Time>> replay(std::int64_t run) const {
+    const auto one = trial(run);
+    if (!one) return one.error();
+    return sim::run(one->plant, one->controller, settings(run, *one));
+  }
+
+  /// Runs them all. The numbers are the same for any count of threads and lanes, bit for bit where
+  /// the compiler contracts no products and sums (-ffp-contract=off).
+  ///
+  /// Packs of runs go through packs of plants and controllers where they have such: all linear
+  /// plants, `nonlinear_plant` of functions that take any scalar, controllers of esokit; others run
+  /// one by one, as do a loop with jitter and runs of which one in the pack fails.
+  /// @tparam Lanes runs at once on a thread
+  /// @return error of the settings
+  template <int Lanes = default_lanes<LaneScalar<typename Types::S>>, class... Reduce, class... F>
+  [[nodiscard]] Expected<Outcome, Error<Time>> run(const Measure<Reduce, F>&... measures) const {
+    Rules<Time> rules;
+    rules.require(config_.runs >= 1, "runs", static_cast<Time>(config_.runs), "must be 1 or more")
+        .require(config_.threads >= 0 && config_.threads <= 4096, "threads",
+                 static_cast<Time>(config_.threads), "must be 0 .. 4096")
+        .require(!config_.loop.number, "loop.number",
+                 static_cast<Time>(config_.loop.number.value_or(0)), "must be left out");
+    if (!rules) return rules.error();
+    // The settings of the loop, by one that ends at once, and how many samples it has.
+    const auto first =
+        sim::run(plant_, controller_, config_.loop, [](const auto&) { return false; });
+    if (!first && is_setting(first.error().field)) return first.error();
+    const auto sample_time = detail::run_sample_time<P, C>(controller_, config_.loop);
+    const double end = static_cast<double>(config_.loop.start_time + config_.loop.duration -
+                                           *sample_time / Time(2));
+    (check(rules, measures.options, end), ...);
+    if (!rules) return rules.error();
+
+    using Packed = detail::InPacks<P, C, Lanes>;
+    bool in_packs = false;
+    if constexpr (Packed::possible) {
+      in_packs = !(config_.loop.jitter > Time(0)) && !config_.loop.step_time;
+    }
+    Work work(*this, sizeof...(measures));
+    work.outcome.lanes = in_packs ? Lanes : 1;
+    (work.outcome.numbers.emplace_back(measures.name, measures.options.limit), ...);
+    work.go([&](std::int64_t from, Results& results) {
+      if constexpr (Packed::possible) {
+        if (in_packs) {
+          run_in_packs<Packed>(from, results, measures...);
+          return;
+        }
+      }
+      for (std::int64_t i = from; i < from + results.count; ++i)
+        run_one(i, results, i - from, measures...);
+    });
+    return std::move(work.outcome);
+  }
+
+ private:
+  /// Of a block.
+  struct Results {
+    std::int64_t count;
+    std::vector<double> numbers;  ///< of run 0, of run 1, ..
+    std::vector<FailedRun<Time>> failed;
+  };
+
+  /// The blocks on their way: computed in any order, taken in theirs.
+  struct Work {
+    Work(const MonteCarlo& of, std::size_t numbers) : study(of), measures(numbers) {}
+
+    template <class Compute>
+    void go(const Compute& compute) {
+      const auto cores = static_cast<int>(std::thread::hardware_concurrency());
+      const std::int64_t blocks = (study.config_.runs + block - 1) / block;
+      const int wanted = study.config_.threads > 0 ? study.config_.threads : std::max(cores, 1);
+      outcome.threads = static_cast<int>(std::min<std::int64_t>(wanted, blocks));
+      const auto work = [&] { take_blocks(blocks, compute); };
+      std::vector<std::thread> others;
+      for (int i = 1; i < outcome.threads; ++i) others.emplace_back(work);
+      work();
+      for (auto& other : others) other.join();
+    }
+
+    template <class Compute>
+    void take_blocks(std::int64_t blocks, const Compute& compute) {
+      std::unique_lock lock(mutex);
+      for (;;) {
+        // Not too far ahead of a slow one: what waits takes memory.
+        news.wait(lock,
+                  [&] { return stopped || next >= blocks || next < taken + 4 * outcome.threads; });
+        if (stopped || next >= blocks) return;
+        const std::int64_t mine = next++;
+        lock.unlock();
+        Results results{std::min(block, study.config_.runs - mine * block), {}, {}};
+        results.numbers.assign(static_cast<std::size_t>(results.count) * measures,
+                               std::numeric_limits<double>::quiet_NaN());
+        compute(mine * block, results);
+        lock.lock();
+        waiting.emplace(mine, std::move(results));
+        while (!stopped && !waiting.empty() && waiting.begin()->first == taken) {
+          take(waiting.begin()->second);
+          waiting.erase(waiting.begin());
+          ++taken;
+        }
+        news.notify_all();
+      }
+    }
+
+    void take(const Results& results) {
+      for (const auto& failure : results.failed) {
+        if (outcome.failed++ == 0) outcome.first_failure = failure;
+      }
+      auto failure = results.failed.begin();
+      for (std::int64_t i = 0; i < results.count; ++i) {
+        const std::int64_t run = outcome.runs + i;
+        const std::span<const double> numbers(
+            results.numbers.data() + static_cast<std::size_t>(i) * measures, measures);
+        if (failure != results.failed.end() && failure->run == run) {
+          ++failure;
+        } else {
+          for (std::size_t k = 0; k < measures; ++k) outcome.numbers[k].add(run, numbers[k]);
+        }
+        if (study.config_.on_run) study.config_.on_run(run, numbers);
+      }
+      outcome.runs += results.count;
+      if (study.config_.progress && !study.config_.progress(outcome.runs)) {
+        stopped = true;
+        outcome.completed = outcome.runs == study.config_.runs;
+      }
+    }
+
+    const MonteCarlo& study;
+    std::size_t measures;
+    Outcome outcome;
+    std::mutex mutex;
+    std::condition_variable news;
+    std::int64_t next = 0;   ///< block that no thread has yet
+    std::int64_t taken = 0;  ///< blocks that are in the outcome
+    bool stopped = false;
+    std::map<std::int64_t, Results> waiting;
+  };
+
+  /// One number a lane of a run or pack of runs, being made.
+  template <class S, class Reduce, class F>
+  struct Meter {
+    explicit Meter(const Measure<Reduce, F>& m) : measure(m), sum(Reduce::template start<S>()) {}
+
+    template <class Sample, class Now>
+    ESOKIT_INLINE void add(const Sample& sample, const Now& controller) {
+      using Seconds = LaneScalar<S>;
+      // Rounding of t must not decide about a sample.
+      const double t = static_cast<double>(sample.t);
+      if (t < measure.options.from - 1e-9 || t > measure.options.to + 1e-9) return;
+      ++samples;
+      const auto passed = static_cast<Seconds>(t - measure.options.from);
+      if constexpr (std::is_invocable_v<const F&, const Sample&, const Now&>) {
+        measure.reduce.add(sum, S(measure.of(sample, controller)), passed);
+      } else {
+        measure.reduce.add(sum, S(measure.of(sample)), passed);
+      }
+    }
+    [[nodiscard]] double number(int lane) const {
+      return measure.reduce.end(static_cast<double>(esokit::detail::number_of_lane(sum, lane)),
+                                static_cast<double>(samples));
+    }
+
+    const Measure<Reduce, F>& measure;
+    S sum;
+    std::int64_t samples = 0;
+  };
+
+  static bool is_setting(std::string_view field) {
+    // What goes wrong in the course of a run, which with other plants may go well.
+    return field != "plant" && field != "controller" && field != "disturbance";
+  }
+
+  static void check(Rules<Time>& rules, const MeasureOptions& options, double end) {
+    const auto from = static_cast<Time>(options.from);
+    rules
+        .require(options.from < end, "measure.from", from,
+                 "must be before the last sample of the loop")
+        .require(options.to >= options.from, "measure.to", static_cast<Time>(options.to),
+                 "must not be before measure.from");
+  }
+
+  template <class Loop, class State, class Output>
+  static void set(Loop& loop, std::int64_t run, const State& state, const Output& noise) {
+    loop.number = static_cast<std::uint64_t>(run);
+    loop.state = state;
+    loop.noise = noise;
+  }
+
+  template <class... Measures>
+  void run_one(std::int64_t run, Results& results, std::int64_t at,
+               const Measures&... measures) const {
+    const auto one = trial(run);
+    if (!one) {
+      results.failed.push_back({run, one.error()});
+      return;
+    }
+    auto loop = settings(run, *one);
+    if (const auto ok = drive(one->plant, one->controller, loop, results, at, 1, measures...); !ok)
+      results.failed.push_back({run, ok.error()});
+  }
+
+  /// Runs it, and writes down the numbers of its lanes; an error where one is not finite.
+  template <class Plant, class Control, class... Reduce, class... F>
+  Check<Time> drive(const Plant& plant, const Control& controller,
+                    const RunConfig<Plant, Control>& loop, Results& results, std::int64_t at,
+                    int lanes, const Measure<Reduce, F>&... measures) const {
+    using S = typename RunTypes<Plant, Control>::S;
+    std::tuple<Meter<S, Reduce, F>...> meters{Meter<S, Reduce, F>(measures)...};
+    const auto end = sim::run(
+        plant, controller, loop, [&](const auto& sample, const Control& now) ESOKIT_INLINE_LAMBDA {
+          std::apply([&](auto&... meter) { (meter.add(sample, now), ...); }, meters);
+        });
+    if (!end) return end.error();
+    constexpr std::size_t count = sizeof...(measures);
+    for (int lane = 0; lane < lanes; ++lane) {
+      double numbers[count + 1];
+      std::size_t i = 0;
+      std::apply([&](const auto&... meter) { ((numbers[i++] = meter.number(lane)), ...); }, meters);
+      for (i = 0; i < count; ++i) {
+        if (!is_finite(numbers[i])) {
+          return Error<Time>{"measure", static_cast<Time>(i), "(its number) is not finite"};
+        }
+        results.numbers[static_cast<std::size_t>(at + lane) * count + i] = numbers[i];
+      }
+    }
+    return {};
+  }
+
+  template <class Packed, class... Measures>
+  void run_in_packs(std::int64_t from, Results& results, const Measures&... measures) const {
+    using S = typename Packed::S;
+    constexpr int lanes = lane_count<S>;
+    auto plant = esokit::detail::blank<typename Packed::Plant>();
+    auto controller = esokit::detail::blank<typename Packed::Control>();
+    auto loop = packed_loop<typename Packed::Plant, typename Packed::Control>();
+    auto state = loop.state;
+    auto noise = loop.noise;
+    constexpr bool varied = !std::is_same_v<Vary, NoVariation>;
+    if constexpr (!varied) {
+      for (int i = 0; i < lanes; ++i) {
+        esokit::detail::set_lane(plant, plant_, i);
+        esokit::detail::set_lane(controller, controller_, i);
+      }
+    }
+    for (std::int64_t at = 0; at < results.count; at += lanes) {
+      bool good = at + lanes <= results.count;
+      if constexpr (varied) {
+        for (int i = 0; i < lanes && good; ++i) {
+          const auto one = trial(from + at + i);
+          good = one.has_value();
+          if (!good) break;
+          esokit::detail::set_lane(plant, one->plant, i);
+          esokit::detail::set_lane(controller, one->controller, i);
+          esokit::detail::set_lane(state, one->state, i);
+          esokit::detail::set_lane(noise, one->noise, i);
+        }
+      }
+      if (good) {
+        set(loop, from + at, state, noise);
+        good = drive(plant, controller, loop, results, at, lanes, measures...).has_value();
+      }
+      // One by one it comes out which of them failed.
+      for (std::int64_t i = at; !good && i < std::min(at + lanes, results.count); ++i) {
+        run_one(from + i, results, i, measures...);
+      }
+    }
+  }
+
+  /// The settings of the loop for packs.
+  template <class Plant, class Control>
+  RunConfig<Plant, Control> packed_loop() const {
+    using S = typename RunTypes<Plant, Control>::S;
+    const RunConfig<P, C>& plain = config_.loop;
+    RunConfig<Plant, Control> loop;
+    const auto broadcast = [](auto& packed, const auto& one) {
+      for (int i = 0; i < lane_count<S>; ++i) esokit::detail::set_lane(packed, one, i);
+    };
+    loop.duration = plain.duration;
+    loop.sample_time = plain.sample_time;
+    loop.reference = plain.reference;
+    loop.disturbance = plain.disturbance;
+    broadcast(loop.noise, plain.noise);
+    if (plain.sensor) {
+      using Output = typename RunTypes<Plant, Control>::Output;
+      loop.sensor = [&plain](const Time& t, const Output& y) {
+        Output seen = y;
+        for (int i = 0; i < lane_count<S>; ++i) {
+          typename Types::Output one{};
+          esokit::detail::copy_lane<false>(y, one, i);
+          esokit::detail::set_lane(seen, plain.sensor(t, one), i);
+        }
+        return seen;
+      };
+    }
+    loop.missing = plain.missing;
+    loop.seed = plain.seed;
+    loop.dead_time = plain.dead_time;
+    loop.substeps = plain.substeps;
+    loop.start_time = plain.start_time;
+    broadcast(loop.initial_input, plain.initial_input);
+    broadcast(loop.state, plain.state);
+    return loop;
+  }
+
+  P plant_;
+  C controller_;
+  Config config_;
+  Vary vary_;
+};
+
+/// Many runs of a loop as `sim::run` drives it, each with its own chance and, by `vary`, its own
+/// plant, controller, start and noise:
+///
+///     auto study = sim::monte_carlo(plant, controller,
+///         {.runs = 100'000, .loop = {.duration = 2.0, .reference = 1.0, .noise = 1e-3}},
+///         [](auto& trial, sim::Draw& draw) { trial.plant.b(1) *= draw.uniform_ratio(0.5, 2.0); });
+///     auto outcome = study.run(sim::largest("overshoot",
+///         [](const auto& s) { return s.output - s.reference; }, {.limit = 0.2}));
+///     auto worst = study.replay(outcome->numbers[0].run_of_largest());
+///
+/// What a run is depends on the seed and its number alone.
+/// @param vary (Trial&, Draw&): makes of the trial, which comes with the plant and the controller
+///        given here, that of a run; pure. It may return a Check, whose error counts as failed.
+/// @{
+template <SampledPlant P, class C, class Vary>
+requires ControllerOf<C, P> MonteCarlo<P, C, Vary> monte_carlo(
+    P plant, C controller, std::type_identity_t<MonteCarloConfig<P, C>> config, Vary vary) {
+  return {std::move(plant), std::move(controller), std::move(config), std::move(vary)};
+}
+template <SampledPlant P, class C>
+requires ControllerOf<C, P> MonteCarlo<P, C> monte_carlo(
+    P plant, C controller, std::type_identity_t<MonteCarloConfig<P, C>> config) {
+  return {std::move(plant), std::move(controller), std::move(config), {}};
+}
+/// @}
+
+}  // namespace esokit::sim

@@ -1,0 +1,360 @@
+// monte_carlo: the same numbers for any threads and lanes, each run as sim::run repeats it, the
+// statistics against sorted lists, runs that fail, what stops it, what is refused.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <esokit/control/adrc.hpp>
+#include <esokit/core/pack.hpp>
+#include <esokit/observer/linear_eso.hpp>
+#include <esokit/sim/monte_carlo.hpp>
+#include <limits>
+#include <span>
+#include <support/refusal.hpp>
+#include <thread>
+#include <vector>
+
+namespace {
+
+using namespace esokit;
+using esokit_test::refusal;
+using Controller = Adrc<LinearEso<2>>;
+using Servo = LinearPlant<2>;
+using Config = sim::MonteCarloConfig<Servo, Controller>;
+
+constexpr double T = 2e-3;
+
+Servo servo() { return Servo::chain({.coefficients = {7, 3}, .input_gain = 50}).value(); }
+Controller::Config design() {
+  return {.observer = {.observer_bandwidth = 80, .input_gain = 50, .sample_time = T},
+          .controller_bandwidth = 12,
+          .limits = {.lower = -6, .upper = 6}};
+}
+Controller adrc() { return Controller::make(design()).value(); }
+
+/// Everything that may be there at once: 700 runs are three blocks, the last not full of packs.
+Config busy() {
+  return {.runs = 701,
+          .loop = {.duration = 0.2,
+                   .reference = [](double t) { return t < 0.02 ? 0.0 : 1.0; },
+                   .disturbance = [](double t) { return t < 0.1 ? 0.0 : -40.0; },
+                   .noise = 2e-3,
+                   .sensor = [](double, double y) { return std::round(y * 1e4) / 1e4; },
+                   .missing = 0.05,
+                   .seed = 99,
+                   .dead_time = 3e-3}};
+}
+constexpr auto vary = [](auto& trial, sim::Draw& draw) {
+  trial.plant.b(1) *= draw.uniform_ratio(0.5, 2.0);
+  trial.plant.a(1, 1) *= draw.uniform(0.5, 1.5);
+  trial.state(0) = 0.1 * draw.normal();
+  trial.noise *= draw.uniform(0.0, 2.0);
+  auto config = design();
+  config.controller_bandwidth = draw.uniform(8.0, 16.0);
+  trial.controller = Controller::make(config).value();
+};
+
+const auto error = [](const auto& sample) { return sample.output - sample.reference; };
+const auto overshoot = sim::largest("overshoot", error, {.limit = 0.05});
+const auto rms = sim::root_mean_square("rms", error, {.from = 0.1, .to = 0.15});
+const auto mean_input = sim::average("mean u", [](const auto& sample) { return sample.input; });
+const auto last = sim::final_value("dhat", [](const auto&, const auto& controller) {
+  return controller.observer().total_disturbance();
+});
+const auto settled = sim::settling_time("settled", error, 0.1, {.from = 0.02});
+
+/// The numbers of all runs, one after the other, as on_run gets them.
+template <int Lanes, class Study>
+std::vector<double> all_numbers(Config config, int threads, const Study& variation, int& lanes) {
+  std::vector<double> all;
+  std::int64_t expected = 0;
+  config.threads = threads;
+  config.on_run = [&](std::int64_t run, std::span<const double> numbers) {
+    EXPECT_EQ(run, expected++);
+    all.insert(all.end(), numbers.begin(), numbers.end());
+  };
+  const auto outcome = sim::monte_carlo(servo(), adrc(), config, variation)
+                           .template run<Lanes>(overshoot, rms, mean_input, last, settled);
+  EXPECT_TRUE(outcome.has_value());
+  EXPECT_EQ(outcome->runs, config.runs);
+  EXPECT_EQ(outcome->failed, 0);
+  EXPECT_TRUE(outcome->completed);
+  lanes = outcome->lanes;
+  return all;
+}
+
+TEST(MonteCarlo, GivesTheSameBitsForAnyThreadsAndLanes) {
+  int lanes = 0;
+  const auto alone = all_numbers<1>(busy(), 1, vary, lanes);
+  EXPECT_EQ(lanes, 1);
+  EXPECT_EQ(alone.size(), 701u * 5);
+  EXPECT_EQ(all_numbers<1>(busy(), 3, vary, lanes), alone);
+  EXPECT_EQ(all_numbers<2>(busy(), 2, vary, lanes), alone);
+  EXPECT_EQ(lanes, 2);
+  EXPECT_EQ(all_numbers<8>(busy(), 3, vary, lanes), alone);
+  EXPECT_EQ(lanes, 8);
+}
+
+// What a run's numbers are made of, by hand from what sim::run records of it.
+TEST(MonteCarlo, RepeatsARunAndItsNumbers) {
+  int lanes = 0;
+  const auto all = all_numbers<4>(busy(), 2, vary, lanes);
+  const auto study = sim::monte_carlo(servo(), adrc(), busy(), vary);
+  for (const std::int64_t run : {0, 255, 256, 700}) {
+    const auto recording = study.replay(run);
+    ASSERT_TRUE(recording.has_value());
+    double largest = -1e9, squares = 0, sum = 0, settles = 0;
+    int in_window = 0;
+    const std::size_t samples = recording->t.size();
+    ASSERT_EQ(samples, 100u);
+    for (std::size_t k = 0; k < samples; ++k) {
+      const double e = recording->output[k] - recording->reference[k];
+      const double t = recording->t[k];
+      largest = std::max(largest, e);
+      if (t > 0.0999 && t < 0.1501) {
+        squares += e * e;
+        ++in_window;
+      }
+      sum += recording->input[k];
+      if (t > 0.0199 && std::abs(e) > 0.1) settles = t - 0.02;
+    }
+    EXPECT_EQ(in_window, 26);
+    const double* numbers = &all[static_cast<std::size_t>(run) * 5];
+    EXPECT_EQ(numbers[0], largest);
+    EXPECT_DOUBLE_EQ(numbers[1], std::sqrt(squares / 26));
+    EXPECT_DOUBLE_EQ(numbers[2], sum / 100);
+    EXPECT_EQ(numbers[3], recording->controller.observer().total_disturbance());
+    EXPECT_DOUBLE_EQ(numbers[4], settles);
+  }
+}
+
+TEST(MonteCarlo, DrawsNewChanceForEachRunAndSeed) {
+  Config config = busy();
+  config.runs = 300;
+  int lanes = 0;
+  const auto numbers = all_numbers<4>(config, 1, sim::NoVariation{}, lanes);
+  std::vector<double> first;
+  for (std::size_t i = 1; i < numbers.size(); i += 5) first.push_back(numbers[i]);
+  std::sort(first.begin(), first.end());
+  EXPECT_EQ(std::adjacent_find(first.begin(), first.end()), first.end());
+  config.loop.seed = 100;
+  EXPECT_NE(all_numbers<4>(config, 1, sim::NoVariation{}, lanes), numbers);
+}
+
+TEST(MonteCarlo, CountsWhatItSaw) {
+  Config config = busy();
+  std::vector<double> seen;
+  config.on_run = [&](std::int64_t, std::span<const double> numbers) {
+    seen.push_back(numbers[0]);
+  };
+  const auto outcome = sim::monte_carlo(servo(), adrc(), config, vary).run<4>(overshoot).value();
+  const auto& numbers = outcome.numbers[0];
+  EXPECT_EQ(numbers.name(), "overshoot");
+  EXPECT_EQ(numbers.count(), 701);
+  const auto worst = std::max_element(seen.begin(), seen.end());
+  EXPECT_EQ(numbers.largest(), *worst);
+  EXPECT_EQ(numbers.run_of_largest(), worst - seen.begin());
+  const auto kept = std::count_if(seen.begin(), seen.end(), [](double x) { return x <= 0.05; });
+  EXPECT_GT(kept, 0);
+  EXPECT_LT(kept, 701);
+  EXPECT_EQ(numbers.kept(), kept);
+  EXPECT_EQ(outcome.share_kept(0), static_cast<double>(kept) / 701);
+}
+
+// The statistics against those of a sorted list, numbers of either sign and zeros among them.
+TEST(RunStatistics, AreThoseOfTheSortedList) {
+  sim::RunStatistics statistics("x", 0.5);
+  sim::Draw draw(1, 1);
+  std::vector<double> all;
+  long double sum = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const double x = i % 100 == 0 ? 0.0 : draw.normal() * draw.uniform_ratio(1e-3, 1e3);
+    all.push_back(x);
+    statistics.add(i, x);
+    sum += x;
+  }
+  const long double mean = sum / 20000;
+  long double squares = 0;
+  for (const double x : all) squares += (x - mean) * (x - mean);
+  EXPECT_NEAR(statistics.mean(), static_cast<double>(mean), 1e-12 * 200);
+  EXPECT_NEAR(statistics.deviation(), static_cast<double>(std::sqrt(squares / 19999)), 1e-12 * 200);
+  std::sort(all.begin(), all.end());
+  EXPECT_EQ(statistics.smallest(), all.front());
+  EXPECT_EQ(statistics.largest(), all.back());
+  EXPECT_EQ(statistics.kept(), std::upper_bound(all.begin(), all.end(), 0.5) - all.begin());
+  for (const double share : {0.0, 0.001, 0.1, 0.45, 0.5, 0.6, 0.95, 0.999, 1.0}) {
+    const auto rank = static_cast<std::size_t>(std::max(0.0, std::ceil(share * 20000) - 1));
+    const double exact = all[rank];
+    EXPECT_NEAR(statistics.quantile(share), exact, std::abs(exact) / 1024 + 1e-300) << share;
+  }
+  EXPECT_EQ(sim::RunStatistics().quantile(0.5), 0.0);
+  EXPECT_EQ(sim::RunStatistics().deviation(), 0.0);
+}
+
+// Plants that blow up (a pole at +4000: 1e308 within 0.18 s) and a refused design, in packs with
+// others, which must not feel it.
+TEST(MonteCarlo, LeavesOutRunsThatFail) {
+  Config config{.runs = 300, .loop = {.duration = 0.3, .reference = 1.0, .noise = 1e-3}};
+  const auto some_fail = [](auto& trial, sim::Draw& draw) -> Check<double> {
+    if (draw.run() % 50 == 17) trial.plant.a(1, 1) = 4000;
+    if (draw.run() % 50 == 30) return Error<double>{"design", 3.0, "was refused"};
+    return {};
+  };
+  std::vector<double> good, mixed;
+  config.on_run = [&](std::int64_t, std::span<const double> n) { good.push_back(n[0]); };
+  ASSERT_TRUE(sim::monte_carlo(servo(), adrc(), config).run<4>(overshoot).has_value());
+  config.on_run = [&](std::int64_t, std::span<const double> n) { mixed.push_back(n[0]); };
+  const auto study = sim::monte_carlo(servo(), adrc(), config, some_fail);
+  const auto outcome = study.run<4>(overshoot).value();
+  EXPECT_EQ(outcome.runs, 300);
+  EXPECT_EQ(outcome.failed, 12);
+  EXPECT_EQ(outcome.first_failure.run, 17);
+  EXPECT_STREQ(outcome.first_failure.error.field, "plant");
+  EXPECT_EQ(outcome.numbers[0].count(), 288);
+  for (std::size_t i = 0; i < 300; ++i) {
+    const bool fails = i % 50 == 17 || i % 50 == 30;
+    EXPECT_EQ(std::isnan(mixed[i]), fails) << i;
+    if (!fails) {
+      EXPECT_EQ(mixed[i], good[i]);
+    }
+  }
+  EXPECT_LT(outcome.share_kept(0), 288.5 / 300);
+  EXPECT_EQ(refusal(study.trial(30)), "design: was refused");
+  EXPECT_EQ(refusal(study.replay(30)), "design: was refused");
+}
+
+TEST(MonteCarlo, StopsWithTheRunsThatItHas) {
+  Config config{.runs = 5000, .loop = {.duration = 0.02, .noise = 1e-3}, .threads = 3};
+  std::vector<std::int64_t> calls;
+  config.progress = [&](std::int64_t done) {
+    calls.push_back(done);
+    return done < 1000;
+  };
+  const auto stopped = sim::monte_carlo(servo(), adrc(), config).run<4>(overshoot).value();
+  EXPECT_EQ(calls, (std::vector<std::int64_t>{256, 512, 768, 1024}));
+  EXPECT_FALSE(stopped.completed);
+  EXPECT_EQ(stopped.runs, 1024);
+  config.progress = {};
+  config.runs = 1024;
+  const auto whole = sim::monte_carlo(servo(), adrc(), config).run<4>(overshoot).value();
+  EXPECT_TRUE(whole.completed);
+  EXPECT_EQ(whole.numbers[0].mean(), stopped.numbers[0].mean());
+  EXPECT_EQ(whole.numbers[0].deviation(), stopped.numbers[0].deviation());
+}
+
+TEST(MonteCarlo, RefusesByName) {
+  const auto answer = [](Config config, sim::MeasureOptions options = {}) {
+    return refusal(
+        sim::monte_carlo(servo(), adrc(), config).run<2>(sim::largest("e", error, options)));
+  };
+  Config config{.runs = 2, .loop = {.duration = 0.02}};
+  EXPECT_EQ(answer(config), "accepted");
+  config.runs = 0;
+  EXPECT_EQ(answer(config), "runs: must be 1 or more");
+  config.runs = 1;
+  EXPECT_EQ(answer(config), "accepted");
+  config.threads = -1;
+  EXPECT_EQ(answer(config), "threads: must be 0 .. 4096");
+  config.threads = 4097;
+  EXPECT_EQ(answer(config), "threads: must be 0 .. 4096");
+  config.threads = 1;
+  config.loop.number = 3;
+  EXPECT_EQ(answer(config), "loop.number: must be left out");
+  config.loop.number.reset();
+  config.loop.duration = 0.0211;
+  EXPECT_EQ(answer(config), "duration: must be a whole multiple of sample_time, which is");
+  config.loop.duration = 0.02;
+  config.loop.noise = -1;
+  EXPECT_EQ(answer(config), "noise: must be finite and not negative");
+  config.loop.noise = 0;
+  EXPECT_EQ(answer(config, {.from = 0.018}), "accepted");
+  EXPECT_EQ(answer(config, {.from = 0.02}),
+            "measure.from: must be before the last sample of the loop");
+  EXPECT_EQ(answer(config, {.from = 0.01, .to = 0.01}), "accepted");
+  EXPECT_EQ(answer(config, {.from = 0.01, .to = 0.009}),
+            "measure.to: must not be before measure.from");
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(answer(config, {.from = nan}),
+            "measure.from: must be before the last sample of the loop");
+  EXPECT_EQ(answer(config, {.to = nan}), "measure.to: must not be before measure.from");
+}
+
+/// A pendulum whose length differs: a function that holds a number says what it is in packs.
+template <class S>
+struct Pendulum {
+  template <class T>
+  using with_scalar = Pendulum<T>;
+  static constexpr auto fields(auto& pendulum) { return esokit::detail::tie(pendulum.rate); }
+
+  Vector<S, 2> operator()(double, const Vector<S, 2>& x, const S& u) const {
+    const S cubic = x(0) - x(0) * x(0) * x(0) * S(1.0 / 6);
+    return {x(1), u - rate * cubic};
+  }
+  S rate{9.81};
+};
+
+// What cannot go through packs goes one by one, and gives the same.
+TEST(MonteCarlo, RunsWhatPacksCannot) {
+  const auto own = [](double y, double r) { return 20 * (r - y); };
+  const auto one_by_one =
+      sim::monte_carlo(servo(), own, {.runs = 10, .loop = {.duration = 0.02, .sample_time = T}})
+          .run<4>(overshoot);
+  EXPECT_EQ(one_by_one->lanes, 1);
+
+  const Config shaky{.runs = 10, .loop = {.duration = 0.02, .noise = 1e-3, .jitter = 0.2}};
+  const auto jitter = sim::monte_carlo(servo(), adrc(), shaky).run<4>(overshoot);
+  EXPECT_EQ(jitter->lanes, 1);
+  EXPECT_GT(jitter->numbers[0].deviation(), 0);
+
+  using P = Pack<double, 2>;
+  const auto packed = LinearPlant<2, P>::chain({.coefficients = {P(7), P(3)}}).value();
+  const auto fourfold = [](const P& y, const P& r) { return r - y; };
+  EXPECT_EQ(refusal(sim::run(packed, fourfold,
+                             {.duration = 0.02, .sample_time = T, .jitter = 0.1, .number = 1})),
+            "jitter: must be left out where packs run by number");
+}
+
+TEST(MonteCarlo, TakesNonlinearPlantsInPacks) {
+  const auto results = [](const auto& plant, const auto& change, int& lanes) {
+    std::vector<double> all;
+    using P = std::remove_cvref_t<decltype(plant)>;
+    sim::MonteCarloConfig<P, Controller> config{
+        .runs = 37,
+        .loop = {.duration = 0.1, .reference = 1.0, .noise = 1e-3},
+        .on_run = [&](std::int64_t, std::span<const double> n) { all.push_back(n[0]); }};
+    const auto study = sim::monte_carlo(plant, adrc(), config, change);
+    lanes = study.template run<4>(overshoot)->lanes;
+    const auto in_packs = all;
+    all.clear();
+    EXPECT_EQ(study.template run<1>(overshoot)->lanes, 1);
+    EXPECT_EQ(in_packs, all);
+    return all;
+  };
+  int lanes = 0;
+  const auto lengths = results(
+      sim::nonlinear_plant<2>(Pendulum<double>{}),
+      [](auto& trial, sim::Draw& draw) { trial.plant.f.rate = draw.uniform(5, 15); }, lanes);
+  EXPECT_EQ(lanes, 4);
+  EXPECT_NE(lengths[0], lengths[1]);
+  results(sim::nonlinear_plant<2>([](const auto&, const auto& x, const auto& u) {
+            return std::remove_cvref_t<decltype(x)>{x(1), u - x(0) * x(0) * x(1)};
+          }),
+          sim::NoVariation{}, lanes);
+  EXPECT_EQ(lanes, 4);
+  // A function of doubles alone, and one that holds a number without saying what it is in packs.
+  results(sim::nonlinear_plant<2>([](double, const Vector<double, 2>& x, double u) {
+            return Vector<double, 2>{x(1), u - std::sin(x(0))};
+          }),
+          sim::NoVariation{}, lanes);
+  EXPECT_EQ(lanes, 1);
+  const double rate = 3;
+  results(sim::nonlinear_plant<2>([rate](const auto&, const auto& x, const auto& u) {
+            return std::remove_cvref_t<decltype(x)>{
+                x(1), u - x(0) * std::remove_cvref_t<decltype(u)>(rate)};
+          }),
+          sim::NoVariation{}, lanes);
+  EXPECT_EQ(lanes, 1);
+}
+
+}  // namespace
