@@ -2,12 +2,14 @@
 // chain where it is one, and refused where y does not show it all.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <esokit/control/adrc.hpp>
-#include <esokit/gain/model_gain.hpp>
-#include <esokit/model/plant_model.hpp>
-#include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/extended_state_filter.hpp>
+#include <esokit/observer/model_eso.hpp>
 #include <esokit/sim/run.hpp>
+#include <limits>
 
 #include <support/refusal.hpp>
 
@@ -16,14 +18,15 @@ namespace {
 using esokit::LinearEso;
 using esokit::LinearPlant;
 using esokit::LinearPlantModel;
+using esokit::ModelParts;
+using esokit::PlantEso;
 using esokit::StepStatus;
 using esokit_test::refusal;
 
 constexpr double kT = 1e-3;
 
-template <int States, int Order, int Constants = 1>
-using PlantEso = LinearEso<Order, double, States + Constants - Order, esokit::EqualPoles,
-                           LinearPlantModel<States, Order, double, Constants>>;
+/// A plant with a zero, of order 2 for a law.
+using ZeroEso = PlantEso<3, ModelParts{.order = 2}>;
 
 /// (s + 30) 200 / (s^3 + 12 s^2 + 47 s + 60), with d into the second state.
 LinearPlant<3> with_zero() {
@@ -35,12 +38,12 @@ LinearPlant<3> with_zero() {
 }
 
 TEST(LinearPlantModel, AChainEqualsLinearEso) {
-  auto model =
-      PlantEso<2, 2, 2>::make({.observer_bandwidth = 80.0,
-                               .input_gain = 3.0,
-                               .sample_time = kT,
-                               .model = {LinearPlant<2>::chain({.input_gain = 3.0}).value()}})
-          .value();
+  auto model = PlantEso<2, ModelParts{.order = 2, .constants = 2}>::make(
+                   {.observer_bandwidth = 80.0,
+                    .input_gain = 3.0,
+                    .sample_time = kT,
+                    .model = {LinearPlant<2>::chain({.input_gain = 3.0}).value()}})
+                   .value();
   auto chain = LinearEso<2, double, 2>::make(
                    {.observer_bandwidth = 80.0, .input_gain = 3.0, .sample_time = kT})
                    .value();
@@ -62,10 +65,10 @@ TEST(LinearPlantModel, AChainEqualsLinearEso) {
 TEST(LinearPlantModel, FindsStatesAndAMismatchedDisturbance) {
   const auto plant = with_zero();
   ASSERT_EQ(plant.relative_degree(), 2);
-  auto observer = PlantEso<3, 2>::make({.observer_bandwidth = 60.0,
-                                        .input_gain = plant.input_gain(),
-                                        .sample_time = kT,
-                                        .model = {plant}})
+  auto observer = ZeroEso::make({.observer_bandwidth = 60.0,
+                                 .input_gain = plant.input_gain(),
+                                 .sample_time = kT,
+                                 .model = {plant}})
                       .value();
   double before = 0;
   const auto run = esokit::sim::run(
@@ -91,9 +94,163 @@ TEST(LinearPlantModel, FindsStatesAndAMismatchedDisturbance) {
   ASSERT_TRUE(run);
 }
 
+/// All parts beside the plant, with a sensor that is corrected (omega_o = 80) or left to itself.
+template <int Sensor, class Lag>
+void equals_the_model_of_parts(const Lag& sensor) {
+  constexpr ModelParts parts{
+      .order = 2, .sensor = Sensor, .constants = 2, .resonators = 2, .leaky = 1};
+  constexpr ModelParts with_poles{.order = 2,
+                                  .plant_poles = true,
+                                  .sensor = Sensor,
+                                  .constants = 2,
+                                  .resonators = 2,
+                                  .leaky = 1};
+  const auto plant =
+      LinearPlant<2>::chain({.coefficients = {-40.0, 7.0}, .input_gain = 3.0}).value();
+  const std::array<esokit::Resonance<double>, 2> swings{{{50.0, 0.1, 30.0}, {120.0}}};
+  auto whole = PlantEso<2, parts>::make(
+      {.observer_bandwidth = 80.0,
+       .input_gain = 3.0,
+       .sample_time = kT,
+       .model = {.plant = plant, .sensor = sensor, .resonators = swings, .leaky = {0.3}}});
+  ASSERT_TRUE(whole) << whole.error();
+  auto made_of_parts = esokit::ModelEso<with_poles>::make({.observer_bandwidth = 80.0,
+                                                           .input_gain = 3.0,
+                                                           .sample_time = kT,
+                                                           .model = {.plant = {-40.0, 7.0},
+                                                                     .sensor = sensor,
+                                                                     .resonators = swings,
+                                                                     .leaky = {0.3}}})
+                           .value();
+  for (int i = 0; i < whole->size; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    EXPECT_NEAR(whole->level_gain(0)[at] / made_of_parts.level_gain(0)[at], 1.0, 1e-9) << i;
+  }
+  EXPECT_EQ(whole->max_gap(), made_of_parts.max_gap());
+  std::array<double, 16> largest{};
+  for (int k = 0; k < 600; ++k) {
+    const double y = std::sin(0.05 * k);
+    const double u = std::cos(0.03 * k);
+    if (k % 7 == 3) {
+      (void)whole->predict(u);
+      (void)made_of_parts.predict(u);
+    } else {
+      (void)whole->update(y, u);
+      (void)made_of_parts.update(y, u);
+    }
+    for (int i = 0; i < whole->size; ++i) {
+      double& size = largest[static_cast<std::size_t>(i)];
+      size = std::max(size, std::abs(made_of_parts.estimate()(i)));
+      ASSERT_NEAR(whole->estimate()(i), made_of_parts.estimate()(i), 1e-8 * size) << k << ", " << i;
+    }
+  }
+  const auto z = whole->estimate();
+  const auto& model = made_of_parts.model();
+  EXPECT_NEAR(whole->model().constant(z), model.constant(made_of_parts.estimate()),
+              1e-7 * std::abs(whole->model().constant(z)));
+  EXPECT_NEAR(whole->model().swing(z, 1).amplitude,
+              model.swing(made_of_parts.estimate(), 1).amplitude,
+              1e-7 * whole->model().swing(z, 1).amplitude);
+  EXPECT_NEAR(whole->model().fading(z, 0), model.fading(made_of_parts.estimate(), 0),
+              1e-7 * std::abs(whole->model().fading(z, 0)));
+  EXPECT_EQ(whole->model().measured(z), z(whole->size - std::max(Sensor, 1)));
+  const auto rest = whole->rest(3.0, 0.4);
+  const auto rest_of_parts = made_of_parts.rest(3.0, 0.4);
+  for (int i = 0; i < 3; ++i) EXPECT_NEAR(rest(i), rest_of_parts(i), 1e-12) << i;
+  EXPECT_EQ(whole->model().measured(rest), 3.0);
+}
+
+TEST(LinearPlantModel, OfAPlantOfPolesIsTheModelOfParts) {
+  equals_the_model_of_parts<1>(esokit::Lag<1, double>{0.02});
+  equals_the_model_of_parts<1>(esokit::Lag<1, double>{0.005});
+  equals_the_model_of_parts<2>(esokit::Lag<2, double>{40.0, 0.7});
+  equals_the_model_of_parts<2>(esokit::Lag<2, double>{300.0, 0.7});
+}
+
+// All parts, mismatched, with a zero and a filtered y: the plant with its disturbance and its
+// sensor as one LinearPlant is what it is compared with.
+TEST(LinearPlantModel, FindsASwingAndAConstantThatEnterElsewhereBehindASensor) {
+  const auto plant = with_zero();
+  const double w = 40.0;
+  const double tau = 0.008;
+  LinearPlant<7> all{};  // x, c, q, r, f
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) all.a(i, j) = plant.a(i, j);
+    all.a(i, 3) = all.a(i, 4) = plant.e(i);
+    all.b(i) = plant.b(i);
+    all.a(6, i) = plant.c(i) / tau;
+  }
+  all.a(4, 5) = w;
+  all.a(5, 4) = -w;
+  all.a(6, 6) = -1 / tau;
+  all.c(6) = 1.0;
+  const auto step = esokit::held_plant(all, kT).value();
+  esokit::Vector<double, 7> x{0.1, -2.0, 1.0, 7.0, 0.0, 3.0, 0.0};
+
+  using Eso = PlantEso<3, ModelParts{.order = 2, .sensor = 1, .resonators = 1}>;
+  auto observer = Eso::make({.observer_bandwidth = 60.0,
+                             .input_gain = plant.input_gain(),
+                             .sample_time = kT,
+                             .model = {.plant = plant, .sensor = {tau}, .resonators = {{{w}}}}})
+                      .value();
+  for (int k = 0; k < 3000; ++k) {
+    const double u = std::sin(0.01 * k);
+    x = step.advanced(x, esokit::Vector<double, 1>(u), esokit::Vector<double, 1>(0.0));
+    ASSERT_EQ(observer.update(x(6), u), StepStatus::ok);
+    if (k < 2000) continue;
+    const auto z = observer.estimate();
+    const auto& model = observer.model();
+    const auto state = model.plant_state(z);
+    for (int i = 0; i < 3; ++i) ASSERT_NEAR(state(i), x(i), 1e-7 * (1 + std::abs(x(i)))) << k;
+    ASSERT_NEAR(model.constant(z), 7.0, 1e-5) << k;
+    ASSERT_NEAR(model.disturbance(z), 7.0 + x(4), 1e-5) << k;
+    ASSERT_NEAR(model.swing(z, 0).amplitude, 3.0, 1e-5) << k;
+    ASSERT_NEAR(model.swing(z, 0).amplitude * std::sin(model.swing(z, 0).phase), x(4), 1e-5) << k;
+    ASSERT_NEAR(observer.estimate()(0), (plant.c * state)(0), 1e-8) << k;
+    ASSERT_NEAR(model.measured(z), x(6), 1e-8) << k;
+  }
+}
+
+// A filter takes it, too.
+TEST(LinearPlantModel, AFilterFindsStatesAndDisturbance) {
+  constexpr ModelParts parts{.order = 2, .resonators = 1};
+  using Model = LinearPlantModel<3, parts>;
+  using Filter =
+      esokit::ExtendedStateFilter<2, double, Model::extension, esokit::NoNominalModel, 0, Model>;
+  const auto plant = with_zero();
+  Filter::Config config;
+  config.input_gain = plant.input_gain();
+  config.sample_time = kT;
+  config.measurement_variance = 1e-8;
+  config.plant_model = {.plant = plant, .resonators = {{{40.0}}}};
+  config.disturbance_bounds = {0.0, 0.0, 0.0, 1.0, 0.1, 0.1};
+  config.inflation_rule = esokit::InflationRule::none;
+  config.initial_covariance = Filter::Covariance::Diagonal({1, 1e2, 1e4, 1e4, 1e2, 1e2});
+  auto filter = Filter::make(config);
+  ASSERT_TRUE(filter) << filter.error();
+  esokit::Vector<double, 3> x{0.0, 0.0, 0.0};
+  LinearPlant<6> all{};
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) all.a(i, j) = plant.a(i, j);
+    all.a(i, 3) = all.a(i, 4) = plant.e(i);
+    all.b(i) = plant.b(i);
+  }
+  all.a(4, 5) = 40.0;
+  all.a(5, 4) = -40.0;
+  all.c(0) = 1.0;
+  const auto step = esokit::held_plant(all, kT).value();
+  esokit::Vector<double, 6> state{0.1, -2.0, 1.0, 7.0, 0.0, 3.0};
+  for (int k = 0; k < 4000; ++k) {
+    state = step.advanced(state, esokit::Vector<double, 1>(0.3), esokit::Vector<double, 1>(0.0));
+    (void)filter->update((plant.c * state.head<3>())(0), 0.3);
+  }
+  EXPECT_NEAR(filter->model().disturbance(filter->estimate()), 7.0 + state(4), 1e-5);
+  EXPECT_NEAR(filter->model().swing(filter->estimate(), 0).amplitude, 3.0, 1e-5);
+}
+
 TEST(LinearPlantModel, AdrcTakesThePlantAsItIs) {
   const auto plant = with_zero();
-  using Controller = esokit::Adrc<PlantEso<3, 2>>;
+  using Controller = esokit::Adrc<ZeroEso>;
   auto controller = Controller::make({.observer = {.observer_bandwidth = 60.0,
                                                    .input_gain = plant.input_gain(),
                                                    .sample_time = kT,
@@ -110,10 +267,10 @@ TEST(LinearPlantModel, AdrcTakesThePlantAsItIs) {
 
 TEST(LinearPlantModel, RestIsWhereThePlantStands) {
   const auto plant = with_zero();
-  auto observer = PlantEso<3, 2>::make({.observer_bandwidth = 60.0,
-                                        .input_gain = plant.input_gain(),
-                                        .sample_time = kT,
-                                        .model = {plant}})
+  auto observer = ZeroEso::make({.observer_bandwidth = 60.0,
+                                 .input_gain = plant.input_gain(),
+                                 .sample_time = kT,
+                                 .model = {plant}})
                       .value();
   ASSERT_EQ(observer.reset(observer.rest(3.0, 0.4)), StepStatus::ok);
   const auto before = observer.estimate();
@@ -126,7 +283,7 @@ TEST(LinearPlantModel, RestIsWhereThePlantStands) {
 }
 
 TEST(LinearPlantModel, RefusesWhatYDoesNotShow) {
-  using Model = LinearPlantModel<3, 2>;
+  using Model = LinearPlantModel<3, ModelParts{.order = 2}>;
   const auto make = [](const LinearPlant<3>& plant) { return Model::make({plant}, 1.0, kT); };
   auto plant = with_zero();
   EXPECT_TRUE(make(plant));
@@ -143,16 +300,92 @@ TEST(LinearPlantModel, RefusesWhatYDoesNotShow) {
   // d into the first state of a plant that differentiates it: (s (s + 3)) / ..
   LinearPlant<2> hidden{.a = {{-3, 1}, {0, 0}}, .b = {0, 1}, .c = {1, 0}};
   hidden.e = {1.0, 0.0};
-  const auto answer = LinearPlantModel<2, 2>::make({hidden}, 1.0, kT);
+  const auto answer = LinearPlantModel<2, ModelParts{.order = 2}>::make({hidden}, 1.0, kT);
   EXPECT_EQ(refusal(answer),
             "model.plant.e: lets a constant disturbance hide behind a zero: of it y shows a share "
             "below");
   EXPECT_EQ(answer.error().value, 0.0);
   hidden.e = {1.0, 1e-6};
-  EXPECT_TRUE((LinearPlantModel<2, 2>::make({hidden}, 1.0, kT)));
-  const auto order = LinearPlantModel<3, 1>::make({with_zero()}, 1.0, kT);
+  EXPECT_TRUE((LinearPlantModel<2, ModelParts{.order = 2}>::make({hidden}, 1.0, kT)));
+  const auto order = LinearPlantModel<3, ModelParts{.order = 1}>::make({with_zero()}, 1.0, kT);
   EXPECT_EQ(refusal(order), "model.plant: has another relative degree than");
   EXPECT_EQ(order.error().value, 2.0);
+}
+
+/// (s^2 + w^2 + beside) / (s + 1)(s + 2)(s + 3) from d to y, 1 / .. from u.
+LinearPlant<3> with_notch(double w, double beside) {
+  auto plant =
+      LinearPlant<3>::transfer_function({.numerator = {1, 0, 0}, .denominator = {6, 11, 6}})
+          .value();
+  plant.e = LinearPlant<3>::transfer_function(
+                {.numerator = {w * w + beside, 0, 1}, .denominator = {6, 11, 6}})
+                .value()
+                .b;
+  return plant;
+}
+
+TEST(LinearPlantModel, RefusesASwingBehindAZeroAtItsFrequency) {
+  using Model = LinearPlantModel<3, ModelParts{.order = 3, .resonators = 2, .leaky = 1}>;
+  const double w = 30.0;
+  const auto make = [&](double beside, double frequency, double damping = 0.0,
+                        double leaky = 0.123) {
+    return Model::make({.plant = with_notch(w, beside),
+                        .resonators = {{{77.0}, {frequency, damping}}},
+                        .leaky = {leaky}},
+                       1.0, kT);
+  };
+  EXPECT_TRUE(make(0.0, 31.0));
+  const auto answer = make(0.0, w);
+  EXPECT_EQ(refusal(answer),
+            "model.resonators.frequency[1]: lets a swing hide behind a zero: of it y shows a share "
+            "below");
+  EXPECT_LT(answer.error().value, answer.error().limit);
+  EXPECT_EQ(answer.error().limit, 1024 * std::numeric_limits<double>::epsilon());
+  // As close as the value says: beside / (4 w^2), for terms of size w^2 + .. in both coefficients.
+  for (const double share : {1e-12, 1e-10}) {
+    EXPECT_TRUE(make(share * 8 * w * w, w)) << share;
+  }
+  EXPECT_FALSE(make(1e-14 * w * w, w));
+  // A damped one has no zero there.
+  EXPECT_TRUE(make(0.0, w, 0.01));
+  // (s + 4)(s + 5) hides what fades with 1/4 s.
+  auto plant = with_notch(w, 0.0);
+  plant.e = LinearPlant<3>::transfer_function({.numerator = {20, 9, 1}, .denominator = {6, 11, 6}})
+                .value()
+                .b;
+  const auto fading = [&](double tau) {
+    return Model::make({.plant = plant, .resonators = {{{77.0}, {20.0}}}, .leaky = {tau}}, 1.0, kT);
+  };
+  EXPECT_EQ(refusal(fading(0.25)),
+            "model.leaky[0]: lets a fading disturbance hide behind a zero: of it y shows a share "
+            "below");
+  EXPECT_TRUE(fading(0.26));
+}
+
+TEST(LinearPlantModel, RefusesPartsThatMakeNoSense) {
+  using Model =
+      LinearPlantModel<3, ModelParts{.order = 2, .sensor = 2, .resonators = 2, .leaky = 1}>;
+  Model::Settings settings{.plant = with_zero(),
+                           .sensor = {200.0, 0.7},
+                           .resonators = {{{20.0}, {40.0}}},
+                           .leaky = {0.5}};
+  const auto changed = [&](const auto& change) {
+    auto other = settings;
+    change(other);
+    return refusal(Model::make(other, 1.0, kT));
+  };
+  EXPECT_EQ(changed([](auto&) {}), "accepted");
+  EXPECT_EQ(changed([](auto& s) { s.sensor.frequency = 0.0; }),
+            "model.sensor.frequency: must be finite and positive");
+  EXPECT_EQ(changed([](auto& s) { s.resonators[1].frequency = 20.0; }),
+            "model.resonators.frequency[1]: must differ by a thousandth of itself from");
+  EXPECT_EQ(changed([](auto& s) { s.resonators[0].frequency = -20.0; }),
+            "model.resonators.frequency[0]: must be finite and positive");
+  EXPECT_EQ(changed([](auto& s) { s.resonators[0].frequency = 3100.0; }),
+            "model.resonators.frequency[0]: must be below half the sample rate");
+  EXPECT_EQ(changed([](auto& s) { s.leaky[0] = 0.9e-5; }),
+            "model.leaky[0]: must be at least a hundredth of sample_time");
+  EXPECT_EQ(changed([](auto& s) { s.plant.a(1, 1) = std::nan(""); }), "a[4]: must be finite");
 }
 
 }  // namespace

@@ -264,9 +264,8 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   /// The sine of resonator 0 .. k - 1.
   [[nodiscard]] static Swing swing(const Estimate& z, int resonator) noexcept
       requires(Parts.resonators > 0) {
-    const S q = z(order + m + 2 * resonator);
-    const S r = z(order + m + 2 * resonator + 1);
-    return {std::hypot(q, r), std::atan2(q, r)};
+    const int q = order + m + 2 * resonator;
+    return detail::swing_of(z(q), z(q + 1));
   }
   /// What fades, part 0 .. l - 1.
   [[nodiscard]] static constexpr S fading(const Estimate& z, int part) noexcept

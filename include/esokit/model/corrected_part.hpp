@@ -26,12 +26,12 @@ struct CorrectedPart {
   Array<Array<S, 2>, Pairs> pairs{};  ///< real and imaginary part of a pair of poles, 1/s
 };
 
-/// All of a model is corrected, and the placement places all poles.
-template <class Model>
+/// All of a model is corrected, and the placement places all poles but `Pairs`.
+template <int Pairs = 0, class Model>
 auto corrected_whole(const Model& model) {
   constexpr int size = Model::size;
   using S = std::remove_cvref_t<decltype(model.sample_time())>;
-  CorrectedPart<size, size, 0, S> all;
+  CorrectedPart<size, size, Pairs, S> all;
   all.step = model.increment();
   all.output.fill(S(0.0));
   all.output[0] = S(1.0);

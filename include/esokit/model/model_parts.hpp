@@ -65,6 +65,12 @@ struct Swing {
 
 namespace detail {
 
+/// @param q the sine @param r a quarter of a turn ahead of it
+template <PlainScalar S>
+Swing<S> swing_of(const S& q, const S& r) noexcept {
+  return {std::hypot(q, r), std::atan2(q, r)};
+}
+
 /// Elements of the disturbance: its integrators, two a resonator, and what fades.
 constexpr int disturbance_size(const ModelParts& parts) noexcept {
   return parts.constants + 2 * parts.resonators + parts.leaky;

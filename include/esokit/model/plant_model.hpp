@@ -8,26 +8,51 @@
 #include <esokit/core/expected.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/math/dense.hpp>
+#include <esokit/model/corrected_part.hpp>
 #include <esokit/model/linear_plant.hpp>
 #include <esokit/model/matrix_model.hpp>
+#include <esokit/model/model_parts.hpp>
 #include <limits>
 
 namespace esokit {
 
 namespace detail {
 
-/// What MatrixModel asks for: nothing is known to be zero.
-template <int Order, int Size>
-struct DenseShape {
-  static constexpr int order = Order;
-  static constexpr int size = Size;
-  static constexpr int measured_rows = 0;
-  static constexpr int degree(int state) noexcept { return state <= Order ? state : Order; }
-  static constexpr ModelPattern<Size> pattern = [] {
-    ModelPattern<Size> all{};
-    for (auto& row : all.couples) row.fill(true);
-    for (auto& row : all.place) {
-      for (int& place : row) place = all.kept++;
+/// What MatrixModel asks for. The states are those of a sensor, y .. y^(n-1), D, what of the plant
+/// is beside them, and the elements of the disturbance; of these D has taken the first one's place
+/// where the plant is nothing but y .. y^(n-1).
+template <int States, ModelParts Parts>
+struct PlantShape {
+  static constexpr int order = Parts.order;
+  static constexpr int size = Parts.sensor + States + disturbance_size(Parts);
+  static constexpr int measured_rows = Parts.sensor;
+  static constexpr int first = size - disturbance_size(Parts);  ///< of the disturbance's states
+  static constexpr int replaced = order == States ? 1 : 0;      ///< of its elements
+
+  static constexpr int degree(int state) noexcept {
+    if (state < Parts.sensor) return 0;
+    if (state <= Parts.sensor + order) return state - Parts.sensor;
+    const int element = state - first;
+    return order + (element > 0 && element < Parts.constants ? element : 0);
+  }
+  static constexpr ModelPattern<size> pattern = [] {
+    ModelPattern<size> all{};
+    for (int i = 0; i < size; ++i) {
+      for (int j = 0; j <= size; ++j) {
+        const int swing = first + Parts.constants;
+        const int fading = swing + 2 * Parts.resonators;
+        bool couples = i < Parts.sensor || j >= Parts.sensor;
+        if (i >= first + replaced) {
+          couples = j < size && j >= first + replaced &&
+                    (i < swing    ? j > i && j < swing
+                     : i < fading ? j >= swing && (j - swing) / 2 == (i - swing) / 2
+                                  : j == i);
+        }
+        const auto row = static_cast<std::size_t>(i);
+        const auto column = static_cast<std::size_t>(j);
+        all.couples[row][column] = couples;
+        if (couples) all.place[row][column] = all.kept++;
+      }
     }
     return all;
   }();
@@ -35,36 +60,51 @@ struct DenseShape {
 
 }  // namespace detail
 
-/// x' = A x + B u + E d, y = C x with d^(m) = 0: a plant with zeros, known poles, or a disturbance
-/// that enters elsewhere than u does (mismatched), sampled exactly.
+/// x' = A x + B u + E d, y = C x: a plant with zeros, known poles, or a disturbance that enters
+/// elsewhere than u does (mismatched), sampled exactly. d is the sum of a constant (or polynomial),
+/// of sines and of what fades; y may be seen through a sensor's lag.
 ///
 /// y^(n) = D + b u, with n the relative degree of u; `estimate` has (y, .., y^(n-1), D, ..), D all
 /// that a law cancels, so that `Adrc` works with it; `plant_state` and `disturbance` give x and d.
 /// Cancelling D makes the plant's zeros poles of the loop: with one in the right half plane take
 /// the estimates alone.
 ///
-/// The config's `input_gain` says b; B is scaled to it, E is not. A dead time is DelayedInput's.
-/// @tparam States of x @tparam Order n, relative degree from u to y @tparam Constants m
-template <int States, int Order, PlainScalar S = double, int Constants = 1>
-class LinearPlantModel : public MatrixModel<detail::DenseShape<Order, States + Constants>, S> {
-  using Base = MatrixModel<detail::DenseShape<Order, States + Constants>, S>;
-  static_assert(Order >= 1 && Order <= States, "esokit: the relative degree is 1 .. States");
-  static_assert(Constants >= 1, "esokit: at least one extended state is needed");
+/// The config's `input_gain` says b; B is scaled to it, E is not. A dead time is DelayedInput's; an
+/// actuator is part of A. Poles: as AugmentedModel's, those of the plant all at exp(-omega_o T).
+/// @tparam States of x @tparam Parts of it `order`, the relative degree from u to y, `sensor`,
+/// `constants`, `resonators` and `leaky`; the rest is in the plant
+template <int States, ModelParts Parts, PlainScalar S = double>
+class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S> {
+  using Shape = detail::PlantShape<States, Parts>;
+  using Base = MatrixModel<Shape, S>;
+  static constexpr int n = Parts.order;
+  static constexpr int lf = Parts.sensor;
+  static constexpr int inner = Base::size - lf;  ///< states without the sensor's
+  static_assert(n >= 1 && n <= States, "esokit: the relative degree is 1 .. States");
+  static_assert(Parts.constants >= 1, "esokit: at least one extended state is needed");
+  static_assert(lf >= 0 && lf <= 2, "esokit: a lag has order 0, 1 or 2");
+  static_assert(Parts.resonators >= 0 && Parts.leaky >= 0, "esokit: a number of parts below zero");
+  static_assert(Parts.actuator == 0 && !Parts.plant_poles,
+                "esokit: actuator and poles of a LinearPlantModel are in its plant");
+  static_assert(!Parts.follows_speed, "esokit: only an AugmentedModel follows a speed");
 
  public:
+  static constexpr ModelParts parts = Parts;  ///< what is known beside the plant
   using Base::order;
   using Base::size;
   using typename Base::Estimate;
   using typename Base::State;
 
-  static constexpr ModelTraits traits{};  ///< nothing beyond SampledModel
+  static constexpr ModelTraits traits{.corrects_part = true};  ///< what it is
   template <class T>
-  using with_scalar =
-      LinearPlantModel<States, Order, T, Constants>;  ///< the same of another scalar
+  using with_scalar = LinearPlantModel<States, Parts, T>;  ///< the same of another scalar
 
-  /// Settings of make.
+  /// Settings of make; those of parts that are not there are empty.
   struct Settings {
-    LinearPlant<States, S> plant{};  ///< A, B, C and, for d, E
+    LinearPlant<States, S> plant{};                      ///< A, B, C and, for d, E
+    Lag<lf, S> sensor{};                                 ///< from y to what is measured
+    Array<Resonance<S>, Parts.resonators> resonators{};  ///< sines of d
+    Array<S, Parts.leaky> leaky{};                       ///< time constants of what fades, s
   };
 
   /// Checks the plant and samples it with its disturbance.
@@ -78,24 +118,41 @@ class LinearPlantModel : public MatrixModel<detail::DenseShape<Order, States + C
     Rules<S> rules;
     const int degree = plant.relative_degree();
     rules
-        .require(degree == Order, {"model.plant", static_cast<S>(degree),
-                                   "has another relative degree than", -1, S(Order), true})
+        .require(degree == n, {"model.plant", static_cast<S>(degree),
+                               "has another relative degree than", -1, S(n), true})
         .require(!(plant.dead_time > S(0)), "model.plant.dead_time", plant.dead_time,
                  "must be 0: a delay of u is DelayedInput's");
+    detail::check_sensor(rules, settings.sensor, sample_time);
+    detail::check_resonators(rules, settings.resonators, sample_time);
+    detail::check_leaky(rules, settings.leaky, sample_time);
     if (!rules) return rules.error();
     const S seen = shown_share(plant, sample_time);
-    const S passed = passed_share(plant);
     constexpr S least = S(1024) * std::numeric_limits<S>::epsilon();
-    rules
-        .require(seen >= least,
-                 {"model.plant.c", seen, "leaves a state unobservable: of it y shows a share below",
-                  -1, least, true})
-        .require(passed >= least, {"model.plant.e", passed,
-                                   "lets a constant disturbance hide behind a zero: of it y shows "
-                                   "a share below",
-                                   -1, least, true});
+    rules.require(seen >= least,
+                  {"model.plant.c", seen,
+                   "leaves a state unobservable: of it y shows a share below", -1, least, true});
+    const Numerator from_d(plant, sample_time);
+    const auto passes = [&](const char* field, int index, const char* rule, const S& real,
+                            const S& imaginary) {
+      const S passed = from_d.share(real * sample_time, imaginary * sample_time);
+      rules.require(passed >= least, {field, passed, rule, index, least, true});
+    };
+    passes("model.plant.e", -1,
+           "lets a constant disturbance hide behind a zero: of it y shows a share below", S(0),
+           S(0));
+    for (std::size_t i = 0; i < settings.resonators.size(); ++i) {
+      const auto& [w, damping, capture] = settings.resonators[i];
+      passes("model.resonators.frequency", static_cast<int>(i),
+             "lets a swing hide behind a zero: of it y shows a share below", -(damping * w),
+             w * std::sqrt(S(1) - damping * damping));
+    }
+    for (std::size_t i = 0; i < settings.leaky.size(); ++i) {
+      passes("model.leaky", static_cast<int>(i),
+             "lets a fading disturbance hide behind a zero: of it y shows a share below",
+             S(-1) / settings.leaky[i], S(0));
+    }
     if (!rules) return rules.error();
-    LinearPlantModel model(plant, input_gain, sample_time);
+    LinearPlantModel model(settings, input_gain, sample_time);
     for (const S& x : model.step_) {
       rules.require(is_finite(x), "model.plant", x,
                     "gives a transition that the scalar cannot hold");
@@ -104,18 +161,46 @@ class LinearPlantModel : public MatrixModel<detail::DenseShape<Order, States + C
     return model;
   }
 
+  /// As they were given.
+  [[nodiscard]] constexpr const Settings& settings() const noexcept { return settings_; }
+
   /// The estimate of a plant that stands at y under u.
   [[nodiscard]] Estimate rest(const S& y, const S& u) const noexcept {
     return rest_of_y_ * y + rest_of_u_ * u;
   }
 
-  /// x. @param z the estimate
+  /// @name The parts of an estimate
+  /// @{
+  /// What is measured, as the sensor would show y.
+  [[nodiscard]] static constexpr S measured(const Estimate& z) noexcept {
+    return z(lf > 0 ? size - lf : 0);
+  }
+  /// x.
   [[nodiscard]] Vector<S, States> plant_state(const Estimate& z) const noexcept {
     const auto natural = natural_of(z);
     return natural.template head<States>();
   }
-  /// d. @param z the estimate
-  [[nodiscard]] S disturbance(const Estimate& z) const noexcept { return natural_of(z)(States); }
+  /// d, all of it.
+  [[nodiscard]] S disturbance(const Estimate& z) const noexcept {
+    const auto natural = natural_of(z);
+    S sum = natural(States);
+    for (int j = 0; j < Parts.resonators; ++j) sum = sum + natural(swings + 2 * j);
+    for (int j = 0; j < Parts.leaky; ++j) sum = sum + natural(swings + 2 * Parts.resonators + j);
+    return sum;
+  }
+  /// Of d what is constant, or a polynomial.
+  [[nodiscard]] S constant(const Estimate& z) const noexcept { return natural_of(z)(States); }
+  /// Of d the sine of resonator 0 .. k - 1.
+  [[nodiscard]] static Swing<S> swing(const Estimate& z, int resonator) noexcept
+      requires(Parts.resonators > 0) {
+    return detail::swing_of(z(swings + 2 * resonator), z(swings + 2 * resonator + 1));
+  }
+  /// Of d what fades, part 0 .. l - 1.
+  [[nodiscard]] static constexpr S fading(const Estimate& z, int part) noexcept
+      requires(Parts.leaky > 0) {
+    return z(swings + 2 * Parts.resonators + part);
+  }
+  /// @}
 
   /// True if u does the same in both.
   [[nodiscard]] bool same_drive(const LinearPlantModel& other) const noexcept {
@@ -126,81 +211,210 @@ class LinearPlantModel : public MatrixModel<detail::DenseShape<Order, States + C
     return this->scaled(before.physical(x));
   }
 
+  /// Calls `design(part)` with the CorrectedPart and returns what it returns.
+  /// @param bandwidth omega_o, rad/s: a sensor that is faster keeps its own poles
+  template <class Design>
+  auto with_corrected_part(const S& bandwidth, const Design& design) const {
+    if constexpr (lf > 0) {
+      if (detail::sensor_rate(settings_.sensor) > bandwidth) {
+        CorrectedPart<inner, size, Parts.resonators, S> part;
+        const auto natural = inner_rates(settings_, this->sample_time_, S(0));
+        const auto step = this->increment();
+        Square rates;
+        for (int i = 0; i < inner; ++i) {
+          for (int j = 0; j < inner; ++j) {
+            rates(i, j) = natural(i, j);
+            part.step(i, j) = step(lf + i, lf + j);
+          }
+        }
+        const auto shown = detail::shown_by_sensor(settings_.sensor, this->sample_time_,
+                                                   in_rows(rows_of(natural), rates));
+        part.output.fill(S(0));
+        part.whole = Matrix<S, size, inner>::Zero();
+        for (int j = 0; j < inner; ++j) {
+          part.degrees[static_cast<std::size_t>(j)] = Base::degree(lf + j);
+          part.output[static_cast<std::size_t>(j)] = shown(0, j);
+          for (int i = 0; i < lf; ++i) part.whole(i, j) = shown(i, j);
+          part.whole(lf + j, j) = S(1);
+        }
+        part.pairs = detail::own_pairs(settings_.resonators);
+        return design(part);
+      }
+    }
+    auto part = corrected_whole<Parts.resonators>(*this);
+    part.pairs = detail::own_pairs(settings_.resonators);
+    return design(part);
+  }
+
  private:
-  static constexpr int N = States + Constants;
-  using Square = Matrix<S, N, N>;
+  static constexpr int swings = States + Parts.constants;  ///< row of the estimate, and of natural_
+  using Square = Matrix<S, inner, inner>;
 
-  LinearPlantModel(const LinearPlant<States, S>& plant, const S& input_gain,
-                   const S& sample_time) noexcept
-      : Base(input_gain, sample_time) {
-    const S scale = input_gain / plant.input_gain();
-    // (x, d, d', ..), in units of T.
-    Matrix<S, N + 1, N + 1> natural = Matrix<S, N + 1, N + 1>::Zero();
-    for (int i = 0; i < States; ++i) {
-      for (int j = 0; j < States; ++j) natural(i, j) = plant.a(i, j) * sample_time;
-      natural(i, States) = plant.e(i) * sample_time;
-      natural(i, N) = plant.b(i) * scale * sample_time;
-    }
-    for (int i = States; i + 1 < N; ++i) natural(i, i + 1) = sample_time;
+  /// C adj(s I - A) E, what the zeros from d to y are, and beside each coefficient what its terms
+  /// would be if nothing cancelled.
+  struct Numerator {
+    Array<S, States> coefficients{};  ///< of s^0, s^1, .., in units of T
+    Array<S, States> sizes{};
 
-    // Rows T^r / r! y^(r), and of (x, d, ..) those that are furthest from them.
-    Square rows = Square::Zero();
-    for (int j = 0; j < States; ++j) rows(0, j) = plant.c(j);
-    for (int r = 1; r <= Order; ++r) {
-      for (int j = 0; j < N; ++j) {
+    Numerator(const LinearPlant<States, S>& plant, const S& time) noexcept {
+      auto adjugate = Matrix<S, States, States>::Identity();  // Faddeev and LeVerrier
+      auto bound = adjugate;
+      for (int k = States - 1; k >= 0; --k) {
         S sum(0);
-        for (int k = 0; k < N; ++k) sum = sum + rows(r - 1, k) * natural(k, j);
-        rows(r, j) = sum / static_cast<S>(r);
-      }
-    }
-    Array<bool, N> taken{};
-    Square work = rows;
-    for (int r = 0; r <= Order; ++r) {
-      int pivot = 0;
-      for (int j = 0; j < N; ++j) {
-        if (detail::absolute(work(r, j)) > detail::absolute(work(r, pivot))) pivot = j;
-      }
-      taken[static_cast<std::size_t>(pivot)] = true;
-      for (int i = r + 1; i <= Order; ++i) {
-        const S factor = work(i, pivot) / work(r, pivot);
-        for (int j = 0; j < N; ++j) work(i, j) = work(i, j) - factor * work(r, j);
-      }
-    }
-    const S unit = this->scaled_disturbance(S(1));
-    int row = Order + 1;
-    for (int j = 0; j < N; ++j) {
-      // Fewer pivots than rows, where they depend on each other: no inverse then, and no make.
-      if (!taken[static_cast<std::size_t>(j)] && row < N) rows(row++, j) = unit;
-    }
-
-    // rows (e^A - I) rows^-1 from behind: rows' X' = (rows E)'.
-    const auto step = detail::exp_minus_identity(natural);
-    Matrix<S, N, N> right;
-    Matrix<S, N + 1, N + 1> all = Matrix<S, N + 1, N + 1>::Zero();
-    this->scaled_input_gain_ = this->scaled_disturbance(input_gain);
-    for (int i = 0; i < N; ++i) {
-      for (int j = 0; j <= N; ++j) {
-        S sum(0);
-        for (int k = 0; k < N; ++k) sum = sum + rows(i, k) * step(k, j);
-        if (j < N) {
-          right(j, i) = sum;
-        } else {
-          all(i, N) = sum / this->scaled_input_gain_;
+        S size(0);
+        for (int i = 0; i < States; ++i) {
+          for (int j = 0; j < States; ++j) {
+            sum = sum + plant.c(i) * adjugate(i, j) * plant.e(j);
+            size = size + detail::absolute(S(plant.c(i) * plant.e(j))) * bound(i, j);
+          }
+        }
+        coefficients[static_cast<std::size_t>(k)] = sum;
+        sizes[static_cast<std::size_t>(k)] = size;
+        auto rates = plant.a * time;
+        adjugate = rates * adjugate;
+        for (S& x : rates) x = detail::absolute(x);
+        bound = rates * bound;
+        const S next = adjugate.trace() / static_cast<S>(States - k);
+        const S more = bound.trace() / static_cast<S>(States - k);
+        for (int i = 0; i < States; ++i) {
+          adjugate(i, i) = adjugate(i, i) - next;
+          bound(i, i) = bound(i, i) + more;
         }
       }
     }
-    Square transposed = rows.transpose();
-    detail::solve_in_place(detail::DenseView<S>{transposed.data(), N},
-                           detail::DenseView<S>{right.data(), N, N});
-    for (int i = 0; i < N; ++i) {
-      for (int j = 0; j < N; ++j) all(i, j) = right(j, i);
+
+    /// Its magnitude at s, against the sizes: 0 where a zero hides what goes like exp(s t).
+    [[nodiscard]] S share(const S& real, const S& imaginary) const noexcept {
+      const S magnitude = std::hypot(real, imaginary);
+      S re(0);
+      S im(0);
+      S size(0);
+      for (std::size_t k = States; k-- > 0;) {
+        const S product = re * real - im * imaginary;
+        im = re * imaginary + im * real;
+        re = product + coefficients[k];
+        size = size * magnitude + sizes[k];
+      }
+      return size > S(0) ? S(std::hypot(re, im) / size) : S(0);
+    }
+  };
+
+  /// T A of (x, elements of d), and in the last column T B of a B whose gain is `scale` times that
+  /// of the plant.
+  static Matrix<S, inner + 1, inner + 1> inner_rates(const Settings& settings, const S& time,
+                                                     const S& scale) noexcept {
+    const auto& plant = settings.plant;
+    auto a = Matrix<S, inner + 1, inner + 1>::Zero();
+    for (int i = 0; i < States; ++i) {
+      for (int j = 0; j < States; ++j) a(i, j) = plant.a(i, j) * time;
+      const S e = plant.e(i) * time;
+      a(i, States) = e;
+      for (int j = 0; j < Parts.resonators; ++j) a(i, swings + 2 * j) = e;
+      for (int j = 0; j < Parts.leaky; ++j) a(i, swings + 2 * Parts.resonators + j) = e;
+      a(i, inner) = plant.b(i) * scale * time;
+    }
+    for (int i = States; i + 1 < swings; ++i) a(i, i + 1) = time;
+    detail::set_swing_rates(a, swings, settings.resonators, settings.leaky, time);
+    return a;
+  }
+
+  /// Rows T^r / r! y^(r) to D, of x those that are furthest from them, and the elements of d.
+  [[nodiscard]] Square rows_of(const Matrix<S, inner + 1, inner + 1>& natural) const noexcept {
+    Square rows = Square::Zero();
+    for (int j = 0; j < States; ++j) rows(0, j) = settings_.plant.c(j);
+    for (int r = 1; r <= n; ++r) {
+      for (int j = 0; j < inner; ++j) {
+        S sum(0);
+        for (int k = 0; k < inner; ++k) sum = sum + rows(r - 1, k) * natural(k, j);
+        rows(r, j) = sum / static_cast<S>(r);
+      }
+    }
+    int row = n + 1;
+    if constexpr (Shape::replaced == 0) {
+      Array<bool, States> taken{};
+      Square work = rows;
+      for (int r = 0; r <= n; ++r) {
+        int pivot = 0;
+        for (int j = 0; j < States; ++j) {
+          if (detail::absolute(work(r, j)) > detail::absolute(work(r, pivot))) pivot = j;
+        }
+        taken[static_cast<std::size_t>(pivot)] = true;
+        for (int i = r + 1; i <= n; ++i) {
+          const S factor = work(i, pivot) / work(r, pivot);
+          for (int j = 0; j < States; ++j) work(i, j) = work(i, j) - factor * work(r, j);
+        }
+      }
+      const S unit = this->scaled_disturbance(S(1));
+      for (int j = 0; j < States; ++j) {
+        // Fewer pivots than rows, where they depend on each other: no inverse then, and no make.
+        if (!taken[static_cast<std::size_t>(j)] && row < States) rows(row++, j) = unit;
+      }
+    }
+    for (row = States + Shape::replaced; row < inner; ++row) {
+      rows(row, row) = S(1);
+      for (int j = 1; j <= Base::degree(lf + row); ++j) {
+        rows(row, row) = rows(row, row) * (this->sample_time_ / static_cast<S>(j));
+      }
+    }
+    return rows;
+  }
+
+  /// Of (x, elements of d) as a matrix that acts on the scaled states without the sensor's:
+  /// rows m rows^-1, from behind: rows' X' = (rows m)'.
+  template <int Size>
+  static Matrix<S, Size, Size> in_rows(Matrix<S, Size, Size> rows,
+                                       const Matrix<S, Size, Size>& m) noexcept {
+    Matrix<S, Size, Size> right = (rows * m).transpose();
+    rows = rows.transpose();
+    detail::solve_in_place(detail::DenseView<S>{rows.data(), Size},
+                           detail::DenseView<S>{right.data(), Size, Size});
+    return right.transpose();
+  }
+
+  LinearPlantModel(const Settings& settings, const S& input_gain, const S& sample_time) noexcept
+      : Base(input_gain, sample_time), settings_(settings) {
+    const auto& plant = settings.plant;
+    const S scale = input_gain / plant.input_gain();
+    const auto natural = inner_rates(settings, sample_time, scale);
+    const Square rows = rows_of(natural);
+    this->scaled_input_gain_ = this->scaled_disturbance(input_gain);
+
+    // (f, x, elements of d, u): what a step does to them, and then in rows.
+    auto all = Matrix<S, size + 1, size + 1>::Zero();
+    for (int i = 0; i <= inner; ++i) {
+      for (int j = 0; j <= inner; ++j) all(lf + i, lf + j) = natural(i, j);
+    }
+    if constexpr (lf > 0) {
+      auto sensor = Matrix<S, lf + 1, lf + 1>::Zero();
+      detail::set_sensor_rates(sensor, settings.sensor, sample_time);
+      for (int i = 0; i < lf; ++i) {
+        for (int j = 0; j < lf; ++j) all(i, j) = sensor(i, j);
+        for (int j = 0; j < States; ++j) all(i, lf + j) = sensor(i, lf) * plant.c(j);
+      }
+    }
+    all = detail::exp_minus_identity(all);
+    auto every = Matrix<S, size, size>::Identity();
+    for (int i = 0; i < inner; ++i) {
+      for (int j = 0; j < inner; ++j) every(lf + i, lf + j) = rows(i, j);
+    }
+    Matrix<S, size, size> step;
+    Matrix<S, size, 1> input;
+    for (int i = 0; i < size; ++i) {
+      for (int j = 0; j < size; ++j) step(i, j) = all(i, j);
+      input(i) = all(i, size);
+    }
+    step = in_rows(every, step);
+    input = every * input;
+    for (int i = 0; i < size; ++i) {
+      for (int j = 0; j < size; ++j) all(i, j) = step(i, j);
+      all(i, size) = input(i) / this->scaled_input_gain_;
     }
     this->set_step(all);
 
     natural_ = Square::Identity();
     Square eliminated = rows;
-    detail::solve_in_place(detail::DenseView<S>{eliminated.data(), N},
-                           detail::DenseView<S>{natural_.data(), N, N});
+    detail::solve_in_place(detail::DenseView<S>{eliminated.data(), inner},
+                           detail::DenseView<S>{natural_.data(), inner, inner});
 
     // At rest: A x + E d = -B u, C x = y.
     Matrix<S, States + 1, States + 1> still;
@@ -217,24 +431,27 @@ class LinearPlantModel : public MatrixModel<detail::DenseShape<Order, States + C
                            detail::DenseView<S>{given.data(), States + 1, 2});
     for (int which = 0; which < 2; ++which) {
       State x{};
-      for (int i = 0; i < N; ++i) {
+      x.fill(S(0));
+      for (int i = 0; i < inner; ++i) {
         S sum(0);
         for (int j = 0; j <= States; ++j) sum = sum + rows(i, j) * given(j, which);
-        x[static_cast<std::size_t>(i)] = sum;
+        x[static_cast<std::size_t>(lf + i)] = sum;
       }
+      if constexpr (lf > 0) x[0] = S(which == 0 ? 1 : 0);
       (which == 0 ? rest_of_y_ : rest_of_u_) = this->physical(x);
     }
     // D is what u has to hold, and nothing moves: without the rounding of the equations.
-    for (int r = 0; r <= Order; ++r) {
+    for (int r = 0; r <= n; ++r) {
       rest_of_y_(r) = S(r == 0 ? 1 : 0);
-      rest_of_u_(r) = r == Order ? S(-input_gain) : S(0);
+      rest_of_u_(r) = r == n ? S(-input_gain) : S(0);
     }
   }
 
-  [[nodiscard]] Vector<S, N> natural_of(const Estimate& z) const noexcept {
+  /// (x, elements of d).
+  [[nodiscard]] Vector<S, inner> natural_of(const Estimate& z) const noexcept {
     const State x = this->scaled(z);
-    Vector<S, N> state;
-    for (int i = 0; i < N; ++i) state(i) = x[static_cast<std::size_t>(i)];
+    Vector<S, inner> state;
+    for (int i = 0; i < inner; ++i) state(i) = x[static_cast<std::size_t>(lf + i)];
     return natural_ * state;
   }
 
@@ -268,36 +485,16 @@ class LinearPlantModel : public MatrixModel<detail::DenseShape<Order, States + C
     return least;
   }
 
-  /// C adj(-A) E, the numerator from d to y at s = 0, against the size of its terms: 0 where a zero
-  /// hides a constant d.
-  static S passed_share(const LinearPlant<States, S>& plant) noexcept {
-    auto adjugate = Matrix<S, States, States>::Identity();  // Faddeev and LeVerrier
-    for (int k = 1; k < States; ++k) {
-      adjugate = plant.a * adjugate;
-      const S next = -adjugate.trace() / static_cast<S>(k);
-      for (int i = 0; i < States; ++i) adjugate(i, i) = adjugate(i, i) + next;
-    }
-    S sum(0);
-    S size(0);
-    for (int i = 0; i < States; ++i) {
-      for (int j = 0; j < States; ++j) {
-        const S term = plant.c(i) * adjugate(i, j) * plant.e(j);
-        sum = sum + term;
-        size = size +
-               detail::absolute(S(plant.c(i) * plant.e(j))) * detail::largest_magnitude(adjugate);
-      }
-    }
-    return size > S(0) ? detail::absolute(sum) / size : S(0);
-  }
-
-  Square natural_;  ///< from the scaled states to (x, d, ..)
+  Settings settings_;
+  Square natural_;  ///< from the scaled states to (x, elements of d)
   Estimate rest_of_y_;
   Estimate rest_of_u_;
 };
 
 /// Told apart in snapshots.
-template <int States, int Order, PlainScalar S, int Constants>
-inline constexpr std::uint32_t type_tag<LinearPlantModel<States, Order, S, Constants>> =
-    make_type_tag<S>("LinearPlantModel", States, Order, Constants);
+template <int States, ModelParts Parts, PlainScalar S>
+inline constexpr std::uint32_t type_tag<LinearPlantModel<States, Parts, S>> =
+    make_type_tag<S>("LinearPlantModel", States, Parts.order, Parts.sensor, Parts.constants,
+                     Parts.resonators, Parts.leaky);
 
 }  // namespace esokit

@@ -5,6 +5,7 @@
 #include <esokit/gain/model_gain.hpp>
 #include <esokit/gain/scheduled_gain.hpp>
 #include <esokit/model/augmented_model.hpp>
+#include <esokit/model/plant_model.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 
@@ -26,5 +27,18 @@ template <ModelParts Parts, int Levels, PlainScalar S = double, class Placement 
 using ModelCascadeEso =
     CascadeEso<AugmentedModel<Parts, S>::order, Levels, S, AugmentedModel<Parts, S>::extension,
                Placement, AugmentedModel<Parts, S>>;
+
+/// LinearEso of a whole plant, with a sensor and a disturbance that may swing or fade and enter
+/// elsewhere than u:
+///
+///     using Eso = PlantEso<3, ModelParts{.order = 2, .resonators = 1}>;
+///     auto eso = Eso::make({.observer_bandwidth = 100, .input_gain = plant.input_gain(),
+///                           .sample_time = 1e-3,
+///                           .model = {.plant = plant, .resonators = {{{.frequency = 314}}}}});
+///
+/// See LinearPlantModel.
+template <int States, ModelParts Parts, PlainScalar S = double, class Placement = EqualPoles>
+using PlantEso = LinearEso<Parts.order, S, LinearPlantModel<States, Parts, S>::extension, Placement,
+                           LinearPlantModel<States, Parts, S>>;
 
 }  // namespace esokit
