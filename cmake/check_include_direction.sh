@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Refuses every include in include/esokit that goes against
-#   core <- math <- model <- gain <- observer <- adapter <- control <- eigen.hpp <- sim <- analysis <- identify
+#   core <- math <- model <- gain <- observer <- adapter <- control <- eigen.hpp <- sim <- analysis <- identify <- tune
 # and every header from core to control, what runs in a controller, that needs Eigen or another header
 # that costs more than a controller; an umbrella header that does not include every other header, and a header that reaches C++20 before
 # core/language.hpp, which says that it is needed.
@@ -22,7 +22,7 @@ check() {  # check INCLUDE_DIR
   fi
   (cd "$include_dir" && awk '
     BEGIN {
-      count = split("core math model gain observer adapter control eigen.hpp sim analysis identify", order, " ")
+      count = split("core math model gain observer adapter control eigen.hpp sim analysis identify tune", order, " ")
       for (i = 1; i <= count; ++i) rank[order[i]] = i
       for (i = 1; i < ARGC; ++i) {
         known[ARGV[i]] = 1

@@ -153,3 +153,9 @@
 #include <esokit/sim/step_response.hpp>
 #include <esokit/sim/trapezoid.hpp>
 #include <esokit/sim/window.hpp>
+#include <esokit/tune/families.hpp>
+#include <esokit/tune/loop_cost.hpp>
+#include <esokit/tune/lqg.hpp>
+#include <esokit/tune/problem.hpp>
+#include <esokit/tune/search.hpp>
+#include <esokit/tune/tune.hpp>

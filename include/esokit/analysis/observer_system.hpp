@@ -9,12 +9,14 @@
 
 #include <cmath>
 #include <concepts>
+#include <cstddef>
 #include <esokit/analysis/linear_system.hpp>
 #include <esokit/gain/sampled_gain.hpp>
 #include <esokit/model/chain_model.hpp>
 #include <esokit/model/integrator_chain.hpp>
 #include <esokit/model/sampled_model.hpp>
 #include <esokit/observer/concepts.hpp>
+#include <vector>
 
 namespace esokit {
 
@@ -110,6 +112,29 @@ constexpr int state_of_row(int row) noexcept {
   }
 }
 
+/// Of a model that is no chain, in double whatever its scalar; without the disturbance's part.
+template <class Model>
+SampledMatrices<Model::size> model_matrices(const Model& model) {
+  constexpr int size = Model::size;
+  using S = std::remove_cvref_t<decltype(model.sample_time())>;
+  SampledMatrices<size> m;
+  typename Model::State ones;
+  ones.fill(S(1));
+  const auto units = model.physical(ones);
+  const auto gamma = model.physical(model.add_input(typename Model::State{}, S(1)));
+  const auto step = model.increment();
+  for (int row = 0; row < size; ++row) {
+    m.units(Model::state_of_row(row)) = static_cast<double>(units(row));
+    m.gamma(Model::state_of_row(row)) = static_cast<double>(gamma(row));
+  }
+  for (int i = 0; i < size; ++i) {
+    for (int j = 0; j < size; ++j) {
+      m.step(i, j) = static_cast<double>(step(i, j)) * m.units(i) / m.units(j);
+    }
+  }
+  return m;
+}
+
 /// In double, whatever the scalar of the observer.
 template <SampledLinearObserver Observer>
 SampledMatrices<Observer::size> sampled_matrices(const Observer& observer) {
@@ -127,20 +152,7 @@ SampledMatrices<Observer::size> sampled_matrices(const Observer& observer) {
     m.units(0) = 1.0;
     for (int r = 1; r < size; ++r) m.units(r) = m.units(r - 1) * r / time;
   } else {
-    typename Model::State ones;
-    ones.fill(S(1));
-    const auto units = model.physical(ones);
-    const auto gamma = model.physical(model.add_input(typename Model::State{}, S(1)));
-    const auto step = model.increment();
-    for (int row = 0; row < size; ++row) {
-      m.units(Model::state_of_row(row)) = static_cast<double>(units(row));
-      m.gamma(Model::state_of_row(row)) = static_cast<double>(gamma(row));
-    }
-    for (int i = 0; i < size; ++i) {
-      for (int j = 0; j < size; ++j) {
-        m.step(i, j) = static_cast<double>(step(i, j)) * m.units(i) / m.units(j);
-      }
-    }
+    m = model_matrices(model);
   }
   if constexpr (Observer::levels > 1) {
     for (int j = 0; j < size; ++j) {
@@ -160,43 +172,45 @@ SampledMatrices<Observer::size> sampled_matrices(const Observer& observer) {
   return m;
 }
 
-template <class Observer>
-using MatricesOf = ObserverMatrices<Observer::order, Observer::extension, Observer::levels>;
+/// Sizes of an observer.
+struct ObserverSizes {
+  int size, levels;
+};
 
-template <SampledLinearObserver Observer>
-MatricesOf<Observer> observer_matrices(const Observer& observer, double = 0.0) {
-  using Matrices = MatricesOf<Observer>;
-  constexpr int size = Matrices::size;
-  constexpr int states = Matrices::states;
+/// What a sampled observer does, in physical units: Phi - I, Gamma, what of a correction is the
+/// disturbance's (of several levels), the gains k level by level, and where each row of the
+/// estimate is among the states.
+struct ObserverParts {
+  DenseView<const double> step, gamma, disturbance;
+  const double* gains;
+  const int* state_of_row;
+};
 
-  Matrices m;
-  const auto sampled = sampled_matrices(observer);
-  m.input_gain = static_cast<double>(observer.input_gain());
-  m.sample_time = static_cast<double>(observer.sample_time());
-
-  // Element by element: block expressions of each size would cost seconds to compile.
-  // `added`: what a correction adds to the levels, as rows over the predicted states and y.
-  EigenMatrix<double, states, states> added = EigenMatrix<double, states, states>::Zero();
-  Array<double, states> added_y{};
-  Array<double, states> measured{};
+/// ObserverMatrices of any size, into matrices that are zero.
+inline void put_together(const ObserverSizes& sizes, const ObserverParts& parts,
+                         DenseView<double> a, DenseView<double> by, DenseView<double> bu,
+                         DenseView<double> c, DenseView<double> dy) {
+  const auto [size, levels] = sizes;
+  const int states = size * levels;
+  // What a correction adds to the levels, as rows over the predicted states and y.
+  DynamicMatrix<double> added(states, states);
+  std::vector<double> added_y(static_cast<std::size_t>(states));
+  std::vector<double> measured(static_cast<std::size_t>(states));
   double measured_y = 1.0;
-  for (int level = 0; level < Observer::levels; ++level) {
+  for (int level = 0; level < levels; ++level) {
     const int first = level * size;
-    const auto scaled = observer.level_gain(level);
     for (int r = 0; r < size; ++r) {
-      const double gain =
-          sampled.units(r) * static_cast<double>(scaled[static_cast<std::size_t>(r)]);
+      const double gain = parts.gains[first + r];
       for (int j = 0; j < states; ++j) {
         const double innovation = measured[static_cast<std::size_t>(j)] - (j == first ? 1.0 : 0.0);
         added(first + r, j) = gain * innovation;
       }
-      const auto row = static_cast<std::size_t>(first + r);
-      added_y[row] = gain * measured_y;
+      added_y[static_cast<std::size_t>(first + r)] = gain * measured_y;
     }
     if (level > 0) {  // what the levels before have found of the disturbance, too
       for (int r = 0; r < size; ++r) {
         for (int q = 0; q < size; ++q) {
-          const double share = sampled.disturbance(r, q);
+          const double share = parts.disturbance(r, q);
           if (!(std::abs(share) > 0.0)) continue;
           for (int j = 0; j < states; ++j) {
             added(first + r, j) += share * added(first - size + q, j);
@@ -215,19 +229,54 @@ MatricesOf<Observer> observer_matrices(const Observer& observer, double = 0.0) {
   for (int row = 0; row < states; ++row) {
     const int first = row / size * size;
     for (int k = first; k < first + size; ++k) {
-      const double step = sampled.step(row - first, k - first);
+      const double step = parts.step(row - first, k - first);
       const double weight = step + (k == row ? 1.0 : 0.0);
-      for (int j = 0; j < states; ++j) m.a(row, j) += weight * added(k, j);
-      m.a(row, k) += step;
-      m.by(row) += weight * added_y[static_cast<std::size_t>(k)];
+      for (int j = 0; j < states; ++j) a(row, j) += weight * added(k, j);
+      a(row, k) += step;
+      by(row, 0) += weight * added_y[static_cast<std::size_t>(k)];
     }
-    m.bu(row) = sampled.gamma(row - first);
+    bu(row, 0) = parts.gamma(row - first, 0);
   }
   for (int r = 0; r < size; ++r) {
-    const int row = states - size + state_of_row<Observer>(r);
-    for (int j = 0; j < states; ++j) m.c(r, j) = added(row, j) + (j == row ? 1.0 : 0.0);
-    m.dy(r) = added_y[static_cast<std::size_t>(row)];
+    const int row = states - size + parts.state_of_row[r];
+    for (int j = 0; j < states; ++j) c(r, j) = added(row, j) + (j == row ? 1.0 : 0.0);
+    dy(r, 0) = added_y[static_cast<std::size_t>(row)];
   }
+}
+
+template <class Observer>
+using MatricesOf = ObserverMatrices<Observer::order, Observer::extension, Observer::levels>;
+
+template <SampledLinearObserver Observer>
+MatricesOf<Observer> observer_matrices(const Observer& observer, double = 0.0) {
+  using Matrices = MatricesOf<Observer>;
+  constexpr int size = Matrices::size;
+  constexpr int states = Matrices::states;
+
+  Matrices m;
+  const auto sampled = sampled_matrices(observer);
+  m.input_gain = static_cast<double>(observer.input_gain());
+  m.sample_time = static_cast<double>(observer.sample_time());
+
+  Array<double, states> gains{};
+  Array<int, size> state_of{};
+  for (int r = 0; r < size; ++r) {
+    state_of[static_cast<std::size_t>(r)] = state_of_row<Observer>(r);
+    for (int level = 0; level < Observer::levels; ++level) {
+      gains[static_cast<std::size_t>(level * size + r)] =
+          sampled.units(r) *
+          static_cast<double>(observer.level_gain(level)[static_cast<std::size_t>(r)]);
+    }
+  }
+  // A matrix of one column is stored by columns.
+  put_together({size, Observer::levels},
+               {{sampled.step.data(), size},
+                {sampled.gamma.data(), size, 1},
+                {sampled.disturbance.data(), size},
+                gains.data(),
+                state_of.data()},
+               {m.a.data(), states}, {m.by.data(), states, 1}, {m.bu.data(), states, 1},
+               {m.c.data(), size, states}, {m.dy.data(), size, 1});
   return m;
 }
 

@@ -1,0 +1,256 @@
+/// @file
+/// The families of controllers that are compared, and each as a linear system for any of its
+/// parameters.
+#pragma once
+
+#include <cmath>
+#include <complex>
+#include <cstddef>
+#include <cstdio>
+#include <esokit/analysis/controllers.hpp>
+#include <esokit/gain/half_gain.hpp>
+#include <esokit/gain/model_gain.hpp>
+#include <esokit/gain/pole_set.hpp>
+#include <esokit/model/augmented_model.hpp>
+#include <esokit/tune/lqg.hpp>
+#include <esokit/tune/problem.hpp>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace esokit {
+
+/// How the gains of observer and law come about.
+enum class TuneFamily : unsigned char {
+  linear,     ///< LinearEso by its bandwidth, law by its bandwidth
+  half_gain,  ///< HalfGainEso, law by its bandwidth
+  cascade,    ///< CascadeEso by bandwidth and factor, law by its bandwidth
+  filter,     ///< frozen ExtendedStateFilter by its noise ratio, LQR gains
+  free_poles  ///< LinearEso by any poles, law by any poles
+};
+
+/// What an observer of the family knows beside the chain.
+struct TuneKnowledge {
+  bool lag = false;     ///< of the actuator
+  bool sensor = false;  ///< lag of the sensor
+  bool swing = false;   ///< what the disturbance swings at
+
+  /// Whether it is more than the chain.
+  [[nodiscard]] constexpr bool any() const noexcept { return lag || sensor || swing; }
+  /// Member by member.
+  friend constexpr bool operator==(const TuneKnowledge&, const TuneKnowledge&) = default;
+};
+
+/// A point of a family.
+struct TuneSettings {
+  double observer_bandwidth = 0.0;    ///< omega_o, of a cascade that of level 1, rad/s
+  double bandwidth_factor = 0.0;      ///< alpha of a cascade
+  double controller_bandwidth = 0.0;  ///< omega_c where the law goes by it, rad/s
+  /// Poles of the error, 1/s: of free poles alone.
+  std::vector<std::complex<double>> observer_poles{};
+  double disturbance_bound = 0.0;  ///< q_n of the filter, see ExtendedStateFilter
+  std::vector<double> gains{};     ///< k_0 .. of the law, whatever it goes by
+};
+
+namespace detail {
+
+/// An observer without its type: the matrices, and the gains for its parameters.
+struct ObserverKind {
+  int order = 1;  ///< of the law
+  int size = 2;
+  int levels = 1;
+  double input_gain = 1.0;  ///< of the law
+  DynamicMatrix<double> step{}, gamma{};
+  DynamicMatrix<double> disturbance{};  ///< see ObserverParts, of several levels
+  std::vector<int> state_of_row{};
+  /// Physical gains, level by level; false where there are none.
+  std::function<bool(const TuneSettings&, std::vector<double>&)> gains{};
+};
+
+/// Poles of a pair s^2 + 2 zeta w s + w^2.
+inline std::array<std::complex<double>, 2> pole_pair(double w, double zeta) {
+  if (zeta < 1.0) {
+    const std::complex<double> p(-zeta * w, w * std::sqrt(1.0 - zeta * zeta));
+    return {p, std::conj(p)};
+  }
+  const double root = std::sqrt(zeta * zeta - 1.0);
+  return {-w * (zeta + root), -w / (zeta + root)};
+}
+
+/// Coefficients below the highest of prod (s - p_i), by rising powers.
+inline std::vector<double> polynomial(const std::vector<std::complex<double>>& poles) {
+  std::vector<std::complex<double>> c{1.0};
+  for (const auto& p : poles) {
+    c.push_back(c.back());
+    for (std::size_t i = c.size() - 2; i > 0; --i) c[i] = c[i - 1] - p * c[i];
+    c[0] *= -p;
+  }
+  std::vector<double> real;
+  for (std::size_t i = 0; i + 1 < c.size(); ++i) real.push_back(c[i].real());
+  return real;
+}
+
+/// `function(std::integral_constant<int, value>)` for a value of First .. Last.
+template <int First, int Last, class Function>
+auto with_number(int value, const Function& function) {
+  if constexpr (First < Last) {
+    if (value != First) return with_number<First + 1, Last>(value, function);
+  }
+  return function(std::integral_constant<int, First>{});
+}
+
+/// Physical gains of a chain whose sampled poles have these weights.
+template <int Size>
+void chain_gains(const PoleWeights<Size, double>& weights, double T, std::vector<double>& gains) {
+  const auto scaled = current_gain<Size, double>(weights);
+  double unit = 1.0;
+  for (int r = 0; r < Size; ++r) {
+    if (r > 0) unit *= r / T;
+    gains.push_back(unit * scaled[static_cast<std::size_t>(r)]);
+  }
+}
+
+/// The chain of integrators, its input, and how its gains are placed.
+inline ObserverKind chain_kind(const TuneModel& model, TuneFamily family, int extension,
+                               int levels) {
+  ObserverKind kind;
+  const int n = model.order;
+  const int size = n + extension;
+  const double T = model.sample_time;
+  kind.order = n;
+  kind.size = size;
+  kind.levels = levels;
+  kind.input_gain = model.input_gain.value;
+  kind.step = DynamicMatrix<double>(size, size);
+  kind.gamma = DynamicMatrix<double>(size, 1);
+  kind.disturbance = DynamicMatrix<double>(size, size);
+  for (int i = n; i < size; ++i) kind.disturbance(i, i) = 1.0;
+  for (int i = 0; i < size; ++i) {
+    double power = 1.0;
+    for (int j = i + 1; j < size; ++j) {
+      power *= T / (j - i);
+      kind.step(i, j) = power;
+    }
+    kind.state_of_row.push_back(i);
+    if (i < n) kind.gamma(i, 0) = kind.step(i, n) * kind.input_gain;
+  }
+  const double noise = model.noise * model.noise;
+  kind.gains = [=, step = kind.step](const TuneSettings& s, std::vector<double>& gains) {
+    if (family == TuneFamily::filter) {
+      auto phi = step;
+      for (int i = 0; i < size; ++i) phi(i, i) += 1.0;
+      DynamicMatrix<double> c(size, 1), q(size, size);
+      c(0, 0) = 1.0;
+      q(size - 1, size - 1) = s.disturbance_bound * s.disturbance_bound;
+      const auto p = solve_riccati(transposed(phi), c, noise, q);
+      for (int i = 0; i < size; ++i) gains.push_back(p(i, 0) / (p(0, 0) + noise));
+      return true;
+    }
+    with_number<2, 5>(size, [&](auto number) {
+      constexpr int N = number();
+      double bandwidth = s.observer_bandwidth;
+      for (int level = 0; level < levels; ++level) {
+        if (family == TuneFamily::half_gain) {
+          chain_gains<N>(HalfGainPoles::sample<N, double>(bandwidth, T).weights(), T, gains);
+        } else if (family == TuneFamily::free_poles) {
+          Array<std::complex<double>, N> poles{};
+          std::copy(s.observer_poles.begin(), s.observer_poles.end(), poles.begin());
+          chain_gains<N>(SampledPoleSet<N, double>::from_continuous(poles, T).weights(), T, gains);
+        } else {
+          chain_gains<N>(EqualSampledPoles<N, double>::from_bandwidth(bandwidth, T).weights(), T,
+                         gains);
+        }
+        bandwidth *= s.bandwidth_factor;
+      }
+      return 0;
+    });
+    return true;
+  };
+  return kind;
+}
+
+template <ModelParts Parts>
+typename AugmentedModel<Parts>::Settings model_settings(const TuneModel& model) {
+  typename AugmentedModel<Parts>::Settings settings{};
+  if constexpr (Parts.actuator == 1) settings.actuator.time_constant = model.lag;
+  if constexpr (Parts.sensor == 1) settings.sensor.time_constant = model.sensor;
+  if constexpr (Parts.resonators == 1) {
+    const KnownSwing& swing = model.swings.front();
+    settings.resonators[0] = {swing.frequency, 0.0, swing.capture_bandwidth};
+  }
+  return settings;
+}
+
+/// An observer that knows parts; none where the model refuses the numbers.
+template <ModelParts Parts, class Placement>
+std::optional<ObserverKind> known_kind(const TuneModel& model) {
+  using Model = AugmentedModel<Parts>;
+  const double T = model.sample_time;
+  const auto made = Model::make(model_settings<Parts>(model), model.input_gain.value, T);
+  if (!made) return std::nullopt;
+  ObserverKind kind;
+  kind.order = Model::order;
+  kind.size = Model::size;
+  kind.input_gain = made->input_gain();
+  const auto matrices = model_matrices(*made);
+  kind.step = dynamic_copy(matrices.step, Model::size, Model::size);
+  kind.gamma = dynamic_copy(matrices.gamma, Model::size, 1);
+  for (int r = 0; r < Model::size; ++r) kind.state_of_row.push_back(Model::state_of_row(r));
+  kind.gains = [made = *made, units = matrices.units, T](const TuneSettings& s,
+                                                         std::vector<double>& gains) {
+    return made.with_corrected_part(s.observer_bandwidth, [&](const auto& part) {
+      using Part = std::remove_cvref_t<decltype(part)>;
+      constexpr int pairs = Part::own_pairs;
+      constexpr int placed = Part::size - 2 * pairs;
+      Array<Contraction<double>, pairs> own{};
+      for (std::size_t i = 0; i < own.size(); ++i) {
+        own[i] = contraction(part.pairs[i][0] * T, part.pairs[i][1] * T);
+      }
+      const auto of_part = placed_gain(
+          part.step, part.output, part.degrees,
+          with_pairs(
+              pole_factors(Placement::template sample<placed, double>(s.observer_bandwidth, T)),
+              own));
+      for (int i = 0; i < Model::size; ++i) {
+        double sum = 0.0;
+        for (std::size_t j = 0; j < of_part.size(); ++j) {
+          sum += part.whole(i, static_cast<int>(j)) * of_part[j];
+        }
+        if (!is_finite(sum)) return false;
+        gains.push_back(units(i) * sum);
+      }
+      return true;
+    });
+  };
+  return kind;
+}
+
+/// The law around an observer, told of its own u.
+inline std::optional<LinearController> tuned_controller(const ObserverKind& kind, double T,
+                                                        const TuneSettings& settings) {
+  std::vector<double> gains;
+  if (!kind.gains(settings, gains)) return std::nullopt;
+  const int states = kind.size * kind.levels;
+  LinearObserverForm form;
+  form.a = DynamicMatrix<double>(states, states);
+  form.from_y = DynamicMatrix<double>(states, 1);
+  form.from_u = DynamicMatrix<double>(states, 1);
+  form.to_estimate = DynamicMatrix<double>(kind.size, states);
+  form.y_to_estimate = DynamicMatrix<double>(kind.size, 1);
+  form.sample_time = T;
+  form.input_gain = kind.input_gain;
+  put_together({kind.size, kind.levels},
+               {{kind.step.data(), kind.size},
+                {kind.gamma.data(), kind.size, 1},
+                {kind.disturbance.data(), kind.size},
+                gains.data(),
+                kind.state_of_row.data()},
+               form.a.view(), form.from_y.view(), form.from_u.view(), form.to_estimate.view(),
+               form.y_to_estimate.view());
+  return closed_upon_itself(feedback_of(form, law_weights(settings.gains, kind.input_gain), false));
+}
+
+}  // namespace detail
+}  // namespace esokit

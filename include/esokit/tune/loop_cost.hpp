@@ -1,0 +1,279 @@
+/// @file
+/// What a loop costs and what margins it has, fast enough to be asked ten thousand times.
+///
+/// The criterion, stationary and at the samples,
+///
+///     J = var(y) + rho var(b0 u~),   u~ = u + d / b0,
+///
+/// is an integral over the frequencies, as a Lyapunov equation would give it; but the plant, dead
+/// time and all, is worked out once for all controllers, and the same loop gains tell the margins.
+/// (d walks, so u has no variance; u~ has. `noise` of the analysis is the reference in the tests.)
+/// The grid is even in the logarithm of W = 2 / T tan(omega T / 2), where the trapezoid rule
+/// converges exponentially: poles with a damping of 0.25 leave 1e-6 at 20 points a decade.
+/// Stable is a loop whose characteristic polynomial turns by half a turn for each state between
+/// z = 1 and z = -1.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <cstddef>
+#include <esokit/analysis/delay_margin.hpp>
+#include <esokit/analysis/linear_controller.hpp>
+#include <esokit/analysis/poles.hpp>
+#include <esokit/tune/problem.hpp>
+#include <limits>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+namespace esokit {
+
+/// What LoopCost answers.
+struct LoopNumbers {
+  bool stable = false;         ///< with b0 as it is
+  bool tolerant = false;       ///< with b0 wrong by the factor that the rules ask for, too
+  double output = 0.0;         ///< standard deviation of y
+  double control = 0.0;        ///< of u~
+  double control_noise = 0.0;  ///< of u, by noise alone
+  double modulus = 0.0;        ///< margin, the least over b0's interval
+  double delay = 0.0;          ///< margin, s, the least over b0's interval
+
+  /// J.
+  [[nodiscard]] double cost(double rho, double input_gain) const {
+    return output * output + rho * input_gain * input_gain * control * control;
+  }
+};
+
+namespace detail {
+
+/// C (value - A)^-1 B + D of one channel, by a Hessenberg form: O(N^2) a frequency.
+class FastResponse {
+ public:
+  /// @param c told of its own u
+  explicit FastResponse(const LinearController& c)
+      : n_(c.states()), h_(c.a), b_(c.from_y), c_(c.to_u), d_(c.y_to_u(0, 0)) {
+    // By elimination with pivots, as it costs least (Wilkinson's elmhes).
+    for (int m = 1; m + 1 < n_; ++m) {
+      int pivot = m;
+      for (int i = m + 1; i < n_; ++i) {
+        if (std::abs(h_(i, m - 1)) > std::abs(h_(pivot, m - 1))) pivot = i;
+      }
+      if (h_(pivot, m - 1) == 0.0) continue;
+      if (pivot != m) {
+        for (int j = 0; j < n_; ++j) std::swap(h_(m, j), h_(pivot, j));
+        for (int i = 0; i < n_; ++i) std::swap(h_(i, m), h_(i, pivot));
+        std::swap(b_(m, 0), b_(pivot, 0));
+        std::swap(c_(0, m), c_(0, pivot));
+      }
+      for (int i = m + 1; i < n_; ++i) {
+        const double factor = h_(i, m - 1) / h_(m, m - 1);
+        if (factor == 0.0) continue;
+        for (int j = m - 1; j < n_; ++j) h_(i, j) -= factor * h_(m, j);
+        b_(i, 0) -= factor * b_(m, 0);
+        for (int k = 0; k < n_; ++k) h_(k, m) += factor * h_(k, i);
+        c_(0, m) += factor * c_(0, i);
+      }
+    }
+    work_.resize(static_cast<std::size_t>(n_ * n_ + n_));
+  }
+
+  struct Answer {
+    std::complex<double> gain;
+    std::complex<double> turn;  ///< det(value - A) over its magnitude
+  };
+  [[nodiscard]] Answer at(std::complex<double> value) {
+    using Complex = std::complex<double>;
+    Complex* const m = work_.data();
+    Complex* const x = m + n_ * n_;
+    const auto entry = [&](int i, int j) -> Complex& { return m[i * n_ + j]; };
+    for (int i = 0; i < n_; ++i) {
+      for (int j = std::max(i - 1, 0); j < n_; ++j) entry(i, j) = -h_(i, j);
+      entry(i, i) += value;
+      x[i] = b_(i, 0);
+    }
+    Complex turn = 1.0;
+    for (int k = 0; k < n_; ++k) {
+      if (k + 1 < n_) {
+        if (std::norm(entry(k + 1, k)) > std::norm(entry(k, k))) {
+          for (int j = k; j < n_; ++j) std::swap(entry(k, j), entry(k + 1, j));
+          std::swap(x[k], x[k + 1]);
+          turn = -turn;
+        }
+        const Complex factor = divided(entry(k + 1, k), entry(k, k));
+        for (int j = k + 1; j < n_; ++j) entry(k + 1, j) -= times(factor, entry(k, j));
+        x[k + 1] -= times(factor, x[k]);
+      }
+      const double size = std::sqrt(std::norm(entry(k, k)));
+      turn = times(turn, entry(k, k) / size);
+    }
+    Complex gain = d_;
+    for (int k = n_ - 1; k >= 0; --k) {
+      Complex sum = x[k];
+      for (int j = k + 1; j < n_; ++j) sum -= times(entry(k, j), x[j]);
+      x[k] = divided(sum, entry(k, k));
+      gain += c_(0, k) * x[k];
+    }
+    return {gain, turn};
+  }
+
+ private:
+  // Without the care that the standard's take for infinities.
+  static std::complex<double> times(std::complex<double> a, std::complex<double> b) noexcept {
+    return {a.real() * b.real() - a.imag() * b.imag(), a.real() * b.imag() + a.imag() * b.real()};
+  }
+  static std::complex<double> divided(std::complex<double> a, std::complex<double> b) noexcept {
+    return times(a, std::conj(b)) / std::norm(b);
+  }
+
+  int n_;
+  DynamicMatrix<double> h_, b_, c_;
+  double d_;
+  std::vector<std::complex<double>> work_;
+};
+
+}  // namespace detail
+
+/// The plant and what shakes it, ready for any controller.
+class LoopCost {
+  using Complex = std::complex<double>;
+
+ public:
+  /// @param model checked @param rules what margins are asked for @param slowest rad/s, well below
+  /// which nothing happens @param points a decade
+  LoopCost(const TuneModel& model, const TuneRules& rules, double slowest, double points = 20.0)
+      : T_(model.sample_time), b0_(model.input_gain.value), factor_(rules.gain_factor) {
+    const double share = model.input_gain.half_width / std::abs(b0_);
+    gains_ = {1.0};
+    if (share > 0.0) gains_ = {1.0, 1.0 - share, 1.0 + share};
+    const detail::SampledPlant plant =
+        detail::sampled_plant(detail::dense_plant(model), model.sample_time);
+    const auto poles = detail::poles_of(plant.a);
+    plant_states_ = plant.a.rows();
+    const auto add = [&](double w, double density, double load) {
+      // 2 j sin(wT/2) e^(j wT/2), which z - 1 of a small angle would cancel.
+      const double half = 0.5 * w * T_;
+      const Complex value = Complex(0.0, 2.0 * std::sin(half)) * std::polar(1.0, half);
+      Point p;
+      p.frequency = w;
+      p.value = value;
+      p.plant = detail::response(plant, value)(0, 0);
+      p.load = detail::response(plant, value, true)(0, 0);
+      p.turn = 1.0;
+      for (const Complex& pole : poles) {
+        const Complex factor = value - pole;
+        p.turn *= factor / std::sqrt(std::norm(factor));
+      }
+      p.noise_power = density * model.noise * model.noise;
+      p.load_power = density * model.disturbance * T_ / std::norm(value) + load;
+      points_.push_back(p);
+    };
+    const double from = 1e-2 * slowest;
+    const double to = 60.0 / T_;
+    const int steps = static_cast<int>(std::ceil(points * std::log10(to / from)));
+    const double h = std::log(to / from) / steps;
+    for (int i = 0; i <= steps; ++i) {
+      const double W = from * std::exp(h * i);
+      const double x = 0.5 * W * T_;
+      // The tails are constant densities.
+      const double ends = i == 0 ? 0.5 * h + 1.0 : i == steps ? 0.5 * h + 1.0 : h;
+      add(2.0 / T_ * std::atan(x), ends * 2.0 * x / (1.0 + x * x) / std::numbers::pi, 0.0);
+    }
+    add(std::numbers::pi / T_, 0.0, 0.0);
+    walked_ = points_.size();
+    for (const KnownSwing& swing : model.swings) {
+      add(swing.frequency, 0.0, 0.5 * swing.amplitude * swing.amplitude);
+    }
+  }
+
+  /// @param controller told of its own u
+  [[nodiscard]] LoopNumbers operator()(const LinearController& controller) const {
+    detail::FastResponse response(controller);
+    LoopNumbers numbers;
+    numbers.modulus = numbers.delay = std::numeric_limits<double>::infinity();
+    double output = 0.0, control = 0.0, noise = 0.0;
+    const double scales[] = {1.0, factor_, 1.0 / factor_};
+    Complex before[3];
+    double turned[3] = {};
+    // Of each gain of b0's interval: what came last.
+    struct Trail {
+      double square[2];
+      Complex loop;
+    };
+    Trail trails[3] = {};
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      const Point& p = points_[i];
+      const auto c = response.at(p.value);
+      const Complex loop = -p.plant * c.gain;
+      const Complex sensitivity = 1.0 / (1.0 + loop);
+      const Complex cs = c.gain * sensitivity;
+      const double caused = std::norm(cs) * p.noise_power;
+      noise += caused;
+      output += std::norm(loop * sensitivity) * p.noise_power +
+                std::norm(p.load * sensitivity) * p.load_power;
+      control += caused + std::norm(1.0 / b0_ + cs * p.load) * p.load_power;
+      if (i >= walked_) continue;
+      const Complex turn = p.turn * c.turn;
+      for (std::size_t g = 0; g < 3; ++g) {
+        const Complex now = turn * (1.0 + scales[g] * loop);
+        turned[g] += i == 0 ? std::arg(now) : std::arg(now * std::conj(before[g]));
+        before[g] = now;
+      }
+      for (std::size_t g = 0; g < gains_.size(); ++g) {
+        margins(numbers, trails[g].square, trails[g].loop, gains_[g] * loop, i);
+      }
+    }
+    const double whole = std::numbers::pi * (plant_states_ + controller.states());
+    bool stable[3];
+    for (std::size_t g = 0; g < 3; ++g) stable[g] = std::abs(turned[g] - whole) < 1.0;
+    numbers.stable = stable[0] && is_finite(output) && is_finite(control);
+    numbers.tolerant = stable[1] && stable[2];
+    numbers.output = std::sqrt(output);
+    numbers.control = std::sqrt(control);
+    numbers.control_noise = std::sqrt(noise);
+    return numbers;
+  }
+
+ private:
+  struct Point {
+    double frequency;
+    Complex value, plant, load, turn;
+    double noise_power, load_power;
+  };
+
+  void margins(LoopNumbers& numbers, double (&square)[2], Complex& last, Complex loop,
+               std::size_t i) const {
+    const double now = std::norm(1.0 + loop);
+    double least = now;
+    // A parabola through three where the middle one is least.
+    if (i >= 2 && square[1] <= square[0] && square[1] <= now) {
+      const double bend = square[0] - 2.0 * square[1] + now;
+      const double slope = 0.5 * (now - square[0]);
+      least = bend > 0.0 ? std::max(square[1] - 0.5 * slope * slope / bend, 0.0) : square[1];
+    }
+    numbers.modulus = std::min(numbers.modulus, std::sqrt(least));
+    if (i > 0) {
+      const double a = std::norm(last), b = std::norm(loop);
+      if ((a < 1.0) != (b < 1.0)) {
+        const double share = std::log(a) / std::log(a / b);
+        const double w =
+            std::pow(points_[i - 1].frequency, 1.0 - share) * std::pow(points_[i].frequency, share);
+        const Complex there = last * std::polar(1.0, share * std::arg(loop * std::conj(last)));
+        numbers.delay = std::min(numbers.delay, detail::lag_to_minus_one(there) / w);
+      }
+    }
+    square[0] = square[1];
+    square[1] = now;
+    last = loop;
+  }
+
+  double T_;
+  double b0_;
+  double factor_;
+  std::vector<double> gains_;
+  int plant_states_ = 0;
+  std::size_t walked_ = 0;
+  std::vector<Point> points_;
+};
+
+}  // namespace esokit

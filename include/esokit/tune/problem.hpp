@@ -1,0 +1,154 @@
+/// @file
+/// What a choice of observer and controller starts from: the model, one wish, and the margins that
+/// the loop has to keep.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <esokit/analysis/loop.hpp>
+#include <esokit/core/check.hpp>
+#include <esokit/identify/identify.hpp>
+#include <vector>
+
+namespace esokit {
+
+/// A disturbance that swings at a known frequency.
+struct KnownSwing {
+  double frequency = 0.0;          ///< w0, rad/s
+  double amplitude = 0.0;          ///< unit of y^(n)
+  double capture_bandwidth = 0.0;  ///< of an observer that knows it, see Resonance; 0: w0
+};
+
+/// What is known of a plant and of what shakes it:
+///
+///     y^(n) + a y^(n-1) = b0 v(t - L) + d,   tau v' + v = u,   tau_s y_s' + y_s = y
+///
+/// y_s is measured with white noise; d is a random walk, and swings where that is known.
+struct TuneModel {
+  int order = 1;                     ///< n, 1 to 3
+  Estimate input_gain{};             ///< b0 with its interval, unit of y^(n) over that of u
+  double pole = 0.0;                 ///< a, 1/s
+  double lag = 0.0;                  ///< tau, s; 0: none
+  double dead_time = 0.0;            ///< L, s
+  double sensor = 0.0;               ///< tau_s, s; 0: none
+  double noise = 0.0;                ///< standard deviation of the measurement noise
+  double disturbance = 0.0;          ///< q: variance of the increments of d over time
+  std::vector<KnownSwing> swings{};  ///< one at most, or none
+  double sample_time = 0.0;          ///< T of the controller, s
+  double u_min = 0.0;                ///< limits of the actuator
+  double u_max = 0.0;                ///< above u_min
+
+  /// Error of a number that no plant has.
+  [[nodiscard]] Check<double> check() const {
+    Rules<double> rules;
+    rules
+        .require(order >= 1 && order <= 3, "order", static_cast<double>(order), "must be 1, 2 or 3")
+        .nonzero("input_gain", input_gain.value)
+        .not_negative("input_gain.half_width", input_gain.half_width)
+        .require(!(input_gain.half_width >= std::abs(input_gain.value)), "input_gain.half_width",
+                 input_gain.half_width, "must be below b0: the sign of b0 has to be known")
+        .require(is_finite(pole), "pole", pole, "must be finite")
+        .not_negative("lag", lag)
+        .not_negative("dead_time", dead_time)
+        .not_negative("sensor", sensor)
+        .positive("noise", noise)
+        .positive("disturbance", disturbance)
+        .positive("sample_time", sample_time)
+        .require(is_finite(u_min), "u_min", u_min, "must be finite")
+        .require(is_finite(u_max), "u_max", u_max, "must be finite")
+        .require(u_min < u_max, "u_max", u_max, "must be above u_min")
+        .require(swings.size() <= 1, "swings", static_cast<double>(swings.size()),
+                 "must be one at most")
+        .require(!(dead_time > 100.0 * sample_time), "dead_time", dead_time,
+                 "must not be above 100 samples");
+    for (std::size_t i = 0; i < swings.size(); ++i) {
+      const int index = static_cast<int>(i);
+      rules.positive("swings.frequency", swings[i].frequency, index)
+          .require(swings[i].frequency * sample_time < 3.1, "swings.frequency", swings[i].frequency,
+                   "must be below half the sample rate", index)
+          .not_negative("swings.amplitude", swings[i].amplitude, index)
+          .not_negative("swings.capture_bandwidth", swings[i].capture_bandwidth, index);
+    }
+    return rules;
+  }
+};
+
+/// The model of a log, for a controller with its sample time.
+/// @param u_min limits of the actuator @param u_max above u_min
+inline TuneModel tune_model(const Identified& found, double u_min, double u_max) {
+  TuneModel model;
+  model.order = found.order;
+  model.input_gain = found.input_gain;
+  model.pole = found.pole.value;
+  model.lag = found.lag.value;
+  model.dead_time = found.dead_time.value;
+  model.noise = found.noise.value;
+  model.disturbance = found.disturbance;
+  model.sample_time = found.log.sample_time;
+  model.u_min = u_min;
+  model.u_max = u_max;
+  return model;
+}
+
+/// What is wished for; one of these at most.
+struct TuneWish {
+  /// Standard deviation of u that the measurement noise may cause, u's unit. Left out: 5 % of
+  /// u_max - u_min, or twice what it takes to cancel the disturbance alone, if that is more.
+  double control_noise = 0.0;
+  double settling_time = 0.0;         ///< s, of a step of the reference to within 2 %
+  double controller_bandwidth = 0.0;  ///< omega_c, rad/s: the law is given, the observer is chosen
+};
+
+/// What a loop has to keep, at b0 and at both ends of its interval.
+struct TuneRules {
+  double modulus_margin = 0.5;  ///< least abs(1 + L)
+  double delay_samples = 2.0;   ///< least delay margin, samples
+  double gain_factor = 2.0;     ///< the loop stays stable with b0 wrong by this, either way
+};
+
+namespace detail {
+
+/// The plant of a model in states (y, .., y^(n-1), v, y_s); d enters at y^(n).
+/// @param gain factor on b0
+inline DensePlant dense_plant(const TuneModel& model, double gain = 1.0) {
+  const int n = model.order;
+  const int lag = model.lag > 0.0 ? 1 : 0;
+  const int sensor = model.sensor > 0.0 ? 1 : 0;
+  const int states = n + lag + sensor;
+  DensePlant plant{DynamicMatrix<double>(states, states),
+                   DynamicMatrix<double>(states, 1),
+                   DynamicMatrix<double>(1, states),
+                   DynamicMatrix<double>(states, 1),
+                   {model.dead_time}};
+  for (int i = 0; i + 1 < n; ++i) plant.a(i, i + 1) = 1.0;
+  plant.a(n - 1, n - 1) = -model.pole;
+  plant.e(n - 1, 0) = 1.0;
+  const double b = gain * model.input_gain.value;
+  if (lag == 1) {
+    plant.a(n - 1, n) = b;
+    plant.a(n, n) = -1.0 / model.lag;
+    plant.b(n, 0) = 1.0 / model.lag;
+  } else {
+    plant.b(n - 1, 0) = b;
+  }
+  if (sensor == 1) {
+    plant.a(n + lag, 0) = 1.0 / model.sensor;
+    plant.a(n + lag, n + lag) = -1.0 / model.sensor;
+    plant.c(0, n + lag) = 1.0;
+  } else {
+    plant.c(0, 0) = 1.0;
+  }
+  return plant;
+}
+
+}  // namespace detail
+
+/// The loop of a model's plant and a controller, for all that the analysis answers.
+/// @param gain factor on b0 of the plant, not of the controller
+inline LoopResult closed_loop(const TuneModel& model, const LinearController& controller,
+                              double gain = 1.0) {
+  if (auto ok = model.check(); !ok) return ok.error();
+  return Loop::make(detail::dense_plant(model, gain), controller);
+}
+
+}  // namespace esokit

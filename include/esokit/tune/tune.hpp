@@ -1,0 +1,643 @@
+/// @file
+/// From a model and a wish to a ranked list of designs: which observer, which bandwidths.
+///
+///     auto tuning = tune(tune_model(*identified, -12.0, 12.0));
+///     std::puts(tuning->designs.front().code.c_str());
+///
+/// 1. J = var(y) + rho var(b0 u~), u~ = u + d / b0, at the samples: what noise and a walking
+///    disturbance make of the loop (tune/loop_cost.hpp).
+/// 2. The wish sets rho: of the LQG controllers, one for each rho, it is met by one.
+/// 3. That controller's J is J*: no linear controller has less (tune/lqg.hpp).
+/// 4. Each family minimises J at this rho under the margins, or says which one it cannot keep.
+/// 5. Ranked by J; what is within 1 % by the cost of an update, then by the modulus margin.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdio>
+#include <esokit/core/expected.hpp>
+#include <esokit/tune/families.hpp>
+#include <esokit/tune/loop_cost.hpp>
+#include <esokit/tune/lqg.hpp>
+#include <esokit/tune/problem.hpp>
+#include <esokit/tune/search.hpp>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace esokit {
+
+/// One family at its best, or as near to the margins as it comes.
+struct TunedDesign {
+  std::string name;          ///< what it is, in words
+  TuneFamily family{};       ///< how its gains come about
+  int extension = 1;         ///< m
+  int levels = 1;            ///< p
+  TuneKnowledge knows{};     ///< what its observer knows
+  TuneSettings settings{};   ///< the numbers that were chosen
+  bool feasible = false;     ///< keeps all margins
+  std::string constraint;    ///< the margin that holds it back, or that it cannot keep; or "none"
+  double cost = 0.0;         ///< J
+  double excess = 0.0;       ///< sqrt(J / J*)
+  double free_excess = 0.0;  ///< the same without margins: their quotient is their price
+  double output_deviation = 0.0;   ///< sd of y
+  double control_deviation = 0.0;  ///< sd of u + d / b0
+  double control_noise = 0.0;      ///< sd of u by the measurement noise alone
+  double load_peak = 0.0;       ///< largest abs(y) after a step of load that one unit of u balances
+  double settling_time = 0.0;   ///< of a step of the reference to within 2 %, s
+  double modulus_margin = 0.0;  ///< least over b0's interval
+  double delay_margin = 0.0;    ///< least over b0's interval, s
+  int instructions = 0;         ///< of an update of the observer, see update_instructions
+  std::string code;             ///< C++ to paste: type and config of the controller
+  LinearController controller{};  ///< for the analysis, see closed_loop(model, controller)
+};
+
+/// What `tune` found.
+struct Tuning {
+  TuneModel model{};           ///< as given
+  TuneRules rules{};           ///< as given
+  double rho = 0.0;            ///< weight of var(b0 u~) in J
+  double control_noise = 0.0;  ///< that was wished for, u's unit; 0 where the wish was another
+  double optimum = 0.0;        ///< J*
+  LoopNumbers lqg{};           ///< of the controller that has it
+  std::vector<TunedDesign> designs{};  ///< the chosen one first; infeasible ones last
+
+  /// The first, if it keeps the margins.
+  [[nodiscard]] const TunedDesign* chosen() const noexcept {
+    return !designs.empty() && designs.front().feasible ? &designs.front() : nullptr;
+  }
+};
+
+/// Instructions of an update of the observer on a Cortex-M4F in float, counted on the straight path
+/// of the disassembly (GCC 12, -O2); the emulator of examples/embedded counts the same within two.
+/// The frozen filter by its nine more in that table.
+inline int update_instructions(int order, TuneFamily family, int extension, int levels,
+                               const TuneKnowledge& knows) {
+  const auto n = static_cast<std::size_t>(order - 1);
+  constexpr int chain[3][2] = {{27, 39}, {39, 50}, {50, 63}};
+  constexpr int cascade[3][2] = {{43, 57}, {58, 83}, {76, 115}};
+  constexpr int lag[3] = {45, 61, 80}, sensor[3] = {41, 56, 75}, swing[3] = {57, 74, 92};
+  constexpr int lag_sensor[3] = {63, 82, 102}, lag_swing[3] = {80, 103, 124};
+  if (knows.lag && knows.sensor) return lag_sensor[n];
+  if (knows.lag && knows.swing) return lag_swing[n];
+  if (knows.lag) return lag[n];
+  if (knows.sensor) return sensor[n];
+  if (knows.swing) return swing[n];
+  if (levels > 1) return cascade[n][static_cast<std::size_t>(levels - 2)];
+  return chain[n][static_cast<std::size_t>(extension - 1)] + (family == TuneFamily::filter ? 9 : 0);
+}
+
+namespace detail {
+
+/// A number as C++ source.
+inline std::string source(double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.6g", value);
+  std::string number = text;
+  if (number.find_first_of(".en") == std::string::npos) number += ".0";
+  return number;
+}
+
+/// Which families there are for a model, and how each is searched.
+struct Contender {
+  TunedDesign design{};
+  ObserverKind kind{};
+  int observer_numbers = 1;  ///< that the search is free in
+  int law_numbers = 1;
+};
+
+/// What a search needs to know of the problem.
+struct TuneSearch {
+  TuneModel model;
+  TuneRules rules;
+  double rho;
+  double fixed_bandwidth;      ///< omega_c where it is given, else 0
+  double reference_bandwidth;  ///< of the LQG's law
+  double filter_bandwidth;     ///< of its filter
+  double possible_bandwidth;   ///< that lag and dead time leave
+  const LoopCost* cost;
+
+  [[nodiscard]] double slowest() const {
+    return 0.05 * std::min({reference_bandwidth, filter_bandwidth, 0.3 * possible_bandwidth});
+  }
+  [[nodiscard]] double fastest() const {
+    return std::min(8.0 * std::max(reference_bandwidth, filter_bandwidth), 3.0 / model.sample_time);
+  }
+
+  /// Settings from the logarithms that are searched in.
+  [[nodiscard]] TuneSettings settings(const Contender& c, const std::vector<double>& x) const {
+    TuneSettings s;
+    const int n = c.kind.order;
+    const double T = model.sample_time;
+    const auto at = [&](int i) { return std::exp(x[static_cast<std::size_t>(i)]); };
+    const auto push = [&](auto& list, const auto& more) {
+      list.insert(list.end(), more.begin(), more.end());
+    };
+    const int first_law = c.observer_numbers;
+    switch (c.design.family) {
+      case TuneFamily::filter:
+        // Intensity R T w^(2 (n + 1)) over a sample.
+        s.disturbance_bound = model.noise * T * std::pow(at(0), c.kind.size);
+        break;
+      case TuneFamily::free_poles:
+        for (int i = 0; i < c.kind.size;) {
+          if (c.kind.size % 2 != 0 && i == 0) {
+            s.observer_poles.push_back(-at(i++));
+          } else {
+            push(s.observer_poles, pole_pair(at(i), at(i + 1)));
+            i += 2;
+          }
+        }
+        break;
+      case TuneFamily::cascade:
+        s.bandwidth_factor = 1.0 + at(1);
+        [[fallthrough]];
+      default:
+        s.observer_bandwidth = at(0);
+    }
+    if (c.law_numbers == 0 || c.design.family != TuneFamily::free_poles) {
+      const double w = c.law_numbers == 0 ? fixed_bandwidth : at(first_law);
+      if (c.law_numbers > 0 && c.design.family == TuneFamily::filter) {
+        s.gains = lqr(n, std::pow(w, -2 * n));
+      } else {
+        s.controller_bandwidth = w;
+        s.gains = polynomial(std::vector<std::complex<double>>(static_cast<std::size_t>(n), -w));
+      }
+    } else {
+      std::vector<std::complex<double>> poles;
+      if (n % 2 != 0) poles.push_back(-at(first_law));
+      if (n > 1) push(poles, pole_pair(at(first_law + n - 2), at(first_law + n - 1)));
+      s.gains = polynomial(poles);
+    }
+    return s;
+  }
+
+  /// Gains of the chain of n for var(y) + rho var(v).
+  [[nodiscard]] std::vector<double> lqr(int n, double weight) const {
+    TuneModel chain = model;
+    chain.order = n;
+    const auto kind = chain_kind(chain, TuneFamily::linear, 1, 1);
+    DynamicMatrix<double> a(n, n), b(n, 1), q(n, n);
+    for (int i = 0; i < n; ++i) {
+      for (int j = 0; j < n; ++j) a(i, j) = kind.step(i, j) + (i == j ? 1.0 : 0.0);
+      b(i, 0) = kind.step(i, n);
+    }
+    q(0, 0) = 1.0;
+    const auto x = solve_riccati(a, b, weight, q);
+    const auto bx = product(transposed(b), x);
+    const auto k = product(bx, a);
+    const double size = weight + product(bx, b)(0, 0);
+    std::vector<double> gains;
+    for (int j = 0; j < n; ++j) gains.push_back(k(0, j) / size);
+    return gains;
+  }
+
+  /// By how much margins are missed: the worst share that is lacking, 0: none.
+  struct Lack {
+    double modulus, delay, gain;
+    [[nodiscard]] double sum() const { return modulus + delay + gain; }
+  };
+  [[nodiscard]] Lack lack(const LoopNumbers& numbers, double more = 1.0) const {
+    const double modulus = more * rules.modulus_margin;
+    const double delay = more * rules.delay_samples * model.sample_time;
+    return {modulus > 0.0 ? std::max(1.0 - numbers.modulus / modulus, 0.0) : 0.0,
+            delay > 0.0 ? std::max(1.0 - numbers.delay / delay, 0.0) : 0.0,
+            numbers.tolerant ? 0.0 : 1.0};
+  }
+
+  /// log J, with a price on margins that are lacking.
+  [[nodiscard]] double value(const Contender& c, const std::vector<double>& x, bool margins) const {
+    double outside = 0.0;
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      outside += std::max(low(c, i) - x[i], 0.0) + std::max(x[i] - high(c, i), 0.0);
+    }
+    if (outside > 0.0) return 1e4 * (1.0 + outside);
+    const auto controller = tuned_controller(c.kind, model.sample_time, settings(c, x));
+    if (!controller) return 1e5;
+    const LoopNumbers numbers = (*cost)(*controller);
+    if (!numbers.stable) return 1e4;
+    const double j = numbers.cost(rho, model.input_gain.value);
+    if (!(j > 0.0) || !is_finite(j)) return 1e4;
+    return std::log(j) + (margins ? 10.0 * lack(numbers, 1.003).sum() : 0.0);
+  }
+
+  /// What number i of the search is: a damping, a factor, or a bandwidth.
+  [[nodiscard]] bool damping(const Contender& c, std::size_t index) const {
+    if (c.design.family != TuneFamily::free_poles) return false;
+    const int i = static_cast<int>(index);
+    if (i < c.observer_numbers) return i > 0 && (c.kind.size - i) % 2 != 0;
+    const int j = i - c.observer_numbers;
+    return j > 0 && (c.kind.order - j) % 2 != 0;
+  }
+  [[nodiscard]] bool factor(const Contender& c, std::size_t i) const {
+    return c.design.family == TuneFamily::cascade && i == 1;
+  }
+  [[nodiscard]] double low(const Contender& c, std::size_t i) const {
+    return std::log(damping(c, i) ? 0.2 : factor(c, i) ? 0.1 : slowest());
+  }
+  [[nodiscard]] double high(const Contender& c, std::size_t i) const {
+    return std::log(damping(c, i) ? 4.0 : factor(c, i) ? 8.0 : fastest());
+  }
+
+  /// The least of a family. @param starts to begin with instead of a scan
+  [[nodiscard]] SearchPoint least(const Contender& c, bool margins,
+                                  const std::vector<std::vector<double>>& starts) const {
+    const auto f = [&](const std::vector<double>& x) { return value(c, x, margins); };
+    const auto numbers = static_cast<std::size_t>(c.observer_numbers + c.law_numbers);
+    SearchPoint best;
+    best.value = std::numeric_limits<double>::infinity();
+    std::vector<double> step(numbers, 0.25);
+    if (starts.empty()) {
+      std::vector<double> from, to;
+      std::vector<int> points;
+      for (std::size_t i = 0; i < numbers; ++i) {
+        from.push_back(low(c, i));
+        to.push_back(high(c, i));
+        points.push_back(factor(c, i) ? 4 : numbers > 2 ? 9 : 12);
+        step[i] = 0.5 * (to[i] - from[i]) / (points[i] - 1);
+      }
+      best = grid_search(f, from, to, points);
+      best = simplex_search(f, best.at, step, 60 * static_cast<int>(numbers));
+    }
+    for (const auto& start : starts) {
+      const auto found = simplex_search(f, start, step, 60 * static_cast<int>(numbers));
+      if (found.value < best.value) best = found;
+    }
+    // Again and again, as a simplex collapses on the edge of a margin.
+    for (int again = 0; again < 6; ++again) {
+      for (double& s : step) s = again % 2 == 0 ? 0.1 : -0.05;
+      const auto found = simplex_search(f, best.at, step, 40 * static_cast<int>(numbers), 1e-7);
+      const bool enough = !(found.value < best.value - 2e-4);
+      if (found.value < best.value) best = found;
+      if (enough && again > 0) break;
+    }
+    return best;
+  }
+};
+
+/// y over a step: largest magnitude, and when it is within 2 % of `final` for good.
+struct StepAnswer {
+  double peak = 0.0;
+  double settling = 0.0;
+};
+inline StepAnswer step_answer(const DynamicSystem& system, int input, double size, double final,
+                              int steps) {
+  const int n = system.a.rows();
+  std::vector<double> x(static_cast<std::size_t>(n)), rate(static_cast<std::size_t>(n));
+  StepAnswer answer;
+  for (int k = 0; k <= steps; ++k) {
+    double y = system.d(0, input) * size;
+    for (int j = 0; j < n; ++j) y += system.c(0, j) * x[static_cast<std::size_t>(j)];
+    answer.peak = std::max(answer.peak, std::abs(y));
+    if (std::abs(y - final) > 0.02 * std::abs(final))
+      answer.settling = (k + 1) * system.sample_time;
+    for (int i = 0; i < n; ++i) rate[static_cast<std::size_t>(i)] = system.b(i, input) * size;
+    for (int j = 0; j < n; ++j) {
+      const double value = x[static_cast<std::size_t>(j)];
+      for (int i = 0; i < n; ++i) rate[static_cast<std::size_t>(i)] += system.a(i, j) * value;
+    }
+    for (std::size_t i = 0; i < x.size(); ++i) x[i] += rate[i];
+  }
+  return answer;
+}
+
+/// The numbers of a design from its settings.
+inline void fill_in(Contender& c, const TuneSearch& search, const LoopCost& fine, double optimum,
+                    double free_cost) {
+  TunedDesign& d = c.design;
+  const TuneModel& model = search.model;
+  const auto controller = tuned_controller(c.kind, model.sample_time, d.settings);
+  if (!controller) return;
+  d.controller = *controller;
+  const LoopNumbers numbers = fine(*controller);
+  d.cost = numbers.cost(search.rho, model.input_gain.value);
+  d.excess = std::sqrt(d.cost / optimum);
+  d.free_excess = std::min(std::sqrt(free_cost / optimum), d.excess);
+  d.output_deviation = numbers.output;
+  d.control_deviation = numbers.control;
+  d.control_noise = numbers.control_noise;
+  d.modulus_margin = numbers.modulus;
+  d.delay_margin = numbers.delay;
+  const auto lack = search.lack(numbers, 0.999);
+  d.feasible = numbers.stable && lack.sum() <= 0.0;
+  if (!numbers.stable) {
+    d.constraint = "stability";
+  } else if (!d.feasible) {
+    d.constraint = lack.gain > 0.0             ? "b0 wrong by a factor"
+                   : lack.modulus > lack.delay ? "modulus margin"
+                                               : "delay margin";
+  } else if (d.cost < free_cost * 1.002) {
+    d.constraint = "none";
+  } else {
+    const double modulus = numbers.modulus / search.rules.modulus_margin;
+    const double delay = numbers.delay / (search.rules.delay_samples * model.sample_time);
+    d.constraint = std::min(modulus, delay) > 1.03 ? "b0 wrong by a factor"
+                   : modulus <= delay              ? "modulus margin"
+                                                   : "delay margin";
+  }
+  if (!numbers.stable) return;
+  const auto loop = closed_loop(model, *controller);
+  if (!loop || !loop->stable()) return;
+  const double decay = -std::log1p(std::max(loop->stability_abscissa(), -0.9));
+  const int steps = static_cast<int>(std::min(12.0 / decay, 50000.0)) + 10;
+  d.settling_time = step_answer(loop->system(), 0, 1.0, 1.0, steps).settling;
+  d.load_peak = step_answer(loop->system(), 2, std::abs(model.input_gain.value), 0.0, steps).peak;
+}
+
+/// Type and config of the controller as C++.
+inline std::string controller_source(const TunedDesign& d, const TuneModel& model) {
+  const std::string n = std::to_string(model.order);
+  const auto list = [](const std::vector<double>& numbers) {
+    std::string text;
+    for (const double number : numbers) text += (text.empty() ? "" : ", ") + source(number);
+    return text;
+  };
+  std::string type, config;
+  if (d.knows.any()) {
+    type = "esokit::ModelEso<esokit::ModelParts{.order = " + n;
+    std::string parts;
+    const auto part = [&](const std::string& text) { parts += (parts.empty() ? "" : ", ") + text; };
+    if (d.knows.lag) {
+      type += ", .actuator = 1";
+      part(".actuator = {.time_constant = " + source(model.lag) + "}");
+    }
+    if (d.knows.sensor) {
+      type += ", .sensor = 1";
+      part(".sensor = {.time_constant = " + source(model.sensor) + "}");
+    }
+    if (d.knows.swing) {
+      type += ", .resonators = 1";
+      const KnownSwing& swing = model.swings.front();
+      part(".resonators = {{{.frequency = " + source(swing.frequency) +
+           (swing.capture_bandwidth > 0.0
+                ? ", .capture_bandwidth = " + source(swing.capture_bandwidth)
+                : "") +
+           "}}}");
+    }
+    type += d.family == TuneFamily::half_gain ? "}, double, esokit::HalfGainPoles>" : "}>";
+    config = ".observer_bandwidth = " + source(d.settings.observer_bandwidth);
+    config += ", .input_gain = " + source(model.input_gain.value) +
+              ", .sample_time = " + source(model.sample_time) + ", .model = {" + parts + "}";
+  } else {
+    const std::string common = ".input_gain = " + source(model.input_gain.value) +
+                               ", .sample_time = " + source(model.sample_time);
+    const std::string bandwidth =
+        ".observer_bandwidth = " + source(d.settings.observer_bandwidth) + ", ";
+    switch (d.family) {
+      case TuneFamily::linear:
+        type = "esokit::LinearEso<" + n + (d.extension > 1 ? ", double, 2>" : ">");
+        config = bandwidth + common;
+        break;
+      case TuneFamily::half_gain:
+        type = "esokit::HalfGainEso<" + n + ">";
+        config = bandwidth + common;
+        break;
+      case TuneFamily::cascade:
+        type = "esokit::CascadeEso<" + n + ", " + std::to_string(d.levels) + ">";
+        config = bandwidth + ".bandwidth_factor = " + source(d.settings.bandwidth_factor) + ", " +
+                 common;
+        break;
+      case TuneFamily::filter: {
+        type = "esokit::ExtendedStateFilter<" + n + ">";
+        std::vector<double> bounds(static_cast<std::size_t>(model.order), 0.0);
+        bounds.push_back(d.settings.disturbance_bound);
+        config = common + ", .measurement_variance = " + source(model.noise * model.noise) +
+                 ", .disturbance_bounds = {{" + list(bounds) +
+                 "}}, .bound_factor = 1.0, .inflation_rule = esokit::InflationRule::none, "
+                 ".mode = esokit::RiccatiMode::frozen";
+        break;
+      }
+      case TuneFamily::free_poles: {
+        type = "esokit::LinearEso<" + n + ", double, 1, esokit::PoleSet>";
+        std::string poles;
+        for (const auto& p : d.settings.observer_poles) {
+          poles += (poles.empty() ? "{" : ", {") + source(p.real()) + ", " + source(p.imag()) + "}";
+        }
+        config = ".poles = {{" + poles + "}}, " + common;
+        break;
+      }
+    }
+  }
+  const bool by_bandwidth = d.settings.controller_bandwidth > 0.0;
+  return "using Observer = " + type + ";\n" +
+         "auto controller = esokit::Adrc<Observer>::make({.observer = {" + config + "},\n" +
+         (by_bandwidth ? "    .controller_bandwidth = " + source(d.settings.controller_bandwidth)
+                       : "    .gains = {{" + list(d.settings.gains) + "}}") +
+         ",\n    .limits = {.lower = " + source(model.u_min) + ", .upper = " + source(model.u_max) +
+         "}});\n";
+}
+
+/// All families that a model has.
+inline std::vector<Contender> contenders(const TuneModel& model, bool law_is_given) {
+  std::vector<Contender> all;
+  const auto take = [&](TuneFamily family, std::string name, const TuneKnowledge& knows, int m,
+                        int p, std::optional<ObserverKind> kind) {
+    if (!kind) return;
+    Contender c;
+    c.design.family = family;
+    c.design.name = std::move(name);
+    c.design.knows = knows;
+    c.design.extension = m;
+    c.design.levels = p;
+    c.design.instructions = update_instructions(model.order, family, m, p, knows);
+    c.kind = std::move(*kind);
+    if (family == TuneFamily::cascade) c.observer_numbers = 2;
+    if (family == TuneFamily::free_poles) {
+      c.observer_numbers = c.kind.size;
+      c.law_numbers = c.kind.order;
+    }
+    if (law_is_given) c.law_numbers = 0;
+    all.push_back(std::move(c));
+  };
+  const auto chain = [&](TuneFamily family, std::string name, int m, int p) {
+    take(family, std::move(name), {}, m, p, chain_kind(model, family, m, p));
+  };
+  const std::string n = std::to_string(model.order);
+  chain(TuneFamily::linear, "LinearEso", 1, 1);
+  chain(TuneFamily::half_gain, "HalfGainEso", 1, 1);
+  chain(TuneFamily::linear, "LinearEso, m = 2", 2, 1);
+  chain(TuneFamily::cascade, "CascadeEso, p = 2", 1, 2);
+  chain(TuneFamily::cascade, "CascadeEso, p = 3", 1, 3);
+  chain(TuneFamily::filter, "frozen filter, LQR gains", 1, 1);
+  chain(TuneFamily::free_poles, "LinearEso, free poles", 1, 1);
+  with_number<1, 3>(model.order, [&](auto number) {
+    constexpr int order = number();
+    const auto known = [&](auto parts, const TuneKnowledge& knows, const std::string& name) {
+      constexpr ModelParts p = decltype(parts)::value;
+      take(TuneFamily::linear, "LinearEso that knows " + name, knows, 1, 1,
+           known_kind<p, EqualPoles>(model));
+      take(TuneFamily::half_gain, "HalfGainEso that knows " + name, knows, 1, 1,
+           known_kind<p, HalfGainPoles>(model));
+    };
+    const bool lag = model.lag > 0.0, sensor = model.sensor > 0.0, swing = !model.swings.empty();
+    using L = std::integral_constant<ModelParts, ModelParts{.order = order, .actuator = 1}>;
+    if (lag) known(L{}, {.lag = true}, "the lag");
+    using F = std::integral_constant<ModelParts, ModelParts{.order = order, .sensor = 1}>;
+    if (sensor) known(F{}, {.sensor = true}, "the sensor");
+    using Q = std::integral_constant<ModelParts, ModelParts{.order = order, .resonators = 1}>;
+    if (swing) known(Q{}, {.swing = true}, "the swing");
+    using LF =
+        std::integral_constant<ModelParts, ModelParts{.order = order, .actuator = 1, .sensor = 1}>;
+    if (lag && sensor) known(LF{}, {.lag = true, .sensor = true}, "lag and sensor");
+    using LQ = std::integral_constant<ModelParts,
+                                      ModelParts{.order = order, .actuator = 1, .resonators = 1}>;
+    if (lag && swing) known(LQ{}, {.lag = true, .swing = true}, "lag and swing");
+    return 0;
+  });
+  return all;
+}
+
+/// Bandwidth of the LQG law, rho = w^(-2n), that meets a wish: `rises(w)` is monotonic, and is to
+/// be `wanted`.
+template <class Function>
+double bandwidth_for(const Function& rises, double wanted, double low, double high) {
+  for (int i = 0; i < 40 && high > low * 1.0005; ++i) {
+    const double middle = std::sqrt(low * high);
+    (rises(middle) < wanted ? low : high) = middle;
+  }
+  return std::sqrt(low * high);
+}
+
+}  // namespace detail
+
+/// The designs for a model, the best one first.
+/// @return error for a model that `check` refuses, for more wishes than one, and for a wish that no
+///         controller can meet
+[[nodiscard]] inline Expected<Tuning, Error<double>> tune(const TuneModel& model,
+                                                          const TuneWish& wish = {},
+                                                          const TuneRules& rules = {}) {
+  Rules<double> checks;
+  checks.all_of(model.check())
+      .not_negative("control_noise", wish.control_noise)
+      .not_negative("settling_time", wish.settling_time)
+      .not_negative("controller_bandwidth", wish.controller_bandwidth)
+      .require(!(wish.settling_time > 0.0 && wish.control_noise > 0.0), "settling_time",
+               wish.settling_time, "must be left out where control_noise is given")
+      .require(!(wish.controller_bandwidth > 0.0 &&
+                 (wish.control_noise > 0.0 || wish.settling_time > 0.0)),
+               "controller_bandwidth", wish.controller_bandwidth,
+               "must be left out where another wish is given")
+      .not_negative("modulus_margin", rules.modulus_margin)
+      .require(!(rules.modulus_margin >= 1.0), "modulus_margin", rules.modulus_margin,
+               "must be below 1")
+      .not_negative("delay_samples", rules.delay_samples)
+      .require(rules.gain_factor >= 1.0 && is_finite(rules.gain_factor), "gain_factor",
+               rules.gain_factor, "must be finite and 1 or more");
+  if (!checks) return checks.error();
+  const int n = model.order;
+  const double T = model.sample_time;
+  const double b0 = model.input_gain.value;
+  Tuning tuning;
+  tuning.model = model;
+  tuning.rules = rules;
+  const double filter_bandwidth =
+      std::pow(model.disturbance / (model.noise * model.noise * T), 0.5 / (n + 1));
+  const double latency = model.lag + model.dead_time + model.sensor + 1.5 * T;
+  const Lqg lqg(model);
+  const double slow = std::min(1e-3 * filter_bandwidth, 1e-2 / T), fast = 0.5 / T;
+  const auto rho_of = [n](double w) { return std::pow(w, -2 * n); };
+  double w = 0.0;
+  if (wish.controller_bandwidth > 0.0) {
+    w = wish.controller_bandwidth;
+    checks.require(w <= fast,
+                   {"controller_bandwidth", w,
+                    "must not be above half of the sample rate in rad/s, that is", -1, fast, true});
+  } else if (wish.settling_time > 0.0) {
+    const auto settling = [&](double x) { return -lqg.settling(rho_of(x)); };
+    checks
+        .require(-settling(fast) <= wish.settling_time,
+                 {"settling_time", wish.settling_time,
+                  "is less than this sample time and dead time allow, that is", -1, -settling(fast),
+                  true})
+        .require(-settling(slow) >= wish.settling_time,
+                 {"settling_time", wish.settling_time, "is far slower than what disturbs; at most",
+                  -1, -settling(slow), true});
+    if (!checks) return checks.error();
+    w = detail::bandwidth_for(settling, -wish.settling_time, slow, fast);
+  } else {
+    const LoopCost cost(model, rules, slow);
+    const auto noise = [&](double x) { return cost(lqg.controller(rho_of(x))).control_noise; };
+    const double least = noise(slow);
+    double wanted = wish.control_noise;
+    if (wanted > 0.0) {
+      checks.require(
+          wanted > 1.001 * least,
+          {"control_noise", wanted, "is less than cancelling the disturbance alone takes, that is",
+           -1, least, true});
+    } else {
+      wanted = std::max(0.05 * (model.u_max - model.u_min), 2.0 * least);
+    }
+    if (!checks) return checks.error();
+    tuning.control_noise = wanted;
+    w = detail::bandwidth_for(noise, wanted, slow, fast);
+  }
+  if (!checks) return checks.error();
+  tuning.rho = rho_of(w);
+
+  detail::TuneSearch search{
+      model,         rules,  tuning.rho, wish.controller_bandwidth, w, filter_bandwidth,
+      1.0 / latency, nullptr};
+  const LoopCost cost(model, rules, search.slowest());
+  const LoopCost fine(model, rules, search.slowest(), 50.0);
+  search.cost = &cost;
+  tuning.lqg = fine(lqg.controller(tuning.rho));
+  tuning.optimum = tuning.lqg.cost(tuning.rho, b0);
+  std::vector<detail::Contender> all = detail::contenders(model, wish.controller_bandwidth > 0.0);
+  for (detail::Contender& c : all) {
+    std::vector<std::vector<double>> starts;
+    if (c.design.family == TuneFamily::free_poles) {
+      // From the families that are in this one.
+      for (const detail::Contender& other : all) {
+        const bool half = other.design.family == TuneFamily::half_gain;
+        if (other.design.knows.any() || other.design.extension > 1 ||
+            !(half || other.design.family == TuneFamily::linear)) {
+          continue;
+        }
+        const double o = std::log(other.design.settings.observer_bandwidth);
+        const double l = std::log(other.design.settings.controller_bandwidth);
+        std::vector<double> start;
+        const auto numbers = static_cast<std::size_t>(c.observer_numbers + c.law_numbers);
+        for (std::size_t i = 0; i < numbers; ++i) {
+          const bool of_observer = static_cast<int>(i) < c.observer_numbers;
+          start.push_back(search.damping(c, i) ? (half && of_observer ? -0.5 : -0.05)
+                          : of_observer        ? o - (half ? 0.3 : 0.0)
+                                               : l);
+        }
+        starts.push_back(std::move(start));
+      }
+    }
+    const auto free = search.least(c, false, starts);
+    auto best = free;
+    if (search.value(c, free.at, true) > free.value) best = search.least(c, true, starts);
+    c.design.settings = search.settings(c, best.at);
+    detail::fill_in(c, search, fine, tuning.optimum, std::exp(free.value));
+    c.design.code = detail::controller_source(c.design, model);
+  }
+  for (detail::Contender& c : all) tuning.designs.push_back(std::move(c.design));
+  // By J; of those within 1 % of the least that is left the one that costs least comes next.
+  std::stable_sort(tuning.designs.begin(), tuning.designs.end(),
+                   [](const TunedDesign& a, const TunedDesign& b) {
+                     return a.feasible != b.feasible ? a.feasible : a.cost < b.cost;
+                   });
+  for (std::size_t i = 0; i < tuning.designs.size(); ++i) {
+    std::size_t best = i;
+    for (std::size_t j = i + 1; j < tuning.designs.size(); ++j) {
+      const TunedDesign& a = tuning.designs[best];
+      const TunedDesign& b = tuning.designs[j];
+      if (b.feasible != tuning.designs[i].feasible || b.cost > 1.01 * tuning.designs[i].cost) break;
+      if (b.instructions < a.instructions ||
+          (b.instructions == a.instructions && b.modulus_margin > a.modulus_margin)) {
+        best = j;
+      }
+    }
+    std::rotate(tuning.designs.begin() + static_cast<std::ptrdiff_t>(i),
+                tuning.designs.begin() + static_cast<std::ptrdiff_t>(best),
+                tuning.designs.begin() + static_cast<std::ptrdiff_t>(best) + 1);
+  }
+  return tuning;
+}
+
+}  // namespace esokit

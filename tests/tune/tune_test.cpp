@@ -1,0 +1,164 @@
+// From a model and a wish to designs: the criterion beside a Lyapunov equation, the optimum beside
+// an independent solution, refusals, and that what is chosen keeps its margins.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <esokit/analysis/covariance.hpp>
+#include <esokit/analysis/delay_margin.hpp>
+#include <esokit/analysis/margins.hpp>
+#include <esokit/tune/tune.hpp>
+#include <limits>
+#include <string>
+
+namespace {
+
+using esokit::DynamicMatrix;
+using esokit::LinearController;
+using esokit::LoopCost;
+using esokit::LoopNumbers;
+using esokit::Lqg;
+using esokit::tune;
+using esokit::TunedDesign;
+using esokit::TuneModel;
+
+TuneModel plain(int order, double disturbance = 1.0) {
+  TuneModel model;
+  model.order = order;
+  model.input_gain = {1.0, 0.0};
+  model.noise = 1e-3;
+  model.disturbance = disturbance;
+  model.sample_time = 1e-3;
+  model.u_min = -5.0;
+  model.u_max = 5.0;
+  return model;
+}
+
+/// All that a plant may have, b0 negative.
+TuneModel full() {
+  TuneModel model = plain(2, 40.0);
+  model.input_gain = {-3.0, 0.15};
+  model.pole = 0.7;
+  model.lag = 0.02;
+  model.dead_time = 0.0037;
+  model.sensor = 0.004;
+  return model;
+}
+
+/// sd of y, of u + d / b0 and of u by noise: by Lyapunov equations of the loop. A state s of the
+/// loop stands at s1 d for a constant d; s - s1 d is stationary while d walks, driven by -s1 times
+/// its increments.
+LoopNumbers by_lyapunov(const TuneModel& model, const LinearController& controller) {
+  const auto loop = closed_loop(model, controller).value();
+  auto system = loop.system();
+  const int n = system.a.rows();
+  auto left = system.a;
+  DynamicMatrix<double> stand(n, 1);
+  for (int i = 0; i < n; ++i) stand(i, 0) = -system.b(i, 2);
+  esokit::detail::solve_in_place(left.view(), stand.view());
+  double y1 = 0.0, u1 = 0.0;
+  for (int i = 0; i < n; ++i) {
+    y1 += system.c(0, i) * stand(i, 0);
+    u1 += system.c(1, i) * stand(i, 0);
+    system.b(i, 2) = -stand(i, 0);
+  }
+  // Integral action: a constant load leaves nothing in y, and u at -d / b0.
+  EXPECT_NEAR(y1, 0.0, 1e-9);
+  EXPECT_NEAR(u1 * model.input_gain.value, -1.0, 1e-7);
+  const auto deviations = [&](double noise, double walk) {
+    DynamicMatrix<double> input(3, 3);
+    input(1, 1) = noise * noise;
+    input(2, 2) = walk;
+    return esokit::output_covariance(system, input).value();
+  };
+  const auto all = deviations(model.noise, model.disturbance * model.sample_time);
+  LoopNumbers numbers;
+  numbers.output = std::sqrt(all(0, 0));
+  numbers.control = std::sqrt(all(1, 1));
+  numbers.control_noise = std::sqrt(deviations(model.noise, 0.0)(1, 1));
+  return numbers;
+}
+
+TEST(LoopCostTest, IsTheLyapunovEquation) {
+  for (const TuneModel& model : {plain(1), plain(2, 100.0), plain(3), full()}) {
+    const LoopCost cost(model, {}, 1.0);
+    for (const double w : {5.0, 30.0}) {
+      const auto controller = Lqg(model).controller(std::pow(w, -2 * model.order));
+      const auto fast = cost(controller);
+      ASSERT_TRUE(fast.stable);
+      const auto exact = by_lyapunov(model, controller);
+      EXPECT_NEAR(fast.output / exact.output, 1.0, 1e-4) << model.order << ' ' << w;
+      EXPECT_NEAR(fast.control / exact.control, 1.0, 1e-4);
+      EXPECT_NEAR(fast.control_noise / exact.control_noise, 1.0, 1e-4);
+    }
+  }
+}
+
+// scipy.linalg.solve_discrete_are and solve_discrete_lyapunov, R = 1e-6, T = 1 ms.
+TEST(LqgTest, IsTheIndependentOptimum) {
+  const struct {
+    int order;
+    double disturbance, bandwidth, cost, control_noise;
+  } cases[] = {{1, 1.0, 3.0, 0.000908637576791936, 0.0455658456555288},
+               {1, 100.0, 30.0, 0.00031439650133497043, 0.2646710955804776},
+               {2, 1.0, 30.0, 8.207318954938578e-07, 0.5146769683643814},
+               {2, 100.0, 3.0, 0.041063614176300806, 0.7891887862517623}};
+  for (const auto& c : cases) {
+    const TuneModel model = plain(c.order, c.disturbance);
+    const double rho = std::pow(c.bandwidth, -2 * c.order);
+    const auto numbers = LoopCost(model, {}, 0.1 * c.bandwidth, 50.0)(Lqg(model).controller(rho));
+    EXPECT_NEAR(numbers.cost(rho, 1.0) / c.cost, 1.0, 1e-5);
+    EXPECT_NEAR(numbers.control_noise / c.control_noise, 1.0, 1e-5);
+  }
+}
+
+TEST(TuneTest, WhatIsChosenKeepsItsMargins) {
+  TuneModel model = plain(2);
+  model.input_gain = {1.0, 0.1};
+  model.lag = 0.01;
+  model.dead_time = 0.0025;
+  const auto tuning = tune(model).value();
+  // 5 % of the range, unless stated.
+  EXPECT_NEAR(tuning.lqg.control_noise, 0.5, 1e-3);
+  ASSERT_NE(tuning.chosen(), nullptr);
+  for (const double gain : {0.9, 1.0, 1.1}) {
+    const auto loop = closed_loop(model, tuning.chosen()->controller, gain).value();
+    EXPECT_GE(margins(loop).value().modulus.value, 0.499) << gain;
+    EXPECT_GE(delay_margin(loop).value().value, 2e-3 * 0.995) << gain;
+  }
+  for (const double gain : {0.5, 2.0}) {
+    EXPECT_TRUE(closed_loop(model, tuning.chosen()->controller, gain).value().stable()) << gain;
+  }
+  for (const TunedDesign& design : tuning.designs) {
+    EXPECT_GE(design.excess, 1.0 - 1e-3) << design.name;
+    EXPECT_GE(design.excess, design.free_excess) << design.name;
+  }
+  EXPECT_LE(tuning.chosen()->cost, 1.01 * tuning.designs[1].cost);
+}
+
+TEST(TuneTest, RefusesWhatIsNoProblem) {
+  const auto refused = [](const auto& change, esokit::TuneWish wish = {}) {
+    TuneModel model = plain(1);
+    change(model);
+    const auto tuning = tune(model, wish);
+    EXPECT_FALSE(tuning);
+    return tuning ? std::string() : std::string(tuning.error().field) + " " + tuning.error().rule;
+  };
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(refused([](TuneModel& m) { m.order = 4; }), "order must be 1, 2 or 3");
+  EXPECT_EQ(refused([](TuneModel& m) { m.noise = 0.0; }), "noise must be finite and positive");
+  EXPECT_EQ(refused([](TuneModel& m) { m.disturbance = nan; }),
+            "disturbance must be finite and positive");
+  EXPECT_EQ(refused([](TuneModel& m) { m.input_gain.half_width = 1.0; }),
+            "input_gain.half_width must be below b0: the sign of b0 has to be known");
+  EXPECT_EQ(refused([](TuneModel& m) { m.u_max = m.u_min; }), "u_max must be above u_min");
+  const auto same = [](TuneModel&) {};
+  EXPECT_EQ(refused(same, {.control_noise = 1e-3}),
+            "control_noise is less than cancelling the disturbance alone takes, that is");
+  EXPECT_EQ(refused(same, {.settling_time = 1e-3}),
+            "settling_time is less than this sample time and dead time allow, that is");
+  EXPECT_EQ(refused(same, {.settling_time = 1.0, .controller_bandwidth = 4.0}),
+            "controller_bandwidth must be left out where another wish is given");
+}
+
+}  // namespace
