@@ -117,8 +117,8 @@ struct ExperimentRow {
 /// L) / (1 + j w tau) at the frequency of the cycle whatever the machine does before and after: no
 /// describing function. abs(H_3 / H_1) tells lag from dead time, the angle of H_3 how far this
 /// model of the machine is wrong, the scatter of the H how far noise goes; all three are in the
-/// interval. What is not: with n = 2, Coulomb friction of 10, 20, 30 % of b0 A makes b0 read 2, 6,
-/// 11 % low and the latency short; a d that rises by r a second all the time shifts H by r P / (12
+/// interval. What is not: with n = 2, Coulomb friction of 10, 20, 30 % of b0 A makes b0 read 3, 8,
+/// 14 % low and the latency short; a d that rises by r a second all the time shifts H by r P / (12
 /// A), P being the time of a cycle. `identify` of the log tells them apart.
 ///
 /// A relay on a machine of order 2 without damping has no cycle without `lead`: it switches on
