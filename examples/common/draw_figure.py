@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Draws a figure that figure.cpp describes on stdin: writes NAME.gp beside its NAME.csv and lets
-gnuplot make NAME.svg and NAME.png of it."""
+gnuplot make NAME.svg and NAME.png of it, or those of them that are asked for."""
 
 import csv
 import math
@@ -21,7 +21,7 @@ BEGIN = """\
 #   gnuplot {name}.gp
 W = {width}; H = {height:.0f}
 set encoding utf8
-do for [format in 'svg png'] {{
+do for [format in '{formats}'] {{
 if (format eq 'svg') {{
   set terminal svg size W,H dynamic enhanced font 'DejaVu Sans,12' background '#ffffff'
 }} else {{
@@ -86,7 +86,7 @@ class Panel:
 
 class Figure:
     def __init__(self, rows):
-        _, self.folder, self.name, self.title, lines, columns, height = next(rows)
+        _, self.folder, self.name, self.title, lines, columns, height, self.formats = next(rows)
         self.panels, self.series = [], []
         blocks = iter(range(1, 10000))  # block 0 is the CSV's heading
         for key, *values in rows:
@@ -95,7 +95,8 @@ class Figure:
             else:
                 self.panels[-1].add(key, values, blocks)
         self.layout(int(lines), int(columns), float(height))
-        self.text = BEGIN.format(name=self.name, width=WIDTH, height=math.ceil(self.height))
+        self.text = BEGIN.format(name=self.name, width=WIDTH, height=math.ceil(self.height),
+                                 formats=self.formats)
         if self.title:
             self.label(self.title, WIDTH / 2, self.height - 16, 14)
         for panel in self.panels:
@@ -277,7 +278,7 @@ def main():
     figure = Figure(csv.reader(sys.stdin))
     file = Path(figure.folder) / figure.name
     Path(f"{file}.gp").write_text(figure.text, encoding="utf-8")
-    for kind in ("svg", "png"):
+    for kind in figure.formats.split():
         Path(f"{file}.{kind}").unlink(missing_ok=True)
     try:
         # -d: without the user's own start-up file, which could change every figure.

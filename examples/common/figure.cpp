@@ -5,8 +5,10 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <filesystem>
 #include <limits>
 #include <set>
+#include <system_error>
 
 #include "csv.hpp"
 
@@ -15,6 +17,17 @@ namespace {
 
 std::string text_of(double value) { return number_text(value, 12); }
 std::string text_of(std::optional<double> value) { return value ? text_of(*value) : "*"; }
+
+/// The script of the sources; an installed program has one beside it.
+std::string draw_command() {
+  std::error_code none;
+  const auto program = std::filesystem::read_symlink("/proc/self/exe", none);
+  const auto installed =
+      program.parent_path().parent_path() / "share" / "esokit" / "draw_figure.py";
+  const std::filesystem::path source = ESOKIT_DRAW_FIGURE;
+  return "python3 '" + (std::filesystem::exists(installed, none) ? installed : source).string() +
+         "'";
+}
 
 /// Adds about `most` of the rows, so that the curve looks the same: of each part the lowest and the
 /// highest, so that noise keeps its envelope, those farthest left and right, and where a gap
@@ -153,11 +166,12 @@ Panel& Figure::panel(std::size_t row, std::size_t column, std::size_t row_span,
   return panel;
 }
 
-bool Figure::write(const std::string& folder) const {
+bool Figure::write(const std::string& folder, const std::string& formats) const {
   // Two empty lines end a series, one is a gap in a line: so gnuplot reads this file too.
   std::string numbers = "panel,series,x,y,z\n";
-  std::string description = csv_line({"figure", folder, name_, title_, std::to_string(grid_.rows),
-                                      std::to_string(grid_.columns), text_of(grid_.panel_height)});
+  std::string description =
+      csv_line({"figure", folder, name_, title_, std::to_string(grid_.rows),
+                std::to_string(grid_.columns), text_of(grid_.panel_height), formats});
   // Many curves have small panels.
   std::size_t count = 1;
   for (const Panel& panel : panels_) count += panel.series_.size();
@@ -207,7 +221,7 @@ bool Figure::write(const std::string& folder) const {
   if (!write_text(file, numbers)) return false;
   std::fflush(nullptr);
   std::signal(SIGPIPE, SIG_IGN);  // where there is no Python: pclose says so
-  std::FILE* pipe = popen(ESOKIT_DRAW_FIGURE, "w");
+  std::FILE* pipe = popen(draw_command().c_str(), "w");
   if (pipe == nullptr) return false;
   std::fwrite(description.data(), 1, description.size(), pipe);
   return pclose(pipe) == 0;

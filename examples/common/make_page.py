@@ -256,6 +256,9 @@ def article(out, example, items, later=False):
         elif item.kind == "diagram":
             text += (f'<figure><img src="{quote((example.folder / item.name).as_posix())}.svg" '
                      f'alt="{esc(item.text)}"><figcaption>{esc(item.text)}</figcaption></figure>\n')
+        elif item.kind == "page":
+            text += (f'<p><a href="{quote((example.folder / item.name).as_posix())}">'
+                     f"{esc(item.text)}</a></p>\n")
         elif item.kind == "remark":
             text += f"<p>{esc(item.text)}</p>\n"
     return text + "</article>\n"

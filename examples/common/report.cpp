@@ -266,6 +266,10 @@ void Report::diagram(const std::string& name, const std::string& caption, std::s
   contents_.push_back({"diagram", name, caption});
 }
 
+void Report::link(const std::string& file, const std::string& text) {
+  contents_.push_back({"page", file, text});
+}
+
 void Report::remark(const std::string& text) { contents_.push_back({"remark", "", text}); }
 
 void Report::not_reproduced(const std::string& text, Miss kind) {

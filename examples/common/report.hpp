@@ -164,6 +164,8 @@ class Report {
   void add(const Figure& figure);
   /// A drawing that is not a plot: NAME.svg with this text.
   void diagram(const std::string& name, const std::string& caption, std::string_view svg);
+  /// A file in the example's folder that the page leads to.
+  void link(const std::string& file, const std::string& text);
   /// A paragraph for the page: conventions, variants, what the reader should see.
   void remark(const std::string& text);
   /// Says plainly what of the paper did not reproduce; shown at the top of its page.

@@ -1,22 +1,26 @@
-/// @file
-/// The measured sets beside the repository, with what is independently known of them. Numbers to
-/// compare with are those of the notes beside the data, from an independent program.
-#pragma once
+#include "from_log/parts/measured_sets.hpp"
 
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <esokit/eigen.hpp>
+#include <cstdio>
 #include <filesystem>
 #include <string>
 #include <vector>
 
-#include "common/report.hpp"
-#include "control_practice/log_observer.hpp"
+#include <esokit/eigen.hpp>
 
-namespace practice {
+#include "common/log_file.hpp"
+#include "common/report.hpp"
+#include "from_log/parts/log_observer.hpp"
+
+namespace from_log {
+namespace {
+
+using esokit::examples::check_time;
+using esokit::examples::LogFile;
 
 using esokit::examples::Color;
 using esokit::examples::CsvRow;
@@ -33,8 +37,8 @@ struct Agreement {
   double rms_share = 0;  ///< RMS of the difference over RMS of the reference
 };
 
-inline Agreement compare(const std::vector<double>& estimate, const std::vector<double>& reference,
-                         std::size_t from, std::size_t to) {
+Agreement compare(const std::vector<double>& estimate, const std::vector<double>& reference,
+                  std::size_t from, std::size_t to) {
   double n = 0, a = 0, b = 0;
   for (std::size_t i = from; i < to; ++i) {
     a += estimate[i];
@@ -56,8 +60,7 @@ inline Agreement compare(const std::vector<double>& estimate, const std::vector<
 
 /// What the observer makes of a disturbance that is known: a plant of integrators without noise is
 /// driven by it, and observed. So the observer's own lag is in both.
-inline std::vector<double> through_observer(LogSettings settings,
-                                            const std::vector<double>& disturbance) {
+std::vector<double> through_observer(LogSettings settings, const std::vector<double>& disturbance) {
   const double T = settings.sample_time;
   std::vector<double> y;
   double x = 0, v = 0;
@@ -74,14 +77,14 @@ inline std::vector<double> through_observer(LogSettings settings,
   return run_observer(settings, {}, y, std::vector<double>(y.size(), 0.0)).columns.back();
 }
 
-inline std::vector<double> scaled(std::vector<double> values, double factor) {
+std::vector<double> scaled(std::vector<double> values, double factor) {
   for (double& value : values) value *= factor;
   return values;
 }
 
 // ---- torque-controlled pendulum: the disturbance is gravity
 
-inline void pendulum(Report& report, const std::filesystem::path& data) {
+void pendulum(Report& report, const std::filesystem::path& data) {
   constexpr double inertia = 0.1495;  // kg m2
   constexpr double gravity = 2.9970;  // m g l, Nm
   constexpr double omega = 40;        // rad/s
@@ -154,7 +157,7 @@ inline void pendulum(Report& report, const std::filesystem::path& data) {
 
 // ---- double pendulum: known torque pulses are injected
 
-inline void acrobot(Report& report, const std::filesystem::path& data) {
+void acrobot(Report& report, const std::filesystem::path& data) {
   constexpr double I1 = 0.031887199591513114, I2 = 0.05086984812807257, Ir = 6.287203962819607e-05;
   constexpr double m1 = 0.5234602302310271, m2 = 0.6255677234174437, l1 = 0.2, r1 = 0.2;
   constexpr double r2 = 0.25569305436052964, b = 0.001, g = 9.81, ratio = 6;
@@ -262,7 +265,7 @@ inline void acrobot(Report& report, const std::filesystem::path& data) {
 
 // ---- temperature control lab: a heater is withheld from the observer
 
-inline void tclab(Report& report, const std::filesystem::path& data) {
+void tclab(Report& report, const std::filesystem::path& data) {
   const auto file = data / "tclab_energy_balance" / "tclab.csv";
   const LogFile log(file, {"t_s", "Q1_pct", "Q2_pct", "T1_degC", "T2_degC"});
   check_time(log, log.column(0));
@@ -346,8 +349,9 @@ inline void tclab(Report& report, const std::filesystem::path& data) {
   report.add(figure);
 }
 
-/// All sets that are there; false if none is.
-inline bool measured_sets(Report& report, const std::filesystem::path& data) {
+}  // namespace
+
+bool measured_sets(Report& report, const std::filesystem::path& data) {
   bool any = false;
   const auto with = [&](const char* name, void (*show)(Report&, const std::filesystem::path&)) {
     if (std::filesystem::is_directory(data / name)) {
@@ -364,4 +368,4 @@ inline bool measured_sets(Report& report, const std::filesystem::path& data) {
   return any;
 }
 
-}  // namespace practice
+}  // namespace from_log

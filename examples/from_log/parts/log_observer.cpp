@@ -1,12 +1,7 @@
-/// @file
-/// Any observer of the library, chosen at run time, over a recorded log.
-#pragma once
+#include "from_log/parts/log_observer.hpp"
 
 #include <cmath>
-#include <cstddef>
-#include <functional>
 #include <limits>
-#include <map>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -21,34 +16,8 @@
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/observer/reduced_order_eso.hpp>
 
-#include "common/log_file.hpp"
-
-namespace practice {
-
-using esokit::examples::check_time;
-using esokit::examples::LogError;
-using esokit::examples::LogFile;
-using esokit::examples::median_step;
-
-/// How the observer is set.
-struct LogSettings {
-  std::string observer = "linear";
-  int order = 2;
-  double input_gain = 1;    ///< b0
-  double bandwidth = 0;     ///< omega_o, rad/s
-  double sample_time = 0;   ///< nominal, s
-  double tolerance = 0.01;  ///< steps within this share of the nominal one count as nominal
-};
-
-/// What it found, a row a sample: y, y', .., d.
-struct LogEstimates {
-  std::vector<std::vector<double>> columns;  ///< NaN before the first measurement
-  std::size_t rejected = 0;                  ///< measurements that were missing or bad
-  std::size_t inputs = 0;    ///< inputs that were missing or bad; the one before was taken
-  std::size_t restarts = 0;  ///< gaps too long to bridge
-};
-
-namespace detail {
+namespace from_log {
+namespace {
 
 inline constexpr double widest_step = 1000;  ///< times the nominal one, and its inverse
 
@@ -58,7 +27,8 @@ LogEstimates run(const typename Observer::Config& config, const LogSettings& set
                  const std::vector<double>& u) {
   using Timed = esokit::VariableTime<Observer>;
   auto made = Timed::make({.observer = config, .ratio = widest_step});
-  if (!made) throw LogError("the observer refuses: " + esokit::to_text(made.error()));
+  if (!made)
+    throw esokit::examples::LogError("the observer refuses: " + esokit::to_text(made.error()));
   Timed observer = *made;
   LogEstimates result;
   result.columns.resize(static_cast<std::size_t>(Observer::size));
@@ -73,9 +43,10 @@ LogEstimates run(const typename Observer::Config& config, const LogSettings& set
           std::abs(step - settings.sample_time) <= settings.tolerance * settings.sample_time;
       const auto accepted = observer.set_step_time(nominal ? settings.sample_time : step);
       if (!accepted) {
-        throw LogError("the step after t = " + esokit::examples::number_text(time[k - 1], 15) +
-                       " s is too short or too long for the nominal sample time: " +
-                       esokit::to_text(accepted.error()));
+        throw esokit::examples::LogError(
+            "the step after t = " + esokit::examples::number_text(time[k - 1], 15) +
+            " s is too short or too long for the nominal sample time: " +
+            esokit::to_text(accepted.error()));
       }
       // The input of the row before was held until now.
       const auto status = observer.update(y[k], u[k - 1]);
@@ -137,27 +108,25 @@ LogEstimates run_order(const LogSettings& s, const std::vector<double>& time,
          .sample_time = s.sample_time},
         s, time, y, u);
   }
-  throw LogError(
+  throw esokit::examples::LogError(
       "no observer '" + s.observer +
       "'; there are linear, half-gain, reduced, cascade, algebraic, adjustable, nonlinear");
 }
 
-}  // namespace detail
+}  // namespace
 
-/// Runs the log through the chosen observer. @param time s, rising; empty: every sample_time
-/// @param y measurement, NaN where missing @param u input that is held from its row to the next
-inline LogEstimates run_observer(const LogSettings& settings, const std::vector<double>& time,
-                                 const std::vector<double>& y, const std::vector<double>& u) {
+LogEstimates run_observer(const LogSettings& settings, const std::vector<double>& time,
+                          const std::vector<double>& y, const std::vector<double>& u) {
   switch (settings.order) {
     case 1:
-      return detail::run_order<1>(settings, time, y, u);
+      return run_order<1>(settings, time, y, u);
     case 2:
-      return detail::run_order<2>(settings, time, y, u);
+      return run_order<2>(settings, time, y, u);
     case 3:
-      return detail::run_order<3>(settings, time, y, u);
+      return run_order<3>(settings, time, y, u);
     default:
-      throw LogError("the order must be 1, 2 or 3");
+      throw esokit::examples::LogError("the order must be 1, 2 or 3");
   }
 }
 
-}  // namespace practice
+}  // namespace from_log

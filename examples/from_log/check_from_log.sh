@@ -1,0 +1,328 @@
+#!/usr/bin/env bash
+# What from_log makes of files as people have them: check_from_log.sh PROGRAM
+# Healthy logs give a design without an alarm, whatever their form; each alarm fires on its file and
+# on no other; of what cannot be read it says line and column; what is pasted compiles. The last line
+# is "N passed, N failed".
+set -uo pipefail
+program=$(realpath "${1:?usage: check_from_log.sh PROGRAM}")
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
+compiler=${CXX:-c++}
+eigen=${EIGEN:-/usr/include/eigen3}
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+cd "$folder" || exit 1
+passed=0
+failed=0
+
+verdict() {  # verdict STATUS TEXT...
+  if (($1 == 0)); then
+    passed=$((passed + 1))
+  else
+    failed=$((failed + 1))
+    shift
+    echo "FAILED: $*"
+  fi
+}
+
+# run FILE [OPTION...]: what it says is in $said, the page in $page, the alarms in $alarms
+run() {
+  local status=0
+  said=$("$program" "$@" --out out 2>&1) || status=$?
+  page=$(tail -n 1 <<<"$said")
+  alarms=$(sed -n 's/^ALARM \([a-z0-9-]*\):.*/\1/p' <<<"$said" | tr '\n' ' ')
+  return "$status"
+}
+
+refuses() {  # refuses "TEXT OF THE ERROR" FILE [OPTION...]: not understood
+  local text=$1 status=0
+  shift
+  run "$@" || status=$?
+  [[ $status == 2 && $said == *"$text"* ]]
+  verdict $? "$*: expected '$text', got status $status and: $said"
+}
+
+# ---- a servo under a PD controller ----
+
+# servo [NAME=NUMBER...]: 8 s, y'' + 2 y' = b u(t - 4 ms) - load, rows "t y u r"; the reference steps.
+#   b input gain; scale of u; quantum of y; still=1: the reference does not move
+servo() {
+  local set=() pair
+  for pair in "$@"; do set+=(-v "$pair"); done
+  awk -v b=50 -v scale=1 -v quantum=0 -v still=0 -v rows=4000 "${set[@]}" '
+    function normal() {
+      seed = (seed * 69069 + 12345) % 4294967296; first = (seed + 1) / 4294967297
+      seed = (seed * 69069 + 12345) % 4294967296
+      return sqrt(-2 * log(first)) * cos(6.283185307 * seed / 4294967296)
+    }
+    BEGIN {
+      T = 0.002; seed = 7; sign = b < 0 ? -1 : 1
+      for (k = 0; k < rows; ++k) {
+        t = k * T
+        if (!still && k % 350 == 150) r = (k % 700 == 150 ? 1 : -0.7) * (1 + 0.3 * normal())
+        y = x + 1e-3 * normal()
+        if (quantum > 0) { y = y / quantum; y = quantum * int(y + (y < 0 ? -0.5 : 0.5)) }
+        slope += 0.1 * ((y - last) / T - slope); last = y
+        u = sign * (3 * (r - y) - 0.25 * slope)
+        if (u > 6) u = 6
+        if (u < -6) u = -6
+        printf "%.3f %.7g %.7g %.7g\n", t, y, scale * u, r
+        drift += 0.02 * normal()
+        for (i = 0; i < 4; ++i) {  # u of 4 ms ago
+          a = b * (i < 4 ? old2 : old1) - 2 * v + 5 + drift
+          x += v * T / 4 + a * T * T / 32; v += a * T / 4
+        }
+        old2 = old1; old1 = u
+      }
+    }'
+}
+servo >rows.txt
+
+# written HEADER SEPARATOR TIME [AWK ACTION]: rows.txt as CSV; TIME is an awk expression of t, as text
+written() {
+  echo "$1"
+  awk -v s="$2" "{ t = \$1; ${4:-} print $3 s \$2 s \$3 }" rows.txt
+}
+
+healthy() {  # healthy FILE [OPTION...]: a design, no alarm, and the true b0
+  local status=0 b0
+  run "$@" || status=$?
+  [[ $status == 0 && -z $alarms && -s $page ]]
+  verdict $? "$*: status $status: $said"
+  b0=$(sed -n 's/.*b0 = \([-0-9.e+]*\).*/\1/p' <<<"$said" | head -n 1)
+  awk -v b="$b0" -v truth="${truth:-50}" 'BEGIN { q = b / truth; exit !(q > 0.95 && q < 1.05) }'
+  verdict $? "$*: b0 is $b0, expected ${truth:-50}"
+}
+
+written t,y,u , t >plain.csv
+healthy plain.csv
+first=$page
+before=$(cksum <"$first")
+healthy plain.csv --limits -6,6 --b0 60 --settling 0.5
+[[ $page != "$first" && $(cksum <"$first") == "$before" ]]
+verdict $? "a second run wrote over the first page, $first"
+! grep -qE '(src|href)="(https?:|/|file:)' "$first"
+verdict $? "$first needs other files"
+written '# recorded by hand
+t;y;u' ';' t | sed 's/$/\r/; s/\([0-9]\)\.\([0-9]\)/\1,\2/g' >excel.csv
+healthy excel.csv
+written t_ms,y,u , '1000 * t' >milliseconds.csv
+healthy milliseconds.csv
+written 'time (us),y,u' , 'sprintf("%d", 1e6 * t)' >microseconds.csv
+healthy microseconds.csv
+written stamp,y,u , 'sprintf("%.6f", 1.7e9 + t)' >epoch.csv
+healthy epoch.csv
+written stamp,y,u , 'sprintf("%.0f", 1.7e12 + 1000 * t)' >epoch_ms.csv
+healthy epoch_ms.csv
+written %time,field.angle,field.effort , 'sprintf("%.0f", 1.7e18 + 1e9 * t)' >epoch_ns.csv
+healthy epoch_ns.csv
+written t,y,u , 'sprintf("%.6f", t + 0.0002 * sin(NR * NR))' >jitter.csv
+healthy jitter.csv
+written t,y,u , t 'if (NR % 17 == 5) next;' >rows_missing.csv
+healthy rows_missing.csv
+written t,y,u , t 'if (NR % 23 == 5) $2 = "";' >fields_empty.csv
+healthy fields_empty.csv
+written t,y,u , t 'if (NR > 2000 && NR < 2020) next;' >gap.csv
+healthy gap.csv
+# A process that is 30,000 times slower, a row a minute.
+written t,y,u , '30000 * t' >process.csv
+truth=5.5556e-8 healthy process.csv
+# Two topics with stamps of their own; u comes 0.1 ms after y.
+{
+  echo /clock,/joint_states/joint1/position,/joint_states/joint1/effort
+  awk '{ printf "%.4f,%s,\n%.4f,,%s\n", $1, $2, $1 + 1e-4, $3 }' rows.txt
+} >topics.csv
+healthy topics.csv
+healthy topics.csv --time clock --y position --u effort
+sed 's/^[^,]*,//' plain.csv >no_time.csv
+healthy no_time.csv --sample-time 0.002
+servo quantum=0.002 >rows.txt
+written t,y,u , t >encoder.csv
+healthy encoder.csv
+servo b=-50 >rows.txt
+written t,y,u , t >wrong_sign.csv
+truth=-50 healthy wrong_sign.csv --b0 -45
+
+# ---- alarms ----
+
+sounds() {  # sounds NAME FILE [OPTION...]: this alarm and no other, on stderr and on the page
+  local name=$1 status=0
+  shift
+  run "$@" || status=$?
+  [[ ($status == 4 || $status == 3) && $alarms == "$name " ]]
+  verdict $? "$*: expected the alarm $name, got '$alarms', status $status: $said"
+  grep -q "<li>$name: " "$page"
+  verdict $? "$*: the page $page does not say $name"
+}
+sounds sign wrong_sign.csv
+servo >rows.txt
+sounds sign plain.csv --b0 -50
+sounds b0 plain.csv --b0 5
+sounds b0 plain.csv --b0 500
+sounds b0 plain.csv --b0 0.87
+[[ $said == *"degrees and radians"* ]]
+verdict $? "b0 wrong by 57.3 is not called degrees and radians: $said"
+written t,y,u , '1e6 * t' >ticks.csv
+sounds time-unit ticks.csv
+[[ $said == *"read as us"* ]]
+verdict $? "microseconds are not called so: $said"
+written t_s,y,u , '1e6 * t' >called_seconds.csv
+sounds time-unit called_seconds.csv
+truth=5e-11 healthy called_seconds.csv --time-unit s
+written t,y,u , 'sprintf("%.3f", t + (NR > 1500 ? 3600 : 0))' >jump.csv
+sounds time-jump jump.csv
+[[ $said == *"line 1502"* ]]
+verdict $? "the jump's line is not named: $said"
+sounds u-unit plain.csv --limits -0.06,0.06
+sounds u-unit plain.csv --limits 6000
+servo quantum=0.5 >rows.txt
+written t,y,u , t >coarse.csv
+sounds quantised coarse.csv
+
+# ---- refused: a page that says what to record instead ----
+
+shows() {  # shows FIELD FILE [OPTION...]
+  local field=$1 status=0
+  shift
+  run "$@" || status=$?
+  [[ $status == 3 && $said == *"refused: $field"* && -s $page ]] &&
+    grep -q 'What to record instead' "$page" && ! grep -q '<h2>Paste this' "$page"
+  verdict $? "$*: expected a page that refuses for $field, got status $status: $said"
+}
+servo still=1 >rows.txt
+written t,y,u , t >standstill.csv
+shows own_input standstill.csv
+servo rows=150 >rows.txt
+written t,y,u , t >short.csv
+shows rows short.csv
+servo >rows.txt
+written t,y,u , t 'if (1) $3 = 1;' >constant.csv
+shows u constant.csv
+# A u that is not this machine's.
+written t,y,u , t '$3 = sin(NR * NR);' >foreign.csv
+shows excitation foreign.csv
+
+# ---- what is pasted compiles, and runs ----
+
+compiles() {  # compiles FILE [OPTION...]
+  run "$@"
+  sed -n '/<pre.*<code>/,/<\/code>/p' "$page" |
+    sed 's/.*<code>//; s/<\/code>.*//; s/&lt;/</g; s/&gt;/>/g; s/&quot;/"/g; s/&amp;/\&/g' >pasted.cpp
+  "$compiler" -std=c++20 -Wall -Wextra -Wconversion -Werror -I"$root/include" -I"$eigen" pasted.cpp \
+    -o pasted 2>errors && ./pasted >/dev/null
+  verdict $? "$*: what $page says does not compile: $(head -n 5 errors; cat pasted.cpp)"
+}
+compiles plain.csv
+
+# ---- an observer that is typed in, over any log ----
+
+settings=(--observer linear --order 2 --b0 2 --bandwidth 20)
+
+near() {  # near EXPECTED COLUMN FILE: the column's last estimate, to a millionth
+  local last
+  last=$(tail -n 1 "$(ls -t out/"$(basename "${3%.*}")"-estimates*.csv | head -n 1)" | cut -d, -f"$2")
+  awk -v a="$last" -v b="$1" 'BEGIN { d = a - b; exit !(a != "" && d * d <= 1e-12 * (1 + b * b)) }'
+  verdict $? "$3: column $2 ends at $last, expected $1"
+}
+
+reads() {  # reads FILE [OPTION...]: to the end, and with the disturbance that is in the data
+  local status=0
+  run "$1" "${settings[@]}" "${@:2}" || status=$?
+  ((status == 0))
+  verdict $? "$*: status $status: $said"
+  near 3 4 "$1"
+}
+
+# y'' = 3 + 2 u, u = 0.5 and, from 1 s on, -1; rows t, y, u.
+table() {  # table SEPARATOR [AWK CONDITION for a row with a measurement]
+  awk -v s="$1" 'BEGIN {
+    for (k = 0; k <= 400; ++k) {
+      t = k * 0.01; u = t < 0.995 ? 0.5 : -1
+      printf "%.2f%s%s%s%s\n", t, s, ('"${2:-1}"' ? sprintf("%.12g", y) : ""), s, u
+      a = 3 + 2 * u; y += v * 0.01 + a * 0.5e-4; v += a * 0.01
+    }
+  }'
+}
+
+{ echo t,y,u; table ,; } >plain.csv
+reads plain.csv
+for observer in half-gain reduced cascade algebraic adjustable nonlinear; do
+  reads plain.csv --observer "$observer"
+done
+reads plain.csv --time 1 --y 2 --u 3
+table , >no_header.csv
+reads no_header.csv --time 1 --y 2 --u 3
+reads no_header.csv --y 2 --u 3 --sample-time 0.01
+{ echo 't;y;u'; table ';'; } >semicolons.csv
+reads semicolons.csv
+{ echo 't|y|u'; table '|'; } >bars.csv
+reads bars.csv
+{ echo 't;y;u'; table ';' | tr . ,; } >decimal_commas.csv
+reads decimal_commas.csv
+{ echo '# logged by hand'; echo t,y,u; echo s,m,N; echo '// units above'; table ,; } >comments.csv
+reads comments.csv
+{ echo '% t y u'; table ' '; } >named_in_comment.csv
+reads named_in_comment.csv
+{ echo /clock/t,/joint_states/joint1/position,/joint_states/joint1/effort; table ,; } >paths.csv
+reads paths.csv --time t --y position --u /joint_states/joint1/effort
+{ echo t,y,u; table ,; printf 4.01,2; } >cut.csv
+reads cut.csv
+{ printf 't\ty\tu\n'; table '\t'; } >tabs.csv
+reads tabs.csv
+reads tabs.csv --separator tab
+{ echo t y u; table ' '; } >spaces.csv
+reads spaces.csv
+{ printf '\xef\xbb\xbf"t","y","u"\r\n'; table , | sed 's/$/\r/'; } >spreadsheet.csv
+reads spreadsheet.csv
+{ echo '"time, s",y,u'; table ,; } >quoted.csv
+reads quoted.csv --time 'time, s'
+{ echo t,y,u; table , 'k < 100 || k > 150'; } >gaps.csv
+reads gaps.csv
+{ echo t,y,u; table , | awk -F, 'NR % 7 != 3'; } >irregular.csv
+reads irregular.csv
+
+# A name of nothing but dots is no folder and no hidden file.
+for dots in ..csv ...csv; do
+  cp plain.csv "$dots"
+  run "$dots" "${settings[@]}" && [[ $page == "$PWD"/out/log*.html && -s $page ]]
+  verdict $? "$dots: $said"
+done
+
+# ---- not understood: status 2, and where ----
+
+refuses "no column 'torque'; there are t, y, u" plain.csv --u torque
+refuses "there is no header and are 3 columns" no_header.csv --time 1 --y 2 --u 4
+refuses "which column is y?" no_header.csv --time 1 --u 2
+{ echo t,/a/position,/b/position; table ,; } >two.csv
+refuses "'position' is /a/position and /b/position" two.csv --time t --y position --u 3
+refuses "which column is y?" two.csv --u 3
+sed '5s/.*/0.03,about 2,1/' plain.csv >word.csv
+refuses "word.csv, line 5: 'about 2' in column 'y' is not a number" word.csv
+sed '7s/.*/0.05,1/' plain.csv >short_line.csv
+refuses "short_line.csv, line 7: only 2 fields, none for 'u'" short_line.csv
+sed '9s/^[^,]*/0.02/' plain.csv >backwards.csv
+refuses "backwards.csv, line 9: time runs backwards in column t, from 0.06 to 0.02" backwards.csv
+sed '9s/^[^,]*/0.06/' plain.csv >still.csv
+refuses "still.csv, line 9: time stands still in column t" still.csv
+sed '9s/^[^,]*//' plain.csv >timeless.csv
+refuses "timeless.csv, line 9: the time is missing in column t" timeless.csv
+sed '402s/^4.00/9999/' plain.csv >leap.csv
+refuses "is too short or too long for the nominal sample time" leap.csv "${settings[@]}"
+echo t,y,u >empty.csv
+refuses "empty.csv: no line with numbers" empty.csv
+refuses "cannot read nowhere.csv" nowhere.csv
+refuses ". is a folder" .
+said=$("$program" 2>&1)
+[[ $? == 2 && $said == *"which file?"* ]]
+verdict $? "without a file: $said"
+refuses "more than one file" plain.csv word.csv
+refuses "unknown option --bandwith" plain.csv --bandwith 3
+refuses "--bandwidth: 'fast' is not a number" plain.csv --bandwidth fast
+refuses "--bandwidth: must be positive, not -1" plain.csv "${settings[@]}" --bandwidth -1
+refuses "--order: must be 1, 2 or 3" plain.csv --order 4
+refuses "--limits: 5,-5 is no range" plain.csv --limits 5,-5
+refuses "--noise, --settling, --omega-c: one of them" plain.csv --noise 3 --settling 1
+refuses "--time-unit: 'hours' is none of" plain.csv --time-unit hours
+refuses "no observer 'luenberger'; there are linear" plain.csv "${settings[@]}" --observer luenberger
+
+echo "$passed passed, $failed failed"
+((failed == 0))

@@ -1,0 +1,271 @@
+// One command from a log to a controller: reads a CSV file, finds the machine in it, chooses an
+// observer and its bandwidths, and writes one HTML page with all that was seen and the C++ to
+// paste.
+//
+//   from_log drive.csv --y angle --u torque --limits -5,5
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <esokit/core/error_text.hpp>
+
+#include "common/report.hpp"
+#include "from_log/parts/measured_sets.hpp"
+#include "from_log/parts/show.hpp"
+
+using namespace from_log;
+
+namespace {
+
+constexpr const char* usage = R"(usage: from_log FILE.csv [options]
+       from_log [--out DIR] [--data DIR]
+Writes FILE.html (FILE-2.html, .. if that is there) and prints its path.
+
+columns, by the header's name, by the end of a name (position of /joint1/position) or by number:
+  --time COLUMN       stamps: s, ms, us, ns, since 1970 or not, with jitter, with rows missing
+  --u COLUMN          input; held from its row to the next
+  --y COLUMN          output
+  --known COLUMN      what else acts where the disturbance acts; may be said several times
+                      left out: found by usual names (t, time, stamp; u, torque, effort, pwm; y,
+                      position, angle, ..)
+  --time-unit UNIT    s, ms, us, ns (default: found out)
+  --sample-time S     seconds between rows, where there is no time
+  --separator C       one character, or the word tab (default: found out)
+the machine:
+  --order N           integrations from u to y, 1 to 3 (default: found out)
+  --limits LOW,HIGH   of u, in the unit of the log (default: what the log has)
+  --b0 B              as you believe it to be: an alarm if the log says otherwise
+the wish, one of:
+  --noise PERCENT     standard deviation of u that noise may cause, % of its range (default 5)
+  --settling S        of a step of the reference
+  --omega-c W         controller bandwidth, rad/s
+an observer of your own in the place of all that (the page, and its estimates as CSV):
+  --observer NAME     linear, half-gain, reduced, cascade, algebraic, adjustable, nonlinear
+  --bandwidth W       omega_o, rad/s; --order and --b0 too
+other:
+  --anyway            a design for a refused log, too
+  --out DIR           where the page goes (default: here)
+Without a file: the measured sets below --data (default: ../shared/data beside the repository).
+
+exit codes: 0 page with a design; 1 page not written; 2 file or options not understood; 3 log
+refused: the page says what was seen and what to record instead; 4 page with an alarm, or no
+design that keeps the margins
+)";
+
+double number(const std::string& option, const std::string& text) {
+  char* end = nullptr;
+  const double value = std::strtod(text.c_str(), &end);
+  if (text.empty() || *end != '\0' || !std::isfinite(value))
+    throw LogError("--" + option + ": '" + text + "' is not a number");
+  return value;
+}
+
+double positive(const std::string& option, const std::string& text) {
+  const double value = number(option, text);
+  if (!(value > 0)) throw LogError("--" + option + ": must be positive, not " + text);
+  return value;
+}
+
+std::pair<double, double> limits(const std::string& text) {
+  const auto comma = text.find_first_of(",:", 1);
+  if (comma == std::string::npos) {
+    const double most = positive("limits", text);
+    return {-most, most};
+  }
+  const std::pair both{number("limits", text.substr(0, comma)),
+                       number("limits", text.substr(comma + 1))};
+  if (!(both.first < both.second)) throw LogError("--limits: " + text + " is no range");
+  return both;
+}
+
+/// A shell would need quotes around some of it.
+std::string in_quotes(const std::string& text) {
+  if (text.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-+=.,"
+                             ":/@%") == std::string::npos &&
+      !text.empty())
+    return text;
+  return "'" + text + "'";
+}
+
+Settings read_arguments(int argc, char** argv, std::filesystem::path& data) {
+  Settings s;
+  s.command = "from_log";
+  int wishes = 0;
+  const std::map<std::string, std::function<void(const std::string&)>> options = {
+      {"time", [&](const auto& text) { s.time = text; }},
+      {"u", [&](const auto& text) { s.u = text; }},
+      {"y", [&](const auto& text) { s.y = text; }},
+      {"known", [&](const auto& text) { s.known.push_back(text); }},
+      {"time-unit", [&](const auto& text) { s.time_unit = text; }},
+      {"sample-time", [&](const auto& text) { s.sample_time = positive("sample-time", text); }},
+      {"separator",
+       [&](const auto& text) {
+         const std::string one = text == "tab" || text == "\\t" ? "\t" : text;
+         if (one.size() != 1) throw LogError("--separator: '" + text + "' is not one character");
+         s.separator = one[0];
+       }},
+      {"order",
+       [&](const auto& text) {
+         const double order = number("order", text);
+         if (!(order >= 1 && order <= 3) || std::floor(order) < order)
+           throw LogError("--order: must be 1, 2 or 3");
+         s.orders = {static_cast<int>(order)};
+       }},
+      {"limits", [&](const auto& text) { s.limits = limits(text); }},
+      {"b0",
+       [&](const auto& text) {
+         s.expected_gain = number("b0", text);
+         if (*s.expected_gain == 0) throw LogError("--b0: must not be zero");
+       }},
+      {"noise",
+       [&](const auto& text) { s.noise_share = 0.01 * positive("noise", text), ++wishes; }},
+      {"settling",
+       [&](const auto& text) { s.settling_time = positive("settling", text), ++wishes; }},
+      {"omega-c", [&](const auto& text) { s.controller = positive("omega-c", text), ++wishes; }},
+      {"observer", [&](const auto& text) { s.observer = text; }},
+      {"bandwidth", [&](const auto& text) { s.bandwidth = positive("bandwidth", text); }},
+      {"data", [&](const auto& text) { data = text; }},
+      {"out", [&](const auto& text) { s.out = text; }}};
+  for (int i = 1; i < argc; ++i) {
+    std::string name = argv[i];
+    s.command += " " + in_quotes(name);
+    if (name == "--help" || name == "-h") {
+      std::printf("%s", usage);
+      std::exit(all_clear);
+    }
+    if (!name.starts_with("--")) {
+      if (!s.file.empty()) throw LogError("more than one file: " + s.file + ", " + name);
+      s.file = name;
+      continue;
+    }
+    name.erase(0, 2);
+    if (name == "anyway") {
+      s.anyway = true;
+      continue;
+    }
+    std::string value;
+    const auto sign = name.find('=');
+    if (sign != std::string::npos) {
+      value = name.substr(sign + 1);
+      name.erase(sign);
+    }
+    const auto option = options.find(name);
+    if (option == options.end()) throw LogError("unknown option --" + name);
+    if (sign == std::string::npos) {
+      if (i + 1 >= argc) throw LogError("--" + name + " needs a value");
+      value = argv[++i];
+      s.command += " " + in_quotes(value);
+    }
+    option->second(value);
+  }
+  if (wishes > 1) throw LogError("--noise, --settling, --omega-c: one of them");
+  return s;
+}
+
+/// A report below `out`, as of an example of this name.
+esokit::examples::Report report_of(const std::string& out, const std::string& name,
+                                   std::string title, std::string description, int order) {
+  std::string program = "from_log", folder = out;
+  char* arguments[] = {program.data(), folder.data(), nullptr};
+  return {2,
+          arguments,
+          "from_log",
+          name,
+          {.paper_title = "From a log to a controller",
+           .citation = "No paper: one command from a CSV file to a controller, on simulated and "
+                       "real machines",
+           .link = "",
+           .title = std::move(title),
+           .description = std::move(description),
+           .order = order}};
+}
+
+/// What the results page shows: two real machines as from_log shows them, and observers over
+/// measured sets against what is independently known.
+int gallery(const std::string& out, const std::filesystem::path& data) {
+  int status = 0;
+  struct Machine {
+    const char *name, *title, *file, *text;
+    double limit;
+  };
+  constexpr Machine machines[] = {
+      {"relay_servo", "A geared servo under a relay", "servo_relay_pid/relay.csv",
+       "A DC servo on an Arduino, its potentiometer in steps of 3.5 degrees.", 100},
+      {"pendulum", "A pendulum swung up", "dfki_simple_pendulum/direct_collocation.csv",
+       "A geared motor with a pendulum; gravity is unknown to the model, so it is found as a "
+       "disturbance.",
+       10}};
+  for (const Machine& machine : machines) {
+    if (!std::filesystem::exists(data / machine.file)) {
+      std::printf("skipped: there is no %s\n", machine.file);
+      continue;
+    }
+    Settings settings;
+    settings.file = (data / machine.file).string();
+    settings.anyway = true;
+    settings.limits = {-machine.limit, machine.limit};
+    settings.command = std::string("from_log ") + machine.file + " --limits " +
+                       esokit::examples::number_text(machine.limit) + " --anyway";
+    auto report = report_of(out, machine.name, machine.title, machine.text, 2);
+    const Outcome outcome = work_out(settings);
+    const Page page = outcome.page(settings);
+    page.add_to(report);
+    const std::string file = page.write(report.folder(), machine.name);
+    if (file.empty()) return failed;
+    report.link(std::filesystem::path(file).filename().string(), "The page as from_log writes it");
+    report.check("log", "rows", std::nullopt, static_cast<double>(outcome.findings.found.log.rows));
+    status |= report.finish();
+  }
+  auto report =
+      report_of(out, "measured_sets", "Observers over logs of real machines",
+                "Observers over recorded measurements with irregular time stamps, against what is "
+                "independently known. Sampled: VariableTime, gains follow the time stamps.",
+                3);
+  if (!measured_sets(report, data)) {
+    std::printf("none of the measured sets is in %s; --data names their folder\n", data.c_str());
+  }
+  return status | report.finish();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    // The sources are in examples/from_log of the repository.
+    const auto root = std::filesystem::path(__FILE__).parent_path().parent_path().parent_path();
+    std::filesystem::path data = (root / ".." / "shared" / "data").lexically_normal();
+    const Settings settings = read_arguments(argc, argv, data);
+    if (argc == 1) throw LogError("which file? from_log --help says more");
+    if (settings.file.empty()) return gallery(settings.out, data);
+    if (!settings.observer.empty()) {
+      const std::string page = show_observer(settings, read_log(settings));
+      if (page.empty()) return failed;
+      std::printf("%s\n", page.c_str());
+      return all_clear;
+    }
+    const Outcome outcome = work_out(settings);
+    for (const Alarm& alarm : outcome.findings.alarms)
+      std::fprintf(stderr, "ALARM %s: %s\n", alarm.name.c_str(), alarm.text.c_str());
+    if (outcome.findings.refusal) {
+      std::fprintf(stderr, "refused: %s\n", esokit::to_text(*outcome.findings.refusal).c_str());
+    }
+    for (const auto& line : outcome.design.summary()) std::printf("%s\n", line.c_str());
+    const std::string page = outcome.page(settings).write(settings.out, stem_of(settings));
+    if (page.empty()) return failed;
+    std::printf("%s\n", page.c_str());
+    return outcome.status;
+  } catch (const LogError& error) {
+    std::fprintf(stderr, "from_log: %s\n", error.what());
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "from_log: %s\n", error.what());
+  }
+  return unreadable;
+}

@@ -1,0 +1,219 @@
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <cstdio>
+#include <numbers>
+#include <utility>
+
+#include "from_log/parts/from_log.hpp"
+
+namespace from_log {
+namespace {
+
+using esokit::examples::number_text;
+
+/// In place, of a length that is a power of two.
+void fourier(std::vector<std::complex<double>>& x) {
+  const std::size_t n = x.size();
+  for (std::size_t i = 1, j = 0; i < n; ++i) {
+    std::size_t bit = n / 2;
+    for (; (j & bit) != 0; bit /= 2) j ^= bit;
+    j ^= bit;
+    if (i < j) std::swap(x[i], x[j]);
+  }
+  for (std::size_t length = 2; length <= n; length *= 2) {
+    const double turn = -2.0 * std::numbers::pi / static_cast<double>(length);
+    for (std::size_t half = 0; half < length / 2; ++half) {
+      const auto w = std::polar(1.0, turn * static_cast<double>(half));
+      for (std::size_t i = half; i < n; i += length) {
+        const auto odd = w * x[i + length / 2];
+        x[i + length / 2] = x[i] - odd;
+        x[i] += odd;
+      }
+    }
+  }
+}
+
+/// Welch's mean over half overlapping pieces with Hann's window, each without its trend.
+Spectrum spectrum(const std::vector<double>& values, double T) {
+  std::size_t length = 64;
+  while (length * 2 <= values.size() / 4 && length < 4096) length *= 2;
+  Spectrum result;
+  if (values.size() < length) return result;
+  std::vector<double> sum(length / 2, 0.0);
+  std::size_t pieces = 0;
+  for (std::size_t from = 0; from + length <= values.size(); from += length / 2) {
+    const double count = static_cast<double>(length);
+    double mean = 0.0, slope = 0.0;
+    for (std::size_t i = 0; i < length; ++i) mean += values[from + i] / count;
+    for (std::size_t i = 0; i < length; ++i) {
+      slope += (static_cast<double>(i) - (count - 1) / 2) * (values[from + i] - mean);
+    }
+    slope *= 12.0 / (count * (count * count - 1));
+    std::vector<std::complex<double>> x(length);
+    double power = 0.0;
+    for (std::size_t i = 0; i < length; ++i) {
+      const double at = static_cast<double>(i);
+      const double window = 0.5 - 0.5 * std::cos(2 * std::numbers::pi * at / count);
+      power += window * window;
+      x[i] = window * (values[from + i] - mean - slope * (at - (count - 1) / 2));
+    }
+    fourier(x);
+    for (std::size_t i = 1; i < length / 2; ++i) sum[i] += std::norm(x[i]) / power;
+    ++pieces;
+  }
+  for (std::size_t i = 1; i < length / 2; ++i) {
+    result.frequency.push_back(2 * std::numbers::pi * static_cast<double>(i) /
+                               (T * static_cast<double>(length)));
+    result.density.push_back(sum[i] / static_cast<double>(pieces) * T / std::numbers::pi);
+  }
+  return result;
+}
+
+/// Innovations of the fit that was chosen, over the rows that it was fitted to.
+std::vector<double> residual_of(const esokit::Identified& found, const esokit::FitData& rows,
+                                double& sample_time) {
+  const auto& chosen = *std::find_if(
+      found.orders.begin(), found.orders.end(),
+      [&](const esokit::OrderFit& order) { return order.model.order == found.order; });
+  esokit::FitData data = esokit::averaged(esokit::excerpt(rows, 60000), found.averaged);
+  sample_time = data.sample_time;
+  if (chosen.friction_scale > 0.0) {
+    const auto speed =
+        esokit::detail::friction_speed(data, found.order, chosen.fit.noise, chosen.fit.at.latency);
+    data = esokit::detail::with_friction(data, speed, chosen.friction_scale);
+  }
+  esokit::InnovationsFit fit(data, chosen.model, esokit::detail::fit_bounds(data));
+  (void)fit.at(chosen.fit.at);
+  return fit.residual();
+}
+
+/// What a factor between two units often is.
+std::string usual_factor(double ratio) {
+  struct Usual {
+    double factor;
+    const char* text;
+  };
+  constexpr Usual all[] = {{57.2958, "degrees and radians"},
+                           {9.5493, "rev/min and rad/s"},
+                           {6.28319, "turns and radians"},
+                           {1000, "a thousand: milli"},
+                           {100, "percent and shares, or centi"},
+                           {10, "a decimal that slipped"},
+                           {9.80665, "kg and N"},
+                           {60, "minutes and seconds"}};
+  const double size = ratio > 1 ? ratio : 1 / ratio;
+  const Usual* best = nullptr;
+  for (const Usual& usual : all) {
+    const double off = std::abs(std::log(size / usual.factor));
+    if (off < 0.08 && (best == nullptr || off < std::abs(std::log(size / best->factor))))
+      best = &usual;
+  }
+  return best == nullptr ? "" : std::string(" (") + best->text + "?)";
+}
+
+void sound_alarms(const Settings& settings, const Input& input, Findings& all) {
+  const esokit::Identified& found = all.found;
+  const auto [least, largest] = std::minmax_element(all.rows.u.begin(), all.rows.u.end());
+  if (settings.limits) {
+    const auto [lower, upper] = *settings.limits;
+    const double ours = std::max(std::abs(*least), std::abs(*largest));
+    const double told = std::max(std::abs(lower), std::abs(upper));
+    if (ours > 1.5 * told || ours < told / 50) {
+      all.alarms.push_back(
+          {"u-unit", "u of the log (" + input.u + ") reaches " + number_text(ours, 4) +
+                         ", the limits that you gave " + number_text(told, 4) +
+                         usual_factor(ours / told) +
+                         ": the log and the controller count u in different units, or these are "
+                         "not the limits. b0 below is for u as it is in the log."});
+    }
+  }
+  const double q = found.log.quantisation;
+  if (q > 0.0) {
+    const auto [low, high] = std::minmax_element(all.rows.y.begin(), all.rows.y.end());
+    const double levels = (*high - *low) / q;
+    if (levels < 10) {
+      all.alarms.push_back(
+          {"quantised", "y (" + input.y + ") comes in steps of " + number_text(q, 3) +
+                            " and moves by " + number_text(levels, 3) +
+                            " of them: nothing of how it moves is left. Record larger motion, or "
+                            "with more digits."});
+    }
+  }
+  if (!all.seen || found.plateau.middle == 0) return;
+  // Only what the log really tells of b0.
+  const double b0 = found.input_gain.value;
+  if (!(found.excitation < 0.15)) return;
+  const double expected = settings.expected_gain.value_or(std::abs(b0));
+  const double ratio = b0 / expected;
+  const bool certain = found.input_gain.half_width < std::abs(b0);
+  if (ratio < 0 && certain) {
+    all.alarms.push_back(
+        {"sign",
+         "b0 is " + number_text(b0, 3) + ": where u rises, y falls" +
+             std::string(settings.expected_gain ? ", and you expect " : "") +
+             (settings.expected_gain ? number_text(expected, 3) : "") +
+             ". With the wrong sign no controller is stable: look at the sign of u and y "
+             "where they are recorded and where the controller will write. If it is so, say "
+             "--b0 " +
+             number_text(b0, 3) + "."});
+  }
+  const double size = std::abs(ratio);
+  if (certain && (size > 3 || size < 1.0 / 3)) {
+    all.alarms.push_back(
+        {"b0", "b0 is " + number_text(b0, 3) + ", " + number_text(size > 1 ? size : 1 / size, 3) +
+                   " times " + (size > 1 ? "more" : "less") + " than the " +
+                   number_text(expected, 3) + " that you expect" + usual_factor(size) +
+                   ": another unit of u, y or time, a gear, or a scale that is wrong."});
+  }
+}
+
+}  // namespace
+
+Findings examine(const Settings& settings, const Input& input) {
+  Findings all;
+  all.alarms = input.alarms;
+  esokit::IdentifyOptions options;
+  options.orders = settings.orders;
+  const bool slow = input.log.y.size() > 200'000;
+  if (slow) {
+    options.progress = [](double share) {
+      std::fprintf(stderr, "identifying: %3.0f %%\n", 100 * share);
+    };
+  }
+  if (const auto prepared = esokit::prepare(input.log)) {
+    all.rows = prepared->data;
+    all.found.log = prepared->report;
+    const double T = all.rows.sample_time;
+    all.u = spectrum(all.rows.u, T);
+    all.y = spectrum(all.rows.y, T);
+  } else {
+    all.refusal = prepared.error();
+    return all;
+  }
+  const auto found = esokit::study(input.log, options);
+  if (!found) {
+    all.refusal = found.error();
+    sound_alarms(settings, input, all);
+    return all;
+  }
+  all.found = *found;
+  all.seen = true;
+  if (const auto verdict = esokit::judge(*found, input.log, options); !verdict)
+    all.refusal = verdict.error();
+  double T = 0.0;
+  const auto residual = residual_of(*found, all.rows, T);
+  double square = 0.0;
+  for (const double e : residual) square += e * e;
+  for (std::size_t lag = 1; lag <= 40 && lag < residual.size(); ++lag) {
+    double sum = 0.0;
+    for (std::size_t k = lag; k < residual.size(); ++k) sum += residual[k] * residual[k - lag];
+    all.residual_correlation.push_back(sum / square);
+  }
+  all.correlation_band = 1.96 / std::sqrt(static_cast<double>(residual.size()));
+  all.residual = spectrum(residual, T);
+  sound_alarms(settings, input, all);
+  return all;
+}
+
+}  // namespace from_log

@@ -1,0 +1,91 @@
+/// @file
+/// What from_log is asked, what it reads, what it finds.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <esokit/identify/identify.hpp>
+
+#include "common/figure.hpp"
+#include "common/log_file.hpp"
+
+namespace from_log {
+
+using esokit::examples::LogError;
+
+/// Exit codes of the program.
+enum Status {
+  all_clear = 0,   ///< a page with a design
+  failed = 1,      ///< the page could not be written
+  unreadable = 2,  ///< file or command line; stderr says where and what
+  refused = 3,     ///< a page that says what was seen, and what to record instead; no design
+  alarmed = 4      ///< a page with a design, and an alarm that has to be looked at first
+};
+
+/// The command line.
+struct Settings {
+  std::string file;
+  std::string time, u, y;          ///< columns; empty: found by their names
+  std::vector<std::string> known;  ///< columns of what else acts where the disturbance acts
+  std::string time_unit;           ///< s, ms, us or ns; empty: found out
+  double sample_time = 0;          ///< s, where there is no time
+  char separator = 0;              ///< 0: found out
+  std::vector<int> orders{1, 2, 3};
+  std::optional<double> expected_gain;  ///< b0 as the user believes it to be
+  std::optional<std::pair<double, double>> limits;
+  double noise_share = 0.05;  ///< wish: deviation of u by noise, share of the range of u
+  double settling_time = 0;   ///< wish instead: s
+  double controller = 0;      ///< wish instead: omega_c, rad/s
+  bool anyway = false;        ///< design for a refused log, too
+  std::string observer;       ///< typed in: nothing is found, the log runs through it
+  double bandwidth = 0;       ///< its omega_o, rad/s
+  std::string out = ".";      ///< folder of the page
+  std::string command;        ///< for the page
+};
+
+/// Something that has to be looked at before anything is pasted.
+struct Alarm {
+  std::string name;  ///< one word
+  std::string text;
+};
+
+/// The columns of a file, and what had to be found out about them.
+struct Input {
+  std::string time, u, y;  ///< names of the columns
+  std::string time_unit = "s";
+  esokit::Log log;                ///< s from the first stamp on; u held from its row to the next
+  std::vector<std::size_t> line;  ///< of the file, for each row
+  bool merged = false;            ///< topics with stamps of their own were brought together
+  bool cut = false;               ///< the last line was cut
+  std::vector<Alarm> alarms;
+};
+
+/// Reads the columns, in seconds. Errors name the line and the column.
+[[nodiscard]] Input read_log(const Settings& settings);
+
+/// One-sided density over frequency.
+struct Spectrum {
+  std::vector<double> frequency;  ///< rad/s
+  std::vector<double> density;    ///< unit^2 s/rad
+};
+
+/// What is seen in a log, whether a model can be trusted or not.
+struct Findings {
+  bool seen = false;  ///< a model was fitted
+  esokit::Identified found;
+  std::optional<esokit::Error<double>> refusal;
+  esokit::FitData rows;  ///< at one sample time
+  Spectrum u, y, residual;
+  std::vector<double> residual_correlation;  ///< lags 1, 2, ..
+  double correlation_band = 0;               ///< white ones stay within this, 95 %
+  std::vector<Alarm> alarms;
+};
+
+/// Identifies, and sounds the alarms.
+[[nodiscard]] Findings examine(const Settings& settings, const Input& input);
+
+}  // namespace from_log

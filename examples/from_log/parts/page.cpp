@@ -1,0 +1,201 @@
+#include "from_log/parts/page.hpp"
+
+#include <cerrno>
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <system_error>
+#include <utility>
+
+#include "from_log/page_template.hpp"  // common/page.html, by CMake
+
+namespace from_log {
+namespace {
+
+using esokit::examples::CsvRow;
+using esokit::examples::Figure;
+
+std::string escaped(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      default:
+        out += c;
+    }
+  }
+  return out;
+}
+
+std::string base64(const std::string& bytes) {
+  constexpr const char* digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string out;
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    std::uint32_t three = 0;
+    for (std::size_t j = i; j < i + 3; ++j) {
+      three = three << 8U | (j < bytes.size() ? static_cast<unsigned char>(bytes[j]) : 0U);
+    }
+    for (int j = 0; j < 4; ++j) out += digits[three >> (18 - 6 * j) & 63U];
+    if (i + 1 >= bytes.size()) out[out.size() - 2] = '=';
+    if (i + 2 >= bytes.size()) out[out.size() - 1] = '=';
+  }
+  return out;
+}
+
+/// A folder that goes with it.
+class Scratch {
+ public:
+  Scratch() {
+    std::string path = (std::filesystem::temp_directory_path() / "from_log.XXXXXX").string();
+    if (mkdtemp(path.data()) != nullptr) path_ = path;
+  }
+  ~Scratch() {
+    std::error_code ignored;
+    if (!path_.empty()) std::filesystem::remove_all(path_, ignored);
+  }
+  Scratch(const Scratch&) = delete;
+  Scratch& operator=(const Scratch&) = delete;
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+/// As an image that is in the page itself; what is said in its place without gnuplot.
+std::string html_of(const Figure& figure, const std::string& scratch) {
+  std::string text = "<figure>\n";
+  if (!scratch.empty() && figure.write(scratch, "svg")) {
+    std::ifstream file(scratch + "/" + figure.name() + ".svg", std::ios::binary);
+    const std::string svg{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+    text += "<img src=\"data:image/svg+xml;base64," + base64(svg) + "\" alt=\"" +
+            escaped(figure.caption()) + "\">\n";
+  } else {
+    text += "<p>Not drawn: figures need gnuplot and Python 3.</p>\n";
+  }
+  return text + "<figcaption>" + escaped(figure.caption()) + "</figcaption>\n</figure>\n";
+}
+
+std::string html_of_table(const std::string& caption, const std::vector<CsvRow>& rows) {
+  std::string text = "<figure class=\"tab\"><figcaption>" + escaped(caption) +
+                     "</figcaption><div class=\"table\" tabindex=\"0\"><table>\n<thead><tr>";
+  for (const auto& field : rows[0]) text += "<th scope=\"col\">" + escaped(field) + "</th>";
+  text += "</tr></thead>\n<tbody>\n";
+  for (std::size_t i = 1; i < rows.size(); ++i) {
+    text += "<tr>";
+    for (std::size_t c = 0; c < rows[i].size(); ++c) {
+      // Long ones are sentences.
+      const bool words = rows[i][c].size() > 30;
+      text += (c == 0  ? "<th scope=\"row\">"
+               : words ? "<td class=\"text\">"
+                       : "<td>") +
+              escaped(rows[i][c]) + (c == 0 ? "</th>" : "</td>");
+    }
+    text += "</tr>\n";
+  }
+  return text + "</tbody></table></div></figure>\n";
+}
+
+void replace(std::string& text, const std::string& mark, const std::string& by) {
+  const auto at = text.find(mark);
+  if (at != std::string::npos) text.replace(at, mark.size(), by);
+}
+
+}  // namespace
+
+std::string new_file(const std::string& folder, const std::string& stem,
+                     const std::string& ending) {
+  std::error_code problem;
+  std::filesystem::create_directories(folder, problem);
+  for (int number = 1; number < 100'000; ++number) {
+    const std::string file = (std::filesystem::path(folder) /
+                              (stem + (number > 1 ? "-" + std::to_string(number) : "") + ending))
+                                 .string();
+    // "x": two runs at the same time cannot take the same name.
+    if (std::FILE* made = std::fopen(file.c_str(), "wx")) {
+      std::fclose(made);
+      return file;
+    }
+    if (errno != EEXIST) {
+      std::fprintf(stderr, "from_log: cannot write %s: %s\n", file.c_str(), std::strerror(errno));
+      break;
+    }
+  }
+  return {};
+}
+
+std::string Page::write(const std::string& folder, const std::string& stem) const {
+  const Scratch scratch;
+  std::string header, main;
+  header = "<h1>" + escaped(title_) + "</h1>\n";
+  for (const Item& item : items_) {
+    switch (item.kind) {
+      case Kind::heading:
+        main += "<h2>" + escaped(item.text) + "</h2>\n";
+        break;
+      case Kind::text:
+        main += "<p>" + escaped(item.text) + "</p>\n";
+        break;
+      case Kind::box:
+      case Kind::bad_box:
+        main += std::string("<section class=\"plainly") +
+                (item.kind == Kind::bad_box ? " failed" : "") + "\">\n<h2>" + escaped(item.text) +
+                "</h2>\n<ul>\n";
+        for (const auto& line : item.rows[0]) main += "<li>" + escaped(line) + "</li>\n";
+        main += "</ul>\n</section>\n";
+        break;
+      case Kind::table:
+        main += html_of_table(item.text, item.rows);
+        break;
+      case Kind::figure:
+        main += html_of(item.figures[0], scratch.path());
+        break;
+      case Kind::code:
+        main += "<pre tabindex=\"0\"><code>" + escaped(item.text) + "</code></pre>\n";
+        break;
+    }
+  }
+  std::string html = page_template;
+  replace(html, "$title", escaped(title_) + " - esokit");
+  replace(html, "$header", header);
+  replace(html, "$main", main);
+  const std::string file = new_file(folder, stem, ".html");
+  if (file.empty() || !esokit::examples::write_text(file, html)) return {};
+  return std::filesystem::absolute(file).lexically_normal().string();
+}
+
+void Page::add_to(esokit::examples::Report& report) const {
+  for (const Item& item : items_) {
+    switch (item.kind) {
+      case Kind::table:
+        report.table(item.name, item.text, item.rows[0], {item.rows.begin() + 1, item.rows.end()});
+        break;
+      case Kind::figure:
+        report.add(item.figures[0]);
+        break;
+      case Kind::box:
+      case Kind::bad_box: {
+        for (const auto& line : item.rows[0]) report.remark(item.text + ": " + line);
+        break;
+      }
+      default:
+        break;
+    }
+  }
+}
+
+}  // namespace from_log

@@ -1,0 +1,324 @@
+#include "from_log/parts/show.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <esokit/core/error_text.hpp>
+#include <esokit/core/version.hpp>
+
+#include "from_log/parts/log_observer.hpp"
+
+namespace from_log {
+namespace {
+
+using namespace esokit::examples;
+
+std::string with_interval(const esokit::Estimate& estimate, double unit = 1.0) {
+  return number_text(unit * estimate.value, 4) + " ± " + number_text(unit * estimate.half_width, 2);
+}
+
+/// At what to do about it: more than fits into the error.
+std::string advice(const std::string& field) {
+  static const std::map<std::string, const char*> all = {
+      {"own_input",
+       "u follows from y alone: the loop runs and its reference stands still. Let the reference "
+       "step every few settling times, by as much as the machine may move, and log again; the "
+       "controller may stay as it is."},
+      {"excitation",
+       "u hardly shows in y. Step the reference (or u itself) up and down by a tenth of its range, "
+       "ten times or more, with pauses as long as the machine needs to settle; or sweep it slowly "
+       "up to the frequency that the controller is to reach."},
+      {"correlation",
+       "The machine is more than a chain of integrators with a lag: something swings, y is "
+       "filtered, or u is not what the actuator held. Log the applied u, y before its filters, and "
+       "what is known to act (--known COLUMN); take what swings off, or log below its frequency."},
+      {"plateau",
+       "b0 depends on the frequency at which it is looked at. Log motion in the band that the "
+       "controller will use: faster steps, or a sweep."},
+      {"interval", "Log twice as long or with twice the steps: the interval shrinks with both."},
+      {"latency", "u changes too slowly to tell lag and dead time: steps instead of ramps."},
+      {"friction_shift",
+       "Friction and b0 are told apart by motion well above the speed at which it sticks."},
+      {"saturated", "Log the u that the actuator really held."},
+      {"rows", "At least 200 rows without a gap; better 20 s at the rate of the controller."},
+      {"u", "Log the input while it moves."},
+      {"y", "Log the output while it moves."}};
+  const auto at = all.find(field);
+  return at == all.end() ? "" : at->second;
+}
+
+/// Every value, or fewer of a long log, by mean.
+Figure log_figure(const Input& input, const Findings& findings) {
+  Figure figure("log", {.rows = 2, .columns = 2, .panel_height = 160});
+  figure.caption("The log (" + input.y + ", " + input.u +
+                 ") and its spectra. What the controller is to do has to be in the band where u "
+                 "moves y.");
+  std::vector<double> t = input.log.time;
+  if (t.empty()) {
+    for (std::size_t k = 0; k < input.log.y.size(); ++k)
+      t.push_back(static_cast<double>(k) * input.log.sample_time);
+  }
+  const auto panel = [&](std::size_t row, const char* name, const std::vector<double>& values,
+                         const Spectrum& spectrum, Color color) {
+    figure.panel(row, 0).x_label("t (s)").y_label(name).name(name).line(
+        t, values, {.color = color, .width = 1.0, .column = name});
+    if (spectrum.frequency.empty()) return;
+    figure.panel(row, 1)
+        .x_label("w (rad/s)")
+        .y_label(std::string("density of ") + name)
+        .log_x()
+        .log_y()
+        .name(std::string("spectrum of ") + name)
+        .line(spectrum.frequency, spectrum.density, {.color = color, .width = 1.2, .column = name});
+  };
+  panel(0, "y", input.log.y, findings.y, Color::blue);
+  panel(1, "u", input.log.u, findings.u, Color::vermillion);
+  return figure;
+}
+
+Figure model_figure(const Findings& findings) {
+  const esokit::Identified& found = findings.found;
+  Figure figure("model", {.rows = 1, .columns = 3, .panel_height = 180});
+  figure.caption(
+      "Left: b0 over the bandwidth at which it is looked at, with two standard errors; dashed "
+      "where "
+      "it was read. Flat is good. Middle: what the model does not explain, correlated with itself; "
+      "white noise stays between the dashed lines, above the dotted one the log is refused. Right: "
+      "its spectrum; a peak is something that swings.");
+  const auto& points = found.plateau.points;
+  if (points.size() >= 3 && found.plateau.middle > 0) {
+    std::vector<double> w, b0, low, high;
+    const double size = std::abs(found.input_gain.value);
+    for (const auto& point : points) {
+      const double value = point.fit.linear[0], error = 2 * point.errors.linear[0];
+      // What is not known at all would hide the rest.
+      if (!(error < size) || std::abs(value) > 3 * size) continue;
+      w.push_back(point.fit.at.bandwidth);
+      b0.push_back(value);
+      low.push_back(value - error);
+      high.push_back(value + error);
+    }
+    if (w.size() >= 2) {
+      figure.panel(0, 0)
+          .x_label("w (rad/s)")
+          .y_label("b0")
+          .log_x()
+          .name("plateau")
+          .band(w, low, high, {.color = Color::sky, .opacity = 0.3, .column = "b0 +- 2 se"})
+          .line(w, b0, {.color = Color::blue, .column = "b0"})
+          .vertical_line(points[found.plateau.middle].fit.at.bandwidth);
+    }
+  }
+  std::vector<double> lag;
+  for (std::size_t i = 0; i < findings.residual_correlation.size(); ++i)
+    lag.push_back(static_cast<double>(i + 1));
+  const double most =
+      *std::max_element(findings.residual_correlation.begin(), findings.residual_correlation.end(),
+                        [](double a, double b) { return std::abs(a) < std::abs(b); });
+  const double range = std::max(0.15, 1.15 * std::abs(most));
+  figure.panel(0, 1)
+      .x_label("rows")
+      .y_label("correlation")
+      .name("residual")
+      .y_range(-range, range)
+      .points(lag, findings.residual_correlation,
+              {.color = Color::blue, .marker = Marker::circle, .size = 0.7, .column = "residual"})
+      .horizontal_line(findings.correlation_band)
+      .horizontal_line(-findings.correlation_band)
+      .horizontal_line(0.1, {.color = Color::vermillion, .dash = Dash::dotted})
+      .horizontal_line(-0.1, {.color = Color::vermillion, .dash = Dash::dotted});
+  if (!findings.residual.frequency.empty()) {
+    figure.panel(0, 2)
+        .x_label("w (rad/s)")
+        .y_label("density of the residual")
+        .log_x()
+        .log_y()
+        .name("spectrum of the residual")
+        .line(findings.residual.frequency, findings.residual.density,
+              {.color = Color::blue, .width = 1.2, .column = "residual"});
+  }
+  return figure;
+}
+
+std::string derivative_of(int order) {
+  return "y" + std::string(static_cast<std::size_t>(order), '\'');
+}
+
+std::vector<CsvRow> model_table(const Findings& findings) {
+  const esokit::Identified& found = findings.found;
+  std::vector<CsvRow> rows{{"quantity", "found, 95 %", "unit", "what it is"}};
+  const std::string highest = derivative_of(found.order);
+  rows.push_back({"order", std::to_string(found.order), "", "integrations from u to y"});
+  rows.push_back({"b0", with_interval(found.input_gain), "[" + highest + "] / [u]",
+                  "what one unit of u adds to " + highest});
+  if (found.plateau.middle == 0) return rows;
+  rows.push_back({"lag", with_interval(found.lag, 1e3), "ms", "of the actuator, first order"});
+  rows.push_back({"dead time", with_interval(found.dead_time, 1e3), "ms", "until u acts at all"});
+  rows.push_back({"lag and dead time", with_interval(found.latency, 1e3), "ms",
+                  "their sum is known better than each"});
+  rows.push_back({"pole", with_interval(found.pole), "1/s", "how fast motion dies by itself"});
+  rows.push_back({"friction", with_interval(found.friction), "[" + highest + "]", "Coulomb"});
+  for (std::size_t c = 0; c < found.columns.size(); ++c) {
+    rows.push_back({"known column " + std::to_string(c + 1), with_interval(found.columns[c]),
+                    "[" + highest + "] / its unit", "its share of the disturbance"});
+  }
+  rows.push_back({"noise", with_interval(found.noise), "[y]", "standard deviation of y"});
+  rows.push_back({"disturbance", number_text(found.disturbance, 3), "[" + highest + "]² / s",
+                  "what a random walk of d gains in variance"});
+  rows.push_back(
+      {"plateau", number_text(100 * found.plateau.spread, 3) + " %",
+       number_text(found.plateau.from, 3) + " to " + number_text(found.plateau.to, 3) + " rad/s",
+       "spread of b0 where it was read; where it stays within 10 %"});
+  rows.push_back({"residual", number_text(found.correlation, 2), "0.1 at most",
+                  "largest correlation with itself: 0 if the model is all"});
+  return rows;
+}
+
+std::vector<CsvRow> log_table(const Input& input, const Findings& findings) {
+  const esokit::LogReport& log = findings.found.log;
+  std::vector<CsvRow> rows{{"of the log", "", "how it was read"}};
+  rows.push_back({"y", input.y, ""});
+  rows.push_back({"u", input.u, "held from its row to the next"});
+  rows.push_back({"time", input.time.empty() ? "none" : input.time,
+                  input.time.empty() ? "equal steps, as told" : "read in " + input.time_unit});
+  rows.push_back({"rows", std::to_string(log.rows),
+                  input.merged ? "topics with stamps of their own; a row "
+                                 "for each y, u averaged between them"
+                               : ""});
+  if (input.cut) rows.push_back({"last line", "cut", "left out"});
+  rows.push_back({"sample time", number_text(1e3 * log.sample_time, 5) + " ms",
+                  "jitter " + number_text(1e3 * log.jitter, 3) + " ms"});
+  rows.push_back({"duration", number_text(log.duration, 5) + " s",
+                  std::to_string(log.pieces) + (log.pieces == 1 ? " piece" : " pieces")});
+  rows.push_back({"missing", std::to_string(log.missing),
+                  std::to_string(log.rejected) + " rows that are no numbers, " +
+                      std::to_string(log.outliers) + " single outliers"});
+  rows.push_back({"step of y", log.quantisation > 0 ? number_text(log.quantisation, 4) : "none",
+                  log.quantisation > 0 ? "an encoder or a converter" : "that shows"});
+  rows.push_back({"u at its ends", number_text(100 * log.saturated, 3) + " %", "of the rows"});
+  return rows;
+}
+
+}  // namespace
+
+std::string stem_of(const Settings& settings) {
+  // A name of nothing but dots would be a hidden file.
+  const std::string stem = std::filesystem::path(settings.file).stem().string();
+  return stem.find_first_not_of('.') == std::string::npos ? "log" + stem : stem;
+}
+
+Page show(const Settings& settings, const Input& input, const Findings& findings,
+          const Design& design) {
+  const std::string name = std::filesystem::path(settings.file).filename().string();
+  Page page("From " + name + " to a controller");
+  if (!findings.alarms.empty()) {
+    std::vector<std::string> lines;
+    for (const Alarm& alarm : findings.alarms) lines.push_back(alarm.name + ": " + alarm.text);
+    page.box("Alarm: look at this before anything is pasted", lines, true);
+  }
+  if (findings.refusal) {
+    std::vector<std::string> lines{esokit::to_text(*findings.refusal)};
+    if (const auto more = advice(findings.refusal->field); !more.empty()) lines.push_back(more);
+    if (findings.seen)
+      lines.push_back("The numbers below are what was seen. They are no model to build on.");
+    page.box("Refused: this log does not tell what a controller needs. What to record instead",
+             lines, true);
+  }
+  if (design.made()) page.box("In short", design.summary(), false);
+  page.heading("The log");
+  page.table("log", "What was read", log_table(input, findings));
+  page.figure(log_figure(input, findings));
+  if (findings.seen) {
+    page.heading(findings.refusal ? "What was seen" : "What was found");
+    page.text(
+        "A chain of integrators behind a lag and a dead time, with a pole, friction and a "
+        "disturbance that walks; intervals are 95 %.");
+    page.table("model", "The machine", model_table(findings));
+    if (!findings.residual_correlation.empty()) page.figure(model_figure(findings));
+  }
+  design.show_on(page, settings, findings);
+  page.text("Made by from_log of esokit " + std::to_string(ESOKIT_VERSION_MAJOR) + "." +
+            std::to_string(ESOKIT_VERSION_MINOR) + "." + std::to_string(ESOKIT_VERSION_PATCH) +
+            ": " + settings.command);
+  return page;
+}
+
+std::string show_observer(const Settings& settings, const Input& input) {
+  if (settings.orders.size() != 1) throw LogError("--observer: --order is missing");
+  if (!settings.expected_gain) throw LogError("--observer: --b0 is missing");
+  if (!(settings.bandwidth > 0)) throw LogError("--observer: --bandwidth is missing");
+  LogSettings how{.observer = settings.observer,
+                  .order = settings.orders[0],
+                  .input_gain = *settings.expected_gain,
+                  .bandwidth = settings.bandwidth,
+                  .sample_time = settings.sample_time};
+  const auto& time = input.log.time;
+  if (!(how.sample_time > 0)) how.sample_time = median_step(time);
+  const LogEstimates found = run_observer(how, time, input.log.y, input.log.u);
+  std::vector<double> t = time;
+  for (std::size_t k = t.size(); k < input.log.y.size(); ++k)
+    t.push_back(static_cast<double>(k) * how.sample_time);
+  std::string text = "t_s";
+  for (int r = 0; r < how.order; ++r) text += ",y" + std::string(static_cast<std::size_t>(r), '\'');
+  text += ",d\n";
+  for (std::size_t k = 0; k < t.size(); ++k) {
+    text += number_text(t[k], 15);
+    for (const auto& column : found.columns) text += ',' + number_text(column[k], 12);
+    text += '\n';
+  }
+  const std::filesystem::path file = settings.file;
+  const std::string numbers = new_file(settings.out, stem_of(settings) + "-estimates", ".csv");
+  if (numbers.empty() || !write_text(numbers, text)) return {};
+  Page page(file.filename().string() + " through an observer");
+  page.text("Observer " + how.observer + ", order " + std::to_string(how.order) + ", b0 = " +
+            number_text(how.input_gain, 6) + ", omega_o = " + number_text(how.bandwidth, 6) +
+            " rad/s, T = " + number_text(how.sample_time, 6) + " s. Gains follow the time stamps.");
+  page.table("log", "The log",
+             {{"", "rows"},
+              {"in the log", std::to_string(t.size())},
+              {"measurements missing or bad, predicted over", std::to_string(found.rejected)},
+              {"inputs missing or bad, the one before taken", std::to_string(found.inputs)},
+              {"gaps too long to bridge, restarts", std::to_string(found.restarts)}});
+  Figure figure("estimates", {.rows = 2, .panel_height = 170});
+  figure.caption("Above: y and its estimate. Below: u, and the total disturbance in units of u.");
+  figure.panel(0, 0)
+      .y_label("y")
+      .legend(Legend::above)
+      .name("output")
+      .line(t, input.log.y, {.name = "y", .color = Color::grey, .width = 1.0})
+      .line(t, found.columns[0], {.name = "estimate", .color = Color::blue, .width = 1.1});
+  std::vector<double> load;
+  for (const double d : found.columns[static_cast<std::size_t>(how.order)])
+    load.push_back(d / how.input_gain);
+  figure.panel(1, 0)
+      .x_label("t (s)")
+      .y_label("u, d / b0")
+      .legend(Legend::above)
+      .name("load")
+      .line(t, input.log.u, {.name = "u", .color = Color::grey, .width = 1.0})
+      .line(t, load, {.name = "dhat / b0", .color = Color::vermillion, .width = 1.1});
+  page.figure(figure);
+  page.text("All estimates: " + std::filesystem::path(numbers).filename().string());
+  return page.write(settings.out, stem_of(settings));
+}
+
+Outcome work_out(const Settings& settings) { return work_out(settings, read_log(settings)); }
+
+Outcome work_out(const Settings& settings, const Input& input) {
+  Outcome outcome;
+  outcome.input = input;
+  outcome.findings = examine(settings, input);
+  if (outcome.findings.seen && (!outcome.findings.refusal || settings.anyway))
+    outcome.design = Design::make(settings, input, outcome.findings);
+  outcome.status = outcome.findings.refusal                                     ? refused
+                   : !outcome.findings.alarms.empty() || !outcome.design.made() ? alarmed
+                                                                                : all_clear;
+  return outcome;
+}
+
+}  // namespace from_log
