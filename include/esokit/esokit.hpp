@@ -4,6 +4,7 @@
 
 #include <esokit/adapter/adapter.hpp>
 #include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/guarded.hpp>
 #include <esokit/adapter/known_model.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
@@ -75,6 +76,7 @@
 #include <esokit/gain/filter_design.hpp>
 #include <esokit/gain/gain_interval.hpp>
 #include <esokit/gain/gain_law.hpp>
+#include <esokit/gain/gating_certificate.hpp>
 #include <esokit/gain/half_gain.hpp>
 #include <esokit/gain/model_gain.hpp>
 #include <esokit/gain/model_placement.hpp>

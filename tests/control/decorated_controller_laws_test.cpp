@@ -3,6 +3,7 @@
 #include "controller_law_suite.hpp"
 //
 #include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/guarded.hpp>
 #include <esokit/adapter/known_model.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
@@ -57,6 +58,15 @@ struct LoopTraits<esokit::VariableTime<O>> {
   }
 };
 
+// Guards that are idle: a bound that this plant's load does not reach.
+template <class O>
+struct LoopTraits<esokit::Guarded<O>> {
+  static typename esokit::Guarded<O>::Config config(double omega, double T, double b0) {
+    return {.observer = LoopTraits<O>::config(omega, T, b0),
+            .disturbance_bound = static_cast<typename O::scalar_type>(1e6)};
+  }
+};
+
 // A model that is wrong: what it says more than the plant does is disturbance.
 template <class O>
 struct LoopTraits<esokit::KnownModel<O, esokit::KnownPoles<2>>> {
@@ -71,7 +81,8 @@ using esokit::LinearEso;
 using DecoratedControllers = TypeList<
     Adrc<esokit::DelayedInput<LinearEso<2>, 3>>, Adrc<esokit::WrappedOutput<LinearEso<2>>>,
     Adrc<esokit::WrappedOutput<esokit::CascadeEso<2, 2>>, ErrorBased>,
-    Adrc<esokit::VariableTime<LinearEso<2>>>,
+    Adrc<esokit::VariableTime<LinearEso<2>>>, Adrc<esokit::Guarded<esokit::CascadeEso<2, 2>>>,
+    Adrc<esokit::Guarded<LinearEso<1, float>>, ErrorBased>,
     Adrc<esokit::KnownModel<LinearEso<2>, esokit::KnownPoles<2>>>,
     Adrc<esokit::VariableTime<esokit::WrappedOutput<esokit::DelayedInput<LinearEso<1, float>, 2>>>,
          ErrorBased>>;

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/guarded.hpp>
 #include <esokit/adapter/known_model.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
@@ -72,6 +73,21 @@ struct GatedAngle {
                          .running_factor = set<T>(lane, again, 3),
                          .most_in_a_row = 2},
             .period = set<T>(lane, again, 4)};
+  }
+};
+
+struct Guards {
+  template <class T>
+  using Type = esokit::Adrc<esokit::Guarded<LinearEso<1, T>>>;
+  template <class T>
+  static typename Type<T>::Config config(int lane, bool again) {
+    typename Type<T>::Config config{};
+    config.observer = {.observer = linear<T>(lane, again),
+                       .disturbance_bound = set<T>(lane, again, 20),
+                       .release_samples = 3};
+    config.controller_bandwidth = set<T>(lane, again, 5);
+    config.limits = {set<T>(lane, again, -2), set<T>(lane, again, 3), set<T>(lane, again, 200)};
+    return config;
   }
 };
 
@@ -286,6 +302,21 @@ TEST(LaneByLane, DelayedInput) {
 TEST(LaneByLane, AGateInAWrappedOutput) {
   expect_lanes<GatedAngle>([](auto& o, const auto& x, int k) {
     return std::tuple_cat(observe(o, x, k), std::tuple(o.wrap(x[2]), o.period()));
+  });
+}
+
+TEST(LaneByLane, Guards) {
+  expect_lanes<Guards>([](auto& c, const auto& x, int k) {
+    if (k % 17 == 9) (void)c.hold(x[0], x[2], x[1]);
+    if (k % 29 == 3) {
+      // One that no lane refuses.
+      const auto b = c.observer().input_gain();
+      EXPECT_TRUE(c.set_input_gain(k % 2 == 0 ? b + b : b).has_value());
+    }
+    const auto u = c.update(x[0], x[2]);
+    const auto& o = c.observer();
+    return std::tuple(u, o.estimate(), o.bounded(), o.gated(), o.trust(), o.standing_input(),
+                      o.input_factor(), o.present_input_gain(), o.applied_input());
   });
 }
 

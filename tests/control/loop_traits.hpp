@@ -53,4 +53,36 @@ class ChainPlant {
   double disturbance_;
 };
 
+/// A number of any kind that a sensor or a report may give.
+template <class S>
+S anything(Random& random) {
+  switch (random.index(8)) {
+    case 0:
+      return hidden_nan<S>();
+    case 1:
+      return random.index(2) == 0 ? hidden_infinity<S>() : -hidden_infinity<S>();
+    case 2:
+    case 3:
+      return static_cast<S>(random.uniform(-4, 4));
+    default: {
+      const double top = 0.999 * std::log(static_cast<double>(std::numeric_limits<S>::max()));
+      const double size = std::exp(random.uniform(-5, top));
+      return static_cast<S>(random.index(2) == 0 ? size : -size);
+    }
+  }
+}
+
+/// The settings of an observer of one bandwidth, or of a nest of adapters around it.
+template <class S, class Config>
+void fill_settings(Config& config, double omega_o, double sample_time, double input_gain) {
+  if constexpr (requires { config.observer; }) {
+    fill_settings<S>(config.observer, omega_o, sample_time, input_gain);
+  } else {
+    config.observer_bandwidth = static_cast<S>(omega_o);
+    if constexpr (requires { config.bandwidth_factor; }) config.bandwidth_factor = S(1.5);
+    config.input_gain = static_cast<S>(input_gain);
+    config.sample_time = static_cast<S>(sample_time);
+  }
+}
+
 }  // namespace esokit_test

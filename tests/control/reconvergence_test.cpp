@@ -6,6 +6,7 @@
 #include <cmath>
 #include <control/loop_traits.hpp>
 #include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/guarded.hpp>
 #include <esokit/adapter/known_model.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
@@ -31,42 +32,20 @@ void set(Config& config, double omega_T) {
   if constexpr (requires { config.observer; }) {
     set<S>(config.observer, omega_T);
   } else {
-    config.observer_bandwidth = static_cast<S>(omega_T / sample_time);
-    if constexpr (requires { config.bandwidth_factor; }) config.bandwidth_factor = S(1.5);
-    config.input_gain = S(1);
-    config.sample_time = static_cast<S>(sample_time);
-  }
-}
-
-template <class S>
-S anything(Random& random) {
-  switch (random.index(8)) {
-    case 0:
-      return hidden_nan<S>();
-    case 1:
-      return random.index(2) == 0 ? hidden_infinity<S>() : -hidden_infinity<S>();
-    case 2:
-    case 3:
-      return static_cast<S>(random.uniform(-4, 4));
-    default: {
-      const double top = 0.999 * std::log(static_cast<double>(std::numeric_limits<S>::max()));
-      const double size = std::exp(random.uniform(-5, top));
-      return static_cast<S>(random.index(2) == 0 ? size : -size);
-    }
+    fill_settings<S>(config, omega_T / sample_time, sample_time, 1);
   }
 }
 
 template <class Controller>
 class LoopReconvergence : public testing::Test {};
 
-using Controllers =
-    testing::Types<Adrc<LinearEso<2>>, Adrc<LinearEso<2, float>, ErrorBased>,
-                   Adrc<WrappedOutput<LinearEso<2>>>, Adrc<WrappedOutput<LinearEso<2>>, ErrorBased>,
-                   Adrc<WrappedOutput<LinearEso<2, float>>>, Adrc<WrappedOutput<CascadeEso<2, 2>>>,
-                   Adrc<DelayedInput<WrappedOutput<LinearEso<2>>, 2>>,
-                   Adrc<WrappedOutput<OutlierGate<LinearEso<2>>>, ErrorBased>,
-                   Adrc<VariableTime<WrappedOutput<LinearEso<2>>>>,
-                   Adrc<KnownModel<WrappedOutput<LinearEso<2>>, KnownPoles<2>>>>;
+using Controllers = testing::Types<
+    Adrc<LinearEso<2>>, Adrc<LinearEso<2, float>, ErrorBased>, Adrc<WrappedOutput<LinearEso<2>>>,
+    Adrc<WrappedOutput<LinearEso<2>>, ErrorBased>, Adrc<WrappedOutput<LinearEso<2, float>>>,
+    Adrc<WrappedOutput<CascadeEso<2, 2>>>, Adrc<DelayedInput<WrappedOutput<LinearEso<2>>, 2>>,
+    Adrc<WrappedOutput<OutlierGate<LinearEso<2>>>, ErrorBased>,
+    Adrc<VariableTime<WrappedOutput<LinearEso<2>>>>,
+    Adrc<KnownModel<WrappedOutput<LinearEso<2>>, KnownPoles<2>>>, Adrc<Guarded<LinearEso<2>>>>;
 TYPED_TEST_SUITE(LoopReconvergence, Controllers);
 
 TYPED_TEST(LoopReconvergence, BackAtTheReference) {
@@ -90,6 +69,14 @@ TYPED_TEST(LoopReconvergence, BackAtTheReference) {
     }
     for (int k = random.index(30); k > 0; --k) {
       S u = controller.output();
+      if constexpr (requires { controller.observer().set_trust(S(0)); }) {
+        controller.observer().set_trust(anything<S>(random));
+        controller.observer().set_pin(static_cast<Pin>(random.index(4)));
+        (void)controller.set_input_gain(anything<S>(random));
+        if (random.index(4) == 0) {
+          (void)controller.hold(anything<S>(random), anything<S>(random), anything<S>(random));
+        }
+      }
       switch (random.index(6)) {
         case 0:
           (void)controller.start(anything<S>(random), anything<S>(random));
@@ -107,6 +94,11 @@ TYPED_TEST(LoopReconvergence, BackAtTheReference) {
       ASSERT_TRUE(is_finite(u)) << seed;
       // What the actuator cannot hold it does not.
       plant.step(std::clamp(static_cast<double>(u), -2.0, 2.0));
+    }
+    if constexpr (requires { controller.observer().set_trust(S(0)); }) {
+      controller.observer().set_trust(S(1));
+      controller.observer().set_pin(Pin::free);
+      ASSERT_TRUE(controller.set_input_gain(S(1)).has_value());
     }
     // While the observer finds back a saturated u carries the plant away, and that far it has to
     // come back; an angle only has to stop.

@@ -221,6 +221,10 @@ class Filler {
       MEMBER(observer_bandwidth, observer_bandwidth(text, member))
     }
     MEMBER(poles, poles(text, member))
+    MEMBER(disturbance_bound, number(text, member, {0, 100 * unit}))
+    MEMBER(unit, choice(text, member, 2))
+    MEMBER(release_samples,
+           promise.waiting += static_cast<double>(member = tape_.integer(0, 60, text)))
     MEMBER(level_poles, poles(text, member))
     MEMBER(bandwidth_ratio, number(text, member, {0.6, 1.4}))
     MEMBER(rule, choice(text, member, 2))

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstring>
+#include <esokit/adapter/guarded.hpp>
 #include <esokit/control/control_loop.hpp>
 #include <esokit/core/snapshot.hpp>
 #include <esokit/core/unroll.hpp>
@@ -517,6 +518,22 @@ class Driver {
                                  nullptr);
                      }});
       }
+      if constexpr (requires(T & o, S s) { o.set_trust(s); }) {
+        a.push_back({"set_trust", [](Driver& d) {
+                       const S phi = d.number({0, 1});
+                       d.quietly([&] { d.object_->set_trust(phi); });
+                     }});
+        a.push_back({"set_pin", [](Driver& d) {
+                       const int where = d.tape_->choice(4);
+                       d.quietly([&] { d.object_->set_pin(static_cast<esokit::Pin>(where)); });
+                     }});
+      }
+      if constexpr (requires(T & o, S s) { o.set_input_gain(s); }) {
+        a.push_back({"set_input_gain", [](Driver& d) {
+                       const S b = config_gain(d.config_) * d.number({1e-2, 10, true});
+                       d.refusable([&] { return d.object_->set_input_gain(b); });
+                     }});
+      }
       if constexpr (requires(T & o) { o.rearm(); }) {
         a.push_back({"rearm", [](Driver& d) { d.quietly([&] { d.object_->rearm(); }); }});
       }
@@ -945,6 +962,10 @@ class Driver {
     } else if constexpr (requires(T & o, S s) {
                            { o.update(s, s) } -> std::same_as<StepStatus>;
                          }) {
+      if constexpr (requires { object_->set_trust(S(1)); }) {
+        object_->set_trust(S(1));
+        object_->set_pin(esokit::Pin::free);
+      }
       return settle([&](const S& y) { return object_->update(y, S(0)); },
                     [&](const S& y) { return distance(*object_, y); });
     } else if constexpr (requires(T & o, S s) {

@@ -1,5 +1,6 @@
 // Every observer and every adapter in its nestings; a new one joins by a line.
 #include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/guarded.hpp>
 #include <esokit/adapter/known_model.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
@@ -33,6 +34,7 @@ void add_observers(std::vector<Kind>& kinds) {
   KIND(WrappedOutput<VariableTime<DelayedInput<LinearEso<2, float>, 3>>>);
   KIND(DelayedInput<KnownModel<WrappedOutput<CascadeEso<2, 2, double>>, KnownPoles<2, double>>, 3>);
   KIND(OutlierGate<LinearEso<2, float>>);
+  KIND(Guarded<LinearEso<2, float>>);
   KIND(ModelEso<ModelParts{.order = 1, .actuator = 1, .sensor = 1, .resonators = 1}, float>);
 #ifndef ESOKIT_ONE_TYPE
   KIND(WrappedOutput<OutlierGate<VariableTime<CascadeEso<2, 2, double>>>>);
@@ -48,6 +50,7 @@ void add_observers(std::vector<Kind>& kinds) {
   KIND(WrappedOutput<AlgebraicEso<2, float>>);
   KIND(DelayedInput<WrappedOutput<NonlinearEso<2, float, 1>>, 4>);
   KIND(VariableTime<AdjustableBandwidthEso<1, double>>);
+  KIND(Guarded<WrappedOutput<CascadeEso<1, 2, double>>>);
   KIND(VariableTime<CascadeEso<2, 2, float>>);
   KIND(KnownModel<LinearEso<2, float>, KnownPoles<2, float>>);
   KIND(VariableTime<KnownModel<LinearEso<1, float>, KnownPoles<1, float>>>);

@@ -38,8 +38,11 @@ struct ExtensionOf<Observer> {
 /// and redefines or deletes what it has another answer to, or none.
 template <LoopObserver Observer>
 class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Observer> {
+  friend struct detail::GuardAccess;
   static_assert(PlainScalar<typename Observer::scalar_type>,
                 "esokit: an adapter of packs is a PackAdapter: so many of plain scalars");
+  static_assert(!observer_traits<Observer>.schedules_input_gain,
+                "esokit: Guarded goes around the other adapters: the loop asks it");
 
  public:
   using Adapted = Observer;                            ///< what is adapted

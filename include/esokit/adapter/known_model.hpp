@@ -104,6 +104,7 @@ class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
     ObserverTraits traits = Base::traits;
     traits.publishes_chain = false;
     traits.acts_by_gain = false;
+    traits.bears_guards = false;
     return traits;
   }();
 

@@ -163,6 +163,20 @@ class Adrc {
     return loop_.track(measured(y, reference), u_applied);
   }
 
+  /// The plant stands, or is carried: the observer follows y, dhat stands still, u is the
+  /// caller's; see Guarded. On release begin with the reference at y.
+  /// @param u_applied what the actuator held since the last sample @return the same
+  S hold(S y, S reference, S u_applied) noexcept
+      requires(observer_traits<Observer>.gates_disturbance) {
+    return loop_.hold(measured(y, reference), u_applied);
+  }
+
+  /// b0 of now, before the sample; see Guarded. @return as there
+  Check<S> set_input_gain(const S& b) noexcept
+      requires(observer_traits<Observer>.schedules_input_gain) {
+    return observer().set_input_gain(error_based ? S(-b) : b);
+  }
+
   /// Takes over a plant that stands at y under u, the reference being y too.
   Status start(S y, S u) noexcept { return start(y, u, y); }
 
@@ -324,11 +338,11 @@ class Adrc {
   [[nodiscard]] ESOKIT_INLINE S command(S reference) const noexcept {
     if constexpr (observer_traits<Observer>.publishes_chain) {
       if constexpr (error_based) {
-        return fast_law_.control_error_based(observer());
+        return detail::by_present_gain(observer(), fast_law_.control_error_based(observer()));
       } else {
         S error = reference - observer().template scaled_estimate<0>();
         if constexpr (wraps) error = observer().wrap(error);
-        return fast_law_.control(observer(), error);
+        return detail::by_present_gain(observer(), fast_law_.control(observer(), error));
       }
     } else {
       return command(filled(Vector<S, 1>(reference)));
@@ -338,12 +352,12 @@ class Adrc {
   [[nodiscard]] S command(Reference reference) const noexcept {
     const auto estimate = observer().estimate();
     if constexpr (error_based) {
-      return law_.control_error_based(estimate);
+      return detail::by_present_gain(observer(), law_.control_error_based(estimate));
     } else {
       if constexpr (wraps) {
         reference(0) = estimate(0) + observer().wrap(reference(0) - estimate(0));
       }
-      return law_.control(estimate, reference);
+      return detail::by_present_gain(observer(), law_.control(estimate, reference));
     }
   }
 

@@ -130,6 +130,20 @@ requires detail::WritesText<Stream> Stream& operator<<(Stream& out, LoopMode mod
   return out;
 }
 
+namespace detail {
+
+/// What was divided by the b0 of the observer's config, divided by that of now.
+template <class Observer, Scalar S>
+ESOKIT_INLINE S by_present_gain(const Observer& observer, const S& u) noexcept {
+  if constexpr (observer_traits<Observer>.schedules_input_gain) {
+    return u * observer.input_factor();
+  } else {
+    return u;
+  }
+}
+
+}  // namespace detail
+
 /// An observer, an actuator's limits, and the rules for bad days. `step` runs one sample with any
 /// law; the controllers (Adrc, DisturbanceCompensator) are this and a law.
 ///
@@ -205,11 +219,18 @@ class ControlLoop {
   /// @param u_applied what was held from k - 1 to k @return the same
   S track(S measured, S u_applied) noexcept {
     report_applied(u_applied);
-    for (int i = 0; i < lanes; ++i) {
-      if (mode(i) == LoopMode::start_hold) set_mode(LoopMode::running, i);
-    }
-    observe_specially(measured, limiter_.last());
-    requested_ = limiter_.last();
+    follow(measured, limiter_.last());
+    return limiter_.last();
+  }
+
+  /// The plant stands, or is carried, and u is someone else's: the observer follows y, dhat stands
+  /// still, see Guarded. @param u_applied what was held from k - 1 to k @return the same
+  S hold(S measured, S u_applied) noexcept requires(observer_traits<Observer>.gates_disturbance) {
+    const S trust = observer_.trust();
+    observer_.set_trust(S(0));
+    report_applied(u_applied);
+    follow(measured, observer_.standing_input());
+    observer_.set_trust(trust);
     return limiter_.last();
   }
 
@@ -319,6 +340,15 @@ class ControlLoop {
     // What stands at the actuator before the first step; of an input left out what is within the
     // limits.
     if (hold_samples > 0) limiter_.track(limiter_.within(hold_input_));
+  }
+
+  /// One sample of someone else's u.
+  void follow(S measured, S drive) noexcept {
+    for (int i = 0; i < lanes; ++i) {
+      if (mode(i) == LoopMode::start_hold) set_mode(LoopMode::running, i);
+    }
+    observe_specially(measured, drive);
+    requested_ = limiter_.last();
   }
 
   void report_applied(S u_applied) noexcept {

@@ -101,6 +101,18 @@ class DisturbanceCompensator {
   /// @param u_applied what the actuator held since the last sample @return the same
   S track(S y, S u_applied) noexcept { return loop_.track(y, u_applied); }
 
+  /// The plant stands, or is carried: the observer follows y, dhat stands still; see Guarded.
+  /// @param u_applied what the actuator held since the last sample @return the same
+  S hold(S y, S u_applied) noexcept requires(observer_traits<Observer>.gates_disturbance) {
+    return loop_.hold(y, u_applied);
+  }
+
+  /// b0 of now, before the sample; see Guarded. @return as there
+  Check<S> set_input_gain(const S& b) noexcept
+      requires(observer_traits<Observer>.schedules_input_gain) {
+    return observer().set_input_gain(b);
+  }
+
   /// Takes over a plant that stands at y under u: dhat = -b0 u.
   /// @return ok, or input_rejected or state_rejected where u or y is not finite: nothing changes
   StatusOf<S> start(S y, S u) noexcept { return loop_.start(y, u); }
@@ -178,7 +190,8 @@ class DisturbanceCompensator {
 
   /// In a step, which tests its sum with u0 anyway.
   [[nodiscard]] ESOKIT_INLINE S unbounded_compensation() const noexcept {
-    return gain_ * loop_.observer().total_disturbance();
+    return detail::by_present_gain(loop_.observer(),
+                                   S(gain_ * loop_.observer().total_disturbance()));
   }
 
   Loop loop_;

@@ -189,6 +189,9 @@ class LaneByLane : public detail::GoesLaneByLane {
   ESOKIT_EACH_LANE(revise_input)
   ESOKIT_EACH_LANE(fill_input)
   ESOKIT_EACH_LANE(rearm)
+  ESOKIT_EACH_LANE(hold)
+  ESOKIT_EACH_LANE(set_trust)
+  ESOKIT_EACH_LANE(set_pin)
 
   ESOKIT_EACH_LANE(estimate)
   ESOKIT_EACH_LANE_ROW(estimate)
@@ -212,6 +215,13 @@ class LaneByLane : public detail::GoesLaneByLane {
   ESOKIT_EACH_LANE(limit)
   ESOKIT_EACH_LANE(open)
   ESOKIT_EACH_LANE(step_time)
+  ESOKIT_EACH_LANE(trust)
+  ESOKIT_EACH_LANE(pin)
+  ESOKIT_EACH_LANE(gated)
+  ESOKIT_EACH_LANE(bounded)
+  ESOKIT_EACH_LANE(standing_input)
+  ESOKIT_EACH_LANE(input_factor)
+  ESOKIT_EACH_LANE(present_input_gain)
   ESOKIT_EACH_LANE(applied_input)
   ESOKIT_EACH_LANE(input_gain)
   ESOKIT_EACH_LANE(sample_time)
@@ -260,6 +270,14 @@ class LaneByLane : public detail::GoesLaneByLane {
   Check<S> set_step_time(const S& seconds) noexcept {
     return all_or_none(
         [&](Plain& lane, [[maybe_unused]] int i) { return lane.set_step_time(seconds[i]); });
+  }
+
+  /// From the coming sample of each lane on; all of them or none.
+  template <class P = Plain>
+  requires requires(P& lane, const LaneScalar<S>& b) { lane.set_input_gain(b); }
+  Check<S> set_input_gain(const S& b) noexcept {
+    return all_or_none(
+        [&](Plain& lane, [[maybe_unused]] int i) { return lane.set_input_gain(b[i]); });
   }
 
   /// Common to all lanes.

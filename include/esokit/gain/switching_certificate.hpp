@@ -34,9 +34,10 @@ constexpr double constexpr_sine(double x) noexcept {
   return sum;
 }
 
-/// Re[p(jw) q(-jw)] > 0 for every w, by a little more than what rounding may hide.
+/// Re[p(jw) q(-jw)] in w^2, less a little more than what rounding may hide.
 template <int Size, Scalar S>
-bool same_half_plane(const ErrorPolynomial<Size, S>& p, const ErrorPolynomial<Size, S>& q) {
+Array<S, Size + 1> half_plane_product(const ErrorPolynomial<Size, S>& p,
+                                      const ErrorPolynomial<Size, S>& q) {
   const S margin = S(8.0 * Size) * rounding<S>();
   Array<S, Size + 1> product{};
   for (S& c : product) c = S(0.0);
@@ -50,7 +51,13 @@ bool same_half_plane(const ErrorPolynomial<Size, S>& p, const ErrorPolynomial<Si
       product[power] = product[power] + signed_term - margin * absolute(term);
     }
   }
-  return positive_on_half_line<Size, S>(product);
+  return product;
+}
+
+/// Re[p(jw) q(-jw)] > 0 for every w.
+template <int Size, Scalar S>
+bool same_half_plane(const ErrorPolynomial<Size, S>& p, const ErrorPolynomial<Size, S>& q) {
+  return positive_on_half_line<Size, S>(half_plane_product<Size, S>(p, q));
 }
 
 template <int Size, Scalar S, class Gain>

@@ -22,6 +22,13 @@
 
 namespace esokit {
 
+namespace detail {
+
+/// How Guarded reaches the disturbance in an observer, through whatever adapters.
+struct GuardAccess;
+
+}  // namespace detail
+
 /// What an observer is beyond LoopObserver: `static constexpr ObserverTraits traits{..}` in it. One
 /// that declares nothing is what the defaults say.
 struct ObserverTraits {
@@ -58,6 +65,16 @@ struct ObserverTraits {
   bool rejects_outliers = false;
 
   bool blanks_estimate = false;  ///< `blanked() const`: `estimate` is an old one for now
+
+  /// A constant gain on the chain, and nothing else, moves its dhat: it may stand in Guarded.
+  bool bears_guards = false;
+
+  /// `set_input_gain(b)` while it runs, and `input_factor() const`, by which a law multiplies what
+  /// it has divided by the config's b0; see Guarded.
+  bool schedules_input_gain = false;
+
+  /// `set_trust(phi)`, `trust() const`, and `standing_input() const`, see Guarded.
+  bool gates_disturbance = false;
 };
 
 /// What an observer declares.
@@ -82,6 +99,8 @@ ESOKIT_MEMBER_NAME(fill_input)
 ESOKIT_MEMBER_NAME(set_step_time)
 ESOKIT_MEMBER_NAME(accepts)
 ESOKIT_MEMBER_NAME(blanked)
+ESOKIT_MEMBER_NAME(input_factor)
+ESOKIT_MEMBER_NAME(set_trust)
 ESOKIT_MEMBER_FUNCTION(wraps)
 ESOKIT_MEMBER_FUNCTION(fill_inputs)
 ESOKIT_MEMBER_FUNCTION(set_sample_time)
@@ -140,6 +159,17 @@ template <class O>
 concept BlanksEstimate = requires(const O& o) {
   { o.blanked() } -> std::same_as<Lanes<bool, typename O::scalar_type>>;
 };
+template <class O>
+concept SchedulesInputGain = requires(O& o, const O& constant, const typename O::scalar_type& s) {
+  { o.set_input_gain(s) } -> std::same_as<Check<typename O::scalar_type>>;
+  { constant.input_factor() } -> std::convertible_to<typename O::scalar_type>;
+};
+template <class O>
+concept GatesDisturbance = requires(O& o, const O& constant, const typename O::scalar_type& s) {
+  o.set_trust(s);
+  { constant.trust() } -> std::convertible_to<typename O::scalar_type>;
+  { constant.standing_input() } -> std::convertible_to<typename O::scalar_type>;
+};
 
 /// As `as_declared`; an adapter names what it hands on, whether what it adapts has it or not.
 template <class O>
@@ -191,6 +221,19 @@ template <class O>
 concept BlanksEstimateAsDeclared = detail::observer_as_declared<O>(
     observer_traits<O>.blanks_estimate, detail::names_blanked<O>, detail::BlanksEstimate<O>);
 
+/// `input_factor() const` and `set_input_gain(b)` are declared by `traits.schedules_input_gain`; or
+/// there are none.
+template <class O>
+concept SchedulesInputGainAsDeclared =
+    detail::observer_as_declared<O>(observer_traits<O>.schedules_input_gain,
+                                    detail::names_input_factor<O>, detail::SchedulesInputGain<O>);
+
+/// `set_trust(phi)`, `trust() const` and `standing_input() const` are declared by
+/// `traits.gates_disturbance`; or there are none.
+template <class O>
+concept GatesDisturbanceAsDeclared = detail::observer_as_declared<O>(
+    observer_traits<O>.gates_disturbance, detail::names_set_trust<O>, detail::GatesDisturbance<O>);
+
 /// No member function has a name that is nearly that of a hook; it would never be called.
 template <class O>
 concept HasNoMisspelledObserverHook =
@@ -202,7 +245,8 @@ template <class O>
 concept ObserverAsDeclared = DeclaresTraits<O, ObserverTraits> && PublishesChainAsDeclared<O> &&
     ActsByGainAsDeclared<O> && AdaptsAsDeclared<O> && WrapsOutputAsDeclared<O> &&
     DelaysInputAsDeclared<O> && VariesTimeAsDeclared<O> && GatesOutliersAsDeclared<O> &&
-    BlanksEstimateAsDeclared<O> && HasNoMisspelledObserverHook<O>;
+    BlanksEstimateAsDeclared<O> && SchedulesInputGainAsDeclared<O> &&
+    GatesDisturbanceAsDeclared<O> && HasNoMisspelledObserverHook<O>;
 
 /// A config that says b0, T and how long a gap is bridged.
 template <class Config, class S>

@@ -92,7 +92,9 @@ class PredictorCorrector {
       .acts_by_gain = gain_law_traits<Law>.kind == GainKind::preset,
       .is_predictable = Levels == 1 || gain_law_traits<Law>.kind == GainKind::preset,
       .gain_kind = gain_law_traits<Law>.kind,
-      .measures_first_row = Model::state_of_row(0) == 0};
+      .measures_first_row = Model::state_of_row(0) == 0,
+      .bears_guards = gain_law_traits<Law>.kind == GainKind::preset &&
+                      !gain_law_traits<Law>.advances && model_traits<Model>.is_chain};
 
   /// From chain settings and ready gain laws; the way in for a gain law of your own.
   /// @return error for input_gain, sample_time or max_gap out of its rule
@@ -456,6 +458,7 @@ class PredictorCorrector {
 
  private:
   friend struct detail::LaneAccess;
+  friend struct detail::GuardAccess;
   template <int OtherOrder, Scalar OtherS, int OtherExtension, class OtherLaw, int OtherLevels,
             class OtherModel>
   requires GainLaw<OtherLaw, OtherOrder + OtherExtension, OtherS> &&

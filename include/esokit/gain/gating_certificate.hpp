@@ -1,0 +1,35 @@
+/// @file
+/// Certificate for observers whose corrections of the disturbance are scaled from sample to sample.
+///
+/// With all gains but the last the error has the characteristic polynomial p_0, with the last one
+/// too p_1; a correction that counts phi times makes p_0 + phi (p_1 - p_0). By the circle criterion
+/// any phi(k) in [0, 1] is stable if Re G > -1 on the unit circle, G = (p_1 - p_0) / p_0: that is
+/// Re p_1 / p_0 > 0, the test of a pair of gain sets, at whose end p_0 has its root at z = 1 (a
+/// disturbance that is not corrected stays).
+#pragma once
+
+#include <esokit/gain/switching_certificate.hpp>
+
+namespace esokit {
+
+/// Whether the error of a sampled observer of the chain with one extended state stays bounded, by a
+/// common quadratic Lyapunov function, while corrections of the disturbance count phi(k) times, in
+/// [0, 1], however phi varies.
+/// @param gain scaled current-estimator gain
+template <int Size, Scalar S>
+[[nodiscard]] bool gating_certified(const ScaledGain<Size, S>& gain) {
+  const S unit = frequency_scale<Size, S>(gain);
+  if (!is_finite(unit) || !(unit > S(0.0))) return false;
+  ScaledGain<Size, S> frozen = gain;
+  frozen[Size - 1] = S(0.0);
+  const auto p = error_polynomial<Size, S>(gain, unit);
+  const auto q = error_polynomial<Size, S>(frozen, unit);
+  if (!is_hurwitz<Size, S>(p) || !(q[1] > S(0.0))) return false;
+  const auto product = detail::half_plane_product<Size, S>(p, q);
+  // q_0 is zero, and with it the value at standstill: what is positive is the rest, over w^2.
+  Array<S, Size> rest{};
+  for (std::size_t i = 0; i < Size; ++i) rest[i] = product[i + 1];
+  return positive_on_half_line<Size - 1, S>(rest);
+}
+
+}  // namespace esokit

@@ -1,0 +1,7 @@
+// expect: esokit: Guarded goes around the other adapters
+#include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/guarded.hpp>
+#include <esokit/observer/linear_eso.hpp>
+
+using Guard = esokit::Guarded<esokit::LinearEso<2>>;
+auto observer = esokit::DelayedInput<Guard, 3>::make({});

@@ -1,0 +1,5 @@
+// expect: esokit: Guarded is proven for constant gains on the chain of integrators
+#include <esokit/adapter/guarded.hpp>
+#include <esokit/observer/algebraic_eso.hpp>
+
+auto observer = esokit::Guarded<esokit::AlgebraicEso<2>>::make({});
