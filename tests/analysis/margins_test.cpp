@@ -323,6 +323,58 @@ TEST(Margins, OfASlowLoopAreThoseOfAFastOne) {
   }
 }
 
+// Circle criterion of the continuous loop, worked out with numpy: 1.870, 2.094, 2.489 either way
+// for n = 2 and omega_o = 2, 4, 8 omega_c; 3.162, 3.654, 4.356 for n = 1.
+TEST(Margins, GainThatVariesArbitrarilyFast) {
+  const double T = 1e-4;
+  const auto factor_of = [&](auto order, double ratio) {
+    constexpr int n = decltype(order)::value;
+    const auto plant = LinearPlant<n>::chain({.input_gain = 2.0}).value();
+    return gain_variation(plant, adrc<n>(ratio, 1.0, 2.0, T)).value().value;
+  };
+  using One = std::integral_constant<int, 1>;
+  using Two = std::integral_constant<int, 2>;
+  EXPECT_NEAR(factor_of(One{}, 2.0), 3.162, 2e-3);
+  EXPECT_NEAR(factor_of(One{}, 8.0), 4.356, 3e-3);
+  EXPECT_NEAR(factor_of(Two{}, 2.0), 1.870, 2e-3);
+  EXPECT_NEAR(factor_of(Two{}, 4.0), 2.094, 2e-3);
+  EXPECT_NEAR(factor_of(Two{}, 8.0), 2.489, 3e-3);
+
+  // Within it no sequence of gains does harm; with ten times as much one is soon found. The fewer
+  // the samples of a loop, the less is left; a lag takes from it, too.
+  const auto plant = LinearPlant<2>::chain({.input_gain = 2.0}).value();
+  const auto controller = adrc<2>(4.0, 1.0, 2.0, 0.05);
+  const double factor = gain_variation(plant, controller).value().value;
+  EXPECT_LT(factor, 2.094);
+  EXPECT_LT(gain_variation(with_lag(plant, 0.2).value(), controller).value().value, factor);
+  const auto size_after = [&](double most) {
+    double worst = 0.0;
+    for (int trial = 0; trial < 200; ++trial) {
+      Random random(static_cast<std::uint64_t>(trial));
+      auto loop = controller;
+      double y = 1.0;
+      double speed = 0.0;
+      const int length = 1 + random.index(60);
+      double gain = 2.0;
+      for (int k = 0; k < 4000; ++k) {
+        if (k % length == 0) gain = 2.0 * (random.index(2) == 0 ? most : 1.0 / most);
+        const double push = gain * loop.update(y, 0.0);
+        y += 0.05 * speed + 0.5 * 0.05 * 0.05 * push;
+        speed += 0.05 * push;
+      }
+      worst = std::max(worst, std::abs(y));
+    }
+    return worst;
+  };
+  EXPECT_LT(size_after(0.99 * factor), 1e-3);
+  EXPECT_GT(size_after(10.0 * factor), 1.0);
+  // A loop that is not stable has none.
+  const auto wrong = adrc<2>(4.0, 1.0, -2.0, 0.05);
+  EXPECT_EQ(refusal(gain_variation(plant, wrong)),
+            "stability_abscissa: must be negative: the nominal loop is not stable, it has no "
+            "margins");
+}
+
 // A gain that may neither rise nor fall: an unstable plant; and any b0 between is stable.
 TEST(Margins, RangeOfTheInputGain) {
   const double T = 0.01;

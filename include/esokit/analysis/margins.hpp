@@ -175,6 +175,51 @@ Expected<Interval<>, Error<double>> input_gain_range(const LinearPlant<States, S
   return input_gain_range(*loop);
 }
 
+/// f > 1: the loop gain at this actuator, and with it b / b0, may vary between 1/f and f times what
+/// it is, as fast and in whatever way it likes from sample to sample, and the loop is stable
+/// (circle criterion: f + 1/f < (1 + abs(L)^2) / -Re L at all frequencies). A bound that suffices:
+/// what it excludes may still be stable. Lag, delay and sensor count as far as the plant has them.
+/// @return the factor and the frequency that limits it; infinity where Re L is never negative;
+/// error for a nominal loop that is not stable, or no such channel
+inline Expected<Margin, Error<double>> gain_variation(const Loop& loop, int channel = 0) {
+  Rules<double> rules;
+  rules.all_of(loop.check_channel("channel", channel))
+      .require(loop.stable(), "stability_abscissa", loop.stability_abscissa(),
+               detail::unstable_loop_rule);
+  if (!rules) return rules.error();
+  const auto response = detail::loop_gain_of(loop, channel);
+  // Of f + 1/f.
+  const auto sum_at = [](std::complex<double> l) {
+    return l.real() < 0.0 ? (1.0 + std::norm(l)) / -l.real()
+                          : std::numeric_limits<double>::infinity();
+  };
+  const auto size = [&](double w) { return sum_at(response(w)); };
+  detail::LeastDistance least;
+  const auto look = [&](double w1, std::complex<double> l1, double w2, std::complex<double> l2) {
+    if (!least.found()) least(size, w1, sum_at(l1));
+    least(size, w2, sum_at(l2));
+  };
+  detail::scan(response, detail::scan_range(loop, channel), look);
+  Margin sum = least.found().value_or(Margin{});
+  if (loop.sample_time() > 0.0) {
+    const double at_nyquist = sum_at(response.at(-2.0));
+    if (at_nyquist < sum.value) sum = {at_nyquist, std::numbers::pi / loop.sample_time()};
+  }
+  if (!is_finite(sum.value)) return Margin{};
+  const double half = 0.5 * sum.value;
+  // Of the pair f, 1/f without a difference of nearly equal numbers; never below 1.
+  return Margin{half + std::sqrt(std::max((half - 1.0) * (half + 1.0), 0.0)), sum.frequency};
+}
+
+/// That of the loop of a plant and a controller, see `closed_loop`.
+template <int States, Scalar S, int Inputs, int Outputs, class Controller>
+Expected<Margin, Error<double>> gain_variation(const LinearPlant<States, S, Inputs, Outputs>& plant,
+                                               const Controller& controller, int channel = 0) {
+  const auto loop = closed_loop(plant, controller);
+  if (!loop) return loop.error();
+  return gain_variation(*loop, channel);
+}
+
 /// Largest singular value of the sensitivity over all frequencies, and where: by how much a
 /// disturbance at the outputs is enlarged at most. Of one channel the inverse of the modulus
 /// margin. See Loop::largest_sensitivity.
