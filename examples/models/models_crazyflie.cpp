@@ -15,6 +15,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -34,9 +35,11 @@ namespace {
 constexpr double lag = 0.072;
 constexpr double observer = 50.0;
 constexpr int delay = 4;
+constexpr double loop_swing = 2 * std::numbers::pi * 6.5;  // rad/s
 
 using Plain = DelayedInput<LinearEso<1>, 8>;
 using Motor = DelayedInput<ModelEso<ModelParts{.order = 1, .actuator = 1}>, 8>;
+using Swinging = DelayedInput<ModelEso<ModelParts{.order = 1, .actuator = 1, .resonators = 1}>, 8>;
 
 struct Log {
   std::vector<double> t, y, u;
@@ -100,13 +103,22 @@ void axis(Report& report, const std::filesystem::path& file, bool pitch, std::ve
                         .delay = delay})
         .value();
   };
-  const auto of_model = [](const Motor& eso) {
+  const auto of_model = [](const auto& eso) {
     return eso.observer().model().constant(eso.estimate());
   };
+  // Where the loop itself swings most: u has its peak there in both axes.
+  const auto swinging =
+      Swinging::make({.observer = {.observer_bandwidth = observer,
+                                   .input_gain = gain,
+                                   .sample_time = log.sample_time,
+                                   .model = {.actuator = {lag}, .resonators = {{{loop_swing}}}}},
+                      .delay = delay})
+          .value();
   const Found ignored = found(log, plain, [](const Plain& eso) { return eso.total_disturbance(); });
   const Found known = found(log, motor(lag), of_model);
   const Found too_short = found(log, motor(0.7 * lag), of_model);
   const Found too_long = found(log, motor(1.3 * lag), of_model);
+  const Found beside = found(log, swinging, of_model);
   const std::string name = pitch ? "pitch" : "roll";
   const auto line = [&](const char* what, const Found& f) {
     lines.push_back(
@@ -116,6 +128,7 @@ void axis(Report& report, const std::filesystem::path& file, bool pitch, std::ve
   line("in the model", known);
   line("model 30 % short", too_short);
   line("model 30 % long", too_long);
+  line("in the model, beside a swing of 6.5 Hz", beside);
   report.expect(name, "RMS of the innovation, of that ignored",
                 known.innovation / ignored.innovation, known.innovation < 0.8 * ignored.innovation,
                 "below 0.8");

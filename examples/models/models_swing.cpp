@@ -48,6 +48,15 @@ double load(double angle) { return 2 * std::sin(angle) + std::sin(2 * angle + 1)
 /// w, from 40 up to 160 rad/s and down again.
 double speed(double t) { return 100 - 60 * std::cos(2 * std::numbers::pi * t / 8); }
 
+/// Margins of a loop on a double integrator, omega_c a quarter of omega_o.
+template <class Observer>
+Price loop_of(const typename Observer::Config& config) {
+  const auto plant = LinearPlant<2>::chain({.input_gain = 1.0}).value();
+  return price_of(
+      plant,
+      Adrc<Observer>::make({.observer = config, .controller_bandwidth = observer / 4}).value());
+}
+
 struct Tracked {
   std::vector<double> t, off;
   double rms = 0;
@@ -88,6 +97,11 @@ Tracked tracked(Observer eso, double noise, const Tell& tell) {
   return result;
 }
 
+Chain::Config chain_config(double bandwidth) {
+  return {.observer_bandwidth = bandwidth, .input_gain = 1.0, .sample_time = sample_time};
+}
+Chain chain_eso(double bandwidth) { return Chain::make(chain_config(bandwidth)).value(); }
+
 template <class Eso>
 typename Eso::Config config_of() {
   return {.observer_bandwidth = observer,
@@ -98,30 +112,36 @@ typename Eso::Config config_of() {
 
 void cogging(Report& report) {
   auto config = config_of<Following>();
-  config.model.speed = {0.4, 2.2};
+  config.model.speed = {0.4, 2.7};
   const auto following = Following::make(config).value();
   const auto nothing = [](auto&, double) {};
   const auto told = [](double wrong) {
     return [wrong](Following& eso, double w) { (void)eso.set_speed(wrong * w / design_speed); };
   };
-  const auto chain =
-      Chain::make({.observer_bandwidth = observer, .input_gain = 1.0, .sample_time = sample_time})
-          .value();
+  const auto chain = chain_eso(observer);
   const auto fixed = Fixed::make(config_of<Fixed>()).value();
   std::vector<CsvRow> lines;
-  const auto show = [&](const char* name, const auto& eso, const auto& tell) {
+  const auto show = [&](const char* name, const auto& eso, const auto& tell, const Price& price) {
     const Tracked exact = tracked(eso, 0.0, tell);
     const Tracked noisy = tracked(eso, 1e-5, tell);
     lines.push_back(
         {name, number_text(exact.rms, 2),
-         number_text(std::sqrt(std::max(0.0, noisy.rms * noisy.rms - exact.rms * exact.rms)), 2)});
+         number_text(std::sqrt(std::max(0.0, noisy.rms * noisy.rms - exact.rms * exact.rms)), 2),
+         or_unstable(price.modulus, 2), or_unstable(1000 * price.delay, 2)});
     return exact;
   };
-  const Tracked none = show("no model of it", chain, nothing);
-  const Tracked middle = show("resonators at the middle speed", fixed, nothing);
-  const Tracked right = show("resonators that follow the speed", following, told(1.0));
-  const Tracked wrong = show("the speed told 5 % too high", following, told(1.05));
-  const Tracked far = show("the speed told 30 % too high", following, told(1.3));
+  const auto loop_at = [](double factor) {
+    auto shifted = config_of<Fixed>();
+    for (auto& resonance : shifted.model.resonators) resonance.frequency *= factor;
+    return loop_of<Fixed>(shifted);
+  };
+  const Price resonating = loop_at(1.0);
+  const Tracked none =
+      show("no model of it", chain, nothing, loop_of<Chain>(chain_config(observer)));
+  const Tracked middle = show("resonators at the middle speed", fixed, nothing, resonating);
+  const Tracked right = show("resonators that follow the speed", following, told(1.0), resonating);
+  const Tracked wrong = show("the speed told 5 % too high", following, told(1.05), loop_at(1.05));
+  const Tracked far = show("the speed told 30 % too high", following, told(1.3), loop_at(1.3));
   const double size = std::sqrt(2.5);
   report.expect("cogging", "share of the load left, no model", none.rms / size,
                 none.rms > 0.3 * size, "above 0.3");
@@ -131,10 +151,20 @@ void cogging(Report& report) {
                 wrong.rms < none.rms, "still better");
   report.expect("cogging", "30 % wrong, of that without a model", far.rms / none.rms,
                 far.rms > 0.3 * none.rms, "most of the gain is gone");
-  Figure figure("cogging", {.rows = 1, .columns = 1, .panel_height = 260});
+  Figure figure("cogging", {.rows = 2, .columns = 1, .panel_height = 220});
   figure.caption(
       "What dhat is off by while the speed goes from 40 to 160 rad/s and back in 8 s, the cogging "
-      "torque of the shaft's angle and its second harmonic with it. omega_o = 60 rad/s.");
+      "torque of the shaft's angle and its second harmonic with it. omega_o = 60 rad/s. Below: a "
+      "speed told wrong.");
+  figure.panel(1, 0)
+      .x_label("t (s)")
+      .y_label("dhat − d (rad/s^2)")
+      .legend(Legend::above)
+      .name("wrong")
+      .line(far.t, far.off,
+            {.name = "speed 30 % too high", .color = Color::vermillion, .width = 0.8})
+      .line(wrong.t, wrong.off, {.name = "5 % too high", .color = Color::sky, .width = 0.8})
+      .line(right.t, right.off, {.name = "right", .color = Color::blue, .width = 1.2});
   figure.panel(0, 0)
       .x_label("t (s)")
       .y_label("dhat − d (rad/s^2)")
@@ -144,10 +174,12 @@ void cogging(Report& report) {
       .line(middle.t, middle.off, {.name = "middle speed", .color = Color::orange, .width = 0.8})
       .line(right.t, right.off, {.name = "following", .color = Color::blue, .width = 1.2});
   report.add(figure);
-  report.table("cogging",
-               "RMS of dhat - d after 1 s: what the motion leaves, and what noise of 10 "
-               "urad on the angle adds",
-               {"observer", "motion (rad/s2)", "noise (rad/s2)"}, lines);
+  report.table(
+      "cogging",
+      "RMS of dhat - d after 1 s: what the motion leaves, and what noise of 10 "
+      "urad on the angle adds; margins of a loop at 80 rad/s with omega_c = 15 rad/s",
+      {"observer", "motion (rad/s2)", "noise (rad/s2)", "modulus margin", "delay margin (ms)"},
+      lines);
 }
 
 /// sd of dhat for noise of 1 on y.
@@ -167,18 +199,14 @@ double left_over(const Observer& eso, double w) {
   return std::abs(1.0 - early * frequency_response(system, w).value()(0, 0));
 }
 
-Ripple ripple_eso(double w, double capture) {
-  return Ripple::make({.observer_bandwidth = observer,
-                       .input_gain = 1.0,
-                       .sample_time = sample_time,
-                       .model = {.resonators = {{{w, 0.0, capture}}}}})
-      .value();
+Ripple::Config ripple_config(double w, double capture) {
+  return {.observer_bandwidth = observer,
+          .input_gain = 1.0,
+          .sample_time = sample_time,
+          .model = {.resonators = {{{w, 0.0, capture}}}}};
 }
-
-Chain chain_eso(double bandwidth) {
-  return Chain::make(
-             {.observer_bandwidth = bandwidth, .input_gain = 1.0, .sample_time = sample_time})
-      .value();
+Ripple ripple_eso(double w, double capture) {
+  return Ripple::make(ripple_config(w, capture)).value();
 }
 
 /// A chain that lets so much noise into dhat.
@@ -220,11 +248,13 @@ void ripple(Report& report) {
     const double w = share * observer;
     const auto eso = ripple_eso(w, 0);
     const double beside = left_over(eso, 1.02 * w);
+    const Price price = loop_of<Ripple>(ripple_config(w, 0));
     lines.push_back({number_text(w, 3), number_text(noise_of(eso) / quiet, 2),
                      number_text(left_over(eso, w), 1), number_text(100 * beside, 2),
                      number_text(100 * left_over(eso, 1.3 * w), 2),
                      number_text(100 * left_over(chain, w), 2),
-                     number_text(100 * left_over(chain_of_noise(noise_of(eso)), w), 2)});
+                     number_text(100 * left_over(chain_of_noise(noise_of(eso)), w), 2),
+                     or_unstable(price.modulus, 2), or_unstable(1000 * price.delay, 2)});
     const std::string name = "ripple at omega_o times " + number_text(share, 2);
     // The held sine is smaller by (w T)^2 / 24.
     const double hold = w * sample_time * w * sample_time / 24;
@@ -238,9 +268,10 @@ void ripple(Report& report) {
   report.table(
       "ripple",
       "A resonator with s = w0 beside the chain, omega_o = 60 rad/s: noise of dhat, and what is "
-      "left of a sine at, 2 % and 30 % beside the frequency it was made for",
+      "left of a sine at, 2 % and 30 % beside the frequency it was made for; margins of the loop "
+      "with the resonator, omega_c = 15 rad/s",
       {"w0 (rad/s)", "noise, chain = 1", "left at w0", "2 % beside (%)", "30 % beside (%)",
-       "chain (%)", "chain of equal noise (%)"},
+       "chain (%)", "chain of equal noise (%)", "modulus margin", "delay margin (ms)"},
       lines);
 
   Figure figure("ripple", {.rows = 1, .columns = 1, .panel_height = 260});

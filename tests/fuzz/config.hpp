@@ -167,7 +167,29 @@ class Filler {
     }
   }
 
-  /// The numbers of an AugmentedModel's parts.
+  /// (A, B, C, E) of a plant of relative degree `order_` whose states couple as those of a chain,
+  /// what feeds back slower than a sample; with zeros, and d elsewhere than u.
+  template <class Plant>
+  void plant(Plant& plant) {
+    constexpr int states = Plant::states;
+    const auto T = time();
+    plant.c(0) = 1;
+    for (int i = 0; i < states; ++i) {
+      for (int j = 0; j <= i; ++j) {
+        const double slow = std::pow(0.01 / T, i - j + 1);
+        number("model.plant.a", plant.a(i, j), {-slow, slow});
+      }
+      if (i + 1 < states) plant.a(i, i + 1) = 1;
+      const double fast = std::pow(0.05 / T, i - order_ + 1);
+      if (i + 1 == order_) number("model.plant.b", plant.b(i), {0.5, 2, true, true});
+      if (i + 1 > order_) number("model.plant.b", plant.b(i), {-fast, fast});
+      const double size = std::pow(0.05 / T, i - states + 1);
+      number("model.plant.e", plant.e(i),
+             i + 1 < states ? Range{-size, size} : Range{0.5, 2, true});
+    }
+  }
+
+  /// The numbers of an AugmentedModel's or LinearPlantModel's parts.
   template <class Settings>
   void parts(Settings& model) {
     const auto T = time();
@@ -178,11 +200,15 @@ class Filler {
         number(name, part.frequency, {0.02 / T, 1 / T, true});
       }
     };
-    lag(model.actuator, "model.actuator");
     lag(model.sensor, "model.sensor");
-    for (std::size_t i = 0; i < model.plant.size(); ++i) {
-      const double slow = std::pow(0.01 / T, static_cast<int>(model.plant.size() - i));
-      number("model.plant", model.plant[i], {-slow, slow});
+    if constexpr (requires { model.plant.dead_time; }) {
+      plant(model.plant);
+    } else {
+      lag(model.actuator, "model.actuator");
+      for (std::size_t i = 0; i < model.plant.size(); ++i) {
+        const double slow = std::pow(0.01 / T, static_cast<int>(model.plant.size() - i));
+        number("model.plant", model.plant[i], {-slow, slow});
+      }
     }
     for (auto& resonance : model.resonators) {
       number("model.resonators", resonance.frequency, {0.02 / T, 0.5 / T, true});

@@ -39,6 +39,7 @@ void add_observers(std::vector<Kind>& kinds) {
 #ifndef ESOKIT_ONE_TYPE
   KIND(WrappedOutput<OutlierGate<VariableTime<CascadeEso<2, 2, double>>>>);
   KIND(LinearEso<1, float>);
+  KIND(PlantEso<3, ModelParts{.order = 2, .sensor = 1, .resonators = 1}, double>);
   KIND(LinearEso<2, long double>);
   KIND(CascadeEso<2, 3, float>);
   KIND(HalfGainEso<2, float>);

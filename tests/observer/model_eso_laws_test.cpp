@@ -1,5 +1,5 @@
-// The law suite on ModelEso, with known plant poles and with a disturbance that swings; gaps, and
-// snapshots.
+// The law suite on ModelEso, with known plant poles and with a disturbance that swings, and on
+// PlantEso, with a zero and a disturbance that enters elsewhere; gaps, and snapshots.
 #include "law_suite.hpp"
 //
 #include <algorithm>
@@ -11,16 +11,27 @@ namespace esokit_test {
 
 inline constexpr esokit::ModelParts plant_parts{.order = 2, .plant_poles = true};
 inline constexpr esokit::ModelParts swing_parts{.order = 2, .resonators = 1};
+inline constexpr esokit::ModelParts zero_parts{.order = 1};
+
+template <class S>
+using WithPoles = esokit::ModelEso<plant_parts, S>;
+template <class S>
+using WithSwing = esokit::ModelEso<swing_parts, S>;
+template <class S>
+using WithZero = esokit::PlantEso<2, zero_parts, S>;
 
 /// The frequency of the model is half the observer's bandwidth, and 10 rad/s at most, so that a
 /// retune from 50 to 150 rad/s keeps the model. All poles decay with the bandwidth.
-template <esokit::ModelParts Parts, class S>
+template <template <class> class Of, class S>
 struct ModelTraitsOf {
-  using Observer = esokit::ModelEso<Parts, S>;
-  using Model = esokit::AugmentedModel<Parts, S>;
+  using Observer = Of<S>;
+  using Model = typename Observer::PlantModel;
+  static constexpr esokit::ModelParts parts = Model::parts;
+  /// It is a LinearPlant.
+  static constexpr bool whole_plant = std::is_same_v<Observer, WithZero<S>>;
   using Config = typename Observer::Config;
   template <class T>
-  using Rebind = esokit::ModelEso<Parts, T>;
+  using Rebind = Of<T>;
   static constexpr const char* field = "observer_bandwidth";
   static constexpr double slowest = 1;
   static constexpr double fastest = 1;
@@ -32,10 +43,18 @@ struct ModelTraitsOf {
                   .max_gap = max_gap};
     // A config that is to be refused for its bandwidth has a good model.
     const double w = omega > 0 ? std::min(omega / 2, 10.0) : 10.0;
-    if constexpr (Parts.plant_poles) {
+    if constexpr (whole_plant) {
+      const auto rate = static_cast<S>(w);
+      auto& plant = config.model.plant;
+      plant.a = {{-rate / S(2), S(1)}, {S(0), -rate}};
+      plant.b = {S(1), rate / S(4)};
+      plant.c = {S(1), S(0)};
+      plant.e = {S(1) / S(8), rate};
+    }
+    if constexpr (parts.plant_poles) {
       config.model.plant = {static_cast<S>(w * w), static_cast<S>(w)};
     }
-    if constexpr (Parts.resonators > 0) {
+    if constexpr (parts.resonators > 0) {
       config.model.resonators = {{{.frequency = static_cast<S>(w),
                                    .capture_bandwidth = static_cast<S>(omega > 0 ? omega : w)}}};
     }
@@ -44,7 +63,11 @@ struct ModelTraitsOf {
   static constexpr int degree(int row) { return Model::degree(Model::state_of_row(row)); }
   static double unknown_amplitude(const Config& config, double nu) {
     double sum = nu * nu;
-    if constexpr (Parts.plant_poles) {
+    // y' = -w / 2 y + x_2 + d / 8, all three of them found.
+    if constexpr (whole_plant) {
+      return 3 * (nu + std::abs(static_cast<double>(config.model.plant.a(1, 1))));
+    }
+    if constexpr (parts.plant_poles) {
       sum += std::abs(static_cast<double>(config.model.plant[0])) +
              std::abs(static_cast<double>(config.model.plant[1])) * nu;
     }
@@ -72,13 +95,14 @@ struct ModelTraitsOf {
 };
 
 template <class S>
-struct ObserverTraits<esokit::ModelEso<plant_parts, S>> : ModelTraitsOf<plant_parts, S> {};
+struct ObserverTraits<esokit::ModelEso<plant_parts, S>> : ModelTraitsOf<WithPoles, S> {};
 template <class S>
-struct ObserverTraits<esokit::ModelEso<swing_parts, S>> : ModelTraitsOf<swing_parts, S> {};
+struct ObserverTraits<esokit::ModelEso<swing_parts, S>> : ModelTraitsOf<WithSwing, S> {};
+template <class S>
+struct ObserverTraits<esokit::PlantEso<2, zero_parts, S>> : ModelTraitsOf<WithZero, S> {};
 
-using ModelTypes =
-    TypeList<esokit::ModelEso<swing_parts>, esokit::ModelEso<plant_parts>,
-             esokit::ModelEso<swing_parts, float>, esokit::ModelEso<plant_parts, float>>;
+using ModelTypes = TypeList<WithSwing<double>, WithPoles<double>, WithZero<double>,
+                            WithSwing<float>, WithPoles<float>, WithZero<float>>;
 const bool registered = register_laws<ObserverLaws>("ModelEso", ModelTypes{});
 
 /// What ModelGain promises of a gap: one correction in M, for ever, lets every error decay by at
@@ -124,6 +148,7 @@ TEST(ModelEso, RecurringGapsDecayUpToTheLongestThatIsBridged) {
   recurring_gaps_decay<esokit::ModelEso<plant_parts>>();
   recurring_gaps_decay<esokit::ModelEso<swing_parts, float>>();
   recurring_gaps_decay<esokit::ModelEso<plant_parts, float>>();
+  recurring_gaps_decay<WithZero<double>>();
 }
 
 /// As `snapshot` saved it, with all that is to come the same bit for bit, in the middle of a gap
@@ -175,6 +200,7 @@ TEST(ModelEsoSnapshot, ContinuesBitForBit) {
   round_trip<esokit::ModelEso<plant_parts>>();
   round_trip<esokit::ModelEso<swing_parts, float>>();
   round_trip<esokit::ModelEso<plant_parts, float>>();
+  round_trip<WithZero<double>>();
 }
 
 TEST(ModelEsoSnapshot, OfOtherPartsIsRefused) {
