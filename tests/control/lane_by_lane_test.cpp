@@ -23,6 +23,7 @@
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/mimo_extended_state_filter.hpp>
+#include <esokit/observer/model_eso.hpp>
 #include <string>
 #include <support/lanes.hpp>
 #include <tuple>
@@ -91,12 +92,47 @@ struct Guards {
   }
 };
 
+/// Friction that grows with the square of the speed.
+template <class T>
+struct Drag {
+  template <class U>
+  using with_scalar = Drag<U>;
+  T factor{};
+  static constexpr auto fields(auto& m) noexcept { return esokit::detail::tie(m.factor); }
+  T operator()(const Vector<T, 2>& x) const noexcept {
+    return T(-1.0) * factor * x(0) * esokit::detail::absolute(x(0));
+  }
+};
+
 struct KnownVarying {
   template <class T>
-  using Type = esokit::VariableTime<esokit::KnownModel<LinearEso<1, T>, esokit::KnownPoles<1, T>>>;
+  using Type = esokit::VariableTime<esokit::KnownModel<LinearEso<1, T>, Drag<T>>>;
   template <class T>
   static typename Type<T>::Config config(int lane, bool again) {
-    return {.observer = {.observer = linear<T>(lane, again), .model = {{set<T>(lane, again, 3)}}}};
+    return {.observer = {.observer = linear<T>(lane, again), .model = {set<T>(lane, again, 3)}}};
+  }
+};
+
+/// All parts, of a lag of second order the damping that is left out.
+struct Modelled {
+  static constexpr esokit::ModelParts parts{
+      .order = 1, .plant_poles = true, .actuator = 1, .sensor = 2, .resonators = 1, .leaky = 1};
+  template <class T>
+  using Type = esokit::ModelCascadeEso<parts, 2, T>;
+  template <class T>
+  static typename Type<T>::Config config(int lane, bool again) {
+    typename Type<T>::Config config{};
+    config.observer_bandwidth = set<T>(lane, again, 20);
+    config.bandwidth_factor = T(1.5);
+    config.input_gain = set<T>(lane, again, -2);
+    config.sample_time = set<T>(lane, false, 0.01);
+    config.model.plant = {set<T>(lane, again, 3)};
+    config.model.actuator.time_constant = set<T>(lane, again, 0.05);
+    config.model.sensor.frequency = set<T>(lane, again, 40);
+    config.model.resonators[0].frequency = set<T>(lane, again, 15);
+    config.model.leaky[0] = set<T>(lane, again, 0.5);
+    config.max_gap = 4;
+    return config;
   }
 };
 
@@ -329,6 +365,8 @@ TEST(LaneByLane, AKnownModelInVariableTime) {
     return std::tuple_cat(observe(o, x, k), std::tuple(o.step_time()));
   });
 }
+
+TEST(LaneByLane, ACascadeWithAModel) { expect_lanes<Modelled>(observe); }
 
 const auto control = [](auto& c, const auto& x, int k) {
   if (k % 113 == 50) (void)c.start(x[0], x[1]);

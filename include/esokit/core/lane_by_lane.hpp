@@ -280,11 +280,15 @@ class LaneByLane : public detail::GoesLaneByLane {
         [&](Plain& lane, [[maybe_unused]] int i) { return lane.set_input_gain(b[i]); });
   }
 
-  /// Common to all lanes.
+  /// What all lanes bridge: with a model a lane may bridge more.
   [[nodiscard]] int max_gap() const noexcept requires requires(const Plain& lane) {
     lane.max_gap();
   }
-  { return lanes_[0].max_gap(); }
+  {
+    int most = lanes_[0].max_gap();
+    for (const Plain& lane : lanes_) most = lane.max_gap() < most ? lane.max_gap() : most;
+    return most;
+  }
   /// Common to all lanes.
   [[nodiscard]] int delay() const noexcept requires requires(const Plain& lane) { lane.delay(); }
   { return lanes_[0].delay(); }

@@ -108,13 +108,35 @@ constexpr S factorial_ratio(int a, int b) noexcept {
 }  // namespace detail
 
 /// How far the frequencies may go from what they are given as, as factors.
-template <bool Follows, PlainScalar S>
+template <bool Follows, Scalar S>
 struct SpeedRange {};
 /// As factors.
-template <PlainScalar S>
+template <Scalar S>
 struct SpeedRange<true, S> {
   S lowest{};   ///< above 0, 1 at most
   S highest{};  ///< 1 or more
+
+  /// @cond
+  static constexpr auto fields(auto& r) noexcept { return detail::tie(r.lowest, r.highest); }
+  /// @endcond
+};
+
+/// The numbers of the parts of an AugmentedModel, in this order; those of a part that is not there
+/// are empty.
+template <ModelParts Parts, Scalar S>
+struct PartsSettings {
+  Array<S, Parts.plant_poles ? Parts.order : 0> plant{};  ///< a_0 .. a_(n-1), 1/s^(n-i)
+  Lag<Parts.actuator, S> actuator{};                      ///< from u to v
+  Lag<Parts.sensor, S> sensor{};                          ///< from y to what is measured
+  Array<Resonance<S>, Parts.resonators> resonators{};     ///< the sines
+  Array<S, Parts.leaky> leaky{};                          ///< time constants of what fades, s
+  SpeedRange<Parts.follows_speed, S> speed{};             ///< of the resonators
+
+  /// @cond
+  static constexpr auto fields(auto& s) noexcept {
+    return detail::tie(s.plant, s.actuator, s.sensor, s.resonators, s.leaky, s.speed);
+  }
+  /// @endcond
 };
 
 /// Plant, actuator, sensor and disturbance as one model, sampled exactly:
@@ -133,7 +155,7 @@ struct SpeedRange<true, S> {
 /// Poles: the actuator is simulated from u alone and never corrected, its poles stay its own; a
 /// sensor that is faster than omega_o keeps its own too; those of a sine go to -s +- j w0; all
 /// others to exp(-omega_o T).
-template <ModelParts Parts, PlainScalar S = double>
+template <ModelParts Parts, Scalar S = double>
 class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   using Base = MatrixModel<detail::PartsShape<Parts>, S>;
   using Base::couples;
@@ -171,15 +193,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   template <class T>
   using with_scalar = AugmentedModel<Parts, T>;  ///< the same of another scalar
 
-  /// The numbers of the parts, in this order; those of a part that is not there are empty.
-  struct Settings {
-    Array<S, Parts.plant_poles ? n : 0> plant{};         ///< a_0 .. a_(n-1), 1/s^(n-i)
-    Lag<la, S> actuator{};                               ///< from u to v
-    Lag<lf, S> sensor{};                                 ///< from y to what is measured
-    Array<Resonance<S>, Parts.resonators> resonators{};  ///< the sines
-    Array<S, Parts.leaky> leaky{};                       ///< time constants of what fades, s
-    SpeedRange<Parts.follows_speed, S> speed{};          ///< of the resonators
-  };
+  using Settings = PartsSettings<Parts, S>;  ///< of make
 
   /// Checks the settings and samples the model.
   /// @param settings what is known @param input_gain b0, unit of y^(n) per unit of v
@@ -308,7 +322,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   }
 
  private:
-  template <ModelParts Other, PlainScalar T>
+  template <ModelParts Other, Scalar T>
   friend class AugmentedModel;
 
   static constexpr ModelParts without(bool actuator, bool sensor) noexcept {
@@ -509,8 +523,22 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   S speed_ = S(1);  ///< factor of the frequencies
 };
 
+/// Of packs: what its numbers are. An observer of packs with a model has one model a lane.
+template <ModelParts Parts, PackScalar S>
+class AugmentedModel<Parts, S> {
+  using Plain = AugmentedModel<Parts, LaneScalar<S>>;
+
+ public:
+  static constexpr int order = Plain::order;            ///< of the law
+  static constexpr int extension = Plain::extension;    ///< all beside the plant's rows
+  static constexpr ModelTraits traits = Plain::traits;  ///< what it is
+  using Settings = PartsSettings<Parts, S>;             ///< of make
+  template <class T>
+  using with_scalar = AugmentedModel<Parts, T>;  ///< the same of another scalar
+};
+
 /// Told apart in snapshots.
-template <ModelParts Parts, PlainScalar S>
+template <ModelParts Parts, Scalar S>
 inline constexpr std::uint32_t type_tag<AugmentedModel<Parts, S>> =
     make_type_tag<S>("AugmentedModel", Parts.order, Parts.plant_poles, Parts.actuator, Parts.sensor,
                      Parts.constants, Parts.resonators, Parts.leaky, Parts.follows_speed);

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <esokit/core/check.hpp>
+#include <esokit/core/lanes.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/scalar.hpp>
 #include <esokit/math/dense.hpp>
@@ -25,35 +26,49 @@ struct ModelParts {
 };
 
 /// A lag by which an actuator or a sensor follows; of order 0 nothing.
-template <int Order, PlainScalar S>
+template <int Order, Scalar S>
 struct Lag {};
 
 /// tau v' = u - v.
-template <PlainScalar S>
+template <Scalar S>
 struct Lag<1, S> {
   S time_constant{};  ///< tau, s
+
+  /// @cond
+  static constexpr auto fields(auto& l) noexcept { return detail::tie(l.time_constant); }
+  /// @endcond
 };
 
 /// v'' = w^2 (u - v) - 2 zeta w v'.
-template <PlainScalar S>
+template <Scalar S>
 struct Lag<2, S> {
-  S frequency{};  ///< w, rad/s
-  S damping = 1;  ///< zeta; 1: two equal time constants 1 / w
+  S frequency{};       ///< w, rad/s
+  S damping = S(1.0);  ///< zeta; 1: two equal time constants 1 / w
 
   /// Of two time constants, s.
   static Lag of_time_constants(const S& first, const S& second) noexcept {
     const S root = std::sqrt(first * second);
     return {S(1) / root, (first + second) / (S(2) * root)};
   }
+
+  /// @cond
+  static constexpr auto fields(auto& l) noexcept { return detail::tie(l.frequency, l.damping); }
+  /// @endcond
 };
 
 /// A disturbance that swings at a known frequency.
-template <PlainScalar S>
+template <Scalar S>
 struct Resonance {
   S frequency{};          ///< w0, rad/s
-  S damping = 0;          ///< of the swing, 0 up to 1
+  S damping{};            ///< of the swing, 0 up to 1
   S capture_bandwidth{};  ///< s, rad/s: its poles go to -s +- j w0. Left out: w0. More captures it
                           ///< faster, and with more error in its frequency, at more noise
+
+  /// @cond
+  static constexpr auto fields(auto& r) noexcept {
+    return detail::tie(r.frequency, r.damping, r.capture_bandwidth);
+  }
+  /// @endcond
 };
 
 /// A sine by its size and where it is: q = amplitude sin(phase).

@@ -2,6 +2,7 @@
 /// The linear observer and the cascade with a model put together from parts.
 #pragma once
 
+#include <esokit/core/lane_by_lane.hpp>
 #include <esokit/gain/model_gain.hpp>
 #include <esokit/gain/scheduled_gain.hpp>
 #include <esokit/model/augmented_model.hpp>
@@ -11,6 +12,64 @@
 
 namespace esokit {
 
+namespace detail {
+
+/// An observer of packs with a model: one a lane, each with the gaps that its model bears.
+template <class Self, class Plain, PackScalar S, class Settings>
+class ModelLanes : public LaneByLane<Self, Plain, S, Settings> {
+ public:
+  static constexpr int order = Plain::order;          ///< n, order of the plant
+  static constexpr int extension = Plain::extension;  ///< all beside the plant's rows
+  static constexpr int size = Plain::size;            ///< N
+  static constexpr int levels = Plain::levels;        ///< p
+  using Estimate = Vector<S, size>;                   ///< (y, .., y^(n-1), d, ..), N x 1
+
+  /// What it is beyond LoopObserver; that it is analysed, or told ahead, is a lane's.
+  static constexpr ObserverTraits traits = [] {
+    ObserverTraits traits = Plain::traits;
+    traits.acts_by_gain = false;
+    traits.is_predictable = false;
+    return traits;
+  }();
+
+  using ModelLanes::LaneByLane::LaneByLane;
+};
+
+}  // namespace detail
+
+/// With a model, of packs.
+template <int Order, PackScalar S, int Extension, class Placement, class Model>
+requires(!model_traits<Model>.is_chain)  //
+    class LinearEso<Order, S, Extension, Placement, Model>
+    : public detail::ModelLanes<
+          LinearEso<Order, S, Extension, Placement, Model>,
+          LinearEso<Order, LaneScalar<S>, Extension, Placement,
+                    detail::WithScalar<Model, LaneScalar<S>>>,
+          S, LinearEsoConfig<Order + Extension, S, Placement, typename Model::Settings>> {
+ public:
+  using LinearEso::ModelLanes::ModelLanes;
+  /// The same of another scalar.
+  template <class T>
+  using with_scalar = LinearEso<Order, T, Extension, Placement, detail::WithScalar<Model, T>>;
+};
+
+/// With a model, of packs.
+template <int Order, int Levels, PackScalar S, int Extension, class Placement, class Model>
+requires(!model_traits<Model>.is_chain)  //
+    class CascadeEso<Order, Levels, S, Extension, Placement, Model>
+    : public detail::ModelLanes<
+          CascadeEso<Order, Levels, S, Extension, Placement, Model>,
+          CascadeEso<Order, Levels, LaneScalar<S>, Extension, Placement,
+                     detail::WithScalar<Model, LaneScalar<S>>>,
+          S, CascadeEsoConfig<Order + Extension, Levels, S, Placement, typename Model::Settings>> {
+ public:
+  using CascadeEso::ModelLanes::ModelLanes;
+  /// The same of another scalar.
+  template <class T>
+  using with_scalar =
+      CascadeEso<Order, Levels, T, Extension, Placement, detail::WithScalar<Model, T>>;
+};
+
 /// LinearEso that knows actuator, sensor, plant poles or what the disturbance swings at:
 ///
 ///     using Eso = ModelEso<ModelParts{.order = 1, .actuator = 1}>;
@@ -18,12 +77,12 @@ namespace esokit {
 ///                           .model = {.actuator = {.time_constant = 0.02}}});
 ///
 /// Adrc<Eso> has the order of plant and actuator together. See AugmentedModel.
-template <ModelParts Parts, PlainScalar S = double, class Placement = EqualPoles>
+template <ModelParts Parts, Scalar S = double, class Placement = EqualPoles>
 using ModelEso = LinearEso<AugmentedModel<Parts, S>::order, S, AugmentedModel<Parts, S>::extension,
                            Placement, AugmentedModel<Parts, S>>;
 
 /// CascadeEso that knows the same.
-template <ModelParts Parts, int Levels, PlainScalar S = double, class Placement = EqualPoles>
+template <ModelParts Parts, int Levels, Scalar S = double, class Placement = EqualPoles>
 using ModelCascadeEso =
     CascadeEso<AugmentedModel<Parts, S>::order, Levels, S, AugmentedModel<Parts, S>::extension,
                Placement, AugmentedModel<Parts, S>>;
