@@ -6,7 +6,6 @@
 #include <cmath>
 #include <control/loop_traits.hpp>
 #include <esokit/adapter/delayed_input.hpp>
-#include <esokit/adapter/known_model.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
@@ -18,6 +17,7 @@
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <limits>
+#include <support/friction.hpp>
 #include <support/numbers.hpp>
 #include <support/refusal.hpp>
 
@@ -82,7 +82,7 @@ TEST(OutlierGate, OutlierIsAMissingSample) {
       {.shape = {.gain_alpha = 0.75, .alpha = 1, .gain_beta = 0.25, .beta = 1}});
   outlier_is_a_missing_sample<DelayedInput<LinearEso<2>, 3>>({.delay = 2});
   outlier_is_a_missing_sample<VariableTime<LinearEso<2>>>({});
-  outlier_is_a_missing_sample<KnownModel<LinearEso<2>, KnownPoles<2>>>({.model = {{1, 2}}});
+  outlier_is_a_missing_sample<KnownModel<LinearEso<2>, Friction<1, double>>>({.model = {2}});
 }
 
 /// Inside of WrappedOutput: an axis that turns by a sixth of a turn a sample is no outlier, one

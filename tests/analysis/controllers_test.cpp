@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <esokit/adapter/known_model.hpp>
 #include <esokit/analysis/loop.hpp>
 #include <esokit/gain/model_gain.hpp>
 #include <esokit/gain/pole_set.hpp>
@@ -193,20 +194,20 @@ TEST(LinearController, OfAGainThatHasSettled) {
   expect_adrc<ExtendedStateFilter<1>>(filter, 1e-9, 3000);
 }
 
+using Poles = ModelEso<ModelParts{.order = 2, .plant_poles = true}>;
+
 TEST(LinearController, OfEveryAdapter) {
   for (const int delay : {0, 1, 3}) {
     SCOPED_TRACE(delay);
     expect_adrc<DelayedInput<LinearEso<2>, 3>>({.observer = linear, .delay = delay});
   }
-  const KnownPoles<2> poles{{30.0, 4.0}};
-  expect_adrc<KnownModel<LinearEso<2>, KnownPoles<2>>>({.observer = linear, .model = poles});
-  expect_adrc<KnownModel<LinearEso<2>, KnownPoles<2>>, ErrorBased>(
-      {.observer = linear, .model = poles});
-  expect_adrc<DelayedInput<KnownModel<LinearEso<2>, KnownPoles<2>>, 2>>(
-      {.observer = {.observer = linear, .model = poles}, .delay = 2});
+  const Poles::Config poles{
+      .observer_bandwidth = 20.0, .input_gain = 2.5, .sample_time = T, .model = {{30.0, 4.0}}};
+  expect_adrc<Poles>(poles);
+  expect_adrc<Poles, ErrorBased>(poles);
+  expect_adrc<DelayedInput<Poles, 2>>({.observer = poles, .delay = 2});
   expect_adrc<WrappedOutput<LinearEso<2>>>({.observer = linear, .period = 100.0});
-  expect_adrc<WrappedOutput<KnownModel<LinearEso<2>, KnownPoles<2>>>>(
-      {.observer = {.observer = linear, .model = poles}, .period = 100.0});
+  expect_adrc<WrappedOutput<Poles>>({.observer = poles, .period = 100.0});
   expect_adrc<OutlierGate<LinearEso<2>>>({.observer = linear, .threshold = 1e6});
   expect_adrc<VariableTime<LinearEso<2>>>({.observer = linear});
   expect_adrc<VariableTime<DelayedInput<LinearEso<2>, 2>>>(

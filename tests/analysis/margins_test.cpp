@@ -13,6 +13,7 @@
 #include <esokit/eigen.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/model_eso.hpp>
 #include <functional>
 #include <limits>
 #include <numbers>
@@ -498,8 +499,12 @@ TEST(Margins, AtTheEdgeTheRealControllerOscillates) {
   of(Adrc<DelayedInput<LinearEso<2>, 2>>::make(
          {.observer = {.observer = config, .delay = 2}, .controller_bandwidth = 4.0})
          .value());
-  of(Adrc<KnownModel<LinearEso<2>, KnownPoles<2>>>::make(
-         {.observer = {.observer = config, .model = {{3.0, 0.4}}}, .controller_bandwidth = 4.0})
+  of(Adrc<ModelEso<ModelParts{.order = 2, .plant_poles = true}>>::make(
+         {.observer = {.observer_bandwidth = 20.0,
+                       .input_gain = 2.5,
+                       .sample_time = T,
+                       .model = {{3.0, 0.4}}},
+          .controller_bandwidth = 4.0})
          .value());
   of(PredictiveAdrc<LinearEso<2>>::make({.observer = config, .controller_bandwidth = 4.0}).value());
   const DualFeedbackAdrc<2>::Config filter{

@@ -4,11 +4,11 @@
 //
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
-#include <esokit/adapter/known_model.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <support/friction.hpp>
 
 namespace esokit_test {
 
@@ -69,11 +69,11 @@ struct LoopTraits<esokit::Guarded<O>> {
 
 // A model that is wrong: what it says more than the plant does is disturbance.
 template <class O>
-struct LoopTraits<esokit::KnownModel<O, esokit::KnownPoles<2>>> {
+struct LoopTraits<esokit::KnownModel<O, Friction<1, double>>> {
   static constexpr bool approximate = true;
-  static typename esokit::KnownModel<O, esokit::KnownPoles<2>>::Config config(double omega,
-                                                                              double T, double b0) {
-    return {.observer = LoopTraits<O>::config(omega, T, b0), .model = {{0.5, 0.25}}};
+  static typename esokit::KnownModel<O, Friction<1, double>>::Config config(double omega, double T,
+                                                                            double b0) {
+    return {.observer = LoopTraits<O>::config(omega, T, b0), .model = {0.25}};
   }
 };
 
@@ -83,7 +83,7 @@ using DecoratedControllers = TypeList<
     Adrc<esokit::WrappedOutput<esokit::CascadeEso<2, 2>>, ErrorBased>,
     Adrc<esokit::VariableTime<LinearEso<2>>>, Adrc<esokit::Guarded<esokit::CascadeEso<2, 2>>>,
     Adrc<esokit::Guarded<LinearEso<1, float>>, ErrorBased>,
-    Adrc<esokit::KnownModel<LinearEso<2>, esokit::KnownPoles<2>>>,
+    Adrc<esokit::KnownModel<LinearEso<2>, Friction<1, double>>>,
     Adrc<esokit::VariableTime<esokit::WrappedOutput<esokit::DelayedInput<LinearEso<1, float>, 2>>>,
          ErrorBased>>;
 const bool registered = register_laws<ControllerLaws>("Decorated", DecoratedControllers{});

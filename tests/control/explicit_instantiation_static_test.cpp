@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <esokit/esokit.hpp>
+#include <support/friction.hpp>
 
 namespace esokit {
 
@@ -23,7 +24,7 @@ template class AlgebraicEso<2>;
 template class CascadeEso<2, 2>;
 template class AdjustableBandwidthEso<2>;
 template class NonlinearEso<2>;
-template class KnownModel<LinearEso<2>, KnownPoles<2>>;
+template class KnownModel<LinearEso<2>, esokit_test::Friction<1, double>>;
 template class Incremental<Adrc<LinearEso<2>>>;
 template class DualFeedbackAdrc<2>;
 template class Adrc<WrappedOutput<LinearEso<2>>>;

@@ -25,6 +25,7 @@
 #include <esokit/observer/mimo_extended_state_filter.hpp>
 #include <esokit/observer/model_eso.hpp>
 #include <string>
+#include <support/friction.hpp>
 #include <support/lanes.hpp>
 #include <tuple>
 #include <vector>
@@ -92,21 +93,9 @@ struct Guards {
   }
 };
 
-/// Friction that grows with the square of the speed.
-template <class T>
-struct Drag {
-  template <class U>
-  using with_scalar = Drag<U>;
-  T factor{};
-  static constexpr auto fields(auto& m) noexcept { return esokit::detail::tie(m.factor); }
-  T operator()(const Vector<T, 2>& x) const noexcept {
-    return T(-1.0) * factor * x(0) * esokit::detail::absolute(x(0));
-  }
-};
-
 struct KnownVarying {
   template <class T>
-  using Type = esokit::VariableTime<esokit::KnownModel<LinearEso<1, T>, Drag<T>>>;
+  using Type = esokit::VariableTime<esokit::KnownModel<LinearEso<1, T>, Friction<0, T>>>;
   template <class T>
   static typename Type<T>::Config config(int lane, bool again) {
     return {.observer = {.observer = linear<T>(lane, again), .model = {set<T>(lane, again, 3)}}};

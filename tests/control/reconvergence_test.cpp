@@ -7,14 +7,15 @@
 #include <control/loop_traits.hpp>
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
-#include <esokit/adapter/known_model.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/model_eso.hpp>
 #include <limits>
+#include <support/friction.hpp>
 #include <support/numbers.hpp>
 
 namespace esokit_test {
@@ -45,7 +46,8 @@ using Controllers = testing::Types<
     Adrc<WrappedOutput<CascadeEso<2, 2>>>, Adrc<DelayedInput<WrappedOutput<LinearEso<2>>, 2>>,
     Adrc<WrappedOutput<OutlierGate<LinearEso<2>>>, ErrorBased>,
     Adrc<VariableTime<WrappedOutput<LinearEso<2>>>>,
-    Adrc<KnownModel<WrappedOutput<LinearEso<2>>, KnownPoles<2>>>, Adrc<Guarded<LinearEso<2>>>>;
+    Adrc<KnownModel<WrappedOutput<LinearEso<2>>, Friction<1, double>>>, Adrc<Guarded<LinearEso<2>>>,
+    Adrc<WrappedOutput<ModelEso<ModelParts{.order = 2, .plant_poles = true}>>>>;
 TYPED_TEST_SUITE(LoopReconvergence, Controllers);
 
 TYPED_TEST(LoopReconvergence, BackAtTheReference) {

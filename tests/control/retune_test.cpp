@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <esokit/adapter/delayed_input.hpp>
-#include <esokit/adapter/known_model.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
@@ -16,6 +15,7 @@
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <support/friction.hpp>
 #include <support/numbers.hpp>
 
 namespace esokit_test {
@@ -75,7 +75,7 @@ TEST(Retune, DesignsAsOftenAsMake) {
   using Gated = esokit::OutlierGate<Counted>;
   using Wrapped = esokit::WrappedOutput<Counted>;
   using Nested = esokit::DelayedInput<esokit::WrappedOutput<Gated>, 4>;
-  using Known = esokit::KnownModel<Counted, esokit::KnownPoles<2>>;
+  using Known = esokit::KnownModel<Counted, Friction<1, double>>;
   using Variable = esokit::VariableTime<Counted>;
   designs_once<Counted>(first(), second(), 1);
   designs_once<Delayed>({.observer = first()}, {.observer = second(), .delay = 2}, 1);

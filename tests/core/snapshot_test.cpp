@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <cstdlib>
 #include <esokit/adapter/delayed_input.hpp>
-#include <esokit/adapter/known_model.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
@@ -30,6 +29,7 @@
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/observer/reduced_order_eso.hpp>
 #include <string>
+#include <support/friction.hpp>
 #include <tuple>
 #include <vector>
 
@@ -37,11 +37,13 @@ namespace {
 
 using namespace esokit;
 
-/// A model in a filter, and another of as many states.
+/// Models in a filter, the last two of as many states and as large.
 using SwingModel = AugmentedModel<ModelParts{.order = 2, .resonators = 1}, float>;
 using SwingFilter = ExtendedStateFilter<2, float, 3, NoNominalModel, 0, SwingModel>;
 using SensorModel = AugmentedModel<ModelParts{.order = 2, .sensor = 2}, float>;
 using SensorFilter = ExtendedStateFilter<2, float, 3, NoNominalModel, 0, SensorModel>;
+using FadingModel = AugmentedModel<ModelParts{.order = 2, .sensor = 1, .leaky = 1}, float>;
+using FadingFilter = ExtendedStateFilter<2, float, 3, NoNominalModel, 0, FadingModel>;
 
 template <class Observer>
 void expect_same_life(Observer made) {
@@ -143,8 +145,17 @@ TEST(Snapshot, FilterRecursiveAndFrozen) {
   const auto frozen = SwingFilter::make(swing).value();
   expect_same_life(frozen);
   // Words of another model, as large.
-  static_assert(sizeof(SensorFilter) == sizeof(SwingFilter));
-  EXPECT_FALSE(from_snapshot<SensorFilter>(snapshot(frozen)));
+  static_assert(sizeof(SensorFilter) == sizeof(FadingFilter));
+  SensorFilter::Config sensor;
+  sensor.input_gain = 3.0f;
+  sensor.sample_time = 1e-2f;
+  sensor.measurement_variance = 1e-4f;
+  sensor.disturbance_bounds = {0.0f, 0.0f, 10.0f, 1.0f, 1.0f};
+  sensor.plant_model.sensor.frequency = 20.0f;
+  sensor.inflation = 0.5f;
+  const auto words = snapshot(SensorFilter::make(sensor).value());
+  EXPECT_TRUE(from_snapshot<SensorFilter>(words));
+  EXPECT_FALSE(from_snapshot<FadingFilter>(words));
 }
 
 TEST(Snapshot, Controllers) {
@@ -219,7 +230,7 @@ TEST(Snapshot, EveryTypeHasATagOfItsOwn) {
            NonlinearEso<2, float, 2, FalGain<float>>, ExtendedStateFilter<2, float>,
            ExtendedStateFilter<2, float, 1, NoNominalModel, 8>, SwingModel, SensorModel,
            SwingFilter, SensorFilter, DelayedInput<Eso, 3>, DelayedInput<Eso, 4>,
-           WrappedOutput<Eso>, VariableTime<Eso>, KnownModel<Eso, KnownPoles<2, float>>,
+           WrappedOutput<Eso>, VariableTime<Eso>, KnownModel<Eso, esokit_test::Friction<1, float>>,
            WrappedOutput<DelayedInput<Eso, 3>>, DelayedInput<WrappedOutput<Eso>, 3>,
            PredictorCorrector<2, float, 1, Gain>, PredictorCorrector<2, float, 1, Gain, 2>,
            PredictorCorrector<2, float, 1, AlgebraicGain<3, float>>,

@@ -313,11 +313,8 @@ class Filler {
       config.most_in_a_row = tape_.integer(1, 20, "most_in_a_row");
     }
     MEMBER(ratio, number(text, member, {2, 4}))
-    if constexpr (requires { config.model.coefficients; }) {
-      for (std::size_t i = 0; i < config.model.coefficients.size(); ++i) {
-        const double slow = std::pow(0.01 / T, order_ - static_cast<int>(i));
-        number("model.coefficients", config.model.coefficients[i], {-slow, slow});
-      }
+    if constexpr (requires { config.model.coefficient; }) {
+      number("model.coefficient", config.model.coefficient, {-0.01 / T, 0.01 / T});
     }
     if constexpr (requires { config.model.resonators; }) parts(config.model);
     // Controllers. B0 says what input_gain would.

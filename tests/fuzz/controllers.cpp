@@ -1,7 +1,6 @@
 // Every controller, with observers of every sort of gain law and adapters; a new one joins by a
 // line.
 #include <esokit/adapter/delayed_input.hpp>
-#include <esokit/adapter/known_model.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
@@ -19,6 +18,8 @@
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/model_eso.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
+
+#include <support/friction.hpp>
 
 #include "fuzz/driver.hpp"
 #include "fuzz/kinds.hpp"
@@ -49,7 +50,7 @@ void add_controllers(std::vector<Kind>& kinds) {
   KIND(Adrc<CascadeEso<2, 2, float>>);
   KIND(Adrc<AlgebraicEso<2, float>>);
   KIND(Adrc<WrappedOutput<LinearEso<2, double>>>);
-  KIND(Adrc<DelayedInput<KnownModel<LinearEso<2, double>, KnownPoles<2, double>>, 3>>);
+  KIND(Adrc<DelayedInput<KnownModel<LinearEso<2, double>, esokit_test::Friction<1, double>>, 3>>);
   KIND(Adrc<ExtendedStateFilter<1, float>>);
   KIND(DisturbanceCompensator<VariableTime<CascadeEso<1, 2, double>>>);
   KIND(PredictiveAdrc<LinearEso<2, float>>);

@@ -1,7 +1,6 @@
 // Every observer and every adapter in its nestings; a new one joins by a line.
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
-#include <esokit/adapter/known_model.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
@@ -15,12 +14,17 @@
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/observer/reduced_order_eso.hpp>
 
+#include <support/friction.hpp>
+
 #include "fuzz/driver.hpp"
 #include "fuzz/kinds.hpp"
 
 namespace fuzz {
 
 using namespace esokit;
+using esokit_test::Friction;
+
+constexpr ModelParts poles_and_lags{.order = 2, .plant_poles = true, .actuator = 1, .sensor = 1};
 
 void add_observers(std::vector<Kind>& kinds) {
   KIND(LinearEso<2, double>);
@@ -32,7 +36,8 @@ void add_observers(std::vector<Kind>& kinds) {
   KIND(NonlinearEso<1, float>);
   KIND(WrappedOutput<LinearEso<1, float>>);
   KIND(WrappedOutput<VariableTime<DelayedInput<LinearEso<2, float>, 3>>>);
-  KIND(DelayedInput<KnownModel<WrappedOutput<CascadeEso<2, 2, double>>, KnownPoles<2, double>>, 3>);
+  KIND(DelayedInput<KnownModel<WrappedOutput<CascadeEso<2, 2, double>>, Friction<1, double>>, 3>);
+  KIND(WrappedOutput<ModelCascadeEso<poles_and_lags, 2, double>>);
   KIND(OutlierGate<LinearEso<2, float>>);
   KIND(Guarded<LinearEso<2, float>>);
   KIND(ModelEso<ModelParts{.order = 1, .actuator = 1, .sensor = 1, .resonators = 1}, float>);
@@ -53,8 +58,10 @@ void add_observers(std::vector<Kind>& kinds) {
   KIND(VariableTime<AdjustableBandwidthEso<1, double>>);
   KIND(Guarded<WrappedOutput<CascadeEso<1, 2, double>>>);
   KIND(VariableTime<CascadeEso<2, 2, float>>);
-  KIND(KnownModel<LinearEso<2, float>, KnownPoles<2, float>>);
-  KIND(VariableTime<KnownModel<LinearEso<1, float>, KnownPoles<1, float>>>);
+  KIND(KnownModel<LinearEso<2, float>, Friction<1, float>>);
+  KIND(VariableTime<ModelEso<ModelParts{.order = 1, .plant_poles = true}, float>>);
+  KIND(DelayedInput<OutlierGate<ModelEso<ModelParts{.order = 2, .plant_poles = true}, float>>, 3>);
+  KIND(ModelCascadeEso<ModelParts{.order = 1, .resonators = 1, .leaky = 1}, 2, float>);
 #endif
 }
 

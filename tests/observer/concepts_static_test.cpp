@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <esokit/adapter/delayed_input.hpp>
-#include <esokit/adapter/known_model.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
@@ -20,6 +19,7 @@
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/sim/closed_loop.hpp>
+#include <support/friction.hpp>
 #include <support/numbers.hpp>
 
 namespace esokit_test {
@@ -33,7 +33,6 @@ using esokit::ErrorBased;
 using esokit::Expected;
 using esokit::GainKind;
 using esokit::KnownModel;
-using esokit::KnownPoles;
 using esokit::LevelledObserver;
 using esokit::LinearEso;
 using esokit::LoopObserver;
@@ -46,6 +45,8 @@ using esokit::ShiftableOutput;
 using esokit::StepStatus;
 using esokit::VariableTime;
 using esokit::WrappedOutput;
+
+using Rubbing = Friction<1, double>;
 
 /// The member that an archetype goes without.
 enum class Without {
@@ -511,7 +512,7 @@ static_assert(refused<Without::gain_law, GainKind::factored>);
 static_assert(!PredictableObserver<DelayedInput<LinearEso<2>, 2>>);
 static_assert(!PredictableObserver<WrappedOutput<LinearEso<2>>>);
 static_assert(!PredictableObserver<VariableTime<LinearEso<2>>>);
-static_assert(!PredictableObserver<KnownModel<LinearEso<2>, KnownPoles<2>>>);
+static_assert(!PredictableObserver<KnownModel<LinearEso<2>, Rubbing>>);
 
 // ---- SampledLinearObserver
 
@@ -521,7 +522,7 @@ static_assert(!SampledLinearObserver<Gains<Without::model>>);
 static_assert(!SampledLinearObserver<Gains<Without::input_gain>>);
 static_assert(!SampledLinearObserver<Gains<Without::sample_time>>);
 static_assert(!SampledLinearObserver<DelayedInput<LinearEso<2>, 2>>);
-static_assert(!SampledLinearObserver<KnownModel<LinearEso<2>, KnownPoles<2>>>);
+static_assert(!SampledLinearObserver<KnownModel<LinearEso<2>, Rubbing>>);
 static_assert(SampledLinearObserver<WrappedOutput<LinearEso<2>>>);
 static_assert(SampledLinearObserver<VariableTime<LinearEso<2>>>);
 static_assert(!SampledLinearObserver<esokit::NonlinearEso<2>>);
@@ -550,7 +551,7 @@ static_assert(!esokit::observer_traits<esokit::AlgebraicEso<2>>.publishes_chain)
 static_assert(!esokit::observer_traits<esokit::AlgebraicEso<2>>.bears_regular_gaps);
 static_assert(!esokit::observer_traits<VariableTime<esokit::AlgebraicEso<2>>>.bears_regular_gaps);
 static_assert(!esokit::observer_traits<VariableTime<LinearEso<2>>>.publishes_chain);
-static_assert(!esokit::observer_traits<KnownModel<LinearEso<2>, KnownPoles<2>>>.publishes_chain);
+static_assert(!esokit::observer_traits<KnownModel<LinearEso<2>, Rubbing>>.publishes_chain);
 static_assert(esokit::observer_traits<DelayedInput<LinearEso<2>, 2>>.publishes_chain);
 
 // ---- adapters are not what they adapt, and have no answer that is not theirs
@@ -561,7 +562,7 @@ constexpr bool is_its_observer =
 using Delayed = DelayedInput<LinearEso<2>, 2>;
 using Wrapped = WrappedOutput<LinearEso<2>>;
 using Timed = VariableTime<LinearEso<2>>;
-using Known = KnownModel<LinearEso<2>, KnownPoles<2>>;
+using Known = KnownModel<LinearEso<2>, Rubbing>;
 using Gated = esokit::OutlierGate<LinearEso<2>>;
 static_assert(!is_its_observer<Delayed> && !is_its_observer<Wrapped>);
 static_assert(!is_its_observer<Timed> && !is_its_observer<Known> && !is_its_observer<Gated>);
@@ -616,7 +617,7 @@ static_assert(Rearms<VariableTime<esokit::AlgebraicEso<2>>> && !Rearms<Delayed>)
 static_assert(esokit::observer_traits<DelayedInput<Timed, 2>>.varies_time);
 static_assert(esokit::observer_traits<VariableTime<WrappedOutput<Delayed>>>.wraps_output);
 static_assert(esokit::observer_traits<VariableTime<WrappedOutput<Delayed>>>.delays_input);
-static_assert(LoopObserver<KnownModel<Wrapped, KnownPoles<2>>>);
+static_assert(LoopObserver<KnownModel<Wrapped, Rubbing>>);
 static_assert(LoopObserver<WrappedOutput<Known>> && LoopObserver<DelayedInput<Known, 2>>);
 // Around an archetype an adapter has no more than the archetype.
 static_assert(!RestartingObserver<DelayedInput<Loop<>, 2>>);
@@ -667,7 +668,7 @@ concept CanBeGated = requires {
 };
 template <class O>
 concept CanHaveAModel = requires {
-  typename KnownModel<O, KnownPoles<2>>;
+  typename KnownModel<O, Rubbing>;
 };
 template <class O>
 concept CanBeAChannel = requires {
@@ -773,18 +774,17 @@ TEST(ShiftableOutput, RunsInWrappedOutput) {
 }
 
 TEST(ShiftableDisturbance, RunsInKnownModelAndMimoAdrc) {
-  using Poles = KnownPoles<2>;
-  const Poles poles{{1.5, 0.5}};
-  adrc_agrees<KnownModel<DisturbanceShifting<>, Poles>, KnownModel<Truth, Poles>>(
-      typename KnownModel<DisturbanceShifting<>, Poles>::Config{.observer = small(),
-                                                                .model = poles},
-      {.observer = full(), .model = poles});
-  auto one = KnownModel<DisturbanceShifting<>, Poles>::make({.observer = small()}).value();
-  auto other = KnownModel<Truth, Poles>::make({.observer = full()}).value();
+  const Rubbing model{1.5};
+  adrc_agrees<KnownModel<DisturbanceShifting<>, Rubbing>, KnownModel<Truth, Rubbing>>(
+      typename KnownModel<DisturbanceShifting<>, Rubbing>::Config{.observer = small(),
+                                                                  .model = model},
+      {.observer = full(), .model = model});
+  auto one = KnownModel<DisturbanceShifting<>, Rubbing>::make({.observer = small()}).value();
+  auto other = KnownModel<Truth, Rubbing>::make({.observer = full()}).value();
   one.update(1, 2);
   other.update(1, 2);
-  ASSERT_TRUE(one.retune({.observer = small(), .model = poles}));
-  ASSERT_TRUE(other.retune({.observer = full(), .model = poles}));
+  ASSERT_TRUE(one.retune({.observer = small(), .model = model}));
+  ASSERT_TRUE(other.retune({.observer = full(), .model = model}));
   EXPECT_EQ(one.estimate(), other.estimate());
   EXPECT_EQ(one.residual_disturbance(), other.residual_disturbance());
 

@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <esokit/adapter/delayed_input.hpp>
-#include <esokit/adapter/known_model.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
@@ -18,6 +17,7 @@
 #include <esokit/observer/mimo_extended_state_filter.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/observer/reduced_order_eso.hpp>
+#include <support/friction.hpp>
 #include <support/numbers.hpp>
 
 namespace {
@@ -51,8 +51,8 @@ using Observers = ::testing::Types<
     esokit::WrappedOutput<esokit::LinearEso<2, float>>, esokit::VariableTime<esokit::LinearEso<2>>,
     esokit::AlgebraicEso<2>, esokit::AlgebraicEso<2, float>, esokit::NonlinearEso<2>,
     esokit::NonlinearEso<2, float>, esokit::ReducedOrderEso<2>,
-    esokit::KnownModel<esokit::LinearEso<2>, esokit::KnownPoles<2>>,
-    esokit::KnownModel<esokit::NonlinearEso<2, float>, esokit::KnownPoles<2, float>>,
+    esokit::KnownModel<esokit::LinearEso<2>, esokit_test::Friction<1, double>>,
+    esokit::KnownModel<esokit::NonlinearEso<2, float>, esokit_test::Friction<1, float>>,
     esokit::OutlierGate<esokit::AlgebraicEso<2>>>;
 TYPED_TEST_SUITE(GivenValues, Observers);
 

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <esokit/adapter/delayed_input.hpp>
-#include <esokit/adapter/known_model.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
@@ -14,8 +13,10 @@
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/model_eso.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <limits>
+#include <support/friction.hpp>
 #include <support/numbers.hpp>
 
 namespace esokit_test {
@@ -92,6 +93,27 @@ struct Settings<ExtendedStateFilter<Order, S>> {
   }
 };
 
+template <ModelParts Parts, class S>
+struct Settings<ModelEso<Parts, S>> {
+  static typename ModelEso<Parts, S>::Config config(double x) {
+    return {.observer_bandwidth = static_cast<S>(x / sample_time),
+            .input_gain = S(2),
+            .sample_time = static_cast<S>(sample_time),
+            .model = {.plant = {S(0), static_cast<S>(x)}}};
+  }
+};
+
+template <ModelParts Parts, int Levels>
+struct Settings<ModelCascadeEso<Parts, Levels>> {
+  static typename ModelCascadeEso<Parts, Levels>::Config config(double x) {
+    return {.observer_bandwidth = x / sample_time,
+            .bandwidth_factor = 1.5,
+            .input_gain = 2,
+            .sample_time = sample_time,
+            .model = {.plant = {0, x}}};
+  }
+};
+
 template <class O>
 struct Settings<WrappedOutput<O>> {
   static typename WrappedOutput<O>::Config config(double x) {
@@ -124,10 +146,9 @@ struct Settings<VariableTime<O>> {
 
 // Of the angle itself a model cannot be: it jumps.
 template <class O>
-struct Settings<KnownModel<O, KnownPoles<2, typename O::scalar_type>>> {
-  static typename KnownModel<O, KnownPoles<2, typename O::scalar_type>>::Config config(double x) {
-    return {.observer = Settings<O>::config(x),
-            .model = {{0, static_cast<typename O::scalar_type>(x)}}};
+struct Settings<KnownModel<O, Friction<1, typename O::scalar_type>>> {
+  static typename KnownModel<O, Friction<1, typename O::scalar_type>>::Config config(double x) {
+    return {.observer = Settings<O>::config(x), .model = {static_cast<typename O::scalar_type>(x)}};
   }
 };
 
@@ -247,8 +268,9 @@ void finds_back(std::uint64_t seed) {
 template <class Observer>
 class Reconvergence : public testing::Test {};
 
+constexpr ModelParts with_poles{.order = 2, .plant_poles = true};
 template <class S>
-using Damped = KnownPoles<2, S>;
+using Damped = Friction<1, S>;
 
 using Observers = testing::Types<
     OutlierGate<LinearEso<2>>, OutlierGate<AlgebraicEso<2, float>>,
@@ -269,7 +291,8 @@ using Observers = testing::Types<
     WrappedOutput<DelayedInput<LinearEso<2, float>, 3>>,
     VariableTime<WrappedOutput<LinearEso<2, float>>>, WrappedOutput<VariableTime<LinearEso<2>>>,
     KnownModel<WrappedOutput<LinearEso<2>>, Damped<double>>,
-    WrappedOutput<KnownModel<LinearEso<2, float>, Damped<float>>>,
+    WrappedOutput<KnownModel<LinearEso<2, float>, Damped<float>>>, ModelEso<with_poles, float>,
+    WrappedOutput<ModelEso<with_poles>>, WrappedOutput<OutlierGate<ModelCascadeEso<with_poles, 2>>>,
     DelayedInput<VariableTime<KnownModel<WrappedOutput<LinearEso<2>>, Damped<double>>>, 2>>;
 TYPED_TEST_SUITE(Reconvergence, Observers);
 

@@ -17,6 +17,7 @@
 #include <esokit/observer/half_gain_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/mimo_extended_state_filter.hpp>
+#include <esokit/observer/model_eso.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/observer/reduced_order_eso.hpp>
 
@@ -25,6 +26,14 @@ namespace esokit {
 
 using Observer = LinearEso<2, float>;
 using Predicting = ExtendedStateFilter<2, float>;
+
+/// Gravity on an arm, by two terms of its sine.
+struct Pendulum {
+  float gravity{};
+  float operator()(const Vector<float, 3>& z) const noexcept {
+    return -gravity * z(0) * (1.0f - z(0) * z(0) * 0.1666667f);
+  }
+};
 
 template class LinearEso<3, float, 2>;
 template class LinearEso<2, float, 1, PoleSet>;
@@ -38,7 +47,8 @@ template class Adrc<DelayedInput<Observer, 4>>;
 template class Adrc<WrappedOutput<Observer>>;
 template class Adrc<WrappedOutput<OutlierGate<Observer>>>;
 template class Adrc<VariableTime<Observer>>;
-template class Adrc<KnownModel<Observer, KnownPoles<2, float>>>;
+template class Adrc<KnownModel<Observer, Pendulum>>;
+template class Adrc<ModelEso<ModelParts{.order = 2, .plant_poles = true}, float>>;
 
 template class DisturbanceCompensator<Observer>;
 template class DualFeedbackAdrc<2, float>;

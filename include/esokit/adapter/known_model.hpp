@@ -1,5 +1,6 @@
 /// @file
-/// KnownModel: what is known of the plant is fed to the observer, which estimates only the rest.
+/// KnownModel: what is known of the plant and not linear is fed to the observer, which estimates
+/// only the rest.
 #pragma once
 
 #include <esokit/adapter/adapter.hpp>
@@ -11,44 +12,8 @@ namespace esokit {
 
 /// What a known model can do beside fbar: `static constexpr PlantModelTraits traits{..}` in it.
 struct PlantModelTraits {
-  bool checks = false;     ///< `check() const` gives the error of a bad parameter, as a Check
-  bool is_linear = false;  ///< fbar is a sum of multiples of y .. y^(n-1): it can be analysed
+  bool checks = false;  ///< `check() const` gives the error of a bad parameter, as a Check
 };
-
-/// fbar = -(a_0 y + a_1 y' + .. + a_(n-1) y^(n-1)): the plant's poles are known.
-template <int Order, Scalar S = double>
-struct KnownPoles {
-  static constexpr PlantModelTraits traits{.checks = true,
-                                           .is_linear = true};  ///< what it can do beside fbar
-  template <class T>
-  using with_scalar = KnownPoles<Order, T>;  ///< the same of another scalar
-
-  Array<S, Order> coefficients{};  ///< a_0 .. a_(n-1) of s^n + a_(n-1) s^(n-1) + .. + a_0
-
-  /// @cond
-  static constexpr auto fields(auto& m) noexcept { return detail::tie(m.coefficients); }
-  /// @endcond
-
-  /// Error of a coefficient that is not finite; `make` of the observer asks for it.
-  [[nodiscard]] Check<S> check() const {
-    return Rules<S>{}.finite("model.coefficients", coefficients);
-  }
-
-  /// fbar, unit of y^(n). @param estimate (y, .., y^(n-1), ..), at least n x 1
-  template <int Size>
-  S operator()(const Vector<S, Size>& estimate) const noexcept {
-    S sum(0.0);
-    for (int i = 0; i < Order; ++i) {
-      sum = sum - coefficients[static_cast<std::size_t>(i)] * estimate(i);
-    }
-    return sum;
-  }
-};
-
-/// Told apart in snapshots.
-template <int Order, Scalar S>
-inline constexpr std::uint32_t type_tag<KnownPoles<Order, S>> = make_type_tag<S>("KnownPoles",
-                                                                                 Order);
 
 /// A known part of y^(n): fbar(estimate), noexcept, in the unit of y^(n), a function of
 /// y .. y^(n-1) alone. What else it can do it declares, see PlantModelTraits.
@@ -81,9 +46,12 @@ struct KnownModelConfig {
 /// Row n of `estimate`, as `total_disturbance`, is fbar + dhat: what a controller cancels, whatever
 /// part of it is known. `residual_disturbance` is dhat.
 ///
+/// For what is not linear: friction, gravity, a spring that hardens. Poles that you know belong
+/// into the model of the observer, which is exact and can be analysed (`ModelEso`, `.plant_poles`).
+///
 /// What fbar changes within a step stays in dhat, O(T). fbar of the estimate is part of the error's
-/// dynamics: omega_o should stay well above the poles of fbar.
-/// @tparam Model a function fbar(estimate): KnownPoles, or your own
+/// dynamics: omega_o should stay well above the slopes of fbar.
+/// @tparam Model a function fbar(estimate) of yours, for packs with `with_scalar` and `fields`
 template <ShiftableDisturbance Observer, class Model>
 requires PlantModel<Model, Observer>
 class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,

@@ -11,7 +11,6 @@
 
 #include <cstddef>
 #include <esokit/adapter/delayed_input.hpp>
-#include <esokit/adapter/known_model.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
@@ -28,7 +27,7 @@
 
 namespace esokit {
 
-/// An observer that acts by its gains, or one that a model or a delay is built around.
+/// An observer that acts by its gains, or one that a delay is built around.
 template <class T>
 concept AnalysedObserver = detail::SaysObserver<T>;
 
@@ -59,21 +58,6 @@ template <class Observer, int Capacity>
 requires detail::SaysObserver<Observer> LinearObserverForm
 linear_observer(const DelayedInput<Observer, Capacity>& observer) {
   return detail::delayed(linear_observer(observer.observer()), observer.delay());
-}
-
-/// Of one with a known model, where that declares itself linear (KnownPoles does).
-template <class Observer, class Model>
-requires detail::SaysObserver<Observer> &&
-    (detail::declared_traits<Model, PlantModelTraits>.is_linear)  //
-    LinearObserverForm linear_observer(const KnownModel<Observer, Model>& observer) {
-  using Estimate = typename Observer::Estimate;
-  std::vector<double> row;
-  for (int i = 0; i < Observer::order; ++i) {
-    Estimate unit = Estimate::Zero();
-    unit(i) = typename Observer::scalar_type(1);
-    row.push_back(static_cast<double>(observer.known_model()(unit)));
-  }
-  return detail::with_model(linear_observer(observer.observer()), row);
 }
 
 /// Of an adapter that is in its linear mode what it adapts.

@@ -102,20 +102,6 @@ inline LinearObserverForm delayed(const LinearObserverForm& observer, int delay)
   return late;
 }
 
-/// The observer whose chain is driven by u + fbar / b0, fbar = row (yhat, .., yhat^(n-1)).
-inline LinearObserverForm with_model(LinearObserverForm observer, const std::vector<double>& row) {
-  const int order = static_cast<int>(row.size());
-  DynamicMatrix<double> fbar(1, observer.to_estimate.rows());
-  for (int i = 0; i < order; ++i) fbar(0, i) = row[static_cast<std::size_t>(i)];
-  const auto from_state = product(fbar, observer.to_estimate);
-  const auto from_y = product(fbar, observer.y_to_estimate);
-  add(observer.a, 0, 0, product(observer.from_u, from_state), 1.0 / observer.input_gain);
-  add(observer.from_y, 0, 0, product(observer.from_u, from_y), 1.0 / observer.input_gain);
-  add(observer.to_estimate, order, 0, from_state);
-  add(observer.y_to_estimate, order, 0, from_y);
-  return observer;
-}
-
 /// u = weights_0 r - weights (yhat, .., dhat); error-based u = weights (ehat, .., dhat), of an
 /// observer that is fed r - y.
 inline LinearController feedback_of(const LinearObserverForm& observer,

@@ -187,7 +187,7 @@ struct LinearPlant {
   }
 
   /// a_0 .. a_(n-1) of det(s I - A) = s^n + a_(n-1) s^(n-1) + .. + a_0: the plant's poles, as
-  /// `chain` and KnownPoles take them.
+  /// `chain` and `.plant` of an AugmentedModel take them.
   [[nodiscard]] constexpr Array<ScalarType, States> coefficients() const noexcept {
     Array<ScalarType, States> all{};
     auto power = Matrix<ScalarType, States, States>::Identity();  // Faddeev and LeVerrier
