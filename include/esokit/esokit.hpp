@@ -38,6 +38,8 @@
 #include <esokit/control/dual_feedback.hpp>
 #include <esokit/control/experiment.hpp>
 #include <esokit/control/filter_form.hpp>
+#include <esokit/control/health.hpp>
+#include <esokit/control/health_text.hpp>
 #include <esokit/control/incremental.hpp>
 #include <esokit/control/limiter.hpp>
 #include <esokit/control/mimo_adrc.hpp>
@@ -45,6 +47,7 @@
 #include <esokit/control/pid_conversion.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/control/scaled_law.hpp>
+#include <esokit/control/telemetry.hpp>
 #include <esokit/control/tracking_differentiator.hpp>
 #include <esokit/core/check.hpp>
 #include <esokit/core/declared.hpp>

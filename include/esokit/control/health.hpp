@@ -1,0 +1,304 @@
+/// @file
+/// Health of a loop: what it counts while it runs, and what is likely wrong with it.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <esokit/control/control_loop.hpp>
+#include <esokit/core/check.hpp>
+#include <esokit/core/expected.hpp>
+#include <esokit/core/type_tag.hpp>
+#include <limits>
+#include <type_traits>
+
+namespace esokit {
+
+/// Config of HealthMonitor.
+template <PlainScalar S = double>
+struct HealthConfig {
+  S observer_bandwidth{};  ///< omega_o, rad/s: the observer's poles, or their mean
+  S sample_time{};         ///< T, s
+  S input_range{};         ///< half of what the limits leave, unit of u
+  S noise{};               ///< standard deviation of y; 0: not known, the innovation is not judged
+  S memory = 1;            ///< s: what is older than a few times this counts for nothing
+  int divider = 4;  ///< the regression takes every D-th sample, 1 .. 1000; D omega_o T is at most 1
+};
+
+/// What a monitor has seen. Shares are of the last `memory` seconds, counts of all samples.
+template <PlainScalar S = double>
+struct Health {
+  std::uint32_t samples = 0;   ///< looked at, since the start or `clear`
+  std::uint32_t rejected = 0;  ///< measurements that were bad numbers or outliers
+  std::uint32_t bridged = 0;   ///< corrections after a gap, and restarts
+  std::uint32_t gated = 0;     ///< samples under less than full trust, see Guarded
+  std::uint32_t unsafe = 0;    ///< samples in which the law did not decide: hold, safe output
+  S saturated{};               ///< share of samples at a limit, of magnitude or rate
+  S bounded{};                 ///< share of samples with dhat at its bound, see Guarded
+  S innovation{};              ///< rms, unit of y
+  S innovation_of_noise{};     ///< what it would be of the noise alone; 0 where that is not known
+  S gain_ratio = 1;            ///< rho: b / b0 as far as u moved by itself, see HealthMonitor
+  S evidence{};                ///< omega_o times the time in which u told something of it
+};
+
+/// What is likely wrong, the worst first.
+enum class LoopFault : unsigned char {
+  none,                         ///< nothing that shows
+  wrong_sign,                   ///< b0 has the wrong sign
+  gain_too_small,               ///< b0 is several times too small: the loop is that much too quick
+  measurements_rejected,        ///< more than a tenth of the measurements are bad or outliers
+  saturated,                    ///< at the limits more than half of the time
+  bounded,                      ///< dhat is at its bound more than half of the time
+  innovation_too_large,         ///< rms over three times what the noise makes
+  gain_too_large_or_disturbed,  ///< what u does is undone: b0 is too large, or a load drives u
+};
+
+/// Limits of `diagnose`. rho was looked at in 1,000 servos of each fault and 5,000 healthy ones,
+/// see examples/guards.
+struct HealthLimits {
+  double wrong_sign = -0.3;  ///< rho below it
+  double too_small = 3;      ///< rho above it
+  double too_large = 0.25;   ///< rho below it, advice alone: a load does the same
+  double evidence = 6;       ///< omega_o times seconds; below it rho says nothing
+};
+
+/// What is likely wrong. @param health of a monitor
+template <PlainScalar S>
+[[nodiscard]] constexpr LoopFault diagnose(const Health<S>& health,
+                                           const HealthLimits& limits = {}) noexcept {
+  const auto rho = static_cast<double>(health.gain_ratio);
+  const bool told = static_cast<double>(health.evidence) >= limits.evidence;
+  if (told && rho < limits.wrong_sign) return LoopFault::wrong_sign;
+  if (told && rho > limits.too_small) return LoopFault::gain_too_small;
+  if (health.rejected > 10 && health.rejected > health.samples / 10) {
+    return LoopFault::measurements_rejected;
+  }
+  if (health.saturated > S(1) / S(2)) return LoopFault::saturated;
+  if (health.bounded > S(1) / S(2)) return LoopFault::bounded;
+  if (health.innovation_of_noise > S(0) && health.innovation > S(3) * health.innovation_of_noise) {
+    return LoopFault::innovation_too_large;
+  }
+  if (told && rho < limits.too_large) return LoopFault::gain_too_large_or_disturbed;
+  return LoopFault::none;
+}
+
+/// Watches a loop of one input: `look(controller)` after each sample.
+///
+/// Of y^(n) = d + b u an observer with b0 finds dhat = (d + (b - b0) u) through its own poles. What
+/// of dhat goes with phi = b0 u, through the same poles, is (b - b0) / b0 of it:
+///
+///     rho = 1 + sum phi psi / sum phi^2,   psi = dhat, both high-passed at omega_o / 10
+///
+/// is b / b0 where u moves by itself (a reference, noise), and tends to 0 where u answers a load
+/// (dhat then is -phi): a small rho is no proof. Negative it is of a wrong sign only. Samples count
+/// while abs(phi) is above 2 % of b0 times the range and 4 times its noise, the law decides and no
+/// guard gates dhat. Sums forget with `memory`.
+/// @tparam Size N of the observer: so many poles filter phi
+template <int Size, PlainScalar S = double>
+class HealthMonitor {
+  static_assert(Size >= 2, "esokit: an observer has at least two states");
+
+ public:
+  using scalar_type = S;           ///< of signals and settings
+  using Config = HealthConfig<S>;  ///< settings of make
+
+  /// Checks the settings. @return the monitor, or an error that names the field
+  static Expected<HealthMonitor, Error<S>> make(const Config& config) {
+    Rules<S> rules;
+    rules.positive("observer_bandwidth", config.observer_bandwidth)
+        .positive("sample_time", config.sample_time)
+        .positive("input_range", config.input_range)
+        .not_negative("noise", config.noise)
+        .positive("memory", config.memory)
+        .require(1 <= config.divider && config.divider <= 1000, "divider",
+                 static_cast<S>(config.divider), "must be 1 .. 1000");
+    if (!rules) return rules.error();
+    const S step = config.sample_time * static_cast<S>(config.divider);
+    rules
+        .require(!(config.observer_bandwidth * step > S(1)),
+                 {"divider", static_cast<S>(config.divider),
+                  "is so large that phi is not seen through the poles: omega_o T D must be at most",
+                  -1, S(1), true})
+        .require(!(config.memory < S(8) / config.observer_bandwidth),
+                 {"memory", config.memory, "must be at least 8 / omega_o, that is", -1,
+                  S(8) / config.observer_bandwidth, true});
+    if (!rules) return rules.error();
+    return HealthMonitor(config);
+  }
+
+  /// After each sample of the controller: Adrc or DisturbanceCompensator, its observer of `Size`
+  /// states.
+  template <class Controller>
+  void look(const Controller& controller) noexcept {
+    const auto& observer = controller.observer();
+    using Observer = std::remove_cvref_t<decltype(observer)>;
+    static_assert(Observer::size == Size, "esokit: a monitor has as many poles as the observer");
+    S b = observer.input_gain();
+    bool gated = false;
+    bool bounded = false;
+    if constexpr (observer_traits<Observer>.schedules_input_gain) {
+      b = observer.present_input_gain();
+      gated = observer.gated();
+      bounded = observer.bounded();
+    }
+    S innovation{};
+    if constexpr (requires { observer.innovation(); }) innovation = observer.innovation();
+    const bool runs = controller.mode() == LoopMode::running;
+    const S beyond = controller.requested() - controller.output();
+    const S hair = static_cast<S>(1e-4) * range_;
+    count(controller.status(), runs, gated, bounded, runs && (beyond > hair || beyond < -hair),
+          innovation);
+    phi_sum_ = phi_sum_ + b * observer.applied_input();
+    if (++phase_ < divider_) return;
+    phase_ = 0;
+    regress(phi_sum_ / static_cast<S>(divider_), observer.total_disturbance(), detail::absolute(b),
+            runs && !gated);
+    phi_sum_ = S(0);
+  }
+
+  /// What it has seen.
+  [[nodiscard]] const Health<S>& health() const noexcept { return health_; }
+
+  /// Begins anew, as after a change of the design.
+  void clear() noexcept {
+    const S of_noise = health_.innovation_of_noise;
+    *this = HealthMonitor(*this, of_noise);
+  }
+
+ private:
+  explicit HealthMonitor(const Config& config) noexcept
+      : range_(config.input_range), divider_(config.divider) {
+    const S x = config.observer_bandwidth * config.sample_time;
+    const S step = x * static_cast<S>(divider_);
+    pole_ = std::exp(-step);
+    slow_ = -std::expm1(-step / S(10));
+    const S samples = config.memory / config.sample_time;
+    weight_ = S(1) / samples;
+    forget_ = std::exp(-static_cast<S>(divider_) / samples);
+    step_ = step;
+    noise_of_noise(config, std::exp(-x));
+  }
+  HealthMonitor(const HealthMonitor& settings, const S& of_noise) noexcept
+      : range_(settings.range_),
+        divider_(settings.divider_),
+        pole_(settings.pole_),
+        slow_(settings.slow_),
+        weight_(settings.weight_),
+        forget_(settings.forget_),
+        step_(settings.step_),
+        least_(settings.least_) {
+    health_.innovation_of_noise = of_noise;
+  }
+
+  /// Of white noise in y: the innovation through ((z-1)/(z-r))^N, dhat through the same with n of
+  /// the N steps by T and one more pole. By their impulse responses.
+  void noise_of_noise(const Config& config, S r) noexcept {
+    if (!(config.noise > S(0))) return;
+    Array<S, Size> innovation{};
+    Array<S, Size> disturbance{};
+    S sum_e{};
+    S sum_d{};
+    Array<S, Size> before_e{};
+    Array<S, Size> before_d{};
+    const S x = config.observer_bandwidth * config.sample_time;
+    const int length = static_cast<int>((std::min)(S(40 * Size) / x, S(100000))) + 2;
+    for (int k = 0; k < length; ++k) {
+      S e = k == 0 ? S(1) : S(0);
+      S d = e;
+      for (std::size_t i = 0; i < Size; ++i) {
+        innovation[i] = r * innovation[i] + e - before_e[i];
+        before_e[i] = e;
+        e = innovation[i];
+        // Of m = 1: all but one are differences.
+        disturbance[i] = r * disturbance[i] +
+                         (S(1) - r) * (i + 1 < Size ? (d - before_d[i]) / config.sample_time : d);
+        before_d[i] = d;
+        d = disturbance[i];
+      }
+      sum_e = sum_e + e * e;
+      sum_d = sum_d + d * d;
+    }
+    health_.innovation_of_noise = config.noise * std::sqrt(sum_e);
+    least_ = S(4) * config.noise * std::sqrt(sum_d);
+    if (!is_finite(least_)) least_ = S(0);
+  }
+
+  void count(StepStatus status, bool runs, bool gated, bool bounded, bool saturated,
+             const S& innovation) noexcept {
+    ++health_.samples;
+    if (has(status, StepStatus::measurement_rejected) ||
+        has(status, StepStatus::outlier_rejected)) {
+      ++health_.rejected;
+    }
+    if (has(status, StepStatus::gap_bridged) || has(status, StepStatus::restarted)) {
+      ++health_.bridged;
+    }
+    if (gated) ++health_.gated;
+    if (!runs) ++health_.unsafe;
+    const auto share = [this](S& of, bool now) { of = of + weight_ * ((now ? S(1) : S(0)) - of); };
+    share(health_.saturated, saturated);
+    share(health_.bounded, bounded);
+    const S square = innovation * innovation;
+    // One absurd sample is not to be the last that counts.
+    if (is_finite(square) && square < largest_square()) {
+      mean_square_ = mean_square_ + weight_ * (square - mean_square_);
+    }
+    health_.innovation = std::sqrt(mean_square_);
+  }
+
+  static constexpr S largest_square() noexcept {
+    return (std::numeric_limits<S>::max)() * static_cast<S>(1e-6);
+  }
+
+  void regress(const S& phi, const S& psi, const S& b, bool counts) noexcept {
+    S filtered = phi;
+    for (S& stage : stages_) {
+      stage = filtered + pole_ * (stage - filtered);
+      filtered = stage;
+    }
+    slow_phi_ = slow_phi_ + slow_ * (filtered - slow_phi_);
+    slow_psi_ = slow_psi_ + slow_ * (psi - slow_psi_);
+    const S x = filtered - slow_phi_;
+    const S y = psi - slow_psi_;
+    const S xx = x * x;
+    const S xy = x * y;
+    const S most = S(1000) * b * range_;
+    if (!(detail::absolute(x) < most && detail::absolute(y) < most) || !is_finite(xx + xy)) {
+      // No u and no plant does that: begin anew, or the sums would remember it for long.
+      for (S& stage : stages_) stage = S(0);
+      slow_phi_ = slow_psi_ = sum_xx_ = sum_xy_ = S(0);
+      return;
+    }
+    const S size = detail::absolute(x);
+    const bool tells = counts && size > static_cast<S>(0.02) * b * range_ && size > least_;
+    sum_xx_ = forget_ * sum_xx_ + (tells ? xx : S(0));
+    sum_xy_ = forget_ * sum_xy_ + (tells ? xy : S(0));
+    health_.evidence = forget_ * health_.evidence + (tells ? step_ : S(0));
+    const S quotient = sum_xy_ / sum_xx_;
+    if (sum_xx_ > S(0) && is_finite(quotient)) health_.gain_ratio = S(1) + quotient;
+  }
+
+  S range_;
+  int divider_;
+  S pole_;     ///< of phi's filter, at the divided rate
+  S slow_;     ///< of the mean that is taken out
+  S weight_;   ///< of a sample in a share
+  S forget_;   ///< of the sums, at the divided rate
+  S step_;     ///< omega_o T D
+  S least_{};  ///< phi below it is noise
+  int phase_ = 0;
+  S phi_sum_{};
+  Array<S, Size> stages_{};
+  S slow_phi_{};
+  S slow_psi_{};
+  S sum_xx_{};
+  S sum_xy_{};
+  S mean_square_{};
+  Health<S> health_{};
+};
+
+/// Told apart in snapshots.
+template <int Size, PlainScalar S>
+inline constexpr std::uint32_t type_tag<HealthMonitor<Size, S>> = make_type_tag<S>("HealthMonitor",
+                                                                                   Size);
+
+}  // namespace esokit

@@ -1,0 +1,278 @@
+// Health of a loop: rho is b / b0 where u moves by itself, counts and shares are what happened, and
+// a diagnosis says the worst of it. Telemetry: all that was, in a table that identify reads.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <control/loop_traits.hpp>
+#include <esokit/adapter/guarded.hpp>
+#include <esokit/control/adrc.hpp>
+#include <esokit/control/health.hpp>
+#include <esokit/control/health_text.hpp>
+#include <esokit/control/telemetry.hpp>
+#include <esokit/observer/linear_eso.hpp>
+#include <sstream>
+#include <string>
+#include <support/numbers.hpp>
+#include <support/refusal.hpp>
+
+namespace esokit_test {
+namespace {
+
+using namespace esokit;
+
+constexpr double sample_time = 1e-3;
+constexpr double omega_o = 100;
+
+template <class S>
+using Loop = Adrc<Guarded<LinearEso<2, S>>>;
+
+template <class S = double>
+Loop<S> loop_of(double b0, double limit = 1, double omega_c = 20) {
+  typename Loop<S>::Config config{};
+  config.observer.observer = {.observer_bandwidth = static_cast<S>(omega_o),
+                              .input_gain = static_cast<S>(b0),
+                              .sample_time = static_cast<S>(sample_time)};
+  config.controller_bandwidth = static_cast<S>(omega_c);
+  config.limits = {.lower = static_cast<S>(-limit), .upper = static_cast<S>(limit)};
+  return Loop<S>::make(config).value();
+}
+
+template <class S = double>
+HealthMonitor<3, S> monitor_of(double noise = 0) {
+  return HealthMonitor<3, S>::make({.observer_bandwidth = static_cast<S>(omega_o),
+                                    .sample_time = static_cast<S>(sample_time),
+                                    .input_range = S(1),
+                                    .noise = static_cast<S>(noise)})
+      .value();
+}
+
+template <class S>
+void ratio_is_that_of_the_gains() {
+  for (const double ratio : {1.0, -1.0, 10.0, 0.1}) {
+    auto loop = loop_of<S>(20);
+    auto monitor = monitor_of<S>();
+    ChainPlant<2> plant(sample_time, 20 * ratio, 3);
+    Random random(5);
+    S u{};
+    for (int k = 0; k < 3000; ++k) {
+      // Someone else's u, which no observer answers.
+      if (k % 40 == 0) u = static_cast<S>(random.uniform(-0.5, 0.5));
+      loop.track(static_cast<S>(plant.output()), S(0), u);
+      monitor.look(loop);
+      plant.step(static_cast<double>(u));
+    }
+    EXPECT_NEAR(static_cast<double>(monitor.health().gain_ratio), ratio,
+                0.03 * std::abs(ratio) + 0.02);
+    EXPECT_GT(monitor.health().evidence, S(6));
+    EXPECT_EQ(monitor.health().samples, 3000u);
+    EXPECT_EQ(diagnose(monitor.health()), ratio < 0     ? LoopFault::wrong_sign
+                                          : ratio > 5   ? LoopFault::gain_too_small
+                                          : ratio < 0.5 ? LoopFault::gain_too_large_or_disturbed
+                                                        : LoopFault::none)
+        << ratio;
+    monitor.clear();
+    EXPECT_EQ(monitor.health().samples, 0u);
+    EXPECT_EQ(monitor.health().gain_ratio, S(1));
+  }
+}
+
+TEST(Health, RatioIsThatOfTheGains) {
+  ratio_is_that_of_the_gains<double>();
+  ratio_is_that_of_the_gains<float>();
+}
+
+/// A load that u answers makes rho small, and no more than that; a gated sample tells nothing.
+TEST(Health, ALoadIsNoFault) {
+  for (const bool gated : {false, true}) {
+    auto loop = loop_of(20);
+    auto monitor = monitor_of();
+    ChainPlant<2> plant(sample_time, 20, 0);
+    for (int k = 0; k < 5000; ++k) {
+      if (gated) loop.observer().set_trust(0.9);
+      plant.set_disturbance(8 * std::sin(0.01 * k));
+      plant.step(loop.update(plant.output(), 0.0));
+      monitor.look(loop);
+    }
+    if (gated) {
+      EXPECT_EQ(monitor.health().gain_ratio, 1);
+      EXPECT_EQ(monitor.health().gated, 5000u);
+      EXPECT_EQ(diagnose(monitor.health()), LoopFault::none);
+    } else {
+      EXPECT_GT(monitor.health().gain_ratio, -0.2);
+      EXPECT_LT(monitor.health().gain_ratio, 0.25);
+      EXPECT_EQ(diagnose(monitor.health()), LoopFault::gain_too_large_or_disturbed);
+    }
+  }
+}
+
+TEST(Health, InnovationOfNoise) {
+  constexpr double noise = 1e-3;
+  auto loop = loop_of(20, 100);
+  auto monitor = monitor_of(noise);
+  Random random(7);
+  const auto normal = [&] {
+    double sum = -6;
+    for (int i = 0; i < 12; ++i) sum += random.uniform(0, 1);
+    return sum;
+  };
+  for (int k = 0; k < 8000; ++k) {
+    loop.track(noise * normal(), 0, 0);
+    monitor.look(loop);
+  }
+  const auto health = monitor.health();
+  // rms of a second's samples: 1 / sqrt(2000) = 2 %, and four of them.
+  EXPECT_NEAR(health.innovation / health.innovation_of_noise, 1, 0.1);
+  EXPECT_EQ(health.evidence, 0);
+  EXPECT_EQ(diagnose(health), LoopFault::none);
+  // Four times as much is not the noise any more.
+  for (int k = 0; k < 8000; ++k) {
+    loop.track(4 * noise * normal(), 0, 0);
+    monitor.look(loop);
+  }
+  EXPECT_EQ(diagnose(monitor.health()), LoopFault::innovation_too_large);
+  monitor.clear();
+  EXPECT_EQ(monitor.health().innovation_of_noise, health.innovation_of_noise);
+}
+
+TEST(Health, CountsWhatHappened) {
+  auto loop = loop_of(20, 0.1);
+  auto monitor = monitor_of();
+  for (int k = 0; k < 4000; ++k) {
+    const bool lost = k % 4 == 1;
+    if (k == 2000) {
+      EXPECT_GT(monitor.health().saturated, 0.8);
+      EXPECT_EQ(diagnose(monitor.health()), LoopFault::measurements_rejected);
+    }
+    loop.update(lost ? hidden_nan<double>() : 0.0, 50.0);
+    monitor.look(loop);
+  }
+  EXPECT_EQ(monitor.health().rejected, 1000u);
+  EXPECT_EQ(monitor.health().bridged, 1000u);
+  for (int k = 0; k < 8000; ++k) {
+    loop.hold(0, 0, 0.05);
+    monitor.look(loop);
+  }
+  EXPECT_EQ(diagnose(monitor.health()), LoopFault::none);
+}
+
+/// Each limit from both sides, the worst first.
+TEST(Health, Diagnosis) {
+  Health<double> health{.samples = 1000, .innovation = 1};
+  EXPECT_EQ(diagnose(health), LoopFault::none);
+  health.gain_ratio = 0.24;
+  EXPECT_EQ(diagnose(health), LoopFault::none);
+  health.evidence = 6;
+  EXPECT_EQ(diagnose(health), LoopFault::gain_too_large_or_disturbed);
+  health.innovation_of_noise = 0.3;
+  EXPECT_EQ(diagnose(health), LoopFault::innovation_too_large);
+  health.bounded = 0.51;
+  EXPECT_EQ(diagnose(health), LoopFault::bounded);
+  health.saturated = 0.51;
+  EXPECT_EQ(diagnose(health), LoopFault::saturated);
+  health.rejected = 101;
+  EXPECT_EQ(diagnose(health), LoopFault::measurements_rejected);
+  health.gain_ratio = 3.01;
+  EXPECT_EQ(diagnose(health), LoopFault::gain_too_small);
+  health.gain_ratio = -0.31;
+  EXPECT_EQ(diagnose(health), LoopFault::wrong_sign);
+  health.evidence = 5.9;
+  EXPECT_EQ(diagnose(health), LoopFault::measurements_rejected);
+  health.rejected = 100;
+  EXPECT_EQ(diagnose(health), LoopFault::saturated);
+  health.saturated = health.bounded = 0.49;
+  health.innovation = 0.89;
+  EXPECT_EQ(diagnose(health), LoopFault::none);
+  health.evidence = 6;
+  for (const double rho : {-0.29, 0.26, 2.99}) {
+    health.gain_ratio = rho;
+    EXPECT_EQ(diagnose(health), rho < 0 ? LoopFault::gain_too_large_or_disturbed : LoopFault::none);
+  }
+  // Each fault in words of its own.
+  std::string all;
+  for (int i = 0; i < 8; ++i) {
+    std::ostringstream words;
+    words << static_cast<LoopFault>(i);
+    EXPECT_EQ(all.find(words.str()), std::string::npos);
+    EXPECT_GT(words.str().size(), 20u);
+    all += words.str();
+  }
+}
+
+TEST(Health, RefusesBadSettings) {
+  const HealthConfig<double> good{
+      .observer_bandwidth = 100, .sample_time = 1e-3, .input_range = 1, .memory = 0.08};
+  const auto refused = [&](auto change) {
+    HealthConfig<double> config = good;
+    change(config);
+    return refusal(HealthMonitor<3>::make(config));
+  };
+  EXPECT_EQ(refused([](auto&) {}), "accepted");
+  EXPECT_EQ(refused([](auto& c) { c.observer_bandwidth = 0; }),
+            "observer_bandwidth: must be finite and positive");
+  EXPECT_EQ(refused([](auto& c) { c.sample_time = -1; }),
+            "sample_time: must be finite and positive");
+  EXPECT_EQ(refused([](auto& c) { c.input_range = hidden_nan<double>(); }),
+            "input_range: must be finite and positive");
+  EXPECT_EQ(refused([](auto& c) { c.noise = -1; }), "noise: must be finite and not negative");
+  EXPECT_EQ(refused([](auto& c) { c.memory = 0.0799; }),
+            "memory: must be at least 8 / omega_o, that is");
+  EXPECT_EQ(refused([](auto& c) { c.divider = 0; }), "divider: must be 1 .. 1000");
+  EXPECT_EQ(refused([](auto& c) { c.divider = 10; }), "accepted");
+  EXPECT_EQ(
+      refused([](auto& c) { c.divider = 11; }),
+      "divider: is so large that phi is not seen through the poles: omega_o T D must be at most");
+}
+
+/// After numbers of any kind it tells numbers, and the truth once the loop is well.
+TEST(Health, AnyNumbers) {
+  Random random(9);
+  for (int trial = 0; trial < 50; ++trial) {
+    auto loop = loop_of<float>(20);
+    auto monitor = monitor_of<float>(1e-6);
+    for (int k = 0; k < 200; ++k) {
+      loop.track(anything<float>(random), 0, anything<float>(random));
+      monitor.look(loop);
+      const auto& h = monitor.health();
+      ASSERT_TRUE(is_finite(h.gain_ratio) && is_finite(h.innovation) && is_finite(h.evidence));
+      ASSERT_TRUE(is_finite(h.saturated) && h.saturated >= 0 && h.saturated <= 1);
+    }
+    ChainPlant<2> plant(sample_time, -20, 0);
+    float push = 0;
+    for (int k = 0; k < 30000; ++k) {
+      if (k % 40 == 0) push = static_cast<float>(random.uniform(-0.5, 0.5));
+      const auto y = static_cast<float>(plant.output());
+      const float u = push + 0.5f * y + 0.3f * static_cast<float>(plant.state()(1));
+      loop.track(y, 0, u);
+      monitor.look(loop);
+      plant.step(static_cast<double>(u));
+    }
+    ASSERT_EQ(diagnose(monitor.health()), LoopFault::wrong_sign) << trial;
+    if (trial == 0 && sanitized) break;
+  }
+}
+
+TEST(Telemetry, IsATableThatIdentifyReads) {
+  auto loop = loop_of(20, 0.5);
+  const double u = loop.update(0.25, 2.0);
+  const auto row = telemetry(loop, 0.125, 0.25, 2.0);
+  EXPECT_EQ(row.u, u);
+  EXPECT_EQ(row.u, 0.5);
+  EXPECT_EQ(row.requested, loop.requested());
+  EXPECT_EQ(row.estimate[2], row.disturbance);
+  EXPECT_EQ(row.trust, 1);
+  static_assert(std::is_trivially_copyable_v<decltype(row)>);
+  std::ostringstream out;
+  write_header<3>(out);
+  EXPECT_EQ(out.str(),
+            "time,u,y,r,requested,dhat,innovation,status,mode,trust,bounded,estimate_0,estimate_1,"
+            "estimate_2\n");
+  out.str("");
+  write_row(out, row);
+  const std::string text = out.str();
+  EXPECT_EQ(text.substr(0, 17), "0.125,0.5,0.25,2,");
+  EXPECT_EQ(std::count(text.begin(), text.end(), ','), 13);
+}
+
+}  // namespace
+}  // namespace esokit_test
