@@ -158,6 +158,7 @@
 #include <esokit/sim/step_response.hpp>
 #include <esokit/sim/trapezoid.hpp>
 #include <esokit/sim/window.hpp>
+#include <esokit/tune/controller.hpp>
 #include <esokit/tune/families.hpp>
 #include <esokit/tune/loop_cost.hpp>
 #include <esokit/tune/lqg.hpp>

@@ -4,12 +4,21 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <complex>
+#include <cstddef>
+#include <cstdint>
 #include <esokit/analysis/covariance.hpp>
 #include <esokit/analysis/delay_margin.hpp>
 #include <esokit/analysis/margins.hpp>
+#include <esokit/model/linear_plant.hpp>
+#include <esokit/sim/gaussian.hpp>
+#include <esokit/sim/run.hpp>
+#include <esokit/tune/controller.hpp>
 #include <esokit/tune/tune.hpp>
 #include <limits>
 #include <string>
+#include <type_traits>
+#include <vector>
 
 namespace {
 
@@ -134,6 +143,107 @@ TEST(TuneTest, WhatIsChosenKeepsItsMargins) {
     EXPECT_GE(design.excess, design.free_excess) << design.name;
   }
   EXPECT_LE(tuning.chosen()->cost, 1.01 * tuning.designs[1].cost);
+}
+
+const TunedDesign& named(const esokit::Tuning& tuning, const std::string& name) {
+  for (const TunedDesign& design : tuning.designs) {
+    if (design.name == name) return design;
+  }
+  ADD_FAILURE() << name;
+  return tuning.designs.front();
+}
+
+// What is searched is what runs: the linear system of each real controller is that of its design,
+// and simulated it does what was predicted.
+TEST(TuneTest, TheReadyControllerIsTheDesign) {
+  TuneModel model = plain(2, 20.0);
+  model.input_gain = {-2.0, 0.1};
+  model.lag = 0.01;
+  model.dead_time = 0.0025;
+  const auto tuning = tune(model).value();
+  int seen = 0;
+  for (const TunedDesign& design : tuning.designs) {
+    const auto ok = esokit::with_controller<2>(model, design, [&](const auto& controller) {
+      const esokit::Expected<LinearController, esokit::Error<double>> linear =
+          linear_controller(controller);
+      const auto real = esokit::detail::closed_upon_itself(linear.value());
+      ++seen;
+      for (const double w : {1.0, 10.0, 100.0, 1000.0}) {
+        const std::complex<double> z1 = std::polar(1.0, w * model.sample_time) - 1.0;
+        const auto found = esokit::detail::response(real, z1)(0, 0);
+        const auto wanted = esokit::detail::response(design.controller, z1)(0, 0);
+        EXPECT_LE(std::abs(found - wanted), 1e-7 * std::abs(wanted)) << design.name << ' ' << w;
+      }
+    });
+    EXPECT_TRUE(ok) << design.name;
+  }
+  EXPECT_EQ(seen, static_cast<int>(tuning.designs.size()));
+  const auto wrong =
+      esokit::with_controller<1>(model, tuning.designs.front(), [](const auto&) { FAIL(); });
+  EXPECT_STREQ(wrong.error().field, "order");
+}
+
+TEST(TuneTest, SimulatedItDoesWhatWasPredicted) {
+  TuneModel model = plain(2, 20.0);
+  model.input_gain = {2.0, 0.0};
+  model.lag = 0.01;
+  model.dead_time = 0.0025;
+  // No walk comes near the limits.
+  model.u_min = -1e3;
+  model.u_max = 1e3;
+  const auto tuning = tune(model, {.control_noise = 0.5}).value();
+  const TunedDesign& design = named(tuning, "LinearEso, free poles");
+  using Rigid = esokit::LinearPlant<2>;
+  const auto plant = with_lag(
+      Rigid::chain({.coefficients = {0.0, 0.0}, .input_gain = 2.0, .dead_time = 0.0025}).value(),
+      0.01);
+  constexpr int runs = 40, samples = 6000, settled = 1500;
+  std::vector<double> output, control;
+  esokit::sim::Gaussian gaussian(11);
+  (void)esokit::with_controller<2>(model, design, [&](const auto& controller) {
+    using Controller = std::remove_cvref_t<decltype(controller)>;
+    using Eso = esokit::LinearEso<2, double, 1, esokit::PoleSet>;
+    if constexpr (std::is_same_v<Controller, esokit::Adrc<Eso>>) {
+      for (int run = 0; run < runs; ++run) {
+        std::vector<double> walk(samples + 1, 0.0);
+        for (int k = 1; k <= samples; ++k) {
+          walk[static_cast<std::size_t>(k)] =
+              walk[static_cast<std::size_t>(k - 1)] +
+              std::sqrt(model.disturbance * model.sample_time) * gaussian.next();
+        }
+        const auto at = [&](double t) {
+          return walk[static_cast<std::size_t>(std::floor(t / model.sample_time + 1e-6))];
+        };
+        double y = 0.0, u = 0.0;
+        const auto end = esokit::sim::run(plant.value(), controller,
+                                          {.duration = samples * model.sample_time,
+                                           .disturbance = at,
+                                           .noise = model.noise,
+                                           .seed = static_cast<std::uint64_t>(run + 1)},
+                                          [&](const auto& sample) {
+                                            if (sample.index < settled) return;
+                                            const double rest = sample.input + at(sample.t) / 2.0;
+                                            y +=
+                                                sample.output * sample.output / (samples - settled);
+                                            u += rest * rest / (samples - settled);
+                                          });
+        ASSERT_TRUE(end);
+        output.push_back(y);
+        control.push_back(u);
+      }
+    }
+  });
+  ASSERT_EQ(output.size(), static_cast<std::size_t>(runs));
+  const auto agrees = [&](const std::vector<double>& found, double deviation) {
+    double mean = 0.0, square = 0.0;
+    for (const double value : found) mean += value / runs;
+    for (const double value : found) square += (value - mean) * (value - mean) / (runs - 1);
+    EXPECT_LE(std::abs(mean - deviation * deviation), 3.0 * std::sqrt(square / runs));
+    // And that says something.
+    EXPECT_LE(3.0 * std::sqrt(square / runs), 0.15 * mean);
+  };
+  agrees(output, design.output_deviation);
+  agrees(control, design.control_deviation);
 }
 
 TEST(TuneTest, RefusesWhatIsNoProblem) {

@@ -48,7 +48,8 @@ struct TuneSettings {
   double observer_bandwidth = 0.0;    ///< omega_o, of a cascade that of level 1, rad/s
   double bandwidth_factor = 0.0;      ///< alpha of a cascade
   double controller_bandwidth = 0.0;  ///< omega_c where the law goes by it, rad/s
-  /// Poles of the error, 1/s: of free poles alone.
+  double capture_bandwidth = 0.0;     ///< of a swing that is known, see Resonance
+  /// Poles of the error that a placement places, 1/s; none for a cascade.
   std::vector<std::complex<double>> observer_poles{};
   double disturbance_bound = 0.0;  ///< q_n of the filter, see ExtendedStateFilter
   std::vector<double> gains{};     ///< k_0 .. of the law, whatever it goes by
@@ -60,6 +61,7 @@ namespace detail {
 struct ObserverKind {
   int order = 1;  ///< of the law
   int size = 2;
+  int placed = 2;  ///< poles of a level that are chosen
   int levels = 1;
   double input_gain = 1.0;  ///< of the law
   DynamicMatrix<double> step{}, gamma{};
@@ -121,6 +123,7 @@ inline ObserverKind chain_kind(const TuneModel& model, TuneFamily family, int ex
   const double T = model.sample_time;
   kind.order = n;
   kind.size = size;
+  kind.placed = size;
   kind.levels = levels;
   kind.input_gain = model.input_gain.value;
   kind.step = DynamicMatrix<double>(size, size);
@@ -172,57 +175,91 @@ inline ObserverKind chain_kind(const TuneModel& model, TuneFamily family, int ex
 }
 
 template <ModelParts Parts>
-typename AugmentedModel<Parts>::Settings model_settings(const TuneModel& model) {
+typename AugmentedModel<Parts>::Settings model_settings(const TuneModel& model,
+                                                        const TuneSettings& chosen) {
   typename AugmentedModel<Parts>::Settings settings{};
   if constexpr (Parts.actuator == 1) settings.actuator.time_constant = model.lag;
   if constexpr (Parts.sensor == 1) settings.sensor.time_constant = model.sensor;
   if constexpr (Parts.resonators == 1) {
-    const KnownSwing& swing = model.swings.front();
-    settings.resonators[0] = {swing.frequency, 0.0, swing.capture_bandwidth};
+    settings.resonators[0] = {model.swings.front().frequency, 0.0, chosen.capture_bandwidth};
   }
   return settings;
 }
 
+/// Gains of a model's state for the poles of the part that is corrected, in physical units.
+/// @param specs what the placement asks for, of as many poles as the part has
+template <class Placement, class Model, class Specs>
+bool model_gains(const Model& made, double bandwidth, const Specs& specs,
+                 std::vector<double>& gains) {
+  const double T = made.sample_time();
+  typename Model::State ones;
+  ones.fill(1.0);
+  const auto units = made.physical(ones);
+  return made.with_corrected_part(bandwidth, [&](const auto& part) {
+    using Part = std::remove_cvref_t<decltype(part)>;
+    constexpr int pairs = Part::own_pairs;
+    constexpr int placed = Part::size - 2 * pairs;
+    Array<Contraction<double>, pairs> own{};
+    for (std::size_t i = 0; i < own.size(); ++i) {
+      own[i] = contraction(part.pairs[i][0] * T, part.pairs[i][1] * T);
+    }
+    const auto of_part =
+        placed_gain(part.step, part.output, part.degrees,
+                    with_pairs(pole_factors(Placement::template sample<placed, double>(
+                                   specs(std::integral_constant<int, placed>{}), T)),
+                               own));
+    gains.resize(Model::size);
+    for (int row = 0; row < Model::size; ++row) {
+      const int i = Model::state_of_row(row);
+      double sum = 0.0;
+      for (std::size_t j = 0; j < of_part.size(); ++j) {
+        sum += part.whole(i, static_cast<int>(j)) * of_part[j];
+      }
+      if (!is_finite(sum)) return false;
+      gains[static_cast<std::size_t>(i)] = units(row) * sum;
+    }
+    return true;
+  });
+}
+
 /// An observer that knows parts; none where the model refuses the numbers.
-template <ModelParts Parts, class Placement>
-std::optional<ObserverKind> known_kind(const TuneModel& model) {
+template <ModelParts Parts>
+std::optional<ObserverKind> known_kind(const TuneModel& model, TuneFamily family) {
   using Model = AugmentedModel<Parts>;
-  const double T = model.sample_time;
-  const auto made = Model::make(model_settings<Parts>(model), model.input_gain.value, T);
-  if (!made) return std::nullopt;
+  const auto make = [model](const TuneSettings& settings) {
+    return Model::make(model_settings<Parts>(model, settings), model.input_gain.value,
+                       model.sample_time);
+  };
+  const auto first = make({});
+  if (!first) return std::nullopt;
   ObserverKind kind;
   kind.order = Model::order;
   kind.size = Model::size;
-  kind.input_gain = made->input_gain();
-  const auto matrices = model_matrices(*made);
+  kind.placed = model.order + 1;
+  kind.input_gain = first->input_gain();
+  const auto matrices = model_matrices(*first);
   kind.step = dynamic_copy(matrices.step, Model::size, Model::size);
   kind.gamma = dynamic_copy(matrices.gamma, Model::size, 1);
   for (int r = 0; r < Model::size; ++r) kind.state_of_row.push_back(Model::state_of_row(r));
-  kind.gains = [made = *made, units = matrices.units, T](const TuneSettings& s,
-                                                         std::vector<double>& gains) {
-    return made.with_corrected_part(s.observer_bandwidth, [&](const auto& part) {
-      using Part = std::remove_cvref_t<decltype(part)>;
-      constexpr int pairs = Part::own_pairs;
-      constexpr int placed = Part::size - 2 * pairs;
-      Array<Contraction<double>, pairs> own{};
-      for (std::size_t i = 0; i < own.size(); ++i) {
-        own[i] = contraction(part.pairs[i][0] * T, part.pairs[i][1] * T);
-      }
-      const auto of_part = placed_gain(
-          part.step, part.output, part.degrees,
-          with_pairs(
-              pole_factors(Placement::template sample<placed, double>(s.observer_bandwidth, T)),
-              own));
-      for (int i = 0; i < Model::size; ++i) {
-        double sum = 0.0;
-        for (std::size_t j = 0; j < of_part.size(); ++j) {
-          sum += part.whole(i, static_cast<int>(j)) * of_part[j];
-        }
-        if (!is_finite(sum)) return false;
-        gains.push_back(units(i) * sum);
-      }
-      return true;
-    });
+  kind.gains = [=, plain = *first](const TuneSettings& s, std::vector<double>& gains) {
+    // The capture bandwidth is a setting of the model.
+    const auto given = Parts.resonators > 0 ? make(s) : plain;
+    if (!given) return false;
+    if (family == TuneFamily::free_poles) {
+      // At a bandwidth of zero a sensor is faster and keeps its pole.
+      return model_gains<PoleSet>(
+          *given, 0.0,
+          [&](auto number) {
+            Array<std::complex<double>, number()> poles{};
+            std::copy_n(s.observer_poles.begin(), number(), poles.begin());
+            return poles;
+          },
+          gains);
+    }
+    const auto bandwidth = [&](auto) { return s.observer_bandwidth; };
+    return family == TuneFamily::half_gain
+               ? model_gains<HalfGainPoles>(*given, s.observer_bandwidth, bandwidth, gains)
+               : model_gains<EqualPoles>(*given, s.observer_bandwidth, bandwidth, gains);
   };
   return kind;
 }

@@ -36,6 +36,7 @@ struct LoopNumbers {
   double output = 0.0;         ///< standard deviation of y
   double control = 0.0;        ///< of u~
   double control_noise = 0.0;  ///< of u, by noise alone
+  double tolerance = 0.0;      ///< factor by which b0 may be wrong, either way
   double modulus = 0.0;        ///< margin, the least over b0's interval
   double delay = 0.0;          ///< margin, s, the least over b0's interval
 
@@ -190,7 +191,7 @@ class LoopCost {
   [[nodiscard]] LoopNumbers operator()(const LinearController& controller) const {
     detail::FastResponse response(controller);
     LoopNumbers numbers;
-    numbers.modulus = numbers.delay = std::numeric_limits<double>::infinity();
+    numbers.modulus = numbers.delay = numbers.tolerance = std::numeric_limits<double>::infinity();
     double output = 0.0, control = 0.0, noise = 0.0;
     const double scales[] = {1.0, factor_, 1.0 / factor_};
     Complex before[3];
@@ -218,6 +219,15 @@ class LoopCost {
         const Complex now = turn * (1.0 + scales[g] * loop);
         turned[g] += i == 0 ? std::arg(now) : std::arg(now * std::conj(before[g]));
         before[g] = now;
+      }
+      if (i > 0 && std::signbit(loop.imag()) != std::signbit(trails[0].loop.imag())) {
+        const Complex last = trails[0].loop;
+        const double share = last.imag() / (last.imag() - loop.imag());
+        const double real = last.real() + share * (loop.real() - last.real());
+        // Where both are large a pole at standstill turned L, no crossing.
+        if (real < 0.0 && is_finite(real)) {
+          numbers.tolerance = std::min(numbers.tolerance, std::max(-real, -1.0 / real));
+        }
       }
       for (std::size_t g = 0; g < gains_.size(); ++g) {
         margins(numbers, trails[g].square, trails[g].loop, gains_[g] * loop, i);

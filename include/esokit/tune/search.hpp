@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdlib>
 #include <esokit/core/language.hpp>
 #include <utility>
 #include <vector>
@@ -75,27 +76,51 @@ SearchPoint simplex_search(const Function& f, const std::vector<double>& start,
   return *std::min_element(s.begin(), s.end(), less);
 }
 
-/// The best of an even grid between `low` and `high`, `points` along each coordinate.
+/// The best of an even grid between `low` and `high`, `points` along each coordinate: up to
+/// `count` of them, each at least two steps from those before.
 template <class Function>
-SearchPoint grid_search(const Function& f, const std::vector<double>& low,
-                        const std::vector<double>& high, const std::vector<int>& points) {
-  SearchPoint best;
-  std::vector<int> index(low.size(), 0);
-  for (bool more = true; more;) {
+std::vector<SearchPoint> grid_search(const Function& f, const std::vector<double>& low,
+                                     const std::vector<double>& high,
+                                     const std::vector<int>& points, std::size_t count) {
+  struct Node {
+    double value;
+    std::vector<int> index;
+  };
+  const auto place = [&](const std::vector<int>& index) {
     std::vector<double> x(low.size());
     for (std::size_t j = 0; j < x.size(); ++j) {
       x[j] = points[j] > 1 ? low[j] + (high[j] - low[j]) * index[j] / (points[j] - 1) : low[j];
     }
-    const double value = f(x);
-    if (best.at.empty() || value < best.value) best = {value, x};
+    return x;
+  };
+  std::vector<Node> nodes;
+  std::vector<int> index(low.size(), 0);
+  for (bool more = true; more;) {
+    nodes.push_back({f(place(index)), index});
     more = false;
-    for (std::size_t j = 0; j < x.size() && !more; ++j) {
+    for (std::size_t j = 0; j < index.size() && !more; ++j) {
       if (++index[j] < points[j]) {
         more = true;
       } else {
         index[j] = 0;
       }
     }
+  }
+  std::sort(nodes.begin(), nodes.end(),
+            [](const Node& a, const Node& b) { return a.value < b.value; });
+  std::vector<SearchPoint> best;
+  std::vector<const Node*> taken;
+  for (const Node& node : nodes) {
+    const auto near = [&](const Node* other) {
+      for (std::size_t j = 0; j < node.index.size(); ++j) {
+        if (std::abs(node.index[j] - other->index[j]) > 1) return false;
+      }
+      return true;
+    };
+    if (std::any_of(taken.begin(), taken.end(), near)) continue;
+    taken.push_back(&node);
+    best.push_back({node.value, place(node.index)});
+    if (best.size() == count) break;
   }
   return best;
 }

@@ -49,6 +49,7 @@ struct TunedDesign {
   double load_peak = 0.0;       ///< largest abs(y) after a step of load that one unit of u balances
   double settling_time = 0.0;   ///< of a step of the reference to within 2 %, s
   double modulus_margin = 0.0;  ///< least over b0's interval
+  double gain_tolerance = 0.0;  ///< factor by which b0 may be wrong, either way
   double delay_margin = 0.0;    ///< least over b0's interval, s
   int instructions = 0;         ///< of an update of the observer, see update_instructions
   std::string code;             ///< C++ to paste: type and config of the controller
@@ -133,44 +134,40 @@ struct TuneSearch {
     const int n = c.kind.order;
     const double T = model.sample_time;
     const auto at = [&](int i) { return std::exp(x[static_cast<std::size_t>(i)]); };
-    const auto push = [&](auto& list, const auto& more) {
-      list.insert(list.end(), more.begin(), more.end());
-    };
-    const int first_law = c.observer_numbers;
-    switch (c.design.family) {
-      case TuneFamily::filter:
-        // Intensity R T w^(2 (n + 1)) over a sample.
-        s.disturbance_bound = model.noise * T * std::pow(at(0), c.kind.size);
-        break;
-      case TuneFamily::free_poles:
-        for (int i = 0; i < c.kind.size;) {
-          if (c.kind.size % 2 != 0 && i == 0) {
-            s.observer_poles.push_back(-at(i++));
-          } else {
-            push(s.observer_poles, pole_pair(at(i), at(i + 1)));
-            i += 2;
-          }
-        }
-        break;
-      case TuneFamily::cascade:
-        s.bandwidth_factor = 1.0 + at(1);
-        [[fallthrough]];
-      default:
-        s.observer_bandwidth = at(0);
-    }
-    if (c.law_numbers == 0 || c.design.family != TuneFamily::free_poles) {
-      const double w = c.law_numbers == 0 ? fixed_bandwidth : at(first_law);
-      if (c.law_numbers > 0 && c.design.family == TuneFamily::filter) {
-        s.gains = lqr(n, std::pow(w, -2 * n));
-      } else {
-        s.controller_bandwidth = w;
-        s.gains = polynomial(std::vector<std::complex<double>>(static_cast<std::size_t>(n), -w));
+    // Of an odd number the first is real, the rest are pairs.
+    const auto poles = [&](int first, int count) {
+      std::vector<std::complex<double>> list;
+      int i = first;
+      if (count % 2 != 0) list.push_back(-at(i++));
+      for (; i < first + count; i += 2) {
+        const auto pair = pole_pair(at(i), at(i + 1));
+        list.insert(list.end(), pair.begin(), pair.end());
       }
+      return list;
+    };
+    const bool free = c.design.family == TuneFamily::free_poles;
+    if (free) {
+      s.observer_poles = poles(0, c.kind.placed);
+    } else if (c.design.family == TuneFamily::filter) {
+      // Intensity R T w^(2 (n + 1)) over a sample.
+      s.disturbance_bound = model.noise * T * std::pow(at(0), c.kind.size);
     } else {
-      std::vector<std::complex<double>> poles;
-      if (n % 2 != 0) poles.push_back(-at(first_law));
-      if (n > 1) push(poles, pole_pair(at(first_law + n - 2), at(first_law + n - 1)));
-      s.gains = polynomial(poles);
+      s.observer_bandwidth = at(0);
+    }
+    if (c.design.family == TuneFamily::cascade) s.bandwidth_factor = 1.0 + at(1);
+    if (c.design.knows.swing) {
+      const double given = model.swings.front().capture_bandwidth;
+      s.capture_bandwidth = given > 0.0 ? given : at(1);
+    }
+    const int law = c.observer_numbers;
+    if (c.law_numbers > 0 && free) {
+      s.gains = polynomial(poles(law, n));
+    } else if (c.law_numbers > 0 && c.design.family == TuneFamily::filter) {
+      s.gains = lqr(n, std::pow(at(law), -2 * n));
+    } else {
+      s.controller_bandwidth = c.law_numbers > 0 ? at(law) : fixed_bandwidth;
+      s.gains = polynomial(
+          std::vector<std::complex<double>>(static_cast<std::size_t>(n), -s.controller_bandwidth));
     }
     return s;
   }
@@ -205,7 +202,7 @@ struct TuneSearch {
     const double delay = more * rules.delay_samples * model.sample_time;
     return {modulus > 0.0 ? std::max(1.0 - numbers.modulus / modulus, 0.0) : 0.0,
             delay > 0.0 ? std::max(1.0 - numbers.delay / delay, 0.0) : 0.0,
-            numbers.tolerant ? 0.0 : 1.0};
+            numbers.tolerant ? 0.0 : std::max(1.0 - numbers.tolerance / rules.gain_factor, 0.01)};
   }
 
   /// log J, with a price on margins that are lacking.
@@ -221,25 +218,51 @@ struct TuneSearch {
     if (!numbers.stable) return 1e4;
     const double j = numbers.cost(rho, model.input_gain.value);
     if (!(j > 0.0) || !is_finite(j)) return 1e4;
-    return std::log(j) + (margins ? 10.0 * lack(numbers, 1.003).sum() : 0.0);
+    return std::log(j) + (margins ? 40.0 * lack(numbers, 1.002).sum() : 0.0);
   }
 
   /// What number i of the search is: a damping, a factor, or a bandwidth.
   [[nodiscard]] bool damping(const Contender& c, std::size_t index) const {
     if (c.design.family != TuneFamily::free_poles) return false;
     const int i = static_cast<int>(index);
-    if (i < c.observer_numbers) return i > 0 && (c.kind.size - i) % 2 != 0;
-    const int j = i - c.observer_numbers;
-    return j > 0 && (c.kind.order - j) % 2 != 0;
+    const int count = i < c.observer_numbers ? c.kind.placed : c.kind.order;
+    const int place = i < c.observer_numbers ? i : i - c.observer_numbers;
+    return (place - count % 2) % 2 != 0 && place >= count % 2;
   }
   [[nodiscard]] bool factor(const Contender& c, std::size_t i) const {
     return c.design.family == TuneFamily::cascade && i == 1;
   }
+  [[nodiscard]] bool capture(const Contender& c, std::size_t i) const {
+    return c.design.knows.swing && c.observer_numbers == 2 && i == 1;
+  }
   [[nodiscard]] double low(const Contender& c, std::size_t i) const {
-    return std::log(damping(c, i) ? 0.2 : factor(c, i) ? 0.1 : slowest());
+    return std::log(damping(c, i)   ? 0.2
+                    : factor(c, i)  ? 0.1
+                    : capture(c, i) ? 0.003 * model.swings.front().frequency
+                                    : slowest());
   }
   [[nodiscard]] double high(const Contender& c, std::size_t i) const {
-    return std::log(damping(c, i) ? 4.0 : factor(c, i) ? 8.0 : fastest());
+    return std::log(damping(c, i)   ? 4.0
+                    : factor(c, i)  ? 8.0
+                    : capture(c, i) ? 3.0 * model.swings.front().frequency
+                                    : fastest());
+  }
+
+  /// Where the search for free poles begins: the observer at `o`, the law at `l`, as half gain does
+  /// or with all poles in one place.
+  [[nodiscard]] std::vector<double> start(const Contender& c, double o, double l, bool half) const {
+    std::vector<double> x;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(c.observer_numbers + c.law_numbers); ++i) {
+      const bool of_observer = static_cast<int>(i) < c.observer_numbers;
+      double value = damping(c, i) ? std::log(half ? 0.6 : 0.95) : std::log(of_observer ? o : l);
+      // With a lag the law has a pole more, and the lag is it.
+      if (!of_observer && half && c.design.knows.lag && static_cast<int>(i) == c.observer_numbers &&
+          c.kind.order % 2 != 0) {
+        value = std::max(value, -std::log(model.lag));
+      }
+      x.push_back(std::clamp(value, low(c, i), high(c, i)));
+    }
+    return x;
   }
 
   /// The least of a family. @param starts to begin with instead of a scan
@@ -259,8 +282,10 @@ struct TuneSearch {
         points.push_back(factor(c, i) ? 4 : numbers > 2 ? 9 : 12);
         step[i] = 0.5 * (to[i] - from[i]) / (points[i] - 1);
       }
-      best = grid_search(f, from, to, points);
-      best = simplex_search(f, best.at, step, 60 * static_cast<int>(numbers));
+      for (const SearchPoint& start : grid_search(f, from, to, points, 3)) {
+        const auto found = simplex_search(f, start.at, step, 40 * static_cast<int>(numbers));
+        if (found.value < best.value) best = found;
+      }
     }
     for (const auto& start : starts) {
       const auto found = simplex_search(f, start, step, 60 * static_cast<int>(numbers));
@@ -321,6 +346,7 @@ inline void fill_in(Contender& c, const TuneSearch& search, const LoopCost& fine
   d.control_noise = numbers.control_noise;
   d.modulus_margin = numbers.modulus;
   d.delay_margin = numbers.delay;
+  d.gain_tolerance = numbers.tolerance;
   const auto lack = search.lack(numbers, 0.999);
   d.feasible = numbers.stable && lack.sum() <= 0.0;
   if (!numbers.stable) {
@@ -334,7 +360,8 @@ inline void fill_in(Contender& c, const TuneSearch& search, const LoopCost& fine
   } else {
     const double modulus = numbers.modulus / search.rules.modulus_margin;
     const double delay = numbers.delay / (search.rules.delay_samples * model.sample_time);
-    d.constraint = std::min(modulus, delay) > 1.03 ? "b0 wrong by a factor"
+    const double gain = numbers.tolerance / search.rules.gain_factor;
+    d.constraint = gain < std::min(modulus, delay) ? "b0 wrong by a factor"
                    : modulus <= delay              ? "modulus margin"
                                                    : "delay margin";
   }
@@ -355,6 +382,12 @@ inline std::string controller_source(const TunedDesign& d, const TuneModel& mode
     for (const double number : numbers) text += (text.empty() ? "" : ", ") + source(number);
     return text;
   };
+  const auto poles = [&](std::string text) {
+    for (const auto& p : d.settings.observer_poles) {
+      text += (text.empty() ? "{" : ", {") + source(p.real()) + ", " + source(p.imag()) + "}";
+    }
+    return ".poles = {{" + text + "}}";
+  };
   std::string type, config;
   if (d.knows.any()) {
     type = "esokit::ModelEso<esokit::ModelParts{.order = " + n;
@@ -370,15 +403,16 @@ inline std::string controller_source(const TunedDesign& d, const TuneModel& mode
     }
     if (d.knows.swing) {
       type += ", .resonators = 1";
-      const KnownSwing& swing = model.swings.front();
-      part(".resonators = {{{.frequency = " + source(swing.frequency) +
-           (swing.capture_bandwidth > 0.0
-                ? ", .capture_bandwidth = " + source(swing.capture_bandwidth)
-                : "") +
-           "}}}");
+      part(".resonators = {{{.frequency = " + source(model.swings.front().frequency) +
+           ", .capture_bandwidth = " + source(d.settings.capture_bandwidth) + "}}}");
     }
-    type += d.family == TuneFamily::half_gain ? "}, double, esokit::HalfGainPoles>" : "}>";
-    config = ".observer_bandwidth = " + source(d.settings.observer_bandwidth);
+    const bool free = d.family == TuneFamily::free_poles;
+    type += d.family == TuneFamily::half_gain ? "}, double, esokit::HalfGainPoles>"
+            : free                            ? "}, double, esokit::PoleSet>"
+                                              : "}>";
+    // The lag keeps its pole.
+    config = free ? poles("{" + source(-1.0 / model.lag) + ", 0.0}")
+                  : ".observer_bandwidth = " + source(d.settings.observer_bandwidth);
     config += ", .input_gain = " + source(model.input_gain.value) +
               ", .sample_time = " + source(model.sample_time) + ", .model = {" + parts + "}";
   } else {
@@ -410,15 +444,10 @@ inline std::string controller_source(const TunedDesign& d, const TuneModel& mode
                  ".mode = esokit::RiccatiMode::frozen";
         break;
       }
-      case TuneFamily::free_poles: {
+      case TuneFamily::free_poles:
         type = "esokit::LinearEso<" + n + ", double, 1, esokit::PoleSet>";
-        std::string poles;
-        for (const auto& p : d.settings.observer_poles) {
-          poles += (poles.empty() ? "{" : ", {") + source(p.real()) + ", " + source(p.imag()) + "}";
-        }
-        config = ".poles = {{" + poles + "}}, " + common;
+        config = poles("") + ", " + common;
         break;
-      }
     }
   }
   const bool by_bandwidth = d.settings.controller_bandwidth > 0.0;
@@ -446,9 +475,10 @@ inline std::vector<Contender> contenders(const TuneModel& model, bool law_is_giv
     c.kind = std::move(*kind);
     if (family == TuneFamily::cascade) c.observer_numbers = 2;
     if (family == TuneFamily::free_poles) {
-      c.observer_numbers = c.kind.size;
+      c.observer_numbers = c.kind.placed;
       c.law_numbers = c.kind.order;
     }
+    if (knows.swing && !(model.swings.front().capture_bandwidth > 0.0)) c.observer_numbers = 2;
     if (law_is_given) c.law_numbers = 0;
     all.push_back(std::move(c));
   };
@@ -465,26 +495,32 @@ inline std::vector<Contender> contenders(const TuneModel& model, bool law_is_giv
   chain(TuneFamily::free_poles, "LinearEso, free poles", 1, 1);
   with_number<1, 3>(model.order, [&](auto number) {
     constexpr int order = number();
-    const auto known = [&](auto parts, const TuneKnowledge& knows, const std::string& name) {
+    const auto known = [&](auto parts, TuneFamily family, const char* type, const char* what,
+                           const TuneKnowledge& knows) {
       constexpr ModelParts p = decltype(parts)::value;
-      take(TuneFamily::linear, "LinearEso that knows " + name, knows, 1, 1,
-           known_kind<p, EqualPoles>(model));
-      take(TuneFamily::half_gain, "HalfGainEso that knows " + name, knows, 1, 1,
-           known_kind<p, HalfGainPoles>(model));
+      take(family, std::string(type) + " that knows " + what, knows, 1, 1,
+           known_kind<p>(model, family));
+    };
+    const auto both = [&](auto parts, const char* what, const TuneKnowledge& knows) {
+      known(parts, TuneFamily::linear, "LinearEso", what, knows);
+      known(parts, TuneFamily::half_gain, "HalfGainEso", what, knows);
     };
     const bool lag = model.lag > 0.0, sensor = model.sensor > 0.0, swing = !model.swings.empty();
     using L = std::integral_constant<ModelParts, ModelParts{.order = order, .actuator = 1}>;
-    if (lag) known(L{}, {.lag = true}, "the lag");
+    if (lag) {
+      both(L{}, "the lag", {.lag = true});
+      known(L{}, TuneFamily::free_poles, "LinearEso, free poles,", "the lag", {.lag = true});
+    }
     using F = std::integral_constant<ModelParts, ModelParts{.order = order, .sensor = 1}>;
-    if (sensor) known(F{}, {.sensor = true}, "the sensor");
+    if (sensor) both(F{}, "the sensor", {.sensor = true});
     using Q = std::integral_constant<ModelParts, ModelParts{.order = order, .resonators = 1}>;
-    if (swing) known(Q{}, {.swing = true}, "the swing");
+    if (swing) both(Q{}, "the swing", {.swing = true});
     using LF =
         std::integral_constant<ModelParts, ModelParts{.order = order, .actuator = 1, .sensor = 1}>;
-    if (lag && sensor) known(LF{}, {.lag = true, .sensor = true}, "lag and sensor");
+    if (lag && sensor) both(LF{}, "lag and sensor", {.lag = true, .sensor = true});
     using LQ = std::integral_constant<ModelParts,
                                       ModelParts{.order = order, .actuator = 1, .resonators = 1}>;
-    if (lag && swing) known(LQ{}, {.lag = true, .swing = true}, "lag and swing");
+    if (lag && swing) both(LQ{}, "lag and swing", {.lag = true, .swing = true});
     return 0;
   });
   return all;
@@ -583,30 +619,25 @@ double bandwidth_for(const Function& rises, double wanted, double low, double hi
   const LoopCost cost(model, rules, search.slowest());
   const LoopCost fine(model, rules, search.slowest(), 50.0);
   search.cost = &cost;
-  tuning.lqg = fine(lqg.controller(tuning.rho));
+  // What swings at a known frequency can be cancelled for nothing.
+  TuneModel walking = model;
+  walking.swings.clear();
+  tuning.lqg = LoopCost(walking, rules, search.slowest(), 50.0)(lqg.controller(tuning.rho));
   tuning.optimum = tuning.lqg.cost(tuning.rho, b0);
   std::vector<detail::Contender> all = detail::contenders(model, wish.controller_bandwidth > 0.0);
   for (detail::Contender& c : all) {
     std::vector<std::vector<double>> starts;
     if (c.design.family == TuneFamily::free_poles) {
-      // From the families that are in this one.
+      starts.push_back(search.start(c, search.filter_bandwidth, w, true));
+      // And from the families that are in this one.
       for (const detail::Contender& other : all) {
         const bool half = other.design.family == TuneFamily::half_gain;
-        if (other.design.knows.any() || other.design.extension > 1 ||
-            !(half || other.design.family == TuneFamily::linear)) {
-          continue;
+        if (other.design.knows == c.design.knows && other.design.extension == 1 &&
+            (half || other.design.family == TuneFamily::linear)) {
+          const TuneSettings& found = other.design.settings;
+          starts.push_back(
+              search.start(c, found.observer_bandwidth, found.controller_bandwidth, half));
         }
-        const double o = std::log(other.design.settings.observer_bandwidth);
-        const double l = std::log(other.design.settings.controller_bandwidth);
-        std::vector<double> start;
-        const auto numbers = static_cast<std::size_t>(c.observer_numbers + c.law_numbers);
-        for (std::size_t i = 0; i < numbers; ++i) {
-          const bool of_observer = static_cast<int>(i) < c.observer_numbers;
-          start.push_back(search.damping(c, i) ? (half && of_observer ? -0.5 : -0.05)
-                          : of_observer        ? o - (half ? 0.3 : 0.0)
-                                               : l);
-        }
-        starts.push_back(std::move(start));
       }
     }
     const auto free = search.least(c, false, starts);

@@ -1,0 +1,132 @@
+/// @file
+/// The controller of a tuned design, ready to run.
+#pragma once
+
+#include <algorithm>
+#include <complex>
+#include <esokit/control/adrc.hpp>
+#include <esokit/gain/model_gain.hpp>
+#include <esokit/gain/pole_set.hpp>
+#include <esokit/observer/cascade_eso.hpp>
+#include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/model_eso.hpp>
+#include <esokit/tune/tune.hpp>
+#include <numbers>
+#include <vector>
+
+namespace esokit {
+
+namespace detail {
+
+template <class Config>
+struct ControllerOfConfig;
+template <class Observer>
+struct ControllerOfConfig<AdrcConfig<Observer>> {
+  using type = Adrc<Observer>;
+};
+template <class Config>
+using ControllerOf = typename ControllerOfConfig<Config>::type;
+
+/// Poles of the error that a design places, 1/s.
+template <int Order>
+std::vector<std::complex<double>> placed_poles(const TuneModel& model, const TunedDesign& d) {
+  const int size = Order + d.extension;
+  const double w = d.settings.observer_bandwidth;
+  const double T = model.sample_time;
+  if (d.family == TuneFamily::free_poles) return d.settings.observer_poles;
+  std::vector<std::complex<double>> poles(static_cast<std::size_t>(size), -w);
+  if (d.family == TuneFamily::half_gain) {
+    // -w / 2 (1 + j cot(theta / 2)), see gain/half_gain.hpp
+    for (int k = 0; k < size; ++k) {
+      const bool real = 2 * k + 1 == size;
+      const double half = 0.5 * std::numbers::pi * (2 * std::min(k, size - 1 - k) + 1) / size;
+      const double imaginary = real ? 0.0 : 0.5 * w / std::tan(half);
+      poles[static_cast<std::size_t>(k)] = {-0.5 * w, 2 * k < size ? -imaginary : imaginary};
+    }
+  } else if (d.family == TuneFamily::filter) {
+    const auto kind = chain_kind(model, d.family, d.extension, 1);
+    std::vector<double> gains;
+    kind.gains(d.settings, gains);
+    // (I - k C) Phi - I
+    auto error = kind.step;
+    for (int i = 0; i < size; ++i) {
+      for (int j = 0; j < size; ++j) {
+        error(i, j) -=
+            gains[static_cast<std::size_t>(i)] * (kind.step(0, j) + (j == 0 ? 1.0 : 0.0));
+      }
+    }
+    poles = poles_of(error);
+    std::sort(poles.begin(), poles.end(),
+              [](const auto& a, const auto& b) { return std::abs(a.imag()) < std::abs(b.imag()); });
+    for (std::size_t i = 0; i < poles.size(); ++i) {
+      // Rounding leaves conjugates that differ.
+      const bool pair =
+          i + 1 < poles.size() && std::abs(poles[i].imag()) > 1e-9 * std::abs(poles[i]);
+      poles[i] = std::log(1.0 + (pair ? poles[i] : std::complex<double>(poles[i].real()))) / T;
+      if (pair) {
+        poles[i + 1] = std::conj(poles[i]);
+        ++i;
+      }
+    }
+  }
+  return poles;
+}
+
+}  // namespace detail
+
+/// Calls `visit(controller)` with the Adrc of a design of a plant of order `Order`, within the
+/// actuator's limits, and returns what it returns.
+///
+/// So that not each family is a type of its own, what has one level is a LinearEso with the poles
+/// of the design (with m = 1 or 2, or that knows the lag): the same gains, but for rounding, as the
+/// code that is pasted. A cascade is a CascadeEso.
+/// @return error for a model of another order, for a design that knows more than the lag (its code
+///         says what it is), and for what `make` refuses
+template <int Order, class Visit>
+Check<double> with_controller(const TuneModel& model, const TunedDesign& design,
+                              const Visit& visit) {
+  Rules<double> rules;
+  rules.all_of(model.check())
+      .require(model.order == Order,
+               {"order", static_cast<double>(model.order), "is not the one that is asked for:", -1,
+                static_cast<double>(Order), true})
+      .require(!design.knows.sensor && !design.knows.swing, "knows", 1.0,
+               "more than the lag: see the code of the design");
+  if (!rules) return rules.error();
+  const auto run = [&](auto config) -> Check<double> {
+    using Config = decltype(config);
+    config.observer.input_gain = model.input_gain.value;
+    config.observer.sample_time = model.sample_time;
+    config.gains.emplace();
+    std::copy_n(design.settings.gains.begin(), config.gains->size(), config.gains->begin());
+    config.limits.lower = model.u_min;
+    config.limits.upper = model.u_max;
+    auto controller = detail::ControllerOf<Config>::make(config);
+    if (!controller) return controller.error();
+    visit(*controller);
+    return {};
+  };
+  if (design.levels > 1) {
+    return detail::with_number<2, 3>(design.levels, [&](auto levels) {
+      AdrcConfig<CascadeEso<Order, levels()>> config;
+      config.observer.observer_bandwidth = design.settings.observer_bandwidth;
+      config.observer.bandwidth_factor = design.settings.bandwidth_factor;
+      return run(config);
+    });
+  }
+  auto poles = detail::placed_poles<Order>(model, design);
+  if (design.knows.lag) {
+    AdrcConfig<ModelEso<ModelParts{.order = Order, .actuator = 1}, double, PoleSet>> config;
+    config.observer.model.actuator.time_constant = model.lag;
+    poles.insert(poles.begin(), -1.0 / model.lag);
+    std::copy_n(poles.begin(), config.observer.poles.size(), config.observer.poles.begin());
+    return run(config);
+  }
+  return detail::with_number<1, 2>(design.extension, [&](auto extension) {
+    AdrcConfig<LinearEso<Order, double, extension(), PoleSet>> config;
+    std::copy_n(poles.begin(), config.observer.poles.size(), config.observer.poles.begin());
+    return run(config);
+  });
+}
+
+}  // namespace esokit
