@@ -283,6 +283,92 @@ TEST(ModelSwing, BesideItsFrequencyItIsFarBelowAChainOfEqualNoise) {
   }
 }
 
+// ---- The parts of a disturbance.
+
+constexpr ModelParts read_parts{.order = 2, .constants = 2, .resonators = 2, .leaky = 1};
+
+/// d = 3 + 0.5 t + 2 sin(90 t + 0.4) + 0.7 sin(25 t - 1) + 4 exp(-t / 0.8) on a double integrator:
+/// what `feed(y)` was fed with is what `disturbance_parts` of `reader` tells.
+template <class Feed, class Reader>
+void reads_the_parts(const char* what, const Feed& feed, const Reader& reader, double sign = 1) {
+  SCOPED_TRACE(what);
+  double t = 0;
+  for (int k = 1; k <= 2500; ++k) {
+    t = k * kT;
+    feed(1.5 * t * t + 0.5 / 6 * t * t * t - 2 / 8100.0 * std::sin(90 * t + 0.4) -
+         0.7 / 625.0 * std::sin(25 * t - 1) + 4 * 0.64 * std::exp(-t / 0.8));
+  }
+  const auto parts = esokit::disturbance_parts(reader());
+  EXPECT_NEAR(parts.constant, sign * (3 + 0.5 * t), 1e-5);
+  EXPECT_NEAR(parts.swings[0].amplitude, 2.0, 1e-6);
+  EXPECT_NEAR(parts.swings[1].amplitude, 0.7, 1e-6);
+  EXPECT_NEAR(std::sin(parts.swings[0].phase), sign * std::sin(90 * t + 0.4), 1e-6);
+  EXPECT_NEAR(std::cos(parts.swings[0].phase), sign * std::cos(90 * t + 0.4), 1e-6);
+  EXPECT_NEAR(std::sin(parts.swings[1].phase), sign * std::sin(25 * t - 1), 1e-6);
+  EXPECT_NEAR(parts.fading[0], sign * 4 * std::exp(-t / 0.8), 1e-5);
+}
+
+TEST(DisturbanceParts, AreReadThroughEveryObserverAdapterAndController) {
+  using Model = AugmentedModel<read_parts>;
+  using Eso = ModelEso<read_parts>;
+  const Model::Settings settings{.resonators = {{{90.0}, {25.0}}}, .leaky = {0.8}};
+  const Eso::Config config{
+      .observer_bandwidth = 60.0, .input_gain = 1.0, .sample_time = kT, .model = settings};
+  const auto check = [](const char* what, auto made) {
+    ASSERT_TRUE(made) << what << ": " << made.error();
+    reads_the_parts(
+        what, [&](double y) { (void)made->update(y, 0.0); }, [&] { return *made; });
+  };
+  check("LinearEso", Eso::make(config));
+  using Cascade = esokit::CascadeEso<2, 2, double, Model::extension, esokit::EqualPoles, Model>;
+  check("CascadeEso", Cascade::make({.observer_bandwidth = 40.0,
+                                     .bandwidth_factor = 2.0,
+                                     .input_gain = 1.0,
+                                     .sample_time = kT,
+                                     .model = settings}));
+  check("DelayedInput", esokit::DelayedInput<Eso, 3>::make({.observer = config, .delay = 3}));
+  check("OutlierGate in VariableTime",
+        esokit::VariableTime<esokit::OutlierGate<Eso>>::make(
+            {.observer = {.observer = config, .threshold = 5.0}, .ratio = 2.0}));
+  check("WrappedOutput", esokit::WrappedOutput<Eso>::make({.observer = config, .period = 100.0}));
+  const auto controls = [&](const char* what, auto made, double sign) {
+    ASSERT_TRUE(made) << what << ": " << made.error();
+    reads_the_parts(
+        what, [&](double y) { (void)made->update(y, 0.0, 0.0); }, [&] { return *made; }, sign);
+  };
+  controls("Adrc", Adrc<Eso>::make({.observer = config, .controller_bandwidth = 10.0}), 1);
+  controls("error-based Adrc in a nest",
+           Adrc<esokit::DelayedInput<Eso, 2>, esokit::ErrorBased>::make(
+               {.observer = {.observer = config, .delay = 1}, .controller_bandwidth = 10.0}),
+           -1);
+  // A plant given as a whole.
+  using Whole = esokit::PlantEso<2, read_parts>;
+  check("PlantEso", Whole::make({.observer_bandwidth = 60.0,
+                                 .input_gain = 1.0,
+                                 .sample_time = kT,
+                                 .model = {.plant = esokit::LinearPlant<2>::chain({}).value(),
+                                           .resonators = settings.resonators,
+                                           .leaky = settings.leaky}}));
+  // A filter, which tells a ramp from what fades by its own weights only: their sum.
+  using Filter =
+      esokit::ExtendedStateFilter<2, double, Model::extension, esokit::NoNominalModel, 0, Model>;
+  Filter::Config filter;
+  filter.input_gain = 1.0;
+  filter.sample_time = kT;
+  filter.measurement_variance = 1e-12;
+  filter.plant_model = settings;
+  filter.disturbance_bounds = {0, 0, 1, 1, 1, 1, 1, 1, 1};
+  filter.inflation_rule = esokit::InflationRule::none;
+  filter.initial_covariance = Filter::Covariance::Identity();
+  auto recursive = Filter::make(filter);
+  ASSERT_TRUE(recursive) << recursive.error();
+  for (int k = 0; k < 300; ++k) (void)recursive->update(std::sin(0.1 * k), 0.3);
+  const auto parts = esokit::disturbance_parts(*recursive);
+  double sum = parts.constant + parts.fading[0];
+  for (const auto& swing : parts.swings) sum += swing.amplitude * std::sin(swing.phase);
+  EXPECT_NEAR(sum, recursive->total_disturbance(), 1e-9 * std::abs(sum));
+}
+
 // ---- Adapters.
 
 TEST(ModelAdapters, DelayGateAngleAndTimeWorkWithIt) {

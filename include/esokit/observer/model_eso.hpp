@@ -9,6 +9,8 @@
 #include <esokit/model/plant_model.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <type_traits>
+#include <utility>
 
 namespace esokit {
 
@@ -99,5 +101,51 @@ using ModelCascadeEso =
 template <int States, ModelParts Parts, PlainScalar S = double, class Placement = EqualPoles>
 using PlantEso = LinearEso<Parts.order, S, LinearPlantModel<States, Parts, S>::extension, Placement,
                            LinearPlantModel<States, Parts, S>>;
+
+/// What a disturbance consists of, each in the unit of d: that of y^(n), or as E says of a
+/// LinearPlantModel.
+template <class Model>
+struct DisturbanceParts {
+  using S = std::remove_cvref_t<decltype(std::declval<const Model&>().sample_time())>;  ///< scalar
+
+  S constant{};                                     ///< the constant, or polynomial, now
+  Array<Swing<S>, Model::parts.resonators> swings;  ///< each sine: constant() + a sin(phase) + ..
+  Array<S, Model::parts.leaky> fading;              ///< what fades, now
+};
+
+/// The parts of the disturbance that an observer with a model of parts has found, or the observer
+/// in an adapter, in any number of them, or in a controller.
+///
+/// They are of d, not of D: without the plant's poles and the actuator, which `total_disturbance`
+/// has in it. An error-based controller observes r - y, whose disturbance has the opposite sign.
+template <class Observer>
+[[nodiscard]] auto disturbance_parts(const Observer& observer) {
+  if constexpr (requires {
+                  observer.model().constant(observer.estimate());
+                  observer.model().parts;
+                }) {
+    const auto& model = observer.model();
+    using Model = std::remove_cvref_t<decltype(model)>;
+    const auto z = observer.estimate();
+    DisturbanceParts<Model> parts;
+    parts.constant = model.constant(z);
+    if constexpr (Model::parts.resonators > 0) {
+      for (int i = 0; i < Model::parts.resonators; ++i) {
+        parts.swings[static_cast<std::size_t>(i)] = model.swing(z, i);
+      }
+    }
+    if constexpr (Model::parts.leaky > 0) {
+      for (int i = 0; i < Model::parts.leaky; ++i) {
+        parts.fading[static_cast<std::size_t>(i)] = model.fading(z, i);
+      }
+    }
+    return parts;
+  } else {
+    static_assert(
+        requires { observer.observer(); },
+        "esokit: the parts of a disturbance are those of an AugmentedModel or a LinearPlantModel");
+    return disturbance_parts(observer.observer());
+  }
+}
 
 }  // namespace esokit
