@@ -18,9 +18,8 @@ namespace esokit::sim {
 /// One number of each run: mean, deviation, extremes with their run, quantiles, and how often a
 /// limit was kept.
 ///
-/// For the quantiles numbers are counted in bins of 2^-10 of their size: right to 0.1 % of
-/// themselves whatever the unit. That takes 8 kB for each power of two in which numbers lie, 32 MB
-/// at most.
+/// For the quantiles numbers are counted in bins of 2^-12 of their size: right to 0.025 % of
+/// themselves whatever the unit. That takes 32 kB for each power of two in which numbers lie.
 class RunStatistics {
  public:
   /// @param name what it is @param limit what the number must not be above, for `kept`
@@ -44,7 +43,7 @@ class RunStatistics {
     }
     if (value <= limit_) ++kept_;
     const std::uint64_t ordered = in_order(value);
-    ++pages_[ordered >> 52u][static_cast<std::size_t>((ordered >> 42u) & 1023u)];
+    ++pages_[ordered >> 52u][static_cast<std::size_t>((ordered >> 40u) & 4095u)];
   }
 
   /// What it is.
@@ -77,9 +76,9 @@ class RunStatistics {
       for (std::size_t i = 0; i < counts.size(); ++i) {
         const auto here = static_cast<double>(counts[i]);
         if (here > 0.0 && below <= here) {
-          const std::uint64_t first = (page << 52u) | (static_cast<std::uint64_t>(i) << 42u);
+          const std::uint64_t first = (page << 52u) | (static_cast<std::uint64_t>(i) << 40u);
           const double low = number_of(first);
-          const double high = number_of(first + ((std::uint64_t{1} << 42u) - 1u));
+          const double high = number_of(first + ((std::uint64_t{1} << 40u) - 1u));
           const double inside = below > 0.0 ? below / here : 0.0;
           return std::fmin(std::fmax(low + (high - low) * inside, smallest_), largest_);
         }
@@ -110,7 +109,7 @@ class RunStatistics {
   double squares_ = 0.0;  ///< of the differences to the mean
   double smallest_ = 0.0, largest_ = 0.0;
   std::int64_t run_of_smallest_ = 0, run_of_largest_ = 0;
-  std::map<std::uint64_t, std::array<std::uint64_t, 1024>> pages_;  ///< by sign and exponent
+  std::map<std::uint64_t, std::array<std::uint64_t, 4096>> pages_;  ///< by sign and exponent
 };
 
 }  // namespace esokit::sim
