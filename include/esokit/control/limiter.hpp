@@ -118,7 +118,7 @@ class Limiter {
         high_(limits.upper),
         rate_limited_(!all(limits.rate >= Limits<S>{}.rate) && all(is_finite(step_))) {
     // So that in a pack it binds as little as if it were not there.
-    if (rate_limited_ == false) step_ = S(std::numeric_limits<LaneScalar<S>>::infinity());
+    if (rate_limited_ == false) step_ = S(detail::unbounded<LaneScalar<S>>());
     track(within(S(0.0)));
   }
 

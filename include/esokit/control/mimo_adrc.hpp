@@ -262,7 +262,7 @@ class MimoAdrc {
                            detail::DenseView<S>{inverse.data(), channels});
     S condition = column_norm(scaled) * column_norm(inverse);
     if (!is_finite(inverse.sum()) || !is_finite(condition)) {
-      condition = std::numeric_limits<S>::infinity();
+      condition = detail::unbounded<S>();
     }
     if (!is_finite(condition) || condition > config.condition_limit) {
       return Error<S>{"input_matrix",

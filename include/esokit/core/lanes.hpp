@@ -105,6 +105,11 @@ struct LaneAccess {
   static constexpr auto fields(Object& object) noexcept {
     return std::remove_const_t<Object>::fields(object);
   }
+  // Not by a friend template with constraints: Clang 16 takes them for another template's.
+  template <class Object, class S>
+  static constexpr auto update_advanced(Object& object, const S& y, const S& u) noexcept {
+    return object.update_advanced(y, u);
+  }
 };
 
 /// A std::array or a Matrix.

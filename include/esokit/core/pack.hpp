@@ -246,7 +246,7 @@ class Pack {
   /// Neither NaN nor infinite, by bits: under -ffast-math too.
   ESOKIT_INLINE friend constexpr Mask is_finite(const Pack& a) noexcept {
     [[maybe_unused]] constexpr auto exponent =
-        std::bit_cast<detail::BitsOf<S>>(std::numeric_limits<S>::infinity());
+        std::bit_cast<detail::BitsOf<S>>(detail::unbounded<S>());
     if (std::is_constant_evaluated()) {  // GCC 12 folds no `and` of vectors
       return Mask(
           by_bits<Bits>(a, [&](auto bits) { return (bits & exponent) != exponent ? -1 : 0; }));

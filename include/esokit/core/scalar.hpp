@@ -35,6 +35,12 @@ constexpr T opaque(T value) noexcept {
   return value;
 }
 
+/// Infinity by its bits and by another name: Clang 19 warns of the word itself under -ffast-math.
+template <class S>
+constexpr S unbounded() noexcept {
+  return S(std::bit_cast<float>(0x7f800000u));
+}
+
 constexpr bool finite_bits(float value) noexcept {
   return (std::bit_cast<std::uint32_t>(opaque(value)) & 0x7f800000u) != 0x7f800000u;
 }

@@ -48,7 +48,7 @@ constexpr S least_factor(const S& power) noexcept {
 /// (1 + sec(pi/N)^N), 0 for N = 2, without an upper end.
 template <int Size>
 constexpr Interval<double> constant_gain_interval() noexcept {
-  return {detail::least_factor<Size>(1.0), std::numeric_limits<double>::infinity()};
+  return {detail::least_factor<Size>(1.0), detail::unbounded<double>()};
 }
 
 /// The same for the sampled observer: 1 / (1 + (c / cos(pi/N))^N) < k < 1 / (1 - c^N).

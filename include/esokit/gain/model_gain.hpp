@@ -68,7 +68,7 @@ struct PartDesign {
     S most(0.0);
     for (int i = 0; i < Size; ++i) {
       for (int j = 0; j < Size; ++j) {
-        if (!all(is_finite(a(i, j)))) return S(std::numeric_limits<double>::infinity());
+        if (!all(is_finite(a(i, j)))) return detail::unbounded<S>();
         const S size = absolute(a(i, j));
         most = select(most < size, size, most);
       }

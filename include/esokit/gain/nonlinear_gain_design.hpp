@@ -134,7 +134,7 @@ Expected<Interval<S>, Error<S>> find_limits(const GainLimits<S>& asked, const Ga
 /// Where `inside(x)` is false, x in error scales; ends to 1e-6 relative.
 template <PlainScalar S, class Inside>
 ErrorRanges<S> ranges_outside(const Inside& inside, S scale) {
-  constexpr S infinite = std::numeric_limits<S>::infinity();
+  constexpr S infinite = detail::unbounded<S>();
   ErrorRanges<S> found;
   S before(0);
   bool was_inside = true;

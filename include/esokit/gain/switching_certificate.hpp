@@ -151,7 +151,7 @@ template <int Size, PlainScalar S>
   if (rule == SwitchingRule::abeso) {
     const S here = std::tanh(x / S(2));
     const S t = above ? here / least : here * least;
-    if (!(t < S(1))) return std::numeric_limits<S>::infinity();
+    if (!(t < S(1))) return detail::unbounded<S>();
     return std::log1p(S(2) * t / (S(1) - t)) / x;
   }
   // rho and 1 / rho change roles: the range is symmetric in the logarithm.

@@ -459,11 +459,6 @@ class PredictorCorrector {
  private:
   friend struct detail::LaneAccess;
   friend struct detail::GuardAccess;
-  template <int OtherOrder, Scalar OtherS, int OtherExtension, class OtherLaw, int OtherLevels,
-            class OtherModel>
-  requires GainLaw<OtherLaw, OtherOrder + OtherExtension, OtherS> &&
-      SampledModel<OtherModel, OtherS>
-  friend class PredictorCorrector;
 
   using LevelStates = Array<State, Levels>;
   using Plain = detail::PlainTwin<PredictorCorrector, S>;  ///< a lane
@@ -750,8 +745,9 @@ class PredictorCorrector {
   using Given = std::conditional_t<PackScalar<S>, const S&, S>;
   ESOKIT_COLD Status update_guarded(Given y, Given u_applied) noexcept {
     if constexpr (PackScalar<S>) {
-      return each_lane(
-          [&](Plain& lane, int i) { return lane.update_advanced(y[i], u_applied[i]); });
+      return each_lane([&](Plain& lane, int i) {
+        return detail::LaneAccess::update_advanced(lane, y[i], u_applied[i]);
+      });
     } else {
       if constexpr (has_squares) {
         if (gap_ == 0) {  // only too large for its squares, perhaps
