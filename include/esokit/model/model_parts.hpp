@@ -212,11 +212,14 @@ void check_lag(Rules<S>& rules, const char* field, const char*, const Lag<1, S>&
 template <PlainScalar S>
 void check_lag(Rules<S>& rules, const char* field, const char* damping, const Lag<2, S>& lag,
                const S& time) {
+  // The faster of two time constants is 1 / (w spread).
+  const S spread =
+      lag.damping > S(1) ? S(lag.damping + std::sqrt(lag.damping * lag.damping - S(1))) : S(1);
   rules.positive(field, lag.frequency)
       .positive(damping, lag.damping)
       .require(lag.frequency * time <= S(100), field, lag.frequency,
                "must be at most a hundred times the sample rate")
-      .require(lag.damping * lag.frequency * time <= S(100), damping, lag.damping,
+      .require(spread * lag.frequency * time <= S(100), damping, lag.damping,
                "gives a time constant below a hundredth of sample_time");
 }
 /// @}
