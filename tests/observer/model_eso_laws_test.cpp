@@ -2,10 +2,9 @@
 // PlantEso, with a zero and a disturbance that enters elsewhere; gaps, and snapshots.
 #include "law_suite.hpp"
 //
-#include <algorithm>
-#include <cmath>
+#include "model_traits.hpp"
+//
 #include <esokit/core/snapshot.hpp>
-#include <esokit/observer/model_eso.hpp>
 
 namespace esokit_test {
 
@@ -20,80 +19,6 @@ using WithSwing = esokit::ModelEso<swing_parts, S>;
 template <class S>
 using WithZero = esokit::PlantEso<2, zero_parts, S>;
 
-/// The frequency of the model is half the observer's bandwidth, and 10 rad/s at most, so that a
-/// retune from 50 to 150 rad/s keeps the model. All poles decay with the bandwidth.
-template <template <class> class Of, class S>
-struct ModelTraitsOf {
-  using Observer = Of<S>;
-  using Model = typename Observer::PlantModel;
-  static constexpr esokit::ModelParts parts = Model::parts;
-  /// It is a LinearPlant.
-  static constexpr bool whole_plant = std::is_same_v<Observer, WithZero<S>>;
-  using Config = typename Observer::Config;
-  template <class T>
-  using Rebind = Of<T>;
-  static constexpr const char* field = "observer_bandwidth";
-  static constexpr double slowest = 1;
-  static constexpr double fastest = 1;
-
-  static Config config(double omega, double sample_time, double input_gain, int max_gap = 100) {
-    Config config{.observer_bandwidth = static_cast<S>(omega),
-                  .input_gain = static_cast<S>(input_gain),
-                  .sample_time = static_cast<S>(sample_time),
-                  .max_gap = max_gap};
-    // A config that is to be refused for its bandwidth has a good model.
-    const double w = omega > 0 ? std::min(omega / 2, 10.0) : 10.0;
-    if constexpr (whole_plant) {
-      const auto rate = static_cast<S>(w);
-      auto& plant = config.model.plant;
-      plant.a = {{-rate / S(2), S(1)}, {S(0), -rate}};
-      plant.b = {S(1), rate / S(4)};
-      plant.c = {S(1), S(0)};
-      plant.e = {S(1) / S(8), rate};
-    }
-    if constexpr (parts.plant_poles) {
-      config.model.plant = {static_cast<S>(w * w), static_cast<S>(w)};
-    }
-    if constexpr (parts.resonators > 0) {
-      config.model.resonators = {{{.frequency = static_cast<S>(w),
-                                   .capture_bandwidth = static_cast<S>(omega > 0 ? omega : w)}}};
-    }
-    return config;
-  }
-  static constexpr int degree(int row) { return Model::degree(Model::state_of_row(row)); }
-  static double unknown_amplitude(const Config& config, double nu) {
-    double sum = nu * nu;
-    // y' = -w / 2 y + x_2 + d / 8, all three of them found.
-    if constexpr (whole_plant) {
-      return 3 * (nu + std::abs(static_cast<double>(config.model.plant.a(1, 1))));
-    }
-    if constexpr (parts.plant_poles) {
-      sum += std::abs(static_cast<double>(config.model.plant[0])) +
-             std::abs(static_cast<double>(config.model.plant[1])) * nu;
-    }
-    return sum;
-  }
-  static constexpr const char* excuse(Law law) {
-    if (law == Law::gains_equal_reference || law == Law::polynomial_equals_reference) {
-      return "the reference is a chain's; see PutsThePolesWhereAsked in augmented_model_test.cpp";
-    }
-    if (law == Law::unbiased_on_own_model_class) {
-      return "its plant is a chain; see WhatFollowsTheModelIsEstimatedToRounding in "
-             "augmented_model_test.cpp";
-    }
-    if (law == Law::order_of_accuracy) return "an observer with a model has no continuous form";
-    if (law == Law::gap_gain_is_that_of_longer_sample) {
-      return "a gap is bridged by a Kalman filter's gain, which stays bounded where that of the "
-             "longer sample does not; see gain/model_gain.hpp";
-    }
-    if (law == Law::recurring_gaps_are_stable) {
-      return "it asks for the decay of the longer sample; see "
-             "RecurringGapsDecayUpToTheLongestThatIsBridged";
-    }
-    return common_excuse<S, Observer::size>(law);
-  }
-};
-
 template <class S>
 struct ObserverTraits<esokit::ModelEso<plant_parts, S>> : ModelTraitsOf<WithPoles, S> {};
 template <class S>
@@ -104,44 +29,6 @@ struct ObserverTraits<esokit::PlantEso<2, zero_parts, S>> : ModelTraitsOf<WithZe
 using ModelTypes = TypeList<WithSwing<double>, WithPoles<double>, WithZero<double>,
                             WithSwing<float>, WithPoles<float>, WithZero<float>>;
 const bool registered = register_laws<ObserverLaws>("ModelEso", ModelTypes{});
-
-/// What ModelGain promises of a gap: one correction in M, for ever, lets every error decay by at
-/// least a hundredth of what a sample without a gap does, to the longest gap that is bridged; after
-/// one more the observer restarts.
-template <class Observer>
-void recurring_gaps_decay() {
-  using Laws = LawsOf<Observer>;
-  using S = typename Laws::S;
-  for (const double omega_t : {0.1, 1.0, 3.0}) {
-    SCOPED_TRACE(omega_t);
-    Observer observer = Laws::make(omega_t);
-    ASSERT_GE(observer.max_gap(), 1);
-    for (int every = 2; every <= observer.max_gap() + 1; ++every) {
-      SCOPED_TRACE(every);
-      const long double apart = Laws::period * every;
-      typename Observer::Estimate state;
-      for (int r = 0; r < Observer::size; ++r) {
-        state(r) = static_cast<S>(1 / Laws::row_unit(r, apart));
-      }
-      ASSERT_EQ(observer.reset(state), StepStatus::ok);
-      const auto largest = [&] {
-        long double most = 0;
-        for (int r = 0; r < Observer::size; ++r) {
-          most = std::max(most, std::abs(observer.estimate()(r)) * Laws::row_unit(r, apart));
-        }
-        return most;
-      };
-      const int corrections = 100 * Laws::settling_samples(omega_t);
-      for (int k = 0; k < corrections && largest() > 1e-9L; ++k) {
-        for (int i = 0; i < every; ++i) observer.predict(S(0));
-        ASSERT_EQ(observer.correct(S(0)), StepStatus::gap_bridged);
-      }
-      EXPECT_LE(largest(), 1e-9L);
-    }
-    for (int i = 0; i < observer.max_gap() + 2; ++i) observer.predict(S(0));
-    EXPECT_EQ(observer.correct(S(0)), StepStatus::restarted);
-  }
-}
 
 TEST(ModelEso, RecurringGapsDecayUpToTheLongestThatIsBridged) {
   recurring_gaps_decay<esokit::ModelEso<swing_parts>>();

@@ -56,6 +56,7 @@ enum class Law {
 /// - `unknown_amplitude(config, nu)`: of what has to be estimated while y = sin(nu t) without
 /// input,
 ///   unit of y^(n); left out where that is y^(n)
+/// - `is_output(r)`: row r stands where y does, as what a sensor shows; left out where none does
 /// - `excuse(law)`: nullptr, or why the law does not apply
 template <class Observer>
 struct ObserverTraits;
