@@ -372,10 +372,11 @@ TEST(LinearController, OfAControllerOfYoursAndACompensatorAroundIt) {
             "base.channels: must be one, as the compensator has");
 }
 
-TEST(LinearController, OfSeveralChannels) {
-  using Controller = MimoAdrc<LinearEso<2>, CascadeEso<1, 2>>;
-  Controller::Config config;
-  std::get<0>(config.observers) = {.observer_bandwidth = 20.0, .sample_time = T};
+template <class First>
+void expect_two_channels(const typename First::Config& first) {
+  using Controller = MimoAdrc<First, CascadeEso<1, 2>>;
+  typename Controller::Config config;
+  std::get<0>(config.observers) = first;
   std::get<1>(config.observers) = {
       .observer_bandwidth = 10.0, .bandwidth_factor = 2.0, .sample_time = T};
   config.controller_bandwidths = {4.0, 3.0};
@@ -387,11 +388,19 @@ TEST(LinearController, OfSeveralChannels) {
         return listed(controller.update({y[0], y[1]}, {r[0], r[1]}, {u[0], u[1]}));
       },
       [&] {
-        List all = listed(controller.observer<0>().estimate());
-        for (const double value : controller.observer<1>().estimate()) all.push_back(value);
+        List all = listed(controller.template observer<0>().estimate());
+        for (const double value : controller.template observer<1>().estimate()) {
+          all.push_back(value);
+        }
         return all;
       },
       1e-11);
+}
+
+TEST(LinearController, OfSeveralChannels) {
+  expect_two_channels<LinearEso<2>>({.observer_bandwidth = 20.0, .sample_time = T});
+  expect_two_channels<ModelEso<ModelParts{.order = 1, .actuator = 1}>>(
+      {.observer_bandwidth = 20.0, .sample_time = T, .model = {.actuator = {0.05}}});
 }
 
 TEST(LinearController, OfAnObserverAndALaw) {

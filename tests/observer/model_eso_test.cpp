@@ -13,6 +13,7 @@
 #include <esokit/analysis/observer_system.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
+#include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/core/snapshot.hpp>
 #include <esokit/gain/pole_set.hpp>
@@ -497,6 +498,39 @@ TEST(ModelControllers, StartDoesNotBump) {
   EXPECT_NEAR(adrc.update(4.0, 4.0), 0.7, 1e-9);
 }
 
+TEST(ModelControllers, ChannelsThatAreNotCoupledAreSingleLoops) {
+  using Two = esokit::MimoAdrc<Both, Both>;
+  auto channel = both_config();
+  channel.input_gain = 0;
+  const auto two_config = [&](double b) {
+    Two::Config config{.observers = {channel, channel}, .controller_bandwidths = {30, 30}};
+    config.input_matrix = {{b, 0}, {0, -b}};
+    return config;
+  };
+  const auto one_config = [&](double b) {
+    Adrc<Both>::Config config{.observer = both_config(), .controller_bandwidth = 30.0};
+    config.observer.input_gain = b;
+    return config;
+  };
+  auto two = Two::make(two_config(2)).value();
+  auto one = Adrc<Both>::make(one_config(2)).value();
+  auto other = Adrc<Both>::make(one_config(-2)).value();
+  for (int k = 0; k < 400; ++k) {
+    const double y = std::sin(0.02 * k);
+    const auto u = two.update({y, -y}, {1.0, 0.5});
+    const double first = one.update(y, 1.0);
+    const double second = other.update(-y, 0.5);
+    ASSERT_NEAR(u(0), first, 1e-9 * (1 + std::abs(first))) << k;
+    ASSERT_NEAR(u(1), second, 1e-9 * (1 + std::abs(second))) << k;
+  }
+  // No bump: what B0 no longer explains is the disturbance's.
+  ASSERT_EQ(two.start({4.0, -1.0}, {0.7, 0.2}), StepStatus::ok);
+  ASSERT_TRUE(two.retune(two_config(3)));
+  const auto u = two.update({4.0, -1.0}, {4.0, -1.0});
+  EXPECT_NEAR(u(0), 0.7, 1e-9);
+  EXPECT_NEAR(u(1), 0.2, 1e-9);
+}
+
 // ---- A swing that follows a speed.
 
 constexpr ModelParts following_parts{.order = 2, .resonators = 2, .follows_speed = true};
@@ -578,6 +612,34 @@ TEST(FollowsSpeed, EveryGapDecaysAtEverySpeed) {
       }
     }
   }
+}
+
+TEST(FollowsSpeed, AdaptersHandItOn) {
+  using Nest = esokit::DelayedInput<esokit::VariableTime<esokit::WrappedOutput<Following>>, 2>;
+  auto nest =
+      Nest::make({.observer = {.observer = {.observer = following_config(60, 90), .period = 100.0},
+                               .ratio = 2.0},
+                  .delay = 0})
+          .value();
+  auto bare = Following::make(following_config(60, 90)).value();
+  ASSERT_TRUE(nest.set_speed(1.25));
+  ASSERT_TRUE(bare.set_speed(1.25));
+  // A step of another length is a retune, which takes the speed back: VariableTime keeps it.
+  ASSERT_TRUE(nest.set_step_time(1.5 * kT));
+  auto slower = following_config(60, 90);
+  slower.sample_time = 1.5 * kT;
+  for (int k = 0; k < 300; ++k) {
+    const double y = std::sin(0.05 * k);
+    ASSERT_EQ(nest.update(y, 0.3), StepStatus::ok);
+    if (k == 0) {
+      ASSERT_TRUE(bare.retune(slower));
+      ASSERT_TRUE(bare.set_speed(1.25));
+    }
+    ASSERT_EQ(bare.update(y, 0.3), StepStatus::ok);
+    for (int i = 0; i < bare.size; ++i) ASSERT_EQ(nest.estimate()(i), bare.estimate()(i)) << k;
+  }
+  EXPECT_EQ(nest.model().speed(), 1.25);
+  EXPECT_EQ(refusal(nest.set_speed(50.0)), "speed: must be at most");
 }
 
 TEST(FollowsSpeed, RefusesWhatIsBeyondItsRange) {

@@ -138,6 +138,11 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
   { return observer_.correct_weighted(y, variance); }
   void rearm() noexcept requires requires(Observer& o) { o.rearm(); }
   { observer_.rearm(); }
+  Check<scalar_type> set_speed(const scalar_type& factor) noexcept requires
+      requires(Observer& o, const scalar_type& s) {
+    o.set_speed(s);
+  }
+  { return observer_.set_speed(factor); }
   /// @}
 
   /// Of an adapter in it.

@@ -147,7 +147,14 @@ class VariableTime
   void take(const S& seconds) noexcept {
     auto config = config_.observer;
     chain_config<Observer>(config).sample_time = seconds;
-    if (detail::retune(observer_, config)) current_ = seconds;
+    if constexpr (requires { observer_.model().speed(); }) {
+      const S speed = observer_.model().speed();  // a retune takes it back to 1
+      if (!detail::retune(observer_, config)) return;
+      (void)observer_.set_speed(speed);  // within the range that it was accepted in
+      current_ = seconds;
+    } else {
+      if (detail::retune(observer_, config)) current_ = seconds;
+    }
   }
 
   Config config_;

@@ -255,7 +255,10 @@ requires(detail::SaysObserver<Observers>&&...)  //
   const auto add = [&]<std::size_t... I>(std::index_sequence<I...>) {
     (channels.push_back(detail::feedback_of(
          linear_observer(controller.template observer<static_cast<int>(I)>()),
-         detail::law_weights(controller.template gains<static_cast<int>(I)>(), 1.0), false)),
+         detail::law_weights(
+             controller.template gains<static_cast<int>(I)>(),
+             static_cast<double>(controller.template observer<static_cast<int>(I)>().input_gain())),
+         false)),
      ...);
   };
   add(std::make_index_sequence<sizeof...(Observers)>{});

@@ -55,6 +55,9 @@ struct MimoAdrcConfig {
 /// nothing up; while one actuator is limited the channels are coupled through B0. A channel whose
 /// measurement is NaN predicts alone, the others go on; one whose reference is keeps its share of
 /// B0 u as it is.
+///
+/// With an actuator in a channel's model it is (B0 u)_i that lags: true where all actuators lag
+/// alike, or B0 does not couple them.
 /// @tparam Observers one observer type a channel, all of one scalar
 template <ShiftableDisturbance... Observers>
 class MimoAdrc {
@@ -160,7 +163,8 @@ class MimoAdrc {
       auto& observer = std::get<channel>(observers);
       if (outcome) outcome = observer.adopt(std::get<channel>(fresh.observers_));
       // Of a u that was reported absurdly large the scalar may not hold what it is to explain.
-      if (outcome && observer.shift_disturbance(moved(row)) != StepStatus::ok) {
+      const S shift = moved(row) * observer.input_gain();
+      if (outcome && observer.shift_disturbance(shift) != StepStatus::ok) {
         outcome = too_large(u(row));
       }
       // Of what is under way to the plant the new B0 makes another drive.
@@ -297,7 +301,7 @@ class MimoAdrc {
     std::tuple<Expected<Observers, Error<S>>...> observers{make_observer<Observers>(
         std::get<I>(config.observers), sample_time, static_cast<int>(I))...};
     std::tuple<Expected<AdrcLaw<Observers::order, S>, Error<S>>...> laws{
-        make_law<Observers::order>(config, config.controller_bandwidths[I], sample_time)...};
+        make_law(config, config.controller_bandwidths[I], sample_time, std::get<I>(observers))...};
     std::tuple limiters{(static_cast<void>(I), Limiter<S>::make(config.limits[I], sample_time))...};
     const Error<S>* error = nullptr;
     int channel = -1;
@@ -334,9 +338,10 @@ class MimoAdrc {
     return Observer::make(config);
   }
 
-  template <int Order>
-  static Expected<AdrcLaw<Order, S>, Error<S>> make_law(const Config& config, const S& bandwidth,
-                                                        const S& sample_time) {
+  template <class Observer, int Order = Observer::order>
+  static Expected<AdrcLaw<Order, S>, Error<S>> make_law(
+      const Config& config, const S& bandwidth, const S& sample_time,
+      const Expected<Observer, Error<S>>& observer) {
     const auto gains =
         feedback_gain<Order, S>({bandwidth, config.domain, config.half_gain}, sample_time);
     if (!gains) {
@@ -346,7 +351,9 @@ class MimoAdrc {
       }
       return named;
     }
-    return AdrcLaw<Order, S>::make({.gains = *gains, .input_gain = S(1)});
+    // 1; with an actuator in the model what a unit of its input is to the highest derivative.
+    const S input_gain = observer ? S(observer->input_gain()) : S(1);
+    return AdrcLaw<Order, S>::make({.gains = *gains, .input_gain = input_gain});
   }
 
   Channels observers_;

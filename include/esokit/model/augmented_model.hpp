@@ -259,6 +259,11 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
     return part;
   }
 
+  /// The factor that the frequencies have now.
+  [[nodiscard]] constexpr const S& speed() const noexcept requires(Parts.follows_speed) {
+    return speed_;
+  }
+
   /// The same with all frequencies of the resonators times `factor`; exact, and as much work as a
   /// matrix exponential: some 16 products of N x N.
   [[nodiscard]] AugmentedModel at_speed(const S& factor) const noexcept {
