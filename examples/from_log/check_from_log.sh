@@ -199,16 +199,20 @@ written t,y,u , t 'if (1) $3 = 1;' >constant.csv
 shows u constant.csv
 # A u that is not this machine's.
 written t,y,u , t '$3 = sin(NR * NR);' >foreign.csv
-shows excitation foreign.csv
+shows '' foreign.csv
 
 # ---- what is pasted compiles, and runs ----
 
-compiles() {  # compiles FILE [OPTION...]
+compiles() {  # compiles FILE [OPTION...]: all programs of the page, in one
   run "$@"
   sed -n '/<pre.*<code>/,/<\/code>/p' "$page" |
-    sed 's/.*<code>//; s/<\/code>.*//; s/&lt;/</g; s/&gt;/>/g; s/&quot;/"/g; s/&amp;/\&/g' >pasted.cpp
-  "$compiler" -std=c++20 -Wall -Wextra -Wconversion -Werror -I"$root/include" -I"$eigen" pasted.cpp \
-    -o pasted 2>errors && ./pasted >/dev/null
+    sed 's/.*<code>//; s/<\/code>.*//; s/&lt;/</g; s/&gt;/>/g; s/&quot;/"/g; s/&amp;/\&/g' |
+    awk '/^int main\(\) \{$/ { $0 = "int main_" ++n "() {" } /^}$/ { print "  return 0;" } { print }
+      END { print "int main() {"; for (i = 1; i <= n; ++i) print "  if (main_" i "() != 0) return 1;"
+            print "}" }' >pasted.cpp
+  (($(grep -c '^int main_' pasted.cpp) >= 4)) &&
+    "$compiler" -std=c++20 -Wall -Wextra -Wconversion -Werror -I"$root/include" -I"$eigen" \
+      pasted.cpp -o pasted 2>errors && ./pasted >/dev/null
   verdict $? "$*: what $page says does not compile: $(head -n 5 errors; cat pasted.cpp)"
 }
 compiles plain.csv

@@ -51,6 +51,7 @@ an observer of your own in the place of all that (the page, and its estimates as
   --observer NAME     linear, half-gain, reduced, cascade, algebraic, adjustable, nonlinear
   --bandwidth W       omega_o, rad/s; --order and --b0 too
 other:
+  --rank K            the design of that rank in the place of the best
   --anyway            a design for a refused log, too
   --out DIR           where the page goes (default: here)
 Without a file: the measured sets below --data (default: ../shared/data beside the repository).
@@ -133,6 +134,13 @@ Settings read_arguments(int argc, char** argv, std::filesystem::path& data) {
       {"observer", [&](const auto& text) { s.observer = text; }},
       {"bandwidth", [&](const auto& text) { s.bandwidth = positive("bandwidth", text); }},
       {"data", [&](const auto& text) { data = text; }},
+      {"rank",
+       [&](const auto& text) {
+         const double rank = number("rank", text);
+         if (!(rank >= 1 && rank <= 99) || std::floor(rank) < rank)
+           throw LogError("--rank: must be 1, 2, ..");
+         s.rank = static_cast<int>(rank);
+       }},
       {"out", [&](const auto& text) { s.out = text; }}};
   for (int i = 1; i < argc; ++i) {
     std::string name = argv[i];

@@ -2,15 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <numbers>
 #include <string>
 
-#include <esokit/analysis/delay_margin.hpp>
-#include <esokit/analysis/loop_noise.hpp>
 #include <esokit/analysis/loop_response.hpp>
 #include <esokit/analysis/margins.hpp>
-#include <esokit/control/adrc.hpp>
-#include <esokit/observer/linear_eso.hpp>
+#include <esokit/core/error_text.hpp>
 #include <esokit/sim/gaussian.hpp>
 #include <esokit/sim/run.hpp>
 
@@ -33,39 +31,6 @@ auto with_plant(const Identified& found, F&& f) {
     default:
       return f(found.plant<3>());
   }
-}
-
-template <int Order>
-std::optional<LinearController> leso(double omega_o, double omega_c, const Identified& found) {
-  const auto made = esokit::Adrc<esokit::LinearEso<Order>>::make(
-      {.observer = {.observer_bandwidth = omega_o,
-                    .input_gain = found.input_gain.value,
-                    .sample_time = found.log.sample_time},
-       .controller_bandwidth = omega_c});
-  if (!made) return std::nullopt;
-  const auto form = linear_controller(*made);
-  if (!form) return std::nullopt;
-  return *form;
-}
-
-std::optional<Loop> loop_of(const Identified& found, const LinearController& form) {
-  return with_plant(found, [&](const auto& plant) -> std::optional<Loop> {
-    if (!plant) return std::nullopt;
-    auto loop = esokit::closed_loop(*plant, form);
-    if (!loop) return std::nullopt;
-    return *loop;
-  });
-}
-
-/// Time until y stays within 2 % of a step of the reference.
-double settling_of(const Loop& loop, double longest) {
-  const auto step = esokit::reference_response(loop, {.duration = longest});
-  if (!step) return longest;
-  std::size_t last = 0;
-  for (std::size_t k = 0; k < step->time.size(); ++k) {
-    if (std::abs(step->output[0][k] - 1) > 0.02) last = k;
-  }
-  return step->time[last];
 }
 
 /// Rows through the observer of a controller, each piece from rest.
@@ -154,148 +119,291 @@ std::vector<double> settled(const Replay& replay, const esokit::FitData& rows,
   return sizes;
 }
 
-std::string cpp(double value) {
-  std::string text = number_text(value, 6);
-  if (text.find_first_of(".en") == std::string::npos) text += ".0";
-  return text;
+/// What a design of a family includes.
+std::vector<std::string> headers_of(const esokit::TunedDesign& design) {
+  using esokit::TuneFamily;
+  if (design.knows.any()) {
+    if (design.family == TuneFamily::half_gain)
+      return {"gain/half_gain.hpp", "observer/model_eso.hpp"};
+    return {"observer/model_eso.hpp"};
+  }
+  switch (design.family) {
+    case TuneFamily::half_gain:
+      return {"observer/half_gain_eso.hpp"};
+    case TuneFamily::cascade:
+      return {"observer/cascade_eso.hpp"};
+    case TuneFamily::filter:
+      return {"observer/extended_state_filter.hpp"};
+    case TuneFamily::free_poles:
+      return {"gain/pole_set.hpp", "observer/linear_eso.hpp"};
+    default:
+      return {"observer/linear_eso.hpp"};
+  }
 }
 
-std::string program(const Settings& settings, const Identified& found, const Candidate& chosen,
-                    std::pair<double, double> limits) {
+std::string program(const Settings& settings, const Identified& found, const esokit::Tuning& tuning,
+                    const esokit::TunedDesign& design) {
   const std::string name = std::filesystem::path(settings.file).filename().string();
   std::string text = "// From " + name + " by from_log: order " + std::to_string(found.order) +
                      ", b0 = " + number_text(found.input_gain.value, 4) + " +- " +
                      number_text(found.input_gain.half_width, 2) +
                      ".\n// y and u in the units of the log, one update every " +
-                     number_text(1e3 * found.log.sample_time, 4) + " ms.\n#include <cstdio>\n";
-  for (const auto& header : chosen.headers) text += "#include <esokit/" + header + ">\n";
-  text += "\nusing Controller = esokit::Adrc<" + chosen.type +
-          ">;\n\nController::Config config() {\n  Controller::Config config;\n" + chosen.settings +
-          "  config.limits = {.lower = " + cpp(limits.first) + ", .upper = " + cpp(limits.second) +
-          "};\n  return config;\n}\n\n"
-          "int main() {\n"
-          "  auto controller = Controller::make(config());\n"
-          "  if (!controller) {\n"
-          "    std::printf(\"%s: %s\\n\", controller.error().field, controller.error().rule);\n"
-          "    return 1;\n"
-          "  }\n"
-          "  const double y = 0.0, u_now = 0.0, reference = 0.0;\n"
-          "  controller->start(y, u_now);  // once, where the machine stands\n"
-          "  const double u = controller->update(y, reference);  // each sample\n"
-          "  std::printf(\"u = %g\\n\", u);\n"
-          "}\n";
-  return text;
+                     number_text(1e3 * found.log.sample_time, 6) +
+                     " ms.\n#include <cstdio>\n#include <esokit/control/adrc.hpp>\n";
+  if (found.order == 2) text += "#include <esokit/control/tracking_differentiator.hpp>\n";
+  for (const auto& header : headers_of(design)) text += "#include <esokit/" + header + ">\n";
+  text += "\nint main() {\n";
+  std::string line;
+  for (const char c : design.code) {
+    if (c != '\n') {
+      line += c;
+      continue;
+    }
+    text += "  " + line + "\n";
+    line.clear();
+  }
+  // Of order 1 u moves y at once; of order 3 there is no ready profile.
+  const bool profiled = found.order == 2;
+  if (profiled) {
+    const auto& model = tuning.model;
+    text +=
+        "  // A reference that u can follow: half of its range accelerates.\n"
+        "  auto profile = esokit::TrackingDifferentiator<double>::make({.acceleration = " +
+        esokit::detail::source(profile_acceleration(model)) +
+        ", .sample_time = " + esokit::detail::source(model.sample_time) + "}).value();\n";
+  }
+  const std::string reference = profiled ? "profile.state()" : "reference";
+  return text +
+         "  if (!controller) {  // which setting, and which rule\n"
+         "    std::printf(\"%s: %s\\n\", controller.error().field, controller.error().rule);\n"
+         "    return 1;\n"
+         "  }\n"
+         "  const double y = 0.0, u_now = 0.0, reference = 0.0;\n"
+         "  controller->start(y, u_now);  // once, where the machine stands\n" +
+         (profiled ? "  profile.reset(y);\n  profile.update(reference);  // then once a sample\n"
+                   : "") +
+         "  const double u = controller->update(y, " + reference + ");" +
+         (profiled ? "" : "  // then once a sample") +
+         "\n"
+         "  std::printf(\"u = %g\\n\", u);\n"
+         "}\n";
 }
 
+std::string percent(double share) { return number_text(100 * share, 3) + " %"; }
+
 }  // namespace
+
+double profile_acceleration(const esokit::TuneModel& model) {
+  return 0.25 * (model.u_max - model.u_min) * std::abs(model.input_gain.value);
+}
+
+Runner::Runner(const esokit::Tuning& tuning, const esokit::TunedDesign& design)
+    : form_(told_of_input(design.controller)),
+      lower_(tuning.model.u_min),
+      upper_(tuning.model.u_max),
+      state_(static_cast<std::size_t>(form_.states())) {
+  const auto& gains = design.settings.gains;
+  if (gains.size() > 1) rate_ = form_.r_to_u(0, 0) * gains[1] / gains[0];
+}
+
+double Runner::update(double y, double r, double slope) {
+  double u = form_.y_to_u(0, 0) * y + form_.r_to_u(0, 0) * r + rate_ * slope;
+  const int n = form_.states();
+  for (int i = 0; i < n; ++i) u += form_.to_u(0, i) * state_[static_cast<std::size_t>(i)];
+  u = std::clamp(u, lower_, upper_);
+  std::vector<double> next = state_;
+  for (int i = 0; i < n; ++i) {
+    double& sum = next[static_cast<std::size_t>(i)];
+    sum += form_.from_y(i, 0) * y + form_.from_r(i, 0) * r + form_.from_u(i, 0) * u;
+    for (int j = 0; j < n; ++j) sum += form_.a(i, j) * state_[static_cast<std::size_t>(j)];
+  }
+  state_ = next;
+  return u;
+}
+
+LinearController told_of_input(const LinearController& own) {
+  LinearController c = own;
+  double told = 0.0;
+  for (int i = 0; i < c.states(); ++i) told += std::abs(c.from_u(i, 0));
+  if (told > 0.0) return c;
+  // A reference reaches the states by u alone.
+  for (int i = 0; i < c.states(); ++i) {
+    c.from_u(i, 0) = own.from_r(i, 0) / own.r_to_u(0, 0);
+    c.from_r(i, 0) = 0.0;
+    c.from_y(i, 0) -= c.from_u(i, 0) * c.y_to_u(0, 0);
+    for (int j = 0; j < c.states(); ++j) c.a(i, j) -= c.from_u(i, 0) * c.to_u(0, j);
+  }
+  return c;
+}
 
 Design Design::make(const Settings& settings, const Input&, const Findings& findings) {
   Design design;
   const Identified& found = findings.found;
   const auto [least, largest] = std::minmax_element(findings.rows.u.begin(), findings.rows.u.end());
-  design.limits_ = settings.limits.value_or(std::pair(*least, *largest));
-  const double range = design.limits_.second - design.limits_.first;
-  const double T = found.log.sample_time;
-  const double wish = settings.noise_share * range;
-  for (int i = 0; i < 40; ++i) {
-    const double omega_o = 1.5 / T * std::pow(10.0, -i / 13.0);
-    const double omega_c = settings.controller > 0 ? settings.controller
-                           : settings.settling_time > 0
-                               ? (found.order == 1 ? 4 : 6) / settings.settling_time
-                               : omega_o / 5;
-    const auto form = found.order == 1   ? leso<1>(omega_o, omega_c, found)
-                      : found.order == 2 ? leso<2>(omega_o, omega_c, found)
-                                         : leso<3>(omega_o, omega_c, found);
-    if (!form) continue;
-    const auto loop = loop_of(found, *form);
-    if (!loop || !loop->stable()) continue;
-    Candidate one;
-    one.form = *form;
-    one.name = "LinearEso, " + number_text(omega_o, 3) + " rad/s";
-    one.type = "esokit::LinearEso<" + std::to_string(found.order) + ">";
-    one.headers = {"control/adrc.hpp", "observer/linear_eso.hpp"};
-    one.settings = "  config.observer = {.observer_bandwidth = " + cpp(omega_o) +
-                   ", .input_gain = " + cpp(found.input_gain.value) + ", .sample_time = " + cpp(T) +
-                   "};\n  config.controller_bandwidth = " + cpp(omega_c) + ";\n";
-    const auto margins = esokit::margins(*loop);
-    const auto delay = esokit::delay_margin(*loop);
-    const auto noise = esokit::noise(*loop, {.measurement = {found.noise.value}});
-    const auto load = esokit::load_response(
-        *loop,
-        {.duration = 400 * T + 10 / omega_c, .height = 0.1 * range * found.input_gain.value});
-    if (!margins || !delay || !noise || !load) continue;
-    one.modulus = margins->modulus.value;
-    one.delay = delay->value;
-    one.control_noise = noise->control[0];
-    for (const double y : load->output[0]) one.load_error = std::max(one.load_error, std::abs(y));
-    one.settling = settling_of(*loop, 30 / omega_c);
-    if (!design.chosen_ && one.modulus >= 0.5 && one.delay >= 2 * T && one.control_noise <= wish) {
-      design.chosen_ = design.all_.size();
-      design.loop_ = loop;
-    }
-    design.all_.push_back(one);
-  }
-  if (!design.chosen_) {
-    design.why_not_ = "No bandwidth keeps the margins and the noise that is wished for.";
+  const auto limits = settings.limits.value_or(std::pair(*least, *largest));
+  auto model = esokit::tune_model(found, limits.first, limits.second);
+  const double range = limits.second - limits.first;
+  // Of a log that was refused nothing may be known: wanted --anyway.
+  model.input_gain.half_width =
+      std::min(model.input_gain.half_width, 0.5 * std::abs(model.input_gain.value));
+  esokit::TuneWish wish;
+  wish.settling_time = settings.settling_time;
+  wish.controller_bandwidth = settings.controller;
+  if (settings.noise_share > 0.0) wish.control_noise = settings.noise_share * range;
+  const auto tuning = esokit::tune(model, wish);
+  if (!tuning) {
+    design.why_not_ = esokit::to_text(tuning.error());
     return design;
   }
-  const Candidate& chosen = design.all_[*design.chosen_];
-  design.code_ = program(settings, found, chosen, design.limits_);
-  design.summary_ = {"y of order " + std::to_string(found.order) +
-                         ", b0 = " + number_text(found.input_gain.value, 4) + " ± " +
-                         number_text(found.input_gain.half_width, 2) + ", lag and dead time " +
-                         number_text(1e3 * found.latency.value, 3) + " ms.",
-                     "Take " + chosen.name + ". It settles in " + number_text(chosen.settling, 3) +
-                         " s; a load of a tenth of the range of u moves y by " +
-                         number_text(chosen.load_error, 3) + "; noise moves u by " +
-                         number_text(100 * chosen.control_noise / range, 2) + " % of its range.",
-                     "Modulus margin " + number_text(chosen.modulus, 2) + ", " +
-                         number_text(1e3 * chosen.delay, 3) + " ms of delay may be added."};
-  design.replay_ = through(chosen.form, found.input_gain.value, found.order, findings.rows);
-  const esokit::FitData model = simulated(found, findings.rows);
-  const Replay expected = through(chosen.form, found.input_gain.value, found.order, model);
-  const auto settling = std::min<std::size_t>(static_cast<std::size_t>(chosen.settling / T) + 20,
-                                              findings.rows.y.size() / 4);
-  auto sizes = settled(expected, model, settling);
+  design.tuning_ = *tuning;
+  const auto rank = static_cast<std::size_t>(settings.rank - 1);
+  if (rank >= tuning->designs.size() || !tuning->designs[rank].feasible) {
+    design.why_not_ = rank == 0 ? "No family keeps the margins; the table says which it misses. "
+                                  "Wish for less: --noise, --settling, --omega-c."
+                                : "There is no design of rank " + std::to_string(settings.rank) +
+                                      " that keeps the margins.";
+    return design;
+  }
+  design.taken_ = rank;
+  const esokit::TunedDesign& taken = design.taken();
+  auto loop = esokit::closed_loop(model, taken.controller);
+  if (!loop) {
+    design.why_not_ = esokit::to_text(loop.error());
+    return design;
+  }
+  design.loop_ = *loop;
+  const double T = model.sample_time;
+  design.code_ = program(settings, found, *tuning, taken);
+  design.summary_ = {
+      "The machine is of order " + std::to_string(found.order) +
+          ", b0 = " + number_text(found.input_gain.value, 4) + " ± " +
+          number_text(found.input_gain.half_width, 2) + ", lag and dead time " +
+          number_text(1e3 * found.latency.value, 3) + " ms.",
+      "Take " + taken.name + ". It settles in " + number_text(taken.settling_time, 3) +
+          " s; a load that a tenth of the range of u balances moves y by " +
+          number_text(0.1 * range * taken.load_peak, 3) + "; noise moves u by " +
+          percent(taken.control_noise / range) + " of its range.",
+      "Modulus margin " + number_text(taken.modulus_margin, 2) + ", " +
+          number_text(1e3 * taken.delay_margin, 3) + " ms of delay may be added; y and u come to " +
+          number_text(taken.excess, 3) +
+          " times what the best linear controller without margins does."};
+  const LinearController form = design.form();
+  design.replay_ = through(form, found.input_gain.value, found.order, findings.rows);
+  const esokit::FitData machine = simulated(found, findings.rows);
+  const Replay expected = through(form, found.input_gain.value, found.order, machine);
+  const auto settling = std::min<std::size_t>(
+      static_cast<std::size_t>(taken.settling_time / T) + 20, findings.rows.y.size() / 4);
+  auto sizes = settled(expected, machine, settling);
   const auto at = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() * 95 / 100);
   std::nth_element(sizes.begin(), at, sizes.end());
   design.replay_.band = *at;
   const auto ours = settled(design.replay_, findings.rows, settling);
   const auto inside =
       std::count_if(ours.begin(), ours.end(), [&](double e) { return e <= design.replay_.band; });
-  design.replay_.inside = static_cast<double>(inside) / static_cast<double>(ours.size());
+  design.replay_.inside =
+      static_cast<double>(inside) / static_cast<double>(std::max<std::size_t>(ours.size(), 1));
   return design;
 }
 
-void Design::show_on(Page& page, const Settings&, const Findings& findings) const {
+namespace {
+
+/// Every design where its noise and its errors are, and the least that any linear controller has.
+Figure tradeoff_figure(const esokit::Tuning& tuning, std::size_t taken) {
+  Figure figure("tradeoff", {.rows = 1, .columns = 1, .panel_height = 260});
+  figure.caption(
+      "Each number is a design of the table below. Right: more noise in u. Up: y is off by more, "
+      "for noise and disturbance together. The curve is the best that any linear controller can "
+      "do, without a margin to keep; the square is the design that was taken.");
+  const esokit::TuneModel& model = tuning.model;
+  const double range = model.u_max - model.u_min;
+  const int n = model.order;
+  const esokit::Lqg lqg(model);
+  const double w0 = std::pow(tuning.rho, -0.5 / n);
+  const esokit::LoopCost cost(model, tuning.rules, 0.05 * w0);
+  std::vector<double> noise, output;
+  for (int i = -12; i <= 12; ++i) {
+    const double w = std::min(w0 * std::pow(10.0, i / 16.0), 1.0 / model.sample_time);
+    const auto numbers = cost(lqg.controller(std::pow(w, -2 * n)));
+    if (!numbers.stable) continue;
+    noise.push_back(100 * numbers.control_noise / range);
+    output.push_back(numbers.output);
+  }
+  auto& panel = figure.panel(0, 0)
+                    .x_label("deviation of u by noise (% of its range)")
+                    .y_label("deviation of y")
+                    .name("tradeoff");
+  if (!noise.empty())
+    panel.line(noise, output, {.name = "best linear controller (LQG)", .color = Color::grey});
+  std::vector<double> x, y;
+  for (std::size_t i = 0; i < tuning.designs.size(); ++i) {
+    const auto& design = tuning.designs[i];
+    if (!(design.control_noise > 0.0)) continue;
+    x.push_back(100 * design.control_noise / range);
+    y.push_back(design.output_deviation);
+    panel.note(x.back() * 1.02, y.back(), " " + std::to_string(i + 1));
+  }
+  if (!x.empty()) {
+    panel.points(x, y, {.color = Color::blue, .marker = Marker::circle, .column = "designs"});
+  }
+  // Numbers stand at decades: within one the axis is even.
+  const auto wide = [](const std::vector<double>& a, const std::vector<double>& b) {
+    std::vector<double> all = a;
+    all.insert(all.end(), b.begin(), b.end());
+    const auto [least, largest] = std::minmax_element(all.begin(), all.end());
+    return *largest > 20 * *least;
+  };
+  if (!x.empty() && wide(x, noise)) panel.log_x();
+  if (!x.empty() && wide(y, output)) panel.log_y();
+  const auto& chosen = tuning.designs[taken];
+  panel.points({100 * chosen.control_noise / range}, {chosen.output_deviation},
+               {.name = chosen.name,
+                .color = Color::vermillion,
+                .marker = Marker::square,
+                .size = 1.6,
+                .column = "taken"});
+  return figure;
+}
+
+std::vector<CsvRow> ranking(const esokit::Tuning& tuning) {
+  const double range = tuning.model.u_max - tuning.model.u_min;
+  std::vector<CsvRow> rows{{"", "times the best", "without margins", "deviation of y",
+                            "noise in u, % of its range", "load of 10 %: y", "settling (s)",
+                            "modulus margin", "delay margin (ms)", "instructions", "held back by"}};
+  for (std::size_t i = 0; i < tuning.designs.size(); ++i) {
+    const auto& d = tuning.designs[i];
+    rows.push_back({std::to_string(i + 1) + " " + d.name + (d.feasible ? "" : " (not kept)"),
+                    number_text(d.excess, 3), number_text(d.free_excess, 3),
+                    number_text(d.output_deviation, 3),
+                    number_text(100 * d.control_noise / range, 3),
+                    number_text(0.1 * range * d.load_peak, 3), number_text(d.settling_time, 3),
+                    number_text(d.modulus_margin, 2), number_text(1e3 * d.delay_margin, 3),
+                    std::to_string(d.instructions), d.constraint});
+  }
+  return rows;
+}
+
+}  // namespace
+
+void Design::show_on(Page& page, const Settings& settings, const Findings& findings) const {
+  if (tuning_) {
+    page.heading("Which observer");
+    page.figure(tradeoff_figure(*tuning_, taken_));
+    page.table("observers",
+               "The families, each at its best for this wish, by what they make of y and u "
+               "together (sqrt(J / J*); within 1 % the one that costs less comes first). "
+               "Instructions of an update on a Cortex-M4F in float. --rank takes another one",
+               ranking(*tuning_));
+  }
   if (!made()) {
     if (!why_not_.empty()) page.box("No controller", {why_not_}, true);
     return;
   }
   const Identified& found = findings.found;
-  const Candidate& chosen = all_[*chosen_];
-  const double range = limits_.second - limits_.first;
-
-  page.heading("Which observer");
-  Figure tradeoff("tradeoff", {.rows = 1, .columns = 1, .panel_height = 240});
-  tradeoff.caption("Noise against load.");
-  std::vector<double> noise, error;
-  for (const Candidate& one : all_) {
-    noise.push_back(100 * one.control_noise / range);
-    error.push_back(one.load_error);
-  }
-  tradeoff.panel(0, 0)
-      .x_label("u by noise (% of its range)")
-      .y_label("largest error after a load")
-      .log_x()
-      .log_y()
-      .line(noise, error, {.name = "LinearEso"})
-      .points({100 * chosen.control_noise / range}, {chosen.load_error},
-              {.name = "taken", .color = Color::vermillion, .marker = Marker::square, .size = 2});
-  page.figure(tradeoff);
+  const esokit::TunedDesign& chosen = taken();
+  const double range = tuning_->model.u_max - tuning_->model.u_min;
 
   page.heading("The loop");
-  Figure loop("loop", {.rows = 2, .columns = 2, .panel_height = 170});
+  Figure loop("loop", {.rows = 2, .columns = 3, .panel_height = 170});
   std::vector<double> w, gain, phase;
   const double nyquist = std::numbers::pi / found.log.sample_time;
   double before = -180;
@@ -317,8 +425,9 @@ void Design::show_on(Page& page, const Settings&, const Findings& findings) cons
       number_text(margins.gain_increase.value, 3) + ", modulus margin " +
       number_text(margins.modulus.value, 2) +
       " (dashed: where L is one, where it is at -180°). "
-      "Right: a step of the reference that takes half of the range of u, and a load of a tenth of "
-      "it.");
+      "Middle and right: a step of the reference, and a load that a tenth of the range of u "
+      "balances; as long as u is within its limits.");
+  double peak = 0.0;
   const auto bode = [&](Panel& panel) {
     if (margins.phase.limited()) panel.vertical_line(margins.phase.frequency);
     if (margins.gain_increase.limited()) panel.vertical_line(margins.gain_increase.frequency);
@@ -330,32 +439,27 @@ void Design::show_on(Page& page, const Settings&, const Findings& findings) cons
       loop.panel(1, 0).x_label("w (rad/s)").y_label("phase of L (°)").log_x().name("phase");
   lower.line(w, phase, {.color = Color::blue, .column = "phase"}).horizontal_line(-180.0);
   bode(lower);
-  const double duration = std::max(4 * chosen.settling, 40 * found.log.sample_time);
-  const auto unit = esokit::reference_response(*loop_, {.duration = duration}).value();
-  double peak = 0;
-  for (const double u : unit.control[0]) peak = std::max(peak, std::abs(u));
-  const double height = 0.5 * range / peak;
-  const auto step =
-      esokit::reference_response(*loop_, {.duration = duration, .height = height}).value();
+  const double duration = std::max(4 * chosen.settling_time, 40 * found.log.sample_time);
+  const auto step = esokit::reference_response(*loop_, {.duration = duration}).value();
   const auto load = esokit::load_response(*loop_, {.duration = duration,
                                                    .height = 0.1 * range * found.input_gain.value})
                         .value();
-  loop.panel(0, 1)
-      .x_label("t (s)")
-      .y_label("y")
-      .legend(Legend::above)
-      .name("output")
-      .line(step.time, step.output[0], {.name = "after a step of r", .color = Color::blue})
-      .line(load.time, load.output[0], {.name = "after a load", .color = Color::vermillion})
-      .horizontal_line(height);
-  loop.panel(1, 1)
-      .x_label("t (s)")
-      .y_label("u")
-      .legend(Legend::above)
-      .name("control")
-      .line(step.time, step.control[0], {.name = "after a step of r", .color = Color::blue})
-      .line(load.time, load.control[0], {.name = "after a load", .color = Color::vermillion});
+  const auto answer = [&](std::size_t column, const esokit::LoopResponse& of, const char* title,
+                          const std::string& y, const std::string& u, Color color) {
+    loop.panel(0, column).title(title).x_label("t (s)").y_label(y).name(y).line(
+        of.time, of.output[0], {.color = color, .column = "y"});
+    loop.panel(1, column).x_label("t (s)").y_label(u).name(u).line(of.time, of.control[0],
+                                                                   {.color = color, .column = "u"});
+  };
+  answer(1, step, "step of the reference", "y, of the step", "u for a step of 1", Color::blue);
+  answer(2, load, "load", "y after the load", "u after the load", Color::vermillion);
   page.figure(loop);
+  for (const double u : step.control[0]) peak = std::max(peak, std::abs(u));
+  page.text("A step of the reference above " + number_text(0.5 * range / peak, 2) +
+            " takes u to its limits" +
+            (found.order == 2 ? ": give larger ones through the profile below, which asks for no "
+                                "more than half of what u can do."
+                              : "."));
 
   page.heading("The log through this observer");
   Figure replay("replay", {.rows = 3, .columns = 1, .panel_height = 150});
@@ -386,9 +490,15 @@ void Design::show_on(Page& page, const Settings&, const Findings& findings) cons
       .horizontal_line(-replay_.band);
   page.figure(replay);
 
-  page.heading("Paste this");
+  page.heading(findings.refusal ? "Paste this, if you know better" : "Paste this");
   page.text("It compiles as it is, with esokit on the include path: g++ -std=c++20 -O2.");
   page.code(code_);
+  for (std::size_t i = 0; i < tuning_->designs.size(); ++i) {
+    const auto& other = tuning_->designs[i];
+    if (i == taken_ || !other.feasible) continue;
+    page.code(program(settings, found, *tuning_, other),
+              "The same with " + std::to_string(i + 1) + " " + other.name);
+  }
 }
 
 }  // namespace from_log

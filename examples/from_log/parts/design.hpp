@@ -8,23 +8,30 @@
 #include <vector>
 
 #include <esokit/analysis/loop.hpp>
+#include <esokit/tune/tune.hpp>
 
 #include "from_log/parts/from_log.hpp"
 #include "from_log/parts/page.hpp"
 
 namespace from_log {
 
-/// A controller that could be taken.
-struct Candidate {
-  std::string name;      ///< of its observer
-  std::string type;      ///< as C++ writes it
-  std::string settings;  ///< of its config, as C++ writes them
-  std::vector<std::string> headers;
-  esokit::LinearController form;
-  double control_noise = 0;       ///< standard deviation of u by the measurement noise
-  double load_error = 0;          ///< largest error of y after a load of a tenth of the range of u
-  double modulus = 0, delay = 0;  ///< margins; s
-  double settling = 0;            ///< s
+/// A controller that is told of its own u, as one that is told what the actuator held.
+[[nodiscard]] esokit::LinearController told_of_input(const esokit::LinearController& own);
+
+/// Half of what u can do, unit of y / s^2, of order 2.
+[[nodiscard]] double profile_acceleration(const esokit::TuneModel& model);
+
+/// A design as it runs, within its limits: what `Adrc` computes, whatever its type.
+class Runner {
+ public:
+  Runner(const esokit::Tuning& tuning, const esokit::TunedDesign& design);
+  /// Once a sample. @param slope of the reference
+  double update(double y, double r, double slope = 0.0);
+
+ private:
+  esokit::LinearController form_;
+  double lower_, upper_, rate_ = 0.0;
+  std::vector<double> state_;
 };
 
 /// The log through an observer.
@@ -42,22 +49,25 @@ class Design {
   [[nodiscard]] static Design make(const Settings& settings, const Input& input,
                                    const Findings& findings);
 
-  [[nodiscard]] bool made() const { return chosen_.has_value(); }
+  [[nodiscard]] bool made() const { return loop_.has_value(); }
   /// A few sentences.
   [[nodiscard]] std::vector<std::string> summary() const { return summary_; }
   /// C++ that compiles as it is.
   [[nodiscard]] const std::string& code() const { return code_; }
-  /// The controller as a linear system.
-  [[nodiscard]] const esokit::LinearController& form() const { return all_[*chosen_].form; }
+  /// The design that was taken.
+  [[nodiscard]] const esokit::TunedDesign& taken() const { return tuning_->designs[taken_]; }
+  /// The choice, its model and its rivals.
+  [[nodiscard]] const esokit::Tuning& tuning() const { return *tuning_; }
+  /// The controller as a linear system that is told what the actuator held.
+  [[nodiscard]] esokit::LinearController form() const { return told_of_input(taken().controller); }
 
   /// Sections of the page: observers, loop, replay, code.
   void show_on(Page& page, const Settings& settings, const Findings& findings) const;
 
  private:
-  std::optional<std::size_t> chosen_;
-  std::vector<Candidate> all_;
+  std::optional<esokit::Tuning> tuning_;
+  std::size_t taken_ = 0;
   std::optional<esokit::Loop> loop_;
-  std::pair<double, double> limits_{};
   std::vector<std::string> summary_;
   std::string code_;
   std::string why_not_;

@@ -37,14 +37,15 @@ struct Settings {
   std::vector<int> orders{1, 2, 3};
   std::optional<double> expected_gain;  ///< b0 as the user believes it to be
   std::optional<std::pair<double, double>> limits;
-  double noise_share = 0.05;  ///< wish: deviation of u by noise, share of the range of u
-  double settling_time = 0;   ///< wish instead: s
-  double controller = 0;      ///< wish instead: omega_c, rad/s
-  bool anyway = false;        ///< design for a refused log, too
-  std::string observer;       ///< typed in: nothing is found, the log runs through it
-  double bandwidth = 0;       ///< its omega_o, rad/s
-  std::string out = ".";      ///< folder of the page
-  std::string command;        ///< for the page
+  double noise_share = 0;  ///< wish: deviation of u by noise, share of its range; 0: as tune has it
+  double settling_time = 0;  ///< wish instead: s
+  double controller = 0;     ///< wish instead: omega_c, rad/s
+  int rank = 1;              ///< which of the designs, the best is 1
+  bool anyway = false;       ///< design for a refused log, too
+  std::string observer;      ///< typed in: nothing is found, the log runs through it
+  double bandwidth = 0;      ///< its omega_o, rad/s
+  std::string out = ".";     ///< folder of the page
+  std::string command;       ///< for the page
 };
 
 /// Something that has to be looked at before anything is pasted.

@@ -1,5 +1,7 @@
 #include "from_log/parts/page.hpp"
 
+#include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <cstdint>
 #include <cstdio>
@@ -93,16 +95,23 @@ std::string html_of(const Figure& figure, const std::string& scratch) {
 std::string html_of_table(const std::string& caption, const std::vector<CsvRow>& rows) {
   std::string text = "<figure class=\"tab\"><figcaption>" + escaped(caption) +
                      "</figcaption><div class=\"table\" tabindex=\"0\"><table>\n<thead><tr>";
-  for (const auto& field : rows[0]) text += "<th scope=\"col\">" + escaped(field) + "</th>";
+  // A column without a number is one of words.
+  std::vector<bool> words(rows[0].size());
+  for (std::size_t c = 0; c < words.size(); ++c) {
+    words[c] = std::none_of(rows.begin() + 1, rows.end(), [c](const CsvRow& row) {
+      return !row[c].empty() &&
+             (std::isdigit(static_cast<unsigned char>(row[c][0])) != 0 || row[c][0] == '-');
+    });
+    text += std::string("<th scope=\"col\"") + (words[c] ? " class=\"text\">" : ">") +
+            escaped(rows[0][c]) + "</th>";
+  }
   text += "</tr></thead>\n<tbody>\n";
   for (std::size_t i = 1; i < rows.size(); ++i) {
     text += "<tr>";
     for (std::size_t c = 0; c < rows[i].size(); ++c) {
-      // Long ones are sentences.
-      const bool words = rows[i][c].size() > 30;
-      text += (c == 0  ? "<th scope=\"row\">"
-               : words ? "<td class=\"text\">"
-                       : "<td>") +
+      text += (c == 0     ? "<th scope=\"row\">"
+               : words[c] ? "<td class=\"text\">"
+                          : "<td>") +
               escaped(rows[i][c]) + (c == 0 ? "</th>" : "</td>");
     }
     text += "</tr>\n";
@@ -165,7 +174,10 @@ std::string Page::write(const std::string& folder, const std::string& stem) cons
         main += html_of(item.figures[0], scratch.path());
         break;
       case Kind::code:
+        if (!item.name.empty())
+          main += "<details>\n<summary>" + escaped(item.name) + "</summary>\n";
         main += "<pre tabindex=\"0\"><code>" + escaped(item.text) + "</code></pre>\n";
+        if (!item.name.empty()) main += "</details>\n";
         break;
     }
   }

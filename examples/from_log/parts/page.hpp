@@ -33,7 +33,10 @@ class Page {
   Page& figure(const esokit::examples::Figure& figure) {
     return add({.kind = Kind::figure, .figures = {figure}});
   }
-  Page& code(std::string text) { return add({.kind = Kind::code, .text = std::move(text)}); }
+  /// @param heading where it is given the code is folded away below it
+  Page& code(std::string text, std::string heading = {}) {
+    return add({.kind = Kind::code, .text = std::move(text), .name = std::move(heading)});
+  }
 
   /// Writes FOLDER/STEM.html, or STEM-2.html and so on where that is there: never over a file.
   /// @return what was written; empty if that failed, stderr says why

@@ -229,7 +229,11 @@ Page show(const Settings& settings, const Input& input, const Findings& findings
     page.box("Refused: this log does not tell what a controller needs. What to record instead",
              lines, true);
   }
-  if (design.made()) page.box("In short", design.summary(), false);
+  if (design.made()) {
+    page.box(
+        findings.refusal ? "In short, as if the numbers could be trusted (--anyway)" : "In short",
+        design.summary(), false);
+  }
   page.heading("The log");
   page.table("log", "What was read", log_table(input, findings));
   page.figure(log_figure(input, findings));
