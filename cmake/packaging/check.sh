@@ -101,6 +101,22 @@ cmake -P "$work/port.cmake"
   fail "the vcpkg port installs no config file or copyright"
 not_tried+=("vcpkg itself")
 
+# --- colcon: a clone in src/ is a package, and before what depends on it ---
+if command -v colcon >/dev/null 2>&1; then
+  mkdir -p "$work/workspace/src/joint"
+  git clone -q "$root" "$work/workspace/src/esokit"
+  cp tests/consumer/CMakeLists.txt "$work/workspace/src/joint"
+  cp "$work/main.cpp" "$work/workspace/src/joint"
+  echo '<package format="3"><name>joint</name><version>1.0.0</version><description>a</description>
+    <maintainer email="a@b.invalid">a</maintainer><license>MIT</license><depend>esokit</depend>
+    <export><build_type>cmake</build_type></export></package>' >"$work/workspace/src/joint/package.xml"
+  (cd "$work/workspace" && colcon build --cmake-args -G Ninja \
+    -DCONSUMER_MAIN="$work/workspace/src/joint/main.cpp")
+  "$work/workspace/build/joint/consumer"
+else
+  not_tried+=(colcon)
+fi
+
 # --- Conan recipe, ROS package file ---
 if command -v conan >/dev/null 2>&1; then
   conan create cmake/packaging/conan --build=missing
