@@ -1,32 +1,46 @@
 #!/usr/bin/env bash
 # Writes the library as one header to standard output: cmake/amalgamate.sh >esokit.hpp
-# With a header's path below include/ as argument, that header and what it needs.
+# With headers' names as arguments (control/adrc.hpp observer/linear_eso.hpp), those and what they need.
+# Several of them go into one program: each part has a guard of its own; of two versions, one #error.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../include"
-first=${1:-esokit/esokit.hpp}
-if [[ ! -f $first ]]; then
-  echo "amalgamate.sh: there is no include/$first" >&2
-  exit 1
-fi
+version=$(sed -n 's/^project(esokit VERSION \([0-9.]*\).*/\1/p' ../CMakeLists.txt)
+headers=("${@:-esokit.hpp}")
+for i in "${!headers[@]}"; do
+  headers[i]=esokit/${headers[i]#esokit/}
+  if [[ ! -f ${headers[i]} ]]; then
+    echo "amalgamate.sh: there is no include/${headers[i]}" >&2
+    exit 1
+  fi
+done
 
-awk -v first="$first" -v license="../LICENSE" '
-  function paste(file,    line, name, status) {
+awk -v headers="${headers[*]}" -v license="../LICENSE" -v version="$version" '
+  function paste(file,    line, name, status, guard) {
     if (file in seen) return
     seen[file] = 1
+    guard = toupper(file)
+    gsub(/[^A-Z0-9]/, "_", guard)
+    body[file] = "#ifndef " guard "\n#define " guard "\n"
     while ((status = (getline line < file)) > 0) {
       if (match(line, /^#include <esokit\/[^>]*>/)) {
         name = substr(line, 11, RLENGTH - 11)
         paste(name)
-      } else if (line ~ /^#pragma once/) {
-      } else {
-        print line
+      } else if (line !~ /^#pragma once/) {
+        body[file] = body[file] line "\n"
       }
     }
     if (status < 0) { print "amalgamate.sh: cannot read " file > "/dev/stderr"; exit 1 }
     close(file)
+    print body[file] "#endif  // " guard "\n"
   }
   BEGIN {
     while ((getline line < license) > 0) print "// " line
-    print "//\n// Written by cmake/amalgamate.sh from " first "; edit the headers, not this file.\n#pragma once\n"
-    paste(first)
+    print "//\n// esokit " version ", written by cmake/amalgamate.sh from " headers "; edit the headers, not this file.\n"
+    split(version, part, ".")
+    number = (part[1] * 1000 + part[2]) * 1000 + part[3]
+    print "#ifndef ESOKIT_SINGLE_HEADER\n#define ESOKIT_SINGLE_HEADER " number
+    print "#elif ESOKIT_SINGLE_HEADER != " number
+    print "#error \"esokit: two single headers of different versions in one program\"\n#endif\n"
+    count = split(headers, first, " ")
+    for (i = 1; i <= count; ++i) paste(first[i])
   }'

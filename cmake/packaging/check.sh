@@ -60,6 +60,14 @@ sed 's|#include <esokit/.*|#include "esokit.hpp"|' "$work/main.cpp" >"$work/sing
 # shellcheck disable=SC2046
 "${CXX:-c++}" -std=c++20 -I"$work/single" $(pkg-config --cflags eigen3) "$work/single/main.cpp" \
   -o "$work/by_single_header"
+bash cmake/amalgamate.sh control/adrc.hpp >"$work/single/adrc.hpp"
+bash cmake/amalgamate.sh observer/linear_eso.hpp observer/cascade_eso.hpp >"$work/single/observers.hpp"
+sed '0,/#include <esokit/s||#include "observers.hpp"\n#include "adrc.hpp"\n#include "esokit.hpp"\n&|; /#include <esokit/d' \
+  "$work/main.cpp" >"$work/single/several.cpp"
+# shellcheck disable=SC2046
+"${CXX:-c++}" -std=c++20 -I"$work/single" $(pkg-config --cflags eigen3) "$work/single/several.cpp" \
+  -o "$work/by_several"
+"$work/by_several"
 "$work/by_single_header"
 
 # --- vcpkg port: run with stand-ins for vcpkg's functions, which do what theirs do here ---
