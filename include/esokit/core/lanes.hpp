@@ -110,6 +110,22 @@ struct LaneAccess {
   static constexpr auto update_advanced(Object& object, const S& y, const S& u) noexcept {
     return object.update_advanced(y, u);
   }
+  template <class Object, class S>
+  static constexpr auto predict_rejecting(Object& object, const S& u) noexcept {
+    return object.predict_rejecting(u);
+  }
+  template <class Object>
+  static constexpr auto states(const Object& object) noexcept {
+    return object.states_;
+  }
+  template <class Object, class State>
+  static constexpr auto shift_to(Object& object, const State& state) noexcept {
+    return object.shift_to(state);
+  }
+  template <class Object, class State>
+  static constexpr auto reset_scaled(Object& object, const State& state) noexcept {
+    return object.reset_scaled(state);
+  }
 };
 
 /// A std::array or a Matrix.

@@ -535,9 +535,9 @@ class PredictorCorrector {
     if (!all(is_finite(probe(next)))) [[unlikely]] {
       if constexpr (PackScalar<S>) {
         return each_lane([&](Plain& lane, int i) {
-          auto lane_next = lane.states_;
+          auto lane_next = detail::LaneAccess::states(lane);
           detail::copy_lane<false>(next, lane_next, i);
-          return lane.shift_to(lane_next);
+          return detail::LaneAccess::shift_to(lane, lane_next);
         });
       } else {
         return StepStatus::state_rejected;
@@ -768,7 +768,9 @@ class PredictorCorrector {
     const LevelStates next = predicted_levels(u_applied);
     if (!all(is_finite(probe(next)))) [[unlikely]] {
       if constexpr (PackScalar<S>) {
-        return each_lane([&](Plain& lane, int i) { return lane.predict_rejecting(u_applied[i]); });
+        return each_lane([&](Plain& lane, int i) {
+          return detail::LaneAccess::predict_rejecting(lane, u_applied[i]);
+        });
       } else {
         return predict_rejecting(u_applied);
       }
@@ -817,9 +819,9 @@ class PredictorCorrector {
   Status reset_scaled(const State& state) noexcept {
     if constexpr (PackScalar<S>) {
       return each_lane([&](Plain& lane, int i) {
-        auto lane_state = lane.states_[0];
+        auto lane_state = detail::LaneAccess::states(lane)[0];
         detail::copy_lane<false>(state, lane_state, i);
-        return lane.reset_scaled(lane_state);
+        return detail::LaneAccess::reset_scaled(lane, lane_state);
       });
     }
     LevelStates states;
