@@ -381,6 +381,74 @@ void gaps_decay(const Observer& made) {
 
 TEST(ModelCascade, EveryGapThatIsBridgedLetsErrorsDecay) { gaps_decay(make_all<2>()); }
 
+// ---- A whole plant.
+
+TEST(ModelCascade, OfAWholePlantIsThatOfItsPoles) {
+  constexpr ModelParts poles{.order = 2, .plant_poles = true, .sensor = 1};
+  auto parts = Cascade<poles, 2>::make({.observer_bandwidth = 50,
+                                        .bandwidth_factor = 1.7,
+                                        .input_gain = 2,
+                                        .sample_time = kT,
+                                        .model = {.plant = {40.0, 5.0}, .sensor = {0.005}}})
+                   .value();
+  const auto plant =
+      esokit::LinearPlant<2>::chain({.coefficients = {40.0, 5.0}, .input_gain = 2.0}).value();
+  using Whole = esokit::PlantCascadeEso<2, ModelParts{.order = 2, .sensor = 1}, 2>;
+  auto whole = Whole::make({.observer_bandwidth = 50,
+                            .bandwidth_factor = 1.7,
+                            .input_gain = 2,
+                            .sample_time = kT,
+                            .model = {.plant = plant, .sensor = {0.005}}})
+                   .value();
+  for (int k = 0; k < 1000; ++k) {
+    const double y = std::sin(0.03 * k);
+    const double u = std::cos(0.05 * k);
+    ASSERT_EQ(parts.update(y, u), whole.update(y, u));
+    for (int level = 0; level < 2; ++level) {
+      for (int i = 0; i < 4; ++i) {
+        ASSERT_NEAR(parts.level_estimate(level)(i), whole.level_estimate(level)(i),
+                    1e-9 * std::pow(200.0, i))
+            << k << " level " << level << " row " << i;
+      }
+    }
+  }
+}
+
+/// A zero, and a load that enters elsewhere than u, with a swing.
+TEST(ModelCascade, OfAWholePlantSharesItsDisturbanceAlone) {
+  esokit::LinearPlant<3> plant;
+  plant.a = {{-3, 1, 0}, {0, -5, 1}, {0, 0, -2}};
+  plant.b = {0, 1, 4};
+  plant.c = {1, 0, 0};
+  plant.e = {1, 0, 2};
+  using Whole = esokit::PlantCascadeEso<3, ModelParts{.order = 2, .sensor = 1, .resonators = 1}, 2>;
+  const Whole::Config config{
+      .observer_bandwidth = 60,
+      .bandwidth_factor = 1.8,
+      .input_gain = plant.input_gain(),
+      .sample_time = kT,
+      .model = {.plant = plant, .sensor = {0.005}, .resonators = {{{.frequency = 40.0}}}}};
+  auto observer = Whole::make(config).value();
+  const auto& model = observer.model();
+  Random random(13);
+  for (int trial = 0; trial < 20; ++trial) {
+    Whole::State x{};
+    for (double& element : x) element = random.uniform(-1, 1);
+    const auto part = model.physical(model.disturbance_part(x));
+    const auto whole = model.physical(x);
+    // d is all there, x is not, nor what the sensor shows.
+    EXPECT_NEAR(model.disturbance(part), model.disturbance(whole),
+                1e-9 * std::abs(model.disturbance(whole)));
+    EXPECT_EQ(part(0), 0.0);
+    EXPECT_EQ(model.measured(part), 0.0);
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_NEAR(model.plant_state(part)(i), 0.0, 1e-9 * std::abs(model.plant_state(whole)(i)))
+          << i;
+    }
+  }
+  gaps_decay(observer);
+}
+
 // ---- Whatever the plant's poles, y may be counted from elsewhere.
 
 TEST(ModelCascade, AnAngleWithKnownPolesAndASensorIsWrapped) {

@@ -95,7 +95,8 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
   using typename Base::Estimate;
   using typename Base::State;
 
-  static constexpr ModelTraits traits{.corrects_part = true};  ///< what it is
+  static constexpr ModelTraits traits{.tells_disturbance = true,
+                                      .corrects_part = true};  ///< what it is
   template <class T>
   using with_scalar = LinearPlantModel<States, Parts, T>;  ///< the same of another scalar
 
@@ -201,6 +202,22 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
     return z(swings + 2 * Parts.resonators + part);
   }
   /// @}
+
+  /// What of a correction is the disturbance's: with x as it is.
+  [[nodiscard]] State disturbance_part(const State& x) const noexcept {
+    State part{};
+    for (int k = States; k < inner; ++k) {
+      S element(0);
+      for (int j = 0; j < inner; ++j) {
+        element = element + natural_(k, j) * x[static_cast<std::size_t>(lf + j)];
+      }
+      for (int i = 0; i < inner; ++i) {
+        S& row = part[static_cast<std::size_t>(lf + i)];
+        row = row + of_disturbance_(i, k - States) * element;
+      }
+    }
+    return part;
+  }
 
   /// True if u does the same in both.
   [[nodiscard]] bool same_drive(const LinearPlantModel& other) const noexcept {
@@ -411,6 +428,9 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
     }
     this->set_step(all);
 
+    for (int i = 0; i < inner; ++i) {
+      for (int k = States; k < inner; ++k) of_disturbance_(i, k - States) = rows(i, k);
+    }
     natural_ = Square::Identity();
     Square eliminated = rows;
     detail::solve_in_place(detail::DenseView<S>{eliminated.data(), inner},
@@ -487,6 +507,7 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
 
   Settings settings_;
   Square natural_;  ///< from the scaled states to (x, elements of d)
+  Matrix<S, inner, inner - States> of_disturbance_;  ///< from the elements of d to the states
   Estimate rest_of_y_;
   Estimate rest_of_u_;
 };

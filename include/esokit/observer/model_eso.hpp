@@ -102,6 +102,13 @@ template <int States, ModelParts Parts, PlainScalar S = double, class Placement 
 using PlantEso = LinearEso<Parts.order, S, LinearPlantModel<States, Parts, S>::extension, Placement,
                            LinearPlantModel<States, Parts, S>>;
 
+/// CascadeEso that knows the same.
+template <int States, ModelParts Parts, int Levels, PlainScalar S = double,
+          class Placement = EqualPoles>
+using PlantCascadeEso =
+    CascadeEso<Parts.order, Levels, S, LinearPlantModel<States, Parts, S>::extension, Placement,
+               LinearPlantModel<States, Parts, S>>;
+
 /// What a disturbance consists of, each in the unit of d: that of y^(n), or as E says of a
 /// LinearPlantModel.
 template <class Model>
