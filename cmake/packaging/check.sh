@@ -62,8 +62,9 @@ sed 's|#include <esokit/.*|#include "esokit.hpp"|' "$work/main.cpp" >"$work/sing
   -o "$work/by_single_header"
 bash cmake/amalgamate.sh control/adrc.hpp >"$work/single/adrc.hpp"
 bash cmake/amalgamate.sh observer/linear_eso.hpp observer/cascade_eso.hpp >"$work/single/observers.hpp"
-sed '0,/#include <esokit/s||#include "observers.hpp"\n#include "adrc.hpp"\n#include "esokit.hpp"\n&|; /#include <esokit/d' \
+sed 's|#include <esokit/control.*|#include "observers.hpp"\n#include "adrc.hpp"\n#include "esokit.hpp"|; /#include <esokit/d' \
   "$work/main.cpp" >"$work/single/several.cpp"
+grep -q '"adrc.hpp"' "$work/single/several.cpp"
 # shellcheck disable=SC2046
 "${CXX:-c++}" -std=c++20 -I"$work/single" $(pkg-config --cflags eigen3) "$work/single/several.cpp" \
   -o "$work/by_several"
