@@ -89,10 +89,12 @@ requires detail::WritesText<Stream> Stream& operator<<(Stream& out, AbortReason 
 template <PlainScalar S>
 struct ExperimentResult {
   S input_gain{};             ///< b0
-  S input_gain_half_width{};  ///< 95 %, of this model: friction and damping are not in it
+  S input_gain_half_width{};  ///< 95 %
   S least{};                  ///< abs(b0) if all of the latency were dead time
   S largest{};                ///< abs(b0) if all of it were lag
   S latency{};                ///< lag and dead time together, s
+  S pole{};                   ///< a of y' + a y, order 1, 1/s; 0 where none shows
+  S friction{};               ///< Coulomb's, order 2, unit of y^(n); 0 where none shows
   S frequency{};              ///< at which it was found, rad/s
   int windows{};              ///< of two cycles each, of which the interval is made
 };
@@ -117,9 +119,11 @@ struct ExperimentRow {
 /// L) / (1 + j w tau) at the frequency of the cycle whatever the machine does before and after: no
 /// describing function. abs(H_3 / H_1) tells lag from dead time, the angle of H_3 how far this
 /// model of the machine is wrong, the scatter of the H how far noise goes; all three are in the
-/// interval. What is not: with n = 2, Coulomb friction of 10, 20, 30 % of b0 A makes b0 read 3, 8,
-/// 14 % low and the latency short; a d that rises by r a second all the time shifts H by r P / (12
-/// A), P being the time of a cycle. `identify` of the log tells them apart.
+/// interval. Damping a y with n = 1, or Coulomb friction with n = 2, turn H_1 and H_3 differently,
+/// by which they are found and taken out; what is too large for that is refused. What is not in it:
+/// damping with n = 2, which reads as less latency, and a d that rises by r a second all the time,
+/// which shifts H by r P / (12 A), P being the time of a cycle. `identify` of the log tells them
+/// apart.
 ///
 /// A relay on a machine of order 2 without damping has no cycle without `lead`: it switches on
 /// y + 3 (y - f), f being y behind a lag of a quarter of `lead`.
@@ -250,43 +254,95 @@ class Experiment {
     const S size = magnitude(one);
     if (!is_finite(size) || !is_finite(third_.square) || !(size > S(0)))
       return E{"input_gain", size, "is not a number that can be used"};
-    const S angle = std::atan2(-one.im, one.re);
-    if (!(angle > S(0)) || angle > S(1.5)) {
-      return E{"latency", angle / frequency_,
+    // Damping (order 1) and friction (order 2) turn H_1 one way and H_3 less, or the other way.
+    const Complex lost = Order == 1 ? Complex{one.im, -one.re} : rubbed_.mean;
+    const Complex lost_third =
+        Order == 1 ? Complex{three.im / S(3), -three.re / S(3)} : rubbed_third_.mean;
+    const S most = Order == 1 ? S(1.2f) : S(0.9f) * size;
+    Split at = split(one, three);
+    const S simple = at.gain();
+    S loss(0);
+    const S scatter = student() * third_.error() / magnitude(three);
+    // Not what noise alone may make of it.
+    if (at.misfit < S(0) && !(at.misfit > -scatter)) {
+      const auto without = [&](S share) {
+        return split(plus(one, lost, share), plus(three, lost_third, share));
+      };
+      constexpr int steps = 16;
+      S below(0), above(0);
+      for (int i = 1; i <= steps && !(above > S(0)); ++i) {
+        const S force = most * S(i) / S(steps);
+        (without(force).misfit < S(0) ? below : above) = force;
+      }
+      if (above > S(0)) {
+        for (int i = 0; i < 30; ++i) {
+          const S middle = (below + above) / S(2);
+          (without(middle).misfit < S(0) ? below : above) = middle;
+        }
+        loss = above;
+        at = without(loss);
+        at.misfit = S(0);
+      }
+    }
+    if (!(at.angle > S(0)) || at.angle > S(1.5)) {
+      return E{"latency", at.angle / frequency_,
                "does not fit: friction or damping is too large for this amplitude, or order, or "
                "the sign of amplitude, is another"};
     }
-    // (1 + x^2) / (1 + 9 x^2) is the square of abs(H_3 / H_1) for x = w tau.
-    const S longest = std::tan(angle) * std::tan(angle);
-    const auto square_of_lag = [longest](S ratio) {
-      const S below = S(9) * ratio * ratio - S(1);
-      const S x = below > S(0) ? (S(1) - ratio * ratio) / below : longest;
-      return x < S(0) ? S(0) : x > longest ? longest : x;
-    };
-    const S ratio = magnitude(three) / size;
-    const S square = square_of_lag(ratio);
-    const S x = std::sqrt(square);
-    const S dead = angle - std::atan(x);
-    const S expected = S(3) * dead + std::atan(S(3) * x);
-    const S c = std::cos(expected), s = std::sin(expected);
-    const S misfit =
-        detail::absolute(std::atan2(three.re * s + three.im * c, three.re * c - three.im * s));
-    const S scatter = student() * third_.error() / (ratio * size);
-    S share = std::sqrt(misfit * misfit + scatter * scatter);
+    // Of b0 A, or of the frequency.
+    const S share = Order == 1 ? loss : S(loss / at.gain());
+    if (Order == 2 && share > S(0.25))
+      return E{"friction", share,   "of b0 A is too large: take a larger amplitude; above",
+               -1,         S(0.25), true};
+    if (Order == 1 && share > S(1))
+      return E{"pole",
+               share,
+               "of the frequency is too large: take a smaller hysteresis or "
+               "half_period; above",
+               -1,
+               S(1),
+               true};
+    if (detail::absolute(at.misfit) > S(0.5) && detail::absolute(at.misfit) > S(2) * scatter) {
+      return E{"misfit",
+               at.misfit,
+               "rad is what the third harmonic is off: the machine is another than order, lag and "
+               "dead time make it, or damping or friction is too large; above",
+               -1,
+               S(0.5),
+               true};
+    }
+    S unsure = std::sqrt(at.misfit * at.misfit + scatter * scatter);
     // A third harmonic that u does not have, or that noise hides, says nothing.
-    if (!is_finite(share) || share > S(1)) share = S(1);
-    const auto gain = [&](S r) { return size * std::sqrt(S(1) + square_of_lag(r)); };
-    const S middle = gain(ratio);
-    const S down = middle - gain(ratio * (S(1) + share));
-    const S up = gain(ratio * (S(1) - share)) - middle;
-    const S split = down > up ? down : up;
+    if (!is_finite(unsure) || unsure > S(1)) unsure = S(1);
+    const S middle = at.gain();
+    const S down = middle - at.gain(at.ratio * (S(1) + unsure));
+    const S up = at.gain(at.ratio * (S(1) - unsure)) - middle;
+    const S lag_or_dead = down > up ? down : up;
     const S repeat = student() * first_.error() * middle / size;
+    // Part of what it changed, and what its own error changes. Friction: b0 falls by about twice
+    // the square of its share, and it was taken to act as long one way as the other.
+    const S changed = detail::absolute(middle - simple);
+    S rubbed;
+    if constexpr (Order == 2) {
+      const S off = unsure / S(4);
+      rubbed = changed / S(2) + middle * (S(2) * off * (S(2) * share + off) +
+                                          S(1.5) * share * detail::absolute(uneven_));
+    } else {
+      const S off = S(0.375f) * unsure;
+      rubbed = changed / S(4) + middle * off * (share + off / S(2));
+    }
     Result found;
     found.input_gain = sign * middle;
-    found.input_gain_half_width = std::sqrt(split * split + repeat * repeat);
-    found.least = size;
-    found.largest = size * std::sqrt(S(1) + longest);
-    found.latency = (dead + x) / frequency_;
+    // A lag between the samples.
+    const S turn = frequency_ * config_.sample_time;
+    const S sampled = middle * turn * turn / S(8);
+    found.input_gain_half_width = std::sqrt(lag_or_dead * lag_or_dead + repeat * repeat +
+                                            rubbed * rubbed + sampled * sampled);
+    found.least = at.size;
+    found.largest = at.size * std::sqrt(S(1) + at.longest);
+    found.latency = (at.dead + at.x) / frequency_;
+    (Order == 1 ? found.pole : found.friction) =
+        loss * (Order == 1 ? frequency_ : detail::absolute(config_.amplitude));
     found.frequency = frequency_;
     found.windows = windows_;
     return found;
@@ -336,9 +392,46 @@ class Experiment {
     }
   };
 
+  /// Lag and dead time of H_1 and H_3. (1 + x^2) / (1 + 9 x^2) is the square of their ratio, for
+  /// x = w tau.
+  struct Split {
+    S size{}, angle{}, longest{}, ratio{}, x{}, dead{}, misfit{};
+    [[nodiscard]] S square_of_lag(S r) const noexcept {
+      const S below = S(9) * r * r - S(1);
+      const S square = below > S(0) ? (S(1) - r * r) / below : longest;
+      return square < S(0) ? S(0) : square > longest ? longest : square;
+    }
+    [[nodiscard]] S gain(S r) const noexcept { return size * std::sqrt(S(1) + square_of_lag(r)); }
+    [[nodiscard]] S gain() const noexcept { return gain(ratio); }
+  };
+
+  static Split split(const Complex& one, const Complex& three) noexcept {
+    Split at;
+    at.size = magnitude(one);
+    at.angle = std::atan2(-one.im, one.re);
+    const S tangent = at.angle > S(0) && at.angle < S(1.5) ? std::tan(at.angle) : S(0);
+    at.longest = tangent * tangent;
+    at.ratio = magnitude(three) / at.size;
+    at.x = std::sqrt(at.square_of_lag(at.ratio));
+    at.dead = at.angle - std::atan(at.x);
+    const S expected = S(3) * at.dead + std::atan(S(3) * at.x);
+    const S c = std::cos(expected), s = std::sin(expected);
+    at.misfit = std::atan2(three.re * s + three.im * c, three.re * c - three.im * s);
+    return at;
+  }
+
+  static Complex plus(const Complex& a, const Complex& b, S factor) noexcept {
+    return {a.re + factor * b.re, a.im + factor * b.im};
+  }
+
   /// Sums over two cycles.
   struct Sums {
     Complex y{}, u{};
+    /// Of z over that of u.
+    [[nodiscard]] Complex over_input(const Complex& z) const noexcept {
+      const S square = u.re * u.re + u.im * u.im;
+      return {(z.re * u.re + z.im * u.im) / square, (z.im * u.re - z.re * u.im) / square};
+    }
     void add(S weight, S c, S s, S difference, S input) noexcept {
       y.re += weight * c * difference;
       y.im -= weight * s * difference;
@@ -346,8 +439,8 @@ class Experiment {
       u.im -= weight * s * input;
     }
     [[nodiscard]] Complex ratio(S power) const noexcept {
-      const S square = power * (u.re * u.re + u.im * u.im);
-      return {(y.re * u.re + y.im * u.im) / square, (y.im * u.re - y.re * u.im) / square};
+      const Complex h = over_input(y);
+      return {h.re / power, h.im / power};
     }
   };
 
@@ -392,6 +485,7 @@ class Experiment {
       input = (input + (u_last_ - config_.input)) / S(2);
     }
     sums_[0].add(weight, c2, s2, difference, input);
+    level_ += weight * input;
     sums_[1].add(weight, c2 * c4 - s2 * s4, s2 * c4 + c2 * s4, difference, input);
     const Complex next{turn_.re * step_.re - turn_.im * step_.im,
                        turn_.re * step_.im + turn_.im * step_.re};
@@ -407,6 +501,7 @@ class Experiment {
     step_ = {std::cos(angle), std::sin(angle)};
     turn_ = {S(1), S(0)};
     sums_[0] = sums_[1] = {};
+    level_ = S(0);
     if (least_window_ == 0 || samples < least_window_) least_window_ = samples;
   }
 
@@ -415,7 +510,10 @@ class Experiment {
     const S power = Order == 1 ? T : S(T * T);
     first_.add(sums_[0].ratio(power));
     third_.add(sums_[1].ratio(power));
+    if constexpr (Order == 2) add_friction();
     ++windows_;
+    const S uneven = level_ / (S(window_) * config_.amplitude);
+    uneven_ += (uneven - uneven_) / static_cast<S>(windows_);
     frequency_ +=
         (S(12.566370614359172L) / (S(window_) * T) - frequency_) / static_cast<S>(windows_);
     window_ = 0;
@@ -423,6 +521,30 @@ class Experiment {
       phase_ = ExperimentPhase::hand_over;
       phase_start_ = count_;
     }
+  }
+
+  /// What the sign of the speed would be in H, a force of A: it changes where the first and third
+  /// harmonic of the speed, which are those of the acceleration over j and 3 j, are zero.
+  void add_friction() noexcept {
+    const Complex one{sums_[0].y.im, -sums_[0].y.re};
+    const Complex three{sums_[1].y.im / S(3), -sums_[1].y.re / S(3)};
+    S t = S(-1.5707963267948966L) - std::atan2(one.im, one.re);
+    S c{}, s{}, c3{}, s3{};
+    const auto turn = [&] {
+      c = std::cos(t), s = std::sin(t);
+      c3 = std::cos(S(3) * t), s3 = std::sin(S(3) * t);
+    };
+    for (int i = 0; i < 4; ++i) {
+      turn();
+      const S value = one.re * c - one.im * s + three.re * c3 - three.im * s3;
+      const S slope = -(one.re * s + one.im * c) - S(3) * (three.re * s3 + three.im * c3);
+      if (slope > S(0)) t -= value / slope;
+    }
+    turn();
+    // Of sgn sin(angle - t): 4 / (pi m) sin, of which the sum is half.
+    const S size = S(0.6366197723675814L) * S(window_) * config_.amplitude;
+    rubbed_.add(sums_[0].over_input({-size * s, -size * c}));
+    rubbed_third_.add(sums_[1].over_input({-size / S(3) * s3, -size / S(3) * c3}));
   }
 
   /// Of this sample on.
@@ -482,7 +604,8 @@ class Experiment {
   ExperimentRow<S> last_row_{};
   Complex turn_{}, step_{};
   Sums sums_[2]{};
-  Spread first_{}, third_{};
+  Spread first_{}, third_{}, rubbed_{}, rubbed_third_{};
+  S level_{}, uneven_{};
   S frequency_{};
   std::int32_t count_ = 0, switched_ = 0, up_ = 0, phase_start_ = 0;
   std::int32_t window_ = 0, left_ = 0, least_window_ = 0;
