@@ -2,6 +2,7 @@
 // observer that bears it; no sequence of guards and garbage keeps a loop from its reference.
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <complex>

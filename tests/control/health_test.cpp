@@ -160,9 +160,15 @@ TEST(Health, CountsWhatHappened) {
 TEST(Health, Diagnosis) {
   Health<double> health{.samples = 1000, .innovation = 1};
   EXPECT_EQ(diagnose(health), LoopFault::none);
-  health.gain_ratio = 0.24;
+  health.gain_ratio = 3.01;
+  health.evidence = 2.9;
   EXPECT_EQ(diagnose(health), LoopFault::none);
-  health.evidence = 6;
+  health.evidence = 3;
+  EXPECT_EQ(diagnose(health), LoopFault::gain_too_small);
+  health.gain_ratio = 0.24;
+  health.evidence = 4.9;
+  EXPECT_EQ(diagnose(health), LoopFault::none);
+  health.evidence = 5;
   EXPECT_EQ(diagnose(health), LoopFault::gain_too_large_or_disturbed);
   health.innovation_of_noise = 0.3;
   EXPECT_EQ(diagnose(health), LoopFault::innovation_too_large);
@@ -176,14 +182,14 @@ TEST(Health, Diagnosis) {
   EXPECT_EQ(diagnose(health), LoopFault::gain_too_small);
   health.gain_ratio = -0.31;
   EXPECT_EQ(diagnose(health), LoopFault::wrong_sign);
-  health.evidence = 5.9;
+  health.evidence = 4.9;
   EXPECT_EQ(diagnose(health), LoopFault::measurements_rejected);
   health.rejected = 100;
   EXPECT_EQ(diagnose(health), LoopFault::saturated);
   health.saturated = health.bounded = 0.49;
   health.innovation = 0.89;
   EXPECT_EQ(diagnose(health), LoopFault::none);
-  health.evidence = 6;
+  health.evidence = 5;
   for (const double rho : {-0.29, 0.26, 2.99}) {
     health.gain_ratio = rho;
     EXPECT_EQ(diagnose(health), rho < 0 ? LoopFault::gain_too_large_or_disturbed : LoopFault::none);

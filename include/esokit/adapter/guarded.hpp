@@ -86,7 +86,8 @@ struct GuardedConfig {
 ///   known is told as u_applied, and needs no guard). dhat moves only so that it frees the
 ///   actuator: with u at its upper end up for b0 > 0. `release_samples` measurements after the end
 ///   of the pin it is free again; there is no time-out while it lasts, which would only restore the
-///   fault.
+///   fault. For a moment that has nothing to do with u: where half of u still gets through, dhat
+///   makes up for the other half, and to hold it does more harm than good (examples/guards).
 /// - Bound: abs(dhat) <= disturbance_bound, after the correction and before the prediction, at
 ///   every level of a cascade. A load above it is a steady error: `bounded()`. With m > 1 a slope
 ///   of the estimate that would lead out is zero.

@@ -55,10 +55,11 @@ enum class LoopFault : unsigned char {
 /// Limits of `diagnose`. rho was looked at in 1,000 servos of each fault and 5,000 healthy ones,
 /// see examples/guards.
 struct HealthLimits {
-  double wrong_sign = -0.3;  ///< rho below it
-  double too_small = 3;      ///< rho above it
-  double too_large = 0.25;   ///< rho below it, advice alone: a load does the same
-  double evidence = 6;       ///< omega_o times seconds; below it rho says nothing
+  double wrong_sign = -0.3;     ///< rho below it
+  double too_small = 3;         ///< rho above it
+  double too_large = 0.25;      ///< rho below it, advice alone: a load does the same
+  double evidence = 5;          ///< omega_o times seconds; below it rho says nothing of the sign
+  double evidence_of_more = 3;  ///< the same of a b0 that is too small, which shows sooner
 };
 
 /// What is likely wrong. @param health of a monitor
@@ -68,7 +69,9 @@ template <PlainScalar S>
   const auto rho = static_cast<double>(health.gain_ratio);
   const bool told = static_cast<double>(health.evidence) >= limits.evidence;
   if (told && rho < limits.wrong_sign) return LoopFault::wrong_sign;
-  if (told && rho > limits.too_small) return LoopFault::gain_too_small;
+  if (static_cast<double>(health.evidence) >= limits.evidence_of_more && rho > limits.too_small) {
+    return LoopFault::gain_too_small;
+  }
   if (health.rejected > 10 && health.rejected > health.samples / 10) {
     return LoopFault::measurements_rejected;
   }

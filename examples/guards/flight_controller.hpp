@@ -1,0 +1,92 @@
+// ADRC on a flight controller: one axis of the rate loop of a multirotor, complete: motor lag, gyro
+// filter, thrust over throttle, mixer, arming. Everything that you write is in this file.
+//
+// y  rate of the filtered gyro, rad/s       u  moment wanted from the mixer, -1 .. 1
+// b0 (rad/s^2) per u at hover: from a log (identify) or a twitch: step u by 0.1, read the slope
+#pragma once
+
+#include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/guarded.hpp>
+#include <esokit/control/adrc.hpp>
+#include <esokit/control/health.hpp>
+#include <esokit/observer/linear_eso.hpp>
+
+namespace guards {
+
+/// One axis. Call `rate` once a gyro sample, armed or not.
+class RateAxis {
+  // Of order 2, as the motor lags: tau y'' = -y' + b u. The gyro's filters take some samples: u is
+  // told to the observer that much later.
+  using Observer = esokit::DelayedInput<esokit::LinearEso<2, float>, 16>;
+  using Loop = esokit::Adrc<esokit::Guarded<Observer>>;
+  using Monitor = esokit::HealthMonitor<3, float>;
+
+ public:
+  struct Config {
+    float sample_time = 1e-3f;      // s
+    float hover_gain = 600;         // b0 at hover throttle, rad/s^2
+    float hover_throttle = 0.4f;    // 0 .. 1
+    float motor_lag = 0.02f;        // s
+    float gyro_delay = 2e-3f;       // s, of all filters together at low frequencies
+    float most_disturbance = 0.6f;  // share of u that a disturbance may be given
+  };
+
+  static esokit::Expected<RateAxis, esokit::Error<float>> make(const Config& config) {
+    const float input_gain = config.hover_gain / config.motor_lag;
+    const float observer_bandwidth = 3 / config.motor_lag;
+    Loop::Config loop;
+    loop.observer.observer.observer = {.observer_bandwidth = observer_bandwidth,
+                                       .input_gain = input_gain,
+                                       .sample_time = config.sample_time};
+    loop.observer.observer.delay = static_cast<int>(config.gyro_delay / config.sample_time);
+    loop.observer.disturbance_bound = config.most_disturbance;
+    loop.observer.unit = esokit::DisturbanceUnit::input;
+    loop.observer.release_samples = 20;
+    loop.controller_bandwidth = observer_bandwidth / 4;
+    loop.limits = {.lower = -1, .upper = 1};
+    const auto made = Loop::make(loop);
+    if (!made) return made.error();
+    const auto monitor = Monitor::make({.observer_bandwidth = observer_bandwidth,
+                                        .sample_time = config.sample_time,
+                                        .input_range = 1});
+    if (!monitor) return monitor.error();
+    return RateAxis(config, *made, *monitor);
+  }
+
+  /// @param flying armed, and thrust beyond what lifts off @param mixer_at_limit of the last sample
+  /// @return u, -1 .. 1
+  float rate(float gyro, float wanted, float throttle, bool flying, bool mixer_at_limit) {
+    // More thrust, more moment: b0 goes with the throttle, and never below a fifth of hover's.
+    const float share = throttle / config_.hover_throttle;
+    const float hover_gain = config_.hover_gain / config_.motor_lag;
+    (void)loop_.set_input_gain(hover_gain * (share > 0.2f ? share : 0.2f));
+    if (!flying) {
+      // On the ground the axis cannot turn, and that is no disturbance. The reference begins at y.
+      reference_ = gyro;
+      return loop_.hold(gyro, gyro, 0);
+    }
+    loop_.observer().set_pin(mixer_at_limit ? esokit::Pin::either : esokit::Pin::free);
+    reference_ += config_.sample_time / 0.02f * (wanted - reference_);
+    const float u = loop_.update(gyro, reference_);
+    monitor_.look(loop_);
+    return u;
+  }
+
+  /// Before each arming, and once a second in the air: wrong_sign is a reason to disarm.
+  [[nodiscard]] esokit::LoopFault fault() const { return esokit::diagnose(monitor_.health()); }
+  /// What the observer makes of everything that is not u, rad/s^2.
+  [[nodiscard]] float disturbance() const { return loop_.observer().total_disturbance(); }
+  /// For the blackbox, see esokit::telemetry.
+  [[nodiscard]] const Loop& loop() const { return loop_; }
+
+ private:
+  RateAxis(const Config& config, const Loop& loop, const Monitor& monitor)
+      : config_(config), loop_(loop), monitor_(monitor) {}
+
+  Config config_;
+  Loop loop_;
+  Monitor monitor_;
+  float reference_ = 0;
+};
+
+}  // namespace guards

@@ -1,0 +1,62 @@
+/// @file
+/// What the failures of this folder share: a plant that is simulated finely, and traces.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <esokit/adapter/guarded.hpp>
+#include <esokit/control/adrc.hpp>
+#include <esokit/observer/linear_eso.hpp>
+
+#include "common/report.hpp"
+
+namespace guards {
+
+inline esokit::examples::About about(std::string title, std::string description) {
+  return {.paper_title = "Guards for the bad day",
+          .citation =
+              "No paper: how loops fail in practice although the numerics are right, bad without a "
+              "guard and good with it",
+          .link = "",
+          .title = std::move(title),
+          .description = std::move(description)};
+}
+
+/// What happened, sample by sample.
+struct Trace {
+  std::vector<double> t, y, u, d;  ///< s, output, input, dhat
+
+  void add(double time, double output, double input, double disturbance) {
+    t.push_back(time);
+    y.push_back(output);
+    u.push_back(input);
+    d.push_back(disturbance);
+  }
+};
+
+/// Largest abs(x) from `from` to `to`, s.
+inline double peak(const Trace& trace, const std::vector<double>& x, double from, double to) {
+  double most = 0;
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    if (trace.t[k] >= from && trace.t[k] < to) most = std::max(most, std::abs(x[k]));
+  }
+  return most;
+}
+
+/// rms of x from `from` to `to`, s.
+inline double rms(const Trace& trace, const std::vector<double>& x, double from, double to) {
+  double sum = 0;
+  double count = 0;
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    if (trace.t[k] < from || trace.t[k] >= to) continue;
+    sum += x[k] * x[k];
+    ++count;
+  }
+  return std::sqrt(sum / count);
+}
+
+}  // namespace guards
