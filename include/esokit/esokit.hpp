@@ -102,6 +102,7 @@
 #include <esokit/identify/intervals.hpp>
 #include <esokit/identify/log.hpp>
 #include <esokit/identify/plateau.hpp>
+#include <esokit/identify/sinusoids.hpp>
 #include <esokit/identify/spectrum.hpp>
 #include <esokit/math/combinatorics.hpp>
 #include <esokit/math/dense.hpp>

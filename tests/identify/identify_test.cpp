@@ -27,8 +27,17 @@ using esokit::Log;
 constexpr double T = 0.004;
 constexpr double b0 = 50, tau = 0.02, dead = 0.004, noise = 1e-3;
 
+// What else a loop has.
+struct Extra {
+  double swing = 0, frequency = 0;  // of the disturbance
+  double slope = 0;                 // of b0 along the scheduling column
+  bool ramps = false;               // the disturbance has two integrators
+  double step = 0;                  // of the encoder
+};
+
 // y'' = b0 v(t - L) + friction + drift, P and D around it, steps of the reference.
-Log closed_loop(double excitation, std::uint64_t seed = 3, int rows = 3000) {
+Log closed_loop(double excitation, std::uint64_t seed = 3, int rows = 3000,
+                const Extra& extra = {}) {
   esokit::sim::Gaussian gaussian(seed);
   Log log;
   log.sample_time = T;
@@ -36,23 +45,29 @@ Log closed_loop(double excitation, std::uint64_t seed = 3, int rows = 3000) {
   constexpr double h = T / steps;
   std::vector<double> sent;
   const auto line = static_cast<std::size_t>(std::lround(dead / h));
-  double v = 0, x0 = 0, x1 = 0, filtered = 0, walk = 0;
+  double v = 0, x0 = 0, x1 = 0, filtered = 0, walk = 0, ramp = 0, t = 0;
   for (int k = 0; k < rows; ++k) {
     const double reference =
         excitation * ((k / 180) % 2 == 0 ? 1 : -1) * (1 + 0.5 * ((k / 420) % 3));
-    const double y = x0 + noise * gaussian.next();
+    double y = x0 + (extra.step > 0 ? 0 : noise) * gaussian.next();
+    if (extra.step > 0) y = std::round(y / extra.step) * extra.step;
     const double before = filtered;
     filtered += 0.15 * (y - filtered);
     const double u = (30 * (reference - y) - 9 * (filtered - before) / T) / b0;
     log.u.push_back(u);
     log.y.push_back(y);
-    walk += 0.05 * gaussian.next();
+    if (extra.slope != 0) log.schedule.push_back(std::sin(0.0071 * k));
+    const double gain = b0 * (1 + extra.slope * std::sin(0.0071 * k));
+    ramp += extra.ramps ? 0.2 * gaussian.next() : 0;
+    walk += extra.ramps ? T * ramp : 0.05 * gaussian.next();
     for (int i = 0; i < steps; ++i) {
       sent.push_back(u);
       const double delayed = sent.size() > line ? sent[sent.size() - 1 - line] : 0.0;
       v = delayed + (v - delayed) * std::exp(-h / tau);
-      x1 += h * (b0 * v - 2.0 * std::tanh(x1 / 0.05) + walk);
+      x1 += h * (gain * v - 2.0 * std::tanh(x1 / 0.05) + walk +
+                 extra.swing * std::sin(extra.frequency * t));
       x0 += h * x1;
+      t += h;
     }
   }
   return log;
@@ -97,6 +112,165 @@ TEST(Identify, FindsTheModelThatMadeTheLog) {
   const auto wrong = found->plant<1>();
   ASSERT_FALSE(wrong);
   EXPECT_STREQ(wrong.error().field, "order");
+}
+
+std::string said(const esokit::Check<double>& check) {
+  return check ? "accepted" : std::string(check.error().field) + ": " + check.error().rule;
+}
+
+// Disturbances that swing are found with frequency and size, also between the rows of a fast one,
+// and go on as resonators; without one none is found.
+TEST(Identify, FindsWhatSwings) {
+  EXPECT_TRUE(esokit::study(closed_loop(1), quick())->sinusoids.empty());
+  for (const auto& [swing, frequency] : {std::pair{3.0, 12.0}, std::pair{200.0, 200.0}}) {
+    const Log log = closed_loop(1, 3, 3000, {.swing = swing, .frequency = frequency});
+    const auto found = esokit::identify(log, quick());
+    ASSERT_TRUE(found) << frequency << found.error().field;
+    ASSERT_EQ(found->sinusoids.size(), 1u);
+    const esokit::Sinusoid& sine = found->sinusoids[0];
+    EXPECT_LT(std::abs(sine.frequency.value - frequency), sine.frequency.half_width);
+    EXPECT_LT(sine.frequency.half_width, 0.02);
+    EXPECT_LT(std::abs(sine.amplitude.value - swing), sine.amplitude.half_width);
+    EXPECT_LT(sine.amplitude.share(), 0.05);
+    EXPECT_LT(std::abs(found->input_gain.value - b0), found->input_gain.half_width);
+    // Not looked for, it is a correlation.
+    IdentifyOptions blind = quick();
+    blind.sinusoids = 0;
+    const auto without = esokit::study(log, blind);
+    EXPECT_TRUE(without->sinusoids.empty());
+    EXPECT_GT(without->correlation, found->correlation);
+    constexpr esokit::ModelParts parts{.order = 2, .actuator = 1, .resonators = 1};
+    EXPECT_TRUE(esokit::ModelEso<parts>::make(*found->observer<parts>(100, T)));
+  }
+}
+
+// A log in stretches keeps its time, so that a sine stays one over the gaps.
+TEST(Identify, FindsWhatSwingsInALongLog) {
+  const Log log = closed_loop(1, 5, 9000, {.swing = 3, .frequency = 12});
+  IdentifyOptions options = quick();
+  options.rows_max = 5000;
+  const auto found = esokit::study(log, options);
+  ASSERT_EQ(found->log.used, 5000u);
+  ASSERT_GE(found->sinusoids.size(), 1u);
+  EXPECT_NEAR(found->sinusoids[0].frequency.value, 12, 0.01);
+  EXPECT_NEAR(found->sinusoids[0].amplitude.value, 3, 0.15);
+}
+
+TEST(Identify, ChoosesTheIntegratorsOfTheDisturbance) {
+  IdentifyOptions options = quick();
+  const Log walk = closed_loop(1), ramp = closed_loop(1, 3, 3000, {.ramps = true});
+  EXPECT_EQ(esokit::study(walk, options)->extension, 1);
+  const auto found = esokit::identify(ramp, options);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->extension, 2);
+  EXPECT_LT(std::abs(found->input_gain.value - b0), found->input_gain.half_width);
+  options.extension = 1;
+  EXPECT_EQ(esokit::study(ramp, options)->extension, 1);
+  options.extension = 2;
+  EXPECT_EQ(esokit::study(walk, options)->extension, 2);
+}
+
+TEST(Identify, TellsB0AlongAColumn) {
+  // b0 itself does not depend on it.
+  Log log = closed_loop(1);
+  for (int k = 0; k < 3000; ++k) log.schedule.push_back(k % 500);
+  auto found = esokit::identify(log, quick());
+  ASSERT_TRUE(found) << found.error().field;
+  ASSERT_EQ(found->schedule.size(), 4u);
+  std::size_t rows = 0;
+  for (const auto& range : found->schedule) {
+    EXPECT_LT(std::abs(range.input_gain.value - b0), 1.5 * range.input_gain.half_width);
+    rows += range.rows;
+  }
+  EXPECT_EQ(rows, 3000u);
+  EXPECT_EQ(found->schedule[0].from, 0);
+  EXPECT_EQ(found->schedule[3].to, 499);
+  EXPECT_LT(std::abs(found->schedule_slope.value), 2 * found->schedule_slope.half_width);
+  EXPECT_LT(found->schedule_shift, 1);
+
+  log = closed_loop(1, 3, 3000, {.slope = 0.04});
+  IdentifyOptions options = quick();
+  found = esokit::identify(log, options);
+  ASSERT_FALSE(found);
+  EXPECT_STREQ(found.error().field, "schedule");
+  options.scheduled = true;
+  found = esokit::identify(log, options);
+  ASSERT_TRUE(found) << found.error().field;
+  EXPECT_NEAR(found->schedule_slope.value, 0.04 * b0, found->schedule_slope.half_width);
+  // Means of the column in its quarters.
+  EXPECT_LT(found->schedule[0].input_gain.high(), b0);
+  EXPECT_NEAR(found->schedule[0].input_gain.value, b0 * (1 - 0.04 * 0.87), 0.01 * b0);
+  EXPECT_NEAR(found->schedule[3].input_gain.value, b0 * (1 + 0.04 * 0.93), 0.01 * b0);
+  // A column of one value is one range.
+  for (double& value : log.schedule) value = 7;
+  found = esokit::study(log, quick());
+  ASSERT_EQ(found->schedule.size(), 1u);
+  EXPECT_EQ(found->schedule[0].rows, 3000u);
+  EXPECT_EQ(found->schedule_shift, 0);
+}
+
+// Rounding of a slow motion (a fifth of a step a row) is alike in neighbouring rows; that is the
+// encoder's, not the model's.
+TEST(Identify, TakesRoundingOutOfTheCorrelation) {
+  Log log;
+  log.sample_time = T;
+  constexpr double step = 0.04;
+  esokit::sim::Gaussian gaussian(4);
+  double x = 0, walk = 0;
+  for (int k = 0; k < 3000; ++k) {
+    const double u = std::sin(0.02 * k) + (k / 110 % 2 == 0 ? 0.5 : -0.5);
+    log.u.push_back(u);
+    log.y.push_back(std::round(x / step) * step);
+    x += T * (2 * u + walk);
+    walk += 0.02 * gaussian.next();
+  }
+  const auto prepared = esokit::prepare(log);
+  ASSERT_NEAR(prepared->report.quantisation, step, 1e-9);
+  const auto rounded = esokit::detail::fit_order(prepared->data, quick(), 1, step);
+  const auto plain = esokit::detail::fit_order(prepared->data, quick(), 1, 0);
+  EXPECT_GT(plain.correlation, 0.2);
+  EXPECT_LT(rounded.correlation, 0.5 * plain.correlation);
+  IdentifyOptions options = quick();
+  options.orders = {1};
+  const double rms = step / std::sqrt(12.0);
+  EXPECT_NEAR(esokit::study(log, options)->noise.value, rms, 0.05 * rms);
+  // What swings beside the model stays a correlation.
+  for (std::size_t k = 0; k < 3000; ++k) {
+    log.y[k] = std::round((log.y[k] + 0.03 * std::sin(0.8 * static_cast<double>(k))) / step) * step;
+  }
+  const auto swinging = esokit::prepare(log);
+  EXPECT_GT(esokit::detail::fit_order(swinging->data, quick(), 1, step).correlation, 0.2);
+}
+
+// A mode far above the loop decides the likelihood at its own bandwidth, not the order.
+TEST(Identify, TheOrderIsNotThatOfAMode) {
+  esokit::sim::Gaussian gaussian(9);
+  Log log;
+  log.sample_time = 0.001;
+  constexpr double h = 1e-4, mode = 150;
+  double v = 0, x = 0, m0 = 0, m1 = 0, walk = 0;
+  for (int k = 0; k < 6000; ++k) {
+    const double reference = (k / 500) % 2 == 0 ? 1 : -1;
+    const double y = x + m0 + 3e-4 * gaussian.next();
+    const double u = 15 * (reference - y) / 2;
+    log.u.push_back(u);
+    log.y.push_back(y);
+    walk += 0.02 * gaussian.next();
+    for (int i = 0; i < 10; ++i) {
+      v += h / 0.008 * (u - v);
+      x += h * (2 * v + walk);
+      m1 += h * (0.15 * 2 * v * mode - mode * mode * m0 - 0.06 * mode * m1);
+      m0 += h * m1;
+    }
+  }
+  IdentifyOptions options = quick();
+  options.orders = {1, 2};
+  const auto found = esokit::study(log, options);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->order, 1);
+  // By the likelihood alone it would have been 2.
+  EXPECT_LT(found->orders[1].fit.mean_square, found->orders[0].fit.mean_square);
+  EXPECT_NEAR(found->input_gain.value, 2, 0.2);
 }
 
 // What was found goes into an observer, and the plant into simulation and analysis, in a call each.
@@ -185,75 +359,89 @@ TEST(Identify, RefusesALogWithoutExcitation) {
   EXPECT_STREQ(found.error().field, "y");
 }
 
-// Each rule from both sides, on a study whose numbers are put there.
+// Each rule by its text and from both sides, on a study whose numbers are put there.
 TEST(Judge, RefusesByName) {
-  const Log log = closed_loop(1, 3, 400);
-  Log stamped = log;
-  stamped.time.resize(1);
+  Log log, stamped;
+  stamped.time = {0, T};
   Identified good;
-  good.input_gain = {50, 2};
+  good.input_gain = {-50, 5};
   good.plateau.points.resize(3);
   good.plateau.middle = 1;
   good.plateau.spread = 0.1;
-  good.excitation = 0.01;
+  good.excitation = 0.149;
+  good.own_input = 1.1e-5;
   good.correlation = 0.1;
   good.friction_shift = 3;
+  good.schedule_shift = 1;
   good.log.sample_time = T;
   good.log.jitter = 0.05 * T;
   good.log.saturated = 1;
-  ASSERT_TRUE(esokit::judge(good, log));
-  const auto field = [&](const Identified& found, const Log& of,
-                         const IdentifyOptions& options = {}) {
-    const auto verdict = esokit::judge(found, of, options);
-    return verdict ? "" : verdict.error().field;
+  ASSERT_EQ(said(esokit::judge(good, log)), "accepted");
+
+  struct Case {
+    double* value;
+    double worse;
+    const char* text;
   };
   Identified bad = good;
-  bad.log.jitter = 0.0501 * T;
-  EXPECT_STREQ(field(bad, log), "jitter");
-  EXPECT_STREQ(field(bad, stamped), "");
-  IdentifyOptions commanded;
-  commanded.applied = false;
-  EXPECT_STREQ(field(good, log, commanded), "saturated");
-  bad = good;
-  bad.log.saturated = 0.49;
-  EXPECT_STREQ(field(bad, log, commanded), "");
-  bad = good;
-  bad.own_input = 0.9e-5;
-  EXPECT_STREQ(field(bad, log), "own_input");
-  bad.own_input = 1.1e-5;
-  EXPECT_STREQ(field(bad, log), "");
-  bad = good;
-  bad.excitation = 0.151;
-  EXPECT_STREQ(field(bad, log), "excitation");
-  bad.excitation = 0.149;
-  EXPECT_STREQ(field(bad, log), "");
-  bad.plateau.middle = 0;
-  EXPECT_STREQ(field(bad, log), "excitation");
-  bad = good;
-  bad.correlation = 0.101;
-  EXPECT_STREQ(field(bad, log), "correlation");
-  bad = good;
-  bad.at_bound = true;
-  EXPECT_STREQ(field(bad, log), "latency");
-  bad = good;
-  bad.plateau.spread = 0.101;
-  EXPECT_STREQ(field(bad, log), "plateau");
-  bad = good;
-  bad.friction_shift = 3.01;
-  EXPECT_STREQ(field(bad, log), "friction_shift");
-  bad = good;
-  bad.input_gain.half_width = 5.01;
-  EXPECT_STREQ(field(bad, log), "interval");
-  bad.input_gain.half_width = 4.99;
-  EXPECT_STREQ(field(bad, log), "");
+  const Case cases[] = {
+      {&bad.log.jitter, 0.0501 * T,
+       "jitter: of T without stamps is above 0.05: record the time of each row"},
+      {&bad.own_input, 0.9e-5,
+       "own_input: of u is not a law of y alone: nothing from outside excites the loop; record a "
+       "reference that moves"},
+      {&bad.excitation, 0.151,
+       "excitation: is the least error of b0, and too large: u hardly shows in y; record steps or "
+       "a sweep"},
+      {&bad.correlation, 0.101,
+       "correlation: of the innovations: the machine is more than the model; record without the "
+       "load that swings, or add what is known as a column; above"},
+      {&bad.plateau.spread, 0.101,
+       "plateau: is how much b0 differs between neighbouring bandwidths, there is no plateau: "
+       "record more motion in the band that the controller will use; above"},
+      {&bad.schedule_shift, 1.01,
+       "schedule: times its interval is what b0 differs by along the scheduling column: ask for "
+       "b0 over the column (scheduled = true), or record at one setting"},
+      {&bad.friction_shift, 3.01,
+       "friction_shift: standard errors between one friction and another: record faster motion; "
+       "above"},
+      {&bad.input_gain.half_width, 5.01,
+       "interval: is the half width of b0 over b0: record longer, or with larger steps; above"}};
   // A number that is none is no reason to trust.
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  for (double* value : {&bad.own_input, &bad.excitation, &bad.correlation, &bad.plateau.spread,
-                        &bad.friction_shift, &bad.input_gain.half_width, &bad.log.jitter}) {
-    bad = good;
-    *value = nan;
-    EXPECT_STRNE(field(bad, log), "");
+  for (const Case& c : cases) {
+    for (const double value : {c.worse, nan, c.value == &bad.own_input ? -nan : nan}) {
+      bad = good;
+      *c.value = value;
+      EXPECT_EQ(said(esokit::judge(bad, log)), c.text);
+    }
   }
+  // Jitter that the stamps tell was taken out.
+  bad = good;
+  bad.log.jitter = T;
+  EXPECT_EQ(said(esokit::judge(bad, stamped)), "accepted");
+  // Saturation is harmless if u is what was applied.
+  IdentifyOptions commanded;
+  commanded.applied = false;
+  bad = good;
+  bad.log.saturated = 0.5;
+  EXPECT_EQ(said(esokit::judge(bad, log)), "accepted");
+  EXPECT_EQ(said(esokit::judge(bad, log, commanded)),
+            "saturated: of the rows have u at its limits: record what the actuator held");
+  bad.log.saturated = 0.499;
+  EXPECT_EQ(said(esokit::judge(bad, log, commanded)), "accepted");
+  bad = good;
+  bad.at_bound = true;
+  EXPECT_EQ(said(esokit::judge(bad, log)),
+            "latency: or pole is at the end of its range: record faster changes of u");
+  bad = good;
+  bad.plateau.middle = 0;
+  EXPECT_EQ(said(esokit::judge(bad, log)).substr(0, 10), "excitation");
+  bad = good;
+  bad.schedule_shift = 100;
+  IdentifyOptions scheduled;
+  scheduled.scheduled = true;
+  EXPECT_EQ(said(esokit::judge(bad, log, scheduled)), "accepted");
 }
 
 TEST(PrepareLog, RefusesWhatCannotBeRead) {
@@ -294,6 +482,93 @@ TEST(PrepareLog, RefusesWhatCannotBeRead) {
   ASSERT_FALSE(back);
   EXPECT_STREQ(back.error().rule, "does not rise");
   EXPECT_EQ(back.error().index, 300);
+}
+
+// What users hand in: nothing crashes, and what is accepted is a model of numbers.
+TEST(Garbage, EndsInARefusalOrInNumbers) {
+  std::uint64_t state = 20261122;
+  const auto next = [&](std::uint64_t below) {
+    state = state * 6364136223846793005u + 1442695040888963407u;
+    return static_cast<std::size_t>((state >> 33u) % below);
+  };
+  const double odd[] = {0.0,
+                        -0.0,
+                        1e-300,
+                        1e-30,
+                        1e30,
+                        1e300,
+                        -1e300,
+                        std::numeric_limits<double>::quiet_NaN(),
+                        std::numeric_limits<double>::infinity(),
+                        -std::numeric_limits<double>::infinity(),
+                        std::numeric_limits<double>::denorm_min(),
+                        3.0};
+  const Log clean = closed_loop(1, 3, 700);
+  int refused = 0, accepted = 0;
+  for (int run = 0; run < 60; ++run) {
+    Log log = clean;
+    const std::size_t rows = 150 + next(551);
+    log.u.resize(rows);
+    log.y.resize(rows);
+    if (next(3) == 0) log.columns.emplace_back(log.y);
+    if (next(4) == 0) log.schedule = log.y;
+    if (next(2) == 0) {
+      for (std::size_t k = 0; k < rows; ++k) log.time.push_back(1.7e9 + static_cast<double>(k) * T);
+    }
+    const auto any = [&]() -> std::vector<double>& {
+      const std::size_t which = next(5);
+      if (which == 0 && !log.time.empty()) return log.time;
+      if (which == 1 && !log.columns.empty()) return log.columns[0];
+      if (which == 2 && !log.schedule.empty()) return log.schedule;
+      return which == 3 ? log.u : log.y;
+    };
+    for (std::size_t fault = 1 + next(3); fault > 0; --fault) {
+      std::vector<double>& values = any();
+      if (values.empty()) continue;
+      const std::size_t at = next(values.size());
+      switch (next(8)) {
+        case 0:
+          values[at] = odd[next(12)];
+          break;
+        case 1:  // a stretch stands
+          for (std::size_t k = at; k < values.size(); ++k) values[k] = values[at];
+          break;
+        case 2:
+          for (double& value : values) value *= odd[next(12)] > 1 ? 1e30 : 1e-20;
+          break;
+        case 3:  // coarse
+          for (double& value : values) value = std::round(value * 2) / 2;
+          break;
+        case 4:
+          values.resize(at);
+          break;
+        case 5:  // a square wave instead
+          for (std::size_t k = 0; k < values.size(); ++k) values[k] = k / 7 % 2 == 0 ? 1 : -1;
+          break;
+        case 6:
+          std::fill(values.begin(), values.end(), odd[next(12)]);
+          break;
+        default:
+          std::reverse(values.begin(), values.end());
+      }
+    }
+    IdentifyOptions options;
+    options.orders = {static_cast<int>(1 + next(3))};
+    options.averaged = static_cast<int>(next(3));
+    const auto found = esokit::study(log, options);
+    if (!found || !esokit::judge(*found, log, options)) {
+      ++refused;
+      continue;
+    }
+    ++accepted;
+    for (const double value :
+         {found->input_gain.low(), found->input_gain.high(), found->latency.half_width,
+          found->noise.value, found->disturbance, found->pole.high(), found->friction.high()}) {
+      EXPECT_TRUE(std::isfinite(value)) << run;
+    }
+  }
+  EXPECT_GT(refused, 30);
+  EXPECT_EQ(refused + accepted, 60);
 }
 
 TEST(PrepareLog, RefusesUnitsOfWhichAFitCannotTakeSquares) {
@@ -464,6 +739,9 @@ TEST(PrepareLog, ReadsALongLogInStretches) {
   EXPECT_EQ(part.starts[2], 200u);
   EXPECT_EQ(part.starts[3], 230u);
   EXPECT_EQ(part.starts[9], 800u);
+  ASSERT_EQ(part.start_times.size(), 21u);
+  EXPECT_NEAR(part.start_times[1], 500 * T, 1e-12);
+  EXPECT_NEAR(part.start_times[3], 1030 * T, 1e-12);
   EXPECT_EQ(part.u[230], 1030);
   EXPECT_EQ(part.y[230], 2060);
   EXPECT_EQ(part.columns[0][230], 3090);
@@ -587,6 +865,25 @@ TEST(Study, RefusesBadOptions) {
   options = quick();
   options.averaged = 16;
   EXPECT_STREQ(esokit::study(log, options).error().field, "averaged");
+  const auto text = [&](const Log& of) {
+    const auto found = esokit::study(of, options);
+    return found ? std::string("accepted")
+                 : std::string(found.error().field) + ": " + found.error().rule;
+  };
+  options = quick();
+  for (const int extension : {-1, 3}) {
+    options.extension = extension;
+    EXPECT_EQ(text(log), "extension: must be 1, 2, or 0: chosen");
+  }
+  options = quick();
+  for (const int bins : {1, 21}) {
+    options.schedule_bins = bins;
+    EXPECT_EQ(text(log), "schedule_bins: must be 2 to 20");
+  }
+  Log short_column = log;
+  short_column.schedule.resize(399);
+  options = quick();
+  EXPECT_EQ(text(short_column), "schedule: must have as many rows as y, or none:");
 }
 
 }  // namespace

@@ -44,6 +44,11 @@ struct FitData {
   std::vector<double> u;               ///< input, held from its row to the next
   std::vector<double> y;               ///< output, measured at its row
   std::vector<std::size_t> starts{0};  ///< first rows of pieces without a gap
+  /// When these were, s; empty: without a gap in time.
+  std::vector<double> start_times{};
+
+  /// More inputs that reach the plant through the same lag and dead time, each as long as u.
+  std::vector<std::vector<double>> inputs{};
 
   /// What acts where the disturbance acts, each as long as y: friction, a load that is known.
   std::vector<std::vector<double>> columns{};
@@ -73,7 +78,7 @@ struct FitPoint {
 /// A fitted model.
 struct Fit {
   FitPoint at{};                 ///< parameters that the innovations are not linear in
-  std::vector<double> linear{};  ///< b0, then one number a column
+  std::vector<double> linear{};  ///< b0, then one number a further input and a column
   double mean_square = 0.0;      ///< of the innovations, y's unit squared
   double noise = 0.0;            ///< standard deviation of the measurement noise
   double disturbance = 0.0;      ///< intensity of d^(m): its increments' variance over time
@@ -297,13 +302,13 @@ struct InnovationsFilter {
   }
 
   /// Innovations of y while b0 u and the columns act: of each alone (one output a column: y, u, the
-  /// data's columns), or of all together.
+  /// data's columns), or of all together. `signal` is u, or what stands for it.
   ///
   /// The first `lead` rows of a piece only fill the lag and the dead time, whose past is not known.
   /// @tparam Runs how many innovations; `output(k)`, `input(k)`, `column(k)` say what run r sees
   template <int Runs, class Output, class Input, class Column>
-  void run(const FitData& data, std::ptrdiff_t lead, const Output& output, const Input& input,
-           const Column& column_at,
+  void run(const FitData& data, std::ptrdiff_t lead, const std::vector<double>& signal,
+           const Output& output, const Input& input, const Column& column_at,
            const std::array<double*, static_cast<std::size_t>(Runs)>& out) const {
     const std::size_t steady = table->weights.size() - 1;
     for (std::size_t piece = 0; piece < data.starts.size(); ++piece) {
@@ -311,7 +316,7 @@ struct InnovationsFilter {
       const auto to = static_cast<std::ptrdiff_t>(
           piece + 1 < data.starts.size() ? data.starts[piece + 1] : data.y.size());
       const auto u = [&](std::ptrdiff_t k) {
-        return data.u[static_cast<std::size_t>(std::clamp(k, from, to - 1))];
+        return signal[static_cast<std::size_t>(std::clamp(k, from, to - 1))];
       };
       double v = u(from);
       double u_before = v, u_now = v;
@@ -499,6 +504,20 @@ class InnovationsFit {
     return p;
   }
 
+  /// What the filter makes of a series in the place of y, while nothing acts.
+  [[nodiscard]] std::vector<double> innovations_of(const FitPoint& point,
+                                                   const std::vector<double>& series) const {
+    std::vector<double> out(series.size());
+    with_filter(point, [&](const auto& filter) {
+      filter.template run<1>(
+          data_, lead_, data_.u,
+          [&](std::size_t, std::ptrdiff_t k) { return series[static_cast<std::size_t>(k)]; },
+          [](std::size_t) { return 0.0; }, [](std::size_t, std::ptrdiff_t) { return 0.0; },
+          {out.data()});
+    });
+    return out;
+  }
+
   /// The noise as it shows in the innovations that `at` or `minimise` gave last, at frequencies
   /// where the disturbance has less than a tenth of its power, in the middle of all stretches; 0 if
   /// these are too few. What the model misses is slower (a mode), or comes now and then (friction
@@ -595,19 +614,25 @@ class InnovationsFit {
     }
   }
 
+  /// The sum of what the linear numbers weigh, from the one numbered `first` on.
+  static void combine(std::vector<double>& sum, const std::vector<std::vector<double>>& parts,
+                      const std::vector<double>& linear, std::size_t first) {
+    for (std::size_t c = 0; c < parts.size(); ++c) {
+      for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += linear[first + c] * parts[c][k];
+    }
+  }
+
   template <class Filter>
   void run_whole(const Filter& filter, const std::vector<double>& linear, double* out) const {
-    const double b0 = linear[0];
+    force_.assign(data_.y.size(), 0.0);
+    for (std::size_t k = 0; k < force_.size(); ++k) force_[k] = linear[0] * data_.u[k];
+    combine(force_, data_.inputs, linear, 1);
     combined_.assign(data_.y.size(), 0.0);
-    for (std::size_t c = 0; c < data_.columns.size(); ++c) {
-      for (std::size_t k = 0; k < combined_.size(); ++k) {
-        combined_[k] += linear[c + 1] * data_.columns[c][k];
-      }
-    }
+    combine(combined_, data_.columns, linear, 1 + data_.inputs.size());
     filter.template run<1>(
-        data_, lead_,
+        data_, lead_, force_,
         [&](std::size_t, std::ptrdiff_t k) { return data_.y[static_cast<std::size_t>(k)]; },
-        [&](std::size_t) { return b0; },
+        [](std::size_t) { return 1.0; },
         [&](std::size_t, std::ptrdiff_t k) { return combined_[static_cast<std::size_t>(k)]; },
         {out});
   }
@@ -615,25 +640,28 @@ class InnovationsFit {
   template <class Filter>
   void solve_linear(const Filter& filter, Fit& fit) {
     const std::size_t rows = data_.y.size();
-    const std::size_t count = 2 + data_.columns.size();
+    const std::size_t count = 2 + data_.inputs.size() + data_.columns.size();
     columns_.resize(count);
     for (auto& column : columns_) column.resize(rows);
+    const auto nothing = [](std::size_t, std::ptrdiff_t) { return 0.0; };
     // y and u side by side, as a processor can work on both at once.
     filter.template run<2>(
-        data_, lead_,
+        data_, lead_, data_.u,
         [&](std::size_t run, std::ptrdiff_t k) {
           return run == 0 ? data_.y[static_cast<std::size_t>(k)] : 0.0;
         },
-        [](std::size_t run) { return run == 1 ? 1.0 : 0.0; },
-        [](std::size_t, std::ptrdiff_t) { return 0.0; }, {columns_[0].data(), columns_[1].data()});
-    for (std::size_t c = 0; c < data_.columns.size(); ++c) {
+        [](std::size_t run) { return run == 1 ? 1.0 : 0.0; }, nothing,
+        {columns_[0].data(), columns_[1].data()});
+    std::size_t next = 2;
+    for (const auto& input : data_.inputs) {
+      filter.template run<1>(data_, lead_, input, nothing, [](std::size_t) { return 1.0; }, nothing,
+                             {columns_[next++].data()});
+    }
+    for (const auto& column : data_.columns) {
       filter.template run<1>(
-          data_, lead_, [](std::size_t, std::ptrdiff_t) { return 0.0; },
-          [](std::size_t) { return 0.0; },
-          [&](std::size_t, std::ptrdiff_t k) {
-            return data_.columns[c][static_cast<std::size_t>(k)];
-          },
-          {columns_[c + 2].data()});
+          data_, lead_, data_.u, nothing, [](std::size_t) { return 0.0; },
+          [&](std::size_t, std::ptrdiff_t k) { return column[static_cast<std::size_t>(k)]; },
+          {columns_[next++].data()});
     }
     std::vector<double> normal;
     normal_equations(std::span(columns_).subspan(1), columns_[0], normal, fit.linear);
@@ -660,7 +688,7 @@ class InnovationsFit {
   std::vector<double> residual_{};
   std::vector<std::vector<double>> kept_columns_{};
   std::vector<double> kept_residual_{};
-  mutable std::vector<double> combined_{};
+  mutable std::vector<double> force_{}, combined_{};
   mutable std::shared_ptr<const detail::GainTable> cached_{};
 };
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <esokit/core/check.hpp>
@@ -12,9 +13,11 @@
 #include <esokit/identify/intervals.hpp>
 #include <esokit/identify/log.hpp>
 #include <esokit/identify/plateau.hpp>
+#include <esokit/identify/sinusoids.hpp>
 #include <esokit/model/augmented_model.hpp>
 #include <esokit/model/linear_plant.hpp>
 #include <esokit/observer/model_eso.hpp>
+#include <esokit/sim/gaussian.hpp>
 #include <functional>
 #include <limits>
 #include <utility>
@@ -27,6 +30,9 @@ struct IdentifyOptions {
   std::vector<int> orders{1, 2, 3};  ///< n that are tried
   bool friction = true;              ///< a column tanh(v / v_s) for orders 1 and 2
   bool pole = true;                  ///< whether a known pole is looked for
+  int extension = 0;                 ///< m: 1 or 2 integrators of the disturbance; 0: chosen
+  int sinusoids = 3;                 ///< most that are looked for in the disturbance
+  int schedule_bins = 4;             ///< ranges of the scheduling column, each with as many rows
   int averaged = 0;                  ///< rows to average; 0: chosen from the innovations
   std::size_t rows_max = 60000;      ///< of a longer log so many rows are used, evenly spread
 
@@ -35,6 +41,7 @@ struct IdentifyOptions {
   double interval_max = 0.1;     ///< widest half interval of b0, share of b0
   double plateau_max = 0.1;      ///< most that b0 may differ between three neighbouring bandwidths
   double correlation_max = 0.1;  ///< of the innovations, lags 1 to 20; at 1 it is not asked for
+  bool scheduled = false;  ///< b0 may depend on the scheduling column: `schedule` is asked for
   double friction_shift_max =
       3;  ///< most that b0 may differ between friction scales, standard errors
   std::function<void(double)> progress{};  ///< hears the share that is done, 0 to 1
@@ -45,15 +52,19 @@ struct OrderFit {
   FitModel model{};             ///< n, m and whether it has a pole
   Fit fit{};                    ///< where the innovations are least
   double friction_scale = 0.0;  ///< v_s, 0 without friction
-  double criterion = 0.0;       ///< rows log(mean square) + parameters log(rows): the least wins
-  double correlation = 0.0;     ///< largest of the innovations' over lags 1 to 20
-  Estimate noise{};             ///< as fast innovations have it, y's unit; 0: not known
+
+  /// rows log(mean square) + parameters log(rows), the mean of three bandwidths: the least wins.
+  double criterion = 0.0;
+  double correlation = 0.0;  ///< largest of the innovations' over lags 1 to 20
+  Estimate noise{};          ///< as fast innovations have it, y's unit; 0: not known
 };
 
-/// A disturbance that swings at one frequency.
-struct Sinusoid {
-  Estimate frequency{};  ///< rad/s
-  Estimate amplitude{};  ///< unit of y^(n), where the disturbance acts
+/// b0 where the scheduling column is within a range.
+struct GainInRange {
+  double from = 0.0;      ///< least value of the column
+  double to = 0.0;        ///< largest
+  std::size_t rows = 0;   ///< that are in it
+  Estimate input_gain{};  ///< b0 there
 };
 
 /// A model with error bars, and what it rests on.
@@ -69,7 +80,10 @@ struct Identified {
   Estimate noise{};                 ///< standard deviation of the measurement noise, y's unit
   double disturbance = 0;           ///< intensity of d^(m): variance of its increments over time
   std::vector<Estimate> columns{};  ///< numbers of the log's own columns
-  std::vector<Sinusoid> sinusoids{};  ///< in the disturbance, the largest first
+  std::vector<Sinusoid> sinusoids{};    ///< in the disturbance, the largest first
+  std::vector<GainInRange> schedule{};  ///< b0 along the log's scheduling column
+  Estimate schedule_slope{};  ///< b0 per unit of the scheduling column, if it is a straight line
+  double schedule_shift = 0;  ///< most that b0 differs along the column, over its interval
   double friction_shift =
       0;  ///< by how much b0 differs between friction scales, standard errors of b0
   double correlation = 0;          ///< of the innovations, largest over lags 1 to 20
@@ -152,17 +166,14 @@ struct Identified {
 
 namespace detail {
 
-/// Largest correlation of the innovations with themselves, 1 to 20 rows later.
-inline double innovations_correlation(const std::vector<double>& e) {
-  double square = 0.0;
-  for (const double value : e) square += value * value;
-  double largest = 0.0;
-  for (std::size_t lag = 1; lag <= 20 && lag < e.size(); ++lag) {
-    double sum = 0.0;
-    for (std::size_t k = lag; k < e.size(); ++k) sum += e[k] * e[k - lag];
-    largest = std::max(largest, std::abs(sum / square));
+/// Correlations of a series with itself, 1 to 20 rows later.
+inline std::array<double, 20> correlations(const std::vector<double>& e) {
+  const double square = dot(e.data(), e.data(), e.size());
+  std::array<double, 20> found{};
+  for (std::size_t lag = 1; lag <= found.size() && lag < e.size(); ++lag) {
+    found[lag - 1] = dot(e.data(), e.data() + lag, e.size() - lag) / square;
   }
-  return largest;
+  return found;
 }
 
 /// Share of u that a law of y_k, y_(k-1), u_(k-1) does not explain: 0 where u is a controller's and
@@ -225,6 +236,35 @@ inline double rms(const std::vector<double>& values) {
   double sum = 0.0;
   for (const double value : values) sum += value * value;
   return std::sqrt(sum / static_cast<double>(std::max<std::size_t>(values.size(), 1)));
+}
+
+/// Largest correlation of the innovations at a fit over lags 1 to 20, without what rounding to
+/// `step` explains: a slow motion is rounded alike in neighbouring rows. How much that is comes
+/// from the same filter on the rounding of the smoothed motion, beside white noise.
+inline double innovations_correlation(const InnovationsFit& fit, const FitPoint& at, double step) {
+  const std::vector<double>& e = fit.residual();
+  auto found = correlations(e);
+  if (step > 0.0) {
+    const std::vector<double>& y = fit.data().y;
+    std::vector<double> rounding = smoothed(fit.data(), 8, 0), white(y.size());
+    sim::Gaussian gaussian(1);
+    for (std::size_t k = 0; k < y.size(); ++k) {
+      const double steps = (rounding[k] - y[0]) / step;
+      rounding[k] = (std::round(steps) - steps) * step;
+      white[k] = gaussian.next();
+    }
+    const auto of_rounding = fit.innovations_of(at, rounding);
+    const auto coloured = correlations(of_rounding);
+    const auto plain = correlations(fit.innovations_of(at, white));
+    const double share = std::min(
+        dot(of_rounding.data(), of_rounding.data(), y.size()) / dot(e.data(), e.data(), e.size()),
+        1.0);
+    for (std::size_t i = 0; i < found.size(); ++i) found[i] -= share * (coloured[i] - plain[i]);
+  }
+  double largest = 0.0;
+  for (const double value : found) largest = std::max(largest, std::abs(value));
+  // A residual of zeros, or of numbers that are none, is no reason to trust.
+  return is_finite(found[0]) ? largest : std::numeric_limits<double>::infinity();
 }
 
 /// Scales of friction that are tried, as shares of the rms of the speed.
@@ -299,7 +339,9 @@ inline double criterion(const Fit& fit, int parameters) {
 }
 
 /// The best fit of one order, with friction where it helps.
-inline OrderFit fit_order(const FitData& data, const IdentifyOptions& options, int order) {
+/// @param step to which y is rounded, 0: to none
+inline OrderFit fit_order(const FitData& data, const IdentifyOptions& options, int order,
+                          double step) {
   const FitBounds bounds = fit_bounds(data);
   OrderFit result;
   result.model = {order, 1, options.pole};
@@ -308,7 +350,7 @@ inline OrderFit fit_order(const FitData& data, const IdentifyOptions& options, i
   result.fit = best_fit(plain);
   (void)plain.at(result.fit.at);  // its innovations, not those of the last start
   result.criterion = criterion(result.fit, 5 + columns);
-  result.correlation = innovations_correlation(plain.residual());
+  result.correlation = innovations_correlation(plain, result.fit.at, step);
   result.noise = plain.noise_floor(result.fit);
   if (!options.friction || order > 2) return result;
   const auto speed = friction_speed(data, order, result.fit.noise, result.fit.at.latency);
@@ -347,26 +389,174 @@ inline OrderFit fit_order(const FitData& data, const IdentifyOptions& options, i
     result.friction_scale = best_scale;
     // The residual is that of the last fit.
     (void)fit.at(found.at);
-    result.correlation = innovations_correlation(fit.residual());
+    result.correlation = innovations_correlation(fit, found.at, step);
     result.noise = fit.noise_floor(result.fit);
   }
   return result;
 }
 
-}  // namespace detail
+/// The data of an order's fit, with its friction.
+inline FitData with_friction(const FitData& data, const OrderFit& order) {
+  if (!(order.friction_scale > 0.0)) return data;
+  return with_friction(
+      data, friction_speed(data, order.model.order, order.fit.noise, order.fit.at.latency),
+      order.friction_scale);
+}
 
-/// By how much intervals are wider than the jackknife makes them: it knows nothing of the choice of
-/// the plateau, which picks where b0 seems best known. Found on 360 logs of random plants, and kept
-/// on others (examples/identify).
-inline constexpr double interval_widening = 1.6;
+/// Takes into the criterion how well each order explains the log at lower bandwidths, too.
+///
+/// At the bandwidth of the likelihood it is the fastest motion that decides, and of a machine that
+/// bends that is the bending. So the criterion is the mean of those at the least of the orders'
+/// bandwidths, and at 1 / sqrt(10) and a tenth of it.
+inline void compare_orders(const FitData& data, std::vector<OrderFit>& orders) {
+  if (orders.size() < 2) return;
+  double least = std::numeric_limits<double>::infinity();
+  for (const OrderFit& order : orders) least = std::min(least, order.fit.at.bandwidth);
+  for (OrderFit& order : orders) {
+    const FitData used = with_friction(data, order);
+    InnovationsFit fit(used, order.model, fit_bounds(data));
+    const double parameters =
+        order.criterion - static_cast<double>(order.fit.rows) * std::log(order.fit.mean_square);
+    FitPoint point = order.fit.at;
+    double sum = 0.0;
+    for (const double factor : {1.0, std::sqrt(0.1), 0.1}) {
+      point.bandwidth = least * factor;
+      const Fit found = fit.minimise(point, false, 8);
+      sum += static_cast<double>(found.rows) * std::log(found.mean_square) / 3.0;
+      if (!fit.at_bound(found.at)) point = found.at;
+    }
+    order.criterion = sum + parameters;
+  }
+}
+
+/// The best fit of each order that is asked for.
+inline std::vector<OrderFit> fit_orders(const FitData& data, const IdentifyOptions& options,
+                                        double step) {
+  std::vector<OrderFit> orders;
+  for (const int order : options.orders) orders.push_back(fit_order(data, options, order, step));
+  compare_orders(data, orders);
+  return orders;
+}
+inline auto best_order(const std::vector<OrderFit>& orders) {
+  return std::min_element(orders.begin(), orders.end(), [](const OrderFit& a, const OrderFit& b) {
+    return a.criterion < b.criterion;
+  });
+}
+
+/// b0 in ranges of a scheduling column and along a straight line, at the plateau.
+/// @param used the data with friction and sines
+inline void find_schedule(const FitData& used, const std::vector<double>& along,
+                          const FitModel& model, const IdentifyOptions& options,
+                          Identified& result) {
+  const double t = student_95(19);
+  std::vector<double> sorted = along;
+  std::sort(sorted.begin(), sorted.end());
+  std::vector<double> edges;  // upper ends but the last; ranges of one value are one range
+  for (int bin = 1; bin < options.schedule_bins; ++bin) {
+    const double edge = sorted[sorted.size() * static_cast<std::size_t>(bin) /
+                               static_cast<std::size_t>(options.schedule_bins)];
+    if (edge > sorted.front() && (edges.empty() || edge > edges.back())) edges.push_back(edge);
+  }
+  FitData parts = used;
+  parts.inputs.assign(edges.size(), std::vector<double>(along.size(), 0.0));
+  result.schedule.assign(edges.size() + 1, {});
+  for (GainInRange& range : result.schedule) {
+    range.from = std::numeric_limits<double>::infinity();
+    range.to = -range.from;
+  }
+  double mean = 0.0;
+  for (std::size_t k = 0; k < along.size(); ++k) {
+    const auto bin = static_cast<std::size_t>(
+        std::upper_bound(edges.begin(), edges.end(), along[k]) - edges.begin());
+    GainInRange& range = result.schedule[bin];
+    range.from = std::min(range.from, along[k]);
+    range.to = std::max(range.to, along[k]);
+    ++range.rows;
+    mean += along[k] / static_cast<double>(along.size());
+    if (bin > 0) {
+      parts.inputs[bin - 1][k] = used.u[k];
+      parts.u[k] = 0.0;
+    }
+  }
+  const FitBounds bounds = fit_bounds(used);
+  const Plateau& plateau = result.plateau;
+  // At the plateau and beside it, as b0 itself.
+  const auto solved = [&](const FitData& data, std::vector<double>& value,
+                          std::vector<double>& error) {
+    InnovationsFit fit(data, model, bounds);
+    std::vector<double> low, high;
+    for (const std::size_t i : {plateau.middle - 1, plateau.middle + 1, plateau.middle}) {
+      const Fit found = fit.at(plateau.points[i].fit.at);
+      if (low.empty()) low = high = found.linear;
+      for (std::size_t c = 0; c < low.size(); ++c) {
+        low[c] = std::min(low[c], found.linear[c]);
+        high[c] = std::max(high[c], found.linear[c]);
+      }
+      if (i == plateau.middle) {
+        value = found.linear;
+        error = jackknife(fit, found, false).linear;
+      }
+    }
+    for (std::size_t c = 0; c < error.size(); ++c) error[c] += 0.25 * (high[c] - low[c]) / t;
+  };
+  std::vector<double> value, error;
+  solved(parts, value, error);
+  double weights = 0.0, middle = 0.0, square = 0.0, most = 0.0;
+  for (std::size_t bin = 0; bin < result.schedule.size(); ++bin) {
+    result.schedule[bin].input_gain = {value[bin], t * error[bin]};
+    const double weight = 1.0 / (error[bin] * error[bin]);
+    weights += weight;
+    middle += weight * value[bin];
+  }
+  middle /= weights;
+  // By chance one of several differs: all together have to differ by more than chance, and one by
+  // more than its interval.
+  for (std::size_t bin = 0; bin < result.schedule.size(); ++bin) {
+    const double off = std::abs(value[bin] - middle) / error[bin];
+    square += off * off;
+    most = std::max(most, off / t);
+  }
+  const double freedom = static_cast<double>(result.schedule.size()) - 1.0;
+  const double cube = 1.0 - 2.0 / (9.0 * freedom) + 1.645 * std::sqrt(2.0 / (9.0 * freedom));
+  result.schedule_shift =
+      freedom > 0.0 ? std::min(most, std::sqrt(square / (freedom * cube * cube * cube))) : 0.0;
+  FitData line = used;
+  line.inputs.assign(1, std::vector<double>(along.size()));
+  for (std::size_t k = 0; k < along.size(); ++k) line.inputs[0][k] = used.u[k] * (along[k] - mean);
+  solved(line, value, error);
+  result.schedule_slope = {value[1], t * error[1]};
+}
+
+}  // namespace detail
 
 /// The model and all that is known of how good it is, whether it can be trusted or not: `judge`
 /// says that. Refused is what cannot be computed.
 [[nodiscard]] inline Expected<Identified, Error<double>> study(
     const Log& log, const IdentifyOptions& options = {}) {
-  auto prepared = prepare(log);
-  if (!prepared) return prepared.error();
   using E = Error<double>;
+  const bool scheduling = !log.schedule.empty();
+  if (scheduling && log.schedule.size() != log.y.size()) {
+    return E{"schedule",
+             static_cast<double>(log.schedule.size()),
+             "must have as many rows as y, or none:",
+             -1,
+             static_cast<double>(log.y.size()),
+             true};
+  }
+  if (options.extension < 0 || options.extension > 2) {
+    return E{"extension", static_cast<double>(options.extension), "must be 1, 2, or 0: chosen"};
+  }
+  if (options.schedule_bins < 2 || options.schedule_bins > 20) {
+    return E{"schedule_bins", static_cast<double>(options.schedule_bins), "must be 2 to 20"};
+  }
+  // It goes through the same rows as the columns, as the last of them.
+  const auto with_schedule = [&] {
+    Log all = log;
+    all.columns.push_back(log.schedule);
+    return prepare(all);
+  };
+  auto prepared = scheduling ? with_schedule() : prepare(log);
+  if (!prepared) return prepared.error();
   if (options.orders.empty()) return E{"orders", 0.0, "must not be empty"};
   for (const int order : options.orders) {
     if (order < 1 || order > 3) return E{"orders", static_cast<double>(order), "must be 1, 2 or 3"};
@@ -385,6 +575,7 @@ inline constexpr double interval_widening = 1.6;
   std::vector<int> folds = {1, 4, 8, 16};
   if (options.averaged > 0) folds = {options.averaged};
   FitData data;
+  std::vector<double> schedule, frequencies;
   std::vector<OrderFit> best_orders;
   const OrderFit* best = nullptr;
   double best_correlation = std::numeric_limits<double>::infinity();
@@ -392,12 +583,24 @@ inline constexpr double interval_widening = 1.6;
   for (const int fold : folds) {
     FitData rows = averaged(raw, fold);
     if (rows.y.size() < 200) break;
-    std::vector<OrderFit> orders;
-    for (const int order : options.orders)
-      orders.push_back(detail::fit_order(rows, options, order));
-    const auto winner = std::min_element(
-        orders.begin(), orders.end(),
-        [](const OrderFit& a, const OrderFit& b) { return a.criterion < b.criterion; });
+    std::vector<double> along;
+    if (scheduling) {
+      along = std::move(rows.columns.back());
+      rows.columns.pop_back();
+    }
+    const double step = fold == 1 ? result.log.quantisation : 0.0;
+    auto orders = detail::fit_orders(rows, options, step);
+    auto winner = detail::best_order(orders);
+    const auto sines =
+        detail::find_sines(detail::with_friction(rows, *winner), winner->model,
+                           detail::fit_bounds(rows), winner->fit.at, options.sinusoids);
+    for (const double frequency : sines) {
+      detail::add_sine(rows, winner->model.order, frequency);
+    }
+    if (!sines.empty()) {
+      orders = detail::fit_orders(rows, options, step);
+      winner = detail::best_order(orders);
+    }
     const std::size_t index = static_cast<std::size_t>(winner - orders.begin());
     if (fold == 1 && winner->correlation < 0.3) raw_noise = winner->noise;
     // Averaging costs what is fast: only if it helps a lot.
@@ -407,6 +610,8 @@ inline constexpr double interval_widening = 1.6;
       best_orders = std::move(orders);
       best = &best_orders[index];
       data = std::move(rows);
+      schedule = std::move(along);
+      frequencies = sines;
       result.averaged = fold;
     }
     if (best_correlation < options.correlation_max) break;
@@ -417,9 +622,7 @@ inline constexpr double interval_widening = 1.6;
   result.orders = best_orders;
   const OrderFit chosen = *best;
   result.order = chosen.model.order;
-  result.extension = chosen.model.extension;
   result.correlation = chosen.correlation;
-  result.disturbance = chosen.fit.disturbance;
   const FitBounds bounds = detail::fit_bounds(data);
   FitData used = data;
   std::vector<double> speed;
@@ -428,8 +631,34 @@ inline constexpr double interval_widening = 1.6;
         detail::friction_speed(data, chosen.model.order, chosen.fit.noise, chosen.fit.at.latency);
     used = detail::with_friction(data, speed, chosen.friction_scale);
   }
-  InnovationsFit fit(used, chosen.model, bounds);
-  Fit likely = fit.at(chosen.fit.at);
+  // The other m: as many parameters, so the likelihood alone decides, by more than one of them.
+  const auto extended = [&](int extension) {
+    InnovationsFit other(used, {chosen.model.order, extension, chosen.model.pole}, bounds);
+    Fit found = other.minimise(chosen.fit.at, true);
+    FitPoint slower = chosen.fit.at;
+    slower.bandwidth *= 0.3;
+    const Fit second = other.minimise(slower, true);
+    return second.mean_square < found.mean_square ? second : found;
+  };
+  FitModel model = chosen.model;
+  Fit likely = chosen.fit;
+  if (options.extension != 1) {
+    const Fit other = extended(2);
+    const double rows = static_cast<double>(other.rows);
+    if (options.extension == 2 ||
+        rows * std::log(chosen.fit.mean_square / other.mean_square) > std::log(rows)) {
+      model.extension = 2;
+      likely = other;
+    }
+  }
+  result.extension = model.extension;
+  InnovationsFit fit(used, model, bounds);
+  likely = fit.at(likely.at);
+  if (model.extension == 2) {
+    result.correlation = detail::innovations_correlation(
+        fit, likely.at, result.averaged == 1 ? result.log.quantisation : 0.0);
+  }
+  result.disturbance = likely.disturbance;
   const FitErrors likely_errors = jackknife(fit, likely, true);
   const double rows_averaged = std::sqrt(static_cast<double>(result.averaged));
   const double t = student_95(19);
@@ -449,6 +678,7 @@ inline constexpr double interval_widening = 1.6;
   if (options.progress) options.progress(0.9);
   if (result.plateau.middle == 0) {
     result.input_gain = {likely.linear[0], std::numeric_limits<double>::infinity()};
+    if (options.progress) options.progress(1.0);
     return result;
   }
   const Plateau& plateau = result.plateau;
@@ -461,41 +691,73 @@ inline constexpr double interval_widening = 1.6;
     double low = here.fit.linear[0], high = low;
     for (const double factor : {0.5, 2.0}) {
       const FitData other = detail::with_friction(data, speed, factor * chosen.friction_scale);
-      InnovationsFit varied(other, chosen.model, bounds);
+      InnovationsFit varied(other, model, bounds);
       const Fit found = varied.minimise(here.fit.at, false, 5);
       low = std::min(low, found.linear[0]);
       high = std::max(high, found.linear[0]);
     }
     friction_spread = high - low;
   }
+  // The jackknife, and by how much the number depends on the bandwidth: between the neighbours, and
+  // over one and a half octaves to each side, where it is known well.
+  const std::size_t first = plateau.middle - std::min<std::size_t>(plateau.middle, 3);
+  const std::size_t last = std::min(plateau.middle + 3, plateau.points.size() - 1);
   const auto estimate = [&](auto value, auto error, double more) {
     const double x = value(here);
     const double spread =
         std::max({value(below), x, value(above)}) - std::min({value(below), x, value(above)});
-    return Estimate{x, interval_widening * (t * error(here) + 0.25 * spread + more)};
+    double squares = 0.0, weights = 0.0;
+    for (std::size_t i = first; i <= last; ++i) {
+      const PlateauPoint& point = plateau.points[i];
+      // What is known better than here, or not told at all, counts no more.
+      const double size = std::max(error(point), error(here));
+      const double weight = size > 0.0 && !point.at_bound ? 1.0 / (size * size) : 0.0;
+      squares += weight * (value(point) - x) * (value(point) - x);
+      weights += weight;
+    }
+    const double drift = weights > 0.0 ? std::sqrt(squares / weights) : 0.0;
+    return Estimate{x, t * error(here) + 0.25 * spread + drift + more};
   };
   result.input_gain =
       estimate([](const PlateauPoint& p) { return p.fit.linear[0]; },
                [](const PlateauPoint& p) { return p.errors.linear[0]; }, 0.25 * friction_spread);
   // A standard error is half of a half width.
   result.friction_shift = 2.0 * friction_spread / result.input_gain.half_width;
-  result.latency = estimate([](const PlateauPoint& p) { return p.fit.at.latency; },
-                            [](const PlateauPoint& p) { return p.errors.latency; }, 0.0);
-  result.lag = estimate([](const PlateauPoint& p) { return p.fit.at.lag(); },
-                        [](const PlateauPoint& p) { return p.errors.lag; }, 0.0);
-  result.dead_time = estimate([](const PlateauPoint& p) { return p.fit.at.dead_time(); },
-                              [](const PlateauPoint& p) { return p.errors.dead_time; }, 0.0);
+  // Times below a twentieth of a row are all the same to the fit.
+  const auto time = [&](Estimate found) {
+    found.half_width = std::max(found.half_width, 0.05 * data.sample_time);
+    return found;
+  };
+  result.latency = time(estimate([](const PlateauPoint& p) { return p.fit.at.latency; },
+                                 [](const PlateauPoint& p) { return p.errors.latency; }, 0.0));
+  result.lag = time(estimate([](const PlateauPoint& p) { return p.fit.at.lag(); },
+                             [](const PlateauPoint& p) { return p.errors.lag; }, 0.0));
+  result.dead_time = time(estimate([](const PlateauPoint& p) { return p.fit.at.dead_time(); },
+                                   [](const PlateauPoint& p) { return p.errors.dead_time; }, 0.0));
   result.pole = estimate([](const PlateauPoint& p) { return p.fit.at.pole; },
                          [](const PlateauPoint& p) { return p.errors.pole; }, 0.0);
-  for (std::size_t c = 1; c < here.fit.linear.size(); ++c) {
-    const Estimate number =
-        estimate([c](const PlateauPoint& p) { return p.fit.linear[c]; },
-                 [c](const PlateauPoint& p) { return p.errors.linear[c]; }, 0.0);
-    if (chosen.friction_scale > 0.0 && c + 1 == here.fit.linear.size()) {
-      result.friction = number;
-    } else {
-      result.columns.push_back(number);
-    }
+  // Linear numbers: b0, the log's columns, sines, friction.
+  const auto linear = [&](std::size_t c) {
+    return estimate([c](const PlateauPoint& p) { return p.fit.linear[c]; },
+                    [c](const PlateauPoint& p) { return p.errors.linear[c]; }, 0.0);
+  };
+  for (std::size_t c = 1; c <= log.columns.size(); ++c) result.columns.push_back(linear(c));
+  if (chosen.friction_scale > 0.0) result.friction = linear(here.fit.linear.size() - 1);
+  for (std::size_t i = 0; i < frequencies.size(); ++i) {
+    FitData rest = used;
+    const auto pair =
+        rest.columns.begin() + static_cast<std::ptrdiff_t>(log.columns.size() + 2 * i);
+    rest.columns.erase(pair, pair + 2);
+    Sinusoid sine = detail::fit_sine(rest, model, bounds, here.fit.at, frequencies[i]).sine;
+    sine.frequency.half_width *= t;
+    sine.amplitude.half_width *= t;
+    if (sine.amplitude.low() > 0.0) result.sinusoids.push_back(sine);
+  }
+  std::sort(
+      result.sinusoids.begin(), result.sinusoids.end(),
+      [](const Sinusoid& a, const Sinusoid& b) { return a.amplitude.value > b.amplitude.value; });
+  if (scheduling) {
+    detail::find_schedule(used, schedule, model, options, result);
   }
   result.at_bound = here.at_bound;
   double excitation = std::numeric_limits<double>::infinity();
@@ -537,6 +799,9 @@ inline constexpr double interval_widening = 1.6;
                  "is how much b0 differs between neighbouring bandwidths, there is no plateau: "
                  "record more motion in the band that the controller will use; above",
                  -1, options.plateau_max, true});
+  rules.require(options.scheduled || found.schedule_shift <= 1.0, "schedule", found.schedule_shift,
+                "times its interval is what b0 differs by along the scheduling column: ask for b0 "
+                "over the column (scheduled = true), or record at one setting");
   rules.require(found.friction_shift <= options.friction_shift_max,
                 {"friction_shift", found.friction_shift,
                  "standard errors between one friction and another: record faster motion; above",

@@ -26,6 +26,8 @@ struct Log {
   /// What else acts where the disturbance acts (sin y of a pendulum, a known load): each as long as
   /// y.
   std::vector<std::vector<double>> columns{};
+  /// What b0 may depend on (throttle, position, battery voltage), as long as y; may be empty.
+  std::vector<double> schedule{};
 };
 
 /// What a log shows by itself.
@@ -219,6 +221,7 @@ inline double quantisation_step(const std::vector<double>& y) {
       uniform = uniform && time[k] - time[k - 1] < 1.6 * T;
     if (rows >= 50) {
       data.starts.push_back(data.y.size());
+      data.start_times.push_back(time[from]);
       if (uniform) {
         data.u.insert(data.u.end(), u.begin() + static_cast<std::ptrdiff_t>(from),
                       u.begin() + static_cast<std::ptrdiff_t>(to));
@@ -283,11 +286,19 @@ inline double quantisation_step(const std::vector<double>& y) {
   for (std::size_t s = 0; s < stretches; ++s) {
     const std::size_t from = data.y.size() / stretches * s;
     while (piece + 1 < data.starts.size() && data.starts[piece + 1] <= from) ++piece;
-    out.starts.push_back(out.y.size());
+    const auto start = [&](std::size_t of, std::size_t row) {
+      out.starts.push_back(out.y.size());
+      const double time = data.start_times.size() == data.starts.size()
+                              ? data.start_times[of]
+                              : data.sample_time * static_cast<double>(data.starts[of]);
+      out.start_times.push_back(time +
+                                data.sample_time * static_cast<double>(row - data.starts[of]));
+    };
+    start(piece, from);
     std::size_t next = piece + 1;
     for (std::size_t k = from; k < std::min(from + length, data.y.size()); ++k) {
       if (next < data.starts.size() && data.starts[next] == k) {
-        if (k > from) out.starts.push_back(out.y.size());
+        if (k > from) start(next, k);
         ++next;
       }
       out.u.push_back(data.u[k]);
@@ -312,6 +323,9 @@ inline double quantisation_step(const std::vector<double>& y) {
   for (std::size_t piece = 0; piece < data.starts.size(); ++piece) {
     const std::size_t to = piece + 1 < data.starts.size() ? data.starts[piece + 1] : data.y.size();
     out.starts.push_back(out.y.size());
+    if (data.start_times.size() == data.starts.size()) {
+      out.start_times.push_back(data.start_times[piece] + 0.5 * (fold - 1) * data.sample_time);
+    }
     for (std::size_t k = data.starts[piece]; k + by <= to; k += by) {
       const auto mean = [&](const std::vector<double>& values) {
         double sum = 0.0;
