@@ -1,38 +1,29 @@
-// Which observer: what each of them makes of measurement noise, against how far its disturbance
-// estimate is off when the disturbance moves. Lower left is better; a curve is one observer with
-// all its bandwidths.
+// Which observer: every family at its best for one wish after another, beside the least that any
+// linear controller can do. The ranking is that of `tune`; this is its picture without units.
 //
-// Way: sampled, sampled observers. Linear ones exactly (Lyapunov equations and frequency
-// responses; the walk of the LESO with m = 2 is simulated); the ABESO, whose gain depends on the
-// error, by simulation, noise and disturbance each alone.
+// Way: exact (the loop at the samples, under noise and a disturbance that walks; tune/tune.hpp).
 //
-// symbol    code         value        unit
-// n         order        2            -
-// T         sample_time  0.001        s
-// omega_o   grid         6 .. 300     rad/s
-// alpha     -            2            cascade
-// rho       -            0.7          ABESO
-//           slow         5            rad/s, of the sine in the second panel
+// Plant   y^(n) = b0 v + d,   tau v' + v = u,   d a random walk, in one case with a slow sine
+//
+// symbol    code            value            unit
+// n         order           1, 2             -
+// T         sample_time     0.001            s
+// w_k       -               30               rad/s, bandwidth of the Kalman filter: (q / (R T))^(1
+// / (2 (n + 1))) w_r       -               w_k / 8 .. 2 w_k rad/s, bandwidth of the LQG law: rho =
+// w_r^(-2n) tau       lag             0.01             s, in one case
+//           swing           5                rad/s, amplitude 3 q^(1/2), in one case
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
-#include <numbers>
+#include <cstddef>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include <esokit/analysis/covariance.hpp>
 #include <esokit/analysis/frequency_response.hpp>
-#include <esokit/analysis/observer_system.hpp>
-#include <esokit/eigen.hpp>
-#include <esokit/observer/adjustable_bandwidth_eso.hpp>
-#include <esokit/observer/cascade_eso.hpp>
-#include <esokit/observer/extended_state_filter.hpp>
-#include <esokit/observer/half_gain_eso.hpp>
-#include <esokit/observer/linear_eso.hpp>
-#include <esokit/sim/gaussian.hpp>
+#include <esokit/tune/tune.hpp>
 
 #include "common/parallel.hpp"
 #include "common/report.hpp"
@@ -42,105 +33,68 @@ using namespace esokit::examples;
 
 namespace {
 
-constexpr int order = 2;
-constexpr double sample_time = 1e-3;
-constexpr int points = 33;
-constexpr double slow = 5.0;
+constexpr double filter_bandwidth = 30.0;
+constexpr int wishes = 7;
 
-struct Point {
-  double setting = 0.0;  // omega_o in rad/s, or q of the filter
-  double noise = 0.0;    // sd of dhat for noise of 1 on y, 1/s^2
-  double walk = 0.0;     // rms of d - dhat for a d that walks by 1 a square root of a second
-  double sine = 0.0;     // abs(1 - dhat/d) at `slow`
-};
-
-struct Family {
+struct Case {
   std::string name;
-  std::string cost;  // of an update, LinearEso = 1
-  std::vector<Point> points;
+  TuneModel model;
 };
 
-/// The plant stands still: u takes off the true d at once, and the observer, which is told that u,
-/// has to find d. So a d that walks far away costs no digits.
-template <class Observer>
-double simulated(Observer observer, double noise, const std::function<double(int)>& d, int samples,
-                 int settle) {
-  sim::Gaussian gaussian(7);
-  double sum = 0.0;
-  double now = d(0);
-  for (int k = 1; k < samples; ++k) {
-    observer.update(noise * gaussian.next(), -now);
-    const double error = now - observer.total_disturbance();
-    if (k >= settle) sum += error * error;
-    now = d(k);
-  }
-  return std::sqrt(sum / (samples - settle));
+TuneModel plain(int order) {
+  TuneModel model;
+  model.order = order;
+  model.input_gain = {1.0, 0.0};
+  model.noise = 1e-3;
+  model.sample_time = 1e-3;
+  model.disturbance =
+      model.noise * model.noise * model.sample_time * std::pow(filter_bandwidth, 2 * (order + 1));
+  model.u_min = -1e3;
+  model.u_max = 1e3;
+  return model;
 }
 
-constexpr int samples = 2'000'000;
-constexpr int settle = 20'000;
-
-template <class Observer>
-double simulated_walk(const Observer& observer) {
-  sim::Gaussian steps(11);
-  double at = 0.0;
-  const auto walk = [&](int) { return at += std::sqrt(sample_time) * steps.next(); };
-  return simulated(observer, 0.0, walk, samples, settle);
+std::vector<Case> cases() {
+  std::vector<Case> all{{"n = 1", plain(1)}, {"n = 2", plain(2)}};
+  all.push_back({"n = 2, lag", plain(2)});
+  all.back().model.lag = 0.01;
+  all.push_back({"n = 2, slow sine", plain(2)});
+  TuneModel& swinging = all.back().model;
+  swinging.swings = {{5.0, 3.0 * std::sqrt(swinging.disturbance), 0.0}};
+  return all;
 }
 
-template <class Observer>
-Point simulate(const Observer& observer, double setting) {
-  const auto none = [](int) { return 0.0; };
-  const auto sine = [](int k) { return std::sin(slow * sample_time * (k + 0.5)); };
-  return {setting, simulated(observer, 1.0, none, samples, settle), simulated_walk(observer),
-          std::numbers::sqrt2 * simulated(observer, 0.0, sine, samples, settle)};
+/// Noise in u of the LQG whose law has this bandwidth: the wish that leads to it.
+double wish_of(const TuneModel& model, double bandwidth) {
+  TuneModel walking = model;
+  walking.swings.clear();
+  const LoopCost cost(walking, {}, 0.1 * bandwidth);
+  return cost(Lqg(model).controller(std::pow(bandwidth, -2 * model.order))).control_noise;
 }
 
-template <class Observer>
-Point exact(const Observer& observer, double setting) {
-  const auto deviation = [&](const EstimationNoise& noise) {
-    const auto covariance = estimation_error_covariance(observer, noise).value();
-    return std::sqrt(covariance(order, order));
-  };
-  const auto channel = estimation_system(observer).template channel<1, order>();
-  const auto response = frequency_response(channel, slow).value()(0, 0);
-  double walk = 0.0;
-  if constexpr (Observer::extension == 1) {
-    walk = deviation({.disturbance = 1.0});
-  } else {  // the exact one is for a walk of the highest derivative
-    walk = simulated_walk(observer);
-  }
-  return {setting, deviation({.measurement = 1.0}), walk, std::abs(1.0 - response)};
+/// What is drawn; the rest is in the table.
+const std::map<std::string, Style>& styles() {
+  static const std::map<std::string, Style> all = {
+      {"LinearEso", {.name = "LESO", .color = Color::blue, .width = 1.8}},
+      {"HalfGainEso", {.name = "half gain", .color = Color::orange, .width = 1.8}},
+      {"LinearEso, m = 2", {.name = "LESO, m = 2", .color = Color::sky, .width = 1.8}},
+      {"CascadeEso, p = 2", {.name = "cascade p = 2", .color = Color::vermillion, .width = 1.8}},
+      {"CascadeEso, p = 3", {.name = "cascade p = 3", .color = Color::green, .width = 1.8}},
+      {"frozen filter, LQR gains", {.name = "filter, LQR", .color = Color::purple, .width = 1.8}},
+      {"LinearEso, free poles", {.name = "free poles", .color = Color::black, .width = 1.8}},
+      {"LinearEso that knows the lag",
+       {.name = "LESO, knows it", .color = Color::blue, .dash = Dash::dashed, .width = 1.8}},
+      {"LinearEso that knows the swing",
+       {.name = "LESO, knows it", .color = Color::blue, .dash = Dash::dashed, .width = 1.8}},
+      {"LinearEso, free poles, that knows the lag",
+       {.name = "free poles, knows it",
+        .color = Color::black,
+        .dash = Dash::dashed,
+        .width = 1.8}}};
+  return all;
 }
 
-template <class Make>
-Family sweep(std::string name, std::string cost, double from, double to, const Make& make) {
-  Family curve{std::move(name), std::move(cost), {}};
-  for (const double setting : log_grid<points>(from, to).value()) {
-    curve.points.push_back(exact(make(setting), setting));
-  }
-  return curve;
-}
-
-/// Bandwidth that gives as much noise as asked for, and the errors there; along a curve the noise
-/// grows with the setting.
-std::optional<Point> at_noise(const Family& curve, double noise) {
-  for (std::size_t i = 1; i < curve.points.size(); ++i) {
-    const Point& a = curve.points[i - 1];
-    const Point& b = curve.points[i];
-    if (!(a.noise <= noise && noise <= b.noise)) continue;
-    const double share = std::log(noise / a.noise) / std::log(b.noise / a.noise);
-    const auto mixed = [&](double x, double y) { return x * std::pow(y / x, share); };
-    return Point{mixed(a.setting, b.setting), noise, mixed(a.walk, b.walk), mixed(a.sine, b.sine)};
-  }
-  return std::nullopt;
-}
-
-std::vector<double> column(const Family& curve, double Point::*member) {
-  std::vector<double> result;
-  for (const Point& point : curve.points) result.push_back(point.*member);
-  return result;
-}
+std::string number_or_dash(bool there, double value) { return there ? number_text(value, 3) : "-"; }
 
 }  // namespace
 
@@ -150,137 +104,86 @@ int main(int argc, char** argv) {
       {.paper_title = "Choosing an observer",
        .citation = "Our own numbers; the observers are those of the papers",
        .link = "",
-       .title = "Noise against disturbance error, every observer",
-       .description = "Sampled observers of a plant of order 2 at 1 kHz, over all bandwidths."});
+       .title = "Every observer at its best, wish after wish",
+       .description = "The ranking of tune/ over the noise that u may have: the price of a family "
+                      "beside the best linear controller, margins kept."});
 
-  std::vector<Family> curves;
-  curves.push_back(sweep("LESO", "1", 6.0, 300.0, [](double w) {
-    return LinearEso<order>::make(
-               {.observer_bandwidth = w, .input_gain = 1.0, .sample_time = sample_time})
-        .value();
-  }));
-  curves.push_back(sweep("LESO, m = 2", "1.3", 6.0, 300.0, [](double w) {
-    return LinearEso<order, double, 2>::make(
-               {.observer_bandwidth = w, .input_gain = 1.0, .sample_time = sample_time})
-        .value();
-  }));
-  curves.push_back(sweep("half gain", "1", 6.0, 300.0, [](double w) {
-    return HalfGainEso<order>::make(
-               {.observer_bandwidth = w, .input_gain = 1.0, .sample_time = sample_time})
-        .value();
-  }));
-  curves.push_back(sweep("cascade p = 2", "1.8", 3.0, 150.0, [](double w) {
-    return CascadeEso<order, 2>::make({.observer_bandwidth = w,
-                                       .bandwidth_factor = 2.0,
-                                       .input_gain = 1.0,
-                                       .sample_time = sample_time})
-        .value();
-  }));
-  curves.push_back(sweep("cascade p = 3", "2.6", 1.5, 75.0, [](double w) {
-    return CascadeEso<order, 3>::make({.observer_bandwidth = w,
-                                       .bandwidth_factor = 2.0,
-                                       .input_gain = 1.0,
-                                       .sample_time = sample_time})
-        .value();
-  }));
-  // The plain Kalman filter for a d that walks: R = 1, and q from slow to fast.
-  curves.push_back(sweep("filter (Kalman gain)", "1 (frozen)", 0.3, 1e6, [](double q) {
-    ExtendedStateFilter<order>::Config config;
-    config.input_gain = 1.0;
-    config.sample_time = sample_time;
-    config.measurement_variance = 1.0;
-    // The walk drives y and y' within the sample as well.
-    EigenMatrix<double, 3, 3> noise;
-    const double t = sample_time;
-    noise << t * t * t * t * t / 20, t * t * t * t / 8, t * t * t / 6, t * t * t * t / 8,
-        t * t * t / 3, t * t / 2, t * t * t / 6, t * t / 2, t;
-    config.process_covariance = EigenMatrix<double, 3, 3>(q * q * noise);
-    config.initial_covariance = EigenMatrix<double, 3, 3>::Identity();
-    config.inflation_rule = InflationRule::none;
-    config.mode = RiccatiMode::frozen;
-    return ExtendedStateFilter<order>::make(config).value();
-  }));
-
-  Family switched{"ABESO (simulated)", "1.3", {}};
-  const auto settings = log_grid<9>(6.0, 300.0).value();
-  switched.points = run_parallel("ABESO", settings.size(), [&](std::size_t i) {
-    const double w = settings[i];
-    return simulate(AdjustableBandwidthEso<order>::make({.observer_bandwidth = w,
-                                                         .bandwidth_ratio = 0.7,
-                                                         .input_gain = 1.0,
-                                                         .sample_time = sample_time})
-                        .value(),
-                    w);
+  const auto all = cases();
+  const auto bandwidths = log_grid<wishes>(filter_bandwidth / 8.0, 2.0 * filter_bandwidth).value();
+  const auto tunings = run_parallel("tune", all.size() * wishes, [&](std::size_t i) {
+    const TuneModel& model = all[i / wishes].model;
+    const double wish = wish_of(model, bandwidths[i % wishes]);
+    return tune(model, {.control_noise = wish}).value();
   });
 
-  Figure figure("tradeoff", {.rows = 1, .columns = 2, .panel_height = 300});
+  Figure figure("tradeoff", {.rows = 2, .columns = 2, .panel_height = 260});
   figure.caption(
-      "n = 2, T = 1 ms; each curve is one observer, slow at the left, fast at the right. "
-      "Horizontal: "
-      "standard deviation of dhat for measurement noise of 1. Vertical: how far dhat is off "
-      "because "
-      "the disturbance moves, left as a random walk, right as a sine of 5 rad/s. The Kalman gain "
-      "is "
-      "the least that a linear observer can do on the left, and the LESO is next to it: for a "
-      "disturbance that may jump at any time nothing beats it. On the right, where the disturbance "
-      "is slow and smooth, the second extended state and the cascade are far better at equal "
-      "noise.");
-  auto& left = figure.panel(0, 0).title("d walks at random").name("walk");
-  auto& right = figure.panel(0, 1).title("d swings slowly").name("sine");
-  left.y_label("rms of d − dhat (s^{1/2})").y_range(1e-2, 1.0).legend(Legend::bottom_left);
-  right.y_label("abs(1 − dhat/d)").y_range(1e-4, 10.0).legend(Legend::bottom_left);
-  constexpr std::array colors = {Color::blue,       Color::sky,   Color::orange,
-                                 Color::vermillion, Color::green, Color::black};
-  for (Panel* panel : {&left, &right}) {
-    panel->log_x().log_y().x_label("sd of dhat / sd of noise (s^{-2})").x_range(10.0, 1e4);
+      "Each curve is one family, at each wish the best that it can do under a modulus margin of "
+      "0.5, a delay margin of two samples and a b0 wrong by two; curves end where it cannot. "
+      "Horizontal: bandwidth of the law over that of the filter, in the LQG controller that the "
+      "wish leads to: slow and quiet at the left. Vertical: J over that of this controller, which "
+      "no linear one beats and which keeps no margins; root of J, so 1.1 are deviations 10 % "
+      "larger. Upper right: beside free poles everything is within a few percent until the wish is "
+      "fast. Lower left: what is known of the lag pays. Lower right: what is slow and smooth "
+      "belongs in the model; without it m = 2 and cascades come next.");
+  for (std::size_t c = 0; c < all.size(); ++c) {
+    Panel& panel = figure.panel(c / 2, c % 2).title(all[c].name);
+    panel.name("case" + std::to_string(c + 1))
+        .log_x()
+        .log_y()
+        .x_label("bandwidth of the law / of the filter")
+        .y_label("root of J / J*")
+        .y_range(1.0, c == 3   ? 10.0
+                      : c == 2 ? 4.0
+                               : 1.5)
+        .legend(c < 2 ? Legend::above : Legend::top_left);
+    for (const auto& [name, style] : styles()) {
+      std::vector<double> x, y;
+      for (std::size_t w = 0; w < wishes; ++w) {
+        for (const TunedDesign& design : tunings[c * wishes + w].designs) {
+          if (design.name != name || !design.feasible) continue;
+          x.push_back(bandwidths[w] / filter_bandwidth);
+          y.push_back(design.excess);
+        }
+      }
+      if (!x.empty()) panel.line(x, y, style);
+    }
   }
-  for (std::size_t i = 0; i < curves.size(); ++i) {
-    const Style style{.name = curves[i].name,
-                      .color = colors[i],
-                      .dash = i + 1 == curves.size() ? Dash::dashed : Dash::solid,
-                      .width = 1.8};
-    const auto noise = column(curves[i], &Point::noise);
-    left.line(noise, column(curves[i], &Point::walk), style);
-    right.line(noise, column(curves[i], &Point::sine), style);
-  }
-  const Style crosses{
-      .name = switched.name, .color = Color::purple, .marker = Marker::cross, .size = 1.3};
-  left.points(column(switched, &Point::noise), column(switched, &Point::walk), crosses);
-  right.points(column(switched, &Point::noise), column(switched, &Point::sine), crosses);
   report.add(figure);
 
-  constexpr double budget = 500.0;
-  std::vector<CsvRow> lines;
-  std::vector<Point> chosen;
-  curves.push_back(switched);
-  for (const Family& curve : curves) {
-    const auto point = at_noise(curve, budget);
-    chosen.push_back(point.value_or(Point{}));
-    lines.push_back({curve.name, number_text(chosen.back().setting, 3),
-                     number_text(chosen.back().walk, 3), number_text(chosen.back().sine, 3),
-                     curve.cost});
+  // The ranking at one wish, as `tune` gives it.
+  constexpr std::size_t middle = 4;
+  for (std::size_t c = 0; c < all.size(); ++c) {
+    const Tuning& tuning = tunings[c * wishes + middle];
+    std::vector<CsvRow> lines;
+    for (const TunedDesign& d : tuning.designs) {
+      const bool known = d.feasible;
+      lines.push_back({d.name, number_or_dash(known, d.excess), number_text(d.free_excess, 3),
+                       number_or_dash(known, 1e3 * d.output_deviation),
+                       number_or_dash(known, d.control_noise / tuning.control_noise),
+                       number_or_dash(known, d.settling_time), number_text(d.modulus_margin, 3),
+                       std::to_string(d.instructions), d.constraint});
+    }
+    report.table("ranking" + std::to_string(c + 1),
+                 all[c].name + ": the ranking where the law is " +
+                     number_text(bandwidths[middle] / filter_bandwidth, 3) +
+                     " times as fast as the filter",
+                 {"family", "root of J / J*", "without margins", "sd of y (1e-3)",
+                  "noise in u over the wish", "settling (s)", "modulus margin",
+                  "instructions of an update", "held back by"},
+                 lines);
   }
-  report.table("budget",
-               "At equal noise, sd of dhat = " + number_text(budget, 3) +
-                   " for noise of 1: the bandwidth that gives it, and the errors",
-               {"observer", "omega_o (rad/s); filter: q", "random walk (s^{1/2})",
-                "sine of 5 rad/s", "cost of an update"},
-               lines);
 
-  // The simulation's way of driving the observer, against the exact one.
-  const auto leso = LinearEso<order>::make(
-      {.observer_bandwidth = 40.0, .input_gain = 1.0, .sample_time = sample_time});
-  const Point truth = exact(*leso, 40.0);
-  const Point run = simulate(*leso, 40.0);
-  report.check_reference("LESO, 40 rad/s", "simulated noise", truth.noise, run.noise, 0.02,
-                         "exact");
-  report.check_reference("LESO, 40 rad/s", "simulated walk", truth.walk, run.walk, 0.04, "exact");
-  report.check_reference("LESO, 40 rad/s", "simulated sine", truth.sine, run.sine, 0.03, "exact");
-  for (std::size_t i = 0; i < chosen.size(); ++i) {
-    if (i == 5) continue;
-    report.expect(curves[i].name, "walk error against the Kalman gain's (ratio)",
-                  chosen[i].walk / chosen[5].walk, chosen[i].walk > 0.99 * chosen[5].walk,
-                  "none is better than the Kalman gain");
+  for (std::size_t c = 0; c < all.size(); ++c) {
+    for (std::size_t w = 0; w < wishes; ++w) {
+      const Tuning& tuning = tunings[c * wishes + w];
+      const std::string name =
+          all[c].name + ", " + number_text(bandwidths[w] / filter_bandwidth, 3);
+      double least = 1e300;
+      for (const TunedDesign& d : tuning.designs) least = std::min(least, d.excess);
+      report.expect(name, "least of all families (root of J / J*)", least, least > 0.999,
+                    "none is better than the LQG");
+    }
   }
   return report.finish();
 }

@@ -37,8 +37,8 @@ struct LoopNumbers {
   double control = 0.0;        ///< of u~
   double control_noise = 0.0;  ///< of u, by noise alone
   double tolerance = 0.0;      ///< factor by which b0 may be wrong, either way
-  double modulus = 0.0;        ///< margin, the least over b0's interval
-  double delay = 0.0;          ///< margin, s, the least over b0's interval
+  double modulus = 0.0;        ///< margin, the least over the intervals
+  double delay = 0.0;          ///< margin, s, the least over the intervals
 
   /// J.
   [[nodiscard]] double cost(double rho, double input_gain) const {
@@ -144,9 +144,12 @@ class LoopCost {
   /// which nothing happens @param points a decade
   LoopCost(const TuneModel& model, const TuneRules& rules, double slowest, double points = 20.0)
       : T_(model.sample_time), b0_(model.input_gain.value), factor_(rules.gain_factor) {
-    const double share = model.input_gain.half_width / std::abs(b0_);
-    gains_ = {1.0};
-    if (share > 0.0) gains_ = {1.0, 1.0 - share, 1.0 + share};
+    std::vector<detail::SampledPlant> others;
+    for (const auto& variant : detail::plant_variants(model)) {
+      others.push_back(detail::sampled_plant(detail::dense_plant(variant.model, variant.gain),
+                                             model.sample_time));
+    }
+    variants_ = std::min(others.size(), most_variants);
     const detail::SampledPlant plant =
         detail::sampled_plant(detail::dense_plant(model), model.sample_time);
     const auto poles = detail::poles_of(plant.a);
@@ -160,6 +163,9 @@ class LoopCost {
       p.value = value;
       p.plant = detail::response(plant, value)(0, 0);
       p.load = detail::response(plant, value, true)(0, 0);
+      for (std::size_t v = 0; v < variants_; ++v) {
+        p.ratio[v] = detail::response(others[v], value)(0, 0) / p.plant;
+      }
       p.turn = 1.0;
       for (const Complex& pole : poles) {
         const Complex factor = value - pole;
@@ -193,15 +199,14 @@ class LoopCost {
     LoopNumbers numbers;
     numbers.modulus = numbers.delay = numbers.tolerance = std::numeric_limits<double>::infinity();
     double output = 0.0, control = 0.0, noise = 0.0;
-    const double scales[] = {1.0, factor_, 1.0 / factor_};
     Complex before[3];
     double turned[3] = {};
-    // Of each gain of b0's interval: what came last.
+    // Of each plant: what came last.
     struct Trail {
       double square[2];
       Complex loop;
     };
-    Trail trails[3] = {};
+    Trail trails[most_variants + 1] = {};
     for (std::size_t i = 0; i < points_.size(); ++i) {
       const Point& p = points_[i];
       const auto c = response.at(p.value);
@@ -215,8 +220,11 @@ class LoopCost {
       control += caused + std::norm(1.0 / b0_ + cs * p.load) * p.load_power;
       if (i >= walked_) continue;
       const Complex turn = p.turn * c.turn;
+      // b0 wrong by the factor at the ends of its interval, too.
+      const Complex scales[] = {loop, factor_ * (variants_ > 0 ? p.ratio[0] : 1.0) * loop,
+                                1.0 / factor_ * (variants_ > 1 ? p.ratio[1] : 1.0) * loop};
       for (std::size_t g = 0; g < 3; ++g) {
-        const Complex now = turn * (1.0 + scales[g] * loop);
+        const Complex now = turn * (1.0 + scales[g]);
         turned[g] += i == 0 ? std::arg(now) : std::arg(now * std::conj(before[g]));
         before[g] = now;
       }
@@ -229,8 +237,9 @@ class LoopCost {
           numbers.tolerance = std::min(numbers.tolerance, std::max(-real, -1.0 / real));
         }
       }
-      for (std::size_t g = 0; g < gains_.size(); ++g) {
-        margins(numbers, trails[g].square, trails[g].loop, gains_[g] * loop, i);
+      margins(numbers, trails[0].square, trails[0].loop, loop, i);
+      for (std::size_t v = 0; v < variants_; ++v) {
+        margins(numbers, trails[v + 1].square, trails[v + 1].loop, p.ratio[v] * loop, i);
       }
     }
     const double whole = std::numbers::pi * (plant_states_ + controller.states());
@@ -245,9 +254,12 @@ class LoopCost {
   }
 
  private:
+  static constexpr std::size_t most_variants = 4;
+
   struct Point {
     double frequency;
     Complex value, plant, load, turn;
+    Complex ratio[most_variants];  ///< of the other plants to this one
     double noise_power, load_power;
   };
 
@@ -280,7 +292,7 @@ class LoopCost {
   double T_;
   double b0_;
   double factor_;
-  std::vector<double> gains_;
+  std::size_t variants_ = 0;
   int plant_states_ = 0;
   std::size_t walked_ = 0;
   std::vector<Point> points_;

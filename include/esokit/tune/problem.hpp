@@ -3,6 +3,7 @@
 /// the loop has to keep.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <esokit/analysis/loop.hpp>
@@ -30,6 +31,8 @@ struct TuneModel {
   double pole = 0.0;                 ///< a, 1/s
   double lag = 0.0;                  ///< tau, s; 0: none
   double dead_time = 0.0;            ///< L, s
+  double latency_half_width = 0.0;   ///< by how much tau + L may be more, s
+  double lag_half_width = 0.0;       ///< how far tau may be off while tau + L stays, s
   double sensor = 0.0;               ///< tau_s, s; 0: none
   double noise = 0.0;                ///< standard deviation of the measurement noise
   double disturbance = 0.0;          ///< q: variance of the increments of d over time
@@ -50,6 +53,8 @@ struct TuneModel {
         .require(is_finite(pole), "pole", pole, "must be finite")
         .not_negative("lag", lag)
         .not_negative("dead_time", dead_time)
+        .not_negative("latency_half_width", latency_half_width)
+        .not_negative("lag_half_width", lag_half_width)
         .not_negative("sensor", sensor)
         .positive("noise", noise)
         .positive("disturbance", disturbance)
@@ -73,15 +78,21 @@ struct TuneModel {
   }
 };
 
-/// The model of a log, for a controller with its sample time.
+/// What takes a 95 % interval to 99 %: 2.576 / 1.960 standard errors.
+inline constexpr double interval_of_99 = 1.314;
+
+/// The model of a log, for a controller with its sample time. The intervals of b0, lag and
+/// latency, 95 % of the log's, are those of 99 %, so that margins hold on the machine.
 /// @param u_min limits of the actuator @param u_max above u_min
 inline TuneModel tune_model(const Identified& found, double u_min, double u_max) {
   TuneModel model;
   model.order = found.order;
-  model.input_gain = found.input_gain;
+  model.input_gain = {found.input_gain.value, interval_of_99 * found.input_gain.half_width};
   model.pole = found.pole.value;
   model.lag = found.lag.value;
   model.dead_time = found.dead_time.value;
+  model.latency_half_width = interval_of_99 * found.latency.half_width;
+  model.lag_half_width = interval_of_99 * found.lag.half_width;
   model.noise = found.noise.value;
   model.disturbance = found.disturbance;
   model.sample_time = found.log.sample_time;
@@ -99,7 +110,8 @@ struct TuneWish {
   double controller_bandwidth = 0.0;  ///< omega_c, rad/s: the law is given, the observer is chosen
 };
 
-/// What a loop has to keep, at b0 and at both ends of its interval.
+/// What a loop has to keep: at the model as it is, and with b0 at both ends of its interval, the
+/// largest latency, and as much or as little of that a lag as may be.
 struct TuneRules {
   double modulus_margin = 0.5;  ///< least abs(1 + L)
   double delay_samples = 2.0;   ///< least delay margin, samples
@@ -139,6 +151,33 @@ inline DensePlant dense_plant(const TuneModel& model, double gain = 1.0) {
     plant.c(0, 0) = 1.0;
   }
   return plant;
+}
+
+/// The plants at the ends of the intervals: the factor on b0, and the rest. The first two differ in
+/// b0 and dead time alone.
+struct PlantVariant {
+  TuneModel model;
+  double gain = 1.0;
+};
+inline std::vector<PlantVariant> plant_variants(const TuneModel& model) {
+  std::vector<PlantVariant> variants;
+  const double share = model.input_gain.half_width / std::abs(model.input_gain.value);
+  const double more = model.latency_half_width;
+  if (!(share > 0.0) && !(more > 0.0) && !(model.lag_half_width > 0.0)) return variants;
+  TuneModel late = model;
+  late.dead_time += more;
+  variants.push_back({late, 1.0 + share});
+  variants.push_back({late, 1.0 - share});
+  if (model.lag > 0.0 && model.lag_half_width > 0.0) {
+    const double latency = late.lag + late.dead_time;
+    for (const double by : {model.lag_half_width, -model.lag_half_width}) {
+      TuneModel other = late;
+      other.lag = std::clamp(model.lag + by, 0.05 * model.lag, latency);
+      other.dead_time = latency - other.lag;
+      variants.push_back({other, 1.0 + share});
+    }
+  }
+  return variants;
 }
 
 }  // namespace detail

@@ -48,9 +48,9 @@ struct TunedDesign {
   double control_noise = 0.0;      ///< sd of u by the measurement noise alone
   double load_peak = 0.0;       ///< largest abs(y) after a step of load that one unit of u balances
   double settling_time = 0.0;   ///< of a step of the reference to within 2 %, s
-  double modulus_margin = 0.0;  ///< least over b0's interval
+  double modulus_margin = 0.0;  ///< least over the intervals
   double gain_tolerance = 0.0;  ///< factor by which b0 may be wrong, either way
-  double delay_margin = 0.0;    ///< least over b0's interval, s
+  double delay_margin = 0.0;    ///< least over the intervals, s
   int instructions = 0;         ///< of an update of the observer, see update_instructions
   std::string code;             ///< C++ to paste: type and config of the controller
   LinearController controller{};  ///< for the analysis, see closed_loop(model, controller)
@@ -616,7 +616,7 @@ double bandwidth_for(const Function& rises, double wanted, double low, double hi
   detail::TuneSearch search{
       model,         rules,  tuning.rho, wish.controller_bandwidth, w, filter_bandwidth,
       1.0 / latency, nullptr};
-  const LoopCost cost(model, rules, search.slowest());
+  const LoopCost cost(model, rules, search.slowest(), 14.0);
   const LoopCost fine(model, rules, search.slowest(), 50.0);
   search.cost = &cost;
   // What swings at a known frequency can be cancelled for nothing.
