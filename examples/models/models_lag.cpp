@@ -16,6 +16,8 @@
 #include <string>
 #include <vector>
 
+#include <esokit/gain/pole_set.hpp>
+
 #include "common/report.hpp"
 #include "models/models.hpp"
 
@@ -29,6 +31,7 @@ constexpr double observer = 100.0;
 
 using Plain = Adrc<LinearEso<1>>;
 using Motor = Adrc<ModelEso<ModelParts{.order = 1, .actuator = 1}>>;
+using AllPlaced = Adrc<ModelEso<ModelParts{.order = 1, .actuator = 1}, double, PoleSet>>;
 using Gyro = Adrc<ModelEso<ModelParts{.order = 1, .sensor = 1}>>;
 
 Plain plain(double bandwidth, double omega_o = observer) {
@@ -45,6 +48,14 @@ Motor motor(double bandwidth, double lag) {
                                    .model = {.actuator = {lag}}},
                       .controller_bandwidth = bandwidth})
       .value();
+}
+/// The actuator corrected as all else is, every pole at omega_o.
+AllPlaced all_placed(double bandwidth, double lag) {
+  AllPlaced::Config config{
+      .observer = {.input_gain = 1.0, .sample_time = sample_time, .model = {.actuator = {lag}}},
+      .controller_bandwidth = bandwidth};
+  for (auto& pole : config.observer.poles) pole = -observer;
+  return AllPlaced::make(config).value();
 }
 Gyro gyro(double omega_o, double lag) {
   return Gyro::make({.observer = {.observer_bandwidth = omega_o,
@@ -80,6 +91,17 @@ void motor_lag(Report& report) {
 
   report.check_reference("lag ignored, omega_c 60 rad/s", "modulus margin at 20 ms", 0.04,
                          price_of(with_motor(0.02), plain(60)).modulus, Tolerance::absolute(0.005));
+  // Why a known actuator runs open loop: one that is faster than the observer would be slowed down.
+  const Price open = price_of(with_motor(0.002), motor(60, 0.002));
+  const Price closed = price_of(with_motor(0.002), all_placed(60, 0.002));
+  const char* fast = "lag of 2 ms in the model, omega_c 60 rad/s";
+  report.check_reference(fast, "sd of u, run open loop", 15, open.noise, Tolerance::absolute(0.5));
+  report.check_reference(fast, "modulus margin, run open loop", 0.62, open.modulus,
+                         Tolerance::absolute(0.005));
+  report.check_reference(fast, "sd of u, all poles at omega_o", 355, closed.noise,
+                         Tolerance::absolute(1));
+  report.check_reference(fast, "modulus margin, all poles at omega_o", 0.05, closed.modulus,
+                         Tolerance::absolute(0.005));
 
   std::vector<CsvRow> lines;
   const auto line = [&](const std::string& what, double lag, double rise, double bandwidth,
