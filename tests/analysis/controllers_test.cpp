@@ -214,6 +214,18 @@ TEST(LinearController, OfEveryAdapter) {
       {.observer = {.observer = linear, .delay = 2}});
 }
 
+TEST(LinearController, OfGuardsWithTheB0OfNow) {
+  using Observer = Guarded<DelayedInput<LinearEso<2>, 2>>;
+  const Observer::Config config{.observer = {.observer = linear, .delay = 1}};
+  auto controller = Adrc<Observer>::make({.observer = config, .controller_bandwidth = 4.0}).value();
+  expect_is_linear(controller);
+  ASSERT_TRUE(controller.set_input_gain(4.0).has_value());
+  expect_is_linear(controller);
+  auto compensator = DisturbanceCompensator<Observer>::make({.observer = config}).value();
+  ASSERT_TRUE(compensator.set_input_gain(1.5).has_value());
+  expect_is_linear(compensator);
+}
+
 TEST(LinearController, OfSettingsOfTheController) {
   using Controller = Adrc<LinearEso<2>>;
   expect_is_linear(Controller::make({.observer = linear,

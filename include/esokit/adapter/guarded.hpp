@@ -128,6 +128,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   /// What it is beyond LoopObserver.
   static constexpr ObserverTraits traits = [] {
     ObserverTraits traits = Base::traits;
+    traits.acts_by_gain = false;  // by what b0 is now, too
     traits.schedules_input_gain = true;
     traits.gates_disturbance = gates;
     return traits;

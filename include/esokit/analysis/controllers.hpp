@@ -3,7 +3,8 @@
 /// `linear_controller`.
 ///
 /// Each is taken as it is within its limits, while no measurement is missing and its law decides:
-/// an angle between two turns, a gate that lets everything in, VariableTime at its present step. A
+/// an angle between two turns, a gate that lets everything in, VariableTime at its present step,
+/// Guarded with its present b0 and full trust. A
 /// float controller is taken in double, with the gains that it has. What is neither linear nor has
 /// such a mode is refused by the compiler; FrozenObserver holds a switched or nonlinear observer in
 /// one of its modes.
@@ -11,6 +12,7 @@
 
 #include <cstddef>
 #include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/guarded.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
@@ -78,6 +80,17 @@ requires detail::SaysObserver<Observer> &&(!LinearObserver<VariableTime<Observer
   return linear_observer(observer.observer());
 }
 /// @}
+
+/// With the b0 of now; with all trust, and within the bound.
+template <class Observer>
+requires detail::SaysObserver<Observer> LinearObserverForm
+linear_observer(const Guarded<Observer>& observer) {
+  LinearObserverForm form = linear_observer(observer.observer());
+  const double ratio = 1.0 / static_cast<double>(observer.input_factor());
+  for (int i = 0; i < form.from_u.rows(); ++i) form.from_u(i, 0) *= ratio;
+  form.input_gain *= ratio;
+  return form;
+}
 
 /// An observer and a law that no controller holds: a continuous observer, or a FrozenObserver in
 /// the place of a switched or nonlinear one. Goes wherever a controller goes.
@@ -194,6 +207,9 @@ requires detail::SaysObserver<Observer> Expected<LinearController, Error<double>
   const auto observer = linear_observer(controller.observer());
   std::vector<double> weights(Observer::order + 1, 0.0);
   weights.back() = -static_cast<double>(controller.compensation_gain());
+  if constexpr (observer_traits<Observer>.schedules_input_gain) {
+    weights.back() *= static_cast<double>(controller.observer().input_factor());
+  }
   auto form = detail::feedback_of(observer, weights, false);
   form.r_to_u(0, 0) = 1.0;
   form.input_gain = 0.0;  // u0 does not go with 1 / b0
