@@ -6,7 +6,7 @@ line before it:
 
     0.097, 0.093 <!--= sim2: Sim2A, p = 1 -> int e dt; sim2: Sim2A, p = 2 -> int e dt -->
 
-A source is EXAMPLE: CASE -> METRIC, a row of its summary.csv, or EXAMPLE#NAME: ROW -> COLUMN, a
+A source is EXAMPLE: CASE -> METRIC (in the project's README FOLDER/EXAMPLE), a row of its summary.csv, or EXAMPLE#NAME: ROW -> COLUMN, a
 cell of its table_NAME.csv, columns by heading or number, `1..4` for four of them; * and ? match any
 text (no bar may stand in a row of a table, write ? for it). Before it may stand `max`, `min` or
 `error` (the greatest relative error, in %), after it `* FACTOR`; of several rows the greatest
@@ -95,6 +95,8 @@ def main():
     passed, failed = 0, 0
     for readme in map(Path, sys.argv[2:]):
         folder = Path(sys.argv[1]) / readme.resolve().parent.name
+        if not folder.is_dir():  # the README of the whole: FOLDER/EXAMPLE
+            folder = Path(sys.argv[1])
         text = readme.read_text(encoding="utf-8")
         for part, sources in re.findall(r"(.*?)<!--=(.*?)-->", text, re.DOTALL):
             # The line before the comment, from the end of the comment before.

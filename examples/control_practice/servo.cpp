@@ -326,6 +326,40 @@ int main(int argc, char** argv) {
     if (i > 0) found.line(first[i].t, first[i].found, quiet);
   }
   report.add(figure);
+
+  // For the front page: the same runs, PID and LESO alone.
+  Figure why("pid_or_adrc", {.rows = 1, .columns = 2, .panel_height = 190});
+  why.caption(
+      "A PID and an ADRC that reacts alike to a load. Left: a step that saturates the motor. "
+      "Right: "
+      "error "
+      "while following a sine, with lost samples, a gap of 40 ms, NaN, and the load going off.");
+  auto& reached = why.panel(0, 0)
+                      .x_label("t (s)")
+                      .y_label("angle (rad)")
+                      .x_range(0.05, 0.7)
+                      .y_range(0, 1.75)
+                      .legend(Legend::bottom_right)
+                      .name("step");
+  auto& followed = why.panel(0, 1)
+                       .x_label("t (s)")
+                       .y_label("error (mrad)")
+                       .x_range(3.4, 5.4)
+                       .y_range(-150, 250)
+                       .name("error");
+  reached.line(first[0].t, wanted,
+               {.name = "reference", .color = Color::black, .dash = Dash::dashed});
+  for (std::size_t i = 0; i < 2; ++i) {
+    const Style style{
+        .name = i == 0 ? "PID" : "ADRC with a LESO", .color = colors[i], .width = 1.8};
+    std::vector<double> e;
+    for (std::size_t k = 0; k < wanted.size(); ++k) {
+      e.push_back(1e3 * (wanted[k] - first[i].angle[k]));
+    }
+    reached.line(first[i].t, first[i].angle, style);
+    followed.line(first[i].t, e, {.color = colors[i], .width = 1.8});
+  }
+  report.add(why);
   report.remark(
       "The PID has the gains that the LESO's ADRC has as a PID, so both react alike to what is "
       "slow. Where a sample is missing the PID holds the last one; the observers predict, and "
