@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <esokit/adapter/known_model.hpp>
+#include <esokit/core/pack.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
@@ -327,6 +328,40 @@ void is_finite_at_any_rate() {
 TEST(Update, IsFiniteAtAnyRate) {
   is_finite_at_any_rate<LinearEso<2>>();
   is_finite_at_any_rate<CascadeEso<2, 3>>();
+}
+
+// Lanes of a pack at 1/T of 1e3 and 1e90, where squares tell nothing, fed what is near the largest
+// number: each is the plain observer, and none is infinite.
+TEST(Update, OfPacksIsFiniteAtAnyRate) {
+  using Two = esokit::Pack<double, 2>;
+  const double times[] = {1e-3, 1e-90};
+  const auto plain = [&](int i) {
+    return LinearEso<2>::make(
+               {.observer_bandwidth = 0.1 / times[i], .input_gain = 2, .sample_time = times[i]})
+        .value();
+  };
+  LinearEso<2> alone[] = {plain(0), plain(1)};
+  auto both = LinearEso<2, Two>::make({.observer_bandwidth = Two({1e2, 1e89}),
+                                       .input_gain = Two(2.0),
+                                       .sample_time = Two({1e-3, 1e-90})})
+                  .value();
+  int refused = 0;
+  double size = 1;
+  for (int k = 0; k < 2000; ++k) {
+    size = k % 200 == 0 ? 1 : size * 40;
+    if (!(size < 1e307)) size = 1e-3;
+    const double y = k % 2 == 0 ? size : -size;
+    const auto status = both.update(Two(y), Two(0.0));
+    for (int i = 0; i < 2; ++i) {
+      EXPECT_EQ(status[i], alone[i].update(y, 0));
+      refused += status[i] == StepStatus::ok ? 0 : 1;
+      for (int row = 0; row < 3; ++row) {
+        ASSERT_TRUE(esokit::is_finite(both.estimate()(row)[i])) << k << ", " << i;
+        EXPECT_EQ(both.estimate()(row)[i], alone[i].estimate()(row));
+      }
+    }
+  }
+  EXPECT_GT(refused, 20);
 }
 
 }  // namespace

@@ -453,7 +453,7 @@ class PredictorCorrector {
   /// All that it holds, for what is built on it, see detail::LaneAccess.
   static constexpr auto fields(auto& o) noexcept {
     return detail::tie(o.states_, o.laws_, o.model_, o.innovation_, o.applied_input_, o.gap_,
-                       o.max_gap_);
+                       o.max_gap_, o.squares_suffice_);
   }
 
  private:
@@ -622,19 +622,23 @@ class PredictorCorrector {
 
   /// Where the sum of all squares is finite, so is the probe, if 1/T is not absurdly large:
   /// cheaper, as a square has no sign and no weight. A float of one level has no room for the flag.
-  static constexpr bool has_squares =
-      PlainScalar<S> && model_traits<Model>.is_chain && (Levels > 1 || sizeof(S) > sizeof(float));
+  static constexpr bool has_squares = PlainScalar<LaneScalar<S>> && model_traits<Model>.is_chain &&
+                                      (Levels > 1 || sizeof(LaneScalar<S>) > sizeof(float));
   struct NoFlag {};
 
   /// States up to the root of the largest number are finite in physical units, all levels together.
   constexpr void look_at_squares() noexcept {
     if constexpr (has_squares) {
-      S root(1.0);
-      for (int i = 1; i < std::numeric_limits<S>::max_exponent / 2; ++i) root = root * S(2.0);
+      using Lane = LaneScalar<S>;
+      Lane root(1);
+      for (int i = 1; i < std::numeric_limits<Lane>::max_exponent / 2; ++i) root = root * Lane(2);
       State ones;
       ones.fill(S(1.0));
-      const S most = model_.finite_probe(ones) * S(Levels);
-      squares_suffice_ = is_finite(most) && most < root;
+      const S most = model_.finite_probe(ones) * detail::integer<S>(Levels);
+      for (int i = 0; i < lane_count<S>; ++i) {
+        const Lane of_lane = detail::number_of_lane(most, i);
+        detail::of_lane(squares_suffice_, i) = is_finite(of_lane) && of_lane < root;
+      }
     }
   }
 
@@ -646,7 +650,7 @@ class PredictorCorrector {
       detail::unroll<Levels - 1>([&](auto i) ESOKIT_INLINE_LAMBDA {
         sum = sum + detail::sum_of_squares(std::get<i + 1>(states));
       });
-      return is_finite(sum);
+      return all(is_finite(sum));
     } else {
       return all(is_finite(probe(states)));
     }
@@ -654,7 +658,7 @@ class PredictorCorrector {
 
   [[nodiscard]] ESOKIT_INLINE constexpr bool may_be_quick() const noexcept {
     if constexpr (has_squares) {
-      return gap_ == 0 && squares_suffice_;
+      return gap_ == 0 && squares_suffice_ == true;
     } else {
       return gap_ == 0;
     }
@@ -846,7 +850,7 @@ class PredictorCorrector {
   S applied_input_ = S(0.0);
   Lanes<std::uint16_t, S> gap_{};
   std::uint16_t max_gap_;
-  [[no_unique_address]] std::conditional_t<has_squares, bool, NoFlag> squares_suffice_{};
+  [[no_unique_address]] std::conditional_t<has_squares, Lanes<bool, S>, NoFlag> squares_suffice_{};
 
   // Last: what comes after it would be missing in whatever is built on this.
   static_assert(Levels >= 1, "esokit: at least one level is needed");
