@@ -53,6 +53,7 @@ an observer of your own in the place of all that (the page, and its estimates as
 other:
   --rank K            the design of that rank in the place of the best
   --anyway            a design for a refused log, too
+  --no-design         what was found alone
   --out DIR           where the page goes (default: here)
 Without a file: the measured sets below --data (default: ../shared/data beside the repository).
 
@@ -155,8 +156,8 @@ Settings read_arguments(int argc, char** argv, std::filesystem::path& data) {
       continue;
     }
     name.erase(0, 2);
-    if (name == "anyway") {
-      s.anyway = true;
+    if (name == "anyway" || name == "no-design") {
+      (name == "anyway" ? s.anyway : s.no_design) = true;
       continue;
     }
     std::string value;
@@ -265,7 +266,8 @@ int main(int argc, char** argv) {
     if (outcome.findings.refusal) {
       std::fprintf(stderr, "refused: %s\n", esokit::to_text(*outcome.findings.refusal).c_str());
     }
-    for (const auto& line : outcome.design.summary()) std::printf("%s\n", line.c_str());
+    for (const auto& line : in_short(outcome.findings, outcome.design))
+      std::printf("%s\n", line.c_str());
     const std::string page = outcome.page(settings).write(settings.out, stem_of(settings));
     if (page.empty()) return failed;
     std::printf("%s\n", page.c_str());

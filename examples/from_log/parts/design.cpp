@@ -119,26 +119,24 @@ std::vector<double> settled(const Replay& replay, const esokit::FitData& rows,
   return sizes;
 }
 
-/// What a design of a family includes.
-std::vector<std::string> headers_of(const esokit::TunedDesign& design) {
-  using esokit::TuneFamily;
-  if (design.knows.any()) {
-    if (design.family == TuneFamily::half_gain)
-      return {"gain/half_gain.hpp", "observer/model_eso.hpp"};
-    return {"observer/model_eso.hpp"};
+/// What the code of a design includes.
+std::string includes_of(const std::string& code) {
+  struct Header {
+    const char *word, *file;
+  };
+  constexpr Header headers[] = {{"HalfGainPoles", "gain/half_gain.hpp"},
+                                {"PoleSet", "gain/pole_set.hpp"},
+                                {"CascadeEso<", "observer/cascade_eso.hpp"},
+                                {"ExtendedStateFilter<", "observer/extended_state_filter.hpp"},
+                                {"HalfGainEso<", "observer/half_gain_eso.hpp"},
+                                {"LinearEso<", "observer/linear_eso.hpp"},
+                                {"ModelEso<", "observer/model_eso.hpp"}};
+  std::string text;
+  for (const Header& header : headers) {
+    if (code.find(header.word) != std::string::npos)
+      text += std::string("#include <esokit/") + header.file + ">\n";
   }
-  switch (design.family) {
-    case TuneFamily::half_gain:
-      return {"observer/half_gain_eso.hpp"};
-    case TuneFamily::cascade:
-      return {"observer/cascade_eso.hpp"};
-    case TuneFamily::filter:
-      return {"observer/extended_state_filter.hpp"};
-    case TuneFamily::free_poles:
-      return {"gain/pole_set.hpp", "observer/linear_eso.hpp"};
-    default:
-      return {"observer/linear_eso.hpp"};
-  }
+  return text;
 }
 
 std::string program(const Settings& settings, const Identified& found, const esokit::Tuning& tuning,
@@ -151,7 +149,7 @@ std::string program(const Settings& settings, const Identified& found, const eso
                      number_text(1e3 * found.log.sample_time, 6) +
                      " ms.\n#include <cstdio>\n#include <esokit/control/adrc.hpp>\n";
   if (found.order == 2) text += "#include <esokit/control/tracking_differentiator.hpp>\n";
-  for (const auto& header : headers_of(design)) text += "#include <esokit/" + header + ">\n";
+  text += includes_of(design.code);
   text += "\nint main() {\n";
   std::string line;
   for (const char c : design.code) {
@@ -275,10 +273,6 @@ Design Design::make(const Settings& settings, const Input&, const Findings& find
   const double T = model.sample_time;
   design.code_ = program(settings, found, *tuning, taken);
   design.summary_ = {
-      "The machine is of order " + std::to_string(found.order) +
-          ", b0 = " + number_text(found.input_gain.value, 4) + " ± " +
-          number_text(found.input_gain.half_width, 2) + ", lag and dead time " +
-          number_text(1e3 * found.latency.value, 3) + " ms.",
       "Take " + taken.name + ". It settles in " + number_text(taken.settling_time, 3) +
           " s; a load that a tenth of the range of u balances moves y by " +
           number_text(0.1 * range * taken.load_peak, 3) + "; noise moves u by " +
@@ -287,6 +281,11 @@ Design Design::make(const Settings& settings, const Input&, const Findings& find
           number_text(1e3 * taken.delay_margin, 3) + " ms of delay may be added; y and u come to " +
           number_text(taken.excess, 3) +
           " times what the best linear controller without margins does."};
+  if (!settings.limits) {
+    design.summary_.push_back("Its limits are those of u in the log, " +
+                              number_text(limits.first, 4) + " to " +
+                              number_text(limits.second, 4) + ": --limits says others.");
+  }
   const LinearController form = design.form();
   design.replay_ = through(form, found.input_gain.value, found.order, findings.rows);
   const esokit::FitData machine = simulated(found, findings.rows);

@@ -42,6 +42,7 @@ struct Settings {
   double controller = 0;     ///< wish instead: omega_c, rad/s
   int rank = 1;              ///< which of the designs, the best is 1
   bool anyway = false;       ///< design for a refused log, too
+  bool no_design = false;    ///< what was found, and no controller
   std::string observer;      ///< typed in: nothing is found, the log runs through it
   double bandwidth = 0;      ///< its omega_o, rad/s
   std::string out = ".";     ///< folder of the page
@@ -58,6 +59,7 @@ struct Alarm {
 struct Input {
   std::string time, u, y;  ///< names of the columns
   std::string time_unit = "s";
+  bool unit_assumed = false;      ///< nothing says that it is seconds
   esokit::Log log;                ///< s from the first stamp on; u held from its row to the next
   std::vector<std::size_t> line;  ///< of the file, for each row
   bool merged = false;            ///< topics with stamps of their own were brought together

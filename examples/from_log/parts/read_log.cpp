@@ -87,6 +87,7 @@ double find_unit(const Settings& settings, Input& input, double first, double st
       if (first * unit > 0.9e9 && first * unit < 2.5e9 && step * unit < 50.0) return unit;
     }
   }
+  input.unit_assumed = !(named > 0.0);
   const double read = named > 0.0 ? named : 1.0;
   const double T = step * read;
   const bool minutes = std::abs(T / 60 - std::round(T / 60)) < 1e-6;

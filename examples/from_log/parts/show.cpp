@@ -185,7 +185,10 @@ std::vector<CsvRow> log_table(const Input& input, const Findings& findings) {
   rows.push_back({"y", input.y, ""});
   rows.push_back({"u", input.u, "held from its row to the next"});
   rows.push_back({"time", input.time.empty() ? "none" : input.time,
-                  input.time.empty() ? "equal steps, as told" : "read in " + input.time_unit});
+                  input.time.empty() ? "equal steps, as told"
+                  : input.unit_assumed
+                      ? "read in " + input.time_unit + ": nothing says so (--time-unit)"
+                      : "read in " + input.time_unit});
   rows.push_back({"rows", std::to_string(log.rows),
                   input.merged ? "topics with stamps of their own; a row "
                                  "for each y, u averaged between them"
@@ -212,6 +215,21 @@ std::string stem_of(const Settings& settings) {
   return stem.find_first_not_of('.') == std::string::npos ? "log" + stem : stem;
 }
 
+std::vector<std::string> in_short(const Findings& findings, const Design& design) {
+  std::vector<std::string> all;
+  const esokit::Identified& found = findings.found;
+  if (findings.seen) {
+    all.push_back("The machine is of order " + std::to_string(found.order) +
+                  ", b0 = " + number_text(found.input_gain.value, 4) + " ± " +
+                  number_text(found.input_gain.half_width, 2) + ", lag and dead time " +
+                  number_text(1e3 * found.latency.value, 3) + " ms; a row every " +
+                  number_text(1e3 * found.log.sample_time, 4) + " ms.");
+  }
+  const auto more = design.summary();
+  all.insert(all.end(), more.begin(), more.end());
+  return all;
+}
+
 Page show(const Settings& settings, const Input& input, const Findings& findings,
           const Design& design) {
   const std::string name = std::filesystem::path(settings.file).filename().string();
@@ -229,10 +247,9 @@ Page show(const Settings& settings, const Input& input, const Findings& findings
     page.box("Refused: this log does not tell what a controller needs. What to record instead",
              lines, true);
   }
-  if (design.made()) {
-    page.box(
-        findings.refusal ? "In short, as if the numbers could be trusted (--anyway)" : "In short",
-        design.summary(), false);
+  if (design.made() || (settings.no_design && findings.seen)) {
+    page.box(findings.refusal ? "In short, as if the numbers could be trusted" : "In short",
+             in_short(findings, design), false);
   }
   page.heading("The log");
   page.table("log", "What was read", log_table(input, findings));
@@ -317,11 +334,14 @@ Outcome work_out(const Settings& settings, const Input& input) {
   Outcome outcome;
   outcome.input = input;
   outcome.findings = examine(settings, input);
-  if (outcome.findings.seen && (!outcome.findings.refusal || settings.anyway))
+  const bool usable = outcome.findings.seen && (!outcome.findings.refusal || settings.anyway);
+  if (usable && !settings.no_design)
     outcome.design = Design::make(settings, input, outcome.findings);
-  outcome.status = outcome.findings.refusal                                     ? refused
-                   : !outcome.findings.alarms.empty() || !outcome.design.made() ? alarmed
-                                                                                : all_clear;
+  outcome.status = outcome.findings.refusal ? refused
+                   : !outcome.findings.alarms.empty() ||
+                           (usable && !settings.no_design && !outcome.design.made())
+                       ? alarmed
+                       : all_clear;
   return outcome;
 }
 

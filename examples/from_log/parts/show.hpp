@@ -11,6 +11,9 @@ namespace from_log {
 /// Name of the page without its ending.
 [[nodiscard]] std::string stem_of(const Settings& settings);
 
+/// A few sentences: what was found, and what to take.
+[[nodiscard]] std::vector<std::string> in_short(const Findings& findings, const Design& design);
+
 /// What was read, found and designed, as a page.
 [[nodiscard]] Page show(const Settings& settings, const Input& input, const Findings& findings,
                         const Design& design);
