@@ -614,17 +614,17 @@ class MonteCarlo {
 /// What a run is depends on the seed and its number alone.
 /// @param vary (Trial&, Draw&): makes of the trial, which comes with the plant and the controller
 ///        given here, that of a run; pure. It may return a Check, whose error counts as failed.
-/// @{
 template <SampledPlant P, class C, class Vary>
 requires ControllerOf<C, P> MonteCarlo<P, C, Vary> monte_carlo(
     P plant, C controller, std::type_identity_t<MonteCarloConfig<P, C>> config, Vary vary) {
   return {std::move(plant), std::move(controller), std::move(config), std::move(vary)};
 }
+
+/// The same with nothing but chance to tell the runs apart.
 template <SampledPlant P, class C>
 requires ControllerOf<C, P> MonteCarlo<P, C> monte_carlo(
     P plant, C controller, std::type_identity_t<MonteCarloConfig<P, C>> config) {
   return {std::move(plant), std::move(controller), std::move(config), {}};
 }
-/// @}
 
 }  // namespace esokit::sim
