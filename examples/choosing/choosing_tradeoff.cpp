@@ -130,13 +130,14 @@ int main(int argc, char** argv) {
     Panel& panel = figure.panel(c / 2, c % 2).title(all[c].name);
     panel.name("case" + std::to_string(c + 1))
         .log_x()
-        .log_y()
+        .x_range(0.1, 2.5)
         .x_label("bandwidth of the law / of the filter")
         .y_label("root of J / J*")
-        .y_range(1.0, c == 3   ? 10.0
-                      : c == 2 ? 4.0
-                               : 1.5)
-        .legend(c < 2 ? Legend::above : Legend::top_left);
+        .y_range(1.0, c == 0   ? 1.15
+                      : c == 1 ? 1.5
+                      : c == 2 ? 2.2
+                               : 3.5)
+        .legend(Legend::top_left);
     for (const auto& [name, style] : styles()) {
       std::vector<double> x, y;
       for (std::size_t w = 0; w < wishes; ++w) {

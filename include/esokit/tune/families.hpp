@@ -49,6 +49,7 @@ struct TuneSettings {
   double bandwidth_factor = 0.0;      ///< alpha of a cascade
   double controller_bandwidth = 0.0;  ///< omega_c where the law goes by it, rad/s
   double capture_bandwidth = 0.0;     ///< of a swing that is known, see Resonance
+
   /// Poles of the error that a placement places, 1/s; none for a cascade.
   std::vector<std::complex<double>> observer_poles{};
   double disturbance_bound = 0.0;  ///< q_n of the filter, see ExtendedStateFilter
