@@ -1,8 +1,6 @@
 /// @file
 /// Observers with a model beside LinearEso of the same number of states: what a known lag, filter,
 /// pole or swing costs a sample.
-#include <esokit/gain/model_gain.hpp>
-#include <esokit/model/plant_model.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/model_eso.hpp>
 #include <string>
@@ -68,13 +66,12 @@ void add_all(const std::string& scalar) {
   add_parts<ModelParts{.order = 1, .actuator = 1, .sensor = 1, .resonators = 1}, S>(
       "lag_sensor_resonator/1", scalar,
       {.actuator = {20 * ms}, .sensor = {5 * ms}, .resonators = {{{S(90)}}}});
-  using Plant = LinearPlantModel<3, 2, S>;
   auto plant = LinearPlant<3, S>::transfer_function(
                    {.numerator = {S(6000), S(200), S(0)}, .denominator = {S(60), S(47), S(12)}})
                    .value();
-  using Eso = LinearEso<2, S, 2, EqualPoles, Plant>;
+  using Eso = PlantEso<3, ModelParts{.order = 2}, S>;
   const std::string base = "/linear_eso/3/" + scalar;
-  add<S>("linear_plant/3/" + scalar, made<Eso, S>({plant}),
+  add<S>("linear_plant/3/" + scalar, made<Eso, S>({.plant = plant}),
          {"vs bank" + base + " <= 1.5", "vs call" + base + " <= 1.5",
           "vs latency" + base + " <= 1.5"});
 }

@@ -228,7 +228,6 @@ TEST(LinearPlantModel, AFilterFindsStatesAndDisturbance) {
   config.initial_covariance = Filter::Covariance::Diagonal({1, 1e2, 1e4, 1e4, 1e2, 1e2});
   auto filter = Filter::make(config);
   ASSERT_TRUE(filter) << filter.error();
-  esokit::Vector<double, 3> x{0.0, 0.0, 0.0};
   LinearPlant<6> all{};
   for (int i = 0; i < 3; ++i) {
     for (int j = 0; j < 3; ++j) all.a(i, j) = plant.a(i, j);
