@@ -6,6 +6,7 @@
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/dual_feedback.hpp>
+#include <esokit/control/experiment.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <support/numbers.hpp>
@@ -80,6 +81,29 @@ void all_controllers() {
 
 TEST(BadSamplesOfControllers, Double) { all_controllers<double>(); }
 TEST(BadSamplesOfControllers, Float) { all_controllers<float>(); }
+
+TEST(BadSamplesOfControllers, EndAnExperiment) {
+  const esokit::ExperimentConfig<float> config{.sample_time = 1e-3f,
+                                               .input = 0.25f,
+                                               .amplitude = 1,
+                                               .hysteresis = 0.1f,
+                                               .travel = 2,
+                                               .time_limit = 9};
+  for (const float bad : {hidden_nan<float>(), hidden_infinity<float>()}) {
+    for (const bool first : {true, false}) {
+      auto experiment = esokit::Experiment<1, float>::make(config).value();
+      if (!first) EXPECT_EQ(experiment.update(1), 1.25f);
+      auto other = experiment;
+      EXPECT_EQ(experiment.update(bad), 0.25f);
+      EXPECT_EQ(experiment.reason(), esokit::AbortReason::bad_sample);
+      EXPECT_EQ(other.update(1, bad), 0.25f);
+      EXPECT_EQ(other.reason(), esokit::AbortReason::bad_sample);
+    }
+    auto wrong = config;
+    wrong.travel = bad;
+    EXPECT_FALSE((esokit::Experiment<1, float>::make(wrong)));
+  }
+}
 
 TEST(BadSamplesOfControllers, ConfigWithNan) {
   const double nan = hidden_nan<double>();

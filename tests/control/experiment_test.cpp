@@ -224,6 +224,11 @@ TEST(Experiment, FrictionIsFoundAndTakenOut) {
       EXPECT_NEAR(found->friction, share * 10, share) << share;
     }
   }
+  // A load that u0 does not hold makes the speed longer one way: in the interval.
+  const auto loaded = run<2>(relay(2), Plant(2, 5, 0.01, 5, T, 1.5).rub(0.2 * 5, 0.01)).result();
+  ASSERT_TRUE(loaded);
+  EXPECT_GT(std::abs(loaded->input_gain - 5), 0.1);
+  EXPECT_LT(std::abs(loaded->input_gain - 5), loaded->input_gain_half_width);
   EXPECT_EQ(refusal(run<2>(relay(2), Plant(2, 5, 0.01, 5, T).rub(0.35 * 5, 0.01)).result()),
             "friction: of b0 A is too large: take a larger amplitude; above");
   // None is seen where there is none, but for rounding.
@@ -410,6 +415,25 @@ TEST(Experiment, BadSampleEndsItInEveryPhase) {
     EXPECT_EQ(experiment.reason(), AbortReason::stopped);
     EXPECT_EQ(experiment.stop(), 0.0);
   }
+}
+
+/// The sums are of the u that there was: an actuator's rate costs nothing but time.
+TEST(Experiment, RateLimitHolds) {
+  auto config = steps();
+  config.limits.rate = 100;
+  auto experiment = Experiment<1>::make(config).value();
+  Plant plant(1, 5, 0, 9, T);
+  double last = 0, fastest = 0;
+  while (!experiment.finished()) {
+    const double u = experiment.update(plant.y());
+    fastest = std::max(fastest, std::abs(u - last));
+    last = u;
+    plant.step(u);
+  }
+  EXPECT_NEAR(fastest, 0.1, 1e-12);
+  EXPECT_NEAR(experiment.result()->input_gain, 5, 1e-9);
+  for (int k = 0; k < 10; ++k) last = experiment.update(0);
+  EXPECT_EQ(last, 0.0);
 }
 
 /// What the actuator held counts, not what was asked.

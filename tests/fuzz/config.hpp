@@ -348,6 +348,25 @@ class Filler {
     MEMBER(domain, choice(text, member, 2))
     MEMBER(half_gain, member = tape_.once_in(5, text))
     MEMBER(limits, limits(member))
+    if constexpr (requires { config.hand_over; }) {
+      const bool relay = tape_.choice(2, "excitation") == 0;
+      if (!relay) config.excitation = static_cast<decltype(config.excitation)>(1);
+      number("input", config.input, {0, 0.5});
+      number("amplitude", config.amplitude, {0.1, 1, true, true});
+      if (relay) {
+        number("hysteresis", config.hysteresis, {0.01, 0.5, true});
+        if (order_ == 2) number("lead", config.lead, {2 * T, 50 * T, true});
+      } else {
+        number("half_period", config.half_period, {9 * T, 40 * T});
+      }
+      number("rest", config.rest, {0, 10 * T});
+      number("travel", config.travel, {1, 10, true});
+      number("time_limit", config.time_limit, {100 * T, 5000 * T, true});
+      number("hand_over", config.hand_over, {0, 20 * T});
+      config.cycles = tape_.integer(6, 13, "cycles");
+      config.cycles -= config.cycles % 2;
+      promise.certain = false;
+    }
     if constexpr (requires { config.start_hold.time; }) {
       if (tape_.once_in(3, "start_hold")) {
         number("start_hold.time", config.start_hold.time, {0, 20 * T});

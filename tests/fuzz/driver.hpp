@@ -896,7 +896,51 @@ class Driver {
   }
 
   // Differentiators and limiters.
+  /// An experiment.
+  void moved(S u) {
+    const S low = config_.input - config_.amplitude, high = config_.input + config_.amplitude;
+    const bool at_once = !(config_.limits.rate < esokit::Limits<S>{}.rate);
+    if (!is_finite(u)) fail("u is not finite");
+    if (at_once && !same(u, config_.input) && !same(u, low) && !same(u, high))
+      fail("u is another one");
+    if (!same(u, object_->output())) fail("output() is not what was put out");
+    if (at_once && object_->finished() && !same(u, config_.input))
+      fail("finished, and not at rest");
+    const auto found = quietly([&] { return object_->result(); });
+    if (!found) {
+      if (const auto wrong = refusal(found.error())) fail(*wrong);
+    } else if (!is_finite(found->input_gain) || !is_finite(found->latency)) {
+      fail("the result is not finite");
+    }
+  }
+  static bool same(S a, S b) { return !(a < b) && !(b < a); }
+
   static void law(std::vector<Action>& a) {
+    if constexpr (requires(const T& o) { o.rest_output(); }) {
+      for (int weight = 0; weight < 4; ++weight) {
+        a.push_back({"update", [](Driver& d) {
+                       const S y = d.number();
+                       d.moved(d.quietly([&] { return d.object_->update(y); }));
+                     }});
+        a.push_back({"update to and fro", [](Driver& d) {
+                       const S one = d.number({-1, 1}), other = d.number({-1, 1});
+                       const int half = 1 + d.tape_->choice(40), count = d.tape_->choice(1000);
+                       for (int i = 0; i < count; ++i) {
+                         const S y = i / half % 2 == 0 ? one : other;
+                         d.moved(d.quietly([&] { return d.object_->update(y); }));
+                       }
+                     }});
+      }
+      a.push_back({"update(y, u)", [](Driver& d) {
+                     const S y = d.number(), u = d.number();
+                     d.moved(d.quietly([&] { return d.object_->update(y, u); }));
+                   }});
+      a.push_back({"stop", [](Driver& d) {
+                     if (d.tape_->choice(8) != 0) return;
+                     d.moved(d.quietly([&] { return d.object_->stop(); }));
+                     if (!d.object_->finished()) d.fail("stopped, and not finished");
+                   }});
+    }
     if constexpr (requires(T & o, S s) {
                     { o.update(s) } -> std::same_as<bool>;
                   }) {

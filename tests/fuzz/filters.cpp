@@ -2,6 +2,7 @@
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
+#include <esokit/control/experiment.hpp>
 #include <esokit/control/nonlinear_feedback.hpp>
 #include <esokit/control/tracking_differentiator.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
@@ -18,6 +19,7 @@ void add_filters(std::vector<Kind>& kinds) {
   KIND(ExtendedStateFilter<1, float>);
   KIND(ExtendedStateFilter<2, float, 1, NoNominalModel, 8>);
   KIND(MimoExtendedStateFilter<ChainOrders<1, 2>, 2, float>);
+  KIND(Experiment<2, float>);
   KIND(TrackingDifferentiator<float>);
   KIND(SignTrackingDifferentiator<float>);
   KIND(NonlinearFeedback<2, float>);
@@ -26,6 +28,7 @@ void add_filters(std::vector<Kind>& kinds) {
   KIND(WrappedOutput<ExtendedStateFilter<2, float>>);
   KIND(VariableTime<DelayedInput<ExtendedStateFilter<2, double>, 2>>);
   KIND(MimoExtendedStateFilter<ChainOrders<2, 1>, 1, double>);
+  KIND(Experiment<1, double>);
   KIND(TrackingDifferentiator<double>);
 #endif
 }

@@ -206,15 +206,16 @@ class Experiment {
     const S power = Order == 1 ? T : S(T * T);
     rules.representable("sample_time", T, power, "has a power that the scalar cannot hold");
     if (!rules) return rules.error();
-    return Experiment(config);
+    return Experiment(config, *limiter);
   }
 
   /// One sample. @param y measurement @return u to be held until the next sample
-  S update(S y) noexcept { return update(y, held_); }
+  S update(S y) noexcept { return update(y, output()); }
 
   /// The same where the actuator reports what it held since the last sample.
   S update(S y, S u_applied) noexcept {
-    if (finished()) return held_ = config_.input;
+    if (is_finite(u_applied)) limiter_.track(u_applied);
+    if (finished()) return put_out(config_.input);
     if (!is_finite(y) || !is_finite(u_applied)) return abort(AbortReason::bad_sample);
     if (count_ > 0) last_row_ = {S(count_ - 1) * config_.sample_time, u_applied, y_[0]};
     const S from_rest = y - rest_;
@@ -229,11 +230,11 @@ class Experiment {
     y_[1] = y_[0];
     y_[0] = y;
     u_last_ = u_applied;
-    return held_ = next(y);
+    return put_out(next(y));
   }
 
   /// Ends it: u0 from now on.
-  S stop() noexcept { return finished() ? held_ : abort(AbortReason::stopped); }
+  S stop() noexcept { return finished() ? output() : abort(AbortReason::stopped); }
 
   /// b0 and latency, once phase `hand_over` or `done` is reached.
   [[nodiscard]] Expected<Result, Error<S>> result() const noexcept {
@@ -357,7 +358,7 @@ class Experiment {
     return phase_ == ExperimentPhase::done || phase_ == ExperimentPhase::aborted;
   }
   /// The u that holds now.
-  [[nodiscard]] S output() const noexcept { return held_; }
+  [[nodiscard]] S output() const noexcept { return limiter_.last(); }
   /// y0: mean of y in the rest.
   [[nodiscard]] S rest_output() const noexcept { return rest_; }
   /// T, s.
@@ -444,13 +445,14 @@ class Experiment {
     }
   };
 
-  explicit Experiment(const Config& config) noexcept
+  Experiment(const Config& config, const Limiter<S>& limiter) noexcept
       : config_(config),
+        limiter_(limiter),
         rest_samples_(to_samples(config.rest)),
         limit_samples_(to_samples(config.time_limit)),
         half_samples_(to_samples(config.half_period)),
-        hand_over_samples_(to_samples(config.hand_over)),
-        held_(config.input) {
+        hand_over_samples_(to_samples(config.hand_over)) {
+    limiter_.track(config.input);
     if (config.lead > S(0)) follow_ = -std::expm1(S(-4) * config.sample_time / config.lead);
   }
 
@@ -469,8 +471,10 @@ class Experiment {
   S abort(AbortReason reason) noexcept {
     phase_ = ExperimentPhase::aborted;
     reason_ = reason;
-    return held_ = config_.input;
+    return put_out(config_.input);
   }
+
+  S put_out(S wanted) noexcept { return limiter_(wanted); }
 
   /// A sample of the window.
   void add(S y, S u_applied) noexcept {
@@ -594,9 +598,9 @@ class Experiment {
   }
 
   Config config_;
+  Limiter<S> limiter_;
   std::int32_t rest_samples_, limit_samples_, half_samples_, hand_over_samples_;
   S follow_{};
-  S held_;
   S u_last_{};
   S rest_{};
   S lagging_{};
