@@ -92,7 +92,9 @@ TEST(BadSamplesOfControllers, EndAnExperiment) {
   for (const float bad : {hidden_nan<float>(), hidden_infinity<float>()}) {
     for (const bool first : {true, false}) {
       auto experiment = esokit::Experiment<1, float>::make(config).value();
-      if (!first) EXPECT_EQ(experiment.update(1), 1.25f);
+      if (!first) {
+        EXPECT_EQ(experiment.update(1), 1.25f);
+      }
       auto other = experiment;
       EXPECT_EQ(experiment.update(bad), 0.25f);
       EXPECT_EQ(experiment.reason(), esokit::AbortReason::bad_sample);

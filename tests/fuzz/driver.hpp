@@ -439,6 +439,9 @@ class Driver {
     }
   }
 
+  /// The second number of an experiment's update is no reference.
+  static constexpr bool takes_applied_input = requires(const T& o) { o.rest_output(); };
+
   static const std::vector<Action>& actions() {
     static const std::vector<Action> list = [] {
       std::vector<Action> a;
@@ -565,7 +568,7 @@ class Driver {
                      }});
       }
       // A controller's.
-      if constexpr (requires(T & o, S s) {
+      if constexpr (!takes_applied_input && requires(T & o, S s) {
                       { o.update(s, s) } -> std::same_as<S>;
                       o.output();
                     }) {

@@ -286,7 +286,7 @@ class Pack {
 
   /// Lane by lane, as the functions of the standard library.
   /// @{
-  ESOKIT_INLINE friend constexpr Pack abs(const Pack& x) noexcept { return x.magnitude(); }
+  ESOKIT_INLINE friend constexpr Pack(abs)(const Pack& x) noexcept { return x.magnitude(); }
   friend Pack exp(const Pack& x) noexcept {
     return lane_by_lane([](S a) { return std::exp(a); }, x);
   }
