@@ -34,6 +34,10 @@ struct DisturbanceCompensatorConfig {
 /// a plant that is nearly y^(n) = b0 u0. The same limits, start, missing and retuning rules as
 /// Adrc.
 ///
+/// With an actuator in the observer's model its lag is taken off as well: of first order, the
+/// controller sees
+/// y^(n+1) = b0 / tau u0, and has to be one for that (a PD where it was a P).
+///
 /// A disturbance that does not come in where u does (mismatched): put the observer where it comes
 /// in, tell it with `update_driven` what drives that equation beside the disturbance (another
 /// state, in the place of u), and give the gain K that takes the estimate to u, for example
