@@ -1,6 +1,7 @@
 // Every controller, with observers of every sort of gain law and adapters; a new one joins by a
 // line.
 #include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/guarded.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
@@ -45,6 +46,7 @@ void add_controllers(std::vector<Kind>& kinds) {
   KIND(MimoAdrc<LinearEso<1, float>, LinearEso<2, float>>);
 #ifndef ESOKIT_ONE_TYPE
   KIND(Adrc<OutlierGate<LinearEso<2, float>>>);
+  KIND(Adrc<Guarded<LinearEso<2, float>>>);
   KIND(Adrc<LinearEso<2, float>>);
   KIND(Adrc<ModelEso<ModelParts{.order = 1, .plant_poles = true, .actuator = 1}, double>>);
   KIND(Adrc<CascadeEso<2, 2, float>>);

@@ -625,6 +625,23 @@ class Driver {
                                  [&] { return d.object_->update_driven(y, base, drive); });
                      }});
       }
+      if constexpr (requires(T & o, S s) { o.hold(s, s, s); }) {
+        a.push_back({"hold", [](Driver& d) {
+                       const S y = d.number(), r = d.number(), u = d.number();
+                       d.tracked(d.quietly([&] { return d.object_->hold(y, r, u); }));
+                     }});
+      }
+      if constexpr (requires(T & o, S s) { o.observer().set_trust(s); }) {
+        a.push_back({"observer().set_trust", [](Driver& d) {
+                       const S phi = d.number({0, 1});
+                       d.quietly([&] { d.object_->observer().set_trust(phi); });
+                     }});
+        a.push_back({"observer().set_pin", [](Driver& d) {
+                       const int where = d.tape_->choice(4);
+                       d.quietly(
+                           [&] { d.object_->observer().set_pin(static_cast<esokit::Pin>(where)); });
+                     }});
+      }
       if constexpr (requires(T & o, S s) { o.track(s, s, s); }) {
         a.push_back({"track", [](Driver& d) {
                        const S y = d.number(), r = d.number(), u = d.number();
@@ -1031,6 +1048,10 @@ class Driver {
                            o.observer().missed();
                          }) {
       if (promise_.stays_safe) (void)object_->start(S(1), S(0));
+      if constexpr (requires { object_->observer().set_trust(S(1)); }) {
+        object_->observer().set_trust(S(1));
+        object_->observer().set_pin(esokit::Pin::free);
+      }
       return settle(
           [&](const S& y) {
             (void)object_->update(y, y, S(0));
