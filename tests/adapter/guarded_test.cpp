@@ -505,5 +505,25 @@ TEST(GivenInputGain, LoopIsThatOfTheRightB0) {
   }
 }
 
+/// A force stays what it is, a bias of the actuator is multiplied; so is a bound in its unit.
+TEST(GivenInputGain, DhatKeepsItsUnit) {
+  using O = CascadeEso<2, 2>;
+  for (const DisturbanceUnit unit : {DisturbanceUnit::output, DisturbanceUnit::input}) {
+    const bool of_input = unit == DisturbanceUnit::input;
+    auto guarded =
+        Guarded<O>::make(
+            {.observer = settings<O>(), .disturbance_bound = of_input ? 3 / b0 : 3, .unit = unit})
+            .value();
+    O::Estimate state = O::Estimate::Zero();
+    state(2) = 1;
+    ASSERT_EQ(guarded.reset(state), StepStatus::ok);
+    ASSERT_TRUE(guarded.set_input_gain(2 * b0).has_value());
+    EXPECT_NEAR(guarded.total_disturbance(), of_input ? 2 : 1, 1e-12);
+    state(2) = -100;
+    ASSERT_EQ(guarded.reset(state), StepStatus::ok);
+    EXPECT_NEAR(guarded.total_disturbance(), of_input ? -6 : -3, 1e-12);
+  }
+}
+
 }  // namespace
 }  // namespace esokit_test
