@@ -4,9 +4,14 @@
 #include <benchmark/benchmark.h>
 
 #include <cmath>
+#include <cstdint>
 #include <esokit/control/adrc.hpp>
+#include <esokit/core/pack.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <esokit/sim/counted_gaussian.hpp>
+#include <esokit/sim/gaussian.hpp>
 #include <esokit/sim/run.hpp>
+#include <optional>
 #include <vector>
 
 #include "../support/run.hpp"
@@ -126,6 +131,70 @@ void recorded(benchmark::State& state) {
   state.SetLabel("vs recorded/hand_written <= 1.2");
 }
 
+/// The random numbers of a run; the time is that of one.
+template <class Random>
+void normal(benchmark::State& state, Random random, int lanes, const char* label) {
+  const auto turns = samples / lanes;
+  while (state.KeepRunningBatch(turns * lanes)) {
+    for (int i = 0; i < turns; ++i) {
+      auto number = random.next();
+      benchmark::DoNotOptimize(number);
+    }
+  }
+  state.SetLabel(label);
+}
+
+/// What a Monte Carlo does, a pack of runs with noise at a time; the time is that of a sample of a
+/// lane. With AVX: --flags "-O2 -march=x86-64-v3".
+template <class S>
+void noisy(benchmark::State& state, std::optional<std::uint64_t> number, const char* label) {
+  using C = Adrc<LinearEso<2, S>>;
+  const auto made =
+      C::make(
+          {.observer = {.observer_bandwidth = S(100.0), .input_gain = S(50.0), .sample_time = S(T)},
+           .controller_bandwidth = S(10.0),
+           .limits = {.lower = S(-5.0), .upper = S(5.0)}})
+          .value();
+  const auto plant =
+      LinearPlant<2, S>::chain({.coefficients = {S(2.0), S(3.0)}, .input_gain = S(50.0)}).value();
+  constexpr int steps = samples / 10;
+  while (state.KeepRunningBatch(steps * lane_count<S>)) {
+    S most(0.0);
+    auto end = sim::run(
+        plant, made,
+        {.duration = steps * LaneScalar<S>(T),
+         .reference = S(1.0),
+         .noise = S(1e-3),
+         .number = number},
+        [&](const auto& sample) { most = select(most < sample.output, sample.output, most); });
+    benchmark::DoNotOptimize(end);
+    benchmark::DoNotOptimize(most);
+  }
+  state.SetLabel(label);
+}
+
+void add_normal() {
+  using sim::CountedGaussian;
+  using sim::RandomStream;
+  benchmark::RegisterBenchmark(
+      "normal/gaussian", [](benchmark::State& state) { normal(state, sim::Gaussian(1), 1, ""); });
+  benchmark::RegisterBenchmark("normal/counted", [](benchmark::State& state) {
+    normal(state, CountedGaussian<>(1, RandomStream::noise, 0), 1, "vs normal/gaussian");
+  });
+  benchmark::RegisterBenchmark("normal/counted_pack", [](benchmark::State& state) {
+    normal(state, CountedGaussian<Pack<double>>(1, RandomStream::noise, 0), default_lanes<double>,
+           "vs normal/gaussian; vs normal/counted");
+  });
+  benchmark::RegisterBenchmark(
+      "noisy/gaussian", [](benchmark::State& state) { noisy<double>(state, std::nullopt, ""); });
+  benchmark::RegisterBenchmark("noisy/counted", [](benchmark::State& state) {
+    noisy<double>(state, 1, "vs noisy/gaussian");
+  });
+  benchmark::RegisterBenchmark("noisy/counted_pack", [](benchmark::State& state) {
+    noisy<Pack<double>>(state, 1, "vs noisy/gaussian; vs noisy/counted");
+  });
+}
+
 void add_all() {
   benchmark::RegisterBenchmark("linear/hand_written", linear_by_hand<false>);
   benchmark::RegisterBenchmark("linear/run", [](benchmark::State& state) {
@@ -144,5 +213,6 @@ void add_all() {
 
 int main(int argc, char** argv) {
   esokit::benchmarks::add_all();
+  esokit::benchmarks::add_normal();
   return esokit::benchmarks::run(argc, argv);
 }
