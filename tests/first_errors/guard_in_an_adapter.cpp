@@ -4,4 +4,5 @@
 #include <esokit/observer/linear_eso.hpp>
 
 using Guard = esokit::Guarded<esokit::LinearEso<2>>;
-auto observer = esokit::DelayedInput<Guard, 3>::make({});
+using Late = esokit::DelayedInput<Guard, 3>;
+constexpr int states = Late::size;

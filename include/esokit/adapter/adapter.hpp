@@ -41,8 +41,6 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
   friend struct detail::GuardAccess;
   static_assert(PlainScalar<typename Observer::scalar_type>,
                 "esokit: an adapter of packs is a PackAdapter: so many of plain scalars");
-  static_assert(!observer_traits<Observer>.schedules_input_gain,
-                "esokit: Guarded goes around the other adapters: the loop asks it");
 
  public:
   using Adapted = Observer;                            ///< what is adapted
@@ -165,6 +163,10 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
   explicit constexpr Adapter(const Observer& observer) noexcept : observer_(observer) {}
 
   [[no_unique_address]] Observer observer_;  ///< what is adapted; the padding at its end is free
+
+  // Last: what comes after it would be missing in whatever is built on this.
+  static_assert(!observer_traits<Observer>.schedules_input_gain,
+                "esokit: Guarded goes around the other adapters: the loop asks it");
 };
 
 /// Base of the adapters with a config: `make`, `retune`, `adopt`, and what the observer in it does
