@@ -140,14 +140,12 @@ void sound_alarms(const Settings& settings, const Input& input, Findings& all) {
                             "with more digits."});
     }
   }
-  if (!all.seen || found.plateau.middle == 0) return;
-  // Only what the log really tells of b0.
+  // Of a log that does not tell b0 its sign means nothing.
+  if (!all.seen || all.refusal) return;
   const double b0 = found.input_gain.value;
-  if (!(found.excitation < 0.15)) return;
   const double expected = settings.expected_gain.value_or(std::abs(b0));
   const double ratio = b0 / expected;
-  const bool certain = found.input_gain.half_width < std::abs(b0);
-  if (ratio < 0 && certain) {
+  if (ratio < 0) {
     all.alarms.push_back(
         {"sign",
          "b0 is " + number_text(b0, 3) + ": where u rises, y falls" +
@@ -159,7 +157,7 @@ void sound_alarms(const Settings& settings, const Input& input, Findings& all) {
              number_text(b0, 3) + "."});
   }
   const double size = std::abs(ratio);
-  if (certain && (size > 3 || size < 1.0 / 3)) {
+  if (size > 3 || size < 1.0 / 3) {
     all.alarms.push_back(
         {"b0", "b0 is " + number_text(b0, 3) + ", " + number_text(size > 1 ? size : 1 / size, 3) +
                    " times " + (size > 1 ? "more" : "less") + " than the " +
