@@ -52,9 +52,10 @@ struct OrderFit {
   FitModel model{};             ///< n, m and whether it has a pole
   Fit fit{};                    ///< where the innovations are least
   double friction_scale = 0.0;  ///< v_s, 0 without friction
+  double criterion = 0.0;       ///< rows log(mean square) + parameters log(rows): the least wins
 
-  /// rows log(mean square) + parameters log(rows), the mean of three bandwidths: the least wins.
-  double criterion = 0.0;
+  /// log(mean square), the mean of 1 / sqrt(10) and a tenth of the least bandwidth of all orders.
+  double slower = 0.0;
   double correlation = 0.0;  ///< largest of the innovations' over lags 1 to 20
   Estimate noise{};          ///< as fast innovations have it, y's unit; 0: not known
 };
@@ -403,11 +404,7 @@ inline FitData with_friction(const FitData& data, const OrderFit& order) {
       order.friction_scale);
 }
 
-/// Takes into the criterion how well each order explains the log at lower bandwidths, too.
-///
-/// At the bandwidth of the likelihood it is the fastest motion that decides, and of a machine that
-/// bends that is the bending. So the criterion is the mean of those at the least of the orders'
-/// bandwidths, and at 1 / sqrt(10) and a tenth of it.
+/// How well each order explains the log at lower bandwidths than the likelihood's.
 inline void compare_orders(const FitData& data, std::vector<OrderFit>& orders) {
   if (orders.size() < 2) return;
   double least = std::numeric_limits<double>::infinity();
@@ -415,17 +412,14 @@ inline void compare_orders(const FitData& data, std::vector<OrderFit>& orders) {
   for (OrderFit& order : orders) {
     const FitData used = with_friction(data, order);
     InnovationsFit fit(used, order.model, fit_bounds(data));
-    const double parameters =
-        order.criterion - static_cast<double>(order.fit.rows) * std::log(order.fit.mean_square);
     FitPoint point = order.fit.at;
-    double sum = 0.0;
-    for (const double factor : {1.0, std::sqrt(0.1), 0.1}) {
+    order.slower = 0.0;
+    for (const double factor : {std::sqrt(0.1), 0.1}) {
       point.bandwidth = least * factor;
       const Fit found = fit.minimise(point, false, 8);
-      sum += static_cast<double>(found.rows) * std::log(found.mean_square) / 3.0;
+      order.slower += 0.5 * std::log(found.mean_square);
       if (!fit.at_bound(found.at)) point = found.at;
     }
-    order.criterion = sum + parameters;
   }
 }
 
@@ -437,10 +431,18 @@ inline std::vector<OrderFit> fit_orders(const FitData& data, const IdentifyOptio
   compare_orders(data, orders);
   return orders;
 }
+
+/// The order of the likelihood, unless another one leaves less than 1 / e of the mean square at
+/// lower bandwidths: at its own the likelihood sees the fastest motion, and of a machine that bends
+/// that is the bending.
 inline auto best_order(const std::vector<OrderFit>& orders) {
-  return std::min_element(orders.begin(), orders.end(), [](const OrderFit& a, const OrderFit& b) {
-    return a.criterion < b.criterion;
-  });
+  const auto likely = std::min_element(
+      orders.begin(), orders.end(),
+      [](const OrderFit& a, const OrderFit& b) { return a.criterion < b.criterion; });
+  const auto slower =
+      std::min_element(orders.begin(), orders.end(),
+                       [](const OrderFit& a, const OrderFit& b) { return a.slower < b.slower; });
+  return slower->slower < likely->slower - 1.0 ? slower : likely;
 }
 
 /// b0 in ranges of a scheduling column and along a straight line, at the plateau.
@@ -685,11 +687,11 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
   const PlateauPoint& here = plateau.points[plateau.middle];
   const PlateauPoint& below = plateau.points[plateau.middle - 1];
   const PlateauPoint& above = plateau.points[plateau.middle + 1];
-  // Friction that rises faster or slower.
+  // Friction that rises faster or slower, by more than the steps in which it was looked for.
   double friction_spread = 0.0;
   if (chosen.friction_scale > 0.0) {
     double low = here.fit.linear[0], high = low;
-    for (const double factor : {0.5, 2.0}) {
+    for (const double factor : {std::sqrt(0.5), std::sqrt(2.0)}) {
       const FitData other = detail::with_friction(data, speed, factor * chosen.friction_scale);
       InnovationsFit varied(other, model, bounds);
       const Fit found = varied.minimise(here.fit.at, false, 5);

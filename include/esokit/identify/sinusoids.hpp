@@ -96,7 +96,8 @@ inline Line highest_line(const FitData& data, const std::vector<double>& e) {
   for (std::size_t j = 0; j < half; ++j) sums[j + 1] = sums[j] + std::norm(x[j]);
   // Not from the first four periods of the log, which a drift has, too.
   const auto first = static_cast<std::size_t>(std::ceil(4.0 * static_cast<double>(length) / rows));
-  constexpr std::size_t wide = 200, own = 12;
+  // A mode that rings is high beside its top, too: only what is nearer than that is compared.
+  constexpr std::size_t wide = 48, own = 8;
   Line highest;
   // Up to where the mean of two rows still tells a sine.
   for (std::size_t j = first; 10 * j < 8 * half; ++j) {
