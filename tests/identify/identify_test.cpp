@@ -85,13 +85,16 @@ TEST(Identify, FindsTheModelThatMadeTheLog) {
   IdentifyOptions options;
   options.averaged = 1;
   double heard = 0;
+  int times = 0;
   options.progress = [&](double share) {
     EXPECT_GE(share, heard);
     heard = share;
+    ++times;
   };
   const auto found = esokit::identify(log, options);
   ASSERT_TRUE(found) << found.error().field << " " << found.error().rule;
   EXPECT_EQ(heard, 1);
+  EXPECT_GE(times, 5);
   EXPECT_EQ(found->order, 2);
   EXPECT_LT(std::abs(found->input_gain.value - b0), found->input_gain.half_width);
   EXPECT_LT(found->input_gain.share(), 0.1);

@@ -559,6 +559,7 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
   };
   auto prepared = scheduling ? with_schedule() : prepare(log);
   if (!prepared) return prepared.error();
+  if (options.progress) options.progress(0.1);
   if (options.orders.empty()) return E{"orders", 0.0, "must not be empty"};
   for (const int order : options.orders) {
     if (order < 1 || order > 3) return E{"orders", static_cast<double>(order), "must be 1, 2 or 3"};
@@ -616,8 +617,8 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
       frequencies = sines;
       result.averaged = fold;
     }
-    if (best_correlation < options.correlation_max) break;
     if (options.progress) options.progress(0.1 * fold / 16 + 0.3);
+    if (best_correlation < options.correlation_max) break;
   }
   if (best == nullptr)
     return E{"averaged", static_cast<double>(options.averaged), "leaves fewer than 200 rows"};
@@ -676,6 +677,7 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
     result.noise.half_width = std::max(result.noise.high() - rounding, result.noise.half_width);
     result.noise.value = rounding;
   }
+  if (options.progress) options.progress(0.6);
   result.plateau = find_plateau(fit, likely);
   if (options.progress) options.progress(0.9);
   if (result.plateau.middle == 0) {
