@@ -44,6 +44,7 @@ struct FitData {
   std::vector<double> u;               ///< input, held from its row to the next
   std::vector<double> y;               ///< output, measured at its row
   std::vector<std::size_t> starts{0};  ///< first rows of pieces without a gap
+
   /// When these were, s; empty: without a gap in time.
   std::vector<double> start_times{};
 
