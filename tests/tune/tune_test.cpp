@@ -153,6 +153,44 @@ const TunedDesign& named(const esokit::Tuning& tuning, const std::string& name) 
   return tuning.designs.front();
 }
 
+// Two numbers each: a grid of 45 x 45 over all that they may be. And of free gains, the families
+// that are in them are no better.
+TEST(TuneTest, EachFamilyIsAsGoodAsAGrid) {
+  TuneModel model = plain(2);
+  model.input_gain = {1.0, 0.05};
+  model.dead_time = 0.002;
+  const auto tuning = tune(model, {.control_noise = 0.5}).value();
+  const esokit::detail::TuneSearch search{
+      model,
+      {},
+      tuning.rho,
+      0.0,
+      std::pow(tuning.rho, -0.25),
+      std::pow(model.disturbance / (model.noise * model.noise * model.sample_time), 1.0 / 6.0),
+      1.0 / (model.dead_time + 1.5e-3),
+      nullptr};
+  auto brute = search;
+  const LoopCost cost(model, {}, search.slowest());
+  brute.cost = &cost;
+  const double free = named(tuning, "LinearEso, free poles").cost;
+  int compared = 0;
+  for (const auto& contender : esokit::detail::contenders(model, false)) {
+    if (contender.observer_numbers + contender.law_numbers != 2) continue;
+    const auto value = [&](const std::vector<double>& x) { return brute.value(contender, x, 1e3); };
+    const auto best = esokit::detail::grid_search(
+        value, {brute.low(contender, 0), brute.low(contender, 1)},
+        {brute.high(contender, 0), brute.high(contender, 1)}, {45, 45}, 1);
+    const TunedDesign& design = named(tuning, contender.design.name);
+    EXPECT_TRUE(design.feasible) << design.name;
+    EXPECT_LE(design.cost, 1.02 * std::exp(best[0].value)) << design.name;
+    if (design.extension == 1) {
+      EXPECT_LE(free, 1.02 * design.cost) << design.name;
+    }
+    ++compared;
+  }
+  EXPECT_EQ(compared, 4);
+}
+
 // What is searched is what runs: the linear system of each real controller is that of its design,
 // and simulated it does what was predicted.
 TEST(TuneTest, TheReadyControllerIsTheDesign) {

@@ -202,11 +202,11 @@ struct TuneSearch {
     const double delay = more * rules.delay_samples * model.sample_time;
     return {modulus > 0.0 ? std::max(1.0 - numbers.modulus / modulus, 0.0) : 0.0,
             delay > 0.0 ? std::max(1.0 - numbers.delay / delay, 0.0) : 0.0,
-            numbers.tolerant ? 0.0 : std::max(1.0 - numbers.tolerance / rules.gain_factor, 0.01)};
+            numbers.tolerant ? 0.0 : std::max(1.0 - numbers.tolerance / rules.gain_factor, 0.02)};
   }
 
   /// log J, with a price on margins that are lacking.
-  [[nodiscard]] double value(const Contender& c, const std::vector<double>& x, bool margins) const {
+  [[nodiscard]] double value(const Contender& c, const std::vector<double>& x, double price) const {
     double outside = 0.0;
     for (std::size_t i = 0; i < x.size(); ++i) {
       outside += std::max(low(c, i) - x[i], 0.0) + std::max(x[i] - high(c, i), 0.0);
@@ -218,7 +218,7 @@ struct TuneSearch {
     if (!numbers.stable) return 1e4;
     const double j = numbers.cost(rho, model.input_gain.value);
     if (!(j > 0.0) || !is_finite(j)) return 1e4;
-    return std::log(j) + (margins ? 40.0 * lack(numbers, 1.002).sum() : 0.0);
+    return std::log(j) + price * lack(numbers, 1.004).sum();
   }
 
   /// What number i of the search is: a damping, a factor, or a bandwidth.
@@ -268,11 +268,18 @@ struct TuneSearch {
   /// The least of a family. @param starts to begin with instead of a scan
   [[nodiscard]] SearchPoint least(const Contender& c, bool margins,
                                   const std::vector<std::vector<double>>& starts) const {
-    const auto f = [&](const std::vector<double>& x) { return value(c, x, margins); };
+    // A low price leads along the edge of a margin, on which a simplex would collapse at a high
+    // one.
+    double price = margins ? 5.0 : 0.0;
+    const auto f = [&](const std::vector<double>& x) { return value(c, x, price); };
     const auto numbers = static_cast<std::size_t>(c.observer_numbers + c.law_numbers);
     SearchPoint best;
     best.value = std::numeric_limits<double>::infinity();
     std::vector<double> step(numbers, 0.25);
+    const auto from_here = [&](const std::vector<double>& start, int evaluations) {
+      auto found = simplex_search(f, start, step, evaluations * static_cast<int>(numbers));
+      if (found.value < best.value) best = std::move(found);
+    };
     if (starts.empty()) {
       std::vector<double> from, to;
       std::vector<int> points;
@@ -283,21 +290,20 @@ struct TuneSearch {
         step[i] = 0.5 * (to[i] - from[i]) / (points[i] - 1);
       }
       for (const SearchPoint& start : grid_search(f, from, to, points, 3)) {
-        const auto found = simplex_search(f, start.at, step, 40 * static_cast<int>(numbers));
-        if (found.value < best.value) best = found;
+        from_here(start.at, 40);
       }
     }
-    for (const auto& start : starts) {
-      const auto found = simplex_search(f, start, step, 60 * static_cast<int>(numbers));
-      if (found.value < best.value) best = found;
-    }
-    // Again and again, as a simplex collapses on the edge of a margin.
-    for (int again = 0; again < 6; ++again) {
-      for (double& s : step) s = again % 2 == 0 ? 0.1 : -0.05;
-      const auto found = simplex_search(f, best.at, step, 40 * static_cast<int>(numbers), 1e-7);
-      const bool enough = !(found.value < best.value - 2e-4);
-      if (found.value < best.value) best = found;
-      if (enough && again > 0) break;
+    for (const auto& start : starts) from_here(start, 60);
+    for (const double next : {price, 4.0 * price, 16.0 * price}) {
+      price = next;
+      best.value = f(best.at);
+      for (int again = 0; again < 3; ++again) {
+        const double before = best.value;
+        for (double& s : step) s = again % 2 == 0 ? 0.1 : -0.05;
+        from_here(best.at, 30);
+        if (!(best.value < before - 2e-4)) break;
+      }
+      if (!margins) break;
     }
     return best;
   }
@@ -616,7 +622,10 @@ double bandwidth_for(const Function& rises, double wanted, double low, double hi
   detail::TuneSearch search{
       model,         rules,  tuning.rho, wish.controller_bandwidth, w, filter_bandwidth,
       1.0 / latency, nullptr};
-  const LoopCost cost(model, rules, search.slowest(), 14.0);
+  // The search asks for a little more, as its grid is coarse.
+  TuneRules strict = rules;
+  strict.gain_factor *= 1.01;
+  const LoopCost cost(model, strict, search.slowest(), 14.0);
   const LoopCost fine(model, rules, search.slowest(), 50.0);
   search.cost = &cost;
   // What swings at a known frequency can be cancelled for nothing.
@@ -642,7 +651,9 @@ double bandwidth_for(const Function& rises, double wanted, double low, double hi
     }
     const auto free = search.least(c, false, starts);
     auto best = free;
-    if (search.value(c, free.at, true) > free.value) best = search.least(c, true, starts);
+    if (search.value(c, free.at, 1.0) > free.value) {
+      best = search.least(c, true, starts);
+    }
     c.design.settings = search.settings(c, best.at);
     detail::fill_in(c, search, fine, tuning.optimum, std::exp(free.value));
     c.design.code = detail::controller_source(c.design, model);
