@@ -268,9 +268,10 @@ struct TuneSearch {
   /// The least of a family. @param starts to begin with instead of a scan
   [[nodiscard]] SearchPoint least(const Contender& c, bool margins,
                                   const std::vector<std::vector<double>>& starts) const {
-    // A low price leads along the edge of a margin, on which a simplex would collapse at a high
-    // one.
-    double price = margins ? 5.0 : 0.0;
+    // Of many numbers a low price leads along the edge of a margin, on which a simplex would
+    // collapse at a high one; a scan is there already.
+    const bool rising = margins && !starts.empty();
+    double price = rising ? 5.0 : margins ? 40.0 : 0.0;
     const auto f = [&](const std::vector<double>& x) { return value(c, x, price); };
     const auto numbers = static_cast<std::size_t>(c.observer_numbers + c.law_numbers);
     SearchPoint best;
@@ -297,13 +298,13 @@ struct TuneSearch {
     for (const double next : {price, 4.0 * price, 16.0 * price}) {
       price = next;
       best.value = f(best.at);
-      for (int again = 0; again < 3; ++again) {
+      for (int again = 0; again < (rising ? 3 : 6); ++again) {
         const double before = best.value;
         for (double& s : step) s = again % 2 == 0 ? 0.1 : -0.05;
         from_here(best.at, 30);
         if (!(best.value < before - 2e-4)) break;
       }
-      if (!margins) break;
+      if (!rising) break;
     }
     return best;
   }
