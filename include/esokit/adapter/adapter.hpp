@@ -1,5 +1,6 @@
 /// @file
-/// What all adapters of observers have in common: they hold what they adapt, and are none.
+/// What all adapters of observers have in common: an adapter contains an observer and does not
+/// derive from it.
 #pragma once
 
 #include <esokit/core/lane_by_lane.hpp>
@@ -33,9 +34,9 @@ struct ExtensionOf<Observer> {
 
 }  // namespace detail
 
-/// Base of the adapters: hands on what the observer in it answers truthfully for them all, each as
-/// far as that observer has it. An adapter adds make, retune, update, predict, correct and reset,
-/// and redefines or deletes what it has another answer to, or none.
+/// Base of the adapters: forwards the members whose answer is the same with any adapter, as far as
+/// the observer has them. An adapter adds make, retune, update, predict, correct and reset. It
+/// redefines the members that it answers differently, and deletes those that it cannot answer.
 template <LoopObserver Observer>
 class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Observer> {
   friend struct detail::GuardAccess;
@@ -49,7 +50,7 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
   static constexpr int order = Observer::order;        ///< n, order of the plant
   static constexpr int size = Observer::size;          ///< N
 
-  /// What the adapted observer declares, as far as it holds for an adapter.
+  /// The traits of the adapted observer, as far as they hold for an adapter.
   static constexpr ObserverTraits traits = [] {
     ObserverTraits traits = observer_traits<Observer>;
     traits.adapts = true;
@@ -59,7 +60,7 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
     return traits;
   }();
 
-  /// What is adapted, for all else that it tells.
+  /// The adapted observer, for all its other members.
   [[nodiscard]] constexpr const Observer& observer() const noexcept { return observer_; }
 
   /// Of the adapted observer, see PredictorCorrector.
@@ -169,9 +170,9 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
                 "esokit: Guarded goes around the other adapters: the loop asks it");
 };
 
-/// Base of the adapters with a config: `make`, `retune`, `adopt`, and what the observer in it does
-/// as it is. An adapter says `check(config)`, a Check, takes `(observer, config)` to be made, and
-/// takes over what it holds itself by `take(fresh)`.
+/// Base of the adapters with a config: `make`, `retune`, `adopt`, and the members that the observer
+/// answers unchanged. An adapter has `check(config)`, which returns a Check, a constructor from
+/// `(observer, config)`, and `take(fresh)`, which takes over its own settings.
 /// @tparam Self the adapter @tparam Settings its Config
 template <class Self, LoopObserver Observer, class Settings>
 class NamedAdapter : public Adapter<Observer> {
@@ -196,7 +197,7 @@ class NamedAdapter : public Adapter<Observer> {
     return detail::retune(static_cast<Self&>(*this), config);
   }
 
-  /// The same, with the settings of `fresh`, as `make` gave it: no design work.
+  /// The same with the settings of `fresh`, as returned by `make`: without design work.
   Check<scalar_type> adopt(const Self& fresh) {
     if (auto ok = this->observer_.adopt(fresh.observer_); !ok) return ok;
     static_cast<Self&>(*this).take(fresh);
@@ -209,17 +210,18 @@ class NamedAdapter : public Adapter<Observer> {
   /// Measurement update alone, see PredictorCorrector::correct.
   StepStatus correct(scalar_type y) noexcept { return this->observer_.correct(y); }
 
-  /// Starts anew at (y, 0, .., 0).
+  /// Restarts at (y, 0, .., 0).
   StepStatus reset(scalar_type y) noexcept { return this->observer_.reset(y); }
 
-  /// Starts anew at a given estimate, N x 1.
+  /// Restarts at a given estimate, N x 1.
   StepStatus reset(const Estimate& state) noexcept { return this->observer_.reset(state); }
 
  protected:
   using Base::Base;
 };
 
-/// Base of the adapters of packs: an adapter branches on what is measured, so it goes lane by lane.
+/// Base of the adapters of packs: an adapter branches on the measurement, so it is computed lane by
+/// lane.
 /// @tparam Self the adapter of packs @tparam Plain of a lane @tparam Settings its Config
 template <class Self, class Plain, LoopObserver Observer, class Settings>
 class PackAdapter : public LaneByLane<Self, Plain, typename Observer::scalar_type, Settings>,

@@ -22,9 +22,10 @@ struct DelayedInputConfig {
 };
 
 /// Feeds the observer u[k-d] instead of u[k] (bus, drive or computing delay of d sample times), so
-/// that input and output belong together and the delay is not taken for a disturbance.
+/// that input and output belong together and the delay does not appear as a disturbance.
 ///
-/// The estimate is that of the present; what u still on its way will do is not predicted.
+/// The estimate is that of the present sample; the effect of inputs still in the delay line is not
+/// predicted.
 /// @tparam Capacity largest d that a config may ask for; the memory is Capacity + 1 scalars
 template <LoopObserver Observer, int Capacity>
 class DelayedInput : public NamedAdapter<DelayedInput<Observer, Capacity>, Observer,
@@ -36,7 +37,7 @@ class DelayedInput : public NamedAdapter<DelayedInput<Observer, Capacity>, Obser
   using S = typename Observer::scalar_type;
 
  public:
-  /// What it is beyond LoopObserver.
+  /// What it declares beyond LoopObserver.
   static constexpr ObserverTraits traits = [] {
     ObserverTraits traits = Base::traits;
     traits.delays_input = true;
@@ -44,7 +45,7 @@ class DelayedInput : public NamedAdapter<DelayedInput<Observer, Capacity>, Obser
     return traits;
   }();
 
-  /// One sample. @param y measurement @param u_applied u[k], of now; the delay is seen to here
+  /// One sample. @param y measurement @param u_applied u[k], undelayed; the delay is applied here
   StepStatus update(S y, S u_applied) noexcept {
     const StepStatus status = push(u_applied);
     return status | observer_.update(y, delayed());
@@ -56,13 +57,14 @@ class DelayedInput : public NamedAdapter<DelayedInput<Observer, Capacity>, Obser
     return status | observer_.predict(delayed());
   }
 
-  /// As if `u` had been applied for long. A u that is not finite changes nothing.
+  /// Fills the delay line as if `u` had been applied for a long time. A u that is not finite
+  /// changes nothing.
   void fill_input(const S& u) noexcept {
     if (!is_finite(u)) return;
     inputs_.fill(u);
   }
 
-  /// What the observer was told is an input of d samples ago.
+  /// Deleted: the observer was given an input of d samples ago.
   StepStatus revise_input(const S&) noexcept = delete;
 
   /// d, samples.
@@ -104,7 +106,7 @@ class DelayedInput : public NamedAdapter<DelayedInput<Observer, Capacity>, Obser
   int newest_ = 0;
 };
 
-/// The same of packs, lane by lane.
+/// The same for packs, lane by lane.
 template <LoopObserver Observer, int Capacity>
 requires PackScalar<typename Observer::scalar_type>
 class DelayedInput<Observer, Capacity>
@@ -115,10 +117,10 @@ class DelayedInput<Observer, Capacity>
   using DelayedInput::PackAdapter::PackAdapter;
   template <class T>
   using with_scalar =
-      DelayedInput<detail::WithScalar<Observer, T>, Capacity>;  ///< the same of another scalar
+      DelayedInput<detail::WithScalar<Observer, T>, Capacity>;  ///< the same with another scalar
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <LoopObserver Observer, int Capacity>
 inline constexpr std::uint32_t type_tag<DelayedInput<Observer, Capacity>> =
     make_type_tag<Observer>("DelayedInput", Capacity);

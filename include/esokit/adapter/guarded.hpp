@@ -1,6 +1,6 @@
 /// @file
-/// Guarded: a disturbance estimate that is held, gated, bounded, or told another b0, for any
-/// observer with a constant gain.
+/// Guarded: holds, gates or bounds the disturbance estimate, or changes b0, for any observer with a
+/// constant gain.
 #pragma once
 
 #include <cstdint>
@@ -42,18 +42,19 @@ struct GuardAccess {
 
 }  // namespace detail
 
-/// In what b0 is constant while it changes: what dhat keeps, and what its bound is given in.
+/// The unit in which dhat stays the same while b0 changes, and in which its bound is given.
 enum class DisturbanceUnit : unsigned char {
   output,  ///< unit of y^(n): a force, which is there whatever b0 is
   input,   ///< unit of u: a bias of the actuator, which b0 multiplies
 };
 
-/// Where an actuator is that delivers something else than it is told, and nobody knows what.
+/// The end at which an actuator is that does not deliver what it is told, while its output is
+/// unknown.
 enum class Pin : unsigned char {
-  free,    ///< nowhere: it delivers what the observer is told
-  upper,   ///< at its upper end: more u would do nothing
-  lower,   ///< at its lower end: less u would do nothing
-  either,  ///< at that end at which the sign of the last u has it
+  free,    ///< none: it delivers what the observer is told
+  upper,   ///< at its upper end: a larger u has no effect
+  lower,   ///< at its lower end: a smaller u has no effect
+  either,  ///< at the end given by the sign of the last u
 };
 
 /// Config of Guarded.
@@ -62,7 +63,7 @@ struct GuardedConfig {
   using S = typename Observer::scalar_type;  ///< of signals and settings
 
   typename Observer::Config observer{};  ///< of the observer itself
-  S disturbance_bound{};  ///< abs(dhat) at most; 0: no bound. Unit of y^(n), or of u, see `unit`
+  S disturbance_bound{};  ///< largest abs(dhat); 0: no bound. Unit of y^(n) or u, see `unit`
   DisturbanceUnit unit = DisturbanceUnit::output;  ///< what dhat is counted in
   int release_samples = 0;  ///< measurements after the end of a pin until dhat is free, 0 .. 65000
 
@@ -73,38 +74,39 @@ struct GuardedConfig {
   /// @endcond
 };
 
-/// Guards of dhat for days on which y^(n) = d + b0 u is not what the plant does. Each is off until
-/// it is asked for; the estimate is then bit for bit that of the observer in it.
+/// Guards of dhat for times when the plant does not follow y^(n) = d + b0 u. Each guard is off by
+/// default; while all are off, the estimate is bit for bit that of the observer inside.
 ///
 /// - Trust: `set_trust(phi)`, 0 .. 1, multiplies every correction of dhat; y and its derivatives
-///   are corrected as ever.
-/// - Held: the plant stands, or is carried (on the ground, a brake, an output that is off), and
-///   nothing that is measured tells of d. The trust is 0, and the observer is told
-///   `standing_input()` in the place of u: y^(n) counts as zero. `Adrc::hold` does so for one
-///   sample; take the reference up at y on release.
-/// - Pinned: the actuator, or a mixer, is at an end, and what it delivers is not known (what is
-///   known is told as u_applied, and needs no guard). dhat moves only so that it frees the
-///   actuator: with u at its upper end up for b0 > 0. `release_samples` measurements after the end
-///   of the pin it is free again; there is no time-out while it lasts, which would only restore the
-///   fault. For a moment that has nothing to do with u: where half of u still gets through, dhat
-///   makes up for the other half, and to hold it does more harm than good (examples/guards).
+///   are corrected as usual.
+/// - Held: the plant stands or is carried (on the ground, at a brake, with its output off), so the
+///   measurement says nothing about d. The trust is 0, and the observer gets `standing_input()`
+///   instead of u, which makes y^(n) zero. `Adrc::hold` does this for one sample; on release start
+///   the reference at y.
+/// - Pinned: the actuator or a mixer is at an end, and its output is not known (a known output is
+///   passed as u_applied and needs no guard). dhat may only move in the direction that frees the
+///   actuator: upwards if u is at its upper end and b0 > 0. It is free again `release_samples`
+///   measurements after the end of the pin; there is no time-out during the pin, because it would
+///   only restore the fault. Use it if the output is unrelated to u: if half of u still gets
+///   through, dhat compensates the other half, and holding it does more harm than good
+///   (examples/guards).
 /// - Bound: abs(dhat) <= disturbance_bound, after the correction and before the prediction, at
-///   every level of a cascade. A load above it is a steady error: `bounded()`. With m > 1 a slope
-///   of the estimate that would lead out is zero.
-/// - b0 that changes: `set_input_gain(b)` before a sample, no design work. The law follows in Adrc
-///   and DisturbanceCompensator.
+///   every level of a cascade. A load above it causes a steady error; `bounded()` reports it. With
+///   m > 1 a slope of the estimate that would lead out of the bound is set to zero.
+/// - A changing b0: `set_input_gain(b)` before a sample, without design work. In Adrc and
+///   DisturbanceCompensator the law follows.
 ///
 /// The first three multiply the correction of dhat by a phi in [0, 1], which may change at every
-/// sample; so does a bound, with m = 1, while the truth is within it. Errors stay bounded, and
-/// decay while the trust returns, if Re G > -1 on the unit circle, G from the correction of dhat
-/// back to its innovation (circle criterion). `make` checks it of each level, and refuses what
-/// fails; all poles in one place pass at any bandwidth (tested to n = 5, omega_o T = 20): min Re G
-/// is -1/4 (n = 1), -1/3 (n = 2), -3/8 (n = 3) for fast sampling, and never below -1/2. With m > 1
-/// a frozen slope would run on, and of VariableTime no gain is known: there are the bound and b0
-/// alone.
+/// sample; so does a bound, with m = 1, while the true d is within it. Errors stay bounded, and
+/// decay while the trust returns, if Re G > -1 on the unit circle, where G is the transfer function
+/// from the correction of dhat to its innovation (circle criterion). `make` checks this for each
+/// level and refuses a level that fails; all poles in one place pass at any bandwidth (tested to n
+/// = 5, omega_o T = 20): min Re G is -1/4 (n = 1), -1/3 (n = 2), -3/8 (n = 3) for fast sampling,
+/// and never below -1/2. With m > 1 a frozen slope would run on, and for VariableTime no gain is
+/// known: for these only the bound and b0 are available.
 ///
-/// For constant gains on the chain, around all other adapters. Not with KnownModel: fbar would be
-/// part of the loop that is proven.
+/// For constant gains on the chain, as the outermost adapter. Not with KnownModel, because the
+/// proof does not cover fbar.
 template <LoopObserver Observer>
 class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<Observer>> {
   static_assert(observer_traits<Observer>.bears_guards,
@@ -125,7 +127,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   /// Corrections of dhat may be scaled: trust, pin and hold.
   static constexpr bool gates = size == n + 1 && !observer_traits<Observer>.varies_time;
 
-  /// What it is beyond LoopObserver.
+  /// What it declares beyond LoopObserver.
   static constexpr ObserverTraits traits = [] {
     ObserverTraits traits = Base::traits;
     traits.acts_by_gain = false;  // by what b0 is now, too
@@ -152,8 +154,8 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     return *made;
   }
 
-  /// Takes the settings of `fresh`, as `make` gave it, with no design work; so does `retune`.
-  /// Trust, pin and the present b0 / b0 of the config are kept.
+  /// Takes over the settings of `fresh`, as returned by `make`, without design work. As with
+  /// `retune`, trust, pin and the ratio of the present b0 to that of the config are kept.
   Check<S> adopt(const Guarded& fresh) {
     if (auto ok = observer_.adopt(fresh.observer_); !ok) return ok;
     bound_ = fresh.bound_;
@@ -189,25 +191,25 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     return status;
   }
 
-  /// Starts anew at (y, 0, .., 0). Trust, pin and b0 stay what they are.
+  /// Restarts at (y, 0, .., 0). Trust, pin and b0 stay what they are.
   StepStatus reset(S y) noexcept { return observer_.reset(y); }
 
-  /// Starts anew at a given estimate, N x 1, its dhat within the bound.
+  /// Restarts at a given estimate, N x 1, its dhat within the bound.
   StepStatus reset(const Estimate& state) noexcept {
     const StepStatus status = observer_.reset(state);
     if (status == StepStatus::ok) keep_bound();
     return status;
   }
 
-  /// From the next correction on those of dhat count `phi` times: 0 .. 1; what is below or above
-  /// counts as the end, what is no number changes nothing.
+  /// From the next correction on, corrections of dhat are multiplied by `phi`, 0 .. 1. A smaller or
+  /// larger phi counts as 0 or 1, one that is not finite changes nothing.
   void set_trust(const S& phi) noexcept requires gates {
     if (!is_finite(phi)) return;
     trust_ = phi < S(0) ? S(0) : phi < S(1) ? phi : S(1);
     set_weights();
   }
 
-  /// From the next correction on the actuator is where `where` says; said once or at every sample.
+  /// States where the actuator is, from the next correction on; call it once or at every sample.
   void set_pin(Pin where) noexcept requires gates {
     if (where == Pin::either) {
       const S u = applied_input();
@@ -224,15 +226,15 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     set_weights();
   }
 
-  /// The u under which the plant would stand, were d what dhat is: what is told in the place of u
-  /// while the plant is held, with a trust of 0.
+  /// The u under which the plant would stand if d were dhat. While the plant is held, with a trust
+  /// of 0, it is given instead of u.
   [[nodiscard]] S standing_input() const noexcept requires gates {
     const S u = -observer_.total_disturbance() * (inverse_gain_ * input_factor_);
     return is_finite(u) ? u : applied_input();
   }
 
-  /// b0 from the coming sample on: of the law's next answer, and of the u that is told one sample
-  /// later, which is that answer. What dhat is counted in is kept, see DisturbanceUnit.
+  /// b0 from the coming sample on: it applies to the law's next answer, and to the u given one
+  /// sample later, which is that answer. dhat is kept in its unit, see DisturbanceUnit.
   /// @return error for a b that is not finite, has not the sign of the config's input_gain, or is
   /// too far from it for the scalar: nothing changes
   Check<S> set_input_gain(const S& b) noexcept {
@@ -266,7 +268,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
 
   /// phi.
   [[nodiscard]] const S& trust() const noexcept { return trust_; }
-  /// Where the actuator was said to be.
+  /// The end given to `set_pin`.
   [[nodiscard]] Pin pin() const noexcept { return pin_; }
   /// True if something scales the next correction of dhat: less than full trust, a pin or its
   /// release.
@@ -280,7 +282,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   [[nodiscard]] S present_input_gain() const noexcept {
     return observer_.input_gain() * gain_ratio_;
   }
-  /// b0 of the config over that of now: what a law that divides by the first multiplies by.
+  /// b0 of the config over the present b0: the factor for a law that divides by the first.
   [[nodiscard]] const S& input_factor() const noexcept { return input_factor_; }
 
   /// Adds `offset` to dhat, within the bound, see PredictorCorrector.
@@ -459,7 +461,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   std::uint16_t release_left_ = 0;
 };
 
-/// The same of packs, lane by lane.
+/// The same for packs, lane by lane.
 template <LoopObserver Observer>
 requires PackScalar<typename Observer::scalar_type>
 class Guarded<Observer> : public PackAdapter<Guarded<Observer>, Guarded<detail::LaneOf<Observer>>,
@@ -467,10 +469,10 @@ class Guarded<Observer> : public PackAdapter<Guarded<Observer>, Guarded<detail::
  public:
   using Guarded::PackAdapter::PackAdapter;
   template <class T>
-  using with_scalar = Guarded<detail::WithScalar<Observer, T>>;  ///< the same of another scalar
+  using with_scalar = Guarded<detail::WithScalar<Observer, T>>;  ///< the same with another scalar
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <LoopObserver Observer>
 inline constexpr std::uint32_t type_tag<Guarded<Observer>> = make_type_tag<Observer>("Guarded");
 

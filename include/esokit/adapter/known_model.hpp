@@ -15,8 +15,8 @@ struct PlantModelTraits {
   bool checks = false;  ///< `check() const` gives the error of a bad parameter, as a Check
 };
 
-/// A known part of y^(n): fbar(estimate), noexcept, in the unit of y^(n), a function of
-/// y .. y^(n-1) alone. What else it can do it declares, see PlantModelTraits.
+/// A known part of y^(n): fbar(estimate), noexcept, in the unit of y^(n), a function of y ..
+/// y^(n-1) alone. It declares what else it can do, see PlantModelTraits.
 template <class Model, class Observer>
 concept PlantModel = std::copyable<Model> &&
     requires(const Model& model, const typename Observer::Estimate& estimate) {
@@ -43,14 +43,14 @@ struct KnownModelConfig {
 /// Observer of y^(n) = fbar(y, ..) + d + b0 u with fbar known. The chain is driven by u + fbar/b0,
 /// fbar taken at the last estimate and held over the step, and estimates d alone.
 ///
-/// Row n of `estimate`, as `total_disturbance`, is fbar + dhat: what a controller cancels, whatever
-/// part of it is known. `residual_disturbance` is dhat.
+/// Row n of `estimate`, like `total_disturbance`, is fbar + dhat: this is what a controller
+/// cancels. `residual_disturbance` is dhat alone.
 ///
-/// For what is not linear: friction, gravity, a spring that hardens. Poles that you know belong
-/// into the model of the observer, which is exact and can be analysed (`ModelEso`, `.plant_poles`).
+/// For nonlinear terms: friction, gravity, a spring that hardens. Known poles belong into the model
+/// of the observer, which is exact and can be analysed (`ModelEso`, `.plant_poles`).
 ///
-/// What fbar changes within a step stays in dhat, O(T). fbar of the estimate is part of the error's
-/// dynamics: omega_o should stay well above the slopes of fbar.
+/// The change of fbar within a step remains in dhat, O(T). Because fbar is computed from the
+/// estimate, it is part of the error dynamics: omega_o should be well above the slopes of fbar.
 /// @tparam Model a function fbar(estimate) of yours, for packs with `with_scalar` and `fields`
 template <ShiftableDisturbance Observer, class Model>
 requires PlantModel<Model, Observer>
@@ -67,7 +67,7 @@ class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
   using Base::order;
   using typename Base::Estimate;
 
-  /// What it is beyond LoopObserver.
+  /// What it declares beyond LoopObserver.
   static constexpr ObserverTraits traits = [] {
     ObserverTraits traits = Base::traits;
     traits.publishes_chain = false;
@@ -76,8 +76,8 @@ class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
     return traits;
   }();
 
-  /// Takes the settings of `fresh`, as `make` gave it, with no design work; so does `retune`. The
-  /// estimate, that is fbar + d, is kept, and what another model explains is taken out of d; a
+  /// Takes over the settings of `fresh`, as returned by `make`, without design work. As with
+  /// `retune`, the estimate fbar + d is kept; d becomes what the new fbar does not explain, and a
   /// change of b0 is moved into d as everywhere. u does not jump.
   Check<S> adopt(const KnownModel& fresh) {
     KnownModel next = *this;
@@ -96,8 +96,8 @@ class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
     return {};
   }
 
-  /// One sample, see PredictorCorrector::update. `u_applied` is what the actuator held, without the
-  /// model's share.
+  /// One sample, see PredictorCorrector::update. `u_applied` is the u that the actuator held,
+  /// without the share of the model.
   StepStatus update(S y, S u_applied) noexcept {
     const S input = accepted(u_applied);
     return report(u_applied) | observer_.update(y, input);
@@ -109,14 +109,14 @@ class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
     return report(u_applied) | observer_.predict(input);
   }
 
-  /// Starts anew at (y, 0, .., 0), with fbar + d zero.
+  /// Restarts at (y, 0, .., 0), with fbar + d zero.
   StepStatus reset(S y) noexcept {
     Estimate state = Estimate::Zero();
     state(0) = y;
     return observer_.reset(state);
   }
 
-  /// Starts anew at a given estimate, whose row n is fbar + d.
+  /// Restarts at a given estimate, whose row n is fbar + d.
   StepStatus reset(const Estimate& state) noexcept {
     Estimate rest = state;
     rest(order) = state(order) - model_(state);
@@ -140,7 +140,7 @@ class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
     }
   }
 
-  /// fbar + dhat, unit of y^(n): all that acts beside b0 u.
+  /// fbar + dhat, unit of y^(n): everything that acts besides b0 u.
   [[nodiscard]] S total_disturbance() const noexcept {
     return known_part() + residual_disturbance();
   }
@@ -166,8 +166,8 @@ class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
   /// fbar.
   [[nodiscard]] const Model& known_model() const noexcept { return model_; }
 
-  /// fbar at the present estimate, unit of y^(n); zero where it, or fbar + dhat, is not finite: a
-  /// model explains nothing there.
+  /// fbar at the present estimate, unit of y^(n); zero if it, or fbar + dhat, is not finite,
+  /// because then the model explains nothing.
   [[nodiscard]] S known_part() const noexcept { return known_part(observer_.estimate()); }
 
   /// Input that the last step used, without the model's share.
@@ -206,7 +206,7 @@ class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
   S applied_input_{};
 };
 
-/// The same of packs, lane by lane.
+/// The same for packs, lane by lane.
 template <ShiftableDisturbance Observer, class Model>
 requires PlantModel<Model, Observer> && PackScalar<typename Observer::scalar_type>
 class KnownModel<Observer, Model>
@@ -220,10 +220,10 @@ class KnownModel<Observer, Model>
   template <class T>
   using with_scalar =
       KnownModel<detail::WithScalar<Observer, T>,
-                 typename detail::ForScalar<Model, T>::type>;  ///< the same of another scalar
+                 typename detail::ForScalar<Model, T>::type>;  ///< the same with another scalar
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <ShiftableDisturbance Observer, class Model>
 inline constexpr std::uint32_t type_tag<KnownModel<Observer, Model>> =
     make_type_tag<Observer, Model>("KnownModel");

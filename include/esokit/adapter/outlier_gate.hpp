@@ -1,5 +1,5 @@
 /// @file
-/// OutlierGate: a finite outlier is a missing sample, for any observer.
+/// OutlierGate: treats a finite outlier as a missing sample, for any observer.
 #pragma once
 
 #include <cstdint>
@@ -14,8 +14,8 @@ struct OutlierGateConfig {
   using S = typename Observer::scalar_type;  ///< of signals and settings
 
   typename Observer::Config observer{};  ///< of the observer itself
-  S threshold{};          ///< unit of y: an innovation up to this is no outlier; 0: no gate
-  S running_factor{};     ///< nor is one up to this times the running mean of abs(innovation)
+  S threshold{};          ///< unit of y: an innovation up to this is accepted; 0: no gate
+  S running_factor{};     ///< so is one up to this times the running mean of abs(innovation)
                           ///< (0.8 standard deviations where Gaussian); 0: the threshold alone
   int most_in_a_row = 5;  ///< outliers in a row that are rejected, 1 .. 65000
 
@@ -30,15 +30,15 @@ struct OutlierGateConfig {
 /// correction uses the gain for the gap. Without it one y of 1e30 spoils a linear observer for ln
 /// 1e30 / (omega_o T) samples.
 ///
-/// Let in is abs(y - z_1) <= M max(threshold, running_factor m), with m the running mean of
-/// abs(y - z_1) over some 64 measurements, M the sample times since the last correction (D where
-/// every D-th sample brings a measurement). The gate never stays shut: after `most_in_a_row`
-/// rejected measurements it opens, and takes everything until as many in a row are within the
-/// limit. So after a true step of any size in y the observer follows it `most_in_a_row` samples
-/// late. At the start and after a reset it is open in the same way.
+/// A measurement is accepted if abs(y - z_1) <= M max(threshold, running_factor m), where m is the
+/// running mean of abs(y - z_1) over about 64 measurements and M the number of sample times since
+/// the last correction (D if only every D-th sample has a measurement). The gate never stays shut:
+/// after `most_in_a_row` rejected measurements it opens and accepts everything until as many in a
+/// row are within the limit. So after a true step of any size in y the observer follows it
+/// `most_in_a_row` samples late. At the start and after a reset it is open in the same way.
 ///
-/// It nests with the other adapters; inside of WrappedOutput, which tells it the turn.
-/// ExtendedStateFilter has a gate of its own, which knows the variance of its innovation.
+/// It nests with the other adapters; WrappedOutput goes around it and tells it the turn.
+/// ExtendedStateFilter has its own gate, which knows the variance of its innovation.
 template <LevelledObserver Observer>
 requires RestartingObserver<Observer>
 class OutlierGate
@@ -51,7 +51,7 @@ class OutlierGate
                 "esokit: WrappedOutput goes around OutlierGate: it counts the turns");
 
  public:
-  /// What it is beyond LoopObserver.
+  /// What it declares beyond LoopObserver.
   static constexpr ObserverTraits traits = [] {
     ObserverTraits traits = Base::traits;
     traits.rejects_outliers = true;
@@ -71,10 +71,10 @@ class OutlierGate
     return observer_.correct(y);
   }
 
-  /// Starts anew at (y, 0, .., 0), with the gate open.
+  /// Restarts at (y, 0, .., 0), with the gate open.
   StepStatus reset(S y) noexcept { return open_after(observer_.reset(y)); }
 
-  /// Starts anew at a given estimate, N x 1.
+  /// Restarts at a given estimate, N x 1.
   StepStatus reset(const typename Observer::Estimate& state) noexcept {
     return open_after(observer_.reset(state));
   }
@@ -82,13 +82,13 @@ class OutlierGate
   /// It would pass the gate.
   StepStatus correct_weighted(const S&, const S&) noexcept = delete;
 
-  /// Innovation up to which a measurement is let in where none is missing, unit of y.
+  /// Innovation up to which a measurement is accepted if none is missing, unit of y.
   [[nodiscard]] S limit() const noexcept {
     const S running = running_factor_ * mean_;
     return running > threshold_ ? running : threshold_;
   }
 
-  /// True while every measurement is let in: at the start, and after too many outliers in a row.
+  /// True while every measurement is accepted: at the start, and after too many outliers in a row.
   [[nodiscard]] bool open() const noexcept { return open_; }
 
  private:
@@ -125,7 +125,8 @@ class OutlierGate
     }
   }
 
-  /// Bad numbers are not its business, nor is a measurement that restarts the observer.
+  /// True also for a y that is not finite (`correct` rejects it) and for one that restarts the
+  /// observer.
   bool lets_in(const S& y) noexcept {
     // The innovation is that of level 1, whose z_1 the correction will subtract.
     const S innovation = y - expected();
@@ -172,7 +173,7 @@ class OutlierGate
   bool open_ = true;
 };
 
-/// The same of packs, lane by lane.
+/// The same for packs, lane by lane.
 template <LevelledObserver Observer>
 requires RestartingObserver<Observer> && PackScalar<typename Observer::scalar_type>
 class OutlierGate<Observer>
@@ -181,10 +182,11 @@ class OutlierGate<Observer>
  public:
   using OutlierGate::PackAdapter::PackAdapter;
   template <class T>
-  using with_scalar = OutlierGate<detail::WithScalar<Observer, T>>;  ///< the same of another scalar
+  using with_scalar =
+      OutlierGate<detail::WithScalar<Observer, T>>;  ///< the same with another scalar
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <LevelledObserver Observer>
 requires RestartingObserver<Observer>
 inline constexpr std::uint32_t type_tag<OutlierGate<Observer>> =

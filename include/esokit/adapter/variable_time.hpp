@@ -20,19 +20,20 @@ struct VariableTimeConfig {
   /// @endcond
 };
 
-/// Tells the observer before each step how long it took; chain and gains follow exactly.
+/// The observer is told before each step how long the step took; chain and gains follow exactly.
 ///
 /// A step of another length than the last one is a retune: the observer's whole `make`, with one
 /// expm1 a level and its checks (LinearEso<2>: some thirty updates' time, 40 .. 80 ns on a desktop,
-/// see benchmarks/control). A step of the same length costs a comparison; where the length changes
-/// by less than matters, leave it. Observers whose `make` works long (AlgebraicEso designs its
-/// whole schedule, AdjustableBandwidthEso and NonlinearEso prove their certificate) are for logs,
-/// or for a rate that changes now and then. After missing samples the gain is that of the whole
-/// time since the last correction, whatever the single steps were.
+/// see benchmarks/control). A step of the same length costs one comparison, so do not report
+/// changes too small to matter. Observers with a slow `make` (AlgebraicEso designs its whole
+/// schedule, AdjustableBandwidthEso and NonlinearEso compute their certificate) are for logs, or
+/// for a rate that changes rarely. After missing samples the gain is that of the whole time since
+/// the last correction, whatever the single steps were.
 ///
-/// AlgebraicEso counts samples: while its bandwidth falls it takes all samples so far as having the
-/// present length; once settled it is exact. A switched observer's gain sets follow time; its
-/// switching test compares innovations, whatever time lies between them.
+/// AlgebraicEso counts samples: while its bandwidth falls, it treats all samples so far as if they
+/// had the present length; once settled it is exact. The gain sets of a switched observer follow
+/// time; its switching test compares successive innovations without regard to the time between
+/// them.
 template <RestartingObserver Observer>
 class VariableTime
     : public NamedAdapter<VariableTime<Observer>, Observer, VariableTimeConfig<Observer>> {
@@ -42,7 +43,7 @@ class VariableTime
   using S = typename Observer::scalar_type;
 
  public:
-  /// What it is beyond LoopObserver.
+  /// What it declares beyond LoopObserver.
   static constexpr ObserverTraits traits = [] {
     ObserverTraits traits = Base::traits;
     traits.varies_time = true;
@@ -68,8 +69,8 @@ class VariableTime
     return VariableTime(*observer, config);
   }
 
-  /// How long the next step takes (s), until it is said anew. Outside T / ratio .. T ratio it is
-  /// refused, and the last length stays.
+  /// Sets the length of the next steps (s), until the next call. A length outside T / ratio .. T
+  /// ratio is refused, and the last one stays.
   Check<S> set_step_time(const S& seconds) noexcept {
     const S nominal = chain_config<Observer>(config_.observer).sample_time;
     const S shortest = nominal / config_.ratio;
@@ -125,7 +126,7 @@ class VariableTime
         step_time_(chain_config<Observer>(config_.observer).sample_time),
         current_(step_time_) {}
 
-  /// Steps are nominal again.
+  /// Sets the steps to the nominal length.
   void take(const VariableTime& fresh) noexcept {
     config_ = fresh.config_;
     step_time_ = fresh.step_time_;
@@ -163,7 +164,7 @@ class VariableTime
   S elapsed_{};
 };
 
-/// The same of packs, lane by lane.
+/// The same for packs, lane by lane.
 template <RestartingObserver Observer>
 requires PackScalar<typename Observer::scalar_type>
 class VariableTime<Observer>
@@ -173,10 +174,10 @@ class VariableTime<Observer>
   using VariableTime::PackAdapter::PackAdapter;
   template <class T>
   using with_scalar =
-      VariableTime<detail::WithScalar<Observer, T>>;  ///< the same of another scalar
+      VariableTime<detail::WithScalar<Observer, T>>;  ///< the same with another scalar
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <RestartingObserver Observer>
 inline constexpr std::uint32_t type_tag<VariableTime<Observer>> =
     make_type_tag<Observer>("VariableTime");

@@ -24,34 +24,35 @@ struct WrappedOutputConfig {
   /// @endcond
 };
 
-/// Counts the turns, so a measurement in any branch (0..2 pi, -180..180) may be fed as it comes,
-/// and keeps z_1 within half a period of zero, so that float stays exact after many turns.
+/// Counts the turns, so a measurement in any branch (0..2 pi, -180..180) can be used as it comes.
+/// z_1 is kept within half a period of zero, so that float stays exact after many turns.
 ///
 /// Turns are counted from one measurement to the next, not from the prediction. The observer sees
-/// an angle without jumps and is what it is on one: every omega_o T will do, and nothing but the
-/// truth is an equilibrium. (With the innovation taken to the nearest period, as is often done,
-/// every y' + k period / T is one: one bad sample, and an axis at rest is seen to spin for good.)
+/// an angle without jumps and behaves as it does on one: every omega_o T is allowed, and the true
+/// angle is the only equilibrium. (If the innovation is taken modulo one period, as is often done,
+/// every y' + k period / T is an equilibrium: after one bad sample an axis at rest may be estimated
+/// as spinning for ever.)
 ///
-/// What it asks of y, noise included:
-/// - between neighbouring measurements (D samples apart, where only every D-th brings one) it moves
+/// Requirements on y, including its noise:
+/// - between neighbouring measurements (D samples apart if only every D-th sample has one) it moves
 ///   by less than half a period;
 /// - the motion changes by less than a quarter of a period against the average of the last eight;
 ///   over a gap it is that average, continued.
 ///
-/// A measurement that breaks the second rule is taken into the turn nearest to the prediction and
-/// reported as `turn_assumed`, so that an outlier shifts no turn; after three in a row turns are
-/// counted again. Once y is good turns are counted right from the 30th measurement on, whatever was
-/// before, and from there the observer converges as it does without turns.
+/// A measurement that breaks the second rule is placed in the turn nearest to the prediction and
+/// reported as `turn_assumed`, so that an outlier does not change the turn; after three in a row,
+/// turns are counted again. Once y is good, turns are correct from the 30th measurement on,
+/// whatever happened before, and from then on the observer converges as without turns.
 ///
-/// A state that a good y cannot correct, or whose turns the scalar cannot hold, restarts from y and
-/// is reported as `restarted`.
+/// If a good y cannot correct the state, or the scalar cannot hold the turns, the observer restarts
+/// from y and reports `restarted`.
 ///
-/// Around a gate a rejected measurement is a missing one, unless the last eight measurements and
-/// all since the gate last let one in moved as the second rule says: then it is the estimate that
-/// is wrong, and turns are counted through what the gate rejected.
+/// With a gate inside, a rejected measurement counts as missing. The exception: if the last eight
+/// measurements, and all since the gate last accepted one, keep the second rule, the estimate is
+/// wrong and the turns are counted from the rejected measurements.
 ///
-/// An axis that turns by more than half a period a sample cannot be told from a slower one: the
-/// actuator must not be able to bring it there.
+/// An axis that turns by more than half a period a sample cannot be distinguished from a slower
+/// one: the actuator must not be able to drive it so fast.
 template <ShiftableOutput Observer>
 class WrappedOutput
     : public NamedAdapter<WrappedOutput<Observer>, Observer, WrappedOutputConfig<Observer>> {
@@ -61,7 +62,7 @@ class WrappedOutput
   using S = typename Observer::scalar_type;
 
  public:
-  /// What it is beyond LoopObserver.
+  /// What it declares beyond LoopObserver.
   static constexpr ObserverTraits traits = [] {
     ObserverTraits traits = Base::traits;
     traits.wraps_output = true;
@@ -100,14 +101,14 @@ class WrappedOutput
     return keep(reading, observer_.correct(reading.y + reading.turns * period_));
   }
 
-  /// Starts anew at (y, 0, .., 0), y taken to the nearest period around zero. A y that `update`
+  /// Restarts at (y, 0, .., 0), y taken to the nearest period around zero. A y that `update`
   /// would reject changes nothing and is reported.
   StepStatus reset(S y) noexcept {
     if (!can_be_told(y)) return StepStatus::state_rejected;
     return begin(observer_.reset(wrap(y)));
   }
 
-  /// Starts anew at a given estimate, N x 1.
+  /// Restarts at a given estimate, N x 1.
   StepStatus reset(const typename Observer::Estimate& state) noexcept {
     if (!can_be_told(state(0))) return StepStatus::state_rejected;
     typename Observer::Estimate wrapped = state;
@@ -362,7 +363,7 @@ class WrappedOutput
   [[no_unique_address]] std::conditional_t<gated, Heard, Nothing> heard_{};
 };
 
-/// The same of packs, lane by lane.
+/// The same for packs, lane by lane.
 template <ShiftableOutput Observer>
 requires PackScalar<typename Observer::scalar_type>
 class WrappedOutput<Observer>
@@ -372,10 +373,10 @@ class WrappedOutput<Observer>
   using WrappedOutput::PackAdapter::PackAdapter;
   template <class T>
   using with_scalar =
-      WrappedOutput<detail::WithScalar<Observer, T>>;  ///< the same of another scalar
+      WrappedOutput<detail::WithScalar<Observer, T>>;  ///< the same with another scalar
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <ShiftableOutput Observer>
 inline constexpr std::uint32_t type_tag<WrappedOutput<Observer>> =
     make_type_tag<Observer>("WrappedOutput");

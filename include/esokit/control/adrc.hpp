@@ -88,7 +88,8 @@ class Adrc {
   using Config = AdrcConfig<Observer>;  ///< settings of make
   using Status = StatusOf<S>;           ///< StepStatus, of a pack one a lane
   template <class T>
-  using with_scalar = Adrc<detail::WithScalar<Observer, T>, Form>;  ///< the same of another scalar
+  using with_scalar =
+      Adrc<detail::WithScalar<Observer, T>, Form>;  ///< the same with another scalar
 
   /// Checks the settings and does all the design work.
   /// @return the controller, or an error that names the field
@@ -376,7 +377,8 @@ class Adrc<Observer, Form>
  public:
   static constexpr int order = Observer::order;  ///< n, order of the plant
   template <class T>
-  using with_scalar = Adrc<detail::WithScalar<Observer, T>, Form>;  ///< the same of another scalar
+  using with_scalar =
+      Adrc<detail::WithScalar<Observer, T>, Form>;  ///< the same with another scalar
 
   using Adrc::LaneByLane::LaneByLane;
 
@@ -387,7 +389,7 @@ class Adrc<Observer, Form>
   }
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <LoopObserver Observer, class Form>
 inline constexpr std::uint32_t type_tag<Adrc<Observer, Form>> =
     make_type_tag<Observer, Form>("Adrc");

@@ -16,7 +16,7 @@ namespace esokit {
 /// The observer is fed y, the law takes r and, where known, its derivatives.
 struct OutputBased {};
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <>
 inline constexpr std::uint32_t type_tag<OutputBased> = make_type_tag<>("OutputBased");
 
@@ -24,7 +24,7 @@ inline constexpr std::uint32_t type_tag<OutputBased> = make_type_tag<>("OutputBa
 /// needed. For a constant reference it equals the output-based form.
 struct ErrorBased {};
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <>
 inline constexpr std::uint32_t type_tag<ErrorBased> = make_type_tag<>("ErrorBased");
 
@@ -54,7 +54,7 @@ class AdrcLaw {
   };
   using scalar_type = S;  ///< of signals and settings
   template <class T>
-  using with_scalar = AdrcLaw<Order, T>;  ///< the same of another scalar
+  using with_scalar = AdrcLaw<Order, T>;  ///< the same with another scalar
 
   /// Checks the settings and does all the design work.
   /// @return the law, or an error that names the field

@@ -207,7 +207,7 @@ class AlgebraicFilter {
   Config config_;
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <int Order, Scalar S, int Extension>
 inline constexpr std::uint32_t type_tag<AlgebraicFilter<Order, S, Extension>> =
     make_type_tag<S>("AlgebraicFilter", Order, Extension);

@@ -155,7 +155,8 @@ class ControlLoop {
   using scalar_type = S;                     ///< the same
   using Status = StatusOf<S>;                ///< StepStatus, of a pack one a lane
   template <class T>
-  using with_scalar = ControlLoop<detail::WithScalar<Observer, T>>;  ///< the same of another scalar
+  using with_scalar =
+      ControlLoop<detail::WithScalar<Observer, T>>;  ///< the same with another scalar
 
   /// Checks the settings.
   /// @param observer as its own `make` gives it

@@ -63,7 +63,7 @@ class DisturbanceCompensator {
   using Config = DisturbanceCompensatorConfig<Observer>;  ///< settings of make
   template <class T>
   using with_scalar =
-      DisturbanceCompensator<detail::WithScalar<Observer, T>>;  ///< the same of another scalar
+      DisturbanceCompensator<detail::WithScalar<Observer, T>>;  ///< the same with another scalar
 
   /// Checks the settings and does all the design work.
   /// @return the compensator, or an error that names the field
@@ -213,10 +213,10 @@ class DisturbanceCompensator<Observer>
   using DisturbanceCompensator::LaneByLane::LaneByLane;
   template <class T>
   using with_scalar =
-      DisturbanceCompensator<detail::WithScalar<Observer, T>>;  ///< the same of another scalar
+      DisturbanceCompensator<detail::WithScalar<Observer, T>>;  ///< the same with another scalar
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <LoopObserver Observer>
 inline constexpr std::uint32_t type_tag<DisturbanceCompensator<Observer>> =
     make_type_tag<Observer>("DisturbanceCompensator");

@@ -23,27 +23,27 @@ namespace esokit {
 /// leave fewer than three of them are refused.
 struct ShiftOperator {};
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <>
 inline constexpr std::uint32_t type_tag<ShiftOperator> = make_type_tag<>("ShiftOperator");
 
 /// The filter runs on delta = z - 1: N additions more, no digits lost for any omega_o T.
 struct DeltaOperator {};
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <>
 inline constexpr std::uint32_t type_tag<DeltaOperator> = make_type_tag<>("DeltaOperator");
 
 /// The filter is told the applied, limited u: the dual-feedback form.
 struct LimitedFeedback {};
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <>
 inline constexpr std::uint32_t type_tag<LimitedFeedback> = make_type_tag<>("LimitedFeedback");
 /// The filter is told its own output: the transfer-function form.
 struct UnlimitedFeedback {};
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <>
 inline constexpr std::uint32_t type_tag<UnlimitedFeedback> = make_type_tag<>("UnlimitedFeedback");
 
@@ -92,7 +92,7 @@ class DualFeedbackAdrc {
   using Status = StatusOf<S>;  ///< StepStatus, of a pack one a lane
   template <class T>
   using with_scalar = DualFeedbackAdrc<Order, T, Extension, Operator, Feedback,
-                                       Placement>;  ///< the same of another scalar
+                                       Placement>;  ///< the same with another scalar
 
   /// Checks the settings and does all the design work.
   /// @return the controller at rest in zero, or an error that names the field
@@ -325,7 +325,7 @@ class DualFeedbackAdrc {
   Status status_ = StepStatus::ok;
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <int Order, Scalar S, int Extension, class Operator, class Feedback, class Placement>
 inline constexpr std::uint32_t
     type_tag<DualFeedbackAdrc<Order, S, Extension, Operator, Feedback, Placement>> =

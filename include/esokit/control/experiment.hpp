@@ -142,7 +142,7 @@ class Experiment {
   using Config = ExperimentConfig<S>;  ///< settings of make
   using Result = ExperimentResult<S>;  ///< what is found
   template <class T>
-  using with_scalar = Experiment<Order, T>;  ///< the same of another scalar
+  using with_scalar = Experiment<Order, T>;  ///< the same with another scalar
 
   /// Checks the settings. @return the experiment before its first sample, or an error
   static Expected<Experiment, Error<S>> make(const Config& config) {

@@ -299,7 +299,7 @@ class HealthMonitor {
   Health<S> health_{};
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <int Size, PlainScalar S>
 inline constexpr std::uint32_t type_tag<HealthMonitor<Size, S>> = make_type_tag<S>("HealthMonitor",
                                                                                    Size);

@@ -27,7 +27,7 @@ class Incremental {
   using Config = typename Controller::Config;            ///< settings of make
   using Status = StatusOf<S>;                            ///< StepStatus, of a pack one a lane
   template <class T>
-  using with_scalar = Incremental<detail::WithScalar<Controller, T>>;  ///< of another scalar
+  using with_scalar = Incremental<detail::WithScalar<Controller, T>>;  ///< with another scalar
 
   /// As Controller::make.
   static Expected<Incremental, Error<S>> make(const Config& config) {
@@ -120,7 +120,7 @@ class Incremental {
   S increment_ = S(0.0);
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <class Controller>
 inline constexpr std::uint32_t type_tag<Incremental<Controller>> =
     make_type_tag<Controller>("Incremental");

@@ -32,7 +32,7 @@ class Limiter {
  public:
   using scalar_type = S;  ///< of u
   template <class T>
-  using with_scalar = Limiter<T>;  ///< the same of another scalar
+  using with_scalar = Limiter<T>;  ///< the same with another scalar
 
   /// Checks the limits.
   /// @param limits of the actuator @param sample_time T, s

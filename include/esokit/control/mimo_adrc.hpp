@@ -364,7 +364,7 @@ class MimoAdrc {
   Array<StepStatus, channels> statuses_{};
 };
 
-/// The same of packs, lane by lane.
+/// The same for packs, lane by lane.
 template <ShiftableDisturbance First, ShiftableDisturbance... Rest>
 requires PackScalar<typename First::scalar_type>
 class MimoAdrc<First, Rest...>
@@ -379,7 +379,7 @@ class MimoAdrc<First, Rest...>
   using Output = Vector<S, channels>;                    ///< y, or r, or u, q x 1
   template <class T>
   using with_scalar = MimoAdrc<detail::WithScalar<First, T>,
-                               detail::WithScalar<Rest, T>...>;  ///< of another scalar
+                               detail::WithScalar<Rest, T>...>;  ///< with another scalar
 
   using Base::Base;
 

@@ -35,7 +35,7 @@ class NonlinearFeedback {
   };
   using scalar_type = S;  ///< of signals and settings
   template <class T>
-  using with_scalar = NonlinearFeedback<Order, T>;  ///< the same of another scalar
+  using with_scalar = NonlinearFeedback<Order, T>;  ///< the same with another scalar
 
   /// Checks the settings and does all the design work.
   /// @return the law, or an error that names the field

@@ -445,7 +445,7 @@ class PredictiveAdrc {
   std::uint32_t hold_;
 };
 
-/// The same of packs, lane by lane.
+/// The same for packs, lane by lane.
 template <PredictableObserver Observer>
 requires PackScalar<typename Observer::scalar_type>
 class PredictiveAdrc<Observer>
@@ -454,7 +454,7 @@ class PredictiveAdrc<Observer>
  public:
   static constexpr int order = Observer::order;  ///< n, order of the plant
   template <class T>
-  using with_scalar = PredictiveAdrc<detail::WithScalar<Observer, T>>;  ///< of another scalar
+  using with_scalar = PredictiveAdrc<detail::WithScalar<Observer, T>>;  ///< with another scalar
 
   using PredictiveAdrc::LaneByLane::LaneByLane;
 
@@ -465,7 +465,7 @@ class PredictiveAdrc<Observer>
   }
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <PredictableObserver Observer>
 inline constexpr std::uint32_t type_tag<PredictiveAdrc<Observer>> =
     make_type_tag<Observer>("PredictiveAdrc");

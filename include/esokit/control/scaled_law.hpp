@@ -15,7 +15,7 @@ class ScaledLaw {
  public:
   using scalar_type = S;  ///< of signals and settings
   template <class T>
-  using with_scalar = ScaledLaw<Order, T>;  ///< the same of another scalar
+  using with_scalar = ScaledLaw<Order, T>;  ///< the same with another scalar
 
   /// Folds scaling and 1/b0 into the gains.
   /// @param law whose gains they are

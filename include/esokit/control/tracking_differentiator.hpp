@@ -39,7 +39,7 @@ class DifferentiatorState {
   /// (r1, r2).
   [[nodiscard]] Vector<S, 2> state() const noexcept { return {r1_, r2_}; }
 
-  /// Starts anew at rest at `value`; false, and nothing changes, if it is not finite.
+  /// Restarts at rest at `value`; false, and nothing changes, if it is not finite.
   bool reset(S value = S(0)) noexcept { return move_to(value, S(0)); }
 
  protected:
@@ -128,7 +128,7 @@ class TrackingDifferentiator<S>
  public:
   using TrackingDifferentiator::LaneByLane::LaneByLane;
   template <class T>
-  using with_scalar = TrackingDifferentiator<T>;  ///< the same of another scalar
+  using with_scalar = TrackingDifferentiator<T>;  ///< the same with another scalar
 };
 
 /// Config of SignTrackingDifferentiator.
@@ -191,7 +191,7 @@ class SignTrackingDifferentiator : public detail::DifferentiatorState<S> {
   Config config_;
 };
 
-/// The same of packs, lane by lane.
+/// The same for packs, lane by lane.
 template <PackScalar S>
 class SignTrackingDifferentiator<S>
     : public LaneByLane<SignTrackingDifferentiator<S>, SignTrackingDifferentiator<LaneScalar<S>>, S,
@@ -199,7 +199,7 @@ class SignTrackingDifferentiator<S>
  public:
   using SignTrackingDifferentiator::LaneByLane::LaneByLane;
   template <class T>
-  using with_scalar = SignTrackingDifferentiator<T>;  ///< the same of another scalar
+  using with_scalar = SignTrackingDifferentiator<T>;  ///< the same with another scalar
 };
 
 }  // namespace esokit

@@ -198,7 +198,7 @@ constexpr void set_lane(Packed& packed, const Plain& plain, int i) noexcept {
   copy_lane<true>(packed, plain, i);
 }
 
-/// The same of another scalar.
+/// The same with another scalar.
 template <class Object, class T>
 struct WithScalarOf {
   static_assert(

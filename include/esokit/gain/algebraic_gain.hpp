@@ -51,7 +51,7 @@ class AlgebraicGain {
 
   using scalar_type = S;  ///< of gains
   template <class T>
-  using with_scalar = AlgebraicGain<Size, T>;  ///< the same of another scalar
+  using with_scalar = AlgebraicGain<Size, T>;  ///< the same with another scalar
   using Count = Lanes<std::uint32_t, S>;       ///< samples, of a pack of each lane
 
   /// Largest start_index, and where the sample counter stops.
@@ -355,7 +355,7 @@ class AlgebraicGain {
   Lanes<bool, S> settled_{false};
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <int Size, Scalar S>
 inline constexpr std::uint32_t type_tag<AlgebraicGain<Size, S>> = make_type_tag<S>("AlgebraicGain",
                                                                                    Size);

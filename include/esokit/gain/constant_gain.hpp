@@ -18,7 +18,7 @@ class ConstantGain {
   static constexpr GainLawTraits traits{.kind = GainKind::preset, .bridges_gaps = true};
   using Spec = typename Placement::template Spec<Size, LaneScalar<S>>;  ///< of the placement
   template <class T>
-  using with_scalar = ConstantGain<Size, T, Placement>;  ///< the same of another scalar
+  using with_scalar = ConstantGain<Size, T, Placement>;  ///< the same with another scalar
 
   /// As below, for the sample time of a chain.
   template <class Chain>
@@ -133,7 +133,7 @@ auto placed_law(const Config& config, const Chain&... chain) {
 
 }  // namespace detail
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <int Size, Scalar S, class Placement>
 inline constexpr std::uint32_t type_tag<ConstantGain<Size, S, Placement>> =
     make_type_tag<S, Placement>("ConstantGain", Size);

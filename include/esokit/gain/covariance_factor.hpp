@@ -44,7 +44,7 @@ struct MatrixTransition {
   Array<int, Size> degrees{};  ///< state r is in units of T^degree
 
   template <class T>
-  using with_scalar = MatrixTransition<Size, T>;  ///< the same of another scalar
+  using with_scalar = MatrixTransition<Size, T>;  ///< the same with another scalar
   /// @cond
   static constexpr auto fields(auto& t) noexcept { return detail::tie(t.phi, t.degrees); }
   /// @endcond

@@ -119,7 +119,7 @@ struct HalfGainPoles : BandwidthPlacement {
   }
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <>
 inline constexpr std::uint32_t type_tag<HalfGainPoles> = make_type_tag<>("HalfGainPoles");
 

@@ -261,7 +261,7 @@ class ModelGain {
   int longest_step_ = 1;
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <int Size, Scalar S, class Placement, int MostBridged>
 inline constexpr std::uint32_t type_tag<ModelGain<Size, S, Placement, MostBridged>> =
     make_type_tag<S, Placement>("ModelGain", Size, MostBridged);

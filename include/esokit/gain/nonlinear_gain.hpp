@@ -56,7 +56,7 @@ template <Scalar S>
 struct PowerSumGain {
   static constexpr EvenGainTraits traits{.checks = true, .prepares = true};  ///< beside k
   template <class T>
-  using with_scalar = PowerSumGain<T>;  ///< the same of another scalar
+  using with_scalar = PowerSumGain<T>;  ///< the same with another scalar
 
   S gain_alpha = S(1.0);  ///< K_alpha >= 0
   S alpha = S(1.0);       ///< alpha > 0; below 1: k is infinite at e = 0
@@ -112,7 +112,7 @@ struct PowerSumGain {
   /// @endcond
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <Scalar S>
 inline constexpr std::uint32_t type_tag<PowerSumGain<S>> = make_type_tag<S>("PowerSumGain");
 
@@ -121,7 +121,7 @@ template <Scalar S>
 struct FalGain {
   static constexpr EvenGainTraits traits{.checks = true, .prepares = true};  ///< beside k
   template <class T>
-  using with_scalar = FalGain<T>;  ///< the same of another scalar
+  using with_scalar = FalGain<T>;  ///< the same with another scalar
 
   S gain = S(1.0);          ///< K >= 0
   S exponent = S(0.5);      ///< a > 0
@@ -166,7 +166,7 @@ struct FalGain {
   /// @endcond
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <Scalar S>
 inline constexpr std::uint32_t type_tag<FalGain<S>> = make_type_tag<S>("FalGain");
 
@@ -249,7 +249,7 @@ class NonlinearGain {
   using Linear = ConstantGain<Size, S>;  ///< the gain where k = 1
   template <class T>
   using with_scalar =
-      NonlinearGain<Size, T, typename detail::ForScalar<Shape, T>::type>;  ///< of another scalar
+      NonlinearGain<Size, T, typename detail::ForScalar<Shape, T>::type>;  ///< with another scalar
 
   /// @param linear the bandwidth gains @param shape k @param error_scale > 0, unit of y
   /// @param gain_min, gain_max limits of k
@@ -294,7 +294,7 @@ class NonlinearGain {
   detail::LimitedGain<S, Shape> factor_;
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <int Size, Scalar S, class Shape>
 inline constexpr std::uint32_t type_tag<NonlinearGain<Size, S, Shape>> =
     make_type_tag<S, Shape>("NonlinearGain", Size);

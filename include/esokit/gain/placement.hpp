@@ -51,7 +51,7 @@ struct EqualPoles : BandwidthPlacement {
   }
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <>
 inline constexpr std::uint32_t type_tag<EqualPoles> = make_type_tag<>("EqualPoles");
 

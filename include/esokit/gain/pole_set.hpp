@@ -189,7 +189,7 @@ struct PoleSet {
   }
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <>
 inline constexpr std::uint32_t type_tag<PoleSet> = make_type_tag<>("PoleSet");
 

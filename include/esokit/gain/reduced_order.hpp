@@ -45,7 +45,7 @@ struct ReducedPoles : BandwidthPlacement {
   }
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <>
 inline constexpr std::uint32_t type_tag<ReducedPoles> = make_type_tag<>("ReducedPoles");
 

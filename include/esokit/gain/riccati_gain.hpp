@@ -101,7 +101,7 @@ class RiccatiGain {
   template <class T>
   using with_scalar =
       RiccatiGain<Size, T, TableSize,
-                  typename detail::ForScalar<Transition, T>::type>;  ///< of another scalar
+                  typename detail::ForScalar<Transition, T>::type>;  ///< with another scalar
 
   /// The law in its recursive mode; `freeze` goes over to another.
   explicit RiccatiGain(const Settings& settings, const Transition& transition = {}) noexcept
@@ -497,7 +497,7 @@ class RiccatiGain {
   Array<Point, TableSize> table_{};
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <int Size, Scalar S, int TableSize, class Transition>
 inline constexpr std::uint32_t type_tag<RiccatiGain<Size, S, TableSize, Transition>> =
     make_type_tag<S>("RiccatiGain", Size, TableSize);

@@ -134,7 +134,7 @@ class ScheduledGain {
   int longest_gap_ = 0;
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <int Size, Scalar S, class Placement, int Count, int MostBridged>
 inline constexpr std::uint32_t type_tag<ScheduledGain<Size, S, Placement, Count, MostBridged>> =
     make_type_tag<S, Placement>("ScheduledGain", Size, Count, MostBridged);

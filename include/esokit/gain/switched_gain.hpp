@@ -46,7 +46,7 @@ class SwitchedGain {
  public:
   using Set = ConstantGain<Size, S, Placement>;  ///< one of the two gain sets
   template <class T>
-  using with_scalar = SwitchedGain<Size, T, Placement, Reading>;  ///< the same of another scalar
+  using with_scalar = SwitchedGain<Size, T, Placement, Reading>;  ///< the same with another scalar
 
   /// What it does beside `gain`. A NaN compares as not shrinking, so that any innovation is safe to
   /// ask with.
@@ -117,7 +117,7 @@ class SwitchedGain {
   S previous_ = detail::nothing_watched<S>(Reading);
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <int Size, Scalar S, class Placement, SignReading Reading>
 inline constexpr std::uint32_t type_tag<SwitchedGain<Size, S, Placement, Reading>> =
     make_type_tag<S, Placement>("SwitchedGain", Size, Reading);

@@ -191,7 +191,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   };
 
   template <class T>
-  using with_scalar = AugmentedModel<Parts, T>;  ///< the same of another scalar
+  using with_scalar = AugmentedModel<Parts, T>;  ///< the same with another scalar
 
   using Settings = PartsSettings<Parts, S>;  ///< of make
 
@@ -539,10 +539,10 @@ class AugmentedModel<Parts, S> {
   static constexpr ModelTraits traits = Plain::traits;  ///< what it is
   using Settings = PartsSettings<Parts, S>;             ///< of make
   template <class T>
-  using with_scalar = AugmentedModel<Parts, T>;  ///< the same of another scalar
+  using with_scalar = AugmentedModel<Parts, T>;  ///< the same with another scalar
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <ModelParts Parts, Scalar S>
 inline constexpr std::uint32_t type_tag<AugmentedModel<Parts, S>> =
     make_type_tag<S>("AugmentedModel", Parts.order, Parts.plant_poles, Parts.actuator, Parts.sensor,

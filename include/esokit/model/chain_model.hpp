@@ -30,7 +30,7 @@ class ChainModel {
   using State = Array<S, N>;      ///< x, scaled, N elements
   using Estimate = Vector<S, N>;  ///< z, physical units, N x 1
   template <class T>
-  using with_scalar = ChainModel<Order, T, Extension>;  ///< the same of another scalar
+  using with_scalar = ChainModel<Order, T, Extension>;  ///< the same with another scalar
 
   /// @param input_gain b0 @param sample_time T, s; both checked
   constexpr ChainModel(const S& input_gain, const S& sample_time) noexcept

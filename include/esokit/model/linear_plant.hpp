@@ -40,7 +40,7 @@ struct LinearPlant {
   using Input = Vector<ScalarType, Inputs>;    ///< u, or d
   using Output = Vector<ScalarType, Outputs>;  ///< y
   template <class T>
-  using with_scalar = LinearPlant<States, T, Inputs, Outputs>;  ///< the same of another scalar
+  using with_scalar = LinearPlant<States, T, Inputs, Outputs>;  ///< the same with another scalar
 
   Matrix<ScalarType, States, States> a{};   ///< A, 1/s
   Matrix<ScalarType, States, Inputs> b{};   ///< B

@@ -98,7 +98,7 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
   static constexpr ModelTraits traits{.tells_disturbance = true,
                                       .corrects_part = true};  ///< what it is
   template <class T>
-  using with_scalar = LinearPlantModel<States, Parts, T>;  ///< the same of another scalar
+  using with_scalar = LinearPlantModel<States, Parts, T>;  ///< the same with another scalar
 
   /// Settings of make; those of parts that are not there are empty.
   struct Settings {
@@ -512,7 +512,7 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
   Estimate rest_of_u_;
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <int States, ModelParts Parts, PlainScalar S>
 inline constexpr std::uint32_t type_tag<LinearPlantModel<States, Parts, S>> =
     make_type_tag<S>("LinearPlantModel", States, Parts.order, Parts.sensor, Parts.constants,

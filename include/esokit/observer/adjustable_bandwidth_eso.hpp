@@ -18,10 +18,10 @@ namespace esokit {
 /// innovation shrinks and omega_o (or, by the BESO rule, omega_o / rho) otherwise.
 ///
 /// `make` accepts the ratios for which the two gain sets share a quadratic Lyapunov function: the
-/// error then decays under any switching, whatever the noise makes of the rule. The paper's Lemma 2
-/// says so for every rho, which is wrong: for N = 3 it holds for 1/3 < rho < 3 (sampled: a little
-/// wider), and at rho = 0.2 there are switchings under which the error grows. The certificate is
-/// about samples without gaps.
+/// error then decays under any switching, also under one caused by noise. The paper's Lemma 2
+/// claims this for every rho. This is wrong: for N = 3 it holds for 1/3 < rho < 3 (sampled: a
+/// little wider), and at rho = 0.2 some switching patterns make the error grow. The certificate
+/// applies to samples without gaps.
 ///
 /// rho = 1 is LinearEso, bit for bit.
 /// @tparam Order n @tparam S scalar @tparam Extension m
@@ -58,10 +58,10 @@ class AdjustableBandwidthEso
   };
   template <class T>
   using with_scalar =
-      AdjustableBandwidthEso<Order, T, Extension, Reading>;  ///< the same of another scalar
+      AdjustableBandwidthEso<Order, T, Extension, Reading>;  ///< the same with another scalar
 
-  /// Takes the settings of `fresh`, as `make` gave it, and keeps the estimate and the innovation to
-  /// compare with: no design work.
+  /// Takes over the settings of `fresh`, as returned by `make`, without design work. The estimate
+  /// and the innovation to compare with are kept.
   Check<S> adopt(AdjustableBandwidthEso fresh) {
     if constexpr (PackScalar<S>) return detail::adopt_lanes(*this, fresh);
     std::get<0>(fresh.laws()).continue_from(std::get<0>(this->laws()));
@@ -90,7 +90,7 @@ class AdjustableBandwidthEso
   }
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <int Order, Scalar S, int Extension, SignReading Reading>
 inline constexpr std::uint32_t type_tag<AdjustableBandwidthEso<Order, S, Extension, Reading>> =
     make_type_tag<S>("AdjustableBandwidthEso", Order, Extension, Reading);

@@ -20,10 +20,10 @@ namespace esokit {
 /// (e^{qt} - 1); once it has settled the observer is LinearEso with omega_o = lambda.
 ///
 /// Right after a start the estimate follows the noise: the variance of the highest state is about
-/// sigma^2 T (2N-1)! (2N-2)! / ((N-1)!)^2 / t^(2N-1). So they are blanked at first: for that time
-/// `estimate` gives what it was at the start.
+/// sigma^2 T (2N-1)! (2N-2)! / ((N-1)!)^2 / t^(2N-1). So the estimates are blanked at first: until
+/// then `estimate` returns its value at the start.
 ///
-/// Missing samples: among the first N they start the schedule anew (state kept); later ones are
+/// A sample missing among the first N restarts the schedule (the state is kept); a later gap is
 /// bridged with the gain that the present bandwidth has for the whole gap.
 ///
 /// @tparam Order n @tparam S scalar @tparam Extension m
@@ -42,9 +42,9 @@ class AlgebraicEso
   using Estimate = typename Base::Estimate;  ///< (y, .., y^(n-1), d, .., d^(m-1)), N x 1
   using Status = typename Base::Status;      ///< StepStatus, of a pack one a lane
   template <class T>
-  using with_scalar = AlgebraicEso<Order, T, Extension>;  ///< the same of another scalar
+  using with_scalar = AlgebraicEso<Order, T, Extension>;  ///< the same with another scalar
 
-  /// What it is beyond LoopObserver.
+  /// What it declares beyond LoopObserver.
   static constexpr ObserverTraits traits = [] {
     ObserverTraits traits = Base::traits;
     traits.bears_regular_gaps = false;
@@ -55,15 +55,15 @@ class AlgebraicEso
 
   /// Settings of make.
   struct Config {
-    S observer_bandwidth{};  ///< lambda, rad/s: the bandwidth that is left in the end
-    S frequency_shift{};     ///< q >= 0, rad/s: how fast it falls there; 0: as lambda + N/t
-    S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
-    S sample_time{};         ///< T, s
+    S observer_bandwidth{};  ///< lambda, rad/s: the final bandwidth
+    S frequency_shift{};  ///< q >= 0, rad/s: how fast the bandwidth falls to it; 0: as lambda + N/t
+    S input_gain{};       ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
+    S sample_time{};      ///< T, s
 
-    /// epsilon >= 0, s: estimates are blanked this long after a start. Left out it follows from the
-    /// two noise levels below, t = (sigma^2 T (2N-1)! (2N-2)! / ((N-1)!)^2 /
-    /// tolerated^2)^(1/(2N-1)), and without them is N - 1 samples: published from the first sample
-    /// on that can be exact.
+    /// epsilon >= 0, s: estimates are blanked this long after a start. If left out, it follows from
+    /// the two noise levels below, t = (sigma^2 T (2N-1)! (2N-2)! / ((N-1)!)^2 /
+    /// tolerated^2)^(1/(2N-1)). Without these levels it is N - 1 samples: estimates are published
+    /// from the first sample that can be exact.
     std::optional<S> blanking{};
     S measurement_noise{};  ///< standard deviation of the noise on y, unit of y
     S disturbance_noise{};  ///< standard deviation to be tolerated in the highest estimate, d^(m-1)
@@ -94,10 +94,10 @@ class AlgebraicEso
   /// Measurement update alone, see PredictorCorrector::correct.
   Status correct(S y) noexcept { return blank_anew(Base::correct(y)); }
 
-  /// Takes the settings of `fresh`, as `make` gave it, with no design work; so does `retune`. The
-  /// estimate and the place in the schedule (counted in samples) are kept, a change of b0 is moved
-  /// into the disturbance, in blanked estimates as well. If the new blanking is not over yet, the
-  /// present estimates are published until it is.
+  /// Takes over the settings of `fresh`, as returned by `make`, without design work. As with
+  /// `retune`, the estimate and the place in the schedule (counted in samples) are kept, and a
+  /// change of b0 is moved into the disturbance, in blanked estimates as well. If the new blanking
+  /// is not over yet, the present estimates are published until it is.
   Check<S> adopt(AlgebraicEso fresh) {
     if constexpr (PackScalar<S>) {
       return detail::adopt_lanes(*this, fresh);
@@ -116,20 +116,20 @@ class AlgebraicEso
     }
   }
 
-  /// After a known jump (of the disturbance, or of the state): the schedule begins anew, the state
-  /// is kept, and the estimates of this moment are published until the blanking is over.
+  /// To be called after a known jump (of the disturbance or of the state): restarts the schedule
+  /// and keeps the state. The present estimates are published until the blanking is over.
   void rearm() noexcept {
     publish(estimate());
     law().restart();
   }
 
-  /// Starts anew at (y, 0, .., 0).
+  /// Restarts at (y, 0, .., 0).
   Status reset(S y) noexcept { return blank_after(Base::reset(y)); }
 
-  /// Starts anew at a given estimate, N x 1.
+  /// Restarts at a given estimate, N x 1.
   Status reset(const Estimate& state) noexcept { return blank_after(Base::reset(state)); }
 
-  /// All published estimates in physical units; those of the start while blanked.
+  /// All published estimates in physical units; while blanked, those of the start.
   [[nodiscard]] Estimate estimate() const noexcept {
     const auto blanked_now = blanked();
     if (blanked_now == true) return published();
@@ -230,7 +230,7 @@ class AlgebraicEso
     return status;
   }
 
-  /// Of a pack: publishes the present estimates in the lanes for which it is asked.
+  /// For packs: publishes the present estimates in the given lanes.
   template <class Where>
   void publish_where(const Where& where) noexcept {
     const Estimate now = Base::estimate();
@@ -268,7 +268,7 @@ class AlgebraicEso
   }();
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <int Order, Scalar S, int Extension>
 inline constexpr std::uint32_t type_tag<AlgebraicEso<Order, S, Extension>> =
     make_type_tag<S>("AlgebraicEso", Order, Extension);

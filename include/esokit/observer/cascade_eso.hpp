@@ -1,6 +1,6 @@
 /// @file
-/// CascadeEso: p linear extended state observers in a row (K. Lakomy, R. Madonski, ISA Transactions
-/// 109 (2021) 1-10).
+/// CascadeEso: a chain of p linear extended state observers (K. Lakomy, R. Madonski, ISA
+/// Transactions 109 (2021) 1-10).
 #pragma once
 
 #include <esokit/core/type_tag.hpp>
@@ -142,14 +142,14 @@ Expected<Array<Law, Levels>, Error<S>> level_laws(const Config& config, MakeLaw&
 /// Level 1 sees the measurement, level i the corrected output of level i - 1 and u plus the
 /// disturbance found so far; equations (23), (24). Only level 1, the slowest, sees the measurement
 /// noise. States are taken from the last level, the disturbance is the sum of all levels'. Stable
-/// for every omega_oi T > 0; one level is LinearEso. Error-based use: feed e = y_d - y as the
-/// measurement and give -b0 as input_gain.
+/// for every omega_oi T > 0; with one level it is LinearEso. Error-based use: pass e = y_d - y as
+/// the measurement and -b0 as input_gain.
 ///
-/// With a model every level has plant, actuator and sensor: each sees y as the sensor shows it, the
-/// actuator runs open loop in all. Noise is then passed on as by a cascade of chains, less than by
-/// one level of the last bandwidth. Each level has the resonators, too, with the same capture
-/// bandwidth: a swing 2 % beside its frequency leaves a third to a tenth of the error that one
-/// level of the last bandwidth leaves, at 1.1 to 1.4 times its noise.
+/// With a model every level has plant, actuator and sensor: each sees y as the sensor shows it, and
+/// in all of them the actuator runs open loop. The noise is then that of a cascade of chains: less
+/// than with one level of the last bandwidth. Each level also has the resonators, with the same
+/// capture bandwidth. If a swing is 2 % beside its frequency, the error is a third to a tenth of
+/// that of one level of the last bandwidth, at 1.1 to 1.4 times its noise.
 ///
 /// @tparam Order n, with a model that of the law @tparam Levels p @tparam S scalar
 /// @tparam Extension m, with a model `Model::extension`
@@ -171,7 +171,7 @@ class CascadeEso : public NamedObserver<
   /// Settings of make.
   using Config =
       CascadeEsoConfig<Order + Extension, Levels, S, Placement, typename Model::Settings>;
-  /// The same of another scalar.
+  /// The same with another scalar.
   template <class T>
   using with_scalar =
       CascadeEso<Order, Levels, T, Extension, Placement, detail::WithScalar<Model, T>>;
@@ -185,7 +185,7 @@ class CascadeEso : public NamedObserver<
   }
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <int Order, int Levels, Scalar S, int Extension, class Placement, class Model>
 inline constexpr std::uint32_t type_tag<CascadeEso<Order, Levels, S, Extension, Placement, Model>> =
     make_type_tag<S, Placement, Model>("CascadeEso", Order, Levels, Extension);

@@ -1,6 +1,6 @@
 /// @file
-/// What controllers, adapters and analyses ask of an observer, one concept a need; and the traits
-/// by which an observer says what it is beyond that.
+/// What controllers, adapters and analyses require of an observer, one concept for each need; and
+/// the traits by which an observer declares what else it can do.
 ///
 /// | concept | who needs it |
 /// |---|---|
@@ -29,30 +29,31 @@ struct GuardAccess;
 
 }  // namespace detail
 
-/// What an observer is beyond LoopObserver: `static constexpr ObserverTraits traits{..}` in it. One
-/// that declares nothing is what the defaults say.
+/// What an observer declares beyond LoopObserver, in a member `static constexpr ObserverTraits
+/// traits{..}`. For an observer without it the defaults apply.
 struct ObserverTraits {
-  /// It keeps its bandwidth where only every D-th sample brings a measurement. AlgebraicEso does
-  /// not: a gap among its first samples starts its schedule anew.
+  /// It keeps its bandwidth if only every D-th sample has a measurement. AlgebraicEso does not: a
+  /// gap among its first samples restarts its schedule.
   bool bears_regular_gaps = true;
 
-  /// What it publishes is the state of its chain, of a sample time that stays:
-  /// `scaled_estimate<Row>() const` is T^r / r! times `estimate<Row>()`. Lets Adrc fold the factors
-  /// into its gains. Not AlgebraicEso while it is blanked, KnownModel, VariableTime.
+  /// It publishes the state of its chain, and its sample time is fixed: `scaled_estimate<Row>()
+  /// const` is T^r / r! times `estimate<Row>()`. Adrc then folds the factors into its gains. False
+  /// for AlgebraicEso (blanked at first), KnownModel and VariableTime.
   bool publishes_chain = false;
 
-  /// Its chain and `level_gain(level) const` are all that it does with u and y. Not where a delay
-  /// or a model is added. Lets analysis make a linear system of it.
+  /// Its behaviour is given by its chain and `level_gain(level) const` alone, so analysis can make
+  /// a linear system of it. False if a delay or a model is added.
   bool acts_by_gain = false;
 
-  /// Its next correction can be told before the measurement, see PredictableObserver.
+  /// Its next correction is known before the measurement, see PredictableObserver.
   bool is_predictable = false;
-  GainKind gain_kind = GainKind::general;  ///< what can be told; of a predictable one
+  GainKind gain_kind = GainKind::general;  ///< what is known of it, if predictable
 
-  /// What is measured is row 0 of the estimate; false where a sensor lags behind it.
+  /// The measurement is row 0 of the estimate; false if a sensor lags behind it.
   bool measures_first_row = true;
 
-  /// It is an adapter around an observer `Adapted`; its config has that of `Adapted` as `observer`.
+  /// It is an adapter around an observer `Adapted`, whose config is the member `observer` of its
+  /// own.
   bool adapts = false;
 
   bool wraps_output = false;  ///< y is an angle: `wrap(difference) const`
@@ -66,11 +67,11 @@ struct ObserverTraits {
 
   bool blanks_estimate = false;  ///< `blanked() const`: `estimate` is an old one for now
 
-  /// A constant gain on the chain, and nothing else, moves its dhat: it may stand in Guarded.
+  /// Only a constant gain on the chain changes its dhat, so it can be used in Guarded.
   bool bears_guards = false;
 
-  /// `set_input_gain(b)` while it runs, and `input_factor() const`, by which a law multiplies what
-  /// it has divided by the config's b0; see Guarded.
+  /// It has `set_input_gain(b)` for use while it runs, and `input_factor() const`, by which a law
+  /// multiplies what it has divided by the config's b0; see Guarded.
   bool schedules_input_gain = false;
 
   /// `set_trust(phi)`, `trust() const`, and `standing_input() const`, see Guarded.
@@ -81,8 +82,8 @@ struct ObserverTraits {
 template <class O>
 inline constexpr ObserverTraits observer_traits = detail::declared_traits<O, ObserverTraits>;
 
-/// The config that names `input_gain`, `sample_time` and `max_gap`: an adapter's config nests that
-/// of the observer in it as `observer`. @tparam O the observer whose config it is
+/// The config that has `input_gain`, `sample_time` and `max_gap`: the config of an adapter contains
+/// that of its observer as `observer`. @tparam O the observer whose config it is
 template <class O, class Config>
 constexpr auto& chain_config(Config& config) noexcept {
   if constexpr (observer_traits<O>.adapts) {
@@ -234,13 +235,13 @@ template <class O>
 concept GatesDisturbanceAsDeclared = detail::observer_as_declared<O>(
     observer_traits<O>.gates_disturbance, detail::names_set_trust<O>, detail::GatesDisturbance<O>);
 
-/// No member function has a name that is nearly that of a hook; it would never be called.
+/// No member function has a name that is almost that of a hook, because it would never be called.
 template <class O>
 concept HasNoMisspelledObserverHook =
     !detail::calls_wraps<O> && !detail::calls_fill_inputs<O> && !detail::calls_set_sample_time<O> &&
     !detail::calls_accept<O> && !detail::calls_rearms<O>;
 
-/// Everything that `traits` declares is there, and nothing that it does not declare.
+/// The type has everything that `traits` declares, and nothing that it does not declare.
 template <class O>
 concept ObserverAsDeclared = DeclaresTraits<O, ObserverTraits> && PublishesChainAsDeclared<O> &&
     ActsByGainAsDeclared<O> && AdaptsAsDeclared<O> && WrapsOutputAsDeclared<O> &&
@@ -248,7 +249,7 @@ concept ObserverAsDeclared = DeclaresTraits<O, ObserverTraits> && PublishesChain
     BlanksEstimateAsDeclared<O> && SchedulesInputGainAsDeclared<O> &&
     GatesDisturbanceAsDeclared<O> && HasNoMisspelledObserverHook<O>;
 
-/// A config that says b0, T and how long a gap is bridged.
+/// A config with b0, T and the longest gap that is bridged.
 template <class Config, class S>
 concept ChainSettings = requires(Config& config) {
   { config.input_gain } -> std::same_as<S&>;
@@ -256,8 +257,8 @@ concept ChainSettings = requires(Config& config) {
   { config.max_gap } -> std::same_as<int&>;
 };
 
-/// A sampled observer of a plain scalar or of packs, with a Config. What is no number it tells of
-/// each lane: Lanes<..>, StatusOf.
+/// A sampled observer of plain scalars or packs, with a Config. For packs, results that are not
+/// numbers are given for each lane: Lanes<..>, StatusOf.
 template <class O>
 concept LoopObserver = std::copyable<O> && PlainScalar<LaneScalar<typename O::scalar_type>> &&
     requires(O& observer, const O& constant, const typename O::scalar_type& s,
@@ -284,30 +285,30 @@ concept LoopObserver = std::copyable<O> && PlainScalar<LaneScalar<typename O::sc
   { chain_config<O>(config) } -> ChainSettings<typename O::scalar_type>;
 };
 
-/// An observer that says whether so many samples are missing that the next `correct` restarts it.
+/// An observer that knows whether so many samples are missing that the next `correct` restarts it.
 template <class O>
 concept RestartingObserver = LoopObserver<O> && requires(const O& observer) {
   { observer.restarts() } -> std::same_as<Lanes<bool, typename O::scalar_type>>;
 };
 
-/// An observer that tells the estimate of each level as it is computed, whatever is published:
-/// `level_estimate(level)`. Level 0 sees the measurement, the last one is the estimate.
+/// An observer that gives the computed estimate of each level, also if another one is published:
+/// `level_estimate(level)`. Level 0 sees the measurement, the last level is the estimate.
 template <class O>
 concept LevelledObserver = LoopObserver<O> && requires(const O& observer) {
   { O::levels } -> std::convertible_to<int>;
   { observer.level_estimate(0) } -> std::same_as<typename O::Estimate>;
 };
 
-/// A levelled observer whose y may be shifted: `shift_output(offset)` adds to it in all levels. ok,
-/// or state_rejected where the estimate would not be finite: nothing changes then.
+/// A levelled observer whose y may be shifted: `shift_output(offset)` adds to it in all levels. It
+/// returns ok, or state_rejected if the estimate would not be finite; then nothing changes.
 template <class O>
 concept ShiftableOutput = LevelledObserver<O> &&
     requires(O& observer, const typename O::scalar_type& s) {
   { observer.shift_output(s) } -> std::same_as<StatusOf<typename O::scalar_type>>;
 };
 
-/// An observer whose disturbance may be shifted: `shift_disturbance(offset)` adds to dhat, where
-/// something else is to explain y^(n) from now on. Returns as `shift_output`.
+/// An observer whose disturbance may be shifted: `shift_disturbance(offset)` adds to dhat when from
+/// now on something else explains a part of y^(n). Returns as `shift_output`.
 template <class O>
 concept ShiftableDisturbance = LoopObserver<O> &&
     requires(O& observer, const typename O::scalar_type& s) {
@@ -337,14 +338,14 @@ concept ForetellsByKind = kind == GainKind::general || requires(const O& o) {
 
 }  // namespace detail
 
-/// An observer whose next correction can be told before the measurement, and no adapter: those do
-/// something of their own with y, u or the estimate. Packs are welcome.
+/// An observer whose next correction is known before the measurement. It is not an adapter, because
+/// adapters change y, u or the estimate. Packs are accepted.
 ///
 /// It declares `traits.is_predictable` and the kind of its gain, see GainKind:
 /// - with one level `correction_gain(e) const` is the scaled gain of the coming correction;
 /// - preset: `preview() const`, and `finite_probe(x) const`, see PredictorCorrector;
 /// - switched, factored: `gain_law() const` has the members of the kind;
-/// - general: nothing more; all is then worked out after the measurement.
+/// - general: nothing more; everything is then computed after the measurement.
 template <class O>
 concept PredictableObserver = std::copyable<O> && Scalar<typename O::scalar_type> &&
     ObserverAsDeclared<O> && observer_traits<O>
@@ -375,8 +376,8 @@ concept PredictableObserver = std::copyable<O> && Scalar<typename O::scalar_type
     detail::ForetellsByKind<O, observer_traits<O>.gain_kind>;
 
 /// A sampled observer whose gain does not depend on the measurement: LinearEso, CascadeEso, a
-/// settled AlgebraicEso, an ExtendedStateFilter frozen where it is. The system is the one that the
-/// present gain makes.
+/// settled AlgebraicEso, an ExtendedStateFilter frozen at its present gain. The system is that of
+/// the present gain.
 template <class O>
 concept SampledLinearObserver = ObserverAsDeclared<O> && observer_traits<O>
 .acts_by_gain&& requires(const O& observer) {

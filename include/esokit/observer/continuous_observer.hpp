@@ -1,5 +1,5 @@
 /// @file
-/// The continuous-time observer as an ODE, for simulation the way the papers do it.
+/// The continuous-time observer as an ODE, for simulation as in the papers.
 #pragma once
 
 #include <esokit/core/check.hpp>
@@ -11,8 +11,8 @@
 
 namespace esokit {
 
-/// z' = A z + B u + l(t, e) e on a row of `Levels` chains; the definition only, the state is the
-/// caller's, to be stacked with that of a plant.
+/// z' = A z + B u + l(t, e) e on `Levels` chains in series. This is only the definition: the caller
+/// holds the state, usually stacked with that of a plant.
 ///
 /// As in PredictorCorrector, level i is driven by u and the disturbances of the levels below it;
 /// its innovation is e_1 = y - x_1, e_i = x_{i-1} - x_i (first elements).
@@ -31,7 +31,7 @@ class ContinuousObserver {
   using State = Vector<S, states>;   ///< the levels one after the other, N p x 1
   using Laws = Array<Law, Levels>;   ///< one a level
 
-  /// From ready gain laws; the way in for a law of your own.
+  /// From ready gain laws; use this for your own law.
   /// @param input_gain b0, unit of y^(n) per unit of u @param laws one a level
   /// @return error if b0 is zero or not finite
   static Expected<ContinuousObserver, Error<S>> make(const S& input_gain, const Laws& laws) {
@@ -59,8 +59,8 @@ class ContinuousObserver {
     return rate;
   }
 
-  /// To be called at the start of each integration step: the one place where a switched law may
-  /// change its mode.
+  /// To be called at the start of each integration step: only there may a switched law change its
+  /// mode.
   void begin_step([[maybe_unused]] const S& t, [[maybe_unused]] const State& z,
                   [[maybe_unused]] const S& y) {
     if constexpr (detail::declared_traits<Law, ContinuousGainLawTraits>.begins_steps) {

@@ -16,19 +16,19 @@
 
 namespace esokit {
 
-/// The ESF without a model of the disturbance: its change is anything within the bounds.
+/// The ESF without a model of the disturbance: d may change in any way within the bounds.
 struct NoNominalModel {};
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <>
 inline constexpr std::uint32_t type_tag<NoNominalModel> = make_type_tag<>("NoNominalModel");
 
 /// A model fbar(x, u, t) of the total disturbance, in the unit of y^(n): x the plant states, u the
 /// input that was held, t seconds since the start or the last reset.
 ///
-/// What fbar does to d closes a loop within the filter, which its gains have to stabilise: with
-/// gains slower than fbar's own dynamics the estimate cycles within the bound of the change (T =
-/// 0.8 s, fbar = -0.5 y, q_n T^2 / sqrt(R) = 0.03).
+/// The effect of fbar on d closes a loop within the filter, which the gains have to stabilise. If
+/// the gains are slower than the dynamics of fbar, the estimate oscillates within the bound of the
+/// change (T = 0.8 s, fbar = -0.5 y, q_n T^2 / sqrt(R) = 0.03).
 template <class Model, int Order, class S>
 concept NominalModel = std::copyable<Model> &&
     (std::same_as<Model, NoNominalModel> ||
@@ -39,22 +39,23 @@ concept NominalModel = std::copyable<Model> &&
 /// Extended state filter of a plant y^(n) = d + b0 u, sampled exactly, with y measured in white
 /// noise.
 ///
-/// The gain follows from R, the variance of the noise, and from Q, what the chain may do within a
-/// sample that its model does not say: for m = 1 above all the change of the disturbance. P0 speeds
-/// up the start. `covariance` is a bound of the covariance of the error (in the sense of matrices)
-/// as long as Q and R are. In a closed loop the noise drives u, and u what the disturbance does:
-/// the bound of its change has to cover that.
+/// The gain follows from R, the variance of the noise, and from Q, which bounds by how much the
+/// state may deviate from its model within a sample; for m = 1 this is mainly the change of the
+/// disturbance. P0 speeds up the start. `covariance` is a bound of the covariance of the error (as
+/// a matrix) if Q and R are bounds. In a closed loop the noise drives u, and u changes the
+/// disturbance: the bound has to cover this.
 ///
-/// Neither minimum variance nor unbiased in general: it is a guaranteed bound. With `none` as the
-/// inflation rule it is the Kalman filter of the chain driven by white noise.
+/// In general the estimate is neither of minimum variance nor unbiased; what is guaranteed is the
+/// bound. With `none` as the inflation rule it is the Kalman filter of the chain driven by white
+/// noise.
 ///
-/// The state before the first measurement is that of the sample before it, as everywhere: `update`
-/// predicts first. Where the initial estimate is meant for the first sample itself, as in the
+/// As everywhere, the initial state is that of the sample before the first measurement, because
+/// `update` predicts first. If the initial estimate is meant for the first sample itself, as in the
 /// paper, begin with `correct(y)`.
 ///
-/// The current (corrected) form z = z- + k (y - C z-). The predictor form of the paper, (4) with
-/// K = -Phi k, is the same filter looked at between `predict` and `correct`: `estimate` and
-/// `covariance` are those of the prediction then, and `predictor_gain` is -K.
+/// The current (corrected) form z = z- + k (y - C z-). The predictor form of the paper, (4) with K
+/// = -Phi k, is the same filter, read between `predict` and `correct`: there `estimate` and
+/// `covariance` are those of the prediction, and `predictor_gain` is -K.
 ///
 /// @tparam Order n @tparam S scalar @tparam Extension m
 /// @tparam Model of the disturbance, see NominalModel (m = 1 only)
@@ -82,7 +83,7 @@ class ExtendedStateFilter
   using Estimate = typename Base::Estimate;  ///< (y, .., y^(n-1), d, .., d^(m-1)), N x 1
   using Covariance = Matrix<S, N, N>;        ///< N x N, in the units of the estimates
 
-  /// What it is beyond LoopObserver.
+  /// What it declares beyond LoopObserver.
   static constexpr ObserverTraits traits = [] {
     ObserverTraits traits = Base::traits;
     traits.acts_by_gain = !has_model;
@@ -97,15 +98,16 @@ class ExtendedStateFilter
     S sample_time{};           ///< T, s
     S measurement_variance{};  ///< R >= 0, unit of y squared; 0: y is believed at once, whatever P0
 
-    /// q_r >= 0: what the estimate r may change by in a sample beyond its model, in its own unit;
-    /// for r < n what sampling neglects (zero in an exactly sampled chain), for r = n the change of
-    /// d, for m > 1 that of its derivatives. Q = bound_factor diag(q_r^2).
+    /// q_r >= 0: by how much state r may change in a sample beyond its model, in its own unit. For
+    /// r < n this is what sampling neglects (zero in an exactly sampled chain), for r = n the
+    /// change of d, for r > n that of its derivatives. Q = bound_factor diag(q_r^2).
     ///
-    /// For n + m odd and a bound of the highest state alone, y says nothing of an error that
-    /// changes sign at every sample: without noise the limit has a pole at -1, and that error fades
-    /// with 1/k only. Refused, unless R (or what Q adds to it at half the sampling rate) is a
-    /// millionth of the trace of Q, each state scaled by T^r/r!, or the inflation is 0.01 or more.
-    /// At that millionth it falls to 1e-6 in 2000 samples for n + m = 3, 4400 for 5, 20000 for 7.
+    /// If n + m is odd and only the highest state has a bound, y does not show an error that
+    /// changes sign at every sample: without noise the limit has a pole at -1, and that error
+    /// decays only as 1/k. This is refused, unless R (or what Q adds to it at half the sampling
+    /// rate) is a millionth of the trace of Q, each state scaled by T^r/r!, or the inflation is
+    /// 0.01 or more. At that millionth it falls to 1e-6 in 2000 samples for n + m = 3, 4400 for 5,
+    /// 20000 for 7.
     Array<S, N> disturbance_bounds{};
     /// c: N covers N bounded errors with any correlation; the paper prints 1 in (12), 2 in (34).
     S bound_factor{static_cast<double>(N)};
@@ -117,12 +119,13 @@ class ExtendedStateFilter
     InflationRule inflation_rule = InflationRule::fixed;  ///< how theta is chosen
     S inflation{};                                        ///< theta > 0 of the fixed rule
 
-    /// Accept that nothing disturbs the highest state: the gain tends to zero, and what is wrong of
-    /// the estimate stays the longer the longer the filter has run.
+    /// Accept that nothing disturbs the highest state. The gain then tends to zero, and the longer
+    /// the filter has run, the longer an error of the estimate stays.
     bool allow_vanishing_gain = false;
 
-    /// Adaptive rule: weights of the states' variances in the trace, each state taken in the unit
-    /// of y by T^r/r!. All one: the error counts by what it does to y within a sample.
+    /// Adaptive rule: weights of the states' variances in the trace, each state converted to the
+    /// unit of y by T^r/r!. With all weights one, an error counts by its effect on y within a
+    /// sample.
     Array<S, N> trace_weights = equal_weights();
 
     RiccatiMode mode = RiccatiMode::recursive;  ///< how the gain is obtained
@@ -131,8 +134,8 @@ class ExtendedStateFilter
     /// A Gaussian innovation passes 6.63 in 1 %, 10.8 in 0.1 %, 15.1 in 0.01 % of all samples. The
     /// gate widens with every sample that is missing, and opens after max_gap.
     S outlier_threshold{};
-    /// fbar. Its change over a sample is taken with the u that `predict` was told; `revise_input`
-    /// does not ask it again.
+    /// fbar. Its change over a sample is computed with the u given to `predict`; `revise_input`
+    /// does not compute it again.
     [[no_unique_address]] Model model{};
     /// What is known of the plant.
     [[no_unique_address]] typename PlantModel::Settings plant_model{};
@@ -159,10 +162,10 @@ class ExtendedStateFilter
   template <class T>
   using with_scalar =
       ExtendedStateFilter<Order, T, Extension, typename detail::ForScalar<Model, T>::type,
-                          TableSize, detail::WithScalar<PlantModel, T>>;  ///< of another scalar
+                          TableSize, detail::WithScalar<PlantModel, T>>;  ///< with another scalar
 
-  /// Takes the settings of `fresh`, as `make` gave it, with no design work; so does `retune`.
-  /// Estimate and covariance are kept, a change of b0 is moved into the disturbance.
+  /// Takes over the settings of `fresh`, as returned by `make`, without design work. As with
+  /// `retune`, estimate and covariance are kept, and a change of b0 is moved into the disturbance.
   Check<S> adopt(ExtendedStateFilter fresh) {
     if constexpr (PackScalar<S>) {
       return detail::adopt_lanes(*this, fresh);
@@ -242,7 +245,8 @@ class ExtendedStateFilter
     }
   }
 
-  /// False if the gate would take y for an outlier. Bad numbers are not its business.
+  /// False if the gate would take y for an outlier. True for a y that is not finite: `correct`
+  /// rejects it.
   [[nodiscard]] Lanes<bool, S> accepts(const S& y) const noexcept {
     if constexpr (PackScalar<S>) {
       Lanes<bool, S> in;
@@ -259,10 +263,10 @@ class ExtendedStateFilter
     }
   }
 
-  /// Starts anew at (y, 0, .., 0) with P0.
+  /// Restarts at (y, 0, .., 0) with P0.
   Status reset(S y) noexcept { return restart_clock(Base::reset(y)); }
 
-  /// Starts anew at a given estimate, N x 1, with P0.
+  /// Restarts at a given estimate, N x 1, with P0.
   Status reset(const Estimate& state) noexcept { return restart_clock(Base::reset(state)); }
 
   /// Bound of the covariance of the present estimate's error, N x N, in the units of the estimates:
@@ -412,7 +416,7 @@ class ExtendedStateFilter
   Lanes<std::uint64_t, S> sample_{};
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <int Order, Scalar S, int Extension, class Model, int TableSize, class PlantModel>
 inline constexpr std::uint32_t
     type_tag<ExtendedStateFilter<Order, S, Extension, Model, TableSize, PlantModel>> =

@@ -49,8 +49,8 @@ struct LinearEsoConfig<Size, S, Placement, Settings> {
 /// Linear extended state observer of a plant y^(n) = d + b0 u, sampled exactly.
 ///
 /// Current-estimator form: the estimate after `update` uses y of the same sample. Stable for every
-/// omega_o T > 0; unbiased for disturbances that are polynomials of degree < m in time.
-/// Error-based use: feed e = y_d - y as the measurement and give -b0 as input_gain.
+/// omega_o T > 0; unbiased for disturbances that are polynomials of degree < m in time. Error-based
+/// use: pass e = y_d - y as the measurement and -b0 as input_gain.
 ///
 /// @tparam Order n @tparam S scalar @tparam Extension m; n + m <= 16, tested for n to 8 and m to 4
 /// @tparam Placement EqualPoles (config by observer_bandwidth) or PoleSet (config by poles;
@@ -70,7 +70,7 @@ class LinearEso
  public:
   /// Settings of make.
   using Config = LinearEsoConfig<Order + Extension, S, Placement, typename Model::Settings>;
-  /// The same of another scalar.
+  /// The same with another scalar.
   template <class T>
   using with_scalar = LinearEso<Order, T, Extension, Placement, detail::WithScalar<Model, T>>;
 
@@ -80,7 +80,7 @@ class LinearEso
   }
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <int Order, Scalar S, int Extension, class Placement, class Model>
 inline constexpr std::uint32_t type_tag<LinearEso<Order, S, Extension, Placement, Model>> =
     make_type_tag<S, Placement, Model>("LinearEso", Order, Extension);

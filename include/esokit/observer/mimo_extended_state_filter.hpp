@@ -56,15 +56,15 @@ struct MimoExtendedStateFilterConfig {
   /// @endcond
 };
 
-/// Extended state filter of p plants y_i^(n_i) = d_i + sum_j B0_ij u_j, sampled exactly. What the
-/// plants do to each other beside B0 is part of d_i. The noises of the measurements may be
-/// correlated (full R), and so may be Q and P0 across the chains; with all of them block diagonal
-/// it is p filters side by side.
+/// Extended state filter of p plants y_i^(n_i) = d_i + sum_j B0_ij u_j, sampled exactly. Couplings
+/// between the plants other than B0 are part of d_i. The noises of the measurements may be
+/// correlated (full R), and Q and P0 may couple the chains; if all three are block diagonal, this
+/// is p independent filters.
 ///
-/// A measurement that is missing (NaN, infinite, or by `correct_some`) takes its channel out of the
-/// sample; the others are used. So does one that would make an estimate infinite. After more than
-/// `max_gap` of them in a row, or where it could not be predicted, a chain restarts from its next
-/// y.
+/// If a measurement is missing (NaN, infinite, or not present in `correct_some`) or would make an
+/// estimate infinite, its channel is left out of the sample; the others are used. After more than
+/// `max_gap` missing measurements in a row, or if it could not be predicted, a chain restarts from
+/// its next y.
 ///
 /// State order: chain by chain, (y_i, .., y_i^(n_i - 1), d_i, .., d_i^(m-1)).
 ///
@@ -146,8 +146,8 @@ class MimoExtendedStateFilter {
     return predicted | correct(y);
   }
 
-  /// Time update alone. A u that is bad in any element is replaced by the last good one. A chain
-  /// that cannot be predicted stands still, and its next good y restarts it.
+  /// Time update alone. A u with a bad element is replaced by the last good u. A chain that cannot
+  /// be predicted stands still until its next good y restarts it.
   StepStatus predict(const Input& u_applied) noexcept {
     StepStatus status = StepStatus::ok;
     for (int& missed : missed_) missed = missed < restart_due ? missed + 1 : restart_due;
@@ -234,14 +234,14 @@ class MimoExtendedStateFilter {
     return status;
   }
 
-  /// Starts anew at (y_i, 0, .., 0) with P0. A y that is not finite changes nothing.
+  /// Restarts at (y_i, 0, .., 0) with P0. A y that is not finite changes nothing.
   StepStatus reset(const Output& y) noexcept {
     Estimate state = Estimate::Zero();
     for (int i = 0; i < outputs; ++i) state(first(i)) = y(i);
     return reset(state);
   }
 
-  /// Starts anew at a given estimate, N x 1, physical units, with P0.
+  /// Restarts at a given estimate, N x 1, physical units, with P0.
   StepStatus reset(const Estimate& state) noexcept {
     Estimate next;
     for (int r = 0; r < size; ++r) next(r) = state(r) * units_(r);
@@ -782,7 +782,8 @@ class MimoExtendedStateFilter<Orders, Inputs, S, Extension>
   using Output = Vector<S, Orders::count>;  ///< y, p x 1
   using Input = Vector<S, Inputs>;          ///< u, q x 1
   template <class T>
-  using with_scalar = MimoExtendedStateFilter<Orders, Inputs, T, Extension>;  ///< of another scalar
+  using with_scalar =
+      MimoExtendedStateFilter<Orders, Inputs, T, Extension>;  ///< with another scalar
 
   using Base::Base;
 

@@ -16,7 +16,8 @@ namespace esokit {
 
 namespace detail {
 
-/// An observer of packs with a model: one a lane, each with the gaps that its model bears.
+/// An observer of packs with a model: one observer per lane, each bridging the gaps that its model
+/// allows.
 template <class Self, class Plain, PackScalar S, class Settings>
 class ModelLanes : public LaneByLane<Self, Plain, S, Settings> {
  public:
@@ -50,7 +51,7 @@ requires(!model_traits<Model>.is_chain)  //
           S, LinearEsoConfig<Order + Extension, S, Placement, typename Model::Settings>> {
  public:
   using LinearEso::ModelLanes::ModelLanes;
-  /// The same of another scalar.
+  /// The same with another scalar.
   template <class T>
   using with_scalar = LinearEso<Order, T, Extension, Placement, detail::WithScalar<Model, T>>;
 };
@@ -66,13 +67,13 @@ requires(!model_traits<Model>.is_chain)  //
           S, CascadeEsoConfig<Order + Extension, Levels, S, Placement, typename Model::Settings>> {
  public:
   using CascadeEso::ModelLanes::ModelLanes;
-  /// The same of another scalar.
+  /// The same with another scalar.
   template <class T>
   using with_scalar =
       CascadeEso<Order, Levels, T, Extension, Placement, detail::WithScalar<Model, T>>;
 };
 
-/// LinearEso that knows actuator, sensor, plant poles or what the disturbance swings at:
+/// LinearEso with a model of actuator, sensor, plant poles or the frequencies of the disturbance:
 ///
 ///     using Eso = ModelEso<ModelParts{.order = 1, .actuator = 1}>;
 ///     auto eso = Eso::make({.observer_bandwidth = 100, .input_gain = 1, .sample_time = 1e-3,
@@ -83,14 +84,14 @@ template <ModelParts Parts, Scalar S = double, class Placement = EqualPoles>
 using ModelEso = LinearEso<AugmentedModel<Parts, S>::order, S, AugmentedModel<Parts, S>::extension,
                            Placement, AugmentedModel<Parts, S>>;
 
-/// CascadeEso that knows the same.
+/// CascadeEso with the same model.
 template <ModelParts Parts, int Levels, Scalar S = double, class Placement = EqualPoles>
 using ModelCascadeEso =
     CascadeEso<AugmentedModel<Parts, S>::order, Levels, S, AugmentedModel<Parts, S>::extension,
                Placement, AugmentedModel<Parts, S>>;
 
-/// LinearEso of a whole plant, with a sensor and a disturbance that may swing or fade and enter
-/// elsewhere than u:
+/// LinearEso of a whole plant with a sensor. The disturbance may swing or fade, and may enter at
+/// another place than u:
 ///
 ///     using Eso = PlantEso<3, ModelParts{.order = 2, .resonators = 1}>;
 ///     auto eso = Eso::make({.observer_bandwidth = 100, .input_gain = plant.input_gain(),
@@ -102,15 +103,15 @@ template <int States, ModelParts Parts, PlainScalar S = double, class Placement 
 using PlantEso = LinearEso<Parts.order, S, LinearPlantModel<States, Parts, S>::extension, Placement,
                            LinearPlantModel<States, Parts, S>>;
 
-/// CascadeEso that knows the same.
+/// CascadeEso with the same model.
 template <int States, ModelParts Parts, int Levels, PlainScalar S = double,
           class Placement = EqualPoles>
 using PlantCascadeEso =
     CascadeEso<Parts.order, Levels, S, LinearPlantModel<States, Parts, S>::extension, Placement,
                LinearPlantModel<States, Parts, S>>;
 
-/// What a disturbance consists of, each in the unit of d: that of y^(n), or as E says of a
-/// LinearPlantModel.
+/// The parts of a disturbance, each in the unit of d: that of y^(n), or for a LinearPlantModel the
+/// one given by E.
 template <class Model>
 struct DisturbanceParts {
   using S = std::remove_cvref_t<decltype(std::declval<const Model&>().sample_time())>;  ///< scalar
@@ -120,11 +121,12 @@ struct DisturbanceParts {
   Array<S, Model::parts.leaky> fading;              ///< what fades, now
 };
 
-/// The parts of the disturbance that an observer with a model of parts has found, or the observer
-/// in an adapter, in any number of them, or in a controller.
+/// The parts of the disturbance, as estimated by an observer with a model of parts. The observer
+/// may be in adapters or in a controller.
 ///
-/// They are of d, not of D: without the plant's poles and the actuator, which `total_disturbance`
-/// has in it. An error-based controller observes r - y, whose disturbance has the opposite sign.
+/// They are parts of d alone; `total_disturbance` also contains the effect of the plant's poles and
+/// of the actuator. An error-based controller observes r - y, whose disturbance has the opposite
+/// sign.
 template <class Observer>
 [[nodiscard]] auto disturbance_parts(const Observer& observer) {
   if constexpr (requires {

@@ -1,6 +1,6 @@
 /// @file
-/// NamedObserver: what all observers with a name do around their config and their gain laws, in
-/// both time domains.
+/// NamedObserver: what all named observers share around their config and their gain laws, in both
+/// time domains.
 #pragma once
 
 #include <esokit/core/check.hpp>
@@ -11,9 +11,9 @@
 
 namespace esokit {
 
-/// Base of the observers with a name: `make`, and `retune` of a sampled one.
+/// Base of the named observers: `make`, and for sampled ones `retune`.
 ///
-/// A name is a model, a law, a config and a page of docs. An observer of your own is
+/// A named observer is a model, a law, a config and their documentation. Your own observer is
 ///
 ///     template <int Order, Scalar S = double>
 ///     class MyEso : public NamedObserver<MyEso<Order, S>,
@@ -31,9 +31,10 @@ namespace esokit {
 ///       }
 ///     };
 ///
-/// `design` gives the gain law, of a cascade all of them, as an Expected; it is asked once b0, T
-/// and max_gap are good, and of a continuous observer (`Base` a ContinuousObserver) with the config
-/// alone. For packs it also says `with_scalar` and, in its config, `fields`.
+/// `design` returns the gain law (for a cascade all laws) as an Expected. It is called after b0, T
+/// and max_gap have been checked; for a continuous observer (`Base` a ContinuousObserver) its only
+/// argument is the config. For packs the observer also declares `with_scalar` and its config
+/// `fields`.
 /// @tparam Self the observer itself @tparam Base PredictorCorrector or ContinuousObserver
 template <class Self, class Base>
 class NamedObserver : public Base {
@@ -75,7 +76,7 @@ class NamedObserver : public Base {
     }
   }
 
-  /// New settings while running: the estimate is kept, of all levels, a change of b0 is moved into
+  /// New settings while running. The estimates of all levels are kept; a change of b0 is moved into
   /// the disturbance (of level 1). A refused config changes nothing.
   template <class O = Self>
   requires sampled Check<scalar_type> retune(const typename O::Config& config) {

@@ -19,14 +19,14 @@ namespace esokit {
 /// (N = 3: 0.15 for 3.5 / omega_o, 5 for 0.2 / omega_o, and so on). So k is kept between gain_min
 /// and gain_max, a pair for which the error decays however k varies between them (a common
 /// quadratic Lyapunov function, see gain/switching_certificate.hpp). By default
-/// - gain_min is 1/2, the round number from which on, for T -> 0, every gain_max is certified, for
-///   every N; or where omega_o T is large, three quarters of the way from 1 down to the least that
-///   is certified;
-/// - gain_max is half of the way from 1 up to the largest that is certified; at that one itself the
-///   error would ring undamped, and k rises as e vanishes.
-/// A pair without the certificate, or no limits at all, has to be asked for by name.
+/// - gain_min is 1/2, a round number above which, for T -> 0, every gain_max is certified for every
+///   N. If omega_o T is large, it is three quarters of the way from 1 down to the smallest
+///   certified value;
+/// - gain_max is halfway from 1 to the largest certified value; at that value itself the error
+///   would ring undamped, and k rises as e vanishes. A pair without the certificate, or no limits
+///   at all, has to be requested by a member of the config.
 ///
-/// k = 1 is LinearEso, bit for bit. The certificate is about samples without gaps.
+/// k = 1 is LinearEso, bit for bit. The certificate applies to samples without gaps.
 /// @tparam Order n @tparam S scalar @tparam Extension m
 /// @tparam Shape an EvenGain: PowerSumGain (the paper's g), FalGain, or a function object of yours
 template <int Order, Scalar S = double, int Extension = 2, class Shape = PowerSumGain<S>>
@@ -66,12 +66,13 @@ class NonlinearEso
   template <class T>
   using with_scalar =
       NonlinearEso<Order, T, Extension,
-                   typename detail::ForScalar<Shape, T>::type>;  ///< of another scalar
+                   typename detail::ForScalar<Shape, T>::type>;  ///< with another scalar
 
   using Report = NonlinearGainReport<detail::TableScalar<S>>;  ///< see `report`
 
-  /// What is known of a config's k: constant-k intervals, limits, and the errors at which the given
-  /// k is outside of them. Errors as `make`; it is not needed for running.
+  /// Report on the k of a config: the stable intervals for constant k, the limits, and the errors e
+  /// at which the given k is outside of them. It fails as `make` does, and is not needed at run
+  /// time.
   static Expected<Report, Error<S>> report(const Config& config) requires PlainScalar<S> {
     const auto made = NonlinearEso::make(config);
     if (!made) return made.error();
@@ -132,7 +133,7 @@ class NonlinearEso
   }
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <int Order, Scalar S, int Extension, class Shape>
 inline constexpr std::uint32_t type_tag<NonlinearEso<Order, S, Extension, Shape>> =
     make_type_tag<S, Shape>("NonlinearEso", Order, Extension);

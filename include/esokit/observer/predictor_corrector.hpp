@@ -1,5 +1,5 @@
 /// @file
-/// The sampled predictor-corrector that every observer is, written once.
+/// The sampled predictor-corrector that all observers share.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@
 
 namespace esokit {
 
-/// What every sampled observer's config says about its chain.
+/// The settings of the chain, common to all sampled observers.
 template <Scalar S>
 struct ChainConfig {
   S input_gain{};     ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
@@ -45,16 +45,16 @@ Check<S> check_chain(const ChainConfig<S>& config) {
 
 }  // namespace detail
 
-/// A row of `Levels` chains with one gain law each; one level is the plain observer, more are the
-/// cascade. Level 1 is corrected by y and driven by u, level i is corrected by the corrected output
-/// of level i - 1 and driven by u and the disturbances that the levels below it found.
+/// `Levels` chains in series with one gain law each: one level is the plain observer, more are the
+/// cascade. Level 1 is corrected by y and driven by u. Level i is corrected by the corrected output
+/// of level i - 1 and driven by u and the disturbances found by the levels before it.
 ///
 /// One instance belongs to one thread. No member allocates, throws or locks after `make`.
 ///
-/// Whatever numbers came in, good samples lead back: what is wrong of the estimate decays by
-/// e^(-omega_o T) a sample, from the largest number to rounding in 60 + 2 ln(max / epsilon) /
-/// (omega_o T) samples at most (tested with every observer and adapter: double 60 + 1500 /
-/// (omega_o T), float 60 + 210 / (omega_o T)).
+/// After any input, good samples lead back to a good estimate: its error decays by e^(-omega_o T) a
+/// sample, from the largest number to rounding in at most 60 + 2 ln(max / epsilon) / (omega_o T)
+/// samples (tested with every observer and adapter: double 60 + 1500 / (omega_o T), float 60 + 210
+/// / (omega_o T)).
 ///
 /// @tparam Order n, order of the plant @tparam Extension m, extended states
 /// @tparam Law gain law, see GainLaw @tparam Levels p
@@ -81,12 +81,12 @@ class PredictorCorrector {
   using Laws = Array<Law, Levels>;                 ///< one a level
   using Status = StatusOf<S>;                      ///< StepStatus, of a pack one a lane
 
-  /// The same of another scalar.
+  /// The same with another scalar.
   template <class T>
   using with_scalar = PredictorCorrector<Order, T, Extension, detail::WithScalar<Law, T>, Levels,
                                          detail::WithScalar<Model, T>>;
 
-  /// What it is beyond LoopObserver.
+  /// What it declares beyond LoopObserver.
   static constexpr ObserverTraits traits{
       .publishes_chain = true,
       .acts_by_gain = gain_law_traits<Law>.kind == GainKind::preset,
@@ -96,7 +96,7 @@ class PredictorCorrector {
       .bears_guards = gain_law_traits<Law>.kind == GainKind::preset &&
                       !gain_law_traits<Law>.advances && model_traits<Model>.is_chain};
 
-  /// From chain settings and ready gain laws; the way in for a gain law of your own.
+  /// From chain settings and ready gain laws; use this for your own gain law.
   /// @return error for input_gain, sample_time or max_gap out of its rule
   static Expected<PredictorCorrector, Error<S>> make(const ChainConfig<S>& config,
                                                      const Laws& laws) {
@@ -209,14 +209,14 @@ class PredictorCorrector {
   /// dhat, unit of y^(n).
   [[nodiscard]] constexpr S total_disturbance() const noexcept { return estimate<Order>(); }
 
-  /// What the next measurement is expected to be.
+  /// The expected next measurement.
   [[nodiscard]] constexpr const S& predicted_measurement() const noexcept { return states_[0][0]; }
 
   /// y - z_1 of the last correction, with the predicted z_1 (of level 1).
   [[nodiscard]] constexpr const S& innovation() const noexcept { return innovation_; }
 
-  /// Predictions since the last correction; 0 when up to date; 65535 where the state was so large
-  /// that it could not be predicted: the next good y restarts the observer.
+  /// Predictions since the last correction; 0 when up to date. 65535 if the state was too large to
+  /// be predicted: then the next good y restarts the observer.
   [[nodiscard]] constexpr Lanes<int, S> missed() const noexcept {
     if constexpr (PackScalar<S>) {
       Lanes<int, S> missed;
@@ -230,14 +230,15 @@ class PredictorCorrector {
   /// Input that the last prediction used.
   [[nodiscard]] constexpr const S& applied_input() const noexcept { return applied_input_; }
 
-  /// What a coming `correct(y)` will make of the estimate, in scaled states (x_r = T^r z_r / r!).
-  /// For a controller that works ahead of the measurement.
+  /// The estimate after the coming `correct(y)`, as a function of y, in scaled states (x_r = T^r
+  /// z_r / r!). For a controller that computes before the measurement arrives.
   struct Preview {
     State offset;  ///< after correct(y) the estimate will be offset + slope y
     State slope;   ///< its derivative by y
   };
 
-  /// Between `predict` and `correct`, for gain laws whose gain is known before the measurement.
+  /// To be called between `predict` and `correct`, for gain laws whose gain is known before the
+  /// measurement.
   [[nodiscard]] Preview preview() const noexcept requires PresetGainLaw<Law, size, S> {
     if constexpr (PackScalar<S>) {
       if (!(gap_ == 1 || gap_ == 0)) {
@@ -264,8 +265,8 @@ class PredictorCorrector {
             by_rows(up_to_level<Levels - 1>(slope.states))};
   }
 
-  /// The scaled gain with which a coming `correct(y)` will weigh the innovation e; after a gap that
-  /// of the gap. A gap beyond `max_gap` is none of its business: `correct` restarts then.
+  /// The scaled gain with which the coming `correct(y)` will weight the innovation e; after a gap,
+  /// the gain for the gap. Gaps above `max_gap` are ignored here: then `correct` restarts.
   [[nodiscard]] ScaledGain<size, S> correction_gain(const S& e) const noexcept
       requires(Levels == 1) {
     if constexpr (PackScalar<S>) {
@@ -280,7 +281,7 @@ class PredictorCorrector {
     return law_gain(laws_[0], e, elapsed());
   }
 
-  /// The gain law, for a controller that works ahead of the measurement.
+  /// The gain law, for a controller that computes before the measurement arrives.
   [[nodiscard]] constexpr const Law& gain_law() const noexcept requires(Levels == 1) {
     return laws_[0];
   }
@@ -296,9 +297,9 @@ class PredictorCorrector {
     }
   }
 
-  /// After `predict`, before `correct`: the actuator held `u_applied` and not what `predict` was
-  /// told. Adds Gamma (u_applied - u_told) to the prediction. A u that is bad, or would make the
-  /// prediction not finite, changes nothing and is reported.
+  /// To be called between `predict` and `correct` if the actuator held `u_applied` and not the u
+  /// given to `predict`. Adds Gamma (u_applied - u_given) to the prediction. A u that is not
+  /// finite, or would make the prediction not finite, changes nothing and is reported.
   Status revise_input(S u_applied) noexcept {
     LevelStates next = states_;
     for (auto& state : next) state = model_.add_input(state, S(u_applied - applied_input_));
@@ -368,10 +369,10 @@ class PredictorCorrector {
     }
   }
 
-  /// Starts anew at (y, 0, .., 0). A y that is not finite changes nothing and is reported.
+  /// Restarts at (y, 0, .., 0). A y that is not finite changes nothing and is reported.
   Status reset(S y) noexcept { return reset_scaled(standing(y)); }
 
-  /// Starts anew at a given estimate, N x 1, physical units. A state that is not finite changes
+  /// Restarts at a given estimate, N x 1, physical units. A state that is not finite changes
   /// nothing and is reported.
   Status reset(const Estimate& state) noexcept { return reset_scaled(model_.scaled(state)); }
 
@@ -856,7 +857,7 @@ class PredictorCorrector {
   static_assert(Levels >= 1, "esokit: at least one level is needed");
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <int Order, Scalar S, int Extension, class Law, int Levels, class Model>
 inline constexpr std::uint32_t
     type_tag<PredictorCorrector<Order, S, Extension, Law, Levels, Model>> =

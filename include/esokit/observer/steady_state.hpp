@@ -1,12 +1,12 @@
 /// @file
-/// An observer in the steady state of its plant: where controllers start, and start again.
+/// An observer in the steady state of its plant: the state in which controllers start and restart.
 #pragma once
 
 #include <esokit/observer/concepts.hpp>
 
 namespace esokit::detail {
 
-/// Puts the observer there, as if u had been applied for long.
+/// Sets the observer to the steady state, as if u had been applied for a long time.
 /// @return ok, or state_rejected if something is not finite: nothing changes then
 template <class Observer, class S>
 StepStatus start_at_rest(Observer& observer, const S& y, const S& u) noexcept {

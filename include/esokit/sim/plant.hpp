@@ -101,8 +101,8 @@ struct NonlinearPlant {
   using Output = ScalarOrVector<ScalarType, Outputs>;  ///< y: a number if it is one
   using Time = LaneScalar<ScalarType>;                 ///< t, s
 
-  /// The same of another scalar. Functions that hold numbers have a `with_scalar`, and `fields`, of
-  /// their own; others take any scalar.
+  /// The same with another scalar. Functions that hold numbers have a `with_scalar`, and `fields`,
+  /// of their own; others take any scalar.
   template <class T>
   requires(esokit::detail::has_other_scalars<F>&&
                esokit::detail::has_other_scalars<H>) using with_scalar =
