@@ -27,7 +27,7 @@ struct AdrcConfig {
   bool half_gain = false;     ///< half-gain tuning of the controller; of the observer: HalfGainEso
   Limits<S> limits{};         ///< of the actuator
   StartHold<S> start_hold{};  ///< u at first, while the observer finds the state
-  MissingRule<S> missing{};   ///< what to do when measurements stay away
+  MissingRule<S> missing{};   ///< what to do when measurements are missing
   int measurement_divider = 1;  ///< D: a measurement is due at every D-th update, the others ignore
                                 ///< y; 1 .. 1000, not above the observer's max_gap
 
@@ -41,32 +41,33 @@ struct AdrcConfig {
 
 /// u = (v - dhat) / b0 around an observer, within an actuator's limits.
 ///
-/// Timing: `update` at sample k takes y[k] and the reference of now and returns the u to be held
-/// until k + 1. The input of k - 1 .. k, which the observer needs, is what `update` returned last,
-/// limited; where the actuator knows better, give it as `u_applied`.
+/// Timing: `update` at sample k takes y[k] and the present reference and returns the u to be held
+/// until k + 1. As the input of k - 1 .. k the observer gets the limited u that `update` returned
+/// last; if the actuator reports another value, pass it as `u_applied`.
 ///
-/// Start: `make` stands at y = 0, u = 0. `start(y, u)` takes over a plant that stands at y under u
-/// without a bump: with the reference at y, or a tracking differentiator reset to y, the first u is
-/// that u. From manual operation, `track` the operator's u and go on with `update`; there is no
-/// step if the plant has come to rest (dhat = -b0 u) and the reference is at y.
+/// Start: after `make` the controller is at y = 0, u = 0. `start(y, u)` takes over a plant that
+/// stands at y under u without a bump: with the reference at y, or a tracking differentiator reset
+/// to y, the first u is that u. During manual operation pass the operator's u to `track`, then go
+/// on with `update`; there is no step if the plant has come to rest (dhat = -b0 u) and the
+/// reference is at y.
 ///
 /// Retuning (`retune`, any member of the config): the estimate and u are kept. A change of omega_o
-/// alters u by nothing while the innovation is zero; a change of b0 is moved into dhat,
-/// (b0_old - b0_new) u with the u before the last sample, so u alters by no more than it changes by
-/// in a sample anyway; a change of omega_c alters u by (dk_0 (r - y) - dk_1 y' ..) / b0. All three
-/// are without a step in the steady state.
+/// does not alter u if the innovation is zero; a change of b0 is moved into dhat, (b0_old - b0_new)
+/// u with the u before the last sample, so u alters by no more than its usual change in a sample; a
+/// change of omega_c alters u by (dk_0 (r - y) - dk_1 y' ..) / b0. All three are without a step in
+/// the steady state.
 ///
 /// Missing measurements: NaN or `update_without_measurement`. The observer predicts, and corrects
-/// with the gain for the whole gap; after `missing.most` in a row `mode()` says `safe` and u goes
-/// to `missing.input`.
+/// with the gain for the whole gap; after `missing.most` in a row `mode()` is `safe` and u goes to
+/// `missing.input`.
 ///
-/// A reference that is not finite keeps u where it is (in the error-based form it is a missing
-/// measurement). A u_applied that is not finite is taken for
-/// what was put out. No call allocates, throws or locks.
+/// If the reference is not finite, u stays the same (in the error-based form this is a missing
+/// measurement). A u_applied that is not finite is replaced by the u that was put out. No call
+/// allocates, throws or locks.
 ///
-/// Delays, angles, a changing sample time and known plant models are the observer's affair: take
-/// DelayedInput, WrappedOutput, VariableTime or KnownModel around it; they nest, DelayedInput
-/// outside of KnownModel.
+/// Delays, angles, a changing sample time and known nonlinear terms are handled by the observer:
+/// put DelayedInput, WrappedOutput, VariableTime or KnownModel around it. They nest; DelayedInput
+/// goes around KnownModel.
 /// @tparam Form OutputBased or ErrorBased
 template <LoopObserver Observer, class Form = OutputBased>
 class Adrc {
@@ -76,10 +77,10 @@ class Adrc {
  public:
   static constexpr int order = Observer::order;        ///< n, order of the plant
   using scalar_type = typename Observer::scalar_type;  ///< of signals and settings
-  using S = scalar_type;                               ///< the same
+  using S = scalar_type;                               ///< the same type
   using Reference = Vector<S, order + 1>;              ///< (r, r', .., r^(n)), n + 1 x 1
 
-  /// What it is beyond `update(y, reference)`.
+  /// What it declares beyond `update(y, reference)`.
   static constexpr ControllerTraits traits{.takes_derivatives = true,
                                            .knows_sample_time = true,
                                            .varies_time = observer_traits<Observer>.varies_time,
@@ -108,30 +109,28 @@ class Adrc {
     return loop_.step(measured(y, r), [&]() ESOKIT_INLINE_LAMBDA { return command(r); });
   }
 
-  /// The same where the actuator reports what it held since the last sample.
+  /// The same if the actuator reports what it held since the last sample.
   S update(S y, S reference, S u_applied) noexcept {
     const S r = reference;
     return loop_.step(measured(y, r), u_applied, [&]() ESOKIT_INLINE_LAMBDA { return command(r); });
   }
 
-  /// With a reference that moves. @param reference (r, r', ..), any number up to n + 1 of them; the
-  /// rest counts as zero. A tracking differentiator gives such a vector. The error-based form uses
-  /// r alone.
+  /// With a moving reference. @param reference (r, r', ..), up to n + 1 elements; the rest counts
+  /// as zero. A tracking differentiator gives such a vector. The error-based form uses r alone.
   template <detail::VectorOf<S> Given>
   S update(S y, const Given& reference) noexcept {
     const Reference r = filled(reference);
     return loop_.step(measured(y, r(0)), [&] { return command(r); });
   }
 
-  /// Both: a reference that moves, and what the actuator held since the last sample.
+  /// Both: a moving reference, and the u that the actuator held since the last sample.
   template <detail::VectorOf<S> Given>
   S update(S y, const Given& reference, S u_applied) noexcept {
     const Reference r = filled(reference);
     return loop_.step(measured(y, r(0)), u_applied, [&] { return command(r); });
   }
 
-  /// The same by a list: `update(y, {r, r1, r2})`.
-  /// @{
+  /// The same with a list: `update(y, {r, r1, r2})`. @{
   template <std::size_t Count>
   S update(S y, const S (&reference)[Count]) noexcept {
     return update(y, detail::listed(reference));
@@ -146,12 +145,12 @@ class Adrc {
   }
   /// @}
 
-  /// One sample whose measurement did not come.
+  /// One sample whose measurement is missing.
   S update_without_measurement(S reference) noexcept {
     return loop_.step_without_measurement([&] { return command(reference); });
   }
 
-  /// The same with a reference that moves.
+  /// The same with a moving reference.
   template <detail::VectorOf<S> Given>
   S update_without_measurement(const Given& reference) noexcept {
     const Reference r = filled(reference);
@@ -164,7 +163,7 @@ class Adrc {
     return loop_.track(measured(y, reference), u_applied);
   }
 
-  /// The plant stands, or is carried: the observer follows y, dhat stands still, u is the
+  /// For a plant that stands or is carried: the observer follows y, dhat stays the same, u is the
   /// caller's; see Guarded. On release begin with the reference at y.
   /// @param u_applied what the actuator held since the last sample @return the same
   S hold(S y, S reference, S u_applied) noexcept
@@ -172,7 +171,7 @@ class Adrc {
     return loop_.hold(measured(y, reference), u_applied);
   }
 
-  /// b0 of now, before the sample; see Guarded. @return as there
+  /// Sets b0 before the sample; see Guarded. @return as there
   Check<S> set_input_gain(const S& b) noexcept
       requires(observer_traits<Observer>.schedules_input_gain) {
     return observer().set_input_gain(error_based ? S(-b) : b);
@@ -197,12 +196,12 @@ class Adrc {
     }
   }
 
-  /// New settings while running. A refused config changes nothing. A start hold that is running
-  /// keeps its time, a new one counts for nothing.
+  /// New settings while running. A refused config changes nothing. A running start hold keeps its
+  /// time; a new one has no effect.
   Check<S> retune(const Config& config) { return detail::retune(*this, config); }
 
-  /// The same, with the settings of `fresh`, as `make` gave it: no design work, fit for an
-  /// interrupt.
+  /// The same with the settings of `fresh`, as returned by `make`: without design work, so it may
+  /// run in an interrupt.
   Check<S> adopt(const Adrc& fresh) {
     if constexpr (PackScalar<S>) return detail::adopt_lanes(*this, fresh);
     if (auto ok = loop_.adopt(fresh.loop_); !ok) return ok;
@@ -212,8 +211,8 @@ class Adrc {
     return {};
   }
 
-  /// How long the next step takes, s; for Adrc<VariableTime<..>>. The observer's gains, the rate
-  /// limit and, where placed in the sampled domain, the controller's gains follow. A length that
+  /// Sets the length of the next step, s; for Adrc<VariableTime<..>>. The observer's gains, the
+  /// rate limit and, if placed in the sampled domain, the controller's gains follow. A length that
   /// the observer's config does not allow is refused and changes nothing.
   template <class O = Observer>
   requires(observer_traits<O>.varies_time) Check<S> set_step_time(const S& seconds)
@@ -233,15 +232,15 @@ class Adrc {
 
   /// The observer, for its estimates.
   [[nodiscard]] const Observer& observer() const noexcept { return loop_.observer(); }
-  /// The observer, for what only it can do (AlgebraicEso::rearm).
+  /// The observer, for its own members (AlgebraicEso::rearm).
   [[nodiscard]] Observer& observer() noexcept { return loop_.observer(); }
   /// T, s.
   [[nodiscard]] S sample_time() const noexcept { return loop_.observer().sample_time(); }
-  /// The u that holds now, within the limits.
+  /// The present u, within the limits.
   [[nodiscard]] const S& output() const noexcept { return loop_.output(); }
-  /// What the law asked for before the limits.
+  /// The u requested by the law, before the limits.
   [[nodiscard]] const S& requested() const noexcept { return loop_.requested(); }
-  /// What the observer said of the last sample.
+  /// Status of the observer at the last sample.
   [[nodiscard]] Status status() const noexcept { return loop_.status(); }
   /// Whether the law, the start hold or the missing rule decides about u.
   [[nodiscard]] Lanes<LoopMode, S> mode() const noexcept { return loop_.mode(); }
@@ -368,7 +367,7 @@ class Adrc {
   [[no_unique_address]] std::conditional_t<has_step_time, FeedbackSpec<S>, NoSpec> spec_;
 };
 
-/// The same with an observer that goes lane by lane.
+/// The same with an observer that is computed lane by lane.
 template <LoopObserver Observer, class Form>
 requires detail::goes_lane_by_lane<Observer>
 class Adrc<Observer, Form>

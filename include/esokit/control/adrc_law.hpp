@@ -13,15 +13,15 @@
 
 namespace esokit {
 
-/// The observer is fed y, the law takes r and, where known, its derivatives.
+/// The observer gets y; the law takes r and, if known, its derivatives.
 struct OutputBased {};
 
 /// Distinguishes the type in snapshots.
 template <>
 inline constexpr std::uint32_t type_tag<OutputBased> = make_type_tag<>("OutputBased");
 
-/// The observer is fed e = r - y; what r does is part of the disturbance, and no derivative of r is
-/// needed. For a constant reference it equals the output-based form.
+/// The observer gets e = r - y; the motion of r is part of the disturbance, so no derivative of r
+/// is needed. For a constant reference it equals the output-based form.
 struct ErrorBased {};
 
 /// Distinguishes the type in snapshots.

@@ -1,5 +1,5 @@
 /// @file
-/// The algebraic observer as its paper writes it: a linear filter with time-varying inputs and
+/// The algebraic observer in the form of its paper: a linear filter with time-varying inputs and
 /// outputs (J. Kasac, A. Pender, M. Pranjic, D. Kotarski, Asian Journal of Control 23 (2021)
 /// 2171-2184, Eqs. (35)-(51)), here for any order and any number of extended states.
 ///

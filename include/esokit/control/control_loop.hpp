@@ -1,6 +1,6 @@
 /// @file
-/// What every controller built on an observer has to do around its law: feed back the applied
-/// input, limit, ride through missing samples, start softly.
+/// What every controller with an observer does around its law: feed back the applied input, limit
+/// u, bridge missing samples, start without a bump.
 #pragma once
 
 #include <cmath>
@@ -24,14 +24,14 @@ struct StartHold {
   /// @endcond
 };
 
-/// What happens when measurements stay away (or are NaN).
+/// What happens if measurements are missing (or NaN).
 template <Scalar S = double>
 struct MissingRule {
-  int most = 50;  ///< missing measurements in a row that the controller rides through, 0 up to
+  int most = 50;  ///< missing measurements in a row that the controller bridges, 0 up to
                   ///< 65535 / measurement_divider - 1
   std::optional<S>
       input{};        ///< u from then on, reached within the rate limit; left out: the last u
-  bool stay = false;  ///< true: until start(); false: a measurement ends it
+  bool stay = false;  ///< safe mode lasts true: until start(); false: until a measurement
 
   /// @cond
   static constexpr auto fields(auto& rule) noexcept {
@@ -45,7 +45,7 @@ template <Scalar S = double>
 struct LoopSettings {
   Limits<S> limits{};           ///< of the actuator
   StartHold<S> start_hold{};    ///< u at first, while the observer finds the state
-  MissingRule<S> missing{};     ///< what to do when measurements stay away
+  MissingRule<S> missing{};     ///< what to do when measurements are missing
   int measurement_divider = 1;  ///< D: a measurement is due at every D-th step, 1 .. 1000
 
   /// @cond
@@ -111,7 +111,7 @@ Expected<CheckedLoop<S>, Error<S>> check_loop(const LoopSettings<S>& settings, S
 
 }  // namespace detail
 
-/// What decides about the output now.
+/// What determines the output now.
 enum class LoopMode : unsigned char {
   running,     ///< the law
   start_hold,  ///< u stands still at first
@@ -144,22 +144,23 @@ ESOKIT_INLINE S by_present_gain(const Observer& observer, const S& u) noexcept {
 
 }  // namespace detail
 
-/// An observer, an actuator's limits, and the rules for bad days. `step` runs one sample with any
-/// law; the controllers (Adrc, DisturbanceCompensator) are this and a law.
+/// An observer, the limits of an actuator, and rules for start-up and for missing or invalid
+/// measurements. `step` runs one sample with any law; a controller (Adrc, DisturbanceCompensator)
+/// is such a loop with a law.
 ///
-/// The input that the observer is told is the limited one, or what the actuator reports.
+/// The observer gets the limited input, or the one that the actuator reports.
 template <LoopObserver Observer>
 class ControlLoop {
  public:
   using S = typename Observer::scalar_type;  ///< of signals and settings
-  using scalar_type = S;                     ///< the same
+  using scalar_type = S;                     ///< the same type
   using Status = StatusOf<S>;                ///< StepStatus, of a pack one a lane
   template <class T>
   using with_scalar =
       ControlLoop<detail::WithScalar<Observer, T>>;  ///< the same with another scalar
 
   /// Checks the settings.
-  /// @param observer as its own `make` gives it
+  /// @param observer as returned by its `make`
   /// @return the loop, with the observer in the state that it has, or an error that names the field
   static Expected<ControlLoop, Error<S>> make(const Observer& observer,
                                               const LoopSettings<S>& settings) {
@@ -185,14 +186,14 @@ class ControlLoop {
     return step_driven(measured, limiter_.last(), law);
   }
 
-  /// The same where the actuator reports what it held from k - 1 to k.
+  /// The same if the actuator reports what it held from k - 1 to k.
   template <class Law>
   ESOKIT_INLINE S step(S measured, S u_applied, Law&& law) noexcept {
     report_applied(u_applied);
     return step(measured, law);
   }
 
-  /// The same where something else than u drives the observer's chain.
+  /// The same if something other than u drives the observer's chain.
   /// @param drive what stood in the place of u from k - 1 to k
   template <class Law>
   ESOKIT_INLINE S step_driven(S measured, S drive, Law&& law) noexcept {
@@ -224,8 +225,9 @@ class ControlLoop {
     return limiter_.last();
   }
 
-  /// The plant stands, or is carried, and u is someone else's: the observer follows y, dhat stands
-  /// still, see Guarded. @param u_applied what was held from k - 1 to k @return the same
+  /// For a plant that stands or is carried while u comes from elsewhere: the observer follows y,
+  /// dhat stays the same; see Guarded. @param u_applied what was held from k - 1 to k @return the
+  /// same
   S hold(S measured, S u_applied) noexcept requires(observer_traits<Observer>.gates_disturbance) {
     const S trust = observer_.trust();
     observer_.set_trust(S(0));
@@ -256,8 +258,8 @@ class ControlLoop {
     }
   }
 
-  /// Takes the settings of `fresh`; state, output and mode are kept. What the observer refuses
-  /// changes nothing.
+  /// Takes over the settings of `fresh`; state, output and mode are kept. If the observer refuses
+  /// them, nothing changes.
   Check<S> adopt(const ControlLoop& fresh) {
     if constexpr (PackScalar<S>) return detail::adopt_lanes(*this, fresh);
     if (auto ok = observer_.adopt(fresh.observer_); !ok) return ok;
@@ -277,7 +279,7 @@ class ControlLoop {
     return {};
   }
 
-  /// How long the next step takes (s), where the observer is VariableTime; the rate limit follows.
+  /// Sets the length of the next step (s) if the observer is VariableTime; the rate limit follows.
   /// A length that the observer refuses changes nothing.
   template <class O = Observer>
   requires(observer_traits<O>.varies_time) Check<S> set_step_time(const S& seconds)
@@ -296,11 +298,11 @@ class ControlLoop {
   [[nodiscard]] Observer& observer() noexcept { return observer_; }
   /// The last output (limited), or what was reported as applied after it.
   [[nodiscard]] const S& output() const noexcept { return limiter_.last(); }
-  /// What the law asked for before the limits.
+  /// The u requested by the law, before the limits.
   [[nodiscard]] const S& requested() const noexcept { return requested_; }
-  /// What the observer said of the last step.
+  /// Status of the observer at the last step.
   [[nodiscard]] Status status() const noexcept { return status_; }
-  /// What decides about the output now.
+  /// What determines the output now.
   [[nodiscard]] Lanes<LoopMode, S> mode() const noexcept { return mode_; }
   /// D: a measurement is due at every D-th step.
   [[nodiscard]] int measurement_divider() const noexcept { return divider_; }

@@ -1,5 +1,6 @@
 /// @file
-/// What a controller has to offer for the rest of the house (a simulation, say) to drive it.
+/// What a controller must offer so that the rest of the library (a simulation, for example) can
+/// drive it.
 #pragma once
 
 #include <concepts>
@@ -11,8 +12,8 @@
 
 namespace esokit {
 
-/// What a controller is beyond `u = controller(y, reference)`: `static constexpr ControllerTraits
-/// traits{..}` in it. One that declares nothing is what the defaults say.
+/// What a controller declares beyond `u = controller(y, reference)`, in a member `static constexpr
+/// ControllerTraits traits{..}`. For a controller without it the defaults apply.
 struct ControllerTraits {
   /// u is `control(y)`; `prepare(next_reference)` comes after it, and `set_reference(reference)`
   /// before the first sample. See PredictiveAdrc.
@@ -67,9 +68,10 @@ using WithDerivatives = Vector<Reference, C::order + 1>;
 
 /// A controller of plants with the measurement Y and the input U (numbers, or vectors of several
 /// channels): `controller(y, reference)`, a lambda for one, or `controller.update(y, reference)`,
-/// called once a sample, gives u until the next one. y is NaN where a measurement is missing.
+/// called once a sample, gives u until the next one. y is NaN if a measurement is missing.
 ///
-/// Copyable: a simulation drives a copy. What else it can do it declares, see ControllerTraits.
+/// It must be copyable, because a simulation drives a copy. It declares what else it can do, see
+/// ControllerTraits.
 template <class C, class Y, class U = Y, class Reference = Y>
 concept Controller =
     std::copy_constructible<C> && DeclaresTraits<C, ControllerTraits> &&

@@ -1,5 +1,5 @@
 /// @file
-/// DisturbanceCompensator: disturbance rejection around a controller that exists already.
+/// DisturbanceCompensator: disturbance rejection around an existing controller.
 #pragma once
 
 #include <esokit/control/control_loop.hpp>
@@ -19,7 +19,7 @@ struct DisturbanceCompensatorConfig {
   std::optional<S> compensation_gain{};  ///< K, unit of u per unit of y^(n); left out: -1/b0
   Limits<S> limits{};                    ///< of the actuator
   StartHold<S> start_hold{};             ///< u at first, while the observer finds the state
-  MissingRule<S> missing{};              ///< what to do when measurements stay away
+  MissingRule<S> missing{};              ///< what to do when measurements are missing
   int measurement_divider = 1;           ///< D: a measurement is due at every D-th update
 
   /// @cond
@@ -34,28 +34,27 @@ struct DisturbanceCompensatorConfig {
 /// a plant that is nearly y^(n) = b0 u0. The same limits, start, missing and retuning rules as
 /// Adrc.
 ///
-/// With an actuator in the observer's model its lag is taken off as well: of first order, the
-/// controller sees
-/// y^(n+1) = b0 / tau u0, and has to be one for that (a PD where it was a P).
+/// With an actuator in the observer's model its lag is removed as well. With a lag of first order
+/// the controller sees y^(n+1) = b0 / tau u0 and has to be designed for that plant (a PD instead of
+/// a P).
 ///
-/// A disturbance that does not come in where u does (mismatched): put the observer where it comes
-/// in, tell it with `update_driven` what drives that equation beside the disturbance (another
-/// state, in the place of u), and give the gain K that takes the estimate to u, for example
-/// -(C A^-1 B)^-1 C A^-1 B_d of the loop under u0, which removes the disturbance from y in the
-/// steady state.
+/// If the disturbance does not enter where u does (mismatched), apply the observer to the equation
+/// where it enters. Pass the quantity that drives this equation (another state instead of u) to
+/// `update_driven`, and choose the gain K from the estimate to u, for example -(C A^-1 B)^-1 C A^-1
+/// B_d of the loop under u0, which removes the disturbance from y in the steady state.
 ///
-/// An integrator in the wrapped controller has nothing left to do; where it already carries the
-/// disturbance, `start(y, u)` and set the controller's output to `base_output()`: the sum goes on
-/// from u without a bump. Give the controller's anti-windup `output() - compensation()` as the u0
-/// that was applied.
+/// An integrator in the wrapped controller has nothing left to do. If it already carries the
+/// disturbance, call `start(y, u)` and set the controller's output to `base_output()`: the sum then
+/// continues from u without a bump. Pass `output() - compensation()` to the controller's
+/// anti-windup as the applied u0.
 template <LoopObserver Observer>
 class DisturbanceCompensator {
  public:
   static constexpr int order = Observer::order;        ///< n, order of the plant
   using scalar_type = typename Observer::scalar_type;  ///< of signals and settings
-  using S = scalar_type;                               ///< the same
+  using S = scalar_type;                               ///< the same type
 
-  /// What it is beyond `update(y, base_output)`.
+  /// What it declares beyond `update(y, base_output)`.
   static constexpr ControllerTraits traits{.knows_sample_time = true,
                                            .varies_time = observer_traits<Observer>.varies_time,
                                            .observes = true};
@@ -82,36 +81,38 @@ class DisturbanceCompensator {
         y, [&]() ESOKIT_INLINE_LAMBDA { return base_output + unbounded_compensation(); });
   }
 
-  /// The same where the actuator reports what it held since the last sample.
+  /// The same if the actuator reports what it held since the last sample.
   S update(S y, S base_output, S u_applied) noexcept {
     return loop_.step(y, u_applied, [&]() ESOKIT_INLINE_LAMBDA {
       return base_output + unbounded_compensation();
     });
   }
 
-  /// The same where the observer's equation is driven by something else than u: from `make`,
-  /// without `start` and `track`, which take u for the drive. A missing measurement is a NaN here.
+  /// The same if something other than u drives the observer's equation. Use it from `make` on,
+  /// without `start` and `track`, which assume that u is the drive. A missing measurement is a NaN
+  /// here.
   /// @param drive what stood in the place of u since the last sample, in units of y^(n) / b0
   S update_driven(S y, S base_output, S drive) noexcept {
     return loop_.step_driven(y, drive, [&] { return base_output + unbounded_compensation(); });
   }
 
-  /// One sample whose measurement did not come.
+  /// One sample whose measurement is missing.
   S update_without_measurement(S base_output) noexcept {
     return loop_.step_without_measurement([&] { return base_output + unbounded_compensation(); });
   }
 
-  /// Compensation off: the observer follows while u is someone else's.
+  /// Compensation off: the observer follows while u comes from elsewhere.
   /// @param u_applied what the actuator held since the last sample @return the same
   S track(S y, S u_applied) noexcept { return loop_.track(y, u_applied); }
 
-  /// The plant stands, or is carried: the observer follows y, dhat stands still; see Guarded.
+  /// For a plant that stands or is carried: the observer follows y, dhat stays the same; see
+  /// Guarded.
   /// @param u_applied what the actuator held since the last sample @return the same
   S hold(S y, S u_applied) noexcept requires(observer_traits<Observer>.gates_disturbance) {
     return loop_.hold(y, u_applied);
   }
 
-  /// b0 of now, before the sample; see Guarded. @return as there
+  /// Sets b0 before the sample; see Guarded. @return as there
   Check<S> set_input_gain(const S& b) noexcept
       requires(observer_traits<Observer>.schedules_input_gain) {
     return observer().set_input_gain(b);
@@ -124,8 +125,8 @@ class DisturbanceCompensator {
   /// New settings while running. A refused config changes nothing.
   Check<S> retune(const Config& config) { return detail::retune(*this, config); }
 
-  /// The same, with the settings of `fresh`, as `make` gave it: no design work, fit for an
-  /// interrupt.
+  /// The same with the settings of `fresh`, as returned by `make`: without design work, so it may
+  /// run in an interrupt.
   Check<S> adopt(const DisturbanceCompensator& fresh) {
     if constexpr (PackScalar<S>) return detail::adopt_lanes(*this, fresh);
     if (auto ok = loop_.adopt(fresh.loop_); !ok) return ok;
@@ -133,24 +134,24 @@ class DisturbanceCompensator {
     return {};
   }
 
-  /// How long the next step takes, s; see Adrc::set_step_time.
+  /// Sets the length of the next step, s; see Adrc::set_step_time.
   template <class O = Observer>
   requires(observer_traits<O>.varies_time) Check<S> set_step_time(const S& seconds)
   noexcept { return loop_.set_step_time(seconds); }
 
-  /// K dhat, what is added to u0; within what the scalar holds.
+  /// K dhat, which is added to u0; limited to what the scalar holds.
   [[nodiscard]] S compensation() const noexcept {
     return detail::clipped(unbounded_compensation());
   }
 
-  /// The u0 with which u would stay what it is; within what the scalar holds.
+  /// The u0 with which u would not change; limited to what the scalar holds.
   [[nodiscard]] S base_output() const noexcept {
     return detail::clipped(loop_.output() - compensation());
   }
 
   /// The observer, for its estimates.
   [[nodiscard]] const Observer& observer() const noexcept { return loop_.observer(); }
-  /// The observer, for what only it can do (AlgebraicEso::rearm).
+  /// The observer, for its own members (AlgebraicEso::rearm).
   [[nodiscard]] Observer& observer() noexcept { return loop_.observer(); }
   /// K, unit of u per unit of y^(n).
   [[nodiscard]] const S& compensation_gain() const noexcept { return gain_; }
@@ -158,11 +159,11 @@ class DisturbanceCompensator {
   [[nodiscard]] int measurement_divider() const noexcept { return loop_.measurement_divider(); }
   /// T, s.
   [[nodiscard]] S sample_time() const noexcept { return loop_.observer().sample_time(); }
-  /// The u that holds now, within the limits.
+  /// The present u, within the limits.
   [[nodiscard]] const S& output() const noexcept { return loop_.output(); }
   /// u0 + K dhat before the limits.
   [[nodiscard]] const S& requested() const noexcept { return loop_.requested(); }
-  /// What the observer said of the last sample.
+  /// Status of the observer at the last sample.
   [[nodiscard]] StatusOf<S> status() const noexcept { return loop_.status(); }
   /// Whether u0 + K dhat, the start hold or the missing rule decides about u.
   [[nodiscard]] Lanes<LoopMode, S> mode() const noexcept { return loop_.mode(); }
@@ -202,7 +203,7 @@ class DisturbanceCompensator {
   S gain_;
 };
 
-/// The same around an observer that goes lane by lane.
+/// The same around an observer that is computed lane by lane.
 template <LoopObserver Observer>
 requires detail::goes_lane_by_lane<Observer>
 class DisturbanceCompensator<Observer>

@@ -19,8 +19,8 @@
 
 namespace esokit {
 
-/// The filter runs on z^-1, as in the literature. Its digits are lost by 1/(1-rho)^N: configs that
-/// leave fewer than three of them are refused.
+/// The filter runs on z^-1, as in the literature. It loses digits by 1/(1-rho)^N: configs that
+/// leave fewer than three digits are refused.
 struct ShiftOperator {};
 
 /// Distinguishes the type in snapshots.
@@ -34,13 +34,13 @@ struct DeltaOperator {};
 template <>
 inline constexpr std::uint32_t type_tag<DeltaOperator> = make_type_tag<>("DeltaOperator");
 
-/// The filter is told the applied, limited u: the dual-feedback form.
+/// The filter gets the applied, limited u: the dual-feedback form.
 struct LimitedFeedback {};
 
 /// Distinguishes the type in snapshots.
 template <>
 inline constexpr std::uint32_t type_tag<LimitedFeedback> = make_type_tag<>("LimitedFeedback");
-/// The filter is told its own output: the transfer-function form.
+/// The filter gets its own output: the transfer-function form.
 struct UnlimitedFeedback {};
 
 /// Distinguishes the type in snapshots.
@@ -58,11 +58,11 @@ inline constexpr std::uint32_t type_tag<UnlimitedFeedback> = make_type_tag<>("Un
 /// for the test that all is finite, and the limits; 3 N + 2 coefficients, N states. For n = 2, m =
 /// 1: 11, 10 (13), 3; 11 and 3.
 ///
-/// A filter has no prediction: a bad measurement is replaced by the last good one and reported.
-/// Where samples get lost, take Adrc.
+/// A filter has no prediction: a bad measurement is replaced by the last good one and reported. If
+/// samples get lost, use Adrc.
 ///
-/// With UnlimitedFeedback it is the transfer-function form: the same while u is within its limits;
-/// outside, its m integrators run on: it winds up. For actuators that never saturate.
+/// With UnlimitedFeedback it is the transfer-function form: the same while u is within its limits,
+/// but at a limit its m integrators run on and it winds up. For actuators that never saturate.
 template <int Order, Scalar S = double, int Extension = 1, class Operator = ShiftOperator,
           class Feedback = LimitedFeedback, class Placement = EqualPoles>
 class DualFeedbackAdrc {
@@ -128,8 +128,8 @@ class DualFeedbackAdrc {
     return limiter_(step.wanted);
   }
 
-  /// The same where the actuator reports what it held since the last sample. The transfer-function
-  /// form does not look at it but for the rate limit.
+  /// The same if the actuator reports what it held since the last sample. The transfer-function
+  /// form uses it only for the rate limit.
   S update(S y, S reference, S u_applied) noexcept {
     const auto good = is_finite(u_applied);
     limiter_.track(select(good, u_applied, limiter_.last()));
@@ -149,13 +149,13 @@ class DualFeedbackAdrc {
     }
   }
 
-  /// New settings while running: starts in the steady state of the last measurement and u, as a
-  /// filter's state says nothing to another filter. No bump at rest. A refused config changes
-  /// nothing, nor does any where the scalar cannot hold that steady state.
+  /// New settings while running: restarts in the steady state of the last measurement and u,
+  /// because the state of one filter has no meaning for another. No bump at rest. A refused config
+  /// changes nothing, nor does one whose steady state the scalar cannot hold.
   Check<S> retune(const Config& config) { return detail::retune(*this, config); }
 
-  /// The same, with the settings of `fresh`, as `make` gave it: no design work, fit for an
-  /// interrupt.
+  /// The same with the settings of `fresh`, as returned by `make`: without design work, so it may
+  /// run in an interrupt.
   Check<S> adopt(DualFeedbackAdrc fresh) {
     if constexpr (PackScalar<S>) return detail::adopt_lanes(*this, fresh);
     if (fresh.start(measured_, output()) != StepStatus::ok) {
@@ -167,12 +167,12 @@ class DualFeedbackAdrc {
     return {};
   }
 
-  /// The u that holds now, within the limits.
+  /// The present u, within the limits.
   [[nodiscard]] const S& output() const noexcept { return limiter_.last(); }
-  /// What the law asked for before the limits.
+  /// The u requested by the law, before the limits.
   [[nodiscard]] const S& requested() const noexcept { return wanted_; }
-  /// ok, measurement_rejected, or restarted: in the steady state of y and u, as the state was so
-  /// large that no measurement led on.
+  /// ok, measurement_rejected, or restarted. It restarts in the steady state of y and u if the
+  /// state was so large that no measurement could bring it back.
   [[nodiscard]] Status status() const noexcept { return status_; }
   /// The filter's coefficients, in z or delta.
   [[nodiscard]] const FilterForm<size, S>& form() const noexcept { return form_; }
@@ -331,7 +331,7 @@ inline constexpr std::uint32_t
     type_tag<DualFeedbackAdrc<Order, S, Extension, Operator, Feedback, Placement>> =
         make_type_tag<S, Operator, Feedback, Placement>("DualFeedbackAdrc", Order, Extension);
 
-/// The transfer-function form: winds up where u is limited.
+/// The transfer-function form: winds up if u is limited.
 template <int Order, Scalar S = double, int Extension = 1, class Operator = ShiftOperator,
           class Placement = EqualPoles>
 using TransferFunctionAdrc =

@@ -20,16 +20,16 @@ enum class Excitation : unsigned char {
 template <PlainScalar S = double>
 struct ExperimentConfig {
   S sample_time{};                            ///< T, s
-  Excitation excitation = Excitation::relay;  ///< relay: nothing of the machine need be known
-  S input{};           ///< u0, unit of u: what holds the machine where the experiment begins
-  S amplitude{};       ///< A, unit of u; negative where more u lowers y
+  Excitation excitation = Excitation::relay;  ///< relay: needs no knowledge of the machine
+  S input{};           ///< u0, unit of u: holds the machine at the position where it begins
+  S amplitude{};       ///< A, unit of u; negative if a larger u lowers y
   S hysteresis{};      ///< relay: unit of y, a few times the noise; left out with steps
-  S lead{};            ///< relay, order 2: s, some five times lag and dead time; else left out
+  S lead{};            ///< relay, order 2: s, about five times lag and dead time; else left out
   S half_period{};     ///< steps: s, at least 8 samples; left out with a relay
   S rest{};            ///< s with u0 before, in which y0 is found; 0: y0 is the first y
   S travel{};          ///< largest abs(y - y0), unit of y; beyond it the experiment stops
   S time_limit{};      ///< longest time of all, s
-  S hand_over{};       ///< s: the relay or the steps go on so long after the last cycle measured
+  S hand_over{};       ///< s: relay or steps go on for this long after the last measured cycle
   int cycles = 8;      ///< measured, after two to settle; even, 6 .. 200
   Limits<S> limits{};  ///< of the actuator; u0 - A and u0 + A must be within
 
@@ -47,7 +47,7 @@ enum class ExperimentPhase : unsigned char {
   rest,       ///< u0, y0 is being found
   settling,   ///< the first two cycles
   measuring,  ///< the cycles that count
-  hand_over,  ///< the result is there; u goes on, for the observer of the controller that follows
+  hand_over,  ///< the result is ready; u goes on, so that the controller's observer can follow
   done,       ///< u0
   aborted     ///< u0; `reason` says why
 };
@@ -107,30 +107,30 @@ struct ExperimentRow {
   S y{};     ///< measured
 };
 
-/// Moves a machine with a relay or with steps around an operating point, stops by itself, and says
-/// what b0 and latency are; `update` at each sample, as with a controller.
+/// Moves a machine with a relay or with steps around an operating point, stops by itself, and
+/// computes b0 and latency. Call `update` at each sample, as with a controller.
 ///
-/// Way: of each two cycles the complex sums of the n-th differences of y and of u, weighted with
-/// w = 1 - cos(theta) and the harmonics 1 and 3 of the cycle,
+/// Method: over every two cycles, the complex sums of the n-th differences of y and of u, weighted
+/// with w = 1 - cos(theta) and the harmonics 1 and 3 of the cycle:
 ///
 ///     H_m = sum w e^(-j m 2 theta) D^n y / (T^n sum w e^(-j m 2 theta) u),   m = 1, 3
 ///
-/// As w and its slope begin and end at zero and a constant d has no part in them, H is b0 e^(-j w
-/// L) / (1 + j w tau) at the frequency of the cycle whatever the machine does before and after: no
-/// describing function. abs(H_3 / H_1) tells lag from dead time, the angle of H_3 how far this
-/// model of the machine is wrong, the scatter of the H how far noise goes; all three are in the
-/// interval. Damping a y with n = 1, or Coulomb friction with n = 2, turn H_1 and H_3 differently,
-/// by which they are found and taken out; what is too large for that is refused. What is not in it:
-/// damping with n = 2, which reads as less latency, and a d that rises by r a second all the time,
-/// which shifts H by r P / (12 A), P being the time of a cycle. `identify` of the log tells them
-/// apart.
+/// Because w and its slope are zero at both ends and a constant d does not contribute, H is b0
+/// e^(-j w L) / (1 + j w tau) at the frequency of the cycle, whatever the machine does before and
+/// after; no describing function is needed. abs(H_3 / H_1) separates lag from dead time, the angle
+/// of H_3 shows how wrong this model of the machine is, and the scatter of the H shows the effect
+/// of noise; all three enter the interval. Damping a y with n = 1, or Coulomb friction with n = 2,
+/// turn H_1 and H_3 by different angles; from this they are found and corrected for, or refused if
+/// too large. Two effects are not modelled: damping with n = 2, which looks like less latency, and
+/// a d that rises steadily by r a second, which shifts H by r P / (12 A), P being the time of a
+/// cycle. `identify` of the log separates them.
 ///
-/// A relay on a machine of order 2 without damping has no cycle without `lead`: it switches on
-/// y + 3 (y - f), f being y behind a lag of a quarter of `lead`.
+/// On a machine of order 2 without damping a relay has no cycle without `lead`. With it, the relay
+/// switches on y + 3 (y - f), where f is y behind a lag of a quarter of `lead`.
 ///
-/// Hand-over: from phase `hand_over` on the result is there; make the controller, lead it with
+/// Hand-over: from phase `hand_over` on the result is ready. Make the controller, call its
 /// `track(y, reference, u)` while the experiment still moves the machine, and go on with its
-/// `update` at phase `done`: its first u is that of its law. `examples/identify` shows it.
+/// `update` at phase `done`: its first u is then that of its law. `examples/identify` shows this.
 /// @tparam Order n, 1 or 2
 template <int Order, PlainScalar S = double>
 class Experiment {
@@ -212,7 +212,7 @@ class Experiment {
   /// One sample. @param y measurement @return u to be held until the next sample
   S update(S y) noexcept { return update(y, output()); }
 
-  /// The same where the actuator reports what it held since the last sample.
+  /// The same if the actuator reports what it held since the last sample.
   S update(S y, S u_applied) noexcept {
     if (is_finite(u_applied)) limiter_.track(u_applied);
     if (finished()) return put_out(config_.input);
@@ -357,7 +357,7 @@ class Experiment {
   [[nodiscard]] bool finished() const noexcept {
     return phase_ == ExperimentPhase::done || phase_ == ExperimentPhase::aborted;
   }
-  /// The u that holds now.
+  /// The present u.
   [[nodiscard]] S output() const noexcept { return limiter_.last(); }
   /// y0: mean of y in the rest.
   [[nodiscard]] S rest_output() const noexcept { return rest_; }

@@ -18,8 +18,8 @@
 ///     m_p = sum_(j=1..p) (beta_(p-j) h Q^(j-1) g - nu_(p-j) e_1 Q^(j-1) g)
 ///
 /// beta and k come from the contractions a_i = 1 - rho_i through expm1, so all coefficients are
-/// good to a few units in the last place for every omega_o T; expanding them in z costs
-/// 1/(1-rho)^N of that.
+/// accurate to a few units in the last place for every omega_o T; expanding them in z loses a
+/// factor 1/(1-rho)^N of that accuracy.
 #pragma once
 
 #include <esokit/core/check.hpp>

@@ -1,5 +1,5 @@
 /// @file
-/// Health of a loop: what it counts while it runs, and what is likely wrong with it.
+/// Health of a loop: counters while it runs, and a diagnosis of what is likely wrong.
 #pragma once
 
 #include <cmath>
@@ -18,13 +18,14 @@ template <PlainScalar S = double>
 struct HealthConfig {
   S observer_bandwidth{};  ///< omega_o, rad/s: the observer's poles, or their mean
   S sample_time{};         ///< T, s
-  S input_range{};         ///< half of what the limits leave, unit of u
-  S noise{};               ///< standard deviation of y; 0: not known, the innovation is not judged
-  S memory = 1;            ///< s: what is older than a few times this counts for nothing
+  S input_range{};         ///< half the range between the limits, unit of u
+  S noise{};     ///< standard deviation of the noise of y; 0: unknown, the innovation is not judged
+  S memory = 1;  ///< s: samples older than a few times this have no weight
   int divider = 4;  ///< the regression takes every D-th sample, 1 .. 1000; D omega_o T is at most 1
 };
 
-/// What a monitor has seen. Shares are of the last `memory` seconds, counts of all samples.
+/// What a monitor has found. Shares are those of the last `memory` seconds, counts those of all
+/// samples.
 template <PlainScalar S = double>
 struct Health {
   std::uint32_t samples = 0;   ///< looked at, since the start or `clear`
@@ -35,31 +36,32 @@ struct Health {
   S saturated{};               ///< share of samples at a limit, of magnitude or rate
   S bounded{};                 ///< share of samples with dhat at its bound, see Guarded
   S innovation{};              ///< rms, unit of y
-  S innovation_of_noise{};     ///< what it would be of the noise alone; 0 where that is not known
-  S gain_ratio = 1;            ///< rho: b / b0 as far as u moved by itself, see HealthMonitor
-  S evidence{};                ///< omega_o times the time in which u told something of it
+  S innovation_of_noise{};     ///< what the noise alone would cause; 0 if unknown
+  S gain_ratio = 1;            ///< rho: b / b0, from the motion of u by itself, see HealthMonitor
+  S evidence{};                ///< omega_o times the time in which u moved enough to estimate rho
 };
 
 /// What is likely wrong, the worst first.
 enum class LoopFault : unsigned char {
-  none,                         ///< nothing that shows
-  wrong_sign,                   ///< b0 has the wrong sign
-  gain_too_small,               ///< b0 is several times too small: the loop is that much too quick
-  measurements_rejected,        ///< more than a tenth of the measurements are bad or outliers
-  saturated,                    ///< at the limits more than half of the time
-  bounded,                      ///< dhat is at its bound more than half of the time
-  innovation_too_large,         ///< rms over three times what the noise makes
-  gain_too_large_or_disturbed,  ///< what u does is undone: b0 is too large, or a load drives u
+  none,                   ///< nothing that shows
+  wrong_sign,             ///< b0 has the wrong sign
+  gain_too_small,         ///< b0 is several times too small: the loop is too fast by that factor
+  measurements_rejected,  ///< more than a tenth of the measurements are bad or outliers
+  saturated,              ///< at the limits more than half of the time
+  bounded,                ///< dhat is at its bound more than half of the time
+  innovation_too_large,   ///< rms over three times what the noise makes
+  gain_too_large_or_disturbed,  ///< the effect of u is cancelled: b0 is too large, or a load drives
+                                ///< u
 };
 
-/// Limits of `diagnose`. rho was looked at in 1,000 servos of each fault and 5,000 healthy ones,
-/// see examples/guards.
+/// Limits of `diagnose`. rho was tested on 1,000 servos with each fault and 5,000 healthy ones, see
+/// examples/guards.
 struct HealthLimits {
-  double wrong_sign = -0.3;     ///< rho below it
-  double too_small = 3;         ///< rho above it
-  double too_large = 0.25;      ///< rho below it, advice alone: a load does the same
-  double evidence = 5;          ///< omega_o times seconds; below it rho says nothing of the sign
-  double evidence_of_more = 3;  ///< the same of a b0 that is too small, which shows sooner
+  double wrong_sign = -0.3;  ///< rho below it
+  double too_small = 3;      ///< rho above it
+  double too_large = 0.25;   ///< rho below it; only an advice, because a load has the same effect
+  double evidence = 5;       ///< omega_o times seconds; below it rho says nothing about the sign
+  double evidence_of_more = 3;  ///< the same for a b0 that is too small, which shows sooner
 };
 
 /// What is likely wrong. @param health of a monitor
@@ -86,16 +88,18 @@ template <PlainScalar S>
 
 /// Watches a loop of one input: `look(controller)` after each sample.
 ///
-/// Of y^(n) = d + b u an observer with b0 finds dhat = (d + (b - b0) u) through its own poles. What
-/// of dhat goes with phi = b0 u, through the same poles, is (b - b0) / b0 of it:
+/// For y^(n) = d + b u an observer with b0 finds dhat = d + (b - b0) u, filtered by its own poles.
+/// The part of dhat that is proportional to phi = b0 u, filtered by the same poles, has the factor
+/// (b - b0) / b0:
 ///
 ///     rho = 1 + sum phi psi / sum phi^2,   psi = dhat, both high-passed at omega_o / 10
 ///
-/// is b / b0 where u moves by itself (a reference, noise), and tends to 0 where u answers a load
-/// (dhat then is -phi): a small rho is no proof. Negative it is of a wrong sign only. Samples count
-/// while abs(phi) is above 2 % of b0 times the range and 4 times its noise, the law decides and no
-/// guard gates dhat. Sums forget with `memory`.
-/// @tparam Size N of the observer: so many poles filter phi
+/// is b / b0 if u moves by itself (because of a reference or noise), and tends to 0 if u reacts to
+/// a load (then dhat is -phi): a small rho proves nothing. It is negative only if the sign of b0 is
+/// wrong. A sample counts if abs(phi) is above 2 % of b0 times the range and above 4 times its
+/// noise, the law determines u and no guard gates dhat. The sums forget with time constant
+/// `memory`.
+/// @tparam Size N of the observer: the number of poles that filter phi
 template <int Size, PlainScalar S = double>
 class HealthMonitor {
   static_assert(Size >= 2, "esokit: an observer has at least two states");
@@ -128,8 +132,8 @@ class HealthMonitor {
     return HealthMonitor(config);
   }
 
-  /// After each sample of the controller: Adrc or DisturbanceCompensator, its observer of `Size`
-  /// states.
+  /// To be called after each sample of the controller, an Adrc or DisturbanceCompensator whose
+  /// observer has `Size` states.
   template <class Controller>
   void look(const Controller& controller) noexcept {
     const auto& observer = controller.observer();
@@ -161,7 +165,7 @@ class HealthMonitor {
   /// What it has seen.
   [[nodiscard]] const Health<S>& health() const noexcept { return health_; }
 
-  /// Begins anew, as after a change of the design.
+  /// Clears everything, for example after a change of the design.
   void clear() noexcept {
     const S of_noise = health_.innovation_of_noise;
     *this = HealthMonitor(*this, of_noise);

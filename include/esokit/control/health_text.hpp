@@ -1,5 +1,5 @@
 /// @file
-/// What a diagnosis and a sample of a loop are in words and in a table, for the host.
+/// A diagnosis in words, and a sample of a loop as a row of a table, for the host.
 #pragma once
 
 #include <esokit/control/health.hpp>
@@ -66,8 +66,8 @@ requires detail::WritesText<Stream> Stream& operator<<(Stream& out, LoopFault fa
   return out;
 }
 
-/// Writes the names of the columns, for a log that `identify` and examples/from_log read: u is what
-/// is held from its row to the next.
+/// Writes the names of the columns, for a log that `identify` and examples/from_log read: u is held
+/// from its row to the next.
 template <int States, class Stream>
 void write_header(Stream& out) {
   out << "time,u,y,r,requested,dhat,innovation,status,mode,trust,bounded";

@@ -10,20 +10,20 @@
 
 namespace esokit {
 
-/// Puts out u[k] - u[k-1] of a controller: for stepper valves, motorised potentiometers, PLC blocks
-/// that take increments.
+/// Returns u[k] - u[k-1] of a controller: for stepper valves, motorised potentiometers and PLC
+/// blocks that take increments.
 ///
-/// The sum of the increments is u but for a constant that nobody need know: the observer takes it
-/// for disturbance. Limits hold for the sum (counted from `start`), the rate limit for an
-/// increment. Where the actuator reports what it made of the last increment, nothing winds up.
-/// An increment is the difference of two u: a limit beyond half of what the scalar holds, as one
-/// that is left out, counts as that half, and a report that leads beyond it as none.
+/// The sum of the increments is u up to a constant, which need not be known: to the observer it is
+/// a disturbance. The limits apply to the sum (counted from `start`), the rate limit to an
+/// increment. If the actuator reports what it did with the last increment, nothing winds up.
+/// Because an increment is the difference of two u, a limit beyond half of what the scalar holds
+/// (or one that is left out) counts as that half, and a report that leads beyond it is ignored.
 /// @tparam Controller such as Adrc
 template <class Controller>
 class Incremental {
  public:
   using scalar_type = typename Controller::scalar_type;  ///< of signals and settings
-  using S = scalar_type;                                 ///< the same
+  using S = scalar_type;                                 ///< the same type
   using Config = typename Controller::Config;            ///< settings of make
   using Status = StatusOf<S>;                            ///< StepStatus, of a pack one a lane
   template <class T>
@@ -45,8 +45,8 @@ class Incremental {
     return increment_;
   }
 
-  /// The same where the actuator reports what it did.
-  /// @param increment_applied what became of the last increment
+  /// The same if the actuator reports what it did.
+  /// @param increment_applied what the actuator did with the last increment
   template <class Reference>
   S update(const S& y, const Reference& reference, const S& increment_applied) noexcept {
     const S missed = increment_applied - increment_;
@@ -57,8 +57,7 @@ class Incremental {
     return increment_;
   }
 
-  /// The same by a list, where the controller takes one: `update(y, {r, r1, r2})`.
-  /// @{
+  /// The same with a list, if the controller takes one: `update(y, {r, r1, r2})`. @{
   template <std::size_t Count>
   S update(const S& y, const S (&reference)[Count]) noexcept {
     return update<S[Count]>(y, reference);
@@ -69,7 +68,7 @@ class Incremental {
   }
   /// @}
 
-  /// Takes over a plant that stands at y; u counts from `u`, zero if nobody knows.
+  /// Takes over a plant that stands at y; u counts from `u`, which is zero if unknown.
   /// @return as Controller::start; input_rejected beyond half of what the scalar holds
   Status start(const S& y, const S& u = S(0.0)) noexcept {
     const auto good = is_finite(u) && within_half(u);

@@ -25,8 +25,8 @@ struct Limits {
 
 /// Holds a command within magnitude limits (asymmetric ones too) and a rate limit.
 ///
-/// Both bounds of a step are worked out from the last output, so that between command and output
-/// only a minimum and a maximum remain.
+/// Both bounds of a step are computed from the last output, so that only a minimum and a maximum
+/// remain between command and output.
 template <Scalar S = double>
 class Limiter {
  public:
@@ -50,7 +50,7 @@ class Limiter {
   }
 
   /// The output nearest to `command` within the limits; remembered as the last output.
-  /// @param command finite, as everything that is computed from an observer's estimate
+  /// @param command finite, as is everything computed from an observer's estimate
   constexpr S operator()(const S& command) noexcept {
     const S output = clamp(command);
     track(output);
@@ -68,7 +68,7 @@ class Limiter {
     return smaller(larger(u, lower_), upper_);
   }
 
-  /// Tells what the actuator really held; the rate limit goes on from there.
+  /// Reports what the actuator really held; the rate limit counts from there.
   constexpr void track(const S& output) noexcept {
     last_ = output;
     // Without a rate limit the bounds stand still.

@@ -27,15 +27,15 @@ struct MimoAdrcConfig {
       typename std::tuple_element_t<0, std::tuple<Observers...>>::scalar_type;  ///< of signals
   using InputMatrix = Matrix<S, channels, channels>;                            ///< B0, q x q
 
-  /// One a channel; `input_gain` is left out, B0 says it, and T is the same in all.
+  /// One for each channel. `input_gain` is left out, because B0 gives it; T is the same in all.
   std::tuple<typename Observers::Config...> observers{};
   Array<S, channels> controller_bandwidths{};      ///< omega_c of each channel, rad/s
   TimeDomain domain = TimeDomain::continuous;      ///< where the controllers' poles are placed
   bool half_gain = false;                          ///< half-gain tuning of the controllers
   InputMatrix input_matrix = InputMatrix::Zero();  ///< B0, unit of y_i^(n_i) per unit of u_j
 
-  /// Largest condition number of B0 that is accepted, in the 1-norm after its rows and columns
-  /// are scaled to a largest element of 1: units do not matter then.
+  /// Largest condition number of B0 that is accepted, in the 1-norm after its rows and columns are
+  /// scaled to a largest element of 1, so that units do not matter.
   S condition_limit = S(1000);
   Array<Limits<S>, channels> limits{};  ///< of each actuator
 
@@ -48,16 +48,15 @@ struct MimoAdrcConfig {
 };
 
 /// Control of y_i^(n_i) = d_i + (B0 u)_i, i = 1..q, B0 square and invertible: each channel has an
-/// observer of its own order, and u = B0^-1 (v - dhat). What B0 gets wrong, and all other coupling,
-/// is disturbance.
+/// observer of its own order, and u = B0^-1 (v - dhat). Errors of B0 and all other coupling count
+/// as disturbance.
 ///
-/// Observer i is told the applied (B0 u)_i, so limits, which are those of the q actuators, wind
-/// nothing up; while one actuator is limited the channels are coupled through B0. A channel whose
-/// measurement is NaN predicts alone, the others go on; one whose reference is keeps its share of
-/// B0 u as it is.
+/// Observer i gets the applied (B0 u)_i, so the limits of the q actuators cause no wind-up; while
+/// one actuator is limited, the channels are coupled through B0. A channel whose measurement is NaN
+/// only predicts, and the others go on; a channel whose reference is NaN keeps its share of B0 u.
 ///
-/// With an actuator in a channel's model it is (B0 u)_i that lags: true where all actuators lag
-/// alike, or B0 does not couple them.
+/// An actuator in a channel's model is a lag of (B0 u)_i: this is correct if all actuators have the
+/// same lag, or if B0 does not couple them.
 /// @tparam Observers one observer type a channel, all of one scalar
 template <ShiftableDisturbance... Observers>
 class MimoAdrc {
@@ -69,13 +68,13 @@ class MimoAdrc {
  public:
   static constexpr int channels = sizeof...(Observers);  ///< q
   using scalar_type = typename First::scalar_type;       ///< of signals and settings
-  using S = scalar_type;                                 ///< the same
+  using S = scalar_type;                                 ///< the same type
   using Output = Vector<S, channels>;                    ///< y, or r, or u, q x 1
   using InputMatrix = Matrix<S, channels, channels>;     ///< B0, q x q
   static_assert((std::is_same_v<typename Observers::scalar_type, S> && ...),
                 "esokit: all channels need the same scalar");
 
-  /// What it is beyond `update(y, reference)`.
+  /// What it declares beyond `update(y, reference)`.
   static constexpr ControllerTraits traits{.knows_sample_time = true};
 
   using Config = MimoAdrcConfig<Observers...>;  ///< settings of make
@@ -119,7 +118,7 @@ class MimoAdrc {
     return put_out(inverse_ * wanted);
   }
 
-  /// The same where the actuators report what they held since the last sample; NaN: not known.
+  /// The same if the actuators report what they held since the last sample; NaN: not known.
   Output update(const Output& y, const Output& reference, const Output& u_applied) noexcept {
     for (int i = 0; i < channels; ++i) {
       if (is_finite(u_applied(i))) limiters_[static_cast<std::size_t>(i)].track(u_applied(i));
@@ -149,8 +148,8 @@ class MimoAdrc {
   /// dhat += (B0_old - B0_new) u. A refused config changes nothing.
   Check<S> retune(const Config& config) { return detail::retune(*this, config); }
 
-  /// The same, with the settings of `fresh`, as `make` gave it: no design work, fit for an
-  /// interrupt.
+  /// The same with the settings of `fresh`, as returned by `make`: without design work, so it may
+  /// run in an interrupt.
   Check<S> adopt(const MimoAdrc& fresh) {
     const Output u = output();
     const Output drive = fresh.input_matrix_ * u;
@@ -181,7 +180,7 @@ class MimoAdrc {
 
   /// T of all channels, s.
   [[nodiscard]] S sample_time() const noexcept { return observer<0>().sample_time(); }
-  /// The u that holds now, q x 1.
+  /// The present u, q x 1.
   [[nodiscard]] Output output() const noexcept {
     Output u;
     for (int i = 0; i < channels; ++i) u(i) = limiters_[static_cast<std::size_t>(i)].last();
@@ -200,13 +199,12 @@ class MimoAdrc {
     return std::get<static_cast<std::size_t>(Channel)>(laws_).gains();
   }
 
-  /// B0, and its inverse as it is used.
-  /// @{
+  /// B0, and the inverse that is used. @{
   [[nodiscard]] const InputMatrix& input_matrix() const noexcept { return input_matrix_; }
   [[nodiscard]] const InputMatrix& decoupling() const noexcept { return inverse_; }
   /// @}
 
-  /// What the observer of a channel said of the last sample.
+  /// Status of the observer of a channel at the last sample.
   [[nodiscard]] StepStatus status(int channel) const noexcept {
     return statuses_[static_cast<std::size_t>(channel)];
   }

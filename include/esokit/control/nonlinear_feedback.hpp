@@ -14,8 +14,8 @@ namespace esokit {
 /// u = (sum_i k_i fal(r_i - z_i, a_i, delta_i) - dhat) / b0: as AdrcLaw with fal in place of the
 /// linear feedback. A function of the estimate, without state.
 ///
-/// Of finite numbers it is one: what is beyond the scalar, as a power above one of a large error
-/// may be, counts as the largest number of its sign. Limits are a Limiter's.
+/// For finite arguments u is finite: a result that the scalar cannot hold, such as a power of a
+/// large error, counts as the largest number of its sign. For limits add a Limiter.
 /// @tparam Order n
 template <int Order, Scalar S = double>
 class NonlinearFeedback {

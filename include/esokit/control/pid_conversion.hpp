@@ -1,6 +1,6 @@
 /// @file
-/// From PID gains to ADRC and back: a first guess for who has a tuned PID, and what an ADRC is in
-/// the words of who reads PIDs.
+/// From PID gains to ADRC and back: a first guess if you have a tuned PID, and an ADRC expressed as
+/// a PID.
 ///
 /// Continuous linear ADRC of order n is, from y to u, exactly
 ///
@@ -37,7 +37,7 @@ struct AdrcTuning {
   S observer_bandwidth{};    ///< omega_o, rad/s
 };
 
-/// Gains of the PI (Order 1) or PID (Order 2) that the ADRC is.
+/// Gains of the PI (Order 1) or PID (Order 2) that equals the ADRC.
 /// @return error for an input gain of zero, a bandwidth that is not positive, or gains that the
 ///         scalar cannot hold
 template <int Order, PlainScalar S>
@@ -76,14 +76,15 @@ Expected<PidGains<S>, Error<S>> pid_from_adrc(const AdrcTuning<S>& tuning) {
   return pid;
 }
 
-/// The ADRC whose PID gains (not filter) are the given ones.
+/// The ADRC that has the given PID gains (its filter may differ).
 ///
-/// PI: any `bandwidth_ratio` kappa = omega_o / omega_c will do, the given one is taken. PID: kappa
-/// follows from K_p^2 / (K_i K_d) = (2 kappa + 3)^2 / (kappa^2 + 6 kappa + 3), which for kappa >= 1
-/// runs from 2.5 to 4 (K_p^2 / (K_i K_d) = 4 is Ziegler and Nichols' T_i = 4 T_d). Outside, and
-/// where kappa would be above `bandwidth_ratio`, no ADRC has these gains: refused, with the nearest
-/// K_d that has one as the limit. Take that only if it is near; far off, b0 is wrong by as much.
-/// @param pid gains that are not zero and of one sign; the filter is not looked at
+/// PI: any `bandwidth_ratio` kappa = omega_o / omega_c is possible, so the given one is used. PID:
+/// kappa follows from K_p^2 / (K_i K_d) = (2 kappa + 3)^2 / (kappa^2 + 6 kappa + 3), which for
+/// kappa >= 1 lies between 2.5 and 4 (K_p^2 / (K_i K_d) = 4 is Ziegler and Nichols' T_i = 4 T_d).
+/// Outside this range, and if kappa would be above `bandwidth_ratio`, no ADRC has these gains. They
+/// are refused, and the limit of the error is the nearest K_d for which there is one. Use that K_d
+/// only if it is near; otherwise b0 is wrong by as much.
+/// @param pid gains, not zero and of one sign; its filter is ignored
 /// @param bandwidth_ratio kappa of PI, largest kappa of PID; the step response wants 3 .. 10, noise
 ///        wants less
 /// @return error for gains that are zero, of different signs or of no ADRC, and for a ratio that is

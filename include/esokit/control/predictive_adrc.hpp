@@ -1,7 +1,7 @@
 /// @file
-/// PredictiveAdrc (PADRC, and EPADRC with the extended state filter): ADRC in two phases, so that
-/// next to nothing stands between the measurement and the control (S. Shi, Z. Zeng, C. Zhao, L.
-/// Guo, P. Chen, Energies 15 (2022) 5799, (26), (51)-(53) corrected).
+/// PredictiveAdrc (PADRC, and EPADRC with the extended state filter): ADRC in two phases, with
+/// almost no computation between the measurement and u (S. Shi, Z. Zeng, C. Zhao, L. Guo, P. Chen,
+/// Energies 15 (2022) 5799, (26), (51)-(53) corrected).
 #pragma once
 
 #include <cmath>
@@ -50,35 +50,36 @@ struct PredictiveAdrcConfig {
 ///
 /// `control` is a multiplication, a subtraction, a test for finiteness and the limits, for gains
 /// that are known before the measurement (constant, cascade, algebraic, ESF). A switched gain costs
-/// one `select` more, a nonlinear one its k(e), an outlier gate one comparison. `prepare` corrects
-/// the observer, predicts, and works out the next ubar. Together they do what `update` of the
-/// observer and AdrcLaw do one after the other, to within rounding.
+/// one more `select`, a nonlinear gain its k(e), an outlier gate one comparison. `prepare` corrects
+/// the observer, predicts, and computes the next ubar. Together they give the result of the
+/// observer's `update` followed by AdrcLaw, up to rounding.
 ///
 /// The price: the reference of the next sample must be known one sample early.
 ///
-/// After `make`, `start` and `reset` the observer's state stands for the prediction of the first
-/// sample; give the reference of that sample to `set_reference`.
+/// After `make`, `start` and `reset` the observer's state is the prediction of the first sample;
+/// pass the reference of that sample to `set_reference`.
 ///
-/// Bad measurements: NaN, infinite, too large, or an outlier by the observer's gate: u follows from
-/// the prediction alone, and the sample counts as missing. A bad reference keeps the last u.
+/// If a measurement is NaN, infinite, too large, or an outlier for the observer's gate, u is
+/// computed from the prediction alone and the sample counts as missing. With a bad reference the
+/// last u is kept.
 ///
-/// The actuator is taken to hold what `control` returned. Where it reports otherwise, before or
-/// after `prepare`, tell `report_applied`: the prediction is put right by Gamma (u_reported -
+/// The actuator is assumed to hold what `control` returned. If it reports another value, before or
+/// after `prepare`, pass it to `report_applied`: the prediction is corrected by Gamma (u_reported -
 /// u_assumed) before the next correction.
 ///
-/// No call but make and retune does more than multiply and add
-/// beside what the observer's gain law does (the division of a filter, the power of fal); none
-/// allocates, throws or locks.
+/// Except for make and retune, a call only multiplies and adds, apart from the work of the
+/// observer's gain law (the division of a filter, the power of fal). No call allocates, throws or
+/// locks.
 template <PredictableObserver Observer>
 class PredictiveAdrc {
  public:
   static constexpr int order = Observer::order;        ///< n, order of the plant
   using scalar_type = typename Observer::scalar_type;  ///< of signals and settings
-  using S = scalar_type;                               ///< the same
+  using S = scalar_type;                               ///< the same type
   using Estimate = typename Observer::Estimate;        ///< (y, .., y^(n-1), d, ..), N x 1
   using Reference = Vector<S, order + 1>;              ///< (r, r', .., r^(n)), n + 1 x 1
 
-  /// What it is beyond `update(y, reference)`.
+  /// What it declares beyond `update(y, reference)`.
   static constexpr ControllerTraits traits{
       .two_phases = true, .takes_derivatives = true, .knows_sample_time = true, .observes = true};
 
@@ -121,7 +122,7 @@ class PredictiveAdrc {
     return output_;
   }
 
-  /// First phase of a sample whose measurement did not come.
+  /// First phase of a sample whose measurement is missing.
   S control_without_measurement() noexcept {
     output_ = limiter_.clamp(blind_);
     phase_ = Phase::missing;
@@ -150,7 +151,7 @@ class PredictiveAdrc {
     return status;
   }
 
-  /// Both phases, for those who do not mind the order. @return u
+  /// Both phases at once, if the delay does not matter. @return u
   template <class NextReference>
   S update(S y, const NextReference& next_reference) noexcept {
     const S u = control(y);
@@ -158,8 +159,7 @@ class PredictiveAdrc {
     return u;
   }
 
-  /// The second phase, and both, by a list: `update(y, {r, r1, r2})`.
-  /// @{
+  /// The second phase, and both, with a list: `update(y, {r, r1, r2})`. @{
   template <std::size_t Count>
   StepStatus prepare(const S (&next_reference)[Count]) noexcept {
     return prepare(detail::listed(next_reference));
@@ -189,14 +189,14 @@ class PredictiveAdrc {
     arm();
   }
 
-  /// The same by a list.
+  /// The same with a list.
   template <std::size_t Count>
   void set_reference(const S (&next_reference)[Count]) noexcept {
     set_reference(detail::listed(next_reference));
   }
 
-  /// What the actuator really holds since the last `control`. A number that is not finite is not
-  /// taken.
+  /// Reports what the actuator has really held since the last `control`. A number that is not
+  /// finite is ignored.
   StepStatus report_applied(S u_applied) noexcept {
     const auto good = is_finite(u_applied);
     const S u = select(good, u_applied, output_);
@@ -223,7 +223,7 @@ class PredictiveAdrc {
     return status;
   }
 
-  /// Starts the observer anew at (y, 0, .., 0), and the hold with it.
+  /// Restarts the observer at (y, 0, .., 0), and the start hold.
   StepStatus reset(S y) noexcept {
     const StepStatus status = observer_.reset(y);
     if (status != StepStatus::ok) return status;
@@ -237,8 +237,8 @@ class PredictiveAdrc {
   /// A refused config changes nothing.
   Check<S> retune(const Config& config) { return detail::retune(*this, config); }
 
-  /// The same, with the settings of `fresh`, as `make` gave it: no design work, fit for an
-  /// interrupt.
+  /// The same with the settings of `fresh`, as returned by `make`: without design work, so it may
+  /// run in an interrupt.
   Check<S> adopt(const PredictiveAdrc& fresh) {
     if (auto ok = observer_.adopt(fresh.observer_); !ok) return ok;
     weights_ = fresh.weights_;
@@ -256,11 +256,11 @@ class PredictiveAdrc {
   [[nodiscard]] const Observer& observer() const noexcept { return observer_; }
   /// T, s.
   [[nodiscard]] S sample_time() const noexcept { return observer_.sample_time(); }
-  /// The u that holds now.
+  /// The present u.
   [[nodiscard]] const S& output() const noexcept { return output_; }
-  /// What the observer said of the last sample.
+  /// Status of the observer at the last sample.
   [[nodiscard]] StepStatus status() const noexcept { return status_; }
-  /// What the next u will be without a measurement, before the limits.
+  /// The next u if its measurement is missing, before the limits.
   [[nodiscard]] const S& blind_output() const noexcept { return blind_; }
   /// k_0 .. k_(n-1).
   [[nodiscard]] const Array<S, order>& gains() const noexcept { return law_.gains(); }

@@ -1,5 +1,5 @@
 /// @file
-/// Telemetry: all that one logs of a sample of a loop.
+/// Telemetry: the quantities to log for each sample of a loop.
 #pragma once
 
 #include <esokit/control/control_loop.hpp>
@@ -8,7 +8,7 @@
 
 namespace esokit {
 
-/// A sample of a loop, trivially copyable: into a ring buffer or over a link as it is.
+/// A sample of a loop. Trivially copyable, so it can go into a ring buffer or over a link as it is.
 /// @tparam States N of the observer
 template <int States, PlainScalar S = double>
 struct Telemetry {
@@ -26,7 +26,7 @@ struct Telemetry {
   Array<S, States> estimate{};         ///< (y, .., y^(n-1), d, ..)
 };
 
-/// What there is to be logged of the last sample of a controller (Adrc, DisturbanceCompensator).
+/// The telemetry of the last sample of a controller (Adrc, DisturbanceCompensator).
 /// @param time of the sample, s @param y, r as they were given
 template <class Controller, PlainScalar S = typename Controller::scalar_type>
 [[nodiscard]] auto telemetry(const Controller& controller, const S& time, const S& y,

@@ -28,7 +28,7 @@ template <PlainScalar S>
 
 namespace detail {
 
-/// What differentiators tell of their state.
+/// The state of a differentiator.
 template <PlainScalar S>
 class DifferentiatorState {
  public:
@@ -72,8 +72,7 @@ struct TrackingDifferentiatorConfig {
 };
 
 /// Tracking differentiator by fhan: r1 follows the reference as fast as |r1''| <= `acceleration`
-/// lets it, r2 = r1'. It is always ready to stop, so it stays r2^2 / (2R) behind a moving
-/// reference.
+/// allows, r2 = r1'. It can always stop in time, so it stays r2^2 / (2R) behind a moving reference.
 template <Scalar S = double>
 class TrackingDifferentiator : public detail::DifferentiatorState<S> {
   using State = detail::DifferentiatorState<S>;
@@ -144,9 +143,10 @@ struct SignTrackingDifferentiatorConfig {
   /// @endcond
 };
 
-/// The differentiator by a sign function, r1' = r2, r2' = -R sign(r1 - r + r2 |r2| / (2R)): what
-/// the papers write. As an ODE for simulation, and sampled with the sign held over a sample;
-/// sampled it chatters about the reference by R h in r2, so prefer TrackingDifferentiator.
+/// The differentiator by a sign function, r1' = r2, r2' = -R sign(r1 - r + r2 |r2| / (2R)): the
+/// form in the papers. Available as an ODE for simulation, and sampled with the sign held over a
+/// sample. The sampled form chatters about the reference by R h in r2, so prefer
+/// TrackingDifferentiator.
 template <Scalar S = double>
 class SignTrackingDifferentiator : public detail::DifferentiatorState<S> {
   using State = detail::DifferentiatorState<S>;
