@@ -42,7 +42,7 @@ class AlgebraicGain {
   friend class AlgebraicGain;
 
  public:
-  /// What it does beside `gain`.
+  /// What it declares beside `gain`.
   static constexpr GainLawTraits traits{.kind = GainKind::preset,
                                         .advances = true,
                                         .accepts = true,
@@ -75,7 +75,7 @@ class AlgebraicGain {
     restart();
   }
 
-  /// k, scaled, whatever the innovation.
+  /// k, scaled, for any innovation.
   /// @{
   [[nodiscard]] constexpr const ScaledGain<Size, S>& gain(const S&) const noexcept { return gain_; }
 
@@ -84,8 +84,8 @@ class AlgebraicGain {
   }
   /// @}
 
-  /// Next sample of the schedule. One that was not corrected among the first N breaks the deadbeat
-  /// property: the schedule starts anew there.
+  /// Next sample of the schedule. If one of the first N is not corrected, the deadbeat property is
+  /// lost and the schedule restarts there.
   ESOKIT_INLINE constexpr void advance() noexcept {
     if constexpr (PackScalar<S>) {
       if (settled_ == true) [[likely]]
@@ -103,10 +103,10 @@ class AlgebraicGain {
   /// This sample was corrected.
   constexpr void accept(const S&) noexcept { pending_ = false; }
 
-  /// As `restart`: a reset of the observer is a start.
+  /// As `restart`, because a reset of the observer is a start.
   constexpr void reset() noexcept { restart(); }
 
-  /// Begins the schedule anew; the observer's state is not touched.
+  /// Restarts the schedule; the state of the observer is kept.
   constexpr void restart() noexcept { resume(0); }
 
   /// Goes to the place in the schedule that is reached after `age` samples.

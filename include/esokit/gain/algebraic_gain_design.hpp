@@ -1,6 +1,5 @@
 /// @file
-/// What AlgebraicEso works out before it runs: how long the estimates are blanked, and the
-/// schedule.
+/// The design of AlgebraicEso before it runs: how long the estimates are blanked, and the schedule.
 #pragma once
 
 #include <cstdint>

@@ -14,7 +14,7 @@ namespace esokit {
 template <int Size, Scalar S, class Placement = EqualPoles>
 class ConstantGain {
  public:
-  /// What it does beside `gain`.
+  /// What it declares beside `gain`.
   static constexpr GainLawTraits traits{.kind = GainKind::preset, .bridges_gaps = true};
   using Spec = typename Placement::template Spec<Size, LaneScalar<S>>;  ///< of the placement
   template <class T>
@@ -52,7 +52,7 @@ class ConstantGain {
     return law;
   }
 
-  /// k, scaled, whatever the innovation.
+  /// k, scaled, for any innovation.
   /// @{
   [[nodiscard]] constexpr const ScaledGain<Size, S>& gain(const S&) const noexcept { return gain_; }
 

@@ -3,9 +3,9 @@
 ///
 /// Nothing is ever subtracted from a variance: the measurement update scales one of them, the time
 /// update adds squares up (modified weighted Gram-Schmidt, C. L. Thornton). So P stays symmetric
-/// and positive semidefinite in float, where the plain and the Joseph form do not. Beside the array
-/// form with square roots this one needs N divisions a step and no root, which an autodiff scalar
-/// likes too; it is as accurate, and 1.4 times faster for N = 3.
+/// and positive semidefinite in float, where the plain and the Joseph form do not. Compared with
+/// the array form with square roots it needs N divisions a step and no root, which is also better
+/// for an autodiff scalar; it is as accurate, and 1.4 times faster for N = 3.
 #pragma once
 
 #include <esokit/core/check.hpp>
@@ -92,7 +92,7 @@ class CovarianceFactor {
     for (S& l : lower_) l = S(0.0);
   }
 
-  /// Factors a symmetric matrix; nothing if it is not positive semidefinite to within rounding,
+  /// Factors a symmetric matrix. Returns nothing if it is not positive semidefinite up to rounding,
   /// that is, not even with its variances 8 N eps larger. Reads the lower triangle.
   static std::optional<CovarianceFactor> from_matrix(const Square& p) noexcept {
     CovarianceFactor factor;
@@ -147,8 +147,8 @@ class CovarianceFactor {
     return gain;
   }
 
-  /// P <- P - k c P for a measurement c x with noise of variance r (G. J. Bierman, 1977), where c
-  /// is not the first state alone. What is known for certain is not corrected.
+  /// P <- P - k c P for a measurement c x with noise of variance r (G. J. Bierman, 1977), for any
+  /// c. A state that is known for certain is not corrected.
   /// @param output c, N elements @return k = P c' / (c P c' + r), N elements
   Array<S, Size> correct(const Array<S, Size>& output, const S& noise) noexcept {
     Array<S, Size> gain;

@@ -1,6 +1,6 @@
 /// @file
-/// Characteristic polynomials of the estimation error from gains, in a form in which continuous and
-/// sampled observers are tested alike.
+/// Characteristic polynomials of the estimation error from gains, in a form that allows the same
+/// tests for continuous and sampled observers.
 #pragma once
 
 #include <esokit/core/check.hpp>

@@ -1,5 +1,5 @@
 /// @file
-/// What ExtendedStateFilter makes of its config: the Riccati law, or the rule that is broken.
+/// The design of ExtendedStateFilter from its config: the Riccati law, or the broken rule.
 #pragma once
 
 #include <cmath>

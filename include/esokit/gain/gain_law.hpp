@@ -1,5 +1,5 @@
 /// @file
-/// The seam between the observers: what a gain law is.
+/// What a gain law is: the only part in which the observers differ.
 #pragma once
 
 #include <concepts>
@@ -10,7 +10,7 @@
 
 namespace esokit {
 
-/// How the gain depends on the innovation e: what can be known of it before the measurement.
+/// How the gain depends on the innovation e, and so what is known of it before the measurement.
 enum class GainKind : unsigned char {
   /// In any way. The observer asks with finite e alone, see `bears_any_innovation`.
   general,
@@ -23,8 +23,8 @@ enum class GainKind : unsigned char {
   factored,
 };
 
-/// What a gain law can do beside `gain(e)`: `static constexpr GainLawTraits traits{..}` in it. One
-/// that does nothing more declares nothing. All hooks are noexcept.
+/// What a gain law can do beside `gain(e)`, declared in a member `static constexpr GainLawTraits
+/// traits{..}`. A law with `gain(e)` alone needs no traits. All hooks are noexcept.
 struct GainLawTraits {
   GainKind kind = GainKind::general;  ///< its members must equal gain(e)
 
@@ -39,13 +39,13 @@ struct GainLawTraits {
   /// `reset()`: forget all history.
   bool resets = false;
 
-  /// `gap_gain(e, samples) const`: the gain where `samples` (unsigned) > 1 sample times have passed
-  /// since the last correction. Without it `gain(e)` is used; a constant nominal gain makes
-  /// recurring gaps diverge, a law that follows time in `advance()` needs none.
+  /// `gap_gain(e, samples) const`: the gain if `samples` (unsigned) > 1 sample times have passed
+  /// since the last correction. Without it `gain(e)` is used. With a constant nominal gain
+  /// recurring gaps then diverge; a law that follows time in `advance()` does not need this hook.
   bool bridges_gaps = false;
 
-  /// `gain(e)` may be asked with an e that is not finite (its answer is then not used); saves the
-  /// observer a test.
+  /// `gain(e)` may be called with an e that is not finite (the result is then not used); this saves
+  /// the observer a test.
   bool bears_any_innovation = false;
 };
 
@@ -158,7 +158,7 @@ concept FactoredAsDeclared = detail::as_declared(gain_law_traits<Law>.kind == Ga
                                                      detail::names_linear_gain<Law>,
                                                  detail::Factored<Law, Size, S>);
 
-/// No member function has a name that is nearly that of a hook; it would never be called.
+/// No member function has a name that is almost that of a hook, because it would never be called.
 template <class Law>
 concept HasNoMisspelledHook =
     !detail::calls_advances<Law> && !detail::calls_accepts<Law> && !detail::calls_accepted<Law> &&
@@ -171,9 +171,10 @@ concept HasNoMisspelledHook =
 /// A gain law of the sampled predictor-corrector: the only thing that differs between observers.
 ///
 /// Required: `gain(e) const noexcept`, the scaled gain k (k_r = T^r / r! times the physical gain;
-/// `scaled_gain` converts) for the innovation e = y - z_1, predicted z_1. Pure: the correction may
-/// yet be dropped. All else is declared, see GainLawTraits; a hook that is named and not declared,
-/// declared and not there, or has another signature, makes it none.
+/// `scaled_gain` converts) for the innovation e = y - z_1, predicted z_1. It must have no side
+/// effect, because the correction may still be dropped. Everything else is declared, see
+/// GainLawTraits. A type with a hook that is not declared, is declared but missing, or has another
+/// signature is not a gain law.
 template <class Law, int Size, class S>
 concept GainLaw = std::copyable<Law> && requires(const Law& law, const S& innovation) {
   { law.gain(innovation) }
@@ -188,8 +189,8 @@ template <class Law, int Size, class S>
 concept PresetGainLaw = GainLaw<Law, Size, S> && gain_law_traits<Law>
 .kind == GainKind::preset;
 
-/// What a gain law of a continuous observer can do beside `gain(t, e)`: `static constexpr
-/// ContinuousGainLawTraits traits{..}` in it.
+/// What a gain law of a continuous observer can do beside `gain(t, e)`, declared in a member
+/// `static constexpr ContinuousGainLawTraits traits{..}`.
 struct ContinuousGainLawTraits {
   /// `begin_step(t, e)`, called at step boundaries of a simulation; the only place where a switched
   /// law may change its mode.
@@ -208,8 +209,8 @@ concept BeginsStepsAsDeclared = detail::as_declared(
     detail::declared_traits<Law, ContinuousGainLawTraits>.begins_steps,
     detail::names_begin_step<Law>, requires(Law& law, const S& x) { law.begin_step(x, x); });
 
-/// A gain law of a continuous observer: `gain(t, e) const` in physical units, N x 1. All else is
-/// declared, see ContinuousGainLawTraits.
+/// A gain law of a continuous observer: `gain(t, e) const` in physical units, N x 1. Everything
+/// else is declared, see ContinuousGainLawTraits.
 template <class Law, int Size, class S>
 concept ContinuousGainLaw = std::copyable<Law> && requires(const Law& law, const S& x) {
   { law.gain(x, x) } -> std::convertible_to<Vector<S, Size>>;

@@ -1,8 +1,8 @@
 /// @file
 /// Certificate for observers whose corrections of the disturbance are scaled from sample to sample.
 ///
-/// With all gains but the last the error has the characteristic polynomial p_0, with the last one
-/// too p_1; a correction that counts phi times makes p_0 + phi (p_1 - p_0). By the circle criterion
+/// Without the last gain the error has the characteristic polynomial p_0, with all gains p_1; if
+/// the last correction is multiplied by phi, it is p_0 + phi (p_1 - p_0). By the circle criterion
 /// any phi(k) in [0, 1] is stable if Re G > -1 on the unit circle, G = (p_1 - p_0) / p_0: that is
 /// Re p_1 / p_0 > 0, the test of a pair of gain sets, at whose end p_0 has its root at z = 1 (a
 /// disturbance that is not corrected stays).
@@ -13,8 +13,8 @@
 namespace esokit {
 
 /// Whether the error of a sampled observer of the chain with one extended state stays bounded, by a
-/// common quadratic Lyapunov function, while corrections of the disturbance count phi(k) times, in
-/// [0, 1], however phi varies.
+/// common quadratic Lyapunov function, while corrections of the disturbance are multiplied by any
+/// phi(k) in [0, 1].
 /// @param gain scaled current-estimator gain
 template <int Size, Scalar S>
 [[nodiscard]] bool gating_certified(const ScaledGain<Size, S>& gain) {

@@ -150,24 +150,26 @@ struct PartDesign {
 
 }  // namespace detail
 
-/// Constant gain for a model, placed numerically; of a model that says what of it is corrected
-/// (CorrectedPart) for that part, with the poles that it places itself.
+/// Constant gain for a model, placed numerically. If the model declares which part is corrected
+/// (CorrectedPart), the gain is for that part, together with the poles that the model places
+/// itself.
 ///
 /// The gain that places the poles for M T, by which the chain bridges a gap, is of no use to what
 /// swings: seen at every M-th sample a resonator is nearly a constant, and the gain grows without
-/// bound (50 Hz at 1 ms: 1e5 after 10 missing samples). After a gap this law weighs y as a Kalman
-/// filter would whose covariance was that of the noise in the estimate, and has grown by the gap:
+/// bound (50 Hz at 1 ms: 1e5 after 10 missing samples). After a gap this law weights y like a
+/// Kalman filter whose covariance was that of the noise in the estimate and has grown during the
+/// gap:
 ///
 ///     k_M = P_M C' / (C P_M C' + R),  P_M = Phi^(M-1) P_1 Phi^(M-1)',  R = 1
 ///
-/// which is bounded, and goes to that of exact measurements. Bridged is up to the last M for which
-/// this M and all before it, each recurring for ever, let errors decay, by at least a hundredth of
-/// what a sample without a gap does; the observer restarts beyond.
+/// which is bounded, and tends to the gain for exact measurements. Gaps are bridged up to the
+/// largest M for which the errors decay if this M, or any smaller one, recurs for ever, with at
+/// least a hundredth of the decay without gaps. After longer gaps the observer restarts.
 /// @tparam MostBridged gaps to be considered; each costs N numbers
 template <int Size, Scalar S, class Placement, int MostBridged>
 class ModelGain {
  public:
-  /// What it does beside `gain`.
+  /// What it declares beside `gain`.
   static constexpr GainLawTraits traits{.kind = GainKind::preset, .bridges_gaps = true};
   using Spec = typename Placement::template Spec<Size, S>;  ///< of the placement
 
@@ -228,7 +230,7 @@ class ModelGain {
     return detail::PartDesign<Size, S, 1>::decays(all.step, all.output, gain);
   }
 
-  /// k, scaled, whatever the innovation.
+  /// k, scaled, for any innovation.
   /// @{
   [[nodiscard]] constexpr const ScaledGain<Size, S>& gain(const S&) const noexcept {
     return gains_[0];

@@ -1,9 +1,9 @@
 /// @file
 /// Poles of the estimation error placed for any sampled model, in a form that keeps its digits.
 ///
-/// With F = (Phi - I) / a, the states taken in units of a^degree, a the distance of the poles from
-/// z = 1: of a chain whose poles all lie within a, F is the same matrix for every a but for terms
-/// of order a, and so are the gains. Ackermann's formula is harmless there; in the plain states its
+/// It uses F = (Phi - I) / a with the states in units of a^degree, where a is the distance of the
+/// poles from z = 1. For a chain whose poles all lie within a, F and the gains are the same for
+/// every a up to terms of order a. There Ackermann's formula is accurate; in the plain states its
 /// terms differ by a^N (N = 7, omega_o T = 1e-3: no digit is left).
 #pragma once
 

@@ -1,6 +1,6 @@
 /// @file
-/// What the configs of the filters say of noise, checked and made into factors: written once for
-/// ExtendedStateFilter and MimoExtendedStateFilter.
+/// The noise settings of the filters, checked and factored: common to ExtendedStateFilter and
+/// MimoExtendedStateFilter.
 #pragma once
 
 #include <esokit/core/check.hpp>

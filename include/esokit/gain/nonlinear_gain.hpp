@@ -11,7 +11,8 @@
 
 namespace esokit {
 
-/// What an even gain can do beside k(x): `static constexpr EvenGainTraits traits{..}` in it.
+/// What an even gain can do beside k(x), declared in a member `static constexpr EvenGainTraits
+/// traits{..}`.
 struct EvenGainTraits {
   bool checks = false;    ///< `check() const` gives the error of a bad parameter, as a Check
   bool prepares = false;  ///< `prepared() const` gives a function object that is quicker to call
@@ -43,7 +44,7 @@ concept PreparesAsDeclared = detail::as_declared(
 
 /// An even gain k(x), x = |e| / error_scale > 0: the correction is l k(x) e.
 ///
-/// Any copyable function object will do; what else it can do it declares, see EvenGainTraits.
+/// Any copyable function object can be used; it declares what else it can do, see EvenGainTraits.
 template <class Shape, class S>
 concept EvenGain = std::copyable<Shape> && requires(const Shape& k, const S& x) {
   { k(x) } -> std::convertible_to<S>;
@@ -243,7 +244,7 @@ template <int Size, Scalar S, class Shape = PowerSumGain<S>>
 requires EvenGain<Shape, S>
 class NonlinearGain {
  public:
-  /// What it does beside `gain`.
+  /// What it declares beside `gain`.
   static constexpr GainLawTraits traits{.kind = GainKind::factored, .bridges_gaps = true};
 
   using Linear = ConstantGain<Size, S>;  ///< the gain where k = 1

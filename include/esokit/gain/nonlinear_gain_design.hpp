@@ -1,6 +1,6 @@
 /// @file
-/// What NonlinearEso finds out about its gain function before it runs: the limits between which it
-/// is kept, and a report on where the given function is outside of what is stable.
+/// The design of NonlinearEso before it runs: the limits of its gain function, and a report on
+/// where the given function is outside the stable range.
 #pragma once
 
 #include <esokit/gain/gain_interval.hpp>
@@ -9,8 +9,8 @@
 
 namespace esokit {
 
-/// Ranges of |e| (unit of y) in ascending order. `from` = 0 and `to` = infinity mean that nothing
-/// else was found as far as the test goes (2^-40 to 2^40 error scales).
+/// Ranges of |e| (unit of y) in ascending order. `from` = 0 and `to` = infinity mean that no end
+/// was found within the tested range (2^-40 to 2^40 error scales).
 template <PlainScalar S>
 struct ErrorRanges {
   static constexpr int most = 4;     ///< capacity

@@ -1,6 +1,7 @@
 /// @file
-/// Any stable set of poles as a placement, complex ones in conjugate pairs; to be included by those
-/// who place by `PoleSet`: the header `complex` takes half as long to compile as a controller.
+/// Any stable set of poles as a placement, complex ones in conjugate pairs; to be included only
+/// where `PoleSet` is used, because the header `complex` takes half as long to compile as a
+/// controller.
 #pragma once
 
 #include <cmath>

@@ -156,8 +156,8 @@ Array<S, Size> alternating_response(const MatrixTransition<Size, S>& transition)
 
 }  // namespace detail
 
-/// Least R for which an error that changes sign at every sample fades, in the unit of `noise`; not
-/// positive: none is needed.
+/// Smallest R for which an error that changes sign at every sample decays, in the unit of `noise`;
+/// if it is not positive, no R is needed.
 ///
 /// |p(-1)|^2 of the limit's poles is in proportion to the density of the innovations at half the
 /// sampling rate, R + |C (-I - Phi)^-1 Q^(1/2)|^2 (spectral factorisation). Where that is zero the

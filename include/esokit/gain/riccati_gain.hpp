@@ -10,9 +10,9 @@
 ///     P- <- (1+theta) Phi (I - k C) P- (I - k C)' Phi' + (Phi k) R (Phi k)'
 ///           + (1+theta)/theta Q                                               (11)
 ///
-/// The paper prints the transpose of s where its inverse belongs, and in its corrected form the
-/// predictor gain Phi k where k belongs. theta = 0 has no meaning in (11): the plain Kalman filter,
-/// inflation 1 and noise Q, is a rule of its own.
+/// The paper prints the transpose of s instead of its inverse, and in its corrected form the
+/// predictor gain Phi k instead of k. theta = 0 has no meaning in (11): the plain Kalman filter,
+/// with inflation 1 and noise Q, is a separate rule.
 #pragma once
 
 #include <cmath>
@@ -46,7 +46,7 @@ TransitionOf<Model, S> transition_of(const Model& model) {
 /// How the inflation theta is chosen.
 enum class InflationRule : unsigned char {
   fixed,     ///< theta > 0 as given
-  adaptive,  ///< at every sample the theta that makes the (weighted) trace of the bound least
+  adaptive,  ///< at every sample the theta that minimises the (weighted) trace of the bound
   none,      ///< the plain Kalman filter
 };
 
@@ -89,7 +89,7 @@ constexpr S largest_variance() noexcept {
 template <int Size, Scalar S, int TableSize = 0, class Transition = PascalTransition>
 class RiccatiGain {
  public:
-  /// What it does beside `gain`.
+  /// What it declares beside `gain`.
   static constexpr GainLawTraits traits{
       .kind = GainKind::preset, .advances = true, .accepts = true, .resets = true};
 

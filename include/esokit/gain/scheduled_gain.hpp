@@ -22,7 +22,7 @@ class ScheduledGain {
   using One = ModelGain<Size, S, Placement, MostBridged>;
 
  public:
-  /// What it does beside `gain`.
+  /// What it declares beside `gain`.
   static constexpr GainLawTraits traits{.kind = GainKind::preset, .bridges_gaps = true};
   using Spec = typename Placement::template Spec<Size, S>;  ///< of the placement
 
@@ -84,7 +84,7 @@ class ScheduledGain {
     return {};
   }
 
-  /// k, scaled, whatever the innovation.
+  /// k, scaled, for any innovation.
   /// @{
   [[nodiscard]] constexpr const ScaledGain<Size, S>& gain(const S&) const noexcept {
     return gains_[0];

@@ -48,8 +48,8 @@ class SwitchedGain {
   template <class T>
   using with_scalar = SwitchedGain<Size, T, Placement, Reading>;  ///< the same with another scalar
 
-  /// What it does beside `gain`. A NaN compares as not shrinking, so that any innovation is safe to
-  /// ask with.
+  /// What it declares beside `gain`. A NaN compares as not shrinking, so that any innovation is
+  /// safe to ask with.
   static constexpr GainLawTraits traits{.kind = GainKind::switched,
                                         .accepts = true,
                                         .resets = true,

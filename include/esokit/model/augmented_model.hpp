@@ -1,6 +1,6 @@
 /// @file
-/// AugmentedModel: plant, actuator, sensor and disturbances put together from what is known of
-/// each.
+/// AugmentedModel: a model put together from known parts of plant, actuator, sensor and
+/// disturbances.
 #pragma once
 
 #include <cmath>
@@ -121,15 +121,14 @@ struct SpeedRange<true, S> {
   /// @endcond
 };
 
-/// The numbers of the parts of an AugmentedModel, in this order; those of a part that is not there
-/// are empty.
+/// The numbers of the parts of an AugmentedModel, in this order; members of absent parts are empty.
 template <ModelParts Parts, Scalar S>
 struct PartsSettings {
   Array<S, Parts.plant_poles ? Parts.order : 0> plant{};  ///< a_0 .. a_(n-1), 1/s^(n-i)
   Lag<Parts.actuator, S> actuator{};                      ///< from u to v
   Lag<Parts.sensor, S> sensor{};                          ///< from y to what is measured
   Array<Resonance<S>, Parts.resonators> resonators{};     ///< the sines
-  Array<S, Parts.leaky> leaky{};                          ///< time constants of what fades, s
+  Array<S, Parts.leaky> leaky{};                          ///< time constants of the fading parts, s
   SpeedRange<Parts.follows_speed, S> speed{};             ///< of the resonators
 
   /// @cond
@@ -146,14 +145,14 @@ struct PartsSettings {
 ///     sensor     what is measured follows y by a lag
 ///     d          a constant (or polynomial), sines, and what fades
 ///
-/// With an actuator the model is of order n + its order, as the law has to be: y^(n+1) = D + b u
-/// with b = b0 / tau. `estimate` has (y, .., y^(order-1), D, ..), D all that a law cancels, so that
-/// any law works with it and omega_c keeps its meaning; then d', .. of more than one integrator,
-/// each sine q with q' / w, what fades, and last what is measured (with a sensor of order 2 its
-/// derivative / w).
+/// With an actuator, model and law have the order n + that of the actuator: y^(n+1) = D + b u with
+/// b = b0 / tau. `estimate` has (y, .., y^(order-1), D, ..), where D is everything that a law
+/// cancels, so that any law works with it and omega_c keeps its meaning. Then follow d', .. if
+/// there is more than one integrator, each sine q with q' / w, the fading parts, and with a sensor
+/// the measured value (for order 2 also its derivative / w).
 ///
-/// Poles: the actuator is simulated from u alone and never corrected, its poles stay its own; a
-/// sensor that is faster than omega_o keeps its own too; those of a sine go to -s +- j w0; all
+/// Poles: the actuator is simulated from u alone and never corrected, so it keeps its own poles; a
+/// sensor that is faster than omega_o also keeps its own; those of a sine go to -s +- j w0; all
 /// others to exp(-omega_o T).
 template <ModelParts Parts, Scalar S = double>
 class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
@@ -219,7 +218,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   /// As they were given.
   [[nodiscard]] constexpr const Settings& settings() const noexcept { return settings_; }
 
-  /// The estimate of a plant that stands at y under u.
+  /// The estimate for a plant that stands at y under u.
   [[nodiscard]] constexpr Estimate rest(const S& y, const S& u) const noexcept {
     Estimate z = Estimate::Zero();
     z(0) = y;
@@ -264,8 +263,8 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
     return speed_;
   }
 
-  /// The same with all frequencies of the resonators times `factor`; exact, and as much work as a
-  /// matrix exponential: some 16 products of N x N.
+  /// The same with all frequencies of the resonators multiplied by `factor`. Exact; it costs a
+  /// matrix exponential, about 16 products of N x N.
   [[nodiscard]] AugmentedModel at_speed(const S& factor) const noexcept {
     AugmentedModel other = *this;
     other.speed_ = factor;
@@ -286,13 +285,12 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
     const int q = order + m + 2 * resonator;
     return detail::swing_of(z(q), z(q + 1));
   }
-  /// What fades, part 0 .. l - 1.
+  /// The fading part 0 .. l - 1.
   [[nodiscard]] static constexpr S fading(const Estimate& z, int part) noexcept
       requires(Parts.leaky > 0) {
     return z(order + m + 2 * Parts.resonators + part);
   }
-  /// The constant part of d, unit of y^(n): what is left of D without the plant, the actuator and
-  /// the other parts.
+  /// The constant part of d, unit of y^(n): D without the plant, the actuator and the other parts.
   [[nodiscard]] S constant(const Estimate& z) const noexcept {
     const auto x = this->scaled(z);
     const auto lag = detail::scaled_lag(settings_.actuator, sample_time_);

@@ -1,6 +1,5 @@
 /// @file
-/// ChainModel: the chain of integrators as the model of an observer, what is known where nothing
-/// more is known.
+/// ChainModel: the chain of integrators as the model of an observer, used if nothing else is known.
 #pragma once
 
 #include <esokit/core/kernels.hpp>
@@ -10,7 +9,7 @@
 
 namespace esokit {
 
-/// The model y^(n) = d + b0 u with d^(m) = 0, sampled at T: what an observer predicts with.
+/// The model y^(n) = d + b0 u with d^(m) = 0, sampled at T, with which an observer predicts.
 ///
 /// States are those of ScaledChain.
 template <int Order, Scalar S = double, int Extension = 1>

@@ -1,5 +1,5 @@
 /// @file
-/// What of a model a measurement corrects, for the design of its gain.
+/// The part of a model that a measurement corrects, for the design of its gain.
 #pragma once
 
 #include <esokit/core/matrix.hpp>
@@ -8,10 +8,10 @@
 
 namespace esokit {
 
-/// A part of a model that is observed by itself, and what its correction is to the whole: what a
-/// model that declares `ModelTraits::corrects_part` gives the design of a gain.
+/// A part of a model that is observed by itself, and the effect of its correction on the whole. A
+/// model that declares `ModelTraits::corrects_part` passes it to the design of a gain.
 ///
-/// What is known and stable need not be corrected: an actuator is simulated from u.
+/// Known and stable states need not be corrected: an actuator is simulated from u.
 /// @tparam Size states of the part @tparam Whole states of the model @tparam Pairs poles that the
 /// model places itself
 template <int Size, int Whole, int Pairs, Scalar S>

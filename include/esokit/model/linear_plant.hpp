@@ -1,5 +1,5 @@
 /// @file
-/// LinearPlant: the one linear plant. It is simulated, analysed and known by observers.
+/// LinearPlant: the type for all linear plants, used in simulation, in analysis and by observers.
 #pragma once
 
 #include <esokit/core/check.hpp>
@@ -14,15 +14,15 @@ namespace esokit {
 
 /// x' = A x + B u(t - dead_time) + E d,  y = C x.
 ///
-/// An aggregate, so that it can be written down as it is; what is typed in is better made by one of
-/// the four, which say what is wrong with it:
+/// An aggregate, so that it can be written down directly. These functions also check it and return
+/// an error:
 ///
 ///     chain({.coefficients = {5, 2}, .input_gain = 10})           // y'' + 2 y' + 5 y = 10 u + d
 ///     transfer_function({.numerator = {3, 1}, .denominator = {5, 2}})  // (s + 3)/(s^2 + 2 s + 5)
 ///     state_space({.a = {{0, 1}, {-5, -2}}, .b = {0, 10}, .c = {1, 0}})
 ///
-/// and `with_lag`, `with_sensor`, `with_dead_time`, which put an actuator, a sensor or a delay
-/// around a plant that is there.
+/// and `with_lag`, `with_sensor`, `with_dead_time` add an actuator, a sensor or a delay to an
+/// existing plant.
 /// @tparam States length of x @tparam Inputs, Outputs lengths of u and y; d has one entry an input
 template <int States, Scalar ScalarType = double, int Inputs = 1, int Outputs = 1>
 struct LinearPlant {
@@ -46,7 +46,7 @@ struct LinearPlant {
   Matrix<ScalarType, States, Inputs> b{};   ///< B
   Matrix<ScalarType, Outputs, States> c{};  ///< C
 
-  /// E: where the disturbance enters; as u does, and in the unit of u, if nothing else is said.
+  /// E: where the disturbance enters; by default where u does, and in the unit of u.
   Matrix<ScalarType, States, Inputs> e = b;
   ScalarType dead_time{};  ///< s, from u to the plant; d is not delayed
 
@@ -64,7 +64,7 @@ struct LinearPlant {
     ScalarType dead_time{};                   ///< s
   };
 
-  /// n integrations from u to y with what feeds back on the way, as ADRC sees a plant:
+  /// n integrations from u to y with feedback of the states, as ADRC sees a plant:
   ///
   ///     y^(n) + a_(n-1) y^(n-1) + .. + a_0 y = b0 u(t - dead_time) + d
   ///
@@ -114,7 +114,7 @@ struct LinearPlant {
     return plant;
   }
 
-  /// The plant as it is listed, after `check`.
+  /// The plant with the given matrices, after `check`.
   static constexpr Expected<LinearPlant, Error<ScalarType>> state_space(const LinearPlant& plant) {
     if (const auto ok = plant.check(); !ok) return ok.error();
     return plant;
@@ -165,8 +165,8 @@ struct LinearPlant {
     return y;
   }
 
-  /// n of ADRC: which derivative of the output is the first one that an input changes at once; 0 if
-  /// none does. What rounding may have left of a zero counts as one.
+  /// n of ADRC: the order of the first derivative of the output that an input changes at once; 0 if
+  /// there is none. A value that may be a rounded zero counts as zero.
   [[nodiscard]] constexpr int relative_degree(int output = 0) const noexcept {
     return first_gain(output).degree;
   }
@@ -320,7 +320,7 @@ constexpr Expected<LinearPlant<States + Outputs, S, Inputs, Outputs>, Error<S>> 
   });
 }
 
-/// The plant with so much more dead time. @param dead_time s, zero or more
+/// The plant with additional dead time. @param dead_time s, zero or more
 template <int States, Scalar S, int Inputs, int Outputs>
 constexpr Expected<LinearPlant<States, S, Inputs, Outputs>, Error<S>> with_dead_time(
     const LinearPlant<States, S, Inputs, Outputs>& plant, const S& dead_time) {
@@ -333,8 +333,8 @@ constexpr Expected<LinearPlant<States, S, Inputs, Outputs>, Error<S>> with_dead_
   return late;
 }
 
-/// What a while under held inputs does to the state of a plant: x + increment x + input u +
-/// disturbance d. Exact.
+/// The exact effect of held inputs on the state of a plant over a time: x + increment x + input u +
+/// disturbance d.
 ///
 /// The increment, exp(A t) - I, is kept instead of exp(A t), which for a short while has the digits
 /// of the dynamics behind those of I.

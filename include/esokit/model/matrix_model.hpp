@@ -1,5 +1,5 @@
 /// @file
-/// MatrixModel: what the models have in common that are given by Phi and Gamma.
+/// MatrixModel: the common base of the models that are given by Phi and Gamma.
 #pragma once
 
 #include <esokit/core/matrix.hpp>
@@ -24,9 +24,9 @@ struct ModelPattern {
 
 }  // namespace detail
 
-/// The members of a SampledModel, of elements of Phi - I and Gamma of which those that are zero
-/// whatever the numbers are left out. The states are the rows of the estimate, scaled, in another
-/// order: first those of a sensor.
+/// The members of a SampledModel, computed with Phi - I and Gamma; elements that are always zero
+/// are left out. The states are the scaled rows of the estimate in another order: those of a sensor
+/// come first.
 /// @tparam Shape `order`, `size`, `measured_rows` (states before y), `degree(state)`, and
 /// `pattern`, a detail::ModelPattern
 template <class Shape, PlainScalar S>

@@ -1,6 +1,6 @@
 /// @file
-/// What a model can be put together from: lags of actuator and sensor, and disturbances that stay,
-/// swing or fade. AugmentedModel and LinearPlantModel share it.
+/// The parts of a model: lags of actuator and sensor, and disturbances that stay, swing or fade.
+/// Common to AugmentedModel and LinearPlantModel.
 #pragma once
 
 #include <cmath>
@@ -12,20 +12,20 @@
 
 namespace esokit {
 
-/// What is known of the plant: which parts a model has. Their numbers are in its Settings.
+/// What is known of the plant: the parts of a model. Their numbers are in its Settings.
 struct ModelParts {
   int order = 1;               ///< n: the plant is y^(n) = -a_(n-1) y^(n-1) - .. - a_0 y + d + b0 v
   bool plant_poles = false;    ///< a_0 .. a_(n-1) are known; false: they are zero, a chain
   int actuator = 0;            ///< order of the lag from u to v: 0 (v = u), 1 or 2
   int sensor = 0;              ///< order of the lag from y to what is measured: 0, 1 or 2
   int constants = 1;           ///< m: the disturbance has m integrators, at least one
-  int resonators = 0;          ///< and so many sines of known frequency
-  int leaky = 0;               ///< and so many that fade, each with a time constant
+  int resonators = 0;          ///< number of sines of known frequency in the disturbance
+  int leaky = 0;               ///< number of fading parts, each with a time constant
   bool follows_speed = false;  ///< the frequencies of the resonators change while running, all by
                                ///< one factor
 };
 
-/// A lag by which an actuator or a sensor follows; of order 0 nothing.
+/// The lag of an actuator or a sensor; empty for order 0.
 template <int Order, Scalar S>
 struct Lag {};
 
@@ -71,7 +71,7 @@ struct Resonance {
   /// @endcond
 };
 
-/// A sine by its size and where it is: q = amplitude sin(phase).
+/// A sine by amplitude and phase: q = amplitude sin(phase).
 template <PlainScalar S>
 struct Swing {
   S amplitude;  ///< unit of the disturbance

@@ -60,17 +60,18 @@ struct PlantShape {
 
 }  // namespace detail
 
-/// x' = A x + B u + E d, y = C x: a plant with zeros, known poles, or a disturbance that enters
-/// elsewhere than u does (mismatched), sampled exactly. d is the sum of a constant (or polynomial),
-/// of sines and of what fades; y may be seen through a sensor's lag.
+/// x' = A x + B u + E d, y = C x: a plant with zeros, known poles, or a disturbance that enters at
+/// another place than u (mismatched), sampled exactly. d is the sum of a constant (or polynomial),
+/// sines and fading parts; y may be measured through a sensor's lag.
 ///
-/// y^(n) = D + b u, with n the relative degree of u; `estimate` has (y, .., y^(n-1), D, ..), D all
-/// that a law cancels, so that `Adrc` works with it; `plant_state` and `disturbance` give x and d.
-/// Cancelling D makes the plant's zeros poles of the loop: with one in the right half plane take
-/// the estimates alone.
+/// y^(n) = D + b u, with n the relative degree of u; `estimate` has (y, .., y^(n-1), D, ..), where
+/// D is everything that a law cancels, so that `Adrc` works with it; `plant_state` and
+/// `disturbance` give x and d. Cancelling D makes the zeros of the plant poles of the loop: if a
+/// zero is in the right half plane, use only the estimates.
 ///
-/// The config's `input_gain` says b; B is scaled to it, E is not. A dead time is DelayedInput's; an
-/// actuator is part of A. Poles: as AugmentedModel's, those of the plant all at exp(-omega_o T).
+/// The config's `input_gain` is b; B is scaled to it, E is not. For a dead time use DelayedInput;
+/// an actuator is part of A. Poles: as for AugmentedModel, with all poles of the plant at
+/// exp(-omega_o T).
 /// @tparam States of x @tparam Parts of it `order`, the relative degree from u to y, `sensor`,
 /// `constants`, `resonators` and `leaky`; the rest is in the plant
 template <int States, ModelParts Parts, PlainScalar S = double>
@@ -105,7 +106,7 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
     LinearPlant<States, S> plant{};                      ///< A, B, C and, for d, E
     Lag<lf, S> sensor{};                                 ///< from y to what is measured
     Array<Resonance<S>, Parts.resonators> resonators{};  ///< sines of d
-    Array<S, Parts.leaky> leaky{};                       ///< time constants of what fades, s
+    Array<S, Parts.leaky> leaky{};                       ///< time constants of the fading parts, s
   };
 
   /// Checks the plant and samples it with its disturbance.
@@ -165,7 +166,7 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
   /// As they were given.
   [[nodiscard]] constexpr const Settings& settings() const noexcept { return settings_; }
 
-  /// The estimate of a plant that stands at y under u.
+  /// The estimate for a plant that stands at y under u.
   [[nodiscard]] Estimate rest(const S& y, const S& u) const noexcept {
     return rest_of_y_ * y + rest_of_u_ * u;
   }
@@ -189,14 +190,14 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
     for (int j = 0; j < Parts.leaky; ++j) sum = sum + natural(swings + 2 * Parts.resonators + j);
     return sum;
   }
-  /// Of d what is constant, or a polynomial.
+  /// The constant (or polynomial) part of d.
   [[nodiscard]] S constant(const Estimate& z) const noexcept { return natural_of(z)(States); }
-  /// Of d the sine of resonator 0 .. k - 1.
+  /// The sine of resonator 0 .. k - 1 in d.
   [[nodiscard]] static Swing<S> swing(const Estimate& z, int resonator) noexcept
       requires(Parts.resonators > 0) {
     return detail::swing_of(z(swings + 2 * resonator), z(swings + 2 * resonator + 1));
   }
-  /// Of d what fades, part 0 .. l - 1.
+  /// The fading part 0 .. l - 1 of d.
   [[nodiscard]] static constexpr S fading(const Estimate& z, int part) noexcept
       requires(Parts.leaky > 0) {
     return z(swings + 2 * Parts.resonators + part);

@@ -1,5 +1,5 @@
 /// @file
-/// What a model of the plant has to be for an observer to predict with it.
+/// What an observer requires of a model of the plant to predict with it.
 #pragma once
 
 #include <concepts>
@@ -12,30 +12,33 @@
 
 namespace esokit {
 
-/// What a model is beyond SampledModel: `static constexpr ModelTraits traits{..}` in it.
+/// What a model declares beyond SampledModel, in a member `static constexpr ModelTraits
+/// traits{..}`.
 struct ModelTraits {
-  /// It is the chain of integrators and nothing else: gains by formula, any gap bridged by the gain
-  /// for the longer step, certificates, error bounds, filter forms. Others are placed numerically,
-  /// and bridge gaps by a gain that stays bounded, see ModelGain.
+  /// It is exactly the chain of integrators. Then gains follow from formulas, any gap is bridged by
+  /// the gain for the longer step, and there are certificates, error bounds and filter forms. For
+  /// other models poles are placed numerically and gaps are bridged by a gain that stays bounded,
+  /// see ModelGain.
   bool is_chain = false;
 
-  /// y may be counted from elsewhere: a constant added to y, with D as it is, is a solution, too.
-  /// Known poles do no harm where the disturbance has a constant that takes it up.
+  /// The origin of y may be moved: with a constant added to y and the same D there is a solution,
+  /// too. This also holds with known poles if the disturbance has a constant that absorbs the
+  /// shift.
   bool shifts_output = false;
 
-  /// Its disturbance has rows of its own, from `order` on, so that what two levels of a cascade
-  /// have found adds up. Not where row `order` also holds what is known of plant or actuator.
+  /// Its disturbance has separate rows, from `order` on, so that the estimates of two levels of a
+  /// cascade add up. False if row `order` also contains known effects of plant or actuator.
   bool adds_levels = false;
 
-  /// `disturbance_part(x)` is what of a correction x is the disturbance's and not the plant's, for
-  /// a cascade of what does not add up.
+  /// `disturbance_part(x)` is the part of a correction x that belongs to the disturbance and not to
+  /// the plant, for a cascade of models without `adds_levels`.
   bool tells_disturbance = false;
 
-  /// `with_corrected_part(..)` says what of it a gain corrects, and which poles are its own to
-  /// place; see CorrectedPart. Otherwise all is corrected.
+  /// `with_corrected_part(..)` gives the part that a gain corrects, and the poles that the model
+  /// places itself; see CorrectedPart. Without it, everything is corrected.
   bool corrects_part = false;
 
-  /// `at_speed(factor)` is the same with its swings that much faster, see ScheduledGain.
+  /// `at_speed(factor)` is the same model with its swings faster by `factor`, see ScheduledGain.
   bool follows_speed = false;
 };
 
@@ -48,10 +51,10 @@ struct NoModelSettings {};
 
 /// A model of plant and disturbance, exact for an input that is held over the sample.
 ///
-/// Its states x, N of them, are scaled so that a state has the size of what it does to y within a
-/// sample: row r < n is T^r / r! times y^(r), row n is T^n / n! times the total disturbance (the
-/// sum of all that the law has to cancel), the rest is the model's own. `estimate` has the same
-/// rows in physical units, so that laws read what they need without knowing the model.
+/// Its N states x are scaled so that each has the size of its effect on y within a sample: row r <
+/// n is T^r / r! times y^(r), row n is T^n / n! times the total disturbance (the sum of everything
+/// that the law has to cancel); the other rows are up to the model. `estimate` has the same rows in
+/// physical units, so that laws read what they need without knowing the model.
 /// - `drive(u)`, `predict(x, drive)`: Phi x + Gamma u; `add_input(x, u)`: x + Gamma u
 /// - `physical(x)`, `physical<Row>(x)`, `scaled(estimate)`, `rescaled(x, before)`: from the model
 ///   that was in force before; `scaled_disturbance(d)`, `same_drive(before)`

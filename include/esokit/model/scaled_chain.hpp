@@ -11,7 +11,7 @@ namespace esokit {
 /// States x_r = T^r z_r / r!, the Taylor coefficients of y over one sample (Nordsieck vector).
 ///
 /// In this scaling Phi is Pascal's triangle, Phi_rj = C(j, r): a prediction is N (N-1) / 2
-/// additions of small multiples (for N = 3 no multiplication at all), exact but for rounding; the
+/// additions of small multiples (for N = 3 no multiplication at all), exact up to rounding; the
 /// gains are dimensionless and depend on omega_o T alone; and nothing overflows float for small T
 /// (an unscaled gain at T = 1e-4 s, N = 12 is 1e44).
 template <int Order, Scalar ScalarType = double, int Extension = 1>
