@@ -2,12 +2,11 @@
 /// The library's observers and controllers as linear systems, `linear_observer` and
 /// `linear_controller`.
 ///
-/// Each is taken as it is within its limits, while no measurement is missing and its law decides:
-/// an angle between two turns, a gate that lets everything in, VariableTime at its present step,
-/// Guarded with its present b0 and full trust. A
-/// float controller is taken in double, with the gains that it has. What is neither linear nor has
-/// such a mode is refused by the compiler; FrozenObserver holds a switched or nonlinear observer in
-/// one of its modes.
+/// The linear form is valid within the limits, while no measurement is missing and the law
+/// determines u. Adapters are taken in their linear mode: an angle within one turn, an open gate,
+/// VariableTime at its present step, Guarded with its present b0 and full trust. A float controller
+/// is analysed in double with its own gains. A type without a linear mode does not compile;
+/// FrozenObserver holds a switched or nonlinear observer in one of its modes.
 #pragma once
 
 #include <cstddef>
@@ -92,8 +91,8 @@ linear_observer(const Guarded<Observer>& observer) {
   return form;
 }
 
-/// An observer and a law that no controller holds: a continuous observer, or a FrozenObserver in
-/// the place of a switched or nonlinear one. Goes wherever a controller goes.
+/// An observer and a law outside of a controller: a continuous observer, or a FrozenObserver for a
+/// switched or nonlinear one. It can be used wherever a controller is expected.
 /// @tparam Form OutputBased or ErrorBased
 template <class Observer, class Law, AdrcForm Form = OutputBased>
 struct ObserverWithLaw {
@@ -108,8 +107,8 @@ ObserverWithLaw(Observer, Law) -> ObserverWithLaw<Observer, Law, OutputBased>;
 template <class Observer, class Law, class Form>
 ObserverWithLaw(Observer, Law, Form) -> ObserverWithLaw<Observer, Law, Form>;
 
-/// A DisturbanceCompensator and the controller that it is around, which says what it is by a
-/// `linear_controller` of its own. Goes wherever a controller goes.
+/// A DisturbanceCompensator and the controller inside it, which has its own `linear_controller`. It
+/// can be used wherever a controller is expected.
 template <class Compensator, class Base>
 struct Compensated {
   Compensator compensator;  ///< adds K dhat

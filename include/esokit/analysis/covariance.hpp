@@ -106,7 +106,7 @@ inline Expected<DynamicMatrix<double>, Error<double>> output_covariance(
   return result;
 }
 
-/// What drives the estimation error.
+/// The noise that drives the estimation error.
 struct EstimationNoise {
   /// White noise on y. Sampled: variance of a sample, unit of y^2. Continuous: two-sided spectral
   /// density, unit of y^2 s.

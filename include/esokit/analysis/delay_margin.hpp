@@ -1,5 +1,5 @@
 /// @file
-/// How much more delay a loop can take.
+/// How much additional delay a loop tolerates.
 #pragma once
 
 #include <esokit/analysis/margins.hpp>
@@ -92,11 +92,11 @@ inline Margin continuous_delay_margin(const Loop& loop, int channel) {
 
 }  // namespace detail
 
-/// Least further delay (s) of one u with which the loop oscillates; the dead time that the plant
-/// has is there already. It need not be a whole number of samples: between samples a delay is no
-/// mere phase shift e^(-i omega tau), and the edge is found on the plant sampled with that delay.
+/// Smallest additional delay (s) of one u at which the loop oscillates, on top of the dead time of
+/// the plant. It need not be a whole number of samples. Between samples a delay is not just a phase
+/// shift e^(-i omega tau), so the limit is found on the plant sampled with that delay.
 /// @param channel 0 .. q - 1
-/// @return infinity where there is none; error for a loop that is not stable, or no such channel
+/// @return infinity if there is no limit; error for a loop that is not stable, or no such channel
 inline Expected<Margin, Error<double>> delay_margin(const Loop& loop, int channel = 0) {
   Rules<double> rules;
   rules.all_of(loop.check_channel("channel", channel))
@@ -154,7 +154,7 @@ inline Expected<Margin, Error<double>> delay_margin(const Loop& loop, int channe
   return Margin{least->value - present, least->frequency};
 }
 
-/// That of the loop of a plant and a controller, see `closed_loop`.
+/// The same for the loop of a plant and a controller, see `closed_loop`.
 template <int States, Scalar S, int Inputs, int Outputs, class Controller>
 Expected<Margin, Error<double>> delay_margin(const LinearPlant<States, S, Inputs, Outputs>& plant,
                                              const Controller& controller, int channel = 0) {

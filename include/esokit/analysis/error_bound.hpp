@@ -1,6 +1,6 @@
 /// @file
-/// Bounds on the estimation error that Lyapunov functions prove, in the form of the papers and
-/// corrected: what a proof promises for your numbers. `peak_gain` says what is true.
+/// Bounds on the estimation error proven by Lyapunov functions, in the corrected form of the
+/// papers: the guarantee of the proof for your numbers. The true worst case is `peak_gain`.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 
 namespace esokit {
 
-/// What the error comes from, by its largest size.
+/// The sources of the error, by their largest size.
 struct ErrorSources {
   double disturbance_rate = 0.0;   ///< largest abs(d^(m)), for m = 1 unit of d per s
   double measurement_noise = 0.0;  ///< largest abs(v), unit of y

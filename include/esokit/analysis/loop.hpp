@@ -1,5 +1,5 @@
 /// @file
-/// The loop of a plant and a controller: what is asked of a finished design is asked of this.
+/// The loop of a plant and a controller, from which all analysis of a finished design starts.
 #pragma once
 
 #include <cmath>
@@ -320,9 +320,9 @@ inline double largest_singular_value(const ComplexMatrix& matrix) {
 
 /// Loop of a plant y = P (u, d) and a controller u = C (y + v, r), of q channels.
 ///
-/// Sampled: y[k] is measured and u[k] set in the same moment; computing time is dead time of the
-/// plant. The loop is opened at the plant's input, behind the path by which the controller is told
-/// u: L = -P C, for one channel the others stay closed. r is a reference without derivatives; d is
+/// Sampled: y[k] is measured and u[k] set at the same instant; give computing time as dead time of
+/// the plant. The loop is opened at the plant's input, behind the path by which the controller gets
+/// u: L = -P C; for one channel the others stay closed. r is a reference without derivatives; d is
 /// held from k to k + 1.
 class Loop {
  public:
@@ -438,9 +438,9 @@ class Loop {
       return Complex(y(output, disturbance));
     });
   }
-  /// Largest singular value of the sensitivity (I - P C)^-1: how much a disturbance at the outputs
-  /// is enlarged at most, in any direction. It knows the units of y: compare outputs of like size.
-  /// Errors as loop_gain.
+  /// Largest singular value of the sensitivity (I - P C)^-1: the largest amplification of a
+  /// disturbance at the outputs, in any direction. It depends on the units of y: scale the outputs
+  /// to similar size. Errors as loop_gain.
   [[nodiscard]] Expected<double, Error<double>> largest_sensitivity(double frequency) const {
     double largest = 0.0;
     const auto found = at(frequency, 0, 0, [&](Complex value) {
@@ -517,7 +517,7 @@ class Loop {
   double input_gain_ = 0.0;
 };
 
-/// A loop, or why there is none.
+/// A loop, or the reason why there is none.
 using LoopResult = Expected<Loop, Error<double>>;
 
 /// The loop of a plant and a controller, the same object that runs. The plant is continuous, and

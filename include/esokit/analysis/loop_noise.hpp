@@ -1,5 +1,5 @@
 /// @file
-/// How much noise and a noisy disturbance move a loop that stands still.
+/// How much noise and a noisy disturbance move a loop at rest.
 #pragma once
 
 #include <cmath>
@@ -9,15 +9,15 @@
 
 namespace esokit {
 
-/// White noise on a loop, a standard deviation for each channel; what is left out is zero.
+/// White noise on a loop, a standard deviation for each channel; missing entries are zero.
 /// Continuous loops: root of the two-sided spectral density, unit times root of s.
 struct LoopNoise {
   std::vector<double> measurement{};  ///< of y, each sample anew
   std::vector<double> disturbance{};  ///< of d, each sample anew and held until the next
 };
 
-/// Standard deviations of what a loop does, one entry a channel (of estimates one a row, channel by
-/// channel).
+/// Standard deviations of the signals of a loop, one entry per channel (for estimates one per row,
+/// channel by channel).
 struct LoopDeviations {
   std::vector<double> output;     ///< y, without the noise on its measurement
   std::vector<double> control;    ///< u
@@ -60,7 +60,7 @@ inline Expected<LoopDeviations, Error<double>> noise(const Loop& loop, const Loo
   return deviations;
 }
 
-/// Those of the loop of a plant and a controller, see `closed_loop`.
+/// The same for the loop of a plant and a controller, see `closed_loop`.
 template <int States, Scalar S, int Inputs, int Outputs, class Controller>
 Expected<LoopDeviations, Error<double>> noise(const LinearPlant<States, S, Inputs, Outputs>& plant,
                                               const Controller& controller, const LoopNoise& of) {

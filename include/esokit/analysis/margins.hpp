@@ -9,21 +9,20 @@
 
 namespace esokit {
 
-/// A margin and where the loop then oscillates. Without a limit it is infinite (a factor below one:
-/// zero), and there is no frequency.
+/// A margin, and the frequency at which the loop then oscillates. Without a limit it is infinite
+/// (for a factor below one: zero), and there is no frequency.
 struct Margin {
-  double value = std::numeric_limits<double>::infinity();  ///< in the unit of what is asked for
+  double value = std::numeric_limits<double>::infinity();       ///< unit of the margin
   double frequency = std::numeric_limits<double>::quiet_NaN();  ///< rad/s; NaN: no limit
 
-  /// False: however far one goes in this direction, the loop stays stable.
+  /// False if the loop stays stable however far one goes in this direction.
   [[nodiscard]] bool limited() const noexcept { return is_finite(frequency); }
 };
 
-/// The edges of stability that are nearest to the loop as it is. Any number of crossings is looked
-/// at.
+/// The stability limits nearest to the nominal loop. Any number of crossings is examined.
 struct Margins {
-  Margin gain_increase;  ///< least factor > 1 on L that makes the loop oscillate; else infinity
-  Margin gain_decrease;  ///< greatest factor in (0, 1) on L that does; else 0
+  Margin gain_increase;  ///< smallest factor > 1 on L at which the loop oscillates; else infinity
+  Margin gain_decrease;  ///< largest factor in (0, 1) on L at which it does; else 0
   Margin phase;          ///< least phase shift, rad, as lag or as lead; else infinity
   Margin modulus;        ///< least abs(1 + L), the inverse of the peak of S
 };
@@ -112,8 +111,8 @@ class MarginFinder {
 
 /// Margins of a loop at one actuator, sampled or continuous; the other channels stay closed.
 ///
-/// Gain and phase are changed in L = -P C: in the plant's gain, the actuator's, or anywhere else in
-/// the loop but between law and observer. A phase shift turns positive frequencies by e^(-i phi).
+/// Gain and phase are changed in L = -P C: in the plant, the actuator, or anywhere else in the loop
+/// except between law and observer. A phase shift turns positive frequencies by e^(-i phi).
 /// @param channel 0 .. q - 1
 /// @return error for a nominal loop that is not stable, or no such channel
 inline Expected<Margins, Error<double>> margins(const Loop& loop, int channel = 0) {
@@ -134,7 +133,7 @@ inline Expected<Margins, Error<double>> margins(const Loop& loop, int channel = 
   return finder.margins();
 }
 
-/// Those of the loop of a plant and a controller, see `closed_loop`.
+/// The margins of the loop of a plant and a controller, see `closed_loop`.
 template <int States, Scalar S, int Inputs, int Outputs, class Controller>
 Expected<Margins, Error<double>> margins(const LinearPlant<States, S, Inputs, Outputs>& plant,
                                          const Controller& controller, int channel = 0) {
@@ -143,11 +142,11 @@ Expected<Margins, Error<double>> margins(const LinearPlant<States, S, Inputs, Ou
   return margins(*loop, channel);
 }
 
-/// Range of b0 with which the controller would hold this plant stable, the rest of its design as it
-/// is; infinity where there is no limit.
+/// Range of b0 with which the loop with this plant is stable while the rest of the design stays the
+/// same; infinity if there is no limit.
 ///
-/// The loop gain depends on b0 and the plant's own b by b / b0 alone: divided by b it is the range
-/// of b0 / b, and the plant's gain may be b0 / upper .. b0 / lower times what it is here.
+/// The loop gain depends only on b / b0, with b of the plant: divided by b this is the range of b0
+/// / b, and the gain of the plant may be multiplied by b0 / upper .. b0 / lower.
 /// @return error for a nominal loop that is not stable, and a controller whose u does not go with
 ///         1 / b0 (a compensator, several channels)
 inline Expected<Interval<>, Error<double>> input_gain_range(const Loop& loop) {
@@ -166,7 +165,7 @@ inline Expected<Interval<>, Error<double>> input_gain_range(const Loop& loop) {
   return b0 > 0.0 ? Interval<>{one, other} : Interval<>{other, one};
 }
 
-/// That of the loop of a plant and a controller, see `closed_loop`.
+/// The same for the loop of a plant and a controller, see `closed_loop`.
 template <int States, Scalar S, class Controller>
 Expected<Interval<>, Error<double>> input_gain_range(const LinearPlant<States, S>& plant,
                                                      const Controller& controller) {
@@ -175,10 +174,10 @@ Expected<Interval<>, Error<double>> input_gain_range(const LinearPlant<States, S
   return input_gain_range(*loop);
 }
 
-/// f > 1: the loop gain at this actuator, and with it b / b0, may vary between 1/f and f times what
-/// it is, as fast and in whatever way it likes from sample to sample, and the loop is stable
-/// (circle criterion: f + 1/f < (1 + abs(L)^2) / -Re L at all frequencies). A bound that suffices:
-/// what it excludes may still be stable. Lag, delay and sensor count as far as the plant has them.
+/// f > 1: the loop is stable while the loop gain at this actuator, and with it b / b0, varies in
+/// any way from sample to sample between 1/f and f times its nominal value (circle criterion: f +
+/// 1/f < (1 + abs(L)^2) / -Re L at all frequencies). The bound is sufficient, not necessary. Lag,
+/// delay and sensor count if they are part of the plant.
 /// @return the factor and the frequency that limits it; infinity where Re L is never negative;
 /// error for a nominal loop that is not stable, or no such channel
 inline Expected<Margin, Error<double>> gain_variation(const Loop& loop, int channel = 0) {
@@ -211,7 +210,7 @@ inline Expected<Margin, Error<double>> gain_variation(const Loop& loop, int chan
   return Margin{half + std::sqrt(std::max((half - 1.0) * (half + 1.0), 0.0)), sum.frequency};
 }
 
-/// That of the loop of a plant and a controller, see `closed_loop`.
+/// The same for the loop of a plant and a controller, see `closed_loop`.
 template <int States, Scalar S, int Inputs, int Outputs, class Controller>
 Expected<Margin, Error<double>> gain_variation(const LinearPlant<States, S, Inputs, Outputs>& plant,
                                                const Controller& controller, int channel = 0) {
@@ -220,8 +219,8 @@ Expected<Margin, Error<double>> gain_variation(const LinearPlant<States, S, Inpu
   return gain_variation(*loop, channel);
 }
 
-/// Largest singular value of the sensitivity over all frequencies, and where: by how much a
-/// disturbance at the outputs is enlarged at most. Of one channel the inverse of the modulus
+/// Largest singular value of the sensitivity over all frequencies, and its frequency: the largest
+/// amplification of a disturbance at the outputs. For one channel it is the inverse of the modulus
 /// margin. See Loop::largest_sensitivity.
 /// @return error for a loop that is not stable
 inline Expected<Margin, Error<double>> sensitivity_peak(const Loop& loop) {

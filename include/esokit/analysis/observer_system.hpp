@@ -1,6 +1,5 @@
 /// @file
-/// Observers as linear systems: what each estimate does with y and u, and with noise and
-/// disturbance.
+/// Observers as linear systems: from y and u, and from noise and disturbance, to each estimate.
 ///
 /// A sampled observer is built from its gains (`level_gain`), not by probing `update`: A - I comes
 /// out without the cancellation that A - I of a probed A has. A continuous one is probed through
@@ -353,8 +352,8 @@ auto observer_system(const Observer& observer, double t = 0.0) {
   return system;
 }
 
-/// From measurement noise v and the true total disturbance d to what they make of the estimates:
-/// the errors yhat^(i) - y^(i) for rows i < n, and dhat, dhat', .. themselves.
+/// From measurement noise v and the true total disturbance d to their effect on the estimates: the
+/// errors yhat^(i) - y^(i) for rows i < n, and dhat, dhat', .. themselves.
 ///
 /// The plant is y^(n) = d + b0 u with y measured as y + v; u drops out. From d to dhat the static
 /// gain is one. Sampled: d[k] is held from k to k + 1, v[k] is on y[k].

@@ -1,5 +1,5 @@
 /// @file
-/// The worst that a controller meets among stated plants.
+/// The worst margins of a controller over a set of plants.
 #pragma once
 
 #include <algorithm>
@@ -18,19 +18,18 @@ struct Worst {
   Array<double, Count> parameters{};  ///< of the plant
 };
 
-/// What was found among the plants, each value at a plant of its own. Without a stable loop at
-/// every plant there are no margins: they are what Margins says of an edge that is reached, modulus
-/// 0.
+/// The worst values over the plants, each with its own plant. If the loop of any plant is unstable,
+/// there are no margins: they have the values of a loop at the stability limit, modulus 0.
 template <std::size_t Count>
 struct WorstCase {
-  Worst<Count> stability_abscissa;  ///< the largest: negative, and every loop was stable
+  Worst<Count> stability_abscissa;  ///< the largest; if negative, every loop was stable
   Worst<Count> modulus;             ///< least abs(1 + L)
   Worst<Count> gain_increase;       ///< least factor > 1 on L that makes a loop oscillate
   Worst<Count> gain_decrease;       ///< greatest factor below 1 that does
   Worst<Count> phase;               ///< least phase shift, rad
   Worst<Count> delay;               ///< least further delay, s
 
-  /// True if every loop that was looked at is stable.
+  /// True if every tested loop is stable.
   [[nodiscard]] bool stable() const noexcept { return stability_abscissa.value < 0.0; }
 };
 
@@ -122,15 +121,14 @@ inline Check<double> find_worst(const PlantStudy& plants, const std::vector<Inte
 
 }  // namespace detail
 
-/// How thoroughly the plants are looked at.
+/// How thorough the search is.
 struct WorstCaseSearch {
   int points = 5;    ///< of each parameter, ends included; points^parameters loops
   int halvings = 6;  ///< of the steps of the search from the worst of them, for each kind; may be 0
 };
 
-/// The worst margins over a box of plants: every point of a grid, and from the worst ones a search
-/// in steps that halve. No proof: what lies between the points may be worse by what margins change
-/// there.
+/// The worst margins over a box of plants: every point of a grid, and from the worst points a
+/// search in steps that halve. This is not a proof: between the points the margins may be worse.
 /// @param plant_of the plant of an Array<double, Count> of parameters: a LinearPlant, or an
 /// Expected
 ///        of one @param ranges of the parameters

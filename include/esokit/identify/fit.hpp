@@ -3,10 +3,10 @@
 ///
 ///     y^(n) + a y^(n-1) = b0 v(t - L) + sum_j theta_j r_j + d,   tau v' + v = u,   d^(m) = noise
 ///
-/// For given bandwidth w (disturbance over noise), tau, L and a the innovations of the Kalman
-/// filter of this model are linear in b0 and theta, which therefore come in closed form; w, L +
-/// tau, tau's share and a by Levenberg and Marquardt on the innovations. In steady state the
-/// likelihood is largest where the mean square of the innovations is least (Ljung, System
+/// For a given bandwidth w (disturbance over noise), tau, L and a, the innovations of the Kalman
+/// filter of this model are linear in b0 and theta, which therefore follow in closed form. w, L +
+/// tau, the share of tau and a are found by Levenberg-Marquardt on the innovations. In steady state
+/// the likelihood is largest where the mean square of the innovations is least (Ljung, System
 /// Identification, 2nd ed., sec. 7.4). The filter starts from a diffuse state, at the first row and
 /// after each gap.
 #pragma once
@@ -27,7 +27,7 @@
 
 namespace esokit {
 
-/// A number and how far it may be off, 95 %.
+/// A number and its 95 % interval.
 struct Estimate {
   double value = 0.0;       ///< best guess
   double half_width = 0.0;  ///< the interval is value - half_width .. value + half_width
@@ -38,20 +38,20 @@ struct Estimate {
   [[nodiscard]] double share() const { return half_width / std::abs(value); }
 };
 
-/// Rows at one sample time, as the fit takes them.
+/// Rows at one sample time, for the fit.
 struct FitData {
   double sample_time = 0.0;            ///< T, s
   std::vector<double> u;               ///< input, held from its row to the next
   std::vector<double> y;               ///< output, measured at its row
   std::vector<std::size_t> starts{0};  ///< first rows of pieces without a gap
 
-  /// When these were, s; empty: without a gap in time.
+  /// Times of these rows, s; empty: no gap in time.
   std::vector<double> start_times{};
 
   /// More inputs that reach the plant through the same lag and dead time, each as long as u.
   std::vector<std::vector<double>> inputs{};
 
-  /// What acts where the disturbance acts, each as long as y: friction, a load that is known.
+  /// Known effects that act where the disturbance acts, each as long as y: friction, a known load.
   std::vector<std::vector<double>> columns{};
   int averaged =
       1;  ///< rows of the log in each of these; above 1 the input goes straight between them
@@ -64,7 +64,7 @@ struct FitModel {
   bool pole = true;   ///< whether a may differ from zero
 };
 
-/// The parameters in which the innovations are not linear.
+/// The parameters on which the innovations depend nonlinearly.
 struct FitPoint {
   double bandwidth =
       0.0;  ///< w, rad/s: w^(2 (n + m)) is the disturbance's intensity over the noise's
@@ -78,7 +78,7 @@ struct FitPoint {
 
 /// A fitted model.
 struct Fit {
-  FitPoint at{};                 ///< parameters that the innovations are not linear in
+  FitPoint at{};                 ///< the nonlinear parameters
   std::vector<double> linear{};  ///< b0, then one number a further input and a column
   double mean_square = 0.0;      ///< of the innovations, y's unit squared
   double noise = 0.0;            ///< standard deviation of the measurement noise
@@ -88,7 +88,7 @@ struct Fit {
   [[nodiscard]] double input_gain() const { return linear.empty() ? 0.0 : linear[0]; }  ///< b0
 };
 
-/// Least and largest of what is fitted.
+/// Bounds of the fitted parameters.
 struct FitBounds {
   double bandwidth_min = 0.0;  ///< of w, rad/s
   double bandwidth_max = 0.0;  ///< of w, rad/s
@@ -371,7 +371,7 @@ struct InnovationsFilter {
 
 }  // namespace detail
 
-/// The innovations of one log under one kind of model, and the fit that makes them least.
+/// The innovations of one log for one kind of model, and the fit that minimises them.
 ///
 /// Holds a reference to the data.
 class InnovationsFit {
@@ -519,10 +519,10 @@ class InnovationsFit {
     return out;
   }
 
-  /// The noise as it shows in the innovations that `at` or `minimise` gave last, at frequencies
-  /// where the disturbance has less than a tenth of its power, in the middle of all stretches; 0 if
-  /// these are too few. What the model misses is slower (a mode), or comes now and then (friction
-  /// as it sticks): it does not come in, as it does in `Fit::noise`.
+  /// The noise from the innovations that `at` or `minimise` gave last, at frequencies where the
+  /// disturbance has less than a tenth of its power, as the median over all stretches; 0 if these
+  /// are too few. Effects outside the model are slower (a mode) or occasional (stiction): they do
+  /// not enter here, but they do in `Fit::noise`.
   [[nodiscard]] Estimate noise_floor(const Fit& fit) const {
     constexpr std::size_t length = 128;
     std::vector<std::size_t> quiet;

@@ -25,26 +25,26 @@
 
 namespace esokit {
 
-/// What is asked of an identification.
+/// Options of an identification.
 struct IdentifyOptions {
-  std::vector<int> orders{1, 2, 3};  ///< n that are tried
+  std::vector<int> orders{1, 2, 3};  ///< the orders n to try
   bool friction = true;              ///< a column tanh(v / v_s) for orders 1 and 2
-  bool pole = true;                  ///< whether a known pole is looked for
+  bool pole = true;                  ///< whether to look for a pole of the plant
   int extension = 0;                 ///< m: 1 or 2 integrators of the disturbance; 0: chosen
-  int sinusoids = 3;                 ///< most that are looked for in the disturbance
+  int sinusoids = 3;                 ///< largest number to look for in the disturbance
   int schedule_bins = 4;             ///< ranges of the scheduling column, each with as many rows
   int averaged = 0;                  ///< rows to average; 0: chosen from the innovations
-  std::size_t rows_max = 60000;      ///< of a longer log so many rows are used, evenly spread
+  std::size_t rows_max = 60000;      ///< rows used of a longer log, evenly spread
 
   /// Whether u is what the actuator held. A command beyond the limits is not.
   bool applied = true;
   double interval_max = 0.1;     ///< widest half interval of b0, share of b0
   double plateau_max = 0.1;      ///< most that b0 may differ between three neighbouring bandwidths
-  double correlation_max = 0.1;  ///< of the innovations, lags 1 to 20; at 1 it is not asked for
-  bool scheduled = false;  ///< b0 may depend on the scheduling column: `schedule` is asked for
+  double correlation_max = 0.1;  ///< of the innovations, lags 1 to 20; 1: not checked
+  bool scheduled = false;        ///< b0 may depend on the scheduling column: `schedule` is wanted
   double friction_shift_max =
       3;  ///< most that b0 may differ between friction scales, standard errors
-  std::function<void(double)> progress{};  ///< hears the share that is done, 0 to 1
+  std::function<void(double)> progress{};  ///< called with the finished share, 0 to 1
 };
 
 /// The best fit of one order.
@@ -57,7 +57,7 @@ struct OrderFit {
   /// log(mean square), the mean of 1 / sqrt(10) and a tenth of the least bandwidth of all orders.
   double slower = 0.0;
   double correlation = 0.0;  ///< largest of the innovations' over lags 1 to 20
-  Estimate noise{};          ///< as fast innovations have it, y's unit; 0: not known
+  Estimate noise{};          ///< from the fast part of the innovations, y's unit; 0: not known
 };
 
 /// b0 where the scheduling column is within a range.
@@ -68,7 +68,7 @@ struct GainInRange {
   Estimate input_gain{};  ///< b0 there
 };
 
-/// A model with error bars, and what it rests on.
+/// A model with error bars, and the evidence for it.
 struct Identified {
   int order = 0;                    ///< n
   int extension = 1;                ///< m
@@ -91,12 +91,12 @@ struct Identified {
   int averaged = 1;                ///< rows of the log that were averaged
   bool at_bound = false;           ///< a parameter came to the end of its range at the plateau
   double excitation = 0;           ///< standard error of b0 over b0 where it is least
-  double own_input = 1;            ///< share of u that y and the row before do not explain
+  double own_input = 1;            ///< share of u that is not explained by y and the row before
   LogReport log{};                 ///< what the log shows by itself
   Plateau plateau{};               ///< b0 over the bandwidth
   std::vector<OrderFit> orders{};  ///< each order's best fit, by order
 
-  /// The plant that was found, as simulation, analysis and observers take it: d enters at y^(n).
+  /// The plant that was found, for simulation, analysis and observers; d enters at y^(n).
   /// @tparam Order n, which must be the one that was found
   template <int Order>
   [[nodiscard]] Expected<LinearPlant<Order + 1>, Error<double>> plant() const {
@@ -114,8 +114,8 @@ struct Identified {
   }
 
   /// What was found, as the settings of a model of these parts: the lag as its actuator, the pole
-  /// as its plant_poles, the largest sinusoids as its resonators. A part that is not asked for is
-  /// left to the disturbance.
+  /// as its plant_poles, the largest sinusoids as its resonators. Parts that are left out become
+  /// part of the disturbance.
   /// @tparam Parts of the order that was found, without a sensor, which a log does not tell from an
   /// actuator
   template <ModelParts Parts>
@@ -531,8 +531,8 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
 
 }  // namespace detail
 
-/// The model and all that is known of how good it is, whether it can be trusted or not: `judge`
-/// says that. Refused is what cannot be computed.
+/// The model and everything known about its quality; whether it can be trusted is the verdict of
+/// `judge`. It fails only if something cannot be computed.
 [[nodiscard]] inline Expected<Identified, Error<double>> study(
     const Log& log, const IdentifyOptions& options = {}) {
   using E = Error<double>;
@@ -773,7 +773,7 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
   return result;
 }
 
-/// Whether a study can be trusted: the first reason why not, and what to record instead.
+/// Whether a study can be trusted; if not, the first reason and what to record instead.
 [[nodiscard]] inline Check<double> judge(const Identified& found, const Log& log,
                                          const IdentifyOptions& options = {}) {
   Rules<double> rules;
@@ -817,7 +817,7 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
   return rules;
 }
 
-/// A model with error bars, or why this log cannot give one.
+/// A model with error bars, or the reason why this log cannot give one.
 [[nodiscard]] inline Expected<Identified, Error<double>> identify(
     const Log& log, const IdentifyOptions& options = {}) {
   auto found = study(log, options);

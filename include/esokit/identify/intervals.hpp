@@ -1,10 +1,10 @@
 /// @file
-/// How far a fitted model can be trusted: the jackknife over stretches of the log.
+/// Standard errors of a fitted model, by a jackknife over stretches of the log.
 ///
-/// The innovations of a machine that is more than the model are not white, and formal intervals
-/// are several times too short then. So the log is cut into stretches, and the fit is repeated
-/// without each of them (one Gauss-Newton step, all parameters together): what differs between
-/// stretches shows in the interval, whatever its cause.
+/// If the machine has more than the model, the innovations are not white and formal intervals are
+/// several times too short. So the log is cut into stretches and the fit is repeated without each
+/// of them (one Gauss-Newton step, all parameters together): any difference between the stretches
+/// enters the interval, whatever its cause.
 #pragma once
 
 #include <algorithm>

@@ -1,6 +1,5 @@
 /// @file
-/// A log as it was recorded, what is found of it before anything is fitted, and its rows at one
-/// sample time.
+/// A recorded log, a report on it before any fit, and its rows at one sample time.
 #pragma once
 
 #include <algorithm>
@@ -16,21 +15,22 @@ namespace esokit {
 
 /// Columns of a log. A row that is missing or not finite in u or y is left out.
 struct Log {
-  std::vector<double> time{};  ///< stamps, s, from anywhere (since 1970, too); may be empty
+  std::vector<double> time{};  ///< stamps, s, with any origin (also 1970); may be empty
   std::vector<double> u{};     ///< input that the actuator held from its row to the next
   std::vector<double> y{};     ///< output
   double sample_time = 0.0;    ///< T, s, where there are no stamps
 
-  /// Clock jitter where there are no stamps, standard deviation, s.
+  /// Clock jitter if there are no stamps, standard deviation, s.
   double jitter = 0.0;
-  /// What else acts where the disturbance acts (sin y of a pendulum, a known load): each as long as
-  /// y.
+  /// Other effects that act where the disturbance acts (sin y of a pendulum, a known load): each as
+  /// long as y.
   std::vector<std::vector<double>> columns{};
-  /// What b0 may depend on (throttle, position, battery voltage), as long as y; may be empty.
+  /// A quantity on which b0 may depend (throttle, position, battery voltage), as long as y; may be
+  /// empty.
   std::vector<double> schedule{};
 };
 
-/// What a log shows by itself.
+/// The report on a log before any fit.
 struct LogReport {
   std::size_t rows = 0;       ///< in the log
   std::size_t used = 0;       ///< rows that were fitted

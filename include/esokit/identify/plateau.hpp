@@ -1,10 +1,11 @@
 /// @file
-/// b0 over the bandwidth of the observer: where it does not depend on it is what it is.
+/// b0 over the bandwidth of the observer: its value is read where it does not depend on the
+/// bandwidth.
 ///
-/// The likelihood chooses the bandwidth that explains the noise, and where a machine is more than a
-/// chain (flexible modes, coloured noise, vibration) this is not the one at which b0 is the
-/// machine's. So b0 is found at each of a range of bandwidths, with lag, dead time and pole fitted
-/// anew, and read where it stays.
+/// The likelihood chooses the bandwidth that explains the noise. If a machine is more than a chain
+/// (flexible modes, coloured noise, vibration), b0 is wrong at this bandwidth. So b0 is computed
+/// over a range of bandwidths, with lag, dead time and pole fitted anew for each, and read where it
+/// stays constant.
 #pragma once
 
 #include <algorithm>

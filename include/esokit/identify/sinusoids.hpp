@@ -1,6 +1,6 @@
 /// @file
-/// Disturbances that swing at one frequency: lines in the innovations, fitted as sines that act
-/// where the disturbance does.
+/// Disturbances that swing at one frequency: lines in the spectrum of the innovations, fitted as
+/// sines that act where the disturbance acts.
 #pragma once
 
 #include <algorithm>

@@ -77,9 +77,9 @@ std::vector<std::complex<double>> placed_poles(const TuneModel& model, const Tun
 /// Calls `visit(controller)` with the Adrc of a design of a plant of order `Order`, within the
 /// actuator's limits, and returns what it returns.
 ///
-/// So that not each family is a type of its own, what has one level is a LinearEso with the poles
-/// of the design (with m = 1 or 2, or that knows the lag): the same gains, but for rounding, as the
-/// code that is pasted. A cascade is a CascadeEso.
+/// To need fewer types, every design with one level becomes a LinearEso with the poles of the
+/// design (with m = 1 or 2, or with the lag in its model). Its gains equal those of the code to
+/// paste up to rounding. A cascade becomes a CascadeEso.
 /// @return error for a model of another order, for a design that knows more than the lag (its code
 ///         says what it is), and for what `make` refuses
 template <int Order, class Visit>

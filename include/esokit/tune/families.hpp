@@ -22,7 +22,7 @@
 
 namespace esokit {
 
-/// How the gains of observer and law come about.
+/// How the gains of observer and law are chosen.
 enum class TuneFamily : unsigned char {
   linear,     ///< LinearEso by its bandwidth, law by its bandwidth
   half_gain,  ///< HalfGainEso, law by its bandwidth
@@ -31,11 +31,11 @@ enum class TuneFamily : unsigned char {
   free_poles  ///< LinearEso by any poles, law by any poles
 };
 
-/// What an observer of the family knows beside the chain.
+/// What the observer of a family knows besides the chain.
 struct TuneKnowledge {
   bool lag = false;     ///< of the actuator
   bool sensor = false;  ///< lag of the sensor
-  bool swing = false;   ///< what the disturbance swings at
+  bool swing = false;   ///< the frequency of a swing in the disturbance
 
   /// Whether it is more than the chain.
   [[nodiscard]] constexpr bool any() const noexcept { return lag || sensor || swing; }
@@ -48,12 +48,12 @@ struct TuneSettings {
   double observer_bandwidth = 0.0;    ///< omega_o, of a cascade that of level 1, rad/s
   double bandwidth_factor = 0.0;      ///< alpha of a cascade
   double controller_bandwidth = 0.0;  ///< omega_c where the law goes by it, rad/s
-  double capture_bandwidth = 0.0;     ///< of a swing that is known, see Resonance
+  double capture_bandwidth = 0.0;     ///< of a known swing, see Resonance
 
   /// Poles of the error that a placement places, 1/s; none for a cascade.
   std::vector<std::complex<double>> observer_poles{};
   double disturbance_bound = 0.0;  ///< q_n of the filter, see ExtendedStateFilter
-  std::vector<double> gains{};     ///< k_0 .. of the law, whatever it goes by
+  std::vector<double> gains{};     ///< k_0 .. of the law, however they are chosen
 };
 
 namespace detail {

@@ -1,17 +1,17 @@
 /// @file
-/// What a loop costs and what margins it has, fast enough to be asked ten thousand times.
+/// Cost and margins of a loop, fast enough for ten thousand evaluations.
 ///
 /// The criterion, stationary and at the samples,
 ///
 ///     J = var(y) + rho var(b0 u~),   u~ = u + d / b0,
 ///
-/// is an integral over the frequencies, as a Lyapunov equation would give it; but the plant, dead
-/// time and all, is worked out once for all controllers, and the same loop gains tell the margins.
-/// (d walks, so u has no variance; u~ has. `noise` of the analysis is the reference in the tests.)
-/// The grid is even in the logarithm of W = 2 / T tan(omega T / 2), where the trapezoid rule
-/// converges exponentially: poles with a damping of 0.25 leave 1e-6 at 20 points a decade.
-/// Stable is a loop whose characteristic polynomial turns by half a turn for each state between
-/// z = 1 and z = -1.
+/// is computed as an integral over the frequencies; a Lyapunov equation would give the same. This
+/// way the plant, with its dead time, is evaluated once for all controllers, and the same loop
+/// gains give the margins. (d is a random walk, so u has no variance, but u~ has one. `noise` of
+/// the analysis is the reference in the tests.) The grid is even in the logarithm of W = 2 / T
+/// tan(omega T / 2), where the trapezoid rule converges exponentially: poles with a damping of 0.25
+/// leave 1e-6 at 20 points a decade. A loop is stable if its characteristic polynomial turns by
+/// half a turn for each state between z = 1 and z = -1.
 #pragma once
 
 #include <algorithm>
@@ -29,14 +29,14 @@
 
 namespace esokit {
 
-/// What LoopCost answers.
+/// The results of LoopCost.
 struct LoopNumbers {
-  bool stable = false;         ///< with b0 as it is
-  bool tolerant = false;       ///< with b0 wrong by the factor that the rules ask for, too
+  bool stable = false;         ///< with the nominal b0
+  bool tolerant = false;       ///< also with b0 wrong by the factor that the rules require
   double output = 0.0;         ///< standard deviation of y
   double control = 0.0;        ///< of u~
   double control_noise = 0.0;  ///< of u, by noise alone
-  double tolerance = 0.0;      ///< factor by which b0 may be wrong, either way
+  double tolerance = 0.0;      ///< factor by which b0 may be wrong in either direction
   double modulus = 0.0;        ///< margin, the least over the intervals
   double delay = 0.0;          ///< margin, s, the least over the intervals
 

@@ -1,9 +1,9 @@
 /// @file
-/// The least that any linear controller can make of J: frozen Kalman gain, LQR gains, -dhat / b0.
+/// The smallest J of any linear controller: frozen Kalman gain, LQR gains, -dhat / b0.
 ///
-/// It knows lag, sensor and dead time, and it keeps no margins. With u~ = u + d / b0 in the place
-/// of u the regulator is that of the plant without disturbance; a dead time of D samples moves the
-/// state that is fed back D samples ahead.
+/// It knows lag, sensor and dead time, but guarantees no margins. With u~ = u + d / b0 instead of
+/// u, the regulator is that of the plant without disturbance; for a dead time of D samples the
+/// state is predicted D samples ahead.
 #pragma once
 
 #include <algorithm>

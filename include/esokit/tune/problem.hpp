@@ -1,5 +1,5 @@
 /// @file
-/// What a choice of observer and controller starts from: the model, one wish, and the margins that
+/// The input for choosing observer and controller: the model, one requirement, and the margins that
 /// the loop has to keep.
 #pragma once
 
@@ -20,28 +20,28 @@ struct KnownSwing {
   double capture_bandwidth = 0.0;  ///< of an observer that knows it, see Resonance; 0: w0
 };
 
-/// What is known of a plant and of what shakes it:
+/// What is known of a plant and of its noise and disturbance:
 ///
 ///     y^(n) + a y^(n-1) = b0 v(t - L) + d,   tau v' + v = u,   tau_s y_s' + y_s = y
 ///
-/// y_s is measured with white noise; d is a random walk, and swings where that is known.
+/// y_s is measured with white noise; d is a random walk, plus a swing if one is given.
 struct TuneModel {
   int order = 1;                     ///< n, 1 to 3
   Estimate input_gain{};             ///< b0 with its interval, unit of y^(n) over that of u
   double pole = 0.0;                 ///< a, 1/s
   double lag = 0.0;                  ///< tau, s; 0: none
   double dead_time = 0.0;            ///< L, s
-  double latency_half_width = 0.0;   ///< by how much tau + L may be more, s
-  double lag_half_width = 0.0;       ///< how far tau may be off while tau + L stays, s
+  double latency_half_width = 0.0;   ///< by how much tau + L may be larger, s
+  double lag_half_width = 0.0;       ///< by how much tau may be wrong while tau + L is right, s
   double sensor = 0.0;               ///< tau_s, s; 0: none
   double noise = 0.0;                ///< standard deviation of the measurement noise
   double disturbance = 0.0;          ///< q: variance of the increments of d over time
-  std::vector<KnownSwing> swings{};  ///< one at most, or none
+  std::vector<KnownSwing> swings{};  ///< none or one
   double sample_time = 0.0;          ///< T of the controller, s
   double u_min = 0.0;                ///< limits of the actuator
   double u_max = 0.0;                ///< above u_min
 
-  /// Error of a number that no plant has.
+  /// Error of a number that is not possible for a plant.
   [[nodiscard]] Check<double> check() const {
     Rules<double> rules;
     rules
@@ -81,8 +81,8 @@ struct TuneModel {
 /// What takes a 95 % interval to 99 %: 2.576 / 1.960 standard errors.
 inline constexpr double interval_of_99 = 1.314;
 
-/// The model of a log, for a controller with its sample time. The intervals of b0, lag and
-/// latency, 95 % of the log's, are those of 99 %, so that margins hold on the machine.
+/// The model of a log, for a controller with the sample time of the log. The intervals of b0, lag
+/// and latency are widened from 95 % to 99 %, so that the margins hold on the machine.
 /// @param u_min limits of the actuator @param u_max above u_min
 inline TuneModel tune_model(const Identified& found, double u_min, double u_max) {
   TuneModel model;
@@ -101,17 +101,17 @@ inline TuneModel tune_model(const Identified& found, double u_min, double u_max)
   return model;
 }
 
-/// What is wished for; one of these at most.
+/// The requirement; at most one of these.
 struct TuneWish {
-  /// Standard deviation of u that the measurement noise may cause, u's unit. Left out: 5 % of
-  /// u_max - u_min, or twice what it takes to cancel the disturbance alone, if that is more.
+  /// Standard deviation of u that the measurement noise may cause, unit of u. Default: 5 % of u_max
+  /// - u_min, or twice the value needed to cancel the disturbance alone if that is larger.
   double control_noise = 0.0;
   double settling_time = 0.0;         ///< s, of a step of the reference to within 2 %
   double controller_bandwidth = 0.0;  ///< omega_c, rad/s: the law is given, the observer is chosen
 };
 
-/// What a loop has to keep: at the model as it is, and with b0 at both ends of its interval, the
-/// largest latency, and as much or as little of that a lag as may be.
+/// The margins that a loop has to keep: for the nominal model, and with b0 at both ends of its
+/// interval, the largest latency, and the largest and smallest share of lag in it.
 struct TuneRules {
   double modulus_margin = 0.5;  ///< least abs(1 + L)
   double delay_samples = 2.0;   ///< least delay margin, samples

@@ -1,5 +1,5 @@
 /// @file
-/// The search for the least of a function of a few numbers: a scan, then simplices.
+/// Minimises a function of a few numbers: a scan, then simplices.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 /// @file
-/// From a model and a wish to a ranked list of designs: which observer, which bandwidths.
+/// From a model and a requirement to a ranked list of designs: which observer, which bandwidths.
 ///
 ///     auto tuning = tune(tune_model(*identified, -12.0, 12.0));
 ///     std::puts(tuning->designs.front().code.c_str());
@@ -30,38 +30,38 @@
 
 namespace esokit {
 
-/// One family at its best, or as near to the margins as it comes.
+/// The best design of a family, or the one nearest to the margins if it cannot keep them.
 struct TunedDesign {
-  std::string name;          ///< what it is, in words
-  TuneFamily family{};       ///< how its gains come about
+  std::string name;          ///< description in words
+  TuneFamily family{};       ///< how its gains are chosen
   int extension = 1;         ///< m
   int levels = 1;            ///< p
   TuneKnowledge knows{};     ///< what its observer knows
   TuneSettings settings{};   ///< the numbers that were chosen
   bool feasible = false;     ///< keeps all margins
-  std::string constraint;    ///< the margin that holds it back, or that it cannot keep; or "none"
+  std::string constraint;    ///< the margin that limits it, or that it cannot keep; or "none"
   double cost = 0.0;         ///< J
   double excess = 0.0;       ///< sqrt(J / J*)
-  double free_excess = 0.0;  ///< the same without margins: their quotient is their price
+  double free_excess = 0.0;  ///< the same without margins: the quotient is the price of the margins
   double output_deviation = 0.0;   ///< sd of y
   double control_deviation = 0.0;  ///< sd of u + d / b0
   double control_noise = 0.0;      ///< sd of u by the measurement noise alone
-  double load_peak = 0.0;       ///< largest abs(y) after a step of load that one unit of u balances
-  double settling_time = 0.0;   ///< of a step of the reference to within 2 %, s
-  double modulus_margin = 0.0;  ///< least over the intervals
-  double gain_tolerance = 0.0;  ///< factor by which b0 may be wrong, either way
-  double delay_margin = 0.0;    ///< least over the intervals, s
-  int instructions = 0;         ///< of an update of the observer, see update_instructions
-  std::string code;             ///< C++ to paste: type and config of the controller
-  LinearController controller{};  ///< for the analysis, see closed_loop(model, controller)
+  double load_peak = 0.0;          ///< largest abs(y) after a load step that one unit of u balances
+  double settling_time = 0.0;      ///< of a step of the reference to within 2 %, s
+  double modulus_margin = 0.0;     ///< least over the intervals
+  double gain_tolerance = 0.0;     ///< factor by which b0 may be wrong, either way
+  double delay_margin = 0.0;       ///< least over the intervals, s
+  int instructions = 0;            ///< of an update of the observer, see update_instructions
+  std::string code;                ///< C++ to paste: type and config of the controller
+  LinearController controller{};   ///< for the analysis, see closed_loop(model, controller)
 };
 
-/// What `tune` found.
+/// The result of `tune`.
 struct Tuning {
   TuneModel model{};           ///< as given
   TuneRules rules{};           ///< as given
   double rho = 0.0;            ///< weight of var(b0 u~) in J
-  double control_noise = 0.0;  ///< that was wished for, u's unit; 0 where the wish was another
+  double control_noise = 0.0;  ///< the required one, unit of u; 0 if something else was required
   double optimum = 0.0;        ///< J*
   LoopNumbers lqg{};           ///< of the controller that has it
   std::vector<TunedDesign> designs{};  ///< the chosen one first; infeasible ones last
@@ -72,9 +72,9 @@ struct Tuning {
   }
 };
 
-/// Instructions of an update of the observer on a Cortex-M4F in float, counted on the straight path
-/// of the disassembly (GCC 12, -O2); the emulator of examples/embedded counts the same within two.
-/// The frozen filter by its nine more in that table.
+/// Instructions of an update of the observer on a Cortex-M4F in float, counted in the disassembly
+/// on the path without branches (GCC 12, -O2); the emulator of examples/embedded counts the same
+/// within two. The frozen filter by its nine more in that table.
 inline int update_instructions(int order, TuneFamily family, int extension, int levels,
                                const TuneKnowledge& knows) {
   const auto n = static_cast<std::size_t>(order - 1);
