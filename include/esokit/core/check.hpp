@@ -1,5 +1,5 @@
 /// @file
-/// The rules that configs are checked against, each with its own wording.
+/// The rules by which configs are checked, each with its error text.
 #pragma once
 
 #include <concepts>
@@ -61,16 +61,16 @@ constexpr bool normal(const S& value) {
 
 }  // namespace detail
 
-/// The rules of a config, in the order in which they are read: the first one broken is the error,
-/// what comes after it changes nothing.
+/// The rules of a config, in the order in which they are written: the first broken rule is the
+/// error, later ones do not change it.
 ///
 ///     Rules<S> rules;
 ///     rules.positive("sample_time", config.sample_time).finite("gains", config.gains);
 ///     if (!rules) return rules.error();
 ///
-/// All of them are evaluated, as a comparison costs less than a branch; what computes with a value
-/// that an earlier rule is about goes into `and_then`. A list of values, in the place of one, is
-/// checked element by element and the error has the index.
+/// All rules are evaluated, because a comparison costs less than a branch; a rule that computes
+/// with a value checked by an earlier rule belongs into `and_then`. A list of values is checked
+/// element by element, and the error has the index.
 template <Scalar S>
 class [[nodiscard]] Rules {
  public:

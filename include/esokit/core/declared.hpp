@@ -1,9 +1,9 @@
 /// @file
 /// Traits that a type declares in one place, and the check that it has what it declares.
 ///
-/// A type says what it can do in a static constant `traits`; one that says nothing has the
-/// defaults. Members are never called because their name is there: a member whose name is that of
-/// a hook, and that is not declared, is a mistake, as is one that is declared and not there.
+/// A type declares what it can do in a static constant `traits`; without it the defaults apply. A
+/// member is never called only because it has the name of a hook: a member with such a name that is
+/// not declared is a mistake, and so is a declared hook that is missing.
 #pragma once
 
 #include <concepts>

@@ -11,11 +11,11 @@
 
 namespace esokit {
 
-/// Names the field, its value and the rule that it breaks. Goes into any stream by <<; `to_text`
-/// and std::format are in core/error_text.hpp, which firmware need not include.
+/// Names the field, its value and the broken rule. It can be written to any stream with <<;
+/// `to_text` and std::format are in core/error_text.hpp, which firmware need not include.
 ///
-/// The value is held in the scalar of the config: a double in here would link soft-float helpers on
-/// a single-precision target.
+/// The value has the scalar type of the config: a double would link soft-float helpers on a
+/// single-precision target.
 template <class ScalarType>
 struct Error {
   const char* field = "";  ///< name of the config member, static storage
@@ -24,7 +24,7 @@ struct Error {
   int index = -1;          ///< element of an array member, -1 for a scalar member
   ScalarType limit{};      ///< computed limit that belongs to the rule, if has_limit
   bool has_limit = false;  ///< whether `limit` says anything
-  int lane = -1;           ///< of a pack: whose value, -1 for a plain scalar
+  int lane = -1;           ///< lane of a pack that the value is from, -1 for a plain scalar
 };
 
 /// Has text.
@@ -57,7 +57,7 @@ requires detail::WritesText<Stream, int, LaneScalar<ScalarType>> Stream& operato
   return out;
 }
 
-/// Last words before `Expected::value()` on an error ends the program; desktop systems only.
+/// Printed before `Expected::value()` on an error ends the program; desktop systems only.
 template <class ScalarType>
 void print_last_words([[maybe_unused]] const Error<ScalarType>& error) noexcept {
 #if defined(__linux__) || defined(_WIN32) || defined(__APPLE__)

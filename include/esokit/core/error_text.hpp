@@ -1,6 +1,7 @@
 /// @file
-/// Text of what `has_text`, for programs that have a console: errors, results, flags. std::format
-/// is tested with Clang 19 and its libc++; GCC has it from 13 on, where it is not tested.
+/// Text of the types with `has_text`, for programs with a console: errors, results, flags.
+/// std::format is tested with Clang 19 and its libc++; GCC has it from 13 on, where it is not
+/// tested.
 #pragma once
 
 #include <esokit/core/text.hpp>
@@ -13,7 +14,7 @@
 
 namespace esokit {
 
-/// What << writes, as a string.
+/// The text that << writes, as a string.
 template <class T>
 requires has_text<T> && detail::WritesText<std::ostream, T> std::string to_text(const T& value) {
   std::ostringstream out;

@@ -10,8 +10,8 @@
 
 namespace esokit {
 
-/// Holds either a T or an E. Checked in every build type: reading the value of an error prints the
-/// error where there is a console, and aborts.
+/// Holds either a T or an E. Checked in every build type: reading the value if there is an error
+/// prints the error (where there is a console) and aborts.
 ///
 /// A subset of C++23's std::expected under the same names, so that code can move to it.
 template <class T, class E>
@@ -33,11 +33,10 @@ class [[nodiscard]] Expected {
   constexpr explicit operator bool() const noexcept { return has_value(); }
   /// @}
 
-  /// The value; ends the program with the error as last words if there is none.
-  /// @{
+  /// The value; if there is none, prints the error and ends the program. @{
   [[nodiscard]] constexpr T& value() & noexcept { return *checked(*this); }
   [[nodiscard]] constexpr const T& value() const& noexcept { return *checked(*this); }
-  /// By value: `for (x : make_grid().value())` would else run over what is gone.
+  /// By value, so that `for (x : make_grid().value())` does not use a destroyed object.
   [[nodiscard]] constexpr T value() && noexcept { return std::move(*checked(*this)); }
 
   [[nodiscard]] constexpr T& operator*() & noexcept { return value(); }
@@ -54,7 +53,7 @@ class [[nodiscard]] Expected {
     return *error;
   }
 
-  /// The value, or `fallback` where there is none.
+  /// The value, or `fallback` if there is none.
   template <class U>
   [[nodiscard]] constexpr T value_or(U&& fallback) const& {
     return has_value() ? value() : static_cast<T>(std::forward<U>(fallback));
@@ -99,7 +98,7 @@ class [[nodiscard]] Expected<void, E> {
   constexpr explicit operator bool() const noexcept { return has_value(); }
   /// @}
 
-  /// Ends the program with the error as last words if there is one.
+  /// If there is an error, prints it and ends the program.
   constexpr void value() const noexcept {
     if (has_value()) return;
     if constexpr (requires(const E& e) { print_last_words(e); }) print_last_words(error());

@@ -1,5 +1,6 @@
 /// @file
-/// LaneByLane: what has nothing to gain from packs takes them all the same, as so many plain ones.
+/// LaneByLane: lets types that gain nothing from packs take them nevertheless, as one plain object
+/// per lane.
 #pragma once
 
 #include <concepts>
@@ -111,11 +112,12 @@ inline constexpr bool goes_lane_by_lane = std::is_base_of_v<GoesLaneByLane, T>;
     return each(*this, [](const Plain& lane, int) { return lane.template name<Row>(); }); \
   }
 
-/// So many `Plain` as a pack has lanes, behind the members of one: each call goes to lane after
-/// lane, numbers are told apart and put together again. What a `Plain` cannot do, it cannot.
+/// One `Plain` object for each lane of a pack, with the members of a single one: each call goes to
+/// lane after lane, packs of arguments are split and packs of results put together. It can do what
+/// `Plain` can do.
 ///
-/// For types that branch on what they measure, or that do little arithmetic: packs would be no
-/// faster there. It costs what the lanes cost.
+/// For types that branch on measurements or do little arithmetic: there packs would not be faster.
+/// It costs as much as its lanes.
 /// @tparam Self the class built on this @tparam Plain a lane @tparam S the pack
 /// @tparam Settings its Config, of packs
 template <class Self, class Plain, PackScalar S, class Settings>
@@ -158,7 +160,7 @@ class LaneByLane : public detail::GoesLaneByLane {
     return all_or_none([&](Plain& lane, [[maybe_unused]] int i) { return lane.adopt(fresh[i]); });
   }
 
-  /// A lane, for all else that it can do.
+  /// A lane, for all its other members.
   [[nodiscard]] constexpr Plain& operator[](int lane) noexcept {
     return lanes_[static_cast<std::size_t>(lane)];
   }

@@ -1,10 +1,10 @@
 /// @file
-/// The lanes of a pack, and of what is made of packs: how an observer of packs is told apart into
-/// plain ones and put together again.
+/// The lanes of a pack and of objects made of packs: how an observer of packs is split into plain
+/// ones and put together again.
 ///
-/// Where all lanes are well an observer of packs computes with packs. Where one is not (a bad
-/// sample, a gap, a restart) each lane goes through the observer of the plain scalar: what happens
-/// then is written once, and the lanes are its equals by construction.
+/// In normal operation an observer of packs computes with packs. If one lane has a bad sample, a
+/// gap or a restart, each lane goes through the observer of the plain scalar: so the handling of
+/// faults is written once, and the lanes behave like plain observers by construction.
 #pragma once
 
 #include <array>
@@ -21,7 +21,7 @@
 
 namespace esokit {
 
-/// Something that is no number, one a lane.
+/// A value that is not a number, one for each lane.
 template <class T, int Count>
 struct PerLane {
   Array<T, Count> values{};  ///< of lane 0, 1, ..

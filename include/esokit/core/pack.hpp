@@ -1,5 +1,5 @@
 /// @file
-/// Pack: several floats or doubles that are worked on at once, as one scalar of the library.
+/// Pack: several floats or doubles that are processed at once, as one scalar of the library.
 #pragma once
 
 #include <bit>
@@ -116,7 +116,7 @@ ESOKIT_INLINE constexpr bool all_bits(const Bits& bits) noexcept {
 template <std::floating_point S>
 inline constexpr int default_lanes = detail::register_lanes<S>;
 
-/// What a comparison of packs says, lane by lane.
+/// The result of a comparison of packs, lane by lane.
 template <class S, int Count>
 class PackMask {
   using Bits = detail::Registers<detail::BitsOf<S>, Count>;
@@ -160,9 +160,9 @@ class PackMask {
 /// `Count` floats or doubles, one of each of as many plants: a scalar of the library whose
 /// arithmetic is done on all lanes at once.
 ///
-/// An observer or controller of packs is that many of the plain scalar, bit for bit (where the
-/// compiler contracts no products and sums, -ffp-contract=off), with settings, faults, gaps and
-/// status of each lane its own.
+/// An observer or controller of packs equals one plain object per lane, bit for bit (if the
+/// compiler does not fuse products and sums, -ffp-contract=off). Each lane has its own settings,
+/// faults, gaps and status.
 /// @tparam S float or double @tparam Count a power of two; more than `default_lanes` take several
 ///         registers, less leave a part of one idle
 template <std::floating_point S, int Count = default_lanes<S>>

@@ -1,6 +1,5 @@
 /// @file
-/// What an explicit Runge-Kutta method is: a Butcher tableau whose claims are checked when it is
-/// compiled.
+/// Explicit Runge-Kutta methods as Butcher tableaus, whose properties are checked at compile time.
 #pragma once
 
 #include <array>

@@ -1,6 +1,6 @@
 /// @file
-/// Closed loops of a plant, an observer and a control law, the two ways of the library:
-/// ContinuousLoop is the papers' way (one stacked ODE), SampledLoop is the deployment way.
+/// Closed loops of a plant, an observer and a control law in two forms: ContinuousLoop as in the
+/// papers (one stacked ODE), SampledLoop as deployed.
 #pragma once
 
 #include <cmath>
@@ -47,7 +47,7 @@ concept NoiseSource = std::copyable<N> && requires(N& noise, std::int64_t k) {
   { noise.at(k) } -> std::convertible_to<ScalarType>;
 };
 
-/// What the observer is fed: m(t, y, v) of the output y and the noise v.
+/// The measurement that the observer gets: m(t, y, v) of the output y and the noise v.
 template <class M, class ScalarType>
 concept MeasurementMap = requires(const M& map, const ScalarType& s) {
   { map(s, s, s) } -> std::convertible_to<ScalarType>;
@@ -105,7 +105,7 @@ struct LoopSample {
   ScalarType measurement{};                ///< what the observer was fed
   ScalarType input{};                      ///< u
   typename Observer::Estimate estimate{};  ///< (y, .., d, ..)
-  StepStatus status = StepStatus::ok;      ///< what a sampled observer said of its update
+  StepStatus status = StepStatus::ok;      ///< status of a sampled observer's update
 };
 
 /// How a run ended.
@@ -130,9 +130,9 @@ auto check_state(const char* field, const State& state) {
 
 }  // namespace detail
 
-/// The papers' way: plant and continuous observer stacked into one ODE and integrated with a fixed
-/// step. Measurement and control are functions of the running state, so they change within a step;
-/// the noise is held over it.
+/// The form of the papers: plant and continuous observer stacked into one ODE and integrated with a
+/// fixed step. Measurement and control are functions of the running state, so they change within a
+/// step; the noise is held over it.
 ///
 /// ```
 /// const ContinuousLoop loop{plant, observer, [&](double, const auto& zhat) { return .. }};
@@ -236,11 +236,11 @@ ContinuousLoop(P, Observer, Law, Measurement, Noise)
     -> ContinuousLoop<P, Observer, Law, Measurement, Noise>;
 /// @}
 
-/// The deployment way: at each sample the observer is updated with the measurement and the input
-/// that was held until now, the law is computed once, and its input is held for a sample time,
-/// over which the plant alone is integrated.
+/// The deployed form: at each sample the observer is updated with the measurement and the input
+/// that was held until now, and the law is computed once. Its u is held for a sample time, over
+/// which the plant alone is integrated.
 ///
-/// A law with limits returns the limited input: what it returns is what the actuator holds.
+/// A law with limits returns the limited u, because the actuator holds what the law returns.
 template <Plant P, SampledObserverModel Observer, class Law, class Measurement = MeasuredOutput,
           class Noise = NoNoise>
 requires ControlFunction<Law, typename P::State::Scalar, typename Observer::Estimate> &&

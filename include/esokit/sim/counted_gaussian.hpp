@@ -141,8 +141,7 @@ ESOKIT_INLINE void normal_pair(const Word& bits, Real& first, Real& second) noex
 
 }  // namespace detail
 
-/// What random numbers are for: numbers of one run for two purposes have nothing to do with each
-/// other.
+/// The purpose of random numbers: numbers of one run for different purposes are independent.
 enum class RandomStream : std::uint64_t {
   noise = 0,             ///< of the measurement; output i: noise + i
   losses = 1u << 20u,    ///< which measurements are missing
@@ -150,8 +149,8 @@ enum class RandomStream : std::uint64_t {
   variation = 3u << 20u  ///< of plant and controller from run to run
 };
 
-/// Random numbers of a run, one of each lane's run a call: lane i has the numbers of run `run` + i,
-/// whatever the number of lanes (bit for bit where the compiler contracts no products and sums,
+/// Random numbers of runs. Each call gives one number for each lane; lane i has the numbers of run
+/// `run` + i for any number of lanes (bit for bit if the compiler does not fuse products and sums,
 /// -ffp-contract=off). Number k is a function of (seed, stream, run, k) alone.
 ///
 /// Threefry-2x64-13 gives the bits, Box and Muller make them normal: 3 ns a number with AVX2.
@@ -159,7 +158,7 @@ enum class RandomStream : std::uint64_t {
 template <Scalar S = double>
 class CountedGaussian {
  public:
-  /// @param seed any number @param stream what for @param run of the first lane
+  /// @param seed any number @param stream the purpose @param run of the first lane
   /// @param index of the output, where there are several
   CountedGaussian(std::uint64_t seed, RandomStream stream, std::uint64_t run,
                   int index = 0) noexcept

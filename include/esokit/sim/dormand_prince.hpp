@@ -1,5 +1,5 @@
 /// @file
-/// The method of Dormand and Prince, and steps of it whose length follows the error.
+/// The method of Dormand and Prince, with fixed steps or steps adapted to the error.
 #pragma once
 
 #include <algorithm>
@@ -35,9 +35,9 @@ struct DormandPrince {
       71 / 57600.0L, 0, -71 / 16695.0L, 71 / 1920.0L, -17253 / 339200.0L, 22 / 525.0L, -1 / 40.0L};
 };
 
-/// Steps by DormandPrince whose length follows the error: x5 goes on, and each element of x5 - x4
-/// must be within max(absolute_tolerance, relative_tolerance M), M the largest magnitude which that
-/// element has had so far. With q the largest ratio of the two,
+/// Steps by DormandPrince with a length adapted to the error: the result is x5, and each element of
+/// x5 - x4 must be within max(absolute_tolerance, relative_tolerance M), M the largest magnitude
+/// which that element has had so far. With q the largest ratio of the two,
 /// - a step with q <= 1 is accepted; the next is q^(-1/5) / 1.25 times as long, at most five times,
 ///   and not longer if the step had been refused before;
 /// - a step with q > 1 is tried again at max(0.1, 0.8 q^(-1/5)) times its length, the second time
@@ -46,7 +46,7 @@ struct DormandPrince {
 ///   below absolute_tolerance / relative_tolerance;
 /// - a step that `end` cuts short does not shorten the next.
 ///
-/// The right-hand side may jump at `end`, nothing of it is kept. One object integrates one
+/// The right-hand side may jump at `end`, because no value of it is kept. One object integrates one
 /// trajectory.
 /// @tparam State a fixed Eigen vector
 template <class State>
@@ -75,8 +75,8 @@ class VariableStep {
   /// @param rhs as in `step` @param t s, below `end` @param x state at t; at the new time
   /// afterwards
   /// @param end s, reached exactly
-  /// @return the new time, s; or an error, x as it was, where the step would fall below the
-  /// resolution of time: the solution, or rhs, is not finite or jumps
+  /// @return the new time, s; or an error, with x unchanged, if the step would fall below the
+  /// resolution of time because the solution or rhs jumps or is not finite
   template <class Rhs>
   requires RightHandSide<std::remove_reference_t<Rhs>, State, ScalarType>
       Expected<ScalarType, Error<ScalarType>> advance(Rhs&& rhs, ScalarType t, State& x,

@@ -40,7 +40,7 @@ class Gaussian {
     return first * factor;
   }
 
-  /// In [0, 1), from the same sequence: whether something happens that does so in a share of cases.
+  /// In [0, 1), from the same sequence; for events that happen in a share of cases.
   double uniform() { return (signed_uniform() + 1.0) / 2.0; }
 
   /// Starts the sequence anew.

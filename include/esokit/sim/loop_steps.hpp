@@ -1,5 +1,5 @@
 /// @file
-/// What the loops share: how many samples a duration has, and how they call back.
+/// Common to the loops: the number of samples of a duration, and the callback.
 #pragma once
 
 #include <cmath>

@@ -1,6 +1,6 @@
 /// @file
-/// Criteria of a recorded response. Inside a loop use the accumulators that they are made of:
-/// Trapezoid, PeakMeter, StepResponse.
+/// Criteria of a recorded response. Inside a loop use the accumulators behind them: Trapezoid,
+/// PeakMeter, StepResponse.
 #pragma once
 
 #include <cmath>

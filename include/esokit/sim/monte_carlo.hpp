@@ -1,6 +1,6 @@
 /// @file
-/// monte_carlo(plant, controller, config, vary): a loop, run with other chance and other plants as
-/// often as you like, on all cores and in the lanes of packs.
+/// monte_carlo(plant, controller, config, vary): many runs of a loop with different random numbers
+/// and plants, on all cores and in the lanes of packs.
 #pragma once
 
 #include <algorithm>
@@ -32,7 +32,7 @@
 
 namespace esokit::sim {
 
-/// The vector instructions that this was compiled for; packs are as wide as they allow.
+/// The vector instructions that the program was compiled for; they determine the width of packs.
 inline constexpr const char* instruction_set =
 #if defined(__AVX512F__)
     "AVX-512";
@@ -48,7 +48,7 @@ inline constexpr const char* instruction_set =
     "none";
 #endif
 
-/// The random numbers by which a run differs from others: a function of seed and run alone.
+/// The random numbers that vary a run: a function of seed and run alone.
 class Draw {
  public:
   /// @param seed of all runs
@@ -57,11 +57,12 @@ class Draw {
 
   /// Mean 0, variance 1.
   double normal() noexcept { return random_.next(); }
-  /// Between two numbers, all alike.
+  /// Uniform between two numbers.
   double uniform(double low, double high) noexcept {
     return low + (high - low) * random_.uniform();
   }
-  /// Between two positive numbers, all ratios alike: a factor of 2 is as likely as one of 1/2.
+  /// Between two positive numbers, uniform in the logarithm: a factor of 2 is as likely as one of
+  /// 1/2.
   double uniform_ratio(double low, double high) noexcept {
     return low * std::exp(std::log(high / low) * random_.uniform());
   }
@@ -73,33 +74,33 @@ class Draw {
   std::int64_t run_;
 };
 
-/// What may differ from run to run, beside chance.
+/// What may differ from run to run besides the random numbers of the loop.
 template <class P, class C>
 struct Trial {
-  P plant;                                ///< with dead time the same in all for speed
-  C controller;                           ///< designed anew, retuned or as it was
+  P plant;                                ///< for speed use the same dead time in all runs
+  C controller;                           ///< newly designed, retuned or unchanged
   typename RunTypes<P, C>::State state;   ///< x at the start
   typename RunTypes<P, C>::Output noise;  ///< of the measurement, standard deviation
 };
 
-/// Nothing but chance.
+/// Varies nothing: the runs differ only by the random numbers of the loop.
 struct NoVariation {
-  /// Leaves all as it is.
+  /// Changes nothing.
   template <class T>
   void operator()(T&, Draw&) const noexcept {}
 };
 
-/// Which samples a Measure looks at, and what its number has to keep.
+/// The samples that a Measure uses, and the limit for its number.
 struct MeasureOptions {
   double from = 0.0;                                       ///< s of the loop, first sample
   double to = std::numeric_limits<double>::infinity();     ///< s, last sample
-  double limit = std::numeric_limits<double>::infinity();  ///< what the number must not be above
+  double limit = std::numeric_limits<double>::infinity();  ///< the number must not be above this
 };
 
-/// A number of a run, made of `of(sample)` or `of(sample, controller)` at its samples.
+/// A number of a run, computed from `of(sample)` or `of(sample, controller)` at its samples.
 ///
-/// A function of any scalar: packs of runs go through it too. Made by `largest`, `average`,
-/// `root_mean_square`, `final_value` and `settling_time`.
+/// The function must take any scalar, because packs of runs go through it too. Made by `largest`,
+/// `average`, `root_mean_square`, `final_value` and `settling_time`.
 template <class Reduce, class F>
 struct Measure {
   std::string name;        ///< what it is
@@ -209,11 +210,11 @@ Measure<detail::SettlingTime, F> settling_time(std::string name, F of, double ba
   return {std::move(name), std::move(of), options, {{}, band}};
 }
 
-/// A run that gave no numbers.
+/// A run that failed and gave no numbers.
 template <class Time>
 struct FailedRun {
   std::int64_t run = 0;  ///< which
-  Error<Time> error{};   ///< of the variation, or of the loop: a state that is no number, say
+  Error<Time> error{};   ///< of `vary` or of the loop, for example a state that is not finite
 };
 
 /// Settings of `monte_carlo`.
@@ -225,7 +226,7 @@ struct MonteCarloConfig {
   RunConfig<P, C> loop{};  ///< of every run, with the seed of them all; its `number` is left out
   int threads = 0;         ///< 0: one a core
 
-  /// Called now and then with the runs that are done, 0 .. runs - 1 of them; false stops.
+  /// Called from time to time with the number of finished runs, 0 .. runs - 1; false stops.
   std::function<bool(std::int64_t done)> progress{};
 
   /// Called with the numbers of each run, in the order of the runs, from one thread at a time; of a
@@ -233,18 +234,18 @@ struct MonteCarloConfig {
   std::function<void(std::int64_t run, std::span<const double> numbers)> on_run{};
 };
 
-/// What came out.
+/// The result.
 template <class Time>
 struct MonteCarloOutcome {
-  std::int64_t runs = 0;               ///< done: the first so many, where it was stopped
-  std::int64_t failed = 0;             ///< that gave no numbers; they are in no statistics
+  std::int64_t runs = 0;               ///< number of finished runs; if stopped, the first ones
+  std::int64_t failed = 0;             ///< number of failed runs; they enter no statistics
   FailedRun<Time> first_failure{};     ///< the first of them
   std::vector<RunStatistics> numbers;  ///< of each Measure
   bool completed = true;               ///< false if it was stopped
   int threads = 1;                     ///< that it ran on
   int lanes = 1;                       ///< runs at once on each
 
-  /// Of all runs, the share that kept the limit of a number; a run that failed did not.
+  /// The share of all runs that kept the limit of a number; a failed run counts as not kept.
   [[nodiscard]] double share_kept(std::size_t number) const {
     return static_cast<double>(numbers[number].kept()) / static_cast<double>(runs);
   }
@@ -283,26 +284,26 @@ class MonteCarlo {
     return one;
   }
 
-  /// The settings by which sim::run repeats a run, with the plant and controller of its trial.
+  /// The settings with which sim::run repeats a run, with the plant and controller of its trial.
   [[nodiscard]] RunConfig<P, C> settings(std::int64_t run, const Trial<P, C>& trial) const {
     RunConfig<P, C> loop = config_.loop;
     set(loop, run, trial.state, trial.noise);
     return loop;
   }
 
-  /// One of the runs again, recorded: the worst, say.
+  /// Repeats one of the runs with a recording, for example the worst.
   [[nodiscard]] Expected<Recording<P, C>, Error<Time>> replay(std::int64_t run) const {
     const auto one = trial(run);
     if (!one) return one.error();
     return sim::run(one->plant, one->controller, settings(run, *one));
   }
 
-  /// Runs them all. The numbers are the same for any count of threads and lanes, bit for bit where
-  /// the compiler contracts no products and sums (-ffp-contract=off).
+  /// Runs them all. The numbers are the same for any number of threads and lanes, bit for bit if
+  /// the compiler does not fuse products and sums (-ffp-contract=off).
   ///
-  /// Packs of runs go through packs of plants and controllers where they have such: all linear
-  /// plants, `nonlinear_plant` of functions that take any scalar, controllers of esokit; others run
-  /// one by one, as do a loop with jitter and runs of which one in the pack fails.
+  /// Runs are computed in packs if plant and controller allow it: all linear plants,
+  /// `nonlinear_plant` with functions that take any scalar, and controllers of esokit. Others run
+  /// one by one; so do a loop with jitter and the runs of a pack in which one fails.
   /// @tparam Lanes runs at once on a thread
   /// @return error of the settings
   template <int Lanes = default_lanes<LaneScalar<typename Types::S>>, class... Reduce, class... F>
@@ -601,8 +602,8 @@ class MonteCarlo {
   Vary vary_;
 };
 
-/// Many runs of a loop as `sim::run` drives it, each with its own chance and, by `vary`, its own
-/// plant, controller, start and noise:
+/// Many runs of the loop of `sim::run`, each with its own random numbers and, through `vary`, its
+/// own plant, controller, initial state and noise:
 ///
 ///     auto study = sim::monte_carlo(plant, controller,
 ///         {.runs = 100'000, .loop = {.duration = 2.0, .reference = 1.0, .noise = 1e-3}},
@@ -611,7 +612,7 @@ class MonteCarlo {
 ///         [](const auto& s) { return s.output - s.reference; }, {.limit = 0.2}));
 ///     auto worst = study.replay(outcome->numbers[0].run_of_largest());
 ///
-/// What a run is depends on the seed and its number alone.
+/// A run depends only on the seed and its number.
 /// @param vary (Trial&, Draw&): makes of the trial, which comes with the plant and the controller
 ///        given here, that of a run; pure. It may return a Check, whose error counts as failed.
 template <SampledPlant P, class C, class Vary>
@@ -620,7 +621,7 @@ requires ControllerOf<C, P> MonteCarlo<P, C, Vary> monte_carlo(
   return {std::move(plant), std::move(controller), std::move(config), std::move(vary)};
 }
 
-/// The same with nothing but chance to tell the runs apart.
+/// The same without `vary`: the runs differ only by the random numbers of the loop.
 template <SampledPlant P, class C>
 requires ControllerOf<C, P> MonteCarlo<P, C> monte_carlo(
     P plant, C controller, std::type_identity_t<MonteCarloConfig<P, C>> config) {

@@ -11,7 +11,7 @@
 
 namespace esokit::sim {
 
-/// Independent normal numbers, one a call. Channels that shall be independent take different seeds.
+/// Independent normal numbers, one for each call. For independent channels use different seeds.
 template <PlainScalar ScalarType = double>
 class WhiteNoise {
  public:

@@ -1,5 +1,5 @@
 /// @file
-/// What a plant of a simulation is: of the continuous one, with a disturbance; a nonlinear one.
+/// Plants for simulation: a continuous one with a disturbance, and a nonlinear one.
 #pragma once
 
 #include <concepts>
@@ -89,7 +89,7 @@ class DisturbedPlant {
   Config config_;
 };
 
-/// A plant of its equations: x' = f(t, x, u), y = h(t, x). Made by `nonlinear_plant`.
+/// A plant given by its equations: x' = f(t, x, u), y = h(t, x). Made by `nonlinear_plant`.
 template <int States, class ScalarType, int Inputs, int Outputs, class F, class H>
 struct NonlinearPlant {
   static constexpr int states = States;                ///< length of x
@@ -158,17 +158,15 @@ struct FirstStates {
   }
 };
 
-/// A plant of functions: a pendulum is
+/// A plant given by functions. A pendulum is
 ///
 ///     nonlinear_plant<2>([](double, const Vector<double, 2>& x, double u) {
 ///       return Vector<double, 2>{x(1), -9.81 * std::sin(x(0)) + u};
 ///     });
 ///
 /// y is the first state, or what `h(t, x)` gives. t is absolute time, s; both functions are pure:
-/// an integrator calls them at times between samples. What jumps in f costs accuracy unless it does
-/// so between steps: a load that is switched on is better given to the simulation as its
-/// disturbance.
-/// @{
+/// an integrator calls them at times between samples. A jump of f within a step costs accuracy:
+/// pass a load that is switched on to the simulation as its disturbance. @{
 template <int States, Scalar ScalarType = double, int Inputs = 1, int Outputs = 1, class F, class H>
 NonlinearPlant<States, ScalarType, Inputs, Outputs, F, H> nonlinear_plant(F f, H h) {
   return {std::move(f), std::move(h)};

@@ -1,5 +1,5 @@
 /// @file
-/// What a run gives: its samples, its end, and the record of them to draw or to write.
+/// The results of a run: its samples, its end, and a recording to draw or to write.
 #pragma once
 
 #include <charconv>
@@ -53,7 +53,7 @@ struct ControllerScalarOf<C, PlantScalar> {
 
 }  // namespace detail
 
-/// What a run is made of: the types that go with a plant and a controller.
+/// The types that belong to a plant and a controller in a run.
 template <class P, class C>
 struct RunTypes {
   using S = typename detail::PlantScalarOf<P>::type;                         ///< of the plant
@@ -77,7 +77,7 @@ struct RunTypes {
   }();
 };
 
-/// What the callback of a run gets once a sample, after the controller.
+/// The argument of the callback of a run, called once a sample after the controller.
 template <class P, class C>
 struct RunSample {
   using Types = RunTypes<P, C>;  ///< of the numbers

@@ -104,18 +104,19 @@ struct RunConfig {
   Time duration{};     ///< s, a whole multiple of the sample time
   Time sample_time{};  ///< T, s; left out: that of the controller, which it must be if it has one
 
-  /// r, a number or a function of t: of a controller that takes them with derivatives, (r, r', ..)
+  /// r, a number or a function of t; for a controller that takes derivatives, (r, r', ..)
   RunSignal<typename Types::S, Types::references, Types::derivatives> reference{};
 
-  /// d, a number or a function of t, held over a step of integration. It comes in by E of a linear
-  /// plant, and beside u in others.
+  /// d, a number or a function of t, held over a step of integration. It enters through E of a
+  /// linear plant; in other plants it is added to u.
   RunSignal<typename Types::S, Types::inputs> disturbance{};
 
   Output noise{};  ///< of the measurement: standard deviation, normal, white
 
-  /// What the sensor makes of (t, y), noise in it: quantised, late, or NaN, that is missing.
+  /// The sensor: a function of (t, y), where y includes noise; it may quantise or return NaN
+  /// (missing).
   std::function<Output(const Time&, const Output&)> sensor{};
-  Time missing{};  ///< share of the samples that get lost at random, 0 .. 1
+  Time missing{};  ///< share of the samples that are lost at random, 0 .. 1
 
   /// Samples come early or late: each takes (1 + jitter r) T with r random in -1 .. 1; 0 .. 0.9
   Time jitter{};
@@ -123,14 +124,16 @@ struct RunConfig {
   std::function<Time(std::int64_t)> step_time{};
   std::uint64_t seed = 1;  ///< of noise, missing and jitter: equal seeds, equal runs
 
-  /// Which of many runs under one seed this is: its chance is then drawn by counter, as that of run
-  /// `number` of a MonteCarlo, and of packs lane i is run number + i. Left out: one sequence,
-  /// handed out to the lanes in turn. Packs with a number do not jitter: lanes have one time.
+  /// The number of this run among many with one seed. Its random numbers are then drawn by counter,
+  /// as for run `number` of a MonteCarlo; for packs lane i is run number + i. If left out, one
+  /// sequence is dealt to the lanes in turn. Packs with a number cannot have jitter, because all
+  /// lanes have the same time.
   std::optional<std::uint64_t> number{};
 
-  Time dead_time{};   ///< s that u takes to the plant, beside the plant's own dead time
-  int substeps = 1;   ///< steps of integration a sample; one is exact of a linear plant but for d
-  Time start_time{};  ///< t of the first sample, s
+  Time dead_time{};  ///< s from u to the plant, in addition to the plant's own dead time
+  int substeps =
+      1;  ///< steps of integration per sample; for a linear plant one is exact, except for d
+  Time start_time{};                                   ///< t of the first sample, s
   Input initial_input{};                               ///< u that was held before it
   typename Types::State state = Types::State::Zero();  ///< x at the start
 };
@@ -595,17 +598,17 @@ class Run {
 
 }  // namespace detail
 
-/// Drives a plant by a controller as it is deployed: at each sample the controller is given the
-/// measurement and the reference, and the u that it returns is held until the next one.
+/// Drives a plant with a controller as it is deployed: at each sample the controller gets the
+/// measurement and the reference, and the u that it returns is held until the next sample.
 ///
 ///     auto run = sim::run(plant, controller, {.duration = 2.0, .reference = 1.0, .noise = 1e-3});
 ///
 /// A linear plant is sampled exactly, others are integrated (Runge-Kutta of order 4, `substeps` a
-/// sample). All that switches does so between steps; the continuous simulation of papers is
-/// ContinuousLoop, and the two are never mixed.
+/// sample). Everything switches between steps only. For the continuous simulation of papers use
+/// ContinuousLoop; the two are never mixed.
 ///
-/// The controller is a copy; it is left in what is returned. Its limits are its own: u is what it
-/// says.
+/// The controller is copied; the copy is in the result. Limits are up to the controller: u is used
+/// as it returns it.
 /// @param plant LinearPlant, nonlinear_plant(..), or a type with `derivative` and `output`
 /// @param controller any controller of esokit, or your own `u = controller(y, reference)`, a lambda
 ///        for one; y is NaN where a measurement is missing

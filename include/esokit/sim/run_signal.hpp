@@ -1,5 +1,5 @@
 /// @file
-/// What a run is given as a number or as a function of time: reference and disturbance.
+/// Inputs of a run that are a number or a function of time: reference and disturbance.
 #pragma once
 
 #include <concepts>

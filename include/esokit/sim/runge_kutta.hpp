@@ -1,5 +1,5 @@
 /// @file
-/// Fixed-step explicit Runge-Kutta integration. The stepper knows nothing of the system: it needs a
+/// Fixed-step explicit Runge-Kutta integration. The stepper works for any system: it needs a
 /// right-hand side rhs(t, x) and a state that can be added and scaled.
 #pragma once
 
@@ -25,8 +25,8 @@ struct RungeKutta4 {
   /// @}
 };
 
-/// A right-hand side of x' = rhs(t, x). It must return a State and no expression template, whose
-/// operands would be gone.
+/// A right-hand side of x' = rhs(t, x). It must return a State and not an expression template,
+/// because its operands would no longer exist.
 template <class Rhs, class State, class ScalarType>
 concept RightHandSide = requires(Rhs& rhs, ScalarType t, const State& x) {
   requires std::same_as<std::remove_cvref_t<decltype(rhs(t, x))>, State>;

@@ -1,5 +1,5 @@
 /// @file
-/// Statistics of a number over many runs, in memory that does not grow with them.
+/// Statistics of a number over many runs, in memory that does not grow with their number.
 #pragma once
 
 #include <array>
@@ -18,8 +18,9 @@ namespace esokit::sim {
 /// One number of each run: mean, deviation, extremes with their run, quantiles, and how often a
 /// limit was kept.
 ///
-/// For the quantiles numbers are counted in bins of 2^-12 of their size: right to 0.025 % of
-/// themselves whatever the unit. That takes 32 kB for each power of two in which numbers lie.
+/// For the quantiles, numbers are counted in bins with a width of 2^-12 of their size: quantiles
+/// are accurate to 0.025 % in any unit. This takes 32 kB for each power of two in which numbers
+/// lie.
 class RunStatistics {
  public:
   /// @param name what it is @param limit what the number must not be above, for `kept`
@@ -68,7 +69,8 @@ class RunStatistics {
   /// How many numbers are not above the limit.
   [[nodiscard]] std::int64_t kept() const noexcept { return kept_; }
 
-  /// The number that a share of all is below, those of a bin spread evenly; zero of none.
+  /// The quantile: the number below which a share of all numbers lies, with those of a bin spread
+  /// evenly; zero if there are none.
   /// @param share 0 .. 1
   [[nodiscard]] double quantile(double share) const {
     double below = share * static_cast<double>(count_);
