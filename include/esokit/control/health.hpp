@@ -92,13 +92,16 @@ template <PlainScalar S>
 /// The part of dhat that is proportional to phi = b0 u, filtered by the same poles, has the factor
 /// (b - b0) / b0:
 ///
-///     rho = 1 + sum phi psi / sum phi^2,   psi = dhat, both high-passed at omega_o / 10
+///     rho = 1 + sum phi psi / sum phi^2,   psi = dhat, both high-passed at omega_o / 3
 ///
 /// is b / b0 if u moves by itself (because of a reference or noise), and tends to 0 if u reacts to
 /// a load (then dhat is -phi): a small rho proves nothing. It is negative only if the sign of b0 is
-/// wrong. A sample counts if abs(phi) is above 2 % of b0 times the range and above 4 times its
-/// noise, the law determines u and no guard gates dhat. The sums forget with time constant
-/// `memory`.
+/// wrong. A sample counts if abs(phi) is above 2 % of b0 times the range and above the noise of
+/// dhat, the law determines u and no guard gates dhat. The sums forget with time constant `memory`.
+///
+/// A larger margin over the noise would lose the fault that matters most: if b0 is too small, the
+/// loop cycles at 1.6 omega_o, where the poles leave a fifth of phi, but dhat is ten times as large.
+/// Noise that u reacts to makes rho smaller, so it raises no alarm of that kind.
 /// @tparam Size N of the observer: the number of poles that filter phi
 template <int Size, PlainScalar S = double>
 class HealthMonitor {
@@ -177,7 +180,7 @@ class HealthMonitor {
     const S x = config.observer_bandwidth * config.sample_time;
     const S step = x * static_cast<S>(divider_);
     pole_ = std::exp(-step);
-    slow_ = -std::expm1(-step / S(10));
+    slow_ = -std::expm1(-step / S(3));
     const S samples = config.memory / config.sample_time;
     weight_ = S(1) / samples;
     forget_ = std::exp(-static_cast<S>(divider_) / samples);
@@ -225,7 +228,7 @@ class HealthMonitor {
       sum_d = sum_d + d * d;
     }
     health_.innovation_of_noise = config.noise * std::sqrt(sum_e);
-    least_ = S(4) * config.noise * std::sqrt(sum_d);
+    least_ = config.noise * std::sqrt(sum_d);
     if (!is_finite(least_)) least_ = S(0);
   }
 
