@@ -236,7 +236,8 @@ TYPED_TEST(GuardedObserver, ComesBackInTheStatedTime) {
 // ---- the circle criterion
 
 /// min Re G by brute force; G from the correction of dhat back to the innovation.
-double least_real_part(const ScaledGain<3, double>& k) {
+/// @param kept of dhat, after each correction
+double least_real_part(const ScaledGain<3, double>& k, double kept = 1) {
   double least = 1e300;
   for (int i = 0; i < 3000; ++i) {
     const double angle = std::numbers::pi * std::pow(10.0, -6.0 + 6.0 * i / 2999.0);
@@ -244,9 +245,10 @@ double least_real_part(const ScaledGain<3, double>& k) {
     EigenMatrix<std::complex<double>, 3, 3> a;
     const EigenMatrix<double, 3, 3> phi{{1, 1, 1}, {0, 1, 2}, {0, 0, 1}};
     EigenMatrix<double, 3, 1> others(k[0], k[1], 0.0);
-    a = (z * EigenMatrix<double, 3, 3>::Identity() - (phi - others * phi.row(0)))
-            .template cast<std::complex<double>>();
-    const EigenMatrix<std::complex<double>, 3, 1> of_d(0.0, 0.0, k[2]);
+    EigenMatrix<double, 3, 3> frozen = phi - others * phi.row(0);
+    frozen.row(2) *= kept;
+    a = (z * EigenMatrix<double, 3, 3>::Identity() - frozen).template cast<std::complex<double>>();
+    const EigenMatrix<std::complex<double>, 3, 1> of_d(0.0, 0.0, kept * k[2]);
     const EigenMatrix<std::complex<double>, 3, 1> x = a.partialPivLu().solve(of_d);
     least = std::min(least, (x(0) + x(1) + x(2)).real());
   }
@@ -257,6 +259,7 @@ TEST(Gating, CertificateIsTheCircleCriterion) {
   Random random(3);
   int proven = 0;
   int refused = 0;
+  int saved = 0;  // by a leak
   for (int trial = 0; trial < 80; ++trial) {
     const double size = random.log_uniform(0.02, 2);
     const double damping = random.uniform(0.05, 1);
@@ -270,7 +273,13 @@ TEST(Gating, CertificateIsTheCircleCriterion) {
     if (std::abs(least + 1) < 1e-3) continue;
     ASSERT_EQ((gating_certified<3, double>(eso.level_gain(0))), least > -1) << least;
     (least > -1 ? proven : refused) += 1;
+    const double leak = random.log_uniform(1e-4, 1);
+    const double leaking = least_real_part(eso.level_gain(0), 1 - leak);
+    if (std::abs(leaking + 1) < 1e-3) continue;
+    ASSERT_EQ((gating_certified<3, double>(eso.level_gain(0), leak)), leaking > -1) << leaking;
+    saved += leaking > -1 && least < -1 ? 1 : 0;
   }
+  EXPECT_GT(saved, 0);
   EXPECT_GT(proven, 10);
   EXPECT_GT(refused, 10);
 }
@@ -443,6 +452,97 @@ TEST(Pinned, ErrorOfDhat) {
   EXPECT_GT(bare, 6);
   EXPECT_GT(timed_out, 6);
   EXPECT_LT(guarded, 1.2);
+}
+
+// ---- leak
+
+/// Where a constant load leads to is what the design says, of the estimate and of y.
+template <class Observer>
+void leak_leads_where_stated(double tolerance) {
+  using S = typename Observer::scalar_type;
+  constexpr int n = Observer::order;
+  for (const double leak_time : {0.05, 2.0}) {
+    using Loop = Adrc<Guarded<Observer>>;
+    typename Loop::Config config{.controller_bandwidth = S(6)};
+    config.observer = {.observer = settings<Observer>(), .leak_time = static_cast<S>(leak_time)};
+    auto loop = Loop::make(config).value();
+    constexpr double load = 0.7;
+    ChainPlant<n> plant(sample_time, b0, load);
+    for (int k = 0; k < 6000; ++k) {
+      plant.step(static_cast<double>(loop.update(static_cast<S>(plant.output()), S(1))));
+    }
+    const auto error = loop.observer().leak_error();
+    const double of_y = load * static_cast<double>(loop.leak_error());
+    ASSERT_GT(std::abs(of_y), 1e-6);
+    EXPECT_NEAR(plant.output() - 1, of_y, tolerance * std::abs(of_y)) << leak_time;
+    // y and its derivatives, d; after the correction, which is before the last input.
+    EXPECT_NEAR(load - static_cast<double>(loop.observer().total_disturbance()),
+                load * static_cast<double>(error(n)), tolerance * load);
+    EXPECT_NEAR(plant.output() - static_cast<double>(loop.observer().template estimate<0>()),
+                load * static_cast<double>(error(0)), tolerance * std::abs(of_y));
+    EXPECT_FALSE(loop.observer().gated());
+  }
+}
+
+TEST(Leak, LeadsWhereTheDesignSays) {
+  leak_leads_where_stated<LinearEso<1>>(1e-7);
+  leak_leads_where_stated<LinearEso<3>>(1e-7);
+  leak_leads_where_stated<CascadeEso<2, 3>>(1e-7);
+  leak_leads_where_stated<ReducedOrderEso<2>>(1e-7);
+  leak_leads_where_stated<DelayedInput<LinearEso<2, float>, 2>>(1e-2);
+}
+
+TEST(Leak, NoneIsNoError) {
+  const auto guarded = Guarded<LinearEso<2>>::make({settings<LinearEso<2>>()}).value();
+  EXPECT_EQ(guarded.leak_error(), (LinearEso<2>::Estimate::Zero()));
+}
+
+/// With a trust of 0 dhat goes with the time constant alone; retuned, with that of the new config.
+TEST(Leak, TimeConstantIsThatOfTheConfig) {
+  Guarded<LinearEso<2>>::Config config{.observer = settings<LinearEso<2>>(), .leak_time = 0.5};
+  auto guarded = Guarded<LinearEso<2>>::make(config).value();
+  LinearEso<2>::Estimate state = LinearEso<2>::Estimate::Zero();
+  state(2) = 1;
+  (void)guarded.reset(state);
+  guarded.set_trust(0);
+  for (int k = 0; k < 100; ++k) {
+    (void)guarded.update(0.3, 0);
+    // No correction, no leak.
+    ASSERT_EQ(guarded.correct(hidden_nan<double>()), StepStatus::measurement_rejected);
+    (void)guarded.predict(0);
+  }
+  EXPECT_NEAR(guarded.total_disturbance(), std::exp(-2), 1e-12);
+  config.leak_time = 0;
+  ASSERT_TRUE(guarded.retune(config).has_value());
+  for (int k = 0; k < 100; ++k) (void)guarded.update(0.3, 0);
+  EXPECT_NEAR(guarded.total_disturbance(), std::exp(-2), 1e-12);
+}
+
+TEST(Leak, RefusesWhatIsNoTime) {
+  const auto refused = []<class O>(O, typename O::scalar_type leak_time) {
+    return refusal(Guarded<O>::make({.observer = settings<O>(), .leak_time = leak_time}));
+  };
+  using Plain = LinearEso<2>;
+  const Plain plain = Plain::make(settings<Plain>()).value();
+  for (const double bad : {-1.0, hidden_nan<double>(), hidden_infinity<double>()}) {
+    EXPECT_EQ(refused(plain, bad), "leak_time: must be finite and not negative");
+  }
+  const char* const long_time =
+      "leak_time: is so long that a sample changes nothing the scalar can hold";
+  const double longest = sample_time / std::numeric_limits<double>::epsilon();
+  EXPECT_EQ(refused(plain, longest * 1.01), long_time);
+  for (const double good : {0.0, 1e-6, sample_time, 1.0, longest * 0.99}) {
+    EXPECT_TRUE(
+        Guarded<Plain>::make({.observer = settings<Plain>(), .leak_time = good}).has_value())
+        << good;
+  }
+  const char* const gated =
+      "leak_time: must be 0 with an extension above 1 or a varying sample time";
+  using Sloped = LinearEso<1, double, 2>;
+  using Varying = VariableTime<Plain>;
+  EXPECT_EQ(refused(Sloped::make(settings<Sloped>()).value(), 1), gated);
+  EXPECT_EQ(refused(Varying::make(settings<Varying>()).value(), 1), gated);
+  EXPECT_TRUE(Guarded<Sloped>::make({settings<Sloped>()}).has_value());
 }
 
 // ---- held

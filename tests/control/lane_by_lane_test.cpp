@@ -86,7 +86,8 @@ struct Guards {
     typename Type<T>::Config config{};
     config.observer = {.observer = linear<T>(lane, again),
                        .disturbance_bound = set<T>(lane, again, 20),
-                       .release_samples = 3};
+                       .release_samples = 3,
+                       .leak_time = set<T>(lane, again, 4)};
     config.controller_bandwidth = set<T>(lane, again, 5);
     config.limits = {set<T>(lane, again, -2), set<T>(lane, again, 3), set<T>(lane, again, 200)};
     return config;

@@ -251,6 +251,9 @@ class Filler {
     MEMBER(unit, choice(text, member, 2))
     MEMBER(release_samples,
            promise.waiting += static_cast<double>(member = tape_.integer(0, 60, text)))
+    MEMBER(leak_time, tape_.once_in(3, text)
+                          ? static_cast<void>(number(text, member, {0.1 * T, 1000 * T, true}))
+                          : static_cast<void>(member))
     MEMBER(level_poles, poles(text, member))
     MEMBER(bandwidth_ratio, number(text, member, {0.6, 1.4}))
     MEMBER(rule, choice(text, member, 2))

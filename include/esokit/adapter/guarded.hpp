@@ -1,8 +1,9 @@
 /// @file
-/// Guarded: holds, gates or bounds the disturbance estimate, or changes b0, for any observer with a
-/// constant gain.
+/// Guarded: holds, gates, bounds or leaks the disturbance estimate, or changes b0, for any observer
+/// with a constant gain.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <esokit/adapter/adapter.hpp>
 #include <esokit/core/kernels.hpp>
@@ -66,10 +67,11 @@ struct GuardedConfig {
   S disturbance_bound{};  ///< largest abs(dhat); 0: no bound. Unit of y^(n) or u, see `unit`
   DisturbanceUnit unit = DisturbanceUnit::output;  ///< what dhat is counted in
   int release_samples = 0;  ///< measurements after the end of a pin until dhat is free, 0 .. 65000
+  S leak_time{};            ///< time constant of the decay of dhat, s; 0: none
 
   /// @cond
   static constexpr auto fields(auto& c) noexcept {
-    return detail::tie(c.observer, c.disturbance_bound, c.unit, c.release_samples);
+    return detail::tie(c.observer, c.disturbance_bound, c.unit, c.release_samples, c.leak_time);
   }
   /// @endcond
 };
@@ -93,6 +95,9 @@ struct GuardedConfig {
 /// - Bound: abs(dhat) <= disturbance_bound, after the correction and before the prediction, at
 ///   every level of a cascade. A load above it causes a steady error; `bounded()` reports it. With
 ///   m > 1 a slope of the estimate that would lead out of the bound is set to zero.
+/// - Leak: each correction multiplies dhat by exp(-T / leak_time), whatever the trust is, so that a
+///   dhat found under other circumstances fades. This removes the integral action: a constant load
+///   leaves a steady error, `leak_error()` of the estimate and `Adrc::leak_error()` of y.
 /// - A changing b0: `set_input_gain(b)` before a sample, without design work. In Adrc and
 ///   DisturbanceCompensator the law follows.
 ///
@@ -102,8 +107,8 @@ struct GuardedConfig {
 /// from the correction of dhat to its innovation (circle criterion). `make` checks this for each
 /// level and refuses a level that fails; all poles in one place pass at any bandwidth (tested to n
 /// = 5, omega_o T = 20): min Re G is -1/4 (n = 1), -1/3 (n = 2), -3/8 (n = 3) for fast sampling,
-/// and never below -1/2. With m > 1 a frozen slope would run on, and for VariableTime no gain is
-/// known: for these only the bound and b0 are available.
+/// and never below -1/2. The check includes the leak. With m > 1 a frozen slope would run on, and
+/// for VariableTime no gain is known: for these only the bound and b0 are available.
 ///
 /// For constant gains on the chain, as the outermost adapter. Not with KnownModel, because the
 /// proof does not cover fbar.
@@ -144,7 +149,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     if (!made) return made.error();
     if constexpr (gates) {
       for (int level = 0; level < levels; ++level) {
-        if (!gating_certified<size, S>(made->level_gain(level))) {
+        if (!gating_certified<size, S>(made->level_gain(level), made->leak_)) {
           return Error<S>{"level", static_cast<S>(level),
                           "has a gain that is not proven stable while corrections of dhat are "
                           "scaled (Re G > -1)"};
@@ -162,6 +167,8 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     unit_ = fresh.unit_;
     release_samples_ = fresh.release_samples_;
     inverse_gain_ = fresh.inverse_gain_;
+    leak_ = fresh.leak_;
+    set_weights();
     set_limit();
     keep_bound();
     return {};
@@ -278,6 +285,35 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     constexpr S rounding = S(1) - S(8) * std::numeric_limits<S>::epsilon();
     return reaches(limit() * rounding);
   }
+  /// x - xhat in the steady state with constant y, for a constant d = 1 (unit of y^(n)): what the
+  /// leak costs, zero without it. N x 1, (y, .., d).
+  [[nodiscard]] Estimate leak_error() const noexcept requires gates {
+    if (!(leak_ > S(0))) return Estimate::Zero();
+    const auto& model = detail::GuardAccess::innermost(observer_).model();
+    // What is found is (1 - leak) / leak of what the levels correct.
+    const S kept = (S(1) - leak_) / leak_;
+    S left = model.scaled_disturbance(S(1));
+    Array<S, size> error{};
+    for (int level = 0; level < levels; ++level) {
+      const auto k = observer_.level_gain(level);
+      // A state stands: what the rows below add to it in a step is what its correction takes.
+      const S share = std::get<n - 1>(k) / static_cast<S>(n);
+      const S innovation = left / (share + kept * std::get<n>(k));
+      left = share * innovation;
+      error[n] = left;
+      for (int i = n - 2; i >= 0; --i) {
+        S sum = k[static_cast<std::size_t>(i)] * innovation;
+        for (int j = i + 2; j <= n; ++j) {
+          sum = sum - static_cast<S>(binomial(j, i)) * error[static_cast<std::size_t>(j)];
+        }
+        error[static_cast<std::size_t>(i + 1)] = sum / static_cast<S>(i + 1);
+      }
+      // A level sees the corrected y of the one before.
+      error[0] = error[0] + (S(1) - k[0]) * innovation;
+    }
+    return model.physical(error);
+  }
+
   /// b0 of now.
   [[nodiscard]] S present_input_gain() const noexcept {
     return observer_.input_gain() * gain_ratio_;
@@ -317,8 +353,10 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
       : Base(observer),
         bound_(config.disturbance_bound),
         inverse_gain_(S(1) / observer.input_gain()),
+        leak_(leak_of(config)),
         unit_(config.unit),
         release_samples_(static_cast<std::uint16_t>(config.release_samples)) {
+    set_weights();
     set_limit();
   }
 
@@ -327,7 +365,19 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
         .invertible("input_gain", chain_config<Observer>(config.observer).input_gain)
         .not_negative("disturbance_bound", config.disturbance_bound)
         .require(0 <= config.release_samples && config.release_samples <= 65000, "release_samples",
-                 static_cast<S>(config.release_samples), "must be 0 .. 65000");
+                 static_cast<S>(config.release_samples), "must be 0 .. 65000")
+        .not_negative("leak_time", config.leak_time)
+        .require(gates || !(config.leak_time > S(0)), "leak_time", config.leak_time,
+                 "must be 0 with an extension above 1 or a varying sample time")
+        .require(!(config.leak_time > S(0)) || leak_of(config) >= std::numeric_limits<S>::epsilon(),
+                 "leak_time", config.leak_time,
+                 "is so long that a sample changes nothing the scalar can hold");
+  }
+
+  /// The part of dhat that goes after each correction.
+  static S leak_of(const Config& config) {
+    if (!(config.leak_time > S(0))) return S(0);
+    return -std::expm1(-chain_config<Observer>(config.observer).sample_time / config.leak_time);
   }
 
   /// The disturbance states, level by level.
@@ -344,9 +394,14 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   /// After a correction. @param before what was found before it: no prediction changes it (m = 1)
   ESOKIT_INLINE void keep_guards(const Found& before, StepStatus status) noexcept {
     if constexpr (gates) {
-      if (gated_) [[unlikely]] {
+      if (acts_) [[unlikely]] {
         // What starts anew knows nothing of what was before.
-        if (!has(status, StepStatus::restarted)) gate(before);
+        if (gated_ && !has(status, StepStatus::restarted)) gate(before);
+        if (!has(status, StepStatus::measurement_rejected | StepStatus::outlier_rejected)) {
+          for (auto& level : detail::GuardAccess::states(observer_)) {
+            level[n] = level[n] - leak_ * level[n];
+          }
+        }
         if (release_left_ > 0 && --release_left_ == 0) set_weights();
       }
     }
@@ -369,6 +424,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     weight_up_ = one_sided && side_ <= 0 ? S(0) : trust_;
     weight_down_ = one_sided && side_ >= 0 ? S(0) : trust_;
     gated_ = one_sided || trust_ < S(1);
+    acts_ = gated_ || leak_ > S(0);
   }
 
   /// Sign of the corrections of dhat that bring u down.
@@ -450,13 +506,15 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   S told_ratio_ = S(1);    ///< of the u that is told next: what it was when the law gave it
   S input_factor_ = S(1);  ///< 1 / gain_ratio
   S inverse_gain_;         ///< 1 / b0 of the config
+  S leak_;                 ///< part of dhat that goes after each correction
   S trust_ = S(1);
   S weight_up_ = S(1);    ///< what a correction of dhat upwards counts
   S weight_down_ = S(1);  ///< and one downwards
   DisturbanceUnit unit_;
   Pin pin_ = Pin::free;
   signed char side_ = 0;  ///< sign of the corrections that free a pinned actuator; 0: none does
-  bool gated_ = false;    ///< one test in the hot path
+  bool gated_ = false;
+  bool acts_ = false;  ///< gated, or leaks: one test in the hot path
   std::uint16_t release_samples_;
   std::uint16_t release_left_ = 0;
 };

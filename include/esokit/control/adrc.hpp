@@ -177,6 +177,17 @@ class Adrc {
     return observer().set_input_gain(error_based ? S(-b) : b);
   }
 
+  /// y - r in the steady state, within the limits, for a constant d = 1 (unit of y^(n)): what the
+  /// leak of Guarded costs.
+  [[nodiscard]] S leak_error() const noexcept
+      requires(observer_traits<Observer>.gates_disturbance) {
+    // b0 u is -d there, and what the law makes of the estimates.
+    const auto left = observer().leak_error();
+    S sum = left(order);
+    for (int i = 0; i < order; ++i) sum = sum + gains()[static_cast<std::size_t>(i)] * left(i);
+    return sum / gains()[0];
+  }
+
   /// Takes over a plant that stands at y under u, the reference being y too.
   Status start(S y, S u) noexcept { return start(y, u, y); }
 

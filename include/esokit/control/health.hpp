@@ -100,8 +100,8 @@ template <PlainScalar S>
 /// dhat, the law determines u and no guard gates dhat. The sums forget with time constant `memory`.
 ///
 /// A larger margin over the noise would lose the fault that matters most: if b0 is too small, the
-/// loop cycles at 1.6 omega_o, where the poles leave a fifth of phi, but dhat is ten times as large.
-/// Noise that u reacts to makes rho smaller, so it raises no alarm of that kind.
+/// loop cycles at 1.6 omega_o, where the poles leave a fifth of phi, but dhat is ten times as
+/// large. Noise that u reacts to makes rho smaller, so it raises no alarm of that kind.
 /// @tparam Size N of the observer: the number of poles that filter phi
 template <int Size, PlainScalar S = double>
 class HealthMonitor {
