@@ -475,6 +475,76 @@ Failure run_study(Episode& episode) {
   return study.done();
 }
 
+// ---- what a monitor says of a loop, whatever happens to it
+
+template <class S>
+Failure health_study(Episode& episode) {
+  Study study(episode);
+  using Controller = Adrc<Guarded<LinearEso<2, S>>>;
+  using Monitor = HealthMonitor<3, S>;
+  const S T = study.number<S>("sample_time", {1e-3, 1e-1, true});
+  const S w = study.number<S>("observer_bandwidth", {5, 200, true});
+  typename Controller::Config config{};
+  config.observer.observer = {.observer_bandwidth = w,
+                              .input_gain = study.number<S>("input_gain", {0.1, 10, true, true}),
+                              .sample_time = T};
+  config.observer.disturbance_bound = study.number<S>("disturbance_bound", {0, 10});
+  config.controller_bandwidth = w / S(5);
+  config.limits = {.lower = S(-10), .upper = S(10)};
+  const auto made = study.answer("controller", Controller::make(config));
+  const auto monitored = study.answer(
+      "monitor", Monitor::make({.observer_bandwidth = w,
+                                .sample_time = T,
+                                .input_range = study.number<S>("input_range", {0.1, 10, true}),
+                                .noise = study.number<S>("noise", {0, 1}),
+                                .memory = study.number<S>("memory", {0.1, 10, true}),
+                                .divider = study.choice("divider", 12)}));
+  if (!made || !monitored) return study.done();
+  auto controller = *made;
+  auto monitor = *monitored;
+  std::uint32_t looked = 0;
+  for (int k = 4 + study.choice("samples", 40); k > 0; --k) {
+    const S y = study.number<S>("y", signal);
+    const S r = study.number<S>("reference", signal);
+    switch (study.choice("call", 8)) {
+      case 0:
+        (void)controller.track(y, r, study.number<S>("u_applied", signal));
+        break;
+      case 1:
+        (void)controller.hold(y, r, study.number<S>("u_applied", signal));
+        break;
+      case 2:
+        (void)controller.set_input_gain(study.number<S>("b", {0.1, 10, true, true}));
+        break;
+      case 3:
+        monitor.clear();
+        looked = 0;
+        break;
+      default:
+        (void)controller.update(y, r);
+    }
+    monitor.look(controller);
+    const Health<S>& health = monitor.health();
+    if (health.samples != ++looked) study.fail("samples", "are not those that were looked at");
+    for (const S& share : {health.saturated, health.bounded}) {
+      if (!(share >= S(0) && share <= S(1))) study.fail("share", "is not within 0 .. 1");
+    }
+    for (const std::uint32_t count :
+         {health.rejected, health.bridged, health.gated, health.unsafe}) {
+      if (count > looked) study.fail("count", "is above that of the samples");
+    }
+    for (const S& x : {health.innovation, health.gain_ratio, health.evidence}) {
+      study.finite("health", x);
+    }
+    if (!(health.innovation >= S(0) && health.evidence >= S(0)))
+      study.fail("health", "is negative");
+    if (*advice(diagnose(health)).wrong == '\0' && diagnose(health) != LoopFault::none) {
+      study.fail("diagnosis", "has no words");
+    }
+  }
+  return study.done();
+}
+
 void add_studies(std::vector<Kind>& kinds) {
   kinds.push_back({"loop of LinearEso<2>", &loop_study<LinearEso<2>>});
   kinds.push_back({"loop of CascadeEso<1, 2, float>", &loop_study<CascadeEso<1, 2, float>>});
@@ -490,6 +560,8 @@ void add_studies(std::vector<Kind>& kinds) {
       {"ContinuousAlgebraicEso<2>", &continuous_study<ContinuousAlgebraicEso<2, double>>});
   kinds.push_back({"signals, noise, plants", &signal_study});
   kinds.push_back({"run", &run_study});
+  kinds.push_back({"HealthMonitor<3, float>", &health_study<float>});
+  kinds.push_back({"HealthMonitor<3>", &health_study<double>});
   kinds.push_back({"PI conversion, float", &pid_study<1, float>});
   kinds.push_back({"PID conversion", &pid_study<2, double>});
   kinds.push_back({"Limiter<float>", &limiter_study<float>});
