@@ -328,9 +328,9 @@ TEST(Identified, GoesStraightIntoAnObserverSimulationAndAnalysis) {
                    : std::string(refused.error().field) + ": " + refused.error().rule;
   };
   EXPECT_EQ(rule(found.model<esokit::ModelParts{.order = 1}>()),
-            "order: is not the one that is asked for:");
+            "order: is not the requested one:");
   EXPECT_EQ(rule(found.observer<esokit::ModelParts{.order = 3}>(40, T)),
-            "order: is not the one that is asked for:");
+            "order: is not the requested one:");
   found.sinusoids.pop_back();
   EXPECT_EQ(rule(found.model<parts>()),
             "sinusoids: were found, fewer than the resonators that are asked for:");
@@ -401,27 +401,29 @@ TEST(Judge, RefusesByName) {
   Identified bad = good;
   const Case cases[] = {
       {&bad.log.jitter, 0.0501 * T,
-       "jitter: of T without stamps is above 0.05: record the time of each row"},
+       "jitter: is the jitter over T without time stamps, above 0.05: record the time of each row"},
       {&bad.own_input, 0.9e-5,
-       "own_input: of u is not a law of y alone: nothing from outside excites the loop; record a "
-       "reference that moves"},
+       "own_input: is the share of u that y does not explain, so nothing else moves the loop: "
+       "record a moving reference"},
       {&bad.excitation, 0.151,
-       "excitation: is the least error of b0, and too large: u hardly shows in y; record steps or "
-       "a sweep"},
+       "excitation: is the smallest relative error of b0 and too large, because u hardly moves y: "
+       "record steps or a sweep"},
       {&bad.correlation, 0.101,
-       "correlation: of the innovations: the machine is more than the model; record without the "
-       "load that swings, or add what is known as a column; above"},
+       "correlation: is the correlation of the innovations, so the machine has more than the "
+       "model: record without a load that swings, or add known effects as a column; must be at "
+       "most"},
       {&bad.plateau.spread, 0.101,
-       "plateau: is how much b0 differs between neighbouring bandwidths, there is no plateau: "
-       "record more motion in the band that the controller will use; above"},
+       "plateau: is the relative change of b0 between neighbouring bandwidths, so there is no "
+       "plateau: record more motion in the band of the controller; must be at most"},
       {&bad.schedule_shift, 1.01,
-       "schedule: times its interval is what b0 differs by along the scheduling column: ask for "
-       "b0 over the column (scheduled = true), or record at one setting"},
+       "schedule: is the change of b0 along the scheduling column over its interval: ask for b0 "
+       "over the column (scheduled = true), or record at one setting"},
       {&bad.friction_shift, 3.01,
-       "friction_shift: standard errors between one friction and another: record faster motion; "
-       "above"},
+       "friction_shift: is the change of b0 between two scales of friction in standard errors: "
+       "record faster motion; must be at most"},
       {&bad.input_gain.half_width, 5.01,
-       "interval: is the half width of b0 over b0: record longer, or with larger steps; above"}};
+       "interval: is the half width of b0 over b0: record longer or with larger steps; must be at "
+       "most"}};
   // A number that is none is no reason to trust.
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (const Case& c : cases) {
@@ -441,14 +443,15 @@ TEST(Judge, RefusesByName) {
   bad = good;
   bad.log.saturated = 0.5;
   EXPECT_EQ(said(esokit::judge(bad, log)), "accepted");
-  EXPECT_EQ(said(esokit::judge(bad, log, commanded)),
-            "saturated: of the rows have u at its limits: record what the actuator held");
+  EXPECT_EQ(
+      said(esokit::judge(bad, log, commanded)),
+      "saturated: is the share of rows with u at its limits: record the u that the actuator held");
   bad.log.saturated = 0.499;
   EXPECT_EQ(said(esokit::judge(bad, log, commanded)), "accepted");
   bad = good;
   bad.at_bound = true;
   EXPECT_EQ(said(esokit::judge(bad, log)),
-            "latency: or pole is at the end of its range: record faster changes of u");
+            "latency: (or the pole) is at the end of its range: record faster changes of u");
   bad = good;
   bad.plateau.middle = 0;
   EXPECT_EQ(said(esokit::judge(bad, log)).substr(0, 10), "excitation");
@@ -595,7 +598,7 @@ TEST(PrepareLog, RefusesUnitsOfWhichAFitCannotTakeSquares) {
                     : std::string(prepared.error().field) + ": " + prepared.error().rule;
   };
   const char* const large = "is too large: write it in another unit";
-  const char* const little = "is all that it changes by: write it in another unit";
+  const char* const little = "is the whole range of its values: write it in another unit";
   for (int which = 0; which < 3; ++which) {
     const std::string field = which == 0 ? "u: " : which == 1 ? "y: " : "columns: ";
     Log bad = log;

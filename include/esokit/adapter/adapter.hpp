@@ -41,7 +41,7 @@ template <LoopObserver Observer>
 class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Observer> {
   friend struct detail::GuardAccess;
   static_assert(PlainScalar<typename Observer::scalar_type>,
-                "esokit: an adapter of packs is a PackAdapter: so many of plain scalars");
+                "esokit: for packs use PackAdapter: one adapter of plain scalars for each lane");
 
  public:
   using Adapted = Observer;                            ///< what is adapted

@@ -203,8 +203,8 @@ template <class Object, class T>
 struct WithScalarOf {
   static_assert(
       requires { typename Object::template with_scalar<T>; },
-      "esokit: what is to work with packs says by `template <class T> using with_scalar` "
-      "what it is for another scalar, and by `fields(object)` what it holds");
+      "esokit: a type for packs needs `template <class T> using with_scalar`, the type with "
+      "another scalar, and `fields(object)`, its members");
   using type = typename Object::template with_scalar<T>;
 };
 template <class Object, class T>

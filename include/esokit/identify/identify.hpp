@@ -101,7 +101,7 @@ struct Identified {
   template <int Order>
   [[nodiscard]] Expected<LinearPlant<Order + 1>, Error<double>> plant() const {
     if (order != Order) {
-      return Error<double>{"order", static_cast<double>(order), "is not the one that is asked for:",
+      return Error<double>{"order", static_cast<double>(order), "is not the requested one:",
                            -1,      static_cast<double>(Order), true};
     }
     typename LinearPlant<Order>::Chain chain;
@@ -122,10 +122,10 @@ struct Identified {
   [[nodiscard]] Expected<typename AugmentedModel<Parts>::Settings, Error<double>> model() const {
     static_assert(Parts.actuator <= 1, "esokit: identify finds a lag of first order");
     static_assert(Parts.sensor == 0 && Parts.leaky == 0 && !Parts.follows_speed,
-                  "esokit: identify finds no sensor, nothing that fades and no speed");
+                  "esokit: identify finds no sensor, no fading parts and no speed");
     Rules<double> rules;
     rules.require(order == Parts.order,
-                  {"order", static_cast<double>(order), "is not the one that is asked for:", -1,
+                  {"order", static_cast<double>(order), "is not the requested one:", -1,
                    static_cast<double>(Parts.order), true});
     const auto swings = static_cast<std::size_t>(Parts.resonators);
     rules.require(sinusoids.size() >= swings,
@@ -779,41 +779,45 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
   Rules<double> rules;
   const double T = found.log.sample_time;
   const double jitter = log.time.empty() ? found.log.jitter / T : 0.0;
-  rules.require(jitter <= 0.05, "jitter", jitter,
-                "of T without stamps is above 0.05: record the time of each row");
-  rules.require(options.applied || found.log.saturated < 0.5, "saturated", found.log.saturated,
-                "of the rows have u at its limits: record what the actuator held");
-  rules.require(found.own_input > 1e-5, "own_input", found.own_input,
-                "of u is not a law of y alone: nothing from outside excites the loop; record a "
-                "reference that moves");
-  const bool excited = found.plateau.middle > 0 && found.excitation < 0.15;
   rules.require(
-      excited, "excitation", found.plateau.middle > 0 ? found.excitation : 1.0,
-      "is the least error of b0, and too large: u hardly shows in y; record steps or a sweep");
+      jitter <= 0.05, "jitter", jitter,
+      "is the jitter over T without time stamps, above 0.05: record the time of each row");
+  rules.require(options.applied || found.log.saturated < 0.5, "saturated", found.log.saturated,
+                "is the share of rows with u at its limits: record the u that the actuator held");
+  rules.require(found.own_input > 1e-5, "own_input", found.own_input,
+                "is the share of u that y does not explain, so nothing else moves the loop: record "
+                "a moving reference");
+  const bool excited = found.plateau.middle > 0 && found.excitation < 0.15;
+  rules.require(excited, "excitation", found.plateau.middle > 0 ? found.excitation : 1.0,
+                "is the smallest relative error of b0 and too large, because u hardly moves y: "
+                "record steps or a sweep");
   if (!rules) return rules;
-  rules.require(found.correlation <= options.correlation_max,
-                {"correlation", found.correlation,
-                 "of the innovations: the machine is more than the model; record without the load "
-                 "that swings, or add what is known as a column; above",
-                 -1, options.correlation_max, true});
+  rules.require(
+      found.correlation <= options.correlation_max,
+      {"correlation", found.correlation,
+       "is the correlation of the innovations, so the machine has more than the model: record "
+       "without a load that swings, or add known effects as a column; must be at most",
+       -1, options.correlation_max, true});
   rules.require(!found.at_bound, "latency", found.latency.value,
-                "or pole is at the end of its range: record faster changes of u");
+                "(or the pole) is at the end of its range: record faster changes of u");
   rules.require(found.plateau.spread <= options.plateau_max,
                 {"plateau", found.plateau.spread,
-                 "is how much b0 differs between neighbouring bandwidths, there is no plateau: "
-                 "record more motion in the band that the controller will use; above",
+                 "is the relative change of b0 between neighbouring bandwidths, so there is no "
+                 "plateau: record more motion in the band of the controller; must be at most",
                  -1, options.plateau_max, true});
   rules.require(options.scheduled || found.schedule_shift <= 1.0, "schedule", found.schedule_shift,
-                "times its interval is what b0 differs by along the scheduling column: ask for b0 "
+                "is the change of b0 along the scheduling column over its interval: ask for b0 "
                 "over the column (scheduled = true), or record at one setting");
   rules.require(found.friction_shift <= options.friction_shift_max,
                 {"friction_shift", found.friction_shift,
-                 "standard errors between one friction and another: record faster motion; above",
+                 "is the change of b0 between two scales of friction in standard errors: record "
+                 "faster motion; must be at most",
                  -1, options.friction_shift_max, true});
-  rules.require(found.input_gain.share() <= options.interval_max,
-                {"interval", found.input_gain.share(),
-                 "is the half width of b0 over b0: record longer, or with larger steps; above", -1,
-                 options.interval_max, true});
+  rules.require(
+      found.input_gain.share() <= options.interval_max,
+      {"interval", found.input_gain.share(),
+       "is the half width of b0 over b0: record longer or with larger steps; must be at most", -1,
+       options.interval_max, true});
   return rules;
 }
 

@@ -155,7 +155,7 @@ inline double quantisation_step(const std::vector<double>& y) {
     const double largest = std::max(-*low, *high);
     rules.require(largest <= 1e60, field, largest, "is too large: write it in another unit", index)
         .require(!(*high > *low) || *high - *low >= 1e-60, field, *high - *low,
-                 "is all that it changes by: write it in another unit", index);
+                 "is the whole range of its values: write it in another unit", index);
   };
   size_fits("u", u);
   size_fits("y", y);

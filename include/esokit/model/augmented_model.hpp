@@ -169,7 +169,8 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   static_assert(n >= 1, "esokit: the plant order must be at least 1");
   static_assert(m >= 1, "esokit: at least one extended state is needed");
   static_assert(la >= 0 && la <= 2 && lf >= 0 && lf <= 2, "esokit: a lag has order 0, 1 or 2");
-  static_assert(Parts.resonators >= 0 && Parts.leaky >= 0, "esokit: a number of parts below zero");
+  static_assert(Parts.resonators >= 0 && Parts.leaky >= 0,
+                "esokit: the number of parts must not be negative");
 
  public:
   static constexpr ModelParts parts = Parts;  ///< what is known

@@ -84,7 +84,8 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
   static_assert(n >= 1 && n <= States, "esokit: the relative degree is 1 .. States");
   static_assert(Parts.constants >= 1, "esokit: at least one extended state is needed");
   static_assert(lf >= 0 && lf <= 2, "esokit: a lag has order 0, 1 or 2");
-  static_assert(Parts.resonators >= 0 && Parts.leaky >= 0, "esokit: a number of parts below zero");
+  static_assert(Parts.resonators >= 0 && Parts.leaky >= 0,
+                "esokit: the number of parts must not be negative");
   static_assert(Parts.actuator == 0 && !Parts.plant_poles,
                 "esokit: actuator and poles of a LinearPlantModel are in its plant");
   static_assert(!Parts.follows_speed, "esokit: only an AugmentedModel follows a speed");

@@ -558,11 +558,11 @@ double bandwidth_for(const Function& rises, double wanted, double low, double hi
       .not_negative("settling_time", wish.settling_time)
       .not_negative("controller_bandwidth", wish.controller_bandwidth)
       .require(!(wish.settling_time > 0.0 && wish.control_noise > 0.0), "settling_time",
-               wish.settling_time, "must be left out where control_noise is given")
+               wish.settling_time, "must be left out if control_noise is given")
       .require(!(wish.controller_bandwidth > 0.0 &&
                  (wish.control_noise > 0.0 || wish.settling_time > 0.0)),
                "controller_bandwidth", wish.controller_bandwidth,
-               "must be left out where another wish is given")
+               "must be left out if control_noise or settling_time is given")
       .not_negative("modulus_margin", rules.modulus_margin)
       .require(!(rules.modulus_margin >= 1.0), "modulus_margin", rules.modulus_margin,
                "must be below 1")
@@ -595,9 +595,10 @@ double bandwidth_for(const Function& rises, double wanted, double low, double hi
                  {"settling_time", wish.settling_time,
                   "is less than this sample time and dead time allow, that is", -1, -settling(fast),
                   true})
-        .require(-settling(slow) >= wish.settling_time,
-                 {"settling_time", wish.settling_time, "is far slower than what disturbs; at most",
-                  -1, -settling(slow), true});
+        .require(
+            -settling(slow) >= wish.settling_time,
+            {"settling_time", wish.settling_time,
+             "is far slower than the disturbance; must be at most", -1, -settling(slow), true});
     if (!checks) return checks.error();
     w = detail::bandwidth_for(settling, -wish.settling_time, slow, fast);
   } else {
@@ -608,7 +609,7 @@ double bandwidth_for(const Function& rises, double wanted, double low, double hi
     if (wanted > 0.0) {
       checks.require(
           wanted > 1.001 * least,
-          {"control_noise", wanted, "is less than cancelling the disturbance alone takes, that is",
+          {"control_noise", wanted, "is less than needed to cancel the disturbance alone, that is",
            -1, least, true});
     } else {
       wanted = std::max(0.05 * (model.u_max - model.u_min), 2.0 * least);
