@@ -9,6 +9,8 @@
 #include <random>
 #include <vector>
 
+#include <esokit/control/adrc.hpp>
+#include <esokit/observer/linear_eso.hpp>
 #include <esokit/sim/gaussian.hpp>
 
 namespace identify_example {
@@ -33,8 +35,9 @@ struct RandomLog {
   std::vector<double> u, y;
 };
 
-/// Of a log: as it is, with a flexible mode, or with a reference that never moves.
-enum class Kind { plain, flexible, unexcited };
+/// Of a log: as it is, with a flexible mode, with a reference that never moves, or of a joint under
+/// gravity, which the model does not have.
+enum class Kind { plain, flexible, unexcited, joint };
 
 /// Same numbers with every standard library.
 class Random {
@@ -170,6 +173,90 @@ inline RandomLog random_log(std::uint64_t seed, Kind kind = Kind::plain, double 
       drift = drift_share * size;
       speed_scale = std::sqrt(speed_square / count);
       p.friction = friction;
+    }
+  }
+  return log;
+}
+
+/// A joint under gravity and ADRC for 12 s: one to three sines or steps of the reference.
+///
+///     y'' = b0 v - a y' - g sin(y + turned) - friction tanh(y' / v_s),   lag v' + v = u
+inline RandomLog random_joint(std::uint64_t seed, double duration = 12) {
+  Random random(seed);
+  esokit::sim::Gaussian gaussian(seed ^ 0x9e3779b97f4a7c15u);
+  constexpr double h = 1e-4, pi = 3.14159265358979323846;
+  RandomLog log;
+  Truth& p = log.truth;
+  p.input_gain = 1 / random.log_uniform(0.002, 2);  // over the moment of inertia, kg m2
+  p.lag = random.log_uniform(0.0003, 0.008);
+  p.pole = random.uniform(0, 3);
+  p.sample_time = 1e-3 * std::round(random.uniform(0.5, 4.499));
+  p.encoder = random.coin();
+  const double step = 2 * pi / std::round(std::exp2(random.uniform(12, 17)));
+  const double gravity = std::pow(random.uniform(1.5, 9), 2);  // a pendulum of 4.4 to 0.12 m
+  const double turned = random.coin() ? 0.0 : random.uniform(-pi, pi);
+  const double friction_share = random.uniform(0, 0.4);
+  const double wc = std::min(random.log_uniform(10, 40), 0.12 / (p.lag + p.sample_time));
+  const double wo = wc * random.uniform(3, 6);
+  const int sines = static_cast<int>(random.uniform(0, 4));  // 0: steps
+  const double hold = random.uniform(0.4, 2);
+  double frequency[3], phase[3], amplitude[3];
+  for (int i = 0; i < 3; ++i) {
+    frequency[i] = random.log_uniform(1, 0.7 * wc);
+    phase[i] = random.uniform(0, 2 * pi);
+    amplitude[i] = random.uniform(0.3, 1) * std::min(0.6, 2 / frequency[i]);
+  }
+  const auto rows = static_cast<std::size_t>(duration / p.sample_time);
+  const auto inner = static_cast<int>(std::lround(p.sample_time / h));
+  std::vector<double> reference(rows);
+  double level = 0, until = 0;
+  for (std::size_t k = 0; k < rows; ++k) {
+    const double t = static_cast<double>(k) * p.sample_time;
+    if (sines == 0) {
+      if (t >= until) {
+        level = random.uniform(-0.8, 0.8);
+        until = t + hold * random.uniform(0.5, 1.5);
+      }
+      reference[k] = level;
+    }
+    for (int i = 0; i < sines; ++i)
+      reference[k] += amplitude[i] * std::sin(frequency[i] * t + phase[i]);
+  }
+  std::vector<double> white(rows);
+  for (double& value : white) value = gaussian.next();
+  const double decay = 1 - std::exp(-h / p.lag);
+  double speed_scale = 1;
+  // Twice: without friction for the size of b0 u, then with it.
+  for (int pass = 0; pass < 2; ++pass) {
+    auto loop =
+        esokit::Adrc<esokit::LinearEso<2>>::make({.observer = {.observer_bandwidth = wo,
+                                                               .input_gain = p.input_gain,
+                                                               .sample_time = p.sample_time},
+                                                  .controller_bandwidth = wc})
+            .value();
+    log.u.assign(rows, 0);
+    log.y.assign(rows, 0);
+    double v = 0, x0 = 0, x1 = 0, input_square = 0, speed_square = 0, error = 0;
+    for (std::size_t k = 0; k < rows; ++k) {
+      const double y = p.encoder ? std::round(x0 / step) * step : x0 + 0.3 * step * white[k];
+      error += (y - x0) * (y - x0);
+      const double u = loop.update(y, reference[k]);
+      log.u[k] = u;
+      log.y[k] = y;
+      for (int i = 0; i < inner; ++i) {
+        v += decay * (u - v);
+        x1 += h * (p.input_gain * v - p.pole * x1 - gravity * std::sin(x0 + turned) -
+                   p.friction * std::tanh(x1 / (0.02 * speed_scale)));
+        x0 += h * x1;
+        input_square += p.input_gain * u * p.input_gain * u;
+        speed_square += x1 * x1;
+      }
+    }
+    const double count = static_cast<double>(rows) * inner;
+    p.noise = std::sqrt(error / static_cast<double>(rows));
+    if (pass == 0) {
+      p.friction = friction_share * std::sqrt(input_square / count);
+      speed_scale = std::sqrt(speed_square / count);
     }
   }
   return log;

@@ -33,6 +33,7 @@ struct Extra {
   double slope = 0;                 // of b0 along the scheduling column
   bool ramps = false;               // the disturbance has two integrators
   double step = 0;                  // of the encoder
+  double gravity = 0;               // times sin y
 };
 
 // y'' = b0 v(t - L) + friction + drift, P and D around it, steps of the reference.
@@ -64,7 +65,7 @@ Log closed_loop(double excitation, std::uint64_t seed = 3, int rows = 3000,
       sent.push_back(u);
       const double delayed = sent.size() > line ? sent[sent.size() - 1 - line] : 0.0;
       v = delayed + (v - delayed) * std::exp(-h / tau);
-      x1 += h * (gain * v - 2.0 * std::tanh(x1 / 0.05) + walk +
+      x1 += h * (gain * v - 2.0 * std::tanh(x1 / 0.05) - extra.gravity * std::sin(x0) + walk +
                  extra.swing * std::sin(extra.frequency * t));
       x0 += h * x1;
       t += h;
@@ -115,6 +116,41 @@ TEST(Identify, FindsTheModelThatMadeTheLog) {
   const auto wrong = found->plant<1>();
   ASSERT_FALSE(wrong);
   EXPECT_STREQ(wrong.error().field, "order");
+}
+
+// Gravity that the model does not have makes a plateau of a wrong b0: it has to be found, or said.
+TEST(Identify, AForceByPositionIsFoundOrMissed) {
+  Log log = closed_loop(0.5, 3, 3000, {.gravity = 30});
+  IdentifyOptions options = quick();
+  options.orders = {1, 2};
+  const auto found = esokit::identify(log, options);
+  ASSERT_TRUE(found) << found.error().field << " " << found.error().value;
+  EXPECT_TRUE(found->position);
+  ASSERT_EQ(found->orders.size(), 2u);
+  EXPECT_EQ(found->orders[0].model.order, 1);
+  EXPECT_EQ(found->orders[1].model.order, 2);
+  EXPECT_LT(std::abs(found->input_gain.value - b0), found->input_gain.half_width);
+  EXPECT_LT(found->position_shift, 1);
+
+  options = quick();
+  options.position = false;
+  const auto missed = esokit::study(log, options);
+  ASSERT_TRUE(missed);
+  EXPECT_FALSE(missed->position);
+  EXPECT_GT(std::abs(missed->input_gain.value - b0), 1.5 * missed->input_gain.half_width);
+  const auto refused = esokit::judge(*missed, log, options);
+  ASSERT_FALSE(refused);
+  EXPECT_STREQ(refused.error().field, "position_shift");
+
+  // As a column of one's own it is all there is.
+  log.columns.emplace_back();
+  for (const double y : log.y) log.columns[0].push_back(std::sin(y));
+  const auto known = esokit::study(log, quick());
+  ASSERT_TRUE(known);
+  EXPECT_FALSE(known->position);
+  EXPECT_LT(known->position_shift, 1);
+  EXPECT_LT(std::abs(known->input_gain.value - b0), known->input_gain.half_width);
+  EXPECT_LT(std::abs(known->columns[0].value + 30), known->columns[0].half_width);
 }
 
 std::string said(const esokit::Check<double>& check) {
@@ -387,6 +423,7 @@ TEST(Judge, RefusesByName) {
   good.own_input = 1.1e-5;
   good.correlation = 0.1;
   good.friction_shift = 3;
+  good.position_shift = 1.5;
   good.schedule_shift = 1;
   good.log.sample_time = T;
   good.log.jitter = 0.05 * T;
@@ -418,6 +455,10 @@ TEST(Judge, RefusesByName) {
       {&bad.schedule_shift, 1.01,
        "schedule: is the change of b0 along the scheduling column over its interval: ask for b0 "
        "over the column (scheduled = true), or record at one setting"},
+      {&bad.position_shift, 1.51,
+       "position_shift: is the change of b0 in half widths if a force depends on y, so gravity or "
+       "a spring is missing: add it as a column (sin y, y), or record motion with more "
+       "frequencies; must be at most"},
       {&bad.friction_shift, 3.01,
        "friction_shift: is the change of b0 between two scales of friction in standard errors: "
        "record faster motion; must be at most"},

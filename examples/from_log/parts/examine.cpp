@@ -78,6 +78,7 @@ std::vector<double> residual_of(const esokit::Identified& found, const esokit::F
       [&](const esokit::OrderFit& order) { return order.model.order == found.order; });
   esokit::FitData data = esokit::averaged(esokit::excerpt(rows, 60000), found.averaged);
   sample_time = data.sample_time;
+  if (found.position) esokit::detail::add_position(data);
   if (chosen.friction_scale > 0.0) {
     const auto speed =
         esokit::detail::friction_speed(data, found.order, chosen.fit.noise, chosen.fit.at.latency);

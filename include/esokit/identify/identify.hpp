@@ -19,7 +19,9 @@
 #include <esokit/observer/model_eso.hpp>
 #include <esokit/sim/gaussian.hpp>
 #include <functional>
+#include <iterator>
 #include <limits>
+#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -30,11 +32,14 @@ struct IdentifyOptions {
   std::vector<int> orders{1, 2, 3};  ///< the orders n to try
   bool friction = true;              ///< a column tanh(v / v_s) for orders 1 and 2
   bool pole = true;                  ///< whether to look for a pole of the plant
-  int extension = 0;                 ///< m: 1 or 2 integrators of the disturbance; 0: chosen
-  int sinusoids = 3;                 ///< largest number to look for in the disturbance
-  int schedule_bins = 4;             ///< ranges of the scheduling column, each with as many rows
-  int averaged = 0;                  ///< rows to average; 0: chosen from the innovations
-  std::size_t rows_max = 60000;      ///< rows used of a longer log, evenly spread
+
+  /// Columns y, y^2 and y^3 (gravity, springs) for orders 2 and 3 if they explain something.
+  bool position = true;
+  int extension = 0;             ///< m: 1 or 2 integrators of the disturbance; 0: chosen
+  int sinusoids = 3;             ///< largest number to look for in the disturbance
+  int schedule_bins = 4;         ///< ranges of the scheduling column, each with as many rows
+  int averaged = 0;              ///< rows to average; 0: chosen from the innovations
+  std::size_t rows_max = 60000;  ///< rows used of a longer log, evenly spread
 
   /// Whether u is what the actuator held. A command beyond the limits is not.
   bool applied = true;
@@ -44,6 +49,7 @@ struct IdentifyOptions {
   bool scheduled = false;        ///< b0 may depend on the scheduling column: `schedule` is wanted
   double friction_shift_max =
       3;  ///< most that b0 may differ between friction scales, standard errors
+  double position_shift_max = 1.5;  ///< most that a force by position may move b0, half widths
   std::function<void(double)> progress{};  ///< called with the finished share, 0 to 1
 };
 
@@ -87,6 +93,13 @@ struct Identified {
   double schedule_shift = 0;  ///< most that b0 differs along the column, over its interval
   double friction_shift =
       0;  ///< by how much b0 differs between friction scales, standard errors of b0
+
+  /// Whether y, y^2 and y^3 act as columns. The force is left to the disturbance by `plant`,
+  /// `model`.
+  bool position = false;
+
+  /// By how much b0 moves if they do (the next three powers, if these do), half widths of b0.
+  double position_shift = 0;
   double correlation = 0;          ///< of the innovations, largest over lags 1 to 20
   int averaged = 1;                ///< rows of the log that were averaged
   bool at_bound = false;           ///< a parameter came to the end of its range at the plateau
@@ -301,6 +314,25 @@ inline FitData with_friction(const FitData& data, const std::vector<double>& spe
   return out;
 }
 
+/// A force that depends on the position, as gravity and springs have it: y, y^2 and y^3 as columns.
+/// Where it is missing b0 is another one below the frequencies of the motion, at every bandwidth
+/// there: a plateau of a wrong b0.
+constexpr std::size_t position_columns = 3;
+inline void add_position(FitData& data, std::size_t from = 1) {
+  // As measured: smoothed it would differ from a column of the log by what y's noise is going to
+  // be.
+  std::vector<double> y = data.y;
+  double mean = 0.0;
+  for (const double value : y) mean += value / static_cast<double>(y.size());
+  for (double& value : y) value -= mean;
+  const double size = rms(y);
+  std::vector<double> column(y.size(), 1.0);
+  for (std::size_t power = 1; power < from + position_columns; ++power) {
+    for (std::size_t k = 0; k < y.size(); ++k) column[k] *= size > 0.0 ? y[k] / size : 0.0;
+    if (power >= from) data.columns.push_back(column);
+  }
+}
+
 inline FitBounds fit_bounds(const FitData& data) {
   const double T = data.sample_time;
   const double duration = T * static_cast<double>(data.y.size());
@@ -334,6 +366,7 @@ inline Fit best_fit(InnovationsFit& fit, int starts = 3) {
   return best;
 }
 
+/// rows log(mean square) + parameters log(rows).
 inline double criterion(const Fit& fit, int parameters) {
   const double rows = static_cast<double>(fit.rows);
   return rows * std::log(fit.mean_square) + parameters * std::log(rows);
@@ -443,6 +476,23 @@ inline auto best_order(const std::vector<OrderFit>& orders) {
       std::min_element(orders.begin(), orders.end(),
                        [](const OrderFit& a, const OrderFit& b) { return a.slower < b.slower; });
   return slower->slower < likely->slower - 1.0 ? slower : likely;
+}
+
+/// Whether a force by position acts: the likelihood pays for it, or it leaves less than 1 / e of
+/// the mean square at a tenth of its bandwidth. At its own all that is slow is the disturbance's.
+inline bool position_acts(const FitData& data, const OrderFit& order) {
+  FitData more = data;
+  add_position(more);
+  const FitData used = with_friction(more, order);
+  InnovationsFit fit(used, order.model, fit_bounds(data));
+  const Fit found = fit.minimise(order.fit.at, true, 8);
+  if (criterion(found, static_cast<int>(position_columns)) < criterion(order.fit, 0)) return true;
+  const FitData before = with_friction(data, order);
+  InnovationsFit without(before, order.model, fit_bounds(data));
+  FitPoint slower = order.fit.at;
+  slower.bandwidth *= 0.1;
+  const double left = without.minimise(slower, false, 8).mean_square;
+  return fit.minimise(slower, false, 8).mean_square < left / std::numbers::e;
 }
 
 /// b0 in ranges of a scheduling column and along a straight line, at the plateau.
@@ -579,7 +629,7 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
   if (options.averaged > 0) folds = {options.averaged};
   FitData data;
   std::vector<double> schedule, frequencies;
-  std::vector<OrderFit> best_orders;
+  std::vector<OrderFit> best_orders, best_first;
   const OrderFit* best = nullptr;
   double best_correlation = std::numeric_limits<double>::infinity();
   Estimate raw_noise;
@@ -594,6 +644,26 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
     const double step = fold == 1 ? result.log.quantisation : 0.0;
     auto orders = detail::fit_orders(rows, options, step);
     auto winner = detail::best_order(orders);
+    bool position = false;
+    IdentifyOptions tried = options;
+    std::vector<OrderFit> first;  // fits of order 1, which has no position
+    if (options.position && winner->model.order > 1) {
+      // Where it is missing an order above can win: then the simplest says so.
+      const OrderFit* simplest = nullptr;
+      for (const OrderFit& order : orders) {
+        const int n = order.model.order;
+        if (n > 1 && (simplest == nullptr || n < simplest->model.order)) simplest = &order;
+      }
+      position = detail::position_acts(rows, *simplest);
+      if (position) {
+        std::copy_if(orders.begin(), orders.end(), std::back_inserter(first),
+                     [](const OrderFit& order) { return order.model.order == 1; });
+        detail::add_position(rows);
+        std::erase(tried.orders, 1);
+        orders = detail::fit_orders(rows, tried, step);
+        winner = detail::best_order(orders);
+      }
+    }
     const auto sines =
         detail::find_sines(detail::with_friction(rows, *winner), winner->model,
                            detail::fit_bounds(rows), winner->fit.at, options.sinusoids);
@@ -601,7 +671,7 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
       detail::add_sine(rows, winner->model.order, frequency);
     }
     if (!sines.empty()) {
-      orders = detail::fit_orders(rows, options, step);
+      orders = detail::fit_orders(rows, tried, step);
       winner = detail::best_order(orders);
     }
     const std::size_t index = static_cast<std::size_t>(winner - orders.begin());
@@ -611,10 +681,12 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
         winner->correlation < 0.5 * best_correlation) {
       best_correlation = winner->correlation;
       best_orders = std::move(orders);
+      best_first = std::move(first);
       best = &best_orders[index];
       data = std::move(rows);
       schedule = std::move(along);
       frequencies = sines;
+      result.position = position;
       result.averaged = fold;
     }
     if (options.progress) options.progress(0.1 * fold / 16 + 0.3);
@@ -622,7 +694,8 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
   }
   if (best == nullptr)
     return E{"averaged", static_cast<double>(options.averaged), "leaves fewer than 200 rows"};
-  result.orders = best_orders;
+  result.orders = best_first;
+  result.orders.insert(result.orders.end(), best_orders.begin(), best_orders.end());
   const OrderFit chosen = *best;
   result.order = chosen.model.order;
   result.correlation = chosen.correlation;
@@ -702,6 +775,15 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
     }
     friction_spread = high - low;
   }
+  // A force by position where none was found, or of higher powers than that.
+  double position_spread = 0.0;
+  if (model.order > 1) {
+    FitData other = used;
+    detail::add_position(other, result.position ? detail::position_columns + 1 : 1);
+    InnovationsFit varied(other, model, bounds);
+    const Fit found = varied.minimise(here.fit.at, false, 5);
+    position_spread = std::abs(found.linear[0] - here.fit.linear[0]);
+  }
   // The jackknife, and by how much the number depends on the bandwidth: between the neighbours, and
   // over one and a half octaves to each side, where it is known well.
   const std::size_t first = plateau.middle - std::min<std::size_t>(plateau.middle, 3);
@@ -725,6 +807,7 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
   result.input_gain =
       estimate([](const PlateauPoint& p) { return p.fit.linear[0]; },
                [](const PlateauPoint& p) { return p.errors.linear[0]; }, 0.25 * friction_spread);
+  result.position_shift = position_spread / result.input_gain.half_width;
   // A standard error is half of a half width.
   result.friction_shift = 2.0 * friction_spread / result.input_gain.half_width;
   // Times below a twentieth of a row are all the same to the fit.
@@ -750,7 +833,9 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
   for (std::size_t i = 0; i < frequencies.size(); ++i) {
     FitData rest = used;
     const auto pair =
-        rest.columns.begin() + static_cast<std::ptrdiff_t>(log.columns.size() + 2 * i);
+        rest.columns.begin() +
+        static_cast<std::ptrdiff_t>(log.columns.size() +
+                                    (result.position ? detail::position_columns : 0) + 2 * i);
     rest.columns.erase(pair, pair + 2);
     Sinusoid sine = detail::fit_sine(rest, model, bounds, here.fit.at, frequencies[i]).sine;
     sine.frequency.half_width *= t;
@@ -808,6 +893,12 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
   rules.require(options.scheduled || found.schedule_shift <= 1.0, "schedule", found.schedule_shift,
                 "is the change of b0 along the scheduling column over its interval: ask for b0 "
                 "over the column (scheduled = true), or record at one setting");
+  rules.require(found.position_shift <= options.position_shift_max,
+                {"position_shift", found.position_shift,
+                 "is the change of b0 in half widths if a force depends on y, so gravity or a "
+                 "spring is missing: add it as a column (sin y, y), or record motion with more "
+                 "frequencies; must be at most",
+                 -1, options.position_shift_max, true});
   rules.require(found.friction_shift <= options.friction_shift_max,
                 {"friction_shift", found.friction_shift,
                  "is the change of b0 between two scales of friction in standard errors: record "
