@@ -27,39 +27,39 @@ namespace {
 
 constexpr const char* usage = R"(usage: from_log FILE.csv [options]
        from_log [--out DIR] [--data DIR]
-Writes FILE.html (FILE-2.html, .. if that is there) and prints its path.
+Writes FILE.html (or FILE-2.html, .. if it exists) and prints its path.
 
 columns, by the header's name, by the end of a name (position of /joint1/position) or by number:
-  --time COLUMN       stamps: s, ms, us, ns, since 1970 or not, with jitter, with rows missing
+  --time COLUMN       stamps: s, ms, us, ns, any origin; jitter and missing rows are allowed
   --u COLUMN          input; held from its row to the next
   --y COLUMN          output
-  --known COLUMN      what else acts where the disturbance acts; may be said several times
-                      left out: found by usual names (t, time, stamp; u, torque, effort, pwm; y,
+  --known COLUMN      a known effect that acts where the disturbance acts; may be repeated
+                      default: columns with usual names (t, time, stamp; u, torque, effort, pwm; y,
                       position, angle, ..)
-  --time-unit UNIT    s, ms, us, ns (default: found out)
-  --sample-time S     seconds between rows, where there is no time
-  --separator C       one character, or the word tab (default: found out)
+  --time-unit UNIT    s, ms, us, ns (default: detected)
+  --sample-time S     seconds between rows, if there is no time column
+  --separator C       one character, or the word tab (default: detected)
 the machine:
-  --order N           integrations from u to y, 1 to 3 (default: found out)
-  --limits LOW,HIGH   of u, in the unit of the log (default: what the log has)
-  --b0 B              as you believe it to be: an alarm if the log says otherwise
-the wish, one of:
+  --order N           integrations from u to y, 1 to 3 (default: identified)
+  --limits LOW,HIGH   of u, in the unit of the log (default: the range of u in the log)
+  --b0 B              the value that you expect: an alarm if the log shows another one
+the requirement, one of:
   --noise PERCENT     standard deviation of u that noise may cause, % of its range (default 5)
-  --settling S        of a step of the reference
+  --settling S        settling time of a step of the reference, s
   --omega-c W         controller bandwidth, rad/s
-an observer of your own in the place of all that (the page, and its estimates as CSV):
+an observer of your own choice instead (the page, and its estimates as CSV):
   --observer NAME     linear, half-gain, reduced, cascade, algebraic, adjustable, nonlinear
   --bandwidth W       omega_o, rad/s; --order and --b0 too
 other:
-  --rank K            the design of that rank in the place of the best
-  --anyway            a design for a refused log, too
-  --no-design         what was found alone
-  --out DIR           where the page goes (default: here)
+  --rank K            the design of this rank instead of the best
+  --anyway            a design even for a refused log
+  --no-design         only the model
+  --out DIR           folder for the page (default: here)
 Without a file: the measured sets below --data (default: ../shared/data beside the repository).
 
 exit codes: 0 page with a design; 1 page not written; 2 file or options not understood; 3 log
-refused: the page says what was seen and what to record instead; 4 page with an alarm, or no
-design that keeps the margins
+refused: the page says what was found and what to record instead; 4 page with an alarm, or no
+design keeps the margins
 )";
 
 double number(const std::string& option, const std::string& text) {
