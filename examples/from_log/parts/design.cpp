@@ -256,10 +256,11 @@ Design Design::make(const Settings& settings, const Input&, const Findings& find
   design.tuning_ = *tuning;
   const auto rank = static_cast<std::size_t>(settings.rank - 1);
   if (rank >= tuning->designs.size() || !tuning->designs[rank].feasible) {
-    design.why_not_ = rank == 0 ? "No family keeps the margins; the table says which it misses. "
-                                  "Wish for less: --noise, --settling, --omega-c."
-                                : "There is no design of rank " + std::to_string(settings.rank) +
-                                      " that keeps the margins.";
+    design.why_not_ = rank == 0
+                          ? "No family keeps the margins; the table says which margin each one "
+                            "misses. Relax the requirement: --noise, --settling, --omega-c."
+                          : "There is no design of rank " + std::to_string(settings.rank) +
+                                " that keeps the margins.";
     return design;
   }
   design.taken_ = rank;
@@ -278,13 +279,13 @@ Design Design::make(const Settings& settings, const Input&, const Findings& find
           number_text(0.1 * range * taken.load_peak, 3) + "; noise moves u by " +
           percent(taken.control_noise / range) + " of its range.",
       "Modulus margin " + number_text(taken.modulus_margin, 2) + ", " +
-          number_text(1e3 * taken.delay_margin, 3) + " ms of delay may be added; y and u come to " +
-          number_text(taken.excess, 3) +
-          " times what the best linear controller without margins does."};
+          number_text(1e3 * taken.delay_margin, 3) +
+          " ms of delay may be added; deviations of y and u are " + number_text(taken.excess, 3) +
+          " times those of the best linear controller without margins."};
   if (!settings.limits) {
-    design.summary_.push_back("Its limits are those of u in the log, " +
+    design.summary_.push_back("Its limits are the range of u in the log, " +
                               number_text(limits.first, 4) + " to " +
-                              number_text(limits.second, 4) + ": --limits says others.");
+                              number_text(limits.second, 4) + ": set others with --limits.");
   }
   const LinearController form = design.form();
   design.replay_ = through(form, found.input_gain.value, found.order, findings.rows);
@@ -310,9 +311,9 @@ namespace {
 Figure tradeoff_figure(const esokit::Tuning& tuning, std::size_t taken) {
   Figure figure("tradeoff", {.rows = 1, .columns = 1, .panel_height = 260});
   figure.caption(
-      "Each number is a design of the table below. Right: more noise in u. Up: y is off by more, "
-      "for noise and disturbance together. The curve is the best that any linear controller can "
-      "do, without a margin to keep; the square is the design that was taken.");
+      "Each number is a design of the table below. Further right: more noise in u. Further up: "
+      "larger deviations of y by noise and disturbance together. The curve is the best possible "
+      "linear controller without margins; the square is the chosen design.");
   const esokit::TuneModel& model = tuning.model;
   const double range = model.u_max - model.u_min;
   const int n = model.order;
@@ -388,9 +389,9 @@ void Design::show_on(Page& page, const Settings& settings, const Findings& findi
     page.heading("Which observer");
     page.figure(tradeoff_figure(*tuning_, taken_));
     page.table("observers",
-               "The families, each at its best for this wish, by what they make of y and u "
-               "together (sqrt(J / J*); within 1 % the one that costs less comes first). "
-               "Instructions of an update on a Cortex-M4F in float. --rank takes another one",
+               "The families, each tuned for this requirement, ranked by the deviations of y and u "
+               "together (sqrt(J / J*); within 1 % the cheaper one comes first). Instructions of "
+               "an update on a Cortex-M4F in float. --rank takes another one",
                ranking(*tuning_));
   }
   if (!made()) {
@@ -418,14 +419,13 @@ void Design::show_on(Page& page, const Settings& settings, const Findings& findi
     phase.push_back(degrees);
   }
   const auto margins = esokit::margins(*loop_).value();
-  loop.caption(
-      "Left: loop gain with the machine that was found; phase margin " +
-      number_text(margins.phase.value * 180 / std::numbers::pi, 3) + "°, gain margin " +
-      number_text(margins.gain_increase.value, 3) + ", modulus margin " +
-      number_text(margins.modulus.value, 2) +
-      " (dashed: where L is one, where it is at -180°). "
-      "Middle and right: a step of the reference, and a load that a tenth of the range of u "
-      "balances; as long as u is within its limits.");
+  loop.caption("Left: loop gain with the identified machine; phase margin " +
+               number_text(margins.phase.value * 180 / std::numbers::pi, 3) + "°, gain margin " +
+               number_text(margins.gain_increase.value, 3) + ", modulus margin " +
+               number_text(margins.modulus.value, 2) +
+               " (dashed: frequencies where abs(L) is one and where the phase is -180°). Middle "
+               "and right: a step of the reference, and a load that a tenth of the range of u "
+               "balances, while u is within its limits.");
   double peak = 0.0;
   const auto bode = [&](Panel& panel) {
     if (margins.phase.limited()) panel.vertical_line(margins.phase.frequency);
@@ -456,17 +456,17 @@ void Design::show_on(Page& page, const Settings& settings, const Findings& findi
   for (const double u : step.control[0]) peak = std::max(peak, std::abs(u));
   page.text("A step of the reference above " + number_text(0.5 * range / peak, 2) +
             " takes u to its limits" +
-            (found.order == 2 ? ": give larger ones through the profile below, which asks for no "
-                                "more than half of what u can do."
+            (found.order == 2 ? ": pass larger steps through the profile below, which needs at "
+                                "most half of the range of u."
                               : "."));
 
   page.heading("The log through this observer");
   Figure replay("replay", {.rows = 3, .columns = 1, .panel_height = 150});
   replay.caption(
-      "Above: y and its estimate. Middle: u, and the disturbance in units of u. Below: what the "
-      "observer had not expected; " +
+      "Above: y and its estimate. Middle: u, and the disturbance in units of u. Below: the "
+      "innovation; " +
       number_text(100 * replay_.inside, 3) +
-      " % lie within the dashed lines, 95 % would if the machine were the model.");
+      " % lie within the dashed lines, 95 % if the machine equals the model.");
   const auto& t = replay_.t;
   replay.panel(0, 0)
       .y_label("y")

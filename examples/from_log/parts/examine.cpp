@@ -100,7 +100,7 @@ std::string usual_factor(double ratio) {
                            {6.28319, "turns and radians"},
                            {1000, "a thousand: milli"},
                            {100, "percent and shares, or centi"},
-                           {10, "a decimal that slipped"},
+                           {10, "a misplaced decimal point"},
                            {9.80665, "kg and N"},
                            {60, "minutes and seconds"}};
   const double size = ratio > 1 ? ratio : 1 / ratio;
@@ -125,8 +125,8 @@ void sound_alarms(const Settings& settings, const Input& input, Findings& all) {
           {"u-unit", "u of the log (" + input.u + ") reaches " + number_text(ours, 4) +
                          ", the limits that you gave " + number_text(told, 4) +
                          usual_factor(ours / told) +
-                         ": the log and the controller count u in different units, or these are "
-                         "not the limits. b0 below is for u as it is in the log."});
+                         ": log and controller use different units of u, or these are not the "
+                         "limits. b0 below is for the unit of the log."});
     }
   }
   const double q = found.log.quantisation;
@@ -135,10 +135,10 @@ void sound_alarms(const Settings& settings, const Input& input, Findings& all) {
     const double levels = (*high - *low) / q;
     if (levels < 10) {
       all.alarms.push_back(
-          {"quantised", "y (" + input.y + ") comes in steps of " + number_text(q, 3) +
-                            " and moves by " + number_text(levels, 3) +
-                            " of them: nothing of how it moves is left. Record larger motion, or "
-                            "with more digits."});
+          {"quantised",
+           "y (" + input.y + ") comes in steps of " + number_text(q, 3) + " and moves by " +
+               number_text(levels, 3) +
+               " of them: too few to see its motion. Record larger motion, or with more digits."});
     }
   }
   // Of a log that does not tell b0 its sign means nothing.
@@ -152,9 +152,8 @@ void sound_alarms(const Settings& settings, const Input& input, Findings& all) {
          "b0 is " + number_text(b0, 3) + ": where u rises, y falls" +
              std::string(settings.expected_gain ? ", and you expect " : "") +
              (settings.expected_gain ? number_text(expected, 3) : "") +
-             ". With the wrong sign no controller is stable: look at the sign of u and y "
-             "where they are recorded and where the controller will write. If it is so, say "
-             "--b0 " +
+             ". With the wrong sign no controller is stable: check the sign of u and y where they "
+             "are recorded and where the controller will write. If the sign is right, use --b0 " +
              number_text(b0, 3) + "."});
   }
   const double size = std::abs(ratio);
@@ -163,7 +162,7 @@ void sound_alarms(const Settings& settings, const Input& input, Findings& all) {
         {"b0", "b0 is " + number_text(b0, 3) + ", " + number_text(size > 1 ? size : 1 / size, 3) +
                    " times " + (size > 1 ? "more" : "less") + " than the " +
                    number_text(expected, 3) + " that you expect" + usual_factor(size) +
-                   ": another unit of u, y or time, a gear, or a scale that is wrong."});
+                   ": check the units of u, y and time, the gear, and the scales."});
   }
 }
 

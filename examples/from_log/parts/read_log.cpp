@@ -52,7 +52,7 @@ std::string guess(const LogFile& file, const char* option, const std::string& gi
     there += (there.empty() ? "" : ", ") + name;
   }
   if (there.empty()) there = "numbers 1 to " + std::to_string(file.columns());
-  throw LogError("which column is " + std::string(option) + "? Say --" + option +
+  throw LogError("which column is " + std::string(option) + "? Use --" + option +
                  " COLUMN; there are " + there);
 }
 
@@ -93,9 +93,10 @@ double find_unit(const Settings& settings, Input& input, double first, double st
   const bool minutes = std::abs(T / 60 - std::round(T / 60)) < 1e-6;
   if (T < 50.0 || minutes) {
     if (T < 2e-6) {
-      input.alarms.push_back({"time-unit", "A step of the time column " + input.time +
-                                               " would be " + number_text(T, 3) +
-                                               " s: its unit is another one. Say --time-unit."});
+      input.alarms.push_back(
+          {"time-unit", "A step of the time column " + input.time + " would be " +
+                            number_text(T, 3) +
+                            " s, so its unit is a different one. Set --time-unit."});
     }
     return read;
   }
@@ -104,8 +105,8 @@ double find_unit(const Settings& settings, Input& input, double first, double st
       {"time-unit", "Read as seconds, a step of the time column " + input.time + " would be " +
                         number_text(T, 4) + " s. It was read as " + unit_name(guessed) +
                         ", T = " + number_text(step * guessed, 4) +
-                        " s; every number in time hangs on this. Say --time-unit " +
-                        unit_name(guessed) + ", or --time-unit s if it is true."});
+                        " s. All times depend on this. Confirm with --time-unit " +
+                        unit_name(guessed) + ", or use --time-unit s if seconds are right."});
   return guessed;
 }
 
@@ -218,18 +219,17 @@ Input read_log(const Settings& settings) {
   for (double& stamp : stamps) stamp = (stamp - first) * unit;
   input.log.time = std::move(stamps);
   if (merged) merge(input);
-  if (input.log.time.size() < 2) throw LogError(settings.file + ": a log of one sample");
+  if (input.log.time.size() < 2) throw LogError(settings.file + ": the log has only one sample");
   // A gap is bridged or cut out; one so long is a clock that was set, or two recordings.
   const double T = esokit::examples::median_step(input.log.time);
   for (std::size_t k = 1; k < input.log.time.size(); ++k) {
     const double jump = input.log.time[k] - input.log.time[k - 1];
     if (jump <= 50.0 * T) continue;
-    input.alarms.push_back(
-        {"time-jump",
-         "Time jumps by " + number_text(jump, 4) + " s at line " + std::to_string(input.line[k]) +
-             " (a step is " + number_text(T, 3) +
-             " s): a clock that was set, or two recordings in one file. What is before "
-             "and what is after is looked at apart."});
+    input.alarms.push_back({"time-jump", "Time jumps by " + number_text(jump, 4) + " s at line " +
+                                             std::to_string(input.line[k]) + " (a step is " +
+                                             number_text(T, 3) +
+                                             " s): the clock was set, or two recordings are in one "
+                                             "file. The parts are treated separately."});
     break;
   }
   return input;

@@ -26,24 +26,26 @@ std::string with_interval(const esokit::Estimate& estimate, double unit = 1.0) {
 std::string advice(const std::string& field) {
   static const std::map<std::string, const char*> all = {
       {"own_input",
-       "u follows from y alone: the loop runs and its reference stands still. Let the reference "
-       "step every few settling times, by as much as the machine may move, and log again; the "
-       "controller may stay as it is."},
+       "u depends on y alone: the loop is closed and its reference does not move. Let the "
+       "reference step every few settling times, by as much as the machine may move, and log "
+       "again. Keep the controller as it is."},
       {"excitation",
-       "u hardly shows in y. Step the reference (or u itself) up and down by a tenth of its range, "
-       "ten times or more, with pauses as long as the machine needs to settle; or sweep it slowly "
-       "up to the frequency that the controller is to reach."},
+       "u hardly moves y. Step the reference (or u itself) up and down by a tenth of its range, "
+       "ten times or more, with pauses in which the machine settles; or sweep it slowly up to the "
+       "frequency that the controller should reach."},
       {"correlation",
-       "The machine is more than a chain of integrators with a lag: something swings, y is "
-       "filtered, or u is not what the actuator held. Log the applied u, y before its filters, and "
-       "what is known to act (--known COLUMN); take what swings off, or log below its frequency."},
+       "The machine has more than a chain of integrators with a lag: something swings, y is "
+       "filtered, or u is not the u that the actuator held. Log the applied u, y before its "
+       "filters, and known effects (--known COLUMN). Remove loads that swing, or log motion below "
+       "their frequency."},
       {"plateau",
-       "b0 depends on the frequency at which it is looked at. Log motion in the band that the "
-       "controller will use: faster steps, or a sweep."},
+       "b0 depends on the frequency. Log motion in the band of the controller: faster steps, or a "
+       "sweep."},
       {"interval", "Log twice as long or with twice the steps: the interval shrinks with both."},
-      {"latency", "u changes too slowly to tell lag and dead time: steps instead of ramps."},
+      {"latency", "u changes too slowly to find lag and dead time: use steps instead of ramps."},
       {"friction_shift",
-       "Friction and b0 are told apart by motion well above the speed at which it sticks."},
+       "Friction and b0 can only be separated by motion well above the speed at which the machine "
+       "sticks."},
       {"saturated", "Log the u that the actuator really held."},
       {"rows", "At least 200 rows without a gap; better 20 s at the rate of the controller."},
       {"u", "Log the input while it moves."},
@@ -56,8 +58,7 @@ std::string advice(const std::string& field) {
 Figure log_figure(const Input& input, const Findings& findings) {
   Figure figure("log", {.rows = 2, .columns = 2, .panel_height = 160});
   figure.caption("The log (" + input.y + ", " + input.u +
-                 ") and its spectra. What the controller is to do has to be in the band where u "
-                 "moves y.");
+                 ") and its spectra. The controller has to work in the band where u moves y.");
   std::vector<double> t = input.log.time;
   if (t.empty()) {
     for (std::size_t k = 0; k < input.log.y.size(); ++k)
@@ -85,11 +86,10 @@ Figure model_figure(const Findings& findings) {
   const esokit::Identified& found = findings.found;
   Figure figure("model", {.rows = 1, .columns = 3, .panel_height = 180});
   figure.caption(
-      "Left: b0 over the bandwidth at which it is looked at, with two standard errors; dashed "
-      "where "
-      "it was read. Flat is good. Middle: what the model does not explain, correlated with itself; "
-      "white noise stays between the dashed lines, above the dotted one the log is refused. Right: "
-      "its spectrum; a peak is something that swings.");
+      "Left: b0 over the bandwidth, with two standard errors; dashed where it was read. Flat is "
+      "good. Middle: correlation of the residual; white noise stays between the dashed lines, and "
+      "above the dotted line the log is refused. Right: spectrum of the residual; a peak is "
+      "something that swings.");
   const auto& points = found.plateau.points;
   if (points.size() >= 3 && found.plateau.middle > 0) {
     std::vector<double> w, b0, low, high;
@@ -158,10 +158,11 @@ std::vector<CsvRow> model_table(const Findings& findings) {
                   "what one unit of u adds to " + highest});
   if (found.plateau.middle == 0) return rows;
   rows.push_back({"lag", with_interval(found.lag, 1e3), "ms", "of the actuator, first order"});
-  rows.push_back({"dead time", with_interval(found.dead_time, 1e3), "ms", "until u acts at all"});
+  rows.push_back(
+      {"dead time", with_interval(found.dead_time, 1e3), "ms", "until u has any effect"});
   rows.push_back({"lag and dead time", with_interval(found.latency, 1e3), "ms",
-                  "their sum is known better than each"});
-  rows.push_back({"pole", with_interval(found.pole), "1/s", "how fast motion dies by itself"});
+                  "the sum is known better than its parts"});
+  rows.push_back({"pole", with_interval(found.pole), "1/s", "decay rate of free motion"});
   rows.push_back({"friction", with_interval(found.friction), "[" + highest + "]", "Coulomb"});
   for (std::size_t c = 0; c < found.columns.size(); ++c) {
     rows.push_back({"known column " + std::to_string(c + 1), with_interval(found.columns[c]),
@@ -169,13 +170,13 @@ std::vector<CsvRow> model_table(const Findings& findings) {
   }
   rows.push_back({"noise", with_interval(found.noise), "[y]", "standard deviation of y"});
   rows.push_back({"disturbance", number_text(found.disturbance, 3), "[" + highest + "]² / s",
-                  "what a random walk of d gains in variance"});
+                  "growth of the variance of d, as a random walk"});
   rows.push_back(
       {"plateau", number_text(100 * found.plateau.spread, 3) + " %",
        number_text(found.plateau.from, 3) + " to " + number_text(found.plateau.to, 3) + " rad/s",
-       "spread of b0 where it was read; where it stays within 10 %"});
+       "spread of b0 where it was read; range in which it stays within 10 %"});
   rows.push_back({"residual", number_text(found.correlation, 2), "0.1 at most",
-                  "largest correlation with itself: 0 if the model is all"});
+                  "largest correlation: 0 if the model explains everything"});
   return rows;
 }
 
@@ -185,14 +186,14 @@ std::vector<CsvRow> log_table(const Input& input, const Findings& findings) {
   rows.push_back({"y", input.y, ""});
   rows.push_back({"u", input.u, "held from its row to the next"});
   rows.push_back({"time", input.time.empty() ? "none" : input.time,
-                  input.time.empty() ? "equal steps, as told"
+                  input.time.empty() ? "equal steps, by --sample-time"
                   : input.unit_assumed
-                      ? "read in " + input.time_unit + ": nothing says so (--time-unit)"
+                      ? "read in " + input.time_unit + ": this is a guess (--time-unit)"
                       : "read in " + input.time_unit});
   rows.push_back({"rows", std::to_string(log.rows),
-                  input.merged ? "topics with stamps of their own; a row "
-                                 "for each y, u averaged between them"
-                               : ""});
+                  input.merged
+                      ? "topics with their own stamps: a row for each y, u averaged in between"
+                      : ""});
   if (input.cut) rows.push_back({"last line", "cut", "left out"});
   rows.push_back({"sample time", number_text(1e3 * log.sample_time, 5) + " ms",
                   "jitter " + number_text(1e3 * log.jitter, 3) + " ms"});
@@ -237,18 +238,17 @@ Page show(const Settings& settings, const Input& input, const Findings& findings
   if (!findings.alarms.empty()) {
     std::vector<std::string> lines;
     for (const Alarm& alarm : findings.alarms) lines.push_back(alarm.name + ": " + alarm.text);
-    page.box("Alarm: look at this before anything is pasted", lines, true);
+    page.box("Alarm: check this before you paste anything", lines, true);
   }
   if (findings.refusal) {
     std::vector<std::string> lines{esokit::to_text(*findings.refusal)};
     if (const auto more = advice(findings.refusal->field); !more.empty()) lines.push_back(more);
-    if (findings.seen)
-      lines.push_back("The numbers below are what was seen. They are no model to build on.");
-    page.box("Refused: this log does not tell what a controller needs. What to record instead",
+    if (findings.seen) lines.push_back("The numbers below are not reliable enough for a design.");
+    page.box("Refused: this log is not enough to design a controller. What to record instead",
              lines, true);
   }
   if (design.made() || (settings.no_design && findings.seen)) {
-    page.box(findings.refusal ? "In short, as if the numbers could be trusted" : "In short",
+    page.box(findings.refusal ? "In short, if the numbers could be trusted" : "In short",
              in_short(findings, design), false);
   }
   page.heading("The log");
@@ -258,7 +258,7 @@ Page show(const Settings& settings, const Input& input, const Findings& findings
     page.heading(findings.refusal ? "What was seen" : "What was found");
     page.text(
         "A chain of integrators behind a lag and a dead time, with a pole, friction and a "
-        "disturbance that walks; intervals are 95 %.");
+        "random-walk disturbance; intervals are 95 %.");
     page.table("model", "The machine", model_table(findings));
     if (!findings.residual_correlation.empty()) page.figure(model_figure(findings));
   }
@@ -299,12 +299,13 @@ std::string show_observer(const Settings& settings, const Input& input) {
   page.text("Observer " + how.observer + ", order " + std::to_string(how.order) + ", b0 = " +
             number_text(how.input_gain, 6) + ", omega_o = " + number_text(how.bandwidth, 6) +
             " rad/s, T = " + number_text(how.sample_time, 6) + " s. Gains follow the time stamps.");
-  page.table("log", "The log",
-             {{"", "rows"},
-              {"in the log", std::to_string(t.size())},
-              {"measurements missing or bad, predicted over", std::to_string(found.rejected)},
-              {"inputs missing or bad, the one before taken", std::to_string(found.inputs)},
-              {"gaps too long to bridge, restarts", std::to_string(found.restarts)}});
+  page.table(
+      "log", "The log",
+      {{"", "rows"},
+       {"in the log", std::to_string(t.size())},
+       {"measurements missing or bad, bridged by prediction", std::to_string(found.rejected)},
+       {"inputs missing or bad, replaced by the one before", std::to_string(found.inputs)},
+       {"gaps too long to bridge, restarts", std::to_string(found.restarts)}});
   Figure figure("estimates", {.rows = 2, .panel_height = 170});
   figure.caption("Above: y and its estimate. Below: u, and the total disturbance in units of u.");
   figure.panel(0, 0)
