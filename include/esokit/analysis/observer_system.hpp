@@ -15,7 +15,6 @@
 #include <esokit/model/integrator_chain.hpp>
 #include <esokit/model/sampled_model.hpp>
 #include <esokit/observer/concepts.hpp>
-#include <vector>
 
 namespace esokit {
 
@@ -185,26 +184,27 @@ struct ObserverParts {
   const int* state_of_row;
 };
 
-/// ObserverMatrices of any size, into matrices that are zero.
+/// ObserverMatrices of any size, into matrices that are zero; `work` has two columns more than
+/// states.
 inline void put_together(const ObserverSizes& sizes, const ObserverParts& parts,
-                         DenseView<double> a, DenseView<double> by, DenseView<double> bu,
-                         DenseView<double> c, DenseView<double> dy) {
+                         DenseView<double> work, DenseView<double> a, DenseView<double> by,
+                         DenseView<double> bu, DenseView<double> c, DenseView<double> dy) {
   const auto [size, levels] = sizes;
   const int states = size * levels;
   // What a correction adds to the levels, as rows over the predicted states and y.
-  DynamicMatrix<double> added(states, states);
-  std::vector<double> added_y(static_cast<std::size_t>(states));
-  std::vector<double> measured(static_cast<std::size_t>(states));
+  const DenseView<double> added{work.data, states, states};
+  double* const added_y = &work(0, states);
+  double* const measured = &work(0, states + 1);
   double measured_y = 1.0;
   for (int level = 0; level < levels; ++level) {
     const int first = level * size;
     for (int r = 0; r < size; ++r) {
       const double gain = parts.gains[first + r];
       for (int j = 0; j < states; ++j) {
-        const double innovation = measured[static_cast<std::size_t>(j)] - (j == first ? 1.0 : 0.0);
+        const double innovation = measured[j] - (j == first ? 1.0 : 0.0);
         added(first + r, j) = gain * innovation;
       }
-      added_y[static_cast<std::size_t>(first + r)] = gain * measured_y;
+      added_y[first + r] = gain * measured_y;
     }
     if (level > 0) {  // what the levels before have found of the disturbance, too
       for (int r = 0; r < size; ++r) {
@@ -214,15 +214,14 @@ inline void put_together(const ObserverSizes& sizes, const ObserverParts& parts,
           for (int j = 0; j < states; ++j) {
             added(first + r, j) += share * added(first - size + q, j);
           }
-          added_y[static_cast<std::size_t>(first + r)] +=
-              share * added_y[static_cast<std::size_t>(first - size + q)];
+          added_y[first + r] += share * added_y[first - size + q];
         }
       }
     }
     for (int j = 0; j < states; ++j) {
-      measured[static_cast<std::size_t>(j)] = added(first, j) + (j == first ? 1.0 : 0.0);
+      measured[j] = added(first, j) + (j == first ? 1.0 : 0.0);
     }
-    measured_y = added_y[static_cast<std::size_t>(first)];
+    measured_y = added_y[first];
   }
 
   for (int row = 0; row < states; ++row) {
@@ -232,14 +231,14 @@ inline void put_together(const ObserverSizes& sizes, const ObserverParts& parts,
       const double weight = step + (k == row ? 1.0 : 0.0);
       for (int j = 0; j < states; ++j) a(row, j) += weight * added(k, j);
       a(row, k) += step;
-      by(row, 0) += weight * added_y[static_cast<std::size_t>(k)];
+      by(row, 0) += weight * added_y[k];
     }
     bu(row, 0) = parts.gamma(row - first, 0);
   }
   for (int r = 0; r < size; ++r) {
     const int row = states - size + parts.state_of_row[r];
     for (int j = 0; j < states; ++j) c(r, j) = added(row, j) + (j == row ? 1.0 : 0.0);
-    dy(r, 0) = added_y[static_cast<std::size_t>(row)];
+    dy(r, 0) = added_y[row];
   }
 }
 
@@ -267,6 +266,7 @@ MatricesOf<Observer> observer_matrices(const Observer& observer, double = 0.0) {
           static_cast<double>(observer.level_gain(level)[static_cast<std::size_t>(r)]);
     }
   }
+  EigenMatrix<double, states, states + 2> work = EigenMatrix<double, states, states + 2>::Zero();
   // A matrix of one column is stored by columns.
   put_together({size, Observer::levels},
                {{sampled.step.data(), size},
@@ -274,8 +274,8 @@ MatricesOf<Observer> observer_matrices(const Observer& observer, double = 0.0) {
                 {sampled.disturbance.data(), size},
                 gains.data(),
                 state_of.data()},
-               {m.a.data(), states}, {m.by.data(), states, 1}, {m.bu.data(), states, 1},
-               {m.c.data(), size, states}, {m.dy.data(), size, 1});
+               {work.data(), states, states + 2}, {m.a.data(), states}, {m.by.data(), states, 1},
+               {m.bu.data(), states, 1}, {m.c.data(), size, states}, {m.dy.data(), size, 1});
   return m;
 }
 

@@ -279,14 +279,15 @@ inline std::optional<LinearController> tuned_controller(const ObserverKind& kind
   form.y_to_estimate = DynamicMatrix<double>(kind.size, 1);
   form.sample_time = T;
   form.input_gain = kind.input_gain;
+  DynamicMatrix<double> work(states, states + 2);
   put_together({kind.size, kind.levels},
                {{kind.step.data(), kind.size},
                 {kind.gamma.data(), kind.size, 1},
                 {kind.disturbance.data(), kind.size},
                 gains.data(),
                 kind.state_of_row.data()},
-               form.a.view(), form.from_y.view(), form.from_u.view(), form.to_estimate.view(),
-               form.y_to_estimate.view());
+               work.view(), form.a.view(), form.from_y.view(), form.from_u.view(),
+               form.to_estimate.view(), form.y_to_estimate.view());
   return closed_upon_itself(feedback_of(form, law_weights(settings.gains, kind.input_gain), false));
 }
 
