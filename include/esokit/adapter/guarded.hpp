@@ -49,8 +49,7 @@ enum class DisturbanceUnit : unsigned char {
   input,   ///< unit of u: a bias of the actuator, which b0 multiplies
 };
 
-/// The end at which an actuator is that does not deliver what it is told, while its output is
-/// unknown.
+/// The end at which a saturated actuator is, if its output is unknown.
 enum class Pin : unsigned char {
   free,    ///< none: it delivers what the observer is told
   upper,   ///< at its upper end: a larger u has no effect
@@ -285,8 +284,8 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     constexpr S rounding = S(1) - S(8) * std::numeric_limits<S>::epsilon();
     return reaches(limit() * rounding);
   }
-  /// x - xhat in the steady state with constant y, for a constant d = 1 (unit of y^(n)): what the
-  /// leak costs, zero without it. N x 1, (y, .., d).
+  /// The steady error x - xhat that the leak causes, with constant y and a constant d = 1 (unit of
+  /// y^(n)); zero without a leak. N x 1, (y, .., d).
   [[nodiscard]] Estimate leak_error() const noexcept requires gates {
     if (!(leak_ > S(0))) return Estimate::Zero();
     const auto& model = detail::GuardAccess::innermost(observer_).model();
@@ -336,7 +335,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   [[nodiscard]] Estimate rest(const S& y, const S& u) const noexcept {
     return observer_.rest(y, S(u * gain_ratio_));
   }
-  /// As if `u` had been applied for long.
+  /// Sets the state as if `u` had been applied for a long time.
   void fill_input(const S& u) noexcept requires(observer_traits<Observer>.delays_input) {
     observer_.fill_input(S(u * gain_ratio_));
   }

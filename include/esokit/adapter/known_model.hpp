@@ -10,7 +10,8 @@
 
 namespace esokit {
 
-/// What a known model can do beside fbar: `static constexpr PlantModelTraits traits{..}` in it.
+/// What a known model can do beside fbar, declared in a member `static constexpr PlantModelTraits
+/// traits{..}`.
 struct PlantModelTraits {
   bool checks = false;  ///< `check() const` gives the error of a bad parameter, as a Check
 };
@@ -51,7 +52,7 @@ struct KnownModelConfig {
 ///
 /// The change of fbar within a step remains in dhat, O(T). Because fbar is computed from the
 /// estimate, it is part of the error dynamics: omega_o should be well above the slopes of fbar.
-/// @tparam Model a function fbar(estimate) of yours, for packs with `with_scalar` and `fields`
+/// @tparam Model your function fbar(estimate), for packs with `with_scalar` and `fields`
 template <ShiftableDisturbance Observer, class Model>
 requires PlantModel<Model, Observer>
 class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,

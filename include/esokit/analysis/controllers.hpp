@@ -33,8 +33,8 @@ template <class T>
 concept AnalysedObserver = detail::SaysObserver<T>;
 
 /// A controller that can be analysed: Adrc, PredictiveAdrc, DisturbanceCompensator with an observer
-/// that can, MimoAdrc, Incremental, ObserverWithLaw, Compensated, a LinearController, or a type of
-/// yours with a function `linear_controller` beside it.
+/// that can, MimoAdrc, Incremental, ObserverWithLaw, Compensated, a LinearController, or your own
+/// type with a function `linear_controller` beside it.
 template <class T>
 concept AnalysedController = detail::SaysController<T>;
 

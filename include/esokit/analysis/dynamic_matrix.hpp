@@ -1,6 +1,6 @@
 /// @file
-/// A small matrix whose size is known at run time only: what loops of a plant and a controller are
-/// put together in, so that their code is compiled once and not for each pair of sizes.
+/// A small matrix whose size is known only at run time. Loops of a plant and a controller are built
+/// with it, so that their code is compiled once and not for each pair of sizes.
 #pragma once
 
 #include <cassert>

@@ -1,6 +1,5 @@
 /// @file
-/// What a controller or an observer is as a linear system: the form in which the analysis takes
-/// them.
+/// Controllers and observers as linear systems, the form that the analysis uses.
 #pragma once
 
 #include <concepts>
@@ -11,17 +10,17 @@
 
 namespace esokit {
 
-/// A controller within its limits, q channels. Sampled (sample_time T > 0), with y[k], r[k], and u
-/// as it is held from k to k + 1, which the controller is told by the next sample:
+/// A controller within its limits, q channels. Sampled (sample_time T > 0), with y[k], r[k], and
+/// the u that is held from k to k + 1 and given to the controller at the next sample:
 ///
 ///     z[k+1] - z[k] = a z + from_y y + from_r r + from_u u
 ///     u[k] = to_u z + y_to_u y + r_to_u r
 ///     estimates[k] = to_estimate z + y_to_estimate y + r_to_estimate r
 ///
-/// Continuous (sample_time 0): z' in the place of the difference. The difference, and not z[k+1],
-/// as a slow controller has its digits there.
+/// Continuous (sample_time 0): z' instead of the difference. The difference is used and not z[k+1],
+/// because it keeps the digits of a slow controller.
 ///
-/// A controller of yours is analysed if a function `linear_controller(const Yours&)` beside it
+/// Your own controller can be analysed if a function `linear_controller(const Yours&)` beside it
 /// returns this, or Expected<LinearController, Error<double>>.
 struct LinearController {
   LinearController() = default;
@@ -61,7 +60,7 @@ struct LinearController {
   double input_gain = 0.0;              ///< b0, where it has one; else 0
 };
 
-/// An observer in its predicted state z, told the u that is held from now on:
+/// An observer in its predicted state z, with the u that is held from now on:
 ///
 ///     z[k+1] - z[k] = a z + from_y y + from_u u
 ///     zhat[k] = to_estimate z + y_to_estimate y

@@ -1,5 +1,5 @@
 /// @file
-/// The one form in which a finished design is analysed: a small state space of fixed size.
+/// The form in which all designs are analysed: a small state space of fixed size.
 #pragma once
 
 #include <cmath>
@@ -16,9 +16,9 @@ namespace esokit {
 /// D x = a x + b w, out = c x + d w. D is d/dt for a continuous system; for a sampled one it is the
 /// difference, D x = x[k+1] - x[k].
 ///
-/// A sampled system is thus kept as A - I: for small omega T that is where its dynamics are, and A
-/// itself would lose log10(1 / (omega T)) digits of them. Inputs and outputs are in physical units,
-/// always in double; the states may be scaled.
+/// A sampled system is thus kept as A - I: for small omega T this holds its dynamics, and A itself
+/// would lose log10(1 / (omega T)) digits of them. Inputs and outputs are in physical units, always
+/// in double; the states may be scaled.
 /// @tparam States, Inputs, Outputs sizes
 template <int States, int Inputs, int Outputs>
 struct LinearSystem {

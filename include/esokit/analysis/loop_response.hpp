@@ -1,5 +1,5 @@
 /// @file
-/// What a loop does after a step of the reference or of a load.
+/// Response of a loop to a step of the reference or of a load.
 #pragma once
 
 #include <esokit/analysis/loop.hpp>
@@ -7,7 +7,7 @@
 
 namespace esokit {
 
-/// Which step, and for how long it is looked at.
+/// The step and the duration of the response.
 struct LoopStep {
   double duration = 0.0;     ///< s, the last sample is at or before it
   int channel = 0;           ///< of r, or of d
@@ -15,7 +15,7 @@ struct LoopStep {
   double sample_time = 0.0;  ///< s, of a continuous loop; left out for a sampled one
 };
 
-/// A response at the sample times, from rest in zero; the step is there from t = 0 on.
+/// A response at the sample times, from rest in zero; the step is at t = 0.
 struct LoopResponse {
   std::vector<double> time;                    ///< s
   std::vector<std::vector<double>> output;     ///< y of each channel
@@ -86,7 +86,7 @@ inline Expected<LoopResponse, Error<double>> respond(const Loop& loop, const Loo
 
 }  // namespace detail
 
-/// Response to a step of a reference, which has no derivatives here.
+/// Response to a step of a reference, without its derivatives.
 /// @return error for a channel or a duration that cannot be
 inline Expected<LoopResponse, Error<double>> reference_response(const Loop& loop,
                                                                 const LoopStep& step) {
@@ -99,8 +99,7 @@ inline Expected<LoopResponse, Error<double>> load_response(const Loop& loop, con
   return detail::respond(loop, step, before + step.channel, loop.system().b.cols() - before);
 }
 
-/// Those of the loop of a plant and a controller, see `closed_loop`.
-/// @{
+/// The same for the loop of a plant and a controller, see `closed_loop`. @{
 template <int States, Scalar S, int Inputs, int Outputs, class Controller>
 Expected<LoopResponse, Error<double>> reference_response(
     const LinearPlant<States, S, Inputs, Outputs>& plant, const Controller& controller,

@@ -1,5 +1,6 @@
 /// @file
-/// Walks along a loop gain in steps so short that no crossing is missed; what margins are made of.
+/// Follows a loop gain over the frequency in steps so short that no crossing is missed, for the
+/// margins.
 #pragma once
 
 #include <algorithm>

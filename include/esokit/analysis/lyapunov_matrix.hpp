@@ -1,6 +1,6 @@
 /// @file
-/// Quadratic Lyapunov functions V = x' P x of one linear system, or of several at once: what the
-/// error bounds are made from.
+/// Quadratic Lyapunov functions V = x' P x of one linear system or common to several, for the error
+/// bounds.
 #pragma once
 
 #include <cmath>
@@ -140,8 +140,8 @@ Expected<LyapunovMatrix<Size>, Error<double>> lyapunov_matrix(
 }
 
 /// One P with A_i'P + P A_i <= -I for all given A_i, hence for every mixture and any switching
-/// between them; of all such P about the one with the least gamma * largest, to which the bounds on
-/// the error are proportional.
+/// between them. Among all such P it is about the one with the smallest gamma * largest, to which
+/// the bounds on the error are proportional.
 ///
 /// The inequalities are solved by the ellipsoid method: cuts along the eigenvectors that violate
 /// them, and along the gradient of the (quasi-convex) aim. Milliseconds for N = 3, a second for

@@ -1,6 +1,6 @@
 /// @file
-/// The largest output that a bounded input can bring about: what is true of a linear observer where
-/// a Lyapunov bound only promises.
+/// The largest output that a bounded input can cause: for a linear observer the true worst case,
+/// where a Lyapunov bound is only an upper bound.
 #pragma once
 
 #include <cmath>
@@ -72,8 +72,8 @@ inline Check<double> peak_gain(const SystemView& system, double abscissa, double
 }  // namespace detail
 
 /// Peak of each output for an input of size one, Outputs x Inputs: the sum (integral) of the
-/// magnitude of the impulse response. Sharp: some input of size one comes as near to it as you
-/// like.
+/// magnitude of the impulse response. This is sharp: inputs of size one come arbitrarily near to
+/// it.
 ///
 /// Sampled systems: to 1e-9, where the sum is broken off. Continuous ones: by the trapezoid rule,
 /// to about 1e-4.

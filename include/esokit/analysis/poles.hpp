@@ -61,8 +61,8 @@ EigenMatrix<std::complex<double>, States> poles(
   return values;
 }
 
-/// How far the worst pole is on the stable side: negative is stable. The largest real part (1/s),
-/// or for a sampled system the largest |z| - 1.
+/// Distance of the worst pole from the stability limit: negative is stable. The largest real part
+/// (1/s), or for a sampled system the largest |z| - 1.
 template <int States, int Inputs, int Outputs>
 double stability_abscissa(const LinearSystem<States, Inputs, Outputs>& system) {
   const auto values = poles(system);
@@ -75,8 +75,7 @@ double spectral_radius(const LinearSystem<States, Inputs, Outputs>& system) {
   return 1.0 + stability_abscissa(system);
 }
 
-/// Those of a system whose sizes are known at run time.
-/// @{
+/// The same for a system whose sizes are known at run time. @{
 inline std::vector<std::complex<double>> poles(const DynamicSystem& system) {
   return detail::poles_of(system.a);
 }

@@ -194,7 +194,7 @@ class ControlLoop {
   }
 
   /// The same if something other than u drives the observer's chain.
-  /// @param drive what stood in the place of u from k - 1 to k
+  /// @param drive the drive instead of u from k - 1 to k
   template <class Law>
   ESOKIT_INLINE S step_driven(S measured, S drive, Law&& law) noexcept {
     if (special_ != false) [[unlikely]] {

@@ -91,7 +91,7 @@ class DisturbanceCompensator {
   /// The same if something other than u drives the observer's equation. Use it from `make` on,
   /// without `start` and `track`, which assume that u is the drive. A missing measurement is a NaN
   /// here.
-  /// @param drive what stood in the place of u since the last sample, in units of y^(n) / b0
+  /// @param drive the drive instead of u since the last sample, in units of y^(n) / b0
   S update_driven(S y, S base_output, S drive) noexcept {
     return loop_.step_driven(y, drive, [&] { return base_output + unbounded_compensation(); });
   }

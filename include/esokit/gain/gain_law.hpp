@@ -113,36 +113,35 @@ concept Factored = requires(const Law& law, const S& e) {
 
 }  // namespace detail
 
-/// `advance()` is noexcept and declared by `traits.advances`; or there is none.
+/// `advance()` exists, noexcept, if and only if `traits.advances` declares it.
 template <class Law>
 concept AdvancesAsDeclared = detail::as_declared(gain_law_traits<Law>.advances,
                                                  detail::names_advance<Law>, detail::Advances<Law>);
 
-/// `accept(e)` is noexcept and declared by `traits.accepts`; or there is none.
+/// `accept(e)` exists, noexcept, if and only if `traits.accepts` declares it.
 template <class Law, class S>
 concept AcceptsAsDeclared = detail::as_declared(gain_law_traits<Law>.accepts,
                                                 detail::names_accept<Law>, detail::Accepts<Law, S>);
 
-/// `reset()` is noexcept and declared by `traits.resets`; or there is none.
+/// `reset()` exists, noexcept, if and only if `traits.resets` declares it.
 template <class Law>
 concept ResetsAsDeclared = detail::as_declared(gain_law_traits<Law>.resets,
                                                detail::names_reset<Law>, detail::Resets<Law>);
 
-/// `gap_gain(e, samples) const` is noexcept and declared by `traits.bridges_gaps`; or there is
-/// none.
+/// `gap_gain(e, samples) const` exists, noexcept, if and only if `traits.bridges_gaps` declares it.
 template <class Law, int Size, class S>
 concept BridgesGapsAsDeclared = detail::as_declared(gain_law_traits<Law>.bridges_gaps,
                                                     detail::names_gap_gain<Law>,
                                                     detail::BridgesGaps<Law, Size, S>);
 
-/// `gain_before_measurement() const` is noexcept and declared by `traits.kind`; or there is none.
+/// `gain_before_measurement() const` exists, noexcept, if and only if `traits.kind` declares it.
 template <class Law, int Size, class S>
 concept PresetAsDeclared = detail::as_declared(gain_law_traits<Law>.kind == GainKind::preset,
                                                detail::names_gain_before_measurement<Law>,
                                                detail::Preset<Law, Size, S>);
 
-/// `shrinks(e) const`, `shrinking_gain() const` and `otherwise_gain() const` are noexcept and
-/// declared by `traits.kind`; or there is none of them.
+/// `shrinks(e) const`, `shrinking_gain() const` and `otherwise_gain() const` exist, noexcept, if
+/// and only if `traits.kind` declares them.
 template <class Law, int Size, class S>
 concept SwitchedAsDeclared = detail::as_declared(gain_law_traits<Law>.kind == GainKind::switched,
                                                  detail::names_shrinks<Law> ||
@@ -150,8 +149,8 @@ concept SwitchedAsDeclared = detail::as_declared(gain_law_traits<Law>.kind == Ga
                                                      detail::names_otherwise_gain<Law>,
                                                  detail::Switched<Law, Size, S>);
 
-/// `factor(e) const` and `linear_gain() const` are noexcept and declared by `traits.kind`; or there
-/// is none of them.
+/// `factor(e) const` and `linear_gain() const` exist, noexcept, if and only if `traits.kind`
+/// declares them.
 template <class Law, int Size, class S>
 concept FactoredAsDeclared = detail::as_declared(gain_law_traits<Law>.kind == GainKind::factored,
                                                  detail::names_factor<Law> ||
@@ -203,7 +202,7 @@ ESOKIT_MEMBER_NAME(begin_step)
 
 }  // namespace detail
 
-/// `begin_step(t, e)` is declared by `traits.begins_steps`; or there is none.
+/// `begin_step(t, e)` exists if and only if `traits.begins_steps` declares it.
 template <class Law, class S>
 concept BeginsStepsAsDeclared = detail::as_declared(
     detail::declared_traits<Law, ContinuousGainLawTraits>.begins_steps,

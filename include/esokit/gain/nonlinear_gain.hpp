@@ -27,14 +27,14 @@ inline constexpr EvenGainTraits even_gain_traits = declared_traits<Shape, EvenGa
 
 }  // namespace detail
 
-/// `check()` is declared by `traits.checks`; or there is none.
+/// `check()` exists if and only if `traits.checks` declares it.
 template <class Shape, class S>
 concept ChecksAsDeclared = detail::as_declared(
     detail::even_gain_traits<Shape>.checks, detail::names_check<Shape>, requires(const Shape& k) {
       { k.check() } -> std::same_as<Check<S>>;
     });
 
-/// `prepared()` is declared by `traits.prepares`; or there is none.
+/// `prepared()` exists if and only if `traits.prepares` declares it.
 template <class Shape, class S>
 concept PreparesAsDeclared = detail::as_declared(
     detail::even_gain_traits<Shape>.prepares, detail::names_prepared<Shape>,

@@ -193,37 +193,37 @@ concept ActsByGainAsDeclared = !observer_traits<O>.acts_by_gain || detail::ActsB
 template <class O>
 concept AdaptsAsDeclared = !observer_traits<O>.adapts || detail::Adapts<O>;
 
-/// `wrap(difference) const` is declared by `traits.wraps_output`; or there is none.
+/// `wrap(difference) const` exists if and only if `traits.wraps_output` declares it.
 template <class O>
 concept WrapsOutputAsDeclared = detail::observer_as_declared<O>(observer_traits<O>.wraps_output,
                                                                 detail::names_wrap<O>,
                                                                 detail::WrapsOutput<O>);
 
-/// `fill_input(u)` is declared by `traits.delays_input`; or there is none.
+/// `fill_input(u)` exists if and only if `traits.delays_input` declares it.
 template <class O>
 concept DelaysInputAsDeclared = detail::observer_as_declared<O>(observer_traits<O>.delays_input,
                                                                 detail::names_fill_input<O>,
                                                                 detail::DelaysInput<O>);
 
-/// `set_step_time(seconds)` is declared by `traits.varies_time`; or there is none.
+/// `set_step_time(seconds)` exists if and only if `traits.varies_time` declares it.
 template <class O>
 concept VariesTimeAsDeclared = detail::observer_as_declared<O>(observer_traits<O>.varies_time,
                                                                detail::names_set_step_time<O>,
                                                                detail::VariesTime<O>);
 
-/// `accepts(y) const` is declared by `traits.gates_outliers`; or there is none.
+/// `accepts(y) const` exists if and only if `traits.gates_outliers` declares it.
 template <class O>
 concept GatesOutliersAsDeclared = detail::observer_as_declared<O>(observer_traits<O>.gates_outliers,
                                                                   detail::names_accepts<O>,
                                                                   detail::GatesOutliers<O>);
 
-/// `blanked() const` is declared by `traits.blanks_estimate`; or there is none.
+/// `blanked() const` exists if and only if `traits.blanks_estimate` declares it.
 template <class O>
 concept BlanksEstimateAsDeclared = detail::observer_as_declared<O>(
     observer_traits<O>.blanks_estimate, detail::names_blanked<O>, detail::BlanksEstimate<O>);
 
-/// `input_factor() const` and `set_input_gain(b)` are declared by `traits.schedules_input_gain`; or
-/// there are none.
+/// `input_factor() const` and `set_input_gain(b)` exist if and only if
+/// `traits.schedules_input_gain` declares them.
 template <class O>
 concept SchedulesInputGainAsDeclared =
     detail::observer_as_declared<O>(observer_traits<O>.schedules_input_gain,
