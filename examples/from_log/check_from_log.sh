@@ -146,6 +146,39 @@ servo b=-50 >rows.txt
 written t,y,u , t >wrong_sign.csv
 truth=-50 healthy wrong_sign.csv --b0 -45
 
+# What a controller logs of itself: telemetry rows, a measurement missing now and then.
+cat >telemetry.cpp <<'END'
+#include <esokit/esokit.hpp>
+#include <iomanip>
+#include <iostream>
+#include <limits>
+using namespace esokit;
+int main() {
+  auto loop = Adrc<LinearEso<2>>::make({.observer = {.observer_bandwidth = 100,
+                                                     .input_gain = 40,
+                                                     .sample_time = 1e-3},
+                                        .controller_bandwidth = 20,
+                                        .limits = {.lower = -5, .upper = 5}})
+                  .value();
+  write_header<3>(std::cout << std::setprecision(17));
+  double y = 0, v = 0;
+  unsigned seed = 7;
+  for (int k = 0; k < 4000; ++k) {
+    seed = seed * 69069u + 12345u;
+    const double r = k % 700 < 350 ? 1 : -1;
+    const double measured = k % 97 == 50 ? std::numeric_limits<double>::quiet_NaN()
+                                         : y + 1e-4 * (seed / 4294967296.0 - 0.5);
+    const double a = 50 * loop.update(measured, r) - 2 * v + 5;
+    write_row(std::cout, telemetry(loop, k * 1e-3, measured, r));
+    y += 1e-3 * v + a * 0.5e-6;
+    v += 1e-3 * a;
+  }
+}
+END
+"$compiler" -std=c++20 -I"$root/include" -I"$eigen" telemetry.cpp -o telemetry &&
+  ./telemetry >telemetry.csv
+healthy telemetry.csv
+
 # ---- alarms ----
 
 sounds() {  # sounds NAME FILE [OPTION...]: this alarm and no other, on stderr and on the page
