@@ -12,6 +12,7 @@
 #include <array>
 #include <cstdint>
 
+#include <esokit/control/gain_probe.hpp>
 #include <esokit/control/health.hpp>
 #include <esokit/control/health_text.hpp>
 
@@ -215,12 +216,17 @@ enum class Wrong { healthy, sign, small, large };
 /// found out.
 struct Found {
   double excited = -1, limited = -1, sign = -1, small = -1;
-  double ratio = 1;  ///< at the end
+  double ratio = 1;    ///< at the end
+  double highest = 1;  ///< b / b0 by a probe, and its 95 %
 };
+
+/// What a probe is to find, and the largest b / b0 that is called too large.
+constexpr double probe_amplitude = 0.2;
+constexpr double called_too_large = 0.4;
 
 /// Friction, lag, noise, bias and a slow load; b0 within a factor of 1.6, or wrong.
 Found watch(Wrong wrong, bool steps, std::uint64_t seed, double duration, Trace* trace = nullptr,
-            bool safe = false) {
+            bool safe = false, bool probed = false) {
   constexpr double T = 1e-3;
   Random random{seed};
   const double b = random.logarithmic(5, 500);
@@ -245,15 +251,23 @@ Found watch(Wrong wrong, bool steps, std::uint64_t seed, double duration, Trace*
       HealthMonitor<3>::make(
           {.observer_bandwidth = observer, .sample_time = T, .input_range = 1, .noise = noise})
           .value();
+  auto probe = GainProbe<3>::make({.observer_bandwidth = observer,
+                                   .sample_time = T,
+                                   .amplitude = probe_amplitude,
+                                   .travel = 1e3,
+                                   .limits = {.lower = -1, .upper = 1}})
+                   .value();
   Found found;
   Mass mass;
   double motor = 0;
+  double u = 0;
   bool stopped = false;
   for (int k = 0; k * T < duration; ++k) {
     const double t = k * T;
     const double r = steps ? (std::fmod(t, 2 * period) < period ? 0.3 : -0.3) : 0.0;
     const double y = mass.y + noise * random.normal();
-    const double u = stopped ? loop.track(y, r, 0) : loop.update(y, r);
+    u = stopped ? loop.track(y, r, 0) : loop.update(y, r, u);
+    if (probed && t > 1) u = probe.update(loop, y);
     monitor.look(loop);
     const auto& health = monitor.health();
     if (found.excited < 0 && health.evidence > 0) found.excited = t;
@@ -269,6 +283,9 @@ Found watch(Wrong wrong, bool steps, std::uint64_t seed, double duration, Trace*
               T);
   }
   found.ratio = monitor.health().gain_ratio;
+  if (const auto result = probe.result()) {
+    found.highest = result->gain_ratio + result->half_width;
+  }
   return found;
 }
 
@@ -349,6 +366,24 @@ void find(Report& report) {
        bad, good, "without", "diagnosed, u = 0", {});
 }
 
+/// Small steps on top of the u of a regulator under its load.
+void probe(Report& report) {
+  for (const Wrong wrong : {Wrong::large, Wrong::healthy}) {
+    const bool large = wrong == Wrong::large;
+    const auto all = run_parallel(
+        large ? "probed, b0 too large" : "probed, healthy", 1000,
+        [&](auto i) { return watch(wrong, false, 32452843u * (i + 1), 3, nullptr, false, true); });
+    int called = 0;
+    for (const Found& one : all) called += one.highest < called_too_large ? 1 : 0;
+    if (large) {
+      report.expect("b0 ten times too large, probed", "found by steps of a fifth of the range (%)",
+                    called / 10.0, called >= 995, "at least 99.5");
+    } else {
+      report.expect("healthy, probed", "false alarms in 1,000", called, called == 0, "none");
+    }
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -359,5 +394,6 @@ int main(int argc, char** argv) {
   euler(report);
   stop(report);
   find(report);
+  probe(report);
   return report.finish();
 }

@@ -38,6 +38,7 @@
 #include <esokit/control/dual_feedback.hpp>
 #include <esokit/control/experiment.hpp>
 #include <esokit/control/filter_form.hpp>
+#include <esokit/control/gain_probe.hpp>
 #include <esokit/control/health.hpp>
 #include <esokit/control/health_text.hpp>
 #include <esokit/control/incremental.hpp>

@@ -499,8 +499,16 @@ Failure health_study(Episode& episode) {
                                 .noise = study.number<S>("noise", {0, 1}),
                                 .memory = study.number<S>("memory", {0.1, 10, true}),
                                 .divider = study.choice("divider", 12)}));
-  if (!made || !monitored) return study.done();
+  const auto probing = study.answer(
+      "probe", GainProbe<3, S>::make({.observer_bandwidth = w,
+                                      .sample_time = T,
+                                      .amplitude = study.number<S>("amplitude", {0.01, 10, true}),
+                                      .travel = study.number<S>("travel", {0.1, 100, true}),
+                                      .periods = 6 + study.choice("periods", 4),
+                                      .limits = {.lower = S(-10), .upper = S(10)}}));
+  if (!made || !monitored || !probing) return study.done();
   auto controller = *made;
+  auto probe = *probing;
   auto monitor = *monitored;
   std::uint32_t looked = 0;
   for (int k = 4 + study.choice("samples", 40); k > 0; --k) {
@@ -524,6 +532,12 @@ Failure health_study(Episode& episode) {
         (void)controller.update(y, r);
     }
     monitor.look(controller);
+    const S held = probe.update(controller, y);
+    if (!(held >= S(-10) && held <= S(10))) study.fail("probe", "is outside of the limits");
+    if (const auto found = probe.result()) {
+      study.finite("probe", found->gain_ratio);
+      study.finite("probe", found->half_width);
+    }
     const Health<S>& health = monitor.health();
     if (health.samples != ++looked) study.fail("samples", "are not those that were looked at");
     for (const S& share : {health.saturated, health.bounded}) {

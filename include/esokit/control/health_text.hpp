@@ -48,8 +48,8 @@ struct Advice {
     case LoopFault::gain_too_large_or_disturbed:
       return {
           "What u does is undone at once: a load drives u, or b0 is too large.",
-          "If the plant is not under load, step the reference by a little and look again: a gain "
-          "ratio that stays small says by how much input_gain is too large."};
+          "Let GainProbe add small steps to u: a gain ratio that it finds small, too, says by how "
+          "much input_gain is too large."};
   }
   return {"", ""};
 }

@@ -1,0 +1,215 @@
+/// @file
+/// GainProbe: small steps added to the u of a running loop, which tell b / b0 under any load.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <esokit/control/control_loop.hpp>
+#include <esokit/control/limiter.hpp>
+#include <esokit/core/check.hpp>
+#include <esokit/core/expected.hpp>
+#include <esokit/core/type_tag.hpp>
+#include <type_traits>
+
+namespace esokit {
+
+/// Config of GainProbe.
+template <PlainScalar S = double>
+struct GainProbeConfig {
+  S observer_bandwidth{};  ///< omega_o, rad/s: the observer's poles, or their mean
+  S sample_time{};         ///< T, s; omega_o T is at most 1
+  S amplitude{};           ///< A, unit of u: several times what friction takes
+  S travel{};              ///< largest abs(y - y0), unit of y; beyond it the probe ends
+  int periods = 8;         ///< measured, after one to settle; each 10 / omega_o long; 6 .. 200
+  Limits<S> limits{};      ///< of the actuator: u and the steps together are kept within
+};
+
+/// What a probe found.
+template <PlainScalar S>
+struct GainProbeResult {
+  S gain_ratio{};  ///< b / b0
+  S half_width{};  ///< 95 %, of what differs from period to period
+};
+
+/// Adds steps v of +-A to the u of a loop, and finds b / b0 from what they alone do:
+///
+///     b / b0 = 1 + sum w psi / sum w phi,   phi = b0 u, w = v, psi = dhat
+///
+/// with phi and w filtered by the observer's poles, and all three high-passed at omega_o / 3. The
+/// sums are taken with w as it is and a quarter of a period late, since the loop turns v, and the
+/// quotient is that of least squares. A load and noise do not know v, so they have no part in its
+/// mean: this separates a b0 that is too large from a load that drives u, which HealthMonitor
+/// cannot. Friction that keeps the plant at rest reads as a b0 that is too large.
+///
+/// After each `u = loop.update(y, r, applied)`: `applied = probe.update(loop, y)` is the u to be
+/// held until the next sample. In the end, or after an abort, it is the u of the loop.
+/// @tparam Size N of the observer
+template <int Size, PlainScalar S = double>
+class GainProbe {
+  static_assert(Size >= 2, "esokit: an observer has at least two states");
+
+ public:
+  using scalar_type = S;              ///< of signals and settings
+  using Config = GainProbeConfig<S>;  ///< settings of make
+  using Result = GainProbeResult<S>;  ///< what is found
+
+  /// Checks the settings. @return the probe before its first sample, or an error
+  static Expected<GainProbe, Error<S>> make(const Config& config) {
+    Rules<S> rules;
+    rules.positive("observer_bandwidth", config.observer_bandwidth)
+        .positive("sample_time", config.sample_time)
+        .positive("amplitude", config.amplitude)
+        .positive("travel", config.travel)
+        .require(6 <= config.periods && config.periods <= 200, "periods",
+                 static_cast<S>(config.periods), "must be 6 .. 200");
+    if (!rules) return rules.error();
+    const S x = config.observer_bandwidth * config.sample_time;
+    rules
+        .require(!(x > S(1)), {"observer_bandwidth", config.observer_bandwidth,
+                               "times sample_time must be at most", -1, S(1), true})
+        .require(S(5) / x < S(1 << 24), "observer_bandwidth", config.observer_bandwidth,
+                 "makes half a period longer than 2^24 samples");
+    if (!rules) return rules.error();
+    const auto limiter = Limiter<S>::make(config.limits, config.sample_time);
+    if (!limiter) return limiter.error();
+    return GainProbe(config, *limiter);
+  }
+
+  /// After each sample of the controller. @param y the measurement that it got
+  /// @return u to be held until the next sample; tell the controller as u_applied
+  template <class Controller>
+  S update(const Controller& controller, const S& y) noexcept {
+    const auto& observer = controller.observer();
+    using Observer = std::remove_cvref_t<decltype(observer)>;
+    static_assert(Observer::size == Size, "esokit: a probe has as many poles as the observer");
+    limiter_.track(observer.applied_input());
+    if (finished()) return limiter_(controller.output());
+    const bool runs = controller.mode() == LoopMode::running;
+    if (!started_) rest_ = y;
+    started_ = true;
+    const S away = y - rest_;
+    if (!runs || !is_finite(away) || detail::absolute(away) > travel_) {
+      aborted_ = true;
+      return limiter_(controller.output());
+    }
+    S b = observer.input_gain();
+    if constexpr (observer_traits<Observer>.schedules_input_gain) b = observer.present_input_gain();
+    add(b * observer.applied_input(), observer.total_disturbance());
+    if (finished()) return limiter_(controller.output());
+    ++phase_;
+    if (phase_ == half_samples_ / 2) late_step_ = step_;
+    if (phase_ >= half_samples_) {
+      phase_ = 0;
+      step_ = -step_;
+    }
+    return limiter_(controller.output() + step_);
+  }
+
+  /// All periods are measured, or it was aborted.
+  [[nodiscard]] bool finished() const noexcept { return aborted_ || measured_ >= periods_; }
+  /// y went further than `travel` or was not finite, or the law did not decide about u.
+  [[nodiscard]] bool aborted() const noexcept { return aborted_; }
+
+  /// b / b0, once it has finished.
+  [[nodiscard]] Expected<Result, Error<S>> result() const noexcept {
+    if (aborted_ || measured_ < periods_) {
+      return Error<S>{"periods", static_cast<S>(measured_),
+                      "are too few: not finished, or aborted"};
+    }
+    const auto& [y0, y1, x0, x1] = sums_;
+    const S square = x0 * x0 + x1 * x1;
+    const S slope = (x0 * y0 + x1 * y1) / square;
+    // What a period adds to the slope, squared and summed.
+    const Array<S, 4> weights{x0, x1, -slope * x0, -slope * x1};
+    S scatter{};
+    for (std::size_t i = 0; i < 4; ++i) {
+      for (std::size_t j = 0; j < 4; ++j) {
+        scatter = scatter + weights[i] * products_[4 * i + j] * weights[j];
+      }
+    }
+    if (!(scatter > S(0))) scatter = S(0);
+    const S count = static_cast<S>(periods_);
+    // Student's factor of six periods.
+    const S half_width = S(2.571f) * std::sqrt(scatter * count / (count - S(1))) / square;
+    if (!is_finite(half_width) || !is_finite(slope) || !(square > S(0))) {
+      return Error<S>{"amplitude", amplitude_, "does not show in u: the actuator is at its limits"};
+    }
+    return Result{S(1) + slope, half_width};
+  }
+
+ private:
+  GainProbe(const Config& config, const Limiter<S>& limiter) noexcept
+      : limiter_(limiter),
+        amplitude_(config.amplitude),
+        travel_(config.travel),
+        step_(config.amplitude),
+        late_step_(-config.amplitude),
+        periods_(config.periods) {
+    const S x = config.observer_bandwidth * config.sample_time;
+    pole_ = std::exp(-x);
+    slow_ = -std::expm1(-x / S(3));
+    half_samples_ = static_cast<std::int32_t>((std::round)(S(5) / x));
+    // Half as long at first: y swings around where it was.
+    phase_ = half_samples_ / 2;
+  }
+
+  /// Through the poles, and less its slow mean.
+  struct Filtered {
+    Array<S, Size> stages{};
+    S mean{};
+    S operator()(S x, const S& pole, const S& slow) noexcept {
+      for (S& stage : stages) {
+        stage = x + pole * (stage - x);
+        x = stage;
+      }
+      mean = mean + slow * (x - mean);
+      return x - mean;
+    }
+  };
+
+  void add(const S& drive, const S& disturbance) noexcept {
+    // Of what was held since the last sample, and a quarter of a period ago: the loop turns v.
+    const S first = of_step_(last_step_, pole_, slow_);
+    const S second = of_late_step_(last_late_step_, pole_, slow_);
+    last_step_ = step_;
+    last_late_step_ = late_step_;
+    const S x = of_drive_(drive, pole_, slow_);
+    slow_disturbance_ = slow_disturbance_ + slow_ * (disturbance - slow_disturbance_);
+    const S y = disturbance - slow_disturbance_;
+    const Array<S, 4> now{first * y, second * y, first * x, second * x};
+    for (std::size_t i = 0; i < 4; ++i) period_[i] = period_[i] + now[i];
+    if (++count_ < 2 * half_samples_) return;
+    count_ = 0;
+    if (settled_) {
+      for (std::size_t i = 0; i < 4; ++i) {
+        sums_[i] = sums_[i] + period_[i];
+        for (std::size_t j = 0; j < 4; ++j) {
+          products_[4 * i + j] = products_[4 * i + j] + period_[i] * period_[j];
+        }
+      }
+      ++measured_;
+    }
+    settled_ = true;
+    period_ = {};
+  }
+
+  Limiter<S> limiter_;
+  S amplitude_, travel_, step_, late_step_;
+  S last_step_{}, last_late_step_{};
+  S pole_{}, slow_{};
+  S rest_{};
+  Filtered of_step_{}, of_late_step_{}, of_drive_{};
+  S slow_disturbance_{};
+  Array<S, 4> period_{}, sums_{};
+  Array<S, 16> products_{};
+  std::int32_t half_samples_{}, phase_{}, count_ = 0;
+  int periods_;
+  int measured_ = 0;
+  bool started_ = false, settled_ = false, aborted_ = false;
+};
+
+/// Told apart in snapshots.
+template <int Size, PlainScalar S>
+inline constexpr std::uint32_t type_tag<GainProbe<Size, S>> = make_type_tag<S>("GainProbe", Size);
+
+}  // namespace esokit
