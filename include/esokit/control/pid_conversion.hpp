@@ -85,8 +85,8 @@ Expected<PidGains<S>, Error<S>> pid_from_adrc(const AdrcTuning<S>& tuning) {
 /// are refused, and the limit of the error is the nearest K_d for which there is one. Use that K_d
 /// only if it is near; otherwise b0 is wrong by as much.
 /// @param pid gains, not zero and of one sign; its filter is ignored
-/// @param bandwidth_ratio kappa of PI, largest kappa of PID; the step response wants 3 .. 10, noise
-///        wants less
+/// @param bandwidth_ratio kappa of PI, largest kappa of PID; 3 .. 10 is good for the step
+///        response, less is better for noise
 /// @return error for gains that are zero, of different signs or of no ADRC, and for a ratio that is
 ///         not positive (PI) or not above 1 (PID)
 template <int Order, PlainScalar S>

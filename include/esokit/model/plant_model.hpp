@@ -112,8 +112,8 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
 
   /// Checks the plant and samples it with its disturbance.
   /// @param settings the plant @param input_gain b @param sample_time T, s; both checked
-  /// @return the model, or an error that names the field: of what y does not show, with the share
-  ///         that it does
+  /// @return the model, or an error that names the field; for a state that y does not show,
+  ///         with the share that it shows
   static Expected<LinearPlantModel, Error<S>> make(const Settings& settings, const S& input_gain,
                                                    const S& sample_time) {
     const auto& plant = settings.plant;

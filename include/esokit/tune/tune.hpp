@@ -4,12 +4,13 @@
 ///     auto tuning = tune(tune_model(*identified, -12.0, 12.0));
 ///     std::puts(tuning->designs.front().code.c_str());
 ///
-/// 1. J = var(y) + rho var(b0 u~), u~ = u + d / b0, at the samples: what noise and a walking
-///    disturbance make of the loop (tune/loop_cost.hpp).
-/// 2. The wish sets rho: of the LQG controllers, one for each rho, it is met by one.
+/// 1. J = var(y) + rho var(b0 u~), u~ = u + d / b0, at the samples: the effect of noise and of a
+///    random-walk disturbance on the loop (tune/loop_cost.hpp).
+/// 2. The requirement sets rho: there is one LQG controller for each rho, and one of them meets it.
 /// 3. That controller's J is J*: no linear controller has less (tune/lqg.hpp).
 /// 4. Each family minimises J at this rho under the margins, or says which one it cannot keep.
-/// 5. Ranked by J; what is within 1 % by the cost of an update, then by the modulus margin.
+/// 5. Designs are ranked by J; those within 1 % by the cost of an update, then by the
+///    modulus margin.
 #pragma once
 
 #include <algorithm>
@@ -547,8 +548,8 @@ double bandwidth_for(const Function& rises, double wanted, double low, double hi
 }  // namespace detail
 
 /// The designs for a model, the best one first.
-/// @return error for a model that `check` refuses, for more wishes than one, and for a wish that no
-///         controller can meet
+/// @return error for a model that `check` refuses, for more than one requirement, and for a
+///         requirement that no controller can meet
 [[nodiscard]] inline Expected<Tuning, Error<double>> tune(const TuneModel& model,
                                                           const TuneWish& wish = {},
                                                           const TuneRules& rules = {}) {
