@@ -14,6 +14,7 @@
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
+#include <esokit/control/mimo_adrc.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/gain/gating_certificate.hpp>
 #include <esokit/gain/pole_set.hpp>
@@ -574,6 +575,24 @@ TEST(Held, BareLoopWindsUp) {
   for (int k = 0; k < 2000; ++k) (void)loop.track(0.8, 0.8, 0.7);
   EXPECT_NEAR(loop.update(0.8, 0.8), 0.7, 1e-6);
   EXPECT_NEAR(loop.observer().total_disturbance(), -0.7 * b0, 1e-6);
+}
+
+/// One channel of two on the ground: its dhat stands still, that of the other is free.
+TEST(Held, OneChannelOfTwo) {
+  using O = Guarded<LinearEso<1>>;
+  using Loop = MimoAdrc<O, O>;
+  Loop::Config config{};
+  config.input_matrix = Loop::InputMatrix::Identity();
+  config.controller_bandwidths = {4, 4};
+  auto channel = settings<LinearEso<1>>();
+  channel.input_gain = 0;
+  std::get<0>(config.observers).observer = channel;
+  std::get<1>(config.observers).observer = channel;
+  auto loop = Loop::make(config).value();
+  loop.observer<0>().set_trust(0);
+  for (int k = 0; k < 50; ++k) (void)loop.update({0.5, 0.5}, {0, 0});
+  EXPECT_EQ(loop.observer<0>().total_disturbance(), 0);
+  EXPECT_GT(loop.observer<1>().total_disturbance(), 0.1);
 }
 
 // ---- b0 in the law

@@ -193,6 +193,12 @@ class MimoAdrc {
     return std::get<static_cast<std::size_t>(Channel)>(observers_);
   }
 
+  /// The same, for what only it can do (trust and pin of Guarded).
+  template <int Channel>
+  [[nodiscard]] ObserverOf<Channel>& observer() noexcept {
+    return std::get<static_cast<std::size_t>(Channel)>(observers_);
+  }
+
   /// k_0 .. k_(n-1) of a channel, 0 .. q - 1.
   template <int Channel>
   [[nodiscard]] const Array<S, ObserverOf<Channel>::order>& gains() const noexcept {
