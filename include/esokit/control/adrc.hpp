@@ -166,21 +166,19 @@ class Adrc {
   /// For a plant that stands or is carried: the observer follows y, dhat stays the same, u is the
   /// caller's; see Guarded. On release begin with the reference at y.
   /// @param u_applied what the actuator held since the last sample @return the same
-  S hold(S y, S reference, S u_applied) noexcept
-      requires(observer_traits<Observer>.gates_disturbance) {
-    return loop_.hold(measured(y, reference), u_applied);
-  }
+  template <class O = Observer>
+  requires(observer_traits<O>.gates_disturbance) S hold(S y, S reference, S u_applied)
+  noexcept { return loop_.hold(measured(y, reference), u_applied); }
 
   /// Sets b0 before the sample; see Guarded. @return as there
-  Check<S> set_input_gain(const S& b) noexcept
-      requires(observer_traits<Observer>.schedules_input_gain) {
-    return observer().set_input_gain(error_based ? S(-b) : b);
-  }
+  template <class O = Observer>
+  requires(observer_traits<O>.schedules_input_gain) Check<S> set_input_gain(const S& b)
+  noexcept { return observer().set_input_gain(error_based ? S(-b) : b); }
 
   /// y - r in the steady state, within the limits, for a constant d = 1 (unit of y^(n)): what the
   /// leak of Guarded costs.
-  [[nodiscard]] S leak_error() const noexcept
-      requires(observer_traits<Observer>.gates_disturbance) {
+  template <class O = Observer>
+  requires(observer_traits<O>.gates_disturbance) [[nodiscard]] S leak_error() const noexcept {
     // b0 u is -d there, and what the law makes of the estimates.
     const auto left = observer().leak_error();
     S sum = left(order);

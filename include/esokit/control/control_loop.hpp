@@ -228,7 +228,9 @@ class ControlLoop {
   /// For a plant that stands or is carried while u comes from elsewhere: the observer follows y,
   /// dhat stays the same; see Guarded. @param u_applied what was held from k - 1 to k @return the
   /// same
-  S hold(S measured, S u_applied) noexcept requires(observer_traits<Observer>.gates_disturbance) {
+  template <class O = Observer>
+  requires(observer_traits<O>.gates_disturbance) S hold(S measured, S u_applied)
+  noexcept {
     const S trust = observer_.trust();
     observer_.set_trust(S(0));
     report_applied(u_applied);

@@ -108,15 +108,14 @@ class DisturbanceCompensator {
   /// For a plant that stands or is carried: the observer follows y, dhat stays the same; see
   /// Guarded.
   /// @param u_applied what the actuator held since the last sample @return the same
-  S hold(S y, S u_applied) noexcept requires(observer_traits<Observer>.gates_disturbance) {
-    return loop_.hold(y, u_applied);
-  }
+  template <class O = Observer>
+  requires(observer_traits<O>.gates_disturbance) S hold(S y, S u_applied)
+  noexcept { return loop_.hold(y, u_applied); }
 
   /// Sets b0 before the sample; see Guarded. @return as there
-  Check<S> set_input_gain(const S& b) noexcept
-      requires(observer_traits<Observer>.schedules_input_gain) {
-    return observer().set_input_gain(b);
-  }
+  template <class O = Observer>
+  requires(observer_traits<O>.schedules_input_gain) Check<S> set_input_gain(const S& b)
+  noexcept { return observer().set_input_gain(b); }
 
   /// Takes over a plant that stands at y under u: dhat = -b0 u.
   /// @return ok, or input_rejected or state_rejected where u or y is not finite: nothing changes
