@@ -181,14 +181,13 @@ int main(int argc, char** argv) {
   auto profile =
       esokit::TrackingDifferentiator<double>::make({.acceleration = acceleration, .sample_time = T})
           .value();
-  Run plan;  // the profile is the same for both
+  std::vector<esokit::Vector<double, 3>> plan;  // the profile is the same for both
   for (int k = 0; k <= 6000; ++k) {
     profile.update(steps(k * T));
-    plan.r.push_back(profile.value());
-    plan.u.push_back(profile.derivative());
+    plan.push_back(profile.motion());
   }
   const auto row = [](double t) { return static_cast<std::size_t>(std::lround(t / T)); };
-  const auto reference = [&](double t) { return plan.r[std::min<std::size_t>(row(t), 6000)]; };
+  const auto reference = [&](double t) { return plan[std::min<std::size_t>(row(t), 6000)](0); };
   const auto load = [](double t) { return t >= 3.5 && t < 5 ? 60.0 : 0.0; };
   const auto with_pid = [&](std::uint64_t seed) {
     auto controller = pid();
@@ -200,8 +199,8 @@ int main(int argc, char** argv) {
     std::size_t k = 0;
     return simulate(
         6, seed,
-        [&](double y, double r) {
-          const double u = controller.update(y, r, plan.u[std::min<std::size_t>(k, 6000)]);
+        [&](double y, double) {
+          const double u = controller.update(y, plan[std::min<std::size_t>(k, 6000)]);
           ++k;
           return u;
         },

@@ -1,6 +1,7 @@
 // Tracking differentiators: time-optimal, without overshoot and chatter, exact at the reference.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <esokit/control/tracking_differentiator.hpp>
 #include <esokit/core/error_text.hpp>
@@ -63,6 +64,32 @@ TEST(TrackingDifferentiator, StepIsTimeOptimalWithoutChatter) {
 }
 
 /// It is always ready to stop at the reference, so it stays r2^2 / (2 R) behind a moving one.
+/// The acceleration is that by which r2 has changed; what is refused changes none of the three.
+TEST(TrackingDifferentiator, MotionTellsTheAcceleration) {
+  constexpr double h = 1e-3;
+  auto td = TrackingDifferentiator<>::make({.acceleration = 25, .sample_time = h}).value();
+  EXPECT_EQ(td.motion()(2), 0.0);
+  double largest = 0;
+  for (int k = 0; k < 300; ++k) {
+    const double before = td.derivative();
+    ASSERT_TRUE(td.update(1));
+    const auto motion = td.motion();
+    EXPECT_EQ(motion(0), td.value());
+    EXPECT_EQ(motion(1), td.derivative());
+    EXPECT_NEAR(motion(2), (td.derivative() - before) / h, 1e-9 * 25);
+    largest = std::max(largest, std::abs(motion(2)));
+  }
+  EXPECT_NEAR(largest, 25, 1e-9);
+  ASSERT_TRUE(td.update(2));
+  const auto moving = td.motion();
+  EXPECT_NE(moving(2), 0.0);
+  EXPECT_FALSE(td.update(hidden_nan<double>()));
+  EXPECT_FALSE(td.reset(hidden_nan<double>()));
+  EXPECT_EQ(td.motion(), moving);
+  ASSERT_TRUE(td.reset(1));
+  EXPECT_EQ(td.motion()(2), 0.0);
+}
+
 TEST(TrackingDifferentiator, FollowsASine) {
   constexpr double h = 1e-3;
   constexpr double R = 200;

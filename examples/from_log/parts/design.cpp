@@ -170,7 +170,7 @@ std::string program(const Settings& settings, const Identified& found, const eso
         esokit::detail::source(profile_acceleration(model)) +
         ", .sample_time = " + esokit::detail::source(model.sample_time) + "}).value();\n";
   }
-  const std::string reference = profiled ? "profile.state()" : "reference";
+  const std::string reference = profiled ? "profile.motion()" : "reference";
   return text +
          "  if (!controller) {  // which setting, and which rule\n"
          "    std::printf(\"%s: %s\\n\", controller.error().field, controller.error().rule);\n"
@@ -201,11 +201,18 @@ Runner::Runner(const esokit::Tuning& tuning, const esokit::TunedDesign& design)
       upper_(tuning.model.u_max),
       state_(static_cast<std::size_t>(form_.states())) {
   const auto& gains = design.settings.gains;
-  if (gains.size() > 1) rate_ = form_.r_to_u(0, 0) * gains[1] / gains[0];
+  // v = k0 (r - y) + k1 (r' - y') + ..: 1 is the factor of the highest derivative.
+  for (std::size_t i = 0; i < weights_.size(); ++i) {
+    if (i <= gains.size()) {
+      weights_[i] = form_.r_to_u(0, 0) * (i < gains.size() ? gains[i] : 1.0) / gains[0];
+    }
+  }
 }
 
-double Runner::update(double y, double r, double slope) {
-  double u = form_.y_to_u(0, 0) * y + form_.r_to_u(0, 0) * r + rate_ * slope;
+double Runner::update(double y, const esokit::Vector<double, 3>& motion) {
+  const double r = motion(0);
+  double u = form_.y_to_u(0, 0) * y;
+  for (int i = 0; i < 3; ++i) u += weights_[static_cast<std::size_t>(i)] * motion(i);
   const int n = form_.states();
   for (int i = 0; i < n; ++i) u += form_.to_u(0, i) * state_[static_cast<std::size_t>(i)];
   u = std::clamp(u, lower_, upper_);

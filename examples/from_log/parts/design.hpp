@@ -2,6 +2,7 @@
 /// From what was found to a controller: the choice, what it does, and the log through its observer.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <utility>
@@ -25,12 +26,13 @@ namespace from_log {
 class Runner {
  public:
   Runner(const esokit::Tuning& tuning, const esokit::TunedDesign& design);
-  /// Once a sample. @param slope of the reference
-  double update(double y, double r, double slope = 0.0);
+  /// Once a sample. @param motion (r, r', r'') of the reference
+  double update(double y, const esokit::Vector<double, 3>& motion);
 
  private:
   esokit::LinearController form_;
-  double lower_, upper_, rate_ = 0.0;
+  double lower_, upper_;
+  std::array<double, 3> weights_{};  ///< of r, r', r'' in u
   std::vector<double> state_;
 };
 

@@ -103,9 +103,23 @@ class TrackingDifferentiator : public detail::DifferentiatorState<S> {
 
   /// One sample. False, and nothing changes, if the reference is not finite or too large.
   bool update(S reference) noexcept {
-    const S step = sample_time_ * fhan(r1_ - reference, r2_, acceleration_, width_);
+    const S change = fhan(r1_ - reference, r2_, acceleration_, width_);
     // An infinite reference would pass for a far one.
-    return is_finite(reference) && State::move_to(r1_ + sample_time_ * r2_, r2_ + step);
+    const bool moved = is_finite(reference) &&
+                       State::move_to(r1_ + sample_time_ * r2_, r2_ + sample_time_ * change);
+    if (moved) change_ = change;
+    return moved;
+  }
+
+  /// (r1, r1', r1''), 3 x 1: for a law that takes the acceleration, too. The last is that of the
+  /// sample before now; its size is at most `acceleration`.
+  [[nodiscard]] Vector<S, 3> motion() const noexcept { return {r1_, r2_, change_}; }
+
+  /// Restarts at rest at `value`; false, and nothing changes, if it is not finite.
+  bool reset(S value = S(0)) noexcept {
+    if (!State::reset(value)) return false;
+    change_ = S(0);
+    return true;
   }
 
  private:
@@ -117,6 +131,7 @@ class TrackingDifferentiator : public detail::DifferentiatorState<S> {
   S acceleration_;
   S sample_time_;
   S width_;
+  S change_ = S(0);  ///< r1'' that the last sample applied
 };
 
 /// The same of packs, lane by lane: half of its time is a root.
