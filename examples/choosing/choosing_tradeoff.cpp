@@ -130,7 +130,7 @@ int main(int argc, char** argv) {
     Panel& panel = figure.panel(c / 2, c % 2).title(all[c].name);
     panel.name("case" + std::to_string(c + 1))
         .log_x()
-        .x_range(0.1, 2.5)
+        .x_range(0.02, 2.5)  // room for the legend
         .x_label("bandwidth of the law / of the filter")
         .y_label("root of J / J*")
         .y_range(1.0, c == 0   ? 1.15
