@@ -104,7 +104,7 @@ int main(int argc, char** argv) {
   const Trace guessed = drive(joint, 10, 1);
   joint.log_to(nullptr);
 
-  // Gravity goes with sin(angle): a column. Left out, it is taken for what u does.
+  // The shape of gravity is known: with sin(angle) as a column only its size has to be found.
   Log rows = rows_of(log.str());
   rows.columns.emplace_back();
   for (const double angle : rows.y) rows.columns[0].push_back(std::sin(angle));
