@@ -1,8 +1,9 @@
 /// @file
-/// Eigen's operations on the vectors and matrices of esokit.
+/// Gives the vectors and matrices of esokit all operations of Eigen.
 ///
-/// `Eigen::Vector3d z = observer.estimate()` and an expression of Eigen's as an argument need no
-/// header; this one is for expressions of both: `(eigen(observer.estimate()) - truth).norm()`.
+/// `Eigen::Vector3d z = observer.estimate()` and passing an Eigen expression as an argument work
+/// without this header. Include it to mix both in one expression: `(eigen(observer.estimate()) -
+/// truth).norm()`.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,11 +11,11 @@
 
 namespace esokit {
 
-/// The type of Eigen's that is like a Matrix.
+/// The Eigen type that corresponds to a Matrix.
 template <class ScalarType, int Rows, int Columns = 1>
 using EigenMatrix = Eigen::Matrix<ScalarType, Rows, Columns>;
 
-/// The elements of `matrix`, as Eigen's; a copy of those of a temporary.
+/// `matrix` as an Eigen object: a map onto its elements, for a temporary a copy of them.
 /// @{
 template <class ScalarType, int Rows, int Columns>
 [[nodiscard]] Eigen::Map<EigenMatrix<ScalarType, Rows, Columns>> eigen(

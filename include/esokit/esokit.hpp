@@ -1,5 +1,6 @@
 /// @file
-/// Everything of esokit. Firmware may prefer the headers that it uses, one file an observer.
+/// Includes all of esokit. Firmware may prefer to include only what it uses: each observer
+/// has a header of its own.
 #pragma once
 
 #include <esokit/adapter/adapter.hpp>

@@ -253,7 +253,7 @@ TEST(LinearPlant, RefusesByFieldAndRule) {
   const auto unstable = LinearPlant<1>::chain({.coefficients = {-1.0}}).value();
   EXPECT_EQ(refusal(held_plant(unstable, 700.0)), "accepted");
   EXPECT_EQ(refusal(held_plant(unstable, 720.0)),
-            "duration: is so long that the scalar cannot hold what the plant does in it");
+            "duration: is so long that the plant's states leave the range of the scalar");
 }
 
 }  // namespace

@@ -292,7 +292,7 @@ TEST(LinearPlantModel, RefusesWhatYDoesNotShow) {
   // A state that nothing hands on to y.
   LinearPlant<3> blind{.a = {{0, 1, 0}, {-2, -3, 0}, {1, 0, -5}}, .b = {0, 1, 0}, .c = {1, 0, 0}};
   EXPECT_EQ(refusal(make(blind)),
-            "model.plant.c: leaves a state unobservable: of it y shows a share below");
+            "model.plant.c: makes a state unobservable: the share that y shows of it is below");
   blind.a(1, 2) = 1e-3;
   blind.e = {0.0, 1.0, 0.0};
   EXPECT_TRUE(make(blind));
@@ -301,8 +301,8 @@ TEST(LinearPlantModel, RefusesWhatYDoesNotShow) {
   hidden.e = {1.0, 0.0};
   const auto answer = LinearPlantModel<2, ModelParts{.order = 2}>::make({hidden}, 1.0, kT);
   EXPECT_EQ(refusal(answer),
-            "model.plant.e: lets a constant disturbance hide behind a zero: of it y shows a share "
-            "below");
+            "model.plant.e: hides a constant disturbance behind a zero: the share that "
+            "y shows of it is below");
   EXPECT_EQ(answer.error().value, 0.0);
   hidden.e = {1.0, 1e-6};
   EXPECT_TRUE((LinearPlantModel<2, ModelParts{.order = 2}>::make({hidden}, 1.0, kT)));
@@ -336,8 +336,8 @@ TEST(LinearPlantModel, RefusesASwingBehindAZeroAtItsFrequency) {
   EXPECT_TRUE(make(0.0, 31.0));
   const auto answer = make(0.0, w);
   EXPECT_EQ(refusal(answer),
-            "model.resonators.frequency[1]: lets a swing hide behind a zero: of it y shows a share "
-            "below");
+            "model.resonators.frequency[1]: hides a sine behind a zero: the share that "
+            "y shows of it is below");
   EXPECT_LT(answer.error().value, answer.error().limit);
   EXPECT_EQ(answer.error().limit, 1024 * std::numeric_limits<double>::epsilon());
   // As close as the value says: beside / (4 w^2), for terms of size w^2 + .. in both coefficients.
@@ -356,8 +356,8 @@ TEST(LinearPlantModel, RefusesASwingBehindAZeroAtItsFrequency) {
     return Model::make({.plant = plant, .resonators = {{{77.0}, {20.0}}}, .leaky = {tau}}, 1.0, kT);
   };
   EXPECT_EQ(refusal(fading(0.25)),
-            "model.leaky[0]: lets a fading disturbance hide behind a zero: of it y shows a share "
-            "below");
+            "model.leaky[0]: hides a decaying disturbance behind a zero: the share that "
+            "y shows of it is below");
   EXPECT_TRUE(fading(0.26));
 }
 

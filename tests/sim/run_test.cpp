@@ -587,7 +587,7 @@ TEST(Run, RefusesBadSettings) {
             "sample_time: must be finite and positive");
   const auto unstable = LinearPlant<1>::chain({.coefficients = {-1000.0}}).value();
   EXPECT_EQ(refusal(sim::run(unstable, own, {.duration = 2.0, .sample_time = 1.0})),
-            "sample_time: is so long that the scalar cannot hold what the plant does in it");
+            "sample_time: is so long that the plant's states leave the range of the scalar");
 }
 
 }  // namespace

@@ -45,7 +45,7 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
 
  public:
   using Adapted = Observer;                            ///< what is adapted
-  using scalar_type = typename Observer::scalar_type;  ///< of states and settings
+  using scalar_type = typename Observer::scalar_type;  ///< type of states and settings
   using Estimate = typename Observer::Estimate;        ///< (y, .., y^(n-1), d, ..), N x 1
   static constexpr int order = Observer::order;        ///< n, order of the plant
   static constexpr int size = Observer::size;          ///< N
@@ -180,7 +180,7 @@ class NamedAdapter : public Adapter<Observer> {
 
  public:
   using Config = Settings;                         ///< settings of make
-  using scalar_type = typename Base::scalar_type;  ///< of states and settings
+  using scalar_type = typename Base::scalar_type;  ///< type of states and settings
   using Estimate = typename Base::Estimate;        ///< (y, .., y^(n-1), d, ..), N x 1
 
   /// Checks the settings and does all the design work.

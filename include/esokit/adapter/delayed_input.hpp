@@ -11,7 +11,7 @@ namespace esokit {
 /// Config of DelayedInput.
 template <LoopObserver Observer>
 struct DelayedInputConfig {
-  using S = typename Observer::scalar_type;  ///< of signals and settings
+  using S = typename Observer::scalar_type;  ///< type of signals and settings
 
   typename Observer::Config observer{};  ///< of the observer itself
   int delay = 0;                         ///< d, samples, 0 .. Capacity

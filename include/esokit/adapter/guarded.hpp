@@ -60,7 +60,7 @@ enum class Pin : unsigned char {
 /// Config of Guarded.
 template <LoopObserver Observer>
 struct GuardedConfig {
-  using S = typename Observer::scalar_type;  ///< of signals and settings
+  using S = typename Observer::scalar_type;  ///< type of signals and settings
 
   typename Observer::Config observer{};  ///< of the observer itself
   S disturbance_bound{};  ///< largest abs(dhat); 0: no bound. Unit of y^(n) or u, see `unit`

@@ -31,7 +31,7 @@ concept PlantModel = std::copyable<Model> &&
 /// Config of KnownModel.
 template <LoopObserver Observer, class Model>
 struct KnownModelConfig {
-  using S = typename Observer::scalar_type;  ///< of signals and settings
+  using S = typename Observer::scalar_type;  ///< type of signals and settings
 
   typename Observer::Config observer{};  ///< of the observer itself
   Model model{};                         ///< fbar

@@ -11,7 +11,7 @@ namespace esokit {
 /// Config of OutlierGate.
 template <LoopObserver Observer>
 struct OutlierGateConfig {
-  using S = typename Observer::scalar_type;  ///< of signals and settings
+  using S = typename Observer::scalar_type;  ///< type of signals and settings
 
   typename Observer::Config observer{};  ///< of the observer itself
   S threshold{};          ///< unit of y: an innovation up to this is accepted; 0: no gate

@@ -10,7 +10,7 @@ namespace esokit {
 /// Config of VariableTime.
 template <LoopObserver Observer>
 struct VariableTimeConfig {
-  using S = typename Observer::scalar_type;  ///< of signals and settings
+  using S = typename Observer::scalar_type;  ///< type of signals and settings
 
   typename Observer::Config observer{};  ///< with the nominal sample time T
   S ratio = S(4);                        ///< above 1: steps may take T / ratio .. T ratio

@@ -14,7 +14,7 @@ namespace esokit {
 /// Config of WrappedOutput.
 template <LoopObserver Observer>
 struct WrappedOutputConfig {
-  using S = typename Observer::scalar_type;  ///< of signals and settings
+  using S = typename Observer::scalar_type;  ///< type of signals and settings
 
   typename Observer::Config observer{};  ///< of the observer itself
   S period{};                            ///< of y, in its unit: 2 pi, 360

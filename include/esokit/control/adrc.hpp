@@ -18,7 +18,7 @@ namespace esokit {
 /// Config of Adrc, of either form. Give `controller_bandwidth` or `gains`, not both.
 template <LoopObserver Observer>
 struct AdrcConfig {
-  using S = typename Observer::scalar_type;  ///< of signals and settings
+  using S = typename Observer::scalar_type;  ///< type of signals and settings
 
   typename Observer::Config observer{};  ///< b0 and T are in here; b0 of the plant in both forms
   S controller_bandwidth{};              ///< omega_c, rad/s
@@ -76,7 +76,7 @@ class Adrc {
 
  public:
   static constexpr int order = Observer::order;        ///< n, order of the plant
-  using scalar_type = typename Observer::scalar_type;  ///< of signals and settings
+  using scalar_type = typename Observer::scalar_type;  ///< type of signals and settings
   using S = scalar_type;                               ///< the same type
   using Reference = Vector<S, order + 1>;              ///< (r, r', .., r^(n)), n + 1 x 1
 

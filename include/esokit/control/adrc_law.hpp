@@ -52,7 +52,7 @@ class AdrcLaw {
     }
     /// @endcond
   };
-  using scalar_type = S;  ///< of signals and settings
+  using scalar_type = S;  ///< type of signals and settings
   template <class T>
   using with_scalar = AdrcLaw<Order, T>;  ///< the same with another scalar
 

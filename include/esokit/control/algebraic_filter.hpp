@@ -35,7 +35,7 @@ class AlgebraicFilter {
   static constexpr int extension = Extension;                     ///< m, extended states
   static constexpr int size = ChainSize<Order, Extension>::size;  ///< N = n + m
   static constexpr int states = size;                             ///< length of x
-  using scalar_type = S;                                          ///< of states and settings
+  using scalar_type = S;                                          ///< type of states and settings
   using Estimate = Vector<S, size>;      ///< (y, .., y^(n-1), d, .., d^(m-1)), N x 1
   using State = Vector<S, size>;         ///< x, N x 1
   using Square = Matrix<S, size, size>;  ///< N x N

@@ -152,7 +152,7 @@ ESOKIT_INLINE S by_present_gain(const Observer& observer, const S& u) noexcept {
 template <LoopObserver Observer>
 class ControlLoop {
  public:
-  using S = typename Observer::scalar_type;  ///< of signals and settings
+  using S = typename Observer::scalar_type;  ///< type of signals and settings
   using scalar_type = S;                     ///< the same type
   using Status = StatusOf<S>;                ///< StepStatus, of a pack one a lane
   template <class T>

@@ -13,7 +13,7 @@ namespace esokit {
 /// Config of DisturbanceCompensator.
 template <LoopObserver Observer>
 struct DisturbanceCompensatorConfig {
-  using S = typename Observer::scalar_type;  ///< of signals and settings
+  using S = typename Observer::scalar_type;  ///< type of signals and settings
 
   typename Observer::Config observer{};  ///< b0 and T are in here
   std::optional<S> compensation_gain{};  ///< K, unit of u per unit of y^(n); left out: -1/b0
@@ -51,7 +51,7 @@ template <LoopObserver Observer>
 class DisturbanceCompensator {
  public:
   static constexpr int order = Observer::order;        ///< n, order of the plant
-  using scalar_type = typename Observer::scalar_type;  ///< of signals and settings
+  using scalar_type = typename Observer::scalar_type;  ///< type of signals and settings
   using S = scalar_type;                               ///< the same type
 
   /// What it declares beyond `update(y, base_output)`.

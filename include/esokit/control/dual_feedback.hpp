@@ -69,7 +69,7 @@ class DualFeedbackAdrc {
  public:
   static constexpr int order = Order;             ///< n, order of the plant
   static constexpr int size = Order + Extension;  ///< N = n + m
-  using scalar_type = S;                          ///< of signals and settings
+  using scalar_type = S;                          ///< type of signals and settings
 
   /// Give `controller_bandwidth` or `gains`, not both.
   struct Config {

@@ -138,7 +138,7 @@ class Experiment {
 
  public:
   static constexpr int order = Order;  ///< n
-  using scalar_type = S;               ///< of signals and settings
+  using scalar_type = S;               ///< type of signals and settings
   using Config = ExperimentConfig<S>;  ///< settings of make
   using Result = ExperimentResult<S>;  ///< what is found
   template <class T>

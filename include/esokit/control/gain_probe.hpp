@@ -49,7 +49,7 @@ class GainProbe {
   static_assert(Size >= 2, "esokit: an observer has at least two states");
 
  public:
-  using scalar_type = S;              ///< of signals and settings
+  using scalar_type = S;              ///< type of signals and settings
   using Config = GainProbeConfig<S>;  ///< settings of make
   using Result = GainProbeResult<S>;  ///< what is found
 

@@ -108,7 +108,7 @@ class HealthMonitor {
   static_assert(Size >= 2, "esokit: an observer has at least two states");
 
  public:
-  using scalar_type = S;           ///< of signals and settings
+  using scalar_type = S;           ///< type of signals and settings
   using Config = HealthConfig<S>;  ///< settings of make
 
   /// Checks the settings. @return the monitor, or an error that names the field

@@ -22,7 +22,7 @@ namespace esokit {
 template <class Controller>
 class Incremental {
  public:
-  using scalar_type = typename Controller::scalar_type;  ///< of signals and settings
+  using scalar_type = typename Controller::scalar_type;  ///< type of signals and settings
   using S = scalar_type;                                 ///< the same type
   using Config = typename Controller::Config;            ///< settings of make
   using Status = StatusOf<S>;                            ///< StepStatus, of a pack one a lane

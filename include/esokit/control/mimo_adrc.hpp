@@ -24,7 +24,7 @@ template <ShiftableDisturbance... Observers>
 struct MimoAdrcConfig {
   static constexpr int channels = sizeof...(Observers);  ///< q
   using S =
-      typename std::tuple_element_t<0, std::tuple<Observers...>>::scalar_type;  ///< of signals
+      typename std::tuple_element_t<0, std::tuple<Observers...>>::scalar_type;  ///< type of signals
   using InputMatrix = Matrix<S, channels, channels>;                            ///< B0, q x q
 
   /// One for each channel. `input_gain` is left out, because B0 gives it; T is the same in all.
@@ -67,7 +67,7 @@ class MimoAdrc {
 
  public:
   static constexpr int channels = sizeof...(Observers);  ///< q
-  using scalar_type = typename First::scalar_type;       ///< of signals and settings
+  using scalar_type = typename First::scalar_type;       ///< type of signals and settings
   using S = scalar_type;                                 ///< the same type
   using Output = Vector<S, channels>;                    ///< y, or r, or u, q x 1
   using InputMatrix = Matrix<S, channels, channels>;     ///< B0, q x q
@@ -379,7 +379,7 @@ class MimoAdrc<First, Rest...>
 
  public:
   static constexpr int channels = 1 + sizeof...(Rest);   ///< q
-  using S = typename MimoAdrcConfig<First, Rest...>::S;  ///< of signals and settings
+  using S = typename MimoAdrcConfig<First, Rest...>::S;  ///< type of signals and settings
   using Output = Vector<S, channels>;                    ///< y, or r, or u, q x 1
   template <class T>
   using with_scalar = MimoAdrc<detail::WithScalar<First, T>,

@@ -33,7 +33,7 @@ class NonlinearFeedback {
     }
     /// @endcond
   };
-  using scalar_type = S;  ///< of signals and settings
+  using scalar_type = S;  ///< type of signals and settings
   template <class T>
   using with_scalar = NonlinearFeedback<Order, T>;  ///< the same with another scalar
 

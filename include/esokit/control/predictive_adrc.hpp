@@ -23,7 +23,7 @@ namespace esokit {
 /// Config of PredictiveAdrc. Give `controller_bandwidth` or `gains`, not both.
 template <PredictableObserver Observer>
 struct PredictiveAdrcConfig {
-  using S = typename Observer::scalar_type;      ///< of signals and settings
+  using S = typename Observer::scalar_type;      ///< type of signals and settings
   static constexpr int order = Observer::order;  ///< n, order of the plant
 
   typename Observer::Config observer{};    ///< b0 and T are in here
@@ -74,7 +74,7 @@ template <PredictableObserver Observer>
 class PredictiveAdrc {
  public:
   static constexpr int order = Observer::order;        ///< n, order of the plant
-  using scalar_type = typename Observer::scalar_type;  ///< of signals and settings
+  using scalar_type = typename Observer::scalar_type;  ///< type of signals and settings
   using S = scalar_type;                               ///< the same type
   using Estimate = typename Observer::Estimate;        ///< (y, .., y^(n-1), d, ..), N x 1
   using Reference = Vector<S, order + 1>;              ///< (r, r', .., r^(n)), n + 1 x 1

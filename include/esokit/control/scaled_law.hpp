@@ -13,7 +13,7 @@ namespace esokit {
 template <int Order, Scalar S>
 class ScaledLaw {
  public:
-  using scalar_type = S;  ///< of signals and settings
+  using scalar_type = S;  ///< type of signals and settings
   template <class T>
   using with_scalar = ScaledLaw<Order, T>;  ///< the same with another scalar
 

@@ -19,20 +19,14 @@ using Check = Expected<void, Error<S>>;
 
 namespace detail {
 
-/// Smallest positive normal number of the scalar, of double for autodiff types.
+/// Smallest positive normal number of the scalar; for autodiff types that of double.
 template <Scalar S>
 constexpr S smallest_normal() noexcept {
   return S((std::numeric_limits<TableScalar<S>>::min)());
 }
 
-/// Spacing of the scalar's numbers above one.
-template <Scalar S>
-constexpr S rounding() noexcept {
-  return S(std::numeric_limits<TableScalar<S>>::epsilon());
-}
-
-/// The larger of two, or the one that is not finite. Without <algorithm>, which takes longer to
-/// compile than a controller.
+/// The larger of the two, or the one that is not finite. Not std::max, because <algorithm> takes
+/// longer to compile than a controller.
 template <PlainScalar S>
 constexpr S larger(const S& a, const S& b) noexcept {
   return is_finite(a) && (!is_finite(b) || a < b) ? b : a;
@@ -69,7 +63,7 @@ constexpr bool normal(const S& value) {
 ///     if (!rules) return rules.error();
 ///
 /// All rules are evaluated, because a comparison costs less than a branch; a rule that computes
-/// with a value checked by an earlier rule belongs into `and_then`. A list of values is checked
+/// with a value checked by an earlier rule belongs in `and_then`. A list of values is checked
 /// element by element, and the error has the index.
 template <Scalar S>
 class [[nodiscard]] Rules {
@@ -80,12 +74,13 @@ class [[nodiscard]] Rules {
   /// The first broken rule; aborts if there is none.
   [[nodiscard]] constexpr const Error<S>& error() const noexcept { return outcome_.error(); }
 
-  /// So that a function that returns `Check` can return its rules.
+  /// Lets a function that returns `Check` return its rules.
   constexpr operator const Check<S>&() const noexcept { return outcome_; }
 
   // Each rule tests finiteness by bits before it compares: under -ffast-math a comparison with NaN
-  // may go either way. They are out of line, as `make` is not where time counts and firmware has
-  // every rule many times; but not cold: what comes after a cold call is compiled for size.
+  // may go either way. They are out of line, because `make` is not time-critical and firmware
+  // contains each rule many times. They are not marked cold, because GCC compiles what follows a
+  // cold call for size.
 
   /// Neither NaN nor infinite.
   [[gnu::noinline]] constexpr Rules& finite(const char* field, const S& value, int index = -1) {
@@ -111,7 +106,7 @@ class [[nodiscard]] Rules {
                    "must be finite and not zero (negative is fine)", index);
   }
 
-  /// Not zero, and neither overflowed nor subnormal as a divisor.
+  /// Usable as a divisor: neither it nor its inverse is zero, subnormal or infinite.
   [[gnu::noinline]] constexpr Rules& invertible(const char* field, const S& value, int index = -1) {
     nonzero(field, value, index);
     if (!outcome_) return *this;
@@ -125,15 +120,15 @@ class [[nodiscard]] Rules {
                    {field, value, "must be finite and above", -1, limit, true});
   }
 
-  /// `derived` is a normal number, neither overflowed nor lost in the subnormals; the error names
-  /// the config field that it was computed from.
+  /// `derived` is a normal number: neither zero, subnormal nor infinite. The error names the config
+  /// field from which it was computed.
   [[gnu::noinline]] constexpr Rules& representable(const char* field, const S& value,
                                                    const S& derived, const char* rule,
                                                    int index = -1) {
     return require(detail::normal(derived), field, value, rule, index);
   }
 
-  /// As it is in a config that does not mention it: zero.
+  /// Zero, as in a config that does not mention the field.
   [[gnu::noinline]] constexpr Rules& left_out(const char* field, const S& value, const char* rule) {
     return require(all(is_finite(value)) && !all(detail::absolute(value) > S(0.0)), field, value,
                    rule);
@@ -165,20 +160,20 @@ class [[nodiscard]] Rules {
     return *this;
   }
 
-  /// The same with a limit in the error, or whatever else it says.
+  /// The same with a complete error, which may carry a limit.
   constexpr Rules& require(bool kept, const Error<S>& error) {
     if (!kept) break_by(error);
     return *this;
   }
 
-  /// The rules that another function checked: `Check`, `Rules`, or an `Expected`.
+  /// The outcome of another function: a `Check`, `Rules` or an `Expected`.
   template <class Outcome>
   constexpr Rules& all_of(const Outcome& outcome) {
     if (!outcome) break_by(outcome.error());
     return *this;
   }
 
-  /// The rules that `check()` reads once all rules before are kept.
+  /// The rules of `check()`, which is called only if no rule was broken before.
   template <class F>
   constexpr Rules& and_then(const F& check) {
     return outcome_ ? all_of(check()) : *this;
@@ -215,7 +210,7 @@ Error<S> in_lane(const Error<LaneScalar<S>>& error, int i) {
   return all;
 }
 
-/// An X of packs, of which `make(i)` designs lane i as one of the plain scalar.
+/// An X of packs; `make(i)` designs lane i as an X of the plain scalar.
 template <class X, class Make>
 requires std::invocable<Make, int> Expected<X, Error<typename X::scalar_type>> make_lanes(
     const Make& make) {
@@ -255,7 +250,7 @@ Check<typename X::scalar_type> adopt_lanes(X& object, const X& fresh) {
   return {};
 }
 
-/// `retune` of all that has `make` and `adopt`: designs once.
+/// `retune` of every type that has `make` and `adopt`.
 template <class T>
 Check<typename T::scalar_type> retune(T& object, const typename T::Config& config) {
   const auto fresh = T::make(config);

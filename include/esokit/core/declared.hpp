@@ -1,9 +1,11 @@
 /// @file
-/// Traits that a type declares in one place, and the check that it has what it declares.
+/// Traits that a type declares in one place, and the check that the type has what it
+/// declares.
 ///
 /// A type declares what it can do in a static constant `traits`; without it the defaults apply. A
-/// member is never called only because it has the name of a hook: a member with such a name that is
-/// not declared is a mistake, and so is a declared hook that is missing.
+/// member is never called only because it has the name of a hook (an optional member function): a
+/// member with such a name that is not declared is a mistake, and so is a declared hook that is
+/// missing.
 #pragma once
 
 #include <concepts>
@@ -15,8 +17,9 @@ namespace esokit::detail {
 template <auto>
 struct Constant;
 
-/// Defines `names_NAME<T>`: T has a member of this name, whatever it is, overloaded or private.
-// The name is looked up in a class that inherits it a second time: found twice it is ambiguous.
+/// Defines `names_NAME<T>`: T has a member of this name, of any kind, even overloaded or private.
+// Looks the name up in a class that inherits from T and from a class with a member of that name: if
+// T has one too, the lookup is ambiguous and fails.
 #define ESOKIT_MEMBER_NAME(name)                               \
   struct Naming_##name {                                       \
     int name;                                                  \
@@ -32,7 +35,7 @@ struct Constant;
     }                                                          \
   }();
 
-/// Defines `calls_NAME<T>`: T has a member function of this name, a misspelled hook.
+/// Defines `calls_NAME<T>`: T has a member function of this name. Used to find misspelled hooks.
 #define ESOKIT_MEMBER_FUNCTION(name)                                \
   template <class T>                                                \
   inline constexpr bool calls_##name = requires {                   \
@@ -42,7 +45,7 @@ struct Constant;
 ESOKIT_MEMBER_NAME(traits)
 ESOKIT_MEMBER_NAME(check)
 
-/// What T declares, or the defaults.
+/// The traits that T declares, or the defaults.
 template <class T, class Traits>
 inline constexpr Traits declared_traits = [] {
   if constexpr (names_traits<T>) {
@@ -52,7 +55,7 @@ inline constexpr Traits declared_traits = [] {
   }
 }();
 
-/// Whether a hook is there as it was declared: one that is not declared must not even be named.
+/// Whether a hook agrees with its declaration. If it is not declared, no member may have its name.
 constexpr bool as_declared(bool declared, bool named, bool right) noexcept {
   return declared ? right : !named;
 }
@@ -61,7 +64,7 @@ constexpr bool as_declared(bool declared, bool named, bool right) noexcept {
 
 namespace esokit {
 
-/// `traits`, where T has it, is a public static constexpr Traits.
+/// If T has a member `traits`, it is a public static constexpr Traits.
 template <class T, class Traits>
 concept DeclaresTraits = !detail::names_traits<T> || requires {
   { T::traits } -> std::same_as<const Traits&>;

@@ -11,29 +11,29 @@
 
 namespace esokit {
 
-/// Names the field, its value and the broken rule. It can be written to any stream with <<;
-/// `to_text` and std::format are in core/error_text.hpp, which firmware need not include.
+/// Names the field, its value and the broken rule. Write it to any stream with <<, or include
+/// core/error_text.hpp for `to_text` and std::format.
 ///
-/// The value has the scalar type of the config: a double would link soft-float helpers on a
-/// single-precision target.
+/// The value has the scalar type of the config: on a single-precision target a double would link
+/// routines for software floating point.
 template <class ScalarType>
 struct Error {
   const char* field = "";  ///< name of the config member, static storage
   ScalarType value{};      ///< the value that was refused
   const char* rule = "";   ///< the rule it breaks, static storage
   int index = -1;          ///< element of an array member, -1 for a scalar member
-  ScalarType limit{};      ///< computed limit that belongs to the rule, if has_limit
-  bool has_limit = false;  ///< whether `limit` says anything
-  int lane = -1;           ///< lane of a pack that the value is from, -1 for a plain scalar
+  ScalarType limit{};      ///< computed limit of the rule; valid if has_limit
+  bool has_limit = false;  ///< whether `limit` is valid
+  int lane = -1;           ///< lane of the pack from which the value is, -1 for a plain scalar
 };
 
-/// Has text.
+/// An Error can be written to a stream, see has_text.
 template <class ScalarType>
 inline constexpr bool has_text<Error<ScalarType>> = true;
 
 namespace detail {
 
-/// The value of the lane that an error is about.
+/// The value in the lane to which an error belongs.
 template <class ScalarType>
 constexpr const auto& value_in_lane(const ScalarType& value, [[maybe_unused]] int lane) noexcept {
   if constexpr (lane_count < ScalarType >> 1) {
@@ -45,7 +45,7 @@ constexpr const auto& value_in_lane(const ScalarType& value, [[maybe_unused]] in
 
 }  // namespace detail
 
-/// Writes `field[index] = value: rule limit`, and which lane.
+/// Writes `field[index] = value: rule limit (lane number)`, without the parts that do not apply.
 template <class Stream, class ScalarType>
 requires detail::WritesText<Stream, int, LaneScalar<ScalarType>> Stream& operator<<(
     Stream& out, const Error<ScalarType>& error) {
@@ -57,7 +57,7 @@ requires detail::WritesText<Stream, int, LaneScalar<ScalarType>> Stream& operato
   return out;
 }
 
-/// Printed before `Expected::value()` on an error ends the program; desktop systems only.
+/// Prints the error before `Expected::value()` ends the program; on systems with a console only.
 template <class ScalarType>
 void print_last_words([[maybe_unused]] const Error<ScalarType>& error) noexcept {
 #if defined(__linux__) || defined(_WIN32) || defined(__APPLE__)

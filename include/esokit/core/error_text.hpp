@@ -1,6 +1,6 @@
 /// @file
-/// Text of the types with `has_text`, for programs with a console: errors, results, flags.
-/// std::format is tested with Clang 19 and its libc++; GCC has it from 13 on, where it is not
+/// Text of the types with `has_text` (errors, results, flags), for programs with a console.
+/// std::format is tested with Clang 19 and libc++; GCC has it from version 13, where it is not
 /// tested.
 #pragma once
 
@@ -14,7 +14,7 @@
 
 namespace esokit {
 
-/// The text that << writes, as a string.
+/// What << writes, as a string.
 template <class T>
 requires has_text<T> && detail::WritesText<std::ostream, T> std::string to_text(const T& value) {
   std::ostringstream out;
@@ -25,7 +25,7 @@ requires has_text<T> && detail::WritesText<std::ostream, T> std::string to_text(
 }  // namespace esokit
 
 #ifdef __cpp_lib_format
-/// The same for std::format, with the width and fill of a string.
+/// Lets std::format write these types, with width and fill as for a string.
 template <class T>
 requires requires(const T& value) { esokit::to_text(value); }
 struct std::formatter<T> : std::formatter<std::string> {

@@ -10,8 +10,8 @@
 
 namespace esokit {
 
-/// Holds either a T or an E. Checked in every build type: reading the value if there is an error
-/// prints the error (where there is a console) and aborts.
+/// Holds either a T or an E. Access is checked in every build type: reading the value when there is
+/// an error prints the error (where there is a console) and aborts.
 ///
 /// A subset of C++23's std::expected under the same names, so that code can move to it.
 template <class T, class E>
@@ -20,7 +20,7 @@ class [[nodiscard]] Expected {
   using value_type = T;  ///< type of the value
   using error_type = E;  ///< type of the error
 
-  /// Implicit, so that `return value;` and `return error;` both do.
+  /// Implicit, so that both `return value;` and `return error;` compile.
   /// @{
   constexpr Expected(const T& value) : content_(std::in_place_index<0>, value) {}
   constexpr Expected(T&& value) : content_(std::in_place_index<0>, std::move(value)) {}
@@ -36,7 +36,7 @@ class [[nodiscard]] Expected {
   /// The value; if there is none, prints the error and ends the program. @{
   [[nodiscard]] constexpr T& value() & noexcept { return *checked(*this); }
   [[nodiscard]] constexpr const T& value() const& noexcept { return *checked(*this); }
-  /// By value, so that `for (x : make_grid().value())` does not use a destroyed object.
+  /// Returns by value, so that `for (x : make_grid().value())` does not use a destroyed object.
   [[nodiscard]] constexpr T value() && noexcept { return std::move(*checked(*this)); }
 
   [[nodiscard]] constexpr T& operator*() & noexcept { return value(); }
@@ -84,12 +84,12 @@ class [[nodiscard]] Expected {
 template <class E>
 class [[nodiscard]] Expected<void, E> {
  public:
-  using value_type = void;  ///< success has none
+  using value_type = void;  ///< a success carries no value
   using error_type = E;     ///< type of the error
 
   /// Success.
   constexpr Expected() noexcept = default;
-  /// Implicit, so that `return error;` does.
+  /// Implicit, so that `return error;` compiles.
   constexpr Expected(E error) : error_(std::in_place_index<1>, std::move(error)) {}
 
   /// True for success, false if there is an error.
@@ -116,11 +116,11 @@ class [[nodiscard]] Expected<void, E> {
   std::variant<std::monostate, E> error_;
 };
 
-/// Has text.
+/// An Expected can be written to a stream, see has_text.
 template <class T, class E>
 inline constexpr bool has_text<Expected<T, E>> = true;
 
-/// Writes the error, or the value where it can be written, else `ok`.
+/// Writes the error or the value; `ok` for a value that cannot be written.
 template <class Stream, class T, class E>
 requires detail::WritesText<Stream, E> Stream& operator<<(Stream& out,
                                                           const Expected<T, E>& result) {

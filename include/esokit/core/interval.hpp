@@ -1,5 +1,5 @@
 /// @file
-/// A part of the number line.
+/// An interval of real numbers.
 #pragma once
 
 #include <esokit/core/language.hpp>

@@ -1,6 +1,7 @@
 /// @file
-/// The vector operations that a step of an observer consists of, unrolled when compiling: all that
-/// is hard to read for the sake of speed is here, so that a step reads like its equation.
+/// The vector operations of which a step of an observer consists, unrolled at compile time.
+/// Code that is hard to read for the sake of speed is kept here, so that a step reads like its
+/// equation.
 #pragma once
 
 #include <esokit/core/scalar.hpp>
@@ -8,7 +9,7 @@
 
 namespace esokit::detail {
 
-/// to = from. GCC copies a pack of several registers in pieces of its own, through memory.
+/// to = from. A plain assignment of a pack of several registers goes through memory with GCC.
 template <class S>
 ESOKIT_INLINE constexpr void assign(S& to, const S& from) noexcept {
   if constexpr (requires { to.assign(from); }) {
@@ -18,7 +19,7 @@ ESOKIT_INLINE constexpr void assign(S& to, const S& from) noexcept {
   }
 }
 
-/// x + k e, element by element: a correction.
+/// x + k e, element by element: the correction step of an observer.
 template <class S, std::size_t Size>
 [[nodiscard]] ESOKIT_INLINE constexpr std::array<S, Size> add_scaled(const std::array<S, Size>& x,
                                                                      const std::array<S, Size>& k,
@@ -50,7 +51,7 @@ template <int First, int Count, class W, class X>
   return sum;
 }
 
-/// The same of an observer's scaled estimates.
+/// The same sum over the scaled estimates of an observer.
 template <int First, int Count, class W, class Observer>
 [[nodiscard]] ESOKIT_INLINE constexpr auto weighed_estimates(const W& w,
                                                              const Observer& observer) noexcept {
@@ -105,7 +106,7 @@ template <class S, std::size_t Size>
   return result;
 }
 
-/// Keeps the vectoriser off all elements, see keep_scalar.
+/// Calls keep_scalar for each element.
 template <class S>
 ESOKIT_INLINE constexpr void keep_scalars(S& x) noexcept {
   keep_scalar(x);

@@ -1,6 +1,6 @@
 /// @file
-/// LaneByLane: lets types that gain nothing from packs take them nevertheless, as one plain object
-/// per lane.
+/// LaneByLane: makes types that gain nothing from packs usable with packs, as one plain
+/// object per lane.
 #pragma once
 
 #include <concepts>
@@ -16,7 +16,7 @@ namespace esokit {
 
 namespace detail {
 
-/// What a T of each lane is for a pack S: numbers become packs, all else a PerLane.
+/// The type that holds one T for each lane of the pack S: numbers become packs, all else a PerLane.
 template <class T, class S>
 struct OfPacks {
   using type = PerLane<T, lane_count<S>>;
@@ -35,7 +35,8 @@ struct OfPacks<std::array<T, Count>, S> {
   using type = std::array<typename OfPacks<T, S>::type, Count>;
 };
 
-/// What lane i has of a T of packs. What is neither made of packs nor PerLane is common to all.
+/// The type of one lane of a T made of packs. What is neither made of packs nor a PerLane is common
+/// to all lanes.
 template <class T, class S>
 struct OfLane {
   using type = T;
@@ -71,16 +72,17 @@ concept Retunable = requires(T& object, const T& fresh, const typename T::Config
   object.adopt(fresh);
 };
 
-/// What a LaneByLane is.
+/// Base of every LaneByLane, by which goes_lane_by_lane finds it.
 struct GoesLaneByLane {};
 
-/// Whether an observer or controller of packs is so many plain ones: what goes around it is too.
+/// Whether an observer or controller of packs consists of plain ones. An adapter around such a type
+/// must be lane by lane, too.
 template <class T>
 inline constexpr bool goes_lane_by_lane = std::is_base_of_v<GoesLaneByLane, T>;
 
 }  // namespace detail
 
-/// Defines member functions of this name: lane by lane what `Plain` has of it.
+/// Defines member functions of this name that call those of `Plain` in each lane.
 #define ESOKIT_EACH_LANE(name)                                                \
   template <class... Given>                                                   \
   auto name(const Given&... given) noexcept requires requires(Plain & lane) { \
@@ -102,7 +104,7 @@ inline constexpr bool goes_lane_by_lane = std::is_base_of_v<GoesLaneByLane, T>;
     });                                                                       \
   }
 
-/// The same of a row that is known when compiling.
+/// The same for functions with the row as a template argument.
 #define ESOKIT_EACH_LANE_ROW(name)                                                        \
   template <int Row>                                                                      \
   [[nodiscard]] auto name() const noexcept requires requires(const Plain& lane) {         \
@@ -113,12 +115,13 @@ inline constexpr bool goes_lane_by_lane = std::is_base_of_v<GoesLaneByLane, T>;
   }
 
 /// One `Plain` object for each lane of a pack, with the members of a single one: each call goes to
-/// lane after lane, packs of arguments are split and packs of results put together. It can do what
-/// `Plain` can do.
+/// one lane after the other, arguments are split into lanes and results are put together as packs.
+/// It has the members of `Plain` that are listed below.
 ///
-/// For types that branch on measurements or do little arithmetic: there packs would not be faster.
-/// It costs as much as its lanes.
-/// @tparam Self the class built on this @tparam Plain a lane @tparam S the pack
+/// For types that branch on measurements or do little arithmetic, where packs would not be faster.
+/// It costs as much as its lanes one by one.
+/// @tparam Self the class that derives from this one @tparam Plain type of a lane @tparam S the
+/// pack
 /// @tparam Settings its Config, of packs
 template <class Self, class Plain, PackScalar S, class Settings>
 class LaneByLane : public detail::GoesLaneByLane {
@@ -128,14 +131,14 @@ class LaneByLane : public detail::GoesLaneByLane {
   using Plains = Array<Plain, count>;
 
  public:
-  using scalar_type = S;    ///< of signals and settings
+  using scalar_type = S;    ///< type of signals and settings
   using Config = Settings;  ///< settings of make
 
-  /// Of the lanes.
+  /// Takes one finished object for each lane.
   constexpr explicit LaneByLane(const Plains& lanes) noexcept : lanes_(lanes) {}
 
   /// Checks the settings and does all the design work, lane by lane.
-  /// @return or an error that names the field, and the lane
+  /// @return the object, or an error that names field and lane
   static Expected<Self, Error<S>> make(const Config& config) {
     return [&]<int... I>(std::integer_sequence<int, I...>)->Expected<Self, Error<S>> {
       const Array<Expected<Plain, Error<LaneScalar<S>>>, count> made{
@@ -149,22 +152,22 @@ class LaneByLane : public detail::GoesLaneByLane {
     (std::make_integer_sequence<int, count>{});
   }
 
-  /// New settings while running: of all lanes or of none.
+  /// New settings while running: taken by all lanes or, on an error, by none.
   Check<S> retune(const Config& config) requires detail::Retunable<Plain> {
     return all_or_none(
         [&](Plain& lane, [[maybe_unused]] int i) { return lane.retune(settings(config, i)); });
   }
 
-  /// The same, with the settings of `fresh`, as `make` gave it.
+  /// The same with the settings of `fresh`, as returned by `make`.
   Check<S> adopt(const Self& fresh) requires detail::Retunable<Plain> {
     return all_or_none([&](Plain& lane, [[maybe_unused]] int i) { return lane.adopt(fresh[i]); });
   }
 
-  /// A lane, for all its other members.
+  /// One lane, to call its other members.
   [[nodiscard]] constexpr Plain& operator[](int lane) noexcept {
     return lanes_[static_cast<std::size_t>(lane)];
   }
-  /// The same, to look at.
+  /// The same, read only.
   [[nodiscard]] constexpr const Plain& operator[](int lane) const noexcept {
     return lanes_[static_cast<std::size_t>(lane)];
   }
@@ -266,7 +269,7 @@ class LaneByLane : public detail::GoesLaneByLane {
     return reset(detail::listed(state));
   }
 
-  /// For the next step of each lane; all of them or none.
+  /// Sets the length of the next step of each lane, s: of all lanes or, on an error, of none.
   template <class P = Plain>
   requires requires(P& lane, const LaneScalar<S>& seconds) { lane.set_step_time(seconds); }
   Check<S> set_step_time(const S& seconds) noexcept {
@@ -274,7 +277,7 @@ class LaneByLane : public detail::GoesLaneByLane {
         [&](Plain& lane, [[maybe_unused]] int i) { return lane.set_step_time(seconds[i]); });
   }
 
-  /// From the coming sample of each lane on; all of them or none.
+  /// Sets b0 of each lane from the next sample on: of all lanes or, on an error, of none.
   template <class P = Plain>
   requires requires(P& lane, const LaneScalar<S>& b) { lane.set_input_gain(b); }
   Check<S> set_input_gain(const S& b) noexcept {
@@ -282,7 +285,7 @@ class LaneByLane : public detail::GoesLaneByLane {
         [&](Plain& lane, [[maybe_unused]] int i) { return lane.set_input_gain(b[i]); });
   }
 
-  /// What all lanes bridge: with a model a lane may bridge more.
+  /// The longest gap that every lane bridges; with a model some lanes may bridge more.
   [[nodiscard]] int max_gap() const noexcept requires requires(const Plain& lane) {
     lane.max_gap();
   }
@@ -291,12 +294,12 @@ class LaneByLane : public detail::GoesLaneByLane {
     for (const Plain& lane : lanes_) most = lane.max_gap() < most ? lane.max_gap() : most;
     return most;
   }
-  /// Common to all lanes.
+  /// The delay, which is the same for all lanes.
   [[nodiscard]] int delay() const noexcept requires requires(const Plain& lane) { lane.delay(); }
   { return lanes_[0].delay(); }
 
  protected:
-  /// f(lane, i) of each lane, put together.
+  /// The results of f(lane, i) of all lanes, put together as packs.
   template <class All, class Function>
   static auto each(All& all, Function&& f) noexcept {
     using Result = std::remove_cvref_t<decltype(f(all.lanes_[0], 0))>;
@@ -311,7 +314,7 @@ class LaneByLane : public detail::GoesLaneByLane {
     }
   }
 
-  /// What f(lane) gives of each lane as the one of packs that it is a part of.
+  /// Puts the objects f(lane) of all lanes together as one `Whole` of packs.
   template <class Whole, class Function>
   [[nodiscard]] Whole gathered(Function&& f) const noexcept {
     Whole all = detail::blank<Whole>();

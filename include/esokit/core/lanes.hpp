@@ -3,8 +3,8 @@
 /// ones and put together again.
 ///
 /// In normal operation an observer of packs computes with packs. If one lane has a bad sample, a
-/// gap or a restart, each lane goes through the observer of the plain scalar: so the handling of
-/// faults is written once, and the lanes behave like plain observers by construction.
+/// gap or a restart, each lane goes through the observer of the plain scalar: so fault handling is
+/// written once, and each lane behaves exactly like a plain observer.
 #pragma once
 
 #include <array>
@@ -21,7 +21,7 @@
 
 namespace esokit {
 
-/// A value that is not a number, one for each lane.
+/// One value for each lane, for types that are not numbers (flags, counts).
 template <class T, int Count>
 struct PerLane {
   Array<T, Count> values{};  ///< of lane 0, 1, ..
@@ -30,7 +30,7 @@ struct PerLane {
   /// The same in every lane.
   constexpr PerLane(T value) noexcept { values.fill(value); }
 
-  /// Of a lane.
+  /// The value of a lane.
   /// @{
   [[nodiscard]] constexpr T& operator[](int lane) noexcept {
     return values[static_cast<std::size_t>(lane)];
@@ -40,10 +40,10 @@ struct PerLane {
   }
   /// @}
 
-  /// Whether they are the same in every lane.
+  /// True if all lanes are equal.
   ESOKIT_INLINE friend constexpr bool operator==(const PerLane& a, const PerLane& b) noexcept {
     if constexpr (std::has_unique_object_representations_v<PerLane>) {
-      // In words: compilers call memcmp for an array.
+      // Compared as machine words: for an array compilers call memcmp.
       constexpr std::size_t size = sizeof(PerLane);
       using Word = std::conditional_t<
           size % 8 == 0, std::uint64_t,
@@ -63,7 +63,7 @@ struct PerLane {
   }
 };
 
-/// A T for each lane of S: T itself where there is one.
+/// One T for each lane of S: T itself if S is a plain scalar.
 template <class T, class S>
 using Lanes = std::conditional_t<lane_count<S> == 1, T, PerLane<T, lane_count<S>>>;
 
@@ -94,8 +94,9 @@ constexpr void copy_fields(const TiedFields<std::integer_sequence<int, I...>, T.
                            const TiedFields<std::integer_sequence<int, I...>, U...>& plain,
                            int i) noexcept;
 
-/// How a class lets its lanes be told apart: it has `with_scalar<T>`, itself of another scalar, and
-/// `fields(object)`, a tie of all that it holds, private for this friend.
+/// Access to the members by which a class is split into lanes: `with_scalar<T>`, the class with
+/// another scalar, and `fields(object)`, a tie of all its data members. Both may be private if this
+/// is a friend.
 struct LaneAccess {
   template <class Object>
   static constexpr bool has_fields = requires(Object& object) {
@@ -105,7 +106,8 @@ struct LaneAccess {
   static constexpr auto fields(Object& object) noexcept {
     return std::remove_const_t<Object>::fields(object);
   }
-  // Not by a friend template with constraints: Clang 16 takes them for another template's.
+  // Not a constrained friend template: Clang 16 takes its constraints for those of another
+  // template.
   template <class Object, class S>
   static constexpr auto update_advanced(Object& object, const S& y, const S& u) noexcept {
     return object.update_advanced(y, u);
@@ -142,12 +144,12 @@ struct IsOptional : std::false_type {};
 template <class T>
 struct IsOptional<std::optional<T>> : std::true_type {};
 
-/// Copies lane `i` of `packed` to `plain`, or back (`Back`). What is no pack and not per lane is
-/// common to all.
+/// Copies lane `i` of `packed` to `plain`, or back (`Back`). What is neither a pack nor a PerLane
+/// is common to all lanes.
 template <bool Back, class Packed, class Plain>
 constexpr void copy_lane(Packed& packed, Plain& plain, int i) noexcept {
   if constexpr (std::is_empty_v<Packed>) {
-    // Nothing to copy; it may be of a type of its own in each.
+    // Nothing to copy; the types in packed and plain objects may differ.
   } else if constexpr (std::is_same_v<std::remove_const_t<Packed>, std::remove_const_t<Plain>>) {
     if constexpr (Back) {
       packed = plain;
@@ -198,7 +200,7 @@ constexpr void set_lane(Packed& packed, const Plain& plain, int i) noexcept {
   copy_lane<true>(packed, plain, i);
 }
 
-/// The same with another scalar.
+/// Object with the scalar T.
 template <class Object, class T>
 struct WithScalarOf {
   static_assert(
@@ -219,15 +221,16 @@ struct PlainTwinOf<Object, S> {
   using type = WithScalar<Object, LaneScalar<S>>;
 };
 
-/// What a lane of an Object of S is; of a plain scalar the Object itself.
+/// The type of one lane of an Object with scalar S; for a plain scalar the Object itself.
 template <class Object, class S>
 using PlainTwin = typename PlainTwinOf<Object, S>::type;
 
-/// The same of an observer or controller.
+/// The type of one lane of an observer or controller.
 template <class Object>
 using LaneOf = PlainTwin<Object, typename Object::scalar_type>;
 
-/// A model or gain function of another scalar; one that does not say what that is serves any.
+/// A model or gain function with another scalar. One without `with_scalar` is used as it is for
+/// every scalar.
 /// @{
 template <class Function, class T>
 struct ForScalar {
@@ -238,14 +241,14 @@ requires requires { typename Function::template with_scalar<T>; }
 struct ForScalar<Function, T> {
   using type = typename Function::template with_scalar<T>;
 };
-/// Whether it can be one of another scalar: it holds nothing, or says what it is then.
+/// Whether a function is available with another scalar: it holds no data, or it has `with_scalar`.
 template <class Function>
 inline constexpr bool has_other_scalars = std::is_empty_v<Function> || requires {
   typename Function::template with_scalar<float>;
 };
 /// @}
 
-/// What belongs to lane `i`: of a PerLane its element, of a plain scalar's the thing itself.
+/// The part of lane `i`: the element of a PerLane, else the object itself.
 /// @{
 template <class T>
 [[nodiscard]] constexpr T& of_lane(T& one, int) noexcept {
@@ -259,7 +262,7 @@ template <class T, int Count>
 [[nodiscard]] constexpr const T& of_lane(const PerLane<T, Count>& each, int i) noexcept {
   return each[i];
 }
-/// bits = (bits & keep) | set, of a PerLane in each lane: all lanes in one word.
+/// bits = (bits & keep) | set. For a PerLane in each lane, with all lanes in one machine word.
 /// @{
 constexpr void set_bits(std::int8_t& bits, int keep, int set) noexcept {
   bits = static_cast<std::int8_t>((bits & keep) | set);
@@ -293,14 +296,14 @@ template <Scalar S>
 }
 /// @}
 
-/// An object whose fields are yet to be filled.
+/// An object whose fields are still to be filled.
 template <class T>
 constexpr T blank() noexcept {
   static_assert(std::is_trivially_copyable_v<T>);
   return std::bit_cast<T>(std::array<unsigned char, sizeof(T)>{});
 }
 
-/// Lane `i` of an observer, law or controller of packs, as one of the plain scalar.
+/// Lane `i` of an observer, law or controller of packs, as an object of the plain scalar.
 template <class Plain, class Packed>
 [[nodiscard]] constexpr Plain get_lane(const Packed& packed, int i) noexcept {
   auto plain = blank<Plain>();
@@ -308,7 +311,7 @@ template <class Plain, class Packed>
   return plain;
 }
 
-/// Calls f(plain, i) for each lane of `packed` and puts `plain` back.
+/// Calls f(plain, i) for each lane of `packed` and stores the changed `plain` in it.
 template <class Plain, class Packed, class Function>
 constexpr void for_each_lane(Packed& packed, Function&& f) noexcept {
   for (int i = 0; i < lane_count<typename Packed::scalar_type>; ++i) {

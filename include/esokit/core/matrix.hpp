@@ -1,10 +1,10 @@
 /// @file
-/// Vectors and matrices of fixed size, of the public interface and of the design work.
+/// Vectors and matrices of fixed size, for the public interface and the design work.
 ///
-/// What a controller runs on needs no linear algebra library: these are arrays with an int
-/// subscript and the few operations that the design takes. Eigen's types convert to and from them
-/// without a header of Eigen being included here; `eigen(x)` of esokit/eigen.hpp is a map onto one,
-/// for all else that Eigen can do.
+/// A controller needs no linear algebra library: these are arrays with an int subscript and the few
+/// operations that the design takes. They convert to and from Eigen types, although no Eigen header
+/// is included here. For all other operations `eigen(x)` of esokit/eigen.hpp gives an Eigen map
+/// onto x.
 #pragma once
 
 #include <array>
@@ -23,8 +23,8 @@ class Matrix;
 
 namespace detail {
 
-/// Has its sizes as enumerators or constants, as Eigen's dense types do; -1 is a size that is known
-/// at run time only.
+/// Has its sizes as enumerators or constants, as the dense types of Eigen do; -1 means that the
+/// size is known at run time only.
 template <class T>
 concept DenseSizes = requires {
   typename T::Scalar;
@@ -39,21 +39,21 @@ concept DenseOfSize = DenseSizes<T> && std::same_as<typename T::Scalar, ScalarTy
                       (static_cast<int>(T::ColsAtCompileTime) == Columns ||
                        static_cast<int>(T::ColsAtCompileTime) < 0);
 
-/// The elements of an expression of Eigen's, once they are computed.
+/// An Eigen expression, evaluated.
 template <class T>
 decltype(auto) evaluated(const T& expression) requires requires {
   expression.eval().coeff(0, 0);
 }
 { return expression.eval(); }
 
-/// The same of a diagonal or triangular one.
+/// The same for a diagonal or triangular expression.
 template <class T>
 auto evaluated(const T& expression) requires requires {
   expression.toDenseMatrix().coeff(0, 0);
 }
 { return expression.toDenseMatrix(); }
 
-/// An expression of Eigen's, whatever it is made of.
+/// Any Eigen expression.
 template <class T>
 concept DenseExpression = DenseSizes<T> && requires(const T& expression) {
   detail::evaluated(expression);
@@ -61,14 +61,14 @@ concept DenseExpression = DenseSizes<T> && requires(const T& expression) {
   static_cast<int>(expression.cols());
 };
 
-/// A matrix, vector or array of Eigen's that owns its elements.
+/// An Eigen matrix, vector or array that owns its elements.
 template <class T>
 concept DenseStorage = DenseSizes<T> && std::default_initializable<T> && requires(T& storage) {
   storage.resize(1, 1);
   storage.coeffRef(0, 0) = typename T::Scalar();
 };
 
-/// An expression of Eigen's, or one of ours, that is a column of elements: how many. Nothing else.
+/// Number of elements of a column vector, of Eigen or of esokit; 0 for all other types.
 template <class T>
 inline constexpr int vector_size = 0;
 
@@ -80,12 +80,13 @@ requires(static_cast<int>(T::ColsAtCompileTime) == 1 &&
 template <class ScalarType, int Size>
 inline constexpr int vector_size<Matrix<ScalarType, Size, 1>> = Size;
 
-/// Converts to a Vector of its own size: what a function takes that leaves the size open.
+/// Converts to a Vector of its own size: an argument of functions that accept any size.
 template <class T, class ScalarType>
 concept VectorOf = vector_size<T> >
 0 && std::convertible_to<const T&, Matrix<ScalarType, vector_size<T>, 1>>;
 
-/// S for every I: as many parameters as there are elements.
+/// S, whatever the int is: expanded over a pack of ints, it lists as many parameters as there are
+/// elements.
 template <class S, int>
 struct Repeated {
   using type = S;  ///< S
@@ -95,8 +96,9 @@ struct Repeated {
 template <class S, int Columns>
 using ListedRow = S[static_cast<std::size_t>(Columns)];
 
-/// The elements, column by column, and the constructors that list them. Their number is part of the
-/// signature, so that the language checks it, and narrowing with it.
+/// The elements, column by column, and the constructors that list them. The number of elements is
+/// part of the constructor's signature, so that the compiler refuses a wrong number and a narrowing
+/// conversion.
 template <class S, int Rows, int Columns, class Places>
 class MatrixElements;
 
@@ -148,8 +150,8 @@ using MatrixBase =
 /// Matrix of `Rows` x `Columns` elements, zero unless listed: `{a, b, c}` for a vector, `{{a, b},
 /// {c, d}}` by rows. An index out of bounds is caught by an assertion.
 ///
-/// A type of Eigen's of the same scalar and of this size, or of a size that is known at run time,
-/// converts from it and to it: `Eigen::Vector3d z = observer.estimate()`.
+/// It converts from and to Eigen types of the same scalar, of this size or of a size known at run
+/// time: `Eigen::Vector3d z = observer.estimate()`.
 template <class ScalarType, int Rows, int Columns>
 class Matrix : public detail::MatrixBase<ScalarType, Rows, Columns> {
   using Base = detail::MatrixBase<ScalarType, Rows, Columns>;
@@ -164,7 +166,7 @@ class Matrix : public detail::MatrixBase<ScalarType, Rows, Columns> {
   /// All elements zero.
   constexpr Matrix() = default;
 
-  /// From an expression of Eigen's; one whose size is known at run time must have this size.
+  /// From an Eigen expression; if its size is known at run time only, it must have this size.
   template <detail::DenseExpression Expression>
   requires detail::DenseOfSize<Expression, ScalarType, Rows, Columns> Matrix(
       const Expression& expression) {
@@ -175,7 +177,7 @@ class Matrix : public detail::MatrixBase<ScalarType, Rows, Columns> {
     }
   }
 
-  /// To a type of Eigen's that owns its elements.
+  /// To an Eigen type that owns its elements.
   template <detail::DenseStorage Storage>
   requires detail::DenseOfSize<Storage, ScalarType, Rows, Columns>
   operator Storage() const {
@@ -197,7 +199,7 @@ class Matrix : public detail::MatrixBase<ScalarType, Rows, Columns> {
     for (ScalarType& element : result) element = value;
     return result;
   }
-  /// Zero but for the diagonal: `Covariance::Diagonal({1e-4, 1, 1e3})`.
+  /// Zero except for the diagonal: `Covariance::Diagonal({1e-4, 1, 1e3})`.
   static constexpr Matrix Diagonal(const Matrix<ScalarType, Rows, 1>& elements) noexcept
       requires(Rows == Columns) {
     Matrix result = Zero();
@@ -240,7 +242,7 @@ class Matrix : public detail::MatrixBase<ScalarType, Rows, Columns> {
     return elements_[place(i)];
   }
 
-  /// Column by column.
+  /// The elements, column by column.
   [[nodiscard]] constexpr ScalarType* data() noexcept { return elements_.data(); }
   [[nodiscard]] constexpr const ScalarType* data() const noexcept { return elements_.data(); }
   [[nodiscard]] constexpr ScalarType* begin() noexcept { return data(); }
@@ -294,7 +296,7 @@ class Matrix : public detail::MatrixBase<ScalarType, Rows, Columns> {
     }
     return result;
   }
-  /// Sum of the products of elements at the same place.
+  /// Scalar product.
   [[nodiscard]] constexpr ScalarType dot(const Matrix& other) const noexcept requires is_vector {
     ScalarType sum = (*this)(0) * other(0);
     for (int i = 1; i < count; ++i) sum = sum + (*this)(i)*other(i);
@@ -388,7 +390,7 @@ constexpr Matrix<ScalarType, Rows, Columns> operator*(
   return result;
 }
 
-/// The same where one is an expression of Eigen's.
+/// The same if one of them is an Eigen expression.
 /// @{
 template <detail::DenseExpression Expression, class ScalarType, int Inner, int Columns>
 requires(static_cast<int>(Expression::RowsAtCompileTime) > 0)  //
@@ -406,11 +408,11 @@ requires(static_cast<int>(Expression::ColsAtCompileTime) > 0)  //
 }
 /// @}
 
-/// Has text.
+/// A Matrix can be written to a stream, see has_text.
 template <class ScalarType, int Rows, int Columns>
 inline constexpr bool has_text<Matrix<ScalarType, Rows, Columns>> = true;
 
-/// Writes a line for each row.
+/// Writes one line for each row.
 template <class Stream, class ScalarType, int Rows, int Columns>
 requires detail::WritesText<Stream, ScalarType> Stream& operator<<(
     Stream& out, const Matrix<ScalarType, Rows, Columns>& matrix) {

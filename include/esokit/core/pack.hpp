@@ -1,5 +1,6 @@
 /// @file
-/// Pack: several floats or doubles that are processed at once, as one scalar of the library.
+/// Pack: several floats or doubles that are processed at once (SIMD), as one scalar of the
+/// library.
 #pragma once
 
 #include <bit>
@@ -29,25 +30,26 @@ inline constexpr int register_bytes =
 template <class S>
 inline constexpr int register_lanes = register_bytes / static_cast<int>(sizeof(S));
 
-/// `Count` numbers in as many registers as they need, in the compilers' vector types. A vector type
-/// wider than a register would go from function to function by other rules (-Wpsabi).
+/// `Count` numbers in as many registers as they need, in the compiler's vector types. A vector type
+/// wider than a register would be passed to functions by different ABI rules (-Wpsabi).
 template <class S, int Count>
 struct Registers {
   typedef S Register __attribute__((vector_size(sizeof(S) * Count)));
 
-  // A vector may be looked at as what it consists of, with both compilers.
+  // GCC and Clang both allow an element of a vector type to be accessed through a pointer to its
+  // element type.
   [[nodiscard]] S& operator[](int lane) noexcept { return reinterpret_cast<S*>(&value)[lane]; }
   [[nodiscard]] const S& operator[](int lane) const noexcept {
     return reinterpret_cast<const S*>(&value)[lane];
   }
 
-  /// f of the registers of all `from`, one after the other.
+  /// Applies f to the registers of all `from`, one register after the other.
   template <class Function, class... From>
   ESOKIT_INLINE static constexpr Registers each(Function&& f, const From&... from) noexcept {
     return {Register(f(from.value...))};
   }
 
-  /// All registers by `and` in one.
+  /// Bitwise `and` of all registers.
   [[nodiscard]] ESOKIT_INLINE constexpr Register every() const noexcept { return value; }
 
   ESOKIT_INLINE constexpr void assign(const Registers& from) noexcept { value = from.value; }
@@ -55,7 +57,7 @@ struct Registers {
   Register value;
 };
 
-// In halves and not as an array, which GCC 12 keeps in memory.
+// Two halves instead of an array, because GCC 12 keeps an array in memory.
 template <class S, int Count>
 requires(Count > register_lanes<S>) struct Registers<S, Count> {
   using Half = Registers<S, Count / 2>;
@@ -94,7 +96,7 @@ ESOKIT_INLINE constexpr bool all_bits(const Bits& bits) noexcept {
     using Word = std::conditional_t<words == 1, std::uint64_t, std::uint32_t>;
     return std::bit_cast<Word>(bits) == static_cast<Word>(-1);
   } else {
-    // By subscript: an array of the words would go through memory.
+    // Read by subscript: an array of the words would go through memory.
     const auto word = std::bit_cast<typename Registers<std::int64_t, words>::Register>(bits);
 #if defined(__AVX__)
     if constexpr (words == 4) {
@@ -112,7 +114,7 @@ ESOKIT_INLINE constexpr bool all_bits(const Bits& bits) noexcept {
 
 }  // namespace detail
 
-/// Lanes that fill one vector register of the target that is compiled for: 4 doubles with AVX2.
+/// Number of lanes that fill one vector register of the compile target: 4 doubles with AVX2.
 template <std::floating_point S>
 inline constexpr int default_lanes = detail::register_lanes<S>;
 
@@ -128,7 +130,7 @@ class PackMask {
   [[nodiscard]] ESOKIT_INLINE constexpr const Bits& bits() const noexcept { return bits_; }
   /// @endcond
 
-  /// Whether it holds in a lane.
+  /// Whether the comparison holds in a lane.
   [[nodiscard]] bool operator[](int lane) const noexcept { return bits_[lane] != 0; }
 
   /// Lane by lane.
@@ -148,7 +150,7 @@ class PackMask {
   }
   /// @}
 
-  /// True if it holds in every lane.
+  /// True if the comparison holds in every lane.
   ESOKIT_INLINE friend constexpr bool all(const PackMask& mask) noexcept {
     return detail::all_bits(mask.bits_.every());
   }
@@ -157,14 +159,14 @@ class PackMask {
   Bits bits_;
 };
 
-/// `Count` floats or doubles, one of each of as many plants: a scalar of the library whose
-/// arithmetic is done on all lanes at once.
+/// `Count` floats or doubles, each of them (a lane) belonging to another plant: a scalar of the
+/// library that computes all lanes at once.
 ///
-/// An observer or controller of packs equals one plain object per lane, bit for bit (if the
-/// compiler does not fuse products and sums, -ffp-contract=off). Each lane has its own settings,
-/// faults, gaps and status.
+/// An observer or controller of packs gives the same results as one plain object per lane, bit for
+/// bit with -ffp-contract=off (the compiler must not fuse products and sums). Each lane has its own
+/// settings, faults, gaps and status.
 /// @tparam S float or double @tparam Count a power of two; more than `default_lanes` take several
-///         registers, less leave a part of one idle
+///         registers, fewer leave part of a register idle
 template <std::floating_point S, int Count = default_lanes<S>>
 class Pack {
   static_assert(std::same_as<S, float> || std::same_as<S, double>,
@@ -180,7 +182,7 @@ class Pack {
  public:
   using value_type = S;                ///< of a lane
   using Mask = PackMask<S, Count>;     ///< what a comparison gives
-  static constexpr int lanes = Count;  ///< numbers in it
+  static constexpr int lanes = Count;  ///< number of lanes
 
   /// Zero.
   constexpr Pack() noexcept : Pack(0.0) {}
@@ -188,7 +190,7 @@ class Pack {
   ESOKIT_INLINE constexpr explicit Pack(double value) noexcept
       : values_(Values::each(
             [value]() ESOKIT_INLINE_LAMBDA { return Register{} + static_cast<S>(value); })) {}
-  /// One number a lane.
+  /// One number for each lane.
   constexpr Pack(const Array<S, Count>& values) noexcept : values_(std::bit_cast<Values>(values)) {}
 
   /// *this = from, register by register.
@@ -243,7 +245,7 @@ class Pack {
                                      mask.bits(), a.values_, b.values_));
   }
 
-  /// Neither NaN nor infinite, by bits: under -ffast-math too.
+  /// Neither NaN nor infinite. Tests bits, so it also holds under -ffast-math.
   ESOKIT_INLINE friend constexpr Mask is_finite(const Pack& a) noexcept {
     [[maybe_unused]] constexpr auto exponent =
         std::bit_cast<detail::BitsOf<S>>(detail::unbounded<S>());
@@ -261,7 +263,8 @@ class Pack {
             ESOKIT_INLINE_LAMBDA { return (std::bit_cast<BitRegister>(x) & exponent) != exponent; },
         looked_at);
 #else
-    // Zero of a finite number, else NaN: needs no constants, which GCC loads anew for each pack.
+    // x - x is zero for a finite number, else NaN. This needs no constants, which GCC would load
+    // anew for each pack.
     return test(
         [](auto x) ESOKIT_INLINE_LAMBDA {
           const auto zero = x - x;
@@ -284,7 +287,7 @@ class Pack {
         *this);
   }
 
-  /// Lane by lane, as the functions of the standard library.
+  /// The functions of the standard library, lane by lane.
   /// @{
   ESOKIT_INLINE friend constexpr Pack(abs)(const Pack& x) noexcept { return x.magnitude(); }
   friend Pack exp(const Pack& x) noexcept {
@@ -332,7 +335,7 @@ class Pack {
   Values values_;
 };
 
-/// Its lanes.
+/// Number of lanes of a Pack.
 template <class S, int Count>
 inline constexpr int lane_count<Pack<S, Count>> = Count;
 

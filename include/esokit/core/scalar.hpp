@@ -1,6 +1,7 @@
 /// @file
-/// What a scalar must offer, and the customisation points by which SIMD packs and autodiff types
-/// join: `is_finite`, `select`, `all` and the elementary functions, all found by ADL.
+/// What a scalar must offer, and the functions that SIMD packs and autodiff types supply:
+/// `is_finite`, `select`, `all` and the elementary functions, all found by argument-dependent
+/// lookup (ADL).
 #pragma once
 
 #include <bit>
@@ -16,14 +17,14 @@
 /// Extended state observers, the controllers built on them, their design and their analysis.
 namespace esokit {
 
-/// True for the scalars that may branch: float, double, long double.
+/// A scalar whose comparisons give a bool on which code can branch: float, double, long double.
 template <class T>
 concept PlainScalar = std::floating_point<T>;
 
 namespace detail {
 
-/// Clang with -ffinite-math-only may fold even a bit test on a parameter; a volatile copy ends what
-/// it knows about the value. GCC does not fold bit tests.
+/// Returns `value` in a way that Clang cannot see through. With -ffinite-math-only Clang may remove
+/// even a bit test on a parameter; GCC does not.
 template <class T>
 constexpr T opaque(T value) noexcept {
 #if defined(__clang__) && defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
@@ -35,7 +36,8 @@ constexpr T opaque(T value) noexcept {
   return value;
 }
 
-/// Infinity by its bits and by another name: Clang 19 warns of the word itself under -ffast-math.
+/// Infinity, made from its bits: Clang 19 warns about the use of std::numeric_limits::infinity()
+/// under -ffast-math.
 template <class S>
 constexpr S unbounded() noexcept {
   return S(std::bit_cast<float>(0x7f800000u));
@@ -68,8 +70,8 @@ inline bool finite_bits(long double value) noexcept {
 
 }  // namespace detail
 
-/// Neither NaN nor infinite. Tests bits, so it holds under -ffast-math too (tested: GCC 12,
-/// Clang 14). A pack overloads it in its own namespace and returns a mask.
+/// Neither NaN nor infinite. Tests bits, so it also holds under -ffast-math. A pack overloads it in
+/// its own namespace and returns a mask.
 template <PlainScalar T>
 constexpr bool is_finite(T value) noexcept {
   return detail::finite_bits(value);
@@ -84,13 +86,12 @@ constexpr T select(bool condition, T a, T b) noexcept {
 /// True if every lane of a mask is set; a plain scalar has one lane.
 constexpr bool all(bool condition) noexcept { return condition; }
 
-/// Numbers in a scalar: one, or those of a pack, which specialises it and has `x[i]`, i = 0 ..
-/// count - 1.
+/// How many numbers a scalar holds: 1, or the lanes of a pack. A pack type specialises it and gives
+/// its numbers as `x[i]`.
 template <class T>
 inline constexpr int lane_count = 1;
 
-/// A comparison gives a bool; or it gives a mask, and the pack says by `lane_count` how many
-/// numbers it holds.
+/// A comparison gives a bool; or it gives a mask, and the type has specialised `lane_count`.
 template <class T>
 concept DeclaresItsLanes =
     std::convertible_to<decltype(std::declval<const T&>() < std::declval<const T&>()), bool> ||
@@ -106,8 +107,8 @@ concept DeclaresItsLanes =
 /// `is_finite(x)`, `select(mask, a, b)`, `all(mask)`; `make` also needs `exp` and `expm1`.
 ///
 /// A pack, whose comparisons give a mask, also specialises `lane_count` and gives its numbers as
-/// `x[i]`: where one lane is not well, the library takes them out one by one. `Pack` is one, ready
-/// made.
+/// `x[i]`: if a lane has a fault, the library processes the lanes one by one. `Pack` is such a
+/// type.
 template <class T>
 concept Scalar = std::copyable<T> && requires(const T a, const T b) {
   T(1.0);
@@ -122,7 +123,7 @@ concept Scalar = std::copyable<T> && requires(const T a, const T b) {
   { select(a < b, a, b) } -> std::convertible_to<T>;
 } && DeclaresItsLanes<T>;
 
-/// A scalar of several numbers.
+/// A scalar that holds several numbers.
 template <class S>
 concept PackScalar = Scalar<S> &&(lane_count<S> > 1);
 
@@ -139,13 +140,13 @@ struct LaneScalarOf<S> {
 
 }  // namespace detail
 
-/// The scalar of a lane: double of a pack of doubles.
+/// The scalar of one lane: double for a pack of doubles.
 template <class S>
 using LaneScalar = typename detail::LaneScalarOf<S>::type;
 
 namespace detail {
 
-/// |x|, one instruction for plain scalars and packs; a complex number brings `abs` by ADL.
+/// |x|, one instruction for plain scalars and packs; for a complex number `abs` is found by ADL.
 template <class T>
 struct Absolute {
   static constexpr auto of(const T& value) noexcept {
@@ -172,25 +173,25 @@ constexpr T constant(double value) noexcept {
   return static_cast<T>(value);
 }
 
-/// The type in which compile-time tables are kept, so that float code loads no doubles.
+/// Type of the elements of compile-time tables, so that float code loads no doubles.
 template <class S>
 using TableScalar = std::conditional_t<PlainScalar<LaneScalar<S>>, LaneScalar<S>, double>;
 
-/// Smallest spacing of the scalar's numbers around one.
+/// Distance from one to the next larger number of the scalar; for autodiff types that of double.
 template <class S>
 constexpr S rounding() noexcept {
   return S(std::numeric_limits<TableScalar<S>>::epsilon());
 }
 
-/// x, or the largest number of its sign where it is beyond the scalar.
+/// x, or the largest finite number of the same sign if x is infinite.
 template <class T>
 constexpr T clipped(const T& x) noexcept {
   const T largest((std::numeric_limits<TableScalar<T>>::max)());
   return select(is_finite(x), x, select(x < T(0.0), T(-largest), largest));
 }
 
-/// A count in the scalar type. Plain scalars convert at once: by way of a double it takes two
-/// soft-float helpers on a single-precision target.
+/// An integer in the scalar type. Plain scalars convert directly: by way of a double, a
+/// single-precision target would need two routines for software floating point.
 template <class T, std::integral Count>
 constexpr T integer(Count count) noexcept {
   if constexpr (PlainScalar<T>) {

@@ -1,6 +1,6 @@
 /// @file
-/// A finished observer or controller as words: designed on the host, pasted into firmware; or kept
-/// over a restart.
+/// A finished observer or controller as 32-bit words: designed on the host and pasted into
+/// firmware, or kept over a restart.
 #pragma once
 
 #include <array>
@@ -16,17 +16,18 @@
 
 namespace esokit {
 
-/// Settings and state of a T: the memory of a T, then a checksum. Good for the same version of the
-/// library, and for targets that lay a T out alike: the same size is checked at compile time, the
-/// sizes of its members are not. x86-64, ARM and RISC-V agree on float types of the library.
+/// Settings and state of a T: the memory of a T, then a checksum. Valid only for the same version
+/// of the library and for targets with the same memory layout of T. That the size is the same is
+/// checked at compile time, that the members have the same sizes is not. x86-64, ARM and RISC-V
+/// have the same layout for the float types of the library.
 template <class T>
 requires(std::is_trivially_copyable_v<T> && sizeof(T) % sizeof(std::uint32_t) == 0)  //
     using Snapshot = std::array<std::uint32_t, sizeof(T) / sizeof(std::uint32_t) + 1>;
 
 namespace detail {
 
-/// CRC-32 over version of the library, size and type, then the words before the last. Any three
-/// wrong bits and any 32 in a row are found, whatever the type (up to 11 KB).
+/// CRC-32 over the library's version, size and type tag of T, then all words but the last. Finds
+/// any three wrong bits and any burst of up to 32 bits in a T of up to 11 KB.
 template <class T>
 constexpr std::uint32_t checksum(const Snapshot<T>& words) noexcept {
   constexpr std::uint32_t version = (std::uint32_t{ESOKIT_VERSION_MAJOR} << 16u) ^
@@ -41,7 +42,7 @@ constexpr std::uint32_t checksum(const Snapshot<T>& words) noexcept {
 
 }  // namespace detail
 
-/// All that `object` is. `snapshot_text` of core/snapshot_text.hpp prints it.
+/// Settings and state of `object`. `snapshot_text` of core/snapshot_text.hpp prints it.
 template <class T>
 [[nodiscard]] Snapshot<T> snapshot(const T& object) noexcept {
   Snapshot<T> words{};
@@ -50,10 +51,10 @@ template <class T>
   return words;
 }
 
-/// The object that `words` were made of, with no design work: no exp, no iteration.
-/// @return error where the words are not as `snapshot` made them: a digit lost, another version of
-///         the library, another type. Types are told by `type_tag`; those that declare none (a
-///         model or a gain law of your own) by the size of the whole
+/// The object from which `words` were made, without design work (no exp, no iteration).
+/// @return error if the words are not as `snapshot` made them: a lost digit, another version of the
+///         library, another type. Types are told apart by `type_tag`, and by their size only if
+///         they declare none (a model or gain law of your own)
 template <class T>
 [[nodiscard]] Expected<T, Error<typename T::scalar_type>> from_snapshot(
     const Snapshot<T>& words) noexcept {

@@ -9,8 +9,8 @@
 
 namespace esokit {
 
-/// Declaration of a constant with the words of a snapshot, ready to be pasted:
-/// `inline constexpr std::array<std::uint32_t, 13> NAME = {0x3f800000, ..};`
+/// Declaration of a constant with the words of a snapshot, to paste into firmware: `inline
+/// constexpr std::array<std::uint32_t, 13> NAME = {0x3f800000, ..};`
 template <std::size_t Count>
 [[nodiscard]] std::string snapshot_text(const std::string& name,
                                         const std::array<std::uint32_t, Count>& words) {

@@ -1,6 +1,6 @@
 /// @file
-/// How results and flags become text, without a header of a stream: <<, on whatever takes a C
-/// string.
+/// How results and flags become text: << on anything that takes C strings and numbers, so
+/// that no stream header is needed.
 #pragma once
 
 #include <esokit/core/language.hpp>
@@ -8,14 +8,14 @@
 
 namespace esokit {
 
-/// True for the types of esokit that have text: Error, Expected, StepStatus, LoopMode. They go into
-/// any stream by <<; `to_text` and std::format are in core/error_text.hpp.
+/// True for the types of esokit that can be written as text, such as Error, Expected, StepStatus
+/// and LoopMode: with << to any stream, or with `to_text` and std::format of core/error_text.hpp.
 template <class T>
 inline constexpr bool has_text = false;
 
 namespace detail {
 
-/// A stream, or a logger of the user's; none of ours is one.
+/// A stream, or a logger of the user; types of esokit with text are excluded.
 template <class Stream, class... Values>
 concept WritesText = std::is_class_v<Stream> && !has_text<Stream> &&
                      requires(Stream & out, const char* text, const Values&... values) {

@@ -1,6 +1,7 @@
 /// @file
-/// A number that tells a type from others of its size, made of a declared name: the same with every
-/// compiler and on every target, without RTTI. And the CRC-32 that it is made with.
+/// A number that tells a type from others of the same size, made from a declared name: the
+/// same with every compiler and on every target, without RTTI. Also the CRC-32 from which it is
+/// made.
 #pragma once
 
 #include <cstdint>
@@ -10,11 +11,13 @@ namespace esokit {
 
 namespace detail {
 
-/// State of a CRC-32 before the first byte; its complement after the last is the checksum.
+/// State of a CRC-32 before the first byte. The checksum is the complement of the state after the
+/// last byte.
 inline constexpr std::uint32_t crc32_start = 0xffffffffu;
 
 /// CRC-32 of IEEE 802.3 (reflected polynomial 0xEDB88320) over the `bytes` low bytes of a word, the
-/// lowest first. Bit by bit: in firmware it runs once, and a table would take more than the loop.
+/// lowest first. Computed bit by bit: in firmware it runs once, and a table would take more flash
+/// than the loop.
 constexpr std::uint32_t crc32(std::uint32_t state, std::uint32_t word, int bytes = 4) noexcept {
   state ^= word;
   for (int bit = 0; bit < 8 * bytes; ++bit) {
@@ -25,14 +28,13 @@ constexpr std::uint32_t crc32(std::uint32_t state, std::uint32_t word, int bytes
 
 }  // namespace detail
 
-/// What tells T from types of the same size in a snapshot; zero for a type that declares none,
-/// which its size alone tells from others. For a type of your own specialise it with
-/// `make_type_tag`.
+/// Tells T from types of the same size in a snapshot. Zero for a type that declares none: then only
+/// its size tells it from others. For a type of your own specialise it with `make_type_tag`.
 template <class T>
 inline constexpr std::uint32_t type_tag = 0;
 
-/// Tag of a declared name, the tags of template arguments that are types, and those that are
-/// numbers.
+/// Tag made from a declared name, the tags of template arguments that are types, and template
+/// arguments that are numbers.
 template <class... Arguments, class... Numbers>
 [[nodiscard]] consteval std::uint32_t make_type_tag(const char* name, Numbers... numbers) {
   std::uint32_t state = detail::crc32_start;
@@ -42,7 +44,8 @@ template <class... Arguments, class... Numbers>
   return ~state;
 }
 
-/// The plain scalars. A long double is not the same on every target, but its size is another then.
+/// Tags of the plain scalars. The format of long double differs between targets, but so does its
+/// size.
 /// @{
 template <>
 inline constexpr std::uint32_t type_tag<float> = make_type_tag<>("float");

@@ -1,8 +1,9 @@
 /// @file
-/// Compile-time unrolled loops for the hot path.
+/// Loops that are unrolled at compile time, for the code that runs at every sample.
 ///
-/// Plain loops over std::array cost about twice hand-written code at g++ -O2 (its vectoriser packs
-/// three-element states into partial vectors); a fold over local copies does not.
+/// At g++ -O2 plain loops over std::array take about twice as long as hand-written code, because
+/// its vectoriser packs three-element states into partial vectors; a fold over local copies does
+/// not.
 #pragma once
 
 #include <array>
@@ -11,15 +12,13 @@
 #include <type_traits>
 #include <utility>
 
-/// @def ESOKIT_INLINE
-/// Forced inline, as all is that a step consists of: GCC at -O2 otherwise leaves parts of it as
-/// calls, and the state goes through memory between them.
+/// @def ESOKIT_INLINE Forces inlining. Used for all parts of a step: otherwise GCC at -O2 leaves
+/// some of them as calls, and the state goes through memory between them.
 
-/// @def ESOKIT_INLINE_LAMBDA
-/// The same behind the parameters of a lambda.
+/// @def ESOKIT_INLINE_LAMBDA The same for a lambda, written after its parameters.
 
-/// @def ESOKIT_COLD
-/// Out of line: what happens rarely shall not cost the hot path.
+/// @def ESOKIT_COLD Keeps code that runs rarely out of line, so that it costs the normal step
+/// nothing.
 
 #if defined(__GNUC__)
 #define ESOKIT_INLINE [[gnu::always_inline]] inline
@@ -33,7 +32,7 @@
 
 namespace esokit {
 
-/// std::array with the signed sizes that the rest of the library counts in.
+/// std::array with an int as size, as everywhere in the library.
 template <class T, int Size>
 using Array = std::array<T, static_cast<std::size_t>(Size)>;
 
@@ -48,9 +47,9 @@ ESOKIT_INLINE constexpr void unroll(Function&& f) noexcept {
   (std::make_integer_sequence<int, Count>{});
 }
 
-/// Keeps the vectoriser off a value, at no instruction: packing pairs of a three-element state
-/// costs shuffles, and a wide load after narrow stores waits for the store buffer (clang 14, float:
-/// twice the time of an update).
+/// Keeps the vectoriser from packing a value, without adding an instruction. Packing pairs of a
+/// three-element state costs shuffles, and a wide load after narrow stores stalls (Clang 14, float:
+/// an update takes twice as long).
 template <class T>
 ESOKIT_INLINE constexpr void keep_scalar([[maybe_unused]] T& value) noexcept {
 #if defined(__GNUC__) && defined(__SSE2__)

@@ -49,7 +49,7 @@ class AlgebraicGain {
                                         .resets = true,
                                         .bridges_gaps = true};
 
-  using scalar_type = S;  ///< of gains
+  using scalar_type = S;  ///< type of gains
   template <class T>
   using with_scalar = AlgebraicGain<Size, T>;  ///< the same with another scalar
   using Count = Lanes<std::uint32_t, S>;       ///< samples, of a pack of each lane

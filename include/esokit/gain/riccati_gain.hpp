@@ -96,7 +96,7 @@ class RiccatiGain {
   using Factor = CovarianceFactor<Size, S>;     ///< P-, scaled
   using Settings = RiccatiSettings<Size, S>;    ///< of the constructor
   using Gain = ScaledGain<Size, S>;             ///< k, scaled
-  using scalar_type = S;                        ///< of gains and covariances
+  using scalar_type = S;                        ///< type of gains and covariances
   static constexpr int table_size = TableSize;  ///< gains in the start table
   template <class T>
   using with_scalar =

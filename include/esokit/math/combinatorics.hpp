@@ -1,5 +1,5 @@
 /// @file
-/// Binomials, factorials and Stirling numbers of the first kind as compile-time doubles.
+/// Binomials, factorials and Stirling numbers of both kinds as compile-time doubles.
 ///
 /// All of them are integers below 2^53 for the sizes of the library (order + extension <= 16), so
 /// double holds them exactly.
@@ -26,8 +26,8 @@ constexpr double binomial(int n, int k) noexcept {
   return value;
 }
 
-/// C(n, k) for n and k from 0 to Most, in T. Where a loop over them is not unrolled, float code
-/// would compute the doubles above while it runs; on a single-precision target in software.
+/// C(n, k) for n and k from 0 to Most, as T. For loops that are not unrolled: there float code
+/// would call `binomial` at run time, which a single-precision target computes in software.
 template <int Most, class T>
 inline constexpr auto binomial_table = [] {
   constexpr auto count = static_cast<std::size_t>(Most) + 1;

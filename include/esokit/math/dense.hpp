@@ -1,11 +1,11 @@
 /// @file
-/// Small dense kernels: linear equations, factors, sums by doubling, the exponential, symmetric
-/// eigenvalues. All that needs a matrix uses these.
+/// Small dense kernels: linear equations, Cholesky factors, Lyapunov sums by doubling, the
+/// matrix exponential, symmetric eigenvalues. The controller headers use nothing else for matrices.
 ///
-/// In plain loops on the caller's storage, column by column, with the size as an argument: one
-/// instantiation serves all sizes. Eigen's decompositions of fixed size cost seconds of compile
-/// time for each (EigenSolver: 7 s), and link malloc for their blocked products, which they never
-/// run at these sizes.
+/// They are plain loops on column-major storage of the caller, with the size as an argument, so
+/// that one instantiation serves all sizes. Each of Eigen's decompositions of fixed size costs
+/// seconds of compile time (EigenSolver: 7 s) and links malloc for blocked products that never run
+/// at these sizes.
 #pragma once
 
 #include <cassert>
@@ -19,7 +19,7 @@
 
 namespace esokit::detail {
 
-/// A column-major square or rectangle of the caller's, as Eigen stores it.
+/// A view of a column-major matrix of the caller, as Eigen stores it.
 template <class T>
 struct DenseView {
   T* data;
@@ -31,8 +31,8 @@ struct DenseView {
   }
 };
 
-/// Solves a x = b in place of b by elimination with row pivoting; `a` is overwritten. Nothing is
-/// reported of a singular a: x is not finite then, or large.
+/// Solves a x = b in place of b by elimination with row pivoting; `a` is overwritten. A singular a
+/// is not reported: x is then large or not finite.
 template <class T>
 void solve_in_place(DenseView<T> a, DenseView<T> b) noexcept {
   const int n = a.rows;
@@ -60,7 +60,7 @@ void solve_in_place(DenseView<T> a, DenseView<T> b) noexcept {
   }
 }
 
-/// A^-1 B for a symmetric positive definite A by Cholesky; nothing if A is not.
+/// A^-1 B for a symmetric positive definite A, by Cholesky; nothing if A is not positive definite.
 template <int Size, int Columns, Scalar S>
 std::optional<Matrix<S, Size, Columns>> solve_positive(const Matrix<S, Size, Size>& a,
                                                        Matrix<S, Size, Columns> b) {
@@ -125,7 +125,7 @@ constexpr void multiply_transposed(const T* a, const T* b, T* out, int n) noexce
   }
 }
 
-/// Largest sum of magnitudes of a row of a, n x n: the norm that goes with the largest component.
+/// Largest row sum of magnitudes of a, n x n: the norm induced by the infinity norm of vectors.
 template <class T>
 constexpr T row_norm(const T* a, int n) noexcept {
   T largest(0.0);
@@ -145,10 +145,11 @@ constexpr T sum_of_magnitudes(const T* values, int count) noexcept {
   return sum;
 }
 
-/// P = sum_k A^k Q A'^k with A = I + e, that is P = A P A' + Q, by doubling (Smith's method
-/// squared): P_{j+1} = P_j + A^(2^j) P_j A'^(2^j). Squaring the difference, (I + e)^2 - I = 2 e +
-/// e^2, loses no digits of slow poles. False if the sum does not end; P may be beyond the scalar.
-/// @param e n x n, is overwritten @param p Q at first, P in the end @param work1, work2 n x n
+/// P = sum_k A^k Q A'^k with A = I + e, that is P = A P A' + Q, by doubling (Smith's squared
+/// method): P_{j+1} = P_j + A^(2^j) P_j A'^(2^j). To square only the difference to I, (I + e)^2 - I
+/// = 2 e + e^2, loses no digits of slow poles. Returns false if the sum does not converge; P may
+/// overflow.
+/// @param e n x n, is overwritten @param p in: Q, out: P @param work1, work2 n x n
 template <class T>
 bool sum_by_doubling(T* e, T* p, T* work1, T* work2, int n) noexcept {
   for (int step = 0; step < 64; ++step) {
@@ -166,15 +167,15 @@ bool sum_by_doubling(T* e, T* p, T* work1, T* work2, int n) noexcept {
         if (i != j) p[i * n + j] = p[j * n + i];
       }
     }
-    // What is left out is size^2 times the term that was just added.
+    // The rest of the sum is at most about size^2 times the term that was just added.
     if (size * size < T(1e-4) * rounding<T>()) return true;
     for (int i = 0; i < n * n; ++i) e[i] = work1[i];
   }
   return false;
 }
 
-/// X = F X F' + W for a stable F, X being W at first; nothing if F is not stable, or if the scalar
-/// cannot hold X.
+/// Solves X = F X F' + W for a stable F. Returns nothing if F is not stable or if the scalar cannot
+/// hold X. @param x W
 template <int Size, Scalar S>
 std::optional<Matrix<S, Size, Size>> solve_stein(Matrix<S, Size, Size> f, Matrix<S, Size, Size> x) {
   for (int i = 0; i < Size; ++i) f(i, i) = f(i, i) - S(1.0);
@@ -186,8 +187,8 @@ std::optional<Matrix<S, Size, Size>> solve_stein(Matrix<S, Size, Size> f, Matrix
   return x;
 }
 
-/// exp(a) - I in place: Taylor series of a / 2^k, then squared k times as 2 E + E^2. Of an a that
-/// is not finite, or too large, nothing is finite.
+/// exp(a) - I in place: Taylor series of a / 2^k, then squared k times as 2 E + E^2. If a is not
+/// finite or too large, the result is not finite.
 /// @param a n x n @param work 2 n^2 numbers
 template <PlainScalar T>
 constexpr void exp_minus_identity(T* a, T* work, int n) noexcept {
@@ -199,7 +200,7 @@ constexpr void exp_minus_identity(T* a, T* work, int n) noexcept {
     for (; size * scale > T(0.25); scale *= T(0.5)) ++squarings;
   }
   for (int i = 0; i < n * n; ++i) a[i] *= scale;
-  // With norm 1/4 the terms fall below 1e-17 by the 12th. Horner, from the smallest.
+  // With norm 1/4 the terms fall below 1e-17 by the 12th. Summed by Horner's rule, smallest first.
   for (int i = 0; i < n * n; ++i) sum[i] = T(0);
   for (int i = 0; i < n; ++i) sum[i * n + i] = T(1);
   for (int k = 14; k >= 2; --k) {
@@ -215,8 +216,8 @@ constexpr void exp_minus_identity(T* a, T* work, int n) noexcept {
   }
 }
 
-/// exp(a) - I. In units that keep its elements of one size: below 1e-13 of the largest, with
-/// squarings for norms to 2e4.
+/// exp(a) - I. If a is scaled so that its elements are of similar size, the error is below 1e-13 of
+/// the largest element, for norms up to 2e4.
 template <PlainScalar T, int Size>
 constexpr Matrix<T, Size, Size> exp_minus_identity(Matrix<T, Size, Size> a) noexcept {
   std::array<T, static_cast<std::size_t>(2 * Size * Size)> work{};
@@ -224,8 +225,8 @@ constexpr Matrix<T, Size, Size> exp_minus_identity(Matrix<T, Size, Size> a) noex
   return a;
 }
 
-/// Eigenvalues of the symmetric a onto its diagonal, eigenvectors into the columns of v, by Jacobi
-/// rotations.
+/// Computes the eigenvalues of a symmetric a by Jacobi rotations: a becomes diagonal with the
+/// eigenvalues, the columns of v become the eigenvectors.
 inline void symmetric_eigenvalues(DenseView<double> a, DenseView<double> v) noexcept {
   const int n = a.rows;
   for (int i = 0; i < n; ++i) {

@@ -1,5 +1,5 @@
 /// @file
-/// Han's fal: a power of the error, with a linear piece around zero.
+/// Han's function fal: a power of the error, linear around zero.
 #pragma once
 
 #include <esokit/core/scalar.hpp>
@@ -7,12 +7,13 @@
 
 namespace esokit {
 
-/// fal(e) = |e|^a sign(e) for |e| > delta, e / delta^(1-a) within. It is e k(|e|) with the even
-/// gain k(x) = max(x, delta)^(a-1): no division by e and no sign function.
+/// fal(e) = |e|^a sign(e) for |e| > delta, and e / delta^(1-a) for |e| <= delta. It is computed as
+/// e k(|e|) with the even gain k(x) = max(x, delta)^(a-1), without a division by e or a sign
+/// function.
 template <Scalar S>
 class Fal {
  public:
-  /// @param exponent a > 0; below 1: small errors count more
+  /// @param exponent a > 0; below 1, small errors get a higher gain than large ones
   /// @param linear_width delta > 0, unit of e
   constexpr Fal(const S& exponent, const S& linear_width) noexcept
       : power_(exponent - S(1.0)), linear_width_(linear_width) {}

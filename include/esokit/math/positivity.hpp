@@ -9,13 +9,13 @@
 
 namespace esokit {
 
-/// True if c_0 + c_1 x + .. + c_D x^D > 0 for every x >= 0 and in the limit.
+/// True if c_0 + c_1 x + .. + c_D x^D > 0 for every x >= 0 and c_D > 0.
 ///
-/// With x = t / (1-t) the coefficients become c_i / C(D,i) in Bernstein's basis on [0, 1], whose
-/// polynomial lies in their convex hull: all positive proves the claim, an end that is not positive
-/// refutes it, and what is undecided is halved (de Casteljau). Near a double root the gap falls
-/// fourfold with each halving, so the depth is bounded; undecided at the bottom counts as false.
-/// No division, no allocation, and as good in float as float can be.
+/// With x = t / (1-t) the coefficients become c_i / C(D,i) in the Bernstein basis on [0, 1], and
+/// the polynomial lies in their convex hull. If all are positive, so is the polynomial; if the
+/// first or last is not, neither is the polynomial; otherwise the interval is halved (de
+/// Casteljau). Near a double root the distance of the hull falls fourfold with each halving, so the
+/// depth is bounded; an interval undecided at that depth counts as not positive.
 template <int Degree, Scalar S>
 bool positive_on_half_line(const Array<S, Degree + 1>& coefficients) {
   using Piece = Array<S, Degree + 1>;

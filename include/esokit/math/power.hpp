@@ -1,5 +1,5 @@
 /// @file
-/// x^p for a p that is known early, without `pow` where a plain operation does it.
+/// x^p for a p that is fixed in advance, without `pow` if a simple operation does it.
 #pragma once
 
 #include <cmath>
@@ -10,7 +10,7 @@ namespace esokit {
 
 namespace detail {
 
-/// Exponents that need no `pow`, and the rest.
+/// Exponents that need no `pow`, and `general` for all others.
 enum class PowerKind : unsigned char { zero, one, two, half, minus_half, general };
 
 template <Scalar S>
@@ -26,10 +26,11 @@ constexpr PowerKind power_kind(const S& p) noexcept {
 
 }  // namespace detail
 
-/// x -> x^p for x > 0. The exponents -1/2, 0, 1/2, 1 and 2 are told apart at construction and need
-/// no `pow`; in a pack lane by lane, and it is quickest where the lanes are of one kind.
+/// x -> x^p for x > 0. The exponents -1/2, 0, 1/2, 1 and 2 are recognised at construction and need
+/// no `pow`. A pack may have another exponent in each lane; it is fastest if all lanes are of one
+/// kind.
 ///
-/// Packs and autodiff types supply `pow(x, p)` and `sqrt(x)` by ADL.
+/// Packs and autodiff types supply `pow(x, p)` and `sqrt(x)`, found by ADL.
 template <Scalar S>
 class Power {
  public:

@@ -20,13 +20,13 @@ namespace esokit {
 
 namespace detail {
 
-/// The order that a law sees: the actuator's lag comes on top.
+/// The order that a control law sees: that of the plant plus that of the actuator's lag.
 constexpr int law_order(const ModelParts& parts) noexcept { return parts.order + parts.actuator; }
 constexpr int model_size(const ModelParts& parts) noexcept {
   return parts.sensor + law_order(parts) + parts.constants + 2 * parts.resonators + parts.leaky;
 }
 
-/// A state is T^degree / degree! times what it is in physical units.
+/// A state is its value in physical units times T^degree / degree!.
 constexpr int model_degree(const ModelParts& parts, int state) noexcept {
   if (state < parts.sensor) return 0;
   const int row = state - parts.sensor;
@@ -46,7 +46,7 @@ constexpr auto make_model_pattern() noexcept {
   constexpr std::size_t first_leaky = d + m + 2 * static_cast<std::size_t>(Parts.resonators);
   ModelPattern<static_cast<int>(size)> all{};
   auto& p = all.couples;
-  // Of A and B.
+  // Nonzero elements of A and B.
   for (std::size_t i = 0; i < lf; ++i) {
     for (std::size_t j = 0; j <= lf; ++j) p[i][j] = true;
   }
@@ -60,19 +60,19 @@ constexpr auto make_model_pattern() noexcept {
     p[q][q] = p[q][q + 1] = p[q + 1][q] = p[q + 1][q + 1] = true;
   }
   for (std::size_t j = first_leaky; j < size; ++j) p[j][j] = true;
-  // Of their powers.
+  // Elements that become nonzero in their powers.
   for (std::size_t k = 0; k < size; ++k) {
     for (std::size_t i = 0; i < size; ++i) {
       for (std::size_t j = 0; j <= size; ++j) p[i][j] = p[i][j] || (p[i][k] && p[k][j]);
     }
   }
-  // y^(order) = D + b u, and in D' the two come together, too: u does what D does.
+  // y^(order) = D + b u, and also in D' they occur only as this sum: u has the same effect as D.
   all.driven = static_cast<int>(d);
   for (std::size_t i = 0; i < size; ++i) {
     for (std::size_t j = 0; j < size; ++j) {
       all.place[i][j] = all.kept;
-      // Plant without poles of its own, and its integrated disturbance; behind an actuator y^(n)
-      // stays as it is where nothing else acts.
+      // The elements of a pure chain: a plant without poles and its integrated disturbance; with an
+      // actuator the chain ends at y^(n).
       const std::size_t last = la == 0 ? d + m - 1 : lf + n;
       if (p[i][j] && !Parts.plant_poles && i >= lf && j <= last) {
         all.chain[i][j] =
@@ -86,7 +86,7 @@ constexpr auto make_model_pattern() noexcept {
 template <ModelParts Parts>
 inline constexpr auto model_pattern = make_model_pattern<Parts>();
 
-/// What MatrixModel asks for.
+/// The Shape that MatrixModel takes.
 template <ModelParts Parts>
 struct PartsShape {
   static constexpr int order = law_order(Parts);
@@ -107,10 +107,10 @@ constexpr S factorial_ratio(int a, int b) noexcept {
 
 }  // namespace detail
 
-/// How far the frequencies may go from what they are given as, as factors.
+/// Range of the factor by which all frequencies may change.
 template <bool Follows, Scalar S>
 struct SpeedRange {};
-/// As factors.
+/// The range of a model that follows a speed.
 template <Scalar S>
 struct SpeedRange<true, S> {
   S lowest{};   ///< above 0, 1 at most
@@ -121,15 +121,15 @@ struct SpeedRange<true, S> {
   /// @endcond
 };
 
-/// The numbers of the parts of an AugmentedModel, in this order; members of absent parts are empty.
+/// Settings of the parts of an AugmentedModel, in this order; members of absent parts are empty.
 template <ModelParts Parts, Scalar S>
 struct PartsSettings {
-  Array<S, Parts.plant_poles ? Parts.order : 0> plant{};  ///< a_0 .. a_(n-1), 1/s^(n-i)
+  Array<S, Parts.plant_poles ? Parts.order : 0> plant{};  ///< a_0 .. a_(n-1), unit of a_i: s^-(n-i)
   Lag<Parts.actuator, S> actuator{};                      ///< from u to v
   Lag<Parts.sensor, S> sensor{};                          ///< from y to what is measured
   Array<Resonance<S>, Parts.resonators> resonators{};     ///< the sines
-  Array<S, Parts.leaky> leaky{};                          ///< time constants of the fading parts, s
-  SpeedRange<Parts.follows_speed, S> speed{};             ///< of the resonators
+  Array<S, Parts.leaky> leaky{};               ///< time constants of the decaying parts, s
+  SpeedRange<Parts.follows_speed, S> speed{};  ///< of the resonators
 
   /// @cond
   static constexpr auto fields(auto& s) noexcept {
@@ -141,15 +141,16 @@ struct PartsSettings {
 /// Plant, actuator, sensor and disturbance as one model, sampled exactly:
 ///
 ///     plant      y^(n) = -a_(n-1) y^(n-1) - .. - a_0 y + d + b0 v
-///     actuator   v follows u by a lag
-///     sensor     what is measured follows y by a lag
-///     d          a constant (or polynomial), sines, and what fades
+///     actuator   v follows u with a lag
+///     sensor     the measured value follows y by a lag
+///     d          a constant (or polynomial), sines, and parts that decay exponentially
 ///
-/// With an actuator, model and law have the order n + that of the actuator: y^(n+1) = D + b u with
-/// b = b0 / tau. `estimate` has (y, .., y^(order-1), D, ..), where D is everything that a law
-/// cancels, so that any law works with it and omega_c keeps its meaning. Then follow d', .. if
-/// there is more than one integrator, each sine q with q' / w, the fading parts, and with a sensor
-/// the measured value (for order 2 also its derivative / w).
+/// With an actuator, model and law have the order of plant and actuator together: y^(n+1) = D + b u
+/// with b = b0 / tau for a lag of first order, y^(n+2) = D + b u with b = b0 w^2 for one of second
+/// order. `estimate` is (y, .., y^(order-1), D, ..), where D is everything that a law cancels, so
+/// that any law works with it and omega_c keeps its meaning. After D come d', .. if there is more
+/// than one integrator, each sine q followed by q' / w, the decaying parts, and with a sensor the
+/// measured value (for order 2 also its derivative / w).
 ///
 /// Poles: the actuator is simulated from u alone and never corrected, so it keeps its own poles; a
 /// sensor that is faster than omega_o also keeps its own; those of a sine go to -s +- j w0; all
@@ -181,7 +182,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   using typename Base::Estimate;
   using typename Base::State;
 
-  /// What it is.
+  /// What the model declares.
   static constexpr ModelTraits traits{
       .shifts_output = true,
       .adds_levels = !Parts.plant_poles && lf == 0 && la == 0,
@@ -193,11 +194,11 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   template <class T>
   using with_scalar = AugmentedModel<Parts, T>;  ///< the same with another scalar
 
-  using Settings = PartsSettings<Parts, S>;  ///< of make
+  using Settings = PartsSettings<Parts, S>;  ///< settings of make
 
   /// Checks the settings and samples the model.
-  /// @param settings what is known @param input_gain b0, unit of y^(n) per unit of v
-  /// @param sample_time T, s; both checked
+  /// @param settings numbers of the parts @param input_gain b0, unit of y^(n) per unit of v
+  /// @param sample_time T, s; both already checked
   /// @return the model, or an error that names the field
   static Expected<AugmentedModel, Error<S>> make(const Settings& settings, const S& input_gain,
                                                  const S& sample_time) {
@@ -216,10 +217,10 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
     return model;
   }
 
-  /// As they were given.
+  /// The settings, as they were given.
   [[nodiscard]] constexpr const Settings& settings() const noexcept { return settings_; }
 
-  /// The estimate for a plant that stands at y under u.
+  /// The estimate for a plant at rest at y under a constant u.
   [[nodiscard]] constexpr Estimate rest(const S& y, const S& u) const noexcept {
     Estimate z = Estimate::Zero();
     z(0) = y;
@@ -228,8 +229,9 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
     return z;
   }
 
-  /// What of a correction is the disturbance's, and the actuator's where that is corrected: all
-  /// but what the plant's own y .. y^(n-1) are, and make of the rows behind them.
+  /// The part of a correction that belongs to the disturbance (and to the actuator, if that is
+  /// corrected): without y .. y^(n-1), and without what these contribute to the rows behind them
+  /// through the plant's poles.
   [[nodiscard]] ESOKIT_INLINE constexpr State disturbance_part(const State& x) const noexcept {
     State part = x;
     detail::unroll<lf + n>([&](auto r) ESOKIT_INLINE_LAMBDA { std::get<r>(part) = S(0); });
@@ -259,7 +261,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
     return part;
   }
 
-  /// The factor that the frequencies have now.
+  /// The present factor of the frequencies.
   [[nodiscard]] constexpr const S& speed() const noexcept requires(Parts.follows_speed) {
     return speed_;
   }
@@ -275,18 +277,18 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
 
   /// @name The parts of an estimate
   /// @{
-  /// What is measured, as the sensor would show y.
+  /// The measured value: y as the sensor shows it.
   [[nodiscard]] static constexpr S measured(const Estimate& z) noexcept {
     return z(lf > 0 ? size - lf : 0);
   }
-  using Swing = esokit::Swing<S>;  ///< a sine by its size and where it is
+  using Swing = esokit::Swing<S>;  ///< a sine by amplitude and phase
   /// The sine of resonator 0 .. k - 1.
   [[nodiscard]] static Swing swing(const Estimate& z, int resonator) noexcept
       requires(Parts.resonators > 0) {
     const int q = order + m + 2 * resonator;
     return detail::swing_of(z(q), z(q + 1));
   }
-  /// The fading part 0 .. l - 1.
+  /// The decaying part 0 .. l - 1.
   [[nodiscard]] static constexpr S fading(const Estimate& z, int part) noexcept
       requires(Parts.leaky > 0) {
     return z(order + m + 2 * Parts.resonators + part);
@@ -313,7 +315,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   }
   /// @}
 
-  /// Calls `design(part)` with the CorrectedPart and returns what it returns.
+  /// Returns `design(part)`, called with the CorrectedPart.
   /// @param bandwidth omega_o, rad/s: a sensor that is faster keeps its own poles
   template <class Design>
   auto with_corrected_part(const S& bandwidth, const Design& design) const {
@@ -359,7 +361,8 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
     return alpha;
   }
 
-  /// act(s) s^derivative of d without its constant, as a row over the states, in units of T^n / n!.
+  /// act(s) s^derivative applied to d without its constant, as a row over the states, in units of
+  /// T^n / n!; act is the actuator's denominator.
   static State others_filtered(const Settings& settings, const S& time, int derivative) noexcept {
     State row{};
     row.fill(S(0));
@@ -404,7 +407,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
     return row;
   }
 
-  /// T A, and in the last column T B of a u whose scaled effect b T^order / order! is one.
+  /// T A, and in the last column T B for a u in units in which b T^order / order! is one.
   static Matrix<S, size + 1, size + 1> rates(const Settings& settings, const S& time) noexcept {
     auto a = Matrix<S, size + 1, size + 1>::Zero();
     detail::set_sensor_rates(a, settings.sensor, time);
@@ -473,7 +476,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
     for (int i = 0; i < part_size; ++i) part.degrees[static_cast<std::size_t>(i)] = Part::degree(i);
     part.output.fill(S(0));
     part.whole = Matrix<S, size, part_size>::Zero();
-    // The actuator's error is zero and stays it: u and v drop out of y^(n), y^(n+1), ..
+    // The actuator's error is zero and stays zero, so u and v drop out of y^(n), y^(n+1), ..
     RowVector<S, part_size> derivative = RowVector<S, part_size>::Zero();
     derivative(part_d) = S(1);
     for (int r = 0; r < n; ++r) part.whole(lf + r, part_lf + r) = S(1);
@@ -486,7 +489,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
       part.output[0] = S(1);
       for (int i = 0; i < lf; ++i) part.whole(i, i) = S(1);
     } else {
-      // The sensor's error is what it makes of the others'.
+      // The sensor's error follows from the errors of the other states.
       const auto shown = detail::shown_by_sensor(settings_.sensor, sample_time_, rates);
       for (int j = 0; j < part_size; ++j) {
         part.output[static_cast<std::size_t>(j)] = shown(0, j);
@@ -511,7 +514,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
     sample();
   }
 
-  /// With the frequencies of now.
+  /// The settings with the present frequencies.
   [[nodiscard]] Settings present() const noexcept {
     Settings now = settings_;
     for (auto& resonance : now.resonators) resonance.frequency = resonance.frequency * speed_;
@@ -527,16 +530,17 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   S speed_ = S(1);  ///< factor of the frequencies
 };
 
-/// Of packs: what its numbers are. An observer of packs with a model has one model a lane.
+/// For packs only sizes and settings: an observer of packs with such a model has one model for each
+/// lane.
 template <ModelParts Parts, PackScalar S>
 class AugmentedModel<Parts, S> {
   using Plain = AugmentedModel<Parts, LaneScalar<S>>;
 
  public:
   static constexpr int order = Plain::order;            ///< of the law
-  static constexpr int extension = Plain::extension;    ///< all beside the plant's rows
+  static constexpr int extension = Plain::extension;    ///< all rows besides the plant's
   static constexpr ModelTraits traits = Plain::traits;  ///< what it is
-  using Settings = PartsSettings<Parts, S>;             ///< of make
+  using Settings = PartsSettings<Parts, S>;             ///< settings of make
   template <class T>
   using with_scalar = AugmentedModel<Parts, T>;  ///< the same with another scalar
 };

@@ -9,7 +9,7 @@
 
 namespace esokit {
 
-/// The model y^(n) = d + b0 u with d^(m) = 0, sampled at T, with which an observer predicts.
+/// The model y^(n) = d + b0 u with d^(m) = 0, sampled at T.
 ///
 /// States are those of ScaledChain.
 template <int Order, Scalar S = double, int Extension = 1>
@@ -24,32 +24,34 @@ class ChainModel {
 
   static constexpr ModelTraits traits{
       .is_chain = true, .shifts_output = true, .adds_levels = true};  ///< what it is
-  using Settings = NoModelSettings;                                   ///< of make
+  using Settings = NoModelSettings;                                   ///< settings of make
 
   using State = Array<S, N>;      ///< x, scaled, N elements
   using Estimate = Vector<S, N>;  ///< z, physical units, N x 1
   template <class T>
   using with_scalar = ChainModel<Order, T, Extension>;  ///< the same with another scalar
 
-  /// @param input_gain b0 @param sample_time T, s; both checked
+  /// @param input_gain b0, unit of y^(n) per unit of u @param sample_time T, s; both already
+  /// checked
   constexpr ChainModel(const S& input_gain, const S& sample_time) noexcept
       : scaled_input_gain_(Chain::scaled_input_gain(input_gain, sample_time)),
         rate_(S(1.0) / sample_time),
         input_gain_(input_gain),
         sample_time_(sample_time) {}
 
-  /// b0, as it was given.
+  /// b0, unit of y^(n) per unit of u, as it was given.
   [[nodiscard]] constexpr const S& input_gain() const noexcept { return input_gain_; }
   /// T, s, as it was given.
   [[nodiscard]] constexpr const S& sample_time() const noexcept { return sample_time_; }
 
-  /// What u, held over the sample, is to the chain: a part of its disturbance, scaled.
+  /// b0 u, scaled like the disturbance: a u held over the sample acts on the chain like a part of
+  /// its disturbance.
   [[nodiscard]] ESOKIT_INLINE constexpr S drive(const S& u) const noexcept {
     return scaled_input_gain_ * u;
   }
 
-  /// `drive`, and with it the disturbance that x has found with its derivatives: what drives the
-  /// next level of a cascade.
+  /// `drive` plus the disturbance (with its derivatives) in the estimate x of a level: what drives
+  /// the next level of a cascade.
   /// @{
   [[nodiscard]] ESOKIT_INLINE static constexpr Array<S, Extension> joined(const S& drive,
                                                                           const State& x) noexcept {
@@ -69,7 +71,7 @@ class ChainModel {
   }
   /// @}
 
-  /// x one sample ahead: Phi x + Gamma u. @param drive of u, or joined
+  /// x one sample ahead: Phi x + Gamma u. @param drive result of `drive` or `joined`
   /// @{
   [[nodiscard]] ESOKIT_INLINE constexpr State predict(const State& x,
                                                       const S& drive) const noexcept {
@@ -96,7 +98,7 @@ class ChainModel {
   [[nodiscard]] constexpr Estimate physical(const State& x) const noexcept {
     return Chain::physical(x, rate_);
   }
-  /// One of them.
+  /// One of the estimates.
   template <int Row>
   [[nodiscard]] ESOKIT_INLINE constexpr S physical(const State& x) const noexcept {
     return Chain::template physical<Row>(std::get<Row>(x), rate_);
@@ -106,12 +108,12 @@ class ChainModel {
     return Chain::scaled(estimate, sample_time_);
   }
 
-  /// d as it is scaled in the state. @param disturbance unit of y^(n)
+  /// d in the scaling of the state. @param disturbance unit of y^(n)
   [[nodiscard]] constexpr S scaled_disturbance(const S& disturbance) const noexcept {
     return Chain::scaled_input_gain(disturbance, sample_time_);
   }
 
-  /// A number that is finite only if all estimates are, see ScaledChain::finite_probe.
+  /// A number that is finite only if all estimates are finite, see ScaledChain::finite_probe.
   [[nodiscard]] ESOKIT_INLINE constexpr S finite_probe(const State& x) const noexcept {
     return Chain::finite_probe(x, rate_);
   }
@@ -129,7 +131,7 @@ class ChainModel {
     return next;
   }
 
-  /// (y, 0, .., 0, -b0 u, 0, ..).
+  /// The estimate for a plant at rest at y under a constant u: (y, 0, .., 0, -b0 u, 0, ..).
   [[nodiscard]] constexpr Estimate rest(const S& y, const S& u) const noexcept {
     Estimate state = Estimate::Zero();
     state(0) = y;
@@ -148,12 +150,12 @@ class ChainModel {
     }
     return step;
   }
-  /// Row r is state r.
+  /// Place of row r of the estimate among the states: r.
   [[nodiscard]] static constexpr int state_of_row(int row) noexcept { return row; }
-  /// r: each state is a derivative more.
+  /// Power of T in the scaling of a state, see SampledModel: r.
   [[nodiscard]] static constexpr int degree(int row) noexcept { return row; }
 
-  /// True if u does the same in both.
+  /// True if u has the same effect in both models.
   [[nodiscard]] constexpr bool same_drive(const ChainModel& other) const noexcept {
     return same_time(other) &&
            !all(detail::absolute(S(scaled_input_gain_ - other.scaled_input_gain_)) > S(0.0));

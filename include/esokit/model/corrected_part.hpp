@@ -1,5 +1,5 @@
 /// @file
-/// The part of a model that a measurement corrects, for the design of its gain.
+/// The part of a model that the measurement corrects, for the design of the gain.
 #pragma once
 
 #include <esokit/core/matrix.hpp>
@@ -8,10 +8,10 @@
 
 namespace esokit {
 
-/// A part of a model that is observed by itself, and the effect of its correction on the whole. A
-/// model that declares `ModelTraits::corrects_part` passes it to the design of a gain.
+/// The part of a model's states for which a gain is designed, and how its correction carries over
+/// to the whole model. A model that declares `ModelTraits::corrects_part` passes it to the design.
 ///
-/// Known and stable states need not be corrected: an actuator is simulated from u.
+/// Known and stable states need no correction: an actuator, say, is simulated from u.
 /// @tparam Size states of the part @tparam Whole states of the model @tparam Pairs poles that the
 /// model places itself
 template <int Size, int Whole, int Pairs, Scalar S>
@@ -20,13 +20,14 @@ struct CorrectedPart {
   static constexpr int own_pairs = Pairs;  ///< poles that the model places
 
   Matrix<S, Size, Size> step;         ///< Phi - I, scaled as the states of a model are
-  Array<S, Size> output{};            ///< C: what of the measurement the states are
+  Array<S, Size> output{};            ///< C: the measurement as a function of the states
   Array<int, Size> degrees{};         ///< see SampledModel: a state is smaller by a^degree
-  Matrix<S, Whole, Size> whole;       ///< takes a correction of the part to that of the model
+  Matrix<S, Whole, Size> whole;       ///< maps a correction of the part to one of the whole model
   Array<Array<S, 2>, Pairs> pairs{};  ///< real and imaginary part of a pair of poles, 1/s
 };
 
-/// All of a model is corrected, and the placement places all poles but `Pairs`.
+/// The CorrectedPart of a model that is corrected as a whole; the placement places all poles except
+/// `Pairs`.
 template <int Pairs = 0, class Model>
 auto corrected_whole(const Model& model) {
   constexpr int size = Model::size;

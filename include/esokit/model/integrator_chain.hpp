@@ -1,5 +1,5 @@
 /// @file
-/// The chain of integrators behind every observer, in physical units.
+/// The chain of integrators on which the observers are built, in physical units.
 #pragma once
 
 #include <esokit/core/matrix.hpp>
@@ -15,7 +15,7 @@ struct ChainSize {
   static constexpr int extension = Extension;     ///< m, extended states
   static constexpr int size = Order + Extension;  ///< N = n + m
 
-  // Last, as Clang leaves out what comes after one that fails.
+  // These come last, because Clang leaves out the declarations after a failed static_assert.
   static_assert(Order >= 1, "esokit: the plant order must be at least 1");
   static_assert(Extension >= 1, "esokit: at least one extended state is needed");
   static_assert(Order + Extension <= 16, "esokit: order + extension above 16 is not supported");
@@ -24,7 +24,7 @@ struct ChainSize {
 /// Continuous and exactly sampled matrices of z = (y, y', .., y^(n-1), d, d', .., d^(m-1)).
 ///
 /// z' = A z + B u, y = C z; z[k+1] = Phi z[k] + Gamma u[k] for an input held over the sample. A is
-/// nilpotent, so Phi and Gamma are finite sums and exact. N = n + m.
+/// nilpotent, so Phi and Gamma are finite sums, and exact. N = n + m.
 /// @tparam Order n, @tparam ScalarType scalar, @tparam Extension m
 template <int Order, Scalar ScalarType = double, int Extension = 1>
 struct IntegratorChain : ChainSize<Order, Extension> {

@@ -1,5 +1,5 @@
 /// @file
-/// LinearPlant: the type for all linear plants, used in simulation, in analysis and by observers.
+/// LinearPlant: the one type of linear plants, for simulation, analysis and observers.
 #pragma once
 
 #include <esokit/core/check.hpp>
@@ -14,16 +14,16 @@ namespace esokit {
 
 /// x' = A x + B u(t - dead_time) + E d,  y = C x.
 ///
-/// An aggregate, so that it can be written down directly. These functions also check it and return
-/// an error:
+/// An aggregate, so that it can be written down directly. These static functions also check it, and
+/// return the plant or an error:
 ///
 ///     chain({.coefficients = {5, 2}, .input_gain = 10})           // y'' + 2 y' + 5 y = 10 u + d
 ///     transfer_function({.numerator = {3, 1}, .denominator = {5, 2}})  // (s + 3)/(s^2 + 2 s + 5)
 ///     state_space({.a = {{0, 1}, {-5, -2}}, .b = {0, 10}, .c = {1, 0}})
 ///
-/// and `with_lag`, `with_sensor`, `with_dead_time` add an actuator, a sensor or a delay to an
+/// `with_lag`, `with_sensor` and `with_dead_time` add an actuator, a sensor or a delay to an
 /// existing plant.
-/// @tparam States length of x @tparam Inputs, Outputs lengths of u and y; d has one entry an input
+/// @tparam States length of x @tparam Inputs, Outputs lengths of u and y; d is as long as u
 template <int States, Scalar ScalarType = double, int Inputs = 1, int Outputs = 1>
 struct LinearPlant {
   static_assert(States >= 1 && Inputs >= 1 && Outputs >= 1);
@@ -32,10 +32,10 @@ struct LinearPlant {
   static constexpr int inputs = Inputs;    ///< length of u, and of d
   static constexpr int outputs = Outputs;  ///< length of y
 
-  /// One input, one output: what ADRC with one observer is for.
+  /// True with one input and one output, as for ADRC with one observer.
   static constexpr bool single = Inputs == 1 && Outputs == 1;
 
-  using scalar_type = ScalarType;              ///< of all its numbers
+  using scalar_type = ScalarType;              ///< type of all its numbers
   using State = Vector<ScalarType, States>;    ///< x
   using Input = Vector<ScalarType, Inputs>;    ///< u, or d
   using Output = Vector<ScalarType, Outputs>;  ///< y
@@ -46,7 +46,7 @@ struct LinearPlant {
   Matrix<ScalarType, States, Inputs> b{};   ///< B
   Matrix<ScalarType, Outputs, States> c{};  ///< C
 
-  /// E: where the disturbance enters; by default where u does, and in the unit of u.
+  /// E: where the disturbance enters. By default E = B: d adds to u and has its unit.
   Matrix<ScalarType, States, Inputs> e = b;
   ScalarType dead_time{};  ///< s, from u to the plant; d is not delayed
 
@@ -64,7 +64,7 @@ struct LinearPlant {
     ScalarType dead_time{};                   ///< s
   };
 
-  /// n integrations from u to y with feedback of the states, as ADRC sees a plant:
+  /// The form in which ADRC sees a plant: n integrations from u to y, with feedback of the states.
   ///
   ///     y^(n) + a_(n-1) y^(n-1) + .. + a_0 y = b0 u(t - dead_time) + d
   ///
@@ -82,7 +82,7 @@ struct LinearPlant {
     return plant;
   }
 
-  /// From u to y
+  /// The plant with the transfer function from u to y
   ///
   ///     (b_(n-1) s^(n-1) + .. + b_0) / (s^n + a_(n-1) s^(n-1) + .. + a_0) e^(-s dead_time)
   ///
@@ -95,7 +95,8 @@ struct LinearPlant {
         .not_negative("dead_time", config.dead_time);
     if (!rules) return rules.error();
     LinearPlant plant = companion(config.denominator, config.dead_time);
-    // Row k of B is what an impulse of u makes of y^(k): b_(n-1-k) less what feeds back.
+    // Row k of B is the jump of y^(k) after an impulse of u: b_(n-1-k) minus the feedback of the
+    // rows before.
     bool any = false;
     for (int k = 0; k < States; ++k) {
       ScalarType row = config.numerator[static_cast<std::size_t>(States - 1 - k)];
@@ -120,9 +121,9 @@ struct LinearPlant {
     return plant;
   }
 
-  /// Error of a number that is not finite, of a negative dead time, of an output that no input
-  /// reaches, and of an input gain that the scalar cannot hold. The index is that of the element,
-  /// by columns; of an output its number.
+  /// An error for a number that is not finite, a negative dead time, an output that no input
+  /// reaches, or an input gain that the scalar cannot hold. Its index is the element, counted by
+  /// columns, or the number of the output.
   [[nodiscard]] constexpr Check<ScalarType> check() const {
     Rules<ScalarType> rules;
     rules.finite("a", a).finite("b", b).finite("c", c).finite("e", e).not_negative("dead_time",
@@ -138,7 +139,7 @@ struct LinearPlant {
     return rules;
   }
 
-  /// x'. @param u as it arrives, dead_time later than it was sent
+  /// x', 1/s times the unit of x. @param u as it arrives at the plant, dead_time after it was sent
   [[nodiscard]] constexpr State derivative(const State& x, const Input& u,
                                            const Input& d = Input()) const noexcept {
     State rate;
@@ -165,13 +166,13 @@ struct LinearPlant {
     return y;
   }
 
-  /// n of ADRC: the order of the first derivative of the output that an input changes at once; 0 if
-  /// there is none. A value that may be a rounded zero counts as zero.
+  /// The order n for ADRC: that of the lowest derivative of the output on which an input acts
+  /// directly; 0 if there is none. A value that could be rounding error counts as zero.
   [[nodiscard]] constexpr int relative_degree(int output = 0) const noexcept {
     return first_gain(output).degree;
   }
 
-  /// b0 of ADRC: what a unit of u adds to the derivative of order relative_degree(). Of several
+  /// b0 for ADRC: what a unit of u adds to the derivative of order relative_degree(). For several
   /// channels a matrix, Outputs x Inputs: the input_matrix of MimoAdrc.
   [[nodiscard]] constexpr auto input_gain() const noexcept {
     if constexpr (single) {
@@ -190,7 +191,7 @@ struct LinearPlant {
   /// `chain` and `.plant` of an AugmentedModel take them.
   [[nodiscard]] constexpr Array<ScalarType, States> coefficients() const noexcept {
     Array<ScalarType, States> all{};
-    auto power = Matrix<ScalarType, States, States>::Identity();  // Faddeev and LeVerrier
+    auto power = Matrix<ScalarType, States, States>::Identity();  // Faddeev-LeVerrier algorithm
     for (int k = 1; k <= States; ++k) {
       power = a * power;
       const ScalarType next = -power.trace() / detail::integer<ScalarType>(k);
@@ -212,7 +213,7 @@ struct LinearPlant {
     RowVector<ScalarType, Inputs> gain;
   };
 
-  /// A and C of the states (y, y', .., y^(n-1)).
+  /// A and C for the states (y, y', .., y^(n-1)).
   static constexpr LinearPlant companion(const Array<ScalarType, States>& coefficients,
                                          const ScalarType& dead_time) noexcept {
     LinearPlant plant;
@@ -225,7 +226,7 @@ struct LinearPlant {
     return plant;
   }
 
-  /// The first of C B, C A B, C A^2 B, .. that is more than the rounding of its sums.
+  /// The first of C B, C A B, C A^2 B, .. that exceeds the rounding error of its sums.
   [[nodiscard]] constexpr Reached first_gain(int output) const noexcept {
     using Table = detail::TableScalar<ScalarType>;
     RowVector<ScalarType, States> row = c.row(output);
@@ -255,7 +256,8 @@ struct LinearPlant {
 
 namespace detail {
 
-/// The plant with `More` states of first order behind its own; `connect(bigger, rate)` wires them.
+/// The plant with `More` first-order lags appended to its states; `connect(bigger, rate)` connects
+/// them.
 template <int More, int States, Scalar S, int Inputs, int Outputs, class Connect>
 constexpr Expected<LinearPlant<States + More, S, Inputs, Outputs>, Error<S>> with_first_order(
     const LinearPlant<States, S, Inputs, Outputs>& plant, const S& time_constant,
@@ -286,8 +288,8 @@ constexpr Expected<LinearPlant<States + More, S, Inputs, Outputs>, Error<S>> wit
 
 }  // namespace detail
 
-/// The plant behind an actuator of first order, time_constant u_a' + u_a = u, one for each input.
-/// d enters behind it, as a load does. The new states come last: u_a.
+/// The plant behind an actuator of first order, time_constant u_a' + u_a = u, one for each input. d
+/// enters behind the actuator, as a load does. The new states u_a come last.
 /// @param time_constant s
 template <int States, Scalar S, int Inputs, int Outputs>
 constexpr Expected<LinearPlant<States + Inputs, S, Inputs, Outputs>, Error<S>> with_lag(
@@ -304,7 +306,7 @@ constexpr Expected<LinearPlant<States + Inputs, S, Inputs, Outputs>, Error<S>> w
 }
 
 /// The plant seen by a sensor of first order, time_constant y_s' + y_s = y, one for each output.
-/// The new states come last: y_s, which are the outputs now.
+/// The new states y_s come last; they are the outputs of the new plant.
 /// @param time_constant s
 template <int States, Scalar S, int Inputs, int Outputs>
 constexpr Expected<LinearPlant<States + Outputs, S, Inputs, Outputs>, Error<S>> with_sensor(
@@ -333,18 +335,18 @@ constexpr Expected<LinearPlant<States, S, Inputs, Outputs>, Error<S>> with_dead_
   return late;
 }
 
-/// The exact effect of held inputs on the state of a plant over a time: x + increment x + input u +
+/// The exact effect of held inputs on a plant over a time t: x(t) = x + increment x + input u +
 /// disturbance d.
 ///
-/// The increment, exp(A t) - I, is kept instead of exp(A t), which for a short while has the digits
-/// of the dynamics behind those of I.
+/// exp(A t) - I is kept instead of exp(A t), in which, for a short t, adding I would lose digits of
+/// the dynamics.
 template <int States, Scalar S = double, int Inputs = 1>
 struct HeldPlant {
   Matrix<S, States, States> increment{};    ///< exp(A t) - I
   Matrix<S, States, Inputs> input{};        ///< the integral of exp(A s) B over 0 .. t
   Matrix<S, States, Inputs> disturbance{};  ///< the integral of exp(A s) E over 0 .. t
 
-  /// x when the while is over. u, which is known last, comes in last.
+  /// x at the end of the time. u is added last, because in a loop it is known last.
   [[nodiscard]] ESOKIT_INLINE constexpr Vector<S, States> advanced(
       const Vector<S, States>& x, const Vector<S, Inputs>& u,
       const Vector<S, Inputs>& d) const noexcept {
@@ -362,7 +364,8 @@ struct HeldPlant {
   }
 };
 
-/// The plant over `duration`, u (as it arrives: without the dead time) and d held.
+/// The plant over `duration` with u and d held. u is the input as it arrives: the dead time is not
+/// included.
 /// @param duration s, zero or more
 /// @return error for a plant that `check` refuses and for a result that the scalar cannot hold
 template <int States, Scalar S, int Inputs, int Outputs>
@@ -406,7 +409,7 @@ constexpr Expected<HeldPlant<States, S, Inputs>, Error<S>> held_plant(
     return true;
   };
   rules.require(fits(held.increment) && fits(held.input) && fits(held.disturbance), "duration",
-                duration, "is so long that the scalar cannot hold what the plant does in it");
+                duration, "is so long that the plant's states leave the range of the scalar");
   if (!rules) return rules.error();
   return held;
 }

@@ -10,23 +10,23 @@ namespace esokit {
 
 namespace detail {
 
-/// Which elements of Phi - I, and in the last column of Gamma, can differ from zero, which are
-/// known when compiling, and where the others are kept, row by row.
+/// Which elements of Phi - I and (last column) of Gamma can differ from zero, which of these are
+/// known at compile time, and where the others are stored, row by row.
 template <int Size>
 struct ModelPattern {
   Array<Array<bool, Size + 1>, Size> couples{};
-  Array<Array<int, Size + 1>, Size> chain{};  ///< those of a chain: binomials; else 0
+  Array<Array<int, Size + 1>, Size> chain{};  ///< elements of a chain (binomials), else 0
   Array<Array<int, Size + 1>, Size> place{};
   int kept = 0;
-  int driven = -1;  ///< the state to which u adds, scaled as it is: Gamma is its column of Phi - I
-                    ///< and is not kept; -1: none
+  int driven = -1;  ///< the state to which u adds: Gamma is its column of Phi and is not stored;
+                    ///< -1: none
 };
 
 }  // namespace detail
 
-/// The members of a SampledModel, computed with Phi - I and Gamma; elements that are always zero
-/// are left out. The states are the scaled rows of the estimate in another order: those of a sensor
-/// come first.
+/// The members of a SampledModel, computed from Phi - I and Gamma without the elements that are
+/// always zero. The states are the scaled rows of the estimate, but in another order: those of a
+/// sensor come first.
 /// @tparam Shape `order`, `size`, `measured_rows` (states before y), `degree(state)`, and
 /// `pattern`, a detail::ModelPattern
 template <class Shape, PlainScalar S>
@@ -34,20 +34,20 @@ class MatrixModel {
  public:
   static constexpr int order = Shape::order;                  ///< of the law
   static constexpr int size = Shape::size;                    ///< N
-  static constexpr int extension = size - order;              ///< all beside the plant's rows
+  static constexpr int extension = size - order;              ///< all rows besides the plant's
   static constexpr int measured_rows = Shape::measured_rows;  ///< states of a sensor
 
   using State = Array<S, size>;      ///< x, scaled, N elements
   using Estimate = Vector<S, size>;  ///< z, physical units, N x 1
 
-  /// b: y^(order) = D + b u. b0, as it was given, where the actuator has no lag.
+  /// b in y^(order) = D + b u. Without an actuator this is b0, as it was given.
   [[nodiscard]] constexpr const S& input_gain() const noexcept { return input_gain_; }
   /// T, s, as it was given.
   [[nodiscard]] constexpr const S& sample_time() const noexcept { return sample_time_; }
-  /// What drives a step: u.
+  /// The input of `predict`: u itself.
   [[nodiscard]] ESOKIT_INLINE constexpr S drive(const S& u) const noexcept { return u; }
 
-  /// x one sample ahead: Phi x + Gamma u; what is zero of Phi - I whatever the numbers is left out.
+  /// x one sample ahead: Phi x + Gamma u, without the elements of Phi - I that are always zero.
   [[nodiscard]] ESOKIT_INLINE constexpr State predict(const State& x, const S& u) const noexcept {
     State next = x;
     State acting = x;
@@ -75,7 +75,7 @@ class MatrixModel {
     return sum;
   }
 
-  /// Where row `row` of the estimate is among the states: those of the sensor come first.
+  /// Place of a row of the estimate among the states: those of the sensor come first.
   [[nodiscard]] static constexpr int state_of_row(int row) noexcept {
     return row + measured_rows < size ? row + measured_rows : row + measured_rows - size;
   }
@@ -86,12 +86,12 @@ class MatrixModel {
     detail::unroll<size>([&](auto row) { z(int{row}) = physical<row>(x); });
     return z;
   }
-  /// One of them.
+  /// One of the estimates.
   template <int Row>
   [[nodiscard]] ESOKIT_INLINE constexpr S physical(const State& x) const noexcept {
     constexpr int state = state_of_row(Row);
     S value = std::get<state>(x);
-    // In steps: T^-degree itself may not fit the scalar where the estimate does.
+    // Multiplied in steps: T^-degree alone may overflow when the estimate does not.
     detail::unroll<degree(state)>([&](auto j) ESOKIT_INLINE_LAMBDA {
       constexpr double weight = degree(state) - j;
       value = value * (detail::constant<S>(weight) * rate_);
@@ -109,14 +109,14 @@ class MatrixModel {
     }
     return x;
   }
-  /// D as it is scaled in the state. @param disturbance unit of y^(order)
+  /// D in the scaling of the state. @param disturbance unit of y^(order)
   [[nodiscard]] constexpr S scaled_disturbance(const S& disturbance) const noexcept {
     S value = disturbance;
     for (int j = 1; j <= order; ++j) value = value * (sample_time_ / static_cast<S>(j));
     return value;
   }
 
-  /// A number that is finite only if all estimates are.
+  /// A number that is finite only if all estimates are finite.
   [[nodiscard]] ESOKIT_INLINE constexpr S finite_probe(const State& x) const noexcept {
     constexpr int first = [] {
       int state = 0;
@@ -142,7 +142,7 @@ class MatrixModel {
     return probe;
   }
 
-  /// A state of the model `before` as the same estimate of this one.
+  /// The state of this model with the same estimate as state x of the model `before`.
   [[nodiscard]] constexpr State rescaled(const State& x, const MatrixModel& before) const noexcept {
     if (!(sample_time_ < before.sample_time_) && !(sample_time_ > before.sample_time_)) return x;
     return scaled(before.physical(x));
@@ -162,10 +162,10 @@ class MatrixModel {
     }
     return step;
   }
-  /// A state is T^degree / degree! times what it is in physical units.
+  /// A state is its value in physical units times T^degree / degree!.
   [[nodiscard]] static constexpr int degree(int state) noexcept { return Shape::degree(state); }
 
-  /// True if u does the same in both.
+  /// True if u has the same effect in both models.
   [[nodiscard]] constexpr bool same_drive(const MatrixModel& other) const noexcept {
     const S change = detail::absolute(S(scaled_input_gain_ - other.scaled_input_gain_)) +
                      detail::absolute(S(rate_ - other.rate_));
@@ -177,8 +177,8 @@ class MatrixModel {
   MatrixModel(const S& input_gain, const S& sample_time) noexcept
       : rate_(S(1) / sample_time), input_gain_(input_gain), sample_time_(sample_time) {}
 
-  /// @param all Phi - I, and as last column Gamma of a u whose scaled effect b T^order / order! is
-  /// one (not read where u adds to a state)
+  /// @param all Phi - I, and as last column Gamma for a u in units in which b T^order / order! is
+  /// one (not read if u only adds to a state)
   void set_step(const Matrix<S, size + 1, size + 1>& all) noexcept {
     for (int i = 0; i < size; ++i) {
       for (int j = 0; j < size + (driven < 0 ? 1 : 0); ++j) {
@@ -189,18 +189,18 @@ class MatrixModel {
     }
   }
 
-  static constexpr const auto& pattern = Shape::pattern;  ///< what is kept
+  static constexpr const auto& pattern = Shape::pattern;  ///< which elements are stored
   static constexpr int driven = pattern.driven;           ///< the state to which u adds, or -1
 
   /// Whether an element of Phi - I or (column N) Gamma is not zero.
   static constexpr bool couples(int i, int j) noexcept {
     return pattern.couples[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
   }
-  /// What of an element is the chain's own, known when compiling.
+  /// The part of an element that belongs to the chain and is known at compile time.
   static constexpr int of_chain(int i, int j) noexcept {
     return pattern.chain[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
   }
-  /// Where among the kept ones an element is.
+  /// Index of an element among the stored ones.
   static constexpr int place(int i, int j) noexcept {
     return pattern.place[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
   }
@@ -221,7 +221,7 @@ class MatrixModel {
     }
   }
 
-  Array<S, pattern.kept> step_{};  ///< Phi - I and Gamma, what is not zero
+  Array<S, pattern.kept> step_{};  ///< the stored elements of Phi - I and Gamma
   S rate_;                         ///< 1/T
   S input_gain_;                   ///< b
   S sample_time_;                  ///< T, s

@@ -1,6 +1,6 @@
 /// @file
-/// The parts of a model: lags of actuator and sensor, and disturbances that stay, swing or fade.
-/// Common to AugmentedModel and LinearPlantModel.
+/// The parts of a model: lags of actuator and sensor, and disturbances that are constant,
+/// sinusoidal or decaying. Common to AugmentedModel and LinearPlantModel.
 #pragma once
 
 #include <cmath>
@@ -12,17 +12,17 @@
 
 namespace esokit {
 
-/// What is known of the plant: the parts of a model. Their numbers are in its Settings.
+/// Which parts a model has. Their numbers are in its Settings.
 struct ModelParts {
   int order = 1;               ///< n: the plant is y^(n) = -a_(n-1) y^(n-1) - .. - a_0 y + d + b0 v
   bool plant_poles = false;    ///< a_0 .. a_(n-1) are known; false: they are zero, a chain
   int actuator = 0;            ///< order of the lag from u to v: 0 (v = u), 1 or 2
-  int sensor = 0;              ///< order of the lag from y to what is measured: 0, 1 or 2
+  int sensor = 0;              ///< order of the lag from y to the measured value: 0, 1 or 2
   int constants = 1;           ///< m: the disturbance has m integrators, at least one
   int resonators = 0;          ///< number of sines of known frequency in the disturbance
-  int leaky = 0;               ///< number of fading parts, each with a time constant
-  bool follows_speed = false;  ///< the frequencies of the resonators change while running, all by
-                               ///< one factor
+  int leaky = 0;               ///< number of decaying parts, each with a time constant
+  bool follows_speed = false;  ///< one factor changes all frequencies of the resonators while
+                               ///< running
 };
 
 /// The lag of an actuator or a sensor; empty for order 0.
@@ -45,7 +45,7 @@ struct Lag<2, S> {
   S frequency{};       ///< w, rad/s
   S damping = S(1.0);  ///< zeta; 1: two equal time constants 1 / w
 
-  /// Of two time constants, s.
+  /// The lag with these two time constants, s.
   static Lag of_time_constants(const S& first, const S& second) noexcept {
     const S root = std::sqrt(first * second);
     return {S(1) / root, (first + second) / (S(2) * root)};
@@ -56,11 +56,11 @@ struct Lag<2, S> {
   /// @endcond
 };
 
-/// A disturbance that swings at a known frequency.
+/// A sinusoidal disturbance of known frequency.
 template <Scalar S>
 struct Resonance {
   S frequency{};          ///< w0, rad/s
-  S damping{};            ///< of the swing, 0 up to 1
+  S damping{};            ///< damping ratio of the sine, 0 to below 1
   S capture_bandwidth{};  ///< s, rad/s: its poles go to -s +- j w0. Left out: w0. More captures it
                           ///< faster, and with more error in its frequency, at more noise
 
@@ -71,7 +71,7 @@ struct Resonance {
   /// @endcond
 };
 
-/// A sine by amplitude and phase: q = amplitude sin(phase).
+/// A sine at the present time: q = amplitude sin(phase).
 template <PlainScalar S>
 struct Swing {
   S amplitude;  ///< unit of the disturbance
@@ -80,18 +80,20 @@ struct Swing {
 
 namespace detail {
 
-/// @param q the sine @param r a quarter of a turn ahead of it
+/// @param q the sine @param r the same sine a quarter period ahead
 template <PlainScalar S>
 Swing<S> swing_of(const S& q, const S& r) noexcept {
   return {std::hypot(q, r), std::atan2(q, r)};
 }
 
-/// Elements of the disturbance: its integrators, two a resonator, and what fades.
+/// Number of states of the disturbance: its integrators, two for each resonator, one for each
+/// decaying part.
 constexpr int disturbance_size(const ModelParts& parts) noexcept {
   return parts.constants + 2 * parts.resonators + parts.leaky;
 }
 
-/// T^l times a_0 .. a_(l-1) of the lag's denominator s^l + .., and one.
+/// Coefficients of a lag of order l with denominator s^l + .. + a_0, in units of T: T^(l-i) a_i for
+/// i < l, then 1.
 /// @{
 template <PlainScalar S>
 Array<S, 1> scaled_lag(const Lag<0, S>&, const S&) noexcept {
@@ -108,7 +110,7 @@ Array<S, 3> scaled_lag(const Lag<2, S>& lag, const S& time) noexcept {
 }
 /// @}
 
-/// How fast a sensor is, 1/s.
+/// Bandwidth of a sensor, 1/s.
 /// @{
 template <PlainScalar S>
 S sensor_rate(const Lag<1, S>& lag) noexcept {
@@ -120,7 +122,7 @@ S sensor_rate(const Lag<2, S>& lag) noexcept {
 }
 /// @}
 
-/// T A of a sensor that is the first states, of what follows behind it: y is state `Order`.
+/// Writes T A of a sensor into a: its states come first, and it follows y, which is state `Order`.
 template <int Order, PlainScalar S, int Rows, int Columns>
 void set_sensor_rates(Matrix<S, Rows, Columns>& a, const Lag<Order, S>& sensor, const S& time) {
   if constexpr (Order == 1) {
@@ -135,7 +137,8 @@ void set_sensor_rates(Matrix<S, Rows, Columns>& a, const Lag<Order, S>& sensor, 
   }
 }
 
-/// T A of resonators, two states each, and of what fades, one each, from state `first` on.
+/// Writes T A of the resonators, two states each, and of the decaying parts, one each, from state
+/// `first` on.
 template <PlainScalar S, int Rows, int Columns, std::size_t Swings, std::size_t Leaks>
 void set_swing_rates(Matrix<S, Rows, Columns>& a, int first,
                      const std::array<Resonance<S>, Swings>& resonators,
@@ -154,8 +157,9 @@ void set_swing_rates(Matrix<S, Rows, Columns>& a, int first,
   }
 }
 
-/// What a sensor's states are where their errors are only what they make of those of the plant,
-/// whose first state is y: f = g x with g A + rate g = rate C, and of order 2 f' / w.
+/// The sensor's states f as a function of those of the plant, f = g x, if the sensor keeps its own
+/// poles: g solves g A + rate g = rate C (order 1); for order 2 the second row is f' / w. The first
+/// state of x is y.
 /// @param rates T A of the plant
 template <int Order, PlainScalar S, int Size>
 Matrix<S, Order, Size> shown_by_sensor(const Lag<Order, S>& sensor, const S& time,
@@ -184,7 +188,7 @@ Matrix<S, Order, Size> shown_by_sensor(const Lag<Order, S>& sensor, const S& tim
   return shown;
 }
 
-/// Real and imaginary part of the poles that the resonators ask for, 1/s.
+/// Real and imaginary part of the poles of the resonators, 1/s: -s +- j w0.
 template <PlainScalar S, std::size_t Swings>
 Array<Array<S, 2>, static_cast<int>(Swings)> own_pairs(
     const std::array<Resonance<S>, Swings>& resonators) {

@@ -1,6 +1,6 @@
 /// @file
-/// LinearPlantModel: any observable linear plant, and where in it the disturbance enters, as the
-/// model of an observer.
+/// LinearPlantModel: any observable linear plant as the model of an observer, with a
+/// disturbance that enters at any place.
 #pragma once
 
 #include <cmath>
@@ -18,16 +18,17 @@ namespace esokit {
 
 namespace detail {
 
-/// What MatrixModel asks for. The states are those of a sensor, y .. y^(n-1), D, what of the plant
-/// is beside them, and the elements of the disturbance; of these D has taken the first one's place
-/// where the plant is nothing but y .. y^(n-1).
+/// The Shape that MatrixModel takes. The states are those of a sensor, y .. y^(n-1), D, the
+/// remaining states of the plant, and the states of the disturbance. If y .. y^(n-1) are all of the
+/// plant, D takes the place of the first state of the disturbance.
 template <int States, ModelParts Parts>
 struct PlantShape {
   static constexpr int order = Parts.order;
   static constexpr int size = Parts.sensor + States + disturbance_size(Parts);
   static constexpr int measured_rows = Parts.sensor;
-  static constexpr int first = size - disturbance_size(Parts);  ///< of the disturbance's states
-  static constexpr int replaced = order == States ? 1 : 0;      ///< of its elements
+  static constexpr int first =
+      size - disturbance_size(Parts);  ///< index of the first state of the disturbance
+  static constexpr int replaced = order == States ? 1 : 0;  ///< of its states, how many D replaces
 
   static constexpr int degree(int state) noexcept {
     if (state < Parts.sensor) return 0;
@@ -60,20 +61,20 @@ struct PlantShape {
 
 }  // namespace detail
 
-/// x' = A x + B u + E d, y = C x: a plant with zeros, known poles, or a disturbance that enters at
-/// another place than u (mismatched), sampled exactly. d is the sum of a constant (or polynomial),
-/// sines and fading parts; y may be measured through a sensor's lag.
+/// x' = A x + B u + E d, y = C x: a plant with zeros, known poles, or a disturbance that does not
+/// enter where u does (mismatched), sampled exactly. d is the sum of a constant (or polynomial),
+/// sines and decaying parts; y may be measured through a sensor with a lag.
 ///
-/// y^(n) = D + b u, with n the relative degree of u; `estimate` has (y, .., y^(n-1), D, ..), where
-/// D is everything that a law cancels, so that `Adrc` works with it; `plant_state` and
-/// `disturbance` give x and d. Cancelling D makes the zeros of the plant poles of the loop: if a
-/// zero is in the right half plane, use only the estimates.
+/// y^(n) = D + b u, where n is the relative degree from u to y. `estimate` is (y, .., y^(n-1), D,
+/// ..), where D is everything that a law cancels, so that `Adrc` works with it; `plant_state` and
+/// `disturbance` give x and d. If D is cancelled, the zeros of the plant become poles of the loop:
+/// with a zero in the right half plane use the estimates only.
 ///
-/// The config's `input_gain` is b; B is scaled to it, E is not. For a dead time use DelayedInput;
-/// an actuator is part of A. Poles: as for AugmentedModel, with all poles of the plant at
-/// exp(-omega_o T).
-/// @tparam States of x @tparam Parts of it `order`, the relative degree from u to y, `sensor`,
-/// `constants`, `resonators` and `leaky`; the rest is in the plant
+/// The config's `input_gain` is b. B is scaled to agree with it, E is not. For a dead time use
+/// DelayedInput; write an actuator into A. Poles: as for AugmentedModel, with all poles of the
+/// plant (an actuator, too) at exp(-omega_o T).
+/// @tparam States length of x @tparam Parts uses `order` (the relative degree from u to y),
+/// `sensor`, `constants`, `resonators` and `leaky`; everything else is in the plant
 template <int States, ModelParts Parts, PlainScalar S = double>
 class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S> {
   using Shape = detail::PlantShape<States, Parts>;
@@ -91,7 +92,7 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
   static_assert(!Parts.follows_speed, "esokit: only an AugmentedModel follows a speed");
 
  public:
-  static constexpr ModelParts parts = Parts;  ///< what is known beside the plant
+  static constexpr ModelParts parts = Parts;  ///< what is known besides the plant
   using Base::order;
   using Base::size;
   using typename Base::Estimate;
@@ -102,18 +103,18 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
   template <class T>
   using with_scalar = LinearPlantModel<States, Parts, T>;  ///< the same with another scalar
 
-  /// Settings of make; those of parts that are not there are empty.
+  /// Settings of make; members of absent parts are empty.
   struct Settings {
     LinearPlant<States, S> plant{};                      ///< A, B, C and, for d, E
     Lag<lf, S> sensor{};                                 ///< from y to what is measured
     Array<Resonance<S>, Parts.resonators> resonators{};  ///< sines of d
-    Array<S, Parts.leaky> leaky{};                       ///< time constants of the fading parts, s
+    Array<S, Parts.leaky> leaky{};  ///< time constants of the decaying parts, s
   };
 
   /// Checks the plant and samples it with its disturbance.
   /// @param settings the plant @param input_gain b @param sample_time T, s; both checked
-  /// @return the model, or an error that names the field; for a state that y does not show,
-  ///         with the share that it shows
+  /// @return the model, or an error that names the field. For an unobservable state or disturbance
+  ///         its value is the share that y shows of it: 0 unobservable, 1 fully visible
   static Expected<LinearPlantModel, Error<S>> make(const Settings& settings, const S& input_gain,
                                                    const S& sample_time) {
     const auto& plant = settings.plant;
@@ -131,9 +132,10 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
     if (!rules) return rules.error();
     const S seen = shown_share(plant, sample_time);
     constexpr S least = S(1024) * std::numeric_limits<S>::epsilon();
-    rules.require(seen >= least,
-                  {"model.plant.c", seen,
-                   "leaves a state unobservable: of it y shows a share below", -1, least, true});
+    rules.require(
+        seen >= least,
+        {"model.plant.c", seen, "makes a state unobservable: the share that y shows of it is below",
+         -1, least, true});
     const Numerator from_d(plant, sample_time);
     const auto passes = [&](const char* field, int index, const char* rule, const S& real,
                             const S& imaginary) {
@@ -141,17 +143,17 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
       rules.require(passed >= least, {field, passed, rule, index, least, true});
     };
     passes("model.plant.e", -1,
-           "lets a constant disturbance hide behind a zero: of it y shows a share below", S(0),
-           S(0));
+           "hides a constant disturbance behind a zero: the share that y shows of it is below",
+           S(0), S(0));
     for (std::size_t i = 0; i < settings.resonators.size(); ++i) {
       const auto& [w, damping, capture] = settings.resonators[i];
       passes("model.resonators.frequency", static_cast<int>(i),
-             "lets a swing hide behind a zero: of it y shows a share below", -(damping * w),
+             "hides a sine behind a zero: the share that y shows of it is below", -(damping * w),
              w * std::sqrt(S(1) - damping * damping));
     }
     for (std::size_t i = 0; i < settings.leaky.size(); ++i) {
       passes("model.leaky", static_cast<int>(i),
-             "lets a fading disturbance hide behind a zero: of it y shows a share below",
+             "hides a decaying disturbance behind a zero: the share that y shows of it is below",
              S(-1) / settings.leaky[i], S(0));
     }
     if (!rules) return rules.error();
@@ -164,17 +166,17 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
     return model;
   }
 
-  /// As they were given.
+  /// The settings, as they were given.
   [[nodiscard]] constexpr const Settings& settings() const noexcept { return settings_; }
 
-  /// The estimate for a plant that stands at y under u.
+  /// The estimate for a plant at rest at y under a constant u.
   [[nodiscard]] Estimate rest(const S& y, const S& u) const noexcept {
     return rest_of_y_ * y + rest_of_u_ * u;
   }
 
   /// @name The parts of an estimate
   /// @{
-  /// What is measured, as the sensor would show y.
+  /// The measured value: y as the sensor shows it.
   [[nodiscard]] static constexpr S measured(const Estimate& z) noexcept {
     return z(lf > 0 ? size - lf : 0);
   }
@@ -183,7 +185,7 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
     const auto natural = natural_of(z);
     return natural.template head<States>();
   }
-  /// d, all of it.
+  /// d, the sum of all its parts.
   [[nodiscard]] S disturbance(const Estimate& z) const noexcept {
     const auto natural = natural_of(z);
     S sum = natural(States);
@@ -198,14 +200,14 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
       requires(Parts.resonators > 0) {
     return detail::swing_of(z(swings + 2 * resonator), z(swings + 2 * resonator + 1));
   }
-  /// The fading part 0 .. l - 1 of d.
+  /// The decaying part 0 .. l - 1 of d.
   [[nodiscard]] static constexpr S fading(const Estimate& z, int part) noexcept
       requires(Parts.leaky > 0) {
     return z(swings + 2 * Parts.resonators + part);
   }
   /// @}
 
-  /// What of a correction is the disturbance's: with x as it is.
+  /// The part of a correction that belongs to the disturbance: the one that leaves x unchanged.
   [[nodiscard]] State disturbance_part(const State& x) const noexcept {
     State part{};
     for (int k = States; k < inner; ++k) {
@@ -221,16 +223,17 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
     return part;
   }
 
-  /// True if u does the same in both.
+  /// True if u has the same effect in both models.
   [[nodiscard]] bool same_drive(const LinearPlantModel& other) const noexcept {
     return Base::same_drive(other);
   }
-  /// A state of the model `before` as the same estimate of this one: of y .. D, and x beside it.
+  /// The state of this model with the same estimates y .. D and the same other plant states as
+  /// state x of the model `before`.
   [[nodiscard]] State rescaled(const State& x, const LinearPlantModel& before) const noexcept {
     return this->scaled(before.physical(x));
   }
 
-  /// Calls `design(part)` with the CorrectedPart and returns what it returns.
+  /// Returns `design(part)`, called with the CorrectedPart.
   /// @param bandwidth omega_o, rad/s: a sensor that is faster keeps its own poles
   template <class Design>
   auto with_corrected_part(const S& bandwidth, const Design& design) const {
@@ -266,17 +269,18 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
   }
 
  private:
-  static constexpr int swings = States + Parts.constants;  ///< row of the estimate, and of natural_
+  static constexpr int swings =
+      States + Parts.constants;  ///< first row of the sines, also in natural_
   using Square = Matrix<S, inner, inner>;
 
-  /// C adj(s I - A) E, what the zeros from d to y are, and beside each coefficient what its terms
-  /// would be if nothing cancelled.
+  /// C adj(s I - A) E, whose roots are the zeros from d to y, and for each coefficient the sum of
+  /// the magnitudes of its terms.
   struct Numerator {
     Array<S, States> coefficients{};  ///< of s^0, s^1, .., in units of T
     Array<S, States> sizes{};
 
     Numerator(const LinearPlant<States, S>& plant, const S& time) noexcept {
-      auto adjugate = Matrix<S, States, States>::Identity();  // Faddeev and LeVerrier
+      auto adjugate = Matrix<S, States, States>::Identity();  // Faddeev-LeVerrier algorithm
       auto bound = adjugate;
       for (int k = States - 1; k >= 0; --k) {
         S sum(0);
@@ -302,7 +306,7 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
       }
     }
 
-    /// Its magnitude at s, against the sizes: 0 where a zero hides what goes like exp(s t).
+    /// Its magnitude at s relative to those sizes: 0 if a zero at s hides a disturbance exp(s t).
     [[nodiscard]] S share(const S& real, const S& imaginary) const noexcept {
       const S magnitude = std::hypot(real, imaginary);
       S re(0);
@@ -318,8 +322,7 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
     }
   };
 
-  /// T A of (x, elements of d), and in the last column T B of a B whose gain is `scale` times that
-  /// of the plant.
+  /// T A of (x, states of d), and in the last column T B with B multiplied by `scale`.
   static Matrix<S, inner + 1, inner + 1> inner_rates(const Settings& settings, const S& time,
                                                      const S& scale) noexcept {
     const auto& plant = settings.plant;
@@ -337,7 +340,8 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
     return a;
   }
 
-  /// Rows T^r / r! y^(r) to D, of x those that are furthest from them, and the elements of d.
+  /// The rows of the model's states over (x, states of d): T^r / r! y^(r) up to D, then the
+  /// elements of x that are least dependent on them, then the states of d.
   [[nodiscard]] Square rows_of(const Matrix<S, inner + 1, inner + 1>& natural) const noexcept {
     Square rows = Square::Zero();
     for (int j = 0; j < States; ++j) rows(0, j) = settings_.plant.c(j);
@@ -365,7 +369,8 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
       }
       const S unit = this->scaled_disturbance(S(1));
       for (int j = 0; j < States; ++j) {
-        // Fewer pivots than rows, where they depend on each other: no inverse then, and no make.
+        // If the rows are dependent, there are fewer pivots than rows: the matrix has no inverse,
+        // and make fails.
         if (!taken[static_cast<std::size_t>(j)] && row < States) rows(row++, j) = unit;
       }
     }
@@ -378,8 +383,8 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
     return rows;
   }
 
-  /// Of (x, elements of d) as a matrix that acts on the scaled states without the sensor's:
-  /// rows m rows^-1, from behind: rows' X' = (rows m)'.
+  /// A matrix m that acts on (x, states of d) as one that acts on the scaled states without the
+  /// sensor's: X = rows m rows^-1, solved from rows' X' = (rows m)'.
   template <int Size>
   static Matrix<S, Size, Size> in_rows(Matrix<S, Size, Size> rows,
                                        const Matrix<S, Size, Size>& m) noexcept {
@@ -398,7 +403,7 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
     const Square rows = rows_of(natural);
     this->scaled_input_gain_ = this->scaled_disturbance(input_gain);
 
-    // (f, x, elements of d, u): what a step does to them, and then in rows.
+    // The step of (f, x, states of d, u), which is then converted to rows.
     auto all = Matrix<S, size + 1, size + 1>::Zero();
     for (int i = 0; i <= inner; ++i) {
       for (int j = 0; j <= inner; ++j) all(lf + i, lf + j) = natural(i, j);
@@ -462,14 +467,15 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
       if constexpr (lf > 0) x[0] = S(which == 0 ? 1 : 0);
       (which == 0 ? rest_of_y_ : rest_of_u_) = this->physical(x);
     }
-    // D is what u has to hold, and nothing moves: without the rounding of the equations.
+    // D is what u has to balance and all derivatives are zero. Set exactly, without the rounding
+    // error of the equations.
     for (int r = 0; r <= n; ++r) {
       rest_of_y_(r) = S(r == 0 ? 1 : 0);
       rest_of_u_(r) = r == n ? S(-input_gain) : S(0);
     }
   }
 
-  /// (x, elements of d).
+  /// (x, states of d) of an estimate.
   [[nodiscard]] Vector<S, inner> natural_of(const Estimate& z) const noexcept {
     const State x = this->scaled(z);
     Vector<S, inner> state;
@@ -477,8 +483,7 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
     return natural_ * state;
   }
 
-  /// Least pivot of the rows C A^i, each in the measure of its own size: 0 where a state is not
-  /// seen in y.
+  /// Smallest pivot of the rows C A^i, each normalised: 0 if a state is unobservable from y.
   static S shown_share(const LinearPlant<States, S>& plant, const S& time) noexcept {
     Matrix<S, States, States> seen;
     RowVector<S, States> row = plant.c;
@@ -508,8 +513,8 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
   }
 
   Settings settings_;
-  Square natural_;  ///< from the scaled states to (x, elements of d)
-  Matrix<S, inner, inner - States> of_disturbance_;  ///< from the elements of d to the states
+  Square natural_;                                   ///< from the scaled states to (x, states of d)
+  Matrix<S, inner, inner - States> of_disturbance_;  ///< from the states of d to the model's states
   Estimate rest_of_y_;
   Estimate rest_of_u_;
 };

@@ -15,14 +15,14 @@ namespace esokit {
 /// What a model declares beyond SampledModel, in a member `static constexpr ModelTraits
 /// traits{..}`.
 struct ModelTraits {
-  /// It is exactly the chain of integrators. Then gains follow from formulas, any gap is bridged by
-  /// the gain for the longer step, and there are certificates, error bounds and filter forms. For
-  /// other models poles are placed numerically and gaps are bridged by a gain that stays bounded,
-  /// see ModelGain.
+  /// The model is exactly the chain of integrators. Then gains have closed formulas, any gap is
+  /// bridged by the gain for the longer step, and stability certificates, error bounds and filter
+  /// forms are available. For other models poles are placed numerically, and gaps are bridged by a
+  /// gain that stays bounded, see ModelGain.
   bool is_chain = false;
 
-  /// The origin of y may be moved: with a constant added to y and the same D there is a solution,
-  /// too. This also holds with known poles if the disturbance has a constant that absorbs the
+  /// The origin of y may be moved: if a constant is added to y, the model still holds with the same
+  /// D. This is also true with known poles if the disturbance has a constant that absorbs the
   /// shift.
   bool shifts_output = false;
 
@@ -38,33 +38,33 @@ struct ModelTraits {
   /// places itself; see CorrectedPart. Without it, everything is corrected.
   bool corrects_part = false;
 
-  /// `at_speed(factor)` is the same model with its swings faster by `factor`, see ScheduledGain.
+  /// `at_speed(factor)` is the same model with the frequencies of its sines multiplied by `factor`,
+  /// see ScheduledGain.
   bool follows_speed = false;
 };
 
-/// What a model declares.
+/// The traits that a model declares, or the defaults.
 template <class Model>
 inline constexpr ModelTraits model_traits = detail::declared_traits<Model, ModelTraits>;
 
-/// Nothing to be set.
+/// Settings of a model that has none.
 struct NoModelSettings {};
 
-/// A model of plant and disturbance, exact for an input that is held over the sample.
+/// A model of plant and disturbance, sampled exactly for an input that is held over the sample.
 ///
 /// Its N states x are scaled so that each has the size of its effect on y within a sample: row r <
 /// n is T^r / r! times y^(r), row n is T^n / n! times the total disturbance (the sum of everything
 /// that the law has to cancel); the other rows are up to the model. `estimate` has the same rows in
 /// physical units, so that laws read what they need without knowing the model.
 /// - `drive(u)`, `predict(x, drive)`: Phi x + Gamma u; `add_input(x, u)`: x + Gamma u
-/// - `physical(x)`, `physical<Row>(x)`, `scaled(estimate)`, `rescaled(x, before)`: from the model
-///   that was in force before; `scaled_disturbance(d)`, `same_drive(before)`
-/// - `finite_probe(x)`: finite only if all estimates are
-/// - `rest(y, u)`: the estimate of a plant that stands at y under u
-/// - `state_of_row(r)`: where row r of the estimate is among the states; state 0 is what is
-/// measured
-///   (row 0 but for a sensor's lag)
-/// - `increment()`: Phi - I, N x N, for the design, its states r smaller by a^degree(r) where all
-///   poles are within a of z = 1
+/// - `physical(x)`, `physical<Row>(x)`, `scaled(estimate)`, `rescaled(x, before)`: conversions
+///   (`before`: the model that was in use until now); `scaled_disturbance(d)`, `same_drive(before)`
+/// - `finite_probe(x)`: finite only if all estimates are finite
+/// - `rest(y, u)`: the estimate for a plant at rest at y under a constant u
+/// - `state_of_row(r)`: place of row r of the estimate among the states; state 0 is the measured
+///   value (row 0, unless there is a sensor's lag)
+/// - `increment()`: Phi - I, N x N, for the design; `degree(r)`: the power of T in the scaling of
+///   state r (if all poles are within a of z = 1, the design scales state r by a^degree(r))
 template <class Model, class S>
 concept SampledModel = std::copyable<Model> && DeclaresTraits<Model, ModelTraits> &&
     requires(const Model& model, const S& s, const typename Model::State& x,

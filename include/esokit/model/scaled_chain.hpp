@@ -1,5 +1,5 @@
 /// @file
-/// The sampled chain in Nordsieck scaling, the form in which the observers compute.
+/// The sampled chain in Nordsieck scaling, in which the observers compute.
 #pragma once
 
 #include <esokit/core/matrix.hpp>
@@ -11,8 +11,8 @@ namespace esokit {
 /// States x_r = T^r z_r / r!, the Taylor coefficients of y over one sample (Nordsieck vector).
 ///
 /// In this scaling Phi is Pascal's triangle, Phi_rj = C(j, r): a prediction is N (N-1) / 2
-/// additions of small multiples (for N = 3 no multiplication at all), exact up to rounding; the
-/// gains are dimensionless and depend on omega_o T alone; and nothing overflows float for small T
+/// additions of small multiples (for N = 3 without a multiplication) and exact up to rounding. The
+/// gains are dimensionless and depend on omega_o T alone, and nothing overflows float for small T
 /// (an unscaled gain at T = 1e-4 s, N = 12 is 1e44).
 template <int Order, Scalar ScalarType = double, int Extension = 1>
 struct ScaledChain : ChainSize<Order, Extension> {
@@ -29,10 +29,11 @@ struct ScaledChain : ChainSize<Order, Extension> {
     return gain;
   }
 
-  /// One sample ahead: the plant rows see the disturbance and the drive, the disturbance rows only
-  /// themselves.
-  /// @param drive what drives the chain beside its own disturbance, scaled like (d, d', ..); the
-  ///        first is scaled_input_gain * u, and in a cascade what lower levels found is added
+  /// The state one sample ahead. The disturbance and the drive act on the plant rows; the
+  /// disturbance rows depend on themselves alone.
+  /// @param drive what drives the chain besides its own disturbance, scaled like (d, d', ..): the
+  ///        first element is scaled_input_gain * u; in a cascade the disturbance found by the
+  ///        levels below is added
   template <int DriveCount>
   [[nodiscard]] ESOKIT_INLINE static constexpr State predict(
       const State& x, const Array<ScalarType, DriveCount>& drive) noexcept {
@@ -65,7 +66,7 @@ struct ScaledChain : ChainSize<Order, Extension> {
 
   /// y^(Row) in physical units from its scaled state. @param rate 1/T, 1/s
   ///
-  /// Multiplied up in steps: T^-Row itself may not fit the scalar where the estimate does.
+  /// Multiplied in steps: T^-Row alone may overflow when the estimate does not.
   template <int Row>
   [[nodiscard]] ESOKIT_INLINE static constexpr ScalarType physical(
       const ScalarType& scaled, const ScalarType& rate) noexcept {
@@ -101,8 +102,8 @@ struct ScaledChain : ChainSize<Order, Extension> {
   }
 
   /// A number that is finite only if every estimate is finite in physical units: the sum of their
-  /// magnitudes, so that large ones of opposite sign do not hide each other. Horner, N - 1
-  /// multiply-adds; its value has no other meaning. @param rate 1/T, 1/s
+  /// magnitudes, so that large ones of opposite sign do not cancel. Computed by Horner's rule with
+  /// N - 1 multiply-adds; its value has no other meaning. @param rate 1/T, 1/s
   [[nodiscard]] ESOKIT_INLINE static constexpr ScalarType finite_probe(
       const State& x, const ScalarType& rate) noexcept {
     ScalarType probe = detail::absolute(std::get<size - 1>(x));

@@ -26,7 +26,7 @@ class ContinuousObserver {
   static constexpr int size = ChainSize<Order, Extension>::size;  ///< N = n + m
   static constexpr int levels = Levels;                           ///< p
   static constexpr int states = Levels * size;                    ///< N p
-  using scalar_type = S;                                          ///< of states and settings
+  using scalar_type = S;                                          ///< type of states and settings
   using Estimate = Vector<S, size>;  ///< (y, .., y^(n-1), d, .., d^(m-1)), N x 1
   using State = Vector<S, states>;   ///< the levels one after the other, N p x 1
   using Laws = Array<Law, Levels>;   ///< one a level

@@ -79,7 +79,7 @@ class MimoExtendedStateFilter {
   static_assert(Inputs >= 1 && Extension >= 1 && size <= 32,
                 "esokit: inputs, extension or size out of range");
 
-  using scalar_type = S;                                 ///< of states and settings
+  using scalar_type = S;                                 ///< type of states and settings
   using Estimate = Vector<S, size>;                      ///< all states, chain by chain, N x 1
   using Output = Vector<S, outputs>;                     ///< y, p x 1
   using Input = Vector<S, Inputs>;                       ///< u, q x 1

@@ -41,7 +41,7 @@ class NamedObserver : public Base {
   static constexpr bool sampled = requires { typename Base::Status; };
 
  public:
-  using scalar_type = typename Base::scalar_type;  ///< of states and settings
+  using scalar_type = typename Base::scalar_type;  ///< type of states and settings
 
   /// Checks the settings and does all the design work.
   /// @return the observer, a sampled one at rest in zero, or an error that names the field

@@ -75,7 +75,7 @@ class PredictorCorrector {
   static constexpr int extension = Extension;      ///< m, extended states
   static constexpr int size = Model::size;         ///< N
   static constexpr int levels = Levels;            ///< p
-  using scalar_type = S;                           ///< of states and settings
+  using scalar_type = S;                           ///< type of states and settings
   using Estimate = typename Model::Estimate;       ///< (y, .., y^(n-1), d, .., d^(m-1)), N x 1
   using State = typename Model::State;             ///< scaled, N elements
   using Laws = Array<Law, Levels>;                 ///< one a level

@@ -52,7 +52,7 @@ struct DormandPrince {
 template <class State>
 class VariableStep {
  public:
-  using ScalarType = typename State::Scalar;  ///< of state and time
+  using ScalarType = typename State::Scalar;  ///< type of state and time
 
   /// Settings of make.
   struct Config {

@@ -80,7 +80,7 @@ struct RunTypes {
 /// The argument of the callback of a run, called once a sample after the controller.
 template <class P, class C>
 struct RunSample {
-  using Types = RunTypes<P, C>;  ///< of the numbers
+  using Types = RunTypes<P, C>;  ///< type of the numbers
 
   std::int64_t index{};                  ///< k
   typename Types::Time t{};              ///< s
@@ -94,7 +94,7 @@ struct RunSample {
 /// How a run ended.
 template <class P, class C>
 struct RunEnd {
-  using Types = RunTypes<P, C>;  ///< of the numbers
+  using Types = RunTypes<P, C>;  ///< type of the numbers
 
   typename Types::Time time{};    ///< s, after the last sample has passed
   std::int64_t samples{};         ///< how often the controller ran
@@ -107,7 +107,7 @@ struct RunEnd {
 /// channels an array of vectors.
 template <class P, class C>
 struct RunRecord {
-  using Types = RunTypes<P, C>;       ///< of the numbers
+  using Types = RunTypes<P, C>;       ///< type of the numbers
   using S = typename Types::S;        ///< of the plant
   using Time = typename Types::Time;  ///< s
 
@@ -187,7 +187,7 @@ struct RunRecord {
 /// A run with the record of its samples.
 template <class P, class C>
 struct Recording : RunEnd<P, C>, RunRecord<P, C> {
-  using Types = RunTypes<P, C>;  ///< of the numbers
+  using Types = RunTypes<P, C>;  ///< type of the numbers
 };
 
 }  // namespace esokit::sim
