@@ -110,21 +110,27 @@ cmake -P "$work/port.cmake"
   fail "the vcpkg port installs no config file or copyright"
 not_tried+=("vcpkg itself")
 
-# --- colcon: a clone in src/ is a package, and before what depends on it ---
+# --- the joint of examples/trades: a package as its README has it, by CMake and by colcon, where a
+# clone in src/ is a package, and before what depends on it ---
+arm=$work/workspace/src/arm
+mkdir -p "$arm"
+cp examples/trades/joint.hpp "$arm"
+for part in cpp:arm.cpp cmake:CMakeLists.txt xml:package.xml; do
+  awk -v start="\`\`\`${part%%:*}" '$0 == start { inside = 1; next } /^```/ && inside { exit } inside' \
+    examples/trades/README.md >"$arm/${part#*:}"
+  [[ -s $arm/${part#*:} ]]
+done
 if command -v colcon >/dev/null 2>&1; then
-  mkdir -p "$work/workspace/src/joint"
   git clone -q "$root" "$work/workspace/src/esokit"
-  cp tests/consumer/CMakeLists.txt "$work/workspace/src/joint"
-  cp "$work/main.cpp" "$work/workspace/src/joint"
-  echo '<package format="3"><name>joint</name><version>1.0.0</version><description>a</description>
-    <maintainer email="a@b.invalid">a</maintainer><license>MIT</license><depend>esokit</depend>
-    <export><build_type>cmake</build_type></export></package>' >"$work/workspace/src/joint/package.xml"
-  (cd "$work/workspace" && colcon build --cmake-args -G Ninja \
-    -DCONSUMER_MAIN="$work/workspace/src/joint/main.cpp")
-  "$work/workspace/build/joint/consumer"
+  (cd "$work/workspace" && colcon build --cmake-args -G Ninja)
+  (cd "$work" && workspace/install/arm/lib/arm/arm)
 else
   not_tried+=(colcon)
+  cmake -S "$arm" -B "$work/arm" -G Ninja -DCMAKE_PREFIX_PATH="$work/root/usr"
+  cmake --build "$work/arm"
+  (cd "$work" && arm/arm)
 fi
+[[ $(wc -l <"$work/joint.csv") == 10001 ]] || fail "the joint of examples/trades writes no log"
 
 # --- Conan recipe, ROS package file ---
 if command -v conan >/dev/null 2>&1; then

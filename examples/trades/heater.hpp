@@ -1,16 +1,19 @@
-// A heater with a slow sensor, 0 .. 100 %: the whole of a temperature loop.
+// A heater with a slow sensor, 0 .. 100 %: the whole of a temperature loop, with manual operation,
+// new settings while it runs, an alarm and a log that from_log reads.
 //
 // temperature, wanted  degC       power  %, 0 .. 100
 #pragma once
 
 #include <esokit/control/adrc.hpp>
+#include <esokit/control/health_text.hpp>
 #include <esokit/observer/model_eso.hpp>
+#include <ostream>
 
 namespace trades {
 
 class Heater {
-  // Heat to temperature is one integration; the sensor follows the heater by a lag of its own,
-  // which is known and so no disturbance. Losses to the room are one, and are found.
+  // Heat to temperature is one integration. The sensor's lag is known, so it is no disturbance. The
+  // losses to the room are one: the observer finds them.
   using Observer = esokit::ModelEso<esokit::ModelParts{.order = 1, .sensor = 1}>;
   using Loop = esokit::Adrc<Observer>;
 
@@ -36,17 +39,47 @@ class Heater {
     return Heater(*loop);
   }
 
-  /// Once a sample. @param temperature NaN where there is none @return power
-  double step(double temperature, double wanted) { return loop_.update(temperature, wanted); }
+  /// Once a sample, in automatic. @param temperature NaN where there is none @return power
+  double step(double temperature, double wanted) {
+    const double power = loop_.update(temperature, wanted);
+    log(temperature, wanted);
+    return power;
+  }
 
-  /// Before the first step: what the sensor shows, and the power that runs.
-  void start(double temperature, double power) {
+  /// Once a sample while someone else sets the power, and before the first `step`: from there the
+  /// loop takes over without a jump.
+  void manual(double temperature, double power) {
     (void)loop_.track(temperature, temperature, power);
+    log(temperature, temperature);
+  }
+
+  /// No measurement for 30 samples: the heater is off.
+  [[nodiscard]] bool sensor_lost() const { return loop_.mode() == esokit::LoopMode::safe; }
+
+  /// Other settings while it runs. If they are refused, nothing changes.
+  esokit::Expected<void, esokit::Error<double>> set(const Config& config) {
+    const auto fresh = make(config);
+    if (!fresh) return fresh.error();
+    return loop_.adopt(fresh->loop_);
+  }
+
+  /// From now on each sample writes a row there, until null is given.
+  void log_to(std::ostream* log) {
+    log_ = log;
+    if (log_) esokit::write_header<Observer::size>(*log_);
   }
 
  private:
   explicit Heater(const Loop& loop) : loop_(loop) {}
+
+  void log(double temperature, double wanted) {
+    if (log_) esokit::write_row(*log_, esokit::telemetry(loop_, time_, temperature, wanted));
+    time_ += loop_.observer().sample_time();
+  }
+
   Loop loop_;
+  std::ostream* log_ = nullptr;
+  double time_ = 0;
 };
 
 }  // namespace trades

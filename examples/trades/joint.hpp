@@ -1,18 +1,17 @@
 // A joint of a robot as a member of a node: parameters by name, one call a cycle, a log that
-// from_log reads, a diagnosis in words. Nothing in here needs ROS; where it would be is said.
+// from_log reads, a diagnosis in words. It needs no ROS; the comments say where ROS would be.
 //
 // angle, wanted  rad                          torque  N m, at most most_torque
-// inertia        kg m^2, motor and load: b0 = 1 / inertia. From a log: from_log FILE
+// inertia        kg m^2, motor and load: b0 = 1 / inertia, which from_log finds in the log
 #pragma once
 
 #include <array>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/health_text.hpp>
+#include <esokit/core/error_text.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <map>
-#include <optional>
 #include <ostream>
-#include <sstream>
 #include <string>
 
 namespace trades {
@@ -24,24 +23,28 @@ class Joint {
  public:
   using Parameters = std::map<std::string, double>;  // in a node: get_parameter(name).as_double()
 
-  // The name and range of what is wrong goes to the caller; in a node: RCLCPP_FATAL and return.
+  /// The error is a sentence; in a node: RCLCPP_FATAL it and return.
   static esokit::Expected<Joint, std::string> make(const Parameters& parameters) {
     for (const char* name : {"inertia", "settling_time", "most_torque", "rate"}) {
-      if (!parameters.contains(name)) return std::string("parameter ") + name + " is missing";
+      const auto found = parameters.find(name);
+      if (found == parameters.end() || !(found->second > 0)) {
+        return std::string("parameter ") + name + " is missing or not positive";
+      }
     }
     const double bandwidth = 6 / parameters.at("settling_time");
-    const auto loop = Loop::make(
-        {.observer = {.observer_bandwidth = 5 * bandwidth,
-                      .input_gain = 1 / parameters.at("inertia"),
-                      .sample_time = 1 / parameters.at("rate")},
-         .controller_bandwidth = bandwidth,
-         .limits = {.lower = -parameters.at("most_torque"), .upper = parameters.at("most_torque")},
-         .missing = {.most = 20, .input = 0}});  // no torque if the encoder stays away
-    if (!loop) return text(loop.error());
-    const auto monitor = Monitor::make({.observer_bandwidth = 5 * bandwidth,
-                                        .sample_time = 1 / parameters.at("rate"),
-                                        .input_range = parameters.at("most_torque")});
-    if (!monitor) return text(monitor.error());
+    const double torque = parameters.at("most_torque");
+    const double sample_time = 1 / parameters.at("rate");
+    const auto loop = Loop::make({.observer = {.observer_bandwidth = 5 * bandwidth,
+                                               .input_gain = 1 / parameters.at("inertia"),
+                                               .sample_time = sample_time},
+                                  .controller_bandwidth = bandwidth,
+                                  .limits = {.lower = -torque, .upper = torque},
+                                  // no torque if 20 measurements are missing
+                                  .missing = {.most = 20, .input = 0}});
+    if (!loop) return to_text(loop.error());
+    const auto monitor = Monitor::make(
+        {.observer_bandwidth = 5 * bandwidth, .sample_time = sample_time, .input_range = torque});
+    if (!monitor) return to_text(monitor.error());
     return Joint(*loop, *monitor);
   }
 
@@ -55,29 +58,27 @@ class Joint {
     return torque;
   }
 
-  /// Once a second: what to say, if there is anything.
-  [[nodiscard]] std::optional<std::string> complaint() const {
+  /// Once a second: what is likely wrong and what to do; empty if nothing is.
+  [[nodiscard]] std::string complaint() const {
     const esokit::LoopFault fault = diagnose(monitor_.health());
-    if (fault == esokit::LoopFault::none) return std::nullopt;
-    return text(fault);
+    return fault == esokit::LoopFault::none ? "" : esokit::to_text(fault);
   }
 
-  /// Parameters changed while it runs: without a jump of the torque. What is refused changes
-  /// nothing.
-  esokit::Expected<void, std::string> set(const Parameters& parameters) {
+  /// New parameters while it runs, without a jump of the torque. If they are refused, nothing
+  /// changes, and the result says why. In a node: the callback for changed parameters.
+  std::string set(const Parameters& parameters) {
     const auto fresh = make(parameters);
     if (!fresh) return fresh.error();
-    if (const auto adopted = loop_.adopt(fresh->loop_); !adopted) return text(adopted.error());
+    if (const auto adopted = loop_.adopt(fresh->loop_); !adopted) return to_text(adopted.error());
     monitor_ = fresh->monitor_;
-    return {};
+    return "";
   }
 
-  /// Every sample goes there as a row, until null. `from_log FILE` finds the inertia in it.
+  /// From now on each cycle writes a row there, until null is given.
   void log_to(std::ostream* log) {
     log_ = log;
-    if (log_ == nullptr) return;
-    log_->precision(17);
-    esokit::write_header<3>(*log_);
+    if (log_) esokit::write_header<3>(*log_);
+    if (log_) log_->precision(17);
   }
 
   /// Torque that friction, load and gravity take, N m.
@@ -87,13 +88,6 @@ class Joint {
 
  private:
   Joint(const Loop& loop, const Monitor& monitor) : loop_(loop), monitor_(monitor) {}
-
-  template <class T>
-  static std::string text(const T& value) {
-    std::ostringstream out;
-    out << value;
-    return out.str();
-  }
 
   Loop loop_;
   Monitor monitor_;

@@ -1,16 +1,20 @@
-// The heater of heater.hpp on the energy balance of a temperature lab, a PI beside it.
+// The heater of heater.hpp on the energy balance of a temperature lab: steps by hand, what identify
+// finds in their log, the loop with it, and a PI beside it.
 //
 // Plant       m c T' = U A (Ta - T) + eps sigma A (Ta^4 - T^4) + alpha Q, the sensor 16.4 s behind;
 //             m 0.004 kg, c 500, A 1.2e-3 m^2, U 5 W/(m^2 K), eps 0.9, alpha 6.4e-3 W / %, Ta 23.5
 //             degC
 // Sensor      steps of 0.1 degC, T = 1 s; 20 samples get lost at 700 s; a fan doubles U at 1000 s
+// Steps       100, 5, 70, 20 and 50 % by hand, 20 minutes
 // Controller  settling time 150 s; PI of the internal model rule for the same settling time
 
 #include "trades/heater.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <esokit/identify/identify.hpp>
 #include <limits>
+#include <sstream>
 
 #include "trades/trades.hpp"
 
@@ -27,27 +31,38 @@ struct Trace {
 
 double wanted(double t) { return t < 60 ? room : t < 500 ? 55 : 45; }
 
-template <class Step>
-Trace run(Step&& step) {
-  Trace trace;
+/// The heater and its sensor.
+struct Lab {
   double heater = room;
   double sensor = room;
-  for (int k = 0; k < 1500; ++k) {
-    const double shown = 0.1 * std::round(sensor / 0.1);
-    const bool lost = 700 <= k && k < 720;
-    const double power = step(lost ? std::numeric_limits<double>::quiet_NaN() : shown, wanted(k));
-    trace.t.push_back(k);
-    trace.y.push_back(heater);
-    trace.wanted.push_back(wanted(k));
-    trace.power.push_back(power);
+
+  [[nodiscard]] double shown() const { return 0.1 * std::round(sensor / 0.1); }
+
+  void second(double power, bool fan) {
     for (int i = 0; i < 20; ++i) {
       const double area = 1.2e-3;
-      const double convection = (k >= 1000 ? 10.0 : 5.0) * area * (room - heater);
+      const double convection = (fan ? 10.0 : 5.0) * area * (room - heater);
       const double radiation =
           0.9 * 5.67e-8 * area * (std::pow(room + 273.15, 4) - std::pow(heater + 273.15, 4));
       sensor += 0.05 * (heater - sensor) / 16.4;
       heater += 0.05 * (convection + radiation + 6.4e-3 * power) / (0.004 * 500);
     }
+  }
+};
+
+template <class Step>
+Trace run(Step&& step) {
+  Trace trace;
+  Lab lab;
+  for (int k = 0; k < 1500; ++k) {
+    const bool lost = 700 <= k && k < 720;
+    const double power =
+        step(lost ? std::numeric_limits<double>::quiet_NaN() : lab.shown(), wanted(k));
+    trace.t.push_back(k);
+    trace.y.push_back(lab.heater);
+    trace.wanted.push_back(wanted(k));
+    trace.power.push_back(power);
+    lab.second(power, k >= 1000);
   }
   return trace;
 }
@@ -68,14 +83,35 @@ int main(int argc, char** argv) {
       argc, argv, "trades", "heater",
       trades::about("A temperature loop",
                     "Order 1 with a slow sensor, power from 0 to 100 %, losses unknown."));
-  Heater heater = Heater::make({}).value();
-  heater.start(room, 0);
+  std::ostringstream rows;
+  Lab lab;
+  Heater by_hand = Heater::make({}).value();
+  by_hand.log_to(&rows);
+  for (int k = 0; k < 1200; ++k) {
+    const double power = k < 10    ? 0
+                         : k < 200 ? 100
+                         : k < 400 ? 5
+                         : k < 600 ? 70
+                         : k < 900 ? 20
+                                   : 50;
+    by_hand.manual(lab.shown(), power);
+    lab.second(power, false);
+  }
+  const auto found = esokit::identify(trades::rows_of(rows.str())).value();
+  const std::string log = "log of 20 min by hand";
+  report.check_reference(log, "heating (degC/s per %)", 6.4e-3 / (0.004 * 500),
+                         found.input_gain.value, 0.02, "as simulated");
+  report.check_reference(log, "sensor lag (s)", 16.4, found.latency.value, 0.05, "as simulated");
+
+  Heater heater =
+      Heater::make({.heating = found.input_gain.value, .sensor_lag = found.latency.value}).value();
+  heater.manual(room, 0);
   const Trace ours = run([&](double y, double r) { return heater.step(y, r); });
 
   // SIMC of the slope and the sensor's lag: gain 1 / (b0 (tau_c + theta)), integral 4 (tau_c +
   // theta).
-  const double together = 37.5 + 16.4;
-  const double gain = 1 / (0.0032 * together);
+  const double together = 37.5 + found.latency.value;
+  const double gain = 1 / (found.input_gain.value * together);
   double integral = 0;
   double last = 0;
   const Trace pi = run([&](double y, double r) {
