@@ -104,23 +104,52 @@ fi
 cmake --build "$build" --target "${selected[@]}"
 echo "built in $(seconds_since "$started")"
 
+# As many at a time as there are cores: much of a run is one thread's, and gnuplot's. What one says is
+# shown when all before it are done. choosing_cost takes the time of updates, and runs alone.
+alone=choosing_cost
+said=$(mktemp -d)
+trap 'rm -rf "$said"' EXIT
+run_one() {
+  local began=${EPOCHREALTIME/[.,]/} status=0
+  "$build/examples/bin/$1" --out "$out" >"$said/$1" 2>&1 </dev/null || status=$?
+  echo "$status $(seconds_since "$began")" >"$said/$1.status"
+}
 failed=()
-number=0
+shown=0
+show_finished() {
+  local name status took
+  while ((shown < ${#selected[@]})) && [[ -s $said/${selected[shown]}.status ]]; do
+    name=${selected[shown]}
+    shown=$((shown + 1))
+    read -r status took <"$said/$name.status"
+    echo
+    echo "[$shown/${#selected[@]}] $name"
+    cat -- "$said/$name"
+    if ((status == 0)); then
+      echo "[$shown/${#selected[@]}] $name: done in $took"
+    else
+      echo "[$shown/${#selected[@]}] $name: FAILED with exit code $status after $took" >&2
+      failed+=("$name")
+    fi
+  done
+}
+cores=$(nproc)
 for name in "${selected[@]}"; do
-  number=$((number + 1))
-  echo
-  echo "[$number/${#selected[@]}] $name"
-  began=${EPOCHREALTIME/[.,]/}
-  status=0
-  "$build/examples/bin/$name" --out "$out" || status=$?
-  if ((status == 0)); then
-    echo "[$number/${#selected[@]}] $name: done in $(seconds_since "$began")"
-  else
-    echo "[$number/${#selected[@]}] $name: FAILED with exit code $status after" \
-      "$(seconds_since "$began")" >&2
-    failed+=("$name")
-  fi
+  [[ $name != "$alone" ]] || run_one "$name"
 done
+for name in "${selected[@]}"; do
+  [[ $name != "$alone" ]] || continue
+  while (($(jobs -rp | wc -l) >= cores)); do
+    wait -n || true
+    show_finished
+  done
+  run_one "$name" &
+done
+while (($(jobs -rp | wc -l) > 0)); do
+  wait -n || true
+  show_finished
+done
+show_finished
 
 # The README of each folder beside its page, as text, which every browser shows.
 for folder in $(printf '%s\n' "${folders[@]}" | sort -u); do
