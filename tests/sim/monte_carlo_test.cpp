@@ -11,8 +11,10 @@
 #include <esokit/sim/monte_carlo.hpp>
 #include <limits>
 #include <span>
+#include <string>
 #include <support/refusal.hpp>
 #include <thread>
+#include <type_traits>
 #include <vector>
 
 namespace {
@@ -43,7 +45,9 @@ Config busy() {
                    .sensor = [](double, double y) { return std::round(y * 1e4) / 1e4; },
                    .missing = 0.05,
                    .seed = 99,
-                   .dead_time = 3e-3}};
+                   .dead_time = 3e-3,
+                   .start_time = 0.01,
+                   .initial_input = 0.5}};
 }
 constexpr auto vary = [](auto& trial, sim::Draw& draw) {
   trial.plant.b(1) *= draw.uniform_ratio(0.5, 2.0);
@@ -189,6 +193,14 @@ TEST(RunStatistics, AreThoseOfTheSortedList) {
     EXPECT_NEAR(statistics.quantile(share), exact, std::abs(exact) / 4096 + 1e-300) << share;
   }
   EXPECT_EQ(sim::RunStatistics().quantile(0.5), 0.0);
+  // A number at the limit keeps it, the first of two equal ones tells the run, and what is in one
+  // bin, the 2^-12 above 1, is spread over all of it.
+  sim::RunStatistics one("one", 1.0);
+  for (int i = 0; i < 4096; ++i) one.add(i, 1 + i % 2048 * std::ldexp(1, -23));
+  EXPECT_EQ(one.kept(), 2);
+  EXPECT_EQ(one.run_of_smallest(), 0);
+  EXPECT_EQ(one.run_of_largest(), 2047);
+  EXPECT_NEAR(one.quantile(0.5), 1 + std::ldexp(1, -13), std::ldexp(1, -23));
   EXPECT_EQ(sim::RunStatistics().deviation(), 0.0);
 }
 
@@ -243,6 +255,20 @@ TEST(MonteCarlo, StopsWithTheRunsThatItHas) {
   EXPECT_EQ(whole.numbers[0].deviation(), stopped.numbers[0].deviation());
 }
 
+TEST(Draw, IsWithinItsEnds) {
+  sim::Draw draw(3, 5);
+  double sum = 0, logarithms = 0;
+  for (int i = 0; i < 100000; ++i) {
+    const double x = draw.uniform(2, 3), ratio = draw.uniform_ratio(0.5, 8);
+    ASSERT_TRUE(2 <= x && x <= 3 && 0.5 <= ratio && ratio <= 8);
+    sum += x / 1e5;
+    logarithms += std::log2(ratio) / 1e5;
+  }
+  // Four standard errors.
+  EXPECT_NEAR(sum, 2.5, 4 / std::sqrt(12e5));
+  EXPECT_NEAR(logarithms, 1, 4 * 4 / std::sqrt(12e5));
+}
+
 TEST(MonteCarlo, RefusesByName) {
   const auto answer = [](Config config, sim::MeasureOptions options = {}) {
     return refusal(
@@ -278,6 +304,49 @@ TEST(MonteCarlo, RefusesByName) {
   EXPECT_EQ(answer(config, {.from = nan}),
             "measure.from: must be before the last sample of the loop");
   EXPECT_EQ(answer(config, {.to = nan}), "measure.to: must not be before measure.from");
+  for (const double bad : {nan, -std::numeric_limits<double>::infinity()})
+    EXPECT_EQ(answer(config, {.limit = bad}), "measure.limit: must be finite, or left out");
+  EXPECT_EQ(answer(config, {.limit = -1.0}), "accepted");
+  for (const double bad : {nan, -1.0, std::numeric_limits<double>::infinity()}) {
+    EXPECT_EQ(
+        refusal(
+            sim::monte_carlo(servo(), adrc(), config).run<2>(sim::settling_time("s", error, bad))),
+        "measure.band: must be finite and not negative");
+  }
+}
+
+// A number of no sample, or of one that is none, would look like any other.
+TEST(MonteCarlo, FailsRunsWithoutANumber) {
+  const Config config{.runs = 4, .loop = {.duration = 0.02, .noise = 1e-3}};
+  const auto wrong = [&](const auto& measure) {
+    const auto outcome = sim::monte_carlo(servo(), adrc(), config).run<2>(measure).value();
+    EXPECT_EQ(outcome.numbers[0].count(), 4 - outcome.failed);
+    return outcome.failed == 4 ? outcome.first_failure.error.rule : "";
+  };
+  const sim::MeasureOptions between{.from = 0.0103, .to = 0.0117};
+  EXPECT_STREQ(wrong(sim::largest("e", error, between)), "(its window) has no sample");
+  EXPECT_STREQ(wrong(sim::settling_time("e", error, 0.1, between)), "(its window) has no sample");
+  EXPECT_STREQ(wrong(sim::largest("e", error, {.from = 0.01, .to = 0.01})), "");
+  const auto none = [](const auto& sample) {
+    using S = std::remove_cvref_t<decltype(sample.output)>;
+    return sample.output + S(sample.t > 0.01 ? std::numeric_limits<double>::quiet_NaN() : 0.0);
+  };
+  EXPECT_STREQ(wrong(sim::largest("e", none)), "(its number) is not finite");
+  EXPECT_STREQ(wrong(sim::settling_time("e", none, 0.1)), "(its number) is not finite");
+  EXPECT_STREQ(wrong(sim::largest("e", none, {.to = 0.01})), "");
+  // What only goes wrong in a run is no refusal, even where it does at the first sample.
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const auto failed_by = [&](const auto& controller, auto loop) {
+    loop.duration = 0.02;
+    const auto outcome =
+        sim::monte_carlo(servo(), controller, {.runs = 2, .loop = loop}).template run<1>(overshoot);
+    return outcome ? std::string(outcome->first_failure.error.field) : "refused";
+  };
+  EXPECT_EQ(failed_by(adrc(), sim::RunConfig<Servo, Controller>{.disturbance = nan}),
+            "disturbance");
+  const auto own = [nan](double, double) { return nan; };
+  using Own = sim::RunConfig<Servo, std::remove_const_t<decltype(own)>>;
+  EXPECT_EQ(failed_by(own, Own{.sample_time = T}), "controller");
 }
 
 /// A pendulum whose length differs: a function that holds a number says what it is in packs.
@@ -321,7 +390,11 @@ TEST(MonteCarlo, TakesNonlinearPlantsInPacks) {
     using P = std::remove_cvref_t<decltype(plant)>;
     sim::MonteCarloConfig<P, Controller> config{
         .runs = 37,
-        .loop = {.duration = 0.1, .reference = 1.0, .noise = 1e-3},
+        .loop = {.duration = 0.1,
+                 .reference = 1.0,
+                 .noise = 1e-3,
+                 .substeps = 3,
+                 .state = Vector<double, 2>{0.0, 3.0}},
         .on_run = [&](std::int64_t, std::span<const double> n) { all.push_back(n[0]); }};
     const auto study = sim::monte_carlo(plant, adrc(), config, change);
     lanes = study.template run<4>(overshoot)->lanes;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <concepts>
 #include <condition_variable>
@@ -92,15 +93,18 @@ struct NoVariation {
 
 /// The samples that a Measure uses, and the limit for its number.
 struct MeasureOptions {
-  double from = 0.0;                                       ///< s of the loop, first sample
-  double to = std::numeric_limits<double>::infinity();     ///< s, last sample
-  double limit = std::numeric_limits<double>::infinity();  ///< the number must not be above this
+  double from = 0.0;                                    ///< s of the loop, first sample
+  double to = std::numeric_limits<double>::infinity();  ///< s, last sample
+  /// The number must not be above this; finite, or left out.
+  double limit = std::numeric_limits<double>::infinity();
 };
 
 /// A number of a run, computed from `of(sample)` or `of(sample, controller)` at its samples.
 ///
 /// The function must take any scalar, because packs of runs go through it too. Made by `largest`,
-/// `average`, `root_mean_square`, `final_value` and `settling_time`.
+/// `average`, `root_mean_square`, `final_value` and `settling_time`. A run fails if its number is
+/// not finite or, for `largest` and `settling_time`, if of(sample) is not finite in the window, and
+/// if its window has no sample.
 template <class Reduce, class F>
 struct Measure {
   std::string name;        ///< what it is
@@ -112,6 +116,7 @@ struct Measure {
 namespace detail {
 
 struct Largest {
+  static constexpr bool needs_each = true;  ///< a comparison would pass over a NaN
   template <class S>
   static S start() {
     return S(std::numeric_limits<LaneScalar<S>>::lowest());
@@ -123,6 +128,7 @@ struct Largest {
   static double end(double sum, double) { return sum; }
 };
 struct Average {
+  static constexpr bool needs_each = false;
   template <class S>
   static S start() {
     return S(0.0);
@@ -148,6 +154,7 @@ struct FinalValue : Average {
   static double end(double sum, double) { return sum; }
 };
 struct SettlingTime : FinalValue {
+  static constexpr bool needs_each = true;
   template <class S>
   ESOKIT_INLINE void add(S& sum, const S& value, const LaneScalar<S>& passed) const {
     sum = select(esokit::detail::absolute(value) > S(band), S(static_cast<double>(passed)), sum);
@@ -204,6 +211,7 @@ Measure<detail::FinalValue, F> final_value(std::string name, F of, MeasureOption
   return {std::move(name), std::move(of), options};
 }
 /// When abs(of(sample)) was above `band` for the last time, s after `options.from`.
+/// @param band 0 or above
 template <class F>
 Measure<detail::SettlingTime, F> settling_time(std::string name, F of, double band,
                                                MeasureOptions options = {}) {
@@ -322,7 +330,7 @@ class MonteCarlo {
     const auto sample_time = detail::run_sample_time<P, C>(controller_, config_.loop);
     const double end = static_cast<double>(config_.loop.start_time + config_.loop.duration -
                                            *sample_time / Time(2));
-    (check(rules, measures.options, end), ...);
+    (check(rules, measures, end), ...);
     if (!rules) return rules.error();
 
     using Packed = detail::InPacks<P, C, Lanes>;
@@ -443,20 +451,29 @@ class MonteCarlo {
       if (t < measure.options.from - 1e-9 || t > measure.options.to + 1e-9) return;
       ++samples;
       const auto passed = static_cast<Seconds>(t - measure.options.from);
-      if constexpr (std::is_invocable_v<const F&, const Sample&, const Now&>) {
-        measure.reduce.add(sum, S(measure.of(sample, controller)), passed);
-      } else {
-        measure.reduce.add(sum, S(measure.of(sample)), passed);
-      }
+      const S value = [&] {
+        if constexpr (std::is_invocable_v<const F&, const Sample&, const Now&>) {
+          return S(measure.of(sample, controller));
+        } else {
+          return S(measure.of(sample));
+        }
+      }();
+      if constexpr (Reduce::needs_each) finite = finite && all(is_finite(value));
+      measure.reduce.add(sum, value, passed);
     }
     [[nodiscard]] double number(int lane) const {
       return measure.reduce.end(static_cast<double>(esokit::detail::number_of_lane(sum, lane)),
                                 static_cast<double>(samples));
     }
+    [[nodiscard]] const char* wrong(double number) const {
+      if (samples == 0) return "(its window) has no sample";
+      return finite && is_finite(number) ? nullptr : "(its number) is not finite";
+    }
 
     const Measure<Reduce, F>& measure;
     S sum;
     std::int64_t samples = 0;
+    bool finite = true;
   };
 
   static bool is_setting(std::string_view field) {
@@ -464,13 +481,22 @@ class MonteCarlo {
     return field != "plant" && field != "controller" && field != "disturbance";
   }
 
-  static void check(Rules<Time>& rules, const MeasureOptions& options, double end) {
+  template <class Reduce, class F>
+  static void check(Rules<Time>& rules, const Measure<Reduce, F>& measure, double end) {
+    const MeasureOptions& options = measure.options;
     const auto from = static_cast<Time>(options.from);
+    if constexpr (std::is_same_v<Reduce, detail::SettlingTime>) {
+      rules.not_negative("measure.band", static_cast<Time>(measure.reduce.band));
+    }
     rules
         .require(options.from < end, "measure.from", from,
                  "must be before the last sample of the loop")
         .require(options.to >= options.from, "measure.to", static_cast<Time>(options.to),
-                 "must not be before measure.from");
+                 "must not be before measure.from")
+        .require(
+            is_finite(options.limit) || std::bit_cast<std::uint64_t>(options.limit) ==
+                                            std::bit_cast<std::uint64_t>(MeasureOptions{}.limit),
+            "measure.limit", static_cast<Time>(options.limit), "must be finite, or left out");
   }
 
   template <class Loop, class State, class Output>
@@ -508,12 +534,15 @@ class MonteCarlo {
     constexpr std::size_t count = sizeof...(measures);
     for (int lane = 0; lane < lanes; ++lane) {
       double numbers[count + 1];
+      const char* wrong[count + 1];
       std::size_t i = 0;
-      std::apply([&](const auto&... meter) { ((numbers[i++] = meter.number(lane)), ...); }, meters);
+      std::apply(
+          [&](const auto&... meter) {
+            ((numbers[i] = meter.number(lane), wrong[i] = meter.wrong(numbers[i]), ++i), ...);
+          },
+          meters);
       for (i = 0; i < count; ++i) {
-        if (!is_finite(numbers[i])) {
-          return Error<Time>{"measure", static_cast<Time>(i), "(its number) is not finite"};
-        }
+        if (wrong[i] != nullptr) return Error<Time>{"measure", static_cast<Time>(i), wrong[i]};
         results.numbers[static_cast<std::size_t>(at + lane) * count + i] = numbers[i];
       }
     }
