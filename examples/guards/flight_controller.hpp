@@ -2,7 +2,7 @@
 // filter, thrust over throttle, mixer, arming. Everything that you write is in this file.
 //
 // y  rate of the filtered gyro, rad/s       u  moment wanted from the mixer, -1 .. 1
-// b0 (rad/s^2) per u at hover: from a log (identify) or a twitch: step u by 0.1, read the slope
+// b0 (rad/s^2) per u at hover: from a log (from_log), or step u by 0.1 and read the slope
 #pragma once
 
 #include <esokit/adapter/delayed_input.hpp>
@@ -27,7 +27,7 @@ class RateAxis {
     float hover_gain = 600;         // b0 at hover throttle, rad/s^2
     float hover_throttle = 0.4f;    // 0 .. 1
     float motor_lag = 0.02f;        // s
-    float gyro_delay = 2e-3f;       // s, of all filters together at low frequencies
+    float gyro_delay = 2e-3f;       // s, of all filters at low frequencies; at most 16 samples
     float most_disturbance = 0.6f;  // share of u that a disturbance may be given
   };
 
@@ -38,7 +38,7 @@ class RateAxis {
     loop.observer.observer.observer = {.observer_bandwidth = observer_bandwidth,
                                        .input_gain = input_gain,
                                        .sample_time = config.sample_time};
-    loop.observer.observer.delay = static_cast<int>(config.gyro_delay / config.sample_time);
+    loop.observer.observer.delay = static_cast<int>(config.gyro_delay / config.sample_time + 0.5f);
     loop.observer.disturbance_bound = config.most_disturbance;
     loop.observer.unit = esokit::DisturbanceUnit::input;
     loop.observer.release_samples = 20;
@@ -66,7 +66,8 @@ class RateAxis {
       return loop_.hold(gyro, gyro, 0);
     }
     loop_.observer().set_pin(mixer_at_limit ? esokit::Pin::either : esokit::Pin::free);
-    reference_ += config_.sample_time / 0.02f * (wanted - reference_);
+    // The motors cannot follow a step: the reference takes their lag, too.
+    reference_ += config_.sample_time / config_.motor_lag * (wanted - reference_);
     const float u = loop_.update(gyro, reference_);
     monitor_.look(loop_);
     return u;
@@ -76,7 +77,7 @@ class RateAxis {
   [[nodiscard]] esokit::LoopFault fault() const { return esokit::diagnose(monitor_.health()); }
   /// What the observer makes of everything that is not u, rad/s^2.
   [[nodiscard]] float disturbance() const { return loop_.observer().total_disturbance(); }
-  /// For the blackbox, see esokit::telemetry.
+  /// For the blackbox: esokit::telemetry(axis.loop(), t, gyro, wanted); as text: health_text.hpp.
   [[nodiscard]] const Loop& loop() const { return loop_; }
 
  private:
