@@ -8,6 +8,7 @@
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/model_eso.hpp>
 #include <support/friction.hpp>
 
 namespace esokit_test {
@@ -30,6 +31,19 @@ struct LoopTraits<esokit::CascadeEso<Order, Levels, S>> {
             .bandwidth_factor = S(2),
             .input_gain = static_cast<S>(b0),
             .sample_time = static_cast<S>(T)};
+  }
+};
+
+inline constexpr esokit::ModelParts swinging{.order = 2, .resonators = 1};
+
+// A sine that this plant has not.
+template <class S>
+struct LoopTraits<esokit::ModelEso<swinging, S>> {
+  static typename esokit::ModelEso<swinging, S>::Config config(double omega, double T, double b0) {
+    return {.observer_bandwidth = static_cast<S>(omega),
+            .input_gain = static_cast<S>(b0),
+            .sample_time = static_cast<S>(T),
+            .model = {.resonators = {{{.frequency = static_cast<S>(omega)}}}}};
   }
 };
 
@@ -83,6 +97,7 @@ using DecoratedControllers = TypeList<
     Adrc<esokit::WrappedOutput<esokit::CascadeEso<2, 2>>, ErrorBased>,
     Adrc<esokit::VariableTime<LinearEso<2>>>, Adrc<esokit::Guarded<esokit::CascadeEso<2, 2>>>,
     Adrc<esokit::Guarded<LinearEso<1, float>>, ErrorBased>,
+    Adrc<esokit::Guarded<esokit::ModelEso<swinging>>>,
     Adrc<esokit::KnownModel<LinearEso<2>, Friction<1, double>>>,
     Adrc<esokit::VariableTime<esokit::WrappedOutput<esokit::DelayedInput<LinearEso<1, float>, 2>>>,
          ErrorBased>>;

@@ -11,6 +11,7 @@
 #include <esokit/control/health_text.hpp>
 #include <esokit/control/telemetry.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/model_eso.hpp>
 #include <sstream>
 #include <string>
 #include <support/numbers.hpp>
@@ -80,6 +81,43 @@ void ratio_is_that_of_the_gains() {
 TEST(Health, RatioIsThatOfTheGains) {
   ratio_is_that_of_the_gains<double>();
   ratio_is_that_of_the_gains<float>();
+}
+
+/// Behind a lag that is in the model it is b0 v that is compared, and d alone; also where b0 is
+/// given with each sample.
+TEST(Health, RatioWithALagInTheModel) {
+  using Lagging = Adrc<Guarded<ModelEso<ModelParts{.order = 1, .actuator = 1}>>>;
+  constexpr double tau = 0.03;
+  for (const double ratio : {1.0, -1.0, 10.0, 0.1}) {
+    Lagging::Config config{.controller_bandwidth = 20, .limits = {.lower = -1, .upper = 1}};
+    config.observer.observer = {.observer_bandwidth = omega_o,
+                                .input_gain = 20,
+                                .sample_time = sample_time,
+                                .model = {.actuator = {tau}}};
+    auto loop = Lagging::make(config).value();
+    EXPECT_NEAR(loop.observer().observer().model().plant_gain(), 20, 1e-12);
+    auto monitor =
+        HealthMonitor<2>::make(
+            {.observer_bandwidth = omega_o, .sample_time = sample_time, .input_range = 1})
+            .value();
+    Random random(5);
+    double y = 0;
+    double v = 0;
+    double u = 0;
+    for (int k = 0; k < 3000; ++k) {
+      if (k % 40 == 0) u = random.uniform(-0.5, 0.5);
+      const double share = 1 + 0.3 * std::sin(0.01 * k);
+      ASSERT_TRUE(loop.set_input_gain(20 * share).has_value());
+      loop.track(y, 0, u);
+      monitor.look(loop);
+      const double left = std::exp(-sample_time / tau);
+      y += sample_time * (3 + 20 * ratio * share * u) +
+           20 * ratio * share * (v - u) * tau * (1 - left);
+      v = u + (v - u) * left;
+    }
+    EXPECT_NEAR(monitor.health().gain_ratio, ratio, 0.03 * std::abs(ratio) + 0.02);
+    EXPECT_GT(monitor.health().evidence, 6);
+  }
 }
 
 /// A load that u answers makes rho small, and no more than that; a gated sample tells nothing.

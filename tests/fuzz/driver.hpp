@@ -530,6 +530,11 @@ class Driver {
                        const int where = d.tape_->choice(4);
                        d.quietly([&] { d.object_->set_pin(static_cast<esokit::Pin>(where)); });
                      }});
+        a.push_back({"hold", [](Driver& d) {
+                       const S u = d.number();
+                       d.quietly([&] { return d.object_->hold(u); });
+                     }});
+        a.push_back({"release", [](Driver& d) { d.quietly([&] { d.object_->release(); }); }});
       }
       if constexpr (requires(T & o, S s) { o.set_input_gain(s); }) {
         a.push_back({"set_input_gain", [](Driver& d) {
@@ -1029,6 +1034,7 @@ class Driver {
       if constexpr (requires { object_->set_trust(S(1)); }) {
         object_->set_trust(S(1));
         object_->set_pin(esokit::Pin::free);
+        object_->release();
       }
       return settle([&](const S& y) { return object_->update(y, S(0)); },
                     [&](const S& y) { return distance(*object_, y); });

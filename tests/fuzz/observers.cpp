@@ -40,7 +40,8 @@ void add_observers(std::vector<Kind>& kinds) {
   KIND(WrappedOutput<ModelCascadeEso<poles_and_lags, 2, double>>);
   KIND(OutlierGate<LinearEso<2, float>>);
   KIND(Guarded<LinearEso<2, float>>);
-  KIND(ModelEso<ModelParts{.order = 1, .actuator = 1, .sensor = 1, .resonators = 1}, float>);
+  KIND(Guarded<
+       ModelEso<ModelParts{.order = 1, .actuator = 1, .sensor = 1, .resonators = 1}, float>>);
 #ifndef ESOKIT_ONE_TYPE
   KIND(WrappedOutput<OutlierGate<VariableTime<CascadeEso<2, 2, double>>>>);
   KIND(LinearEso<1, float>);

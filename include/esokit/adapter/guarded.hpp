@@ -9,8 +9,13 @@
 #include <esokit/core/kernels.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/gating_certificate.hpp>
+#include <esokit/math/dense.hpp>
+#include <esokit/model/corrected_part.hpp>
+#include <esokit/model/sampled_model.hpp>
 #include <limits>
+#include <tuple>
 #include <type_traits>
+#include <utility>
 
 namespace esokit {
 
@@ -39,6 +44,87 @@ struct GuardAccess {
   static constexpr bool finite(const O& o, const States& states) noexcept {
     return is_finite(innermost(o).probe(states));
   }
+};
+
+/// Where the constant of the disturbance is in the states: of a chain dhat itself.
+template <class Model, class S>
+struct DisturbanceConstant {
+  static_assert(model_traits<Model>.is_chain);
+  explicit constexpr DisturbanceConstant(const Model&) noexcept {}
+
+  template <class State>
+  [[nodiscard]] ESOKIT_INLINE static constexpr S of(const State& x) noexcept {
+    return std::get<Model::order>(x);
+  }
+  /// Puts `value` in the place of `now`.
+  template <class State>
+  ESOKIT_INLINE static constexpr void replace(State& x, const S&, const S& value) noexcept {
+    std::get<Model::order>(x) = value;
+  }
+  [[nodiscard]] static S scaled(const Model& model, const S& d) noexcept {
+    return model.scaled_disturbance(d);
+  }
+};
+
+/// Of a model that tells it, see ModelTraits.
+template <class Model, class S>
+requires(model_traits<Model>.tells_constant) struct DisturbanceConstant<Model, S> {
+  using State = typename Model::State;
+  using ActuatorRows = decltype(std::declval<const Model&>().actuator_rows());
+  static constexpr int lag = ActuatorRows::rows() - 1;                      ///< of the actuator
+  static constexpr int driven = Model::measured_rows + Model::order - lag;  ///< state of y^(n)
+
+  explicit DisturbanceConstant(const Model& model) noexcept
+      : row(model.constant_row()),
+        column(model.constant_column()),
+        actuator(model.actuator_rows()) {}
+
+  [[nodiscard]] ESOKIT_INLINE S of(const State& x) const noexcept {
+    S sum = std::get<0>(row) * std::get<0>(x);
+    unroll<Model::size - 1>([&](auto i) ESOKIT_INLINE_LAMBDA {
+      sum = sum + std::get<i + 1>(row) * std::get<i + 1>(x);
+    });
+    return sum;
+  }
+  ESOKIT_INLINE void replace(State& x, const S& now, const S& value) const noexcept {
+    const S more = value - now;
+    unroll<Model::size>([&](auto i) ESOKIT_INLINE_LAMBDA {
+      std::get<i>(x) = std::get<i>(x) + std::get<i>(column) * more;
+    });
+  }
+  /// A bound of the rounding of `of`.
+  [[nodiscard]] S rounding_of(const State& x) const noexcept {
+    S sum(0);
+    for (std::size_t i = 0; i < x.size(); ++i) sum = sum + absolute(S(row[i] * x[i]));
+    return S(8) * std::numeric_limits<S>::epsilon() * sum;
+  }
+  /// b0 v times `factor`, and with `all` the disturbance, too.
+  [[nodiscard]] State rescaled(const Model& model, State x, const S& factor,
+                               bool all) const noexcept {
+    const S more = factor - S(1);
+    if (all) {
+      const State part = model.disturbance_part(x);
+      for (std::size_t i = driven; i < x.size(); ++i) x[i] = x[i] + more * part[i];
+    } else if constexpr (lag > 0) {
+      const State before = x;
+      for (int i = 0; i <= lag; ++i) {
+        S sum(0);
+        for (int j = 0; j < Model::size; ++j) {
+          sum = sum + actuator(i, j) * before[static_cast<std::size_t>(j)];
+        }
+        S& state = x[static_cast<std::size_t>(driven + i)];
+        state = state + more * sum;
+      }
+    }
+    return x;
+  }
+  [[nodiscard]] static S scaled(const Model& model, const S& d) noexcept {
+    return model.scaled_constant(d);
+  }
+
+  State row;              ///< see AugmentedModel
+  State column;           ///< the same
+  ActuatorRows actuator;  ///< the same
 };
 
 }  // namespace detail
@@ -100,27 +186,60 @@ struct GuardedConfig {
 /// - A changing b0: `set_input_gain(b)` before a sample, without design work. In Adrc and
 ///   DisturbanceCompensator the law follows.
 ///
+/// With a model (ModelEso) all guards act on the constant part of d, which is told from what the
+/// plant's poles, the actuator and the sines contribute to `total_disturbance`. d and its bound are
+/// counted in y^(n), n of the plant, or in units of the actuator's output.
+/// - The actuator is simulated from u, whatever the guards do. While the plant is held, the u that
+///   was applied is given, and the prediction is made to stand: on release v is what it is.
+/// - A changing b0 is that of the actuator's output v: y .. y^(n-1), v and d go on smoothly, and
+///   y^(n) jumps as it does in the plant. (A gain ahead of the lag, such as a supply voltage, is a
+///   factor of u_applied.)
+/// - Sines are corrected as usual, pinned or not, and a bound does not count them. Frozen for some
+///   samples of each turn they would be unstable; Re G has a pole there.
+/// - After a pin give `release_samples` the time in which the lag forgets what it was told.
+///
 /// The first three multiply the correction of dhat by a phi in [0, 1], which may change at every
 /// sample; so does a bound, with m = 1, while the true d is within it. Errors stay bounded, and
 /// decay while the trust returns, if Re G > -1 on the unit circle, where G is the transfer function
 /// from the correction of dhat to its innovation (circle criterion). `make` checks this for each
 /// level and refuses a level that fails; all poles in one place pass at any bandwidth (tested to n
 /// = 5, omega_o T = 20): min Re G is -1/4 (n = 1), -1/3 (n = 2), -3/8 (n = 3) for fast sampling,
-/// and never below -1/2. The check includes the leak. With m > 1 a frozen slope would run on, and
+/// and never below -1/2. The check includes the leak. Known poles and an actuator do not change it,
+/// a sensor counts like up to one order more per lag; a sine that is captured faster than about
+/// its frequency allows (20 rad/s at omega_o = 100: `capture_bandwidth` 20 fails, 4 passes) is
+/// refused. With m > 1 a frozen slope would run on, and
 /// for VariableTime no gain is known: for these only the bound and b0 are available.
 ///
-/// For constant gains on the chain, as the outermost adapter. Not with KnownModel, because the
-/// proof does not cover fbar.
+/// For constant gains on the chain or an AugmentedModel with one constant, as the outermost
+/// adapter. Not with KnownModel, because the proof does not cover fbar; not with leaky parts
+/// (`leak_time` is the guard of that kind): beside one that fades, a frozen constant is unstable.
 template <LoopObserver Observer>
 class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<Observer>> {
   static_assert(observer_traits<Observer>.bears_guards,
                 "esokit: Guarded is proven for constant gains on the chain of integrators: "
-                "LinearEso, CascadeEso and adapters of them, without KnownModel");
+                "LinearEso, CascadeEso and adapters of them, without KnownModel; or for LinearEso "
+                "with an AugmentedModel of one constant, without leaky parts or a varying speed");
   using Base = NamedAdapter<Guarded, Observer, GuardedConfig<Observer>>;
   friend Base;
   using Base::observer_;
   using S = typename Observer::scalar_type;
   static constexpr int n = Observer::order;
+  using Model = std::remove_cvref_t<
+      decltype(detail::GuardAccess::innermost(std::declval<const Observer&>()).model())>;
+  static constexpr bool on_chain = model_traits<Model>.is_chain;
+  static_assert(on_chain || !observer_traits<Observer>.varies_time,
+                "esokit: Guarded knows the constant of a model at one sample time only: not with "
+                "VariableTime");
+  static constexpr bool turns_move_constant = [] {
+    if constexpr (on_chain || !observer_traits<Observer>.bears_guards) {
+      return false;
+    } else {
+      return Model::parts.plant_poles && observer_traits<Observer>.wraps_output;
+    }
+  }();
+  static_assert(!turns_move_constant,
+                "esokit: with the poles of a plant a whole turn is a step of the constant: Guarded "
+                "takes WrappedOutput without plant_poles");
 
  public:
   using Base::levels;
@@ -129,7 +248,8 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   using typename Base::Estimate;
 
   /// Corrections of dhat may be scaled: trust, pin and hold.
-  static constexpr bool gates = size == n + 1 && !observer_traits<Observer>.varies_time;
+  static constexpr bool gates =
+      !on_chain || (size == n + 1 && !observer_traits<Observer>.varies_time);
 
   /// What it declares beyond LoopObserver.
   static constexpr ObserverTraits traits = [] {
@@ -148,7 +268,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     if (!made) return made.error();
     if constexpr (gates) {
       for (int level = 0; level < levels; ++level) {
-        if (!gating_certified<size, S>(made->level_gain(level), made->leak_)) {
+        if (!made->certified(level)) {
           return Error<S>{"level", static_cast<S>(level),
                           "has a gain that is not proven stable while corrections of dhat are "
                           "scaled (Re G > -1)"};
@@ -167,6 +287,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     release_samples_ = fresh.release_samples_;
     inverse_gain_ = fresh.inverse_gain_;
     leak_ = fresh.leak_;
+    constant_ = fresh.constant_;
     set_weights();
     set_limit();
     keep_bound();
@@ -175,17 +296,27 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
 
   /// One sample, see PredictorCorrector::update.
   StepStatus update(S y, S u_applied) noexcept {
+    if constexpr (!on_chain) {
+      if (held_ || told_ratio_ < gain_ratio_ || told_ratio_ > gain_ratio_) [[unlikely]] {
+        const StepStatus predicted = predict(u_applied);
+        return predicted | correct(y);
+      }
+    }
     const Found before = found();
     const StepStatus status = observer_.update(y, S(u_applied * told_ratio_));
-    told_ratio_ = gain_ratio_;
+    if constexpr (on_chain) told_ratio_ = gain_ratio_;
     keep_guards(before, status);
     return status;
   }
 
   /// Time update alone, see PredictorCorrector::predict.
   StepStatus predict(S u_applied) noexcept {
+    if constexpr (!on_chain) {
+      if (held_) [[unlikely]]
+        return predict_standing(u_applied);
+    }
     const StepStatus status = observer_.predict(S(u_applied * told_ratio_));
-    told_ratio_ = gain_ratio_;
+    take_gain();
     return status;
   }
 
@@ -232,10 +363,34 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     set_weights();
   }
 
-  /// The u under which the plant would stand if d were dhat. While the plant is held, with a trust
-  /// of 0, it is given instead of u.
+  /// Until `release` the plant stands or is carried: no correction of dhat counts.
+  /// @param u_applied what was held since the last sample
+  /// @return what the observer is to be given instead: on the chain `standing_input`; with a model
+  ///         the same u, for its actuator, while its predictions stand
+  S hold(const S& u_applied) noexcept requires gates {
+    held_ = true;
+    set_weights();
+    if constexpr (on_chain) {
+      return standing_input();
+    } else {
+      return u_applied;
+    }
+  }
+  /// Ends `hold`.
+  void release() noexcept requires gates {
+    held_ = false;
+    set_weights();
+  }
+
+  /// The u under which the plant would stand if d were dhat.
   [[nodiscard]] S standing_input() const noexcept requires gates {
-    const S u = -observer_.total_disturbance() * (inverse_gain_ * input_factor_);
+    S from_d;
+    if constexpr (on_chain) {
+      from_d = -observer_.total_disturbance();
+    } else {
+      from_d = detail::GuardAccess::innermost(observer_).model().standing_input(this->estimate());
+    }
+    const S u = from_d * (inverse_gain_ * input_factor_);
     return is_finite(u) ? u : applied_input();
   }
 
@@ -247,12 +402,19 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     const S ratio = b * inverse_gain_;
     const S factor = S(1) / ratio;
     if (!is_finite(b) || !is_finite(ratio) || !is_finite(factor) || !(ratio > S(0))) {
-      return Error<S>{"input_gain",
-                      b,
-                      "must be finite, not zero, and have the sign of the config's",
-                      -1,
-                      observer_.input_gain(),
-                      true};
+      return Error<S>{
+          "input_gain",      b,   "must be finite, not zero, and have the sign of the config's", -1,
+          configured_gain(), true};
+    }
+    if constexpr (!on_chain) {
+      // The sample that ends now is of the b0 of before.
+      const auto& states = detail::GuardAccess::states(observer_);
+      if (!detail::GuardAccess::finite(observer_, rescaled(states, S(ratio / told_ratio_)))) {
+        return Error<S>{"input_gain", b, "would make the estimate not finite"};
+      }
+      gain_ratio_ = ratio;
+      input_factor_ = factor;
+      return {};
     }
     if (unit_ == DisturbanceUnit::input) {
       const S change = ratio * input_factor_;
@@ -281,6 +443,11 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   [[nodiscard]] bool gated() const noexcept { return gated_; }
   /// True if dhat is at its bound.
   [[nodiscard]] bool bounded() const noexcept {
+    if constexpr (!on_chain) {
+      const auto& x = detail::GuardAccess::states(observer_)[0];
+      return limit_ < (std::numeric_limits<S>::max)() &&
+             detail::absolute(constant_.of(x)) >= limit_ - constant_.rounding_of(x);
+    }
     constexpr S rounding = S(1) - S(8) * std::numeric_limits<S>::epsilon();
     return reaches(limit() * rounding);
   }
@@ -289,6 +456,24 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   [[nodiscard]] Estimate leak_error() const noexcept requires gates {
     if (!(leak_ > S(0))) return Estimate::Zero();
     const auto& model = detail::GuardAccess::innermost(observer_).model();
+    if constexpr (!on_chain) {
+      return with_level([&](const auto& part, const auto& level) {
+        // (I - A) error = leak d.
+        constexpr int count = std::tuple_size_v<std::remove_cvref_t<decltype(level.row)>>;
+        auto kept = -level.error(S(1), leak_);
+        Matrix<S, count, 1> error;
+        const S leaking = leak_ * model.scaled_constant(S(1));
+        for (int i = 0; i < count; ++i) {
+          error(i) = leaking * level.column[static_cast<std::size_t>(i)];
+        }
+        detail::solve_in_place(detail::DenseView<S>{kept.data(), count},
+                               detail::DenseView<S>{error.data(), count, 1});
+        const auto all = part.whole * error;
+        typename Model::State x{};
+        for (int i = 0; i < size; ++i) x[static_cast<std::size_t>(i)] = all(i);
+        return model.physical(x);
+      });
+    }
     // What is found is (1 - leak) / leak of what the levels correct.
     const S kept = (S(1) - leak_) / leak_;
     S left = model.scaled_disturbance(S(1));
@@ -314,9 +499,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   }
 
   /// b0 of now.
-  [[nodiscard]] S present_input_gain() const noexcept {
-    return observer_.input_gain() * gain_ratio_;
-  }
+  [[nodiscard]] S present_input_gain() const noexcept { return configured_gain() * gain_ratio_; }
   /// b0 of the config over the present b0: the factor for a law that divides by the first.
   [[nodiscard]] const S& input_factor() const noexcept { return input_factor_; }
 
@@ -351,8 +534,9 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   Guarded(const Observer& observer, const Config& config) noexcept
       : Base(observer),
         bound_(config.disturbance_bound),
-        inverse_gain_(S(1) / observer.input_gain()),
+        inverse_gain_(S(1) / chain_config<Observer>(config.observer).input_gain),
         leak_(leak_of(config)),
+        constant_(detail::GuardAccess::innermost(observer).model()),
         unit_(config.unit),
         release_samples_(static_cast<std::uint16_t>(config.release_samples)) {
     set_weights();
@@ -379,13 +563,99 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     return -std::expm1(-chain_config<Observer>(config.observer).sample_time / config.leak_time);
   }
 
+  /// b0 of the config: that of a model with an actuator is b0 / tau.
+  [[nodiscard]] S configured_gain() const noexcept {
+    if constexpr (on_chain) {
+      return observer_.input_gain();
+    } else {
+      return S(1) / inverse_gain_;
+    }
+  }
+
+  /// Calls `use(part, level)` with what the gain of a model corrects, all of its sensor included.
+  template <class Use>
+  auto with_level(const Use& use) const {
+    const auto& observer = detail::GuardAccess::innermost(observer_);
+    const auto& model = observer.model();
+    const auto run = [&](const auto& part) {
+      return use(part, detail::ConstantLevel(part, model, observer.level_gain(0)));
+    };
+    using Settings = std::remove_cvref_t<decltype(chain_config<Observer>(
+        std::declval<const typename Observer::Config&>()))>;
+    if constexpr (requires(const Settings& settings) { settings.poles; }) {
+      return run(corrected_whole(model));
+    } else {
+      return model.with_corrected_part((std::numeric_limits<S>::max)(), run);
+    }
+  }
+
+  [[nodiscard]] bool certified([[maybe_unused]] int level) const {
+    if constexpr (on_chain) {
+      return gating_certified<size, S>(observer_.level_gain(level), leak_);
+    } else {
+      return with_level(
+          [&](const auto&, const auto& corrected) { return gating_certified(corrected, leak_); });
+    }
+  }
+
+  template <class States>
+  [[nodiscard]] States rescaled(const States& states, const S& factor) const noexcept
+      requires(!on_chain) {
+    const auto& model = detail::GuardAccess::innermost(observer_).model();
+    return {constant_.rescaled(model, states[0], factor, unit_ == DisturbanceUnit::input)};
+  }
+
+  /// From now on the b0 of `set_input_gain` is in force.
+  ESOKIT_INLINE void take_gain() noexcept {
+    if constexpr (!on_chain) {
+      if (told_ratio_ < gain_ratio_ || told_ratio_ > gain_ratio_) [[unlikely]] {
+        auto& states = detail::GuardAccess::states(observer_);
+        const auto next = rescaled(states, S(gain_ratio_ / told_ratio_));
+        if (detail::GuardAccess::finite(observer_, next)) states = next;
+        set_limit();
+        keep_bound();
+      }
+    }
+    told_ratio_ = gain_ratio_;
+  }
+
+  /// While held: d and the actuator go on, the sensor follows a y that stands.
+  ESOKIT_COLD StepStatus predict_standing(S u_applied) noexcept requires(!on_chain) {
+    using State = typename Model::State;
+    constexpr auto y = static_cast<std::size_t>(Model::state_of_row(0));
+    State& now = detail::GuardAccess::states(observer_)[0];
+    State standing = now;
+    const StepStatus status = observer_.predict(S(u_applied * told_ratio_));
+    if (!has(status, StepStatus::prediction_dropped)) {
+      const auto& inner = detail::GuardAccess::innermost(observer_);
+      const auto& model = inner.model();
+      // What an adapter has shifted y by.
+      const S turns = now[y] - model.predict(standing, model.drive(S(inner.applied_input())))[y];
+      for (std::size_t i = y + 1; i < standing.size(); ++i) standing[i] = S(0);
+      standing = model.predict(standing, model.drive(S(0)));
+      standing[y] = standing[y] + turns;
+      if constexpr (y > 0) standing[0] = standing[0] + turns;
+      const State other = model.disturbance_part(standing);
+      const State disturbed = model.disturbance_part(now);
+      for (std::size_t i = 0; i < standing.size(); ++i) {
+        standing[i] = standing[i] - other[i] + disturbed[i];
+      }
+      if (is_finite(model.finite_probe(standing))) now = standing;
+    }
+    take_gain();
+    return status;
+  }
+
   /// The disturbance states, level by level.
   using Found = Array<S, Base::levels>;
   [[nodiscard]] ESOKIT_INLINE Found found() const noexcept {
-    Found all;
+    Found all{};
+    if constexpr (!on_chain) {
+      if (!acts_) return all;
+    }
     const auto& states = detail::GuardAccess::states(observer_);
     detail::unroll<levels>([&](auto level) ESOKIT_INLINE_LAMBDA {
-      std::get<level>(all) = std::get<n>(std::get<level>(states));
+      std::get<level>(all) = constant_.of(std::get<level>(states));
     });
     return all;
   }
@@ -398,7 +668,8 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
         if (gated_ && !has(status, StepStatus::restarted)) gate(before);
         if (!has(status, StepStatus::measurement_rejected | StepStatus::outlier_rejected)) {
           for (auto& level : detail::GuardAccess::states(observer_)) {
-            level[n] = level[n] - leak_ * level[n];
+            const S d = constant_.of(level);
+            constant_.replace(level, d, S(d - leak_ * d));
           }
         }
         if (release_left_ > 0 && --release_left_ == 0) set_weights();
@@ -412,17 +683,20 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   ESOKIT_INLINE void gate(const Found& before) noexcept {
     auto& states = detail::GuardAccess::states(observer_);
     detail::unroll<levels>([&](auto level) ESOKIT_INLINE_LAMBDA {
-      S& d = std::get<n>(std::get<level>(states));
+      auto& state = std::get<level>(states);
+      const S d = constant_.of(state);
       const S moved = d - std::get<level>(before);
-      d = std::get<level>(before) + (moved > S(0) ? weight_up_ : weight_down_) * moved;
+      constant_.replace(
+          state, d,
+          S(std::get<level>(before) + (moved > S(0) ? weight_up_ : weight_down_) * moved));
     });
   }
 
   ESOKIT_COLD void set_weights() noexcept {
     const bool one_sided = pin_ != Pin::free || release_left_ > 0;
-    weight_up_ = one_sided && side_ <= 0 ? S(0) : trust_;
-    weight_down_ = one_sided && side_ >= 0 ? S(0) : trust_;
-    gated_ = one_sided || trust_ < S(1);
+    weight_up_ = held_ || (one_sided && side_ <= 0) ? S(0) : trust_;
+    weight_down_ = held_ || (one_sided && side_ >= 0) ? S(0) : trust_;
+    gated_ = held_ || one_sided || trust_ < S(1);
     acts_ = gated_ || leak_ > S(0);
   }
 
@@ -435,7 +709,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     const S most = (std::numeric_limits<S>::max)();
     S bound = bound_;
     if (unit_ == DisturbanceUnit::input) {
-      bound = bound * detail::absolute(S(observer_.input_gain() * gain_ratio_));
+      bound = bound * detail::absolute(S(configured_gain() * gain_ratio_));
     }
     bound_in_force_ = bound > S(0) && is_finite(bound) ? bound : most;
     limit_ = scaled_limit();
@@ -443,8 +717,8 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
 
   [[nodiscard]] S scaled_limit() const noexcept {
     const S most = (std::numeric_limits<S>::max)();
-    const S scaled =
-        detail::GuardAccess::innermost(observer_).model().scaled_disturbance(bound_in_force_);
+    const S scaled = detail::DisturbanceConstant<Model, S>::scaled(
+        detail::GuardAccess::innermost(observer_).model(), bound_in_force_);
     return bound_in_force_ < most && is_finite(scaled) ? scaled : most;
   }
 
@@ -459,8 +733,11 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
 
   [[nodiscard]] ESOKIT_INLINE bool beyond_bound() const noexcept {
     const S most = limit();
+    if constexpr (!on_chain) {
+      if (!(most < (std::numeric_limits<S>::max)())) return false;
+    }
     const auto& states = detail::GuardAccess::states(observer_);
-    S sum = std::get<n>(std::get<0>(states));
+    S sum = constant_.of(std::get<0>(states));
     bool beyond = detail::absolute(sum) > most;
     detail::unroll<levels - 1>([&](auto below) ESOKIT_INLINE_LAMBDA {
       sum = sum + std::get<n>(std::get<below + 1>(states));
@@ -481,6 +758,12 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   /// What each level, with those below it, has found is within the bound.
   ESOKIT_COLD void keep_bound() noexcept {
     const S most = limit();
+    if constexpr (!on_chain) {
+      auto& x = detail::GuardAccess::states(observer_)[0];
+      const S d = constant_.of(x);
+      if (detail::absolute(d) > most) constant_.replace(x, d, d > S(0) ? most : S(-most));
+      return;
+    }
     S below{};
     for (auto& level : detail::GuardAccess::states(observer_)) {
       const S sum = below + level[n];
@@ -506,12 +789,14 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   S input_factor_ = S(1);  ///< 1 / gain_ratio
   S inverse_gain_;         ///< 1 / b0 of the config
   S leak_;                 ///< part of dhat that goes after each correction
+  [[no_unique_address]] detail::DisturbanceConstant<Model, S> constant_;  ///< of a model
   S trust_ = S(1);
   S weight_up_ = S(1);    ///< what a correction of dhat upwards counts
   S weight_down_ = S(1);  ///< and one downwards
   DisturbanceUnit unit_;
   Pin pin_ = Pin::free;
   signed char side_ = 0;  ///< sign of the corrections that free a pinned actuator; 0: none does
+  bool held_ = false;
   bool gated_ = false;
   bool acts_ = false;  ///< gated, or leaks: one test in the hot path
   std::uint16_t release_samples_;

@@ -231,11 +231,9 @@ class ControlLoop {
   template <class O = Observer>
   requires(observer_traits<O>.gates_disturbance) S hold(S measured, S u_applied)
   noexcept {
-    const S trust = observer_.trust();
-    observer_.set_trust(S(0));
     report_applied(u_applied);
-    follow(measured, observer_.standing_input());
-    observer_.set_trust(trust);
+    follow(measured, observer_.hold(limiter_.last()));
+    observer_.release();
     return limiter_.last();
   }
 

@@ -86,6 +86,19 @@ template <PlainScalar S>
   return LoopFault::none;
 }
 
+namespace detail {
+
+template <class Observer>
+constexpr const auto& in_adapters(const Observer& observer) noexcept {
+  if constexpr (observer_traits<Observer>.adapts) {
+    return in_adapters(observer.observer());
+  } else {
+    return observer;
+  }
+}
+
+}  // namespace detail
+
 /// Watches a loop of one input: `look(controller)` after each sample.
 ///
 /// For y^(n) = d + b u an observer with b0 finds dhat = d + (b - b0) u, filtered by its own poles.
@@ -102,7 +115,11 @@ template <PlainScalar S>
 /// A larger margin over the noise would lose the fault that matters most: if b0 is too small, the
 /// loop cycles at 1.6 omega_o, where the poles leave a fifth of phi, but dhat is ten times as
 /// large. Noise that u reacts to makes rho smaller, so it raises no alarm of that kind.
-/// @tparam Size N of the observer: the number of poles that filter phi
+///
+/// With a model (ModelEso) psi is d alone, and behind an actuator's lag phi is b0 v, the actuator's
+/// output as it is simulated.
+/// @tparam Size N of the observer, less the order of an actuator's lag: the number of poles that
+/// filter phi
 template <int Size, PlainScalar S = double>
 class HealthMonitor {
   static_assert(Size >= 2, "esokit: an observer has at least two states");
@@ -136,13 +153,26 @@ class HealthMonitor {
   }
 
   /// To be called after each sample of the controller, an Adrc or DisturbanceCompensator whose
-  /// observer has `Size` states.
+  /// observer corrects `Size` states.
   template <class Controller>
   void look(const Controller& controller) noexcept {
     const auto& observer = controller.observer();
     using Observer = std::remove_cvref_t<decltype(observer)>;
-    static_assert(Observer::size == Size, "esokit: a monitor has as many poles as the observer");
+    const auto& model = detail::in_adapters(observer).model();
+    using Model = std::remove_cvref_t<decltype(model)>;
+    constexpr bool tells = model_traits<Model>.tells_constant;
+    constexpr int lag = [] {
+      if constexpr (tells) {
+        return Model::parts.actuator;
+      } else {
+        return 0;
+      }
+    }();
+    static_assert(Observer::size - lag == Size,
+                  "esokit: a monitor has as many poles as the observer corrects: its states, less "
+                  "those of an actuator in its model");
     S b = observer.input_gain();
+    if constexpr (lag > 0) b = model.plant_gain();
     bool gated = false;
     bool bounded = false;
     if constexpr (observer_traits<Observer>.schedules_input_gain) {
@@ -160,8 +190,14 @@ class HealthMonitor {
     phi_sum_ = phi_sum_ + b * observer.applied_input();
     if (++phase_ < divider_) return;
     phase_ = 0;
-    regress(phi_sum_ / static_cast<S>(divider_), observer.total_disturbance(), detail::absolute(b),
-            runs && !gated);
+    S phi = phi_sum_ / static_cast<S>(divider_);
+    S psi = observer.total_disturbance();
+    if constexpr (tells) {
+      const auto z = observer.estimate();
+      psi = model.disturbance(z);
+      if constexpr (lag > 0) phi = model.delivered(z);
+    }
+    regress(phi, psi, detail::absolute(b), runs && !gated);
     phi_sum_ = S(0);
   }
 

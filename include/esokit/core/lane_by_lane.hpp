@@ -195,6 +195,7 @@ class LaneByLane : public detail::GoesLaneByLane {
   ESOKIT_EACH_LANE(fill_input)
   ESOKIT_EACH_LANE(rearm)
   ESOKIT_EACH_LANE(hold)
+  ESOKIT_EACH_LANE(release)
   ESOKIT_EACH_LANE(set_trust)
   ESOKIT_EACH_LANE(set_pin)
 

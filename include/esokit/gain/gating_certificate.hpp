@@ -10,7 +10,10 @@
 /// at z = 1 is at 1 - a then.
 #pragma once
 
+#include <cmath>
 #include <esokit/gain/switching_certificate.hpp>
+#include <esokit/math/dense.hpp>
+#include <esokit/model/corrected_part.hpp>
 
 namespace esokit {
 
@@ -33,6 +36,14 @@ ErrorPolynomial<Size, S> leaking_polynomial(const ScaledGain<Size, S>& gain, con
   return p;
 }
 
+/// Where q_0 is zero, and with it the value at standstill: what is positive is the rest, over w^2.
+template <int Size, Scalar S>
+bool positive_but_at_standstill(const Array<S, Size + 1>& product) {
+  Array<S, Size> rest{};
+  for (std::size_t i = 0; i < Size; ++i) rest[i] = product[i + 1];
+  return positive_on_half_line<Size - 1, S>(rest);
+}
+
 }  // namespace detail
 
 /// Whether the error of a sampled observer of the chain with one extended state stays bounded, by a
@@ -51,10 +62,100 @@ template <int Size, Scalar S>
   if (!is_hurwitz<Size, S>(p) || !(q[1] > S(0.0))) return false;
   const auto product = detail::half_plane_product<Size, S>(p, q);
   if (leak > S(0.0)) return positive_on_half_line<Size, S>(product);
-  // q_0 is zero, and with it the value at standstill: what is positive is the rest, over w^2.
-  Array<S, Size> rest{};
-  for (std::size_t i = 0; i < Size; ++i) rest[i] = product[i + 1];
-  return positive_on_half_line<Size - 1, S>(rest);
+  return detail::positive_but_at_standstill<Size, S>(product);
+}
+
+namespace detail {
+
+/// One level of an observer with a model, as far as its constant disturbance is concerned: the part
+/// that is corrected, its gain, and the constant among its states.
+template <int Size, Scalar S>
+struct ConstantLevel {
+  Matrix<S, Size, Size> step;  ///< Phi - I
+  Array<S, Size> ahead{};      ///< C Phi
+  Array<S, Size> gain{};       ///< k
+  Array<S, Size> row{};        ///< the constant is row x
+  Array<S, Size> column{};     ///< what one more of it is to x
+
+  template <int Whole, int Pairs, class Model>
+  ConstantLevel(const CorrectedPart<Size, Whole, Pairs, S>& part, const Model& model,
+                const ScaledGain<Whole, S>& of_model)
+      : step(part.step) {
+    const auto constant_row = model.constant_row();
+    const auto constant_column = model.constant_column();
+    for (std::size_t j = 0; j < Size; ++j) {
+      const auto state = static_cast<std::size_t>(part.states[j]);
+      gain[j] = of_model[state];
+      column[j] = constant_column[state];
+      ahead[j] = part.output[j];
+      row[j] = S(0.0);
+      for (std::size_t i = 0; i < Size; ++i) {
+        ahead[j] = ahead[j] + part.output[i] * step(static_cast<int>(i), static_cast<int>(j));
+      }
+      for (std::size_t i = 0; i < Whole; ++i) {
+        row[j] = row[j] + constant_row[i] * part.whole(static_cast<int>(i), static_cast<int>(j));
+      }
+    }
+  }
+
+  /// A - I of the error after correction and leak. @param trust phi @param leak a
+  [[nodiscard]] Matrix<S, Size, Size> error(const S& trust, const S& leak) const {
+    S found(0.0);
+    for (std::size_t i = 0; i < Size; ++i) found = found + row[i] * gain[i];
+    auto all = step;
+    for (std::size_t i = 0; i < Size; ++i) {
+      const S k = gain[i] - (S(1.0) - trust) * found * column[i];
+      for (std::size_t j = 0; j < Size; ++j) {
+        S& x = all(static_cast<int>(i), static_cast<int>(j));
+        // No prediction changes the constant: row Phi = row.
+        x = x - k * ahead[j] - leak * column[i] * (row[j] - trust * found * ahead[j]);
+      }
+    }
+    return all;
+  }
+};
+
+/// q_0 .. q_N of det(x I - M) for M = (I + E / 2)^-1 E / unit, by Faddeev and LeVerrier: with E = A
+/// - I that of A by the bilinear map, see error_polynomial.
+template <int Size, Scalar S>
+ErrorPolynomial<Size, S> bilinear_polynomial(const Matrix<S, Size, Size>& difference,
+                                             const S& unit) {
+  auto mapped = difference;
+  auto half = Matrix<S, Size, Size>::Identity() + difference * S(0.5);
+  solve_in_place(DenseView<S>{half.data(), Size}, DenseView<S>{mapped.data(), Size, Size});
+  mapped = mapped / unit;
+  ErrorPolynomial<Size, S> q{};
+  q[Size] = S(1.0);
+  auto adjugate = Matrix<S, Size, Size>::Identity();
+  for (int k = 1; k <= Size; ++k) {
+    adjugate = mapped * adjugate;
+    const S next = -adjugate.trace() / S(static_cast<double>(k));
+    q[static_cast<std::size_t>(Size - k)] = next;
+    for (int i = 0; i < Size; ++i) adjugate(i, i) = adjugate(i, i) + next;
+  }
+  return q;
+}
+
+}  // namespace detail
+
+/// The same for a model that tells its constant from the rest of its disturbance, whose other parts
+/// are corrected as usual.
+/// @param level what is corrected @param leak as above, of the constant
+template <int Size, Scalar S>
+[[nodiscard]] bool gating_certified(const detail::ConstantLevel<Size, S>& level,
+                                    const S& leak = S(0.0)) {
+  const auto trusted = level.error(S(1.0), leak);
+  // In units of the geometric mean of its poles.
+  const S product_of_poles =
+      detail::absolute(detail::bilinear_polynomial<Size, S>(trusted, S(1.0))[0]);
+  const S unit = std::pow(product_of_poles, S(1.0) / S(static_cast<double>(Size)));
+  if (!is_finite(unit) || !(unit > S(0.0))) return false;
+  const auto p = detail::bilinear_polynomial<Size, S>(trusted, unit);
+  const auto q = detail::bilinear_polynomial<Size, S>(level.error(S(0.0), leak), unit);
+  if (!is_hurwitz<Size, S>(p) || !(q[1] > S(0.0))) return false;
+  const auto product = detail::half_plane_product<Size, S>(p, q);
+  return leak > S(0.0) ? positive_on_half_line<Size, S>(product)
+                       : detail::positive_but_at_standstill<Size, S>(product);
 }
 
 }  // namespace esokit

@@ -188,6 +188,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
       .adds_levels = !Parts.plant_poles && lf == 0 && la == 0,
       .tells_disturbance = true,
       .corrects_part = true,
+      .tells_constant = m == 1 && Parts.leaky == 0 && !Parts.follows_speed,
       .follows_speed = Parts.follows_speed,
   };
 
@@ -215,6 +216,13 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
     }
     if (!rules) return rules.error();
     return model;
+  }
+
+  /// b0 of the plant, without the lag: unit of y^(n) per unit of v.
+  [[nodiscard]] constexpr S plant_gain() const noexcept {
+    S gain = input_gain_ / detail::scaled_lag(settings_.actuator, sample_time_)[0];
+    for (int i = 0; i < la; ++i) gain = gain * sample_time_;
+    return gain;
   }
 
   /// The settings, as they were given.
@@ -293,24 +301,98 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
       requires(Parts.leaky > 0) {
     return z(order + m + 2 * Parts.resonators + part);
   }
+  /// d, all of it, unit of y^(n).
+  [[nodiscard]] S disturbance(const Estimate& z) const noexcept {
+    S sum = constant(z);
+    for (int i = 0; i < Parts.resonators; ++i) sum = sum + z(order + m + 2 * i);
+    for (int i = 0; i < Parts.leaky; ++i) sum = sum + z(order + m + 2 * Parts.resonators + i);
+    return sum;
+  }
+  /// b0 v: what the actuator delivers, simulated from u; unit of y^(n).
+  [[nodiscard]] S delivered(const Estimate& z) const noexcept requires(Parts.actuator > 0) {
+    S sum = z(n) - disturbance(z);
+    if constexpr (Parts.plant_poles) {
+      for (int i = 0; i < n; ++i) sum = sum + settings_.plant[static_cast<std::size_t>(i)] * z(i);
+    }
+    return sum;
+  }
   /// The constant part of d, unit of y^(n): D without the plant, the actuator and the other parts.
   [[nodiscard]] S constant(const Estimate& z) const noexcept {
     const auto x = this->scaled(z);
+    const auto row = constant_row();
+    S sum(0);
+    for (std::size_t j = 0; j < row.size(); ++j) sum = sum + row[j] * x[j];
+    for (int j = n; j > 0; --j) sum = sum * (static_cast<S>(j) * rate_);
+    return sum;
+  }
+  /// @}
+
+  /// @name The constant of the disturbance among the states
+  /// The natural states are y .. y^(n-1), the parts of d, and the actuator's output b0 v.
+  /// @{
+  /// The constant part of d, T^n / n! times what it is, is the sum of row_i x_i; no prediction
+  /// changes it (m = 1).
+  [[nodiscard]] State constant_row() const noexcept {
     const auto lag = detail::scaled_lag(settings_.actuator, sample_time_);
     const auto alpha = denominator(settings_, sample_time_);
-    const auto found = detail::factorial_ratio<S>(order, n);
     // act(s) d = D + sum_i alpha_i y^(i), in units of T^n / n!.
-    S sum = x[lf + order] * found;
-    for (int i = 0; i < order; ++i) {
-      sum = sum + alpha[static_cast<std::size_t>(i)] * x[static_cast<std::size_t>(lf + i)] *
-                      detail::factorial_ratio<S>(i, n);
+    State row = others_filtered(present(), sample_time_, 0);
+    for (S& weight : row) weight = -weight;
+    for (int i = 0; i <= order; ++i) {
+      row[static_cast<std::size_t>(lf + i)] =
+          alpha[static_cast<std::size_t>(i)] * detail::factorial_ratio<S>(i, n);
     }
-    const auto others = others_filtered(present(), sample_time_, 0);
-    for (int j = lf + order + 1; j < size; ++j) {
-      sum = sum - others[static_cast<std::size_t>(j)] * x[static_cast<std::size_t>(j)];
+    for (S& weight : row) weight = weight / lag[0];
+    return row;
+  }
+  /// What one more of it is to the states, with all other natural states as they are.
+  [[nodiscard]] State constant_column() const noexcept {
+    const auto part = corrected_part<without(true, false)>();
+    State column{};
+    for (int i = 0; i < size; ++i) column[static_cast<std::size_t>(i)] = part.whole(i, lf + n);
+    return column;
+  }
+  /// What the actuator's output is to the states y^(n) .. D: (rows x) of them.
+  [[nodiscard]] Matrix<S, la + 1, size> actuator_rows() const noexcept {
+    const auto part = corrected_part<without(true, false)>();
+    constexpr int part_size = size - la;
+    constexpr int acted_on = lf + n;  // of the part: what acts on y^(n) beside the actuator
+    // The part's states from those of the model: the same, but for this one, which the constant
+    // tells.
+    auto natural = Matrix<S, part_size, size>::Zero();
+    const State row = constant_row();
+    for (int j = 0; j < size; ++j) natural(acted_on, j) = row[static_cast<std::size_t>(j)];
+    for (int k = 0; k < part_size; ++k) {
+      if (k == acted_on) continue;
+      const int state = part.states[static_cast<std::size_t>(k)];
+      natural(k, state) = S(1);
+      S weight(0);
+      for (int i = 0; i < size; ++i) {
+        weight = weight + row[static_cast<std::size_t>(i)] * part.whole(i, k);
+      }
+      natural(acted_on, state) = natural(acted_on, state) - weight;
     }
-    sum = sum / lag[0];
-    for (int j = n; j > 0; --j) sum = sum * (static_cast<S>(j) * rate_);
+    Matrix<S, la + 1, size> rows;
+    for (int i = 0; i <= la; ++i) {
+      for (int j = 0; j < size; ++j) {
+        S sum(j == acted_on + i ? 1 : 0);
+        for (int k = 0; k < part_size; ++k) sum = sum - part.whole(acted_on + i, k) * natural(k, j);
+        rows(i, j) = sum;
+      }
+    }
+    return rows;
+  }
+  /// T^n / n! d. @param d unit of y^(n)
+  [[nodiscard]] constexpr S scaled_constant(const S& d) const noexcept {
+    S value = d;
+    for (int j = 1; j <= n; ++j) value = value * (sample_time_ / number(j));
+    return value;
+  }
+  /// b0 v under which the plant would stand at its present y, if all of d stayed as it is; unit of
+  /// y^(n).
+  [[nodiscard]] S standing_input(const Estimate& z) const noexcept {
+    S sum = -disturbance(z);
+    if constexpr (Parts.plant_poles) sum = sum + settings_.plant[0] * z(0);
     return sum;
   }
   /// @}
@@ -473,7 +555,12 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
 
     CorrectedPart<part_size, size, Parts.resonators, S> part;
     part.step = detail::exp_minus_identity(rates);
-    for (int i = 0; i < part_size; ++i) part.degrees[static_cast<std::size_t>(i)] = Part::degree(i);
+    for (int i = 0; i < part_size; ++i) {
+      part.degrees[static_cast<std::size_t>(i)] = Part::degree(i);
+      part.states[static_cast<std::size_t>(i)] = i < part_lf   ? i
+                                                 : i <= part_d ? lf + i - part_lf
+                                                               : lf + order + i - part_d;
+    }
     part.output.fill(S(0));
     part.whole = Matrix<S, size, part_size>::Zero();
     // The actuator's error is zero and stays zero, so u and v drop out of y^(n), y^(n+1), ..

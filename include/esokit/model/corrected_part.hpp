@@ -22,6 +22,7 @@ struct CorrectedPart {
   Matrix<S, Size, Size> step;         ///< Phi - I, scaled as the states of a model are
   Array<S, Size> output{};            ///< C: the measurement as a function of the states
   Array<int, Size> degrees{};         ///< see SampledModel: a state is smaller by a^degree
+  Array<int, Size> states{};          ///< of the model, that they are
   Matrix<S, Whole, Size> whole;       ///< maps a correction of the part to one of the whole model
   Array<Array<S, 2>, Pairs> pairs{};  ///< real and imaginary part of a pair of poles, 1/s
 };
@@ -36,7 +37,10 @@ auto corrected_whole(const Model& model) {
   all.step = model.increment();
   all.output.fill(S(0.0));
   all.output[0] = S(1.0);
-  for (int i = 0; i < size; ++i) all.degrees[static_cast<std::size_t>(i)] = model.degree(i);
+  for (int i = 0; i < size; ++i) {
+    all.degrees[static_cast<std::size_t>(i)] = model.degree(i);
+    all.states[static_cast<std::size_t>(i)] = i;
+  }
   all.whole = Matrix<S, size, size>::Identity();
   return all;
 }

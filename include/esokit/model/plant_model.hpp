@@ -255,6 +255,7 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
         part.whole = Matrix<S, size, inner>::Zero();
         for (int j = 0; j < inner; ++j) {
           part.degrees[static_cast<std::size_t>(j)] = Base::degree(lf + j);
+          part.states[static_cast<std::size_t>(j)] = lf + j;
           part.output[static_cast<std::size_t>(j)] = shown(0, j);
           for (int i = 0; i < lf; ++i) part.whole(i, j) = shown(i, j);
           part.whole(lf + j, j) = S(1);

@@ -38,6 +38,12 @@ struct ModelTraits {
   /// places itself; see CorrectedPart. Without it, everything is corrected.
   bool corrects_part = false;
 
+  /// The disturbance has one constant, which is told from its other parts and from what the
+  /// actuator delivers: `constant_row()`, `constant_column()`, `actuator_rows()`,
+  /// `scaled_constant(d)`, `standing_input(z)`, see AugmentedModel. Guarded holds, gates, bounds
+  /// and leaks this constant.
+  bool tells_constant = false;
+
   /// `at_speed(factor)` is the same model with the frequencies of its sines multiplied by `factor`,
   /// see ScheduledGain.
   bool follows_speed = false;

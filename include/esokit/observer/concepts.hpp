@@ -67,14 +67,14 @@ struct ObserverTraits {
 
   bool blanks_estimate = false;  ///< `blanked() const`: `estimate` is an old one for now
 
-  /// Only a constant gain on the chain changes its dhat, so it can be used in Guarded.
+  /// Only a constant gain changes its dhat, which its model tells, so it can be used in Guarded.
   bool bears_guards = false;
 
   /// It has `set_input_gain(b)` for use while it runs, and `input_factor() const`, by which a law
   /// multiplies what it has divided by the config's b0; see Guarded.
   bool schedules_input_gain = false;
 
-  /// `set_trust(phi)`, `trust() const`, and `standing_input() const`, see Guarded.
+  /// `set_trust(phi)`, `trust() const`, `hold(u)` and `release()`, see Guarded.
   bool gates_disturbance = false;
 };
 
@@ -169,7 +169,8 @@ template <class O>
 concept GatesDisturbance = requires(O& o, const O& constant, const typename O::scalar_type& s) {
   o.set_trust(s);
   { constant.trust() } -> std::convertible_to<typename O::scalar_type>;
-  { constant.standing_input() } -> std::convertible_to<typename O::scalar_type>;
+  { o.hold(s) } -> std::convertible_to<typename O::scalar_type>;
+  o.release();
 };
 
 /// As `as_declared`; an adapter names what it hands on, whether what it adapts has it or not.
@@ -229,7 +230,7 @@ concept SchedulesInputGainAsDeclared =
     detail::observer_as_declared<O>(observer_traits<O>.schedules_input_gain,
                                     detail::names_input_factor<O>, detail::SchedulesInputGain<O>);
 
-/// `set_trust(phi)`, `trust() const` and `standing_input() const` are declared by
+/// `set_trust(phi)`, `trust() const`, `hold(u)` and `release()` are declared by
 /// `traits.gates_disturbance`; or there are none.
 template <class O>
 concept GatesDisturbanceAsDeclared = detail::observer_as_declared<O>(

@@ -93,8 +93,9 @@ class PredictorCorrector {
       .is_predictable = Levels == 1 || gain_law_traits<Law>.kind == GainKind::preset,
       .gain_kind = gain_law_traits<Law>.kind,
       .measures_first_row = Model::state_of_row(0) == 0,
-      .bears_guards = gain_law_traits<Law>.kind == GainKind::preset &&
-                      !gain_law_traits<Law>.advances && model_traits<Model>.is_chain};
+      .bears_guards =
+          gain_law_traits<Law>.kind == GainKind::preset && !gain_law_traits<Law>.advances &&
+          (model_traits<Model>.is_chain || (Levels == 1 && model_traits<Model>.tells_constant))};
 
   /// From chain settings and ready gain laws; use this for your own gain law.
   /// @return error for input_gain, sample_time or max_gap out of its rule
