@@ -27,8 +27,8 @@ inline const std::string folder = "analysis";
 inline esokit::examples::About about(std::string title, std::string description) {
   return {.paper_title = "Analysis of finished designs",
           .citation =
-              "Our own numbers, by include/esokit/analysis; the observers and the bounds are those "
-              "of the papers",
+              "Our own numbers, computed by include/esokit/analysis; the observers and the bounds "
+              "are those of the papers",
           .link = "",
           .title = std::move(title),
           .description = std::move(description)};

@@ -78,10 +78,11 @@ std::vector<double> degrees(const Array<double, points>& phase) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  Report report(argc, argv, folder, "bode",
-                about("LESO against cascade at equal disturbance bandwidth",
-                      "What each observer makes of a disturbance and of measurement noise, over "
-                      "frequency: sampled observers, exact, nothing is simulated."));
+  Report report(
+      argc, argv, folder, "bode",
+      about("LESO and cascade compared at equal disturbance bandwidth",
+            "How a disturbance and measurement noise affect the estimates of each observer, over "
+            "frequency. Sampled observers; the results are exact, nothing is simulated."));
   const double wanted = disturbance_bandwidth(observer_with<order, 1>(reference, sample_time));
   const auto grid = log_grid<points>(1.0, 0.999 * std::numbers::pi / sample_time).value();
   const std::array rows = {analyse<1>(wanted, grid), analyse<2>(wanted, grid),
@@ -89,12 +90,11 @@ int main(int argc, char** argv) {
 
   Figure figure("bode", {.rows = 2, .columns = 2, .panel_height = 230});
   figure.caption(
-      "Observers of equal disturbance bandwidth (−3 dB at the dotted line), n = 2, T = 1 ms. Where "
-      "the cascade wins: the noise in its disturbance estimate falls off earlier and faster, and "
-      "its "
-      "error for slow disturbances is of order p in ω. Where it loses: between a tenth of the "
-      "bandwidth and the bandwidth it exaggerates the disturbance by up to two, and lags more, so "
-      "that its error there is larger.");
+      "Observers of equal disturbance bandwidth (−3 dB at the dotted line), n = 2, T = 1 ms. "
+      "Advantage of the cascade: the noise in its disturbance estimate falls off earlier and "
+      "faster, and its error for slow disturbances is of order p in ω. Drawback: between a tenth "
+      "of the bandwidth and the bandwidth it amplifies the disturbance by up to a factor of two, "
+      "and lags more, so that its error there is larger.");
   auto& magnitude = figure.panel(0, 0).title("disturbance to its estimate").name("estimate");
   auto& error = figure.panel(0, 1).title("error of the estimate, 1 − G").name("error");
   auto& phase = figure.panel(1, 0).title("phase of the estimate").name("phase");
@@ -124,12 +124,13 @@ int main(int argc, char** argv) {
                      number_text(row.lag * 180.0 / std::numbers::pi, 3), number_text(row.peak, 3),
                      number_text(row.overshoot, 3)});
   }
-  report.table("observers",
-               "Equal disturbance bandwidth, omega_B = " + number_text(wanted, 4) +
-                   " rad/s. sd: standard deviation for measurement noise of standard deviation 1",
-               {"observer", "omega_o1 (rad/s)", "sd of dhat", "sd of the rate",
-                "error at omega_B/10", "lag at omega_B/3 (°)", "largest error", "largest gain"},
-               lines);
+  report.table(
+      "observers",
+      "Equal disturbance bandwidth, omega_B = " + number_text(wanted, 4) +
+          " rad/s. sd: standard deviation for measurement noise with a standard deviation of 1",
+      {"observer", "omega_o1 (rad/s)", "sd of dhat", "sd of the rate", "error at omega_B/10",
+       "lag at omega_B/3 (°)", "largest error", "largest gain"},
+      lines);
 
   // Closed form of the LESO's bandwidth in continuous time, which T = 1 ms comes near to.
   report.check_reference("LESO", "omega_B (rad/s)", reference * std::sqrt(std::cbrt(2.0) - 1.0),

@@ -182,10 +182,10 @@ CsvRow nonlinear_line(Report& report) {
 
 int main(int argc, char** argv) {
   Report report(argc, argv, folder, "bounds",
-                about("Error bounds of the papers against the truth",
-                      "What the Lyapunov bounds promise for the disturbance estimate, beside the "
-                      "sharp worst case (peak gain) and a run with the worst disturbance. Paper "
-                      "way: continuous observers, RK4."));
+                about("Error bounds of the papers compared with the true error",
+                      "The Lyapunov bounds on the error of the disturbance estimate, compared with "
+                      "the true worst case (peak gain) and with a simulation under the worst "
+                      "disturbance. Continuous observers, as in the papers, RK4."));
 
   const std::vector<Entry> entries = {cascade_entry<1>(0.0), cascade_entry<2>(level_factor),
                                       cascade_entry<3>(level_factor)};
@@ -254,16 +254,17 @@ int main(int argc, char** argv) {
                 "bound / simulated"},
                lines);
   report.remark(
-      "The bounds are true and safe to print, but no basis for a design: the LESO's is an order "
-      "of magnitude too large, and each further level of a cascade multiplies the excess by "
-      "hundreds, because the bound of one level is fed to the next as if all its components and "
-      "all moments were the worst at once. `peak_gain` costs a second line of code and is sharp.");
+      "The bounds are correct, but no basis for a design: that of the LESO is an order of "
+      "magnitude too large, and each further level of a cascade makes it hundreds of times worse, "
+      "because the bound of one level enters the next as if all components were at their worst at "
+      "all times. `peak_gain` computes the true worst case.");
 
   Figure figure("bounds", {.rows = 1, .columns = 3, .panel_height = 230});
   figure.caption(
-      "Left: error of the disturbance estimate of a LESO from a wrong start under the worst "
-      "disturbance, and its bound. Middle: the same for the ABESO (rho = 0.7) with a P common to "
-      "both modes. Right: bound, sharp worst case and simulation over the number of levels.");
+      "Left: error of the disturbance estimate of a LESO after a wrong start, under the worst "
+      "disturbance, and its bound. Middle: the same for the ABESO (rho = 0.7); its bound uses a "
+      "Lyapunov matrix P that both modes share. Right: bound, true worst case and simulation over "
+      "the number of levels.");
   const auto draw = [&](std::size_t column, const char* name, const Trace& trace,
                         const std::vector<double>& over) {
     auto& panel = figure.panel(0, column).title(name).name(column == 0 ? "leso" : "abeso");

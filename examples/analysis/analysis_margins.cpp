@@ -100,18 +100,19 @@ LoopMargins margins_at(std::size_t levels, double bandwidth) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  Report report(argc, argv, folder, "margins",
-                about("Margins against the observer's bandwidth, plant of paper 1",
-                      "Gain, phase, delay and modulus margin of the sampled loop (T = 1 ms), "
-                      "opened at the plant's input. Exact, nothing is simulated."));
+  Report report(
+      argc, argv, folder, "margins",
+      about("Margins over the bandwidth of the observer, plant of paper 1",
+            "Gain, phase, delay and modulus margin of the sampled loop (T = 1 ms), opened at the "
+            "input of the plant. The results are exact, nothing is simulated."));
   const auto grid = log_grid<points>(4.0, 400.0).value();
   Figure figure("margins", {.rows = 2, .columns = 2, .panel_height = 220});
   figure.caption(
       "Margins of the loop with the plant of paper 1 (g = 1), omega_c = 2 rad/s, T = 1 ms; dots: "
-      "the bandwidths of Table 1, at which the three observe a disturbance about equally well. The "
-      "bandwidth of the observer hardly touches gain, phase and modulus, but the delay that the "
-      "loop "
-      "can take falls as one over it; every level of a cascade costs gain and phase.");
+      "the bandwidths of Table 1, at which the three observers estimate a disturbance about "
+      "equally well. The bandwidth of the observer hardly affects the gain, phase and modulus "
+      "margins, but the delay margin is inversely proportional to it. Every level of a cascade "
+      "reduces the gain and phase margins.");
   auto& gain = figure.panel(1, 0).title("gain margin, upwards").name("gain");
   auto& phase = figure.panel(0, 0).title("phase margin").name("phase");
   auto& delay = figure.panel(1, 1).title("delay margin").name("delay");
@@ -169,11 +170,10 @@ int main(int argc, char** argv) {
   for (int i = 0; i <= 40; ++i) gains.push_back(0.4 + 0.02 * i);
   Figure cases("worst_case", {.rows = 1, .columns = 1, .panel_height = 260});
   cases.caption(
-      "Modulus margin of the three observers of Table 1 over the plants that the paper's may be: "
-      "its gain g between 0.4 and 1.2 and a dead time up to 5 ms (solid: none, dashed: 5 ms). "
-      "Dots: what worst_case finds without looking at all of them. One and two levels have the "
-      "least margin where the gain is largest, three where it is least: they need the gain that "
-      "they were tuned for.");
+      "Modulus margin with the three observers of Table 1, over the plants that the paper allows "
+      "(gain g between 0.4 and 1.2) and a dead time of up to 5 ms (solid: none, dashed: 5 ms). "
+      "Dots: the worst case that worst_case finds without trying all plants. With one and two "
+      "levels the margin is smallest at the largest gain, with three levels at the smallest gain.");
   auto& panel = cases.panel(0, 0).title("modulus margin over the plants").name("worst_case");
   panel.x_label("g").y_label("min abs(1 + L)").x_range(0.35, 1.25).y_range(0.0, 1.0);
   panel.legend(Legend::above);

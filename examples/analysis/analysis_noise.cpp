@@ -126,10 +126,10 @@ std::vector<double> over_frequency(const Array<double, 300>& grid) {
 
 int main(int argc, char** argv) {
   Report report(argc, argv, folder, "noise",
-                about("Noise to the actuator against the number of levels",
-                      "Standard deviation of u for white measurement noise of standard deviation "
-                      "1, observers of equal disturbance bandwidth: exact, and beside it runs of "
-                      "1e7 samples of the real observer and law."));
+                about("Noise in u over the number of levels",
+                      "Standard deviation of u for white measurement noise with a standard "
+                      "deviation of 1, observers of equal disturbance bandwidth: exact values, "
+                      "compared with simulations of 1e7 samples of the observer and control law."));
   const std::array exact = {by_levels<1>(sample_time), by_levels<2>(sample_time),
                             by_levels<3>(sample_time)};
 
@@ -169,12 +169,12 @@ int main(int argc, char** argv) {
   const auto grid = log_grid<300>(1.0, 0.999 * std::numbers::pi / sample_time).value();
   Figure figure("noise", {.rows = 1, .columns = 3, .panel_height = 230});
   figure.caption(
-      "Noise to the actuator at equal disturbance bandwidth (50 rad/s), omega_c = 5 rad/s. Left: "
-      "against the number of levels, for T = 1 ms; crosses: runs of 1e7 samples of observer and "
-      "law. Middle: over "
-      "frequency, n = 2. Right: against the sample time, n = 2, for the same noise per sample: it "
-      "falls with the square root of T, as the band of the observer takes a smaller share of it. "
-      "The second level gains most, and the more the higher the order of the plant.");
+      "Noise in u at equal disturbance bandwidth (50 rad/s), omega_c = 5 rad/s. Left: over the "
+      "number of levels, for T = 1 ms; crosses: simulations of 1e7 samples of observer and control "
+      "law. Middle: over frequency, n = 2. Right: over the sample time, n = 2, for the same noise "
+      "per sample: it falls with the square root of T, because a smaller part of the noise is "
+      "within the band of the observer. The second level reduces the noise most, and more so for "
+      "plants of higher order.");
   auto& left = figure.panel(0, 0)
                    .title("against the levels")
                    .name("levels")

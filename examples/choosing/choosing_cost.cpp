@@ -83,8 +83,8 @@ int main(int argc, char** argv) {
   Report report(argc, argv, "choosing", "cost",
                 {.paper_title = "Choosing an observer",
                  .title = "What an update costs",
-                 .description = "Time of an update over the number of states and of levels, double "
-                                "and a pack of doubles, as this machine has it.",
+                 .description = "Time of an update over the number of states and of levels, with "
+                                "double and with packs of double, measured on this machine.",
                  .order = 2});
   using Wide = Pack<double>;
   std::vector<Timed> families[2][2] = {{over_states<double>(), over_states<Wide>()},
@@ -99,9 +99,9 @@ int main(int argc, char** argv) {
   const std::string pack = "a lane of " + std::to_string(default_lanes<double>);
   Figure figure("cost", {.rows = 1, .columns = 2, .panel_height = 220});
   figure.caption(
-      "Time of an update in a bank of 16: LinearEso over its states N = n + 1, "
-      "CascadeEso<2, p> over its levels; double, and a lane of a pack. Measured in this "
-      "run.");
+      "Time of an update in a bank of 16 observers: LinearEso over its number of states N = n + 1, "
+      "CascadeEso<2, p> over its number of levels; with double, and per lane of a pack. Measured "
+      "in this run.");
   std::vector<CsvRow> rows;
   for (std::size_t i = 0; i < 2; ++i) {
     auto& panel = figure.panel(0, i)
@@ -128,7 +128,7 @@ int main(int argc, char** argv) {
   }
   report.add(figure);
   report.table("cost", "ns an update",
-               {"observer", "double", pack, "updates of lanes in the time of one alone"}, rows);
+               {"observer", "double", pack, "lanes updated in the time of one double"}, rows);
   // Shown, not judged: they are those of the machine.
   const auto& states = families[0][0];
   const auto& levels = families[1][0];

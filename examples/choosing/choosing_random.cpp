@@ -96,13 +96,14 @@ int main(int argc, char** argv) {
       rest.push_back(argv[i]);
     }
   }
-  Report report(static_cast<int>(rest.size()), rest.data(), "choosing", "random",
-                {.paper_title = "Choosing an observer",
-                 .citation = "Our own numbers; the observers are those of the papers",
-                 .link = "",
-                 .title = "From a log to margins on the true plant",
-                 .description = "Random plants: a log is identified, a controller chosen for the "
-                                "model, and its margins looked at on the plant."});
+  Report report(
+      static_cast<int>(rest.size()), rest.data(), "choosing", "random",
+      {.paper_title = "Choosing an observer",
+       .citation = "Our own numbers; the observers are those of the papers",
+       .link = "",
+       .title = "From a log to margins on the true plant",
+       .description = "Random plants: a log of each is identified, a controller is chosen for the "
+                      "model, and its margins are computed with the true plant."});
   const auto outcomes = run_parallel("random plants", logs > 0 ? logs : 16,
                                      [](std::size_t i) { return tuned(9000 + i); });
   double accepted = 0, chosen = 0, holds = 0, modulus = 0, delay = 0, gain = 0, order = 0;

@@ -99,14 +99,13 @@ std::string number_or_dash(bool there, double value) { return there ? number_tex
 }  // namespace
 
 int main(int argc, char** argv) {
-  Report report(
-      argc, argv, "choosing", "tradeoff",
-      {.paper_title = "Choosing an observer",
-       .citation = "Our own numbers; the observers are those of the papers",
-       .link = "",
-       .title = "Every observer at its best, wish after wish",
-       .description = "The ranking of tune/ over the noise that u may have: the price of a family "
-                      "beside the best linear controller, margins kept."});
+  Report report(argc, argv, "choosing", "tradeoff",
+                {.paper_title = "Choosing an observer",
+                 .citation = "Our own numbers; the observers are those of the papers",
+                 .link = "",
+                 .title = "Every observer family at its best, for several requirements",
+                 .description = "The ranking by tune/, over the noise that u may have: each family "
+                                "with its margins, compared with the best linear controller."});
 
   const auto all = cases();
   const auto bandwidths = log_grid<wishes>(filter_bandwidth / 8.0, 2.0 * filter_bandwidth).value();
@@ -118,14 +117,16 @@ int main(int argc, char** argv) {
 
   Figure figure("tradeoff", {.rows = 2, .columns = 2, .panel_height = 260});
   figure.caption(
-      "Each curve is one family, at each wish the best that it can do under a modulus margin of "
-      "0.5, a delay margin of two samples and a b0 wrong by two; curves end where it cannot. "
-      "Horizontal: bandwidth of the law over that of the filter, in the LQG controller that the "
-      "wish leads to: slow and quiet at the left. Vertical: J over that of this controller, which "
-      "no linear one beats and which keeps no margins; root of J, so 1.1 are deviations 10 % "
-      "larger. Upper right: beside free poles everything is within a few percent until the wish is "
-      "fast. Lower left: what is known of the lag pays. Lower right: what is slow and smooth "
-      "belongs in the model; without it m = 2 and cascades come next.");
+      "Each curve is one family. Each point is its best design for one requirement that keeps a "
+      "modulus margin of 0.5, a delay margin of two samples, and stability with a b0 that is wrong "
+      "by a factor of two; a curve ends where the family cannot keep them. Horizontal axis: the "
+      "requirement, as the bandwidth of the control law divided by that of the filter in the LQG "
+      "controller that meets it (left: slow, little noise in u). Vertical axis: sqrt(J / J*), "
+      "where J* is the cost of this LQG controller, which is the best linear one and keeps no "
+      "margins; 1.1 means deviations 10 % larger. Upper right: all families but the free poles are "
+      "within a few percent of each other until the requirement is fast. Lower left: it pays to "
+      "have the lag in the model. Lower right: it pays to have a slow, smooth disturbance in the "
+      "model; otherwise m = 2 and the cascades come next.");
   for (std::size_t c = 0; c < all.size(); ++c) {
     Panel& panel = figure.panel(c / 2, c % 2).title(all[c].name);
     panel.name("case" + std::to_string(c + 1))
@@ -166,12 +167,12 @@ int main(int argc, char** argv) {
                        std::to_string(d.instructions), d.constraint});
     }
     report.table("ranking" + std::to_string(c + 1),
-                 all[c].name + ": the ranking where the law is " +
+                 all[c].name + ": the ranking for the requirement with a control law " +
                      number_text(bandwidths[middle] / filter_bandwidth, 3) +
                      " times as fast as the filter",
-                 {"family", "root of J / J*", "without margins", "sd of y (1e-3)",
-                  "noise in u over the wish", "settling (s)", "modulus margin",
-                  "instructions of an update", "held back by"},
+                 {"family", "sqrt(J / J*)", "the same without margins", "sd of y (1e-3)",
+                  "noise in u / noise allowed", "settling time (s)", "modulus margin",
+                  "instructions per update", "limited by"},
                  lines);
   }
 
@@ -182,7 +183,7 @@ int main(int argc, char** argv) {
           all[c].name + ", " + number_text(bandwidths[w] / filter_bandwidth, 3);
       double least = 1e300;
       for (const TunedDesign& d : tuning.designs) least = std::min(least, d.excess);
-      report.expect(name, "least of all families (root of J / J*)", least, least > 0.999,
+      report.expect(name, "smallest of all families (root of J / J*)", least, least > 0.999,
                     "none is better than the LQG");
     }
   }

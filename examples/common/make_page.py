@@ -20,7 +20,7 @@ from urllib.parse import quote
 
 SUMMARY = ["case", "metric", "paper", "ours", "relative_error", "tolerance", "pass", "note"]
 CONTENTS = ["kind", "name", "text", "alt", "more", "figure"]
-MISSES = ("printed number missed", "the text says other than what was simulated",
+MISSES = ("printed number missed", "the text does not describe what was simulated",
           "a claim does not hold", "settings or data not published")  # miss_texts in report.cpp
 WIDEST = 10  # columns of a table, then it is split
 Row = namedtuple("Row", "case metric paper ours error tolerance passed note outcome miss")
@@ -140,7 +140,7 @@ def counts(paper):
                 f' <span class="{kind if number else "reported"}">{number} {name}</span>'
                 for number, name, kind in numbers) + "</span>\n"
     return ('<p class="counts">' +
-            (text or '<span class="reported">Nothing is compared here.</span>') + "</p>\n")
+            (text or '<span class="reported">These programs compare no numbers.</span>') + "</p>\n")
 
 
 def table(caption, headings, rows, text=False):
@@ -202,7 +202,7 @@ def claims(paper):
 
 def corrections(paper):
     return table("Corrections of printed formulas",
-                 ["where", "printed", "correct", "how one knows"], [
+                 ["where", "printed", "correct", "reason"], [
         (cell(item.name, "text narrow"), cell(item.text, "text"), cell(item.alt, "text"),
          cell(item.more, "text")) for _, item in paper.items("correction")], True)
 
@@ -297,12 +297,13 @@ def cover(out, paper):
 
 
 def overview(out, papers):
-    header = """<h1>esokit: papers reproduced</h1>
-<p>Every figure and table was computed by the programs in examples/, from the equations \
-of the papers. A <b>printed number</b> stands in a paper: it is met, missed, or not \
-judged (where no tolerance can be given). An <b>own check</b> compares with a formula or \
-an independent run, or demands what must hold; it passes or fails. The two are never \
-added up.</p>
+    header = """<h1>esokit: results of the examples</h1>
+<p>The programs in examples/ reproduce five papers from their equations, and show what the \
+library does. Each card leads to a page with figures, tables and all numbers. Two kinds of \
+comparison are counted separately. A <b>printed number</b> is a number in a paper: it is met, \
+missed, or not judged (if no tolerance can be given). An <b>own check</b> compares one of our \
+numbers with a formula, with an independent program, or with a limit that it has to keep: it \
+passes or fails.</p>
 """
     cards = "".join(f'<li><a href="{paper.page}">{cover(out, paper)}<b>{esc(paper.title)}</b></a>\n'
                     f"{counts(paper)}</li>\n" for paper in papers)
@@ -318,16 +319,16 @@ def one_paper(out, paper):
     readme = f"examples/{esc(paper.folder)}/README.md"
     if (out / paper.folder / "README.txt").exists():
         readme = f'<a href="{quote(paper.folder)}/README.txt">{readme}</a>'
-    header += ('</p>\n<p class="quiet">What it is, when it helps and how to choose: '
+    header += ('</p>\n<p class="quiet">What this is, when it helps and how to use it: '
                f"{readme}</p>\n{counts(paper)}")
-    header += ('<p class="quiet">Two ways to run: a <b>continuous simulation</b>, as in the papers, '
-               "integrates plant and observer as one differential equation; a <b>sampled "
-               "observer</b> runs once a sample, as it does in a controller.</p>\n")
+    header += ('<p class="quiet">A <b>continuous simulation</b>, as in the papers, integrates plant '
+               "and observer as one differential equation. A <b>sampled observer</b> is updated once "
+               "per sample, as in a controller.</p>\n")
 
     main = failures(paper) + claims(paper) + misses(paper) + corrections(paper)
     main += '<nav aria-label="Contents">\n<ul>\n'
     for one in paper.examples:
-        own = ' <span class="quiet">(own addition)</span>' if one.addition and paper.link else ""
+        own = ' <span class="quiet">(our addition)</span>' if one.addition and paper.link else ""
         main += f'<li><a href="#{one.anchor}">{esc(one.title)}</a>{own}</li>\n'
     main += "</ul>\n</nav>\n"
     for one in paper.examples:
@@ -335,7 +336,7 @@ def one_paper(out, paper):
             main += article(out, one, [item for item in one.items if not item.addition])
     later = [one for one in paper.examples if one.has_additions]
     if later and paper.link:
-        main += '<h2 id="additions">Own additions</h2>\n'
+        main += '<h2 id="additions">Our additions</h2>\n'
     for one in later:
         main += article(out, one, [item for item in one.items if one.addition or item.addition],
                         not one.addition)
@@ -353,7 +354,7 @@ def main():
         papers = read_results(out)
         files = {paper.folder: (paper.title + " - esokit", *one_paper(out, paper))
                  for paper in papers}
-        files["index"] = ("esokit: papers reproduced", *overview(out, papers))
+        files["index"] = ("esokit: results of the examples", *overview(out, papers))
         for name, (title, header, content) in files.items():
             text = page.substitute(title=esc(title), header=header, main=content)
             (out / (name + ".html")).write_text(text, encoding="utf-8")

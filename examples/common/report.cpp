@@ -14,7 +14,7 @@ namespace {
 // They begin the note of a known miss, so that a reader of summary.csv (make_page.py is one) can
 // tell it from a failure: both have pass = no.
 constexpr std::array miss_texts = {"printed number missed",
-                                   "the text says other than what was simulated",
+                                   "the text does not describe what was simulated",
                                    "a claim does not hold", "settings or data not published"};
 
 std::string fixed(double value, int decimals) {

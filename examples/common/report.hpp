@@ -54,13 +54,13 @@ struct Correction {
   std::string where = {};    ///< number of the equation or table
   std::string printed = {};  ///< as it stands in the paper
   std::string correct = {};  ///< as it must be
-  std::string why = {};      ///< how one knows, with numbers
+  std::string why = {};      ///< the reason, with numbers
 };
 
 /// Kinds of "does not reproduce".
 enum class Miss {
   printed_number,  ///< a printed number is missed, and we do not know why
-  other_reading,   ///< the text says other than what was simulated; a reading that works exists
+  other_reading,   ///< the text does not describe what was simulated; another reading works
   claim,           ///< a claim does not hold
   not_published    ///< settings or data that are needed are not published
 };

@@ -302,8 +302,8 @@ double tracking_error(const Faults& faults, std::uint64_t seed) {
 int main(int argc, char** argv) {
   Report report(argc, argv, folder, "limits_and_gaps",
                 about("Limits, starts, retunes, gaps",
-                      "A double integrator known exactly, so that every deviation is the "
-                      "controller's. Sampled."));
+                      "A double integrator that is known exactly, so that every deviation is "
+                      "caused by the controller. Sampled observers."));
 
   const StepRun truth = true_states();
   std::vector<CsvRow> rows;
@@ -317,8 +317,9 @@ int main(int argc, char** argv) {
                rows);
   Figure figure("windup", {.rows = 2, .columns = 1, .panel_height = 200});
   figure.caption(
-      "A step of 10 with |u| limited to 3. The observer that is told the applied input behaves as "
-      "the same limited law on the true states, whose overshoot the saturation alone makes.");
+      "A step of 10 with |u| limited to 3. If the observer gets the applied input, the loop "
+      "behaves as if the control law knew the true states; the overshoot is then caused by the "
+      "saturation alone.");
   auto& output = figure.panel(0, 0).y_label("y (-)").legend(Legend::above).x_range(0, 8);
   auto& input = figure.panel(1, 0).x_label("t (s)").y_label("u (V)").x_range(0, 8).y_range(-4, 4);
   output.name("output");
@@ -337,7 +338,7 @@ int main(int argc, char** argv) {
   bumps<Linear>(report, "LESO", linear, rows);
   bumps<Cascade>(report, "cascade", cascade, rows);
   bumps<Algebraic>(report, "algebraic", algebraic, rows);
-  report.table("bumps", "Jump of u in the steady state, as a share of its range",
+  report.table("bumps", "Step of u in the steady state, divided by the range of u",
                {"observer", "switch-on", "omega_o times 1.5", "b0 times 1.4", "omega_c halved"},
                rows);
 
@@ -346,11 +347,11 @@ int main(int argc, char** argv) {
   gaps<2>(report, rows);
   gaps<3>(report, rows);
   gaps<4>(report, rows);
-  report.table(
-      "gaps",
-      "One correction in M, M = 1 to 20: largest spectral radius of the error with the gain "
-      "for M T, and with the gain for T as most code has it",
-      {"observer", "gain for M T", "gain for T", "patterns of 20 that diverge with it"}, rows);
+  report.table("gaps",
+               "One measurement in M samples, M = 1 to 20: largest spectral radius of the "
+               "estimation error with the gain for M T, and with the gain for T, as in most code",
+               {"observer", "gain for M T", "gain for T", "patterns of 20 that diverge with it"},
+               rows);
 
   rows.clear();
   const auto fault_case = [&](const char* name, const Faults& faults) {
@@ -372,8 +373,8 @@ int main(int argc, char** argv) {
          number_text(ratio, 4)});
   }
   report.table("faults",
-               "Following a sine under a sine disturbance, 2 ms, noise on y: RMS tracking error in "
-               "1e-3, mean (standard deviation) over 20 seeds",
+               "Sine as the reference and as the disturbance, T = 2 ms, noise on y: RMS tracking "
+               "error in 1e-3, mean (standard deviation) over 20 seeds",
                {"case", "RMS error", "ratio"}, rows);
   return report.finish();
 }

@@ -117,7 +117,7 @@ int main(int argc, char** argv) {
   Report report(argc, argv, folder, "pid_wrapping",
                 about("Wrapping an existing PID",
                       "A disturbance compensator is switched on around a PID while the machine "
-                      "runs; the PID's gains stay. Sampled, 1 ms."));
+                      "runs; the gains of the PID do not change. Sampled at 1 ms."));
   const Run plain = simulate(false);
   const Run wrapped = simulate(true);
   report.check("PID", "peak error after the load at 1 s", std::nullopt, plain.first_load);
@@ -132,12 +132,13 @@ int main(int argc, char** argv) {
   report.expect("PID, wrapped at 2.5 s", "jump of u at the switch (share of the range)",
                 wrapped.bump / (2 * limit), wrapped.bump < 0.001 * 2 * limit,
                 "below 0.1 %; the plant is not quite at rest");
-  report.comparison("table", "The second load, as large as the first, with and without");
+  report.comparison(
+      "table", "The second load step, as large as the first, with and without the compensator");
   Figure figure("pid_wrapping", {.rows = 2, .columns = 1, .panel_height = 200});
   figure.caption(
       "Load steps at 1 s and 4 s; from 2.5 s on the compensator is between the PID and the "
-      "actuator. Below: u, and the PID's own output, which falls to nothing at the switch because "
-      "the compensator brings the rest.");
+      "actuator. Bottom: u, and the output of the PID itself, which falls to zero when the "
+      "compensator is switched on and takes over the load.");
   auto& output =
       figure.panel(0, 0).y_label("y (-)").x_range(0, 6).legend(Legend::above).name("output");
   auto& input = figure.panel(1, 0)

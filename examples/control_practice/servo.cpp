@@ -228,11 +228,12 @@ Run simulate(const Controller& driven, std::uint64_t seed, const Run* clean = nu
 }  // namespace
 
 int main(int argc, char** argv) {
-  Report report(argc, argv, folder, "servo",
-                about("A servo on a bad day",
-                      "Friction, saturation, a load step, a retune while running, lost samples and "
-                      "NaN: PID with anti-windup beside ADRC with three observers. Sampled, "
-                      "1 ms; mean and spread over 20 seeds of noise and faults."));
+  Report report(
+      argc, argv, folder, "servo",
+      about("A servo on a bad day",
+            "Friction, saturation, a load step, retuning while the loop runs, lost samples and "
+            "NaN: a PID with anti-windup compared with ADRC with three observers. Sampled at 1 ms; "
+            "mean and standard deviation over 20 seeds of noise and faults."));
   std::vector<Run> first;
   std::vector<std::string> names;
   for (const Controller& c : controllers()) names.push_back(c.name);
@@ -264,7 +265,7 @@ int main(int argc, char** argv) {
                   fault_errors[i].mean / fault_errors[0].mean,
                   fault_errors[i].mean < fault_errors[0].mean, "below 1");
   }
-  report.comparison("table", "Controllers side by side, mean (standard deviation) over 20 seeds",
+  report.comparison("table", "The controllers compared, mean (standard deviation) over 20 seeds",
                     names,
                     {"overshoot (% of the step)", "int |e| dt to 2.5 s (rad s)",
                      "peak error after load (mrad)", "change by faults, RMS (mrad)",
@@ -273,12 +274,9 @@ int main(int argc, char** argv) {
   Figure figure("servo", {.rows = 4, .columns = 2, .panel_height = 165});
   figure.caption(
       "Top: angle. Second row: the first step enlarged, and the error after the load step at 2.5 "
-      "s. "
-      "Third: error and motor voltage while following a sine with lost samples (3.6 to 4.6 s, a "
-      "gap "
-      "of 40 ms at 4 s), NaN (4.6 to 5 s), and the load going off at 5 s. Bottom: total "
-      "disturbance "
-      "as the observers find it, friction and load in it.");
+      "s. Third row: error and motor voltage while following a sine with lost samples (3.6 to 4.6 "
+      "s, with a gap of 40 ms at 4 s) and NaN (4.6 to 5 s); the load is removed at 5 s. Bottom: "
+      "the total disturbance, that is, friction and load, as the observers estimate it.");
   auto& angle = figure.panel(0, 0, 1, 2)
                     .y_label("angle (rad)")
                     .x_range(0, 6)
@@ -330,10 +328,9 @@ int main(int argc, char** argv) {
   // For the front page: the same runs, PID and LESO alone.
   Figure why("pid_or_adrc", {.rows = 1, .columns = 2, .panel_height = 190});
   why.caption(
-      "A PID and an ADRC that reacts alike to a load. Left: a step that saturates the motor. "
-      "Right: "
-      "error "
-      "while following a sine, with lost samples, a gap of 40 ms, NaN, and the load going off.");
+      "A PID, and an ADRC that reacts to a load in the same way. Left: a step that saturates the "
+      "motor. Right: error while following a sine, with lost samples, a gap of 40 ms, NaN, and the "
+      "load being removed.");
   auto& reached = why.panel(0, 0)
                       .x_label("t (s)")
                       .y_label("angle (rad)")
@@ -361,12 +358,12 @@ int main(int argc, char** argv) {
   }
   report.add(why);
   report.remark(
-      "The PID has the gains that the LESO's ADRC has as a PID, so both react alike to what is "
-      "slow. Where a sample is missing the PID holds the last one; the observers predict, and "
-      "correct with the gain for the whole gap. The ADRC is given the derivatives of the sine, "
-      "which "
-      "this PID has no use for; nor is it retuned, its change of u at 3.2 s is noise, as most of "
-      "the others' is (steady and without noise the bump is 1e-14, see limits_and_gaps). Once its "
-      "bandwidth has fallen the algebraic observer is the LESO.");
+      "The PID has the gains that correspond to the ADRC with LESO, so both react to slow signals "
+      "in the same way. If a sample is missing, the PID holds the last one; the observers predict, "
+      "and then correct with the gain that belongs to the length of the gap. The ADRC is also "
+      "given the derivatives of the sine, which this PID cannot use. The PID is not retuned: its "
+      "change of u at 3.2 s is noise, and so is most of the change of the others (in the steady "
+      "state without noise it is 1e-14, see limits_and_gaps). Once its bandwidth has fallen, the "
+      "algebraic observer equals the LESO.");
   return report.finish();
 }

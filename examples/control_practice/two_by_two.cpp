@@ -92,8 +92,8 @@ Run simulate(const C& controller) {
 int main(int argc, char** argv) {
   Report report(argc, argv, folder, "two_by_two",
                 about("Two inputs, two outputs",
-                      "A second-order and a first-order channel coupled through their inputs: "
-                      "decoupled by B0^-1, and as two single loops. Sampled, 2 ms."));
+                      "A channel of order 2 and one of order 1, coupled through their inputs: "
+                      "decoupled by B0^-1, and as two separate loops. Sampled at 2 ms."));
   const Run decoupled = simulate(Mimo::make(config()).value());
 
   const auto matrix = config().input_matrix;
@@ -134,8 +134,8 @@ int main(int argc, char** argv) {
 
   Figure figure("two_by_two", {.rows = 2, .columns = 2, .panel_height = 190});
   figure.caption(
-      "Steps of r_1 at 0.5 s and r_2 at 2 s, disturbances at 3 s and 4.5 s. B0 is ten to twenty "
-      "percent off; the rest of the coupling is disturbance.");
+      "Steps of r_1 at 0.5 s and r_2 at 2 s, disturbances at 3 s and 4.5 s. B0 is wrong by ten to "
+      "twenty percent; the observers estimate the remaining coupling as a disturbance.");
   auto& y1 = figure.panel(0, 0).y_label("y_1 (-)").x_range(0, 6).legend(Legend::above).name("y1");
   auto& y2 = figure.panel(0, 1).y_label("y_2 (-)").x_range(0, 6).name("y2");
   auto& u1 = figure.panel(1, 0).x_label("t (s)").y_label("u_1 (V)").x_range(0, 6).name("u1");

@@ -17,10 +17,10 @@
 namespace guards {
 
 inline esokit::examples::About about(std::string title, std::string description) {
-  return {.paper_title = "Guards for the bad day",
+  return {.paper_title = "Guards against failures in operation",
           .citation =
-              "No paper: how loops fail in practice although the numerics are right, bad without a "
-              "guard and good with it",
+              "No paper. How loops fail in practice even if the numerics are right, without and "
+              "with a guard",
           .link = "",
           .title = std::move(title),
           .description = std::move(description)};

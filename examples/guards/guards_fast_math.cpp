@@ -52,9 +52,9 @@ Run run(Step&& step) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  Report report(
-      argc, argv, "guards", "fast_math",
-      about("A measurement that is no number", "Under -ffast-math, by hand and by esokit."));
+  Report report(argc, argv, "guards", "fast_math",
+                about("A measurement that is no number",
+                      "A hand-written observer and esokit, both compiled with -ffast-math."));
   double z0 = 0, z1 = 0, z2 = 0, held = 0;
   const Run bare = run([&](double y) {
     constexpr double w = 150;
@@ -81,8 +81,8 @@ int main(int argc, char** argv) {
   report.expect(name, "error at the end, esokit", off, off < 1e-6, "none");
   Figure figure("fast_math", {.rows = 1, .columns = 1, .panel_height = 220});
   figure.caption(
-      "One measurement of 1000 is NaN, at 0.3 s. std::isnan is compiled away, and the observer by "
-      "hand never finds back; for esokit it is a missing sample.");
+      "One measurement of 1000 is NaN, at 0.3 s. The compiler removes std::isnan, and the "
+      "hand-written observer never recovers; for esokit it is a missing sample.");
   figure.panel(0, 0)
       .x_label("t (s)")
       .y_label("y")

@@ -103,13 +103,11 @@ void ground(Report& report) {
   const double rate = peak(guarded, guarded.y, 2, 3);
   report.expect(name, "largest rate without (rad/s)", rate_bare, rate_bare > 2, "above 2");
   report.expect(name, "largest rate with hold (rad/s)", rate, rate < 0.35, "below 0.35");
-  draw(
-      report, "ground",
-      "Two seconds on the ground, the stick 0.3 rad/s off its centre. Without a guard the observer "
-      "takes the ground for a load, u goes to its limit, and the craft jumps when it is free. "
-      "Held, "
-      "dhat stands still, and the loop begins where it stood.",
-      bare, guarded, "rate (rad/s)", "u");
+  draw(report, "ground",
+       "Two seconds on the ground, with the stick 0.3 rad/s off its centre. Without a guard the "
+       "observer takes the ground for a load, u goes to its limit, and the craft jumps when it "
+       "takes off. With hold, dhat does not change, and the loop starts from rest.",
+       bare, guarded, "rate (rad/s)", "u");
 }
 
 /// b0 goes with the throttle; the law is told nothing, the truth, or the inverse.
@@ -148,10 +146,10 @@ void throttle(Report& report) {
                 "more than twice that of no law");
   Figure figure("throttle", {.rows = 1, .columns = 1, .panel_height = 240});
   figure.caption(
-      "Rate steps while the throttle, and with it b, jumps between 0.35 and 2.2 times that of "
-      "hovering every half second. With the b0 of each sample the loop is the same everywhere; "
-      "with "
-      "the inverse law it is worse than with none.");
+      "Rate steps while the throttle, and with it b, jumps every half second between 0.35 and 2.2 "
+      "times its value at hover. If b0 is set to b at each sample, the loop is the same at every "
+      "throttle. If the dependence on the throttle is inverted, the loop is worse than with a "
+      "constant b0.");
   figure.panel(0, 0)
       .x_label("t (s)")
       .y_label("rate (rad/s)")
@@ -180,7 +178,7 @@ void bound(Report& report) {
   };
   const Trace bare = fly(false);
   const Trace guarded = fly(true);
-  const std::string name = "disturbance beyond what the airframe may be given";
+  const std::string name = "disturbance beyond what the loop may compensate";
   const double most_bare = peak(bare, bare.d, 0, 2);
   const double most = peak(guarded, guarded.d, 0, 2);
   report.expect(name, "largest dhat / b0 without", most_bare, most_bare > 0.75, "above 0.75");
@@ -191,11 +189,10 @@ void bound(Report& report) {
   report.check_reference(name, "steady error of the rate under it (rad/s)",
                          hover * 0.3 * (1.0 / 25 + 1.0 / 200), steady, Tolerance(0.03),
                          "(d - bound) (1 / omega_c + 1 / (2 omega_o))");
-  draw(
-      report, "bound",
-      "A load of 0.8 b0 for 0.4 s, dhat bounded to 0.5 b0: what is above it is a steady error, and "
-      "bounded() says so.",
-      bare, guarded, "rate (rad/s)", "dhat / b0", true);
+  draw(report, "bound",
+       "A load of 0.8 b0 for 0.4 s, with dhat limited to 0.5 b0: the load above this bound causes "
+       "a steady error, and bounded() reports it.",
+       bare, guarded, "rate (rad/s)", "dhat / b0", true);
 }
 
 /// An unstable airframe whose mixer is at its end for 0.4 s and gives a moment of its own.
@@ -277,8 +274,9 @@ void pinned(Report& report) {
                   follows ? "more than saved: no guard for this" : "reported");
   }
   draw(report, "pinned",
-       "An attitude loop of an unstable airframe. From 1 to 1.4 s the mixer gives a moment of its "
-       "own. Without the flag dhat explains it, and the loop departs when it is free again.",
+       "The attitude loop of an unstable airframe. From 1 to 1.4 s the mixer delivers a moment "
+       "that does not depend on u. Without set_pin, dhat compensates this moment, and control is "
+       "lost when the mixer is free again.",
        bare, guarded, "angle (rad)", "dhat (rad/s^2)", true);
 }
 
@@ -321,9 +319,8 @@ void flight(Report& report) {
                 "nothing, or that a load drives u: there is one");
   Figure figure("flight", {.rows = 2, .columns = 1, .panel_height = 180});
   figure.caption(
-      "One flight: on the ground to 1 s, hover, a load from 2 s, full throttle from 3 to 4 s, "
-      "descent, "
-      "landed at 5.5 s. The thrust, and with it b, changes by a factor of 3.");
+      "One flight: on the ground until 1 s, hover, a load from 2 s on, full throttle from 3 to 4 "
+      "s, descent, landed at 5.5 s. The thrust, and with it b, changes by a factor of 3.");
   figure.panel(0, 0)
       .y_label("rate (rad/s)")
       .legend(Legend::above)
@@ -336,9 +333,10 @@ void flight(Report& report) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  Report report(argc, argv, "guards", "flight",
-                about("A rate loop on its bad days",
-                      "Ground, throttle, gust, mixer, and a whole axis of a flight controller."));
+  Report report(
+      argc, argv, "guards", "flight",
+      about("A rate loop on its bad days",
+            "Ground, throttle, gust, mixer, and a complete axis of a flight controller."));
   ground(report);
   throttle(report);
   bound(report);

@@ -100,9 +100,9 @@ void scaled(Report& report) {
   const double rest = peak(good, good.u, 1, 2);
   report.expect(name, "largest u at rest, told what was applied", rest, rest < 0.01, "below 0.01");
   draw(report, "scaled",
-       "The observer is told a fifth of the u that the actuator got: dhat makes up for the rest, "
-       "late, "
-       "and the loop cycles at full range. Told what was applied, it is at rest.",
+       "The observer is passed a fifth of the u that the actuator got: dhat compensates the rest, "
+       "but late, and the loop oscillates over the full range of u. If the applied u is passed, "
+       "the loop is at rest.",
        bad, good, "told a fifth", "told what was applied", {});
 }
 
@@ -143,7 +143,7 @@ void euler(Report& report) {
                 std::abs(good.y.back() - 0.1) < 1e-6, "none");
   draw(report, "euler",
        "omega_o = 600 rad/s at 200 Hz (omega_o T = 3) under a load. An observer by forward Euler "
-       "diverges in a few samples; sampled exactly, any omega_o T is stable.",
+       "diverges in a few samples; designed in discrete time, it is stable for any omega_o T.",
        bad, good, "forward Euler", "sampled exactly", {-0.05, 0.25});
 }
 
@@ -180,12 +180,11 @@ void stop(Report& report) {
   report.expect(name, "undershoot on the way back without", swing_bad, true, "reported");
   report.expect(name, "undershoot on the way back with it", swing, swing <= swing_bad + 1e-4,
                 "not more");
-  draw(
-      report, "stop",
-      "The axis hits its stop at 0.3 at speed, is pressed against it to 0.8 s, and goes back. The "
-      "impact is a disturbance of many times what the actuator can do; bounded, dhat keeps to what "
-      "may be answered.",
-      bad, good, "without", "dhat bounded", {}, true);
+  draw(report, "stop",
+       "The axis hits its stop at 0.3 at speed, is pressed against it until 0.8 s, and goes back. "
+       "The impact is a disturbance many times larger than the actuator can compensate; with the "
+       "bound, dhat stays within what the actuator can do.",
+       bad, good, "without", "dhat bounded", {}, true);
 }
 
 // ---- wrong b0, found
@@ -345,10 +344,11 @@ void find(Report& report) {
   }
   report.expect("healthy, 5,000 runs of 10 s", "false alarms", alarms, alarms <= 1, "at most one");
   report.table("found",
-               "Faults found by b / b0, in time: within 0.2 s of the first u that tells "
-               "something, or is at a limit, after a step, 0.4 s in a regulator",
-               {"runs", "count", "u told something", "found within 2 s", "in time (% of those)",
-                "u at a limit", "in time (% of those)", "false alarms"},
+               "Faults found by the estimate of b / b0. In time means within 0.2 s (step) or 0.4 s "
+               "(regulator) after u first moves enough, or "
+               "reaches a limit",
+               {"runs", "count", "u moved enough", "found within 2 s", "in time (% of those)",
+                "u reached a limit", "in time (% of those)", "false alarms"},
                rows);
   Trace bad, good;
   (void)watch(Wrong::sign, true, 7, 1.5, &bad);
@@ -360,9 +360,8 @@ void find(Report& report) {
   report.expect(name, "largest y without", away, away > 3 * safe, "runs away");
   report.expect(name, "largest y with it", safe, true, "reported");
   draw(report, "safe",
-       "A wrong sign of b0: status is ok throughout, and the axis runs away. Diagnosed, the output "
-       "is "
-       "taken to zero, and what moves it then is bias and friction alone.",
+       "A wrong sign of b0: the status is ok all the time, and the axis diverges. With the "
+       "diagnosis u is set to zero; after that only bias and friction move the axis.",
        bad, good, "without", "diagnosed, u = 0", {});
 }
 
@@ -389,7 +388,8 @@ void probe(Report& report) {
 int main(int argc, char** argv) {
   Report report(argc, argv, "guards", "servo",
                 about("A servo on its bad days",
-                      "A u that is not the actuator's, forward Euler, a stop, a wrong b0."));
+                      "An observer that gets another u than the actuator, forward Euler, a hard "
+                      "stop, a wrong b0."));
   scaled(report);
   euler(report);
   stop(report);

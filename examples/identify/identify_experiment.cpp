@@ -118,15 +118,16 @@ CsvRow alone(double friction) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  Report report(argc, argv, "identify", "identify_experiment",
-                {.paper_title = "From a log to a model",
-                 .citation = "No paper: order, b0, lag, dead time, friction and noise from logs, "
-                             "with intervals",
-                 .link = "",
-                 .title = "No log yet: a relay",
-                 .description = "A servo that nobody knows: relay within limits, b0 and latency, "
-                                "ADRC from there on.",
-                 .order = 3});
+  Report report(
+      argc, argv, "identify", "identify_experiment",
+      {.paper_title = "From a log to a model",
+       .citation =
+           "No paper. Order, b0, lag, dead time, friction and noise from logs, with intervals",
+       .link = "",
+       .title = "If there is no log: a relay experiment",
+       .description =
+           "An unknown servo: a relay within limits finds b0 and latency, then ADRC takes over.",
+       .order = 3});
   auto experiment = Experiment<2>::make(relay).value();
   std::optional<Controller> controller;
   Servo servo(0.1);
@@ -224,7 +225,7 @@ int main(int argc, char** argv) {
 
   std::vector<CsvRow> lines;
   for (const double friction : {0.0, 0.05, 0.1, 0.2, 0.3, 0.5}) lines.push_back(alone(friction));
-  report.table("friction", "What friction does to the numbers of the relay (true: 40, 8 ms)",
+  report.table("friction", "Effect of friction on the results of the relay (true: b0 = 40, 8 ms)",
                {"friction (% of b0 A)", "b0", "half width", "lag and dead time (ms)",
                 "friction found (%)", "verdict"},
                lines);

@@ -87,8 +87,8 @@ class Machines {
   void finish() {
     if (lines_.empty()) return;
     report_.table("machines",
-                  "What was found, with 95 % intervals, beside what is known. Refused logs show "
-                  "their numbers, too: they say why",
+                  "What was found, with 95 % intervals, and what is known. The table also shows "
+                  "the numbers of refused logs",
                   {"log", "known", "order", "b0", "lag (ms)", "dead time (ms)", "noise", "averaged",
                    "verdict"},
                   lines_);
@@ -118,8 +118,8 @@ class Machines {
     Figure figure("plateaus", {.rows = (all.size() + 1) / 2, .columns = 2, .panel_height = 150});
     figure.caption(
         "b0 over the bandwidth w of the filter, with two standard errors; lag, dead time and pole "
-        "fitted anew at each. Dashed: where b0 was read. A machine is known where the curve is "
-        "flat; where it is not, b0 is one number a band.");
+        "are fitted anew at each w. Dashed: where b0 was taken. Where the curve is flat, b0 is "
+        "known; where it is not, b0 depends on the frequency.");
     for (std::size_t i = 0; i < all.size(); ++i) {
       figure.panel(i / 2, i % 2)
           .title(all[i].title)
@@ -354,9 +354,9 @@ void swing_table(Report& report, const std::vector<Swing>& swings) {
                      number_text(s.b0 / s.weighed, 2), number_text(s.gravity, 3), s.verdict});
   }
   report.table("torque",
-               "The pendulum's torque reads high, by itself: m g l / J, which has no torque in it, "
-               "is that of the weighed parts, b0 is not, nor is it by the energy that the torque "
-               "should have given",
+               "The drive of the pendulum reports too much torque: m g l / J, which does not "
+               "depend on the torque, is that of the weighed parts. b0 is too small, and so is b0 "
+               "from the energy that the torque should have supplied",
                {"run", "b0", "b0 by energy", "b0 weighed", "found over weighed",
                 "m g l / J (weighed 20.0 and 19.9)", "verdict"},
                lines);
@@ -530,15 +530,16 @@ int main(int argc, char** argv) {
       rest.push_back(argv[i]);
     }
   }
-  Report report(static_cast<int>(rest.size()), rest.data(), "identify", "identify_machines",
-                {.paper_title = "From a log to a model",
-                 .citation = "No paper: order, b0, lag, dead time, friction and noise from logs, "
-                             "with intervals",
-                 .link = "",
-                 .title = "Real machines",
-                 .description = "Logs of real machines, identified, beside what is independently "
-                                "known of them.",
-                 .order = 2});
+  Report report(
+      static_cast<int>(rest.size()), rest.data(), "identify", "identify_machines",
+      {.paper_title = "From a log to a model",
+       .citation =
+           "No paper. Order, b0, lag, dead time, friction and noise from logs, with intervals",
+       .link = "",
+       .title = "Real machines",
+       .description = "Logs of real machines are identified, and the results are compared with "
+                      "what is known independently.",
+       .order = 2});
   try {
     Machines machines(report, data);
     std::vector<Swing> swings;

@@ -130,15 +130,16 @@ int main(int argc, char** argv) {
       rest.push_back(argv[i]);
     }
   }
-  Report report(static_cast<int>(rest.size()), rest.data(), "identify", "identify_random",
-                {.paper_title = "From a log to a model",
-                 .citation = "No paper: order, b0, lag, dead time, friction and noise from logs, "
-                             "with intervals",
-                 .link = "",
-                 .title = "Random plants",
-                 .description = "Logs of random plants in a closed loop, identified, beside what "
-                                "made them. Fixed seeds.",
-                 .order = 1});
+  Report report(
+      static_cast<int>(rest.size()), rest.data(), "identify", "identify_random",
+      {.paper_title = "From a log to a model",
+       .citation =
+           "No paper. Order, b0, lag, dead time, friction and noise from logs, with intervals",
+       .link = "",
+       .title = "Random plants",
+       .description = "Logs of random plants in a closed loop are identified, and the results are "
+                      "compared with the true plants. Fixed seeds.",
+       .order = 1});
   const auto many = [&](const char* label, Kind kind, std::size_t count, std::uint64_t first) {
     return run_parallel(label, logs > 0 ? logs : count,
                         [=](std::size_t i) { return identified(first + i, kind); });
@@ -200,8 +201,8 @@ int main(int argc, char** argv) {
   line("without excitation", summarise(still), still.size());
   report.table(
       "random",
-      "All logs, and of those not refused how far off. Wrongly refused: order right and "
-      "b0 within 10 %; wrongly accepted: neither",
+      "All logs, and the errors of those that were accepted. Wrongly refused: although the order "
+      "is right and b0 within 10 %; wrongly accepted: although they are not",
       {"logs", "count", "accepted (%)", "b0: median error (%)", "95th percentile (%)",
        "in its 95 % interval (%)", "lag and dead time: median error (ms)", "noise within 5 % (%)",
        "order right (%)", "wrongly refused (%)", "wrongly accepted (%)"},
@@ -213,7 +214,7 @@ int main(int argc, char** argv) {
   lines.clear();
   for (const auto& [name, count] : reasons) lines.push_back({name, std::to_string(count)});
   if (!lines.empty())
-    report.table("refusals", "Why random plants were refused", {"field", "logs"}, lines);
+    report.table("refusals", "Why logs of random plants were refused", {"field", "logs"}, lines);
 
   std::vector<double> half, error;
   for (const Outcome& o : plain) {
@@ -223,8 +224,8 @@ int main(int argc, char** argv) {
   }
   Figure figure("errors", {.rows = 1, .columns = 1, .panel_height = 260});
   figure.caption(
-      "Each accepted log: error of b0 over the half width of its 95 % interval. Points below the "
-      "line are covered.");
+      "Each accepted log: error of b0 divided by the half width of its 95 % interval. Below the "
+      "line, the true b0 is within the interval.");
   figure.panel(0, 0)
       .log_x()
       .log_y()

@@ -27,10 +27,10 @@ using esokit::examples::number_text;
 inline constexpr double sample_time = 1e-3;  ///< T, s
 
 inline esokit::examples::About about(std::string title, std::string description) {
-  return {.paper_title = "What you know goes into the model",
+  return {.paper_title = "Putting what you know into the model",
           .citation =
-              "No paper: actuator, sensor and swinging disturbances in the observer's "
-              "model, with their price",
+              "No paper. Actuator, sensor and oscillating disturbances in the model of the "
+              "observer: what they gain and cost",
           .link = "",
           .title = std::move(title),
           .description = std::move(description)};

@@ -155,22 +155,23 @@ void axis(Report& report, const std::filesystem::path& file, bool pitch, std::ve
 int main(int argc, char** argv) {
   Report report(argc, argv, "models", "crazyflie",
                 about("A quadrotor's motors",
-                      "Logs of a Crazyflie in free flight: the disturbance that is found with the "
-                      "motor's lag ignored, and in the model."));
+                      "Logs of a Crazyflie in free flight: the estimated disturbance if the lag of "
+                      "the motors is ignored, and if it is in the model."));
   const auto root = std::filesystem::path(__FILE__).parent_path().parent_path().parent_path();
   const auto file = (root / ".." / "shared" / "data" / "crazyflie_motor_lag" / "roll_pitch.csv")
                         .lexically_normal();
   if (!std::filesystem::exists(file)) {
     std::printf("skipped: there is no %s\n", file.c_str());
-    report.remark("The measured log was not there when this page was made.");
+    report.remark("The measured log was not available when this page was made.");
     return report.finish();
   }
   std::vector<CsvRow> lines;
   Figure figure("crazyflie", {.rows = 2, .columns = 1, .panel_height = 200});
   figure.caption(
-      "Crazyflie, roll and pitch manoeuvres, b0 from the bench of another airframe, lag 72 ms from "
-      "the log's authors, omega_o = 50 rad/s. What is called disturbance without the lag is mostly "
-      "the motors that have not got there yet.");
+      "Crazyflie, roll and pitch manoeuvres, b0 from a bench test of another airframe, lag of 72 "
+      "ms from the authors of the log, omega_o = 50 rad/s. Without the lag in the model, most of "
+      "the estimated disturbance is the difference between command and thrust while the motors "
+      "accelerate.");
   axis(report, file, false, lines, figure);
   axis(report, file, true, lines, figure);
   report.add(figure);

@@ -114,8 +114,8 @@ void motor_lag(Report& report) {
   };
   Figure figure("motor_lag", {.rows = 1, .columns = 2, .panel_height = 240});
   figure.caption(
-      "Step of a rate loop whose motor lags by 20 ms, at equal time from 0 to 90 %. Left 64 ms, "
-      "right 35 ms, which the loop that ignores the lag reaches at the edge of stability only. "
+      "Step of a rate loop whose motor lags by 20 ms, at equal rise time (0 to 90 %): left 64 ms; "
+      "right 35 ms, which the loop that ignores the lag reaches only at the limit of stability. "
       "Dashed: the motor is 30 % slower or faster than the model.");
   int column = 0;
   for (const double rise : {0.064, 0.035}) {
@@ -177,7 +177,8 @@ void motor_lag(Report& report) {
   }
   report.add(figure);
   report.table("motor_lag",
-               "The price: u's deviation for noise of 1 on y, and the margins. omega_o = 100 rad/s",
+               "The price: standard deviation of u for noise with a standard deviation of 1 on y, "
+               "and the margins. omega_o = 100 rad/s",
                {"motor lag", "omega_c (rad/s)", "rise (ms)", "overshoot (%)", "sd of u",
                 "modulus margin", "delay margin (ms)"},
                lines);
@@ -188,10 +189,10 @@ void gyro_filter(Report& report) {
   std::vector<CsvRow> lines;
   Figure figure("gyro_filter", {.rows = 1, .columns = 1, .panel_height = 240});
   figure.caption(
-      "The rate itself after a load step, gyro filter of 5 ms: both loops bear 5 ms more delay. "
-      "With the filter in the model the observer may be twice as fast, and the load moves the rate "
-      "half as far; what is estimated is the rate, not what the filter shows of it. Dashed: the "
-      "filter is 30 % slower or faster than the model.");
+      "The true rate after a load step, with a gyro filter of 5 ms; both loops tolerate 5 ms of "
+      "additional delay. With the filter in the model the observer may be twice as fast, and the "
+      "load moves the rate half as far; the observer estimates the rate itself and not the output "
+      "of the filter. Dashed: the filter is 30 % slower or faster than the model.");
   for (const auto& [tau, low, high, ratio] :
        {std::array{0.002, 174.0, 238.0, 1.4}, std::array{0.005, 132.0, 264.0, 2.0},
         std::array{0.010, 100.0, 264.0, 2.6}}) {
@@ -249,8 +250,9 @@ void gyro_filter(Report& report) {
   }
   report.add(figure);
   report.table("gyro_filter",
-               "The highest omega_o (omega_c half of it) with which the loop bears 5 ms more "
-               "delay; u's deviation for noise of 1 on the filtered rate",
+               "The highest omega_o (with omega_c = omega_o / 2) for which the loop tolerates 5 ms "
+               "of additional delay; standard deviation of u for noise with a standard deviation "
+               "of 1 on the filtered rate",
                {"gyro filter", "omega_o (rad/s)", "sd of u", "modulus margin", "delay margin (ms)"},
                lines);
 }
@@ -258,9 +260,10 @@ void gyro_filter(Report& report) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  Report report(argc, argv, "models", "lag",
-                about("Motor lag and gyro filter",
-                      "A rate loop, the lag ignored, in the model, and 30 % off the model."));
+  Report report(
+      argc, argv, "models", "lag",
+      about("Motor lag and gyro filter",
+            "A rate loop, with the lag ignored, in the model, and 30 % different from the model."));
   motor_lag(report);
   gyro_filter(report);
   return report.finish();

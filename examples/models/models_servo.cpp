@@ -88,14 +88,14 @@ Found found(const LogFile& log, const std::array<double, Resonators>& frequencie
 int main(int argc, char** argv) {
   Report report(argc, argv, "models", "servo",
                 about("A servo that follows a sine",
-                      "The log of a geared DC servo: how much of what disturbs it comes back with "
-                      "every period, and is left to a resonator."));
+                      "The log of a geared DC servo: how much of its disturbance repeats with "
+                      "every period and is taken by a resonator."));
   const auto root = std::filesystem::path(__FILE__).parent_path().parent_path().parent_path();
   const auto file =
       (root / ".." / "shared" / "data" / "servo_relay_pid" / "pid_sine.csv").lexically_normal();
   if (!std::filesystem::exists(file)) {
     std::printf("skipped: there is no %s\n", file.c_str());
-    report.remark("The measured log was not there when this page was made.");
+    report.remark("The measured log was not available when this page was made.");
     return report.finish();
   }
   const LogFile log(file, {"u_pct", "y_deg"});
@@ -128,9 +128,9 @@ int main(int argc, char** argv) {
   }
   Figure figure("servo", {.rows = 1, .columns = 1, .panel_height = 240});
   figure.caption(
-      "A DC servo on a sine of 0.1 Hz, omega_o = 3 rad/s: the disturbance that is found (friction, "
-      "dead band), and what is left of it beside a resonator at that frequency. Dashed: the "
-      "resonator 30 % too high.");
+      "A DC servo that follows a sine of 0.1 Hz, omega_o = 3 rad/s: the estimated disturbance "
+      "(friction, dead band), and what remains of it if a resonator at that frequency takes its "
+      "part. Dashed: the frequency of the resonator is 30 % too high.");
   figure.panel(0, 0)
       .x_label("t (s)")
       .y_label("dhat (deg/s)")
@@ -141,7 +141,7 @@ int main(int argc, char** argv) {
       .line(t, c, {.name = "30 % too high", .color = Color::sky, .dash = Dash::dashed});
   report.add(figure);
   report.table(
-      "servo", "What is left of dhat beside the resonators, after 15 s",
+      "servo", "What remains of dhat without the part of the resonators, after 15 s",
       {"resonators", "sd of the rest (deg/s)", "share taken (%)", "RMS of the innovation (deg)"},
       lines);
   return report.finish();

@@ -153,9 +153,9 @@ void cogging(Report& report) {
                 far.rms > 0.3 * none.rms, "most of the gain is gone");
   Figure figure("cogging", {.rows = 2, .columns = 1, .panel_height = 220});
   figure.caption(
-      "What dhat is off by while the speed goes from 40 to 160 rad/s and back in 8 s, the cogging "
-      "torque of the shaft's angle and its second harmonic with it. omega_o = 60 rad/s. Below: a "
-      "speed told wrong.");
+      "Error of dhat while the speed, and with it the frequency of a cogging torque and of its "
+      "second harmonic, goes from 40 to 160 rad/s and back in 8 s. omega_o = 60 rad/s. Bottom: "
+      "with a wrong speed.");
   figure.panel(1, 0)
       .x_label("t (s)")
       .y_label("dhat − d (rad/s^2)")
@@ -176,8 +176,8 @@ void cogging(Report& report) {
   report.add(figure);
   report.table(
       "cogging",
-      "RMS of dhat - d after 1 s: what the motion leaves, and what noise of 10 "
-      "urad on the angle adds; margins of a loop at 80 rad/s with omega_c = 15 rad/s",
+      "RMS of dhat - d after 1 s without noise, and what noise of 10 urad on the angle adds; "
+      "margins of a loop with omega_c = 15 rad/s at a cogging frequency of 80 rad/s",
       {"observer", "motion (rad/s2)", "noise (rad/s2)", "modulus margin", "delay margin (ms)"},
       lines);
 }
@@ -265,20 +265,19 @@ void ripple(Report& report) {
     report.expect(name, "noise of dhat, of the chain's", noise_of(eso) / quiet,
                   noise_of(eso) < 3.3 * quiet, "3.2 at most");
   }
-  report.table(
-      "ripple",
-      "A resonator with s = w0 beside the chain, omega_o = 60 rad/s: noise of dhat, and what is "
-      "left of a sine at, 2 % and 30 % beside the frequency it was made for; margins of the loop "
-      "with the resonator, omega_c = 15 rad/s",
-      {"w0 (rad/s)", "noise, chain = 1", "left at w0", "2 % beside (%)", "30 % beside (%)",
-       "chain (%)", "chain of equal noise (%)", "modulus margin", "delay margin (ms)"},
-      lines);
+  report.table("ripple",
+               "A resonator with s = w0 compared with the chain, omega_o = 60 rad/s: noise of "
+               "dhat, and what remains of a sine at the frequency w0 of the resonator, 2 % and 30 "
+               "% away from it; margins of the loop with the resonator, omega_c = 15 rad/s",
+               {"w0 (rad/s)", "noise, chain = 1", "left at w0", "2 % beside (%)", "30 % beside (%)",
+                "chain (%)", "chain of equal noise (%)", "modulus margin", "delay margin (ms)"},
+               lines);
 
   Figure figure("ripple", {.rows = 1, .columns = 1, .panel_height = 260});
   figure.caption(
-      "What is left of a disturbance, over its frequency: a resonator at 30 rad/s with capture "
-      "bandwidths of a third, one and three times w0, beside the chain. Wider forgives more and "
-      "lets more noise through.");
+      "What remains of a disturbance, over its frequency: a resonator at 30 rad/s with capture "
+      "bandwidths of a third, one and three times w0, compared with the chain. A wider one "
+      "tolerates a larger error of the frequency and lets more noise through.");
   auto& panel = figure.panel(0, 0);
   panel.log_x().log_y().x_label("w (rad/s)").y_label("abs(1 − dhat/d)").name("left");
   panel.legend(Legend::bottom_right).y_range(1e-3, 3.0);
@@ -305,10 +304,10 @@ void ripple(Report& report) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  Report report(argc, argv, "models", "swing",
-                about("Cogging and ripple",
-                      "Disturbances that swing: with the speed of a shaft, and at a known "
-                      "frequency."));
+  Report report(
+      argc, argv, "models", "swing",
+      about("Cogging and ripple",
+            "Disturbances that oscillate with the speed of a shaft, and at a known frequency."));
   cogging(report);
   ripple(report);
   return report.finish();

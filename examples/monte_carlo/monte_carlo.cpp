@@ -123,15 +123,15 @@ int main(int argc, char** argv) {
       rest.push_back(argv[i]);
     }
   }
-  Report report(static_cast<int>(rest.size()), rest.data(), "monte_carlo", "drive",
-                {.paper_title = "Monte Carlo",
-                 .citation = "No paper: a design at random plants, and a paper's noise, in "
-                             "100,000 runs",
-                 .title = "A design at 100,000 random drives",
-                 .description = "One controller, made for one drive, at drives with another "
-                                "inertia, friction, lag and noise: how many keep what was wished, "
-                                "which do not, and the worst of them again.",
-                 .order = 1});
+  Report report(
+      static_cast<int>(rest.size()), rest.data(), "monte_carlo", "drive",
+      {.paper_title = "Monte Carlo",
+       .citation = "No paper. 100,000 runs: one design on random plants, and the noise of a paper",
+       .title = "One design on 100,000 random drives",
+       .description = "One controller, designed for one drive, controls drives with another "
+                      "inertia, friction, lag and noise: how many meet the requirements, which do "
+                      "not, and the worst run.",
+       .order = 1});
 
   // All numbers go into the statistics; the picture takes what the first runs violate.
   auto settings = config(runs);
@@ -178,8 +178,7 @@ int main(int argc, char** argv) {
     }
     if (i == 0 || i == 2) {
       report.expect("random drives", number.name() + ", the worst run again", again,
-                    again == number.largest(),
-                    "the number of the run among the others, to the bit");
+                    again == number.largest(), "the same number as in the study, to the bit");
     }
   }
   report.check("random drives", "all four kept (%)", std::nullopt,
@@ -189,9 +188,9 @@ int main(int argc, char** argv) {
 
   Figure figure("drives", {.rows = 2, .columns = 2, .panel_height = 230});
   figure.caption("Of the first " + std::to_string(drawn) +
-                 " drives those that violate each of the four wishes, by their gain and their lag; "
-                 "grey: what keeps all of them. The cross is the drive that the design was made "
-                 "for. Friction and noise differ, too.");
+                 " drives, those that violate each of the four requirements, over their gain and "
+                 "their lag; grey: drives that meet all of them. The cross is the drive for which "
+                 "the controller was designed. Friction and noise differ, too.");
   for (std::size_t i = 0; i < numbers; ++i) {
     figure.panel(i / 2, i % 2)
         .title(wishes[i])
@@ -210,9 +209,9 @@ int main(int argc, char** argv) {
 
   Figure worst("worst", {.rows = 2, .columns = 1, .panel_height = 200});
   worst.caption(
-      "Forty of the drives (grey), the one of the design without noise (black), and the "
-      "run with the largest overshoot (a lag that the observer takes for a "
-      "load that it drives up), and the one that dips the deepest without overshoot.");
+      "Forty of the drives (grey), the drive of the design without noise (black), the run with the "
+      "largest overshoot (the observer takes the effect of the lag for a load), and the run that "
+      "the load moves most among those without overshoot.");
   auto& position = worst.panel(0, 0).y_label("y (rad)").legend(Legend::above).name("position");
   auto& input = worst.panel(1, 0).x_label("t (s)").y_label("u (-)").name("input");
   const auto add = [&](const auto& run, const Style& style) {

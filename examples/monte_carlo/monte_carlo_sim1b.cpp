@@ -197,13 +197,14 @@ int main(int argc, char** argv) {
       rest.push_back(argv[i]);
     }
   }
-  Report report(static_cast<int>(rest.size()), rest.data(), "monte_carlo", "sim1b",
-                {.paper_title = "Monte Carlo",
-                 .title = "Sim1B of paper 1 with very many seeds",
-                 .description = "The noisy run of paper 1 with very many seeds, in packs: how the "
-                                "criteria of its Table 2 scatter, and where the printed numbers, "
-                                "of one run each, lie among them.",
-                 .order = 2});
+  Report report(
+      static_cast<int>(rest.size()), rest.data(), "monte_carlo", "sim1b",
+      {.paper_title = "Monte Carlo",
+       .title = "Sim1B of paper 1 with very many seeds",
+       .description = "The noisy simulation of paper 1 with very many seeds, in packs: how the "
+                      "criteria of its Table 2 scatter, and where in this scatter the printed "
+                      "numbers are, each of which is from a single run.",
+       .order = 2});
 
   // The same ODE as the program of the paper: without noise, and by the mean over its seeds.
   const auto check_quiet = [&](int levels, const sim::MonteCarloOutcome<double>& quiet) {
@@ -227,8 +228,8 @@ int main(int argc, char** argv) {
   std::vector<CsvRow> rows;
   Figure figure("scatter", {.rows = 3, .columns = 3, .panel_height = 120});
   figure.caption("Sim1B with " + std::to_string(runs) +
-                 " seeds: how the criteria of Table 2 are distributed for p = 1, 2, 3. Dashed: the "
-                 "printed numbers, each of one run.");
+                 " seeds: distribution of the criteria of Table 2 for p = 1, 2, 3. Dashed: the "
+                 "printed numbers, each from a single run.");
   constexpr std::array colors = {Color::blue, Color::vermillion, Color::green};
   for (std::size_t p = 0; p < 3; ++p) {
     for (std::size_t i = 0; i < 3; ++i) {

@@ -113,8 +113,8 @@ int main(int argc, char** argv) {
   Report report(
       argc, argv, folder, "deployed",
       about("Sim1A and Sim1B in a controller (our addition)",
-            "The sampled observers at T = 10, 1 and 0.1 ms beside the continuous simulation: "
-            "exact sampled observer, input held, law once a sample.",
+            "The sampled observers at T = 10, 1 and 0.1 ms compared with the continuous "
+            "simulation: exact sampled observer, input held, control law once per sample.",
             4, true));
 
   std::array<std::array<paper1::Series, 4>, 3> runs;  // continuous, then the sample times
@@ -150,17 +150,16 @@ int main(int argc, char** argv) {
     return std::log2(away[0] / away[1]);
   });
   for (std::size_t p = 0; p < 3; ++p) {
-    report.expect(level_names[p] + ", T -> 0", "order in T of the difference of the ways",
-                  orders[p], std::abs(orders[p] - 1.0) < 0.1,
-                  "first order; measured between 25 and 12.5 us");
+    report.expect(level_names[p] + ", T -> 0",
+                  "order in T of the difference to the continuous simulation", orders[p],
+                  std::abs(orders[p] - 1.0) < 0.1, "first order; measured between 25 and 12.5 us");
   }
-  report.table(
-      "criteria",
-      "Sim1A: criteria of Table 2 simulated continuously and in a controller, and the greatest "
-      "difference of the output between the two",
-      {"case", "1e3 int |e| dt", "int u^2 dt", "int |z3 error| dt",
-       "max |y - y of the continuous one|"},
-      lines);
+  report.table("criteria",
+               "Sim1A: criteria of Table 2, simulated continuously and with sampled observers, and "
+               "the largest difference of the output between the two",
+               {"case", "1e3 int |e| dt", "int u^2 dt", "int |z3 error| dt",
+                "max |y - y of the continuous one|"},
+               lines);
 
   const auto largest_after = [](const paper1::Series& run) {  // the disturbance sets in at 3.5 s
     double most = 0.0;
@@ -170,13 +169,13 @@ int main(int argc, char** argv) {
     return most;
   };
   report.remark(
-      "With p = 1 at 10 ms int |z3 error| dt is smaller than in the continuous "
-      "simulation, though e is larger: the error of the estimate is smaller nearly "
-      "throughout (the largest in the sine after 3.6 s " +
+      "With p = 1 at 10 ms int |z3 error| dt is smaller than in the continuous simulation, "
+      "although e is larger: the error of the estimate is smaller nearly all the time (the largest "
+      "in the sine after 3.6 s " +
       shown_text(largest_after(runs[0][1])) + " instead of " +
       shown_text(largest_after(runs[0][0])) +
-      "). A likely reason, not tested apart: a sampled observer corrects with the present y, "
-      "while the control is held for T.");
+      "). A likely reason, which was not tested separately: a sampled observer corrects with the "
+      "present y, while the control is held for T.");
 
   // With noise: at T = 10 ms each sample has a noise value of its own.
   const auto noisy = run_parallel("Sim1B deployed, seeds", 9 * seeds, [](std::size_t job) {
@@ -201,12 +200,10 @@ int main(int argc, char** argv) {
 
   Figure figure("deployed", {.rows = 3, .columns = 3, .panel_height = 150});
   figure.caption(
-      "Sim1A in a controller: the sampled observers at T = 10, 1 and 0.1 ms beside the continuous "
-      "simulation, "
-      "for p = 1, 2, 3 (left to right). At 10 ms omega_o T is 2.5 for p = 1 and 1.4 for the last "
-      "level of p = 3. Legends as in the first row; 1 ms and 0.1 ms lie on the continuous curve "
-      "(black) almost "
-      "everywhere.");
+      "Sim1A with sampled observers at T = 10, 1 and 0.1 ms, and the continuous simulation "
+      "(black), for p = 1, 2, 3 (left to right). At 10 ms omega_o T is 2.5 for p = 1 and 1.4 for "
+      "the last level of p = 3. The curves for 1 ms and 0.1 ms coincide with the continuous one "
+      "almost everywhere. The legend of the first row is valid for all.");
   constexpr std::array colors = {Color::black, Color::vermillion, Color::blue, Color::green};
   constexpr std::array dashes = {Dash::solid, Dash::solid, Dash::dashed, Dash::dotted};
   const std::array<std::string, 4> names = {"continuous", "10 ms", "1 ms", "0.1 ms"};

@@ -97,7 +97,7 @@ std::vector<double> difference(const CriterionCurve& x, const CriterionCurve& y)
 int main(int argc, char** argv) {
   Report report(argc, argv, folder, "fig5",
                 about("Comparison over all bandwidths (Fig. 5)",
-                      "The difference of int |z3 error| between two observers over both their "
+                      "The difference of int |z3 error| between two observers over their two "
                       "bandwidths, without and with noise. Continuous simulation, RK4 at 1 ms.",
                       2));
 
@@ -183,13 +183,12 @@ int main(int argc, char** argv) {
 
   Figure figure("fig5", {.rows = 3, .columns = 2, .panel_height = 230});
   figure.caption(
-      "Fig. 5: J_p = int |z3 error| dt, difference between an observer with more levels (upwards) "
-      "and one with fewer (to the right); blue: more levels estimate better. Left without noise, "
-      "right with noise (mean over " +
+      "Fig. 5: difference of J_p = int |z3 error| dt between an observer with more levels "
+      "(vertical axis) and one with fewer (horizontal axis); blue: more levels estimate better. "
+      "Left: without noise; right: with noise (mean over " +
       std::to_string(seeds) +
-      " seeds). Dashed: equal quality without noise; dots: the bandwidths of Table 1. The colours "
-      "of "
-      "a panel end where 95 % of its map lie.");
+      " seeds). Dashed: equal quality without noise; dots: the bandwidths of Table 1. The colour "
+      "scale of a panel covers 95 % of its values.");
   for (std::size_t row = 0; row < maps.size(); ++row) {
     const Map& map = maps[row];
     for (const bool with_noise : {false, true}) {
@@ -224,7 +223,7 @@ int main(int argc, char** argv) {
 
   report.additions();
   Figure curves("criterion", {.rows = 1, .columns = 2, .panel_height = 210});
-  curves.caption("What Fig. 5 is made of: J_p over the bandwidth of the first level.");
+  curves.caption("The data of Fig. 5: J_p over the bandwidth of the first level.");
   for (const bool with_noise : {false, true}) {
     auto& panel = curves.panel(0, with_noise ? 1 : 0)
                       .title(with_noise ? "with noise" : "without noise")

@@ -148,17 +148,19 @@ int main(int argc, char** argv) {
   }
   report.diagram("diagram1", "Fig. 1: disturbance rejection with an extended state observer.",
                  loop_diagram());
-  report.diagram("diagram2",
-                 "Fig. 2: the cascade observer. Only the slow first level sees the noise.",
-                 cascade_diagram());
+  report.diagram(
+      "diagram2",
+      "Fig. 2: the cascade observer. Only the slow first level gets the noisy measurement.",
+      cascade_diagram());
   report.table("1", "Table 1: bandwidths of the levels, omega_oi = 2^(i-1) omega_o1 (rad/s)",
                {"observer", "omega_o1", "omega_o2", "omega_o3"}, bandwidths);
   report.comparison("2", "Table 2: criteria over 0..5 s; Sim1B: mean (standard deviation) over " +
                              std::to_string(seeds) + " seeds");
   report.remark(
-      "What reproduces the numbers: the observer is driven by the error y_d − y with input gain "
-      "−ghat, d* enters through g, the reference steps at 0.2 s, all states start at zero, and e "
-      "contains the noise. The noise is band-limited white noise of power 1e-9, held over 10 ms.");
+      "The numbers are reproduced with these settings: the observer is driven by the error y_d − y "
+      "with input gain −ghat, d* enters through g, the reference steps at 0.2 s, all states start "
+      "at zero, and e contains the noise. The noise is band-limited white noise of power 1e-9, "
+      "held over 10 ms.");
 
   report.add(draw("fig3",
                   "Fig. 3 (Sim1A): tracking, control and disturbance estimate without "
@@ -166,7 +168,7 @@ int main(int argc, char** argv) {
                   quiet, false));
   report.add(draw("fig4",
                   "Fig. 4 (Sim1B): the same with measurement noise (one seed). The standard "
-                  "observer hands the noise on to u, the cascades do not.",
+                  "observer passes the noise on to u, the cascades do not.",
                   noisy, true));
 
   const auto mean_b = [&](std::size_t p, double Criteria::*number) {
@@ -188,7 +190,7 @@ int main(int argc, char** argv) {
   const double control_drop = drop(&Criteria::control);
   const double estimate_drop = drop(&Criteria::estimate);
   report.claim(
-      {.text = "With measurement noise the cascades estimate better and spend less control.",
+      {.text = "With measurement noise the cascades estimate better and need less control effort.",
        .where = "Table 2, B",
        .holds = control_drop > 0.0 && estimate_drop > 0.0 ? Claim::Holds::yes : Claim::Holds::no,
        .here = "int |z3 error| falls by " + number_text(100.0 * estimate_drop, 2) +
@@ -197,8 +199,8 @@ int main(int argc, char** argv) {
   report.correction({.where = "(26)",
                      .printed = "b' in front of d'; Gamma_ij for j < i-1 (misprint)",
                      .correct = "b d'; Gamma_ij = b b'(l_{j+1} - l_j) c' for j < i-1",
-                     .why = "the printed one leaves a residual; (28) to (30) then carry "
-                            "omega_j (alpha^{n+1} - 1) instead of omega_j"});
+                     .why = "the printed one leaves a residual; (28) to (30) then contain omega_j "
+                            "(alpha^{n+1} - 1) instead of omega_j"});
   report.correction({.where = "(9) to (30)",
                      .printed = "kappa_max the largest kappa (3 for n = 2)",
                      .correct = "the 2-norm of kappa (4.36)",
@@ -233,20 +235,20 @@ int main(int argc, char** argv) {
       report.expect(name, "int u^2 dt above the paper's (%)", excess,
                     std::round(excess) >= low && std::round(excess) <= high,
                     "expected " + number_text(low, 3) + " to " + number_text(high, 3) +
-                        " %: the text's form is not what the paper's numbers come from");
+                        " %: the numbers of the paper do not come from the form in its text");
       lines.push_back({name, number_text(ours.error, 5), number_text(ours.control, 5),
                        number_text(ours.estimate, 4), number_text(excess, 3)});
     }
   }
   report.table(
       "literal",
-      "Variant, Sim1A as the text states it (observer driven by y, d* beside g u): int u^2 "
-      "is far from the paper's",
+      "Variant: Sim1A as described in the text (observer driven by y, d* added to g u). int u^2 is "
+      "far from that of the paper",
       {"case", error_metric, control_metric, estimate_metric, "int u^2 dt above the paper's (%)"},
       lines);
   report.not_reproduced(
-      "Sim1A by the letter of the text (observer driven by y, d* beside g u) gives an int u^2 that "
-      "is " +
+      "Sim1A as described in the text (observer driven by y, d* added to g u) gives an int u^2 "
+      "that is " +
           number_text(least, 2) + " to " + number_text(most, 2) +
           " % above Table 2 (step at 0.2 s or at 0 s). The error-based form with d* through g "
           "gives "
@@ -254,7 +256,8 @@ int main(int argc, char** argv) {
       Miss::other_reading);
 
   Figure variant("literal", {.rows = 1, .columns = 2, .panel_height = 200});
-  variant.caption("Sim1A, p = 2: the set-up that gives Table 2 beside the one of the text.");
+  variant.caption(
+      "Sim1A, p = 2: the set-up that reproduces Table 2, and the set-up that the text describes.");
   paper1::Series text;
   (void)run_generic(2, table1[1], 0.0, 0,
                     {.error_based = false,

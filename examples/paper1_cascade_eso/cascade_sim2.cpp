@@ -213,7 +213,7 @@ std::string with_deviation(const Statistics& seeds_of) {
 void reproduce(Report& report) {
   const std::string reason =
       "26000 set-ups of an independent search do not give this column; over 0..40 s ours has its "
-      "size, but not its numbers";
+      "order of magnitude, but not its numbers";
   std::vector<CsvRow> whole;
   for (std::size_t p = 0; p < 3; ++p) {
     const auto ours = run_pvtol(levels(p), paper_setup(p, 0.0));
@@ -240,7 +240,7 @@ void reproduce(Report& report) {
   const double noisy_control = statistics_of(b[0], &PvtolCriteria::control).mean;
   const double cascade_control = statistics_of(b[1], &PvtolCriteria::control).mean;
   report.claim(
-      {.text = "On the aircraft too the cascades keep the noise out of the control.",
+      {.text = "On the aircraft, too, the cascades keep the noise out of the control.",
        .where = "Table 4, B",
        .holds = cascade_control < 0.01 * noisy_control ? Claim::Holds::yes : Claim::Holds::no,
        .here = "int v1^2 + v2^2 is " + shown_text(noisy_control) + " with p = 1 and " +
@@ -264,27 +264,26 @@ void reproduce(Report& report) {
     }
     bandwidths.push_back(row);
   }
-  report.table(
-      "3",
-      "Table 3: bandwidths of the levels (rad/s), omega_oi = alpha^(i-1) omega_o1: with the "
-      "alpha = 2.5 that gives Table 4, and with the printed alpha = 3",
-      {"observer", "omega_o1", "omega_o2, alpha = 2.5", "omega_o3, alpha = 2.5",
-       "omega_o2, alpha = 3", "omega_o3, alpha = 3"},
-      bandwidths);
+  report.table("3",
+               "Table 3: bandwidths of the levels (rad/s), omega_oi = alpha^(i-1) omega_o1, with "
+               "the alpha = 2.5 that reproduces Table 4, and with the printed alpha = 3",
+               {"observer", "omega_o1", "omega_o2, alpha = 2.5", "omega_o3, alpha = 2.5",
+                "omega_o2, alpha = 3", "omega_o3, alpha = 3"},
+               bandwidths);
   report.comparison("4", "Table 4: criteria over 5..40 s; Sim2B: mean (standard deviation) over " +
                              std::to_string(seeds) + " seeds");
   report.remark(
-      "What reproduces the numbers: no wind, alpha = 2.5, the gains in the printed order, RK4 at "
-      "1 ms; the observers of p = 1 and 2 start from zero, those of p = 3 from the true states.");
+      "The numbers are reproduced with these settings: no wind, alpha = 2.5, the gains in the "
+      "printed order, RK4 at 1 ms; the observers with p = 1 and 2 start from zero, those with p = "
+      "3 from the true states.");
   report.not_reproduced(
-      "Table 4's column of the tracking error is not reproduced: 3.237, 3.092, 2.990 in the "
+      "The column of the tracking error in Table 4 is not reproduced: 3.237, 3.092, 2.990 in the "
       "paper, " +
       whole[0][2] + ", " + whole[1][2] + ", " + whole[2][2] +
       " here. An independent search tried 26000 set-ups (axes, sums, squares, weights, windows, "
-      "starts, limits, the error-based form). A magnitude of 3 fits a window from 0 s, start-up "
-      "included (" +
-      whole[0][3] + ", " + whole[1][3] + ", " + whole[2][3] +
-      " here), but that does not give its numbers either.");
+      "initial states, limits, the error-based form). A window from 0 s, which includes the "
+      "start-up, gives the right order of magnitude (" +
+      whole[0][3] + ", " + whole[1][3] + ", " + whole[2][3] + " here), but not the numbers.");
   report.table("error", "The tracking error column of Table 4, Sim2A: the paper's and ours",
                {"observer", "paper", "ours, 5..40 s", "ours, 0..40 s"}, whole);
 
@@ -294,20 +293,20 @@ void reproduce(Report& report) {
       draw_tracking("fig6", "Fig. 6 (Sim2A): path and tracking errors without noise.", quiet));
   report.add(draw_control("fig7",
                           "Fig. 7 (Sim2A): control and errors of the total disturbances without "
-                          "noise. The peaks of the start are cut off.",
+                          "noise. The peaks at the start are cut off.",
                           quiet, {.v1 = {0.0, 4.0}, .v2 = {-2.0, 4.0}, .estimate = {-0.05, 0.1}}));
   report.add(draw_tracking(
       "fig8", "Fig. 8 (Sim2B): path and tracking errors with noise (one seed).", noisy));
-  auto figure9 = draw_control(
-      "fig9",
-      "Fig. 9 (Sim2B): control and errors of the total disturbances with noise (one seed); below, "
-      "the cascades alone. The peaks of the start are cut off.",
-      noisy,
-      {.v1 = {0.0, 4.0},
-       .v2 = {-150.0, 450.0},
-       .estimate = {-100.0, 300.0},
-       .zoom = {20.0, 20.2},
-       .noisy = true});
+  auto figure9 =
+      draw_control("fig9",
+                   "Fig. 9 (Sim2B): control and errors of the total disturbances with noise (one "
+                   "seed); bottom: only the cascades. The peaks at the start are cut off.",
+                   noisy,
+                   {.v1 = {0.0, 4.0},
+                    .v2 = {-150.0, 450.0},
+                    .estimate = {-100.0, 300.0},
+                    .zoom = {20.0, 20.2},
+                    .noisy = true});
   report.add(figure9);
 }
 
@@ -335,8 +334,8 @@ void show_step(Report& report) {
         return number_text(100.0 * (1.0 - ours / paper), 2);
       };
       report.not_reproduced(
-          "Sim2B with p = 1 depends on the step: the paper's numbers are those of a fixed step of "
-          "1 ms. Converged, at 0.1 ms, they are " +
+          "Sim2B with p = 1 depends on the step of the integration: the numbers of the paper are "
+          "those of a fixed step of 1 ms. With a step of 0.1 ms, which is small enough, they are " +
               below(table4_b[0].control, control.mean) + " and " +
               below(table4_b[0].estimate, estimate.mean) + " % lower.",
           Miss::not_published);
@@ -347,10 +346,11 @@ void show_step(Report& report) {
                              Tolerance::deviations(3.0, estimate).or_relative(0.03));
     }
   }
-  report.table("step",
-               "Sim2B, p = 1, against the step of the integration (" + std::to_string(count) +
-                   " seeds, the same at each step): the paper's 27813 and 1121 are those of 1 ms",
-               {"step (ms)", control_metric, estimate_metric}, lines);
+  report.table(
+      "step",
+      "Sim2B, p = 1, over the step of the integration (" + std::to_string(count) +
+          " seeds, the same at each step): the 27813 and 1121 of the paper are those of 1 ms",
+      {"step (ms)", control_metric, estimate_metric}, lines);
 }
 
 /// By the letter of the text p = 2 and 3 do not fly.
@@ -374,17 +374,17 @@ void show_literal(Report& report) {
                      number_text(ours.end, 4)});
   }
   report.table("literal",
-               "The text's set-up (wind, alpha = 3, observers from zero): v1 below 0.05 means that "
-               "M is all but singular",
+               "The set-up of the text (wind, alpha = 3, observers started from zero): v1 below "
+               "0.05 means that M is almost singular",
                {"observer", "outcome", "v1 < 0.05 first at (s)", "end of the run (s)"}, lines);
   report.not_reproduced(
-      "By the letter of the text (wind, alpha = 3, observers started from zero) the aircraft does "
-      "not fly with p = 2 and p = 3: the start-up peak of the observers drives v1 to 0.",
+      "With the set-up of the text (wind, alpha = 3, observers started from zero) the aircraft "
+      "does not fly with p = 2 and p = 3: the start-up peak of the observers drives v1 to 0.",
       Miss::other_reading);
   Figure figure("literal", {.rows = 1, .columns = 2, .panel_height = 200});
   figure.caption(
-      "The text's set-up (wind, alpha = 3, observers from zero): the thrust v_1 comes to 0, where "
-      "M is singular, and the run is lost.");
+      "The set-up of the text (wind, alpha = 3, observers started from zero): the thrust v_1 "
+      "reaches 0, where M is singular, and the run diverges.");
   auto& v1 = figure.panel(0, 0).x_label("t (s)").y_label("v_1 (m/s²)").name("v1");
   auto& error = figure.panel(0, 1).x_label("t (s)").y_label("|e| (m)").name("error");
   for (std::size_t p = 0; p < 3; ++p) {
@@ -432,10 +432,10 @@ void show_flying(Report& report) {
                            "Our addition: the printed wind, alpha = 3, observers started from the "
                            "true states; no noise.",
                            runs));
-  report.add(draw_control("wind_control",
-                          "Our addition: control and errors of the total "
-                          "disturbances under the printed wind.",
-                          runs, {.v1 = {0.0, 4.0}, .v2 = {-2.0, 6.0}, .estimate = {-0.2, 0.4}}));
+  report.add(draw_control(
+      "wind_control",
+      "Our addition: control and errors of the total disturbances with the printed wind.", runs,
+      {.v1 = {0.0, 4.0}, .v2 = {-2.0, 6.0}, .estimate = {-0.2, 0.4}}));
 }
 
 }  // namespace

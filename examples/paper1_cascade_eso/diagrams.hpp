@@ -94,7 +94,8 @@ inline std::string cascade_diagram() {
       .arrow("550,190 850,190")
       .words(740, 212, "dhat: what all levels found")
       .words(430, 250,
-             "Level i also gets the disturbances of the levels before it, as part of its input.")
+             "Level i also gets the disturbance estimates of the levels before it, as part of its "
+             "input.")
       .svg();
 }
 

@@ -200,7 +200,7 @@ int main(int argc, char** argv) {
   Report report(
       argc, argv, folder, "dc_servo",
       about("DC servo drive (Figs 2-6, Table 2)",
-            "Tracking of sin t from five initial states, linear against algebraic "
+            "Tracking of sin t from five initial states with a linear and with the algebraic "
             "observer. Continuous simulation: plant, observer and law as one ODE, RK4 at 1 ms.",
             1));
   report.cover("fig3");
@@ -215,9 +215,10 @@ int main(int argc, char** argv) {
                        .why = "from the derivation; Eqs. (35) to (51) are right as printed"});
   }
   report.remark(
-      "Not stated in the paper, but needed for its numbers: b0 = 1.5 b; before epsilon the FSB "
-      "estimates are zero and the law stays on; the linear observer starts at zero; max |u| is of "
-      "the mean of u over an RK4 step. Columns v and d are of the estimates.");
+      "These settings are not in the paper, but needed for its numbers: b0 = 1.5 b; before epsilon "
+      "the estimates of the algebraic observer (FSB) are zero and the control law is active; the "
+      "linear observer starts at zero; max |u| is that of the mean of u over an RK4 step. The "
+      "columns v and d are those of the estimates.");
 
   const auto linear = linear_observer<2>(bandwidth, b0);
   const BlankedFilter<2> shifted(bandwidth, q, b0, epsilon);
@@ -263,12 +264,12 @@ int main(int argc, char** argv) {
                     "Table 2: largest velocity and disturbance estimate and largest control", rows,
                     {"LESO max |v|", "LESO max |d|", "LESO max |u|", "FSB max |v|", "FSB max |d|",
                      "FSB max |u|"});
-  report.remark("Of the 30 entries " + std::to_string(cut_off) +
-                " agree in every printed digit when ours are cut off, as the paper's are, and " +
-                std::to_string(equal) + " when they are cut off or rounded. The others:" + others +
-                " Both depend on how the switch at epsilon falls into the stages of a step: a "
-                "switch at the step's boundary gives 58.358 and 53.8239, a step of 0.1 ms 58.3574 "
-                "and 53.8239.");
+  report.remark(
+      "Of the 30 entries " + std::to_string(cut_off) +
+      " agree in every printed digit when ours are cut off, as those of the paper are, and " +
+      std::to_string(equal) + " when they are cut off or rounded. The others:" + others +
+      " Both depend on how the stages of the integrator treat the switch at epsilon: a switch at "
+      "the boundary of a step gives 58.358 and 53.8239, a step of 0.1 ms 58.3574 and 53.8239.");
 
   // The sampled observer beside it.
   std::vector<CsvRow> lines;
@@ -302,12 +303,11 @@ int main(int argc, char** argv) {
                   "within 10 % of the continuous simulation");
   }
   report.additions();
-  report.table(
-      "deployed",
-      "The same in a controller (our addition): observers sampled at 1 ms, input held. "
-      "Without measurement noise there is nothing to wait for, and the default blanking of "
-      "two samples does without the jump at epsilon",
-      {"case", "observer", "max |v|", "max |d|", "max |u|"}, lines);
+  report.table("deployed",
+               "The same with sampled observers (our addition) at 1 ms, input held. Without "
+               "measurement noise there is no reason to wait, and the default blanking of two "
+               "samples avoids the jump at epsilon",
+               {"case", "observer", "max |v|", "max |d|", "max |u|"}, lines);
 
   // Figures, row 3 of the table.
   const std::string start = " y(0) = 0.5, y'(0) = -0.3; right: the first 0.3 s.";
@@ -333,30 +333,27 @@ int main(int argc, char** argv) {
                  .line(t, linear_drawn.v_estimate, leso)
                  .line(t, shifted_drawn.v_estimate, fsb)
                  .figure);
-  report.add(
-      Drawing(
-          "fig4",
-          "Fig 4: error of the velocity estimate. That of the FSB observer is the "
-          "velocity itself until epsilon = 0.02 s; then both lag behind the disturbance alike." +
-              start,
-          "velocity error (rad/s)")
-          .line(t, linear_drawn.v_error, leso)
-          .line(t, shifted_drawn.v_error, fsb)
-          .figure);
-  report.add(
-      Drawing(
-          "fig5",
-          "Fig 5: estimate of the total disturbance. The dotted lines are the true ones, a x2 + "
-          "(b - b0) u, which differ as the controls do." +
-              start,
-          "disturbance (rad/s^2)")
-          .line(t, linear_drawn.d_estimate, leso)
-          .line(t, shifted_drawn.d_estimate, fsb)
-          .line(t, linear_drawn.d,
-                {.name = "true (LESO)", .color = Color::orange, .dash = Dash::dotted})
-          .line(t, shifted_drawn.d,
-                {.name = "true (FSB)", .color = Color::sky, .dash = Dash::dotted})
-          .figure);
+  report.add(Drawing("fig4",
+                     "Fig 4: error of the velocity estimate. That of the FSB observer is the "
+                     "velocity itself until epsilon = 0.02 s; after that both observers lag behind "
+                     "the disturbance by the same amount." +
+                         start,
+                     "velocity error (rad/s)")
+                 .line(t, linear_drawn.v_error, leso)
+                 .line(t, shifted_drawn.v_error, fsb)
+                 .figure);
+  report.add(Drawing("fig5",
+                     "Fig 5: estimate of the total disturbance. The dotted lines are the true "
+                     "disturbances, a x2 + (b - b0) u, which differ because u differs." +
+                         start,
+                     "disturbance (rad/s^2)")
+                 .line(t, linear_drawn.d_estimate, leso)
+                 .line(t, shifted_drawn.d_estimate, fsb)
+                 .line(t, linear_drawn.d,
+                       {.name = "true (LESO)", .color = Color::orange, .dash = Dash::dotted})
+                 .line(t, shifted_drawn.d,
+                       {.name = "true (FSB)", .color = Color::sky, .dash = Dash::dotted})
+                 .figure);
   report.add(Drawing("fig6", "Fig 6: control." + start, "u (V)")
                  .line(t, linear_drawn.u, leso)
                  .line(t, shifted_drawn.u, fsb)

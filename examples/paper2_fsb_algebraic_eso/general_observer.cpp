@@ -198,20 +198,21 @@ void add_row(Page& page) {
 int main(int argc, char** argv) {
   Report report(argc, argv, folder, "general_observer",
                 about("Any order, any number of extended states (our addition)",
-                      "n = 1..4 and m = 1..3 on polynomial disturbances, error against time, "
-                      "AlgebraicEso beside LinearEso. Sampled observers, 10 ms.",
+                      "n = 1..4 and m = 1..3 with polynomial disturbances: error over time of "
+                      "AlgebraicEso and LinearEso. Sampled observers at 10 ms.",
                       4, true));
   report.remark(
-      "Both observers start at zero, the plant does not. On a disturbance of degree below m the "
-      "algebraic observer is exact from sample N - 1 = n + m - 1 on; what is left is the rounding "
-      "of the measurement, magnified n times by 1/T, and it averages out. On one of degree m both "
-      "end with the same lag, and the algebraic one begins without.");
+      "Both observers start at zero, the plant does not. If the disturbance is a polynomial of "
+      "degree below m, the algebraic observer is exact from sample N - 1 = n + m - 1 on; what "
+      "remains is the rounding of the measurement, amplified n times by 1/T, which averages out. "
+      "If it is of degree m, both observers end with the same lag, and the algebraic one starts "
+      "without it.");
   Figure figure("general", {.rows = 3, .columns = 4, .panel_height = 150});
   figure.title("solid: disturbance of degree m - 1; dashed: of degree m");
   figure.caption(
       "Error of the disturbance estimate for n = 1..4 (columns) and m = 1..3 (rows). Solid: a "
-      "disturbance of degree m - 1. Dashed: one of degree m. lambda = omega_o = 8 rad/s, q = 2 "
-      "rad/s, T = 10 ms.");
+      "disturbance of degree m - 1. Dashed: a disturbance of degree m. lambda = omega_o = 8 rad/s, "
+      "q = 2 rad/s, T = 10 ms.");
   std::vector<CsvRow> lines;
   Page page{report, figure, lines, {}};
   for (int k = 0; k * period <= shown; ++k) page.time.push_back(k * period);

@@ -204,18 +204,17 @@ Figure bandwidth_figure(const std::string& name, const std::string& caption,
 }  // namespace
 
 int main(int argc, char** argv) {
-  Report report(
-      argc, argv, folder, "multirotor_altitude",
-      about("Multirotor altitude (Figs 7-12)",
-            "Step of 10 m under an unknown constant force, right and wrong input gain, "
-            "with and without noise. Continuous simulation: plant, observer and law as one "
-            "ODE, RK4 at 1 ms.",
-            2));
+  Report report(argc, argv, folder, "multirotor_altitude",
+                about("Multirotor altitude (Figs 7-12)",
+                      "Step of 10 m under an unknown constant force, with a right and a wrong "
+                      "input gain, with and without noise. Continuous simulation: plant, observer "
+                      "and law as one ODE, RK4 at 1 ms.",
+                      2));
   std::vector<Figure> wrong_gain;  // Figs 11 and 12, after 9 and 10
   report.remark(
-      "The paper prints no numbers here, and neither the start, the set-point, q, epsilon nor the "
-      "list of bandwidths. Used: z(0) = 0, z_d = 10 m, q = 0.1 rad/s, epsilon = 0.02 s, bandwidths "
-      "1, 2, 3, 5, 7 rad/s. References are those of an independent simulation.");
+      "The paper prints no numbers here, nor the initial state, the set-point, q, epsilon or the "
+      "list of bandwidths. We used z(0) = 0, z_d = 10 m, q = 0.1 rad/s, epsilon = 0.02 s and "
+      "bandwidths of 1, 2, 3, 5, 7 rad/s. The references are those of an independent simulation.");
 
   // ---- without noise
   struct Case {
@@ -275,11 +274,10 @@ int main(int argc, char** argv) {
     show(bandwidth_figure(
         "fig" + second,
         "Fig " + second + ": algebraic observer, " + gain + " input gain." +
-            (c == 0
-                 ? std::string(" The force is known from epsilon on, whatever lambda: all curves "
-                               "are one.")
-                 : std::string(" The disturbance now holds (b - b0) u, which changes, and the "
-                               "bandwidth that is left matters.")),
+            (c == 0 ? std::string(" The force is known from epsilon on, whatever lambda is: all "
+                                  "curves coincide.")
+                    : std::string(" The disturbance now contains (b - b0) u, which changes, so the "
+                                  "final bandwidth matters.")),
         "{/Symbol l}", Legend::bottom_right, shifted));
   }
   report.additions();
@@ -342,25 +340,24 @@ int main(int argc, char** argv) {
   }
   report.table("noise",
                "Noise of 0.8 m at 1 kHz, mean (standard deviation) over 20 seeds. Right after a "
-               "small epsilon the algebraic observer does peak: its bandwidth is then still "
-               "lambda + 3/epsilon",
+               "small epsilon the algebraic observer does peak, because its bandwidth is then "
+               "still lambda + 3/epsilon",
                {"case", "formula: sd of d at epsilon (m/s^2)", "peak of d error (m/s^2)", "ratio",
                 "max |u| (N)", "overshoot (%)", "late rms of d (m/s^2)"},
                noise_lines);
   report.not_reproduced(
-      "\"No peaking\" holds without noise. With the example's own noise of 0.8 m the algebraic "
+      "\"No peaking\" holds without noise. With the noise of 0.8 m of this example the algebraic "
       "estimate of the disturbance peaks by thousands of m/s^2 right after epsilon = 0.02 s, and "
-      "the control with it; epsilon has to be chosen by the noise (about 1 s here).",
+      "so does the control; epsilon has to be chosen by the noise (about 1 s here).",
       Miss::claim);
   const double soon_peak = of_setting(1, &Run::peak).mean;
-  report.claim(
-      {.text = "The algebraic observer does not peak.",
-       .where = "text",
-       .holds = soon_peak < 1.0 ? Claim::Holds::yes : Claim::Holds::partly,
-       .here = "Without noise it does not. With the noise of 0.8 m its disturbance estimate "
-               "is off by " +
-               shown_text(soon_peak) + " m/s^2 right after epsilon = 0.02 s.",
-       .figure = "fig10"});
+  report.claim({.text = "The algebraic observer does not peak.",
+                .where = "text",
+                .holds = soon_peak < 1.0 ? Claim::Holds::yes : Claim::Holds::partly,
+                .here = "Without noise it does not. With the noise of 0.8 m the error of its "
+                        "disturbance estimate is " +
+                        shown_text(soon_peak) + " m/s^2 right after epsilon = 0.02 s.",
+                .figure = "fig10"});
 
   // In a controller: the blanking from the noise level.
   constexpr double tolerated = 1.0;  // m/s^2
@@ -381,8 +378,8 @@ int main(int argc, char** argv) {
   report.check("AlgebraicEso, noise levels given", "blanking (s)", std::nullopt,
                deployed.blanking());
   report.table("deployed",
-               "The same in a controller (our addition): AlgebraicEso at 1 kHz told of a noise of "
-               "0.8 m and a tolerated error of 1 m/s^2 chooses its blanking itself",
+               "The same with sampled observers (our addition): AlgebraicEso at 1 kHz computes its "
+               "blanking from the noise of 0.8 m and a tolerated error of 1 m/s^2",
                {"blanking (s)", "peak of d error (m/s^2)", "max |u| (N)", "overshoot (%)",
                 "late rms of d (m/s^2)"},
                {{number_text(deployed.blanking(), 3), with_deviation(deployed_peak),
@@ -396,9 +393,9 @@ int main(int argc, char** argv) {
   const Run& patient = noisy[4 * seeds];  // epsilon = 1
   Figure fig9("fig9", {.rows = 1, .columns = 2, .panel_height = 260});
   fig9.caption(
-      "Fig 9: altitude under noise, LESO with omega_o = 7 and FSB with lambda = 1, and what the "
-      "wait for epsilon costs: for 1 s the control does not know of the force. The panel of u is "
-      "clipped at 15 N: right after epsilon = 0.02 s the algebraic observer's peak drives u to " +
+      "Fig 9: altitude with noise, LESO with omega_o = 7 and FSB with lambda = 1, and the price of "
+      "a long epsilon: for 1 s the control does not know the force. The panel of u is clipped at "
+      "15 N: right after epsilon = 0.02 s the peak of the algebraic observer drives u to " +
       shown_text(of_setting(1, &Run::control_peak).mean) + " N (mean of the seeds).");
   auto& z = fig9.panel(0, 0).x_label("t (s)").y_label("z (m)").legend(Legend::bottom_right);
   auto& u = fig9.panel(0, 1).x_label("t (s)").y_label("u (N)").legend(Legend::top_right);
@@ -406,10 +403,10 @@ int main(int argc, char** argv) {
   u.y_range(-15.0, 15.0).name("control");
   Figure fig10("fig10", {.rows = 1, .columns = 2, .panel_height = 260});
   fig10.caption(
-      "Fig 10: disturbance estimates under noise. Left: after the start; the FSB observer with "
-      "lambda = 1 is quiet. Right: the first 1.5 s on a logarithmic axis, error of the estimate: "
-      "with epsilon = 0.02 s it starts at thousands of m/s^2 and falls as the formula says "
-      "(dashed: its standard deviation).");
+      "Fig 10: disturbance estimates with noise. Left: after the start; the FSB observer with "
+      "lambda = 1 has little noise. Right: error of the estimate in the first 1.5 s on a "
+      "logarithmic axis: with epsilon = 0.02 s it starts at thousands of m/s^2 and falls according "
+      "to the formula (dashed: its standard deviation).");
   auto& d = fig10.panel(0, 0).x_label("t (s)").y_label("disturbance estimate (m/s^2)");
   auto& e = fig10.panel(0, 1).x_label("t (s)").y_label("|disturbance error| (m/s^2)");
   d.y_range(0.0, 24.0).legend(Legend::top_right).name("estimate");

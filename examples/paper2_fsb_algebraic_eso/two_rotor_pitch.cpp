@@ -119,7 +119,7 @@ struct Drawing {
   Figure figure;
   Drawing(const std::string& name, const std::string& caption, const std::string& label)
       : figure(name, {.rows = 1, .columns = 2, .panel_height = 260}) {
-    figure.caption(caption + " Stand-in: simulated, not the paper's measurement.");
+    figure.caption(caption + " Simulated, in place of the measurement of the paper.");
     figure.panel(0, 0).x_label("t (s)").y_label(label).x_range(0.0, duration).name("whole");
     figure.panel(0, 1).x_label("t (s)").x_range(0.0, shown_start).name("start");
     for (std::size_t c = 0; c < 2; ++c) figure.panel(0, c).legend(Legend::above);
@@ -137,20 +137,18 @@ struct Drawing {
 
 int main(int argc, char** argv) {
   Report report(argc, argv, folder, "two_rotor_pitch",
-                about("Two-rotor pitch rig (Figs 14-17), a stand-in",
-                      "Both observers on one simulated motion of Eq. (61), in place of the paper's "
-                      "unpublished measurement. Continuous simulation, RK4 at 1 "
-                      "ms.",
+                about("Two-rotor pitch rig (Figs 14-17), simulated",
+                      "Both observers on a simulated motion of Eq. (61), because the measurement "
+                      "of the paper is not published. Continuous simulation, RK4 at 1 ms.",
                       3));
   report.not_reproduced(
-      "Figs 14 to 17 show a measurement that is not published. What stands here is a simulation of "
-      "Eq. (61) with an inertia (0.02 kg m^2) and an input of our choice: the observers' behaviour "
-      "may be compared with the paper's, the curves may not.",
+      "Figs 14 to 17 show a measurement that is not published. Here Eq. (61) is simulated with an "
+      "inertia (0.02 kg m^2) and an input of our choice: the behaviour of the observers can be "
+      "compared with the paper, the curves cannot.",
       Miss::not_published);
   report.not_reproduced(
-      "Fig 13 is not reproduced: it belongs to no simulation whose settings we have; the settings "
-      "of "
-      "Figs 7 to 12 and Figs 14 to 17 are all there are.",
+      "Fig 13 is not reproduced, because we do not have its settings; only those of Figs 7 to 12 "
+      "and Figs 14 to 17 are known.",
       Miss::not_published);
 
   const Run linear = run(linear_observer<2>(bandwidth, 1.0 / inertia), 0.0);
@@ -202,8 +200,7 @@ int main(int argc, char** argv) {
   Figure errors("fig17", {.rows = 1, .columns = 2, .panel_height = 260});
   errors.caption(
       "Fig 17: errors of the velocity and of the disturbance estimate on logarithmic axes. "
-      "Stand-in: "
-      "simulated, not the paper's measurement.");
+      "Simulated, in place of the measurement of the paper.");
   const auto magnitude = [](const std::vector<double>& values) {
     std::vector<double> result;
     for (const double value : values) result.push_back(std::max(std::abs(value), 1e-9));

@@ -203,8 +203,8 @@ int main(int argc, char** argv) {
   Report report(
       argc, argv, folder, "noise",
       about("Three observers under noise (Figs 1-4, Tables 2-8)",
-            "A second-order plant under a growing sine disturbance, controlled through "
-            "LESO, BESO and ABESO; bandwidths 4 to 10 rad/s, " +
+            "A second-order plant under a growing sine disturbance, controlled with LESO, BESO and "
+            "ABESO; bandwidths 4 to 10 rad/s, " +
                 std::to_string(seeds) + " noise seeds. Continuous simulation with a variable step.",
             1));
 
@@ -232,9 +232,8 @@ int main(int argc, char** argv) {
                            " seeds; met: within 3 standard deviations of one run, as the paper's "
                            "numbers are of one run";
   const std::string index_is =
-      "J = 100 mean(|error|) over the steps of the solver, 20 s. Printed: the observer's "
-      "equations, "
-      "noise variance, bandwidths, rho. ";
+      "J = 100 mean(|error|) over the steps of the solver, 20 s. The paper prints the equations of "
+      "the observer, the noise variance, the bandwidths and rho. ";
 
   // ---- Fig. 1
   {
@@ -243,9 +242,9 @@ int main(int argc, char** argv) {
     (void)run(leso, 7.0, 1, &series);
     Figure figure("fig1", {.rows = 1, .columns = 2, .panel_height = 200});
     figure.caption(
-        "Fig. 1: the reference and the total disturbance (LESO, w = 7). The paper draws a curve "
-        "without a formula, 1 + sin t is our guess; dashed the constant with which the tables "
-        "come out.");
+        "Fig. 1: the reference and the total disturbance (LESO, w = 7). The paper draws the "
+        "reference without a formula; 1 + sin t is our guess. Dashed: the constant that reproduces "
+        "the tables.");
     figure.panel(0, 0)
         .x_label("t (s)")
         .y_label("r (-)")
@@ -267,21 +266,22 @@ int main(int argc, char** argv) {
   // ---- Tables 2 and 3, Fig. 2
   const Three scale = common_scale();
   const std::string errors_are =
-      "Estimation errors for w = 5, 6, 7, seed 1; enlarged the start (above) and a piece of the "
-      "steady state (below); and the disturbance with its estimate at w = 7. Figs 2 to 4 have one "
-      "scale.";
+      "Estimation errors for w = 5, 6, 7, seed 1; the start (top) and a part of the steady state "
+      "(bottom) are enlarged; and the disturbance with its estimate at w = 7. Figs 2 to 4 have the "
+      "same scale.";
   const std::string rise_is =
-      ". t_r and peak are fitted: the paper's words cannot be what it tabulates: t_r is when the "
-      "error is back in [-0.01, 0.01] after its first overshoot (e_d: after its second), peak the "
-      "largest error after t_r (e_d: after 5 s)";
+      ". The definitions of t_r and peak are fitted, because those in the paper do not give its "
+      "numbers: t_r is when the error is back in [-0.01, 0.01] after its first overshoot (e_d: "
+      "after its second), peak is the largest error after t_r (e_d: after 5 s)";
   for (std::size_t w = 0; w < count; ++w) {
     const std::string name = case_of(leso, bandwidths[w]);
     for (std::size_t i = 0; i < 3; ++i) {
       const bool swapped = i == 1 && (bandwidths[w] == 8.0 || bandwidths[w] == 9.0);
       report.check_single_run(name, index_names[i], table2[i][w], linear.index(w, i),
-                              swapped ? "Table 6 prints " + number_text(table6[1][w], 4) +
-                                            " in this place, which fits: the two look exchanged"
-                                      : "",
+                              swapped
+                                  ? "Table 6 prints " + number_text(table6[1][w], 4) +
+                                        " in this place, which fits: the two seem to be exchanged"
+                                  : "",
                               swapped && bandwidths[w] == 9.0);
     }
   }
@@ -328,7 +328,7 @@ int main(int argc, char** argv) {
       const bool missed = w == w7 && i == 2;
       report.check_single_run(
           case_of(beso, bandwidths[w]), index_names[i], table4[i][w], bi.index(w, i),
-          missed ? "3.4 sd; no setting that was tried has all of Table 4 within 3"
+          missed ? "3.4 sd; no setting that we tried has all of Table 4 within 3 sd"
                  : "derivative filter of 0.02 s fitted",
           missed);
     }
@@ -336,12 +336,13 @@ int main(int argc, char** argv) {
                            bi.index(w, 2), Tolerance::deviations(1.0, bi.index(w, 2)));
   }
   judge_transient(bi, table5_rise, table5_peak);
-  report.comparison("4",
-                    "Table 4: BESO. " + index_is +
-                        "Fitted: the switching by the sign of the derivative of en (not of |en|) "
-                        "through a filter of 0.02 s, asked in every stage of the solver; " +
-                        mean,
-                    cases(beso, 0, 6), indexes);
+  report.comparison(
+      "4",
+      "Table 4: BESO. " + index_is +
+          "Fitted: it switches by the sign of the derivative of en (not of |en|), which is "
+          "filtered with 0.02 s and evaluated in every stage of the solver; " +
+          mean,
+      cases(beso, 0, 6), indexes);
   report.comparison("5", "Table 5: BESO, rise times, as in Table 3", cases(beso, 1, 3), rises);
   report.comparison("5_peaks", "Table 5: BESO, peaks", cases(beso, 1, 3), peaks);
   report.add(draw_errors("fig3", beso, scale,
@@ -370,7 +371,8 @@ int main(int argc, char** argv) {
       if (w == w7) {
         report.check_single_run(
             case_of(abeso, bandwidths[w]), rise_names[i], table8_rise[i], rise,
-            i == 1 ? "the paper's ABESO is faster than its LESO here, ours slower" : own_definition,
+            i == 1 ? "in the paper the ABESO is faster than the LESO here, ours is slower"
+                   : own_definition,
             i == 1);
       } else {
         report.check(case_of(abeso, bandwidths[w]), rise_names[i], std::nullopt, rise);
@@ -383,8 +385,8 @@ int main(int argc, char** argv) {
                         "Fitted: |en| is compared from one noise value to the next; " + mean,
                     cases(abeso, 0, 6), indexes);
   const std::string lost =
-      " (standard deviation). The paper's table was not available to us, its rise times at w = 7 "
-      "are from Table 8";
+      " (standard deviation). This table of the paper was not available to us; its rise times at w "
+      "= 7 are from Table 8";
   report.comparison("7", "Table 7: ABESO, rise times; ours: mean" + lost, cases(abeso, 1, 3),
                     rises);
   report.comparison("7_peaks", "Table 7: ABESO, peaks; ours: mean" + lost, cases(abeso, 1, 3),
@@ -415,8 +417,8 @@ int main(int argc, char** argv) {
              {true, true, true, false, true});
   reductions(bi, table8_index_over_beso, table8_rise_over_beso, {false, false, false, false, true});
   report.comparison("8",
-                    "Table 8: reductions by the ABESO at w = 7 in %, paired, seed by seed (its "
-                    "other numbers are those of Tables 2 to 6); " +
+                    "Table 8: reductions by the ABESO at w = 7 in %, from pairs of runs with the "
+                    "same seed (its other numbers are those of Tables 2 to 6); " +
                         mean,
                     quantities, {"less than the LESO (%)", "less than the BESO (%)"});
 
@@ -432,7 +434,7 @@ int main(int argc, char** argv) {
   report.check_reference("ABESO, w = 7", "mean bandwidth (rad/s)", 5.95, mean_bandwidth[w7], 0.01);
   report.expect("ABESO against LESO, w = 7", "less int |e_d| for t > 5 s (%)", in_steady,
                 std::abs(in_steady.mean) < in_steady.standard_deviation,
-                "no gain but for the transient: within a standard deviation of zero");
+                "no gain except in the transient: within a standard deviation of zero");
   report.claim({.text = "At w = 7 the ABESO has 15 % less J_ed than the LESO",
                 .where = "Table 8",
                 .holds = by_index.mean > 12.0  ? Claim::Holds::yes
@@ -441,7 +443,8 @@ int main(int argc, char** argv) {
                 .here = shown_text(by_index.mean, 15.28) + " % by the paper's index, " +
                         shown_text(by_integral.mean, 15.28) +
                         " % by the time integral; after 5 s " + shown_text(in_steady.mean, 15.28) +
-                        " %: all of it is the start. A LESO at the ABESO's mean bandwidth gains " +
+                        " %: the whole gain is at the start. A LESO with the mean bandwidth of the "
+                        "ABESO gains " +
                         shown_text(mean_by_integral.mean, 15.28) + " %",
                 .figure = "gain"});
   const auto smaller_index = [&](const Runs& ours, const Runs& base) {
@@ -476,20 +479,21 @@ int main(int argc, char** argv) {
                 .figure = "fig4"});
 
   report.not_reproduced(
-      "The indexes of Tables 2, 4 and 6 are not the time integrals that the text has, but means "
-      "over the steps of a variable-step solver: six steps more near t = 0, where e_x = 1, raise "
-      "J_ex by 0.3.",
+      "The indexes of Tables 2, 4 and 6 are not time integrals, as the text says, but means over "
+      "the steps of a variable-step solver: six more steps near t = 0, where e_x = 1, raise J_ex "
+      "by 0.3.",
       Miss::other_reading);
   report.not_reproduced(
-      "Table 4 (and 5) is that of a BESO which switches by the filtered derivative of en, not of "
+      "Tables 4 and 5 are those of a BESO that switches by the filtered derivative of en, not of "
       "|en|; the filter is not printed, 0.02 s is fitted.",
       Miss::other_reading);
   report.not_reproduced(
-      "Table 6: 8 of 21 numbers of the ABESO are missed, and with them 5 reductions of Table 8; " +
+      "Table 6: 8 of the 21 numbers of the ABESO are missed, and therefore 5 reductions of Table "
+      "8; " +
       tried + ".");
   report.not_reproduced(
-      "J_edx at w = 8 and 9 looks exchanged between Tables 2 and 6: Table 6's 14.13 and 15.63 are "
-      "the LESO's (" +
+      "J_edx at w = 8 and 9 seems to be exchanged between Tables 2 and 6: the 14.13 and 15.63 of "
+      "Table 6 are those of the LESO (" +
       shown_text(linear.index(4, 1).mean, 14.13) + " and " +
       shown_text(linear.index(5, 1).mean, 15.63) + " here).");
 
@@ -507,15 +511,17 @@ int main(int argc, char** argv) {
          number_text(mean_bandwidth[w], 3), mean_text(paired_gain(m, l, ed_integral)),
          mean_text(paired_gain(m, l, ed_transient)), mean_text(paired_gain(m, l, ed_steady))});
   }
-  report.table("gain",
-               "Where the gain is: how much less error of the disturbance the ABESO has than the "
-               "LESO of the same w, in %, paired, mean (standard deviation) over " +
-                   std::to_string(seeds) +
-                   " seeds: by the paper's index, by the time integral, and that in the two parts "
-                   "of the run. Beside it the LESO at the ABESO's mean bandwidth",
-               {"w (rad/s)", "paper", "index", "integral", "t < 5 s", "t > 5 s", "mean bandwidth",
-                "LESO at it", "t < 5 s", "t > 5 s"},
-               lines);
+  report.table(
+      "gain",
+      "When the ABESO is better: by how many % its error of the disturbance is smaller than that "
+      "of the LESO with the same w, from pairs of runs with the same seed, mean (standard "
+      "deviation) over " +
+          std::to_string(seeds) +
+          " seeds: by the index of the paper, by the time integral, and by the time integral of "
+          "the two parts of the run. For comparison, the LESO with the mean bandwidth of the ABESO",
+      {"w (rad/s)", "paper", "index", "integral", "t < 5 s", "t > 5 s", "mean bandwidth",
+       "LESO at it", "t < 5 s", "t > 5 s"},
+      lines);
 
   // Other readings of the switching.
   const Runs bi_at_steps = run_all(beso_at_steps);
@@ -549,15 +555,16 @@ int main(int argc, char** argv) {
   lines.clear();
   readings(table4, {&bi, &bi_at_steps, &bi_innovation, &bi_magnitude});
   report.table("beso_readings",
-               "Table 4 by other readings of the switching: numbers met, and mean deviation from "
-               "the printed ones. Filtered derivative of en in every stage (the table's), at the "
-               "steps only, en compared from noise value to noise value, |en| so",
+               "Table 4 with other readings of the switching rule: numbers met, and mean deviation "
+               "from the printed ones. The rule takes the filtered derivative of en in every stage "
+               "(as for the table above), the same at the steps only, en compared from one noise "
+               "value to the next, or |en| compared in this way",
                {"index", "filtered, stages", "filtered, steps", "en", "|en|"}, lines);
   lines.clear();
   readings(table6, {&adjustable, &fitted, &adjustable_innovation});
   report.table("abeso_readings",
-               "Table 6 by other readings: the printed gains with |en| (the table's), l1 = 3 w in "
-               "both modes (fitted), and the sign as the equation prints it, of en",
+               "Table 6 with other readings: the printed gains with |en| (as for the table above), "
+               "l1 = 3 w in both modes (fitted), and the sign of en, as in the printed equation",
                {"index", "printed gains, |en|", "l1 = 3 w, |en|", "printed gains, en"}, lines);
   const auto printed_gain = paired_gain(adjustable_innovation.at[w7], l7, ed_integral);
   report.check_reference("ABESO with the printed sign, w = 7", "less J_ed as time integral (%)",
@@ -567,7 +574,7 @@ int main(int argc, char** argv) {
                      .correct = "delta = rho while d |en| / dt < 0",
                      .why = "the text describes the second; with the first J_ed is " +
                             shown_text(-printed_gain.mean, 15.28) +
-                            " % more than the LESO's at w = 7"});
+                            " % more than that of the LESO at w = 7"});
 
   // The variant of the reference.
   const Runs sine = run_all(leso, bandwidths, Reference::sine);
@@ -583,7 +590,8 @@ int main(int argc, char** argv) {
     lines.push_back(row);
   }
   report.table("sine",
-               "The reference 1 + sin t: LESO beside Table 2, and how much less J_ed the ABESO has",
+               "The reference 1 + sin t: the LESO compared with Table 2, and by how much J_ed of "
+               "the ABESO is smaller",
                {"w (rad/s)", "J_ex, paper", "ours", "J_edx, paper", "ours", "J_ed, paper", "ours",
                 "ABESO: less J_ed (%)"},
                lines);
@@ -591,8 +599,8 @@ int main(int argc, char** argv) {
   Figure gains("gain", {.rows = 1, .columns = 2, .panel_height = 230});
   gains.caption(
       "Left: J_ed over the bandwidth (bands: standard deviation over the seeds; crosses: printed "
-      "in the paper). Right: how much less error of the disturbance (time integral) than the LESO "
-      "of the same w, in the two parts of the run.");
+      "in the paper). Right: by how much the error of the disturbance (time integral) is smaller "
+      "than that of the LESO with the same w, in the two parts of the run.");
   auto& left = gains.panel(0, 0).x_label("w (rad/s)").y_label("J_{ed} (10^{-2})").name("index");
   left.legend(Legend::top_left);
   const auto add = [&](const Runs& runs, Color color, Dash dash) {

@@ -198,13 +198,12 @@ Curve own_switching(double ratio, double duration) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  Report report(
-      argc, argv, folder, "stability",
-      about("Is the switching stable? (Lemmas 1 and 2)",
-            "For which ratios of the two bandwidths the error decays under any switching, "
-            "and a switching under which it grows. Continuous observers, no simulation step; the "
-            "limits also for sampled ones.",
-            2));
+  Report report(argc, argv, folder, "stability",
+                about("Is the switching stable? (Lemmas 1 and 2)",
+                      "For which ratios of the two bandwidths the error decays under any "
+                      "switching, and a switching under which it grows. Continuous observers, "
+                      "nothing is simulated; the limits also for sampled observers.",
+                      2));
 
   constexpr std::size_t sizes = 7;
   const auto found =
@@ -233,10 +232,10 @@ int main(int argc, char** argv) {
   }
   report.table(
       "limits",
-      "Least rho with a common quadratic Lyapunov function, by the closed form and by the "
-      "general test on the gain sets; for the BESO (its two bandwidths differ by rho^2); "
-      "the largest rho at which a periodic switching was found that grows; and the sampled "
-      "limits",
+      "Smallest rho with a common quadratic Lyapunov function, by the closed form and by the "
+      "general test on the gain sets; the same for the BESO (its two bandwidths differ by rho^2); "
+      "the largest rho for which a periodic switching was found that makes the error grow; and the "
+      "limits for sampled observers",
       {"N", "closed form", "test", "BESO", "grows from", "w T = 0.1", "w T = 1", "w T = 3"}, lines);
 
   const Switching bad = worst_switching<3>(0.2);
@@ -246,17 +245,17 @@ int main(int argc, char** argv) {
   report.expect("N = 3, rho = 0.7", "growth (units of w)", fair.growth, fair.growth < 0.0,
                 "no switching found that grows");
   report.remark(
-      "Below the limit no common quadratic Lyapunov function exists, and from a lower ratio on "
-      "there are periodic switchings that make the error grow. Between the two curves neither is "
-      "known. The observer's own rule decayed in every noise-free trial, but noise may make the "
-      "rule switch in any way. AdjustableBandwidthEso refuses a ratio below the certificate unless "
-      "allow_uncertified_switching is set.");
+      "Below the first limit no common quadratic Lyapunov function exists; below the second there "
+      "are periodic switchings that make the error grow. Between the two neither is proven. With "
+      "the switching rule of the observer the error decayed in every noise-free trial, but noise "
+      "may make the rule switch in any way. AdjustableBandwidthEso refuses a ratio below the first "
+      "limit unless allow_uncertified_switching is set.");
   report.claim({.text = "The error decays under any switching, for every rho",
                 .where = "Lemma 2",
                 .holds = bad.growth > 0.0 ? Claim::Holds::no : Claim::Holds::not_tested,
                 .here = "at rho = 0.2, N = 3, it grows at " + shown_text(bad.growth, 0.048) +
-                        " w under a periodic switching; certified for 1/3 < rho < 3, the paper's "
-                        "0.7 among them",
+                        " w under a periodic switching; proven for 1/3 < rho < 3, which includes "
+                        "the 0.7 of the paper",
                 .figure = "stability"});
   report.correction(
       {.where = "(9), Lemma 2",
@@ -264,16 +263,19 @@ int main(int argc, char** argv) {
        .correct = "(x - w^2 rho)(x^2 + w^2 (3 rho^2 - 8 rho + 3) x + w^4 rho^2)",
        .why = "(9) itself has these factors; two of its roots are negative for rho < 1/3, so that "
               "no common Lyapunov function exists there"});
-  report.correction({.where = "(7), (11)",
-                     .printed = "third entry d'",
-                     .correct = "-d'",
-                     .why = "the error is estimate minus truth, and only the truth has d'"});
+  report.correction(
+      {.where = "(7), (11)",
+       .printed = "third entry d'",
+       .correct = "-d'",
+       .why =
+           "the error is the estimate minus the true value, and only the true value contains d'"});
   Figure figure("stability", {.rows = 2, .columns = 2, .panel_height = 220});
   figure.caption(
-      "Top left: least certified rho and the largest rho at which a periodic switching was found "
-      "that grows, over N. Top right: growth under the worst periodic switching over rho, N = 3. "
-      "Bottom left: the error under the worst periodic switchings at rho = 0.2 and 0.7 and under "
-      "the observer's own rule. Bottom right: the certified limit of the sampled observer.");
+      "Top left: smallest rho that is proven stable, and the largest rho for which a periodic "
+      "switching was found that makes the error grow, over N. Top right: growth under the worst "
+      "periodic switching over rho, N = 3. Bottom left: the error under the worst periodic "
+      "switchings at rho = 0.2 and 0.7 and under the switching rule of the observer. Bottom right: "
+      "the limit for the sampled observer.");
   std::vector<double> floor(sizes, 0.0);
   std::vector<double> one(sizes, 1.0);
   figure.panel(0, 0)

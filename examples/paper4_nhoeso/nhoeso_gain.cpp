@@ -156,8 +156,8 @@ Figure draw_g(const std::string& name, const PowerSumGain<double>& shape,
 int main(int argc, char** argv) {
   Report report(argc, argv, folder, "gain",
                 about("The nonlinear gain and its stability (Figs 1, 2; Table 2)",
-                      "What the gain function does to an error of a given size, where it makes the "
-                      "observer unstable, and the limits that prevent it.",
+                      "The gain over the size of the error, where it makes the observer unstable, "
+                      "and the limits that prevent this.",
                       1));
 
   // ---- Table 2: e = 0.1
@@ -187,7 +187,7 @@ int main(int argc, char** argv) {
   }
   report.comparison("2",
                     "Table 2: beta_i g(e) at e = 0.1, omega_0 = 50, N = 4. The paper prints alpha "
-                    "= 0.233, and computed with 0.2333: g(0.1) = 0.36719");
+                    "= 0.233, but computed with 0.2333: g(0.1) = 0.36719");
 
   report.add(draw_g("fig1", table2_g, "Fig. 1: g(e) with the parameters of Table 2."));
   report.add(
@@ -255,15 +255,15 @@ int main(int argc, char** argv) {
                   "no limit cycle");
   }
   report.table("cycle",
-               "Limit cycle of the printed g_new, N = 4: largest error of the estimate, sampled "
-               "observer, without limits and with the default ones",
+               "Limit cycle with the printed g_new, N = 4: largest error of the estimate, sampled "
+               "observer, without limits on the gain and with the default limits",
                {"omega_0 T", "unlimited", "default limits"}, lines);
   report.claim({.text = "The choice (29), with Table 2's g_new, is for noise",
                 .where = "(29), Table 2",
                 .holds = fundamental > 1.0 ? Claim::Holds::no : Claim::Holds::not_tested,
-                .here = "k(e) < 1/5 for 9.8e-4 < |e| < 1.76, where N = 4 is unstable: it cycles "
-                        "with an amplitude of " +
-                        number_text(fundamental, 3) + "; with the default limits it decays",
+                .here = "k(e) < 1/5 for 9.8e-4 < |e| < 1.76, where N = 4 is unstable: there is a "
+                        "limit cycle with an amplitude of " +
+                        number_text(fundamental, 3) + "; with the default limits the error decays",
                 .figure = "stability"});
   report.correction({.where = "(9)",
                      .printed = "xi_{rho+1} in the last line",
@@ -298,8 +298,8 @@ int main(int argc, char** argv) {
       {.text = "The observer converges for gains of its class",
        .where = "Theorem 1",
        .holds = rate_of(bad) > 0.0 ? Claim::Holds::no : Claim::Holds::not_tested,
-       .here = "a constant k must be above 1/9 (N = 3) or 1/5 (N = 4), and one that varies "
-               "above that may grow: 0.15 and 5 in turn, N = 3, at " +
+       .here = "a constant k must be above 1/9 (N = 3) or 1/5 (N = 4), and with a k that varies "
+               "above this limit the error may grow: 0.15 and 5 in turn, N = 3, at " +
                shown_text(rate_of(bad), 0.034) + " omega_0",
        .figure = "stability"});
   report.remark(
@@ -312,10 +312,9 @@ int main(int argc, char** argv) {
   Figure figure("stability", {.rows = 2, .columns = 2, .panel_height = 220});
   figure.caption(
       "Top: the gains k(e) of Table 2 over the size of the error, N = 4; below 1/5 a constant gain "
-      "is unstable (red); limits of 1/2 and more are certified for any variation (green). Bottom "
-      "left: the observer alone with g_new, without limits and with the default ones. Bottom "
-      "right: "
-      "N = 3, a gain that changes between two values which are both stable.");
+      "is unstable (red); above 1/2 any variation is proven stable (green). Bottom left: the "
+      "observer alone with g_new, without limits and with the default limits. Bottom right: N = 3, "
+      "a gain that changes between two values, each of which is stable as a constant.");
   std::vector<double> size;
   for (double x = 1e-6; x < 20.0; x *= 1.05) size.push_back(x);
   const std::vector<double> ends = {size.front(), size.back()};

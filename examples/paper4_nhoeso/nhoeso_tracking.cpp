@@ -122,7 +122,7 @@ int main(int argc, char** argv) {
   Report report(
       argc, argv, folder, "tracking",
       about("Tracking in noise (Figs 3-5, Table 3)",
-            "An uncertain second-order plant follows cos(t/2) through a nonlinear law; "
+            "An uncertain second-order plant follows cos(t/2) under a nonlinear control law; "
             "linear and nonlinear observers, " +
                 std::to_string(seeds) + " noise seeds. Continuous simulation, RK4 at 2 ms.",
             2));
@@ -200,24 +200,23 @@ int main(int argc, char** argv) {
   }
   report.comparison(
       "3",
-      "Table 3: ITAE = int t |r - x1| dt and ISU = int u^2 dt over 10 s. Printed: noise, plant, "
-      "form of the law, g of scenario 2; fitted to these six numbers: the other 17 quantities. "
-      "Ours: mean (standard deviation) over " +
+      "Table 3: ITAE = int t |r - x1| dt and ISU = int u^2 dt over 10 s. The paper prints the "
+      "noise, the plant, the form of the control law and g of scenario 2; the other 17 quantities "
+      "are fitted to these six numbers. Ours: mean (standard deviation) over " +
           std::to_string(seeds) +
           " seeds; met: within 3 standard deviations of one run; not judged where those are more "
           "than the number",
       {cases[0].name, cases[1].name, cases[2].name}, {names[0], names[1]});
 
   report.add(draw("fig3",
-                  "Fig. 3, scenario 1: LESO with 101.66 rad/s, tuned without noise, in noise (one "
-                  "seed) and without. In noise the control stands at its limits.",
+                  "Fig. 3, scenario 1: LESO with 101.66 rad/s, tuned without noise, with noise "
+                  "(one seed) and without. With noise the control stays at its limits.",
                   cases[0], tracked, true));
-  report.add(
-      draw("fig4",
-           "Fig. 4, scenario 2: NHOESO with g of Table 2, tuned without noise, in noise (one "
-           "seed) and without.",
-           cases[1], tracked, true));
-  report.add(draw("fig5", "Fig. 5, scenario 3: NHOESO with a fitted g, in noise and without.",
+  report.add(draw("fig4",
+                  "Fig. 4, scenario 2: NHOESO with g of Table 2, tuned without noise, with noise "
+                  "(one seed) and without.",
+                  cases[1], tracked, true));
+  report.add(draw("fig5", "Fig. 5, scenario 3: NHOESO with a fitted g, with noise and without.",
                   cases[2], tracked, true));
 
   const auto mean_of = [&](std::size_t i, double Criteria::*number) {
@@ -249,14 +248,14 @@ int main(int argc, char** argv) {
                         "), the g_new that Table 2 prints cycles (" + both(3) + ")",
                 .figure = "cycle"});
   report.not_reproduced(
-      "Table 3 comes out in a setting of which 17 quantities are fitted to its 6 numbers (limit on "
-      "u, bandwidths, fal, R, duration, step, g of scenario 3): it is consistent with the paper, "
-      "and no proof that it is the paper's.",
+      "Table 3 is reproduced with settings of which 17 quantities are fitted to its 6 numbers "
+      "(limit on u, bandwidths, fal, R, duration, step, g of scenario 3). They are consistent with "
+      "the paper, but need not be those of the paper.",
       Miss::not_published);
   report.not_reproduced(
-      "That the nonlinear observer is better than a linear one: scenario 1 compares with a linear "
-      "observer whose bandwidth (101.66 rad/s) was tuned without noise. A linear observer at 4 "
-      "rad/s (N = 4) does better than scenarios 2 and 3 in both numbers.",
+      "The claim that the nonlinear observer is better than a linear one: scenario 1 has a linear "
+      "observer whose bandwidth (101.66 rad/s) was tuned without noise. A linear observer of 4 "
+      "rad/s (N = 4) is better than scenarios 2 and 3 in both numbers.",
       Miss::claim);
 
   report.additions();
@@ -275,8 +274,8 @@ int main(int argc, char** argv) {
   };
   report.table("spread",
                "Scenario 1, ITAE over " + std::to_string(seeds) +
-                   " seeds: a drift under a control at its limits, heavy-tailed (printed: "
-                   "41.347519)",
+                   " seeds: a drift while the control is at its limits, with a heavy-tailed "
+                   "distribution (printed: 41.347519)",
                {"least", "16 %", "median", "84 %", "largest"},
                {{share(0.0), share(0.16), share(0.5), share(0.84), share(1.0)}});
 
@@ -304,7 +303,7 @@ int main(int argc, char** argv) {
     }
   }
   report.table("step",
-               "The same against the step of the integration, " + std::to_string(few) +
+               "The same over the step of the integration, " + std::to_string(few) +
                    " seeds: without a limit on k scenario 2 depends on it",
                {"case", "quantity", "2 ms", "1 ms", "0.5 ms"}, lines);
   report.add(draw("cycle",

@@ -122,7 +122,7 @@ double delay_margin(const EigenMatrix<double, 3>& gain, bool current) {
 
 int main(int argc, char** argv) {
   Report report(argc, argv, folder, "delay",
-                about("Delay study: PADRC beside the predictor form",
+                about("Delay study: PADRC compared with the predictor form",
                       "Spectral radius of the linear sampled loop over observer bandwidth and "
                       "actuator delay. Sampled controllers.",
                       2, true));
@@ -164,7 +164,7 @@ int main(int argc, char** argv) {
   report.check("ADRC, predictor form, omega_o = 800", "delay margin (ms)", std::nullopt, adrc);
   report.expect("PADRC beside the predictor form, omega_o = 800", "delay margin gained (samples)",
                 (padrc - adrc) * 1e-3 / sample_time, padrc > adrc,
-                "the two-phase form bears more delay");
+                "the two-phase form tolerates more delay");
   for (const double deviation : {0.001, 0.01}) {
     const double margin = 1e3 * delay_margin(filter_gain(deviation), true);
     report.check("EPADRC, limit gain for sigma " + number_text(deviation, 3), "delay margin (ms)",
@@ -199,9 +199,9 @@ int main(int argc, char** argv) {
 
   Figure figure("delay", {.rows = 1, .columns = 2, .panel_height = 260});
   figure.caption(
-      "Left: delay that the loop bears over omega_o. The predictor form uses measurements one "
-      "sample old, yet loses less than a sample time. Dashed: EPADRC with its limit gains. "
-      "Right: spectral radius over omega_o; below one the loop is stable.");
+      "Left: delay that the loop tolerates, over omega_o. The predictor form uses measurements "
+      "that are one sample old, but loses less than one sample time. Dashed: EPADRC with its "
+      "steady-state gains. Right: spectral radius over omega_o; below one the loop is stable.");
   auto& margin_panel = figure.panel(0, 0)
                            .x_label("ω_o (rad/s)")
                            .y_label("delay margin (ms)")
@@ -237,11 +237,10 @@ int main(int argc, char** argv) {
       .horizontal_line(1.0);
   report.add(figure);
   report.remark(
-      "The paper claims a smaller delay for PADRC and shows no number. With omega_c = 100 the "
-      "plant "
-      "with its pole at +78 needs omega_o of at least " +
+      "The paper claims a smaller delay for PADRC, but shows no number. With omega_c = 100 the "
+      "plant with its pole at +78 needs an omega_o of at least " +
       number_text(none, 3) + " rad/s; a sample of delay raises that to " + number_text(one, 3) +
-      ". The predictor form, whose measurements are a sample old, needs " +
+      ". The predictor form, whose measurements are one sample old, needs " +
       number_text(predictor, 3) + ".");
   return report.finish();
 }

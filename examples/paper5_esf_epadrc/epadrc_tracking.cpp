@@ -263,14 +263,14 @@ int main(int argc, char** argv) {
       "without r' and r'', 0.35 to within 0.5 %.",
       Miss::claim);
   report.not_reproduced(
-      "The better estimate of f at sigma = 0.001: with these settings EPADRC's error of f is 2.7 "
-      "times PADRC's there. It holds at sigma = 0 and 0.01.",
+      "The better estimate of f at sigma = 0.001: with these settings the error of EPADRC is 2.7 "
+      "times that of PADRC. At sigma = 0 and 0.01 the claim holds.",
       Miss::claim);
   report.not_reproduced(
       "EPADRC with the gains as printed in (37)-(39), (52), (53): the predictor gain in the "
-      "current "
-      "form makes the loop unstable without noise and at sigma = 0.001 (dotted in the figures); at "
-      "0.01, where the gains are lower, it stays bounded. All else here uses the corrected form.",
+      "current form makes the loop unstable without noise and at sigma = 0.001 (dotted in the "
+      "figures); at 0.01, where the gains are lower, it stays bounded. All other results here use "
+      "the corrected form.",
       Miss::other_reading);
   const auto share = [&](std::size_t which, std::size_t metric) {
     return mean(which, Kind::epadrc, metric) / mean(which, Kind::padrc, metric);
@@ -294,7 +294,7 @@ int main(int argc, char** argv) {
                 .holds = holds(5, 0.99),
                 .here = "RMS of the error of f: " + shares(5),
                 .figure = "fig3"});
-  report.claim({.text = "EPADRC spends less control under noise.",
+  report.claim({.text = "EPADRC needs less control effort with noise.",
                 .where = "Figs 2 to 7",
                 .holds = share(2, 2) < 0.99
                              ? (share(1, 2) < 0.99 ? Claim::Holds::yes : Claim::Holds::partly)
@@ -328,23 +328,25 @@ int main(int argc, char** argv) {
   }
 
   report.remark(
-      "The paper has no table, and prints neither its gains nor omega_o, theta, Q, P0, R or the "
-      "seeds; its figures are drawn here with settings that work. sigma is read as a standard "
-      "deviation in the figures and as a variance, as the paper calls it, in the last table.");
+      "The paper has no table of results, and prints neither its gains nor omega_o, theta, Q, P0, "
+      "R or the seeds; its figures are drawn here with settings that work. sigma is taken as a "
+      "standard deviation, except in the last table, where it is a variance, as the paper calls "
+      "it.");
   int number = 2;
   for (const Reference reference : {Reference::sine, Reference::step}) {
     for (const double level : levels) {
       const std::string what = reference == Reference::sine ? "r = 4 sin(2 pi t)" : "r = 20";
-      report.add(draw("fig" + std::to_string(number),
-                      "Fig. " + std::to_string(number) + ": " + what +
-                          (level > 0.0 ? ", sigma = " + number_text(level, 3) : ", no noise") +
-                          ". Output, tracking error, control, and the errors of the estimates" +
-                          (level > 0.0 ? ", one column a controller, one scale a row; those of "
-                                         "the estimates are for what comes after the first 60 ms"
-                                       : "; insets: after the peak of the start") +
-                          ". ADRC is in predictor form, one sample late. Dotted: EPADRC with the "
-                          "gains as the paper prints them, which are wrong.",
-                      reference, level));
+      report.add(
+          draw("fig" + std::to_string(number),
+               "Fig. " + std::to_string(number) + ": " + what +
+                   (level > 0.0 ? ", sigma = " + number_text(level, 3) : ", no noise") +
+                   ". Output, tracking error, control, and the errors of the estimates" +
+                   (level > 0.0 ? ", one column per controller, one scale per row; the scales of "
+                                  "the estimates are chosen for the time after the first 60 ms"
+                                : "; insets: after the peak of the start") +
+                   ". ADRC is in predictor form, one sample late. Dotted: EPADRC with the "
+                   "gains as the paper prints them, which are wrong.",
+               reference, level));
       ++number;
     }
   }
@@ -357,7 +359,7 @@ int main(int argc, char** argv) {
   CsvRow header{"controller", "standard deviation of the noise"};
   for (const auto& metric : metric_names) header.push_back(metric.name);
   report.table("variance",
-               "The other reading, the paper's: 0.001 and 0.01 are variances (sine; mean, standard "
+               "With 0.001 and 0.01 as variances, as the paper calls them (sine; mean, standard "
                "deviation over 50 seeds)",
                header, variance_lines);
   return report.finish();

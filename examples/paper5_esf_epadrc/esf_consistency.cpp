@@ -158,11 +158,11 @@ double mean_after_start(const std::vector<double>& values) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  Report report(argc, argv, folder, "consistency",
-                about("Covariance consistency: P beside the error of 400 runs",
-                      "Open loop with a disturbance within its bound, and the closed loop. "
-                      "Sampled, 1 ms.",
-                      3, true));
+  Report report(
+      argc, argv, folder, "consistency",
+      about("Covariance consistency: P compared with the error of 400 runs",
+            "Open loop with a disturbance within its bound, and the closed loop. Sampled at 1 ms.",
+            3, true));
   // Sample covariances of 400 runs: their largest eigenvalue scatters by about sqrt(2 / 400), and
   // is biased upwards by 2 sqrt(3 / 400).
   const double scatter = 1.0 + 4.0 * std::sqrt(2.0 / runs);
@@ -171,12 +171,11 @@ int main(int argc, char** argv) {
   for (int k = 0; k < open_samples; ++k) t[static_cast<std::size_t>(k)] = 1e3 * k * sample_time;
   Figure figure("consistency", {.rows = 1, .columns = 2, .panel_height = 250});
   figure.caption(
-      "Left: open loop with an f that runs away from its estimate by q2 a sample: variances of the "
-      "errors (400 runs) beside P. For y the bound is exact, so the ratio is 1 but for the scatter "
-      "of "
-      "400 runs. Right: closed loop over q2; what the noise does to f through the control grows "
-      "with "
-      "sigma, and q2 has to be where the points are below the dashed line.");
+      "Left: open loop with an f that moves away from its estimate by q2 per sample: variances of "
+      "the errors (400 runs) compared with P. For y the bound is exact, so the ratio is 1 except "
+      "for the scatter of 400 runs. Right: closed loop over q2. The effect of the noise on f "
+      "through the control grows with sigma; q2 has to be chosen where the points are below the "
+      "dashed line.");
   auto& open = figure.panel(0, 0)
                    .x_label("t (ms)")
                    .y_label("E[e_i^2] / P_{ii}")
@@ -214,10 +213,10 @@ int main(int argc, char** argv) {
   // P beside the error in the closed loop.
   Figure closed_figure("consistency_closed", {.rows = 1, .columns = 2, .panel_height = 250});
   closed_figure.caption(
-      "Closed loop: variances of the errors (400 runs) beside P. Left: over time, for sigma = 0.01 "
-      "and the q2 that covers all that f does. Right: the variance of the error of f over q2, mean "
-      "after 0.25 s. P is a bound all along: theta = 0.5 leaves more room than a q2 too small "
-      "takes.");
+      "Closed loop: variances of the errors (400 runs) compared with P. Left: over time, for sigma "
+      "= 0.01 and the q2 that covers every change of f. Right: the variance of the error of f over "
+      "q2, mean after 0.25 s. P is a bound for every q2 shown, because theta = 0.5 leaves enough "
+      "room even for a q2 that is too small.");
   auto& in_time = closed_figure.panel(0, 0)
                       .x_label("t (ms)")
                       .y_label("E[e_i^2] / P_{ii}")
@@ -275,7 +274,7 @@ int main(int argc, char** argv) {
                  "independent run: about " + number_text(level.sheet, 2));
     report.expect(name, "that q2, share of the independent run's", high / level.sheet,
                   high > 0.5 * level.sheet && high < 2.0 * level.sheet,
-                  "within a factor of two: the other is given as \"about\", by its first digit");
+                  "within a factor of two: the reference is known only to its first digit");
     const Spread covered = at(high);
     const double ratio = mean_after_start(ratios(covered, runs));
     report.expect(name + ", that q2", "lambda, mean after 0.25 s", ratio, ratio <= 1.0,
@@ -294,18 +293,16 @@ int main(int argc, char** argv) {
   over_q2.horizontal_line(1.0);
   closed.line({1e4, 2e6}, {1e4, 2e6},
               {.name = "|Δf| = q_2", .color = Color::grey, .dash = Dash::dashed});
-  report.table(
-      "closed",
-      "Closed loop over q2: the largest change of f in a sample, and the error of f beside P and "
-      "lambda (means after 0.25 s)",
-      {"sigma", "q2", "largest change of f", "E[e_f^2] / P_ff", "lambda"}, lines);
+  report.table("closed",
+               "Closed loop over q2: the largest change of f per sample, and the error of f "
+               "compared with P and lambda (means after 0.25 s)",
+               {"sigma", "q2", "largest change of f", "E[e_f^2] / P_ff", "lambda"}, lines);
   report.add(figure);
   report.add(closed_figure);
   report.remark(
-      "In the open loop P is a bound whatever f does within q2. In the closed loop the noise makes "
-      "u, u moves x2, and f = 20 x1 + 78 x2 + 10 changes with it: what the bound assumes of q2 "
-      "then "
-      "needs a q2 in proportion to sigma. P itself stays a bound for much smaller q2 with these "
-      "settings: theta = 0.5 leaves room.");
+      "In the open loop P is a bound whatever f does within q2. In the closed loop the noise "
+      "enters u, u moves x2, and f = 20 x1 + 78 x2 + 10 changes with it: to cover these changes, "
+      "q2 has to grow in proportion to sigma. With these settings P is a bound for much smaller "
+      "q2, too, because theta = 0.5 leaves room.");
   return report.finish();
 }

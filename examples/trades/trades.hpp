@@ -14,7 +14,7 @@ namespace trades {
 
 inline esokit::examples::About about(std::string title, std::string description) {
   return {.paper_title = "By trade",
-          .citation = "No paper: what one writes in a project of one's own, complete",
+          .citation = "No paper. Complete code to copy into your own project",
           .link = "",
           .title = std::move(title),
           .description = std::move(description)};

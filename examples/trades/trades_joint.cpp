@@ -76,8 +76,8 @@ double rms(const std::vector<double>& values, std::size_t from) {
 int main(int argc, char** argv) {
   Report report(argc, argv, "trades", "joint",
                 trades::about("A joint of a robot",
-                              "A class in a node: parameters by name, a log, what the log says of "
-                              "the inertia, and a diagnosis."));
+                              "A class for a node: parameters by name, a log, the inertia found "
+                              "from the log, and a diagnosis."));
   Joint::Parameters parameters{
       {"inertia", 0.02}, {"settling_time", 0.3}, {"most_torque", 6}, {"rate", 1000}};
   std::ostringstream log;
