@@ -365,7 +365,7 @@ refuses "empty.csv: no line with numbers" empty.csv
 refuses "cannot read nowhere.csv" nowhere.csv
 refuses ". is a folder" .
 said=$("$program" 2>&1)
-[[ $? == 2 && $said == *"which file?"* ]]
+[[ $? == 2 && $said == *"no file is given"* ]]
 verdict $? "without a file: $said"
 refuses "more than one file" plain.csv word.csv
 refuses "unknown option --bandwith" plain.csv --bandwith 3

@@ -29,33 +29,35 @@ constexpr const char* usage = R"(usage: from_log FILE.csv [options]
        from_log [--out DIR] [--data DIR]
 Writes FILE.html (or FILE-2.html, .. if it exists) and prints its path.
 
-columns, by the header's name, by the end of a name (position of /joint1/position) or by number:
-  --time COLUMN       stamps: s, ms, us, ns, any origin; jitter and missing rows are allowed
-  --u COLUMN          input; held from its row to the next
-  --y COLUMN          output
-  --known COLUMN      a known effect that acts where the disturbance acts; may be repeated
-                      default: columns with usual names (t, time, stamp; u, torque, effort, pwm; y,
-                      position, angle, ..)
+columns, by their name, by the end of a name (position of /joint1/position) or by number:
+  --time COLUMN       time stamps from any origin; jitter and missing rows are allowed
+  --u COLUMN          input that the actuator held from its row to the next
+  --y COLUMN          measured output
+                      (default of these three: columns with usual names: t, time, stamp; u, torque,
+                      effort, pwm; y, position, angle, ..)
+  --known COLUMN      a known effect that acts where the disturbance acts, e.g. the sine of the
+                      angle for gravity; may be repeated
   --time-unit UNIT    s, ms, us, ns (default: detected)
   --sample-time S     seconds between rows, if there is no time column
   --separator C       one character, or the word tab (default: detected)
 the machine:
   --order N           integrations from u to y, 1 to 3 (default: identified)
   --limits LOW,HIGH   of u, in the unit of the log (default: the range of u in the log)
-  --b0 B              the value that you expect: an alarm if the log shows another one
+  --b0 B              the input gain that you expect: an alarm if the log shows another one
 the requirement, one of:
   --noise PERCENT     standard deviation of u that noise may cause, % of its range (default 5)
   --settling S        settling time of a step of the reference, s
   --omega-c W         controller bandwidth, rad/s
-an observer of your own choice instead (the page, and its estimates as CSV):
+instead of a design, the log through an observer of your choice (page, and estimates as CSV):
   --observer NAME     linear, half-gain, reduced, cascade, algebraic, adjustable, nonlinear
-  --bandwidth W       omega_o, rad/s; --order and --b0 too
+  --bandwidth W       its bandwidth omega_o, rad/s; --order and --b0 are needed, too
 other:
-  --rank K            the design of this rank instead of the best
-  --anyway            a design even for a refused log
-  --no-design         only the model
+  --rank K            take the design of this rank instead of the best
+  --anyway            make a design even from a refused log
+  --no-design         find only the model
   --out DIR           folder for the page (default: here)
-Without a file: the measured sets below --data (default: ../shared/data beside the repository).
+With --out or --data but without a file: example pages from records of real machines in the folder
+that --data names (default: ../shared/data beside the repository).
 
 exit codes: 0 page with a design; 1 page not written; 2 file or options not understood; 3 log
 refused: the page says what was found and what to record instead; 4 page with an alarm, or no
@@ -84,7 +86,8 @@ std::pair<double, double> limits(const std::string& text) {
   }
   const std::pair both{number("limits", text.substr(0, comma)),
                        number("limits", text.substr(comma + 1))};
-  if (!(both.first < both.second)) throw LogError("--limits: " + text + " is no range");
+  if (!(both.first < both.second))
+    throw LogError("--limits: " + text + " is no range, the first number must be the smaller one");
   return both;
 }
 
@@ -175,7 +178,7 @@ Settings read_arguments(int argc, char** argv, std::filesystem::path& data) {
     }
     option->second(value);
   }
-  if (wishes > 1) throw LogError("--noise, --settling, --omega-c: one of them");
+  if (wishes > 1) throw LogError("--noise, --settling, --omega-c: one of them only");
   return s;
 }
 
@@ -189,7 +192,7 @@ esokit::examples::Report report_of(const std::string& out, const std::string& na
           "from_log",
           name,
           {.paper_title = "From a log to a controller",
-           .citation = "No paper: one command from a CSV file to a controller, on simulated and "
+           .citation = "No paper. One command from a CSV file to a controller, on simulated and "
                        "real machines",
            .link = "",
            .title = std::move(title),
@@ -207,10 +210,10 @@ int gallery(const std::string& out, const std::filesystem::path& data) {
   };
   constexpr Machine machines[] = {
       {"relay_servo", "A geared servo under a relay", "servo_relay_pid/relay.csv",
-       "A DC servo on an Arduino, its potentiometer in steps of 3.5 degrees.", 100},
-      {"pendulum", "A pendulum swung up", "dfki_simple_pendulum/direct_collocation.csv",
-       "A geared motor with a pendulum; gravity is unknown to the model, so it is found as a "
-       "disturbance.",
+       "A DC servo controlled by an Arduino; its angle is measured in steps of 3.5 degrees.", 100},
+      {"pendulum", "A pendulum during a swing-up", "dfki_simple_pendulum/direct_collocation.csv",
+       "A geared motor with a pendulum. The controller does not know gravity: its observer finds "
+       "it as a disturbance.",
        10}};
   for (const Machine& machine : machines) {
     if (!std::filesystem::exists(data / machine.file)) {
@@ -234,12 +237,13 @@ int gallery(const std::string& out, const std::filesystem::path& data) {
     status |= report.finish();
   }
   auto report =
-      report_of(out, "measured_sets", "Observers over logs of real machines",
-                "Observers over recorded measurements with irregular time stamps, against what is "
-                "independently known. Sampled: VariableTime, gains follow the time stamps.",
+      report_of(out, "measured_sets", "Observers on logs of real machines",
+                "Recorded measurements are run through observers, and the estimated disturbance is "
+                "compared with what is known independently. Sampled observers whose gains follow "
+                "the irregular time stamps (VariableTime).",
                 3);
   if (!measured_sets(report, data)) {
-    std::printf("none of the measured sets is in %s; --data names their folder\n", data.c_str());
+    std::printf("none of the records is in %s; --data names their folder\n", data.c_str());
   }
   return status | report.finish();
 }
@@ -252,7 +256,7 @@ int main(int argc, char** argv) {
     const auto root = std::filesystem::path(__FILE__).parent_path().parent_path().parent_path();
     std::filesystem::path data = (root / ".." / "shared" / "data").lexically_normal();
     const Settings settings = read_arguments(argc, argv, data);
-    if (argc == 1) throw LogError("which file? from_log --help says more");
+    if (argc == 1) throw LogError("no file is given; from_log --help shows the options");
     if (settings.file.empty()) return gallery(settings.out, data);
     if (!settings.observer.empty()) {
       const std::string page = show_observer(settings, read_log(settings));

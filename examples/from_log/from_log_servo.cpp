@@ -1,5 +1,5 @@
-// The whole way, once: 20 s of log of a servo under a bad PID, one command, and the controller that
-// comes out of it on the true machine, the PID beside it.
+// The whole procedure, once: 20 s of log of a servo under a badly tuned PID, one command, and the
+// controller that it chooses on the true machine, compared with the PID.
 //
 // Way: sampled. Each controller runs once a sample; the plant is integrated in between. The log is
 // a file, and from_log sees nothing but this file and the limits of u.
@@ -125,12 +125,12 @@ double rms(const Run& run, double from, double to) {
 int main(int argc, char** argv) {
   Report report(argc, argv, "from_log", "from_log_servo",
                 {.paper_title = "From a log to a controller",
-                 .citation = "No paper: one command from a CSV file to a controller, on simulated "
+                 .citation = "No paper. One command from a CSV file to a controller, on simulated "
                              "and real machines",
                  .link = "",
-                 .title = "The whole way: a servo under a bad PID",
-                 .description = "20 s of log, one command, and the new loop on the true machine. "
-                                "Sampled.",
+                 .title = "The whole procedure: a servo under a badly tuned PID",
+                 .description = "20 s of log, one command, and the new controller on the same "
+                                "simulated servo. Sampled controllers.",
                  .order = 1});
   // 1. Record.
   auto bad = pid();
@@ -164,7 +164,7 @@ int main(int argc, char** argv) {
   if (page.empty()) return 1;
   report.link(std::filesystem::path(page).filename().string(), "The page that from_log writes");
   report.expect("log", "status", outcome->status, outcome->status == from_log::all_clear,
-                "0: a design, no alarm");
+                "0: there is a design and no alarm");
   if (!outcome->design.made()) return report.finish() | 1;
   const auto& found = outcome->findings.found;
   report.check_reference("log", "b0 (rad/s2 per V)", gain, found.input_gain.value, 0.02, "true");
@@ -228,8 +228,8 @@ int main(int argc, char** argv) {
     lines.push_back({measure.name, number_text(pid_value, 3), number_text(value, 3),
                      number_text(pid_value / value, 3)});
   }
-  report.table("result", "On the true machine: " + taken.name,
-               {"", "bad PID", "from the log", "times less"}, lines);
+  report.table("result", "Both controllers on the true machine; from the log: " + taken.name,
+               {"", "PID", "from the log", "PID / from the log"}, lines);
   report.expect("from the log", "largest error after the load, share of the PID's",
                 measures[2].of(after) / measures[2].of(before),
                 measures[2].of(after) < 0.2 * measures[2].of(before), "below a fifth");
@@ -239,9 +239,9 @@ int main(int argc, char** argv) {
 
   Figure figure("servo", {.rows = 4, .columns = 1, .panel_height = 130});
   figure.caption(
-      "The whole way. Above: the log, 20 s under the bad PID. Below it: the same machine, the same "
-      "reference profile and load, under that PID and under the controller that one command made "
-      "of the log (" +
+      "Top: the log, 20 s under the badly tuned PID. Below: the same machine with a reference "
+      "profile and a load, under that PID and under the controller that one command chose from "
+      "the log (" +
       taken.name + ").");
   figure.panel(0, 0)
       .title("recorded")

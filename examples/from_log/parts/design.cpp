@@ -165,19 +165,19 @@ std::string program(const Settings& settings, const Identified& found, const eso
   if (profiled) {
     const auto& model = tuning.model;
     text +=
-        "  // A reference that u can follow: half of its range accelerates.\n"
+        "  // A reference that the machine can follow with half of the range of u.\n"
         "  auto profile = esokit::TrackingDifferentiator<double>::make({.acceleration = " +
         esokit::detail::source(profile_acceleration(model)) +
         ", .sample_time = " + esokit::detail::source(model.sample_time) + "}).value();\n";
   }
   const std::string reference = profiled ? "profile.motion()" : "reference";
   return text +
-         "  if (!controller) {  // which setting, and which rule\n"
+         "  if (!controller) {  // says which setting breaks which rule\n"
          "    std::printf(\"%s: %s\\n\", controller.error().field, controller.error().rule);\n"
          "    return 1;\n"
          "  }\n"
          "  const double y = 0.0, u_now = 0.0, reference = 0.0;\n"
-         "  controller->start(y, u_now);  // once, where the machine stands\n" +
+         "  controller->start(y, u_now);  // once, while the machine is at rest\n" +
          (profiled ? "  profile.reset(y);\n  profile.update(reference);  // then once a sample\n"
                    : "") +
          "  const double u = controller->update(y, " + reference + ");" +
@@ -281,18 +281,20 @@ Design Design::make(const Settings& settings, const Input&, const Findings& find
   const double T = model.sample_time;
   design.code_ = program(settings, found, *tuning, taken);
   design.summary_ = {
-      "Take " + taken.name + ". It settles in " + number_text(taken.settling_time, 3) +
-          " s; a load that a tenth of the range of u balances moves y by " +
-          number_text(0.1 * range * taken.load_peak, 3) + "; noise moves u by " +
-          percent(taken.control_noise / range) + " of its range.",
-      "Modulus margin " + number_text(taken.modulus_margin, 2) + ", " +
-          number_text(1e3 * taken.delay_margin, 3) +
-          " ms of delay may be added; deviations of y and u are " + number_text(taken.excess, 3) +
-          " times those of the best linear controller without margins."};
+      "Chosen: " + taken.name + ". A step of the reference settles in " +
+          number_text(taken.settling_time, 3) +
+          " s. A load step that takes a tenth of the range of u moves y by at most " +
+          number_text(0.1 * range * taken.load_peak, 3) +
+          ". Noise causes a standard deviation of u of " + percent(taken.control_noise / range) +
+          " of its range.",
+      "The modulus margin is " + number_text(taken.modulus_margin, 2) + ", the delay margin " +
+          number_text(1e3 * taken.delay_margin, 3) + " ms. Deviations of y and u are " +
+          number_text(taken.excess, 3) +
+          " times those of the best linear controller, which keeps no margins."};
   if (!settings.limits) {
-    design.summary_.push_back("Its limits are the range of u in the log, " +
+    design.summary_.push_back("The limits of u are those that the log shows, " +
                               number_text(limits.first, 4) + " to " +
-                              number_text(limits.second, 4) + ": set others with --limits.");
+                              number_text(limits.second, 4) + "; set others with --limits.");
   }
   const LinearController form = design.form();
   design.replay_ = through(form, found.input_gain.value, found.order, findings.rows);
@@ -318,9 +320,9 @@ namespace {
 Figure tradeoff_figure(const esokit::Tuning& tuning, std::size_t taken) {
   Figure figure("tradeoff", {.rows = 1, .columns = 1, .panel_height = 260});
   figure.caption(
-      "Each number is a design of the table below. Further right: more noise in u. Further up: "
-      "larger deviations of y by noise and disturbance together. The curve is the best possible "
-      "linear controller without margins; the square is the chosen design.");
+      "Each number is a design of the table below. Designs further to the right have more noise in "
+      "u, designs further up larger deviations of y (by noise and disturbance together). The curve "
+      "is the best possible linear controller without margins; the square is the chosen design.");
   const esokit::TuneModel& model = tuning.model;
   const double range = model.u_max - model.u_min;
   const int n = model.order;
@@ -336,8 +338,8 @@ Figure tradeoff_figure(const esokit::Tuning& tuning, std::size_t taken) {
     output.push_back(numbers.output);
   }
   auto& panel = figure.panel(0, 0)
-                    .x_label("deviation of u by noise (% of its range)")
-                    .y_label("deviation of y")
+                    .x_label("standard deviation of u by noise (% of its range)")
+                    .y_label("standard deviation of y")
                     .name("tradeoff");
   if (!noise.empty())
     panel.line(noise, output, {.name = "best linear controller (LQG)", .color = Color::grey});
@@ -373,18 +375,19 @@ Figure tradeoff_figure(const esokit::Tuning& tuning, std::size_t taken) {
 
 std::vector<CsvRow> ranking(const esokit::Tuning& tuning) {
   const double range = tuning.model.u_max - tuning.model.u_min;
-  std::vector<CsvRow> rows{{"", "times the best", "without margins", "deviation of y",
-                            "noise in u, % of its range", "load of 10 %: y", "settling (s)",
-                            "modulus margin", "delay margin (ms)", "instructions", "held back by"}};
+  std::vector<CsvRow> rows{{"", "times the best", "the same without margins",
+                            "standard deviation of y", "noise in u, % of its range",
+                            "y after a load of 10 %", "settling time (s)", "modulus margin",
+                            "delay margin (ms)", "instructions", "limited by"}};
   for (std::size_t i = 0; i < tuning.designs.size(); ++i) {
     const auto& d = tuning.designs[i];
-    rows.push_back({std::to_string(i + 1) + " " + d.name + (d.feasible ? "" : " (not kept)"),
-                    number_text(d.excess, 3), number_text(d.free_excess, 3),
-                    number_text(d.output_deviation, 3),
-                    number_text(100 * d.control_noise / range, 3),
-                    number_text(0.1 * range * d.load_peak, 3), number_text(d.settling_time, 3),
-                    number_text(d.modulus_margin, 2), number_text(1e3 * d.delay_margin, 3),
-                    std::to_string(d.instructions), d.constraint});
+    rows.push_back(
+        {std::to_string(i + 1) + " " + d.name + (d.feasible ? "" : " (does not keep the margins)"),
+         number_text(d.excess, 3), number_text(d.free_excess, 3),
+         number_text(d.output_deviation, 3), number_text(100 * d.control_noise / range, 3),
+         number_text(0.1 * range * d.load_peak, 3), number_text(d.settling_time, 3),
+         number_text(d.modulus_margin, 2), number_text(1e3 * d.delay_margin, 3),
+         std::to_string(d.instructions), d.constraint});
   }
   return rows;
 }
@@ -396,9 +399,10 @@ void Design::show_on(Page& page, const Settings& settings, const Findings& findi
     page.heading("Which observer");
     page.figure(tradeoff_figure(*tuning_, taken_));
     page.table("observers",
-               "The families, each tuned for this requirement, ranked by the deviations of y and u "
-               "together (sqrt(J / J*); within 1 % the cheaper one comes first). Instructions of "
-               "an update on a Cortex-M4F in float. --rank takes another one",
+               "The observer families, each tuned for this requirement, ranked by the deviations "
+               "of y and u together, compared with the best linear controller (sqrt(J / J*); "
+               "within 1 % the cheaper one comes first). The instructions are those of an update "
+               "on a Cortex-M4F in float. --rank takes another row",
                ranking(*tuning_));
   }
   if (!made()) {
@@ -426,13 +430,13 @@ void Design::show_on(Page& page, const Settings& settings, const Findings& findi
     phase.push_back(degrees);
   }
   const auto margins = esokit::margins(*loop_).value();
-  loop.caption("Left: loop gain with the identified machine; phase margin " +
-               number_text(margins.phase.value * 180 / std::numbers::pi, 3) + "°, gain margin " +
-               number_text(margins.gain_increase.value, 3) + ", modulus margin " +
-               number_text(margins.modulus.value, 2) +
-               " (dashed: frequencies where abs(L) is one and where the phase is -180°). Middle "
-               "and right: a step of the reference, and a load that a tenth of the range of u "
-               "balances, while u is within its limits.");
+  loop.caption("Left: loop gain L with the identified machine. The phase margin is " +
+               number_text(margins.phase.value * 180 / std::numbers::pi, 3) +
+               "°, the gain margin " + number_text(margins.gain_increase.value, 3) +
+               ", the modulus margin " + number_text(margins.modulus.value, 2) +
+               " (dashed: the frequencies where abs(L) is one and where the phase is -180°). "
+               "Middle: response to a step of the reference. Right: response to a load step that "
+               "takes a tenth of the range of u. Both hold while u is within its limits.");
   double peak = 0.0;
   const auto bode = [&](Panel& panel) {
     if (margins.phase.limited()) panel.vertical_line(margins.phase.frequency);
@@ -457,23 +461,23 @@ void Design::show_on(Page& page, const Settings& settings, const Findings& findi
     loop.panel(1, column).x_label("t (s)").y_label(u).name(u).line(of.time, of.control[0],
                                                                    {.color = color, .column = "u"});
   };
-  answer(1, step, "step of the reference", "y, of the step", "u for a step of 1", Color::blue);
-  answer(2, load, "load", "y after the load", "u after the load", Color::vermillion);
+  answer(1, step, "step of the reference by 1", "y", "u", Color::blue);
+  answer(2, load, "load step", "y after the load", "u after the load", Color::vermillion);
   page.figure(loop);
   for (const double u : step.control[0]) peak = std::max(peak, std::abs(u));
-  page.text("A step of the reference above " + number_text(0.5 * range / peak, 2) +
-            " takes u to its limits" +
-            (found.order == 2 ? ": pass larger steps through the profile below, which needs at "
-                                "most half of the range of u."
+  page.text("A step of the reference by more than " + number_text(0.5 * range / peak, 2) +
+            " drives u to its limits" +
+            (found.order == 2 ? ". Pass larger steps through the profile in the code below, which "
+                                "needs at most half of the range of u."
                               : "."));
 
   page.heading("The log through this observer");
   Figure replay("replay", {.rows = 3, .columns = 1, .panel_height = 150});
   replay.caption(
-      "Above: y and its estimate. Middle: u, and the disturbance in units of u. Below: the "
-      "innovation; " +
+      "Top: y and its estimate. Middle: u, and the estimated disturbance in units of u. Bottom: "
+      "the innovation; " +
       number_text(100 * replay_.inside, 3) +
-      " % lie within the dashed lines, 95 % if the machine equals the model.");
+      " % of the rows are within the dashed lines. If the machine equals the model, 95 % are.");
   const auto& t = replay_.t;
   replay.panel(0, 0)
       .y_label("y")
@@ -496,14 +500,15 @@ void Design::show_on(Page& page, const Settings& settings, const Findings& findi
       .horizontal_line(-replay_.band);
   page.figure(replay);
 
-  page.heading(findings.refusal ? "Paste this, if you know better" : "Paste this");
-  page.text("It compiles as it is, with esokit on the include path: g++ -std=c++20 -O2.");
+  page.heading(findings.refusal ? "Paste this only if you know that the model is right"
+                                : "Paste this");
+  page.text("This program compiles as it is, with esokit on the include path: g++ -std=c++20 -O2.");
   page.code(code_);
   for (std::size_t i = 0; i < tuning_->designs.size(); ++i) {
     const auto& other = tuning_->designs[i];
     if (i == taken_ || !other.feasible) continue;
     page.code(program(settings, found, *tuning_, other),
-              "The same with " + std::to_string(i + 1) + " " + other.name);
+              "The code for number " + std::to_string(i + 1) + ", " + other.name);
   }
 }
 

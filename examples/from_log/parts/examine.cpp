@@ -98,8 +98,8 @@ std::string usual_factor(double ratio) {
   constexpr Usual all[] = {{57.2958, "degrees and radians"},
                            {9.5493, "rev/min and rad/s"},
                            {6.28319, "turns and radians"},
-                           {1000, "a thousand: milli"},
-                           {100, "percent and shares, or centi"},
+                           {1000, "a unit and its thousandth, as m and mm"},
+                           {100, "a fraction and percent, or m and cm"},
                            {10, "a misplaced decimal point"},
                            {9.80665, "kg and N"},
                            {60, "minutes and seconds"}};
@@ -122,11 +122,11 @@ void sound_alarms(const Settings& settings, const Input& input, Findings& all) {
     const double told = std::max(std::abs(lower), std::abs(upper));
     if (ours > 1.5 * told || ours < told / 50) {
       all.alarms.push_back(
-          {"u-unit", "u of the log (" + input.u + ") reaches " + number_text(ours, 4) +
-                         ", the limits that you gave " + number_text(told, 4) +
+          {"u-unit", "In the log u (" + input.u + ") reaches " + number_text(ours, 4) +
+                         ", but the limits that you gave are " + number_text(told, 4) +
                          usual_factor(ours / told) +
-                         ": log and controller use different units of u, or these are not the "
-                         "limits. b0 below is for the unit of the log."});
+                         ". Either the log and the controller use different units of u, or the "
+                         "limits are wrong. b0 below is for the unit of the log."});
     }
   }
   const double q = found.log.quantisation;
@@ -136,9 +136,10 @@ void sound_alarms(const Settings& settings, const Input& input, Findings& all) {
     if (levels < 10) {
       all.alarms.push_back(
           {"quantised",
-           "y (" + input.y + ") comes in steps of " + number_text(q, 3) + " and moves by " +
+           "y (" + input.y + ") has a resolution of " + number_text(q, 3) + " and moves by only " +
                number_text(levels, 3) +
-               " of them: too few to see its motion. Record larger motion, or with more digits."});
+               " such steps, too few to see its motion. Record larger motion, or y with a finer "
+               "resolution."});
     }
   }
   // Of a log that does not tell b0 its sign means nothing.
@@ -149,20 +150,23 @@ void sound_alarms(const Settings& settings, const Input& input, Findings& all) {
   if (ratio < 0) {
     all.alarms.push_back(
         {"sign",
-         "b0 is " + number_text(b0, 3) + ": where u rises, y falls" +
-             std::string(settings.expected_gain ? ", and you expect " : "") +
+         "b0 is " + number_text(b0, 3) +
+             (b0 < 0 ? ", that is, a larger u lowers y" : ", that is, a larger u raises y") +
+             std::string(settings.expected_gain ? "; you expect " : "") +
              (settings.expected_gain ? number_text(expected, 3) : "") +
-             ". With the wrong sign no controller is stable: check the sign of u and y where they "
-             "are recorded and where the controller will write. If the sign is right, use --b0 " +
+             ". With the wrong sign no controller is stable. Check the signs of u and y, in the "
+             "recording and in the controller. If the sign found here is right, confirm it with "
+             "--b0 " +
              number_text(b0, 3) + "."});
   }
   const double size = std::abs(ratio);
   if (size > 3 || size < 1.0 / 3) {
     all.alarms.push_back(
-        {"b0", "b0 is " + number_text(b0, 3) + ", " + number_text(size > 1 ? size : 1 / size, 3) +
-                   " times " + (size > 1 ? "more" : "less") + " than the " +
-                   number_text(expected, 3) + " that you expect" + usual_factor(size) +
-                   ": check the units of u, y and time, the gear, and the scales."});
+        {"b0", "b0 is " + number_text(b0, 3) + (ratio < 0 ? ", in magnitude " : ", ") +
+                   number_text(size > 1 ? size : 1 / size, 3) + " times as " +
+                   (size > 1 ? "large" : "small") + " as the " + number_text(expected, 3) +
+                   " that you expect" + usual_factor(size) +
+                   ". Check the units of u, y and time, the gear ratio, and scale factors."});
   }
 }
 
@@ -176,7 +180,7 @@ Findings examine(const Settings& settings, const Input& input) {
   const bool slow = input.log.y.size() > 200'000;
   if (slow) {
     options.progress = [](double share) {
-      std::fprintf(stderr, "identifying: %3.0f %%\n", 100 * share);
+      std::fprintf(stderr, "identifying the model: %3.0f %%\n", 100 * share);
     };
   }
   if (const auto prepared = esokit::prepare(input.log)) {

@@ -44,8 +44,8 @@ LogEstimates run(const typename Observer::Config& config, const LogSettings& set
       const auto accepted = observer.set_step_time(nominal ? settings.sample_time : step);
       if (!accepted) {
         throw esokit::examples::LogError(
-            "the step after t = " + esokit::examples::number_text(time[k - 1], 15) +
-            " s is too short or too long for the nominal sample time: " +
+            "the time from t = " + esokit::examples::number_text(time[k - 1], 15) +
+            " s to the next row is too short or too long for the nominal sample time: " +
             esokit::to_text(accepted.error()));
       }
       // The input of the row before was held until now.

@@ -99,10 +99,9 @@ void pendulum(Report& report, const std::filesystem::path& data) {
   Figure figure("pendulum", {.rows = 2, .columns = 1, .panel_height = 220});
   figure.caption(
       "Pendulum on a test bench: the disturbance torque that LinearEso<2> finds at omega_o = 40 "
-      "rad/s from angle and motor torque, beside the gravity torque -m g l sin(y) of weighed "
-      "parts, "
-      "passed through the same observer. What is left over is gear friction and a motor torque "
-      "that is reported late.");
+      "rad/s from angle and motor torque, compared with the gravity torque -m g l sin(y) of the "
+      "weighed parts, passed through the same observer. The difference is gear friction and a "
+      "motor torque that is reported late.");
   std::size_t row = 0;
   std::vector<CsvRow> others;
   for (const Run& run : runs) {
@@ -150,9 +149,9 @@ void pendulum(Report& report, const std::filesystem::path& data) {
   }
   report.add(figure);
   report.table("pendulum_observers",
-               "The other observers on the same logs, same omega_o, each against gravity through "
-               "itself",
-               {"run", "observer", "correlation", "RMS of the rest (%)"}, others);
+               "The other observers on the same logs with the same omega_o; each is compared with "
+               "gravity passed through the same observer",
+               {"run", "observer", "correlation", "RMS of the difference (%)"}, others);
 }
 
 // ---- double pendulum: known torque pulses are injected
@@ -168,10 +167,10 @@ void acrobot(Report& report, const std::filesystem::path& data) {
   std::array<std::vector<double>, 2> gains;
   Figure figure("acrobot", {.rows = 2, .columns = 1, .panel_height = 200});
   figure.caption(
-      "Double pendulum, run 01: torque that one observer a joint finds (the controller's torque "
-      "and an identified model are known to it, the injected pulses are not), and the pulses "
-      "through the same observer. Unmodelled friction is about as large as the pulses, so only "
-      "the mean over all 24 pulses says something.");
+      "Double pendulum, run 01: the torque that one observer per joint finds (the torque of the "
+      "controller and an identified model are known to it, the injected pulses are not), and the "
+      "pulses passed through the same observer. Unmodelled friction is about as large as the "
+      "pulses, so only the mean over all 24 pulses is meaningful.");
   for (const char* number : {"01", "04", "05", "08", "09", "10"}) {
     const auto file = data / "dfki_acrobot_perturbed" / ("run" + std::string(number) + ".csv");
     const LogFile log(file, {"t_s", "u1_Nm", "u2_Nm", "y1_rad", "y2_rad", "v1_rad_s", "v2_rad_s",
@@ -296,9 +295,10 @@ void tclab(Report& report, const std::filesystem::path& data) {
                                           {0.072, 0.27, 0.067, 0.20}}};
   Figure figure("tclab", {.rows = 2, .columns = 1, .panel_height = 200});
   figure.caption(
-      "Temperature control lab, LinearEso<1> at 0.05 rad/s, parameters fitted on this very record "
-      "(consistency, no prediction). Above: the heater is not told to the observer, which finds "
-      "heating and loss together. Below: it is told, and the loss is left.");
+      "Temperature control lab, LinearEso<1> at 0.05 rad/s, parameters fitted to this same record "
+      "(so this shows consistency; it is not a prediction). Top: the heater is unknown to the "
+      "observer, which finds heating and loss together. Bottom: the heater is known, and the "
+      "observer finds the loss.");
   for (const Parameters& p : sets) {
     for (std::size_t i = 0; i < 2; ++i) {
       const auto& own = log.column(3 + i);

@@ -52,7 +52,7 @@ std::string guess(const LogFile& file, const char* option, const std::string& gi
     there += (there.empty() ? "" : ", ") + name;
   }
   if (there.empty()) there = "numbers 1 to " + std::to_string(file.columns());
-  throw LogError("which column is " + std::string(option) + "? Use --" + option +
+  throw LogError("which column is " + std::string(option) + "? Name it with --" + option +
                  " COLUMN; there are " + there);
 }
 
@@ -94,18 +94,18 @@ double find_unit(const Settings& settings, Input& input, double first, double st
   if (T < 50.0 || minutes) {
     if (T < 2e-6) {
       input.alarms.push_back(
-          {"time-unit", "A step of the time column " + input.time + " would be " +
+          {"time-unit", "The time between two rows (column " + input.time + ") would be " +
                             number_text(T, 3) +
-                            " s, so its unit is a different one. Set --time-unit."});
+                            " s, so the unit of time must be another one. Set --time-unit."});
     }
     return read;
   }
   const double guessed = read * (step >= 1e5 ? 1e-9 : step >= 100.0 ? 1e-6 : 1e-3);
   input.alarms.push_back(
-      {"time-unit", "Read as seconds, a step of the time column " + input.time + " would be " +
+      {"time-unit", "In seconds, the time between two rows (column " + input.time + ") would be " +
                         number_text(T, 4) + " s. It was read as " + unit_name(guessed) +
-                        ", T = " + number_text(step * guessed, 4) +
-                        " s. All times depend on this. Confirm with --time-unit " +
+                        ", so that T = " + number_text(step * guessed, 4) +
+                        " s. All times on this page depend on it. Confirm it with --time-unit " +
                         unit_name(guessed) + ", or use --time-unit s if seconds are right."});
   return guessed;
 }
@@ -201,7 +201,7 @@ Input read_log(const Settings& settings) {
     if (stamps[i] < stamps[i - 1]) {
       throw LogError(file.where(i) + "time runs backwards" + in + ", from " +
                      number_text(stamps[i - 1], 15) + " to " + number_text(stamps[i], 15) +
-                     ": the clock was set, or two recordings are in one file");
+                     ": the clock was set, or the file contains two recordings");
     }
     if (!merged) {
       throw LogError(file.where(i) + "time stands still" + in + " at " +
@@ -226,10 +226,11 @@ Input read_log(const Settings& settings) {
     const double jump = input.log.time[k] - input.log.time[k - 1];
     if (jump <= 50.0 * T) continue;
     input.alarms.push_back({"time-jump", "Time jumps by " + number_text(jump, 4) + " s at line " +
-                                             std::to_string(input.line[k]) + " (a step is " +
-                                             number_text(T, 3) +
-                                             " s): the clock was set, or two recordings are in one "
-                                             "file. The parts are treated separately."});
+                                             std::to_string(input.line[k]) +
+                                             " (usually, two rows are " + number_text(T, 3) +
+                                             " s apart): the clock was set, or the file contains "
+                                             "two recordings. The parts before and after are "
+                                             "treated separately."});
     break;
   }
   return input;

@@ -26,28 +26,33 @@ std::string with_interval(const esokit::Estimate& estimate, double unit = 1.0) {
 std::string advice(const std::string& field) {
   static const std::map<std::string, const char*> all = {
       {"own_input",
-       "u depends on y alone: the loop is closed and its reference does not move. Let the "
-       "reference step every few settling times, by as much as the machine may move, and log "
-       "again. Keep the controller as it is."},
+       "u depends on y alone: the loop is closed and its reference does not move. Log again with a "
+       "reference that steps every few settling times, by as much as the machine may move. The "
+       "controller may stay as it is."},
       {"excitation",
        "u hardly moves y. Step the reference (or u itself) up and down by a tenth of its range, "
-       "ten times or more, with pauses in which the machine settles; or sweep it slowly up to the "
-       "frequency that the controller should reach."},
+       "ten times or more, with pauses in which the machine settles. Or sweep it slowly up to the "
+       "bandwidth that the controller should have."},
       {"correlation",
-       "The machine has more than a chain of integrators with a lag: something swings, y is "
-       "filtered, or u is not the u that the actuator held. Log the applied u, y before its "
-       "filters, and known effects (--known COLUMN). Remove loads that swing, or log motion below "
-       "their frequency."},
+       "The machine behaves differently from a chain of integrators with a lag: something "
+       "oscillates, y was filtered, or the logged u is not what the actuator held. Log the applied "
+       "u, y before its filters, and known effects (--known COLUMN). Remove loads that can swing, "
+       "or log motion below their frequency."},
       {"plateau",
-       "b0 depends on the frequency. Log motion in the band of the controller: faster steps, or a "
-       "sweep."},
-      {"interval", "Log twice as long or with twice the steps: the interval shrinks with both."},
+       "b0 depends on the frequency. Log motion in the frequency band of the controller: faster "
+       "steps, or a sweep."},
+      {"interval", "Record a longer log, or use larger steps; both make the interval smaller."},
       {"latency", "u changes too slowly to find lag and dead time: use steps instead of ramps."},
+      {"position_shift",
+       "If the force is gravity, add a column with the sine of the angle to the file, if it is a "
+       "spring, a column with y, and name the column with --known."},
       {"friction_shift",
-       "Friction and b0 can only be separated by motion well above the speed at which the machine "
-       "sticks."},
+       "Friction and b0 can only be separated by motion that is much faster than the speed at "
+       "which the machine sticks."},
       {"saturated", "Log the u that the actuator really held."},
-      {"rows", "At least 200 rows without a gap; better 20 s at the rate of the controller."},
+      {"rows",
+       "Record at least 200 rows without a gap; 20 s at the sample rate of the controller are "
+       "better."},
       {"u", "Log the input while it moves."},
       {"y", "Log the output while it moves."}};
   const auto at = all.find(field);
@@ -57,8 +62,9 @@ std::string advice(const std::string& field) {
 /// Every value, or fewer of a long log, by mean.
 Figure log_figure(const Input& input, const Findings& findings) {
   Figure figure("log", {.rows = 2, .columns = 2, .panel_height = 160});
-  figure.caption("The log (" + input.y + ", " + input.u +
-                 ") and its spectra. The controller has to work in the band where u moves y.");
+  figure.caption("Left: the log (y is " + input.y + ", u is " + input.u +
+                 "). Right: the spectra. The log tells most about the frequencies where u and y "
+                 "are large; the bandwidth of the controller should be among these.");
   std::vector<double> t = input.log.time;
   if (t.empty()) {
     for (std::size_t k = 0; k < input.log.y.size(); ++k)
@@ -86,10 +92,11 @@ Figure model_figure(const Findings& findings) {
   const esokit::Identified& found = findings.found;
   Figure figure("model", {.rows = 1, .columns = 3, .panel_height = 180});
   figure.caption(
-      "Left: b0 over the bandwidth, with two standard errors; dashed where it was read. Flat is "
-      "good. Middle: correlation of the residual; white noise stays between the dashed lines, and "
-      "above the dotted line the log is refused. Right: spectrum of the residual; a peak is "
-      "something that swings.");
+      "Left: b0 as a function of the bandwidth of the fit, with two standard errors; it was taken "
+      "at the dashed line. It should be flat around this line. Middle: correlation of the residual "
+      "with itself, over the distance in rows; for white noise 95 % of the points are between the "
+      "dashed lines, and beyond the dotted lines the log is refused. Right: spectrum of the "
+      "residual; a peak means that something oscillates.");
   const auto& points = found.plateau.points;
   if (points.size() >= 3 && found.plateau.middle > 0) {
     std::vector<double> w, b0, low, high;
@@ -122,7 +129,7 @@ Figure model_figure(const Findings& findings) {
                         [](double a, double b) { return std::abs(a) < std::abs(b); });
   const double range = std::max(0.15, 1.15 * std::abs(most));
   figure.panel(0, 1)
-      .x_label("rows")
+      .x_label("distance (rows)")
       .y_label("correlation")
       .name("residual")
       .y_range(-range, range)
@@ -151,60 +158,67 @@ std::string derivative_of(int order) {
 
 std::vector<CsvRow> model_table(const Findings& findings) {
   const esokit::Identified& found = findings.found;
-  std::vector<CsvRow> rows{{"quantity", "found, 95 %", "unit", "what it is"}};
+  std::vector<CsvRow> rows{{"quantity", "found, 95 % interval", "unit", "what it is"}};
   const std::string highest = derivative_of(found.order);
   rows.push_back({"order", std::to_string(found.order), "", "integrations from u to y"});
   rows.push_back({"b0", with_interval(found.input_gain), "[" + highest + "] / [u]",
-                  "what one unit of u adds to " + highest});
+                  "input gain: what one unit of u adds to " + highest});
   if (found.plateau.middle == 0) return rows;
-  rows.push_back({"lag", with_interval(found.lag, 1e3), "ms", "of the actuator, first order"});
   rows.push_back(
-      {"dead time", with_interval(found.dead_time, 1e3), "ms", "until u has any effect"});
+      {"lag", with_interval(found.lag, 1e3), "ms", "time constant of the actuator, first order"});
+  rows.push_back({"dead time", with_interval(found.dead_time, 1e3), "ms",
+                  "from a change of u to its first effect"});
   rows.push_back({"lag and dead time", with_interval(found.latency, 1e3), "ms",
-                  "the sum is known better than its parts"});
-  rows.push_back({"pole", with_interval(found.pole), "1/s", "decay rate of free motion"});
-  rows.push_back({"friction", with_interval(found.friction), "[" + highest + "]", "Coulomb"});
+                  "the sum is more accurate than its parts"});
+  rows.push_back({"pole", with_interval(found.pole), "1/s", "rate at which free motion decays"});
+  rows.push_back(
+      {"friction", with_interval(found.friction), "[" + highest + "]", "Coulomb friction"});
+  rows.push_back({"gravity or spring", found.position ? "found" : "none", "",
+                  "a force that depends on y; the controller treats it as a disturbance"});
   for (std::size_t c = 0; c < found.columns.size(); ++c) {
     rows.push_back({"known column " + std::to_string(c + 1), with_interval(found.columns[c]),
-                    "[" + highest + "] / its unit", "its share of the disturbance"});
+                    "[" + highest + "] / its unit", "what one unit of it adds to " + highest});
   }
-  rows.push_back({"noise", with_interval(found.noise), "[y]", "standard deviation of y"});
+  rows.push_back(
+      {"noise", with_interval(found.noise), "[y]", "standard deviation of the measurement noise"});
   rows.push_back({"disturbance", number_text(found.disturbance, 3), "[" + highest + "]² / s",
-                  "growth of the variance of d, as a random walk"});
+                  "rate at which the variance of d grows, as a random walk"});
   rows.push_back(
       {"plateau", number_text(100 * found.plateau.spread, 3) + " %",
        number_text(found.plateau.from, 3) + " to " + number_text(found.plateau.to, 3) + " rad/s",
-       "spread of b0 where it was read; range in which it stays within 10 %"});
+       "spread of b0 where it was taken; bandwidths at which it stays within 10 %"});
   rows.push_back({"residual", number_text(found.correlation, 2), "0.1 at most",
-                  "largest correlation: 0 if the model explains everything"});
+                  "largest correlation with itself: 0 if the model explains everything"});
   return rows;
 }
 
 std::vector<CsvRow> log_table(const Input& input, const Findings& findings) {
   const esokit::LogReport& log = findings.found.log;
-  std::vector<CsvRow> rows{{"of the log", "", "how it was read"}};
+  std::vector<CsvRow> rows{{"", "in the log", "how it was read"}};
   rows.push_back({"y", input.y, ""});
-  rows.push_back({"u", input.u, "held from its row to the next"});
+  rows.push_back({"u", input.u, "held by the actuator from its row to the next"});
   rows.push_back({"time", input.time.empty() ? "none" : input.time,
                   input.time.empty() ? "equal steps, by --sample-time"
                   : input.unit_assumed
-                      ? "read in " + input.time_unit + ": this is a guess (--time-unit)"
+                      ? "read in " + input.time_unit + "; this is a guess, see --time-unit"
                       : "read in " + input.time_unit});
-  rows.push_back({"rows", std::to_string(log.rows),
-                  input.merged
-                      ? "topics with their own stamps: a row for each y, u averaged in between"
-                      : ""});
-  if (input.cut) rows.push_back({"last line", "cut", "left out"});
+  rows.push_back(
+      {"rows", std::to_string(log.rows),
+       input.merged ? "u and y have their own time stamps: a row for each y, u averaged in between"
+                    : ""});
+  if (input.cut) rows.push_back({"last line", "incomplete", "left out"});
   rows.push_back({"sample time", number_text(1e3 * log.sample_time, 5) + " ms",
                   "jitter " + number_text(1e3 * log.jitter, 3) + " ms"});
   rows.push_back({"duration", number_text(log.duration, 5) + " s",
                   std::to_string(log.pieces) + (log.pieces == 1 ? " piece" : " pieces")});
-  rows.push_back({"missing", std::to_string(log.missing),
-                  std::to_string(log.rejected) + " rows that are no numbers, " +
+  rows.push_back({"missing rows", std::to_string(log.missing),
+                  std::to_string(log.rejected) + " rows without a number, " +
                       std::to_string(log.outliers) + " single outliers"});
-  rows.push_back({"step of y", log.quantisation > 0 ? number_text(log.quantisation, 4) : "none",
-                  log.quantisation > 0 ? "an encoder or a converter" : "that shows"});
-  rows.push_back({"u at its ends", number_text(100 * log.saturated, 3) + " %", "of the rows"});
+  rows.push_back(
+      {"resolution of y", log.quantisation > 0 ? number_text(log.quantisation, 4) : "fine",
+       log.quantisation > 0 ? "steps, as of an encoder or a converter" : "no steps can be seen"});
+  rows.push_back({"u at its limits", number_text(100 * log.saturated, 3) + " %",
+                  "of the rows have the largest or smallest u"});
   return rows;
 }
 
@@ -223,7 +237,7 @@ std::vector<std::string> in_short(const Findings& findings, const Design& design
     all.push_back("The machine is of order " + std::to_string(found.order) +
                   ", b0 = " + number_text(found.input_gain.value, 4) + " ± " +
                   number_text(found.input_gain.half_width, 2) + ", lag and dead time " +
-                  number_text(1e3 * found.latency.value, 3) + " ms; a row every " +
+                  number_text(1e3 * found.latency.value, 3) + " ms; sampled every " +
                   number_text(1e3 * found.log.sample_time, 4) + " ms.");
   }
   const auto more = design.summary();
@@ -238,17 +252,17 @@ Page show(const Settings& settings, const Input& input, const Findings& findings
   if (!findings.alarms.empty()) {
     std::vector<std::string> lines;
     for (const Alarm& alarm : findings.alarms) lines.push_back(alarm.name + ": " + alarm.text);
-    page.box("Alarm: check this before you paste anything", lines, true);
+    page.box("Alarm: check this before you use any of the results", lines, true);
   }
   if (findings.refusal) {
     std::vector<std::string> lines{esokit::to_text(*findings.refusal)};
     if (const auto more = advice(findings.refusal->field); !more.empty()) lines.push_back(more);
     if (findings.seen) lines.push_back("The numbers below are not reliable enough for a design.");
-    page.box("Refused: this log is not enough to design a controller. What to record instead",
+    page.box("Refused: this log cannot be used to design a controller. What to record instead",
              lines, true);
   }
   if (design.made() || (settings.no_design && findings.seen)) {
-    page.box(findings.refusal ? "In short, if the numbers could be trusted" : "In short",
+    page.box(findings.refusal ? "Summary, if the numbers were reliable" : "Summary",
              in_short(findings, design), false);
   }
   page.heading("The log");
@@ -257,8 +271,8 @@ Page show(const Settings& settings, const Input& input, const Findings& findings
   if (findings.seen) {
     page.heading(findings.refusal ? "What was seen" : "What was found");
     page.text(
-        "A chain of integrators behind a lag and a dead time, with a pole, friction and a "
-        "random-walk disturbance; intervals are 95 %.");
+        "The model is a chain of integrators behind a lag and a dead time, with a pole, friction "
+        "and a disturbance that is a random walk.");
     page.table("model", "The machine", model_table(findings));
     if (!findings.residual_correlation.empty()) page.figure(model_figure(findings));
   }
@@ -295,19 +309,21 @@ std::string show_observer(const Settings& settings, const Input& input) {
   const std::filesystem::path file = settings.file;
   const std::string numbers = new_file(settings.out, stem_of(settings) + "-estimates", ".csv");
   if (numbers.empty() || !write_text(numbers, text)) return {};
-  Page page(file.filename().string() + " through an observer");
-  page.text("Observer " + how.observer + ", order " + std::to_string(how.order) + ", b0 = " +
-            number_text(how.input_gain, 6) + ", omega_o = " + number_text(how.bandwidth, 6) +
-            " rad/s, T = " + number_text(how.sample_time, 6) + " s. Gains follow the time stamps.");
+  Page page(file.filename().string() + ", run through an observer");
+  page.text(
+      "Observer " + how.observer + ", order " + std::to_string(how.order) +
+      ", b0 = " + number_text(how.input_gain, 6) + ", omega_o = " + number_text(how.bandwidth, 6) +
+      " rad/s, T = " + number_text(how.sample_time, 6) + " s. The gains follow the time stamps.");
   page.table(
       "log", "The log",
       {{"", "rows"},
        {"in the log", std::to_string(t.size())},
        {"measurements missing or bad, bridged by prediction", std::to_string(found.rejected)},
        {"inputs missing or bad, replaced by the one before", std::to_string(found.inputs)},
-       {"gaps too long to bridge, restarts", std::to_string(found.restarts)}});
+       {"restarts, because a gap was too long to bridge", std::to_string(found.restarts)}});
   Figure figure("estimates", {.rows = 2, .panel_height = 170});
-  figure.caption("Above: y and its estimate. Below: u, and the total disturbance in units of u.");
+  figure.caption(
+      "Top: y and its estimate. Bottom: u, and the estimated total disturbance in units of u.");
   figure.panel(0, 0)
       .y_label("y")
       .legend(Legend::above)
@@ -325,7 +341,8 @@ std::string show_observer(const Settings& settings, const Input& input) {
       .line(t, input.log.u, {.name = "u", .color = Color::grey, .width = 1.0})
       .line(t, load, {.name = "dhat / b0", .color = Color::vermillion, .width = 1.1});
   page.figure(figure);
-  page.text("All estimates: " + std::filesystem::path(numbers).filename().string());
+  page.text("All estimates are in the file " + std::filesystem::path(numbers).filename().string() +
+            ".");
   return page.write(settings.out, stem_of(settings));
 }
 
