@@ -135,11 +135,11 @@ linked() {
 }
 kinds=(heap exceptions doubles text constructors)
 
-# text_bytes PRESET: code and constants of the image without board and output, from the link map.
+# text_bytes PRESET IMAGE: code and constants without board and output, from the link map.
 text_bytes() {
   local map file
-  map=$(image "$1" firmware).elf.map
-  file=$(image "$1" firmware).elf
+  map=$(image "$1" "$2").elf.map
+  file=$(image "$1" "$2").elf
   awk '
     function hex(text,  i, value) {
       for (i = 3; i <= length(text); ++i) {
@@ -213,10 +213,11 @@ limit() {
 
 # compare PRESET IMAGE [--exact]
 compare() {
-  local line
+  local line reference=host
+  [[ $2 != drive* ]] || reference=host-drive
   while IFS= read -r line; do
     if [[ $line == ok* ]]; then pass; else fail "$1, $2: ${line#FAILED }"; fi
-  done < <("$(image firmware-host compare_runs)" ${3+"$3"} "$out/host.txt" "$out/$1-$2.txt")
+  done < <("$(image firmware-host compare_runs)" ${3+"$3"} "$out/$reference.txt" "$out/$1-$2.txt")
 }
 
 # check_links PRESET FILE
@@ -234,8 +235,9 @@ check_links() {
 }
 
 host_run() {
-  build firmware-host firmware_exact compare_runs &&
-    "$(image firmware-host firmware_exact)" >"$out/host.txt" </dev/null
+  build firmware-host firmware_exact drive compare_runs &&
+    "$(image firmware-host firmware_exact)" >"$out/host.txt" </dev/null &&
+    "$(image firmware-host drive)" >"$out/host-drive.txt" </dev/null
 }
 
 if [[ $paste == yes ]]; then
@@ -304,7 +306,7 @@ fi
 built=()
 for core in "${cores[@]}"; do
   # Without a floating-point unit nothing is fused, and there is one image.
-  images=(firmware)
+  images=(firmware drive drive_make)
   [[ $core == cortex-m0plus ]] || images+=(firmware_exact)
   [[ $core != cortex-m4f ]] || images+=(firmware_others)
   if build "$core" "${images[@]}"; then
@@ -317,7 +319,7 @@ done
 echo "built in $((SECONDS - started)) s"
 
 for core in ${built[@]+"${built[@]}"}; do
-  for image in firmware firmware_exact; do
+  for image in firmware firmware_exact drive drive_make; do
     [[ $core-$image != cortex-m0plus-firmware_exact ]] || continue
     if run "$core" "$image" "$out/$core-$image.txt"; then pass; else
       fail "$core, $image: status $? in the emulator; the end of what it said:"
@@ -330,7 +332,10 @@ for core in ${built[@]+"${built[@]}"}; do
     compare "$core" firmware_exact --exact
     compare "$core" firmware
   fi
-  check_links "$core" "$(image "$core" firmware).elf"
+  for image in drive drive_make; do compare "$core" "$image"; done
+  for image in firmware drive drive_make; do
+    check_links "$core" "$(image "$core" "$image").elf"
+  done
   [[ $core != cortex-m4f ]] || check_links "$core" "$(object "$core" others)"
   measures "$core" >"$out/$core.measures"
 done
@@ -339,7 +344,8 @@ done
   for core in ${built[@]+"${built[@]}"}; do
     runs=$out/$core-firmware.txt
     echo
-    echo "**${title[$core]}**; the whole image: $(text_bytes "$core") bytes"
+    echo "**${title[$core]}**; the whole image: $(text_bytes "$core" firmware) bytes; \`drive.cpp\` alone:" \
+      "$(text_bytes "$core" drive) bytes from a snapshot, $(text_bytes "$core" drive_make) with \`make\`"
     echo
     echo "| float, -O2 | code | guarded path | state | stack | deepest | instructions | at most |"
     echo "|---|---:|---:|---:|---:|---:|---:|---:|"
@@ -361,7 +367,7 @@ for core in cortex-m4f cortex-m7; do
   limit "$core: code bytes of LinearEso<2>" "$code" 200
   limit "$core: state bytes of LinearEso<2>" "$(value "$runs" size LinearEso 3)" 56
   limit "$core: instructions of CascadeEso<2, 3>" "$(value "$runs" count CascadeEso 4)" 110
-  limit "$core: bytes of the whole image" "$(text_bytes "$core")" 65536
+  limit "$core: bytes of the whole image" "$(text_bytes "$core" firmware)" 65536
 done
 
 # Only a complete table goes into the page.

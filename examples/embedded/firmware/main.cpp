@@ -1,12 +1,11 @@
-// Every observer on a simulated servo, in float: open loop with a given input, closed loop under
-// ADRC, and one controller out of a timer interrupt. The lines that it prints are compared with
-// those of the same program on the host; numbers are the bits of floats.
+// Every observer on a simulated servo, in float: open loop with a given input, and closed loop
+// under ADRC. The lines that it prints are compared with those of the same program on the host;
+// numbers are the bits of floats.
 //
 //   size NAME observer controller            bytes
 //   open NAME k estimates ..                after sample k
 //   count NAME last most                     instructions of update: of the last sample, of any
 //   closed NAME k y u dhat
-//   interrupt y dhat                         in the end
 //   done
 
 #include <esokit/control/adrc.hpp>
@@ -16,7 +15,6 @@
 #include "board.hpp"
 #include "counting.hpp"
 #include "designs.hpp"
-#include "interrupt.hpp"
 #include "output.hpp"
 #include "pasted.hpp"
 #include "servo.hpp"
@@ -156,7 +154,6 @@ bool run() {
   bool fine = run_all<Linear, Cascade, Algebraic, AdjustableBandwidth, Nonlinear, RecursiveFilter,
                       FrozenFilter>(counter ? &*counter : nullptr);
   fine = open_loop_of_pasted(counter ? &*counter : nullptr) && fine;
-  fine = run_from_interrupt() && fine;
   if (fine) Line("done");
   return fine;
 }

@@ -1,13 +1,15 @@
-// Prints pasted.hpp, on the host: designs of designs.hpp as words.
+// Prints pasted.hpp, on the host: designs as words.
 
 #include <cstdio>
 #include <esokit/core/snapshot_text.hpp>
 
 #include "designs.hpp"
+#include "drive_design.hpp"
 
 int main() {
   const auto observer = firmware::FrozenFilter::Observer::make(firmware::FrozenFilter::config());
-  if (!observer) return 1;
+  const auto controller = drive::Controller::make(drive::config());
+  if (!observer || !controller) return 1;
   std::printf(
       "/// @file\n"
       "/// Printed by print_pasted.cpp; `run.sh --paste` writes it anew.\n"
@@ -17,6 +19,11 @@ int main() {
       "namespace firmware {\n\n"
       "/// FrozenFilter of designs.hpp.\n"
       "%s\n"
-      "}  // namespace firmware\n",
-      esokit::snapshot_text("frozen_filter", esokit::snapshot(*observer)).c_str());
+      "}  // namespace firmware\n\n"
+      "namespace drive {\n\n"
+      "/// The controller of drive_design.hpp.\n"
+      "%s\n"
+      "}  // namespace drive\n",
+      esokit::snapshot_text("frozen_filter", esokit::snapshot(*observer)).c_str(),
+      esokit::snapshot_text("words", esokit::snapshot(*controller)).c_str());
 }
