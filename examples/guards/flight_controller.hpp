@@ -9,17 +9,17 @@
 #include <esokit/adapter/guarded.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/health.hpp>
-#include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/model_eso.hpp>
 
 namespace guards {
 
 /// One axis. Call `rate` once a gyro sample, armed or not.
 class RateAxis {
-  // Of order 2, as the motor lags: tau y'' = -y' + b u. The gyro's filters take some samples: u is
-  // told to the observer that much later.
-  using Observer = esokit::DelayedInput<esokit::LinearEso<2, float>, 16>;
-  using Loop = esokit::Adrc<esokit::Guarded<Observer>>;
-  using Monitor = esokit::HealthMonitor<3, float>;
+  // The motor's lag is in the model: the guards hold and bound the disturbance, not what the motor
+  // does. The gyro's filters take some samples: u is told to the observer that much later.
+  using Lagging = esokit::ModelEso<esokit::ModelParts{.order = 1, .actuator = 1}, float>;
+  using Loop = esokit::Adrc<esokit::Guarded<esokit::DelayedInput<Lagging, 16>>>;
+  using Monitor = esokit::HealthMonitor<2, float>;
 
  public:
   struct Config {
@@ -32,17 +32,18 @@ class RateAxis {
   };
 
   static esokit::Expected<RateAxis, esokit::Error<float>> make(const Config& config) {
-    const float input_gain = config.hover_gain / config.motor_lag;
     const float observer_bandwidth = 3 / config.motor_lag;
     Loop::Config loop;
     loop.observer.observer.observer = {.observer_bandwidth = observer_bandwidth,
-                                       .input_gain = input_gain,
-                                       .sample_time = config.sample_time};
+                                       .input_gain = config.hover_gain,
+                                       .sample_time = config.sample_time,
+                                       .model = {.actuator = {config.motor_lag}}};
     loop.observer.observer.delay = static_cast<int>(config.gyro_delay / config.sample_time + 0.5f);
     loop.observer.disturbance_bound = config.most_disturbance;
     loop.observer.unit = esokit::DisturbanceUnit::input;
-    loop.observer.release_samples = 20;
-    loop.controller_bandwidth = observer_bandwidth / 4;
+    // Until the motor has forgotten what the mixer made of u.
+    loop.observer.release_samples = static_cast<int>(3 * config.motor_lag / config.sample_time);
+    loop.controller_bandwidth = observer_bandwidth / 2;
     loop.limits = {.lower = -1, .upper = 1};
     const auto made = Loop::make(loop);
     if (!made) return made.error();
@@ -58,8 +59,7 @@ class RateAxis {
   float rate(float gyro, float wanted, float throttle, bool flying, bool mixer_at_limit) {
     // More thrust, more moment: b0 goes with the throttle, and never below a fifth of hover's.
     const float share = throttle / config_.hover_throttle;
-    const float hover_gain = config_.hover_gain / config_.motor_lag;
-    (void)loop_.set_input_gain(hover_gain * (share > 0.2f ? share : 0.2f));
+    (void)loop_.set_input_gain(config_.hover_gain * (share > 0.2f ? share : 0.2f));
     if (!flying) {
       // On the ground the axis cannot turn, and that is no disturbance. The reference begins at y.
       reference_ = gyro;
@@ -75,8 +75,8 @@ class RateAxis {
 
   /// Before each arming, and once a second in the air: wrong_sign is a reason to disarm.
   [[nodiscard]] esokit::LoopFault fault() const { return esokit::diagnose(monitor_.health()); }
-  /// What the observer makes of everything that is not u, rad/s^2.
-  [[nodiscard]] float disturbance() const { return loop_.observer().total_disturbance(); }
+  /// What the observer makes of everything that is not the motors, rad/s^2.
+  [[nodiscard]] float disturbance() const { return disturbance_parts(loop_).constant; }
   /// For the blackbox: esokit::telemetry(axis.loop(), t, gyro, wanted); as text: health_text.hpp.
   [[nodiscard]] const Loop& loop() const { return loop_; }
 

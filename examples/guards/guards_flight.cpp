@@ -14,6 +14,9 @@
 // tau       lag           0.01       s
 // b0        hover         600        rad/s^2
 
+#include <esokit/sim/gaussian.hpp>
+#include <type_traits>
+
 #include "guards/flight_controller.hpp"
 #include "guards/guards.hpp"
 
@@ -280,6 +283,126 @@ void pinned(Report& report) {
        bare, guarded, "angle (rad)", "dhat (rad/s^2)", true);
 }
 
+/// A rate loop whose motor lags by 20 ms and whose gyro is filtered, with all its guards.
+struct LagResult {
+  Trace trace;
+  double overshoot = 0;   ///< of a step
+  double deviation = 0;   ///< after a load of 60 rad/s^2
+  double noise = 0;       ///< sd of u, gyro noise of 0.05 rad/s
+  double off_pinned = 0;  ///< abs(dhat - d) / b0 while the mixer gives what it likes
+  double off_after = 0;   ///< the same in the half second after it
+};
+template <class Observer>
+LagResult lagging_flight(double omega_c, double motor_lag = 0.02) {
+  using Loop2 = Adrc<Guarded<DelayedInput<Observer, 4>>>;
+  typename Loop2::Config config{.controller_bandwidth = omega_c,
+                                .limits = {.lower = -1, .upper = 1}};
+  constexpr bool in_model = !std::is_same_v<Observer, LinearEso<2>>;
+  auto& eso = config.observer.observer.observer;
+  eso.observer_bandwidth = 150;
+  eso.sample_time = sample_time;
+  if constexpr (in_model) {
+    eso.input_gain = hover;
+    eso.model = {.actuator = {0.02}};
+  } else {
+    eso.input_gain = hover / 0.02;
+  }
+  config.observer.observer.delay = 2;
+  config.observer.disturbance_bound = 0.6;
+  config.observer.unit = DisturbanceUnit::input;
+  config.observer.release_samples = 60;
+  const auto designed = Loop2::make(config).value();
+  // d by itself: of a chain of order 2 without what the motor makes of it.
+  const auto found = [](const Loop2& loop) {
+    if constexpr (in_model) {
+      return disturbance_parts(loop).constant;
+    } else {
+      return 0.02 * loop.observer().total_disturbance() + loop.observer().template estimate<1>();
+    }
+  };
+  LagResult result;
+  auto loop = designed;
+  Axis axis;
+  double gyro = 0;
+  for (int k = 0; k < 3200; ++k) {
+    const double t = k * sample_time;
+    const bool on_ground = t < 0.5;
+    const bool pinned = t >= 2.5 && t < 2.7;
+    const double load = t >= 1.5 && t < 2 ? 60 : 0;
+    const double wanted = t >= 0.5 && t < 1 ? 3 : t >= 2.45 ? 2 : 0;
+    gyro += sample_time / 0.004 * (axis.rate - gyro);
+    loop.observer().set_pin(pinned ? Pin::either : Pin::free);
+    const double held = loop.output();
+    if (on_ground) {
+      (void)loop.hold(gyro, gyro, 0);
+    } else {
+      (void)loop.update(gyro, wanted);
+    }
+    const double off = std::abs(found(loop) - load) / hover;
+    if (t >= 0.5 && t < 1) result.overshoot = std::max(result.overshoot, axis.rate / 3 - 1);
+    if (load > 0) result.deviation = std::max(result.deviation, axis.rate);
+    if (pinned) result.off_pinned = std::max(result.off_pinned, off);
+    if (t >= 2.7) result.off_after = std::max(result.off_after, off);
+    result.trace.add(t, axis.rate, loop.output(), found(loop) / hover);
+    axis.step(pinned ? -0.1 : held, hover, load, motor_lag);
+    if (on_ground) axis.rate = 0;
+  }
+  loop = designed;
+  axis = {};
+  gyro = 0;
+  Trace noisy;
+  sim::Gaussian noise(1);
+  for (int k = 0; k < 4000; ++k) {
+    gyro += sample_time / 0.004 * (axis.rate + 0.05 * noise.next() - gyro);
+    const double held = loop.output();
+    noisy.add(k * sample_time, gyro, loop.update(gyro, 0.0), 0);
+    axis.step(held, hover, 0, motor_lag);
+  }
+  result.noise = rms(noisy, noisy.u, 0.5, 4);
+  return result;
+}
+
+/// What the guards act on where the motor lags: dhat of a chain of order 2, or d of the model.
+void lag(Report& report) {
+  using Chain = LinearEso<2>;
+  using InModel = ModelEso<ModelParts{.order = 1, .actuator = 1}>;
+  const LagResult chain = lagging_flight<Chain>(37.5);
+  const LagResult model = lagging_flight<InModel>(75);
+  const LagResult slower = lagging_flight<InModel>(75, 0.026);
+  const std::string name = "motor lag and guards";
+  const auto row = [&](const std::string& metric, double LagResult::*of, double factor) {
+    report.expect(name, metric + ", chain of order 2", factor * (chain.*of), true, "reported");
+    report.expect(
+        name, metric + ", lag in the model", factor * (model.*of),
+        of == &LagResult::deviation ? model.*of < 1.1 * (chain.*of) : model.*of < 0.8 * (chain.*of),
+        of == &LagResult::deviation ? "at most a tenth more" : "a fifth less at least");
+    report.expect(name, metric + ", motor 30 % slower than the model", factor * (slower.*of), true,
+                  "reported");
+  };
+  row("overshoot of a step (%)", &LagResult::overshoot, 100);
+  row("rate after a load step (rad/s)", &LagResult::deviation, 1);
+  row("sd of u from noise", &LagResult::noise, 1);
+  row("dhat off while pinned, of b0", &LagResult::off_pinned, 1);
+  row("dhat off afterwards, of b0", &LagResult::off_after, 1);
+  Figure figure("lag", {.rows = 1, .columns = 2, .panel_height = 220});
+  figure.caption(
+      "A rate loop whose motor lags by 20 ms, on the ground until 0.5 s, then a step, a load from "
+      "1.5 to 2 s, and a mixer at its end from 2.5 to 2.7 s. Both loops have the same guards; the "
+      "disturbance of a chain of order 2 contains the motor, which a guard then holds, too.");
+  figure.panel(0, 0)
+      .x_label("t (s)")
+      .y_label("rate (rad/s)")
+      .legend(Legend::above)
+      .line(chain.trace.t, chain.trace.y, {.name = "chain of order 2", .color = Color::vermillion})
+      .line(model.trace.t, model.trace.y, {.name = "lag in the model", .color = Color::blue});
+  figure.panel(0, 1)
+      .x_label("t (s)")
+      .y_label("d found, of b0")
+      .line(chain.trace.t, chain.trace.d, {.color = Color::vermillion})
+      .line(model.trace.t, model.trace.d, {.color = Color::blue});
+  report.add(figure);
+}
+
 /// flight_controller.hpp from arming to landing.
 void flight(Report& report) {
   auto axis = RateAxis::make({}).value();
@@ -341,6 +464,7 @@ int main(int argc, char** argv) {
   throttle(report);
   bound(report);
   pinned(report);
+  lag(report);
   flight(report);
   return report.finish();
 }
