@@ -6,12 +6,14 @@
 
 #include <cmath>
 #include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/guarded.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/model_eso.hpp>
 #include <limits>
 #include <string>
 #include <support/refusal.hpp>
@@ -112,6 +114,91 @@ TEST(MimoAdrc, ChannelsAreDecoupled) {
 }
 
 /// A wrong B0 is disturbance.
+/// B0 of each sample, which turns and grows: the loop does not notice. Told late or not at all it
+/// does.
+TEST(MimoAdrc, InputMatrixOfEachSample) {
+  for (const bool told : {true, false}) {
+    auto controller = Two::make(base()).value();
+    CoupledPlant plant{eigen(base().input_matrix)};
+    const EigenMatrix<double, 2> reference(1.0, -2.0);
+    double off = 0;
+    for (int k = 0; k < 8000; ++k) {
+      const double angle = 0.4 * std::sin(0.05 * k);
+      const EigenMatrix<double, 2, 2> turn{{std::cos(angle), -std::sin(angle)},
+                                           {std::sin(angle), std::cos(angle)}};
+      plant.gain = (1 + 0.3 * std::sin(0.31 * k)) * turn * eigen(base().input_matrix);
+      if (told) {
+        ASSERT_TRUE(controller.set_input_matrix(plant.gain).has_value());
+      }
+      plant.step(eigen(controller.update(plant.output(), reference)));
+      if (k < 6000) continue;
+      off = std::max(off, std::abs(plant.output()(0) - 1));
+      off = std::max(off, std::abs(controller.observer<0>().total_disturbance() + 3));
+    }
+    if (told) {
+      EXPECT_LT(off, 1e-8);
+    } else {
+      EXPECT_GT(off, 1e-2);
+    }
+  }
+}
+
+TEST(MimoAdrc, InputMatrixThatIsRefusedChangesNothing) {
+  auto controller = Two::make(base()).value();
+  const Two::InputMatrix flat{{2, 1}, {4, 2.0001}};
+  EXPECT_EQ(refusal(controller.set_input_matrix(flat)),
+            "input_matrix: has a condition number (the value here) that must be at most");
+  Two::InputMatrix bad = base().input_matrix;
+  bad(1, 0) = hidden_nan<double>();
+  EXPECT_EQ(refusal(controller.set_input_matrix(bad)), "input_matrix[2]: must be finite");
+  EXPECT_EQ(controller.input_matrix(), base().input_matrix);
+}
+
+/// On the ground with the operator's u: no dhat moves, and the first free step does not kick. One
+/// channel has the lag of its actuator in the model, and b0 of what it delivers changes.
+TEST(MimoAdrc, HeldAndScheduled) {
+  using Motor = esokit::Guarded<esokit::ModelEso<esokit::ModelParts{.order = 1, .actuator = 1}>>;
+  using Plain = esokit::Guarded<LinearEso<1>>;
+  using Loop = MimoAdrc<Motor, Plain>;
+  Loop::Config config{.controller_bandwidths = {10, 8}};
+  config.input_matrix = {{2, 1}, {0.5, 3}};
+  std::get<0>(config.observers).observer = {
+      .observer_bandwidth = 60, .sample_time = period, .model = {.actuator = {0.02}}};
+  std::get<1>(config.observers).observer = {.observer_bandwidth = 40, .sample_time = period};
+  auto loop = Loop::make(config).value();
+  const Loop::InputMatrix gain = config.input_matrix;
+  ASSERT_EQ(loop.start({0.5, -1.0}, {0.25, 0.5}), esokit::StepStatus::ok);
+  // At rest: d = -B0 u.
+  const Loop::Output d = -(gain * Loop::Output{0.25, 0.5});
+  double lagging = (gain * Loop::Output{0.25, 0.5})(0);
+  Loop::Output y{0.5, -1.0};
+  const auto found = [&] {
+    return Loop::Output{esokit::disturbance_parts(loop.observer<0>()).constant,
+                        loop.observer<1>().total_disturbance()};
+  };
+  const double left = std::exp(-period / 0.02);
+  for (int k = 0; k < 500; ++k) {
+    const Loop::Output u{0.1 * std::sin(0.01 * k), -0.3};
+    lagging = (gain * u)(0) + (lagging - (gain * u)(0)) * left;
+    ASSERT_EQ(loop.hold(y, u), u);
+    for (int i = 0; i < 2; ++i) ASSERT_NEAR(found()(i), d(i), 1e-11);
+    ASSERT_FALSE(loop.observer<0>().gated());
+  }
+  double share = 1;
+  for (int k = 0; k < 3000; ++k) {
+    const Loop::Output drive = gain * loop.output();
+    y(0) += share * (period * drive(0) + (lagging - drive(0)) * 0.02 * (1 - left)) + period * d(0);
+    y(1) += period * (drive(1) + d(1));
+    lagging = drive(0) + (lagging - drive(0)) * left;
+    share = 1 + 0.5 * std::sin(0.2 * k);
+    ASSERT_TRUE(loop.observer<0>().set_input_gain(share).has_value());
+    (void)loop.update(y, {0.5, -1.0});
+    for (int i = 0; i < 2; ++i) ASSERT_NEAR(found()(i), d(i), 1e-9) << k;
+  }
+  EXPECT_NEAR(y(0), 0.5, 0.05);
+  EXPECT_NEAR(y(1), -1, 1e-9);
+}
+
 TEST(MimoAdrc, WrongMatrix) {
   auto config = base();
   config.input_matrix = {{1.7, 0.6}, {0.8, 3.4}};

@@ -62,7 +62,8 @@ void add_controllers(std::vector<Kind>& kinds) {
   KIND(DualFeedbackAdrc<2, float, 1, DeltaOperator, LimitedFeedback, PoleSet>);
   KIND(TransferFunctionAdrc<2, float>);
   KIND(MimoAdrc<WrappedOutput<LinearEso<1, double>>, DelayedInput<LinearEso<2, double>, 3>>);
-  KIND(MimoAdrc<ModelEso<ModelParts{.order = 1, .actuator = 1}, float>, LinearEso<1, float>>);
+  KIND(MimoAdrc<Guarded<ModelEso<ModelParts{.order = 1, .actuator = 1}, float>>,
+                Guarded<LinearEso<1, float>>>);
 #endif
 }
 

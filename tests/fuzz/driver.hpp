@@ -861,6 +861,24 @@ class Driver {
                      d.refusable([&] { return d.object_->start(y, u); });
                      if (!(fine(y) && fine(u)) && d.accepted_) d.fail("a bad start is taken");
                    }});
+      a.push_back({"set_input_matrix", [](Driver& d) {
+                     auto b = d.config_.input_matrix;
+                     for (auto& x : b) x = x * d.number({0.5, 2});
+                     d.refusable([&] { return d.object_->set_input_matrix(b); });
+                   }});
+      if constexpr (requires(T & o, const V& v) { o.hold(v, v); }) {
+        a.push_back({"hold", [](Driver& d) {
+                       const V y = d.template vector<V>(), u = d.template vector<V>();
+                       V from = d.object_->output();
+                       for (int i = 0; i < from.size(); ++i) {
+                         if (is_finite(u(i))) from(i) = u(i);
+                       }
+                       const V now = d.quietly([&] { return d.object_->hold(y, u); });
+                       for (int i = 0; i < from.size(); ++i) {
+                         if (now(i) < from(i) || now(i) > from(i)) d.fail("hold changes u");
+                       }
+                     }});
+      }
     } else {
       using Y = typename T::Output;
       using U = typename T::Input;

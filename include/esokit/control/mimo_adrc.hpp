@@ -3,6 +3,7 @@
 #pragma once
 
 #include <esokit/control/adrc_law.hpp>
+#include <esokit/control/control_loop.hpp>
 #include <esokit/control/controller.hpp>
 #include <esokit/control/limiter.hpp>
 #include <esokit/core/lane_by_lane.hpp>
@@ -83,7 +84,7 @@ class MimoAdrc {
   /// @return the controller at rest in zero, or an error that names the field; for B0 with its
   /// condition number as the value
   static Expected<MimoAdrc, Error<S>> make(const Config& config) {
-    auto inverse = inverted(config);
+    auto inverse = inverted(config.input_matrix, config.condition_limit);
     if (!inverse) return inverse.error();
     const S& sample_time = chain_config<First>(std::get<0>(config.observers)).sample_time;
     return make_channels(config, *inverse, sample_time,
@@ -93,37 +94,61 @@ class MimoAdrc {
   /// One sample. @param y q x 1, NaN where missing @param reference r, q x 1
   /// @return u, q x 1, to be held until the next sample, within the limits
   Output update(const Output& y, const Output& reference) noexcept {
-    Output applied;
-    for (int i = 0; i < channels; ++i) applied(i) = limiters_[static_cast<std::size_t>(i)].last();
-    const Output drive = input_matrix_ * applied;
+    const Output applied = output();
+    const Output drive = told_matrix_ * applied;
+    told_matrix_ = input_matrix_;
     Output wanted;
     detail::unroll<channels>([&](auto i) {
       constexpr auto channel = static_cast<std::size_t>(i);
       constexpr int row = i;
       auto& observer = std::get<channel>(observers_);
-      const StepStatus status = observer.update(y(row), drive(row));
-      std::get<channel>(statuses_) = status;
-      // After a gap too long to bridge: the steady state of the present u does not bump.
-      if (has(status, StepStatus::restarted)) [[unlikely]] {
-        const S input = observer.applied_input();
-        (void)observer.reset(observer.rest(S(y(row)), input));
-      }
+      observe<row>(y(row), drive(row));
       const auto estimate = observer.estimate();
       S r = reference(row);
       if constexpr (observer_traits<ObserverOf<row>>.wraps_output)
         r = estimate(0) + observer.wrap(r - estimate(0));
-      const S v = std::get<channel>(laws_).control(estimate, r);
-      wanted(row) = is_finite(v) ? v : drive(row);
+      const S v =
+          detail::by_present_gain(observer, S(std::get<channel>(laws_).control(estimate, r)));
+      wanted(row) = is_finite(v) ? v : S((input_matrix_ * applied)(row));
     });
     return put_out(inverse_ * wanted);
   }
 
   /// The same if the actuators report what they held since the last sample; NaN: not known.
   Output update(const Output& y, const Output& reference, const Output& u_applied) noexcept {
-    for (int i = 0; i < channels; ++i) {
-      if (is_finite(u_applied(i))) limiters_[static_cast<std::size_t>(i)].track(u_applied(i));
-    }
+    report_applied(u_applied);
     return update(y, reference);
+  }
+
+  /// For a plant at rest or carried: the observers follow y, every dhat keeps its value, u is the
+  /// caller's; see Guarded. After it begin with the reference at y.
+  /// @param u_applied what the actuators held since the last sample @return the same
+  Output hold(const Output& y, const Output& u_applied) noexcept
+      requires(observer_traits<Observers>.gates_disturbance&&...) {
+    report_applied(u_applied);
+    const Output drive = told_matrix_ * output();
+    told_matrix_ = input_matrix_;
+    detail::unroll<channels>([&](auto i) {
+      constexpr int row = i;
+      auto& observer = std::get<static_cast<std::size_t>(i)>(observers_);
+      observe<row>(y(row), observer.hold(S(drive(row))));
+      observer.release();
+    });
+    return output();
+  }
+
+  /// B0 from the coming sample on: it applies to the law's next answer, and to the u given one
+  /// sample later, which is that answer. Every dhat keeps its value (unit of y^(n)). It costs an
+  /// inversion of q x q. Ahead of the lag of an actuator in a channel's model; a factor of what
+  /// this actuator delivers is the `set_input_gain` of a Guarded channel, whose gain is 1 in make.
+  /// @return as `make` for a B0 that it would refuse: nothing changes
+  Check<S> set_input_matrix(const InputMatrix& input_matrix) noexcept {
+    const auto inverse = inverted(input_matrix, condition_limit_);
+    if (!inverse) return inverse.error();
+    if (!is_finite(S((input_matrix * output()).sum()))) return too_large(S(output()(0)));
+    input_matrix_ = input_matrix;
+    inverse_ = *inverse;
+    return {};
   }
 
   /// Takes over a plant that stands at y under u: dhat = -B0 u.
@@ -219,12 +244,33 @@ class MimoAdrc {
   using Laws = std::tuple<AdrcLaw<Observers::order, S>...>;
 
   MimoAdrc(const Channels& observers, const Laws& laws, const Array<Limiter<S>, channels>& limiters,
-           const InputMatrix& input_matrix, const InputMatrix& inverse) noexcept
+           const Config& config, const InputMatrix& inverse) noexcept
       : observers_(observers),
         laws_(laws),
         limiters_(limiters),
-        input_matrix_(input_matrix),
-        inverse_(inverse) {}
+        input_matrix_(config.input_matrix),
+        told_matrix_(config.input_matrix),
+        inverse_(inverse),
+        condition_limit_(config.condition_limit) {}
+
+  template <int Channel>
+  void observe(const S& y, const S& drive) noexcept {
+    constexpr auto channel = static_cast<std::size_t>(Channel);
+    auto& observer = std::get<channel>(observers_);
+    const StepStatus status = observer.update(y, drive);
+    std::get<channel>(statuses_) = status;
+    // After a gap too long to bridge: the steady state of the present u does not bump.
+    if (has(status, StepStatus::restarted)) [[unlikely]] {
+      const S input = observer.applied_input();
+      (void)observer.reset(observer.rest(y, input));
+    }
+  }
+
+  void report_applied(const Output& u_applied) noexcept {
+    for (int i = 0; i < channels; ++i) {
+      if (is_finite(u_applied(i))) limiters_[static_cast<std::size_t>(i)].track(u_applied(i));
+    }
+  }
 
   static Error<S> too_large(const S& u) {
     return {"input_matrix", u,
@@ -242,16 +288,17 @@ class MimoAdrc {
     return u;
   }
 
-  static Expected<InputMatrix, Error<S>> inverted(const Config& config) {
+  static Expected<InputMatrix, Error<S>> inverted(const InputMatrix& input_matrix,
+                                                  const S& condition_limit) {
     Rules<S> rules;
-    rules.above("condition_limit", config.condition_limit, S(1));
+    rules.above("condition_limit", condition_limit, S(1));
     for (int i = 0; i < channels; ++i) {
       for (int j = 0; j < channels; ++j) {
-        rules.finite("input_matrix", S(config.input_matrix(i, j)), i * channels + j);
+        rules.finite("input_matrix", S(input_matrix(i, j)), i * channels + j);
       }
     }
     if (!rules) return rules.error();
-    InputMatrix scaled = config.input_matrix;
+    InputMatrix scaled = input_matrix;
     Output rows;
     Output columns;
     const auto scale_of = [](const S& largest) { return largest > S(0) ? S(1) / largest : S(1); };
@@ -272,12 +319,12 @@ class MimoAdrc {
     if (!is_finite(inverse.sum()) || !is_finite(condition)) {
       condition = detail::unbounded<S>();
     }
-    if (!is_finite(condition) || condition > config.condition_limit) {
+    if (!is_finite(condition) || condition > condition_limit) {
       return Error<S>{"input_matrix",
                       condition,
                       "has a condition number (the value here) that must be at most",
                       -1,
-                      config.condition_limit,
+                      condition_limit,
                       true};
     }
     for (int i = 0; i < channels; ++i) {
@@ -323,7 +370,7 @@ class MimoAdrc {
       return named;
     }
     return MimoAdrc({*std::get<I>(observers)...}, {*std::get<I>(laws)...},
-                    {*std::get<I>(limiters)...}, config.input_matrix, inverse);
+                    {*std::get<I>(limiters)...}, config, inverse);
   }
 
   template <class Observer>
@@ -364,7 +411,9 @@ class MimoAdrc {
   Laws laws_;
   Array<Limiter<S>, channels> limiters_;
   InputMatrix input_matrix_;
+  InputMatrix told_matrix_;  ///< of the u that is told next: what it was when the law gave it
   InputMatrix inverse_;
+  S condition_limit_;
   Array<StepStatus, channels> statuses_{};
 };
 

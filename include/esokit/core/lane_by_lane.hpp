@@ -286,6 +286,15 @@ class LaneByLane : public detail::GoesLaneByLane {
         [&](Plain& lane, [[maybe_unused]] int i) { return lane.set_input_gain(b[i]); });
   }
 
+  /// The same for B0. @param b0 q x q
+  template <class B, class P = Plain>
+  requires requires(P& lane) { typename P::InputMatrix; }
+  Check<S> set_input_matrix(const B& b0) noexcept {
+    return all_or_none([&](Plain& lane, int i) {
+      return lane.set_input_matrix(detail::get_lane<typename P::InputMatrix>(b0, i));
+    });
+  }
+
   /// The longest gap that every lane bridges; with a model some lanes may bridge more.
   [[nodiscard]] int max_gap() const noexcept requires requires(const Plain& lane) {
     lane.max_gap();
