@@ -8,6 +8,7 @@
 #include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/type_tag.hpp>
+#include <esokit/model/sampled_model.hpp>
 #include <limits>
 #include <type_traits>
 
