@@ -3,12 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <complex>
 #include <cstddef>
 #include <cstdint>
 #include <esokit/analysis/covariance.hpp>
 #include <esokit/analysis/delay_margin.hpp>
+#include <esokit/analysis/frequency_response.hpp>
 #include <esokit/analysis/margins.hpp>
 #include <esokit/model/linear_plant.hpp>
 #include <esokit/sim/gaussian.hpp>
@@ -17,6 +19,7 @@
 #include <esokit/tune/tune.hpp>
 #include <limits>
 #include <string>
+#include <support/refusal.hpp>
 #include <type_traits>
 #include <vector>
 
@@ -101,6 +104,90 @@ TEST(LoopCostTest, IsTheLyapunovEquation) {
       EXPECT_NEAR(fast.control_noise / exact.control_noise, 1.0, 1e-4);
     }
   }
+}
+
+// Beside the analysis of the same loops, each in turn: the margins are the least over the ends of
+// the intervals, the tolerance is where the loop ends to be stable, and a swing adds half the
+// square of what it does.
+TEST(LoopCostTest, IsTheAnalysis) {
+  TuneModel model = full();
+  model.latency_half_width = 1e-3;
+  model.lag_half_width = 4e-3;
+  TuneModel late = model, long_lag = model, short_lag = model;
+  late.dead_time += 1e-3;
+  long_lag.lag += 4e-3;
+  long_lag.dead_time += 1e-3 - 4e-3;
+  short_lag.lag -= 4e-3;
+  short_lag.dead_time += 1e-3 + 4e-3;
+  for (const double w : {5.0, 20.0}) {
+    const auto controller = Lqg(model).controller(std::pow(w, -4));
+    const auto fast = LoopCost(model, {}, 1.0, 200.0)(controller);
+    double modulus = 1e9, delay = 1e9;
+    const auto take = [&](const TuneModel& variant, double gain) {
+      const auto loop = closed_loop(variant, controller, gain).value();
+      modulus = std::min(modulus, margins(loop).value().modulus.value);
+      delay = std::min(delay, delay_margin(loop).value().value);
+    };
+    take(model, 1.0);
+    take(late, 1.05);
+    take(late, 0.95);
+    take(long_lag, 1.05);
+    take(short_lag, 1.05);
+    EXPECT_NEAR(fast.modulus / modulus, 1.0, 1e-3) << w;
+    EXPECT_NEAR(fast.delay / delay, 1.0, 1e-3) << w;
+    const auto stable = [&](const TuneModel& variant, double gain) {
+      return closed_loop(variant, controller, gain).value().stable();
+    };
+    const double inside = 0.999 * fast.tolerance, outside = 1.001 * fast.tolerance;
+    EXPECT_TRUE(stable(model, inside) && stable(model, 1.0 / inside)) << w;
+    EXPECT_FALSE(stable(model, outside) && stable(model, 1.0 / outside)) << w;
+    for (double factor = 1.0; factor < 6.0; factor *= 1.04) {
+      const auto numbers = LoopCost(model, {.gain_factor = factor}, 1.0)(controller);
+      EXPECT_EQ(numbers.tolerant, stable(late, 1.05 * factor) && stable(late, 0.95 / factor))
+          << w << ' ' << factor;
+    }
+    const double frequency = 30.0, amplitude = 3.0;
+    auto swinging = model;
+    swinging.swings = {{frequency, amplitude, 0.0}};
+    const auto swung = LoopCost(swinging, {}, 1.0, 200.0)(controller);
+    const auto loop = closed_loop(model, controller).value();
+    const auto response = frequency_response(loop.system(), frequency).value();
+    const auto grown = [](double with, double without) { return with * with - without * without; };
+    EXPECT_NEAR(grown(swung.output, fast.output) / (4.5 * std::norm(response(0, 2))), 1.0, 1e-6);
+    EXPECT_NEAR(grown(swung.control, fast.control) / (4.5 * std::norm(response(1, 2) - 1.0 / 3.0)),
+                1.0, 1e-6);
+  }
+  LoopNumbers numbers;
+  numbers.output = 2.0;
+  numbers.control = 3.0;
+  EXPECT_EQ(numbers.cost(0.5, -4.0), 76.0);
+}
+
+// X = A' X A - A' X b (r + b' X b)^-1 b' X A + Q, to the last digits.
+TEST(LqgTest, SolvesTheRiccatiEquation) {
+  using esokit::detail::product;
+  using esokit::detail::transposed;
+  DynamicMatrix<double> a(2, 2), b(2, 1), q(2, 2);
+  a(0, 0) = a(1, 1) = 1.0;
+  a(0, 1) = 0.1;
+  b(0, 0) = 0.005;
+  b(1, 0) = 0.1;
+  q(0, 0) = 1.0;
+  const auto x = esokit::detail::solve_riccati(a, b, 0.01, q);
+  const auto ax = product(transposed(a), x);
+  const auto axa = product(ax, a), axb = product(ax, b);
+  const double size = 0.01 + product(product(transposed(b), x), b)(0, 0);
+  for (int i = 0; i < 2; ++i) {
+    for (int j = 0; j < 2; ++j) {
+      EXPECT_NEAR(axa(i, j) - axb(i, 0) * axb(j, 0) / size + q(i, j), x(i, j), 1e-12 * x(0, 0));
+    }
+  }
+  // A chain of one with two samples of dead time: y falls by the same factor in each sample.
+  TuneModel model = plain(1);
+  model.dead_time = 2e-3;
+  const Lqg lqg(model);
+  const double rho = 1e-3, factor = 1.0 - 1e-3 * lqg.feedback(rho)(0, 0);
+  EXPECT_DOUBLE_EQ(lqg.settling(rho), 1e-3 * (std::ceil(std::log(0.02) / std::log(factor)) + 2));
 }
 
 // scipy.linalg.solve_discrete_are and solve_discrete_lyapunov, R = 1e-6, T = 1 ms.
@@ -198,10 +285,17 @@ TEST(TuneTest, TheReadyControllerIsTheDesign) {
   model.input_gain = {-2.0, 0.1};
   model.lag = 0.01;
   model.dead_time = 0.0025;
+  model.u_max = 4.0;
   const auto tuning = tune(model).value();
   int seen = 0;
   for (const TunedDesign& design : tuning.designs) {
+    const auto loop = closed_loop(model, design.controller).value();
+    // A load that one unit of u balances.
+    EXPECT_EQ(design.load_peak, esokit::detail::step_answer(loop.system(), 2, 2.0, 0.0, 3000).peak);
     const auto ok = esokit::with_controller<2>(model, design, [&](const auto& controller) {
+      auto far = controller;
+      EXPECT_EQ(far.update(1e6, 0.0), 4.0);
+      EXPECT_EQ(far.update(-1e9, 0.0), -5.0);
       const esokit::Expected<LinearController, esokit::Error<double>> linear =
           linear_controller(controller);
       const auto real = esokit::detail::closed_upon_itself(linear.value());
@@ -219,6 +313,78 @@ TEST(TuneTest, TheReadyControllerIsTheDesign) {
   const auto wrong =
       esokit::with_controller<1>(model, tuning.designs.front(), [](const auto&) { FAIL(); });
   EXPECT_STREQ(wrong.error().field, "order");
+  const auto refused = [&](const auto& change) {
+    TunedDesign design = named(tuning, "LinearEso, free poles");
+    change(design);
+    return esokit_test::refusal(
+        esokit::with_controller<2>(model, design, [](const auto&) { FAIL(); }));
+  };
+  const std::string more = "knows: more than the lag: see the code of the design";
+  EXPECT_EQ(refused([](TunedDesign& d) { d.knows.sensor = true; }), more);
+  EXPECT_EQ(refused([](TunedDesign& d) { d.knows.swing = true; }), more);
+  const std::string alien = "design: is not one that tune made for a model of this order";
+  EXPECT_EQ(refused([](TunedDesign& d) { d = {}; }), alien);
+  EXPECT_EQ(refused([](TunedDesign& d) { d.settings.gains.pop_back(); }), alien);
+  EXPECT_EQ(refused([](TunedDesign& d) { d.settings.observer_poles.pop_back(); }), alien);
+  for (const int number : {0, 4}) {
+    EXPECT_EQ(refused([&](TunedDesign& d) { d.levels = number; }), alien);
+    EXPECT_EQ(refused([&](TunedDesign& d) { d.extension = number; }), alien);
+  }
+}
+
+// Feasible is what keeps the margins, and comes first; then what costs less, and of equals what is
+// updated faster.
+TEST(TuneTest, RanksByCostAmongThoseThatKeepTheirMargins) {
+  TuneModel model = plain(2);
+  model.dead_time = 0.002;
+  const esokit::TuneRules rules{.modulus_margin = 0.6, .delay_samples = 6.0, .gain_factor = 3.0};
+  const auto tuning = tune(model, {.controller_bandwidth = 30.0}, rules).value();
+  int feasible = 0;
+  for (std::size_t i = 0; i < tuning.designs.size(); ++i) {
+    const TunedDesign& a = tuning.designs[i];
+    feasible += a.feasible ? 1 : 0;
+    const auto wrong = [&](double gain) {
+      return closed_loop(model, a.controller, gain).value().stable();
+    };
+    EXPECT_EQ(a.feasible, a.modulus_margin >= 0.999 * 0.6 && a.delay_margin >= 0.999 * 6e-3 &&
+                              wrong(3.0) && wrong(1.0 / 3.0))
+        << a.name;
+    for (std::size_t j = i + 1; j < tuning.designs.size(); ++j) {
+      const TunedDesign& b = tuning.designs[j];
+      EXPECT_TRUE(a.feasible || !b.feasible) << a.name << b.name;
+      if (a.feasible != b.feasible) continue;
+      EXPECT_LE(a.cost, 1.01 * b.cost) << a.name << b.name;
+      if (b.cost <= a.cost) {
+        EXPECT_LE(a.instructions, b.instructions) << a.name << b.name;
+      }
+    }
+  }
+  EXPECT_GT(feasible, 0);
+  EXPECT_LT(feasible, static_cast<int>(tuning.designs.size()));
+  EXPECT_EQ(esokit::update_instructions(2, esokit::TuneFamily::filter, 1, 1, {}), 39 + 9);
+  // 1 - 0.9^k is within 2 % of 1 from k = 38 on, and a load that leaves nothing has its peak at
+  // once.
+  esokit::DynamicSystem lag;
+  lag.a = lag.b = lag.c = lag.d = DynamicMatrix<double>(1, 1);
+  lag.a(0, 0) = -0.1;
+  lag.b(0, 0) = 0.1;
+  lag.c(0, 0) = 1.0;
+  lag.sample_time = 0.5;
+  EXPECT_EQ(esokit::detail::step_answer(lag, 0, 1.0, 1.0, 100).settling, 19.0);
+}
+
+// 99 % are 2.576 standard errors, 95 % are 1.960.
+TEST(TuneTest, TakesAModelWithIntervalsOfNinetyNinePercent) {
+  esokit::Identified found;
+  found.order = 2;
+  found.input_gain = {3.0, 0.5};
+  found.latency = {0.02, 0.001};
+  found.lag = {0.01, 0.002};
+  found.log.sample_time = 1e-3;
+  const TuneModel model = esokit::tune_model(found, -1.0, 2.0);
+  EXPECT_NEAR(model.input_gain.half_width, 0.5 * 2.576 / 1.960, 1e-3);
+  EXPECT_NEAR(model.latency_half_width, 0.001 * 2.576 / 1.960, 1e-6);
+  EXPECT_NEAR(model.lag_half_width, 0.002 * 2.576 / 1.960, 1e-6);
 }
 
 TEST(TuneTest, SimulatedItDoesWhatWasPredicted) {
@@ -307,6 +473,78 @@ TEST(TuneTest, RefusesWhatIsNoProblem) {
             "settling_time is less than this sample time and dead time allow, that is");
   EXPECT_EQ(refused(same, {.settling_time = 1.0, .controller_bandwidth = 4.0}),
             "controller_bandwidth must be left out if control_noise or settling_time is given");
+  EXPECT_EQ(refused(same, {.settling_time = 1e9}),
+            "settling_time is far slower than the disturbance; must be at most");
+  EXPECT_EQ(refused(same, {.controller_bandwidth = 501.0}),
+            "controller_bandwidth must not be above half of the sample rate in rad/s, that is");
+  EXPECT_EQ(refused(same, {.controller_bandwidth = 0.99e-3}),
+            "controller_bandwidth must be at least 1e-6 of the sample rate");
+  // Numbers of an LQG controller that no double holds.
+  EXPECT_EQ(refused([](TuneModel& m) { m.pole = -9e4; }),
+            "optimum cannot be computed: the numbers of this model are too far apart");
+  for (const esokit::TuneRules rules :
+       {esokit::TuneRules{.modulus_margin = 1.0}, esokit::TuneRules{.gain_factor = 0.99}}) {
+    EXPECT_EQ(esokit_test::refusal(tune(plain(1), {}, rules)),
+              rules.gain_factor < 1.0 ? "gain_factor: must be finite and 1 or more"
+                                      : "modulus_margin: must be below 1");
+  }
+}
+
+// Sizes with which nothing can be computed, each from both sides of its limit.
+TEST(TuneModelTest, RefusesWhatIsTooFarApart) {
+  const struct {
+    double TuneModel::*member;
+    double good, bad;
+    const char* rule;
+  } cases[] = {
+      {&TuneModel::noise, 1e-60, 0.9e-60,
+       "noise: must be between 1e-60 and 1e60: write it in another unit"},
+      {&TuneModel::disturbance, 1e60, 1.1e60,
+       "disturbance: must be between 1e-60 and 1e60: write it in another unit"},
+      // (q / (N^2 T))^(1/4) T = 1e-6 of order 1
+      {&TuneModel::disturbance, 1.1e-21, 0.9e-21,
+       "disturbance: is so small for this noise that an observer would take a million samples"},
+      {&TuneModel::lag, 1.001e-12, 0.999e-12, "lag: must be 0, or between 1e-9 and 1e6 samples"},
+      {&TuneModel::lag, 1e3, 1.1e3, "lag: must be 0, or between 1e-9 and 1e6 samples"},
+      {&TuneModel::sensor, 1e3, 1.1e3, "sensor: must be 0, or between 1e-9 and 1e6 samples"},
+      {&TuneModel::pole, 1e5, 1.1e5, "pole: must be at most a hundred times the sample rate"},
+      {&TuneModel::pole, -1e5, -1.1e5, "pole: must be at most a hundred times the sample rate"},
+      {&TuneModel::dead_time, 0.1, 0.101, "dead_time: must not be above 100 samples"},
+      {&TuneModel::latency_half_width, 0.1, 0.101,
+       "latency_half_width: must not be above 100 samples"},
+      {&TuneModel::sample_time, 1e-12, 0.9e-12, "sample_time: must be between 1e-12 s and 1e12 s"},
+      {&TuneModel::u_max, 1e60, 1.1e60, "u_max: is too large: write it in another unit"},
+      {&TuneModel::u_min, -1e60, -1.1e60, "u_min: is too large: write it in another unit"}};
+  for (const auto& c : cases) {
+    TuneModel model = plain(1, 1e9);
+    model.*c.member = c.good;
+    EXPECT_EQ(esokit_test::refusal(model.check()), "accepted") << c.rule;
+    model.*c.member = c.bad;
+    EXPECT_EQ(esokit_test::refusal(model.check()), c.rule);
+  }
+  const auto swinging = [](const esokit::KnownSwing& swing) {
+    TuneModel model = plain(1);
+    model.swings = {swing};
+    return esokit_test::refusal(model.check());
+  };
+  EXPECT_EQ(swinging({1e-6, 1e60, 0.0}), "accepted");
+  EXPECT_EQ(swinging({0.9e-6, 1.0, 0.0}),
+            "swings.frequency[0]: must be at least 1e-9 of the sample rate");
+  EXPECT_EQ(swinging({3101.0, 1.0, 0.0}),
+            "swings.frequency[0]: must be below half the sample rate");
+  EXPECT_EQ(swinging({1.0, 1.1e60, 0.0}),
+            "swings.amplitude[0]: is too large: write it in another unit");
+  TuneModel two = plain(1);
+  two.swings.resize(2);
+  EXPECT_EQ(esokit_test::refusal(two.check()), "swings: must be one at most");
+  for (const double gain : {1e-20, -1e20, 0.9e-20, -1.1e20}) {
+    TuneModel model = plain(1);
+    model.input_gain = {gain, 0.0};
+    EXPECT_EQ(esokit_test::refusal(model.check()),
+              gain == 1e-20 || gain == -1e20
+                  ? "accepted"
+                  : "input_gain: must be between 1e-20 and 1e20: write it in another unit");
+  }
 }
 
 }  // namespace

@@ -41,9 +41,23 @@ struct TuneModel {
   double u_min = 0.0;                ///< limits of the actuator
   double u_max = 0.0;                ///< above u_min
 
-  /// Error of a number that is not possible for a plant.
+  /// (q / (N^2 T))^(1 / (2 n + 2)): that of a Kalman filter of the chain, rad/s.
+  [[nodiscard]] double filter_bandwidth() const {
+    return std::pow(disturbance / (noise * noise * sample_time), 0.5 / (order + 1));
+  }
+
+  /// Error of a number that is not possible for a plant, or of a size with which nothing can be
+  /// computed.
   [[nodiscard]] Check<double> check() const {
     Rules<double> rules;
+    const auto size_fits = [&](const char* field, double value) {
+      rules.require(std::abs(value) >= 1e-60 && std::abs(value) <= 1e60, field, value,
+                    "must be between 1e-60 and 1e60: write it in another unit");
+    };
+    const auto lag_fits = [&](const char* field, double value) {
+      rules.require(!(value > 0.0) || (value >= 1e-9 * sample_time && value <= 1e6 * sample_time),
+                    field, value, "must be 0, or between 1e-9 and 1e6 samples");
+    };
     rules
         .require(order >= 1 && order <= 3, "order", static_cast<double>(order), "must be 1, 2 or 3")
         .nonzero("input_gain", input_gain.value)
@@ -65,13 +79,36 @@ struct TuneModel {
         .require(swings.size() <= 1, "swings", static_cast<double>(swings.size()),
                  "must be one at most")
         .require(!(dead_time > 100.0 * sample_time), "dead_time", dead_time,
-                 "must not be above 100 samples");
+                 "must not be above 100 samples")
+        .require(!(latency_half_width > 100.0 * sample_time), "latency_half_width",
+                 latency_half_width, "must not be above 100 samples")
+        .require(sample_time >= 1e-12 && sample_time <= 1e12, "sample_time", sample_time,
+                 "must be between 1e-12 s and 1e12 s")
+        .require(!(std::abs(pole) * sample_time > 100.0), "pole", pole,
+                 "must be at most a hundred times the sample rate")
+        .require(std::abs(u_min) <= 1e60, "u_min", u_min, "is too large: write it in another unit")
+        .require(std::abs(u_max) <= 1e60, "u_max", u_max, "is too large: write it in another unit");
+    // Of order 3 the LQG controller is another one beyond this.
+    rules.require(std::abs(input_gain.value) >= 1e-20 && std::abs(input_gain.value) <= 1e20,
+                  "input_gain", input_gain.value,
+                  "must be between 1e-20 and 1e20: write it in another unit");
+    size_fits("noise", noise);
+    size_fits("disturbance", disturbance);
+    lag_fits("lag", lag);
+    lag_fits("sensor", sensor);
+    // Beyond, the criterion is the difference of numbers that are the same to the last digit.
+    rules.require(filter_bandwidth() * sample_time >= 1e-6, "disturbance", disturbance,
+                  "is so small for this noise that an observer would take a million samples");
     for (std::size_t i = 0; i < swings.size(); ++i) {
       const int index = static_cast<int>(i);
       rules.positive("swings.frequency", swings[i].frequency, index)
           .require(swings[i].frequency * sample_time < 3.1, "swings.frequency", swings[i].frequency,
                    "must be below half the sample rate", index)
+          .require(swings[i].frequency * sample_time >= 1e-9, "swings.frequency",
+                   swings[i].frequency, "must be at least 1e-9 of the sample rate", index)
           .not_negative("swings.amplitude", swings[i].amplitude, index)
+          .require(!(swings[i].amplitude > 1e60), "swings.amplitude", swings[i].amplitude,
+                   "is too large: write it in another unit", index)
           .not_negative("swings.capture_bandwidth", swings[i].capture_bandwidth, index);
     }
     return rules;

@@ -375,7 +375,12 @@ inline void fill_in(Contender& c, const TuneSearch& search, const LoopCost& fine
   }
   if (!numbers.stable) return;
   const auto loop = closed_loop(model, *controller);
-  if (!loop || !loop->stable()) return;
+  if (!loop || !loop->stable()) {
+    // The poles themselves have the last word.
+    d.feasible = false;
+    d.constraint = "stability";
+    return;
+  }
   const double decay = -std::log1p(std::max(loop->stability_abscissa(), -0.9));
   const int steps = static_cast<int>(std::min(12.0 / decay, 50000.0)) + 10;
   d.settling_time = step_answer(loop->system(), 0, 1.0, 1.0, steps).settling;
@@ -577,8 +582,7 @@ double bandwidth_for(const Function& rises, double wanted, double low, double hi
   Tuning tuning;
   tuning.model = model;
   tuning.rules = rules;
-  const double filter_bandwidth =
-      std::pow(model.disturbance / (model.noise * model.noise * T), 0.5 / (n + 1));
+  const double filter_bandwidth = model.filter_bandwidth();
   const double latency = model.lag + model.dead_time + model.sensor + 1.5 * T;
   const Lqg lqg(model);
   const double slow = std::min(1e-3 * filter_bandwidth, 1e-2 / T), fast = 0.5 / T;
@@ -586,9 +590,12 @@ double bandwidth_for(const Function& rises, double wanted, double low, double hi
   double w = 0.0;
   if (wish.controller_bandwidth > 0.0) {
     w = wish.controller_bandwidth;
-    checks.require(w <= fast,
-                   {"controller_bandwidth", w,
-                    "must not be above half of the sample rate in rad/s, that is", -1, fast, true});
+    checks
+        .require(w <= fast,
+                 {"controller_bandwidth", w,
+                  "must not be above half of the sample rate in rad/s, that is", -1, fast, true})
+        .require(w * T >= 1e-6, "controller_bandwidth", w,
+                 "must be at least 1e-6 of the sample rate");
   } else if (wish.settling_time > 0.0) {
     const auto settling = [&](double x) { return -lqg.settling(rho_of(x)); };
     checks
@@ -636,6 +643,9 @@ double bandwidth_for(const Function& rises, double wanted, double low, double hi
   walking.swings.clear();
   tuning.lqg = LoopCost(walking, rules, search.slowest(), 50.0)(lqg.controller(tuning.rho));
   tuning.optimum = tuning.lqg.cost(tuning.rho, b0);
+  checks.require(tuning.lqg.stable && tuning.optimum > 0.0 && is_finite(tuning.optimum), "optimum",
+                 tuning.optimum, "cannot be computed: the numbers of this model are too far apart");
+  if (!checks) return checks.error();
   std::vector<detail::Contender> all = detail::contenders(model, wish.controller_bandwidth > 0.0);
   for (detail::Contender& c : all) {
     std::vector<std::vector<double>> starts;
