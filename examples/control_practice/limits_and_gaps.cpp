@@ -312,8 +312,8 @@ int main(int argc, char** argv) {
   wind_up<Cascade>(report, "cascade", cascade(), truth, rows, nullptr);
   wind_up<Algebraic>(report, "algebraic", algebraic(), truth, rows, nullptr);
   report.table("windup", "A step of 10 with |u| limited to 3: overshoot in % of the step",
-               {"observer", "law on the true states", "ADRC, told the applied u",
-                "its innovations minus those without limits", "ADRC, told the unlimited u"},
+               {"observer", "law on the true states", "ADRC, observer gets the applied u",
+                "change of its innovations by the limits", "ADRC, observer gets the unlimited u"},
                rows);
   Figure figure("windup", {.rows = 2, .columns = 1, .panel_height = 200});
   figure.caption(
@@ -329,7 +329,7 @@ int main(int argc, char** argv) {
     style.name.clear();
     input.line(run.t, run.u, style);
   };
-  draw(shown[1], {.name = "told the unlimited u", .color = Color::vermillion, .width = 1.3});
+  draw(shown[1], {.name = "gets the unlimited u", .color = Color::vermillion, .width = 1.3});
   draw(shown[0], {.name = "ADRC", .color = Color::blue, .width = 2.4});
   draw(truth, {.name = "true states", .color = Color::black, .dash = Dash::dashed, .width = 1.3});
   report.add(figure);

@@ -159,9 +159,9 @@ void throttle(Report& report) {
       .x_range(0.5, 2)
       .y_range(-6, 6)
       .legend(Legend::above)
-      .line(wrong.t, wrong.y, {.name = "inverse law", .color = Color::orange, .width = 1})
-      .line(none.t, none.y, {.name = "no law", .color = Color::vermillion})
-      .line(right.t, right.y, {.name = "right law", .color = Color::blue});
+      .line(wrong.t, wrong.y, {.name = "b0 inverted", .color = Color::orange, .width = 1})
+      .line(none.t, none.y, {.name = "constant b0", .color = Color::vermillion})
+      .line(right.t, right.y, {.name = "b0 follows the throttle", .color = Color::blue});
   report.add(figure);
 }
 

@@ -103,7 +103,7 @@ void scaled(Report& report) {
        "The observer is passed a fifth of the u that the actuator got: dhat compensates the rest, "
        "but late, and the loop oscillates over the full range of u. If the applied u is passed, "
        "the loop is at rest.",
-       bad, good, "told a fifth", "told what was applied", {});
+       bad, good, "passed a fifth of u", "passed the applied u", {});
 }
 
 /// 600 rad/s at 200 Hz.
