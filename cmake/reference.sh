@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # cmake/reference.sh: writes the reference with Doxygen and prints where it is. Any warning is a
-# failure (1). Installs nothing: without Doxygen it names the Debian package (3).
+# failure (1), and so is a name of the namespace detail on a page. Installs nothing: without Doxygen
+# it names the Debian package (3).
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 source cmake/debian_packages.sh
@@ -22,4 +23,8 @@ if ((status != 0)) || [[ -s $log ]]; then
   exit 1
 fi
 rm "$log"
+if pages=$(grep -lE '\bdetail(::|<)' build/reference/html/*.html build/reference/html/search/*.js | grep -v '_source\.html$'); then
+  echo "these pages show a name of the namespace detail (cmake/reference_filter.pl): ${pages//$'\n'/ }" >&2
+  exit 1
+fi
 echo "$PWD/build/reference/html/index.html"

@@ -26,9 +26,7 @@ template <PlainScalar S>
   return detail::absolute(a) > d ? -std::copysign(acceleration, a) : -acceleration * (a / d);
 }
 
-namespace detail {
-
-/// The state of a differentiator.
+/// What a differentiator answers: the followed reference and its derivative.
 template <PlainScalar S>
 class DifferentiatorState {
  public:
@@ -51,11 +49,9 @@ class DifferentiatorState {
     return true;
   }
 
-  S r1_ = S(0);
-  S r2_ = S(0);
+  S r1_ = S(0);  ///< value
+  S r2_ = S(0);  ///< its derivative
 };
-
-}  // namespace detail
 
 /// Config of TrackingDifferentiator.
 template <Scalar S>
@@ -74,8 +70,8 @@ struct TrackingDifferentiatorConfig {
 /// Tracking differentiator by fhan: r1 follows the reference as fast as |r1''| <= `acceleration`
 /// allows, r2 = r1'. It can always stop in time, so it stays r2^2 / (2R) behind a moving reference.
 template <Scalar S = double>
-class TrackingDifferentiator : public detail::DifferentiatorState<S> {
-  using State = detail::DifferentiatorState<S>;
+class TrackingDifferentiator : public DifferentiatorState<S> {
+  using State = DifferentiatorState<S>;
   using State::r1_;
   using State::r2_;
 
@@ -163,8 +159,8 @@ struct SignTrackingDifferentiatorConfig {
 /// sample. The sampled form chatters about the reference by R h in r2, so prefer
 /// TrackingDifferentiator.
 template <Scalar S = double>
-class SignTrackingDifferentiator : public detail::DifferentiatorState<S> {
-  using State = detail::DifferentiatorState<S>;
+class SignTrackingDifferentiator : public DifferentiatorState<S> {
+  using State = DifferentiatorState<S>;
   using State::r1_;
   using State::r2_;
 

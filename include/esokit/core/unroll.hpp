@@ -12,12 +12,15 @@
 #include <type_traits>
 #include <utility>
 
-/// @def ESOKIT_INLINE Forces inlining. Used for all parts of a step: otherwise GCC at -O2 leaves
+/// @def ESOKIT_INLINE
+/// Forces inlining. Used for all parts of a step: otherwise GCC at -O2 leaves
 /// some of them as calls, and the state goes through memory between them.
 
-/// @def ESOKIT_INLINE_LAMBDA The same for a lambda, written after its parameters.
+/// @def ESOKIT_INLINE_LAMBDA
+/// The same for a lambda, written after its parameters.
 
-/// @def ESOKIT_COLD Keeps code that runs rarely out of line, so that it costs the normal step
+/// @def ESOKIT_COLD
+/// Keeps code that runs rarely out of line, so that it costs the normal step
 /// nothing.
 
 #if defined(__GNUC__)

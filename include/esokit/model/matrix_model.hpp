@@ -28,7 +28,7 @@ struct ModelPattern {
 /// always zero. The states are the scaled rows of the estimate, but in another order: those of a
 /// sensor come first.
 /// @tparam Shape `order`, `size`, `measured_rows` (states before y), `degree(state)`, and
-/// `pattern`, a detail::ModelPattern
+/// `pattern`, which elements are not zero
 template <class Shape, PlainScalar S>
 class MatrixModel {
  public:

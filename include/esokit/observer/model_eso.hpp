@@ -14,6 +14,7 @@
 
 namespace esokit {
 
+/// @cond
 namespace detail {
 
 /// An observer of packs with a model: one observer per lane, each bridging the gaps that its model
@@ -39,6 +40,7 @@ class ModelLanes : public LaneByLane<Self, Plain, S, Settings> {
 };
 
 }  // namespace detail
+/// @endcond
 
 /// With a model, of packs.
 template <int Order, PackScalar S, int Extension, class Placement, class Model>

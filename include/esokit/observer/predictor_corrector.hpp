@@ -452,7 +452,7 @@ class PredictorCorrector {
   /// The gain laws, to be changed.
   [[nodiscard]] constexpr Laws& laws() noexcept { return laws_; }
 
-  /// All that it holds, for what is built on it, see detail::LaneAccess.
+  /// All that it holds, for what is built on it.
   static constexpr auto fields(auto& o) noexcept {
     return detail::tie(o.states_, o.laws_, o.model_, o.innovation_, o.applied_input_, o.gap_,
                        o.max_gap_, o.squares_suffice_);

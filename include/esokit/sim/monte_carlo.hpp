@@ -95,6 +95,7 @@ struct NoVariation {
 struct MeasureOptions {
   double from = 0.0;                                    ///< s of the loop, first sample
   double to = std::numeric_limits<double>::infinity();  ///< s, last sample
+
   /// The number must not be above this; finite, or left out.
   double limit = std::numeric_limits<double>::infinity();
 };
