@@ -1,20 +1,25 @@
 #!/usr/bin/env bash
 # Writes the library as one header to standard output: cmake/amalgamate.sh >esokit.hpp
-# With headers' names as arguments (control/adrc.hpp observer/linear_eso.hpp), those and what they need.
-# Several of them go into one program: each part has a guard of its own; of two versions, one #error.
+# With names of headers or folders as arguments (control/adrc.hpp observer/linear_eso.hpp; or: observer
+# adapter control), those and what they need. Several such files go into one program: each part has a
+# guard of its own; of two versions, one #error.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../include"
 version=$(sed -n 's/^project(esokit VERSION \([0-9.]*\).*/\1/p' ../CMakeLists.txt)
-headers=("${@:-esokit.hpp}")
-for i in "${!headers[@]}"; do
-  headers[i]=esokit/${headers[i]#esokit/}
-  if [[ ! -f ${headers[i]} ]]; then
-    echo "amalgamate.sh: there is no include/${headers[i]}" >&2
+headers=()
+for name in "${@:-esokit.hpp}"; do
+  name=esokit/${name#esokit/}
+  if [[ -d $name ]]; then
+    headers+=("$name"/*.hpp)
+  elif [[ -f $name ]]; then
+    headers+=("$name")
+  else
+    echo "amalgamate.sh: there is no include/$name" >&2
     exit 1
   fi
 done
 
-awk -v headers="${headers[*]}" -v license="../LICENSE" -v version="$version" '
+awk -v headers="${headers[*]}" -v wanted="${*:-esokit.hpp}" -v license="../LICENSE" -v version="$version" '
   function paste(file,    line, name, status, guard) {
     if (file in seen) return
     seen[file] = 1
@@ -35,7 +40,7 @@ awk -v headers="${headers[*]}" -v license="../LICENSE" -v version="$version" '
   }
   BEGIN {
     while ((getline line < license) > 0) print "// " line
-    print "//\n// esokit " version ", written by cmake/amalgamate.sh from " headers "; edit the headers, not this file.\n"
+    print "//\n// esokit " version ", written by cmake/amalgamate.sh from " wanted "; edit the headers, not this file.\n"
     split(version, part, ".")
     number = (part[1] * 1000 + part[2]) * 1000 + part[3]
     print "#ifndef ESOKIT_SINGLE_HEADER\n#define ESOKIT_SINGLE_HEADER " number

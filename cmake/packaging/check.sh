@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # What can be tried of the packages without a network: cmake/packaging/check.sh BUILD_FOLDER
-# BUILD_FOLDER is emptied. Needs pkg-config and dpkg; the last line says what was not tried.
+# BUILD_FOLDER is emptied; the files of a release are in BUILD_FOLDER/release afterwards. Needs
+# pkg-config and dpkg; the last line says what was not tried.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 work=$(realpath -m "${1:?usage: check.sh BUILD_FOLDER}")
@@ -52,24 +53,43 @@ read -r -a flags < <(pkg-config --cflags esokit)
 "${CXX:-c++}" -std=c++20 "${flags[@]}" "$work/main.cpp" -o "$work/by_pkg_config"
 "$work/by_pkg_config"
 
+# --- FetchContent, with the lines of README.md ---
+mkdir "$work/fetch"
+{
+  echo 'cmake_minimum_required(VERSION 3.23)'
+  echo 'project(my LANGUAGES CXX)'
+  echo "add_executable(my_controller \"$work/main.cpp\")"
+  awk '/^```cmake$/ { inside = 1; next } /^```/ && inside { exit } inside' README.md |
+    sed "s|GIT_REPOSITORY <this repository> GIT_TAG main|GIT_REPOSITORY \"$root\" GIT_TAG $(git rev-parse HEAD)|"
+} >"$work/fetch/CMakeLists.txt"
+grep -q "GIT_REPOSITORY \"$root\"" "$work/fetch/CMakeLists.txt"
+cmake -S "$work/fetch" -B "$work/fetch/build" -G Ninja
+cmake --build "$work/fetch/build"
+"$work/fetch/build/my_controller"
+
 # --- one header ---
-mkdir -p "$work/single/esokit/observer" "$work/single/esokit/control"
-bash cmake/amalgamate.sh >"$work/single/esokit.hpp"
-if grep -n '#include <esokit/' "$work/single/esokit.hpp"; then fail "the single header includes esokit"; fi
-sed 's|#include <esokit/.*|#include "esokit.hpp"|' "$work/main.cpp" >"$work/single/main.cpp"
-# shellcheck disable=SC2046
-"${CXX:-c++}" -std=c++20 -I"$work/single" $(pkg-config --cflags eigen3) "$work/single/main.cpp" \
-  -o "$work/by_single_header"
-bash cmake/amalgamate.sh control/adrc.hpp >"$work/single/adrc.hpp"
+mkdir "$work/single" "$work/release"
+cp "${deb[0]}" "$work/release"
+bash cmake/amalgamate.sh >"$work/release/esokit.hpp"
+bash cmake/amalgamate.sh observer adapter control >"$work/release/esokit_control.hpp"
+if grep -n '#include <esokit/' "$work"/release/*.hpp; then fail "a single header includes esokit"; fi
+if grep -n '#include <Eigen/' "$work/release/esokit_control.hpp"; then fail "esokit_control.hpp includes Eigen"; fi
 bash cmake/amalgamate.sh observer/linear_eso.hpp observer/cascade_eso.hpp >"$work/single/observers.hpp"
-sed 's|#include <esokit/control.*|#include "observers.hpp"\n#include "adrc.hpp"\n#include "esokit.hpp"|; /#include <esokit/d' \
-  "$work/main.cpp" >"$work/single/several.cpp"
-grep -q '"adrc.hpp"' "$work/single/several.cpp"
-# shellcheck disable=SC2046
-"${CXX:-c++}" -std=c++20 -I"$work/single" $(pkg-config --cflags eigen3) "$work/single/several.cpp" \
-  -o "$work/by_several"
-"$work/by_several"
-"$work/by_single_header"
+bash cmake/amalgamate.sh control/adrc.hpp >"$work/single/adrc.hpp"
+# by_headers NAME HEADER...: the program of README.md with these instead of its own
+by_headers() {
+  local name=$1 header includes=
+  shift
+  for header; do includes+="#include \"$header\"\n"; done
+  { printf '%b' "$includes"; grep -v '#include <esokit/' "$work/main.cpp"; } >"$work/single/$name.cpp"
+  # shellcheck disable=SC2046
+  "${CXX:-c++}" -std=c++20 -I"$work/single" -I"$work/release" $(pkg-config --cflags eigen3) \
+    "$work/single/$name.cpp" -o "$work/single/$name"
+  "$work/single/$name"
+}
+by_headers control esokit_control.hpp
+by_headers everything esokit.hpp adrc.hpp
+by_headers several observers.hpp adrc.hpp esokit_control.hpp
 
 # --- vcpkg port: run with stand-ins for vcpkg's functions, which do what theirs do here ---
 cat >"$work/port.cmake" <<END

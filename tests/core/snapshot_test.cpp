@@ -3,9 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
+#include <cstring>
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
@@ -166,6 +168,30 @@ TEST(Snapshot, Controllers) {
            .limits = {.lower = -1.0f, .upper = 2.0f}})
           .value());
 }
+
+#ifdef ESOKIT_CLEARS_PADDING
+TEST(Snapshot, WhatLiesBetweenTheMembersIsNotInTheWords) {
+  using Controller = Adrc<LinearEso<2, float>>;
+  auto controller =
+      Controller::make(
+          {.observer = {.observer_bandwidth = 50.0f, .input_gain = 3.0f, .sample_time = 1e-3f},
+           .controller_bandwidth = 10.0f})
+          .value();
+  const auto words = snapshot(controller);
+  alignas(Controller) std::array<unsigned char, sizeof(Controller)> members{};
+  members.fill(0xff);
+  __builtin_clear_padding(reinterpret_cast<Controller*>(members.data()));
+  std::array<unsigned char, sizeof(Controller)> memory{};
+  std::memcpy(memory.data(), &controller, sizeof(Controller));
+  int between = 0;
+  for (std::size_t i = 0; i < memory.size(); ++i) {
+    if (members[i] == 0) memory[i] = 0x5a, ++between;
+  }
+  ASSERT_GT(between, 0);
+  std::memcpy(static_cast<void*>(&controller), memory.data(), sizeof(Controller));
+  EXPECT_EQ(snapshot(controller), words);
+}
+#endif
 
 TEST(Snapshot, ChecksumIsTheStandardCrc32) {
   // The check value of CRC-32/ISO-HDLC: of the bytes "123456789".

@@ -14,6 +14,12 @@
 #include <esokit/core/version.hpp>
 #include <type_traits>
 
+#ifdef __has_builtin
+#if __has_builtin(__builtin_clear_padding)
+#define ESOKIT_CLEARS_PADDING 1
+#endif
+#endif
+
 namespace esokit {
 
 /// Settings and state of a T: the memory of a T, then a checksum. Valid only for the same version
@@ -42,11 +48,18 @@ constexpr std::uint32_t checksum(const Snapshot<T>& words) noexcept {
 
 }  // namespace detail
 
-/// Settings and state of `object`. `snapshot_text` of core/snapshot_text.hpp prints it.
+/// Settings and state of `object`. `snapshot_text` of core/snapshot_text.hpp prints it. With GCC
+/// equal objects give equal words; other compilers may leave anything in the bytes between members.
 template <class T>
 [[nodiscard]] Snapshot<T> snapshot(const T& object) noexcept {
   Snapshot<T> words{};
-  std::memcpy(words.data(), &object, sizeof(T));  // no bit_cast: T may have padding
+#ifdef ESOKIT_CLEARS_PADDING
+  T copy = object;
+  __builtin_clear_padding(&copy);
+#else
+  const T& copy = object;
+#endif
+  std::memcpy(words.data(), &copy, sizeof(T));  // no bit_cast: T may have padding
   words.back() = detail::checksum<T>(words);
   return words;
 }
