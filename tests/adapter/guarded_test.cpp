@@ -425,6 +425,31 @@ TEST(Pinned, DhatMovesOnlyToFreeTheActuatorAndIsFreeInTime) {
   }
 }
 
+/// By the sign of a u of zero nothing frees the actuator.
+TEST(Pinned, WithoutASideNothingMovesDhat) {
+  auto guarded = Guarded<LinearEso<1>>::make({.observer = settings<LinearEso<1>>()}).value();
+  (void)guarded.update(1, 0);
+  const double before = guarded.total_disturbance();
+  guarded.set_pin(Pin::either);
+  for (const double y : {5.0, -5.0}) {
+    (void)guarded.update(y, 0);
+    EXPECT_EQ(guarded.total_disturbance(), before);
+  }
+}
+
+/// What starts anew after a long gap is not drawn back to the dhat before it.
+TEST(Gating, ARestartForgetsWhatWasHeld) {
+  auto config = settings<LinearEso<1>>();
+  config.max_gap = 3;
+  auto guarded = Guarded<LinearEso<1>>::make({.observer = config}).value();
+  for (int k = 0; k < 20; ++k) (void)guarded.update(0.1 * k, 0);
+  guarded.set_trust(0);
+  EXPECT_GT(guarded.total_disturbance(), 1);
+  for (int k = 0; k < 6; ++k) (void)guarded.update(hidden_nan<double>(), 0);
+  EXPECT_TRUE(has(guarded.update(2, 0), StepStatus::restarted));
+  EXPECT_EQ(guarded.total_disturbance(), 0);
+}
+
 /// A mixer pinned for 0.4 s delivers 0.3 of u; numpy's figures of the same loop: dhat off by 7.00
 /// bare, by 0.87 with the pin, by 7.00 with a pin that times out after 0.1 s.
 TEST(Pinned, ErrorOfDhat) {
@@ -625,6 +650,23 @@ TEST(GivenInputGain, LoopIsThatOfTheRightB0) {
 }
 
 /// A force stays what it is, a bias of the actuator is multiplied; so is a bound in its unit.
+TEST(GivenInputGain, InputsAreByTheGainOfNow) {
+  auto guarded = Guarded<LinearEso<1>>::make({.observer = settings<LinearEso<1>>()}).value();
+  for (int k = 0; k < 20; ++k) (void)guarded.update(0.1 * k, 0);
+  ASSERT_TRUE(guarded.set_input_gain(2 * b0));
+  for (int k = 0; k < 2; ++k) (void)guarded.update(2, 0.5);
+  EXPECT_EQ(guarded.applied_input(), 0.5);
+  EXPECT_EQ(guarded.standing_input(), -guarded.total_disturbance() / (2 * b0));
+  // Where that u is beyond the scalar it is the one there was.
+  auto config = settings<LinearEso<1>>();
+  config.input_gain = 1e-3;
+  auto weak = Guarded<LinearEso<1>>::make({.observer = config}).value();
+  (void)weak.update(0, 0.25);
+  ASSERT_EQ(weak.reset({0, 1e306}), StepStatus::ok);
+  (void)weak.predict(0.25);
+  EXPECT_EQ(weak.standing_input(), 0.25);
+}
+
 TEST(GivenInputGain, DhatKeepsItsUnit) {
   using O = CascadeEso<2, 2>;
   for (const DisturbanceUnit unit : {DisturbanceUnit::output, DisturbanceUnit::input}) {

@@ -102,6 +102,65 @@ TEST(GainProbe, EndsWhereItMustNotGoOn) {
   EXPECT_FALSE(probe.aborted());
 }
 
+/// What a probe asks of a controller, under the test's control.
+struct Fake {
+  struct Observer {
+    static constexpr int size = 2;
+    double u = 0, d = 0;
+    double input_gain() const { return 1; }
+    double applied_input() const { return u; }
+    double total_disturbance() const { return d; }
+  };
+  Observer seen;
+  double wanted = 0;
+  const Observer& observer() const { return seen; }
+  LoopMode mode() const { return LoopMode::running; }
+  double output() const { return wanted; }
+};
+
+/// The interval of 6 periods of noise alone covers b = b0 as often as 95 % do.
+TEST(GainProbe, IntervalCoversTheNoise) {
+  Random random(17);
+  int covered = 0;
+  constexpr int trials = 4000;
+  for (int trial = 0; trial < trials; ++trial) {
+    auto probe = GainProbe<2>::make({.observer_bandwidth = 1,
+                                     .sample_time = 1,
+                                     .amplitude = 1,
+                                     .travel = 1,
+                                     .periods = 6,
+                                     .limits = {.lower = -9, .upper = 9}})
+                     .value();
+    Fake loop;
+    while (!probe.finished()) {
+      loop.seen.u = probe.update(loop, 0);
+      loop.seen.d = random.uniform(-1, 1) + random.uniform(-1, 1) + random.uniform(-1, 1);
+    }
+    const auto found = probe.result().value();
+    covered += std::abs(found.gain_ratio - 1) <= found.half_width ? 1 : 0;
+  }
+  // Three standard errors of the share.
+  EXPECT_NEAR(static_cast<double>(covered) / trials, 0.95, 3 * std::sqrt(0.95 * 0.05 / trials));
+}
+
+TEST(GainProbe, RateCountsFromWhatWasHeldAndTravelFromTheStart) {
+  auto config = settings<double>();
+  config.limits.rate = 10;  // 0.01 a sample
+  auto probe = GainProbe<2>::make({.observer_bandwidth = omega_o,
+                                   .sample_time = sample_time,
+                                   .amplitude = 0.1,
+                                   .travel = 5,
+                                   .limits = config.limits})
+                   .value();
+  Fake loop;
+  loop.seen.u = 0.5;
+  EXPECT_NEAR(probe.update(loop, 2), 0.49, 1e-12);
+  (void)probe.update(loop, 7);
+  EXPECT_FALSE(probe.aborted());
+  (void)probe.update(loop, -3.000001);
+  EXPECT_TRUE(probe.aborted());
+}
+
 TEST(GainProbe, StaysWithinTheLimits) {
   auto loop = loop_of<double>(20);
   auto config = settings<double>();

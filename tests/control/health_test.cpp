@@ -192,6 +192,39 @@ TEST(Health, CountsWhatHappened) {
     monitor.look(loop);
   }
   EXPECT_EQ(diagnose(monitor.health()), LoopFault::none);
+  for (int k = 0; k < 2000; ++k) {
+    loop.update(0, -50);
+    monitor.look(loop);
+  }
+  EXPECT_GT(monitor.health().saturated, 0.8);
+}
+
+/// An absurd sample is forgotten, not averaged: what comes after it tells the truth at once.
+TEST(Health, AnAbsurdSampleIsNotRemembered) {
+  auto loop = loop_of<float>(20);
+  auto monitor = monitor_of<float>();
+  Random random(3);
+  const auto run = [&](float b, int samples) {
+    ChainPlant<2> plant(sample_time, static_cast<double>(b), 0);
+    loop.observer().reset(0.f);
+    for (int k = 0; k < samples; ++k) {
+      const float u = k % 40 < 20 ? 0.3f : -0.3f;
+      loop.track(static_cast<float>(plant.output()), 0.f, u);
+      monitor.look(loop);
+      plant.step(static_cast<double>(u));
+    }
+  };
+  run(20, 3000);
+  EXPECT_NEAR(monitor.health().gain_ratio, 1, 0.1);
+  for (int k = 0; k < 4; ++k) {
+    loop.track(1e17f, 0.f, 0.f);
+    monitor.look(loop);
+  }
+  EXPECT_LT(monitor.health().innovation, 1e15f);
+  loop = loop_of<float>(20);
+  // 0.3 of the memory: sums of the time before would still weigh e^-0.3 = 0.74, which gives 0.5.
+  run(-20, 300);
+  EXPECT_LT(monitor.health().gain_ratio, -0.5);
 }
 
 /// Each limit from both sides, the worst first.
@@ -231,6 +264,17 @@ TEST(Health, Diagnosis) {
   for (const double rho : {-0.29, 0.26, 2.99}) {
     health.gain_ratio = rho;
     EXPECT_EQ(diagnose(health), rho < 0 ? LoopFault::gain_too_large_or_disturbed : LoopFault::none);
+  }
+  // At a limit it is not beyond it.
+  const HealthLimits limits;
+  for (const double rho : {limits.wrong_sign, limits.too_small}) {
+    const Health<double> at{.samples = 20,
+                            .rejected = 10,
+                            .saturated = 0.5,
+                            .bounded = 0.5,
+                            .gain_ratio = rho,
+                            .evidence = 9};
+    EXPECT_EQ(diagnose(at), rho < 0 ? LoopFault::gain_too_large_or_disturbed : LoopFault::none);
   }
   // Each fault in words of its own.
   std::string all;
