@@ -1,17 +1,23 @@
 #!/usr/bin/env python3
 """Checks the numbers of READMEs against what the examples wrote: check_readme.py OUT README...
 
-A comment after numbers says where they come from, one source for each of the last numbers of the
-line before it:
+A comment after numbers says where they come from, with one source for each of the last numbers of
+the line before it:
 
     0.097, 0.093 <!--= sim2: Sim2A, p = 1 -> int e dt; sim2: Sim2A, p = 2 -> int e dt -->
 
-A source is EXAMPLE: CASE -> METRIC (in the project's README FOLDER/EXAMPLE), a row of its summary.csv, or EXAMPLE#NAME: ROW -> COLUMN, a
-cell of its table_NAME.csv, columns by heading or number, `1..4` for four of them; * and ? match any
-text (no bar may stand in a row of a table, write ? for it). Before it may stand `max`, `min` or
-`error` (the greatest relative error, in %), after it `* FACTOR`; of several rows the greatest
-counts (with min the least). A number must agree in its last printed digit; after "<=" it must not
-be exceeded.
+A source is one of
+
+    EXAMPLE: CASE -> METRIC         a row of the example's summary.csv
+    EXAMPLE#NAME: ROW -> COLUMN     a cell of its table_NAME.csv; the column by its heading or its
+                                    number, or `1..4` for four numbers
+
+EXAMPLE is a folder below OUT/FOLDER, where FOLDER is that of the README (for the README of the
+project, below OUT). In the other names * and ? match any text; write ? for a bar, because a row of
+a Markdown table must not contain one. Several rows may match: then the largest number counts, with
+`min` before the source the smallest. `error` before it takes the largest relative error in %
+instead, `* FACTOR` after it multiplies. The number in the README must agree in its last printed
+digit; with `<=` before the source it must only not be exceeded.
 """
 
 import csv
