@@ -71,12 +71,14 @@ class Panel:
     def get(self, key, default=""):
         return self.settings.get(key, [default])[0]
 
-    def finish(self):
-        """Where the legend is, what colours a map ends with, and the room that numbers and labels
-        need at the left, below, at the right and above, px."""
-        named = any(one.name for one in self.drawn)
-        self.legend = PLACES[int(self.get("legend", "2"))] if named else None
-        self.legend_height = 20 if self.legend == "above" else 0
+    def finish(self, width):
+        """For axes of about that width: where the legend is, what colours a map ends with, and the
+        room that numbers and labels need at the left, below, at the right and above, px."""
+        names = [one.name for one in self.drawn if one.name]
+        self.legend = PLACES[int(self.get("legend", "2"))] if names else None
+        # As many columns as gnuplot finds room for: all are as wide as the longest name.
+        columns = max(1, int(width / (50 + 7.2 * max(map(len, names), default=0))))
+        self.legend_height = 20 * math.ceil(len(names) / columns) if self.legend == "above" else 0
         self.limit = next((one.at for one in self.drawn if one.kind == "map"), None)
         self.room = (74 if self.get("y_label") else 50,
                      8 if self.get("x_hidden") else 48 if self.get("x_label") else 28,
@@ -109,7 +111,8 @@ class Figure:
     def layout(self, lines, columns, height):
         """Axes of one row share their top and bottom, axes of one column their left and right."""
         for panel in self.panels:
-            panel.finish()
+            span = panel.right_column - panel.left_column + 1
+            panel.finish(span * WIDTH / columns - 92)
 
         def widest(count, cell, side):
             return [max([panel.room[side] for panel in self.panels
@@ -172,8 +175,8 @@ class Figure:
         if panel.legend is None:
             self.put("unset key")
         elif panel.legend == "above":
-            self.put(f"set key at {self.screen((left + right) / 2, top + 15)} center center "
-                     f"horizontal maxrows 1 {style}")
+            self.put(f"set key at {self.screen((left + right) / 2, top + 5 + panel.legend_height / 2)} "
+                     f"center center horizontal {style}")
         else:
             self.put(f"set key inside {panel.legend} vertical maxrows auto {style} opaque "
                      "fillcolor rgb '#ffffff'")

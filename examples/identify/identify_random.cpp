@@ -49,6 +49,8 @@ struct Outcome {
   double half_width = 0;  // share of the true b0
   double latency = 0;     // error, s
   double noise = 0;       // found over true
+  Curve plateau = {};     // b0 over the bandwidth at which it is fitted
+  std::vector<double> low = {}, high = {};
 };
 
 Outcome identified(std::uint64_t seed, Kind kind) {
@@ -72,6 +74,14 @@ Outcome identified(std::uint64_t seed, Kind kind) {
   outcome.half_width = found->input_gain.half_width / made.truth.input_gain;
   outcome.latency = found->latency.value - made.truth.lag - made.truth.dead_time;
   outcome.noise = found->noise.value / made.truth.noise;
+  for (const auto& point : found->plateau.points) {
+    const double value = point.fit.linear[0] / made.truth.input_gain;
+    const double error = 2 * point.errors.linear[0] / made.truth.input_gain;
+    if (!(error < 1)) continue;
+    outcome.plateau.add(point.fit.at.bandwidth, value);
+    outcome.low.push_back(value - error);
+    outcome.high.push_back(value + error);
+  }
   return outcome;
 }
 
@@ -238,5 +248,34 @@ int main(int argc, char** argv) {
       .points(half, error, {.name = "log", .color = Color::blue})
       .line({0.05, 20}, {0.05, 20}, {.name = "edge of the interval", .color = Color::grey});
   report.add(figure);
+
+  // For the README: the first of each that was neither averaged away nor refused for nothing.
+  const auto accepted = std::find_if(plain.begin(), plain.end(), [](const Outcome& o) {
+    return o.accepted && o.order == 2 && o.truth.order == 2;
+  });
+  const auto hidden =
+      std::find_if(flexible.begin(), flexible.end(), [](const Outcome& o) { return !o.accepted; });
+  if (accepted != plain.end() && hidden != flexible.end()) {
+    Figure plateau("plateau", {.rows = 1, .columns = 2, .panel_height = 190});
+    plateau.caption(
+        "b0 over the bandwidth at which it is fitted, with two standard errors, as a share of the "
+        "true b0. Left: the first accepted log of order 2. Right: the first refused one of a "
+        "machine with a flexible mode (" +
+        hidden->refusal + ").");
+    for (const Outcome* o : {&*accepted, &*hidden}) {
+      plateau.panel(0, o == &*accepted ? 0 : 1)
+          .title(o == &*accepted ? "accepted" : "refused")
+          .x_label("bandwidth of the fit (rad/s)")
+          .y_label("b0 found / true b0")
+          .log_x()
+          .y_range(0, 2)
+          .name(o == &*accepted ? "accepted" : "refused")
+          .horizontal_line(1.0)
+          .band(o->plateau.x, o->low, o->high,
+                {.color = Color::sky, .opacity = 0.3, .column = "two standard errors"})
+          .line(o->plateau, {.color = Color::blue, .column = "b0"});
+    }
+    report.add(plateau);
+  }
   return report.finish();
 }

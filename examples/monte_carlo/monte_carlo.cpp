@@ -106,6 +106,7 @@ constexpr std::array<Color, numbers> colors = {Color::vermillion, Color::purple,
 struct Seen {
   Curve kept;
   std::array<Curve, numbers> violates;
+  Curve few_kept, only_dip, restless;
   std::int64_t dips = 0;  ///< deepest of those that do not overshoot
   double depth = 0.0;
 };
@@ -135,7 +136,7 @@ int main(int argc, char** argv) {
 
   // All numbers go into the statistics; the picture takes what the first runs violate.
   auto settings = config(runs);
-  constexpr std::int64_t drawn = 4000;
+  constexpr std::int64_t drawn = 4000, few = 1000;
   Seen seen;
   std::array<std::int64_t, numbers + 1> violated{};  // so many of the wishes at once
   const std::array limits = {overshoot.options.limit, settling.options.limit, dip.options.limit,
@@ -155,6 +156,11 @@ int main(int argc, char** argv) {
     for (std::size_t i = 0; i < numbers; ++i) {
       if (!(number[i] <= limits[i])) seen.violates[i].add(machine.gain, 1e3 * machine.lag);
     }
+    if (run >= few) return;
+    Curve& group = count == 0                                ? seen.few_kept
+                   : count == 1 && !(number[2] <= limits[2]) ? seen.only_dip
+                                                             : seen.restless;
+    group.add(machine.gain, 1e3 * machine.lag);
   };
   const auto study = sim::monte_carlo(drive(input_gain, 3, 2e-3), controller(), settings, vary);
   const auto outcome = study.run(overshoot, settling, dip, chatter).value();
@@ -206,6 +212,27 @@ int main(int argc, char** argv) {
   }
   report.add(figure);
   report.cover("drives");
+
+  // For the README: the first few, in one panel.
+  Figure which("which", {.rows = 1, .columns = 1, .panel_height = 240});
+  which.caption("The first " + std::to_string(few) +
+                " drives by gain and lag. The cross is the drive that the design was made for.");
+  which.panel(0, 0)
+      .x_label("gain b of the drive (rad/s^2)")
+      .y_label("lag (ms)")
+      .x_range(20, 125)
+      .y_range(0, 12)
+      .legend(Legend::above)
+      .name("drives")
+      .points(seen.few_kept.x, seen.few_kept.y,
+              {.name = "keep all four limits", .color = Color::grey, .size = 0.6})
+      .points(seen.only_dip.x, seen.only_dip.y,
+              {.name = "dip too far under the load", .color = Color::blue, .size = 0.8})
+      .points(seen.restless.x, seen.restless.y,
+              {.name = "overshoot or do not settle", .color = Color::vermillion, .size = 0.8})
+      .points(Column{input_gain}, Column{2.0},
+              {.color = Color::black, .marker = Marker::cross, .size = 2});
+  report.add(which);
 
   Figure worst("worst", {.rows = 2, .columns = 1, .panel_height = 200});
   worst.caption(

@@ -210,6 +210,35 @@ int main(int argc, char** argv) {
                      .correct = "omega^n; gamma in front",
                      .why = "from the derivation; the bounds hold in this form (analysis_bounds)"});
 
+  // For the README: a piece of Fig 4, and the first and the last observer alone.
+  Figure piece("in_noise", {.rows = 1, .columns = 2, .panel_height = 190});
+  piece.caption("Fig 4 from 2 to 2.4 s: one level (LESO) and three under the same noise.");
+  for (const std::size_t p : {0u, 2u}) {
+    const auto shown = [&](const std::vector<double>& values) {
+      std::vector<double> out;
+      for (std::size_t k = 0; k < values.size(); ++k) {
+        if (noisy[p].t[k] >= 2.0 && noisy[p].t[k] <= 2.4) out.push_back(values[k]);
+      }
+      return out;
+    };
+    const Style style{.name = p == 0 ? "LESO (p = 1)" : "cascade, p = 3",
+                      .color = p == 0 ? Color::vermillion : Color::blue};
+    const auto t = shown(noisy[p].t);
+    piece.panel(0, 0)
+        .x_label("t (s)")
+        .y_label("u (-)")
+        .legend(Legend::above)
+        .name("control")
+        .line(t, shown(noisy[p].control), style);
+    piece.panel(0, 1)
+        .x_label("t (s)")
+        .y_label("error of the disturbance (-)")
+        .legend(Legend::above)
+        .name("estimate")
+        .line(t, shown(noisy[p].estimate_error), style);
+  }
+  report.add(piece);
+
   // The variant that the text describes.
   report.additions();
   std::vector<CsvRow> lines;

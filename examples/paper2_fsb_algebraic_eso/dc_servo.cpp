@@ -358,5 +358,29 @@ int main(int argc, char** argv) {
                  .line(t, linear_drawn.u, leso)
                  .line(t, shifted_drawn.u, fsb)
                  .figure);
+
+  // For the README: the starts of Figs 3 and 6 side by side.
+  Figure peak("peak", {.rows = 1, .columns = 2, .panel_height = 190});
+  peak.caption("The starts of Figs 3 and 6: velocity as it is and as it is estimated, and u." +
+               std::string(" y(0) = 0.5, y'(0) = -0.3."));
+  const auto few = std::upper_bound(t.begin(), t.end(), Drawing::shown_start) - t.begin();
+  const auto begin = [&](const std::vector<double>& values) {
+    return std::vector<double>(values.begin(), values.begin() + few);
+  };
+  peak.panel(0, 0)
+      .x_label("t (s)")
+      .y_label("velocity estimate (rad/s)")
+      .legend(Legend::top_right)
+      .name("velocity")
+      .line(begin(t), begin(linear_drawn.v_estimate), leso)
+      .line(begin(t), begin(shifted_drawn.v_estimate),
+            {.name = "AlgebraicEso", .color = Color::blue});
+  peak.panel(0, 1)
+      .x_label("t (s)")
+      .y_label("u (V)")
+      .name("control")
+      .line(begin(t), begin(linear_drawn.u), {.color = Color::vermillion, .column = "LESO"})
+      .line(begin(t), begin(shifted_drawn.u), {.color = Color::blue, .column = "AlgebraicEso"});
+  report.add(peak);
   return report.finish();
 }

@@ -640,5 +640,29 @@ int main(int argc, char** argv) {
   part(adjustable, ed_steady, "ABESO, t > 5 s", Color::blue, Dash::dashed);
   part(linear_at_mean, ed_steady, "LESO at its mean, t > 5 s", Color::green, Dash::dashed);
   report.add(gains);
+
+  // For the README: the start and a later piece, LESO and ABESO of the same bandwidth.
+  Figure start("start", {.rows = 1, .columns = 2, .panel_height = 190});
+  start.caption("Error of the disturbance estimate at w = 7, seed 1: the start, and steady state.");
+  for (const auto* kind : {&leso, &abeso}) {
+    Series series;
+    (void)run(*kind, bandwidths[w7], 1, &series);
+    const Style style{.name = kind == &leso ? "LESO" : "ABESO",
+                      .color = kind == &leso ? Color::vermillion : Color::blue};
+    for (const std::size_t later : {0u, 1u}) {
+      const double from = later == 0 ? 0.0 : 14.0, to = later == 0 ? 1.5 : 15.5;
+      Curve shown;
+      for (std::size_t k = 0; k < series.t.size(); ++k) {
+        if (series.t[k] >= from && series.t[k] <= to) shown.add(series.t[k], series.error[2][k]);
+      }
+      start.panel(0, later)
+          .x_label("t (s)")
+          .y_label("error of d (-)")
+          .legend(Legend::above)
+          .name(later == 0 ? "start" : "later")
+          .line(shown, style);
+    }
+  }
+  report.add(start);
   return report.finish();
 }
