@@ -1,7 +1,9 @@
 #!/usr/bin/env bash
-# Compiles every ```cpp block of the Markdown files: cmake/readme_snippets.sh [FILE.md...]
+# Compiles every ```cpp block of the Markdown files and of the comments of the headers:
+# cmake/readme_snippets.sh [FILE...]
 # A block with main() stands alone; the other blocks of a file follow one another in one function,
 # after what the file declares for them in a comment: <!-- snippets: double y = 0; -->
+# A block of a header has a scope of its own, after what is declared below for all headers.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 1
 compiler=${CXX:-c++}
@@ -15,6 +17,24 @@ files=("$@")
 if ((${#files[@]} == 0)); then
   mapfile -t files < <(find . \( -name .git -o -name build -o -name out \) -prune -o -name '*.md' -print | LC_ALL=C sort)
 fi
+
+headers() {
+  cat <<'END'
+#include <cstdio>
+#include <esokit/esokit.hpp>
+namespace esokit {
+void snippets() {
+  double y = 0, next_reference = 0;
+  auto plant = LinearPlant<3>::transfer_function({.numerator = {6}, .denominator = {6, 11, 6}}).value();
+  auto controller = PredictiveAdrc<LinearEso<2>>::make({}).value();
+  auto identified = identify(Log{});
+END
+  grep -rhE '^ *///' include |
+    awk '/\/\/\/ ```cpp$/ { inside = 1; print "{"; next } /\/\/\/ ```$/ && inside { inside = 0; print "}" }
+         inside { sub(/^ *\/\/\/ ?/, ""); print }'
+  echo "}  // snippets"
+  echo "}  // namespace esokit"
+}
 
 try() {  # try SOURCE NAME
   if "$compiler" -std=c++20 -fsyntax-only -Iinclude "-I$(dirname -- "$2")" -isystem "$eigen" "$1" 2>"$work/errors"; then
@@ -53,5 +73,9 @@ for file in "${files[@]}"; do
   } >"$work/loose.cpp"
   try "$work/loose.cpp" "$file"
 done
+if (($# == 0)); then
+  headers >"$work/headers.cpp"
+  try "$work/headers.cpp" "comments of the headers"
+fi
 echo "$passed passed, $failed failed"
 ((passed > 0 && failed == 0))

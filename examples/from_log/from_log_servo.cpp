@@ -279,5 +279,27 @@ int main(int argc, char** argv) {
       .line(before.t, before.u, {.color = Color::blue, .width = 1.2, .column = "bad PID"});
   report.add(figure);
   report.cover("servo");
+
+  // For the README: the same machine before and after.
+  Figure result("before_and_after", {.rows = 1, .columns = 2, .panel_height = 190});
+  result.caption(
+      "The two steps and the load of the whole way, with the PID of the log and with the "
+      "controller that from_log made of it.");
+  const Style dashed{.name = "reference", .color = Color::black, .dash = Dash::dashed};
+  result.panel(0, 0)
+      .x_label("t (s)")
+      .y_label("angle (rad)")
+      .legend(Legend::above)
+      .name("angle")
+      .line(before.t, before.r, dashed)
+      .line(before.t, before.y, {.name = "old PID", .color = Color::grey})
+      .line(after.t, after.y, {.name = "from the log", .color = Color::blue});
+  result.panel(0, 1)
+      .x_label("t (s)")
+      .y_label("error (mrad)")
+      .name("error")
+      .line(before.t, error(before), {.color = Color::grey, .column = "old PID"})
+      .line(after.t, error(after), {.color = Color::blue, .column = "from the log"});
+  report.add(result);
   return report.finish();
 }

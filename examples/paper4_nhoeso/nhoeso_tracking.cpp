@@ -313,5 +313,39 @@ int main(int argc, char** argv) {
                   tracked, false));
   report.add(draw("fair", "A fair linear comparison: LESO with N = 4 at 4 rad/s.", cases[6],
                   tracked, true));
+
+  // For the README: all cases at a glance.
+  Figure ranking("ranking", {.rows = 1, .columns = 1, .panel_height = 230});
+  ranking.caption(
+      "Tracking error (ITAE) and control effort (ISU) of the table of all cases in noise: means "
+      "over the seeds. Less is better in both.");
+  struct Shown {
+    const char* name;
+    Color color;
+    Marker marker;
+  };
+  constexpr std::array<Shown, 7> shown = {
+      {{"paper: linear, 101.66 rad/s", Color::vermillion, Marker::circle},
+       {"paper: nonlinear, g of Table 2", Color::blue, Marker::circle},
+       {"paper: nonlinear, g fitted", Color::blue, Marker::square},
+       {"paper: nonlinear by (29)", Color::blue, Marker::triangle},
+       {"the same within proven limits", Color::blue, Marker::open_circle},
+       {"linear, N = 3, 10 rad/s", Color::vermillion, Marker::square},
+       {"linear, N = 4, 4 rad/s", Color::vermillion, Marker::triangle}}};
+  Panel& both_numbers = ranking.panel(0, 0)
+                            .x_label("tracking error: integral of t |r − x_1| dt")
+                            .y_label("effort: integral of u^2 dt")
+                            .log_x()
+                            .log_y()
+                            .x_range(0.7, 5000)
+                            .y_range(2, 10000)
+                            .legend(Legend::bottom_right)
+                            .name("means");
+  for (std::size_t i = 0; i < shown.size(); ++i) {
+    both_numbers.points(
+        Column{mean_of(i, &Criteria::itae)}, Column{mean_of(i, &Criteria::isu)},
+        {.name = shown[i].name, .color = shown[i].color, .marker = shown[i].marker, .size = 1.6});
+  }
+  report.add(ranking);
   return report.finish();
 }

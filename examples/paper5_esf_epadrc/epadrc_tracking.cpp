@@ -350,6 +350,32 @@ int main(int argc, char** argv) {
       ++number;
     }
   }
+  // For the README: the error of f with the same settings, without noise and with the most.
+  Figure errors("disturbance", {.rows = 1, .columns = 2, .panel_height = 190});
+  errors.caption(
+      "Error of the estimate of f in pieces of Fig. 2 (sine, no noise) and of Fig. 4 "
+      "(sigma = 0.01). PADRC: LESO of 800 rad/s; EPADRC: extended state filter.");
+  for (const std::size_t column : {0u, 1u}) {
+    for (const Kind kind : {Kind::padrc, Kind::epadrc}) {
+      Series series;
+      (void)run(kind, Reference::sine, column == 0 ? 0.0 : 0.01, 1, &series);
+      Curve piece;
+      for (std::size_t k = 0; k < series.t.size(); ++k) {
+        if (series.t[k] >= 1.0 && series.t[k] <= (column == 0 ? 2.0 : 1.08)) {
+          piece.add(series.t[k], series.e3[k]);
+        }
+      }
+      errors.panel(0, column)
+          .title(column == 0 ? "without noise" : "with noise, sigma = 0.01")
+          .x_label("t (s)")
+          .y_label("error of f (1/s^2)")
+          .legend(Legend::above)
+          .name(column == 0 ? "quiet" : "noisy")
+          .line(piece, {.name = name_of(kind),
+                        .color = kind == Kind::padrc ? Color::vermillion : Color::blue});
+    }
+  }
+  report.add(errors);
   report.additions();
   report.comparison("sine",
                     "Sine, 2 s: mean (standard deviation) over 50 seeds; sigma is the standard "

@@ -43,7 +43,7 @@ struct PredictiveAdrcConfig {
 /// u = (v - dhat) / b0, as AdrcLaw gives it after the observer's correction, but with the
 /// correction folded in: u_k = ubar_k - slope y_k, where ubar_k and slope are known before y_k.
 ///
-/// ```
+/// ```cpp
 /// const double u = controller.control(y);   // at the sample: to the actuator at once
 /// controller.prepare(next_reference);       // then the rest, any time before the next sample
 /// ```

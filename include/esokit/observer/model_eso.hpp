@@ -77,9 +77,11 @@ requires(!model_traits<Model>.is_chain)  //
 
 /// LinearEso with a model of actuator, sensor, plant poles or the frequencies of the disturbance:
 ///
-///     using Eso = ModelEso<ModelParts{.order = 1, .actuator = 1}>;
-///     auto eso = Eso::make({.observer_bandwidth = 100, .input_gain = 1, .sample_time = 1e-3,
-///                           .model = {.actuator = {.time_constant = 0.02}}});
+/// ```cpp
+/// using Eso = ModelEso<ModelParts{.order = 1, .actuator = 1}>;
+/// auto eso = Eso::make({.observer_bandwidth = 100, .input_gain = 1, .sample_time = 1e-3,
+///                       .model = {.actuator = {.time_constant = 0.02}}});
+/// ```
 ///
 /// Adrc<Eso> has the order of plant and actuator together. See AugmentedModel.
 template <ModelParts Parts, Scalar S = double, class Placement = EqualPoles>
@@ -95,10 +97,12 @@ using ModelCascadeEso =
 /// LinearEso of a whole plant with a sensor. The disturbance may swing or fade, and may enter at
 /// another place than u:
 ///
-///     using Eso = PlantEso<3, ModelParts{.order = 2, .resonators = 1}>;
-///     auto eso = Eso::make({.observer_bandwidth = 100, .input_gain = plant.input_gain(),
-///                           .sample_time = 1e-3,
-///                           .model = {.plant = plant, .resonators = {{{.frequency = 314}}}}});
+/// ```cpp
+/// using Eso = PlantEso<3, ModelParts{.order = 2, .resonators = 1}>;
+/// auto eso = Eso::make({.observer_bandwidth = 100, .input_gain = plant.input_gain(),
+///                       .sample_time = 1e-3,
+///                       .model = {.plant = plant, .resonators = {{{.frequency = 314}}}}});
+/// ```
 ///
 /// See LinearPlantModel.
 template <int States, ModelParts Parts, PlainScalar S = double, class Placement = EqualPoles>

@@ -635,12 +635,14 @@ class MonteCarlo {
 /// Many runs of the loop of `sim::run`, each with its own random numbers and, through `vary`, its
 /// own plant, controller, initial state and noise:
 ///
-///     auto study = sim::monte_carlo(plant, controller,
-///         {.runs = 100'000, .loop = {.duration = 2.0, .reference = 1.0, .noise = 1e-3}},
-///         [](auto& trial, sim::Draw& draw) { trial.plant.b(1) *= draw.uniform_ratio(0.5, 2.0); });
-///     auto outcome = study.run(sim::largest("overshoot",
-///         [](const auto& s) { return s.output - s.reference; }, {.limit = 0.2}));
-///     auto worst = study.replay(outcome->numbers[0].run_of_largest());
+/// ```cpp
+/// auto study = sim::monte_carlo(plant, controller,
+///     {.runs = 100'000, .loop = {.duration = 2.0, .reference = 1.0, .noise = 1e-3}},
+///     [](auto& trial, sim::Draw& draw) { trial.plant.b(1) *= draw.uniform_ratio(0.5, 2.0); });
+/// auto outcome = study.run(sim::largest("overshoot",
+///     [](const auto& s) { return s.output - s.reference; }, {.limit = 0.2}));
+/// auto worst = study.replay(outcome->numbers[0].run_of_largest());
+/// ```
 ///
 /// A run depends only on the seed and its number.
 /// @param vary (Trial&, Draw&): makes of the trial, which comes with the plant and the controller

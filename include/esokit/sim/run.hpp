@@ -601,7 +601,9 @@ class Run {
 /// Drives a plant with a controller as it is deployed: at each sample the controller gets the
 /// measurement and the reference, and the u that it returns is held until the next sample.
 ///
-///     auto run = sim::run(plant, controller, {.duration = 2.0, .reference = 1.0, .noise = 1e-3});
+/// ```cpp
+/// auto run = sim::run(plant, controller, {.duration = 2.0, .reference = 1.0, .noise = 1e-3});
+/// ```
 ///
 /// A linear plant is sampled exactly, others are integrated (Runge-Kutta of order 4, `substeps` a
 /// sample). Everything switches between steps only. For the continuous simulation of papers use

@@ -1,8 +1,10 @@
 /// @file
 /// From a model and a requirement to a ranked list of designs: which observer, which bandwidths.
 ///
-///     auto tuning = tune(tune_model(*identified, -12.0, 12.0));
-///     std::puts(tuning->designs.front().code.c_str());
+/// ```cpp
+/// auto tuning = tune(tune_model(*identified, -12.0, 12.0));
+/// std::puts(tuning->designs.front().code.c_str());
+/// ```
 ///
 /// 1. J = var(y) + rho var(b0 u~), u~ = u + d / b0, at the samples: the effect of noise and of a
 ///    random-walk disturbance on the loop (tune/loop_cost.hpp).
