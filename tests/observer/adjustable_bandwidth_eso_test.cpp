@@ -228,8 +228,8 @@ TEST(AdjustableBandwidthEso, RefusesByName) {
   bad = good;
   bad.bandwidth_ratio = 0.2;
   EXPECT_EQ(text_of_refusal(bad),
-            "bandwidth_ratio = 0.2: is not certified against every switching "
-            "(allow_uncertified_switching asks for it); must be above 0.333272");
+            "bandwidth_ratio = 0.2: must be certified against every switching (or set "
+            "allow_uncertified_switching): above 0.333272");
   const auto refused = AdjustableBandwidthEso<2>::make(bad);
   const double x = 50 * 1e-3;
   EXPECT_NEAR(refused.error().limit, 2 * std::atanh(std::tanh(x / 2) / 3) / x, 1e-12);
@@ -238,16 +238,16 @@ TEST(AdjustableBandwidthEso, RefusesByName) {
   bad = good;
   bad.bandwidth_ratio = 3.1;
   EXPECT_EQ(text_of_refusal(bad),
-            "bandwidth_ratio = 3.1: is not certified against every switching "
-            "(allow_uncertified_switching asks for it); must be below 3.00502");
+            "bandwidth_ratio = 3.1: must be certified against every switching (or set "
+            "allow_uncertified_switching): below 3.00502");
   bad.bandwidth_ratio = 3.0;
   EXPECT_EQ(text_of_refusal(bad), "accepted");
   bad = good;
   bad.rule = SwitchingRule::beso;
   bad.bandwidth_ratio = 0.5;
   EXPECT_EQ(text_of_refusal(bad),
-            "bandwidth_ratio = 0.5: is not certified against every switching "
-            "(allow_uncertified_switching asks for it); must be above 0.57719");
+            "bandwidth_ratio = 0.5: must be certified against every switching (or set "
+            "allow_uncertified_switching): above 0.57719");
   bad.bandwidth_ratio = 0.6;
   EXPECT_EQ(text_of_refusal(bad), "accepted");
 }
@@ -278,8 +278,8 @@ TEST(ContinuousAdjustableBandwidthEso, RefusesByName) {
   };
   EXPECT_EQ(field({.observer_bandwidth = 7, .bandwidth_ratio = 0.7, .input_gain = 1}), "accepted");
   EXPECT_EQ(field({.observer_bandwidth = 7, .bandwidth_ratio = 0.33, .input_gain = 1}),
-            "bandwidth_ratio: is not certified against every switching "
-            "(allow_uncertified_switching asks for it); must be above");
+            "bandwidth_ratio: must be certified against every switching (or set "
+            "allow_uncertified_switching): above");
   EXPECT_EQ(field({.observer_bandwidth = 7, .bandwidth_ratio = 0.34, .input_gain = 1}), "accepted");
   EXPECT_EQ(field({.observer_bandwidth = 7,
                    .bandwidth_ratio = 0.33,

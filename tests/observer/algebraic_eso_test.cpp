@@ -713,8 +713,8 @@ TEST(AlgebraicEso, RefusesBadConfigByName) {
       {changed([&](Config& c) { c.observer_bandwidth = infinity; }),
        "observer_bandwidth: must be finite and not negative", infinity},
       {changed([](Config& c) { c.observer_bandwidth = 0; }),
-       "observer_bandwidth: with frequency_shift above zero lets the gains vanish; "
-       "allow_vanishing_gain asks for it",
+       "observer_bandwidth: must be above zero if frequency_shift is: the gains vanish (or set "
+       "allow_vanishing_gain)",
        0},
       {changed([](Config& c) { c.observer_bandwidth = 1e-110; }),
        "observer_bandwidth: times sample_time gives a gain that the scalar cannot hold", 1e-110},
@@ -771,8 +771,8 @@ TEST(AlgebraicEso, RefusesBadConfigByName) {
   // What is asked for by name is given: a gain that vanishes, and growing memory.
   Config vanishing = paper_config<2>(1e-3, 0, 1);
   EXPECT_EQ(refusal(AlgebraicEso<2>::make(vanishing)),
-            "observer_bandwidth: with frequency_shift above zero lets the gains vanish; "
-            "allow_vanishing_gain asks for it");
+            "observer_bandwidth: must be above zero if frequency_shift is: the gains vanish (or "
+            "set allow_vanishing_gain)");
   vanishing.allow_vanishing_gain = true;
   EXPECT_TRUE(AlgebraicEso<2>::make(vanishing).has_value());
   EXPECT_TRUE(AlgebraicEso<2>::make(paper_config<2>(1e-3, 0, 0)).has_value());

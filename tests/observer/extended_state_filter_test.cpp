@@ -380,7 +380,7 @@ TEST(ExtendedStateFilter, start_table_may_be_too_short) {
   ASSERT_FALSE(made.has_value());
   EXPECT_EQ(
       refusal(made),
-      "mode[0]: has a start table too short: its last gain is more than a tenth off the limit");
+      "mode[0]: has too short a start table: its last gain is more than a tenth off the limit");
   EXPECT_TRUE(made.error().has_limit);
   auto other = typical<2, double, 1>();
   other.mode = RiccatiMode::start_table;
@@ -799,7 +799,7 @@ TEST(ExtendedStateFilter, refuses_bad_configs_by_name) {
             "trace_weights[2]: must be finite and positive");
   EXPECT_EQ(
       refused([](Config& c) { c.disturbance_bounds = {}; }, InflationRule::adaptive),
-      "disturbance_bounds: or process_covariance must not be zero where the inflation is adaptive");
+      "disturbance_bounds: (or process_covariance) must not be zero if the inflation is adaptive");
   const auto indefinite = [](auto& p) {
     p = Eigen::Vector3d(1, 1e4, 1e6).asDiagonal();
     p(0, 1) = p(1, 0) = 101;
@@ -815,19 +815,19 @@ TEST(ExtendedStateFilter, refuses_bad_configs_by_name) {
   EXPECT_EQ(refused([](Config& c) { c.initial_covariance(1, 0) = 1e-9; }),
             "initial_covariance[3]: must be symmetric");
   EXPECT_EQ(refused([](Config& c) { c.process_covariance = Eigen::Matrix3d::Identity(); }),
-            "disturbance_bounds[0]: must be left out where process_covariance is given");
+            "disturbance_bounds[0]: must be left out if process_covariance is given");
   // P0 = Q = R = 0, and Q = R = 0 as well: nothing is left to find a gain from.
   EXPECT_EQ(refused([](Config& c) {
               c.measurement_variance = 0;
               c.disturbance_bounds = {};
               eigen(c.initial_covariance).setZero();
             }),
-            "measurement_variance: must be positive where nothing disturbs the plant");
+            "measurement_variance: must be positive if nothing disturbs the plant");
   EXPECT_EQ(refused([](Config& c) {
               c.measurement_variance = 0;
               c.disturbance_bounds = {};
             }),
-            "measurement_variance: must be positive where nothing disturbs the plant");
+            "measurement_variance: must be positive if nothing disturbs the plant");
   EXPECT_EQ(refused(
                 [](Config& c) {
                   c.disturbance_bounds[2] = 0;
@@ -835,8 +835,8 @@ TEST(ExtendedStateFilter, refuses_bad_configs_by_name) {
                   c.mode = RiccatiMode::frozen;
                 },
                 InflationRule::none),
-            "disturbance_bounds[2]: must disturb the highest state where the gain is to be frozen "
-            "without inflation: its limit is zero");
+            "disturbance_bounds[2]: must disturb the highest state if the gain is frozen without "
+            "inflation: its limit is zero");
   for (const double bad : {1e-170, 1e200}) {
     EXPECT_EQ(refused([&](Config& c) { c.disturbance_bounds[1] = bad; }),
               "disturbance_bounds[1]: has a square that the scalar cannot hold");
@@ -899,8 +899,8 @@ void alternating_error_fades(int stated) {
     const auto refused = Filter::make(config);
     ASSERT_FALSE(refused);
     EXPECT_EQ(refusal(refused),
-              "measurement_variance: leaves an error that changes sign at every sample undamped: "
-              "give y' a bound, or y a variance of at least");
+              "measurement_variance: does not damp an error that alternates in sign: give y' a "
+              "bound, or y a variance of at least");
     EXPECT_NEAR(static_cast<double>(refused.error().limit) / least, 1, 1e-5);
     config.measurement_variance = static_cast<S>(1.001 * least);
     const int samples = samples_to_fade(Filter::make(config).value());
@@ -964,7 +964,7 @@ TEST(ExtendedStateFilter, vanishing_gain_has_to_be_asked_for) {
   EXPECT_EQ(
       rule(config),
       "disturbance_bounds[2]: must disturb the highest state: without inflation its gain tends "
-      "to zero (allow_vanishing_gain asks for it)");
+      "to zero (or set allow_vanishing_gain)");
   auto covariance = config;
   covariance.disturbance_bounds = {};
   covariance.process_covariance = Eigen::Vector3d(1, 1, 0).asDiagonal();
@@ -979,10 +979,9 @@ TEST(ExtendedStateFilter, vanishing_gain_has_to_be_asked_for) {
   config.disturbance_bounds = {};
   EXPECT_EQ(rule(config), "accepted");
   config.initial_covariance(2, 2) = 0;
-  EXPECT_EQ(
-      rule(config),
-      "initial_covariance[8]: must leave the highest state uncertain where nothing disturbs it "
-      "(allow_vanishing_gain asks for it)");
+  EXPECT_EQ(rule(config),
+            "initial_covariance[8]: must leave the highest state uncertain if nothing disturbs it "
+            "(or set allow_vanishing_gain)");
   // The limit is there from the start.
   config.mode = esokit::RiccatiMode::frozen;
   EXPECT_EQ(rule(config), "accepted");

@@ -369,7 +369,7 @@ TEST(MimoExtendedStateFilter, refuses_bad_configs_by_name) {
   EXPECT_EQ(refused([](Config& c) { c.initial_covariance(0, 2) = c.initial_covariance(2, 0) = 2; }),
             "initial_covariance: must be finite and positive semidefinite");
   EXPECT_EQ(refused([](Config& c) { c.disturbance_bounds[3] = 1; }),
-            "disturbance_bounds[3]: must be left out where process_covariance is given");
+            "disturbance_bounds[3]: must be left out if process_covariance is given");
   EXPECT_EQ(refused([](Config& c) { c.disturbance_bounds[3] = -1; }),
             "disturbance_bounds[3]: must be finite and not negative");
   EXPECT_EQ(refused([](Config& c) { c.bound_factor = 0; }),
@@ -569,8 +569,8 @@ TEST(MimoExtendedStateFilter, refuses_what_has_no_way_back) {
   EXPECT_EQ(rule([](Config& c) { c.measurement_covariance(1, 1) = 0; }), "accepted");
 
   const std::string certain =
-      "initial_covariance[24]: must leave the highest state of a chain uncertain where nothing "
-      "disturbs it: it would never be corrected (allow_vanishing_gain asks for it)";
+      "initial_covariance[24]: must leave the highest state of a chain uncertain if nothing "
+      "disturbs it: it would never be corrected (or set allow_vanishing_gain)";
   EXPECT_EQ(rule([](Config& c) {
               c.disturbance_bounds[4] = 0;
               c.initial_covariance(4, 4) = 0;
@@ -584,7 +584,7 @@ TEST(MimoExtendedStateFilter, refuses_what_has_no_way_back) {
             "accepted");
   const std::string vanishing =
       "disturbance_bounds[2]: must disturb the highest state of every chain: without inflation its "
-      "gain tends to zero (allow_vanishing_gain asks for it)";
+      "gain tends to zero (or set allow_vanishing_gain)";
   const auto plain = [](Config& c) {
     c.inflation_rule = InflationRule::none;
     c.inflation = 0;
@@ -604,9 +604,8 @@ TEST(MimoExtendedStateFilter, refuses_what_has_no_way_back) {
 
   // The chain of three states has a pole at -1 without noise; the other has not.
   const std::string alternating =
-      "measurement_covariance[0]: leaves an error that changes sign at every sample undamped: give "
-      "y' "
-      "a bound, or y a variance of at least";
+      "measurement_covariance[0]: does not damp an error that alternates in sign: give y' a bound, "
+      "or y a variance of at least";
   const float least = 1e-6f * 5 * 5e-6f * 5e-6f;  // a millionth of 5 (10 T^2 / 2)^2
   for (const float share : {0.99f, 1.01f}) {
     EXPECT_EQ(rule([&](Config& c) {

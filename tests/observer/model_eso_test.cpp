@@ -673,8 +673,8 @@ TEST(FollowsSpeed, RefusesWhatIsBeyondItsRange) {
             "model.speed.highest: takes a resonator to half the sample rate");
   config.model.speed = {0.02, 8.0};
   EXPECT_EQ(refusal(Following::make(config)),
-            "model.speed.highest: is too far from lowest: between two speeds of the table the "
-            "error does not decay, at");
+            "model.speed.highest: is too far from lowest: the error does not decay between two "
+            "speeds of the table, at");
 }
 
 // ---- Analysis and snapshots.

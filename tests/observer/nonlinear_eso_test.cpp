@@ -351,8 +351,8 @@ TEST(ContinuousNonlinearEso, LimitsByDefaultAndByName) {
   config.gain_min = 0.3;  // below 3/8: needs an upper limit, 4.1 is the largest
   config.gain_max = 1e5;
   EXPECT_EQ(refusal(Observer::make(config)),
-            "gain_max: is not certified for a varying gain (allow_uncertified_gain asks for it); "
-            "with this gain_min the largest is");
+            "gain_max: must be certified for a varying gain (or set allow_uncertified_gain): with "
+            "this gain_min, at most");
   config.allow_uncertified_gain = true;
   EXPECT_NEAR(factor(config, 0.1), 0.3, 1e-12);
 }
@@ -497,13 +497,13 @@ TEST(NonlinearEso, RefusesByName) {
             }),
             "gain_min: must not be above gain_max, which is");
   EXPECT_EQ(with([](C& c) { c.gain_min = 0.1; }),
-            "gain_min: is not certified for a varying gain (allow_uncertified_gain asks for it); "
-            "were gain_max 1, the least would be");
+            "gain_min: must be certified for a varying gain (or set allow_uncertified_gain): with "
+            "gain_max = 1, at least");
   EXPECT_EQ(with([](C& c) { c.gain_min = 100; }),
-            "gain_min: must be below what is stable for a constant gain, which is");
+            "gain_min: must be below the stability limit for a constant gain, which is");
   EXPECT_EQ(with([](C& c) { c.gain_max = 100; }),
-            "gain_max: is not certified for a varying gain (allow_uncertified_gain asks for it); "
-            "with this gain_min the largest is");
+            "gain_max: must be certified for a varying gain (or set allow_uncertified_gain): with "
+            "this gain_min, at most");
   EXPECT_EQ(with([](C& c) { c.gain_max = 0.4; }), "accepted");
   EXPECT_EQ(with([](C& c) {
               c.gain_max = 100;
@@ -514,7 +514,7 @@ TEST(NonlinearEso, RefusesByName) {
               c.gain_min = 0.1;
               c.allow_uncertified_gain = true;
             }),
-            "gain_max: must be given where gain_min is not certified");
+            "gain_max: must be given if gain_min is not certified");
   EXPECT_EQ(with([](C& c) { c.unlimited = true; }), "accepted");
   EXPECT_EQ(with([](C& c) {
               c.unlimited = true;
@@ -527,7 +527,7 @@ TEST(NonlinearEso, RefusesByName) {
   at_limit.gain_min = 100;
   const double ceiling = Observer::make(at_limit).error().limit;
   EXPECT_EQ(with([&](C& c) { c.gain_min = ceiling; }),
-            "gain_min: must be below what is stable for a constant gain, which is");
+            "gain_min: must be below the stability limit for a constant gain, which is");
   EXPECT_EQ(with([&](C& c) { c.gain_min = 0.999 * ceiling; }), "accepted");
 
   auto refused = good;
@@ -538,8 +538,8 @@ TEST(NonlinearEso, RefusesByName) {
   EXPECT_TRUE(Observer::make(refused).has_value());
   refused.gain_max = error.limit * (1 + 1e-9);
   EXPECT_EQ(refusal(Observer::make(refused)),
-            "gain_max: is not certified for a varying gain (allow_uncertified_gain asks for it); "
-            "with this gain_min the largest is");
+            "gain_max: must be certified for a varying gain (or set allow_uncertified_gain): with "
+            "this gain_min, at most");
 
   const auto broken = NonlinearEso<2, double, 2, Broken>::make(
       {.observer_bandwidth = 10, .input_gain = 1, .sample_time = 0.01});

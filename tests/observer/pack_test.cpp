@@ -475,7 +475,7 @@ TEST(PackOfAdjustableBandwidth, NamesTheLaneWithoutACertificate) {
   EXPECT_EQ(made.error().limit[1], alone.error().limit);
   std::ostringstream text;
   text << made.error();
-  EXPECT_NE(text.str().find("bandwidth_ratio = 0.1: is not certified"), std::string::npos);
+  EXPECT_NE(text.str().find("bandwidth_ratio = 0.1: must be certified"), std::string::npos);
   EXPECT_NE(text.str().find("(lane 1)"), std::string::npos);
 }
 

@@ -54,8 +54,8 @@ void refuses() {
                                     .bandwidth_ratio = static_cast<S>(0.3),
                                     .input_gain = S(1),
                                     .sample_time = T})),
-            "bandwidth_ratio: is not certified against every switching "
-            "(allow_uncertified_switching asks for it); must be above");
+            "bandwidth_ratio: must be certified against every switching (or set "
+            "allow_uncertified_switching): above");
 }
 
 template <class Observer>

@@ -3,9 +3,9 @@
 /// Kasac, A. Pender, M. Pranjic, D. Kotarski, Asian Journal of Control 23 (2021) 2171-2184),
 /// sampled exactly and for any order and any number of extended states.
 ///
-/// In continuous time the error obeys (D + mu(t))^N e_1 = d^(m), mu(t) = lambda + N q / (e^{qt} -
-/// 1): poles that come from minus infinity and settle at -lambda. Sampled, with rho = e^{-lambda
-/// T}, p = e^{-qT} and [i] = (1 - p^i) / (1 - p), the weights of the gain (see
+/// In continuous time the error obeys (D + mu(t))^N e_1 = d^(m), D = d/dt, mu(t) = lambda + N q /
+/// (e^{qt} - 1): its poles start at minus infinity and settle at -lambda. Sampled, with rho =
+/// e^{-lambda T}, p = e^{-qT} and [i] = (1 - p^i) / (1 - p), the weights of the gain (see
 /// gain/sampled_gain.hpp) at sample k >= N - 1 are
 ///
 ///     b_j = C(N,j) rho^{N-j} h_{k+1} .. h_{k+N-j} P_j,
@@ -14,8 +14,8 @@
 ///     c_{j,r} = sum_i C(j,i) (1-rho)^{j-i} rho^i t_{i,r},
 ///     t_{0,0} = 1,  t_{i+1,r} = (1 - p^r) t_{i,r} + [N+r-1] t_{i,r-1}.
 ///
-/// Every term is positive, and all limits (lambda -> 0, q -> 0) are regular. At k = N - 1 this is
-/// deadbeat, and so are the samples before.
+/// Every term is positive, and the limits lambda -> 0 and q -> 0 are regular. Up to k = N - 1 the
+/// observer is deadbeat.
 #pragma once
 
 #include <cmath>
@@ -29,20 +29,21 @@
 
 namespace esokit {
 
-/// Gain law of AlgebraicEso. Gains advance by recursion: one division a sample, no exponential;
-/// once the schedule has settled to within rounding they are constant.
+/// Gain law of AlgebraicEso. The gain follows a fixed schedule over time, which advances by
+/// recursion: one division and no exponential per sample. Once the schedule has settled to within
+/// rounding, the gain is constant.
 ///
-/// Samples are counted in an integer, from which p^i and [i] are set anew every `anchor_interval`
-/// samples: a recursion alone would collect its rounding (a float one at q = 0 would stand still
-/// at i = 2^24, one with qT = 1e-8 would be 1 % off after 1e6 samples). Such an update takes up to
-/// 30 short multiplication steps more.
+/// Every `anchor_interval` samples p^i and [i] are computed anew from an integer count of samples,
+/// because the recursion alone accumulates rounding errors (in float, with q = 0 it would stop at i
+/// = 2^24, with qT = 1e-8 it would be 1 % off after 1e6 samples). Such an update takes up to 30
+/// additional short multiplication steps.
 template <int Size, Scalar S>
 class AlgebraicGain {
   template <int OtherSize, Scalar OtherS>
   friend class AlgebraicGain;
 
  public:
-  /// What it declares beside `gain`.
+  /// What the law can do besides `gain`.
   static constexpr GainLawTraits traits{.kind = GainKind::preset,
                                         .advances = true,
                                         .accepts = true,
@@ -52,18 +53,18 @@ class AlgebraicGain {
   using scalar_type = S;  ///< type of gains
   template <class T>
   using with_scalar = AlgebraicGain<Size, T>;  ///< the same with another scalar
-  using Count = Lanes<std::uint32_t, S>;       ///< samples, of a pack of each lane
+  using Count = Lanes<std::uint32_t, S>;       ///< number of samples; for a pack one in each lane
 
-  /// Largest start_index, and where the sample counter stops.
+  /// Largest start_index; the sample counter stops there, too.
   static constexpr std::uint32_t max_index = 0x3fffffffu;
 
-  /// Samples between two anchors, a power of two.
+  /// Samples between two computations from the integer count, a power of two.
   static constexpr std::uint32_t anchor_interval = 256;
 
-  /// @param bandwidth lambda >= 0, rad/s: the bandwidth that is left in the end
-  /// @param shift q >= 0, rad/s: how fast it falls there
-  /// @param start_index k0 >= 0, sample of the schedule to begin with (soft start)
-  /// @param least_age samples that are counted before the schedule may settle
+  /// @param bandwidth lambda >= 0, rad/s: the final bandwidth
+  /// @param shift q >= 0, rad/s: how fast the bandwidth falls to it
+  /// @param start_index k0 >= 0, sample of the schedule at which it starts (soft start)
+  /// @param least_age number of samples before the schedule may settle
   AlgebraicGain(const S& bandwidth, const S& shift, const S& sample_time, std::uint32_t start_index,
                 const Count& least_age = 0) noexcept
       : final_poles_(EqualSampledPoles<Size, S>::from_bandwidth(bandwidth, sample_time)),
@@ -75,7 +76,7 @@ class AlgebraicGain {
     restart();
   }
 
-  /// k, scaled, for any innovation.
+  /// k, scaled; the same for every innovation.
   /// @{
   [[nodiscard]] constexpr const ScaledGain<Size, S>& gain(const S&) const noexcept { return gain_; }
 
@@ -84,8 +85,8 @@ class AlgebraicGain {
   }
   /// @}
 
-  /// Next sample of the schedule. If one of the first N is not corrected, the deadbeat property is
-  /// lost and the schedule restarts there.
+  /// Goes to the next sample of the schedule. If one of the first N samples is not corrected, the
+  /// deadbeat property is lost, and the schedule restarts.
   ESOKIT_INLINE constexpr void advance() noexcept {
     if constexpr (PackScalar<S>) {
       if (settled_ == true) [[likely]]
@@ -100,13 +101,13 @@ class AlgebraicGain {
     }
   }
 
-  /// This sample was corrected.
+  /// Notes that this sample was corrected.
   constexpr void accept(const S&) noexcept { pending_ = false; }
 
-  /// As `restart`, because a reset of the observer is a start.
+  /// Same as `restart`.
   constexpr void reset() noexcept { restart(); }
 
-  /// Restarts the schedule; the state of the observer is kept.
+  /// Restarts the schedule. (The state of the observer is not part of the law.)
   constexpr void restart() noexcept { resume(0); }
 
   /// Goes to the place in the schedule that is reached after `age` samples.
@@ -114,7 +115,7 @@ class AlgebraicGain {
     age_ = age;
     pending_ = false;
     settled_ = false;
-    // At rest the registers hold i = k + 1 .. k + N of the last sample k; deadbeat up to k = N - 1.
+    // Between samples the registers hold i = k + 1 .. k + N for the last sample k.
     const std::uint32_t next = start_index_ + age;
     const std::uint32_t first = next > Size ? next - Size : 0u;
     anchor(first);
@@ -122,7 +123,7 @@ class AlgebraicGain {
     set_gain();
   }
 
-  /// The bandwidth at this place in the schedule, frozen, for the whole gap.
+  /// The gain for the whole gap at the bandwidth of this place in the schedule.
   [[nodiscard]] ScaledGain<Size, S> gap_gain(const S&, unsigned samples) const noexcept {
     if constexpr (PackScalar<S>) {
       ScaledGain<Size, S> all;
@@ -133,8 +134,8 @@ class AlgebraicGain {
       return all;
     } else {
       if (settled_) return esokit::gap_gain<Size, S>(final_poles_, samples);
-      // Deadbeat for the longer step: its first gain is 1 as well, so that N samples in a row make
-      // the estimate exact all the same, and gaps that recur do not diverge.
+      // Deadbeat for the longer step. Its first gain is also 1, so that N consecutive samples still
+      // make the estimate exact, and recurring gaps do not diverge.
       if (deadbeat()) return esokit::gap_gain<Size, S>(EqualSampledPoles<Size, S>{S(1.0)}, samples);
       const S a = final_poles_.contraction;
       const S now = a + (S(1.0) - a) * (size_bracket_ * std::get<0>(ratios_u_));
@@ -142,10 +143,10 @@ class AlgebraicGain {
     }
   }
 
-  /// Samples since the schedule began; the count ends where it settles.
+  /// Samples since the schedule began; the count stops when it settles.
   [[nodiscard]] constexpr Count age() const noexcept { return age_; }
 
-  /// Samples that are counted before the schedule may settle.
+  /// Number of samples before the schedule may settle.
   [[nodiscard]] constexpr const Count& least_age() const noexcept { return least_age_; }
 
   /// True once the gain is that of LinearEso with bandwidth lambda, to within rounding.
@@ -153,7 +154,7 @@ class AlgebraicGain {
 
  private:
   friend struct detail::LaneAccess;
-  using Plain = detail::PlainTwin<AlgebraicGain, S>;  ///< a lane
+  using Plain = detail::PlainTwin<AlgebraicGain, S>;  ///< type of a lane
 
   static constexpr auto fields(auto& o) noexcept {
     return detail::tie(o.gain_, o.coefficients_, o.ratios_u_, o.ratios_h_, o.final_poles_, o.shift_,
@@ -161,7 +162,8 @@ class AlgebraicGain {
                        o.start_index_, o.least_age_, o.age_, o.pending_, o.settled_);
   }
 
-  /// The lanes of a pack are at the same place, so that one recursion does for all.
+  /// True if all lanes of a pack are at the same place of the schedule: then one recursion serves
+  /// all.
   template <class = S>
   [[nodiscard]] constexpr bool together() const noexcept {
     return age_ == age_[0] && pending_ == pending_[0] && settled_ == false;
@@ -170,7 +172,7 @@ class AlgebraicGain {
   ESOKIT_COLD constexpr void advance_apart() noexcept {
     detail::for_each_lane<Plain>(*this, [](Plain& lane, int) { lane.advance(); });
   }
-  /// Of all lanes that are together.
+  /// Age of the lanes, if they are together.
   [[nodiscard]] constexpr std::uint32_t common_age() const noexcept {
     return detail::of_lane(age_, 0);
   }
@@ -208,7 +210,7 @@ class AlgebraicGain {
 
   static constexpr int coefficient_count = Size * (Size + 3) / 2;
 
-  /// c_{j,0} of the j-th row, j = 1 .. N, in the packed triangle.
+  /// Index of c_{j,0}, j = 1 .. N, in the packed triangle of the coefficients.
   static constexpr int row_start(int j) noexcept { return (j - 1) * (j + 2) / 2; }
 
   /// [count] = 1 + p + .. + p^(count-1).
@@ -216,16 +218,17 @@ class AlgebraicGain {
     return bracket(count, shift_.power(count).contraction);
   }
 
-  /// The same from 1 - p^count.
+  /// The same, computed from 1 - p^count.
   [[nodiscard]] constexpr S bracket(std::uint32_t count, const S& contraction) const noexcept {
     const auto shifting = shift_.contraction > S(0.0);
     const S ratio = contraction / select(shifting, shift_.contraction, S(1.0));
     return select(shifting, ratio, detail::integer<S>(count));
   }
 
-  /// Sets the registers of the next push to i - N = count, to a few units in the last place.
+  /// Sets the registers for a next push with i - N = count, accurate to a few units in the last
+  /// place.
   ESOKIT_COLD constexpr void anchor(std::uint32_t count) noexcept {
-    // p^c and 1 - p^c side by side: each is found from the other where that cancels nothing.
+    // Computes p^c and 1 - p^c together: each is obtained from the other where nothing cancels.
     S power(1.0);
     S contraction(0.0);
     S base_power = decay_;
@@ -260,7 +263,7 @@ class AlgebraicGain {
     const S a = final_poles_.contraction;
     const S rho = S(1.0) - a;
     for (int j = 1; j <= Size; ++j) {
-      // C(j,i) a^(j-i) rho^i of all i at once.
+      // C(j,i) a^(j-i) rho^i for all i.
       Array<S, Size + 1> mix{};
       for (S& x : mix) x = S(0.0);
       mix[0] = S(1.0);
@@ -280,7 +283,8 @@ class AlgebraicGain {
       }
     }
     size_bracket_ = bracket(Size);
-    // Below this u the terms with r >= 1 and 1 - h = [N] u are lost in the rounding of the first.
+    // Below this u the terms with r >= 1, and 1 - h = [N] u, are smaller than the rounding error of
+    // the first term.
     constexpr detail::TableScalar<S> unit = detail::rounding<detail::TableScalar<S>>() / 4;
     settled_below_ = S(unit / Size) / size_bracket_;
     for (int j = 1; j <= Size; ++j) {
@@ -290,7 +294,7 @@ class AlgebraicGain {
     }
   }
 
-  /// Shifts i on by one in the registers: the newest u_i and h_i.
+  /// Increments i in the registers: adds the next u_i and h_i.
   ESOKIT_INLINE constexpr void push() noexcept {
     const S inverse = S(1.0) / (bracket_ + size_bracket_ * power_);
     detail::unroll<Size - 1>([&](auto i) ESOKIT_INLINE_LAMBDA {
@@ -308,7 +312,7 @@ class AlgebraicGain {
     S remaining(1.0);
     detail::unroll<Size>([&](auto below) ESOKIT_INLINE_LAMBDA {
       constexpr int j = Size - below;
-      // Horner in the u_i, the newest of them innermost.
+      // Horner's rule over the u_i, the newest innermost.
       S nested = std::get<row_start(j) + j>(coefficients_);
       detail::unroll<j>([&](auto s) ESOKIT_INLINE_LAMBDA {
         constexpr int r = j - 1 - s;
@@ -326,7 +330,7 @@ class AlgebraicGain {
     gain_ = current_gain<Size, S>(final_poles_.weights());
   }
 
-  // Of packs alone, a template: Clang 14 instantiates the members of a class all.
+  // For packs only. A template, because Clang 14 instantiates all other members of a class.
   template <class = S>
   ESOKIT_COLD void settle_lanes() noexcept {
     for (int i = 0; i < lane_count<S>; ++i) {
@@ -339,8 +343,8 @@ class AlgebraicGain {
 
   ScaledGain<Size, S> gain_{};
   Array<S, coefficient_count> coefficients_{};
-  Array<S, Size> ratios_u_{};  ///< u_i, i = k + 1 .. k + N
-  Array<S, Size> ratios_h_{};  ///< h_i, the same
+  Array<S, Size> ratios_u_{};  ///< u_i for i = k + 1 .. k + N
+  Array<S, Size> ratios_h_{};  ///< h_i for the same i
   EqualSampledPoles<Size, S> final_poles_;
   EqualSampledPoles<Size, S> shift_;  ///< 1 - p
   S decay_;                           ///< p

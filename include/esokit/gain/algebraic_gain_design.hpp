@@ -1,5 +1,5 @@
 /// @file
-/// The design of AlgebraicEso before it runs: how long the estimates are blanked, and the schedule.
+/// The design of AlgebraicEso in make: how long the estimates are blanked, and the schedule.
 #pragma once
 
 #include <cstdint>
@@ -9,10 +9,10 @@
 
 namespace esokit::detail {
 
-/// Variance of the highest estimate after `count` samples over the one that is tolerated:
-/// (sigma / tolerated)^2 F / (count (count T)^(2N-2)), F = (2N-1)! (2N-2)! / ((N-1)!)^2 = (2N-1)
-/// prod_{i=1..N-1} (N-1+i)^2. In this order it overflows or vanishes only where the answer is
-/// clear.
+/// Ratio of the variance of the highest estimate after `count` samples to the tolerated one: (sigma
+/// / tolerated)^2 F / (count (count T)^(2N-2)), F = (2N-1)! (2N-2)! / ((N-1)!)^2 = (2N-1)
+/// prod_{i=1..N-1} (N-1+i)^2. Multiplied in this order, it overflows or underflows only if the
+/// comparison with 1 is clear anyway.
 template <int Size, Scalar S, class Config>
 S noise_ratio(const Config& config, const S& count) {
   constexpr int last = Size - 1;
@@ -26,8 +26,8 @@ S noise_ratio(const Config& config, const S& count) {
   return ratio * integer<S>(2 * last + 1);
 }
 
-/// The smallest number of samples, `low` to 1e6, that is enough; none is an error. No logarithms
-/// or roots, so it serves every scalar.
+/// The smallest number of samples from `low` to 1e6 for which enough(count) is true, or an error.
+/// Needs no logarithm or root, so that it works for every scalar.
 template <Scalar S, class Enough>
 Expected<std::uint32_t, Error<S>> smallest_count(const char* field, const S& value,
                                                  std::uint32_t low, const Enough& enough) {
@@ -46,7 +46,7 @@ Expected<std::uint32_t, Error<S>> smallest_count(const char* field, const S& val
   return high;
 }
 
-/// The samples for which estimates are blanked after a start.
+/// Number of samples for which the estimates are blanked after a start.
 template <int Size, Scalar S, class Config>
 Expected<std::uint32_t, Error<S>> blanking_samples(const Config& config) {
   Rules<S> rules;
@@ -59,7 +59,7 @@ Expected<std::uint32_t, Error<S>> blanking_samples(const Config& config) {
   if (config.blanking) rules.not_negative("blanking", *config.blanking);
   if (!rules) return rules.error();
   if (config.blanking) {
-    // A blanking of 20.0001 samples by rounding is one of 20.
+    // A blanking that is 20.0001 samples because of rounding counts as 20.
     const S samples = *config.blanking / config.sample_time - S(1e-3);
     return smallest_count<S>("blanking", *config.blanking, 0u,
                              [&](const S& count) { return all(count >= samples); });
@@ -72,7 +72,7 @@ Expected<std::uint32_t, Error<S>> blanking_samples(const Config& config) {
   return std::uint32_t{Size - 1};
 }
 
-/// The law that a config of AlgebraicEso asks for; its least age is the blanking.
+/// The law for a config of AlgebraicEso; it cannot settle before the blanking has ended.
 template <int Size, Scalar S, class Config>
 Expected<AlgebraicGain<Size, S>, Error<S>> design_algebraic_gain(const Config& config) {
   using Law = AlgebraicGain<Size, S>;
@@ -84,8 +84,8 @@ Expected<AlgebraicGain<Size, S>, Error<S>> design_algebraic_gain(const Config& c
       .not_negative("frequency_shift", shift)
       .require(all(bandwidth > S(0.0)) || !all(shift > S(0.0)) || config.allow_vanishing_gain,
                "observer_bandwidth", bandwidth,
-               "with frequency_shift above zero lets the gains vanish; allow_vanishing_gain asks "
-               "for it")
+               "must be above zero if frequency_shift is: the gains vanish (or set "
+               "allow_vanishing_gain)")
       .require(0 <= config.start_index && config.start_index <= 1000000, "start_index",
                integer<S>(config.start_index), "must be 0 .. 1000000");
   if (!rules) return rules.error();

@@ -14,13 +14,13 @@ namespace esokit {
 template <int Size, Scalar S, class Placement = EqualPoles>
 class ConstantGain {
  public:
-  /// What it declares beside `gain`.
+  /// What the law can do besides `gain`.
   static constexpr GainLawTraits traits{.kind = GainKind::preset, .bridges_gaps = true};
-  using Spec = typename Placement::template Spec<Size, LaneScalar<S>>;  ///< of the placement
+  using Spec = typename Placement::template Spec<Size, LaneScalar<S>>;  ///< bandwidth or poles
   template <class T>
   using with_scalar = ConstantGain<Size, T, Placement>;  ///< the same with another scalar
 
-  /// As below, for the sample time of a chain.
+  /// The same as the overload below, with the sample time of `chain`.
   template <class Chain>
   static Expected<ConstantGain, Error<S>> make(const char* field, const Spec& spec,
                                                const Chain& chain,
@@ -30,9 +30,9 @@ class ConstantGain {
   { return make(field, spec, chain.sample_time(), index); }
 
   /// The gain for a set of poles.
-  /// @param field name of the config member that `spec` came from, for the error
+  /// @param field name of the config member that holds `spec`, for the error
   /// @param spec poles of the error, checked by the placement
-  /// @param sample_time T, s; checked by the chain
+  /// @param sample_time T, s; already checked
   /// @param index element of `field` that the error names, -1: none
   /// @return error for a spec that the placement refuses, or a gain that the scalar cannot hold
   static Expected<ConstantGain, Error<S>> make(const char* field, const Spec& spec,
@@ -52,7 +52,7 @@ class ConstantGain {
     return law;
   }
 
-  /// k, scaled, for any innovation.
+  /// k, scaled; the same for every innovation.
   /// @{
   [[nodiscard]] constexpr const ScaledGain<Size, S>& gain(const S&) const noexcept { return gain_; }
 
@@ -61,7 +61,7 @@ class ConstantGain {
   }
   /// @}
 
-  /// Gain that puts the poles of the step over `samples` T at rho_i^samples, in the scaling of T.
+  /// Gain for a gap: places the poles of the step over `samples` T at rho_i^samples, scaled with T.
   [[nodiscard]] ScaledGain<Size, S> gap_gain(const S&, unsigned samples) const noexcept {
     if constexpr (PackScalar<S>) {
       ScaledGain<Size, S> all;
@@ -90,7 +90,7 @@ class ModelGain;  // gain/model_gain.hpp, to be included with a model other than
 template <int Size, Scalar S, class Placement = EqualPoles, int Count = 9, int MostBridged = 16>
 class ScheduledGain;  // gain/scheduled_gain.hpp, with a model that follows a speed
 
-/// The constant gain law for a model: by formula for the chain.
+/// The constant gain law for a model: ConstantGain for the chain, else ModelGain or ScheduledGain.
 template <class Model, int Size, Scalar S, class Placement>
 using ConstantGainOf = std::conditional_t<
     model_traits<Model>.is_chain, ConstantGain<Size, S, Placement>,
@@ -99,7 +99,7 @@ using ConstantGainOf = std::conditional_t<
 
 namespace detail {
 
-/// An Expected that is no error: costs nothing.
+/// Has the interface of an Expected, but always holds a value: for designs that cannot fail.
 template <class T, class S>
 struct Certain {
   T value;
@@ -108,7 +108,7 @@ struct Certain {
   [[nodiscard]] constexpr Error<S> error() const noexcept { return {}; }
 };
 
-/// The model of a checked config.
+/// Makes the model of a config that was checked.
 template <class Model, class Config>
 auto make_model(const Config& config) {
   using S = std::remove_cvref_t<decltype(config.input_gain)>;
@@ -121,7 +121,7 @@ auto make_model(const Config& config) {
   }
 }
 
-/// The law that a config asks for by bandwidth or by poles. @param chain to be sampled, if it is
+/// The law for a config with a bandwidth or poles. @param chain the chain, for a sampled observer
 template <class Law, class Config, class... Chain>
 auto placed_law(const Config& config, const Chain&... chain) {
   if constexpr (requires { config.poles; }) {
@@ -142,10 +142,10 @@ inline constexpr std::uint32_t type_tag<ConstantGain<Size, S, Placement>> =
 template <int Size, Scalar S, class Placement = EqualPoles>
 class ContinuousConstantGain {
  public:
-  using Spec = typename Placement::template Spec<Size, S>;  ///< of the placement
+  using Spec = typename Placement::template Spec<Size, S>;  ///< bandwidth or poles
 
   /// The gain for a set of poles.
-  /// @param field name of the config member that `spec` came from, for the error
+  /// @param field name of the config member that holds `spec`, for the error
   /// @param spec poles of the error, checked by the placement
   /// @param index element of `field` that the error names, -1: none
   /// @return error for a spec that the placement refuses, or a gain that the scalar cannot hold

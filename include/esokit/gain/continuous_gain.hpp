@@ -1,5 +1,5 @@
 /// @file
-/// Gains of the continuous observer from the poles of its estimation error.
+/// Gains of the continuous observer with all poles of its estimation error at one place.
 #pragma once
 
 #include <esokit/core/matrix.hpp>

@@ -1,11 +1,11 @@
 /// @file
 /// An error covariance of the chain in square-root form, P = L D L'.
 ///
-/// Nothing is ever subtracted from a variance: the measurement update scales one of them, the time
-/// update adds squares up (modified weighted Gram-Schmidt, C. L. Thornton). So P stays symmetric
-/// and positive semidefinite in float, where the plain and the Joseph form do not. Compared with
-/// the array form with square roots it needs N divisions a step and no root, which is also better
-/// for an autodiff scalar; it is as accurate, and 1.4 times faster for N = 3.
+/// Nothing is ever subtracted from a variance: the measurement update scales one variance, the time
+/// update sums squares (modified weighted Gram-Schmidt, C. L. Thornton). So P stays symmetric and
+/// positive semidefinite in float, which the plain and the Joseph form do not guarantee. In
+/// comparison with the array form with square roots it needs N divisions a step and no root, is
+/// equally accurate and, for N = 3, 1.4 times as fast.
 #pragma once
 
 #include <esokit/core/check.hpp>
@@ -22,7 +22,7 @@ namespace esokit {
 
 namespace detail {
 
-/// f(0), .., f(Count - 1): unrolled where that pays, a loop for the large sizes.
+/// Calls f(0), .., f(Count - 1): unrolled, or in a loop for large sizes.
 template <int Count, bool Unrolled, class Function>
 ESOKIT_INLINE constexpr void repeat(Function&& f) noexcept {
   if constexpr (Unrolled) {
@@ -34,14 +34,14 @@ ESOKIT_INLINE constexpr void repeat(Function&& f) noexcept {
 
 }  // namespace detail
 
-/// Phi of the chain in Nordsieck scaling: known when compiling.
+/// Phi of the chain in Nordsieck scaling, known at compile time.
 struct PascalTransition {};
 
 /// Phi of any other model.
 template <int Size, Scalar S>
 struct MatrixTransition {
   Matrix<S, Size, Size> phi;   ///< N x N, scaled
-  Array<int, Size> degrees{};  ///< state r is in units of T^degree
+  Array<int, Size> degrees{};  ///< power of T in the scaling of each state
 
   template <class T>
   using with_scalar = MatrixTransition<Size, T>;  ///< the same with another scalar
@@ -49,7 +49,7 @@ struct MatrixTransition {
   static constexpr auto fields(auto& t) noexcept { return detail::tie(t.phi, t.degrees); }
   /// @endcond
 
-  /// Of a model.
+  /// Phi of a model.
   template <class Model>
   static MatrixTransition of(const Model& model) noexcept {
     MatrixTransition transition{model.increment(), {}};
@@ -60,7 +60,7 @@ struct MatrixTransition {
     return transition;
   }
 
-  /// As a model has them, see SampledModel.
+  /// Members of a model, see SampledModel.
   /// @{
   [[nodiscard]] Matrix<S, Size, Size> increment() const noexcept {
     Matrix<S, Size, Size> step = phi;
@@ -76,8 +76,8 @@ struct MatrixTransition {
 /// P = L D L', N x N, in the Nordsieck scaling of the chain (all states have the unit of y), with L
 /// unit lower triangular and D diagonal, not negative.
 ///
-/// The first state is the measured one, so the first column of L is the direction of the gain and a
-/// measurement changes nothing but D_1: P C' = D_1 l_1, and C l_i = 0 for i > 1.
+/// The first state is the measured one, so the first column of L is the direction of the gain, and
+/// a measurement changes only D_1: P C' = D_1 l_1, and C l_i = 0 for i > 1.
 template <int Size, Scalar S>
 class CovarianceFactor {
   static constexpr bool unrolled = Size <= 5;
@@ -92,12 +92,12 @@ class CovarianceFactor {
     for (S& l : lower_) l = S(0.0);
   }
 
-  /// Factors a symmetric matrix. Returns nothing if it is not positive semidefinite up to rounding,
-  /// that is, not even with its variances 8 N eps larger. Reads the lower triangle.
+  /// Factors a symmetric matrix. Returns nothing if it is not positive semidefinite within
+  /// rounding, that is, even with variances larger by a share of 8 N eps. Reads the lower triangle.
   static std::optional<CovarianceFactor> from_matrix(const Square& p) noexcept {
     CovarianceFactor factor;
     if (factor.set<false>(p)) return factor;
-    // Nearly singular: rounding of one element is multiplied by what the pivots before it lack.
+    // Nearly singular: the rounding of an element is amplified by the small pivots before it.
     Square larger = p;
     for (int i = 0; i < Size; ++i) {
       if (!all(p(i, i) >= S(0.0))) return std::nullopt;
@@ -106,7 +106,8 @@ class CovarianceFactor {
     return factor.set<false>(larger) ? std::optional(factor) : std::nullopt;
   }
 
-  /// The same for a matrix that is positive semidefinite but for rounding: what is not is left out.
+  /// The same for a matrix that is positive semidefinite except for rounding; indefinite remainders
+  /// are dropped.
   static CovarianceFactor nearest(const Square& p) noexcept {
     CovarianceFactor factor;
     factor.set<true>(p);
@@ -147,8 +148,8 @@ class CovarianceFactor {
     return gain;
   }
 
-  /// P <- P - k c P for a measurement c x with noise of variance r (G. J. Bierman, 1977), for any
-  /// c. A state that is known for certain is not corrected.
+  /// P <- P - k c P for a measurement c x with noise of variance r, for any c (G. J. Bierman,
+  /// 1977). States that are known exactly are not corrected.
   /// @param output c, N elements @return k = P c' / (c P c' + r), N elements
   Array<S, Size> correct(const Array<S, Size>& output, const S& noise) noexcept {
     Array<S, Size> gain;
@@ -179,15 +180,15 @@ class CovarianceFactor {
 
   /// One sample ahead: P <- inflation Phi P Phi' + Q.
   /// @param inflation > 0 @param noise Q, in the same scaling @param transition Phi
-  /// @tparam DiagonalNoise Q is diagonal, which saves a tenth
+  /// @tparam DiagonalNoise Q is diagonal, which saves a tenth of the time
   template <bool DiagonalNoise = false, class Transition = PascalTransition>
   ESOKIT_INLINE constexpr void advance(const S& inflation, const CovarianceFactor& noise,
                                        const Transition& transition = {}) noexcept {
     advance_by<DiagonalNoise, unrolled>(inflation, noise, transition);
   }
 
-  /// The same in loops, for where it is not called at every sample: unrolled it is a large part of
-  /// what a filter takes to compile.
+  /// The same in loops, for calls outside the hot path: the unrolled form takes a large part of a
+  /// filter's compile time.
   template <class Transition = PascalTransition>
   [[gnu::noinline]] constexpr void advance_seldom(const S& inflation, const CovarianceFactor& noise,
                                                   const Transition& transition = {}) noexcept {
@@ -218,7 +219,7 @@ class CovarianceFactor {
     return sum;
   }
 
-  /// Every D_i and L_ij within a share of the other's.
+  /// True if every D_i and L_ij differs by at most a share from that of `other`.
   [[nodiscard]] constexpr bool near(const CovarianceFactor& other, const S& share) const noexcept {
     const auto close = [&share](const S& a, const S& b) {
       return all(detail::absolute(S(a - b)) <= share * detail::absolute(b));
@@ -237,7 +238,7 @@ class CovarianceFactor {
     for (S& d : variances_) d = d * factor;
   }
 
-  /// The same covariance in other units: state i times `unit`^degree, all variances times `factor`.
+  /// Converts to other units: state i is multiplied by `unit`^degree, all variances by `factor`.
   template <class Transition = PascalTransition>
   constexpr void rescale(const S& unit, const S& factor,
                          const Transition& transition = {}) noexcept {
@@ -261,8 +262,8 @@ class CovarianceFactor {
   template <bool DiagonalNoise, bool Unrolled, class Transition>
   ESOKIT_INLINE constexpr void advance_by(const S& inflation, const CovarianceFactor& noise,
                                           const Transition& transition) noexcept {
-    // Rows of [Phi L, L_Q] with the weights [inflation D, D_Q], made orthogonal one by one. Of the
-    // right half only what is below the diagonal is kept, negated; the diagonal is one.
+    // The rows of [Phi L, L_Q] with the weights [inflation D, D_Q] are made orthogonal one by one.
+    // Of the right half only the part below the diagonal is stored, negated; the diagonal is one.
     Array<S, Size> weights;
     Array<Array<S, Size>, Size> rows;
     Array<Array<S, Size>, Size> noise_rows;
@@ -280,7 +281,8 @@ class CovarianceFactor {
       const auto& noise_row = noise_rows[index(i)];
       Array<S, Size> weighted;
       Array<S, Size> noise_weighted;
-      // Two sums side by side, the one whose terms are late on its own: it is latency that counts.
+      // Two separate sums, one for the terms that become available late, because latency limits the
+      // speed.
       S early = noise.variances_[index(i)];
       S late = S(0.0);
       detail::repeat<Size, Unrolled>([&](int k) ESOKIT_INLINE_LAMBDA {
@@ -341,8 +343,8 @@ class CovarianceFactor {
     for (int k = 0; k < Size; ++k) {
       const S pivot = rest(k, k);
       if (!all(is_finite(p(k, k))) || !all(p(k, k) >= S(0.0))) return false;
-      // A pivot of nothing but rounding: the state is a combination of those before it, and all
-      // that is left of its column must be rounding too.
+      // A pivot of rounding errors only: the state is a combination of those before it, and the
+      // rest of its column must also be rounding errors.
       const bool lost = !all(pivot > unit * p(k, k));
       if (!Lenient && !all(pivot >= -(unit * p(k, k)))) return false;
       variances_[index(k)] = lost ? S(0.0) : pivot;
@@ -365,7 +367,7 @@ class CovarianceFactor {
     return true;
   }
 
-  /// Place of L_ij, i > j, column by column.
+  /// Index of L_ij, i > j, stored column by column.
   static constexpr std::size_t packed(int i, int j) noexcept {
     return index(j * (2 * Size - j - 1) / 2 + i - j - 1);
   }
@@ -388,7 +390,7 @@ class CovarianceFactor {
   template <bool Unrolled>
   [[nodiscard]] ESOKIT_INLINE constexpr S transported(const PascalTransition&, int i,
                                                       int k) const noexcept {
-    // Not from zero: adding a zero costs an addition.
+    // Starts with the first term instead of zero, which would cost an addition.
     S sum = k < i ? lower_[packed(i, k)] : S(pascal(k, i));
     detail::repeat<Size, Unrolled>([&](int j) ESOKIT_INLINE_LAMBDA {
       if (j <= i || j <= k) return;
@@ -398,12 +400,12 @@ class CovarianceFactor {
     return sum;
   }
 
-  /// C(j, i) in the scalar of tables.
+  /// C(j, i) in the scalar type of tables.
   static constexpr detail::TableScalar<S> pascal(int j, int i) noexcept {
     return binomial_table<Size, detail::TableScalar<S>>[index(j)][index(i)];
   }
 
-  /// Zero for what has no inverse.
+  /// 1 / x, or zero if x is too small to have an inverse.
   static constexpr S inverse_of_normal(const S& x) noexcept {
     const auto some = x >= detail::smallest_normal<S>();
     return select(some, S(S(1.0) / select(some, x, S(1.0))), S(0.0));

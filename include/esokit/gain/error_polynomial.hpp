@@ -1,6 +1,6 @@
 /// @file
-/// Characteristic polynomials of the estimation error from gains, in a form that allows the same
-/// tests for continuous and sampled observers.
+/// Characteristic polynomials of the estimation error for given gains, in a form that allows the
+/// same tests for continuous and sampled observers.
 #pragma once
 
 #include <esokit/core/check.hpp>
@@ -38,7 +38,7 @@ constexpr Array<Array<T, Size + 1>, Size> eulerian_table() noexcept {
 
 }  // namespace detail
 
-/// s^N + l_1 s^(N-1) + .. + l_N with s counted in `unit` (1/s), so that q_i stays near one.
+/// s^N + l_1 s^(N-1) + .. + l_N with s in units of `unit` (1/s), so that the q_i are near one.
 /// @param gain N x 1, row i in 1/s^(i+1)
 template <int Size, Scalar S>
 ErrorPolynomial<Size, S> error_polynomial(const Vector<S, Size>& gain, const S& unit) {
@@ -78,25 +78,26 @@ ErrorPolynomial<Size, S> error_polynomial(const ScaledGain<Size, S>& gain, const
   return q;
 }
 
-/// A frequency scale of a gain set: the harmonic mean of its poles, exact for equal continuous
-/// ones.
+/// A frequency scale of a gain set, 1/s: the harmonic mean of its poles; equal to their magnitude
+/// if all are equal.
 template <int Size, Scalar S>
 S frequency_scale(const Vector<S, Size>& gain) {
   static_assert(Size >= 2);
   return S(static_cast<double>(Size)) * gain(Size - 1) / gain(Size - 2);
 }
 
-/// The same for a scaled gain, in units of 1/T; about omega T, at most 2 for poles in one place.
+/// The same for a scaled gain, in units of 1/T: about omega T, and at most 2 for equal poles.
 template <int Size, Scalar S>
 S frequency_scale(const ScaledGain<Size, S>& gain) {
   static_assert(Size >= 2);
   return S(static_cast<double>(Size * (Size - 1))) * gain[Size - 1] / gain[Size - 2];
 }
 
-/// Every root has a negative real part: Routh's test. q_N must be positive.
+/// True if every root has a negative real part (Routh's test). q_N must be positive.
 template <int Size, Scalar S>
 bool is_hurwitz(const ErrorPolynomial<Size, S>& q) {
-  // Two rows of Routh's array at a time: coefficients of even and odd place from the top.
+  // Two rows of the Routh array at a time, beginning with every other coefficient from the highest
+  // and from the second.
   constexpr auto width = static_cast<std::size_t>(Size / 2 + 1);
   std::array<S, width + 1> upper{};
   std::array<S, width + 1> lower{};

@@ -15,8 +15,8 @@ namespace esokit {
 
 /// The domain in which controller poles are placed.
 enum class TimeDomain : unsigned char {
-  continuous,  ///< poles at -omega_c of the continuous loop; what most of the literature does
-  sampled      ///< poles at exp(-omega_c T) under the held input; right for any omega_c T
+  continuous,  ///< poles of the continuous loop at -omega_c, as in most of the literature
+  sampled      ///< poles at exp(-omega_c T) for a held input; exact for any omega_c T
 };
 
 /// Where a controller puts its n poles.
@@ -46,8 +46,8 @@ constexpr Array<Array<T, Order>, Order> held_input_table() noexcept {
 ///
 ///     k_r = (n-r)! / T^(n-r) sum_{i<=r} e_(n-i) s(n-i, n-r) / (n-i)!
 ///
-/// (s: signed Stirling numbers of the first kind). It is Ackermann's formula written in delta =
-/// Phi - 1: the row that picks Gamma's last power is e_1^T e^A (A / (e^A - 1))^(n+1).
+/// (s: signed Stirling numbers of the first kind). It is Ackermann's formula written in delta = Phi
+/// - 1: the last row of the inverse of (Gamma, delta Gamma, ..) is e_1^T e^A (A / (e^A - 1))^(n+1).
 template <int Order, Scalar S>
 Array<S, Order> held_input_feedback(const Array<S, Order + 1>& symmetric, const S& rate) {
   constexpr auto table = held_input_table<Order, TableScalar<S>>();
@@ -76,8 +76,8 @@ Array<S, Order> sampled_feedback_gain(const S& bandwidth, const S& sample_time) 
   return detail::held_input_feedback<Order, S>(poles.symmetric(), S(S(1.0) / sample_time));
 }
 
-/// Gains for a spec. @param sample_time T, s; matters in the sampled domain only
-/// @return k_0 .. k_(n-1), k_i in 1/s^(n-i), or the error of a bandwidth that is not positive or is
+/// Gains for a spec. @param sample_time T, s; used in the sampled domain only
+/// @return k_0 .. k_(n-1), k_i in 1/s^(n-i), or an error for a bandwidth that is not positive or
 ///         too large
 template <int Order, PlainScalar S>
 Expected<Array<S, Order>, Error<S>> feedback_gain(const FeedbackSpec<S>& spec,

@@ -1,5 +1,5 @@
 /// @file
-/// The design of ExtendedStateFilter from its config: the Riccati law, or the broken rule.
+/// The design of ExtendedStateFilter: from its config the Riccati law or an error.
 #pragma once
 
 #include <cmath>
@@ -17,7 +17,7 @@ class FilterDesign {
   using Covariance = Matrix<S, N, N>;
 
  public:
-  /// The law, or the error of a config whose chain is checked.
+  /// The law, or an error. Sample time and input gain of the config are already checked.
   template <class Config>
   static Expected<Law, Error<S>> make(const Config& config, const PlantModel& plant) {
     Rules<S> rules;
@@ -55,8 +55,8 @@ class FilterDesign {
     return rules;
   }
 
-  /// What makes a state of the law of one in physical units, T^r / r! of the chain, over the root
-  /// of the unit.
+  /// Factors from the rows of the estimate to the states of the law (T^r / r! for the chain),
+  /// divided by `root`, the root of the unit of variances.
   static Array<S, N> scaled_units(const PlantModel& plant, const S& root) {
     typename PlantModel::Estimate ones;
     for (int r = 0; r < N; ++r) ones(r) = S(1.0) / root;
@@ -79,14 +79,15 @@ class FilterDesign {
       q = *config.process_covariance;
       rules.all_of(check_covariance("process_covariance", q, true));
     }
-    // With a model the change left over is the difference of two within the bound.
+    // With a model of the disturbance the unmodelled change is the difference of two changes, each
+    // within the bound: it can be twice the bound.
     rules.all_of(add_bounds(config, q, has_model ? Order : -1));
     const S& change = config.disturbance_bounds[Order];
     rules.require(!has_model || all(change > S(0.0)), "disturbance_bounds", change,
                   "must say by how much the model may change the disturbance in a sample", Order);
     if (!rules) return rules.error();
 
-    // The unit of all variances: R, or without noise the largest variance there is.
+    // The unit of all variances: R, or without noise the largest variance of the config.
     S unit = r;
     const Array<S, N> plain = scaled_units(plant, S(1.0));
     bool driven = false;
@@ -100,14 +101,14 @@ class FilterDesign {
     }
     rules
         .require(driven || all(r > S(0.0)), "measurement_variance", r,
-                 "must be positive where nothing disturbs the plant")
+                 "must be positive if nothing disturbs the plant")
         .require(driven || config.inflation_rule != InflationRule::adaptive, "disturbance_bounds",
-                 S(0.0), "or process_covariance must not be zero where the inflation is adaptive")
+                 S(0.0), "(or process_covariance) must not be zero if the inflation is adaptive")
         .all_of(check_way_back(config, q));
     if (!rules) return rules.error();
     const Array<S, N> units = scaled_units(plant, S(sqrt(unit)));
     const auto in_law = [&units](const char* field, const Covariance& p) {
-      // The config is by rows of the estimate; the law has the model's states.
+      // The config is in rows of the estimate, the law in states of the model.
       Covariance of_states;
       Array<S, N> units_of_states;
       for (int i = 0; i < N; ++i) {
@@ -140,25 +141,26 @@ class FilterDesign {
     return config.process_covariance ? N * N - 1 : N - 1;
   }
 
-  /// What is known for certain is never corrected, what is never disturbed ever less.
+  /// A state that is known exactly is never corrected, and one that is never disturbed is corrected
+  /// less and less.
   template <class Config>
   static Check<S> check_way_back(const Config& config, const Covariance& q) {
     const S& highest = q(N - 1, N - 1);
-    // Of a model put together which state that is depends on its parts: an actuator that is known
-    // is not disturbed.
+    // In a composed model it depends on the parts which state is the highest; a known actuator need
+    // not be disturbed.
     if (model_traits<PlantModel>.corrects_part) return {};
     if (config.allow_vanishing_gain || all(highest > S(0.0))) return {};
     if (config.inflation_rule == InflationRule::none) {
       return Error<S>{noise_field(config), highest,
                       "must disturb the highest state: without inflation its gain tends to zero "
-                      "(allow_vanishing_gain asks for it)",
+                      "(or set allow_vanishing_gain)",
                       place_of_highest(config)};
     }
     const S& start = config.initial_covariance(N - 1, N - 1);
     if (config.mode != RiccatiMode::frozen && !all(start > S(0.0))) {
       return Error<S>{"initial_covariance", start,
-                      "must leave the highest state uncertain where nothing disturbs it "
-                      "(allow_vanishing_gain asks for it)",
+                      "must leave the highest state uncertain if nothing disturbs it "
+                      "(or set allow_vanishing_gain)",
                       N * N - 1};
     }
     return {};
@@ -187,8 +189,8 @@ class FilterDesign {
     if (!model_traits<PlantModel>.corrects_part && config.inflation_rule == InflationRule::none &&
         !all(highest > S(0.0))) {
       return Error<S>{field, highest,
-                      "must disturb the highest state where the gain is to be frozen without "
-                      "inflation: its limit is zero",
+                      "must disturb the highest state if the gain is frozen without inflation: its "
+                      "limit is zero",
                       place_of_highest(config)};
     }
     if (!law.freeze(config.mode)) {
@@ -200,13 +202,13 @@ class FilterDesign {
           const S limit = law.limit_gain()[index(i)];
           const S last = law.last_table_gain()[index(i)];
           if (!all(absolute(S(last - limit)) <= S(0.1) * absolute(limit))) {
-            return Error<S>{"mode",
-                            last,
-                            "has a start table too short: its last gain is more than a tenth off "
-                            "the limit",
-                            i,
-                            limit,
-                            true};
+            return Error<S>{
+                "mode",
+                last,
+                "has too short a start table: its last gain is more than a tenth off the limit",
+                i,
+                limit,
+                true};
           }
         }
       }

@@ -1,10 +1,10 @@
 /// @file
-/// By how much the bandwidth gains of a linear observer may be multiplied: intervals for a constant
-/// factor k, and pairs between which k may vary in any way.
+/// Stable ranges of a factor k on the bandwidth gains of a linear observer: intervals for a
+/// constant k, and limits between which k may vary arbitrarily.
 ///
-/// With all poles in one place the loop opened at k is (c (1 - j v))^N - 1, v = 0 .. infinity, c =
-/// 1 for the continuous observer and c = (1 + exp(-omega T)) / 2 for the sampled one; all closed
-/// forms here follow from that.
+/// With all poles in one place, the loop opened at k has the frequency response (c (1 - j v))^N -
+/// 1, v = 0 .. infinity, with c = 1 for the continuous observer and c = (1 + exp(-omega T)) / 2 for
+/// the sampled one. All closed forms here follow from it.
 #pragma once
 
 #include <cmath>
@@ -44,8 +44,8 @@ constexpr S least_factor(const S& power) noexcept {
 
 }  // namespace detail
 
-/// Constant k for which the continuous error s^N + k ((s + omega)^N - s^N) is stable: k above 1 /
-/// (1 + sec(pi/N)^N), 0 for N = 2, without an upper end.
+/// Constant k for which the continuous error polynomial s^N + k ((s + omega)^N - s^N) is stable: k
+/// > 1 / (1 + sec(pi/N)^N), which is 0 for N = 2, without an upper limit.
 template <int Size>
 constexpr Interval<double> constant_gain_interval() noexcept {
   return {detail::least_factor<Size>(1.0), detail::unbounded<double>()};
@@ -66,7 +66,8 @@ constexpr Interval<S> constant_gain_interval(const EqualSampledPoles<Size, S>& p
   return {detail::least_factor<Size>(power), S(1.0) / (b * sum)};
 }
 
-/// Least k_min for which the pair (k_min, 1) is certified: 1 / (1 + c^N sec(pi/(N+1))^(N+1)).
+/// Smallest k_min for which any variation of k within [k_min, 1] is certified: 1 / (1 + c^N
+/// sec(pi/(N+1))^(N+1)).
 template <int Size, Scalar S>
 constexpr S least_certified_gain(const EqualSampledPoles<Size, S>& poles) noexcept {
   return detail::least_factor<Size + 1>(detail::centre_power(poles));
@@ -78,7 +79,8 @@ constexpr double least_certified_gain() noexcept {
   return detail::least_factor<Size + 1>(1.0);
 }
 
-/// (N-1) / (2N): from this k_min on every k_max is certified for the continuous observer.
+/// (N-1) / (2N): with a k_min of at least this, every k_max is certified for the continuous
+/// observer.
 template <int Size>
 constexpr double unbounded_certified_gain() noexcept {
   return (Size - 1.0) / (2.0 * Size);
@@ -92,7 +94,8 @@ constexpr ScaledGain<Size, S> multiplied(const ScaledGain<Size, S>& gain, const 
   return result;
 }
 
-/// Whether a factor that varies between `low` and `high` in any way is certified on a sampled gain.
+/// True if the sampled observer is certified stable for any variation of the factor between `low`
+/// and `high`.
 template <int Size, Scalar S>
 [[nodiscard]] bool gain_range_certified(const ScaledGain<Size, S>& gain, const S& low,
                                         const S& high) {
@@ -100,7 +103,7 @@ template <int Size, Scalar S>
                                       multiplied<Size, S>(gain, high));
 }
 
-/// The same on a continuous gain.
+/// The same for a continuous gain.
 template <int Size, Scalar S>
 [[nodiscard]] bool gain_range_certified(const Vector<S, Size>& gain, const S& low, const S& high) {
   const Vector<S, Size> first = gain * low;
@@ -108,8 +111,8 @@ template <int Size, Scalar S>
   return switching_certified<Size, S>(first, second);
 }
 
-/// Largest k_max in (base, ceiling) that is certified with `low`, by bisection; `base` if even that
-/// fails.
+/// Largest k_max in (base, ceiling) that is certified together with the limit `low`, by bisection;
+/// `base` if there is none.
 /// @param gain a ScaledGain, or the gain vector of a continuous observer
 template <int Size, Scalar S, class Gain>
 [[nodiscard]] S largest_certified_gain(const Gain& gain, const S& low, const S& base,

@@ -1,5 +1,5 @@
 /// @file
-/// What a gain law is: the only part in which the observers differ.
+/// The concept of a gain law, the only part besides the model in which the observers differ.
 #pragma once
 
 #include <concepts>
@@ -10,26 +10,27 @@
 
 namespace esokit {
 
-/// How the gain depends on the innovation e, and so what is known of it before the measurement.
+/// How the gain depends on the innovation e, and thus what is known about it before the
+/// measurement.
 enum class GainKind : unsigned char {
-  /// In any way. The observer asks with finite e alone, see `bears_any_innovation`.
+  /// In any way. The observer calls `gain` with finite e only, see `bears_any_innovation`.
   general,
   /// Not at all: `gain_before_measurement() const` is the gain of the next correction.
   preset,
-  /// It is one of two: `shrinking_gain() const` where `shrinks(e) const`, else `otherwise_gain()
-  /// const`. `shrinks` is asked with any e.
+  /// It is one of two: `shrinking_gain() const` if `shrinks(e) const` is true, else
+  /// `otherwise_gain() const`. `shrinks` must accept any e, also NaN.
   switched,
-  /// It is `factor(e) const` times `linear_gain() const`. `factor` is asked with any e.
+  /// It is `factor(e) const` times `linear_gain() const`. `factor` must accept any e, also NaN.
   factored,
 };
 
-/// What a gain law can do beside `gain(e)`, declared in a member `static constexpr GainLawTraits
+/// What a gain law can do besides `gain(e)`, declared in a member `static constexpr GainLawTraits
 /// traits{..}`. A law with `gain(e)` alone needs no traits. All hooks are noexcept.
 struct GainLawTraits {
-  GainKind kind = GainKind::general;  ///< its members must equal gain(e)
+  GainKind kind = GainKind::general;  ///< the members that it requires must agree with gain(e)
 
   /// `advance()`: one sample time has passed (schedules, Riccati time update). Called in every
-  /// predict, whether a measurement follows or not.
+  /// predict, also if no measurement follows.
   bool advances = false;
 
   /// `accept(e)`: the correction with innovation e was carried out (switching memory, Riccati
@@ -40,8 +41,8 @@ struct GainLawTraits {
   bool resets = false;
 
   /// `gap_gain(e, samples) const`: the gain if `samples` (unsigned) > 1 sample times have passed
-  /// since the last correction. Without it `gain(e)` is used. With a constant nominal gain
-  /// recurring gaps then diverge; a law that follows time in `advance()` does not need this hook.
+  /// since the last correction. Without it `gain(e)` is used: a constant gain then diverges in
+  /// recurring gaps. A law that follows time in `advance()` does not need this hook.
   bool bridges_gaps = false;
 
   /// `gain(e)` may be called with an e that is not finite (the result is then not used); this saves
@@ -49,7 +50,7 @@ struct GainLawTraits {
   bool bears_any_innovation = false;
 };
 
-/// What a gain law declares.
+/// The traits that a gain law declares, or the defaults.
 template <class Law>
 inline constexpr GainLawTraits gain_law_traits = detail::declared_traits<Law, GainLawTraits>;
 
@@ -79,7 +80,7 @@ ESOKIT_MEMBER_FUNCTION(factors)
 template <class Gain, int Size, class S>
 concept GainOf = std::convertible_to<Gain, ScaledGain<Size, S>>;
 
-// The hooks as they have to be.
+// The required signatures of the hooks.
 template <class Law>
 concept Advances = noexcept(std::declval<Law&>().advance());
 template <class Law, class S>
@@ -164,14 +165,14 @@ concept HasNoMisspelledHook =
     !detail::calls_resets<Law> && !detail::calls_bridge_gap<Law> &&
     !detail::calls_gain_for_gap<Law> && !detail::calls_preset_gain<Law> &&
     !detail::calls_shrink<Law> && !detail::calls_factors<Law> &&
-    // Was a constant of the law; is declared in `traits` now.
+    // Formerly a constant of the law, now declared in `traits`.
     !detail::names_bears_any_innovation<Law>;
 
-/// A gain law of the sampled predictor-corrector: the only thing that differs between observers.
+/// A gain law of the sampled predictor-corrector.
 ///
 /// Required: `gain(e) const noexcept`, the scaled gain k (k_r = T^r / r! times the physical gain;
-/// `scaled_gain` converts) for the innovation e = y - z_1, predicted z_1. It must have no side
-/// effect, because the correction may still be dropped. Everything else is declared, see
+/// `scaled_gain` converts) for the innovation e = y - z_1, where z_1 is predicted. It must have no
+/// side effect, because the correction may still be rejected. Everything else is declared, see
 /// GainLawTraits. A type with a hook that is not declared, is declared but missing, or has another
 /// signature is not a gain law.
 template <class Law, int Size, class S>
@@ -188,7 +189,7 @@ template <class Law, int Size, class S>
 concept PresetGainLaw = GainLaw<Law, Size, S> && gain_law_traits<Law>
 .kind == GainKind::preset;
 
-/// What a gain law of a continuous observer can do beside `gain(t, e)`, declared in a member
+/// What a gain law of a continuous observer can do besides `gain(t, e)`, declared in a member
 /// `static constexpr ContinuousGainLawTraits traits{..}`.
 struct ContinuousGainLawTraits {
   /// `begin_step(t, e)`, called at step boundaries of a simulation; the only place where a switched

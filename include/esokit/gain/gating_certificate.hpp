@@ -1,13 +1,14 @@
 /// @file
-/// Certificate for observers whose corrections of the disturbance are scaled from sample to sample.
+/// Stability certificate for observers in which the correction of the disturbance is scaled by a
+/// factor that changes from sample to sample.
 ///
-/// Without the last gain the error has the characteristic polynomial p_0, with all gains p_1; if
-/// the last correction is multiplied by phi, it is p_0 + phi (p_1 - p_0). By the circle criterion
-/// any phi(k) in [0, 1] is stable if Re G > -1 on the unit circle, G = (p_1 - p_0) / p_0: that is
-/// Re p_1 / p_0 > 0, the test of a pair of gain sets, at whose end p_0 has its root at z = 1 (a
-/// disturbance that is not corrected stays). A disturbance that leaks, multiplied by 1 - a after
-/// each correction, makes (1 - a) p + a z p_m of both, p_m that of the gains but the last; the root
-/// at z = 1 is at 1 - a then.
+/// The error has the characteristic polynomial p_1 with all gains, p_0 without the last one, and
+/// p_0 + phi (p_1 - p_0) if the last correction is multiplied by phi. By the circle criterion any
+/// phi(k) in [0, 1] is stable if Re G > -1 on the unit circle, where G = (p_1 - p_0) / p_0. This is
+/// Re p_1 / p_0 > 0, the same test as for a pair of gain sets, except that p_0 has a root at z = 1,
+/// because a disturbance that is not corrected stays. If the disturbance leaks, that is, is
+/// multiplied by 1 - a after each correction, both polynomials p become (1 - a) p + a z p_m, where
+/// p_m is that of all gains but the last; the root at z = 1 moves to 1 - a.
 #pragma once
 
 #include <cmath>
@@ -19,7 +20,7 @@ namespace esokit {
 
 namespace detail {
 
-/// (1 - a) p + a z p_m by the bilinear map, see error_polynomial.
+/// (1 - a) p + a z p_m after the bilinear map, see error_polynomial.
 template <int Size, Scalar S>
 ErrorPolynomial<Size, S> leaking_polynomial(const ScaledGain<Size, S>& gain, const S& leak,
                                             const S& unit) {
@@ -36,7 +37,7 @@ ErrorPolynomial<Size, S> leaking_polynomial(const ScaledGain<Size, S>& gain, con
   return p;
 }
 
-/// Where q_0 is zero, and with it the value at standstill: what is positive is the rest, over w^2.
+/// Where q_0 is zero, and with it the value at w = 0. The test is for the rest, divided by w^2.
 template <int Size, Scalar S>
 bool positive_but_at_standstill(const Array<S, Size + 1>& product) {
   Array<S, Size> rest{};
@@ -46,11 +47,11 @@ bool positive_but_at_standstill(const Array<S, Size + 1>& product) {
 
 }  // namespace detail
 
-/// Whether the error of a sampled observer of the chain with one extended state stays bounded, by a
-/// common quadratic Lyapunov function, while corrections of the disturbance are multiplied by any
+/// True if the error of a sampled observer of the chain with one extended state stays bounded (by a
+/// common quadratic Lyapunov function) while corrections of the disturbance are multiplied by any
 /// phi(k) in [0, 1].
 /// @param gain scaled current-estimator gain
-/// @param leak a: the part of the disturbance that goes after each correction, 0 .. 1
+/// @param leak a: the share of the disturbance that is removed after each correction, 0 .. 1
 template <int Size, Scalar S>
 [[nodiscard]] bool gating_certified(const ScaledGain<Size, S>& gain, const S& leak = S(0.0)) {
   const S unit = frequency_scale<Size, S>(gain);
@@ -67,15 +68,15 @@ template <int Size, Scalar S>
 
 namespace detail {
 
-/// One level of an observer with a model, as far as its constant disturbance is concerned: the part
-/// that is corrected, its gain, and the constant among its states.
+/// The parts of one level of an observer with a model that concern its constant disturbance: the
+/// corrected part, its gain, and the place of the constant among its states.
 template <int Size, Scalar S>
 struct ConstantLevel {
   Matrix<S, Size, Size> step;  ///< Phi - I
   Array<S, Size> ahead{};      ///< C Phi
   Array<S, Size> gain{};       ///< k
-  Array<S, Size> row{};        ///< the constant is row x
-  Array<S, Size> column{};     ///< what one more of it is to x
+  Array<S, Size> row{};        ///< the constant is `row` x
+  Array<S, Size> column{};     ///< change of x with the constant
 
   template <int Whole, int Pairs, class Model>
   ConstantLevel(const CorrectedPart<Size, Whole, Pairs, S>& part, const Model& model,
@@ -98,7 +99,7 @@ struct ConstantLevel {
     }
   }
 
-  /// A - I of the error after correction and leak. @param trust phi @param leak a
+  /// A - I of the error dynamics with correction and leak. @param trust phi @param leak a
   [[nodiscard]] Matrix<S, Size, Size> error(const S& trust, const S& leak) const {
     S found(0.0);
     for (std::size_t i = 0; i < Size; ++i) found = found + row[i] * gain[i];
@@ -107,7 +108,7 @@ struct ConstantLevel {
       const S k = gain[i] - (S(1.0) - trust) * found * column[i];
       for (std::size_t j = 0; j < Size; ++j) {
         S& x = all(static_cast<int>(i), static_cast<int>(j));
-        // No prediction changes the constant: row Phi = row.
+        // A prediction does not change the constant: row Phi = row.
         x = x - k * ahead[j] - leak * column[i] * (row[j] - trust * found * ahead[j]);
       }
     }
@@ -138,14 +139,14 @@ ErrorPolynomial<Size, S> bilinear_polynomial(const Matrix<S, Size, Size>& differ
 
 }  // namespace detail
 
-/// The same for a model that tells its constant from the rest of its disturbance, whose other parts
-/// are corrected as usual.
-/// @param level what is corrected @param leak as above, of the constant
+/// The same for a model in which the constant is separate from the other parts of the disturbance,
+/// which are corrected as usual.
+/// @param level the level @param leak as above, for the constant
 template <int Size, Scalar S>
 [[nodiscard]] bool gating_certified(const detail::ConstantLevel<Size, S>& level,
                                     const S& leak = S(0.0)) {
   const auto trusted = level.error(S(1.0), leak);
-  // In units of the geometric mean of its poles.
+  // Scaled by the geometric mean of its poles.
   const S product_of_poles =
       detail::absolute(detail::bilinear_polynomial<Size, S>(trusted, S(1.0))[0]);
   const S unit = std::pow(product_of_poles, S(1.0) / S(static_cast<double>(Size)));

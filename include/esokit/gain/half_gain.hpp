@@ -7,9 +7,9 @@
 ///
 ///     s_k = -omega/2 (1 + j cot(theta_k / 2)),  theta_k = pi (2k + 1) / N,
 ///
-/// so it is a pole set like any other. Sampled, the poles go to exp(s_k T): stable for every
-/// omega T, which halved sampled gains are not (N = 4 loses stability at omega T = 0.88), and with
-/// the half gains as the limit for T -> 0.
+/// so it is an ordinary pole set. In the sampled observer the poles are at exp(s_k T): stable for
+/// every omega T, while halved sampled gains are not (for N = 4 they are unstable from omega T =
+/// 0.88). For T -> 0 both agree.
 #pragma once
 
 #include <cmath>
@@ -25,7 +25,7 @@ namespace detail {
 /// -omega/2 cot(theta_k / 2), the imaginary part of s_k, 1/s; its conjugate is s_(N-1-k).
 template <int Size, PlainScalar S>
 S half_gain_imaginary(const S& bandwidth, int k) {
-  // The middle one of an odd number is real: cot(pi/2) = 0, which rounding would miss.
+  // For odd N the middle pole is real: cot(pi/2) = 0, which rounding would miss.
   if (2 * k + 1 == Size) return S(0);
   const S angle = std::numbers::pi_v<S> * static_cast<S>(2 * k + 1) / static_cast<S>(2 * Size);
   return -bandwidth / S(2) / std::tan(angle);
@@ -33,12 +33,12 @@ S half_gain_imaginary(const S& bandwidth, int k) {
 
 }  // namespace detail
 
-/// Poles of the sampled error in conjugate pairs and, where their number is odd, one that is real;
-/// kept as contractions 1 - rho. In real numbers: complex ones take 4 KiB of flash.
+/// Poles of the sampled error in conjugate pairs and, if their number is odd, one real pole; stored
+/// as contractions 1 - rho. In real arithmetic, because std::complex takes 4 KiB of flash.
 template <int Size, PlainScalar S>
 struct SampledPolePairs {
   using Contraction = detail::Contraction<S>;   ///< 1 - rho
-  static constexpr int count = (Size + 1) / 2;  ///< pairs, and the real one, which is the last
+  static constexpr int count = (Size + 1) / 2;  ///< pairs; the last may be the real pole
   Array<Contraction, count> pairs{};            ///< one of each pair
 
   /// The poles for `samples` sample times in one: rho_i^samples.
@@ -61,7 +61,7 @@ struct SampledPolePairs {
   [[nodiscard]] constexpr PoleWeights<Size, S> weights() const noexcept { return product<true>(); }
 
  private:
-  /// Of two poles one after the other: 1 - (1 - a)(1 - b), without the cancellation.
+  /// Contraction of the product of two poles: 1 - (1 - a)(1 - b), without cancellation.
   static constexpr Contraction after(const Contraction& a, const Contraction& b) noexcept {
     const S rest = S(1) - a.real;
     return {a.real + (rest * b.real + a.imaginary * b.imaginary),
@@ -112,7 +112,7 @@ struct HalfGainPoles : BandwidthPlacement {
     return poles;
   }
 
-  /// Exactly half of the bandwidth parameterisation's. @return l, N x 1, row i in 1/s^(i+1)
+  /// Exactly half the gain of the bandwidth parameterisation. @return l, N x 1, row i in 1/s^(i+1)
   template <int Size, PlainScalar S>
   static Vector<S, Size> gain(const S& bandwidth) {
     return continuous_gain<Size, S>(bandwidth) / S(2);

@@ -15,13 +15,13 @@ namespace esokit {
 
 namespace detail {
 
-/// The gains of a part that is observed by itself: after one sample, and after each gap.
+/// The gains of a CorrectedPart: after one sample, and after each gap.
 template <int Size, Scalar S, int MostBridged>
 struct PartDesign {
   Array<ScaledGain<Size, S>, MostBridged> gains{};
-  int longest_step = 0;  ///< samples from correction to correction; 0: poles cannot be placed
+  int longest_step = 0;  ///< longest step that is bridged, samples; 0: the poles cannot be placed
 
-  /// True if with this gain every error decays.
+  /// True if every error decays with this gain.
   static bool decays(const Matrix<S, Size, Size>& step, const Array<S, Size>& output,
                      const ScaledGain<Size, S>& gain) {
     Array<S, Size> units{};
@@ -33,9 +33,9 @@ struct PartDesign {
              const Array<int, Size>& degrees, const PoleFactors<Size, S>& poles) {
     gains[0] = placed_gain(step, output, degrees, poles);
     const auto units = degree_units<Size>(degrees, poles.unit);
-    // Rounding spreads N equal poles by its N-th root: N = 8 in double by a third where the model
-    // swings at three times the bandwidth. Where little is left after a sample that is of no
-    // account.
+    // Rounding spreads N equal poles by its N-th root: for N = 8 in double by a third if the model
+    // has a sine at three times the bandwidth. It does not matter if each sample leaves only a
+    // tenth of the error (2.3 = ln 10).
     const S got = decay(corrected(step, output, gains[0]), units);
     if (!all(got >= S(0.5) * poles.decay) && !all(got >= S(2.3))) return;
     longest_step = 1;
@@ -45,7 +45,7 @@ struct PartDesign {
  private:
   using Square = Matrix<S, Size, Size>;
 
-  // Matrices near I are kept without it: Phi - I has all its digits, Phi has not.
+  // Matrices near I are stored without I: Phi - I keeps all its digits, Phi does not.
 
   /// (I - k C) Phi - I from Phi - I.
   static Square corrected(Square step, const Array<S, Size>& output,
@@ -63,7 +63,7 @@ struct PartDesign {
   /// (I + A)(I + B) - I.
   static Square joined(const Square& a, const Square& b) { return a * b + (a + b); }
 
-  /// The largest magnitude of an element; infinite where one is not finite.
+  /// The largest magnitude of an element; infinite if one is not finite.
   static S largest(const Square& a) {
     S most(0.0);
     for (int i = 0; i < Size; ++i) {
@@ -76,8 +76,8 @@ struct PartDesign {
     return most;
   }
 
-  /// -ln of the largest pole of I + A, by its powers; -1 where they are not finite.
-  /// @param units a^degree, in which its elements are of one size
+  /// -ln of the magnitude of the largest pole of I + A, from its powers; -1 if they are not finite.
+  /// @param units a^degree, units in which the elements of A are of similar size
   static S decay(Square a, const Array<S, Size>& units) {
     using std::log;
     for (std::size_t i = 0; i < Size; ++i) {
@@ -106,8 +106,8 @@ struct PartDesign {
 
   void find_gap_gains(const Square& step, const Array<S, Size>& output, const Array<S, Size>& units,
                       const S& least_decay) {
-    // P_1, that of noise alone with the gain k: P_1 = A P_1 A' + (Phi k) (Phi k)', A = Phi (I -
-    // kC).
+    // P_1, the stationary covariance with the gain k and measurement noise only: P_1 = A P_1 A' +
+    // (Phi k) (Phi k)', A = Phi (I - k C).
     Square phi = step;
     for (int i = 0; i < Size; ++i) phi(i, i) = phi(i, i) + S(1.0);
     Array<S, Size> ahead{};
@@ -151,41 +151,43 @@ struct PartDesign {
 }  // namespace detail
 
 /// Constant gain for a model, placed numerically. If the model declares which part is corrected
-/// (CorrectedPart), the gain is for that part, together with the poles that the model places
-/// itself.
+/// (CorrectedPart), the gain is designed for that part, with the poles that the model itself
+/// places.
 ///
-/// The gain that places the poles for M T, by which the chain bridges a gap, is of no use to what
-/// swings: seen at every M-th sample a resonator is nearly a constant, and the gain grows without
-/// bound (50 Hz at 1 ms: 1e5 after 10 missing samples). After a gap this law weights y like a
-/// Kalman filter whose covariance was that of the noise in the estimate and has grown during the
-/// gap:
+/// The chain bridges a gap by the gain that places the poles for a step of M T. With a resonator
+/// this fails: sampled at every M-th sample it can look like a constant, and the gain grows without
+/// bound (50 Hz at 1 ms: 1e5 after 10 missing samples). Instead this law weights y after a gap like
+/// a Kalman filter whose covariance before the gap was that of the noise in the estimate, and has
+/// grown during the gap:
 ///
 ///     k_M = P_M C' / (C P_M C' + R),  P_M = Phi^(M-1) P_1 Phi^(M-1)',  R = 1
 ///
-/// which is bounded, and tends to the gain for exact measurements. Gaps are bridged up to the
-/// largest M for which the errors decay if this M, or any smaller one, recurs for ever, with at
-/// least a hundredth of the decay without gaps. After longer gaps the observer restarts.
-/// @tparam MostBridged gaps to be considered; each costs N numbers
+/// This is bounded and, as P_M grows, tends to the gain for exact measurements. Gaps are bridged up
+/// to the largest M for which errors decay if this M, or any smaller one, recurs forever, at no
+/// less than a hundredth of the rate without gaps. After longer gaps the observer restarts.
+/// @tparam MostBridged longest gap to be considered, samples; each sample costs N numbers
 template <int Size, Scalar S, class Placement, int MostBridged>
 class ModelGain {
  public:
-  /// What it declares beside `gain`.
+  /// What the law can do besides `gain`.
   static constexpr GainLawTraits traits{.kind = GainKind::preset, .bridges_gaps = true};
-  using Spec = typename Placement::template Spec<Size, S>;  ///< of the placement
+  using Spec = typename Placement::template Spec<Size, S>;  ///< bandwidth or poles: a
+                                                            ///< bandwidth or poles
 
   /// The gain for a set of poles.
-  /// @param field name of the config member that `spec` came from, for the error
-  /// @param spec poles of the error, checked by the placement @param model to be observed
+  /// @param field name of the config member that holds `spec`, for the error
+  /// @param spec poles of the error, checked by the placement @param model the model that is
+  /// observed
   /// @param index element of `field` that the error names, -1: none
-  /// @return error for a spec that the placement refuses, or poles that rounding would make slower
-  ///         than half of what was asked for
+  /// @return error for a spec that the placement refuses, or for poles that rounding would make
+  ///         less than half as fast as specified
   template <SampledModel<S> Model>
   static Expected<ModelGain, Error<S>> make(const char* field, const Spec& spec, const Model& model,
                                             int index = -1) {
     if (auto ok = Placement::template check<Size, S>(field, spec, index); !ok) return ok.error();
     const S named = Placement::template representative<Size, S>(spec);
     ModelGain law;
-    // What the part's gains are to the whole.
+    // Converts the gains of the part to those of the whole model.
     const auto take = [&](const auto& part, const auto& poles) -> Expected<ModelGain, Error<S>> {
       const auto design = designed(part, poles);
       if (design.longest_step == 0) {
@@ -223,14 +225,14 @@ class ModelGain {
     }
   }
 
-  /// True if with this gain every error of the model decays.
+  /// True if every error of the model decays with this gain.
   template <class Model>
   [[nodiscard]] static bool decays(const Model& model, const ScaledGain<Size, S>& gain) {
     const auto all = corrected_whole(model);
     return detail::PartDesign<Size, S, 1>::decays(all.step, all.output, gain);
   }
 
-  /// k, scaled, for any innovation.
+  /// k, scaled; the same for every innovation.
   /// @{
   [[nodiscard]] constexpr const ScaledGain<Size, S>& gain(const S&) const noexcept {
     return gains_[0];
@@ -240,12 +242,12 @@ class ModelGain {
   }
   /// @}
 
-  /// k_M.
+  /// k_M, the gain after a gap of M samples.
   [[nodiscard]] constexpr ScaledGain<Size, S> gap_gain(const S&, unsigned samples) const noexcept {
     return gains_[samples < MostBridged ? samples - 1 : MostBridged - 1];
   }
 
-  /// The largest number of missing samples that is bridged, of those that are asked for.
+  /// The largest number of missing samples that is bridged, at most `asked`.
   [[nodiscard]] constexpr int longest_gap(int asked) const noexcept {
     return asked < longest_step_ ? asked : longest_step_ - 1;
   }

@@ -1,10 +1,10 @@
 /// @file
-/// Poles of the estimation error placed for any sampled model, in a form that keeps its digits.
+/// Pole placement of the estimation error for any sampled model, in a form that loses no digits.
 ///
-/// It uses F = (Phi - I) / a with the states in units of a^degree, where a is the distance of the
-/// poles from z = 1. For a chain whose poles all lie within a, F and the gains are the same for
-/// every a up to terms of order a. There Ackermann's formula is accurate; in the plain states its
-/// terms differ by a^N (N = 7, omega_o T = 1e-3: no digit is left).
+/// It applies Ackermann's formula to F = (Phi - I) / a with state r in units of a^degree(r), where
+/// a is the largest distance of a pole from z = 1. In these units F and the gains of a chain do not
+/// depend on a, up to terms of order a, and the formula is accurate. In the original states its
+/// terms differ by a^N, and with N = 7 and omega_o T = 1e-3 no digit is left.
 #pragma once
 
 #include <cmath>
@@ -16,20 +16,20 @@
 
 namespace esokit {
 
-/// Poles z_i of a sampled error as factors of its polynomial in x = (z - 1) / a: pairs
-/// x^2 + sum x + product, and x + last where N is odd.
+/// Poles z_i of a sampled error as factors of its polynomial in x = (z - 1) / a: pairs x^2 + sum x
+/// + product, and x + last if N is odd.
 template <int Size, Scalar S>
 struct PoleFactors {
   S unit{};                          ///< a, the largest of all abs(z_i - 1)
   S decay{};                         ///< -ln of the largest abs(z_i)
-  Array<S, Size / 2 + 1> sum{};      ///< of the pairs; what is not used is zero
-  Array<S, Size / 2 + 1> product{};  ///< of the pairs
-  S last{};                          ///< of the one left
+  Array<S, Size / 2 + 1> sum{};      ///< sum of each pair; unused elements are zero
+  Array<S, Size / 2 + 1> product{};  ///< product of each pair
+  S last{};                          ///< for odd N the remaining pole
 };
 
 namespace detail {
 
-/// -ln(1 - a), a from 0 to 1; where nothing is left, a large number.
+/// -ln(1 - a) for a from 0 to 1; at a = 1 a large number.
 template <Scalar S>
 S decay_of(const S& contraction) {
   using std::log;
@@ -51,7 +51,7 @@ PoleFactors<Size, S> pole_factors(const EqualSampledPoles<Size, S>& poles) noexc
   return factors;
 }
 
-/// Pairs of conjugate poles, `First` of them given otherwise: all of `factors` and these.
+/// Adds pairs of conjugate poles to `factors`.
 /// @param pairs 1 - rho of one of each pair
 template <int Size, std::size_t Count, PlainScalar S>
 PoleFactors<Size + 2 * static_cast<int>(Count), S> with_pairs(
@@ -78,7 +78,7 @@ PoleFactors<Size + 2 * static_cast<int>(Count), S> with_pairs(
   return all;
 }
 
-/// Pairs, and a real one where N is odd.
+/// Factors of conjugate pairs, with a real pole if N is odd.
 template <int Size, PlainScalar S>
 PoleFactors<Size, S> pole_factors(const SampledPolePairs<Size, S>& poles) noexcept {
   PoleFactors<Size % 2, S> real;
@@ -121,10 +121,11 @@ Array<S, Size> output_ahead(const Array<S, Size>& output, const Matrix<S, Size, 
 
 }  // namespace detail
 
-/// The gain k of the correction z = z- + k (y - C z-), scaled, that puts the poles of
-/// (I - k C) Phi there.
-/// @param step Phi - I @param output C @param degrees of the states @param poles wanted
-/// @return not finite where y does not tell all states
+/// The gain k of the correction z = z- + k (y - C z-), scaled, that gives (I - k C) Phi the poles
+/// `poles`.
+/// @param step Phi - I @param output C @param degrees power of T in the scaling of each state
+/// @param poles poles to be placed
+/// @return the gain; not finite if the model is not observable
 template <int Size, Scalar S>
 ScaledGain<Size, S> placed_gain(const Matrix<S, Size, Size>& step, const Array<S, Size>& output,
                                 const Array<int, Size>& degrees,
@@ -139,7 +140,7 @@ ScaledGain<Size, S> placed_gain(const Matrix<S, Size, Size>& step, const Array<S
       f(i, j) = f(i, j) / a * unit[static_cast<std::size_t>(j)] / unit[static_cast<std::size_t>(i)];
     }
   }
-  // C Phi F^i, i = 0 .. N - 1, and the vector that it takes to (0, .., 0, 1).
+  // The rows C Phi F^i, i = 0 .. N - 1, and the vector that they map to (0, .., 0, 1).
   Square seen;
   Array<S, Size> ahead = output;
   for (std::size_t j = 0; j < Size; ++j) ahead[j] = ahead[j] * unit[j];

@@ -26,13 +26,13 @@ Check<S> check_inflation(const Config& config) {
   return rules;
 }
 
-/// What a config says Q by.
+/// The config member from which Q is made.
 template <class Config>
 const char* noise_field(const Config& config) noexcept {
   return config.process_covariance ? "process_covariance" : "disturbance_bounds";
 }
 
-/// Finite and symmetric. @param variances whether a negative variance is an error of its own
+/// Finite and symmetric. @param variances true: a negative variance is refused here, too
 template <int N, Scalar S>
 Check<S> check_covariance(const char* field, const Matrix<S, N, N>& p, bool variances) {
   Rules<S> rules;
@@ -51,7 +51,7 @@ Check<S> check_covariance(const char* field, const Matrix<S, N, N>& p, bool vari
   return rules;
 }
 
-/// The rules for the bounds of the disturbance, and what they make of Q.
+/// Checks the bounds of the disturbance and writes their squares to Q.
 /// @param twice state whose bound counts twice, -1: none
 template <int N, Scalar S, class Config>
 Check<S> add_bounds(const Config& config, Matrix<S, N, N>& q, int twice = -1) {
@@ -65,14 +65,14 @@ Check<S> add_bounds(const Config& config, Matrix<S, N, N>& q, int twice = -1) {
     q(i, i) = config.bound_factor * whole * whole;
     rules
         .require(!config.process_covariance, "disturbance_bounds", bound,
-                 "must be left out where process_covariance is given", i)
+                 "must be left out if process_covariance is given", i)
         .require(normal(q(i, i)), "disturbance_bounds", bound,
                  "has a square that the scalar cannot hold", i);
   }
   return rules;
 }
 
-/// Far enough from both ends of the scalar for what the recursion makes of it.
+/// True if a variance is far enough from both ends of the scalar's range for the recursion.
 template <Scalar S>
 bool is_held(const S& variance) noexcept {
   return all(is_finite(variance)) && all(variance > smallest_normal<S>() / rounding<S>()) &&
@@ -89,8 +89,8 @@ Matrix<S, N, N> in_units(const Matrix<S, N, N>& p, const S* units) noexcept {
   return scaled;
 }
 
-/// The factor of P in these units.
-/// @param held, semidefinite wording of the rules @param place that the second one names
+/// The factor of P in these units, or an error.
+/// @param held, semidefinite texts of the two rules @param place index in the error of the second
 template <int N, Scalar S>
 Expected<CovarianceFactor<N, S>, Error<S>> factored(const char* field, const Matrix<S, N, N>& p,
                                                     const S* units, const char* held,
@@ -106,13 +106,13 @@ Expected<CovarianceFactor<N, S>, Error<S>> factored(const char* field, const Mat
   return *factor;
 }
 
-/// Where the limit would have a pole at -1. @param least variance that would do
+/// The error for a limit with a pole at z = -1. @param least smallest variance that avoids it
 template <Scalar S>
 Error<S> alternating(const char* field, const S& variance, int place, const S& least) {
   return {field,
           variance,
-          "leaves an error that changes sign at every sample undamped: give y' a bound, or y a "
-          "variance of at least",
+          "does not damp an error that alternates in sign: give y' a bound, or y a variance of at "
+          "least",
           place,
           least,
           true};

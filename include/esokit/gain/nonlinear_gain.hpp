@@ -11,11 +11,11 @@
 
 namespace esokit {
 
-/// What an even gain can do beside k(x), declared in a member `static constexpr EvenGainTraits
+/// What an even gain can do besides k(x), declared in a member `static constexpr EvenGainTraits
 /// traits{..}`.
 struct EvenGainTraits {
   bool checks = false;    ///< `check() const` gives the error of a bad parameter, as a Check
-  bool prepares = false;  ///< `prepared() const` gives a function object that is quicker to call
+  bool prepares = false;  ///< `prepared() const` gives a function object that is faster to call
 };
 
 namespace detail {
@@ -42,29 +42,29 @@ concept PreparesAsDeclared = detail::as_declared(
       { k.prepared()(x) } -> std::convertible_to<S>;
     });
 
-/// An even gain k(x), x = |e| / error_scale > 0: the correction is l k(x) e.
+/// An even gain k(x), x = |e| / error_scale > 0, dimensionless: the correction is l k(x) e.
 ///
-/// Any copyable function object can be used; it declares what else it can do, see EvenGainTraits.
+/// Any copyable function object can be used. What else it can do it declares in EvenGainTraits.
 template <class Shape, class S>
 concept EvenGain = std::copyable<Shape> && requires(const Shape& k, const S& x) {
   { k(x) } -> std::convertible_to<S>;
 } && DeclaresTraits<Shape, EvenGainTraits> && ChecksAsDeclared<Shape, S> &&
     PreparesAsDeclared<Shape, S>;
 
-/// k(x) = K_alpha x^(alpha-1) + K_beta x^beta: g(e) / e of the NHOESO paper, (10). The default is
-/// k = 1, the linear observer.
+/// k(x) = K_alpha x^(alpha-1) + K_beta x^beta: g(e) / e of the NHOESO paper, (10). The default is k
+/// = 1, which makes the observer linear.
 template <Scalar S>
 struct PowerSumGain {
-  static constexpr EvenGainTraits traits{.checks = true, .prepares = true};  ///< beside k
+  static constexpr EvenGainTraits traits{.checks = true, .prepares = true};  ///< besides k
   template <class T>
   using with_scalar = PowerSumGain<T>;  ///< the same with another scalar
 
   S gain_alpha = S(1.0);  ///< K_alpha >= 0
-  S alpha = S(1.0);       ///< alpha > 0; below 1: k is infinite at e = 0
+  S alpha = S(1.0);       ///< alpha > 0; below 1, k is infinite at e = 0
   S gain_beta = S(0.0);   ///< K_beta >= 0
   S beta = S(1.0);        ///< beta >= 0
 
-  /// k with its exponents told apart.
+  /// k with its exponents classified, see Power.
   class Prepared {
    public:
     /// Copies what it needs.
@@ -120,7 +120,7 @@ inline constexpr std::uint32_t type_tag<PowerSumGain<S>> = make_type_tag<S>("Pow
 /// k(x) = K max(x, delta)^(a-1): K fal(e) / e of Han's observers.
 template <Scalar S>
 struct FalGain {
-  static constexpr EvenGainTraits traits{.checks = true, .prepares = true};  ///< beside k
+  static constexpr EvenGainTraits traits{.checks = true, .prepares = true};  ///< besides k
   template <class T>
   using with_scalar = FalGain<T>;  ///< the same with another scalar
 
@@ -128,7 +128,7 @@ struct FalGain {
   S exponent = S(0.5);      ///< a > 0
   S linear_width = S(1.0);  ///< delta > 0, in units of the error scale
 
-  /// k with its exponent told apart.
+  /// k with its exponent classified, see Power.
   class Prepared {
    public:
     /// Copies what it needs.
@@ -191,16 +191,16 @@ constexpr T power_of_two(int exponent) noexcept {
   return value;
 }
 
-/// Magnitudes below this count as this: k may be infinite at zero.
+/// Smaller magnitudes are replaced by this one, because k may be infinite at zero.
 template <Scalar S>
 constexpr S least_magnitude() noexcept {
-  // Named, so that no compiler leaves the power to the run time.
+  // A named constant, so that no compiler computes the power at run time.
   constexpr auto least =
       power_of_two<TableScalar<S>>(std::numeric_limits<TableScalar<S>>::min_exponent / 3);
   return S(least);
 }
 
-/// k(|e| / scale) between its limits; what the sampled and the continuous law have in common.
+/// k(|e| / scale) within its limits; common to the sampled and the continuous law.
 template <Scalar S, class Shape>
 class LimitedGain {
  public:
@@ -213,7 +213,7 @@ class LimitedGain {
   [[nodiscard]] ESOKIT_INLINE constexpr S operator()(const S& e) const noexcept {
     const S x = absolute(e) * inverse_scale_;
     const S k = function_(select(least_magnitude<S>() < x, x, least_magnitude<S>()));
-    // In this order a NaN ends as `high`.
+    // In this order a NaN becomes `high`.
     const S from_above = select(k < high_, k, high_);
     return select(low_ < from_above, from_above, low_);
   }
@@ -235,19 +235,19 @@ class LimitedGain {
 
 }  // namespace detail
 
-/// Gain law of NonlinearEso: k(|e| / error_scale) times constant bandwidth gains, k kept between
-/// `gain_min` and `gain_max`.
+/// Gain law of NonlinearEso: k(|e| / error_scale) times constant bandwidth gains, with k limited to
+/// `gain_min` .. `gain_max`.
 ///
-/// After a gap of M samples k = 1 with the linear gain for M T: limits that are certified for T
-/// need not be so for M T.
+/// After a gap of M samples the linear gain for M T is used with k = 1, because limits certified
+/// for T need not be stable for M T.
 template <int Size, Scalar S, class Shape = PowerSumGain<S>>
 requires EvenGain<Shape, S>
 class NonlinearGain {
  public:
-  /// What it declares beside `gain`.
+  /// What the law can do besides `gain`.
   static constexpr GainLawTraits traits{.kind = GainKind::factored, .bridges_gaps = true};
 
-  using Linear = ConstantGain<Size, S>;  ///< the gain where k = 1
+  using Linear = ConstantGain<Size, S>;  ///< the gain for k = 1
   template <class T>
   using with_scalar =
       NonlinearGain<Size, T, typename detail::ForScalar<Shape, T>::type>;  ///< with another scalar
@@ -273,7 +273,7 @@ class NonlinearGain {
     return linear_.gap_gain(e, samples);
   }
 
-  /// gain(e) is factor(e) times this.
+  /// The gain for k = 1, scaled: gain(e) is factor(e) times this.
   [[nodiscard]] constexpr const ScaledGain<Size, S>& linear_gain() const noexcept {
     return linear_.gain_before_measurement();
   }

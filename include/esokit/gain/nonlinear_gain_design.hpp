@@ -1,6 +1,6 @@
 /// @file
-/// The design of NonlinearEso before it runs: the limits of its gain function, and a report on
-/// where the given function is outside the stable range.
+/// The design of NonlinearEso in make: the limits of its gain function, and a report on where the
+/// given function is outside the stable range.
 #pragma once
 
 #include <esokit/gain/gain_interval.hpp>
@@ -9,8 +9,8 @@
 
 namespace esokit {
 
-/// Ranges of |e| (unit of y) in ascending order. `from` = 0 and `to` = infinity mean that no end
-/// was found within the tested range (2^-40 to 2^40 error scales).
+/// Ranges of |e| (unit of y) in ascending order. `lower` = 0 or `upper` = infinity means that this
+/// end was not found within the tested range (2^-40 to 2^40 error scales).
 template <PlainScalar S>
 struct ErrorRanges {
   static constexpr int most = 4;     ///< capacity
@@ -19,12 +19,12 @@ struct ErrorRanges {
   bool complete = true;              ///< false: there are more than `most`
 };
 
-/// What `NonlinearEso::report` says of a config.
+/// What `NonlinearEso::report` tells about a config.
 template <PlainScalar S>
 struct NonlinearGainReport {
-  Interval<S> continuous;  ///< constant k: stable for the continuous observer
-  Interval<S> sampled;     ///< constant k: stable for the sampled observer
-  Interval<S> limits;      ///< k is kept within
+  Interval<S> continuous;  ///< constant k for which the continuous observer is stable
+  Interval<S> sampled;     ///< constant k for which the sampled observer is stable
+  Interval<S> limits;      ///< k is limited to this interval
   bool certified = false;  ///< any variation of k within `limits` is stable
   S certified_max{};       ///< largest k_max that is certified with limits.lower; 0 if none is
   ErrorRanges<S> outside;  ///< |e| where the given k would be outside `sampled`
@@ -35,7 +35,8 @@ namespace detail {
 
 inline constexpr int tested_octaves = 40;
 
-/// k finite where it is tested: at the least magnitude and at four points an octave.
+/// Refuses a k that is not finite at a tested point: the smallest magnitude, and four points per
+/// octave.
 template <Scalar S, class Shape>
 Check<S> check_shape(const Shape& shape) {
   if constexpr (even_gain_traits<Shape>.checks) {
@@ -56,7 +57,7 @@ Check<S> check_shape(const Shape& shape) {
   return {};
 }
 
-/// The limits that a config asks for, or the default ones. See NonlinearEso.
+/// The limits of a config, see NonlinearEso.
 template <Scalar S>
 struct GainLimits {
   std::optional<S> lower{};
@@ -71,7 +72,7 @@ constexpr S largest(const S& a, const S& b) noexcept {
 }
 
 /// @param gain the bandwidth gains: scaled, or those of a continuous observer
-/// @param least_with_one least k_min that is certified with k_max = 1
+/// @param least_with_one smallest k_min that is certified with k_max = 1
 /// @param ceiling beyond this no k_max is certified
 template <int Size, Scalar S, class Gain>
 Expected<Interval<S>, Error<S>> find_limits(const GainLimits<S>& asked, const Gain& gain,
@@ -87,7 +88,7 @@ Expected<Interval<S>, Error<S>> find_limits(const GainLimits<S>& asked, const Ga
   if (asked.unlimited) return Interval<S>{-widest, widest};
   const S three_quarters_down = S(0.25) * (S(1.0) + S(3.0) * least_with_one);
   S low = largest(S(0.5), three_quarters_down);
-  // A gain_max below the default gain_min is no reason to refuse it.
+  // A gain_max below the default gain_min is not refused: it lowers gain_min.
   if (asked.upper) low = select(*asked.upper < low, *asked.upper, low);
   if (asked.lower) low = *asked.lower;
   if (asked.upper && !(*asked.upper >= low)) {
@@ -100,38 +101,39 @@ Expected<Interval<S>, Error<S>> find_limits(const GainLimits<S>& asked, const Ga
     if (asked.allow_uncertified || gain_range_certified<Size, S>(gain, low, *asked.upper)) {
       return Interval<S>{low, *asked.upper};
     }
-    // Blame gain_min where nothing from it upwards would do.
+    // The error names gain_min if no gain_max is certified with it.
     if (gain_range_certified<Size, S>(gain, low, low)) {
       return Error<S>{"gain_max",
                       *asked.upper,
-                      "is not certified for a varying gain (allow_uncertified_gain asks for it); "
-                      "with this gain_min the largest is",
+                      "must be certified for a varying gain (or set allow_uncertified_gain): with "
+                      "this gain_min, at most",
                       -1,
                       largest_certified_gain<Size, S>(gain, low, low, ceiling),
                       true};
     }
   } else if (room && gain_range_certified<Size, S>(gain, low, base)) {
-    // Half of the way: at the end itself the error is at the border of stability.
+    // Half way to the largest: there the error would be at the stability limit.
     const S most = largest_certified_gain<Size, S>(gain, low, base, ceiling);
     return Interval<S>{low, S(0.5) * (base + most)};
   } else if (asked.allow_uncertified) {
-    return Error<S>{"gain_max", S(0.0), "must be given where gain_min is not certified"};
+    return Error<S>{"gain_max", S(0.0), "must be given if gain_min is not certified"};
   }
   if (!(low < ceiling)) {
     return Error<S>{
-        "gain_min", low,     "must be below what is stable for a constant gain, which is",
+        "gain_min", low,     "must be below the stability limit for a constant gain, which is",
         -1,         ceiling, true};
   }
   return Error<S>{"gain_min",
                   low,
-                  "is not certified for a varying gain (allow_uncertified_gain asks for it); were "
-                  "gain_max 1, the least would be",
+                  "must be certified for a varying gain (or set allow_uncertified_gain): with "
+                  "gain_max = 1, at least",
                   -1,
                   least_with_one,
                   true};
 }
 
-/// Where `inside(x)` is false, x in error scales; ends to 1e-6 relative.
+/// The ranges in which `inside(x)` is false, x in error scales; their ends are accurate to 1e-6
+/// relative.
 template <PlainScalar S, class Inside>
 ErrorRanges<S> ranges_outside(const Inside& inside, S scale) {
   constexpr S infinite = detail::unbounded<S>();

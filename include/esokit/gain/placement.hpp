@@ -1,9 +1,9 @@
 /// @file
-/// Where the poles of the estimation error go: all in one place; any stable set is in
+/// Placement of the poles of the estimation error, all in one place. For any stable set see
 /// gain/pole_set.hpp.
 ///
-/// A placement is what a linear observer's config names: its `Spec`, the check of it, and the gains
-/// it gives in both time domains.
+/// A placement is a template argument of a linear observer. It defines what the config specifies
+/// (`Spec`), the check of it, and the gains in both time domains.
 #pragma once
 
 #include <esokit/core/check.hpp>
@@ -14,19 +14,19 @@
 
 namespace esokit {
 
-/// What the placements by a bandwidth have in common; each adds `Sampled` and `sample`, and `gain`
-/// where there is a continuous one.
+/// Common base of the placements by a bandwidth. Each adds `Sampled` and `sample`, and `gain` if it
+/// has a continuous form.
 struct BandwidthPlacement {
   template <int Size, Scalar S>
   using Spec = S;  ///< omega_o, rad/s
 
-  /// Error of a bandwidth that is not finite or not positive.
+  /// An error for a bandwidth that is not finite or not positive.
   template <int Size, Scalar S>
   static Check<S> check(const char* field, const S& bandwidth, int index = -1) {
     return Rules<S>{}.positive(field, bandwidth, index);
   }
 
-  /// A number that names the spec in an error.
+  /// The number that stands for the spec in an error.
   template <int Size, Scalar S>
   static S representative(const S& bandwidth) {
     return bandwidth;
@@ -36,7 +36,7 @@ struct BandwidthPlacement {
 /// All N poles at -omega_o (at exp(-omega_o T) when sampled): the bandwidth parameterisation.
 struct EqualPoles : BandwidthPlacement {
   template <int Size, Scalar S>
-  using Sampled = EqualSampledPoles<Size, S>;  ///< what `sample` gives
+  using Sampled = EqualSampledPoles<Size, S>;  ///< result of `sample`
 
   /// Poles at exp(-omega_o T). @param bandwidth omega_o, rad/s @param sample_time T, s
   template <int Size, Scalar S>
@@ -55,7 +55,7 @@ struct EqualPoles : BandwidthPlacement {
 template <>
 inline constexpr std::uint32_t type_tag<EqualPoles> = make_type_tag<>("EqualPoles");
 
-/// A placement whose spec is the poles themselves, as PoleSet's is.
+/// A placement whose spec is a list of poles, such as PoleSet.
 template <class Placement>
 concept ListsPoles = requires {
   requires Placement::lists_poles;

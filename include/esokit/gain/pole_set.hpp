@@ -1,7 +1,6 @@
 /// @file
-/// Any stable set of poles as a placement, complex ones in conjugate pairs; to be included only
-/// where `PoleSet` is used, because the header `complex` takes half as long to compile as a
-/// controller.
+/// Any stable set of poles as a placement, complex poles in conjugate pairs. Not included by other
+/// headers, because <complex> takes half as long to compile as a controller.
 #pragma once
 
 #include <cmath>
@@ -18,7 +17,7 @@
 
 namespace esokit {
 
-/// Any set of poles of the sampled error, kept as contractions 1 - rho_i. Complex poles come with
+/// Any set of poles of the sampled error, stored as contractions 1 - rho_i. Complex poles come with
 /// their conjugates.
 template <int Size, PlainScalar S>
 struct SampledPoleSet {
@@ -102,7 +101,7 @@ Vector<S, Size> continuous_gain(const Array<std::complex<S>, Size>& poles) {
   return gain;
 }
 
-/// Conjugate ones as pairs; two real ones make a pair, too.
+/// Factors of a pole set; two real poles also make a pair.
 template <int Size, PlainScalar S>
 PoleFactors<Size, S> pole_factors(const SampledPoleSet<Size, S>& poles) noexcept {
   PoleFactors<Size, S> factors;
@@ -134,16 +133,16 @@ PoleFactors<Size, S> pole_factors(const SampledPoleSet<Size, S>& poles) noexcept
 
 /// Any stable set of poles p_i (1/s), complex ones in conjugate pairs.
 struct PoleSet {
-  static constexpr bool lists_poles = true;  ///< a config names them `poles`
+  static constexpr bool lists_poles = true;  ///< the config has a member `poles`
 
   template <int Size, PlainScalar S>
   using Spec = Array<std::complex<S>, Size>;  ///< p_i, 1/s
 
   template <int Size, PlainScalar S>
-  using Sampled = SampledPoleSet<Size, S>;  ///< what `sample` gives
+  using Sampled = SampledPoleSet<Size, S>;  ///< result of `sample`
 
-  /// Error of the first pole that is not finite, not in the left half plane, or complex without its
-  /// conjugate.
+  /// An error for the first pole that is not finite, not in the left half plane, or complex without
+  /// its conjugate.
   /// @param set number of the set in an array of sets; the error then counts poles through all sets
   template <int Size, PlainScalar S>
   static Check<S> check(const char* field, const Spec<Size, S>& poles, int set = -1) {
@@ -183,7 +182,7 @@ struct PoleSet {
     return continuous_gain<Size, S>(poles);
   }
 
-  /// A number that names the spec in an error.
+  /// The number that stands for the spec in an error.
   template <int Size, PlainScalar S>
   static S representative(const Spec<Size, S>& poles) {
     return poles[0].real();
@@ -204,8 +203,8 @@ Array<S, Order> sampled_feedback_gain(const Array<std::complex<S>, Order>& contr
   return detail::held_input_feedback<Order, S>(poles.symmetric(), S(1) / sample_time);
 }
 
-/// The poles that half the gains of the bandwidth parameterisation have, see gain/half_gain.hpp:
-/// s_k, 1/s, in conjugate pairs. @param bandwidth omega, rad/s
+/// The poles s_k of half the gains of the bandwidth parameterisation, 1/s, in conjugate pairs, see
+/// gain/half_gain.hpp. @param bandwidth omega, rad/s
 template <int Size, PlainScalar S>
 Array<std::complex<S>, Size> half_gain_poles(const S& bandwidth) {
   Array<std::complex<S>, Size> poles{};

@@ -1,8 +1,8 @@
 /// @file
-/// Poles of a reduced-order observer, which takes the measurement as it is.
+/// Poles of a reduced-order observer, whose estimate of y is the measurement itself.
 ///
-/// The predictor-corrector with one pole at z = 0 has the gain k_0 = 1: each correction puts z_1 on
-/// the measurement, and what is left is the observer of order N - 1 for the other states.
+/// The predictor-corrector with one pole at z = 0 has the gain k_0 = 1: each correction sets z_1 to
+/// the measurement, which leaves an observer of order N - 1 for the other states.
 #pragma once
 
 #include <esokit/core/type_tag.hpp>
@@ -10,7 +10,7 @@
 
 namespace esokit {
 
-/// One sampled pole at zero, the others at rho, kept as the contraction 1 - rho.
+/// One sampled pole at zero, the others at rho, stored as the contraction 1 - rho.
 template <int Size, Scalar S>
 struct ReducedSampledPoles {
   static_assert(Size >= 2, "esokit: a reduced-order observer needs two states or more");
@@ -33,10 +33,10 @@ struct ReducedSampledPoles {
 };
 
 /// Placement of a reduced-order observer: N - 1 poles at exp(-omega_o T), one at zero. For sampled
-/// observers; there is no continuous gain of the kind.
+/// observers only; there is no such continuous gain.
 struct ReducedPoles : BandwidthPlacement {
   template <int Size, Scalar S>
-  using Sampled = ReducedSampledPoles<Size, S>;  ///< what `sample` gives
+  using Sampled = ReducedSampledPoles<Size, S>;  ///< result of `sample`
 
   /// The poles. @param bandwidth omega_o, rad/s @param sample_time T, s
   template <int Size, Scalar S>

@@ -1,13 +1,14 @@
 /// @file
-/// Steady state of the Riccati recursion of a filter.
+/// The steady state of the Riccati recursion of a filter:
 ///
 ///     P- = inflation Phi P Phi' + Q,  K = P- C' (C P- C' + R)^-1,  P = (I - K C) P-
 ///
-/// Newton's method on the gain (G. A. Hewer, 1971): the covariance of a given stable gain solves a
-/// Stein equation, which Smith's doubling sums up from positive terms, and gives the next gain. It
-/// starts from a gain that puts all poles at zero, which a chain of integrators always has, and
-/// converges quadratically to the only stabilising solution wherever there is one. (The doubling
-/// algorithm SDA finds the least solution instead, which for Q = 0 and inflation > 1 is zero.)
+/// It is found by Newton's method on the gain (G. A. Hewer, 1971): the covariance for a given
+/// stable gain solves a Stein equation, which is summed from positive terms by Smith's doubling
+/// method, and gives the next gain. The first gain puts all poles at zero, which is always possible
+/// for a chain of integrators. The iteration converges quadratically to the stabilising solution,
+/// which is unique, if there is one. (The doubling algorithm SDA would find the smallest solution
+/// instead, which is zero for Q = 0 and inflation > 1.)
 #pragma once
 
 #include <cmath>
@@ -35,7 +36,7 @@ struct RiccatiModel {
 
 namespace detail {
 
-/// Largest relative change of the elements that count.
+/// Largest relative change of the elements that are not negligible.
 template <int Rows, int Columns, Scalar S>
 S relative_change(const Matrix<S, Rows, Columns>& now, const Matrix<S, Rows, Columns>& before) {
   S worst(0.0);
@@ -54,8 +55,8 @@ S relative_change(const Matrix<S, Rows, Columns>& now, const Matrix<S, Rows, Col
 
 /// Predicted covariance P- of the steady state, N x N.
 /// @param start_gain K, N x p, for which inflation^(1/2) (Phi - Phi K C) is stable
-/// @return nothing if `start_gain` is not stabilising, or there is no stabilising solution (a mode
-///         on the unit circle that the noise does not reach)
+/// @return nothing if `start_gain` is not stabilising, or if there is no stabilising solution (a
+///         mode on the unit circle that is not excited by the noise)
 template <int Size, int Outputs, Scalar S>
 std::optional<Matrix<S, Size, Size>> riccati_covariance(const RiccatiModel<Size, Outputs, S>& model,
                                                         Matrix<S, Size, Outputs> start_gain) {
@@ -86,7 +87,7 @@ std::optional<Matrix<S, Size, Size>> riccati_covariance(const RiccatiModel<Size,
     }
     const S change = detail::relative_change(next_gain, gain);
     gain = next_gain;
-    // Quadratic convergence ends in rounding, where changes no longer fall.
+    // Quadratic convergence ends at the rounding error, when the changes no longer fall.
     const bool rounding_left = all(change < S(1e-3)) && !all(change < last_change * S(0.25));
     if (!all(change > S(8.0 * Size) * detail::rounding<S>()) || rounding_left) return covariance;
     last_change = change;
@@ -156,12 +157,13 @@ Array<S, Size> alternating_response(const MatrixTransition<Size, S>& transition)
 
 }  // namespace detail
 
-/// Smallest R for which an error that changes sign at every sample decays, in the unit of `noise`;
-/// if it is not positive, no R is needed.
+/// Smallest R for which an error that changes sign at every sample decays, in the unit of `noise`.
+/// If it is zero or negative, no R is needed.
 ///
-/// |p(-1)|^2 of the limit's poles is in proportion to the density of the innovations at half the
-/// sampling rate, R + |C (-I - Phi)^-1 Q^(1/2)|^2 (spectral factorisation). Where that is zero the
-/// limit has a pole at -1: a millionth of the trace of Q is asked for.
+/// By spectral factorisation, |p(-1)|^2 for the characteristic polynomial p of the limit is
+/// proportional to the spectral density of the innovations at half the sampling rate, R + |C (-I -
+/// Phi)^-1 Q^(1/2)|^2. If that is zero, the limit has a pole at -1. At least a millionth of the
+/// trace of Q is required.
 /// @param noise Q, scaled @param transition Phi
 template <int Size, Scalar S, class Transition = PascalTransition>
 S least_measurement_variance(const CovarianceFactor<Size, S>& noise,
@@ -182,10 +184,10 @@ S least_measurement_variance(const CovarianceFactor<Size, S>& noise,
 }
 
 /// Steady state for the chain of integrators in Nordsieck scaling, or another model whose first
-/// state is measured, P- = L D L'; its gain is good to a few units in the last place.
+/// state is measured, P- = L D L'; its gain is accurate to a few units in the last place.
 /// @param noise Q @param measurement R >= 0 @param inflation >= 1 @param transition Phi
-/// @return nothing if there is none: inflation = 1 where nothing drives the highest state, or
-///         Q = R = 0; of another model also where nothing disturbs a state that fades by itself
+/// @return nothing if there is none: if inflation = 1 and nothing drives the highest state, or if Q
+///         = R = 0; for other models also if nothing disturbs a state that decays by itself
 template <int Size, Scalar S, class Transition = PascalTransition>
 std::optional<CovarianceFactor<Size, S>> steady_covariance(const CovarianceFactor<Size, S>& noise,
                                                            const S& measurement, const S& inflation,
@@ -198,7 +200,7 @@ std::optional<CovarianceFactor<Size, S>> steady_covariance(const CovarianceFacto
   model.measurement(0, 0) = measurement;
   model.inflation = inflation;
   for (int i = 0; i < Size; ++i) model.output(0, i) = S(i == 0 ? 1.0 : 0.0);
-  // Of another model the recursion below finds out: no gain that tends to zero comes to rest.
+  // For other models the recursion below detects it: a gain that tends to zero does not converge.
   if (std::is_same_v<Transition, PascalTransition> && !all(inflation > S(1.0)) &&
       !all(model.noise(Size - 1, Size - 1) > S(0.0))) {
     return std::nullopt;
@@ -207,9 +209,10 @@ std::optional<CovarianceFactor<Size, S>> steady_covariance(const CovarianceFacto
   for (int i = 0; i < Size; ++i) start(i) = deadbeat[static_cast<std::size_t>(i)];
   const auto covariance = riccati_covariance<Size, 1, S>(model, start);
 
-  // The recursion itself is more accurate than the sums above, whose small variances drown in the
-  // rounding of the large ones: it has the last word. Where poles near zero leave those sums no
-  // digits at all (float, N = 6) it begins elsewhere, as it is quick then.
+  // The recursion itself is more accurate than the sums above, whose small variances are lost in
+  // the rounding of the large ones, so it is run at the end. If poles near zero leave the sums no
+  // digits at all (float, N = 6), it starts from another covariance, because it then converges
+  // fast.
   constexpr int most_steps = 4000;
   CovarianceFactor<Size, S> factor;
   if (covariance) {

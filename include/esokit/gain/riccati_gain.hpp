@@ -3,16 +3,17 @@
 /// Energies 15 (2022) 5799; W. Bai, W. Xue, Y. Huang, H. Fang, Sci. China Inf. Sci. 61 (2018)
 /// 042201).
 ///
-/// With P- a bound of the covariance of the predicted state's error, R the variance of the noise
-/// and theta > 0 the inflation, which covers that the disturbance is correlated with the error:
+/// P- is a bound on the covariance of the error of the predicted state, R the variance of the
+/// measurement noise, and theta > 0 the inflation, which accounts for the correlation of the
+/// disturbance with the error:
 ///
 ///     s = C P- C' + R/(1+theta),  k = P- C' / s                                (24), corrected
 ///     P- <- (1+theta) Phi (I - k C) P- (I - k C)' Phi' + (Phi k) R (Phi k)'
 ///           + (1+theta)/theta Q                                               (11)
 ///
-/// The paper prints the transpose of s instead of its inverse, and in its corrected form the
-/// predictor gain Phi k instead of k. theta = 0 has no meaning in (11): the plain Kalman filter,
-/// with inflation 1 and noise Q, is a separate rule.
+/// In (24) Shi et al. print the transpose of s instead of its inverse, and the predictor gain
+/// Phi k instead of k. theta = 0 has no meaning in (11): the plain Kalman filter, without inflation
+/// and with noise Q, is a separate rule.
 #pragma once
 
 #include <cmath>
@@ -46,34 +47,35 @@ TransitionOf<Model, S> transition_of(const Model& model) {
 /// How the inflation theta is chosen.
 enum class InflationRule : unsigned char {
   fixed,     ///< theta > 0 as given
-  adaptive,  ///< at every sample the theta that minimises the (weighted) trace of the bound
+  adaptive,  ///< at every sample the theta that minimises the weighted trace of the bound
   none,      ///< the plain Kalman filter
 };
 
 /// How the gain is obtained.
 enum class RiccatiMode : unsigned char {
-  recursive,    ///< by the recursion, at every sample
-  frozen,       ///< its limit, found in make; after missing samples the recursion brings it back
-  start_table,  ///< the first gains, from P0, out of a table; then the limit
+  recursive,  ///< by the recursion, at every sample
+  frozen,     ///< its limit, computed in make; after missing samples the recursion runs until it is
+              ///< back
+  start_table,  ///< the first gains, from P0, from a table made in make; then the limit
 };
 
-/// What RiccatiGain needs, all covariances in the scaling of the chain and divided by `unit`.
+/// Settings of RiccatiGain. All covariances are in the scaling of the model's states and divided by
+/// `unit`.
 template <int Size, Scalar S>
 struct RiccatiSettings {
   CovarianceFactor<Size, S> start{};          ///< P0, of the first prediction
   CovarianceFactor<Size, S> noise{};          ///< Q
   S measurement{};                            ///< R
-  S unit{1.0};                                ///< what 1 stands for, unit of y squared
+  S unit{1.0};                                ///< unit of all variances, in unit of y squared
   InflationRule rule = InflationRule::fixed;  ///< how theta is chosen
   S inflation{};                              ///< theta of the fixed rule
-  Array<S, Size> trace_weights{};             ///< of the adaptive rule
+  Array<S, Size> trace_weights{};             ///< W of the adaptive rule
   RiccatiMode mode = RiccatiMode::recursive;  ///< how the gain is obtained
 };
 
 namespace detail {
 
-/// What a variance may be, in the unit of the law, for all that the recursion makes of it to fit
-/// the scalar.
+/// Largest variance, in the unit of the law, for which the recursion does not overflow.
 template <Scalar S>
 constexpr S largest_variance() noexcept {
   return S(1e-6) * (rounding<S>() / smallest_normal<S>());
@@ -81,20 +83,20 @@ constexpr S largest_variance() noexcept {
 
 }  // namespace detail
 
-/// Gain law of ExtendedStateFilter. The gain is known before the measurement; a missing sample is
-/// `advance` alone, which lets the covariance grow, so no gain for gaps is needed.
+/// Gain law of ExtendedStateFilter. The gain is known before the measurement. For a missing sample
+/// only `advance` is called, which lets the covariance grow, so that no gain for gaps is needed.
 ///
 /// @tparam TableSize gains in the start table
 /// @tparam Transition Phi of the model
 template <int Size, Scalar S, int TableSize = 0, class Transition = PascalTransition>
 class RiccatiGain {
  public:
-  /// What it declares beside `gain`.
+  /// What the law can do besides `gain`.
   static constexpr GainLawTraits traits{
       .kind = GainKind::preset, .advances = true, .accepts = true, .resets = true};
 
   using Factor = CovarianceFactor<Size, S>;     ///< P-, scaled
-  using Settings = RiccatiSettings<Size, S>;    ///< of the constructor
+  using Settings = RiccatiSettings<Size, S>;    ///< settings of the constructor
   using Gain = ScaledGain<Size, S>;             ///< k, scaled
   using scalar_type = S;                        ///< type of gains and covariances
   static constexpr int table_size = TableSize;  ///< gains in the start table
@@ -103,7 +105,7 @@ class RiccatiGain {
       RiccatiGain<Size, T, TableSize,
                   typename detail::ForScalar<Transition, T>::type>;  ///< with another scalar
 
-  /// The law in its recursive mode; `freeze` goes over to another.
+  /// The law in its recursive mode; `freeze` changes the mode.
   explicit RiccatiGain(const Settings& settings, const Transition& transition = {}) noexcept
       : transition_(transition),
         measurement_(settings.measurement),
@@ -128,25 +130,26 @@ class RiccatiGain {
     reset();
   }
 
-  /// Works out the limit and the table, and goes over to `mode`. False if there is no limit. This
-  /// and `fits` are design: gain/riccati_gain_design.hpp has them.
+  /// Computes the limit and the table, and changes to `mode`. False if there is no limit. This and
+  /// `fits` are defined in gain/riccati_gain_design.hpp.
   bool freeze(RiccatiMode mode);
 
-  /// True if the recursion stays within the scalar. What a large inflation lets it grow to is
-  /// reached within the first samples; one above 1e6, or so small that Q / theta is large, also
-  /// lets it grow in gaps.
+  /// True if the recursion stays within the range of the scalar. With a large inflation it reaches
+  /// its largest values in the first samples; with one above 1e6, or so small that Q / theta is
+  /// large, it also grows in gaps.
   [[nodiscard]] bool fits() const noexcept;
 
-  /// k of the coming correction, scaled, whatever the innovation.
+  /// k of the next correction, scaled; the same for every innovation.
   /// @{
   [[nodiscard]] constexpr const Gain& gain(const S&) const noexcept { return now_.gain; }
   [[nodiscard]] constexpr const Gain& gain_before_measurement() const noexcept { return now_.gain; }
   /// @}
 
-  /// One sample ahead, from the corrected covariance if there was a correction.
+  /// One sample ahead: from the corrected covariance, or from the predicted one if there was no
+  /// correction.
   ESOKIT_INLINE constexpr void advance() noexcept {
     if constexpr (PackScalar<S>) {
-      // Each lane as the others, and as it usually is: at once.
+      // If all lanes are in the same, usual state, they are processed at once.
       const int bits = since_[0] & ~watched;
       if (since_ == since_[0] && bits > standing && (TableSize == 0 || place_ == done)) [[likely]] {
         note(standing);
@@ -174,31 +177,32 @@ class RiccatiGain {
     detail::set_bits(since_, -1, corrected);
   }
 
-  /// True if the next `advance` has nothing to work out: the gain stands, and no sample is missing.
+  /// True if the next `advance` has nothing to compute: the gain is constant, and no sample is
+  /// missing.
   [[nodiscard]] ESOKIT_INLINE constexpr bool rests() const noexcept {
     return (since_ & ~watched) > standing;
   }
 
-  /// The same, and nobody wants to look at the measurement first: one test for both.
+  /// True if in addition the law is not watched; one test for both.
   [[nodiscard]] ESOKIT_INLINE constexpr bool rests_unwatched() const noexcept {
     return since_ > standing;
   }
 
-  /// True if any lane is watched.
+  /// True if any lane is watched, see `watch`.
   [[nodiscard]] constexpr bool any_watched() const noexcept {
     auto all = since_;
     detail::set_bits(all, watched, 0);
     return !(all == std::int8_t{0});
   }
 
-  /// The observer looks at every measurement before it is used (an outlier gate).
+  /// Sets whether the observer examines every measurement before it is used (an outlier gate).
   constexpr void watch(bool on) noexcept {
     since_ = static_cast<std::int8_t>((since_ & ~watched) | (on ? watched : 0));
   }
-  /// What `watch` was told last.
+  /// The last argument of `watch`.
   [[nodiscard]] constexpr bool is_watched() const noexcept { return since_ < 0; }
 
-  /// Begins anew: from P0, or with the limit.
+  /// Starts again: from P0, or in the frozen mode with the limit.
   constexpr void reset() noexcept {
     note(mode_ != RiccatiMode::recursive ? standing | nothing_yet : 0);
     place_ = mode_ == RiccatiMode::start_table ? std::uint16_t{0} : done;
@@ -212,24 +216,25 @@ class RiccatiGain {
     }
   }
 
-  /// Another variance of the noise, for the coming correction alone. @param variance R, unit of y
+  /// Sets another noise variance, for the next correction only. @param variance R, unit of y
   /// squared, not negative
   constexpr void set_measurement_variance(const S& variance) noexcept {
     note(since_ & (corrected | gapped));
-    // No sum with it may overflow, in the unit of y squared neither; so large it says nothing of y.
+    // Limited so that no sum with it overflows, also not in the unit of y squared. A measurement
+    // with a variance so large has no effect anyway.
     const S most = S(1.0) / (S(16.0) * detail::smallest_normal<S>());
     const S held = select(variance < most, variance, most) / unit_;
     current_measurement_ = select(held < most, held, most);
     set_gain();
   }
 
-  /// R, unit of y squared, to a rounding.
+  /// R, unit of y squared, to within rounding.
   [[nodiscard]] constexpr S measurement_variance() const noexcept { return measurement_ * unit_; }
 
-  /// Goes on from the covariance of a law with other settings. @param time_ratio T_new / T_old
-  /// @return false if that covariance is not one that the scalar holds in this law's unit
+  /// Continues with the covariance of a law with other settings. @param time_ratio T_new / T_old
+  /// @return false if the scalar cannot hold that covariance in this law's unit
   bool continue_from(const RiccatiGain& other, const S& time_ratio) noexcept {
-    // From one limit to the next.
+    // Both laws are at their limit: nothing to take over.
     if (mode_ == RiccatiMode::frozen && other.stands()) return true;
     now_.factor = other.now_.factor;
     now_.factor.rescale(time_ratio, S(other.unit_ / unit_), transition_);
@@ -250,8 +255,8 @@ class RiccatiGain {
     return true;
   }
 
-  /// Bound of the covariance of the present estimate's error, N x N, scaled: of the prediction
-  /// after `advance`, of the correction after `accept`.
+  /// Bound on the covariance of the error of the present estimate, N x N, scaled: after `advance`
+  /// that of the prediction, after `accept` that of the corrected estimate.
   [[nodiscard]] Matrix<S, Size, Size> covariance() const noexcept {
     if constexpr (PackScalar<S>) {
       Matrix<S, Size, Size> all;
@@ -264,8 +269,7 @@ class RiccatiGain {
     }
   }
 
-  /// C P- C' + R of the last prediction, unit of y squared: what the square of the innovation is
-  /// measured by.
+  /// Variance of the innovation after the last prediction, C P- C' + R, unit of y squared.
   [[nodiscard]] constexpr S innovation_variance() const noexcept {
     return (now_.factor.variance(0) + current_measurement_) * unit_;
   }
@@ -273,10 +277,10 @@ class RiccatiGain {
   /// P- of the last prediction, scaled and divided by the unit.
   [[nodiscard]] constexpr const Factor& covariance_factor() const noexcept { return now_.factor; }
 
-  /// theta, as the present gain is made with it.
+  /// theta of the present gain.
   [[nodiscard]] constexpr const S& inflation() const noexcept { return now_.inflation; }
 
-  /// True while the recursion rests: the gain is the limit, or out of the table.
+  /// True while the recursion does not run: the gain is the limit or from the table.
   [[nodiscard]] constexpr Lanes<bool, S> stands() const noexcept {
     Lanes<bool, S> all{};
     for (int i = 0; i < lane_count<S>; ++i) {
@@ -285,7 +289,7 @@ class RiccatiGain {
     return all;
   }
 
-  /// The limit gain of the frozen modes, and the last gain of the table.
+  /// The limit gain (modes frozen and start_table), and the last gain of the table.
   /// @{
   [[nodiscard]] constexpr const Gain& limit_gain() const noexcept { return limit_.gain; }
   [[nodiscard]] constexpr const Gain& last_table_gain() const noexcept requires(TableSize > 0) {
@@ -301,22 +305,22 @@ class RiccatiGain {
                        o.noise_trace_, o.trace_weights_, o.rule_, o.diagonal_noise_, o.limit_,
                        o.table_);
   }
-  using Plain = detail::PlainTwin<RiccatiGain, S>;  ///< a lane
+  using Plain = detail::PlainTwin<RiccatiGain, S>;  ///< type of a lane
   template <int OtherSize, Scalar Other, int OtherTable, class OtherTransition>
   friend class RiccatiGain;
 
-  // Bits of `since_`: what happened since the last `advance`, and whether the gain stands.
-  // Together, so that a frozen filter has one test to make.
+  // Bits of `since_`: what happened since the last `advance`, and whether the gain is constant. In
+  // one number, so that a frozen filter needs only one test.
   static constexpr int corrected = 1;
-  static constexpr int nothing_yet = 2;  ///< after a reset with a standing gain
+  static constexpr int nothing_yet = 2;  ///< after a reset to a constant gain
   static constexpr int gapped = 4;       ///< no correction before the last `advance` either
-  static constexpr std::uint16_t done = TableSize + 1;  ///< of `place_`
-  static constexpr int standing = 8;                    ///< above the others: see `rests`
-  static constexpr int watched = -128;                  ///< the sign: see `rests_unwatched`
+  static constexpr std::uint16_t done = TableSize + 1;  ///< value of `place_` after the table
+  static constexpr int standing = 8;    ///< gain is constant; above the others, see `rests`
+  static constexpr int watched = -128;  ///< the sign bit, see `rests_unwatched`
 
   ESOKIT_INLINE constexpr void note(int bits) noexcept { detail::set_bits(since_, watched, bits); }
 
-  /// A gain and the covariance that it belongs to.
+  /// A gain and the covariance from which it follows.
   struct Point {
     Gain gain{};
     Factor factor{};  ///< P-
@@ -336,24 +340,25 @@ class RiccatiGain {
   [[nodiscard]] Matrix<S, Size, Size> covariance_of_one() const noexcept {
     Factor factor = now_.factor;
     if ((since_ & corrected) != 0) {
-      // (I - k C) P- (I - k C)' + k R k'. The recursion goes on with R/(1+theta) in place of R, as
-      // its inflation is not meant for the noise.
+      // (I - k C) P- (I - k C)' + k R k'. The recursion uses R/(1+theta) in place of R, because the
+      // inflation does not apply to the noise.
       factor.set_variance(0, S(factor.variance(0) * now_.rest * now_.rest +
                                now_.share * now_.share * current_measurement_));
     }
     return factor.matrix() * unit_;
   }
 
-  /// Gain and covariance times `room` are numbers.
+  /// True if gain and covariance times `room` are finite.
   [[nodiscard]] bool fits(const S& room) const noexcept;
 
-  /// P- / R above which a measurement tells all there is to know of y. A gap lets P- grow no
-  /// further but along the chain: more would only cost the digits in which the states differ.
+  /// The P- / R above which an estimate of y depends on the measurement only. In a gap P- then
+  /// grows along the chain only, without Q: more growth would cost the digits in which the states
+  /// differ.
   static constexpr S ceiling() noexcept { return S(1.0) / detail::rounding<S>(); }
 
-  /// Exact measurements of a state that is known exactly: the recursion has a fixed point at which
-  /// the estimate inverts the chain, and diverges (n = 3: by 3.7 a sample). It is not a stable one,
-  /// and rounding leaves it, but not where nothing is rounded.
+  /// With exact measurements and an exactly known state the recursion starts at a fixed point at
+  /// which the estimate inverts the chain and diverges (n = 3: by a factor of 3.7 a sample). The
+  /// fixed point is unstable, but without a rounding error the recursion would not leave it.
   void leave_exact_start() noexcept {
     const S least = detail::rounding<S>();  // without R the unit is the largest variance
     for (int i = 0; i < Size; ++i) {
@@ -367,9 +372,8 @@ class RiccatiGain {
     note(had_correction ? 0 : gapped);
     if (in_gap && !all(now_.factor.variance(0) < ceiling())) [[unlikely]] {
       now_.factor.advance_seldom(S(1.0), Factor{}, transition_);
-      // Without noise it still grows as samples^(2N-2), until the scalar cannot hold it. The gain
-      // is that of exact measurements by now, which a factor common to all variances does not
-      // alter.
+      // It still grows as samples^(2N-2) and would overflow. By now the gain is that for exact
+      // measurements, which a common factor on all variances does not change.
       const S most = S(1024.0) * ceiling();
       const S variance = now_.factor.variance(0);
       if (!all(variance < most))
@@ -391,7 +395,7 @@ class RiccatiGain {
       stand_if_close();
   }
 
-  /// What `recur` comes to after a correction.
+  /// `recur` for the usual case, after a correction.
   [[gnu::noinline]] constexpr void recur_from_correction() noexcept {
     now_.factor.set_variance(0, S(now_.factor.variance(0) * now_.rest));
     advance_factor(noise_);
@@ -399,15 +403,16 @@ class RiccatiGain {
     set_gain();
   }
 
-  /// Sets theta^2 = tr W Q / tr W (A + K C) P- (A + K C)' and what is to be advanced; the noise
-  /// that goes with it. The gain of this sample was made with the theta before: the two depend on
-  /// each other, and the bound holds for any gain.
+  /// Sets theta^2 = tr W Q / tr W (A + K C) P- (A + K C)' and the covariance to be advanced, and
+  /// returns the noise for this theta. The gain of this sample was computed with the previous
+  /// theta: theta and gain depend on each other, and the bound holds for any gain.
   ESOKIT_COLD constexpr Factor adapt(bool had_correction) noexcept {
     using std::sqrt;
     const S before = now_.factor.variance(0);
     if (had_correction) now_.factor.set_variance(0, S(before * now_.rest * now_.rest));
     const S trace = now_.factor.transported_trace(trace_weights_, transition_);
-    // Bounded: P- = 0 asks for an infinite theta, a P- that grows without bound for zero.
+    // Limited, because theta would be infinite for P- = 0, and zero for a P- that grows without
+    // bound.
     const S most = S(1e3);
     const S least = S(1e-6);
     const auto some = trace > S(0.0);
@@ -443,8 +448,8 @@ class RiccatiGain {
     const S noise = current_measurement_ * now_.shrink;
     const S variance = now_.factor.variance(0);
     const S sum = variance + noise;
-    // P- and R both zero: the prediction is exact, there is nothing to correct. Below the normal
-    // numbers the inverse would overflow.
+    // If P- and R are zero, the prediction is exact and nothing is corrected. The inverse of a
+    // subnormal sum would overflow.
     if constexpr (PlainScalar<S>) {
       const bool some = sum >= detail::smallest_normal<S>();
       const S inverse = S(1.0) / (some ? sum : S(1.0));
@@ -459,9 +464,9 @@ class RiccatiGain {
     now_.gain = now_.factor.gain(now_.share);
   }
 
-  /// Back to the limit, once the covariance differs by less than a thousandth. Not once the gain
-  /// does: a nearly deadbeat gain says little about the covariance, and what a filter believes of
-  /// it decides whether recurring gaps are stable.
+  /// Returns to the limit when the covariance differs from it by less than a thousandth. To compare
+  /// the gain is not enough: a nearly deadbeat gain tells little about the covariance, which
+  /// decides whether recurring gaps are stable.
   ESOKIT_COLD constexpr void stand_if_close() noexcept {
     if (!now_.factor.near(limit_.factor, S(1e-3))) return;
     note(standing);
@@ -476,12 +481,12 @@ class RiccatiGain {
 
   [[nodiscard]] std::optional<Point> find_limit() const;
 
-  // What a step touches comes first.
+  // Members that every step uses come first.
   Point now_{};
   Lanes<std::int8_t, S> since_{};
   RiccatiMode mode_ = RiccatiMode::recursive;
-  Lanes<std::uint16_t, S> place_{};  ///< next one of the table; one past the limit: done
-  S current_measurement_{};          ///< R of the coming correction
+  Lanes<std::uint16_t, S> place_{};  ///< next place in the table; `done`: past the limit
+  S current_measurement_{};          ///< R of the next correction
 
   [[no_unique_address]] Transition transition_;
   S measurement_;

@@ -1,6 +1,6 @@
 /// @file
-/// What RiccatiGain works out before it runs: its limit, the start table, and whether the scalar
-/// can hold what the recursion makes.
+/// The design of RiccatiGain in make: its limit, the start table, and whether the scalar can hold
+/// what the recursion computes.
 #pragma once
 
 #include <esokit/gain/riccati.hpp>
@@ -41,7 +41,7 @@ template <int Size, Scalar S, int TableSize, class Transition>
 bool RiccatiGain<Size, S, TableSize, Transition>::fits() const noexcept {
   const bool usual = all(start_inflation_ <= S(1e6)) && all(start_inflation_ >= S(1e-6));
   const int most_missing = usual ? 0 : Size;
-  // Room for two more samples that are missing.
+  // Leaves room for two more missing samples.
   const S growth = S(1.0) + start_inflation_;
   const S room = usual ? S(1.0) : S(growth * growth);
   for (int missing = 0; missing <= most_missing; ++missing) {
@@ -68,7 +68,7 @@ auto RiccatiGain<Size, S, TableSize, Transition>::find_limit() const -> std::opt
   RiccatiGain run = *this;
   run.mode_ = RiccatiMode::recursive;
   run.reset();
-  // theta and the limit that it leads to depend on each other: repeated until they agree.
+  // theta and its limit depend on each other: repeated until they agree.
   const bool adaptive = rule_ == InflationRule::adaptive;
   const int rounds = adaptive ? 500 : 1;
   S theta(1.0);
@@ -88,7 +88,7 @@ auto RiccatiGain<Size, S, TableSize, Transition>::find_limit() const -> std::opt
     }
     if (std::is_same_v<Transition, PascalTransition> && rule_ == InflationRule::fixed &&
         !all(noise_trace_ > S(0.0))) {
-      // Nothing disturbs the plant: all poles at 1/(1+theta), known exactly.
+      // Nothing disturbs the plant: all poles are exactly at 1/(1+theta).
       const EqualSampledPoles<Size, S> poles{run.now_.inflation * run.now_.shrink};
       run.now_.gain = current_gain<Size, S>(poles.weights());
     }

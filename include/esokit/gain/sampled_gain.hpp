@@ -9,7 +9,7 @@
 ///     k_r = sum_{j>r} b_j c(j, r+1) / (j-1)!,   sum_j b_j s^j = prod_i (a_i s + rho_i)
 ///
 /// (c: unsigned Stirling numbers of the first kind). For real poles in [0, 1) every term is
-/// positive: nothing cancels, and each gain is good to a few units in the last place for any
+/// positive: nothing cancels, and each gain is accurate to a few units in the last place for any
 /// omega_o T.
 #pragma once
 
@@ -53,7 +53,7 @@ constexpr ScaledGain<Size, S> current_gain(const PoleWeights<Size, S>& weights) 
   constexpr auto table = detail::gain_table<Size, detail::TableScalar<S>>();
   ScaledGain<Size, S> gain{};
   for (std::size_t r = 0; r < Size; ++r) {
-    // From the smallest term up: for small omega_o T the b_j fall quickly with j.
+    // Summed from the smallest term: for small omega_o T the b_j fall fast with j.
     S sum = weights[Size] * S(table[r][Size]);
     for (std::size_t j = Size - 1; j > r; --j) sum = sum + weights[j] * S(table[r][j]);
     gain[r] = sum;
@@ -87,14 +87,14 @@ ScaledGain<Size, S> scaled_gain(const Vector<S, Size>& gain, const S& sample_tim
 
 namespace detail {
 
-/// A number of the complex plane, without <complex>.
+/// A complex number without <complex>.
 template <PlainScalar S>
 struct Contraction {
   S real{};
   S imaginary{};
 };
 
-/// 1 - rho of rho = e^(x + j phi).
+/// 1 - rho for rho = e^(x + j phi).
 template <PlainScalar S>
 Contraction<S> contraction(const S& x, const S& phi) noexcept {
   // 1 - e^x cos(phi) = -expm1(x) + 2 e^x sin^2(phi/2): no cancellation for small T.
@@ -104,7 +104,7 @@ Contraction<S> contraction(const S& x, const S& phi) noexcept {
 
 }  // namespace detail
 
-/// All N poles of the sampled error at rho = exp(-omega_o T), kept as the contraction 1 - rho.
+/// All N poles of the sampled error at rho = exp(-omega_o T), stored as the contraction 1 - rho.
 template <int Size, Scalar S>
 struct EqualSampledPoles {
   S contraction{};  ///< a = 1 - rho, in (0, 1]
@@ -115,12 +115,13 @@ struct EqualSampledPoles {
     return {-expm1(-(bandwidth * sample_time))};
   }
 
-  /// The poles for `samples` sample times in one: rho^samples. No exponential; log2 steps.
+  /// The poles for `samples` sample times in one: rho^samples. By repeated squaring, without an
+  /// exponential.
   [[nodiscard]] constexpr EqualSampledPoles power(unsigned samples) const noexcept {
     S base = contraction;
     S result(0.0);
     for (; samples != 0; samples >>= 1u) {
-      // 1 - (1-a)(1-b), without the cancellation.
+      // 1 - (1-a)(1-b), without cancellation.
       if ((samples & 1u) != 0) result = result + (S(1.0) - result) * base;
       base = base + (S(1.0) - base) * base;
     }
@@ -156,7 +157,7 @@ struct EqualSampledPoles {
   /// @endcond
 };
 
-/// Gain of one correction after `samples` sample times, scaled to one sample time: it puts the
+/// Gain of a correction after `samples` sample times, scaled with one sample time: it places the
 /// poles of the long step at rho_i^samples.
 template <int Size, Scalar S, class Poles>
 constexpr ScaledGain<Size, S> gap_gain(const Poles& poles, unsigned samples) noexcept {

@@ -1,6 +1,6 @@
 /// @file
-/// The constant gain law of a model whose swings follow a speed: designs for several speeds, and
-/// between them their mean.
+/// The gain law for a model whose frequencies follow a speed: a table of constant gains for several
+/// speeds, with interpolation.
 #pragma once
 
 #include <cmath>
@@ -8,29 +8,32 @@
 
 namespace esokit {
 
-/// ModelGain for `Count` speeds, spaced evenly in their logarithm, made in `make`; `set_speed`
-/// interpolates. What is in force is a constant gain: that errors decay is proven for every speed
-/// of the table and, by `make`, half way between two of them; while the speed changes only where
-/// that is slow against the error's own decay.
+/// One ModelGain for each of `Count` speeds, spaced evenly in their logarithm and designed in
+/// `make`; `set_speed` interpolates. Decay of the error is proven for each constant speed of the
+/// table and, by a check in `make`, half way between two of them. While the speed changes, it holds
+/// only if the change is slow in comparison with the decay of the error.
 ///
-/// One constant gain for all speeds is not enough: with the swing at the observer's bandwidth it
-/// bears a frequency of 0.7 to 1.8 times its design, at three times the bandwidth of 0.9 to 1.2.
-/// @tparam Count speeds in the table, each of MostBridged N numbers
+/// One constant gain for all speeds is not enough: designed for a frequency equal to the observer's
+/// bandwidth, it tolerates 0.7 to 1.8 times this frequency, for three times the bandwidth only 0.9
+/// to 1.2 times.
+/// @tparam Count number of speeds in the table, each of MostBridged x N numbers
 template <int Size, Scalar S, class Placement, int Count, int MostBridged>
 class ScheduledGain {
-  static_assert(Count >= 2, "esokit: a schedule has two speeds at least");
+  static_assert(Count >= 2, "esokit: a schedule needs at least two speeds");
   using One = ModelGain<Size, S, Placement, MostBridged>;
 
  public:
-  /// What it declares beside `gain`.
+  /// What the law can do besides `gain`.
   static constexpr GainLawTraits traits{.kind = GainKind::preset, .bridges_gaps = true};
-  using Spec = typename Placement::template Spec<Size, S>;  ///< of the placement
+  using Spec = typename Placement::template Spec<Size, S>;  ///< bandwidth or poles: a
+                                                            ///< bandwidth or poles
 
   /// The gains for a set of poles, at all speeds.
-  /// @param field name of the config member that `spec` came from, for the error
-  /// @param spec poles of the error, checked by the placement @param model that follows a speed
+  /// @param field name of the config member that holds `spec`, for the error
+  /// @param spec poles of the error, checked by the placement @param model a model that follows a
+  /// speed
   /// @param index element of `field` that the error names, -1: none
-  /// @return error as ModelGain, or where two speeds of the table are too far from each other
+  /// @return error as for ModelGain, or if two speeds of the table are too far apart
   template <SampledModel<S> Model>
   requires(model_traits<Model>.follows_speed) static Expected<ScheduledGain, Error<S>> make(
       const char* field, const Spec& spec, const Model& model, int index = -1) {
@@ -60,8 +63,8 @@ class ScheduledGain {
         if (!One::decays(model.at_speed(speed), law.gains_[0])) {
           return Error<S>{"model.speed.highest",
                           range.highest,
-                          "is too far from lowest: between two speeds of the table the error does "
-                          "not decay, at",
+                          "is too far from lowest: the error does not decay between two speeds of "
+                          "the table, at",
                           -1,
                           speed,
                           true};
@@ -72,7 +75,7 @@ class ScheduledGain {
     return law;
   }
 
-  /// The gains for another speed, as a factor. @return error outside of the range
+  /// Changes to another speed, given as a factor. @return error if it is outside the model's range
   Check<S> set_speed(const S& factor) noexcept {
     Rules<S> rules;
     rules
@@ -84,7 +87,7 @@ class ScheduledGain {
     return {};
   }
 
-  /// k, scaled, for any innovation.
+  /// k, scaled; the same for every innovation.
   /// @{
   [[nodiscard]] constexpr const ScaledGain<Size, S>& gain(const S&) const noexcept {
     return gains_[0];
@@ -94,12 +97,12 @@ class ScheduledGain {
   }
   /// @}
 
-  /// k_M.
+  /// k_M, the gain after a gap of M samples.
   [[nodiscard]] constexpr ScaledGain<Size, S> gap_gain(const S&, unsigned samples) const noexcept {
     return gains_[samples < MostBridged ? samples - 1 : MostBridged - 1];
   }
 
-  /// The largest number of missing samples that is bridged at every speed, of those asked for.
+  /// The largest number of missing samples that is bridged at every speed, at most `asked`.
   [[nodiscard]] constexpr int longest_gap(int asked) const noexcept {
     return (std::min)(asked, longest_gap_);
   }
@@ -130,7 +133,7 @@ class ScheduledGain {
   Array<Gains, Count> table_{};
   S lowest_{};
   S highest_{};
-  S per_log_{};  ///< places of the table a unit of the speed's logarithm
+  S per_log_{};  ///< table entries per unit of the speed's logarithm
   int longest_gap_ = 0;
 };
 

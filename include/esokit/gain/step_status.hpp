@@ -7,31 +7,34 @@
 
 namespace esokit {
 
-/// Bit flags; `ok` is zero. A step of packs reports one a lane, `StatusOf`.
+/// Bit flags; `ok` is zero. A step of packs reports one status per lane, see `StatusOf`.
 enum class StepStatus : unsigned char {
   ok = 0,
-  /// y was NaN, infinite, or so large that the estimate would not be finite: predicted only.
+  /// y was NaN, infinite, or so large that the estimate would not be finite. It was not used: the
+  /// step only predicted.
   measurement_rejected = 1,
-  /// u was NaN, infinite or too large: predicted with the last good u.
+  /// u was NaN, infinite or too large. The last good u was used instead.
   input_rejected = 2,
-  /// No good u gives a finite prediction: the state stands still, and the next good y restarts it.
+  /// Not even the last good u gives a finite prediction: the state was kept, and the next good y
+  /// restarts the observer.
   prediction_dropped = 4,
-  /// Samples were missing before this correction; it used the gain for the whole gap.
+  /// Samples were missing before this correction, which used the gain for the whole gap.
   gap_bridged = 8,
-  /// More samples than `max_gap` were missing, or the state could not be predicted: restarted as by
-  /// reset(y).
+  /// More samples than `max_gap` were missing, or the state could not be predicted: the observer
+  /// was restarted as by reset(y).
   restarted = 16,
-  /// The state given to a reset was not finite, or an angle too large to tell its branch: nothing
-  /// changed.
+  /// The state given to a reset was not finite, or its angle was too large to determine its turn:
+  /// nothing was changed.
   state_rejected = 32,
-  /// y lay too far from its prediction for the observer's outlier gate: predicted only.
+  /// y was too far from its prediction and was rejected by the outlier gate: the step only
+  /// predicted.
   outlier_rejected = 64,
-  /// An angle moved otherwise than before by more than a quarter of its period: its turn is not
-  /// sure, see WrappedOutput.
+  /// An angle differed by more than a quarter of its period from what its motion so far predicts:
+  /// its turn is uncertain, see WrappedOutput.
   turn_assumed = 128,
 };
 
-/// Both flags.
+/// The flags of both.
 /// @{
 constexpr StepStatus operator|(StepStatus a, StepStatus b) noexcept {
   return static_cast<StepStatus>(static_cast<unsigned char>(a) | static_cast<unsigned char>(b));
@@ -45,11 +48,11 @@ constexpr bool has(StepStatus status, StepStatus flag) noexcept {
   return (static_cast<unsigned char>(status) & static_cast<unsigned char>(flag)) != 0;
 }
 
-/// What a step of scalar S reports: a status, of a pack one a lane.
+/// What a step with scalar S reports: a status, for a pack one per lane.
 template <class S>
 using StatusOf = Lanes<StepStatus, S>;
 
-/// Lane by lane, and true if `flag` is set in any.
+/// The same for packs: the flags of both lane by lane; true if `flag` is set in any lane.
 /// @{
 template <int Count>
 constexpr PerLane<StepStatus, Count> operator|(const PerLane<StepStatus, Count>& a,
@@ -68,11 +71,11 @@ constexpr bool has(const PerLane<StepStatus, Count>& status, StepStatus flag) no
 }
 /// @}
 
-/// Has text.
+/// A status can be written to a stream, see has_text.
 template <>
 inline constexpr bool has_text<StepStatus> = true;
 
-/// Writes all flags that are set, `measurement_rejected|gap_bridged`, or `ok`.
+/// Writes all flags that are set, for example `measurement_rejected|gap_bridged`, or `ok`.
 template <class Stream>
 requires detail::WritesText<Stream> Stream& operator<<(Stream& out, StepStatus status) {
   constexpr const char* names[] = {"measurement_rejected", "input_rejected", "prediction_dropped",

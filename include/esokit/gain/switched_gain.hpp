@@ -10,23 +10,24 @@
 
 namespace esokit {
 
-/// What "the error shrinks" means. The equation of the ABESO paper prints the sign of the error's
-/// derivative; its text, and what improves on the linear observer, is that of its magnitude.
+/// What "the error shrinks" means. The equation in the ABESO paper uses the sign of the derivative
+/// of the error; its text uses the derivative of the magnitude, and only this improves on the
+/// linear observer.
 enum class SignReading : unsigned char {
-  magnitude,  ///< |e| is smaller than at the sample before: the working one
-  printed,    ///< xhat_1 - y is smaller than at the sample before, whatever its sign
+  magnitude,  ///< |e| is smaller than one sample before; use this one
+  printed,    ///< xhat_1 - y, with its sign, is smaller than one sample before
 };
 
 namespace detail {
 
-/// The number whose fall counts as shrinking.
+/// The number that has to fall for the error to count as shrinking.
 template <Scalar S>
 [[nodiscard]] ESOKIT_INLINE constexpr S watched(SignReading reading, const S& e) noexcept {
   if (reading == SignReading::printed) return -e;
   return absolute(e);
 }
 
-/// What no innovation falls below: the next one counts as not shrinking.
+/// The start value, below which no innovation falls: the first one counts as not shrinking.
 template <Scalar S>
 [[nodiscard]] constexpr S nothing_watched(SignReading reading) noexcept {
   using Limits = std::numeric_limits<TableScalar<S>>;
@@ -38,7 +39,7 @@ template <Scalar S>
 /// Gain law of AdjustableBandwidthEso: gain set `shrinking` while the innovation shrinks, else
 /// `otherwise`. The first innovation counts as not shrinking.
 ///
-/// After a gap the comparison with the innovation before it means nothing: the gap gain of
+/// After a gap the comparison with the last innovation is meaningless, so the gap gain of
 /// `otherwise` is used.
 template <int Size, Scalar S, class Placement = EqualPoles,
           SignReading Reading = SignReading::magnitude>
@@ -48,22 +49,23 @@ class SwitchedGain {
   template <class T>
   using with_scalar = SwitchedGain<Size, T, Placement, Reading>;  ///< the same with another scalar
 
-  /// What it declares beside `gain`. A NaN compares as not shrinking, so that any innovation is
-  /// safe to ask with.
+  /// What the law can do besides `gain`. A NaN counts as not shrinking, so that `gain` accepts any
+  /// innovation.
   static constexpr GainLawTraits traits{.kind = GainKind::switched,
                                         .accepts = true,
                                         .resets = true,
                                         .bridges_gaps = true,
                                         .bears_any_innovation = true};
 
-  /// @param shrinking in force while the innovation shrinks @param otherwise else
+  /// @param shrinking gains while the innovation shrinks @param otherwise gains at all other times
   constexpr SwitchedGain(const Set& shrinking, const Set& otherwise) noexcept
       : sets_{otherwise, shrinking} {}
 
   /// k for an innovation, scaled.
   //
-  // Whether an innovation shrinks is as good as random: a branch on it would cost more than the
-  // rest of the update. One lane picks its set by address, a pack element by element.
+  // Whether an innovation shrinks is practically random, so that a mispredicted branch would cost
+  // more than the rest of the update. A plain scalar selects the set by address, a pack each
+  // element.
   [[nodiscard]] ESOKIT_INLINE constexpr decltype(auto) gain(const S& e) const noexcept {
     const auto is_shrinking = shrinks(e);
     if constexpr (PlainScalar<S>) {
@@ -78,12 +80,12 @@ class SwitchedGain {
     }
   }
 
-  /// That of `otherwise` for the whole gap.
+  /// The gain of `otherwise` for the whole gap.
   [[nodiscard]] ScaledGain<Size, S> gap_gain(const S& e, unsigned samples) const noexcept {
     return sets_[0].gap_gain(e, samples);
   }
 
-  /// The correction was carried out: e is what the next innovation is compared with.
+  /// The correction was carried out: stores e for the comparison with the next innovation.
   ESOKIT_INLINE constexpr void accept(const S& e) noexcept {
     previous_ = detail::watched(Reading, e);
   }
@@ -91,7 +93,7 @@ class SwitchedGain {
   /// The next innovation counts as not shrinking.
   constexpr void reset() noexcept { previous_ = detail::nothing_watched<S>(Reading); }
 
-  /// Takes over what another law of this kind remembers.
+  /// Takes over the last innovation from another law.
   constexpr void continue_from(const SwitchedGain& other) noexcept { previous_ = other.previous_; }
 
   /// True (per lane) if gain(e) is `shrinking_gain`, else it is `otherwise_gain`.
@@ -113,7 +115,7 @@ class SwitchedGain {
   friend struct detail::LaneAccess;
   static constexpr auto fields(auto& o) noexcept { return detail::tie(o.sets_, o.previous_); }
 
-  Array<Set, 2> sets_;  ///< otherwise, shrinking
+  Array<Set, 2> sets_;  ///< {otherwise, shrinking}
   S previous_ = detail::nothing_watched<S>(Reading);
 };
 
@@ -127,7 +129,7 @@ template <int Size, Scalar S>
 class ContinuousSwitchedGain {
  public:
   static constexpr ContinuousGainLawTraits traits{.begins_steps =
-                                                      true};  ///< what it does beside `gain`
+                                                      true};  ///< what it can do besides `gain`
 
   /// @param shrinking, otherwise l, N x 1, row i in 1/s^(i+1)
   ContinuousSwitchedGain(const Vector<S, Size>& shrinking, const Vector<S, Size>& otherwise,
@@ -137,14 +139,14 @@ class ContinuousSwitchedGain {
         previous_(detail::nothing_watched<S>(reading)),
         reading_(reading) {}
 
-  /// Compares e with that of the step before, and chooses the gain set of this step.
+  /// Compares e with that of the last step and selects the gain set of this step.
   void begin_step(const S&, const S& e) noexcept {
     const S now = detail::watched(reading_, e);
     is_shrinking_ = now < previous_;
     previous_ = now;
   }
 
-  /// l, N x 1, row i in 1/s^(i+1); the same over a whole step.
+  /// l, N x 1, row i in 1/s^(i+1); constant over a whole step.
   [[nodiscard]] const Vector<S, Size>& gain(const S&, const S&) const noexcept {
     return is_shrinking_ ? shrinking_ : otherwise_;
   }

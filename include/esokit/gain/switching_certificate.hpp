@@ -1,13 +1,14 @@
 /// @file
-/// Certificates for observers that change between two gain sets.
+/// Stability certificates for observers that switch between two gain sets.
 ///
-/// The errors of two gain sets on one chain have closed loops A_1, A_2 that differ by rank one.
+/// The error dynamics A_1, A_2 of two gain sets on the same chain differ by a matrix of rank one.
 /// They share a quadratic Lyapunov function, and so stay stable under any switching and any
 /// blending, iff both are stable and A_2 A_1 has no negative real eigenvalue (H. Lin, P. J.
 /// Antsaklis, IEEE Transactions on Automatic Control 54 (2009) 308-322). det(A_2 A_1 + x I) is, up
 /// to its sign, the polynomial Re[p_2(jw) p_1(-jw)] in x = w^2, p_i the characteristic polynomials:
-/// an eigenvalue -x is a root x > 0 of it. So the eigenvalue test is a test for positivity, which
-/// needs no eigenvalue solver. Sampled pairs are tested after the bilinear map.
+/// an eigenvalue -x is a root x > 0 of it. So the test of the eigenvalues becomes one of the
+/// positivity of a polynomial, without an eigenvalue solver. Sampled pairs are tested after the
+/// bilinear map.
 #pragma once
 
 #include <cmath>
@@ -34,7 +35,8 @@ constexpr double constexpr_sine(double x) noexcept {
   return sum;
 }
 
-/// Re[p(jw) q(-jw)] in w^2, less a little more than what rounding may hide.
+/// The coefficients of Re[p(jw) q(-jw)] in w^2, each reduced by more than its possible rounding
+/// error.
 template <int Size, Scalar S>
 Array<S, Size + 1> half_plane_product(const ErrorPolynomial<Size, S>& p,
                                       const ErrorPolynomial<Size, S>& q) {
@@ -66,13 +68,14 @@ bool certified_pair(const Gain& first, const Gain& second) {
   if (!is_finite(unit) || !(unit > S(0.0))) return false;
   const auto p = error_polynomial<Size, S>(first, unit);
   const auto q = error_polynomial<Size, S>(second, unit);
-  // Positive all along the axis, the two have as many roots to its right: one test tells of both.
+  // If it is positive along the whole axis, p and q have equally many roots in the right half
+  // plane, so Routh's test of p is enough.
   return is_hurwitz<Size, S>(p) && same_half_plane<Size, S>(p, q);
 }
 
 }  // namespace detail
 
-/// Whether the errors of two continuous gain sets share a quadratic Lyapunov function. Then every
+/// True if the errors of two continuous gain sets share a quadratic Lyapunov function. Then every
 /// l(t) on the segment between them is stable, however it varies.
 /// @param first, second l, N x 1, row i in 1/s^(i+1)
 template <int Size, Scalar S>
@@ -99,8 +102,8 @@ constexpr double least_bandwidth_ratio() noexcept {
   return (1.0 - sine) / (1.0 + sine);
 }
 
-/// What takes the place of the bandwidth ratio for sampled gain sets with equal poles:
-/// tanh(w_1 T/2) / tanh(w_2 T/2), to be compared with least_bandwidth_ratio.
+/// The ratio that replaces the bandwidth ratio for sampled gain sets with equal poles: tanh(w_1
+/// T/2) / tanh(w_2 T/2), to be compared with least_bandwidth_ratio.
 template <int Size, Scalar S>
 S sampled_bandwidth_ratio(const EqualSampledPoles<Size, S>& first,
                           const EqualSampledPoles<Size, S>& second) {
@@ -109,13 +112,13 @@ S sampled_bandwidth_ratio(const EqualSampledPoles<Size, S>& first,
          (second.contraction * (S(2.0) - first.contraction));
 }
 
-/// Which two bandwidths an observer switches between.
+/// The two bandwidths between which an observer switches.
 enum class SwitchingRule : unsigned char {
   abeso,  ///< rho w while the innovation shrinks, w otherwise
   beso,   ///< rho w while the innovation shrinks, w / rho otherwise
 };
 
-/// Whether the two bandwidths of a rule are certified: the closed form for poles in one place.
+/// True if the two bandwidths of a rule are certified; the closed form for equal poles.
 /// @param sample_time T, s; 0 for a continuous observer
 template <int Size, Scalar S>
 [[nodiscard]] bool bandwidth_switching_certified(SwitchingRule rule, const S& bandwidth,
@@ -134,9 +137,9 @@ template <int Size, Scalar S>
   return is_finite(quotient) && quotient > limit && S(1.0) / quotient > limit;
 }
 
-/// The end of the certified range of rho on the side of `ratio`: below 1 the least, above 1 the
-/// largest (infinite where every rho > 1 is certified). Closed form for the ABESO, bisection for
-/// the BESO.
+/// The limit of the certified range of rho on the side of `ratio`: for a ratio below 1 the
+/// smallest, above 1 the largest certified rho (infinite if every rho > 1 is certified). A closed
+/// form for the ABESO, by bisection for the BESO.
 /// @param sample_time T, s; 0 for a continuous observer
 template <int Size, PlainScalar S>
 [[nodiscard]] S certified_ratio_limit(SwitchingRule rule, const S& bandwidth, const S& ratio,
@@ -154,8 +157,8 @@ template <int Size, PlainScalar S>
     if (!(t < S(1))) return detail::unbounded<S>();
     return std::log1p(S(2) * t / (S(1) - t)) / x;
   }
-  // rho and 1 / rho change roles: the range is symmetric in the logarithm.
-  S low = least;  // less strict when sampled than sqrt(least) in continuous time, down to zero
+  // rho and 1 / rho are interchangeable, so the range is symmetric in the logarithm.
+  S low = least;  // sampled, it lies between zero and sqrt(least), the value in continuous time
   S high = S(1);
   while (low > (std::numeric_limits<S>::min)() * S(1e6) &&
          bandwidth_switching_certified<Size, S>(rule, bandwidth, low, sample_time)) {
@@ -171,7 +174,7 @@ template <int Size, PlainScalar S>
 
 namespace detail {
 
-/// The two bandwidths of a rule, or why there are none.
+/// The two bandwidths of a rule.
 template <Scalar S>
 struct BandwidthPair {
   S shrinking{};
@@ -198,18 +201,16 @@ Expected<BandwidthPair<S>, Error<S>> bandwidth_pair(const S& bandwidth, const S&
     return pair;
   }
   constexpr const char* below =
-      "is not certified against every switching (allow_uncertified_switching asks for it); must be "
-      "above";
+      "must be certified against every switching (or set allow_uncertified_switching): above";
   constexpr const char* above =
-      "is not certified against every switching (allow_uncertified_switching asks for it); must be "
-      "below";
+      "must be certified against every switching (or set allow_uncertified_switching): below";
   if constexpr (PlainScalar<S>) {
     const S limit = certified_ratio_limit<Size, S>(rule, bandwidth, ratio, sample_time);
     return Error<S>{"bandwidth_ratio", ratio, ratio < S(1) ? below : above, -1, limit, true};
   } else {
-    return Error<S>{"bandwidth_ratio", ratio,
-                    "is not certified against every switching (allow_uncertified_switching asks "
-                    "for it)"};
+    return Error<S>{
+        "bandwidth_ratio", ratio,
+        "must be certified against every switching (or set allow_uncertified_switching)"};
   }
 }
 

@@ -413,14 +413,14 @@ class MimoExtendedStateFilter {
       if (none) {
         return Error<S>{detail::noise_field(config), noise(last, last),
                         "must disturb the highest state of every chain: without inflation its gain "
-                        "tends to zero (allow_vanishing_gain asks for it)",
+                        "tends to zero (or set allow_vanishing_gain)",
                         config.process_covariance ? last * size + last : last};
       }
       const S& start = config.initial_covariance(last, last);
       if (config.mode != RiccatiMode::frozen && !(start > S(0))) {
         return Error<S>{"initial_covariance", start,
-                        "must leave the highest state of a chain uncertain where nothing disturbs "
-                        "it: it would never be corrected (allow_vanishing_gain asks for it)",
+                        "must leave the highest state of a chain uncertain if nothing disturbs it: "
+                        "it would never be corrected (or set allow_vanishing_gain)",
                         last * size + last};
       }
     }
