@@ -1,4 +1,4 @@
-// expect: esokit: a cascade takes a model that tells the disturbance from the plant
+// expect: esokit: a cascade needs a model that separates the disturbance
 #include <esokit/observer/cascade_eso.hpp>
 
 /// Says no more than that it predicts.

@@ -246,8 +246,8 @@ void retune_to_any_variance_is_finite_or_refused() {
       if (!outcome) {
         ++refusals;
         EXPECT_EQ(refusal(outcome),
-                  "measurement_variance: is too small, or sample_time too far from the one before, "
-                  "for the present covariance to be carried over: measure first");
+                  "measurement_variance: is too small, or sample_time changed too much, to carry "
+                  "over the present covariance: measure first");
         EXPECT_EQ(filter.covariance(), before.covariance());
         EXPECT_EQ(filter.gain(), before.gain());
         continue;
@@ -280,9 +280,8 @@ TEST(FilterVariance, OneThatCannotBeCarriedOverIsEnough) {
     other.initial_covariance = Filter::Covariance::Zero();
     EXPECT_EQ(refusal(filter.retune(other)),
               variance > 1e-275 ? "accepted"
-                                : "measurement_variance: is too small, or sample_time too far from "
-                                  "the one before, for the present covariance to be carried over: "
-                                  "measure first");
+                                : "measurement_variance: is too small, or sample_time changed too "
+                                  "much, to carry over the present covariance: measure first");
   }
 }
 

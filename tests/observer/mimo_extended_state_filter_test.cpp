@@ -387,7 +387,7 @@ TEST(MimoExtendedStateFilter, refuses_bad_configs_by_name) {
               c.process_covariance.reset();
               eigen(c.measurement_covariance).setZero();
             }),
-            "measurement_covariance: must be positive definite where nothing disturbs the plants");
+            "measurement_covariance: must be positive definite if nothing disturbs the plants");
   EXPECT_EQ(refused([](Config& c) {
               c.inflation_rule = InflationRule::none;
               c.inflation = 0;
@@ -396,8 +396,8 @@ TEST(MimoExtendedStateFilter, refuses_bad_configs_by_name) {
               c.allow_vanishing_gain = true;
               c.mode = RiccatiMode::frozen;
             }),
-            "process_covariance: gives no limit gain; without inflation every highest state must "
-            "be disturbed");
+            "process_covariance: gives no limit gain: without inflation the highest state of every "
+            "chain must be disturbed");
 }
 
 // ---- absurd numbers, long gaps
@@ -510,8 +510,8 @@ TEST(MimoExtendedStateFilter, refuses_what_the_scalar_cannot_hold) {
   };
   using Config = Pair::Config;
   EXPECT_EQ(rule([](Config& c) { c.sample_time = 1e-25f; }),
-            "sample_time: to the power of a chain's highest state over its factorial is not what "
-            "the scalar can hold");
+            "sample_time: to the power of a chain's highest state, over its factorial, leaves the "
+            "scalar's range");
   EXPECT_EQ(rule([](Config& c) { c.sample_time = 1e-40f; }),
             "sample_time: has an inverse that the scalar cannot hold");
   EXPECT_EQ(rule([](Config& c) { c.input_matrix(1, 0) = 1e-37f; }),
@@ -559,7 +559,7 @@ TEST(MimoExtendedStateFilter, refuses_what_has_no_way_back) {
   };
   using Config = Pair::Config;
   const std::string exact =
-      "measurement_covariance: must be positive definite where nothing disturbs the plants";
+      "measurement_covariance: must be positive definite if nothing disturbs the plants";
   EXPECT_EQ(rule([](Config& c) { c.disturbance_bounds[4] = 0; }), "accepted");
   EXPECT_EQ(rule([](Config& c) {
               c.disturbance_bounds[4] = 0;

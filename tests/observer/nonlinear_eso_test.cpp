@@ -533,7 +533,7 @@ TEST(NonlinearEso, RefusesByName) {
   auto refused = good;
   refused.gain_max = 100;
   const auto error = Observer::make(refused).error();
-  EXPECT_EQ(esokit::to_text(error).substr(0, 30), "gain_max = 100: is not certifi");
+  EXPECT_EQ(esokit::to_text(error).substr(0, 30), "gain_max = 100: must be certif");
   refused.gain_max = error.limit;
   EXPECT_TRUE(Observer::make(refused).has_value());
   refused.gain_max = error.limit * (1 + 1e-9);

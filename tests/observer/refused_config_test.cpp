@@ -218,11 +218,11 @@ TYPED_TEST(Refused, CascadeByLevels) {
     auto config = good;
     config.observer_bandwidth = given;
     EXPECT_EQ(refusal(Observer::make(config)),
-              "observer_bandwidth: must be left out where level_bandwidths is given");
+              "observer_bandwidth: must be left out if level_bandwidths is given");
     config = good;
     config.bandwidth_factor = given;
     EXPECT_EQ(refusal(Observer::make(config)),
-              "bandwidth_factor: must be left out where level_bandwidths is given");
+              "bandwidth_factor: must be left out if level_bandwidths is given");
   }
 }
 

@@ -171,8 +171,7 @@ class ModelGain {
  public:
   /// What the law can do besides `gain`.
   static constexpr GainLawTraits traits{.kind = GainKind::preset, .bridges_gaps = true};
-  using Spec = typename Placement::template Spec<Size, S>;  ///< bandwidth or poles: a
-                                                            ///< bandwidth or poles
+  using Spec = typename Placement::template Spec<Size, S>;  ///< bandwidth or poles
 
   /// The gain for a set of poles.
   /// @param field name of the config member that holds `spec`, for the error

@@ -25,8 +25,7 @@ class ScheduledGain {
  public:
   /// What the law can do besides `gain`.
   static constexpr GainLawTraits traits{.kind = GainKind::preset, .bridges_gaps = true};
-  using Spec = typename Placement::template Spec<Size, S>;  ///< bandwidth or poles: a
-                                                            ///< bandwidth or poles
+  using Spec = typename Placement::template Spec<Size, S>;  ///< bandwidth or poles
 
   /// The gains for a set of poles, at all speeds.
   /// @param field name of the config member that holds `spec`, for the error

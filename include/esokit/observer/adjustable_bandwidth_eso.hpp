@@ -18,14 +18,14 @@ namespace esokit {
 /// innovation shrinks and omega_o (or, by the BESO rule, omega_o / rho) otherwise.
 ///
 /// `make` accepts the ratios for which the two gain sets share a quadratic Lyapunov function: the
-/// error then decays under any switching, also under one caused by noise. The paper's Lemma 2
+/// error then decays under any switching, also switching caused by noise. The paper's Lemma 2
 /// claims this for every rho. This is wrong: for N = 3 it holds for 1/3 < rho < 3 (sampled: a
 /// little wider), and at rho = 0.2 some switching patterns make the error grow. The certificate
 /// applies to samples without gaps.
 ///
 /// rho = 1 is LinearEso, bit for bit.
 /// @tparam Order n @tparam S scalar @tparam Extension m
-/// @tparam Reading of "shrinks"; `printed` is for comparison with the paper only
+/// @tparam Reading meaning of "shrinks"; `printed` is for comparison with the paper only
 template <int Order, Scalar S = double, int Extension = 1,
           SignReading Reading = SignReading::magnitude>
 class AdjustableBandwidthEso
@@ -44,7 +44,7 @@ class AdjustableBandwidthEso
     S observer_bandwidth{};                     ///< omega_o, rad/s
     S bandwidth_ratio = S(1.0);                 ///< rho > 0
     SwitchingRule rule = SwitchingRule::abeso;  ///< abeso or beso
-    bool allow_uncertified_switching = false;   ///< accept a ratio without the certificate
+    bool allow_uncertified_switching = false;   ///< accept a ratio without a certificate
     S input_gain{};     ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
     S sample_time{};    ///< T, s
     int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts
@@ -61,7 +61,7 @@ class AdjustableBandwidthEso
       AdjustableBandwidthEso<Order, T, Extension, Reading>;  ///< the same with another scalar
 
   /// Takes over the settings of `fresh`, as returned by `make`, without design work. The estimate
-  /// and the innovation to compare with are kept.
+  /// and the last innovation are kept.
   Check<S> adopt(AdjustableBandwidthEso fresh) {
     if constexpr (PackScalar<S>) return detail::adopt_lanes(*this, fresh);
     std::get<0>(fresh.laws()).continue_from(std::get<0>(this->laws()));
@@ -69,13 +69,14 @@ class AdjustableBandwidthEso
   }
 
  private:
-  // For a ratio without the certificate the error's limit is the end of the certified range.
+  // For a ratio without the certificate, `limit` in the error is the end of the certified range.
   static Expected<Law, Error<S>> design(const Config& config, const typename Shell::PlantModel&) {
     const auto pair = detail::bandwidth_pair<Order + Extension, S>(
         config.observer_bandwidth, config.bandwidth_ratio, config.rule, config.sample_time,
         config.allow_uncertified_switching);
     if (!pair) return pair.error();
-    // The plain bandwidth first, so that the error blames the ratio only where it is to blame.
+    // The bandwidth is checked alone first, so that the error names the ratio only if it is the
+    // cause.
     using Set = typename Law::Set;
     constexpr const char* rule =
         "with observer_bandwidth and sample_time gives a gain that the scalar cannot hold";
@@ -113,8 +114,8 @@ class ContinuousAdjustableBandwidthEso
     S observer_bandwidth{};                             ///< omega_o, rad/s
     S bandwidth_ratio = S(1.0);                         ///< rho > 0
     SwitchingRule rule = SwitchingRule::abeso;          ///< abeso or beso
-    SignReading sign_reading = SignReading::magnitude;  ///< printed: as the paper's equation has it
-    bool allow_uncertified_switching = false;           ///< accept a ratio without the certificate
+    SignReading sign_reading = SignReading::magnitude;  ///< printed: as in the paper's equation
+    bool allow_uncertified_switching = false;           ///< accept a ratio without a certificate
     S input_gain{};  ///< b0, unit of y^(n) per unit of u; not zero
   };
 

@@ -20,11 +20,11 @@ namespace esokit {
 /// (e^{qt} - 1); once it has settled the observer is LinearEso with omega_o = lambda.
 ///
 /// Right after a start the estimate follows the noise: the variance of the highest state is about
-/// sigma^2 T (2N-1)! (2N-2)! / ((N-1)!)^2 / t^(2N-1). So the estimates are blanked at first: until
-/// then `estimate` returns its value at the start.
+/// sigma^2 T (2N-1)! (2N-2)! / ((N-1)!)^2 / t^(2N-1). So the estimates are blanked for a while:
+/// during this time `estimate` returns the value from the start.
 ///
-/// A sample missing among the first N restarts the schedule (the state is kept); a later gap is
-/// bridged with the gain that the present bandwidth has for the whole gap.
+/// If one of the first N samples is missing, the schedule restarts (the state is kept). A later gap
+/// is bridged with the gain for the whole gap at the present bandwidth.
 ///
 /// @tparam Order n @tparam S scalar @tparam Extension m
 template <int Order, Scalar S = double, int Extension = 1>
@@ -40,11 +40,11 @@ class AlgebraicEso
 
  public:
   using Estimate = typename Base::Estimate;  ///< (y, .., y^(n-1), d, .., d^(m-1)), N x 1
-  using Status = typename Base::Status;      ///< StepStatus, of a pack one a lane
+  using Status = typename Base::Status;      ///< StepStatus, for a pack one per lane
   template <class T>
   using with_scalar = AlgebraicEso<Order, T, Extension>;  ///< the same with another scalar
 
-  /// What it declares beyond LoopObserver.
+  /// What the observer can do beyond LoopObserver.
   static constexpr ObserverTraits traits = [] {
     ObserverTraits traits = Base::traits;
     traits.bears_regular_gaps = false;
@@ -66,9 +66,10 @@ class AlgebraicEso
     /// from the first sample that can be exact.
     std::optional<S> blanking{};
     S measurement_noise{};  ///< standard deviation of the noise on y, unit of y
-    S disturbance_noise{};  ///< standard deviation to be tolerated in the highest estimate, d^(m-1)
-    int start_index = 0;  ///< soft start: sample of the schedule to begin with; > 0 is not deadbeat
-    bool allow_vanishing_gain = false;  ///< lambda = 0 with q > 0: the gains go to zero, blind
+    S disturbance_noise{};  ///< standard deviation that is tolerated in the highest estimate,
+                            ///< d^(m-1)
+    int start_index = 0;    ///< soft start: first sample of the schedule; > 0 is not deadbeat
+    bool allow_vanishing_gain = false;  ///< accept lambda = 0 with q > 0: in the end y is ignored
     int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts
 
     /// @cond
@@ -91,13 +92,13 @@ class AlgebraicEso
     return update_running(y, u_applied);
   }
 
-  /// Measurement update alone, see PredictorCorrector::correct.
+  /// Measurement update only, see PredictorCorrector::correct.
   Status correct(S y) noexcept { return blank_anew(Base::correct(y)); }
 
   /// Takes over the settings of `fresh`, as returned by `make`, without design work. As with
   /// `retune`, the estimate and the place in the schedule (counted in samples) are kept, and a
-  /// change of b0 is moved into the disturbance, in blanked estimates as well. If the new blanking
-  /// is not over yet, the present estimates are published until it is.
+  /// change of b0 is moved into the disturbance, also in blanked estimates. If the new blanking
+  /// time has not passed yet, the present estimates are published until it has.
   Check<S> adopt(AlgebraicEso fresh) {
     if constexpr (PackScalar<S>) {
       return detail::adopt_lanes(*this, fresh);
@@ -108,7 +109,7 @@ class AlgebraicEso
       if (!all(is_finite(published(Order)))) {
         return Error<S>{"input_gain", fresh.input_gain(), "would make the estimate not finite"};
       }
-      // One that has settled stays so, and no longer knows its age.
+      // A settled observer no longer knows its age, and stays settled.
       fresh.law().resume(settled() ? Law::max_index : age());
       if (auto ok = Base::adopt(fresh); !ok) return ok;
       publish(published);
@@ -116,8 +117,8 @@ class AlgebraicEso
     }
   }
 
-  /// To be called after a known jump (of the disturbance or of the state): restarts the schedule
-  /// and keeps the state. The present estimates are published until the blanking is over.
+  /// Call this after a known jump of the disturbance or of the state: restarts the schedule and
+  /// keeps the state. The present estimates are published until the blanking is over.
   void rearm() noexcept {
     publish(estimate());
     law().restart();
@@ -129,7 +130,7 @@ class AlgebraicEso
   /// Restarts at a given estimate, N x 1.
   Status reset(const Estimate& state) noexcept { return blank_after(Base::reset(state)); }
 
-  /// All published estimates in physical units; while blanked, those of the start.
+  /// All published estimates in physical units, N x 1; while blanked, those from the start.
   [[nodiscard]] Estimate estimate() const noexcept {
     const auto blanked_now = blanked();
     if (blanked_now == true) return published();
@@ -154,10 +155,10 @@ class AlgebraicEso
   /// Published dhat, unit of y^(n).
   [[nodiscard]] S total_disturbance() const noexcept { return estimate<Order>(); }
 
-  /// The estimate as it is computed, blanked or not.
+  /// The computed estimate, also while blanked, N x 1.
   [[nodiscard]] Estimate raw_estimate() const noexcept { return Base::estimate(); }
 
-  /// True while the published estimates are those of the start.
+  /// True while the published estimates are those from the start.
   [[nodiscard]] Lanes<bool, S> blanked() const noexcept {
     if constexpr (PackScalar<S>) {
       const auto age = this->age();
@@ -186,7 +187,7 @@ class AlgebraicEso
     }
   }
 
-  /// Samples since the schedule began; the count ends where it settles.
+  /// Samples since the schedule began; the count stops when it settles.
   [[nodiscard]] typename Law::Count age() const noexcept { return law().age(); }
 
  private:
@@ -213,8 +214,8 @@ class AlgebraicEso
     return estimate;
   }
 
-  // Out of line: the settled observer then costs what LinearEso does, with both in one place it
-  // costs 1.3 times.
+  // Out of line, so that the settled observer costs the same as LinearEso; in one function it would
+  // take 1.3 times as long.
   [[gnu::noinline, gnu::flatten]] Status update_running(S y, S u_applied) noexcept {
     return blank_anew(Base::update(y, u_applied));
   }
@@ -240,7 +241,7 @@ class AlgebraicEso
     }
   }
 
-  // Of packs alone, a template: Clang 14 instantiates the members of a class all.
+  // For packs only. A template, because Clang 14 instantiates all other members of a class.
   template <class Mask>
   [[nodiscard]] S published_row(int row, S computed, const Mask& blanked_now) const noexcept {
     for (int i = 0; i < lane_count<S>; ++i) {
@@ -249,7 +250,7 @@ class AlgebraicEso
     return computed;
   }
 
-  /// After a restart for a long gap what was published before is too old to be published.
+  /// After a restart because of a long gap, the estimates published before are too old.
   ESOKIT_INLINE Status blank_anew(const Status& status) noexcept {
     if (has(status, StepStatus::restarted)) [[unlikely]] {
       if constexpr (PackScalar<S>) {

@@ -14,18 +14,17 @@
 namespace esokit {
 
 /// Settings of CascadeEso by bandwidths.
-/// @tparam Settings of a model other than the chain
+/// @tparam Settings settings of a model other than the chain
 template <int Size, int Levels, Scalar S, class Placement, class Settings = NoModelSettings>
 struct CascadeEsoConfig {
   S observer_bandwidth{};  ///< omega_o1 of level 1, rad/s
-  S bandwidth_factor{};    ///< alpha > 1: omega_oi = alpha omega_o(i-1); left out for one level
-  std::optional<Array<S, Levels>>
-      level_bandwidths{};  ///< omega_oi, rad/s, instead of the two above
-  S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
-  S sample_time{};         ///< T, s
+  S bandwidth_factor{};    ///< alpha > 1: omega_oi = alpha omega_o(i-1); leave out for one level
+  std::optional<Array<S, Levels>> level_bandwidths{};  ///< omega_oi, rad/s; replaces the two above
+  S input_gain{};   ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
+  S sample_time{};  ///< T, s
   [[no_unique_address]] Settings model{};  ///< what is known of the plant
-  int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts; fewer
-                      ///< where the model says so, see `max_gap()`
+  int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts;
+                      ///< a model may allow fewer, see `max_gap()`
 
   /// @cond
   static constexpr auto fields(auto& c) noexcept {
@@ -38,7 +37,7 @@ struct CascadeEsoConfig {
 /// Settings of CascadeEso by poles.
 template <int Size, int Levels, Scalar S, ListsPoles Placement, class Settings>
 struct CascadeEsoConfig<Size, Levels, S, Placement, Settings> {
-  /// p_i of each level, 1/s; of a pack those of all lanes
+  /// p_i of each level, 1/s; for a pack common to all lanes
   Array<typename Placement::template Spec<Size, LaneScalar<S>>, Levels> level_poles{};
   S input_gain{};                          ///< b0, unit of y^(n) per unit of u; not zero
   S sample_time{};                         ///< T, s
@@ -56,10 +55,9 @@ struct CascadeEsoConfig<Size, Levels, S, Placement, Settings> {
 template <int Size, int Levels, Scalar S, class Placement>
 struct ContinuousCascadeEsoConfig {
   S observer_bandwidth{};  ///< omega_o1 of level 1, rad/s
-  S bandwidth_factor{};    ///< alpha > 1: omega_oi = alpha omega_o(i-1); left out for one level
-  std::optional<Array<S, Levels>>
-      level_bandwidths{};  ///< omega_oi, rad/s, instead of the two above
-  S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero
+  S bandwidth_factor{};    ///< alpha > 1: omega_oi = alpha omega_o(i-1); leave out for one level
+  std::optional<Array<S, Levels>> level_bandwidths{};  ///< omega_oi, rad/s; replaces the two above
+  S input_gain{};  ///< b0, unit of y^(n) per unit of u; not zero
 };
 
 /// Settings of ContinuousCascadeEso by poles.
@@ -72,7 +70,7 @@ struct ContinuousCascadeEsoConfig<Size, Levels, S, Placement> {
 
 namespace detail {
 
-/// The pole specs of the levels, and what to call them in an error.
+/// The pole specs of the levels, and the config member that an error names.
 template <class Spec, int Levels>
 struct LevelSpecs {
   Array<Spec, Levels> specs{};
@@ -89,7 +87,7 @@ Expected<LevelSpecs<typename Placement::template Spec<Size, S>, Levels>, Error<S
   } else {
     Rules<S> rules;
     if (config.level_bandwidths) {
-      constexpr const char* rule = "must be left out where level_bandwidths is given";
+      constexpr const char* rule = "must be left out if level_bandwidths is given";
       rules.left_out("observer_bandwidth", config.observer_bandwidth, rule)
           .left_out("bandwidth_factor", config.bandwidth_factor, rule);
       if (!rules) return rules.error();
@@ -113,12 +111,12 @@ Expected<LevelSpecs<typename Placement::template Spec<Size, S>, Levels>, Error<S
   }
 }
 
-/// One law a level, each made by `make_law(field, spec, index)`.
+/// One law for each level, made by `make_law(field, spec, index)`.
 template <class Law, class Placement, int Size, int Levels, Scalar S, class Config, class MakeLaw>
 Expected<Array<Law, Levels>, Error<S>> level_laws(const Config& config, MakeLaw&& make_law) {
   const auto levels = level_specs<Placement, Size, Levels, S>(config);
   if (!levels) return levels.error();
-  // Laws have no empty state, so the array is filled by its first law and then overwritten.
+  // Laws have no empty state, so the array is filled with the first law and then overwritten.
   std::optional<Array<Law, Levels>> laws;
   for (int i = 0; i < Levels; ++i) {
     const auto law = make_law(levels->field, levels->specs[static_cast<std::size_t>(i)],
@@ -139,19 +137,20 @@ Expected<Array<Law, Levels>, Error<S>> level_laws(const Config& config, MakeLaw&
 
 /// Cascade extended state observer of a plant y^(n) = d + b0 u, sampled exactly.
 ///
-/// Level 1 sees the measurement, level i the corrected output of level i - 1 and u plus the
-/// disturbance found so far; equations (23), (24). Only level 1, the slowest, sees the measurement
-/// noise. States are taken from the last level, the disturbance is the sum of all levels'. Stable
-/// for every omega_oi T > 0; with one level it is LinearEso. Error-based use: pass e = y_d - y as
-/// the measurement and -b0 as input_gain.
+/// Level 1 is corrected by the measurement; level i is corrected by the output of level i - 1 and
+/// driven by u plus the disturbance found so far; equations (23), (24). Measurement noise enters
+/// level 1 only, the slowest. The states are those of the last level, the disturbance is the sum
+/// over all levels. Stable for every omega_oi T > 0; with one level it is LinearEso. Error-based
+/// use: pass e = y_d - y as the measurement and -b0 as input_gain.
 ///
-/// With a model every level has plant, actuator and sensor: each sees y as the sensor shows it, and
-/// in all of them the actuator runs open loop. The noise is then that of a cascade of chains: less
-/// than with one level of the last bandwidth. Each level also has the resonators, with the same
-/// capture bandwidth. If a swing is 2 % beside its frequency, the error is a third to a tenth of
-/// that of one level of the last bandwidth, at 1.1 to 1.4 times its noise.
+/// With a model every level contains plant, actuator and sensor: each is corrected by a measurement
+/// through the sensor, and the actuator runs open loop in all of them. The noise is that of a
+/// cascade of chains: less than with one level of the last bandwidth. Each level also contains the
+/// resonators, with the same capture bandwidth. If the frequency of a sine is off by 2 %, the error
+/// is a third to a tenth of that with one level of the last bandwidth, at 1.1 to 1.4 times its
+/// noise.
 ///
-/// @tparam Order n, with a model that of the law @tparam Levels p @tparam S scalar
+/// @tparam Order n, with a model the order of the law @tparam Levels p @tparam S scalar
 /// @tparam Extension m, with a model `Model::extension`
 /// @tparam Placement EqualPoles (config by bandwidths) or PoleSet (config by level_poles;
 /// gain/pole_set.hpp)

@@ -1,5 +1,5 @@
 /// @file
-/// What controllers, adapters and analyses require of an observer, one concept for each need; and
+/// What controllers, adapters and analysis require of an observer, one concept for each need; and
 /// the traits by which an observer declares what else it can do.
 ///
 /// | concept | who needs it |
@@ -24,7 +24,7 @@ namespace esokit {
 
 namespace detail {
 
-/// How Guarded reaches the disturbance in an observer, through whatever adapters.
+/// Access of Guarded to the disturbance in an observer, through any adapters.
 struct GuardAccess;
 
 }  // namespace detail
@@ -32,7 +32,7 @@ struct GuardAccess;
 /// What an observer declares beyond LoopObserver, in a member `static constexpr ObserverTraits
 /// traits{..}`. For an observer without it the defaults apply.
 struct ObserverTraits {
-  /// It keeps its bandwidth if only every D-th sample has a measurement. AlgebraicEso does not: a
+  /// It keeps its bandwidth if only every D-th sample has a measurement. False for AlgebraicEso: a
   /// gap among its first samples restarts its schedule.
   bool bears_regular_gaps = true;
 
@@ -41,15 +41,15 @@ struct ObserverTraits {
   /// for AlgebraicEso (blanked at first), KnownModel and VariableTime.
   bool publishes_chain = false;
 
-  /// Its behaviour is given by its chain and `level_gain(level) const` alone, so analysis can make
-  /// a linear system of it. False if a delay or a model is added.
+  /// Its behaviour is determined by its chain and `level_gain(level) const`, so that analysis can
+  /// derive a linear system. False if a delay or known terms are added.
   bool acts_by_gain = false;
 
   /// Its next correction is known before the measurement, see PredictableObserver.
   bool is_predictable = false;
-  GainKind gain_kind = GainKind::general;  ///< what is known of it, if predictable
+  GainKind gain_kind = GainKind::general;  ///< the kind of its gain, if predictable
 
-  /// The measurement is row 0 of the estimate; false if a sensor lags behind it.
+  /// The measurement is row 0 of the estimate; false if it passes a sensor with a lag.
   bool measures_first_row = true;
 
   /// It is an adapter around an observer `Adapted`, whose config is the member `observer` of its
@@ -57,33 +57,33 @@ struct ObserverTraits {
   bool adapts = false;
 
   bool wraps_output = false;  ///< y is an angle: `wrap(difference) const`
-  bool delays_input = false;  ///< u acts late: `fill_input(u)`, as if applied for long
+  bool delays_input = false;  ///< u acts late: `fill_input(u)`, as if u had been applied for long
   bool varies_time = false;   ///< `set_step_time(seconds)`, before each step
   bool gates_outliers =
-      false;  ///< `accepts(y) const`: false for what `correct` takes for an outlier
+      false;  ///< `accepts(y) const`: false if `correct` would reject y as an outlier
 
-  /// Its `correct`, or that of what it adapts, may answer `outlier_rejected`.
+  /// Its `correct`, or that of the adapted observer, may return `outlier_rejected`.
   bool rejects_outliers = false;
 
-  bool blanks_estimate = false;  ///< `blanked() const`: `estimate` is an old one for now
+  bool blanks_estimate = false;  ///< `blanked() const`: true while `estimate` is an old one
 
   /// Only a constant gain changes its dhat, which its model tells, so it can be used in Guarded.
   bool bears_guards = false;
 
   /// It has `set_input_gain(b)` for use while it runs, and `input_factor() const`, by which a law
-  /// multiplies what it has divided by the config's b0; see Guarded.
+  /// multiplies a u computed with the config's b0; see Guarded.
   bool schedules_input_gain = false;
 
   /// `set_trust(phi)`, `trust() const`, `hold(u)` and `release()`, see Guarded.
   bool gates_disturbance = false;
 };
 
-/// What an observer declares.
+/// The traits that an observer declares, or the defaults.
 template <class O>
 inline constexpr ObserverTraits observer_traits = detail::declared_traits<O, ObserverTraits>;
 
-/// The config that has `input_gain`, `sample_time` and `max_gap`: the config of an adapter contains
-/// that of its observer as `observer`. @tparam O the observer whose config it is
+/// The part of a config with `input_gain`, `sample_time` and `max_gap`: the config of an adapter
+/// contains that of its observer as `observer`. @tparam O the observer to which the config belongs
 template <class O, class Config>
 constexpr auto& chain_config(Config& config) noexcept {
   if constexpr (observer_traits<O>.adapts) {
@@ -113,7 +113,7 @@ Class declaring_class(Result (Class::*)() const);
 template <class Class, class Result>
 Class declaring_class(Result (Class::*)() const noexcept);
 
-/// False where a derived class overrides what its base publishes, and has not said so.
+/// False if a derived class overrides what its base publishes without declaring it.
 template <class O>
 concept PublishesWhatItsChainHas = !requires {
   declaring_class(&O::total_disturbance);
@@ -124,7 +124,7 @@ concept PublishesWhatItsChainHas = !requires {
                         decltype(declaring_class(&O::template scaled_estimate<O::order>))>;
 };
 
-// The members that go with the traits, as they have to be.
+// The required signatures of the members that belong to the traits.
 template <class O>
 concept PublishesChain = PublishesWhatItsChainHas<O> && requires(const O& o) {
   { o.template scaled_estimate<0>() } -> std::convertible_to<typename O::scalar_type>;
@@ -173,7 +173,8 @@ concept GatesDisturbance = requires(O& o, const O& constant, const typename O::s
   o.release();
 };
 
-/// As `as_declared`; an adapter names what it hands on, whether what it adapts has it or not.
+/// Like `as_declared`. An adapter has members for everything that it passes on, even if the adapted
+/// observer has no such member.
 template <class O>
 constexpr bool observer_as_declared(bool declared, bool named, bool right) noexcept {
   return as_declared(declared, observer_traits<O>.adapts ? right : named, right);
@@ -181,16 +182,16 @@ constexpr bool observer_as_declared(bool declared, bool named, bool right) noexc
 
 }  // namespace detail
 
-/// `scaled_estimate<Row>() const` is there if `traits.publishes_chain` says so, and no derived
+/// `scaled_estimate<Row>() const` exists if `traits.publishes_chain` declares it, and no derived
 /// class publishes something else.
 template <class O>
 concept PublishesChainAsDeclared = !observer_traits<O>.publishes_chain || detail::PublishesChain<O>;
 
-/// `levels` and `level_gain(level) const` are there if `traits.acts_by_gain` says so.
+/// `levels` and `level_gain(level) const` exist if `traits.acts_by_gain` declares them.
 template <class O>
 concept ActsByGainAsDeclared = !observer_traits<O>.acts_by_gain || detail::ActsByGain<O>;
 
-/// `Adapted` and `Config::observer` are there if `traits.adapts` says so.
+/// `Adapted` and `Config::observer` exist if `traits.adapts` declares them.
 template <class O>
 concept AdaptsAsDeclared = !observer_traits<O>.adapts || detail::Adapts<O>;
 
@@ -259,7 +260,7 @@ concept ChainSettings = requires(Config& config) {
 };
 
 /// A sampled observer of plain scalars or packs, with a Config. For packs, results that are not
-/// numbers are given for each lane: Lanes<..>, StatusOf.
+/// numbers have one value for each lane: Lanes<..>, StatusOf.
 template <class O>
 concept LoopObserver = std::copyable<O> && PlainScalar<LaneScalar<typename O::scalar_type>> &&
     requires(O& observer, const O& constant, const typename O::scalar_type& s,
@@ -286,30 +287,30 @@ concept LoopObserver = std::copyable<O> && PlainScalar<LaneScalar<typename O::sc
   { chain_config<O>(config) } -> ChainSettings<typename O::scalar_type>;
 };
 
-/// An observer that knows whether so many samples are missing that the next `correct` restarts it.
+/// An observer that tells whether so many samples are missing that the next `correct` restarts it.
 template <class O>
 concept RestartingObserver = LoopObserver<O> && requires(const O& observer) {
   { observer.restarts() } -> std::same_as<Lanes<bool, typename O::scalar_type>>;
 };
 
-/// An observer that gives the computed estimate of each level, also if another one is published:
-/// `level_estimate(level)`. Level 0 sees the measurement, the last level is the estimate.
+/// An observer with `level_estimate(level)`: the computed estimate of each level, even if another
+/// one is published. Level 0 is corrected by the measurement, the last level is the estimate.
 template <class O>
 concept LevelledObserver = LoopObserver<O> && requires(const O& observer) {
   { O::levels } -> std::convertible_to<int>;
   { observer.level_estimate(0) } -> std::same_as<typename O::Estimate>;
 };
 
-/// A levelled observer whose y may be shifted: `shift_output(offset)` adds to it in all levels. It
-/// returns ok, or state_rejected if the estimate would not be finite; then nothing changes.
+/// A levelled observer whose y may be shifted: `shift_output(offset)` adds to y in all levels. It
+/// returns ok, or state_rejected if the estimate would not be finite; nothing changes then.
 template <class O>
 concept ShiftableOutput = LevelledObserver<O> &&
     requires(O& observer, const typename O::scalar_type& s) {
   { observer.shift_output(s) } -> std::same_as<StatusOf<typename O::scalar_type>>;
 };
 
-/// An observer whose disturbance may be shifted: `shift_disturbance(offset)` adds to dhat when from
-/// now on something else explains a part of y^(n). Returns as `shift_output`.
+/// An observer whose disturbance may be shifted: `shift_disturbance(offset)` adds to dhat, for when
+/// another term takes over a part of y^(n). It returns the same as `shift_output`.
 template <class O>
 concept ShiftableDisturbance = LoopObserver<O> &&
     requires(O& observer, const typename O::scalar_type& s) {
@@ -318,7 +319,7 @@ concept ShiftableDisturbance = LoopObserver<O> &&
 
 namespace detail {
 
-/// What PredictiveAdrc asks for by the kind of the gain.
+/// The members that PredictiveAdrc needs for a kind of gain.
 template <class O, GainKind kind>
 concept ForetellsByKind = kind == GainKind::general || requires(const O& o) {
   requires kind == GainKind::preset;
@@ -343,9 +344,9 @@ concept ForetellsByKind = kind == GainKind::general || requires(const O& o) {
 /// adapters change y, u or the estimate. Packs are accepted.
 ///
 /// It declares `traits.is_predictable` and the kind of its gain, see GainKind:
-/// - with one level `correction_gain(e) const` is the scaled gain of the coming correction;
+/// - with one level `correction_gain(e) const` is the scaled gain of the next correction;
 /// - preset: `preview() const`, and `finite_probe(x) const`, see PredictorCorrector;
-/// - switched, factored: `gain_law() const` has the members of the kind;
+/// - switched, factored: `gain_law() const` has the members that the kind requires;
 /// - general: nothing more; everything is then computed after the measurement.
 template <class O>
 concept PredictableObserver = std::copyable<O> && Scalar<typename O::scalar_type> &&
@@ -377,8 +378,7 @@ concept PredictableObserver = std::copyable<O> && Scalar<typename O::scalar_type
     detail::ForetellsByKind<O, observer_traits<O>.gain_kind>;
 
 /// A sampled observer whose gain does not depend on the measurement: LinearEso, CascadeEso, a
-/// settled AlgebraicEso, an ExtendedStateFilter frozen at its present gain. The system is that of
-/// the present gain.
+/// settled AlgebraicEso, an ExtendedStateFilter. It is analysed with its present gain.
 template <class O>
 concept SampledLinearObserver = ObserverAsDeclared<O> && observer_traits<O>
 .acts_by_gain&& requires(const O& observer) {

@@ -1,5 +1,5 @@
 /// @file
-/// The continuous-time observer as an ODE, for simulation as in the papers.
+/// The continuous-time observer as an ODE, to simulate as the papers do.
 #pragma once
 
 #include <esokit/core/check.hpp>
@@ -11,8 +11,8 @@
 
 namespace esokit {
 
-/// z' = A z + B u + l(t, e) e on `Levels` chains in series. This is only the definition: the caller
-/// holds the state, usually stacked with that of a plant.
+/// z' = A z + B u + l(t, e) e on `Levels` chains in series. This type only defines the equations:
+/// the caller holds the state, usually stacked with that of a plant.
 ///
 /// As in PredictorCorrector, level i is driven by u and the disturbances of the levels below it;
 /// its innovation is e_1 = y - x_1, e_i = x_{i-1} - x_i (first elements).
@@ -28,11 +28,11 @@ class ContinuousObserver {
   static constexpr int states = Levels * size;                    ///< N p
   using scalar_type = S;                                          ///< type of states and settings
   using Estimate = Vector<S, size>;  ///< (y, .., y^(n-1), d, .., d^(m-1)), N x 1
-  using State = Vector<S, states>;   ///< the levels one after the other, N p x 1
-  using Laws = Array<Law, Levels>;   ///< one a level
+  using State = Vector<S, states>;   ///< states of all levels, stacked, N p x 1
+  using Laws = Array<Law, Levels>;   ///< one for each level
 
-  /// From ready gain laws; use this for your own law.
-  /// @param input_gain b0, unit of y^(n) per unit of u @param laws one a level
+  /// From finished gain laws; use this for a law of your own.
+  /// @param input_gain b0, unit of y^(n) per unit of u @param laws one for each level
   /// @return error if b0 is zero or not finite
   static Expected<ContinuousObserver, Error<S>> make(const S& input_gain, const Laws& laws) {
     if (Rules<S> rules; !rules.nonzero("input_gain", input_gain)) return rules.error();
@@ -59,8 +59,8 @@ class ContinuousObserver {
     return rate;
   }
 
-  /// To be called at the start of each integration step: only there may a switched law change its
-  /// mode.
+  /// Call this at the start of each integration step: a switched law may change its mode only
+  /// there.
   void begin_step([[maybe_unused]] const S& t, [[maybe_unused]] const State& z,
                   [[maybe_unused]] const S& y) {
     if constexpr (detail::declared_traits<Law, ContinuousGainLawTraits>.begins_steps) {
@@ -72,8 +72,9 @@ class ContinuousObserver {
     }
   }
 
-  /// (y, .., y^(n-1), d, .., d^(m-1)): plant states of the last level, disturbance of all levels
-  /// together, equation (24) of the cascade paper.
+  /// (y, .., y^(n-1), d, .., d^(m-1)): plant states of the last level, disturbance summed over all
+  /// levels, equation (24) of the cascade paper (K. Lakomy, R. Madonski, ISA Transactions 109
+  /// (2021) 1-10).
   [[nodiscard]] static Estimate estimate(const State& z) {
     Estimate estimate = z.template segment<size>(states - size);
     for (int level = 0; level + 1 < Levels; ++level) {
@@ -89,7 +90,7 @@ class ContinuousObserver {
     return sum;
   }
 
-  /// State with every level at the given estimate; the first level holds the disturbance.
+  /// State in which every level has the given estimate; the first level holds the disturbance.
   [[nodiscard]] static State state_at(const Estimate& estimate) {
     State state;
     for (int level = 0; level < Levels; ++level) {
@@ -103,7 +104,7 @@ class ContinuousObserver {
   [[nodiscard]] const S& input_gain() const noexcept { return input_gain_; }
 
  protected:
-  /// `input_gain` is checked already. @param laws or the law of one level
+  /// `input_gain` is already checked. @param laws one for each level, or one law for one level
   template <class Given>
   ContinuousObserver(const S& input_gain, const Given& laws)
       : laws_{laws}, input_gain_(input_gain) {}

@@ -16,19 +16,20 @@
 
 namespace esokit {
 
-/// The ESF without a model of the disturbance: d may change in any way within the bounds.
+/// For an ESF without a model of the disturbance: d may change in any way within the bounds.
 struct NoNominalModel {};
 
 /// Distinguishes the type in snapshots.
 template <>
 inline constexpr std::uint32_t type_tag<NoNominalModel> = make_type_tag<>("NoNominalModel");
 
-/// A model fbar(x, u, t) of the total disturbance, in the unit of y^(n): x the plant states, u the
-/// input that was held, t seconds since the start or the last reset.
+/// A model fbar(x, u, t) of the total disturbance, in the unit of y^(n), of the plant states x, the
+/// held input u and the time t in seconds since the start or the last reset.
 ///
-/// The effect of fbar on d closes a loop within the filter, which the gains have to stabilise. If
-/// the gains are slower than the dynamics of fbar, the estimate oscillates within the bound of the
-/// change (T = 0.8 s, fbar = -0.5 y, q_n T^2 / sqrt(R) = 0.03).
+/// fbar depends on the estimated state and changes the estimated d: this is a loop inside the
+/// filter, which the gains have to stabilise. If the gains are slower than the dynamics of fbar,
+/// the estimate oscillates, limited only by the bound on the change (example: T = 0.8 s, fbar =
+/// -0.5 y, q_n T^2 / sqrt(R) = 0.03).
 template <class Model, int Order, class S>
 concept NominalModel = std::copyable<Model> &&
     (std::same_as<Model, NoNominalModel> ||
@@ -41,25 +42,25 @@ concept NominalModel = std::copyable<Model> &&
 ///
 /// The gain follows from R, the variance of the noise, and from Q, which bounds by how much the
 /// state may deviate from its model within a sample; for m = 1 this is mainly the change of the
-/// disturbance. P0 speeds up the start. `covariance` is a bound of the covariance of the error (as
-/// a matrix) if Q and R are bounds. In a closed loop the noise drives u, and u changes the
-/// disturbance: the bound has to cover this.
+/// disturbance. P0 speeds up the start. `covariance` is an upper bound on the covariance matrix of
+/// the error if Q and R are bounds. In a closed loop the noise acts on u, and u changes the
+/// disturbance: the bounds have to cover this, too.
 ///
-/// In general the estimate is neither of minimum variance nor unbiased; what is guaranteed is the
-/// bound. With `none` as the inflation rule it is the Kalman filter of the chain driven by white
+/// In general the estimate is neither of minimum variance nor unbiased; only the bound is
+/// guaranteed. With the inflation rule `none` it is the Kalman filter of a chain driven by white
 /// noise.
 ///
-/// As everywhere, the initial state is that of the sample before the first measurement, because
-/// `update` predicts first. If the initial estimate is meant for the first sample itself, as in the
-/// paper, begin with `correct(y)`.
+/// As for all observers, the initial state belongs to the sample before the first measurement,
+/// because `update` predicts first. If the initial estimate is for the first sample itself, as in
+/// the paper, start with `correct(y)`.
 ///
-/// The current (corrected) form z = z- + k (y - C z-). The predictor form of the paper, (4) with K
-/// = -Phi k, is the same filter, read between `predict` and `correct`: there `estimate` and
-/// `covariance` are those of the prediction, and `predictor_gain` is -K.
+/// This is the current (corrected) form z = z- + k (y - C z-). The predictor form of the paper, (4)
+/// with K = -Phi k, is the same filter read between `predict` and `correct`: there `estimate` and
+/// `covariance` belong to the prediction, and `predictor_gain` is -K.
 ///
 /// @tparam Order n @tparam S scalar @tparam Extension m
-/// @tparam Model of the disturbance, see NominalModel (m = 1 only)
-/// @tparam TableSize samples in the start table of RiccatiMode::start_table
+/// @tparam Model model of the disturbance, see NominalModel (m = 1 only)
+/// @tparam TableSize number of samples in the table of RiccatiMode::start_table
 /// @tparam PlantModel what is known of the plant, see SampledModel
 template <int Order, Scalar S = double, int Extension = 1, class Model = NoNominalModel,
           int TableSize = 0, class PlantModel = ChainModel<Order, S, Extension>>
@@ -76,14 +77,14 @@ class ExtendedStateFilter
   static constexpr int N = Base::size;
   static constexpr bool has_model = !std::same_as<Model, NoNominalModel>;
   static_assert(!has_model || (Extension == 1 && model_traits<PlantModel>.is_chain),
-                "esokit: the nominal model is for the chain and one extended state");
+                "esokit: a nominal model needs the chain and one extended state");
 
  public:
   using Chain = typename Base::Chain;        ///< the sampled chain, in its scaling
   using Estimate = typename Base::Estimate;  ///< (y, .., y^(n-1), d, .., d^(m-1)), N x 1
   using Covariance = Matrix<S, N, N>;        ///< N x N, in the units of the estimates
 
-  /// What it declares beyond LoopObserver.
+  /// What the observer can do beyond LoopObserver.
   static constexpr ObserverTraits traits = [] {
     ObserverTraits traits = Base::traits;
     traits.acts_by_gain = !has_model;
@@ -96,22 +97,23 @@ class ExtendedStateFilter
   struct Config {
     S input_gain{};            ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
     S sample_time{};           ///< T, s
-    S measurement_variance{};  ///< R >= 0, unit of y squared; 0: y is believed at once, whatever P0
+    S measurement_variance{};  ///< R >= 0, unit of y squared; 0: y counts as exact
 
-    /// q_r >= 0: by how much state r may change in a sample beyond its model, in its own unit. For
-    /// r < n this is what sampling neglects (zero in an exactly sampled chain), for r = n the
-    /// change of d, for r > n that of its derivatives. Q = bound_factor diag(q_r^2).
+    /// q_r >= 0: by how much state r may deviate from its model within a sample, in the unit of the
+    /// state. For r < n this is the error of sampling (zero for an exactly sampled chain), for r =
+    /// n the change of d, for r > n that of its derivatives. Q = bound_factor diag(q_r^2).
     ///
-    /// If n + m is odd and only the highest state has a bound, y does not show an error that
-    /// changes sign at every sample: without noise the limit has a pole at -1, and that error
-    /// decays only as 1/k. This is refused, unless R (or what Q adds to it at half the sampling
-    /// rate) is a millionth of the trace of Q, each state scaled by T^r/r!, or the inflation is
-    /// 0.01 or more. At that millionth it falls to 1e-6 in 2000 samples for n + m = 3, 4400 for 5,
-    /// 20000 for 7.
+    /// If n + m is odd and only the highest state has a bound, an error that changes sign at every
+    /// sample is not visible in y: without noise the limit has a pole at -1, and this error decays
+    /// only as 1/k. Such a config is refused, unless R (plus the contribution of Q at half the
+    /// sampling rate) is at least a millionth of the trace of Q, with each state scaled by T^r/r!,
+    /// or the inflation is 0.01 or more. With just a millionth the error falls to 1e-6 in 2000
+    /// samples for n + m = 3, 4400 for 5, 20000 for 7.
     Array<S, N> disturbance_bounds{};
-    /// c: N covers N bounded errors with any correlation; the paper prints 1 in (12), 2 in (34).
+    /// c: c = N covers N bounded errors with any correlation. The paper has 1 in (12) and 2 in
+    /// (34).
     S bound_factor{static_cast<double>(N)};
-    /// Q itself, N x N, positive semidefinite, per sample; instead of the bounds.
+    /// Q itself, N x N, positive semidefinite, per sample; replaces the bounds.
     std::optional<Covariance> process_covariance{};
     /// P0, N x N, positive semidefinite: at least the covariance of the initial error, as a matrix.
     Covariance initial_covariance = Covariance::Zero();
@@ -119,8 +121,8 @@ class ExtendedStateFilter
     InflationRule inflation_rule = InflationRule::fixed;  ///< how theta is chosen
     S inflation{};                                        ///< theta > 0 of the fixed rule
 
-    /// Accept that nothing disturbs the highest state. The gain then tends to zero, and the longer
-    /// the filter has run, the longer an error of the estimate stays.
+    /// Accept that nothing disturbs the highest state. The gain then tends to zero: the longer the
+    /// filter has run, the longer an error of the estimate lasts.
     bool allow_vanishing_gain = false;
 
     /// Adaptive rule: weights of the states' variances in the trace, each state converted to the
@@ -130,12 +132,12 @@ class ExtendedStateFilter
 
     RiccatiMode mode = RiccatiMode::recursive;  ///< how the gain is obtained
 
-    /// Normalised innovation squared above which y is an outlier, and a missing sample; 0: no gate.
-    /// A Gaussian innovation passes 6.63 in 1 %, 10.8 in 0.1 %, 15.1 in 0.01 % of all samples. The
-    /// gate widens with every sample that is missing, and opens after max_gap.
+    /// Normalised innovation squared above which y is rejected as an outlier and counts as missing;
+    /// 0: no gate. A Gaussian innovation exceeds 6.63 in 1 %, 10.8 in 0.1 %, 15.1 in 0.01 % of all
+    /// samples. The gate widens with every missing sample and accepts everything after max_gap.
     S outlier_threshold{};
-    /// fbar. Its change over a sample is computed with the u given to `predict`; `revise_input`
-    /// does not compute it again.
+    /// fbar. Its change over a sample is computed with the u of `predict`; `revise_input` does not
+    /// recompute it.
     [[no_unique_address]] Model model{};
     /// What is known of the plant.
     [[no_unique_address]] typename PlantModel::Settings plant_model{};
@@ -150,7 +152,7 @@ class ExtendedStateFilter
     }
     /// @endcond
 
-    /// All one.
+    /// All weights one.
     static constexpr Array<S, N> equal_weights() noexcept {
       Array<S, N> weights{};
       for (S& w : weights) w = S(1.0);
@@ -158,7 +160,7 @@ class ExtendedStateFilter
     }
   };
 
-  using Status = StatusOf<S>;  ///< StepStatus, of a pack one a lane
+  using Status = StatusOf<S>;  ///< StepStatus, for a pack one per lane
   template <class T>
   using with_scalar =
       ExtendedStateFilter<Order, T, Extension, typename detail::ForScalar<Model, T>::type,
@@ -172,8 +174,8 @@ class ExtendedStateFilter
     } else {
       if (!fresh.law().continue_from(law(), S(fresh.sample_time() / this->sample_time()))) {
         return Error<S>{"measurement_variance", fresh.law().measurement_variance(),
-                        "is too small, or sample_time too far from the one before, for the present "
-                        "covariance to be carried over: measure first"};
+                        "is too small, or sample_time changed too much, to carry over the present "
+                        "covariance: measure first"};
       }
       if (auto ok = Base::adopt(fresh); !ok) return ok;
       nominal_model_ = fresh.nominal_model_;
@@ -198,14 +200,14 @@ class ExtendedStateFilter
     }
   }
 
-  /// The same with the variance of this measurement's noise, R in unit of y squared. A variance
-  /// that is negative or not finite makes the measurement a missing one.
+  /// The same with the noise variance R of this measurement, unit of y squared. If it is negative
+  /// or not finite, the measurement counts as missing.
   Status update_weighted(S y, S u_applied, S measurement_variance) noexcept {
     const Status predicted = predict(u_applied);
     return predicted | correct_weighted(y, measurement_variance);
   }
 
-  /// Time update alone: one sample without a measurement, or the first half of `update`.
+  /// Time update only: one sample without a measurement, or the first half of `update`.
   Status predict(S u_applied) noexcept {
     if constexpr (!has_model) {
       return Base::predict(u_applied);
@@ -219,7 +221,7 @@ class ExtendedStateFilter
     }
   }
 
-  /// Measurement update alone.
+  /// Measurement update only.
   Status correct(S y) noexcept {
     if constexpr (PackScalar<S>) {
       if (law().any_watched()) {
@@ -231,7 +233,7 @@ class ExtendedStateFilter
     return Base::correct(y);
   }
 
-  /// The same with the variance of this measurement's noise.
+  /// The same with the noise variance R of this measurement, unit of y squared.
   Status correct_weighted(S y, S measurement_variance) noexcept {
     if constexpr (PackScalar<S>) {
       return each_lane(
@@ -245,8 +247,8 @@ class ExtendedStateFilter
     }
   }
 
-  /// False if the gate would take y for an outlier. True for a y that is not finite: `correct`
-  /// rejects it.
+  /// False if the gate would reject y as an outlier. True for a y that is not finite, which
+  /// `correct` rejects anyway.
   [[nodiscard]] Lanes<bool, S> accepts(const S& y) const noexcept {
     if constexpr (PackScalar<S>) {
       Lanes<bool, S> in;
@@ -257,7 +259,7 @@ class ExtendedStateFilter
     } else {
       if (!gated() || this->restarts()) return true;
       const S e = y - this->predicted_measurement();
-      // A square beyond the scalar is beyond the threshold.
+      // A square that overflows is above the threshold.
       if (!all(is_finite(e))) return true;
       return all(e * e <= outlier_threshold_ * innovation_variance());
     }
@@ -269,12 +271,13 @@ class ExtendedStateFilter
   /// Restarts at a given estimate, N x 1, with P0.
   Status reset(const Estimate& state) noexcept { return restart_clock(Base::reset(state)); }
 
-  /// Bound of the covariance of the present estimate's error, N x N, in the units of the estimates:
-  /// after `predict` that of the prediction, after `correct` that of the correction. An element
-  /// beyond the scalar is its largest number.
+  /// Bound on the covariance of the error of the present estimate, N x N, in the units of the
+  /// estimates: after `predict` that of the prediction, after `correct` that of the corrected
+  /// estimate. An element that overflows is given as the largest number of the scalar.
   [[nodiscard]] Covariance covariance() const noexcept {
     const Covariance of_states = law().covariance();
-    // In two steps from both sides: the whole factor may not fit the scalar where P does.
+    // Multiplied in two steps, from both sides: the product of the units may overflow when P does
+    // not.
     const Array<S, N> units = physical_units(this->model());
     Covariance p;
     for (int i = 0; i < N; ++i) {
@@ -287,36 +290,36 @@ class ExtendedStateFilter
     return p;
   }
 
-  /// C P- C' + R of the last prediction, unit of y squared; the largest number where it is beyond
-  /// the scalar.
+  /// Variance of the innovation, C P- C' + R of the last prediction, unit of y squared; on overflow
+  /// the largest number of the scalar.
   [[nodiscard]] S innovation_variance() const noexcept {
     return detail::clipped(law().innovation_variance());
   }
 
-  /// Normalised innovation squared (NIS) of the last correction: e^2 over its variance; about 1 on
-  /// average where R, Q and P0 are right, less where they are bounds; the largest number where it
-  /// is beyond the scalar.
+  /// Normalised innovation squared (NIS) of the last correction: e^2 divided by its variance. About
+  /// 1 on average if R, Q and P0 are exact, less if they are bounds; on overflow the largest number
+  /// of the scalar.
   [[nodiscard]] S normalised_innovation() const noexcept {
     const S& e = this->innovation();
     return select(detail::absolute(e) > S(0.0), detail::clipped(S(e * (e / innovation_variance()))),
                   S(0.0));
   }
 
-  /// theta in force.
+  /// theta at present.
   [[nodiscard]] S inflation() const noexcept { return law().inflation(); }
 
-  /// Gain of the coming correction in physical units, N x 1.
+  /// Gain of the next correction in physical units, N x 1.
   [[nodiscard]] Estimate gain() const noexcept {
     return this->model().physical(law().gain_before_measurement());
   }
 
-  /// Phi times it, -K of the predictor form (24), N x 1, physical units.
+  /// Phi times this gain, -K of the predictor form (24), N x 1, physical units.
   [[nodiscard]] Estimate predictor_gain() const noexcept {
     const PlantModel& plant = this->model();
     return plant.physical(plant.predict(law().gain_before_measurement(), plant.drive(S(0.0))));
   }
 
-  /// True while the recursion rests in a frozen mode.
+  /// True while a filter in a frozen mode does not run the recursion.
   [[nodiscard]] Lanes<bool, S> frozen() const noexcept { return law().stands(); }
 
  private:
@@ -327,9 +330,9 @@ class ExtendedStateFilter
     return detail::tie(static_cast<BaseOf&>(o), o.nominal_model_, o.outlier_threshold_,
                        o.change_bound_, o.sample_);
   }
-  using Plain = detail::PlainTwin<ExtendedStateFilter, S>;  ///< a lane
+  using Plain = detail::PlainTwin<ExtendedStateFilter, S>;  ///< type of a lane
 
-  /// `step` with the filter of each lane.
+  /// Calls `step` with the filter of each lane.
   template <class Step>
   ESOKIT_COLD Status each_lane(Step&& step) noexcept {
     Status status{};
@@ -337,7 +340,7 @@ class ExtendedStateFilter
     return status;
   }
 
-  /// No lane has anything to do beside the predictor-corrector's step.
+  /// True if no lane has anything to do besides the predictor-corrector's step.
   [[nodiscard]] bool usual() const noexcept { return !has_model && !law().any_watched(); }
 
   ExtendedStateFilter(const Config& config, const PlantModel& plant, const Law& law,
@@ -359,7 +362,7 @@ class ExtendedStateFilter
   [[nodiscard]] const Law& law() const noexcept { return std::get<0>(this->laws()); }
   [[nodiscard]] Law& law() noexcept { return std::get<0>(this->laws()); }
 
-  /// What makes a state of the model of one in its scaling one in physical units.
+  /// Factors from the states in the scaling of the model to physical units.
   static Array<S, N> physical_units(const PlantModel& plant) noexcept {
     typename PlantModel::State ones;
     ones.fill(S(1.0));
@@ -369,7 +372,7 @@ class ExtendedStateFilter
     return units;
   }
 
-  // On its own, so that the frozen filter's step has no call in it but at its end.
+  // A function of its own, so that the step of a frozen filter contains only a tail call.
   [[gnu::noinline]] StepStatus update_out_of_line(S y, S u_applied) noexcept {
     if constexpr (!has_model) {
       if (!gated()) [[likely]]
@@ -387,7 +390,8 @@ class ExtendedStateFilter
     return status;
   }
 
-  /// d grows by sat(fbar(x+, u, t + T) - fbar(x, u, t)), (6) with the input that it leaves out.
+  /// Adds sat(fbar(x+, u, t + T) - fbar(x, u, t)) to d: (6), with the input that the printed
+  /// prediction of x+ lacks.
   void shift_by_model(const Estimate& before) noexcept {
     if constexpr (has_model) {
       const S time = this->sample_time();
@@ -395,7 +399,7 @@ class ExtendedStateFilter
       const S u = this->applied_input();
       Vector<S, Order> x = before.template head<Order>();
       const S now = nominal_model_(x, u, t);
-      // Ahead along the chain with fbar in place of the estimated disturbance.
+      // x+: predicted along the chain, with fbar in place of the estimated disturbance.
       Estimate start = before;
       start(Order) = now;
       const S drive = Chain::scaled_input_gain(this->input_gain(), time) * u;

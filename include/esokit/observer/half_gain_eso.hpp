@@ -7,9 +7,9 @@
 
 namespace esokit {
 
-/// LinearEso with poles at exp(s_k T), s_k those of half the continuous gains: about half the noise
-/// in u for about the same disturbance rejection. `observer_bandwidth` is that of the observer
-/// whose gains are halved.
+/// LinearEso with the poles exp(s_k T), where s_k are the poles of half the continuous gains: about
+/// half the noise in u with about the same disturbance rejection. `observer_bandwidth` is the
+/// bandwidth before the gains are halved.
 /// @tparam Order n @tparam S a plain scalar or a pack @tparam Extension m
 template <int Order, Scalar S = double, int Extension = 1>
 using HalfGainEso = LinearEso<Order, S, Extension, HalfGainPoles>;

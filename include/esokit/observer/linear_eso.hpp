@@ -11,16 +11,17 @@
 
 namespace esokit {
 
-/// Settings of LinearEso by bandwidth, as the placement reads it.
-/// @tparam Settings of a model other than the chain
+/// Settings of LinearEso by bandwidth.
+/// @tparam Settings settings of a model other than the chain
 template <int Size, Scalar S, class Placement, class Settings = NoModelSettings>
 struct LinearEsoConfig {
-  S observer_bandwidth{};  ///< omega_o, rad/s: all poles at exp(-omega_o T), or see the placement
+  S observer_bandwidth{};  ///< omega_o, rad/s: all poles at exp(-omega_o T), or as the placement
+                           ///< says
   S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
   S sample_time{};         ///< T, s
   [[no_unique_address]] Settings model{};  ///< what is known of the plant
-  int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts; fewer
-                      ///< where the model says so, see `max_gap()`
+  int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts;
+                      ///< a model may allow fewer, see `max_gap()`
 
   /// @cond
   static constexpr auto fields(auto& c) noexcept {
@@ -32,7 +33,8 @@ struct LinearEsoConfig {
 /// Settings of LinearEso by poles.
 template <int Size, Scalar S, ListsPoles Placement, class Settings>
 struct LinearEsoConfig<Size, S, Placement, Settings> {
-  /// p_i, 1/s, left half plane, in conjugate pairs, one a row of the gain; of a pack of all lanes
+  /// p_i, 1/s, N poles in the left half plane, complex ones in conjugate pairs; for a pack common
+  /// to all lanes
   typename Placement::template Spec<Size, LaneScalar<S>> poles{};
   S input_gain{};                          ///< b0, unit of y^(n) per unit of u; not zero
   S sample_time{};                         ///< T, s
@@ -52,7 +54,7 @@ struct LinearEsoConfig<Size, S, Placement, Settings> {
 /// omega_o T > 0; unbiased for disturbances that are polynomials of degree < m in time. Error-based
 /// use: pass e = y_d - y as the measurement and -b0 as input_gain.
 ///
-/// @tparam Order n @tparam S scalar @tparam Extension m; n + m <= 16, tested for n to 8 and m to 4
+/// @tparam Order n @tparam S scalar @tparam Extension m; n + m <= 16, tested up to n = 8 and m = 4
 /// @tparam Placement EqualPoles (config by observer_bandwidth) or PoleSet (config by poles;
 /// gain/pole_set.hpp)
 /// @tparam Model what is known of the plant
@@ -88,20 +90,20 @@ inline constexpr std::uint32_t type_tag<LinearEso<Order, S, Extension, Placement
 /// Settings of ContinuousLinearEso by bandwidth.
 template <int Size, Scalar S, class Placement>
 struct ContinuousLinearEsoConfig {
-  S observer_bandwidth{};  ///< omega_o, rad/s: all poles at -omega_o, or see the placement
+  S observer_bandwidth{};  ///< omega_o, rad/s: all poles at -omega_o, or as the placement says
   S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero
 };
 
 /// Settings of ContinuousLinearEso by poles.
 template <int Size, Scalar S, ListsPoles Placement>
 struct ContinuousLinearEsoConfig<Size, S, Placement> {
-  /// p_i, 1/s, left half plane, in conjugate pairs, one a row of the gain
+  /// p_i, 1/s, N poles in the left half plane, complex ones in conjugate pairs
   typename Placement::template Spec<Size, S> poles{};
   S input_gain{};  ///< b0, unit of y^(n) per unit of u; not zero
 };
 
 /// LinearEso as an ODE, z' = A z + B u + l (y - z_1), for simulation.
-/// @tparam Order n @tparam S scalar @tparam Extension m @tparam Placement as of LinearEso
+/// @tparam Order n @tparam S scalar @tparam Extension m @tparam Placement as for LinearEso
 template <int Order, Scalar S = double, int Extension = 1, class Placement = EqualPoles>
 class ContinuousLinearEso
     : public NamedObserver<

@@ -14,7 +14,7 @@
 
 namespace esokit {
 
-/// Orders n_1 .. n_p of the chains.
+/// The orders n_1 .. n_p of the chains.
 template <int... Orders>
 struct ChainOrders {
   static_assert(sizeof...(Orders) >= 1, "esokit: at least one chain is needed");
@@ -37,8 +37,8 @@ struct MimoExtendedStateFilterConfig {
   OutputCovariance measurement_covariance = OutputCovariance::Zero();  ///< R, p x p, semidefinite
   Array<S, size> disturbance_bounds{};                 ///< q_r per state, as in ExtendedStateFilter
   S bound_factor{static_cast<double>(size)};           ///< c
-  std::optional<Covariance> process_covariance{};      ///< Q, N x N, instead of the bounds
-  Covariance initial_covariance = Covariance::Zero();  ///< P0, N x N, semidefinite
+  std::optional<Covariance> process_covariance{};      ///< Q, N x N, replaces the bounds
+  Covariance initial_covariance = Covariance::Zero();  ///< P0, N x N, positive semidefinite
   InflationRule inflation_rule = InflationRule::fixed;  ///< fixed or none
   S inflation{};                                        ///< theta > 0 of the fixed rule
   RiccatiMode mode = RiccatiMode::recursive;            ///< recursive or frozen
@@ -126,8 +126,8 @@ class MimoExtendedStateFilter {
     if (config.mode == RiccatiMode::frozen) {
       if (!filter.freeze(noise)) {
         return Error<S>{detail::noise_field(config), noise(size - 1, size - 1),
-                        "gives no limit gain; without inflation every highest state must be "
-                        "disturbed"};
+                        "gives no limit gain: without inflation the highest state of every chain "
+                        "must be disturbed"};
       }
     }
     filter.restart();
@@ -139,21 +139,21 @@ class MimoExtendedStateFilter {
   }
 
   /// One sample: `predict(u_applied)`, then `correct(y)`.
-  /// @param y p x 1, NaN where missing
+  /// @param y p x 1, NaN for a missing element
   /// @param u_applied q x 1, what the actuators held since the last sample
   StepStatus update(const Output& y, const Input& u_applied) noexcept {
     const StepStatus predicted = predict(u_applied);
     return predicted | correct(y);
   }
 
-  /// Time update alone. A u with a bad element is replaced by the last good u. A chain that cannot
-  /// be predicted stands still until its next good y restarts it.
+  /// Time update only. A u with a bad element is replaced by the last good u. A chain that cannot
+  /// be predicted keeps its state until its next good y restarts it.
   StepStatus predict(const Input& u_applied) noexcept {
     StepStatus status = StepStatus::ok;
     for (int& missed : missed_) missed = missed < restart_due ? missed + 1 : restart_due;
     Estimate next = ahead(u_applied);
     if (finite(next) || no_larger(u_applied)) {
-      // No larger than the one before, u is not to blame.
+      // u is no larger than the last one, so it is not the cause.
       input_ = u_applied;
     } else {
       status = StepStatus::input_rejected;
@@ -191,8 +191,8 @@ class MimoExtendedStateFilter {
       e(i) = S(0);
       status |= due ? restart_chain(i, y(i)) : StepStatus::measurement_rejected;
     }
-    // Where the estimate would not be finite the channel furthest from its prediction is left out,
-    // until it is.
+    // If the estimate would not be finite, channels are left out, the one furthest from its
+    // prediction first, until it is.
     bool changed = has(status, StepStatus::restarted);
     for (int left = outputs; left > 0; --left) {
       bool any_used = false;
@@ -223,7 +223,7 @@ class MimoExtendedStateFilter {
       }
       used[index(worst)] = false;
       e(worst) = S(0);
-      // An absurd but finite u can leave a prediction from which no good y leads back.
+      // A finite but absurdly large u can lead to a prediction from which no good y recovers.
       const bool state_is_to_blame =
           detail::absolute(y(worst)) < detail::absolute(state_(first(worst)));
       status |=
@@ -253,8 +253,8 @@ class MimoExtendedStateFilter {
     return StepStatus::ok;
   }
 
-  /// Predictions since the last correction by channel i, 0 .. p - 1; 0 when up to date, 65535 where
-  /// its chain could not be predicted.
+  /// Number of predictions since the last correction by a channel, 0 .. p - 1; 0 if it is up to
+  /// date, 65535 if its chain could not be predicted.
   [[nodiscard]] int missed(int channel) const noexcept { return missed_[index(channel)]; }
 
   /// All estimates, N x 1, physical units.
@@ -282,15 +282,16 @@ class MimoExtendedStateFilter {
   /// y - C z of the last correction; zero in channels that were not used.
   [[nodiscard]] const Output& innovation() const noexcept { return innovation_; }
 
-  /// C P- C' + R of the last prediction, p x p. An element beyond the scalar is its largest number.
+  /// Covariance of the innovation, C P- C' + R of the last prediction, p x p. An element that
+  /// overflows is given as the largest number of the scalar.
   [[nodiscard]] OutputCovariance innovation_covariance() const noexcept {
     OutputCovariance s = seen_covariance() * unit_;
     for (int i = 0; i < s.size(); ++i) s.data()[i] = detail::clipped(s.data()[i]);
     return s;
   }
 
-  /// e' (C P- C' + R)^-1 e of the last correction: about p on average where R, Q and P0 are right;
-  /// the largest number where it is beyond the scalar.
+  /// Normalised innovation squared, e' (C P- C' + R)^-1 e of the last correction: about p on
+  /// average if R, Q and P0 are exact; on overflow the largest number of the scalar.
   [[nodiscard]] S normalised_innovation() const noexcept {
     const S largest = detail::largest_magnitude(innovation_);
     if (!(largest > S(0))) return S(0);
@@ -299,8 +300,8 @@ class MimoExtendedStateFilter {
     return weighted ? detail::clipped(S(largest * (largest / unit_) * e.dot(*weighted))) : S(0);
   }
 
-  /// Bound of the covariance of the present estimate's error, N x N, physical units. An element
-  /// beyond the scalar is its largest number.
+  /// Bound on the covariance of the error of the present estimate, N x N, physical units. An
+  /// element that overflows is given as the largest number of the scalar.
   [[nodiscard]] Covariance covariance() const noexcept {
     Covariance p = factor_.matrix();
     if (corrected_) {
@@ -309,7 +310,7 @@ class MimoExtendedStateFilter {
       for (int i = 0; i < outputs; ++i) {
         for (int r = 0; r < size; ++r) rest(r, first(i)) -= gain_(r, i);
       }
-      // Of a channel that was left out the gain is zero.
+      // The gain is zero for channels that were left out.
       const auto spread = gain_ * used_measurement_.matrix();
       const auto noise = detail::plus_product_transposed<size, outputs, size, S>(
           Covariance::Zero(), spread, gain_, S(1));
@@ -320,7 +321,7 @@ class MimoExtendedStateFilter {
     return p;
   }
 
-  /// Gain of the coming correction (all channels present), N x p, physical units.
+  /// Gain of the next correction (all channels present), N x p, physical units.
   [[nodiscard]] Gain gain() const noexcept {
     const Estimate rate = inverse(units_);
     Gain gain = gain_;
@@ -330,7 +331,7 @@ class MimoExtendedStateFilter {
     return gain;
   }
 
-  /// True while the recursion rests in the frozen mode.
+  /// True while the filter is in frozen mode and does not run the recursion.
   [[nodiscard]] bool frozen() const noexcept { return standing_; }
 
   /// T, s.
@@ -343,19 +344,19 @@ class MimoExtendedStateFilter {
   static constexpr std::size_t index(int i) noexcept { return static_cast<std::size_t>(i); }
   static constexpr int order_of(int chain) noexcept { return Orders::values[index(chain)]; }
 
-  /// First state of a chain.
+  /// Index of the first state of a chain.
   static constexpr int first(int chain) noexcept {
     int begin = 0;
     for (int i = 0; i < chain; ++i) begin += order_of(i) + Extension;
     return begin;
   }
 
-  /// One past its last.
+  /// Index after its last state.
   static constexpr int end(int chain) noexcept {
     return first(chain) + order_of(chain) + Extension;
   }
 
-  /// A gap that is above every max_gap.
+  /// A gap longer than any max_gap.
   static constexpr int restart_due = 65535;
 
   /// @param noise Q, inflated
@@ -366,13 +367,14 @@ class MimoExtendedStateFilter {
       for (int r = 0; r < order_of(chain) + Extension; ++r) {
         if (r > 0) unit = unit * sample_time_ / static_cast<S>(r);
         units_(first(chain) + r) = unit;
-        // Scaled effect of the inputs where the disturbance acts.
+        // Scaled effect of the inputs, in the row of the disturbance.
         if (r != order_of(chain)) continue;
         for (int j = 0; j < Inputs; ++j) drive_(chain, j) = config.input_matrix(chain, j) * unit;
       }
     }
     if (config.inflation_rule == InflationRule::fixed) growth_ = S(1) + config.inflation;
-    // The unit of all variances: the largest of R, or without noise the largest there is.
+    // The unit of all variances: the largest of R, or without noise the largest variance of the
+    // config.
     S unit = config.measurement_covariance(0, 0);
     for (int i = 1; i < outputs; ++i) {
       unit = detail::larger(unit, config.measurement_covariance(i, i));
@@ -392,7 +394,7 @@ class MimoExtendedStateFilter {
       "hold";
   static constexpr const char* not_semidefinite = "must be finite and positive semidefinite";
 
-  /// Chain by chain: as in ExtendedStateFilter.
+  /// For each chain as in ExtendedStateFilter, see FilterDesign.
   Check<S> check_way_back(const Config& config, const Covariance& noise) const {
     OutputCovariance exact = measurement_.matrix();
     for (int chain = 0; chain < outputs; ++chain) {
@@ -404,7 +406,7 @@ class MimoExtendedStateFilter {
     }
     if (!positive(exact)) {
       return Error<S>{"measurement_covariance", config.measurement_covariance(0, 0),
-                      "must be positive definite where nothing disturbs the plants"};
+                      "must be positive definite if nothing disturbs the plants"};
     }
     const bool none = config.inflation_rule == InflationRule::none;
     for (int chain = 0; chain < outputs && !config.allow_vanishing_gain; ++chain) {
@@ -459,7 +461,7 @@ class MimoExtendedStateFilter {
     return result;
   }
 
-  /// Scaled states, and the estimates in physical units.
+  /// True if the scaled states and the estimates in physical units are finite.
   [[nodiscard]] bool finite(const Estimate& x, int chain) const noexcept {
     S sum(0);
     for (int r = first(chain); r < end(chain); ++r) {
@@ -483,7 +485,7 @@ class MimoExtendedStateFilter {
     return true;
   }
 
-  /// True if the recursion stays within the scalar.
+  /// True if the recursion stays within the range of the scalar.
   [[nodiscard]] bool fits() const {
     MimoExtendedStateFilter run = *this;
     for (int k = 0; k < 8 * size; ++k) {
@@ -494,7 +496,7 @@ class MimoExtendedStateFilter {
     return true;
   }
 
-  /// Chain i starts anew at (y_i, 0, .., 0) with its part of P0, or of the limit.
+  /// Restarts chain i at (y_i, 0, .., 0) with its part of P0, or of the limit.
   StepStatus restart_chain(int chain, const S& y) noexcept {
     Estimate next = state_;
     for (int r = first(chain); r < end(chain); ++r) next(r) = S(0);
@@ -535,8 +537,8 @@ class MimoExtendedStateFilter {
       for (int r = 1; r < order_of(i) + Extension; ++r) {
         unit = unit * config.sample_time / static_cast<S>(r);
         rules.representable("sample_time", config.sample_time, unit,
-                            "to the power of a chain's highest state over its factorial is not "
-                            "what the scalar can hold");
+                            "to the power of a chain's highest state, over its factorial, leaves "
+                            "the scalar's range");
         for (int j = 0; r == order_of(i) && j < Inputs; ++j) {
           const S& gain = config.input_matrix(i, j);
           if (!(detail::absolute(gain) > S(0))) continue;
@@ -564,7 +566,7 @@ class MimoExtendedStateFilter {
         detail::check_covariance("initial_covariance", config.initial_covariance, false));
   }
 
-  /// Phi x + Gamma u: every chain ahead by Pascal's triangle, as sums of neighbours.
+  /// Phi x + Gamma u: Pascal's triangle applied to each chain, as sums of neighbours.
   [[nodiscard]] Estimate ahead(const Input& u) const noexcept {
     Estimate x = state_;
     for (int chain = 0; chain < outputs; ++chain) {
@@ -576,7 +578,7 @@ class MimoExtendedStateFilter {
       for (int pass = 0; pass + 1 < length; ++pass) {
         for (int r = length - 2; r >= pass; --r) x(begin + r) += x(begin + r + 1);
       }
-      // The disturbance itself is not driven.
+      // u does not change the disturbance itself.
       x(begin + order_of(chain)) -= S(drive_.row(chain) * u);
     }
     return x;
@@ -607,10 +609,11 @@ class MimoExtendedStateFilter {
     if (corrected_) factor_ = posterior_;
     corrected_ = false;
     fresh_ = false;
-    // As in RiccatiGain: in a gap P- of a chain grows no further than a measurement can tell.
+    // As in RiccatiGain: in a gap P- of a chain stops growing once an estimate depends on the next
+    // measurement only.
     Transition step{transition(), {}};
     Covariance& phi = step.phi;
-    Covariance held;  // Q of what still grows
+    Covariance held;  // Q of the chains that still grow
     bool any_held = false;
     for (int chain = 0; chain < outputs; ++chain) {
       if (missed_[index(chain)] < 3 || !tells_nothing(chain)) continue;
@@ -621,7 +624,7 @@ class MimoExtendedStateFilter {
         for (int j = first(chain); j < end(chain); ++j) phi(r, j) *= still;
         for (int j = 0; j < size; ++j) held(r, j) = held(j, r) = S(0);
       }
-      // After max_gap the chain starts anew, whatever its covariance is until then.
+      // After max_gap the chain will restart, so its covariance no longer matters.
       if (missed_[index(chain)] > max_gap_ + 1) {
         for (int r = first(chain); r < end(chain); ++r) {
           for (int j = first(chain); j < end(chain); ++j) phi(r, j) = r == j ? phi(r, r) : S(0);
@@ -633,7 +636,8 @@ class MimoExtendedStateFilter {
     if (has_limit_ && factor_.near(limit_, S(1e-3))) stand();
   }
 
-  /// P- of the chain is so large beside R that a measurement tells all there is to know.
+  /// True if P- of the chain is so large in comparison with R that the estimate depends on the next
+  /// measurement only.
   [[nodiscard]] bool tells_nothing(int chain) const noexcept {
     const Covariance p = factor_.matrix();
     const OutputCovariance r = measurement_.matrix();
@@ -650,8 +654,9 @@ class MimoExtendedStateFilter {
     prepare(used);
   }
 
-  /// Gain and corrected covariance for a measurement with these channels, one after the other: with
-  /// R = L D L' the rows of L^-1 y are measurements whose noises are independent, of variances D.
+  /// Computes gain and corrected covariance for a measurement with these channels, one after the
+  /// other: with R = L D L' the rows of L^-1 y are measurements with independent noise of variances
+  /// D.
   void prepare(const Array<bool, outputs>& used) noexcept {
     used_measurement_ = measurement_;
     bool all_used = true;
@@ -678,7 +683,7 @@ class MimoExtendedStateFilter {
       Array<S, size> output{};
       for (int j = 0; j <= i; ++j) output[index(first(j))] = apart(i, j);
       const auto k = posterior_.correct(output, S(used_measurement_.variance(i) / growth_));
-      // What the channels before have already explained of it.
+      // Subtracts what the channels before have already explained.
       for (int j = 0; j < i; ++j) {
         S explained(0);
         for (int l = 0; l <= i; ++l) explained += apart(i, l) * gain(first(l), j);
@@ -710,7 +715,7 @@ class MimoExtendedStateFilter {
     const auto covariance = riccati_covariance<size, outputs, S>(model, start);
     if (!covariance) return false;
     factor_ = Factor::nearest(*covariance);
-    // The recursion has the last word, as for a single chain.
+    // The recursion is run at the end, as for a single chain, because it is more accurate.
     constexpr int most_steps = 2000;
     Gain last = Gain::Zero();
     for (int step = 0; step < most_steps; ++step) {
@@ -746,9 +751,9 @@ class MimoExtendedStateFilter {
   }
 
   Estimate state_ = Estimate::Zero();  ///< scaled, x_r = T^r z_r / r! chain by chain
-  Gain gain_ = Gain::Zero();           ///< of the coming correction, scaled
+  Gain gain_ = Gain::Zero();           ///< of the next correction, scaled
   Factor factor_{};                    ///< of P-
-  Factor posterior_{};                 ///< of what the correction will leave
+  Factor posterior_{};                 ///< of P after the next correction
   Factor start_{};
   Factor noise_{};
   Factor limit_{};
@@ -756,8 +761,8 @@ class MimoExtendedStateFilter {
   CovarianceFactor<outputs, S> used_measurement_{};
   Matrix<S, outputs, Inputs> drive_;
   Estimate units_;       ///< T^r / r!
-  Estimate root_units_;  ///< the same over the root of the unit: of what the roots are made
-  S unit_{1};            ///< of all variances in them, unit of y squared
+  Estimate root_units_;  ///< the same divided by the root of the unit of variances
+  S unit_{1};            ///< unit of all variances, in unit of y squared
   Input input_ = Input::Zero();
   Output innovation_ = Output::Zero();
   S sample_time_;
@@ -765,12 +770,12 @@ class MimoExtendedStateFilter {
   int max_gap_;
   Array<int, outputs> missed_{};  ///< predictions since the last correction
   bool corrected_ = false;
-  bool fresh_ = false;  ///< nothing happened since a reset with a standing gain
+  bool fresh_ = false;  ///< no step since a reset to the limit
   bool standing_ = false;
   bool has_limit_ = false;
 };
 
-/// The same of packs, lane by lane: it takes channels in and out as they come.
+/// For packs, lane by lane, because each lane may lack other channels.
 template <class Orders, int Inputs, PackScalar S, int Extension>
 class MimoExtendedStateFilter<Orders, Inputs, S, Extension>
     : public LaneByLane<MimoExtendedStateFilter<Orders, Inputs, S, Extension>,
@@ -787,7 +792,7 @@ class MimoExtendedStateFilter<Orders, Inputs, S, Extension>
 
   using Base::Base;
 
-  /// As of plain scalars.
+  /// As for plain scalars.
   /// @{
   StatusOf<S> update(const Output& y, const Input& u_applied) noexcept {
     return Base::update(y, u_applied);

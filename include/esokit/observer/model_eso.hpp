@@ -1,5 +1,5 @@
 /// @file
-/// The linear observer and the cascade with a model put together from parts.
+/// LinearEso and CascadeEso with a model composed of parts.
 #pragma once
 
 #include <esokit/core/lane_by_lane.hpp>
@@ -23,12 +23,12 @@ template <class Self, class Plain, PackScalar S, class Settings>
 class ModelLanes : public LaneByLane<Self, Plain, S, Settings> {
  public:
   static constexpr int order = Plain::order;          ///< n, order of the plant
-  static constexpr int extension = Plain::extension;  ///< all beside the plant's rows
+  static constexpr int extension = Plain::extension;  ///< all rows besides the plant's
   static constexpr int size = Plain::size;            ///< N
   static constexpr int levels = Plain::levels;        ///< p
   using Estimate = Vector<S, size>;                   ///< (y, .., y^(n-1), d, ..), N x 1
 
-  /// What it is beyond LoopObserver; that it is analysed, or told ahead, is a lane's.
+  /// What it can do beyond LoopObserver. For analysis and prediction use a lane.
   static constexpr ObserverTraits traits = [] {
     ObserverTraits traits = Plain::traits;
     traits.acts_by_gain = false;
@@ -94,8 +94,8 @@ using ModelCascadeEso =
     CascadeEso<AugmentedModel<Parts, S>::order, Levels, S, AugmentedModel<Parts, S>::extension,
                Placement, AugmentedModel<Parts, S>>;
 
-/// LinearEso of a whole plant with a sensor. The disturbance may swing or fade, and may enter at
-/// another place than u:
+/// LinearEso of any linear plant, with a sensor. The disturbance may be sinusoidal or decay, and
+/// need not enter where u does:
 ///
 /// ```cpp
 /// using Eso = PlantEso<3, ModelParts{.order = 2, .resonators = 1}>;
@@ -116,21 +116,21 @@ using PlantCascadeEso =
     CascadeEso<Parts.order, Levels, S, LinearPlantModel<States, Parts, S>::extension, Placement,
                LinearPlantModel<States, Parts, S>>;
 
-/// The parts of a disturbance, each in the unit of d: that of y^(n), or for a LinearPlantModel the
-/// one given by E.
+/// The parts of a disturbance at the present time, each in the unit of d: that of y^(n), or for a
+/// LinearPlantModel the one defined by E.
 template <class Model>
 struct DisturbanceParts {
   using S = std::remove_cvref_t<decltype(std::declval<const Model&>().sample_time())>;  ///< scalar
 
-  S constant{};                                     ///< the constant, or polynomial, now
+  S constant{};                                     ///< the constant or polynomial part
   Array<Swing<S>, Model::parts.resonators> swings;  ///< each sine: constant() + a sin(phase) + ..
-  Array<S, Model::parts.leaky> fading;              ///< what fades, now
+  Array<S, Model::parts.leaky> fading;              ///< the decaying parts
 };
 
 /// The parts of the disturbance, as estimated by an observer with a model of parts. The observer
 /// may be in adapters or in a controller.
 ///
-/// They are parts of d alone; `total_disturbance` also contains the effect of the plant's poles and
+/// They are parts of d only; `total_disturbance` also contains the effects of the plant's poles and
 /// of the actuator. An error-based controller observes r - y, whose disturbance has the opposite
 /// sign.
 template <class Observer>

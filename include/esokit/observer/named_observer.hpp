@@ -1,6 +1,6 @@
 /// @file
-/// NamedObserver: what all named observers share around their config and their gain laws, in both
-/// time domains.
+/// NamedObserver: the common base of all named observers, sampled and continuous: design from a
+/// config.
 #pragma once
 
 #include <esokit/core/check.hpp>
@@ -33,7 +33,7 @@ namespace esokit {
 ///
 /// `design` returns the gain law (for a cascade all laws) as an Expected. It is called after b0, T
 /// and max_gap have been checked; for a continuous observer (`Base` a ContinuousObserver) its only
-/// argument is the config. For packs the observer also declares `with_scalar` and its config
+/// argument is the config. For packs the observer also declares `with_scalar`, and its config
 /// `fields`.
 /// @tparam Self the observer itself @tparam Base PredictorCorrector or ContinuousObserver
 template <class Self, class Base>
@@ -44,11 +44,11 @@ class NamedObserver : public Base {
   using scalar_type = typename Base::scalar_type;  ///< type of states and settings
 
   /// Checks the settings and does all the design work.
-  /// @return the observer, a sampled one at rest in zero, or an error that names the field
+  /// @return the observer (a sampled one at rest at zero), or an error that names the field
   template <class O = Self>
   static Expected<Self, Error<scalar_type>> make(const typename O::Config& config) {
     if constexpr (Base::order < 1) {
-      // Nothing else is instantiated: what follows from it would hide the sentence.
+      // Nothing else is instantiated: further errors would hide this one.
       static_assert(Base::order >= 1, "esokit: the plant order must be at least 1");
       return Error<scalar_type>{};
     } else if constexpr (!sampled) {
@@ -84,11 +84,11 @@ class NamedObserver : public Base {
   }
 
  protected:
-  using Laws = typename Base::Laws;       ///< one a level
-  using Law = typename Laws::value_type;  ///< what `design` gives
+  using Laws = typename Base::Laws;       ///< one for each level
+  using Law = typename Laws::value_type;  ///< result of `design`
 
-  /// From what is checked already: the config, for an observer that is more than its laws, then as
-  /// the constructor of `Base`.
+  /// From checked parts: the config, for observers that store more than their laws, and the
+  /// arguments of the constructor of `Base`.
   template <class Config, class... Parts>
   NamedObserver(const Config&, const Parts&... parts) noexcept : Base(parts...) {}
 };

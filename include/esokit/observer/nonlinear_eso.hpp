@@ -1,7 +1,7 @@
 /// @file
 /// NonlinearEso: the extended state observer with a nonlinear gain (NHOESO: A. T. Azar, F. A.
 /// Abdul-Majeed, H. S. Majdi et al., Mathematics 10 (2022) 2261, doi:10.3390/math10132261; with fal
-/// instead, Han's).
+/// it is the observer of J. Han).
 #pragma once
 
 #include <esokit/core/type_tag.hpp>
@@ -15,20 +15,18 @@ namespace esokit {
 /// Extended state observer of a plant y^(n) = d + b0 u whose bandwidth gains are multiplied by an
 /// even function k of the innovation.
 ///
-/// A gain k(e) that varies can make the error grow although every constant k in its range is stable
-/// (N = 3: 0.15 for 3.5 / omega_o, 5 for 0.2 / omega_o, and so on). So k is kept between gain_min
-/// and gain_max, a pair for which the error decays however k varies between them (a common
-/// quadratic Lyapunov function, see gain/switching_certificate.hpp). By default
-/// - gain_min is 1/2, a round number above which, for T -> 0, every gain_max is certified for every
-///   N. If omega_o T is large, it is three quarters of the way from 1 down to the smallest
-///   certified value;
-/// - gain_max is halfway from 1 to the largest certified value; at that value itself the error
-///   would ring undamped, and k rises as e vanishes. A pair without the certificate, or no limits
-///   at all, has to be requested by a member of the config.
+/// A varying gain k(e) can make the error grow although every constant k in its range is stable (N
+/// = 3: k = 0.15 for 3.5 / omega_o, then k = 5 for 0.2 / omega_o, and so on). So k is limited to
+/// gain_min .. gain_max, a range within which the error decays however k varies (certified by a
+/// common quadratic Lyapunov function, see gain/switching_certificate.hpp). By default
+/// - gain_min is 1/2: for T -> 0 and any N every gain_max is certified with it. If omega_o T is
+///   large, it is three quarters of the way from 1 down to the smallest certified value;
+/// - gain_max is halfway from 1 to the largest certified value; at that value the error could ring
+///   undamped. Limits without a certificate, or no limits at all, must be requested in the config.
 ///
 /// k = 1 is LinearEso, bit for bit. The certificate applies to samples without gaps.
 /// @tparam Order n @tparam S scalar @tparam Extension m
-/// @tparam Shape an EvenGain: PowerSumGain (the paper's g), FalGain, or a function object of yours
+/// @tparam Shape an EvenGain: PowerSumGain (the paper's g), FalGain, or your own function object
 template <int Order, Scalar S = double, int Extension = 2, class Shape = PowerSumGain<S>>
 requires EvenGain<Shape, S>
 class NonlinearEso
@@ -44,7 +42,7 @@ class NonlinearEso
  public:
   /// Settings of make.
   struct Config {
-    S observer_bandwidth{};       ///< omega_o, rad/s: the poles are at exp(-omega_o T) where k = 1
+    S observer_bandwidth{};       ///< omega_o, rad/s: the poles are at exp(-omega_o T) for k = 1
     Shape shape{};                ///< k(|e| / error_scale)
     S error_scale = S(1.0);       ///< unit of y: what counts as an error of one
     std::optional<S> gain_min{};  ///< k is not less
@@ -71,8 +69,8 @@ class NonlinearEso
   using Report = NonlinearGainReport<detail::TableScalar<S>>;  ///< see `report`
 
   /// Report on the k of a config: the stable intervals for constant k, the limits, and the errors e
-  /// at which the given k is outside of them. It fails as `make` does, and is not needed at run
-  /// time.
+  /// at which the given k is outside of them. It returns the same errors as `make`, and is not
+  /// needed at run time.
   static Expected<Report, Error<S>> report(const Config& config) requires PlainScalar<S> {
     const auto made = NonlinearEso::make(config);
     if (!made) return made.error();
@@ -104,7 +102,7 @@ class NonlinearEso
   /// k for an innovation e (unit of y), within its limits.
   [[nodiscard]] S gain_factor(const S& e) const noexcept { return law().factor(e); }
 
-  /// Limits of k in force.
+  /// The limits of k.
   /// @{
   [[nodiscard]] const S& gain_min() const noexcept { return law().gain_min(); }
   [[nodiscard]] const S& gain_max() const noexcept { return law().gain_max(); }
@@ -156,7 +154,7 @@ class ContinuousNonlinearEso
  public:
   /// Settings of make.
   struct Config {
-    S observer_bandwidth{};               ///< omega_o, rad/s: the poles are at -omega_o where k = 1
+    S observer_bandwidth{};               ///< omega_o, rad/s: the poles are at -omega_o for k = 1
     Shape shape{};                        ///< k(|e| / error_scale)
     S error_scale = S(1.0);               ///< unit of y: what counts as an error of one
     std::optional<S> gain_min{};          ///< k is not less

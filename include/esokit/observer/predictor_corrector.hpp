@@ -17,7 +17,7 @@
 
 namespace esokit {
 
-/// The settings of the chain, common to all sampled observers.
+/// The settings that all sampled observers have in common.
 template <Scalar S>
 struct ChainConfig {
   S input_gain{};     ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
@@ -28,7 +28,7 @@ struct ChainConfig {
 
 namespace detail {
 
-/// Of no class, so that all observers of an order share its code.
+/// Not a member of a class, so that all observers of an order share its code.
 template <int Order, Scalar S>
 Check<S> check_chain(const ChainConfig<S>& config) {
   using Chain = ScaledChain<Order, S, 1>;
@@ -51,10 +51,10 @@ Check<S> check_chain(const ChainConfig<S>& config) {
 ///
 /// One instance belongs to one thread. No member allocates, throws or locks after `make`.
 ///
-/// After any input, good samples lead back to a good estimate: its error decays by e^(-omega_o T) a
-/// sample, from the largest number to rounding in at most 60 + 2 ln(max / epsilon) / (omega_o T)
-/// samples (tested with every observer and adapter: double 60 + 1500 / (omega_o T), float 60 + 210
-/// / (omega_o T)).
+/// After any input, however bad, good samples lead back to a good estimate: the error decays by
+/// e^(-omega_o T) a sample, from the largest number of the scalar to rounding in at most 60 + 2
+/// ln(max / epsilon) / (omega_o T) samples. This is tested with every observer and adapter: double
+/// 60 + 1500 / (omega_o T), float 60 + 210 / (omega_o T) samples.
 ///
 /// @tparam Order n, order of the plant @tparam Extension m, extended states
 /// @tparam Law gain law, see GainLaw @tparam Levels p
@@ -78,15 +78,15 @@ class PredictorCorrector {
   using scalar_type = S;                           ///< type of states and settings
   using Estimate = typename Model::Estimate;       ///< (y, .., y^(n-1), d, .., d^(m-1)), N x 1
   using State = typename Model::State;             ///< scaled, N elements
-  using Laws = Array<Law, Levels>;                 ///< one a level
-  using Status = StatusOf<S>;                      ///< StepStatus, of a pack one a lane
+  using Laws = Array<Law, Levels>;                 ///< one for each level
+  using Status = StatusOf<S>;                      ///< StepStatus, for a pack one per lane
 
   /// The same with another scalar.
   template <class T>
   using with_scalar = PredictorCorrector<Order, T, Extension, detail::WithScalar<Law, T>, Levels,
                                          detail::WithScalar<Model, T>>;
 
-  /// What it declares beyond LoopObserver.
+  /// What the observer can do beyond LoopObserver.
   static constexpr ObserverTraits traits{
       .publishes_chain = true,
       .acts_by_gain = gain_law_traits<Law>.kind == GainKind::preset,
@@ -97,8 +97,8 @@ class PredictorCorrector {
           gain_law_traits<Law>.kind == GainKind::preset && !gain_law_traits<Law>.advances &&
           (model_traits<Model>.is_chain || (Levels == 1 && model_traits<Model>.tells_constant))};
 
-  /// From chain settings and ready gain laws; use this for your own gain law.
-  /// @return error for input_gain, sample_time or max_gap out of its rule
+  /// From settings and finished gain laws; use this for a gain law of your own.
+  /// @return the observer, or an error for input_gain, sample_time or max_gap
   static Expected<PredictorCorrector, Error<S>> make(const ChainConfig<S>& config,
                                                      const Laws& laws) {
     if (auto ok = check_chain(config); !ok) return ok.error();
@@ -119,22 +119,23 @@ class PredictorCorrector {
     return update_advanced(y, u_applied);
   }
 
-  /// The same of packs.
-  // In line, as a call has a frame aligned for vectors, which costs a third of the step. A
-  // template, or Clang 14 instantiates both in an explicit instantiation.
+  /// The same for packs.
+  // Inlined, because a call sets up a stack frame aligned for vectors, which takes a third of the
+  // step's time. A template, because Clang 14 would otherwise instantiate both in an explicit
+  // instantiation.
   template <class T = S>
   ESOKIT_INLINE Status update(const S& y, const S& u_applied) noexcept requires PackScalar<T> {
     advance_laws();
     return update_advanced(y, u_applied);
   }
 
-  /// Time update alone: one sample without a measurement, or the first half of `update`.
+  /// Time update only: one sample without a measurement, or the first half of `update`.
   Status predict(S u_applied) noexcept {
     advance_laws();
     return predict_guarded(u_applied);
   }
 
-  /// Measurement update alone. After a gap it uses the gain for the time since the last correction.
+  /// Measurement update only. After a gap it uses the gain for the time since the last correction.
   Status correct(S y) noexcept {
     if constexpr (PackScalar<S>) {
       if (gap_ == 1 || gap_ == 0) [[likely]] {
@@ -154,7 +155,7 @@ class PredictorCorrector {
       }
       Correction step{states_};
       if (!correct_levels<false>(step, y, elapsed) || !is_finite(probe(step.states))) {
-        // An absurd but finite u can leave a prediction from which no good y leads back.
+        // A finite but absurdly large u can lead to a prediction from which no good y recovers.
         const bool state_is_to_blame =
             is_finite(y) && detail::absolute(y) < detail::absolute(states_[0][0]);
         if (state_is_to_blame && reset(y) == StepStatus::ok) return StepStatus::restarted;
@@ -166,8 +167,8 @@ class PredictorCorrector {
     }
   }
 
-  /// All estimates in physical units, after the last step: plant states of the last level,
-  /// disturbance of all levels together.
+  /// All estimates after the last step, N x 1, in physical units: plant states of the last level,
+  /// disturbance summed over all levels.
   [[nodiscard]] Estimate estimate() const noexcept {
     if constexpr (Levels == 1) {
       return model_.physical(states_[0]);
@@ -183,7 +184,7 @@ class PredictorCorrector {
     return model_.template physical<Row>(up_to_level<Levels - 1>());
   }
 
-  /// The same in the scaling of the chain, x_r = T^r z_r / r!, for laws that fold the factors into
+  /// The same in the scaling of the chain, x_r = T^r z_r / r!, for laws that include the factors in
   /// their gains.
   template <int Row>
   [[nodiscard]] ESOKIT_INLINE constexpr S scaled_estimate() const noexcept {
@@ -198,7 +199,7 @@ class PredictorCorrector {
   }
 
   /// Estimate of level `level` = 0 .. p - 1 of a cascade: its plant states, and the disturbance
-  /// that it and the levels below it found. NaN throughout for any other level.
+  /// found by it and the levels below it. All NaN for any other level.
   [[nodiscard]] Estimate level_estimate(int level) const noexcept {
     Estimate estimate = Estimate::Constant(S(std::numeric_limits<double>::quiet_NaN()));
     detail::unroll<Levels>([&](auto i) {
@@ -216,8 +217,8 @@ class PredictorCorrector {
   /// y - z_1 of the last correction, with the predicted z_1 (of level 1).
   [[nodiscard]] constexpr const S& innovation() const noexcept { return innovation_; }
 
-  /// Predictions since the last correction; 0 when up to date. 65535 if the state was too large to
-  /// be predicted: then the next good y restarts the observer.
+  /// Number of predictions since the last correction; 0 if up to date. 65535 if the state was too
+  /// large to be predicted: then the next good y restarts the observer.
   [[nodiscard]] constexpr Lanes<int, S> missed() const noexcept {
     if constexpr (PackScalar<S>) {
       Lanes<int, S> missed;
@@ -228,17 +229,17 @@ class PredictorCorrector {
     }
   }
 
-  /// Input that the last prediction used.
+  /// The input that the last prediction used.
   [[nodiscard]] constexpr const S& applied_input() const noexcept { return applied_input_; }
 
-  /// The estimate after the coming `correct(y)`, as a function of y, in scaled states (x_r = T^r
-  /// z_r / r!). For a controller that computes before the measurement arrives.
+  /// The estimate after the next `correct(y)` as a linear function of y, in scaled states (x_r =
+  /// T^r z_r / r!). For a controller that computes before the measurement arrives.
   struct Preview {
     State offset;  ///< after correct(y) the estimate will be offset + slope y
-    State slope;   ///< its derivative by y
+    State slope;   ///< its derivative with respect to y
   };
 
-  /// To be called between `predict` and `correct`, for gain laws whose gain is known before the
+  /// Call this between `predict` and `correct`. For gain laws whose gain is known before the
   /// measurement.
   [[nodiscard]] Preview preview() const noexcept requires PresetGainLaw<Law, size, S> {
     if constexpr (PackScalar<S>) {
@@ -266,8 +267,8 @@ class PredictorCorrector {
             by_rows(up_to_level<Levels - 1>(slope.states))};
   }
 
-  /// The scaled gain with which the coming `correct(y)` will weight the innovation e; after a gap,
-  /// the gain for the gap. Gaps above `max_gap` are ignored here: then `correct` restarts.
+  /// The scaled gain with which the next `correct(y)` will weight the innovation e; after a gap,
+  /// the gain for the gap. For gaps above `max_gap` it does not apply, because `correct` restarts.
   [[nodiscard]] ScaledGain<size, S> correction_gain(const S& e) const noexcept
       requires(Levels == 1) {
     if constexpr (PackScalar<S>) {
@@ -287,7 +288,7 @@ class PredictorCorrector {
     return laws_[0];
   }
 
-  /// True if so many samples are missing that the next `correct` restarts.
+  /// True if so many samples are missing that the next `correct` restarts the observer.
   [[nodiscard]] constexpr Lanes<bool, S> restarts() const noexcept {
     if constexpr (PackScalar<S>) {
       Lanes<bool, S> due;
@@ -298,7 +299,7 @@ class PredictorCorrector {
     }
   }
 
-  /// To be called between `predict` and `correct` if the actuator held `u_applied` and not the u
+  /// Call this between `predict` and `correct` if the actuator held `u_applied` instead of the u
   /// given to `predict`. Adds Gamma (u_applied - u_given) to the prediction. A u that is not
   /// finite, or would make the prediction not finite, changes nothing and is reported.
   Status revise_input(S u_applied) noexcept {
@@ -322,18 +323,18 @@ class PredictorCorrector {
   /// T, s, as it was given.
   [[nodiscard]] constexpr const S& sample_time() const noexcept { return model_.sample_time(); }
 
-  /// Missing samples that a correction bridges before it restarts: as given, or what the model
-  /// allows.
+  /// Missing samples that a correction bridges before it restarts: the config's number, or fewer if
+  /// the model allows fewer.
   [[nodiscard]] constexpr int max_gap() const noexcept { return max_gap_; }
 
   /// What is known of the plant.
   [[nodiscard]] constexpr const Model& model() const noexcept { return model_; }
 
-  /// From the next step on the swings of the model are `factor` times as fast as they were given:
-  /// Phi exactly, the gain from the table that `make` has made. The estimate is kept, and with it
-  /// where each swing is. Bounded work without design; for speeds that change slowly against the
-  /// slowest pole. After a retune the factor is 1 again.
-  /// @return error for a factor outside of the range in the settings: nothing changes then
+  /// From the next step on the frequencies of the model are `factor` times those of the config. Phi
+  /// is computed exactly, the gain is interpolated in a table from `make`. The estimate is kept,
+  /// and with it the phase of each sine. The work is bounded and involves no design. The speed must
+  /// change slowly in comparison with the slowest pole. After a retune the factor is 1 again.
+  /// @return error for a factor outside the range in the settings: nothing changes then
   Check<S> set_speed(const S& factor) noexcept requires(model_traits<Model>.follows_speed) {
     Laws laws = laws_;
     for (Law& law : laws) {
@@ -344,19 +345,21 @@ class PredictorCorrector {
     return {};
   }
 
-  /// Gain of the next correction of level `level` = 0 .. p - 1, scaled; for laws that know it
-  /// before the measurement.
+  /// Gain of the next correction of level `level` = 0 .. p - 1, scaled; for laws whose gain is
+  /// known before the measurement.
   [[nodiscard]] constexpr ScaledGain<size, S> level_gain(int level) const noexcept requires
       PresetGainLaw<Law, size, S> {
     return laws_[static_cast<std::size_t>(level)].gain_before_measurement();
   }
 
-  /// The estimate of a plant that stands at y under u, physical units: where controllers start.
+  /// The estimate for a plant at rest at y under a constant u, N x 1, physical units: the start of
+  /// a controller.
   [[nodiscard]] constexpr Estimate rest(const S& y, const S& u) const noexcept {
     return model_.rest(y, u);
   }
 
-  /// A number that is finite only if the estimate that x stands for is. @param x scaled, row by row
+  /// A number that is finite only if the estimate that belongs to x is finite. @param x scaled
+  /// estimates, row by row
   [[nodiscard]] constexpr S finite_probe(const State& x) const noexcept {
     if constexpr (traits.measures_first_row) {
       return model_.finite_probe(x);
@@ -377,10 +380,10 @@ class PredictorCorrector {
   /// nothing and is reported.
   Status reset(const Estimate& state) noexcept { return reset_scaled(model_.scaled(state)); }
 
-  /// Moves the origin of y: every level's z_1 grows by `offset`. For periodic quantities, whose
-  /// estimate would otherwise run away with the turns.
-  /// @return ok, or state_rejected where the offset, or what it would make of the estimate, is not
-  ///         finite: nothing changes
+  /// Moves the origin of y: adds `offset` to z_1 of every level. For periodic quantities, whose
+  /// estimate would otherwise grow with every turn.
+  /// @return ok, or state_rejected if the offset or the new estimate is not finite: nothing changes
+  ///         then
   constexpr Status shift_output(const S& offset) noexcept
       requires(model_traits<Model>.shifts_output) {
     constexpr auto y = static_cast<std::size_t>(Model::state_of_row(0));
@@ -392,17 +395,17 @@ class PredictorCorrector {
     return shift_to(next);
   }
 
-  /// Adds `offset` (unit of y^(n)) to dhat, as a change of what else explains y^(n) asks for.
-  /// @return as `shift_output`
+  /// Adds `offset` (unit of y^(n)) to dhat, for when another term takes over a part of y^(n).
+  /// @return as for `shift_output`
   constexpr Status shift_disturbance(const S& offset) noexcept {
     LevelStates next = states_;
     add_disturbance(next, model_.scaled_disturbance(offset));
     return shift_to(next);
   }
 
-  /// Takes the settings of `fresh` and keeps the estimate: states are rescaled to its sample time,
-  /// and what a change of b0 no longer explains goes into the disturbance,
-  /// dhat += (b0_old - b0_new) u, so that the control does not jump.
+  /// Takes over the settings of `fresh` and keeps the estimate: states are rescaled to its sample
+  /// time, and a change of b0 is moved into the disturbance, dhat += (b0_old - b0_new) u, so that
+  /// the control does not jump.
   Check<S> adopt(const PredictorCorrector& fresh) {
     if constexpr (PackScalar<S>) return detail::adopt_lanes(*this, fresh);
     PredictorCorrector next = fresh;
@@ -424,7 +427,7 @@ class PredictorCorrector {
   }
 
  protected:
-  /// At rest in zero; `config` is checked already.
+  /// At rest at zero; `config` is already checked.
   PredictorCorrector(const ChainConfig<S>& config, const Laws& laws) noexcept requires
       std::same_as<Model, ChainModel<Order, S, Extension>>
       : laws_(laws),
@@ -434,7 +437,8 @@ class PredictorCorrector {
     look_at_squares();
   }
 
-  /// The same with a model that `make` of its own has checked. @param laws or the law of one level
+  /// The same with a model from its own `make`. @param laws one for each level, or one law for one
+  /// level
   template <class Given>
   PredictorCorrector(const Model& model, const Given& laws, int max_gap) noexcept
       : laws_{laws}, model_(model), max_gap_(static_cast<std::uint16_t>(max_gap)) {
@@ -447,9 +451,9 @@ class PredictorCorrector {
     return detail::check_chain<Order, S>(config);
   }
 
-  /// The gain laws, for the observer that is built on this.
+  /// The gain laws, for derived observers.
   [[nodiscard]] constexpr const Laws& laws() const noexcept { return laws_; }
-  /// The gain laws, to be changed.
+  /// The gain laws, for changing them.
   [[nodiscard]] constexpr Laws& laws() noexcept { return laws_; }
 
   /// All that it holds, for what is built on it.
@@ -463,9 +467,9 @@ class PredictorCorrector {
   friend struct detail::GuardAccess;
 
   using LevelStates = Array<State, Levels>;
-  using Plain = detail::PlainTwin<PredictorCorrector, S>;  ///< a lane
+  using Plain = detail::PlainTwin<PredictorCorrector, S>;  ///< type of a lane
 
-  /// As `scaled_estimate` has them.
+  /// The states in the order of the estimate, as in `scaled_estimate`.
   [[nodiscard]] ESOKIT_INLINE static constexpr State by_rows(const State& states) noexcept {
     if constexpr (traits.measures_first_row) {
       return states;
@@ -478,13 +482,14 @@ class PredictorCorrector {
     }
   }
 
-  /// What the levels keep. Of the chain, level i what it has found beyond those below it, driven by
-  /// what those have: the fewest operations. Of other models, where the disturbance has no rows of
-  /// its own, each level all of its estimate, with what those below it correct of the disturbance:
-  /// of the chain the same.
+  /// What the levels store. For the chain, level i stores only the disturbance that it has found in
+  /// addition to the levels below and is driven by theirs: this takes the fewest operations. In
+  /// other models the disturbance has no separate rows: each level stores its whole estimate and
+  /// also receives the corrections of the disturbance by the levels below. For the chain this would
+  /// be equivalent.
   static constexpr bool adds_up = Levels > 1 && model_traits<Model>.is_chain;
 
-  /// To the total disturbance of all levels.
+  /// Adds to the total disturbance of all levels.
   static constexpr void add_disturbance(LevelStates& states, const S& scaled) noexcept {
     constexpr auto state = static_cast<std::size_t>(Model::state_of_row(Order));
     for (std::size_t i = 0; i < (adds_up ? 1 : Levels); ++i) {
@@ -492,7 +497,7 @@ class PredictorCorrector {
     }
   }
 
-  /// What of a correction is the disturbance's.
+  /// The part of a correction that belongs to the disturbance.
   [[nodiscard]] ESOKIT_INLINE constexpr State disturbance_part(const State& x) const noexcept {
     if constexpr (model_traits<Model>.tells_disturbance) {
       return model_.disturbance_part(x);
@@ -503,7 +508,7 @@ class PredictorCorrector {
     }
   }
 
-  /// The state of (y, 0, .., 0), as the sensor would show it.
+  /// The state for (y, 0, .., 0), with a sensor that shows y.
   [[nodiscard]] static constexpr State standing(const S& y) noexcept {
     State state{};
     state.fill(S(0.0));
@@ -512,20 +517,21 @@ class PredictorCorrector {
     return state;
   }
 
-  /// A gap that is above every max_gap.
+  /// A gap longer than any max_gap.
   static constexpr std::uint16_t restart_due = 65535;
 
   struct Nothing {};
   struct Correction {
     LevelStates states;
     S innovation{};  ///< of level 1
-    // Of all levels where the laws are told. Apart: what nobody reads would be stored.
+    // Of all levels, if the laws have `accept`. Otherwise omitted, because compilers would store it
+    // although nobody reads it.
     [[no_unique_address]] std::conditional_t<gain_law_traits<Law>.accepts, Array<S, Levels>,
                                              Nothing>
         innovations{};
   };
 
-  /// `step` with the observer of each lane.
+  /// Calls `step` with the observer of each lane.
   template <class Step>
   ESOKIT_COLD constexpr Status each_lane(Step&& step) noexcept {
     Status status{};
@@ -549,7 +555,7 @@ class PredictorCorrector {
     return StepStatus::ok;
   }
 
-  /// Samples that the next correction bridges; of a pack whose lanes agree.
+  /// Number of samples that the next correction bridges; for a pack with equal lanes.
   [[nodiscard]] constexpr unsigned elapsed() const noexcept {
     if constexpr (PackScalar<S>) {
       return 1u;
@@ -608,9 +614,9 @@ class PredictorCorrector {
     return state;
   }
 
-  /// Finite only if all scaled states and the estimates of all levels in physical units are; see
-  /// ScaledChain::finite_probe. Of the sum of the levels' magnitudes, which no sum of some of their
-  /// disturbances exceeds.
+  /// Finite only if all scaled states and the estimates of all levels in physical units are finite,
+  /// see ScaledChain::finite_probe. It is taken of the sum of the magnitudes of all levels, an
+  /// upper bound on any sum of their disturbances.
   [[nodiscard]] ESOKIT_INLINE constexpr S probe(const LevelStates& states) const noexcept {
     if constexpr (Levels == 1) {
       return model_.finite_probe(states[0]);
@@ -622,13 +628,15 @@ class PredictorCorrector {
     }
   }
 
-  /// Where the sum of all squares is finite, so is the probe, if 1/T is not absurdly large:
-  /// cheaper, as a square has no sign and no weight. A float of one level has no room for the flag.
+  /// If the sum of all squares is finite, so is the probe, unless 1/T is absurdly large. This test
+  /// is cheaper, as squares need no absolute value and no weights. Not used for float with one
+  /// level, which would grow by the flag.
   static constexpr bool has_squares = PlainScalar<LaneScalar<S>> && model_traits<Model>.is_chain &&
                                       (Levels > 1 || sizeof(LaneScalar<S>) > sizeof(float));
   struct NoFlag {};
 
-  /// States up to the root of the largest number are finite in physical units, all levels together.
+  /// Sets the flag: true if states up to the root of the largest number are finite in physical
+  /// units, summed over all levels.
   constexpr void look_at_squares() noexcept {
     if constexpr (has_squares) {
       using Lane = LaneScalar<S>;
@@ -644,7 +652,7 @@ class PredictorCorrector {
     }
   }
 
-  /// True only if `probe` is finite; false may be wrong.
+  /// True implies that `probe` is finite; false does not imply the opposite.
   [[nodiscard]] ESOKIT_INLINE constexpr bool surely_finite(
       const LevelStates& states) const noexcept {
     if constexpr (has_squares) {
@@ -676,8 +684,8 @@ class PredictorCorrector {
     }
   }
 
-  /// Corrects `step.states` in place. False if an innovation is not finite where the law would look
-  /// at it; such a law never sees one.
+  /// Corrects `step.states` in place. False if an innovation is not finite and the law does not
+  /// accept such innovations.
   template <bool NominalGain>
   ESOKIT_INLINE constexpr bool correct_levels(Correction& step, S y,
                                               unsigned elapsed) const noexcept {
@@ -708,7 +716,7 @@ class PredictorCorrector {
     return fine;
   }
 
-  /// @param found what the levels so far have corrected of the disturbance
+  /// @param found corrections of the disturbance by the levels so far
   template <class Gain, class Found>
   ESOKIT_INLINE constexpr void correct_level(State& z, const Gain& gain, const S& e,
                                              [[maybe_unused]] Found& found) const noexcept {
@@ -730,11 +738,11 @@ class PredictorCorrector {
     }
   }
 
-  /// `update` where the laws have advanced.
+  /// `update` after the laws have advanced.
   ESOKIT_INLINE Status update_advanced(const S& y, const S& u_applied) noexcept {
     if (may_be_quick()) [[likely]] {
-      // One test for all: a bad y or u makes the new state non-finite. Nothing is kept then, and
-      // the guarded path finds out what it was, or that it was only large.
+      // One test for all faults: a bad y or u makes the new state non-finite. The state is then
+      // discarded, and update_guarded finds the cause.
       Correction step{predicted_levels(u_applied)};
       const bool looked = correct_levels<true>(step, y, 1u);
       detail::keep_scalars(step.states);
@@ -747,7 +755,8 @@ class PredictorCorrector {
     return update_guarded(y, u_applied);
   }
 
-  // A pack by reference: by value each step would keep it in memory for this call.
+  // Packs are passed by reference: by value every step would have to keep them in memory for this
+  // call.
   using Given = std::conditional_t<PackScalar<S>, const S&, S>;
   ESOKIT_COLD Status update_guarded(Given y, Given u_applied) noexcept {
     if constexpr (PackScalar<S>) {
@@ -756,7 +765,7 @@ class PredictorCorrector {
       });
     } else {
       if constexpr (has_squares) {
-        if (gap_ == 0) {  // only too large for its squares, perhaps
+        if (gap_ == 0) {  // perhaps only the squares overflowed
           Correction step{predicted_levels(u_applied)};
           if (correct_levels<true>(step, y, 1u) && is_finite(probe(step.states))) {
             commit(step);
@@ -797,24 +806,25 @@ class PredictorCorrector {
     }
   }
 
-  /// Where u or the state is so large that the prediction is not finite.
+  /// Handles a u or a state so large that the prediction is not finite.
   ESOKIT_COLD StepStatus predict_rejecting(S u_applied) noexcept requires(!PackScalar<S>) {
     LevelStates next = predicted_levels(u_applied);
     count_missed();
-    if (is_finite(probe(next))) {  // of a pack whose other lane it was
+    if (is_finite(probe(next))) {  // a pack in which another lane has the fault
       states_ = next;
       applied_input_ = u_applied;
       return StepStatus::ok;
     }
     if (is_finite(u_applied) && !(detail::absolute(u_applied) > detail::absolute(applied_input_))) {
-      // Not u is to blame, which is no larger than the one before.
+      // u is no larger than the last one, so it is not the cause.
       applied_input_ = u_applied;
       gap_ = restart_due;
       return StepStatus::prediction_dropped;
     }
     next = predicted_levels(applied_input_);
     if (!is_finite(probe(next))) {
-      // It is the state that cannot be predicted, and may never be again: y starts anew.
+      // The state itself cannot be predicted, and perhaps never can again: the next y restarts the
+      // observer.
       gap_ = restart_due;
       return StepStatus::input_rejected | StepStatus::prediction_dropped;
     }
@@ -854,7 +864,8 @@ class PredictorCorrector {
   std::uint16_t max_gap_;
   [[no_unique_address]] std::conditional_t<has_squares, Lanes<bool, S>, NoFlag> squares_suffice_{};
 
-  // Last: what comes after it would be missing in whatever is built on this.
+  // Last, because after a failed assertion the members below it would be missing in derived
+  // classes.
   static_assert(Levels >= 1, "esokit: at least one level is needed");
 };
 
