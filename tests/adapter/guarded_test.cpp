@@ -310,10 +310,9 @@ TEST(Gating, RefusesAGainThatIsNotProven) {
         {.observer = {
              .poles = {pair, std::conj(pair), -120}, .input_gain = 1, .sample_time = 0.001}});
   };
-  EXPECT_EQ(
-      refusal(made(0.1)),
-      "level: has a gain that is not proven stable while corrections of dhat are scaled (Re G "
-      "> -1)");
+  EXPECT_EQ(refusal(made(0.1)),
+            "level: has a gain that is not proven stable if corrections of dhat are scaled: Re G > "
+            "-1 fails");
   EXPECT_TRUE(made(0.7).has_value());
   Guarded<O>::Config bad{
       .observer = {.poles = {-30, -30, -30}, .input_gain = 1, .sample_time = 0.01}};
@@ -554,7 +553,7 @@ TEST(Leak, RefusesWhatIsNoTime) {
     EXPECT_EQ(refused(plain, bad), "leak_time: must be finite and not negative");
   }
   const char* const long_time =
-      "leak_time: is so long that a sample changes nothing the scalar can hold";
+      "leak_time: is too long: what leaks in one sample is below the rounding of the scalar";
   const double longest = sample_time / std::numeric_limits<double>::epsilon();
   EXPECT_EQ(refused(plain, longest * 1.01), long_time);
   for (const double good : {0.0, 1e-6, sample_time, 1.0, longest * 0.99}) {

@@ -292,7 +292,7 @@ TEST(OutlierGate, OffAndRetuned) {
     refused({.observer = linear, .threshold = 1, .running_factor = bad}, "running_factor", number);
   }
   refused({.observer = linear, .running_factor = 3}, "threshold",
-          "must be positive where running_factor is: without noise nothing would pass");
+          "must be positive if running_factor is: without noise nothing would pass");
   for (const int bad : {-1, 0, 65001}) {
     refused({.observer = linear, .threshold = 1, .most_in_a_row = bad}, "most_in_a_row",
             "must be 1 .. 65000");

@@ -1,4 +1,4 @@
-// expect: esokit: WrappedOutput goes around OutlierGate: it counts the turns
+// expect: esokit: put WrappedOutput around OutlierGate, not inside it
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/observer/linear_eso.hpp>

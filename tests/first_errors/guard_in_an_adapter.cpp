@@ -1,4 +1,4 @@
-// expect: esokit: Guarded goes around the other adapters
+// expect: esokit: Guarded must be the outermost adapter
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
 #include <esokit/observer/linear_eso.hpp>

@@ -1,4 +1,4 @@
-// expect: esokit: Guarded is proven for constant gains on the chain of integrators
+// expect: esokit: Guarded needs a constant gain on the chain of integrators
 #include <esokit/adapter/guarded.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 

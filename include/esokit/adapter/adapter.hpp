@@ -1,5 +1,5 @@
 /// @file
-/// What all adapters of observers have in common: an adapter contains an observer and does not
+/// The common base of all adapters of observers. An adapter contains an observer and does not
 /// derive from it.
 #pragma once
 
@@ -10,7 +10,7 @@ namespace esokit {
 
 namespace detail {
 
-/// p, where an observer has it.
+/// p, if the observer has it.
 template <class Observer>
 struct LevelsOf {};
 template <class Observer>
@@ -21,7 +21,7 @@ struct LevelsOf<Observer> {
   static constexpr int levels = Observer::levels;  ///< p
 };
 
-/// m, where an observer has it.
+/// m, if the observer has it.
 template <class Observer>
 struct ExtensionOf {};
 template <class Observer>
@@ -34,9 +34,9 @@ struct ExtensionOf<Observer> {
 
 }  // namespace detail
 
-/// Base of the adapters: forwards the members whose answer is the same with any adapter, as far as
-/// the observer has them. An adapter adds make, retune, update, predict, correct and reset. It
-/// redefines the members that it answers differently, and deletes those that it cannot answer.
+/// Base of the adapters: forwards the members of the observer whose result no adapter changes. An
+/// adapter adds make, retune, update, predict, correct and reset, redefines members whose result
+/// differs, and deletes those that it cannot offer.
 template <LoopObserver Observer>
 class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Observer> {
   friend struct detail::GuardAccess;
@@ -50,7 +50,7 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
   static constexpr int order = Observer::order;        ///< n, order of the plant
   static constexpr int size = Observer::size;          ///< N
 
-  /// The traits of the adapted observer, as far as they hold for an adapter.
+  /// The traits of the adapted observer that also hold for an adapter.
   static constexpr ObserverTraits traits = [] {
     ObserverTraits traits = observer_traits<Observer>;
     traits.adapts = true;
@@ -60,10 +60,10 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
     return traits;
   }();
 
-  /// The adapted observer, for all its other members.
+  /// The adapted observer, for its other members.
   [[nodiscard]] constexpr const Observer& observer() const noexcept { return observer_; }
 
-  /// Of the adapted observer, see PredictorCorrector.
+  /// Members of the adapted observer, see PredictorCorrector.
   /// @{
   [[nodiscard]] constexpr Estimate estimate() const noexcept { return observer_.estimate(); }
   template <int Row>
@@ -144,7 +144,7 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
   { return observer_.set_speed(factor); }
   /// @}
 
-  /// Of an adapter in it.
+  /// Members of an adapter inside.
   /// @{
   [[nodiscard]] scalar_type wrap(const scalar_type& angle) const noexcept
       requires(observer_traits<Observer>.wraps_output) {
@@ -160,19 +160,20 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
   /// @}
 
  protected:
-  /// Holds a copy.
+  /// Stores a copy.
   explicit constexpr Adapter(const Observer& observer) noexcept : observer_(observer) {}
 
-  [[no_unique_address]] Observer observer_;  ///< what is adapted; the padding at its end is free
+  [[no_unique_address]] Observer observer_;  ///< its padding may hold other members
 
-  // Last: what comes after it would be missing in whatever is built on this.
+  // Last, because after a failed assertion the members below it would be missing in derived
+  // classes.
   static_assert(!observer_traits<Observer>.schedules_input_gain,
-                "esokit: Guarded goes around the other adapters: the loop asks it");
+                "esokit: Guarded must be the outermost adapter");
 };
 
-/// Base of the adapters with a config: `make`, `retune`, `adopt`, and the members that the observer
-/// answers unchanged. An adapter has `check(config)`, which returns a Check, a constructor from
-/// `(observer, config)`, and `take(fresh)`, which takes over its own settings.
+/// Base of the adapters with a config: `make`, `retune`, `adopt`, and members that most adapters
+/// forward. An adapter has `check(config)`, which returns a Check, a constructor from `(observer,
+/// config)`, and `take(fresh)`, which takes over its own settings.
 /// @tparam Self the adapter @tparam Settings its Config
 template <class Self, LoopObserver Observer, class Settings>
 class NamedAdapter : public Adapter<Observer> {
@@ -184,7 +185,7 @@ class NamedAdapter : public Adapter<Observer> {
   using Estimate = typename Base::Estimate;        ///< (y, .., y^(n-1), d, ..), N x 1
 
   /// Checks the settings and does all the design work.
-  /// @return the adapter, its observer at rest in zero, or an error that names the field
+  /// @return the adapter, with its observer at rest at zero, or an error that names the field
   static Expected<Self, Error<scalar_type>> make(const Config& config) {
     if (Check<scalar_type> ok = Self::check(config); !ok) return ok.error();
     const auto observer = Observer::make(config.observer);
@@ -204,10 +205,10 @@ class NamedAdapter : public Adapter<Observer> {
     return {};
   }
 
-  /// Time update alone, see PredictorCorrector::predict.
+  /// Time update only, see PredictorCorrector::predict.
   StepStatus predict(scalar_type u_applied) noexcept { return this->observer_.predict(u_applied); }
 
-  /// Measurement update alone, see PredictorCorrector::correct.
+  /// Measurement update only, see PredictorCorrector::correct.
   StepStatus correct(scalar_type y) noexcept { return this->observer_.correct(y); }
 
   /// Restarts at (y, 0, .., 0).
@@ -220,9 +221,9 @@ class NamedAdapter : public Adapter<Observer> {
   using Base::Base;
 };
 
-/// Base of the adapters of packs: an adapter branches on the measurement, so it is computed lane by
-/// lane.
-/// @tparam Self the adapter of packs @tparam Plain of a lane @tparam Settings its Config
+/// Base of the adapters for packs. Adapters branch on the measurement, so they run lane by lane.
+/// @tparam Self the adapter of packs @tparam Plain the adapter of a lane @tparam Settings its
+/// Config
 template <class Self, class Plain, LoopObserver Observer, class Settings>
 class PackAdapter : public LaneByLane<Self, Plain, typename Observer::scalar_type, Settings>,
                     public detail::LevelsOf<Observer>,
@@ -234,11 +235,11 @@ class PackAdapter : public LaneByLane<Self, Plain, typename Observer::scalar_typ
   using Estimate = typename Observer::Estimate;            ///< (y, .., y^(n-1), d, ..), N x 1
   static constexpr int order = Observer::order;            ///< n, order of the plant
   static constexpr int size = Observer::size;              ///< N
-  static constexpr ObserverTraits traits = Plain::traits;  ///< what it is beyond LoopObserver
+  static constexpr ObserverTraits traits = Plain::traits;  ///< what it can do beyond LoopObserver
 
   using Base::Base;
 
-  /// What is adapted, put together from the lanes.
+  /// The adapted observer as one of packs, put together from the lanes.
   [[nodiscard]] Observer observer() const noexcept {
     return this->template gathered<Observer>(
         [](const Plain& lane) -> const auto& { return lane.observer(); });

@@ -1,5 +1,5 @@
 /// @file
-/// DelayedInput: an observer of a plant whose input acts a known number of samples late.
+/// DelayedInput: an observer for a plant whose input acts a known number of samples late.
 #pragma once
 
 #include <esokit/adapter/adapter.hpp>
@@ -13,7 +13,7 @@ template <LoopObserver Observer>
 struct DelayedInputConfig {
   using S = typename Observer::scalar_type;  ///< type of signals and settings
 
-  typename Observer::Config observer{};  ///< of the observer itself
+  typename Observer::Config observer{};  ///< config of the observer
   int delay = 0;                         ///< d, samples, 0 .. Capacity
 
   /// @cond
@@ -21,11 +21,12 @@ struct DelayedInputConfig {
   /// @endcond
 };
 
-/// Feeds the observer u[k-d] instead of u[k] (bus, drive or computing delay of d sample times), so
-/// that input and output belong together and the delay does not appear as a disturbance.
+/// Passes u[k-d] instead of u[k] to the observer (for a delay of d sample times by bus, drive or
+/// computation), so that the observer sees each y with the u that caused it, and the delay does not
+/// appear as a disturbance.
 ///
-/// The estimate is that of the present sample; the effect of inputs still in the delay line is not
-/// predicted.
+/// The estimate is for the present sample; the effect of inputs that are still in the delay line is
+/// not predicted.
 /// @tparam Capacity largest d that a config may ask for; the memory is Capacity + 1 scalars
 template <LoopObserver Observer, int Capacity>
 class DelayedInput : public NamedAdapter<DelayedInput<Observer, Capacity>, Observer,
@@ -37,7 +38,7 @@ class DelayedInput : public NamedAdapter<DelayedInput<Observer, Capacity>, Obser
   using S = typename Observer::scalar_type;
 
  public:
-  /// What it declares beyond LoopObserver.
+  /// What the adapter can do beyond LoopObserver.
   static constexpr ObserverTraits traits = [] {
     ObserverTraits traits = Base::traits;
     traits.delays_input = true;
@@ -45,13 +46,13 @@ class DelayedInput : public NamedAdapter<DelayedInput<Observer, Capacity>, Obser
     return traits;
   }();
 
-  /// One sample. @param y measurement @param u_applied u[k], undelayed; the delay is applied here
+  /// One sample. @param y measurement @param u_applied u[k], not delayed; the delay is applied here
   StepStatus update(S y, S u_applied) noexcept {
     const StepStatus status = push(u_applied);
     return status | observer_.update(y, delayed());
   }
 
-  /// Time update alone, see PredictorCorrector::predict.
+  /// Time update only, see PredictorCorrector::predict.
   StepStatus predict(S u_applied) noexcept {
     const StepStatus status = push(u_applied);
     return status | observer_.predict(delayed());
@@ -64,7 +65,7 @@ class DelayedInput : public NamedAdapter<DelayedInput<Observer, Capacity>, Obser
     inputs_.fill(u);
   }
 
-  /// Deleted: the observer was given an input of d samples ago.
+  /// Deleted, because the observer was given the input of d samples ago.
   StepStatus revise_input(const S&) noexcept = delete;
 
   /// d, samples.
@@ -83,11 +84,11 @@ class DelayedInput : public NamedAdapter<DelayedInput<Observer, Capacity>, Obser
                                static_cast<S>(Capacity), true});
   }
 
-  /// The inputs under way are kept.
+  /// Keeps the inputs in the delay line.
   void take(const DelayedInput& fresh) noexcept { delay_ = fresh.delay_; }
 
-  /// A bad input takes the place of the last good one here already, so that it is reported now and
-  /// not d samples later.
+  /// Replaces a bad input by the last good one at once, so that it is reported now and not d
+  /// samples later.
   StepStatus push(const S& u) noexcept {
     const S last = inputs_[static_cast<std::size_t>(newest_)];
     newest_ = newest_ + 1 == length ? 0 : newest_ + 1;

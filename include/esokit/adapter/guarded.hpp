@@ -22,7 +22,7 @@ namespace esokit {
 namespace detail {
 
 struct GuardAccess {
-  /// The observer in all adapters.
+  /// The observer inside all adapters.
   template <class O>
   static constexpr auto& innermost(O& o) noexcept {
     using Plain = std::remove_const_t<O>;
@@ -34,12 +34,12 @@ struct GuardAccess {
       return o;
     }
   }
-  /// Its scaled states, level by level.
+  /// The scaled states of the observer, level by level.
   template <class O>
   static constexpr auto& states(O& o) noexcept {
     return innermost(o).states_;
   }
-  /// Whether all estimates that they stand for are finite.
+  /// True if all estimates that belong to these states are finite.
   template <class O, class States>
   static constexpr bool finite(const O& o, const States& states) noexcept {
     return is_finite(innermost(o).probe(states));
@@ -129,18 +129,18 @@ requires(model_traits<Model>.tells_constant) struct DisturbanceConstant<Model, S
 
 }  // namespace detail
 
-/// The unit in which dhat stays the same while b0 changes, and in which its bound is given.
+/// The unit in which dhat stays constant when b0 changes, and in which its bound is given.
 enum class DisturbanceUnit : unsigned char {
-  output,  ///< unit of y^(n): a force, which is there whatever b0 is
-  input,   ///< unit of u: a bias of the actuator, which b0 multiplies
+  output,  ///< unit of y^(n): a force, which does not depend on b0
+  input,   ///< unit of u: a bias of the actuator, which is multiplied by b0
 };
 
-/// The end at which a saturated actuator is, if its output is unknown.
+/// The limit at which an actuator with unknown output is saturated.
 enum class Pin : unsigned char {
-  free,    ///< none: it delivers what the observer is told
-  upper,   ///< at its upper end: a larger u has no effect
-  lower,   ///< at its lower end: a smaller u has no effect
-  either,  ///< at the end given by the sign of the last u
+  free,    ///< at none: the actuator outputs the u given to the observer
+  upper,   ///< at its upper limit: a larger u has no effect
+  lower,   ///< at its lower limit: a smaller u has no effect
+  either,  ///< at the limit given by the sign of the last u
 };
 
 /// Config of Guarded.
@@ -148,10 +148,10 @@ template <LoopObserver Observer>
 struct GuardedConfig {
   using S = typename Observer::scalar_type;  ///< type of signals and settings
 
-  typename Observer::Config observer{};  ///< of the observer itself
+  typename Observer::Config observer{};  ///< config of the observer
   S disturbance_bound{};  ///< largest abs(dhat); 0: no bound. Unit of y^(n) or u, see `unit`
-  DisturbanceUnit unit = DisturbanceUnit::output;  ///< what dhat is counted in
-  int release_samples = 0;  ///< measurements after the end of a pin until dhat is free, 0 .. 65000
+  DisturbanceUnit unit = DisturbanceUnit::output;  ///< unit of dhat and its bound
+  int release_samples = 0;  ///< measurements from the end of a pin until dhat is free, 0 .. 65000
   S leak_time{};            ///< time constant of the decay of dhat, s; 0: none
 
   /// @cond
@@ -161,30 +161,30 @@ struct GuardedConfig {
   /// @endcond
 };
 
-/// Guards of dhat for times when the plant does not follow y^(n) = d + b0 u. Each guard is off by
-/// default; while all are off, the estimate is bit for bit that of the observer inside.
+/// Guards dhat while the plant does not follow y^(n) = d + b0 u. Each guard is off by default.
+/// While all are off, the estimate is the same, bit for bit, as that of the observer inside.
 ///
 /// - Trust: `set_trust(phi)`, 0 .. 1, multiplies every correction of dhat; y and its derivatives
 ///   are corrected as usual.
-/// - Held: the plant stands or is carried (on the ground, at a brake, with its output off), so the
-///   measurement says nothing about d. The trust is 0, and the observer gets `standing_input()`
-///   instead of u, which makes y^(n) zero. `Adrc::hold` does this for one sample; on release start
-///   the reference at y.
-/// - Pinned: the actuator or a mixer is at an end, and its output is not known (a known output is
-///   passed as u_applied and needs no guard). dhat may only move in the direction that frees the
-///   actuator: upwards if u is at its upper end and b0 > 0. It is free again `release_samples`
-///   measurements after the end of the pin; there is no time-out during the pin, because it would
-///   only restore the fault. Use it if the output is unrelated to u: if half of u still gets
-///   through, dhat compensates the other half, and holding it does more harm than good
-///   (examples/guards).
+/// - Held: the plant is held by something else (the ground, a brake, its output is off), so the
+///   measurement contains no information about d. Set the trust to 0 and give the observer
+///   `standing_input()` instead of u, which makes y^(n) zero. `Adrc::hold` does this for one
+///   sample; on release start the reference at y.
+/// - Pinned: the actuator or a mixer is at a limit, and its output is not known (a known output is
+///   passed as u_applied and needs no guard). dhat may only move in the direction that brings u
+///   back from the limit: upwards if u is at its upper limit and b0 > 0. dhat is free again
+///   `release_samples` measurements after the end of the pin. There is no time-out during the pin,
+///   because it would only restore the fault. Use this guard only if the output is unrelated to u:
+///   if half of u still acts, dhat compensates for the other half, and holding it does more harm
+///   than good (examples/guards).
 /// - Bound: abs(dhat) <= disturbance_bound, after the correction and before the prediction, at
-///   every level of a cascade. A load above it causes a steady error; `bounded()` reports it. With
-///   m > 1 a slope of the estimate that would lead out of the bound is set to zero.
-/// - Leak: each correction multiplies dhat by exp(-T / leak_time), whatever the trust is, so that a
-///   dhat found under other circumstances fades. This removes the integral action: a constant load
-///   leaves a steady error, `leak_error()` of the estimate and `Adrc::leak_error()` of y.
-/// - A changing b0: `set_input_gain(b)` before a sample, without design work. In Adrc and
-///   DisturbanceCompensator the law follows.
+///   every level of a cascade. A load above the bound causes a steady error; `bounded()` reports
+///   this. With m > 1 a slope of dhat that would exceed the bound is set to zero.
+/// - Leak: each correction multiplies dhat by exp(-T / leak_time), for any trust, so that an
+///   outdated dhat decays. This removes the integral action: a constant load leaves a steady error,
+///   in the estimate `leak_error()`, in y `Adrc::leak_error()`.
+/// - A changing b0: `set_input_gain(b)` before a sample, without design work. Adrc and
+///   DisturbanceCompensator use the new b0, too.
 ///
 /// With a model (ModelEso) all guards act on the constant part of d, which is told from what the
 /// plant's poles, the actuator and the sines contribute to `total_disturbance`. d and its bound are
@@ -199,16 +199,16 @@ struct GuardedConfig {
 /// - After a pin give `release_samples` the time in which the lag forgets what it was told.
 ///
 /// The first three multiply the correction of dhat by a phi in [0, 1], which may change at every
-/// sample; so does a bound, with m = 1, while the true d is within it. Errors stay bounded, and
-/// decay while the trust returns, if Re G > -1 on the unit circle, where G is the transfer function
-/// from the correction of dhat to its innovation (circle criterion). `make` checks this for each
-/// level and refuses a level that fails; all poles in one place pass at any bandwidth (tested to n
-/// = 5, omega_o T = 20): min Re G is -1/4 (n = 1), -1/3 (n = 2), -3/8 (n = 3) for fast sampling,
-/// and never below -1/2. The check includes the leak. Known poles and an actuator do not change it,
-/// a sensor counts like up to one order more per lag; a sine that is captured faster than about
-/// its frequency allows (20 rad/s at omega_o = 100: `capture_bandwidth` 20 fails, 4 passes) is
-/// refused. With m > 1 a frozen slope would run on, and
-/// for VariableTime no gain is known: for these only the bound and b0 are available.
+/// sample. With m = 1 the bound does the same, as long as the true d is within it. By the circle
+/// criterion errors stay bounded, and decay once the trust returns, if Re G > -1 on the unit
+/// circle, where G is the transfer function from the correction of dhat to its innovation. `make`
+/// checks this for each level and refuses a level that fails; all poles in one place pass at any
+/// bandwidth (tested to n = 5, omega_o T = 20): min Re G is -1/4 (n = 1), -1/3 (n = 2), -3/8 (n =
+/// 3) for fast sampling, and never below -1/2. The check includes the leak. Known poles and an
+/// actuator do not change it, a sensor counts like up to one order more per lag; a sine that is
+/// captured faster than about its frequency allows (20 rad/s at omega_o = 100: `capture_bandwidth`
+/// 20 fails, 4 passes) is refused. With m > 1 a frozen slope would run on, and for VariableTime no
+/// gain is known: for these only the bound and b0 are available.
 ///
 /// For constant gains on the chain or an AugmentedModel with one constant, as the outermost
 /// adapter. Not with KnownModel, because the proof does not cover fbar; not with leaky parts
@@ -247,22 +247,22 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   using typename Base::Config;
   using typename Base::Estimate;
 
-  /// Corrections of dhat may be scaled: trust, pin and hold.
+  /// Whether corrections of dhat may be scaled (trust, pin and hold).
   static constexpr bool gates =
       !on_chain || (size == n + 1 && !observer_traits<Observer>.varies_time);
 
-  /// What it declares beyond LoopObserver.
+  /// What the adapter can do beyond LoopObserver.
   static constexpr ObserverTraits traits = [] {
     ObserverTraits traits = Base::traits;
-    traits.acts_by_gain = false;  // by what b0 is now, too
+    traits.acts_by_gain = false;  // it also depends on the present b0
     traits.schedules_input_gain = true;
     traits.gates_disturbance = gates;
     return traits;
   }();
 
   /// Checks the settings and does all the design work.
-  /// @return the observer at rest in zero, nothing pinned, full trust; or an error that names the
-  /// field, `level` with its number where the circle criterion fails
+  /// @return the observer at rest at zero, without a pin and with full trust; or an error that
+  /// names the field, or `level` and its number if the circle criterion fails
   static Expected<Guarded, Error<S>> make(const Config& config) {
     const auto made = Base::make(config);
     if (!made) return made.error();
@@ -309,7 +309,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     return status;
   }
 
-  /// Time update alone, see PredictorCorrector::predict.
+  /// Time update only, see PredictorCorrector::predict.
   StepStatus predict(S u_applied) noexcept {
     if constexpr (!on_chain) {
       if (held_) [[unlikely]]
@@ -320,7 +320,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     return status;
   }
 
-  /// Measurement update alone, see PredictorCorrector::correct.
+  /// Measurement update only, see PredictorCorrector::correct.
   StepStatus correct(S y) noexcept {
     const Found before = found();
     const StepStatus status = observer_.correct(y);
@@ -328,10 +328,10 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     return status;
   }
 
-  /// Restarts at (y, 0, .., 0). Trust, pin and b0 stay what they are.
+  /// Restarts at (y, 0, .., 0). Trust, pin and b0 are kept.
   StepStatus reset(S y) noexcept { return observer_.reset(y); }
 
-  /// Restarts at a given estimate, N x 1, its dhat within the bound.
+  /// Restarts at a given estimate, N x 1, with its dhat limited to the bound.
   StepStatus reset(const Estimate& state) noexcept {
     const StepStatus status = observer_.reset(state);
     if (status == StepStatus::ok) keep_bound();
@@ -339,14 +339,15 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   }
 
   /// From the next correction on, corrections of dhat are multiplied by `phi`, 0 .. 1. A smaller or
-  /// larger phi counts as 0 or 1, one that is not finite changes nothing.
+  /// larger phi counts as 0 or 1; one that is not finite changes nothing.
   void set_trust(const S& phi) noexcept requires gates {
     if (!is_finite(phi)) return;
     trust_ = phi < S(0) ? S(0) : phi < S(1) ? phi : S(1);
     set_weights();
   }
 
-  /// States where the actuator is, from the next correction on; call it once or at every sample.
+  /// Tells at which limit the actuator is, from the next correction on. Call it once, or at every
+  /// sample.
   void set_pin(Pin where) noexcept requires gates {
     if (where == Pin::either) {
       const S u = applied_input();
@@ -394,10 +395,11 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     return is_finite(u) ? u : applied_input();
   }
 
-  /// b0 from the coming sample on: it applies to the law's next answer, and to the u given one
-  /// sample later, which is that answer. dhat is kept in its unit, see DisturbanceUnit.
+  /// Sets b0 from the next sample on: it applies to the next output of the law, and therefore to
+  /// the u that is passed to the observer one sample later. dhat is kept in its unit, see
+  /// DisturbanceUnit.
   /// @return error for a b that is not finite, has not the sign of the config's input_gain, or is
-  /// too far from it for the scalar: nothing changes
+  /// too far from it for the scalar: nothing changes then
   Check<S> set_input_gain(const S& b) noexcept {
     const S ratio = b * inverse_gain_;
     const S factor = S(1) / ratio;
@@ -434,12 +436,12 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     return {};
   }
 
-  /// phi.
+  /// The trust phi, 0 .. 1.
   [[nodiscard]] const S& trust() const noexcept { return trust_; }
-  /// The end given to `set_pin`.
+  /// The last argument of `set_pin`.
   [[nodiscard]] Pin pin() const noexcept { return pin_; }
-  /// True if something scales the next correction of dhat: less than full trust, a pin or its
-  /// release.
+  /// True if the next correction of dhat will be scaled: by less than full trust, a pin, or the
+  /// time after a pin.
   [[nodiscard]] bool gated() const noexcept { return gated_; }
   /// True if dhat is at its bound.
   [[nodiscard]] bool bounded() const noexcept {
@@ -451,8 +453,8 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     constexpr S rounding = S(1) - S(8) * std::numeric_limits<S>::epsilon();
     return reaches(limit() * rounding);
   }
-  /// The steady error x - xhat that the leak causes, with constant y and a constant d = 1 (unit of
-  /// y^(n)); zero without a leak. N x 1, (y, .., d).
+  /// The steady error x - xhat caused by the leak, for a constant y and a constant d = 1 (unit of
+  /// y^(n)): (y, .., d), N x 1. Zero without a leak.
   [[nodiscard]] Estimate leak_error() const noexcept requires gates {
     if (!(leak_ > S(0))) return Estimate::Zero();
     const auto& model = detail::GuardAccess::innermost(observer_).model();
@@ -474,13 +476,13 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
         return model.physical(x);
       });
     }
-    // What is found is (1 - leak) / leak of what the levels correct.
+    // In steady state dhat is (1 - leak) / leak times its correction.
     const S kept = (S(1) - leak_) / leak_;
     S left = model.scaled_disturbance(S(1));
     Array<S, size> error{};
     for (int level = 0; level < levels; ++level) {
       const auto k = observer_.level_gain(level);
-      // A state stands: what the rows below add to it in a step is what its correction takes.
+      // Each state is constant: in a step, the prediction adds what the correction removes.
       const S share = std::get<n - 1>(k) / static_cast<S>(n);
       const S innovation = left / (share + kept * std::get<n>(k));
       left = share * innovation;
@@ -492,7 +494,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
         }
         error[static_cast<std::size_t>(i + 1)] = sum / static_cast<S>(i + 1);
       }
-      // A level sees the corrected y of the one before.
+      // A level is corrected by the corrected y of the level before.
       error[0] = error[0] + (S(1) - k[0]) * innovation;
     }
     return model.physical(error);
@@ -500,21 +502,22 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
 
   /// b0 of now.
   [[nodiscard]] S present_input_gain() const noexcept { return configured_gain() * gain_ratio_; }
-  /// b0 of the config over the present b0: the factor for a law that divides by the first.
+  /// b0 of the config divided by the present b0: the factor on the output of a law that uses the
+  /// former.
   [[nodiscard]] const S& input_factor() const noexcept { return input_factor_; }
 
-  /// Adds `offset` to dhat, within the bound, see PredictorCorrector.
+  /// Adds `offset` to dhat, limited to the bound, see PredictorCorrector.
   StepStatus shift_disturbance(const S& offset) noexcept requires ShiftableDisturbance<Observer> {
     const StepStatus status = observer_.shift_disturbance(offset);
     if (status == StepStatus::ok) keep_bound();
     return status;
   }
 
-  /// Input that the last prediction used, by the b0 of now.
+  /// The input that the last prediction used, converted to the present b0.
   [[nodiscard]] S applied_input() const noexcept {
     return detail::clipped(S(observer_.applied_input() * input_factor_));
   }
-  /// The estimate of a plant that stands at y under u.
+  /// The estimate for a plant at rest at y under a constant u, N x 1.
   [[nodiscard]] Estimate rest(const S& y, const S& u) const noexcept {
     return observer_.rest(y, S(u * gain_ratio_));
   }
@@ -522,12 +525,12 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   void fill_input(const S& u) noexcept requires(observer_traits<Observer>.delays_input) {
     observer_.fill_input(S(u * gain_ratio_));
   }
-  /// The actuator held `u_applied`, see PredictorCorrector.
+  /// Tells that the actuator held `u_applied`, see PredictorCorrector.
   StepStatus revise_input(const S& u_applied) noexcept requires requires(Observer& o, const S& s) {
     o.revise_input(s);
   }
   { return observer_.revise_input(S(u_applied * gain_ratio_)); }
-  /// It would pass the gates.
+  /// Deleted, because it would bypass the guards.
   StepStatus correct_weighted(const S&, const S&) noexcept = delete;
 
  private:
@@ -557,7 +560,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
                  "is so long that a sample changes nothing the scalar can hold");
   }
 
-  /// The part of dhat that goes after each correction.
+  /// The share of dhat that is removed after each correction.
   static S leak_of(const Config& config) {
     if (!(config.leak_time > S(0))) return S(0);
     return -std::expm1(-chain_config<Observer>(config.observer).sample_time / config.leak_time);
@@ -660,11 +663,12 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     return all;
   }
 
-  /// After a correction. @param before what was found before it: no prediction changes it (m = 1)
+  /// Applies the guards after a correction. @param before dhat of the levels before it, which no
+  /// prediction changes (m = 1)
   ESOKIT_INLINE void keep_guards(const Found& before, StepStatus status) noexcept {
     if constexpr (gates) {
       if (acts_) [[unlikely]] {
-        // What starts anew knows nothing of what was before.
+        // After a restart the old dhat is meaningless.
         if (gated_ && !has(status, StepStatus::restarted)) gate(before);
         if (!has(status, StepStatus::measurement_rejected | StepStatus::outlier_rejected)) {
           for (auto& level : detail::GuardAccess::states(observer_)) {
@@ -679,7 +683,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
       keep_bound();
   }
 
-  /// Takes back what of the correction does not count.
+  /// Takes back the part of the correction that does not count.
   ESOKIT_INLINE void gate(const Found& before) noexcept {
     auto& states = detail::GuardAccess::states(observer_);
     detail::unroll<levels>([&](auto level) ESOKIT_INLINE_LAMBDA {
@@ -700,7 +704,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     acts_ = gated_ || leak_ > S(0);
   }
 
-  /// Sign of the corrections of dhat that bring u down.
+  /// Sign of the corrections of dhat that lower u.
   [[nodiscard]] signed char side_at_upper() const noexcept {
     return observer_.input_gain() > S(0) ? 1 : -1;
   }
@@ -755,7 +759,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     return false;
   }
 
-  /// What each level, with those below it, has found is within the bound.
+  /// Limits the dhat of each level, summed with the levels below it, to the bound.
   ESOKIT_COLD void keep_bound() noexcept {
     const S most = limit();
     if constexpr (!on_chain) {
@@ -771,7 +775,8 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
         const S end = sum > S(0) ? most : S(-most);
         level[n] = end - below;
         if constexpr (size > n + 1) {
-          // The slope of all levels so far is not told apart: that of this one must not lead out.
+          // The slopes of the levels are not distinguished: the slope of this one must not lead out
+          // of the bound.
           if (level[n + 1] * end > S(0)) {
             for (std::size_t r = n + 1; r < size; ++r) level[r] = S(0);
           }
@@ -781,24 +786,24 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     }
   }
 
-  S bound_;                ///< as it was given
+  S bound_;                ///< in the unit of the config
   S bound_in_force_;       ///< unit of y^(n), at the present b0
   S limit_;                ///< the same, scaled
-  S gain_ratio_ = S(1);    ///< b0 of now by that of the config
-  S told_ratio_ = S(1);    ///< of the u that is told next: what it was when the law gave it
+  S gain_ratio_ = S(1);    ///< present b0 divided by b0 of the config
+  S told_ratio_ = S(1);    ///< gain_ratio when the law computed the u that comes next
   S input_factor_ = S(1);  ///< 1 / gain_ratio
   S inverse_gain_;         ///< 1 / b0 of the config
-  S leak_;                 ///< part of dhat that goes after each correction
+  S leak_;                 ///< share of dhat that is removed after each correction
   [[no_unique_address]] detail::DisturbanceConstant<Model, S> constant_;  ///< of a model
   S trust_ = S(1);
-  S weight_up_ = S(1);    ///< what a correction of dhat upwards counts
-  S weight_down_ = S(1);  ///< and one downwards
+  S weight_up_ = S(1);    ///< factor on corrections that raise dhat
+  S weight_down_ = S(1);  ///< factor on corrections that lower dhat
   DisturbanceUnit unit_;
   Pin pin_ = Pin::free;
-  signed char side_ = 0;  ///< sign of the corrections that free a pinned actuator; 0: none does
+  signed char side_ = 0;  ///< sign of the corrections that free a pinned actuator; 0: unknown
   bool held_ = false;
   bool gated_ = false;
-  bool acts_ = false;  ///< gated, or leaks: one test in the hot path
+  bool acts_ = false;  ///< gated or leaking: one test in the hot path
   std::uint16_t release_samples_;
   std::uint16_t release_left_ = 0;
 };

@@ -1,6 +1,6 @@
 /// @file
-/// KnownModel: what is known of the plant and not linear is fed to the observer, which estimates
-/// only the rest.
+/// KnownModel: passes known nonlinear terms of the plant to the observer, which estimates only the
+/// rest.
 #pragma once
 
 #include <esokit/adapter/adapter.hpp>
@@ -10,14 +10,14 @@
 
 namespace esokit {
 
-/// What a known model can do beside fbar, declared in a member `static constexpr PlantModelTraits
+/// What a known model can do besides fbar, declared in a member `static constexpr PlantModelTraits
 /// traits{..}`.
 struct PlantModelTraits {
   bool checks = false;  ///< `check() const` gives the error of a bad parameter, as a Check
 };
 
 /// A known part of y^(n): fbar(estimate), noexcept, in the unit of y^(n), a function of y ..
-/// y^(n-1) alone. It declares what else it can do, see PlantModelTraits.
+/// y^(n-1) only. What else it can do it declares in PlantModelTraits.
 template <class Model, class Observer>
 concept PlantModel = std::copyable<Model> &&
     requires(const Model& model, const typename Observer::Estimate& estimate) {
@@ -33,7 +33,7 @@ template <LoopObserver Observer, class Model>
 struct KnownModelConfig {
   using S = typename Observer::scalar_type;  ///< type of signals and settings
 
-  typename Observer::Config observer{};  ///< of the observer itself
+  typename Observer::Config observer{};  ///< config of the observer
   Model model{};                         ///< fbar
 
   /// @cond
@@ -42,17 +42,17 @@ struct KnownModelConfig {
 };
 
 /// Observer of y^(n) = fbar(y, ..) + d + b0 u with fbar known. The chain is driven by u + fbar/b0,
-/// fbar taken at the last estimate and held over the step, and estimates d alone.
+/// with fbar computed from the last estimate and held over the step; so it estimates d only.
 ///
 /// Row n of `estimate`, like `total_disturbance`, is fbar + dhat: this is what a controller
-/// cancels. `residual_disturbance` is dhat alone.
+/// cancels. `residual_disturbance` is dhat only.
 ///
-/// For nonlinear terms: friction, gravity, a spring that hardens. Known poles belong into the model
+/// For nonlinear terms: friction, gravity, a spring that hardens. Known poles belong in the model
 /// of the observer, which is exact and can be analysed (`ModelEso`, `.plant_poles`).
 ///
-/// The change of fbar within a step remains in dhat, O(T). Because fbar is computed from the
+/// The change of fbar within a step, O(T), remains in dhat. Because fbar is computed from the
 /// estimate, it is part of the error dynamics: omega_o should be well above the slopes of fbar.
-/// @tparam Model your function fbar(estimate), for packs with `with_scalar` and `fields`
+/// @tparam Model your function fbar(estimate); for packs it needs `with_scalar` and `fields`
 template <ShiftableDisturbance Observer, class Model>
 requires PlantModel<Model, Observer>
 class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
@@ -62,13 +62,13 @@ class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
   using Base::observer_;
   using S = typename Observer::scalar_type;
   static_assert(!observer_traits<Observer>.delays_input,
-                "esokit: DelayedInput goes around KnownModel: fbar is not delayed");
+                "esokit: put DelayedInput around KnownModel, not inside it: fbar is not delayed");
 
  public:
   using Base::order;
   using typename Base::Estimate;
 
-  /// What it declares beyond LoopObserver.
+  /// What the adapter can do beyond LoopObserver.
   static constexpr ObserverTraits traits = [] {
     ObserverTraits traits = Base::traits;
     traits.publishes_chain = false;
@@ -78,8 +78,8 @@ class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
   }();
 
   /// Takes over the settings of `fresh`, as returned by `make`, without design work. As with
-  /// `retune`, the estimate fbar + d is kept; d becomes what the new fbar does not explain, and a
-  /// change of b0 is moved into d as everywhere. u does not jump.
+  /// `retune`, the estimate fbar + d is kept; d becomes the part that the new fbar does not
+  /// explain, and a change of b0 is moved into d as usual. u does not jump.
   Check<S> adopt(const KnownModel& fresh) {
     KnownModel next = *this;
     const S fed = observer_.applied_input() - applied_input_;
@@ -87,7 +87,8 @@ class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
     if (auto ok = next.observer_.adopt(fresh.observer_); !ok) return ok;
     next.model_ = fresh.model_;
     next.inverse_gain_ = fresh.inverse_gain_;
-    // The observer moved (b0_old - b0_new) times all that drove it; fbar's share is not b0's.
+    // The observer added (b0_old - b0_new) times its whole input to d; the share of fbar in this
+    // input must be taken out again.
     const S moved = known_part() - next.known_part() - gain_change * fed;
     const bool some = !is_finite(moved) || moved < S(0) || moved > S(0);
     if (some && next.observer_.shift_disturbance(moved) != StepStatus::ok) {
@@ -98,13 +99,13 @@ class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
   }
 
   /// One sample, see PredictorCorrector::update. `u_applied` is the u that the actuator held,
-  /// without the share of the model.
+  /// without the contribution of the model.
   StepStatus update(S y, S u_applied) noexcept {
     const S input = accepted(u_applied);
     return report(u_applied) | observer_.update(y, input);
   }
 
-  /// Time update alone, see PredictorCorrector::predict.
+  /// Time update only, see PredictorCorrector::predict.
   StepStatus predict(S u_applied) noexcept {
     const S input = accepted(u_applied);
     return report(u_applied) | observer_.predict(input);
@@ -131,7 +132,7 @@ class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
     return state;
   }
 
-  /// One row of it.
+  /// One row of the estimate.
   template <int Row>
   [[nodiscard]] S estimate() const noexcept {
     if constexpr (Row == order) {
@@ -146,7 +147,7 @@ class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
     return known_part() + residual_disturbance();
   }
 
-  /// Estimate of level `level`, its row n with fbar of that level's estimate.
+  /// Estimate of level `level`, N x 1; fbar in its row n is computed from that level's estimate.
   [[nodiscard]] Estimate level_estimate(int level) const noexcept requires
       LevelledObserver<Observer> {
     Estimate state = observer_.level_estimate(level);
@@ -154,24 +155,23 @@ class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
     return state;
   }
 
-  /// The chain of the observer has dhat in it, not fbar + dhat.
+  /// Deleted, because the chain of the observer contains dhat, not fbar + dhat.
   template <int Row>
   S scaled_estimate() const noexcept = delete;
 
-  /// fbar's share would be lost.
+  /// Deleted, because the contribution of fbar would be lost.
   StepStatus revise_input(const S&) noexcept = delete;
 
-  /// dhat without what the model explains, unit of y^(n).
+  /// dhat without the known part, unit of y^(n).
   [[nodiscard]] S residual_disturbance() const noexcept { return observer_.total_disturbance(); }
 
   /// fbar.
   [[nodiscard]] const Model& known_model() const noexcept { return model_; }
 
-  /// fbar at the present estimate, unit of y^(n); zero if it, or fbar + dhat, is not finite,
-  /// because then the model explains nothing.
+  /// fbar at the present estimate, unit of y^(n); zero if it, or fbar + dhat, is not finite.
   [[nodiscard]] S known_part() const noexcept { return known_part(observer_.estimate()); }
 
-  /// Input that the last step used, without the model's share.
+  /// The input that the last step used, without the contribution of the model.
   [[nodiscard]] const S& applied_input() const noexcept { return applied_input_; }
 
  private:
@@ -192,7 +192,7 @@ class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
     return is_finite(known + state(order)) ? known : S(0);
   }
 
-  /// u, or the last good one, with the model's share.
+  /// u, or the last good one, plus the contribution of the model.
   S accepted(const S& u) noexcept {
     if (is_finite(u)) applied_input_ = u;
     return applied_input_ + known_part() * inverse_gain_;

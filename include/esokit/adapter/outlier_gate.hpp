@@ -13,11 +13,11 @@ template <LoopObserver Observer>
 struct OutlierGateConfig {
   using S = typename Observer::scalar_type;  ///< type of signals and settings
 
-  typename Observer::Config observer{};  ///< of the observer itself
-  S threshold{};          ///< unit of y: an innovation up to this is accepted; 0: no gate
-  S running_factor{};     ///< so is one up to this times the running mean of abs(innovation)
-                          ///< (0.8 standard deviations where Gaussian); 0: the threshold alone
-  int most_in_a_row = 5;  ///< outliers in a row that are rejected, 1 .. 65000
+  typename Observer::Config observer{};  ///< config of the observer
+  S threshold{};          ///< innovations up to this are accepted, unit of y; 0: no gate
+  S running_factor{};     ///< and those up to this times the running mean of abs(innovation)
+                          ///< (0.8 standard deviations if Gaussian); 0: threshold only
+  int most_in_a_row = 5;  ///< consecutive outliers that are rejected, 1 .. 65000
 
   /// @cond
   static constexpr auto fields(auto& c) noexcept {
@@ -27,18 +27,18 @@ struct OutlierGateConfig {
 };
 
 /// Rejects a measurement whose innovation is too large: the observer only predicts, and the next
-/// correction uses the gain for the gap. Without it one y of 1e30 spoils a linear observer for ln
-/// 1e30 / (omega_o T) samples.
+/// correction uses the gain for the gap. Without a gate a single y of 1e30 spoils the estimate of a
+/// linear observer for ln 1e30 / (omega_o T) samples.
 ///
 /// A measurement is accepted if abs(y - z_1) <= M max(threshold, running_factor m), where m is the
 /// running mean of abs(y - z_1) over about 64 measurements and M the number of sample times since
 /// the last correction (D if only every D-th sample has a measurement). The gate never stays shut:
 /// after `most_in_a_row` rejected measurements it opens and accepts everything until as many in a
-/// row are within the limit. So after a true step of any size in y the observer follows it
-/// `most_in_a_row` samples late. At the start and after a reset it is open in the same way.
+/// row are within the limit. So the observer follows a true step of y, of any size, with a delay of
+/// `most_in_a_row` samples. At the start and after a reset the gate is open in the same way.
 ///
-/// It nests with the other adapters; WrappedOutput goes around it and tells it the turn.
-/// ExtendedStateFilter has its own gate, which knows the variance of its innovation.
+/// It can be combined with the other adapters; WrappedOutput must be outside, because it determines
+/// the turn of y. ExtendedStateFilter has its own gate, which uses the variance of the innovation.
 template <LevelledObserver Observer>
 requires RestartingObserver<Observer>
 class OutlierGate
@@ -48,24 +48,24 @@ class OutlierGate
   using Base::observer_;
   using S = typename Observer::scalar_type;
   static_assert(!observer_traits<Observer>.wraps_output,
-                "esokit: WrappedOutput goes around OutlierGate: it counts the turns");
+                "esokit: put WrappedOutput around OutlierGate, not inside it");
 
  public:
-  /// What it declares beyond LoopObserver.
+  /// What the adapter can do beyond LoopObserver.
   static constexpr ObserverTraits traits = [] {
     ObserverTraits traits = Base::traits;
     traits.rejects_outliers = true;
     return traits;
   }();
 
-  /// One sample, see PredictorCorrector::update; `outlier_rejected` where y was taken for one.
+  /// One sample, see PredictorCorrector::update; reports `outlier_rejected` if y was rejected.
   StepStatus update(S y, S u_applied) noexcept {
     if (!gated()) return observer_.update(y, u_applied);
     const StepStatus predicted = observer_.predict(u_applied);
     return predicted | correct(y);
   }
 
-  /// Measurement update alone.
+  /// Measurement update only.
   StepStatus correct(S y) noexcept {
     if (gated() && !lets_in(y)) return StepStatus::outlier_rejected;
     return observer_.correct(y);
@@ -79,10 +79,10 @@ class OutlierGate
     return open_after(observer_.reset(state));
   }
 
-  /// It would pass the gate.
+  /// Deleted, because it would bypass the gate.
   StepStatus correct_weighted(const S&, const S&) noexcept = delete;
 
-  /// Innovation up to which a measurement is accepted if none is missing, unit of y.
+  /// The innovation up to which a measurement is accepted if none is missing, unit of y.
   [[nodiscard]] S limit() const noexcept {
     const S running = running_factor_ * mean_;
     return running > threshold_ ? running : threshold_;
@@ -104,7 +104,7 @@ class OutlierGate
         .not_negative("running_factor", config.running_factor)
         .require(!(config.running_factor > S(0)) || config.threshold > S(0), "threshold",
                  config.threshold,
-                 "must be positive where running_factor is: without noise nothing would pass")
+                 "must be positive if running_factor is: without noise nothing would pass")
         .require(1 <= config.most_in_a_row && config.most_in_a_row <= 65000, "most_in_a_row",
                  static_cast<S>(config.most_in_a_row), "must be 1 .. 65000");
   }
@@ -125,10 +125,10 @@ class OutlierGate
     }
   }
 
-  /// True also for a y that is not finite (`correct` rejects it) and for one that restarts the
-  /// observer.
+  /// True if y may be used. Also true for a y that is not finite, which `correct` rejects, and for
+  /// one that restarts the observer.
   bool lets_in(const S& y) noexcept {
-    // The innovation is that of level 1, whose z_1 the correction will subtract.
+    // The innovation of level 1, as in the correction.
     const S innovation = y - expected();
     if (!is_finite(innovation)) return true;
     if (this->restarts()) {
@@ -143,8 +143,7 @@ class OutlierGate
       ++count_;
       return false;
     }
-    // What is beyond the limit counts as the limit, so that no outlier and no gap widens the gate
-    // for long.
+    // Larger values count as the limit, so that no outlier and no gap widens the gate for long.
     const S counted = distance < limit() ? distance : limit();
     mean_ += (counted - mean_) * static_cast<S>(1.0 / 64);
     if (open_ && fits) {
@@ -169,7 +168,7 @@ class OutlierGate
   S running_factor_;
   S mean_{};  ///< of abs(innovation)
   std::uint16_t most_in_a_row_;
-  std::uint16_t count_ = 0;  ///< in a row: rejected while shut, within the limit while open
+  std::uint16_t count_ = 0;  ///< consecutive: rejected if closed, within the limit if open
   bool open_ = true;
 };
 

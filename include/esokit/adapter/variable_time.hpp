@@ -12,7 +12,7 @@ template <LoopObserver Observer>
 struct VariableTimeConfig {
   using S = typename Observer::scalar_type;  ///< type of signals and settings
 
-  typename Observer::Config observer{};  ///< with the nominal sample time T
+  typename Observer::Config observer{};  ///< config of the observer, with the nominal sample time T
   S ratio = S(4);                        ///< above 1: steps may take T / ratio .. T ratio
 
   /// @cond
@@ -20,20 +20,20 @@ struct VariableTimeConfig {
   /// @endcond
 };
 
-/// The observer is told before each step how long the step took; chain and gains follow exactly.
+/// Before each step the observer is told how long the step took; model and gains follow exactly.
 ///
-/// A step of another length than the last one is a retune: the observer's whole `make`, with one
-/// expm1 a level and its checks (LinearEso<2>: some thirty updates' time, 40 .. 80 ns on a desktop,
-/// see benchmarks/control). A step of the same length costs one comparison, so do not report
-/// changes too small to matter. Observers with a slow `make` (AlgebraicEso designs its whole
-/// schedule, AdjustableBandwidthEso and NonlinearEso compute their certificate) are for logs, or
-/// for a rate that changes rarely. After missing samples the gain is that of the whole time since
-/// the last correction, whatever the single steps were.
+/// A step with another length than the last one is a retune: the whole `make` of the observer, with
+/// its checks and one expm1 per level (LinearEso<2>: 40 .. 80 ns on a desktop, the time of some
+/// thirty updates, see benchmarks/control). A step of the same length costs one comparison, so do
+/// not pass on insignificant changes of the length. Observers with a slow `make` (AlgebraicEso
+/// designs its whole schedule, AdjustableBandwidthEso and NonlinearEso compute their certificate)
+/// are for logs, or for a rate that changes rarely. After missing samples the gain is that for the
+/// total time since the last correction.
 ///
 /// AlgebraicEso counts samples: while its bandwidth falls, it treats all samples so far as if they
 /// had the present length; once settled it is exact. The gain sets of a switched observer follow
-/// time; its switching test compares successive innovations without regard to the time between
-/// them.
+/// the step time, but its switching test compares successive innovations regardless of the time
+/// between them.
 template <RestartingObserver Observer>
 class VariableTime
     : public NamedAdapter<VariableTime<Observer>, Observer, VariableTimeConfig<Observer>> {
@@ -43,7 +43,7 @@ class VariableTime
   using S = typename Observer::scalar_type;
 
  public:
-  /// What it declares beyond LoopObserver.
+  /// What the adapter can do beyond LoopObserver.
   static constexpr ObserverTraits traits = [] {
     ObserverTraits traits = Base::traits;
     traits.varies_time = true;
@@ -54,13 +54,13 @@ class VariableTime
   using typename Base::Config;
 
   /// Checks the settings and does all the design work.
-  /// @return the observer at rest in zero, or an error that names the field; the observer's config
-  /// must be good at both ends of the range
+  /// @return the observer at rest at zero, or an error that names the field. The observer's config
+  /// must be valid at both ends of the range
   static Expected<VariableTime, Error<S>> make(const Config& config) {
     if (Rules<S> rules; !rules.above("ratio", config.ratio, S(1))) return rules.error();
     auto observer = Observer::make(config.observer);
     if (!observer) return observer.error();
-    // All that may be asked for later must be a good config: the ends of the range are.
+    // Every step time in the range must give a valid config; it does if both ends do.
     for (const S factor : {config.ratio, S(1) / config.ratio}) {
       auto edge = config.observer;
       chain_config<Observer>(edge).sample_time = chain_config<Observer>(edge).sample_time * factor;
@@ -70,7 +70,7 @@ class VariableTime
   }
 
   /// Sets the length of the next steps (s), until the next call. A length outside T / ratio .. T
-  /// ratio is refused, and the last one stays.
+  /// ratio is refused, and the last one is kept.
   Check<S> set_step_time(const S& seconds) noexcept {
     const S nominal = chain_config<Observer>(config_.observer).sample_time;
     const S shortest = nominal / config_.ratio;
@@ -85,7 +85,7 @@ class VariableTime
     return {};
   }
 
-  /// One sample, see PredictorCorrector::update; it took `step_time`.
+  /// One sample of length `step_time`, see PredictorCorrector::update.
   StepStatus update(S y, S u_applied) noexcept {
     if (!is_current() || this->missed() != 0) [[unlikely]] {
       const StepStatus predicted = predict(u_applied);
@@ -95,20 +95,20 @@ class VariableTime
     return observer_.update(y, u_applied);
   }
 
-  /// Time update alone, over `step_time`.
+  /// Time update only, over `step_time`.
   StepStatus predict(S u_applied) noexcept {
     if (!is_current()) take(step_time_);
     elapsed_ = this->missed() == 0 ? step_time_ : elapsed_ + step_time_;
     return observer_.predict(u_applied);
   }
 
-  /// Measurement update alone, with the gain for all the time since the last one.
+  /// Measurement update only, with the gain for the total time since the last one.
   StepStatus correct(S y) noexcept {
     take_gap();
     return observer_.correct(y);
   }
 
-  /// The same with the variance of this measurement's noise, see ExtendedStateFilter.
+  /// The same with the noise variance of this measurement, see ExtendedStateFilter.
   template <class B = Base>
   requires requires(B& base, S s) { base.correct_weighted(s, s); }
   StepStatus correct_weighted(S y, S variance) noexcept {
@@ -116,7 +116,7 @@ class VariableTime
     return observer_.correct_weighted(y, variance);
   }
 
-  /// Length of the steps now, s.
+  /// Present length of the steps, s.
   [[nodiscard]] const S& step_time() const noexcept { return step_time_; }
 
  private:
@@ -137,21 +137,21 @@ class VariableTime
     return !(step_time_ < current_ || step_time_ > current_);
   }
 
-  /// The observer bridges `missed` steps of its sample time: makes that their mean.
+  /// The observer bridges a gap in `missed` equal steps: sets its sample time to their mean.
   void take_gap() noexcept {
     const int steps = this->missed();
     if (steps > 1 && !this->restarts()) take(elapsed_ / static_cast<S>(steps));
   }
 
-  /// The ends of the range were accepted by `make`; an estimate that would overflow keeps the old
-  /// sample time, and the guarded step reports what is not finite.
+  /// `make` has accepted the ends of the range, so only an estimate that would overflow can be
+  /// refused. Then the old sample time is kept, and the next step reports it.
   void take(const S& seconds) noexcept {
     auto config = config_.observer;
     chain_config<Observer>(config).sample_time = seconds;
     if constexpr (requires { observer_.model().speed(); }) {
-      const S speed = observer_.model().speed();  // a retune takes it back to 1
+      const S speed = observer_.model().speed();  // a retune resets it to 1
       if (!detail::retune(observer_, config)) return;
-      (void)observer_.set_speed(speed);  // within the range that it was accepted in
+      (void)observer_.set_speed(speed);  // it is within its range
       current_ = seconds;
     } else {
       if (detail::retune(observer_, config)) current_ = seconds;
@@ -160,7 +160,7 @@ class VariableTime
 
   Config config_;
   S step_time_;
-  S current_;  ///< the sample time that the observer has now
+  S current_;  ///< present sample time of the observer
   S elapsed_{};
 };
 

@@ -1,5 +1,5 @@
 /// @file
-/// WrappedOutput: an observer of an angle, whose measurement jumps by a period.
+/// WrappedOutput: an observer for an angle whose measurement jumps by a period at each turn.
 #pragma once
 
 #include <cmath>
@@ -16,40 +16,41 @@ template <LoopObserver Observer>
 struct WrappedOutputConfig {
   using S = typename Observer::scalar_type;  ///< type of signals and settings
 
-  typename Observer::Config observer{};  ///< of the observer itself
-  S period{};                            ///< of y, in its unit: 2 pi, 360
+  typename Observer::Config observer{};  ///< config of the observer
+  S period{};                            ///< period of y in its unit: 2 pi, 360
 
   /// @cond
   static constexpr auto fields(auto& c) noexcept { return detail::tie(c.observer, c.period); }
   /// @endcond
 };
 
-/// Counts the turns, so a measurement in any branch (0..2 pi, -180..180) can be used as it comes.
-/// z_1 is kept within half a period of zero, so that float stays exact after many turns.
+/// Counts the turns, so that a measurement in any branch (0 .. 2 pi, -180 .. 180) can be used
+/// directly. z_1 is kept within half a period of zero, so that float keeps its resolution after
+/// many turns.
 ///
-/// Turns are counted from one measurement to the next, not from the prediction. The observer sees
-/// an angle without jumps and behaves as it does on one: every omega_o T is allowed, and the true
-/// angle is the only equilibrium. (If the innovation is taken modulo one period, as is often done,
-/// every y' + k period / T is an equilibrium: after one bad sample an axis at rest may be estimated
-/// as spinning for ever.)
+/// Turns are counted from one measurement to the next, not from the prediction. So the observer
+/// sees an angle without jumps: every omega_o T is allowed, and the true angle is the only
+/// equilibrium. (If the innovation is taken modulo one period, as is often done, every y' + k
+/// period / T is an equilibrium: after one bad sample an axis at rest may be estimated as spinning
+/// forever.)
 ///
 /// Requirements on y, including its noise:
-/// - between neighbouring measurements (D samples apart if only every D-th sample has one) it moves
-///   by less than half a period;
-/// - the motion changes by less than a quarter of a period against the average of the last eight;
-///   over a gap it is that average, continued.
+/// - y moves by less than half a period between consecutive measurements (D samples apart if only
+///   every D-th sample has one);
+/// - this motion differs by less than a quarter of a period from the average of the last eight;
+///   during a gap the average is assumed to continue.
 ///
-/// A measurement that breaks the second rule is placed in the turn nearest to the prediction and
-/// reported as `turn_assumed`, so that an outlier does not change the turn; after three in a row,
-/// turns are counted again. Once y is good, turns are correct from the 30th measurement on,
-/// whatever happened before, and from then on the observer converges as without turns.
+/// A measurement that violates the second requirement is placed in the turn nearest to the
+/// prediction and reported as `turn_assumed`, so that an outlier does not change the turn; after
+/// three in a row, turns are counted again. Once y meets the requirements, turns are correct from
+/// the 30th measurement on, whatever happened before, and the observer converges as without turns.
 ///
-/// If a good y cannot correct the state, or the scalar cannot hold the turns, the observer restarts
-/// from y and reports `restarted`.
+/// If a good y cannot correct the state, or the number of turns is too large for the scalar, the
+/// observer restarts from y and reports `restarted`.
 ///
-/// With a gate inside, a rejected measurement counts as missing. The exception: if the last eight
-/// measurements, and all since the gate last accepted one, keep the second rule, the estimate is
-/// wrong and the turns are counted from the rejected measurements.
+/// With an outlier gate inside, a rejected measurement counts as missing. Exception: if the last
+/// eight measurements, and all since the gate last accepted one, meet the second requirement, the
+/// estimate is wrong, and the turns are counted from the rejected measurements.
 ///
 /// An axis that turns by more than half a period a sample cannot be distinguished from a slower
 /// one: the actuator must not be able to drive it so fast.
@@ -62,15 +63,15 @@ class WrappedOutput
   using S = typename Observer::scalar_type;
 
  public:
-  /// What it declares beyond LoopObserver.
+  /// What the adapter can do beyond LoopObserver.
   static constexpr ObserverTraits traits = [] {
     ObserverTraits traits = Base::traits;
     traits.wraps_output = true;
     return traits;
   }();
 
-  /// One sample, see PredictorCorrector::update. @param y in any branch; one so large that its
-  /// rounding is an eighth of a period is rejected
+  /// One sample, see PredictorCorrector::update. @param y in any branch; rejected if it is so large
+  /// that its rounding is an eighth of a period
   StepStatus update(S y, S u_applied) noexcept {
     if (const Reading reading = take(y, this->missed() + 1); reading.counted) [[likely]] {
       return keep(reading, observer_.update(reading.y + reading.turns * period_, u_applied));
@@ -79,20 +80,20 @@ class WrappedOutput
     return predicted | correct(y);
   }
 
-  /// Time update alone, see PredictorCorrector::predict.
+  /// Time update only, see PredictorCorrector::predict.
   StepStatus predict(S u_applied) noexcept {
     const StepStatus status = observer_.predict(u_applied);
     recentre();
     return status;
   }
 
-  /// Measurement update alone. @param y in any branch
+  /// Measurement update only. @param y in any branch
   StepStatus correct(S y) noexcept {
     Reading reading = take(y, this->missed());
     if (!reading.usable) return StepStatus::measurement_rejected;
     if (reading.fits && !is_finite(reading.turns * period_)) [[unlikely]] {
-      // The prediction has run off by more turns than the scalar holds: what it says of the turn
-      // would leave no innovation that leads back.
+      // The prediction is off by more turns than the scalar can hold: the turn taken from it would
+      // leave an innovation of zero, and the estimate would not recover.
       return restart(reading);
     }
     if (!reading.counted) {
@@ -101,8 +102,8 @@ class WrappedOutput
     return keep(reading, observer_.correct(reading.y + reading.turns * period_));
   }
 
-  /// Restarts at (y, 0, .., 0), y taken to the nearest period around zero. A y that `update`
-  /// would reject changes nothing and is reported.
+  /// Restarts at (y, 0, .., 0), with y wrapped to the period around zero. A y that `update` would
+  /// reject changes nothing and is reported.
   StepStatus reset(S y) noexcept {
     if (!can_be_told(y)) return StepStatus::state_rejected;
     return begin(observer_.reset(wrap(y)));
@@ -116,43 +117,44 @@ class WrappedOutput
     return begin(observer_.reset(wrapped));
   }
 
-  /// The turns would no longer be those of y.
+  /// Deleted, because the turns would no longer be those of y.
   StepStatus shift_output(const S&) noexcept = delete;
 
-  /// Its y would not be in the right branch.
+  /// Deleted, because it would bypass the count of turns.
   StepStatus correct_weighted(const S&, const S&) noexcept = delete;
 
-  /// The difference `angle` to the nearest whole period, in -period/2 .. period/2.
+  /// `angle` minus the nearest multiple of the period, in -period/2 .. period/2.
   [[nodiscard]] S wrap(const S& angle) const noexcept {
     if (detail::absolute(angle) <= half_period()) return angle;
     return angle - period_ * (std::round)(angle * inverse_period_);
   }
 
-  /// Of y, in its unit.
+  /// The period of y, in its unit.
   [[nodiscard]] const S& period() const noexcept { return period_; }
 
  private:
-  /// Where the turns stand.
+  /// The state of the count of turns.
   struct Count {
-    S y{};                         ///< the last measurement that was taken, wrapped
-    S turns{};                     ///< whole; y + turns periods is where the observer's z_1 belongs
-    S motion{};                    ///< of y within `samples`, average; at most half a period
-    std::uint16_t samples = none;  ///< 65535: motion is not known
-    std::uint8_t gaps = 0;         ///< measurements that came later than after `samples`, in a row
-    std::uint8_t doubts = 0;       ///< measurements with a turn_assumed in a row, 3 at most
-    bool begun = false;            ///< there is a last measurement
+    S y{};       ///< last measurement used, wrapped
+    S turns{};   ///< whole number; z_1 of the observer belongs at y + turns periods
+    S motion{};  ///< average motion of y within `samples`; at most half a period
+    std::uint16_t samples = none;  ///< 65535: motion is unknown
+    std::uint8_t gaps = 0;         ///< consecutive measurements that came after more than `samples`
+    std::uint8_t doubts = 0;       ///< consecutive measurements with turn_assumed, at most 3
+    bool begun = false;            ///< true if there is a last measurement
   };
 
-  /// The same of every measurement, whatever a gate makes of it. What the gate lets in depends on
-  /// the estimate: turns that are counted between those alone may keep a wrong one for good.
+  /// A second count over all measurements, including those that a gate rejects. The gate decides by
+  /// the estimate, so turns counted between accepted measurements only could stay wrong forever.
   struct Heard {
     Count count{};
-    std::uint16_t at = 0;       ///< missed() at the last one
-    std::uint8_t steady = 0;    ///< in a row that moved as before, 255 at most
-    std::uint8_t rejected = 0;  ///< since the gate last let one in, 255 at most
+    std::uint16_t at = 0;       ///< missed() at the last measurement
+    std::uint8_t steady = 0;    ///< consecutive measurements that moved as before, at most 255
+    std::uint8_t rejected = 0;  ///< measurements since the gate last accepted one, at most 255
   };
 
-  /// What the correction will subtract from the measurement: of level 1, as a sensor shows it.
+  /// The prediction of the measurement that the correction will use: that of level 1, as a sensor
+  /// shows it.
   [[nodiscard]] S predicted() const noexcept {
     if constexpr (observer_traits<Observer>.measures_first_row) {
       return observer_.level_estimate(0)(0);
@@ -161,17 +163,17 @@ class WrappedOutput
     }
   }
 
-  /// What a measurement is taken for.
+  /// The interpretation of a measurement.
   struct Reading {
     S y{};                 ///< wrapped
-    S turns{};             ///< if counted
-    S step{};              ///< from the last measurement, to the nearest period
-    int samples = 0;       ///< since then
-    int missed = 0;        ///< samples since a measurement was let in
-    bool usable = false;   ///< its branch can be told
-    bool fits = true;      ///< it moved as before
-    bool counted = false;  ///< false: the turn is that of the prediction
-    bool heard = false;    ///< its turn is counted through rejected ones
+    S turns{};             ///< its turn, if counted
+    S step{};              ///< motion since the last measurement, by the nearest turn
+    int samples = 0;       ///< samples since then
+    int missed = 0;        ///< samples since a measurement was accepted
+    bool usable = false;   ///< small enough to determine its turn
+    bool fits = true;      ///< it moved as expected
+    bool counted = false;  ///< false: the turn follows from the prediction
+    bool heard = false;    ///< its turn is counted from rejected measurements
   };
 
   static constexpr std::uint16_t none = 65535;
@@ -187,7 +189,7 @@ class WrappedOutput
     return Rules<S>{}.positive("period", config.period).invertible("period", config.period);
   }
 
-  /// Of another period the turns are counted anew.
+  /// With another period the count of turns starts again.
   void take(const WrappedOutput& fresh) noexcept {
     if (!(fresh.period_ < period_ || fresh.period_ > period_)) return;
     period_ = fresh.period_;
@@ -198,14 +200,14 @@ class WrappedOutput
 
   [[nodiscard]] S half_period() const noexcept { return period_ * static_cast<S>(0.5); }
 
-  /// Not so where a rounding of y is an eighth of a period or more.
+  /// True if the rounding of y is less than an eighth of a period.
   [[nodiscard]] bool can_be_told(const S& y) const noexcept {
     constexpr S most_turns = S(1) / (S(8) * detail::rounding<S>());
     const S turns = y * inverse_period_;
     return is_finite(turns) && detail::absolute(turns) < most_turns;
   }
 
-  /// A measurement, `missed` samples after the last one that was let in.
+  /// Interprets a measurement, `missed` samples after the last accepted one.
   [[nodiscard]] Reading take(const S& y, int missed) const noexcept {
     Reading reading = read(count_, y, missed);
     reading.missed = missed;
@@ -260,9 +262,9 @@ class WrappedOutput
                                               : StepStatus::measurement_rejected;
   }
 
-  /// Takes over what the observer has taken.
+  /// Updates the count after the correction by the observer.
   StepStatus keep(const Reading& reading, StepStatus status) noexcept {
-    // y can be held, so it is the state that cannot be corrected with it.
+    // y itself is acceptable, so it is the state that cannot be corrected.
     if (has(status, StepStatus::measurement_rejected)) [[unlikely]] {
       const bool input = has(status, StepStatus::input_rejected);
       return restart(reading) | (input ? StepStatus::input_rejected : StepStatus::ok);
@@ -278,7 +280,7 @@ class WrappedOutput
     if constexpr (gated) {
       if (!reading.heard) learn(count_, reading);
       hear(reading);
-      // Turns count from what the observer has taken.
+      // Turns are counted from the measurements that the observer has used.
       if (reading.heard) {
         count_ = heard_.count;
       } else {
@@ -323,7 +325,8 @@ class WrappedOutput
   static void learn_motion(Count& count, const Reading& reading) noexcept {
     if (!count.begun || reading.samples == 0) return;
     if (reading.samples > count.samples) {
-      // A gap. That of neighbours is not known for ever, they may not come again.
+      // A gap. After too many of them the motion between consecutive measurements counts as
+      // unknown, because these may never come again.
       if (++count.gaps >= most_gaps) count.samples = none;
       return;
     }
