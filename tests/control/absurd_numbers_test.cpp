@@ -278,8 +278,8 @@ TEST(MimoAbsurd, RetuneIsRefusedOrFinite) {
   changed.input_matrix = {{200, 1}, {0, 2}};
   const auto refused = single.retune(changed);
   ASSERT_EQ(refusal(refused),
-            "input_matrix: makes of the u that holds now (the value here) a disturbance that the "
-            "scalar cannot hold");
+            "input_matrix: turns the present u (the value here) into a disturbance that the scalar "
+            "cannot hold");
   EXPECT_EQ(refused.error().value, 1e307);
   EXPECT_DOUBLE_EQ(single.observer<0>().estimate()(1), -2e307);
 }

@@ -76,9 +76,9 @@ TEST(AdrcLaw, RefusesBadConfigs) {
   EXPECT_EQ(refused<double>({.input_gain = 1}),
             "controller_bandwidth: must be finite and positive");
   EXPECT_EQ(refused<double>({.controller_bandwidth = 1, .gains = {{1, 2}}, .input_gain = 1}),
-            "controller_bandwidth: must be left out where gains is given");
+            "controller_bandwidth: must be left out if gains is given");
   EXPECT_EQ(refused<double>({.controller_bandwidth = nan, .gains = {{1, 2}}, .input_gain = 1}),
-            "controller_bandwidth: must be left out where gains is given");
+            "controller_bandwidth: must be left out if gains is given");
   for (const double bad : {nan, inf, -inf}) {
     const auto refused = Law::make({.gains = {{1, bad}}, .input_gain = 1});
     EXPECT_EQ(refusal(refused), "gains[1]: must be finite");

@@ -608,7 +608,7 @@ TEST(Adrc, BadConfigIsRefusedByName) {
   EXPECT_EQ(field([](auto& c) {
               c.gains = {{1, 2}};
             }),
-            "controller_bandwidth: must be left out where gains is given");
+            "controller_bandwidth: must be left out if gains is given");
   EXPECT_EQ(field([](auto& c) {
               c.gains = {{1, 2}};
               c.controller_bandwidth = 0;
@@ -619,7 +619,7 @@ TEST(Adrc, BadConfigIsRefusedByName) {
               c.controller_bandwidth = 0;
               c.half_gain = true;
             }),
-            "half_gain: must be left out where gains is given");
+            "half_gain: must be left out if gains is given");
   EXPECT_EQ(field([](auto& c) { c.observer.input_gain = 0; }),
             "input_gain: must be finite and not zero (negative is fine)");
   EXPECT_EQ(field([](auto& c) { c.observer.sample_time = 0; }),

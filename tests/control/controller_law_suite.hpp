@@ -363,7 +363,7 @@ struct ControllerLawsOf<Adrc<O, F>> {
       settings.measurement_divider = 2;
       const auto refused = Controller::make(settings);
       ASSERT_EQ(refusal(refused),
-                "measurement_divider: must be 1 for an observer that regular gaps restart");
+                "measurement_divider: must be 1: regular gaps restart this observer");
     } else {
       constexpr int every = 4;
       Config settings = config();

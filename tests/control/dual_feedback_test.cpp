@@ -143,7 +143,7 @@ TEST(DualFeedback, TooFewDigitsAreRefused) {
   const auto refused = Shift::make(
       {.observer_bandwidth = 20, .controller_bandwidth = 5, .input_gain = 1, .sample_time = 1e-3f});
   ASSERT_EQ(refusal(refused),
-            "observer_bandwidth: times sample_time leaves too few digits in z; take DeltaOperator");
+            "observer_bandwidth: times sample_time leaves too few digits in z; use DeltaOperator");
   EXPECT_TRUE(Delta::make({.observer_bandwidth = 20,
                            .controller_bandwidth = 5,
                            .input_gain = 1,
@@ -291,7 +291,7 @@ TEST(DualFeedback, NoAllocationAndNamedErrors) {
   EXPECT_EQ(field([](auto& c) {
               c.gains = {{1, 1}};
             }),
-            "controller_bandwidth: must be left out where gains is given");
+            "controller_bandwidth: must be left out if gains is given");
   EXPECT_EQ(field([](auto& c) { c.input_gain = 0; }),
             "input_gain: must be finite and not zero (negative is fine)");
   EXPECT_EQ(field([](auto& c) { c.sample_time = 0; }), "sample_time: must be finite and positive");

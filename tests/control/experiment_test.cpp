@@ -189,10 +189,11 @@ TEST(Experiment, DampingIsFoundAndTakenOut) {
     EXPECT_NEAR(found->pole, pole, 0.01 * pole + 0.02) << pole;
   }
   EXPECT_EQ(refusal(run<1>(steps(), Plant(1, 5, 0.01, 5, T, 0, 0, 34)).result()),
-            "pole: of the frequency is too large: take a smaller hysteresis or half_period; above");
+            "pole: as a share of the frequency is too large: use a smaller hysteresis or "
+            "half_period; must be at most");
   EXPECT_EQ(refusal(run<1>(steps(), Plant(1, 5, 0.01, 30, T, 0, 0, 50)).result()),
-            "misfit: rad is what the third harmonic is off: the machine is another than order, lag "
-            "and dead time make it, or damping or friction is too large; above");
+            "misfit: of the third harmonic, rad, is too large: the machine has another order or "
+            "more than lag and dead time, or damping or friction is too large; must be at most");
 }
 
 TEST(Experiment, RelayFindsOrderOneAndTwo) {
@@ -230,7 +231,7 @@ TEST(Experiment, FrictionIsFoundAndTakenOut) {
   EXPECT_GT(std::abs(loaded->input_gain - 5), 0.1);
   EXPECT_LT(std::abs(loaded->input_gain - 5), loaded->input_gain_half_width);
   EXPECT_EQ(refusal(run<2>(relay(2), Plant(2, 5, 0.01, 5, T).rub(0.35 * 5, 0.01)).result()),
-            "friction: of b0 A is too large: take a larger amplitude; above");
+            "friction: as a share of b0 A is too large: use a larger amplitude; must be at most");
   // None is seen where there is none, but for rounding.
   EXPECT_LT(run<2>(relay(2), Plant(2, 5, 0.01, 5, T)).result()->friction, 0.05);
 }
@@ -308,7 +309,7 @@ TEST(Experiment, MachineThatTurnsTheOtherWay) {
     } else {
       EXPECT_EQ(refusal(away.result()),
                 "latency: does not fit: friction or damping is too large for this amplitude, or "
-                "order, or the sign of amplitude, is another");
+                "the order or the sign of amplitude is wrong");
     }
   }
 }
@@ -368,7 +369,7 @@ TEST(Experiment, TravelEndsItFromBothSidesAndOnlyBeyond) {
     EXPECT_EQ(at_limit.phase(), ExperimentPhase::aborted);
     EXPECT_EQ(at_limit.reason(), AbortReason::travel);
     EXPECT_EQ(at_limit.update(2.0), 0.0);
-    EXPECT_EQ(refusal(at_limit.result()), "phase: of the experiment is before its result");
+    EXPECT_EQ(refusal(at_limit.result()), "phase: of the experiment has no result yet");
   }
 }
 
@@ -512,7 +513,7 @@ TEST(Experiment, RefusesBadSettings) {
   EXPECT_EQ(refused(1, [](C& c) { c.hysteresis = 0; }), "hysteresis: must be finite and positive");
   EXPECT_EQ(refused(1, [](C& c) { c.hysteresis = 10; }), "hysteresis: must be below travel");
   EXPECT_EQ(refused(1, [](C& c) { c.lead = 0.1; }),
-            "lead: is for a relay of order 2: must be left out");
+            "lead: must be left out: it is for a relay of order 2");
   EXPECT_EQ(refused(2, [](C& c) { c.lead = 0; }), "lead: must be finite and positive");
   EXPECT_EQ(refused(1, [](C& c) { c.half_period = 1; }),
             "half_period: must be left out with a relay");
@@ -530,10 +531,10 @@ TEST(Experiment, RefusesBadSettings) {
     EXPECT_EQ(refused(1, [&](C& c) { c.cycles = bad; }), "cycles: must be even, 6 .. 200");
   EXPECT_EQ(refused(1, [](C& c) { c.limits.upper = 1; }), "accepted");
   EXPECT_EQ(refused(1, [](C& c) { c.limits.upper = 0.99; }),
-            "amplitude: leads beyond limits.upper with input");
+            "amplitude: with input goes above limits.upper, which is");
   EXPECT_EQ(refused(1, [](C& c) { c.limits.lower = -1; }), "accepted");
   EXPECT_EQ(refused(1, [](C& c) { c.limits.lower = -0.99; }),
-            "amplitude: leads beyond limits.lower with input");
+            "amplitude: with input goes below limits.lower, which is");
   EXPECT_EQ(refused(1, [](C& c) { c.limits.rate = 0; }),
             "limits.rate: must be finite and positive");
   const auto stepped = [](auto change) {
@@ -546,16 +547,17 @@ TEST(Experiment, RefusesBadSettings) {
             "half_period: must be at least 8 samples");
   EXPECT_EQ(stepped([](C& c) { c.half_period = 100; }), "half_period: must be below time_limit");
   EXPECT_EQ(stepped([](C& c) { c.hysteresis = 1; }), "hysteresis: must be left out with steps");
-  EXPECT_EQ(stepped([](C& c) { c.lead = 1; }), "lead: is for a relay of order 2: must be left out");
+  EXPECT_EQ(stepped([](C& c) { c.lead = 1; }),
+            "lead: must be left out: it is for a relay of order 2");
   // A latency of more than a quarter of the cycle.
   EXPECT_EQ(refusal(run<1>(steps(), Plant(1, 5, 0, 60, T)).result()),
-            "latency: does not fit: friction or damping is too large for this amplitude, or order, "
-            "or the sign of amplitude, is another");
+            "latency: does not fit: friction or damping is too large for this amplitude, or the "
+            "order or the sign of amplitude is wrong");
   // Too few samples a cycle: told by the result.
   auto quick = steps();
   quick.half_period = 0.011;
   EXPECT_EQ(refusal(run<1>(quick, Plant(1, 5, 0, 1, T)).result()),
-            "cycle: is the shortest in samples, and must be at least");
+            "cycle: (the shortest, in samples) must be at least");
   quick.half_period = 0.012;
   EXPECT_EQ(refusal(run<1>(quick, Plant(1, 5, 0, 1, T)).result()), "accepted");
 }

@@ -345,7 +345,7 @@ TEST(MimoAdrc, BadConfigIsRefusedByName) {
   auto bandwidth = error([](C& c) { c.controller_bandwidths[1] = 0; });
   EXPECT_EQ(refusal(bandwidth), "controller_bandwidths[1]: must be finite and positive");
   auto gain = error([](C& c) { std::get<1>(c.observers).input_gain = 3; });
-  EXPECT_EQ(refusal(gain), "input_gain[1]: must be left out, input_matrix says it");
+  EXPECT_EQ(refusal(gain), "input_gain[1]: is given by input_matrix: leave it out");
   EXPECT_EQ(refusal(error([](C& c) { std::get<1>(c.observers).sample_time = 1; })),
             "sample_time[1]: must be the same in all channels, as");
   EXPECT_EQ(refusal(error([](C& c) { c.limits[1] = {.lower = 1, .upper = 0}; })),

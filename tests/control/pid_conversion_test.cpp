@@ -96,8 +96,8 @@ TEST(PidConversion, RefusedWhereThereIsNone) {
         continue;
       }
       ASSERT_EQ(refusal(tuning),
-                "derivative: is that of no ADRC with this proportional, integral and "
-                "bandwidth_ratio; the nearest that is");
+                "derivative: belongs to no ADRC with this proportional, integral and "
+                "bandwidth_ratio; the nearest that does is");
       EXPECT_NEAR(tuning.error().limit, derivative < least ? least : most, 1e-12);
       // And that one is taken.
       const auto nearest =

@@ -638,7 +638,7 @@ TEST(PredictiveAdrc, refuses_bad_configs_by_name) {
   EXPECT_EQ(refused([](Config& c) {
               c.gains = {1.0, 2.0};
             }),
-            "controller_bandwidth: must be left out where gains is given");
+            "controller_bandwidth: must be left out if gains is given");
   EXPECT_EQ(refused([](Config& c) { c.limits = {.lower = 1, .upper = -1}; }),
             "limits.lower: must be below limits.upper");
   EXPECT_EQ(refused([](Config& c) { c.limits.rate = -1; }),

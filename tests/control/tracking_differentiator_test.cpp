@@ -189,7 +189,7 @@ TEST(TrackingDifferentiator, RefusesByName) {
   EXPECT_EQ(refusal(SignTrackingDifferentiator<>::make({.acceleration = -1})),
             "acceleration: must be finite and positive");
   EXPECT_EQ(refusal(TrackingDifferentiator<>::make({.acceleration = 1e-300, .sample_time = 1e-10})),
-            "acceleration: times the square of the sample time cannot be held");
+            "acceleration: times sample_time squared leaves the scalar's range");
   EXPECT_TRUE(SignTrackingDifferentiator<>::make({.acceleration = 1}).has_value());
 }
 

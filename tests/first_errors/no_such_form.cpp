@@ -1,4 +1,4 @@
-// expect: esokit: no such form
+// expect: esokit: the form is OutputBased or ErrorBased
 #include <esokit/control/adrc.hpp>
 #include <esokit/observer/linear_eso.hpp>
 

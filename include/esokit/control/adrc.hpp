@@ -20,14 +20,14 @@ template <LoopObserver Observer>
 struct AdrcConfig {
   using S = typename Observer::scalar_type;  ///< type of signals and settings
 
-  typename Observer::Config observer{};  ///< b0 and T are in here; b0 of the plant in both forms
+  typename Observer::Config observer{};  ///< includes T and b0, in both forms that of the plant
   S controller_bandwidth{};              ///< omega_c, rad/s
-  std::optional<Array<S, Observer::order>> gains{};  ///< k_0 .. k_(n-1), instead of omega_c
+  std::optional<Array<S, Observer::order>> gains{};  ///< k_0 .. k_(n-1), replace omega_c
   TimeDomain domain = TimeDomain::continuous;        ///< where the controller's poles are placed
-  bool half_gain = false;     ///< half-gain tuning of the controller; of the observer: HalfGainEso
-  Limits<S> limits{};         ///< of the actuator
-  StartHold<S> start_hold{};  ///< u at first, while the observer finds the state
-  MissingRule<S> missing{};   ///< what to do when measurements are missing
+  bool half_gain = false;  ///< half-gain tuning of the controller; for the observer use HalfGainEso
+  Limits<S> limits{};      ///< of the actuator
+  StartHold<S> start_hold{};    ///< u at the start, while the observer converges
+  MissingRule<S> missing{};     ///< what to do when measurements are missing
   int measurement_divider = 1;  ///< D: a measurement is due at every D-th update, the others ignore
                                 ///< y; 1 .. 1000, not above the observer's max_gap
 
@@ -39,40 +39,41 @@ struct AdrcConfig {
   /// @endcond
 };
 
-/// u = (v - dhat) / b0 around an observer, within an actuator's limits.
+/// Active disturbance rejection control, u = (v - dhat) / b0, with an observer and within the
+/// limits of an actuator.
 ///
 /// Timing: `update` at sample k takes y[k] and the present reference and returns the u to be held
-/// until k + 1. As the input of k - 1 .. k the observer gets the limited u that `update` returned
-/// last; if the actuator reports another value, pass it as `u_applied`.
+/// until k + 1. The observer takes the limited u that `update` returned last as the input from k -
+/// 1 to k; if the actuator reports another value, pass it as `u_applied`.
 ///
-/// Start: after `make` the controller is at y = 0, u = 0. `start(y, u)` takes over a plant that
-/// stands at y under u without a bump: with the reference at y, or a tracking differentiator reset
-/// to y, the first u is that u. During manual operation pass the operator's u to `track`, then go
-/// on with `update`; there is no step if the plant has come to rest (dhat = -b0 u) and the
+/// Start: after `make` the controller is at y = 0, u = 0. `start(y, u)` takes over a plant at rest
+/// at y under u without a bump: with the reference at y, or a tracking differentiator reset to y,
+/// the first output is this u. During manual operation pass the operator's u to `track`, then
+/// continue with `update`; u does not jump if the plant has come to rest (dhat = -b0 u) and the
 /// reference is at y.
 ///
 /// Retuning (`retune`, any member of the config): the estimate and u are kept. A change of omega_o
-/// does not alter u if the innovation is zero; a change of b0 is moved into dhat, (b0_old - b0_new)
-/// u with the u before the last sample, so u alters by no more than its usual change in a sample; a
-/// change of omega_c alters u by (dk_0 (r - y) - dk_1 y' ..) / b0. All three are without a step in
-/// the steady state.
+/// does not change u if the innovation is zero. A change of b0 is moved into dhat as (b0_old -
+/// b0_new) u, with the u before the last sample, so that u changes by no more than is usual within
+/// a sample. A change of omega_c changes u by (dk_0 (r - y) - dk_1 y' ..) / b0. In the steady state
+/// none of them makes u jump.
 ///
-/// Missing measurements: NaN or `update_without_measurement`. The observer predicts, and corrects
-/// with the gain for the whole gap; after `missing.most` in a row `mode()` is `safe` and u goes to
-/// `missing.input`.
+/// Missing measurements: NaN or `update_without_measurement`. The observer predicts, and later
+/// corrects with the gain for the whole gap. After more than `missing.most` missing measurements in
+/// a row, `mode()` is `safe` and u goes to `missing.input`.
 ///
-/// If the reference is not finite, u stays the same (in the error-based form this is a missing
-/// measurement). A u_applied that is not finite is replaced by the u that was put out. No call
-/// allocates, throws or locks.
+/// If the reference is not finite, u is kept (in the error-based form the measurement counts as
+/// missing). A u_applied that is not finite is replaced by the last output. No call allocates,
+/// throws or locks.
 ///
 /// Delays, angles, a changing sample time and known nonlinear terms are handled by the observer:
-/// put DelayedInput, WrappedOutput, VariableTime or KnownModel around it. They nest; DelayedInput
-/// goes around KnownModel.
+/// put DelayedInput, WrappedOutput, VariableTime or KnownModel around it. They can be nested, with
+/// DelayedInput outside KnownModel.
 /// @tparam Form OutputBased or ErrorBased
 template <LoopObserver Observer, class Form = OutputBased>
 class Adrc {
   static constexpr bool error_based = std::is_same_v<Form, ErrorBased>;
-  static_assert(AdrcForm<Form>, "esokit: no such form");
+  static_assert(AdrcForm<Form>, "esokit: the form is OutputBased or ErrorBased");
 
  public:
   static constexpr int order = Observer::order;        ///< n, order of the plant
@@ -80,14 +81,14 @@ class Adrc {
   using S = scalar_type;                               ///< the same type
   using Reference = Vector<S, order + 1>;              ///< (r, r', .., r^(n)), n + 1 x 1
 
-  /// What it declares beyond `update(y, reference)`.
+  /// What the controller can do beyond `update(y, reference)`.
   static constexpr ControllerTraits traits{.takes_derivatives = true,
                                            .knows_sample_time = true,
                                            .varies_time = observer_traits<Observer>.varies_time,
                                            .observes = true};
 
   using Config = AdrcConfig<Observer>;  ///< settings of make
-  using Status = StatusOf<S>;           ///< StepStatus, of a pack one a lane
+  using Status = StatusOf<S>;           ///< StepStatus, for a pack one per lane
   template <class T>
   using with_scalar =
       Adrc<detail::WithScalar<Observer, T>, Form>;  ///< the same with another scalar
@@ -115,15 +116,15 @@ class Adrc {
     return loop_.step(measured(y, r), u_applied, [&]() ESOKIT_INLINE_LAMBDA { return command(r); });
   }
 
-  /// With a moving reference. @param reference (r, r', ..), up to n + 1 elements; the rest counts
-  /// as zero. A tracking differentiator gives such a vector. The error-based form uses r alone.
+  /// With a moving reference. @param reference (r, r', ..), up to n + 1 elements, the others are
+  /// zero. A tracking differentiator gives such a vector. The error-based form uses only r.
   template <detail::VectorOf<S> Given>
   S update(S y, const Given& reference) noexcept {
     const Reference r = filled(reference);
     return loop_.step(measured(y, r(0)), [&] { return command(r); });
   }
 
-  /// Both: a moving reference, and the u that the actuator held since the last sample.
+  /// With a moving reference and the u that the actuator held since the last sample.
   template <detail::VectorOf<S> Given>
   S update(S y, const Given& reference, S u_applied) noexcept {
     const Reference r = filled(reference);
@@ -157,40 +158,40 @@ class Adrc {
     return loop_.step_without_measurement([&] { return command(r); });
   }
 
-  /// Manual operation: the observer follows, u is the operator's.
+  /// Manual operation: the observer runs, u is the operator's.
   /// @param u_applied what the actuator held since the last sample @return the same
   S track(S y, S reference, S u_applied) noexcept {
     return loop_.track(measured(y, reference), u_applied);
   }
 
-  /// For a plant that stands or is carried: the observer follows y, dhat stays the same, u is the
+  /// For a plant that is held by something else: the observer follows y, dhat is kept, u is the
   /// caller's; see Guarded. On release begin with the reference at y.
   /// @param u_applied what the actuator held since the last sample @return the same
   template <class O = Observer>
   requires(observer_traits<O>.gates_disturbance) S hold(S y, S reference, S u_applied)
   noexcept { return loop_.hold(measured(y, reference), u_applied); }
 
-  /// Sets b0 before the sample; see Guarded. @return as there
+  /// Sets b0 before the next sample. @return as for Guarded::set_input_gain
   template <class O = Observer>
   requires(observer_traits<O>.schedules_input_gain) Check<S> set_input_gain(const S& b)
   noexcept { return observer().set_input_gain(error_based ? S(-b) : b); }
 
-  /// y - r in the steady state, within the limits, for a constant d = 1 (unit of y^(n)): what the
-  /// leak of Guarded costs.
+  /// y - r in the steady state, within the limits, for a constant d = 1 (unit of y^(n)): the steady
+  /// error caused by the leak of Guarded, unit of y.
   template <class O = Observer>
   requires(observer_traits<O>.gates_disturbance) [[nodiscard]] S leak_error() const noexcept {
-    // b0 u is -d there, and what the law makes of the estimates.
+    // In the steady state b0 u = -d, which must equal the output of the law.
     const auto left = observer().leak_error();
     S sum = left(order);
     for (int i = 0; i < order; ++i) sum = sum + gains()[static_cast<std::size_t>(i)] * left(i);
     return sum / gains()[0];
   }
 
-  /// Takes over a plant that stands at y under u, the reference being y too.
+  /// Takes over a plant at rest at y under u, with the reference at y, too.
   Status start(S y, S u) noexcept { return start(y, u, y); }
 
-  /// Takes over a plant that stands at y under u. @param reference matters to the error-based form
-  /// @return ok, or input_rejected or state_rejected where u or y is not finite: nothing changes
+  /// Takes over a plant at rest at y under u. @param reference r, used by the error-based form only
+  /// @return ok, or input_rejected or state_rejected if u or y is not finite: nothing changes then
   Status start(S y, S u, S reference) noexcept {
     if constexpr (PackScalar<S>) {
       using Plain = detail::PlainTwin<Adrc, S>;
@@ -199,14 +200,14 @@ class Adrc {
           *this, [&](Plain& lane, int i) { status[i] = lane.start(y[i], u[i], reference[i]); });
       return status;
     } else {
-      // One by one: told not to expect NaN, a compiler makes zero of y - y.
+      // Tested one by one: under -ffast-math a compiler may replace y - y by zero.
       if (!is_finite(y) || !is_finite(reference)) return StepStatus::state_rejected;
       return loop_.start(measured(y, reference), u);
     }
   }
 
   /// New settings while running. A refused config changes nothing. A running start hold keeps its
-  /// time; a new one has no effect.
+  /// duration; a new one has no effect.
   Check<S> retune(const Config& config) { return detail::retune(*this, config); }
 
   /// The same with the settings of `fresh`, as returned by `make`: without design work, so it may
@@ -251,7 +252,7 @@ class Adrc {
   [[nodiscard]] const S& requested() const noexcept { return loop_.requested(); }
   /// Status of the observer at the last sample.
   [[nodiscard]] Status status() const noexcept { return loop_.status(); }
-  /// Whether the law, the start hold or the missing rule decides about u.
+  /// Whether u is determined by the law, the start hold or the rule for missing measurements.
   [[nodiscard]] Lanes<LoopMode, S> mode() const noexcept { return loop_.mode(); }
   /// k_0 .. k_(n-1).
   [[nodiscard]] const Array<S, order>& gains() const noexcept { return law_.gains(); }
@@ -304,12 +305,12 @@ class Adrc {
   }
 
   static Expected<Law, Error<S>> make_law(const Config& config, const Observer& observer) {
-    // That of a model with an actuator is b0 / tau.
+    // With an actuator in the model this is the b of the model, for example b0 / tau.
     const S input_gain = error_based ? S(-observer.input_gain()) : S(observer.input_gain());
     const S sample_time = observer.sample_time();
     if (config.gains) {
       if (config.half_gain) {
-        return Error<S>{"half_gain", S(1), "must be left out where gains is given"};
+        return Error<S>{"half_gain", S(1), "must be left out if gains is given"};
       }
       return Law::make({.controller_bandwidth = config.controller_bandwidth,
                         .gains = config.gains,
@@ -320,14 +321,15 @@ class Adrc {
     return Law::make({.gains = *gains, .input_gain = input_gain});
   }
 
-  /// What the observer is fed.
+  /// The measurement for the observer.
   [[nodiscard]] ESOKIT_INLINE S measured(S y, S reference) const noexcept {
     if constexpr (!error_based) {
       return y;
     } else {
       S e = reference - y;
 #if defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
-      // Of one and the same y the compiler makes zero, whatever it is.
+      // If reference and y are the same variable, a compiler may replace their difference by zero
+      // even for NaN.
       e = select(is_finite(y), e, y);
 #endif
       return e;
@@ -376,7 +378,7 @@ class Adrc {
   [[no_unique_address]] std::conditional_t<has_step_time, FeedbackSpec<S>, NoSpec> spec_;
 };
 
-/// The same with an observer that is computed lane by lane.
+/// The same with an observer that runs lane by lane.
 template <LoopObserver Observer, class Form>
 requires detail::goes_lane_by_lane<Observer>
 class Adrc<Observer, Form>

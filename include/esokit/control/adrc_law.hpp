@@ -1,5 +1,6 @@
 /// @file
-/// The control law of active disturbance rejection control (ADRC) on an observer's estimate.
+/// The control law of active disturbance rejection control (ADRC), computed from an observer's
+/// estimate.
 #pragma once
 
 #include <esokit/core/check.hpp>
@@ -28,23 +29,24 @@ struct ErrorBased {};
 template <>
 inline constexpr std::uint32_t type_tag<ErrorBased> = make_type_tag<>("ErrorBased");
 
-/// Which of the two: what controller and analysis take as `Form`.
+/// OutputBased or ErrorBased: the template argument `Form` of controllers and analysis.
 template <class Form>
 concept AdrcForm = std::is_same_v<Form, OutputBased> || std::is_same_v<Form, ErrorBased>;
 
-/// u = (v - dhat) / b0 with v a state feedback; the total disturbance is cancelled, the rest is a
-/// chain of n integrators with its poles at -omega_c.
+/// u = (v - dhat) / b0 with a state feedback v. The total disturbance is cancelled; what remains is
+/// a chain of n integrators, with closed-loop poles at -omega_c.
 ///
-/// A function of the estimate, without state: it fits sampled and continuous observers alike.
+/// A function of the estimate, without state, for sampled and continuous observers.
 /// @tparam Order n
 template <int Order, Scalar S = double>
 class AdrcLaw {
  public:
   /// Give `controller_bandwidth` or `gains`, not both.
   struct Config {
-    S controller_bandwidth{};                ///< omega_c, rad/s: k_i = C(n, i) omega_c^(n-i)
-    std::optional<Array<S, Order>> gains{};  ///< k_0 .. k_(n-1) on r - y, r' - y', ..
-    S input_gain{};                          ///< b0 of the plant, not zero, negative is fine
+    S controller_bandwidth{};  ///< omega_c, rad/s: k_i = C(n, i) omega_c^(n-i)
+    std::optional<Array<S, Order>>
+        gains{};     ///< k_0 .. k_(n-1) for r - y, r' - y', ..; k_i in 1/s^(n-i)
+    S input_gain{};  ///< b0 of the plant, not zero, negative is fine
 
     /// @cond
     static constexpr auto fields(auto& c) noexcept {
@@ -103,8 +105,8 @@ class AdrcLaw {
   }
 
   /// Error-based form: u = (dhat + sum_i k_i ehat^(i)) / b0; no reference derivative is needed.
-  /// @param given (e, .., e^(n-1), d, ..) of an observer that is fed e = y_d - y as measurement
-  ///        and has the input gain -b0
+  /// @param given (e, .., e^(n-1), d, ..) of an observer with e = r - y as the measurement and -b0
+  ///        as input gain
   template <detail::VectorOf<S> Estimate>
   [[nodiscard]] S control_error_based(const Estimate& given) const noexcept {
     constexpr int Size = detail::vector_size<Estimate>;
@@ -136,7 +138,7 @@ class AdrcLaw {
     if (config.gains) {
       rules
           .left_out("controller_bandwidth", config.controller_bandwidth,
-                    "must be left out where gains is given")
+                    "must be left out if gains is given")
           .finite("gains", *config.gains);
       law.gains_ = *config.gains;
     } else {

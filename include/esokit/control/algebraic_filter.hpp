@@ -1,6 +1,6 @@
 /// @file
-/// The algebraic observer in the form of its paper: a linear filter with time-varying inputs and
-/// outputs (J. Kasac, A. Pender, M. Pranjic, D. Kotarski, Asian Journal of Control 23 (2021)
+/// The algebraic observer as in its paper: a linear filter with time-varying input and output
+/// matrices (J. Kasac, A. Pender, M. Pranjic, D. Kotarski, Asian Journal of Control 23 (2021)
 /// 2171-2184, Eqs. (35)-(51)), here for any order and any number of extended states.
 ///
 /// x' = A x + b1(t) y + b2(t) u, x(0) = 0; (y, .., y^(n-1), d, .., d^(m-1)) = C(t) x, t > 0. With
@@ -11,8 +11,8 @@
 ///     b2_r = b0 (-1)^{r-n} C(m,r-n) G_{r-n}, r = n .. N, else 0
 ///     C_{k+1,r+1} = C(N-1-r,k-r) P_{k-r} / g, 0 <= r <= k < N                  (45)-(51)
 ///
-/// P_j as in ContinuousAlgebraicGain: C(t) b1(t) = L(t). The paper's g is (E - 1)^N and its x is
-/// (-q)^N times the one here; without that factor, which cancels, q = 0 is regular.
+/// P_j as in ContinuousAlgebraicGain: C(t) b1(t) = L(t). The paper has g = (E - 1)^N and an x that
+/// is (-q)^N times this one. The factor cancels, and without it q = 0 is regular.
 #pragma once
 
 #include <cmath>
@@ -22,11 +22,11 @@
 namespace esokit {
 
 /// The filter's equations for simulation, to be stacked with those of a plant. It gives the same
-/// estimates as ContinuousAlgebraicEso but, unlike that, is regular at t = 0: its state starts at
-/// zero whatever the plant does, so there are no initial conditions to choose.
+/// estimates as ContinuousAlgebraicEso but is regular at t = 0: its state always starts at zero, so
+/// there are no initial conditions to choose.
 ///
-/// The outputs divide by g, about t^N: close to t = 0 they show the rounding and the integration
-/// error of the state, which is why the paper uses them from a time epsilon on.
+/// The outputs are divided by g, which is about t^N. Near t = 0 this amplifies the rounding and
+/// integration errors of the state, so the paper uses the outputs only from a time epsilon on.
 /// @tparam Order n @tparam S scalar @tparam Extension m
 template <int Order, Scalar S = double, int Extension = 1>
 class AlgebraicFilter {
@@ -111,7 +111,7 @@ class AlgebraicFilter {
   [[nodiscard]] Estimate estimate(const S& t, const State& x) const {
     const auto p = law().factors(t);
     const S g = power(weight(t), size);
-    // x / g first: it is of the size of the signals, while P / g may not fit the scalar.
+    // x / g is computed first: it has the size of the signals, while P / g may overflow.
     Estimate estimate;
     for (int k = 0; k < size; ++k) {
       S sum(0.0);
@@ -154,8 +154,8 @@ class AlgebraicFilter {
   }
 
   /// G_j = sum_r c_{j,r} M_r, M_r = N! / (N-r)! w^{N-r} E^r. From D M_r = M_{r+1} - r q M_r follows
-  /// c_{j+1,r} = (lambda - r q) c_{j,r} + c_{j,r-1}. For small qt the term r = j leads and nothing
-  /// cancels, where the paper's sums of e^{-iqt} lose all digits.
+  /// c_{j+1,r} = (lambda - r q) c_{j,r} + c_{j,r-1}. For small qt the term r = j dominates and
+  /// nothing cancels, while the paper's sums of e^{-iqt} lose all digits.
   [[nodiscard]] Weights shifted_weights(const S& t) const {
     using std::exp;
     const S& q = config_.frequency_shift;

@@ -1,5 +1,5 @@
 /// @file
-/// What every controller with an observer does around its law: feed back the applied input, limit
+/// What every controller with an observer does besides its law: feed back the applied input, limit
 /// u, bridge missing samples, start without a bump.
 #pragma once
 
@@ -13,11 +13,11 @@
 
 namespace esokit {
 
-/// u is held at a value while the observer finds the state.
+/// Holds u at a value at the start, while the observer converges.
 template <Scalar S = double>
 struct StartHold {
-  S time{};   ///< s; 0: none. Rounded up to whole samples, of the nominal length
-  S input{};  ///< u meanwhile, within the limits
+  S time{};   ///< duration, s; 0: none. Rounded up to whole samples of nominal length
+  S input{};  ///< u during the hold, within the limits
 
   /// @cond
   static constexpr auto fields(auto& hold) noexcept { return detail::tie(hold.time, hold.input); }
@@ -30,8 +30,8 @@ struct MissingRule {
   int most = 50;  ///< missing measurements in a row that the controller bridges, 0 up to
                   ///< 65535 / measurement_divider - 1
   std::optional<S>
-      input{};        ///< u from then on, reached within the rate limit; left out: the last u
-  bool stay = false;  ///< safe mode lasts true: until start(); false: until a measurement
+      input{};        ///< u in safe mode, approached within the rate limit; left out: the last u
+  bool stay = false;  ///< true: safe mode lasts until start(); false: until a measurement
 
   /// @cond
   static constexpr auto fields(auto& rule) noexcept {
@@ -44,7 +44,7 @@ struct MissingRule {
 template <Scalar S = double>
 struct LoopSettings {
   Limits<S> limits{};           ///< of the actuator
-  StartHold<S> start_hold{};    ///< u at first, while the observer finds the state
+  StartHold<S> start_hold{};    ///< u at the start, while the observer converges
   MissingRule<S> missing{};     ///< what to do when measurements are missing
   int measurement_divider = 1;  ///< D: a measurement is due at every D-th step, 1 .. 1000
 
@@ -75,7 +75,7 @@ struct CheckedLoop {
   std::uint32_t hold_samples;
 };
 
-/// The rules for the settings; of no class, so that the loops of all observers share its code.
+/// Checks the settings. Not a member of a class, so that the loops of all observers share its code.
 template <PlainScalar S>
 Expected<CheckedLoop<S>, Error<S>> check_loop(const LoopSettings<S>& settings, S sample_time,
                                               int max_gap, bool bears_gaps) {
@@ -98,7 +98,7 @@ Expected<CheckedLoop<S>, Error<S>> check_loop(const LoopSettings<S>& settings, S
                                     "must not be above the observer's max_gap, which is", -1,
                                     static_cast<S>(max_gap), true})
       .require(divider == 1 || bears_gaps, "measurement_divider", counted,
-               "must be 1 for an observer that regular gaps restart");
+               "must be 1: regular gaps restart this observer");
   if (!rules) return rules.error();
   // The observer counts missing samples up to 65535.
   const int most = 65535 / divider - 1;
@@ -111,18 +111,18 @@ Expected<CheckedLoop<S>, Error<S>> check_loop(const LoopSettings<S>& settings, S
 
 }  // namespace detail
 
-/// What determines the output now.
+/// What determines the output at present.
 enum class LoopMode : unsigned char {
   running,     ///< the law
-  start_hold,  ///< u stands still at first
+  start_hold,  ///< the start hold
   safe         ///< too many measurements are missing
 };
 
-/// Has text.
+/// A LoopMode can be written to a stream, see has_text.
 template <>
 inline constexpr bool has_text<LoopMode> = true;
 
-/// Writes the mode's name.
+/// Writes the name of the mode.
 template <class Stream>
 requires detail::WritesText<Stream> Stream& operator<<(Stream& out, LoopMode mode) {
   constexpr const char* names[] = {"running", "start_hold", "safe"};
@@ -132,7 +132,7 @@ requires detail::WritesText<Stream> Stream& operator<<(Stream& out, LoopMode mod
 
 namespace detail {
 
-/// What was divided by the b0 of the observer's config, divided by that of now.
+/// Converts a u computed with b0 of the observer's config to the present b0.
 template <class Observer, Scalar S>
 ESOKIT_INLINE S by_present_gain(const Observer& observer, const S& u) noexcept {
   if constexpr (observer_traits<Observer>.schedules_input_gain) {
@@ -148,20 +148,20 @@ ESOKIT_INLINE S by_present_gain(const Observer& observer, const S& u) noexcept {
 /// measurements. `step` runs one sample with any law; a controller (Adrc, DisturbanceCompensator)
 /// is such a loop with a law.
 ///
-/// The observer gets the limited input, or the one that the actuator reports.
+/// The observer gets the limited u, or the one that the actuator reports.
 template <LoopObserver Observer>
 class ControlLoop {
  public:
   using S = typename Observer::scalar_type;  ///< type of signals and settings
   using scalar_type = S;                     ///< the same type
-  using Status = StatusOf<S>;                ///< StepStatus, of a pack one a lane
+  using Status = StatusOf<S>;                ///< StepStatus, for a pack one per lane
   template <class T>
   using with_scalar =
       ControlLoop<detail::WithScalar<Observer, T>>;  ///< the same with another scalar
 
   /// Checks the settings.
   /// @param observer as returned by its `make`
-  /// @return the loop, with the observer in the state that it has, or an error that names the field
+  /// @return the loop, with the observer in its present state, or an error that names the field
   static Expected<ControlLoop, Error<S>> make(const Observer& observer,
                                               const LoopSettings<S>& settings) {
     if constexpr (PackScalar<S>) {
@@ -177,9 +177,9 @@ class ControlLoop {
     }
   }
 
-  /// One sample: the observer's update with the input that this loop put out last, then the law.
-  /// @param measured measurement at sample k; NaN: it is missing
-  /// @param law () -> S, the wanted u, computed from the new estimate
+  /// One sample: the observer's update with the last output of this loop, then the law.
+  /// @param measured measurement at sample k, NaN if missing
+  /// @param law () -> S, the requested u, computed from the new estimate
   /// @return u for k .. k+1
   template <class Law>
   ESOKIT_INLINE S step(S measured, Law&& law) noexcept {
@@ -194,7 +194,7 @@ class ControlLoop {
   }
 
   /// The same if something other than u drives the observer's chain.
-  /// @param drive the drive instead of u from k - 1 to k
+  /// @param drive what drove the chain from k - 1 to k, in place of u
   template <class Law>
   ESOKIT_INLINE S step_driven(S measured, S drive, Law&& law) noexcept {
     if (special_ != false) [[unlikely]] {
@@ -217,7 +217,7 @@ class ControlLoop {
     return put_out(law);
   }
 
-  /// Manual operation: the observer follows, the output is the operator's.
+  /// Manual operation: the observer runs, the output is the operator's.
   /// @param u_applied what was held from k - 1 to k @return the same
   S track(S measured, S u_applied) noexcept {
     report_applied(u_applied);
@@ -225,9 +225,8 @@ class ControlLoop {
     return limiter_.last();
   }
 
-  /// For a plant that stands or is carried while u comes from elsewhere: the observer follows y,
-  /// dhat stays the same; see Guarded. @param u_applied what was held from k - 1 to k @return the
-  /// same
+  /// For a plant that is held by something else while u comes from elsewhere: the observer follows
+  /// y, dhat is kept; see Guarded. @param u_applied what was held from k - 1 to k @return the same
   template <class O = Observer>
   requires(observer_traits<O>.gates_disturbance) S hold(S measured, S u_applied)
   noexcept {
@@ -237,8 +236,8 @@ class ControlLoop {
     return limiter_.last();
   }
 
-  /// Starts in the steady state (y, u): dhat = -b0 u. Ends start hold and safe mode.
-  /// @return ok, or input_rejected or state_rejected where u or y is not finite: nothing changes
+  /// Starts in the steady state at y under u, dhat = -b0 u. Ends the start hold and safe mode.
+  /// @return ok, or input_rejected or state_rejected if u or y is not finite: nothing changes then
   Status start(S measured, S u) noexcept {
     if constexpr (PackScalar<S>) {
       Status status{};
@@ -269,7 +268,7 @@ class ControlLoop {
     hold_input_ = fresh.hold_input_;
     safe_input_ = fresh.safe_input_;
     missing_limit_ = fresh.missing_limit_;
-    // Of another divider the next update is the one with a measurement.
+    // After a change of the divider the next update is one with a measurement.
     if (divider_ != fresh.divider_) phase_ = 0;
     divider_ = fresh.divider_;
     set_mode(detail::of_lane(mode_, 0));
@@ -294,15 +293,15 @@ class ControlLoop {
 
   /// The observer, for its estimates.
   [[nodiscard]] const Observer& observer() const noexcept { return observer_; }
-  /// The observer, for what only it can do.
+  /// The observer, for its own members.
   [[nodiscard]] Observer& observer() noexcept { return observer_; }
-  /// The last output (limited), or what was reported as applied after it.
+  /// The last output, after the limits, or the u that was reported as applied since.
   [[nodiscard]] const S& output() const noexcept { return limiter_.last(); }
   /// The u requested by the law, before the limits.
   [[nodiscard]] const S& requested() const noexcept { return requested_; }
   /// Status of the observer at the last step.
   [[nodiscard]] Status status() const noexcept { return status_; }
-  /// What determines the output now.
+  /// What determines the output at present.
   [[nodiscard]] Lanes<LoopMode, S> mode() const noexcept { return mode_; }
   /// D: a measurement is due at every D-th step.
   [[nodiscard]] int measurement_divider() const noexcept { return divider_; }
@@ -316,8 +315,8 @@ class ControlLoop {
   struct Nothing {};
   static constexpr bool has_step_time = observer_traits<Observer>.varies_time;
   static constexpr int lanes = lane_count<S>;
-  using PlainObserver = detail::PlainTwin<Observer, S>;  ///< that of a lane
-  using Plain = detail::PlainTwin<ControlLoop, S>;       ///< a lane
+  using PlainObserver = detail::PlainTwin<Observer, S>;  ///< observer of a lane
+  using Plain = detail::PlainTwin<ControlLoop, S>;       ///< type of a lane
 
   static constexpr auto fields(auto& o) noexcept {
     return detail::tie(o.observer_, o.limiter_, o.requested_, o.hold_input_, o.safe_input_,
@@ -340,12 +339,12 @@ class ControlLoop {
         static_cast<std::uint16_t>((settings.missing.most + 1) * settings.measurement_divider);
     if constexpr (has_step_time) limits_ = settings.limits;
     set_mode(detail::of_lane(mode_, 0));
-    // What stands at the actuator before the first step; of an input left out what is within the
+    // The output before the first step is the hold input, or the value nearest to it within the
     // limits.
     if (hold_samples > 0) limiter_.track(limiter_.within(hold_input_));
   }
 
-  /// One sample of someone else's u.
+  /// One sample with a u from elsewhere.
   void follow(S measured, S drive) noexcept {
     for (int i = 0; i < lanes; ++i) {
       if (mode(i) == LoopMode::start_hold) set_mode(LoopMode::running, i);
@@ -379,7 +378,7 @@ class ControlLoop {
   }
 
   ESOKIT_INLINE S limited(S wanted) noexcept {
-    // A bad reference, or a law that overflows: the last output stays.
+    // A bad reference or an overflow in the law: keeps the last output.
     if (const auto good = is_finite(wanted); !all(good)) [[unlikely]]
       wanted = select(good, wanted, limiter_.last());
     requested_ = wanted;
@@ -409,8 +408,8 @@ class ControlLoop {
   }
 
   ESOKIT_COLD void after_trouble(S measured) noexcept {
-    // After a gap too long to bridge the observer begins at rest with dhat = 0; the steady state of
-    // the present u is the better guess, and does not bump.
+    // After a gap too long to bridge, the observer would restart with dhat = 0. The steady state
+    // under the present u is a better guess and causes no bump.
     if (has(status_, StepStatus::restarted)) {
       if constexpr (PackScalar<S>) {
         detail::for_each_lane<PlainObserver>(observer_, [&](PlainObserver& lane, int i) {
@@ -441,12 +440,12 @@ class ControlLoop {
     }
   }
 
-  /// Of lane `i` where the law does not decide.
+  /// The output of lane `i` if the law does not determine it.
   [[nodiscard]] ESOKIT_COLD LaneScalar<S> other_output(int i) noexcept {
     if (mode(i) == LoopMode::safe) {
       return detail::number_of_lane(has_safe_input_ ? safe_input_ : limiter_.last(), i);
     }
-    // The step that uses up the hold is the last one held.
+    // The step in which the hold ends is still held.
     if (--detail::of_lane(hold_left_, i) == 0) set_mode(LoopMode::running, i);
     return detail::number_of_lane(hold_input_, i);
   }
@@ -472,7 +471,7 @@ class ControlLoop {
   std::uint16_t divider_;
   std::uint16_t phase_ = 0;
   Lanes<LoopMode, S> mode_;
-  /// Anything but the law at every sample: one test in the hot path.
+  /// True if anything besides the law has to be done: one test in the hot path.
   Lanes<bool, S> special_{false};
   bool has_safe_input_;
   bool stay_safe_;

@@ -1,6 +1,5 @@
 /// @file
-/// What a controller must offer so that the rest of the library (a simulation, for example) can
-/// drive it.
+/// The concept of a controller, by which simulation and other parts of the library call it.
 #pragma once
 
 #include <concepts>
@@ -12,8 +11,8 @@
 
 namespace esokit {
 
-/// What a controller declares beyond `u = controller(y, reference)`, in a member `static constexpr
-/// ControllerTraits traits{..}`. For a controller without it the defaults apply.
+/// What a controller can do beyond `u = controller(y, reference)`, declared, in a member `static
+/// constexpr ControllerTraits traits{..}`. For a controller without it the defaults apply.
 struct ControllerTraits {
   /// u is `control(y)`; `prepare(next_reference)` comes after it, and `set_reference(reference)`
   /// before the first sample. See PredictiveAdrc.
@@ -24,16 +23,16 @@ struct ControllerTraits {
 
   bool knows_sample_time = false;  ///< `sample_time() const`, s
   bool varies_time = false;        ///< `set_step_time(seconds)`, before each step
-  bool observes = false;  ///< `observer() const`, with `total_disturbance()`; one for all channels
+  bool observes = false;  ///< `observer() const`, with `total_disturbance()`; for one channel only
 };
 
-/// What a controller declares.
+/// The traits that a controller declares, or the defaults.
 template <class C>
 inline constexpr ControllerTraits controller_traits = detail::declared_traits<C, ControllerTraits>;
 
 namespace detail {
 
-/// u of the sample with the measurement y.
+/// Calls the controller for one sample with measurement y and returns u.
 template <class C, class Y, class Reference>
 ESOKIT_INLINE constexpr decltype(auto) command(C& controller, const Y& y,
                                                [[maybe_unused]] const Reference& reference) {
@@ -66,11 +65,12 @@ using WithDerivatives = Vector<Reference, C::order + 1>;
 
 }  // namespace detail
 
-/// A controller of plants with the measurement Y and the input U (numbers, or vectors of several
-/// channels): `controller(y, reference)`, a lambda for one, or `controller.update(y, reference)`,
-/// called once a sample, gives u until the next one. y is NaN if a measurement is missing.
+/// A controller for plants with measurement Y and input U (numbers, or vectors for several
+/// channels). Called once a sample, `controller(y, reference)` (for example a lambda) or
+/// `controller.update(y, reference)` returns the u to be held until the next sample. y is NaN if
+/// the measurement is missing.
 ///
-/// It must be copyable, because a simulation drives a copy. It declares what else it can do, see
+/// It must be copyable, because a simulation runs a copy. What else it can do it declares in
 /// ControllerTraits.
 template <class C, class Y, class U = Y, class Reference = Y>
 concept Controller =

@@ -1,5 +1,5 @@
 /// @file
-/// DisturbanceCompensator: disturbance rejection around an existing controller.
+/// DisturbanceCompensator: adds disturbance rejection to an existing controller.
 #pragma once
 
 #include <esokit/control/control_loop.hpp>
@@ -15,10 +15,10 @@ template <LoopObserver Observer>
 struct DisturbanceCompensatorConfig {
   using S = typename Observer::scalar_type;  ///< type of signals and settings
 
-  typename Observer::Config observer{};  ///< b0 and T are in here
+  typename Observer::Config observer{};  ///< includes b0 and T
   std::optional<S> compensation_gain{};  ///< K, unit of u per unit of y^(n); left out: -1/b0
   Limits<S> limits{};                    ///< of the actuator
-  StartHold<S> start_hold{};             ///< u at first, while the observer finds the state
+  StartHold<S> start_hold{};             ///< u at the start, while the observer converges
   MissingRule<S> missing{};              ///< what to do when measurements are missing
   int measurement_divider = 1;           ///< D: a measurement is due at every D-th update
 
@@ -30,23 +30,24 @@ struct DisturbanceCompensatorConfig {
   /// @endcond
 };
 
-/// u = u0 + K dhat with u0 from any controller (a PID, say) and K = -1/b0: the controller then sees
-/// a plant that is nearly y^(n) = b0 u0. The same limits, start, missing and retuning rules as
-/// Adrc.
+/// u = u0 + K dhat, with u0 from any controller (a PID, say) and K = -1/b0. That controller then
+/// sees a plant that is nearly y^(n) = b0 u0. Limits, start, missing measurements and retuning work
+/// as in Adrc.
 ///
 /// With an actuator in the observer's model its lag is removed as well. With a lag of first order
 /// the controller sees y^(n+1) = b0 / tau u0 and has to be designed for that plant (a PD instead of
 /// a P).
 ///
 /// If the disturbance does not enter where u does (mismatched), apply the observer to the equation
-/// where it enters. Pass the quantity that drives this equation (another state instead of u) to
-/// `update_driven`, and choose the gain K from the estimate to u, for example -(C A^-1 B)^-1 C A^-1
-/// B_d of the loop under u0, which removes the disturbance from y in the steady state.
+/// in which it enters. Pass the quantity that drives this equation (another state instead of u) to
+/// `update_driven`, and choose the gain K from dhat to u. For example K = -(C A^-1 B)^-1 C A^-1
+/// B_d, with A, B, C and B_d (input of the disturbance) of the loop closed by u0, removes the
+/// disturbance from y in the steady state.
 ///
-/// An integrator in the wrapped controller has nothing left to do. If it already carries the
-/// disturbance, call `start(y, u)` and set the controller's output to `base_output()`: the sum then
-/// continues from u without a bump. Pass `output() - compensation()` to the controller's
-/// anti-windup as the applied u0.
+/// An integrator in the wrapped controller is no longer needed. If it already compensates for the
+/// disturbance, call `start(y, u)` and set the controller's output to `base_output()`: u then
+/// continues without a bump. Pass `output() - compensation()` to the controller's anti-windup as
+/// the applied u0.
 template <LoopObserver Observer>
 class DisturbanceCompensator {
  public:
@@ -54,7 +55,7 @@ class DisturbanceCompensator {
   using scalar_type = typename Observer::scalar_type;  ///< type of signals and settings
   using S = scalar_type;                               ///< the same type
 
-  /// What it declares beyond `update(y, base_output)`.
+  /// What the compensator can do beyond `update(y, base_output)`.
   static constexpr ControllerTraits traits{.knows_sample_time = true,
                                            .varies_time = observer_traits<Observer>.varies_time,
                                            .observes = true};
@@ -89,9 +90,10 @@ class DisturbanceCompensator {
   }
 
   /// The same if something other than u drives the observer's equation. Use it from `make` on,
-  /// without `start` and `track`, which assume that u is the drive. A missing measurement is a NaN
-  /// here.
-  /// @param drive the drive instead of u since the last sample, in units of y^(n) / b0
+  /// without `start` and `track`, which assume that u is the drive. Pass NaN if the measurement is
+  /// missing.
+  /// @param drive what drove the equation since the last sample in place of u, in units of y^(n) /
+  /// b0
   S update_driven(S y, S base_output, S drive) noexcept {
     return loop_.step_driven(y, drive, [&] { return base_output + unbounded_compensation(); });
   }
@@ -101,24 +103,23 @@ class DisturbanceCompensator {
     return loop_.step_without_measurement([&] { return base_output + unbounded_compensation(); });
   }
 
-  /// Compensation off: the observer follows while u comes from elsewhere.
+  /// Without compensation: the observer runs while u comes from elsewhere.
   /// @param u_applied what the actuator held since the last sample @return the same
   S track(S y, S u_applied) noexcept { return loop_.track(y, u_applied); }
 
-  /// For a plant that stands or is carried: the observer follows y, dhat stays the same; see
-  /// Guarded.
+  /// For a plant that is held by something else: the observer follows y, dhat is kept; see Guarded.
   /// @param u_applied what the actuator held since the last sample @return the same
   template <class O = Observer>
   requires(observer_traits<O>.gates_disturbance) S hold(S y, S u_applied)
   noexcept { return loop_.hold(y, u_applied); }
 
-  /// Sets b0 before the sample; see Guarded. @return as there
+  /// Sets b0 before the next sample. @return as for Guarded::set_input_gain
   template <class O = Observer>
   requires(observer_traits<O>.schedules_input_gain) Check<S> set_input_gain(const S& b)
   noexcept { return observer().set_input_gain(b); }
 
-  /// Takes over a plant that stands at y under u: dhat = -b0 u.
-  /// @return ok, or input_rejected or state_rejected where u or y is not finite: nothing changes
+  /// Takes over a plant at rest at y under u: dhat = -b0 u.
+  /// @return ok, or input_rejected or state_rejected if u or y is not finite: nothing changes then
   StatusOf<S> start(S y, S u) noexcept { return loop_.start(y, u); }
 
   /// New settings while running. A refused config changes nothing.
@@ -138,12 +139,12 @@ class DisturbanceCompensator {
   requires(observer_traits<O>.varies_time) Check<S> set_step_time(const S& seconds)
   noexcept { return loop_.set_step_time(seconds); }
 
-  /// K dhat, which is added to u0; limited to what the scalar holds.
+  /// K dhat, which is added to u0; limited to the range of the scalar.
   [[nodiscard]] S compensation() const noexcept {
     return detail::clipped(unbounded_compensation());
   }
 
-  /// The u0 with which u would not change; limited to what the scalar holds.
+  /// The u0 with which u would not change; limited to the range of the scalar.
   [[nodiscard]] S base_output() const noexcept {
     return detail::clipped(loop_.output() - compensation());
   }
@@ -164,7 +165,7 @@ class DisturbanceCompensator {
   [[nodiscard]] const S& requested() const noexcept { return loop_.requested(); }
   /// Status of the observer at the last sample.
   [[nodiscard]] StatusOf<S> status() const noexcept { return loop_.status(); }
-  /// Whether u0 + K dhat, the start hold or the missing rule decides about u.
+  /// Whether u is determined by u0 + K dhat, the start hold or the rule for missing measurements.
   [[nodiscard]] Lanes<LoopMode, S> mode() const noexcept { return loop_.mode(); }
 
  private:
@@ -192,7 +193,7 @@ class DisturbanceCompensator {
 
   DisturbanceCompensator(const Loop& loop, S gain) noexcept : loop_(loop), gain_(gain) {}
 
-  /// In a step, which tests its sum with u0 anyway.
+  /// For a step, which tests the sum with u0 anyway.
   [[nodiscard]] ESOKIT_INLINE S unbounded_compensation() const noexcept {
     return detail::by_present_gain(loop_.observer(),
                                    S(gain_ * loop_.observer().total_disturbance()));
@@ -202,7 +203,7 @@ class DisturbanceCompensator {
   S gain_;
 };
 
-/// The same around an observer that is computed lane by lane.
+/// The same with an observer that runs lane by lane.
 template <LoopObserver Observer>
 requires detail::goes_lane_by_lane<Observer>
 class DisturbanceCompensator<Observer>

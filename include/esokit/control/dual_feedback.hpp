@@ -1,6 +1,6 @@
 /// @file
-/// The minimum-footprint forms of linear ADRC after Herbst (see control/filter_form.hpp): one
-/// filter of order N = n + m instead of observer and law.
+/// The minimum-footprint forms of linear ADRC by G. Herbst (see control/filter_form.hpp): one
+/// filter of order N = n + m in place of observer and law.
 #pragma once
 
 #include <cmath>
@@ -19,50 +19,52 @@
 
 namespace esokit {
 
-/// The filter runs on z^-1, as in the literature. It loses digits by 1/(1-rho)^N: configs that
-/// leave fewer than three digits are refused.
+/// The filter is computed in z^-1, as in the literature. This loses a factor of 1/(1-rho)^N in
+/// accuracy; configs that leave fewer than three digits are refused.
 struct ShiftOperator {};
 
 /// Distinguishes the type in snapshots.
 template <>
 inline constexpr std::uint32_t type_tag<ShiftOperator> = make_type_tag<>("ShiftOperator");
 
-/// The filter runs on delta = z - 1: N additions more, no digits lost for any omega_o T.
+/// The filter is computed in delta = z - 1: N more additions, but no digits are lost for any
+/// omega_o T.
 struct DeltaOperator {};
 
 /// Distinguishes the type in snapshots.
 template <>
 inline constexpr std::uint32_t type_tag<DeltaOperator> = make_type_tag<>("DeltaOperator");
 
-/// The filter gets the applied, limited u: the dual-feedback form.
+/// The limited u is fed back to the filter: the dual-feedback form.
 struct LimitedFeedback {};
 
 /// Distinguishes the type in snapshots.
 template <>
 inline constexpr std::uint32_t type_tag<LimitedFeedback> = make_type_tag<>("LimitedFeedback");
-/// The filter gets its own output: the transfer-function form.
+/// The filter's own output, before the limits, is fed back: the transfer-function form.
 struct UnlimitedFeedback {};
 
 /// Distinguishes the type in snapshots.
 template <>
 inline constexpr std::uint32_t type_tag<UnlimitedFeedback> = make_type_tag<>("UnlimitedFeedback");
 
-/// Linear ADRC (LinearEso and law with constant gains) as one filter with two feedbacks, of y and
-/// of the limited u. At sample k, with u[k-1] as it was applied:
+/// Linear ADRC (LinearEso and law with constant gains) as one filter with feedback of y and of the
+/// limited u. At sample k, where u is at first the applied u[k-1]:
 ///
 ///     s_i = p_i - m_i u,  c = s_1 - n_0 y,
 ///     u <- limited(c + k_r r),  p_i <- s_(i+1) - n_i y - d_i c
 ///
-/// (DeltaOperator: + s_i). Equal to Adrc<LinearEso> in every sample, limited or not. Operations for
-/// N = n + m: 3 N + 2 multiplications, 3 N + 1 additions (4 N + 1 with DeltaOperator), N additions
-/// for the test that all is finite, and the limits; 3 N + 2 coefficients, N states. For n = 2, m =
-/// 1: 11, 10 (13), 3; 11 and 3.
+/// (with DeltaOperator p_i also gets + s_i). The output equals that of Adrc<LinearEso> in every
+/// sample, limited or not. Operations for N = n + m: 3 N + 2 multiplications, 3 N + 1 additions
+/// (DeltaOperator: 4 N + 1), N additions for the test that all is finite, and the limits; memory: 3
+/// N + 2 coefficients and N states. For n = 2, m = 1: 11 multiplications, 10 (13) and 3 additions,
+/// 11 coefficients and 3 states.
 ///
 /// A filter has no prediction: a bad measurement is replaced by the last good one and reported. If
-/// samples get lost, use Adrc.
+/// samples may be lost, use Adrc.
 ///
 /// With UnlimitedFeedback it is the transfer-function form: the same while u is within its limits,
-/// but at a limit its m integrators run on and it winds up. For actuators that never saturate.
+/// but at a limit its m integrators wind up. Use it only for actuators that never saturate.
 template <int Order, Scalar S = double, int Extension = 1, class Operator = ShiftOperator,
           class Feedback = LimitedFeedback, class Placement = EqualPoles>
 class DualFeedbackAdrc {
@@ -89,13 +91,13 @@ class DualFeedbackAdrc {
     }
     /// @endcond
   };
-  using Status = StatusOf<S>;  ///< StepStatus, of a pack one a lane
+  using Status = StatusOf<S>;  ///< StepStatus, for a pack one per lane
   template <class T>
   using with_scalar = DualFeedbackAdrc<Order, T, Extension, Operator, Feedback,
                                        Placement>;  ///< the same with another scalar
 
   /// Checks the settings and does all the design work.
-  /// @return the controller at rest in zero, or an error that names the field
+  /// @return the controller at rest at zero, or an error that names the field
   static Expected<DualFeedbackAdrc, Error<S>> make(const Config& config) {
     if constexpr (PackScalar<S>) {
       return detail::make_lanes<DualFeedbackAdrc>(config);
@@ -109,7 +111,7 @@ class DualFeedbackAdrc {
   S update(S y, S reference) noexcept {
     Step step = advance(y, limited ? limiter_.last() : wanted_);
     step.wanted = step.control + form_.reference * reference;
-    // Two states stored one by one and loaded as a pair by the next step would stall it.
+    // States stored one by one and loaded as a pair would stall the next step.
     detail::keep_scalars(step.pending);
     if (!all(is_finite(probe(step)))) [[unlikely]] {
       if constexpr (PackScalar<S>) {
@@ -136,7 +138,7 @@ class DualFeedbackAdrc {
     return update(y, reference);
   }
 
-  /// Takes over a plant that stands at y under u, the reference being y too. A y or u that is not
+  /// Takes over a plant at rest at y under u, with the reference at y, too. A y or u that is not
   /// finite changes nothing and is reported.
   Status start(S y, S u) noexcept {
     if constexpr (PackScalar<S>) {
@@ -149,9 +151,9 @@ class DualFeedbackAdrc {
     }
   }
 
-  /// New settings while running: restarts in the steady state of the last measurement and u,
-  /// because the state of one filter has no meaning for another. No bump at rest. A refused config
-  /// changes nothing, nor does one whose steady state the scalar cannot hold.
+  /// New settings while running: restarts in the steady state for the last measurement and u,
+  /// because the state of one filter is meaningless for another. At rest u does not jump. A refused
+  /// config changes nothing; one whose steady state overflows is refused, too.
   Check<S> retune(const Config& config) { return detail::retune(*this, config); }
 
   /// The same with the settings of `fresh`, as returned by `make`: without design work, so it may
@@ -171,8 +173,8 @@ class DualFeedbackAdrc {
   [[nodiscard]] const S& output() const noexcept { return limiter_.last(); }
   /// The u requested by the law, before the limits.
   [[nodiscard]] const S& requested() const noexcept { return wanted_; }
-  /// ok, measurement_rejected, or restarted. It restarts in the steady state of y and u if the
-  /// state was so large that no measurement could bring it back.
+  /// ok, measurement_rejected, or restarted. It restarts in the steady state for y and u if the
+  /// state was so large that it could not recover.
   [[nodiscard]] Status status() const noexcept { return status_; }
   /// The filter's coefficients, in z or delta.
   [[nodiscard]] const FilterForm<size, S>& form() const noexcept { return form_; }
@@ -185,14 +187,14 @@ class DualFeedbackAdrc {
   static constexpr auto fields(auto& o) noexcept {
     return detail::tie(o.form_, o.limiter_, o.pending_, o.measured_, o.wanted_, o.status_);
   }
-  using Plain = detail::PlainTwin<DualFeedbackAdrc, S>;  ///< a lane
+  using Plain = detail::PlainTwin<DualFeedbackAdrc, S>;  ///< type of a lane
   using Form = FilterForm<size, S>;
   using States = Array<S, size>;
   static constexpr bool delta = std::is_same_v<Operator, DeltaOperator>;
   static constexpr bool limited = std::is_same_v<Feedback, LimitedFeedback>;
 
   struct Step {
-    States pending;  ///< the next states without the share of u
+    States pending;  ///< the next states without the contribution of u
     S control;       ///< c
     S wanted{};
   };
@@ -214,7 +216,7 @@ class DualFeedbackAdrc {
         Placement::template sample<size, S>(config.observer_bandwidth, config.sample_time);
     Form form = delta_form<Order, size, S>(poles, *gains, config.input_gain, config.sample_time);
     const S bandwidth = Placement::template representative<size, S>(config.observer_bandwidth);
-    // The last coefficient of D is prod(1 - rho_i).
+    // The last coefficient of D is prod(1 - rho_i), the smallest for slow poles.
     rules.representable("observer_bandwidth", bandwidth, form.denominator[size],
                         "times sample_time gives a filter the scalar cannot hold");
     for (const S& coefficient : form.measurement) {
@@ -224,7 +226,7 @@ class DualFeedbackAdrc {
     if constexpr (!delta) {
       const S unit = S(100) * detail::rounding<S>();
       rules.require(unit < static_cast<S>(1e-3) * form.denominator[size], "observer_bandwidth",
-                    bandwidth, "times sample_time leaves too few digits in z; take DeltaOperator");
+                    bandwidth, "times sample_time leaves too few digits in z; use DeltaOperator");
       form = shift_form<size, S>(form);
     }
     if (!rules) return rules.error();
@@ -286,7 +288,7 @@ class DualFeedbackAdrc {
     return form_.measurement[i] * y + form_.denominator[i] * c;
   }
 
-  /// Finite only if all of the step is.
+  /// Finite only if all numbers of the step are finite.
   [[nodiscard]] ESOKIT_INLINE static S probe(const Step& step) noexcept {
     return detail::plus_all(step.wanted, step.pending);
   }
@@ -299,7 +301,8 @@ class DualFeedbackAdrc {
       measured_ = y;
     } else {
       const Step without = advance(measured_, u);
-      // From there the last measurement leads nowhere either, or this one is no larger.
+      // The state is the cause if the last measurement would also fail, or if this one is no
+      // larger.
       const bool state_is_to_blame =
           is_finite(y) &&
           (!is_finite(probe(without)) || detail::absolute(y) <= detail::absolute(measured_));

@@ -1,5 +1,6 @@
 /// @file
-/// Experiment: a relay or steps on the real machine, within limits, for b0, latency and a log.
+/// Experiment: moves the real machine with a relay or steps, within limits, and finds b0 and
+/// latency; its samples are a log for `identify`.
 #pragma once
 
 #include <cmath>
@@ -10,10 +11,11 @@
 
 namespace esokit {
 
-/// What moves the machine.
+/// How u moves the machine.
 enum class Excitation : unsigned char {
-  relay,  ///< u0 + A until y has risen by the hysteresis, u0 - A until it has fallen by it, ..
-  steps   ///< u0 + A and u0 - A in turns of `half_period`, the first one half as long
+  relay,  ///< u0 + A until y has risen by the hysteresis, u0 - A until it has fallen by it, and so
+          ///< on
+  steps   ///< u0 + A and u0 - A alternately for `half_period` each, the first one half as long
 };
 
 /// Config of Experiment.
@@ -21,16 +23,16 @@ template <PlainScalar S = double>
 struct ExperimentConfig {
   S sample_time{};                            ///< T, s
   Excitation excitation = Excitation::relay;  ///< relay: needs no knowledge of the machine
-  S input{};           ///< u0, unit of u: holds the machine at the position where it begins
-  S amplitude{};       ///< A, unit of u; negative if a larger u lowers y
-  S hysteresis{};      ///< relay: unit of y, a few times the noise; left out with steps
-  S lead{};            ///< relay, order 2: s, about five times lag and dead time; else left out
-  S half_period{};     ///< steps: s, at least 8 samples; left out with a relay
-  S rest{};            ///< s with u0 before, in which y0 is found; 0: y0 is the first y
-  S travel{};          ///< largest abs(y - y0), unit of y; beyond it the experiment stops
-  S time_limit{};      ///< longest time of all, s
-  S hand_over{};       ///< s: relay or steps go on for this long after the last measured cycle
-  int cycles = 8;      ///< measured, after two to settle; even, 6 .. 200
+  S input{};        ///< u0, unit of u: holds the machine at its start position
+  S amplitude{};    ///< A, unit of u; negative if a larger u lowers y
+  S hysteresis{};   ///< relay: unit of y, a few times the noise; leave out with steps
+  S lead{};         ///< relay, order 2: s, about five times lag plus dead time; else leave out
+  S half_period{};  ///< steps: s, at least 8 samples; leave out with a relay
+  S rest{};         ///< s, time with u0 at the start, in which y0 is measured; 0: y0 is the first y
+  S travel{};       ///< largest abs(y - y0), unit of y; beyond it the experiment stops
+  S time_limit{};   ///< longest total duration, s
+  S hand_over{};    ///< s: relay or steps continue for this time after the last measured cycle
+  int cycles = 8;   ///< number of measured cycles, after two to settle; even, 6 .. 200
   Limits<S> limits{};  ///< of the actuator; u0 - A and u0 + A must be within
 
   /// @cond
@@ -42,21 +44,21 @@ struct ExperimentConfig {
   /// @endcond
 };
 
-/// Where an experiment is.
+/// The phase of an experiment.
 enum class ExperimentPhase : unsigned char {
-  rest,       ///< u0, y0 is being found
+  rest,       ///< u0; y0 is measured
   settling,   ///< the first two cycles
-  measuring,  ///< the cycles that count
-  hand_over,  ///< the result is ready; u goes on, so that the controller's observer can follow
+  measuring,  ///< the cycles from which the result is computed
+  hand_over,  ///< the result is ready; u continues, so that the controller's observer can converge
   done,       ///< u0
-  aborted     ///< u0; `reason` says why
+  aborted     ///< u0; see `reason`
 };
 
 /// Has text.
 template <>
 inline constexpr bool has_text<ExperimentPhase> = true;
 
-/// Writes the phase's name.
+/// Writes the name of the phase.
 template <class Stream>
 requires detail::WritesText<Stream> Stream& operator<<(Stream& out, ExperimentPhase phase) {
   constexpr const char* names[] = {"rest", "settling", "measuring", "hand_over", "done", "aborted"};
@@ -66,9 +68,9 @@ requires detail::WritesText<Stream> Stream& operator<<(Stream& out, ExperimentPh
 
 /// Why an experiment was aborted.
 enum class AbortReason : unsigned char {
-  none,        ///< it was not
-  travel,      ///< y went further than `travel`
-  time_limit,  ///< it took longer: the relay does not switch, or switches slowly
+  none,        ///< not aborted
+  travel,      ///< y moved further than `travel`
+  time_limit,  ///< it took too long: the relay does not switch, or switches slowly
   bad_sample,  ///< y or the reported u was not finite
   stopped      ///< by `stop`
 };
@@ -85,21 +87,21 @@ requires detail::WritesText<Stream> Stream& operator<<(Stream& out, AbortReason 
   return out;
 }
 
-/// What an experiment found, for y^(n) = b0 v(t - L) + d, tau v' + v = u.
+/// The result of an experiment, for y^(n) = b0 v(t - L) + d, tau v' + v = u.
 template <PlainScalar S>
 struct ExperimentResult {
-  S input_gain{};             ///< b0
-  S input_gain_half_width{};  ///< 95 %
+  S input_gain{};             ///< b0, unit of y^(n) per unit of u
+  S input_gain_half_width{};  ///< of the 95 % interval of b0
   S least{};                  ///< abs(b0) if all of the latency were dead time
   S largest{};                ///< abs(b0) if all of it were lag
-  S latency{};                ///< lag and dead time together, s
-  S pole{};                   ///< a of y' + a y, order 1, 1/s; 0 where none shows
-  S friction{};               ///< Coulomb's, order 2, unit of y^(n); 0 where none shows
-  S frequency{};              ///< at which it was found, rad/s
-  int windows{};              ///< of two cycles each, of which the interval is made
+  S latency{};                ///< lag plus dead time, s
+  S pole{};                   ///< order 1: a of y' + a y, 1/s; 0 if not visible
+  S friction{};               ///< order 2: Coulomb friction, unit of y^(n); 0 if not visible
+  S frequency{};              ///< frequency of the cycle, rad/s
+  int windows{};              ///< number of windows of two cycles, on which the interval is based
 };
 
-/// A row of the log: y, and the u that was held from then to the next row.
+/// A row of the log: y, and the u that was held from there to the next row.
 template <PlainScalar S>
 struct ExperimentRow {
   S time{};  ///< s since the first sample
@@ -107,30 +109,31 @@ struct ExperimentRow {
   S y{};     ///< measured
 };
 
-/// Moves a machine with a relay or with steps around an operating point, stops by itself, and
-/// computes b0 and latency. Call `update` at each sample, as with a controller.
+/// Moves a machine around an operating point with a relay or with steps, stops by itself, and
+/// computes b0 and latency. Call `update` at each sample, like a controller.
 ///
 /// Method: over every two cycles, the complex sums of the n-th differences of y and of u, weighted
-/// with w = 1 - cos(theta) and the harmonics 1 and 3 of the cycle:
+/// with the window w = 1 - cos(theta) (theta: 0 to 2 pi over the window) and the harmonics 1 and 3
+/// of the cycle:
 ///
 ///     H_m = sum w e^(-j m 2 theta) D^n y / (T^n sum w e^(-j m 2 theta) u),   m = 1, 3
 ///
 /// Because w and its slope are zero at both ends and a constant d does not contribute, H is b0
-/// e^(-j w L) / (1 + j w tau) at the frequency of the cycle, whatever the machine does before and
-/// after; no describing function is needed. abs(H_3 / H_1) separates lag from dead time, the angle
-/// of H_3 shows how wrong this model of the machine is, and the scatter of the H shows the effect
-/// of noise; all three enter the interval. Damping a y with n = 1, or Coulomb friction with n = 2,
-/// turn H_1 and H_3 by different angles; from this they are found and corrected for, or refused if
-/// too large. Two effects are not modelled: damping with n = 2, which looks like less latency, and
-/// a d that rises steadily by r a second, which shifts H by r P / (12 A), P being the time of a
-/// cycle. `identify` of the log separates them.
+/// e^(-j w L) / (1 + j w tau) at the angular frequency w of the harmonic, whatever the machine does
+/// before and after; no describing function is needed. abs(H_3 / H_1) separates lag from dead time,
+/// the angle of H_3 shows how wrong this model of the machine is, and the scatter of the H shows
+/// the effect of noise. All three contribute to the interval. Damping a y (n = 1) and Coulomb
+/// friction (n = 2) turn H_1 and H_3 by different angles; from this they are estimated and
+/// corrected for, or refused if too large. Two effects are not modelled: damping with n = 2, which
+/// looks like less latency, and a d that rises steadily by r per second, which shifts H by r P /
+/// (12 A), where P is the period of a cycle. `identify` can separate them from the log.
 ///
-/// On a machine of order 2 without damping a relay has no cycle without `lead`. With it, the relay
-/// switches on y + 3 (y - f), where f is y behind a lag of a quarter of `lead`.
+/// On a machine of order 2 without damping a relay does not reach a stable cycle without `lead`.
+/// With it, the relay switches on y + 3 (y - f), where f is y behind a lag of a quarter of `lead`.
 ///
 /// Hand-over: from phase `hand_over` on the result is ready. Make the controller, call its
-/// `track(y, reference, u)` while the experiment still moves the machine, and go on with its
-/// `update` at phase `done`: its first u is then that of its law. `examples/identify` shows this.
+/// `track(y, reference, u)` while the experiment still moves the machine, and continue with its
+/// `update` from phase `done` on. `examples/identify` shows this.
 /// @tparam Order n, 1 or 2
 template <int Order, PlainScalar S = double>
 class Experiment {
@@ -140,7 +143,7 @@ class Experiment {
   static constexpr int order = Order;  ///< n
   using scalar_type = S;               ///< type of signals and settings
   using Config = ExperimentConfig<S>;  ///< settings of make
-  using Result = ExperimentResult<S>;  ///< what is found
+  using Result = ExperimentResult<S>;  ///< the result
   template <class T>
   using with_scalar = Experiment<Order, T>;  ///< the same with another scalar
 
@@ -172,7 +175,7 @@ class Experiment {
     if (relay && Order == 2) {
       rules.positive("lead", config.lead);
     } else {
-      rules.left_out("lead", config.lead, "is for a relay of order 2: must be left out");
+      rules.left_out("lead", config.lead, "must be left out: it is for a relay of order 2");
     }
     if (!rules) return rules.error();
     const auto limiter = Limiter<S>::make(config.limits, T);
@@ -182,10 +185,10 @@ class Experiment {
     const S samples = config.time_limit / T;
     rules
         .require(is_finite(high) && !(high > config.limits.upper),
-                 {"amplitude", config.amplitude, "leads beyond limits.upper with input", -1,
+                 {"amplitude", config.amplitude, "with input goes above limits.upper, which is", -1,
                   config.limits.upper, true})
         .require(is_finite(low) && !(low < config.limits.lower),
-                 {"amplitude", config.amplitude, "leads beyond limits.lower with input", -1,
+                 {"amplitude", config.amplitude, "with input goes below limits.lower, which is", -1,
                   config.limits.lower, true})
         .require(is_finite(samples) && samples < S(1 << 24), "time_limit", config.time_limit,
                  "must be below 2^24 samples")
@@ -233,19 +236,20 @@ class Experiment {
     return put_out(next(y));
   }
 
-  /// Ends it: u0 from now on.
+  /// Ends the experiment: u0 from now on. @return u0
   S stop() noexcept { return finished() ? output() : abort(AbortReason::stopped); }
 
-  /// b0 and latency, once phase `hand_over` or `done` is reached.
+  /// b0 and latency, from phase `hand_over` on. @return the result, or an error that names the
+  /// quantity that is missing or out of range
   [[nodiscard]] Expected<Result, Error<S>> result() const noexcept {
     using E = Error<S>;
-    // An abort while handing over takes nothing back.
+    // An abort during the hand-over does not invalidate the result.
     if (2 * windows_ < config_.cycles)
-      return E{"phase", S(static_cast<int>(phase_)), "of the experiment is before its result"};
+      return E{"phase", S(static_cast<int>(phase_)), "of the experiment has no result yet"};
     if (least_window_ < 48)
       return E{"cycle",
                S(least_window_) / S(2),
-               "is the shortest in samples, and must be at least",
+               "(the shortest, in samples) must be at least",
                -1,
                S(24),
                true};
@@ -254,8 +258,9 @@ class Experiment {
     const Complex three{sign * third_.mean.re, sign * third_.mean.im};
     const S size = magnitude(one);
     if (!is_finite(size) || !is_finite(third_.square) || !(size > S(0)))
-      return E{"input_gain", size, "is not a number that can be used"};
-    // Damping (order 1) and friction (order 2) turn H_1 one way and H_3 less, or the other way.
+      return E{"input_gain", size, "is not usable"};
+    // Damping (order 1) and friction (order 2) turn H_1 in one direction, and H_3 less or in the
+    // other.
     const Complex lost = Order == 1 ? Complex{one.im, -one.re} : rubbed_.mean;
     const Complex lost_third =
         Order == 1 ? Complex{three.im / S(3), -three.re / S(3)} : rubbed_third_.mean;
@@ -264,7 +269,7 @@ class Experiment {
     const S simple = at.gain();
     S loss(0);
     const S scatter = student() * third_.error() / magnitude(three);
-    // Not what noise alone may make of it.
+    // Only if the misfit is larger than noise alone may cause.
     if (at.misfit < S(0) && !(at.misfit > -scatter)) {
       const auto without = [&](S share) {
         return split(plus(one, lost, share), plus(three, lost_third, share));
@@ -287,41 +292,46 @@ class Experiment {
     }
     if (!(at.angle > S(0)) || at.angle > S(1.5)) {
       return E{"latency", at.angle / frequency_,
-               "does not fit: friction or damping is too large for this amplitude, or order, or "
-               "the sign of amplitude, is another"};
+               "does not fit: friction or damping is too large for this amplitude, or the order or "
+               "the sign of amplitude is wrong"};
     }
-    // Of b0 A, or of the frequency.
+    // Relative to b0 A, or to the frequency.
     const S share = Order == 1 ? loss : S(loss / at.gain());
     if (Order == 2 && share > S(0.25))
-      return E{"friction", share,   "of b0 A is too large: take a larger amplitude; above",
-               -1,         S(0.25), true};
+      return E{"friction",
+               share,
+               "as a share of b0 A is too large: use a larger amplitude; must be at most",
+               -1,
+               S(0.25),
+               true};
     if (Order == 1 && share > S(1))
       return E{"pole",
                share,
-               "of the frequency is too large: take a smaller hysteresis or "
-               "half_period; above",
+               "as a share of the frequency is too large: use a smaller hysteresis or half_period; "
+               "must be at most",
                -1,
                S(1),
                true};
     if (detail::absolute(at.misfit) > S(0.5) && detail::absolute(at.misfit) > S(2) * scatter) {
       return E{"misfit",
                at.misfit,
-               "rad is what the third harmonic is off: the machine is another than order, lag and "
-               "dead time make it, or damping or friction is too large; above",
+               "of the third harmonic, rad, is too large: the machine has another order or more "
+               "than lag and dead time, or damping or friction is too large; must be at most",
                -1,
                S(0.5),
                true};
     }
     S unsure = std::sqrt(at.misfit * at.misfit + scatter * scatter);
-    // A third harmonic that u does not have, or that noise hides, says nothing.
+    // If u has no third harmonic, or noise hides it, lag and dead time are not separated.
     if (!is_finite(unsure) || unsure > S(1)) unsure = S(1);
     const S middle = at.gain();
     const S down = middle - at.gain(at.ratio * (S(1) + unsure));
     const S up = at.gain(at.ratio * (S(1) - unsure)) - middle;
     const S lag_or_dead = down > up ? down : up;
     const S repeat = student() * first_.error() * middle / size;
-    // Part of what it changed, and what its own error changes. Friction: b0 falls by about twice
-    // the square of its share, and it was taken to act as long one way as the other.
+    // The uncertainty from this correction: a part of the change, and the effect of an error of the
+    // estimated loss. Friction lowers b0 by about twice the square of its share, and was assumed to
+    // act equally long in both directions.
     const S changed = detail::absolute(middle - simple);
     S rubbed;
     if constexpr (Order == 2) {
@@ -334,7 +344,7 @@ class Experiment {
     }
     Result found;
     found.input_gain = sign * middle;
-    // A lag between the samples.
+    // The error of treating the lag between samples.
     const S turn = frequency_ * config_.sample_time;
     const S sampled = middle * turn * turn / S(8);
     found.input_gain_half_width = std::sqrt(lag_or_dead * lag_or_dead + repeat * repeat +
@@ -349,24 +359,24 @@ class Experiment {
     return found;
   }
 
-  /// Where it is.
+  /// The present phase.
   [[nodiscard]] ExperimentPhase phase() const noexcept { return phase_; }
-  /// Why it was aborted.
+  /// Why the experiment was aborted.
   [[nodiscard]] AbortReason reason() const noexcept { return reason_; }
-  /// Done or aborted: u is u0.
+  /// True if done or aborted; u is u0.
   [[nodiscard]] bool finished() const noexcept {
     return phase_ == ExperimentPhase::done || phase_ == ExperimentPhase::aborted;
   }
   /// The present u.
   [[nodiscard]] S output() const noexcept { return limiter_.last(); }
-  /// y0: mean of y in the rest.
+  /// y0, the mean of y at rest.
   [[nodiscard]] S rest_output() const noexcept { return rest_; }
   /// T, s.
   [[nodiscard]] S sample_time() const noexcept { return config_.sample_time; }
   /// Samples so far.
   [[nodiscard]] std::int32_t samples() const noexcept { return count_; }
-  /// The row before this sample, complete now that the u applied since is known; from the second
-  /// sample on. Collected they are a log for `identify`.
+  /// The row of the previous sample, with the u that was applied since; valid from the second
+  /// sample on. The collected rows are a log for `identify`.
   [[nodiscard]] const ExperimentRow<S>& row() const noexcept { return last_row_; }
 
  private:
@@ -375,7 +385,7 @@ class Experiment {
     S re{}, im{};
   };
 
-  /// Mean and scatter, one by one.
+  /// Running mean and scatter.
   struct Spread {
     Complex mean{};
     S square{};
@@ -393,8 +403,8 @@ class Experiment {
     }
   };
 
-  /// Lag and dead time of H_1 and H_3. (1 + x^2) / (1 + 9 x^2) is the square of their ratio, for
-  /// x = w tau.
+  /// Separates lag and dead time by H_1 and H_3: the squared ratio of their magnitudes is (1 + x^2)
+  /// / (1 + 9 x^2), x = w tau.
   struct Split {
     S size{}, angle{}, longest{}, ratio{}, x{}, dead{}, misfit{};
     [[nodiscard]] S square_of_lag(S r) const noexcept {
@@ -428,7 +438,7 @@ class Experiment {
   /// Sums over two cycles.
   struct Sums {
     Complex y{}, u{};
-    /// Of z over that of u.
+    /// The sum of z divided by the sum of u.
     [[nodiscard]] Complex over_input(const Complex& z) const noexcept {
       const S square = u.re * u.re + u.im * u.im;
       return {(z.re * u.re + z.im * u.im) / square, (z.im * u.re - z.re * u.im) / square};
@@ -462,7 +472,7 @@ class Experiment {
 
   static S magnitude(const Complex& z) noexcept { return std::hypot(z.re, z.im); }
 
-  /// Of the 95 % interval of a mean of `windows_` numbers.
+  /// Student's factor for the 95 % interval of a mean of `windows_` numbers.
   [[nodiscard]] S student() const noexcept {
     constexpr float table[] = {4.303f, 3.182f, 2.776f, 2.571f, 2.447f, 2.365f, 2.306f, 2.262f};
     return windows_ <= 10 ? static_cast<S>(table[windows_ - 3]) : static_cast<S>(2.228f);
@@ -476,7 +486,7 @@ class Experiment {
 
   S put_out(S wanted) noexcept { return limiter_(wanted); }
 
-  /// A sample of the window.
+  /// Adds a sample to the window.
   void add(S y, S u_applied) noexcept {
     if (window_ == 0) return;
     const S weight = S(1) - turn_.re;
@@ -493,7 +503,7 @@ class Experiment {
     sums_[1].add(weight, c2 * c4 - s2 * s4, s2 * c4 + c2 * s4, difference, input);
     const Complex next{turn_.re * step_.re - turn_.im * step_.im,
                        turn_.re * step_.im + turn_.im * step_.re};
-    // What rounding makes of its length.
+    // Corrects the rounding error of its length.
     const S length = S(1.5) - (next.re * next.re + next.im * next.im) / S(2);
     turn_ = {next.re * length, next.im * length};
     if (--left_ == 0) close_window();
@@ -527,8 +537,9 @@ class Experiment {
     }
   }
 
-  /// What the sign of the speed would be in H, a force of A: it changes where the first and third
-  /// harmonic of the speed, which are those of the acceleration over j and 3 j, are zero.
+  /// Adds the contribution to H of a friction force A with the sign of the speed. The speed is
+  /// approximated by its first and third harmonic, those of the acceleration divided by j and 3 j,
+  /// which give its zeros.
   void add_friction() noexcept {
     const Complex one{sums_[0].y.im, -sums_[0].y.re};
     const Complex three{sums_[1].y.im / S(3), -sums_[1].y.re / S(3)};
@@ -545,13 +556,13 @@ class Experiment {
       if (slope > S(0)) t -= value / slope;
     }
     turn();
-    // Of sgn sin(angle - t): 4 / (pi m) sin, of which the sum is half.
+    // Harmonic m of sgn sin(angle - t) is 4 / (pi m) sin; its sum over the window is half of that.
     const S size = S(0.6366197723675814L) * S(window_) * config_.amplitude;
     rubbed_.add(sums_[0].over_input({-size * s, -size * c}));
     rubbed_third_.add(sums_[1].over_input({-size / S(3) * s3, -size / S(3) * c3}));
   }
 
-  /// Of this sample on.
+  /// u from this sample on.
   S next(S y) noexcept {
     if (phase_ == ExperimentPhase::rest) {
       rest_ += (y - rest_) / S(count_);
@@ -574,7 +585,7 @@ class Experiment {
       if (up) {
         up_ = count_;
         ++cycles_;
-        // The first to settle have no cycle before them.
+        // The first of the settling cycles have no complete cycle before them.
         if (phase_ == ExperimentPhase::settling && cycles_ > 2) phase_ = ExperimentPhase::measuring;
         if (phase_ == ExperimentPhase::measuring && window_ == 0) open_window(2 * cycle);
       }
@@ -589,7 +600,7 @@ class Experiment {
       lagging_ += follow_ * (deviation - lagging_);
       seen += S(3) * (deviation - lagging_);
     }
-    // By amplitude < 0 a side of u moves y the other way, which is in `side_` already.
+    // With amplitude < 0 each side of u moves y the other way; `side_` already includes this.
     return side_ ? seen > config_.hysteresis : seen < -config_.hysteresis;
   }
 

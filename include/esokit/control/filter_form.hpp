@@ -1,5 +1,5 @@
 /// @file
-/// A sampled linear ADRC as a filter: the polynomials that take y and the applied u to u.
+/// A sampled linear ADRC as a filter: the polynomials from y and the applied u to the new u.
 ///
 /// G. Herbst, "Transfer function analysis and implementation of active disturbance rejection
 /// control", Control Theory and Technology 19 (2021) 19-34; "A minimum-footprint implementation of
@@ -10,7 +10,8 @@
 ///     D c = -(N_y y + N_u u),  u = limited(c + k_r r),  k_r = k_0 / b0.
 ///
 /// With delta = z - 1, Q = P - 1 (P Pascal's triangle, the predictor of the scaled chain), l = P k
-/// the predictor gain, h the law as a row on scaled states and g the effect of a unit drive:
+/// the predictor gain, h the law as a row on scaled states and g the effect of a unit input on the
+/// state:
 ///
 ///     D   = prod(delta + a_i)             = sum_j beta_j delta^(N-j)
 ///     N_y = n! / (b0 T^n) sum_j nu_j delta^(N-j),  nu_0 = h k,  nu_j = h Q^(j-1) l
@@ -18,8 +19,8 @@
 ///     m_p = sum_(j=1..p) (beta_(p-j) h Q^(j-1) g - nu_(p-j) e_1 Q^(j-1) g)
 ///
 /// beta and k come from the contractions a_i = 1 - rho_i through expm1, so all coefficients are
-/// accurate to a few units in the last place for every omega_o T; expanding them in z loses a
-/// factor 1/(1-rho)^N of that accuracy.
+/// accurate to a few units in the last place for every omega_o T. Expanding them in z loses a
+/// factor of 1/(1-rho)^N of that accuracy.
 #pragma once
 
 #include <esokit/core/check.hpp>
@@ -29,7 +30,7 @@
 
 namespace esokit {
 
-/// Coefficients in descending powers, of delta or of z; index 0 belongs to the N-th power.
+/// Coefficients in descending powers of delta or z; index 0 is the N-th power.
 template <int Size, Scalar S>
 struct FilterForm {
   Array<S, Size + 1> denominator{};  ///< D, monic
@@ -71,7 +72,7 @@ S inner(const Array<S, Size>& a, const Array<S, Size>& b) {
 }  // namespace detail
 
 /// The filter in delta = z - 1.
-/// @param poles of the sampled observer (EqualSampledPoles, SampledPoleSet)
+/// @param poles poles of the sampled observer (EqualSampledPoles, SampledPoleSet)
 /// @param gains k_0 .. k_(n-1) of the law
 template <int Order, int Size, PlainScalar S, class Poles>
 FilterForm<Size, S> delta_form(const Poles& poles, const Array<S, Order>& gains, S input_gain,
@@ -118,8 +119,8 @@ FilterForm<Size, S> delta_form(const Poles& poles, const Array<S, Order>& gains,
   return form;
 }
 
-/// The same polynomials in z: sum_j c_j (z-1)^(N-j) multiplied out.
-/// @param delta as `delta_form` gives it
+/// The same filter in z: sum_j c_j (z-1)^(N-j) expanded.
+/// @param delta result of `delta_form`
 template <int Size, PlainScalar S>
 FilterForm<Size, S> shift_form(const FilterForm<Size, S>& delta) {
   const auto expand = [](const Array<S, Size + 1>& in) {

@@ -1,5 +1,6 @@
 /// @file
-/// GainProbe: small steps added to the u of a running loop, which tell b / b0 under any load.
+/// GainProbe: adds small steps to the u of a running loop and finds b / b0 from them, under any
+/// load.
 #pragma once
 
 #include <cmath>
@@ -16,34 +17,36 @@ namespace esokit {
 /// Config of GainProbe.
 template <PlainScalar S = double>
 struct GainProbeConfig {
-  S observer_bandwidth{};  ///< omega_o, rad/s: the observer's poles, or their mean
+  S observer_bandwidth{};  ///< omega_o, rad/s: magnitude of the observer's poles, or their mean
   S sample_time{};         ///< T, s; omega_o T is at most 1
-  S amplitude{};           ///< A, unit of u: several times what friction takes
+  S amplitude{};           ///< A, unit of u: several times the u that overcomes friction
   S travel{};              ///< largest abs(y - y0), unit of y; beyond it the probe ends
-  int periods = 8;         ///< measured, after one to settle; each 10 / omega_o long; 6 .. 200
-  Limits<S> limits{};      ///< of the actuator: u and the steps together are kept within
+  int periods =
+      8;  ///< number of measured periods, after one to settle; each 10 / omega_o long; 6 .. 200
+  Limits<S> limits{};  ///< of the actuator: u plus the steps is kept within them
 };
 
-/// What a probe found.
+/// The result of a probe.
 template <PlainScalar S>
 struct GainProbeResult {
   S gain_ratio{};  ///< b / b0
-  S half_width{};  ///< 95 %, of what differs from period to period
+  S half_width{};  ///< of the 95 % interval, from the scatter between periods
 };
 
-/// Adds steps v of +-A to the u of a loop, and finds b / b0 from what they alone do:
+/// Adds steps v of +-A to the u of a loop, and finds b / b0 from their effect:
 ///
 ///     b / b0 = 1 + sum w psi / sum w phi,   phi = b0 u, w = v, psi = dhat
 ///
-/// with phi and w filtered by the observer's poles, and all three high-passed at omega_o / 3. The
-/// sums are taken with w as it is and a quarter of a period late, since the loop turns v, and the
-/// quotient is that of least squares. A load and noise do not know v, so they have no part in its
-/// mean: this separates a b0 that is too large from a load that drives u, which HealthMonitor
-/// cannot. Friction that keeps the plant at rest reads as a b0 that is too large.
+/// with phi and w filtered by the observer's poles, and phi, psi and w high-passed at omega_o / 3.
+/// Both sums are taken twice, with w and with w delayed by a quarter of a period (because the loop
+/// shifts the phase of v), and combined by least squares. Load and noise are not correlated with v,
+/// so on average they do not affect the result: this distinguishes a b0 that is too large from a
+/// load that drives u, which HealthMonitor cannot. Friction that keeps the plant at rest looks like
+/// a b0 that is too large.
 ///
 /// After each `u = loop.update(y, r, applied)`: `applied = probe.update(loop, y)` is the u to be
-/// held until the next sample. In the end, or after an abort, it is the u of the loop.
-/// @tparam Size N of the observer
+/// held until the next sample. After the end or an abort it is the u of the loop.
+/// @tparam Size N, number of states of the observer
 template <int Size, PlainScalar S = double>
 class GainProbe {
   static_assert(Size >= 2, "esokit: an observer has at least two states");
@@ -51,7 +54,7 @@ class GainProbe {
  public:
   using scalar_type = S;              ///< type of signals and settings
   using Config = GainProbeConfig<S>;  ///< settings of make
-  using Result = GainProbeResult<S>;  ///< what is found
+  using Result = GainProbeResult<S>;  ///< the result
 
   /// Checks the settings. @return the probe before its first sample, or an error
   static Expected<GainProbe, Error<S>> make(const Config& config) {
@@ -75,8 +78,8 @@ class GainProbe {
     return GainProbe(config, *limiter);
   }
 
-  /// After each sample of the controller. @param y the measurement that it got
-  /// @return u to be held until the next sample; tell the controller as u_applied
+  /// After each sample of the controller. @param y the measurement that the controller got
+  /// @return u to be held until the next sample; pass it to the controller as u_applied
   template <class Controller>
   S update(const Controller& controller, const S& y) noexcept {
     const auto& observer = controller.observer();
@@ -105,12 +108,12 @@ class GainProbe {
     return limiter_(controller.output() + step_);
   }
 
-  /// All periods are measured, or it was aborted.
+  /// True if all periods are measured or the probe was aborted.
   [[nodiscard]] bool finished() const noexcept { return aborted_ || measured_ >= periods_; }
-  /// y went further than `travel` or was not finite, or the law did not decide about u.
+  /// True if y moved further than `travel` or was not finite, or the law did not determine u.
   [[nodiscard]] bool aborted() const noexcept { return aborted_; }
 
-  /// b / b0, once it has finished.
+  /// b / b0, once the probe has finished.
   [[nodiscard]] Expected<Result, Error<S>> result() const noexcept {
     if (aborted_ || measured_ < periods_) {
       return Error<S>{"periods", static_cast<S>(measured_),
@@ -119,7 +122,7 @@ class GainProbe {
     const auto& [y0, y1, x0, x1] = sums_;
     const S square = x0 * x0 + x1 * x1;
     const S slope = (x0 * y0 + x1 * y1) / square;
-    // What a period adds to the slope, squared and summed.
+    // Squared contributions of the periods to the slope, summed.
     const Array<S, 4> weights{x0, x1, -slope * x0, -slope * x1};
     S scatter{};
     for (std::size_t i = 0; i < 4; ++i) {
@@ -129,7 +132,7 @@ class GainProbe {
     }
     if (!(scatter > S(0))) scatter = S(0);
     const S count = static_cast<S>(periods_);
-    // Student's factor of six periods.
+    // Student's factor for six periods.
     const S half_width = S(2.571f) * std::sqrt(scatter * count / (count - S(1))) / square;
     if (!is_finite(half_width) || !is_finite(slope) || !(square > S(0))) {
       return Error<S>{"amplitude", amplitude_, "does not show in u: the actuator is at its limits"};
@@ -149,11 +152,11 @@ class GainProbe {
     pole_ = std::exp(-x);
     slow_ = -std::expm1(-x / S(3));
     half_samples_ = static_cast<std::int32_t>((std::round)(S(5) / x));
-    // Half as long at first: y swings around where it was.
+    // The first step is half as long, so that y oscillates around its start.
     phase_ = half_samples_ / 2;
   }
 
-  /// Through the poles, and less its slow mean.
+  /// A signal filtered by the poles, minus its slow mean.
   struct Filtered {
     Array<S, Size> stages{};
     S mean{};
@@ -168,7 +171,8 @@ class GainProbe {
   };
 
   void add(const S& drive, const S& disturbance) noexcept {
-    // Of what was held since the last sample, and a quarter of a period ago: the loop turns v.
+    // The step that was held since the last sample, and the one a quarter of a period ago, because
+    // the loop shifts the phase of v.
     const S first = of_step_(last_step_, pole_, slow_);
     const S second = of_late_step_(last_late_step_, pole_, slow_);
     last_step_ = step_;
@@ -208,7 +212,7 @@ class GainProbe {
   bool started_ = false, settled_ = false, aborted_ = false;
 };
 
-/// Told apart in snapshots.
+/// Distinguishes the type in snapshots.
 template <int Size, PlainScalar S>
 inline constexpr std::uint32_t type_tag<GainProbe<Size, S>> = make_type_tag<S>("GainProbe", Size);
 

@@ -1,5 +1,5 @@
 /// @file
-/// Health of a loop: counters while it runs, and a diagnosis of what is likely wrong.
+/// Health of a running loop: counters, and a diagnosis of the likely fault.
 #pragma once
 
 #include <cmath>
@@ -17,55 +17,58 @@ namespace esokit {
 /// Config of HealthMonitor.
 template <PlainScalar S = double>
 struct HealthConfig {
-  S observer_bandwidth{};  ///< omega_o, rad/s: the observer's poles, or their mean
+  S observer_bandwidth{};  ///< omega_o, rad/s: magnitude of the observer's poles, or their mean
   S sample_time{};         ///< T, s
   S input_range{};         ///< half the range between the limits, unit of u
-  S noise{};     ///< standard deviation of the noise of y; 0: unknown, the innovation is not judged
-  S memory = 1;  ///< s: samples older than a few times this have no weight
-  int divider = 4;  ///< the regression takes every D-th sample, 1 .. 1000; D omega_o T is at most 1
+  S noise{};     ///< standard deviation of the noise of y, unit of y; 0: unknown, no check of the
+                 ///< innovation
+  S memory = 1;  ///< s: time constant with which old samples are forgotten
+  int divider =
+      4;  ///< D: the regression uses every D-th sample, 1 .. 1000; D omega_o T is at most 1
 };
 
-/// What a monitor has found. Shares are those of the last `memory` seconds, counts those of all
+/// What a monitor has found. Shares refer to about the last `memory` seconds, counts to all
 /// samples.
 template <PlainScalar S = double>
 struct Health {
-  std::uint32_t samples = 0;   ///< looked at, since the start or `clear`
-  std::uint32_t rejected = 0;  ///< measurements that were bad numbers or outliers
+  std::uint32_t samples = 0;   ///< number of samples since the start or `clear`
+  std::uint32_t rejected = 0;  ///< measurements that were not finite or outliers
   std::uint32_t bridged = 0;   ///< corrections after a gap, and restarts
   std::uint32_t gated = 0;     ///< samples under less than full trust, see Guarded
-  std::uint32_t unsafe = 0;    ///< samples in which the law did not decide: hold, safe output
-  S saturated{};               ///< share of samples at a limit, of magnitude or rate
-  S bounded{};                 ///< share of samples with dhat at its bound, see Guarded
-  S innovation{};              ///< rms, unit of y
-  S innovation_of_noise{};     ///< what the noise alone would cause; 0 if unknown
-  S gain_ratio = 1;            ///< rho: b / b0, from the motion of u by itself, see HealthMonitor
-  S evidence{};                ///< omega_o times the time in which u moved enough to estimate rho
+  std::uint32_t unsafe =
+      0;                    ///< samples in which the law did not determine u: start hold, safe mode
+  S saturated{};            ///< share of samples at a limit, of magnitude or rate
+  S bounded{};              ///< share of samples with dhat at its bound, see Guarded
+  S innovation{};           ///< rms, unit of y
+  S innovation_of_noise{};  ///< rms that the noise alone would cause; 0 if unknown
+  S gain_ratio = 1;         ///< rho: estimate of b / b0, see HealthMonitor
+  S evidence{};             ///< omega_o times the time in which u moved enough to estimate rho
 };
 
-/// What is likely wrong, the worst first.
+/// The likely fault of a loop, the worst first.
 enum class LoopFault : unsigned char {
-  none,                   ///< nothing that shows
-  wrong_sign,             ///< b0 has the wrong sign
-  gain_too_small,         ///< b0 is several times too small: the loop is too fast by that factor
-  measurements_rejected,  ///< more than a tenth of the measurements are bad or outliers
-  saturated,              ///< at the limits more than half of the time
+  none,            ///< no fault found
+  wrong_sign,      ///< b0 has the wrong sign
+  gain_too_small,  ///< b0 is several times too small: the loop gain is too large by that factor
+  measurements_rejected,  ///< more than a tenth of the measurements are not finite or outliers
+  saturated,              ///< u is at its limits more than half of the time
   bounded,                ///< dhat is at its bound more than half of the time
-  innovation_too_large,   ///< rms over three times what the noise makes
+  innovation_too_large,   ///< rms above three times that caused by the noise
   gain_too_large_or_disturbed,  ///< the effect of u is cancelled: b0 is too large, or a load drives
                                 ///< u
 };
 
-/// Limits of `diagnose`. rho was tested on 1,000 servos with each fault and 5,000 healthy ones, see
-/// examples/guards.
+/// Limits of `diagnose`. Those of rho were tested on 1,000 servos with each fault and 5,000 healthy
+/// ones, see examples/guards.
 struct HealthLimits {
-  double wrong_sign = -0.3;  ///< rho below it
-  double too_small = 3;      ///< rho above it
-  double too_large = 0.25;   ///< rho below it; only an advice, because a load has the same effect
-  double evidence = 5;       ///< omega_o times seconds; below it rho says nothing about the sign
-  double evidence_of_more = 3;  ///< the same for a b0 that is too small, which shows sooner
+  double wrong_sign = -0.3;     ///< rho below it
+  double too_small = 3;         ///< rho above it
+  double too_large = 0.25;      ///< rho below it; only a hint, because a load has the same effect
+  double evidence = 5;          ///< omega_o times time; with less, rho does not tell the sign
+  double evidence_of_more = 3;  ///< the same for a b0 that is too small, which is visible sooner
 };
 
-/// What is likely wrong. @param health of a monitor
+/// The likely fault. @param health result of a monitor
 template <PlainScalar S>
 [[nodiscard]] constexpr LoopFault diagnose(const Health<S>& health,
                                            const HealthLimits& limits = {}) noexcept {
@@ -103,19 +106,20 @@ constexpr const auto& in_adapters(const Observer& observer) noexcept {
 /// Watches a loop of one input: `look(controller)` after each sample.
 ///
 /// For y^(n) = d + b u an observer with b0 finds dhat = d + (b - b0) u, filtered by its own poles.
-/// The part of dhat that is proportional to phi = b0 u, filtered by the same poles, has the factor
-/// (b - b0) / b0:
+/// So the part of dhat that is proportional to phi, which is b0 u filtered by the same poles, has
+/// the factor (b - b0) / b0, and
 ///
 ///     rho = 1 + sum phi psi / sum phi^2,   psi = dhat, both high-passed at omega_o / 3
 ///
-/// is b / b0 if u moves by itself (because of a reference or noise), and tends to 0 if u reacts to
-/// a load (then dhat is -phi): a small rho proves nothing. It is negative only if the sign of b0 is
-/// wrong. A sample counts if abs(phi) is above 2 % of b0 times the range and above the noise of
-/// dhat, the law determines u and no guard gates dhat. The sums forget with time constant `memory`.
+/// is b / b0 if u moves because of a reference or noise. If u reacts to a load, dhat is -phi and
+/// rho tends to 0: so a small rho alone proves nothing. rho is negative only if the sign of b0 is
+/// wrong. A sample counts if abs(phi) is above 2 % of b0 times the input range and above the noise
+/// of dhat, the law determines u and no guard gates dhat. The sums forget with the time constant
+/// `memory`.
 ///
-/// A larger margin over the noise would lose the fault that matters most: if b0 is too small, the
-/// loop cycles at 1.6 omega_o, where the poles leave a fifth of phi, but dhat is ten times as
-/// large. Noise that u reacts to makes rho smaller, so it raises no alarm of that kind.
+/// A larger margin above the noise would miss the most important fault: if b0 is too small, the
+/// loop oscillates at 1.6 omega_o, where the poles attenuate phi to a fifth, but dhat is ten times
+/// as large. Noise to which u reacts lowers rho, so it cannot cause this alarm.
 ///
 /// With a model (ModelEso) psi is d alone, and behind an actuator's lag phi is b0 v, the actuator's
 /// output as it is simulated.
@@ -202,7 +206,7 @@ class HealthMonitor {
     phi_sum_ = S(0);
   }
 
-  /// What it has seen.
+  /// The counters and estimates.
   [[nodiscard]] const Health<S>& health() const noexcept { return health_; }
 
   /// Clears everything, for example after a change of the design.
@@ -236,8 +240,9 @@ class HealthMonitor {
     health_.innovation_of_noise = of_noise;
   }
 
-  /// Of white noise in y: the innovation through ((z-1)/(z-r))^N, dhat through the same with n of
-  /// the N steps by T and one more pole. By their impulse responses.
+  /// Computes the rms of innovation and dhat for white noise in y from the impulse responses: the
+  /// innovation passes ((z-1)/(z-r))^N; for dhat n of the N differences are divided by T, and there
+  /// is one more pole.
   void noise_of_noise(const Config& config, S r) noexcept {
     if (!(config.noise > S(0))) return;
     Array<S, Size> innovation{};
@@ -255,7 +260,7 @@ class HealthMonitor {
         innovation[i] = r * innovation[i] + e - before_e[i];
         before_e[i] = e;
         e = innovation[i];
-        // Of m = 1: all but one are differences.
+        // For m = 1 all stages but one are differences.
         disturbance[i] = r * disturbance[i] +
                          (S(1) - r) * (i + 1 < Size ? (d - before_d[i]) / config.sample_time : d);
         before_d[i] = d;
@@ -285,7 +290,7 @@ class HealthMonitor {
     share(health_.saturated, saturated);
     share(health_.bounded, bounded);
     const S square = innovation * innovation;
-    // One absurd sample is not to be the last that counts.
+    // A single absurd sample must not make the mean infinite.
     if (is_finite(square) && square < largest_square()) {
       mean_square_ = mean_square_ + weight_ * (square - mean_square_);
     }
@@ -310,7 +315,8 @@ class HealthMonitor {
     const S xy = x * y;
     const S most = S(1000) * b * range_;
     if (!(detail::absolute(x) < most && detail::absolute(y) < most) || !is_finite(xx + xy)) {
-      // No u and no plant does that: begin anew, or the sums would remember it for long.
+      // No real u or plant causes this. The sums start again, because they would remember it for
+      // long.
       for (S& stage : stages_) stage = S(0);
       slow_phi_ = slow_psi_ = sum_xx_ = sum_xy_ = S(0);
       return;
@@ -326,12 +332,12 @@ class HealthMonitor {
 
   S range_;
   int divider_;
-  S pole_;     ///< of phi's filter, at the divided rate
-  S slow_;     ///< of the mean that is taken out
-  S weight_;   ///< of a sample in a share
-  S forget_;   ///< of the sums, at the divided rate
+  S pole_;     ///< pole of the filter of phi, at the divided rate
+  S slow_;     ///< pole of the slow mean that is subtracted
+  S weight_;   ///< weight of a sample in a share
+  S forget_;   ///< forgetting factor of the sums, at the divided rate
   S step_;     ///< omega_o T D
-  S least_{};  ///< phi below it is noise
+  S least_{};  ///< smallest phi that counts
   int phase_ = 0;
   S phi_sum_{};
   Array<S, Size> stages_{};

@@ -1,5 +1,5 @@
 /// @file
-/// Incremental: a controller whose output is the change of u, for an actuator that integrates.
+/// Incremental: a controller whose output is the change of u, for actuators that integrate.
 #pragma once
 
 #include <esokit/core/check.hpp>
@@ -13,23 +13,23 @@ namespace esokit {
 /// Returns u[k] - u[k-1] of a controller: for stepper valves, motorised potentiometers and PLC
 /// blocks that take increments.
 ///
-/// The sum of the increments is u up to a constant, which need not be known: to the observer it is
-/// a disturbance. The limits apply to the sum (counted from `start`), the rate limit to an
-/// increment. If the actuator reports what it did with the last increment, nothing winds up.
-/// Because an increment is the difference of two u, a limit beyond half of what the scalar holds
-/// (or one that is left out) counts as that half, and a report that leads beyond it is ignored.
-/// @tparam Controller such as Adrc
+/// The sum of the increments is u up to a constant, which need not be known, because the observer
+/// takes it as a disturbance. The limits apply to the sum (counted from `start`), the rate limit to
+/// each increment. If the actuator reports how much of the last increment it carried out, nothing
+/// winds up. Because an increment is the difference of two u, limits beyond half the largest number
+/// of the scalar (or left out) count as this half, and a report that exceeds it is ignored.
+/// @tparam Controller a controller such as Adrc
 template <class Controller>
 class Incremental {
  public:
   using scalar_type = typename Controller::scalar_type;  ///< type of signals and settings
   using S = scalar_type;                                 ///< the same type
   using Config = typename Controller::Config;            ///< settings of make
-  using Status = StatusOf<S>;                            ///< StepStatus, of a pack one a lane
+  using Status = StatusOf<S>;                            ///< StepStatus, for a pack one per lane
   template <class T>
   using with_scalar = Incremental<detail::WithScalar<Controller, T>>;  ///< with another scalar
 
-  /// As Controller::make.
+  /// Same as Controller::make.
   static Expected<Incremental, Error<S>> make(const Config& config) {
     auto controller = Controller::make(halved(config));
     if (!controller) return controller.error();
@@ -45,8 +45,8 @@ class Incremental {
     return increment_;
   }
 
-  /// The same if the actuator reports what it did.
-  /// @param increment_applied what the actuator did with the last increment
+  /// The same if the actuator reports what it carried out.
+  /// @param increment_applied how much of the last increment the actuator carried out
   template <class Reference>
   S update(const S& y, const Reference& reference, const S& increment_applied) noexcept {
     const S missed = increment_applied - increment_;
@@ -68,12 +68,13 @@ class Incremental {
   }
   /// @}
 
-  /// Takes over a plant that stands at y; u counts from `u`, which is zero if unknown.
-  /// @return as Controller::start; input_rejected beyond half of what the scalar holds
+  /// Takes over a plant at rest at y; the sum of increments starts at `u`, zero if unknown.
+  /// @return as for Controller::start; input_rejected for a u beyond half the largest number of the
+  /// scalar
   Status start(const S& y, const S& u = S(0.0)) noexcept {
     const auto good = is_finite(u) && within_half(u);
     if constexpr (PackScalar<S>) {
-      // Of another u the controller tells, and changes nothing.
+      // With NaN as u the controller reports the error and changes nothing.
       const S none(std::numeric_limits<LaneScalar<S>>::quiet_NaN());
       Status status = controller_.start(y, select(good, u, none));
       for (int i = 0; i < lane_count<S>; ++i) {
@@ -89,7 +90,7 @@ class Incremental {
     }
   }
 
-  /// As Controller::retune.
+  /// Same as Controller::retune.
   Check<S> retune(const Config& config) { return controller_.retune(halved(config)); }
 
   /// The controller, whose output is the sum of the increments.

@@ -8,7 +8,7 @@
 
 namespace esokit {
 
-/// Limits of an actuator. Left out, a limit does not bind.
+/// Limits of an actuator. A limit that is left out has no effect.
 template <Scalar S = double>
 struct Limits {
   S lower = S(std::numeric_limits<LaneScalar<S>>::lowest());  ///< least u, unit of u
@@ -23,19 +23,19 @@ struct Limits {
   /// @endcond
 };
 
-/// Holds a command within magnitude limits (asymmetric ones too) and a rate limit.
+/// Limits a command in magnitude (also asymmetrically) and rate.
 ///
-/// Both bounds of a step are computed from the last output, so that only a minimum and a maximum
-/// remain between command and output.
+/// The bounds of the next step are computed in advance from the last output, so that only a minimum
+/// and a maximum are left between command and output.
 template <Scalar S = double>
 class Limiter {
  public:
-  using scalar_type = S;  ///< of u
+  using scalar_type = S;  ///< type of u
   template <class T>
   using with_scalar = Limiter<T>;  ///< the same with another scalar
 
   /// Checks the limits.
-  /// @param limits of the actuator @param sample_time T, s
+  /// @param limits limits of the actuator @param sample_time T, s
   /// @return error for limits that are crossed or not finite, or a rate or sample time that is not
   ///         positive
   static Expected<Limiter, Error<S>> make(const Limits<S>& limits, const S& sample_time) {
@@ -49,7 +49,7 @@ class Limiter {
     }
   }
 
-  /// The output nearest to `command` within the limits; remembered as the last output.
+  /// The output nearest to `command` within the limits; stored as the last output.
   /// @param command finite, as is everything computed from an observer's estimate
   constexpr S operator()(const S& command) noexcept {
     const S output = clamp(command);
@@ -57,13 +57,13 @@ class Limiter {
     return output;
   }
 
-  /// What the next output would be for `command`; nothing is remembered.
+  /// The output that `command` would give; nothing is stored.
   [[nodiscard]] constexpr S clamp(const S& command) const noexcept {
     const S above = select(command < low_, low_, command);
     return select(high_ < above, high_, above);
   }
 
-  /// `u` within the magnitude limits, whatever the rate.
+  /// `u` within the magnitude limits, without the rate limit.
   [[nodiscard]] constexpr S within(const S& u) const noexcept {
     return smaller(larger(u, lower_), upper_);
   }
@@ -71,11 +71,11 @@ class Limiter {
   /// Reports what the actuator really held; the rate limit counts from there.
   constexpr void track(const S& output) noexcept {
     last_ = output;
-    // Without a rate limit the bounds stand still.
+    // Without a rate limit the bounds do not change.
     if (rate_limited_ == false) return;
     low_ = larger(lower_, S(output - step_));
     high_ = smaller(upper_, S(output + step_));
-    // An output from outside may lie beyond a magnitude limit by more than a step.
+    // A reported output may be beyond a magnitude limit by more than a step.
     low_ = smaller(low_, upper_);
     high_ = larger(high_, lower_);
   }
@@ -117,7 +117,7 @@ class Limiter {
         low_(limits.lower),
         high_(limits.upper),
         rate_limited_(!all(limits.rate >= Limits<S>{}.rate) && all(is_finite(step_))) {
-    // So that in a pack it binds as little as if it were not there.
+    // In a pack a lane without a rate limit gets an infinite step.
     if (rate_limited_ == false) step_ = S(detail::unbounded<LaneScalar<S>>());
     track(within(S(0.0)));
   }

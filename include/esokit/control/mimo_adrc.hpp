@@ -1,5 +1,5 @@
 /// @file
-/// MimoAdrc: q channels of ADRC, decoupled by the inverse of the input matrix.
+/// MimoAdrc: ADRC with q channels, decoupled by the inverse of the input matrix.
 #pragma once
 
 #include <esokit/control/adrc_law.hpp>
@@ -28,15 +28,16 @@ struct MimoAdrcConfig {
       typename std::tuple_element_t<0, std::tuple<Observers...>>::scalar_type;  ///< type of signals
   using InputMatrix = Matrix<S, channels, channels>;                            ///< B0, q x q
 
-  /// One for each channel. `input_gain` is left out, because B0 gives it; T is the same in all.
+  /// One config for each channel. Leave out `input_gain`, which B0 gives; T must be the same in
+  /// all.
   std::tuple<typename Observers::Config...> observers{};
   Array<S, channels> controller_bandwidths{};      ///< omega_c of each channel, rad/s
   TimeDomain domain = TimeDomain::continuous;      ///< where the controllers' poles are placed
   bool half_gain = false;                          ///< half-gain tuning of the controllers
   InputMatrix input_matrix = InputMatrix::Zero();  ///< B0, unit of y_i^(n_i) per unit of u_j
 
-  /// Largest condition number of B0 that is accepted, in the 1-norm after its rows and columns are
-  /// scaled to a largest element of 1, so that units do not matter.
+  /// Largest accepted condition number of B0, in the 1-norm, after rows and columns are scaled to a
+  /// largest element of 1 so that units do not matter.
   S condition_limit = S(1000);
   Array<Limits<S>, channels> limits{};  ///< of each actuator
 
@@ -49,16 +50,16 @@ struct MimoAdrcConfig {
 };
 
 /// Control of y_i^(n_i) = d_i + (B0 u)_i, i = 1..q, B0 square and invertible: each channel has an
-/// observer of its own order, and u = B0^-1 (v - dhat). Errors of B0 and all other coupling count
-/// as disturbance.
+/// observer of its own order, and u = B0^-1 (v - dhat). Errors of B0 and all other couplings are
+/// part of the disturbance.
 ///
 /// Observer i gets the applied (B0 u)_i, so the limits of the q actuators cause no wind-up; while
-/// one actuator is limited, the channels are coupled through B0. A channel whose measurement is NaN
-/// only predicts, and the others go on; a channel whose reference is NaN keeps its share of B0 u.
+/// an actuator is at its limit, the channels are coupled through B0. A channel whose measurement is
+/// NaN only predicts, the others continue; a channel whose reference is NaN keeps its part of B0 u.
 ///
-/// An actuator in a channel's model is a lag of (B0 u)_i: this is correct if all actuators have the
-/// same lag, or if B0 does not couple them.
-/// @tparam Observers one observer type a channel, all of one scalar
+/// An actuator in the model of a channel is a lag of (B0 u)_i. This is correct if all actuators
+/// have the same lag, or if B0 does not couple them.
+/// @tparam Observers one observer type for each channel, all with the same scalar
 template <ShiftableDisturbance... Observers>
 class MimoAdrc {
   using Channels = std::tuple<Observers...>;
@@ -75,14 +76,14 @@ class MimoAdrc {
   static_assert((std::is_same_v<typename Observers::scalar_type, S> && ...),
                 "esokit: all channels need the same scalar");
 
-  /// What it declares beyond `update(y, reference)`.
+  /// What the controller can do beyond `update(y, reference)`.
   static constexpr ControllerTraits traits{.knows_sample_time = true};
 
   using Config = MimoAdrcConfig<Observers...>;  ///< settings of make
 
   /// Checks the settings and does all the design work.
-  /// @return the controller at rest in zero, or an error that names the field; for B0 with its
-  /// condition number as the value
+  /// @return the controller at rest at zero, or an error that names the field; for B0 the value is
+  /// its condition number
   static Expected<MimoAdrc, Error<S>> make(const Config& config) {
     auto inverse = inverted(config.input_matrix, config.condition_limit);
     if (!inverse) return inverse.error();
@@ -91,7 +92,7 @@ class MimoAdrc {
                          std::make_index_sequence<sizeof...(Observers)>{});
   }
 
-  /// One sample. @param y q x 1, NaN where missing @param reference r, q x 1
+  /// One sample. @param y q x 1, NaN for a missing element @param reference r, q x 1
   /// @return u, q x 1, to be held until the next sample, within the limits
   Output update(const Output& y, const Output& reference) noexcept {
     const Output applied = output();
@@ -114,14 +115,14 @@ class MimoAdrc {
     return put_out(inverse_ * wanted);
   }
 
-  /// The same if the actuators report what they held since the last sample; NaN: not known.
+  /// The same if the actuators report what they held since the last sample; NaN for an unknown one.
   Output update(const Output& y, const Output& reference, const Output& u_applied) noexcept {
     report_applied(u_applied);
     return update(y, reference);
   }
 
-  /// For a plant at rest or carried: the observers follow y, every dhat keeps its value, u is the
-  /// caller's; see Guarded. After it begin with the reference at y.
+  /// For a plant that is held by something else: the observers follow y, every dhat is kept, u is
+  /// the caller's; see Guarded. On release begin with the reference at y.
   /// @param u_applied what the actuators held since the last sample @return the same
   Output hold(const Output& y, const Output& u_applied) noexcept
       requires(observer_traits<Observers>.gates_disturbance&&...) {
@@ -137,11 +138,12 @@ class MimoAdrc {
     return output();
   }
 
-  /// B0 from the coming sample on: it applies to the law's next answer, and to the u given one
-  /// sample later, which is that answer. Every dhat keeps its value (unit of y^(n)). It costs an
-  /// inversion of q x q. Ahead of the lag of an actuator in a channel's model; a factor of what
-  /// this actuator delivers is the `set_input_gain` of a Guarded channel, whose gain is 1 in make.
-  /// @return as `make` for a B0 that it would refuse: nothing changes
+  /// Sets B0 from the next sample on: it applies to the next output of the law, and therefore to
+  /// the u that is passed to the observers one sample later. Every dhat is kept (unit of y^(n)).
+  /// Costs an inversion of a q x q matrix. With an actuator in a channel's model this B0 acts
+  /// before the lag; for a factor on the output of the lag use `set_input_gain` of a Guarded
+  /// channel, whose gain is 1 in make.
+  /// @return the error of `make` for a B0 that it would refuse: nothing changes then
   Check<S> set_input_matrix(const InputMatrix& input_matrix) noexcept {
     const auto inverse = inverted(input_matrix, condition_limit_);
     if (!inverse) return inverse.error();
@@ -151,8 +153,8 @@ class MimoAdrc {
     return {};
   }
 
-  /// Takes over a plant that stands at y under u: dhat = -B0 u.
-  /// @return ok, or state_rejected if something is not finite: nothing is changed then
+  /// Takes over a plant at rest at y under u: dhat = -B0 u.
+  /// @return ok, or state_rejected if something is not finite: nothing changes then
   StepStatus start(const Output& y, const Output& u) noexcept {
     const Output drive = input_matrix_ * u;
     if (!is_finite(y.sum() + drive.sum() + u.sum())) return StepStatus::state_rejected;
@@ -186,12 +188,12 @@ class MimoAdrc {
       constexpr int row = i;
       auto& observer = std::get<channel>(observers);
       if (outcome) outcome = observer.adopt(std::get<channel>(fresh.observers_));
-      // Of a u that was reported absurdly large the scalar may not hold what it is to explain.
+      // After an absurdly large reported u this change of the disturbance may overflow.
       const S shift = moved(row) * observer.input_gain();
       if (outcome && observer.shift_disturbance(shift) != StepStatus::ok) {
         outcome = too_large(u(row));
       }
-      // Of what is under way to the plant the new B0 makes another drive.
+      // Inputs that are still delayed act on the plant through the new B0.
       if constexpr (observer_traits<ObserverOf<row>>.delays_input) {
         if (moved(row) < S(0) || moved(row) > S(0)) observer.fill_input(drive(row));
       }
@@ -218,7 +220,7 @@ class MimoAdrc {
     return std::get<static_cast<std::size_t>(Channel)>(observers_);
   }
 
-  /// The same, for what only it can do (trust and pin of Guarded).
+  /// The same, for its own members (trust and pin of Guarded).
   template <int Channel>
   [[nodiscard]] ObserverOf<Channel>& observer() noexcept {
     return std::get<static_cast<std::size_t>(Channel)>(observers_);
@@ -230,7 +232,7 @@ class MimoAdrc {
     return std::get<static_cast<std::size_t>(Channel)>(laws_).gains();
   }
 
-  /// B0, and the inverse that is used. @{
+  /// B0 and its inverse. @{
   [[nodiscard]] const InputMatrix& input_matrix() const noexcept { return input_matrix_; }
   [[nodiscard]] const InputMatrix& decoupling() const noexcept { return inverse_; }
   /// @}
@@ -259,7 +261,8 @@ class MimoAdrc {
     auto& observer = std::get<channel>(observers_);
     const StepStatus status = observer.update(y, drive);
     std::get<channel>(statuses_) = status;
-    // After a gap too long to bridge: the steady state of the present u does not bump.
+    // After a gap too long to bridge the observer starts in the steady state under the present u,
+    // so that u does not jump.
     if (has(status, StepStatus::restarted)) [[unlikely]] {
       const S input = observer.applied_input();
       (void)observer.reset(observer.rest(y, input));
@@ -282,7 +285,7 @@ class MimoAdrc {
     Output u;
     for (int i = 0; i < channels; ++i) {
       auto& limiter = limiters_[static_cast<std::size_t>(i)];
-      // What the scalar cannot hold: the last output stays.
+      // On overflow the last output is kept.
       u(i) = limiter(is_finite(wanted(i)) ? wanted(i) : limiter.last());
     }
     return u;
@@ -333,7 +336,7 @@ class MimoAdrc {
     return inverse;
   }
 
-  /// The largest sum of the magnitudes in a column.
+  /// The largest column sum of magnitudes (1-norm).
   static S column_norm(const InputMatrix& matrix) noexcept {
     S norm(0);
     for (int j = 0; j < channels; ++j) {
@@ -402,7 +405,7 @@ class MimoAdrc {
       }
       return named;
     }
-    // 1; with an actuator in the model what a unit of its input is to the highest derivative.
+    // 1; with an actuator in the model its b, for example 1 / tau.
     const S input_gain = observer ? S(observer->input_gain()) : S(1);
     return AdrcLaw<Order, S>::make({.gains = *gains, .input_gain = input_gain});
   }
@@ -411,7 +414,7 @@ class MimoAdrc {
   Laws laws_;
   Array<Limiter<S>, channels> limiters_;
   InputMatrix input_matrix_;
-  InputMatrix told_matrix_;  ///< of the u that is told next: what it was when the law gave it
+  InputMatrix told_matrix_;  ///< B0 when the law computed the u that comes next
   InputMatrix inverse_;
   S condition_limit_;
   Array<StepStatus, channels> statuses_{};
@@ -436,7 +439,7 @@ class MimoAdrc<First, Rest...>
 
   using Base::Base;
 
-  /// As of plain scalars.
+  /// As for plain scalars.
   /// @{
   Output update(const Output& y, const Output& reference) noexcept {
     return Base::update(y, reference);

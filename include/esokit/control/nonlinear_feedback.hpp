@@ -11,11 +11,11 @@
 
 namespace esokit {
 
-/// u = (sum_i k_i fal(r_i - z_i, a_i, delta_i) - dhat) / b0: as AdrcLaw with fal in place of the
+/// u = (sum_i k_i fal(r_i - z_i, a_i, delta_i) - dhat) / b0: like AdrcLaw, with fal in place of
 /// linear feedback. A function of the estimate, without state.
 ///
-/// For finite arguments u is finite: a result that the scalar cannot hold, such as a power of a
-/// large error, counts as the largest number of its sign. For limits add a Limiter.
+/// For finite arguments u is finite: a result that overflows, such as a power of a large error, is
+/// replaced by the largest number of its sign. For limits add a Limiter.
 /// @tparam Order n
 template <int Order, Scalar S = double>
 class NonlinearFeedback {
@@ -49,7 +49,7 @@ class NonlinearFeedback {
 
   /// v = sum_i k_i fal(r_i - z_i), unit of y^(n).
   /// @param given (y, .., y^(n-1), ..), at least n x 1
-  /// @param reference (r, .., r^(n-1)), n x 1, e.g. of a TrackingDifferentiator
+  /// @param reference (r, .., r^(n-1)), n x 1, for example from a TrackingDifferentiator
   template <detail::VectorOf<S> Estimate>
   [[nodiscard]] S feedback(const Estimate& given,
                            const Vector<S, Order>& reference) const noexcept {
@@ -103,7 +103,7 @@ class NonlinearFeedback {
     const NonlinearFeedback law(config, std::make_integer_sequence<int, Order>{});
     for (int i = 0; i < Order; ++i) {
       const auto row = static_cast<std::size_t>(i);
-      // The steepest there is with a_i <= 1: within the linear piece.
+      // The largest slope for a_i <= 1, that of the linear part.
       const S slope = law.fal_[row].gain(S(0.0));
       rules.require(
           all(is_finite(slope)) &&
@@ -121,7 +121,7 @@ class NonlinearFeedback {
     return result;
   }
 
-  /// What came of `from`: a bad number stays one.
+  /// x limited to the range of the scalar, but not finite if an element of `from` is not.
   template <int Count>
   static S bounded(const S& x, const Array<S, Count>& from) noexcept {
     S good = detail::clipped(x);

@@ -1,6 +1,6 @@
 /// @file
-/// From PID gains to ADRC and back: a first guess if you have a tuned PID, and an ADRC expressed as
-/// a PID.
+/// Converts PID gains to ADRC and back: for a first guess from a tuned PID, and to express an ADRC
+/// as a PID.
 ///
 /// Continuous linear ADRC of order n is, from y to u, exactly
 ///
@@ -23,13 +23,13 @@ namespace esokit {
 template <PlainScalar S = double>
 struct PidGains {
   S proportional{};         ///< K_p, unit of u per unit of y
-  S integral{};             ///< K_i, K_p per s
-  S derivative{};           ///< K_d, K_p times s; zero for PI
+  S integral{};             ///< K_i, unit of K_p per s
+  S derivative{};           ///< K_d, unit of K_p times s; zero for PI
   S filter_time{};          ///< tau1, s
   S filter_time_squared{};  ///< tau2, s^2; zero for PI
 };
 
-/// A continuous linear ADRC by its bandwidths.
+/// A continuous linear ADRC, given by b0 and its bandwidths.
 template <PlainScalar S = double>
 struct AdrcTuning {
   S input_gain{};            ///< b0
@@ -37,7 +37,7 @@ struct AdrcTuning {
   S observer_bandwidth{};    ///< omega_o, rad/s
 };
 
-/// Gains of the PI (Order 1) or PID (Order 2) that equals the ADRC.
+/// Gains of the PI (Order 1) or PID (Order 2) that is equal to the ADRC.
 /// @return error for an input gain of zero, a bandwidth that is not positive, or gains that the
 ///         scalar cannot hold
 template <int Order, PlainScalar S>
@@ -82,13 +82,13 @@ Expected<PidGains<S>, Error<S>> pid_from_adrc(const AdrcTuning<S>& tuning) {
 /// kappa follows from K_p^2 / (K_i K_d) = (2 kappa + 3)^2 / (kappa^2 + 6 kappa + 3), which for
 /// kappa >= 1 lies between 2.5 and 4 (K_p^2 / (K_i K_d) = 4 is Ziegler and Nichols' T_i = 4 T_d).
 /// Outside this range, and if kappa would be above `bandwidth_ratio`, no ADRC has these gains. They
-/// are refused, and the limit of the error is the nearest K_d for which there is one. Use that K_d
-/// only if it is near; otherwise b0 is wrong by as much.
+/// are refused, and `limit` in the error is the nearest K_d for which there is one. Use it only if
+/// it is close to your K_d; otherwise b0 is wrong by the same factor.
 /// @param pid gains, not zero and of one sign; its filter is ignored
-/// @param bandwidth_ratio kappa of PI, largest kappa of PID; 3 .. 10 is good for the step
-///        response, less is better for noise
-/// @return error for gains that are zero, of different signs or of no ADRC, and for a ratio that is
-///         not positive (PI) or not above 1 (PID)
+/// @param bandwidth_ratio kappa for PI, largest kappa for PID; 3 .. 10 gives good step responses,
+///        less gives less noise
+/// @return error for gains that are zero, have different signs or belong to no ADRC, and for a
+///         ratio that is not positive (PI) or not above 1 (PID)
 template <int Order, PlainScalar S>
 Expected<AdrcTuning<S>, Error<S>> adrc_from_pid(const PidGains<S>& pid, S bandwidth_ratio = S(10)) {
   static_assert(Order == 1 || Order == 2, "esokit: PID is for orders 1 and 2");
@@ -119,7 +119,7 @@ Expected<AdrcTuning<S>, Error<S>> adrc_from_pid(const PidGains<S>& pid, S bandwi
     const S b = S(12) * ratio - S(6);
     const S c = S(9) * ratio - S(3);
     S square = b * b - S(4) * a * c;
-    // At kappa = 1 it vanishes, but for rounding.
+    // At kappa = 1 it is zero except for rounding.
     const S rounding = S(64) * detail::rounding<S>();
     if (square < S(0) && square > -rounding * (b * b)) square = S(0);
     const S root = a > S(0) && square >= S(0) ? (-b + std::sqrt(square)) / (S(2) * a) : S(-1);
@@ -129,14 +129,13 @@ Expected<AdrcTuning<S>, Error<S>> adrc_from_pid(const PidGains<S>& pid, S bandwi
       kappa = too_much ? S(1) : bandwidth_ratio;
       const S both = S(2) * kappa + S(3);
       const S nearest = (kappa * kappa + S(6) * kappa + S(3)) / (both * both);
-      return Error<S>{
-          "derivative",
-          pid.derivative,
-          "is that of no ADRC with this proportional, integral and bandwidth_ratio; the "
-          "nearest that is",
-          -1,
-          nearest * pid.proportional / rate,
-          true};
+      return Error<S>{"derivative",
+                      pid.derivative,
+                      "belongs to no ADRC with this proportional, integral and bandwidth_ratio; "
+                      "the nearest that does is",
+                      -1,
+                      nearest * pid.proportional / rate,
+                      true};
     }
     kappa = root < S(1) ? S(1) : root;
     tuning.controller_bandwidth = rate * (S(3) + S(2) * kappa) / kappa;

@@ -26,11 +26,11 @@ struct PredictiveAdrcConfig {
   using S = typename Observer::scalar_type;      ///< type of signals and settings
   static constexpr int order = Observer::order;  ///< n, order of the plant
 
-  typename Observer::Config observer{};    ///< b0 and T are in here
+  typename Observer::Config observer{};    ///< includes b0 and T
   S controller_bandwidth{};                ///< omega_c, rad/s: k_i = C(n, i) omega_c^(n-i)
   std::optional<Array<S, order>> gains{};  ///< k_0 .. k_(n-1)
   Limits<S> limits{};                      ///< of the actuator
-  S start_hold{};  ///< t_u >= 0, s: u = 0 (within the limits) for so long after the start, while
+  S start_hold{};  ///< t_u >= 0, s: time after the start with u = 0 (within the limits), while
                    ///< the observer settles; rounded up to whole samples
 
   /// @cond
@@ -40,36 +40,35 @@ struct PredictiveAdrcConfig {
   /// @endcond
 };
 
-/// u = (v - dhat) / b0, as AdrcLaw gives it after the observer's correction, but with the
-/// correction folded in: u_k = ubar_k - slope y_k, where ubar_k and slope are known before y_k.
+/// u = (v - dhat) / b0, the same as AdrcLaw after the observer's correction, but written as u_k =
+/// ubar_k - slope y_k, where ubar_k and slope are known before y_k.
 ///
 /// ```cpp
 /// const double u = controller.control(y);   // at the sample: to the actuator at once
 /// controller.prepare(next_reference);       // then the rest, any time before the next sample
 /// ```
 ///
-/// `control` is a multiplication, a subtraction, a test for finiteness and the limits, for gains
-/// that are known before the measurement (constant, cascade, algebraic, ESF). A switched gain costs
-/// one more `select`, a nonlinear gain its k(e), an outlier gate one comparison. `prepare` corrects
-/// the observer, predicts, and computes the next ubar. Together they give the result of the
-/// observer's `update` followed by AdrcLaw, up to rounding.
+/// For gains that are known before the measurement (constant, cascade, algebraic, ESF), `control`
+/// takes a multiplication, a subtraction, a test for finiteness and the limits. A switched gain
+/// needs one more `select`, a nonlinear gain its k(e), an outlier gate one comparison. `prepare`
+/// corrects the observer, predicts, and computes the next ubar. Together they give the result of
+/// the observer's `update` followed by AdrcLaw, up to rounding.
 ///
-/// The price: the reference of the next sample must be known one sample early.
+/// The price is that the reference must be known one sample in advance.
 ///
-/// After `make`, `start` and `reset` the observer's state is the prediction of the first sample;
+/// After `make`, `start` and `reset` the observer's state is the prediction for the first sample;
 /// pass the reference of that sample to `set_reference`.
 ///
 /// If a measurement is NaN, infinite, too large, or an outlier for the observer's gate, u is
-/// computed from the prediction alone and the sample counts as missing. With a bad reference the
+/// computed from the prediction only and the sample counts as missing. With a bad reference the
 /// last u is kept.
 ///
 /// The actuator is assumed to hold what `control` returned. If it reports another value, before or
 /// after `prepare`, pass it to `report_applied`: the prediction is corrected by Gamma (u_reported -
 /// u_assumed) before the next correction.
 ///
-/// Except for make and retune, a call only multiplies and adds, apart from the work of the
-/// observer's gain law (the division of a filter, the power of fal). No call allocates, throws or
-/// locks.
+/// Calls other than make and retune only multiply and add, except in the observer's gain law (the
+/// division of a filter, the power of fal). No call allocates, throws or locks.
 template <PredictableObserver Observer>
 class PredictiveAdrc {
  public:
@@ -79,7 +78,7 @@ class PredictiveAdrc {
   using Estimate = typename Observer::Estimate;        ///< (y, .., y^(n-1), d, ..), N x 1
   using Reference = Vector<S, order + 1>;              ///< (r, r', .., r^(n)), n + 1 x 1
 
-  /// What it declares beyond `update(y, reference)`.
+  /// What the controller can do beyond `update(y, reference)`.
   static constexpr ControllerTraits traits{
       .two_phases = true, .takes_derivatives = true, .knows_sample_time = true, .observes = true};
 
@@ -122,7 +121,7 @@ class PredictiveAdrc {
     return output_;
   }
 
-  /// First phase of a sample whose measurement is missing.
+  /// First phase of a sample without a measurement.
   S control_without_measurement() noexcept {
     output_ = limiter_.clamp(blind_);
     phase_ = Phase::missing;
@@ -136,8 +135,8 @@ class PredictiveAdrc {
     return prepare(reference);
   }
 
-  /// Second phase. @param next_reference (r, r', ..) of the next sample, up to n + 1 of them, the
-  /// rest counts as zero
+  /// Second phase. @param next_reference (r, r', ..) of the next sample, up to n + 1 elements, the
+  /// others are zero
   template <detail::VectorOf<S> Given>
   StepStatus prepare(const Given& next_reference) noexcept {
     StepStatus status = StepStatus::ok;
@@ -151,7 +150,7 @@ class PredictiveAdrc {
     return status;
   }
 
-  /// Both phases at once, if the delay does not matter. @return u
+  /// Both phases at once, if the computing delay does not matter. @return u
   template <class NextReference>
   S update(S y, const NextReference& next_reference) noexcept {
     const S u = control(y);
@@ -170,14 +169,14 @@ class PredictiveAdrc {
   }
   /// @}
 
-  /// Another reference for the next sample, any time before it.
+  /// Changes the reference of the next sample, any time before it.
   void set_reference(S next_reference) noexcept {
     Reference reference = Reference::Zero();
     reference(0) = next_reference;
     set_reference(reference);
   }
 
-  /// The same with its derivatives. @param given as in `prepare`
+  /// The same with derivatives. @param given as for `prepare`
   template <detail::VectorOf<S> Given>
   void set_reference(const Given& given) noexcept {
     constexpr int Count = detail::vector_size<Given>;
@@ -195,8 +194,8 @@ class PredictiveAdrc {
     set_reference(detail::listed(next_reference));
   }
 
-  /// Reports what the actuator has really held since the last `control`. A number that is not
-  /// finite is ignored.
+  /// Reports what the actuator really held since the last `control`. A number that is not finite is
+  /// ignored.
   StepStatus report_applied(S u_applied) noexcept {
     const auto good = is_finite(u_applied);
     const S u = select(good, u_applied, output_);
@@ -210,8 +209,8 @@ class PredictiveAdrc {
     return status;
   }
 
-  /// Takes over a plant that stands at y under u, without a bump: with the reference at y the first
-  /// u is that u.
+  /// Takes over a plant at rest at y under u without a bump: with the reference at y the first
+  /// output is this u.
   StepStatus start(S y, S u) noexcept {
     const StepStatus status = detail::start_at_rest(observer_, y, u);
     if (status != StepStatus::ok) return StepStatus::state_rejected;
@@ -233,8 +232,8 @@ class PredictiveAdrc {
     return status;
   }
 
-  /// New settings while running: the estimate and u are kept. Not between `control` and `prepare`.
-  /// A refused config changes nothing.
+  /// New settings while running: the estimate and u are kept. Do not call it between `control` and
+  /// `prepare`. A refused config changes nothing.
   Check<S> retune(const Config& config) { return detail::retune(*this, config); }
 
   /// The same with the settings of `fresh`, as returned by `make`: without design work, so it may
@@ -269,14 +268,13 @@ class PredictiveAdrc {
   using Weights = Array<S, order + 1>;
   enum class Phase : unsigned char { prepared, measured, missing };
 
-  /// What is known of the gain before the measurement.
+  /// What is known about the gain before the measurement.
   static constexpr GainKind kind = observer_traits<Observer>.gain_kind;
   static constexpr bool preset = kind == GainKind::preset;
   static constexpr bool measures_first_row = observer_traits<Observer>.measures_first_row;
-  static_assert(
-      preset || measures_first_row,
-      "esokit: with a sensor's lag in the model PredictiveAdrc takes gains that are known "
-      "before the measurement");
+  static_assert(preset || measures_first_row,
+                "esokit: with a sensor's lag in the model PredictiveAdrc needs a gain that is "
+                "known before the measurement");
   static constexpr bool switched = kind == GainKind::switched;
   static constexpr bool factored = kind == GainKind::factored;
 
@@ -289,7 +287,7 @@ class PredictiveAdrc {
         rate_(S(1.0) / observer.sample_time()),
         hold_left_(hold),
         hold_(hold) {
-    // Folded into the weights: 1/b0, and the scaling T^i / i! of the chain.
+    // The weights include 1/b0 and the scaling T^i / i! of the chain.
     const S inverse = S(1.0) / law.input_gain();
     S unit = inverse;
     for (int i = 0; i <= order; ++i) {
@@ -333,7 +331,7 @@ class PredictiveAdrc {
     }
   }
 
-  /// Whether the observer will take y: not if any estimate would become infinite.
+  /// True if the observer will accept y, that is, if no estimate would become infinite.
   [[nodiscard]] ESOKIT_INLINE auto usable(const S& y,
                                           [[maybe_unused]] const S& raw) const noexcept {
     if constexpr (preset) {
@@ -343,7 +341,7 @@ class PredictiveAdrc {
     }
   }
 
-  /// After a gap, or where u does not depend on y.
+  /// For samples after a gap, or if u does not depend on y.
   [[nodiscard]] ESOKIT_COLD S wanted_in_general(const S& y) const noexcept {
     if (settled_) return blind_;
     if (observer_.restarts()) return feed_ - weights_[0] * y;
@@ -358,7 +356,7 @@ class PredictiveAdrc {
     return detail::weighed<0, order + 1>(weights_, x);
   }
 
-  /// Everything of the next u that does not need the measurement.
+  /// Computes all parts of the next u that do not need the measurement.
   void arm() noexcept {
     settled_ = false;
     feed_ = detail::weighed<0, order + 1>(feeds_, reference_);
@@ -387,7 +385,7 @@ class PredictiveAdrc {
     }
     if constexpr (observer_traits<Observer>.blanks_estimate) {
       if (observer_.blanked()) [[unlikely]] {
-        // The observer publishes what it held at its start, whatever y will be.
+        // A blanked observer publishes the estimate from its start, so u does not depend on y.
         Reference reference;
         for (int i = 0; i <= order; ++i) reference(i) = reference_[static_cast<std::size_t>(i)];
         settle_for(law_.control(observer_.estimate(), reference));
@@ -395,13 +393,13 @@ class PredictiveAdrc {
     }
     if (hold_left_ > 0) [[unlikely]]
       settle_for(S(0.0));
-    // What is not finite in here would be NaN with a measurement, and pass through the limits.
+    // If this is not finite, u would be NaN with a measurement, and a NaN passes the limits.
     const auto good = is_finite(blind_);
     if (!all(good) || !all(is_finite(offset_)) || !all(is_finite(slope_))) [[unlikely]]
       settle_for(select(good, blind_, limiter_.last()));
   }
 
-  /// Where levels correct one another, or the observer will restart.
+  /// For cascades, and if the observer will restart.
   void arm_by_preview() noexcept {
     const auto next = observer_.preview();
     slope_ = weigh(next.slope);
@@ -420,8 +418,8 @@ class PredictiveAdrc {
     }
   }
 
-  // What `control` touches comes first.
-  S offset_{};  ///< ubar_k; where the gain depends on e, the predicted y
+  // Members that `control` uses come first.
+  S offset_{};  ///< ubar_k; if the gain depends on e, the predicted y
   S slope_{};   ///< minus du/dy
   S guard_{};   ///< largest factor, with units, by which y enters the estimates
   S other_slope_{};
@@ -429,14 +427,14 @@ class PredictiveAdrc {
   Limiter<S> limiter_;
   S measurement_{};
   S output_{};
-  bool general_ = false;  ///< gains that depend on e: not by the short way
-  bool settled_ = false;  ///< u is blind_ whatever y
+  bool general_ = false;  ///< the gain depends on e: no short way
+  bool settled_ = false;  ///< u is blind_ for any y
   Phase phase_ = Phase::prepared;
 
   Observer observer_;
   AdrcLaw<order, S> law_;
-  Weights weights_{};    ///< of the scaled states
-  Weights feeds_{};      ///< of the reference and its derivatives
+  Weights weights_{};    ///< weights of the scaled states
+  Weights feeds_{};      ///< weights of the reference and its derivatives
   Weights reference_{};  ///< (r, r', .., r^(n)) of the next sample
   S feed_{};
   S rate_;  ///< 1/T

@@ -1,6 +1,7 @@
 /// @file
-/// ScaledLaw: AdrcLaw for a reference without derivatives, with the scaling of the observer's chain
-/// and 1/b0 folded into its gains. A third of the multiplications of the law on physical estimates.
+/// ScaledLaw: AdrcLaw for a reference without derivatives, whose gains include the scaling of the
+/// observer's chain and 1/b0. It needs a third of the multiplications of the law on physical
+/// estimates.
 #pragma once
 
 #include <esokit/control/adrc_law.hpp>
@@ -17,9 +18,10 @@ class ScaledLaw {
   template <class T>
   using with_scalar = ScaledLaw<Order, T>;  ///< the same with another scalar
 
-  /// Folds scaling and 1/b0 into the gains.
-  /// @param law whose gains they are
-  /// @param observer for its sample time; its b0 is that of the law, or minus that (error-based)
+  /// Multiplies scaling and 1/b0 into the gains.
+  /// @param law the law whose gains are used
+  /// @param observer gives the sample time; its b0 is that of the law, or its negative
+  /// (error-based)
   /// @return error for gains that the scalar cannot hold
   template <class Observer>
   static Expected<ScaledLaw, Error<S>> make(const AdrcLaw<Order, S>& law,
@@ -54,7 +56,7 @@ class ScaledLaw {
     return weights_[0] * error - tail(observer);
   }
 
-  /// Error-based form: the same gains on the error's chain.
+  /// Error-based form: the same gains, on the estimate of e.
   template <class Observer>
   [[nodiscard]] ESOKIT_INLINE S control_error_based(const Observer& observer) const noexcept {
     return weights_[0] * observer.template scaled_estimate<0>() + tail(observer);
@@ -66,7 +68,7 @@ class ScaledLaw {
 
   ScaledLaw() = default;
 
-  /// sum_(i>=1) w_i x_i, apart from the first term so that both are worked out side by side.
+  /// sum_(i>=1) w_i x_i, separate from the first term, so that both are computed in parallel.
   template <class Observer>
   [[nodiscard]] ESOKIT_INLINE S tail(const Observer& observer) const noexcept {
     return detail::weighed_estimates<1, Order>(weights_, observer);
@@ -75,9 +77,9 @@ class ScaledLaw {
   Array<S, Order + 1> weights_{};
 };
 
-/// Where the law cannot be folded.
+/// Used if the observer does not publish its chain.
 struct NoScaledLaw {
-  /// Nothing; never an error.
+  /// Makes nothing, without an error.
   template <class Law, class Observer>
   static Expected<NoScaledLaw, Error<typename Observer::scalar_type>> make(const Law&,
                                                                            const Observer&) {

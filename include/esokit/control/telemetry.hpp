@@ -8,26 +8,27 @@
 
 namespace esokit {
 
-/// A sample of a loop. Trivially copyable, so it can go into a ring buffer or over a link as it is.
-/// @tparam States N of the observer
+/// A sample of a loop. Trivially copyable, so that it can be stored in a ring buffer or sent over a
+/// link.
+/// @tparam States N, number of states status of the observer
 template <int States, PlainScalar S = double>
 struct Telemetry {
   S time{};                            ///< s
-  S u{};                               ///< put out: held until the next row
+  S u{};                               ///< output, held until the next row
   S y{};                               ///< measured
   S r{};                               ///< reference
-  S requested{};                       ///< what the law asked for
+  S requested{};                       ///< u requested by the law, before the limits
   S disturbance{};                     ///< dhat
-  S innovation{};                      ///< of the last correction; 0 where it is not told
-  S trust = 1;                         ///< in dhat, see Guarded
+  S innovation{};                      ///< of the last correction; 0 if not available
+  S trust = 1;                         ///< trust in dhat, see Guarded
   bool bounded = false;                ///< dhat is at its bound
   StepStatus status = StepStatus::ok;  ///< of the observer
-  LoopMode mode = LoopMode::running;   ///< who decides about u
+  LoopMode mode = LoopMode::running;   ///< what determines u
   Array<S, States> estimate{};         ///< (y, .., y^(n-1), d, ..)
 };
 
 /// The telemetry of the last sample of a controller (Adrc, DisturbanceCompensator).
-/// @param time of the sample, s @param y, r as they were given
+/// @param time of the sample, s @param y, r measurement and reference of the sample
 template <class Controller, PlainScalar S = typename Controller::scalar_type>
 [[nodiscard]] auto telemetry(const Controller& controller, const S& time, const S& y,
                              const S& r) noexcept {

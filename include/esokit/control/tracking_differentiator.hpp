@@ -11,16 +11,17 @@
 namespace esokit {
 
 /// Han's time-optimal control of a double integrator sampled with h, fhan(x1, x2, r, h0): brings
-/// (x1, x2) to zero in the least number of steps with |.| <= r, and without chatter.
+/// (x1, x2) to zero in the smallest number of steps with a result of at most r in magnitude,
+/// without chatter.
 /// @param x1 distance @param x2 its derivative @param acceleration r > 0
-/// @param width h0 > 0, s: the sample time h, or more to smooth
+/// @param width h0 > 0, s: the sample time h, or more to smooth the result
 /// @return the acceleration to be applied, unit of x1 / s^2
 template <PlainScalar S>
 [[nodiscard]] S fhan(S x1, S x2, S acceleration, S width) noexcept {
   const S d = acceleration * width * width;
   const S a0 = width * x2;
   const S y = x1 + a0;
-  // Beyond d from the switching curve it is a square root, within it is linear.
+  // Further than d from the switching curve it is a square root, closer it is linear.
   const S root = std::sqrt(d * (d + S(8) * detail::absolute(y)));
   const S a = detail::absolute(y) > d ? a0 + std::copysign((root - d) / S(2), y) : a0 + y;
   return detail::absolute(a) > d ? -std::copysign(acceleration, a) : -acceleration * (a / d);
@@ -41,7 +42,7 @@ class DifferentiatorState {
   bool reset(S value = S(0)) noexcept { return move_to(value, S(0)); }
 
  protected:
-  /// False, and nothing changes, if one of them is not finite.
+  /// Sets the state. False, and nothing changes, if one of them is not finite.
   bool move_to(S r1, S r2) noexcept {
     if (!is_finite(r1) || !is_finite(r2)) return false;
     r1_ = r1;
@@ -67,8 +68,9 @@ struct TrackingDifferentiatorConfig {
   /// @endcond
 };
 
-/// Tracking differentiator by fhan: r1 follows the reference as fast as |r1''| <= `acceleration`
-/// allows, r2 = r1'. It can always stop in time, so it stays r2^2 / (2R) behind a moving reference.
+/// Tracking differentiator with fhan: r1 follows the reference as fast as |r1''| <= `acceleration`
+/// allows, and r2 = r1'. Because it can always stop in time, it stays r2^2 / (2R) behind a moving
+/// reference.
 template <Scalar S = double>
 class TrackingDifferentiator : public DifferentiatorState<S> {
   using State = DifferentiatorState<S>;
@@ -79,7 +81,7 @@ class TrackingDifferentiator : public DifferentiatorState<S> {
   using Config = TrackingDifferentiatorConfig<S>;  ///< settings of make
 
   /// Checks the settings and does all the design work.
-  /// @return at rest in zero, or an error that names the field
+  /// @return the differentiator at rest at zero, or an error that names the field
   static Expected<TrackingDifferentiator, Error<S>> make(const Config& config) {
     Rules<S> rules;
     rules.positive("acceleration", config.acceleration)
@@ -92,7 +94,7 @@ class TrackingDifferentiator : public DifferentiatorState<S> {
     TrackingDifferentiator result(config);
     rules.representable("acceleration", config.acceleration,
                         S(config.acceleration * result.width_ * result.width_),
-                        "times the square of the sample time cannot be held");
+                        "times sample_time squared leaves the scalar's range");
     if (!rules) return rules.error();
     return result;
   }
@@ -100,15 +102,15 @@ class TrackingDifferentiator : public DifferentiatorState<S> {
   /// One sample. False, and nothing changes, if the reference is not finite or too large.
   bool update(S reference) noexcept {
     const S change = fhan(r1_ - reference, r2_, acceleration_, width_);
-    // An infinite reference would pass for a far one.
+    // Without this test an infinite reference would be treated as a distant one.
     const bool moved = is_finite(reference) &&
                        State::move_to(r1_ + sample_time_ * r2_, r2_ + sample_time_ * change);
     if (moved) change_ = change;
     return moved;
   }
 
-  /// (r1, r1', r1''), 3 x 1: for a law that takes the acceleration, too. The last is that of the
-  /// sample before now; its size is at most `acceleration`.
+  /// (r1, r1', r1''), 3 x 1: for a law that also takes the acceleration. r1'' is that of the last
+  /// sample; its magnitude is at most `acceleration`.
   [[nodiscard]] Vector<S, 3> motion() const noexcept { return {r1_, r2_, change_}; }
 
   /// Restarts at rest at `value`; false, and nothing changes, if it is not finite.
@@ -130,7 +132,7 @@ class TrackingDifferentiator : public DifferentiatorState<S> {
   S change_ = S(0);  ///< r1'' that the last sample applied
 };
 
-/// The same of packs, lane by lane: half of its time is a root.
+/// The same for packs, lane by lane, because half of the time is spent on a root.
 template <PackScalar S>
 class TrackingDifferentiator<S>
     : public LaneByLane<TrackingDifferentiator<S>, TrackingDifferentiator<LaneScalar<S>>, S,
@@ -145,7 +147,7 @@ class TrackingDifferentiator<S>
 template <Scalar S>
 struct SignTrackingDifferentiatorConfig {
   S acceleration{};  ///< R > 0, unit of the reference / s^2
-  S sample_time{};   ///< h, s, of `update`; it may be left out where only `rate` is used
+  S sample_time{};   ///< h of `update`, s; may be left out if only `rate` is used
 
   /// @cond
   static constexpr auto fields(auto& c) noexcept {
@@ -154,10 +156,9 @@ struct SignTrackingDifferentiatorConfig {
   /// @endcond
 };
 
-/// The differentiator by a sign function, r1' = r2, r2' = -R sign(r1 - r + r2 |r2| / (2R)): the
-/// form in the papers. Available as an ODE for simulation, and sampled with the sign held over a
-/// sample. The sampled form chatters about the reference by R h in r2, so prefer
-/// TrackingDifferentiator.
+/// Tracking differentiator with a sign function, r1' = r2, r2' = -R sign(r1 - r + r2 |r2| / (2R)):
+/// the form in the papers. Available as an ODE for simulation, and sampled with the sign held over
+/// a sample. In the sampled form r2 chatters by R h, so prefer TrackingDifferentiator.
 template <Scalar S = double>
 class SignTrackingDifferentiator : public DifferentiatorState<S> {
   using State = DifferentiatorState<S>;
@@ -168,7 +169,7 @@ class SignTrackingDifferentiator : public DifferentiatorState<S> {
   using Config = SignTrackingDifferentiatorConfig<S>;  ///< settings of make
 
   /// Checks the settings and does all the design work.
-  /// @return at rest in zero, or an error that names the field
+  /// @return the differentiator at rest at zero, or an error that names the field
   static Expected<SignTrackingDifferentiator, Error<S>> make(const Config& config) {
     Rules<S> rules;
     rules.positive("acceleration", config.acceleration)
@@ -182,7 +183,7 @@ class SignTrackingDifferentiator : public DifferentiatorState<S> {
     return {state(1), acceleration(state(0), state(1), reference)};
   }
 
-  /// One sample: exact for the acceleration held over it. False, and nothing changes, if the
+  /// One sample, exact for an acceleration that is held over it. False, and nothing changes, if the
   /// reference is not finite.
   bool update(S reference) noexcept {
     const S a = acceleration(r1_, r2_, reference);
