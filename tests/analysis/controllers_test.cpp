@@ -239,17 +239,17 @@ TEST(LinearController, OfSettingsOfTheController) {
   expect_is_linear(
       DisturbanceCompensator<LinearEso<2>>::make({.observer = linear, .compensation_gain = 0.7})
           .value());
-  EXPECT_EQ(refusal(linear_controller(
-                Controller::make(
-                    {.observer = linear, .controller_bandwidth = 4.0, .measurement_divider = 2})
-                    .value())),
-            "measurement_divider: must be 1: the analysis takes a loop that is the same in every "
-            "sample");
-  EXPECT_EQ(refusal(linear_controller(DisturbanceCompensator<LinearEso<2>>::make(
-                                          {.observer = linear, .measurement_divider = 2})
-                                          .value())),
-            "measurement_divider: must be 1: the analysis takes a loop that is the same in every "
-            "sample");
+  EXPECT_EQ(
+      refusal(linear_controller(
+          Controller::make(
+              {.observer = linear, .controller_bandwidth = 4.0, .measurement_divider = 2})
+              .value())),
+      "measurement_divider: must be 1: the analysis needs a loop that is the same at every sample");
+  EXPECT_EQ(
+      refusal(linear_controller(
+          DisturbanceCompensator<LinearEso<2>>::make({.observer = linear, .measurement_divider = 2})
+              .value())),
+      "measurement_divider: must be 1: the analysis needs a loop that is the same at every sample");
 }
 
 TEST(LinearController, OfTwoPhases) {

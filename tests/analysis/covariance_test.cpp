@@ -337,7 +337,7 @@ TEST(Covariance, WhatDoesNotExistIsAnError) {
   system.d(0, 0) = 1.0;
   const auto direct = output_covariance(system, one);
   ASSERT_EQ(refusal(direct),
-            "output[0]: sees continuous white noise directly: its variance is infinite");
+            "output[0]: receives continuous white noise directly: its variance is infinite");
   system.sample_time = 1.0;  // a = A - 1: A = 0.999
   EXPECT_NEAR(output_covariance(system, one).value()(0, 0), 1.0 + 1.0 / (1.0 - 0.999 * 0.999),
               1e-9);
@@ -353,14 +353,14 @@ TEST(Covariance, WhatDoesNotExistIsAnError) {
     EXPECT_NEAR(output_covariance(two, noise).value()(0, 0), 0.5 * (5.0 + 2.0 * across), 1e-12);
     noise(0, 1) = noise(1, 0) = 1.001 * across;
     EXPECT_EQ(refusal(output_covariance(two, noise)),
-              "input[0]: must be a covariance: symmetric and not indefinite");
+              "input[0]: must be a covariance matrix: symmetric and positive semidefinite");
   }
   noise << 1.0, 0.5, 0.4, 4.0;
   EXPECT_EQ(refusal(output_covariance(two, noise)),
-            "input[0]: must be a covariance: symmetric and not indefinite");
+            "input[0]: must be a covariance matrix: symmetric and positive semidefinite");
   noise(0, 1) = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(refusal(output_covariance(two, noise)),
-            "input[0]: must be a covariance: symmetric and not indefinite");
+            "input[0]: must be a covariance matrix: symmetric and positive semidefinite");
   one(0, 0) = -1.0;
   system.a(0, 0) = -1.0;
   EXPECT_EQ(refusal(output_covariance(system, one)), "input[0]: must be finite and not negative");

@@ -384,11 +384,11 @@ TEST(Loop, RefusesWhatDoesNotBelongTogether) {
             "frequency: must not be above the Nyquist frequency");
   for (const int channel : {-1, 1}) {
     EXPECT_EQ(refusal(loop.loop_gain(1.0, channel)),
-              "channel: must be 0 up to the channels less one, that is");
+              "channel: must be 0 .. channels - 1, that is at most");
     EXPECT_EQ(refusal(loop.noise_to_control(1.0, 0, channel)),
-              "channel: must be 0 up to the channels less one, that is");
+              "channel: must be 0 .. channels - 1, that is at most");
     EXPECT_EQ(refusal(loop.disturbance_to_output(1.0, channel)),
-              "channel: must be 0 up to the channels less one, that is");
+              "channel: must be 0 .. channels - 1, that is at most");
   }
   LinearController odd = linear_controller(adrc).value();
   for (auto* matrix : {&odd.a, &odd.from_y, &odd.from_r, &odd.from_u, &odd.to_u, &odd.y_to_u,
@@ -506,7 +506,7 @@ TEST(Loop, HasASystemForAllElse) {
   EXPECT_GT(std::abs(together(1, 1) - apart.control[0] * apart.control[0]), 1e-3);
   input(1, 2) = 0.1;
   EXPECT_EQ(refusal(output_covariance(system, input)),
-            "input[1]: must be a covariance: symmetric and not indefinite");
+            "input[1]: must be a covariance matrix: symmetric and positive semidefinite");
   EXPECT_EQ(refusal(output_covariance(system, DynamicMatrix<double>(2, 2))),
             "input: must have a row and a column for each input, that is");
 }

@@ -403,8 +403,8 @@ TEST(Margins, RangeOfTheInputGain) {
       {.observer = {.observer_bandwidth = 20.0, .input_gain = 1.0, .sample_time = T}});
   EXPECT_EQ(refusal(input_gain_range(LinearPlant<1>::chain({.coefficients = {1.0}}).value(),
                                      compensator.value())),
-            "input_gain: must be one by which all of u is divided: this controller has none; see "
-            "gain_increase and gain_decrease of its margins");
+            "input_gain: does not scale all of u in this controller: use gain_increase and "
+            "gain_decrease of its margins");
 }
 
 // The dead time that a plant has counts, and the margin is what is left.
@@ -573,9 +573,9 @@ TEST(Margins, OfOneChannelOfTwo) {
   EXPECT_GT(peak.value, 1.0 / modulus * 0.9);
   for (const int channel : {-1, 2}) {
     EXPECT_EQ(refusal(margins(loop, channel)),
-              "channel: must be 0 up to the channels less one, that is");
+              "channel: must be 0 .. channels - 1, that is at most");
     EXPECT_EQ(refusal(delay_margin(loop, channel)),
-              "channel: must be 0 up to the channels less one, that is");
+              "channel: must be 0 .. channels - 1, that is at most");
   }
 }
 
@@ -663,7 +663,7 @@ TEST(WorstCase, FindsAnUnstablePlantAndRefusesByRule) {
   };
   EXPECT_EQ(of({0.5, 2.0}), "accepted");
   EXPECT_EQ(of({0.5, 0.5}), "accepted");
-  EXPECT_EQ(of({2.0, 0.5}), "ranges[0]: must not end below their start");
+  EXPECT_EQ(of({2.0, 0.5}), "ranges[0]: must not be above upper");
   EXPECT_EQ(of({std::nan(""), 0.5}), "ranges[0]: must be finite");
   EXPECT_EQ(of({0.5, std::numeric_limits<double>::infinity()}), "ranges[0]: must be finite");
   EXPECT_EQ(of({0.0, 2.0}), "input_gain: must be finite and not zero (negative is fine)");

@@ -1,4 +1,4 @@
-// expect: the analysis takes linear controllers.*FrozenObserver
+// expect: the analysis needs a linear controller.*FrozenObserver
 #include <esokit/analysis/margins.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
 

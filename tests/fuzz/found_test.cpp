@@ -301,7 +301,7 @@ TEST(Found, ErrorBoundsAreNumbers) {
   EXPECT_TRUE(bound.convergence_time({1, 2, 3}));
   EXPECT_EQ(refusal(bound.convergence_time({1, 2, HUGE_VAL})), "initial[2]: must be finite");
   EXPECT_EQ(refusal(bound.convergence_time({1, largest<double>, 3})),
-            "initial: is in the scaling of the bound beyond what the scalar can hold");
+            "initial: leaves the range of the scalar in the scaling of the bound");
   const std::string rule =
       "observer_bandwidth: gives with these sources a bound that the scalar cannot hold";
   EXPECT_EQ(refusal(esokit::linear_error_bound<3>({2e-209, 1}, {0, 1e-3})), rule);

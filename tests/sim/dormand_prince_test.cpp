@@ -292,7 +292,8 @@ TEST(VariableStep, ASolutionThatEndsIsAnError) {
     const State1 before = x;
     const auto next = stepper.advance(square, t, x, 2.0);
     if (!next) {
-      EXPECT_EQ(refusal(next), "t: is where the step falls below the resolution of time");
+      EXPECT_EQ(refusal(next),
+                "t: is the time at which the step falls below the resolution of time");
       EXPECT_NEAR(next.error().value, 1.0, 1e-2);
       EXPECT_EQ(x, before);
       return;

@@ -381,7 +381,7 @@ TEST(MonteCarlo, RunsWhatPacksCannot) {
   const auto fourfold = [](const P& y, const P& r) { return r - y; };
   EXPECT_EQ(refusal(sim::run(packed, fourfold,
                              {.duration = 0.02, .sample_time = T, .jitter = 0.1, .number = 1})),
-            "jitter: must be left out where packs run by number");
+            "jitter: must be left out if packs run by number");
 }
 
 TEST(MonteCarlo, TakesNonlinearPlantsInPacks) {

@@ -57,9 +57,9 @@ TEST(RefusedConfig, Noise) {
   EXPECT_EQ(refusal(BandLimitedWhiteNoise<>::make({.hold = 0.0})),
             "hold: must be finite and positive");
   EXPECT_EQ(refusal(BandLimitedWhiteNoise<>::make({.power = 1e300, .hold = 1e-300})),
-            "power: power/hold must be a number that the scalar can hold");
+            "power: power/hold must not leave the range of the scalar");
   EXPECT_EQ(refusal(BandLimitedWhiteNoise<>::make({.power = 1e-300, .hold = 1e300})),
-            "power: power/hold must be a number that the scalar can hold");
+            "power: power/hold must not leave the range of the scalar");
   EXPECT_EQ(refusal(HeldNoise<>::make({.step = 0.0})), "step: must be finite and positive");
   EXPECT_EQ(refusal(HeldNoise<>::make({.hold = 0.0105, .step = 0.001})),
             "hold: must be a whole multiple (1 to 2^31) of the step");

@@ -573,7 +573,7 @@ TEST(Run, RefusesBadSettings) {
   EXPECT_EQ(said({.duration = 1.0, .jitter = 0.9}), "accepted");
   EXPECT_EQ(said({.duration = 1.0, .jitter = 0.91}), "jitter: must not be above 0.9");
   EXPECT_EQ(said({.duration = 1.0, .dead_time = 1000001 * T}),
-            "dead_time: must be below 1e6 samples (1e5 where they jitter)");
+            "dead_time: must be below 1e6 samples (1e5 with jitter)");
   for (const int bad : {0, -1, 1000001}) {
     EXPECT_EQ(said({.duration = 1.0, .substeps = bad}), "substeps: must be 1 .. 1000000");
   }

@@ -1,12 +1,12 @@
 /// @file
-/// The library's observers and controllers as linear systems, `linear_observer` and
+/// Observers and controllers of the library as linear systems: `linear_observer` and
 /// `linear_controller`.
 ///
 /// The linear form is valid within the limits, while no measurement is missing and the law
-/// determines u. Adapters are taken in their linear mode: an angle within one turn, an open gate,
-/// VariableTime at its present step, Guarded with its present b0 and full trust. A float controller
-/// is analysed in double with its own gains. A type without a linear mode does not compile;
-/// FrozenObserver holds a switched or nonlinear observer in one of its modes.
+/// determines u. Adapters are analysed in their linear mode: an angle within one turn, an open
+/// gate, VariableTime with its present step, Guarded with its present b0 and full trust. A float
+/// controller is analysed in double with its own gains. A type without a linear mode does not
+/// compile; use FrozenObserver for one mode of a switched or nonlinear observer.
 #pragma once
 
 #include <cstddef>
@@ -28,17 +28,18 @@
 
 namespace esokit {
 
-/// An observer that acts by its gains, or one that a delay is built around.
+/// An observer that can be analysed: one determined by its gains, with any adapters that have a
+/// linear mode.
 template <class T>
 concept AnalysedObserver = detail::SaysObserver<T>;
 
-/// A controller that can be analysed: Adrc, PredictiveAdrc, DisturbanceCompensator with an observer
-/// that can, MimoAdrc, Incremental, ObserverWithLaw, Compensated, a LinearController, or your own
-/// type with a function `linear_controller` beside it.
+/// A controller that can be analysed: Adrc, PredictiveAdrc or DisturbanceCompensator with an
+/// AnalysedObserver, MimoAdrc, Incremental, ObserverWithLaw, Compensated, a LinearController, or
+/// your own type with a function `linear_controller` in its namespace.
 template <class T>
 concept AnalysedController = detail::SaysController<T>;
 
-/// Of an observer that acts by its gains.
+/// The linear form of an observer that is determined by its gains.
 template <LinearObserver Observer>
 LinearObserverForm linear_observer(const Observer& observer) {
   const auto m = detail::observer_matrices(observer);
@@ -54,14 +55,14 @@ LinearObserverForm linear_observer(const Observer& observer) {
   return form;
 }
 
-/// Of one with a delay of u: d more states, the inputs under way.
+/// The linear form with a delay of u: d more states for the delayed inputs.
 template <class Observer, int Capacity>
 requires detail::SaysObserver<Observer> LinearObserverForm
 linear_observer(const DelayedInput<Observer, Capacity>& observer) {
   return detail::delayed(linear_observer(observer.observer()), observer.delay());
 }
 
-/// Of an adapter that is in its linear mode what it adapts.
+/// The linear form of adapters that do nothing in their linear mode.
 /// @{
 template <class Observer>
 requires detail::SaysObserver<Observer> &&(!LinearObserver<WrappedOutput<Observer>>)  //
@@ -80,7 +81,7 @@ requires detail::SaysObserver<Observer> &&(!LinearObserver<VariableTime<Observer
 }
 /// @}
 
-/// With the b0 of now; with all trust, and within the bound.
+/// The linear form with the present b0, full trust, and dhat within its bound.
 template <class Observer>
 requires detail::SaysObserver<Observer> LinearObserverForm
 linear_observer(const Guarded<Observer>& observer) {
@@ -91,37 +92,37 @@ linear_observer(const Guarded<Observer>& observer) {
   return form;
 }
 
-/// An observer and a law outside of a controller: a continuous observer, or a FrozenObserver for a
-/// switched or nonlinear one. It can be used wherever a controller is expected.
+/// An observer and a law without a controller: a continuous observer, or a FrozenObserver for a
+/// switched or nonlinear one. It can be analysed like a controller.
 /// @tparam Form OutputBased or ErrorBased
 template <class Observer, class Law, AdrcForm Form = OutputBased>
 struct ObserverWithLaw {
   Observer observer;  ///< with b0, error-based with -b0
   Law law;            ///< AdrcLaw with b0
-  Form form{};        ///< what the observer is fed with
+  Form form{};        ///< OutputBased or ErrorBased: what the observer measures
 };
-/// Fed with y.
+/// The observer measures y.
 template <class Observer, class Law>
 ObserverWithLaw(Observer, Law) -> ObserverWithLaw<Observer, Law, OutputBased>;
-/// Fed with what is said.
+/// The observer measures what the given form says.
 template <class Observer, class Law, class Form>
 ObserverWithLaw(Observer, Law, Form) -> ObserverWithLaw<Observer, Law, Form>;
 
-/// A DisturbanceCompensator and the controller inside it, which has its own `linear_controller`. It
-/// can be used wherever a controller is expected.
+/// A DisturbanceCompensator and the controller that it wraps, which has its own
+/// `linear_controller`. It can be analysed like a controller.
 template <class Compensator, class Base>
 struct Compensated {
   Compensator compensator;  ///< adds K dhat
-  Base base;                ///< puts out u0
+  Base base;                ///< controller with the output u0
 };
-/// Of copies.
+/// Stores copies.
 template <class Compensator, class Base>
 Compensated(Compensator, Base) -> Compensated<Compensator, Base>;
 
 namespace detail {
 
-/// Whether two numbers were given as the same one, as far as the coarser of two scalars tells:
-/// 0.01 in float and in double.
+/// True if two numbers are equal within the rounding of the coarser scalar: 0.01 in float and in
+/// double.
 template <Scalar A, Scalar B>
 bool same_as_given(double a, double b) noexcept {
   if constexpr (std::is_same_v<A, float> || std::is_same_v<B, float>) {
@@ -141,17 +142,17 @@ std::vector<double> law_weights(const Gains& gains, double input_gain) {
 }
 
 inline Check<double> measured_every_time(int divider) {
-  return Rules<double>{}.require(divider == 1, "measurement_divider", divider,
-                                 "must be 1: the analysis takes a loop that is the same in every "
-                                 "sample");
+  return Rules<double>{}.require(
+      divider == 1, "measurement_divider", divider,
+      "must be 1: the analysis needs a loop that is the same at every sample");
 }
 
 }  // namespace detail
 
-/// A description is one.
+/// A LinearController describes itself.
 inline LinearController linear_controller(const LinearController& controller) { return controller; }
 
-/// u = (k_0 (r - yhat) - .. - dhat) / b0, of either form.
+/// Adrc: u = (k_0 (r - yhat) - .. - dhat) / b0, in either form.
 template <class Observer, class Form>
 requires detail::SaysObserver<Observer> Expected<LinearController, Error<double>> linear_controller(
     const Adrc<Observer, Form>& controller) {
@@ -165,7 +166,7 @@ requires detail::SaysObserver<Observer> Expected<LinearController, Error<double>
                              error_based);
 }
 
-/// The same in two phases.
+/// PredictiveAdrc: the same law in two phases.
 template <class Observer>
 requires detail::SaysObserver<Observer> LinearController
 linear_controller(const PredictiveAdrc<Observer>& controller) {
@@ -174,7 +175,7 @@ linear_controller(const PredictiveAdrc<Observer>& controller) {
                              false);
 }
 
-/// @return error for input gains of observer and law that do not belong together
+/// An observer with a law. @return error if the input gains of observer and law do not agree
 template <class Observer, int Order, class S, class Form>
 requires detail::SaysObserver<Observer> Expected<LinearController, Error<double>> linear_controller(
     const ObserverWithLaw<Observer, AdrcLaw<Order, S>, Form>& parts) {
@@ -195,8 +196,8 @@ requires detail::SaysObserver<Observer> Expected<LinearController, Error<double>
                              error_based);
 }
 
-/// u = r + K dhat: its reference is u0. What it makes of a plant is what the controller around
-/// which it is put then sees.
+/// DisturbanceCompensator: u = r + K dhat, with u0 as its reference r. Its closed loop with a plant
+/// is the plant that the wrapped controller sees.
 template <class Observer>
 requires detail::SaysObserver<Observer> Expected<LinearController, Error<double>> linear_controller(
     const DisturbanceCompensator<Observer>& controller) {
@@ -211,12 +212,12 @@ requires detail::SaysObserver<Observer> Expected<LinearController, Error<double>
   }
   auto form = detail::feedback_of(observer, weights, false);
   form.r_to_u(0, 0) = 1.0;
-  form.input_gain = 0.0;  // u0 does not go with 1 / b0
+  form.input_gain = 0.0;  // u0 is not proportional to 1 / b0
   return form;
 }
 
-/// u = u0 + K dhat.
-/// @return error of either, and for other sample times than one
+/// Compensated: u = u0 + K dhat.
+/// @return the errors of both, or an error if their sample times differ
 template <class Observer, class Base>
 requires detail::SaysObserver<Observer> && detail::SaysController<Base>
     Expected<LinearController, Error<double>> linear_controller(
@@ -228,14 +229,14 @@ requires detail::SaysObserver<Observer> && detail::SaysController<Base>
   return detail::compensated(*compensator, *base);
 }
 
-/// The controller whose increments are put out: the actuator's sum of them is its u.
+/// Incremental: that of the controller inside, because the actuator sums the increments to its u.
 template <class Controller>
 requires detail::SaysController<Controller> Expected<LinearController, Error<double>>
 linear_controller(const Incremental<Controller>& controller) {
   return linear_controller(controller.controller());
 }
 
-/// The filter. It keeps neither T nor b0: they are in the config that it was made from.
+/// A filter form. T and b0 are not stored in it, but in the config from which it was made.
 template <int Order, class S, int Extension, class Operator, class Feedback, class Placement>
 LinearController linear_controller(
     const DualFeedbackAdrc<Order, S, Extension, Operator, Feedback, Placement>& controller,
@@ -262,7 +263,7 @@ LinearController linear_controller(
   return form;
 }
 
-/// All channels: observer i is told (B0 u)_i, u = B0^-1 (v - dhat).
+/// MimoAdrc, all channels: observer i gets (B0 u)_i, and u = B0^-1 (v - dhat).
 template <class... Observers>
 requires(detail::SaysObserver<Observers>&&...)  //
     LinearController linear_controller(const MimoAdrc<Observers...>& controller) {

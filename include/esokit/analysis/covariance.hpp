@@ -32,7 +32,8 @@ inline Check<double> output_covariance(const SystemView& system,
       const double value = input(i, j);
       rules.require(is_finite(value) && value == input(j, i) &&
                         value * value <= input(i, i) * input(j, j) * (1.0 + 1e-12),
-                    "input", value, "must be a covariance: symmetric and not indefinite", i);
+                    "input", value,
+                    "must be a covariance matrix: symmetric and positive semidefinite", i);
     }
   }
   if (!rules) return rules.error();
@@ -40,7 +41,7 @@ inline Check<double> output_covariance(const SystemView& system,
     for (int i = 0; i < system.outputs(); ++i) {
       const double direct = quadratic(system.d, input, i, i);
       rules.require(!(direct > 0.0), "output", direct,
-                    "sees continuous white noise directly: its variance is infinite", i);
+                    "receives continuous white noise directly: its variance is infinite", i);
     }
     if (!rules) return rules.error();
   }
@@ -64,12 +65,12 @@ inline Check<double> output_covariance(const SystemView& system,
 
 }  // namespace detail
 
-/// Covariance of all outputs, Outputs x Outputs, for white noise on the inputs.
+/// Stationary covariance of all outputs, Outputs x Outputs, for white noise on the inputs.
 /// @param input Inputs x Inputs. Sampled: covariance per sample. Continuous: two-sided spectral
-///        density, unit^2 s (a held noise of variance s^2 and hold h has about s^2 h)
-/// @return error for an unstable system, an `input` that is no covariance, or an output to which
-///         continuous white noise comes straight (its variance is infinite), or whose variance is
-///         beyond the scalar
+///        density, unit^2 s (noise of variance v that is held for h has about v h)
+/// @return error for an unstable system, an `input` that is not a covariance matrix, or an output
+///         that receives continuous white noise directly (infinite variance) or whose variance
+///         overflows
 template <int States, int Inputs, int Outputs>
 Expected<EigenMatrix<double, Outputs, Outputs>, Error<double>> output_covariance(
     const LinearSystem<States, Inputs, Outputs>& system,
@@ -84,7 +85,7 @@ Expected<EigenMatrix<double, Outputs, Outputs>, Error<double>> output_covariance
   return result;
 }
 
-/// The same of a system whose sizes are known at run time.
+/// The same for a system whose sizes are known at run time.
 inline Expected<DynamicMatrix<double>, Error<double>> output_covariance(
     const DynamicSystem& system, const DynamicMatrix<double>& input) {
   const int n = system.a.rows();
@@ -108,18 +109,18 @@ inline Expected<DynamicMatrix<double>, Error<double>> output_covariance(
 
 /// The noise that drives the estimation error.
 struct EstimationNoise {
-  /// White noise on y. Sampled: variance of a sample, unit of y^2. Continuous: two-sided spectral
+  /// White noise on y. Sampled: variance per sample, unit of y^2. Continuous: two-sided spectral
   /// density, unit of y^2 s.
   double measurement = 0.0;
   /// White noise that drives d^(m), two-sided spectral density, (unit of d)^2 s^(1 - 2m): for m = 1
-  /// d is a random walk whose variance grows by this per second.
+  /// d is a random walk whose variance grows by this number per second.
   double disturbance = 0.0;
 };
 
 /// Covariance of z - zhat, N x N, rows (y, .., y^(n-1), d, .., d^(m-1)), right after a correction.
 ///
-/// The disturbance's noise acts between the samples too; its effect over a sample is integrated
-/// exactly. With disturbance = 0 the variances are those of the estimates themselves.
+/// The noise of the disturbance also acts between the samples; its effect over a sample is
+/// integrated exactly. With disturbance = 0 the variances are those of the estimates themselves.
 /// @return error for a negative noise or an observer that is not stable
 template <LinearObserver Observer>
 Expected<EigenMatrix<double, Observer::order + Observer::extension,
@@ -146,7 +147,7 @@ estimation_error_covariance(const Observer& observer, const EstimationNoise& noi
   EigenMatrix<double, size + 1, size + 1> input = EigenMatrix<double, size + 1, size + 1>::Zero();
   input(0, 0) = noise.measurement;
   if (m.sample_time > 0.0) {
-    // integral of Phi(s) e_N e_N' Phi(s)' over a sample
+    // The integral of Phi(s) e_N e_N' Phi(s)' over a sample.
     for (int i = 0; i < size; ++i) {
       for (int j = 0; j < size; ++j) {
         const int p = size - 1 - i;

@@ -8,7 +8,8 @@ namespace esokit {
 
 namespace detail {
 
-/// Sampled loop gain with any delay of one input: whole samples as z^-M, the rest inside a sample.
+/// Sampled loop gain with any delay of one input: whole samples as z^-M, the remaining fraction
+/// within a sample.
 struct DelayedLoopGain {
   DensePlant plant;  ///< continuous
   LinearController controller;
@@ -25,7 +26,7 @@ struct DelayedLoopGain {
     return gain;
   }
 
-  /// log(-L) at a frequency (rad/s) and delay (s): zero where the loop oscillates.
+  /// log(-L) at a frequency (rad/s) and delay (s): zero if the loop oscillates there.
   [[nodiscard]] std::complex<double> log_minus(double frequency, double delay) const {
     const double T = controller.sample_time;
     const double whole = std::floor(delay / T);
@@ -34,7 +35,7 @@ struct DelayedLoopGain {
   }
 };
 
-/// Newton's method for log(-L) = 0 from a frequency and a delay near by.
+/// Newton's method for log(-L) = 0, from an approximate frequency and delay.
 inline std::optional<Margin> refine_delay(const DelayedLoopGain& loop, double frequency,
                                           double delay) {
   const double T = loop.controller.sample_time;
@@ -44,7 +45,7 @@ inline std::optional<Margin> refine_delay(const DelayedLoopGain& loop, double fr
     if (!is_finite(f.real()) || !is_finite(f.imag())) return std::nullopt;
     if (std::abs(f) < 1e-12) return Margin{delay, frequency};
     const double dw = (frequency > 0.5 * nyquist ? -1e-7 : 1e-7) * frequency;
-    // Away from the next whole sample, where the slope changes.
+    // Towards the middle of the sample, because the slope changes at whole samples.
     const double position = delay / T - std::floor(delay / T);
     const double dt = (position > 0.5 ? -1e-7 : 1e-7) * T;
     const std::complex<double> by_w = (loop.log_minus(frequency + dw, delay) - f) / dw;
@@ -62,7 +63,7 @@ inline std::optional<Margin> refine_delay(const DelayedLoopGain& loop, double fr
   return std::nullopt;
 }
 
-/// Calls visit(w, L) where abs(L) is one.
+/// Calls visit(w, L) at every frequency where abs(L) is one.
 template <class Response, class Visit>
 void gain_crossings(const Response& response, const ScanRange& range, Visit&& visit) {
   scan(response, range,
@@ -73,13 +74,13 @@ void gain_crossings(const Response& response, const ScanRange& range, Visit&& vi
        });
 }
 
-/// Phase lag that turns L to -1, in [0, 2 pi).
+/// The phase lag that turns L to -1, in [0, 2 pi).
 inline double lag_to_minus_one(std::complex<double> l) {
   const double lag = std::arg(-l);
   return lag < 0.0 ? lag + 2.0 * std::numbers::pi : lag;
 }
 
-/// In a continuous loop a delay is a phase shift.
+/// Delay margin of a continuous loop, where a delay is a phase shift.
 inline Margin continuous_delay_margin(const Loop& loop, int channel) {
   std::optional<Margin> least;
   gain_crossings(loop_gain_of(loop, channel), scan_range(loop, channel),
@@ -93,8 +94,8 @@ inline Margin continuous_delay_margin(const Loop& loop, int channel) {
 }  // namespace detail
 
 /// Smallest additional delay (s) of one u at which the loop oscillates, on top of the dead time of
-/// the plant. It need not be a whole number of samples. Between samples a delay is not just a phase
-/// shift e^(-i omega tau), so the limit is found on the plant sampled with that delay.
+/// the plant. It need not be a whole number of samples. In a sampled loop a fraction of a sample is
+/// not just a phase shift e^(-i omega tau), so the plant is sampled with that delay.
 /// @param channel 0 .. q - 1
 /// @return infinity if there is no limit; error for a loop that is not stable, or no such channel
 inline Expected<Margin, Error<double>> delay_margin(const Loop& loop, int channel = 0) {
@@ -114,7 +115,7 @@ inline Expected<Margin, Error<double>> delay_margin(const Loop& loop, int channe
     if (edge.value > behind && (!least || edge.value < least->value)) least = edge;
   };
 
-  // Which frequencies cross depends on the fraction of a sample.
+  // The crossing frequencies depend on the fraction of a sample.
   constexpr int fractions = 4;
   for (int i = 0; i < fractions; ++i) {
     const double fraction = double(i) / fractions;
@@ -128,7 +129,7 @@ inline Expected<Margin, Error<double>> delay_margin(const Loop& loop, int channe
                            });
   }
 
-  // At z = -1, where L is real and a whole sample turns its sign.
+  // At z = -1, where L is real and a whole sample changes its sign.
   constexpr int steps = 64;
   const auto at_nyquist = [&](double fraction) {
     return delayed.with_fraction(fraction).at(-2.0).real();
@@ -148,7 +149,7 @@ inline Expected<Margin, Error<double>> delay_margin(const Loop& loop, int channe
   }
   if (delayed.overflows) {
     return Error<double>{"plant.dead_time", present,
-                         "and any more give a sampled plant that the scalar cannot hold"};
+                         "or more gives a sampled plant that the scalar cannot hold"};
   }
   if (!least) return Margin{};
   return Margin{least->value - present, least->frequency};

@@ -10,7 +10,7 @@
 
 namespace esokit {
 
-/// Rows x Columns, zero at first; by columns, as Eigen stores it. May be empty.
+/// A rows x columns matrix, initially zero; stored by columns, as in Eigen. May be empty.
 template <class T>
 class DynamicMatrix {
  public:
@@ -39,7 +39,7 @@ class DynamicMatrix {
   [[nodiscard]] const T* data() const noexcept { return values_.data(); }
   /// @}
 
-  /// For the kernels that work on the caller's storage.
+  /// A view for the kernels that work on the caller's storage.
   [[nodiscard]] detail::DenseView<T> view() noexcept { return {values_.data(), rows_, columns_}; }
 
  private:
@@ -69,7 +69,7 @@ DynamicMatrix<T> product(const DynamicMatrix<T>& a, const DynamicMatrix<T>& b) {
   return out;
 }
 
-/// to += factor block, from a row and a column on.
+/// Adds factor * block to the part of `to` that begins at a row and a column.
 template <class T>
 void add(DynamicMatrix<T>& to, int row, int column, const DynamicMatrix<T>& block,
          double factor = 1.0) {
@@ -78,7 +78,7 @@ void add(DynamicMatrix<T>& to, int row, int column, const DynamicMatrix<T>& bloc
   }
 }
 
-/// Of any matrix with (i, j), in double.
+/// A copy of any matrix with (i, j), in double.
 template <class MatrixType>
 DynamicMatrix<double> dynamic_copy(const MatrixType& matrix, int rows, int columns) {
   DynamicMatrix<double> out(rows, columns);

@@ -11,7 +11,7 @@
 
 namespace esokit::detail {
 
-/// Makes h upper Hessenberg by similarity, with elimination and pivoting.
+/// Transforms h to upper Hessenberg form by elimination with pivoting.
 inline void to_hessenberg(DenseView<std::complex<double>> h) noexcept {
   const int n = h.rows;
   for (int m = 1; m + 1 < n; ++m) {
@@ -33,7 +33,7 @@ inline void to_hessenberg(DenseView<std::complex<double>> h) noexcept {
   }
 }
 
-/// Nearer one to h22 of the eigenvalues of ((h11, h12), (h21, h22)).
+/// The eigenvalue of ((h11, h12), (h21, h22)) that is closer to h22.
 inline std::complex<double> wilkinson_shift(std::complex<double> h11, std::complex<double> h12,
                                             std::complex<double> h21,
                                             std::complex<double> h22) noexcept {
@@ -46,8 +46,8 @@ inline std::complex<double> wilkinson_shift(std::complex<double> h11, std::compl
   return larger == 0.0 ? h22 : h22 - product / larger;
 }
 
-/// One QR step with a shift on rows and columns low .. high of a Hessenberg matrix, which is that
-/// of the eigenvalues alone: the rest is not updated.
+/// One shifted QR step on rows and columns low .. high of a Hessenberg matrix. The rest is not
+/// updated, because only eigenvalues are needed.
 inline void qr_step(DenseView<std::complex<double>> h, int low, int high,
                     std::complex<double> shift) noexcept {
   using Complex = std::complex<double>;
@@ -87,7 +87,8 @@ inline void qr_step(DenseView<std::complex<double>> h, int low, int high,
   for (int i = low; i <= high; ++i) h(i, i) += shift;
 }
 
-/// Eigenvalues of h, which is overwritten, into `values`. False if the iteration does not end.
+/// Writes the eigenvalues of h, which is overwritten, to `values`. False if the iteration does not
+/// converge.
 inline bool eigenvalues(DenseView<std::complex<double>> h, std::complex<double>* values) noexcept {
   const int n = h.rows;
   double size = 0.0;
@@ -114,7 +115,7 @@ inline bool eigenvalues(DenseView<std::complex<double>> h, std::complex<double>*
     if (++steps > 200) return false;
     std::complex<double> shift =
         wilkinson_shift(h(high - 1, high - 1), h(high - 1, high), h(high, high - 1), h(high, high));
-    // Out of a cycle.
+    // An exceptional shift, to leave a cycle.
     if (steps % 20 == 0) shift += std::abs(h(high, high - 1));
     qr_step(h, low, high, shift);
   }

@@ -1,6 +1,6 @@
 /// @file
-/// Bounds on the estimation error proven by Lyapunov functions, in the corrected form of the
-/// papers: the guarantee of the proof for your numbers. The true worst case is `peak_gain`.
+/// Bounds on the estimation error that are proven by Lyapunov functions, as in the papers with
+/// corrections. The exact worst case is given by `peak_gain`.
 #pragma once
 
 #include <algorithm>
@@ -12,14 +12,14 @@
 
 namespace esokit {
 
-/// The sources of the error, by their largest size.
+/// Upper limits of the sources of the error.
 struct ErrorSources {
   double disturbance_rate = 0.0;   ///< largest abs(d^(m)), for m = 1 unit of d per s
   double measurement_noise = 0.0;  ///< largest abs(v), unit of y
 };
 
-/// A bound on z - zhat. It lives in the scaled error zeta_i = omega^(N-i) (z_i - zhat_i), i = 1..N,
-/// for which norm(zeta(t)) <= gamma (norm(zeta(0)) e^(-rate t) + level (1 - e^(-rate t))).
+/// A bound on z - zhat, in terms of the scaled error zeta_i = omega^(N-i) (z_i - zhat_i), i = 1..N:
+/// norm(zeta(t)) <= gamma (norm(zeta(0)) e^(-rate t) + level (1 - e^(-rate t))).
 template <int Size>
 struct ErrorBound {
   double bandwidth = 0.0;  ///< omega, rad/s
@@ -27,19 +27,20 @@ struct ErrorBound {
   double level = 0.0;      ///< unit of d^(m-1)
   double rate = 0.0;       ///< 1/s
 
-  /// Bound on each abs(z_i - zhat_i) once the start is forgotten, N x 1, physical units.
+  /// Ultimate bound on each abs(z_i - zhat_i), for t to infinity, N x 1, physical units.
   [[nodiscard]] EigenMatrix<double, Size> ultimate() const { return unscaled(gamma * level); }
 
-  /// The same at a time t (s) after an initial error z(0) - zhat(0), N x 1.
+  /// The same at a time t (s), for an initial error z(0) - zhat(0), N x 1.
   [[nodiscard]] EigenMatrix<double, Size> at(double t,
                                              const EigenMatrix<double, Size>& initial) const {
     const double decay = std::exp(-rate * t);
     return unscaled(gamma * (scaled_norm(initial) * decay + level * (1.0 - decay)));
   }
 
-  /// Time (s) after which the bound is within `excess` of its ultimate value, 0 if it always is.
-  /// @return error without a source of error (then it is never reached), for excess <= 0, or an
-  ///         initial error that the scalar cannot hold in the scaling
+  /// Time (s) after which the bound exceeds its ultimate value by at most a share of `excess`; 0 if
+  /// it always does.
+  /// @return error if there is no source of error (the bound is then never reached), for excess <=
+  ///         0, or for an initial error that overflows in the scaling
   [[nodiscard]] Expected<double, Error<double>> convergence_time(
       const EigenMatrix<double, Size>& initial, double excess = 0.1) const {
     Rules<double> rules;
@@ -50,7 +51,7 @@ struct ErrorBound {
     const double over = (scaled_norm(initial) - level) / (excess * level);
     if (!is_finite(over)) {
       return Error<double>{"initial", initial.norm(),
-                           "is in the scaling of the bound beyond what the scalar can hold"};
+                           "leaves the range of the scalar in the scaling of the bound"};
     }
     return over > 1.0 ? std::log(over) / rate : 0.0;
   }
@@ -89,7 +90,7 @@ EigenMatrix<double, Size> binomial_gain(double factor = 1.0) {
   return gain;
 }
 
-/// H* = A - kappa c': the scaled error obeys zeta' = omega H* zeta + .. .
+/// H* = A - kappa c', where the scaled error obeys zeta' = omega H* zeta + .. .
 template <int Size>
 EigenMatrix<double, Size, Size> scaled_error_matrix(const EigenMatrix<double, Size>& gain) {
   EigenMatrix<double, Size, Size> h = EigenMatrix<double, Size, Size>::Zero();
@@ -101,7 +102,7 @@ EigenMatrix<double, Size, Size> scaled_error_matrix(const EigenMatrix<double, Si
 }
 
 /// From V = zeta' P zeta: V' <= -omega norm^2 + 2 norm(P) norm drive.
-/// @return error for one that the scalar cannot hold
+/// @return error for a bound that overflows
 template <int Size>
 Expected<ErrorBound<Size>, Error<double>> bound_from(const LyapunovMatrix<Size>& lyapunov,
                                                      double bandwidth, double drive) {
@@ -117,7 +118,7 @@ Expected<ErrorBound<Size>, Error<double>> bound_from(const LyapunovMatrix<Size>&
   return bound;
 }
 
-/// Bound for an observer whose scaled gain wanders in any way between two gains.
+/// Bound for an observer whose scaled gain varies arbitrarily between two gains.
 template <int Size>
 Expected<ErrorBound<Size>, Error<double>> bound_between(const EigenMatrix<double, Size>& gain1,
                                                         const EigenMatrix<double, Size>& gain2,
@@ -160,18 +161,19 @@ Expected<ErrorBound<Size>, Error<double>> linear_error_bound(
       sources.disturbance_rate + std::pow(w, Size) * gain.norm() * sources.measurement_noise);
 }
 
-/// Bounds for the continuous cascade ESO, one a level, each for the error of (24) with the levels
-/// up to it: (22), (30) of the same paper in corrected form. The last one is that of the estimate.
+/// Bounds for the continuous cascade ESO, one per level, each for the error of (24) with the levels
+/// up to it: (22), (30) of the paper by Lakomy and Madonski, corrected. The last one is the bound
+/// for the estimate.
 ///
 /// With z_i the estimate by the levels up to i and l_i their gains, (26) reads
 ///
 ///     z~_i' = H_i z~_i + b d' + (l_i - b b' l_{i-1}) c' z~_{i-1}
 ///             + sum_{j<i-1} b b' (l_{j+1} - l_j) c' z~_j - b b' l_1 v
 ///
-/// (for m > 1: b b' the projection on all disturbance rows), so that beside d' the levels before
-/// drive level i by their bounds, with omega_j (alpha^(n+1) - 1) for j < i - 1; only level 1 has
-/// norm(kappa) omega^N at the noise. `rate` and `at` count from when the levels before have
-/// settled.
+/// (for m > 1 b b' is the projection on all disturbance rows). So besides d' the levels before
+/// drive level i, which their bounds limit, for j < i - 1 with omega_j (alpha^(n+1) - 1); noise
+/// enters with norm(kappa) omega^N at level 1 only. `rate` and `at` count from the time at which
+/// the levels before have settled.
 /// @tparam Order n @return error for a bad config or source
 template <int Order, int Size, int Levels>
 Expected<Array<ErrorBound<Size>, Levels>, Error<double>> cascade_error_bounds(
@@ -190,7 +192,8 @@ Expected<Array<ErrorBound<Size>, Levels>, Error<double>> cascade_error_bounds(
 
   Array<ErrorBound<Size>, Levels> bounds{};
   for (std::size_t i = 0; i < Levels; ++i) {
-    // A term g c' z~_j, scaled for level i: norm of omega_i^(N-r) g_r, times the bound on z~_j1.
+    // A term g c' z~_j, scaled for level i: the norm of omega_i^(N-r) g_r, times the bound on
+    // z~_j1.
     const auto size_of = [&](const auto& term) {
       double sum = 0.0;
       for (int r = 0; r < Size; ++r) {
@@ -228,8 +231,8 @@ struct SwitchedBandwidth {
 
 /// Bound and convergence time for the adjustable-bandwidth ESO under any switching: S. Zhang, X.
 /// Qi, S. Yang, J. Systems Engineering and Electronics (2023), (15), (20), (21), with a P common to
-/// both modes found from the inequalities, and delta-bar = norm of the larger gain (the square root
-/// that (13) lacks).
+/// both modes that is computed from the inequalities, and delta-bar = norm of the larger gain (in
+/// (13) the square root is missing).
 /// @tparam Size N @return error for a bad setting, or factors without a common P
 template <int Size>
 Expected<ErrorBound<Size>, Error<double>> switched_error_bound(const SwitchedBandwidth& setting,
@@ -243,7 +246,7 @@ Expected<ErrorBound<Size>, Error<double>> switched_error_bound(const SwitchedBan
                                      setting.observer_bandwidth, sources);
 }
 
-/// An observer with gains k(e) times those of the bandwidth.
+/// An observer whose gains are k(e) times those of the bandwidth.
 struct GainRange {
   double observer_bandwidth{};  ///< omega_0, rad/s
   double gain_min{};            ///< k_min
@@ -251,8 +254,8 @@ struct GainRange {
 };
 
 /// Bound for the nonlinear higher-order ESO: A. T. Azar et al., Mathematics 10 (2022) 2261, (34),
-/// (35), under the assumption that the paper leaves out: k(e) stays within (k_min, k_max), and the
-/// two share a P. Any variation of k within them is covered.
+/// (35), under assumptions that the paper omits: k(e) stays within (k_min, k_max), and both limits
+/// share a P. The bound then covers any variation of k between them.
 /// @tparam Size N @return error for a bad setting, or a range without a common P
 template <int Size>
 Expected<ErrorBound<Size>, Error<double>> nonlinear_error_bound(const GainRange& setting,

@@ -1,5 +1,5 @@
 /// @file
-/// Frequency responses of linear systems, logarithmic grids, and arrays ready for a Bode plot.
+/// Frequency responses of linear systems, logarithmic grids, and arrays for a Bode plot.
 #pragma once
 
 #include <cmath>
@@ -34,7 +34,7 @@ EigenMatrix<std::complex<double>, Outputs, Inputs> evaluate(
     pencil(j, j) += value;
     for (int i = 0; i < Inputs; ++i) x(j, i) = system.b(j, i);
   }
-  // A vector that is a row is stored by rows, which for a vector is the same.
+  // Eigen stores row vectors by rows, which for a vector is the same.
   solve_in_place(DenseView<Complex>{pencil.data(), States},
                  DenseView<Complex>{x.data(), States, Inputs});
   EigenMatrix<Complex, Outputs, Inputs> response;
@@ -109,7 +109,7 @@ inline Check<double> check_frequency(double frequency, double sample_time) {
 
 /// Response at one frequency, Outputs x Inputs.
 ///
-/// For a sampled system the response of samples to samples; it ends at pi / T.
+/// For a sampled system it is the response from samples to samples, up to pi / T.
 /// @param frequency omega, rad/s; 0 gives the static gain
 /// @return error for a frequency that is negative, above pi / T, or a pole
 template <int States, int Inputs, int Outputs>
@@ -124,7 +124,7 @@ Expected<EigenMatrix<std::complex<double>, Outputs, Inputs>, Error<double>> freq
   return response;
 }
 
-/// The same of a system whose sizes are known at run time.
+/// The same for a system whose sizes are known at run time.
 inline Expected<DynamicMatrix<std::complex<double>>, Error<double>> frequency_response(
     const DynamicSystem& system, double frequency) {
   if (auto ok = detail::check_frequency(frequency, system.sample_time); !ok) return ok.error();
@@ -140,7 +140,7 @@ inline Expected<DynamicMatrix<std::complex<double>>, Error<double>> frequency_re
 /// @param from, to rad/s, 0 < from < to
 template <int Count>
 Expected<Array<double, Count>, Error<double>> log_grid(double from, double to) {
-  static_assert(Count >= 2, "esokit: a grid has two points or more");
+  static_assert(Count >= 2, "esokit: a grid has at least two points");
   Rules<double> rules;
   rules.positive("from", from).above("to", to, from);
   if (!rules) return rules.error();
@@ -151,7 +151,7 @@ Expected<Array<double, Count>, Error<double>> log_grid(double from, double to) {
   return grid;
 }
 
-/// A curve ready for a Bode plot.
+/// Arrays for a Bode plot.
 template <int Count>
 struct Bode {
   Array<double, Count> frequency{};  ///< rad/s
@@ -160,7 +160,7 @@ struct Bode {
   Array<double, Count> phase{};      ///< rad, without jumps; the first one in (-pi, pi]
 };
 
-/// Bode arrays of any response over a grid.
+/// Bode arrays of any response on a grid.
 /// @param response response(omega), an Expected<std::complex<double>, Error<double>>
 /// @return the first error of `response`
 template <std::size_t Count, class Response>

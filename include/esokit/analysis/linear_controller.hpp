@@ -10,22 +10,22 @@
 
 namespace esokit {
 
-/// A controller within its limits, q channels. Sampled (sample_time T > 0), with y[k], r[k], and
-/// the u that is held from k to k + 1 and given to the controller at the next sample:
+/// A controller within its limits, q channels. Sampled (sample_time T > 0), u being held from k to
+/// k + 1 and given to the controller at the next sample:
 ///
 ///     z[k+1] - z[k] = a z + from_y y + from_r r + from_u u
 ///     u[k] = to_u z + y_to_u y + r_to_u r
 ///     estimates[k] = to_estimate z + y_to_estimate y + r_to_estimate r
 ///
-/// Continuous (sample_time 0): z' instead of the difference. The difference is used and not z[k+1],
-/// because it keeps the digits of a slow controller.
+/// Continuous (sample_time 0): z' instead of the difference. A - I is stored instead of A, because
+/// it keeps the digits of slow dynamics.
 ///
-/// Your own controller can be analysed if a function `linear_controller(const Yours&)` beside it
-/// returns this, or Expected<LinearController, Error<double>>.
+/// Your own controller can be analysed if a function `linear_controller(const Yours&)` in its
+/// namespace returns this, or Expected<LinearController, Error<double>>.
 struct LinearController {
   LinearController() = default;
-  /// Zero throughout. @param states length of z, may be 0 @param channels q @param estimates how
-  /// many estimates it tells of, may be 0 @param time T, s; 0: continuous
+  /// All matrices zero. @param states length of z, may be 0 @param channels q
+  /// @param estimates number of estimates that it gives, may be 0 @param time T, s; 0: continuous
   LinearController(int states, int channels, int estimates, double time)
       : a(states, states),
         from_y(states, channels),
@@ -47,20 +47,20 @@ struct LinearController {
   /// @}
 
   DynamicMatrix<double> a;              ///< A - I; continuous: A
-  DynamicMatrix<double> from_y;         ///< the measurement's way to z
-  DynamicMatrix<double> from_r;         ///< the reference's way to z
-  DynamicMatrix<double> from_u;         ///< the applied u's way to z
+  DynamicMatrix<double> from_y;         ///< from y to z
+  DynamicMatrix<double> from_r;         ///< from r to z
+  DynamicMatrix<double> from_u;         ///< from the applied u to z
   DynamicMatrix<double> to_u;           ///< from z to u
-  DynamicMatrix<double> y_to_u;         ///< from y to u at once
-  DynamicMatrix<double> r_to_u;         ///< from r to u at once
+  DynamicMatrix<double> y_to_u;         ///< from y to u directly
+  DynamicMatrix<double> r_to_u;         ///< from r to u directly
   DynamicMatrix<double> to_estimate;    ///< from z to the estimates
-  DynamicMatrix<double> y_to_estimate;  ///< from y to the estimates at once
-  DynamicMatrix<double> r_to_estimate;  ///< from r to the estimates at once
+  DynamicMatrix<double> y_to_estimate;  ///< from y to the estimates directly
+  DynamicMatrix<double> r_to_estimate;  ///< from r to the estimates directly
   double sample_time = 0.0;             ///< T, s; 0 for a continuous one
-  double input_gain = 0.0;              ///< b0, where it has one; else 0
+  double input_gain = 0.0;              ///< b0, or 0 if it has none
 };
 
-/// An observer in its predicted state z, with the u that is held from now on:
+/// An observer with its predicted state z, and with the u that is held from k to k + 1:
 ///
 ///     z[k+1] - z[k] = a z + from_y y + from_u u
 ///     zhat[k] = to_estimate z + y_to_estimate y
@@ -79,7 +79,7 @@ struct LinearObserverForm {
 
 namespace detail {
 
-/// The observer of a plant whose u acts d samples late.
+/// The observer with u delayed by d samples.
 inline LinearObserverForm delayed(const LinearObserverForm& observer, int delay) {
   if (delay == 0) return observer;
   const int states = observer.states();
@@ -101,8 +101,8 @@ inline LinearObserverForm delayed(const LinearObserverForm& observer, int delay)
   return late;
 }
 
-/// u = weights_0 r - weights (yhat, .., dhat); error-based u = weights (ehat, .., dhat), of an
-/// observer that is fed r - y.
+/// u = weights_0 r - weights (yhat, .., dhat); error-based u = weights (ehat, .., dhat) with an
+/// observer that measures r - y.
 inline LinearController feedback_of(const LinearObserverForm& observer,
                                     const std::vector<double>& weights, bool error_based) {
   const double sign = error_based ? -1.0 : 1.0;
@@ -127,7 +127,7 @@ inline LinearController feedback_of(const LinearObserverForm& observer,
   return form;
 }
 
-/// The controller told of its own u, which is its u as long as it is within its limits.
+/// The controller with its own u as the applied u, as it is within its limits.
 inline LinearController closed_upon_itself(const LinearController& c) {
   LinearController own = c;
   add(own.a, 0, 0, product(c.from_u, c.to_u));
@@ -137,7 +137,8 @@ inline LinearController closed_upon_itself(const LinearController& c) {
   return own;
 }
 
-/// u = u0 + K dhat: the compensator's r is the u of the base, which is told u0.
+/// u = u0 + K dhat: r of the compensator is the output u0 of the base; the base gets u0 as the
+/// applied u.
 inline Expected<LinearController, Error<double>> compensated(const LinearController& compensator,
                                                              const LinearController& given) {
   Rules<double> rules;
@@ -167,7 +168,8 @@ inline Expected<LinearController, Error<double>> compensated(const LinearControl
   return both;
 }
 
-/// Single channels side by side, behind the inverse of B0; each is told its share of B0 u.
+/// Single channels in parallel, with the inverse of B0 at their outputs; each gets its part of B0
+/// u.
 inline LinearController decoupled(const std::vector<LinearController>& parts,
                                   const DynamicMatrix<double>& input_matrix,
                                   const DynamicMatrix<double>& inverse) {
@@ -206,7 +208,7 @@ inline LinearController decoupled(const std::vector<LinearController>& parts,
   return all;
 }
 
-// So that the names are known here, and found beside a type of yours.
+// Declares the names, so that a function in the namespace of a user's type is found.
 void linear_controller();
 void linear_observer();
 

@@ -1,5 +1,5 @@
 /// @file
-/// The form in which all designs are analysed: a small state space of fixed size.
+/// The form in which designs are analysed: a small state-space system of fixed size.
 #pragma once
 
 #include <cmath>
@@ -16,9 +16,9 @@ namespace esokit {
 /// D x = a x + b w, out = c x + d w. D is d/dt for a continuous system; for a sampled one it is the
 /// difference, D x = x[k+1] - x[k].
 ///
-/// A sampled system is thus kept as A - I: for small omega T this holds its dynamics, and A itself
-/// would lose log10(1 / (omega T)) digits of them. Inputs and outputs are in physical units, always
-/// in double; the states may be scaled.
+/// So a sampled system is stored as A - I: for small omega T this keeps all digits of the dynamics,
+/// of which A would lose log10(1 / (omega T)). Inputs and outputs are in physical units, always in
+/// double; the states may be scaled.
 /// @tparam States, Inputs, Outputs sizes
 template <int States, int Inputs, int Outputs>
 struct LinearSystem {
@@ -27,7 +27,7 @@ struct LinearSystem {
   static constexpr int inputs = Inputs;    ///< length of w
   static constexpr int outputs = Outputs;  ///< length of out
 
-  /// A, or A - I where sampled.
+  /// A, for a sampled system A - I.
   EigenMatrix<double, States, States> a = EigenMatrix<double, States, States>::Zero();
   /// From w to D x.
   EigenMatrix<double, States, Inputs> b = EigenMatrix<double, States, Inputs>::Zero();
@@ -65,9 +65,9 @@ struct LinearSystem {
   }
 };
 
-/// D x = a x + b w, out = c x + d w, of sizes known at run time; else as LinearSystem.
+/// D x = a x + b w, out = c x + d w: a LinearSystem whose sizes are known at run time.
 struct DynamicSystem {
-  DynamicMatrix<double> a;   ///< A, or A - I where sampled
+  DynamicMatrix<double> a;   ///< A, for a sampled system A - I
   DynamicMatrix<double> b;   ///< from w to D x
   DynamicMatrix<double> c;   ///< from x to out
   DynamicMatrix<double> d;   ///< from w to out directly
@@ -76,7 +76,7 @@ struct DynamicSystem {
 
 namespace detail {
 
-/// y, y', .. and d, d', ..: names of the rows of an estimate.
+/// Names of the rows of an estimate: yhat, yhat', .. and dhat, dhat', ..
 template <int Order, int Extension>
 constexpr Array<const char*, Order + Extension> estimate_names() noexcept {
   constexpr const char* plant[] = {"yhat",     "yhat'",    "yhat''",   "yhat^(3)",
@@ -93,7 +93,7 @@ constexpr Array<const char*, Order + Extension> estimate_names() noexcept {
   return names;
 }
 
-/// `balance` without the sizes in the type, for code that is compiled once.
+/// `balance` without the sizes in the type, for code that is compiled once only.
 inline void balance(DenseView<double> a, DenseView<double> b, DenseView<double> c) noexcept {
   const int states = a.rows;
   for (int sweep = 0; sweep < 30; ++sweep) {
@@ -106,7 +106,7 @@ inline void balance(DenseView<double> a, DenseView<double> b, DenseView<double> 
         row += std::abs(a(i, j));
         column += std::abs(a(j, i));
       }
-      // Not finite where nothing couples.
+      // Not finite if nothing couples to this state.
       const double exponent = std::round(0.5 * std::log2(row / column));
       if (!is_finite(exponent) || exponent == 0.0) continue;
       // x_i is replaced by x_i / 2^exponent.
@@ -123,18 +123,18 @@ inline void balance(DenseView<double> a, DenseView<double> b, DenseView<double> 
 
 }  // namespace detail
 
-/// Scales the states by powers of two until rows and columns of `a` are of like size; nothing is
-/// rounded, and inputs and outputs stay as they are. States of a chain differ by omega^n.
+/// Scales the states by powers of two until rows and columns of `a` are of similar size. Nothing is
+/// rounded, and inputs and outputs do not change. The states of a chain differ by up to omega^n.
 template <int States, int Inputs, int Outputs>
 void balance(LinearSystem<States, Inputs, Outputs>& system) noexcept {
-  // A matrix of one row is stored by rows, which is the same.
+  // Eigen stores a matrix of one row by rows, which is the same.
   detail::balance({system.a.data(), States}, {system.b.data(), States, Inputs},
                   {system.c.data(), Outputs, States});
 }
 
 namespace detail {
 
-/// A system without its sizes in the type, for code that is compiled once.
+/// A system without its sizes in the type, for code that is compiled once only.
 struct SystemView {
   DenseView<const double> a, b, c, d;
   double sample_time;
@@ -147,7 +147,7 @@ struct SystemView {
 
 template <int States, int Inputs, int Outputs>
 SystemView view_of(const LinearSystem<States, Inputs, Outputs>& system) noexcept {
-  // A matrix of one row is stored by rows, which is the same.
+  // Eigen stores a matrix of one row by rows, which is the same.
   return {{system.a.data(), States},
           {system.b.data(), States, Inputs},
           {system.c.data(), Outputs, States},

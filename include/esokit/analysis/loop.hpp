@@ -1,5 +1,5 @@
 /// @file
-/// The loop of a plant and a controller, from which all analysis of a finished design starts.
+/// The loop of a plant and a controller, the start of every analysis of a finished design.
 #pragma once
 
 #include <cmath>
@@ -20,13 +20,13 @@ namespace esokit {
 
 namespace detail {
 
-/// Whole samples of dead time that a loop is made with; more is refused.
+/// Longest dead time that a loop accepts, samples.
 inline constexpr double most_whole_samples = 1000.0;
 
 /// A LinearPlant in double without its sizes in the type.
 struct DensePlant {
   DynamicMatrix<double> a, b, c, e;
-  std::vector<double> dead_time;  ///< s, of each input
+  std::vector<double> dead_time;  ///< of each input, s
 };
 
 template <int States, Scalar S, int Inputs, int Outputs>
@@ -36,7 +36,7 @@ DensePlant dense_plant(const LinearPlant<States, S, Inputs, Outputs>& plant) {
           std::vector<double>(Inputs, static_cast<double>(plant.dead_time))};
 }
 
-/// exp(A t) - I and the integral of exp(A s) B over 0..t.
+/// exp(A t) - I, and the integral of exp(A s) B over 0..t.
 struct HeldFor {
   DynamicMatrix<double> increment, input;
 };
@@ -56,14 +56,14 @@ inline HeldFor held_for(const DynamicMatrix<double>& a, const DynamicMatrix<doub
   return held;
 }
 
-/// A plant at the sample times: D x = a x + now u[k - whole] + before u[k - whole - 1] + e d,
-/// `whole` of each input its own. A continuous one has `now` alone.
+/// A plant at the sample times: D x = a x + now u[k - whole] + before u[k - whole - 1] + e d, with
+/// its own `whole` for each input. A continuous plant has only `now`.
 struct SampledPlant {
   DynamicMatrix<double> a, now, before, e, c;
   std::vector<int> whole;
   double sample_time = 0.0;
 
-  /// How many inputs of the past it has to remember.
+  /// Number of past inputs that it needs.
   [[nodiscard]] int remembered(int input) const {
     for (int i = 0; i < a.rows(); ++i) {
       if (before(i, input) != 0.0) return whole[static_cast<std::size_t>(input)] + 1;
@@ -72,7 +72,7 @@ struct SampledPlant {
   }
 };
 
-/// Column `input` of a sampled plant for a dead time of its own.
+/// Computes column `input` of a sampled plant for the dead time of this input.
 inline void set_input(SampledPlant& sampled, const DensePlant& plant, int input, double dead_time) {
   const double T = sampled.sample_time;
   const int n = plant.a.rows();
@@ -80,14 +80,14 @@ inline void set_input(SampledPlant& sampled, const DensePlant& plant, int input,
   for (int i = 0; i < n; ++i) b(i, 0) = plant.b(i, input);
   double whole = std::floor(dead_time / T);
   double rest = dead_time - whole * T;
-  // A whole number of samples but for the rounding of T.
+  // A whole number of samples within the rounding of T.
   const double rounding = 1e-12 * (dead_time + T);
   if (rest > T - rounding) whole += 1.0;
   if (rest > T - rounding || rest < rounding) rest = 0.0;
   sampled.whole[static_cast<std::size_t>(input)] = static_cast<int>(whole);
   const HeldFor late = held_for(plant.a, b, T - rest);
   const HeldFor early = held_for(plant.a, b, rest);
-  // On to the end of the sample by exp(A (T - rest)).
+  // Advances to the end of the sample by exp(A (T - rest)).
   auto old = product(late.increment, early.input);
   add(old, 0, 0, early.input);
   for (int i = 0; i < n; ++i) {
@@ -108,7 +108,7 @@ inline SampledPlant sampled_plant(const DensePlant& plant, double sample_time) {
       set_input(sampled, plant, j, plant.dead_time[static_cast<std::size_t>(j)]);
     }
   }
-  // States of like size: nothing is rounded.
+  // Scales the states to similar size, without rounding.
   const int n = plant.a.rows();
   const int q = plant.b.cols();
   DynamicMatrix<double> inputs(n, 2 * q + plant.e.cols());
@@ -126,7 +126,7 @@ inline SampledPlant sampled_plant(const DensePlant& plant, double sample_time) {
   return sampled;
 }
 
-/// The same with the inputs of the past as states.
+/// The same with past inputs as states.
 inline DynamicSystem with_memory(const SampledPlant& plant) {
   const int n = plant.a.rows();
   const int q = plant.now.cols();
@@ -162,7 +162,7 @@ inline DynamicSystem with_memory(const SampledPlant& plant) {
   return all;
 }
 
-/// u to y at a value of D (i omega, or z - 1). @param disturbance d to y instead
+/// Response from u to y at a value of D (i omega, or z - 1). @param disturbance from d to y instead
 inline ComplexMatrix response(const SampledPlant& plant, std::complex<double> value,
                               bool disturbance = false) {
   const int n = plant.a.rows();
@@ -188,7 +188,7 @@ inline ComplexMatrix response(const SampledPlant& plant, std::complex<double> va
   return seen(plant.c, resolvent(plant.a, value, std::move(b)));
 }
 
-/// y to u. @param controller told of its own u
+/// Response from y to u. @param controller with its own u as the applied u
 inline ComplexMatrix response(const LinearController& controller, std::complex<double> value) {
   ComplexMatrix b(controller.states(), controller.channels());
   for (int j = 0; j < b.cols(); ++j) {
@@ -221,8 +221,8 @@ inline void balance(LinearController& c) {
   }
 }
 
-/// The loop (r, v, d) to (y, u, zhat). @param open this channel's u does not reach the plant; -1:
-/// all do @param controller told of its own u
+/// The loop from (r, v, d) to (y, u, zhat). @param open channel whose u does not reach the plant;
+/// -1: none @param controller with its own u as the applied u
 inline DynamicSystem closed_system(const SampledPlant& sampled, const LinearController& controller,
                                    int open = -1) {
   const DynamicSystem plant = with_memory(sampled);
@@ -273,7 +273,7 @@ inline ComplexMatrix identity_plus(const ComplexMatrix& g, double factor = 1.0) 
   return out;
 }
 
-/// Loop gain of one channel with the others closed, of L = -C P at the plant's inputs.
+/// Loop gain L = -C P of one channel at the plant's input, with the other channels closed.
 inline std::complex<double> loop_gain_of_channel(const ComplexMatrix& plant,
                                                  const ComplexMatrix& controller, int channel) {
   ComplexMatrix l = product(controller, plant);
@@ -320,17 +320,18 @@ inline double largest_singular_value(const ComplexMatrix& matrix) {
 
 /// Loop of a plant y = P (u, d) and a controller u = C (y + v, r), of q channels.
 ///
-/// Sampled: y[k] is measured and u[k] set at the same instant; give computing time as dead time of
-/// the plant. The loop is opened at the plant's input, behind the path by which the controller gets
-/// u: L = -P C; for one channel the others stay closed. r is a reference without derivatives; d is
-/// held from k to k + 1.
+/// Sampled: y[k] is measured and u[k] is set at the same instant; give computing time as dead time
+/// of the plant. The loop gain L = -P C is that of the loop opened at the plant's input, while the
+/// controller still gets its own u; with several channels the others stay closed. r is a reference
+/// without derivatives; d is held from k to k + 1.
 class Loop {
  public:
   using Complex = std::complex<double>;  ///< a response at a frequency
 
-  /// Closes the loop; better by `closed_loop`.
-  /// @return error for a plant with other channels than the controller, one that the scalar cannot
-  ///         hold, and a dead time that a loop cannot have
+  /// Closes the loop. Use `closed_loop` instead.
+  /// @return error if plant and controller have different numbers of channels, if a number
+  ///         overflows, and for a dead time that is too long (or, with a continuous controller, not
+  ///         zero)
   static Expected<Loop, Error<double>> make(detail::DensePlant plant, LinearController controller) {
     const double T = controller.sample_time;
     const int q = controller.channels();
@@ -384,20 +385,22 @@ class Loop {
   [[nodiscard]] int channels() const noexcept { return controller_.channels(); }
   /// T, s; 0 for a continuous loop.
   [[nodiscard]] double sample_time() const noexcept { return system_.sample_time; }
-  /// (r, v, d) to (y, u, zhat), q columns and rows of each, d and zhat as many as there are.
+  /// The closed loop from (r, v, d) to (y, u, zhat): q columns for r and v, q rows for y and u, and
+  /// as many as there are for d and zhat.
   [[nodiscard]] const DynamicSystem& system() const noexcept { return system_; }
   /// b0 of the controller, 0 if it has none.
   [[nodiscard]] double input_gain() const noexcept { return input_gain_; }
 
   /// True if all poles of the closed loop are stable.
   [[nodiscard]] bool stable() const noexcept { return abscissa_ < 0.0; }
-  /// As esokit::stability_abscissa of the closed loop: negative is stable.
+  /// esokit::stability_abscissa of the closed loop: negative is stable.
   [[nodiscard]] double stability_abscissa() const noexcept { return abscissa_; }
-  /// Of the closed loop; sampled: z - 1.
+  /// Poles of the closed loop, 1/s; sampled: z - 1.
   [[nodiscard]] const std::vector<Complex>& poles() const noexcept { return poles_; }
 
-  /// L at one actuator, the other channels closed. @param frequency rad/s, above 0; sampled: to
-  /// pi / T @return error for a frequency outside of that, one that is a pole, or no such channel
+  /// L at one actuator, with the other channels closed. @param frequency rad/s, above 0; sampled:
+  /// up to pi / T @return error for a frequency outside this range or at a pole, or if there is no
+  /// such channel
   [[nodiscard]] Expected<Complex, Error<double>> loop_gain(double frequency,
                                                            int channel = 0) const {
     return at(frequency, channel, channel, [&](Complex value) {
@@ -405,18 +408,18 @@ class Loop {
                                           detail::response(controller_, value), channel);
     });
   }
-  /// S = 1 / (1 + L): from a disturbance at an actuator to what reaches the plant; of one channel
-  /// also from a disturbance at the output to y. Errors as loop_gain.
+  /// S = 1 / (1 + L): from a disturbance at an actuator to the input of the plant; with one channel
+  /// also from a disturbance at the output to y. Errors as for loop_gain.
   [[nodiscard]] Expected<Complex, Error<double>> sensitivity(double frequency,
                                                              int channel = 0) const {
     return of_gain(frequency, channel, [](Complex l) { return 1.0 / (1.0 + l); });
   }
-  /// T = L / (1 + L): of one channel from noise v to -y. Errors as loop_gain.
+  /// T = L / (1 + L): with one channel from noise v to -y. Errors as for loop_gain.
   [[nodiscard]] Expected<Complex, Error<double>> complementary_sensitivity(double frequency,
                                                                            int channel = 0) const {
     return of_gain(frequency, channel, [](Complex l) { return l / (1.0 + l); });
   }
-  /// From noise on one measurement to one u. Errors as loop_gain.
+  /// From noise on one measurement to one u. Errors as for loop_gain.
   [[nodiscard]] Expected<Complex, Error<double>> noise_to_control(double frequency, int control = 0,
                                                                   int measurement = 0) const {
     return at(frequency, control, measurement, [&](Complex value) {
@@ -427,7 +430,7 @@ class Loop {
       return Complex(c(control, measurement));
     });
   }
-  /// From a disturbance of the plant to one y. Errors as loop_gain.
+  /// From a disturbance of the plant to one y. Errors as for loop_gain.
   [[nodiscard]] Expected<Complex, Error<double>> disturbance_to_output(double frequency,
                                                                        int output = 0,
                                                                        int disturbance = 0) const {
@@ -440,7 +443,7 @@ class Loop {
   }
   /// Largest singular value of the sensitivity (I - P C)^-1: the largest amplification of a
   /// disturbance at the outputs, in any direction. It depends on the units of y: scale the outputs
-  /// to similar size. Errors as loop_gain.
+  /// to similar size. Errors as for loop_gain.
   [[nodiscard]] Expected<double, Error<double>> largest_sensitivity(double frequency) const {
     double largest = 0.0;
     const auto found = at(frequency, 0, 0, [&](Complex value) {
@@ -465,7 +468,7 @@ class Loop {
   [[nodiscard]] Check<double> check_channel(const char* field, int channel) const {
     return Rules<double>{}.require(
         0 <= channel && channel < channels(),
-        {field, static_cast<double>(channel), "must be 0 up to the channels less one, that is", -1,
+        {field, static_cast<double>(channel), "must be 0 .. channels - 1, that is at most", -1,
          static_cast<double>(channels() - 1), true});
   }
   /// @endcond
@@ -510,27 +513,27 @@ class Loop {
 
   detail::DensePlant continuous_;
   detail::SampledPlant plant_;
-  LinearController controller_;  ///< told of its own u
+  LinearController controller_;  ///< with its own u as the applied u
   DynamicSystem system_;
   std::vector<Complex> poles_;
   double abscissa_ = 0.0;
   double input_gain_ = 0.0;
 };
 
-/// A loop, or the reason why there is none.
+/// A loop, or the error that prevented it.
 using LoopResult = Expected<Loop, Error<double>>;
 
-/// The loop of a plant and a controller, the same object that runs. The plant is continuous, and
-/// sampled exactly here, with any dead time.
-/// @return errors of Loop::make, and of a controller that is not the same in every sample
+/// The loop of a plant and a controller, the same object that runs on the machine. The plant is
+/// continuous and is sampled exactly, with any dead time.
+/// @return the errors of Loop::make, and an error for a controller that is not the same at every
+/// sample
 template <int States, Scalar S, int Inputs, int Outputs, class Controller>
 LoopResult closed_loop(const LinearPlant<States, S, Inputs, Outputs>& plant,
                        const Controller& controller) {
   static_assert(AnalysedController<Controller>,
-                "esokit: the analysis takes linear controllers: an observer with a nonlinear or "
-                "switched gain is held in one of its modes by FrozenObserver and "
-                "ObserverWithLaw; a filter form by linear_controller(form, config); a controller "
-                "of yours says what it is by a function linear_controller beside it");
+                "esokit: the analysis needs a linear controller: for a nonlinear or switched gain "
+                "use FrozenObserver and ObserverWithLaw, for a filter form linear_controller(form, "
+                "config); for your own type write a function linear_controller beside it");
   if constexpr (AnalysedController<Controller>) {
     if (const auto ok = plant.check(); !ok) {
       const auto& error = ok.error();

@@ -1,5 +1,5 @@
 /// @file
-/// How much noise and a noisy disturbance move a loop at rest.
+/// The effect of measurement noise and a noisy disturbance on a loop at rest.
 #pragma once
 
 #include <cmath>
@@ -9,24 +9,24 @@
 
 namespace esokit {
 
-/// White noise on a loop, a standard deviation for each channel; missing entries are zero.
-/// Continuous loops: root of the two-sided spectral density, unit times root of s.
+/// White noise on a loop, one standard deviation for each channel; missing entries are zero. For
+/// continuous loops the root of the two-sided spectral density, unit times root of s.
 struct LoopNoise {
-  std::vector<double> measurement{};  ///< of y, each sample anew
-  std::vector<double> disturbance{};  ///< of d, each sample anew and held until the next
+  std::vector<double> measurement{};  ///< of y, independent in each sample
+  std::vector<double> disturbance{};  ///< of d, independent in each sample and held until the next
 };
 
 /// Standard deviations of the signals of a loop, one entry per channel (for estimates one per row,
-/// channel by channel).
+/// channel after channel).
 struct LoopDeviations {
   std::vector<double> output;     ///< y, without the noise on its measurement
   std::vector<double> control;    ///< u
-  std::vector<double> estimates;  ///< (yhat, .., dhat, ..), as far as the controller tells
+  std::vector<double> estimates;  ///< (yhat, .., dhat, ..), if the controller gives them
 };
 
-/// Standard deviations in the steady state, exact.
-/// @return error for a negative noise, one for more channels than there are, a loop that is not
-///         stable, or a u that continuous white noise reaches directly
+/// The exact standard deviations in the steady state.
+/// @return error for a negative noise, more entries than channels, a loop that is not stable, or a
+///         u that continuous white noise reaches directly
 inline Expected<LoopDeviations, Error<double>> noise(const Loop& loop, const LoopNoise& of) {
   const DynamicSystem& system = loop.system();
   const int q = loop.channels();

@@ -9,18 +9,18 @@ namespace esokit {
 
 /// The step and the duration of the response.
 struct LoopStep {
-  double duration = 0.0;     ///< s, the last sample is at or before it
+  double duration = 0.0;     ///< s; the last sample is at or before it
   int channel = 0;           ///< of r, or of d
   double height = 1.0;       ///< in the unit of r, or of d
-  double sample_time = 0.0;  ///< s, of a continuous loop; left out for a sampled one
+  double sample_time = 0.0;  ///< s, for a continuous loop; leave out for a sampled one
 };
 
-/// A response at the sample times, from rest in zero; the step is at t = 0.
+/// A response at the sample times, from rest at zero; the step is at t = 0.
 struct LoopResponse {
   std::vector<double> time;                    ///< s
   std::vector<std::vector<double>> output;     ///< y of each channel
   std::vector<std::vector<double>> control;    ///< u of each channel
-  std::vector<std::vector<double>> estimates;  ///< each row that the controller tells of
+  std::vector<std::vector<double>> estimates;  ///< each estimate that the controller gives
 };
 
 namespace detail {
@@ -87,13 +87,14 @@ inline Expected<LoopResponse, Error<double>> respond(const Loop& loop, const Loo
 }  // namespace detail
 
 /// Response to a step of a reference, without its derivatives.
-/// @return error for a channel or a duration that cannot be
+/// @return error for an invalid channel or duration
 inline Expected<LoopResponse, Error<double>> reference_response(const Loop& loop,
                                                                 const LoopStep& step) {
   return detail::respond(loop, step, step.channel, loop.channels());
 }
 
-/// Response to a step of a disturbance of the plant, its E d. Errors as reference_response.
+/// Response to a step of the disturbance d of the plant, which enters through E. Errors as for
+/// reference_response.
 inline Expected<LoopResponse, Error<double>> load_response(const Loop& loop, const LoopStep& step) {
   const int before = 2 * loop.channels();
   return detail::respond(loop, step, before + step.channel, loop.system().b.cols() - before);

@@ -1,5 +1,5 @@
 /// @file
-/// Follows a loop gain over the frequency in steps so short that no crossing is missed, for the
+/// Follows a loop gain over the frequency in steps short enough to miss no crossing, for the
 /// margins.
 #pragma once
 
@@ -16,13 +16,13 @@ namespace esokit::detail {
 /// L = -P C of one channel.
 struct LoopGain {
   SampledPlant plant;
-  LinearController controller;  ///< told of its own u
+  LinearController controller;  ///< with its own u as the applied u
   int channel;
 
   [[nodiscard]] std::complex<double> operator()(double frequency) const {
     return at(frequency_operator(frequency, controller.sample_time));
   }
-  /// @param value of D: i omega, or z - 1
+  /// @param value value of D: i omega, or z - 1
   [[nodiscard]] std::complex<double> at(std::complex<double> value) const {
     return loop_gain_of_channel(response(plant, value), response(controller, value), channel);
   }
@@ -32,8 +32,9 @@ inline LoopGain loop_gain_of(const Loop& loop, int channel) {
   return {loop.plant(), loop.controller(), channel};
 }
 
-/// Where a loop gain is looked at: from well below its slowest pole to pi / T, or to well above
-/// its fastest; with the frequencies of all poles, near which it may change quickly.
+/// The frequency range in which a loop gain is examined: from well below its slowest pole to pi / T
+/// or well above its fastest pole; with the frequencies of all poles, near which it may change
+/// fast.
 struct ScanRange {
   std::vector<double> features;  ///< rad/s, rising
   double from = 0.0;
@@ -48,7 +49,7 @@ inline ScanRange scan_range(const Loop& loop, int channel) {
   const auto look = [&](const std::vector<std::complex<double>>& poles, bool stable) {
     for (const std::complex<double>& p : poles) {
       const double size = T > 0.0 ? std::abs(p) / T : std::abs(p);
-      // Integrators come out as poles of rounding size.
+      // Integrators are computed as poles of the size of rounding errors.
       if (!stable && !(size > 1e-9 * fastest)) continue;
       if (stable) fastest = std::max(fastest, size);
       slowest = std::min(slowest, size);
@@ -68,8 +69,8 @@ inline ScanRange scan_range(const Loop& loop, int channel) {
   return range;
 }
 
-/// Calls visit(w1, L1, w2, L2) for adjacent pieces, over which L changes by less than a fifth of
-/// its size and less than half its distance from -1.
+/// Calls visit(w1, L1, w2, L2) for adjacent intervals in which L changes by less than a fifth of
+/// its magnitude and less than half its distance from -1.
 template <class Response, class Visit>
 void scan_piece(const Response& response, double w1, std::complex<double> l1, double w2,
                 std::complex<double> l2, int depth, Visit& visit) {
@@ -93,10 +94,10 @@ void scan(const Response& response, const ScanRange& range, Visit&& visit) {
   double w1 = range.from;
   std::complex<double> l1 = response(w1);
   const auto go_to = [&](double w2) {
-    // Poles that differ by rounding are one feature.
+    // Poles that differ by rounding only are one feature.
     if (!(w2 > w1 * (1.0 + 1e-7)) || w2 > range.to) return;
     const double start = w1;
-    // By its root, as the quotient of what the scalar holds may be beyond it.
+    // The root of the quotient, because the quotient itself may overflow.
     const double root = std::sqrt(w2) / std::sqrt(start);
     const int pieces = 2 + static_cast<int>(std::ceil(60.0 * std::log10(root)));
     for (int i = 1; i <= pieces; ++i) {
@@ -113,14 +114,14 @@ void scan(const Response& response, const ScanRange& range, Visit&& visit) {
     }
   };
   for (const double feature : range.features) {
-    // Beside the pole, not on it: it may lie on the axis.
+    // Close to the pole but not at it, because it may lie on the axis.
     go_to(feature * (1.0 - 1e-6));
     go_to(feature * (1.0 + 1e-6));
   }
   go_to(range.to);
 }
 
-/// Root of f in [low, high], whose ends have different signs, to the last digits.
+/// Root of f in [low, high] by bisection to the last digits; f has different signs at the ends.
 template <class Function>
 double bisect(const Function& f, double low, double high) {
   const bool rising = f(low) < 0.0;
@@ -132,7 +133,7 @@ double bisect(const Function& f, double low, double high) {
   return 0.5 * (low + high);
 }
 
-/// Place of the smallest f in [low, high] by golden section.
+/// Position of the minimum of f in [low, high] by golden section.
 template <class Function>
 double golden_section(const Function& f, double low, double high) {
   constexpr double ratio = 0.6180339887498949;

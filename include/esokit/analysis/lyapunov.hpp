@@ -1,5 +1,5 @@
 /// @file
-/// Lyapunov equations of linear systems, by doubling (Smith's method squared).
+/// Lyapunov equations of linear systems, by doubling (Smith's squared method).
 #pragma once
 
 #include <cmath>
@@ -10,15 +10,15 @@ namespace esokit {
 
 namespace detail {
 
-// All matrices n x n, column-major, of the caller.
+// All matrices are n x n, column-major, in storage of the caller.
 
-/// Largest row sum of a^2, whose root is of the size of the poles.
+/// Largest row sum of a^2; its root has the size of the poles.
 inline double square_size(const double* a, double* work, int n) noexcept {
   multiply(a, a, work, n);
   return row_norm(work, n);
 }
 
-/// P into p. @param work 3 n^2
+/// Writes P to p. @param work 3 n^2
 inline bool solve_lyapunov_once(const double* a, const double* q, double* p, double* work, int n,
                                 bool sampled) noexcept {
   double* const e = work;
@@ -31,8 +31,8 @@ inline bool solve_lyapunov_once(const double* a, const double* q, double* p, dou
     }
     return sum_by_doubling(e, p, work1, work2, n);
   }
-  // Cayley: with s = c (z - 1) / (z + 1) the equation is that of (cI - A)^-1 (cI + A) and
-  // 2 c (cI - A)^-1 Q (cI - A)^-T, and has the same P.
+  // Cayley transform: with s = c (z - 1) / (z + 1) the sampled equation for (cI - A)^-1 (cI + A)
+  // and 2 c (cI - A)^-1 Q (cI - A)^-T has the same P.
   const double c = std::sqrt(square_size(a, work1, n));
   if (!is_finite(c) || !(c > 0.0)) return false;
   const auto shift = [&](double* to) {
@@ -55,8 +55,8 @@ inline bool solve_lyapunov_once(const double* a, const double* q, double* p, dou
   return sum_by_doubling(e, p, work1, work2, n);
 }
 
-/// D P + P D' [+ D P D'] + Q into `residual`, and its largest element as a share of the terms that
-/// it is made of. @param work 2 n^2
+/// Writes D P + P D' [+ D P D'] + Q to `residual`, and returns its largest element as a share of
+/// its terms. @param work 2 n^2
 inline double lyapunov_residual(const double* a, const double* q, const double* p, double* residual,
                                 double* work, int n, bool sampled) noexcept {
   double* const ap = work;
@@ -98,15 +98,15 @@ inline Check<double> solve_lyapunov(const double* a, const double* q, double* p,
   }
   const double share = lyapunov_residual(a, q, p, residual, work, n, sampled);
   return Rules<double>{}.require(share <= 1e-11, "system", share,
-                                 "leaves a residual in the Lyapunov equation");
+                                 "leaves too large a residual in the Lyapunov equation");
 }
 
 }  // namespace detail
 
 /// Solves A P + P A' + Q = 0 (continuous) or P = A P A' + Q (sampled), N x N.
 ///
-/// Doubling, one step of iterative refinement, and a check of the residual against the size of its
-/// terms. About log2(1 / (1 - spectral radius)) + 6 steps of three matrix products.
+/// By doubling, one step of iterative refinement, and a check of the residual against the size of
+/// its terms. About log2(1 / (1 - spectral radius)) + 6 steps of three matrix products.
 /// @param a A, or A - I for a sampled system, as LinearSystem keeps it @param q symmetric
 /// @return error if A is not stable, or the residual is above 1e-11 of its terms
 template <int N>

@@ -1,6 +1,6 @@
 /// @file
-/// Quadratic Lyapunov functions V = x' P x of one linear system or common to several, for the error
-/// bounds.
+/// Quadratic Lyapunov functions V = x' P x for one linear system or common to several, for the
+/// error bounds.
 #pragma once
 
 #include <cmath>
@@ -14,7 +14,7 @@ namespace esokit {
 template <int Size>
 struct LyapunovMatrix {
   EigenMatrix<double, Size, Size> p;  ///< N x N, symmetric
-  double smallest = 0.0;              ///< least eigenvalue of P, above 0
+  double smallest = 0.0;              ///< smallest eigenvalue of P, above 0
   double largest = 0.0;               ///< largest eigenvalue of P
 
   /// gamma = sqrt(largest / smallest).
@@ -23,7 +23,7 @@ struct LyapunovMatrix {
 
 namespace detail {
 
-/// Extreme eigenvalues of a symmetric matrix, and their vectors.
+/// Extreme eigenvalues of a symmetric matrix, and their eigenvectors.
 template <int Size>
 struct Extremes {
   double smallest, largest;
@@ -76,8 +76,8 @@ EigenMatrix<double, Size, Size> from_triangle(const Array<double, triangle<Size>
   return p;
 }
 
-/// Ellipsoid {center + factor u, norm(u) <= 1} that holds what is looked for. Kept by its factor:
-/// the matrix factor factor' would lose its sign to rounding where the ellipsoid is long.
+/// Ellipsoid {center + factor u, norm(u) <= 1} that contains the solution. Stored by its factor,
+/// because for a long ellipsoid factor factor' would become indefinite by rounding.
 template <int Count>
 struct Ellipsoid {
   Array<double, Count> center{};
@@ -139,20 +139,20 @@ Expected<LyapunovMatrix<Size>, Error<double>> lyapunov_matrix(
   return detail::with_eigenvalues<Size>(*p);
 }
 
-/// One P with A_i'P + P A_i <= -I for all given A_i, hence for every mixture and any switching
-/// between them. Among all such P it is about the one with the smallest gamma * largest, to which
-/// the bounds on the error are proportional.
+/// One P with A_i'P + P A_i <= -I for all given A_i, and therefore for every convex combination of
+/// them and any switching between them. Among all such P it is approximately the one with the
+/// smallest gamma * largest, to which the error bounds are proportional.
 ///
 /// The inequalities are solved by the ellipsoid method: cuts along the eigenvectors that violate
-/// them, and along the gradient of the (quasi-convex) aim. Milliseconds for N = 3, a second for
-/// N = 6.
-/// @param a the A_i, each N x N @param most bound on the entries of P; the A_i are best scaled to
-///        poles of size one
-/// @return error if there is none, with what is left of the inequalities at the end
+/// them, and along the gradient of the (quasi-convex) objective. Milliseconds for N = 3, a second
+/// for N = 6.
+/// @param a the A_i, each N x N @param most bound on the entries of P; scale the A_i so that their
+///        poles are of size one
+/// @return error if there is none; its value is the remaining violation of the inequalities
 template <int Size, std::size_t Modes>
 Expected<LyapunovMatrix<Size>, Error<double>> common_lyapunov_matrix(
     const std::array<EigenMatrix<double, Size, Size>, Modes>& a, double most = 1e5) {
-  static_assert(Size >= 2, "esokit: two states or more");
+  static_assert(Size >= 2, "esokit: at least two states");
   constexpr int count = detail::triangle<Size>;
   using Square = EigenMatrix<double, Size, Size>;
   Rules<double> rules;
@@ -178,7 +178,7 @@ Expected<LyapunovMatrix<Size>, Error<double>> common_lyapunov_matrix(
       }
     };
 
-    // The inequality that is violated most: v' (A'P + P A + I) v > 0.
+    // The most violated inequality: v' (A'P + P A + I) v > 0.
     double excess = -std::numeric_limits<double>::infinity();
     EigenMatrix<double, Size> v = EigenMatrix<double, Size>::Zero();
     const Square* violated = &a[0];
@@ -207,7 +207,8 @@ Expected<LyapunovMatrix<Size>, Error<double>> common_lyapunov_matrix(
       continue;
     }
 
-    // log(largest^3 / smallest), twice the logarithm of gamma * largest. Its level sets are convex.
+    // log(largest^3 / smallest), twice the logarithm of gamma * largest. Its sublevel sets are
+    // convex.
     const auto values = detail::extremes<Size>(p);
     const double aim = 3.0 * std::log(values.largest) - std::log(values.smallest);
     if (aim < best) {

@@ -1,5 +1,6 @@
 /// @file
-/// Stability margins of a loop: gain both ways, phase, modulus; and the range of b0 / b.
+/// Stability margins of a loop: gain increase and decrease, phase, modulus; and the range of b0 /
+/// b.
 #pragma once
 
 #include <esokit/analysis/loop_scan.hpp>
@@ -9,22 +10,22 @@
 
 namespace esokit {
 
-/// A margin, and the frequency at which the loop then oscillates. Without a limit it is infinite
-/// (for a factor below one: zero), and there is no frequency.
+/// A margin, and the frequency at which the loop oscillates at this limit. Without a limit it is
+/// infinite (for a factor below one: zero), and there is no frequency.
 struct Margin {
   double value = std::numeric_limits<double>::infinity();       ///< unit of the margin
   double frequency = std::numeric_limits<double>::quiet_NaN();  ///< rad/s; NaN: no limit
 
-  /// False if the loop stays stable however far one goes in this direction.
+  /// False if the loop stays stable for any change in this direction.
   [[nodiscard]] bool limited() const noexcept { return is_finite(frequency); }
 };
 
-/// The stability limits nearest to the nominal loop. Any number of crossings is examined.
+/// The stability limits nearest to the nominal loop. All crossings are examined.
 struct Margins {
   Margin gain_increase;  ///< smallest factor > 1 on L at which the loop oscillates; else infinity
-  Margin gain_decrease;  ///< largest factor in (0, 1) on L at which it does; else 0
-  Margin phase;          ///< least phase shift, rad, as lag or as lead; else infinity
-  Margin modulus;        ///< least abs(1 + L), the inverse of the peak of S
+  Margin gain_decrease;  ///< largest factor in (0, 1) on L at which it oscillates; else 0
+  Margin phase;          ///< smallest phase shift, rad, as lag or lead; else infinity
+  Margin modulus;        ///< smallest abs(1 + L), the inverse of the peak of S
 };
 
 namespace detail {
@@ -32,14 +33,14 @@ namespace detail {
 inline constexpr const char* unstable_loop_rule =
     "must be negative: the nominal loop is not stable, it has no margins";
 
-/// Keeps the least of a function of the frequency that is walked along.
+/// Finds the minimum of a function while the frequency advances.
 class LeastDistance {
  public:
-  /// @param size the function @param value it at w
+  /// @param size the function @param value its value at w
   template <class Size>
   void operator()(const Size& size, double w, double value) {
     if (!least_ || value < least_->value) least_ = Margin{value, w};
-    // The middle one of three is a local least: look between its neighbours.
+    // The middle one of three is a local minimum: search between its neighbours.
     if (seen_ >= 2 && last_.value <= before_.value && last_.value <= value &&
         last_.value < 1.5 * least_->value) {
       const double place = golden_section(size, before_.frequency, w);
@@ -51,7 +52,7 @@ class LeastDistance {
     ++seen_;
   }
 
-  /// The next frequency has nothing to do with the last.
+  /// The next frequency does not follow the last one.
   void restart() noexcept { seen_ = 0; }
 
   [[nodiscard]] const std::optional<Margin>& found() const noexcept { return least_; }
@@ -62,7 +63,7 @@ class LeastDistance {
   long seen_ = 0;
 };
 
-/// Keeps the nearest edges while the loop gain is walked along.
+/// Finds the nearest stability limits while the frequency advances.
 template <class Response>
 class MarginFinder {
  public:
@@ -73,7 +74,7 @@ class MarginFinder {
         std::min(l1.real(), l2.real()) < 0.0) {
       const double w = bisect([&](double x) { return response_(x).imag(); }, w1, w2);
       const std::complex<double> l = response_(w);
-      // Across a pole on the axis the imaginary part changes its sign at infinity.
+      // At a pole on the axis the imaginary part changes its sign at infinity.
       if (std::abs(l) < 10.0 * std::max(std::abs(l1), std::abs(l2))) real_axis(l.real(), w);
     }
     if ((std::abs(l1) < 1.0) != (std::abs(l2) < 1.0)) {
@@ -86,7 +87,7 @@ class MarginFinder {
     modulus_(size, w2, std::abs(1.0 + l2));
   }
 
-  /// A place where L crosses or touches the real axis.
+  /// Evaluates a point at which L crosses or touches the real axis.
   void real_axis(double l, double w) {
     if (!(l < 0.0)) return;
     const double factor = -1.0 / l;
@@ -111,10 +112,11 @@ class MarginFinder {
 
 /// Margins of a loop at one actuator, sampled or continuous; the other channels stay closed.
 ///
-/// Gain and phase are changed in L = -P C: in the plant, the actuator, or anywhere else in the loop
-/// except between law and observer. A phase shift turns positive frequencies by e^(-i phi).
+/// Gain and phase change in L = -P C, that is in the plant, the actuator or anywhere else in the
+/// loop, but the controller still gets its own u. A phase shift multiplies positive frequencies by
+/// e^(-i phi).
 /// @param channel 0 .. q - 1
-/// @return error for a nominal loop that is not stable, or no such channel
+/// @return error for a nominal loop that is not stable, or if there is no such channel
 inline Expected<Margins, Error<double>> margins(const Loop& loop, int channel = 0) {
   Rules<double> rules;
   rules.all_of(loop.check_channel("channel", channel))
@@ -124,7 +126,7 @@ inline Expected<Margins, Error<double>> margins(const Loop& loop, int channel = 
   const auto response = detail::loop_gain_of(loop, channel);
   detail::MarginFinder finder(response);
   detail::scan(response, detail::scan_range(loop, channel), finder);
-  // L is real at z = -1; at standstill it is infinite, as every observer integrates.
+  // L is real at z = -1; at frequency zero it is infinite, because every observer integrates.
   if (loop.sample_time() > 0.0) {
     const double nyquist = std::numbers::pi / loop.sample_time();
     const std::complex<double> l = response.at(-2.0);
@@ -142,21 +144,21 @@ Expected<Margins, Error<double>> margins(const LinearPlant<States, S, Inputs, Ou
   return margins(*loop, channel);
 }
 
-/// Range of b0 with which the loop with this plant is stable while the rest of the design stays the
-/// same; infinity if there is no limit.
+/// Range of b0 for which the loop with this plant is stable while the rest of the design stays the
+/// same; an end is infinite if there is no limit.
 ///
-/// The loop gain depends only on b / b0, with b of the plant: divided by b this is the range of b0
-/// / b, and the gain of the plant may be multiplied by b0 / upper .. b0 / lower.
-/// @return error for a nominal loop that is not stable, and a controller whose u does not go with
-///         1 / b0 (a compensator, several channels)
+/// The loop gain depends only on b / b0, where b is the plant's: divided by b this is the range of
+/// b0 / b, and the gain of the plant may be multiplied by b0 / upper .. b0 / lower.
+/// @return error for a nominal loop that is not stable, and a controller whose u is not
+///         proportional to 1 / b0 (a compensator, several channels)
 inline Expected<Interval<>, Error<double>> input_gain_range(const Loop& loop) {
   const double b0 = loop.input_gain();
   Rules<double> rules;
   rules.nonzero("input_gain", b0);
   if (!rules) {
     return Error<double>{"input_gain", b0,
-                         "must be one by which all of u is divided: this controller has none; see "
-                         "gain_increase and gain_decrease of its margins"};
+                         "does not scale all of u in this controller: use gain_increase and "
+                         "gain_decrease of its margins"};
   }
   const auto found = margins(loop);
   if (!found) return found.error();
@@ -174,12 +176,12 @@ Expected<Interval<>, Error<double>> input_gain_range(const LinearPlant<States, S
   return input_gain_range(*loop);
 }
 
-/// f > 1: the loop is stable while the loop gain at this actuator, and with it b / b0, varies in
-/// any way from sample to sample between 1/f and f times its nominal value (circle criterion: f +
-/// 1/f < (1 + abs(L)^2) / -Re L at all frequencies). The bound is sufficient, not necessary. Lag,
-/// delay and sensor count if they are part of the plant.
-/// @return the factor and the frequency that limits it; infinity where Re L is never negative;
-/// error for a nominal loop that is not stable, or no such channel
+/// The factor f > 1 such that the loop is stable while the loop gain at this actuator, and with it
+/// b / b0, varies arbitrarily from sample to sample between 1/f and f times its nominal value
+/// (circle criterion: f + 1/f < (1 + abs(L)^2) / -Re L at all frequencies). The bound is
+/// sufficient, not necessary. Lag, delay and sensor are included if they are part of the plant.
+/// @return the factor and the frequency that limits it; infinity if Re L is never negative; error
+/// for a nominal loop that is not stable, or if there is no such channel
 inline Expected<Margin, Error<double>> gain_variation(const Loop& loop, int channel = 0) {
   Rules<double> rules;
   rules.all_of(loop.check_channel("channel", channel))
@@ -187,7 +189,7 @@ inline Expected<Margin, Error<double>> gain_variation(const Loop& loop, int chan
                detail::unstable_loop_rule);
   if (!rules) return rules.error();
   const auto response = detail::loop_gain_of(loop, channel);
-  // Of f + 1/f.
+  // The bound on f + 1/f.
   const auto sum_at = [](std::complex<double> l) {
     return l.real() < 0.0 ? (1.0 + std::norm(l)) / -l.real()
                           : std::numeric_limits<double>::infinity();
@@ -206,7 +208,7 @@ inline Expected<Margin, Error<double>> gain_variation(const Loop& loop, int chan
   }
   if (!is_finite(sum.value)) return Margin{};
   const double half = 0.5 * sum.value;
-  // Of the pair f, 1/f without a difference of nearly equal numbers; never below 1.
+  // f from f + 1/f, without a difference of nearly equal numbers; never below 1.
   return Margin{half + std::sqrt(std::max((half - 1.0) * (half + 1.0), 0.0)), sum.frequency};
 }
 

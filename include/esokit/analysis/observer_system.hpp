@@ -1,9 +1,9 @@
 /// @file
-/// Observers as linear systems: from y and u, and from noise and disturbance, to each estimate.
+/// Observers as linear systems: from y and u, or from noise and disturbance, to the estimates.
 ///
-/// A sampled observer is built from its gains (`level_gain`), not by probing `update`: A - I comes
-/// out without the cancellation that A - I of a probed A has. A continuous one is probed through
-/// `derivative`, each of whose entries is one product.
+/// For a sampled observer the system is computed from its gains (`level_gain`) and not by calling
+/// `update` with unit vectors, so that A - I has no cancellation. For a continuous one it is
+/// computed by calling `derivative` with unit vectors, each entry being a single product.
 #pragma once
 
 #include <cmath>
@@ -18,7 +18,7 @@
 
 namespace esokit {
 
-/// A continuous observer, linear in its state; ContinuousLinearEso, ContinuousCascadeEso.
+/// A continuous observer that is linear in its state: ContinuousLinearEso, ContinuousCascadeEso.
 template <class T>
 concept ContinuousLinearObserver = requires(const T& observer, typename T::State z,
                                             typename T::scalar_type s) {
@@ -31,21 +31,22 @@ concept ContinuousLinearObserver = requires(const T& observer, typename T::State
 template <class T>
 concept LinearObserver = SampledLinearObserver<T> || ContinuousLinearObserver<T>;
 
-/// A sampled observer held in one mode: the gains of a switched or nonlinear law at one place.
+/// A sampled observer fixed in one mode: with the gains of a switched or nonlinear law at one
+/// innovation.
 template <int Order, int Levels = 1, int Extension = 1>
 struct FrozenObserver {
-  using scalar_type = double;                                     ///< of the gains
+  using scalar_type = double;                                     ///< type of the gains
   static constexpr int order = Order;                             ///< n, order of the plant
   static constexpr int extension = Extension;                     ///< m, extended states
   static constexpr int size = ChainSize<Order, Extension>::size;  ///< N = n + m
   static constexpr int levels = Levels;                           ///< p
-  static constexpr ObserverTraits traits{.acts_by_gain = true};   ///< beyond that
+  static constexpr ObserverTraits traits{.acts_by_gain = true};   ///< what it can do
 
   Array<ScaledGain<size, double>, Levels> gains{};  ///< current-estimator gains, scaled
   double gain_of_input{};                           ///< b0, unit of y^(n) per unit of u
   double time_step{};                               ///< T, s
 
-  /// The members by the names that an observer has for them.
+  /// The members under the names that they have in an observer.
   /// @{
   [[nodiscard]] const ScaledGain<size, double>& level_gain(int level) const noexcept {
     return gains[static_cast<std::size_t>(level)];
@@ -58,12 +59,12 @@ struct FrozenObserver {
   /// @}
 };
 
-/// A continuous gain law held in one mode, for ContinuousObserver. @tparam Size N
+/// A continuous gain law fixed in one mode, for ContinuousObserver. @tparam Size N
 template <int Size>
 struct FrozenGain {
   EigenMatrix<double, Size> value;  ///< l, row i in 1/s^(i+1)
 
-  /// l, whatever the time and the innovation.
+  /// l, for any time and innovation.
   [[nodiscard]] const EigenMatrix<double, Size>& gain(double, double) const noexcept {
     return value;
   }
@@ -71,10 +72,9 @@ struct FrozenGain {
 
 namespace detail {
 
-/// An observer in its predicted state z-, in physical units:
-///   D z- = a z- + by y + bu u,   zhat = c z- + dy y.
-/// Level i keeps its plant states and the disturbance that levels 1..i found together, so that the
-/// truth is the same for all levels.
+/// An observer with its predicted state z-, in physical units: D z- = a z- + by y + bu u,   zhat =
+///   c z- + dy y. Level i holds its plant states and the sum of the disturbances found by levels
+///   1..i, so that the true state is the same for all levels.
 template <int Order, int Extension, int Levels>
 struct ObserverMatrices {
   static constexpr int order = Order;
@@ -89,17 +89,17 @@ struct ObserverMatrices {
   double sample_time = 0.0;
 };
 
-/// Phi - I, Gamma, and what a unit of the scaled states is, in physical units.
+/// Phi - I, Gamma, and the units of the scaled states, in physical units.
 template <int Size>
 struct SampledMatrices {
   Matrix<double, Size, Size> step;
   Vector<double, Size> gamma;
-  Vector<double, Size> units;  ///< of state s
-  /// What of a correction is the disturbance's, from state to state.
+  Vector<double, Size> units;  ///< unit of each state
+  /// The part of a correction that belongs to the disturbance, as a matrix on the states.
   Matrix<double, Size, Size> disturbance = Matrix<double, Size, Size>::Zero();
 };
 
-/// Where row `row` of the estimate is among the states.
+/// Place of a row of the estimate among the states.
 template <class Observer>
 constexpr int state_of_row(int row) noexcept {
   if constexpr (SampledLinearObserver<Observer>) {
@@ -110,7 +110,7 @@ constexpr int state_of_row(int row) noexcept {
   }
 }
 
-/// Of a model that is no chain, in double whatever its scalar; without the disturbance's part.
+/// For a model that is not a chain, in double for any scalar; without the part of the disturbance.
 template <class Model>
 SampledMatrices<Model::size> model_matrices(const Model& model) {
   constexpr int size = Model::size;
@@ -133,7 +133,7 @@ SampledMatrices<Model::size> model_matrices(const Model& model) {
   return m;
 }
 
-/// In double, whatever the scalar of the observer.
+/// In double for any scalar of the observer.
 template <SampledLinearObserver Observer>
 SampledMatrices<Observer::size> sampled_matrices(const Observer& observer) {
   constexpr int size = Observer::size;
@@ -175,23 +175,23 @@ struct ObserverSizes {
   int size, levels;
 };
 
-/// What a sampled observer does, in physical units: Phi - I, Gamma, what of a correction is the
-/// disturbance's (of several levels), the gains k level by level, and where each row of the
-/// estimate is among the states.
+/// The parts of a sampled observer, in physical units: Phi - I, Gamma, the part of a correction
+/// that belongs to the disturbance (for several levels), the gains k level by level, and the place
+/// of each row of the estimate among the states.
 struct ObserverParts {
   DenseView<const double> step, gamma, disturbance;
   const double* gains;
   const int* state_of_row;
 };
 
-/// ObserverMatrices of any size, into matrices that are zero; `work` has two columns more than
-/// states.
+/// Computes ObserverMatrices of any size; the results must be zero at first. `work` has two more
+/// columns than states.
 inline void put_together(const ObserverSizes& sizes, const ObserverParts& parts,
                          DenseView<double> work, DenseView<double> a, DenseView<double> by,
                          DenseView<double> bu, DenseView<double> c, DenseView<double> dy) {
   const auto [size, levels] = sizes;
   const int states = size * levels;
-  // What a correction adds to the levels, as rows over the predicted states and y.
+  // The correction of each level, as rows over the predicted states and y.
   const DenseView<double> added{work.data, states, states};
   double* const added_y = &work(0, states);
   double* const measured = &work(0, states + 1);
@@ -206,7 +206,7 @@ inline void put_together(const ObserverSizes& sizes, const ObserverParts& parts,
       }
       added_y[first + r] = gain * measured_y;
     }
-    if (level > 0) {  // what the levels before have found of the disturbance, too
+    if (level > 0) {  // plus the corrections of the disturbance by the levels before
       for (int r = 0; r < size; ++r) {
         for (int q = 0; q < size; ++q) {
           const double share = parts.disturbance(r, q);
@@ -267,7 +267,7 @@ MatricesOf<Observer> observer_matrices(const Observer& observer, double = 0.0) {
     }
   }
   EigenMatrix<double, states, states + 2> work = EigenMatrix<double, states, states + 2>::Zero();
-  // A matrix of one column is stored by columns.
+  // Eigen stores a matrix of one column by columns.
   put_together({size, Observer::levels},
                {{sampled.step.data(), size},
                 {sampled.gamma.data(), size, 1},
@@ -289,7 +289,7 @@ requires(!SampledLinearObserver<Observer>)  //
   const S time = static_cast<S>(t);
   constexpr int order = Observer::order;
   constexpr int size = MatricesOf<Observer>::size;
-  // The observer's own states hold what each level found of the disturbance; ours the sums.
+  // The states of the observer contain the disturbance found by each level; these contain the sums.
   const auto sums = [](const State& z, int row) {
     double sum = static_cast<double>(z(row));
     if (row % size < order) return sum;
@@ -324,7 +324,8 @@ LinearSystem<Matrices::states, Inputs, Matrices::size> system_of(const Matrices&
   return system;
 }
 
-/// First input: y (or noise on it) times `sign`; second: a column given row by row.
+/// Sets the first input, y (or noise on it) times `sign`, and the second, a column given row by
+/// row.
 template <class System, class Matrices, class Column>
 void set_inputs(System& system, const Matrices& m, Column&& column, double sign = 1.0) {
   for (int i = 0; i < Matrices::states; ++i) {
@@ -338,9 +339,10 @@ void set_inputs(System& system, const Matrices& m, Column&& column, double sign 
 
 /// From (y, u) to all estimates (y, .., y^(n-1), d, .., d^(m-1)); N p states.
 ///
-/// Sampled: y[k] and the input u[k] that is held from k to k + 1 (what the next `update` is told),
-/// and the estimate right after the correction at k.
-/// @param t s, for a continuous observer whose gain changes with time: frozen there
+/// Sampled: from y[k] and the input u[k] that is held from k to k + 1 (the u_applied of the next
+/// `update`) to the estimate right after the correction at k.
+/// @param t s, for a continuous observer whose gain changes with time: the gain at this time is
+/// used
 template <LinearObserver Observer>
 auto observer_system(const Observer& observer, double t = 0.0) {
   const auto m = detail::observer_matrices(observer, t);
@@ -352,11 +354,11 @@ auto observer_system(const Observer& observer, double t = 0.0) {
   return system;
 }
 
-/// From measurement noise v and the true total disturbance d to their effect on the estimates: the
-/// errors yhat^(i) - y^(i) for rows i < n, and dhat, dhat', .. themselves.
+/// From measurement noise v and the true total disturbance d to the errors yhat^(i) - y^(i) in rows
+/// i < n, and to dhat, dhat', .. themselves.
 ///
-/// The plant is y^(n) = d + b0 u with y measured as y + v; u drops out. From d to dhat the static
-/// gain is one. Sampled: d[k] is held from k to k + 1, v[k] is on y[k].
+/// The plant is y^(n) = d + b0 u, measured as y + v; u has no effect. From d to dhat the static
+/// gain is one. Sampled: d[k] is held from k to k + 1, and v[k] adds to y[k].
 /// @param t s, as in observer_system
 template <LinearObserver Observer>
 auto estimation_system(const Observer& observer, double t = 0.0) {
@@ -367,7 +369,7 @@ auto estimation_system(const Observer& observer, double t = 0.0) {
   }
   const auto m = detail::observer_matrices(observer, t);
   auto system = detail::system_of<detail::MatricesOf<Observer>, 2>(m);
-  // In zhat - (y, .., y^(n-1), 0) the disturbance enters as -u b0 does.
+  // In zhat - (y, .., y^(n-1), 0) the disturbance enters like -b0 u.
   detail::set_inputs(system, m, [&](int i) { return -m.bu(i) / m.input_gain; });
   system.input_names = {"v", "d"};
   system.output_names = detail::estimate_names<Observer::order, Observer::extension>();
@@ -376,8 +378,8 @@ auto estimation_system(const Observer& observer, double t = 0.0) {
   return system;
 }
 
-/// From measurement noise v and w = d^(m) to the estimation errors z - zhat, all rows: zero unless
-/// the measurement is noisy or d leaves the observer's model class. Sampled: w is held from k to
+/// From measurement noise v and w = d^(m) to the estimation errors z - zhat, all rows. The errors
+/// tend to zero unless the measurement is noisy or d^(m) is not zero. Sampled: w is held from k to
 /// k + 1.
 /// @param t s, as in observer_system
 template <LinearObserver Observer>
@@ -400,7 +402,7 @@ auto error_system(const Observer& observer, double t = 0.0) {
       drive[static_cast<std::size_t>(i)] = term;
     }
   }
-  // The error is the truth minus the estimate: from -v as the estimate from y.
+  // The error is the true state minus the estimate, so v enters like -y.
   detail::set_inputs(
       system, m, [&](int i) { return drive[static_cast<std::size_t>(i % size)]; }, -1.0);
   system.input_names = {"v", "w"};

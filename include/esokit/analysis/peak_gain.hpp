@@ -1,6 +1,6 @@
 /// @file
-/// The largest output that a bounded input can cause: for a linear observer the true worst case,
-/// where a Lyapunov bound is only an upper bound.
+/// The largest output that a bounded input can cause: for a linear observer the exact worst case,
+/// while a Lyapunov bound is only an upper bound.
 #pragma once
 
 #include <cmath>
@@ -11,8 +11,8 @@ namespace esokit {
 
 namespace detail {
 
-/// `peak_gain` on the caller's storage. @param fastest largest size of a pole, of a continuous one
-/// @param work 3 n^2 + 2 n
+/// `peak_gain` on the caller's storage.
+/// @param fastest largest magnitude of a pole, for a continuous system @param work 3 n^2 + 2 n
 inline Check<double> peak_gain(const SystemView& system, double abscissa, double fastest,
                                const DenseView<double>& peak, double* work) {
   if (auto ok = check_system(system); !ok) return ok;
@@ -34,7 +34,7 @@ inline Check<double> peak_gain(const SystemView& system, double abscissa, double
     for (int r = 0; r < system.outputs(); ++r) peak(r, input) = std::abs(system.d(r, input));
     for (int i = 0; i < n; ++i) x[i] = system.b(i, input);
     for (long k = 0;; ++k) {
-      // The trapezoid rule counts the first value half; a sampled sum counts it whole.
+      // The trapezoid rule takes half of the first value, the sum of a sampled system all of it.
       const double weight = system.sampled() || k > 0 ? step : 0.5 * step;
       bool ended = true;
       for (int r = 0; r < system.outputs(); ++r) {
@@ -45,13 +45,14 @@ inline Check<double> peak_gain(const SystemView& system, double abscissa, double
           size += std::abs(system.c(r, i) * x[i]);
         }
         peak(r, input) += weight * std::abs(response);
-        // Relative to the end of a geometric sum.
+        // Relative to the remainder of a geometric series.
         const double slowest = system.sampled() ? -abscissa : -abscissa * step;
         if (size * step > 1e-9 * slowest * peak(r, input)) ended = false;
       }
       if (ended && k > 2 * n) break;
       if (k > 100'000'000L) {
-        return Error<double>{"stability_abscissa", abscissa, "is too slow for the sum to end"};
+        return Error<double>{"stability_abscissa", abscissa,
+                             "is too close to zero: the sum does not converge"};
       }
       for (int i = 0; i < n; ++i) {
         double sum = x[i];
@@ -71,14 +72,14 @@ inline Check<double> peak_gain(const SystemView& system, double abscissa, double
 
 }  // namespace detail
 
-/// Peak of each output for an input of size one, Outputs x Inputs: the sum (integral) of the
-/// magnitude of the impulse response. This is sharp: inputs of size one come arbitrarily near to
-/// it.
+/// Peak of each output for each input of magnitude up to one, Outputs x Inputs: the sum (integral)
+/// of the magnitude of the impulse response. This bound is sharp: some input of magnitude one comes
+/// arbitrarily close to it.
 ///
-/// Sampled systems: to 1e-9, where the sum is broken off. Continuous ones: by the trapezoid rule,
-/// to about 1e-4.
+/// Accuracy: sampled systems 1e-9, at which the sum is truncated; continuous ones, by the trapezoid
+/// rule, about 1e-4.
 /// @return error for a system that is not stable, or whose response lasts longer than 1e8 steps or
-///         is beyond the scalar
+///         overflows
 template <int States, int Inputs, int Outputs>
 Expected<EigenMatrix<double, Outputs, Inputs>, Error<double>> peak_gain(
     const LinearSystem<States, Inputs, Outputs>& system) {
@@ -94,7 +95,7 @@ Expected<EigenMatrix<double, Outputs, Inputs>, Error<double>> peak_gain(
   return peak;
 }
 
-/// The same of a system whose sizes are known at run time.
+/// The same for a system whose sizes are known at run time.
 inline Expected<DynamicMatrix<double>, Error<double>> peak_gain(const DynamicSystem& system) {
   double fastest = 0.0;
   for (const std::complex<double>& p : poles(system)) fastest = std::max(fastest, std::abs(p));

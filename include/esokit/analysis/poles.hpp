@@ -14,7 +14,7 @@ namespace esokit {
 
 namespace detail {
 
-/// How far the worst of some poles is on the stable side, as stability_abscissa says.
+/// stability_abscissa of the given poles.
 inline double worst_pole(const std::complex<double>* poles, std::size_t count,
                          bool sampled) noexcept {
   double worst = -std::numeric_limits<double>::infinity();
@@ -29,7 +29,7 @@ inline double worst_pole(const std::complex<double>* poles, std::size_t count,
   return worst;
 }
 
-/// Poles of a matrix as LinearSystem keeps it; not finite if they cannot be found.
+/// Poles of a matrix as stored in LinearSystem; not finite if the iteration fails.
 inline std::vector<std::complex<double>> poles_of(const DynamicMatrix<double>& a) {
   DynamicMatrix<std::complex<double>> work(a.rows(), a.rows());
   for (int j = 0; j < a.rows(); ++j) {
@@ -44,8 +44,9 @@ inline std::vector<std::complex<double>> poles_of(const DynamicMatrix<double>& a
 
 }  // namespace detail
 
-/// Poles: eigenvalues of A for a continuous system (1/s); for a sampled one z - 1, which keeps the
-/// digits of slow poles. N poles in one place come out spread by about eps^(1/N) of their size.
+/// Poles of a system: for a continuous one the eigenvalues of A (1/s), for a sampled one z - 1,
+/// which keeps the digits of slow poles. N equal poles are computed with a spread of about
+/// eps^(1/N) of their size.
 template <int States, int Inputs, int Outputs>
 EigenMatrix<std::complex<double>, States> poles(
     const LinearSystem<States, Inputs, Outputs>& system) {
@@ -61,8 +62,8 @@ EigenMatrix<std::complex<double>, States> poles(
   return values;
 }
 
-/// Distance of the worst pole from the stability limit: negative is stable. The largest real part
-/// (1/s), or for a sampled system the largest |z| - 1.
+/// Distance of the worst pole from the stability limit, negative if stable: the largest real part
+/// (1/s), for a sampled system the largest |z| - 1.
 template <int States, int Inputs, int Outputs>
 double stability_abscissa(const LinearSystem<States, Inputs, Outputs>& system) {
   const auto values = poles(system);

@@ -11,23 +11,24 @@
 
 namespace esokit {
 
-/// A worst value and the parameters of the plant at which it was found.
+/// A worst value and the parameters of the plant for which it was found.
 template <std::size_t Count>
 struct Worst {
-  double value = 0.0;                 ///< in the unit of what is asked for
-  Array<double, Count> parameters{};  ///< of the plant
+  double value = 0.0;                 ///< unit of the margin
+  Array<double, Count> parameters{};  ///< parameters of the plant
 };
 
-/// The worst values over the plants, each with its own plant. If the loop of any plant is unstable,
-/// there are no margins: they have the values of a loop at the stability limit, modulus 0.
+/// The worst values over all plants, each with the plant at which it occurs. If the loop of any
+/// plant is unstable, there are no margins: they then have the values of a loop at the stability
+/// limit, for example modulus 0.
 template <std::size_t Count>
 struct WorstCase {
   Worst<Count> stability_abscissa;  ///< the largest; if negative, every loop was stable
-  Worst<Count> modulus;             ///< least abs(1 + L)
-  Worst<Count> gain_increase;       ///< least factor > 1 on L that makes a loop oscillate
-  Worst<Count> gain_decrease;       ///< greatest factor below 1 that does
-  Worst<Count> phase;               ///< least phase shift, rad
-  Worst<Count> delay;               ///< least further delay, s
+  Worst<Count> modulus;             ///< smallest abs(1 + L)
+  Worst<Count> gain_increase;       ///< smallest factor > 1 on L that makes a loop oscillate
+  Worst<Count> gain_decrease;       ///< largest factor below 1 that does so
+  Worst<Count> phase;               ///< smallest phase shift, rad
+  Worst<Count> delay;               ///< smallest additional delay, s
 
   /// True if every tested loop is stable.
   [[nodiscard]] bool stable() const noexcept { return stability_abscissa.value < 0.0; }
@@ -35,10 +36,11 @@ struct WorstCase {
 
 namespace detail {
 
-/// What is compared of one plant, the larger the worse: abscissa, and margins with their sign.
+/// The values of one plant that are compared, larger being worse: abscissa, and margins with a
+/// suitable sign.
 using Badness = std::array<double, 6>;
 
-/// @param worst is written
+/// Computes the values of one loop. @param worst is written
 inline Check<double> judge(const LoopResult& loop, Badness& worst) {
   if (!loop) return loop.error();
   const double abscissa = loop->stability_abscissa();
@@ -61,19 +63,20 @@ inline Check<double> judge(const LoopResult& loop, Badness& worst) {
   return {};
 }
 
-/// The worst of each kind so far, and where.
+/// The worst of each kind so far, and its parameters.
 struct Found {
   Badness value{};
   std::array<std::vector<double>, 6> at{};
 };
 
-/// What is looked at: `look(study, parameters, worst)`, see `judge`.
+/// The plants to be studied: `look(study, parameters, worst)`, see `judge`.
 struct PlantStudy {
   const void* study;
   Check<double> (*look)(const void*, const std::vector<double>&, Badness&);
 };
 
-/// Every point of a grid over the ranges, then from the worst of each kind in steps that halve.
+/// Evaluates every point of a grid over the ranges, then searches from the worst of each kind in
+/// steps that are halved.
 inline Check<double> find_worst(const PlantStudy& plants, const std::vector<Interval<>>& ranges,
                                 int points, int halvings, Found& found) {
   const std::size_t count = ranges.size();
@@ -121,18 +124,18 @@ inline Check<double> find_worst(const PlantStudy& plants, const std::vector<Inte
 
 }  // namespace detail
 
-/// How thorough the search is.
+/// The effort of the search.
 struct WorstCaseSearch {
-  int points = 5;    ///< of each parameter, ends included; points^parameters loops
-  int halvings = 6;  ///< of the steps of the search from the worst of them, for each kind; may be 0
+  int points = 5;    ///< points per parameter, ends included; points^parameters loops
+  int halvings = 6;  ///< halvings of the step in the search from the worst points; may be 0
 };
 
-/// The worst margins over a box of plants: every point of a grid, and from the worst points a
-/// search in steps that halve. This is not a proof: between the points the margins may be worse.
-/// @param plant_of the plant of an Array<double, Count> of parameters: a LinearPlant, or an
-/// Expected
-///        of one @param ranges of the parameters
-/// @return error for an empty range, and that of the first plant that makes no loop
+/// The worst margins over a box of plant parameters: at every point of a grid, and by a search from
+/// the worst points in steps that are halved. This is not a proof: between the points the margins
+/// may be worse.
+/// @param plant_of function from an Array<double, Count> of parameters to a LinearPlant, or to an
+/// Expected of one @param ranges of the parameters
+/// @return error for an empty range, or the error of the first plant that does not form a loop
 template <class PlantOf, std::size_t Count, class Controller>
 Expected<WorstCase<Count>, Error<double>> worst_case(PlantOf&& plant_of,
                                                      const std::array<Interval<>, Count>& ranges,
@@ -149,7 +152,7 @@ Expected<WorstCase<Count>, Error<double>> worst_case(PlantOf&& plant_of,
     rules.finite("ranges", ranges[i].lower, index)
         .finite("ranges", ranges[i].upper, index)
         .require(!(ranges[i].lower > ranges[i].upper), "ranges", ranges[i].lower,
-                 "must not end below their start", index);
+                 "must not be above upper", index);
   }
   if (!rules) return rules.error();
   const auto look = [&](const std::vector<double>& at, detail::Badness& worst) -> Check<double> {

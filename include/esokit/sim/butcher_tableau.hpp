@@ -10,8 +10,8 @@
 
 namespace esokit::sim {
 
-/// The constants of a method: `stages`, `order`, the stage weights `a` (stages x stages), the
-/// result weights `b` (stages) and the nodes `c` (stages).
+/// The constants of a Runge-Kutta method: `stages`, `order`, the stage weights `a` (stages x
+/// stages), the result weights `b` (stages) and the nodes `c` (stages).
 template <class Method>
 concept ButcherTableau = requires {
   { Method::stages } -> std::convertible_to<int>;
@@ -32,7 +32,7 @@ concept ButcherTableau = requires {
 
 namespace detail {
 
-/// A tableau entry, of whatever type the method keeps it in.
+/// A tableau entry as long double.
 template <class T>
 constexpr long double entry(T value) {
   return static_cast<long double>(value);
@@ -40,7 +40,7 @@ constexpr long double entry(T value) {
 
 }  // namespace detail
 
-/// True if no stage needs itself or a later one.
+/// True if no stage depends on itself or a later one.
 template <ButcherTableau Method>
 consteval bool is_explicit() {
   for (std::size_t i = 0; i < Method::stages; ++i) {
@@ -51,8 +51,8 @@ consteval bool is_explicit() {
   return true;
 }
 
-/// The order of accuracy that the tableau has, found from the order conditions; at most 4, since
-/// conditions beyond order 4 are not tested. Zero if the tableau is not consistent.
+/// The order of accuracy of the tableau, from the order conditions; at most 4, because conditions
+/// beyond order 4 are not tested. Zero if the tableau is not consistent.
 ///
 /// Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed.,
 /// II.2, Table 2.2. The coefficients may be rounded to double.
@@ -61,7 +61,7 @@ consteval int proven_order() {
   const auto holds = [](long double sum, long double target) {
     return sum - target < 1e-14L && target - sum < 1e-14L;
   };
-  // The order conditions of systems in t rest on every node being the sum of its row.
+  // For time-dependent systems the order conditions require each node to be the sum of its row.
   long double b = 0, bc = 0, bc2 = 0, bac = 0, bc3 = 0, bcac = 0, bac2 = 0, baac = 0;
   for (std::size_t i = 0; i < Method::stages; ++i) {
     long double row = 0, ac = 0, ac2 = 0, aac = 0;
@@ -95,7 +95,7 @@ consteval int proven_order() {
   return 4;
 }
 
-/// An explicit method with the order that it claims (order conditions are tested up to 4).
+/// An explicit method that has the order it claims (order conditions are tested up to 4).
 template <class Method>
 concept ExplicitRungeKutta = ButcherTableau<Method> && is_explicit<Method>() &&
                              (proven_order<Method>() >= (Method::order < 4 ? Method::order : 4)) &&

@@ -1,6 +1,6 @@
 /// @file
 /// Closed loops of a plant, an observer and a control law in two forms: ContinuousLoop as in the
-/// papers (one stacked ODE), SampledLoop as deployed.
+/// papers (one stacked ODE), SampledLoop as on the real system.
 #pragma once
 
 #include <cmath>
@@ -41,7 +41,7 @@ concept SampledObserverModel = std::copyable<O> &&
   { constant.sample_time() } -> std::convertible_to<typename O::scalar_type>;
 };
 
-/// Measurement noise of a simulation: `at(k)` is its value during step k, such as HeldNoise.
+/// Measurement noise of a simulation, such as HeldNoise: `at(k)` is its value during step k.
 template <class N, class ScalarType>
 concept NoiseSource = std::copyable<N> && requires(N& noise, std::int64_t k) {
   { noise.at(k) } -> std::convertible_to<ScalarType>;
@@ -53,13 +53,14 @@ concept MeasurementMap = requires(const M& map, const ScalarType& s) {
   { map(s, s, s) } -> std::convertible_to<ScalarType>;
 };
 
-/// u(t, estimate). It must be pure: the continuous loop calls it at times between steps.
+/// u(t, estimate). It must be a pure function, because the continuous loop also calls it at times
+/// between steps.
 template <class L, class ScalarType, class Estimate>
 concept ControlFunction = requires(const L& law, const ScalarType& t, const Estimate& estimate) {
   { law(t, estimate) } -> std::convertible_to<ScalarType>;
 };
 
-/// Output-based form: the measured output, y + v.
+/// Output-based form: the observer gets the measured output, y + v.
 struct MeasuredOutput {
   /// y + v.
   template <PlainScalar ScalarType>
@@ -68,8 +69,8 @@ struct MeasuredOutput {
   }
 };
 
-/// Error-based form: the measured error, y_d(t) - (y + v). The observer then takes the input gain
-/// -b0. `MeasuredError{reference}`.
+/// Error-based form: the observer gets the measured error, y_d(t) - (y + v), and needs the input
+/// gain -b0. Use `MeasuredError{reference}`.
 template <class Reference>
 struct MeasuredError {
   Reference reference;  ///< y_d(t), a Signal
@@ -92,29 +93,29 @@ struct NoNoise {
   constexpr int at(std::int64_t /*k*/) const noexcept { return 0; }
 };
 
-/// The loop at t = start + k step. Measurement, input and estimate belong together; the input is
-/// the one that acts from t on.
+/// The loop at t = start + k step. Measurement, input and estimate belong to the same time; the
+/// input acts from t on.
 template <Plant P, class Observer>
 struct LoopSample {
-  using ScalarType = typename P::State::Scalar;  ///< of the plant
+  using ScalarType = typename P::State::Scalar;  ///< scalar of the plant
 
   std::int64_t index{};                    ///< k
   ScalarType t{};                          ///< s
   typename P::State plant_state{};         ///< x(t)
   ScalarType output{};                     ///< y(t), without noise
-  ScalarType measurement{};                ///< what the observer was fed
+  ScalarType measurement{};                ///< what the observer got
   ScalarType input{};                      ///< u
   typename Observer::Estimate estimate{};  ///< (y, .., d, ..)
   StepStatus status = StepStatus::ok;      ///< status of a sampled observer's update
 };
 
-/// How a run ended.
+/// The end of a run.
 template <Plant P, class ObserverEnd>
 struct LoopEnd {
   typename P::State::Scalar t{};    ///< s
   std::int64_t steps{};             ///< steps carried out
   typename P::State plant_state{};  ///< x(t)
-  ObserverEnd observer;             ///< its state (continuous), or the observer (sampled)
+  ObserverEnd observer;             ///< observer state (continuous), or the observer (sampled)
   bool completed = true;            ///< false if the callback stopped the run
 };
 
@@ -130,9 +131,9 @@ auto check_state(const char* field, const State& state) {
 
 }  // namespace detail
 
-/// The form of the papers: plant and continuous observer stacked into one ODE and integrated with a
-/// fixed step. Measurement and control are functions of the running state, so they change within a
-/// step; the noise is held over it.
+/// The loop as in the papers: plant and continuous observer are stacked into one ODE and integrated
+/// with a fixed step. Measurement and control are functions of the present state, so they change
+/// within a step; the noise is held over a step.
 ///
 /// ```
 /// const ContinuousLoop loop{plant, observer, [&](double, const auto& zhat) { return .. }};
@@ -144,7 +145,7 @@ requires ControlFunction<Law, typename P::State::Scalar, typename Observer::Esti
     MeasurementMap<Measurement, typename P::State::Scalar> &&
     NoiseSource<Noise, typename P::State::Scalar>
 struct ContinuousLoop {
-  using ScalarType = typename P::State::Scalar;      ///< of the plant
+  using ScalarType = typename P::State::Scalar;      ///< scalar of the plant
   using Sample = LoopSample<P, Observer>;            ///< what the callback gets
   using End = LoopEnd<P, typename Observer::State>;  ///< what `run` returns
 
@@ -157,15 +158,15 @@ struct ContinuousLoop {
     typename Observer::State observer_state = Observer::State::Zero();  ///< z at the start
   };
 
-  P plant;                    ///< copied into the loop, as all of these
-  Observer observer;          ///< its equations
+  P plant;                    ///< copied into the loop, like all members
+  Observer observer;          ///< equations of the observer
   Law law;                    ///< u(t, estimate)
   Measurement measurement{};  ///< what the observer is fed
   Noise noise{};              ///< v, held over a step
 
   /// Runs from the config's states; equal runs give equal results. `on_sample(const Sample&)` is
   /// called at the start of each step and at the end; if it returns a bool, false stops the run.
-  /// @return how it ended, or an error that names the field of the config
+  /// @return the end of the run, or an error that names the field of the config
   template <ExplicitRungeKutta Method = RungeKutta4, std::invocable<const Sample&> Callback>
   Expected<End, Error<ScalarType>> run(const Config& config, Callback&& on_sample) const {
     if (Rules<ScalarType> rules; !rules.positive("step", config.step)) return rules.error();
@@ -225,7 +226,7 @@ struct ContinuousLoop {
   }
 };
 
-/// ContinuousLoop{plant, observer, law}, where need be with measurement and noise.
+/// ContinuousLoop{plant, observer, law}, optionally with measurement and noise.
 /// @{
 template <class P, class Observer, class Law>
 ContinuousLoop(P, Observer, Law) -> ContinuousLoop<P, Observer, Law>;
@@ -236,9 +237,9 @@ ContinuousLoop(P, Observer, Law, Measurement, Noise)
     -> ContinuousLoop<P, Observer, Law, Measurement, Noise>;
 /// @}
 
-/// The deployed form: at each sample the observer is updated with the measurement and the input
-/// that was held until now, and the law is computed once. Its u is held for a sample time, over
-/// which the plant alone is integrated.
+/// The loop as on the real system: at each sample the observer is updated with the measurement and
+/// the input that was held until now, and the law is computed once. Its u is held for a sample
+/// time, over which only the plant is integrated.
 ///
 /// A law with limits returns the limited u, because the actuator holds what the law returns.
 template <Plant P, SampledObserverModel Observer, class Law, class Measurement = MeasuredOutput,
@@ -247,7 +248,7 @@ requires ControlFunction<Law, typename P::State::Scalar, typename Observer::Esti
     MeasurementMap<Measurement, typename P::State::Scalar> &&
     NoiseSource<Noise, typename P::State::Scalar>
 struct SampledLoop {
-  using ScalarType = typename P::State::Scalar;  ///< of the plant
+  using ScalarType = typename P::State::Scalar;  ///< scalar of the plant
   using Sample = LoopSample<P, Observer>;        ///< what the callback gets
   using End = LoopEnd<P, Observer>;              ///< what `run` returns
 
@@ -255,20 +256,20 @@ struct SampledLoop {
   struct Config {
     ScalarType duration{};       ///< s, a whole multiple of `sample_time`
     ScalarType sample_time{};    ///< T, s; that of the observer
-    int substeps = 1;            ///< integration steps of the plant a sample, 1 or more
+    int substeps = 1;            ///< integration steps of the plant per sample, 1 or more
     ScalarType start_time{};     ///< s
     ScalarType initial_input{};  ///< u that was held before the start
     typename P::State plant_state = P::State::Zero();  ///< x at the start
   };
 
-  P plant;                    ///< copied into the loop, as all of these
-  Observer observer;          ///< in the state it has one sample before the start
+  P plant;                    ///< copied into the loop, like all members
+  Observer observer;          ///< with its state one sample before the start
   Law law;                    ///< u(t, estimate), called once a sample
   Measurement measurement{};  ///< what the observer is fed
-  Noise noise{};              ///< v, one value a sample
+  Noise noise{};              ///< v, one value per sample
 
-  /// As ContinuousLoop::run; `on_sample` is called once a sample and at the end, after the update.
-  /// The callback sees the samples only, not what the plant does between them.
+  /// Same as ContinuousLoop::run; `on_sample` is called once a sample and at the end, after the
+  /// update. It sees the samples only, not the plant between them.
   template <ExplicitRungeKutta Method = RungeKutta4, std::invocable<const Sample&> Callback>
   Expected<End, Error<ScalarType>> run(const Config& config, Callback&& on_sample) const {
     const auto own = static_cast<typename Observer::scalar_type>(observer.sample_time());
@@ -322,7 +323,7 @@ struct SampledLoop {
   }
 };
 
-/// SampledLoop{plant, observer, law}, where need be with measurement and noise.
+/// SampledLoop{plant, observer, law}, optionally with measurement and noise.
 /// @{
 template <class P, class Observer, class Law>
 SampledLoop(P, Observer, Law) -> SampledLoop<P, Observer, Law>;

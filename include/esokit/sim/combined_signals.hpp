@@ -8,7 +8,7 @@
 
 namespace esokit::sim {
 
-/// s(t) = first(t) + second(t). An aggregate, because nothing can be wrong with it: `Sum{a, b}`.
+/// s(t) = first(t) + second(t). An aggregate, because it cannot be invalid: `Sum{a, b}`.
 template <class First, class Second>
 struct Sum {
   First first;    ///< a Signal

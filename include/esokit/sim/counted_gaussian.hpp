@@ -1,5 +1,5 @@
 /// @file
-/// Random numbers by counter: number k of run r is a function of (seed, stream, r, k) alone, so
+/// Counter-based random numbers: number k of run r is a function of (seed, stream, r, k) only, so
 /// that runs may be computed in any order, on any thread and in any lane.
 #pragma once
 
@@ -18,14 +18,14 @@ namespace esokit::sim {
 namespace detail {
 
 /// Threefry-2x64 with 13 rounds: J. Salmon, M. Moraes, R. Dror, D. Shaw, "Parallel random numbers:
-/// as easy as 1, 2, 3", SC 2011, doi:10.1145/2063384.2063405. It passes BigCrush with 13 rounds.
-/// Sums, rotations and `xor` alone: what AVX2 has for 64-bit words (it has no product of them).
+/// as easy as 1, 2, 3", SC 2011, doi:10.1145/2063384.2063405. With 13 rounds it passes BigCrush. It
+/// uses only sums, rotations and `xor`, which AVX2 has for 64-bit words (it has no 64-bit product).
 class Threefry {
  public:
   explicit constexpr Threefry(std::uint64_t key0, std::uint64_t key1) noexcept
       : key_{key0, key1, 0x1BD11BDAA9FC1A22u ^ key0 ^ key1} {}
 
-  /// The two counters become two words of 64 random bits.
+  /// Replaces the two counters by two words of 64 random bits.
   /// @tparam Word std::uint64_t or a vector of them
   template <class Word>
   ESOKIT_INLINE constexpr void operator()(Word& x0, Word& x1) const noexcept {
@@ -48,7 +48,7 @@ class Threefry {
   std::array<std::uint64_t, 3> key_;
 };
 
-/// sqrt of a number or a register, rounded correctly by all of these.
+/// sqrt of a number or of a register, correctly rounded.
 template <class Real>
 ESOKIT_INLINE Real square_root(const Real& x) noexcept {
   if constexpr (std::is_same_v<Real, double>) {
@@ -67,13 +67,13 @@ ESOKIT_INLINE Real square_root(const Real& x) noexcept {
   }
 }
 
-/// log of a normal number above 0, within 1 ulp; with the polynomial of fdlibm (e_log.c).
+/// log of a positive normal number, accurate to 1 ulp; with the polynomial of fdlibm (e_log.c).
 template <class Word, class Real>
 ESOKIT_INLINE Real logarithm(const Real& x) noexcept {
   // x = 2^k (1 + f), 1 + f in sqrt(1/2) .. sqrt(2)
   constexpr std::uint64_t half_root = 0x3FE6A09E667F3BCDu;  // of sqrt(1/2)
   const Word shifted = std::bit_cast<Word>(x) - half_root;
-  // k + 1023 in the last digits of 2^52.
+  // k + 1023, from the last digits of 2^52 + k + 1023.
   const Real k =
       std::bit_cast<Real>(((shifted + 0x3FF0000000000000u) >> 52u) | 0x4330000000000000u) -
       4503599627371519.0;
@@ -91,8 +91,8 @@ ESOKIT_INLINE Real logarithm(const Real& x) noexcept {
          ((square - (s * (square + (odd + even)) + k * 1.90821492927058770002e-10)) - f);
 }
 
-/// cos and sin of half_turns pi / 2, abs(half_turns) up to 1/2; polynomials of fdlibm (k_cos.c,
-/// k_sin.c), a few ulp.
+/// cos and sin of quarter_turns pi / 2 for abs(quarter_turns) up to 1/2, accurate to a few ulp;
+/// with the polynomials of fdlibm (k_cos.c, k_sin.c).
 template <class Real>
 ESOKIT_INLINE void cosine_and_sine(const Real& quarter_turns, Real& cosine, Real& sine) noexcept {
   const Real x = quarter_turns * 1.5707963267948966;
@@ -116,15 +116,16 @@ ESOKIT_INLINE void cosine_and_sine(const Real& quarter_turns, Real& cosine, Real
       1.0;
 }
 
-/// Two independent standard normal numbers of a word of random bits (Box and Muller): without a
-/// branch, thus the same in a register as alone. 40 bits make the radius, which ends at 7.45
-/// deviations, 24 the angle.
+/// Two independent standard normal numbers from a word of random bits (Box-Muller method), without
+/// a branch, so that the result is the same in a register and alone. 40 bits give the radius, which
+/// is at most 7.45 standard deviations, 24 bits the angle.
 template <class Word, class Real>
 ESOKIT_INLINE void normal_pair(const Word& bits, Real& first, Real& second) noexcept {
-  constexpr std::uint64_t one = 0x3FF0000000000000u;  // 1.0: with digits behind it in [1, 2)
+  constexpr std::uint64_t one = 0x3FF0000000000000u;  // bits of 1.0
   const Real share = 2.0 - std::bit_cast<Real>(((bits >> 12u) & 0x000FFFFFFFFFF000u) | one);
   const Real radius = square_root<Real>(logarithm<Word, Real>(share) * -2.0);
-  // A quarter of the circle around the first axis; the last two bits turn it to all four.
+  // An angle in the quarter circle around the first axis; the last two bits select one of the four
+  // quarters.
   const Real turn =
       std::bit_cast<Real>(((bits << 28u) & 0x000FFFFFC0000000u) | one) - (1.5 - 0x1p-23);
   Real cosine;
@@ -143,23 +144,25 @@ ESOKIT_INLINE void normal_pair(const Word& bits, Real& first, Real& second) noex
 
 /// The purpose of random numbers: numbers of one run for different purposes are independent.
 enum class RandomStream : std::uint64_t {
-  noise = 0,             ///< of the measurement; output i: noise + i
+  noise = 0,             ///< measurement noise; output i uses noise + i
   losses = 1u << 20u,    ///< which measurements are missing
-  jitter = 2u << 20u,    ///< of the sample time
+  jitter = 2u << 20u,    ///< jitter of the sample time
   variation = 3u << 20u  ///< of plant and controller from run to run
 };
 
-/// Random numbers of runs. Each call gives one number for each lane; lane i has the numbers of run
-/// `run` + i for any number of lanes (bit for bit if the compiler does not fuse products and sums,
-/// -ffp-contract=off). Number k is a function of (seed, stream, run, k) alone.
+/// The random numbers of a run, or of the runs in the lanes of a pack. Each call gives one number
+/// for each lane; lane i has the numbers of run `run` + i for any number of lanes (bit for bit with
+/// -ffp-contract=off: the compiler must not fuse products and sums). Number k is a function of
+/// (seed, stream, run, k) only.
 ///
-/// Threefry-2x64-13 gives the bits, Box and Muller make them normal: 3 ns a number with AVX2.
-/// Always made in double.
+/// Threefry-2x64-13 generates the bits, the Box-Muller method converts them: 3 ns per number with
+/// AVX2. Always computed in double.
 template <Scalar S = double>
 class CountedGaussian {
  public:
-  /// @param seed any number @param stream the purpose @param run of the first lane
-  /// @param index of the output, where there are several
+  /// @param seed any number @param stream the purpose @param run number of the run in the first
+  /// lane
+  /// @param index number of the output, if there are several
   CountedGaussian(std::uint64_t seed, RandomStream stream, std::uint64_t run,
                   int index = 0) noexcept
       : generator_(seed, static_cast<std::uint64_t>(stream) + static_cast<std::uint64_t>(index)),
@@ -177,9 +180,9 @@ class CountedGaussian {
     S number;
     for (int lane = 0; lane < lane_count<S>; ++lane) {
       std::uint64_t first = run_ + static_cast<std::uint64_t>(lane);
-      std::uint64_t second = ~uniforms_;  // from the other end: apart from the normal ones
+      std::uint64_t second = ~uniforms_;  // independent of the normal numbers
       generator_(first, second);
-      constexpr int digits = std::numeric_limits<LaneScalar<S>>::digits;  // that it holds
+      constexpr int digits = std::numeric_limits<LaneScalar<S>>::digits;  // digits of the scalar
       const double share = std::ldexp(static_cast<double>(first >> (64 - digits)), -digits);
       esokit::detail::set_lane(number, static_cast<LaneScalar<S>>(share), lane);
     }
@@ -188,8 +191,8 @@ class CountedGaussian {
   }
 
  private:
-  static constexpr int blocks = 8;         ///< calls of the generator at once
-  static constexpr int size = 4 * blocks;  ///< numbers of a lane that they give
+  static constexpr int blocks = 8;         ///< calls of the generator at a time
+  static constexpr int size = 4 * blocks;  ///< numbers per lane that they give
 
   [[gnu::noinline]] void fill() noexcept {
     if constexpr (lane_count<S> == 1) {
@@ -233,8 +236,8 @@ class CountedGaussian {
 
   detail::Threefry generator_;
   std::uint64_t run_;
-  std::uint64_t next_ = 0;      ///< of the generator's second counter
-  std::uint64_t uniforms_ = 0;  ///< that have been given
+  std::uint64_t next_ = 0;      ///< next value of the generator's second counter
+  std::uint64_t uniforms_ = 0;  ///< number of uniform numbers so far
   int left_ = 0;
   std::array<S, size> numbers_;
 };

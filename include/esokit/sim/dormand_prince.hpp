@@ -1,5 +1,5 @@
 /// @file
-/// The method of Dormand and Prince, with fixed steps or steps adapted to the error.
+/// The method of Dormand and Prince, with fixed or error-controlled steps.
 #pragma once
 
 #include <algorithm>
@@ -35,19 +35,19 @@ struct DormandPrince {
       71 / 57600.0L, 0, -71 / 16695.0L, 71 / 1920.0L, -17253 / 339200.0L, 22 / 525.0L, -1 / 40.0L};
 };
 
-/// Steps by DormandPrince with a length adapted to the error: the result is x5, and each element of
-/// x5 - x4 must be within max(absolute_tolerance, relative_tolerance M), M the largest magnitude
-/// which that element has had so far. With q the largest ratio of the two,
+/// DormandPrince with error-controlled steps: the result is x5, and each element of x5 - x4 must be
+/// within max(absolute_tolerance, relative_tolerance M), where M is the largest magnitude of this
+/// element so far. With q, the largest ratio of error to tolerance,
 /// - a step with q <= 1 is accepted; the next is q^(-1/5) / 1.25 times as long, at most five times,
-///   and not longer if the step had been refused before;
-/// - a step with q > 1 is tried again at max(0.1, 0.8 q^(-1/5)) times its length, the second time
-///   and later at half;
-/// - the first step is 0.8 relative_tolerance^(1/5) times the least of M / |x'|, where M is not
-///   below absolute_tolerance / relative_tolerance;
-/// - a step that `end` cuts short does not shorten the next.
+///   and not longer if the step was refused before;
+/// - a step with q > 1 is repeated with max(0.1, 0.8 q^(-1/5)) times its length, from the second
+///   time on with half the length;
+/// - the first step is 0.8 relative_tolerance^(1/5) times the smallest M / |x'|, where M is at
+///   least absolute_tolerance / relative_tolerance;
+/// - a step that is shortened to reach `end` does not shorten the next.
 ///
-/// The right-hand side may jump at `end`, because no value of it is kept. One object integrates one
-/// trajectory.
+/// The right-hand side may jump at `end`, because none of its values is kept for the next step. One
+/// object integrates one trajectory.
 /// @tparam State a fixed Eigen vector
 template <class State>
 class VariableStep {
@@ -60,7 +60,7 @@ class VariableStep {
     ScalarType absolute_tolerance = static_cast<ScalarType>(1e-6);  ///< unit of the state
   };
 
-  /// Refuses tolerances that are not positive, and a relative one of 1 or more.
+  /// Refuses tolerances that are not positive, and a relative tolerance of 1 or more.
   static Expected<VariableStep, Error<ScalarType>> make(const Config& config) {
     Rules<ScalarType> rules;
     rules.positive("relative_tolerance", config.relative_tolerance)
@@ -71,9 +71,9 @@ class VariableStep {
     return VariableStep(config);
   }
 
-  /// One accepted step of x' = rhs(t, x) from t, to `end` at most.
-  /// @param rhs as in `step` @param t s, below `end` @param x state at t; at the new time
-  /// afterwards
+  /// One accepted step of x' = rhs(t, x) from t, at most to `end`.
+  /// @param rhs as in `step` @param t s, below `end` @param x in: state at t, out: state at the new
+  /// time
   /// @param end s, reached exactly
   /// @return the new time, s; or an error, with x unchanged, if the step would fall below the
   /// resolution of time because the solution or rhs jumps or is not finite
@@ -96,9 +96,10 @@ class VariableStep {
       const bool cut = !(t + h < end);
       if (cut) h = end - t;
       if (!(t + h > t)) {
-        return Error<ScalarType>{.field = "t",
-                                 .value = t,
-                                 .rule = "is where the step falls below the resolution of time"};
+        return Error<ScalarType>{
+            .field = "t",
+            .value = t,
+            .rule = "is the time at which the step falls below the resolution of time"};
       }
       State difference = State::Zero();
       const State result = stages(rhs, t, x, h, difference);
@@ -124,7 +125,7 @@ class VariableStep {
   static constexpr ScalarType fraction(double value) { return static_cast<ScalarType>(value); }
   static ScalarType fifth_root(ScalarType q) { return std::pow(q, fraction(0.2)); }
 
-  /// x5, and x5 - x4 in `difference`.
+  /// Returns x5, and x5 - x4 in `difference`.
   template <class Rhs>
   static State stages(Rhs& rhs, ScalarType t, const State& x, ScalarType h, State& difference) {
     constexpr auto weight = [](long double entry) { return static_cast<ScalarType>(entry); };

@@ -1,9 +1,9 @@
 /// @file
 /// Constant, step and sine with exact derivatives.
 ///
-/// A signal that begins at a time is active for t >= time, compared as written: on a grid t = k h a
-/// start of k0 h that is computed in the same way falls on its sample, a decimal one may fall one
-/// sample late.
+/// A signal that begins at `time` is active for t >= time, without tolerance: on a grid t = k h, a
+/// start computed as k0 h is active at sample k0; one written as a decimal number may be active one
+/// sample later.
 #pragma once
 
 #include <array>

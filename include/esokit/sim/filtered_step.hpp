@@ -1,5 +1,5 @@
 /// @file
-/// A step through a chain of equal first-order lags, in closed form.
+/// The response of a chain of equal first-order lags to a step, in closed form.
 #pragma once
 
 #include <cmath>
@@ -14,8 +14,8 @@
 namespace esokit::sim {
 
 /// Response of 1/(tau s + 1)^Order to a step of `size` at `time`, from rest: the reference of many
-/// ADRC papers. It has Order - 1 continuous derivatives; the derivative Order jumps at `time` to
-/// size/tau^Order, and the value there is the one from the right.
+/// ADRC papers. It has Order - 1 continuous derivatives; the derivative of order Order jumps at
+/// `time` to size/tau^Order; at the jump the value from the right is given.
 ///
 /// With x = (t - time)/tau and the Erlang densities g_k(x) = x^(k-1) e^-x / (k-1)! the value is
 /// size (1 - g_1 - .. - g_Order), and since g_k' = g_{k-1} - g_k the derivative j > 0 is
@@ -74,7 +74,7 @@ class FilteredStep {
 
   explicit constexpr FilteredStep(const Config& config) : config_(config) {}
 
-  /// Bounded where every density has long been zero, so that 0 times infinity cannot arise.
+  /// Limited to a range beyond which all densities are zero, so that 0 times infinity cannot occur.
   ScalarType scaled_time(ScalarType t) const noexcept {
     const ScalarType x = (t - config_.time) / config_.time_constant;
     const ScalarType far{20000};
@@ -88,8 +88,8 @@ class FilteredStep {
     return g;
   }
 
-  /// 1 - g_1 - .. - g_Order = g_{Order+1} (1 + x/(Order+1) + x^2/((Order+1)(Order+2)) + ..): the
-  /// series where the difference would cancel.
+  /// 1 - g_1 - .. - g_Order = g_{Order+1} (1 + x/(Order+1) + x^2/((Order+1)(Order+2)) + ..). The
+  /// series is used if the difference would cancel.
   static ScalarType rise(ScalarType x, const Densities& g) noexcept {
     if (x > static_cast<ScalarType>(Order + 1)) {
       ScalarType tail{};

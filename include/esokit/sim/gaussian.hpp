@@ -9,12 +9,12 @@
 
 namespace esokit::sim {
 
-/// Mean 0, variance 1. std::mt19937_64 is specified to the bit, std::normal_distribution is not, so
-/// the Gaussian is made here by Marsaglia's polar method: pairs (2 U - 1, 2 U - 1) with U the upper
-/// 53 bits, until the pair lies within the unit circle; the first of a pair is returned first. Only
-/// `log` depends on the platform, in the last digits.
+/// Normal random numbers with mean 0 and variance 1. std::mt19937_64 is specified to the bit,
+/// std::normal_distribution is not, so the numbers are computed here by Marsaglia's polar method:
+/// pairs (2 U - 1, 2 U - 1), U from the upper 53 bits, until a pair lies within the unit circle;
+/// the first of the pair is returned first. Only the last digits of `log` depend on the platform.
 ///
-/// Always drawn in double, so that a float simulation sees the same noise.
+/// Always computed in double, so that a float simulation gets the same noise.
 class Gaussian {
  public:
   /// @param seed any number; equal seeds give equal sequences
@@ -40,17 +40,17 @@ class Gaussian {
     return first * factor;
   }
 
-  /// In [0, 1), from the same sequence; for events that happen in a share of cases.
+  /// A number in [0, 1), from the same sequence; for events that occur with a given probability.
   double uniform() { return (signed_uniform() + 1.0) / 2.0; }
 
-  /// Starts the sequence anew.
+  /// Restarts the sequence.
   void reset() {
     engine_.seed(seed_);
     has_spare_ = false;
   }
 
  private:
-  /// In [-1, 1), every value a multiple of 2^-52.
+  /// A number in [-1, 1), a multiple of 2^-52.
   double signed_uniform() {
     constexpr double two_to_minus_52 = 1.0 / 4503599627370496.0;
     return static_cast<double>(engine_() >> 11u) * two_to_minus_52 - 1.0;

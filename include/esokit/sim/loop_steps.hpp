@@ -1,5 +1,5 @@
 /// @file
-/// Common to the loops: the number of samples of a duration, and the callback.
+/// Common parts of the loops: the number of samples in a duration, and the callback.
 #pragma once
 
 #include <cmath>
@@ -12,8 +12,8 @@
 
 namespace esokit::sim::detail {
 
-/// Finite and `part` times a whole number; that number. Both may be rounded decimals.
-/// @param precision of the coarser one
+/// Checks that `value` is positive and a whole multiple of `part`, and returns the multiple. Both
+/// may be rounded decimals. @param precision spacing of the coarser scalar around one
 template <PlainScalar ScalarType>
 Expected<std::int64_t, Error<ScalarType>> whole_multiple(
     const char* field, ScalarType value, ScalarType part, const char* rule,
@@ -33,8 +33,8 @@ Expected<std::int64_t, Error<ScalarType>> whole_multiple(
   return static_cast<std::int64_t>(whole);
 }
 
-/// Calls back with the sample, and with what else the callback takes; true unless it returned
-/// false.
+/// Calls the callback with the sample, and with further arguments if it takes them. True unless it
+/// returned false.
 template <class Callback, class Sample, class... More>
 bool keep_going(Callback& on_sample, const Sample& sample, More&... more) {
   if constexpr (sizeof...(More) > 0 && !std::invocable<Callback&, const Sample&, More&...>) {

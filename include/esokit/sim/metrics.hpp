@@ -1,6 +1,6 @@
 /// @file
-/// Criteria of a recorded response. Inside a loop use the accumulators behind them: Trapezoid,
-/// PeakMeter, StepResponse.
+/// Criteria of a recorded response. Inside a loop use the accumulators on which they are based:
+/// Trapezoid, PeakMeter, StepResponse.
 #pragma once
 
 #include <cmath>
@@ -55,7 +55,7 @@ ScalarType integral_time_abs(const Series<ScalarType>& series,
       .value();
 }
 
-/// Root of the mean square over the time covered; nothing if that is zero.
+/// Root mean square over the time covered; nothing if this time is zero.
 template <PlainScalar ScalarType>
 std::optional<ScalarType> rms(const Series<ScalarType>& series,
                               const Window<ScalarType>& window = {}) {
@@ -73,8 +73,8 @@ std::optional<Peak<ScalarType>> peak(const Series<ScalarType>& series,
   return meter.value();
 }
 
-/// Overshoot, settling time and rise time: the meter after all samples. Refuses what
-/// StepResponse::make refuses.
+/// Overshoot, settling time and rise time: a StepResponse to which all samples were added. Returns
+/// the same errors as StepResponse::make.
 template <PlainScalar ScalarType>
 Expected<StepResponse<ScalarType>, Error<ScalarType>> step_response(
     const Series<ScalarType>& series, const typename StepResponse<ScalarType>::Config& config) {

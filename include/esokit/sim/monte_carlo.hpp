@@ -33,7 +33,7 @@
 
 namespace esokit::sim {
 
-/// The vector instructions that the program was compiled for; they determine the width of packs.
+/// The vector instructions for which the program was compiled; they determine the width of packs.
 inline constexpr const char* instruction_set =
 #if defined(__AVX512F__)
     "AVX-512";
@@ -49,25 +49,25 @@ inline constexpr const char* instruction_set =
     "none";
 #endif
 
-/// The random numbers that vary a run: a function of seed and run alone.
+/// Random numbers to vary a run: a function of seed and run only.
 class Draw {
  public:
-  /// @param seed of all runs
+  /// @param seed common to all runs
   Draw(std::uint64_t seed, std::int64_t run) noexcept
       : random_(seed, RandomStream::variation, static_cast<std::uint64_t>(run)), run_(run) {}
 
-  /// Mean 0, variance 1.
+  /// A normal number with mean 0 and variance 1.
   double normal() noexcept { return random_.next(); }
-  /// Uniform between two numbers.
+  /// A number uniform between two limits.
   double uniform(double low, double high) noexcept {
     return low + (high - low) * random_.uniform();
   }
-  /// Between two positive numbers, uniform in the logarithm: a factor of 2 is as likely as one of
-  /// 1/2.
+  /// A number between two positive limits, uniform in its logarithm: a factor of 2 is as likely as
+  /// one of 1/2.
   double uniform_ratio(double low, double high) noexcept {
     return low * std::exp(std::log(high / low) * random_.uniform());
   }
-  /// Which run, 0, 1, ..
+  /// Number of the run, 0, 1, ..
   [[nodiscard]] std::int64_t run() const noexcept { return run_; }
 
  private:
@@ -81,7 +81,7 @@ struct Trial {
   P plant;                                ///< for speed use the same dead time in all runs
   C controller;                           ///< newly designed, retuned or unchanged
   typename RunTypes<P, C>::State state;   ///< x at the start
-  typename RunTypes<P, C>::Output noise;  ///< of the measurement, standard deviation
+  typename RunTypes<P, C>::Output noise;  ///< standard deviation of measurement noise
 };
 
 /// Varies nothing: the runs differ only by the random numbers of the loop.
@@ -91,27 +91,28 @@ struct NoVariation {
   void operator()(T&, Draw&) const noexcept {}
 };
 
-/// The samples that a Measure uses, and the limit for its number.
+/// The samples that a Measure uses, and the limit for its result.
 struct MeasureOptions {
-  double from = 0.0;                                    ///< s of the loop, first sample
+  double from = 0.0;                                    ///< s, time of the first sample used
   double to = std::numeric_limits<double>::infinity();  ///< s, last sample
 
   /// The number must not be above this; finite, or left out.
   double limit = std::numeric_limits<double>::infinity();
 };
 
-/// A number of a run, computed from `of(sample)` or `of(sample, controller)` at its samples.
+/// A criterion of a run, one number computed from `of(sample)` or `of(sample, controller)` at its
+/// samples.
 ///
-/// The function must take any scalar, because packs of runs go through it too. Made by `largest`,
-/// `average`, `root_mean_square`, `final_value` and `settling_time`. A run fails if its number is
-/// not finite or, for `largest` and `settling_time`, if of(sample) is not finite in the window, and
-/// if its window has no sample.
+/// The function must accept any scalar, because it is also called with packs of runs. Made by
+/// `largest`, `average`, `root_mean_square`, `final_value` and `settling_time`. A run fails if its
+/// number is not finite or, for `largest` and `settling_time`, if of(sample) is not finite in the
+/// window, and if its window has no sample.
 template <class Reduce, class F>
 struct Measure {
-  std::string name;        ///< what it is
-  F of;                    ///< of a sample
+  std::string name;        ///< name of the criterion
+  F of;                    ///< function of a sample
   MeasureOptions options;  ///< window and limit
-  Reduce reduce{};         ///< how numbers of samples become one
+  Reduce reduce{};         ///< reduces the numbers of all samples to one
 };
 
 namespace detail {
@@ -163,7 +164,7 @@ struct SettlingTime : FinalValue {
   double band;
 };
 
-/// The types of `Lanes` runs at once.
+/// The types for `Lanes` runs at once.
 template <class P, class C, int Lanes>
 struct InPacks {
   static constexpr bool possible = false;
@@ -190,28 +191,28 @@ requires(Lanes > 1 && esokit::detail::LaneAccess::has_fields<P> &&
 
 }  // namespace detail
 
-/// The largest of(sample) of a run: of `s.output - s.reference` its overshoot.
+/// The largest of(sample) in a run: for `s.output - s.reference` the overshoot.
 template <class F>
 Measure<detail::Largest, F> largest(std::string name, F of, MeasureOptions options = {}) {
   return {std::move(name), std::move(of), options};
 }
-/// The mean of of(sample) over a run's samples.
+/// The mean of of(sample) over the samples of a run.
 template <class F>
 Measure<detail::Average, F> average(std::string name, F of, MeasureOptions options = {}) {
   return {std::move(name), std::move(of), options};
 }
-/// The root of the mean square of of(sample).
+/// The root mean square of of(sample).
 template <class F>
 Measure<detail::RootMeanSquare, F> root_mean_square(std::string name, F of,
                                                     MeasureOptions options = {}) {
   return {std::move(name), std::move(of), options};
 }
-/// of(sample) of the last sample.
+/// of(sample) at the last sample.
 template <class F>
 Measure<detail::FinalValue, F> final_value(std::string name, F of, MeasureOptions options = {}) {
   return {std::move(name), std::move(of), options};
 }
-/// When abs(of(sample)) was above `band` for the last time, s after `options.from`.
+/// The last time at which abs(of(sample)) was above `band`, s after `options.from`.
 /// @param band 0 or above
 template <class F>
 Measure<detail::SettlingTime, F> settling_time(std::string name, F of, double band,
@@ -219,48 +220,49 @@ Measure<detail::SettlingTime, F> settling_time(std::string name, F of, double ba
   return {std::move(name), std::move(of), options, {{}, band}};
 }
 
-/// A run that failed and gave no numbers.
+/// A run that failed and gave no results.
 template <class Time>
 struct FailedRun {
-  std::int64_t run = 0;  ///< which
-  Error<Time> error{};   ///< of `vary` or of the loop, for example a state that is not finite
+  std::int64_t run = 0;  ///< number of the run
+  Error<Time> error{};   ///< error of `vary` or of the loop, for example a state that is not finite
 };
 
 /// Settings of `monte_carlo`.
 template <class P, class C>
 struct MonteCarloConfig {
-  using Time = typename RunTypes<P, C>::Time;  ///< of times
+  using Time = typename RunTypes<P, C>::Time;  ///< type of times
 
-  std::int64_t runs{};     ///< how many, 1 or more
-  RunConfig<P, C> loop{};  ///< of every run, with the seed of them all; its `number` is left out
-  int threads = 0;         ///< 0: one a core
+  std::int64_t runs{};     ///< number of runs, 1 or more
+  RunConfig<P, C> loop{};  ///< settings of every run, with the common seed; leave out its `number`
+  int threads = 0;         ///< 0: one per core
 
   /// Called from time to time with the number of finished runs, 0 .. runs - 1; false stops.
   std::function<bool(std::int64_t done)> progress{};
 
-  /// Called with the numbers of each run, in the order of the runs, from one thread at a time; of a
-  /// run that failed they are NaN.
+  /// Called with the results of each run, in the order of the runs, from one thread at a time; NaN
+  /// for a run that failed.
   std::function<void(std::int64_t run, std::span<const double> numbers)> on_run{};
 };
 
 /// The result.
 template <class Time>
 struct MonteCarloOutcome {
-  std::int64_t runs = 0;               ///< number of finished runs; if stopped, the first ones
-  std::int64_t failed = 0;             ///< number of failed runs; they enter no statistics
-  FailedRun<Time> first_failure{};     ///< the first of them
-  std::vector<RunStatistics> numbers;  ///< of each Measure
+  std::int64_t runs = 0;               ///< number of finished runs; if stopped, the first so many
+  std::int64_t failed = 0;             ///< number of failed runs, which are not in the statistics
+  FailedRun<Time> first_failure{};     ///< the first failed run
+  std::vector<RunStatistics> numbers;  ///< statistics of each Measure
   bool completed = true;               ///< false if it was stopped
-  int threads = 1;                     ///< that it ran on
-  int lanes = 1;                       ///< runs at once on each
+  int threads = 1;                     ///< number of threads used
+  int lanes = 1;                       ///< runs at once on each thread
 
-  /// The share of all runs that kept the limit of a number; a failed run counts as not kept.
+  /// The share of all runs that kept the limit of a Measure; failed runs count as not kept. @param
+  /// number index of the Measure
   [[nodiscard]] double share_kept(std::size_t number) const {
     return static_cast<double>(numbers[number].kept()) / static_cast<double>(runs);
   }
 };
 
-/// Many runs of a loop. See monte_carlo.
+/// Many runs of a loop, see monte_carlo.
 template <SampledPlant P, class C, class Vary = NoVariation>
 requires ControllerOf<C, P>
 class MonteCarlo {
@@ -268,19 +270,19 @@ class MonteCarlo {
   using Types = RunTypes<P, C>;             ///< type of the numbers
   using Time = typename Types::Time;        ///< s
   using Config = MonteCarloConfig<P, C>;    ///< settings
-  using Outcome = MonteCarloOutcome<Time>;  ///< what comes out
+  using Outcome = MonteCarloOutcome<Time>;  ///< the result
 
-  /// Runs that are handed out to a thread at once.
+  /// Number of runs that a thread takes at a time.
   static constexpr std::int64_t block = 256;
 
-  /// Nothing is run yet.
+  /// Stores its arguments; runs nothing yet.
   MonteCarlo(P plant, C controller, Config config, Vary vary)
       : plant_(std::move(plant)),
         controller_(std::move(controller)),
         config_(std::move(config)),
         vary_(std::move(vary)) {}
 
-  /// What a run differs by; an error where `vary` gave one.
+  /// The varied plant, controller, state and noise of a run, or the error of `vary`.
   [[nodiscard]] Expected<Trial<P, C>, Error<Time>> trial(std::int64_t run) const {
     Trial<P, C> one{plant_, controller_, config_.loop.state, config_.loop.noise};
     Draw draw(config_.loop.seed, run);
@@ -293,28 +295,28 @@ class MonteCarlo {
     return one;
   }
 
-  /// The settings with which sim::run repeats a run, with the plant and controller of its trial.
+  /// The settings with which sim::run repeats a run with the plant and controller of its trial.
   [[nodiscard]] RunConfig<P, C> settings(std::int64_t run, const Trial<P, C>& trial) const {
     RunConfig<P, C> loop = config_.loop;
     set(loop, run, trial.state, trial.noise);
     return loop;
   }
 
-  /// Repeats one of the runs with a recording, for example the worst.
+  /// Repeats one of the runs, for example the worst, and records it.
   [[nodiscard]] Expected<Recording<P, C>, Error<Time>> replay(std::int64_t run) const {
     const auto one = trial(run);
     if (!one) return one.error();
     return sim::run(one->plant, one->controller, settings(run, *one));
   }
 
-  /// Runs them all. The numbers are the same for any number of threads and lanes, bit for bit if
-  /// the compiler does not fuse products and sums (-ffp-contract=off).
+  /// Computes all runs. The results are the same for any number of threads and lanes, bit for bit
+  /// with -ffp-contract=off (the compiler must not fuse products and sums).
   ///
   /// Runs are computed in packs if plant and controller allow it: all linear plants,
-  /// `nonlinear_plant` with functions that take any scalar, and controllers of esokit. Others run
-  /// one by one; so do a loop with jitter and the runs of a pack in which one fails.
+  /// `nonlinear_plant` with functions that take any scalar, and controllers of esokit. Others are
+  /// computed one by one, as are loops with jitter, and the runs of a pack in which one fails.
   /// @tparam Lanes runs at once on a thread
-  /// @return error of the settings
+  /// @return the outcome, or an error in the settings
   template <int Lanes = default_lanes<LaneScalar<typename Types::S>>, class... Reduce, class... F>
   [[nodiscard]] Expected<Outcome, Error<Time>> run(const Measure<Reduce, F>&... measures) const {
     Rules<Time> rules;
@@ -324,7 +326,7 @@ class MonteCarlo {
         .require(!config_.loop.number, "loop.number",
                  static_cast<Time>(config_.loop.number.value_or(0)), "must be left out");
     if (!rules) return rules.error();
-    // The settings of the loop, by one that ends at once, and how many samples it has.
+    // Checks the settings by a run that ends at once, and counts its samples.
     const auto first =
         sim::run(plant_, controller_, config_.loop, [](const auto&) { return false; });
     if (!first && is_setting(first.error().field)) return first.error();
@@ -356,14 +358,14 @@ class MonteCarlo {
   }
 
  private:
-  /// Of a block.
+  /// The results of a block of runs.
   struct Results {
     std::int64_t count;
-    std::vector<double> numbers;  ///< of run 0, of run 1, ..
+    std::vector<double> numbers;  ///< those of run 0, then of run 1, ..
     std::vector<FailedRun<Time>> failed;
   };
 
-  /// The blocks on their way: computed in any order, taken in theirs.
+  /// The blocks in work: computed in any order, collected in sequence.
   struct Work {
     Work(const MonteCarlo& of, std::size_t numbers) : study(of), measures(numbers) {}
 
@@ -384,7 +386,7 @@ class MonteCarlo {
     void take_blocks(std::int64_t blocks, const Compute& compute) {
       std::unique_lock lock(mutex);
       for (;;) {
-        // Not too far ahead of a slow one: what waits takes memory.
+        // Limits how far threads get ahead of a slow one, because waiting results take memory.
         news.wait(lock,
                   [&] { return stopped || next >= blocks || next < taken + 4 * outcome.threads; });
         if (stopped || next >= blocks) return;
@@ -433,13 +435,13 @@ class MonteCarlo {
     Outcome outcome;
     std::mutex mutex;
     std::condition_variable news;
-    std::int64_t next = 0;   ///< block that no thread has yet
-    std::int64_t taken = 0;  ///< blocks that are in the outcome
+    std::int64_t next = 0;   ///< next block that no thread has taken
+    std::int64_t taken = 0;  ///< number of blocks in the outcome
     bool stopped = false;
     std::map<std::int64_t, Results> waiting;
   };
 
-  /// One number a lane of a run or pack of runs, being made.
+  /// Accumulates one result per lane of a run or pack of runs.
   template <class S, class Reduce, class F>
   struct Meter {
     explicit Meter(const Measure<Reduce, F>& m) : measure(m), sum(Reduce::template start<S>()) {}
@@ -447,7 +449,7 @@ class MonteCarlo {
     template <class Sample, class Now>
     ESOKIT_INLINE void add(const Sample& sample, const Now& controller) {
       using Seconds = LaneScalar<S>;
-      // Rounding of t must not decide about a sample.
+      // Whether a sample is used must not depend on the rounding of t.
       const double t = static_cast<double>(sample.t);
       if (t < measure.options.from - 1e-9 || t > measure.options.to + 1e-9) return;
       ++samples;
@@ -478,7 +480,7 @@ class MonteCarlo {
   };
 
   static bool is_setting(std::string_view field) {
-    // What goes wrong in the course of a run, which with other plants may go well.
+    // Errors that occur during a run; with another plant it may succeed.
     return field != "plant" && field != "controller" && field != "disturbance";
   }
 
@@ -520,7 +522,7 @@ class MonteCarlo {
       results.failed.push_back({run, ok.error()});
   }
 
-  /// Runs it, and writes down the numbers of its lanes; an error where one is not finite.
+  /// Computes a run and stores the results of its lanes; an error if one is not finite.
   template <class Plant, class Control, class... Reduce, class... F>
   Check<Time> drive(const Plant& plant, const Control& controller,
                     const RunConfig<Plant, Control>& loop, Results& results, std::int64_t at,
@@ -583,7 +585,7 @@ class MonteCarlo {
         set(loop, from + at, state, noise);
         good = drive(plant, controller, loop, results, at, lanes, measures...).has_value();
       }
-      // One by one it comes out which of them failed.
+      // Repeated one by one to find out which of them failed.
       for (std::int64_t i = at; !good && i < std::min(at + lanes, results.count); ++i) {
         run_one(from + i, results, i, measures...);
       }
@@ -632,8 +634,8 @@ class MonteCarlo {
   Vary vary_;
 };
 
-/// Many runs of the loop of `sim::run`, each with its own random numbers and, through `vary`, its
-/// own plant, controller, initial state and noise:
+/// Prepares many runs of the loop of `sim::run`, each with its own random numbers and, through
+/// `vary`, its own plant, controller, initial state and noise:
 ///
 /// ```cpp
 /// auto study = sim::monte_carlo(plant, controller,
@@ -645,8 +647,9 @@ class MonteCarlo {
 /// ```
 ///
 /// A run depends only on the seed and its number.
-/// @param vary (Trial&, Draw&): makes of the trial, which comes with the plant and the controller
-///        given here, that of a run; pure. It may return a Check, whose error counts as failed.
+/// @param vary (Trial&, Draw&): changes the trial, which holds the given plant and controller, to
+///        that of a run. It must be a pure function, and may return a Check, whose error makes the
+///        run fail.
 template <SampledPlant P, class C, class Vary>
 requires ControllerOf<C, P> MonteCarlo<P, C, Vary> monte_carlo(
     P plant, C controller, std::type_identity_t<MonteCarloConfig<P, C>> config, Vary vary) {

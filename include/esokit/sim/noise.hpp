@@ -17,7 +17,7 @@ class WhiteNoise {
  public:
   /// Settings of make.
   struct Config {
-    ScalarType standard_deviation{};  ///< in the unit of the signal; zero is no noise
+    ScalarType standard_deviation{};  ///< in the unit of the signal; zero: no noise
     std::uint64_t seed = 0;           ///< any number
   };
 
@@ -32,10 +32,10 @@ class WhiteNoise {
   /// The next number, in the unit of the signal.
   ScalarType next() { return standard_deviation_ * static_cast<ScalarType>(gaussian_.next()); }
 
-  /// Starts the sequence anew.
+  /// Restarts the sequence.
   void reset() { gaussian_.reset(); }
 
-  /// In the unit of the signal.
+  /// The standard deviation, in the unit of the signal.
   ScalarType standard_deviation() const noexcept { return standard_deviation_; }
 
  private:
@@ -46,11 +46,11 @@ class WhiteNoise {
   ScalarType standard_deviation_;
 };
 
-/// The "band-limited white noise" of block-diagram tools: one normal number an interval of `hold`
-/// seconds, with variance power/hold, so that the spectral density at low frequency is `power`
-/// whatever the interval.
+/// The "band-limited white noise" of block-diagram tools: one normal number for each interval of
+/// `hold` seconds, with variance power/hold, so that the spectral density at low frequency is
+/// `power` for any interval.
 ///
-/// `next()` is called once an interval; HeldNoise does that for a simulation with smaller steps.
+/// Call `next()` once per interval; HeldNoise does this for a simulation with smaller steps.
 template <PlainScalar ScalarType = double>
 class BandLimitedWhiteNoise {
  public:
@@ -61,7 +61,7 @@ class BandLimitedWhiteNoise {
     std::uint64_t seed = 0;  ///< any number
   };
 
-  /// Refuses a negative power, a hold that is not positive, and a variance beyond the scalar.
+  /// Refuses a negative power, a hold that is not positive, and a variance that overflows.
   static Expected<BandLimitedWhiteNoise, Error<ScalarType>> make(const Config& config) {
     Rules<ScalarType> rules;
     rules.not_negative("power", config.power).positive("hold", config.hold);
@@ -70,7 +70,7 @@ class BandLimitedWhiteNoise {
     if (!is_finite(variance) || (config.power > ScalarType{} && variance <= ScalarType{})) {
       return Error<ScalarType>{.field = "power",
                                .value = config.power,
-                               .rule = "power/hold must be a number that the scalar can hold"};
+                               .rule = "power/hold must not leave the range of the scalar"};
     }
     const auto white = WhiteNoise<ScalarType>::make(
         {.standard_deviation = std::sqrt(variance), .seed = config.seed});
@@ -80,7 +80,7 @@ class BandLimitedWhiteNoise {
   /// The number of the next interval.
   ScalarType next() { return white_.next(); }
 
-  /// Starts the sequence anew.
+  /// Restarts the sequence.
   void reset() { white_.reset(); }
 
   /// sqrt(power/hold), in the unit of the signal.
@@ -92,10 +92,10 @@ class BandLimitedWhiteNoise {
   WhiteNoise<ScalarType> white_;
 };
 
-/// Band-limited white noise seen by a simulation of fixed step: at(k) is its value at t = k step.
+/// Band-limited white noise for a simulation with a fixed step: at(k) is its value at t = k step.
 ///
-/// Goes by the index of the step and not by time, since floor(k step / hold) is wrong by rounding
-/// at some edges of the intervals.
+/// It uses the index of the step and not the time, because rounding makes floor(k step / hold)
+/// wrong at some edges of the intervals.
 template <PlainScalar ScalarType = double>
 class HeldNoise {
  public:
@@ -107,8 +107,8 @@ class HeldNoise {
     std::uint64_t seed = 0;  ///< any number
   };
 
-  /// Refuses what BandLimitedWhiteNoise refuses, a step that is not positive, and a hold that is
-  /// no whole multiple of the step.
+  /// Returns the errors of BandLimitedWhiteNoise, and refuses a step that is not positive and a
+  /// hold that is not a whole multiple of the step.
   static Expected<HeldNoise, Error<ScalarType>> make(const Config& config) {
     const auto noise = BandLimitedWhiteNoise<ScalarType>::make(
         {.power = config.power, .hold = config.hold, .seed = config.seed});
@@ -132,8 +132,8 @@ class HeldNoise {
     return HeldNoise(*noise, static_cast<std::int64_t>(whole));
   }
 
-  /// The value during step k, which starts at t = k step; zero before step 0. It depends on k
-  /// alone; going back replays the sequence from its start, so ascending k is the fast way.
+  /// The value during step k, which starts at t = k step; zero before step 0. It depends on k only.
+  /// Going back replays the sequence from its start, so ascending k is fast.
   ScalarType at(std::int64_t k) {
     if (k < 0) return ScalarType{};
     const std::int64_t interval = k / steps_per_hold_;
@@ -142,7 +142,7 @@ class HeldNoise {
     return value_;
   }
 
-  /// Starts the sequence anew; at(k) does not change by it.
+  /// Restarts the sequence; this does not change at(k).
   void reset() {
     noise_.reset();
     drawn_ = 0;

@@ -16,7 +16,7 @@ struct Peak {
   ScalarType magnitude{};  ///< abs(value)
 };
 
-/// Finds the peak inside a loop: add(t, y) at every sample.
+/// Finds the peak while a loop runs: call add(t, y) at every sample.
 template <PlainScalar ScalarType = double>
 class PeakMeter {
  public:

@@ -16,15 +16,15 @@
 /// Simulation: plants, signals, noise, integrators, closed loops, criteria.
 namespace esokit::sim {
 
-/// A number, or a vector of several.
+/// A number, or a vector if Size is not 1.
 template <class ScalarType, int Size>
 using ScalarOrVector = std::conditional_t<Size == 1, ScalarType, Vector<ScalarType, Size>>;
 
 /// A system with one input and one output: x' = derivative(t, x, u), y = output(t, x).
 ///
-/// t is absolute time in seconds, so that disturbances and parameters that change with time may
-/// live in the plant. Both functions are pure: an integrator calls them at times between samples,
-/// several times a step and not in order.
+/// t is absolute time in seconds, so that the plant may contain disturbances and parameters that
+/// change with time. Both functions must be pure: an integrator calls them at times between
+/// samples, several times per step and not in order.
 template <class P>
 concept Plant = requires(const P& plant, const typename P::State& x,
                          const typename P::State::Scalar& scalar) {
@@ -37,8 +37,8 @@ concept Plant = requires(const P& plant, const typename P::State& x,
 
 /// A linear plant with a disturbance d(t), for the continuous simulation.
 ///
-/// @tparam Disturbance a Signal, d(t) in the unit that E of the plant takes: of a chain y^(n), of a
-///         transfer function that of u
+/// @tparam Disturbance a Signal, d(t) in the unit defined by E of the plant: for a chain that of
+///         y^(n), for a transfer function that of u
 template <int States, PlainScalar ScalarType = double, class Disturbance = Constant<ScalarType>>
 requires Signal<Disturbance, ScalarType>
 class DisturbedPlant {
@@ -53,7 +53,7 @@ class DisturbedPlant {
     Disturbance disturbance{};  ///< d(t)
   };
 
-  /// Refuses a plant that its `check` refuses, and one with a dead time.
+  /// Returns the errors of the plant's `check`, and refuses a dead time.
   static Expected<DisturbedPlant, Error<ScalarType>> make(Config config) {
     Rules<ScalarType> rules;
     rules.all_of(config.plant.check())
@@ -97,12 +97,12 @@ struct NonlinearPlant {
   static constexpr int outputs = Outputs;              ///< length of y
   using scalar_type = ScalarType;                      ///< of x, u and y
   using State = Vector<ScalarType, States>;            ///< x
-  using Input = ScalarOrVector<ScalarType, Inputs>;    ///< u: a number if it is one
-  using Output = ScalarOrVector<ScalarType, Outputs>;  ///< y: a number if it is one
+  using Input = ScalarOrVector<ScalarType, Inputs>;    ///< u; a number if it has one element
+  using Output = ScalarOrVector<ScalarType, Outputs>;  ///< y; a number if it has one element
   using Time = LaneScalar<ScalarType>;                 ///< t, s
 
-  /// The same with another scalar. Functions that hold numbers have a `with_scalar`, and `fields`,
-  /// of their own; others take any scalar.
+  /// The same with another scalar. Functions that store numbers need a `with_scalar` and `fields`;
+  /// others must accept any scalar.
   template <class T>
   requires(esokit::detail::has_other_scalars<F>&&
                esokit::detail::has_other_scalars<H>) using with_scalar =
@@ -128,7 +128,7 @@ struct NonlinearPlant {
 };
 
 namespace detail {
-/// The output of a plant of another scalar.
+/// The output type of a plant with another scalar.
 template <class Output, class T>
 struct OutputIn {
   using type = T;
@@ -139,7 +139,7 @@ struct OutputIn<Vector<S, Size>, T> {
 };
 }  // namespace detail
 
-/// The first states, as many as there are outputs.
+/// The output function that gives the first states, as many as there are outputs.
 template <class Output>
 struct FirstStates {
   /// @cond
@@ -158,15 +158,15 @@ struct FirstStates {
   }
 };
 
-/// A plant given by functions. A pendulum is
+/// Makes a plant from functions. A pendulum is
 ///
 ///     nonlinear_plant<2>([](double, const Vector<double, 2>& x, double u) {
 ///       return Vector<double, 2>{x(1), -9.81 * std::sin(x(0)) + u};
 ///     });
 ///
-/// y is the first state, or what `h(t, x)` gives. t is absolute time, s; both functions are pure:
-/// an integrator calls them at times between samples. A jump of f within a step costs accuracy:
-/// pass a load that is switched on to the simulation as its disturbance. @{
+/// y is the first state, or the result of `h(t, x)`. t is absolute time, s. Both functions must be
+/// pure, because an integrator calls them at times between samples. A jump of f within a step costs
+/// accuracy: pass a load that is switched on to the simulation as its disturbance. @{
 template <int States, Scalar ScalarType = double, int Inputs = 1, int Outputs = 1, class F, class H>
 NonlinearPlant<States, ScalarType, Inputs, Outputs, F, H> nonlinear_plant(F f, H h) {
   return {std::move(f), std::move(h)};

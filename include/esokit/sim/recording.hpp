@@ -1,5 +1,5 @@
 /// @file
-/// The results of a run: its samples, its end, and a recording to draw or to write.
+/// The results of a run: its samples, its end, and a recording to plot or save.
 #pragma once
 
 #include <charconv>
@@ -40,7 +40,8 @@ constexpr int outputs_of() {
   return 1;
 }
 
-/// The scalar that a controller computes in; one that does not say it takes that of the plant.
+/// The scalar in which a controller computes; that of the plant if the controller does not declare
+/// one.
 template <class C, class PlantScalar>
 struct ControllerScalarOf {
   using type = PlantScalar;
@@ -56,18 +57,20 @@ struct ControllerScalarOf<C, PlantScalar> {
 /// The types that belong to a plant and a controller in a run.
 template <class P, class C>
 struct RunTypes {
-  using S = typename detail::PlantScalarOf<P>::type;                         ///< of the plant
-  using ControllerScalar = typename detail::ControllerScalarOf<C, S>::type;  ///< of the controller
-  using Time = LaneScalar<S>;                                                ///< s
-  static constexpr int inputs = detail::inputs_of<P>();                      ///< length of u
-  static constexpr int outputs = detail::outputs_of<P>();                    ///< length of y
-  using State = typename P::State;                                           ///< x
-  using Input = ScalarOrVector<S, inputs>;                                   ///< u: a number if one
-  using Output = ScalarOrVector<S, outputs>;                                 ///< y: a number if one
+  using S = typename detail::PlantScalarOf<P>::type;  ///< scalar of the plant
+  using ControllerScalar =
+      typename detail::ControllerScalarOf<C, S>::type;     ///< scalar of the controller
+  using Time = LaneScalar<S>;                              ///< s
+  static constexpr int inputs = detail::inputs_of<P>();    ///< length of u
+  static constexpr int outputs = detail::outputs_of<P>();  ///< length of y
+  using State = typename P::State;                         ///< x
+  using Input = ScalarOrVector<S, inputs>;                 ///< u; a number if one
+  using Output = ScalarOrVector<S, outputs>;               ///< y; a number if one
 
-  /// (r, r', ..) of a controller that takes derivatives, else one for each output.
+  /// The reference is (r, r', ..) for a controller that takes derivatives, else one number per
+  /// output.
   static constexpr bool derivatives = controller_traits<C>.takes_derivatives && outputs == 1;
-  /// Numbers of a reference.
+  /// Length of a reference.
   static constexpr int references = [] {
     if constexpr (derivatives) {
       return C::order + 1;
@@ -96,22 +99,22 @@ template <class P, class C>
 struct RunEnd {
   using Types = RunTypes<P, C>;  ///< type of the numbers
 
-  typename Types::Time time{};    ///< s, after the last sample has passed
-  std::int64_t samples{};         ///< how often the controller ran
-  typename Types::State state{};  ///< x then
-  C controller;                   ///< as it was left
+  typename Types::Time time{};    ///< s, at the end of the last sample
+  std::int64_t samples{};         ///< number of samples that the controller computed
+  typename Types::State state{};  ///< x at this time
+  C controller;                   ///< the controller at the end
   bool completed = true;          ///< false if the callback stopped the run
 };
 
-/// The samples of a run, a column for each signal: `output` is a vector of numbers, of several
+/// The samples of a run, one column per signal: `output` is a vector of numbers, for several
 /// channels an array of vectors.
 template <class P, class C>
 struct RunRecord {
   using Types = RunTypes<P, C>;       ///< type of the numbers
-  using S = typename Types::S;        ///< of the plant
+  using S = typename Types::S;        ///< scalar of the plant
   using Time = typename Types::Time;  ///< s
 
-  /// Of a signal of `Count` numbers.
+  /// The column of a signal with `Count` elements.
   template <int Count>
   using Column = std::conditional_t<Count == 1, std::vector<S>, Array<std::vector<S>, Count>>;
 
@@ -121,10 +124,10 @@ struct RunRecord {
   Column<Types::outputs> reference;    ///< r
   Column<Types::inputs> input;         ///< u from this sample to the next
 
-  /// dhat after the sample, in the unit of y^(n); empty where the controller has no observer.
+  /// dhat after the sample, in the unit of y^(n); empty if the controller has no observer.
   std::vector<S> total_disturbance;
 
-  /// One sample more.
+  /// Adds a sample.
   void add(const RunSample<P, C>& sample, const C& controller) {
     t.push_back(sample.t);
     append(output, sample.output);
@@ -136,7 +139,7 @@ struct RunRecord {
     }
   }
 
-  /// A table with a line of names: t, y, measurement, reference, u, total_disturbance; of several
+  /// A table with a line of names: t, y, measurement, reference, u, total_disturbance; for several
   /// channels y1, y2, ..; numbers with all their digits. `std::ofstream("run.csv") << run.csv()`.
   [[nodiscard]] std::string csv() const requires PlainScalar<S> {
     std::string text = "t";
@@ -184,7 +187,7 @@ struct RunRecord {
   }
 };
 
-/// A run with the record of its samples.
+/// The end of a run with the record of its samples.
 template <class P, class C>
 struct Recording : RunEnd<P, C>, RunRecord<P, C> {
   using Types = RunTypes<P, C>;  ///< type of the numbers

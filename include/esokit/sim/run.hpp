@@ -1,5 +1,6 @@
 /// @file
-/// run(plant, controller, config): the sampled loop of a plant and a controller as deployed.
+/// run(plant, controller, config): simulates the sampled loop of a plant and a controller as on the
+/// real system.
 #pragma once
 
 #include <algorithm>
@@ -31,7 +32,7 @@ inline constexpr bool is_linear_plant = false;
 template <int States, class S, int Inputs, int Outputs>
 inline constexpr bool is_linear_plant<LinearPlant<States, S, Inputs, Outputs>> = true;
 
-/// A number or a vector in another scalar.
+/// Converts a number or a vector to another scalar.
 template <class To, class From>
 ESOKIT_INLINE auto in_scalar(const From& from) {
   constexpr int size = esokit::detail::vector_size<From>;
@@ -44,7 +45,7 @@ ESOKIT_INLINE auto in_scalar(const From& from) {
   }
 }
 
-/// The numbers of a number, a vector or a state.
+/// True if a number, or all elements of a vector or state, are finite.
 template <class T>
 constexpr bool finite_throughout(const T& value) noexcept {
   if constexpr (requires { all(is_finite(value)); }) {
@@ -57,7 +58,7 @@ constexpr bool finite_throughout(const T& value) noexcept {
   }
 }
 
-/// f(number) of each of them.
+/// Calls f(number) for each element.
 template <class T, class F>
 void each_number(T& value, const F& f) {
   if constexpr (std::is_invocable_v<const F&, T&>) {
@@ -69,8 +70,8 @@ void each_number(T& value, const F& f) {
 
 }  // namespace detail
 
-/// A linear plant; or a plant of functions with `derivative(t, x, u)` and `output(t, x)`, its State
-/// added and scaled as a vector.
+/// A linear plant, or a plant with functions `derivative(t, x, u)` and `output(t, x)` and a State
+/// that can be added and scaled like a vector.
 template <class P>
 concept SampledPlant = std::copy_constructible<P> &&
     (detail::is_linear_plant<P> ||
@@ -86,7 +87,7 @@ concept SampledPlant = std::copy_constructible<P> &&
              ScalarOrVector<typename detail::PlantScalarOf<P>::type, detail::outputs_of<P>()>>;
      });
 
-/// A controller that fits a plant, the measurement and the reference in the controller's scalar.
+/// A controller that fits a plant; measurement and reference are in the controller's scalar.
 template <class C, class P>
 concept ControllerOf =
     Controller<C,
@@ -102,62 +103,63 @@ struct RunConfig {
   using Output = typename Types::Output;  ///< y
 
   Time duration{};     ///< s, a whole multiple of the sample time
-  Time sample_time{};  ///< T, s; left out: that of the controller, which it must be if it has one
+  Time sample_time{};  ///< T, s; must agree with the controller's, if that has one; left out: that
+                       ///< of the controller
 
   /// r, a number or a function of t; for a controller that takes derivatives, (r, r', ..)
   RunSignal<typename Types::S, Types::references, Types::derivatives> reference{};
 
-  /// d, a number or a function of t, held over a step of integration. It enters through E of a
-  /// linear plant; in other plants it is added to u.
+  /// d, a number or a function of t, held over an integration step. It enters through E of a linear
+  /// plant; in other plants it is added to u.
   RunSignal<typename Types::S, Types::inputs> disturbance{};
 
-  Output noise{};  ///< of the measurement: standard deviation, normal, white
+  Output noise{};  ///< standard deviation of the white normal measurement noise, unit of y
 
   /// The sensor: a function of (t, y), where y includes noise; it may quantise or return NaN
   /// (missing).
   std::function<Output(const Time&, const Output&)> sensor{};
-  Time missing{};  ///< share of the samples that are lost at random, 0 .. 1
+  Time missing{};  ///< share of measurements that are lost at random, 0 .. 1
 
-  /// Samples come early or late: each takes (1 + jitter r) T with r random in -1 .. 1; 0 .. 0.9
+  /// Jitter of the sample time: a sample takes (1 + jitter r) T with random r in -1 .. 1; 0 .. 0.9
   Time jitter{};
-  /// Or as the function says: s from sample k to the next, 0.1 T .. 10 T.
+  /// Alternatively a function: time from sample k to the next, s, 0.1 T .. 10 T.
   std::function<Time(std::int64_t)> step_time{};
-  std::uint64_t seed = 1;  ///< of noise, missing and jitter: equal seeds, equal runs
+  std::uint64_t seed = 1;  ///< of noise, missing and jitter; equal seeds give equal runs
 
-  /// The number of this run among many with one seed. Its random numbers are then drawn by counter,
-  /// as for run `number` of a MonteCarlo; for packs lane i is run number + i. If left out, one
-  /// sequence is dealt to the lanes in turn. Packs with a number cannot have jitter, because all
-  /// lanes have the same time.
+  /// The number of this run among many with the same seed. Its random numbers are then
+  /// counter-based, as in run `number` of a MonteCarlo; for packs lane i is run number + i. If left
+  /// out, the lanes take numbers in turn from one sequence. Packs with a number cannot have jitter,
+  /// because all lanes share the time.
   std::optional<std::uint64_t> number{};
 
   Time dead_time{};  ///< s from u to the plant, in addition to the plant's own dead time
   int substeps =
-      1;  ///< steps of integration per sample; for a linear plant one is exact, except for d
+      1;  ///< integration steps per sample; for a linear plant one is exact, unless d changes in it
   Time start_time{};                                   ///< t of the first sample, s
-  Input initial_input{};                               ///< u that was held before it
+  Input initial_input{};                               ///< u that was held before the first sample
   typename Types::State state = Types::State::Zero();  ///< x at the start
 };
 
 namespace detail {
 
-/// A part of a sample in which the input that arrives at the plant stands still.
+/// A part of a sample in which the input that arrives at the plant is constant.
 template <class Time>
 struct Stretch {
-  Time start;   ///< s from the sample on
+  Time start;   ///< s after the sample
   Time length;  ///< s
-  int age;      ///< of the input, samples: 0 is the newest
+  int age;      ///< age of the input, samples; 0: the newest
 };
 
-/// What is no longer than this is none.
+/// Stretches of up to this length are rounding errors and are dropped.
 template <class Time>
 Time rounding_of(const Time& sample_time) {
   return sample_time * std::max(Time(1e-9), 16 * std::numeric_limits<Time>::epsilon());
 }
 
-/// The stretches of a sample of length `whole`: it is cut at the steps of integration and where,
-/// dead_time late, another input arrives. A cut within rounding of another one is the same.
-/// @param arrivals when the input of age 0, 1, .. arrives, s from the sample on; the last one has
-///        arrived already
+/// Divides a sample of length `whole` into stretches: at the integration steps, and where another
+/// input arrives after the dead time. Cuts that differ by rounding only are the same.
+/// @param arrivals when the input of age 0, 1, .. arrives, s after the sample; the last one has
+///        already arrived
 template <class Time>
 void cut_sample(std::vector<Stretch<Time>>& stretches, const Time& whole, int substeps,
                 const std::vector<Time>& arrivals) {
@@ -180,7 +182,7 @@ void cut_sample(std::vector<Stretch<Time>>& stretches, const Time& whole, int su
   }
 }
 
-/// The inputs that are on their way to the plant.
+/// The inputs that have not arrived at the plant yet.
 template <class Input>
 class InputQueue {
  public:
@@ -191,7 +193,7 @@ class InputQueue {
     newest_ = newest_ + 1 == inputs_.size() ? 0 : newest_ + 1;
     inputs_[newest_] = u;
   }
-  /// @param age samples: 0 is the one pushed last
+  /// @param age samples; 0 is the one pushed last
   const Input& operator[](int age) const {
     const auto back = static_cast<std::size_t>(age);
     return inputs_[newest_ >= back ? newest_ - back : newest_ + inputs_.size() - back];
@@ -202,7 +204,7 @@ class InputQueue {
   std::size_t newest_ = 0;
 };
 
-/// An error in the scalar of time: of a pack that of its lane.
+/// Converts an error to the scalar of time; for a pack that of the lane.
 template <class Time, class From>
 Error<Time> as_error(const Error<From>& error) {
   return {error.field,
@@ -214,7 +216,7 @@ Error<Time> as_error(const Error<From>& error) {
           error.lane};
 }
 
-/// T, if it is one that the run can have.
+/// The sample time T, or an error if it does not fit the controller.
 template <class P, class C>
 Expected<typename RunTypes<P, C>::Time, Error<typename RunTypes<P, C>::Time>> run_sample_time(
     const C& controller, const RunConfig<P, C>& config) {
@@ -241,7 +243,7 @@ Expected<typename RunTypes<P, C>::Time, Error<typename RunTypes<P, C>::Time>> ru
   return given;
 }
 
-/// The plant over one stretch.
+/// Advances the plant over one stretch.
 template <class P>
 class PlantStep {
   using Time = LaneScalar<typename PlantScalarOf<P>::type>;
@@ -273,7 +275,7 @@ class PlantStep {
   Time length_;
 };
 
-/// A linear plant: exact.
+/// Advances a linear plant exactly.
 template <int States, class S, int Inputs, int Outputs>
 class PlantStep<LinearPlant<States, S, Inputs, Outputs>> {
   using P = LinearPlant<States, S, Inputs, Outputs>;
@@ -298,8 +300,8 @@ class PlantStep<LinearPlant<States, S, Inputs, Outputs>> {
   HeldPlant<States, S, Inputs> held_;
 };
 
-/// Noise, losses and jitter of a run, each with its own random numbers, so that one does not change
-/// the others.
+/// Noise, losses and jitter of a run, each with its own random numbers, so that a change of one
+/// does not affect the others.
 template <class P, class C>
 class RunChance {
   using Types = RunTypes<P, C>;
@@ -329,13 +331,13 @@ class RunChance {
     quiet_ = !noisy && !(config.missing > Time(0)) && !config.sensor;
   }
 
-  /// What the controller is given of y.
+  /// The measurement of y that the controller gets.
   ESOKIT_INLINE Output measured(Time t, Output y) {
     if (quiet_) return y;
     return disturbed(t, y);
   }
 
-  /// From this sample to the next, s.
+  /// Time from this sample to the next, s.
   Time step_time(std::int64_t k, const Time& sample_time) {
     if (config_.step_time) return config_.step_time(k);
     const double uniform =
@@ -392,11 +394,11 @@ class RunChance {
   const RunConfig<P, C>& config_;
   bool quiet_ = false;
   std::optional<Gaussian> noise_, losses_, jitter_;
-  std::vector<CountedGaussian<S>> counted_noise_;  ///< one an output
+  std::vector<CountedGaussian<S>> counted_noise_;  ///< one per output
   std::optional<CountedGaussian<S>> counted_losses_, counted_jitter_;
 };
 
-/// A run whose settings are checked.
+/// A run with checked settings.
 template <class P, class C>
 class Run {
   using Types = RunTypes<P, C>;
@@ -443,10 +445,10 @@ class Run {
   }
 
  private:
-  /// The shortest sample that there may be.
+  /// The shortest possible sample.
   [[nodiscard]] Time shortest() const { return even_ ? sample_time_ : sample_time_ / Time(10); }
 
-  /// The stretches of a sample that takes so long.
+  /// Computes the stretches of a sample of this length.
   Check<Time> cut(const Time& whole) {
     arrivals_.assign(1, dead_time_);
     for (int age = 0; arrivals_.back() > rounding_of(whole); ++age) {
@@ -474,7 +476,7 @@ class Run {
     }
   }
 
-  /// Calls use(r), with derivatives where there are some.
+  /// Calls use(r), with derivatives if the controller takes them.
   template <class Use>
   ESOKIT_INLINE void with(const Reference& reference, const Use& use) const {
     if constexpr (Types::references == 1) {
@@ -490,14 +492,15 @@ class Run {
     }
   }
 
-  /// @tparam Even all samples are as long @tparam Direct each is one stretch under its own u
+  /// @tparam Even all samples are equally long @tparam Direct each is one stretch under its own u
   template <bool Even, bool Direct, class Callback>
   [[gnu::noinline]] Outcome drive(C controller, Callback& on_sample) {
     constexpr bool channels = Types::references > 1 && !Types::derivatives;
-    // What is used in every sample is held here, where the compiler sees that nothing changes it.
+    // Local copies of everything that is used in every sample, so that the compiler knows that
+    // nothing changes it.
     auto x = config_.state;
     Time t = config_.start_time;
-    Time passed = sample_time_;  // since the sample before
+    Time passed = sample_time_;  // time since the last sample
     Reference reference = config_.reference(t);
     const auto direct = [&] {
       if constexpr (Direct) {
@@ -585,39 +588,39 @@ class Run {
   Time sample_time_, dead_time_;
   std::int64_t samples_;
   bool even_;
-  int oldest_;  ///< age of an input, samples
-  bool first_ =
-      false;  ///< y is the first state of a linear plant, which then is not to be computed
+  int oldest_;          ///< largest age of an input, samples
+  bool first_ = false;  ///< y is the first state of a linear plant: no product with C is needed
   InputQueue<Input> inputs_;
   InputQueue<Time> lengths_;
   RunChance<P, C> chance_;
   std::vector<Time> arrivals_;
   std::vector<Stretch<Time>> stretches_;
-  std::vector<PlantStep<P>> steps_;  ///< one a stretch
+  std::vector<PlantStep<P>> steps_;  ///< one per stretch
 };
 
 }  // namespace detail
 
-/// Drives a plant with a controller as it is deployed: at each sample the controller gets the
-/// measurement and the reference, and the u that it returns is held until the next sample.
+/// Simulates a plant with a controller as on the real system: at each sample the controller gets
+/// the measurement and the reference, and the u that it returns is held until the next sample.
 ///
 /// ```cpp
 /// auto run = sim::run(plant, controller, {.duration = 2.0, .reference = 1.0, .noise = 1e-3});
 /// ```
 ///
-/// A linear plant is sampled exactly, others are integrated (Runge-Kutta of order 4, `substeps` a
-/// sample). Everything switches between steps only. For the continuous simulation of papers use
-/// ContinuousLoop; the two are never mixed.
+/// A linear plant is sampled exactly, others are integrated (Runge-Kutta of order 4, `substeps`
+/// steps per sample). Inputs change between integration steps only. For continuous simulation as in
+/// the papers use ContinuousLoop.
 ///
-/// The controller is copied; the copy is in the result. Limits are up to the controller: u is used
-/// as it returns it.
+/// The controller is copied, and the copy is in the result. Limits are the controller's task: the
+/// simulation adds none to the u that it returns.
 /// @param plant LinearPlant, nonlinear_plant(..), or a type with `derivative` and `output`
-/// @param controller any controller of esokit, or your own `u = controller(y, reference)`, a lambda
-///        for one; y is NaN where a measurement is missing
+/// @param controller any controller of esokit, or your own `u = controller(y, reference)`, for
+///        example a lambda; y is NaN if the measurement is missing
 /// @param on_sample called once a sample with a RunSample, after the controller, and with the
-///        controller itself if it takes a second argument (to retune it, say); false stops the run
-/// @return how it ended; or an error that names the field of the config, or `plant`, `controller`,
-///         `disturbance` or `sensor` with the time at which its number was not finite
+///        controller itself if it takes a second argument (to retune it, say); if it returns false,
+///        the run stops
+/// @return the end of the run; or an error that names the field of the config, or `plant`,
+///         `controller`, `disturbance` or `sensor` with the time at which its result was not finite
 template <SampledPlant P, class C, class Callback>
 requires ControllerOf<C, P> Expected<RunEnd<P, C>, Error<typename RunTypes<P, C>::Time>> run(
     const P& plant, C controller, const std::type_identity_t<RunConfig<P, C>>& config,
@@ -656,7 +659,7 @@ requires ControllerOf<C, P> Expected<RunEnd<P, C>, Error<typename RunTypes<P, C>
       .not_negative("jitter", config.jitter)
       .require(!(config.jitter > Time(0.9)), "jitter", config.jitter, "must not be above 0.9")
       .require(lane_count<S> == 1 || !config.number || !(config.jitter > Time(0)), "jitter",
-               config.jitter, "must be left out where packs run by number")
+               config.jitter, "must be left out if packs run by number")
       .not_negative("dead_time", config.dead_time)
       .require(config.substeps >= 1 && config.substeps <= 1000000, "substeps",
                static_cast<Time>(config.substeps), "must be 1 .. 1000000")
@@ -679,14 +682,14 @@ requires ControllerOf<C, P> Expected<RunEnd<P, C>, Error<typename RunTypes<P, C>
   const bool even = !(config.jitter > Time(0)) && !config.step_time;
   const Time shortest = even ? T : T / Time(10);
   rules.require(dead_time / shortest < Time(1e6), "dead_time", dead_time,
-                "must be below 1e6 samples (1e5 where they jitter)");
+                "must be below 1e6 samples (1e5 with jitter)");
   if (!rules) return rules.error();
 
   detail::Run<P, C> driven(plant, config, T, dead_time, *samples);
   return driven(controller, on_sample);
 }
 
-/// The same, recorded.
+/// The same, with a recording of all samples.
 template <SampledPlant P, class C>
 requires ControllerOf<C, P> Expected<Recording<P, C>, Error<typename RunTypes<P, C>::Time>> run(
     const P& plant, C controller, const std::type_identity_t<RunConfig<P, C>>& config) {

@@ -1,5 +1,5 @@
 /// @file
-/// Inputs of a run that are a number or a function of time: reference and disturbance.
+/// The reference and the disturbance of a run: a number or a function of time.
 #pragma once
 
 #include <concepts>
@@ -14,7 +14,7 @@ namespace esokit::sim {
 
 namespace detail {
 
-/// What a function of time gives: a number, or a vector of at most so many.
+/// The result of a function of time: a number, or a vector of at most `Count`.
 template <class Value, class ScalarType, int Count>
 concept SignalValue = std::convertible_to<Value, ScalarType> ||
     (esokit::detail::vector_size<std::remove_cvref_t<Value>> >= 1 &&
@@ -22,10 +22,11 @@ concept SignalValue = std::convertible_to<Value, ScalarType> ||
 
 }  // namespace detail
 
-/// A constant or a function of t (s), `Count` numbers.
+/// A constant or a function of t (s), with `Count` elements.
 ///
-/// With `Derivatives` they are (s, s', ..): a plain number stands for (s, 0, ..), a vector may be
-/// shorter, and a signal of sim that knows its derivatives gives them. Without, they are channels.
+/// With `Derivatives` the elements are (s, s', ..): a plain number stands for (s, 0, ..), a vector
+/// may be shorter, and a DifferentiableSignal also gives its derivatives. Without, the elements are
+/// channels.
 template <Scalar ScalarType, int Count, bool Derivatives = false>
 class RunSignal {
   template <class Value>
@@ -35,7 +36,7 @@ class RunSignal {
 
  public:
   using Time = LaneScalar<ScalarType>;      ///< t, s
-  using Value = Vector<ScalarType, Count>;  ///< what it gives
+  using Value = Vector<ScalarType, Count>;  ///< its value
 
   /// Zero.
   RunSignal() = default;
@@ -51,8 +52,8 @@ class RunSignal {
       : plain_(std::convertible_to<std::invoke_result_t<const F&, Time>, ScalarType>) {
     using Result = std::invoke_result_t<const F&, Time>;
     static_assert(fits<Result>,
-                  "esokit: the function gives a number, or as many as there are channels, or no "
-                  "more derivatives than the controller takes");
+                  "esokit: the function must give one number, one per channel, or no more "
+                  "derivatives than the controller takes");
     if constexpr (Derivatives && Count > 1 && DifferentiableSignal<F, Time> &&
                   std::same_as<ScalarType, Time>) {
       plain_ = false;
@@ -78,7 +79,7 @@ class RunSignal {
     }
   }
 
-  /// Of packs what a plain one is, the same in every lane.
+  /// From a plain signal, the same in every lane.
   template <Scalar Plain>
   requires(lane_count<ScalarType> > 1 && std::same_as<Plain, LaneScalar<ScalarType>>)
       RunSignal(const RunSignal<Plain, Count, Derivatives>& plain)
@@ -98,14 +99,14 @@ class RunSignal {
     }
   }
 
-  /// Its numbers at t.
+  /// The value at t.
   [[nodiscard]] Value operator()(const Time& t) const {
     return function_ ? function_(t) : constant_;
   }
 
-  /// True if it gives one number, whose derivatives, if any, count as zero.
+  /// True if it gives one number; derivatives, if needed, are then zero.
   [[nodiscard]] bool plain() const noexcept { return plain_; }
-  /// True if it is no function.
+  /// True if it is constant, not a function.
   [[nodiscard]] bool constant() const noexcept { return !function_; }
 
  private:

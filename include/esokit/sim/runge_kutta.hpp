@@ -12,7 +12,7 @@
 
 namespace esokit::sim {
 
-/// The classical method of order 4.
+/// The classical Runge-Kutta method of order 4.
 struct RungeKutta4 {
   /// See ButcherTableau.
   /// @{
@@ -26,7 +26,7 @@ struct RungeKutta4 {
 };
 
 /// A right-hand side of x' = rhs(t, x). It must return a State and not an expression template,
-/// because its operands would no longer exist.
+/// whose operands would no longer exist.
 template <class Rhs, class State, class ScalarType>
 concept RightHandSide = requires(Rhs& rhs, ScalarType t, const State& x) {
   requires std::same_as<std::remove_cvref_t<decltype(rhs(t, x))>, State>;
@@ -34,7 +34,7 @@ concept RightHandSide = requires(Rhs& rhs, ScalarType t, const State& x) {
 
 namespace detail {
 
-/// A tableau entry in the scalar; entries that are not plain go through double.
+/// A tableau entry in the scalar type; scalars that are not plain are converted from double.
 template <class ScalarType>
 constexpr ScalarType coefficient(long double value) {
   if constexpr (PlainScalar<ScalarType>) {
@@ -50,7 +50,7 @@ constexpr ScalarType scaled(long double weight, ScalarType h) {
   return weight == 1 ? h : coefficient<ScalarType>(weight) * h;
 }
 
-/// A number of time as what a state can be multiplied by: of packs it is the same in each lane.
+/// A number of the type of time as a factor for a state; for packs the same in each lane.
 template <class State, class ScalarType>
 constexpr auto factor(const ScalarType& number) {
   if constexpr (requires { requires(lane_count<typename State::value_type> > 1); }) {
@@ -70,11 +70,11 @@ constexpr long double weight_of() {
   }
 }
 
-// Each stage is a local of its own, handed on by reference: an array of stages stays in memory, and
-// costs 2.4 times hand-written code for two states at g++ -O2.
+// Each stage is a separate local variable that is passed on by reference: an array of stages would
+// stay in memory and, for two states at g++ -O2, take 2.4 times as long as hand-written code.
 
-/// sum + h (w_J first + w_{J+1} rest..), zero weights left out. The sum is handed on unevaluated,
-/// so that Eigen makes one pass over it.
+/// sum + h (w_J first + w_{J+1} rest..), without zero weights. The sum is passed on unevaluated, so
+/// that Eigen evaluates it in one pass.
 template <class Method, int Stage, int J, class State, class ScalarType, class Sum>
 [[gnu::always_inline]] inline State advanced(ScalarType /*h*/, const Sum& sum) {
   return sum;
@@ -91,7 +91,7 @@ template <class Method, int Stage, int J, class State, class ScalarType, class S
   }
 }
 
-/// Evaluates the stages from number sizeof...(k) on, and adds them up.
+/// Evaluates the stages from number sizeof...(k) on, and sums them.
 template <class Method, class Rhs, class State, class ScalarType, class... Stages>
 [[gnu::always_inline]] inline State finish_step(Rhs& rhs, ScalarType t, const State& x,
                                                 ScalarType h, const Stages&... k) {
@@ -113,9 +113,9 @@ template <class Method, class Rhs, class State, class ScalarType, class... Stage
 
 /// One step of x' = rhs(t, x) from t to t + h.
 ///
-/// The state is a scalar, a fixed Eigen vector, or any copyable type with `x + x` and
-/// `scalar * x`. Inputs and noise that are held over a step belong into the closure of rhs;
-/// switches belong between steps, since a jump inside a step costs the order.
+/// The state is a scalar, a fixed Eigen vector, or any copyable type with `x + x` and `scalar * x`.
+/// Inputs and noise that are held over a step belong in the closure of rhs. Switch between steps
+/// only, because a jump within a step reduces the order of accuracy.
 ///
 /// @param rhs called `Method::stages` times as rhs(time, state)
 /// @param t   time at the start of the step, s
@@ -128,7 +128,7 @@ requires RightHandSide<std::remove_reference_t<Rhs>, State, ScalarType>
   return detail::finish_step<Method>(rhs, t, x, h);
 }
 
-/// `steps` steps from t0; the time of a step is t0 + k h, so that it does not drift.
+/// `steps` steps from t0. The time of a step is t0 + k h, so that rounding does not accumulate.
 /// @param rhs as in `step` @param t0 s @param x state at t0 @param h step, s
 /// @return the state at t0 + steps h
 template <ExplicitRungeKutta Method = RungeKutta4, class State, PlainScalar ScalarType, class Rhs>

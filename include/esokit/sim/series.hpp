@@ -9,7 +9,7 @@
 
 namespace esokit::sim {
 
-/// A view of samples, at given times or with a constant step. It owns nothing.
+/// A view of samples, at given times or with a constant step. It does not own them.
 template <PlainScalar ScalarType = double>
 class Series {
  public:

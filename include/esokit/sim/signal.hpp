@@ -1,5 +1,5 @@
 /// @file
-/// What a signal is.
+/// The concept of a signal.
 #pragma once
 
 #include <array>
@@ -8,7 +8,7 @@
 
 namespace esokit::sim {
 
-/// A function of time, s(t). A lambda is one.
+/// A function of time, s(t), for example a lambda.
 template <class S, class ScalarType = double>
 concept Signal = std::copy_constructible<S> && requires(const S& s, ScalarType t) {
   { s(t) } -> std::same_as<ScalarType>;
@@ -16,7 +16,7 @@ concept Signal = std::copy_constructible<S> && requires(const S& s, ScalarType t
 
 /// A signal that also knows its derivatives: `derivatives<Count>(t)` is (s, s', .., s^(Count-1)).
 ///
-/// At a point where a derivative jumps it is the limit from the right, and impulses are left out.
+/// Where a derivative jumps, its limit from the right is given; impulses are left out.
 template <class S, class ScalarType = double>
 concept DifferentiableSignal = Signal<S, ScalarType> && requires(const S& s, ScalarType t) {
   { s.template derivatives<1>(t) } -> std::same_as<std::array<ScalarType, 1>>;

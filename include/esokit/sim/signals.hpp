@@ -1,5 +1,5 @@
 /// @file
-/// All signals.
+/// Includes all signals.
 #pragma once
 
 #include <esokit/sim/combined_signals.hpp>    // IWYU pragma: export

@@ -1,5 +1,5 @@
 /// @file
-/// Statistics of a number over many runs, in memory that does not grow with their number.
+/// Statistics of a result over many runs, in memory that does not grow with the number of runs.
 #pragma once
 
 #include <array>
@@ -15,20 +15,20 @@
 
 namespace esokit::sim {
 
-/// One number of each run: mean, deviation, extremes with their run, quantiles, and how often a
-/// limit was kept.
+/// Statistics of one result per run: mean, standard deviation, extremes with their run, quantiles,
+/// and how often a limit was kept.
 ///
-/// For the quantiles, numbers are counted in bins with a width of 2^-12 of their size: quantiles
-/// are accurate to 0.025 % in any unit. This takes 32 kB for each power of two in which numbers
-/// lie.
+/// For the quantiles, results are counted in bins with a width of 2^-12 of their size, so that
+/// quantiles are accurate to 0.025 % in any unit. This takes 32 kB for each power of two in which
+/// results lie.
 class RunStatistics {
  public:
-  /// @param name what it is @param limit what the number must not be above, for `kept`
+  /// @param name name of the result @param limit largest result that counts as `kept`
   explicit RunStatistics(std::string name = {},
                          double limit = std::numeric_limits<double>::infinity())
       : name_(std::move(name)), limit_(limit) {}
 
-  /// One more. @param run which it belongs to @param value finite
+  /// Adds a result. @param run number of the run @param value finite
   void add(std::int64_t run, double value) {
     ++count_;
     const double step = value - mean_;
@@ -47,17 +47,17 @@ class RunStatistics {
     ++pages_[ordered >> 52u][static_cast<std::size_t>((ordered >> 40u) & 4095u)];
   }
 
-  /// What it is.
+  /// Name of the result.
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
-  /// Runs that gave a number.
+  /// Number of results.
   [[nodiscard]] std::int64_t count() const noexcept { return count_; }
-  /// Mean; zero of none.
+  /// Mean; zero without results.
   [[nodiscard]] double mean() const noexcept { return mean_; }
-  /// Standard deviation, with count - 1 below; zero of one number.
+  /// Standard deviation, with count - 1 as divisor; zero for one result.
   [[nodiscard]] double deviation() const noexcept {
     return count_ > 1 ? std::sqrt(squares_ / static_cast<double>(count_ - 1)) : 0.0;
   }
-  /// The extremes, and the first run that had them; zero of none.
+  /// The extremes, and the first run that had them; zero without results.
   /// @{
   [[nodiscard]] double smallest() const noexcept { return smallest_; }
   [[nodiscard]] double largest() const noexcept { return largest_; }
@@ -66,11 +66,11 @@ class RunStatistics {
   /// @}
   /// The limit; infinite if there is none.
   [[nodiscard]] double limit() const noexcept { return limit_; }
-  /// How many numbers are not above the limit.
+  /// Number of results that are not above the limit.
   [[nodiscard]] std::int64_t kept() const noexcept { return kept_; }
 
-  /// The quantile: the number below which a share of all numbers lies, with those of a bin spread
-  /// evenly; zero if there are none.
+  /// The quantile: the value below which a share of all results lies, interpolated within a bin;
+  /// zero without results.
   /// @param share 0 .. 1
   [[nodiscard]] double quantile(double share) const {
     double below = share * static_cast<double>(count_);
@@ -91,7 +91,7 @@ class RunStatistics {
   }
 
  private:
-  /// Bits whose order as whole numbers is that of the numbers, and back.
+  /// Converts a number to bits that have the same order as whole numbers, and back.
   /// @{
   static std::uint64_t in_order(double value) noexcept {
     const auto bits = std::bit_cast<std::uint64_t>(value);
@@ -108,10 +108,10 @@ class RunStatistics {
   std::int64_t count_ = 0;
   std::int64_t kept_ = 0;
   double mean_ = 0.0;
-  double squares_ = 0.0;  ///< of the differences to the mean
+  double squares_ = 0.0;  ///< sum of squared differences to the mean
   double smallest_ = 0.0, largest_ = 0.0;
   std::int64_t run_of_smallest_ = 0, run_of_largest_ = 0;
-  std::map<std::uint64_t, std::array<std::uint64_t, 4096>> pages_;  ///< by sign and exponent
+  std::map<std::uint64_t, std::array<std::uint64_t, 4096>> pages_;  ///< bins by sign and exponent
 };
 
 }  // namespace esokit::sim

@@ -9,25 +9,26 @@
 
 namespace esokit::sim {
 
-/// Measures a step response inside a loop: add(t, y) at every sample. Crossings between samples are
-/// interpolated linearly; all times count from `step_time`, and samples before it are passed over.
+/// Measures a step response while a loop runs: call add(t, y) at every sample. Crossings between
+/// samples are interpolated linearly; all times count from `step_time`, and samples before it are
+/// ignored.
 template <PlainScalar ScalarType = double>
 class StepResponse {
  public:
   /// Settings of make.
   struct Config {
-    ScalarType initial_value{};  ///< before the step
-    ScalarType final_value{1};   ///< after it; differs from the initial one
+    ScalarType initial_value{};  ///< value before the step
+    ScalarType final_value{1};   ///< value after it, not equal to the initial one
     ScalarType step_time{};      ///< s
     ScalarType band =
         static_cast<ScalarType>(0.02L);  ///< settling band, as a fraction of the step, positive
     ScalarType rise_from =
-        static_cast<ScalarType>(0.1L);  ///< where the rise begins, as a fraction of the step
-    ScalarType rise_to = static_cast<ScalarType>(0.9L);  ///< where it ends, above `rise_from`
+        static_cast<ScalarType>(0.1L);  ///< start of the rise, as a fraction of the step
+    ScalarType rise_to = static_cast<ScalarType>(0.9L);  ///< end of the rise, above `rise_from`
   };
 
-  /// Refuses members that are not finite, a step of no height or one that the scalar cannot hold,
-  /// a band that is not positive, and a rise that does not go up.
+  /// Refuses members that are not finite, a step that is zero or overflows, a band that is not
+  /// positive, and a `rise_to` that is not above `rise_from`.
   static constexpr Expected<StepResponse, Error<ScalarType>> make(const Config& config) {
     Rules<ScalarType> rules;
     rules.finite("initial_value", config.initial_value)
@@ -76,8 +77,8 @@ class StepResponse {
     return true;
   }
 
-  /// How far the response went beyond the final value, as a fraction of the step; zero if it never
-  /// did. Nothing before the first sample.
+  /// The largest excess over the final value, as a fraction of the step; zero if there is none.
+  /// Nothing before the first sample.
   constexpr std::optional<ScalarType> overshoot() const noexcept {
     if (!valid()) return std::nullopt;
     return largest_ > ScalarType{1} ? largest_ - ScalarType{1} : ScalarType{};
@@ -105,7 +106,7 @@ class StepResponse {
 
   constexpr bool valid() const noexcept { return started_ && !spoilt_; }
 
-  /// Where the line from the last sample to (t, progress) has the given level.
+  /// Time at which the line from the last sample to (t, progress) has the given level.
   constexpr ScalarType crossing(ScalarType level, ScalarType t,
                                 ScalarType progress) const noexcept {
     return time_ + (t - time_) * ((level - progress_) / (progress - progress_));

@@ -7,9 +7,9 @@
 
 namespace esokit::sim {
 
-/// Trapezoid rule inside a loop: add(t, f(t)) at every sample, f being the integrand (abs(e), e^2,
-/// t abs(e), ..). Where an edge of the window falls between two samples the integrand there is
-/// interpolated.
+/// Trapezoid rule while a loop runs: call add(t, f(t)) at every sample with the integrand f
+/// (abs(e), e^2, t abs(e), ..). If an edge of the window falls between two samples, the integrand
+/// there is interpolated.
 template <PlainScalar ScalarType = double>
 class Trapezoid {
  public:
@@ -19,8 +19,8 @@ class Trapezoid {
   explicit constexpr Trapezoid(const Window<ScalarType>& window) : window_(window) {}
 
   /// Adds a sample. False, and the sample is left out, if the time is not finite or before that of
-  /// the last sample. A repeated time marks a jump. An integrand that is not finite is taken, and
-  /// shows in the value.
+  /// the last sample. A repeated time marks a jump. An integrand that is not finite is added and
+  /// makes the value not finite.
   constexpr bool add(ScalarType t, ScalarType f) noexcept {
     if (!is_finite(t) || (started_ && t < time_)) return false;
     if (started_ && t > time_) add_segment(t, f);
@@ -45,7 +45,7 @@ class Trapezoid {
     const ScalarType to = t > window_.end() ? window_.end() : t;
     if (!(from < to)) return;
     const ScalarType slope = (f - integrand_) / (t - time_);
-    // Whole segments use the samples themselves: the interpolation would round them.
+    // Whole segments use the samples themselves, because interpolation would round them.
     const ScalarType f_from = from == time_ ? integrand_ : integrand_ + slope * (from - time_);
     const ScalarType f_to = to == t ? f : integrand_ + slope * (to - time_);
     value_ += (f_from + f_to) / ScalarType{2} * (to - from);

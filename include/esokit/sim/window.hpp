@@ -39,7 +39,7 @@ class Window {
   constexpr ScalarType start() const noexcept { return config_.start; }
   /// Last moment, s.
   constexpr ScalarType end() const noexcept { return config_.end; }
-  /// True if t (s) is in it, ends included.
+  /// True if t (s) is in the window, ends included.
   constexpr bool contains(ScalarType t) const noexcept { return t >= start() && t <= end(); }
 
  private:
