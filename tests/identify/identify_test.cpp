@@ -364,12 +364,12 @@ TEST(Identified, GoesStraightIntoAnObserverSimulationAndAnalysis) {
                    : std::string(refused.error().field) + ": " + refused.error().rule;
   };
   EXPECT_EQ(rule(found.model<esokit::ModelParts{.order = 1}>()),
-            "order: is not the requested one:");
+            "order: is not the requested order, which is");
   EXPECT_EQ(rule(found.observer<esokit::ModelParts{.order = 3}>(40, T)),
-            "order: is not the requested one:");
+            "order: is not the requested order, which is");
   found.sinusoids.pop_back();
   EXPECT_EQ(rule(found.model<parts>()),
-            "sinusoids: were found, fewer than the resonators that are asked for:");
+            "sinusoids: were found, fewer than the requested resonators:");
 }
 
 // Stamps since 1970, with jitter that they tell, missing rows and a long gap.
@@ -440,15 +440,14 @@ TEST(Judge, RefusesByName) {
       {&bad.log.jitter, 0.0501 * T,
        "jitter: is the jitter over T without time stamps, above 0.05: record the time of each row"},
       {&bad.own_input, 0.9e-5,
-       "own_input: is the share of u that y does not explain, so nothing else moves the loop: "
-       "record a moving reference"},
+       "own_input: is the share of u that does not follow from y, which is too small: record a "
+       "moving reference"},
       {&bad.excitation, 0.151,
        "excitation: is the smallest relative error of b0 and too large, because u hardly moves y: "
        "record steps or a sweep"},
       {&bad.correlation, 0.101,
-       "correlation: is the correlation of the innovations, so the machine has more than the "
-       "model: record without a load that swings, or add known effects as a column; must be at "
-       "most"},
+       "correlation: is the correlation of the innovations, so the model lacks something: record "
+       "without an oscillating load, or add known effects as columns; must be at most"},
       {&bad.plateau.spread, 0.101,
        "plateau: is the relative change of b0 between neighbouring bandwidths, so there is no "
        "plateau: record more motion in the band of the controller; must be at most"},
@@ -638,8 +637,8 @@ TEST(PrepareLog, RefusesUnitsOfWhichAFitCannotTakeSquares) {
     return prepared ? "accepted"
                     : std::string(prepared.error().field) + ": " + prepared.error().rule;
   };
-  const char* const large = "is too large: write it in another unit";
-  const char* const little = "is the whole range of its values: write it in another unit";
+  const char* const large = "is too large: use another unit";
+  const char* const little = "is the range of its values, which is too small: use another unit";
   for (int which = 0; which < 3; ++which) {
     const std::string field = which == 0 ? "u: " : which == 1 ? "y: " : "columns: ";
     Log bad = log;
@@ -932,7 +931,7 @@ TEST(Study, RefusesBadOptions) {
   options = quick();
   for (const int extension : {-1, 3}) {
     options.extension = extension;
-    EXPECT_EQ(text(log), "extension: must be 1, 2, or 0: chosen");
+    EXPECT_EQ(text(log), "extension: must be 0 (chosen), 1 or 2");
   }
   options = quick();
   for (const int bins : {1, 21}) {

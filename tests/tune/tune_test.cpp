@@ -468,9 +468,9 @@ TEST(TuneTest, RefusesWhatIsNoProblem) {
   EXPECT_EQ(refused([](TuneModel& m) { m.u_max = m.u_min; }), "u_max must be above u_min");
   const auto same = [](TuneModel&) {};
   EXPECT_EQ(refused(same, {.control_noise = 1e-3}),
-            "control_noise is less than needed to cancel the disturbance alone, that is");
+            "control_noise is less than needed to cancel the disturbance alone, which is");
   EXPECT_EQ(refused(same, {.settling_time = 1e-3}),
-            "settling_time is less than this sample time and dead time allow, that is");
+            "settling_time is shorter than sample time and dead time allow, which is");
   EXPECT_EQ(refused(same, {.settling_time = 1.0, .controller_bandwidth = 4.0}),
             "controller_bandwidth must be left out if control_noise or settling_time is given");
   EXPECT_EQ(refused(same, {.settling_time = 1e9}),

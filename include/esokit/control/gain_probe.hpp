@@ -21,9 +21,8 @@ struct GainProbeConfig {
   S sample_time{};         ///< T, s; omega_o T is at most 1
   S amplitude{};           ///< A, unit of u: several times the u that overcomes friction
   S travel{};              ///< largest abs(y - y0), unit of y; beyond it the probe ends
-  int periods =
-      8;  ///< number of measured periods, after one to settle; each 10 / omega_o long; 6 .. 200
-  Limits<S> limits{};  ///< of the actuator: u plus the steps is kept within them
+  int periods = 8;         ///< measured periods, after one to settle; 10 / omega_o each; 6 .. 200
+  Limits<S> limits{};      ///< of the actuator: u plus the steps is kept within them
 };
 
 /// The result of a probe.

@@ -23,8 +23,7 @@ struct HealthConfig {
   S noise{};     ///< standard deviation of the noise of y, unit of y; 0: unknown, no check of the
                  ///< innovation
   S memory = 1;  ///< s: time constant with which old samples are forgotten
-  int divider =
-      4;  ///< D: the regression uses every D-th sample, 1 .. 1000; D omega_o T is at most 1
+  int divider = 4;  ///< D: the regression uses every D-th sample, 1 .. 1000; D omega_o T <= 1
 };
 
 /// What a monitor has found. Shares refer to about the last `memory` seconds, counts to all
@@ -35,14 +34,13 @@ struct Health {
   std::uint32_t rejected = 0;  ///< measurements that were not finite or outliers
   std::uint32_t bridged = 0;   ///< corrections after a gap, and restarts
   std::uint32_t gated = 0;     ///< samples under less than full trust, see Guarded
-  std::uint32_t unsafe =
-      0;                    ///< samples in which the law did not determine u: start hold, safe mode
-  S saturated{};            ///< share of samples at a limit, of magnitude or rate
-  S bounded{};              ///< share of samples with dhat at its bound, see Guarded
-  S innovation{};           ///< rms, unit of y
-  S innovation_of_noise{};  ///< rms that the noise alone would cause; 0 if unknown
-  S gain_ratio = 1;         ///< rho: estimate of b / b0, see HealthMonitor
-  S evidence{};             ///< omega_o times the time in which u moved enough to estimate rho
+  std::uint32_t unsafe = 0;    ///< samples with u not determined by the law: start hold, safe mode
+  S saturated{};               ///< share of samples at a limit, of magnitude or rate
+  S bounded{};                 ///< share of samples with dhat at its bound, see Guarded
+  S innovation{};              ///< rms, unit of y
+  S innovation_of_noise{};     ///< rms that the noise alone would cause; 0 if unknown
+  S gain_ratio = 1;            ///< rho: estimate of b / b0, see HealthMonitor
+  S evidence{};                ///< omega_o times the time in which u moved enough to estimate rho
 };
 
 /// The likely fault of a loop, the worst first.

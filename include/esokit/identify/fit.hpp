@@ -1,14 +1,14 @@
 /// @file
-/// The innovations fit: a chain of integrators behind a lag and a dead time, from a log.
+/// The innovations fit: from a log to a chain of integrators with a lag and a dead time.
 ///
 ///     y^(n) + a y^(n-1) = b0 v(t - L) + sum_j theta_j r_j + d,   tau v' + v = u,   d^(m) = noise
 ///
-/// For a given bandwidth w (disturbance over noise), tau, L and a, the innovations of the Kalman
-/// filter of this model are linear in b0 and theta, which therefore follow in closed form. w, L +
-/// tau, the share of tau and a are found by Levenberg-Marquardt on the innovations. In steady state
-/// the likelihood is largest where the mean square of the innovations is least (Ljung, System
-/// Identification, 2nd ed., sec. 7.4). The filter starts from a diffuse state, at the first row and
-/// after each gap.
+/// For a given bandwidth w (ratio of disturbance to noise), tau, L and a, the innovations of the
+/// Kalman filter of this model are linear in b0 and theta, which therefore have a closed form. w, L
+/// + tau, the share of tau and a are found by the Levenberg-Marquardt method on the innovations. In
+/// steady state the likelihood is largest where the mean square of the innovations is smallest (L.
+/// Ljung, System Identification, 2nd ed., sec. 7.4). The filter starts from a diffuse state
+/// (infinite covariance) at the first row and after each gap.
 #pragma once
 
 #include <algorithm>
@@ -27,23 +27,23 @@
 
 namespace esokit {
 
-/// A number and its 95 % interval.
+/// An estimated number with its 95 % interval.
 struct Estimate {
-  double value = 0.0;       ///< best guess
+  double value = 0.0;       ///< best estimate
   double half_width = 0.0;  ///< the interval is value - half_width .. value + half_width
   [[nodiscard]] double low() const { return value - half_width; }   ///< lower end
   [[nodiscard]] double high() const { return value + half_width; }  ///< upper end
 
-  /// Half width over magnitude.
+  /// Half width divided by the magnitude.
   [[nodiscard]] double share() const { return half_width / std::abs(value); }
 };
 
-/// Rows at one sample time, for the fit.
+/// Rows with a constant sample time, for the fit.
 struct FitData {
   double sample_time = 0.0;            ///< T, s
   std::vector<double> u;               ///< input, held from its row to the next
   std::vector<double> y;               ///< output, measured at its row
-  std::vector<std::size_t> starts{0};  ///< first rows of pieces without a gap
+  std::vector<std::size_t> starts{0};  ///< index of the first row of each piece without a gap
 
   /// Times of these rows, s; empty: no gap in time.
   std::vector<double> start_times{};
@@ -51,13 +51,14 @@ struct FitData {
   /// More inputs that reach the plant through the same lag and dead time, each as long as u.
   std::vector<std::vector<double>> inputs{};
 
-  /// Known effects that act where the disturbance acts, each as long as y: friction, a known load.
+  /// Columns with known effects that enter where the disturbance does, each as long as y: friction,
+  /// a known load.
   std::vector<std::vector<double>> columns{};
   int averaged =
-      1;  ///< rows of the log in each of these; above 1 the input goes straight between them
+      1;  ///< rows of the log that were averaged into one; above 1 the input is linear between rows
 };
 
-/// Which model is fitted.
+/// The model that is fitted.
 struct FitModel {
   int order = 2;      ///< n, 1 to 3
   int extension = 1;  ///< m, 1 or 2
@@ -66,8 +67,8 @@ struct FitModel {
 
 /// The parameters on which the innovations depend nonlinearly.
 struct FitPoint {
-  double bandwidth =
-      0.0;  ///< w, rad/s: w^(2 (n + m)) is the disturbance's intensity over the noise's
+  double bandwidth = 0.0;  ///< w, rad/s: w^(2 (n + m)) is the intensity of the disturbance divided
+                           ///< by that of the noise
   double latency = 0.0;    ///< tau + L, s
   double lag_share = 0.5;  ///< tau / (tau + L)
   double pole = 0.0;       ///< a, 1/s
@@ -79,11 +80,11 @@ struct FitPoint {
 /// A fitted model.
 struct Fit {
   FitPoint at{};                 ///< the nonlinear parameters
-  std::vector<double> linear{};  ///< b0, then one number a further input and a column
-  double mean_square = 0.0;      ///< of the innovations, y's unit squared
+  std::vector<double> linear{};  ///< b0, then one number for each further input and each column
+  double mean_square = 0.0;      ///< of the innovations, unit of y squared
   double noise = 0.0;            ///< standard deviation of the measurement noise
-  double disturbance = 0.0;      ///< intensity of d^(m): its increments' variance over time
-  std::size_t rows = 0;          ///< innovations that count
+  double disturbance = 0.0;      ///< intensity of d^(m): variance of its increments per time
+  std::size_t rows = 0;          ///< number of innovations used
   bool converged = false;        ///< whether the last step was small
   [[nodiscard]] double input_gain() const { return linear.empty() ? 0.0 : linear[0]; }  ///< b0
 };
@@ -93,14 +94,15 @@ struct FitBounds {
   double bandwidth_min = 0.0;  ///< of w, rad/s
   double bandwidth_max = 0.0;  ///< of w, rad/s
   double latency_min = 0.0;    ///< of tau + L, s
-  double latency_max = 0.0;  ///< of tau + L, s; so many rows of a piece only fill lag and dead time
-  double pole_latency = 0.5;  ///< largest a (tau + L): beyond, pole and lag swap
+  double latency_max =
+      0.0;  ///< of tau + L, s; the first rows of a piece, for this time, are not used
+  double pole_latency = 0.5;  ///< largest a (tau + L): beyond it pole and lag are exchanged
 };
 
 namespace detail {
 
-/// Solves the normal equations in place of `right`, with columns scaled to one; a column of zeros
-/// gets zero.
+/// Solves the normal equations in place of `right`, with columns scaled to one. A column of zeros
+/// gets the solution zero.
 inline void solve_normal(std::vector<double> matrix, std::vector<double>& right, int n) {
   std::vector<double> scale(static_cast<std::size_t>(n));
   const auto at = [n](int i, int j) { return static_cast<std::size_t>(j * n + i); };
@@ -112,7 +114,7 @@ inline void solve_normal(std::vector<double> matrix, std::vector<double>& right,
     for (int i = 0; i < n; ++i) {
       matrix[at(i, j)] *= scale[static_cast<std::size_t>(i)] * scale[static_cast<std::size_t>(j)];
     }
-    // Two columns that are the same to ten digits share the effect instead of dividing by zero.
+    // Two columns that agree to ten digits share the effect, instead of a division by zero.
     matrix[at(j, j)] += scale[static_cast<std::size_t>(j)] > 0.0 ? 1e-10 : 1.0;
     right[static_cast<std::size_t>(j)] *= scale[static_cast<std::size_t>(j)];
   }
@@ -121,7 +123,7 @@ inline void solve_normal(std::vector<double> matrix, std::vector<double>& right,
     right[static_cast<std::size_t>(i)] *= scale[static_cast<std::size_t>(i)];
 }
 
-/// Sum of a[k] b[k], in four sums so that one addition need not wait for the other.
+/// Sum of a[k] b[k], as four independent sums, so that additions do not wait for each other.
 inline double dot(const double* a, const double* b, std::size_t count) noexcept {
   std::array<double, 4> sums{};
   std::size_t k = 0;
@@ -132,36 +134,36 @@ inline double dot(const double* a, const double* b, std::size_t count) noexcept 
   return (sums[0] + sums[1]) + (sums[2] + sums[3]);
 }
 
-/// What the Riccati recursion gives; it depends on w and a alone.
+/// The result of the Riccati recursion; it depends on w and a only.
 struct GainTable {
   double bandwidth = 0.0;
   double pole = 0.0;
-  std::vector<double> gains{};    // so many a row as there are states, until steady
+  std::vector<double> gains{};    // one per state in each row, until steady
   std::vector<double> weights{};  // sqrt(steady variance / variance)
-  double steady_variance = 1.0;   // of an innovation, over that of the noise
+  double steady_variance = 1.0;   // of an innovation, divided by that of the noise
 };
 
-/// The Kalman filter of one point: transition, input weights, gains from a diffuse start on.
+/// The Kalman filter for one point: transition, input weights, and gains from a diffuse start.
 template <int States>
 struct InnovationsFilter {
   static constexpr int N = States;
   using Vector = std::array<double, static_cast<std::size_t>(N)>;
 
   std::array<Vector, static_cast<std::size_t>(N)> phi{};  // [row][column]
-  Vector lag{}, previous{}, current{}, next{};            // from v, u of three rows to x
+  Vector lag{}, previous{}, current{}, next{};            // from v and from u of three rows to x
   double lag_decay = 0.0, lag_previous = 0.0, lag_current = 0.0, lag_next = 0.0;
   Vector column{};  // from a column to x
   std::ptrdiff_t delay = 0;
   std::shared_ptr<const GainTable> table{};
 
-  /// @param cached gains of the filter before, taken if they are the same; gets the new ones
+  /// @param cached gains of the last filter, reused if they are the same; receives the new ones
   static InnovationsFilter make(const FitData& data, const FitModel& model, const FitPoint& point,
                                 std::shared_ptr<const GainTable>& cached) {
     InnovationsFilter f;
     const double T = data.sample_time;
     const double w = point.bandwidth;
     const int n = model.order;
-    // States are y^(i) / w^i, so that the entries are of one size.
+    // The states are y^(i) / w^i, so that the entries are of similar size.
     const double tau = std::max(point.lag(), 0.05 * T);
     double dead = std::max(point.latency - tau, 0.0);
     if (data.averaged > 1) dead += 0.5 * T / data.averaged;
@@ -192,7 +194,7 @@ struct InnovationsFilter {
         f.phi[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)] = whole[at(i, j)];
       }
     }
-    // The input as seen over one row: u of the row before until `fraction`, then the row's own.
+    // The input within one row: u of the row before until `fraction`, then that of the row itself.
     const bool straight = data.averaged > 1;
     std::array<double, static_cast<std::size_t>(M)> weight{};
     const auto weigh = [&](int which) {  // 0 previous, 1 current, 2 next
@@ -224,7 +226,7 @@ struct InnovationsFilter {
     take(f.next, f.lag_next);
     for (int i = 0; i < N; ++i) f.lag[static_cast<std::size_t>(i)] = whole[at(i, N)];
     f.lag_decay = whole[at(N, N)];
-    // A column acts as the disturbance does.
+    // A column enters where the disturbance does.
     for (int i = 0; i < n; ++i) {
       f.column[static_cast<std::size_t>(i)] =
           f.phi[static_cast<std::size_t>(i)][static_cast<std::size_t>(n)] / std::pow(w, n);
@@ -240,7 +242,8 @@ struct InnovationsFilter {
     return f;
   }
 
-  /// Riccati recursion for noise of variance one; the last state takes a step of variance q a row.
+  /// Riccati recursion for noise of variance one; the last state is a random walk with variance q
+  /// per row.
   void find_gains(double q, std::size_t most, GainTable& found) const {
     std::array<Vector, static_cast<std::size_t>(N)> p{};
     for (int i = 0; i < N; ++i) p[static_cast<std::size_t>(i)][static_cast<std::size_t>(i)] = 1e8;
@@ -264,7 +267,7 @@ struct InnovationsFilter {
       for (std::size_t i = 1; i < k.size(); ++i) {
         for (std::size_t j = 1; j < k.size(); ++j) p[i][j] -= k[i] * k[j] * s;
       }
-      // p - p^2 / (p + 1) as it stands would lose what is left of it.
+      // p - p^2 / (p + 1), computed directly, would cancel.
       for (std::size_t i = 0; i < k.size(); ++i) p[0][i] = p[i][0] = k[i];
       for (std::size_t i = 0; i < k.size(); ++i) {
         for (std::size_t j = 0; j < k.size(); ++j) {
@@ -290,7 +293,8 @@ struct InnovationsFilter {
     }
   }
 
-  /// Power of the disturbance in y over that of the noise, at that part of half the sample rate.
+  /// Power of the disturbance in y divided by that of the noise, at the frequency `part` times half
+  /// the sample rate.
   [[nodiscard]] double disturbance_over_noise(double q, double part) const {
     const std::complex<double> z = std::polar(1.0, std::numbers::pi * part);
     std::array<std::complex<double>, static_cast<std::size_t>(N)> x{};
@@ -302,11 +306,13 @@ struct InnovationsFilter {
     return q * std::norm(x[0]);
   }
 
-  /// Innovations of y while b0 u and the columns act: of each alone (one output a column: y, u, the
-  /// data's columns), or of all together. `signal` is u, or what stands for it.
+  /// Computes innovations of y, u and the data's columns, each alone (one output for each), or of
+  /// all of them together. `signal` is u or a replacement.
   ///
-  /// The first `lead` rows of a piece only fill the lag and the dead time, whose past is not known.
-  /// @tparam Runs how many innovations; `output(k)`, `input(k)`, `column(k)` say what run r sees
+  /// The first `lead` rows of a piece only fill the lag and the dead time, because the input before
+  /// is unknown.
+  /// @tparam Runs number of innovations; `output(k)`, `input(k)` and `column(k)` give the signals
+  /// of run r
   template <int Runs, class Output, class Input, class Column>
   void run(const FitData& data, std::ptrdiff_t lead, const std::vector<double>& signal,
            const Output& output, const Input& input, const Column& column_at,
@@ -371,12 +377,12 @@ struct InnovationsFilter {
 
 }  // namespace detail
 
-/// The innovations of one log for one kind of model, and the fit that minimises them.
+/// The innovations of a log for one model structure, and the fit that minimises them.
 ///
-/// Holds a reference to the data.
+/// It stores a reference to the data.
 class InnovationsFit {
  public:
-  /// Of `data`, which must outlive it.
+  /// For `data`, which must outlive this object.
   InnovationsFit(const FitData& data, const FitModel& model, const FitBounds& bounds)
       : data_(data),
         model_(model),
@@ -391,7 +397,8 @@ class InnovationsFit {
     }
   }
 
-  /// b0 and the columns' numbers in closed form, everything else as given.
+  /// The fit with b0 and the numbers of the columns in closed form and all other parameters as
+  /// given.
   [[nodiscard]] Fit at(const FitPoint& point) {
     Fit fit;
     fit.at = point;
@@ -399,7 +406,7 @@ class InnovationsFit {
     return fit;
   }
 
-  /// The least of the innovations near `start`. @param with_bandwidth false: w stays
+  /// Minimises the innovations, from `start` on. @param with_bandwidth false: w is kept
   [[nodiscard]] Fit minimise(const FitPoint& start, bool with_bandwidth, int steps = 25) {
     Fit best = at(inside(start));
     double damping = 1e-3;
@@ -426,7 +433,7 @@ class InnovationsFit {
               -change[static_cast<std::size_t>(i)], -longest_step[static_cast<std::size_t>(which)],
               longest_step[static_cast<std::size_t>(which)]);
         }
-        if (!finite) break;  // more damping would not make it a step
+        if (!finite) break;  // more damping would not help
         const FitPoint trial_point = moved(best.at, move);
         std::swap(residual_, kept_residual_);
         std::swap(columns_, kept_columns_);
@@ -436,7 +443,7 @@ class InnovationsFit {
           best = trial;
           damping = std::max(damping * 0.2, 1e-9);
           better = true;
-          // A hundredth of what moves the likelihood by one.
+          // A hundredth of the change that changes the likelihood by one.
           if (gain * static_cast<double>(best.rows) < 0.02) best.converged = true;
           break;
         }
@@ -450,14 +457,15 @@ class InnovationsFit {
     return best;
   }
 
-  /// Derivatives of the innovations by the free parameters, then by the linear ones, and which
-  /// parameters are free: 0 log w, 1 log(tau + L), 2 share squared, 3 a (tau + L).
+  /// Derivatives of the innovations with respect to the free parameters, then the linear ones, and
+  /// which parameters are free: 0 log w, 1 log(tau + L), 2 share squared, 3 a (tau + L).
   struct Sensitivities {
-    std::vector<std::vector<double>> columns;  ///< one a parameter, each as long as the log
-    std::vector<int> free;                     ///< which parameters the first of them belong to
+    std::vector<std::vector<double>> columns;  ///< one for each parameter, each as long as the log
+    std::vector<int> free;                     ///< the parameters to which the first of them belong
   };
 
-  /// At a fit that `at` or `minimise` gave last. Parameters at a bound are not free.
+  /// The sensitivities at the fit that `at` or `minimise` returned last. Parameters at a bound are
+  /// not free.
   [[nodiscard]] Sensitivities sensitivities(const Fit& fit, bool with_bandwidth) {
     Sensitivities result;
     std::array<bool, 4> wanted = {with_bandwidth, true, true, model_.pole};
@@ -486,16 +494,17 @@ class InnovationsFit {
     return result;
   }
 
-  /// Innovations of the fit that `at` or `minimise` gave last; zero where the start is not known.
+  /// Innovations of the fit that `at` or `minimise` returned last; zero in the first rows of a
+  /// piece, which are not used.
   [[nodiscard]] const std::vector<double>& residual() const { return residual_; }
 
-  /// Whether a parameter has come to an end of its range.
+  /// Whether a parameter is at a bound of its range.
   [[nodiscard]] bool at_bound(const FitPoint& p) const {
     return p.latency >= bounds_.latency_max * 0.999 ||
            (model_.pole && std::abs(p.pole) * p.latency >= bounds_.pole_latency * 0.999);
   }
 
-  /// The point within bounds.
+  /// The point, limited to the bounds.
   [[nodiscard]] FitPoint inside(FitPoint p) const {
     p.bandwidth = std::clamp(p.bandwidth, bounds_.bandwidth_min, bounds_.bandwidth_max);
     p.latency = std::clamp(p.latency, bounds_.latency_min, bounds_.latency_max);
@@ -505,7 +514,7 @@ class InnovationsFit {
     return p;
   }
 
-  /// What the filter makes of a series in the place of y, while nothing acts.
+  /// The output of the filter for a series in place of y, without inputs.
   [[nodiscard]] std::vector<double> innovations_of(const FitPoint& point,
                                                    const std::vector<double>& series) const {
     std::vector<double> out(series.size());
@@ -519,10 +528,11 @@ class InnovationsFit {
     return out;
   }
 
-  /// The noise from the innovations that `at` or `minimise` gave last, at frequencies where the
-  /// disturbance has less than a tenth of its power, as the median over all stretches; 0 if these
-  /// are too few. Effects outside the model are slower (a mode) or occasional (stiction): they do
-  /// not enter here, but they do in `Fit::noise`.
+  /// The measurement noise from the innovations of the fit that `at` or `minimise` returned last,
+  /// at frequencies where the disturbance has less than a tenth of the noise's power, as the median
+  /// over all stretches; 0 if these are too few. Effects that are not in the model are slower (a
+  /// flexible mode) or occasional (stiction), so they do not affect this number, while they affect
+  /// `Fit::noise`.
   [[nodiscard]] Estimate noise_floor(const Fit& fit) const {
     constexpr std::size_t length = 128;
     std::vector<std::size_t> quiet;
@@ -546,21 +556,23 @@ class InnovationsFit {
     if (quiet.size() < 8 || powers.size() < 15) return {};
     std::sort(powers.begin(), powers.end());
     const double middle = powers[powers.size() / 2];
-    // The middle of a chi square is below its mean; neighbours in frequency share a third.
+    // The median of a chi-square distribution is below its mean; neighbouring frequencies share a
+    // third.
     const double freedom = 2.0 * static_cast<double>(quiet.size()) * 2.0 / 3.0;
     const double floor = std::sqrt(middle / (variance * (1.0 - 2.0 / (3.0 * freedom))));
-    // The standard error of a median is 1.253 times the mean's, and half of it is the root's.
+    // The standard error of a median is 1.253 times that of the mean; the relative error of a root
+    // is half as large.
     const double between = powers[powers.size() * 3 / 4] - powers[powers.size() / 4];
     const double error =
         1.253 * between / 1.349 / std::sqrt(static_cast<double>(powers.size())) / middle;
     return {floor, 2.0 * 0.5 * error * floor};
   }
 
-  [[nodiscard]] const FitData& data() const { return data_; }        ///< what it was made of
-  [[nodiscard]] const FitModel& model() const { return model_; }     ///< what it was made of
-  [[nodiscard]] const FitBounds& bounds() const { return bounds_; }  ///< what it was made of
+  [[nodiscard]] const FitData& data() const { return data_; }        ///< as given
+  [[nodiscard]] const FitModel& model() const { return model_; }     ///< as given
+  [[nodiscard]] const FitBounds& bounds() const { return bounds_; }  ///< as given
 
-  /// J'J and J'r of rows [from, to).
+  /// J'J and J'r over rows [from, to).
   static void normal_equations(std::span<const std::vector<double>> jacobian,
                                const std::vector<double>& residual, std::vector<double>& normal,
                                std::vector<double>& right, std::size_t from = 0,
@@ -593,7 +605,8 @@ class InnovationsFit {
     const FitPoint before = p;
     p.bandwidth *= std::exp(move[0]);
     p.latency *= std::exp(move[1]);
-    // Lag in exchange for dead time shows by its square: from no lag at all there would be no way.
+    // The effect of lag in exchange for dead time is quadratic, so the step is in its square:
+    // otherwise the derivative at zero lag would vanish.
     if (move[2] != 0.0) p.lag_share = std::sqrt(std::max(p.lag_share * p.lag_share + move[2], 0.0));
     if (move[1] != 0.0 || move[3] != 0.0) p.pole = (product + move[3]) / p.latency;
     p = inside(p);
@@ -615,7 +628,7 @@ class InnovationsFit {
     }
   }
 
-  /// The sum of what the linear numbers weigh, from the one numbered `first` on.
+  /// Adds the parts weighted by the linear numbers, from number `first` on.
   static void combine(std::vector<double>& sum, const std::vector<std::vector<double>>& parts,
                       const std::vector<double>& linear, std::size_t first) {
     for (std::size_t c = 0; c < parts.size(); ++c) {
@@ -645,7 +658,7 @@ class InnovationsFit {
     columns_.resize(count);
     for (auto& column : columns_) column.resize(rows);
     const auto nothing = [](std::size_t, std::ptrdiff_t) { return 0.0; };
-    // y and u side by side, as a processor can work on both at once.
+    // y and u in parallel, because a processor can compute both at once.
     filter.template run<2>(
         data_, lead_, data_.u,
         [&](std::size_t run, std::ptrdiff_t k) {
@@ -684,7 +697,7 @@ class InnovationsFit {
   FitModel model_;
   FitBounds bounds_;
   std::ptrdiff_t lead_;
-  std::size_t rows_ = 0;                        // innovations that count
+  std::size_t rows_ = 0;                        // number of innovations used
   std::vector<std::vector<double>> columns_{};  // of y, u, and the data's columns
   std::vector<double> residual_{};
   std::vector<std::vector<double>> kept_columns_{};

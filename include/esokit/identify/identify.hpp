@@ -1,5 +1,5 @@
 /// @file
-/// From a log to a model with error bars, or to a refusal that says what to record instead.
+/// From a log to a model with error bars, or to an error that says what to record instead.
 #pragma once
 
 #include <algorithm>
@@ -31,91 +31,93 @@ namespace esokit {
 struct IdentifyOptions {
   std::vector<int> orders{1, 2, 3};  ///< the orders n to try
   bool friction = true;              ///< a column tanh(v / v_s) for orders 1 and 2
-  bool pole = true;                  ///< whether to look for a pole of the plant
+  bool pole = true;                  ///< whether the plant may have a pole
 
-  /// Columns y, y^2 and y^3 (gravity, springs) for orders 2 and 3 if they explain something.
+  /// Columns y, y^2 and y^3 (gravity, springs) for orders 2 and 3, if they improve the fit.
   bool position = true;
-  int extension = 0;             ///< m: 1 or 2 integrators of the disturbance; 0: chosen
-  int sinusoids = 3;             ///< largest number to look for in the disturbance
-  int schedule_bins = 4;         ///< ranges of the scheduling column, each with as many rows
-  int averaged = 0;              ///< rows to average; 0: chosen from the innovations
-  std::size_t rows_max = 60000;  ///< rows used of a longer log, evenly spread
+  int extension = 0;      ///< m: 1 or 2 integrators of the disturbance; 0: chosen by the fit
+  int sinusoids = 3;      ///< largest number of sines in the disturbance
+  int schedule_bins = 4;  ///< number of ranges of the scheduling column, with equal numbers of rows
+  int averaged = 0;       ///< rows to average into one; 0: chosen from the innovations
+  std::size_t rows_max = 60000;  ///< rows used of a longer log, in evenly spread pieces
 
-  /// Whether u is what the actuator held. A command beyond the limits is not.
+  /// Whether u is what the actuator held. A command beyond its limits is not.
   bool applied = true;
-  double interval_max = 0.1;     ///< widest half interval of b0, share of b0
-  double plateau_max = 0.1;      ///< most that b0 may differ between three neighbouring bandwidths
-  double correlation_max = 0.1;  ///< of the innovations, lags 1 to 20; 1: not checked
-  bool scheduled = false;        ///< b0 may depend on the scheduling column: `schedule` is wanted
+  double interval_max = 0.1;     ///< largest half width of the interval of b0, share of b0
+  double plateau_max = 0.1;      ///< largest relative difference of b0 between three bandwidths
+  double correlation_max = 0.1;  ///< largest correlation of innovations, lags 1 to 20; 1: no check
+  bool scheduled = false;        ///< accept a b0 that depends on the scheduling column
   double friction_shift_max =
-      3;  ///< most that b0 may differ between friction scales, standard errors
-  double position_shift_max = 1.5;  ///< most that a force by position may move b0, half widths
+      3;  ///< largest difference of b0 between friction scales, standard errors
+  double position_shift_max = 1.5;  ///< largest change of b0 by a force by position, half widths
   std::function<void(double)> progress{};  ///< called with the finished share, 0 to 1
 };
 
 /// The best fit of one order.
 struct OrderFit {
   FitModel model{};             ///< n, m and whether it has a pole
-  Fit fit{};                    ///< where the innovations are least
+  Fit fit{};                    ///< the fit with the smallest innovations
   double friction_scale = 0.0;  ///< v_s, 0 without friction
-  double criterion = 0.0;       ///< rows log(mean square) + parameters log(rows): the least wins
+  double criterion = 0.0;  ///< rows log(mean square) + parameters log(rows): the smallest is best
 
-  /// log(mean square), the mean of 1 / sqrt(10) and a tenth of the least bandwidth of all orders.
+  /// log(mean square) at lower bandwidths: the mean over 1 / sqrt(10) and a tenth of the lowest
+  /// bandwidth of all orders.
   double slower = 0.0;
-  double correlation = 0.0;  ///< largest of the innovations' over lags 1 to 20
-  Estimate noise{};          ///< from the fast part of the innovations, y's unit; 0: not known
+  double correlation = 0.0;  ///< largest correlation of the innovations over lags 1 to 20
+  Estimate noise{};          ///< from the fast part of the innovations, unit of y; 0: unknown
 };
 
-/// b0 where the scheduling column is within a range.
+/// b0 for a range of the scheduling column.
 struct GainInRange {
-  double from = 0.0;      ///< least value of the column
-  double to = 0.0;        ///< largest
-  std::size_t rows = 0;   ///< that are in it
-  Estimate input_gain{};  ///< b0 there
+  double from = 0.0;      ///< smallest value of the column
+  double to = 0.0;        ///< largest value of the column
+  std::size_t rows = 0;   ///< number of rows in the range
+  Estimate input_gain{};  ///< b0 in the range
 };
 
 /// A model with error bars, and the evidence for it.
 struct Identified {
-  int order = 0;                    ///< n
-  int extension = 1;                ///< m
-  Estimate input_gain{};            ///< b0, unit of y^(n) over that of u
-  Estimate latency{};               ///< lag and dead time together, s
-  Estimate lag{};                   ///< tau, s
-  Estimate dead_time{};             ///< L, s
-  Estimate pole{};                  ///< a, 1/s
-  Estimate friction{};              ///< Coulomb friction, unit of y^(n); 0 where none was asked for
-  Estimate noise{};                 ///< standard deviation of the measurement noise, y's unit
-  double disturbance = 0;           ///< intensity of d^(m): variance of its increments over time
-  std::vector<Estimate> columns{};  ///< numbers of the log's own columns
-  std::vector<Sinusoid> sinusoids{};    ///< in the disturbance, the largest first
-  std::vector<GainInRange> schedule{};  ///< b0 along the log's scheduling column
-  Estimate schedule_slope{};  ///< b0 per unit of the scheduling column, if it is a straight line
-  double schedule_shift = 0;  ///< most that b0 differs along the column, over its interval
-  double friction_shift =
-      0;  ///< by how much b0 differs between friction scales, standard errors of b0
+  int order = 0;                        ///< n
+  int extension = 1;                    ///< m
+  Estimate input_gain{};                ///< b0, unit of y^(n) per unit of u
+  Estimate latency{};                   ///< lag plus dead time, s
+  Estimate lag{};                       ///< tau, s
+  Estimate dead_time{};                 ///< L, s
+  Estimate pole{};                      ///< a, 1/s
+  Estimate friction{};                  ///< Coulomb friction, unit of y^(n); 0 if not fitted
+  Estimate noise{};                     ///< standard deviation of the measurement noise, unit of y
+  double disturbance = 0;               ///< intensity of d^(m): variance of its increments per time
+  std::vector<Estimate> columns{};      ///< factors of the log's own columns
+  std::vector<Sinusoid> sinusoids{};    ///< sines in the disturbance, the largest first
+  std::vector<GainInRange> schedule{};  ///< b0 over the log's scheduling column
+  Estimate schedule_slope{};  ///< slope of b0 over the scheduling column, from a straight line
+  double schedule_shift = 0;  ///< largest difference of b0 over the column, divided by its interval
+  double friction_shift = 0;  ///< difference of b0 between friction scales, standard errors of b0
 
-  /// Whether y, y^2 and y^3 act as columns. The force is left to the disturbance by `plant`,
-  /// `model`.
+  /// Whether y, y^2 and y^3 were fitted as columns. In `plant` and `model` this force is part of
+  /// the disturbance.
   bool position = false;
 
-  /// By how much b0 moves if they do (the next three powers, if these do), half widths of b0.
+  /// Change of b0 if they are added (if they are in the model: the next three powers), half widths
+  /// of b0.
   double position_shift = 0;
-  double correlation = 0;          ///< of the innovations, largest over lags 1 to 20
-  int averaged = 1;                ///< rows of the log that were averaged
-  bool at_bound = false;           ///< a parameter came to the end of its range at the plateau
-  double excitation = 0;           ///< standard error of b0 over b0 where it is least
-  double own_input = 1;            ///< share of u that is not explained by y and the row before
-  LogReport log{};                 ///< what the log shows by itself
+  double correlation = 0;          ///< largest correlation of the innovations over lags 1 to 20
+  int averaged = 1;                ///< rows of the log that were averaged into one
+  bool at_bound = false;           ///< a parameter is at a bound of its range at the plateau
+  double excitation = 0;           ///< smallest relative standard error of b0
+  double own_input = 1;            ///< share of u that does not follow from y and the row before
+  LogReport log{};                 ///< the report on the log before any fit
   Plateau plateau{};               ///< b0 over the bandwidth
-  std::vector<OrderFit> orders{};  ///< each order's best fit, by order
+  std::vector<OrderFit> orders{};  ///< best fit of each order, by order
 
-  /// The plant that was found, for simulation, analysis and observers; d enters at y^(n).
-  /// @tparam Order n, which must be the one that was found
+  /// The identified plant, for simulation, analysis and observers; d enters at y^(n).
+  /// @tparam Order n, which must be the identified order
   template <int Order>
   [[nodiscard]] Expected<LinearPlant<Order + 1>, Error<double>> plant() const {
     if (order != Order) {
-      return Error<double>{"order", static_cast<double>(order), "is not the requested one:",
-                           -1,      static_cast<double>(Order), true};
+      return Error<double>{
+          "order", static_cast<double>(order), "is not the requested order, which is",
+          -1,      static_cast<double>(Order), true};
     }
     typename LinearPlant<Order>::Chain chain;
     chain.coefficients[Order - 1] = pole.value;
@@ -126,25 +128,24 @@ struct Identified {
     return with_lag(*rigid, lag.value);
   }
 
-  /// What was found, as the settings of a model of these parts: the lag as its actuator, the pole
-  /// as its plant_poles, the largest sinusoids as its resonators. Parts that are left out become
-  /// part of the disturbance.
-  /// @tparam Parts of the order that was found, without a sensor, which a log does not tell from an
-  /// actuator
+  /// The identified model as settings of an AugmentedModel: the lag as its actuator, the pole as
+  /// its plant_poles, the largest sinusoids as its resonators. Effects without a part in `Parts`
+  /// are left to the disturbance.
+  /// @tparam Parts with the identified order and without a sensor, which a log cannot distinguish
+  /// from an actuator
   template <ModelParts Parts>
   [[nodiscard]] Expected<typename AugmentedModel<Parts>::Settings, Error<double>> model() const {
     static_assert(Parts.actuator <= 1, "esokit: identify finds a lag of first order");
     static_assert(Parts.sensor == 0 && Parts.leaky == 0 && !Parts.follows_speed,
-                  "esokit: identify finds no sensor, no fading parts and no speed");
+                  "esokit: identify finds no sensor, no decaying parts and no speed");
     Rules<double> rules;
     rules.require(order == Parts.order,
-                  {"order", static_cast<double>(order), "is not the requested one:", -1,
+                  {"order", static_cast<double>(order), "is not the requested order, which is", -1,
                    static_cast<double>(Parts.order), true});
     const auto swings = static_cast<std::size_t>(Parts.resonators);
-    rules.require(sinusoids.size() >= swings,
-                  {"sinusoids", static_cast<double>(sinusoids.size()),
-                   "were found, fewer than the resonators that are asked for:", -1,
-                   static_cast<double>(Parts.resonators), true});
+    rules.require(sinusoids.size() >= swings, {"sinusoids", static_cast<double>(sinusoids.size()),
+                                               "were found, fewer than the requested resonators:",
+                                               -1, static_cast<double>(Parts.resonators), true});
     if (!rules) return rules.error();
     typename AugmentedModel<Parts>::Settings settings;
     if constexpr (Parts.plant_poles) settings.plant[Parts.order - 1] = pole.value;
@@ -157,8 +158,8 @@ struct Identified {
     return settings;
   }
 
-  /// The config of a ModelEso with what was found.
-  /// @param observer_bandwidth rad/s @param sample_time s, of the loop it is for
+  /// The config of a ModelEso with the identified model.
+  /// @param observer_bandwidth omega_o, rad/s @param sample_time of the controller, s
   template <ModelParts Parts>
   [[nodiscard]] Expected<typename ModelEso<Parts>::Config, Error<double>> observer(
       double observer_bandwidth, double sample_time) const {
@@ -172,7 +173,7 @@ struct Identified {
     return config;
   }
 
-  /// The dead time in samples, as DelayedInput takes it. @param sample_time s
+  /// The dead time in samples, for DelayedInput. @param sample_time s
   [[nodiscard]] int delay(double sample_time) const {
     return static_cast<int>(std::lround(dead_time.value / sample_time));
   }
@@ -180,7 +181,7 @@ struct Identified {
 
 namespace detail {
 
-/// Correlations of a series with itself, 1 to 20 rows later.
+/// Autocorrelation of a series at lags of 1 to 20 rows.
 inline std::array<double, 20> correlations(const std::vector<double>& e) {
   const double square = dot(e.data(), e.data(), e.size());
   std::array<double, 20> found{};
@@ -190,8 +191,8 @@ inline std::array<double, 20> correlations(const std::vector<double>& e) {
   return found;
 }
 
-/// Share of u that a law of y_k, y_(k-1), u_(k-1) does not explain: 0 where u is a controller's and
-/// its reference never moves.
+/// Share of u that does not follow from y_k, y_(k-1), u_(k-1): 0 if u comes from a controller whose
+/// reference never moves.
 inline double own_input(const FitData& data) {
   const std::size_t rows = data.u.size();
   std::vector<std::vector<double>> columns(4, std::vector<double>(rows, 0.0));
@@ -221,7 +222,7 @@ inline double own_input(const FitData& data) {
   return std::sqrt(left / all);
 }
 
-/// Slope (derivative 1) or value (0) of a parabola through 2 half + 1 rows, at each row.
+/// Slope (derivative 1) or value (0) at each row of a parabola fitted to 2 half + 1 rows.
 inline std::vector<double> smoothed(const FitData& data, int half, int derivative) {
   std::vector<double> out(data.y.size());
   const double T = data.sample_time;
@@ -252,9 +253,9 @@ inline double rms(const std::vector<double>& values) {
   return std::sqrt(sum / static_cast<double>(std::max<std::size_t>(values.size(), 1)));
 }
 
-/// Largest correlation of the innovations at a fit over lags 1 to 20, without what rounding to
-/// `step` explains: a slow motion is rounded alike in neighbouring rows. How much that is comes
-/// from the same filter on the rounding of the smoothed motion, beside white noise.
+/// Largest correlation of the innovations at a fit over lags 1 to 20, without the part that
+/// rounding to `step` causes: a slow motion is rounded alike in neighbouring rows. This part is
+/// computed with the same filter from the rounding of the smoothed motion, plus white noise.
 inline double innovations_correlation(const InnovationsFit& fit, const FitPoint& at, double step) {
   const std::vector<double>& e = fit.residual();
   auto found = correlations(e);
@@ -277,21 +278,21 @@ inline double innovations_correlation(const InnovationsFit& fit, const FitPoint&
   }
   double largest = 0.0;
   for (const double value : found) largest = std::max(largest, std::abs(value));
-  // A residual of zeros, or of numbers that are none, is no reason to trust.
+  // A residual that is zero or not finite is no evidence of a good fit.
   return is_finite(found[0]) ? largest : std::numeric_limits<double>::infinity();
 }
 
-/// Scales of friction that are tried, as shares of the rms of the speed.
+/// Friction scales v_s that are tried, as shares of the rms of the speed.
 constexpr double friction_scales[] = {0.01, 0.02, 0.04, 0.08, 0.16, 0.32};
 
-/// Speed that friction goes by: y' of order 2, y of order 1; smoothed until the noise in it is a
-/// fiftieth, over no more than the latency.
+/// The speed on which friction depends: y' for order 2, y for order 1; smoothed until the noise in
+/// it is a fiftieth, over at most the latency.
 inline std::vector<double> friction_speed(const FitData& data, int order, double noise,
                                           double latency) {
   const double T = data.sample_time;
   const int longest = std::clamp(static_cast<int>(latency / T), 2, 200);
   if (order == 1) {
-    // Until the noise is a tenth of what the least scale turns around in.
+    // Until the noise is a tenth of the smallest scale.
     int half = 0;
     const double turn = 0.1 * friction_scales[0] * rms(data.y);
     while (half < std::min(longest, 3) && noise / std::sqrt(2.0 * half + 1.0) > turn) ++half;
@@ -305,7 +306,7 @@ inline std::vector<double> friction_speed(const FitData& data, int order, double
   return half > 2 ? smoothed(data, half, 1) : speed;
 }
 
-/// The data with a column of friction that rises over `scale`.
+/// The data with an added column for friction, tanh(speed / scale).
 inline FitData with_friction(const FitData& data, const std::vector<double>& speed, double scale) {
   FitData out = data;
   std::vector<double> column(speed.size());
@@ -314,13 +315,13 @@ inline FitData with_friction(const FitData& data, const std::vector<double>& spe
   return out;
 }
 
-/// A force that depends on the position, as gravity and springs have it: y, y^2 and y^3 as columns.
-/// Where it is missing b0 is another one below the frequencies of the motion, at every bandwidth
-/// there: a plateau of a wrong b0.
+/// A force that depends on the position, such as gravity or a spring: y, y^2 and y^3 as columns.
+/// Without it b0 is wrong below the frequencies of the motion, by the same amount at every
+/// bandwidth there: a plateau at a wrong b0.
 constexpr std::size_t position_columns = 3;
 inline void add_position(FitData& data, std::size_t from = 1) {
-  // As measured: smoothed it would differ from a column of the log by what y's noise is going to
-  // be.
+  // As measured: if it were smoothed, the future noise of y would make it differ from a column of
+  // the log.
   std::vector<double> y = data.y;
   double mean = 0.0;
   for (const double value : y) mean += value / static_cast<double>(y.size());
@@ -339,7 +340,7 @@ inline FitBounds fit_bounds(const FitData& data) {
   return {6.0 / duration, 1.5 / T, 0.05 * T, std::min(200.0 * T, duration / 30.0), 0.5};
 }
 
-/// The best of several starts, w free.
+/// The best fit from several starts, with w free.
 inline Fit best_fit(InnovationsFit& fit, int starts = 3) {
   const double T = fit.data().sample_time;
   std::vector<Fit> grid;
@@ -372,8 +373,8 @@ inline double criterion(const Fit& fit, int parameters) {
   return rows * std::log(fit.mean_square) + parameters * std::log(rows);
 }
 
-/// The best fit of one order, with friction where it helps.
-/// @param step to which y is rounded, 0: to none
+/// The best fit of one order, with friction if that improves it.
+/// @param step to which y is rounded, 0: not rounded
 inline OrderFit fit_order(const FitData& data, const IdentifyOptions& options, int order,
                           double step) {
   const FitBounds bounds = fit_bounds(data);
@@ -382,7 +383,7 @@ inline OrderFit fit_order(const FitData& data, const IdentifyOptions& options, i
   const int columns = static_cast<int>(data.columns.size());
   InnovationsFit plain(data, result.model, bounds);
   result.fit = best_fit(plain);
-  (void)plain.at(result.fit.at);  // its innovations, not those of the last start
+  (void)plain.at(result.fit.at);  // innovations of this fit, not of the last start
   result.criterion = criterion(result.fit, 5 + columns);
   result.correlation = innovations_correlation(plain, result.fit.at, step);
   result.noise = plain.noise_floor(result.fit);
@@ -392,7 +393,7 @@ inline OrderFit fit_order(const FitData& data, const IdentifyOptions& options, i
   if (!(size > 0.0)) return result;
   Fit best = result.fit;
   double best_scale = 0.0;
-  // Friction moves the other parameters, and they the scale: twice.
+  // Friction changes the other parameters, and they change its scale: repeated twice.
   for (int pass = 0; pass < 2; ++pass) {
     double least = std::numeric_limits<double>::infinity();
     const auto attempt = [&](double scale) {
@@ -413,7 +414,7 @@ inline OrderFit fit_order(const FitData& data, const IdentifyOptions& options, i
   }
   const FitData rubbed = with_friction(data, speed, best_scale);
   InnovationsFit fit(rubbed, result.model, bounds);
-  // Other starts: friction that was not there can have led the first fit astray.
+  // Further starts, because the missing friction may have misled the first fit.
   Fit found = best_fit(fit, 2);
   if (best.mean_square < found.mean_square) found = fit.minimise(best.at, true);
   const double with = criterion(found, 6 + columns);
@@ -421,7 +422,7 @@ inline OrderFit fit_order(const FitData& data, const IdentifyOptions& options, i
     result.fit = found;
     result.criterion = with;
     result.friction_scale = best_scale;
-    // The residual is that of the last fit.
+    // Computes the residual of this fit again.
     (void)fit.at(found.at);
     result.correlation = innovations_correlation(fit, found.at, step);
     result.noise = fit.noise_floor(result.fit);
@@ -429,7 +430,7 @@ inline OrderFit fit_order(const FitData& data, const IdentifyOptions& options, i
   return result;
 }
 
-/// The data of an order's fit, with its friction.
+/// The data for the fit of an order, with its friction.
 inline FitData with_friction(const FitData& data, const OrderFit& order) {
   if (!(order.friction_scale > 0.0)) return data;
   return with_friction(
@@ -437,7 +438,7 @@ inline FitData with_friction(const FitData& data, const OrderFit& order) {
       order.friction_scale);
 }
 
-/// How well each order explains the log at lower bandwidths than the likelihood's.
+/// Compares how well each order explains the log at bandwidths below that of the likelihood.
 inline void compare_orders(const FitData& data, std::vector<OrderFit>& orders) {
   if (orders.size() < 2) return;
   double least = std::numeric_limits<double>::infinity();
@@ -456,7 +457,7 @@ inline void compare_orders(const FitData& data, std::vector<OrderFit>& orders) {
   }
 }
 
-/// The best fit of each order that is asked for.
+/// The best fit of each requested order.
 inline std::vector<OrderFit> fit_orders(const FitData& data, const IdentifyOptions& options,
                                         double step) {
   std::vector<OrderFit> orders;
@@ -465,9 +466,9 @@ inline std::vector<OrderFit> fit_orders(const FitData& data, const IdentifyOptio
   return orders;
 }
 
-/// The order of the likelihood, unless another one leaves less than 1 / e of the mean square at
-/// lower bandwidths: at its own the likelihood sees the fastest motion, and of a machine that bends
-/// that is the bending.
+/// The order with the best likelihood, unless another one leaves less than 1 / e of the mean square
+/// at lower bandwidths: at its own bandwidth the likelihood depends on the fastest motion, which in
+/// a flexible machine is the bending.
 inline auto best_order(const std::vector<OrderFit>& orders) {
   const auto likely = std::min_element(
       orders.begin(), orders.end(),
@@ -478,8 +479,9 @@ inline auto best_order(const std::vector<OrderFit>& orders) {
   return slower->slower < likely->slower - 1.0 ? slower : likely;
 }
 
-/// Whether a force by position acts: the likelihood pays for it, or it leaves less than 1 / e of
-/// the mean square at a tenth of its bandwidth. At its own all that is slow is the disturbance's.
+/// Whether a force that depends on position acts: it improves the likelihood by more than its
+/// parameters cost, or it leaves less than 1 / e of the mean square at a tenth of the bandwidth.
+/// (At the full bandwidth everything slow is attributed to the disturbance.)
 inline bool position_acts(const FitData& data, const OrderFit& order) {
   FitData more = data;
   add_position(more);
@@ -495,7 +497,8 @@ inline bool position_acts(const FitData& data, const OrderFit& order) {
   return fit.minimise(slower, false, 8).mean_square < left / std::numbers::e;
 }
 
-/// b0 in ranges of a scheduling column and along a straight line, at the plateau.
+/// Computes b0 at the plateau for ranges of a scheduling column, and as a straight line over the
+/// column.
 /// @param used the data with friction and sines
 inline void find_schedule(const FitData& used, const std::vector<double>& along,
                           const FitModel& model, const IdentifyOptions& options,
@@ -503,7 +506,7 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
   const double t = student_95(19);
   std::vector<double> sorted = along;
   std::sort(sorted.begin(), sorted.end());
-  std::vector<double> edges;  // upper ends but the last; ranges of one value are one range
+  std::vector<double> edges;  // upper ends except the last; ranges with a single value are merged
   for (int bin = 1; bin < options.schedule_bins; ++bin) {
     const double edge = sorted[sorted.size() * static_cast<std::size_t>(bin) /
                                static_cast<std::size_t>(options.schedule_bins)];
@@ -532,7 +535,7 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
   }
   const FitBounds bounds = fit_bounds(used);
   const Plateau& plateau = result.plateau;
-  // At the plateau and beside it, as b0 itself.
+  // At the plateau and its neighbours, like b0 itself.
   const auto solved = [&](const FitData& data, std::vector<double>& value,
                           std::vector<double>& error) {
     InnovationsFit fit(data, model, bounds);
@@ -561,8 +564,8 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
     middle += weight * value[bin];
   }
   middle /= weights;
-  // By chance one of several differs: all together have to differ by more than chance, and one by
-  // more than its interval.
+  // One of several ranges may differ by chance: all together must differ by more than chance, and
+  // one by more than its interval.
   for (std::size_t bin = 0; bin < result.schedule.size(); ++bin) {
     const double off = std::abs(value[bin] - middle) / error[bin];
     square += off * off;
@@ -581,7 +584,7 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
 
 }  // namespace detail
 
-/// The model and everything known about its quality; whether it can be trusted is the verdict of
+/// The model and everything known about its quality. Whether it can be trusted is decided by
 /// `judge`. It fails only if something cannot be computed.
 [[nodiscard]] inline Expected<Identified, Error<double>> study(
     const Log& log, const IdentifyOptions& options = {}) {
@@ -596,12 +599,12 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
              true};
   }
   if (options.extension < 0 || options.extension > 2) {
-    return E{"extension", static_cast<double>(options.extension), "must be 1, 2, or 0: chosen"};
+    return E{"extension", static_cast<double>(options.extension), "must be 0 (chosen), 1 or 2"};
   }
   if (options.schedule_bins < 2 || options.schedule_bins > 20) {
     return E{"schedule_bins", static_cast<double>(options.schedule_bins), "must be 2 to 20"};
   }
-  // It goes through the same rows as the columns, as the last of them.
+  // The scheduling column is processed like the columns, as the last of them.
   const auto with_schedule = [&] {
     Log all = log;
     all.columns.push_back(log.schedule);
@@ -646,9 +649,9 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
     auto winner = detail::best_order(orders);
     bool position = false;
     IdentifyOptions tried = options;
-    std::vector<OrderFit> first;  // fits of order 1, which has no position
+    std::vector<OrderFit> first;  // fits for order 1, which has no position
     if (options.position && winner->model.order > 1) {
-      // Where it is missing an order above can win: then the simplest says so.
+      // Without the force a higher order can be best, so the simplest order decides about it.
       const OrderFit* simplest = nullptr;
       for (const OrderFit& order : orders) {
         const int n = order.model.order;
@@ -676,7 +679,7 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
     }
     const std::size_t index = static_cast<std::size_t>(winner - orders.begin());
     if (fold == 1 && winner->correlation < 0.3) raw_noise = winner->noise;
-    // Averaging costs what is fast: only if it helps a lot.
+    // Averaging loses fast effects, so it is used only if it helps much.
     if (winner->correlation < options.correlation_max ||
         winner->correlation < 0.5 * best_correlation) {
       best_correlation = winner->correlation;
@@ -707,7 +710,8 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
         detail::friction_speed(data, chosen.model.order, chosen.fit.noise, chosen.fit.at.latency);
     used = detail::with_friction(data, speed, chosen.friction_scale);
   }
-  // The other m: as many parameters, so the likelihood alone decides, by more than one of them.
+  // The other m has the same number of parameters, so the likelihood decides, if it improves by
+  // more than one parameter costs.
   const auto extended = [&](int extension) {
     InnovationsFit other(used, {chosen.model.order, extension, chosen.model.pole}, bounds);
     Fit found = other.minimise(chosen.fit.at, true);
@@ -739,12 +743,12 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
   const double rows_averaged = std::sqrt(static_cast<double>(result.averaged));
   const double t = student_95(19);
   result.noise = {likely.noise * rows_averaged, t * likely_errors.noise * rows_averaged};
-  // Rows that are nearly white tell the noise where nothing else is as fast.
+  // If the innovations of the rows are nearly white, their fast part gives the noise.
   if (raw_noise.value > 0.0) {
     result.noise = {raw_noise.value,
                     std::max(raw_noise.half_width, result.noise.share() * raw_noise.value)};
   }
-  // An encoder rounds, and at rest does not show it.
+  // The rounding of an encoder is not visible at rest.
   const double rounding = result.log.quantisation / std::sqrt(12.0);
   if (result.noise.low() < rounding) {
     result.noise.half_width = std::max(result.noise.high() - rounding, result.noise.half_width);
@@ -762,7 +766,7 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
   const PlateauPoint& here = plateau.points[plateau.middle];
   const PlateauPoint& below = plateau.points[plateau.middle - 1];
   const PlateauPoint& above = plateau.points[plateau.middle + 1];
-  // Friction that rises faster or slower, by more than the steps in which it was looked for.
+  // Friction with a smaller or larger scale, by more than the steps of the search.
   double friction_spread = 0.0;
   if (chosen.friction_scale > 0.0) {
     double low = here.fit.linear[0], high = low;
@@ -775,7 +779,7 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
     }
     friction_spread = high - low;
   }
-  // A force by position where none was found, or of higher powers than that.
+  // A force that depends on position if none was found, or else with higher powers.
   double position_spread = 0.0;
   if (model.order > 1) {
     FitData other = used;
@@ -784,8 +788,8 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
     const Fit found = varied.minimise(here.fit.at, false, 5);
     position_spread = std::abs(found.linear[0] - here.fit.linear[0]);
   }
-  // The jackknife, and by how much the number depends on the bandwidth: between the neighbours, and
-  // over one and a half octaves to each side, where it is known well.
+  // The interval combines the jackknife with the dependence on the bandwidth: between neighbours,
+  // and over one and a half octaves to each side as far as the number is accurate there.
   const std::size_t first = plateau.middle - std::min<std::size_t>(plateau.middle, 3);
   const std::size_t last = std::min(plateau.middle + 3, plateau.points.size() - 1);
   const auto estimate = [&](auto value, auto error, double more) {
@@ -795,7 +799,7 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
     double squares = 0.0, weights = 0.0;
     for (std::size_t i = first; i <= last; ++i) {
       const PlateauPoint& point = plateau.points[i];
-      // What is known better than here, or not told at all, counts no more.
+      // A point that is more accurate than this one, or has no error, does not count more.
       const double size = std::max(error(point), error(here));
       const double weight = size > 0.0 && !point.at_bound ? 1.0 / (size * size) : 0.0;
       squares += weight * (value(point) - x) * (value(point) - x);
@@ -810,7 +814,7 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
   result.position_shift = position_spread / result.input_gain.half_width;
   // A standard error is half of a half width.
   result.friction_shift = 2.0 * friction_spread / result.input_gain.half_width;
-  // Times below a twentieth of a row are all the same to the fit.
+  // The fit cannot distinguish times below a twentieth of a row.
   const auto time = [&](Estimate found) {
     found.half_width = std::max(found.half_width, 0.05 * data.sample_time);
     return found;
@@ -823,7 +827,7 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
                                    [](const PlateauPoint& p) { return p.errors.dead_time; }, 0.0));
   result.pole = estimate([](const PlateauPoint& p) { return p.fit.at.pole; },
                          [](const PlateauPoint& p) { return p.errors.pole; }, 0.0);
-  // Linear numbers: b0, the log's columns, sines, friction.
+  // The linear numbers: b0, the log's columns, sines, friction.
   const auto linear = [&](std::size_t c) {
     return estimate([c](const PlateauPoint& p) { return p.fit.linear[c]; },
                     [c](const PlateauPoint& p) { return p.errors.linear[c]; }, 0.0);
@@ -858,7 +862,8 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
   return result;
 }
 
-/// Whether a study can be trusted; if not, the first reason and what to record instead.
+/// Decides whether a study can be trusted; if not, returns the first reason and what to record
+/// instead.
 [[nodiscard]] inline Check<double> judge(const Identified& found, const Log& log,
                                          const IdentifyOptions& options = {}) {
   Rules<double> rules;
@@ -870,19 +875,18 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
   rules.require(options.applied || found.log.saturated < 0.5, "saturated", found.log.saturated,
                 "is the share of rows with u at its limits: record the u that the actuator held");
   rules.require(found.own_input > 1e-5, "own_input", found.own_input,
-                "is the share of u that y does not explain, so nothing else moves the loop: record "
-                "a moving reference");
+                "is the share of u that does not follow from y, which is too small: record a "
+                "moving reference");
   const bool excited = found.plateau.middle > 0 && found.excitation < 0.15;
   rules.require(excited, "excitation", found.plateau.middle > 0 ? found.excitation : 1.0,
                 "is the smallest relative error of b0 and too large, because u hardly moves y: "
                 "record steps or a sweep");
   if (!rules) return rules;
-  rules.require(
-      found.correlation <= options.correlation_max,
-      {"correlation", found.correlation,
-       "is the correlation of the innovations, so the machine has more than the model: record "
-       "without a load that swings, or add known effects as a column; must be at most",
-       -1, options.correlation_max, true});
+  rules.require(found.correlation <= options.correlation_max,
+                {"correlation", found.correlation,
+                 "is the correlation of the innovations, so the model lacks something: record "
+                 "without an oscillating load, or add known effects as columns; must be at most",
+                 -1, options.correlation_max, true});
   rules.require(!found.at_bound, "latency", found.latency.value,
                 "(or the pole) is at the end of its range: record faster changes of u");
   rules.require(found.plateau.spread <= options.plateau_max,
@@ -912,7 +916,7 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
   return rules;
 }
 
-/// A model with error bars, or the reason why this log cannot give one.
+/// `study` and `judge`: a model with error bars, or the reason why this log cannot give one.
 [[nodiscard]] inline Expected<Identified, Error<double>> identify(
     const Log& log, const IdentifyOptions& options = {}) {
   auto found = study(log, options);

@@ -3,8 +3,8 @@
 ///
 /// If the machine has more than the model, the innovations are not white and formal intervals are
 /// several times too short. So the log is cut into stretches and the fit is repeated without each
-/// of them (one Gauss-Newton step, all parameters together): any difference between the stretches
-/// enters the interval, whatever its cause.
+/// of them (one Gauss-Newton step, all parameters together): any difference between the stretches,
+/// whatever its cause, widens the interval.
 #pragma once
 
 #include <algorithm>
@@ -17,16 +17,17 @@ namespace esokit {
 
 /// Standard errors of a fit.
 struct FitErrors {
-  double bandwidth = 0.0;        ///< rad/s; 0 where w was given
+  double bandwidth = 0.0;        ///< rad/s; 0 if w was given
   double latency = 0.0;          ///< s
   double lag = 0.0;              ///< s
   double dead_time = 0.0;        ///< s
   double pole = 0.0;             ///< 1/s
-  double noise = 0.0;            ///< y's unit
+  double noise = 0.0;            ///< unit of y
   std::vector<double> linear{};  ///< b0 and the columns
 };
 
-/// Student's t, two-sided 95 %, for that many degrees of freedom (Cornish-Fisher from the normal).
+/// Student's t for a two-sided 95 % interval (Cornish-Fisher expansion from the normal). @param
+/// freedom degrees of freedom
 [[nodiscard]] inline double student_95(int freedom) {
   const double z = 1.959963985;
   const double n = freedom;
@@ -34,8 +35,8 @@ struct FitErrors {
          (5.0 * std::pow(z, 5) + 16.0 * z * z * z + 3.0 * z) / (96.0 * n * n);
 }
 
-/// Errors by leaving out one of `stretches` equal stretches at a time, of the fit that `fit` gave
-/// last.
+/// Standard errors of the fit that `fit` returned last, by leaving out one of `stretches` equal
+/// stretches at a time.
 [[nodiscard]] inline FitErrors jackknife(InnovationsFit& fit, const Fit& at, bool with_bandwidth,
                                          int stretches = 20) {
   const auto sensitivities = fit.sensitivities(at, with_bandwidth);
@@ -57,7 +58,7 @@ struct FitErrors {
     for (std::size_t i = 0; i < right.size(); ++i) right[i] += rights[s][i];
     square += squares[s];
   }
-  // What each stretch left out gives: w, latency, lag, dead time, pole, noise, linear.
+  // The results without each stretch: w, latency, lag, dead time, pole, noise, linear.
   const std::size_t quantities = 6 + at.linear.size();
   std::vector<std::vector<double>> values;
   for (std::size_t s = 0; s < normals.size(); ++s) {

@@ -1,5 +1,5 @@
 /// @file
-/// A recorded log, a report on it before any fit, and its rows at one sample time.
+/// A recorded log, a report on it before any fit, and its rows at a constant sample time.
 #pragma once
 
 #include <algorithm>
@@ -13,17 +13,17 @@
 
 namespace esokit {
 
-/// Columns of a log. A row that is missing or not finite in u or y is left out.
+/// The columns of a log. Rows with a missing or non-finite u or y are left out.
 struct Log {
-  std::vector<double> time{};  ///< stamps, s, with any origin (also 1970); may be empty
+  std::vector<double> time{};  ///< time stamps, s, with any origin (also 1970); may be empty
   std::vector<double> u{};     ///< input that the actuator held from its row to the next
   std::vector<double> y{};     ///< output
-  double sample_time = 0.0;    ///< T, s, where there are no stamps
+  double sample_time = 0.0;    ///< T, s, if there are no time stamps
 
-  /// Clock jitter if there are no stamps, standard deviation, s.
+  /// Standard deviation of the clock jitter, s, if there are no time stamps.
   double jitter = 0.0;
-  /// Other effects that act where the disturbance acts (sin y of a pendulum, a known load): each as
-  /// long as y.
+  /// Known effects that enter where the disturbance does (sin y of a pendulum, a known load), each
+  /// as long as y.
   std::vector<std::vector<double>> columns{};
   /// A quantity on which b0 may depend (throttle, position, battery voltage), as long as y; may be
   /// empty.
@@ -32,23 +32,23 @@ struct Log {
 
 /// The report on a log before any fit.
 struct LogReport {
-  std::size_t rows = 0;       ///< in the log
+  std::size_t rows = 0;       ///< rows in the log
   std::size_t used = 0;       ///< rows that were fitted
-  std::size_t rejected = 0;   ///< with a number that is not finite
-  std::size_t outliers = 0;   ///< single rows of y off by more than their neighbours allow
-  std::size_t missing = 0;    ///< that the stamps say should be there
-  std::size_t pieces = 1;     ///< parts between gaps too long to bridge
+  std::size_t rejected = 0;   ///< rows with a number that is not finite
+  std::size_t outliers = 0;   ///< single values of y that do not fit their neighbours
+  std::size_t missing = 0;    ///< rows that are missing according to the time stamps
+  std::size_t pieces = 1;     ///< number of pieces between gaps too long to bridge
   double sample_time = 0.0;   ///< T: the mean step without gaps, s
   double jitter = 0.0;        ///< standard deviation of the steps without gaps, s
   double duration = 0.0;      ///< s
-  double quantisation = 0.0;  ///< step of y, 0 where it has none that shows
-  double saturated = 0.0;     ///< share of rows with u at its largest or least
+  double quantisation = 0.0;  ///< step of y, 0 if none is visible
+  double saturated = 0.0;     ///< share of rows with u at its largest or smallest value
 };
 
-/// Rows at one sample time, and the report on the log.
+/// Rows at a constant sample time, and the report on the log.
 struct PreparedLog {
-  FitData data{};      ///< what is fitted
-  LogReport report{};  ///< what was found on the way
+  FitData data{};      ///< data for the fit
+  LogReport report{};  ///< report on the log
 };
 
 namespace detail {
@@ -60,7 +60,7 @@ inline double median(std::vector<double> values) {
   return *middle;
 }
 
-/// The step of which all values are multiples but for the digits that they were written with; 0 if
+/// The step of which all values are multiples within the digits with which they were written; 0 if
 /// there is none.
 inline double quantisation_step(const std::vector<double>& y) {
   std::vector<double> values = y;
@@ -74,7 +74,7 @@ inline double quantisation_step(const std::vector<double>& y) {
   }
   if (differences.empty()) return 0.0;
   double step = *std::min_element(differences.begin(), differences.end());
-  // Rounding to decimal digits makes the least difference a little short or long.
+  // Rounding to decimal digits makes the smallest difference slightly too short or too long.
   for (int pass = 0; pass < 3; ++pass) {
     double sum = 0.0, count = 0.0;
     for (const double difference : differences) {
@@ -93,8 +93,8 @@ inline double quantisation_step(const std::vector<double>& y) {
 
 }  // namespace detail
 
-/// Checks a log and brings it to one sample time. Where the stamps jitter by more than 2 % of T, y
-/// is read between its rows on a straight line and u is what the actuator held on average.
+/// Checks a log and converts it to a constant sample time. If the time stamps jitter by more than 2
+/// % of T, y is interpolated linearly, and u is the mean of what the actuator held in the row.
 [[nodiscard]] inline Expected<PreparedLog, Error<double>> prepare(const Log& log) {
   using E = Error<double>;
   const std::size_t count = log.y.size();
@@ -131,9 +131,9 @@ inline double quantisation_step(const std::vector<double>& y) {
   }
   report.rejected = count - good.size();
   if (good.size() < 200)
-    return E{"rows", size(good.size()), "that can be read are too few: record at least", -1, 200.0,
+    return E{"rows", size(good.size()), "are usable, which is too few: record at least", -1, 200.0,
              true};
-  // Stamps since 1970 lose nothing but their start.
+  // The first time is subtracted, so that stamps since 1970 lose no digits.
   std::vector<double> time, u, y;
   std::vector<std::vector<double>> columns(log.columns.size());
   for (const std::size_t k : good) {
@@ -149,13 +149,13 @@ inline double quantisation_step(const std::vector<double>& y) {
     }
     steps.push_back(time[k] - time[k - 1]);
   }
-  // Within these the squares, and the powers of T, of any model are numbers.
+  // Within these limits all squares and powers of T are finite.
   const auto size_fits = [&](const char* field, const std::vector<double>& values, int index = -1) {
     const auto [low, high] = std::minmax_element(values.begin(), values.end());
     const double largest = std::max(-*low, *high);
-    rules.require(largest <= 1e60, field, largest, "is too large: write it in another unit", index)
+    rules.require(largest <= 1e60, field, largest, "is too large: use another unit", index)
         .require(!(*high > *low) || *high - *low >= 1e-60, field, *high - *low,
-                 "is the whole range of its values: write it in another unit", index);
+                 "is the range of its values, which is too small: use another unit", index);
   };
   size_fits("u", u);
   size_fits("y", y);
@@ -177,7 +177,7 @@ inline double quantisation_step(const std::vector<double>& y) {
   report.sample_time = T;
   report.jitter = log.time.empty() ? log.jitter : std::sqrt(square / regular);
   report.duration = time.back();
-  // A single row that neither side agrees with.
+  // Finds single rows that fit neither of their neighbours.
   std::vector<double> jumps;
   for (std::size_t k = 1; k + 1 < y.size(); ++k) {
     jumps.push_back(std::abs(y[k] - 0.5 * (y[k - 1] + y[k + 1])));
@@ -271,8 +271,7 @@ inline double quantisation_step(const std::vector<double>& y) {
   return prepared;
 }
 
-/// Twenty stretches, evenly spread, of together `most` rows; the data as they are if they have no
-/// more.
+/// Twenty evenly spread stretches of `most` rows in total; all data if they have no more rows.
 [[nodiscard]] inline FitData excerpt(const FitData& data, std::size_t most) {
   if (data.y.size() <= most) return data;
   constexpr std::size_t stretches = 20;
@@ -311,7 +310,7 @@ inline double quantisation_step(const std::vector<double>& y) {
   return out;
 }
 
-/// Means of `fold` rows each; what a piece has beyond a multiple is left out.
+/// Means of `fold` rows each; the remaining rows of a piece are left out.
 [[nodiscard]] inline FitData averaged(const FitData& data, int fold) {
   if (fold <= 1) return data;
   FitData out;

@@ -1,11 +1,11 @@
 /// @file
-/// b0 over the bandwidth of the observer: its value is read where it does not depend on the
-/// bandwidth.
+/// b0 as a function of the bandwidth of the observer; the result is its value where it does not
+/// depend on the bandwidth.
 ///
 /// The likelihood chooses the bandwidth that explains the noise. If a machine is more than a chain
-/// (flexible modes, coloured noise, vibration), b0 is wrong at this bandwidth. So b0 is computed
-/// over a range of bandwidths, with lag, dead time and pole fitted anew for each, and read where it
-/// stays constant.
+/// (flexible modes, coloured noise, vibration), b0 at this bandwidth is wrong. So b0 is computed
+/// over a range of bandwidths, with lag, dead time and pole fitted again for each, and taken where
+/// it is constant.
 #pragma once
 
 #include <algorithm>
@@ -20,19 +20,19 @@ namespace esokit {
 
 /// The fit at one bandwidth.
 struct PlateauPoint {
-  Fit fit{};              ///< with w as given
-  FitErrors errors{};     ///< of the fit
-  bool at_bound = false;  ///< a parameter came to the end of its range
+  Fit fit{};              ///< fit with w given
+  FitErrors errors{};     ///< errors of the fit
+  bool at_bound = false;  ///< a parameter is at a bound of its range
 };
 
-/// Fits over the bandwidth, and where they agree.
+/// Fits for several bandwidths, and where they agree.
 struct Plateau {
-  std::vector<PlateauPoint> points{};  ///< by rising bandwidth, a factor of sqrt(2) apart
-  std::size_t middle = 0;  ///< of the three neighbours that agree best; 0: there are none
-  double spread = 0.0;     ///< of b0 over those three, largest less least over the middle
-  double error = 0.0;      ///< standard error of b0 there
-  double from = 0.0;       ///< rad/s: b0 stays within the tolerance down to here
-  double to = 0.0;         ///< and up to here
+  std::vector<PlateauPoint> points{};  ///< by rising bandwidth, by a factor of sqrt(2)
+  std::size_t middle = 0;  ///< index: middle of the three neighbours that agree best; 0: none
+  double spread = 0.0;     ///< (largest - smallest) / middle of b0 over those three
+  double error = 0.0;      ///< standard error of b0 at the middle one
+  double from = 0.0;       ///< rad/s, lowest bandwidth at which b0 is within the tolerance
+  double to = 0.0;         ///< rad/s, highest bandwidth at which b0 is within the tolerance
 };
 
 /// Fits at bandwidths around that of `best`.
@@ -50,7 +50,7 @@ struct Plateau {
       here.fit = fit.minimise(point, false, 8);
       here.errors = jackknife(fit, here.fit, false);
       here.at_bound = fit.at_bound(here.fit.at);
-      // From a bound the next fit would not come back.
+      // A fit that starts at a bound would not leave it.
       if (!here.at_bound) point = here.fit.at;
       point.bandwidth = here.fit.at.bandwidth * factor;
       found.push_back(std::move(here));

@@ -1,6 +1,6 @@
 /// @file
-/// Disturbances that swing at one frequency: lines in the spectrum of the innovations, fitted as
-/// sines that act where the disturbance acts.
+/// Sinusoidal disturbances: lines in the spectrum of the innovations, fitted as sines that enter
+/// where the disturbance does.
 #pragma once
 
 #include <algorithm>
@@ -16,10 +16,10 @@
 
 namespace esokit {
 
-/// A disturbance that swings at one frequency.
+/// A sinusoidal disturbance.
 struct Sinusoid {
   Estimate frequency{};  ///< rad/s
-  Estimate amplitude{};  ///< unit of y^(n), where the disturbance acts
+  Estimate amplitude{};  ///< unit of y^(n)
 };
 
 namespace detail {
@@ -43,8 +43,8 @@ void each_time(const FitData& data, const Use& use) {
   }
 }
 
-/// What a sine that acts does over what is fitted for it: a column counts by the mean of two rows,
-/// held between them, through `order` integrations.
+/// Ratio of the effect of a continuous sine to that of its column: a column acts by the mean of two
+/// rows, held between them, through `order` integrations.
 inline double sine_scale(const FitData& data, int order, double frequency) {
   const double half = 0.5 * frequency * data.sample_time;
   const double ratio = std::tan(half) / half;
@@ -54,7 +54,7 @@ inline double sine_scale(const FitData& data, int order, double frequency) {
   return 3.0 * over * over * over / (std::cos(half) * (2.0 + std::cos(2.0 * half)));
 }
 
-/// The data with cos(w t) and sin(w t) as further columns.
+/// Adds cos(w t) and sin(w t) to the data as further columns.
 inline void add_sine(FitData& data, int order, double frequency) {
   std::vector<double> cosine(data.y.size()), sine(data.y.size());
   const double scale = sine_scale(data, order, frequency);
@@ -69,11 +69,11 @@ inline void add_sine(FitData& data, int order, double frequency) {
 /// A line in a spectrum.
 struct Line {
   double frequency = 0.0;  ///< rad/s
-  double height = 0.0;     ///< power over the mean of what is near
+  double height = 0.0;     ///< power divided by the mean of its neighbourhood
 };
 
-/// With what sine e swings most, above what is beside it; zeros if the rows lie too far apart in
-/// time.
+/// The line of e that is highest in comparison with its neighbourhood; zeros if the rows are too
+/// far apart in time.
 inline Line highest_line(const FitData& data, const std::vector<double>& e) {
   constexpr double most = 4194304.0;
   const double T = data.sample_time;
@@ -85,7 +85,8 @@ inline Line highest_line(const FitData& data, const std::vector<double>& e) {
   const double rows = (to - from) / T + 1.0;
   if (!(rows < most)) return {};
   std::size_t length = 2;
-  while (static_cast<double>(length) < 2.0 * rows) length *= 2;  // no line between two bins
+  while (static_cast<double>(length) < 2.0 * rows)
+    length *= 2;  // so that no line falls between two bins
   std::vector<std::complex<double>> x(length);
   each_time(data, [&](std::size_t k, double time) {
     x[static_cast<std::size_t>(std::lround((time - from) / T))] = e[k];
@@ -94,12 +95,12 @@ inline Line highest_line(const FitData& data, const std::vector<double>& e) {
   const std::size_t half = length / 2;
   std::vector<double> sums(half + 1, 0.0);
   for (std::size_t j = 0; j < half; ++j) sums[j + 1] = sums[j] + std::norm(x[j]);
-  // Not from the first four periods of the log, which a drift has, too.
+  // Lines with fewer than four periods in the log are left out, because drift causes them, too.
   const auto first = static_cast<std::size_t>(std::ceil(4.0 * static_cast<double>(length) / rows));
-  // A mode that rings is high beside its top, too: only what is nearer than that is compared.
+  // A ringing mode is also high next to its peak, so only a narrow neighbourhood is compared.
   constexpr std::size_t wide = 48, own = 8;
   Line highest;
-  // Up to where the mean of two rows still tells a sine.
+  // Up to the frequency at which the mean of two rows still represents a sine.
   for (std::size_t j = first; 10 * j < 8 * half; ++j) {
     const std::size_t low = j > wide ? j - wide : 1, high = std::min(j + wide, half);
     const std::size_t inner_low = std::max(low, j > own ? j - own : 1);
@@ -128,13 +129,14 @@ inline double amplitude_of(const FitData& data, const std::vector<double>& value
   return 2.0 * std::abs(sum) / static_cast<double>(values.size());
 }
 
-/// A sine as it is fitted beside all else: amplitude, and by how much its frequency is off.
+/// A sine that is fitted together with the linear parameters: amplitude, and correction of its
+/// frequency.
 struct FittedSine {
-  Sinusoid sine{};    ///< with its errors, one standard error each
-  double gain = 0.0;  ///< by how much the likelihood rises, twice its logarithm
+  Sinusoid sine{};    ///< with one standard error as half width
+  double gain = 0.0;  ///< twice the rise of the log-likelihood
 };
 
-/// The sine near `frequency` in the disturbance of a log whose other parameters are at `point`.
+/// Fits the sine near `frequency` in the disturbance, with the other parameters at `point`.
 inline FittedSine fit_sine(const FitData& data, const FitModel& model, const FitBounds& bounds,
                            const FitPoint& point, double frequency) {
   InnovationsFit without(data, model, bounds);
@@ -149,7 +151,7 @@ inline FittedSine fit_sine(const FitData& data, const FitModel& model, const Fit
     InnovationsFit fit(with, model, bounds);
     const Fit swinging = fit.at(point);
     const double a = swinging.linear[c], b = swinging.linear[c + 1];
-    // What a frequency that is off does: the derivative of a cos + b sin.
+    // The effect of a frequency error: the derivative of a cos + b sin.
     std::vector<double> slope(data.y.size());
     const double scale = sine_scale(data, model.order, frequency);
     each_time(data, [&](std::size_t k, double time) {
@@ -174,10 +176,11 @@ inline FittedSine fit_sine(const FitData& data, const FitModel& model, const Fit
   return found;
 }
 
-/// Frequencies (rad/s) of the sines that swing in the innovations of `data`, the largest first. One
-/// counts if the likelihood pays for amplitude, phase, frequency and for having searched it, if its
-/// amplitude is three standard errors, and if it is no small share of what u does at its frequency:
-/// that would be a fault of the model where the reference swings.
+/// Frequencies (rad/s) of the sines in the innovations of `data`, the largest first. A sine counts
+/// if it improves the likelihood by more than amplitude, phase, frequency and the search for it
+/// cost, if its amplitude is at least three standard errors, and if it is not small in comparison
+/// with the effect of u at its frequency (otherwise it could be a model error at a frequency of the
+/// reference).
 inline std::vector<double> find_sines(FitData data, const FitModel& model, const FitBounds& bounds,
                                       const FitPoint& point, int most) {
   std::vector<double> frequencies;
@@ -186,7 +189,7 @@ inline std::vector<double> find_sines(FitData data, const FitModel& model, const
     const Fit found = fit.at(point);
     const Line line = highest_line(data, fit.residual());
     const double rows = static_cast<double>(found.rows);
-    // The largest of so many powers of noise is log(rows) of their mean.
+    // The largest of this many powers of white noise is about log(rows) times their mean.
     if (!(line.height > 2.0 * std::log(rows))) break;
     const FittedSine swing = fit_sine(data, model, bounds, point, line.frequency);
     const double frequency = swing.sine.frequency.value;

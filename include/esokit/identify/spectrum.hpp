@@ -1,5 +1,5 @@
 /// @file
-/// Power over frequency of a residual that may have gaps.
+/// Power spectrum of a residual that may have gaps.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +15,7 @@ namespace esokit {
 
 namespace detail {
 
-/// Fourier transform in place; the size is a power of two.
+/// Fast Fourier transform in place; the size must be a power of two.
 inline void transform(std::vector<std::complex<double>>& x) {
   const std::size_t n = x.size();
   for (std::size_t i = 1, j = 0; i < n; ++i) {
@@ -42,10 +42,10 @@ inline void transform(std::vector<std::complex<double>>& x) {
 }  // namespace detail
 
 /// Calls `use(power)` for each stretch of `length` rows (a power of two); stretches overlap by half
-/// and rise and fall as a cosine, as Welch has them. `power` is at j / (length / 2) of half the
-/// sample rate, j = 0 .. length / 2; of white noise each is its variance on average.
-/// @param starts first rows of pieces without a gap @param lead rows at the start of each that do
-/// not count
+/// and have a raised-cosine window (Welch's method). power[j] is at j / (length / 2) of half the
+/// sample rate, j = 0 .. length / 2; for white noise each is on average its variance.
+/// @param starts first rows of pieces without a gap @param lead rows at the start of each piece
+/// that are not used
 template <class Use>
 void each_spectrum(const std::vector<double>& values, const std::vector<std::size_t>& starts,
                    std::size_t lead, std::size_t length, const Use& use) {

@@ -26,8 +26,7 @@ struct PlantShape {
   static constexpr int order = Parts.order;
   static constexpr int size = Parts.sensor + States + disturbance_size(Parts);
   static constexpr int measured_rows = Parts.sensor;
-  static constexpr int first =
-      size - disturbance_size(Parts);  ///< index of the first state of the disturbance
+  static constexpr int first = size - disturbance_size(Parts);  ///< first disturbance state
   static constexpr int replaced = order == States ? 1 : 0;  ///< of its states, how many D replaces
 
   static constexpr int degree(int state) noexcept {
@@ -270,8 +269,7 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
   }
 
  private:
-  static constexpr int swings =
-      States + Parts.constants;  ///< first row of the sines, also in natural_
+  static constexpr int swings = States + Parts.constants;  ///< first row of the sines
   using Square = Matrix<S, inner, inner>;
 
   /// C adj(s I - A) E, whose roots are the zeros from d to y, and for each coefficient the sum of

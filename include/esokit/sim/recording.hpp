@@ -58,14 +58,13 @@ struct ControllerScalarOf<C, PlantScalar> {
 template <class P, class C>
 struct RunTypes {
   using S = typename detail::PlantScalarOf<P>::type;  ///< scalar of the plant
-  using ControllerScalar =
-      typename detail::ControllerScalarOf<C, S>::type;     ///< scalar of the controller
-  using Time = LaneScalar<S>;                              ///< s
-  static constexpr int inputs = detail::inputs_of<P>();    ///< length of u
-  static constexpr int outputs = detail::outputs_of<P>();  ///< length of y
-  using State = typename P::State;                         ///< x
-  using Input = ScalarOrVector<S, inputs>;                 ///< u; a number if one
-  using Output = ScalarOrVector<S, outputs>;               ///< y; a number if one
+  using ControllerScalar = typename detail::ControllerScalarOf<C, S>::type;  ///< its scalar
+  using Time = LaneScalar<S>;                                                ///< s
+  static constexpr int inputs = detail::inputs_of<P>();                      ///< length of u
+  static constexpr int outputs = detail::outputs_of<P>();                    ///< length of y
+  using State = typename P::State;                                           ///< x
+  using Input = ScalarOrVector<S, inputs>;                                   ///< u; a number if one
+  using Output = ScalarOrVector<S, outputs>;                                 ///< y; a number if one
 
   /// The reference is (r, r', ..) for a controller that takes derivatives, else one number per
   /// output.

@@ -27,7 +27,7 @@ struct ControllerOfConfig<AdrcConfig<Observer>> {
 template <class Config>
 using ControllerOf = typename ControllerOfConfig<Config>::type;
 
-/// Poles of the error that a design places, 1/s.
+/// The observer poles that a design places, 1/s.
 template <int Order>
 std::vector<std::complex<double>> placed_poles(const TuneModel& model, const TunedDesign& d) {
   const int size = Order + d.extension;
@@ -59,7 +59,7 @@ std::vector<std::complex<double>> placed_poles(const TuneModel& model, const Tun
     std::sort(poles.begin(), poles.end(),
               [](const auto& a, const auto& b) { return std::abs(a.imag()) < std::abs(b.imag()); });
     for (std::size_t i = 0; i < poles.size(); ++i) {
-      // Rounding leaves conjugates that differ.
+      // By rounding, computed conjugates may differ.
       const bool pair =
           i + 1 < poles.size() && std::abs(poles[i].imag()) > 1e-9 * std::abs(poles[i]);
       poles[i] = std::log(1.0 + (pair ? poles[i] : std::complex<double>(poles[i].real()))) / T;
@@ -74,14 +74,14 @@ std::vector<std::complex<double>> placed_poles(const TuneModel& model, const Tun
 
 }  // namespace detail
 
-/// Calls `visit(controller)` with the Adrc of a design of a plant of order `Order`, within the
-/// actuator's limits, and returns what it returns.
+/// Calls `visit(controller)` with the Adrc of a design for a plant of order `Order`, with the
+/// actuator's limits, and returns its result.
 ///
-/// To need fewer types, every design with one level becomes a LinearEso with the poles of the
-/// design (with m = 1 or 2, or with the lag in its model). Its gains equal those of the code to
-/// paste up to rounding. A cascade becomes a CascadeEso.
-/// @return error for a model of another order, for a design that knows more than the lag (its code
-///         says what it is), and for what `make` refuses
+/// So that fewer types are needed, every design with one level becomes a LinearEso with the poles
+/// of the design (with m = 1 or 2, or with the lag in its model). Its gains equal those of the
+/// design's `code` up to rounding. A cascade becomes a CascadeEso.
+/// @return error for a model of another order, for a design that knows more than the lag (use its
+///         `code`), or from `make`
 template <int Order, class Visit>
 Check<double> with_controller(const TuneModel& model, const TunedDesign& design,
                               const Visit& visit) {

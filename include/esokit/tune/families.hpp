@@ -1,5 +1,5 @@
 /// @file
-/// The families of controllers that are compared, and each as a linear system for any of its
+/// The families of controllers that are compared, each as a linear system that depends on its
 /// parameters.
 #pragma once
 
@@ -24,55 +24,55 @@ namespace esokit {
 
 /// How the gains of observer and law are chosen.
 enum class TuneFamily : unsigned char {
-  linear,     ///< LinearEso by its bandwidth, law by its bandwidth
-  half_gain,  ///< HalfGainEso, law by its bandwidth
-  cascade,    ///< CascadeEso by bandwidth and factor, law by its bandwidth
+  linear,     ///< LinearEso and law, each by a bandwidth
+  half_gain,  ///< HalfGainEso and law, each by a bandwidth
+  cascade,    ///< CascadeEso by bandwidth and factor, law by a bandwidth
   filter,     ///< frozen ExtendedStateFilter by its noise ratio, LQR gains
-  free_poles  ///< LinearEso by any poles, law by any poles
+  free_poles  ///< LinearEso and law with arbitrary poles
 };
 
 /// What the observer of a family knows besides the chain.
 struct TuneKnowledge {
-  bool lag = false;     ///< of the actuator
+  bool lag = false;     ///< lag of the actuator
   bool sensor = false;  ///< lag of the sensor
-  bool swing = false;   ///< the frequency of a swing in the disturbance
+  bool swing = false;   ///< the frequency of a sine in the disturbance
 
-  /// Whether it is more than the chain.
+  /// True if it knows anything.
   [[nodiscard]] constexpr bool any() const noexcept { return lag || sensor || swing; }
-  /// Member by member.
+  /// True if all members are equal.
   friend constexpr bool operator==(const TuneKnowledge&, const TuneKnowledge&) = default;
 };
 
-/// A point of a family.
+/// The parameters of a design within its family.
 struct TuneSettings {
-  double observer_bandwidth = 0.0;    ///< omega_o, of a cascade that of level 1, rad/s
+  double observer_bandwidth = 0.0;    ///< omega_o, for a cascade that of level 1, rad/s
   double bandwidth_factor = 0.0;      ///< alpha of a cascade
-  double controller_bandwidth = 0.0;  ///< omega_c where the law goes by it, rad/s
-  double capture_bandwidth = 0.0;     ///< of a known swing, see Resonance
+  double controller_bandwidth = 0.0;  ///< omega_c if the law is given by it, rad/s
+  double capture_bandwidth = 0.0;     ///< of a known sine, see Resonance
 
-  /// Poles of the error that a placement places, 1/s; none for a cascade.
+  /// The observer poles, 1/s; none for a cascade.
   std::vector<std::complex<double>> observer_poles{};
   double disturbance_bound = 0.0;  ///< q_n of the filter, see ExtendedStateFilter
-  std::vector<double> gains{};     ///< k_0 .. of the law, however they are chosen
+  std::vector<double> gains{};     ///< k_0 .. of the law
 };
 
 namespace detail {
 
-/// An observer without its type: the matrices, and the gains for its parameters.
+/// An observer without its type: its matrices, and its gains as a function of the parameters.
 struct ObserverKind {
   int order = 1;  ///< of the law
   int size = 2;
-  int placed = 2;  ///< poles of a level that are chosen
+  int placed = 2;  ///< number of poles that are placed in each level
   int levels = 1;
   double input_gain = 1.0;  ///< of the law
   DynamicMatrix<double> step{}, gamma{};
-  DynamicMatrix<double> disturbance{};  ///< see ObserverParts, of several levels
+  DynamicMatrix<double> disturbance{};  ///< for several levels, see ObserverParts
   std::vector<int> state_of_row{};
-  /// Physical gains, level by level; false where there are none.
+  /// Writes the physical gains, level by level; false if there are none.
   std::function<bool(const TuneSettings&, std::vector<double>&)> gains{};
 };
 
-/// Poles of a pair s^2 + 2 zeta w s + w^2.
+/// The poles of s^2 + 2 zeta w s + w^2.
 inline std::array<std::complex<double>, 2> pole_pair(double w, double zeta) {
   if (zeta < 1.0) {
     const std::complex<double> p(-zeta * w, w * std::sqrt(1.0 - zeta * zeta));
@@ -82,7 +82,7 @@ inline std::array<std::complex<double>, 2> pole_pair(double w, double zeta) {
   return {-w * (zeta + root), -w / (zeta + root)};
 }
 
-/// Coefficients below the highest of prod (s - p_i), by rising powers.
+/// Coefficients of prod (s - p_i) except the highest, by rising powers.
 inline std::vector<double> polynomial(const std::vector<std::complex<double>>& poles) {
   std::vector<std::complex<double>> c{1.0};
   for (const auto& p : poles) {
@@ -95,7 +95,7 @@ inline std::vector<double> polynomial(const std::vector<std::complex<double>>& p
   return real;
 }
 
-/// `function(std::integral_constant<int, value>)` for a value of First .. Last.
+/// Calls `function(std::integral_constant<int, value>)` for a value of First .. Last.
 template <int First, int Last, class Function>
 auto with_number(int value, const Function& function) {
   if constexpr (First < Last) {
@@ -104,7 +104,7 @@ auto with_number(int value, const Function& function) {
   return function(std::integral_constant<int, First>{});
 }
 
-/// Physical gains of a chain whose sampled poles have these weights.
+/// Physical gains of a chain for sampled poles with these weights.
 template <int Size>
 void chain_gains(const PoleWeights<Size, double>& weights, double T, std::vector<double>& gains) {
   const auto scaled = current_gain<Size, double>(weights);
@@ -115,7 +115,7 @@ void chain_gains(const PoleWeights<Size, double>& weights, double T, std::vector
   }
 }
 
-/// The chain of integrators, its input, and how its gains are placed.
+/// The observer of the chain of integrators: matrices and placement.
 inline ObserverKind chain_kind(const TuneModel& model, TuneFamily family, int extension,
                                int levels) {
   ObserverKind kind;
@@ -187,8 +187,8 @@ typename AugmentedModel<Parts>::Settings model_settings(const TuneModel& model,
   return settings;
 }
 
-/// Gains of a model's state for the poles of the part that is corrected, in physical units.
-/// @param specs what the placement asks for, of as many poles as the part has
+/// Gains of a model's states for given poles of its corrected part, in physical units.
+/// @param specs the spec of the placement for the number of poles of the part
 template <class Placement, class Model, class Specs>
 bool model_gains(const Model& made, double bandwidth, const Specs& specs,
                  std::vector<double>& gains) {
@@ -223,7 +223,7 @@ bool model_gains(const Model& made, double bandwidth, const Specs& specs,
   });
 }
 
-/// An observer that knows parts; none where the model refuses the numbers.
+/// An observer that knows parts of the plant; none if the model refuses the numbers.
 template <ModelParts Parts>
 std::optional<ObserverKind> known_kind(const TuneModel& model, TuneFamily family) {
   using Model = AugmentedModel<Parts>;
@@ -247,7 +247,7 @@ std::optional<ObserverKind> known_kind(const TuneModel& model, TuneFamily family
     const auto given = Parts.resonators > 0 ? make(s) : plain;
     if (!given) return false;
     if (family == TuneFamily::free_poles) {
-      // At a bandwidth of zero a sensor is faster and keeps its pole.
+      // The bandwidth is given as zero, so that a sensor counts as faster and keeps its pole.
       return model_gains<PoleSet>(
           *given, 0.0,
           [&](auto number) {
@@ -265,7 +265,7 @@ std::optional<ObserverKind> known_kind(const TuneModel& model, TuneFamily family
   return kind;
 }
 
-/// The law around an observer, told of its own u.
+/// Observer and law as a controller, with its own u as the applied u.
 inline std::optional<LinearController> tuned_controller(const ObserverKind& kind, double T,
                                                         const TuneSettings& settings) {
   std::vector<double> gains;

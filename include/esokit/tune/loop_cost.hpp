@@ -1,17 +1,17 @@
 /// @file
-/// Cost and margins of a loop, fast enough for ten thousand evaluations.
+/// Cost and margins of a loop, computed fast enough for ten thousand evaluations.
 ///
-/// The criterion, stationary and at the samples,
+/// The criterion, in the steady state and at the samples,
 ///
 ///     J = var(y) + rho var(b0 u~),   u~ = u + d / b0,
 ///
-/// is computed as an integral over the frequencies; a Lyapunov equation would give the same. This
-/// way the plant, with its dead time, is evaluated once for all controllers, and the same loop
-/// gains give the margins. (d is a random walk, so u has no variance, but u~ has one. `noise` of
-/// the analysis is the reference in the tests.) The grid is even in the logarithm of W = 2 / T
-/// tan(omega T / 2), where the trapezoid rule converges exponentially: poles with a damping of 0.25
-/// leave 1e-6 at 20 points a decade. A loop is stable if its characteristic polynomial turns by
-/// half a turn for each state between z = 1 and z = -1.
+/// is computed as an integral over the frequency, which gives the same as a Lyapunov equation. This
+/// way the plant with its dead time is evaluated only once for all controllers, and the same loop
+/// gains give the margins. (d is a random walk, so the variance of u is infinite, but that of u~ is
+/// not.) The grid is even in the logarithm of W = 2 / T tan(omega T / 2), on which the trapezoid
+/// rule converges exponentially: with poles of damping 0.25 the error is 1e-6 at 20 points per
+/// decade. A loop is stable if the phase of its characteristic polynomial turns by half a turn for
+/// each state between z = 1 and z = -1.
 #pragma once
 
 #include <algorithm>
@@ -31,14 +31,14 @@ namespace esokit {
 
 /// The results of LoopCost.
 struct LoopNumbers {
-  bool stable = false;         ///< with the nominal b0
-  bool tolerant = false;       ///< also with b0 wrong by the factor that the rules require
+  bool stable = false;         ///< stable with the nominal b0
+  bool tolerant = false;       ///< also stable with b0 wrong by the factor that the rules require
   double output = 0.0;         ///< standard deviation of y
-  double control = 0.0;        ///< of u~
-  double control_noise = 0.0;  ///< of u, by noise alone
+  double control = 0.0;        ///< standard deviation of u~
+  double control_noise = 0.0;  ///< standard deviation of u from noise only
   double tolerance = 0.0;      ///< factor by which b0 may be wrong in either direction
-  double modulus = 0.0;        ///< margin, the least over the intervals
-  double delay = 0.0;          ///< margin, s, the least over the intervals
+  double modulus = 0.0;        ///< modulus margin, the smallest over the intervals
+  double delay = 0.0;          ///< delay margin, s, the smallest over the intervals
 
   /// J.
   [[nodiscard]] double cost(double rho, double input_gain) const {
@@ -48,13 +48,13 @@ struct LoopNumbers {
 
 namespace detail {
 
-/// C (value - A)^-1 B + D of one channel, by a Hessenberg form: O(N^2) a frequency.
+/// C (value - A)^-1 B + D for one channel by a Hessenberg form: O(N^2) operations per frequency.
 class FastResponse {
  public:
-  /// @param c told of its own u
+  /// @param c with its own u as the applied u
   explicit FastResponse(const LinearController& c)
       : n_(c.states()), h_(c.a), b_(c.from_y), c_(c.to_u), d_(c.y_to_u(0, 0)) {
-    // By elimination with pivots, as it costs least (Wilkinson's elmhes).
+    // By elimination with pivoting, which is cheapest (Wilkinson's elmhes).
     for (int m = 1; m + 1 < n_; ++m) {
       int pivot = m;
       for (int i = m + 1; i < n_; ++i) {
@@ -81,7 +81,7 @@ class FastResponse {
 
   struct Answer {
     std::complex<double> gain;
-    std::complex<double> turn;  ///< det(value - A) over its magnitude
+    std::complex<double> turn;  ///< det(value - A) divided by its magnitude
   };
   [[nodiscard]] Answer at(std::complex<double> value) {
     using Complex = std::complex<double>;
@@ -119,7 +119,7 @@ class FastResponse {
   }
 
  private:
-  // Without the care that the standard's take for infinities.
+  // A product without the handling of infinities that std::complex has.
   static std::complex<double> times(std::complex<double> a, std::complex<double> b) noexcept {
     return {a.real() * b.real() - a.imag() * b.imag(), a.real() * b.imag() + a.imag() * b.real()};
   }
@@ -135,13 +135,13 @@ class FastResponse {
 
 }  // namespace detail
 
-/// The plant and what shakes it, ready for any controller.
+/// The plant and its disturbances, prepared for evaluating any controller.
 class LoopCost {
   using Complex = std::complex<double>;
 
  public:
-  /// @param model checked @param rules what margins are asked for @param slowest rad/s, well below
-  /// which nothing happens @param points a decade
+  /// @param model checked model @param rules required margins @param slowest rad/s, well below all
+  /// dynamics @param points per decade
   LoopCost(const TuneModel& model, const TuneRules& rules, double slowest, double points = 20.0)
       : T_(model.sample_time), b0_(model.input_gain.value), factor_(rules.gain_factor) {
     std::vector<detail::SampledPlant> others;
@@ -155,7 +155,7 @@ class LoopCost {
     const auto poles = detail::poles_of(plant.a);
     plant_states_ = plant.a.rows();
     const auto add = [&](double w, double density, double load) {
-      // 2 j sin(wT/2) e^(j wT/2), which z - 1 of a small angle would cancel.
+      // z - 1 as 2 j sin(wT/2) e^(j wT/2), which does not cancel for small angles.
       const double half = 0.5 * w * T_;
       const Complex value = Complex(0.0, 2.0 * std::sin(half)) * std::polar(1.0, half);
       Point p;
@@ -182,7 +182,7 @@ class LoopCost {
     for (int i = 0; i <= steps; ++i) {
       const double W = from * std::exp(h * i);
       const double x = 0.5 * W * T_;
-      // The tails are constant densities.
+      // Beyond the ends the densities are constant.
       const double ends = i == 0 ? 0.5 * h + 1.0 : i == steps ? 0.5 * h + 1.0 : h;
       add(2.0 / T_ * std::atan(x), ends * 2.0 * x / (1.0 + x * x) / std::numbers::pi, 0.0);
     }
@@ -193,7 +193,7 @@ class LoopCost {
     }
   }
 
-  /// @param controller told of its own u
+  /// @param controller with its own u as the applied u
   [[nodiscard]] LoopNumbers operator()(const LinearController& controller) const {
     detail::FastResponse response(controller);
     LoopNumbers numbers;
@@ -201,7 +201,7 @@ class LoopCost {
     double output = 0.0, control = 0.0, noise = 0.0;
     Complex before[3];
     double turned[3] = {};
-    // Of each plant: what came last.
+    // The last values for each plant.
     struct Trail {
       double square[2];
       Complex loop;
@@ -220,7 +220,7 @@ class LoopCost {
       control += caused + std::norm(1.0 / b0_ + cs * p.load) * p.load_power;
       if (i >= walked_) continue;
       const Complex turn = p.turn * c.turn;
-      // b0 wrong by the factor at the ends of its interval, too.
+      // Also with b0 wrong by the factor at the ends of its interval.
       const Complex scales[] = {loop, factor_ * (variants_ > 0 ? p.ratio[0] : 1.0) * loop,
                                 1.0 / factor_ * (variants_ > 1 ? p.ratio[1] : 1.0) * loop};
       for (std::size_t g = 0; g < 3; ++g) {
@@ -232,7 +232,7 @@ class LoopCost {
         const Complex last = trails[0].loop;
         const double share = last.imag() / (last.imag() - loop.imag());
         const double real = last.real() + share * (loop.real() - last.real());
-        // Where both are large a pole at standstill turned L, no crossing.
+        // If both are large, a pole at frequency zero has turned L: this is no crossing.
         if (real < 0.0 && is_finite(real)) {
           numbers.tolerance = std::min(numbers.tolerance, std::max(-real, -1.0 / real));
         }
@@ -259,7 +259,7 @@ class LoopCost {
   struct Point {
     double frequency;
     Complex value, plant, load, turn;
-    Complex ratio[most_variants];  ///< of the other plants to this one
+    Complex ratio[most_variants];  ///< ratio of the other plants to this one
     double noise_power, load_power;
   };
 
@@ -267,7 +267,7 @@ class LoopCost {
                std::size_t i) const {
     const double now = std::norm(1.0 + loop);
     double least = now;
-    // A parabola through three where the middle one is least.
+    // A parabola through three points of which the middle one is smallest.
     if (i >= 2 && square[1] <= square[0] && square[1] <= now) {
       const double bend = square[0] - 2.0 * square[1] + now;
       const double slope = 0.5 * (now - square[0]);

@@ -1,8 +1,9 @@
 /// @file
-/// The smallest J of any linear controller: frozen Kalman gain, LQR gains, -dhat / b0.
+/// The controller with the smallest J of all linear controllers: constant Kalman gain, LQR gains,
+/// and -dhat / b0.
 ///
-/// It knows lag, sensor and dead time, but guarantees no margins. With u~ = u + d / b0 instead of
-/// u, the regulator is that of the plant without disturbance; for a dead time of D samples the
+/// It knows lag, sensor and dead time, but guarantees no margins. With u~ = u + d / b0 in place of
+/// u the regulator is that for the plant without disturbance; for a dead time of D samples the
 /// state is predicted D samples ahead.
 #pragma once
 
@@ -34,7 +35,8 @@ inline DynamicMatrix<double> identity_matrix(int size, double value = 1.0) {
 
 /// X = A' X A - A' X B (R + B' X B)^-1 B' X A + Q, one input, by the structure-preserving doubling
 /// algorithm (E. K.-W. Chu, H.-Y. Fan, W.-W. Lin, C.-S. Wang, Int. J. Control 77 (2004) 767-788).
-/// The least solution, which is the stabilising one where Q sees all of A that is not stable.
+/// Gives the smallest solution, which is stabilising if all unstable modes of A are observable
+/// through Q.
 /// @param q positive semidefinite
 inline DynamicMatrix<double> solve_riccati(DynamicMatrix<double> a, const DynamicMatrix<double>& b,
                                            double r, DynamicMatrix<double> q) {
@@ -73,10 +75,10 @@ inline DynamicMatrix<double> solve_riccati(DynamicMatrix<double> a, const Dynami
 
 }  // namespace detail
 
-/// The LQG controllers of a model: one for each rho.
+/// The LQG controllers of a model, one for each rho.
 class Lqg {
  public:
-  /// @param model checked
+  /// @param model checked model
   explicit Lqg(const TuneModel& model)
       : plant_(detail::sampled_plant(detail::dense_plant(model), model.sample_time)),
         b0_(model.input_gain.value),
@@ -87,7 +89,7 @@ class Lqg {
     const double T = model.sample_time;
     whole_ = plant_.whole[0];
     fraction_ = plant_.remembered(0) > whole_;
-    // The estimated: (x, d).
+    // The estimated states: (x, d).
     phi_ = detail::identity_matrix(n + 1);
     add(phi_, 0, 0, plant_.a);
     add(phi_, 0, n, plant_.e);
@@ -99,7 +101,7 @@ class Lqg {
     kalman_ = product(p, c);
     const double innovation = product(detail::transposed(c), kalman_)(0, 0) + r;
     for (int i = 0; i <= n; ++i) kalman_(i, 0) /= innovation;
-    // What is regulated: (x, u of the sample before, if a fraction of it still comes).
+    // The regulated states: (x, and u of the last sample if a fraction of it still acts).
     const int states = n + (fraction_ ? 1 : 0);
     a_ = DynamicMatrix<double>(states, states);
     add(a_, 0, 0, phi_block(n));
@@ -109,7 +111,7 @@ class Lqg {
       add(a_, 0, n, plant_.before);
       b_(n, 0) = 1.0;
     }
-    // Where the states stand under d = 1: the lag at -1 / b0.
+    // The states at rest under d = 1: the lag at -1 / b0.
     rest_ = DynamicMatrix<double>(states, 1);
     for (int i = 0; i < n; ++i) {
       const double input = plant_.now(i, 0) + plant_.before(i, 0);
@@ -135,14 +137,14 @@ class Lqg {
     return k;
   }
 
-  /// Time after which y stays within 2 % of a step, with the state known.
+  /// Time after which y stays within 2 % of a step, with known state, s.
   [[nodiscard]] double settling(double rho) const {
     const auto k = feedback(rho);
     const int states = a_.rows();
     auto closed = a_;
     detail::add(closed, 0, 0, detail::product(b_, k), -1.0);
     DynamicMatrix<double> x(states, 1);
-    // One at y and where it is measured, as it stands there.
+    // One in y and in the sensor, as at rest.
     const bool direct = plant_.c(0, 0) != 0.0;
     x(0, 0) = direct ? 1.0 / plant_.c(0, 0) : 0.0;
     if (!direct) {
@@ -160,7 +162,7 @@ class Lqg {
     return plant_.sample_time * (last + whole_);
   }
 
-  /// The controller, told of its own u.
+  /// The controller, with its own u as the applied u.
   [[nodiscard]] LinearController controller(double rho) const {
     using detail::add;
     using detail::product;
@@ -185,7 +187,7 @@ class Lqg {
     }
     for (int j = 0; j < n; ++j) row(0, j) = -ahead(0, j);
     if (fraction_) row(0, n + 1) -= k(0, n);
-    // Predicted (x, d) and the inputs of the past.
+    // The states: predicted (x, d) and past inputs.
     const int states = n + 1 + memory;
     LinearController form(states, 1, 0, plant_.sample_time);
     DynamicMatrix<double> output(1, n + 1);
@@ -220,7 +222,7 @@ class Lqg {
   }
 
  private:
-  /// Phi of the plant alone.
+  /// Phi of the plant without the disturbance.
   [[nodiscard]] DynamicMatrix<double> phi_block(int n) const {
     auto phi = plant_.a;
     for (int i = 0; i < n; ++i) phi(i, i) += 1.0;

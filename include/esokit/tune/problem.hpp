@@ -1,6 +1,5 @@
 /// @file
-/// The input for choosing observer and controller: the model, one requirement, and the margins that
-/// the loop has to keep.
+/// The input of `tune`: the model, one requirement, and the margins that the loop has to keep.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +12,7 @@
 
 namespace esokit {
 
-/// A disturbance that swings at a known frequency.
+/// A sinusoidal disturbance of known frequency.
 struct KnownSwing {
   double frequency = 0.0;          ///< w0, rad/s
   double amplitude = 0.0;          ///< unit of y^(n)
@@ -24,22 +23,22 @@ struct KnownSwing {
 ///
 ///     y^(n) + a y^(n-1) = b0 v(t - L) + d,   tau v' + v = u,   tau_s y_s' + y_s = y
 ///
-/// y_s is measured with white noise; d is a random walk, plus a swing if one is given.
+/// y_s is measured with white noise; d is a random walk, plus a sine if one is given.
 struct TuneModel {
   int order = 1;                     ///< n, 1 to 3
-  Estimate input_gain{};             ///< b0 with its interval, unit of y^(n) over that of u
+  Estimate input_gain{};             ///< b0 with its interval, unit of y^(n) per unit of u
   double pole = 0.0;                 ///< a, 1/s
   double lag = 0.0;                  ///< tau, s; 0: none
   double dead_time = 0.0;            ///< L, s
-  double latency_half_width = 0.0;   ///< by how much tau + L may be larger, s
-  double lag_half_width = 0.0;       ///< by how much tau may be wrong while tau + L is right, s
+  double latency_half_width = 0.0;   ///< possible increase of tau + L, s
+  double lag_half_width = 0.0;       ///< possible error of tau at the same tau + L, s
   double sensor = 0.0;               ///< tau_s, s; 0: none
-  double noise = 0.0;                ///< standard deviation of the measurement noise
-  double disturbance = 0.0;          ///< q: variance of the increments of d over time
+  double noise = 0.0;                ///< standard deviation of the measurement noise, unit of y
+  double disturbance = 0.0;          ///< q: variance of the increments of d per time
   std::vector<KnownSwing> swings{};  ///< none or one
   double sample_time = 0.0;          ///< T of the controller, s
   double u_min = 0.0;                ///< limits of the actuator
-  double u_max = 0.0;                ///< above u_min
+  double u_max = 0.0;                ///< upper limit, above u_min
 
   /// (q / (N^2 T))^(1 / (2 n + 2)): that of a Kalman filter of the chain, rad/s.
   [[nodiscard]] double filter_bandwidth() const {
@@ -115,12 +114,13 @@ struct TuneModel {
   }
 };
 
-/// What takes a 95 % interval to 99 %: 2.576 / 1.960 standard errors.
+/// Factor from a 95 % to a 99 % interval: 2.576 / 1.960 standard errors.
 inline constexpr double interval_of_99 = 1.314;
 
-/// The model of a log, for a controller with the sample time of the log. The intervals of b0, lag
-/// and latency are widened from 95 % to 99 %, so that the margins hold on the machine.
-/// @param u_min limits of the actuator @param u_max above u_min
+/// The model that was identified from a log, for a controller with the sample time of the log. The
+/// intervals of b0, lag and latency are widened from 95 % to 99 %, so that the margins hold on the
+/// machine.
+/// @param u_min lower limit of the actuator, unit of u @param u_max above u_min
 inline TuneModel tune_model(const Identified& found, double u_min, double u_max) {
   TuneModel model;
   model.order = found.order;
@@ -138,26 +138,28 @@ inline TuneModel tune_model(const Identified& found, double u_min, double u_max)
   return model;
 }
 
-/// The requirement; at most one of these.
+/// The requirement. Give at most one of these.
 struct TuneWish {
   /// Standard deviation of u that the measurement noise may cause, unit of u. Default: 5 % of u_max
   /// - u_min, or twice the value needed to cancel the disturbance alone if that is larger.
   double control_noise = 0.0;
-  double settling_time = 0.0;         ///< s, of a step of the reference to within 2 %
-  double controller_bandwidth = 0.0;  ///< omega_c, rad/s: the law is given, the observer is chosen
+  double settling_time = 0.0;  ///< s, to within 2 % after a step of the reference
+  double controller_bandwidth =
+      0.0;  ///< omega_c, rad/s: the law is given, only the observer is chosen
 };
 
 /// The margins that a loop has to keep: for the nominal model, and with b0 at both ends of its
 /// interval, the largest latency, and the largest and smallest share of lag in it.
 struct TuneRules {
-  double modulus_margin = 0.5;  ///< least abs(1 + L)
-  double delay_samples = 2.0;   ///< least delay margin, samples
-  double gain_factor = 2.0;     ///< the loop stays stable with b0 wrong by this, either way
+  double modulus_margin = 0.5;  ///< smallest abs(1 + L)
+  double delay_samples = 2.0;   ///< smallest delay margin, samples
+  double gain_factor =
+      2.0;  ///< the loop stays stable with b0 too large or too small by this factor
 };
 
 namespace detail {
 
-/// The plant of a model in states (y, .., y^(n-1), v, y_s); d enters at y^(n).
+/// The plant of a model with states (y, .., y^(n-1), v, y_s); d enters at y^(n).
 /// @param gain factor on b0
 inline DensePlant dense_plant(const TuneModel& model, double gain = 1.0) {
   const int n = model.order;
@@ -190,8 +192,8 @@ inline DensePlant dense_plant(const TuneModel& model, double gain = 1.0) {
   return plant;
 }
 
-/// The plants at the ends of the intervals: the factor on b0, and the rest. The first two differ in
-/// b0 and dead time alone.
+/// A plant at the ends of the intervals: the factor on b0, and the other numbers. The first two
+/// differ in b0 and dead time only.
 struct PlantVariant {
   TuneModel model;
   double gain = 1.0;
@@ -219,7 +221,7 @@ inline std::vector<PlantVariant> plant_variants(const TuneModel& model) {
 
 }  // namespace detail
 
-/// The loop of a model's plant and a controller, for all that the analysis answers.
+/// The loop of a model's plant and a controller, for the functions of the analysis.
 /// @param gain factor on b0 of the plant, not of the controller
 inline LoopResult closed_loop(const TuneModel& model, const LinearController& controller,
                               double gain = 1.0) {

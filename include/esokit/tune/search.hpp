@@ -1,5 +1,5 @@
 /// @file
-/// Minimises a function of a few numbers: a scan, then simplices.
+/// Minimises a function of a few variables: a scan of a grid, then the simplex method.
 #pragma once
 
 #include <algorithm>
@@ -12,14 +12,14 @@
 
 namespace esokit::detail {
 
-/// Where a search ended.
+/// The result of a search.
 struct SearchPoint {
   double value = 0.0;
   std::vector<double> at{};
 };
 
-/// Nelder and Mead's simplex (Computer J. 7 (1965) 308-313).
-/// @param size of the first simplex, each coordinate its own
+/// The simplex method of Nelder and Mead (Computer J. 7 (1965) 308-313).
+/// @param size size of the first simplex in each coordinate
 template <class Function>
 SearchPoint simplex_search(const Function& f, const std::vector<double>& start,
                            const std::vector<double>& size, int evaluations,
@@ -39,7 +39,7 @@ SearchPoint simplex_search(const Function& f, const std::vector<double>& start,
   }
   const auto less = [](const SearchPoint& a, const SearchPoint& b) { return a.value < b.value; };
   const auto along = [&](double by) {
-    // From the mean of all but the worst, away from the worst.
+    // Moves from the mean of all points except the worst, away from the worst.
     std::vector<double> x(n);
     for (std::size_t j = 0; j < n; ++j) {
       double mean = 0.0;
@@ -76,8 +76,8 @@ SearchPoint simplex_search(const Function& f, const std::vector<double>& start,
   return *std::min_element(s.begin(), s.end(), less);
 }
 
-/// The best of an even grid between `low` and `high`, `points` along each coordinate: up to
-/// `count` of them, each at least two steps from those before.
+/// The best points of an even grid between `low` and `high` with `points` values per coordinate: up
+/// to `count`, each at least two steps away from the better ones.
 template <class Function>
 std::vector<SearchPoint> grid_search(const Function& f, const std::vector<double>& low,
                                      const std::vector<double>& high,

@@ -6,11 +6,13 @@
 /// std::puts(tuning->designs.front().code.c_str());
 /// ```
 ///
-/// 1. J = var(y) + rho var(b0 u~), u~ = u + d / b0, at the samples: the effect of noise and of a
-///    random-walk disturbance on the loop (tune/loop_cost.hpp).
-/// 2. The requirement sets rho: there is one LQG controller for each rho, and one of them meets it.
-/// 3. That controller's J is J*: no linear controller has less (tune/lqg.hpp).
-/// 4. Each family minimises J at this rho under the margins, or says which one it cannot keep.
+/// 1. J = var(y) + rho var(b0 u~), u~ = u + d / b0, at the samples: the effect of measurement noise
+///    and of a random-walk disturbance on the loop (tune/loop_cost.hpp).
+/// 2. The requirement sets rho: there is one LQG controller for each rho, and one of them just
+/// meets it.
+/// 3. J of that controller is J*, the smallest J of all linear controllers (tune/lqg.hpp).
+/// 4. For each family J is minimised at this rho under the margins; if it cannot keep them, the
+/// design says which one.
 /// 5. Designs are ranked by J; those within 1 % by the cost of an update, then by the
 ///    modulus margin.
 #pragma once
@@ -33,29 +35,30 @@
 
 namespace esokit {
 
-/// The best design of a family, or the one nearest to the margins if it cannot keep them.
+/// The best design of a family, or the one closest to the margins if it cannot keep them.
 struct TunedDesign {
-  std::string name;          ///< description in words
-  TuneFamily family{};       ///< how its gains are chosen
-  int extension = 1;         ///< m
-  int levels = 1;            ///< p
-  TuneKnowledge knows{};     ///< what its observer knows
-  TuneSettings settings{};   ///< the numbers that were chosen
-  bool feasible = false;     ///< keeps all margins
-  std::string constraint;    ///< the margin that limits it, or that it cannot keep; or "none"
-  double cost = 0.0;         ///< J
-  double excess = 0.0;       ///< sqrt(J / J*)
-  double free_excess = 0.0;  ///< the same without margins: the quotient is the price of the margins
-  double output_deviation = 0.0;   ///< sd of y
-  double control_deviation = 0.0;  ///< sd of u + d / b0
-  double control_noise = 0.0;      ///< sd of u by the measurement noise alone
+  std::string name;         ///< description in words
+  TuneFamily family{};      ///< how its gains are chosen
+  int extension = 1;        ///< m
+  int levels = 1;           ///< p
+  TuneKnowledge knows{};    ///< what its observer knows
+  TuneSettings settings{};  ///< the chosen parameters
+  bool feasible = false;    ///< keeps all margins
+  std::string constraint;   ///< the margin that limits it, or that it cannot keep; or "none"
+  double cost = 0.0;        ///< J
+  double excess = 0.0;      ///< sqrt(J / J*)
+  double free_excess =
+      0.0;  ///< the same without margins; excess / free_excess is the price of the margins
+  double output_deviation = 0.0;   ///< standard deviation of y
+  double control_deviation = 0.0;  ///< standard deviation of u + d / b0
+  double control_noise = 0.0;      ///< standard deviation of u from measurement noise only
   double load_peak = 0.0;          ///< largest abs(y) after a load step that one unit of u balances
-  double settling_time = 0.0;      ///< of a step of the reference to within 2 %, s
-  double modulus_margin = 0.0;     ///< least over the intervals
-  double gain_tolerance = 0.0;     ///< factor by which b0 may be wrong, either way
-  double delay_margin = 0.0;       ///< least over the intervals, s
-  int instructions = 0;            ///< of an update of the observer, see update_instructions
-  std::string code;                ///< C++ to paste: type and config of the controller
+  double settling_time = 0.0;      ///< s, to within 2 % after a step of the reference
+  double modulus_margin = 0.0;     ///< smallest over the intervals
+  double gain_tolerance = 0.0;     ///< factor by which b0 may be wrong in either direction
+  double delay_margin = 0.0;       ///< smallest over the intervals, s
+  int instructions = 0;            ///< per update of the observer, see update_instructions
+  std::string code;                ///< C++ source of the controller, type and config, to paste
   LinearController controller{};   ///< for the analysis, see closed_loop(model, controller)
 };
 
@@ -64,20 +67,20 @@ struct Tuning {
   TuneModel model{};           ///< as given
   TuneRules rules{};           ///< as given
   double rho = 0.0;            ///< weight of var(b0 u~) in J
-  double control_noise = 0.0;  ///< the required one, unit of u; 0 if something else was required
+  double control_noise = 0.0;  ///< the required value, unit of u; 0 if something else was required
   double optimum = 0.0;        ///< J*
-  LoopNumbers lqg{};           ///< of the controller that has it
-  std::vector<TunedDesign> designs{};  ///< the chosen one first; infeasible ones last
+  LoopNumbers lqg{};           ///< of the controller with J*
+  std::vector<TunedDesign> designs{};  ///< the best one first, infeasible ones last
 
-  /// The first, if it keeps the margins.
+  /// The first design, or null if it does not keep the margins.
   [[nodiscard]] const TunedDesign* chosen() const noexcept {
     return !designs.empty() && designs.front().feasible ? &designs.front() : nullptr;
   }
 };
 
 /// Instructions of an update of the observer on a Cortex-M4F in float, counted in the disassembly
-/// on the path without branches (GCC 12, -O2); the emulator of examples/embedded counts the same
-/// within two. The frozen filter by its nine more in that table.
+/// on the path without faults (GCC 12, -O2). The emulator of examples/embedded counts the same
+/// within two; its table gives the frozen filter nine more.
 inline int update_instructions(int order, TuneFamily family, int extension, int levels,
                                const TuneKnowledge& knows) {
   const auto n = static_cast<std::size_t>(order - 1);
@@ -105,23 +108,23 @@ inline std::string source(double value) {
   return number;
 }
 
-/// Which families there are for a model, and how each is searched.
+/// A family for a model, and how it is searched.
 struct Contender {
   TunedDesign design{};
   ObserverKind kind{};
-  int observer_numbers = 1;  ///< that the search is free in
+  int observer_numbers = 1;  ///< number of free parameters of the observer
   int law_numbers = 1;
 };
 
-/// What a search needs to know of the problem.
+/// The data of the problem that a search needs.
 struct TuneSearch {
   TuneModel model;
   TuneRules rules;
   double rho;
-  double fixed_bandwidth;      ///< omega_c where it is given, else 0
-  double reference_bandwidth;  ///< of the LQG's law
-  double filter_bandwidth;     ///< of its filter
-  double possible_bandwidth;   ///< that lag and dead time leave
+  double fixed_bandwidth;      ///< omega_c if it is given, else 0
+  double reference_bandwidth;  ///< of the law of the LQG controller
+  double filter_bandwidth;     ///< of the filter of the LQG controller
+  double possible_bandwidth;   ///< largest one that lag and dead time allow
   const LoopCost* cost;
 
   [[nodiscard]] double slowest() const {
@@ -131,13 +134,13 @@ struct TuneSearch {
     return std::min(8.0 * std::max(reference_bandwidth, filter_bandwidth), 3.0 / model.sample_time);
   }
 
-  /// Settings from the logarithms that are searched in.
+  /// Settings from the logarithms over which the search runs.
   [[nodiscard]] TuneSettings settings(const Contender& c, const std::vector<double>& x) const {
     TuneSettings s;
     const int n = c.kind.order;
     const double T = model.sample_time;
     const auto at = [&](int i) { return std::exp(x[static_cast<std::size_t>(i)]); };
-    // Of an odd number the first is real, the rest are pairs.
+    // If their number is odd, the first is real; the others are pairs.
     const auto poles = [&](int first, int count) {
       std::vector<std::complex<double>> list;
       int i = first;
@@ -175,7 +178,7 @@ struct TuneSearch {
     return s;
   }
 
-  /// Gains of the chain of n for var(y) + rho var(v).
+  /// LQR gains of a chain of n integrators for var(y) + rho var(v).
   [[nodiscard]] std::vector<double> lqr(int n, double weight) const {
     TuneModel chain = model;
     chain.order = n;
@@ -195,7 +198,7 @@ struct TuneSearch {
     return gains;
   }
 
-  /// By how much margins are missed: the worst share that is lacking, 0: none.
+  /// How much of the margins is missing: shares, 0 if none.
   struct Lack {
     double modulus, delay, gain;
     [[nodiscard]] double sum() const { return modulus + delay + gain; }
@@ -208,7 +211,7 @@ struct TuneSearch {
             numbers.tolerant ? 0.0 : std::max(1.0 - numbers.tolerance / rules.gain_factor, 0.02)};
   }
 
-  /// log J, with a price on margins that are lacking.
+  /// log J plus a penalty on missing margins.
   [[nodiscard]] double value(const Contender& c, const std::vector<double>& x, double price) const {
     double outside = 0.0;
     for (std::size_t i = 0; i < x.size(); ++i) {
@@ -224,7 +227,7 @@ struct TuneSearch {
     return std::log(j) + price * lack(numbers, 1.004).sum();
   }
 
-  /// What number i of the search is: a damping, a factor, or a bandwidth.
+  /// Whether variable `index` of the search is a damping; the others are factors or bandwidths.
   [[nodiscard]] bool damping(const Contender& c, std::size_t index) const {
     if (c.design.family != TuneFamily::free_poles) return false;
     const int i = static_cast<int>(index);
@@ -251,14 +254,14 @@ struct TuneSearch {
                                     : fastest());
   }
 
-  /// Where the search for free poles begins: the observer at `o`, the law at `l`, as half gain does
-  /// or with all poles in one place.
+  /// A start for the search for free poles: bandwidths `o` of the observer and `l` of the law, with
+  /// the poles of half gains or all in one place.
   [[nodiscard]] std::vector<double> start(const Contender& c, double o, double l, bool half) const {
     std::vector<double> x;
     for (std::size_t i = 0; i < static_cast<std::size_t>(c.observer_numbers + c.law_numbers); ++i) {
       const bool of_observer = static_cast<int>(i) < c.observer_numbers;
       double value = damping(c, i) ? std::log(half ? 0.6 : 0.95) : std::log(of_observer ? o : l);
-      // With a lag the law has a pole more, and the lag is it.
+      // With a lag the law has one more pole, that of the lag.
       if (!of_observer && half && c.design.knows.lag && static_cast<int>(i) == c.observer_numbers &&
           c.kind.order % 2 != 0) {
         value = std::max(value, -std::log(model.lag));
@@ -268,11 +271,11 @@ struct TuneSearch {
     return x;
   }
 
-  /// The least of a family. @param starts to begin with instead of a scan
+  /// The minimum of a family. @param starts start points in place of a scan
   [[nodiscard]] SearchPoint least(const Contender& c, bool margins,
                                   const std::vector<std::vector<double>>& starts) const {
-    // Of many numbers a low price leads along the edge of a margin, on which a simplex would
-    // collapse at a high one; a scan is there already.
+    // With many variables the penalty begins low and rises: it leads along the edge of a margin, on
+    // which a simplex would collapse with a high penalty. After a scan this is not needed.
     const bool rising = margins && !starts.empty();
     double price = rising ? 5.0 : margins ? 40.0 : 0.0;
     const auto f = [&](const std::vector<double>& x) { return value(c, x, price); };
@@ -313,7 +316,8 @@ struct TuneSearch {
   }
 };
 
-/// y over a step: largest magnitude, and when it is within 2 % of `final` for good.
+/// The response of y to a step: largest magnitude, and the time after which it stays within 2 % of
+/// `final`.
 struct StepAnswer {
   double peak = 0.0;
   double settling = 0.0;
@@ -339,7 +343,7 @@ inline StepAnswer step_answer(const DynamicSystem& system, int input, double siz
   return answer;
 }
 
-/// The numbers of a design from its settings.
+/// Computes the results of a design from its settings.
 inline void fill_in(Contender& c, const TuneSearch& search, const LoopCost& fine, double optimum,
                     double free_cost) {
   TunedDesign& d = c.design;
@@ -389,7 +393,7 @@ inline void fill_in(Contender& c, const TuneSearch& search, const LoopCost& fine
   d.load_peak = step_answer(loop->system(), 2, std::abs(model.input_gain.value), 0.0, steps).peak;
 }
 
-/// Type and config of the controller as C++.
+/// Type and config of the controller as C++ source.
 inline std::string controller_source(const TunedDesign& d, const TuneModel& model) {
   const std::string n = std::to_string(model.order);
   const auto list = [](const std::vector<double>& numbers) {
@@ -425,7 +429,7 @@ inline std::string controller_source(const TunedDesign& d, const TuneModel& mode
     type += d.family == TuneFamily::half_gain ? "}, double, esokit::HalfGainPoles>"
             : free                            ? "}, double, esokit::PoleSet>"
                                               : "}>";
-    // The lag keeps its pole.
+    // The pole of the lag is kept.
     config = free ? poles("{" + source(-1.0 / model.lag) + ", 0.0}")
                   : ".observer_bandwidth = " + source(d.settings.observer_bandwidth);
     config += ", .input_gain = " + source(model.input_gain.value) +
@@ -474,7 +478,7 @@ inline std::string controller_source(const TunedDesign& d, const TuneModel& mode
          "}});\n";
 }
 
-/// All families that a model has.
+/// All families for a model.
 inline std::vector<Contender> contenders(const TuneModel& model, bool law_is_given) {
   std::vector<Contender> all;
   const auto take = [&](TuneFamily family, std::string name, const TuneKnowledge& knows, int m,
@@ -541,8 +545,8 @@ inline std::vector<Contender> contenders(const TuneModel& model, bool law_is_giv
   return all;
 }
 
-/// Bandwidth of the LQG law, rho = w^(-2n), that meets a wish: `rises(w)` is monotonic, and is to
-/// be `wanted`.
+/// Bandwidth w of the LQG law, rho = w^(-2n), that meets a requirement: the monotonic function
+/// `rises(w)` shall be `wanted`.
 template <class Function>
 double bandwidth_for(const Function& rises, double wanted, double low, double high) {
   for (int i = 0; i < 40 && high > low * 1.0005; ++i) {
@@ -554,9 +558,9 @@ double bandwidth_for(const Function& rises, double wanted, double low, double hi
 
 }  // namespace detail
 
-/// The designs for a model, the best one first.
-/// @return error for a model that `check` refuses, for more than one requirement, and for a
-///         requirement that no controller can meet
+/// Finds designs for a model, the best one first.
+/// @return error for a model that `check` refuses, more than one requirement, or a requirement that
+///         no controller can meet
 [[nodiscard]] inline Expected<Tuning, Error<double>> tune(const TuneModel& model,
                                                           const TuneWish& wish = {},
                                                           const TuneRules& rules = {}) {
@@ -634,13 +638,13 @@ double bandwidth_for(const Function& rises, double wanted, double low, double hi
   detail::TuneSearch search{
       model,         rules,  tuning.rho, wish.controller_bandwidth, w, filter_bandwidth,
       1.0 / latency, nullptr};
-  // The search asks for a little more, as its grid is coarse.
+  // The search requires slightly larger margins, because its frequency grid is coarse.
   TuneRules strict = rules;
   strict.gain_factor *= 1.01;
   const LoopCost cost(model, strict, search.slowest(), 14.0);
   const LoopCost fine(model, rules, search.slowest(), 50.0);
   search.cost = &cost;
-  // What swings at a known frequency can be cancelled for nothing.
+  // A sine of known frequency can be cancelled at no cost, so J* is computed without it.
   TuneModel walking = model;
   walking.swings.clear();
   tuning.lqg = LoopCost(walking, rules, search.slowest(), 50.0)(lqg.controller(tuning.rho));
@@ -653,7 +657,7 @@ double bandwidth_for(const Function& rises, double wanted, double low, double hi
     std::vector<std::vector<double>> starts;
     if (c.design.family == TuneFamily::free_poles) {
       starts.push_back(search.start(c, search.filter_bandwidth, w, true));
-      // And from the families that are in this one.
+      // Also from the results of the families that are special cases of this one.
       for (const detail::Contender& other : all) {
         const bool half = other.design.family == TuneFamily::half_gain;
         if (other.design.knows == c.design.knows && other.design.extension == 1 &&
@@ -674,7 +678,8 @@ double bandwidth_for(const Function& rises, double wanted, double low, double hi
     c.design.code = detail::controller_source(c.design, model);
   }
   for (detail::Contender& c : all) tuning.designs.push_back(std::move(c.design));
-  // By J; of those within 1 % of the least that is left the one that costs least comes next.
+  // Ranks by J; among the remaining designs within 1 % of the smallest J, the cheapest update comes
+  // next.
   std::stable_sort(tuning.designs.begin(), tuning.designs.end(),
                    [](const TunedDesign& a, const TunedDesign& b) {
                      return a.feasible != b.feasible ? a.feasible : a.cost < b.cost;
