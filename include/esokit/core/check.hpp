@@ -25,7 +25,7 @@ constexpr S smallest_normal() noexcept {
   return S((std::numeric_limits<TableScalar<S>>::min)());
 }
 
-/// The larger of the two, or the one that is not finite. Not std::max, because <algorithm> takes
+/// The larger of the two, or the one that is not finite. Not std::max, because `<algorithm>` takes
 /// longer to compile than a controller.
 template <PlainScalar S>
 constexpr S larger(const S& a, const S& b) noexcept {

@@ -1,6 +1,6 @@
 /// @file
 /// Any stable set of poles as a placement, complex poles in conjugate pairs. Not included by other
-/// headers, because <complex> takes half as long to compile as a controller.
+/// headers, because `<complex>` takes half as long to compile as a controller.
 #pragma once
 
 #include <cmath>

@@ -87,7 +87,7 @@ ScaledGain<Size, S> scaled_gain(const Vector<S, Size>& gain, const S& sample_tim
 
 namespace detail {
 
-/// A complex number without <complex>.
+/// A complex number without `<complex>`.
 template <PlainScalar S>
 struct Contraction {
   S real{};
