@@ -27,7 +27,7 @@ struct DelayedInputConfig {
 ///
 /// The estimate is for the present sample; the effect of inputs that are still in the delay line is
 /// not predicted.
-/// @tparam Capacity largest d that a config may ask for; the memory is Capacity + 1 scalars
+/// @tparam Capacity largest d of a config; the memory is Capacity + 1 scalars
 template <LoopObserver Observer, int Capacity>
 class DelayedInput : public NamedAdapter<DelayedInput<Observer, Capacity>, Observer,
                                          DelayedInputConfig<Observer>> {

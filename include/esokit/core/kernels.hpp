@@ -41,7 +41,7 @@ template <int First, class S, std::size_t Size, std::size_t Count>
   return rest;
 }
 
-/// sum_i w_i x_i of `Count` elements from `First` on.
+/// sum_i w_i x_i over `Count` elements, beginning with `First`.
 template <int First, int Count, class W, class X>
 [[nodiscard]] ESOKIT_INLINE constexpr auto weighed(const W& w, const X& x) noexcept {
   typename W::value_type sum = std::get<First>(w) * std::get<First>(x);

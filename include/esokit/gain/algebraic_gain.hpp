@@ -33,7 +33,7 @@ namespace esokit {
 /// recursion: one division and no exponential per sample. Once the schedule has settled to within
 /// rounding, the gain is constant.
 ///
-/// Every `anchor_interval` samples p^i and [i] are computed anew from an integer count of samples,
+/// Every `anchor_interval` samples p^i and [i] are recomputed from an integer count of samples,
 /// because the recursion alone accumulates rounding errors (in float, with q = 0 it would stop at i
 /// = 2^24, with qT = 1e-8 it would be 1 % off after 1e6 samples). Such an update takes up to 30
 /// additional short multiplication steps.

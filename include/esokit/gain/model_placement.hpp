@@ -136,7 +136,7 @@ ScaledGain<Size, S> placed_gain(const Matrix<S, Size, Size>& step, const Array<S
   Square f = step;
   for (int i = 0; i < Size; ++i) {
     for (int j = 0; j < Size; ++j) {
-      // In this order nothing overflows on the way.
+      // In this order no intermediate result overflows.
       f(i, j) = f(i, j) / a * unit[static_cast<std::size_t>(j)] / unit[static_cast<std::size_t>(i)];
     }
   }

@@ -97,7 +97,7 @@ struct PowerSumGain {
   /// k(x), x > 0.
   [[nodiscard]] S operator()(const S& x) const noexcept { return prepared()(x); }
 
-  /// Error of a parameter out of its range; `make` of the observer asks for it.
+  /// An error for a parameter out of its range; called by `make` of the observer.
   [[nodiscard]] Check<S> check() const {
     return Rules<S>{}
         .not_negative("shape.gain_alpha", gain_alpha)
@@ -152,7 +152,7 @@ struct FalGain {
   /// k(x), x > 0.
   [[nodiscard]] S operator()(const S& x) const noexcept { return prepared()(x); }
 
-  /// Error of a parameter out of its range; `make` of the observer asks for it.
+  /// An error for a parameter out of its range; called by `make` of the observer.
   [[nodiscard]] Check<S> check() const {
     return Rules<S>{}
         .not_negative("shape.gain", gain)

@@ -42,7 +42,7 @@ class ModelLanes : public LaneByLane<Self, Plain, S, Settings> {
 }  // namespace detail
 /// @endcond
 
-/// With a model, of packs.
+/// LinearEso with a model, for packs.
 template <int Order, PackScalar S, int Extension, class Placement, class Model>
 requires(!model_traits<Model>.is_chain)  //
     class LinearEso<Order, S, Extension, Placement, Model>
@@ -58,7 +58,7 @@ requires(!model_traits<Model>.is_chain)  //
   using with_scalar = LinearEso<Order, T, Extension, Placement, detail::WithScalar<Model, T>>;
 };
 
-/// With a model, of packs.
+/// CascadeEso with a model, for packs.
 template <int Order, int Levels, PackScalar S, int Extension, class Placement, class Model>
 requires(!model_traits<Model>.is_chain)  //
     class CascadeEso<Order, Levels, S, Extension, Placement, Model>
