@@ -350,8 +350,8 @@ TEST(GuardedModel, CertificateIsTheCircleCriterion) {
     EXPECT_EQ(guarded.has_value(), least > -1) << trial << ' ' << least;
     if (!guarded) {
       EXPECT_EQ(refusal(guarded),
-                "level: has a gain that is not proven stable while corrections of dhat are scaled "
-                "(Re G > -1)");
+                "level: has a gain that is not proven stable if corrections of dhat are scaled: Re "
+                "G > -1 fails");
     }
     (least > -1 ? proven : refused) += 1;
   }

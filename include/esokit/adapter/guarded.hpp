@@ -46,7 +46,7 @@ struct GuardAccess {
   }
 };
 
-/// Where the constant of the disturbance is in the states: of a chain dhat itself.
+/// Access to the constant of the disturbance in the states: for a chain this is dhat itself.
 template <class Model, class S>
 struct DisturbanceConstant {
   static_assert(model_traits<Model>.is_chain);
@@ -56,7 +56,7 @@ struct DisturbanceConstant {
   [[nodiscard]] ESOKIT_INLINE static constexpr S of(const State& x) noexcept {
     return std::get<Model::order>(x);
   }
-  /// Puts `value` in the place of `now`.
+  /// Replaces the value `now` of the constant by `value`.
   template <class State>
   ESOKIT_INLINE static constexpr void replace(State& x, const S&, const S& value) noexcept {
     std::get<Model::order>(x) = value;
@@ -66,7 +66,7 @@ struct DisturbanceConstant {
   }
 };
 
-/// Of a model that tells it, see ModelTraits.
+/// For a model with ModelTraits::tells_constant.
 template <class Model, class S>
 requires(model_traits<Model>.tells_constant) struct DisturbanceConstant<Model, S> {
   using State = typename Model::State;
@@ -92,13 +92,13 @@ requires(model_traits<Model>.tells_constant) struct DisturbanceConstant<Model, S
       std::get<i>(x) = std::get<i>(x) + std::get<i>(column) * more;
     });
   }
-  /// A bound of the rounding of `of`.
+  /// A bound on the rounding error of `of`.
   [[nodiscard]] S rounding_of(const State& x) const noexcept {
     S sum(0);
     for (std::size_t i = 0; i < x.size(); ++i) sum = sum + absolute(S(row[i] * x[i]));
     return S(8) * std::numeric_limits<S>::epsilon() * sum;
   }
-  /// b0 v times `factor`, and with `all` the disturbance, too.
+  /// The state with b0 v multiplied by `factor`; with `all` also the disturbance.
   [[nodiscard]] State rescaled(const Model& model, State x, const S& factor,
                                bool all) const noexcept {
     const S more = factor - S(1);
@@ -167,9 +167,9 @@ struct GuardedConfig {
 /// - Trust: `set_trust(phi)`, 0 .. 1, multiplies every correction of dhat; y and its derivatives
 ///   are corrected as usual.
 /// - Held: the plant is held by something else (the ground, a brake, its output is off), so the
-///   measurement contains no information about d. Set the trust to 0 and give the observer
-///   `standing_input()` instead of u, which makes y^(n) zero. `Adrc::hold` does this for one
-///   sample; on release start the reference at y.
+///   measurement contains no information about d. `hold(u)` suspends the corrections of dhat and
+///   returns the u to give to the observer, on the chain the one that makes y^(n) zero; `release()`
+///   ends it. `Adrc::hold` does this for one sample; on release start the reference at y.
 /// - Pinned: the actuator or a mixer is at a limit, and its output is not known (a known output is
 ///   passed as u_applied and needs no guard). dhat may only move in the direction that brings u
 ///   back from the limit: upwards if u is at its upper limit and b0 > 0. dhat is free again
@@ -186,38 +186,39 @@ struct GuardedConfig {
 /// - A changing b0: `set_input_gain(b)` before a sample, without design work. Adrc and
 ///   DisturbanceCompensator use the new b0, too.
 ///
-/// With a model (ModelEso) all guards act on the constant part of d, which is told from what the
-/// plant's poles, the actuator and the sines contribute to `total_disturbance`. d and its bound are
-/// counted in y^(n), n of the plant, or in units of the actuator's output.
-/// - The actuator is simulated from u, whatever the guards do. While the plant is held, the u that
-///   was applied is given, and the prediction is made to stand: on release v is what it is.
-/// - A changing b0 is that of the actuator's output v: y .. y^(n-1), v and d go on smoothly, and
-///   y^(n) jumps as it does in the plant. (A gain ahead of the lag, such as a supply voltage, is a
-///   factor of u_applied.)
-/// - Sines are corrected as usual, pinned or not, and a bound does not count them. Frozen for some
-///   samples of each turn they would be unstable; Re G has a pole there.
-/// - After a pin give `release_samples` the time in which the lag forgets what it was told.
+/// With a model (ModelEso) all guards act on the constant part of d only, not on the contributions
+/// of plant poles, actuator and sines to `total_disturbance`. The unit of d and its bound is that
+/// of y^(n), with n of the plant, or that of the actuator's output.
+/// - The actuator is always simulated from the applied u. While the plant is held, give the applied
+///   u; the prediction of y stands still, and v is correct on release.
+/// - A changing b0 is the gain of the actuator's output v: y .. y^(n-1), v and d continue without a
+///   jump, and y^(n) jumps as in the plant. (For a gain before the lag, such as a supply voltage,
+///   multiply u_applied.)
+/// - Sines are always corrected as usual, and are not included in the bound. If they were held for
+///   some samples of each period, they would be unstable, because G has a pole at their frequency.
+/// - Choose `release_samples` long enough for the simulated lag to forget the wrong u after a pin.
 ///
 /// The first three multiply the correction of dhat by a phi in [0, 1], which may change at every
 /// sample. With m = 1 the bound does the same, as long as the true d is within it. By the circle
 /// criterion errors stay bounded, and decay once the trust returns, if Re G > -1 on the unit
 /// circle, where G is the transfer function from the correction of dhat to its innovation. `make`
-/// checks this for each level and refuses a level that fails; all poles in one place pass at any
-/// bandwidth (tested to n = 5, omega_o T = 20): min Re G is -1/4 (n = 1), -1/3 (n = 2), -3/8 (n =
-/// 3) for fast sampling, and never below -1/2. The check includes the leak. Known poles and an
-/// actuator do not change it, a sensor counts like up to one order more per lag; a sine that is
-/// captured faster than about its frequency allows (20 rad/s at omega_o = 100: `capture_bandwidth`
-/// 20 fails, 4 passes) is refused. With m > 1 a frozen slope would run on, and for VariableTime no
-/// gain is known: for these only the bound and b0 are available.
+/// checks this for each level, including the leak. Poles in one place pass at any bandwidth (tested
+/// up to n = 5, omega_o T = 20): min Re G is -1/4 (n = 1), -1/3 (n = 2), -3/8 (n = 3) for fast
+/// sampling, and never below -1/2. Known poles and an actuator do not change it; a sensor has an
+/// effect like up to one more order per lag. A sine that is captured too fast for its frequency is
+/// refused (20 rad/s at omega_o = 100: `capture_bandwidth` 20 fails, 4 passes). With m > 1 the
+/// estimated slope would continue while dhat is held, and with VariableTime the gain is not
+/// constant: for these only the bound and a changing b0 are available.
 ///
-/// For constant gains on the chain or an AugmentedModel with one constant, as the outermost
-/// adapter. Not with KnownModel, because the proof does not cover fbar; not with leaky parts
-/// (`leak_time` is the guard of that kind): beside one that fades, a frozen constant is unstable.
+/// Requires a constant gain, on the chain or on an AugmentedModel with one constant, and must be
+/// the outermost adapter. KnownModel is excluded, because the proof does not cover fbar, and so are
+/// leaky parts (use `leak_time` instead), because a held constant next to a decaying one is
+/// unstable.
 template <LoopObserver Observer>
 class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<Observer>> {
   static_assert(observer_traits<Observer>.bears_guards,
-                "esokit: Guarded is proven for constant gains on the chain of integrators: "
-                "LinearEso, CascadeEso and adapters of them, without KnownModel; or for LinearEso "
+                "esokit: Guarded needs a constant gain on the chain of integrators: LinearEso, "
+                "CascadeEso and adapters of them, without KnownModel; or for LinearEso "
                 "with an AugmentedModel of one constant, without leaky parts or a varying speed");
   using Base = NamedAdapter<Guarded, Observer, GuardedConfig<Observer>>;
   friend Base;
@@ -228,7 +229,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
       decltype(detail::GuardAccess::innermost(std::declval<const Observer&>()).model())>;
   static constexpr bool on_chain = model_traits<Model>.is_chain;
   static_assert(on_chain || !observer_traits<Observer>.varies_time,
-                "esokit: Guarded knows the constant of a model at one sample time only: not with "
+                "esokit: with a model Guarded needs a fixed sample time: not with "
                 "VariableTime");
   static constexpr bool turns_move_constant = [] {
     if constexpr (on_chain || !observer_traits<Observer>.bears_guards) {
@@ -270,8 +271,8 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
       for (int level = 0; level < levels; ++level) {
         if (!made->certified(level)) {
           return Error<S>{"level", static_cast<S>(level),
-                          "has a gain that is not proven stable while corrections of dhat are "
-                          "scaled (Re G > -1)"};
+                          "has a gain that is not proven stable if corrections of dhat are scaled: "
+                          "Re G > -1 fails"};
         }
       }
     }
@@ -364,10 +365,10 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     set_weights();
   }
 
-  /// Until `release` the plant stands or is carried: no correction of dhat counts.
-  /// @param u_applied what was held since the last sample
-  /// @return what the observer is to be given instead: on the chain `standing_input`; with a model
-  ///         the same u, for its actuator, while its predictions stand
+  /// Tells that something else holds the plant, until `release`: dhat is not corrected.
+  /// @param u_applied the u that was held since the last sample
+  /// @return the u to give to the observer instead: on the chain `standing_input`; with a model the
+  ///         same u, for its actuator, while its prediction of y stands still
   S hold(const S& u_applied) noexcept requires gates {
     held_ = true;
     set_weights();
@@ -383,7 +384,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     set_weights();
   }
 
-  /// The u under which the plant would stand if d were dhat.
+  /// The u under which the plant would stand still if d were dhat.
   [[nodiscard]] S standing_input() const noexcept requires gates {
     S from_d;
     if constexpr (on_chain) {
@@ -409,7 +410,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
           configured_gain(), true};
     }
     if constexpr (!on_chain) {
-      // The sample that ends now is of the b0 of before.
+      // The sample that ends now still has the previous b0.
       const auto& states = detail::GuardAccess::states(observer_);
       if (!detail::GuardAccess::finite(observer_, rescaled(states, S(ratio / told_ratio_)))) {
         return Error<S>{"input_gain", b, "would make the estimate not finite"};
@@ -500,7 +501,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     return model.physical(error);
   }
 
-  /// b0 of now.
+  /// The present b0, unit of y^(n) per unit of u.
   [[nodiscard]] S present_input_gain() const noexcept { return configured_gain() * gain_ratio_; }
   /// b0 of the config divided by the present b0: the factor on the output of a law that uses the
   /// former.
@@ -557,7 +558,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
                  "must be 0 with an extension above 1 or a varying sample time")
         .require(!(config.leak_time > S(0)) || leak_of(config) >= std::numeric_limits<S>::epsilon(),
                  "leak_time", config.leak_time,
-                 "is so long that a sample changes nothing the scalar can hold");
+                 "is too long: what leaks in one sample is below the rounding of the scalar");
   }
 
   /// The share of dhat that is removed after each correction.
@@ -566,7 +567,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     return -std::expm1(-chain_config<Observer>(config.observer).sample_time / config.leak_time);
   }
 
-  /// b0 of the config: that of a model with an actuator is b0 / tau.
+  /// b0 of the config. (Of a model with an actuator input_gain() is b0 / tau.)
   [[nodiscard]] S configured_gain() const noexcept {
     if constexpr (on_chain) {
       return observer_.input_gain();
@@ -575,7 +576,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     }
   }
 
-  /// Calls `use(part, level)` with what the gain of a model corrects, all of its sensor included.
+  /// Calls `use(part, level)` with the corrected part of the model, including all of its sensor.
   template <class Use>
   auto with_level(const Use& use) const {
     const auto& observer = detail::GuardAccess::innermost(observer_);
@@ -608,7 +609,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     return {constant_.rescaled(model, states[0], factor, unit_ == DisturbanceUnit::input)};
   }
 
-  /// From now on the b0 of `set_input_gain` is in force.
+  /// Puts the b0 of `set_input_gain` into effect.
   ESOKIT_INLINE void take_gain() noexcept {
     if constexpr (!on_chain) {
       if (told_ratio_ < gain_ratio_ || told_ratio_ > gain_ratio_) [[unlikely]] {
@@ -622,7 +623,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     told_ratio_ = gain_ratio_;
   }
 
-  /// While held: d and the actuator go on, the sensor follows a y that stands.
+  /// Prediction while held: d and the actuator continue, and the sensor follows a constant y.
   ESOKIT_COLD StepStatus predict_standing(S u_applied) noexcept requires(!on_chain) {
     using State = typename Model::State;
     constexpr auto y = static_cast<std::size_t>(Model::state_of_row(0));
@@ -632,7 +633,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     if (!has(status, StepStatus::prediction_dropped)) {
       const auto& inner = detail::GuardAccess::innermost(observer_);
       const auto& model = inner.model();
-      // What an adapter has shifted y by.
+      // The shift of y by an adapter.
       const S turns = now[y] - model.predict(standing, model.drive(S(inner.applied_input())))[y];
       for (std::size_t i = y + 1; i < standing.size(); ++i) standing[i] = S(0);
       standing = model.predict(standing, model.drive(S(0)));

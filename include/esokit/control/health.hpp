@@ -119,10 +119,10 @@ constexpr const auto& in_adapters(const Observer& observer) noexcept {
 /// loop oscillates at 1.6 omega_o, where the poles attenuate phi to a fifth, but dhat is ten times
 /// as large. Noise to which u reacts lowers rho, so it cannot cause this alarm.
 ///
-/// With a model (ModelEso) psi is d alone, and behind an actuator's lag phi is b0 v, the actuator's
-/// output as it is simulated.
-/// @tparam Size N of the observer, less the order of an actuator's lag: the number of poles that
-/// filter phi
+/// With a model (ModelEso) psi is d only, and with an actuator's lag phi is b0 v, from the
+/// simulated output of the actuator.
+/// @tparam Size number of poles that filter phi: N of the observer, minus the order of an
+/// actuator's lag
 template <int Size, PlainScalar S = double>
 class HealthMonitor {
   static_assert(Size >= 2, "esokit: an observer has at least two states");
@@ -146,8 +146,7 @@ class HealthMonitor {
     rules
         .require(!(config.observer_bandwidth * step > S(1)),
                  {"divider", static_cast<S>(config.divider),
-                  "is so large that phi is not seen through the poles: omega_o T D must be at most",
-                  -1, S(1), true})
+                  "is too large: omega_o T D must be at most", -1, S(1), true})
         .require(!(config.memory < S(8) / config.observer_bandwidth),
                  {"memory", config.memory, "must be at least 8 / omega_o, that is", -1,
                   S(8) / config.observer_bandwidth, true});
@@ -155,7 +154,7 @@ class HealthMonitor {
     return HealthMonitor(config);
   }
 
-  /// To be called after each sample of the controller, an Adrc or DisturbanceCompensator whose
+  /// Call this after each sample of the controller, an Adrc or DisturbanceCompensator whose
   /// observer corrects `Size` states.
   template <class Controller>
   void look(const Controller& controller) noexcept {
@@ -172,7 +171,7 @@ class HealthMonitor {
       }
     }();
     static_assert(Observer::size - lag == Size,
-                  "esokit: a monitor has as many poles as the observer corrects: its states, less "
+                  "esokit: Size of the monitor must be the number of states of the observer, minus "
                   "those of an actuator in its model");
     S b = observer.input_gain();
     if constexpr (lag > 0) b = model.plant_gain();

@@ -37,7 +37,7 @@ ErrorPolynomial<Size, S> leaking_polynomial(const ScaledGain<Size, S>& gain, con
   return p;
 }
 
-/// Where q_0 is zero, and with it the value at w = 0. The test is for the rest, divided by w^2.
+/// For q_0 = 0, which makes the product zero at w = 0: tests the rest, divided by w^2.
 template <int Size, Scalar S>
 bool positive_but_at_standstill(const Array<S, Size + 1>& product) {
   Array<S, Size> rest{};
@@ -116,8 +116,8 @@ struct ConstantLevel {
   }
 };
 
-/// q_0 .. q_N of det(x I - M) for M = (I + E / 2)^-1 E / unit, by Faddeev and LeVerrier: with E = A
-/// - I that of A by the bilinear map, see error_polynomial.
+/// q_0 .. q_N of det(x I - M) for M = (I + E / 2)^-1 E / unit, by the Faddeev-LeVerrier algorithm.
+/// With E = A - I this is the polynomial of A after the bilinear map, see error_polynomial.
 template <int Size, Scalar S>
 ErrorPolynomial<Size, S> bilinear_polynomial(const Matrix<S, Size, Size>& difference,
                                              const S& unit) {

@@ -301,14 +301,14 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
       requires(Parts.leaky > 0) {
     return z(order + m + 2 * Parts.resonators + part);
   }
-  /// d, all of it, unit of y^(n).
+  /// d, the sum of all its parts, unit of y^(n).
   [[nodiscard]] S disturbance(const Estimate& z) const noexcept {
     S sum = constant(z);
     for (int i = 0; i < Parts.resonators; ++i) sum = sum + z(order + m + 2 * i);
     for (int i = 0; i < Parts.leaky; ++i) sum = sum + z(order + m + 2 * Parts.resonators + i);
     return sum;
   }
-  /// b0 v: what the actuator delivers, simulated from u; unit of y^(n).
+  /// b0 v with the output v of the actuator, simulated from u; unit of y^(n).
   [[nodiscard]] S delivered(const Estimate& z) const noexcept requires(Parts.actuator > 0) {
     S sum = z(n) - disturbance(z);
     if constexpr (Parts.plant_poles) {
@@ -330,8 +330,8 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   /// @name The constant of the disturbance among the states
   /// The natural states are y .. y^(n-1), the parts of d, and the actuator's output b0 v.
   /// @{
-  /// The constant part of d, T^n / n! times what it is, is the sum of row_i x_i; no prediction
-  /// changes it (m = 1).
+  /// The row by which the states x give the constant part of d times T^n / n!. Predictions do not
+  /// change it (m = 1).
   [[nodiscard]] State constant_row() const noexcept {
     const auto lag = detail::scaled_lag(settings_.actuator, sample_time_);
     const auto alpha = denominator(settings_, sample_time_);
@@ -345,20 +345,22 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
     for (S& weight : row) weight = weight / lag[0];
     return row;
   }
-  /// What one more of it is to the states, with all other natural states as they are.
+  /// The change of the states x per unit of this constant, with all other natural states kept.
   [[nodiscard]] State constant_column() const noexcept {
     const auto part = corrected_part<without(true, false)>();
     State column{};
     for (int i = 0; i < size; ++i) column[static_cast<std::size_t>(i)] = part.whole(i, lf + n);
     return column;
   }
-  /// What the actuator's output is to the states y^(n) .. D: (rows x) of them.
+  /// The rows by which the states x give the contribution of the actuator's output to the states
+  /// y^(n) .. D.
   [[nodiscard]] Matrix<S, la + 1, size> actuator_rows() const noexcept {
     const auto part = corrected_part<without(true, false)>();
     constexpr int part_size = size - la;
-    constexpr int acted_on = lf + n;  // of the part: what acts on y^(n) beside the actuator
-    // The part's states from those of the model: the same, but for this one, which the constant
-    // tells.
+    constexpr int acted_on =
+        lf + n;  // of the part: the state of what acts on y^(n) besides the actuator
+    // The states of the part are those of the model, except this one, which follows from the
+    // constant.
     auto natural = Matrix<S, part_size, size>::Zero();
     const State row = constant_row();
     for (int j = 0; j < size; ++j) natural(acted_on, j) = row[static_cast<std::size_t>(j)];
@@ -388,7 +390,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
     for (int j = 1; j <= n; ++j) value = value * (sample_time_ / number(j));
     return value;
   }
-  /// b0 v under which the plant would stand at its present y, if all of d stayed as it is; unit of
+  /// b0 v under which the plant would stand still at its present y with the present d; unit of
   /// y^(n).
   [[nodiscard]] S standing_input(const Estimate& z) const noexcept {
     S sum = -disturbance(z);

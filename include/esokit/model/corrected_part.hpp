@@ -22,7 +22,7 @@ struct CorrectedPart {
   Matrix<S, Size, Size> step;         ///< Phi - I, scaled as the states of a model are
   Array<S, Size> output{};            ///< C: the measurement as a function of the states
   Array<int, Size> degrees{};         ///< see SampledModel: a state is smaller by a^degree
-  Array<int, Size> states{};          ///< of the model, that they are
+  Array<int, Size> states{};          ///< their indices among the model's states
   Matrix<S, Whole, Size> whole;       ///< maps a correction of the part to one of the whole model
   Array<Array<S, 2>, Pairs> pairs{};  ///< real and imaginary part of a pair of poles, 1/s
 };

@@ -38,8 +38,8 @@ struct ModelTraits {
   /// places itself; see CorrectedPart. Without it, everything is corrected.
   bool corrects_part = false;
 
-  /// The disturbance has one constant, which is told from its other parts and from what the
-  /// actuator delivers: `constant_row()`, `constant_column()`, `actuator_rows()`,
+  /// The disturbance has one constant, which is separate from its other parts and from the effect
+  /// of the actuator: `constant_row()`, `constant_column()`, `actuator_rows()`,
   /// `scaled_constant(d)`, `standing_input(z)`, see AugmentedModel. Guarded holds, gates, bounds
   /// and leaks this constant.
   bool tells_constant = false;

@@ -67,14 +67,15 @@ struct ObserverTraits {
 
   bool blanks_estimate = false;  ///< `blanked() const`: true while `estimate` is an old one
 
-  /// Only a constant gain changes its dhat, which its model tells, so it can be used in Guarded.
+  /// Its dhat is changed only by a constant gain, and its model separates it, so that it can be
+  /// used in Guarded.
   bool bears_guards = false;
 
   /// It has `set_input_gain(b)` for use while it runs, and `input_factor() const`, by which a law
   /// multiplies a u computed with the config's b0; see Guarded.
   bool schedules_input_gain = false;
 
-  /// `set_trust(phi)`, `trust() const`, `hold(u)` and `release()`, see Guarded.
+  /// It has `set_trust(phi)`, `trust() const`, `hold(u)` and `release()`, see Guarded.
   bool gates_disturbance = false;
 };
 
@@ -231,8 +232,8 @@ concept SchedulesInputGainAsDeclared =
     detail::observer_as_declared<O>(observer_traits<O>.schedules_input_gain,
                                     detail::names_input_factor<O>, detail::SchedulesInputGain<O>);
 
-/// `set_trust(phi)`, `trust() const`, `hold(u)` and `release()` are declared by
-/// `traits.gates_disturbance`; or there are none.
+/// `set_trust(phi)`, `trust() const`, `hold(u)` and `release()` exist if and only if
+/// `traits.gates_disturbance` declares them.
 template <class O>
 concept GatesDisturbanceAsDeclared = detail::observer_as_declared<O>(
     observer_traits<O>.gates_disturbance, detail::names_set_trust<O>, detail::GatesDisturbance<O>);

@@ -94,9 +94,9 @@ struct NoVariation {
 /// The samples that a Measure uses, and the limit for its result.
 struct MeasureOptions {
   double from = 0.0;                                    ///< s, time of the first sample used
-  double to = std::numeric_limits<double>::infinity();  ///< s, last sample
+  double to = std::numeric_limits<double>::infinity();  ///< s, time of the last sample used
 
-  /// The number must not be above this; finite, or left out.
+  /// The result must not be above this; finite, or left out.
   double limit = std::numeric_limits<double>::infinity();
 };
 
@@ -105,8 +105,8 @@ struct MeasureOptions {
 ///
 /// The function must accept any scalar, because it is also called with packs of runs. Made by
 /// `largest`, `average`, `root_mean_square`, `final_value` and `settling_time`. A run fails if its
-/// number is not finite or, for `largest` and `settling_time`, if of(sample) is not finite in the
-/// window, and if its window has no sample.
+/// result is not finite, if its window has no sample, or, for `largest` and `settling_time`, if
+/// of(sample) is not finite in the window.
 template <class Reduce, class F>
 struct Measure {
   std::string name;        ///< name of the criterion
@@ -118,7 +118,7 @@ struct Measure {
 namespace detail {
 
 struct Largest {
-  static constexpr bool needs_each = true;  ///< a comparison would pass over a NaN
+  static constexpr bool needs_each = true;  ///< a comparison would ignore a NaN
   template <class S>
   static S start() {
     return S(std::numeric_limits<LaneScalar<S>>::lowest());
@@ -224,7 +224,8 @@ Measure<detail::SettlingTime, F> settling_time(std::string name, F of, double ba
 template <class Time>
 struct FailedRun {
   std::int64_t run = 0;  ///< number of the run
-  Error<Time> error{};   ///< error of `vary` or of the loop, for example a state that is not finite
+  Error<Time>
+      error{};  ///< error error of `vary` or of the loop, for example a state that is not finite
 };
 
 /// Settings of `monte_carlo`.
@@ -253,7 +254,7 @@ struct MonteCarloOutcome {
   std::vector<RunStatistics> numbers;  ///< statistics of each Measure
   bool completed = true;               ///< false if it was stopped
   int threads = 1;                     ///< number of threads used
-  int lanes = 1;                       ///< runs at once on each thread
+  int lanes = 1;                       ///< runs at once on each thread thread
 
   /// The share of all runs that kept the limit of a Measure; failed runs count as not kept. @param
   /// number index of the Measure
