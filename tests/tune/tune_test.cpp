@@ -319,10 +319,10 @@ TEST(TuneTest, TheReadyControllerIsTheDesign) {
     return esokit_test::refusal(
         esokit::with_controller<2>(model, design, [](const auto&) { FAIL(); }));
   };
-  const std::string more = "knows: more than the lag: see the code of the design";
+  const std::string more = "knows: includes more than the lag: use the code of the design";
   EXPECT_EQ(refused([](TunedDesign& d) { d.knows.sensor = true; }), more);
   EXPECT_EQ(refused([](TunedDesign& d) { d.knows.swing = true; }), more);
-  const std::string alien = "design: is not one that tune made for a model of this order";
+  const std::string alien = "design: was not made by tune for a model of this order";
   EXPECT_EQ(refused([](TunedDesign& d) { d = {}; }), alien);
   EXPECT_EQ(refused([](TunedDesign& d) { d.settings.gains.pop_back(); }), alien);
   EXPECT_EQ(refused([](TunedDesign& d) { d.settings.observer_poles.pop_back(); }), alien);
@@ -476,7 +476,7 @@ TEST(TuneTest, RefusesWhatIsNoProblem) {
   EXPECT_EQ(refused(same, {.settling_time = 1e9}),
             "settling_time is far slower than the disturbance; must be at most");
   EXPECT_EQ(refused(same, {.controller_bandwidth = 501.0}),
-            "controller_bandwidth must not be above half of the sample rate in rad/s, that is");
+            "controller_bandwidth must not be above half the sample rate, which is");
   EXPECT_EQ(refused(same, {.controller_bandwidth = 0.99e-3}),
             "controller_bandwidth must be at least 1e-6 of the sample rate");
   // Numbers of an LQG controller that no double holds.
@@ -498,12 +498,12 @@ TEST(TuneModelTest, RefusesWhatIsTooFarApart) {
     const char* rule;
   } cases[] = {
       {&TuneModel::noise, 1e-60, 0.9e-60,
-       "noise: must be between 1e-60 and 1e60: write it in another unit"},
+       "noise: must be between 1e-60 and 1e60: use another unit"},
       {&TuneModel::disturbance, 1e60, 1.1e60,
-       "disturbance: must be between 1e-60 and 1e60: write it in another unit"},
+       "disturbance: must be between 1e-60 and 1e60: use another unit"},
       // (q / (N^2 T))^(1/4) T = 1e-6 of order 1
       {&TuneModel::disturbance, 1.1e-21, 0.9e-21,
-       "disturbance: is so small for this noise that an observer would take a million samples"},
+       "disturbance: is so small for this noise that an observer would need a million samples"},
       {&TuneModel::lag, 1.001e-12, 0.999e-12, "lag: must be 0, or between 1e-9 and 1e6 samples"},
       {&TuneModel::lag, 1e3, 1.1e3, "lag: must be 0, or between 1e-9 and 1e6 samples"},
       {&TuneModel::sensor, 1e3, 1.1e3, "sensor: must be 0, or between 1e-9 and 1e6 samples"},
@@ -513,8 +513,8 @@ TEST(TuneModelTest, RefusesWhatIsTooFarApart) {
       {&TuneModel::latency_half_width, 0.1, 0.101,
        "latency_half_width: must not be above 100 samples"},
       {&TuneModel::sample_time, 1e-12, 0.9e-12, "sample_time: must be between 1e-12 s and 1e12 s"},
-      {&TuneModel::u_max, 1e60, 1.1e60, "u_max: is too large: write it in another unit"},
-      {&TuneModel::u_min, -1e60, -1.1e60, "u_min: is too large: write it in another unit"}};
+      {&TuneModel::u_max, 1e60, 1.1e60, "u_max: is too large: use another unit"},
+      {&TuneModel::u_min, -1e60, -1.1e60, "u_min: is too large: use another unit"}};
   for (const auto& c : cases) {
     TuneModel model = plain(1, 1e9);
     model.*c.member = c.good;
@@ -532,8 +532,7 @@ TEST(TuneModelTest, RefusesWhatIsTooFarApart) {
             "swings.frequency[0]: must be at least 1e-9 of the sample rate");
   EXPECT_EQ(swinging({3101.0, 1.0, 0.0}),
             "swings.frequency[0]: must be below half the sample rate");
-  EXPECT_EQ(swinging({1.0, 1.1e60, 0.0}),
-            "swings.amplitude[0]: is too large: write it in another unit");
+  EXPECT_EQ(swinging({1.0, 1.1e60, 0.0}), "swings.amplitude[0]: is too large: use another unit");
   TuneModel two = plain(1);
   two.swings.resize(2);
   EXPECT_EQ(esokit_test::refusal(two.check()), "swings: must be one at most");
@@ -543,7 +542,7 @@ TEST(TuneModelTest, RefusesWhatIsTooFarApart) {
     EXPECT_EQ(esokit_test::refusal(model.check()),
               gain == 1e-20 || gain == -1e20
                   ? "accepted"
-                  : "input_gain: must be between 1e-20 and 1e20: write it in another unit");
+                  : "input_gain: must be between 1e-20 and 1e20: use another unit");
   }
 }
 

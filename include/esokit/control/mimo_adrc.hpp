@@ -277,8 +277,7 @@ class MimoAdrc {
 
   static Error<S> too_large(const S& u) {
     return {"input_matrix", u,
-            "makes of the u that holds now (the value here) a disturbance that "
-            "the scalar cannot hold"};
+            "turns the present u (the value here) into a disturbance that the scalar cannot hold"};
   }
 
   Output put_out(const Output& wanted) noexcept {
@@ -381,7 +380,7 @@ class MimoAdrc {
                                                     const S& sample_time, int) {
     auto& chain = chain_config<Observer>(config);
     if (chain.input_gain < S(0) || chain.input_gain > S(0) || !is_finite(chain.input_gain)) {
-      return Error<S>{"input_gain", chain.input_gain, "must be left out, input_matrix says it"};
+      return Error<S>{"input_gain", chain.input_gain, "is given by input_matrix: leave it out"};
     }
     if (chain.sample_time < sample_time || chain.sample_time > sample_time) {
       return Error<S>{

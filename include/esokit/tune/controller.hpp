@@ -88,10 +88,10 @@ Check<double> with_controller(const TuneModel& model, const TunedDesign& design,
   Rules<double> rules;
   rules.all_of(model.check())
       .require(model.order == Order,
-               {"order", static_cast<double>(model.order), "is not the one that is asked for:", -1,
-                static_cast<double>(Order), true})
+               {"order", static_cast<double>(model.order), "is not the requested order, which is",
+                -1, static_cast<double>(Order), true})
       .require(!design.knows.sensor && !design.knows.swing, "knows", 1.0,
-               "more than the lag: see the code of the design")
+               "includes more than the lag: use the code of the design")
       .require(
           static_cast<int>(design.settings.gains.size()) == Order + (design.knows.lag ? 1 : 0) &&
               design.extension >= 1 && design.extension <= 2 && design.levels >= 1 &&
@@ -99,7 +99,7 @@ Check<double> with_controller(const TuneModel& model, const TunedDesign& design,
               (design.family != TuneFamily::free_poles ||
                static_cast<int>(design.settings.observer_poles.size()) == Order + design.extension),
           "design", static_cast<double>(design.settings.gains.size()),
-          "is not one that tune made for a model of this order");
+          "was not made by tune for a model of this order");
   if (!rules) return rules.error();
   const auto run = [&](auto config) -> Check<double> {
     using Config = decltype(config);

@@ -40,18 +40,18 @@ struct TuneModel {
   double u_min = 0.0;                ///< limits of the actuator
   double u_max = 0.0;                ///< upper limit, above u_min
 
-  /// (q / (N^2 T))^(1 / (2 n + 2)): that of a Kalman filter of the chain, rad/s.
+  /// (q / (N^2 T))^(1 / (2 n + 2)): the bandwidth of a Kalman filter for the chain, rad/s.
   [[nodiscard]] double filter_bandwidth() const {
     return std::pow(disturbance / (noise * noise * sample_time), 0.5 / (order + 1));
   }
 
-  /// Error of a number that is not possible for a plant, or of a size with which nothing can be
-  /// computed.
+  /// An error for a number that is not allowed, or so large or small that nothing can be computed
+  /// with it.
   [[nodiscard]] Check<double> check() const {
     Rules<double> rules;
     const auto size_fits = [&](const char* field, double value) {
       rules.require(std::abs(value) >= 1e-60 && std::abs(value) <= 1e60, field, value,
-                    "must be between 1e-60 and 1e60: write it in another unit");
+                    "must be between 1e-60 and 1e60: use another unit");
     };
     const auto lag_fits = [&](const char* field, double value) {
       rules.require(!(value > 0.0) || (value >= 1e-9 * sample_time && value <= 1e6 * sample_time),
@@ -85,19 +85,19 @@ struct TuneModel {
                  "must be between 1e-12 s and 1e12 s")
         .require(!(std::abs(pole) * sample_time > 100.0), "pole", pole,
                  "must be at most a hundred times the sample rate")
-        .require(std::abs(u_min) <= 1e60, "u_min", u_min, "is too large: write it in another unit")
-        .require(std::abs(u_max) <= 1e60, "u_max", u_max, "is too large: write it in another unit");
-    // Of order 3 the LQG controller is another one beyond this.
+        .require(std::abs(u_min) <= 1e60, "u_min", u_min, "is too large: use another unit")
+        .require(std::abs(u_max) <= 1e60, "u_max", u_max, "is too large: use another unit");
+    // For order 3 the computed LQG controller is wrong beyond this.
     rules.require(std::abs(input_gain.value) >= 1e-20 && std::abs(input_gain.value) <= 1e20,
                   "input_gain", input_gain.value,
-                  "must be between 1e-20 and 1e20: write it in another unit");
+                  "must be between 1e-20 and 1e20: use another unit");
     size_fits("noise", noise);
     size_fits("disturbance", disturbance);
     lag_fits("lag", lag);
     lag_fits("sensor", sensor);
-    // Beyond, the criterion is the difference of numbers that are the same to the last digit.
+    // Beyond this limit the criterion is a difference of numbers that agree to the last digit.
     rules.require(filter_bandwidth() * sample_time >= 1e-6, "disturbance", disturbance,
-                  "is so small for this noise that an observer would take a million samples");
+                  "is so small for this noise that an observer would need a million samples");
     for (std::size_t i = 0; i < swings.size(); ++i) {
       const int index = static_cast<int>(i);
       rules.positive("swings.frequency", swings[i].frequency, index)
@@ -107,7 +107,7 @@ struct TuneModel {
                    swings[i].frequency, "must be at least 1e-9 of the sample rate", index)
           .not_negative("swings.amplitude", swings[i].amplitude, index)
           .require(!(swings[i].amplitude > 1e60), "swings.amplitude", swings[i].amplitude,
-                   "is too large: write it in another unit", index)
+                   "is too large: use another unit", index)
           .not_negative("swings.capture_bandwidth", swings[i].capture_bandwidth, index);
     }
     return rules;
@@ -140,8 +140,9 @@ inline TuneModel tune_model(const Identified& found, double u_min, double u_max)
 
 /// The requirement. Give at most one of these.
 struct TuneWish {
-  /// Standard deviation of u that the measurement noise may cause, unit of u. Default: 5 % of u_max
-  /// - u_min, or twice the value needed to cancel the disturbance alone if that is larger.
+  /// Standard deviation of u that the measurement noise may cause, unit of u. If nothing is given:
+  /// 5 % of u_max - u_min, or twice the value needed to cancel the disturbance alone if that is
+  /// larger.
   double control_noise = 0.0;
   double settling_time = 0.0;  ///< s, to within 2 % after a step of the reference
   double controller_bandwidth =

@@ -382,7 +382,7 @@ inline void fill_in(Contender& c, const TuneSearch& search, const LoopCost& fine
   if (!numbers.stable) return;
   const auto loop = closed_loop(model, *controller);
   if (!loop || !loop->stable()) {
-    // The poles themselves have the last word.
+    // Stability is decided by the poles.
     d.feasible = false;
     d.constraint = "stability";
     return;
@@ -597,9 +597,8 @@ double bandwidth_for(const Function& rises, double wanted, double low, double hi
   if (wish.controller_bandwidth > 0.0) {
     w = wish.controller_bandwidth;
     checks
-        .require(w <= fast,
-                 {"controller_bandwidth", w,
-                  "must not be above half of the sample rate in rad/s, that is", -1, fast, true})
+        .require(w <= fast, {"controller_bandwidth", w,
+                             "must not be above half the sample rate, which is", -1, fast, true})
         .require(w * T >= 1e-6, "controller_bandwidth", w,
                  "must be at least 1e-6 of the sample rate");
   } else if (wish.settling_time > 0.0) {
@@ -607,7 +606,7 @@ double bandwidth_for(const Function& rises, double wanted, double low, double hi
     checks
         .require(-settling(fast) <= wish.settling_time,
                  {"settling_time", wish.settling_time,
-                  "is less than this sample time and dead time allow, that is", -1, -settling(fast),
+                  "is shorter than sample time and dead time allow, which is", -1, -settling(fast),
                   true})
         .require(
             -settling(slow) >= wish.settling_time,
@@ -623,7 +622,7 @@ double bandwidth_for(const Function& rises, double wanted, double low, double hi
     if (wanted > 0.0) {
       checks.require(
           wanted > 1.001 * least,
-          {"control_noise", wanted, "is less than needed to cancel the disturbance alone, that is",
+          {"control_noise", wanted, "is less than needed to cancel the disturbance alone, which is",
            -1, least, true});
     } else {
       wanted = std::max(0.05 * (model.u_max - model.u_min), 2.0 * least);
