@@ -65,7 +65,7 @@ requires GainLaw<Law, Order + Extension, S> && SampledModel<Model, S>
 class PredictorCorrector {
   static_assert(Levels == 1 || model_traits<Model>.adds_levels ||
                     model_traits<Model>.tells_disturbance,
-                "esokit: a cascade takes a model that tells the disturbance from the plant: "
+                "esokit: a cascade needs a model that separates the disturbance: "
                 "ModelTraits::adds_levels or tells_disturbance");
 
  public:
@@ -456,7 +456,7 @@ class PredictorCorrector {
   /// The gain laws, for changing them.
   [[nodiscard]] constexpr Laws& laws() noexcept { return laws_; }
 
-  /// All that it holds, for what is built on it.
+  /// All data members, for derived classes.
   static constexpr auto fields(auto& o) noexcept {
     return detail::tie(o.states_, o.laws_, o.model_, o.innovation_, o.applied_input_, o.gap_,
                        o.max_gap_, o.squares_suffice_);
