@@ -179,7 +179,7 @@ int main(int argc, char** argv) {
                    .title("against the levels")
                    .name("levels")
                    .x_label("levels p")
-                   .y_label("sd of u");
+                   .y_label("sd of u / sd of y (-)");
   left.log_y().x_range(0.7, 4.3).x_tick(1.0).y_range(1.0, 1e8).legend(Legend::top_right);
   constexpr std::array colors = {Color::blue, Color::vermillion, Color::green};
   for (std::size_t n = 0; n < 3; ++n) {
@@ -197,7 +197,7 @@ int main(int argc, char** argv) {
                      .title("over frequency, n = 2")
                      .name("frequency")
                      .x_label("ω (rad/s)")
-                     .y_label("abs(u/v)");
+                     .y_label("gain from noise to u (-)");
   middle.log_x().log_y().x_range(1.0, 3e3).y_range(10.0, 2e5).legend(Legend::top_left);
   middle.line(grid, over_frequency<1>(grid), {.name = "p = 1"});
   middle.line(grid, over_frequency<2>(grid), {.name = "p = 2"});
@@ -214,7 +214,7 @@ int main(int argc, char** argv) {
                     .title("against T, n = 2")
                     .name("sample_time")
                     .x_label("T (s)")
-                    .y_label("sd of u");
+                    .y_label("sd of u / sd of y (-)");
   right.log_x().log_y().legend(Legend::bottom_right);
   for (std::size_t i = 0; i < 4; ++i) {
     right.line(sample_times, over_time[i], {.name = "p = " + std::to_string(i + 1)});

@@ -110,7 +110,7 @@ void ground(Report& report) {
        "Two seconds on the ground, with the stick 0.3 rad/s off its centre. Without a guard the "
        "observer takes the ground for a load, u goes to its limit, and the craft jumps when it "
        "takes off. With hold, dhat does not change, and the loop starts from rest.",
-       bare, guarded, "rate (rad/s)", "u");
+       bare, guarded, "rate (rad/s)", "u (-)");
 }
 
 /// b0 goes with the throttle; the law is told nothing, the truth, or the inverse.
@@ -449,7 +449,8 @@ void flight(Report& report) {
       .legend(Legend::above)
       .line(trace.t, wanted_rate, {.name = "wanted", .color = Color::grey, .width = 1})
       .line(trace.t, trace.y, {.name = "rate", .color = Color::blue});
-  figure.panel(1, 0).x_label("t (s)").y_label("u").line(trace.t, trace.u, {.color = Color::blue});
+  figure.panel(1, 0).x_label("t (s)").y_label("u (-)").line(trace.t, trace.u,
+                                                            {.color = Color::blue});
   report.add(figure);
 }
 

@@ -163,7 +163,7 @@ void motor_lag(Report& report) {
       figure.panel(0, static_cast<std::size_t>(column++))
           .title("rise in " + number_text(1000 * rise, 2) + " ms")
           .x_label("t (s)")
-          .y_label("y")
+          .y_label("rate / its reference (-)")
           .x_range(0.0, 0.3)
           .legend(Legend::bottom_right)
           .name("rise" + number_text(1000 * rise, 2))

@@ -120,15 +120,15 @@ int main(int argc, char** argv) {
       .y_label("error (mrad)")
       .x_range(4, 6)
       .legend(Legend::above)
-      .line(guessed.t, guessed.error, {.name = "guessed", .color = Color::grey})
-      .line(known.t, known.error, {.name = "from the log", .color = Color::blue});
+      .line(guessed.t, guessed.error, {.name = "inertia guessed", .color = Color::grey})
+      .line(known.t, known.error, {.name = "inertia from the log", .color = Color::blue});
   figure.panel(0, 1)
       .x_label("t (s)")
       .y_label("load (N m)")
       .x_range(4, 6)
       .legend(Legend::above)
-      .line(known.t, known.load, {.name = "simulated", .color = Color::black, .dash = Dash::dashed})
-      .line(known.t, known.found, {.name = "found", .color = Color::vermillion});
+      .line(known.t, known.load, {.name = "true load", .color = Color::black, .dash = Dash::dashed})
+      .line(known.t, known.found, {.name = "estimate", .color = Color::vermillion});
   report.add(figure);
   report.remark("The complaint: " + complaint);
   return report.finish();
