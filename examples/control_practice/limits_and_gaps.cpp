@@ -301,7 +301,7 @@ double tracking_error(const Faults& faults, std::uint64_t seed) {
 
 int main(int argc, char** argv) {
   Report report(argc, argv, folder, "limits_and_gaps",
-                about("Limits, starts, retunes, gaps",
+                about("Limits, start-up, retuning, lost samples",
                       "A double integrator that is known exactly, so that every deviation is "
                       "caused by the controller. Sampled observers."));
 

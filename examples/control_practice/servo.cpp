@@ -230,7 +230,7 @@ Run simulate(const Controller& driven, std::uint64_t seed, const Run* clean = nu
 int main(int argc, char** argv) {
   Report report(
       argc, argv, folder, "servo",
-      about("A servo on a bad day",
+      about("A servo with friction, saturation and lost samples",
             "Friction, saturation, a load step, retuning while the loop runs, lost samples and "
             "NaN: a PID with anti-windup compared with ADRC with three observers. Sampled at 1 ms; "
             "mean and standard deviation over 20 seeds of noise and faults."));

@@ -53,7 +53,7 @@ Run run(Step&& step) {
 
 int main(int argc, char** argv) {
   Report report(argc, argv, "guards", "fast_math",
-                about("A measurement that is no number",
+                about("A measurement that is NaN",
                       "A hand-written observer and esokit, both compiled with -ffast-math."));
   double z0 = 0, z1 = 0, z2 = 0, held = 0;
   const Run bare = run([&](double y) {

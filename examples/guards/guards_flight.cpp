@@ -459,7 +459,7 @@ void flight(Report& report) {
 int main(int argc, char** argv) {
   Report report(
       argc, argv, "guards", "flight",
-      about("A rate loop on its bad days",
+      about("Failures of a rate loop",
             "Ground, throttle, gust, mixer, and a complete axis of a flight controller."));
   ground(report);
   throttle(report);

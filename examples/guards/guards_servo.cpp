@@ -387,7 +387,7 @@ void probe(Report& report) {
 
 int main(int argc, char** argv) {
   Report report(argc, argv, "guards", "servo",
-                about("A servo on its bad days",
+                about("Failures of a servo",
                       "An observer that gets another u than the actuator, forward Euler, a hard "
                       "stop, a wrong b0."));
   scaled(report);

@@ -112,7 +112,7 @@ std::string with_deviation(const Statistics& of) {
 int main(int argc, char** argv) {
   Report report(
       argc, argv, folder, "deployed",
-      about("Sim1A and Sim1B in a controller (our addition)",
+      about("Sim1A and Sim1B with sampled observers (our addition)",
             "The sampled observers at T = 10, 1 and 0.1 ms compared with the continuous "
             "simulation: exact sampled observer, input held, control law once per sample.",
             4, true));
@@ -193,10 +193,10 @@ int main(int argc, char** argv) {
          with_deviation(statistics_of(mine, &Criteria::control)),
          with_deviation(statistics_of(mine, &Criteria::estimate))});
   }
-  report.table(
-      "noise",
-      "Sim1B in a controller: mean (standard deviation) over " + std::to_string(seeds) + " seeds",
-      {"case", "1e3 int |e| dt", "int u^2 dt", "int |z3 error| dt"}, noisy_lines);
+  report.table("noise",
+               "Sim1B with sampled observers: mean (standard deviation) over " +
+                   std::to_string(seeds) + " seeds",
+               {"case", "1e3 int |e| dt", "int u^2 dt", "int |z3 error| dt"}, noisy_lines);
 
   Figure figure("deployed", {.rows = 3, .columns = 3, .panel_height = 150});
   figure.caption(

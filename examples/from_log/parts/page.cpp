@@ -201,7 +201,9 @@ void Page::add_to(esokit::examples::Report& report) const {
         break;
       case Kind::box:
       case Kind::bad_box: {
-        for (const auto& line : item.rows[0]) report.remark(item.text + ": " + line);
+        std::string text = item.text + ":";
+        for (const auto& line : item.rows[0]) text += ' ' + line;
+        report.remark(text);
         break;
       }
       default:
