@@ -23,6 +23,8 @@
 #include <esokit/analysis/margins.hpp>
 #include <esokit/tune/tune.hpp>
 
+#include "common/compiled/study.hpp"
+#include "common/compiled/tune.hpp"
 #include "common/parallel.hpp"
 #include "common/report.hpp"
 #include "identify/random_plant.hpp"
@@ -51,14 +53,14 @@ Outcome tuned(std::uint64_t seed) {
   log.y = made.y;
   log.sample_time = truth.sample_time;
   Outcome outcome;
-  const auto found = esokit::identify(log);
+  const auto found = compiled::identify(log);
   if (!found) return outcome;
   outcome.accepted = true;
   outcome.right_order = found->order == truth.order;
   double largest = 0;
   for (const double u : made.u) largest = std::max(largest, std::abs(u));
   const auto model = esokit::tune_model(*found, -largest, largest);
-  const auto tuning = esokit::tune(model);
+  const auto tuning = compiled::tune(model);
   if (!tuning || tuning->chosen() == nullptr) return outcome;
   outcome.chosen = true;
   const esokit::TunedDesign& design = *tuning->chosen();

@@ -143,6 +143,11 @@ Panel& Panel::add(const char* kind, Style style, Series series, double at) {
   return draw(kind, style, at);
 }
 
+Figure::Figure(std::string name, Grid grid) : name_(std::move(name)), grid_(grid) {}
+Figure::Figure(const Figure&) = default;
+Figure::Figure(Figure&&) noexcept = default;
+Figure::~Figure() = default;
+
 Figure& Figure::title(std::string text) {
   title_ = std::move(text);
   return *this;

@@ -148,7 +148,10 @@ struct Grid {
 /// Panels in a grid.
 class Figure {
  public:
-  explicit Figure(std::string name, Grid grid = {}) : name_(std::move(name)), grid_(grid) {}
+  explicit Figure(std::string name, Grid grid = {});
+  Figure(const Figure&);
+  Figure(Figure&&) noexcept;
+  ~Figure();
 
   /// Heading above all panels.
   Figure& title(std::string text);

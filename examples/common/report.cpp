@@ -308,6 +308,8 @@ Report::Report(int argc, char** argv, const std::string& paper, const std::strin
   std::fflush(stdout);
 }
 
+Report::~Report() = default;
+
 int Report::finish() {
   std::string summary = "case,metric,paper,ours,relative_error,tolerance,pass,note\n";
   std::ptrdiff_t failed = 0;

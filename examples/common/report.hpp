@@ -118,6 +118,8 @@ class Report {
   /// Reads `[--out DIR | DIR]` from the command line and makes DIR/<paper>/<example>. A command
   /// line that it does not understand ends the program with exit code 2.
   Report(int argc, char** argv, const std::string& paper, const std::string& example, About about);
+  Report(const Report&) = delete;
+  ~Report();
 
   /// Where the files of this example go.
   [[nodiscard]] const std::string& folder() const { return folder_; }

@@ -21,8 +21,6 @@
 #include <string>
 #include <vector>
 
-#include <Eigen/Eigenvalues>
-
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/eigen.hpp>
@@ -33,6 +31,7 @@
 #include <esokit/sim/gaussian.hpp>
 #include <esokit/sim/run.hpp>
 
+#include "common/compiled/spectral_radius.hpp"
 #include "common/report.hpp"
 #include "control_practice/practice.hpp"
 
@@ -220,7 +219,7 @@ double spectral_radius(double omega_t, int every, bool follow) {
       esokit::EigenMatrix<double, size, size>::Identity();
   for (int i = 0; i < every; ++i) error = Chain::transition_matrix(1.0) * error;
   error -= eigen(observer.estimate() * Chain::output_matrix() * error);
-  return Eigen::MatrixXd(error).eigenvalues().cwiseAbs().maxCoeff();
+  return compiled::spectral_radius(error);
 }
 
 template <int Order>

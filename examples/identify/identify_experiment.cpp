@@ -29,6 +29,7 @@
 #include <esokit/identify/identify.hpp>
 #include <esokit/observer/linear_eso.hpp>
 
+#include "common/compiled/study.hpp"
 #include "common/report.hpp"
 
 using namespace esokit::examples;
@@ -191,7 +192,7 @@ int main(int argc, char** argv) {
   report.check_reference("servo", "friction by the relay (rad/s2)", 0.1 * b0 * amplitude,
                          found.friction, 0.25);
   report.check("servo", "relay done after (s)", std::nullopt, hand_over);
-  const auto identified = esokit::study(log, {.orders = {2}});
+  const auto identified = compiled::study(log, {.orders = {2}});
   if (identified) {
     report.check_reference("servo", "b0 by identify, same rows", b0, identified->input_gain.value,
                            0.03, "with friction as a column");

@@ -17,6 +17,7 @@
 #include <Eigen/Dense>
 #include <esokit/identify/identify.hpp>
 
+#include "common/compiled/study.hpp"
 #include "common/log_file.hpp"
 #include "common/parallel.hpp"
 #include "common/report.hpp"
@@ -53,7 +54,7 @@ class Machines {
   /// Studies a log, with a row in the table. The reference holds until the next call.
   const Identified& study(const std::string& name, const Log& log, const std::string& known,
                           const IdentifyOptions& options = {}, bool drawn = false) {
-    return add(name, log, esokit::study(log, options), known, options, drawn);
+    return add(name, log, compiled::study(log, options), known, options, drawn);
   }
 
   /// The same of a study that was made before.
@@ -441,10 +442,10 @@ void tclab(Report& report, Machines& machines) {
                  "20 is a thirtieth of the log, the longest that is looked for");
     if (heater != 1) continue;
     // Without that end, at bandwidths between those of the plateau and of the likelihood.
-    const auto rows = esokit::prepare(log);
-    esokit::InnovationsFit fit(rows->data, {1, 1, true}, {0.01, 1.5, 0.05, 40.0, 0.5});
+    const auto rows = compiled::prepare(log);
     for (const double w : {0.05, 0.1, 0.2}) {
-      const esokit::Fit free = fit.minimise({w, 15.0, 0.7, 0.003}, false);
+      const esokit::Fit free = compiled::minimised(
+          rows->data, {1, 1, true}, {0.01, 1.5, 0.05, 40.0, 0.5}, {w, 15.0, 0.7, 0.003});
       report.check_reference(name, "lag, latency up to 40 s, w = " + number_text(w, 2) + " (s)",
                              16.38, free.at.lag(), 0.25, "fitted to the same record by the notes");
     }
@@ -496,7 +497,7 @@ void acrobot(Report& report, Machines& machines) {
   options.pole = false;
   options.friction = false;
   const auto found = run_parallel("acrobot", logs.size(), [&](std::size_t i) {
-    return std::optional(esokit::study(logs[i], options));
+    return std::optional(compiled::study(logs[i], options));
   });
   std::vector<double> gains[2];
   for (std::size_t i = 0; i < logs.size(); ++i) {

@@ -31,6 +31,7 @@
 
 #include <esokit/identify/identify.hpp>
 
+#include "common/compiled/study.hpp"
 #include "common/parallel.hpp"
 #include "common/report.hpp"
 #include "identify/random_plant.hpp"
@@ -61,7 +62,7 @@ Outcome identified(std::uint64_t seed, Kind kind) {
   log.sample_time = made.truth.sample_time;
   Outcome outcome;
   outcome.truth = made.truth;
-  const auto found = esokit::study(log);
+  const auto found = compiled::study(log);
   if (!found) {
     outcome.refusal = found.error().field;
     return outcome;

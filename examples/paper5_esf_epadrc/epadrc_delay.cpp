@@ -24,6 +24,7 @@
 #include <string>
 #include <vector>
 
+#include "common/compiled/spectral_radius.hpp"
 #include "common/parallel.hpp"
 #include "common/report.hpp"
 #include "paper5_esf_epadrc/paper5.hpp"
@@ -73,7 +74,7 @@ double spectral_radius(const EigenMatrix<double, 3>& gain, double delay, bool cu
   constexpr int size = Loop::RowsAtCompileTime;
   EigenMatrix<double, size, size> map;
   for (int i = 0; i < size; ++i) map.col(i) = step(Loop::Unit(i), gain, delay, current);
-  return Eigen::EigenSolver<Eigen::MatrixXd>(map, false).eigenvalues().cwiseAbs().maxCoeff();
+  return compiled::spectral_radius(map);
 }
 
 EigenMatrix<double, 3> linear_gain(double bandwidth) {

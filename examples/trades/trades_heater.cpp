@@ -16,6 +16,7 @@
 #include <limits>
 #include <sstream>
 
+#include "common/compiled/study.hpp"
 #include "trades/trades.hpp"
 
 using namespace esokit::examples;
@@ -97,7 +98,7 @@ int main(int argc, char** argv) {
     by_hand.manual(lab.shown(), power);
     lab.second(power, false);
   }
-  const auto found = esokit::identify(trades::rows_of(rows.str())).value();
+  const auto found = compiled::identify(trades::rows_of(rows.str())).value();
   const std::string log = "log of 20 min by hand";
   report.check_reference(log, "heating (degC/s per %)", 6.4e-3 / (0.004 * 500),
                          found.input_gain.value, 0.02, "as simulated");

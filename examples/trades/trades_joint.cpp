@@ -14,6 +14,7 @@
 #include <numbers>
 #include <sstream>
 
+#include "common/compiled/study.hpp"
 #include "trades/trades.hpp"
 
 using namespace esokit;
@@ -86,7 +87,7 @@ int main(int argc, char** argv) {
   const Trace guessed = drive(joint, 10, 1);
   joint.log_to(nullptr);
 
-  const auto found = identify(trades::rows_of(log.str()));
+  const auto found = compiled::identify(trades::rows_of(log.str()));
   const double seen = 1 / found.value().input_gain.value;
   report.check_reference("log of 10 s under the guess", "inertia (kg m^2)", inertia, seen, 0.05,
                          "as simulated");

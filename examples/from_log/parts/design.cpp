@@ -12,6 +12,8 @@
 #include <esokit/sim/gaussian.hpp>
 #include <esokit/sim/run.hpp>
 
+#include "common/compiled/tune.hpp"
+
 namespace from_log {
 namespace {
 
@@ -255,7 +257,7 @@ Design Design::make(const Settings& settings, const Input&, const Findings& find
   wish.settling_time = settings.settling_time;
   wish.controller_bandwidth = settings.controller;
   if (settings.noise_share > 0.0) wish.control_noise = settings.noise_share * range;
-  const auto tuning = esokit::tune(model, wish);
+  const auto tuning = compiled::tune(model, wish);
   if (!tuning) {
     design.why_not_ = esokit::to_text(tuning.error());
     return design;

@@ -5,12 +5,14 @@
 #include <numbers>
 #include <utility>
 
+#include "common/compiled/study.hpp"
 #include "from_log/parts/from_log.hpp"
 
 namespace from_log {
 namespace {
 
 using esokit::examples::number_text;
+namespace compiled = esokit::examples::compiled;
 
 /// In place, of a length that is a power of two.
 void fourier(std::vector<std::complex<double>>& x) {
@@ -68,25 +70,6 @@ Spectrum spectrum(const std::vector<double>& values, double T) {
     result.density.push_back(sum[i] / static_cast<double>(pieces) * T / std::numbers::pi);
   }
   return result;
-}
-
-/// Innovations of the fit that was chosen, over the rows that it was fitted to.
-std::vector<double> residual_of(const esokit::Identified& found, const esokit::FitData& rows,
-                                double& sample_time) {
-  const auto& chosen = *std::find_if(
-      found.orders.begin(), found.orders.end(),
-      [&](const esokit::OrderFit& order) { return order.model.order == found.order; });
-  esokit::FitData data = esokit::averaged(esokit::excerpt(rows, 60000), found.averaged);
-  sample_time = data.sample_time;
-  if (found.position) esokit::detail::add_position(data);
-  if (chosen.friction_scale > 0.0) {
-    const auto speed =
-        esokit::detail::friction_speed(data, found.order, chosen.fit.noise, chosen.fit.at.latency);
-    data = esokit::detail::with_friction(data, speed, chosen.friction_scale);
-  }
-  esokit::InnovationsFit fit(data, chosen.model, esokit::detail::fit_bounds(data));
-  (void)fit.at(chosen.fit.at);
-  return fit.residual();
 }
 
 /// What a factor between two units often is.
@@ -183,7 +166,7 @@ Findings examine(const Settings& settings, const Input& input) {
       std::fprintf(stderr, "identifying the model: %3.0f %%\n", 100 * share);
     };
   }
-  if (const auto prepared = esokit::prepare(input.log)) {
+  if (const auto prepared = compiled::prepare(input.log)) {
     all.rows = prepared->data;
     all.found.log = prepared->report;
     const double T = all.rows.sample_time;
@@ -193,7 +176,7 @@ Findings examine(const Settings& settings, const Input& input) {
     all.refusal = prepared.error();
     return all;
   }
-  const auto found = esokit::study(input.log, options);
+  const auto found = compiled::study(input.log, options);
   if (!found) {
     all.refusal = found.error();
     sound_alarms(settings, input, all);
@@ -204,7 +187,7 @@ Findings examine(const Settings& settings, const Input& input) {
   if (const auto verdict = esokit::judge(*found, input.log, options); !verdict)
     all.refusal = verdict.error();
   double T = 0.0;
-  const auto residual = residual_of(*found, all.rows, T);
+  const auto residual = compiled::residual_of(*found, all.rows, T);
   double square = 0.0;
   for (const double e : residual) square += e * e;
   for (std::size_t lag = 1; lag <= 40 && lag < residual.size(); ++lag) {

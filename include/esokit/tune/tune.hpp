@@ -478,8 +478,10 @@ inline std::string controller_source(const TunedDesign& d, const TuneModel& mode
          "}});\n";
 }
 
-/// All families for a model.
-inline std::vector<Contender> contenders(const TuneModel& model, bool law_is_given) {
+/// All families for a model. A template, as `tune`, so that it costs compile time only where it is
+/// called.
+template <class = void>
+std::vector<Contender> contenders(const TuneModel& model, bool law_is_given) {
   std::vector<Contender> all;
   const auto take = [&](TuneFamily family, std::string name, const TuneKnowledge& knows, int m,
                         int p, std::optional<ObserverKind> kind) {
@@ -561,9 +563,10 @@ double bandwidth_for(const Function& rises, double wanted, double low, double hi
 /// Finds designs for a model, the best one first.
 /// @return error for a model that `check` refuses, more than one requirement, or a requirement that
 ///         no controller can meet
-[[nodiscard]] inline Expected<Tuning, Error<double>> tune(const TuneModel& model,
-                                                          const TuneWish& wish = {},
-                                                          const TuneRules& rules = {}) {
+template <class = void>
+[[nodiscard]] Expected<Tuning, Error<double>> tune(const TuneModel& model,
+                                                   const TuneWish& wish = {},
+                                                   const TuneRules& rules = {}) {
   Rules<double> checks;
   checks.all_of(model.check())
       .not_negative("control_noise", wish.control_noise)
