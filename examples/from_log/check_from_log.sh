@@ -41,6 +41,54 @@ refuses() {  # refuses "TEXT OF THE ERROR" FILE [OPTION...]: not understood
   verdict $? "$*: expected '$text', got status $status and: $said"
 }
 
+# ---- what has to be compiled, beside the rest ----
+
+# What a controller logs of itself: telemetry rows, a measurement missing now and then.
+cat >telemetry.cpp <<'END'
+#include <esokit/esokit.hpp>
+#include <iomanip>
+#include <iostream>
+#include <limits>
+using namespace esokit;
+int main() {
+  auto loop = Adrc<LinearEso<2>>::make({.observer = {.observer_bandwidth = 100,
+                                                     .input_gain = 40,
+                                                     .sample_time = 1e-3},
+                                        .controller_bandwidth = 20,
+                                        .limits = {.lower = -5, .upper = 5}})
+                  .value();
+  write_header<3>(std::cout << std::setprecision(17));
+  double y = 0, v = 0;
+  unsigned seed = 7;
+  for (int k = 0; k < 4000; ++k) {
+    seed = seed * 69069u + 12345u;
+    const double r = k % 700 < 350 ? 1 : -1;
+    const double measured = k % 97 == 50 ? std::numeric_limits<double>::quiet_NaN()
+                                         : y + 1e-4 * (seed / 4294967296.0 - 0.5);
+    const double a = 50 * loop.update(measured, r) - 2 * v + 5;
+    write_row(std::cout, telemetry(loop, k * 1e-3, measured, r));
+    y += 1e-3 * v + a * 0.5e-6;
+    v += 1e-3 * a;
+  }
+}
+END
+{
+  "$compiler" -std=c++20 -I"$root/include" -I"$eigen" telemetry.cpp -o telemetry &&
+    ./telemetry >telemetry.csv
+} &
+telemetry=$!
+
+compiles() {  # compiles PAGE: all programs of the page, in one; they run, too
+  sed -n '/<pre.*<code>/,/<\/code>/p' "$1" |
+    sed 's/.*<code>//; s/<\/code>.*//; s/&lt;/</g; s/&gt;/>/g; s/&quot;/"/g; s/&amp;/\&/g' |
+    awk '/^int main\(\) \{$/ { $0 = "int main_" ++n "() {" } /^}$/ { print "  return 0;" } { print }
+      END { print "int main() {"; for (i = 1; i <= n; ++i) print "  if (main_" i "() != 0) return 1;"
+            print "}" }' >pasted.cpp
+  (($(grep -c '^int main_' pasted.cpp) >= 4)) &&
+    "$compiler" -std=c++20 -Wall -Wextra -Wconversion -Werror -I"$root/include" -I"$eigen" \
+      pasted.cpp -o pasted 2>errors && ./pasted >/dev/null
+}
+
 # ---- a servo under a PD controller ----
 
 # servo [NAME=NUMBER...]: 8 s, y'' + 2 y' = b u(t - 4 ms) - load, rows "t y u r"; the reference steps.
@@ -99,6 +147,8 @@ healthy plain.csv
 [[ $(grep -c '<h2>Paste this' "$page") == 1 ]]
 verdict $? "plain.csv: no controller on $page"
 first=$page
+compiles "$first" &
+pasted=$!
 before=$(cksum <"$first")
 healthy plain.csv --limits -6,6 --b0 60 --settling 0.5
 [[ $page != "$first" && $(cksum <"$first") == "$before" ]]
@@ -146,37 +196,7 @@ servo b=-50 >rows.txt
 written t,y,u , t >wrong_sign.csv
 truth=-50 healthy wrong_sign.csv --b0 -45
 
-# What a controller logs of itself: telemetry rows, a measurement missing now and then.
-cat >telemetry.cpp <<'END'
-#include <esokit/esokit.hpp>
-#include <iomanip>
-#include <iostream>
-#include <limits>
-using namespace esokit;
-int main() {
-  auto loop = Adrc<LinearEso<2>>::make({.observer = {.observer_bandwidth = 100,
-                                                     .input_gain = 40,
-                                                     .sample_time = 1e-3},
-                                        .controller_bandwidth = 20,
-                                        .limits = {.lower = -5, .upper = 5}})
-                  .value();
-  write_header<3>(std::cout << std::setprecision(17));
-  double y = 0, v = 0;
-  unsigned seed = 7;
-  for (int k = 0; k < 4000; ++k) {
-    seed = seed * 69069u + 12345u;
-    const double r = k % 700 < 350 ? 1 : -1;
-    const double measured = k % 97 == 50 ? std::numeric_limits<double>::quiet_NaN()
-                                         : y + 1e-4 * (seed / 4294967296.0 - 0.5);
-    const double a = 50 * loop.update(measured, r) - 2 * v + 5;
-    write_row(std::cout, telemetry(loop, k * 1e-3, measured, r));
-    y += 1e-3 * v + a * 0.5e-6;
-    v += 1e-3 * a;
-  }
-}
-END
-"$compiler" -std=c++20 -I"$root/include" -I"$eigen" telemetry.cpp -o telemetry &&
-  ./telemetry >telemetry.csv
+wait "$telemetry"
 healthy telemetry.csv
 
 # ---- alarms ----
@@ -249,22 +269,6 @@ shows u constant.csv
 # A u that is not this machine's.
 written t,y,u , t '$3 = sin(NR * NR);' >foreign.csv
 shows '' foreign.csv
-
-# ---- what is pasted compiles, and runs ----
-
-compiles() {  # compiles FILE [OPTION...]: all programs of the page, in one
-  run "$@"
-  sed -n '/<pre.*<code>/,/<\/code>/p' "$page" |
-    sed 's/.*<code>//; s/<\/code>.*//; s/&lt;/</g; s/&gt;/>/g; s/&quot;/"/g; s/&amp;/\&/g' |
-    awk '/^int main\(\) \{$/ { $0 = "int main_" ++n "() {" } /^}$/ { print "  return 0;" } { print }
-      END { print "int main() {"; for (i = 1; i <= n; ++i) print "  if (main_" i "() != 0) return 1;"
-            print "}" }' >pasted.cpp
-  (($(grep -c '^int main_' pasted.cpp) >= 4)) &&
-    "$compiler" -std=c++20 -Wall -Wextra -Wconversion -Werror -I"$root/include" -I"$eigen" \
-      pasted.cpp -o pasted 2>errors && ./pasted >/dev/null
-  verdict $? "$*: what $page says does not compile: $(head -n 5 errors; cat pasted.cpp)"
-}
-compiles plain.csv
 
 # ---- an observer that is typed in, over any log ----
 
@@ -376,6 +380,9 @@ refuses "--limits: 5,-5 is no range" plain.csv --limits 5,-5
 refuses "--noise, --settling, --omega-c: one of them" plain.csv --noise 3 --settling 1
 refuses "--time-unit: 'hours' is none of" plain.csv --time-unit hours
 refuses "no observer 'luenberger'; there are linear" plain.csv "${settings[@]}" --observer luenberger
+
+wait "$pasted"
+verdict $? "what $first says does not compile: $(head -n 5 errors; cat pasted.cpp)"
 
 echo "$passed passed, $failed failed"
 ((failed == 0))
