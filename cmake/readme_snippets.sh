@@ -28,6 +28,10 @@ void snippets() {
   auto plant = LinearPlant<3>::transfer_function({.numerator = {6}, .denominator = {6, 11, 6}}).value();
   auto controller = PredictiveAdrc<LinearEso<2>>::make({}).value();
   auto identified = identify(Log{});
+  const auto chain = LinearPlant<2>::chain({.input_gain = 1.0}).value();
+  const auto motor = sim::DisturbedPlant<2>::make({.plant = chain}).value();
+  const auto observer = ContinuousLinearEso<2>::make({}).value();
+  const auto law = AdrcLaw<2>::make({}).value();
 END
   grep -rhE '^ *///' include |
     awk '/\/\/\/ ```cpp$/ { inside = 1; print "{"; next } /\/\/\/ ```$/ && inside { inside = 0; print "}" }

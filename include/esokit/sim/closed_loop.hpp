@@ -135,9 +135,11 @@ auto check_state(const char* field, const State& state) {
 /// with a fixed step. Measurement and control are functions of the present state, so they change
 /// within a step; the noise is held over a step.
 ///
-/// ```
-/// const ContinuousLoop loop{plant, observer, [&](double, const auto& zhat) { return .. }};
-/// auto end = loop.run({.duration = 5.0, .step = 1e-3}, [&](const auto& sample) { .. });
+/// ```cpp
+/// const sim::ContinuousLoop loop{motor, observer,
+///     [&](double, const auto& zhat) { return law.control(zhat, 0.0); }};
+/// auto end = loop.run({.duration = 5.0, .step = 1e-3},
+///     [](const auto& sample) { std::printf("%g %g\n", sample.t, sample.output); });
 /// ```
 template <Plant P, ContinuousObserverModel Observer, class Law, class Measurement = MeasuredOutput,
           class Noise = NoNoise>
