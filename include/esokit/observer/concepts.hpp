@@ -37,7 +37,7 @@ struct ObserverTraits {
   bool bears_regular_gaps = true;
 
   /// It publishes the state of its chain, and its sample time is fixed: `scaled_estimate<Row>()
-  /// const` is T^r / r! times `estimate<Row>()`. Adrc then folds the factors into its gains. False
+  /// const` is T^r / r! times `estimate<Row>()`. Adrc then includes the factors in its gains. False
   /// for AlgebraicEso (blanked at first), KnownModel and VariableTime.
   bool publishes_chain = false;
 
@@ -52,8 +52,8 @@ struct ObserverTraits {
   /// The measurement is row 0 of the estimate; false if it passes a sensor with a lag.
   bool measures_first_row = true;
 
-  /// It is an adapter around an observer `Adapted`, whose config is the member `observer` of its
-  /// own.
+  /// It is an adapter around an observer `Adapted`, whose config is the member `observer` of the
+  /// adapter's config.
   bool adapts = false;
 
   bool wraps_output = false;  ///< y is an angle: `wrap(difference) const`

@@ -268,7 +268,7 @@ template <SampledPlant P, class C, class Vary = NoVariation>
 requires ControllerOf<C, P>
 class MonteCarlo {
  public:
-  using Types = RunTypes<P, C>;             ///< type of the numbers
+  using Types = RunTypes<P, C>;             ///< types of the numbers
   using Time = typename Types::Time;        ///< s
   using Config = MonteCarloConfig<P, C>;    ///< settings
   using Outcome = MonteCarloOutcome<Time>;  ///< the result

@@ -82,7 +82,7 @@ struct RunTypes {
 /// The argument of the callback of a run, called once a sample after the controller.
 template <class P, class C>
 struct RunSample {
-  using Types = RunTypes<P, C>;  ///< type of the numbers
+  using Types = RunTypes<P, C>;  ///< types of the numbers
 
   std::int64_t index{};                  ///< k
   typename Types::Time t{};              ///< s
@@ -96,7 +96,7 @@ struct RunSample {
 /// How a run ended.
 template <class P, class C>
 struct RunEnd {
-  using Types = RunTypes<P, C>;  ///< type of the numbers
+  using Types = RunTypes<P, C>;  ///< types of the numbers
 
   typename Types::Time time{};    ///< s, at the end of the last sample
   std::int64_t samples{};         ///< number of samples that the controller computed
@@ -109,7 +109,7 @@ struct RunEnd {
 /// channels an array of vectors.
 template <class P, class C>
 struct RunRecord {
-  using Types = RunTypes<P, C>;       ///< type of the numbers
+  using Types = RunTypes<P, C>;       ///< types of the numbers
   using S = typename Types::S;        ///< scalar of the plant
   using Time = typename Types::Time;  ///< s
 
@@ -189,7 +189,7 @@ struct RunRecord {
 /// The end of a run with the record of its samples.
 template <class P, class C>
 struct Recording : RunEnd<P, C>, RunRecord<P, C> {
-  using Types = RunTypes<P, C>;  ///< type of the numbers
+  using Types = RunTypes<P, C>;  ///< types of the numbers
 };
 
 }  // namespace esokit::sim

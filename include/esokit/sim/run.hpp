@@ -97,7 +97,7 @@ concept ControllerOf =
 /// Settings of `run`; all but `duration` may be left out.
 template <class P, class C>
 struct RunConfig {
-  using Types = RunTypes<P, C>;           ///< type of the numbers
+  using Types = RunTypes<P, C>;           ///< types of the numbers
   using Time = typename Types::Time;      ///< s
   using Input = typename Types::Input;    ///< u
   using Output = typename Types::Output;  ///< y
