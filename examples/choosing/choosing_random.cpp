@@ -89,17 +89,9 @@ Outcome tuned(std::uint64_t seed) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  std::size_t logs = 0;
-  std::vector<char*> rest;
-  for (int i = 0; i < argc; ++i) {
-    if (std::string(argv[i]) == "--logs" && i + 1 < argc) {
-      logs = std::strtoul(argv[++i], nullptr, 10);
-    } else {
-      rest.push_back(argv[i]);
-    }
-  }
+  const std::size_t logs = std::stoul(take_option(argc, argv, "--logs", "0"));
   Report report(
-      static_cast<int>(rest.size()), rest.data(), "choosing", "random",
+      argc, argv, "choosing", "random",
       {.paper_title = "Choosing an observer",
        .citation = "Our own numbers; the observers are those of the papers",
        .link = "",

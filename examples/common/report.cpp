@@ -293,6 +293,16 @@ void Report::cover(const std::string& figure) { contents_.push_back({"cover", fi
 
 // ---- begin and end ----
 
+std::string take_option(int& argc, char** argv, std::string_view name, std::string otherwise) {
+  char** const end = argv + argc;
+  char** const found = std::find(argv, end, name);
+  if (end - found < 2) return otherwise;
+  otherwise = found[1];
+  std::copy(found + 2, end, found);
+  argc -= 2;
+  return otherwise;
+}
+
 Report::Report(int argc, char** argv, const std::string& paper, const std::string& example,
                About about)
     : name_(paper + "/" + example),

@@ -112,6 +112,10 @@ struct Tolerance {
   std::string rule = {};    ///< in words; empty for a plain relative tolerance
 };
 
+/// What follows `name` ("--runs") on the command line, of which both are taken out for Report;
+/// `otherwise` if it is not there.
+std::string take_option(int& argc, char** argv, std::string_view name, std::string otherwise);
+
 /// One example's results. Console output and files; nothing throws, what fails shows in finish().
 class Report {
  public:

@@ -522,17 +522,10 @@ void acrobot(Report& report, Machines& machines) {
 int main(int argc, char** argv) {
   // The sources are in examples/identify of the repository.
   const auto root = std::filesystem::path(__FILE__).parent_path().parent_path().parent_path();
-  std::filesystem::path data = (root / ".." / "shared" / "data").lexically_normal();
-  std::vector<char*> rest;
-  for (int i = 0; i < argc; ++i) {
-    if (std::string(argv[i]) == "--data" && i + 1 < argc) {
-      data = argv[++i];
-    } else {
-      rest.push_back(argv[i]);
-    }
-  }
+  const std::filesystem::path data = take_option(
+      argc, argv, "--data", (root / ".." / "shared" / "data").lexically_normal().string());
   Report report(
-      static_cast<int>(rest.size()), rest.data(), "identify", "identify_machines",
+      argc, argv, "identify", "identify_machines",
       {.paper_title = "From a log to a model",
        .citation =
            "No paper. Order, b0, lag, dead time, friction and noise from logs, with intervals",

@@ -132,17 +132,9 @@ std::string percent(double share) { return number_text(100 * share, 3); }
 }  // namespace
 
 int main(int argc, char** argv) {
-  std::size_t logs = 0;
-  std::vector<char*> rest;
-  for (int i = 0; i < argc; ++i) {
-    if (std::string(argv[i]) == "--logs" && i + 1 < argc) {
-      logs = std::strtoul(argv[++i], nullptr, 10);
-    } else {
-      rest.push_back(argv[i]);
-    }
-  }
+  const std::size_t logs = std::stoul(take_option(argc, argv, "--logs", "0"));
   Report report(
-      static_cast<int>(rest.size()), rest.data(), "identify", "identify_random",
+      argc, argv, "identify", "identify_random",
       {.paper_title = "From a log to a model",
        .citation =
            "No paper. Order, b0, lag, dead time, friction and noise from logs, with intervals",

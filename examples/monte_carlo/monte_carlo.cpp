@@ -115,17 +115,9 @@ struct Seen {
 
 int main(int argc, char** argv) {
   take_widest(argv);
-  std::int64_t runs = 100'000;
-  std::vector<char*> rest;
-  for (int i = 0; i < argc; ++i) {
-    if (std::string(argv[i]) == "--runs" && i + 1 < argc) {
-      runs = std::strtol(argv[++i], nullptr, 10);
-    } else {
-      rest.push_back(argv[i]);
-    }
-  }
+  const std::int64_t runs = std::stoll(take_option(argc, argv, "--runs", "100000"));
   Report report(
-      static_cast<int>(rest.size()), rest.data(), "monte_carlo", "drive",
+      argc, argv, "monte_carlo", "drive",
       {.paper_title = "Monte Carlo",
        .citation = "No paper. 100,000 runs: one design on random plants, and the noise of a paper",
        .title = "One design on 100,000 random drives",

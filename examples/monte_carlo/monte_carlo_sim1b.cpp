@@ -188,17 +188,9 @@ double tick(double width) {
 
 int main(int argc, char** argv) {
   take_widest(argv);
-  std::int64_t runs = 10'000;
-  std::vector<char*> rest;
-  for (int i = 0; i < argc; ++i) {
-    if (std::string(argv[i]) == "--runs" && i + 1 < argc) {
-      runs = std::strtol(argv[++i], nullptr, 10);
-    } else {
-      rest.push_back(argv[i]);
-    }
-  }
+  const std::int64_t runs = std::stoll(take_option(argc, argv, "--runs", "10000"));
   Report report(
-      static_cast<int>(rest.size()), rest.data(), "monte_carlo", "sim1b",
+      argc, argv, "monte_carlo", "sim1b",
       {.paper_title = "Monte Carlo",
        .title = "Sim1B of paper 1 with very many seeds",
        .description = "The noisy simulation of paper 1 with very many seeds, in packs: how the "

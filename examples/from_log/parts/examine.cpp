@@ -2,6 +2,7 @@
 #include <cmath>
 #include <complex>
 #include <cstdio>
+#include <esokit/identify/spectrum.hpp>
 #include <numbers>
 #include <utility>
 
@@ -13,28 +14,6 @@ namespace {
 
 using esokit::examples::number_text;
 namespace compiled = esokit::examples::compiled;
-
-/// In place, of a length that is a power of two.
-void fourier(std::vector<std::complex<double>>& x) {
-  const std::size_t n = x.size();
-  for (std::size_t i = 1, j = 0; i < n; ++i) {
-    std::size_t bit = n / 2;
-    for (; (j & bit) != 0; bit /= 2) j ^= bit;
-    j ^= bit;
-    if (i < j) std::swap(x[i], x[j]);
-  }
-  for (std::size_t length = 2; length <= n; length *= 2) {
-    const double turn = -2.0 * std::numbers::pi / static_cast<double>(length);
-    for (std::size_t half = 0; half < length / 2; ++half) {
-      const auto w = std::polar(1.0, turn * static_cast<double>(half));
-      for (std::size_t i = half; i < n; i += length) {
-        const auto odd = w * x[i + length / 2];
-        x[i + length / 2] = x[i] - odd;
-        x[i] += odd;
-      }
-    }
-  }
-}
 
 /// Welch's mean over half overlapping pieces with Hann's window, each without its trend.
 Spectrum spectrum(const std::vector<double>& values, double T) {
@@ -60,7 +39,7 @@ Spectrum spectrum(const std::vector<double>& values, double T) {
       power += window * window;
       x[i] = window * (values[from + i] - mean - slope * (at - (count - 1) / 2));
     }
-    fourier(x);
+    esokit::detail::transform(x);
     for (std::size_t i = 1; i < length / 2; ++i) sum[i] += std::norm(x[i]) / power;
     ++pieces;
   }
