@@ -495,6 +495,33 @@ TEST(Experiment, GarbageChangesNoPromise) {
   EXPECT_GT(results, 0);
 }
 
+/// Two reports of a u that no actuator holds: the sums may overflow one by one, and what is
+/// accepted is numbers.
+TEST(Experiment, AbsurdReportsOfUAreNoResult) {
+  const ExperimentConfig<float> config{.sample_time = 1e-3f,
+                                       .excitation = Excitation::steps,
+                                       .amplitude = 1,
+                                       .half_period = 0.03f,
+                                       .travel = 10,
+                                       .time_limit = 100};
+  for (int first = 0; first < 120; first += 4) {
+    auto experiment = Experiment<2, float>::make(config).value();
+    Plant plant(2, 5, 0, 3, T);
+    int measured = 0;
+    while (!experiment.finished()) {
+      measured += experiment.phase() == ExperimentPhase::measuring ? 1 : 0;
+      const float held = experiment.output();
+      const bool absurd = measured == 120 + first || measured == 120 + first + 29;
+      const float u = experiment.update(static_cast<float>(plant.y()), absurd ? 1.2e38f : held);
+      plant.step(static_cast<double>(u));
+    }
+    const auto found = experiment.result();
+    if (!found) continue;
+    EXPECT_TRUE(esokit::is_finite(found->input_gain_half_width)) << first;
+    EXPECT_TRUE(esokit::is_finite(found->latency)) << first;
+  }
+}
+
 TEST(Experiment, RefusesBadSettings) {
   const auto refused = [](int order, auto change) {
     auto config = relay(order);

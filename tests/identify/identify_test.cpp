@@ -938,6 +938,15 @@ TEST(Study, RefusesBadOptions) {
     options.schedule_bins = bins;
     EXPECT_EQ(text(log), "schedule_bins: must be 2 to 20");
   }
+  options = quick();
+  options.averaged = -1;
+  EXPECT_EQ(text(log), "averaged: must be 0 (chosen), 1 or more");
+  options = quick();
+  options.sinusoids = -1;
+  EXPECT_EQ(text(log), "sinusoids: must not be negative");
+  options = quick();
+  options.rows_max = 999;
+  EXPECT_EQ(text(log), "rows_max: must be at least 1000");
   Log short_column = log;
   short_column.schedule.resize(399);
   options = quick();

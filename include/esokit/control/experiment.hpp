@@ -257,8 +257,8 @@ class Experiment {
     const Complex one{sign * first_.mean.re, sign * first_.mean.im};
     const Complex three{sign * third_.mean.re, sign * third_.mean.im};
     const S size = magnitude(one);
-    if (!is_finite(size) || !is_finite(third_.square) || !(size > S(0)))
-      return E{"input_gain", size, "is not usable"};
+    const E unusable{"input_gain", size, "is not usable"};
+    if (!is_finite(size) || !is_finite(third_.square) || !(size > S(0))) return unusable;
     // Damping (order 1) and friction (order 2) turn H_1 in one direction, and H_3 less or in the
     // other.
     const Complex lost = Order == 1 ? Complex{one.im, -one.re} : rubbed_.mean;
@@ -349,6 +349,8 @@ class Experiment {
     const S sampled = middle * turn * turn / S(8);
     found.input_gain_half_width = std::sqrt(lag_or_dead * lag_or_dead + repeat * repeat +
                                             rubbed * rubbed + sampled * sampled);
+    // Sums that only the interval has may have overflowed.
+    if (!is_finite(found.input_gain_half_width)) return unusable;
     found.least = at.size;
     found.largest = at.size * std::sqrt(S(1) + at.longest);
     found.latency = (at.dead + at.x) / frequency_;

@@ -173,7 +173,7 @@ struct Identified {
     return config;
   }
 
-  /// The dead time in samples, for DelayedInput. @param sample_time s
+  /// The dead time in samples, for DelayedInput. @param sample_time s, above 0
   [[nodiscard]] int delay(double sample_time) const {
     return static_cast<int>(std::lround(dead_time.value / sample_time));
   }
@@ -598,12 +598,21 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
              static_cast<double>(log.y.size()),
              true};
   }
-  if (options.extension < 0 || options.extension > 2) {
-    return E{"extension", static_cast<double>(options.extension), "must be 0 (chosen), 1 or 2"};
-  }
-  if (options.schedule_bins < 2 || options.schedule_bins > 20) {
-    return E{"schedule_bins", static_cast<double>(options.schedule_bins), "must be 2 to 20"};
-  }
+  Rules<double> rules;
+  const auto number = [](auto value) { return static_cast<double>(value); };
+  rules
+      .require(0 <= options.extension && options.extension <= 2, "extension",
+               number(options.extension), "must be 0 (chosen), 1 or 2")
+      .require(2 <= options.schedule_bins && options.schedule_bins <= 20, "schedule_bins",
+               number(options.schedule_bins), "must be 2 to 20")
+      .require(0 <= options.averaged, "averaged", number(options.averaged),
+               "must be 0 (chosen), 1 or more")
+      .require(0 <= options.sinusoids, "sinusoids", number(options.sinusoids),
+               "must not be negative")
+      // Twenty stretches of at least 50 rows; of fewer rows they would overlap.
+      .require(1000 <= options.rows_max, "rows_max", number(options.rows_max),
+               "must be at least 1000");
+  if (!rules) return rules.error();
   // The scheduling column is processed like the columns, as the last of them.
   const auto with_schedule = [&] {
     Log all = log;
