@@ -32,6 +32,7 @@ using esokit::LoopNumbers;
 using esokit::Lqg;
 using esokit::tune;
 using esokit::TunedDesign;
+using esokit::TuneFamily;
 using esokit::TuneModel;
 
 TuneModel plain(int order, double disturbance = 1.0) {
@@ -230,6 +231,64 @@ TEST(TuneTest, WhatIsChosenKeepsItsMargins) {
     EXPECT_GE(design.excess, design.free_excess) << design.name;
   }
   EXPECT_LE(tuning.chosen()->cost, 1.01 * tuning.designs[1].cost);
+}
+
+TEST(LoopCostTest, SamplesAreTheSumOfTheirAliases) {
+  for (int order = 1; order <= 3; ++order) {
+    TuneModel model = plain(order);
+    model.pole = 3.0;
+    model.lag = 0.0017;
+    for (const double w : {20.0, 700.0, 3000.0}) {
+      for (const double dead : {0.0, 0.00025, 0.0007}) {
+        model.dead_time = dead;
+        const auto sampled =
+            esokit::detail::sampled_plant(esokit::detail::dense_plant(model), model.sample_time);
+        const auto z1 = std::polar(1.0, w * model.sample_time) - 1.0;
+        const double size = std::abs(esokit::detail::response(sampled, z1)(0, 0));
+        const auto found = esokit::detail::aliases(model, 1.0, w, 0.0);
+        // Eleven and more times the sample rate are left out, of a response that falls by its cube.
+        EXPECT_NEAR(found.largest / size, 1.0, 1e-3) << order << ' ' << w << ' ' << dead;
+        EXPECT_GE(found.any, found.largest);
+      }
+    }
+  }
+}
+
+// A model that a log gave, next to no lag but a latency of six samples known to two: at half the
+// sample rate the plant of this dead time has a fifth of the gain that another fraction of a sample
+// gives it. The first of the designs once oscillated with the true one.
+TEST(TuneTest, MarginsHoldAtEveryLatencyOfTheInterval) {
+  TuneModel model = plain(1, 2.28);
+  model.input_gain = {61.86, 1.64};
+  model.pole = -0.184;
+  model.lag = 2e-4;
+  model.dead_time = 0.01276;
+  model.latency_half_width = 0.00409;
+  model.lag_half_width = 0.00645;
+  model.noise = 8.27e-4;
+  model.sample_time = 0.002;
+  model.u_max = 0.2016;
+  model.u_min = -0.2016;
+  const auto tuning = tune(model).value();
+  const double late = model.latency_half_width + 2.0 * model.sample_time;
+  int looked = 0;
+  for (const TunedDesign& design : tuning.designs) {
+    if (!design.feasible || (&design != tuning.chosen() && design.family != TuneFamily::half_gain))
+      continue;
+    for (double by = -model.latency_half_width; by < late; by += 0.23 * model.sample_time) {
+      for (const double lag : {model.lag, 0.005}) {
+        TuneModel plant = model;
+        plant.lag = lag;
+        plant.dead_time += model.lag - lag + by;
+        const auto loop = closed_loop(plant, design.controller).value();
+        ASSERT_TRUE(loop.stable()) << design.name << ' ' << by << ' ' << lag;
+        if (by > model.latency_half_width) continue;
+        EXPECT_GE(margins(loop).value().modulus.value, 0.499) << design.name << ' ' << by;
+        ++looked;
+      }
+    }
+  }
+  EXPECT_GE(looked, 50);
 }
 
 const TunedDesign& named(const esokit::Tuning& tuning, const std::string& name) {

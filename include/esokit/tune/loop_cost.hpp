@@ -12,6 +12,10 @@
 /// rule converges exponentially: with poles of damping 0.25 the error is 1e-6 at 20 points per
 /// decade. A loop is stable if the phase of its characteristic polynomial turns by half a turn for
 /// each state between z = 1 and z = -1.
+///
+/// A latency that is wrong by part of a sample is more than a phase: near half the sample rate a
+/// sampled plant of one dead time can have next to no gain, and that of half a sample more a lot.
+/// So margins over latencies go by the largest gain that the plant has with any dead time.
 #pragma once
 
 #include <algorithm>
@@ -133,6 +137,46 @@ class FastResponse {
   std::vector<std::complex<double>> work_;
 };
 
+/// The response of a sampled plant is a sum over the frequencies that the samples do not tell from
+/// each other. A dead time turns each of them at its own rate.
+struct Aliases {
+  std::complex<double> direction;  ///< of the response at the frequency itself, magnitude one
+  double largest = 0.0;            ///< magnitude of the sum, over the dead times of a range
+  double any = 0.0;                ///< over all dead times
+};
+
+/// @param gain factor on b0 @param range by how much the dead time may differ either way, s
+inline Aliases aliases(const TuneModel& model, double gain, double w, double range) {
+  using Complex = std::complex<double>;
+  const double T = model.sample_time;
+  const Complex held = 1.0 - std::polar(1.0, -w * T);
+  constexpr int most = 10;
+  Complex parts[2 * most + 1];
+  Aliases found;
+  for (int k = -most; k <= most; ++k) {
+    const Complex s(0.0, w + 2.0 * std::numbers::pi * k / T);
+    Complex part = gain * model.input_gain.value * held /
+                   (s * T * (s + model.pole) * (1.0 + model.lag * s) * (1.0 + model.sensor * s));
+    for (int i = 1; i < model.order; ++i) part /= s;
+    part *= std::exp(-s * model.dead_time);
+    parts[k + most] = part;
+    found.any += std::abs(part);
+  }
+  found.direction = parts[most] / std::abs(parts[most]);
+  found.largest = found.any;
+  if (range < 0.5 * T) {
+    found.largest = 0.0;
+    for (const double share : {-1.0, -0.5, 0.0, 0.5, 1.0}) {
+      Complex sum = 0.0;
+      for (int k = -most; k <= most; ++k) {
+        sum += parts[k + most] * std::polar(1.0, -2.0 * std::numbers::pi * k * share * range / T);
+      }
+      found.largest = std::max(found.largest, std::abs(sum));
+    }
+  }
+  return found;
+}
+
 }  // namespace detail
 
 /// The plant and its disturbances, prepared for evaluating any controller.
@@ -145,7 +189,8 @@ class LoopCost {
   LoopCost(const TuneModel& model, const TuneRules& rules, double slowest, double points = 20.0)
       : T_(model.sample_time), b0_(model.input_gain.value), factor_(rules.gain_factor) {
     std::vector<detail::SampledPlant> others;
-    for (const auto& variant : detail::plant_variants(model)) {
+    const auto variants = detail::plant_variants(model);
+    for (const auto& variant : variants) {
       others.push_back(detail::sampled_plant(detail::dense_plant(variant.model, variant.gain),
                                              model.sample_time));
     }
@@ -154,6 +199,13 @@ class LoopCost {
         detail::sampled_plant(detail::dense_plant(model), model.sample_time);
     const auto poles = detail::poles_of(plant.a);
     plant_states_ = plant.a.rows();
+    // By how much latencies may differ from the middle one, which is less than the largest by that.
+    range_ = 0.5 * (model.latency_half_width +
+                    std::min(model.latency_half_width, model.lag + model.dead_time));
+    const auto middle = [&](TuneModel other, double late) {
+      other.dead_time += late - range_;
+      return other;
+    };
     const auto add = [&](double w, double density, double load) {
       // z - 1 as 2 j sin(wT/2) e^(j wT/2), which does not cancel for small angles.
       const double half = 0.5 * w * T_;
@@ -163,8 +215,12 @@ class LoopCost {
       p.value = value;
       p.plant = detail::response(plant, value)(0, 0);
       p.load = detail::response(plant, value, true)(0, 0);
+      p.aliases[0] = detail::aliases(middle(model, model.latency_half_width), 1.0, w, range_);
+      p.turned = std::polar(1.0, std::min(w * range_, std::numbers::pi));
       for (std::size_t v = 0; v < variants_; ++v) {
         p.ratio[v] = detail::response(others[v], value)(0, 0) / p.plant;
+        p.aliases[v + 1] =
+            detail::aliases(middle(variants[v].model, 0.0), variants[v].gain, w, range_);
       }
       p.turn = 1.0;
       for (const Complex& pole : poles) {
@@ -201,12 +257,7 @@ class LoopCost {
     double output = 0.0, control = 0.0, noise = 0.0;
     Complex before[3];
     double turned[3] = {};
-    // The last values for each plant.
-    struct Trail {
-      double square[2];
-      Complex loop;
-    };
-    Trail trails[most_variants + 1] = {};
+    Trail trails[most_variants + 1];
     for (std::size_t i = 0; i < points_.size(); ++i) {
       const Point& p = points_[i];
       const auto c = response.at(p.value);
@@ -237,9 +288,10 @@ class LoopCost {
           numbers.tolerance = std::min(numbers.tolerance, std::max(-real, -1.0 / real));
         }
       }
-      margins(numbers, trails[0].square, trails[0].loop, loop, i);
+      const double size = std::sqrt(std::norm(c.gain));
+      margins(numbers, trails[0], loop, p.aliases[0], c.gain, size, i);
       for (std::size_t v = 0; v < variants_; ++v) {
-        margins(numbers, trails[v + 1].square, trails[v + 1].loop, p.ratio[v] * loop, i);
+        margins(numbers, trails[v + 1], p.ratio[v] * loop, p.aliases[v + 1], c.gain, size, i);
       }
     }
     const double whole = std::numbers::pi * (plant_states_ + controller.states());
@@ -247,6 +299,9 @@ class LoopCost {
     for (std::size_t g = 0; g < 3; ++g) stable[g] = std::abs(turned[g] - whole) < 1.0;
     numbers.stable = stable[0] && is_finite(output) && is_finite(control);
     numbers.tolerant = stable[1] && stable[2];
+    for (const Trail& trail : trails) {
+      numbers.modulus = std::min(numbers.modulus, std::sqrt(trail.least));
+    }
     numbers.output = std::sqrt(output);
     numbers.control = std::sqrt(control);
     numbers.control_noise = std::sqrt(noise);
@@ -259,39 +314,73 @@ class LoopCost {
   struct Point {
     double frequency;
     Complex value, plant, load, turn;
-    Complex ratio[most_variants];  ///< ratio of the other plants to this one
+    Complex ratio[most_variants];                ///< ratio of the other plants to this one
+    Complex turned;                              ///< by the range of latencies, half a turn at most
+    detail::Aliases aliases[most_variants + 1];  ///< of all plants at the middle latency
     double noise_power, load_power;
   };
 
-  void margins(LoopNumbers& numbers, double (&square)[2], Complex& last, Complex loop,
-               std::size_t i) const {
-    const double now = std::norm(1.0 + loop);
-    double least = now;
-    // A parabola through three points of which the middle one is smallest.
-    if (i >= 2 && square[1] <= square[0] && square[1] <= now) {
-      const double bend = square[0] - 2.0 * square[1] + now;
-      const double slope = 0.5 * (now - square[0]);
-      least = bend > 0.0 ? std::max(square[1] - 0.5 * slope * slope / bend, 0.0) : square[1];
+  /// The last values for each plant, and the least so far.
+  struct Trail {
+    double least = std::numeric_limits<double>::infinity();  ///< abs(1 + L)^2
+    double square[2] = {};
+    Complex loop{}, largest{};
+  };
+
+  /// @param gain of the controller @param size its magnitude
+  void margins(LoopNumbers& numbers, Trail& trail, Complex loop, const detail::Aliases& aliases,
+               Complex gain, double size, std::size_t i) const {
+    const Point& p = points_[i];
+    const Complex direction = -aliases.direction * gain;
+    double now = std::norm(1.0 + loop);
+    // Where L is large nothing is near to -1, and that is half of all frequencies.
+    if (now < 16.0) {
+      if (range_ > 0.0) {
+        // As near to -1 as a latency of the range turns it.
+        const double toward = -direction.real(), across = std::abs(direction.imag());
+        const double nearest = toward >= size * p.turned.real()
+                                   ? size
+                                   : toward * p.turned.real() + across * p.turned.imag();
+        const double whole = aliases.largest * size;
+        now = std::min(now, 1.0 + whole * whole - 2.0 * aliases.largest * nearest);
+      }
+      double least = now;
+      // A parabola through three points of which the middle one is smallest.
+      if (i >= 2 && trail.square[1] <= trail.square[0] && trail.square[1] <= now) {
+        const double bend = trail.square[0] - 2.0 * trail.square[1] + now;
+        const double slope = 0.5 * (now - trail.square[0]);
+        least = bend > 0.0 ? std::max(trail.square[1] - 0.5 * slope * slope / bend, 0.0)
+                           : trail.square[1];
+      }
+      trail.least = std::min(trail.least, least);
     }
-    numbers.modulus = std::min(numbers.modulus, std::sqrt(least));
+    // The largest latency is the middle one and the range.
+    const auto delay = [&](Complex there, double w) {
+      numbers.delay = std::min(numbers.delay, detail::lag_to_minus_one(there) / w - range_);
+    };
+    const Complex largest = aliases.any * direction;
+    const double b = std::norm(largest);
     if (i > 0) {
-      const double a = std::norm(last), b = std::norm(loop);
+      const double a = std::norm(trail.largest);
       if ((a < 1.0) != (b < 1.0)) {
         const double share = std::log(a) / std::log(a / b);
         const double w =
-            std::pow(points_[i - 1].frequency, 1.0 - share) * std::pow(points_[i].frequency, share);
-        const Complex there = last * std::polar(1.0, share * std::arg(loop * std::conj(last)));
-        numbers.delay = std::min(numbers.delay, detail::lag_to_minus_one(there) / w);
+            std::pow(points_[i - 1].frequency, 1.0 - share) * std::pow(p.frequency, share);
+        delay(trail.largest * std::polar(1.0, share * std::arg(largest * std::conj(trail.largest))),
+              w);
       }
     }
-    square[0] = square[1];
-    square[1] = now;
-    last = loop;
+    if (i + 1 == walked_ && b >= 1.0) delay(largest, p.frequency);
+    trail.square[0] = trail.square[1];
+    trail.square[1] = now;
+    trail.loop = loop;
+    trail.largest = largest;
   }
 
   double T_;
   double b0_;
   double factor_;
+  double range_ = 0.0;  ///< of latencies, either way from the middle one, s
   std::size_t variants_ = 0;
   int plant_states_ = 0;
   std::size_t walked_ = 0;
