@@ -181,6 +181,16 @@ TEST(GuardedModel, EveryGuardWithALagOfSecondOrder) {
       });
 }
 
+/// y' = d + b v, tau v' = u - v, in steps that are exact.
+struct LagPlant {
+  double y = 0, v = 0, d = 0, tau = 0.05;
+  void step(double u, double b) {
+    const double left = std::exp(-T / tau);
+    y += T * (d + b * u) + b * (v - u) * tau * (1 - left);
+    v = u + (v - u) * left;
+  }
+};
+
 // ---- idle
 
 template <class Observer>
@@ -284,6 +294,47 @@ TYPED_TEST(GuardedModelObserver, ComesBack) {
     ASSERT_NEAR(static_cast<double>(guarded.total_disturbance()), 0,
                 tolerance * std::pow(30, O::order))
         << seed;
+  }
+}
+
+/// A loop after garbage, pins, holds and any b0: back at its reference.
+TEST(GuardedModel, LoopComesBack) {
+  using Loop = Adrc<Guarded<ModelEso<lag>>>;
+  for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(long_run(20)); ++seed) {
+    Random random(seed);
+    Loop::Config config{.controller_bandwidth = 6, .limits = {.lower = -2, .upper = 2}};
+    config.observer = {.observer = lagging(),
+                       .disturbance_bound = random.index(2) * 3.0,
+                       .unit = static_cast<DisturbanceUnit>(random.index(2)),
+                       .release_samples = random.index(20)};
+    auto loop = Loop::make(config).value();
+    LagPlant plant{.d = random.uniform(-1, 1)};
+    const double r = random.uniform(-2, 2);
+    double u = 0;
+    for (int k = 0; k < 300; ++k) {
+      plant.step(u, b0);
+      const double y = random.index(4) == 0 ? anything<double>(random) : plant.y;
+      if (random.index(6) == 0) loop.observer().set_pin(static_cast<Pin>(random.index(4)));
+      if (random.index(6) == 0) loop.observer().set_trust(anything<double>(random));
+      if (random.index(6) == 0) (void)loop.set_input_gain(anything<double>(random));
+      u = random.index(6) == 0   ? loop.hold(y, r, random.uniform(-2, 2))
+          : random.index(6) == 0 ? loop.track(y, r, anything<double>(random))
+                                 : loop.update(y, r);
+      u = std::clamp(u, -2.0, 2.0);
+      ASSERT_TRUE(is_finite(u)) << seed;
+    }
+    loop.observer().set_trust(1);
+    loop.observer().set_pin(Pin::free);
+    ASSERT_TRUE(loop.set_input_gain(b0).has_value());
+    // u of 1e300 leaves the lag's estimate after 3,500 samples, in which u is at its limit; the
+    // plant needs as many to come back, and as a load may stand against it, several times that.
+    for (int k = 0; k < 30000; ++k) {
+      plant.step(u, b0);
+      u = loop.update(plant.y, r);
+      ASSERT_LE(std::abs(u), 2);
+    }
+    EXPECT_NEAR(plant.y, r, 1e-9) << seed;
+    EXPECT_NEAR(disturbance_parts(loop).constant, plant.d, 1e-8) << seed;
   }
 }
 
@@ -392,16 +443,6 @@ TEST(GuardedModel, PoleSetCorrectsTheActuatorToo) {
 }
 
 // ---- b0 of the actuator's output
-
-/// y' = d + b v, tau v' = u - v, in steps that are exact.
-struct LagPlant {
-  double y = 0, v = 0, d = 0, tau = 0.05;
-  void step(double u, double b) {
-    const double left = std::exp(-T / tau);
-    y += T * (d + b * u) + b * (v - u) * tau * (1 - left);
-    v = u + (v - u) * left;
-  }
-};
 
 /// Nothing of y, d and v moves in the estimate while b0 jumps by any factor: there is no
 /// innovation. dhat and the state of the plant do not jump; what b0 multiplies does.

@@ -7,6 +7,7 @@
 #include <complex>
 #include <cstddef>
 #include <cstdio>
+#include <esokit/adapter/guarded.hpp>
 #include <esokit/analysis/delay_margin.hpp>
 #include <esokit/analysis/margins.hpp>
 #include <esokit/analysis/worst_case.hpp>
@@ -348,6 +349,18 @@ TEST(Margins, GainThatVariesArbitrarilyFast) {
   const double factor = gain_variation(plant, controller).value().value;
   EXPECT_LT(factor, 2.094);
   EXPECT_LT(gain_variation(with_lag(plant, 0.2).value(), controller).value().value, factor);
+  // numpy, a lag of 20 ms in the model, guarded, T = 1 ms: the certificate of a b0 that is wrong by
+  // a factor that changes as it likes.
+  using Lagging = Adrc<Guarded<ModelEso<ModelParts{.order = 1, .actuator = 1}>>>;
+  const auto motor = with_lag(LinearPlant<1>::chain({.input_gain = 600}).value(), 0.02).value();
+  for (const auto& [ratio, wanted] : {std::pair{2.0, 2.391735}, {4.0, 2.749543}, {8.0, 3.425557}}) {
+    Lagging::Config config{.controller_bandwidth = 150 / ratio};
+    config.observer.observer = {.observer_bandwidth = 150,
+                                .input_gain = 600,
+                                .sample_time = 1e-3,
+                                .model = {.actuator = {0.02}}};
+    EXPECT_NEAR(gain_variation(motor, Lagging::make(config).value()).value().value, wanted, 2e-5);
+  }
   const auto size_after = [&](double most) {
     double worst = 0.0;
     for (int trial = 0; trial < 200; ++trial) {

@@ -674,14 +674,33 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
         if (!has(status, StepStatus::measurement_rejected | StepStatus::outlier_rejected)) {
           for (auto& level : detail::GuardAccess::states(observer_)) {
             const S d = constant_.of(level);
-            constant_.replace(level, d, S(d - leak_ * d));
+            put(level, d, S(d - leak_ * d));
           }
         }
         if (release_left_ > 0 && --release_left_ == 0) set_weights();
       }
     }
+    if constexpr (!on_chain) {
+      // A refused measurement changes nothing, not even by rounding.
+      if (has(status, StepStatus::measurement_rejected | StepStatus::outlier_rejected)) return;
+    }
     if (beyond_bound()) [[unlikely]]
       keep_bound();
+  }
+
+  /// Puts `value` in the place of the constant `now`; where the states of a model are so large that
+  /// the sum would not be finite, they stay.
+  template <class State>
+  ESOKIT_INLINE void put(State& state, const S& now, const S& value) const noexcept {
+    if constexpr (on_chain) {
+      constant_.replace(state, now, value);
+    } else {
+      State next = state;
+      constant_.replace(next, now, value);
+      if (is_finite(detail::GuardAccess::innermost(observer_).model().finite_probe(next))) {
+        state = next;
+      }
+    }
   }
 
   /// Takes back the part of the correction that does not count.
@@ -691,8 +710,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
       auto& state = std::get<level>(states);
       const S d = constant_.of(state);
       const S moved = d - std::get<level>(before);
-      constant_.replace(
-          state, d,
+      put(state, d,
           S(std::get<level>(before) + (moved > S(0) ? weight_up_ : weight_down_) * moved));
     });
   }
@@ -766,7 +784,10 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     if constexpr (!on_chain) {
       auto& x = detail::GuardAccess::states(observer_)[0];
       const S d = constant_.of(x);
-      if (detail::absolute(d) > most) constant_.replace(x, d, d > S(0) ? most : S(-most));
+      // Not for its rounding: what has been put to the bound stays as it is.
+      if (detail::absolute(d) - most > constant_.rounding_of(x)) {
+        put(x, d, d > S(0) ? most : S(-most));
+      }
       return;
     }
     S below{};
