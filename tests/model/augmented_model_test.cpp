@@ -2,6 +2,7 @@
 // asked for, equal to the chain where it is one, and refused where its numbers make no sense.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <complex>
 #include <esokit/control/adrc.hpp>
@@ -82,6 +83,16 @@ double sampling_error(const Settings<parts>& settings, double time) {
     if (largest > 0) worst = std::max(worst, static_cast<double>(Big(error / largest)));
   }
   return worst;
+}
+
+// The poles of a swing go where they are asked to, or to its own frequency.
+TEST(Resonance, PolesGoToTheCaptureBandwidth) {
+  const std::array<esokit::Resonance<double>, 2> swings{{{50.0, 0.0, 5.0}, {80.0, 0.1, 0.0}}};
+  const auto pairs = esokit::detail::own_pairs(swings);
+  EXPECT_EQ(pairs[0][0], -5.0);
+  EXPECT_EQ(pairs[0][1], 50.0);
+  EXPECT_EQ(pairs[1][0], -80.0);
+  EXPECT_EQ(pairs[1][1], 80.0);
 }
 
 // 1e-13 is asked for; squaring a norm of 1e4 fourteen times doubles the rounding as often.
