@@ -290,7 +290,7 @@ Design Design::make(const Settings& settings, const Input&, const Findings& find
           ". Noise causes a standard deviation of u of " + percent(taken.control_noise / range) +
           " of its range.",
       "The modulus margin is " + number_text(taken.modulus_margin, 2) + ", the delay margin " +
-          number_text(1e3 * taken.delay_margin, 3) + " ms. Deviations of y and u are " +
+          duration_text(taken.delay_margin) + ". Deviations of y and u are " +
           number_text(taken.excess, 3) +
           " times those of the best linear controller, which keeps no margins."};
   if (!settings.limits) {

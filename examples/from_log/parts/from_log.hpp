@@ -10,6 +10,7 @@
 
 #include <esokit/identify/identify.hpp>
 
+#include "common/csv.hpp"
 #include "common/figure.hpp"
 #include "common/log_file.hpp"
 
@@ -90,5 +91,17 @@ struct Findings {
 
 /// Identifies, and sounds the alarms.
 [[nodiscard]] Findings examine(const Settings& settings, const Input& input);
+
+/// The unit for a time of this size: units in a second, and its name.
+inline std::pair<double, const char*> unit_of(double seconds) {
+  if (seconds < 1) return {1e3, "ms"};
+  return {1, "s"};
+}
+
+/// A time in words, three digits of it.
+inline std::string duration_text(double seconds) {
+  const auto [per_second, unit] = unit_of(seconds);
+  return esokit::examples::number_text(per_second * seconds, 3) + " " + unit;
+}
 
 }  // namespace from_log

@@ -164,11 +164,12 @@ std::vector<CsvRow> model_table(const Findings& findings) {
   rows.push_back({"b0", with_interval(found.input_gain), "[" + highest + "] / [u]",
                   "input gain: what one unit of u adds to " + highest});
   if (found.plateau.middle == 0) return rows;
-  rows.push_back(
-      {"lag", with_interval(found.lag, 1e3), "ms", "time constant of the actuator, first order"});
-  rows.push_back({"dead time", with_interval(found.dead_time, 1e3), "ms",
+  const auto [per_second, unit] = unit_of(found.latency.value);
+  rows.push_back({"lag", with_interval(found.lag, per_second), unit,
+                  "time constant of the actuator, first order"});
+  rows.push_back({"dead time", with_interval(found.dead_time, per_second), unit,
                   "from a change of u to its first effect"});
-  rows.push_back({"lag and dead time", with_interval(found.latency, 1e3), "ms",
+  rows.push_back({"lag and dead time", with_interval(found.latency, per_second), unit,
                   "the sum is more accurate than its parts"});
   rows.push_back({"pole", with_interval(found.pole), "1/s", "rate at which free motion decays"});
   rows.push_back(
@@ -207,7 +208,8 @@ std::vector<CsvRow> log_table(const Input& input, const Findings& findings) {
        input.merged ? "u and y have their own time stamps: a row for each y, u averaged in between"
                     : ""});
   if (input.cut) rows.push_back({"last line", "incomplete", "left out"});
-  rows.push_back({"sample time", number_text(1e3 * log.sample_time, 5) + " ms",
+  const auto [per_second, unit] = unit_of(log.sample_time);
+  rows.push_back({"sample time", number_text(per_second * log.sample_time, 5) + " " + unit,
                   "jitter " + number_text(1e3 * log.jitter, 3) + " ms"});
   rows.push_back({"duration", number_text(log.duration, 5) + " s",
                   std::to_string(log.pieces) + (log.pieces == 1 ? " piece" : " pieces")});
@@ -237,8 +239,8 @@ std::vector<std::string> in_short(const Findings& findings, const Design& design
     all.push_back("The machine is of order " + std::to_string(found.order) +
                   ", b0 = " + number_text(found.input_gain.value, 4) + " ± " +
                   number_text(found.input_gain.half_width, 2) + ", lag and dead time " +
-                  number_text(1e3 * found.latency.value, 3) + " ms; sampled every " +
-                  number_text(1e3 * found.log.sample_time, 4) + " ms.");
+                  duration_text(found.latency.value) + "; sampled every " +
+                  duration_text(found.log.sample_time) + ".");
   }
   const auto more = design.summary();
   all.insert(all.end(), more.begin(), more.end());

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cmath>
+#include <concepts>
 #include <cstdint>
 #include <esokit/control/limiter.hpp>
 #include <esokit/core/unroll.hpp>
@@ -123,8 +124,8 @@ template <>
 inline constexpr bool has_text<LoopMode> = true;
 
 /// Writes the name of the mode.
-template <class Stream>
-requires detail::WritesText<Stream> Stream& operator<<(Stream& out, LoopMode mode) {
+template <class Stream, std::same_as<LoopMode> Value>
+requires detail::WritesText<Stream> Stream& operator<<(Stream& out, Value mode) {
   constexpr const char* names[] = {"running", "start_hold", "safe"};
   out << names[static_cast<int>(mode)];
   return out;

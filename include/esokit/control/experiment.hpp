@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cmath>
+#include <concepts>
 #include <cstdint>
 #include <esokit/control/limiter.hpp>
 #include <esokit/core/check.hpp>
@@ -59,8 +60,8 @@ template <>
 inline constexpr bool has_text<ExperimentPhase> = true;
 
 /// Writes the name of the phase.
-template <class Stream>
-requires detail::WritesText<Stream> Stream& operator<<(Stream& out, ExperimentPhase phase) {
+template <class Stream, std::same_as<ExperimentPhase> Value>
+requires detail::WritesText<Stream> Stream& operator<<(Stream& out, Value phase) {
   constexpr const char* names[] = {"rest", "settling", "measuring", "hand_over", "done", "aborted"};
   out << names[static_cast<int>(phase)];
   return out;
@@ -80,8 +81,8 @@ template <>
 inline constexpr bool has_text<AbortReason> = true;
 
 /// Writes the reason.
-template <class Stream>
-requires detail::WritesText<Stream> Stream& operator<<(Stream& out, AbortReason reason) {
+template <class Stream, std::same_as<AbortReason> Value>
+requires detail::WritesText<Stream> Stream& operator<<(Stream& out, Value reason) {
   constexpr const char* names[] = {"none", "travel", "time_limit", "bad_sample", "stopped"};
   out << names[static_cast<int>(reason)];
   return out;

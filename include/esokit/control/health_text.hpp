@@ -2,6 +2,7 @@
 /// A diagnosis as text, and telemetry as rows of a table, for the host.
 #pragma once
 
+#include <concepts>
 #include <esokit/control/health.hpp>
 #include <esokit/control/telemetry.hpp>
 #include <esokit/core/text.hpp>
@@ -59,8 +60,8 @@ template <>
 inline constexpr bool has_text<LoopFault> = true;
 
 /// Writes both sentences of the advice.
-template <class Stream>
-requires detail::WritesText<Stream> Stream& operator<<(Stream& out, LoopFault fault) {
+template <class Stream, std::same_as<LoopFault> Value>
+requires detail::WritesText<Stream> Stream& operator<<(Stream& out, Value fault) {
   const Advice words = advice(fault);
   out << words.wrong << ' ' << words.doing;
   return out;

@@ -16,6 +16,8 @@ inline constexpr bool has_text = false;
 namespace detail {
 
 /// A stream, or a logger of the user; types of esokit with text are excluded.
+/// A << of ours that asks this takes its value by a deduced type: for a named one GCC 11 asks here
+/// what it is just asking.
 template <class Stream, class... Values>
 concept WritesText = std::is_class_v<Stream> && !has_text<Stream> &&
                      requires(Stream & out, const char* text, const Values&... values) {

@@ -2,6 +2,7 @@
 /// What a step of an observer reports.
 #pragma once
 
+#include <concepts>
 #include <esokit/core/lanes.hpp>
 #include <esokit/core/text.hpp>
 
@@ -76,8 +77,8 @@ template <>
 inline constexpr bool has_text<StepStatus> = true;
 
 /// Writes all flags that are set, for example `measurement_rejected|gap_bridged`, or `ok`.
-template <class Stream>
-requires detail::WritesText<Stream> Stream& operator<<(Stream& out, StepStatus status) {
+template <class Stream, std::same_as<StepStatus> Value>
+requires detail::WritesText<Stream> Stream& operator<<(Stream& out, Value status) {
   constexpr const char* names[] = {"measurement_rejected", "input_rejected", "prediction_dropped",
                                    "gap_bridged",          "restarted",      "state_rejected",
                                    "outlier_rejected",     "turn_assumed"};
