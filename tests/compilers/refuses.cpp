@@ -1,10 +1,13 @@
-// Bad numbers are refused by what any compiler makes of the check, also at -O3 -ffast-math: a plain
-// program, as GoogleTest is not there for every standard library. Returns 0 when it passes.
+// Bad numbers are refused by what any compiler makes of the check, also at -O3 -ffast-math, and
+// results have text: a plain program, as GoogleTest is not there for every standard library.
+// Returns 0 when it passes.
 #include <cstdio>
 #include <esokit/control/adrc.hpp>
+#include <esokit/control/health_text.hpp>
 #include <esokit/core/pack.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <sstream>
 
 #include "support/numbers.hpp"
 
@@ -67,6 +70,14 @@ void rejects_a_lane() {
   expect(status[1] == StepStatus::ok, "the good lane of a pack");
 }
 
+void writes_text() {
+  std::ostringstream out;
+  out << StepStatus::ok << LoopMode::safe << LoopFault::wrong_sign;
+  write_header<1>(out);
+  write_row(out, Telemetry<1, float>{});
+  expect(out.str().starts_with("oksafe"), "results have text");
+}
+
 }  // namespace
 
 int main() {
@@ -74,5 +85,6 @@ int main() {
   rejects_all<double>();
   rejects_all<long double>();
   rejects_a_lane();
+  writes_text();
   return failures;
 }
