@@ -17,7 +17,7 @@
 #include <support/refusal.hpp>
 
 namespace esokit_test {
-namespace {
+namespace adapter_decorators_test {
 
 using esokit::LinearEso;
 using esokit::StepStatus;
@@ -522,5 +522,5 @@ TEST(WrappedOutput, ComesBackFromASpeedBeyondTheScalar) {
   EXPECT_NEAR(cascade.estimate()(1), 0, 1e-9);
 }
 
-}  // namespace
+}  // namespace adapter_decorators_test
 }  // namespace esokit_test

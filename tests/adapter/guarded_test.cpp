@@ -30,7 +30,7 @@
 #include <support/refusal.hpp>
 
 namespace esokit_test {
-namespace {
+namespace adapter_guarded_test {
 
 using namespace esokit;
 
@@ -685,5 +685,5 @@ TEST(GivenInputGain, DhatKeepsItsUnit) {
   }
 }
 
-}  // namespace
+}  // namespace adapter_guarded_test
 }  // namespace esokit_test

@@ -22,7 +22,7 @@
 #include <support/refusal.hpp>
 
 namespace esokit_test {
-namespace {
+namespace adapter_outlier_gate_test {
 
 using namespace esokit;
 
@@ -346,5 +346,5 @@ TEST(OutlierGate, InAdrc) {
 static_assert(LoopObserver<WrappedOutput<OutlierGate<LinearEso<2, float>>>>);
 static_assert(sizeof(OutlierGate<LinearEso<2, float>>) == sizeof(LinearEso<2, float>) + 20);
 
-}  // namespace
+}  // namespace adapter_outlier_gate_test
 }  // namespace esokit_test

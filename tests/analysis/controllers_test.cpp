@@ -26,7 +26,7 @@
 
 #include "support/numbers.hpp"
 
-namespace {
+namespace analysis_controllers_test {
 
 using namespace esokit;
 using esokit_test::Random;
@@ -465,4 +465,4 @@ static_assert(!AnalysedController<int>);
 // A filter form knows neither T nor b0.
 static_assert(!AnalysedController<DualFeedbackAdrc<2>>);
 
-}  // namespace
+}  // namespace analysis_controllers_test

@@ -18,7 +18,7 @@
 
 #include "support/numbers.hpp"
 
-namespace {
+namespace analysis_covariance_test {
 
 using namespace esokit;
 using esokit_test::Random;
@@ -368,4 +368,4 @@ TEST(Covariance, WhatDoesNotExistIsAnError) {
             "measurement: must be finite and not negative");
 }
 
-}  // namespace
+}  // namespace analysis_covariance_test

@@ -13,7 +13,7 @@
 
 #include "support/numbers.hpp"
 
-namespace {
+namespace analysis_dense_test {
 
 using esokit_test::refusal;
 
@@ -185,4 +185,4 @@ TEST(Lyapunov, SolvesBothEquations) {
             "system: is not stable: the stationary covariance does not exist");
 }
 
-}  // namespace
+}  // namespace analysis_dense_test

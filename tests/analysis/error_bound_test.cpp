@@ -21,7 +21,7 @@
 
 #include "support/numbers.hpp"
 
-namespace {
+namespace analysis_error_bound_test {
 
 using namespace esokit;
 using esokit_test::Random;
@@ -494,4 +494,4 @@ TEST(ErrorBound, RefusesBadSettings) {
   EXPECT_EQ(some.convergence_time(EigenMatrix<double, 3>::Zero()).value(), 0.0);
 }
 
-}  // namespace
+}  // namespace analysis_error_bound_test

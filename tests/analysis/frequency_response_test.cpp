@@ -17,7 +17,7 @@
 
 #include "support/reference_observer.hpp"
 
-namespace {
+namespace analysis_frequency_response_test {
 
 using namespace esokit;
 using Complex = std::complex<double>;
@@ -290,4 +290,4 @@ TEST(ObserverSystem, NamesAndFloat) {
   EXPECT_GT(std::abs(a(2, 0) - b(2, 0)), 0.0);
 }
 
-}  // namespace
+}  // namespace analysis_frequency_response_test

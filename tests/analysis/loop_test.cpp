@@ -18,7 +18,7 @@
 
 #include "support/numbers.hpp"
 
-namespace {
+namespace analysis_loop_test {
 
 using esokit_test::Random;
 using esokit_test::refusal;
@@ -568,4 +568,4 @@ TEST(LoopResponse, RefusesByRule) {
             "sample_time: must be finite and positive");
 }
 
-}  // namespace
+}  // namespace analysis_loop_test

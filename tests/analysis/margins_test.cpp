@@ -24,7 +24,7 @@
 #include "support/numbers.hpp"
 #include "support/reference_observer.hpp"
 
-namespace {
+namespace analysis_margins_test {
 
 using namespace esokit;
 using Complex = std::complex<double>;
@@ -718,4 +718,4 @@ TEST(Margins, OfAnUnstableLoopAreAnError) {
   EXPECT_EQ(refusal(sensitivity_peak(loop)), rule);
 }
 
-}  // namespace
+}  // namespace analysis_margins_test

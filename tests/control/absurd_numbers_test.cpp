@@ -21,7 +21,7 @@
 #include <support/refusal.hpp>
 
 namespace esokit_test {
-namespace {
+namespace control_absurd_numbers_test {
 
 using esokit::Adrc;
 using esokit::CascadeEso;
@@ -340,5 +340,5 @@ TEST(AbsurdSettings, PidOfAnAdrcIsFinite) {
   EXPECT_TRUE(pid_from_adrc<2>(esokit::AdrcTuning<float>{1e-3f, 100, 1000}).has_value());
 }
 
-}  // namespace
+}  // namespace control_absurd_numbers_test
 }  // namespace esokit_test

@@ -9,7 +9,7 @@
 #include <support/numbers.hpp>
 #include <support/refusal.hpp>
 
-namespace {
+namespace control_adrc_law_test {
 
 using esokit::AdrcLaw;
 using esokit::Array;
@@ -190,4 +190,4 @@ TEST(AdrcLaw, ChangeOfInputGainDoesNotJump) {
   }
 }
 
-}  // namespace
+}  // namespace control_adrc_law_test

@@ -18,7 +18,7 @@
 #include "loop_traits.hpp"
 
 namespace esokit_test {
-namespace {
+namespace control_adrc_test {
 
 using esokit::EigenMatrix;
 using esokit::LinearEso;
@@ -664,5 +664,5 @@ TEST(Adrc, CostsNothingThatIsNotAskedFor) {
             sizeof(Adrc<esokit::DelayedInput<LinearEso<2, float>, 4>>));
 }
 
-}  // namespace
+}  // namespace control_adrc_test
 }  // namespace esokit_test

@@ -15,7 +15,7 @@
 #include <utility>
 
 namespace esokit_test {
-namespace {
+namespace control_algebraic_filter_test {
 
 using esokit::AlgebraicFilter;
 
@@ -427,5 +427,5 @@ TEST(AlgebraicFilter, RefusesBadConfigByName) {
   }
 }
 
-}  // namespace
+}  // namespace control_algebraic_filter_test
 }  // namespace esokit_test

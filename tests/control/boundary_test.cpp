@@ -15,7 +15,7 @@
 #include <support/refusal.hpp>
 
 namespace esokit_test {
-namespace {
+namespace control_boundary_test {
 
 using esokit::Adrc;
 using esokit::LinearEso;
@@ -115,5 +115,5 @@ TEST(Boundary, StartVariance) {
   EXPECT_EQ(with(0), "accepted");
 }
 
-}  // namespace
+}  // namespace control_boundary_test
 }  // namespace esokit_test

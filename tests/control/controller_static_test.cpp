@@ -11,7 +11,7 @@
 #include <esokit/core/pack.hpp>
 #include <esokit/observer/linear_eso.hpp>
 
-namespace {
+namespace control_controller_static_test {
 
 using namespace esokit;
 using Eso = LinearEso<2>;
@@ -122,4 +122,4 @@ TEST(Controller, KnowsItsSampleTime) {
   EXPECT_EQ(MimoAdrc<Eso>::make(one)->sample_time(), 3e-3);
 }
 
-}  // namespace
+}  // namespace control_controller_static_test

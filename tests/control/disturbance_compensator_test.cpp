@@ -13,7 +13,7 @@
 #include "loop_traits.hpp"
 
 namespace esokit_test {
-namespace {
+namespace control_disturbance_compensator_test {
 
 using esokit::DisturbanceCompensator;
 using esokit::LinearEso;
@@ -176,5 +176,5 @@ TEST(DisturbanceCompensator, LimitsMissingAndErrors) {
   EXPECT_EQ(refusal(Compensator::make(settings)), "limits.rate: must be finite and positive");
 }
 
-}  // namespace
+}  // namespace control_disturbance_compensator_test
 }  // namespace esokit_test

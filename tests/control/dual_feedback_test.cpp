@@ -14,7 +14,7 @@
 #include "loop_traits.hpp"
 
 namespace esokit_test {
-namespace {
+namespace control_dual_feedback_test {
 
 using esokit::DeltaOperator;
 using esokit::DualFeedbackAdrc;
@@ -303,5 +303,5 @@ TEST(DualFeedback, NoAllocationAndNamedErrors) {
             "limits.lower: must be below limits.upper");
 }
 
-}  // namespace
+}  // namespace control_dual_feedback_test
 }  // namespace esokit_test

@@ -17,7 +17,7 @@
 #include <vector>
 
 namespace esokit_test {
-namespace {
+namespace control_experiment_test {
 
 using esokit::AbortReason;
 using esokit::Excitation;
@@ -618,5 +618,5 @@ TEST(Experiment, HandsOverWithoutABump) {
   EXPECT_GT(std::abs(started.update(y, 0.0) - asked), 2 * share);
 }
 
-}  // namespace
+}  // namespace control_experiment_test
 }  // namespace esokit_test

@@ -41,10 +41,10 @@ template class RiccatiGain<3, double>;
 
 }  // namespace esokit
 
-namespace {
+namespace control_explicit_instantiation_static_test {
 
 TEST(ExplicitInstantiation, Links) {
   EXPECT_FALSE(esokit::Adrc<esokit::LinearEso<2>>::make({}).has_value());
 }
 
-}  // namespace
+}  // namespace control_explicit_instantiation_static_test

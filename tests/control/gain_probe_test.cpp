@@ -13,7 +13,7 @@
 #include <support/refusal.hpp>
 
 namespace esokit_test {
-namespace {
+namespace control_gain_probe_test {
 
 using namespace esokit;
 
@@ -208,5 +208,5 @@ TEST(GainProbe, Refusals) {
   }
 }
 
-}  // namespace
+}  // namespace control_gain_probe_test
 }  // namespace esokit_test

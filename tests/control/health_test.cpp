@@ -18,7 +18,7 @@
 #include <support/refusal.hpp>
 
 namespace esokit_test {
-namespace {
+namespace control_health_test {
 
 using namespace esokit;
 
@@ -361,5 +361,5 @@ TEST(Telemetry, IsATableThatIdentifyReads) {
   EXPECT_EQ(std::count(text.begin(), text.end(), ','), 13);
 }
 
-}  // namespace
+}  // namespace control_health_test
 }  // namespace esokit_test

@@ -31,7 +31,7 @@
 #include <vector>
 
 namespace esokit_test {
-namespace {
+namespace control_lane_by_lane_test {
 
 using esokit::lane_count;
 using esokit::LinearEso;
@@ -493,5 +493,5 @@ TEST(LaneByLane, NamesTheLaneOfAnError) {
   EXPECT_TRUE(lane_equals(varied.step_time(), step[0].step_time(), 0));
 }
 
-}  // namespace
+}  // namespace control_lane_by_lane_test
 }  // namespace esokit_test

@@ -21,7 +21,7 @@
 #include "loop_traits.hpp"
 
 namespace esokit_test {
-namespace {
+namespace control_mimo_adrc_test {
 
 using esokit::EigenMatrix;
 using esokit::LinearEso;
@@ -352,5 +352,5 @@ TEST(MimoAdrc, BadConfigIsRefusedByName) {
             "limits.lower[1]: must be below limits.upper");
 }
 
-}  // namespace
+}  // namespace control_mimo_adrc_test
 }  // namespace esokit_test

@@ -14,7 +14,7 @@
 #include "loop_traits.hpp"
 
 namespace esokit_test {
-namespace {
+namespace control_missing_samples_test {
 
 using esokit::LinearEso;
 using esokit::VariableTime;
@@ -147,5 +147,5 @@ TEST(MissingSamples, CostOfFaults) {
   EXPECT_LT(all, 2 * clean);
 }
 
-}  // namespace
+}  // namespace control_missing_samples_test
 }  // namespace esokit_test

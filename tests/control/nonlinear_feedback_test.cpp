@@ -10,7 +10,7 @@
 #include <support/refusal.hpp>
 
 namespace esokit_test {
-namespace {
+namespace control_nonlinear_feedback_test {
 
 using esokit::EigenMatrix;
 using esokit::NonlinearFeedback;
@@ -107,5 +107,5 @@ TEST(NonlinearFeedback, RefusesByName) {
             "gains[0]: must be finite and not negative");
 }
 
-}  // namespace
+}  // namespace control_nonlinear_feedback_test
 }  // namespace esokit_test

@@ -12,7 +12,7 @@
 #include <vector>
 
 namespace esokit_test {
-namespace {
+namespace control_pack_test {
 
 using esokit::lane_count;
 using esokit::LaneScalar;
@@ -298,5 +298,5 @@ TEST(PackOfAnAdrcLaw, NamesTheLaneOfAnError) {
   EXPECT_STREQ(refused.error().field, "input_gain");
 }
 
-}  // namespace
+}  // namespace control_pack_test
 }  // namespace esokit_test

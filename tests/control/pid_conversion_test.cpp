@@ -10,7 +10,7 @@
 #include <limits>
 #include <support/refusal.hpp>
 
-namespace {
+namespace control_pid_conversion_test {
 
 using esokit_test::refusal;
 
@@ -136,4 +136,4 @@ TEST(PidConversion, RefusedByName) {
             "observer_bandwidth: must be finite and positive");
 }
 
-}  // namespace
+}  // namespace control_pid_conversion_test

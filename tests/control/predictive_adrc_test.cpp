@@ -23,7 +23,7 @@
 #include <support/refusal.hpp>
 #include <vector>
 
-namespace esokit_test {
+namespace esokit_test::control_predictive_adrc_test {
 
 using esokit::PredictiveAdrc;
 using esokit::StepStatus;
@@ -675,4 +675,4 @@ TEST(PredictiveAdrc, allocates_nothing) {
   EXPECT_TRUE(std::isfinite(sink));
 }
 
-}  // namespace esokit_test
+}  // namespace esokit_test::control_predictive_adrc_test

@@ -19,7 +19,7 @@
 #include <support/numbers.hpp>
 
 namespace esokit_test {
-namespace {
+namespace control_reconvergence_test {
 
 using namespace esokit;
 
@@ -118,5 +118,5 @@ TYPED_TEST(LoopReconvergence, BackAtTheReference) {
   }
 }
 
-}  // namespace
+}  // namespace control_reconvergence_test
 }  // namespace esokit_test

@@ -19,7 +19,7 @@
 #include <support/numbers.hpp>
 
 namespace esokit_test {
-namespace {
+namespace control_retune_test {
 
 using esokit::Adrc;
 using esokit::Check;
@@ -174,5 +174,5 @@ TEST(Retune, AdoptsWhatAnotherContextMade) {
                                observed<Filter>);
 }
 
-}  // namespace
+}  // namespace control_retune_test
 }  // namespace esokit_test

@@ -10,7 +10,7 @@
 #include <support/refusal.hpp>
 
 namespace esokit_test {
-namespace {
+namespace control_tracking_differentiator_test {
 
 using esokit::SignTrackingDifferentiator;
 using esokit::TrackingDifferentiator;
@@ -193,5 +193,5 @@ TEST(TrackingDifferentiator, RefusesByName) {
   EXPECT_TRUE(SignTrackingDifferentiator<>::make({.acceleration = 1}).has_value());
 }
 
-}  // namespace
+}  // namespace control_tracking_differentiator_test
 }  // namespace esokit_test

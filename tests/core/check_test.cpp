@@ -10,7 +10,7 @@
 
 #include "../support/pack.hpp"
 
-namespace {
+namespace core_check_test {
 
 using esokit::Check;
 using esokit::Error;
@@ -200,4 +200,4 @@ TEST(RulesDeathTest, ErrorOfKeptRulesEndsTheProgram) {
   EXPECT_DEATH(static_cast<void>(Rules<double>{}.positive("a", 1.0).error()), "");
 }
 
-}  // namespace
+}  // namespace core_check_test

@@ -9,7 +9,7 @@
 #include <type_traits>
 #include <vector>
 
-namespace {
+namespace core_expected_test {
 
 using esokit::Error;
 using esokit::Expected;
@@ -154,4 +154,4 @@ TEST(Expected, ValueOfATemporaryOutlivesIt) {
   static_assert(std::is_same_v<decltype(make().value()), std::vector<int>>);
 }
 
-}  // namespace
+}  // namespace core_expected_test

@@ -6,7 +6,7 @@
 #include <optional>
 #include <tuple>
 
-namespace {
+namespace core_lanes_test {
 
 using esokit::Lanes;
 using esokit::LaneScalar;
@@ -125,4 +125,4 @@ TYPED_TEST(PerLaneOf, IsEqualIfEveryLaneIs) {
   }
 }
 
-}  // namespace
+}  // namespace core_lanes_test

@@ -12,7 +12,7 @@
 #include <support/pack.hpp>
 #include <type_traits>
 
-namespace {
+namespace core_matrix_test {
 
 using esokit::eigen;
 using esokit::Matrix;
@@ -226,4 +226,4 @@ TEST(Matrix, OfAnObserverWithEigen) {
   EXPECT_EQ((eigen(observer.estimate()) - z).norm(), 0);
 }
 
-}  // namespace
+}  // namespace core_matrix_test

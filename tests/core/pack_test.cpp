@@ -7,7 +7,7 @@
 #include <support/numbers.hpp>
 
 namespace esokit_test {
-namespace {
+namespace core_pack_test {
 
 using esokit::lane_count;
 using esokit::LaneScalar;
@@ -163,5 +163,5 @@ TYPED_TEST(PackOf, IsMadeOfAnArray) {
   }
 }
 
-}  // namespace
+}  // namespace core_pack_test
 }  // namespace esokit_test

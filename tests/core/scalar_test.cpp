@@ -9,7 +9,7 @@
 #include <support/numbers.hpp>
 #include <support/pack.hpp>
 
-namespace {
+namespace core_scalar_test {
 
 using esokit::is_finite;
 using esokit::PlainScalar;
@@ -66,10 +66,10 @@ struct WithoutNumbers : Undeclared {
   using Undeclared::Undeclared;
 };
 
-}  // namespace
+}  // namespace core_scalar_test
 template <>
-inline constexpr int esokit::lane_count<WithoutNumbers> = 2;
-namespace {
+inline constexpr int esokit::lane_count<core_scalar_test::WithoutNumbers> = 2;
+namespace core_scalar_test {
 
 static_assert(!Scalar<Undeclared>, "a scalar whose comparison is a mask has to declare its lanes");
 static_assert(!Scalar<WithoutNumbers>, "and to give the number of each");
@@ -108,4 +108,4 @@ TEST(IsFiniteAtCompileTime, Works) {
   static_assert(esokit::all(true) && !esokit::all(false));
 }
 
-}  // namespace
+}  // namespace core_scalar_test

@@ -35,7 +35,7 @@
 #include <tuple>
 #include <vector>
 
-namespace {
+namespace core_snapshot_test {
 
 using namespace esokit;
 
@@ -288,4 +288,4 @@ TEST(Snapshot, TextHasTheWords) {
   EXPECT_EQ(at, std::string::npos);
 }
 
-}  // namespace
+}  // namespace core_snapshot_test

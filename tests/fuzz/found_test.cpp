@@ -18,7 +18,7 @@
 #include <string>
 #include <support/refusal.hpp>
 
-namespace {
+namespace fuzz_found_test {
 
 using esokit::has;
 using esokit::LinearEso;
@@ -312,4 +312,4 @@ TEST(Found, ErrorBoundsAreNumbers) {
             rule);
 }
 
-}  // namespace
+}  // namespace fuzz_found_test

@@ -13,7 +13,7 @@
 #include <vector>
 
 namespace esokit_test {
-namespace {
+namespace gain_algebraic_gain_test {
 
 using esokit::AlgebraicGain;
 
@@ -305,5 +305,5 @@ TEST(AlgebraicGain, GapGainBelongsToThePresentBandwidth) {
   EXPECT_NEAR(first[2], 0.5 / 4, 1e-15);
 }
 
-}  // namespace
+}  // namespace gain_algebraic_gain_test
 }  // namespace esokit_test

@@ -6,7 +6,7 @@
 #include <esokit/gain/placement.hpp>
 #include <esokit/gain/pole_set.hpp>
 
-namespace {
+namespace gain_continuous_gain_test {
 
 using esokit::Array;
 using esokit::continuous_gain;
@@ -41,4 +41,4 @@ TEST(ContinuousGain, EqualPolesEqualTheBandwidth) {
   EXPECT_TRUE(eigen(a).isApprox(eigen(b), 1e-15));
 }
 
-}  // namespace
+}  // namespace gain_continuous_gain_test

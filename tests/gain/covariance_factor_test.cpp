@@ -9,7 +9,7 @@
 #include <limits>
 #include <support/numbers.hpp>
 
-namespace esokit_test {
+namespace esokit_test::gain_covariance_factor_test {
 
 using esokit::CovarianceFactor;
 
@@ -242,4 +242,4 @@ TEST(CovarianceFactor, a_million_steps_in_float) {
   }
 }
 
-}  // namespace esokit_test
+}  // namespace esokit_test::gain_covariance_factor_test

@@ -9,7 +9,7 @@
 #include <limits>
 #include <support/refusal.hpp>
 
-namespace {
+namespace gain_feedback_gain_test {
 
 using esokit_test::refusal;
 
@@ -134,4 +134,4 @@ TEST(FeedbackGain, RefusesBadBandwidths) {
   EXPECT_FALSE((esokit::feedback_gain<4, float>({1e12f, TimeDomain::continuous, false}, 0.1f)));
 }
 
-}  // namespace
+}  // namespace gain_feedback_gain_test

@@ -8,7 +8,7 @@
 #include <support/switching.hpp>
 
 namespace esokit_test {
-namespace {
+namespace gain_gain_interval_test {
 
 using esokit::constant_gain_interval;
 using esokit::EqualSampledPoles;
@@ -191,5 +191,5 @@ TEST(CertifiedGain, CertifiedPairDecays) {
   }
 }
 
-}  // namespace
+}  // namespace gain_gain_interval_test
 }  // namespace esokit_test

@@ -8,7 +8,7 @@
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
 
-namespace {
+namespace gain_gain_law_static_test {
 
 using esokit::ContinuousGainLaw;
 using esokit::ContinuousGainLawTraits;
@@ -411,4 +411,4 @@ TYPED_TEST(Kind, Runs) {
   EXPECT_EQ(observer.template estimate<0>(), 3);
 }
 
-}  // namespace
+}  // namespace gain_gain_law_static_test

@@ -9,7 +9,7 @@
 #include <support/numbers.hpp>
 #include <support/refusal.hpp>
 
-namespace {
+namespace gain_gain_law_test {
 
 using esokit::Array;
 using esokit::ChainConfig;
@@ -443,4 +443,4 @@ TEST(ContinuousGainLaw, ModeChangesAtStepBoundariesAlone) {
   EXPECT_EQ(observer.derivative(0.0, z, 3.0, 0.0), (EigenMatrix<double, 4>(60, 300, 1, 0.5)));
 }
 
-}  // namespace
+}  // namespace gain_gain_law_test

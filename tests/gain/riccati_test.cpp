@@ -11,7 +11,7 @@
 #include <support/high_precision.hpp>
 #include <support/numbers.hpp>
 
-namespace esokit_test {
+namespace esokit_test::gain_riccati_test {
 
 using esokit::CovarianceFactor;
 using esokit::steady_covariance;
@@ -276,4 +276,4 @@ TEST(Riccati, general_model_solves_the_equation) {
   EXPECT_LE(eigen(next - *p).cwiseAbs().maxCoeff(), 1e-12 * eigen(*p).cwiseAbs().maxCoeff());
 }
 
-}  // namespace esokit_test
+}  // namespace esokit_test::gain_riccati_test

@@ -20,7 +20,7 @@
 // The references compute in long double on purpose; the library above is still checked.
 #pragma GCC diagnostic ignored "-Wdouble-promotion"
 
-namespace {
+namespace gain_sampled_gain_test {
 
 using esokit::Array;
 using esokit::current_gain;
@@ -338,4 +338,4 @@ TEST(SampledGain, IsAvailableAtCompileTime) {
   static_assert(l[0] == 1.0f && l[1] == 0.25f);
 }
 
-}  // namespace
+}  // namespace gain_sampled_gain_test

@@ -12,7 +12,7 @@
 #include <support/switching.hpp>
 
 namespace esokit_test {
-namespace {
+namespace gain_switching_certificate_test {
 
 using esokit::Array;
 using esokit::certified_ratio_limit;
@@ -344,5 +344,5 @@ TEST(SwitchingCertificate, CertifiedPairDecaysUnderRandomAndWorstSwitching) {
   }
 }
 
-}  // namespace
+}  // namespace gain_switching_certificate_test
 }  // namespace esokit_test

@@ -8,7 +8,7 @@
 #include <esokit/identify/fit.hpp>
 #include <vector>
 
-namespace {
+namespace identify_fit_test {
 
 using esokit::Fit;
 using esokit::FitBounds;
@@ -218,4 +218,4 @@ TEST(InnovationsFit, KeepsItsParametersWithinBounds) {
   EXPECT_LE(found.at.latency, 0.05);
 }
 
-}  // namespace
+}  // namespace identify_fit_test

@@ -18,7 +18,7 @@
 #include <utility>
 #include <vector>
 
-namespace {
+namespace identify_identify_test {
 
 using esokit::Identified;
 using esokit::IdentifyOptions;
@@ -953,4 +953,4 @@ TEST(Study, RefusesBadOptions) {
   EXPECT_EQ(text(short_column), "schedule: must have as many rows as y, or none:");
 }
 
-}  // namespace
+}  // namespace identify_identify_test

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <esokit/math/combinatorics.hpp>
 
-namespace {
+namespace math_combinatorics_test {
 
 using namespace esokit;
 
@@ -65,4 +65,4 @@ TEST(Combinatorics, SumsOverRows) {
   }
 }
 
-}  // namespace
+}  // namespace math_combinatorics_test

@@ -40,7 +40,7 @@ inline Number select(bool condition, Number a, Number b) { return condition ? a 
 }  // namespace counted
 
 namespace esokit_test {
-namespace {
+namespace math_fal_test {
 
 double printed_fal(double e, double a, double delta) {
   if (std::abs(e) <= delta) return e / std::pow(delta, 1 - a);
@@ -94,5 +94,5 @@ TEST(Power, NoPowForPlainExponents) {
   }
 }
 
-}  // namespace
+}  // namespace math_fal_test
 }  // namespace esokit_test

@@ -9,7 +9,7 @@
 #include <vector>
 
 namespace esokit_test {
-namespace {
+namespace math_positivity_test {
 
 using esokit::positive_on_half_line;
 
@@ -127,5 +127,5 @@ TEST(ErrorPolynomial, BilinearMapOfEqualPoles) {
   bilinear_of_equal_poles<8>();
 }
 
-}  // namespace
+}  // namespace math_positivity_test
 }  // namespace esokit_test

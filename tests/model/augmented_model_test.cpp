@@ -13,7 +13,7 @@
 #include <support/augmented_reference.hpp>
 #include <support/refusal.hpp>
 
-namespace {
+namespace model_augmented_model_test {
 
 using esokit::AugmentedModel;
 using esokit::LinearEso;
@@ -631,4 +631,4 @@ TEST(AugmentedModel, RefusesASwingAboveWhatTheBandwidthCanPlace) {
             "observer_bandwidth: gives poles that the scalar cannot place for this model");
 }
 
-}  // namespace
+}  // namespace model_augmented_model_test

@@ -12,7 +12,7 @@
 // The references compute in long double on purpose; the library above is still checked.
 #pragma GCC diagnostic ignored "-Wdouble-promotion"
 
-namespace {
+namespace model_integrator_chain_test {
 
 using esokit::EigenMatrix;
 using esokit::IntegratorChain;
@@ -190,4 +190,4 @@ TEST(ScaledChain, SurvivesSmallSampleTimesInFloat) {
   EXPECT_NEAR(Chain::physical(x, 1e4f)(8), 3.0f, 1e-5f);
 }
 
-}  // namespace
+}  // namespace model_integrator_chain_test

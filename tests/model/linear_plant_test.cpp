@@ -10,7 +10,7 @@
 #include <string>
 #include <support/refusal.hpp>
 
-namespace {
+namespace model_linear_plant_test {
 
 using namespace esokit;
 using esokit_test::refusal;
@@ -256,4 +256,4 @@ TEST(LinearPlant, RefusesByFieldAndRule) {
             "duration: is so long that the plant's states leave the range of the scalar");
 }
 
-}  // namespace
+}  // namespace model_linear_plant_test

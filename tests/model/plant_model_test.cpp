@@ -13,7 +13,7 @@
 
 #include <support/refusal.hpp>
 
-namespace {
+namespace model_plant_model_test {
 
 using esokit::LinearEso;
 using esokit::LinearPlant;
@@ -387,4 +387,4 @@ TEST(LinearPlantModel, RefusesPartsThatMakeNoSense) {
   EXPECT_EQ(changed([](auto& s) { s.plant.a(1, 1) = std::nan(""); }), "a[4]: must be finite");
 }
 
-}  // namespace
+}  // namespace model_plant_model_test

@@ -16,7 +16,7 @@
 #include <support/refusal.hpp>
 
 namespace esokit_test {
-namespace {
+namespace observer_absurd_numbers_test {
 
 using esokit::CascadeEso;
 using esokit::ExtendedStateFilter;
@@ -363,5 +363,5 @@ TEST(Update, OfPacksIsFiniteAtAnyRate) {
   EXPECT_GT(refused, 20);
 }
 
-}  // namespace
+}  // namespace observer_absurd_numbers_test
 }  // namespace esokit_test

@@ -11,7 +11,7 @@
 #include <support/refusal.hpp>
 
 namespace esokit_test {
-namespace {
+namespace observer_adjustable_bandwidth_eso_test {
 
 using esokit::AdjustableBandwidthEso;
 using esokit::ContinuousAdjustableBandwidthEso;
@@ -358,5 +358,5 @@ TEST(ContinuousAdjustableBandwidthEso, SwitchesAtStepBoundaries) {
   EXPECT_NEAR(bandwidth(1), 10, 1e-12);
 }
 
-}  // namespace
+}  // namespace observer_adjustable_bandwidth_eso_test
 }  // namespace esokit_test

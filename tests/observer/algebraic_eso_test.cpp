@@ -20,7 +20,7 @@
 #include <vector>
 
 namespace esokit_test {
-namespace {
+namespace observer_algebraic_eso_test {
 
 using esokit::AlgebraicEso;
 using esokit::has;
@@ -965,5 +965,5 @@ TEST(AlgebraicEso, PublishesTheRestartOfASettledObserver) {
   EXPECT_EQ(eso.estimate()(0), 0.5);
 }
 
-}  // namespace
+}  // namespace observer_algebraic_eso_test
 }  // namespace esokit_test

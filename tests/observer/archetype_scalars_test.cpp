@@ -8,7 +8,7 @@
 #include <support/dual.hpp>
 #include <support/numbers.hpp>
 
-namespace {
+namespace observer_archetype_scalars_test {
 
 using esokit::CascadeEso;
 using esokit::LinearEso;
@@ -96,4 +96,4 @@ TEST(Dual, BadDerivativeIsABadMeasurement) {
   EXPECT_TRUE(std::isfinite(eso.estimate()(1).derivative));
 }
 
-}  // namespace
+}  // namespace observer_archetype_scalars_test

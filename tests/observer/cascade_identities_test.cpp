@@ -12,7 +12,7 @@
 #include <support/numbers.hpp>
 #include <vector>
 
-namespace {
+namespace observer_cascade_identities_test {
 
 using esokit::Array;
 using esokit::CascadeEso;
@@ -357,4 +357,4 @@ TEST(LinearEso, ErrorObeysThePolesThatWereAskedFor) {
   EXPECT_GT(std::abs(e[0]), 0.1);
 }
 
-}  // namespace
+}  // namespace observer_cascade_identities_test

@@ -23,7 +23,7 @@
 #include <support/numbers.hpp>
 
 namespace esokit_test {
-namespace {
+namespace observer_concepts_static_test {
 
 using esokit::Adrc;
 using esokit::Check;
@@ -858,5 +858,5 @@ TEST(SampledLinearObserver, IsAnalysed) {
   EXPECT_EQ(esokit::error_system(gains).d, esokit::error_system(truth).d);
 }
 
-}  // namespace
+}  // namespace observer_concepts_static_test
 }  // namespace esokit_test

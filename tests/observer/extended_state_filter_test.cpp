@@ -15,7 +15,7 @@
 #include <support/refusal.hpp>
 #include <type_traits>
 
-namespace esokit_test {
+namespace esokit_test::observer_extended_state_filter_test {
 
 using esokit::ExtendedStateFilter;
 using esokit::InflationRule;
@@ -1046,4 +1046,4 @@ TEST(ExtendedStateFilter, model_costs_nothing_when_absent) {
   static_assert(sizeof(Filter) <= 70 * sizeof(double));
 }
 
-}  // namespace esokit_test
+}  // namespace esokit_test::observer_extended_state_filter_test

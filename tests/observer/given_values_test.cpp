@@ -20,7 +20,7 @@
 #include <support/friction.hpp>
 #include <support/numbers.hpp>
 
-namespace {
+namespace observer_given_values_test {
 
 using esokit::chain_config;
 using esokit_test::Random;
@@ -121,4 +121,4 @@ TEST(GivenValues, OfTheLaws) {
   laws_give_back<float>();
 }
 
-}  // namespace
+}  // namespace observer_given_values_test

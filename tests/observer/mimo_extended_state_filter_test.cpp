@@ -12,7 +12,7 @@
 #include <support/numbers.hpp>
 #include <support/refusal.hpp>
 
-namespace esokit_test {
+namespace esokit_test::observer_mimo_extended_state_filter_test {
 
 using esokit::ChainOrders;
 using esokit::ExtendedStateFilter;
@@ -667,4 +667,4 @@ TEST(MimoExtendedStateFilter, many_steps_in_float) {
   }
 }
 
-}  // namespace esokit_test
+}  // namespace esokit_test::observer_mimo_extended_state_filter_test

@@ -17,7 +17,7 @@
 #include <support/numbers.hpp>
 #include <support/refusal.hpp>
 
-namespace {
+namespace observer_model_cascade_test {
 
 using esokit::AugmentedModel;
 using esokit::ModelParts;
@@ -475,4 +475,4 @@ TEST(ModelCascade, AnAngleWithKnownPolesAndASensorIsWrapped) {
   }
 }
 
-}  // namespace
+}  // namespace observer_model_cascade_test

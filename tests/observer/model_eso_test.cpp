@@ -27,7 +27,7 @@
 #include <support/numbers.hpp>
 #include <support/refusal.hpp>
 
-namespace {
+namespace observer_model_eso_test {
 
 using esokit::Adrc;
 using esokit::AugmentedModel;
@@ -707,4 +707,4 @@ TEST(ModelSnapshots, KnowWhichModel) {
             (esokit::type_tag<AugmentedModel<both_parts, double>>));
 }
 
-}  // namespace
+}  // namespace observer_model_eso_test

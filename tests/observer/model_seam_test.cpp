@@ -21,7 +21,7 @@
 #include <support/refusal.hpp>
 #include <support/resonator_model.hpp>
 
-namespace {
+namespace observer_model_seam_test {
 
 using esokit::Adrc;
 using esokit::CascadeEso;
@@ -758,4 +758,4 @@ TEST(ResonatorModel, AnalysisIsThatOfTheDenseSystem) {
   }
 }
 
-}  // namespace
+}  // namespace observer_model_seam_test

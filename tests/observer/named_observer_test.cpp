@@ -8,7 +8,7 @@
 #include <limits>
 #include <support/refusal.hpp>
 
-namespace {
+namespace observer_named_observer_test {
 
 using esokit::ContinuousObserver;
 using esokit::Error;
@@ -114,4 +114,4 @@ TEST(NamedObserver, TakesTheLawsOfAllLevels) {
   EXPECT_DOUBLE_EQ(rate(5), -1000);
 }
 
-}  // namespace
+}  // namespace observer_named_observer_test

@@ -13,7 +13,7 @@
 #include <support/refusal.hpp>
 
 namespace esokit_test {
-namespace {
+namespace observer_nonlinear_eso_test {
 
 using esokit::ContinuousNonlinearEso;
 using esokit::FalGain;
@@ -557,5 +557,5 @@ TEST(NonlinearEso, RefusesByName) {
   EXPECT_EQ(fal({.linear_width = 0}), "shape.linear_width: must be finite and positive");
 }
 
-}  // namespace
+}  // namespace observer_nonlinear_eso_test
 }  // namespace esokit_test

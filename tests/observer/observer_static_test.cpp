@@ -7,7 +7,7 @@
 #include <support/pack.hpp>
 #include <type_traits>
 
-namespace {
+namespace observer_observer_static_test {
 
 using esokit::CascadeEso;
 using esokit::LinearEso;
@@ -90,4 +90,4 @@ TEST(StepStatus, FlagsDoNotOverlap) {
   }
 }
 
-}  // namespace
+}  // namespace observer_observer_static_test

@@ -19,7 +19,7 @@
 #include <vector>
 
 namespace esokit_test {
-namespace {
+namespace observer_pack_test {
 
 using esokit::lane_count;
 using esokit::LaneScalar;
@@ -503,5 +503,5 @@ TEST(Pack, TakesNoSettingsThatALaneCannotTake) {
   }
 }
 
-}  // namespace
+}  // namespace observer_pack_test
 }  // namespace esokit_test

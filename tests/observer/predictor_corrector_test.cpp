@@ -12,7 +12,7 @@
 // The references compute in long double on purpose; the library above is still checked.
 #pragma GCC diagnostic ignored "-Wdouble-promotion"
 
-namespace {
+namespace observer_predictor_corrector_test {
 
 using esokit::CascadeEso;
 using esokit::LinearEso;
@@ -215,4 +215,4 @@ TEST(CorrectionGain, IsTheGainForTheGap) {
   EXPECT_EQ(observer.gain_law().gain(0.0), observer.level_gain(0));
 }
 
-}  // namespace
+}  // namespace observer_predictor_corrector_test

@@ -15,7 +15,7 @@
 // The references compute in long double on purpose; the library above is still checked.
 #pragma GCC diagnostic ignored "-Wdouble-promotion"
 
-namespace {
+namespace observer_random_config_test {
 
 using esokit::CascadeEso;
 using esokit::has;
@@ -345,4 +345,4 @@ TEST(RandomConfigLinear, RecoversFromAnyInput) {
   }
 }
 
-}  // namespace
+}  // namespace observer_random_config_test

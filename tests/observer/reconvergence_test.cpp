@@ -20,7 +20,7 @@
 #include <support/numbers.hpp>
 
 namespace esokit_test {
-namespace {
+namespace observer_reconvergence_test {
 
 using namespace esokit;
 
@@ -303,5 +303,5 @@ TYPED_TEST(Reconvergence, AfterAnyGarbage) {
   }
 }
 
-}  // namespace
+}  // namespace observer_reconvergence_test
 }  // namespace esokit_test

@@ -16,7 +16,7 @@
 #include <type_traits>
 #include <vector>
 
-namespace {
+namespace observer_refused_config_test {
 
 using esokit::CascadeEso;
 using esokit::ContinuousCascadeEso;
@@ -365,4 +365,4 @@ TEST(RefusedText, SaysFieldValueAndRule) {
   EXPECT_EQ(to_text(gap.error()).substr(0, 12), "max_gap = 0:");
 }
 
-}  // namespace
+}  // namespace observer_refused_config_test

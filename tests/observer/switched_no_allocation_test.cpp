@@ -9,7 +9,7 @@
 
 namespace esokit_test {
 
-namespace {
+namespace observer_switched_no_allocation_test {
 
 TEST(NoAllocation, CountsWhatEigenAllocates) {
   const NoAllocation guard;
@@ -41,5 +41,5 @@ TEST(SwitchedObservers, MakeAllocatesNothing) {
   EXPECT_EQ(count, 0);
 }
 
-}  // namespace
+}  // namespace observer_switched_no_allocation_test
 }  // namespace esokit_test

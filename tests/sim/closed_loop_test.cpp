@@ -16,7 +16,7 @@
 #include <unsupported/Eigen/MatrixFunctions>
 #include <vector>
 
-namespace {
+namespace sim_closed_loop_test {
 
 using namespace esokit;
 using namespace esokit::sim;
@@ -480,4 +480,4 @@ static_assert(MeasurementMap<MeasuredOutput, double> && !MeasurementMap<Constant
 static_assert(ControlFunction<decltype(error_law), double, EigenMatrix<double, 3>>);
 static_assert(!ControlFunction<decltype(sine_reference), double, EigenMatrix<double, 3>>);
 
-}  // namespace
+}  // namespace sim_closed_loop_test

@@ -9,7 +9,7 @@
 #include <limits>
 #include <vector>
 
-namespace {
+namespace sim_counted_gaussian_test {
 
 using esokit::lane_count;
 using esokit::LaneScalar;
@@ -170,4 +170,4 @@ TYPED_TEST(CountedLanes, AreTheRunsThatTheyStandFor) {
   }
 }
 
-}  // namespace
+}  // namespace sim_counted_gaussian_test

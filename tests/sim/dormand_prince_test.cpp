@@ -13,7 +13,7 @@
 #include <support/refusal.hpp>
 #include <vector>
 
-namespace {
+namespace sim_dormand_prince_test {
 
 using namespace esokit;
 using namespace esokit::sim;
@@ -363,4 +363,4 @@ TEST(VariableStep, Float) {
   EXPECT_NEAR(x[0], std::exp(-1.0F), 2e-4F);
 }
 
-}  // namespace
+}  // namespace sim_dormand_prince_test

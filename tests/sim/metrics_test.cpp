@@ -7,7 +7,7 @@
 #include <numbers>
 #include <vector>
 
-namespace {
+namespace sim_metrics_test {
 
 using namespace esokit::sim;
 
@@ -210,4 +210,4 @@ TEST(Metrics, WorkInFloat) {
   EXPECT_FLOAT_EQ(*step_response(e, {}).value().rise_time(), 0.4F);
 }
 
-}  // namespace
+}  // namespace sim_metrics_test

@@ -17,7 +17,7 @@
 #include <type_traits>
 #include <vector>
 
-namespace {
+namespace sim_monte_carlo_test {
 
 using namespace esokit;
 using esokit_test::refusal;
@@ -430,4 +430,4 @@ TEST(MonteCarlo, TakesNonlinearPlantsInPacks) {
   EXPECT_EQ(lanes, 1);
 }
 
-}  // namespace
+}  // namespace sim_monte_carlo_test

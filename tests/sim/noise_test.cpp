@@ -6,7 +6,7 @@
 #include <esokit/sim/noise.hpp>
 #include <vector>
 
-namespace {
+namespace sim_noise_test {
 
 using namespace esokit::sim;
 
@@ -135,4 +135,4 @@ TEST(Noise, HoldOfOneStepAndRoundedRatios) {
   }
 }
 
-}  // namespace
+}  // namespace sim_noise_test

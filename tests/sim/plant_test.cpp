@@ -6,7 +6,7 @@
 #include <esokit/sim/plant.hpp>
 #include <esokit/sim/runge_kutta.hpp>
 
-namespace {
+namespace sim_plant_test {
 
 using namespace esokit;
 using namespace esokit::sim;
@@ -77,4 +77,4 @@ TEST(Plant, DisturbanceMayBeALambda) {
   EXPECT_NEAR(run(plant, State(1.0), 1.0, 2.0)[0], 5.0, 1e-12);
 }
 
-}  // namespace
+}  // namespace sim_plant_test

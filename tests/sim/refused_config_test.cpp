@@ -10,7 +10,7 @@
 #include <support/refusal.hpp>
 #include <vector>
 
-namespace {
+namespace sim_refused_config_test {
 
 using namespace esokit;
 using namespace esokit::sim;
@@ -142,4 +142,4 @@ TEST(RefusedConfig, StepResponse) {
   EXPECT_EQ(refusal(step_response(series, {.band = -1.0})), "band: must be finite and positive");
 }
 
-}  // namespace
+}  // namespace sim_refused_config_test

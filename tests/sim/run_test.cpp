@@ -22,7 +22,7 @@
 #include <support/refusal.hpp>
 #include <vector>
 
-namespace {
+namespace sim_run_test {
 
 using namespace esokit;
 using esokit_test::refusal;
@@ -590,4 +590,4 @@ TEST(Run, RefusesBadSettings) {
             "sample_time: is so long that the plant's states leave the range of the scalar");
 }
 
-}  // namespace
+}  // namespace sim_run_test

@@ -8,7 +8,7 @@
 #include <esokit/eigen.hpp>
 #include <esokit/sim/runge_kutta.hpp>
 
-namespace {
+namespace sim_runge_kutta_test {
 
 using namespace esokit;
 using namespace esokit::sim;
@@ -205,4 +205,4 @@ TEST(RungeKutta, DynamicStates) {
   EXPECT_NEAR((end - std::exp(-1.0) * start).norm(), 0.0, 1e-9);
 }
 
-}  // namespace
+}  // namespace sim_runge_kutta_test

@@ -11,7 +11,7 @@
 #include <esokit/sim/runge_kutta.hpp>
 #include <esokit/sim/signals.hpp>
 
-namespace {
+namespace sim_signals_test {
 
 using namespace esokit;
 using namespace esokit::sim;
@@ -174,4 +174,4 @@ TEST(Signals, AreConstantExpressionsWhereTheyCanBe) {
   static_assert(s(2.0F) == 1.0F && s(0.5F) == 0.0F);
 }
 
-}  // namespace
+}  // namespace sim_signals_test

@@ -23,7 +23,7 @@
 #include <type_traits>
 #include <vector>
 
-namespace {
+namespace tune_tune_test {
 
 using esokit::DynamicMatrix;
 using esokit::LinearController;
@@ -605,4 +605,4 @@ TEST(TuneModelTest, RefusesWhatIsTooFarApart) {
   }
 }
 
-}  // namespace
+}  // namespace tune_tune_test
