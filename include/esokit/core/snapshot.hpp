@@ -14,12 +14,6 @@
 #include <esokit/core/version.hpp>
 #include <type_traits>
 
-#ifdef __has_builtin
-#if __has_builtin(__builtin_clear_padding)
-#define ESOKIT_CLEARS_PADDING 1
-#endif
-#endif
-
 namespace esokit {
 
 /// Settings and state of a T: the memory of a T, then a checksum. Valid only for the same version
@@ -48,18 +42,14 @@ constexpr std::uint32_t checksum(const Snapshot<T>& words) noexcept {
 
 }  // namespace detail
 
-/// Settings and state of `object`. `snapshot_text` of core/snapshot_text.hpp prints it. With GCC
-/// equal objects give equal words; other compilers may leave anything in the bytes between members.
+/// Settings and state of `object`. `snapshot_text` of core/snapshot_text.hpp prints it.
+/// The bytes between members may hold anything, so equal objects may give different words.
 template <class T>
 [[nodiscard]] Snapshot<T> snapshot(const T& object) noexcept {
   Snapshot<T> words{};
-#ifdef ESOKIT_CLEARS_PADDING
-  T copy = object;
-  __builtin_clear_padding(&copy);
-#else
-  const T& copy = object;
-#endif
-  std::memcpy(words.data(), &copy, sizeof(T));  // no bit_cast: T may have padding
+  // No bit_cast, as T may have padding. And no __builtin_clear_padding: that of GCC 12 also clears
+  // half of a number beside an empty member (a ModelEso came back with another gain).
+  std::memcpy(words.data(), &object, sizeof(T));
   words.back() = detail::checksum<T>(words);
   return words;
 }
