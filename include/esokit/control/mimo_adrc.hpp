@@ -124,8 +124,10 @@ class MimoAdrc {
   /// For a plant that is held by something else: the observers follow y, every dhat is kept, u is
   /// the caller's; see Guarded. On release begin with the reference at y.
   /// @param u_applied what the actuators held since the last sample @return the same
-  Output hold(const Output& y, const Output& u_applied) noexcept
-      requires(observer_traits<Observers>.gates_disturbance&&...) {
+  template <int = 0>
+  requires(observer_traits<Observers>.gates_disturbance&&...)  //
+      Output hold(const Output& y, const Output& u_applied)
+  noexcept {
     report_applied(u_applied);
     const Output drive = told_matrix_ * output();
     told_matrix_ = input_matrix_;

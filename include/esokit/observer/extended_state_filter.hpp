@@ -97,7 +97,7 @@ class ExtendedStateFilter
   struct Config {
     S input_gain{};            ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
     S sample_time{};           ///< T, s
-    S measurement_variance{};  ///< R >= 0, unit of y squared; 0: y counts as exact
+    S measurement_variance{};  ///< R >= 0, unit of y squared; 0: y is exact; encoder: step^2 / 12
 
     /// q_r >= 0: by how much state r may deviate from its model within a sample, in the unit of the
     /// state. For r < n this is the error of sampling (zero for an exactly sampled chain), for r =
