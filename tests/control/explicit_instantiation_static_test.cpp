@@ -18,6 +18,8 @@ template class DelayedInput<LinearEso<2>, 3>;
 template class PredictiveAdrc<LinearEso<2>>;
 template class DisturbanceCompensator<LinearEso<2>>;
 template class MimoAdrc<LinearEso<2>, LinearEso<1>>;
+template class Guarded<LinearEso<2>>;
+template class Guarded<ModelEso<ModelParts{.order = 1, .actuator = 1}>>;
 template class ExtendedStateFilter<2>;
 template class MimoExtendedStateFilter<ChainOrders<1, 2>, 2>;
 template class AlgebraicEso<2>;

@@ -523,7 +523,8 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     return observer_.rest(y, S(u * gain_ratio_));
   }
   /// Sets the state as if `u` had been applied for a long time.
-  void fill_input(const S& u) noexcept requires(observer_traits<Observer>.delays_input) {
+  template <class O = Observer>
+  requires(observer_traits<O>.delays_input) void fill_input(const S& u) noexcept {
     observer_.fill_input(S(u * gain_ratio_));
   }
   /// Tells that the actuator held `u_applied`, see PredictorCorrector.
@@ -624,7 +625,9 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   }
 
   /// Prediction while held: d and the actuator continue, and the sensor follows a constant y.
-  ESOKIT_COLD StepStatus predict_standing(S u_applied) noexcept requires(!on_chain) {
+  template <class M = Model>
+  requires(!model_traits<M>.is_chain) ESOKIT_COLD StepStatus predict_standing(S u_applied)
+  noexcept {
     using State = typename Model::State;
     constexpr auto y = static_cast<std::size_t>(Model::state_of_row(0));
     State& now = detail::GuardAccess::states(observer_)[0];
