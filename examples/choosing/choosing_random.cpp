@@ -89,7 +89,7 @@ Outcome tuned(std::uint64_t seed) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const std::size_t logs = std::stoul(take_option(argc, argv, "--logs", "0"));
+  const auto logs = static_cast<std::size_t>(take_count(argc, argv, "--logs", 0));
   Report report(
       argc, argv, "choosing", "random",
       {.paper_title = "Choosing an observer",

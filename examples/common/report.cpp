@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <system_error>
 #include <utility>
 
 namespace esokit::examples {
@@ -301,6 +303,19 @@ std::string take_option(int& argc, char** argv, std::string_view name, std::stri
   std::copy(found + 2, end, found);
   argc -= 2;
   return otherwise;
+}
+
+std::int64_t take_count(int& argc, char** argv, std::string_view name, std::int64_t otherwise) {
+  const std::string given = take_option(argc, argv, name, std::to_string(otherwise));
+  std::int64_t count = 0;
+  const char* const end = given.data() + given.size();
+  const auto read = std::from_chars(given.data(), end, count);
+  if (read.ec != std::errc{} || read.ptr != end || count < 0) {
+    std::fprintf(stderr, "%.*s %s: must be a whole number, 0 or more\n",
+                 static_cast<int>(name.size()), name.data(), given.c_str());
+    std::exit(2);
+  }
+  return count;
 }
 
 Report::Report(int argc, char** argv, const std::string& paper, const std::string& example,

@@ -16,6 +16,7 @@
 /// ```
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
@@ -115,6 +116,8 @@ struct Tolerance {
 /// What follows `name` ("--runs") on the command line, of which both are taken out for Report;
 /// `otherwise` if it is not there.
 std::string take_option(int& argc, char** argv, std::string_view name, std::string otherwise);
+/// The same for a number of runs or logs. What is no such number ends the program with exit code 2.
+std::int64_t take_count(int& argc, char** argv, std::string_view name, std::int64_t otherwise);
 
 /// One example's results. Console output and files; nothing throws, what fails shows in finish().
 class Report {

@@ -132,7 +132,7 @@ std::string percent(double share) { return number_text(100 * share, 3); }
 }  // namespace
 
 int main(int argc, char** argv) {
-  const std::size_t logs = std::stoul(take_option(argc, argv, "--logs", "0"));
+  const auto logs = static_cast<std::size_t>(take_count(argc, argv, "--logs", 0));
   Report report(
       argc, argv, "identify", "identify_random",
       {.paper_title = "From a log to a model",

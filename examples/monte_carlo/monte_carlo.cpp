@@ -115,7 +115,7 @@ struct Seen {
 
 int main(int argc, char** argv) {
   take_widest(argv);
-  const std::int64_t runs = std::stoll(take_option(argc, argv, "--runs", "100000"));
+  const std::int64_t runs = take_count(argc, argv, "--runs", 100000);
   Report report(
       argc, argv, "monte_carlo", "drive",
       {.paper_title = "Monte Carlo",

@@ -188,7 +188,7 @@ double tick(double width) {
 
 int main(int argc, char** argv) {
   take_widest(argv);
-  const std::int64_t runs = std::stoll(take_option(argc, argv, "--runs", "10000"));
+  const std::int64_t runs = take_count(argc, argv, "--runs", 10000);
   Report report(
       argc, argv, "monte_carlo", "sim1b",
       {.paper_title = "Monte Carlo",

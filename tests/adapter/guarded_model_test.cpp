@@ -1,6 +1,8 @@
 // Guarded with a model: every guard acts on the constant of the disturbance, told from what plant,
 // actuator and sines contribute. Against numpy in natural states (y, y', d, q, r, v), where the b0
 // of the sample is a factor of the actuator's output.
+#include "guard_garbage.hpp"
+//
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -259,30 +261,7 @@ TYPED_TEST(GuardedModelObserver, ComesBack) {
                                      .unit = static_cast<DisturbanceUnit>(random.index(2)),
                                      .release_samples = random.index(30)})
                        .value();
-    for (int k = random.index(150); k > 0; --k) {
-      if (random.index(5) == 0) guarded.set_pin(static_cast<Pin>(random.index(4)));
-      if (random.index(5) == 0) guarded.set_trust(anything<S>(random));
-      if (random.index(5) == 0) (void)guarded.set_input_gain(anything<S>(random));
-      if (random.index(5) == 0) (void)guarded.hold(anything<S>(random));
-      if (random.index(5) == 0) guarded.release();
-      switch (random.index(6)) {
-        case 0:
-          (void)guarded.predict(anything<S>(random));
-          break;
-        case 1:
-          (void)guarded.correct(anything<S>(random));
-          break;
-        case 2:
-          (void)guarded.reset(anything<S>(random));
-          break;
-        default:
-          (void)guarded.update(anything<S>(random), anything<S>(random));
-      }
-      for (int i = 0; i < O::size; ++i) ASSERT_TRUE(is_finite(guarded.estimate()(i))) << seed;
-    }
-    guarded.set_trust(S(1));
-    guarded.set_pin(Pin::free);
-    guarded.release();
+    ASSERT_NO_FATAL_FAILURE(esokit_test::play_garbage(guarded, random)) << seed;
     // The lag of 5 samples decays slowest, then omega_o T = 0.3.
     const double e_folds = std::is_same_v<S, float> ? 210 : 1500;
     for (int k = 0; k < 90 + static_cast<int>(e_folds / 0.2); ++k) {

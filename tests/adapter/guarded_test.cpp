@@ -1,5 +1,7 @@
 // Guarded: idle it is the observer in it, bit for bit; each guard does what it says, of any
 // observer that bears it; no sequence of guards and garbage keeps a loop from its reference.
+#include "guard_garbage.hpp"
+//
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -197,31 +199,7 @@ TYPED_TEST(GuardedObserver, ComesBackInTheStatedTime) {
                                      .unit = static_cast<DisturbanceUnit>(random.index(2)),
                                      .release_samples = release})
                        .value();
-    for (int k = random.index(150); k > 0; --k) {
-      if constexpr (Guarded<O>::gates) {
-        if (random.index(5) == 0) guarded.set_pin(static_cast<Pin>(random.index(4)));
-        if (random.index(5) == 0) guarded.set_trust(anything<S>(random));
-      }
-      if (random.index(5) == 0) (void)guarded.set_input_gain(anything<S>(random));
-      switch (random.index(6)) {
-        case 0:
-          (void)guarded.predict(anything<S>(random));
-          break;
-        case 1:
-          (void)guarded.correct(anything<S>(random));
-          break;
-        case 2:
-          (void)guarded.reset(anything<S>(random));
-          break;
-        default:
-          (void)guarded.update(anything<S>(random), anything<S>(random));
-      }
-      for (int i = 0; i < O::size; ++i) ASSERT_TRUE(is_finite(guarded.estimate()(i))) << seed;
-    }
-    if constexpr (Guarded<O>::gates) {
-      guarded.set_trust(S(1));
-      guarded.set_pin(Pin::free);
-    }
+    ASSERT_NO_FATAL_FAILURE(esokit_test::play_garbage(guarded, random)) << seed;
     const double e_folds = std::is_same_v<S, float> ? 210 : 1500;
     const int samples = 60 + static_cast<int>(e_folds / omega_T) + release;
     for (int k = 0; k < samples; ++k) (void)guarded.update(S(0.5), S(0));
