@@ -477,6 +477,25 @@ TEST(GuardedModel, LoopIsThatOfTheRightB0) {
 
 // ---- held, bounded, pinned, leaking
 
+/// While held, y is followed through every turn, with the lag of its own gain k_0 = 1 - e^(-2 w T).
+TEST(GuardedModel, HeldFollowsThroughTurns) {
+  using O = WrappedOutput<ModelEso<ModelParts{.order = 1, .actuator = 1}>>;
+  Guarded<O>::Config config{};
+  config.observer.observer = {.observer_bandwidth = 50,
+                              .input_gain = 10,
+                              .sample_time = 1e-3,
+                              .model = {.actuator = {0.02}}};
+  config.observer.period = 2;
+  auto guarded = Guarded<O>::make(config).value();
+  const double k_0 = -std::expm1(-2 * 50 * 1e-3);
+  for (int k = 0; k < 4000; ++k) {
+    const double y = std::remainder(0.003 * k, 2.0);
+    (void)guarded.update(y, guarded.hold(0.1));
+    if (k < 1000) continue;
+    ASSERT_NEAR(std::remainder(y - guarded.estimate<0>(), 2.0), 0.003 * (1 - k_0) / k_0, 1e-9) << k;
+  }
+}
+
 /// On the ground with a motor that turns: d is frozen, v is what it is, and the first step in the
 /// air has no kick, nor any error of d.
 TEST(GuardedModel, HeldActuatorGoesOn) {

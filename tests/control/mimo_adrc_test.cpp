@@ -167,6 +167,7 @@ TEST(MimoAdrc, HeldAndScheduled) {
   std::get<1>(config.observers).observer = {.observer_bandwidth = 40, .sample_time = period};
   auto loop = Loop::make(config).value();
   const Loop::InputMatrix gain = config.input_matrix;
+  const Loop::InputMatrix later{{2.5, 1}, {0.25, 2}};
   ASSERT_EQ(loop.start({0.5, -1.0}, {0.25, 0.5}), esokit::StepStatus::ok);
   // At rest: d = -B0 u.
   const Loop::Output d = -(gain * Loop::Output{0.25, 0.5});
@@ -180,13 +181,15 @@ TEST(MimoAdrc, HeldAndScheduled) {
   for (int k = 0; k < 500; ++k) {
     const Loop::Output u{0.1 * std::sin(0.01 * k), -0.3};
     lagging = (gain * u)(0) + (lagging - (gain * u)(0)) * left;
+    // The sample that ends now still has the B0 of before.
+    if (k == 499) ASSERT_TRUE(loop.set_input_matrix(later).has_value());
     ASSERT_EQ(loop.hold(y, u), u);
     for (int i = 0; i < 2; ++i) ASSERT_NEAR(found()(i), d(i), 1e-11);
     ASSERT_FALSE(loop.observer<0>().gated());
   }
   double share = 1;
   for (int k = 0; k < 3000; ++k) {
-    const Loop::Output drive = gain * loop.output();
+    const Loop::Output drive = later * loop.output();
     y(0) += share * (period * drive(0) + (lagging - drive(0)) * 0.02 * (1 - left)) + period * d(0);
     y(1) += period * (drive(1) + d(1));
     lagging = drive(0) + (lagging - drive(0)) * left;
