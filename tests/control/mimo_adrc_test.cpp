@@ -182,7 +182,9 @@ TEST(MimoAdrc, HeldAndScheduled) {
     const Loop::Output u{0.1 * std::sin(0.01 * k), -0.3};
     lagging = (gain * u)(0) + (lagging - (gain * u)(0)) * left;
     // The sample that ends now still has the B0 of before.
-    if (k == 499) ASSERT_TRUE(loop.set_input_matrix(later).has_value());
+    if (k == 499) {
+      ASSERT_TRUE(loop.set_input_matrix(later).has_value());
+    }
     ASSERT_EQ(loop.hold(y, u), u);
     for (int i = 0; i < 2; ++i) ASSERT_NEAR(found()(i), d(i), 1e-11);
     ASSERT_FALSE(loop.observer<0>().gated());
