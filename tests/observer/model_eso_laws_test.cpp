@@ -31,42 +31,45 @@ using ModelTypes = TypeList<WithSwing<double>, WithPoles<double>, WithZero<doubl
 const bool registered = register_laws<ObserverLaws>("ModelEso", ModelTypes{});
 
 TEST(ModelEso, RecurringGapsDecayUpToTheLongestThatIsBridged) {
-  recurring_gaps_decay<esokit::ModelEso<swing_parts>>();
-  recurring_gaps_decay<esokit::ModelEso<plant_parts>>();
-  recurring_gaps_decay<esokit::ModelEso<swing_parts, float>>();
-  recurring_gaps_decay<esokit::ModelEso<plant_parts, float>>();
-  recurring_gaps_decay<WithZero<double>>();
+  recurring_gaps_decay(kind_of<esokit::ModelEso<swing_parts>>());
+  recurring_gaps_decay(kind_of<esokit::ModelEso<plant_parts>>());
+  recurring_gaps_decay(kind_of<esokit::ModelEso<swing_parts, float>>());
+  recurring_gaps_decay(kind_of<esokit::ModelEso<plant_parts, float>>());
+  recurring_gaps_decay(kind_of<WithZero<double>>());
 }
 
-/// As `snapshot` saved it, with all that is to come the same bit for bit, in the middle of a gap
-/// too.
-template <class Observer>
-void round_trip() {
-  using Laws = LawsOf<Observer>;
-  Observer running = Laws::warm();
-  running.predict(Laws::input(0.5));
-  running.predict(Laws::input(0.25));
-  const auto read = esokit::from_snapshot<Observer>(esokit::snapshot(running));
-  ASSERT_TRUE(read) << read.error();
-  Observer restored = *read;
+/// `restored` is `running`, with all that is to come the same bit for bit.
+void continues(const LawSuite& laws, AnyObserver running, AnyObserver restored) {
   EXPECT_TRUE(same_observer(restored, running));
-  EXPECT_EQ(restored.missed(), 2);
+  EXPECT_EQ(restored->missed(), 2);
   Random random(59);
   for (int k = 0; k < 100; ++k) {
-    const auto y = static_cast<typename Laws::S>(random.uniform(-1, 1));
-    const auto u = Laws::input(random.uniform(-1, 1));
-    const StepStatus status = k % 9 == 4 ? running.predict(u) : running.update(y, u);
-    EXPECT_EQ(k % 9 == 4 ? restored.predict(u) : restored.update(y, u), status);
+    const Real y = random.uniform(-1, 1);
+    const Real u = laws.input(random.uniform(-1, 1));
+    const StepStatus status = k % 9 == 4 ? running->predict(u) : running->update(y, u);
+    EXPECT_EQ(k % 9 == 4 ? restored->predict(u) : restored->update(y, u), status);
     ASSERT_TRUE(same_observer(restored, running)) << k;
   }
   // The model is restored as well: a retune starts from it.
-  for (Observer* o : {&running, &restored}) {
-    ASSERT_TRUE(o->retune(Laws::config(1.5, 3.0)));
-    o->update(typename Laws::S(1), Laws::input(0.5));
+  for (AnyObserver* o : {&running, &restored}) {
+    ASSERT_EQ(laws.kind.retune(*o, {1.5 / laws.period, laws.period, 3.0}), "accepted");
+    (*o)->update(1, laws.input(0.5));
   }
   EXPECT_TRUE(same_observer(restored, running));
+}
+
+/// As `snapshot` saved it, in the middle of a gap.
+template <class Observer>
+void round_trip() {
+  const LawSuite laws{kind_of<Observer>()};
+  AnyObserver running = laws.warm();
+  running->predict(laws.input(0.5));
+  running->predict(laws.input(0.25));
+  auto words = esokit::snapshot(running.as<Observer>());
+  const Made restored(esokit::from_snapshot<Observer>(words));
+  ASSERT_TRUE(restored) << restored.refused;
+  continues(laws, running, *restored.observer);
   // A bit of the model is enough to be refused.
-  auto words = esokit::snapshot(running);
   words[words.size() / 2] ^= 1u << 7;
   EXPECT_TRUE(refusal(esokit::from_snapshot<Observer>(words))
                   .starts_with("snapshot: has a wrong checksum"));
@@ -100,7 +103,7 @@ TEST(ModelEsoSnapshot, OfOtherPartsIsRefused) {
                                        .sample_time = 0.01,
                                        .model = {.plant = {3.0}, .sensor = {0.02}}})
                              .value());
-  refuses_another<Sensor>(LawsOf<Plant>::warm());
+  refuses_another<Sensor>(LawSuite{kind_of<Plant>()}.warm().as<Plant>());
 }
 
 }  // namespace esokit_test

@@ -25,9 +25,9 @@ using PartTypes = TypeList<WithLags<double>, InCascade<double>, WithLags<float>,
 const bool registered = register_laws<ObserverLaws>("ModelParts", PartTypes{});
 
 TEST(ModelParts, RecurringGapsDecayUpToTheLongestThatIsBridged) {
-  recurring_gaps_decay<WithLags<double>>();
-  recurring_gaps_decay<InCascade<double>>();
-  recurring_gaps_decay<InCascade<float>>();
+  recurring_gaps_decay(kind_of<WithLags<double>>());
+  recurring_gaps_decay(kind_of<InCascade<double>>());
+  recurring_gaps_decay(kind_of<InCascade<float>>());
 }
 
 }  // namespace esokit_test

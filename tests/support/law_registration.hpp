@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <string>
 
 namespace esokit_test {
@@ -13,7 +14,7 @@ namespace esokit_test {
 /// A law of one type; `excuse` says why it does not apply, null if it does.
 struct NamedLaw {
   const char* name;
-  void (*run)();
+  std::function<void()> run;
   const char* excuse = nullptr;
 };
 

@@ -16,7 +16,7 @@
 
 namespace esokit_test {
 
-/// The laws of tests/observer/law_suite.hpp.
+/// The laws of tests/observer/law_suite.cpp.
 enum class Law {
   gains_equal_reference,
   polynomial_equals_reference,
