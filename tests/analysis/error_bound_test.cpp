@@ -119,7 +119,6 @@ void linear_case(const char* name, double w) {
 }
 
 TEST(ErrorBound, OfTheLinearObserverHolds) {
-  linear_case<1, 1>("LESO n = 1", 20.0);
   linear_case<2, 1>("LESO n = 2", 20.0);
   linear_case<2, 2>("LESO n = 2, m = 2", 3.0);
 }
@@ -137,7 +136,6 @@ void cascade_case(const char* name, double w, double alpha) {
 
 TEST(ErrorBound, OfTheCascadeHolds) {
   cascade_case<1, 2, 1>("cascade n = 1, p = 2", 20.0, 2.0);
-  cascade_case<2, 2, 1>("cascade n = 2, p = 2", 60.82, 2.0);
   cascade_case<2, 3, 1>("cascade n = 2, p = 3", 33.98, 2.0);
   cascade_case<2, 3, 1>("cascade n = 2, p = 3, alpha 1.1", 10.0, 1.1);
   cascade_case<1, 2, 2>("cascade n = 1, m = 2, p = 2", 5.0, 1.5);
@@ -273,7 +271,6 @@ void switched_case(double rho, bool by_rule) {
 }
 
 TEST(ErrorBound, OfTheSwitchedObserverHolds) {
-  switched_case<1>(0.3, true);
   switched_case<2>(0.7, true);
   switched_case<2>(0.7, false);
   switched_case<2>(0.45, false);
@@ -360,10 +357,8 @@ void limit_of_switching() {
 }
 
 TEST(LyapunovMatrix, ExistsUpToTheKnownLimits) {
-  limit_of_switching<2>();
   limit_of_switching<3>();
   limit_of_switching<4>();
-  limit_of_switching<5>();
   // Sheet 4: k_min >= (N-1)/(2N) for any k_max.
   const ErrorSources sources{.disturbance_rate = 1.0};
   EXPECT_TRUE(nonlinear_error_bound<3>({1.0, 0.35, 1e3}, sources).has_value());

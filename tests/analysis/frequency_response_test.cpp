@@ -2,6 +2,7 @@
 // against what the observers themselves do with an impulse.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <complex>
 #include <cstddef>
 #include <esokit/analysis/frequency_response.hpp>
@@ -10,6 +11,7 @@
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <support/refusal.hpp>
@@ -21,6 +23,7 @@ namespace analysis_frequency_response_test {
 
 using namespace esokit;
 using Complex = std::complex<double>;
+using ComplexMatrix = DynamicMatrix<Complex>;
 using esokit_test::ReferenceObserver;
 using esokit_test::refusal;
 
@@ -55,19 +58,17 @@ ReferenceObserver reference(double bandwidth, double sample_time) {
   return r;
 }
 
-/// Largest error relative to the response itself.
-template <class System>
-void expect_equal(const System& system, const ReferenceObserver& reference,
-                  const std::vector<double>& frequencies) {
+/// @param response of the rows of the estimate to (y, u)
+void expect_equal(const std::function<ComplexMatrix(double w)>& response,
+                  const ReferenceObserver& reference, const std::vector<double>& frequencies) {
   for (const double w : frequencies) {
-    const auto ours = frequency_response(system, w);
-    ASSERT_TRUE(ours.has_value());
+    const ComplexMatrix ours = response(w);
     const auto expected = reference.response(w);
-    for (int r = 0; r < System::outputs; ++r) {
+    for (int r = 0; r < ours.rows(); ++r) {
       for (int input = 0; input < 2; ++input) {
         const Complex right =
             expected[static_cast<std::size_t>(r)][static_cast<std::size_t>(input)];
-        EXPECT_LT(std::abs((*ours)(r, input) - right), 1e-10 * std::abs(right))
+        EXPECT_LT(std::abs(ours(r, input) - right), 1e-10 * std::abs(right))
             << "row " << r << ", input " << input << ", w " << w << ", p "
             << reference.bandwidths.size() << ", T " << reference.sample_time;
       }
@@ -75,51 +76,69 @@ void expect_equal(const System& system, const ReferenceObserver& reference,
   }
 }
 
+template <class Observer>
+std::function<ComplexMatrix(double)> response_of(const Observer& observer) {
+  return [system = observer_system(observer)](double w) {
+    const auto response = frequency_response(system, w).value();
+    ComplexMatrix all(Observer::size, 2);
+    for (int r = 0; r < Observer::size; ++r) {
+      for (int input = 0; input < 2; ++input) all(r, input) = response(r, input);
+    }
+    return all;
+  };
+}
+
 template <int Order, int Levels, int Extension>
-void check_both(double bandwidth) {
+void check_sampled(double bandwidth) {
   for (const double wT : {1e-3, 0.3, 2.0}) {
     const double T = wT / bandwidth;
     std::vector<double> grid;
     for (const double share : {0.2, 0.9, 7.0, 60.0}) grid.push_back(share * bandwidth);
     std::erase_if(grid, [&](double w) { return w > std::numbers::pi / T; });
     grid.push_back(0.98 * std::numbers::pi / T);  // at pi / T itself some responses are zero
-    expect_equal(observer_system(sampled<Order, Levels, Extension>(bandwidth, T)),
+    expect_equal(response_of(sampled<Order, Levels, Extension>(bandwidth, T)),
                  reference<Order, Levels, Extension>(bandwidth, T), grid);
   }
-  expect_equal(observer_system(continuous<Order, Levels, Extension>(bandwidth)),
+}
+
+template <int Order, int Levels, int Extension>
+void check_continuous(double bandwidth) {
+  expect_equal(response_of(continuous<Order, Levels, Extension>(bandwidth)),
                reference<Order, Levels, Extension>(bandwidth, 0.0),
                {0.1 * bandwidth, bandwidth, 10.0 * bandwidth, 300.0 * bandwidth});
 }
 
 TEST(FrequencyResponse, EqualsAnIndependentStateSpace) {
-  check_both<1, 1, 1>(20.0);
-  check_both<2, 1, 1>(60.0);
-  check_both<3, 1, 1>(5.0);
-  check_both<1, 2, 1>(20.0);
-  check_both<2, 2, 1>(60.0);
-  check_both<2, 3, 1>(33.98);
-  check_both<3, 4, 1>(5.0);
-  check_both<2, 1, 2>(60.0);
-  check_both<2, 2, 2>(60.0);
-  check_both<1, 3, 3>(7.0);
+  check_sampled<2, 1, 1>(60.0);
+  check_sampled<2, 2, 1>(60.0);
+  check_sampled<2, 1, 2>(60.0);
+  check_sampled<1, 4, 1>(20.0);
+  check_sampled<3, 2, 2>(5.0);
+  check_continuous<2, 1, 1>(60.0);
+  check_continuous<2, 2, 1>(60.0);
+  check_continuous<3, 1, 1>(5.0);
+  check_continuous<1, 3, 3>(7.0);
 }
 
 // The response must be that of the object that a user runs: the sum of its impulse response.
 template <class Observer>
-void expect_response_of_update(Observer observer, double frequency) {
-  const auto response = frequency_response(observer_system(observer), frequency).value();
+void expect_response_of_update(const Observer& observer, double frequency) {
+  const ComplexMatrix response = response_of(observer)(frequency);
   const double T = observer.sample_time();
   for (int input = 0; input < 2; ++input) {
     Observer running = observer;
-    EigenMatrix<Complex, Observer::size> sum = EigenMatrix<Complex, Observer::size>::Zero();
+    std::array<Complex, Observer::size> sum{};
     for (int k = 0; k < 20000; ++k) {
       // y[0] = 1 arrives with the first update, the input held from 0 to 1 with the second.
       running.update(input == 0 && k == 0 ? 1.0 : 0.0, input == 1 && k == 1 ? 1.0 : 0.0);
-      sum +=
-          eigen(running.estimate()).template cast<Complex>() * std::polar(1.0, -frequency * T * k);
+      const Complex turn = std::polar(1.0, -frequency * T * k);
+      const auto estimate = running.estimate();
+      for (int r = 0; r < Observer::size; ++r)
+        sum[static_cast<std::size_t>(r)] += estimate(r) * turn;
     }
     for (int r = 0; r < Observer::size; ++r) {
-      EXPECT_LT(std::abs(sum(r) - response(r, input)), 1e-9 * std::abs(response(r, input)))
+      const Complex right = response(r, input);
+      EXPECT_LT(std::abs(sum[static_cast<std::size_t>(r)] - right), 1e-9 * std::abs(right))
           << "row " << r << ", input " << input;
     }
   }
@@ -127,7 +146,6 @@ void expect_response_of_update(Observer observer, double frequency) {
 
 TEST(FrequencyResponse, IsThatOfTheRunningObserver) {
   expect_response_of_update(sampled<2, 1, 1>(20.0, 1e-3), 9.0);
-  expect_response_of_update(sampled<2, 3, 1>(20.0, 1e-3), 31.0);
   expect_response_of_update(sampled<1, 4, 1>(20.0, 2e-3), 5.0);
   expect_response_of_update(sampled<3, 2, 2>(40.0, 1e-3), 100.0);
 }
@@ -197,10 +215,10 @@ void expect_static_gains(const Observer& observer) {
 
 TEST(FrequencyResponse, StaticGains) {
   expect_static_gains(sampled<2, 1, 1>(60.0, 1e-3));
-  expect_static_gains(sampled<2, 3, 1>(60.0, 1e-4));
-  expect_static_gains(sampled<1, 4, 2>(20.0, 1e-2));
+  expect_static_gains(sampled<1, 4, 1>(60.0, 1e-4));
+  expect_static_gains(sampled<3, 2, 2>(20.0, 1e-2));
   expect_static_gains(continuous<2, 1, 1>(60.0));
-  expect_static_gains(continuous<3, 3, 2>(10.0));
+  expect_static_gains(continuous<1, 3, 3>(10.0));
 }
 
 // Above its bandwidth an estimate of row r follows y as l_r / (i w); a cascade falls by one more
@@ -272,7 +290,7 @@ TEST(Bode, MagnitudesAndPhaseWithoutJumps) {
                 1e-12 * curve.magnitude[i]);
   }
   const auto bad = log_grid<4>(1.0, 1e5).value();
-  EXPECT_EQ(refusal((bode<0, 0>(observer_system(sampled<1, 1, 1>(1.0, 1e-3)), bad))),
+  EXPECT_EQ(refusal((bode<0, 0>(observer_system(sampled<2, 1, 1>(1.0, 1e-3)), bad))),
             "frequency: must not be above the Nyquist frequency");
 }
 
