@@ -1,11 +1,10 @@
 // Guarded with a model: every guard acts on the constant of the disturbance, told from what plant,
 // actuator and sines contribute. Against numpy in natural states (y, y', d, q, r, v), where the b0
 // of the sample is a factor of the actuator's output.
-#include "guard_garbage.hpp"
+#include "guard_laws.hpp"
 //
 #include <gtest/gtest.h>
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -26,12 +25,12 @@
 #include <vector>
 
 namespace esokit_test {
-namespace guarded_model_test {
+namespace adapter_guarded_model_test {
 
 using namespace esokit;
 
-constexpr double T = 0.01;
-constexpr double b0 = 2;
+using guards::b0;
+constexpr double T = guards::sample_time;
 
 constexpr ModelParts lag{.order = 1, .actuator = 1};
 constexpr ModelParts all_parts{
@@ -193,86 +192,23 @@ struct LagPlant {
   }
 };
 
-// ---- idle
+// ---- idle, and after garbage
 
-template <class Observer>
-class GuardedModelObserver : public testing::Test {};
-using Bearing =
-    testing::Types<ModelEso<lag>,
-                   WrappedOutput<DelayedInput<
-                       ModelEso<ModelParts{.order = 2, .actuator = 1, .sensor = 1}, float>, 2>>>;
-TYPED_TEST_SUITE(GuardedModelObserver, Bearing);
-
-template <class O>
-typename O::Config settings() {
-  typename O::Config config{};
-  fill_settings<typename O::scalar_type>(config, 30, T, b0);
-  using S = typename O::scalar_type;
-  if constexpr (requires { config.period; }) config.period = S(64);
-  auto& model = chain_config<O>(config).model;
-  model.actuator = {S(0.05)};
-  if constexpr (requires { model.sensor.time_constant; }) model.sensor = {S(0.01)};
-  return config;
+const std::vector<guards::Type>& bearing() {
+  using Nested = WrappedOutput<
+      DelayedInput<ModelEso<ModelParts{.order = 2, .actuator = 1, .sensor = 1}, float>, 2>>;
+  static const std::vector<guards::Type> types{guards::type_of<ModelEso<lag>>(),
+                                               guards::type_of<Nested>()};
+  return types;
 }
 
-TYPED_TEST(GuardedModelObserver, IdleIsTheObserverBitForBit) {
-  using O = TypeParam;
-  using S = typename O::scalar_type;
-  auto plain = O::make(settings<O>()).value();
-  auto guarded = Guarded<O>::make({.observer = settings<O>(), .release_samples = 3}).value();
-  Random random(11);
-  for (int k = 0; k < 3000; ++k) {
-    const S y = random.index(20) == 0 ? anything<S>(random) : static_cast<S>(random.uniform(-1, 1));
-    const S u = random.index(20) == 0 ? anything<S>(random) : static_cast<S>(random.uniform(-1, 1));
-    guarded.set_trust(S(0.5));
-    (void)guarded.hold(u);
-    guarded.set_pin(Pin::free);
-    guarded.release();
-    guarded.set_trust(S(1));
-    ASSERT_TRUE(guarded.set_input_gain(S(b0)).has_value());
-    const int what = random.index(12);
-    ASSERT_EQ(what == 0   ? guarded.predict(u)
-              : what == 1 ? guarded.correct(y)
-                          : guarded.update(y, u),
-              what == 0   ? plain.predict(u)
-              : what == 1 ? plain.correct(y)
-                          : plain.update(y, u))
-        << k;
-    ASSERT_FALSE(guarded.gated());
-    for (int i = 0; i < O::size; ++i) {
-      ASSERT_TRUE(same_bits(guarded.estimate()(i), plain.estimate()(i))) << k;
-    }
-    ASSERT_EQ(guarded.missed(), plain.missed());
-    if (k % 400 == 399) {
-      guarded.reset(S(0));
-      plain.reset(S(0));
-    }
-  }
+TEST(GuardedModelObserver, IdleIsTheObserverBitForBit) {
+  for (const guards::Type& type : bearing()) guards::idle_is_the_observer(type);
 }
 
-/// After any sequence of guards, gaps and garbage: back at the truth.
-TYPED_TEST(GuardedModelObserver, ComesBack) {
-  using O = TypeParam;
-  using S = typename O::scalar_type;
-  for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(long_run(100)); ++seed) {
-    Random random(seed);
-    auto guarded = Guarded<O>::make({.observer = settings<O>(),
-                                     .disturbance_bound = static_cast<S>(random.index(2) * 50.0),
-                                     .unit = static_cast<DisturbanceUnit>(random.index(2)),
-                                     .release_samples = random.index(30)})
-                       .value();
-    ASSERT_NO_FATAL_FAILURE(esokit_test::play_garbage(guarded, random)) << seed;
-    // The lag of 5 samples decays slowest, then omega_o T = 0.3.
-    const double e_folds = std::is_same_v<S, float> ? 210 : 1500;
-    for (int k = 0; k < 90 + static_cast<int>(e_folds / 0.2); ++k) {
-      (void)guarded.update(S(0.5), S(0));
-    }
-    ASSERT_FALSE(guarded.gated());
-    const double tolerance = 1e5 * static_cast<double>(std::numeric_limits<S>::epsilon());
-    ASSERT_NEAR(static_cast<double>(guarded.template estimate<0>()), 0.5, tolerance) << seed;
-    ASSERT_NEAR(static_cast<double>(guarded.total_disturbance()), 0,
-                tolerance * std::pow(30, O::order))
-        << seed;
+TEST(GuardedModelObserver, ComesBackInTheStatedTime) {
+  for (const guards::Type& type : bearing()) {
+    guards::comes_back_in_the_stated_time(type, 0.3, 0.3);
   }
 }
 
@@ -319,36 +255,21 @@ TEST(GuardedModel, LoopComesBack) {
 
 // ---- the circle criterion
 
-/// min Re G by brute force in the states of the model.
 template <class Observer>
 double least_real_part(const Observer& observer, double leak) {
-  constexpr int N = Observer::size;
+  const auto numbers = [](const auto& all) { return std::vector<double>(all.begin(), all.end()); };
   const auto& model = observer.model();
-  const auto row = model.constant_row();
-  const auto column = model.constant_column();
-  const auto gain = observer.level_gain(0);
-  EigenMatrix<double, N, N> step = eigen(model.increment());
-  step.diagonal().array() += 1;
-  EigenMatrix<double, N, 1> k, r, c;
-  for (int i = 0; i < N; ++i) {
-    k(i) = gain[static_cast<std::size_t>(i)];
-    r(i) = row[static_cast<std::size_t>(i)];
-    c(i) = column[static_cast<std::size_t>(i)];
+  const auto increment = model.increment();
+  std::vector<std::vector<double>> transition;
+  for (int i = 0; i < Observer::size; ++i) {
+    transition.emplace_back();
+    for (int j = 0; j < Observer::size; ++j) {
+      transition.back().push_back(increment(i, j) + (i == j ? 1 : 0));
+    }
   }
-  const double found = r.dot(k);
-  const EigenMatrix<double, 1, N> ahead = step.row(0);
-  EigenMatrix<double, N, N> frozen = step - (k - found * c) * ahead;
-  frozen -= leak * c * (r.transpose() * frozen);
-  double least = 1e300;
-  for (int i = 0; i < 300; ++i) {
-    const std::complex<double> z =
-        std::polar(1.0, std::numbers::pi * std::pow(10.0, -5.0 + 5.0 * i / 299.0));
-    EigenMatrix<std::complex<double>, N, N> a = z * EigenMatrix<double, N, N>::Identity() - frozen;
-    const EigenMatrix<std::complex<double>, N, 1> x =
-        a.partialPivLu().solve(((1 - leak) * found * c).template cast<std::complex<double>>());
-    least = std::min(least, (ahead * x)(0).real());
-  }
-  return least;
+  return guards::least_real_part(transition, numbers(observer.level_gain(0)),
+                                 numbers(model.constant_row()), numbers(model.constant_column()),
+                                 leak);
 }
 
 TEST(GuardedModel, CertificateIsTheCircleCriterion) {
@@ -655,5 +576,5 @@ TEST(GuardedModel, RefusesAnInputGainThatIsNone) {
   EXPECT_EQ(guarded.present_input_gain(), b0);
 }
 
-}  // namespace guarded_model_test
+}  // namespace adapter_guarded_model_test
 }  // namespace esokit_test

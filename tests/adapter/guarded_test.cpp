@@ -1,10 +1,9 @@
 // Guarded: idle it is the observer in it, bit for bit; each guard does what it says, of any
 // observer that bears it; no sequence of guards and garbage keeps a loop from its reference.
-#include "guard_garbage.hpp"
+#include "guard_laws.hpp"
 //
 #include <gtest/gtest.h>
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <complex>
@@ -36,27 +35,9 @@ namespace adapter_guarded_test {
 
 using namespace esokit;
 
-constexpr double sample_time = 0.01;
-constexpr double b0 = 2;
-
-template <class S, class Config>
-void fill(Config& config, double omega_T) {
-  if constexpr (requires { config.period; }) config.period = S(64);
-  if constexpr (requires { config.threshold; }) config.threshold = S(40);
-  if constexpr (requires { config.delay; }) config.delay = 1;
-  if constexpr (requires { config.observer; }) {
-    fill<S>(config.observer, omega_T);
-  } else {
-    fill_settings<S>(config, omega_T / sample_time, sample_time, b0);
-  }
-}
-
-template <class Observer>
-typename Observer::Config settings(double omega_T = 0.3) {
-  typename Observer::Config config{};
-  fill<typename Observer::scalar_type>(config, omega_T);
-  return config;
-}
+using guards::b0;
+using guards::sample_time;
+using guards::settings;
 
 // ---- which observers bear guards, and which not
 
@@ -64,174 +45,113 @@ template <class O>
 constexpr bool bears = observer_traits<O>.bears_guards;
 static_assert(bears<LinearEso<3, float, 2>> && bears<LinearEso<2, double, 1, PoleSet>>);
 static_assert(bears<CascadeEso<2, 3>> && bears<ReducedOrderEso<2>>);
-static_assert(bears<WrappedOutput<DelayedInput<OutlierGate<LinearEso<1>>, 2>>>);
 static_assert(bears<VariableTime<LinearEso<2>>>);
 static_assert(!bears<AlgebraicEso<2>> && !bears<NonlinearEso<2>> && !bears<ExtendedStateFilter<2>>);
 static_assert(LoopObserver<Guarded<LinearEso<2>>> && Guarded<LinearEso<2>>::gates);
 static_assert(!Guarded<LinearEso<2, double, 2>>::gates);
 static_assert(!Guarded<VariableTime<LinearEso<2>>>::gates);
 
-template <class Observer>
-class GuardedObserver : public testing::Test {};
-using Bearing = testing::Types<LinearEso<2>, LinearEso<2, float>, LinearEso<1, double, 2>,
-                               CascadeEso<2, 2>, CascadeEso<1, 3, float>, ReducedOrderEso<2>,
-                               WrappedOutput<DelayedInput<OutlierGate<LinearEso<2, float>>, 2>>,
-                               VariableTime<LinearEso<2>>>;
-TYPED_TEST_SUITE(GuardedObserver, Bearing);
+using Nested = WrappedOutput<DelayedInput<OutlierGate<LinearEso<2, float>>, 2>>;
 
-/// With guards that have nothing to do, and after guards that are over.
-TYPED_TEST(GuardedObserver, IdleIsTheObserverBitForBit) {
-  using O = TypeParam;
-  using S = typename O::scalar_type;
-  auto plain = O::make(settings<O>()).value();
-  auto guarded =
-      Guarded<O>::make({.observer = settings<O>(), .disturbance_bound = S(0), .release_samples = 3})
-          .value();
-  Random random(11);
-  for (int k = 0; k < 3000; ++k) {
-    const S y = random.index(20) == 0 ? anything<S>(random) : static_cast<S>(random.uniform(-1, 1));
-    const S u = random.index(20) == 0 ? anything<S>(random) : static_cast<S>(random.uniform(-1, 1));
-    if constexpr (Guarded<O>::gates) {
-      guarded.set_trust(S(0.5));
-      guarded.set_pin(Pin::free);
-      guarded.set_trust(S(1));
-    }
-    const int what = random.index(12);
-    ASSERT_EQ(what == 0   ? guarded.predict(u)
-              : what == 1 ? guarded.correct(y)
-                          : guarded.update(y, u),
-              what == 0   ? plain.predict(u)
-              : what == 1 ? plain.correct(y)
-                          : plain.update(y, u))
-        << k;
-    ASSERT_FALSE(guarded.gated());
-    for (int i = 0; i < O::size; ++i) {
-      ASSERT_TRUE(same_bits(guarded.estimate()(i), plain.estimate()(i))) << k;
-    }
-    ASSERT_EQ(guarded.missed(), plain.missed());
-    ASSERT_TRUE(same_bits(guarded.applied_input(), S(plain.applied_input())));
-    if (k % 400 == 399) {
-      guarded.reset(S(0));
-      plain.reset(S(0));
-    }
-  }
+const std::vector<guards::Type>& bearing() {
+  static const std::vector<guards::Type> types{guards::type_of<LinearEso<2>>(),
+                                               guards::type_of<LinearEso<2, float>>(),
+                                               guards::type_of<LinearEso<1, double, 2>>(),
+                                               guards::type_of<CascadeEso<2, 2>>(),
+                                               guards::type_of<CascadeEso<1, 3, float>>(),
+                                               guards::type_of<ReducedOrderEso<2>>(),
+                                               guards::type_of<Nested>(),
+                                               guards::type_of<VariableTime<LinearEso<2>>>()};
+  return types;
 }
+
+TEST(GuardedObserver, IdleIsTheObserverBitForBit) {
+  for (const guards::Type& type : bearing()) guards::idle_is_the_observer(type);
+}
+
+TEST(GuardedObserver, ComesBackInTheStatedTime) {
+  for (const guards::Type& type : bearing()) guards::comes_back_in_the_stated_time(type, 0.3, 2);
+}
+
+/// y^(n) = d + b0 u, of first or second order, exact between samples.
+struct Plant {
+  int order;
+  double d;
+  double y = 0, v = 0;
+  void step(double u) {
+    const double a = d + b0 * u;
+    y += order == 1 ? sample_time * a : sample_time * (v + sample_time / 2 * a);
+    v += order == 1 ? 0 : sample_time * a;
+  }
+};
 
 /// abs(dhat) never passes its bound, at no level, and stays there under a load above it; below it
 /// nothing is lost.
-TYPED_TEST(GuardedObserver, BoundHolds) {
-  using O = TypeParam;
-  using S = typename O::scalar_type;
+void bound_holds(const guards::Type& type, DisturbanceUnit unit) {
+  SCOPED_TRACE(type.name);
   constexpr double bound = 1.5;
-  for (const DisturbanceUnit unit : {DisturbanceUnit::output, DisturbanceUnit::input}) {
-    const double given = unit == DisturbanceUnit::input ? bound / b0 : bound;
-    auto guarded =
-        Guarded<O>::make(
-            {.observer = settings<O>(), .disturbance_bound = static_cast<S>(given), .unit = unit})
-            .value();
-    // y'' = d on a sine, so that a state that is off leads back.
-    double d = 1;
-    ChainPlant<O::order> plant(sample_time, b0, d);
-    const double most = bound * (1 + 64 * static_cast<double>(std::numeric_limits<S>::epsilon()));
-    for (int k = 0; k < 4000; ++k) {
-      if (k == 1000) d = 4;
-      if (k == 1400) d = -1;
-      const double u = -plant.output() - (O::order > 1 ? 1.5 * plant.state()(O::order - 1) : 0);
-      plant.set_disturbance(d);
-      plant.step(u);
-      (void)guarded.update(static_cast<S>(plant.output()), static_cast<S>(u));
-      for (int level = 0; level < O::levels; ++level) {
-        ASSERT_LE(std::abs(static_cast<double>(guarded.level_estimate(level)(O::order))), most)
-            << k;
-      }
-      if (k == 999) {
-        ASSERT_NEAR(static_cast<double>(guarded.total_disturbance()), 1, 0.05);
-      }
-      if (k == 999 || k == 1399) {
-        ASSERT_EQ(guarded.bounded(), k == 1399);
-      }
+  const auto guarded = type.guarded(
+      {.disturbance_bound = unit == DisturbanceUnit::input ? bound / b0 : bound, .unit = unit});
+  Plant plant{.order = type.order, .d = 1};
+  for (int k = 0; k < 4000; ++k) {
+    if (k == 1000) plant.d = 4;
+    if (k == 1400) plant.d = -1;
+    const double u = -plant.y - 1.5 * plant.v;  // so that a state that is off leads back
+    plant.step(u);
+    (void)guarded->update(plant.y, u);
+    const auto now = guarded->read();
+    ASSERT_LE(now.largest, bound * (1 + 64 * type.epsilon())) << k;
+    if (k == 999) {
+      ASSERT_NEAR(now.disturbance, 1, 0.05);
     }
-    EXPECT_FALSE(guarded.bounded());
-    EXPECT_NEAR(static_cast<double>(guarded.total_disturbance()), -1, 0.05);
-    typename O::Estimate far = guarded.estimate();
-    far(O::order) = S(1e6);
-    (void)guarded.reset(far);
-    EXPECT_TRUE(guarded.bounded());
-    EXPECT_NEAR(static_cast<double>(guarded.total_disturbance()), bound, 1e-5);
+    if (k == 999 || k == 1399) {
+      ASSERT_EQ(now.bounded, k == 1399);
+    }
+  }
+  EXPECT_FALSE(guarded->read().bounded);
+  EXPECT_NEAR(guarded->read().disturbance, -1, 0.05);
+  (void)guarded->set_disturbance(1e6);
+  EXPECT_TRUE(guarded->read().bounded);
+  EXPECT_NEAR(guarded->read().disturbance, bound, 1e-5);
+}
+
+TEST(GuardedObserver, BoundHolds) {
+  for (const guards::Type& type : bearing()) {
+    bound_holds(type, DisturbanceUnit::output);
+    bound_holds(type, DisturbanceUnit::input);
   }
 }
 
 /// A b0 that changes at every sample is the u that it makes of it.
-TYPED_TEST(GuardedObserver, GivenInputGainIsExact) {
-  using O = TypeParam;
-  using S = typename O::scalar_type;
-  auto plain = O::make(settings<O>()).value();
-  auto guarded = Guarded<O>::make({.observer = settings<O>()}).value();
+void given_input_gain_is_exact(const guards::Type& type) {
+  SCOPED_TRACE(type.name);
+  const auto plain = type.bare(0.3);
+  const auto guarded = type.guarded({});
   Random random(4);
-  S before(1);
+  double before = 1;
   for (int k = 0; k < 500; ++k) {
-    const S ratio = static_cast<S>(std::exp2(random.index(7) - 3));
-    ASSERT_TRUE(guarded.set_input_gain(static_cast<S>(b0) * ratio).has_value());
-    ASSERT_EQ(guarded.present_input_gain(), static_cast<S>(b0) * ratio);
-    const S y = static_cast<S>(random.uniform(-1, 1));
-    const S u = static_cast<S>(random.uniform(-1, 1));
+    const double ratio = std::exp2(random.index(7) - 3);
+    ASSERT_TRUE(guarded->set_input_gain(b0 * ratio));
+    ASSERT_EQ(guarded->present_input_gain(), b0 * ratio);
+    const double y = random.uniform(-1, 1);
+    const double u = random.uniform(-1, 1);
     // What was held until now was worked out with the b0 of before.
-    ASSERT_EQ(guarded.update(y, u), plain.update(y, u * before));
+    ASSERT_EQ(guarded->update(y, u), plain->update(y, u * before));
     before = ratio;
-    for (int i = 0; i < O::size; ++i) {
-      ASSERT_TRUE(same_bits(guarded.estimate()(i), plain.estimate()(i))) << k;
-    }
-    ASSERT_EQ(guarded.rest(y, u), plain.rest(y, u * ratio));
+    ASSERT_TRUE(guards::same(guarded->read().estimate, plain->read().estimate)) << k;
+    ASSERT_EQ(guarded->rest(y, u), plain->rest(y, u * ratio));
   }
 }
 
-/// After any sequence of trust, pins, b0, gaps and garbage: back in the time that a bare observer
-/// is given, and the samples of a release.
-TYPED_TEST(GuardedObserver, ComesBackInTheStatedTime) {
-  using O = TypeParam;
-  using S = typename O::scalar_type;
-  for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(long_run(100)); ++seed) {
-    Random random(seed);
-    const double omega_T = random.uniform(0.3, 2);
-    const int release = random.index(30);
-    auto guarded = Guarded<O>::make({.observer = settings<O>(omega_T),
-                                     .disturbance_bound = static_cast<S>(random.index(2) * 50.0),
-                                     .unit = static_cast<DisturbanceUnit>(random.index(2)),
-                                     .release_samples = release})
-                       .value();
-    ASSERT_NO_FATAL_FAILURE(esokit_test::play_garbage(guarded, random)) << seed;
-    const double e_folds = std::is_same_v<S, float> ? 210 : 1500;
-    const int samples = 60 + static_cast<int>(e_folds / omega_T) + release;
-    for (int k = 0; k < samples; ++k) (void)guarded.update(S(0.5), S(0));
-    ASSERT_FALSE(guarded.gated());
-    const double tolerance = 1e5 * static_cast<double>(std::numeric_limits<S>::epsilon());
-    ASSERT_NEAR(static_cast<double>(guarded.template estimate<0>()), 0.5, tolerance) << seed;
-    ASSERT_NEAR(static_cast<double>(guarded.total_disturbance()), 0,
-                tolerance * std::pow(omega_T / sample_time, O::order))
-        << seed;
-  }
+TEST(GuardedObserver, GivenInputGainIsExact) {
+  for (const guards::Type& type : bearing()) given_input_gain_is_exact(type);
 }
 
 // ---- the circle criterion
 
-/// min Re G by brute force; G from the correction of dhat back to the innovation.
-/// @param kept of dhat, after each correction
-double least_real_part(const ScaledGain<3, double>& k, double kept = 1) {
-  double least = 1e300;
-  for (int i = 0; i < 3000; ++i) {
-    const double angle = std::numbers::pi * std::pow(10.0, -6.0 + 6.0 * i / 2999.0);
-    const std::complex<double> z = std::polar(1.0, angle);
-    EigenMatrix<std::complex<double>, 3, 3> a;
-    const EigenMatrix<double, 3, 3> phi{{1, 1, 1}, {0, 1, 2}, {0, 0, 1}};
-    EigenMatrix<double, 3, 1> others(k[0], k[1], 0.0);
-    EigenMatrix<double, 3, 3> frozen = phi - others * phi.row(0);
-    frozen.row(2) *= kept;
-    a = (z * EigenMatrix<double, 3, 3>::Identity() - frozen).template cast<std::complex<double>>();
-    const EigenMatrix<std::complex<double>, 3, 1> of_d(0.0, 0.0, kept * k[2]);
-    const EigenMatrix<std::complex<double>, 3, 1> x = a.partialPivLu().solve(of_d);
-    least = std::min(least, (x(0) + x(1) + x(2)).real());
-  }
-  return least;
+double least_real_part(const ScaledGain<3, double>& k, double leak = 0) {
+  return guards::least_real_part({{1, 1, 1}, {0, 1, 2}, {0, 0, 1}}, {k[0], k[1], k[2]}, {0, 0, 1},
+                                 {0, 0, 1}, leak);
 }
 
 TEST(Gating, CertificateIsTheCircleCriterion) {
@@ -253,7 +173,7 @@ TEST(Gating, CertificateIsTheCircleCriterion) {
     ASSERT_EQ((gating_certified<3, double>(eso.level_gain(0))), least > -1) << least;
     (least > -1 ? proven : refused) += 1;
     const double leak = random.log_uniform(1e-4, 1);
-    const double leaking = least_real_part(eso.level_gain(0), 1 - leak);
+    const double leaking = least_real_part(eso.level_gain(0), leak);
     if (std::abs(leaking + 1) < 1e-3) continue;
     ASSERT_EQ((gating_certified<3, double>(eso.level_gain(0), leak)), leaking > -1) << leaking;
     saved += leaking > -1 && least < -1 ? 1 : 0;
@@ -489,10 +409,9 @@ void leak_leads_where_stated(double tolerance) {
 
 TEST(Leak, LeadsWhereTheDesignSays) {
   leak_leads_where_stated<LinearEso<1>>(1e-7);
-  leak_leads_where_stated<LinearEso<3>>(1e-7);
-  leak_leads_where_stated<CascadeEso<2, 3>>(1e-7);
+  leak_leads_where_stated<CascadeEso<3, 2>>(1e-7);
   leak_leads_where_stated<ReducedOrderEso<2>>(1e-7);
-  leak_leads_where_stated<DelayedInput<LinearEso<2, float>, 2>>(1e-2);
+  leak_leads_where_stated<Nested>(1e-2);
 }
 
 TEST(Leak, NoneIsNoError) {
