@@ -1,15 +1,15 @@
 // Lost, bad and late samples: what they cost, and what happens without care.
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/observer/linear_eso.hpp>
-#include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "loop_traits.hpp"
 
@@ -19,22 +19,58 @@ namespace control_missing_samples_test {
 using esokit::LinearEso;
 using esokit::VariableTime;
 
-/// Spectral radius of the error over `every` predictions and one correction, from the chain's
-/// matrices and the gain that is read off the observer.
+using Matrix = std::vector<std::vector<double>>;
+
+Matrix product(const Matrix& a, const Matrix& b) {
+  Matrix c(a.size(), std::vector<double>(a.size()));
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    for (std::size_t k = 0; k < a.size(); ++k) {
+      for (std::size_t j = 0; j < a.size(); ++j) c[i][j] += a[i][k] * b[k][j];
+    }
+  }
+  return c;
+}
+
+/// lim norm(A^m)^(1/m), of m = 2^40.
+double spectral_radius(Matrix a) {
+  double log_of_scale = 0;
+  for (int squarings = 0; squarings < 40; ++squarings) {
+    double norm = 0;
+    for (const auto& row : a) {
+      for (const double x : row) norm = std::max(norm, std::abs(x));
+    }
+    for (auto& row : a) {
+      for (double& x : row) x /= norm;
+    }
+    log_of_scale += std::ldexp(std::log(norm), -squarings);
+    a = product(a, a);
+  }
+  return std::exp(log_of_scale);
+}
+
+/// Of the error over `every` predictions and one correction, from the chain's matrices and the gain
+/// that is read off the observer.
 template <int Order>
 double spectral_radius(double omega_t, int every, bool follow) {
-  constexpr int N = Order + 1;
-  using Chain = esokit::IntegratorChain<Order, double>;
   auto observer =
       LinearEso<Order>::make({.observer_bandwidth = omega_t, .input_gain = 1, .sample_time = 1})
           .value();
   for (int i = 0; i < (follow ? every : 1); ++i) observer.predict(0);
   observer.correct(1);
-  const esokit::EigenMatrix<double, N> gain = observer.estimate();
-  esokit::EigenMatrix<double, N, N> error = esokit::EigenMatrix<double, N, N>::Identity();
-  for (int i = 0; i < every; ++i) error = Chain::transition_matrix(1.0) * error;
-  error = (esokit::EigenMatrix<double, N, N>::Identity() - gain * Chain::output_matrix()) * error;
-  return Eigen::MatrixXd(error).eigenvalues().cwiseAbs().maxCoeff();  // one solver for all N
+  constexpr std::size_t size = Order + 1;
+  Matrix error(size, std::vector<double>(size));
+  for (std::size_t i = 0; i < size; ++i) {
+    for (std::size_t j = i; j < size; ++j) {
+      const int power = static_cast<int>(j - i);
+      error[i][j] = std::pow(every, power) / factorial_of(power);
+    }
+  }
+  const auto first = error[0];
+  for (std::size_t i = 0; i < size; ++i) {
+    const double gain = observer.estimate()(static_cast<int>(i));
+    for (std::size_t j = 0; j < size; ++j) error[i][j] -= gain * first[j];
+  }
+  return spectral_radius(error);
 }
 
 template <int Order>
