@@ -93,7 +93,7 @@ struct LoopTraits<esokit::KnownModel<O, Friction<1, double>>> {
 
 using esokit::LinearEso;
 using DecoratedControllers = TypeList<
-    Adrc<esokit::DelayedInput<LinearEso<2>, 3>>, Adrc<esokit::WrappedOutput<LinearEso<2>>>,
+    Adrc<esokit::DelayedInput<LinearEso<2>, 3>>,
     Adrc<esokit::WrappedOutput<esokit::CascadeEso<2, 2>>, ErrorBased>,
     Adrc<esokit::VariableTime<LinearEso<2>>>, Adrc<esokit::Guarded<esokit::CascadeEso<2, 2>>>,
     Adrc<esokit::Guarded<LinearEso<1, float>>, ErrorBased>,
@@ -101,6 +101,6 @@ using DecoratedControllers = TypeList<
     Adrc<esokit::KnownModel<LinearEso<2>, Friction<1, double>>>,
     Adrc<esokit::VariableTime<esokit::WrappedOutput<esokit::DelayedInput<LinearEso<1, float>, 2>>>,
          ErrorBased>>;
-const bool registered = register_laws<ControllerLaws>("Decorated", DecoratedControllers{});
+const bool registered = register_controller_laws("Decorated", DecoratedControllers{});
 
 }  // namespace esokit_test

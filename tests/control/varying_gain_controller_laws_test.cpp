@@ -61,10 +61,9 @@ struct LoopTraits<esokit::ExtendedStateFilter<Order, S>> {
 
 using VaryingControllers = TypeList<
     Adrc<esokit::AlgebraicEso<2>>, Adrc<esokit::AlgebraicEso<1>, ErrorBased>,
-    Adrc<esokit::AlgebraicEso<2, float>>, Adrc<esokit::AdjustableBandwidthEso<2>>,
-    Adrc<esokit::AdjustableBandwidthEso<2>, ErrorBased>, Adrc<esokit::NonlinearEso<2, double, 1>>,
-    Adrc<esokit::NonlinearEso<1, double, 2>, ErrorBased>, Adrc<esokit::ExtendedStateFilter<2>>,
-    Adrc<esokit::ExtendedStateFilter<2>, ErrorBased>>;
-const bool registered = register_laws<ControllerLaws>("VaryingGain", VaryingControllers{});
+    Adrc<esokit::AlgebraicEso<2, float>>, Adrc<esokit::AdjustableBandwidthEso<2>, ErrorBased>,
+    Adrc<esokit::NonlinearEso<2, double, 1>>, Adrc<esokit::NonlinearEso<1, double, 2>, ErrorBased>,
+    Adrc<esokit::ExtendedStateFilter<2>>>;
+const bool registered = register_controller_laws("VaryingGain", VaryingControllers{});
 
 }  // namespace esokit_test
