@@ -15,7 +15,8 @@
 ///
 /// A latency that is wrong by part of a sample is more than a phase: near half the sample rate a
 /// sampled plant of one dead time can have next to no gain, and that of half a sample more a lot.
-/// So margins over latencies go by the largest gain that the plant has with any dead time.
+/// So margins over latencies follow the sampled plant from one end of the interval to the other,
+/// and where that is a sample or more, take what any dead time can make of it.
 #pragma once
 
 #include <algorithm>
@@ -140,9 +141,12 @@ class FastResponse {
 /// The response of a sampled plant is a sum over the frequencies that the samples do not tell from
 /// each other. A dead time turns each of them at its own rate.
 struct Aliases {
-  std::complex<double> direction;  ///< of the response at the frequency itself, magnitude one
-  double largest = 0.0;            ///< magnitude of the sum, over the dead times of a range
-  double any = 0.0;                ///< over all dead times
+  static constexpr int most_cells = 8;
+  std::complex<double> base;  ///< response at the frequency itself
+  double size = 0.0;          ///< its magnitude
+  double rest = 0.0;          ///< sum of the magnitudes at the others
+  int cells = 0;  ///< 0: the range of dead times is so large that the others turn freely
+  std::complex<double> sums[most_cells + 1];  ///< for the dead times at the ends of the cells
 };
 
 /// @param gain factor on b0 @param range by how much the dead time may differ either way, s
@@ -160,18 +164,20 @@ inline Aliases aliases(const TuneModel& model, double gain, double w, double ran
     for (int i = 1; i < model.order; ++i) part /= s;
     part *= std::exp(-s * model.dead_time);
     parts[k + most] = part;
-    found.any += std::abs(part);
+    if (k != 0) found.rest += std::abs(part);
   }
-  found.direction = parts[most] / std::abs(parts[most]);
-  found.largest = found.any;
-  if (range < 0.5 * T) {
-    found.largest = 0.0;
-    for (const double share : {-1.0, -0.5, 0.0, 0.5, 1.0}) {
-      Complex sum = 0.0;
-      for (int k = -most; k <= most; ++k) {
-        sum += parts[k + most] * std::polar(1.0, -2.0 * std::numbers::pi * k * share * range / T);
-      }
-      found.largest = std::max(found.largest, std::abs(sum));
+  found.base = parts[most];
+  found.size = std::abs(found.base);
+  if (range >= 0.5 * T) return found;
+  // A cell is short enough for a straight line: at most 0.4 rad of the frequency itself, and where
+  // the others count, an eighth of a turn of the nearest two.
+  found.cells =
+      found.rest < 0.02 * found.size ? 1 + static_cast<int>(5.0 * w * range) : Aliases::most_cells;
+  for (int cell = 0; cell <= found.cells; ++cell) {
+    const double late = (2.0 * cell / found.cells - 1.0) * range;
+    for (int k = -most; k <= most; ++k) {
+      found.sums[cell] +=
+          parts[k + most] * std::polar(1.0, -(w + 2.0 * std::numbers::pi * k / T) * late);
     }
   }
   return found;
@@ -331,18 +337,32 @@ class LoopCost {
   void margins(LoopNumbers& numbers, Trail& trail, Complex loop, const detail::Aliases& aliases,
                Complex gain, double size, std::size_t i) const {
     const Point& p = points_[i];
-    const Complex direction = -aliases.direction * gain;
+    const double base = size * aliases.size, rest = size * aliases.rest;
     double now = std::norm(1.0 + loop);
     // Where L is large nothing is near to -1, and that is half of all frequencies.
-    if (now < 16.0) {
-      if (range_ > 0.0) {
-        // As near to -1 as a latency of the range turns it.
-        const double toward = -direction.real(), across = std::abs(direction.imag());
-        const double nearest = toward >= size * p.turned.real()
-                                   ? size
-                                   : toward * p.turned.real() + across * p.turned.imag();
-        const double whole = aliases.largest * size;
-        now = std::min(now, 1.0 + whole * whole - 2.0 * aliases.largest * nearest);
+    if (range_ > 0.0 ? base - rest < 5.0 : now < 16.0) {
+      // As near to -1 as a latency of the range brings it.
+      if (range_ > 0.0 && aliases.cells > 0) {
+        Complex from = 1.0 - gain * aliases.sums[0];
+        for (int cell = 1; cell <= aliases.cells; ++cell) {
+          const Complex to = 1.0 - gain * aliases.sums[cell];
+          const Complex step = to - from;
+          const double share = -(from.real() * step.real() + from.imag() * step.imag());
+          const double length = std::norm(step);
+          now = std::min(now, share <= 0.0 ? std::norm(from)
+                              : share >= length
+                                  ? std::norm(to)
+                                  : std::max(std::norm(from) - share * share / length, 0.0));
+          from = to;
+        }
+      } else if (range_ > 0.0) {
+        const Complex middle = aliases.base * gain;
+        const double nearest =
+            middle.real() >= base * p.turned.real()
+                ? base
+                : middle.real() * p.turned.real() + std::abs(middle.imag()) * p.turned.imag();
+        const double distance = std::max(std::sqrt(1.0 + base * base - 2.0 * nearest) - rest, 0.0);
+        now = std::min(now, distance * distance);
       }
       double least = now;
       // A parabola through three points of which the middle one is smallest.
@@ -358,7 +378,7 @@ class LoopCost {
     const auto delay = [&](Complex there, double w) {
       numbers.delay = std::min(numbers.delay, detail::lag_to_minus_one(there) / w - range_);
     };
-    const Complex largest = aliases.any * direction;
+    const Complex largest = -(1.0 + aliases.rest / aliases.size) * aliases.base * gain;
     const double b = std::norm(largest);
     if (i > 0) {
       const double a = std::norm(trail.largest);
