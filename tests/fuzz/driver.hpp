@@ -3,7 +3,6 @@
 /// of observers.cpp, controllers.cpp or laws.cpp; a member with a new name by a line here.
 #pragma once
 
-#include <cstring>
 #include <esokit/adapter/guarded.hpp>
 #include <esokit/control/control_loop.hpp>
 #include <esokit/core/snapshot.hpp>
@@ -11,8 +10,7 @@
 #include <esokit/gain/step_status.hpp>
 #include <type_traits>
 
-#include "fuzz/config.hpp"
-#include "fuzz/run.hpp"
+#include "fuzz/game.hpp"
 
 namespace fuzz {
 
@@ -78,7 +76,7 @@ struct Nonlinear<T> {
 };
 
 template <class T>
-class Driver {
+class Driver final : public Game {
  public:
   using S = typename ScalarOf<T>::type;
   using Config = typename T::Config;
@@ -86,58 +84,25 @@ class Driver {
   static Failure run(Episode& episode) { return Driver(episode).play(); }
 
  private:
-  explicit Driver(Episode& episode) : episode_(episode) {}
+  explicit Driver(Episode& episode) : Game(episode, actions()) {}
 
-  // ------------------------------------------------------------------ the play
-  Failure play() {
-    Tape& tape = episode_.config;
-    if (episode_.random != nullptr)
-      tape.record(*episode_.random, episode_.mix);
-    else
-      tape.play();
-    Filler<S> filler(tape, order_of<T>(), chains());
+  void fill() override {
+    Filler<S> filler(episode_.config, order_of<T>(), chains());
     filler.fill(config_);
     promise_ = filler.promise;
-    calm_ = tape.plain();
-    if (episode_.random == nullptr) say("make(" + tape.text() + ")");
-    const long before = allocations();
-    auto made = T::make(config_);
-    if (allocations() != before) return "make allocates";
-    if (!made) return refusal(made.error());
-    episode_.made = true;
-    object_.emplace(*made);
-    if (Failure f = invariants()) return "after make: " + *f;
-
-    const auto& list = actions();
-    for (int k = 0;; ++k) {
-      Call* call = nullptr;
-      if (episode_.random != nullptr) {
-        if (k == episode_.length) break;
-        call = &episode_.calls.emplace_back();
-        call->action = episode_.random->index(static_cast<int>(list.size()));
-        call->tape.record(*episode_.random, episode_.call_mix);
-      } else {
-        if (k == static_cast<int>(episode_.calls.size())) break;
-        call = &episode_.calls[static_cast<std::size_t>(k)];
-        call->tape.play();
-      }
-      const Action& action = list[static_cast<std::size_t>(call->action)];
-      tape_ = &call->tape;
-      failure_.reset();
-      const T twin = *object_;
-      const std::vector<unsigned char> old = bytes(twin);
-
-      action.act(*this);
-      calm_ = calm_ && tape_->plain();
-      ++episode_.played;
-      if (episode_.random == nullptr) say(std::string(action.name) + "(" + tape_->text() + ")");
-      if (!failure_) failure_ = invariants();
-      if (!failure_ && bytes(twin) != old) failure_ = "a copy changed with the original";
-      if (failure_) return std::string(action.name) + ": " + *failure_;
-    }
-    if (episode_.recover && recoverable()) return recovery();
-    return {};
   }
+  bool make() override {
+    const auto made = quietly([&] { return T::make(config_); });
+    if (!made) {
+      explained(made.error().field, made.error().rule);
+      return false;
+    }
+    object_at_ = &object_.emplace(*made);
+    size_ = sizeof(T);
+    return true;
+  }
+  void copy() override { twin_at_ = &twin_.emplace(*object_); }
+  void act(const Action& action) override { reinterpret_cast<Act>(action.act)(*this); }
 
   /// Lengths of a filter's chains.
   static std::vector<int> chains() {
@@ -163,7 +128,7 @@ class Driver {
 
   /// How far a varying gain keeps from where a constant one rings undamped, 1 / (1 - c^N) with
   /// c = (1 + exp(-omega T)) / 2; one of a thousandth takes thousands of samples.
-  [[nodiscard]] bool far_from_ringing() const {
+  [[nodiscard]] bool far_from_ringing() const override {
     if constexpr (requires { innermost(config_).gain_max; }) {
       const auto& nonlinear = innermost(config_);
       if (!nonlinear.gain_max) return true;
@@ -177,82 +142,45 @@ class Driver {
     }
   }
 
-  void say(std::string text) {
-    if (episode_.loud) std::fprintf(stderr, "  %s\n", text.c_str());
-    episode_.text.push_back(std::move(text));
-  }
-
-  static std::vector<unsigned char> bytes(const T& object) {
-    return memory_of(static_cast<const void*>(&object), sizeof(T));
-  }
-
-  template <class E>
-  static Failure refusal(const E& error) {
-    if (*error.field == '\0' || *error.rule == '\0') return "a refusal without field or rule";
-    return {};
-  }
-
   /// One call, without allocation.
   template <class Function>
   auto quietly(Function&& call) {
     const long before = allocations();
     if constexpr (std::is_void_v<decltype(call())>) {
       call();
-      if (allocations() != before) fail("allocates");
+      without_allocation(before);
     } else {
       auto result = call();
-      if (allocations() != before) fail("allocates");
+      without_allocation(before);
       return result;
     }
-  }
-  void fail(const std::string& text) {
-    if (!failure_) failure_ = text;
   }
 
   /// What must not change anything where it is refused.
   template <class Function>
   void refusable(Function&& call) {
-    const auto before = bytes(*object_);
+    remember();
     const auto outcome = quietly(call);
-    bool accepted;
     if constexpr (std::is_same_v<std::remove_const_t<decltype(outcome)>, StepStatus>) {
-      accepted = outcome == StepStatus::ok;
+      answered(outcome == StepStatus::ok);
     } else {
-      accepted = static_cast<bool>(outcome);
+      answered(static_cast<bool>(outcome));
       if constexpr (requires { outcome.error(); }) {
-        if (!outcome) {
-          if (const auto wrong = refusal(outcome.error())) fail(*wrong);
-        }
+        if (!outcome) explained(outcome.error().field, outcome.error().rule);
       }
     }
-    if (!accepted && bytes(*object_) != before) fail("refused, but something changed");
-    accepted_ = accepted;
   }
 
   // ------------------------------------------------------------------ invariants of steps
   /// @param y null where none was given
   void stepped(StepStatus status, const S* y, const S* u) {
-    const auto y_fine = y == nullptr || is_finite(*y);
-    const auto u_fine = u == nullptr || is_finite(*u);
-    if (!y_fine && !has(status, StepStatus::measurement_rejected)) fail("a bad y is not reported");
-    if (!u_fine && !has(status, StepStatus::input_rejected)) fail("a bad u is not reported");
-    if (calm_ && promise_.certain && tape_->plain()) {
-      for (const StepStatus flag : {StepStatus::measurement_rejected, StepStatus::input_rejected,
-                                    StepStatus::prediction_dropped, StepStatus::state_rejected}) {
-        if (has(status, flag)) fail("good numbers are reported as bad");
-      }
-    }
+    Game::stepped(status, y == nullptr || is_finite(*y), u == nullptr || is_finite(*u));
   }
 
   /// A controller put out u; `from` is what the actuator held before.
   void put_out(S u, S from) {
     if (!is_finite(u)) return fail("u is not finite");
     check_limits(config_.limits, u, from);
-    if constexpr (requires(const T& o) {
-                    o.status();
-                    o.missed();
-                  }) {
-    }
   }
 
   template <class L>
@@ -309,8 +237,9 @@ class Driver {
     return true;
   }
 
+  /// What is not, null where all is.
   template <class O>
-  static Failure finite(const O& o, bool calm) {
+  static const char* finite(const O& o, bool calm) {
 // An observable by its name.
 #define FINITE(member)                                    \
   if constexpr (requires { o.member; }) {                 \
@@ -355,32 +284,30 @@ class Driver {
     if constexpr (requires { o.missed(); }) {
       if (o.missed() < 0 || o.missed() > 65535) return "missed() is no count";
     }
-    return {};
+    return nullptr;
   }
 
-  Failure invariants() {
-    if (Failure f = finite(*object_, calm_)) return f;
+  void invariants() override {
+    if (const char* text = finite(*object_, calm_)) fail(text);
     if constexpr (requires(const T& o) { o.observer().missed(); }) {
-      if (Failure f = finite(object_->observer(), calm_)) return "observer: " + *f;
+      if (const char* text = finite(object_->observer(), calm_)) fail("observer", text);
     }
     if constexpr (requires(const T& o) { o.controller().output(); }) {
-      if (Failure f = finite(object_->controller(), calm_)) return "controller: " + *f;
+      if (const char* text = finite(object_->controller(), calm_)) fail("controller", text);
     }
     if constexpr (requires(const T& o) { o.template observer<0>(); }) {
-      Failure f;
       esokit::detail::unroll<T::channels>([&](auto i) {
-        if (!f) f = finite(object_->template observer<i>(), calm_);
+        if (const char* text = finite(object_->template observer<i>(), calm_))
+          fail("observer", text);
       });
-      if (f) return "observer: " + *f;
     }
-    return {};
   }
 
   // ------------------------------------------------------------------ calls
-  struct Action {
-    const char* name;
-    void (*act)(Driver&);
-  };
+  using Act = void (*)(Driver&);
+  static void add(std::vector<Action>& a, const char* name, Act act) {
+    add_action(a, name, reinterpret_cast<void (*)()>(act));
+  }
 
   S number(const Range& range = signal) { return tape_->template number<S>(range); }
   template <class V>
@@ -450,127 +377,122 @@ class Driver {
                       { o.update(s, s) } -> std::same_as<StepStatus>;
                     }) {
         for (int weight = 0; weight < 4; ++weight) {
-          a.push_back({"update", [](Driver& d) {
-                         const S y = d.number(), u = d.number();
-                         d.stepped(d.quietly([&] { return d.object_->update(y, u); }), &y, &u);
-                       }});
+          add(a, "update", [](Driver& d) {
+            const S y = d.number(), u = d.number();
+            d.stepped(d.quietly([&] { return d.object_->update(y, u); }), &y, &u);
+          });
         }
-        a.push_back({"predict", [](Driver& d) {
-                       const S u = d.number();
-                       d.stepped(d.quietly([&] { return d.object_->predict(u); }), nullptr, &u);
-                     }});
-        a.push_back({"predict several times", [](Driver& d) {
-                       const int count = d.tape_->choice(130);
-                       const S u = d.number();
-                       for (int i = 0; i < count; ++i) {
-                         d.stepped(d.quietly([&] { return d.object_->predict(u); }), nullptr, &u);
-                       }
-                     }});
-        a.push_back({"correct", [](Driver& d) {
-                       const S y = d.number();
-                       const auto before = d.object_->estimate();
-                       const StepStatus status = d.quietly([&] { return d.object_->correct(y); });
-                       d.stepped(status, &y, nullptr);
-                       if (status == StepStatus::measurement_rejected ||
-                           status == StepStatus::outlier_rejected) {
-                         // VariableTime takes the mean of the steps before it looks at y: that
-                         // rounds. WrappedOutput recentres: the same angle.
-                         constexpr bool another_number = requires(T & o, S s) {
-                           o.set_step_time(s);
-                         }
-                         || requires(T & o, S s) { o.wrap(s); };
-                         if (!another_number && d.object_->estimate() != before) {
-                           d.fail("rejected, but the estimate changed");
-                         }
-                       }
-                     }});
-        a.push_back({"reset(y)", [](Driver& d) {
-                       const S y = d.number();
-                       d.refusable([&] { return d.object_->reset(y); });
-                       if (!is_finite(y) && d.accepted_) d.fail("a bad y is taken");
-                       if (d.calm_ && d.tape_->plain() && !d.accepted_)
-                         d.fail("a good y is refused");
-                     }});
-        a.push_back({"reset(state)", [](Driver& d) {
-                       const auto z = d.template state<typename T::Estimate>();
-                       d.refusable([&] { return d.object_->reset(z); });
-                       if (!fine(z) && d.accepted_) d.fail("a bad state is taken");
-                     }});
-        a.push_back({"const members", [](Driver& d) {
-                       const S x = d.number();
-                       const auto before = bytes(*d.object_);
-                       d.quietly([&] { look(*d.object_, x); });
-                       if (bytes(*d.object_) != before) d.fail("a const member changed something");
-                     }});
+        add(a, "predict", [](Driver& d) {
+          const S u = d.number();
+          d.stepped(d.quietly([&] { return d.object_->predict(u); }), nullptr, &u);
+        });
+        add(a, "predict several times", [](Driver& d) {
+          const int count = d.tape_->choice(130);
+          const S u = d.number();
+          for (int i = 0; i < count; ++i) {
+            d.stepped(d.quietly([&] { return d.object_->predict(u); }), nullptr, &u);
+          }
+        });
+        add(a, "correct", [](Driver& d) {
+          const S y = d.number();
+          const auto before = d.object_->estimate();
+          const StepStatus status = d.quietly([&] { return d.object_->correct(y); });
+          d.stepped(status, &y, nullptr);
+          if (status == StepStatus::measurement_rejected ||
+              status == StepStatus::outlier_rejected) {
+            // VariableTime takes the mean of the steps before it looks at y: that
+            // rounds. WrappedOutput recentres: the same angle.
+            constexpr bool another_number = requires(T & o, S s) { o.set_step_time(s); }
+            || requires(T & o, S s) { o.wrap(s); };
+            if (!another_number && d.object_->estimate() != before) {
+              d.fail("rejected, but the estimate changed");
+            }
+          }
+        });
+        add(a, "reset(y)", [](Driver& d) {
+          const S y = d.number();
+          d.refusable([&] { return d.object_->reset(y); });
+          if (!is_finite(y) && d.accepted_) d.fail("a bad y is taken");
+          if (d.calm_ && d.tape_->plain() && !d.accepted_) d.fail("a good y is refused");
+        });
+        add(a, "reset(state)", [](Driver& d) {
+          const auto z = d.template state<typename T::Estimate>();
+          d.refusable([&] { return d.object_->reset(z); });
+          if (!fine(z) && d.accepted_) d.fail("a bad state is taken");
+        });
+        add(a, "const members", [](Driver& d) {
+          const S x = d.number();
+          d.remember();
+          d.quietly([&] { look(*d.object_, x); });
+          if (d.changed()) d.fail("a const member changed something");
+        });
       }
       if constexpr (requires(T & o, S s) { o.revise_input(s); }) {
-        a.push_back({"revise_input", [](Driver& d) {
-                       const S u = d.number();
-                       d.refusable([&] { return d.object_->revise_input(u); });
-                     }});
+        add(a, "revise_input", [](Driver& d) {
+          const S u = d.number();
+          d.refusable([&] { return d.object_->revise_input(u); });
+        });
       }
       if constexpr (requires(T & o, S s) { o.update_weighted(s, s, s); }) {
-        a.push_back({"update_weighted", [](Driver& d) {
-                       const S y = d.number(), u = d.number(), r = d.number({1e-3, 1, true});
-                       d.stepped(d.quietly([&] { return d.object_->update_weighted(y, u, r); }), &y,
-                                 &u);
-                     }});
-        a.push_back({"correct_weighted", [](Driver& d) {
-                       const S y = d.number(), r = d.number({1e-3, 1, true});
-                       d.stepped(d.quietly([&] { return d.object_->correct_weighted(y, r); }), &y,
-                                 nullptr);
-                     }});
+        add(a, "update_weighted", [](Driver& d) {
+          const S y = d.number(), u = d.number(), r = d.number({1e-3, 1, true});
+          d.stepped(d.quietly([&] { return d.object_->update_weighted(y, u, r); }), &y, &u);
+        });
+        add(a, "correct_weighted", [](Driver& d) {
+          const S y = d.number(), r = d.number({1e-3, 1, true});
+          d.stepped(d.quietly([&] { return d.object_->correct_weighted(y, r); }), &y, nullptr);
+        });
       }
       if constexpr (requires(T & o, S s) { o.set_trust(s); }) {
-        a.push_back({"set_trust", [](Driver& d) {
-                       const S phi = d.number({0, 1});
-                       d.quietly([&] { d.object_->set_trust(phi); });
-                     }});
-        a.push_back({"set_pin", [](Driver& d) {
-                       const int where = d.tape_->choice(4);
-                       d.quietly([&] { d.object_->set_pin(static_cast<esokit::Pin>(where)); });
-                     }});
-        a.push_back({"hold", [](Driver& d) {
-                       const S u = d.number();
-                       d.quietly([&] { return d.object_->hold(u); });
-                     }});
-        a.push_back({"release", [](Driver& d) { d.quietly([&] { d.object_->release(); }); }});
+        add(a, "set_trust", [](Driver& d) {
+          const S phi = d.number({0, 1});
+          d.quietly([&] { d.object_->set_trust(phi); });
+        });
+        add(a, "set_pin", [](Driver& d) {
+          const int where = d.tape_->choice(4);
+          d.quietly([&] { d.object_->set_pin(static_cast<esokit::Pin>(where)); });
+        });
+        add(a, "hold", [](Driver& d) {
+          const S u = d.number();
+          d.quietly([&] { return d.object_->hold(u); });
+        });
+        add(a, "release", [](Driver& d) { d.quietly([&] { d.object_->release(); }); });
       }
       if constexpr (requires(T & o, S s) { o.set_input_gain(s); }) {
-        a.push_back({"set_input_gain", [](Driver& d) {
-                       const S b = config_gain(d.config_) * d.number({1e-2, 10, true});
-                       d.refusable([&] { return d.object_->set_input_gain(b); });
-                     }});
+        add(a, "set_input_gain", [](Driver& d) {
+          const S b = config_gain(d.config_) * d.number({1e-2, 10, true});
+          d.refusable([&] { return d.object_->set_input_gain(b); });
+        });
       }
       if constexpr (requires(T & o) { o.rearm(); }) {
-        a.push_back({"rearm", [](Driver& d) { d.quietly([&] { d.object_->rearm(); }); }});
+        add(a, "rearm", [](Driver& d) { d.quietly([&] { d.object_->rearm(); }); });
       }
       if constexpr (requires(T & o) { o.observer().rearm(); }) {
-        a.push_back({"observer().rearm",
-                     [](Driver& d) { d.quietly([&] { d.object_->observer().rearm(); }); }});
+        add(a, "observer().rearm",
+            [](Driver& d) { d.quietly([&] { d.object_->observer().rearm(); }); });
       }
       if constexpr (requires(T & o, S s) { o.shift_output(s); }) {
-        a.push_back({"shift_output", [](Driver& d) {
-                       const S x = d.number();
-                       d.shift(x, [&] { d.object_->shift_output(x); });
-                     }});
-        a.push_back({"shift_disturbance", [](Driver& d) {
-                       const S x = d.number();
-                       d.shift(x, [&] { d.object_->shift_disturbance(x); });
-                     }});
+        add(a, "shift_output", [](Driver& d) {
+          const S x = d.number();
+          d.shift(x, [&] { d.object_->shift_output(x); });
+        });
+        add(a, "shift_disturbance", [](Driver& d) {
+          const S x = d.number();
+          d.shift(x, [&] { d.object_->shift_disturbance(x); });
+        });
       }
       if constexpr (requires(T & o, S s) { o.fill_input(s); }) {
-        a.push_back({"fill_input", [](Driver& d) {
-                       const S x = d.number();
-                       d.shift(x, [&] { d.object_->fill_input(x); });
-                     }});
+        add(a, "fill_input", [](Driver& d) {
+          const S x = d.number();
+          d.shift(x, [&] { d.object_->fill_input(x); });
+        });
       }
       if constexpr (requires(T & o, S s) { o.set_step_time(s); }) {
-        a.push_back({"set_step_time", [](Driver& d) {
-                       const double t = d.promise_.sample_time;
-                       const S seconds = d.number({0.6 * t, 1.6 * t});
-                       d.refusable([&] { return d.object_->set_step_time(seconds); });
-                     }});
+        add(a, "set_step_time", [](Driver& d) {
+          const double t = d.promise_.sample_time;
+          const S seconds = d.number({0.6 * t, 1.6 * t});
+          d.refusable([&] { return d.object_->set_step_time(seconds); });
+        });
       }
       // A controller's.
       if constexpr (!takes_applied_input && requires(T & o, S s) {
@@ -578,10 +500,10 @@ class Driver {
                       o.output();
                     }) {
         for (int weight = 0; weight < 4; ++weight) {
-          a.push_back({"update(y, r)", [](Driver& d) {
-                         const S y = d.number(), r = d.number();
-                         d.control(&y, nullptr, [&] { return d.object_->update(y, r); });
-                       }});
+          add(a, "update(y, r)", [](Driver& d) {
+            const S y = d.number(), r = d.number();
+            d.control(&y, nullptr, [&] { return d.object_->update(y, r); });
+          });
         }
       }
       if constexpr (requires(T & o, S s) {
@@ -589,93 +511,87 @@ class Driver {
                       o.output();
                     }) {
         for (int weight = 0; weight < 2; ++weight) {
-          a.push_back({"update(y, r, u)", [](Driver& d) {
-                         const S y = d.number(), r = d.number(), u = d.number();
-                         d.control(&y, &u, [&] { return d.object_->update(y, r, u); });
-                       }});
+          add(a, "update(y, r, u)", [](Driver& d) {
+            const S y = d.number(), r = d.number(), u = d.number();
+            d.control(&y, &u, [&] { return d.object_->update(y, r, u); });
+          });
         }
       }
       if constexpr (TakesReferences<T>) {
-        a.push_back({"update(y, references)", [](Driver& d) {
-                       const S y = d.number();
-                       const auto r = d.template state<typename T::Reference>();
-                       d.control(&y, nullptr, [&] { return d.object_->update(y, r); });
-                     }});
-        a.push_back({"update(y, references, u)", [](Driver& d) {
-                       const S y = d.number();
-                       const auto r = d.template state<typename T::Reference>();
-                       const S u = d.number();
-                       d.control(&y, &u, [&] { return d.object_->update(y, r, u); });
-                     }});
-        a.push_back({"update_without_measurement(references)", [](Driver& d) {
-                       const auto r = d.template state<typename T::Reference>();
-                       d.control(nullptr, nullptr,
-                                 [&] { return d.object_->update_without_measurement(r); });
-                     }});
+        add(a, "update(y, references)", [](Driver& d) {
+          const S y = d.number();
+          const auto r = d.template state<typename T::Reference>();
+          d.control(&y, nullptr, [&] { return d.object_->update(y, r); });
+        });
+        add(a, "update(y, references, u)", [](Driver& d) {
+          const S y = d.number();
+          const auto r = d.template state<typename T::Reference>();
+          const S u = d.number();
+          d.control(&y, &u, [&] { return d.object_->update(y, r, u); });
+        });
+        add(a, "update_without_measurement(references)", [](Driver& d) {
+          const auto r = d.template state<typename T::Reference>();
+          d.control(nullptr, nullptr, [&] { return d.object_->update_without_measurement(r); });
+        });
       }
       if constexpr (requires(T & o, S s) { o.update_without_measurement(s); }) {
-        a.push_back({"update_without_measurement several times", [](Driver& d) {
-                       const int count = 1 + d.tape_->choice(80);
-                       const S r = d.number();
-                       for (int i = 0; i < count; ++i) {
-                         d.control(nullptr, nullptr,
-                                   [&] { return d.object_->update_without_measurement(r); });
-                       }
-                     }});
+        add(a, "update_without_measurement several times", [](Driver& d) {
+          const int count = 1 + d.tape_->choice(80);
+          const S r = d.number();
+          for (int i = 0; i < count; ++i) {
+            d.control(nullptr, nullptr, [&] { return d.object_->update_without_measurement(r); });
+          }
+        });
       }
       if constexpr (requires(T & o, S s) { o.update_driven(s, s, s); }) {
-        a.push_back({"update_driven", [](Driver& d) {
-                       const S y = d.number(), base = d.number(), drive = d.number();
-                       d.control(&y, nullptr,
-                                 [&] { return d.object_->update_driven(y, base, drive); });
-                     }});
+        add(a, "update_driven", [](Driver& d) {
+          const S y = d.number(), base = d.number(), drive = d.number();
+          d.control(&y, nullptr, [&] { return d.object_->update_driven(y, base, drive); });
+        });
       }
       if constexpr (requires(T & o, S s) { o.hold(s, s, s); }) {
-        a.push_back({"hold", [](Driver& d) {
-                       const S y = d.number(), r = d.number(), u = d.number();
-                       d.tracked(d.quietly([&] { return d.object_->hold(y, r, u); }));
-                     }});
+        add(a, "hold", [](Driver& d) {
+          const S y = d.number(), r = d.number(), u = d.number();
+          d.tracked(d.quietly([&] { return d.object_->hold(y, r, u); }));
+        });
       }
       if constexpr (requires(T & o, S s) { o.observer().set_trust(s); }) {
-        a.push_back({"observer().set_trust", [](Driver& d) {
-                       const S phi = d.number({0, 1});
-                       d.quietly([&] { d.object_->observer().set_trust(phi); });
-                     }});
-        a.push_back({"observer().set_pin", [](Driver& d) {
-                       const int where = d.tape_->choice(4);
-                       d.quietly(
-                           [&] { d.object_->observer().set_pin(static_cast<esokit::Pin>(where)); });
-                     }});
+        add(a, "observer().set_trust", [](Driver& d) {
+          const S phi = d.number({0, 1});
+          d.quietly([&] { d.object_->observer().set_trust(phi); });
+        });
+        add(a, "observer().set_pin", [](Driver& d) {
+          const int where = d.tape_->choice(4);
+          d.quietly([&] { d.object_->observer().set_pin(static_cast<esokit::Pin>(where)); });
+        });
       }
       if constexpr (requires(T & o, S s) { o.track(s, s, s); }) {
-        a.push_back({"track", [](Driver& d) {
-                       const S y = d.number(), r = d.number(), u = d.number();
-                       d.tracked(d.quietly([&] { return d.object_->track(y, r, u); }));
-                     }});
+        add(a, "track", [](Driver& d) {
+          const S y = d.number(), r = d.number(), u = d.number();
+          d.tracked(d.quietly([&] { return d.object_->track(y, r, u); }));
+        });
       } else if constexpr (requires(T & o, S s) {
                              o.track(s, s);
                              o.compensation();
                            }) {
-        a.push_back({"track", [](Driver& d) {
-                       const S y = d.number(), u = d.number();
-                       d.tracked(d.quietly([&] { return d.object_->track(y, u); }));
-                     }});
+        add(a, "track", [](Driver& d) {
+          const S y = d.number(), u = d.number();
+          d.tracked(d.quietly([&] { return d.object_->track(y, u); }));
+        });
       }
       if constexpr (requires(T & o, S s) { o.start(s, s); }) {
-        a.push_back({"start(y, u)", [](Driver& d) {
-                       const S y = d.number(), u = d.number();
-                       d.refusable([&] { return d.object_->start(y, u); });
-                       if (!(is_finite(y) && is_finite(u)) && d.accepted_)
-                         d.fail("a bad start is taken");
-                     }});
+        add(a, "start(y, u)", [](Driver& d) {
+          const S y = d.number(), u = d.number();
+          d.refusable([&] { return d.object_->start(y, u); });
+          if (!(is_finite(y) && is_finite(u)) && d.accepted_) d.fail("a bad start is taken");
+        });
       }
       if constexpr (requires(T & o, S s) { o.start(s, s, s); }) {
-        a.push_back({"start(y, u, r)", [](Driver& d) {
-                       const S y = d.number(), u = d.number(), r = d.number();
-                       d.refusable([&] { return d.object_->start(y, u, r); });
-                       if (!(is_finite(y) && is_finite(u)) && d.accepted_)
-                         d.fail("a bad start is taken");
-                     }});
+        add(a, "start(y, u, r)", [](Driver& d) {
+          const S y = d.number(), u = d.number(), r = d.number();
+          d.refusable([&] { return d.object_->start(y, u, r); });
+          if (!(is_finite(y) && is_finite(u)) && d.accepted_) d.fail("a bad start is taken");
+        });
       }
       if constexpr (requires(T & o, S s) {
                       o.control(s);
@@ -687,35 +603,33 @@ class Driver {
           requires { T::channels; } || requires { T::outputs; })
         several(a);
       // Any.
-      a.push_back({"retune", [](Driver& d) {
-                     Config config{};
-                     Filler<S> filler(*d.tape_, order_of<T>(), chains());
-                     filler.fill(config);
-                     if constexpr (requires(T & o) { o.retune(config); }) {
-                       d.refusable([&] { return d.object_->retune(config); });
-                       if (d.accepted_) {
-                         d.config_ = config;
-                         // A sample time that stays: what is running goes on.
-                         filler.promise.waiting += d.promise_.waiting;
-                         d.promise_ = filler.promise;
-                       }
-                     } else {
-                       const auto made = d.quietly([&] { return T::make(config); });
-                       if (!made) {
-                         if (const auto wrong = refusal(made.error())) d.fail(*wrong);
-                       }
-                     }
-                   }});
+      add(a, "retune", [](Driver& d) {
+        Config config{};
+        Filler<S> filler(*d.tape_, order_of<T>(), chains());
+        filler.fill(config);
+        if constexpr (requires(T & o) { o.retune(config); }) {
+          d.refusable([&] { return d.object_->retune(config); });
+          if (d.accepted_) {
+            d.config_ = config;
+            // A sample time that stays: what is running goes on.
+            filler.promise.waiting += d.promise_.waiting;
+            d.promise_ = filler.promise;
+          }
+        } else {
+          const auto made = d.quietly([&] { return T::make(config); });
+          if (!made) d.explained(made.error().field, made.error().rule);
+        }
+      });
       if constexpr (requires(const T& o) {
                       esokit::snapshot(o);
                       typename T::scalar_type;
                     }) {
-        a.push_back({"snapshot", [](Driver& d) {
-                       const auto words = esokit::snapshot(*d.object_);
-                       const auto restored = esokit::from_snapshot<T>(words);
-                       if (!restored) return d.fail("its own snapshot is refused");
-                       d.object_.emplace(*restored);
-                     }});
+        add(a, "snapshot", [](Driver& d) {
+          const auto words = esokit::snapshot(*d.object_);
+          const auto restored = esokit::from_snapshot<T>(words);
+          if (!restored) return d.fail("its own snapshot is refused");
+          d.object_.emplace(*restored);
+        });
       }
       law(a);
       return a;
@@ -725,9 +639,9 @@ class Driver {
 
   template <class Function>
   void shift(const S& x, Function&& call) {
-    const auto before = bytes(*object_);
+    remember();
     quietly(call);
-    if (!is_finite(x) && bytes(*object_) != before) fail("a bad number changed something");
+    if (!is_finite(x) && changed()) fail("a bad number changed something");
   }
 
   void tracked(S u) {
@@ -753,58 +667,56 @@ class Driver {
 
   static void two_phases(std::vector<Action>& a) {
     for (int weight = 0; weight < 3; ++weight) {
-      a.push_back({"control, prepare", [](Driver& d) {
-                     const S y = d.number(), r = d.number();
-                     const S from = d.object_->output();
-                     const S u = d.quietly([&] { return d.object_->control(y); });
-                     d.put_out(u, from);
-                     const StepStatus status = d.quietly([&] { return d.object_->prepare(r); });
-                     d.stepped(status, &y, nullptr);
-                     if (status != d.object_->status()) d.fail("status() is another one");
-                   }});
+      add(a, "control, prepare", [](Driver& d) {
+        const S y = d.number(), r = d.number();
+        const S from = d.object_->output();
+        const S u = d.quietly([&] { return d.object_->control(y); });
+        d.put_out(u, from);
+        const StepStatus status = d.quietly([&] { return d.object_->prepare(r); });
+        d.stepped(status, &y, nullptr);
+        if (status != d.object_->status()) d.fail("status() is another one");
+      });
     }
-    a.push_back({"update", [](Driver& d) {
-                   const S y = d.number(), r = d.number();
-                   const S from = d.object_->output();
-                   d.put_out(d.quietly([&] { return d.object_->update(y, r); }), from);
-                 }});
-    a.push_back({"control_without_measurement, prepare several times", [](Driver& d) {
-                   const int count = 1 + d.tape_->choice(80);
-                   const S r = d.number();
-                   for (int i = 0; i < count; ++i) {
-                     const S from = d.object_->output();
-                     d.put_out(d.quietly([&] { return d.object_->control_without_measurement(); }),
-                               from);
-                     (void)d.object_->prepare(r);
-                   }
-                 }});
-    a.push_back({"control, report_applied, prepare(references)", [](Driver& d) {
-                   const S y = d.number(), u = d.number();
-                   const auto r = d.template state<typename T::Reference>();
-                   const S from = d.object_->output();
-                   d.put_out(d.quietly([&] { return d.object_->control(y); }), from);
-                   const StepStatus reported =
-                       d.quietly([&] { return d.object_->report_applied(u); });
-                   if (!is_finite(u) && !has(reported, StepStatus::input_rejected))
-                     d.fail("a bad u is not reported");
-                   d.stepped(d.quietly([&] { return d.object_->prepare(r); }), &y, nullptr);
-                 }});
-    a.push_back({"report_applied", [](Driver& d) {
-                   const S u = d.number();
-                   (void)d.quietly([&] { return d.object_->report_applied(u); });
-                 }});
-    a.push_back({"set_reference", [](Driver& d) {
-                   const S r = d.number();
-                   d.quietly([&] { d.object_->set_reference(r); });
-                 }});
-    a.push_back({"set_reference(references)", [](Driver& d) {
-                   const auto r = d.template state<typename T::Reference>();
-                   d.quietly([&] { d.object_->set_reference(r); });
-                 }});
-    a.push_back({"reset", [](Driver& d) {
-                   const S y = d.number();
-                   d.refusable([&] { return d.object_->reset(y); });
-                 }});
+    add(a, "update", [](Driver& d) {
+      const S y = d.number(), r = d.number();
+      const S from = d.object_->output();
+      d.put_out(d.quietly([&] { return d.object_->update(y, r); }), from);
+    });
+    add(a, "control_without_measurement, prepare several times", [](Driver& d) {
+      const int count = 1 + d.tape_->choice(80);
+      const S r = d.number();
+      for (int i = 0; i < count; ++i) {
+        const S from = d.object_->output();
+        d.put_out(d.quietly([&] { return d.object_->control_without_measurement(); }), from);
+        (void)d.object_->prepare(r);
+      }
+    });
+    add(a, "control, report_applied, prepare(references)", [](Driver& d) {
+      const S y = d.number(), u = d.number();
+      const auto r = d.template state<typename T::Reference>();
+      const S from = d.object_->output();
+      d.put_out(d.quietly([&] { return d.object_->control(y); }), from);
+      const StepStatus reported = d.quietly([&] { return d.object_->report_applied(u); });
+      if (!is_finite(u) && !has(reported, StepStatus::input_rejected))
+        d.fail("a bad u is not reported");
+      d.stepped(d.quietly([&] { return d.object_->prepare(r); }), &y, nullptr);
+    });
+    add(a, "report_applied", [](Driver& d) {
+      const S u = d.number();
+      (void)d.quietly([&] { return d.object_->report_applied(u); });
+    });
+    add(a, "set_reference", [](Driver& d) {
+      const S r = d.number();
+      d.quietly([&] { d.object_->set_reference(r); });
+    });
+    add(a, "set_reference(references)", [](Driver& d) {
+      const auto r = d.template state<typename T::Reference>();
+      d.quietly([&] { d.object_->set_reference(r); });
+    });
+    add(a, "reset", [](Driver& d) {
+      const S y = d.number();
+      d.refusable([&] { return d.object_->reset(y); });
+    });
   }
 
   static void increments(std::vector<Action>& a) {
@@ -817,17 +729,17 @@ class Driver {
     };
     static_cast<void>(step);
     for (int weight = 0; weight < 3; ++weight) {
-      a.push_back({"increment", [](Driver& d) {
-                     const S y = d.number(), r = d.number();
-                     const S change = d.quietly([&] { return d.object_->update(y, r); });
-                     d.incremented(change);
-                   }});
+      add(a, "increment", [](Driver& d) {
+        const S y = d.number(), r = d.number();
+        const S change = d.quietly([&] { return d.object_->update(y, r); });
+        d.incremented(change);
+      });
     }
-    a.push_back({"increment, reported", [](Driver& d) {
-                   const S y = d.number(), r = d.number(), applied = d.number();
-                   const S change = d.quietly([&] { return d.object_->update(y, r, applied); });
-                   d.incremented(change);
-                 }});
+    add(a, "increment, reported", [](Driver& d) {
+      const S y = d.number(), r = d.number(), applied = d.number();
+      const S change = d.quietly([&] { return d.object_->update(y, r, applied); });
+      d.incremented(change);
+    });
   }
 
   void incremented(S change) {
@@ -842,82 +754,81 @@ class Driver {
   static void several(std::vector<Action>& a) {
     if constexpr (requires { T::channels; }) {
       using V = typename T::Output;
-      a.push_back({"update", [](Driver& d) {
-                     const V y = d.template vector<V>(), r = d.template vector<V>();
-                     const V from = d.object_->output();
-                     d.all_out(y, d.quietly([&] { return d.object_->update(y, r); }), from);
-                   }});
-      a.push_back({"update, reported", [](Driver& d) {
-                     const V y = d.template vector<V>(), r = d.template vector<V>(),
-                             u = d.template vector<V>();
-                     V from = d.object_->output();
-                     for (int i = 0; i < from.size(); ++i) {
-                       if (is_finite(u(i))) from(i) = u(i);
-                     }
-                     d.all_out(y, d.quietly([&] { return d.object_->update(y, r, u); }), from);
-                   }});
-      a.push_back({"start", [](Driver& d) {
-                     const V y = d.template vector<V>(), u = d.template vector<V>();
-                     d.refusable([&] { return d.object_->start(y, u); });
-                     if (!(fine(y) && fine(u)) && d.accepted_) d.fail("a bad start is taken");
-                   }});
-      a.push_back({"set_input_matrix", [](Driver& d) {
-                     auto b = d.config_.input_matrix;
-                     for (auto& x : b) x = x * d.number({0.5, 2});
-                     d.refusable([&] { return d.object_->set_input_matrix(b); });
-                   }});
+      add(a, "update", [](Driver& d) {
+        const V y = d.template vector<V>(), r = d.template vector<V>();
+        const V from = d.object_->output();
+        d.all_out(y, d.quietly([&] { return d.object_->update(y, r); }), from);
+      });
+      add(a, "update, reported", [](Driver& d) {
+        const V y = d.template vector<V>(), r = d.template vector<V>(), u = d.template vector<V>();
+        V from = d.object_->output();
+        for (int i = 0; i < from.size(); ++i) {
+          if (is_finite(u(i))) from(i) = u(i);
+        }
+        d.all_out(y, d.quietly([&] { return d.object_->update(y, r, u); }), from);
+      });
+      add(a, "start", [](Driver& d) {
+        const V y = d.template vector<V>(), u = d.template vector<V>();
+        d.refusable([&] { return d.object_->start(y, u); });
+        if (!(fine(y) && fine(u)) && d.accepted_) d.fail("a bad start is taken");
+      });
+      add(a, "set_input_matrix", [](Driver& d) {
+        auto b = d.config_.input_matrix;
+        for (auto& x : b) x = x * d.number({0.5, 2});
+        d.refusable([&] { return d.object_->set_input_matrix(b); });
+      });
       if constexpr (requires(T & o, const V& v) { o.hold(v, v); }) {
-        a.push_back({"hold", [](Driver& d) {
-                       const V y = d.template vector<V>(), u = d.template vector<V>();
-                       V from = d.object_->output();
-                       for (int i = 0; i < from.size(); ++i) {
-                         if (is_finite(u(i))) from(i) = u(i);
-                       }
-                       const V now = d.quietly([&] { return d.object_->hold(y, u); });
-                       for (int i = 0; i < from.size(); ++i) {
-                         if (now(i) < from(i) || now(i) > from(i)) d.fail("hold changes u");
-                       }
-                     }});
+        add(a, "hold", [](Driver& d) {
+          const V y = d.template vector<V>(), u = d.template vector<V>();
+          V from = d.object_->output();
+          for (int i = 0; i < from.size(); ++i) {
+            if (is_finite(u(i))) from(i) = u(i);
+          }
+          const V now = d.quietly([&] { return d.object_->hold(y, u); });
+          for (int i = 0; i < from.size(); ++i) {
+            if (now(i) < from(i) || now(i) > from(i)) d.fail("hold changes u");
+          }
+        });
       }
     } else {
       using Y = typename T::Output;
       using U = typename T::Input;
       for (int weight = 0; weight < 3; ++weight) {
-        a.push_back({"update", [](Driver& d) {
-                       const Y y = d.template vector<Y>();
-                       const U u = d.template vector<U>();
-                       d.all_seen(d.quietly([&] { return d.object_->update(y, u); }), &y, &u);
-                     }});
+        add(a, "update", [](Driver& d) {
+          const Y y = d.template vector<Y>();
+          const U u = d.template vector<U>();
+          d.all_seen(d.quietly([&] { return d.object_->update(y, u); }), &y, &u);
+        });
       }
-      a.push_back({"predict several times", [](Driver& d) {
-                     const int count = 1 + d.tape_->choice(80);
-                     const U u = d.template vector<U>();
-                     for (int i = 0; i < count; ++i) {
-                       d.all_seen(d.quietly([&] { return d.object_->predict(u); }),
-                                  static_cast<const Y*>(nullptr), &u);
-                     }
-                   }});
-      a.push_back({"correct", [](Driver& d) {
-                     const Y y = d.template vector<Y>();
-                     d.all_seen(d.quietly([&] { return d.object_->correct(y); }), &y,
-                                static_cast<const U*>(nullptr));
-                   }});
-      a.push_back({"correct_some", [](Driver& d) {
-                     const Y y = d.template vector<Y>();
-                     esokit::Array<bool, T::outputs> present{};
-                     for (bool& each : present) each = d.tape_->once_in(2);
-                     (void)d.quietly([&] { return d.object_->correct_some(y, present); });
-                   }});
-      a.push_back({"reset(y)", [](Driver& d) {
-                     const Y y = d.template vector<Y>();
-                     d.refusable([&] { return d.object_->reset(y); });
-                     if (!fine(y) && d.accepted_) d.fail("a bad y is taken");
-                   }});
-      a.push_back({"reset(state)", [](Driver& d) {
-                     const auto z = d.template state<typename T::Estimate>();
-                     d.refusable([&] { return d.object_->reset(z); });
-                     if (!fine(z) && d.accepted_) d.fail("a bad state is taken");
-                   }});
+      add(a, "predict several times", [](Driver& d) {
+        const int count = 1 + d.tape_->choice(80);
+        const U u = d.template vector<U>();
+        for (int i = 0; i < count; ++i) {
+          d.all_seen(d.quietly([&] { return d.object_->predict(u); }),
+                     static_cast<const Y*>(nullptr), &u);
+        }
+      });
+      add(a, "correct", [](Driver& d) {
+        const Y y = d.template vector<Y>();
+        d.all_seen(d.quietly([&] { return d.object_->correct(y); }), &y,
+                   static_cast<const U*>(nullptr));
+      });
+      add(a, "correct_some", [](Driver& d) {
+        const Y y = d.template vector<Y>();
+        esokit::Array<bool, T::outputs> present{};
+        for (bool& each : present) each = d.tape_->once_in(2);
+        (void)d.quietly([&] { return d.object_->correct_some(y, present); });
+      });
+      add(a, "reset(y)", [](Driver& d) {
+        const Y y = d.template vector<Y>();
+        d.refusable([&] { return d.object_->reset(y); });
+        if (!fine(y) && d.accepted_) d.fail("a bad y is taken");
+      });
+      add(a, "reset(state)", [](Driver& d) {
+        const auto z = d.template state<typename T::Estimate>();
+        d.refusable([&] { return d.object_->reset(z); });
+        if (!fine(z) && d.accepted_) d.fail("a bad state is taken");
+      });
     }
   }
 
@@ -951,7 +862,7 @@ class Driver {
       fail("finished, and not at rest");
     const auto found = quietly([&] { return object_->result(); });
     if (!found) {
-      if (const auto wrong = refusal(found.error())) fail(*wrong);
+      explained(found.error().field, found.error().rule);
     } else if (!is_finite(found->input_gain) || !is_finite(found->latency)) {
       fail("the result is not finite");
     }
@@ -961,91 +872,69 @@ class Driver {
   static void law(std::vector<Action>& a) {
     if constexpr (requires(const T& o) { o.rest_output(); }) {
       for (int weight = 0; weight < 4; ++weight) {
-        a.push_back({"update", [](Driver& d) {
-                       const S y = d.number();
-                       d.moved(d.quietly([&] { return d.object_->update(y); }));
-                     }});
-        a.push_back({"update to and fro", [](Driver& d) {
-                       const S one = d.number({-1, 1}), other = d.number({-1, 1});
-                       const int half = 1 + d.tape_->choice(40), count = d.tape_->choice(1000);
-                       for (int i = 0; i < count; ++i) {
-                         const S y = i / half % 2 == 0 ? one : other;
-                         d.moved(d.quietly([&] { return d.object_->update(y); }));
-                       }
-                     }});
+        add(a, "update", [](Driver& d) {
+          const S y = d.number();
+          d.moved(d.quietly([&] { return d.object_->update(y); }));
+        });
+        add(a, "update to and fro", [](Driver& d) {
+          const S one = d.number({-1, 1}), other = d.number({-1, 1});
+          const int half = 1 + d.tape_->choice(40), count = d.tape_->choice(1000);
+          for (int i = 0; i < count; ++i) {
+            const S y = i / half % 2 == 0 ? one : other;
+            d.moved(d.quietly([&] { return d.object_->update(y); }));
+          }
+        });
       }
-      a.push_back({"update(y, u)", [](Driver& d) {
-                     const S y = d.number(), u = d.number();
-                     d.moved(d.quietly([&] { return d.object_->update(y, u); }));
-                   }});
-      a.push_back({"stop", [](Driver& d) {
-                     if (d.tape_->choice(8) != 0) return;
-                     d.moved(d.quietly([&] { return d.object_->stop(); }));
-                     if (!d.object_->finished()) d.fail("stopped, and not finished");
-                   }});
+      add(a, "update(y, u)", [](Driver& d) {
+        const S y = d.number(), u = d.number();
+        d.moved(d.quietly([&] { return d.object_->update(y, u); }));
+      });
+      add(a, "stop", [](Driver& d) {
+        if (d.tape_->choice(8) != 0) return;
+        d.moved(d.quietly([&] { return d.object_->stop(); }));
+        if (!d.object_->finished()) d.fail("stopped, and not finished");
+      });
     }
     if constexpr (requires(T & o, S s) {
                     { o.update(s) } -> std::same_as<bool>;
                   }) {
       for (int weight = 0; weight < 4; ++weight) {
-        a.push_back({"update", [](Driver& d) {
-                       const S r = d.number();
-                       d.refusable([&] { return d.object_->update(r); });
-                       if (!is_finite(r) && d.accepted_) d.fail("a bad reference is taken");
-                       if (d.calm_ && d.tape_->plain() && !d.accepted_)
-                         d.fail("a good reference is refused");
-                     }});
+        add(a, "update", [](Driver& d) {
+          const S r = d.number();
+          d.refusable([&] { return d.object_->update(r); });
+          if (!is_finite(r) && d.accepted_) d.fail("a bad reference is taken");
+          if (d.calm_ && d.tape_->plain() && !d.accepted_) d.fail("a good reference is refused");
+        });
       }
-      a.push_back({"reset", [](Driver& d) {
-                     const S r = d.number();
-                     d.refusable([&] { return d.object_->reset(r); });
-                     if (is_finite(r) != d.accepted_)
-                       d.fail("reset takes what is not finite, or refuses what is");
-                   }});
+      add(a, "reset", [](Driver& d) {
+        const S r = d.number();
+        d.refusable([&] { return d.object_->reset(r); });
+        if (is_finite(r) != d.accepted_)
+          d.fail("reset takes what is not finite, or refuses what is");
+      });
     }
     if constexpr (requires(const T& o, const esokit::Vector<S, order_of<T>() + 1>& z,
                            const esokit::Vector<S, order_of<T>()>& r) {
                     o.control(z, r);
                     o.feedback(z, r);
                   }) {
-      a.push_back({"control", [](Driver& d) {
-                     const auto z = d.template state<esokit::Vector<S, order_of<T>() + 1>>();
-                     const auto r = d.template state<esokit::Vector<S, order_of<T>()>>();
-                     const S u = d.quietly([&] { return d.object_->control(z, r); });
-                     if (fine(z) && fine(r) && !is_finite(u)) d.fail("u is not finite");
-                   }});
+      add(a, "control", [](Driver& d) {
+        const auto z = d.template state<esokit::Vector<S, order_of<T>() + 1>>();
+        const auto r = d.template state<esokit::Vector<S, order_of<T>()>>();
+        const S u = d.quietly([&] { return d.object_->control(z, r); });
+        if (fine(z) && fine(r) && !is_finite(u)) d.fail("u is not finite");
+      });
     }
   }
 
   // ------------------------------------------------------------------ the way back
-  [[nodiscard]] bool recoverable() const {
-    if (!promise_.certain || !far_from_ringing()) return false;
-    // Settings out of range promise nothing but to stay finite.
-    if (!episode_.config.plain()) return false;
-    for (const Call& call : episode_.calls) {
-      const auto* name = actions()[static_cast<std::size_t>(call.action)].name;
-      if (std::strcmp(name, "retune") == 0 && !call.tape.plain()) return false;
-      if (std::strcmp(name, "set_step_time") == 0 && !call.tape.plain()) return false;
-      // A variance of the measurement's noise is a setting.
-      if (std::strstr(name, "weighted") != nullptr && !call.tape.plain()) return false;
-    }
-    return true;
-  }
-
-  /// Good samples of a plant at rest. The stated number: an estimate of the largest finite size
-  /// falls as k^(N-1) rho^k; a gap and a hold may come before. Several times that, for laws that
-  /// vary.
-  [[nodiscard]] long patience() const {
-    const double decades = std::log(10.0) * (std::numeric_limits<S>::max_exponent10 + 20);
-    return static_cast<long>(500 + promise_.waiting + 12 * decades / promise_.slowest);
-  }
-
-  Failure recovery() {
+  /// Good samples of a plant at rest.
+  void recover() override {
     if constexpr (
         requires { T::channels; } || requires { T::outputs; }) {
-      return recovery_of_several();
+      recover_several();
     } else if constexpr (requires(const T& o) { o.controller(); }) {
-      return {};  // its controller has been looked at
+      // Its controller has been looked at.
     } else if constexpr (requires(T & o, S s) {
                            { o.update(s, s) } -> std::same_as<StepStatus>;
                          }) {
@@ -1054,13 +943,13 @@ class Driver {
         object_->set_pin(esokit::Pin::free);
         object_->release();
       }
-      return settle([&](const S& y) { return object_->update(y, S(0)); },
-                    [&](const S& y) { return distance(*object_, y); });
+      settle([&](const S& y) { return object_->update(y, S(0)); },
+             [&](const S& y) { return distance(*object_, y); });
     } else if constexpr (requires(T & o, S s) {
                            o.control(s);
                            o.prepare(s);
                          }) {
-      return settle(
+      settle(
           [&](const S& y) {
             (void)object_->control(y);
             (void)object_->report_applied(S(0));
@@ -1076,7 +965,7 @@ class Driver {
         object_->observer().set_trust(S(1));
         object_->observer().set_pin(esokit::Pin::free);
       }
-      return settle(
+      settle(
           [&](const S& y) {
             (void)object_->update(y, y, S(0));
             return object_->mode() == LoopMode::running ? object_->status()
@@ -1092,7 +981,7 @@ class Driver {
             }
           });
     } else if constexpr (requires(const T& o) { o.form(); } && !winds_up<T>) {
-      return settle(
+      settle(
           [&](const S& y) {
             (void)object_->update(y, y, S(0));
             return object_->status();
@@ -1103,8 +992,6 @@ class Driver {
             for (const S& n : object_->form().measurement) unit += std::abs(static_cast<double>(n));
             return std::abs(static_cast<double>(object_->requested())) / unit;
           });
-    } else {
-      return {};
     }
   }
 
@@ -1136,32 +1023,20 @@ class Driver {
   }
 
   template <class Step, class Distance>
-  Failure settle(Step&& step, Distance&& distance) {
+  void settle(Step&& step, Distance&& distance) {
     const S y(1.25);
-    const double close = std::is_same_v<S, float> ? 3e-3 : 1e-5;
-    const long most = patience();
-    int in_a_row = 0;
-    double last = 0;
-    for (long k = 0; k < most; ++k) {
-      const StepStatus status = step(y);
-      if (Failure f = invariants()) return "on the way back: " + *f;
-      last = distance(y);
-      in_a_row = status == StepStatus::ok && last < close ? in_a_row + 1 : 0;
-      if (in_a_row == 8) {
-        episode_.recovery = k;
-        return {};
-      }
-    }
-    std::array<char, 160> text{};
-    std::snprintf(text.data(), text.size(), "%ld good samples do not bring it back: off by %g",
-                  most, last);
-    return text.data();
+    set_out(std::is_same_v<S, float> ? 3e-3 : 1e-5, std::numeric_limits<S>::max_exponent10);
+    StepStatus status{};
+    do {
+      status = step(y);
+      invariants();
+    } while (!back(status, distance(y)));
   }
 
-  Failure recovery_of_several() {
+  void recover_several() {
     if constexpr (requires { T::channels; }) {
       using V = typename T::Output;
-      return settle(
+      settle(
           [&](const S& y) {
             const V all = V::Constant(y);
             (void)object_->update(all, all, V::Zero());
@@ -1177,37 +1052,30 @@ class Driver {
             return worst;
           });
     } else {
-      return settle(
-          [&](const S& y) { return object_->update(T::Output::Constant(y), T::Input::Zero()); },
-          [&](const S& y) {
-            double worst = 0;
-            esokit::detail::unroll<T::outputs>([&](auto i) {
-              const auto z = object_->template chain_estimate<i>();
-              double unit = 1;
-              for (int r = 0; r < z.size(); ++r) {
-                if (r > 0) unit *= static_cast<double>(object_->sample_time()) / r;
-                const double error =
-                    static_cast<double>(z(r)) - (r == 0 ? static_cast<double>(y) : 0.0);
-                worst = std::max(worst, std::abs(error) * unit);
-              }
-            });
-            return worst;
-          });
+      settle([&](const S& y) { return object_->update(T::Output::Constant(y), T::Input::Zero()); },
+             [&](const S& y) {
+               double worst = 0;
+               esokit::detail::unroll<T::outputs>([&](auto i) {
+                 const auto z = object_->template chain_estimate<i>();
+                 double unit = 1;
+                 for (int r = 0; r < z.size(); ++r) {
+                   if (r > 0) unit *= static_cast<double>(object_->sample_time()) / r;
+                   const double error =
+                       static_cast<double>(z(r)) - (r == 0 ? static_cast<double>(y) : 0.0);
+                   worst = std::max(worst, std::abs(error) * unit);
+                 }
+               });
+               return worst;
+             });
     }
   }
 
-  Episode& episode_;
   Config config_{};
-  Promise promise_{};
   std::optional<T> object_{};
-  Tape* tape_ = nullptr;
-  Failure failure_{};
-
-  bool calm_ = true;
-  bool accepted_ = false;
+  std::optional<T> twin_{};
 };
 
 }  // namespace fuzz
 
 /// A line of a list, by the type's name.
-#define KIND(...) kinds.push_back({#__VA_ARGS__, &Driver<__VA_ARGS__>::run})
+#define KIND(...) add_kind(kinds, #__VA_ARGS__, &Driver<__VA_ARGS__>::run)

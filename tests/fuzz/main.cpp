@@ -20,6 +20,10 @@ namespace fuzz {
 
 long allocations() { return esokit_test::allocation_count; }
 
+void add_kind(std::vector<Kind>& kinds, const char* name, Failure (*run)(Episode&)) {
+  kinds.push_back({name, run});
+}
+
 std::vector<unsigned char> memory_of(const void* object, std::size_t size) {
   const auto* first = static_cast<const unsigned char*>(object);
   return {first, first + size};

@@ -48,6 +48,9 @@ struct Kind {
   std::function<Failure(Episode&)> run;
 };
 
+/// Lists a type.
+void add_kind(std::vector<Kind>& kinds, const char* name, Failure (*run)(Episode&));
+
 /// Of this program: operator new so far.
 long allocations();
 
