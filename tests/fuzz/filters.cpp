@@ -17,7 +17,7 @@ using namespace esokit;
 
 void add_filters(std::vector<Kind>& kinds) {
   KIND(ExtendedStateFilter<1, float>);
-  KIND(ExtendedStateFilter<2, float, 1, NoNominalModel, 8>);
+  KIND(ExtendedStateFilter<1, float, 1, NoNominalModel, 8>);
   KIND(MimoExtendedStateFilter<ChainOrders<1, 2>, 2, float>);
   KIND(Experiment<2, float>);
   KIND(TrackingDifferentiator<float>);
@@ -27,7 +27,7 @@ void add_filters(std::vector<Kind>& kinds) {
   KIND(ExtendedStateFilter<2, double>);
   KIND(WrappedOutput<ExtendedStateFilter<2, float>>);
   KIND(VariableTime<DelayedInput<ExtendedStateFilter<2, double>, 2>>);
-  KIND(MimoExtendedStateFilter<ChainOrders<2, 1>, 1, double>);
+  KIND(MimoExtendedStateFilter<ChainOrders<2, 2>, 1, double>);
   KIND(Experiment<1, double>);
   KIND(TrackingDifferentiator<double>);
 #endif
