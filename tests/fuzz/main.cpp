@@ -21,7 +21,7 @@ namespace fuzz {
 long allocations() { return esokit_test::allocation_count; }
 
 void add_kind(std::vector<Kind>& kinds, const char* name, Failure (*run)(Episode&)) {
-  kinds.push_back({name, run});
+  kinds.push_back({name, run, 1});
 }
 
 std::vector<unsigned char> memory_of(const void* object, std::size_t size) {
@@ -179,7 +179,7 @@ int run(const Options& options) {
         const auto seed =
             options.one_case.value_or(mixed(seed_of_all, i, (round << 16u) + within++));
         one_case(kinds[i], seed, tallies[i]);
-      } while (!options.one_case && (options.cases > 0 ? within < options.cases
+      } while (!options.one_case && (options.cases > 0 ? within < options.cases / kinds[i].one_of
                                                        : Clock::now() < turn && within < 65536));
     }
     if (options.one_case || options.cases > 0 || Clock::now() >= end) break;

@@ -46,6 +46,9 @@ using Failure = std::optional<std::string>;
 struct Kind {
   std::string name;
   std::function<Failure(Episode&)> run;
+  /// Where the number of cases is given, this plays one of so many: an analysis takes as long as
+  /// a hundred calls.
+  std::uint64_t one_of = 1;
 };
 
 /// Lists a type.

@@ -2,8 +2,34 @@
 // analysis, of signals, noise and plants, of continuous observers, the PID conversion and the
 // limiter. An answer is a number or an error with field and rule, whatever the arguments.
 #include <bit>
+#include <esokit/adapter/guarded.hpp>
+#include <esokit/adapter/variable_time.hpp>
+#include <esokit/analysis/covariance.hpp>
+#include <esokit/analysis/delay_margin.hpp>
+#include <esokit/analysis/error_bound.hpp>
+#include <esokit/analysis/frequency_response.hpp>
+#include <esokit/analysis/loop.hpp>
+#include <esokit/analysis/loop_noise.hpp>
+#include <esokit/analysis/loop_response.hpp>
+#include <esokit/analysis/margins.hpp>
+#include <esokit/analysis/peak_gain.hpp>
+#include <esokit/analysis/poles.hpp>
+#include <esokit/control/adrc.hpp>
+#include <esokit/control/gain_probe.hpp>
+#include <esokit/control/health.hpp>
+#include <esokit/control/health_text.hpp>
+#include <esokit/control/limiter.hpp>
+#include <esokit/control/pid_conversion.hpp>
 #include <esokit/eigen.hpp>
-#include <esokit/esokit.hpp>
+#include <esokit/observer/adjustable_bandwidth_eso.hpp>
+#include <esokit/observer/algebraic_eso.hpp>
+#include <esokit/observer/cascade_eso.hpp>
+#include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/nonlinear_eso.hpp>
+#include <esokit/sim/noise.hpp>
+#include <esokit/sim/plant.hpp>
+#include <esokit/sim/run.hpp>
+#include <esokit/sim/signals.hpp>
 #include <optional>
 
 #include "fuzz/config.hpp"
@@ -560,10 +586,10 @@ Failure health_study(Episode& episode) {
 }
 
 void add_studies(std::vector<Kind>& kinds) {
-  kinds.push_back({"loop of LinearEso<2>", &loop_study<LinearEso<2>>});
-  kinds.push_back({"loop of CascadeEso<1, 2, float>", &loop_study<CascadeEso<1, 2, float>>});
-  kinds.push_back({"loop of ContinuousLinearEso<2>", &loop_study<ContinuousLinearEso<2>>});
-  kinds.push_back({"error bounds", &bound_study});
+  kinds.push_back({"loop of LinearEso<2>", &loop_study<LinearEso<2>>, 5});
+  kinds.push_back({"loop of CascadeEso<1, 2, float>", &loop_study<CascadeEso<1, 2, float>>, 5});
+  kinds.push_back({"loop of ContinuousLinearEso<2>", &loop_study<ContinuousLinearEso<2>>, 5});
+  kinds.push_back({"error bounds", &bound_study, 5});
   kinds.push_back(
       {"ContinuousCascadeEso<2, 2>", &continuous_study<ContinuousCascadeEso<2, 2, double>>});
   kinds.push_back(
