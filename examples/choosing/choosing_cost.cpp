@@ -16,7 +16,6 @@
 #include <esokit/observer/linear_eso.hpp>
 
 #include "common/report.hpp"
-#include "common/widest.hpp"
 
 using namespace esokit;
 using namespace esokit::examples;
@@ -79,7 +78,6 @@ std::vector<Timed> over_levels() {
 }  // namespace
 
 int main(int argc, char** argv) {
-  take_widest(argv);
   Report report(argc, argv, "choosing", "cost",
                 {.paper_title = "Choosing an observer",
                  .title = "What an update costs",

@@ -32,7 +32,6 @@
 #include <esokit/sim/monte_carlo.hpp>
 
 #include "common/report.hpp"
-#include "common/widest.hpp"
 
 using namespace esokit;
 using namespace esokit::examples;
@@ -114,7 +113,6 @@ struct Seen {
 }  // namespace
 
 int main(int argc, char** argv) {
-  take_widest(argv);
   const std::int64_t runs = take_count(argc, argv, "--runs", 100000);
   Report report(
       argc, argv, "monte_carlo", "drive",

@@ -28,7 +28,6 @@
 #include <esokit/sim/monte_carlo.hpp>
 
 #include "common/report.hpp"
-#include "common/widest.hpp"
 #include "paper1_cascade_eso/paper1.hpp"
 
 using namespace esokit::examples;
@@ -187,7 +186,6 @@ double tick(double width) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  take_widest(argv);
   const std::int64_t runs = take_count(argc, argv, "--runs", 10000);
   Report report(
       argc, argv, "monte_carlo", "sim1b",
