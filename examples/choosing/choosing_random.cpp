@@ -70,8 +70,7 @@ Outcome tuned(std::uint64_t seed) {
   plant.input_gain = {truth.input_gain, 0.0};
   plant.pole = truth.pole;
   plant.lag = truth.lag;
-  // The log was made by steps of 0.1 ms whose every integration is half a step early.
-  plant.dead_time = std::max(truth.dead_time - 0.5e-4 * truth.order, 0.0);
+  plant.dead_time = truth.dead_time;
   const auto loop = closed_loop(plant, design.controller);
   if (!loop || !loop->stable()) return outcome;
   const esokit::TuneRules rules;

@@ -65,9 +65,13 @@ inline RandomLog random_log(std::uint64_t seed, Kind kind = Kind::plain, double 
   p.order = random.coin() ? 2 : 1;
   p.input_gain = random.log_uniform(0.1, 1000);
   p.lag = random.log_uniform(0.002, 0.040);
-  p.dead_time = std::round(random.uniform(0, 0.010) / h) * h;
+  // Steps by which u is late. The integrators below use the value at the end of a step, half a step
+  // early each: the dead time of the plant is shorter by that.
+  const auto lines =
+      static_cast<std::size_t>(std::max(std::round(random.uniform(0, 0.010) / h), 1.0));
+  p.dead_time = (static_cast<double>(lines) - 0.5 * p.order) * h;
   p.sample_time = 1e-3 * std::round(random.uniform(0.5, 4.499));
-  const double latency = p.lag + p.dead_time;
+  const double latency = p.lag + static_cast<double>(lines) * h;
   p.pole = random.coin() ? 0.0 : random.uniform(0, std::min(0.4 / latency, 20.0));
   p.encoder = random.coin();
   p.flexible = kind == Kind::flexible;
@@ -123,7 +127,6 @@ inline RandomLog random_log(std::uint64_t seed, Kind kind = Kind::plain, double 
   for (int pass = 0; pass < 2; ++pass) {
     log.u.assign(rows, 0);
     log.y.assign(rows, 0);
-    const auto lines = static_cast<std::size_t>(std::lround(p.dead_time / h));
     std::vector<double> line(lines + 1, 0.0);
     std::size_t at = 0;
     double v = 0, x0 = kind == Kind::unexcited ? 0.3 : 0.0, x1 = 0, m0 = 0, m1 = 0, filtered = x0,
@@ -236,7 +239,7 @@ inline RandomLog random_joint(std::uint64_t seed, double duration = 12) {
             .value();
     log.u.assign(rows, 0);
     log.y.assign(rows, 0);
-    double v = 0, x0 = 0, x1 = 0, input_square = 0, speed_square = 0, error = 0;
+    double v = 0, x0 = 0, x1 = 0, held = 0, input_square = 0, speed_square = 0, error = 0;
     for (std::size_t k = 0; k < rows; ++k) {
       const double y = p.encoder ? std::round(x0 / step) * step : x0 + 0.3 * step * white[k];
       error += (y - x0) * (y - x0);
@@ -244,7 +247,9 @@ inline RandomLog random_joint(std::uint64_t seed, double duration = 12) {
       log.u[k] = u;
       log.y[k] = y;
       for (int i = 0; i < inner; ++i) {
-        v += decay * (u - v);
+        // One step late, because two integrators are half a step early each.
+        v += decay * (held - v);
+        held = u;
         x1 += h * (p.input_gain * v - p.pole * x1 - gravity * std::sin(x0 + turned) -
                    p.friction * std::tanh(x1 / (0.02 * speed_scale)));
         x0 += h * x1;
