@@ -92,11 +92,12 @@ compiles() {  # compiles PAGE: all programs of the page, in one; they run, too
 # ---- a servo under a PD controller ----
 
 # servo [NAME=NUMBER...]: 8 s, y'' + 2 y' = b u(t - 4 ms) - load, rows "t y u r"; the reference steps.
-#   b input gain; scale of u; quantum of y; still=1: the reference does not move
+#   b input gain; scale of u; quantum of y; still=1: the reference does not move; noise of y; drift
+#   of the load a row
 servo() {
   local set=() pair
   for pair in "$@"; do set+=(-v "$pair"); done
-  awk -v b=50 -v scale=1 -v quantum=0 -v still=0 -v rows=4000 "${set[@]}" '
+  awk -v b=50 -v scale=1 -v quantum=0 -v still=0 -v rows=4000 -v noise=1e-3 -v wander=0.02 "${set[@]}" '
     function normal() {
       seed = (seed * 69069 + 12345) % 4294967296; first = (seed + 1) / 4294967297
       seed = (seed * 69069 + 12345) % 4294967296
@@ -107,14 +108,14 @@ servo() {
       for (k = 0; k < rows; ++k) {
         t = k * T
         if (!still && k % 350 == 150) r = (k % 700 == 150 ? 1 : -0.7) * (1 + 0.3 * normal())
-        y = x + 1e-3 * normal()
+        y = x + noise * normal()
         if (quantum > 0) { y = y / quantum; y = quantum * int(y + (y < 0 ? -0.5 : 0.5)) }
         slope += 0.1 * ((y - last) / T - slope); last = y
         u = sign * (3 * (r - y) - 0.25 * slope)
         if (u > 6) u = 6
         if (u < -6) u = -6
         printf "%.3f %.7g %.7g %.7g\n", t, y, scale * u, r
-        drift += 0.02 * normal()
+        drift += wander * normal()
         for (i = 0; i < 4; ++i) {  # u of 4 ms ago
           a = b * (i < 4 ? old2 : old1) - 2 * v + 5 + drift
           x += v * T / 4 + a * T * T / 32; v += a * T / 4
@@ -231,6 +232,13 @@ sounds time-jump jump.csv
 verdict $? "the jump's line is not named: $said"
 sounds u-unit plain.csv --limits -0.06,0.06
 sounds u-unit plain.csv --limits 6000
+# A load that is constant says nothing of what to resist, however fine y is; one that hardly moves does.
+servo noise=1e-5 wander=0 >rows.txt
+written t,y,u , t >quiet.csv
+sounds disturbance quiet.csv
+servo noise=1e-5 wander=0.0005 >rows.txt
+written t,y,u , t >moving_little.csv
+healthy moving_little.csv
 servo quantum=0.5 >rows.txt
 written t,y,u , t >coarse.csv
 sounds quantised coarse.csv

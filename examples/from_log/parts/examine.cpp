@@ -121,6 +121,22 @@ void sound_alarms(const Settings& settings, const Input& input, Findings& all) {
              "--b0 " +
              number_text(b0, 3) + "."});
   }
+  // The bandwidth at which an observer follows the disturbance above the noise. Of a slower one
+  // than some periods of the log next to nothing is seen, and a design for it gives no feedback.
+  const double bandwidth =
+      std::pow(found.disturbance / (found.noise.value * found.noise.value * found.log.sample_time),
+               0.5 / (found.order + found.extension));
+  const double slowest = 60.0 / found.log.duration;
+  if (bandwidth < slowest) {
+    all.alarms.push_back(
+        {"disturbance",
+         "The disturbance hardly changes in this log: an observer with a bandwidth of " +
+             number_text(bandwidth, 3) + " rad/s follows it, which must be at least " +
+             number_text(slowest, 3) + " rad/s, 60 over the duration of the log. A constant load " +
+             "does not tell how fast loads change in use, so a design from this log gives almost "
+             "no "
+             "feedback. Log the machine with the loads that it has to resist."});
+  }
   const double size = std::abs(ratio);
   if (size > 3 || size < 1.0 / 3) {
     all.alarms.push_back(
