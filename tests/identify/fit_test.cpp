@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstddef>
 #include <esokit/identify/fit.hpp>
+#include <esokit/identify/sinusoids.hpp>
+#include <esokit/sim/gaussian.hpp>
 #include <vector>
 
 namespace identify_fit_test {
@@ -212,10 +214,38 @@ TEST(InnovationsFit, KeepsItsParametersWithinBounds) {
   EXPECT_EQ(small.latency, 0.002);
   EXPECT_GT(small.lag_share, 0);
   EXPECT_NEAR(small.pole * small.latency, -0.05, 1e-12);
+  EXPECT_FALSE(fit.at_bound({20, 0.01, 0.5, 0.499 / 0.01}));
+  EXPECT_TRUE(fit.at_bound({20, 0.01, 0.5, 0.4999 / 0.01}));
+  EXPECT_FALSE(fit.at_bound({20, 0.04994, 0.5, 0}));
+  EXPECT_TRUE(fit.at_bound({20, 0.04996, 0.5, 0}));
   const Fit found = fit.minimise(wild, true);
   EXPECT_GE(found.at.bandwidth, 5);
   EXPECT_LE(found.at.bandwidth, 50);
   EXPECT_LE(found.at.latency, 0.05);
+}
+
+// A line where u has one, too, may be an error of the model: it counts from a fifth of u's own on.
+TEST(FindSines, LeavesALineThatUMayHaveMade) {
+  constexpr double gain = 2, swing = 0.5, w = 11;
+  for (const double share : {0.17, 0.23}) {
+    esokit::sim::Gaussian gaussian(5);
+    FitData data;
+    data.sample_time = T;
+    double y = 0;
+    for (int k = 0; k < 2000; ++k) {
+      const double t = k * T;
+      const double u = swing * std::sin(w * t) + (k / 60 % 2 == 0 ? 1 : -1) + 3;
+      data.u.push_back(u);
+      data.y.push_back(y + 1e-3 * gaussian.next());
+      // What the sine adds until the next row, and u, which is held.
+      const double sine = (std::cos(w * t + 1) - std::cos(w * (t + T) + 1)) / w;
+      y += T * gain * u + share * gain * swing * sine;
+    }
+    const auto found = esokit::detail::find_sines(data, {1, 1, false}, {1, 300, 1e-4, 0.03, 0.5},
+                                                  {5, 2e-4, 1, 0}, 2);
+    ASSERT_EQ(found.size(), share > 0.2 ? 1u : 0u) << share;
+    for (const double frequency : found) EXPECT_NEAR(frequency, w, 0.05);
+  }
 }
 
 }  // namespace identify_fit_test

@@ -105,7 +105,64 @@ TEST(Identify, FindsTheModelThatMadeTheLog) {
   EXPECT_EQ(found->log.rows, 3000u);
   ASSERT_EQ(found->orders.size(), 3u);
   EXPECT_LT(found->orders[1].criterion, found->orders[0].criterion);
-  EXPECT_LE(found->plateau.from, found->plateau.to);
+
+  // The plateau is where three neighbours agree best, and ends where b0 leaves it by a tenth.
+  const esokit::Plateau& plateau = found->plateau;
+  const auto& points = plateau.points;
+  const auto b_at = [&](std::size_t i) { return points[i].fit.linear[0]; };
+  const auto disagreement = [&](std::size_t i) {
+    const auto [low, high] = std::minmax({b_at(i - 1), b_at(i), b_at(i + 1)});
+    double error = 0;
+    for (std::size_t j = i - 1; j <= i + 1; ++j)
+      error = std::max(error, points[j].errors.linear[0]);
+    return std::hypot(high - low, error) / std::abs(b_at(i));
+  };
+  const std::size_t middle = plateau.middle;
+  for (std::size_t i = 1; i + 1 < points.size(); ++i) {
+    EXPECT_LE(disagreement(middle), disagreement(i)) << i;
+  }
+  int outside = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double w = points[i].fit.at.bandwidth;
+    const bool near = std::abs(b_at(i) - b_at(middle)) <= 0.1 * b_at(middle);
+    if (plateau.from <= w && w <= plateau.to) {
+      EXPECT_TRUE(near) << w;
+    }
+    if (i + 1 < points.size() && points[i + 1].fit.at.bandwidth == plateau.from) {
+      EXPECT_FALSE(near);
+    }
+    if (i > 0 && points[i - 1].fit.at.bandwidth == plateau.to) {
+      EXPECT_FALSE(near);
+    }
+    outside += near ? 0 : 1;
+  }
+  EXPECT_GT(outside, 0);
+  EXPECT_LT(plateau.from, plateau.to);
+  double excitation = 1;
+  for (const auto& point : points)
+    excitation = std::min(excitation, point.errors.linear[0] / std::abs(point.fit.linear[0]));
+  EXPECT_EQ(found->excitation, excitation);
+
+  // The interval is the sum of its parts, as the README of the example has them.
+  double low = b_at(middle), high = low, squares = 0, weights = 0;
+  const double own = points[middle].errors.linear[0];
+  for (std::size_t i = middle - std::min<std::size_t>(middle, 3);
+       i <= std::min(middle + 3, points.size() - 1); ++i) {
+    if (i + 1 >= middle && i <= middle + 1) {
+      low = std::min(low, b_at(i));
+      high = std::max(high, b_at(i));
+    }
+    if (points[i].at_bound) continue;
+    const double weight = 1 / std::pow(std::max(own, points[i].errors.linear[0]), 2);
+    squares += weight * std::pow(b_at(i) - b_at(middle), 2);
+    weights += weight;
+  }
+  const double friction_spread = 0.5 * found->friction_shift * found->input_gain.half_width;
+  EXPECT_GT(friction_spread, 0);
+  EXPECT_NEAR(found->input_gain.half_width,
+              esokit::student_95(19) * own + 0.25 * (high - low) + std::sqrt(squares / weights) +
+                  0.25 * friction_spread,
+              1e-9 * b0);
 
   // It goes on as a plant.
   const auto plant = found->plant<2>();
@@ -155,6 +212,50 @@ TEST(Identify, AForceByPositionIsFoundOrMissed) {
 
 std::string said(const esokit::Check<double>& check) {
   return check ? "accepted" : std::string(check.error().field) + ": " + check.error().rule;
+}
+
+// The part of u that a controller computes from y is not its own.
+TEST(OwnInput, IsWhatDoesNotFollowFromY) {
+  esokit::sim::Gaussian gaussian(8);
+  esokit::FitData data;
+  data.sample_time = T;
+  double y = 3, before = 3, u = 0, own_square = 0, square = 0;
+  std::vector<double> own;
+  for (int k = 0; k < 4000; ++k) {
+    own.push_back(0.1 * gaussian.next());
+    u = 0.3 * u - 2 * (y - 3) - 5 * (y - before);
+    data.u.push_back(u + 7);
+    data.y.push_back(y);
+    before = y;
+    y += 0.2 * gaussian.next() - 0.1 * (y - 3);
+  }
+  EXPECT_LT(esokit::detail::own_input(data), 1e-4);
+  double mean = 0;
+  for (std::size_t k = 0; k < own.size(); ++k) {
+    data.u[k] += own[k] - (k > 0 ? 0.0 : own[0]);
+    mean += data.u[k] / 4000;
+  }
+  for (std::size_t k = 1; k < own.size(); ++k) {
+    own_square += own[k] * own[k];
+    square += std::pow(data.u[k] - mean, 2);
+  }
+  // The row before has own input, too, which its factor 0.3 makes part of this row's.
+  EXPECT_NEAR(esokit::detail::own_input(data) / std::sqrt(1.09 * own_square / square), 1, 0.05);
+}
+
+// A straight line keeps value and slope at each row, at the ends of a piece, too.
+TEST(Smoothed, KeepsAStraightLine) {
+  esokit::FitData data;
+  data.sample_time = T;
+  data.starts = {0, 30};
+  for (int k = 0; k < 50; ++k) data.y.push_back(k < 30 ? 3 + 2 * k * T : -5 - 4 * k * T);
+  const auto slope = esokit::detail::smoothed(data, 4, 1),
+             value = esokit::detail::smoothed(data, 4, 0);
+  for (std::size_t k = 0; k < 50; ++k) {
+    EXPECT_NEAR(value[k], data.y[k], 1e-12) << k;
+    if (k == 0 || k == 29 || k == 30 || k == 49) continue;
+    EXPECT_NEAR(slope[k], k < 30 ? 2 : -4, 1e-9) << k;
+  }
 }
 
 // Disturbances that swing are found with frequency and size, also between the rows of a fast one,
@@ -883,7 +984,7 @@ TEST(NoiseFloor, IsTheNoiseBesideBursts) {
 // For a mean of white noise the jackknife is the standard error; here b0 is read off innovations
 // that are nearly white, over seeds as it says itself.
 TEST(Intervals, TheJackknifeIsTheSpreadOverSeeds) {
-  double mean = 0, square = 0, error = 0;
+  double mean = 0, square = 0, error = 0, noise_mean = 0, noise_square = 0, noise_error = 0;
   constexpr int seeds = 40;
   for (int seed = 0; seed < seeds; ++seed) {
     // y' = 2 u + walk, white noise.
@@ -903,12 +1004,78 @@ TEST(Intervals, TheJackknifeIsTheSpreadOverSeeds) {
     const double b = found.linear[0];
     mean += b / seeds;
     square += b * b / seeds;
-    error += esokit::jackknife(fit, found, true).linear[0] / seeds;
+    const esokit::FitErrors errors = esokit::jackknife(fit, found, true);
+    error += errors.linear[0] / seeds;
+    noise_mean += found.noise / seeds;
+    noise_square += found.noise * found.noise / seeds;
+    noise_error += errors.noise / seeds;
   }
   const double spread = std::sqrt((square - mean * mean) * seeds / (seeds - 1));
   EXPECT_NEAR(mean, 2, 4 * spread / std::sqrt(seeds));
   // A spread over 40 seeds is known to 11 %: three times that.
   EXPECT_NEAR(error / spread, 1, 0.34);
+  const double noise_spread =
+      std::sqrt((noise_square - noise_mean * noise_mean) * seeds / (seeds - 1));
+  EXPECT_NEAR(noise_error / noise_spread, 1, 0.34);
+}
+
+// Far from its ends the lag's error is that of its square over 2 tau. At zero lag the square alone
+// has an error, and no lag is longer than the latency.
+TEST(Intervals, ShareOutTheErrorOfTheLatency) {
+  constexpr double t = 2, lag = 0.02, dead_time = 0.01, latency_error = 3e-5, square_error = 2e-6;
+  const esokit::FitPoint inside{30, lag + dead_time, lag / (lag + dead_time), 0};
+  for (const double correlation : {0.0, 0.8, -0.8}) {
+    const auto [of_lag, of_dead_time] =
+        esokit::split_errors(inside,
+                             {latency_error * latency_error, square_error * square_error,
+                              correlation * latency_error * square_error},
+                             t);
+    const double expected = square_error / (2 * lag);
+    // The curvature of the root, (t expected / lag) / 2, and the directions that are tried.
+    EXPECT_NEAR(of_lag / expected, 1, 0.01);
+    EXPECT_NEAR(of_dead_time / std::sqrt(latency_error * latency_error + expected * expected -
+                                         2 * correlation * latency_error * expected),
+                1, 0.01);
+  }
+  const esokit::FitPoint none{30, 0.03, 0, 0};
+  const auto [of_lag, of_dead_time] = esokit::split_errors(none, {0, 1e-12, 0}, t);
+  EXPECT_NEAR(of_lag, std::sqrt(t * 1e-6) / t, 1e-9);
+  EXPECT_NEAR(of_dead_time, of_lag, 1e-12);
+  constexpr double infinite = std::numeric_limits<double>::infinity();
+  const auto [any_lag, any_dead_time] = esokit::split_errors(none, {0, infinite, infinite}, t);
+  EXPECT_NEAR(any_lag, 0.03 / t, 1e-9);
+  EXPECT_NEAR(any_dead_time, 0.03 / t, 1e-9);
+}
+
+// A lag that the fit loses in the noise (it is at zero, the end of its range, for a quarter of the
+// seeds) is within its interval all the same.
+TEST(Intervals, CoverALagThatIsFoundToBeZero) {
+  constexpr double lag = 0.008;
+  int covered = 0, lost = 0;
+  constexpr int seeds = 40;
+  for (int seed = 0; seed < seeds; ++seed) {
+    esokit::sim::Gaussian gaussian(static_cast<std::uint64_t>(seed));
+    esokit::FitData data;
+    data.sample_time = T;
+    double y = 0, v = 1, sent = 1;
+    const double decay = std::exp(-T / lag);
+    for (int k = 0; k < 1000; ++k) {
+      const double late = std::exchange(sent, k / 25 % 2 == 0 ? 1.0 : -1.0);
+      data.u.push_back(sent);
+      data.y.push_back(y + 0.08 * gaussian.next());
+      y += 2 * (T * late + lag * (1 - decay) * (v - late));
+      v = late + (v - late) * decay;
+    }
+    esokit::InnovationsFit fit(data, {1, 1, false}, {1, 300, 1e-4, 0.03, 0.5});
+    const esokit::Fit found = fit.minimise({10, 4e-3, 0.7, 0}, true);
+    const esokit::FitErrors errors = esokit::jackknife(fit, found, true);
+    lost += found.at.lag() < 0.2 * T ? 1 : 0;
+    covered += std::abs(found.at.lag() - lag) <= esokit::student_95(19) * errors.lag ? 1 : 0;
+    EXPECT_LE(errors.lag, found.at.latency);
+  }
+  EXPECT_GE(lost, 5);
+  // Three standard errors of 95 % of 40: 34.
+  EXPECT_GE(covered, 34);
 }
 
 TEST(Study, RefusesBadOptions) {

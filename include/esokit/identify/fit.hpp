@@ -498,7 +498,8 @@ class InnovationsFit {
   /// piece, which are not used.
   [[nodiscard]] const std::vector<double>& residual() const { return residual_; }
 
-  /// Whether a parameter is at a bound of its range.
+  /// Whether the latency or the pole is at the upper bound of its range. A lag or a dead time of
+  /// zero does not count: `split_errors` tells how large they may be.
   [[nodiscard]] bool at_bound(const FitPoint& p) const {
     return p.latency >= bounds_.latency_max * 0.999 ||
            (model_.pole && std::abs(p.pole) * p.latency >= bounds_.pole_latency * 0.999);

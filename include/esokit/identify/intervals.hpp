@@ -10,7 +10,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <esokit/core/scalar.hpp>
 #include <esokit/identify/fit.hpp>
+#include <numbers>
+#include <utility>
 #include <vector>
 
 namespace esokit {
@@ -19,8 +22,8 @@ namespace esokit {
 struct FitErrors {
   double bandwidth = 0.0;        ///< rad/s; 0 if w was given
   double latency = 0.0;          ///< s
-  double lag = 0.0;              ///< s
-  double dead_time = 0.0;        ///< s
+  double lag = 0.0;              ///< s: as of `split_errors`
+  double dead_time = 0.0;        ///< s: as of `split_errors`
   double pole = 0.0;             ///< 1/s
   double noise = 0.0;            ///< unit of y
   std::vector<double> linear{};  ///< b0 and the columns
@@ -33,6 +36,42 @@ struct FitErrors {
   const double n = freedom;
   return z + (z * z * z + z) / (4.0 * n) +
          (5.0 * std::pow(z, 5) + 16.0 * z * z * z + 3.0 * z) / (96.0 * n * n);
+}
+
+/// Variances of latency and squared lag, and their covariance.
+struct SplitCovariance {
+  double latency = 0.0;     ///< of tau + L, s^2
+  double lag_square = 0.0;  ///< of tau^2, s^4
+  double both = 0.0;        ///< their covariance, s^3
+};
+
+/// Standard errors of lag and dead time: the largest distance from the fit within the ellipse of
+/// latency and squared lag of which `t` standard errors are the 95 % interval, divided by `t`.
+///
+/// The log determines latency and squared lag: in these the ellipse is right, also where the lag is
+/// at zero, the end of its range, and has no standard error of its own.
+[[nodiscard]] inline std::pair<double, double> split_errors(const FitPoint& at,
+                                                            const SplitCovariance& covariance,
+                                                            double t) {
+  // The squared lag is between zero and the squared latency, so a larger error says nothing more.
+  const double square = std::min(at.latency * at.latency, t * std::sqrt(covariance.lag_square));
+  const double along = t * std::sqrt(covariance.latency);
+  const double correlation =
+      covariance.both / std::sqrt(covariance.latency * covariance.lag_square);
+  const double shared = is_finite(correlation) ? std::clamp(correlation, -1.0, 1.0) : 0.0;
+  const double alone = std::sqrt(1.0 - shared * shared);
+  double lag = 0.0, dead_time = 0.0;
+  constexpr int directions = 64;
+  for (int i = 0; i < directions; ++i) {
+    const double angle = 2.0 * std::numbers::pi * i / directions;
+    const double latency =
+        std::max(at.latency + along * (shared * std::cos(angle) + alone * std::sin(angle)), 0.0);
+    const double tau =
+        std::min(std::sqrt(std::max(at.lag() * at.lag() + square * std::cos(angle), 0.0)), latency);
+    lag = std::max(lag, std::abs(tau - at.lag()));
+    dead_time = std::max(dead_time, std::abs(latency - tau - at.dead_time()));
+  }
+  return {lag / t, dead_time / t};
 }
 
 /// Standard errors of the fit that `fit` returned last, by leaving out one of `stretches` equal
@@ -58,8 +97,8 @@ struct FitErrors {
     for (std::size_t i = 0; i < right.size(); ++i) right[i] += rights[s][i];
     square += squares[s];
   }
-  // The results without each stretch: w, latency, lag, dead time, pole, noise, linear.
-  const std::size_t quantities = 6 + at.linear.size();
+  // The results without each stretch: w, latency, squared lag, pole, noise, linear.
+  const std::size_t quantities = 5 + at.linear.size();
   std::vector<std::vector<double>> values;
   for (std::size_t s = 0; s < normals.size(); ++s) {
     std::vector<double> without = normal, step = right;
@@ -79,19 +118,16 @@ struct FitErrors {
           log_latency = by;
           break;
         case 2:
-          share_square += by;
+          // Not limited: at a limit all stretches would agree.
+          share_square -= step[i];
           break;
         default:
           product += by;
       }
     }
     const double latency = at.at.latency * std::exp(log_latency);
-    const double share = std::sqrt(std::clamp(share_square, 0.0, 1.0));
     std::vector<double> value = {
-        at.at.bandwidth * std::exp(log_w),
-        latency,
-        latency * share,
-        latency * (1.0 - share),
+        at.at.bandwidth * std::exp(log_w), latency, latency * latency * share_square,
         product / latency,
         at.noise * std::sqrt((1.0 - squares[s] / square) * static_cast<double>(stretches) /
                              static_cast<double>(stretches - 1))};
@@ -100,20 +136,21 @@ struct FitErrors {
     values.push_back(std::move(value));
   }
   const double n = static_cast<double>(stretches);
-  std::vector<double> errors(quantities);
-  for (std::size_t q = 0; q < quantities; ++q) {
-    double mean = 0.0, sum = 0.0;
-    for (const auto& value : values) mean += value[q] / n;
-    for (const auto& value : values) sum += (value[q] - mean) * (value[q] - mean);
-    errors[q] = std::sqrt(sum * (n - 1.0) / n);
+  std::vector<double> means(quantities);
+  for (const auto& value : values) {
+    for (std::size_t q = 0; q < quantities; ++q) means[q] += value[q] / n;
   }
-  return {errors[0],
-          errors[1],
-          errors[2],
-          errors[3],
-          errors[4],
-          errors[5],
-          {errors.begin() + 6, errors.end()}};
+  const auto covariance = [&](std::size_t p, std::size_t q) {
+    double sum = 0.0;
+    for (const auto& value : values) sum += (value[p] - means[p]) * (value[q] - means[q]);
+    return sum * (n - 1.0) / n;
+  };
+  const auto error = [&](std::size_t q) { return std::sqrt(covariance(q, q)); };
+  const auto [lag, dead_time] = split_errors(
+      at.at, {covariance(1, 1), covariance(2, 2), covariance(1, 2)}, student_95(stretches - 1));
+  FitErrors errors{error(0), error(1), lag, dead_time, error(3), error(4), {}};
+  for (std::size_t q = 5; q < quantities; ++q) errors.linear.push_back(error(q));
+  return errors;
 }
 
 }  // namespace esokit
