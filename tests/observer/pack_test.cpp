@@ -2,6 +2,7 @@
 // innovation, bit for bit, with settings, faults, gaps, restarts and retunes of each lane its own.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <esokit/core/pack.hpp>
 #include <esokit/gain/pole_set.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
@@ -12,10 +13,15 @@
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/observer/reduced_order_eso.hpp>
+#include <functional>
+#include <memory>
 #include <sstream>
 #include <string>
 #include <support/lanes.hpp>
+#include <support/law_registration.hpp>
 #include <support/pack.hpp>
+#include <support/refusal.hpp>
+#include <type_traits>
 #include <vector>
 
 namespace esokit_test {
@@ -236,229 +242,398 @@ struct GatedRiccati {
   }
 };
 
-/// What all observers tell, of the pack's lanes and of the scalars.
-template <class Packed, class One>
-void expect_equal(const Packed& packed, const std::vector<One>& lanes) {
-  using S = typename Packed::scalar_type;
-  const auto estimate = packed.estimate();
-  for (int i = 0; i < lane_count<S>; ++i) {
-    const One& one = lanes[static_cast<std::size_t>(i)];
-    ASSERT_TRUE(lane_equals(estimate, one.estimate(), i)) << "lane " << i;
-    ASSERT_TRUE(lane_equals(packed.template estimate<1>(), one.template estimate<1>(), i));
-    ASSERT_TRUE(lane_equals(packed.total_disturbance(), one.total_disturbance(), i));
-    ASSERT_TRUE(lane_equals(packed.level_estimate(0), one.level_estimate(0), i));
-    ASSERT_TRUE(lane_equals(packed.innovation(), one.innovation(), i)) << "lane " << i;
-    ASSERT_TRUE(lane_equals(packed.applied_input(), one.applied_input(), i)) << "lane " << i;
-    ASSERT_TRUE(lane_equals(packed.input_gain(), one.input_gain(), i));
-    ASSERT_TRUE(lane_equals(packed.sample_time(), one.sample_time(), i));
-    ASSERT_EQ(packed.missed()[i], one.missed()) << "lane " << i;
-    ASSERT_EQ(packed.restarts()[i], one.restarts()) << "lane " << i;
-    if constexpr (requires { one.preview(); }) {
-      ASSERT_TRUE(lane_equals(packed.preview().offset, one.preview().offset, i)) << "lane " << i;
-      ASSERT_TRUE(lane_equals(packed.preview().slope, one.preview().slope, i)) << "lane " << i;
-    }
-    if constexpr (requires { one.blanked(); }) {
-      ASSERT_EQ(packed.blanked()[i], one.blanked()) << "lane " << i;
-      ASSERT_EQ(packed.settled()[i], one.settled()) << "lane " << i;
-      ASSERT_EQ(packed.age()[i], one.age()) << "lane " << i;
-      ASSERT_TRUE(lane_equals(packed.blanking(), one.blanking(), i)) << "lane " << i;
-    }
-    if constexpr (requires { one.normalised_innovation(); }) {
-      ASSERT_TRUE(lane_equals(packed.covariance().row(0), one.covariance().row(0), i));
-      ASSERT_TRUE(lane_equals(packed.normalised_innovation(), one.normalised_innovation(), i));
-      ASSERT_TRUE(lane_equals(packed.gain(), one.gain(), i));
-      ASSERT_EQ(packed.frozen()[i], one.frozen()) << "lane " << i;
-    }
-    if constexpr (requires { one.gain_min(); }) {
-      ASSERT_TRUE(lane_equals(packed.gain_min(), one.gain_min(), i)) << "lane " << i;
-      ASSERT_TRUE(lane_equals(packed.gain_max(), one.gain_max(), i)) << "lane " << i;
-    }
-  }
-}
+// ---- The tests, compiled once: of each type they know what it can be asked.
 
-template <class Kind, class S>
-struct Of {
-  using Observer = Kind;
-  using Scalar = S;
+/// A number for each lane; a double holds a float. A plain scalar has the first.
+constexpr int most_lanes = 8;
+using Numbers = std::array<double, most_lanes>;
+using Statuses = std::array<StepStatus, most_lanes>;
+
+/// What an observer tells of a lane.
+class Told {
+ public:
+  void add(const char* name, double value) {
+    names_.push_back(name);
+    values_.push_back(value);
+  }
+  /// The first that differs in a bit, or "".
+  [[nodiscard]] std::string difference(const Told& other) const {
+    if (names_.size() != other.names_.size()) return "another number of values";
+    for (std::size_t i = 0; i < names_.size(); ++i) {
+      if (!same_bits(values_[i], other.values_[i])) return names_[i];
+    }
+    return "";
+  }
+
+ private:
+  std::vector<const char*> names_;
+  std::vector<double> values_;
 };
 
-template <class Case>
-class Packs : public ::testing::Test {
- protected:
-  using Kind = typename Case::Observer;
-  using Scalar = typename Case::Scalar;
-  using Number = LaneScalar<Scalar>;
-  using Packed = typename Kind::template Observer<Scalar>;
-  using Plain = typename Kind::template Observer<Number>;
+/// How a bad config of one lane is refused.
+struct Refused {
+  std::string by_make, by_retune;
+  int lane_of_make, lane_of_retune;
+  bool value_is_given;
+};
 
-  Packs() {
-    for (int i = 0; i < lane_count<Scalar>; ++i) {
-      lanes.push_back(Plain::make(Kind::template config<Number>(i, false)).value());
+/// An observer of packs or of plain scalars.
+class Subject {
+ public:
+  virtual ~Subject() = default;
+  virtual Statuses update(const Numbers& y, const Numbers& u) = 0;
+  virtual Statuses update_weighted(const Numbers& y, const Numbers& u, const Numbers& root) = 0;
+  virtual Statuses predict(const Numbers& u) = 0;
+  virtual Statuses correct(const Numbers& y) = 0;
+  virtual Statuses revise_input(const Numbers& u) = 0;
+  virtual Statuses reset(const Numbers& y) = 0;
+  virtual Statuses reset_two(const Numbers& first, const Numbers& second) = 0;
+  virtual Statuses shift_output(const Numbers& y) = 0;
+  virtual Statuses shift_disturbance(const Numbers& d) = 0;
+  virtual bool retune(int lane, bool again) = 0;
+  virtual Refused refuse(int bad) = 0;
+  [[nodiscard]] virtual Told told(int lane) const = 0;
+};
+
+template <class Kind, class S>
+class Of final : public Subject {
+  using Observer = typename Kind::template Observer<S>;
+  static constexpr bool is_pack = esokit::PackScalar<S>;
+
+  static S in(const Numbers& x) {
+    if constexpr (is_pack) {
+      S all(0.0);
+      for (int i = 0; i < lane_count<S>; ++i) {
+        all[i] = static_cast<LaneScalar<S>>(x[static_cast<std::size_t>(i)]);
+      }
+      return all;
+    } else {
+      return static_cast<S>(x[0]);
+    }
+  }
+  static Statuses out(const esokit::StatusOf<S>& status) {
+    Statuses all{};
+    if constexpr (is_pack) {
+      for (int i = 0; i < lane_count<S>; ++i) all[static_cast<std::size_t>(i)] = status[i];
+    } else {
+      all[0] = status;
+    }
+    return all;
+  }
+  /// Of a number, of a count, or of the rows of a vector.
+  template <class T>
+  static void add(Told& told, int lane, const char* name, const T& x) {
+    if constexpr (requires { x.size(); } && !std::is_same_v<T, S>) {
+      for (decltype(x.size()) r = 0; r < x.size(); ++r) add(told, lane, name, x[r]);
+    } else if constexpr (is_pack) {
+      told.add(name, static_cast<double>(x[lane]));
+    } else {
+      told.add(name, static_cast<double>(x));
     }
   }
 
-  /// Calls step(observer, signal of it ..) on the pack and on each scalar; their status must agree.
-  template <class Step, class... Signals>
-  void both(const Step& step, const Signals&... signals) {
-    const auto status = step(packed, signals...);
-    for (int i = 0; i < lane_count<Scalar>; ++i) {
-      Plain& one = lanes[static_cast<std::size_t>(i)];
-      const StepStatus of_one = step(one, signals[i]...);
+ public:
+  explicit Of(int lane)
+      : observer_(Observer::make(Kind::template config<S>(lane, false)).value()) {}
+
+  Statuses update(const Numbers& y, const Numbers& u) override {
+    return out(observer_.update(in(y), in(u)));
+  }
+  Statuses update_weighted([[maybe_unused]] const Numbers& y, [[maybe_unused]] const Numbers& u,
+                           [[maybe_unused]] const Numbers& root) override {
+    if constexpr (requires { observer_.update_weighted(in(y), in(u), in(y)); }) {
+      return out(observer_.update_weighted(in(y), in(u), in(root)*in(root)));
+    } else {
+      return {};
+    }
+  }
+  Statuses predict(const Numbers& u) override { return out(observer_.predict(in(u))); }
+  Statuses correct(const Numbers& y) override { return out(observer_.correct(in(y))); }
+  Statuses revise_input(const Numbers& u) override { return out(observer_.revise_input(in(u))); }
+  Statuses reset(const Numbers& y) override { return out(observer_.reset(in(y))); }
+  Statuses reset_two(const Numbers& first, const Numbers& second) override {
+    auto state = observer_.estimate();
+    state[0] = in(first);
+    state[1] = in(second);
+    return out(observer_.reset(state));
+  }
+  Statuses shift_output(const Numbers& y) override { return out(observer_.shift_output(in(y))); }
+  Statuses shift_disturbance(const Numbers& d) override {
+    return out(observer_.shift_disturbance(in(d)));
+  }
+  bool retune(int lane, bool again) override {
+    return observer_.retune(Kind::template config<S>(lane, again)).has_value();
+  }
+  Refused refuse([[maybe_unused]] int bad) override {
+    if constexpr (is_pack) {
+      auto config = Kind::template config<S>(0, false);
+      config.sample_time[bad] = -config.sample_time[bad];
+      const auto made = Observer::make(config);
+      const auto retuned = observer_.retune(config);
+      if (made || retuned) return {};
+      return {refusal(made), refusal(retuned), made.error().lane, retuned.error().lane,
+              made.error().value[bad] == config.sample_time[bad]};
+    } else {
+      return {};
+    }
+  }
+  [[nodiscard]] Told told(int lane) const override {
+    const auto& o = observer_;
+    Told told;
+    const auto add = [&](const char* name, const auto& x) { Of::add(told, lane, name, x); };
+    add("estimate", o.estimate());
+    add("estimate<1>", o.template estimate<1>());
+    add("total_disturbance", o.total_disturbance());
+    add("level_estimate", o.level_estimate(0));
+    add("innovation", o.innovation());
+    add("applied_input", o.applied_input());
+    add("input_gain", o.input_gain());
+    add("sample_time", o.sample_time());
+    add("missed", o.missed());
+    add("restarts", o.restarts());
+    if constexpr (requires { o.preview(); }) {
+      add("preview offset", o.preview().offset);
+      add("preview slope", o.preview().slope);
+    }
+    if constexpr (requires { o.blanked(); }) {
+      add("blanked", o.blanked());
+      add("settled", o.settled());
+      add("age", o.age());
+      add("blanking", o.blanking());
+    }
+    if constexpr (requires { o.normalised_innovation(); }) {
+      for (int r = 0; r < Observer::size; ++r) add("covariance", o.covariance()(0, r));
+      add("normalised_innovation", o.normalised_innovation());
+      add("gain", o.gain());
+      add("frozen", o.frozen());
+    }
+    if constexpr (requires { o.gain_min(); }) {
+      add("gain_min", o.gain_min());
+      add("gain_max", o.gain_max());
+    }
+    return told;
+  }
+
+ private:
+  Observer observer_;
+};
+
+/// What the tests know of a case.
+struct Case {
+  int lanes;
+  bool single, gates, weighs;
+  std::unique_ptr<Subject> (*packed)();
+  std::unique_ptr<Subject> (*plain)(int lane);
+};
+
+template <class Kind, class S>
+Case case_of() {
+  using One = LaneScalar<S>;
+  using Plain = typename Kind::template Observer<One>;
+  return {lane_count<S>, std::is_same_v<One, float>, esokit::observer_traits<Plain>.gates_outliers,
+          requires(Plain o){o.update_weighted(One(0), One(0), One(1));
+}
+, []() -> std::unique_ptr<Subject> { return std::make_unique<Of<Kind, S>>(0); },
+    [](int lane) -> std::unique_ptr<Subject> { return std::make_unique<Of<Kind, One>>(lane); }
+};  // namespace observer_pack_test
+}  // namespace esokit_test
+
+/// A pack and the scalars that it has to equal.
+class Packs {
+ public:
+  explicit Packs(const Case& of) : count(of.lanes), packed(of.packed()), of_(of) {
+    for (int i = 0; i < count; ++i) lanes.push_back(of.plain(i));
+  }
+
+  /// The same call of the pack and of each scalar; their status must agree.
+  template <class... Signals>
+  void both(Statuses (Subject::*call)(const Signals&...), const Signals&... signals) {
+    const Statuses status = ((*packed).*call)(signals...);
+    for (std::size_t i = 0; i < lanes.size(); ++i) {
+      const StepStatus of_one = ((*lanes[i]).*call)(Numbers{signals[i]}...)[0];
       ASSERT_EQ(status[i], of_one) << "lane " << i;
       flags = flags | of_one;
     }
-    expect_equal(packed, lanes);
+    expect_equal();
   }
-
-  // Out of line, as each inlines the update of the pack: it is what takes long to compile here.
-  [[gnu::noinline]] auto update_packed(const Scalar& y, const Scalar& u) {
-    return packed.update(y, u);
-  }
-  [[gnu::noinline]] void update(const Scalar& y, const Scalar& u) {
-    both([](auto& o, const auto& y_of, const auto& u_of) { return o.update(y_of, u_of); }, y, u);
-  }
-
-  void retune(bool again) {
-    ASSERT_TRUE(packed.retune(Kind::template config<Scalar>(0, again)));
-    for (int i = 0; i < lane_count<Scalar>; ++i) {
-      ASSERT_TRUE(
-          lanes[static_cast<std::size_t>(i)].retune(Kind::template config<Number>(i, again)));
+  void expect_equal() const {
+    for (std::size_t i = 0; i < lanes.size(); ++i) {
+      ASSERT_EQ(packed->told(static_cast<int>(i)).difference(lanes[i]->told(0)), "")
+          << "lane " << i;
     }
-    expect_equal(packed, lanes);
+  }
+  void retune(bool again) {
+    ASSERT_TRUE(packed->retune(0, again));
+    for (int i = 0; i < count; ++i) {
+      ASSERT_TRUE(lanes[static_cast<std::size_t>(i)]->retune(i, again));
+    }
+    expect_equal();
+  }
+  /// A signal with faults, in the lanes' precision.
+  std::function<Numbers()> signal(unsigned seed, double faults) const {
+    return of_.single ? of_lanes<float>(seed, faults) : of_lanes<double>(seed, faults);
   }
 
-  Packed packed = Packed::make(Kind::template config<Scalar>(0, false)).value();
-  std::vector<Plain> lanes;
+  int count;
+  std::unique_ptr<Subject> packed;
+  std::vector<std::unique_ptr<Subject>> lanes;
   StepStatus flags{};  ///< all that were met
+
+ private:
+  template <class One>
+  static std::function<Numbers()> of_lanes(unsigned seed, double faults) {
+    return [from = FaultySignal<Pack<One, most_lanes>>(seed, faults)]() mutable {
+      const auto all = from();
+      Numbers numbers{};
+      for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = static_cast<double>(all[i]);
+      return numbers;
+    };
+  }
+
+  Case of_;
 };
 
-// With more lanes than a register has those whose steps differ, the others share them. The last are
-// of an archetype: what the concept names and nothing more.
-template <class... Kinds>
-#ifdef ESOKIT_ONE_TYPE
-using Cases = ::testing::Types<Of<Kinds, esokit::Pack<float>>..., Of<Cascade, Pack<float, 3>>>;
-#else
-using Cases = ::testing::Types<
-    Of<Kinds, esokit::Pack<double>>..., Of<Linear, esokit::Pack<double, 8>>,
-    Of<Cascade, esokit::Pack<double, 8>>, Of<AdjustableBandwidth, esokit::Pack<double, 8>>,
-    Of<PowerSum, esokit::Pack<double, 8>>, Of<Algebraic, esokit::Pack<double, 8>>,
-    Of<Linear, Pack<double, 4>>, Of<Cascade, Pack<float, 3>>, Of<Riccati, esokit::Pack<double>>,
-    Of<RiccatiTable, esokit::Pack<float>>, Of<GatedRiccati, esokit::Pack<double>>>;
-#endif
-using All = Cases<Linear, ByPoles, HalfGain, Reduced, Cascade, CascadeByLevels, AdjustableBandwidth,
-                  PowerSum, FalShape, OwnShape, Algebraic>;
-TYPED_TEST_SUITE(Packs, All);
-
-TYPED_TEST(Packs, AreTheirLanesWithoutFaults) {
-  using S = typename TestFixture::Scalar;
-  FaultySignal<S> y(1, 0);
-  FaultySignal<S> u(2, 0);
+void are_their_lanes_without_faults(const Case& of) {
+  Packs packs(of);
+  auto y = packs.signal(1, 0);
+  auto u = packs.signal(2, 0);
   for (int k = 0; k < 2000; ++k) {
-    this->update(y(), u());
-    if (this->HasFatalFailure()) FAIL() << "sample " << k;
+    packs.both(&Subject::update, y(), u());
+    if (::testing::Test::HasFatalFailure()) FAIL() << "sample " << k;
   }
   // A gate takes these signals for outliers now and then.
-  if (!esokit::observer_traits<typename TestFixture::Plain>.gates_outliers) {
-    EXPECT_EQ(this->flags, StepStatus::ok);
+  if (!of.gates) {
+    EXPECT_EQ(packs.flags, StepStatus::ok);
   }
 }
 
-TYPED_TEST(Packs, AreTheirLanesWithFaultsInSingleLanes) {
-  using S = typename TestFixture::Scalar;
-  FaultySignal<S> y(3, 0.05);
-  FaultySignal<S> u(4, 0.02);
+void are_their_lanes_with_faults_in_single_lanes(const Case& of) {
+  Packs packs(of);
+  auto y = packs.signal(3, 0.05);
+  auto u = packs.signal(4, 0.02);
   for (int k = 0; k < 4000; ++k) {
-    this->update(y(), u());
-    if (this->HasFatalFailure()) FAIL() << "sample " << k;
+    packs.both(&Subject::update, y(), u());
+    if (::testing::Test::HasFatalFailure()) FAIL() << "sample " << k;
   }
   for (const StepStatus flag :
        {StepStatus::measurement_rejected, StepStatus::input_rejected, StepStatus::restarted}) {
-    EXPECT_TRUE(has(this->flags, flag)) << flag << " was not met";
+    EXPECT_TRUE(has(packs.flags, flag)) << flag << " was not met";
   }
 }
 
-TYPED_TEST(Packs, AreTheirLanesInEveryCall) {
-  using S = typename TestFixture::Scalar;
-  FaultySignal<S> y(5, 0.02);
-  FaultySignal<S> u(6, 0.01);
+void are_their_lanes_in_every_call(const Case& of) {
+  Packs packs(of);
+  auto y = packs.signal(5, 0.02);
+  auto u = packs.signal(6, 0.01);
   Random random(7);
   for (int k = 0; k < 3000; ++k) {
     const int call = static_cast<int>(random.uniform(0, 100));
     if (call < 60) {
-      this->update(y(), u());
+      packs.both(&Subject::update, y(), u());
     } else if (call < 75) {
-      this->both([](auto& o, const auto& of) { return o.predict(of); }, u());
+      packs.both(&Subject::predict, u());
     } else if (call < 85) {
-      this->both([](auto& o, const auto& of) { return o.correct(of); }, y());
+      packs.both(&Subject::correct, y());
     } else if (call < 88) {
-      if constexpr (requires { this->packed.update_weighted(y(), u(), y()); }) {
-        this->both([](auto& o, const auto& of_y, const auto& of_u,
-                      const auto& of_r) { return o.update_weighted(of_y, of_u, of_r * of_r); },
-                   y(), u(), y());
-        if (this->HasFatalFailure()) FAIL() << "sample " << k << ", weighted";
-      }
-      this->both([](auto& o, const auto& of) { return o.revise_input(of); }, u());
+      if (of.weighs) packs.both(&Subject::update_weighted, y(), u(), y());
+      if (::testing::Test::HasFatalFailure()) FAIL() << "sample " << k << ", weighted";
+      packs.both(&Subject::revise_input, u());
     } else if (call < 90) {
-      this->both([](auto& o, const auto& of) { return o.reset(of); }, y());
+      packs.both(&Subject::reset, y());
     } else if (call < 92) {
-      this->both(
-          [](auto& o, const auto& a, const auto& b) {
-            auto state = o.estimate();
-            state[0] = a;
-            state[1] = b;
-            return o.reset(state);
-          },
-          y(), y());
+      packs.both(&Subject::reset_two, y(), y());
     } else if (call < 95) {
-      this->both([](auto& o, const auto& of) { return o.shift_output(of); }, y());
+      packs.both(&Subject::shift_output, y());
     } else if (call < 98) {
-      this->both([](auto& o, const auto& of) { return o.shift_disturbance(of); }, y());
+      packs.both(&Subject::shift_disturbance, y());
     } else {
-      this->both([](auto& o, const auto& of) { return o.reset(of); }, S(0.5));
-      this->retune(k % 2 == 0);
+      Numbers half;
+      half.fill(0.5);
+      packs.both(&Subject::reset, half);
+      packs.retune(k % 2 == 0);
     }
-    if (this->HasFatalFailure()) FAIL() << "sample " << k << ", call " << call;
+    if (::testing::Test::HasFatalFailure()) FAIL() << "sample " << k << ", call " << call;
   }
 }
 
 /// What a lane suffers leaves the others alone.
-TYPED_TEST(Packs, KeepOneLanesTroubleInIt) {
-  using S = typename TestFixture::Scalar;
-  using One = typename TestFixture::Number;
-  for (int bad = 0; bad < lane_count<S>; ++bad) {
+void keep_one_lanes_trouble_in_it(const Case& of) {
+  Packs packs(of);
+  Numbers good;
+  good.fill(0.25);
+  Numbers u;
+  u.fill(0.5);
+  for (std::size_t bad = 0; bad < packs.lanes.size(); ++bad) {
     for (int k = 0; k < 3; ++k) {
-      S y(0.25);
-      y[bad] = k == 1 ? hidden_infinity<One>() : hidden_nan<One>();
-      const auto status = this->update_packed(y, S(0.5));
-      for (int i = 0; i < lane_count<S>; ++i) {
+      Numbers y = good;
+      y[bad] = k == 1 ? hidden_infinity<double>() : hidden_nan<double>();
+      const Statuses status = packs.packed->update(y, u);
+      for (std::size_t i = 0; i < packs.lanes.size(); ++i) {
         EXPECT_EQ(has(status[i], StepStatus::measurement_rejected), i == bad);
-        EXPECT_EQ(this->packed.missed()[i] > 0, i == bad);
+        packs.lanes[i]->update({y[i]}, u);
       }
+      packs.expect_equal();
     }
-    this->update_packed(S(0.25), S(0.5));
+    packs.both(&Subject::update, good, u);
   }
 }
 
-TYPED_TEST(Packs, NameTheLaneOfAnError) {
-  using S = typename TestFixture::Scalar;
-  using Which = typename TestFixture::Kind;
-  for (int bad = 0; bad < lane_count<S>; ++bad) {
-    auto config = Which::template config<S>(0, false);
-    config.sample_time[bad] = -config.sample_time[bad];
-    const auto made = TestFixture::Packed::make(config);
-    ASSERT_FALSE(made);
-    EXPECT_EQ(made.error().lane, bad);
-    EXPECT_STREQ(made.error().field, "sample_time");
-    EXPECT_STREQ(made.error().rule, "must be finite and positive");
-    EXPECT_EQ(made.error().value[bad], config.sample_time[bad]);
-    const auto before = this->packed;
-    const auto refused = this->packed.retune(config);
-    ASSERT_FALSE(refused);
-    EXPECT_EQ(refused.error().lane, bad);
-    expect_equal(before, this->lanes);
-    expect_equal(this->packed, this->lanes);
+void name_the_lane_of_an_error(const Case& of) {
+  Packs packs(of);
+  for (int bad = 0; bad < packs.count; ++bad) {
+    const Refused refused = packs.packed->refuse(bad);
+    EXPECT_EQ(refused.by_make, "sample_time: must be finite and positive");
+    EXPECT_EQ(refused.by_retune, "sample_time: must be finite and positive");
+    EXPECT_EQ(refused.lane_of_make, bad);
+    EXPECT_EQ(refused.lane_of_retune, bad);
+    EXPECT_TRUE(refused.value_is_given);
+    packs.expect_equal();
   }
 }
+
+bool registered(int index, const std::string& type, const Case& of) {
+  const auto test = [&](const char* name, void (*run)(const Case&)) {
+    register_law("Packs/" + std::to_string(index), type, {name, [=] { run(of); }});
+  };
+  test("AreTheirLanesWithoutFaults", are_their_lanes_without_faults);
+  test("AreTheirLanesWithFaultsInSingleLanes", are_their_lanes_with_faults_in_single_lanes);
+  test("AreTheirLanesInEveryCall", are_their_lanes_in_every_call);
+  test("KeepOneLanesTroubleInIt", keep_one_lanes_trouble_in_it);
+  test("NameTheLaneOfAnError", name_the_lane_of_an_error);
+  return true;
+}
+
+template <class Kind, class S>
+struct As {};
+
+template <class... Kinds, class... Scalars>
+bool register_cases(TypeList<As<Kinds, Scalars>...>) {
+  int index = 0;
+  return (registered(index++, ::testing::internal::GetTypeName<As<Kinds, Scalars>>(),
+                     case_of<Kinds, Scalars>()) &&
+          ...);
+}
+
+// Of one register, and of two where the steps differ in more than the gains. The last two are of an
+// archetype: what the concept names and nothing more.
+using OneRegister = esokit::Pack<double>;
+using TwoRegisters = esokit::Pack<double, 2 * esokit::default_lanes<double>>;
+#ifdef ESOKIT_ONE_TYPE
+template <class... Kinds>
+using InFloat = TypeList<As<Kinds, esokit::Pack<float>>..., As<Cascade, Pack<float, 3>>>;
+using Cases = InFloat<Linear, ByPoles, HalfGain, Reduced, Cascade, CascadeByLevels,
+                      AdjustableBandwidth, PowerSum, FalShape, OwnShape, Algebraic>;
+#else
+using Cases =
+    TypeList<As<Linear, TwoRegisters>, As<ByPoles, OneRegister>, As<HalfGain, OneRegister>,
+             As<Reduced, OneRegister>, As<Cascade, TwoRegisters>, As<CascadeByLevels, OneRegister>,
+             As<AdjustableBandwidth, TwoRegisters>, As<PowerSum, TwoRegisters>,
+             As<FalShape, OneRegister>, As<OwnShape, OneRegister>, As<Algebraic, TwoRegisters>,
+             As<Riccati, OneRegister>, As<RiccatiTable, esokit::Pack<float>>,
+             As<GatedRiccati, OneRegister>, As<Linear, Pack<double, 4>>,
+             As<Cascade, Pack<float, 3>>>;
+#endif
+const bool all_registered = register_cases(Cases{});
 
 TEST(PackOfAdjustableBandwidth, NamesTheLaneWithoutACertificate) {
   using S = esokit::Pack<double, 2>;
