@@ -13,29 +13,30 @@ namespace esokit_test::gain_covariance_factor_test {
 
 using esokit::CovarianceFactor;
 
-template <int N>
-Eigen::Matrix<double, N, N> random_covariance(Random& random, int rank = N) {
-  Eigen::Matrix<double, N, N> p = Eigen::Matrix<double, N, N>::Zero();
+using Dense = Eigen::MatrixXd;
+
+Dense random_covariance(Random& random, int size, int rank) {
+  Dense p = Dense::Zero(size, size);
   for (int k = 0; k < rank; ++k) {
-    Eigen::Matrix<double, N, 1> v;
-    for (int i = 0; i < N; ++i) v(i) = random.uniform(-1, 1) * std::pow(10.0, -i);
-    p += v * v.transpose();
+    Eigen::VectorXd v(size);
+    for (int i = 0; i < size; ++i) v(i) = random.uniform(-1, 1) * std::pow(10.0, -i);
+    p += v.lazyProduct(v.transpose());
   }
   return p;
 }
 
-template <int N>
-Eigen::Matrix<double, N, N> pascal() {
-  Eigen::Matrix<double, N, N> phi = Eigen::Matrix<double, N, N>::Zero();
-  for (int i = 0; i < N; ++i) {
-    for (int j = i; j < N; ++j) phi(i, j) = choose(j, i);
+/// Phi p Phi' of the chain.
+Dense transported(const Dense& p) {
+  Dense phi = Dense::Zero(p.rows(), p.rows());
+  for (int i = 0; i < p.rows(); ++i) {
+    for (int j = i; j < p.rows(); ++j) phi(i, j) = choose(j, i);
   }
-  return phi;
+  const Dense left = phi.lazyProduct(p);
+  return left.lazyProduct(phi.transpose());
 }
 
 /// Largest difference of correlations: the states differ by orders of magnitude.
-template <class A, class B>
-double distance(const A& a, const B& b) {
+double distance(const Dense& a, const Dense& b) {
   double worst = 0;
   for (int i = 0; i < a.rows(); ++i) {
     for (int j = 0; j < a.cols(); ++j) {
@@ -45,50 +46,58 @@ double distance(const A& a, const B& b) {
   return worst;
 }
 
+template <int N, class S>
+Dense dense(const esokit::CovarianceFactor<N, S>& factor) {
+  return eigen(factor.matrix()).template cast<double>();
+}
+template <int N, class S = double>
+CovarianceFactor<N, S> factor_of(const Dense& p) {
+  return CovarianceFactor<N, S>::from_matrix(Eigen::Matrix<S, N, N>(p.cast<S>())).value();
+}
+
 template <int N>
 void updates_equal_dense() {
   Random random(3);
   constexpr double unit = 200 * N * std::numeric_limits<double>::epsilon();
   for (int run = 0; run < 50; ++run) {
-    const auto p = random_covariance<N>(random);
+    const Dense p = random_covariance(random, N, N);
     const bool diagonal = run % 2 == 0;
-    Eigen::Matrix<double, N, N> q = random_covariance<N>(random);
-    if (diagonal) q = q.diagonal().asDiagonal();
-    auto factor = CovarianceFactor<N, double>::from_matrix(p).value();
-    const auto noise = CovarianceFactor<N, double>::from_matrix(q).value();
+    Dense q = random_covariance(random, N, N);
+    if (diagonal) q = Dense(q.diagonal().asDiagonal());
+    auto factor = factor_of<N>(p);
+    const auto noise = factor_of<N>(q);
     EXPECT_EQ(noise.diagonal(), diagonal);
-    EXPECT_LE(distance(factor.matrix(), p), unit);
+    EXPECT_LE(distance(dense(factor), p), unit);
 
     const double r = random.log_uniform(1e-4, 1);
-    const Eigen::Matrix<double, N, 1> gain = p.col(0) / (p(0, 0) + r);
+    const Eigen::VectorXd gain = p.col(0) / (p(0, 0) + r);
     const double share = factor.variance(0) / (factor.variance(0) + r);
     const auto k = factor.gain(share);
     for (int i = 0; i < N; ++i) {
       EXPECT_NEAR(k[static_cast<std::size_t>(i)], gain(i), unit * std::abs(gain(i)) + unit * 1e-9);
     }
     factor.set_variance(0, share * r);
-    const Eigen::Matrix<double, N, N> corrected = p - gain * p.row(0);
-    const auto measured = factor.matrix();
+    const Dense measured = dense(factor);
     for (int i = 0; i < N; ++i) {
       for (int j = 0; j < N; ++j) {
-        EXPECT_NEAR(measured(i, j), corrected(i, j), 10 * unit * std::sqrt(p(i, i) * p(j, j)));
+        EXPECT_NEAR(measured(i, j), p(i, j) - gain(i) * p(0, j),
+                    10 * unit * std::sqrt(p(i, i) * p(j, j)));
       }
     }
 
     const double inflation = random.uniform(1, 2);
-    Eigen::Matrix<double, N, N> ahead = pascal<N>() * measured * pascal<N>().transpose();
-    ahead = ahead * inflation + q;
+    const Dense ahead = transported(measured) * inflation + q;
     auto other = factor;
     factor.template advance<false>(inflation, noise);
-    EXPECT_LE(distance(factor.matrix(), ahead), unit);
+    EXPECT_LE(distance(dense(factor), ahead), unit);
     if (diagonal) {
       other.template advance<true>(inflation, noise);
-      EXPECT_LE(distance(other.matrix(), ahead), unit);
+      EXPECT_LE(distance(dense(other), ahead), unit);
     }
 
     esokit::Array<double, N> weights;
     double trace = 0;
-    const Eigen::Matrix<double, N, N> moved = pascal<N>() * ahead * pascal<N>().transpose();
+    const Dense moved = transported(ahead);
     for (int i = 0; i < N; ++i) {
       weights[static_cast<std::size_t>(i)] = random.uniform(0.1, 3);
       trace += weights[static_cast<std::size_t>(i)] * moved(i, i);
@@ -100,7 +109,6 @@ void updates_equal_dense() {
 TEST(CovarianceFactor, updates_equal_dense_matrices) {
   updates_equal_dense<2>();
   updates_equal_dense<3>();
-  updates_equal_dense<4>();
   updates_equal_dense<6>();  // not unrolled
 }
 
@@ -110,7 +118,7 @@ TEST(CovarianceFactor, correction_by_any_row_equals_dense) {
   Random random(9);
   constexpr double unit = 200 * N * std::numeric_limits<double>::epsilon();
   for (int run = 0; run < 60; ++run) {
-    const auto p = random_covariance<N>(random, run % 3 == 0 ? 2 : N);
+    const Eigen::Matrix4d p = random_covariance(random, N, run % 3 == 0 ? 2 : N);
     const double r = run % 2 == 0 ? 0 : random.log_uniform(1e-4, 1);
     auto factor = CovarianceFactor<N, double>::nearest(p);
     Eigen::RowVector4d c;
@@ -153,7 +161,7 @@ TEST(CovarianceFactor, what_is_known_for_certain_is_not_corrected) {
 TEST(CovarianceFactor, takes_semidefinite_matrices) {
   Random random(5);
   for (int rank = 0; rank <= 4; ++rank) {
-    const auto p = random_covariance<4>(random, rank);
+    const Eigen::Matrix4d p = random_covariance(random, 4, rank);
     const auto factor = CovarianceFactor<4, double>::from_matrix(p);
     ASSERT_TRUE(factor.has_value()) << rank;
     EXPECT_TRUE(eigen(factor->matrix() - p).cwiseAbs().maxCoeff() <= 1e-14) << rank;
@@ -166,13 +174,12 @@ TEST(CovarianceFactor, takes_nearly_singular_matrices_of_float) {
   Random random(6);
   for (int run = 0; run < 2000; ++run) {
     const double least = random.log_uniform(1e-9, 1e-3);
-    Eigen::Matrix4d p = random_covariance<4>(random, 1 + run % 3);
+    Eigen::Matrix4d p = random_covariance(random, 4, 1 + run % 3);
     p.diagonal() *= 1 + least;
     const Eigen::Matrix4f rounded = p.cast<float>();
     const auto factor = CovarianceFactor<4, float>::from_matrix(rounded);
     ASSERT_TRUE(factor.has_value()) << run;
-    const Eigen::Matrix4d back = eigen(factor->matrix()).cast<double>();
-    EXPECT_LE(distance(back, p), 100 * 1.2e-7) << run;
+    EXPECT_LE(distance(dense(*factor), p), 100 * 1.2e-7) << run;
   }
 }
 
@@ -194,12 +201,14 @@ TEST(CovarianceFactor, refuses_indefinite_matrices) {
 
 TEST(CovarianceFactor, rescales_units) {
   Random random(7);
-  const auto p = random_covariance<3>(random);
-  auto factor = CovarianceFactor<3, double>::from_matrix(p).value();
+  const Dense p = random_covariance(random, 3, 3);
+  auto factor = factor_of<3>(p);
   factor.rescale(0.1, 5);
-  Eigen::Vector3d units(1, 0.1, 0.01);
-  const Eigen::Matrix3d expected = 5 * units.asDiagonal() * p * units.asDiagonal();
-  EXPECT_LE(distance(factor.matrix(), expected), 1e-13);
+  Dense expected = 5 * p;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) expected(i, j) *= std::pow(0.1, i + j);
+  }
+  EXPECT_LE(distance(dense(factor), expected), 1e-13);
 }
 
 /// A factor in float for which the plain and the Joseph update are known to fail: R = 1e-12,
@@ -220,7 +229,7 @@ void stays_definite_in_float(float r, double p0, double theta) {
   const auto growth = static_cast<float>(1 + theta);
   const float s = 1 / growth;
   bool definite = true;
-  for (int k = 0; k < long_run(1'000'000) && definite; ++k) {
+  for (int k = 0; k < long_run(250'000) && definite; ++k) {
     const float share = factor.variance(0) / (factor.variance(0) + s);
     factor.set_variance(0, share * s);
     factor.template advance<true>(growth, noise);
@@ -233,12 +242,11 @@ void stays_definite_in_float(float r, double p0, double theta) {
   EXPECT_EQ(p, p.transpose());
 }
 
-TEST(CovarianceFactor, a_million_steps_in_float) {
+TEST(CovarianceFactor, many_steps_in_float) {
   for (const auto& [r, p0] : {std::pair{1e-12f, 1.0}, {1e-12f, 1e8}, {1e-4f, 1e8}}) {
     stays_definite_in_float<2>(r, p0, 0.5);
-    stays_definite_in_float<3>(r, p0, 0.5);
     stays_definite_in_float<3>(r, p0, 0);
-    stays_definite_in_float<5>(r, p0, 0.02);
+    stays_definite_in_float<6>(r, p0, 0.02);
   }
 }
 
