@@ -4,7 +4,6 @@
 // packs itself without an observer: the filter form, the nonlinear feedback.
 #include <gtest/gtest.h>
 
-#include <array>
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
 #include <esokit/adapter/known_model.hpp>
@@ -252,49 +251,6 @@ struct Feedback {
     config.input_gain = set<T>(lane, again, 2);
     return config;
   }
-};
-
-/// What an object answers, of a pack lane by lane, of a plain scalar as the first lane.
-class Answers {
- public:
-  template <class... All>
-  explicit Answers(const All&... all) {
-    (add(all), ...);
-  }
-  /// With more of them.
-  template <class... All>
-  [[nodiscard]] Answers and_also(const All&... all) const {
-    Answers more = *this;
-    (more.add(all), ...);
-    return more;
-  }
-  /// The first that lane `lane` of the pack has not as the scalar; -1: none.
-  [[nodiscard]] int differs(int lane, const Answers& scalar) const {
-    const auto& mine = lanes_[static_cast<std::size_t>(lane)];
-    const auto& wanted = scalar.lanes_[0];
-    for (std::size_t i = 0; i < wanted.size(); ++i) {
-      if (i >= mine.size() || !same_bits(mine[i], wanted[i])) return static_cast<int>(i);
-    }
-    return mine.size() == wanted.size() ? -1 : static_cast<int>(wanted.size());
-  }
-
- private:
-  template <class T>
-  void add(const T& value) {
-    if constexpr (requires { value.size(); }) {
-      for (decltype(value.size()) i = 0; i < value.size(); ++i) add(value[i]);
-    } else if constexpr (requires { value[0]; }) {
-      for (int i = 0; i < lane_count<S>; ++i) put(i, value[i]);
-    } else {
-      put(0, value);
-    }
-  }
-  template <class T>
-  void put(int lane, T value) {
-    lanes_[static_cast<std::size_t>(lane)].push_back(static_cast<double>(value));
-  }
-
-  std::array<std::vector<double>, lane_count<S>> lanes_;
 };
 
 /// `step(object, signals, k)` gives all that is to be compared; it sees a pack, and then each plain

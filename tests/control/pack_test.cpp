@@ -2,13 +2,17 @@
 // bit, with limits, rates, start holds, gaps and safe mode of each lane its own.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <esokit/control/adrc.hpp>
 #include <esokit/core/pack.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <memory>
+#include <string>
 #include <support/lanes.hpp>
+#include <support/refusal.hpp>
 #include <vector>
 
 namespace esokit_test {
@@ -91,167 +95,230 @@ struct Divided {
   }
 };
 
+/// A controller of packs and the plain ones that it has to be, of any type: what plays them is
+/// compiled once.
+class Pair {
+ public:
+  enum class Call { update, report, miss, derive, track, start };
+  /// An error of a config.
+  struct Named {
+    int lane;
+    std::string text;
+  };
+
+  virtual ~Pair() = default;
+  /// Signals with faults from now on.
+  virtual void feed(unsigned seed, double faults_of_y, double other_faults) = 0;
+  /// Calls both with the next signals. @return the lane that differs, -1: none
+  virtual int call(Call what) = 0;
+  virtual int start_and_retune(bool again) = 0;
+  /// An update of the pack alone, without a measurement in its last lane.
+  virtual void update(double y, double r, bool last_is_bad) = 0;
+  /// What make and retune say of a config with a bad rate in a lane; nothing changes.
+  [[nodiscard]] virtual Named made_with_bad_rate(int lane) const = 0;
+  virtual Named retuned_with_bad_rate(int lane) = 0;
+  [[nodiscard]] virtual int differs() const = 0;
+  [[nodiscard]] virtual std::vector<LoopMode> modes() const = 0;
+  [[nodiscard]] virtual bool finite() const = 0;
+};
+
 template <class Kind, class S>
-struct Of {
-  using Controller = Kind;
-  using Scalar = S;
+class PairOf final : public Pair {
+  using One = LaneScalar<S>;
+  using Packed = typename Kind::template Controller<S>;
+  using Plain = typename Kind::template Controller<One>;
+  static constexpr int count = lane_count<S>;
+
+ public:
+  PairOf() {
+    for (int i = 0; i < count; ++i) {
+      lanes_.push_back(Plain::make(Kind::template config<One>(i, false)).value());
+    }
+  }
+
+  void feed(unsigned seed, double faults_of_y, double other_faults) override {
+    y_ = FaultySignal<S>(seed, faults_of_y);
+    r_ = FaultySignal<S>(seed + 1, other_faults);
+    u_ = FaultySignal<S>(seed + 2, other_faults);
+  }
+
+  int call(Call what) override {
+    const S y = y_();
+    const S r = r_();
+    const S u = u_();
+    return both([&](auto& c, const auto& in) {
+      using T = std::remove_cvref_t<decltype(in(y))>;
+      switch (what) {
+        case Call::update:
+          return Answers(c.update(in(y), in(r)));
+        case Call::report:
+          return Answers(c.update(in(y), in(r), in(u)));
+        case Call::miss:
+          return Answers(c.update_without_measurement(in(r)));
+        case Call::derive: {
+          const T reference[] = {in(r), in(u)};
+          return Answers(c.update(in(y), reference));
+        }
+        case Call::track:
+          return Answers(c.track(in(y), in(r), in(u)));
+        case Call::start:
+          return Answers(c.start(in(y), in(u)));
+      }
+      return Answers();
+    });
+  }
+
+  int start_and_retune(bool again) override {
+    packed_.start(S(0.5), S(0.5));
+    bool done = packed_.retune(Kind::template config<S>(0, again)).has_value();
+    for (int i = 0; i < count; ++i) {
+      Plain& one = lanes_[static_cast<std::size_t>(i)];
+      one.start(One(0.5), One(0.5));
+      done = done && one.retune(Kind::template config<One>(i, again));
+    }
+    EXPECT_TRUE(done);
+    return differs();
+  }
+
+  void update(double y, double r, bool last_is_bad) override {
+    S measured(y);
+    if (last_is_bad) measured[count - 1] = hidden_nan<One>();
+    packed_.update(measured, S(r));
+  }
+
+  [[nodiscard]] Named made_with_bad_rate(int lane) const override {
+    return named(Packed::make(with_bad_rate(lane)));
+  }
+  Named retuned_with_bad_rate(int lane) override {
+    return named(packed_.retune(with_bad_rate(lane)));
+  }
+
+  [[nodiscard]] int differs() const override {
+    const Answers mine = state(packed_);
+    for (int i = 0; i < count; ++i) {
+      if (mine.differs(i, state(lanes_[static_cast<std::size_t>(i)])) != -1) return i;
+    }
+    return -1;
+  }
+  [[nodiscard]] std::vector<LoopMode> modes() const override {
+    std::vector<LoopMode> modes;
+    for (int i = 0; i < count; ++i) modes.push_back(packed_.mode()[i]);
+    return modes;
+  }
+  [[nodiscard]] bool finite() const override { return all(is_finite(packed_.output())); }
+
+ private:
+  template <class Controller>
+  static Answers state(const Controller& c) {
+    return Answers(c.output(), c.requested(), c.status(), c.mode(), c.observer().estimate(),
+                   c.observer().missed(), c.gains());
+  }
+  template <class Step>
+  int both(const Step& step) {
+    const Answers mine = step(packed_, [](const S& all) { return all; });
+    for (int i = 0; i < count; ++i) {
+      const auto of_lane = [i](const S& all) { return all[i]; };
+      if (mine.differs(i, step(lanes_[static_cast<std::size_t>(i)], of_lane)) != -1) return i;
+    }
+    return differs();
+  }
+  static auto with_bad_rate(int lane) {
+    auto config = Kind::template config<S>(0, false);
+    config.limits.rate[lane] = -config.limits.rate[lane];
+    return config;
+  }
+  template <class Made>
+  static Named named(const Made& made) {
+    return {made ? -1 : made.error().lane, refusal(made)};
+  }
+
+  Packed packed_ = Packed::make(Kind::template config<S>(0, false)).value();
+  std::vector<Plain> lanes_;
+  FaultySignal<S> y_{1, 0}, r_{2, 0}, u_{3, 0};
 };
 
-template <class Case>
-class ControllerPacks : public ::testing::Test {
- protected:
-  using Kind = typename Case::Controller;
-  using Scalar = typename Case::Scalar;
-  using Number = LaneScalar<Scalar>;
-  using Packed = typename Kind::template Controller<Scalar>;
-  using Plain = typename Kind::template Controller<Number>;
-  static constexpr int count = lane_count<Scalar>;
-
-  ControllerPacks() {
-    for (int i = 0; i < count; ++i) {
-      lanes.push_back(Plain::make(Kind::template config<Number>(i, false)).value());
-    }
-  }
-
-  /// Calls step(controller, signal of it ..) on the pack and on each scalar.
-  template <class Step, class... Signals>
-  void both(const Step& step, const Signals&... signals) {
-    const auto u = step(packed, signals...);
-    for (int i = 0; i < count; ++i) {
-      Plain& one = lanes[static_cast<std::size_t>(i)];
-      ASSERT_TRUE(lane_equals(u, step(one, signals[i]...), i)) << "lane " << i;
-    }
-    expect_equal();
-  }
-
-  void expect_equal() {
-    for (int i = 0; i < count; ++i) {
-      const Plain& one = lanes[static_cast<std::size_t>(i)];
-      ASSERT_TRUE(lane_equals(packed.output(), one.output(), i)) << "lane " << i;
-      ASSERT_TRUE(lane_equals(packed.requested(), one.requested(), i)) << "lane " << i;
-      ASSERT_EQ(packed.status()[i], one.status()) << "lane " << i;
-      ASSERT_EQ(packed.mode()[i], one.mode()) << "lane " << i;
-      ASSERT_TRUE(lane_equals(packed.observer().estimate(), one.observer().estimate(), i));
-      ASSERT_EQ(packed.observer().missed()[i], one.observer().missed()) << "lane " << i;
-      ASSERT_TRUE(lane_equals(packed.gains(), one.gains(), i)) << "lane " << i;
-      mixed = mixed || packed.mode()[i] != packed.mode()[0];
-      safe = safe || packed.mode()[i] == LoopMode::safe;
-      bad_estimate = bad_estimate || !all(is_finite(packed.output()));
-    }
-  }
-
-  void retune(bool again) {
-    ASSERT_TRUE(packed.retune(Kind::template config<Scalar>(0, again)));
-    for (int i = 0; i < count; ++i) {
-      ASSERT_TRUE(
-          lanes[static_cast<std::size_t>(i)].retune(Kind::template config<Number>(i, again)));
-    }
-    expect_equal();
-  }
-
-  Packed packed = Packed::make(Kind::template config<Scalar>(0, false)).value();
-  std::vector<Plain> lanes;
-  bool mixed = false;         ///< lanes were in different modes
-  bool safe = false;          ///< one was in safe mode
-  bool bad_estimate = false;  ///< never
-};
-
-// More lanes than a register has: with one observer that steps alike and one that does not, the
-// rest of them is in observer/pack_test.cpp.
-template <class... Kinds>
+// One with more lanes than a register has; the rest of them is in observer/pack_test.cpp.
+using Pairs = std::vector<std::unique_ptr<Pair>>;
+Pairs pairs() {
 #ifdef ESOKIT_ONE_TYPE
-using Cases = ::testing::Types<Of<Kinds, esokit::Pack<float>>...>;
+  using S = esokit::Pack<float>;
+  using Wide = S;
 #else
-using Cases =
-    ::testing::Types<Of<Kinds, esokit::Pack<double>>..., Of<OfLinear, esokit::Pack<double, 8>>,
-                     Of<OfAlgebraic, esokit::Pack<double, 8>>>;
+  using S = esokit::Pack<double>;
+  using Wide = esokit::Pack<double, 8>;
 #endif
-using All = Cases<OfLinear, ErrorBasedOfCascade, OfAlgebraic, Divided>;
-TYPED_TEST_SUITE(ControllerPacks, All);
-
-const auto update = [](auto& c, const auto& y, const auto& r) { return c.update(y, r); };
-
-TYPED_TEST(ControllerPacks, AreTheirLanesWithoutFaults) {
-  using S = typename TestFixture::Scalar;
-  FaultySignal<S> y(1, 0);
-  FaultySignal<S> r(2, 0);
-  for (int k = 0; k < 1500; ++k) {
-    this->both(update, y(), r());
-    if (this->HasFatalFailure()) FAIL() << "sample " << k;
-  }
-  EXPECT_TRUE(this->mixed) << "some lanes hold at first";
-  EXPECT_FALSE(this->safe);
+  Pairs all;
+  all.push_back(std::make_unique<PairOf<OfLinear, Wide>>());
+  all.push_back(std::make_unique<PairOf<ErrorBasedOfCascade, S>>());
+  all.push_back(std::make_unique<PairOf<OfAlgebraic, S>>());
+  all.push_back(std::make_unique<PairOf<Divided, S>>());
+  return all;
 }
 
-TYPED_TEST(ControllerPacks, AreTheirLanesInEveryCall) {
-  using S = typename TestFixture::Scalar;
-  FaultySignal<S> y(3, 0.06);
-  FaultySignal<S> r(4, 0.01);
-  FaultySignal<S> u(5, 0.01);
-  Random random(6);
-  for (int k = 0; k < 4000; ++k) {
-    const int call = static_cast<int>(random.uniform(0, 200));
-    if (call < 140) {
-      this->both(update, y(), r());
-    } else if (call < 160) {
-      this->both([](auto& c, const auto& of_y, const auto& of_r,
-                    const auto& of_u) { return c.update(of_y, of_r, of_u); },
-                 y(), r(), u());
-    } else if (call < 170) {
-      this->both([](auto& c, const auto& of) { return c.update_without_measurement(of); }, r());
-    } else if (call < 180) {
-      this->both(
-          [](auto& c, const auto& of_y, const auto& of_r, const auto& of_rate) {
-            return c.update(of_y, {of_r, of_rate});
-          },
-          y(), r(), r());
-    } else if (call < 190) {
-      this->both([](auto& c, const auto& of_y, const auto& of_r,
-                    const auto& of_u) { return c.track(of_y, of_r, of_u); },
-                 y(), r(), u());
-    } else if (call < 197) {
-      this->both([](auto& c, const auto& of_y, const auto& of_u) { return c.start(of_y, of_u); },
-                 y(), u());
-    } else {
-      this->both([](auto& c, const auto& of) { return c.start(of, of); }, S(0.5));
-      this->retune(k % 2 == 0);
+bool mixed(const std::vector<LoopMode>& modes) {
+  return std::count(modes.begin(), modes.end(), modes[0]) != static_cast<int>(modes.size());
+}
+bool safe(const std::vector<LoopMode>& modes) {
+  return std::count(modes.begin(), modes.end(), LoopMode::safe) > 0;
+}
+
+TEST(ControllerPacks, AreTheirLanesWithoutFaults) {
+  for (const auto& pair : pairs()) {
+    bool were_mixed = false;
+    for (int k = 0; k < 1500; ++k) {
+      ASSERT_EQ(pair->call(Pair::Call::update), -1) << "sample " << k;
+      were_mixed = were_mixed || mixed(pair->modes());
+      ASSERT_FALSE(safe(pair->modes()));
     }
-    if (this->HasFatalFailure()) FAIL() << "sample " << k << ", call " << call;
+    EXPECT_TRUE(were_mixed) << "some lanes hold at first";
   }
-  EXPECT_TRUE(this->mixed);
-  EXPECT_TRUE(this->safe);
-  EXPECT_FALSE(this->bad_estimate);
+}
+
+TEST(ControllerPacks, AreTheirLanesInEveryCall) {
+  for (const auto& pair : pairs()) {
+    pair->feed(3, 0.06, 0.01);
+    Random random(6);
+    bool were_mixed = false;
+    bool were_safe = false;
+    for (int k = 0; k < 4000; ++k) {
+      const int draw = random.index(200);
+      const auto what = draw < 140   ? Pair::Call::update
+                        : draw < 160 ? Pair::Call::report
+                        : draw < 170 ? Pair::Call::miss
+                        : draw < 180 ? Pair::Call::derive
+                        : draw < 190 ? Pair::Call::track
+                                     : Pair::Call::start;
+      ASSERT_EQ(draw < 197 ? pair->call(what) : pair->start_and_retune(k % 2 == 0), -1)
+          << "sample " << k << ", call " << draw;
+      were_mixed = were_mixed || mixed(pair->modes());
+      were_safe = were_safe || safe(pair->modes());
+      ASSERT_TRUE(pair->finite());
+    }
+    EXPECT_TRUE(were_mixed);
+    EXPECT_TRUE(were_safe);
+  }
 }
 
 /// A lane without measurements goes to safe mode alone, and comes back alone.
-TYPED_TEST(ControllerPacks, KeepSafeModeInItsLane) {
-  using S = typename TestFixture::Scalar;
-  using One = typename TestFixture::Number;
-  for (int k = 0; k < 60; ++k) this->packed.update(S(0.1), S(0.2));
-  constexpr int bad = TestFixture::count - 1;
-  S y(0.1);
-  y[bad] = hidden_nan<One>();
-  for (int k = 0; k < 10; ++k) this->packed.update(y, S(0.2));
-  for (int i = 0; i < TestFixture::count; ++i) {
-    EXPECT_EQ(this->packed.mode()[i], i == bad ? LoopMode::safe : LoopMode::running);
+TEST(ControllerPacks, KeepSafeModeInItsLane) {
+  for (const auto& pair : pairs()) {
+    for (int k = 0; k < 60; ++k) pair->update(0.1, 0.2, false);
+    for (int k = 0; k < 10; ++k) pair->update(0.1, 0.2, true);
+    std::vector<LoopMode> wanted(pair->modes().size(), LoopMode::running);
+    wanted.back() = LoopMode::safe;
+    EXPECT_EQ(pair->modes(), wanted);
   }
 }
 
-TYPED_TEST(ControllerPacks, NameTheLaneOfAnError) {
-  using S = typename TestFixture::Scalar;
-  using Which = typename TestFixture::Kind;
-  for (int bad = 0; bad < TestFixture::count; ++bad) {
-    auto config = Which::template config<S>(0, false);
-    config.limits.rate[bad] = -config.limits.rate[bad];
-    const auto made = TestFixture::Packed::make(config);
-    ASSERT_FALSE(made);
-    EXPECT_EQ(made.error().lane, bad);
-    EXPECT_STREQ(made.error().field, "limits.rate");
-    EXPECT_STREQ(made.error().rule, "must be finite and positive");
-    const auto refused = this->packed.retune(config);
-    ASSERT_FALSE(refused);
-    EXPECT_EQ(refused.error().lane, bad);
-    this->expect_equal();
+TEST(ControllerPacks, NameTheLaneOfAnError) {
+  for (const auto& pair : pairs()) {
+    for (int bad = 0; bad < static_cast<int>(pair->modes().size()); ++bad) {
+      for (const auto& error : {pair->made_with_bad_rate(bad), pair->retuned_with_bad_rate(bad)}) {
+        EXPECT_EQ(error.lane, bad);
+        EXPECT_EQ(error.text, "limits.rate: must be finite and positive");
+      }
+      EXPECT_EQ(pair->differs(), -1);
+    }
   }
 }
 

@@ -8,6 +8,7 @@
 #include <esokit/core/lanes.hpp>
 #include <limits>
 #include <support/numbers.hpp>
+#include <vector>
 
 namespace esokit_test {
 
@@ -79,5 +80,52 @@ bool lane_equals(const Packed& packed, const One& one, int lane) {
     return packed[lane] == one;
   }
 }
+
+/// What an object answers, as numbers: of a pack lane by lane, of a plain scalar as its only lane.
+/// So that what compares them is compiled once.
+class Answers {
+ public:
+  template <class... All>
+  explicit Answers(const All&... all) {
+    (add(all), ...);
+  }
+  /// With more of them.
+  template <class... All>
+  [[nodiscard]] Answers and_also(const All&... all) const {
+    Answers more = *this;
+    (more.add(all), ...);
+    return more;
+  }
+  /// The first number that lane `lane` of the pack has not as the scalar, bit for bit; -1: none.
+  [[nodiscard]] int differs(int lane, const Answers& scalar) const {
+    const auto& mine = lanes_[static_cast<std::size_t>(lane)];
+    const auto& wanted = scalar.lanes_[0];
+    for (std::size_t i = 0; i < wanted.size(); ++i) {
+      if (i >= mine.size() || !same_bits(mine[i], wanted[i])) return static_cast<int>(i);
+    }
+    return mine.size() == wanted.size() ? -1 : static_cast<int>(wanted.size());
+  }
+
+ private:
+  template <class T>
+  void add(const T& value) {
+    if constexpr (requires { value.values.size(); }) {  // PerLane
+      for (std::size_t i = 0; i < value.values.size(); ++i) put(i, value.values[i]);
+    } else if constexpr (requires { value.size(); }) {
+      for (decltype(value.size()) i = 0; i < value.size(); ++i) add(value[i]);
+    } else if constexpr (esokit::PackScalar<T>) {
+      for (int i = 0; i < esokit::lane_count<T>; ++i) put(static_cast<std::size_t>(i), value[i]);
+    } else {
+      put(0, value);
+    }
+  }
+  template <class T>
+  void put(std::size_t lane, T value) {
+    if (lanes_.size() <= lane) lanes_.resize(lane + 1);
+    lanes_[lane].push_back(static_cast<double>(value));
+  }
+
+  std::vector<std::vector<double>> lanes_;
+};
 
 }  // namespace esokit_test
