@@ -73,18 +73,6 @@ TEST(GuardedObserver, ComesBackInTheStatedTime) {
   for (const guards::Type& type : bearing()) guards::comes_back_in_the_stated_time(type, 0.3, 2);
 }
 
-/// y^(n) = d + b0 u, of first or second order, exact between samples.
-struct Plant {
-  int order;
-  double d;
-  double y = 0, v = 0;
-  void step(double u) {
-    const double a = d + b0 * u;
-    y += order == 1 ? sample_time * a : sample_time * (v + sample_time / 2 * a);
-    v += order == 1 ? 0 : sample_time * a;
-  }
-};
-
 /// abs(dhat) never passes its bound, at no level, and stays there under a load above it; below it
 /// nothing is lost.
 void bound_holds(const guards::Type& type, DisturbanceUnit unit) {
@@ -92,13 +80,14 @@ void bound_holds(const guards::Type& type, DisturbanceUnit unit) {
   constexpr double bound = 1.5;
   const auto guarded = type.guarded(
       {.disturbance_bound = unit == DisturbanceUnit::input ? bound / b0 : bound, .unit = unit});
-  Plant plant{.order = type.order, .d = 1};
+  ChainPlant plant(type.order, sample_time, b0, 1);
   for (int k = 0; k < 4000; ++k) {
-    if (k == 1000) plant.d = 4;
-    if (k == 1400) plant.d = -1;
-    const double u = -plant.y - 1.5 * plant.v;  // so that a state that is off leads back
+    if (k == 1000) plant.set_disturbance(4);
+    if (k == 1400) plant.set_disturbance(-1);
+    // So that a state that is off leads back.
+    const double u = -plant.output() - (type.order > 1 ? 1.5 * plant.state()[1] : 0);
     plant.step(u);
-    (void)guarded->update(plant.y, u);
+    (void)guarded->update(plant.output(), u);
     const auto now = guarded->read();
     ASSERT_LE(now.largest, bound * (1 + 64 * type.epsilon())) << k;
     if (k == 999) {
@@ -355,7 +344,7 @@ TEST(Pinned, ErrorOfDhat) {
     Loop::Config config{.controller_bandwidth = 10, .limits = {.lower = -1, .upper = 1}};
     config.observer.observer = {.observer_bandwidth = 40, .input_gain = 10, .sample_time = 0.002};
     auto loop = Loop::make(config).value();
-    ChainPlant<1> plant(0.002, 10, -2);
+    ChainPlant plant(1, 0.002, 10, -2);
     double u = 0;
     double off = 0;
     for (int k = 0; k < 1500; ++k) {
@@ -390,7 +379,7 @@ void leak_leads_where_stated(double tolerance) {
     config.observer = {.observer = settings<Observer>(), .leak_time = static_cast<S>(leak_time)};
     auto loop = Loop::make(config).value();
     constexpr double load = 0.7;
-    ChainPlant<n> plant(sample_time, b0, load);
+    ChainPlant plant(n, sample_time, b0, load);
     for (int k = 0; k < 6000; ++k) {
       plant.step(static_cast<double>(loop.update(static_cast<S>(plant.output()), S(1))));
     }
@@ -528,7 +517,7 @@ TEST(GivenInputGain, LoopIsThatOfTheRightB0) {
     const double bias = unit == DisturbanceUnit::input ? 0.4 : 0;
     double off = 0;
     double b = b0;
-    ChainPlant<2> plant(sample_time, 1, force);
+    ChainPlant plant(2, sample_time, 1, force);
     for (int k = 0; k < 3000; ++k) {
       // By a factor of 4, much faster than the observer is.
       b = b0 * std::exp2(std::sin(0.5 * k));

@@ -327,7 +327,7 @@ TEST(OutlierGate, InAdrc) {
         Adrc<Observer>::make(
             {.observer = config, .controller_bandwidth = 8, .limits = {.lower = -5, .upper = 5}})
             .value();
-    ChainPlant<2> plant(sample_time, 2, -3);
+    ChainPlant plant(2, sample_time, 2, -3);
     double largest = 0;
     for (int k = 0; k < 3000; ++k) {
       const double y = k > 1000 && k % 50 == 0 ? 1e30 : plant.output();

@@ -143,8 +143,8 @@ TEST(Adrc, StatusAndModeHaveText) {
 TEST(Adrc, ErrorBasedEqualsOutputBasedForAConstantReference) {
   auto output = Linear::make(base()).value();
   auto error = Adrc<LinearEso<2>, ErrorBased>::make(base()).value();
-  ChainPlant<2> plant(period, 2, -3);
-  ChainPlant<2> other = plant;
+  ChainPlant plant(2, period, 2, -3);
+  ChainPlant other = plant;
   // Matched: (y, y', d) = (0.2, 0, -2) is (e, e', d) = (r - 0.2, 0, 2).
   output.start(0.2, 1);
   error.start(0.2, 1, 0.9);
@@ -163,7 +163,7 @@ TEST(Adrc, FollowsATrackingDifferentiator) {
   auto profile =
       esokit::TrackingDifferentiator<double>::make({.acceleration = 4, .sample_time = period})
           .value();
-  ChainPlant<2> plant(period, 2, -3);
+  ChainPlant plant(2, period, 2, -3);
   // Bumpless from rest at y = 0.5 under u = 1.5, the differentiator reset to y.
   plant.set_state({0.5, 0});
   controller.start(0.5, 1.5);
@@ -190,7 +190,7 @@ TEST(Adrc, IncrementsAddUpToU) {
   auto position = Linear::make(settings).value();
   auto velocity = esokit::Incremental<Linear>::make(settings).value();
   auto reported = velocity;
-  ChainPlant<2> plant(period, 2, -3);
+  ChainPlant plant(2, period, 2, -3);
   double u = 0;
   for (int k = 0; k < 1500; ++k) {
     const double y = plant.output();
@@ -230,7 +230,7 @@ TEST(Adrc, ReportedIncrementsAreThePosition) {
 /// An actuator that loses every third increment, and an offset that nobody knows.
 TEST(Adrc, IncrementalWithALossyActuator) {
   auto velocity = esokit::Incremental<Linear>::make(base()).value();
-  ChainPlant<2> plant(period, 2, -3);
+  ChainPlant plant(2, period, 2, -3);
   velocity.start(0);
   double u = 5;  // the truth; the controller counts from zero
   double applied = 0;
@@ -273,7 +273,7 @@ TEST(Adrc, SampledPlacementHoldsForAnyBandwidth) {
              .controller_bandwidth = 1500,
              .domain = domain})
             .value();
-    ChainPlant<2> plant(period, 2, -3);
+    ChainPlant plant(2, period, 2, -3);
     for (int k = 0; k < 100; ++k) plant.step(controller.update(plant.output(), 1.0));
     return std::abs(plant.output() - 1);
   };
@@ -329,14 +329,14 @@ TEST(Adrc, NoWindUp) {
     auto settings = base();
     if (kind != 2) settings.limits = {.lower = -limit, .upper = limit};
     auto controller = Linear::make(settings).value();
-    ChainPlant<2> plant(period, 2, -3);
+    ChainPlant plant(2, period, 2, -3);
     controller.start(0, 1.5);
     double peak = 0;
     for (int k = 0; k < 20000; ++k) {
       double u = 0;
       if (kind == 0) {  // true states
         const auto& x = plant.state();
-        u = (100 * (step - x(0)) - 20 * x(1) + 3) / 2;
+        u = (100 * (step - x[0]) - 20 * x[1] + 3) / 2;
       } else {
         u = controller.update(plant.output(), step);
       }
@@ -377,7 +377,7 @@ TEST(Adrc, KnownDelay) {
                                      .controller_bandwidth = 10})
                           .value();
     EXPECT_EQ(controller.observer().delay(), assumed);
-    ChainPlant<2> plant(period, 2, -3);
+    ChainPlant plant(2, period, 2, -3);
     double line[delay] = {};
     double worst = 0;
     for (int k = 0; k < 4000; ++k) {
@@ -429,7 +429,7 @@ TEST(Adrc, Angle) {
     auto angle = Wrapped::make({.observer = {.observer = base().observer, .period = turn},
                                 .controller_bandwidth = 10})
                      .value();
-    ChainPlant<2> plant(period, 2, -3);
+    ChainPlant plant(2, period, 2, -3);
     plant.set_state({0.1, 0});
     plain.start(0.1, 1.5);
     angle.start(0.1, 1.5);
@@ -468,7 +468,7 @@ TEST(Adrc, AngleLoopNeverRunsAway) {
                            .controller_bandwidth = 4,
                            .limits = {.lower = -5, .upper = 5}})
                 .value();
-        ChainPlant<2> plant(0.01, 1, -1);
+        ChainPlant plant(2, 0.01, 1, -1);
         plant.set_state({fault == 2 ? 2.0 : 0.0, 0});
         double fastest = 0;
         for (int k = 0; k < 4000; ++k) {
@@ -496,7 +496,7 @@ TEST(Adrc, AngleLoopNeverRunsAway) {
 /// A change of b0 moves what b0 u explained into the disturbance, in motion too.
 TEST(Adrc, RetuneOfInputGainKeepsWhatTheDisturbanceExplains) {
   auto controller = Linear::make(base()).value();
-  ChainPlant<2> plant(period, 2, -3);
+  ChainPlant plant(2, period, 2, -3);
   for (int k = 0; k < 100; ++k) plant.step(controller.update(plant.output(), 1.0));
   const double before = controller.observer().total_disturbance();
   const double u = controller.output();
@@ -514,7 +514,7 @@ TEST(Adrc, RetuneOfInputGainDoesNotBumpInMotion) {
   auto settings = base();
   settings.observer.sample_time = 1e-4;
   auto controller = Linear::make(settings).value();
-  ChainPlant<2> plant(1e-4, 2, -3);
+  ChainPlant plant(2, 1e-4, 2, -3);
   double before = 0;
   for (int k = 0; k < 600; ++k) {
     before = controller.output();
@@ -537,7 +537,7 @@ TEST(Adrc, RetuneKeepsThePhaseOfTheDivider) {
   settings.measurement_divider = 5;
   settings.missing.most = 2;
   auto controller = Linear::make(settings).value();
-  ChainPlant<2> plant(period, 2, -3);
+  ChainPlant plant(2, period, 2, -3);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (int k = 0; k < 4000; ++k) {
     if (k == 2002) {

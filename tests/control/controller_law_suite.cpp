@@ -14,25 +14,13 @@ constexpr double steady_input = 1.5;
 using Type = ControllerType;
 using Controller = std::unique_ptr<AnyController>;
 
-/// y^(n) = d + b0 u with constant d, exact between samples, in double whatever the controller is.
-class Plant {
- public:
-  explicit Plant(int order, double y = 0) : x_(static_cast<std::size_t>(order)) { x_[0] = y; }
-  void step(double u) {
-    const double highest = disturbance + gain * u;
-    for (std::size_t i = 0; i < x_.size(); ++i) {
-      double term = 1;
-      for (std::size_t j = i + 1; j <= x_.size(); ++j) {
-        term *= period / static_cast<double>(j - i);
-        x_[i] += term * (j < x_.size() ? x_[j] : highest);
-      }
-    }
-  }
-  [[nodiscard]] double output() const { return x_[0]; }
-
- private:
-  std::vector<double> x_;
-};
+ChainPlant plant_of(const Type& type, double y = 0) {
+  ChainPlant plant(type.order, period, gain, disturbance);
+  std::vector<double> x(static_cast<std::size_t>(type.order));
+  x[0] = y;
+  plant.set_state(x);
+  return plant;
+}
 
 double epsilon(const Type& type) {
   return type.single ? static_cast<double>(std::numeric_limits<float>::epsilon())
@@ -80,7 +68,7 @@ Controller warm(const Type& type, const LoopSetup& setup = {}) {
 
 void reaches_reference_under_disturbance(const Type& type) {
   const Controller c = type.make({});
-  Plant plant(type.order);
+  ChainPlant plant = plant_of(type);
   for (int k = 0; k < 4000; ++k) plant.step(c->update(plant.output(), 1));
   const double tolerance = std::max(1e-6, rounding(type));
   EXPECT_NEAR(plant.output(), 1, tolerance);
@@ -98,8 +86,8 @@ void limits_do_not_reach_the_observer(const Type& type) {
   limited.loop.limits = {.lower = -1, .upper = 2.5, .rate = 40};
   const Controller free = type.make({});
   const Controller bound = type.make(limited);
-  Plant of_free(type.order, 0.3);
-  Plant of_bound(type.order, 0.3);
+  ChainPlant of_free = plant_of(type, 0.3);
+  ChainPlant of_bound = plant_of(type, 0.3);
   int limited_samples = 0;
   for (int k = 0; k < 600; ++k) {
     of_free.step(free->update(of_free.output(), 1));
@@ -146,7 +134,7 @@ void start_does_not_bump(const Type& type) {
   setup.loop.limits = {.lower = -5, .upper = 5};
   setup.loop.start_hold = {.time = 0.5, .input = -2};
   const Controller c = warm(type, setup);
-  Plant plant(type.order, 2.5);
+  ChainPlant plant = plant_of(type, 2.5);
   EXPECT_EQ(c->start(2.5, steady_input), StepStatus::ok);
   EXPECT_EQ(c->state().output, steady_input);
   EXPECT_EQ(c->state().mode, LoopMode::running);
@@ -181,7 +169,7 @@ void retune_does_not_bump(const Type& type) {
     EXPECT_NEAR(started->update(0, 0), steady_input, 10 * bump_limit(type));
 
     const Controller c = type.make({});
-    Plant plant(type.order);
+    ChainPlant plant = plant_of(type);
     ASSERT_EQ(c->start(0, steady_input), StepStatus::ok);
     for (int k = 0; k < 30; ++k) plant.step(c->update(plant.output(), 0));
     const double before = c->state().output;
@@ -208,7 +196,7 @@ void refused_retune_changes_nothing(const Type& type) {
 /// The operator holds the plant at rest; then the controller takes over with the reference there.
 void takeover_from_manual_does_not_bump(const Type& type) {
   const Controller c = type.make({});
-  Plant plant(type.order, 0.8);
+  ChainPlant plant = plant_of(type, 0.8);
   for (int k = 0; k < 3000; ++k) {
     ASSERT_EQ(c->track(plant.output(), 0.8, steady_input), steady_input);
     plant.step(steady_input);
@@ -333,7 +321,7 @@ void divider_takes_every_dth_measurement(const Type& type) {
     return;
   }
   const Controller c = type.make(setup);
-  Plant plant(type.order);
+  ChainPlant plant = plant_of(type);
   for (int k = 0; k < 4000; ++k) {
     plant.step(c->update(k % every == 0 ? plant.output() : hidden_nan<double>(), 1));
     const auto now = c->state();
@@ -362,7 +350,7 @@ void beside(const Type& type, Type::Form (*make)(const LoopSetup&),
   setup.loop.limits = {.lower = -3, .upper = 4, .rate = 200};
   const Controller c = type.make(setup);
   const Type::Form form = make(setup);
-  Plant plant(type.order);
+  ChainPlant plant = plant_of(type);
   Random random(11);
   int at_limit = 0;
   for (int k = 0; k < 200; ++k) {

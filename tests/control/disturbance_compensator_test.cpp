@@ -34,7 +34,7 @@ TEST(DisturbanceCompensator, AroundAStateFeedbackItIsAdrc) {
       Adrc<LinearEso<2>>::make(
           {.observer = settings.observer, .controller_bandwidth = 10, .limits = settings.limits})
           .value();
-  ChainPlant<2> plant(period, 2, -3);
+  ChainPlant plant(2, period, 2, -3);
   for (int k = 0; k < 2000; ++k) {
     const double y = plant.output();
     const double u = adrc.update(y, 1.0);
@@ -49,10 +49,10 @@ TEST(DisturbanceCompensator, AroundAStateFeedbackItIsAdrc) {
 template <class Observer>
 void removes_the_steady_error(const typename Observer::Config& observer) {
   auto compensator = DisturbanceCompensator<Observer>::make({.observer = observer}).value();
-  ChainPlant<2> plain(period, 2, -3);
-  ChainPlant<2> wrapped = plain;
-  const auto pd = [](const ChainPlant<2>& plant) {
-    return 50 * (1 - plant.output()) - 10 * plant.state()(1);
+  ChainPlant plain(2, period, 2, -3);
+  ChainPlant wrapped = plain;
+  const auto pd = [](const ChainPlant& plant) {
+    return 50 * (1 - plant.output()) - 10 * plant.state()[1];
   };
   for (int k = 0; k < 8000; ++k) {
     plain.step(pd(plain));
@@ -109,7 +109,7 @@ TEST(DisturbanceCompensator, StartTrackAndRetuneDoNotBump) {
   auto compensator = Compensator::make(settings).value();
   EXPECT_EQ(compensator.start(0.5, 1.5), StepStatus::ok);
   EXPECT_NEAR(compensator.base_output(), 0, 1e-12);
-  ChainPlant<2> plant(period, 2, -3);
+  ChainPlant plant(2, period, 2, -3);
   plant.set_state({0.5, 0});
   for (int k = 0; k < 50; ++k) {
     const double u = compensator.update(plant.output(), 0.0);

@@ -8,8 +8,10 @@
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/dual_feedback.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <functional>
 #include <limits>
 #include <type_traits>
+#include <vector>
 
 #include "loop_traits.hpp"
 
@@ -27,110 +29,114 @@ constexpr double period = 1e-3;
 constexpr double gain = 1.7;
 constexpr int samples = 100000;
 
-template <class S>
-esokit::Limits<S> tight() {
-  return {.lower = S(-1), .upper = static_cast<S>(0.6), .rate = S(300)};
+/// What a form holds and asks for, of y and r.
+struct Output {
+  double u, requested;
+};
+using Form = std::function<Output(double y, double r)>;
+
+template <class Controller>
+Form form_of(const typename Controller::Config& config) {
+  auto made = Controller::make(config).value();
+  using S = std::remove_cvref_t<decltype(made.output())>;
+  EXPECT_EQ(made.start(static_cast<S>(0.2), static_cast<S>(0.2)), StepStatus::ok);
+  return [made](double y, double r) mutable -> Output {
+    const S u = made.update(static_cast<S>(y), static_cast<S>(r));
+    return {static_cast<double>(u), static_cast<double>(made.requested())};
+  };
 }
 
 /// Largest difference of what the two forms ask for, relative to the largest |u| asked for.
-template <int Order, class S, int Extension, class Operator, class Feedback>
-double difference(double omega_t, bool limited, bool closed) {
-  const S omega = static_cast<S>(omega_t / period);
-  const S b0 = static_cast<S>(gain);
-  const S T = static_cast<S>(period);
-  const esokit::Limits<S> limits = limited ? tight<S>() : esokit::Limits<S>{};
-  using Filter = DualFeedbackAdrc<Order, S, Extension, Operator, Feedback>;
-  using State = Adrc<LinearEso<Order, S, Extension>>;
-  auto filter = Filter::make({.observer_bandwidth = omega,
-                              .controller_bandwidth = omega / 5,
-                              .input_gain = b0,
-                              .sample_time = T,
-                              .limits = limits})
-                    .value();
-  auto state =
-      State::make({.observer = {.observer_bandwidth = omega, .input_gain = b0, .sample_time = T},
-                   .controller_bandwidth = omega / 5,
-                   .limits = limits})
-          .value();
-  const S start = static_cast<S>(0.2);
-  EXPECT_EQ(filter.start(start, start), StepStatus::ok);
-  EXPECT_EQ(state.start(start, start), StepStatus::ok);
+double difference(const Form& filter, const Form& state, int order, double omega_t, bool limited,
+                  bool closed) {
   // y and r of a size that makes u of order one.
-  const double unit = gain / std::pow(omega_t / period / 5, Order);
-  ChainPlant<Order> plant(period, gain, -gain * 0.2);
-  ChainPlant<Order> other = plant;
+  const double unit = gain / std::pow(omega_t / period / 5, order);
+  ChainPlant plant(order, period, gain, -gain * 0.2);
+  ChainPlant other = plant;
   Random random(1);
   double worst = 0;
   double largest = 0;
   int at_limit = 0;
   for (int k = 0; k < samples; ++k) {
     const double noise = 0.3 * unit * random.uniform(-1, 1);
-    const S r = static_cast<S>(0.3 * unit * random.uniform(-1, 1));
-    const S u = state.update(static_cast<S>((closed ? plant.output() : 0) + noise), r);
-    const S v = filter.update(static_cast<S>((closed ? other.output() : 0) + noise), r);
-    worst = std::max(worst, std::abs(static_cast<double>(state.requested() - filter.requested())));
-    largest = std::max(largest, std::abs(static_cast<double>(state.requested())));
-    at_limit += u != state.requested() ? 1 : 0;
+    const double r = 0.3 * unit * random.uniform(-1, 1);
+    const auto [u, requested] = state((closed ? plant.output() : 0) + noise, r);
+    const auto [v, by_filter] = filter((closed ? other.output() : 0) + noise, r);
+    worst = std::max(worst, std::abs(requested - by_filter));
+    largest = std::max(largest, std::abs(requested));
+    at_limit += std::abs(u - requested) > 0 ? 1 : 0;
     if (closed) {
       // Each has a plant of its own: unlimited and outside the loop its m integrators would sum up
       // what rounding leaves.
-      plant.step(static_cast<double>(u));
-      other.step(static_cast<double>(v));
+      plant.step(u);
+      other.step(v);
     }
     if (limited) {
-      EXPECT_LE(std::abs(static_cast<double>(v)), 1);
+      EXPECT_LE(std::abs(v), 1);
     }
   }
   EXPECT_EQ(at_limit > samples / 10, limited);
   return worst / largest;
 }
 
-template <int Size, class S>
-double bound(double omega_t) {
-  return 100 * static_cast<double>(std::numeric_limits<S>::epsilon()) /
-         std::pow(-std::expm1(-omega_t), Size);
+template <int Order, class S, int Extension, class Operator, class Feedback>
+double difference(double omega_t, bool limited, bool closed) {
+  const S omega = static_cast<S>(omega_t / period);
+  const S b0 = static_cast<S>(gain);
+  const S T = static_cast<S>(period);
+  esokit::Limits<S> limits{};
+  if (limited) limits = {.lower = S(-1), .upper = static_cast<S>(0.6), .rate = S(300)};
+  const auto filter = form_of<DualFeedbackAdrc<Order, S, Extension, Operator, Feedback>>(
+      {.observer_bandwidth = omega,
+       .controller_bandwidth = omega / 5,
+       .input_gain = b0,
+       .sample_time = T,
+       .limits = limits});
+  const auto state = form_of<Adrc<LinearEso<Order, S, Extension>>>(
+      {.observer = {.observer_bandwidth = omega, .input_gain = b0, .sample_time = T},
+       .controller_bandwidth = omega / 5,
+       .limits = limits});
+  return difference(filter, state, Order, omega_t, limited, closed);
 }
 
-template <int Order, class S, int Extension>
-void equal_to_state_space(const std::vector<double>& grid) {
-  constexpr int N = Order + Extension;
+template <class S>
+double bound(int size, double omega_t) {
+  return 100 * static_cast<double>(std::numeric_limits<S>::epsilon()) /
+         std::pow(-std::expm1(-omega_t), size);
+}
+
+template <int Order, class S, int Extension, class Operator>
+void equal_to_state_space(int digits, const std::vector<double>& grid) {
   for (const double omega_t : grid) {
     SCOPED_TRACE(::testing::Message()
                  << "n = " << Order << ", m = " << Extension << ", omega T = " << omega_t);
-    const double limit = bound<N, S>(omega_t);
+    const double limit = bound<S>(digits, omega_t);
     // Limited: y and u are what they are, the filter's states must be the observer's.
-    EXPECT_LE(
-        (difference<Order, S, Extension, ShiftOperator, LimitedFeedback>(omega_t, true, false)),
-        limit);
-    EXPECT_LE(
-        (difference<Order, S, Extension, ShiftOperator, LimitedFeedback>(omega_t, false, true)),
-        limit);
-    // In delta nothing is lost: the same bound without 1/(1-rho)^N, but for the 1/(1-rho) samples
-    // that it remembers.
-    const double delta_limit = bound<1, S>(omega_t);
-    EXPECT_LE(
-        (difference<Order, S, Extension, DeltaOperator, LimitedFeedback>(omega_t, true, false)),
-        delta_limit);
-    EXPECT_LE(
-        (difference<Order, S, Extension, DeltaOperator, LimitedFeedback>(omega_t, false, true)),
-        delta_limit);
+    EXPECT_LE((difference<Order, S, Extension, Operator, LimitedFeedback>(omega_t, true, false)),
+              limit);
+    EXPECT_LE((difference<Order, S, Extension, Operator, LimitedFeedback>(omega_t, false, true)),
+              limit);
   }
 }
 
 TEST(DualFeedback, EqualsStateSpace) {
-  equal_to_state_space<1, double, 1>({0.03, 0.3, 1});
-  equal_to_state_space<2, double, 1>({0.03, 0.3, 1});
-  equal_to_state_space<3, double, 1>({0.03, 0.3, 1});
-  equal_to_state_space<2, double, 2>({0.1, 0.3});
-  equal_to_state_space<1, float, 1>({0.3, 1});
-  equal_to_state_space<2, float, 1>({0.5});
+  equal_to_state_space<1, double, 1, ShiftOperator>(2, {0.03, 0.3, 1});
+  equal_to_state_space<2, double, 1, ShiftOperator>(3, {0.03, 0.3, 1});
+  equal_to_state_space<2, double, 2, ShiftOperator>(4, {0.1, 0.3});
+  equal_to_state_space<1, float, 1, ShiftOperator>(2, {0.3, 1});
+  // In delta nothing is lost: the same bound without 1/(1-rho)^N, but for the 1/(1-rho) samples
+  // that it remembers.
+  equal_to_state_space<1, double, 1, DeltaOperator>(1, {0.03, 0.3, 1});
+  equal_to_state_space<2, double, 1, DeltaOperator>(1, {0.03, 0.3, 1});
+  equal_to_state_space<2, double, 2, DeltaOperator>(1, {0.1, 0.3});
+  equal_to_state_space<1, float, 1, DeltaOperator>(1, {0.3, 1});
 }
 
 TEST(DualFeedback, TransferFunctionFormWindsUp) {
   EXPECT_LE((difference<2, double, 1, ShiftOperator, UnlimitedFeedback>(0.3, false, true)),
-            (bound<3, double>(0.3)));
+            bound<double>(3, 0.3));
   EXPECT_LE((difference<2, double, 1, DeltaOperator, UnlimitedFeedback>(0.3, false, true)),
-            (bound<1, double>(0.3)));
+            bound<double>(1, 0.3));
   EXPECT_GT((difference<2, double, 1, DeltaOperator, UnlimitedFeedback>(0.3, true, false)), 0.1);
 }
 
@@ -179,7 +185,7 @@ TEST(DualFeedback, StartAndRetuneDoNotBump) {
   const auto check = [](auto filter, auto config) {
     EXPECT_EQ(filter.start(2.5, 0.4), StepStatus::ok);
     EXPECT_EQ(filter.output(), 0.4);
-    ChainPlant<2> plant(period, gain, -gain * 0.4);
+    ChainPlant plant(2, period, gain, -gain * 0.4);
     plant.set_state({2.5, 0});
     for (int k = 0; k < 100; ++k) {
       const double u = filter.update(plant.output(), 2.5);

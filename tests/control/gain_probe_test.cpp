@@ -49,7 +49,7 @@ void ratio_is_that_of_the_gains() {
       const double b0 = sign * 20;
       auto loop = loop_of<S>(b0);
       auto probe = GainProbe<3, S>::make(settings<S>()).value();
-      ChainPlant<2> plant(sample_time, b0 * ratio, 0);
+      ChainPlant plant(2, sample_time, b0 * ratio, 0);
       S applied{};
       double most = 0;
       int samples = 0;

@@ -53,7 +53,7 @@ void ratio_is_that_of_the_gains() {
   for (const double ratio : {1.0, -1.0, 10.0, 0.1}) {
     auto loop = loop_of<S>(20);
     auto monitor = monitor_of<S>();
-    ChainPlant<2> plant(sample_time, 20 * ratio, 3);
+    ChainPlant plant(2, sample_time, 20 * ratio, 3);
     Random random(5);
     S u{};
     for (int k = 0; k < 3000; ++k) {
@@ -125,7 +125,7 @@ TEST(Health, ALoadIsNoFault) {
   for (const bool gated : {false, true}) {
     auto loop = loop_of(20);
     auto monitor = monitor_of();
-    ChainPlant<2> plant(sample_time, 20, 0);
+    ChainPlant plant(2, sample_time, 20, 0);
     for (int k = 0; k < 5000; ++k) {
       if (gated) loop.observer().set_trust(0.9);
       plant.set_disturbance(8 * std::sin(0.01 * k));
@@ -205,7 +205,7 @@ TEST(Health, AnAbsurdSampleIsNotRemembered) {
   auto monitor = monitor_of<float>();
   Random random(3);
   const auto run = [&](float b, int samples) {
-    ChainPlant<2> plant(sample_time, static_cast<double>(b), 0);
+    ChainPlant plant(2, sample_time, static_cast<double>(b), 0);
     loop.observer().reset(0.f);
     for (int k = 0; k < samples; ++k) {
       const float u = k % 40 < 20 ? 0.3f : -0.3f;
@@ -324,12 +324,12 @@ TEST(Health, AnyNumbers) {
       ASSERT_TRUE(is_finite(h.gain_ratio) && is_finite(h.innovation) && is_finite(h.evidence));
       ASSERT_TRUE(is_finite(h.saturated) && h.saturated >= 0 && h.saturated <= 1);
     }
-    ChainPlant<2> plant(sample_time, -20, 0);
+    ChainPlant plant(2, sample_time, -20, 0);
     float push = 0;
     for (int k = 0; k < 30000; ++k) {
       if (k % 40 == 0) push = static_cast<float>(random.uniform(-0.5, 0.5));
       const auto y = static_cast<float>(plant.output());
-      const float u = push + 0.5f * y + 0.3f * static_cast<float>(plant.state()(1));
+      const float u = push + 0.5f * y + 0.3f * static_cast<float>(plant.state()[1]);
       loop.track(y, 0, u);
       monitor.look(loop);
       plant.step(static_cast<double>(u));

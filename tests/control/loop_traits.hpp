@@ -3,11 +3,12 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 #include <esokit/control/adrc.hpp>
 #include <esokit/eigen.hpp>
-#include <esokit/model/integrator_chain.hpp>
 #include <limits>
 #include <support/numbers.hpp>
+#include <vector>
 
 namespace esokit_test {
 
@@ -22,33 +23,33 @@ template <class Observer>
 struct LoopTraits;
 
 /// y^(n) = d + b0 u with constant d, exact between samples, in double whatever the controller is.
-template <int Order>
 class ChainPlant {
  public:
-  using State = esokit::EigenMatrix<double, Order>;
-
-  ChainPlant(double sample_time, double input_gain, double disturbance)
-      : input_gain_(input_gain), disturbance_(disturbance) {
-    using Chain = esokit::IntegratorChain<Order, double>;
-    transition_ =
-        eigen(Chain::transition_matrix(sample_time)).template topLeftCorner<Order, Order>();
-    drive_ = Chain::sampled_input_matrix(sample_time, 1).template head<Order>();
-  }
+  ChainPlant(int order, double sample_time, double input_gain, double disturbance)
+      : x_(static_cast<std::size_t>(order)),
+        sample_time_(sample_time),
+        input_gain_(input_gain),
+        disturbance_(disturbance) {}
 
   void step(double u) {
-    const State next = transition_ * x_ + drive_ * (disturbance_ + input_gain_ * u);
-    x_ = next;
+    const double highest = disturbance_ + input_gain_ * u;
+    for (std::size_t i = 0; i < x_.size(); ++i) {
+      double term = 1;
+      for (std::size_t j = i + 1; j <= x_.size(); ++j) {
+        term *= sample_time_ / static_cast<double>(j - i);
+        x_[i] += term * (j < x_.size() ? x_[j] : highest);
+      }
+    }
   }
 
-  [[nodiscard]] double output() const { return x_(0); }
-  [[nodiscard]] const State& state() const { return x_; }
-  void set_state(const State& x) { x_ = x; }
+  [[nodiscard]] double output() const { return x_[0]; }
+  [[nodiscard]] const std::vector<double>& state() const { return x_; }
+  void set_state(const std::vector<double>& x) { x_ = x; }
   void set_disturbance(double d) { disturbance_ = d; }
 
  private:
-  esokit::EigenMatrix<double, Order, Order> transition_;
-  State drive_;
-  State x_ = State::Zero();
+  std::vector<double> x_;
+  double sample_time_;
   double input_gain_;
   double disturbance_;
 };

@@ -41,8 +41,8 @@ Two::Config base() {
 /// y_1'' = d_1 + (B u)_1, y_2' = d_2 + (B u)_2, exact for a held u.
 struct CoupledPlant {
   EigenMatrix<double, 2, 2> gain;
-  ChainPlant<2> first{period, 1, -3};
-  ChainPlant<1> second{period, 1, 2};
+  ChainPlant first{2, period, 1, -3};
+  ChainPlant second{1, period, 1, 2};
 
   [[nodiscard]] EigenMatrix<double, 2> output() const { return {first.output(), second.output()}; }
   void step(const EigenMatrix<double, 2>& u) {
@@ -103,7 +103,7 @@ TEST(MimoAdrc, ChannelsAreDecoupled) {
                     .controller_bandwidth = 10})
                    .value();
   CoupledPlant plant{base().input_matrix};
-  ChainPlant<2> single(period, 1, -3);
+  ChainPlant single(2, period, 1, -3);
   for (int k = 0; k < 4000; ++k) {
     // The other channel is stepped up and down meanwhile.
     plant.step(both.update(plant.output(), {1, k % 500 < 250 ? 1.0 : -1.0}));
@@ -247,7 +247,7 @@ TEST(MimoAdrc, StartAndRetuneDoNotBump) {
       eigen(base().input_matrix).inverse() * EigenMatrix<double, 2>(3, -2);
   const EigenMatrix<double, 2> y(0.4, -0.2);
   plant.first.set_state({0.4, 0});
-  plant.second.set_state(EigenMatrix<double, 1>(-0.2));
+  plant.second.set_state({-0.2});
   EXPECT_EQ(controller.start(y, steady), StepStatus::ok);
   for (int k = 0; k < 50; ++k) {
     const EigenMatrix<double, 2> u = controller.update(plant.output(), y);

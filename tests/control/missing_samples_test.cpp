@@ -110,7 +110,7 @@ TEST(MissingSamples, LoopWithOneMeasurementInM) {
             {.observer = {.observer_bandwidth = 100, .input_gain = 2, .sample_time = 1e-3},
              .controller_bandwidth = 8})
             .value();
-    ChainPlant<2> plant(1e-3, 2, -3);
+    ChainPlant plant(2, 1e-3, 2, -3);
     for (int k = 0; k < 6000; ++k) {
       const double u = k % every == every - 1 ? controller.update(plant.output(), 1.0)
                                               : controller.update_without_measurement(1.0);

@@ -117,7 +117,7 @@ void back_at_the_reference(Make make) {
   for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(long_run(100)); ++seed) {
     Random random(seed);
     const auto loop = make(random.uniform(0.7, 3));
-    ChainPlant<2> plant(sample_time, 1, random.uniform(-1, 1));
+    ChainPlant plant(2, sample_time, 1, random.uniform(-1, 1));
     const double r = random.uniform(-3, 3);
     const auto angle = [&] {
       const double y = plant.output();
@@ -159,7 +159,7 @@ void back_at_the_reference(Make make) {
         1e4 * (loop->single ? static_cast<double>(std::numeric_limits<float>::epsilon())
                             : std::numeric_limits<double>::epsilon());
     ASSERT_NEAR(loop->wraps ? off - turn * std::round(off / turn) : off, 0, tolerance) << seed;
-    ASSERT_NEAR(plant.state()(1), 0, 10 * tolerance) << seed;
+    ASSERT_NEAR(plant.state()[1], 0, 10 * tolerance) << seed;
     ASSERT_TRUE(loop->undisturbed()) << seed;
   }
 }
