@@ -22,9 +22,8 @@ using esokit::ModelParts;
 using esokit::SampledModel;
 using esokit::StepStatus;
 using esokit_test::AugmentedReference;
-using esokit_test::Big;
-using esokit_test::BigMatrix;
 using esokit_test::Poles;
+using esokit_test::reference_of;
 using esokit_test::refusal;
 
 constexpr double kT = 1e-3;
@@ -60,27 +59,27 @@ double sampling_error(const Settings<parts>& settings, double time) {
   using Model = AugmentedModel<parts>;
   constexpr int N = Model::size;
   const Model model = Model::make(settings, -2.5, time).value();
-  const BigMatrix exact = AugmentedReference<parts>(settings, -2.5).step(time);
+  const auto exact = reference_of<parts>(settings, -2.5).step(time);
   const auto unit = [&](int state) {
-    Big factor = 1;
-    for (int j = 1; j <= Model::degree(state); ++j) factor *= Big(time) / j;
+    long double factor = 1;
+    for (int j = 1; j <= Model::degree(state); ++j) factor *= static_cast<long double>(time) / j;
     return factor;
   };
   const auto step = model.increment();
   const auto gamma = model.add_input({}, 1.0);
   double worst = 0;
   for (int i = 0; i < N; ++i) {
-    Big largest = 0;
-    Big error = 0;
-    const auto compare = [&](const Big& reference, double got) {
-      largest = std::max(largest, Big(abs(reference)));
-      error = std::max(error, Big(abs(reference - Big(got))));
+    long double largest = 0;
+    long double error = 0;
+    const auto compare = [&](long double reference, double got) {
+      largest = std::max(largest, std::abs(reference));
+      error = std::max(error, std::abs(reference - static_cast<long double>(got)));
     };
     for (int j = 0; j < N; ++j) {
       compare(exact[size_t(i)][size_t(j)] * unit(i) / unit(j), step(i, j));
     }
     compare(exact[size_t(i)][size_t(N)] * unit(i), gamma[size_t(i)]);
-    if (largest > 0) worst = std::max(worst, static_cast<double>(Big(error / largest)));
+    if (largest > 0) worst = std::max(worst, static_cast<double>(error / largest));
   }
   return worst;
 }
@@ -123,31 +122,6 @@ TEST(AugmentedModel, IsSampledExactly) {
 }
 
 // ---- Poles.
-
-template <ModelParts parts>
-double worst_coefficient(const ModelEso<parts>& observer, const Settings<parts>& settings,
-                         const Poles& poles) {
-  constexpr auto N = static_cast<std::size_t>(ModelEso<parts>::size);
-  const double time = observer.sample_time();
-  BigMatrix m = AugmentedReference<parts>(settings, 1.0).step(time);
-  const auto gain = observer.level_gain(0);
-  using Model = AugmentedModel<parts>;
-  for (std::size_t i = 0; i < N; ++i) m[i].resize(N);
-  std::vector<Big> output = m[0];
-  output[0] += 1;
-  for (std::size_t i = 0; i < N; ++i) {
-    Big k = gain[i];
-    for (int j = 1; j <= Model::degree(static_cast<int>(i)); ++j) k *= Big(j) / Big(time);
-    for (std::size_t j = 0; j < N; ++j) m[i][j] -= k * output[j];
-  }
-  const auto got = esokit_test::characteristic(m);
-  const auto wanted = esokit_test::reference_polynomial(poles, static_cast<long double>(time));
-  double worst = 0;
-  for (std::size_t i = 0; i < got.size(); ++i) {
-    worst = std::max(worst, std::abs(static_cast<double>(Big(got[i] / wanted[i] - 1))));
-  }
-  return worst;
-}
 
 /// omega_o T and everything else of it, as far as the rules go.
 template <ModelParts parts>
@@ -194,7 +168,9 @@ void poles_are_placed(double tolerance, const std::vector<double>& speeds) {
                                                    .sample_time = kT,
                                                    .model = settings});
       ASSERT_TRUE(observer) << observer.error();
-      EXPECT_LT(worst_coefficient<parts>(*observer, settings, poles), tolerance);
+      EXPECT_LT(
+          esokit_test::worst_coefficient(*observer, reference_of<parts>(settings, 1.0), poles),
+          tolerance);
     }
   }
 }
@@ -283,27 +259,18 @@ TEST(AugmentedModel, AChainEqualsLinearEso) {
 // ---- What it estimates.
 
 /// The system of a reference, from a state of its own, sampled at T in long double.
-template <ModelParts parts>
 class Truth {
  public:
-  using Reference = AugmentedReference<parts>;
-  static constexpr std::size_t N = Reference::size;
+  explicit Truth(const AugmentedReference& reference)
+      : step_(reference.natural_step(kT)), published_(reference.published()), x_(reference.size) {}
 
-  explicit Truth(const Settings<parts>& settings, double input_gain = 1.0)
-      : reference_(settings, input_gain) {
-    const BigMatrix all = esokit_test::big_exponential(reference_.a, kT);
-    for (std::size_t i = 0; i < N; ++i) {
-      for (std::size_t j = 0; j <= N; ++j) {
-        step_[i][j] = static_cast<long double>(all[i][j]) + (i == j ? 1.0L : 0.0L);
-      }
-    }
-  }
   long double& operator[](std::size_t i) { return x_[i]; }
   void advance(double u) {
-    std::array<long double, N> next{};
-    for (std::size_t i = 0; i < N; ++i) {
-      next[i] = step_[i][N] * static_cast<long double>(u);
-      for (std::size_t j = 0; j < N; ++j) next[i] += step_[i][j] * x_[j];
+    const std::size_t n = x_.size();
+    std::vector<long double> next = x_;
+    for (std::size_t i = 0; i < n; ++i) {
+      next[i] += step_[i][n] * static_cast<long double>(u);
+      for (std::size_t j = 0; j < n; ++j) next[i] += step_[i][j] * x_[j];
     }
     x_ = next;
   }
@@ -311,16 +278,13 @@ class Truth {
   /// The library's state `i` in physical units.
   [[nodiscard]] double published(std::size_t i) const {
     long double sum = 0;
-    for (std::size_t j = 0; j < N; ++j) {
-      sum += static_cast<long double>(reference_.published[i][j]) * x_[j];
-    }
+    for (std::size_t j = 0; j < x_.size(); ++j) sum += published_[i][j] * x_[j];
     return static_cast<double>(sum);
   }
 
  private:
-  Reference reference_;
-  std::array<std::array<long double, N + 1>, N> step_{};
-  std::array<long double, N> x_{};
+  esokit_test::Table step_, published_;
+  std::vector<long double> x_;
 };
 
 TEST(AugmentedModel, WhatFollowsTheModelIsEstimatedToRounding) {
@@ -336,12 +300,12 @@ TEST(AugmentedModel, WhatFollowsTheModelIsEstimatedToRounding) {
                                  .sensor = {0.004},
                                  .resonators = {{{150.0, 0.001}}},
                                  .leaky = {0.5}};
-  Truth<parts> truth(settings, 2.0);
-  using Reference = AugmentedReference<parts>;
-  truth[Reference::c] = 3;
-  truth[Reference::c + 1] = 0.5;
-  truth[Reference::q] = 1;
-  truth[Reference::fade] = -4;
+  const AugmentedReference reference = reference_of<parts>(settings, 2.0);
+  Truth truth(reference);
+  truth[reference.c] = 3;
+  truth[reference.c + 1] = 0.5;
+  truth[reference.q] = 1;
+  truth[reference.fade] = -4;
   auto observer =
       ModelEso<parts>::make(
           {.observer_bandwidth = 120.0, .input_gain = 2.0, .sample_time = kT, .model = settings})
@@ -361,10 +325,10 @@ TEST(AugmentedModel, WhatFollowsTheModelIsEstimatedToRounding) {
           << k << " " << row;
     }
     const auto swing = model.swing(z, 0);
-    ASSERT_NEAR(swing.amplitude * std::sin(swing.phase), static_cast<double>(truth[Reference::q]),
+    ASSERT_NEAR(swing.amplitude * std::sin(swing.phase), static_cast<double>(truth[reference.q]),
                 1e-7);
-    ASSERT_NEAR(model.constant(z), static_cast<double>(truth[Reference::c]), 1e-7);
-    ASSERT_NEAR(model.fading(z, 0), static_cast<double>(truth[Reference::fade]), 1e-7);
+    ASSERT_NEAR(model.constant(z), static_cast<double>(truth[reference.c]), 1e-7);
+    ASSERT_NEAR(model.fading(z, 0), static_cast<double>(truth[reference.fade]), 1e-7);
     ASSERT_NEAR(model.measured(z), truth.measured(), 1e-12);
   }
 }
@@ -477,7 +441,7 @@ struct Step {
 };
 template <class Controller>
 Step rate_step(Controller controller, double lag) {
-  Truth<lag_parts> plant({.actuator = {lag}});
+  Truth plant(reference_of<lag_parts>({.actuator = {lag}}, 1.0));
   Step step{0, 0};
   double before = 0;
   for (int k = 0; k < 600; ++k) {

@@ -23,9 +23,8 @@ using esokit::AugmentedModel;
 using esokit::ModelParts;
 using esokit::StepStatus;
 using esokit_test::AugmentedReference;
-using esokit_test::Big;
-using esokit_test::BigMatrix;
 using esokit_test::Random;
+using esokit_test::reference_of;
 
 constexpr double kT = 1e-3;
 constexpr ModelParts all_parts{
@@ -55,16 +54,11 @@ Cascade<all_parts, Levels> make_all(double bandwidth = 80.0) {
 /// The plant of all_settings, (f, y, y', v, c, q, r) and the input, sampled exactly.
 struct Truth {
   static constexpr std::size_t size = 7;
-  std::array<std::array<long double, size + 1>, size> step{};
+  explicit Truth(const AugmentedReference& reference) : step(reference.natural_step(kT)) {}
+
+  esokit_test::Table step;
   std::array<long double, size> x{};
 
-  Truth() {
-    const AugmentedReference<all_parts> reference(all_settings(), 2.0);
-    const BigMatrix all = esokit_test::big_exponential(reference.a, kT);
-    for (std::size_t i = 0; i < size; ++i) {
-      for (std::size_t j = 0; j <= size; ++j) step[i][j] = static_cast<long double>(all[i][j]);
-    }
-  }
   /// x one sample ahead of `from`.
   [[nodiscard]] std::array<long double, size> ahead(const std::array<long double, size>& from,
                                                     long double u) const {
@@ -84,22 +78,22 @@ constexpr std::size_t first_disturbance = 4;
 template <int Levels>
 struct PapersCascade {
   using Model = AugmentedModel<all_parts>;
-  Truth plant;
-  BigMatrix published = AugmentedReference<all_parts>(all_settings(), 2.0).published;
+  AugmentedReference reference = reference_of<all_parts>(all_settings(), 2.0);
+  Truth plant{reference};
+  esokit_test::Table published = reference.published();
   esokit::Array<std::array<long double, Truth::size>, Levels> gains{};
   esokit::Array<std::array<long double, Truth::size>, Levels> z{};
 
   explicit PapersCascade(const Cascade<all_parts, Levels>& observer) {
     for (int i = 0; i < Levels; ++i) {
       const auto physical = observer.model().physical(observer.level_gain(i));
-      BigMatrix column = esokit_test::big_zero(Truth::size, 1);
+      std::vector<long double> column(Truth::size);
       for (int row = 0; row < Model::size; ++row) {
-        column[static_cast<std::size_t>(Model::state_of_row(row))][0] = physical(row);
+        column[static_cast<std::size_t>(Model::state_of_row(row))] =
+            static_cast<long double>(physical(row));
       }
-      const BigMatrix natural = esokit_test::solved(published, column);
-      for (std::size_t r = 0; r < Truth::size; ++r) {
-        gains[static_cast<std::size_t>(i)][r] = static_cast<long double>(natural[r][0]);
-      }
+      const auto natural = reference.natural(column);
+      std::copy(natural.begin(), natural.end(), gains[static_cast<std::size_t>(i)].begin());
     }
   }
 
@@ -134,7 +128,7 @@ struct PapersCascade {
       const auto state = static_cast<std::size_t>(Model::state_of_row(row));
       long double value = 0;
       for (std::size_t j = 0; j < Truth::size; ++j) {
-        value += static_cast<long double>(published[state][j]) * sum[j];
+        value += published[state][j] * sum[j];
       }
       rows[static_cast<std::size_t>(row)] = static_cast<double>(value);
     }
@@ -213,7 +207,7 @@ TEST(ModelCascade, OfAChainIsTheChains) {
 
 TEST(ModelCascade, WhatFollowsTheModelIsEstimatedToRounding) {
   auto observer = make_all<2>();
-  Truth truth;
+  Truth truth(reference_of<all_parts>(all_settings(), 2.0));
   Random random(5);
   // A known actuator under a known input, at rest at first: nothing is left to estimate.
   for (int k = 0; k < 500; ++k) {
@@ -273,18 +267,11 @@ TEST(ModelCascade, PassesLessNoiseThanOneLevelOfItsLastBandwidth) {
 template <class Observer>
 double error_beside(Observer observer) {
   const double w = 1.02 * 60.0;
-  const AugmentedReference<all_parts> reference({.plant = {40.0, 5.0},
-                                                 .actuator = {0.02},
-                                                 .sensor = {0.005},
-                                                 .resonators = {{{.frequency = w}}}},
-                                                2.0);
-  Truth truth;
-  const BigMatrix all = esokit_test::big_exponential(reference.a, kT);
-  for (std::size_t i = 0; i < Truth::size; ++i) {
-    for (std::size_t j = 0; j <= Truth::size; ++j) {
-      truth.step[i][j] = static_cast<long double>(all[i][j]);
-    }
-  }
+  Truth truth(reference_of<all_parts>({.plant = {40.0, 5.0},
+                                       .actuator = {0.02},
+                                       .sensor = {0.005},
+                                       .resonators = {{{.frequency = w}}}},
+                                      2.0));
   truth.x[5] = 1;
   double most = 0;
   for (int k = 0; k < 4000; ++k) {

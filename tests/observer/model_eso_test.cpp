@@ -35,8 +35,7 @@ using esokit::LinearEso;
 using esokit::ModelEso;
 using esokit::ModelParts;
 using esokit::StepStatus;
-using esokit_test::AugmentedReference;
-using esokit_test::BigMatrix;
+using esokit_test::reference_of;
 using esokit_test::refusal;
 
 constexpr double kT = 1e-3;
@@ -57,8 +56,8 @@ Both::Config both_config(double bandwidth = 100.0) {
 /// The plant of both_config, without a disturbance, (f, y, v), and something constant.
 template <class Controller>
 double settled_error(Controller controller, double load, int samples) {
-  BigMatrix a = AugmentedReference<both_parts>({.actuator = {0.02}, .sensor = {0.005}}, 2.0).a;
-  const BigMatrix all = esokit_test::big_exponential(a, kT);
+  const auto all =
+      reference_of<both_parts>({.actuator = {0.02}, .sensor = {0.005}}, 2.0).natural_step(kT);
   std::array<double, 5> x{0, 0, 0, load, 0};
   double worst = 0;
   for (int k = 0; k < samples; ++k) {
@@ -82,12 +81,12 @@ Eigen::VectorXd dense_limit(const typename AugmentedModel<parts>::Settings& sett
   using Square = Eigen::Matrix<long double, -1, -1>;
   using Model = AugmentedModel<parts>;
   constexpr int N = Model::size;
-  const BigMatrix step = AugmentedReference<parts>(settings, 2.0).step(kT);
+  const auto step = reference_of<parts>(settings, 2.0).step(kT);
   Square phi(N, N);
   Square q = Square::Zero(N, N);
   for (int i = 0; i < N; ++i) {
     for (int j = 0; j < N; ++j) {
-      phi(i, j) = static_cast<long double>(step[size_t(i)][size_t(j)]) + (i == j ? 1.0L : 0.0L);
+      phi(i, j) = step[size_t(i)][size_t(j)] + (i == j ? 1.0L : 0.0L);
     }
     q(Model::state_of_row(i), Model::state_of_row(i)) =
         static_cast<long double>(noise(i)) * static_cast<long double>(noise(i)) * N;

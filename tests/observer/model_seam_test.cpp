@@ -17,9 +17,10 @@
 #include <random>
 #include <vector>
 
-#include <support/high_precision.hpp>
+#include <support/augmented_reference.hpp>
 #include <support/refusal.hpp>
 #include <support/resonator_model.hpp>
+#include <support/switching.hpp>
 
 namespace observer_model_seam_test {
 
@@ -34,10 +35,9 @@ using esokit::ModelTraits;
 using esokit::RiccatiMode;
 using esokit::SampledModel;
 using esokit::StepStatus;
-using esokit_test::Big;
+using esokit_test::AugmentedReference;
 using esokit_test::refusal;
 using esokit_test::ResonatorModel;
-using BigMatrix = std::vector<std::vector<Big>>;
 
 template <int Order, class S = double>
 using ResonatorEso = LinearEso<Order, S, 3, EqualPoles, ResonatorModel<Order, S>>;
@@ -103,95 +103,26 @@ static_assert(esokit::LoopObserver<ResonatorEso<2>> &&
 
 // ---- References in 100 digits, from the differential equation.
 
-BigMatrix identity(std::size_t n) {
-  BigMatrix m(n, std::vector<Big>(n, Big(0)));
-  for (std::size_t i = 0; i < n; ++i) m[i][i] = 1;
-  return m;
+/// y^(n) = c + q, q a sine of that frequency: published as (y, .., D, q, r).
+template <int Order>
+AugmentedReference swinging(double frequency) {
+  return esokit_test::reference_of<esokit::ModelParts{.order = Order, .resonators = 1}>(
+      {.resonators = {{{frequency}}}}, 1.0);
 }
 
-BigMatrix times(const BigMatrix& a, const BigMatrix& b) {
-  BigMatrix c(a.size(), std::vector<Big>(a.size(), Big(0)));
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    for (std::size_t k = 0; k < a.size(); ++k) {
-      for (std::size_t j = 0; j < a.size(); ++j) c[i][j] += a[i][k] * b[k][j];
-    }
-  }
-  return c;
-}
-
-/// exp(A T) by its series, physical units; A of (y, .., D, q, r) or of the chain.
-BigMatrix transition(int order, int extension, double frequency, double sample_time) {
-  const auto n = static_cast<std::size_t>(order + extension);
-  BigMatrix a(n, std::vector<Big>(n, Big(0)));
-  const auto d = static_cast<std::size_t>(order);
-  if (frequency > 0) {
-    for (std::size_t i = 0; i < d; ++i) a[i][i + 1] = 1;
-    a[d][d + 2] = frequency;
-    a[d + 1][d + 2] = frequency;
-    a[d + 2][d + 1] = -Big(frequency);
-  } else {
-    for (std::size_t i = 0; i + 1 < n; ++i) a[i][i + 1] = 1;
-  }
-  for (auto& row : a) {
-    for (Big& x : row) x *= Big(sample_time);
-  }
-  BigMatrix sum = identity(n);
-  BigMatrix term = sum;
-  for (int k = 1; k < 120; ++k) {
-    term = times(term, a);
-    for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t j = 0; j < n; ++j) {
-        term[i][j] /= k;
-        sum[i][j] += term[i][j];
-      }
-    }
-  }
-  return sum;
-}
-
-/// Coefficients of det(x I - M), by Faddeev and LeVerrier.
-std::vector<Big> polynomial(const BigMatrix& m) {
-  const std::size_t n = m.size();
-  std::vector<Big> c{Big(1)};
-  BigMatrix b = identity(n);
-  for (std::size_t k = 1; k <= n; ++k) {
-    b = times(m, b);
-    Big trace = 0;
-    for (std::size_t i = 0; i < n; ++i) trace += b[i][i];
-    c.push_back(-trace / k);
-    for (std::size_t i = 0; i < n; ++i) b[i][i] += c.back();
-  }
-  return c;
-}
-
-/// (I - k C) Phi - I, k in physical units.
-template <class Observer>
-std::vector<Big> error_polynomial(const Observer& observer, const BigMatrix& phi) {
-  const std::size_t n = phi.size();
-  const auto scaled = observer.level_gain(0);
-  typename Observer::State ones{};
-  ones.fill(1);
-  const auto units = observer.model().physical(ones);
-  BigMatrix m = phi;
-  for (std::size_t i = 0; i < n; ++i) {
-    const Big gain = Big(scaled[i]) * Big(units(static_cast<int>(i)));
-    for (std::size_t j = 0; j < n; ++j) m[i][j] -= gain * phi[0][j];
-    m[i][i] -= 1;
-  }
-  return polynomial(m);
+/// Phi of y'' = D.
+esokit_test::Table transition(double frequency) {
+  auto phi = swinging<2>(frequency).step(1e-3);
+  for (std::size_t i = 0; i < phi.size(); ++i) phi[i][i] += 1;
+  return phi;
 }
 
 template <class Observer>
-double worst_coefficient(const Observer& observer, const BigMatrix& phi, double bandwidth) {
-  const esokit_test::Poles poles(phi.size(), std::complex<long double>(-bandwidth, 0));
-  const auto wanted =
-      esokit_test::reference_polynomial(poles, static_cast<long double>(observer.sample_time()));
-  const auto got = error_polynomial(observer, phi);
-  double worst = 0;
-  for (std::size_t i = 0; i < got.size(); ++i) {
-    worst = std::max(worst, std::abs(static_cast<double>(Big(got[i] / wanted[i] - 1))));
-  }
-  return worst;
+double worst_coefficient(const Observer& observer, const AugmentedReference& reference,
+                         double bandwidth) {
+  return esokit_test::worst_coefficient(
+      observer, reference,
+      esokit_test::Poles(Observer::size, {-static_cast<long double>(bandwidth), 0}));
 }
 
 template <int Order>
@@ -207,7 +138,7 @@ void resonator_poles_are_placed(double tolerance) {
       const auto observer = ResonatorEso<Order>::make(
           {.observer_bandwidth = product / T, .input_gain = 1.0, .sample_time = T, .model = {w}});
       ASSERT_TRUE(observer) << observer.error();
-      EXPECT_LT(worst_coefficient(*observer, transition(Order, 3, w, T), product / T), tolerance);
+      EXPECT_LT(worst_coefficient(*observer, swinging<Order>(w), product / T), tolerance);
     }
   }
 }
@@ -238,7 +169,10 @@ void chain_is_placed() {
       EXPECT_NEAR(placed->level_gain(0)[r] / formula.level_gain(0)[r], 1.0, 1e-12)
           << Order << "+" << Extension << " row " << r << ", omega_o T " << product;
     }
-    EXPECT_LT(worst_coefficient(*placed, transition(Order, Extension, 0, T), product / T), 1e-11);
+    const auto reference =
+        esokit_test::reference_of<esokit::ModelParts{.order = Order, .constants = Extension}>({},
+                                                                                              2.0);
+    EXPECT_LT(worst_coefficient(*placed, reference, product / T), 1e-11);
   }
 }
 
@@ -262,19 +196,19 @@ TEST(ModelPlacement, InFloatDecaysWithinAQuarterOfWhatWasAskedFor) {
                                                           .model = {float(w)}});
       ASSERT_TRUE(observer) << observer.error();
       // Largest pole, in double.
-      const BigMatrix phi = transition(2, 3, w, T);
+      const auto phi = transition(w);
       typename ResonatorEso<2, float>::State ones{};
       ones.fill(1);
       const auto units = observer->model().physical(ones);
-      Eigen::MatrixXd m(5, 5);
+      esokit_test::Square<5> m;
       for (int i = 0; i < 5; ++i) {
         for (int j = 0; j < 5; ++j) {
-          m(i, j) = static_cast<double>(phi[size_t(i)][size_t(j)] -
-                                        Big(observer->level_gain(0)[size_t(i)]) * Big(units(i)) *
-                                            phi[0][size_t(j)]);
+          const auto k = static_cast<long double>(observer->level_gain(0)[size_t(i)]) *
+                         static_cast<long double>(units(i));
+          m(i, j) = static_cast<double>(phi[size_t(i)][size_t(j)] - k * phi[0][size_t(j)]);
         }
       }
-      const double decay = -std::log(m.eigenvalues().cwiseAbs().maxCoeff()) / product;
+      const double decay = -std::log(esokit_test::spectral_radius<5>(m)) / product;
       EXPECT_GT(decay, 0.75) << "omega_o T " << product << ", w / omega_o " << ratio;
       EXPECT_LT(decay, 1.25) << "omega_o T " << product << ", w / omega_o " << ratio;
     }
@@ -372,10 +306,10 @@ struct DenseKalman {
   long double r = 1e-8L;
 
   DenseKalman() {
-    const BigMatrix exact = transition(2, 3, kW, kT);
+    const auto exact = transition(kW);
     for (int i = 0; i < 5; ++i) {
       for (int j = 0; j < 5; ++j) {
-        phi(i, j) = static_cast<long double>(exact[size_t(i)][size_t(j)]);
+        phi(i, j) = exact[size_t(i)][size_t(j)];
       }
     }
     for (int i = 2; i < 5; ++i) q(i, i) = 5;  // c = N
@@ -645,7 +579,7 @@ template <class Observer>
 double tracking_error(const typename Adrc<Observer>::Config& config) {
   auto controller = Adrc<Observer>::make(config).value();
   // (y, y', D, q, r) without control, the input added.
-  const BigMatrix phi = transition(2, 3, kW, kT);
+  const auto phi = transition(kW);
   double z[5] = {0, 0, -5, 0, 3};
   double worst = 0;
   for (int k = 0; k < 6000; ++k) {
@@ -716,7 +650,7 @@ TEST(ResonatorModel, AnalysisIsThatOfTheDenseSystem) {
   using Complex = std::complex<long double>;
   using Square = Eigen::Matrix<Complex, 5, 5>;
   using Column = Eigen::Matrix<Complex, 5, 1>;
-  const BigMatrix exact = transition(2, 3, kW, kT);
+  const auto exact = transition(kW);
   Square phi;
   Column k;
   typename ResonatorEso<2>::State ones{};
@@ -725,7 +659,7 @@ TEST(ResonatorModel, AnalysisIsThatOfTheDenseSystem) {
   for (int i = 0; i < 5; ++i) {
     k(i) = static_cast<long double>(observer.level_gain(0)[size_t(i)] * units(i));
     for (int j = 0; j < 5; ++j) {
-      phi(i, j) = static_cast<long double>(exact[size_t(i)][size_t(j)]);
+      phi(i, j) = exact[size_t(i)][size_t(j)];
     }
   }
   Column gamma = Column::Zero();
