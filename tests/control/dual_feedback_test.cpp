@@ -27,7 +27,7 @@ using esokit::UnlimitedFeedback;
 
 constexpr double period = 1e-3;
 constexpr double gain = 1.7;
-constexpr int samples = 100000;
+constexpr int samples = long_run(100'000);
 
 /// What a form holds and asks for, of y and r.
 struct Output {

@@ -16,6 +16,7 @@
 #include <esokit/observer/linear_eso.hpp>
 #include <limits>
 #include <string>
+#include <support/numbers.hpp>
 #include <support/refusal.hpp>
 
 namespace fuzz_found_test {
@@ -287,6 +288,7 @@ TEST(Found, MarginsOfAPlantWithNextToNoGainAreNumbers) {
       esokit::ContinuousLinearEso<2>::make({.observer_bandwidth = 12, .input_gain = 3}).value();
   const auto law = esokit::AdrcLaw<2>::make({.controller_bandwidth = 7, .input_gain = 3}).value();
   for (const double b : {1e-300, 1e-310, 1e-320}) {
+    if (esokit_test::sanitized && b > 1e-315) continue;  // takes long
     const auto plant =
         esokit::LinearPlant<2>::chain({.coefficients = {0.007, 4.9}, .input_gain = b});
     const auto found = margins(plant.value(), esokit::ObserverWithLaw{observer, law});

@@ -262,6 +262,7 @@ struct Laws : LawSuite {
       const Real y = 1;
       Real peak = 0;
       const int settling = settling_samples(omega_t);
+      if (too_long(settling)) continue;
       for (int i = 0; i < settling; ++i) {
         ASSERT_EQ(observer->update(y, u), StepStatus::ok);
         peak = std::max(peak, std::abs(observer->total_disturbance()));
@@ -805,7 +806,7 @@ struct Laws : LawSuite {
   void recurring_gaps_are_stable() const {
     for (const double omega_t : {0.1, 1.0, 3.0}) {
       if (!kind.make(settings(omega_t))) continue;
-      for (int every = 1; every <= 20; ++every) {
+      for (int every = 1; every <= 20; every += stride) {
         SCOPED_TRACE(::testing::Message() << omega_t << ", one in " << every);
         AnyObserver observer = make(omega_t);
         const auto start = state([](int) { return 1; }, period * every);

@@ -28,6 +28,13 @@ inline constexpr bool sanitized = false;
 /// at what a million of them add up to.
 constexpr int long_run(int full) { return sanitized ? full / 50 : full; }
 
+/// Whether a loop of so many samples is left out: the sanitizers see the same steps in shorter
+/// ones.
+constexpr bool too_long(int samples) { return sanitized && samples > 20'000; }
+
+/// The step through many cases that take the same way: every fifth under the sanitizers.
+inline constexpr int stride = sanitized ? 5 : 1;
+
 /// splitmix64: the same numbers on every platform and standard library.
 class Random {
  public:
