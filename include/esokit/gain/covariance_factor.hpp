@@ -22,11 +22,13 @@ namespace esokit {
 
 namespace detail {
 
-/// Calls f(0), .., f(Count - 1): unrolled, or in a loop for large sizes.
+/// Calls f(0), .., f(Count - 1): unrolled, or in a loop for large sizes. Unrolled, f takes its
+/// index as a constant (`auto`, not int): what an `if` leaves out is then not compiled at all, also
+/// where the optimiser does not see to it (-O0, -Og).
 template <int Count, bool Unrolled, class Function>
 ESOKIT_INLINE constexpr void repeat(Function&& f) noexcept {
   if constexpr (Unrolled) {
-    unroll<Count>([&](auto i) ESOKIT_INLINE_LAMBDA { f(static_cast<int>(i)); });
+    unroll<Count>(f);
   } else {
     for (int i = 0; i < Count; ++i) f(i);
   }
@@ -143,8 +145,9 @@ class CovarianceFactor {
   [[nodiscard]] ESOKIT_INLINE constexpr ScaledGain<Size, S> gain(const S& share) const noexcept {
     ScaledGain<Size, S> gain;
     gain[0] = share;
-    detail::repeat<Size - 1, unrolled>(
-        [&](int i) ESOKIT_INLINE_LAMBDA { gain[index(i + 1)] = share * lower_[packed(i + 1, 0)]; });
+    detail::repeat<Size - 1, unrolled>([&](auto i) ESOKIT_INLINE_LAMBDA {
+      gain[index(i + 1)] = share * lower_[packed(i + 1, 0)];
+    });
     return gain;
   }
 
@@ -208,9 +211,9 @@ class CovarianceFactor {
   [[nodiscard]] constexpr S transported_trace(const Array<S, Size>& weights,
                                               const Transition& transition = {}) const noexcept {
     S sum(0.0);
-    detail::repeat<Size, unrolled>([&](int i) ESOKIT_INLINE_LAMBDA {
+    detail::repeat<Size, unrolled>([&](auto i) ESOKIT_INLINE_LAMBDA {
       S diagonal(0.0);
-      detail::repeat<Size, unrolled>([&](int k) ESOKIT_INLINE_LAMBDA {
+      detail::repeat<Size, unrolled>([&](auto k) ESOKIT_INLINE_LAMBDA {
         const S x = transported<unrolled>(transition, i, k);
         diagonal = diagonal + x * x * variances_[index(k)];
       });
@@ -267,16 +270,16 @@ class CovarianceFactor {
     Array<S, Size> weights;
     Array<Array<S, Size>, Size> rows;
     Array<Array<S, Size>, Size> noise_rows;
-    detail::repeat<Size, Unrolled>([&](int k) ESOKIT_INLINE_LAMBDA {
+    detail::repeat<Size, Unrolled>([&](auto k) ESOKIT_INLINE_LAMBDA {
       weights[index(k)] = inflation * variances_[index(k)];
-      detail::repeat<Size, Unrolled>([&](int i) ESOKIT_INLINE_LAMBDA {
+      detail::repeat<Size, Unrolled>([&](auto i) ESOKIT_INLINE_LAMBDA {
         rows[index(i)][index(k)] = transported<Unrolled>(transition, i, k);
         if constexpr (!DiagonalNoise) {
           if (k < i) noise_rows[index(i)][index(k)] = -noise.lower_[packed(i, k)];
         }
       });
     });
-    detail::repeat<Size, Unrolled>([&](int i) ESOKIT_INLINE_LAMBDA {
+    detail::repeat<Size, Unrolled>([&](auto i) ESOKIT_INLINE_LAMBDA {
       const auto& row = rows[index(i)];
       const auto& noise_row = noise_rows[index(i)];
       Array<S, Size> weighted;
@@ -285,7 +288,7 @@ class CovarianceFactor {
       // speed.
       S early = noise.variances_[index(i)];
       S late = S(0.0);
-      detail::repeat<Size, Unrolled>([&](int k) ESOKIT_INLINE_LAMBDA {
+      detail::repeat<Size, Unrolled>([&](auto k) ESOKIT_INLINE_LAMBDA {
         weighted[index(k)] = weights[index(k)] * row[index(k)];
         const S term = weighted[index(k)] * row[index(k)];
         late = k == 0 ? term : S(late + term);
@@ -298,13 +301,13 @@ class CovarianceFactor {
       variances_[index(i)] = variance;
       if (i == Size - 1) return;
       const S inverse = inverse_of(variance);
-      detail::repeat<Size, Unrolled>([&](int j) ESOKIT_INLINE_LAMBDA {
+      detail::repeat<Size, Unrolled>([&](auto j) ESOKIT_INLINE_LAMBDA {
         if (j <= i) return;
         auto& other = rows[index(j)];
         auto& noise_other = noise_rows[index(j)];
         S product = weighted[0] * other[0];
         S noise_product = S(0.0);
-        detail::repeat<Size, Unrolled>([&](int k) ESOKIT_INLINE_LAMBDA {
+        detail::repeat<Size, Unrolled>([&](auto k) ESOKIT_INLINE_LAMBDA {
           if (k > 0) product = product + weighted[index(k)] * other[index(k)];
           if (k >= i) return;
           const S term = noise_weighted[index(k)] * noise_other[index(k)];
@@ -317,7 +320,7 @@ class CovarianceFactor {
         if (!DiagonalNoise || i > 0) product = product + noise_product;
         const S l = product * inverse;
         lower_[packed(j, i)] = l;
-        detail::repeat<Size, Unrolled>([&](int k) ESOKIT_INLINE_LAMBDA {
+        detail::repeat<Size, Unrolled>([&](auto k) ESOKIT_INLINE_LAMBDA {
           other[index(k)] = other[index(k)] - l * row[index(k)];
           if (k < i) noise_other[index(k)] = noise_other[index(k)] - l * noise_row[index(k)];
         });
@@ -392,7 +395,7 @@ class CovarianceFactor {
                                                       int k) const noexcept {
     // Starts with the first term instead of zero, which would cost an addition.
     S sum = k < i ? lower_[packed(i, k)] : S(pascal(k, i));
-    detail::repeat<Size, Unrolled>([&](int j) ESOKIT_INLINE_LAMBDA {
+    detail::repeat<Size, Unrolled>([&](auto j) ESOKIT_INLINE_LAMBDA {
       if (j <= i || j <= k) return;
       const S& l = lower_[packed(j, k)];
       sum = sum + (pascal(j, i) == 1 ? l : pascal(j, i) == 2 ? S(l + l) : S(S(pascal(j, i)) * l));

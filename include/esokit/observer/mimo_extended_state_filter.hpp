@@ -726,7 +726,7 @@ class MimoExtendedStateFilter {
       last = gain_;
       if (done && step > 3) break;
       factor_ = posterior_;
-      factor_.advance(growth_, noise_, Transition{transition(), {}});
+      factor_.advance_seldom(growth_, noise_, Transition{transition(), {}});
     }
     limit_ = factor_;
     has_limit_ = true;
