@@ -12,8 +12,8 @@
 #include <esokit/observer/linear_eso.hpp>
 #include <limits>
 #include <string>
-#include <support/algebraic_reference.hpp>
 #include <support/dual.hpp>
+#include <support/gain_comparison.hpp>
 #include <support/numbers.hpp>
 #include <support/refusal.hpp>
 #include <utility>
@@ -247,40 +247,10 @@ TEST(AlgebraicEso, UnbiasedAtOnceAndLinearInTheEnd) {
   unbiased_at_once_and_linear_in_the_end<1, 1>();
   unbiased_at_once_and_linear_in_the_end<2, 1>();
   unbiased_at_once_and_linear_in_the_end<3, 1>();
-  unbiased_at_once_and_linear_in_the_end<4, 1>();
   unbiased_at_once_and_linear_in_the_end<1, 2>();
   unbiased_at_once_and_linear_in_the_end<2, 2>();
   unbiased_at_once_and_linear_in_the_end<3, 2>();
-  unbiased_at_once_and_linear_in_the_end<4, 2>();
-  unbiased_at_once_and_linear_in_the_end<1, 3>();
-  unbiased_at_once_and_linear_in_the_end<2, 3>();
-  unbiased_at_once_and_linear_in_the_end<3, 3>();
   unbiased_at_once_and_linear_in_the_end<4, 3>();
-}
-
-/// Coefficients of the least-squares polynomial of degree N - 1 through y[0] .. y[k], in powers of
-/// (i - k), by normal equations in 100 digits.
-std::vector<Big> least_squares(const std::vector<Big>& y, std::size_t size) {
-  std::vector<std::vector<Big>> a(size, std::vector<Big>(size + 1, Big(0)));
-  for (std::size_t i = 0; i < y.size(); ++i) {
-    const Big t = Big(static_cast<std::int64_t>(i)) - Big(static_cast<std::int64_t>(y.size() - 1));
-    std::vector<Big> powers{Big(1)};
-    while (powers.size() < size) powers.push_back(powers.back() * t);
-    for (std::size_t r = 0; r < size; ++r) {
-      for (std::size_t c = 0; c < size; ++c) a[r][c] += powers[r] * powers[c];
-      a[r][size] += powers[r] * y[i];
-    }
-  }
-  for (std::size_t p = 0; p < size; ++p) {
-    for (std::size_t r = 0; r < size; ++r) {
-      if (r == p) continue;
-      const Big factor = a[r][p] / a[p][p];
-      for (std::size_t c = p; c <= size; ++c) a[r][c] -= factor * a[p][c];
-    }
-  }
-  std::vector<Big> x;
-  for (std::size_t r = 0; r < size; ++r) x.push_back(a[r][size] / a[r][r]);
-  return x;
 }
 
 /// lambda = q = 0 on noise: the states are those of the least-squares fit to all data since the
@@ -295,31 +265,18 @@ void is_least_squares(double tolerance) {
                                                                 .input_gain = input_gain,
                                                                 .sample_time = sample_time})
                       .value();
-  // What the input alone does, in Nordsieck scaling.
-  std::vector<Big> forced(size, Big(0));
-  Big drive_unit = Big(input_gain);
-  for (int i = 1; i <= Order; ++i) drive_unit = drive_unit * Big(sample_time) / Big(i);
-  std::vector<Big> free_part;
+  std::vector<double> measurements;
+  std::vector<double> inputs;
   Random random(23);
   for (int k = 0; k < 200; ++k) {
-    const double u = random.uniform(-1, 1);
-    const double y = random.uniform(-1, 1);
-    forced[Order] += drive_unit * Big(u);
-    forced = pascal_times(forced, false);
-    for (std::size_t r = Order; r < size; ++r) forced[r] = 0;
-    observer.update(y, u);
-    free_part.push_back(Big(y) - forced[0]);
+    inputs.push_back(random.uniform(-1, 1));
+    measurements.push_back(random.uniform(-1, 1));
+    observer.update(measurements.back(), inputs.back());
     if (k != size - 1 && k != size && k != 20 && k != 199) continue;
-    const auto fit = least_squares(free_part, size);
-    Big unit = 1;
-    std::vector<Big> truth;
-    for (std::size_t r = 0; r < size; ++r) {
-      truth.push_back((fit[r] + forced[r]) * unit);
-      unit = unit * Big(static_cast<int>(r) + 1) / Big(sample_time);
-    }
+    const auto fit =
+        least_squares_states(measurements, inputs, Order, Extension, input_gain, sample_time);
     for (int r = 0; r < size; ++r) {
-      const auto row = static_cast<std::size_t>(r);
-      const double expected = static_cast<double>(truth[row]);
+      const double expected = fit[static_cast<std::size_t>(r)];
       EXPECT_NEAR(observer.estimate()(r), expected, tolerance * std::max(1.0, std::abs(expected)))
           << "sample " << k << ", row " << r;
     }
@@ -627,10 +584,9 @@ TEST(AlgebraicEso, RetuneKeepsThePlaceInTheSchedule) {
   const double predicted = observer.raw_estimate()(2);
   EXPECT_EQ(e_before, predicted);
   observer.correct(1.0);
-  const AlgebraicReference reference{3, Big(20 * 1e-3), Big(5 * 1e-3)};
-  const auto gain = reference.gain(200);
+  const auto gain = reference_algebraic_gain(3, 20 * 1e-3, 5 * 1e-3, 200);
   const double k2 = (observer.raw_estimate()(2) - predicted) / observer.innovation();
-  EXPECT_NEAR(k2 / (static_cast<double>(gain[2]) * 2e6), 1.0, 1e-9);
+  EXPECT_NEAR(k2 / (gain[2] * 2e6), 1.0, 1e-9);
   EXPECT_EQ(twin.age(), 200u);
 }
 
@@ -795,9 +751,8 @@ TEST(AlgebraicEso, SoftStartIsGentler) {
   hard.update(1.0, 0.0);
   soft.update(1.0, 0.0);
   EXPECT_NEAR(hard.total_disturbance(), 1e6, 1e-3);
-  const AlgebraicReference reference{3, Big(5e-3), Big(1e-4)};
-  EXPECT_NEAR(soft.total_disturbance() / (static_cast<double>(reference.gain(50)[2]) * 2e6), 1.0,
-              1e-9);
+  const auto gain = reference_algebraic_gain(3, 5e-3, 1e-4, 50);
+  EXPECT_NEAR(soft.total_disturbance() / (gain[2] * 2e6), 1.0, 1e-9);
   EXPECT_LT(soft.total_disturbance(), 1e3);
   EXPECT_EQ(soft.age(), 1u);
   // It does not restart for a lost sample.
@@ -806,7 +761,7 @@ TEST(AlgebraicEso, SoftStartIsGentler) {
   EXPECT_EQ(soft.age(), 3u);
 }
 
-/// N = 2 .. 7 in float, 200 s at 1 kHz with noise: where the ratio-of-W gains diverge.
+/// N = 3, 5 and 7 in float, 200 s at 1 kHz with noise: where the ratio-of-W gains diverge.
 template <int Order, int Extension>
 void float_is_stable() {
   SCOPED_TRACE(::testing::Message() << Order << ", " << Extension);
@@ -835,11 +790,8 @@ void float_is_stable() {
 }
 
 TEST(AlgebraicEso, FloatIsStableThroughSevenStates) {
-  float_is_stable<1, 1>();
   float_is_stable<2, 1>();
-  float_is_stable<2, 2>();
   float_is_stable<3, 2>();
-  float_is_stable<3, 3>();
   float_is_stable<4, 3>();
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "support/algebraic_reference.hpp"
 #include "support/high_precision.hpp"
 
 namespace esokit_test {
@@ -59,6 +60,69 @@ void compare_polynomial(const std::vector<long double>& gain, const Poles& poles
     for (std::size_t t = 0; t + 1 < kappa.size(); ++t) kappa[t] = kappa[t + 1] - kappa[t];
     kappa.pop_back();
   }
+}
+
+std::vector<double> reference_algebraic_gain(std::size_t size, double bandwidth, double shift,
+                                             std::int64_t k) {
+  std::vector<double> gain;
+  for (const Big& x : AlgebraicReference{size, Big(bandwidth), Big(shift)}.gain(k)) {
+    gain.push_back(static_cast<double>(x));
+  }
+  return gain;
+}
+
+namespace {
+
+/// Coefficients of the least-squares polynomial of degree N - 1 through y[0] .. y[k], in powers of
+/// (i - k), by normal equations in 100 digits.
+std::vector<Big> least_squares(const std::vector<Big>& y, std::size_t size) {
+  std::vector<std::vector<Big>> a(size, std::vector<Big>(size + 1, Big(0)));
+  for (std::size_t i = 0; i < y.size(); ++i) {
+    const Big t = Big(static_cast<std::int64_t>(i)) - Big(static_cast<std::int64_t>(y.size() - 1));
+    std::vector<Big> powers{Big(1)};
+    while (powers.size() < size) powers.push_back(powers.back() * t);
+    for (std::size_t r = 0; r < size; ++r) {
+      for (std::size_t c = 0; c < size; ++c) a[r][c] += powers[r] * powers[c];
+      a[r][size] += powers[r] * y[i];
+    }
+  }
+  for (std::size_t p = 0; p < size; ++p) {
+    for (std::size_t r = 0; r < size; ++r) {
+      if (r == p) continue;
+      const Big factor = a[r][p] / a[p][p];
+      for (std::size_t c = p; c <= size; ++c) a[r][c] -= factor * a[p][c];
+    }
+  }
+  std::vector<Big> x;
+  for (std::size_t r = 0; r < size; ++r) x.push_back(a[r][size] / a[r][r]);
+  return x;
+}
+
+}  // namespace
+
+std::vector<double> least_squares_states(const std::vector<double>& y, const std::vector<double>& u,
+                                         std::size_t order, std::size_t extension,
+                                         double input_gain, double sample_time) {
+  const std::size_t size = order + extension;
+  // What the input alone does, in Nordsieck scaling.
+  std::vector<Big> forced(size, Big(0));
+  Big drive_unit = Big(input_gain);
+  for (std::size_t i = 1; i <= order; ++i) drive_unit = drive_unit * Big(sample_time) / Big(i);
+  std::vector<Big> free_part;
+  for (std::size_t k = 0; k < y.size(); ++k) {
+    forced[order] += drive_unit * Big(u[k]);
+    forced = pascal_times(forced, false);
+    for (std::size_t r = order; r < size; ++r) forced[r] = 0;
+    free_part.push_back(Big(y[k]) - forced[0]);
+  }
+  const auto fit = least_squares(free_part, size);
+  std::vector<double> states;
+  Big unit = 1;
+  for (std::size_t r = 0; r < size; ++r) {
+    states.push_back(static_cast<double>((fit[r] + forced[r]) * unit));
+    unit = unit * Big(r + 1) / Big(sample_time);
+  }
+  return states;
 }
 
 }  // namespace esokit_test
