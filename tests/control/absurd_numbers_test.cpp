@@ -180,11 +180,9 @@ void predictive_stays_within_limits() {
 }
 
 TEST(PredictiveAdrcAbsurd, OutputStaysWithinLimits) {
-  predictive_stays_within_limits<LinearEso<2, float>>();
   predictive_stays_within_limits<LinearEso<2, double>>();
   predictive_stays_within_limits<LinearEso<1, float, 2>>();
   predictive_stays_within_limits<CascadeEso<2, 3, float>>();
-  predictive_stays_within_limits<CascadeEso<2, 2, double>>();
 }
 
 // ---- Incremental

@@ -664,5 +664,26 @@ TEST(Adrc, CostsNothingThatIsNotAskedFor) {
             sizeof(Adrc<esokit::DelayedInput<LinearEso<2, float>, 4>>));
 }
 
+TEST(Adrc, HoldAndSafeInputAtTheLimit) {
+  auto config = base();
+  config.limits = {.lower = -1, .upper = 2};
+  const auto with = [&](double hold, double safe) {
+    auto changed = config;
+    changed.start_hold = {.time = 0.01, .input = hold};
+    changed.missing.input = safe;
+    return refusal(Linear::make(changed));
+  };
+  const double above = std::nextafter(2.0, 3.0);
+  const double below = std::nextafter(-1.0, -2.0);
+  EXPECT_EQ(with(2, 2), "accepted");
+  EXPECT_EQ(with(-1, -1), "accepted");
+  EXPECT_EQ(with(above, 0), "start_hold.input: must not be above limits.upper");
+  EXPECT_EQ(with(below, 0), "start_hold.input: must not be below limits.lower");
+  EXPECT_EQ(with(0, above), "missing.input: must not be above limits.upper");
+  EXPECT_EQ(with(0, below), "missing.input: must not be below limits.lower");
+  EXPECT_EQ(with(hidden_nan<double>(), 0), "start_hold.input: must be finite");
+  EXPECT_EQ(with(0, hidden_infinity<double>()), "missing.input: must be finite");
+}
+
 }  // namespace control_adrc_test
 }  // namespace esokit_test

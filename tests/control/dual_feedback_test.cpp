@@ -7,6 +7,7 @@
 #include <cmath>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/dual_feedback.hpp>
+#include <esokit/gain/pole_set.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <functional>
 #include <limits>
@@ -307,6 +308,35 @@ TEST(DualFeedback, NoAllocationAndNamedErrors) {
             "sample_time: gives a filter that the scalar cannot hold");
   EXPECT_EQ(field([](auto& c) { c.limits.lower = 1, c.limits.upper = 0; }),
             "limits.lower: must be below limits.upper");
+}
+
+/// Any poles: the filter is the observer with the same poles and the law.
+TEST(DualFeedback, WithAnyPoles) {
+  using Poles = esokit::PoleSet;
+  using Filter =
+      esokit::DualFeedbackAdrc<2, double, 1, esokit::DeltaOperator, esokit::LimitedFeedback, Poles>;
+  using State = Adrc<LinearEso<2, double, 1, Poles>>;
+  const esokit::Array<std::complex<double>, 3> poles{{{-40, 25}, {-40, -25}, {-90, 0}}};
+  auto filter = Filter::make({.observer_bandwidth = poles,
+                              .controller_bandwidth = 10,
+                              .input_gain = 2,
+                              .sample_time = 1e-3,
+                              .limits = {.lower = -3, .upper = 2}})
+                    .value();
+  auto state = State::make({.observer = {.poles = poles, .input_gain = 2, .sample_time = 1e-3},
+                            .controller_bandwidth = 10,
+                            .limits = {.lower = -3, .upper = 2}})
+                   .value();
+  Random random(8);
+  double largest = 0;
+  for (int k = 0; k < 2000; ++k) {
+    const double y = 0.01 * std::sin(0.01 * k) + 1e-4 * random.uniform(-1, 1);
+    const double r = k % 200 < 100 ? 0.02 : -0.02;
+    largest = std::max(largest, std::abs(state.requested()));
+    ASSERT_NEAR(filter.update(y, r), state.update(y, r), 1e-9) << k;
+    ASSERT_NEAR(filter.requested(), state.requested(), 1e-9) << k;
+  }
+  EXPECT_GT(largest, 0.5);
 }
 
 }  // namespace control_dual_feedback_test

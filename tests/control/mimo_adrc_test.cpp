@@ -357,5 +357,23 @@ TEST(MimoAdrc, BadConfigIsRefusedByName) {
             "limits.lower[1]: must be below limits.upper");
 }
 
+TEST(MimoAdrc, BadNumberAnywhereInTheInputMatrix) {
+  Two::Config config{.observers = {{.observer_bandwidth = 50, .sample_time = 1e-3},
+                                   {.observer_bandwidth = 50, .sample_time = 1e-3}},
+                     .controller_bandwidths = {10, 10}};
+  config.input_matrix = {{2, 1}, {0.5, 3}};
+  ASSERT_EQ(refusal(Two::make(config)), "accepted");
+  for (int i = 0; i < 2; ++i) {
+    for (int j = 0; j < 2; ++j) {
+      for (const double bad : {hidden_nan<double>(), hidden_infinity<double>()}) {
+        auto changed = config;
+        changed.input_matrix(i, j) = bad;
+        EXPECT_EQ(refusal(Two::make(changed)),
+                  "input_matrix[" + std::to_string(2 * i + j) + "]: must be finite");
+      }
+    }
+  }
+}
+
 }  // namespace control_mimo_adrc_test
 }  // namespace esokit_test

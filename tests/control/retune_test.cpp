@@ -139,15 +139,15 @@ double observed(Observer& observer, double y) {
 }
 
 TEST(Retune, AdoptsWhatAnotherContextMade) {
-  adopts_as_it_retunes<Adrc<LinearEso<2>>>({.observer = first(), .controller_bandwidth = 5},
-                                           {.observer = second(), .controller_bandwidth = 4},
-                                           controlled<Adrc<LinearEso<2>>>);
+  adopts_as_it_retunes<Adrc<Counted>>({.observer = first(), .controller_bandwidth = 5},
+                                      {.observer = second(), .controller_bandwidth = 4},
+                                      controlled<Adrc<Counted>>);
   using Dual = esokit::DualFeedbackAdrc<2>;
   adopts_as_it_retunes<Dual>(
       {.observer_bandwidth = 40, .controller_bandwidth = 5, .input_gain = 5, .sample_time = 0.01},
       {.observer_bandwidth = 25, .controller_bandwidth = 4, .input_gain = 7, .sample_time = 0.01},
       controlled<Dual>);
-  using Predictive = esokit::PredictiveAdrc<LinearEso<2>>;
+  using Predictive = esokit::PredictiveAdrc<Counted>;
   adopts_as_it_retunes<Predictive>({.observer = first(), .controller_bandwidth = 5},
                                    {.observer = second(), .controller_bandwidth = 4},
                                    [](Predictive& controller, double y) {
@@ -160,16 +160,16 @@ TEST(Retune, AdoptsWhatAnotherContextMade) {
       {.observer_bandwidth = 40, .bandwidth_ratio = 0.7, .input_gain = 5, .sample_time = 0.01},
       {.observer_bandwidth = 25, .bandwidth_ratio = 0.8, .input_gain = 7, .sample_time = 0.01},
       observed<Switched>);
-  using Filter = esokit::ExtendedStateFilter<2>;
+  using Filter = esokit::ExtendedStateFilter<1>;
   adopts_as_it_retunes<Filter>({.input_gain = 5,
                                 .sample_time = 0.01,
                                 .measurement_variance = 1e-4,
-                                .disturbance_bounds = {0, 0, 1},
+                                .disturbance_bounds = {0, 1},
                                 .inflation = 0.01},
                                {.input_gain = 7,
                                 .sample_time = 0.01,
                                 .measurement_variance = 1e-3,
-                                .disturbance_bounds = {0, 0, 2},
+                                .disturbance_bounds = {0, 2},
                                 .inflation = 0.01},
                                observed<Filter>);
 }

@@ -1046,4 +1046,28 @@ TEST(ExtendedStateFilter, model_costs_nothing_when_absent) {
   static_assert(sizeof(Filter) <= 70 * sizeof(double));
 }
 
+/// The largest and the least variance that a filter starts from, from both sides.
+TEST(ExtendedStateFilter, start_variance_from_both_sides) {
+  using Filter = ExtendedStateFilter<2, float>;
+  Filter::Config config;
+  config.input_gain = 2;
+  config.sample_time = 1;
+  config.measurement_variance = 1;
+  config.disturbance_bounds = {0, 0, 10};
+  config.inflation = 0.1f;
+  const float range = std::numeric_limits<float>::epsilon() / std::numeric_limits<float>::min();
+  const auto with = [&](float variance) {
+    config.initial_covariance(0, 0) = variance;
+    return refusal(Filter::make(config));
+  };
+  const std::string rule =
+      "initial_covariance[0]: in the scaling T^2r / r!^2 and divided by R is a variance that the "
+      "scalar cannot hold";
+  EXPECT_EQ(with(0.9e-6f * range), "accepted");
+  EXPECT_EQ(with(1.1e-6f * range), rule);
+  EXPECT_EQ(with(1.1f / range), "accepted");
+  EXPECT_EQ(with(0.9f / range), rule);
+  EXPECT_EQ(with(0), "accepted");
+}
+
 }  // namespace esokit_test::observer_extended_state_filter_test
