@@ -67,14 +67,17 @@ void outlier_is_a_missing_sample(typename Observer::Config config, double omega_
       ASSERT_EQ(status, expected) << k;
     }
     ASSERT_EQ(gated.missed(), plain.missed());
-    ASSERT_EQ(gated.estimate(), plain.estimate()) << k;
+    bool same = true;
+    for (int i = 0; i < Observer::size; ++i) {
+      same = same && same_bits(gated.estimate()(i), plain.estimate()(i));
+    }
+    ASSERT_TRUE(same) << k;
   }
 }
 
 TEST(OutlierGate, OutlierIsAMissingSample) {
   outlier_is_a_missing_sample<LinearEso<2>>({});
-  outlier_is_a_missing_sample<LinearEso<2, float>>({});
-  outlier_is_a_missing_sample<LinearEso<1>>({}, 2);
+  outlier_is_a_missing_sample<LinearEso<2>>({}, 2);
   outlier_is_a_missing_sample<CascadeEso<2, 2>>({.bandwidth_factor = 2});
   outlier_is_a_missing_sample<AlgebraicEso<2>>({.frequency_shift = 30});
   outlier_is_a_missing_sample<AdjustableBandwidthEso<2, float>>({.bandwidth_ratio = 0.75f});
