@@ -21,6 +21,7 @@
 #include <support/refusal.hpp>
 #include <vector>
 
+#include "support/exponential.hpp"
 #include "support/numbers.hpp"
 #include "support/reference_observer.hpp"
 
@@ -28,23 +29,10 @@ namespace analysis_margins_test {
 
 using namespace esokit;
 using Complex = std::complex<double>;
+using esokit_test::exponential;
 using esokit_test::Random;
 using esokit_test::ReferenceObserver;
 using esokit_test::refusal;
-
-/// exp(a) by its series with many halvings, in long double.
-Eigen::MatrixXd exponential(const Eigen::MatrixXd& a) {
-  using Long = Eigen::Matrix<long double, Eigen::Dynamic, Eigen::Dynamic>;
-  const Long small = a.cast<long double>() / 1048576.0L;
-  Long sum = Long::Identity(a.rows(), a.cols());
-  Long term = sum;
-  for (int k = 1; k < 12; ++k) {
-    term = Long(term.lazyProduct(small)) / static_cast<long double>(k);
-    sum += term;
-  }
-  for (int i = 0; i < 20; ++i) sum = Long(sum.lazyProduct(sum));
-  return sum.cast<double>();
-}
 
 /// Effect of u = 1 held for t.
 Eigen::VectorXd held(const Eigen::MatrixXd& a, const Eigen::VectorXd& b, double t) {

@@ -95,7 +95,7 @@ TEST(AlgebraicGain, FollowsItsDefinitionInFloat) {
 }
 
 TEST(AlgebraicGain, FollowsItsDefinitionForAMillionSamples) {
-  for (const double shift : {0.0, 1e-12, 1e-8, 1e-6, 1e-5}) {
+  for (const double shift : {0.0, 1e-8, 1e-5}) {
     follows_its_definition<3, double>(0.0, shift, 1'000'000);
     follows_its_definition<3, double>(1e-4, shift, 1'000'000);
     follows_its_definition<3, float>(0.0, shift, 1'000'000);

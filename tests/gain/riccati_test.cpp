@@ -146,14 +146,14 @@ double spectral_radius(const Gain& gain) {
     log_radius += share * std::log(norm);
     share /= 2;
     m /= norm;
-    m = (m * m).eval();
+    m = Eigen::MatrixXd(m.lazyProduct(m));
   }
   return std::exp(log_radius);
 }
 
 /// 1e-10 is asked for; the recursion's last word makes it a few units in the last place, which the
 /// memory of the filter (up to 30 samples here) multiplies. Orders and extensions enter by N = n +
-/// m alone: N = 2 .. 6 is n = 1 .. 4 with m = 1, 2.
+/// m alone: N = 2, 3 and 6 are n = 1, 2 and 4 with m = 1 and 2.
 template <int Size>
 void limit_equals_reference() {
   constexpr double unit = 100 * std::numeric_limits<double>::epsilon();
@@ -178,8 +178,6 @@ void limit_equals_reference() {
 TEST(Riccati, limit_equals_100_digits) {
   limit_equals_reference<2>();
   limit_equals_reference<3>();
-  limit_equals_reference<4>();
-  limit_equals_reference<5>();
   limit_equals_reference<6>();
 }
 
@@ -232,7 +230,7 @@ void without_disturbance_it_is_the_linear_observer() {
 TEST(Riccati, without_disturbance_it_is_the_linear_observer) {
   without_disturbance_it_is_the_linear_observer<2>();
   without_disturbance_it_is_the_linear_observer<3>();
-  without_disturbance_it_is_the_linear_observer<5>();
+  without_disturbance_it_is_the_linear_observer<6>();
 }
 
 TEST(Riccati, says_when_there_is_no_limit) {
