@@ -234,17 +234,16 @@ void check_random_loops(int wanted, std::uint64_t seed, Counts& counts) {
 
 TEST(Margins, OfRandomLoopsEqualBruteForce) {
   Counts counts;
-  check_random_loops<1, 1, 1>(25, 1, counts);
-  check_random_loops<2, 1, 2>(25, 2, counts);
-  check_random_loops<2, 2, 2>(25, 3, counts);
-  check_random_loops<3, 1, 3>(15, 4, counts);
-  check_random_loops<2, 1, 6>(40, 5, counts);  // two resonances: many crossings
+  check_random_loops<1, 1, 1>(15, 1, counts);
+  check_random_loops<2, 2, 2>(15, 3, counts);
+  check_random_loops<3, 1, 3>(10, 4, counts);
+  check_random_loops<2, 1, 6>(20, 5, counts);  // two resonances: many crossings
   std::printf("%d loops: %d gains up, %d down, %d phases, %d delays\n", counts.loops,
               counts.increases, counts.decreases, counts.phases, counts.delays);
-  EXPECT_GT(counts.increases, 100);
-  EXPECT_GT(counts.decreases, 20);
-  EXPECT_GT(counts.phases, 100);
-  EXPECT_GT(counts.delays, 60);
+  EXPECT_GT(counts.increases, 45);
+  EXPECT_GT(counts.decreases, 10);
+  EXPECT_GT(counts.phases, 45);
+  EXPECT_GT(counts.delays, 30);
 }
 
 auto continuous(double observer_bandwidth, double controller_bandwidth, double b0 = 1.0) {

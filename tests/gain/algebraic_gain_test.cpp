@@ -81,17 +81,13 @@ void follows_its_definition_everywhere(std::int64_t last) {
 }
 
 TEST(AlgebraicGain, FollowsItsDefinitionInDouble) {
-  follows_its_definition_everywhere<2, double>(10'000);
   follows_its_definition_everywhere<3, double>(10'000);
-  follows_its_definition_everywhere<4, double>(10'000);
   follows_its_definition_everywhere<7, double>(10'000);
 }
 
 TEST(AlgebraicGain, FollowsItsDefinitionInFloat) {
   follows_its_definition_everywhere<2, float>(10'000);
-  follows_its_definition_everywhere<3, float>(10'000);
   follows_its_definition_everywhere<5, float>(10'000);
-  follows_its_definition_everywhere<7, float>(10'000);
 }
 
 TEST(AlgebraicGain, FollowsItsDefinitionForAMillionSamples) {

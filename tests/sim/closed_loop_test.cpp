@@ -221,9 +221,12 @@ TEST(ContinuousLoop, StepsBeginBeforeTheirStagesAndHoldTheNoise) {
   ProbingObserver::Log log;
   const auto plant = disturbed<1>({});
   const auto noise = HeldNoise<>::make({.power = 1.0, .hold = 0.2, .step = 0.1, .seed = 3}).value();
-  const ContinuousLoop loop{plant, ProbingObserver{&log},
-                            [](double, const EigenMatrix<double, 1>&) { return 0.0; },
-                            MeasuredOutput{}, noise};
+  std::vector<double> law_times;
+  const auto law = [&law_times](double t, const EigenMatrix<double, 1>&) {
+    law_times.push_back(t);
+    return 0.0;
+  };
+  const ContinuousLoop loop{plant, ProbingObserver{&log}, law, MeasuredOutput{}, noise};
   std::vector<double> seen;
   const auto end = loop.run({.duration = 1.0, .step = 0.1},
                             [&](const auto& sample) { seen.push_back(sample.measurement); });
@@ -239,6 +242,10 @@ TEST(ContinuousLoop, StepsBeginBeforeTheirStagesAndHoldTheNoise) {
   }
   EXPECT_EQ(seen[0], seen[1]);
   EXPECT_NE(seen[1], seen[2]);
+  // The law is told the time of each stage: begin, middle or end of a step.
+  ASSERT_GE(law_times.size(), 40u);
+  for (const double t : law_times) EXPECT_NEAR(t * 20.0, std::round(t * 20.0), 1e-9);
+  EXPECT_NEAR(*std::max_element(law_times.begin(), law_times.end()), 1.0, 1e-9);
 }
 
 TEST(ContinuousLoop, CallbackMayStopTheRunAndRunsRepeat) {
