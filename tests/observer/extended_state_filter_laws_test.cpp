@@ -11,17 +11,18 @@
 
 namespace esokit_test {
 
-/// TableSize is but a mark here: 0 frozen, 1 recursive.
-template <int Order, class S, int Extension, int Recursive, class PlantModel>
-struct ObserverTraits<esokit::ExtendedStateFilter<Order, S, Extension, esokit::NoNominalModel,
-                                                  Recursive, PlantModel>> {
-  using Observer = esokit::ExtendedStateFilter<Order, S, Extension, esokit::NoNominalModel,
-                                               Recursive, PlantModel>;
+/// Those of one state and its disturbances by the recursion, the others frozen.
+template <int Order, class S, int Extension, class PlantModel>
+struct ObserverTraits<
+    esokit::ExtendedStateFilter<Order, S, Extension, esokit::NoNominalModel, 0, PlantModel>> {
+  using Observer =
+      esokit::ExtendedStateFilter<Order, S, Extension, esokit::NoNominalModel, 0, PlantModel>;
+  static constexpr bool recursive = Order == 1;
   static constexpr bool is_chain = esokit::model_traits<PlantModel>.is_chain;
   using Config = typename Observer::Config;
   using Continuous = esokit::ContinuousLinearEso<Order, double, Extension>;
   template <class T>
-  using Rebind = esokit::ExtendedStateFilter<Order, T, Extension, esokit::NoNominalModel, Recursive,
+  using Rebind = esokit::ExtendedStateFilter<Order, T, Extension, esokit::NoNominalModel, 0,
                                              esokit::detail::WithScalar<PlantModel, T>>;
   static constexpr const char* field = "inflation";
   static constexpr double slowest = 1;
@@ -39,7 +40,7 @@ struct ObserverTraits<esokit::ExtendedStateFilter<Order, S, Extension, esokit::N
       config.plant_model.resonators[0].frequency =
           static_cast<S>(omega > 0 ? std::min(omega / 2, 10.0) : 10.0);
     }
-    if constexpr (Recursive != 0) {
+    if constexpr (recursive) {
       config.mode = esokit::RiccatiMode::recursive;
       config.initial_covariance = eigen(steady_covariance(config)).template cast<S>();
     }
@@ -99,11 +100,11 @@ struct ObserverTraits<esokit::ExtendedStateFilter<Order, S, Extension, esokit::N
              "digits; "
              "see riccati_test.cpp";
     }
-    if (Recursive != 0 &&
+    if (recursive &&
         (law == Law::gains_equal_reference || law == Law::polynomial_equals_reference)) {
       return "its gain comes out of the recursion; see extended_state_filter_test.cpp";
     }
-    if (Recursive != 0 &&
+    if (recursive &&
         (law == Law::retune_keeps_estimate || law == Law::retune_rescales_sample_time)) {
       return "the covariance is kept too; see retune_keeps_estimate_and_covariance";
     }
@@ -111,17 +112,17 @@ struct ObserverTraits<esokit::ExtendedStateFilter<Order, S, Extension, esokit::N
   }
 };
 
-template <int Order, class S, int Extension>
-using Frozen = esokit::ExtendedStateFilter<Order, S, Extension>;
-template <int Order, class S, int Extension>
-using Recursive = esokit::ExtendedStateFilter<Order, S, Extension, esokit::NoNominalModel, 1>;
+template <class S>
+using Frozen = esokit::ExtendedStateFilter<2, S, 1>;
+template <class S>
+using Recursive = esokit::ExtendedStateFilter<1, S, 2>;
 inline constexpr esokit::ModelParts swing_parts{.order = 2, .resonators = 1};
 template <class S>
 using Swing = esokit::ExtendedStateFilter<2, S, 3, esokit::NoNominalModel, 0,
                                           esokit::AugmentedModel<swing_parts, S>>;
 
-using FilterTypes = TypeList<Frozen<2, double, 1>, Frozen<2, float, 1>, Recursive<2, double, 1>,
-                             Recursive<2, float, 1>, Swing<double>, Swing<float>>;
+using FilterTypes = TypeList<Frozen<double>, Frozen<float>, Recursive<double>, Recursive<float>,
+                             Swing<double>, Swing<float>>;
 const bool registered = register_laws<ObserverLaws>("ExtendedStateFilter", FilterTypes{});
 
 /// y'' = 3 + 2 sin(w t). All that may be wrong in the end is what rounding of the states, as large
