@@ -30,7 +30,7 @@ constexpr int long_run(int full) { return sanitized ? full / 50 : full; }
 
 /// Whether a loop of so many samples is left out: the sanitizers see the same steps in shorter
 /// ones.
-constexpr bool too_long(int samples) { return sanitized && samples > 20'000; }
+constexpr bool too_long(int samples) { return sanitized && samples > 50'000; }
 
 /// The step through many cases that take the same way: every fifth under the sanitizers.
 inline constexpr int stride = sanitized ? 5 : 1;
