@@ -99,7 +99,7 @@ struct Identified {
   bool position = false;
 
   /// Change of b0 if they are added (if they are in the model: the next three powers), half widths
-  /// of b0.
+  /// of b0, with its drift over one and a half octaves.
   double position_shift = 0;
   double correlation = 0;          ///< largest correlation of the innovations over lags 1 to 20
   int averaged = 1;                ///< rows of the log that were averaged into one
@@ -798,18 +798,20 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
     position_spread = std::abs(found.linear[0] - here.fit.linear[0]);
   }
   // The interval combines the jackknife with the dependence on the bandwidth: between neighbours,
-  // and over one and a half octaves to each side as far as the number is accurate there.
-  const std::size_t first = plateau.middle - std::min<std::size_t>(plateau.middle, 3);
+  // and over one and a half octaves to each side as far as the number is accurate there. `down` is
+  // the number of points below, `resolved` the share to which a point counts at most.
   const std::size_t last = std::min(plateau.middle + 3, plateau.points.size() - 1);
-  const auto estimate = [&](auto value, auto error, double more) {
+  const auto estimate = [&](auto value, auto error, double more, std::size_t down = 3,
+                            double resolved = 0.0) {
     const double x = value(here);
+    const std::size_t first = plateau.middle - std::min(plateau.middle, down);
     const double spread =
         std::max({value(below), x, value(above)}) - std::min({value(below), x, value(above)});
     double squares = 0.0, weights = 0.0;
     for (std::size_t i = first; i <= last; ++i) {
       const PlateauPoint& point = plateau.points[i];
       // A point that is more accurate than this one, or has no error, does not count more.
-      const double size = std::max(error(point), error(here));
+      const double size = std::max({error(point), error(here), resolved * std::abs(x)});
       const double weight = size > 0.0 && !point.at_bound ? 1.0 / (size * size) : 0.0;
       squares += weight * (value(point) - x) * (value(point) - x);
       weights += weight;
@@ -817,12 +819,20 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
     const double drift = weights > 0.0 ? std::sqrt(squares / weights) : 0.0;
     return Estimate{x, t * error(here) + 0.25 * spread + drift + more};
   };
-  result.input_gain =
-      estimate([](const PlateauPoint& p) { return p.fit.linear[0]; },
-               [](const PlateauPoint& p) { return p.errors.linear[0]; }, 0.25 * friction_spread);
-  result.position_shift = position_spread / result.input_gain.half_width;
+  const auto gain = [&](std::size_t down, double resolved) {
+    return estimate([](const PlateauPoint& p) { return p.fit.linear[0]; },
+                    [](const PlateauPoint& p) { return p.errors.linear[0]; },
+                    0.25 * friction_spread, down, resolved);
+  };
+  // A flexible mode changes b0 over octaves, by more than the errors at each bandwidth: so b0 is
+  // compared over three octaves below, where the machine is closer to the model, and to 2 %.
+  result.input_gain = gain(6, 0.02);
+  // What else could change b0 is compared with the interval of this plateau: a wider one would hide
+  // it.
+  const double near = gain(3, 0.0).half_width;
+  result.position_shift = position_spread / near;
   // A standard error is half of a half width.
-  result.friction_shift = 2.0 * friction_spread / result.input_gain.half_width;
+  result.friction_shift = 2.0 * friction_spread / near;
   // The fit cannot distinguish times below a twentieth of a row.
   const auto time = [&](Estimate found) {
     found.half_width = std::max(found.half_width, 0.05 * data.sample_time);
