@@ -148,10 +148,13 @@ class Figure:
 
     def axis(self, which, limits, tick, font, shift, label="", log="", hidden=""):
         # The scale first: a change of scale drops the end of a range that it cannot show.
+        # Between ticks more than a decade apart gnuplot would put small ones at 2, 3, .. one by one.
+        far = log and tick and float(tick) > 10
+        small = f"unset m{which}tics" if far else f"set m{which}tics default"
         form = "''" if hidden else "'10^{%L}'" if log else "'%h'"
         self.put(f"set {which}label {quoted('' if hidden else label)}"
                  f"{' offset 0,0.3' if which == 'x' else ''}\n"
-                 f"{'set' if log else 'unset'} logscale {which}\n"
+                 f"{'set' if log else 'unset'} logscale {which}; {small}\n"
                  f"set {which}range [{limits[0]}:{limits[1]}]\nset format {which} {form}\n"
                  f"set {which}tics in scale 0.6,0.3 mirror {tick or 'autofreq'} offset {shift} "
                  f"font ',{font}' textcolor rgb '#202020'")
