@@ -53,7 +53,6 @@ void add_controllers(std::vector<Kind>& kinds) {
   KIND(Adrc<Guarded<ModelEso<ModelParts{.order = 1, .actuator = 1}, double>>>);
   KIND(Adrc<CascadeEso<2, 2, float>>);
   KIND(Adrc<AlgebraicEso<2, float>>);
-  KIND(Adrc<WrappedOutput<LinearEso<2, double>>>);
   KIND(Adrc<DelayedInput<KnownModel<LinearEso<2, double>, esokit_test::Friction<1, double>>, 3>>);
   KIND(Adrc<ExtendedStateFilter<1, float>>);
   KIND(DisturbanceCompensator<VariableTime<CascadeEso<1, 2, double>>>);

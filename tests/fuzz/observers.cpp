@@ -44,7 +44,6 @@ void add_observers(std::vector<Kind>& kinds) {
        ModelEso<ModelParts{.order = 1, .actuator = 1, .sensor = 1, .resonators = 1}, float>>);
 #ifndef ESOKIT_ONE_TYPE
   KIND(WrappedOutput<OutlierGate<VariableTime<CascadeEso<2, 2, double>>>>);
-  KIND(LinearEso<1, float>);
   KIND(PlantEso<3, ModelParts{.order = 2, .sensor = 1, .resonators = 1}, double>);
   KIND(LinearEso<2, long double>);
   KIND(CascadeEso<2, 3, float>);
@@ -52,13 +51,10 @@ void add_observers(std::vector<Kind>& kinds) {
   KIND(ReducedOrderEso<2, double>);
   KIND(AlgebraicEso<1, double, 2>);
   KIND(NonlinearEso<2, double, 1, FalGain<double>>);
-  KIND(WrappedOutput<LinearEso<2, double>>);
-  KIND(WrappedOutput<CascadeEso<2, 2, float>>);
   KIND(WrappedOutput<AlgebraicEso<2, float>>);
   KIND(DelayedInput<WrappedOutput<NonlinearEso<2, float, 1>>, 4>);
   KIND(VariableTime<AdjustableBandwidthEso<1, double>>);
   KIND(Guarded<WrappedOutput<CascadeEso<1, 2, double>>>);
-  KIND(VariableTime<CascadeEso<2, 2, float>>);
   KIND(KnownModel<LinearEso<2, float>, Friction<1, float>>);
   KIND(VariableTime<ModelEso<ModelParts{.order = 1, .plant_poles = true}, float>>);
   KIND(DelayedInput<OutlierGate<ModelEso<ModelParts{.order = 2, .plant_poles = true}, float>>, 3>);
