@@ -140,6 +140,7 @@
 #include <esokit/sim/closed_loop.hpp>
 #include <esokit/sim/combined_signals.hpp>
 #include <esokit/sim/counted_gaussian.hpp>
+#include <esokit/sim/disturbed_plant.hpp>
 #include <esokit/sim/dormand_prince.hpp>
 #include <esokit/sim/elementary_signals.hpp>
 #include <esokit/sim/filtered_step.hpp>

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <esokit/eigen.hpp>
+#include <esokit/sim/disturbed_plant.hpp>
 #include <esokit/sim/plant.hpp>
 #include <esokit/sim/runge_kutta.hpp>
 

@@ -1,9 +1,9 @@
 // Every bad config of the simulation part is refused, and the error names the field.
 #include <gtest/gtest.h>
 
+#include <esokit/sim/disturbed_plant.hpp>
 #include <esokit/sim/metrics.hpp>
 #include <esokit/sim/noise.hpp>
-#include <esokit/sim/plant.hpp>
 #include <esokit/sim/signals.hpp>
 #include <limits>
 #include <string>

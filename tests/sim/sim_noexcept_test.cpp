@@ -1,8 +1,8 @@
 // The simulation part without exceptions and RTTI; a plain main, 0 is good.
 #include <cmath>
+#include <esokit/sim/disturbed_plant.hpp>
 #include <esokit/sim/metrics.hpp>
 #include <esokit/sim/noise.hpp>
-#include <esokit/sim/plant.hpp>
 #include <esokit/sim/runge_kutta.hpp>
 #include <esokit/sim/signals.hpp>
 

@@ -10,6 +10,7 @@
 #include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/lanes.hpp>
+#include <esokit/model/linear_plant.hpp>
 #include <esokit/sim/counted_gaussian.hpp>
 #include <esokit/sim/gaussian.hpp>
 #include <esokit/sim/loop_steps.hpp>
