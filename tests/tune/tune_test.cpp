@@ -458,6 +458,21 @@ TEST(TuneTest, TakesAModelWithIntervalsOfNinetyNinePercent) {
   EXPECT_NEAR(model.lag_half_width, 0.002 * 2.576 / 1.960, 1e-6);
 }
 
+TEST(TuneTest, TakesADisturbanceWithASlopeAsARandomWalkOfTheSameBandwidth) {
+  esokit::Identified found;
+  found.order = 2;
+  found.noise = {0.01, 0.0};
+  found.log.sample_time = 1e-3;
+  // w = 30 rad/s: q_m = w^(2 (n + m)) N^2 T.
+  found.disturbance = std::pow(30.0, 6) * 1e-7;
+  EXPECT_EQ(esokit::tune_model(found, -1.0, 1.0).disturbance, found.disturbance);
+  found.extension = 2;
+  found.disturbance = std::pow(30.0, 8) * 1e-7;
+  const TuneModel model = esokit::tune_model(found, -1.0, 1.0);
+  EXPECT_NEAR(model.disturbance, std::pow(30.0, 6) * 1e-7, 1e-9 * model.disturbance);
+  EXPECT_NEAR(model.filter_bandwidth(), 30.0, 1e-9);
+}
+
 TEST(TuneTest, SimulatedItDoesWhatWasPredicted) {
   TuneModel model = plain(2, 20.0);
   model.input_gain = {2.0, 0.0};

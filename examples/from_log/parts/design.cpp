@@ -80,7 +80,7 @@ esokit::FitData simulated(const Identified& found, const esokit::FitData& rows) 
   std::vector<double> walk(count + 1, 0.0);
   esokit::sim::Gaussian gaussian(1);
   for (std::size_t k = 1; k <= count; ++k)
-    walk[k] = walk[k - 1] + std::sqrt(found.disturbance * T) * gaussian.next();
+    walk[k] = walk[k - 1] + std::sqrt(found.random_walk() * T) * gaussian.next();
   with_plant(found, [&](const auto& plant) {
     if (!plant) return 0;
     std::size_t row = 0;

@@ -123,9 +123,7 @@ void sound_alarms(const Settings& settings, const Input& input, Findings& all) {
   }
   // The bandwidth at which an observer follows the disturbance above the noise. Of a slower one
   // than some periods of the log next to nothing is seen, and a design for it gives no feedback.
-  const double bandwidth =
-      std::pow(found.disturbance / (found.noise.value * found.noise.value * found.log.sample_time),
-               0.5 / (found.order + found.extension));
+  const double bandwidth = found.disturbance_bandwidth();
   const double slowest = 60.0 / found.log.duration;
   if (bandwidth < slowest) {
     all.alarms.push_back(

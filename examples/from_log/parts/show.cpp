@@ -182,7 +182,7 @@ std::vector<CsvRow> model_table(const Findings& findings) {
   }
   rows.push_back(
       {"noise", with_interval(found.noise), "[y]", "standard deviation of the measurement noise"});
-  rows.push_back({"disturbance", number_text(found.disturbance, 3), "[" + highest + "]² / s",
+  rows.push_back({"disturbance", number_text(found.random_walk(), 3), "[" + highest + "]² / s",
                   "rate at which the variance of d grows, as a random walk"});
   rows.push_back(
       {"plateau", number_text(100 * found.plateau.spread, 3) + " %",

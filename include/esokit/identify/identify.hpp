@@ -173,6 +173,18 @@ struct Identified {
     return config;
   }
 
+  /// Where the disturbance comes above the noise: the bandwidth of a Kalman filter for both, rad/s.
+  [[nodiscard]] double disturbance_bandwidth() const {
+    return std::pow(disturbance / (noise.value * noise.value * log.sample_time),
+                    0.5 / (order + extension));
+  }
+
+  /// Intensity of the random walk that stands for the disturbance, (unit of y^(n))^2 / s: of equal
+  /// power at disturbance_bandwidth(). For m = 1 it is `disturbance`.
+  [[nodiscard]] double random_walk() const {
+    return disturbance / std::pow(disturbance_bandwidth(), 2 * (extension - 1));
+  }
+
   /// The dead time in samples, for DelayedInput. @param sample_time s, above 0
   [[nodiscard]] int delay(double sample_time) const {
     return static_cast<int>(std::lround(dead_time.value / sample_time));

@@ -119,7 +119,8 @@ inline constexpr double interval_of_99 = 1.314;
 
 /// The model that was identified from a log, for a controller with the sample time of the log. The
 /// intervals of b0, lag and latency are widened from 95 % to 99 %, so that the margins hold on the
-/// machine.
+/// machine. For a disturbance with a slope (m = 2) stands the random walk of equal power where it
+/// comes above the noise.
 /// @param u_min lower limit of the actuator, unit of u @param u_max above u_min
 inline TuneModel tune_model(const Identified& found, double u_min, double u_max) {
   TuneModel model;
@@ -131,7 +132,7 @@ inline TuneModel tune_model(const Identified& found, double u_min, double u_max)
   model.latency_half_width = interval_of_99 * found.latency.half_width;
   model.lag_half_width = interval_of_99 * found.lag.half_width;
   model.noise = found.noise.value;
-  model.disturbance = found.disturbance;
+  model.disturbance = found.random_walk();
   model.sample_time = found.log.sample_time;
   model.u_min = u_min;
   model.u_max = u_max;
