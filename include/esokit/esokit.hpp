@@ -1,6 +1,5 @@
 /// @file
-/// Includes all of esokit. Firmware may prefer to include only what it uses: each observer
-/// has a header of its own.
+/// Everything of esokit. Firmware may prefer the headers that it uses, one file an observer.
 #pragma once
 
 #include <esokit/adapter/adapter.hpp>
@@ -49,6 +48,7 @@
 #include <esokit/control/pid_conversion.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/control/scaled_law.hpp>
+#include <esokit/control/softening.hpp>
 #include <esokit/control/telemetry.hpp>
 #include <esokit/control/tracking_differentiator.hpp>
 #include <esokit/core/check.hpp>
@@ -73,6 +73,7 @@
 #include <esokit/eigen.hpp>
 #include <esokit/gain/algebraic_gain.hpp>
 #include <esokit/gain/algebraic_gain_design.hpp>
+#include <esokit/gain/bridged_steps.hpp>
 #include <esokit/gain/constant_gain.hpp>
 #include <esokit/gain/continuous_gain.hpp>
 #include <esokit/gain/covariance_factor.hpp>
@@ -81,6 +82,7 @@
 #include <esokit/gain/filter_design.hpp>
 #include <esokit/gain/gain_interval.hpp>
 #include <esokit/gain/gain_law.hpp>
+#include <esokit/gain/gap_certificate.hpp>
 #include <esokit/gain/gating_certificate.hpp>
 #include <esokit/gain/half_gain.hpp>
 #include <esokit/gain/model_gain.hpp>
@@ -104,6 +106,7 @@
 #include <esokit/identify/intervals.hpp>
 #include <esokit/identify/log.hpp>
 #include <esokit/identify/plateau.hpp>
+#include <esokit/identify/second_opinion.hpp>
 #include <esokit/identify/sinusoids.hpp>
 #include <esokit/identify/spectrum.hpp>
 #include <esokit/math/combinatorics.hpp>
@@ -166,6 +169,7 @@
 #include <esokit/tune/families.hpp>
 #include <esokit/tune/loop_cost.hpp>
 #include <esokit/tune/lqg.hpp>
+#include <esokit/tune/play.hpp>
 #include <esokit/tune/problem.hpp>
 #include <esokit/tune/search.hpp>
 #include <esokit/tune/tune.hpp>

@@ -157,6 +157,10 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
       requires(observer_traits<Observer>.varies_time) {
     return observer_.set_step_time(seconds);
   }
+  [[nodiscard]] const scalar_type& step_time() const noexcept
+      requires(observer_traits<Observer>.varies_time) {
+    return observer_.step_time();
+  }
   /// @}
 
  protected:

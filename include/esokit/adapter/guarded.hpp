@@ -39,6 +39,12 @@ struct GuardAccess {
   static constexpr auto& states(O& o) noexcept {
     return innermost(o).states_;
   }
+  /// The share of the innovation by which the next correction moves the measured value.
+  template <class O>
+  static constexpr auto measured_gain(const O& o) noexcept {
+    const auto& inner = innermost(o);
+    return std::get<0>(inner.law_gain(inner.laws_[0], {}, inner.elapsed()));
+  }
   /// True if all estimates that belong to these states are finite.
   template <class O, class States>
   static constexpr bool finite(const O& o, const States& states) noexcept {
@@ -60,6 +66,14 @@ struct DisturbanceConstant {
   template <class State>
   ESOKIT_INLINE static constexpr void replace(State& x, const S&, const S& value) noexcept {
     std::get<Model::order>(x) = value;
+  }
+  /// The state of a plant that stands still at y (scaled), with the disturbance of `x`.
+  template <class State>
+  [[nodiscard]] static State standing(const Model&, const State& x, const S& y) noexcept {
+    State still{};
+    std::get<0>(still) = y;
+    std::get<Model::order>(still) = std::get<Model::order>(x);
+    return still;
   }
   [[nodiscard]] static S scaled(const Model& model, const S& d) noexcept {
     return model.scaled_disturbance(d);
@@ -98,6 +112,18 @@ requires(model_traits<Model>.tells_constant) struct DisturbanceConstant<Model, S
     for (std::size_t i = 0; i < x.size(); ++i) sum = sum + absolute(S(row[i] * x[i]));
     return S(8) * std::numeric_limits<S>::epsilon() * sum;
   }
+  /// The state of a plant that stands still at y, with the constant and the actuator of `x` and
+  /// without sines.
+  [[nodiscard]] State standing(const Model& model, const State& x, const S& y) const noexcept {
+    State still{};
+    still[0] = y;
+    still[Model::measured_rows] = y;
+    const State other = model.disturbance_part(still);
+    for (std::size_t i = driven; i < x.size(); ++i) still[i] = still[i] - other[i];
+    replace(still, S(0), of(x));
+    if constexpr (lag > 0) add_output(still, x, S(1));
+    return still;
+  }
   /// The state with b0 v multiplied by `factor`; with `all` also the disturbance.
   [[nodiscard]] State rescaled(const Model& model, State x, const S& factor,
                                bool all) const noexcept {
@@ -107,16 +133,20 @@ requires(model_traits<Model>.tells_constant) struct DisturbanceConstant<Model, S
       for (std::size_t i = driven; i < x.size(); ++i) x[i] = x[i] + more * part[i];
     } else if constexpr (lag > 0) {
       const State before = x;
-      for (int i = 0; i <= lag; ++i) {
-        S sum(0);
-        for (int j = 0; j < Model::size; ++j) {
-          sum = sum + actuator(i, j) * before[static_cast<std::size_t>(j)];
-        }
-        S& state = x[static_cast<std::size_t>(driven + i)];
-        state = state + more * sum;
-      }
+      add_output(x, before, more);
     }
     return x;
+  }
+  /// Adds `share` of what the actuator's output contributes to the state `from`.
+  void add_output(State& x, const State& from, const S& share) const noexcept {
+    for (int i = 0; i <= lag; ++i) {
+      S sum(0);
+      for (int j = 0; j < Model::size; ++j) {
+        sum = sum + actuator(i, j) * from[static_cast<std::size_t>(j)];
+      }
+      S& state = x[static_cast<std::size_t>(driven + i)];
+      state = state + share * sum;
+    }
   }
   [[nodiscard]] static S scaled(const Model& model, const S& d) noexcept {
     return model.scaled_constant(d);
@@ -166,10 +196,13 @@ struct GuardedConfig {
 ///
 /// - Trust: `set_trust(phi)`, 0 .. 1, multiplies every correction of dhat; y and its derivatives
 ///   are corrected as usual.
-/// - Held: the plant is held by something else (the ground, a brake, its output is off), so the
-///   measurement contains no information about d. `hold(u)` suspends the corrections of dhat and
-///   returns the u to give to the observer, on the chain the one that makes y^(n) zero; `release()`
-///   ends it. `Adrc::hold` does this for one sample; on release start the reference at y.
+/// - Held: something else (the ground, a brake) keeps the plant at a standstill, so the measurement
+///   contains no information about d. Between `hold(u)` and `release()` the estimate is (y, 0, ..,
+///   0, dhat) with the y that is measured and the dhat of before, whatever u is; a hold without any
+///   measurement is completed by the first one after it. `hold` returns the u to give to the
+///   observer, on the chain the one that makes y^(n) zero. `Adrc::hold` does this for one sample;
+///   on release start the reference at y. A plant that moves while its output is off needs no hold:
+///   u is known to be zero.
 /// - Pinned: the actuator or a mixer is at a limit, and its output is not known (a known output is
 ///   passed as u_applied and needs no guard). dhat may only move in the direction that brings u
 ///   back from the limit: upwards if u is at its upper limit and b0 > 0. dhat is free again
@@ -190,25 +223,38 @@ struct GuardedConfig {
 /// of plant poles, actuator and sines to `total_disturbance`. The unit of d and its bound is that
 /// of y^(n), with n of the plant, or that of the actuator's output.
 /// - The actuator is always simulated from the applied u. While the plant is held, give the applied
-///   u; the prediction of y stands still, and v is correct on release.
+///   u; v is correct on release.
 /// - A changing b0 is the gain of the actuator's output v: y .. y^(n-1), v and d continue without a
 ///   jump, and y^(n) jumps as in the plant. (For a gain before the lag, such as a supply voltage,
 ///   multiply u_applied.)
-/// - Sines are always corrected as usual, and are not included in the bound. If they were held for
-///   some samples of each period, they would be unstable, because G has a pole at their frequency.
+/// - Sines are always corrected as usual, and are not included in the bound. If their corrections
+///   were left out for some samples of each period, they would be unstable, because G has a pole at
+///   their frequency. So a hold cannot keep them: after it they start again from zero.
 /// - Choose `release_samples` long enough for the simulated lag to forget the wrong u after a pin.
 ///
 /// The first three multiply the correction of dhat by a phi in [0, 1], which may change at every
-/// sample. With m = 1 the bound does the same, as long as the true d is within it. By the circle
-/// criterion errors stay bounded, and decay once the trust returns, if Re G > -1 on the unit
-/// circle, where G is the transfer function from the correction of dhat to its innovation. `make`
-/// checks this for each level, including the leak. Poles in one place pass at any bandwidth (tested
-/// up to n = 5, omega_o T = 20): min Re G is -1/4 (n = 1), -1/3 (n = 2), -3/8 (n = 3) for fast
-/// sampling, and never below -1/2. Known poles and an actuator do not change it; a sensor has an
-/// effect like up to one more order per lag. A sine that is captured too fast for its frequency is
-/// refused (20 rad/s at omega_o = 100: `capture_bandwidth` 20 fails, 4 passes). With m > 1 the
-/// estimated slope would continue while dhat is held, and with VariableTime the gain is not
-/// constant: for these only the bound and a changing b0 are available.
+/// sample. With m = 1 the bound does the same, as long as the true d is within it. What is proven
+/// of this, level by level:
+/// - By the circle criterion errors stay bounded, and decay once the trust returns, if Re G > -1 on
+///   the unit circle, where G is the transfer function from the correction of dhat to its
+///   innovation. `make` checks this, including the leak. Poles in one place pass at any bandwidth
+///   (tested up to n = 5, omega_o T = 20): min Re G is -1/4 (n = 1), -1/3 (n = 2), -3/8 (n = 3) for
+///   fast sampling, and never below -1/2. Known poles and an actuator do not change it; a sensor
+///   has an effect like up to one more order per lag. A sine that is captured too fast for its
+///   frequency is refused (20 rad/s at omega_o = 100: `capture_bandwidth` 20 fails, 4 passes).
+/// - At each hold the error of dhat is at most that at the hold before, whatever phi was between
+///   them: `make` checks this, too (gain/gating_certificate.hpp). Poles in one place pass as they
+///   are up to omega_o T = 1 at least. For other gains, with slow sines for example, the first
+///   correction that is scaled within the settling time after a release stops all corrections of
+///   dhat for this time.
+///
+/// Gaps and the effect of a level of a cascade on the next are not part of the proof. Searched,
+/// without a sequence that grows: all of the above with gaps of any length, for n = 1 .. 5, models
+/// with lags and sines, two and three levels. While dhat is at its bound, the other states decay as
+/// if it were not corrected, which is slower.
+///
+/// With m > 1 the estimated slope would continue while dhat is held, and with VariableTime the gain
+/// is not constant: for these only the bound and a changing b0 are available.
 ///
 /// Requires a constant gain, on the chain or on an AugmentedModel with one constant, and must be
 /// the outermost adapter. KnownModel is excluded, because the proof does not cover fbar, and so are
@@ -265,7 +311,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   /// @return the observer at rest at zero, without a pin and with full trust; or an error that
   /// names the field, or `level` and its number if the circle criterion fails
   static Expected<Guarded, Error<S>> make(const Config& config) {
-    const auto made = Base::make(config);
+    auto made = Base::make(config);
     if (!made) return made.error();
     if constexpr (gates) {
       for (int level = 0; level < levels; ++level) {
@@ -273,6 +319,14 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
           return Error<S>{"level", static_cast<S>(level),
                           "has a gain that is not proven stable if corrections of dhat are scaled: "
                           "Re G > -1 fails"};
+        }
+        const Holding held = made->holding_of(level);
+        if (!held.stable) {
+          return Error<S>{"level", static_cast<S>(level),
+                          "has a gain that is not proven stable if the plant is held and released"};
+        }
+        if (held.settling > made->settling_samples_) {
+          made->settling_samples_ = held.settling;
         }
       }
     }
@@ -289,6 +343,9 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     inverse_gain_ = fresh.inverse_gain_;
     leak_ = fresh.leak_;
     constant_ = fresh.constant_;
+    settling_samples_ = fresh.settling_samples_;
+    if (release_left_ > release_samples_) release_left_ = release_samples_;
+    if (settling_left_ > 0) settling_left_ = settling_samples_;
     set_weights();
     set_limit();
     keep_bound();
@@ -297,11 +354,13 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
 
   /// One sample, see PredictorCorrector::update.
   StepStatus update(S y, S u_applied) noexcept {
+    bool in_parts = acts_ && (held_ || unsettled_);
     if constexpr (!on_chain) {
-      if (held_ || told_ratio_ < gain_ratio_ || told_ratio_ > gain_ratio_) [[unlikely]] {
-        const StepStatus predicted = predict(u_applied);
-        return predicted | correct(y);
-      }
+      in_parts = in_parts || told_ratio_ < gain_ratio_ || told_ratio_ > gain_ratio_;
+    }
+    if (in_parts) [[unlikely]] {
+      const StepStatus predicted = predict(u_applied);
+      return predicted | correct(y);
     }
     const Found before = found();
     const StepStatus status = observer_.update(y, S(u_applied * told_ratio_));
@@ -312,7 +371,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
 
   /// Time update only, see PredictorCorrector::predict.
   StepStatus predict(S u_applied) noexcept {
-    if constexpr (!on_chain) {
+    if constexpr (gates) {
       if (held_) [[unlikely]]
         return predict_standing(u_applied);
     }
@@ -323,21 +382,22 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
 
   /// Measurement update only, see PredictorCorrector::correct.
   StepStatus correct(S y) noexcept {
+    if constexpr (gates) {
+      if (held_ || unsettled_) [[unlikely]]
+        return correct_standing(y);
+    }
     const Found before = found();
     const StepStatus status = observer_.correct(y);
     keep_guards(before, status);
     return status;
   }
 
-  /// Restarts at (y, 0, .., 0). Trust, pin and b0 are kept.
-  StepStatus reset(S y) noexcept { return observer_.reset(y); }
+  /// Restarts at (y, 0, .., 0), with its dhat limited to the bound. (With the poles of a plant this
+  /// dhat is the one that lets the plant rest at y.) Trust, pin and b0 are kept.
+  StepStatus reset(S y) noexcept { return begin(observer_.reset(y)); }
 
   /// Restarts at a given estimate, N x 1, with its dhat limited to the bound.
-  StepStatus reset(const Estimate& state) noexcept {
-    const StepStatus status = observer_.reset(state);
-    if (status == StepStatus::ok) keep_bound();
-    return status;
-  }
+  StepStatus reset(const Estimate& state) noexcept { return begin(observer_.reset(state)); }
 
   /// From the next correction on, corrections of dhat are multiplied by `phi`, 0 .. 1. A smaller or
   /// larger phi counts as 0 or 1; one that is not finite changes nothing.
@@ -352,9 +412,9 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   void set_pin(Pin where) noexcept requires gates {
     if (where == Pin::either) {
       const S u = applied_input();
-      side_ = u > S(0) ? side_at_upper() : u < S(0) ? -side_at_upper() : 0;
+      side_ = u > S(0) ? 1 : u < S(0) ? -1 : 0;
     } else if (where != Pin::free) {
-      side_ = where == Pin::upper ? side_at_upper() : -side_at_upper();
+      side_ = where == Pin::upper ? 1 : -1;
     }
     if (where != Pin::free) {
       release_left_ = 0;
@@ -454,6 +514,8 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     constexpr S rounding = S(1) - S(8) * std::numeric_limits<S>::epsilon();
     return reaches(limit() * rounding);
   }
+  /// The share of dhat that the leak removes after each correction, 0 .. 1.
+  [[nodiscard]] const S& leak_share() const noexcept { return leak_; }
   /// The steady error x - xhat caused by the leak, for a constant y and a constant d = 1 (unit of
   /// y^(n)): (y, .., d), N x 1. Zero without a leak.
   [[nodiscard]] Estimate leak_error() const noexcept requires gates {
@@ -603,6 +665,16 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     }
   }
 
+  [[nodiscard]] Holding holding_of([[maybe_unused]] int level) const {
+    const bool leaks = leak_ > S(0);
+    if constexpr (on_chain) {
+      return holding(detail::ConstantLevel<size, S>(observer_.level_gain(level)), leaks);
+    } else {
+      return with_level(
+          [&](const auto&, const auto& corrected) { return holding(corrected, leaks); });
+    }
+  }
+
   template <class States>
   [[nodiscard]] States rescaled(const States& states, const S& factor) const noexcept
       requires(!on_chain) {
@@ -624,32 +696,80 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     told_ratio_ = gain_ratio_;
   }
 
+  /// After a restart at a given estimate.
+  StepStatus begin(StepStatus status) noexcept {
+    if (status == StepStatus::ok) {
+      settling_left_ = 0;
+      frozen_ = false;
+      settle(true);
+      keep_bound();
+    }
+    return status;
+  }
+
+  void settle(bool settled) noexcept {
+    unsettled_ = !settled;
+    set_weights();
+  }
+
+  [[nodiscard]] static constexpr bool refused(StepStatus status) noexcept {
+    return has(status, StepStatus::measurement_rejected | StepStatus::outlier_rejected);
+  }
+
+  /// Puts each level at rest at y, with its disturbance.
+  template <class States>
+  void stand(const States& with, const S& y) noexcept {
+    const auto& inner = detail::GuardAccess::innermost(observer_);
+    States still = with;
+    for (auto& level : still) level = constant_.standing(inner.model(), level, y);
+    if (detail::GuardAccess::finite(observer_, still)) {
+      detail::GuardAccess::states(observer_) = still;
+    }
+  }
+
   /// Prediction while held: d and the actuator continue, and the sensor follows a constant y.
-  template <class M = Model>
-  requires(!model_traits<M>.is_chain) ESOKIT_COLD StepStatus predict_standing(S u_applied)
-  noexcept {
-    using State = typename Model::State;
+  ESOKIT_COLD StepStatus predict_standing(S u_applied) noexcept requires gates {
     constexpr auto y = static_cast<std::size_t>(Model::state_of_row(0));
-    State& now = detail::GuardAccess::states(observer_)[0];
-    State standing = now;
+    auto& states = detail::GuardAccess::states(observer_);
+    const auto before = states;
     const StepStatus status = observer_.predict(S(u_applied * told_ratio_));
     if (!has(status, StepStatus::prediction_dropped)) {
       const auto& inner = detail::GuardAccess::innermost(observer_);
       const auto& model = inner.model();
       // The shift of y by an adapter.
-      const S turns = now[y] - model.predict(standing, model.drive(S(inner.applied_input())))[y];
-      for (std::size_t i = y + 1; i < standing.size(); ++i) standing[i] = S(0);
-      standing = model.predict(standing, model.drive(S(0)));
-      standing[y] = standing[y] + turns;
-      if constexpr (y > 0) standing[0] = standing[0] + turns;
-      const State other = model.disturbance_part(standing);
-      const State disturbed = model.disturbance_part(now);
-      for (std::size_t i = 0; i < standing.size(); ++i) {
-        standing[i] = standing[i] - other[i] + disturbed[i];
+      const S turns =
+          states[0][y] - model.predict(before[0], model.drive(S(inner.applied_input())))[y];
+      auto still = before[0];
+      for (std::size_t i = y + 1; i < still.size(); ++i) {
+        const bool moves = i < y + n || i > y + Model::order;  // a derivative of y, or a sine
+        if (moves && (still[i] < S(0) || still[i] > S(0))) settle(false);
+        still[i] = S(0);
       }
-      if (is_finite(model.finite_probe(standing))) now = standing;
+      stand(states, S(before[0][y] + turns));
+      if constexpr (y > 0) {
+        still = model.predict(still, model.drive(S(0)));
+        for (std::size_t i = 0; i < y; ++i) states[0][i] = still[i] + (i == 0 ? turns : S(0));
+      }
     }
     take_gain();
+    return status;
+  }
+
+  /// Correction while held: y is what is measured, and dhat stays.
+  ESOKIT_COLD StepStatus correct_standing(S y) noexcept requires gates {
+    const auto& inner = detail::GuardAccess::innermost(observer_);
+    const auto before = detail::GuardAccess::states(observer_);
+    const S left = S(1) - detail::GuardAccess::measured_gain(observer_);
+    const StepStatus status = observer_.correct(y);
+    if (!refused(status)) {
+      settling_left_ = settling_samples_;
+      frozen_ = false;
+      settle(true);
+      // y itself, in the turn in which an adapter has put it.
+      stand(before, S(detail::GuardAccess::states(observer_)[0][0] + left * inner.innovation()));
+    }
+    // What stands has no correction to scale, also after a restart.
+    keep_guards(found(), status);
     return status;
   }
 
@@ -672,20 +792,28 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   ESOKIT_INLINE void keep_guards(const Found& before, StepStatus status) noexcept {
     if constexpr (gates) {
       if (acts_) [[unlikely]] {
+        if (settling_left_ > 0 && gated_ && !held_ && !frozen_) {
+          frozen_ = true;
+          settling_left_ = settling_samples_;
+          set_weights();
+        }
         // After a restart the old dhat is meaningless.
         if (gated_ && !has(status, StepStatus::restarted)) gate(before);
-        if (!has(status, StepStatus::measurement_rejected | StepStatus::outlier_rejected)) {
+        if (!refused(status)) {
           for (auto& level : detail::GuardAccess::states(observer_)) {
             const S d = constant_.of(level);
             put(level, d, S(d - leak_ * d));
           }
+          const bool released = release_left_ > 0 && --release_left_ == 0;
+          const bool settled = settling_left_ > 0 && --settling_left_ == 0;
+          if (settled) frozen_ = false;
+          if (released || settled) set_weights();
         }
-        if (release_left_ > 0 && --release_left_ == 0) set_weights();
       }
     }
     if constexpr (!on_chain) {
       // A refused measurement changes nothing, not even by rounding.
-      if (has(status, StepStatus::measurement_rejected | StepStatus::outlier_rejected)) return;
+      if (refused(status)) return;
     }
     if (beyond_bound()) [[unlikely]]
       keep_bound();
@@ -720,15 +848,12 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
 
   ESOKIT_COLD void set_weights() noexcept {
     const bool one_sided = pin_ != Pin::free || release_left_ > 0;
-    weight_up_ = held_ || (one_sided && side_ <= 0) ? S(0) : trust_;
-    weight_down_ = held_ || (one_sided && side_ >= 0) ? S(0) : trust_;
-    gated_ = held_ || one_sided || trust_ < S(1);
-    acts_ = gated_ || leak_ > S(0);
-  }
-
-  /// Sign of the corrections of dhat that lower u.
-  [[nodiscard]] signed char side_at_upper() const noexcept {
-    return observer_.input_gain() > S(0) ? 1 : -1;
+    const int freeing = observer_.input_gain() > S(0) ? side_ : -side_;
+    const bool none = held_ || frozen_;
+    weight_up_ = none || (one_sided && freeing <= 0) ? S(0) : trust_;
+    weight_down_ = none || (one_sided && freeing >= 0) ? S(0) : trust_;
+    gated_ = none || one_sided || trust_ < S(1);
+    acts_ = gated_ || unsettled_ || settling_left_ > 0 || leak_ > S(0);
   }
 
   void set_limit() noexcept {
@@ -825,12 +950,16 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   S weight_down_ = S(1);  ///< factor on corrections that lower dhat
   DisturbanceUnit unit_;
   Pin pin_ = Pin::free;
-  signed char side_ = 0;  ///< sign of the corrections that free a pinned actuator; 0: unknown
+  signed char side_ = 0;  ///< limit at which the actuator is pinned: 1 upper, -1 lower, 0 unknown
   bool held_ = false;
+  bool unsettled_ = false;  ///< held, but no measurement has told where since
   bool gated_ = false;
-  bool acts_ = false;  ///< gated or leaking: one test in the hot path
+  bool frozen_ = false;  ///< no correction of dhat counts until the observer has settled
+  bool acts_ = false;    ///< any of these, or a leak: one test in the hot path
   std::uint16_t release_samples_;
   std::uint16_t release_left_ = 0;
+  int settling_samples_ = 0;  ///< see Holding
+  int settling_left_ = 0;     ///< since the last sample held
 };
 
 /// The same for packs, lane by lane.

@@ -34,8 +34,8 @@ struct OutlierGateConfig {
 /// running mean of abs(y - z_1) over about 64 measurements and M the number of sample times since
 /// the last correction (D if only every D-th sample has a measurement). The gate never stays shut:
 /// after `most_in_a_row` rejected measurements it opens and accepts everything until as many in a
-/// row are within the limit. So the observer follows a true step of y, of any size, with a delay of
-/// `most_in_a_row` samples. At the start and after a reset the gate is open in the same way.
+/// row are within the limit. So it follows a true step of y, of any size, after `most_in_a_row`
+/// samples, or after max_gap() if fewer: then the observer restarts. It begins open, also by reset.
 ///
 /// It can be combined with the other adapters; WrappedOutput must be outside, because it determines
 /// the turn of y. ExtendedStateFilter has its own gate, which uses the variance of the innovation.

@@ -30,6 +30,12 @@ struct VariableTimeConfig {
 /// are for logs, or for a rate that changes rarely. After missing samples the gain is that for the
 /// total time since the last correction.
 ///
+/// The gains for two lengths in turn can make the error grow although each alone is stable (order
+/// 3, omega_o 460 rad/s: 3 and 16 ms). So a correction bridges steps and gaps only up to the length
+/// for which errors decay in any sequence: for the chain with equal poles 14 / omega_o for three
+/// states, 5 / omega_o for four, 3 / omega_o for five (gain/bridged_steps.hpp). After a longer one
+/// the observer restarts from the measurement.
+///
 /// AlgebraicEso counts samples: while its bandwidth falls, it treats all samples so far as if they
 /// had the present length; once settled it is exact. The gain sets of a switched observer follow
 /// the step time, but its switching test compares successive innovations regardless of the time
@@ -61,12 +67,31 @@ class VariableTime
     auto observer = Observer::make(config.observer);
     if (!observer) return observer.error();
     // Every step time in the range must give a valid config; it does if both ends do.
+    S longest{};
     for (const S factor : {config.ratio, S(1) / config.ratio}) {
       auto edge = config.observer;
-      chain_config<Observer>(edge).sample_time = chain_config<Observer>(edge).sample_time * factor;
-      if (auto ok = Observer::make(edge); !ok) return ok.error();
+      auto& chain = chain_config<Observer>(edge);
+      chain.sample_time = chain.sample_time * factor;
+      constexpr int most = 65000;
+      chain.max_gap = most;
+      const auto made = Observer::make(edge);
+      if (!made) return made.error();
+      if (longest == detail::unbounded<S>()) continue;
+      // What any sequence of samples at the shortest step bridges, any sequence of steps does.
+      longest = factor > S(1) && made->max_gap() == most
+                    ? detail::unbounded<S>()
+                    : static_cast<S>(made->max_gap() + 1) * chain.sample_time;
     }
-    return VariableTime(*observer, config);
+    if (const S nominal = chain_config<Observer>(config.observer).sample_time; longest < nominal) {
+      return Error<S>{"ratio",
+                      config.ratio,
+                      "allows steps of so different lengths that errors may grow; the longest step "
+                      "(s) after which they decay is",
+                      -1,
+                      longest,
+                      true};
+    }
+    return VariableTime(*observer, config, longest);
   }
 
   /// Sets the length of the next steps (s), until the next call. A length outside T / ratio .. T
@@ -87,7 +112,7 @@ class VariableTime
 
   /// One sample of length `step_time`, see PredictorCorrector::update.
   StepStatus update(S y, S u_applied) noexcept {
-    if (!is_current() || this->missed() != 0) [[unlikely]] {
+    if (!is_current() || this->missed() != 0 || step_time_ > longest_) [[unlikely]] {
       const StepStatus predicted = predict(u_applied);
       return predicted | correct(y);
     }
@@ -104,6 +129,10 @@ class VariableTime
 
   /// Measurement update only, with the gain for the total time since the last one.
   StepStatus correct(S y) noexcept {
+    if (is_too_long()) {
+      return observer_.reset(y) == StepStatus::ok ? StepStatus::restarted
+                                                  : StepStatus::measurement_rejected;
+    }
     take_gap();
     return observer_.correct(y);
   }
@@ -116,25 +145,34 @@ class VariableTime
     return observer_.correct_weighted(y, variance);
   }
 
+  /// True if so much time has passed that the next `correct` restarts the observer.
+  [[nodiscard]] bool restarts() const noexcept { return is_too_long() || observer_.restarts(); }
+
   /// Present length of the steps, s.
   [[nodiscard]] const S& step_time() const noexcept { return step_time_; }
 
  private:
-  VariableTime(const Observer& observer, const Config& config) noexcept
+  VariableTime(const Observer& observer, const Config& config, const S& longest) noexcept
       : Base(observer),
         config_(config),
         step_time_(chain_config<Observer>(config_.observer).sample_time),
-        current_(step_time_) {}
+        current_(step_time_),
+        longest_(longest) {}
 
   /// Sets the steps to the nominal length.
   void take(const VariableTime& fresh) noexcept {
     config_ = fresh.config_;
     step_time_ = fresh.step_time_;
     current_ = fresh.current_;
+    longest_ = fresh.longest_;
   }
 
   [[nodiscard]] bool is_current() const noexcept {
     return !(step_time_ < current_ || step_time_ > current_);
+  }
+
+  [[nodiscard]] bool is_too_long() const noexcept {
+    return this->missed() != 0 && elapsed_ > longest_;
   }
 
   /// The observer bridges a gap in `missed` equal steps: sets its sample time to their mean.
@@ -162,6 +200,7 @@ class VariableTime
   S step_time_;
   S current_;  ///< present sample time of the observer
   S elapsed_{};
+  S longest_;  ///< time since the last correction that the next one may bridge
 };
 
 /// The same for packs, lane by lane.

@@ -5,8 +5,10 @@
 /// The linear form is valid within the limits, while no measurement is missing and the law
 /// determines u. Adapters are analysed in their linear mode: an angle within one turn, an open
 /// gate, VariableTime with its present step, Guarded with its present b0 and full trust. A float
-/// controller is analysed in double with its own gains. A type without a linear mode does not
-/// compile; use FrozenObserver for one mode of a switched or nonlinear observer.
+/// controller is analysed in double with its own gains. Of an Adrc that softens at the limits it is
+/// the law as designed, also while it is soft (`softness()` < 1): then the loop is another one. A
+/// type without a linear mode does not compile; use FrozenObserver for one mode of a switched or
+/// nonlinear observer.
 #pragma once
 
 #include <cstddef>
@@ -81,11 +83,65 @@ requires detail::SaysObserver<Observer> &&(!LinearObserver<VariableTime<Observer
 }
 /// @}
 
-/// The linear form with the present b0, full trust, and dhat within its bound.
+namespace detail {
+
+/// The observer with a disturbance of which a share is removed after each correction.
+/// @param observer that of the form, without adapters
+template <class Observer>
+void add_leak(LinearObserverForm& form, const Observer& observer, double leak) {
+  constexpr int size = Observer::size;
+  using Model = std::remove_cvref_t<decltype(observer.model())>;
+  const auto sampled = sampled_matrices(observer);
+  // The disturbance as a row over the states, and a disturbance of one as states: after the
+  // correction, and after the prediction.
+  Vector<double, size> row = Vector<double, size>::Zero();
+  Vector<double, size> column = row;
+  if constexpr (model_traits<Model>.is_chain) {
+    row(Observer::order) = column(Observer::order) = 1.0;
+  } else {
+    const auto of_model = observer.model().constant_row();
+    const auto with_constant = observer.model().constant_column();
+    for (int i = 0; i < size; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      row(i) = static_cast<double>(of_model[at]) / sampled.units(i);
+      column(i) = static_cast<double>(with_constant[at]) * sampled.units(i);
+    }
+  }
+  const Vector<double, size> predicted = column + sampled.step * column;
+  // Each level has the sum of the disturbances found by it and the levels below it.
+  for (int first = 0; first < size * Observer::levels; first += size) {
+    const auto leave = [&](DynamicMatrix<double>& to, int j, double more) {
+      double found = more;
+      for (int i = 0; i < size; ++i) found += row(i) * to(first + i, j);
+      for (int i = 0; i < size; ++i) to(first + i, j) -= leak * found * predicted(i);
+    };
+    for (int j = 0; j < form.states(); ++j) {
+      // A - I is stored.
+      const bool own = first <= j && j < first + size;
+      leave(form.a, j, own ? row(j - first) : 0.0);
+    }
+    leave(form.from_y, 0, 0.0);
+  }
+  const auto leave_estimate = [&](DynamicMatrix<double>& to, int j) {
+    double found = 0.0;
+    for (int r = 0; r < size; ++r) found += row(state_of_row<Observer>(r)) * to(r, j);
+    for (int r = 0; r < size; ++r) to(r, j) -= leak * found * column(state_of_row<Observer>(r));
+  };
+  for (int j = 0; j < form.states(); ++j) leave_estimate(form.to_estimate, j);
+  leave_estimate(form.y_to_estimate, 0);
+}
+
+}  // namespace detail
+
+/// The linear form with the present b0, full trust, the leak, and dhat within its bound.
 template <class Observer>
 requires detail::SaysObserver<Observer> LinearObserverForm
 linear_observer(const Guarded<Observer>& observer) {
   LinearObserverForm form = linear_observer(observer.observer());
+  if constexpr (Guarded<Observer>::gates) {
+    const auto leak = static_cast<double>(observer.leak_share());
+    if (leak > 0.0) detail::add_leak(form, detail::GuardAccess::innermost(observer), leak);
+  }
   const double ratio = 1.0 / static_cast<double>(observer.input_factor());
   for (int i = 0; i < form.from_u.rows(); ++i) form.from_u(i, 0) *= ratio;
   form.input_gain *= ratio;

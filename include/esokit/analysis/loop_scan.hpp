@@ -69,6 +69,16 @@ inline ScanRange scan_range(const Loop& loop, int channel) {
   return range;
 }
 
+/// L at frequency zero, which is real; NaN if plant or controller integrates. As this makes L
+/// infinite in theory but only very large in numbers, it is told by the rise from the lowest
+/// frequency, at which everything slow has ended.
+inline double loop_gain_at_zero(const LoopGain& response, const ScanRange& range) {
+  const std::complex<double> l = response.at(0.0);
+  return std::abs(l) <= 2.0 * std::abs(response(range.from))
+             ? l.real()
+             : std::numeric_limits<double>::quiet_NaN();
+}
+
 /// Calls visit(w1, L1, w2, L2) for adjacent intervals in which L changes by less than a fifth of
 /// its magnitude and less than half its distance from -1.
 template <class Response, class Visit>

@@ -69,6 +69,13 @@ class MarginFinder {
  public:
   explicit MarginFinder(const Response& response) : response_(response) {}
 
+  /// First: frequency zero, where L is real; nothing if it is not finite.
+  void at_zero(double l) {
+    if (!is_finite(l)) return;
+    real_axis(l, 0.0);
+    modulus_(distance(), 0.0, std::abs(1.0 + l));
+  }
+
   void operator()(double w1, std::complex<double> l1, double w2, std::complex<double> l2) {
     if (std::signbit(l1.imag()) != std::signbit(l2.imag()) &&
         std::min(l1.real(), l2.real()) < 0.0) {
@@ -82,9 +89,8 @@ class MarginFinder {
       const double shift = std::abs(std::arg(-response_(w)));
       if (!phase_ || shift < phase_->value) phase_ = Margin{shift, w};
     }
-    const auto size = [&](double x) { return std::abs(1.0 + response_(x)); };
-    if (!modulus_.found()) modulus_(size, w1, std::abs(1.0 + l1));
-    modulus_(size, w2, std::abs(1.0 + l2));
+    if (!modulus_.found()) modulus_(distance(), w1, std::abs(1.0 + l1));
+    modulus_(distance(), w2, std::abs(1.0 + l2));
   }
 
   /// Evaluates a point at which L crosses or touches the real axis.
@@ -103,6 +109,10 @@ class MarginFinder {
   }
 
  private:
+  [[nodiscard]] auto distance() const {
+    return [this](double w) { return std::abs(1.0 + response_(w)); };
+  }
+
   const Response& response_;
   std::optional<Margin> increase_, decrease_, phase_;
   LeastDistance modulus_;
@@ -124,9 +134,11 @@ inline Expected<Margins, Error<double>> margins(const Loop& loop, int channel = 
                detail::unstable_loop_rule);
   if (!rules) return rules.error();
   const auto response = detail::loop_gain_of(loop, channel);
+  const detail::ScanRange range = detail::scan_range(loop, channel);
   detail::MarginFinder finder(response);
-  detail::scan(response, detail::scan_range(loop, channel), finder);
-  // L is real at z = -1; at frequency zero it is infinite, because every observer integrates.
+  finder.at_zero(detail::loop_gain_at_zero(response, range));
+  detail::scan(response, range, finder);
+  // L is real at z = -1, too.
   if (loop.sample_time() > 0.0) {
     const double nyquist = std::numbers::pi / loop.sample_time();
     const std::complex<double> l = response.at(-2.0);
@@ -195,12 +207,16 @@ inline Expected<Margin, Error<double>> gain_variation(const Loop& loop, int chan
                           : std::numeric_limits<double>::infinity();
   };
   const auto size = [&](double w) { return sum_at(response(w)); };
+  const detail::ScanRange range = detail::scan_range(loop, channel);
   detail::LeastDistance least;
+  if (const double l = detail::loop_gain_at_zero(response, range); is_finite(l)) {
+    least(size, 0.0, sum_at(l));
+  }
   const auto look = [&](double w1, std::complex<double> l1, double w2, std::complex<double> l2) {
     if (!least.found()) least(size, w1, sum_at(l1));
     least(size, w2, sum_at(l2));
   };
-  detail::scan(response, detail::scan_range(loop, channel), look);
+  detail::scan(response, range, look);
   Margin sum = least.found().value_or(Margin{});
   if (loop.sample_time() > 0.0) {
     const double at_nyquist = sum_at(response.at(-2.0));
@@ -239,7 +255,12 @@ inline Expected<Margin, Error<double>> sensitivity_peak(const Loop& loop) {
     least(size, w2, size(w2));
   };
   for (int channel = 0; channel < loop.channels(); ++channel) {
-    detail::scan(detail::loop_gain_of(loop, channel), detail::scan_range(loop, channel), look);
+    const auto response = detail::loop_gain_of(loop, channel);
+    const detail::ScanRange range = detail::scan_range(loop, channel);
+    if (loop.channels() == 1 && is_finite(detail::loop_gain_at_zero(response, range))) {
+      least(size, 0.0, size(0.0));
+    }
+    detail::scan(response, range, look);
     least.restart();
   }
   return Margin{1.0 / least.found()->value, least.found()->frequency};

@@ -95,9 +95,10 @@ Expected<CheckedLoop<S>, Error<S>> check_loop(const LoopSettings<S>& settings, S
   }
   rules
       .require(1 <= divider && divider <= 1000, "measurement_divider", counted, "must be 1 .. 1000")
-      .require(divider <= max_gap, {"measurement_divider", counted,
-                                    "must not be above the observer's max_gap, which is", -1,
-                                    static_cast<S>(max_gap), true})
+      .require(
+          divider == 1 || divider <= max_gap,
+          {"measurement_divider", counted, "must not be above the observer's max_gap, which is", -1,
+           static_cast<S>(max_gap), true})
       .require(divider == 1 || bears_gaps, "measurement_divider", counted,
                "must be 1: regular gaps restart this observer");
   if (!rules) return rules.error();
@@ -162,25 +163,28 @@ class ControlLoop {
 
   /// Checks the settings.
   /// @param observer as returned by its `make`
+  /// @param watched the law is asked by its `in_general` at every sample
   /// @return the loop, with the observer in its present state, or an error that names the field
   static Expected<ControlLoop, Error<S>> make(const Observer& observer,
-                                              const LoopSettings<S>& settings) {
+                                              const LoopSettings<S>& settings,
+                                              bool watched = false) {
     if constexpr (PackScalar<S>) {
       return detail::make_lanes<ControlLoop>([&](int i) {
         return Plain::make(detail::get_lane<PlainObserver>(observer, i),
-                           detail::get_lane<LoopSettings<LaneScalar<S>>>(settings, i));
+                           detail::get_lane<LoopSettings<LaneScalar<S>>>(settings, i), watched);
       });
     } else {
       const auto checked = detail::check_loop(settings, observer.sample_time(), observer.max_gap(),
                                               observer_traits<Observer>.bears_regular_gaps);
       if (!checked) return checked.error();
-      return ControlLoop(observer, checked->limiter, settings, checked->hold_samples);
+      return ControlLoop(observer, checked->limiter, settings, checked->hold_samples, watched);
     }
   }
 
   /// One sample: the observer's update with the last output of this loop, then the law.
   /// @param measured measurement at sample k, NaN if missing
-  /// @param law () -> S, the requested u, computed from the new estimate
+  /// @param law () -> S, the requested u, computed from the new estimate. If it also has
+  ///        `in_general`, this is called instead in samples in which something is special
   /// @return u for k .. k+1
   template <class Law>
   ESOKIT_INLINE S step(S measured, Law&& law) noexcept {
@@ -272,6 +276,7 @@ class ControlLoop {
     // After a change of the divider the next update is one with a measurement.
     if (divider_ != fresh.divider_) phase_ = 0;
     divider_ = fresh.divider_;
+    watched_ = fresh.watched_;
     set_mode(detail::of_lane(mode_, 0));
     has_safe_input_ = fresh.has_safe_input_;
     stay_safe_ = fresh.stay_safe_;
@@ -322,11 +327,11 @@ class ControlLoop {
   static constexpr auto fields(auto& o) noexcept {
     return detail::tie(o.observer_, o.limiter_, o.requested_, o.hold_input_, o.safe_input_,
                        o.hold_left_, o.missing_limit_, o.divider_, o.phase_, o.mode_, o.special_,
-                       o.has_safe_input_, o.stay_safe_, o.status_, o.limits_);
+                       o.watched_, o.has_safe_input_, o.stay_safe_, o.status_, o.limits_);
   }
 
   ControlLoop(const Observer& observer, const Limiter<S>& limiter, const LoopSettings<S>& settings,
-              std::uint32_t hold_samples) noexcept
+              std::uint32_t hold_samples, bool watched) noexcept
       : observer_(observer),
         limiter_(limiter),
         hold_input_(settings.start_hold.input),
@@ -334,6 +339,7 @@ class ControlLoop {
         hold_left_(hold_samples),
         divider_(static_cast<std::uint16_t>(settings.measurement_divider)),
         mode_(hold_samples > 0 ? LoopMode::start_hold : LoopMode::running),
+        watched_(watched),
         has_safe_input_(settings.missing.input.has_value()),
         stay_safe_(settings.missing.stay) {
     missing_limit_ =
@@ -364,9 +370,18 @@ class ControlLoop {
   }
 
   template <class Law>
+  static S asked(Law& law) noexcept {
+    if constexpr (requires { law.in_general(); }) {
+      return law.in_general();
+    } else {
+      return law();
+    }
+  }
+
+  template <class Law>
   S put_out(Law&& law) noexcept {
     if constexpr (PackScalar<S>) {
-      S wanted = law();
+      S wanted = asked(law);
       if (mode_ != LoopMode::running) {
         for (int i = 0; i < lanes; ++i) {
           if (mode_[i] != LoopMode::running) wanted[i] = other_output(i);
@@ -374,7 +389,7 @@ class ControlLoop {
       }
       return limited(wanted);
     } else {
-      return limited(mode_ == LoopMode::running ? S(law()) : other_output(0));
+      return limited(mode_ == LoopMode::running ? S(asked(law)) : other_output(0));
     }
   }
 
@@ -394,6 +409,7 @@ class ControlLoop {
     phase_ = next_phase();
     const Lanes<int, S> missed = observer_.missed();
     status_ = observer_.update(measured, drive);
+    if (status_ == StepStatus::ok && mode_ == LoopMode::running) return;
     after_trouble(measured);
     for (int i = 0; i < lanes; ++i) {
       const bool as_planned = detail::of_lane(missed, i) == divider_ - 1;
@@ -455,7 +471,8 @@ class ControlLoop {
 
   void set_mode(LoopMode mode, int i = 0) noexcept {
     detail::of_lane(mode_, i) = mode;
-    detail::of_lane(special_, i) = mode != LoopMode::running || divider_ != 1;
+    detail::of_lane(special_, i) =
+        mode != LoopMode::running || divider_ != 1 || detail::of_lane(watched_, i);
   }
 
   [[nodiscard]] std::uint16_t next_phase() const noexcept {
@@ -472,6 +489,7 @@ class ControlLoop {
   std::uint16_t divider_;
   std::uint16_t phase_ = 0;
   Lanes<LoopMode, S> mode_;
+  Lanes<bool, S> watched_{false};
   /// True if anything besides the law has to be done: one test in the hot path.
   Lanes<bool, S> special_{false};
   bool has_safe_input_;

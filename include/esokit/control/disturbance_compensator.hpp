@@ -163,6 +163,8 @@ class DisturbanceCompensator {
   [[nodiscard]] const S& output() const noexcept { return loop_.output(); }
   /// u0 + K dhat before the limits.
   [[nodiscard]] const S& requested() const noexcept { return loop_.requested(); }
+  /// The limits of u.
+  [[nodiscard]] const Limiter<S>& limiter() const noexcept { return loop_.limiter(); }
   /// Status of the observer at the last sample.
   [[nodiscard]] StatusOf<S> status() const noexcept { return loop_.status(); }
   /// Whether u is determined by u0 + K dhat, the start hold or the rule for missing measurements.
@@ -211,10 +213,20 @@ class DisturbanceCompensator<Observer>
                         DisturbanceCompensator<detail::LaneOf<Observer>>,
                         typename Observer::scalar_type, DisturbanceCompensatorConfig<Observer>> {
  public:
-  using DisturbanceCompensator::LaneByLane::LaneByLane;
+  /// What it can do beyond `update(y, r)`.
+  static constexpr ControllerTraits traits =
+      DisturbanceCompensator<detail::LaneOf<Observer>>::traits;
   template <class T>
   using with_scalar =
       DisturbanceCompensator<detail::WithScalar<Observer, T>>;  ///< the same with another scalar
+
+  using DisturbanceCompensator::LaneByLane::LaneByLane;
+
+  /// The observer, put together from the lanes.
+  [[nodiscard]] Observer observer() const noexcept {
+    return this->template gathered<Observer>(
+        [](const auto& lane) -> const auto& { return lane.observer(); });
+  }
 };
 
 /// Distinguishes the type in snapshots.

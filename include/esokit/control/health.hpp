@@ -19,7 +19,8 @@ template <PlainScalar S = double>
 struct HealthConfig {
   S observer_bandwidth{};  ///< omega_o, rad/s: magnitude of the observer's poles, or their mean
   S sample_time{};         ///< T, s
-  S input_range{};         ///< half the range between the limits, unit of u
+  S input_range{};         ///< half the range between the limits of the actuator, unit of u; keep
+                           ///< it if you narrow the limits of the loop
   S noise{};     ///< standard deviation of the noise of y, unit of y; 0: unknown, no check of the
                  ///< innovation
   S memory = 1;  ///< s: time constant with which old samples are forgotten
@@ -36,11 +37,15 @@ struct Health {
   std::uint32_t gated = 0;     ///< samples under less than full trust, see Guarded
   std::uint32_t unsafe = 0;    ///< samples with u not determined by the law: start hold, safe mode
   S saturated{};               ///< share of samples at a limit, of magnitude or rate
+  S side{};                    ///< share of samples at the upper limit, minus that at the lower
   S bounded{};                 ///< share of samples with dhat at its bound, see Guarded
   S innovation{};              ///< rms, unit of y
   S innovation_of_noise{};     ///< rms that the noise alone would cause; 0 if unknown
   S gain_ratio = 1;            ///< rho: estimate of b / b0, see HealthMonitor
+  S response = 1;              ///< rms of y^(n) over that of phi, see HealthMonitor
   S evidence{};                ///< omega_o times the time in which u moved enough to estimate rho
+  S opposed{};  ///< omega_o times the time for which u has been near a limit and y^(n) been
+                ///< against it
 };
 
 /// The likely fault of a loop, the worst first.
@@ -56,14 +61,16 @@ enum class LoopFault : unsigned char {
                                 ///< u
 };
 
-/// Limits of `diagnose`. Those of rho were tested on 1,000 servos with each fault and 5,000 healthy
-/// ones, see examples/guards.
+/// Limits of `diagnose`. They were tested on simulated drives with each fault and healthy ones, see
+/// examples/guards.
 struct HealthLimits {
-  double wrong_sign = -0.3;     ///< rho below it
-  double too_small = 3;         ///< rho above it
-  double too_large = 0.25;      ///< rho below it; only a hint, because a load has the same effect
-  double evidence = 5;          ///< omega_o times time; with less, rho does not tell the sign
-  double evidence_of_more = 3;  ///< the same for a b0 that is too small, which is visible sooner
+  double opposed = 4;            ///< omega_o times time; with rho below 0, b0 has the wrong sign
+  double wrong_sign = -0.5;      ///< rho below it for evidence_of_sign: the same in other motions
+  double evidence_of_sign = 50;  ///< omega_o times time: a load can make rho negative for shorter
+  double response = 2.5;         ///< of a u that moves between its limits: b0 is too small
+  double too_small = 3;          ///< rho above it: the same in other motions
+  double too_large = 0.25;       ///< rho below it; only a hint, because a load has the same effect
+  double evidence = 5;           ///< omega_o times time, for the last three
 };
 
 /// The likely fault. @param health result of a monitor
@@ -71,9 +78,21 @@ template <PlainScalar S>
 [[nodiscard]] constexpr LoopFault diagnose(const Health<S>& health,
                                            const HealthLimits& limits = {}) noexcept {
   const auto rho = static_cast<double>(health.gain_ratio);
-  const bool told = static_cast<double>(health.evidence) >= limits.evidence;
-  if (told && rho < limits.wrong_sign) return LoopFault::wrong_sign;
-  if (static_cast<double>(health.evidence) >= limits.evidence_of_more && rho > limits.too_small) {
+  const auto response = static_cast<double>(health.response);
+  const auto evidence = static_cast<double>(health.evidence);
+  const auto opposed = static_cast<double>(health.opposed);
+  // An old rho is no evidence.
+  if ((rho < 0 && evidence >= 1 && opposed >= limits.opposed) ||
+      (rho < limits.wrong_sign && evidence >= limits.evidence_of_sign)) {
+    return LoopFault::wrong_sign;
+  }
+  const auto saturated = static_cast<double>(health.saturated);
+  const auto side = static_cast<double>(health.side);
+  const bool swings = saturated > 0.05 && detail::absolute(side) < 0.8 * saturated;
+  // A lag delays y^(n): by up to 75 degrees here.
+  const bool told = evidence >= limits.evidence;
+  if (told &&
+      (rho > limits.too_small || (swings && response > limits.response && rho > response / 4))) {
     return LoopFault::gain_too_small;
   }
   if (health.rejected > 10 && health.rejected > health.samples / 10) {
@@ -109,15 +128,27 @@ constexpr const auto& in_adapters(const Observer& observer) noexcept {
 ///
 ///     rho = 1 + sum phi psi / sum phi^2,   psi = dhat, both high-passed at omega_o / 3
 ///
-/// is b / b0 if u moves because of a reference or noise. If u reacts to a load, dhat is -phi and
-/// rho tends to 0: so a small rho alone proves nothing. rho is negative only if the sign of b0 is
-/// wrong. A sample counts if abs(phi) is above 2 % of b0 times the input range and above the noise
-/// of dhat, the law determines u and no guard gates dhat. The sums forget with the time constant
-/// `memory`.
+/// is b / b0 if u moves because of a reference. If u reacts to a load, dhat is -phi and rho tends
+/// to 0: so a small rho alone proves nothing. Nor does a negative one: u reacts to a load late, and
+/// lags, friction and noise add to that, so that a load step on a healthy loop makes rho negative
+/// for a while. A sample counts if abs(phi) is above 2 % of b0 times the input range and above the
+/// noise of dhat, its measurement is good, the law determines u and no guard gates or bounds dhat.
+/// The sums forget with the time constant `memory`.
 ///
-/// A larger margin above the noise would miss the most important fault: if b0 is too small, the
-/// loop oscillates at 1.6 omega_o, where the poles attenuate phi to a fifth, but dhat is ten times
-/// as large. Noise to which u reacts lowers rho, so it cannot cause this alarm.
+/// Two rules for the sign therefore ask for more. Where u comes from a loop, a wrong sign drives it
+/// to a limit, where it stays. `opposed` is the time for which both phi and phi delayed by
+/// 3 / omega_o are beyond 0.9 of the way to a limit, and y^(n) = phi + dhat has the other sign:
+/// phi and dhat are filtered by poles that weigh the past by positive numbers, so with the right
+/// sign and a lag below this delay only a load above about 0.9 of what the actuator can do keeps
+/// y^(n) there. Such a load does not make rho negative by itself. If u is not at a limit, for
+/// example in manual operation, rho has to be below -0.5 for long. (Where dhat is at its bound, the
+/// sign of the innovation stands for that of y^(n).) A machine that runs into a stop before both
+/// are true is not found, and one that bounces between stops may be named wrongly.
+///
+/// A lag reduces rho: if b0 is too small, the loop oscillates at about omega_o, where a lag of
+/// 3 / omega_o attenuates y^(n) to a third and delays it by 70 degrees. `response`, the ratio of
+/// the rms of y^(n) and phi, both high-passed, does not depend on that delay. A load raises it,
+/// too: it tells of b0 only in a loop that moves u between both limits.
 ///
 /// With a model (ModelEso) psi is d only, and with an actuator's lag phi is b0 v, from the
 /// simulated output of the actuator.
@@ -185,10 +216,17 @@ class HealthMonitor {
     S innovation{};
     if constexpr (requires { observer.innovation(); }) innovation = observer.innovation();
     const bool runs = controller.mode() == LoopMode::running;
+    const StepStatus status = controller.status();
+    const bool rejected =
+        has(status, StepStatus::measurement_rejected) || has(status, StepStatus::outlier_rejected);
     const S beyond = controller.requested() - controller.output();
     const S hair = static_cast<S>(1e-4) * range_;
-    count(controller.status(), runs, gated, bounded, runs && (beyond > hair || beyond < -hair),
-          innovation);
+    const int above = beyond > hair ? 1 : 0;
+    const int below = beyond < -hair ? 1 : 0;
+    count(status, rejected, runs, gated, bounded, runs ? above - below : 0);
+    if (observer.missed() == 0 && !rejected) average(innovation);
+    lost_ = lost_ || rejected;
+    free_ = free_ && runs && !gated;
     phi_sum_ = phi_sum_ + b * observer.applied_input();
     if (++phase_ < divider_) return;
     phase_ = 0;
@@ -199,8 +237,21 @@ class HealthMonitor {
       psi = model.disturbance(z);
       if constexpr (lag > 0) phi = model.delivered(z);
     }
-    regress(phi, psi, detail::absolute(b), runs && !gated);
     phi_sum_ = S(0);
+    // Between measurements dhat is as old as the last one.
+    const bool lost = lost_ || observer.missed() >= divider_;
+    const bool free = free_;
+    lost_ = false;
+    free_ = true;
+    const S range = detail::absolute(b) * range_;
+    if (!filter(phi, psi, range)) return;
+    if (!free) health_.opposed = S(0);
+    if (!free || lost) {
+      forget();
+      return;
+    }
+    oppose(b * middle(controller.limiter()), psi, bounded, range, innovation);
+    regress(range, !bounded);
   }
 
   /// The counters and estimates.
@@ -271,34 +322,47 @@ class HealthMonitor {
     if (!is_finite(least_)) least_ = S(0);
   }
 
-  void count(StepStatus status, bool runs, bool gated, bool bounded, bool saturated,
-             const S& innovation) noexcept {
+  void count(StepStatus status, bool rejected, bool runs, bool gated, bool bounded,
+             int limit) noexcept {
     ++health_.samples;
-    if (has(status, StepStatus::measurement_rejected) ||
-        has(status, StepStatus::outlier_rejected)) {
-      ++health_.rejected;
-    }
+    if (rejected) ++health_.rejected;
     if (has(status, StepStatus::gap_bridged) || has(status, StepStatus::restarted)) {
       ++health_.bridged;
     }
     if (gated) ++health_.gated;
     if (!runs) ++health_.unsafe;
-    const auto share = [this](S& of, bool now) { of = of + weight_ * ((now ? S(1) : S(0)) - of); };
-    share(health_.saturated, saturated);
-    share(health_.bounded, bounded);
+    const auto share = [this](S& of, int now) { of = of + weight_ * (static_cast<S>(now) - of); };
+    share(health_.saturated, limit != 0 ? 1 : 0);
+    share(health_.side, limit);
+    share(health_.bounded, bounded ? 1 : 0);
+  }
+
+  void average(const S& innovation) noexcept {
     const S square = innovation * innovation;
     // A single absurd sample must not make the mean infinite.
-    if (is_finite(square) && square < largest_square()) {
-      mean_square_ = mean_square_ + weight_ * (square - mean_square_);
-    }
+    if (!is_finite(square) || !(square < largest_square())) return;
+    mean_square_ = mean_square_ + weight_ * (square - mean_square_);
     health_.innovation = std::sqrt(mean_square_);
   }
+
+  static constexpr S larger(const S& a, const S& b) noexcept { return a < b ? b : a; }
 
   static constexpr S largest_square() noexcept {
     return (std::numeric_limits<S>::max)() * static_cast<S>(1e-6);
   }
 
-  void regress(const S& phi, const S& psi, const S& b, bool counts) noexcept {
+  /// The u in the middle between the limits; if they are further apart, the nearest to zero that
+  /// keeps the range from them.
+  [[nodiscard]] S middle(const Limiter<S>& limiter) const noexcept {
+    const S lowest = limiter.lower() + range_;
+    const S highest = limiter.upper() - range_;
+    return lowest > S(0) ? lowest : highest < S(0) ? highest : S(0);
+  }
+
+  /// phi by the poles of the observer, and the slow means.
+  /// @return false for what no real u or plant causes: the sums would remember it for long
+  bool filter(const S& phi, const S& psi, const S& range) noexcept {
+    const S most = S(1000) * range;
     S filtered = phi;
     for (S& stage : stages_) {
       stage = filtered + pole_ * (stage - filtered);
@@ -306,25 +370,51 @@ class HealthMonitor {
     }
     slow_phi_ = slow_phi_ + slow_ * (filtered - slow_phi_);
     slow_psi_ = slow_psi_ + slow_ * (psi - slow_psi_);
-    const S x = filtered - slow_phi_;
-    const S y = psi - slow_psi_;
-    const S xx = x * x;
-    const S xy = x * y;
-    const S most = S(1000) * b * range_;
-    if (!(detail::absolute(x) < most && detail::absolute(y) < most) || !is_finite(xx + xy)) {
-      // No real u or plant causes this. The sums start again, because they would remember it for
-      // long.
-      for (S& stage : stages_) stage = S(0);
-      slow_phi_ = slow_psi_ = sum_xx_ = sum_xy_ = S(0);
-      return;
+    phi_ = filtered;
+    x_ = filtered - slow_phi_;
+    y_ = psi - slow_psi_;
+    if (detail::absolute(x_) < most && detail::absolute(y_) < most &&
+        is_finite(x_ * x_ + y_ * y_ + sum_xx_ + sum_aa_)) {
+      return true;
     }
-    const S size = detail::absolute(x);
-    const bool tells = counts && size > static_cast<S>(0.02) * b * range_ && size > least_;
-    sum_xx_ = forget_ * sum_xx_ + (tells ? xx : S(0));
-    sum_xy_ = forget_ * sum_xy_ + (tells ? xy : S(0));
-    health_.evidence = forget_ * health_.evidence + (tells ? step_ : S(0));
+    for (S& stage : stages_) stage = S(0);
+    slow_phi_ = slow_psi_ = sum_xx_ = sum_xy_ = sum_aa_ = health_.opposed = S(0);
+    return false;
+  }
+
+  /// Counts the time for which y^(n) is against u near its limit. @param middle b0 u between them
+  void oppose(const S& middle, const S& psi, bool bounded, const S& range,
+              const S& innovation) noexcept {
+    const S end = static_cast<S>(0.9) * range;
+    const S now = phi_ - middle;
+    const S late = slow_phi_ - middle;
+    const S side = now > end && late > end ? S(1) : now < -end && late < -end ? S(-1) : S(0);
+    const S against = -side * (bounded ? innovation : phi_ + psi);
+    const S least = bounded ? S(0) : larger(static_cast<S>(0.02) * range, S(3) * least_);
+    health_.opposed = against > least ? health_.opposed + step_ : S(0);
+  }
+
+  void forget() noexcept {
+    sum_xx_ = forget_ * sum_xx_;
+    sum_xy_ = forget_ * sum_xy_;
+    sum_aa_ = forget_ * sum_aa_;
+    health_.evidence = forget_ * health_.evidence;
+  }
+
+  void regress(const S& range, bool counts) noexcept {
+    forget();
+    const S size = detail::absolute(x_);
+    if (!counts || !(size > static_cast<S>(0.02) * range && size > least_)) return;
+    sum_xx_ = sum_xx_ + x_ * x_;
+    sum_xy_ = sum_xy_ + x_ * y_;
+    const S a = x_ + y_;
+    sum_aa_ = sum_aa_ + a * a;
+    health_.evidence = health_.evidence + step_;
     const S quotient = sum_xy_ / sum_xx_;
-    if (sum_xx_ > S(0) && is_finite(quotient)) health_.gain_ratio = S(1) + quotient;
+    const S square = sum_aa_ / sum_xx_;
+    if (!is_finite(quotient) || !is_finite(square)) return;
+    health_.gain_ratio = S(1) + quotient;
+    health_.response = std::sqrt(square);
   }
 
   S range_;
@@ -342,6 +432,12 @@ class HealthMonitor {
   S slow_psi_{};
   S sum_xx_{};
   S sum_xy_{};
+  S sum_aa_{};
+  S phi_{};            ///< filtered
+  S x_{};              ///< and high-passed
+  S y_{};              ///< psi, high-passed
+  bool lost_ = false;  ///< a measurement since the last sum
+  bool free_ = true;   ///< the law determined u since then, and no guard dhat
   S mean_square_{};
   Health<S> health_{};
 };

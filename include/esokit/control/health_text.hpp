@@ -23,15 +23,14 @@ struct Advice {
     case LoopFault::wrong_sign:
       return {
           "A larger u moves y in the opposite direction to b0: the sign of b0, of the sensor or of "
-          "the "
-          "wiring is wrong.",
-          "Set the output to its safe value, change the sign of input_gain, and try again with "
-          "narrow limits."};
+          "the wiring is wrong (or a load is stronger than the actuator).",
+          "Set the output to its safe value; if no such load is there, change the sign of "
+          "input_gain, and try again with narrow limits."};
     case LoopFault::gain_too_small:
       return {
           "u has several times the effect that b0 predicts: b0 is too small, or in other units.",
-          "Set the output to its safe value, multiply input_gain by the gain ratio found, and "
-          "check the units of u."};
+          "Set the output to its safe value, multiply input_gain by at least the response found, "
+          "and check the units of u."};
     case LoopFault::measurements_rejected:
       return {"Many measurements are outliers or not finite.",
               "Look at the sensor, its bus and its range; widen the outlier gate if the values are "

@@ -72,14 +72,6 @@ concept Retunable = requires(T& object, const T& fresh, const typename T::Config
   object.adopt(fresh);
 };
 
-/// Base of every LaneByLane, by which goes_lane_by_lane finds it.
-struct GoesLaneByLane {};
-
-/// Whether an observer or controller of packs consists of plain ones. An adapter around such a type
-/// must be lane by lane, too.
-template <class T>
-inline constexpr bool goes_lane_by_lane = std::is_base_of_v<GoesLaneByLane, T>;
-
 }  // namespace detail
 
 /// Defines member functions of this name that call those of `Plain` in each lane.

@@ -130,6 +130,14 @@ struct LaneAccess {
   }
 };
 
+/// Base of every LaneByLane, by which goes_lane_by_lane finds it.
+struct GoesLaneByLane {};
+
+/// Whether an observer or controller of packs consists of plain ones. An adapter around such a type
+/// must be lane by lane, too.
+template <class T>
+inline constexpr bool goes_lane_by_lane = std::is_base_of_v<GoesLaneByLane, T>;
+
 /// A std::array or a Matrix.
 template <class T>
 concept HoldsElements = requires(T& elements) {
@@ -200,13 +208,13 @@ constexpr void set_lane(Packed& packed, const Plain& plain, int i) noexcept {
   copy_lane<true>(packed, plain, i);
 }
 
-/// Object with the scalar T.
+/// Object with the scalar T. Without a `type` if it has no such form: then no alias made of it has
+/// one, and what prefers packs does without them.
 template <class Object, class T>
-struct WithScalarOf {
-  static_assert(
-      requires { typename Object::template with_scalar<T>; },
-      "esokit: a type for packs needs `template <class T> using with_scalar`, the type with "
-      "another scalar, and `fields(object)`, its members");
+struct WithScalarOf {};
+template <class Object, class T>
+requires requires { typename Object::template with_scalar<T>; }
+struct WithScalarOf<Object, T> {
   using type = typename Object::template with_scalar<T>;
 };
 template <class Object, class T>
@@ -218,6 +226,10 @@ struct PlainTwinOf {
 };
 template <class Object, PackScalar S>
 struct PlainTwinOf<Object, S> {
+  static_assert(
+      requires { typename Object::template with_scalar<LaneScalar<S>>; },
+      "esokit: a type for packs needs `template <class T> using with_scalar`, the type with "
+      "another scalar, and `fields(object)`, its members");
   using type = WithScalar<Object, LaneScalar<S>>;
 };
 

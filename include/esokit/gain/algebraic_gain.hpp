@@ -23,6 +23,7 @@
 #include <esokit/core/check.hpp>
 #include <esokit/core/lanes.hpp>
 #include <esokit/core/type_tag.hpp>
+#include <esokit/gain/bridged_steps.hpp>
 #include <esokit/gain/gain_law.hpp>
 #include <esokit/gain/sampled_gain.hpp>
 #include <limits>
@@ -141,6 +142,14 @@ class AlgebraicGain {
       const S now = a + (S(1.0) - a) * (size_bracket_ * std::get<0>(ratios_u_));
       return esokit::gap_gain<Size, S>(EqualSampledPoles<Size, S>{now}, samples);
     }
+  }
+
+  /// The largest number of missing samples, at most `asked`, up to which errors decay in any
+  /// sequence of gaps once the schedule has settled.
+  [[nodiscard]] constexpr int longest_gap(int asked) const noexcept requires(!PackScalar<S>) {
+    const int longest =
+        detail::longest_step<Size, detail::equal_steps>(S(S(1.0) - final_poles_.contraction));
+    return asked < longest ? asked : longest - 1;
   }
 
   /// Samples since the schedule began; the count stops when it settles.

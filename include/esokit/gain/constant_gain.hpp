@@ -74,6 +74,17 @@ class ConstantGain {
     }
   }
 
+  /// The largest number of missing samples, at most `asked`, up to which errors decay in any
+  /// sequence of gaps.
+  [[nodiscard]] constexpr int longest_gap(int asked) const noexcept requires(!PackScalar<S>) {
+    if constexpr (requires { Placement::template longest_step<Size, S>(poles_); }) {
+      const int longest = Placement::template longest_step<Size, S>(poles_);
+      return asked < longest ? asked : longest - 1;
+    } else {
+      return 0;
+    }
+  }
+
  private:
   friend struct detail::LaneAccess;
   static constexpr auto fields(auto& o) noexcept { return detail::tie(o.gain_, o.poles_); }
@@ -89,6 +100,18 @@ class ModelGain;  // gain/model_gain.hpp, to be included with a model other than
 
 template <int Size, Scalar S, class Placement = EqualPoles, int Count = 9, int MostBridged = 16>
 class ScheduledGain;  // gain/scheduled_gain.hpp, with a model that follows a speed
+
+namespace detail {
+
+/// Gap that is bridged by a law with varying gains, which has the gap gain of `linear`: half the
+/// step.
+template <class Linear>
+constexpr int half_gap(const Linear& linear, int asked) noexcept {
+  const int step = (linear.longest_gap(most_bridged) + 1) / 2;
+  return asked < step ? asked : (step > 1 ? step - 1 : 0);
+}
+
+}  // namespace detail
 
 /// The constant gain law for a model: ConstantGain for the chain, else ModelGain or ScheduledGain.
 template <class Model, int Size, Scalar S, class Placement>

@@ -41,8 +41,10 @@ struct GainLawTraits {
   bool resets = false;
 
   /// `gap_gain(e, samples) const`: the gain if `samples` (unsigned) > 1 sample times have passed
-  /// since the last correction. Without it `gain(e)` is used: a constant gain then diverges in
-  /// recurring gaps. A law that follows time in `advance()` does not need this hook.
+  /// since the last correction, and `longest_gap(asked) const`: how many missing samples the law
+  /// bridges, at most `asked`, so that errors decay in any sequence of gaps; after more the
+  /// observer restarts. Without them `gain(e)` is used: a constant gain then diverges in recurring
+  /// gaps. A law that follows time in `advance()` does not need these hooks.
   bool bridges_gaps = false;
 
   /// `gain(e)` may be called with an e that is not finite (the result is then not used); this saves
@@ -87,10 +89,16 @@ template <class Law, class S>
 concept Accepts = noexcept(std::declval<Law&>().accept(std::declval<const S&>()));
 template <class Law>
 concept Resets = noexcept(std::declval<Law&>().reset());
+template <class Law>
+concept LimitsGaps = requires(const Law& law) {
+  { law.longest_gap(1) } -> std::same_as<int>;
+  requires noexcept(law.longest_gap(1));
+};
 template <class Law, int Size, class S>
 concept BridgesGaps = requires(const Law& law, const S& e, unsigned samples) {
   { law.gap_gain(e, samples) } -> GainOf<Size, S>;
   requires noexcept(law.gap_gain(e, samples));
+  requires PackScalar<S> || LimitsGaps<Law>;
 };
 template <class Law, int Size, class S>
 concept Preset = requires(const Law& law) {
@@ -112,6 +120,15 @@ concept Factored = requires(const Law& law, const S& e) {
   requires noexcept(law.linear_gain())&& noexcept(law.factor(e));
 };
 
+/// Missing samples that all laws bridge, at most `asked`.
+template <class Laws>
+constexpr int bridged_gap(const Laws& laws, int asked) noexcept {
+  if constexpr (gain_law_traits<typename Laws::value_type>.bridges_gaps) {
+    for (const auto& law : laws) asked = law.longest_gap(asked);
+  }
+  return asked;
+}
+
 }  // namespace detail
 
 /// `advance()` exists, noexcept, if and only if `traits.advances` declares it.
@@ -129,7 +146,8 @@ template <class Law>
 concept ResetsAsDeclared = detail::as_declared(gain_law_traits<Law>.resets,
                                                detail::names_reset<Law>, detail::Resets<Law>);
 
-/// `gap_gain(e, samples) const` exists, noexcept, if and only if `traits.bridges_gaps` declares it.
+/// `gap_gain(e, samples) const` and `longest_gap(asked) const` exist, noexcept, if and only if
+/// `traits.bridges_gaps` declares them.
 template <class Law, int Size, class S>
 concept BridgesGapsAsDeclared = detail::as_declared(gain_law_traits<Law>.bridges_gaps,
                                                     detail::names_gap_gain<Law>,

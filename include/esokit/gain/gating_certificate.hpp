@@ -9,6 +9,15 @@
 /// because a disturbance that is not corrected stays. If the disturbance leaks, that is, is
 /// multiplied by 1 - a after each correction, both polynomials p become (1 - a) p + a z p_m, where
 /// p_m is that of all gains but the last; the root at z = 1 moves to 1 - a.
+///
+/// Between two holds of the plant (y, 0, .., 0 is known then, so that only the disturbance is in
+/// error) more can be said. Let e be its error and h(j) the answer of the innovation to an e of one
+/// sample, while nothing corrects e; so the innovation is sum_j h(j) e(k - j), and e moves by at
+/// most r = k sum |h| in a sample if abs(e) was never above 1. To pass -1 for the first time e
+/// needs a positive innovation while it is at -1, hence was at most min(1, r j - 1) j samples
+/// before. If sum h+(j) min(1, r j - 1) + h-(j) is below zero, with h+ - h- = h, that cannot be,
+/// whatever phi(k) in [0, 1]: an error is never larger than at the hold before, and nothing can
+/// grow over any number of holds.
 #pragma once
 
 #include <cmath>
@@ -78,6 +87,18 @@ struct ConstantLevel {
   Array<S, Size> row{};        ///< the constant is `row` x
   Array<S, Size> column{};     ///< change of x with the constant
 
+  /// That of a chain with one extended state.
+  explicit ConstantLevel(const ScaledGain<Size, S>& of_chain) : gain(of_chain) {
+    constexpr auto& binomials = binomial_table<Size, TableScalar<S>>;
+    for (std::size_t i = 0; i < Size; ++i) {
+      for (std::size_t j = 0; j < Size; ++j) {
+        step(static_cast<int>(i), static_cast<int>(j)) = j > i ? S(binomials[j][i]) : S(0.0);
+      }
+      ahead[i] = S(1.0);
+      row[i] = column[i] = S(i + 1 == Size ? 1.0 : 0.0);
+    }
+  }
+
   template <int Whole, int Pairs, class Model>
   ConstantLevel(const CorrectedPart<Size, Whole, Pairs, S>& part, const Model& model,
                 const ScaledGain<Whole, S>& of_model)
@@ -99,10 +120,16 @@ struct ConstantLevel {
     }
   }
 
-  /// A - I of the error dynamics with correction and leak. @param trust phi @param leak a
-  [[nodiscard]] Matrix<S, Size, Size> error(const S& trust, const S& leak) const {
+  /// The correction of the constant by an innovation of one.
+  [[nodiscard]] S correction() const {
     S found(0.0);
     for (std::size_t i = 0; i < Size; ++i) found = found + row[i] * gain[i];
+    return found;
+  }
+
+  /// A - I of the error dynamics with correction and leak. @param trust phi @param leak a
+  [[nodiscard]] Matrix<S, Size, Size> error(const S& trust, const S& leak) const {
+    const S found = correction();
     auto all = step;
     for (std::size_t i = 0; i < Size; ++i) {
       const S k = gain[i] - (S(1.0) - trust) * found * column[i];
@@ -157,6 +184,107 @@ template <int Size, Scalar S>
   const auto product = detail::half_plane_product<Size, S>(p, q);
   return leak > S(0.0) ? positive_on_half_line<Size, S>(product)
                        : detail::positive_but_at_standstill<Size, S>(product);
+}
+
+/// What is proven of a plant that is held and released, see `holding`.
+struct Holding {
+  bool stable = false;  ///< under full trust the error of the disturbance never grows
+  int settling = 0;     ///< samples after a release in which corrections of the disturbance must
+                        ///< either all count or, from one on, none; 0: any factors are proven
+};
+
+namespace detail {
+
+/// The error after a hold, sample by sample: `of` the innovation and of the disturbance.
+template <int Size, Scalar S>
+struct ErrorAfterHold {
+  static constexpr int steps = 512;
+  Array<S, steps> change{};  ///< of the innovation, times the gain of the disturbance, in a step
+  S all = S(0.0);            ///< sum of their magnitudes
+  S largest = S(0.0);        ///< error of the disturbance, for 1 at first
+  int length = 1;            ///< of a step, in samples
+  int settled = 0;           ///< samples; 0: it does not settle
+
+  /// @param trust phi, the same at every sample
+  ErrorAfterHold(const ConstantLevel<Size, S>& level, const S& trust) {
+    auto error = level.error(trust, S(0.0));
+    const S gain = level.correction();
+    for (; length < 1 << 20; length *= 2) {
+      play(level, error, gain);
+      if (!is_finite(all)) return;
+      S left(0.0);
+      int last = steps;
+      while (last > 0 && !(left > S(0.001) * all)) left = left + absolute(change[index(--last)]);
+      if (2 * last < steps) {
+        settled = (last + 1) * length;
+        return;
+      }
+      error = error * S(2.0) + error * error;  // A^2 - I of A - I
+    }
+  }
+
+ private:
+  static constexpr std::size_t index(int i) noexcept { return static_cast<std::size_t>(i); }
+
+  void play(const ConstantLevel<Size, S>& level, const Matrix<S, Size, Size>& error,
+            const S& gain) {
+    auto x = level.column;
+    S before(0.0);
+    all = largest = S(0.0);
+    for (S& moved : change) {
+      S innovation(0.0);
+      S disturbance(0.0);
+      for (std::size_t j = 0; j < Size; ++j) {
+        innovation = innovation + level.ahead[j] * x[j];
+        disturbance = disturbance + level.row[j] * x[j];
+      }
+      moved = gain * (innovation - before);
+      before = innovation;
+      all = all + absolute(moved);
+      if (absolute(disturbance) > largest) largest = absolute(disturbance);
+      const auto now = x;
+      for (std::size_t r = 0; r < Size; ++r) {
+        for (std::size_t j = 0; j < Size; ++j) {
+          x[r] = x[r] + error(static_cast<int>(r), static_cast<int>(j)) * now[j];
+        }
+      }
+    }
+  }
+};
+
+/// The argument at the head of this file.
+template <int Size, Scalar S>
+bool never_grows(const ErrorAfterHold<Size, S>& frozen, bool leaks) {
+  S positive(0.0);
+  S sum(0.0);
+  S highest = S(-1.0);  // min(1, r j - 1)
+  for (const S& moved : frozen.change) {
+    if (moved > S(0.0)) positive = positive + moved;
+    sum = sum + (moved > S(0.0) ? moved * highest : S(-moved));
+    if (sum > S(0.0)) return false;
+    highest = highest + frozen.all * S(static_cast<double>(frozen.length));
+    // A leak takes an error above zero faster to zero.
+    if (highest > S(1.0) || (leaks && highest > S(0.0))) highest = S(1.0);
+  }
+  return positive <= S(1.0) && sum < S(-0.01) * frozen.all;
+}
+
+}  // namespace detail
+
+/// What holds and releases of the plant do to the error of the disturbance, see the head of this
+/// file. Where the argument there fails (slow sines), the common Lyapunov function V of
+/// `gating_certified` says: among all errors with the same error of the disturbance V is least for
+/// the one to which an uncorrected observer settles. So if nothing is corrected until this has
+/// settled, whatever follows cannot take the error of the disturbance beyond its value then.
+/// @param level the level, which is gating_certified @param leaks whether the constant leaks
+template <int Size, Scalar S>
+[[nodiscard]] Holding holding(const detail::ConstantLevel<Size, S>& level, bool leaks) {
+  const detail::ErrorAfterHold<Size, S> frozen(level, S(0.0));
+  if (frozen.settled > 0 && detail::never_grows(frozen, leaks)) return {true, 0};
+  const detail::ErrorAfterHold<Size, S> trusted(level, S(1.0));
+  const bool settles = frozen.settled > 0 && trusted.settled > 0;
+  return {settles && trusted.largest <= S(1.0) + S(8.0 * Size) * detail::rounding<S>(),
+          frozen.settled > trusted.settled ? frozen.settled : trusted.settled};
 }
 
 }  // namespace esokit

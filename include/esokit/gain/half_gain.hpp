@@ -112,6 +112,15 @@ struct HalfGainPoles : BandwidthPlacement {
     return poles;
   }
 
+  /// The longest step after which errors decay in any sequence of steps, in samples.
+  template <int Size, PlainScalar S>
+  static constexpr int longest_step(const SampledPolePairs<Size, S>& poles) noexcept {
+    // All poles have the magnitude exp(-omega_o T / 2).
+    const auto& [real, imaginary] = poles.pairs[0];
+    return detail::longest_step<Size, detail::half_gain_steps>(
+        S((S(1) - real) * (S(1) - real) + imaginary * imaginary));
+  }
+
   /// Exactly half the gain of the bandwidth parameterisation. @return l, N x 1, row i in 1/s^(i+1)
   template <int Size, PlainScalar S>
   static Vector<S, Size> gain(const S& bandwidth) {

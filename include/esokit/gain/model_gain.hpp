@@ -6,6 +6,7 @@
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/constant_gain.hpp>
 #include <esokit/gain/gain_law.hpp>
+#include <esokit/gain/gap_certificate.hpp>
 #include <esokit/gain/model_placement.hpp>
 #include <esokit/gain/placement.hpp>
 #include <esokit/gain/riccati.hpp>
@@ -39,7 +40,7 @@ struct PartDesign {
     const S got = decay(corrected(step, output, gains[0]), units);
     if (!all(got >= S(0.5) * poles.decay) && !all(got >= S(2.3))) return;
     longest_step = 1;
-    find_gap_gains(step, output, units, S(S(0.01) * got));
+    find_gap_gains(step, output, units, got);
   }
 
  private:
@@ -104,47 +105,75 @@ struct PartDesign {
     return -radius;
   }
 
-  void find_gap_gains(const Square& step, const Array<S, Size>& output, const Array<S, Size>& units,
-                      const S& least_decay) {
-    // P_1, the stationary covariance with the gain k and measurement noise only: P_1 = A P_1 A' +
-    // (Phi k) (Phi k)', A = Phi (I - k C).
-    Square phi = step;
-    for (int i = 0; i < Size; ++i) phi(i, i) = phi(i, i) + S(1.0);
-    Array<S, Size> ahead{};
-    for (int i = 0; i < Size; ++i) {
-      S sum(0.0);
-      for (int j = 0; j < Size; ++j) sum = sum + phi(i, j) * gains[0][static_cast<std::size_t>(j)];
-      ahead[static_cast<std::size_t>(i)] = sum;
-    }
-    Square spread;
-    Square predictor = phi;
-    for (int i = 0; i < Size; ++i) {
-      for (int j = 0; j < Size; ++j) {
-        spread(i, j) = ahead[static_cast<std::size_t>(i)] * ahead[static_cast<std::size_t>(j)];
-        predictor(i, j) = predictor(i, j) -
-                          ahead[static_cast<std::size_t>(i)] * output[static_cast<std::size_t>(j)];
+  /// Gains of steps in which V of the gain without a gap falls as well, see FallingSquare.
+  void find_gap_gains(Square step, Array<S, Size> output, const Array<S, Size>& units,
+                      const S& decay) {
+    // In units in which the elements are of similar size.
+    Array<S, Size> gain{};
+    for (std::size_t i = 0; i < Size; ++i) {
+      gain[i] = gains[0][i] / units[i];
+      output[i] = output[i] * units[i];
+      for (std::size_t j = 0; j < Size; ++j) {
+        S& x = step(static_cast<int>(i), static_cast<int>(j));
+        x = x * (units[j] / units[i]);
       }
     }
-    const auto noise = solve_stein<Size, S>(predictor, spread);
-    if (!noise) return;
-    Square p = *noise;
+    const Square sample = corrected(step, output, gain);
+    // Which V suits best depends on how far the poles are apart. A step in which it rises is added
+    // to the sum of which P consists; that lets V fall there, and rise elsewhere.
+    constexpr int rounds = 8;
+    for (const double share : {1.0, 0.2}) {
+      Square spread = squared<Size, S>(gain);
+      for (int round = 0; round < rounds && longest_step < MostBridged; ++round) {
+        const S rate = S(share) * decay;
+        const auto square = FallingSquare<Size, S>::make(sample, spread, rate);
+        if (!square) break;
+        const Square rising = find_gap_gains(*square, step, output, units);
+        spread = spread + (rising * square->covariance() * rising.transpose()) * rate;
+      }
+    }
+  }
+
+  /// The same with a given V. Nothing changes if it bridges no more than what was found before.
+  /// @return (I - k C) Phi of the first step in which V rises
+  Square find_gap_gains(const FallingSquare<Size, S>& square, const Square& step,
+                        const Array<S, Size>& output, const Array<S, Size>& units) {
+    auto found = gains;
     Square over = step;  // Phi^M - I
+    Square error;
+    S noise(1.0);
     for (int samples = 2; samples <= MostBridged; ++samples) {
-      p = phi * p * phi.transpose();
       over = joined(over, step);
-      auto& gain = gains[static_cast<std::size_t>(samples - 1)];
-      S innovation(1.0);
-      for (std::size_t i = 0; i < Size; ++i) {
-        gain[i] = S(0.0);
-        for (std::size_t j = 0; j < Size; ++j) {
-          gain[i] = gain[i] + p(static_cast<int>(i), static_cast<int>(j)) * output[j];
+      const Square phi = plus_identity(over);
+      const Square grown = phi * square.covariance() * phi.transpose();
+      auto& gain = found[static_cast<std::size_t>(samples - 1)];
+      // R is halved until V falls; at R = 0 it may rise, too.
+      for (int halvings = 0;; ++halvings, noise = noise * S(0.5)) {
+        if (halvings == 16) return plus_identity(error);
+        S innovation = noise;
+        for (std::size_t i = 0; i < Size; ++i) {
+          gain[i] = S(0.0);
+          for (std::size_t j = 0; j < Size; ++j) {
+            gain[i] = gain[i] + grown(static_cast<int>(i), static_cast<int>(j)) * output[j];
+          }
+          innovation = innovation + output[i] * gain[i];
         }
-        innovation = innovation + output[i] * gain[i];
+        for (S& k : gain) k = k / innovation;
+        error = corrected(over, output, gain);
+        if (square.falls(error)) break;
       }
-      for (S& k : gain) k = k / innovation;
-      if (!all(decay(corrected(over, output, gain), units) > least_decay)) return;
-      longest_step = samples;
+      for (std::size_t i = 0; i < Size; ++i) gain[i] = gain[i] * units[i];
+      if (samples > longest_step) {
+        longest_step = samples;
+        gains = found;
+      }
     }
+    return error;
+  }
+
+  static Square plus_identity(Square a) {
+    for (int i = 0; i < Size; ++i) a(i, i) = a(i, i) + S(1.0);
+    return a;
   }
 };
 
@@ -157,14 +186,15 @@ struct PartDesign {
 /// The chain bridges a gap by the gain that places the poles for a step of M T. With a resonator
 /// this fails: sampled at every M-th sample it can look like a constant, and the gain grows without
 /// bound (50 Hz at 1 ms: 1e5 after 10 missing samples). Instead this law weights y after a gap like
-/// a Kalman filter whose covariance before the gap was that of the noise in the estimate, and has
-/// grown during the gap:
+/// a Kalman filter whose covariance before the gap was P, and has grown during the gap:
 ///
-///     k_M = P_M C' / (C P_M C' + R),  P_M = Phi^(M-1) P_1 Phi^(M-1)',  R = 1
+///     k_M = P_M C' / (C P_M C' + R),  P_M = Phi^M P Phi^M'
 ///
-/// This is bounded and, as P_M grows, tends to the gain for exact measurements. Gaps are bridged up
-/// to the largest M for which errors decay if this M, or any smaller one, recurs forever, at no
-/// less than a hundredth of the rate without gaps. After longer gaps the observer restarts.
+/// This is bounded and, as P_M grows, tends to the gain for exact measurements. P is that of
+/// V(e) = e' P^-1 e, which falls in each sample without a gap (gain/gap_certificate.hpp); R is the
+/// largest 2^-i for which V falls in the step over M samples, too. Gaps are bridged up to the
+/// longest for which there is such an R, so errors decay in any sequence of them. After longer gaps
+/// the observer restarts.
 /// @tparam MostBridged longest gap to be considered, samples; each sample costs N numbers
 template <int Size, Scalar S, class Placement, int MostBridged>
 class ModelGain {

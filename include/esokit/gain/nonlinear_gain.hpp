@@ -273,6 +273,11 @@ class NonlinearGain {
     return linear_.gap_gain(e, samples);
   }
 
+  /// The largest number of missing samples that is bridged, at most `asked`.
+  [[nodiscard]] constexpr int longest_gap(int asked) const noexcept requires(!PackScalar<S>) {
+    return detail::half_gap(linear_, asked);
+  }
+
   /// The gain for k = 1, scaled: gain(e) is factor(e) times this.
   [[nodiscard]] constexpr const ScaledGain<Size, S>& linear_gain() const noexcept {
     return linear_.gain_before_measurement();

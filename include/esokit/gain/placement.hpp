@@ -3,12 +3,14 @@
 /// gain/pole_set.hpp.
 ///
 /// A placement is a template argument of a linear observer. It defines what the config specifies
-/// (`Spec`), the check of it, and the gains in both time domains.
+/// (`Spec`), the check of it, the gains in both time domains, and the longest step (in samples)
+/// that a correction may bridge (`longest_step`; without it every gap restarts the observer).
 #pragma once
 
 #include <esokit/core/check.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/type_tag.hpp>
+#include <esokit/gain/bridged_steps.hpp>
 #include <esokit/gain/continuous_gain.hpp>
 #include <esokit/gain/sampled_gain.hpp>
 
@@ -42,6 +44,12 @@ struct EqualPoles : BandwidthPlacement {
   template <int Size, Scalar S>
   static EqualSampledPoles<Size, S> sample(const S& bandwidth, const S& sample_time) {
     return EqualSampledPoles<Size, S>::from_bandwidth(bandwidth, sample_time);
+  }
+
+  /// The longest step after which errors decay in any sequence of steps, in samples.
+  template <int Size, Scalar S>
+  static constexpr int longest_step(const EqualSampledPoles<Size, S>& poles) noexcept {
+    return detail::longest_step<Size, detail::equal_steps>(S(S(1.0) - poles.contraction));
   }
 
   /// Gain of the continuous observer. @return l, N x 1, row i in 1/s^(i+1)

@@ -10,6 +10,7 @@
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/continuous_gain.hpp>
 #include <esokit/gain/feedback_gain.hpp>
+#include <esokit/gain/gap_certificate.hpp>
 #include <esokit/gain/half_gain.hpp>
 #include <esokit/gain/model_placement.hpp>
 #include <esokit/gain/placement.hpp>
@@ -174,6 +175,20 @@ struct PoleSet {
   template <int Size, PlainScalar S>
   static SampledPoleSet<Size, S> sample(const Spec<Size, S>& poles, const S& sample_time) {
     return SampledPoleSet<Size, S>::from_continuous(poles, sample_time);
+  }
+
+  /// The longest step after which errors decay in any sequence of steps, in samples; see
+  /// gain/gap_certificate.hpp.
+  template <int Size, PlainScalar S>
+  static int longest_step(const SampledPoleSet<Size, S>& poles) noexcept {
+    using Fine = std::conditional_t<std::is_same_v<S, float>, double, S>;
+    SampledPoleSet<Size, Fine> fine;
+    for (std::size_t i = 0; i < Size; ++i) {
+      fine.contractions[i] = {static_cast<Fine>(poles.contractions[i].real()),
+                              static_cast<Fine>(poles.contractions[i].imag())};
+    }
+    const auto factors = pole_factors(fine);
+    return detail::longest_falling_step<Size, Fine>(fine, factors.unit, factors.decay);
   }
 
   /// Gain of the continuous observer. @return l, N x 1, row i in 1/s^(i+1)

@@ -43,6 +43,12 @@ struct ReducedPoles : BandwidthPlacement {
   static ReducedSampledPoles<Size, S> sample(const S& bandwidth, const S& sample_time) {
     return {EqualSampledPoles<Size - 1, S>::from_bandwidth(bandwidth, sample_time)};
   }
+
+  /// The longest step after which errors decay in any sequence of steps, in samples.
+  template <int Size, Scalar S>
+  static constexpr int longest_step(const ReducedSampledPoles<Size, S>& poles) noexcept {
+    return detail::longest_step<Size, detail::reduced_steps>(S(S(1.0) - poles.rest.contraction));
+  }
 };
 
 /// Distinguishes the type in snapshots.

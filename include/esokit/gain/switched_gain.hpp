@@ -40,7 +40,8 @@ template <Scalar S>
 /// `otherwise`. The first innovation counts as not shrinking.
 ///
 /// After a gap the comparison with the last innovation is meaningless, so the gap gain of
-/// `otherwise` is used.
+/// `otherwise` is used. Bridged are gaps of half the length that either set alone bridges: a search
+/// for the worst sequence of gaps and of sets between them found no growth up to there.
 template <int Size, Scalar S, class Placement = EqualPoles,
           SignReading Reading = SignReading::magnitude>
 class SwitchedGain {
@@ -83,6 +84,11 @@ class SwitchedGain {
   /// The gain of `otherwise` for the whole gap.
   [[nodiscard]] ScaledGain<Size, S> gap_gain(const S& e, unsigned samples) const noexcept {
     return sets_[0].gap_gain(e, samples);
+  }
+
+  /// The largest number of missing samples that is bridged, at most `asked`.
+  [[nodiscard]] constexpr int longest_gap(int asked) const noexcept requires(!PackScalar<S>) {
+    return detail::half_gap(sets_[1], detail::half_gap(sets_[0], asked));
   }
 
   /// The correction was carried out: stores e for the comparison with the next innovation.

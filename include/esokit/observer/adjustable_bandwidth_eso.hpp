@@ -47,7 +47,8 @@ class AdjustableBandwidthEso
     bool allow_uncertified_switching = false;   ///< accept a ratio without a certificate
     S input_gain{};     ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
     S sample_time{};    ///< T, s
-    int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts
+    int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts, see
+                        ///< `max_gap()`
 
     /// @cond
     static constexpr auto fields(auto& c) noexcept {

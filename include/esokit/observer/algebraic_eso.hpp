@@ -70,7 +70,8 @@ class AlgebraicEso
                             ///< d^(m-1)
     int start_index = 0;    ///< soft start: first sample of the schedule; > 0 is not deadbeat
     bool allow_vanishing_gain = false;  ///< accept lambda = 0 with q > 0: in the end y is ignored
-    int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts
+    int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts, see
+                        ///< `max_gap()`
 
     /// @cond
     static constexpr auto fields(auto& c) noexcept {

@@ -19,6 +19,7 @@
 #include <esokit/core/scalar.hpp>
 #include <esokit/gain/gain_law.hpp>
 #include <esokit/gain/step_status.hpp>
+#include <utility>
 
 namespace esokit {
 
@@ -58,7 +59,8 @@ struct ObserverTraits {
 
   bool wraps_output = false;  ///< y is an angle: `wrap(difference) const`
   bool delays_input = false;  ///< u acts late: `fill_input(u)`, as if u had been applied for long
-  bool varies_time = false;   ///< `set_step_time(seconds)`, before each step
+  bool varies_time = false;   ///< `set_step_time(seconds)`, before each step, and (but for packs)
+                              ///< `step_time() const`, its present length
   bool gates_outliers =
       false;  ///< `accepts(y) const`: false if `correct` would reject y as an outlier
 
@@ -152,6 +154,9 @@ concept DelaysInput = requires(O& o, const typename O::scalar_type& s) {
 template <class O>
 concept VariesTime = requires(O& o, const typename O::scalar_type& s) {
   { o.set_step_time(s) } -> std::same_as<Check<typename O::scalar_type>>;
+  requires PackScalar<typename O::scalar_type> || requires {
+    { std::as_const(o).step_time() } -> std::convertible_to<typename O::scalar_type>;
+  };
 };
 template <class O>
 concept GatesOutliers = requires(const O& o, const typename O::scalar_type& s) {
@@ -174,11 +179,12 @@ concept GatesDisturbance = requires(O& o, const O& constant, const typename O::s
   o.release();
 };
 
-/// Like `as_declared`. An adapter has members for everything that it passes on, even if the adapted
-/// observer has no such member.
+/// Like `as_declared`. An adapter, and a LaneByLane, has members for everything that it passes on,
+/// even if what it consists of has no such member.
 template <class O>
 constexpr bool observer_as_declared(bool declared, bool named, bool right) noexcept {
-  return as_declared(declared, observer_traits<O>.adapts ? right : named, right);
+  return as_declared(declared, observer_traits<O>.adapts || goes_lane_by_lane<O> ? right : named,
+                     right);
 }
 
 }  // namespace detail
@@ -208,7 +214,8 @@ concept DelaysInputAsDeclared = detail::observer_as_declared<O>(observer_traits<
                                                                 detail::names_fill_input<O>,
                                                                 detail::DelaysInput<O>);
 
-/// `set_step_time(seconds)` exists if and only if `traits.varies_time` declares it.
+/// `set_step_time(seconds)` and `step_time() const` exist if and only if `traits.varies_time`
+/// declares them.
 template <class O>
 concept VariesTimeAsDeclared = detail::observer_as_declared<O>(observer_traits<O>.varies_time,
                                                                detail::names_set_step_time<O>,

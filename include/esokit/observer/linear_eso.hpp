@@ -20,8 +20,8 @@ struct LinearEsoConfig {
   S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
   S sample_time{};         ///< T, s
   [[no_unique_address]] Settings model{};  ///< what is known of the plant
-  int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts;
-                      ///< a model may allow fewer, see `max_gap()`
+  int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts; fewer
+                      ///< if errors would not decay in any sequence of gaps, see `max_gap()`
 
   /// @cond
   static constexpr auto fields(auto& c) noexcept {

@@ -68,11 +68,7 @@ class NamedObserver : public Base {
       if (!model) return model.error();
       const auto laws = O::design(config, *model);
       if (!laws) return laws.error();
-      int max_gap = config.max_gap;
-      if constexpr (!model_traits<Model>.is_chain && gain_law_traits<Law>.bridges_gaps) {
-        for (const Law& law : Laws{*laws}) max_gap = law.longest_gap(max_gap);
-      }
-      return Self(config, *model, *laws, max_gap);
+      return Self(config, *model, *laws, detail::bridged_gap(Laws{*laws}, config.max_gap));
     }
   }
 

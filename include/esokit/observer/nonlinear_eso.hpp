@@ -24,7 +24,9 @@ namespace esokit {
 /// - gain_max is halfway from 1 to the largest certified value; at that value the error could ring
 ///   undamped. Limits without a certificate, or no limits at all, must be requested in the config.
 ///
-/// k = 1 is LinearEso, bit for bit. The certificate applies to samples without gaps.
+/// k = 1 is LinearEso, bit for bit. The certificate applies to samples without gaps. After a gap
+/// the gain is the linear one; bridged are gaps of half the length that LinearEso bridges, up to
+/// which a search for the worst sequence found no growth.
 /// @tparam Order n @tparam S scalar @tparam Extension m
 /// @tparam Shape an EvenGain: PowerSumGain (the paper's g), FalGain, or your own function object
 template <int Order, Scalar S = double, int Extension = 2, class Shape = PowerSumGain<S>>
@@ -51,7 +53,8 @@ class NonlinearEso
     bool unlimited = false;               ///< no limits, no certificate
     S input_gain{};     ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
     S sample_time{};    ///< T, s
-    int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts
+    int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts, see
+                        ///< `max_gap()`
 
     /// @cond
     static constexpr auto fields(auto& c) noexcept {

@@ -23,7 +23,7 @@ struct ChainConfig {
   S input_gain{};     ///< b0, unit of y^(n) per unit of u; not zero, negative is fine
   S sample_time{};    ///< T, s
   int max_gap = 100;  ///< missing samples in a row that a correction may bridge, 1 .. 65000;
-                      ///< after more it restarts from the measurement
+                      ///< after more it restarts from the measurement; see `max_gap()`
 };
 
 namespace detail {
@@ -52,9 +52,12 @@ Check<S> check_chain(const ChainConfig<S>& config) {
 /// One instance belongs to one thread. No member allocates, throws or locks after `make`.
 ///
 /// After any input, however bad, good samples lead back to a good estimate: the error decays by
-/// e^(-omega_o T) a sample, from the largest number of the scalar to rounding in at most 60 + 2
-/// ln(max / epsilon) / (omega_o T) samples. This is tested with every observer and adapter: double
-/// 60 + 1500 / (omega_o T), float 60 + 210 / (omega_o T) samples.
+/// e^(-r T) a sample, r the rate of its slowest pole, from the largest number of the scalar to
+/// rounding in at most 60 + 2 ln(max / epsilon) / (r T) samples. This is tested with every observer
+/// and adapter: double 60 + 1500 / (r T), float 60 + 210 / (r T) samples. With all poles at one
+/// bandwidth r is omega_o; of a cascade it is the least bandwidth, of half gains omega_o / 2, and
+/// no faster than what a model computes without correcting it, such as the lag of an actuator (1 /
+/// tau). `-stability_abscissa(observer_system(observer))` (analysis) is 1 - e^(-r T).
 ///
 /// @tparam Order n, order of the plant @tparam Extension m, extended states
 /// @tparam Law gain law, see GainLaw @tparam Levels p
@@ -292,7 +295,7 @@ class PredictorCorrector {
   [[nodiscard]] constexpr Lanes<bool, S> restarts() const noexcept {
     if constexpr (PackScalar<S>) {
       Lanes<bool, S> due;
-      for (int i = 0; i < lane_count<S>; ++i) due[i] = gap_[i] > max_gap_ + 1u;
+      for (int i = 0; i < lane_count<S>; ++i) due[i] = gap_[i] > max_gap_[i] + 1u;
       return due;
     } else {
       return gap_ > max_gap_ + 1u;
@@ -324,8 +327,16 @@ class PredictorCorrector {
   [[nodiscard]] constexpr const S& sample_time() const noexcept { return model_.sample_time(); }
 
   /// Missing samples that a correction bridges before it restarts: the config's number, or fewer if
-  /// the model allows fewer.
-  [[nodiscard]] constexpr int max_gap() const noexcept { return max_gap_; }
+  /// errors would not decay in every sequence of gaps up to it; for a pack the least of its lanes.
+  [[nodiscard]] constexpr int max_gap() const noexcept {
+    if constexpr (PackScalar<S>) {
+      int least = max_gap_[0];
+      for (int i = 1; i < lane_count<S>; ++i) least = max_gap_[i] < least ? max_gap_[i] : least;
+      return least;
+    } else {
+      return max_gap_;
+    }
+  }
 
   /// What is known of the plant.
   [[nodiscard]] constexpr const Model& model() const noexcept { return model_; }
@@ -432,7 +443,7 @@ class PredictorCorrector {
       std::same_as<Model, ChainModel<Order, S, Extension>>
       : laws_(laws),
         model_(config.input_gain, config.sample_time),
-        max_gap_(static_cast<std::uint16_t>(config.max_gap)) {
+        max_gap_(bridged(laws, config.max_gap)) {
     for (State& state : states_) state.fill(S(0.0));
     look_at_squares();
   }
@@ -515,6 +526,16 @@ class PredictorCorrector {
     state[0] = y;
     std::get<Model::state_of_row(0)>(state) = y;
     return state;
+  }
+
+  /// The gaps that the laws bridge, at most `asked`.
+  static constexpr Lanes<std::uint16_t, S> bridged(const Laws& laws, int asked) noexcept {
+    Lanes<std::uint16_t, S> gaps{};
+    for (int i = 0; i < lane_count<S>; ++i) {
+      detail::of_lane(gaps, i) = static_cast<std::uint16_t>(detail::bridged_gap(
+          detail::get_lane<Array<detail::PlainTwin<Law, S>, Levels>>(laws, i), asked));
+    }
+    return gaps;
   }
 
   /// A gap longer than any max_gap.
@@ -861,7 +882,7 @@ class PredictorCorrector {
   S innovation_ = S(0.0);
   S applied_input_ = S(0.0);
   Lanes<std::uint16_t, S> gap_{};
-  std::uint16_t max_gap_;
+  Lanes<std::uint16_t, S> max_gap_;
   [[no_unique_address]] std::conditional_t<has_squares, Lanes<bool, S>, NoFlag> squares_suffice_{};
 
   // Last, because after a failed assertion the members below it would be missing in derived

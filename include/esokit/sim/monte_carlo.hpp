@@ -164,6 +164,11 @@ struct SettlingTime : FinalValue {
   double band;
 };
 
+/// Whether the plain form of `Packed` is One. A class that is derived from one of esokit inherits
+/// the packs of that one, which do what that one does.
+template <class Packed, class One, class S>
+concept PacksOf = std::same_as<typename Packed::template with_scalar<S>, One>;
+
 /// The types for `Lanes` runs at once.
 template <class P, class C, int Lanes>
 struct InPacks {
@@ -181,7 +186,8 @@ requires(Lanes > 1 && esokit::detail::LaneAccess::has_fields<P> &&
   using Plant = typename P::template with_scalar<S>;
   using Control = typename C::template with_scalar<S>;
   static constexpr bool possible = [] {
-    if constexpr (SampledPlant<Plant>) {
+    using One = LaneScalar<S>;
+    if constexpr (SampledPlant<Plant> && PacksOf<Plant, P, One> && PacksOf<Control, C, One>) {
       return ControllerOf<Control, Plant> && std::is_trivially_copyable_v<Control>;
     } else {
       return false;

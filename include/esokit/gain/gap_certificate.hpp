@@ -1,0 +1,128 @@
+/// @file
+/// A quadratic function of the error that falls in every step of a set: then any sequence of these
+/// steps decays.
+///
+/// With P = sum_i (A k)(A k)' / rho^i, the covariance of what a noise in the measurements leaves in
+/// the estimate if its share is discounted by rho a sample, V(e) = e' P^-1 e falls at least by rho
+/// in each sample with the gain k. Another step e -> A_M e is joined to them if V falls in it, too,
+/// which is A_M P A_M' < P. (With all poles in one place, P^-1 is the information of least squares
+/// with exponential forgetting.)
+#pragma once
+
+#include <cmath>
+#include <esokit/core/scalar.hpp>
+#include <esokit/gain/bridged_steps.hpp>
+#include <esokit/gain/sampled_gain.hpp>
+#include <esokit/math/combinatorics.hpp>
+#include <esokit/math/dense.hpp>
+#include <optional>
+
+namespace esokit::detail {
+
+/// P of V(e) = e' P^-1 e. Matrices of steps are given without I.
+template <int Size, Scalar S>
+class FallingSquare {
+ public:
+  using Square = Matrix<S, Size, Size>;
+
+  /// @param step A - I for one sample @param spread k k', or any other term of the sum
+  /// @param decay -ln of the largest abs(pole) of A
+  static std::optional<FallingSquare> make(const Square& step, const Square& spread,
+                                           const S& decay) {
+    using std::expm1;
+    FallingSquare square;
+    square.margin_ = S(0.1) * -expm1(S(-decay));
+    // A / sqrt(rho), without I.
+    const S more = expm1(S(S(0.5) * decay));
+    Square discounted = step + step * more;
+    for (int i = 0; i < Size; ++i) discounted(i, i) = discounted(i, i) + more;
+    square.p_ = spread;
+    Array<S, 2 * Size * Size> work;
+    if (!sum_by_doubling(discounted.data(), square.p_.data(), work.data(),
+                         work.data() + Size * Size, Size) ||
+        !square.falls(step)) {
+      return std::nullopt;
+    }
+    return square;
+  }
+
+  /// True if V falls in e -> A e, by at least a tenth of what a sample without a gap takes.
+  /// @param step A - I
+  [[nodiscard]] bool falls(const Square& step) const {
+    // P - A P A' = -(E P + (E P)' + E P E'), E = A - I.
+    const Square half = step * p_;
+    Square rest = half * step.transpose();
+    for (int i = 0; i < Size; ++i) {
+      for (int j = 0; j < Size; ++j) {
+        rest(i, j) = -(rest(i, j) + half(i, j) + half(j, i)) - margin_ * p_(i, j);
+      }
+    }
+    Matrix<S, Size, 1> none{};
+    return solve_positive<Size, 1, S>(rest, none).has_value();
+  }
+
+  /// P.
+  [[nodiscard]] const Square& covariance() const noexcept { return p_; }
+
+ private:
+  Square p_;
+  S margin_{};
+};
+
+/// k k'.
+template <int Size, Scalar S>
+Matrix<S, Size, Size> squared(const Array<S, Size>& gain) noexcept {
+  Matrix<S, Size, Size> square;
+  for (int i = 0; i < Size; ++i) {
+    for (int j = 0; j < Size; ++j) {
+      square(i, j) = gain[static_cast<std::size_t>(i)] * gain[static_cast<std::size_t>(j)];
+    }
+  }
+  return square;
+}
+
+/// The longest step of the chain, in samples, with the gains of `poles` after gaps: each one up to
+/// 20 samples is tested, then steps that grow by a twentieth.
+/// @param unit a, largest abs(1 - rho_i) @param decay -ln of the largest abs(rho_i)
+template <int Size, PlainScalar S, class Poles>
+int longest_falling_step(const Poles& poles, const S& unit, const S& decay) {
+  const auto step = [&](int samples) {
+    // Errors in units of 1 / a^r.
+    const auto gain = gap_gain<Size, S>(poles, static_cast<unsigned>(samples));
+    const S over = unit * static_cast<S>(samples);
+    std::pair<Matrix<S, Size, Size>, Array<S, Size>> all;
+    Array<S, Size> power{};
+    S of_over(1), of_unit(1);
+    for (std::size_t i = 0; i < Size; ++i) {
+      power[i] = of_over;
+      all.second[i] = gain[i] / of_unit;
+      of_over = of_over * over;
+      of_unit = of_unit * unit;
+    }
+    for (int i = 0; i < Size; ++i) {
+      for (int j = 0; j < Size; ++j) {
+        all.first(i, j) =
+            -(all.second[static_cast<std::size_t>(i)] * power[static_cast<std::size_t>(j)]);
+        if (j > i) {
+          all.first(i, j) +=
+              static_cast<S>(binomial(j, i)) * power[static_cast<std::size_t>(j - i)];
+        }
+      }
+    }
+    return all;
+  };
+  const auto [one, gain] = step(1);
+  int longest = 1;
+  // The discount that suits best depends on how far the poles are apart.
+  for (const S share : {S(0.5), S(1), S(1.5)}) {
+    const auto square = FallingSquare<Size, S>::make(one, squared<Size, S>(gain), S(share * decay));
+    if (!square) continue;
+    for (int samples = 2; samples <= most_bridged; samples += 1 + samples / 20) {
+      if (!square->falls(step(samples).first)) break;
+      longest = samples > longest ? samples : longest;
+    }
+  }
+  return longest;
+}
+
+}  // namespace esokit::detail
