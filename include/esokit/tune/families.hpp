@@ -3,11 +3,13 @@
 /// parameters.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <complex>
 #include <cstddef>
 #include <cstdio>
 #include <esokit/analysis/controllers.hpp>
+#include <esokit/analysis/poles.hpp>
 #include <esokit/gain/half_gain.hpp>
 #include <esokit/gain/model_gain.hpp>
 #include <esokit/gain/pole_set.hpp>
@@ -263,6 +265,38 @@ std::optional<ObserverKind> known_kind(const TuneModel& model, TuneFamily family
                : model_gains<EqualPoles>(*given, s.observer_bandwidth, bandwidth, gains);
   };
   return kind;
+}
+
+/// Geometric mean of the magnitudes of the observer's poles, of level 1 in a cascade, rad/s.
+inline double observer_mean(TuneFamily family, const ObserverKind& kind, const TuneModel& model,
+                            const TuneSettings& s) {
+  if (family == TuneFamily::free_poles) {
+    double logarithm = 0.0;
+    for (const auto& pole : s.observer_poles) logarithm += std::log(std::abs(pole));
+    return std::exp(logarithm / static_cast<double>(s.observer_poles.size()));
+  }
+  if (family == TuneFamily::filter) {
+    return std::pow(s.disturbance_bound / (model.noise * model.sample_time), 1.0 / kind.size);
+  }
+  // Half gains halve the product of the poles, too.
+  return s.observer_bandwidth *
+         (family == TuneFamily::half_gain ? std::pow(0.5, 1.0 / kind.placed) : 1.0);
+}
+
+/// Geometric mean of the magnitudes of the law's `order` slowest poles, rad/s.
+inline double law_mean(const std::vector<double>& gains, int order) {
+  const int n = static_cast<int>(gains.size());
+  DynamicMatrix<double> companion(n, n);
+  for (int i = 0; i < n; ++i) {
+    if (i + 1 < n) companion(i, i + 1) = 1.0;
+    companion(n - 1, i) = -gains[static_cast<std::size_t>(i)];
+  }
+  std::vector<double> size;
+  for (const auto& pole : poles_of(companion)) size.push_back(std::abs(pole));
+  std::sort(size.begin(), size.end());
+  double logarithm = 0.0;
+  for (int i = 0; i < order; ++i) logarithm += std::log(size[static_cast<std::size_t>(i)]);
+  return std::exp(logarithm / order);
 }
 
 /// Observer and law as a controller, with its own u as the applied u.

@@ -44,6 +44,7 @@ struct LoopNumbers {
   double tolerance = 0.0;      ///< factor by which b0 may be wrong in either direction
   double modulus = 0.0;        ///< modulus margin, the smallest over the intervals
   double delay = 0.0;          ///< delay margin, s, the smallest over the intervals
+  double phase = 0.0;          ///< phase margin, rad, the smallest over the intervals
 
   /// J.
   [[nodiscard]] double cost(double rho, double input_gain) const {
@@ -259,7 +260,8 @@ class LoopCost {
   [[nodiscard]] LoopNumbers operator()(const LinearController& controller) const {
     detail::FastResponse response(controller);
     LoopNumbers numbers;
-    numbers.modulus = numbers.delay = numbers.tolerance = std::numeric_limits<double>::infinity();
+    numbers.modulus = numbers.delay = numbers.tolerance = numbers.phase =
+        std::numeric_limits<double>::infinity();
     double output = 0.0, control = 0.0, noise = 0.0;
     Complex before[3];
     double turned[3] = {};
@@ -377,6 +379,7 @@ class LoopCost {
     // The largest latency is the middle one and the range.
     const auto delay = [&](Complex there, double w) {
       numbers.delay = std::min(numbers.delay, detail::lag_to_minus_one(there) / w - range_);
+      numbers.phase = std::min(numbers.phase, std::abs(std::arg(-there)) - w * range_);
     };
     const Complex largest = -(1.0 + aliases.rest / aliases.size) * aliases.base * gain;
     const double b = std::norm(largest);

@@ -42,7 +42,17 @@ struct TuneModel {
 
   /// (q / (N^2 T))^(1 / (2 n + 2)): the bandwidth of a Kalman filter for the chain, rad/s.
   [[nodiscard]] double filter_bandwidth() const {
-    return std::pow(disturbance / (noise * noise * sample_time), 0.5 / (order + 1));
+    return std::pow(disturbance / (noise * noise * sample_time), 0.5 / (order + 1.0));
+  }
+
+  /// The disturbance of this filter bandwidth.
+  [[nodiscard]] double disturbance_of(double bandwidth) const {
+    return std::pow(bandwidth, 2 * (order + 1)) * noise * noise * sample_time;
+  }
+
+  /// The largest time by which u may be late, with the sample for which it is held, s.
+  [[nodiscard]] double latency() const {
+    return lag + dead_time + sensor + sample_time + latency_half_width;
   }
 
   /// An error for a number that is not allowed, or so large or small that nothing can be computed
@@ -139,24 +149,41 @@ inline TuneModel tune_model(const Identified& found, double u_min, double u_max)
   return model;
 }
 
+/// Share of the range of u that noise may cause if nothing else is required.
+inline constexpr double usual_control_noise = 0.05;
+
 /// The requirement. Give at most one of these.
 struct TuneWish {
   /// Standard deviation of u that the measurement noise may cause, unit of u. If nothing is given:
-  /// 5 % of u_max - u_min, or twice the value needed to cancel the disturbance alone if that is
-  /// larger.
+  /// usual_control_noise of u_max - u_min.
   double control_noise = 0.0;
   double settling_time = 0.0;  ///< s, to within 2 % after a step of the reference
   double controller_bandwidth =
       0.0;  ///< omega_c, rad/s: the law is given, only the observer is chosen
 };
 
-/// The margins that a loop has to keep: for the nominal model, and with b0 at both ends of its
+/// What a loop has to keep. Margins: for the nominal model, and with b0 at both ends of its
 /// interval, the largest latency, and the largest and smallest share of lag in it.
 struct TuneRules {
   double modulus_margin = 0.5;  ///< smallest abs(1 + L)
   double delay_samples = 2.0;   ///< smallest delay margin, samples
   double gain_factor =
       2.0;  ///< the loop stays stable with b0 too large or too small by this factor
+  double phase_margin = 0.0;  ///< smallest phase margin, rad; 0: not required
+
+  /// Order 2: smallest k_1 / k_0, in TuneModel::latency. Limits act as a lower gain of u, and at a
+  /// low gain a chain of two integrators whose u is late is stable only if k_1 / k_0 is above the
+  /// latency. 0: not required.
+  double damping_latencies = 1.3;
+  /// Largest omega_c / omega_o, the geometric means of the poles of law and observer: beyond it the
+  /// observer decides how fast the loop is. Three integrators are stable at no very low gain: there
+  /// it helps, and does not suffice. 0: not required.
+  double bandwidth_ratio = 5.0;
+  /// Smallest filter bandwidth that is reckoned with, in 1 / TuneModel::latency, as far as the
+  /// control noise allows: a log without disturbances does not show the loads of tomorrow. 0: none.
+  double filter_floor = 0.1;
+  /// Play every design within the limits of u, see tune/play.hpp.
+  bool play = true;
 };
 
 namespace detail {

@@ -11,9 +11,11 @@
 /// 2. The requirement sets rho: there is one LQG controller for each rho, and one of them just
 /// meets it.
 /// 3. J of that controller is J*, the smallest J of all linear controllers (tune/lqg.hpp).
-/// 4. For each family J is minimised at this rho under the margins; if it cannot keep them, the
+/// 4. For each family J is minimised at this rho under the rules; if it cannot keep them, the
 /// design says which one.
-/// 5. Designs are ranked by J; those within 1 % by the cost of an update, then by the
+/// 5. Every design is played within the limits of u: what does not come back from an overload ranks
+///    behind (tune/play.hpp).
+/// 6. Designs are ranked by J; those within 1 % by the cost of an update, then by the
 ///    modulus margin.
 #pragma once
 
@@ -26,9 +28,11 @@
 #include <esokit/tune/families.hpp>
 #include <esokit/tune/loop_cost.hpp>
 #include <esokit/tune/lqg.hpp>
+#include <esokit/tune/play.hpp>
 #include <esokit/tune/problem.hpp>
 #include <esokit/tune/search.hpp>
 #include <limits>
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -43,8 +47,12 @@ struct TunedDesign {
   int levels = 1;           ///< p
   TuneKnowledge knows{};    ///< what its observer knows
   TuneSettings settings{};  ///< the chosen parameters
-  bool feasible = false;    ///< keeps all margins
-  std::string constraint;   ///< the margin that limits it, or that it cannot keep; or "none"
+  bool feasible = false;    ///< keeps all rules: margins, noise in u, and what lets it come back
+  std::string constraint;   ///< the rule that limits it, or that it cannot keep; or "none"
+  bool comes_back = true;   ///< from all that was played; true if nothing was
+  std::string lost;         ///< in words, what it does not come back from
+  PlayEvent lost_in{};      ///< this event, on variant `lost_on` of the plant
+  int lost_on = 0;          ///< see played_variants
   double cost = 0.0;        ///< J
   double excess = 0.0;      ///< sqrt(J / J*)
   double free_excess =
@@ -57,6 +65,9 @@ struct TunedDesign {
   double modulus_margin = 0.0;     ///< smallest over the intervals
   double gain_tolerance = 0.0;     ///< factor by which b0 may be wrong in either direction
   double delay_margin = 0.0;       ///< smallest over the intervals, s
+  double phase_margin = 0.0;       ///< smallest over the intervals, rad
+  double damping_latencies = 0.0;  ///< k_1 / k_0 over TuneModel::latency, 0 if there is no k_1
+  double bandwidth_ratio = 0.0;    ///< omega_c / omega_o, geometric means of poles
   int instructions = 0;            ///< per update of the observer, see update_instructions
   std::string code;                ///< C++ source of the controller, type and config, to paste
   LinearController controller{};   ///< for the analysis, see closed_loop(model, controller)
@@ -64,19 +75,62 @@ struct TunedDesign {
 
 /// The result of `tune`.
 struct Tuning {
-  TuneModel model{};           ///< as given
-  TuneRules rules{};           ///< as given
-  double rho = 0.0;            ///< weight of var(b0 u~) in J
+  TuneModel model{};               ///< as given, with at least the disturbance of the floor
+  TuneRules rules{};               ///< as given
+  double given_disturbance = 0.0;  ///< that of the given model; model.disturbance may be larger
+  double rho = 0.0;                ///< weight of var(b0 u~) in J
   double control_noise = 0.0;  ///< the required value, unit of u; 0 if something else was required
+  double least_noise = 0.0;    ///< what cancelling the given disturbance alone needs, unit of u
   double optimum = 0.0;        ///< J*
   LoopNumbers lqg{};           ///< of the controller with J*
-  std::vector<TunedDesign> designs{};  ///< the best one first, infeasible ones last
+  std::vector<TunedDesign> designs{};  ///< the best one first, then what does not come back when
+                                       ///< played, infeasible ones last
 
-  /// The first design, or null if it does not keep the margins.
+  /// The first design, or null if it does not keep the rules or does not come back.
   [[nodiscard]] const TunedDesign* chosen() const noexcept {
-    return !designs.empty() && designs.front().feasible ? &designs.front() : nullptr;
+    return !designs.empty() && designs.front().feasible && designs.front().comes_back
+               ? &designs.front()
+               : nullptr;
   }
 };
+
+/// Something that has to be looked at before a design is used.
+struct TuneAlarm {
+  const char* name = "";  ///< one word
+  std::string text;       ///< a sentence
+};
+
+/// What speaks against a design that keeps its rules: noise in u above usual_control_noise, more
+/// than three times the deviations of the best linear controller, and what it does not come back
+/// from.
+inline std::vector<TuneAlarm> alarms(const Tuning& tuning, const TunedDesign& design) {
+  std::vector<TuneAlarm> all;
+  const double range = tuning.model.u_max - tuning.model.u_min;
+  const auto number = [](double value) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.3g", value);
+    return std::string(text);
+  };
+  if (!design.comes_back) {
+    all.push_back({"overload", "This design does not come back from " + design.lost +
+                                   ": u goes from limit to limit, or stays at one."});
+  }
+  if (design.control_noise > 1.001 * usual_control_noise * range) {
+    all.push_back({"noise", "Noise moves u by " + number(100.0 * design.control_noise / range) +
+                                " % of its range (standard deviation); usual is " +
+                                number(100.0 * usual_control_noise) +
+                                " %. The least that cancels the disturbance of the log is " +
+                                number(100.0 * tuning.least_noise / range) +
+                                " %. Measure y with less noise, or sample faster."});
+  }
+  if (design.excess > 3.0) {
+    all.push_back({"excess", "Deviations of y and u are " + number(design.excess) +
+                                 " times those of the best linear controller: the rules leave "
+                                 "little of what this machine could do. It is limited by: " +
+                                 design.constraint + "."});
+  }
+  return all;
+}
 
 /// Instructions of an update of the observer on a Cortex-M4F in float, counted in the disassembly
 /// on the path without faults (GCC 12, -O2). The emulator of examples/embedded counts the same
@@ -125,7 +179,14 @@ struct TuneSearch {
   double reference_bandwidth;  ///< of the law of the LQG controller
   double filter_bandwidth;     ///< of the filter of the LQG controller
   double possible_bandwidth;   ///< largest one that lag and dead time allow
+  double most_noise;           ///< in u, 0 if something else is required
   const LoopCost* cost;
+
+  /// Of a point that was evaluated: log J, and what its rules lack.
+  struct Seen {
+    double value = 0.0, lack = 0.0;
+  };
+  mutable std::map<std::vector<double>, Seen> seen{};  ///< of one contender
 
   [[nodiscard]] double slowest() const {
     return 0.05 * std::min({reference_bandwidth, filter_bandwidth, 0.3 * possible_bandwidth});
@@ -198,33 +259,66 @@ struct TuneSearch {
     return gains;
   }
 
-  /// How much of the margins is missing: shares, 0 if none.
-  struct Lack {
-    double modulus, delay, gain;
-    [[nodiscard]] double sum() const { return modulus + delay + gain; }
+  /// What the rules are about: of each the number that a design has, over the one that is required;
+  /// infinite if nothing is.
+  struct Kept {
+    double modulus, delay, gain, phase, noise, damping, ratio;
   };
-  [[nodiscard]] Lack lack(const LoopNumbers& numbers, double more = 1.0) const {
-    const double modulus = more * rules.modulus_margin;
-    const double delay = more * rules.delay_samples * model.sample_time;
-    return {modulus > 0.0 ? std::max(1.0 - numbers.modulus / modulus, 0.0) : 0.0,
-            delay > 0.0 ? std::max(1.0 - numbers.delay / delay, 0.0) : 0.0,
-            numbers.tolerant ? 0.0 : std::max(1.0 - numbers.tolerance / rules.gain_factor, 0.02)};
+  [[nodiscard]] Kept kept(const Contender& c, const TuneSettings& s,
+                          const LoopNumbers& numbers) const {
+    const auto over = [](double has, double required) {
+      return required > 0.0 ? has / required : std::numeric_limits<double>::infinity();
+    };
+    const int n = model.order;
+    return {over(numbers.modulus, rules.modulus_margin),
+            over(numbers.delay, rules.delay_samples * model.sample_time),
+            numbers.tolerant ? std::max(numbers.tolerance / rules.gain_factor, 1.0)
+                             : std::min(numbers.tolerance / rules.gain_factor, 0.98),
+            over(numbers.phase, rules.phase_margin),
+            most_noise > 0.0 ? most_noise / numbers.control_noise
+                             : std::numeric_limits<double>::infinity(),
+            n == 2 ? over(s.gains[1] / s.gains[0], rules.damping_latencies * model.latency())
+                   : std::numeric_limits<double>::infinity(),
+            rules.bandwidth_ratio > 0.0
+                ? rules.bandwidth_ratio * observer_mean(c.design.family, c.kind, model, s) /
+                      law_mean(s.gains, n)
+                : std::numeric_limits<double>::infinity()};
+  }
+  /// How much is missing: the sum of shares, 0 if nothing is.
+  [[nodiscard]] static double lack(const Kept& kept, double more = 1.0) {
+    double sum = std::max(1.0 - kept.gain, 0.0);
+    for (const double share :
+         {kept.modulus, kept.delay, kept.phase, kept.noise, kept.damping, kept.ratio}) {
+      sum += std::max(1.0 - share / more, 0.0);
+    }
+    return sum;
   }
 
-  /// log J plus a penalty on missing margins.
+  /// log J plus a penalty on broken rules.
   [[nodiscard]] double value(const Contender& c, const std::vector<double>& x, double price) const {
     double outside = 0.0;
     for (std::size_t i = 0; i < x.size(); ++i) {
       outside += std::max(low(c, i) - x[i], 0.0) + std::max(x[i] - high(c, i), 0.0);
     }
     if (outside > 0.0) return 1e4 * (1.0 + outside);
-    const auto controller = tuned_controller(c.kind, model.sample_time, settings(c, x));
-    if (!controller) return 1e5;
+    // The search with rules comes back to the points of that without.
+    auto [at, added] = seen.try_emplace(x);
+    Seen& found = at->second;
+    if (!added) return found.value + price * found.lack;
+    const TuneSettings chosen = settings(c, x);
+    const auto controller = tuned_controller(c.kind, model.sample_time, chosen);
+    if (!controller) {
+      found.value = 1e5;
+      return found.value;
+    }
     const LoopNumbers numbers = (*cost)(*controller);
-    if (!numbers.stable) return 1e4;
     const double j = numbers.cost(rho, model.input_gain.value);
-    if (!(j > 0.0) || !is_finite(j)) return 1e4;
-    return std::log(j) + price * lack(numbers, 1.004).sum();
+    if (!numbers.stable || !(j > 0.0) || !is_finite(j)) {
+      found.value = 1e4;
+    } else {
+      found = {std::log(j), lack(kept(c, chosen, numbers), 1.004)};
+    }
+    return found.value + price * found.lack;
   }
 
   /// Whether variable `index` of the search is a damping; the others are factors or bandwidths.
@@ -271,10 +365,68 @@ struct TuneSearch {
     return x;
   }
 
+  /// The same free poles, divided otherwise between observer and law: all that there are.
+  [[nodiscard]] std::vector<std::vector<double>> divisions(const Contender& c,
+                                                           const std::vector<double>& x) const {
+    // A pair is one unit, as its poles cannot be divided.
+    std::vector<std::complex<double>> reals, pairs;
+    for (const auto& [first, count] :
+         {std::pair(0, c.kind.placed), std::pair(c.observer_numbers, c.kind.order)}) {
+      int i = first;
+      if (count % 2 != 0) reals.emplace_back(-std::exp(x[static_cast<std::size_t>(i++)]));
+      for (; i < first + count; i += 2) {
+        const auto pair = pole_pair(std::exp(x[static_cast<std::size_t>(i)]),
+                                    std::exp(x[static_cast<std::size_t>(i) + 1]));
+        if (pair[0].imag() != 0.0) {
+          pairs.push_back(pair[0]);
+        } else {
+          reals.insert(reals.end(), pair.begin(), pair.end());
+        }
+      }
+    }
+    std::vector<std::vector<double>> all;
+    const std::size_t units = reals.size() + pairs.size();
+    for (unsigned chosen = 0; chosen < 1U << units; ++chosen) {
+      std::vector<double> found;
+      for (const bool of_law : {false, true}) {
+        std::vector<double> own;
+        std::vector<std::complex<double>> twos;
+        for (std::size_t i = 0; i < units; ++i) {
+          if (((chosen >> i & 1U) != 0) != of_law) continue;
+          if (i < reals.size()) {
+            own.push_back(-reals[i].real());
+          } else {
+            twos.push_back(pairs[i - reals.size()]);
+          }
+        }
+        const auto count = static_cast<std::size_t>(of_law ? c.kind.order : c.kind.placed);
+        if (own.size() + 2 * twos.size() != count) break;
+        std::sort(own.begin(), own.end());
+        std::size_t i = 0;
+        if (count % 2 != 0) found.push_back(std::log(own[i++]));
+        for (; i + 1 < own.size(); i += 2) {
+          const double w = std::sqrt(own[i] * own[i + 1]);
+          found.push_back(std::log(w));
+          found.push_back(std::log(0.5 * (own[i] + own[i + 1]) / w));
+        }
+        for (const auto& pole : twos) {
+          found.push_back(std::log(std::abs(pole)));
+          found.push_back(std::log(-pole.real() / std::abs(pole)));
+        }
+      }
+      if (found.size() != x.size()) continue;
+      for (std::size_t i = 0; i < found.size(); ++i) {
+        found[i] = std::clamp(found[i], low(c, i), high(c, i));
+      }
+      all.push_back(std::move(found));
+    }
+    return all;
+  }
+
   /// The minimum of a family. @param starts start points in place of a scan
   [[nodiscard]] SearchPoint least(const Contender& c, bool margins,
                                   const std::vector<std::vector<double>>& starts) const {
-    // With many variables the penalty begins low and rises: it leads along the edge of a margin, on
+    // With many variables the penalty begins low and rises: it leads along the edge of a rule, on
     // which a simplex would collapse with a high penalty. After a scan this is not needed.
     const bool rising = margins && !starts.empty();
     double price = rising ? 5.0 : margins ? 40.0 : 0.0;
@@ -296,7 +448,7 @@ struct TuneSearch {
         points.push_back(factor(c, i) ? 4 : numbers > 2 ? 9 : 12);
         step[i] = 0.5 * (to[i] - from[i]) / (points[i] - 1);
       }
-      for (const SearchPoint& start : grid_search(f, from, to, points, 3)) {
+      for (const SearchPoint& start : grid_search(f, from, to, points, margins ? 2 : 3)) {
         from_here(start.at, 40);
       }
     }
@@ -343,6 +495,43 @@ inline StepAnswer step_answer(const DynamicSystem& system, int input, double siz
   return answer;
 }
 
+/// An event in words.
+inline std::string in_words(const PlayEvent& event, const TuneModel& model) {
+  const auto number = [](double value) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.3g", value);
+    return std::string(text);
+  };
+  const std::string share = number(100.0 * event.share) + " % of half the range of u";
+  const std::string time = number(1e3 * event.latencies * model.latency()) + " ms";
+  switch (event.kind) {
+    case PlayKind::load:
+      return "a load of " + share + " for " + time;
+    case PlayKind::kick:
+      return "a kick worth " + share + " for " + time;
+    default:
+      return "a step of the reference as far as " + share + " moves the chain in " + time;
+  }
+}
+
+/// Plays all events on all variants of the plant, until one is lost.
+inline void play_all(TunedDesign& d, const TuneModel& model) {
+  const auto variants = played_variants(model);
+  for (std::size_t v = 0; v < variants.size(); ++v) {
+    for (const PlayEvent& event : play_events) {
+      const Played played = play(variants[v].model, variants[v].gain, d.controller, event,
+                                 d.settling_time, [](double, double, double, double) {});
+      if (played.back || !played.counts) continue;
+      d.comes_back = false;
+      d.lost_in = event;
+      d.lost_on = static_cast<int>(v);
+      d.lost = in_words(event, model) +
+               (v > 0 ? ", with b0 and the latency at the ends of their intervals" : "");
+      return;
+    }
+  }
+}
+
 /// Computes the results of a design from its settings.
 inline void fill_in(Contender& c, const TuneSearch& search, const LoopCost& fine, double optimum,
                     double free_cost) {
@@ -361,23 +550,28 @@ inline void fill_in(Contender& c, const TuneSearch& search, const LoopCost& fine
   d.modulus_margin = numbers.modulus;
   d.delay_margin = numbers.delay;
   d.gain_tolerance = numbers.tolerance;
-  const auto lack = search.lack(numbers, 0.999);
-  d.feasible = numbers.stable && lack.sum() <= 0.0;
+  d.phase_margin = numbers.phase;
+  const auto& gains = d.settings.gains;
+  d.damping_latencies = gains.size() > 1 ? gains[1] / gains[0] / model.latency() : 0.0;
+  d.bandwidth_ratio =
+      law_mean(gains, model.order) / observer_mean(d.family, c.kind, model, d.settings);
+  const auto kept = search.kept(c, d.settings, numbers);
+  d.feasible = numbers.stable && search.lack(kept, 0.999) <= 0.0;
   if (!numbers.stable) {
     d.constraint = "stability";
-  } else if (!d.feasible) {
-    d.constraint = lack.gain > 0.0             ? "b0 wrong by a factor"
-                   : lack.modulus > lack.delay ? "modulus margin"
-                                               : "delay margin";
-  } else if (d.cost < free_cost * 1.002) {
+  } else if (d.feasible && d.cost < free_cost * 1.002) {
     d.constraint = "none";
   } else {
-    const double modulus = numbers.modulus / search.rules.modulus_margin;
-    const double delay = numbers.delay / (search.rules.delay_samples * model.sample_time);
-    const double gain = numbers.tolerance / search.rules.gain_factor;
-    d.constraint = gain < std::min(modulus, delay) ? "b0 wrong by a factor"
-                   : modulus <= delay              ? "modulus margin"
-                                                   : "delay margin";
+    const double gain = numbers.tolerant ? numbers.tolerance / search.rules.gain_factor : kept.gain;
+    const std::pair<double, const char*> all[] = {
+        {gain, "b0 wrong by a factor"},   {kept.modulus, "modulus margin"},
+        {kept.delay, "delay margin"},     {kept.phase, "phase margin"},
+        {kept.noise, "noise in u"},       {kept.damping, "k_1 / k_0 and the latency"},
+        {kept.ratio, "omega_c / omega_o"}};
+    d.constraint =
+        std::min_element(std::begin(all), std::end(all), [](const auto& a, const auto& b) {
+          return a.first < b.first;
+        })->second;
   }
   if (!numbers.stable) return;
   const auto loop = closed_loop(model, *controller);
@@ -391,6 +585,7 @@ inline void fill_in(Contender& c, const TuneSearch& search, const LoopCost& fine
   const int steps = static_cast<int>(std::min(12.0 / decay, 50000.0)) + 10;
   d.settling_time = step_answer(loop->system(), 0, 1.0, 1.0, steps).settling;
   d.load_peak = step_answer(loop->system(), 2, std::abs(model.input_gain.value), 0.0, steps).peak;
+  if (d.feasible && search.rules.play) play_all(d, model);
 }
 
 /// Type and config of the controller as C++ source.
@@ -564,11 +759,11 @@ double bandwidth_for(const Function& rises, double wanted, double low, double hi
 /// @return error for a model that `check` refuses, more than one requirement, or a requirement that
 ///         no controller can meet
 template <class = void>
-[[nodiscard]] Expected<Tuning, Error<double>> tune(const TuneModel& model,
+[[nodiscard]] Expected<Tuning, Error<double>> tune(const TuneModel& given,
                                                    const TuneWish& wish = {},
                                                    const TuneRules& rules = {}) {
   Rules<double> checks;
-  checks.all_of(model.check())
+  checks.all_of(given.check())
       .not_negative("control_noise", wish.control_noise)
       .not_negative("settling_time", wish.settling_time)
       .not_negative("controller_bandwidth", wish.controller_bandwidth)
@@ -583,19 +778,69 @@ template <class = void>
                "must be below 1")
       .not_negative("delay_samples", rules.delay_samples)
       .require(rules.gain_factor >= 1.0 && is_finite(rules.gain_factor), "gain_factor",
-               rules.gain_factor, "must be finite and 1 or more");
+               rules.gain_factor, "must be finite and 1 or more")
+      .not_negative("phase_margin", rules.phase_margin)
+      .require(!(rules.phase_margin >= 1.5), "phase_margin", rules.phase_margin,
+               "must be below 1.5 rad")
+      .not_negative("damping_latencies", rules.damping_latencies)
+      .not_negative("bandwidth_ratio", rules.bandwidth_ratio)
+      .not_negative("filter_floor", rules.filter_floor)
+      .require(!(rules.filter_floor > 1.0), "filter_floor", rules.filter_floor,
+               "must not be above 1");
   if (!checks) return checks.error();
-  const int n = model.order;
-  const double T = model.sample_time;
-  const double b0 = model.input_gain.value;
+  const int n = given.order;
+  const double T = given.sample_time;
+  const double b0 = given.input_gain.value;
   Tuning tuning;
-  tuning.model = model;
   tuning.rules = rules;
+  tuning.given_disturbance = given.disturbance;
+  const double latency = given.latency();
+  const double fast = 0.5 / T;
+  const auto rho_of = [n](double x) { return std::pow(x, -2 * n); };
+  const auto slowest_of = [&](const TuneModel& of) {
+    return std::min(1e-3 * of.filter_bandwidth(), 1e-2 / T);
+  };
+  const auto least_noise = [&](const TuneModel& of) {
+    const double slow = slowest_of(of);
+    const LoopNumbers numbers = LoopCost(of, rules, slow)(Lqg(of).controller(rho_of(slow)));
+    return numbers.stable ? numbers.control_noise : 0.0;
+  };
+  tuning.least_noise = least_noise(given);
+  const double wanted = wish.control_noise > 0.0
+                            ? wish.control_noise
+                            : usual_control_noise * (given.u_max - given.u_min);
+  TuneModel model = given;
+  const double floor = rules.filter_floor / latency;
+  if (given.filter_bandwidth() < floor) {
+    // No further than half of the noise that is allowed, which leaves as much for the law.
+    const auto noise_at = [&](double bandwidth) {
+      model.disturbance = given.disturbance_of(bandwidth);
+      return least_noise(model);
+    };
+    double low = given.filter_bandwidth(), high = floor;
+    if (2.0 * noise_at(floor) > wanted) {
+      if (2.0 * tuning.least_noise > wanted) {
+        high = low;
+      } else {
+        for (int i = 0; i < 12; ++i) {
+          const double middle = std::sqrt(low * high);
+          (2.0 * noise_at(middle) > wanted ? high : low) = middle;
+        }
+        high = low;
+      }
+    }
+    model.disturbance =
+        high > given.filter_bandwidth() ? given.disturbance_of(high) : given.disturbance;
+  }
+  tuning.model = model;
   const double filter_bandwidth = model.filter_bandwidth();
-  const double latency = model.lag + model.dead_time + model.sensor + 1.5 * T;
   const Lqg lqg(model);
-  const double slow = std::min(1e-3 * filter_bandwidth, 1e-2 / T), fast = 0.5 / T;
-  const auto rho_of = [n](double w) { return std::pow(w, -2 * n); };
+  const double slow = slowest_of(model);
+  // What keeps order 2 from swinging at its limits: sqrt(2) / w is k_1 / k_0 of an LQR law, 2 / w
+  // that of a given bandwidth.
+  const double damped = n == 2 && rules.damping_latencies > 0.0
+                            ? 1.0 / (rules.damping_latencies * latency)
+                            : std::numeric_limits<double>::infinity();
   double w = 0.0;
   if (wish.controller_bandwidth > 0.0) {
     w = wish.controller_bandwidth;
@@ -603,14 +848,25 @@ template <class = void>
         .require(w <= fast, {"controller_bandwidth", w,
                              "must not be above half the sample rate, which is", -1, fast, true})
         .require(w * T >= 1e-6, "controller_bandwidth", w,
-                 "must be at least 1e-6 of the sample rate");
+                 "must be at least 1e-6 of the sample rate")
+        .require(w <= 2.0 * damped,
+                 {"controller_bandwidth", w,
+                  "is so fast for this latency that the loop would swing at its limits for ever; "
+                  "must be at most",
+                  -1, 2.0 * damped, true});
   } else if (wish.settling_time > 0.0) {
     const auto settling = [&](double x) { return -lqg.settling(rho_of(x)); };
+    const double safe = std::min(fast, std::sqrt(2.0) * damped);
     checks
         .require(-settling(fast) <= wish.settling_time,
                  {"settling_time", wish.settling_time,
                   "is shorter than sample time and dead time allow, which is", -1, -settling(fast),
                   true})
+        .require(-settling(safe) <= wish.settling_time,
+                 {"settling_time", wish.settling_time,
+                  "is so short for this latency that the loop would swing at its limits for ever; "
+                  "must be at least",
+                  -1, -settling(safe), true})
         .require(
             -settling(slow) >= wish.settling_time,
             {"settling_time", wish.settling_time,
@@ -618,28 +874,28 @@ template <class = void>
     if (!checks) return checks.error();
     w = detail::bandwidth_for(settling, -wish.settling_time, slow, fast);
   } else {
+    checks.require(
+        wanted > 1.001 * tuning.least_noise,
+        {"control_noise", wanted, "is less than needed to cancel the disturbance alone, which is",
+         -1, tuning.least_noise, true});
+    if (!checks) return checks.error();
     const LoopCost cost(model, rules, slow);
     const auto noise = [&](double x) { return cost(lqg.controller(rho_of(x))).control_noise; };
-    const double least = noise(slow);
-    double wanted = wish.control_noise;
-    if (wanted > 0.0) {
-      checks.require(
-          wanted > 1.001 * least,
-          {"control_noise", wanted, "is less than needed to cancel the disturbance alone, which is",
-           -1, least, true});
-    } else {
-      wanted = std::max(0.05 * (model.u_max - model.u_min), 2.0 * least);
-    }
-    if (!checks) return checks.error();
     tuning.control_noise = wanted;
     w = detail::bandwidth_for(noise, wanted, slow, fast);
   }
   if (!checks) return checks.error();
   tuning.rho = rho_of(w);
 
-  detail::TuneSearch search{
-      model,         rules,  tuning.rho, wish.controller_bandwidth, w, filter_bandwidth,
-      1.0 / latency, nullptr};
+  detail::TuneSearch search{model,
+                            rules,
+                            tuning.rho,
+                            wish.controller_bandwidth,
+                            w,
+                            filter_bandwidth,
+                            1.0 / (model.lag + model.dead_time + model.sensor + 1.5 * T),
+                            tuning.control_noise,
+                            nullptr};
   // The search requires slightly larger margins, because its frequency grid is coarse.
   TuneRules strict = rules;
   strict.gain_factor *= 1.01;
@@ -656,6 +912,7 @@ template <class = void>
   if (!checks) return checks.error();
   std::vector<detail::Contender> all = detail::contenders(model, wish.controller_bandwidth > 0.0);
   for (detail::Contender& c : all) {
+    search.seen.clear();
     std::vector<std::vector<double>> starts;
     if (c.design.family == TuneFamily::free_poles) {
       starts.push_back(search.start(c, search.filter_bandwidth, w, true));
@@ -672,8 +929,18 @@ template <class = void>
     }
     const auto free = search.least(c, false, starts);
     auto best = free;
-    if (search.value(c, free.at, 1.0) > free.value) {
-      best = search.least(c, true, starts);
+    best.value = search.value(c, free.at, 40.0);
+    if (best.value > free.value) {
+      if (c.design.family == TuneFamily::free_poles && c.law_numbers > 0) {
+        // Divided otherwise the same poles give nearly the same J and margins.
+        best.value = std::numeric_limits<double>::infinity();
+        for (auto& x : search.divisions(c, free.at)) {
+          const double value = search.value(c, x, 40.0);
+          if (value < best.value) best = {value, std::move(x)};
+        }
+        if (best.value < 1e3) starts.insert(starts.begin(), best.at);
+      }
+      if (best.value > free.value + 2e-3) best = search.least(c, true, starts);
     }
     c.design.settings = search.settings(c, best.at);
     detail::fill_in(c, search, fine, tuning.optimum, std::exp(free.value));
@@ -684,14 +951,19 @@ template <class = void>
   // next.
   std::stable_sort(tuning.designs.begin(), tuning.designs.end(),
                    [](const TunedDesign& a, const TunedDesign& b) {
-                     return a.feasible != b.feasible ? a.feasible : a.cost < b.cost;
+                     return a.feasible != b.feasible       ? a.feasible
+                            : a.comes_back != b.comes_back ? a.comes_back
+                                                           : a.cost < b.cost;
                    });
   for (std::size_t i = 0; i < tuning.designs.size(); ++i) {
     std::size_t best = i;
     for (std::size_t j = i + 1; j < tuning.designs.size(); ++j) {
       const TunedDesign& a = tuning.designs[best];
       const TunedDesign& b = tuning.designs[j];
-      if (b.feasible != tuning.designs[i].feasible || b.cost > 1.01 * tuning.designs[i].cost) break;
+      if (b.feasible != tuning.designs[i].feasible ||
+          b.comes_back != tuning.designs[i].comes_back || b.cost > 1.01 * tuning.designs[i].cost) {
+        break;
+      }
       if (b.instructions < a.instructions ||
           (b.instructions == a.instructions && b.modulus_margin > a.modulus_margin)) {
         best = j;

@@ -1,0 +1,208 @@
+/// @file
+/// Plays a controller on the plant of a model, with limits and noise: does the loop come back from
+/// an overload, or does it swing between the limits for ever?
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <esokit/analysis/linear_controller.hpp>
+#include <esokit/analysis/loop.hpp>
+#include <esokit/sim/gaussian.hpp>
+#include <esokit/tune/problem.hpp>
+#include <utility>
+#include <vector>
+
+namespace esokit {
+
+/// What happens to a loop that is played.
+enum class PlayKind : unsigned char {
+  load,  ///< a load for some time
+  kick,  ///< all at once, what half the range of u does in this time to y^(n-1)
+  step   ///< of the reference, as far as half the range of u moves the chain in this time
+};
+
+/// An event, in units of the model.
+struct PlayEvent {
+  PlayKind kind{};         ///< what it is
+  double share = 1.0;      ///< of half the range of u
+  double latencies = 0.0;  ///< multiples of TuneModel::latency
+};
+
+/// The events that a recommended design comes back from.
+inline constexpr std::array<PlayEvent, 4> play_events{{{PlayKind::load, 1.5, 10.0},
+                                                       {PlayKind::load, 1.5, 100.0},
+                                                       {PlayKind::kick, 1.0, 30.0},
+                                                       {PlayKind::step, 1.0, 30.0}}};
+
+/// How a loop came through an event.
+struct Played {
+  bool counts = true;   ///< false: even the best controller would be lost
+  bool back = false;    ///< y is near its reference again, and u off its limits
+  double time = 0.0;    ///< s from the end of the event until then, or as long as was waited
+  double peak = 0.0;    ///< largest abs(y - r)
+  double beyond = 0.0;  ///< largest y - r beyond a step of the reference, share of the step
+};
+
+/// The plants that a design is played on: the model, and what its intervals allow.
+inline std::vector<detail::PlantVariant> played_variants(const TuneModel& model) {
+  std::vector<detail::PlantVariant> all{{model, 1.0}};
+  for (auto& variant : detail::plant_variants(model)) all.push_back(std::move(variant));
+  return all;
+}
+
+namespace detail {
+
+/// The told form of a controller that has its own u as the applied u: within limits, the applied u
+/// is another one.
+inline LinearController told_of_input(const LinearController& own) {
+  LinearController c = own;
+  double told = 0.0;
+  for (int i = 0; i < c.states(); ++i) told += std::abs(c.from_u(i, 0));
+  if (told > 0.0) return c;
+  // A reference reaches the states by u alone.
+  for (int i = 0; i < c.states(); ++i) {
+    c.from_u(i, 0) = own.from_r(i, 0) / own.r_to_u(0, 0);
+    c.from_r(i, 0) = 0.0;
+    c.from_y(i, 0) -= c.from_u(i, 0) * c.y_to_u(0, 0);
+    for (int j = 0; j < c.states(); ++j) c.a(i, j) -= c.from_u(i, 0) * c.to_u(0, j);
+  }
+  return c;
+}
+
+/// A controller and a plant within limits, sample by sample.
+class PlayLoop {
+ public:
+  PlayLoop(const TuneModel& model, double gain, const LinearController& told, double half)
+      : plant_(sampled_plant(dense_plant(model, gain), model.sample_time)),
+        c_(told),
+        half_(half),
+        x_(static_cast<std::size_t>(plant_.a.rows())),
+        z_(static_cast<std::size_t>(told.states())),
+        next_(std::max(x_.size(), z_.size())),
+        held_(static_cast<std::size_t>(plant_.whole[0]) + 2) {}
+
+  [[nodiscard]] double output() const {
+    double y = 0.0;
+    for (std::size_t i = 0; i < x_.size(); ++i) y += plant_.c(0, static_cast<int>(i)) * x_[i];
+    return y;
+  }
+
+  /// One sample. @param y as measured @param d unit of y^(n) @param more added to u, for the
+  /// derivatives of r @return u
+  double operator()(double y, double r, double d, double more = 0.0) {
+    double u = c_.y_to_u(0, 0) * y + c_.r_to_u(0, 0) * r + more;
+    const int states = c_.states();
+    for (int i = 0; i < states; ++i) u += c_.to_u(0, i) * z_[static_cast<std::size_t>(i)];
+    u = std::clamp(u, -half_, half_);
+    advance(z_, c_.a,
+            [&](int i) { return c_.from_y(i, 0) * y + c_.from_r(i, 0) * r + c_.from_u(i, 0) * u; });
+    held_[at_] = u;
+    const double now = held_[(at_ + 2) % held_.size()];
+    const double before = held_[(at_ + 1) % held_.size()];
+    at_ = (at_ + 1) % held_.size();
+    advance(x_, plant_.a, [&](int i) {
+      return plant_.now(i, 0) * now + plant_.before(i, 0) * before + plant_.e(i, 0) * d;
+    });
+    return u;
+  }
+
+ private:
+  /// x += a x + input
+  template <class Input>
+  void advance(std::vector<double>& x, const DynamicMatrix<double>& a, const Input& input) {
+    const int n = a.rows();
+    for (int i = 0; i < n; ++i) next_[static_cast<std::size_t>(i)] = input(i);
+    for (int j = 0; j < n; ++j) {
+      const double value = x[static_cast<std::size_t>(j)];
+      for (int i = 0; i < n; ++i) next_[static_cast<std::size_t>(i)] += a(i, j) * value;
+    }
+    for (std::size_t i = 0; i < x.size(); ++i) x[i] += next_[i];
+  }
+
+  SampledPlant plant_;
+  LinearController c_;
+  double half_;
+  std::vector<double> x_, z_, next_, held_;
+  std::size_t at_ = 0;
+};
+
+}  // namespace detail
+
+/// How far an event goes: what its share of half the range of u moves the chain in its time; of
+/// order 1 at most 60 % of what u holds against the pole. @param gain factor on b0 of the plant
+inline double play_distance(const TuneModel& model, double gain, const PlayEvent& event) {
+  const double force = 0.5 * (model.u_max - model.u_min) * std::abs(gain * model.input_gain.value);
+  double far = event.share * force;
+  for (int i = 1; i <= model.order; ++i) far *= event.latencies * model.latency() / i;
+  const double pull = std::abs(model.pole);
+  return model.order == 1 && pull > 0.0 ? std::min(far, 0.6 * force / pull) : far;
+}
+
+/// Plays one event from rest, with u about the middle of its range and the noise of the model.
+/// Back is: y within 2 % of its peak and four deviations of the noise, and u mostly off its limits,
+/// for a settling time; this within 25 times the length of the event and 10 settling times.
+/// @param gain factor on b0 of the plant, not of the controller
+/// @param settling_time of the linear loop, s
+/// @param on_sample called as on_sample(t, r, y, u) once a sample
+template <class Callback>
+Played play(const TuneModel& model, double gain, const LinearController& controller,
+            const PlayEvent& event, double settling_time, const Callback& on_sample) {
+  const double T = model.sample_time;
+  const double latency = model.latency();
+  const double half = 0.5 * (model.u_max - model.u_min);
+  const double force = std::abs(gain * model.input_gain.value) * half;
+  const double length = event.latencies * latency;
+  Played result;
+  const double pull = std::abs(model.pole);
+  // Below 60 % of what u brings back.
+  if (model.pole < 0.0) {
+    const double grown = event.kind == PlayKind::kick ? event.share * length * pull
+                         : event.kind == PlayKind::load
+                             ? std::expm1(pull * length) * std::max(event.share - 1.0, 0.0) +
+                                   event.share * pull * latency
+                             : 0.0;
+    result.counts = grown < 0.6;
+    if (!result.counts) return result;
+  }
+  detail::PlayLoop loop(model, gain, detail::told_of_input(controller), half);
+  sim::Gaussian gaussian(1);
+  const double r = event.kind == PlayKind::step ? play_distance(model, gain, event) : 0.0;
+  const auto samples_of = [T](double time) {
+    return static_cast<long>(std::min(std::ceil(time / T), 1e6));
+  };
+  const long pushed = event.kind == PlayKind::load   ? samples_of(length)
+                      : event.kind == PlayKind::kick ? 1
+                                                     : 0;
+  const double d = event.share * force * (event.kind == PlayKind::kick ? length / T : 1.0);
+  const long last = pushed + std::min(samples_of(25.0 * length + 10.0 * settling_time), 200000L);
+  const long quiet = std::min(samples_of(std::max(settling_time, 20.0 * latency)), 4000L);
+  long since = 0, at_limits = 0;
+  for (long k = 0; k < last; ++k) {
+    const double y = loop.output();
+    const double u = loop(y + model.noise * gaussian.next(), r, k < pushed ? d : 0.0);
+    on_sample(static_cast<double>(k) * T, r, y, u);
+    if (!is_finite(y)) return result;
+    result.peak = std::max(result.peak, std::abs(y - r));
+    if (r > 0.0) result.beyond = std::max(result.beyond, (y - r) / r);
+    if (k < pushed || std::abs(y - r) > 0.02 * result.peak + 4.0 * model.noise) {
+      since = k + 1;
+      at_limits = 0;
+      continue;
+    }
+    at_limits += std::abs(u) >= half ? 1 : 0;
+    if (k - since < quiet) continue;
+    if (4 * at_limits <= quiet) {
+      result.back = true;
+      result.time = static_cast<double>(since - pushed) * T;
+      return result;
+    }
+    since = k + 1;
+    at_limits = 0;
+  }
+  result.time = static_cast<double>(last - pushed) * T;
+  return result;
+}
+
+}  // namespace esokit
