@@ -54,6 +54,9 @@ struct FitData {
   /// Columns with known effects that enter where the disturbance does, each as long as y: friction,
   /// a known load.
   std::vector<std::vector<double>> columns{};
+
+  std::ptrdiff_t friction = -1;  ///< index of the column that is friction, whose number is not
+                                 ///< negative; -1: none
   int averaged =
       1;  ///< rows of the log that were averaged into one; above 1 the input is linear between rows
 };
@@ -94,9 +97,9 @@ struct FitBounds {
   double bandwidth_min = 0.0;  ///< of w, rad/s
   double bandwidth_max = 0.0;  ///< of w, rad/s
   double latency_min = 0.0;    ///< of tau + L, s
-  double latency_max =
-      0.0;  ///< of tau + L, s; the first rows of a piece, for this time, are not used
-  double pole_latency = 0.5;  ///< largest a (tau + L): beyond it pole and lag are exchanged
+  double latency_max = 0.0;    ///< of tau + L, s; the first rows of a piece, for this time, are not
+                               ///< used (unless much of the motion of u lies there)
+  double pole_latency = 0.5;   ///< largest a (tau + L): beyond it pole and lag are exchanged
 };
 
 namespace detail {
@@ -246,7 +249,10 @@ struct InnovationsFilter {
   /// per row.
   void find_gains(double q, std::size_t most, GainTable& found) const {
     std::array<Vector, static_cast<std::size_t>(N)> p{};
-    for (int i = 0; i < N; ++i) p[static_cast<std::size_t>(i)][static_cast<std::size_t>(i)] = 1e8;
+    // Infinite at any w: the states are divided by w^i.
+    for (std::size_t i = 0; i < p.size(); ++i) {
+      p[i][i] = 1e8 / std::min(std::pow(q, static_cast<double>(i)), 1.0);
+    }
     std::vector<double> variances;
     Vector before{};
     const double small = 1e-9 * std::sqrt(q);
@@ -309,13 +315,14 @@ struct InnovationsFilter {
   /// Computes innovations of y, u and the data's columns, each alone (one output for each), or of
   /// all of them together. `signal` is u or a replacement.
   ///
-  /// The first `lead` rows of a piece only fill the lag and the dead time, because the input before
-  /// is unknown.
+  /// The first rows of a piece, `lead` of them, only fill the lag and the dead time, because the
+  /// input before is unknown.
   /// @tparam Runs number of innovations; `output(k)`, `input(k)` and `column(k)` give the signals
   /// of run r
   template <int Runs, class Output, class Input, class Column>
-  void run(const FitData& data, std::ptrdiff_t lead, const std::vector<double>& signal,
-           const Output& output, const Input& input, const Column& column_at,
+  void run(const FitData& data, const std::vector<std::size_t>& lead,
+           const std::vector<double>& signal, const Output& output, const Input& input,
+           const Column& column_at,
            const std::array<double*, static_cast<std::size_t>(Runs)>& out) const {
     const std::size_t steady = table->weights.size() - 1;
     for (std::size_t piece = 0; piece < data.starts.size(); ++piece) {
@@ -327,7 +334,7 @@ struct InnovationsFilter {
       };
       double v = u(from);
       double u_before = v, u_now = v;
-      const std::ptrdiff_t begin = std::min(from + lead, to);
+      const std::ptrdiff_t begin = std::min(from + static_cast<std::ptrdiff_t>(lead[piece]), to);
       for (std::ptrdiff_t k = from; k < begin; ++k) {
         for (double* const to_run : out) to_run[k] = 0.0;
         const double u_next = u(k - delay + 1);
@@ -384,15 +391,13 @@ class InnovationsFit {
  public:
   /// For `data`, which must outlive this object.
   InnovationsFit(const FitData& data, const FitModel& model, const FitBounds& bounds)
-      : data_(data),
-        model_(model),
-        bounds_(bounds),
-        lead_(static_cast<std::ptrdiff_t>(std::ceil(bounds.latency_max / data.sample_time))) {
+      : data_(data), model_(model), bounds_(bounds) {
     for (std::size_t piece = 0; piece < data.starts.size(); ++piece) {
       const std::size_t to =
           piece + 1 < data.starts.size() ? data.starts[piece + 1] : data.y.size();
-      const std::size_t blind =
-          data.starts[piece] + static_cast<std::size_t>(lead_ + model.order + model.extension);
+      lead_.push_back(lead(data.starts[piece], to));
+      const std::size_t blind = data.starts[piece] + lead_.back() +
+                                static_cast<std::size_t>(model.order + model.extension);
       if (to > blind) rows_ += to - blind;
     }
   }
@@ -515,20 +520,6 @@ class InnovationsFit {
     return p;
   }
 
-  /// The output of the filter for a series in place of y, without inputs.
-  [[nodiscard]] std::vector<double> innovations_of(const FitPoint& point,
-                                                   const std::vector<double>& series) const {
-    std::vector<double> out(series.size());
-    with_filter(point, [&](const auto& filter) {
-      filter.template run<1>(
-          data_, lead_, data_.u,
-          [&](std::size_t, std::ptrdiff_t k) { return series[static_cast<std::size_t>(k)]; },
-          [](std::size_t) { return 0.0; }, [](std::size_t, std::ptrdiff_t) { return 0.0; },
-          {out.data()});
-    });
-    return out;
-  }
-
   /// The measurement noise from the innovations of the fit that `at` or `minimise` returned last,
   /// at frequencies where the disturbance has less than a tenth of the noise's power, as the median
   /// over all stretches; 0 if these are too few. Effects that are not in the model are slower (a
@@ -547,13 +538,13 @@ class InnovationsFit {
       variance = filter.table->steady_variance;
     });
     std::vector<double> powers;
-    each_spectrum(residual_, data_.starts,
-                  static_cast<std::size_t>(lead_ + model_.order + model_.extension), length,
-                  [&](const std::vector<double>& power) {
-                    double sum = 0.0;
-                    for (const std::size_t j : quiet) sum += power[j];
-                    powers.push_back(sum / static_cast<double>(quiet.size()));
-                  });
+    const std::size_t lead = *std::max_element(lead_.begin(), lead_.end()) +
+                             static_cast<std::size_t>(model_.order + model_.extension);
+    each_spectrum(residual_, data_.starts, lead, length, [&](const std::vector<double>& power) {
+      double sum = 0.0;
+      for (const std::size_t j : quiet) sum += power[j];
+      powers.push_back(sum / static_cast<double>(quiet.size()));
+    });
     if (quiet.size() < 8 || powers.size() < 15) return {};
     std::sort(powers.begin(), powers.end());
     const double middle = powers[powers.size() / 2];
@@ -593,6 +584,24 @@ class InnovationsFit {
   }
 
  private:
+  /// Rows at the start of a piece that only fill the lag and the dead time: those of the longest
+  /// latency, unless much of the motion of u lies there, as in the record of a step. Then u is
+  /// taken to have been at rest before.
+  [[nodiscard]] std::size_t lead(std::size_t from, std::size_t to) const {
+    const auto most = static_cast<std::size_t>(std::ceil(bounds_.latency_max / data_.sample_time));
+    const std::vector<double>& u = data_.u;
+    double first = 0.0, all = 0.0;
+    std::size_t rest = 0;
+    for (std::size_t k = from + 1; k < to; ++k) {
+      const double move = std::abs(u[k] - u[k - 1]);
+      if (all <= 0.0) rest = k - 1 - from;
+      all += move;
+      if (k <= from + most) first += move;
+    }
+    const double share = static_cast<double>(most) / static_cast<double>(to - from);
+    return first > std::max(0.1, 3.0 * share) * all ? rest : most;
+  }
+
   static constexpr std::array<double, 4> longest_step = {1.0, 0.7, 0.4, 0.2};
   static constexpr std::array<double, 4> small_step = {1e-4, 1e-4, 1e-4, 1e-4};
 
@@ -678,10 +687,20 @@ class InnovationsFit {
           [&](std::size_t, std::ptrdiff_t k) { return column[static_cast<std::size_t>(k)]; },
           {columns_[next++].data()});
     }
-    std::vector<double> normal;
-    normal_equations(std::span(columns_).subspan(1), columns_[0], normal, fit.linear);
-    for (double& value : fit.linear) value = -value;
-    detail::solve_normal(normal, fit.linear, static_cast<int>(count) - 1);
+    const auto solve = [&] {
+      std::vector<double> normal;
+      normal_equations(std::span(columns_).subspan(1), columns_[0], normal, fit.linear);
+      for (double& value : fit.linear) value = -value;
+      detail::solve_normal(normal, fit.linear, static_cast<int>(count) - 1);
+    };
+    solve();
+    if (data_.friction >= 0) {
+      const std::size_t c = 1 + data_.inputs.size() + static_cast<std::size_t>(data_.friction);
+      if (fit.linear[c] < 0.0) {
+        columns_[c + 1].assign(rows, 0.0);
+        solve();
+      }
+    }
     residual_ = columns_[0];
     for (std::size_t c = 1; c < count; ++c) {
       for (std::size_t k = 0; k < rows; ++k) residual_[k] += fit.linear[c - 1] * columns_[c][k];
@@ -697,7 +716,7 @@ class InnovationsFit {
   const FitData& data_;
   FitModel model_;
   FitBounds bounds_;
-  std::ptrdiff_t lead_;
+  std::vector<std::size_t> lead_{};             // unused rows at the start of each piece
   std::size_t rows_ = 0;                        // number of innovations used
   std::vector<std::vector<double>> columns_{};  // of y, u, and the data's columns
   std::vector<double> residual_{};

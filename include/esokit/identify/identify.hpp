@@ -13,15 +13,16 @@
 #include <esokit/identify/intervals.hpp>
 #include <esokit/identify/log.hpp>
 #include <esokit/identify/plateau.hpp>
+#include <esokit/identify/second_opinion.hpp>
 #include <esokit/identify/sinusoids.hpp>
 #include <esokit/model/augmented_model.hpp>
 #include <esokit/model/linear_plant.hpp>
 #include <esokit/observer/model_eso.hpp>
-#include <esokit/sim/gaussian.hpp>
 #include <functional>
 #include <iterator>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -43,10 +44,11 @@ struct IdentifyOptions {
 
   /// Whether u is what the actuator held. A command beyond its limits is not.
   bool applied = true;
-  double interval_max = 0.1;     ///< largest half width of the interval of b0, share of b0
-  double plateau_max = 0.1;      ///< largest relative difference of b0 between three bandwidths
-  double correlation_max = 0.1;  ///< largest correlation of innovations, lags 1 to 20; 1: no check
-  bool scheduled = false;        ///< accept a b0 that depends on the scheduling column
+  double interval_max = 0.1;      ///< largest half width of the interval of b0, share of b0
+  double interval_agreed = 0.35;  ///< the same if output error finds the same b0
+  double plateau_max = 0.1;       ///< largest relative difference of b0 between three bandwidths
+  double correlation_max = 0.1;   ///< largest correlation of innovations, lags 1 to 20; 1: no check
+  bool scheduled = false;         ///< accept a b0 that depends on the scheduling column
   double friction_shift_max =
       3;  ///< largest difference of b0 between friction scales, standard errors
   double position_shift_max = 1.5;  ///< largest change of b0 by a force by position, half widths
@@ -56,6 +58,7 @@ struct IdentifyOptions {
 /// The best fit of one order.
 struct OrderFit {
   FitModel model{};             ///< n, m and whether it has a pole
+  FitBounds bounds{};           ///< of its parameters
   Fit fit{};                    ///< the fit with the smallest innovations
   double friction_scale = 0.0;  ///< v_s, 0 without friction
   double criterion = 0.0;  ///< rows log(mean square) + parameters log(rows): the smallest is best
@@ -99,9 +102,10 @@ struct Identified {
   bool position = false;
 
   /// Change of b0 if they are added (if they are in the model: the next three powers), half widths
-  /// of b0, with its drift over one and a half octaves.
+  /// of b0 (at least 1 % of b0), with its drift over one and a half octaves.
   double position_shift = 0;
   double correlation = 0;          ///< largest correlation of the innovations over lags 1 to 20
+  SecondOpinion second_opinion{};  ///< b0 by output error
   int averaged = 1;                ///< rows of the log that were averaged into one
   bool at_bound = false;           ///< a parameter is at a bound of its range at the plateau
   double excitation = 0;           ///< smallest relative standard error of b0
@@ -265,29 +269,9 @@ inline double rms(const std::vector<double>& values) {
   return std::sqrt(sum / static_cast<double>(std::max<std::size_t>(values.size(), 1)));
 }
 
-/// Largest correlation of the innovations at a fit over lags 1 to 20, without the part that
-/// rounding to `step` causes: a slow motion is rounded alike in neighbouring rows. This part is
-/// computed with the same filter from the rounding of the smoothed motion, plus white noise.
-inline double innovations_correlation(const InnovationsFit& fit, const FitPoint& at, double step) {
-  const std::vector<double>& e = fit.residual();
-  auto found = correlations(e);
-  if (step > 0.0) {
-    const std::vector<double>& y = fit.data().y;
-    std::vector<double> rounding = smoothed(fit.data(), 8, 0), white(y.size());
-    sim::Gaussian gaussian(1);
-    for (std::size_t k = 0; k < y.size(); ++k) {
-      const double steps = (rounding[k] - y[0]) / step;
-      rounding[k] = (std::round(steps) - steps) * step;
-      white[k] = gaussian.next();
-    }
-    const auto of_rounding = fit.innovations_of(at, rounding);
-    const auto coloured = correlations(of_rounding);
-    const auto plain = correlations(fit.innovations_of(at, white));
-    const double share = std::min(
-        dot(of_rounding.data(), of_rounding.data(), y.size()) / dot(e.data(), e.data(), e.size()),
-        1.0);
-    for (std::size_t i = 0; i < found.size(); ++i) found[i] -= share * (coloured[i] - plain[i]);
-  }
+/// Largest correlation of the innovations over lags 1 to 20.
+inline double innovations_correlation(const std::vector<double>& e) {
+  const auto found = correlations(e);
   double largest = 0.0;
   for (const double value : found) largest = std::max(largest, std::abs(value));
   // A residual that is zero or not finite is no evidence of a good fit.
@@ -318,12 +302,21 @@ inline std::vector<double> friction_speed(const FitData& data, int order, double
   return half > 2 ? smoothed(data, half, 1) : speed;
 }
 
+/// Whether a speed comes near zero, where friction turns round. Of a y that stays away from zero (a
+/// temperature) nothing may depend on where zero is.
+inline bool stops(const std::vector<double>& speed) {
+  const auto [low, high] = std::minmax_element(speed.begin(), speed.end());
+  const double near = 0.02 * (*high - *low);
+  return *low <= near && *high >= -near;
+}
+
 /// The data with an added column for friction, tanh(speed / scale).
 inline FitData with_friction(const FitData& data, const std::vector<double>& speed, double scale) {
   FitData out = data;
   std::vector<double> column(speed.size());
   for (std::size_t k = 0; k < speed.size(); ++k) column[k] = -std::tanh(speed[k] / scale);
   out.columns.push_back(std::move(column));
+  out.friction = static_cast<std::ptrdiff_t>(out.columns.size()) - 1;
   return out;
 }
 
@@ -346,12 +339,14 @@ inline void add_position(FitData& data, std::size_t from = 1) {
   }
 }
 
-inline FitBounds fit_bounds(const FitData& data) {
+/// Bounds of the fit. A slow sensor in a short log needs wide ones, in which an order that is too
+/// low can pass for a higher one: so only when the order is chosen.
+inline FitBounds fit_bounds(const FitData& data, bool wide) {
   const double T = data.sample_time;
   const double duration = T * static_cast<double>(data.y.size());
-  return {6.0 / duration, 1.5 / T, 0.05 * T, std::min(200.0 * T, duration / 30.0), 0.5};
+  return {6.0 / duration, 1.5 / T, 0.05 * T, std::min(200.0 * T, duration / (wide ? 12.0 : 30.0)),
+          wide ? 0.9 : 0.5};
 }
-
 /// The best fit from several starts, with w free.
 inline Fit best_fit(InnovationsFit& fit, int starts = 3) {
   const double T = fit.data().sample_time;
@@ -373,10 +368,10 @@ inline Fit best_fit(InnovationsFit& fit, int starts = 3) {
     if (near) continue;
     if (static_cast<int>(tried.size()) == starts) break;
     tried.push_back(start.at.latency);
-    const Fit found = fit.minimise(start.at, true);
+    const Fit found = fit.minimise(start.at, true, 8);
     if (found.mean_square < best.mean_square) best = found;
   }
-  return best;
+  return best.converged ? best : fit.minimise(best.at, true);
 }
 
 /// rows log(mean square) + parameters log(rows).
@@ -386,20 +381,19 @@ inline double criterion(const Fit& fit, int parameters) {
 }
 
 /// The best fit of one order, with friction if that improves it.
-/// @param step to which y is rounded, 0: not rounded
 inline OrderFit fit_order(const FitData& data, const IdentifyOptions& options, int order,
-                          double step) {
-  const FitBounds bounds = fit_bounds(data);
+                          const FitBounds& bounds) {
   OrderFit result;
   result.model = {order, 1, options.pole};
+  result.bounds = bounds;
   const int columns = static_cast<int>(data.columns.size());
   InnovationsFit plain(data, result.model, bounds);
   result.fit = best_fit(plain);
   (void)plain.at(result.fit.at);  // innovations of this fit, not of the last start
   result.criterion = criterion(result.fit, 5 + columns);
-  result.correlation = innovations_correlation(plain, result.fit.at, step);
+  result.correlation = innovations_correlation(plain.residual());
   result.noise = plain.noise_floor(result.fit);
-  if (!options.friction || order > 2) return result;
+  if (!options.friction || order > 2 || (order == 1 && !stops(data.y))) return result;
   const auto speed = friction_speed(data, order, result.fit.noise, result.fit.at.latency);
   const double size = rms(speed);
   if (!(size > 0.0)) return result;
@@ -436,7 +430,7 @@ inline OrderFit fit_order(const FitData& data, const IdentifyOptions& options, i
     result.friction_scale = best_scale;
     // Computes the residual of this fit again.
     (void)fit.at(found.at);
-    result.correlation = innovations_correlation(fit, found.at, step);
+    result.correlation = innovations_correlation(fit.residual());
     result.noise = fit.noise_floor(result.fit);
   }
   return result;
@@ -457,7 +451,7 @@ inline void compare_orders(const FitData& data, std::vector<OrderFit>& orders) {
   for (const OrderFit& order : orders) least = std::min(least, order.fit.at.bandwidth);
   for (OrderFit& order : orders) {
     const FitData used = with_friction(data, order);
-    InnovationsFit fit(used, order.model, fit_bounds(data));
+    InnovationsFit fit(used, order.model, order.bounds);
     FitPoint point = order.fit.at;
     order.slower = 0.0;
     for (const double factor : {std::sqrt(0.1), 0.1}) {
@@ -471,9 +465,9 @@ inline void compare_orders(const FitData& data, std::vector<OrderFit>& orders) {
 
 /// The best fit of each requested order.
 inline std::vector<OrderFit> fit_orders(const FitData& data, const IdentifyOptions& options,
-                                        double step) {
+                                        const FitBounds& bounds) {
   std::vector<OrderFit> orders;
-  for (const int order : options.orders) orders.push_back(fit_order(data, options, order, step));
+  for (const int order : options.orders) orders.push_back(fit_order(data, options, order, bounds));
   compare_orders(data, orders);
   return orders;
 }
@@ -498,11 +492,11 @@ inline bool position_acts(const FitData& data, const OrderFit& order) {
   FitData more = data;
   add_position(more);
   const FitData used = with_friction(more, order);
-  InnovationsFit fit(used, order.model, fit_bounds(data));
+  InnovationsFit fit(used, order.model, order.bounds);
   const Fit found = fit.minimise(order.fit.at, true, 8);
   if (criterion(found, static_cast<int>(position_columns)) < criterion(order.fit, 0)) return true;
   const FitData before = with_friction(data, order);
-  InnovationsFit without(before, order.model, fit_bounds(data));
+  InnovationsFit without(before, order.model, order.bounds);
   FitPoint slower = order.fit.at;
   slower.bandwidth *= 0.1;
   const double left = without.minimise(slower, false, 8).mean_square;
@@ -545,7 +539,10 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
       parts.u[k] = 0.0;
     }
   }
-  const FitBounds bounds = fit_bounds(used);
+  const FitBounds& bounds =
+      std::find_if(result.orders.begin(), result.orders.end(), [&](const auto& order) {
+        return order.model.order == result.order;
+      })->bounds;
   const Plateau& plateau = result.plateau;
   // At the plateau and its neighbours, like b0 itself.
   const auto solved = [&](const FitData& data, std::vector<double>& value,
@@ -592,6 +589,272 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
   for (std::size_t k = 0; k < along.size(); ++k) line.inputs[0][k] = used.u[k] * (along[k] - mean);
   solved(line, value, error);
   result.schedule_slope = {value[1], t * error[1]};
+}
+
+/// Smallest share of u that does not follow from y.
+constexpr double own_input_min = 1e-5;
+
+/// Largest relative standard error of b0 at which u can be said to move y.
+constexpr double excitation_max = 0.15;
+
+/// Whether the innovations are as white as those of an exact model: of few rows the largest of
+/// twenty correlations is larger.
+inline double correlation_limit(const Identified& found, const IdentifyOptions& options) {
+  const double rows = static_cast<double>(found.log.used) / found.averaged;
+  return std::max(options.correlation_max, 3.0 / std::sqrt(rows));
+}
+inline bool white(const Identified& found, const IdentifyOptions& options) {
+  return found.correlation <= correlation_limit(found, options);
+}
+
+/// Whether output error tells b0. Where y follows u within half a row, no machine was seen between
+/// them (y may have been logged before u, or b0 is lost in the noise): then nothing is confirmed.
+inline bool informed(const Identified& found) {
+  return found.second_opinion.informative() &&
+         found.latency.value >= 0.5 * found.averaged * found.log.sample_time;
+}
+
+/// The study of rows that were averaged by `fold`.
+/// @param rows without the scheduling column @param along the scheduling column, or empty
+/// @param result what is known of the log before; returned with the rest
+/// @param raw_noise noise from the fast part of the innovations of the plain rows
+/// @param wide whether the bounds are those of a chosen order
+inline Identified study_rows(FitData rows, const std::vector<double>& along,
+                             const IdentifyOptions& options, Identified result, Estimate& raw_noise,
+                             bool wide, const std::function<void(double)>& progress) {
+  const std::size_t known = rows.columns.size();
+  const FitBounds bounds = fit_bounds(rows, wide);
+  auto orders = fit_orders(rows, options, bounds);
+  progress(0.3);
+  auto winner = best_order(orders);
+  bool& position = result.position;
+  IdentifyOptions tried = options;
+  std::vector<OrderFit> of_speed;  // fits for order 1, which has no position
+  if (options.position && winner->model.order > 1) {
+    // Without the force a higher order can be best, so the simplest order decides about it.
+    const OrderFit* simplest = nullptr;
+    for (const OrderFit& order : orders) {
+      const int n = order.model.order;
+      if (n > 1 && (simplest == nullptr || n < simplest->model.order)) simplest = &order;
+    }
+    position = position_acts(rows, *simplest);
+    if (position) {
+      std::copy_if(orders.begin(), orders.end(), std::back_inserter(of_speed),
+                   [](const OrderFit& order) { return order.model.order == 1; });
+      add_position(rows);
+      std::erase(tried.orders, 1);
+      orders = fit_orders(rows, tried, bounds);
+      winner = best_order(orders);
+    }
+  }
+  const auto sines = find_sines(with_friction(rows, *winner), winner->model, bounds, winner->fit.at,
+                                options.sinusoids);
+  for (const double frequency : sines) {
+    add_sine(rows, winner->model.order, frequency);
+  }
+  if (!sines.empty()) {
+    orders = fit_orders(rows, tried, bounds);
+    winner = best_order(orders);
+  }
+  const OrderFit chosen = *winner;
+  if (result.averaged == 1 && chosen.correlation < 0.3) raw_noise = chosen.noise;
+  result.orders = std::move(of_speed);
+  result.orders.insert(result.orders.end(), orders.begin(), orders.end());
+  result.order = chosen.model.order;
+  result.correlation = chosen.correlation;
+  FitData used = rows;
+  std::vector<double> speed;
+  if (chosen.friction_scale > 0.0) {
+    speed = friction_speed(rows, chosen.model.order, chosen.fit.noise, chosen.fit.at.latency);
+    used = with_friction(rows, speed, chosen.friction_scale);
+  }
+  // The other m has the same number of parameters, so the likelihood decides, if it improves by
+  // more than one parameter costs.
+  const auto extended = [&](int extension) {
+    InnovationsFit other(used, {chosen.model.order, extension, chosen.model.pole}, bounds);
+    Fit found = other.minimise(chosen.fit.at, true);
+    FitPoint slower = chosen.fit.at;
+    slower.bandwidth *= 0.3;
+    const Fit second = other.minimise(slower, true);
+    return second.mean_square < found.mean_square ? second : found;
+  };
+  FitModel model = chosen.model;
+  Fit likely = chosen.fit;
+  if (options.extension != 1) {
+    const Fit other = extended(2);
+    const double count = static_cast<double>(other.rows);
+    if (options.extension == 2 ||
+        count * std::log(chosen.fit.mean_square / other.mean_square) > std::log(count)) {
+      model.extension = 2;
+      likely = other;
+    }
+  }
+  result.extension = model.extension;
+  InnovationsFit fit(used, model, bounds);
+  likely = fit.at(likely.at);
+  if (model.extension == 2) {
+    result.correlation = innovations_correlation(fit.residual());
+  }
+  result.disturbance = likely.disturbance;
+  const FitErrors likely_errors = jackknife(fit, likely, true);
+  const double rows_averaged = std::sqrt(static_cast<double>(result.averaged));
+  const double t = student_95(19);
+  result.noise = {likely.noise * rows_averaged, t * likely_errors.noise * rows_averaged};
+  // If the innovations of the rows are nearly white, their fast part gives the noise.
+  if (raw_noise.value > 0.0) {
+    result.noise = {raw_noise.value,
+                    std::max(raw_noise.half_width, result.noise.share() * raw_noise.value)};
+  }
+  // The rounding of an encoder is not visible at rest.
+  const double rounding = result.log.quantisation / std::sqrt(12.0);
+  if (result.noise.low() < rounding) {
+    result.noise.half_width = std::max(result.noise.high() - rounding, result.noise.half_width);
+    result.noise.value = rounding;
+  }
+  progress(0.5);
+  result.plateau = find_plateau(fit, likely);
+  progress(0.8);
+  if (result.plateau.middle == 0) {
+    result.input_gain = {likely.linear[0], std::numeric_limits<double>::infinity()};
+    return result;
+  }
+  const Plateau& plateau = result.plateau;
+  const PlateauPoint& here = plateau.points[plateau.middle];
+  const PlateauPoint& below = plateau.points[plateau.middle - 1];
+  const PlateauPoint& above = plateau.points[plateau.middle + 1];
+  // Friction with a smaller or larger scale, by more than the steps of the search.
+  double friction_spread = 0.0;
+  if (chosen.friction_scale > 0.0) {
+    double low = here.fit.linear[0], high = low;
+    for (const double factor : {std::sqrt(0.5), std::sqrt(2.0)}) {
+      const FitData other = with_friction(rows, speed, factor * chosen.friction_scale);
+      InnovationsFit varied(other, model, bounds);
+      const Fit found = varied.minimise(here.fit.at, false, 5);
+      low = std::min(low, found.linear[0]);
+      high = std::max(high, found.linear[0]);
+    }
+    friction_spread = high - low;
+  }
+  // A force that depends on position if none was found, or else with higher powers.
+  double position_spread = 0.0;
+  if (model.order > 1) {
+    FitData other = used;
+    add_position(other, result.position ? position_columns + 1 : 1);
+    InnovationsFit varied(other, model, bounds);
+    const Fit found = varied.minimise(here.fit.at, false, 5);
+    position_spread = std::abs(found.linear[0] - here.fit.linear[0]);
+  }
+  // The interval combines the jackknife with the dependence on the bandwidth: between neighbours,
+  // and over one and a half octaves to each side as far as the number is accurate there. `down` is
+  // the number of points below, `resolved` the share to which a point counts at most.
+  const std::size_t last = std::min(plateau.middle + 3, plateau.points.size() - 1);
+  const auto estimate = [&](auto value, auto error, double more, std::size_t down = 3,
+                            double resolved = 0.0) {
+    const double x = value(here);
+    const std::size_t first = plateau.middle - std::min(plateau.middle, down);
+    const double spread =
+        std::max({value(below), x, value(above)}) - std::min({value(below), x, value(above)});
+    double squares = 0.0, weights = 0.0;
+    for (std::size_t i = first; i <= last; ++i) {
+      const PlateauPoint& point = plateau.points[i];
+      // A point that is more accurate than this one, or has no error, does not count more.
+      const double size = std::max({error(point), error(here), resolved * std::abs(x)});
+      const double weight = size > 0.0 && !point.at_bound ? 1.0 / (size * size) : 0.0;
+      squares += weight * (value(point) - x) * (value(point) - x);
+      weights += weight;
+    }
+    const double drift = weights > 0.0 ? std::sqrt(squares / weights) : 0.0;
+    return Estimate{x, t * error(here) + 0.25 * spread + drift + more};
+  };
+  const auto gain = [&](std::size_t down, double resolved) {
+    return estimate([](const PlateauPoint& p) { return p.fit.linear[0]; },
+                    [](const PlateauPoint& p) { return p.errors.linear[0]; },
+                    0.25 * friction_spread, down, resolved);
+  };
+  // A flexible mode changes b0 over octaves, by more than the errors at each bandwidth: so b0 is
+  // compared over three octaves below, where the machine is closer to the model, and to 2 %.
+  result.input_gain = gain(6, 0.02);
+  // What else could change b0 is compared with the interval of this plateau: a wider one would hide
+  // it.
+  const double near = gain(3, 0.0).half_width;
+  // Less than a per cent does no harm, however sharp the interval is.
+  result.position_shift =
+      position_spread / std::max(near, 0.01 * std::abs(result.input_gain.value));
+  // A standard error is half of a half width.
+  result.friction_shift = 2.0 * friction_spread / near;
+  // The fit cannot distinguish times below a twentieth of a row.
+  const auto time = [&](Estimate found) {
+    found.half_width = std::max(found.half_width, 0.05 * rows.sample_time);
+    return found;
+  };
+  result.latency = time(estimate([](const PlateauPoint& p) { return p.fit.at.latency; },
+                                 [](const PlateauPoint& p) { return p.errors.latency; }, 0.0));
+  result.lag = time(estimate([](const PlateauPoint& p) { return p.fit.at.lag(); },
+                             [](const PlateauPoint& p) { return p.errors.lag; }, 0.0));
+  result.dead_time = time(estimate([](const PlateauPoint& p) { return p.fit.at.dead_time(); },
+                                   [](const PlateauPoint& p) { return p.errors.dead_time; }, 0.0));
+  result.pole = estimate([](const PlateauPoint& p) { return p.fit.at.pole; },
+                         [](const PlateauPoint& p) { return p.errors.pole; }, 0.0);
+  // The linear numbers: b0, the log's columns, sines, friction.
+  const auto linear = [&](std::size_t c) {
+    return estimate([c](const PlateauPoint& p) { return p.fit.linear[c]; },
+                    [c](const PlateauPoint& p) { return p.errors.linear[c]; }, 0.0);
+  };
+  for (std::size_t c = 1; c <= known; ++c) result.columns.push_back(linear(c));
+  if (chosen.friction_scale > 0.0) result.friction = linear(here.fit.linear.size() - 1);
+  for (std::size_t i = 0; i < sines.size(); ++i) {
+    FitData rest = used;
+    const auto pair =
+        rest.columns.begin() +
+        static_cast<std::ptrdiff_t>(known + (result.position ? position_columns : 0) + 2 * i);
+    rest.columns.erase(pair, pair + 2);
+    if (rest.friction >= 0) rest.friction -= 2;
+    Sinusoid sine = fit_sine(rest, model, bounds, here.fit.at, sines[i]).sine;
+    sine.frequency.half_width *= t;
+    sine.amplitude.half_width *= t;
+    if (sine.amplitude.low() > 0.0) result.sinusoids.push_back(sine);
+  }
+  std::sort(
+      result.sinusoids.begin(), result.sinusoids.end(),
+      [](const Sinusoid& a, const Sinusoid& b) { return a.amplitude.value > b.amplitude.value; });
+  if (!along.empty()) {
+    find_schedule(used, along, model, options, result);
+  }
+  double excitation = std::numeric_limits<double>::infinity();
+  for (const PlateauPoint& point : plateau.points) {
+    excitation = std::min(excitation, point.errors.linear[0] / std::abs(point.fit.linear[0]));
+  }
+  result.excitation = excitation;
+  // The fit of output error is blind where the plant integrates or a force depends on y: nearer to
+  // the plateau it sees again.
+  const double middle = here.fit.at.bandwidth;
+  for (const double w : {0.1 * bounds.bandwidth_min, 0.1 * middle, 0.3 * middle}) {
+    if (!(excitation < excitation_max)) break;
+    result.second_opinion = second_opinion(used, model, bounds, here.fit.at, w);
+    if (result.second_opinion.informative()) break;
+  }
+  // Where one of the two may be wrong, the interval spans both. Coloured innovations mean that the
+  // model is not exact, so b0 is not known better than to a percent.
+  const bool coloured = !white(result, options);
+  Estimate& gain_found = result.input_gain;
+  if (coloured) gain_found.half_width += 0.01 * std::abs(gain_found.value);
+  if (informed(result) && (coloured || gain_found.share() > options.interval_max)) {
+    gain_found.half_width = std::max(
+        gain_found.half_width, std::abs(result.second_opinion.input_gain.value - gain_found.value));
+  }
+  result.at_bound = here.at_bound;
+  return result;
+}
+
+/// Whether averaged rows are better. Averaging loses fast effects, in the end the motion itself: so
+/// it must help much, b0 must agree with that of the plain rows, and a row must be short.
+inline bool better(const Identified& averaged, const Identified& plain, const Identified& best,
+                   const IdentifyOptions& options) {
+  const double apart = std::abs(averaged.input_gain.value - plain.input_gain.value);
+  const double span = averaged.averaged * averaged.log.sample_time;
+  return (white(averaged, options) || averaged.correlation < 0.5 * best.correlation) &&
+         apart <= averaged.input_gain.half_width + plain.input_gain.half_width &&
+         span * std::abs(averaged.pole.value) < 0.2;
 }
 
 }  // namespace detail
@@ -651,12 +914,12 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
   result.own_input = detail::own_input(raw);
   std::vector<int> folds = {1, 4, 8, 16};
   if (options.averaged > 0) folds = {options.averaged};
-  FitData data;
-  std::vector<double> schedule, frequencies;
-  std::vector<OrderFit> best_orders, best_first;
-  const OrderFit* best = nullptr;
-  double best_correlation = std::numeric_limits<double>::infinity();
+  // Once an order is chosen and at a bound, it alone is tried within wider ones.
+  IdentifyOptions how = options;
+  bool wide = false;
+  std::optional<Identified> first, best;
   Estimate raw_noise;
+  double done = 0.1;
   for (const int fold : folds) {
     FitData rows = averaged(raw, fold);
     if (rows.y.size() < 200) break;
@@ -665,232 +928,36 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
       along = std::move(rows.columns.back());
       rows.columns.pop_back();
     }
-    const double step = fold == 1 ? result.log.quantisation : 0.0;
-    auto orders = detail::fit_orders(rows, options, step);
-    auto winner = detail::best_order(orders);
-    bool position = false;
-    IdentifyOptions tried = options;
-    std::vector<OrderFit> first;  // fits for order 1, which has no position
-    if (options.position && winner->model.order > 1) {
-      // Without the force a higher order can be best, so the simplest order decides about it.
-      const OrderFit* simplest = nullptr;
+    const double share = 0.6 * (1.0 - done);
+    result.averaged = fold;
+    const auto studied = [&] {
+      return detail::study_rows(rows, along, how, result, raw_noise, wide, [&](double part) {
+        if (options.progress)
+          options.progress(done + share * (wide ? 0.5 + 0.5 * part : 0.5 * part));
+      });
+    };
+    Identified found = studied();
+    if (found.at_bound && !wide) {
+      wide = true;
+      how.orders = {found.order};
+      const auto orders = found.orders;
+      found = studied();
       for (const OrderFit& order : orders) {
-        const int n = order.model.order;
-        if (n > 1 && (simplest == nullptr || n < simplest->model.order)) simplest = &order;
+        if (order.model.order != found.order) found.orders.push_back(order);
       }
-      position = detail::position_acts(rows, *simplest);
-      if (position) {
-        std::copy_if(orders.begin(), orders.end(), std::back_inserter(first),
-                     [](const OrderFit& order) { return order.model.order == 1; });
-        detail::add_position(rows);
-        std::erase(tried.orders, 1);
-        orders = detail::fit_orders(rows, tried, step);
-        winner = detail::best_order(orders);
-      }
+      std::sort(found.orders.begin(), found.orders.end(),
+                [](const auto& a, const auto& b) { return a.model.order < b.model.order; });
     }
-    const auto sines =
-        detail::find_sines(detail::with_friction(rows, *winner), winner->model,
-                           detail::fit_bounds(rows), winner->fit.at, options.sinusoids);
-    for (const double frequency : sines) {
-      detail::add_sine(rows, winner->model.order, frequency);
-    }
-    if (!sines.empty()) {
-      orders = detail::fit_orders(rows, tried, step);
-      winner = detail::best_order(orders);
-    }
-    const std::size_t index = static_cast<std::size_t>(winner - orders.begin());
-    if (fold == 1 && winner->correlation < 0.3) raw_noise = winner->noise;
-    // Averaging loses fast effects, so it is used only if it helps much.
-    if (winner->correlation < options.correlation_max ||
-        winner->correlation < 0.5 * best_correlation) {
-      best_correlation = winner->correlation;
-      best_orders = std::move(orders);
-      best_first = std::move(first);
-      best = &best_orders[index];
-      data = std::move(rows);
-      schedule = std::move(along);
-      frequencies = sines;
-      result.position = position;
-      result.averaged = fold;
-    }
-    if (options.progress) options.progress(0.1 * fold / 16 + 0.3);
-    if (best_correlation < options.correlation_max) break;
+    done += share;
+    if (!first) first = found;
+    if (!best || detail::better(found, *first, *best, options)) best = std::move(found);
+    const bool decided = detail::white(*best, options) || detail::informed(*best);
+    if (decided || !(result.own_input > detail::own_input_min)) break;
   }
-  if (best == nullptr)
+  if (!best)
     return E{"averaged", static_cast<double>(options.averaged), "leaves fewer than 200 rows"};
-  result.orders = best_first;
-  result.orders.insert(result.orders.end(), best_orders.begin(), best_orders.end());
-  const OrderFit chosen = *best;
-  result.order = chosen.model.order;
-  result.correlation = chosen.correlation;
-  const FitBounds bounds = detail::fit_bounds(data);
-  FitData used = data;
-  std::vector<double> speed;
-  if (chosen.friction_scale > 0.0) {
-    speed =
-        detail::friction_speed(data, chosen.model.order, chosen.fit.noise, chosen.fit.at.latency);
-    used = detail::with_friction(data, speed, chosen.friction_scale);
-  }
-  // The other m has the same number of parameters, so the likelihood decides, if it improves by
-  // more than one parameter costs.
-  const auto extended = [&](int extension) {
-    InnovationsFit other(used, {chosen.model.order, extension, chosen.model.pole}, bounds);
-    Fit found = other.minimise(chosen.fit.at, true);
-    FitPoint slower = chosen.fit.at;
-    slower.bandwidth *= 0.3;
-    const Fit second = other.minimise(slower, true);
-    return second.mean_square < found.mean_square ? second : found;
-  };
-  FitModel model = chosen.model;
-  Fit likely = chosen.fit;
-  if (options.extension != 1) {
-    const Fit other = extended(2);
-    const double rows = static_cast<double>(other.rows);
-    if (options.extension == 2 ||
-        rows * std::log(chosen.fit.mean_square / other.mean_square) > std::log(rows)) {
-      model.extension = 2;
-      likely = other;
-    }
-  }
-  result.extension = model.extension;
-  InnovationsFit fit(used, model, bounds);
-  likely = fit.at(likely.at);
-  if (model.extension == 2) {
-    result.correlation = detail::innovations_correlation(
-        fit, likely.at, result.averaged == 1 ? result.log.quantisation : 0.0);
-  }
-  result.disturbance = likely.disturbance;
-  const FitErrors likely_errors = jackknife(fit, likely, true);
-  const double rows_averaged = std::sqrt(static_cast<double>(result.averaged));
-  const double t = student_95(19);
-  result.noise = {likely.noise * rows_averaged, t * likely_errors.noise * rows_averaged};
-  // If the innovations of the rows are nearly white, their fast part gives the noise.
-  if (raw_noise.value > 0.0) {
-    result.noise = {raw_noise.value,
-                    std::max(raw_noise.half_width, result.noise.share() * raw_noise.value)};
-  }
-  // The rounding of an encoder is not visible at rest.
-  const double rounding = result.log.quantisation / std::sqrt(12.0);
-  if (result.noise.low() < rounding) {
-    result.noise.half_width = std::max(result.noise.high() - rounding, result.noise.half_width);
-    result.noise.value = rounding;
-  }
-  if (options.progress) options.progress(0.6);
-  result.plateau = find_plateau(fit, likely);
-  if (options.progress) options.progress(0.9);
-  if (result.plateau.middle == 0) {
-    result.input_gain = {likely.linear[0], std::numeric_limits<double>::infinity()};
-    if (options.progress) options.progress(1.0);
-    return result;
-  }
-  const Plateau& plateau = result.plateau;
-  const PlateauPoint& here = plateau.points[plateau.middle];
-  const PlateauPoint& below = plateau.points[plateau.middle - 1];
-  const PlateauPoint& above = plateau.points[plateau.middle + 1];
-  // Friction with a smaller or larger scale, by more than the steps of the search.
-  double friction_spread = 0.0;
-  if (chosen.friction_scale > 0.0) {
-    double low = here.fit.linear[0], high = low;
-    for (const double factor : {std::sqrt(0.5), std::sqrt(2.0)}) {
-      const FitData other = detail::with_friction(data, speed, factor * chosen.friction_scale);
-      InnovationsFit varied(other, model, bounds);
-      const Fit found = varied.minimise(here.fit.at, false, 5);
-      low = std::min(low, found.linear[0]);
-      high = std::max(high, found.linear[0]);
-    }
-    friction_spread = high - low;
-  }
-  // A force that depends on position if none was found, or else with higher powers.
-  double position_spread = 0.0;
-  if (model.order > 1) {
-    FitData other = used;
-    detail::add_position(other, result.position ? detail::position_columns + 1 : 1);
-    InnovationsFit varied(other, model, bounds);
-    const Fit found = varied.minimise(here.fit.at, false, 5);
-    position_spread = std::abs(found.linear[0] - here.fit.linear[0]);
-  }
-  // The interval combines the jackknife with the dependence on the bandwidth: between neighbours,
-  // and over one and a half octaves to each side as far as the number is accurate there. `down` is
-  // the number of points below, `resolved` the share to which a point counts at most.
-  const std::size_t last = std::min(plateau.middle + 3, plateau.points.size() - 1);
-  const auto estimate = [&](auto value, auto error, double more, std::size_t down = 3,
-                            double resolved = 0.0) {
-    const double x = value(here);
-    const std::size_t first = plateau.middle - std::min(plateau.middle, down);
-    const double spread =
-        std::max({value(below), x, value(above)}) - std::min({value(below), x, value(above)});
-    double squares = 0.0, weights = 0.0;
-    for (std::size_t i = first; i <= last; ++i) {
-      const PlateauPoint& point = plateau.points[i];
-      // A point that is more accurate than this one, or has no error, does not count more.
-      const double size = std::max({error(point), error(here), resolved * std::abs(x)});
-      const double weight = size > 0.0 && !point.at_bound ? 1.0 / (size * size) : 0.0;
-      squares += weight * (value(point) - x) * (value(point) - x);
-      weights += weight;
-    }
-    const double drift = weights > 0.0 ? std::sqrt(squares / weights) : 0.0;
-    return Estimate{x, t * error(here) + 0.25 * spread + drift + more};
-  };
-  const auto gain = [&](std::size_t down, double resolved) {
-    return estimate([](const PlateauPoint& p) { return p.fit.linear[0]; },
-                    [](const PlateauPoint& p) { return p.errors.linear[0]; },
-                    0.25 * friction_spread, down, resolved);
-  };
-  // A flexible mode changes b0 over octaves, by more than the errors at each bandwidth: so b0 is
-  // compared over three octaves below, where the machine is closer to the model, and to 2 %.
-  result.input_gain = gain(6, 0.02);
-  // What else could change b0 is compared with the interval of this plateau: a wider one would hide
-  // it.
-  const double near = gain(3, 0.0).half_width;
-  result.position_shift = position_spread / near;
-  // A standard error is half of a half width.
-  result.friction_shift = 2.0 * friction_spread / near;
-  // The fit cannot distinguish times below a twentieth of a row.
-  const auto time = [&](Estimate found) {
-    found.half_width = std::max(found.half_width, 0.05 * data.sample_time);
-    return found;
-  };
-  result.latency = time(estimate([](const PlateauPoint& p) { return p.fit.at.latency; },
-                                 [](const PlateauPoint& p) { return p.errors.latency; }, 0.0));
-  result.lag = time(estimate([](const PlateauPoint& p) { return p.fit.at.lag(); },
-                             [](const PlateauPoint& p) { return p.errors.lag; }, 0.0));
-  result.dead_time = time(estimate([](const PlateauPoint& p) { return p.fit.at.dead_time(); },
-                                   [](const PlateauPoint& p) { return p.errors.dead_time; }, 0.0));
-  result.pole = estimate([](const PlateauPoint& p) { return p.fit.at.pole; },
-                         [](const PlateauPoint& p) { return p.errors.pole; }, 0.0);
-  // The linear numbers: b0, the log's columns, sines, friction.
-  const auto linear = [&](std::size_t c) {
-    return estimate([c](const PlateauPoint& p) { return p.fit.linear[c]; },
-                    [c](const PlateauPoint& p) { return p.errors.linear[c]; }, 0.0);
-  };
-  for (std::size_t c = 1; c <= log.columns.size(); ++c) result.columns.push_back(linear(c));
-  if (chosen.friction_scale > 0.0) result.friction = linear(here.fit.linear.size() - 1);
-  for (std::size_t i = 0; i < frequencies.size(); ++i) {
-    FitData rest = used;
-    const auto pair =
-        rest.columns.begin() +
-        static_cast<std::ptrdiff_t>(log.columns.size() +
-                                    (result.position ? detail::position_columns : 0) + 2 * i);
-    rest.columns.erase(pair, pair + 2);
-    Sinusoid sine = detail::fit_sine(rest, model, bounds, here.fit.at, frequencies[i]).sine;
-    sine.frequency.half_width *= t;
-    sine.amplitude.half_width *= t;
-    if (sine.amplitude.low() > 0.0) result.sinusoids.push_back(sine);
-  }
-  std::sort(
-      result.sinusoids.begin(), result.sinusoids.end(),
-      [](const Sinusoid& a, const Sinusoid& b) { return a.amplitude.value > b.amplitude.value; });
-  if (scheduling) {
-    detail::find_schedule(used, schedule, model, options, result);
-  }
-  result.at_bound = here.at_bound;
-  double excitation = std::numeric_limits<double>::infinity();
-  for (const PlateauPoint& point : plateau.points) {
-    excitation = std::min(excitation, point.errors.linear[0] / std::abs(point.fit.linear[0]));
-  }
-  result.excitation = excitation;
   if (options.progress) options.progress(1.0);
-  return result;
+  return *best;
 }
 
 /// Decides whether a study can be trusted; if not, returns the first reason and what to record
@@ -905,19 +972,25 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
       "is the jitter over T without time stamps, above 0.05: record the time of each row");
   rules.require(options.applied || found.log.saturated < 0.5, "saturated", found.log.saturated,
                 "is the share of rows with u at its limits: record the u that the actuator held");
-  rules.require(found.own_input > 1e-5, "own_input", found.own_input,
+  rules.require(found.own_input > detail::own_input_min, "own_input", found.own_input,
                 "is the share of u that does not follow from y, which is too small: record a "
                 "moving reference");
-  const bool excited = found.plateau.middle > 0 && found.excitation < 0.15;
+  const bool excited = found.plateau.middle > 0 && found.excitation < detail::excitation_max;
   rules.require(excited, "excitation", found.plateau.middle > 0 ? found.excitation : 1.0,
-                "is the smallest relative error of b0 and too large, because u hardly moves y: "
-                "record steps or a sweep");
+                "is the smallest relative error of b0 and too large, because too little of y "
+                "follows from u: record several steps that last until y settles, or a sweep");
   if (!rules) return rules;
-  rules.require(found.correlation <= options.correlation_max,
+  const SecondOpinion& second = found.second_opinion;
+  const bool informed = detail::informed(found);
+  rules.require(detail::white(found, options) || informed,
                 {"correlation", found.correlation,
-                 "is the correlation of the innovations, so the model lacks something: record "
-                 "without an oscillating load, or add known effects as columns; must be at most",
-                 -1, options.correlation_max, true});
+                 "is the correlation of the innovations, so the model lacks something, and output "
+                 "error does not tell b0 either: record longer, with steps of u that last until y "
+                 "settles, or add known effects as columns; must be at most",
+                 -1, detail::correlation_limit(found, options), true});
+  rules.require(!informed || second.agrees(found.input_gain.value),
+                {"second_opinion", found.input_gain.value / second.input_gain.value,
+                 "is b0 over that of output error: they must agree by 0.6 to 1.7"});
   rules.require(!found.at_bound, "latency", found.latency.value,
                 "(or the pole) is at the end of its range: record faster changes of u");
   rules.require(found.plateau.spread <= options.plateau_max,
@@ -939,11 +1012,12 @@ inline void find_schedule(const FitData& used, const std::vector<double>& along,
                  "is the change of b0 between two scales of friction in standard errors: record "
                  "faster motion; must be at most",
                  -1, options.friction_shift_max, true});
+  const double widest = informed ? options.interval_agreed : options.interval_max;
   rules.require(
-      found.input_gain.share() <= options.interval_max,
+      found.input_gain.share() <= widest,
       {"interval", found.input_gain.share(),
        "is the half width of b0 over b0: record longer or with larger steps; must be at most", -1,
-       options.interval_max, true});
+       widest, true});
   return rules;
 }
 

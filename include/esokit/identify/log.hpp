@@ -32,10 +32,11 @@ struct Log {
 
 /// The report on a log before any fit.
 struct LogReport {
-  std::size_t rows = 0;       ///< rows in the log
-  std::size_t used = 0;       ///< rows that were fitted
-  std::size_t rejected = 0;   ///< rows with a number that is not finite
-  std::size_t outliers = 0;   ///< single values of y that do not fit their neighbours
+  std::size_t rows = 0;      ///< rows in the log
+  std::size_t used = 0;      ///< rows that were fitted
+  std::size_t rejected = 0;  ///< rows with a number that is not finite
+  std::size_t outliers =
+      0;  ///< values of y, one or two in succession, that do not fit their neighbours
   std::size_t missing = 0;    ///< rows that are missing according to the time stamps
   std::size_t pieces = 1;     ///< number of pieces between gaps too long to bridge
   double sample_time = 0.0;   ///< T: the mean step without gaps, s
@@ -196,6 +197,18 @@ inline double quantisation_step(const std::vector<double>& y) {
   }
   for (std::size_t k = 1; k + 1 < y.size(); ++k) {
     if (outlier[k]) y[k] = 0.5 * (y[k - 1] + y[k + 1]);
+  }
+  // Two bad rows in succession are as far from what is around them.
+  for (std::size_t k = 2; k + 3 < y.size(); ++k) {
+    const double before = y[k - 1], after = y[k + 2];
+    const double first = y[k] - 0.5 * (before + after), second = y[k + 1] - 0.5 * (before + after);
+    const double jump = std::min(std::abs(first), std::abs(second));
+    if (usual > 0.0 && first * second > 0.0 && jump > 8.0 * usual &&
+        std::abs(after - before) < 0.2 * jump) {
+      y[k] = before + (after - before) / 3.0;
+      y[k + 1] = after - (after - before) / 3.0;
+      report.outliers += 2;
+    }
   }
   const auto [least, largest] = std::minmax_element(u.begin(), u.end());
   const double reach = 1e-6 * (*largest - *least);
