@@ -377,7 +377,7 @@ TEST(WrappedOutput, OutlierShiftsNoTurn) {
 
 /// Over a gap of many turns: the motion goes on as it was.
 TEST(WrappedOutput, GapsAtSpeed) {
-  for (const int gap : {2, 7, 60}) {
+  for (const int gap : {2, 7, 40}) {
     for (const double speed : {100.0, -170.0}) {
       auto angle = axis(0.3);
       double y = 0;

@@ -35,6 +35,7 @@ constexpr double T = guards::sample_time;
 constexpr ModelParts lag{.order = 1, .actuator = 1};
 constexpr ModelParts all_parts{
     .order = 2, .plant_poles = true, .actuator = 1, .sensor = 1, .resonators = 1};
+constexpr ModelParts sine{.order = 2, .resonators = 1};
 constexpr ModelParts second_lag{.order = 2, .plant_poles = true, .actuator = 2, .resonators = 1};
 
 // ---- which models bear guards
@@ -126,12 +127,10 @@ TEST(GuardedModel, EveryGuardIsThatOfTheNaturalStates) {
           {239,
            {0.3094448549722, 4.600936637695, -250.9403258339, 22630.41536759, -276.8974101351,
             547.8987902332, -0.5220314738124}},
-          {299,
-           {0.9885112704162, 3.2834998042, -153.2850183461, 9465.679583601, -173.8889540292,
-            226.3035882216, 0.6769902160718}},
+          {299, {0.6913486259351, 0, 31.64308567364, -128.1142581062, 0, 0, 0.6913486259351}},
           {399,
-           {1.171168341729, -3.981437132782, -597.0459297668, 16011.90232555, -643.3208529852,
-            354.6286122864, 0.7425271821387}},
+           {1.171439259087, -3.971634622786, -597.2326417549, 15994.29937888, -643.4770737739,
+            354.1755154716, 0.7425466668995}},
       });
   runs_as<ModelEso<all_parts>>(
       config, DisturbanceUnit::input,
@@ -145,12 +144,10 @@ TEST(GuardedModel, EveryGuardIsThatOfTheNaturalStates) {
           {239,
            {0.09433606259612, -7.134948461468, -237.6490205889, 36645.14240419, -360.8073479162,
             898.0902255314, -0.5340868092999}},
-          {299,
-           {0.9885112704165, 3.283499804213, -220.2234417736, 18565.95299197, -305.8831480699,
-            448.7900416738, 0.6769902160717}},
+          {299, {0.6913486259351, 0, 96.69885628691, -323.281569946, 0, 0, 0.6913486259351}},
           {399,
-           {1.283754679043, -1.004009021197, -921.081476752, 10570.52625381, -967.769291782,
-            194.5892872801, 0.7508659847879}},
+           {1.283747692813, -1.004415161146, -921.0836661008, 10571.00669492, -967.7659830081,
+            194.6010934928, 0.7508657187139}},
       });
 }
 
@@ -173,12 +170,10 @@ TEST(GuardedModel, EveryGuardWithALagOfSecondOrder) {
           {239,
            {-0.5370076990808, 7.354567791847, -211.4787003157, 31.52789728984, 469221.1464401,
             -293.5626087635, -14.82927752541}},
-          {299,
-           {0.6633078472793, 1.863013657939, -383.3529426738, -21960.22547658, 689375.2435071,
-            -389.7708265028, -578.036339141}},
+          {299, {0.6913486259351, 0, 11.8947616882, -17.06296939128, -1668.557236395, 0, 0}},
           {399,
-           {0.7360692131242, 4.457148789302, -232.4837306095, -10864.75802021, 344021.789961,
-            -193.8537293761, -288.9563848603}},
+           {0.7360737195922, 4.457910209474, -232.4607850032, -10866.49132869, 343987.5264432,
+            -193.829122088, -288.9979205097}},
       });
 }
 
@@ -200,6 +195,12 @@ const std::vector<guards::Type>& bearing() {
   static const std::vector<guards::Type> types{guards::type_of<ModelEso<lag>>(),
                                                guards::type_of<Nested>()};
   return types;
+}
+
+TEST(GuardedModelObserver, NoSequenceGrows) {
+  for (const guards::Type& type : bearing()) guards::no_sequence_grows(type);
+  guards::no_sequence_grows(guards::type_of<ModelEso<all_parts>>());
+  guards::no_sequence_grows(guards::type_of<ModelEso<sine>>());
 }
 
 TEST(GuardedModelObserver, IdleIsTheObserverBitForBit) {
@@ -398,7 +399,7 @@ TEST(GuardedModel, LoopIsThatOfTheRightB0) {
 
 // ---- held, bounded, pinned, leaking
 
-/// While held, y is followed through every turn, with the lag of its own gain k_0 = 1 - e^(-2 w T).
+/// While held, y is what is measured, through every turn.
 TEST(GuardedModel, HeldFollowsThroughTurns) {
   using O = WrappedOutput<ModelEso<ModelParts{.order = 1, .actuator = 1}>>;
   Guarded<O>::Config config{};
@@ -408,13 +409,81 @@ TEST(GuardedModel, HeldFollowsThroughTurns) {
                               .model = {.actuator = {0.02}}};
   config.observer.period = 2;
   auto guarded = Guarded<O>::make(config).value();
-  const double k_0 = -std::expm1(-2 * 50 * 1e-3);
   for (int k = 0; k < 4000; ++k) {
     const double y = std::remainder(0.003 * k, 2.0);
     (void)guarded.update(y, guarded.hold(0.1));
-    if (k < 1000) continue;
-    ASSERT_NEAR(std::remainder(y - guarded.estimate<0>(), 2.0), 0.003 * (1 - k_0) / k_0, 1e-9) << k;
+    ASSERT_NEAR(std::remainder(y - guarded.estimate<0>(), 2.0), 0, 1e-12) << k;
   }
+}
+
+/// A plant at rest at y = u = 0, held and released by turns: sine, full trust. Where the states of
+/// the sine went on while held, the error grew by a factor of 1.3 each time.
+TEST(GuardedModel, HeldAndReleasedByTurns) {
+  auto guarded =
+      Guarded<ModelEso<sine>>::make(
+          {.observer = {.observer_bandwidth = 150,
+                        .input_gain = 1,
+                        .sample_time = 1e-3,
+                        .model = {.resonators = {{{.frequency = 30, .capture_bandwidth = 18}}}}}})
+          .value();
+  ASSERT_EQ(guarded.reset(1.0), StepStatus::ok);
+  double last = std::numeric_limits<double>::max();
+  for (int turn = 0; turn < 100; ++turn) {
+    for (int k = 0; k < 20; ++k) (void)guarded.update(0, 0);
+    for (int k = 0; k < 60; ++k) (void)guarded.update(0, guarded.hold(0));
+    const auto z = guarded.estimate();
+    // Only dhat is left, and less of it each time.
+    EXPECT_EQ(z(0), 0);
+    EXPECT_EQ(z(1), 0);
+    EXPECT_EQ(z(3), 0);
+    EXPECT_LT(std::abs(z(2)), last);
+    last = std::abs(z(2));
+    guarded.release();
+  }
+  EXPECT_LT(last, 1e-9);
+}
+
+/// Between two holds no factors make the error of dhat larger. With a sine the circle criterion
+/// alone allows it: by 1.15 here, if an optimiser chooses them.
+TEST(GuardedModel, NoFactorsBetweenHoldsGrow) {
+  const auto made =
+      Guarded<ModelEso<sine>>::make(
+          {.observer = {.observer_bandwidth = 150,
+                        .input_gain = 1,
+                        .sample_time = 1e-3,
+                        .model = {.resonators = {{{.frequency = 30, .capture_bandwidth = 18}}}}}})
+          .value();
+  Random random(12);
+  double largest = 0;
+  for (int trial = 0; trial < long_run(1000); ++trial) {
+    auto guarded = made;
+    const auto touch_down = [&] {
+      (void)guarded.update(0, guarded.hold(0));
+      guarded.release();
+    };
+    ASSERT_EQ(guarded.reset({0, 0, 1, 0, 0}), StepStatus::ok);
+    touch_down();
+    for (int part = random.index(8); part >= 0; --part) {
+      guarded.set_trust(part % 2);
+      for (int k = random.index(150); k > 0; --k) (void)guarded.update(0, 0);
+    }
+    touch_down();
+    const double error = std::abs(guarded.total_disturbance());
+    ASSERT_LE(error, 1 + 1e-6) << trial;
+    largest = std::max(largest, error);
+  }
+  EXPECT_GT(largest, 0.9);
+}
+
+/// The poles of a plant make a dhat of (y, 0, .., 0) that the bound does not allow.
+TEST(GuardedModel, ResetKeepsTheBound) {
+  using O = ModelEso<ModelParts{.order = 2, .plant_poles = true}>;
+  const O::Config config{
+      .observer_bandwidth = 30, .input_gain = b0, .sample_time = T, .model = {.plant = {100, 3}}};
+  auto guarded = Guarded<O>::make({.observer = config, .disturbance_bound = 5}).value();
+  ASSERT_EQ(guarded.reset(2.0), StepStatus::ok);
+  EXPECT_NEAR(guarded.observer().model().constant(guarded.estimate()), 5, 1e-9);
+  EXPECT_EQ(guarded.estimate<0>(), 2);
 }
 
 /// On the ground with a motor that turns: d is frozen, v is what it is, and the first step in the

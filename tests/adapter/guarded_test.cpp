@@ -73,6 +73,11 @@ TEST(GuardedObserver, ComesBackInTheStatedTime) {
   for (const guards::Type& type : bearing()) guards::comes_back_in_the_stated_time(type, 0.3, 2);
 }
 
+TEST(GuardedObserver, NoSequenceGrows) {
+  for (const guards::Type& type : bearing()) guards::no_sequence_grows(type);
+  guards::no_sequence_grows(guards::type_of<LinearEso<4>>());
+}
+
 /// abs(dhat) never passes its bound, at no level, and stays there under a load above it; below it
 /// nothing is lost.
 void bound_holds(const guards::Type& type, DisturbanceUnit unit) {
@@ -323,6 +328,47 @@ TEST(Pinned, WithoutASideNothingMovesDhat) {
   }
 }
 
+/// Lost measurements do not count as measurements since the end of the pin.
+TEST(Pinned, LostMeasurementsDoNotRelease) {
+  auto guarded =
+      Guarded<LinearEso<1>>::make({.observer = settings<LinearEso<1>>(), .release_samples = 4})
+          .value();
+  guarded.set_pin(Pin::upper);
+  guarded.set_pin(Pin::free);
+  for (int k = 0; k < 20; ++k) {
+    (void)guarded.update(hidden_nan<double>(), 0);
+    (void)guarded.predict(0);
+    ASSERT_TRUE(guarded.gated());
+  }
+  for (int k = 0; k < 4; ++k) {
+    ASSERT_TRUE(guarded.gated());
+    (void)guarded.update(-1, 0);
+    ASSERT_EQ(guarded.total_disturbance(), 0);
+  }
+  EXPECT_FALSE(guarded.gated());
+}
+
+/// The limit stays the upper one if b0 changes its sign; what frees the actuator does not.
+TEST(Pinned, SideFollowsTheSignOfB0) {
+  for (const Pin where : {Pin::upper, Pin::either}) {
+    Guarded<LinearEso<1>>::Config config{.observer = settings<LinearEso<1>>(),
+                                         .release_samples = 4};
+    auto guarded = Guarded<LinearEso<1>>::make(config).value();
+    (void)guarded.update(0, 0.5);
+    guarded.set_pin(where);
+    config.observer.input_gain = -config.observer.input_gain;
+    ASSERT_TRUE(guarded.retune(config).has_value());
+    for (const bool released : {false, true}) {
+      if (released) guarded.set_pin(Pin::free);
+      const double before = guarded.total_disturbance();
+      (void)guarded.update(guarded.estimate<0>() + 5, 0.5);
+      EXPECT_EQ(guarded.total_disturbance(), before);
+      (void)guarded.update(guarded.estimate<0>() - 5, 0.5);
+      EXPECT_LT(guarded.total_disturbance(), before);
+    }
+  }
+}
+
 /// What starts anew after a long gap is not drawn back to the dhat before it.
 TEST(Gating, ARestartForgetsWhatWasHeld) {
   auto config = settings<LinearEso<1>>();
@@ -476,6 +522,45 @@ TEST(Held, LoopDoesNotKick) {
   // What the law asks for at rest is -dhat / b0; a step of 1 % of the range beyond it is a kick.
   EXPECT_NEAR(loop.update(0.8, 0.8), -0.5 / b0, 0.01 * 10);
   EXPECT_FALSE(loop.observer().gated());
+}
+
+/// Held, the estimate is at rest where the measurement says, at every level, and dhat is kept: at
+/// once, without an effect of u, over lost measurements, and after a restart.
+TEST(Held, StandsStill) {
+  using O = CascadeEso<3, 2>;
+  auto config = settings<O>();
+  config.max_gap = 5;
+  auto guarded = Guarded<O>::make({.observer = config}).value();
+  for (int k = 0; k < 20; ++k) (void)guarded.update(0.1 * k, 0.3);
+  const double d = guarded.total_disturbance();
+  const auto stands_at = [&](double y) {
+    const O::Estimate wanted{y, 0, 0, d};
+    for (int i = 0; i < O::size; ++i) {
+      EXPECT_NEAR(guarded.estimate()(i), wanted(i), 1e-13 * std::abs(d)) << i;
+      const double first = guarded.level_estimate(0)(i);
+      EXPECT_NEAR(first, i < 3 ? wanted(i) : first, 1e-13 * std::abs(d)) << i;
+    }
+  };
+  (void)guarded.update(7, guarded.hold(0.3));
+  stands_at(7);
+  for (int k = 0; k < 3; ++k) (void)guarded.update(hidden_nan<double>(), 100);
+  stands_at(7);
+  for (int k = 0; k < 8; ++k) (void)guarded.predict(guarded.hold(0));
+  stands_at(7);
+  EXPECT_TRUE(has(guarded.update(6, 0), StepStatus::restarted));
+  stands_at(6);
+  // Without a measurement it stands still where it was, and where it is the first one says.
+  guarded.release();
+  for (int k = 0; k < 20; ++k) (void)guarded.update(6 + 0.1 * k, 0.3);
+  auto before = guarded.estimate();
+  before(0) = guarded.level_estimate(0)(0);
+  (void)guarded.update(hidden_nan<double>(), guarded.hold(0.3));
+  EXPECT_EQ(guarded.estimate(), (O::Estimate{before(0), 0, 0, before(3)}));
+  guarded.release();
+  EXPECT_EQ(guarded.update(9, guarded.standing_input()), StepStatus::gap_bridged);
+  EXPECT_NEAR(guarded.estimate<0>(), 9, 1e-12);
+  EXPECT_EQ(guarded.estimate<1>(), 0);
+  EXPECT_EQ(guarded.total_disturbance(), before(3));
 }
 
 /// Without: dhat takes the ground for a load, and all of the range is asked for at once.

@@ -145,8 +145,9 @@ TEST(OutlierGate, AngleComesBackFromAnyState) {
 TEST(OutlierGate, OpensAfterAStepOfAnySize) {
   Random random(3);
   for (int trial = 0; trial < 300; ++trial) {
-    const int most = 1 + random.index(20);
+    // The observer bridges 14 / (omega_o T).
     const double omega_T = random.uniform(0.2, 2);
+    const int most = 1 + random.index(std::min(20, static_cast<int>(14 / omega_T) - 2));
     auto gated =
         OutlierGate<LinearEso<2>>::make({.observer = with<LinearEso<2>>({}, omega_T),
                                          .threshold = random.log_uniform(1e-3, 1),
@@ -257,8 +258,8 @@ TEST(OutlierGate, RunningLimitWithoutNeighbours) {
     EXPECT_NEAR(gate.limit(), 5 * sum / (measurements / 2), 0.5 * gate.limit()) << divider;
     // A long gap counts as one measurement.
     const double before = gate.limit();
-    for (int i = 0; i < 80; ++i) gate.predict(0);
-    EXPECT_EQ(gate.update(before * 70, 0), StepStatus::gap_bridged);
+    for (int i = 0; i < 40; ++i) gate.predict(0);
+    EXPECT_EQ(gate.update(before * 30, 0), StepStatus::gap_bridged);
     EXPECT_LE(gate.limit(), before * (1 + 4.0 / 64 + 1e-12)) << divider;
   }
 }

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <esokit/adapter/known_model.hpp>
 #include <esokit/analysis/loop.hpp>
+#include <esokit/analysis/loop_response.hpp>
 #include <esokit/gain/model_gain.hpp>
 #include <esokit/gain/pole_set.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
@@ -224,6 +225,55 @@ TEST(LinearController, OfGuardsWithTheB0OfNow) {
   auto compensator = DisturbanceCompensator<Observer>::make({.observer = config}).value();
   ASSERT_TRUE(compensator.set_input_gain(1.5).has_value());
   expect_is_linear(compensator);
+}
+
+template <class Observer>
+void expect_leaking(const typename Observer::Config& config, double share = 1e-11) {
+  using Leaking = Guarded<Observer>;
+  using S = typename Observer::scalar_type;
+  for (const S leak_time : {S(0), S(1) / S(8), S(2)}) {
+    SCOPED_TRACE(leak_time);
+    const typename Leaking::Config guarded{.observer = config, .leak_time = leak_time};
+    auto controller =
+        Adrc<Leaking>::make({.observer = guarded, .controller_bandwidth = S(4)}).value();
+    expect_is_linear(controller, share);
+    ASSERT_TRUE(controller.set_input_gain(S(4)).has_value());
+    expect_is_linear(controller, share);
+  }
+}
+
+TEST(LinearController, OfALeak) {
+  expect_leaking<LinearEso<2>>(linear);
+  expect_leaking<LinearEso<2, float>>(
+      {.observer_bandwidth = 20.0f, .input_gain = 2.5f, .sample_time = 0.01f}, 1e-4);
+  expect_leaking<DelayedInput<LinearEso<2>, 3>>({.observer = linear, .delay = 2});
+  expect_leaking<WrappedOutput<DelayedInput<LinearEso<2>, 3>>>(
+      {.observer = {.observer = linear, .delay = 2}, .period = 100.0});
+  expect_leaking<CascadeEso<2, 3>>(
+      {.observer_bandwidth = 10.0, .bandwidth_factor = 2.0, .input_gain = 2.5, .sample_time = T});
+  constexpr ModelParts parts{
+      .order = 1, .plant_poles = true, .actuator = 1, .sensor = 2, .resonators = 1};
+  ModelEso<parts>::Config config;
+  config.observer_bandwidth = 20.0;
+  config.input_gain = 2.5;
+  config.sample_time = T;
+  config.model.plant = {1.5};
+  config.model.actuator.time_constant = 0.05;
+  config.model.sensor.frequency = 150.0;
+  config.model.resonators[0] = {.frequency = 7.0, .capture_bandwidth = 1.0};
+  expect_leaking<ModelEso<parts>>(config, 1e-9);
+}
+
+/// What a load leads to in the analysis is what it leads to in the loop.
+TEST(LinearController, LeakLeavesALoad) {
+  using Controller = Adrc<Guarded<LinearEso<2>>>;
+  const auto controller = Controller::make({.observer = {.observer = linear, .leak_time = 2.0},
+                                            .controller_bandwidth = 4.0})
+                              .value();
+  const auto plant = LinearPlant<2>::chain({.input_gain = 2.5}).value();
+  const auto response = load_response(plant, controller, {.duration = 60.0}).value();
+  EXPECT_NEAR(response.output[0].back(), controller.leak_error(), 1e-9);
+  EXPECT_GT(std::abs(controller.leak_error()), 1e-3);
 }
 
 TEST(LinearController, OfSettingsOfTheController) {
@@ -464,5 +514,27 @@ static_assert(!AnalysedObserver<KnownModel<LinearEso<2>, Saturating>>);
 static_assert(!AnalysedController<int>);
 // A filter form knows neither T nor b0.
 static_assert(!AnalysedController<DualFeedbackAdrc<2>>);
+
+/// The state of a slow actuator (0.1 s) is computed from u and not corrected: the error decays by
+/// that, however fast the observer.
+TEST(SlowestPole, SaysWhenAnObserverIsBack) {
+  auto observer = esokit::ModelEso<esokit::ModelParts{.order = 1, .actuator = 1}>::make(
+                      {.observer_bandwidth = 100,
+                       .input_gain = 1,
+                       .sample_time = 1e-3,
+                       .model = {.actuator = {.time_constant = 0.1}}})
+                      .value();
+  const double rate = -stability_abscissa(observer_system(observer));
+  EXPECT_NEAR(rate, -std::expm1(-0.01), 1e-9);
+  (void)observer.update(1, 1e300);
+  int needed = 0;
+  const int most = 60 + static_cast<int>(1500 / rate);
+  for (int k = 1; k <= most; ++k) {
+    (void)observer.update(0.5, 0);
+    if (!(std::abs(observer.total_disturbance()) < 1e-6)) needed = k + 1;
+  }
+  EXPECT_LE(needed, most);
+  EXPECT_GT(needed, 60 + 1500 / (100 * 1e-3));
+}
 
 }  // namespace analysis_controllers_test

@@ -673,6 +673,105 @@ TEST(WorstCase, FindsAnUnstablePlantAndRefusesByRule) {
   EXPECT_EQ(of({0.5, 2.0}, {.halvings = 101}), "halvings: must be 0 .. 100");
 }
 
+/// u = k (r - y): a controller of the user, which does not integrate.
+struct Proportional {
+  double gain, sample_time;
+};
+LinearController linear_controller(const Proportional& p) {
+  LinearController form(0, 1, 0, p.sample_time);
+  form.y_to_u(0, 0) = -p.gain;
+  form.r_to_u(0, 0) = p.gain;
+  return form;
+}
+
+/// y' = -a y + b u with u = -k y: it leaves by z = 1, or s = 0, where b k = -a.
+auto first_order(double a, double b, double gain, double sample_time) {
+  return closed_loop(LinearPlant<1>::chain({.coefficients = {a}, .input_gain = b}).value(),
+                     Proportional{gain, sample_time})
+      .value();
+}
+
+TEST(Margins, HaveALimitAtFrequencyZeroWhereNothingIntegrates) {
+  for (const double T : {0.0, 1e-3, 1e-2}) {
+    SCOPED_TRACE(T);
+    const auto held = margins(first_order(-10, 1, 22, T)).value();
+    EXPECT_NEAR(held.gain_decrease.value, 10.0 / 22, 1e-13);
+    EXPECT_EQ(held.gain_decrease.frequency, 0);
+    EXPECT_NE(held.gain_increase.frequency, 0);
+    // Positive feedback of a stable plant: more of it, and the least distance is there, too.
+    const auto pushed = margins(first_order(2, -1, 0.5, T)).value();
+    EXPECT_NEAR(pushed.gain_increase.value, 4, 1e-13);
+    EXPECT_EQ(pushed.gain_increase.frequency, 0);
+    EXPECT_EQ(pushed.gain_decrease.value, 0);
+    EXPECT_NEAR(pushed.modulus.value, 0.75, 1e-13);
+    EXPECT_NEAR(pushed.modulus.frequency, 0, 1e-6);
+    const auto loop = first_order(2, -1, 0.5, T);
+    EXPECT_NEAR(sensitivity_peak(loop)->value, 1 / 0.75, 1e-13);
+    // 1 + L^2 over L at L = 1/4 is 17/4, of f = 4.
+    EXPECT_NEAR(gain_variation(loop)->value, 4, 1e-12);
+    // No limit there, by either sign of L(0).
+    EXPECT_FALSE(margins(first_order(2, 1, 0.5, T))->gain_decrease.limited());
+  }
+  EXPECT_FALSE(margins(first_order(0, 1, 0.5, 0))->gain_decrease.limited());
+  const auto worst = worst_case(
+      [](const Array<double, 1>& p) { return LinearPlant<1>::chain({.coefficients = {p[0]}}); },
+      std::array<Interval<>, 1>{{{-11, -9}}}, Proportional{22, 0});
+  EXPECT_NEAR(worst->gain_decrease.value, 0.5, 1e-13);
+  EXPECT_NEAR(worst->gain_decrease.parameters[0], -11, 1e-13);
+}
+
+// Searched: no change of the gain between the limits leaves the loop unstable, any at them does.
+TEST(Margins, OfRandomProportionalLoopsAreWhereTheyTurnUnstable) {
+  Random random(21);
+  int at_zero = 0, loops = 0;
+  for (int trial = 0; trial < 3000 && loops < 150; ++trial) {
+    const auto sign = [&] { return random.index(2) == 0 ? 1.0 : -1.0; };
+    const auto plant =
+        LinearPlant<3>::chain({.coefficients = {random.uniform(-20, 100), random.uniform(-5, 60),
+                                                random.uniform(0, 10)},
+                               .input_gain = sign()})
+            .value();
+    const double T = trial % 2 == 0 ? 0.0 : random.log_uniform(1e-3, 0.1);
+    const double gain = sign() * random.log_uniform(1, 100);
+    const auto stable = [&](double factor) {
+      return closed_loop(plant, Proportional{factor * gain, T})->stable();
+    };
+    const auto all = margins(closed_loop(plant, Proportional{gain, T}).value());
+    if (!all) continue;
+    ++loops;
+    SCOPED_TRACE(trial);
+    const double least = all->gain_decrease.value, most = all->gain_increase.value;
+    EXPECT_FALSE(all->gain_decrease.limited() && stable(least * (1 - 1e-6)));
+    EXPECT_FALSE(all->gain_increase.limited() && stable(most * (1 + 1e-6)));
+    for (int i = 0; i <= 20; ++i) {
+      const double low = std::max(least * (1 + 1e-6), 1e-3), high = std::min(most, 1e3);
+      EXPECT_TRUE(stable(low * std::pow(high * (1 - 1e-6) / low, i / 20.0))) << i;
+    }
+    at_zero += all->gain_decrease.frequency == 0 || all->gain_increase.frequency == 0;
+  }
+  EXPECT_EQ(loops, 150);
+  EXPECT_GT(at_zero, 30);
+}
+
+/// What integrates has no limit at zero, however its rounding falls.
+TEST(Margins, HaveNoLimitAtZeroWhereTheLoopIntegrates) {
+  Random random(12);
+  int loops = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    const double a = random.uniform(-5, 5);
+    const auto plant = LinearPlant<2>::chain(
+        {.coefficients = {a, random.uniform(0, 5)}, .input_gain = random.log_uniform(25, 100)});
+    const auto loop = closed_loop(*plant, adrc<2>(random.log_uniform(30, 80), 8, 50, 1e-3)).value();
+    const auto all = margins(loop);
+    if (!all) continue;
+    ++loops;
+    EXPECT_NE(all->gain_decrease.frequency, 0) << trial;
+    EXPECT_NE(all->gain_increase.frequency, 0) << trial;
+    EXPECT_GT(all->modulus.frequency, 1) << trial;
+  }
+  EXPECT_GT(loops, 150);
+}
+
 /// abs(L) < 1 everywhere, which no loop with a disturbance estimate has: by hand.
 TEST(Margins, WithoutAnEdgeAreInfinite) {
   const auto weak = [](double w) { return std::complex<double>(0.1, 0.05) / (1.0 + w); };

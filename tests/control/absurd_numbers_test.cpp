@@ -2,6 +2,7 @@
 // limits, and good samples lead back.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
@@ -88,6 +89,7 @@ TEST(MissingMost, TheLargestIsCounted) {
     SCOPED_TRACE(divider);
     auto settings = config<Adrc<LinearEso<2>>>();
     settings.observer.max_gap = 65000;
+    settings.observer.observer_bandwidth = 10;  // bridges 1000 samples
     settings.measurement_divider = divider;
     settings.missing.most = 65535 / divider;
     const auto refused = Adrc<LinearEso<2>>::make(settings);
@@ -105,10 +107,24 @@ TEST(MissingMost, TheLargestIsCounted) {
   }
 }
 
+/// Every sample measured: that needs no gap that the observer bridges.
+TEST(MissingMost, AnObserverThatBridgesNothingIsTaken) {
+  using Fast = Adrc<LinearEso<4>>;
+  auto settings = config<Fast>();
+  settings.observer.observer_bandwidth = 4 / settings.observer.sample_time;
+  const auto made = Fast::make(settings);
+  ASSERT_TRUE(made.has_value()) << refusal(made);
+  EXPECT_EQ(made->observer().max_gap(), 0);
+  settings.measurement_divider = 2;
+  EXPECT_EQ(refusal(Fast::make(settings)),
+            "measurement_divider: must not be above the observer's max_gap, which is");
+}
+
 /// With nothing missing nothing is safe.
 TEST(MissingMost, MeasurementsThatComeAreNotMissing) {
   auto settings = config<Adrc<LinearEso<2>>>();
   settings.observer.max_gap = 65000;
+  settings.observer.observer_bandwidth = 10;  // bridges 1000 samples
   settings.measurement_divider = 1000;
   settings.missing.most = 64;
   auto controller = Adrc<LinearEso<2>>::make(settings).value();
@@ -287,6 +303,13 @@ TEST(AbsurdNumbers, NoRateLimitIsNone) {
   auto limiter = esokit::Limiter<double>::make({}, 1e-3).value();
   EXPECT_EQ(limiter(1e308), 1e308);
   EXPECT_EQ(limiter(-1e308), -1e308);
+}
+
+TEST(AbsurdNumbers, WithinIsTheMagnitudeOnBothSides) {
+  const auto limiter = esokit::Limiter<double>::make({-1, 2, 1}, 1e-3).value();
+  for (const double u : {-1e308, -1.0, 0.5, 2.0, 1e308}) {
+    EXPECT_EQ(limiter.within(u), std::clamp(u, -1.0, 2.0));
+  }
 }
 
 // ---- make

@@ -348,6 +348,7 @@ void beside(const Type& type, Type::Form (*make)(const LoopSetup&),
   if (make == nullptr) GTEST_SKIP() << "is fed y";
   LoopSetup setup;
   setup.loop.limits = {.lower = -3, .upper = 4, .rate = 200};
+  setup.soften = false;  // the others do not
   const Controller c = type.make(setup);
   const Type::Form form = make(setup);
   ChainPlant plant = plant_of(type);

@@ -15,6 +15,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <support/law_registration.hpp>
 #include <support/refusal.hpp>
@@ -32,6 +33,7 @@ struct LoopSetup {
   double gain = 2;                         ///< b0
   double omega_c = 6;                      ///< rad/s
   esokit::LoopSettings<double> loop{};
+  std::optional<bool> soften{};
 };
 
 /// A controller of any type. Numbers are double; one of floats rounds them.
@@ -187,6 +189,7 @@ class ErasedController<Adrc<O, F>> final : public AnyController {
     if (loop.missing.input) config.missing.input = s(*loop.missing.input);
     config.missing.stay = loop.missing.stay;
     config.measurement_divider = loop.measurement_divider;
+    config.soften = setup.soften;
     return config;
   }
 

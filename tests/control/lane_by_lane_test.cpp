@@ -124,6 +124,15 @@ struct Modelled {
   }
 };
 
+struct GatedModel {
+  template <class T>
+  using Type = esokit::OutlierGate<Modelled::Type<T>>;
+  template <class T>
+  static typename Type<T>::Config config(int lane, bool again) {
+    return {.observer = Modelled::config<T>(lane, again), .threshold = set<T>(lane, again, 0.75)};
+  }
+};
+
 template <class Kind>
 struct InAdrc {
   template <class T>
@@ -357,6 +366,14 @@ TEST(LaneByLane, IncrementalAdrcOfAnAngle) {
     const auto& inner = c.controller();
     return Answers(u, inner.output(), inner.requested(), inner.status(), inner.mode(),
                    inner.gains(), inner.observer().estimate());
+  });
+}
+
+TEST(LaneByLane, AdrcOfAGatedModel) {
+  expect_lanes<InAdrc<GatedModel>>([](auto& c, const auto& x, int k) {
+    const auto u = control(c, x, k);
+    const auto& inner = c.controller();
+    return Answers(u, inner.status(), inner.mode(), inner.observer().estimate());
   });
 }
 

@@ -74,9 +74,19 @@ double spectral_radius(double omega_t, int every, bool follow) {
 }
 
 template <int Order>
+int longest_step(double omega_t) {
+  return 1 +
+         LinearEso<Order>::make({.observer_bandwidth = omega_t, .input_gain = 1, .sample_time = 1})
+             .value()
+             .max_gap();
+}
+
+template <int Order>
 void periodic_patterns(int& diverging) {
   for (const double omega_t : {0.1, 1.0, 3.0}) {
     for (int every = 1; every <= 20; ++every) {
+      if (spectral_radius<Order>(omega_t, every, false) > 1) ++diverging;
+      if (every > longest_step<Order>(omega_t)) continue;
       SCOPED_TRACE(::testing::Message()
                    << "N = " << Order + 1 << ", omega T = " << omega_t << ", one in " << every);
       // All poles at rho^M; as an N-fold one it is known to an N-th root of the rounding, which
@@ -85,7 +95,6 @@ void periodic_patterns(int& diverging) {
       const double radius = spectral_radius<Order>(omega_t, every, true);
       EXPECT_LT(radius, 1);
       EXPECT_NEAR(radius, rho, 0.25);
-      if (spectral_radius<Order>(omega_t, every, false) > 1) ++diverging;
     }
   }
 }
@@ -100,6 +109,64 @@ TEST(MissingSamples, EveryPeriodicPatternIsStable) {
   EXPECT_GT(diverging, 50);
   // The number of DESIGN.md.
   EXPECT_NEAR(spectral_radius<2>(1, 3, false), 1.66, 0.01);
+}
+
+/// dhat after 200 corrections from (1, 0, ..) at y = 0, with `a` and `b` samples to each in turn.
+template <class Observer>
+double two_gaps_in_turn(Observer observer, int a, int b, StepStatus expected) {
+  EXPECT_EQ(observer.reset(1.0), StepStatus::ok);
+  for (int k = 0; k < 200; ++k) {
+    for (int i = 0; i < (k % 2 == 0 ? a : b); ++i) observer.predict(0);
+    const StepStatus status = observer.correct(0);
+    if (k % 2 == 1) {
+      EXPECT_EQ(status, expected);
+    }
+  }
+  return observer.total_disturbance();
+}
+
+/// With the gains for the gaps 3 and 16 ms in turn dhat was 1.5e32, 9 and 101 ms 2e11, and the
+/// steps of VariableTime 1.5e32.
+TEST(MissingSamples, TwoGapsInTurnDoNotDiverge) {
+  const auto third =
+      LinearEso<3>::make({.observer_bandwidth = 460, .input_gain = 1, .sample_time = 1e-3}).value();
+  EXPECT_EQ(third.max_gap(), 9);
+  EXPECT_EQ(two_gaps_in_turn(third, 3, 16, StepStatus::restarted), 0);
+  EXPECT_NEAR(two_gaps_in_turn(third, 3, 10, StepStatus::gap_bridged), 0, 1e-6);
+  const auto second =
+      LinearEso<2>::make({.observer_bandwidth = 200, .input_gain = 1, .sample_time = 1e-3}).value();
+  EXPECT_EQ(second.max_gap(), 69);
+  EXPECT_EQ(two_gaps_in_turn(second, 9, 101, StepStatus::restarted), 0);
+  EXPECT_NEAR(two_gaps_in_turn(second, 9, 70, StepStatus::gap_bridged), 0, 1e-6);
+
+  // Without a lost sample: 5 / omega_o = 10.87 ms, below that all steps of the shortest, 0.998 ms.
+  auto timed = VariableTime<LinearEso<3>>::make(
+                   {.observer = {.observer_bandwidth = 460, .input_gain = 1, .sample_time = 4e-3},
+                    .ratio = 4.01})
+                   .value();
+  for (const double longest : {9.97e-3, 9.98e-3, 16e-3}) {
+    timed.reset(1.0);
+    for (int k = 0; k < 400; ++k) {
+      ASSERT_TRUE(timed.set_step_time(k % 2 == 0 ? 3e-3 : longest).has_value());
+      const StepStatus status = timed.update(0, 0);
+      EXPECT_EQ(status, k % 2 == 1 && longest > 9.975e-3 ? StepStatus::restarted : StepStatus::ok);
+    }
+    EXPECT_NEAR(timed.total_disturbance(), 0, 1e-6) << longest;
+  }
+  // If not even the nominal step is within the range, the ratio is refused.
+  const auto refused = VariableTime<LinearEso<4>>::make(
+      {.observer = {.observer_bandwidth = 1000, .input_gain = 1, .sample_time = 4e-3}, .ratio = 2});
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_STREQ(refused.error().field, "ratio");
+  EXPECT_EQ(refused.error().value, 2);
+  EXPECT_NEAR(refused.error().limit, 2e-3, 1e-15);
+  // A gap counts as the time that it takes.
+  ASSERT_TRUE(timed.set_step_time(4e-3).has_value());
+  for (const int steps : {2, 3}) {
+    for (int i = 0; i < steps; ++i) timed.predict(0);
+    EXPECT_EQ(timed.restarts(), steps == 3);
+    EXPECT_EQ(timed.correct(0), steps == 3 ? StepStatus::restarted : StepStatus::gap_bridged);
+  }
 }
 
 /// The whole controller in a loop, one measurement in M.

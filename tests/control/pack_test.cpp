@@ -58,6 +58,26 @@ struct OfLinear {
   }
 };
 
+/// It softens at the limits, where a lane has them.
+struct OfThirdOrder {
+  template <class S>
+  using Controller = esokit::Adrc<esokit::LinearEso<3, S>>;
+  template <class S>
+  static auto config(int lane, bool again) {
+    auto config = with_loop<S>(typename Controller<S>::Config{}, lane, again);
+    config.observer.input_gain = by_lane<S>(lane, again ? -35 : -45, 10);
+    const auto nearer = [&](const S& limit) {
+      return each_lane<S>(lane, [&](int i) {
+        const LaneScalar<S> one = esokit::detail::number_of_lane(limit, i);
+        return i == 1 ? one : one / 4;
+      });
+    };
+    config.limits.lower = nearer(config.limits.lower);
+    config.limits.upper = nearer(config.limits.upper);
+    return config;
+  }
+};
+
 struct ErrorBasedOfCascade {
   template <class S>
   using Controller = esokit::Adrc<esokit::CascadeEso<1, 2, S>, esokit::ErrorBased>;
@@ -211,7 +231,7 @@ class PairOf final : public Pair {
   template <class Controller>
   static Answers state(const Controller& c) {
     return Answers(c.output(), c.requested(), c.status(), c.mode(), c.observer().estimate(),
-                   c.observer().missed(), c.gains());
+                   c.observer().missed(), c.gains(), c.softness());
   }
   template <class Step>
   int both(const Step& step) {
@@ -249,6 +269,7 @@ Pairs pairs() {
 #endif
   Pairs all;
   all.push_back(std::make_unique<PairOf<OfLinear, Wide>>());
+  all.push_back(std::make_unique<PairOf<OfThirdOrder, S>>());
   all.push_back(std::make_unique<PairOf<ErrorBasedOfCascade, S>>());
   all.push_back(std::make_unique<PairOf<OfAlgebraic, S>>());
   all.push_back(std::make_unique<PairOf<Divided, S>>());

@@ -553,6 +553,9 @@ TEST(PredictiveAdrc, the_rate_limit_goes_on_from_what_was_reported) {
     controller.report_applied(-5);
     if (!late) controller.prepare(1e6);
     EXPECT_EQ(controller.control(0), -4);
+    // Downwards as well.
+    controller.prepare(-1e6);
+    EXPECT_EQ(controller.control(0), -5);
   }
 }
 

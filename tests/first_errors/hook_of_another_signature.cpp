@@ -5,6 +5,7 @@ struct Bridging {
   static constexpr esokit::GainLawTraits traits{.bridges_gaps = true};
   esokit::ScaledGain<3, double> k{};
   const esokit::ScaledGain<3, double>& gain(double) const noexcept { return k; }
+  int longest_gap(int asked) const noexcept { return asked; }
   const esokit::ScaledGain<3, double>& gap_gain(unsigned) const noexcept { return k; }
 };
 

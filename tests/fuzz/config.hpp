@@ -350,6 +350,8 @@ class Filler {
     }
     MEMBER(domain, choice(text, member, 2))
     MEMBER(half_gain, member = tape_.once_in(5, text))
+    MEMBER(soften, tape_.once_in(3, text) ? static_cast<void>(member = tape_.once_in(2, text))
+                                          : static_cast<void>(member))
     MEMBER(limits, limits(member))
     if constexpr (requires { config.hand_over; }) {
       const bool relay = tape_.choice(2, "excitation") == 0;

@@ -47,7 +47,7 @@ void add_controllers(std::vector<Kind>& kinds) {
 #ifndef ESOKIT_ONE_TYPE
   KIND(Adrc<OutlierGate<LinearEso<2, float>>>);
   KIND(Adrc<Guarded<LinearEso<2, float>>>);
-  KIND(Adrc<LinearEso<2, float>>);
+  KIND(Adrc<LinearEso<3, float>>);
   KIND(Adrc<ModelEso<ModelParts{.order = 1, .plant_poles = true, .actuator = 1}, double>>);
   // Without plant poles: under them y = 1 needs a load, and of a load a leak leaves an error.
   KIND(Adrc<Guarded<ModelEso<ModelParts{.order = 1, .actuator = 1}, double>>>);

@@ -268,6 +268,7 @@ class Driver final : public Game {
     FINITE(state())
     FINITE(last())
     FINITE(gains())
+    FINITE(softness())
     FINITE(covariance())
     FINITE(innovation_covariance())
     FINITE(normalised_innovation())

@@ -574,10 +574,15 @@ Failure health_study(Episode& episode) {
          {health.rejected, health.bridged, health.gated, health.unsafe}) {
       if (count > looked) study.fail("count", "is above that of the samples");
     }
-    for (const S& x : {health.innovation, health.gain_ratio, health.evidence}) {
+    for (const S& x :
+         {health.innovation, health.gain_ratio, health.evidence, health.response, health.opposed}) {
       study.finite("health", x);
     }
-    if (!(health.innovation >= S(0) && health.evidence >= S(0)))
+    if (!(health.side >= S(-1) && health.side <= S(1))) {
+      study.fail("side", "is not within -1 .. 1");
+    }
+    if (!(health.innovation >= S(0) && health.evidence >= S(0) && health.response >= S(0) &&
+          health.opposed >= S(0)))
       study.fail("health", "is negative");
     if (*advice(diagnose(health)).wrong == '\0' && diagnose(health) != LoopFault::none) {
       study.fail("diagnosis", "has no words");

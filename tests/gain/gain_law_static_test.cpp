@@ -184,27 +184,40 @@ static_assert(is_law<Reset> && !is_law<ResetUndeclared> && !is_law<Declaring<res
 static_assert(!is_law<ResetToAValue>);
 
 constexpr GainLawTraits bridges{.bridges_gaps = true};
-struct Bridge : Declaring<bridges> {
+struct Limited : Declaring<bridges> {
+  [[nodiscard]] int longest_gap(int asked) const noexcept { return asked; }
+};
+struct Bridge : Limited {
   [[nodiscard]] Gain gap_gain(double, unsigned) const noexcept { return {}; }
 };
 struct BridgeUndeclared : Plain {
   [[nodiscard]] Gain gap_gain(double, unsigned) const noexcept { return {}; }
 };
-struct BridgeWithoutInnovation : Declaring<bridges> {
+struct BridgeWithoutInnovation : Limited {
   [[nodiscard]] Gain gap_gain(unsigned) const noexcept { return {}; }
 };
-struct BridgeNotConst : Declaring<bridges> {
+struct BridgeNotConst : Limited {
   Gain gap_gain(double, unsigned) noexcept { return {}; }
 };
-struct BridgeThrows : Declaring<bridges> {
+struct BridgeThrows : Limited {
   [[nodiscard]] Gain gap_gain(double, unsigned) const { return {}; }
 };
-struct BridgeOfAnotherSize : Declaring<bridges> {
+struct BridgeOfAnotherSize : Limited {
   [[nodiscard]] esokit::ScaledGain<3, double> gap_gain(double, unsigned) const noexcept {
     return {};
   }
 };
-static_assert(is_law<Bridge> && !is_law<BridgeUndeclared> && !is_law<Declaring<bridges>>);
+struct BridgeAnyGap : Declaring<bridges> {
+  [[nodiscard]] Gain gap_gain(double, unsigned) const noexcept { return {}; }
+};
+struct BridgeToANumber : BridgeAnyGap {
+  [[nodiscard]] double longest_gap(int) const noexcept { return 1; }
+};
+struct BridgeLimitThrows : BridgeAnyGap {
+  [[nodiscard]] int longest_gap(int asked) const { return asked; }
+};
+static_assert(is_law<Bridge> && !is_law<BridgeUndeclared> && !is_law<Limited>);
+static_assert(!is_law<BridgeAnyGap> && !is_law<BridgeToANumber> && !is_law<BridgeLimitThrows>);
 static_assert(!is_law<BridgeWithoutInnovation> && !is_law<BridgeNotConst>);
 static_assert(!is_law<BridgeThrows> && !is_law<BridgeOfAnotherSize>);
 

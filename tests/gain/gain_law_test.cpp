@@ -96,6 +96,7 @@ struct Bridging : Constant {
   [[nodiscard]] ScaledGain<3, double> gap_gain(double, unsigned samples) const noexcept {
     return {0.5, static_cast<double>(samples), 0};
   }
+  [[nodiscard]] int longest_gap(int asked) const noexcept { return asked < 6 ? asked : 6; }
 };
 
 TEST(GainLaw, OwnGapGainIsUsed) {
@@ -109,6 +110,13 @@ TEST(GainLaw, OwnGapGainIsUsed) {
   EXPECT_EQ(observer.correct(4), StepStatus::gap_bridged);
   EXPECT_EQ(observer.estimate()(0), 2);
   EXPECT_EQ(observer.estimate()(1), 20);
+  // Six missing samples are the last that it bridges.
+  EXPECT_EQ(observer.max_gap(), 6);
+  for (const int predictions : {7, 8}) {
+    for (int i = 0; i < predictions; ++i) observer.predict(0);
+    EXPECT_EQ(observer.correct(4),
+              predictions == 7 ? StepStatus::gap_bridged : StepStatus::restarted);
+  }
 }
 
 // ---- switched, with memory

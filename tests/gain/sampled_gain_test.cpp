@@ -10,6 +10,7 @@
 #include <esokit/gain/continuous_gain.hpp>
 #include <esokit/gain/placement.hpp>
 #include <esokit/gain/pole_set.hpp>
+#include <esokit/gain/reduced_order.hpp>
 #include <esokit/gain/sampled_gain.hpp>
 #include <limits>
 #include <support/high_precision.hpp>
@@ -26,6 +27,8 @@ using esokit::Array;
 using esokit::current_gain;
 using esokit::EqualSampledPoles;
 using esokit::predictor_gain;
+using esokit::ReducedSampledPoles;
+using esokit::SampledPolePairs;
 using esokit::SampledPoleSet;
 using esokit::ScaledGain;
 using esokit_test::Big;
@@ -336,6 +339,140 @@ TEST(SampledGain, IsAvailableAtCompileTime) {
   static_assert(half.power(2).contraction == 0.75f);
   constexpr auto l = predictor_gain<2, float>(half.weights());
   static_assert(l[0] == 1.0f && l[1] == 0.25f);
+}
+
+// ---- steps of different lengths
+
+/// e -> (I - k C) Phi e over a step of x / omega, errors in units of 1 / omega^r.
+template <class Poles, int Size>
+esokit::Matrix<double, Size, Size> step_error(double x) {
+  Poles poles{};
+  if constexpr (requires { poles.contraction; }) {
+    poles.contraction = -std::expm1(-x);
+  } else if constexpr (requires { poles.rest; }) {
+    poles.rest.contraction = -std::expm1(-x);
+  } else {
+    poles = esokit::HalfGainPoles::sample<Size, double>(x, 1.0);
+  }
+  const auto gain = current_gain<Size, double>(poles.weights());
+  esokit::Matrix<double, Size, Size> step;
+  for (int i = 0; i < Size; ++i) {
+    for (int j = 0; j < Size; ++j) {
+      step(i, j) = (j < i ? 0 : esokit::binomial(j, i) * std::pow(x, j - i)) -
+                   gain[static_cast<std::size_t>(i)] * std::pow(x, j - i);
+    }
+  }
+  return step;
+}
+
+template <class Poles>
+constexpr esokit::detail::BridgedSteps bridged_steps(int size) {
+  if constexpr (requires(Poles poles) { poles.contraction; }) {
+    return esokit::detail::equal_steps(size);
+  } else if constexpr (requires(Poles poles) { poles.rest; }) {
+    return esokit::detail::reduced_steps(size);
+  } else {
+    return esokit::detail::half_gain_steps(size);
+  }
+}
+
+/// The certificate of gain/bridged_steps.hpp: e' L' L e falls in every step up to the reach. With
+/// one pole at zero the first error is zero after each correction, and L is that of the others.
+/// @param l upper triangle of L, row by row
+template <class Poles, int Size>
+void falls(const std::vector<double>& l) {
+  constexpr double reach = bridged_steps<Poles>(Size).reach;
+  SCOPED_TRACE(::testing::Message() << "N = " << Size << ", reach " << reach);
+  constexpr int first = requires(Poles poles) { poles.rest; }
+  ? 1 : 0;
+  constexpr int count = Size - first;
+  using Square = esokit::Matrix<double, count, count>;
+  Square upper = Square::Zero();
+  ASSERT_EQ(l.size(), static_cast<std::size_t>(count * (count + 1) / 2));
+  std::size_t next = 0;
+  for (int i = 0; i < count; ++i) {
+    for (int j = i; j < count; ++j) upper(i, j) = l[next++];
+  }
+  const Square p = upper.transpose() * upper;
+  for (int k = 1; k <= 400; ++k) {
+    for (const double x : {reach * k / 400, reach * std::pow(1e-3, k / 400.0)}) {
+      const auto whole = step_error<Poles, Size>(x);
+      Square step;
+      for (int i = 0; i < count; ++i) {
+        for (int j = 0; j < count; ++j) step(i, j) = whole(i + first, j + first);
+      }
+      const Square fallen = p * (1 - 0.005 * std::min(x, 1.0)) - step.transpose() * p * step;
+      const esokit::Matrix<double, count, 1> none{};
+      ASSERT_TRUE((esokit::detail::solve_positive<count, 1, double>(fallen, none))) << x;
+    }
+  }
+}
+
+TEST(BridgedSteps, ASquareFallsInEveryStepUpToTheReach) {
+  falls<EqualSampledPoles<3, double>, 3>({1, -0.11266, 0.02537, 0.81257, -3.6325, 3.3309});
+  falls<EqualSampledPoles<4, double>, 4>(
+      {1, -0.37694, 0.99378, -6.3087, 1.1311, -5.3674, 30.374, 3.5124, -37.834, 11.421});
+  falls<EqualSampledPoles<5, double>, 5>({1, -0.60843, 1.6734, -6.3654, 14.404, 1.2488, -5.8163,
+                                          31.93, -206.98, 3.4379, -39.546, 402.49, 12.76, -239.63,
+                                          36.214});
+  falls<EqualSampledPoles<6, double>, 6>({1,       -0.46379, 1.0591, -3.7917, 15.075,  -78.243,
+                                          1.093,   -4.0842,  17.6,   -87.456, 516.79,  2.5775,
+                                          -24.733, 204.47,   -1635,  10.303,  -195.83, 2901.8,
+                                          52.993,  -1524.6,  182.85});
+  falls<EqualSampledPoles<7, double>, 7>(
+      {1,       -0.26203, 0.3741,  -1.3958, 6.8008,  -31.436, -36.09,  0.78817, -2.4546, 9.9066,
+       -51.725, 323.6,    -1997.9, 1.7339,  -14.172, 106.37,  -858.14, 7919.6,  5.73,    -89.622,
+       1113.8,  -13499,   27.122,  -677.23, 12025,   154.21,  -5933.6, 864.87});
+  falls<SampledPolePairs<3, double>, 3>({1, -0.26386, 0.47195, 1.0711, -4.447, 3.7502});
+  falls<SampledPolePairs<4, double>, 4>(
+      {1, -0.72613, 1.1811, -1.6943, 1.0287, -3.8997, 17.695, 2.4119, -22.181, 7.7414});
+  falls<ReducedSampledPoles<3, double>, 3>({1, -3.3863, 3.2887});
+  falls<ReducedSampledPoles<4, double>, 4>({1, -2.7453, 8.4283, 2.7117, -22.494, 8.7997});
+}
+
+/// Largest spectral radius of A(a) A(b)^k, k = 1 .. 5, of all steps up to `longest`.
+template <class Poles, int Size>
+double worst_pattern(double longest) {
+  using Square = esokit::Matrix<double, Size, Size>;
+  std::vector<Square> steps;
+  for (int k = 1; k <= 24; ++k) steps.push_back(step_error<Poles, Size>(longest * k / 24));
+  for (int k = 1; k <= 8; ++k) {
+    steps.push_back(step_error<Poles, Size>(longest / 24 * std::pow(0.6, k)));
+  }
+  double worst = 0;
+  for (const Square& a : steps) {
+    for (const Square& b : steps) {
+      Square pattern = a;
+      for (int k = 1; k <= 5; ++k) {
+        pattern = pattern * b;
+        Square power = pattern;
+        double radius = 0;
+        for (int squarings = 0; squarings < 30; ++squarings) {
+          double size = 0;
+          for (int i = 0; i < Size * Size; ++i) size = std::max(size, std::abs(power.data()[i]));
+          radius += std::ldexp(std::log(size), -squarings);
+          power = power * (1 / size);
+          power = power * power;
+        }
+        worst = std::max(worst, std::exp(radius));
+      }
+    }
+  }
+  return worst;
+}
+
+/// The search finds nothing up to the reach, and it can find: not far above it errors grow.
+TEST(BridgedSteps, TheSearchFindsNoGrowthUpToTheReachAndFindsItAbove) {
+  const auto check = []<class Poles, int Size>(double above) {
+    const double reach = bridged_steps<Poles>(Size).reach;
+    EXPECT_LT((worst_pattern<Poles, Size>(reach)), 1) << Size;
+    EXPECT_GT((worst_pattern<Poles, Size>(above * reach)), 1) << Size;
+  };
+  check.operator()<EqualSampledPoles<3, double>, 3>(1.35);
+  check.operator()<EqualSampledPoles<4, double>, 4>(1.2);
+  check.operator()<EqualSampledPoles<5, double>, 5>(1.25);
+  check.operator()<EqualSampledPoles<6, double>, 6>(1.35);
+  check.operator()<ReducedSampledPoles<4, double>, 4>(1.25);
 }
 
 }  // namespace gain_sampled_gain_test

@@ -215,26 +215,32 @@ std::string said(const esokit::Check<double>& check) {
   return check ? "accepted" : std::string(check.error().field) + ": " + check.error().rule;
 }
 
-// Rows are averaged if that halves the correlation of the innovations, as of a sensor that takes
-// the mean of four rows; a mode that the averaged rows have as well is left as it is.
-TEST(Identify, AveragesRowsOnlyIfThatHelps) {
-  const Log log = closed_loop(1, 3, 1600);
-  Log filtered = log, swinging = log;
-  esokit::sim::Gaussian gaussian(8);
-  std::array<double, 4> white{};
-  for (std::size_t k = 0; k < log.y.size(); ++k) {
-    white[k % 4] = 0.01 * gaussian.next();
-    filtered.y[k] += (white[0] + white[1] + white[2] + white[3]) / 4;
-    swinging.y[k] += 0.01 * std::sin(0.5 * static_cast<double>(k));
-  }
-  IdentifyOptions options = quick();
-  options.averaged = 0;
-  options.friction = options.position = false;
-  options.sinusoids = 0;
-  EXPECT_EQ(esokit::study(filtered, options)->averaged, 4);
-  const auto left = esokit::study(swinging, options);
-  EXPECT_EQ(left->averaged, 1);
-  EXPECT_GT(left->correlation, options.correlation_max);
+// Rows are averaged if that halves the correlation of the innovations or makes them white, if b0 is
+// that of the plain rows within the intervals, and if a row is short for the plant.
+TEST(Averaging, MustHelpAgreeAndBeShort) {
+  Identified plain;
+  plain.input_gain = {50, 3};
+  plain.correlation = 0.7;
+  plain.log.sample_time = T;
+  plain.log.used = 8000;
+  Identified best = plain, averaged = plain;
+  averaged.averaged = 4;
+  averaged.input_gain = {46, 1.1};
+  averaged.correlation = 0.34;
+  averaged.pole = {0.199 / (4 * T), 1};
+  const auto better = [&] { return esokit::detail::better(averaged, plain, best, {}); };
+  EXPECT_TRUE(better());
+  averaged.input_gain.value = 45.8;
+  EXPECT_FALSE(better());
+  averaged.input_gain.value = 46;
+  averaged.pole.value *= -1.01;
+  EXPECT_FALSE(better());
+  averaged.pole.value = 0;
+  averaged.correlation = 0.36;
+  EXPECT_FALSE(better());
+  best.correlation = 0.15;
+  averaged.correlation = 0.1;
+  EXPECT_TRUE(better());
 }
 
 // The part of u that a controller computes from y is not its own.
@@ -372,37 +378,147 @@ TEST(Identify, TellsB0AlongAColumn) {
   EXPECT_EQ(found->schedule_shift, 0);
 }
 
-// Rounding of a slow motion (a fifth of a step a row) is alike in neighbouring rows; that is the
-// encoder's, not the model's.
-TEST(Identify, TakesRoundingOutOfTheCorrelation) {
+// Rounding of a slow motion (a fifth of a step a row) is alike in neighbouring rows: a correlation
+// that says nothing against b0, as output error confirms. The noise is that of the rounding.
+TEST(Identify, RoundingIsNoReasonToRefuse) {
   Log log;
   log.sample_time = T;
   constexpr double step = 0.04;
   esokit::sim::Gaussian gaussian(4);
-  double x = 0, walk = 0;
+  double x = 0, walk = 0, before = 0;
   for (int k = 0; k < 3000; ++k) {
     const double u = std::sin(0.02 * k) + (k / 110 % 2 == 0 ? 0.5 : -0.5);
     log.u.push_back(u);
     log.y.push_back(std::round(x / step) * step);
-    x += T * (2 * u + walk);
+    x += T * (2 * before + walk);
+    before = u;
     walk += 0.02 * gaussian.next();
   }
-  const auto prepared = esokit::prepare(log);
-  ASSERT_NEAR(prepared->report.quantisation, step, 1e-9);
-  const auto rounded = esokit::detail::fit_order(prepared->data, quick(), 1, step);
-  const auto plain = esokit::detail::fit_order(prepared->data, quick(), 1, 0);
-  EXPECT_GT(plain.correlation, 0.2);
-  EXPECT_LT(rounded.correlation, 0.5 * plain.correlation);
   IdentifyOptions options = quick();
   options.orders = {1};
+  const auto found = esokit::identify(log, options);
+  ASSERT_TRUE(found) << found.error().field;
+  ASSERT_NEAR(found->log.quantisation, step, 1e-9);
+  EXPECT_GT(found->correlation, 0.2);
+  EXPECT_LT(std::abs(found->input_gain.value - 2), found->input_gain.half_width);
   const double rms = step / std::sqrt(12.0);
-  EXPECT_NEAR(esokit::study(log, options)->noise.value, rms, 0.05 * rms);
-  // What swings beside the model stays a correlation.
-  for (std::size_t k = 0; k < 3000; ++k) {
-    log.y[k] = std::round((log.y[k] + 0.03 * std::sin(0.8 * static_cast<double>(k))) / step) * step;
+  EXPECT_NEAR(found->noise.value, rms, 0.05 * rms);
+}
+
+// y' = b0 u(t - 7 ms) - a y - friction of a motor that turns one way and rests at zero, under steps
+// of voltage; its speed from counts. Averaged rows would be whiter, and far from the truth.
+Log motor(std::uint64_t seed, int rows) {
+  esokit::sim::Gaussian gaussian(seed);
+  Log log;
+  log.sample_time = 0.01;
+  constexpr int steps = 20;
+  constexpr double h = 0.01 / steps;
+  double y = 0, walk = 0, u = 0, before = 0;
+  int until = 0;
+  const auto draw = [&](double from, double to) {
+    return from + (to - from) * 0.5 * std::erfc(-gaussian.next() / std::sqrt(2.0));
+  };
+  for (int k = 0; k < rows; ++k) {
+    if (k >= until) {
+      u = draw(0, 5);
+      until = k + static_cast<int>(draw(40, 220));
+    }
+    log.u.push_back(u);
+    log.y.push_back(2.8 * std::round((y + 0.4 * gaussian.next()) / 2.8));
+    walk += 10 * gaussian.next();
+    for (int i = 0; i < steps; ++i) {
+      const double force = 420 * (i < 14 ? before : u) + walk - 16 * y;
+      if (y <= 0 && force <= 150) continue;
+      y = std::max(y + h * (force - 150), 0.0);
+    }
+    before = u;
   }
-  const auto swinging = esokit::prepare(log);
-  EXPECT_GT(esokit::detail::fit_order(swinging->data, quick(), 1, step).correlation, 0.2);
+  return log;
+}
+
+TEST(Identify, AveragedRowsMustAgreeWithPlainOnes) {
+  IdentifyOptions options;
+  options.orders = {1};
+  for (const std::uint64_t seed : {1u, 2u, 3u, 4u, 5u, 6u}) {
+    const Log log = motor(seed, 2400);
+    const auto found = esokit::study(log, options);
+    ASSERT_TRUE(found);
+    const esokit::Estimate& b = found->input_gain;
+    EXPECT_LT(std::abs(b.value - 420), b.half_width) << seed;
+    EXPECT_NEAR(b.value, 420, 126) << seed;
+    EXPECT_LT(found->latency.value, 0.05) << seed;
+  }
+}
+
+// y' = b0 u - a (y - ambient) of a heater through a sensor, steps of u; `rest` rows before the
+// first.
+Log heater(double ambient, int rows, int rest, double power = 40) {
+  esokit::sim::Gaussian gaussian(6);
+  Log log;
+  log.sample_time = 1;
+  double x = 0, v = 0;
+  for (int k = 0; k < rows; ++k) {
+    const double u = k < rest ? 0 : (k - rest) * 4 / (rows - rest) % 2 == 0 ? power : 0.3 * power;
+    log.u.push_back(u);
+    log.y.push_back(ambient + x + 0.02 * gaussian.next());
+    for (int i = 0; i < 10; ++i) {
+      v += 0.1 / 8 * (u - v);
+      x += 0.1 * (0.03 * v - 0.02 * x);
+    }
+  }
+  return log;
+}
+
+// Friction depends on the sign of y, and a temperature has none: the zero of y must not matter.
+TEST(Identify, TheZeroOfATemperatureDoesNotMatter) {
+  IdentifyOptions options;
+  options.orders = {1};
+  const auto celsius = esokit::identify(heater(20, 600, 60), options),
+             kelvin = esokit::identify(heater(293.15, 600, 60), options);
+  ASSERT_TRUE(celsius) << celsius.error().field;
+  ASSERT_TRUE(kelvin) << kelvin.error().field;
+  EXPECT_NEAR(celsius->input_gain.value / kelvin->input_gain.value, 1, 1e-5);
+  EXPECT_EQ(celsius->friction.value, 0);
+  EXPECT_LT(std::abs(kelvin->input_gain.value - 0.03), kelvin->input_gain.half_width);
+}
+
+// A short step test: twenty correlations of few rows of white noise exceed a tenth, the steps are
+// few, and the first of them is in the first rows.
+TEST(Identify, AShortStepTestIsEnough) {
+  IdentifyOptions options;
+  options.orders = {1};
+  for (const int rest : {3, 12}) {
+    const auto found = esokit::identify(heater(20, 240, rest), options);
+    ASSERT_TRUE(found) << rest << found.error().field;
+    EXPECT_LT(std::abs(found->input_gain.value - 0.03), found->input_gain.half_width) << rest;
+    EXPECT_LT(found->input_gain.share(), 0.2) << rest;
+  }
+}
+
+// Friction that drives is none.
+TEST(Identify, FrictionIsNotNegative) {
+  Log log = heater(0, 600, 60);
+  for (std::size_t k = 0; k < log.y.size(); ++k) {
+    log.u[k] -= 20;
+    log.y[k] -= 20;
+    log.y[k] += log.y[k] > 0 ? 3 : -3;
+  }
+  esokit::FitData data;
+  data.sample_time = 1;
+  data.u = log.u;
+  data.y = log.y;
+  const esokit::FitData rubbed = esokit::detail::with_friction(data, data.y, 0.1);
+  esokit::InnovationsFit fit(rubbed, {1, 1, true}, esokit::detail::fit_bounds(data, false));
+  esokit::InnovationsFit without(data, {1, 1, true}, esokit::detail::fit_bounds(data, false));
+  const esokit::FitPoint at{0.02, 5, 0.7, 0.02};
+  for (const double bandwidth : {0.02, 0.2, 1.0}) {
+    esokit::FitPoint here = at;
+    here.bandwidth = bandwidth;
+    const esokit::Fit found = fit.at(here);
+    EXPECT_GE(found.linear[1], 0) << bandwidth;
+    if (found.linear[1] > 0) continue;
+    EXPECT_EQ(found.linear[0], without.at(here).linear[0]) << bandwidth;
+  }
 }
 
 // A mode above the loop decides the likelihood at its own bandwidth; below it the plant's order
@@ -429,7 +545,9 @@ TEST(Identify, LowerBandwidthsTellTheOrderOfAMachineThatBends) {
   }
   IdentifyOptions options = quick();
   options.orders = {1, 2};
-  const auto orders = esokit::detail::fit_orders(esokit::prepare(log)->data, options, 0);
+  const auto data = esokit::prepare(log)->data;
+  const auto orders =
+      esokit::detail::fit_orders(data, options, esokit::detail::fit_bounds(data, false));
   EXPECT_LT(orders[1].criterion, orders[0].criterion);
   EXPECT_LT(orders[0].slower, orders[1].slower);
 }
@@ -546,6 +664,7 @@ TEST(Judge, RefusesByName) {
   good.excitation = 0.149;
   good.own_input = 1.1e-5;
   good.correlation = 0.1;
+  good.log.used = 900;
   good.friction_shift = 3;
   good.position_shift = 1.5;
   good.schedule_shift = 1;
@@ -567,11 +686,12 @@ TEST(Judge, RefusesByName) {
        "own_input: is the share of u that does not follow from y, which is too small: record a "
        "moving reference"},
       {&bad.excitation, 0.151,
-       "excitation: is the smallest relative error of b0 and too large, because u hardly moves y: "
-       "record steps or a sweep"},
+       "excitation: is the smallest relative error of b0 and too large, because too little of y "
+       "follows from u: record several steps that last until y settles, or a sweep"},
       {&bad.correlation, 0.101,
-       "correlation: is the correlation of the innovations, so the model lacks something: record "
-       "without an oscillating load, or add known effects as columns; must be at most"},
+       "correlation: is the correlation of the innovations, so the model lacks something, and "
+       "output error does not tell b0 either: record longer, with steps of u that last until y "
+       "settles, or add known effects as columns; must be at most"},
       {&bad.plateau.spread, 0.101,
        "plateau: is the relative change of b0 between neighbouring bandwidths, so there is no "
        "plateau: record more motion in the band of the controller; must be at most"},
@@ -596,6 +716,39 @@ TEST(Judge, RefusesByName) {
       *c.value = value;
       EXPECT_EQ(said(esokit::judge(bad, log)), c.text);
     }
+  }
+  // Few rows are correlated by chance: 3 / sqrt(rows).
+  bad = good;
+  bad.log.used = 400;
+  bad.averaged = 4;
+  bad.correlation = 0.3;
+  EXPECT_EQ(said(esokit::judge(bad, log)), "accepted");
+  bad.correlation = 0.301;
+  EXPECT_NE(said(esokit::judge(bad, log)), "accepted");
+  // If output error tells b0, correlation does not matter, the interval may be wider, and both must
+  // agree.
+  bad.correlation = 0.9;
+  bad.input_gain.half_width = 17.5;
+  bad.second_opinion = {{-50, 24.9}, 0.7, 1.0};
+  bad.latency.value = 0.499 * 4 * T;
+  EXPECT_TRUE(said(esokit::judge(bad, log)).starts_with("correlation: "));
+  bad.latency.value = 0.501 * 4 * T;
+  EXPECT_EQ(said(esokit::judge(bad, log)), "accepted");
+  for (const auto& [gain, accepted] :
+       {std::pair{-83.0, true}, std::pair{-84.0, false}, std::pair{-29.5, true},
+        std::pair{-29.3, false}, std::pair{50.0, false}}) {
+    bad.second_opinion.input_gain = {gain, 0.4 * std::abs(gain)};
+    const std::string text = said(esokit::judge(bad, log));
+    EXPECT_EQ(text.starts_with(accepted ? "accepted" : "second_opinion: "), true) << gain << text;
+  }
+  bad.second_opinion = {{-50, 24.9}, 0.7, 1.0};
+  bad.input_gain.half_width = 17.6;
+  EXPECT_TRUE(said(esokit::judge(bad, log)).starts_with("interval: "));
+  bad.input_gain.half_width = 5.0;
+  for (const auto& [half_width, explained] :
+       {std::pair{25.1, 0.7}, std::pair{24.9, 0.69}, std::pair{nan, 0.7}, std::pair{1.0, nan}}) {
+    bad.second_opinion = {{-50, half_width}, explained, 1.0};
+    EXPECT_TRUE(said(esokit::judge(bad, log)).starts_with("correlation: ")) << half_width;
   }
   // Jitter that the stamps tell was taken out.
   bad = good;
@@ -847,12 +1000,19 @@ TEST(PrepareLog, BadNumbersCostTheirRow) {
 }
 
 TEST(PrepareLog, TellsOutliersFromMotion) {
-  Log log = closed_loop(1, 3, 400);
+  Log log = closed_loop(1, 3, 1200);
   EXPECT_EQ(esokit::prepare(log)->report.outliers, 0u);
   log.y[150] += 50;
   const auto prepared = esokit::prepare(log);
   EXPECT_EQ(prepared->report.outliers, 1u);
   EXPECT_NEAR(prepared->data.y[150], log.y[149], 0.1);
+  // Two in succession, on the same side.
+  log.y[250] -= 50;
+  log.y[251] -= 40;
+  const auto more = esokit::prepare(log);
+  EXPECT_EQ(more->report.outliers, 3u);
+  EXPECT_NEAR(more->data.y[250], log.y[249], 0.1);
+  EXPECT_NEAR(more->data.y[251], log.y[252], 0.1);
 }
 
 // An encoder's step is found, also written with few digits; noise has none.
@@ -1040,6 +1200,87 @@ TEST(Intervals, TheJackknifeIsTheSpreadOverSeeds) {
   const double noise_spread =
       std::sqrt((noise_square - noise_mean * noise_mean) * seeds / (seeds - 1));
   EXPECT_NEAR(noise_error / noise_spread, 1, 0.34);
+}
+
+// The same for a pole, and for lag and dead time apart, which the log tells apart by less than it
+// tells their sum: if one is too long, the other is too short.
+TEST(Intervals, OfPoleLagAndDeadTimeAreTheirSpreadOverSeeds) {
+  constexpr double pole = 3, lag = 0.03;
+  constexpr int seeds = 40;
+  struct Spread {
+    double mean = 0, square = 0, error = 0;
+    void add(double value, double own) {
+      mean += value / seeds;
+      square += value * value / seeds;
+      error += own / seeds;
+    }
+    [[nodiscard]] double ratio() const {
+      return error / std::sqrt((square - mean * mean) * seeds / (seeds - 1));
+    }
+  } poles, lags, dead_times;
+  for (int seed = 0; seed < seeds; ++seed) {
+    esokit::sim::Gaussian gaussian(static_cast<std::uint64_t>(seed));
+    esokit::FitData data;
+    data.sample_time = T;
+    double y = 0, v = 0, walk = 0, sent = 0;
+    for (int k = 0; k < 1500; ++k) {
+      // A row late.
+      const double late = std::exchange(sent, k / 25 % 2 == 0 ? 1.0 : -1.0);
+      data.u.push_back(sent);
+      data.y.push_back(y + 0.002 * gaussian.next());
+      constexpr int steps = 20;
+      for (int i = 0; i < steps; ++i) {
+        y += T / steps * (2 * v + walk - pole * y);
+        v += T / steps * (late - v) / lag;
+      }
+      walk += 0.05 * gaussian.next();
+    }
+    esokit::InnovationsFit fit(data, {1, 1, true}, {1, 300, 1e-4, 0.1, 0.5});
+    const esokit::Fit found = fit.minimise({10, 0.04, 0.7, 2}, true);
+    const esokit::FitErrors errors = esokit::jackknife(fit, found, true);
+    poles.add(found.at.pole, errors.pole);
+    lags.add(found.at.lag(), errors.lag);
+    dead_times.add(found.at.dead_time(), errors.dead_time);
+  }
+  std::printf("spread: pole %g lag %g dead %g of %g %g %g\n", poles.ratio(), lags.ratio(),
+              dead_times.ratio(), poles.mean, lags.mean, dead_times.mean);
+  // A spread over 40 seeds is known to 11 %: three times that.
+  EXPECT_NEAR(poles.ratio(), 1, 0.34);
+  EXPECT_NEAR(lags.ratio(), 1, 0.34);
+  EXPECT_NEAR(dead_times.ratio(), 1, 0.34);
+}
+
+// Orders are compared at the square root of a tenth and at a tenth of the lowest of their
+// bandwidths, each from what the one before found.
+TEST(Orders, AreComparedBelowTheLowestBandwidth) {
+  esokit::sim::Gaussian gaussian(5);
+  esokit::FitData data;
+  data.sample_time = T;
+  double y = 0, walk = 0;
+  for (int k = 0; k < 1000; ++k) {
+    data.u.push_back(k / 60 % 2 == 0 ? 1 : -1);
+    data.y.push_back(y + 0.01 * gaussian.next());
+    y += T * (2 * data.u.back() + walk);
+    walk += 0.05 * gaussian.next();
+  }
+  std::vector<esokit::OrderFit> orders(2);
+  for (int i = 0; i < 2; ++i) {
+    auto& order = orders[static_cast<std::size_t>(i)];
+    order.model = {i + 1, 1, false};
+    order.bounds = esokit::detail::fit_bounds(data, false);
+    order.fit.at = {i == 0 ? 20.0 : 60.0, 1e-3, 0.5, 0};
+  }
+  esokit::detail::compare_orders(data, orders);
+  for (const auto& order : orders) {
+    esokit::InnovationsFit fit(data, order.model, order.bounds);
+    esokit::FitPoint point = order.fit.at;
+    point.bandwidth = 20 * std::sqrt(0.1);
+    const esokit::Fit above = fit.minimise(point, false, 8);
+    if (!fit.at_bound(above.at)) point = above.at;
+    point.bandwidth = 2;
+    const esokit::Fit below = fit.minimise(point, false, 8);
+    EXPECT_NEAR(order.slower, 0.5 * std::log(above.mean_square * below.mean_square), 1e-9);
+  }
 }
 
 // Far from its ends the lag's error is that of its square over 2 tau. At zero lag the square alone

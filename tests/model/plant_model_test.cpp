@@ -60,16 +60,16 @@ TEST(LinearPlantModel, AChainEqualsLinearEso) {
   }
 }
 
-// A disturbance that enters where u does not, and a zero: states and d to rounding, and D is what
-// is left of y^(n) without u.
-TEST(LinearPlantModel, FindsStatesAndAMismatchedDisturbance) {
-  const auto plant = with_zero();
+// States and d to rounding, and D is what is left of y^(n) without u.
+template <int States>
+void finds_states_and_disturbance(const LinearPlant<States>& plant) {
   ASSERT_EQ(plant.relative_degree(), 2);
-  auto observer = ZeroEso::make({.observer_bandwidth = 60.0,
-                                 .input_gain = plant.input_gain(),
-                                 .sample_time = kT,
-                                 .model = {plant}})
-                      .value();
+  auto made = PlantEso<States, ModelParts{.order = 2}>::make({.observer_bandwidth = 60.0,
+                                                              .input_gain = plant.input_gain(),
+                                                              .sample_time = kT,
+                                                              .model = {plant}});
+  ASSERT_TRUE(made) << made.error();
+  auto& observer = *made;
   double before = 0;
   const auto run = esokit::sim::run(
       plant, [k = 0](double, double) mutable { return std::sin(0.01 * k++); },
@@ -81,7 +81,7 @@ TEST(LinearPlantModel, FindsStatesAndAMismatchedDisturbance) {
         if (sample.index < 1000) return;
         const auto z = observer.estimate();
         const auto x = observer.model().plant_state(z);
-        for (int i = 0; i < 3; ++i) {
+        for (int i = 0; i < States; ++i) {
           ASSERT_NEAR(x(i), sample.state(i), 1e-8 * (1 + std::abs(sample.state(i))))
               << sample.index << ", " << i;
         }
@@ -92,6 +92,25 @@ TEST(LinearPlantModel, FindsStatesAndAMismatchedDisturbance) {
         ASSERT_NEAR(observer.total_disturbance(), second, 1e-6 * (1 + std::abs(second)));
       });
   ASSERT_TRUE(run);
+}
+
+// A disturbance that enters where u does not, and a zero.
+TEST(LinearPlantModel, FindsStatesAndAMismatchedDisturbance) {
+  finds_states_and_disturbance(with_zero());
+}
+
+// More states than y, y' and D: the model keeps those of x that the rows of y, y' and D leave open.
+// In each row the first state is the largest, so the open ones show only after an elimination.
+TEST(LinearPlantModel, FindsStatesThatAreNoneOfTheDerivatives) {
+  LinearPlant<5> plant{.a = {{-3, 1, 0, 0, 0},
+                             {4, -2, 1, 0, 0},
+                             {0, 0, -6, 1, 0},
+                             {0, 0, 0, -7, 1},
+                             {1, 0, 0, 0, -8}},
+                       .b = {0, 3, 0, 0, 0.5},
+                       .c = {1, 0, 0, 0, 0}};
+  plant.e = {0.0, 1.0, 0.0, 0.0, 0.0};
+  finds_states_and_disturbance(plant);
 }
 
 /// All parts beside the plant, with a sensor that is corrected (omega_o = 80) or left to itself.
@@ -311,6 +330,16 @@ TEST(LinearPlantModel, RefusesWhatYDoesNotShow) {
   EXPECT_EQ(order.error().value, 2.0);
 }
 
+// The states beside y and y' are those that these two leave out: here both are of the first two,
+// and of the first most. By the largest element of each row alone the second would be taken.
+TEST(LinearPlantModel, TakesTheStateThatYAndItsDerivativeLeaveOut) {
+  LinearPlant<3> plant{
+      .a = {{-3, 0, -1}, {1, -1, 1}, {-2, -3, -1}}, .b = {1, 0, 0}, .c = {2, 2, 0}};
+  plant.e = plant.b;
+  EXPECT_EQ(refusal(LinearPlantModel<3, ModelParts{.order = 1}>::make({plant}, 2.0, kT)),
+            "accepted");
+}
+
 /// (s^2 + w^2 + beside) / (s + 1)(s + 2)(s + 3) from d to y, 1 / .. from u.
 LinearPlant<3> with_notch(double w, double beside) {
   auto plant =
@@ -345,8 +374,29 @@ TEST(LinearPlantModel, RefusesASwingBehindAZeroAtItsFrequency) {
     EXPECT_TRUE(make(share * 8 * w * w, w)) << share;
   }
   EXPECT_FALSE(make(1e-14 * w * w, w));
+  // Refused, with the share as its value, up to the rounding of the coefficients.
+  EXPECT_NEAR(make(4e-13 * w * w, w).error().value / make(2e-13 * w * w, w).error().value, 2, 0.05);
   // A damped one has no zero there.
   EXPECT_TRUE(make(0.0, w, 0.01));
+  // A damped zero hides the sine that decays as it does, and neither one that does not nor one that
+  // decays faster.
+  auto damped = with_notch(w, 0.0);
+  damped.e = LinearPlant<3>::transfer_function(
+                 {.numerator = {w * w, 2 * 0.2 * w, 1}, .denominator = {6, 11, 6}})
+                 .value()
+                 .b;
+  const auto swinging = [&](double damping) {
+    return refusal(Model::make(
+        {.plant = damped, .resonators = {{{77.0}, {w, damping}}}, .leaky = {0.123}}, 1.0, kT));
+  };
+  EXPECT_EQ(swinging(0.2), refusal(answer));
+  for (const double damping : {0.0, 0.19, 0.21}) EXPECT_EQ(swinging(damping), "accepted");
+  // A zero that grows as the sine decays hides nothing.
+  damped.e = LinearPlant<3>::transfer_function(
+                 {.numerator = {w * w, -2 * 0.2 * w, 1}, .denominator = {6, 11, 6}})
+                 .value()
+                 .b;
+  EXPECT_EQ(swinging(0.2), "accepted");
   // (s + 4)(s + 5) hides what fades with 1/4 s.
   auto plant = with_notch(w, 0.0);
   plant.e = LinearPlant<3>::transfer_function({.numerator = {20, 9, 1}, .denominator = {6, 11, 6}})

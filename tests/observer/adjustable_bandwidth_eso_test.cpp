@@ -24,7 +24,7 @@ using esokit::SwitchingRule;
 template <int Order, class S, int Extension>
 void ratio_of_one_is_linear_eso(SwitchingRule rule) {
   using Observer = AdjustableBandwidthEso<Order, S, Extension>;
-  auto switched = Observer::make({.observer_bandwidth = S(50),
+  auto switched = Observer::make({.observer_bandwidth = S(25),
                                   .bandwidth_ratio = S(1),
                                   .rule = rule,
                                   .input_gain = S(-3),
@@ -32,7 +32,7 @@ void ratio_of_one_is_linear_eso(SwitchingRule rule) {
                       .value();
   auto linear =
       LinearEso<Order, S, Extension>::make(
-          {.observer_bandwidth = S(50), .input_gain = S(-3), .sample_time = static_cast<S>(0.01)})
+          {.observer_bandwidth = S(25), .input_gain = S(-3), .sample_time = static_cast<S>(0.01)})
           .value();
   Random random(17);
   for (int k = 0; k < 500; ++k) {

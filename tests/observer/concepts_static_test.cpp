@@ -450,11 +450,18 @@ ESOKIT_OBSERVER(FillWithNothing, {.delays_input = true}) { void fill_input(); };
 static_assert(LoopObserver<Fills> && !LoopObserver<FillMissing>);
 static_assert(!LoopObserver<FillUndeclared> && !LoopObserver<FillWithNothing>);
 
-ESOKIT_OBSERVER(Varies, {.varies_time = true}) { Check<S> set_step_time(S); };
+ESOKIT_OBSERVER(Varies, {.varies_time = true}) {
+  Check<S> set_step_time(S);
+  S step_time() const;
+};
 ESOKIT_OBSERVER(TimeMissing, {.varies_time = true}){};
+ESOKIT_OBSERVER(TimeNotSaid, {.varies_time = true}) { Check<S> set_step_time(S); };
 ESOKIT_OBSERVER(TimeUndeclared, {}) { Check<S> set_step_time(S); };
-ESOKIT_OBSERVER(TimeTellsNothing, {.varies_time = true}) { void set_step_time(S); };
-static_assert(LoopObserver<Varies> && !LoopObserver<TimeMissing>);
+ESOKIT_OBSERVER(TimeTellsNothing, {.varies_time = true}) {
+  void set_step_time(S);
+  S step_time() const;
+};
+static_assert(LoopObserver<Varies> && !LoopObserver<TimeMissing> && !LoopObserver<TimeNotSaid>);
 static_assert(!LoopObserver<TimeUndeclared> && !LoopObserver<TimeTellsNothing>);
 
 ESOKIT_OBSERVER(Gates, {.gates_outliers = true}) { bool accepts(S) const; };

@@ -550,7 +550,7 @@ struct Laws : LawSuite {
   void bad_measurement_is_a_missing_one() const {
     const Real u = input(0.25);
     for (const Real bad : {nan, infinity, -infinity, -nan}) {
-      AnyObserver hit = warm();
+      AnyObserver hit = warm(bridging);
       AnyObserver missing = hit;
       EXPECT_EQ(hit->update(bad, u), StepStatus::measurement_rejected);
       EXPECT_EQ(missing->predict(u), StepStatus::ok);
@@ -568,7 +568,7 @@ struct Laws : LawSuite {
   void bad_input_is_the_last_good_one() const {
     const Real u = input(0.125);
     for (const Real bad : {nan, infinity, -infinity}) {
-      AnyObserver hit = warm();
+      AnyObserver hit = warm(bridging);
       AnyObserver held = hit;
       const Real last = hit->applied_input();
       EXPECT_NE(last, 0);
@@ -594,13 +594,15 @@ struct Laws : LawSuite {
     // b0 so large that b0 T u alone is too much.
     const double b0 = 16 / period;
     const Real u = input(0.25);
+    const StepStatus late =
+        make(0.5, b0)->max_gap() > 0 ? StepStatus::gap_bridged : StepStatus::restarted;
     for (const Real bad : {huge(), -huge()}) {
       AnyObserver hit = warm(0.5, b0);
       AnyObserver missing = hit;
       EXPECT_EQ(hit->update(bad, u), StepStatus::measurement_rejected);
       missing->predict(u);
       EXPECT_TRUE(same_observer(hit, missing));
-      EXPECT_EQ(hit->update(0.5, u), StepStatus::gap_bridged);
+      EXPECT_EQ(hit->update(0.5, u), late);
       missing->update(0.5, u);
       EXPECT_TRUE(same_observer(hit, missing));
       EXPECT_TRUE(finite(hit));
@@ -771,30 +773,31 @@ struct Laws : LawSuite {
 
   /// M predictions and a correction equal one step of an observer that is made for M T.
   void gap_gain_is_that_of_longer_sample() const {
-    for (const double omega_t : {0.1, 1.0, 3.0}) {
+    for (const double omega_t : {bridging, 0.1, 1.0, 3.0}) {
       if (!kind.make(settings(omega_t))) continue;
       for (const int samples : {2, 3, 7, 20}) {
         SCOPED_TRACE(::testing::Message() << omega_t << " x " << samples);
+        if (samples > make(omega_t)->max_gap() + 1) break;
         const double long_period = samples * period;  // rounded to double
         const Real unit_roundoff = std::max<Real>(epsilon, std::numeric_limits<double>::epsilon());
-        AnyObserver bridging = make(omega_t);
+        AnyObserver gapped = make(omega_t);
         AnyObserver slow = make({omega_t / period, long_period, gain});
         const auto start = state([](int r) { return r % 2 == 0 ? 0.7 : -0.4; }, long_period);
-        bridging->reset(start);
+        gapped->reset(start);
         slow->reset(start);
         const Real u = s(0.5 / gain / nordsieck(n, long_period));
-        for (int i = 0; i < samples; ++i) bridging->predict(u);
+        for (int i = 0; i < samples; ++i) gapped->predict(u);
         slow->predict(u);
         Real scale = 0;
         for (int r = 0; r < N; ++r) {
           scale = std::max(scale, std::abs(slow->estimate(r)) * row_unit(r, long_period));
         }
-        EXPECT_EQ(bridging->missed(), samples);
-        EXPECT_EQ(bridging->correct(9), StepStatus::gap_bridged);
+        EXPECT_EQ(gapped->missed(), samples);
+        EXPECT_EQ(gapped->correct(9), StepStatus::gap_bridged);
         EXPECT_EQ(slow->correct(9), StepStatus::ok);
         scale += 9;
         for (int r = 0; r < N; ++r) {
-          EXPECT_LE(std::abs(bridging->estimate(r) - slow->estimate(r)) * row_unit(r, long_period),
+          EXPECT_LE(std::abs(gapped->estimate(r) - slow->estimate(r)) * row_unit(r, long_period),
                     16 * N * p * unit_roundoff * scale)
               << r;
         }
@@ -809,6 +812,7 @@ struct Laws : LawSuite {
       for (int every = 1; every <= 20; every += stride) {
         SCOPED_TRACE(::testing::Message() << omega_t << ", one in " << every);
         AnyObserver observer = make(omega_t);
+        if (every > observer->max_gap() + 1) break;
         const auto start = state([](int) { return 1; }, period * every);
         ASSERT_EQ(observer->reset(start), StepStatus::ok);
         const int corrections = settling_samples(omega_t * every);
@@ -823,11 +827,82 @@ struct Laws : LawSuite {
     }
   }
 
+  /// The size of the estimate in units of the slowest pole.
+  [[nodiscard]] Real error_size(const AnyObserver& observer, double omega_t) const {
+    Real most = 0;
+    for (int r = 0; r < N; ++r) {
+      most = std::max(
+          most, std::abs(observer->estimate(r)) * row_unit(r, period / std::min(1.0, omega_t)));
+    }
+    return most;
+  }
+
+  /// `missing` predictions and a correction.
+  static void bridge(AnyObserver& observer, int missing) {
+    for (int i = 0; i <= missing; ++i) observer->predict(0);
+    ASSERT_EQ(observer->correct(0), missing == 0 ? StepStatus::ok : StepStatus::gap_bridged);
+  }
+
+  /// The errors decay in any sequence of gaps up to max_gap(): two of all lengths in turn, random
+  /// ones, and the worst found step by step.
+  void any_sequence_of_gaps_decays() const {
+    constexpr int corrections = 200;
+    Random random(42);
+    for (const double omega_t : {bridging, 0.2, 0.46, 2.0}) {
+      if (!kind.make(settings(omega_t))) continue;
+      const AnyObserver start = make(omega_t);
+      std::vector<int> gaps;  // 0, 1, 2, 4, .. and the longest
+      for (int gap = 0; gap < start->max_gap(); gap = gap < 2 ? gap + 1 : gap * 7 / 4) {
+        gaps.push_back(gap);
+      }
+      gaps.push_back(start->max_gap());
+      const auto play = [&](const char* name, auto&& next) {
+        AnyObserver observer = start;
+        observer->reset(
+            state([](int r) { return r % 2 == 0 ? 1 : -1; }, period / std::min(1.0, omega_t)));
+        // Before the first correction a schedule or a filter may still be at its start.
+        for (int k = 0; k < 2 * N; ++k) bridge(observer, 0);
+        const Real before = error_size(observer, omega_t);
+        double time = 0;
+        for (int k = 0; k < corrections || time < 60 / kind.slowest; ++k) {
+          const int gap = next(observer, k);
+          bridge(observer, gap);
+          time += omega_t * (gap + 1);
+        }
+        EXPECT_LE(error_size(observer, omega_t), 1e-3 * before + 1e-12)
+            << name << ", " << omega_t << ", gaps to " << gaps.back();
+      };
+      for (const int a : gaps) {
+        for (const int b : gaps) {
+          if (a < b) play("two", [&](const AnyObserver&, int k) { return k % 2 == 0 ? a : b; });
+        }
+      }
+      for (int run = 0; run < 3; ++run) {
+        play("random", [&](const AnyObserver&, int) {
+          return gaps[static_cast<std::size_t>(random.index(static_cast<int>(gaps.size())))];
+        });
+      }
+      play("worst", [&](const AnyObserver& observer, int) {
+        int worst = 0;
+        Real most = -1;
+        for (const int gap : gaps) {
+          AnyObserver tried = observer;
+          bridge(tried, gap);
+          if (const Real size = error_size(tried, omega_t); size > most) {
+            most = size;
+            worst = gap;
+          }
+        }
+        return worst;
+      });
+    }
+  }
+
   void long_gap_restarts() const {
-    constexpr int max_gap = 5;
+    constexpr int max_gap = 2;
     const Real u = input(0.5);
     const auto after = [&](int missing) {
-      AnyObserver observer = make(0.5, gain, max_gap);
+      AnyObserver observer = make(bridging, gain, max_gap);
       observer->update(1, u);
       for (int i = 0; i < missing; ++i) observer->predict(u);
       return observer;
@@ -840,14 +915,14 @@ struct Laws : LawSuite {
     EXPECT_EQ(restarted->missed(), max_gap + 2);
     EXPECT_EQ(restarted->update(2, u), StepStatus::restarted);
     EXPECT_EQ(restarted->missed(), 0);
-    AnyObserver fresh = make(0.5, gain, max_gap);
+    AnyObserver fresh = make(bridging, gain, max_gap);
     fresh->predict(u);
     fresh->reset(2);
     EXPECT_TRUE(same_observer(restarted, fresh));
     EXPECT_EQ(restarted->update(2, u), StepStatus::ok);
 
     // The count of missing samples does not wrap around.
-    AnyObserver forgotten = make(0.5, gain, 65000);
+    AnyObserver forgotten = make(bridging, gain, 65000);
     forgotten->update(1, 0);
     for (int i = 0; i < 70000; ++i) forgotten->predict(0);
     EXPECT_EQ(forgotten->correct(1), StepStatus::restarted);
@@ -886,6 +961,7 @@ std::vector<NamedLaw> LawSuite::laws() const {
   ESOKIT_LAW(refused_retune_changes_nothing);
   ESOKIT_LAW(gap_gain_is_that_of_longer_sample);
   ESOKIT_LAW(recurring_gaps_are_stable);
+  ESOKIT_LAW(any_sequence_of_gaps_decays);
   ESOKIT_LAW(long_gap_restarts);
 #undef ESOKIT_LAW
   return laws;

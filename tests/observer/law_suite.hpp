@@ -149,8 +149,9 @@ const ObserverKind& kind_of() {
 
 /// The laws of one type, and what it takes to write more of them.
 struct LawSuite {
-  static constexpr double period = 0.01;  ///< T, s
-  static constexpr double gain = 2;       ///< b0, a power of two: u = -d / b0 is exact
+  static constexpr double period = 0.01;    ///< T, s
+  static constexpr double gain = 2;         ///< b0, a power of two: u = -d / b0 is exact
+  static constexpr double bridging = 0.02;  ///< omega_o T at which all types bridge some gaps
 
   const ObserverKind& kind;
   int n = kind.order;

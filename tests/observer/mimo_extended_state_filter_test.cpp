@@ -330,7 +330,13 @@ TEST(MimoExtendedStateFilter, bad_inputs_and_resets) {
   EXPECT_EQ(filter.estimate(), held.estimate());
   EXPECT_EQ(filter.reset(bad), StepStatus::state_rejected);
   EXPECT_EQ(filter.estimate(), held.estimate());
+  EXPECT_EQ(filter.missed(0), 1);
+  EXPECT_NE(filter.innovation()(0), 0);
   EXPECT_EQ(filter.reset(y), StepStatus::ok);
+  for (const int channel : {0, 1}) {
+    EXPECT_EQ(filter.innovation()(channel), 0);
+    EXPECT_EQ(filter.missed(channel), 0);
+  }
   EXPECT_EQ(filter.estimate()(0), 0.1);
   EXPECT_EQ(filter.estimate()(2), 0.2);
   EXPECT_LE(covariance_distance(filter.covariance(), coupled().initial_covariance), 1e-14);

@@ -199,6 +199,14 @@ TYPED_TEST(PredictorCorrector, LevelGainsAreThoseOfTheBandwidths) {
   }
 }
 
+TYPED_TEST(PredictorCorrector, ResetForgetsTheInnovation) {
+  using S = typename TypeParam::scalar_type;
+  auto observer = TestFixture::warm();
+  EXPECT_NE(observer.innovation(), S(0));
+  ASSERT_EQ(observer.reset(S(0.5)), esokit::StepStatus::ok);
+  EXPECT_EQ(observer.innovation(), S(0));
+}
+
 TEST(CorrectionGain, IsTheGainForTheGap) {
   auto observer =
       LinearEso<2>::make({.observer_bandwidth = 40, .input_gain = 1, .sample_time = period})

@@ -120,7 +120,7 @@ TYPED_TEST(RandomConfig, ModerateDataWithBadSamples) {
         if (bad_y) {
           expected |= StepStatus::measurement_rejected;
         } else {
-          if (missed > config.max_gap + 1) {
+          if (missed > observer.max_gap() + 1) {
             expected |= StepStatus::restarted;
           } else if (missed > 1) {
             expected |= StepStatus::gap_bridged;

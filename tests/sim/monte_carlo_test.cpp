@@ -5,9 +5,15 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/guarded.hpp>
+#include <esokit/adapter/outlier_gate.hpp>
+#include <esokit/adapter/variable_time.hpp>
 #include <esokit/control/adrc.hpp>
+#include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/core/pack.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/model_eso.hpp>
 #include <esokit/sim/monte_carlo.hpp>
 #include <limits>
 #include <span>
@@ -389,6 +395,59 @@ TEST(MonteCarlo, RunsWhatPacksCannot) {
   EXPECT_EQ(refusal(sim::run(packed, fourfold,
                              {.duration = 0.02, .sample_time = T, .jitter = 0.1, .number = 1})),
             "jitter: must be left out if packs run by number");
+}
+
+/// An observer of a user, who knows of no packs: what it inherits of them is not its own.
+struct Own : LinearEso<2> {
+  static Expected<Own, Error<double>> make(const Config& config) {
+    const auto made = LinearEso<2>::make(config);
+    if (!made) return made.error();
+    return Own{*made};
+  }
+  StepStatus update(double y, double u) noexcept { return LinearEso<2>::update(0.5 * y, u); }
+};
+
+/// The lanes in which runs go, whose numbers are those of single runs.
+template <class C>
+int lanes_of(void (*settings)(typename C::Config&) = nullptr) {
+  typename C::Config config{};
+  auto& chain = chain_config<std::remove_cvref_t<decltype(std::declval<const C&>().observer())>>(
+      config.observer);
+  chain.observer_bandwidth = 80;
+  chain.input_gain = 50;
+  chain.sample_time = T;
+  config.limits = {.lower = -6, .upper = 6};
+  if constexpr (requires { config.controller_bandwidth; }) config.controller_bandwidth = 12;
+  if (settings != nullptr) settings(config);
+  std::vector<double> numbers;
+  const sim::MonteCarloConfig<Servo, C> study{
+      .runs = 6,
+      .loop = {.duration = 0.06, .reference = 0.5, .disturbance = 3.0, .noise = 1e-3},
+      .on_run = [&](std::int64_t, std::span<const double> n) { numbers.push_back(n[0]); }};
+  const auto runs = sim::monte_carlo(servo(), C::make(config).value(), study);
+  const auto outcome = runs.template run<4>(sim::final_value("y", error)).value();
+  EXPECT_EQ(outcome.failed, 0);
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    const auto alone = runs.replay(static_cast<std::int64_t>(i)).value();
+    EXPECT_EQ(numbers[i], alone.output.back() - alone.reference.back()) << i;
+  }
+  return outcome.lanes;
+}
+
+// Whether it is in packs is a question that every controller bears.
+TEST(MonteCarlo, AsksEveryControllerForPacks) {
+  using Swinging = ModelEso<ModelParts{.order = 2, .resonators = 1}>;
+  const auto swing = [](auto& config) { config.observer.model.resonators[0].frequency = 20; };
+  EXPECT_EQ(lanes_of<Adrc<Swinging>>(swing), 4);
+  EXPECT_EQ(lanes_of<DisturbanceCompensator<Swinging>>(swing), 4);
+  EXPECT_EQ(lanes_of<Adrc<Own>>(), 1);
+  EXPECT_EQ(lanes_of<Adrc<Guarded<LinearEso<2>>>>(), 1);
+  EXPECT_EQ((lanes_of<Adrc<DelayedInput<LinearEso<2>, 4>>>()), 1);
+  EXPECT_EQ(lanes_of<Adrc<VariableTime<LinearEso<2>>>>(), 1);
+  EXPECT_EQ(lanes_of<Adrc<OutlierGate<LinearEso<2>>>>(), 1);
+  EXPECT_EQ((lanes_of<Adrc<PlantEso<2, ModelParts{.order = 2}>>>(
+                [](auto& config) { config.observer.model.plant = servo(); })),
+            1);
 }
 
 TEST(MonteCarlo, TakesNonlinearPlantsInPacks) {

@@ -42,6 +42,7 @@ enum class Law {
   refused_retune_changes_nothing,
   gap_gain_is_that_of_longer_sample,
   recurring_gaps_are_stable,
+  any_sequence_of_gaps_decays,
   long_gap_restarts,
 };
 

@@ -34,6 +34,7 @@ using esokit::tune;
 using esokit::TunedDesign;
 using esokit::TuneFamily;
 using esokit::TuneModel;
+using esokit::TuneRules;
 
 TuneModel plain(int order, double disturbance = 1.0) {
   TuneModel model;
@@ -318,6 +319,7 @@ TEST(TuneTest, EachFamilyIsAsGoodAsAGrid) {
   model.input_gain = {1.0, 0.05};
   model.dead_time = 0.002;
   const auto tuning = tune(model, {.control_noise = 0.5}).value();
+  model = tuning.model;
   const esokit::detail::TuneSearch search{
       model,
       {},
@@ -326,6 +328,7 @@ TEST(TuneTest, EachFamilyIsAsGoodAsAGrid) {
       std::pow(tuning.rho, -0.25),
       std::pow(model.disturbance / (model.noise * model.noise * model.sample_time), 1.0 / 6.0),
       1.0 / (model.dead_time + 1.5e-3),
+      0.5,
       nullptr};
   auto brute = search;
   const LoopCost cost(model, {}, search.slowest());
@@ -334,6 +337,7 @@ TEST(TuneTest, EachFamilyIsAsGoodAsAGrid) {
   int compared = 0;
   for (const auto& contender : esokit::detail::contenders(model, false)) {
     if (contender.observer_numbers + contender.law_numbers != 2) continue;
+    brute.seen.clear();
     const auto value = [&](const std::vector<double>& x) { return brute.value(contender, x, 1e3); };
     const auto best = esokit::detail::grid_search(
         value, {brute.low(contender, 0), brute.low(contender, 1)},
@@ -473,6 +477,263 @@ TEST(TuneTest, TakesADisturbanceWithASlopeAsARandomWalkOfTheSameBandwidth) {
   EXPECT_NEAR(model.filter_bandwidth(), 30.0, 1e-9);
 }
 
+/// A servo with little noise.
+TuneModel servo() {
+  TuneModel model;
+  model.order = 2;
+  model.input_gain = {80.0, 2.0};
+  model.pole = 1.2;
+  model.lag = 0.004;
+  model.dead_time = 0.002;
+  model.latency_half_width = 2e-4;
+  model.lag_half_width = 4e-4;
+  model.noise = 2e-4;
+  model.sample_time = 1e-3;
+  model.disturbance = model.disturbance_of(0.2 / model.latency());
+  model.u_min = -5.0;
+  model.u_max = 5.0;
+  return model;
+}
+
+// Without the rules for the limits the best loop swings between them for ever; with them it comes
+// back, for next to the same J.
+TEST(TuneTest, WhatIsChosenComesBackFromTheLimits) {
+  TuneModel model = servo();
+  model.input_gain = {80.0, 4.5};
+  model.pole = 0.0;
+  model.lag = 0.0012;
+  model.dead_time = 0.0098;
+  model.latency_half_width = 7.7e-4;
+  model.lag_half_width = 2e-4;
+  model.noise = 4.3e-4;
+  model.sample_time = 1.8e-3;
+  model.disturbance = model.disturbance_of(0.2 / model.latency());
+  const esokit::TuneRules old{.damping_latencies = 0.0, .bandwidth_ratio = 0.0};
+  const auto before = tune(model, {}, old).value();
+  const TunedDesign& fast =
+      *std::min_element(before.designs.begin(), before.designs.end(),
+                        [](const TunedDesign& a, const TunedDesign& b) { return a.cost < b.cost; });
+  EXPECT_TRUE(fast.feasible);
+  EXPECT_LT(fast.damping_latencies, 1.0);
+  EXPECT_FALSE(fast.comes_back);
+  EXPECT_FALSE(fast.lost.empty());
+  const auto tuning = tune(model).value();
+  ASSERT_NE(tuning.chosen(), nullptr);
+  EXPECT_TRUE(alarms(tuning, *tuning.chosen()).empty());
+  const TunedDesign& chosen = *tuning.chosen();
+  EXPECT_GE(chosen.damping_latencies, 1.3 * 0.999);
+  EXPECT_LE(chosen.bandwidth_ratio, 5.0 * 1.001);
+  EXPECT_LE(chosen.cost, 1.02 * fast.cost);
+  for (std::size_t i = 0; i < tuning.designs.size(); ++i) {
+    const TunedDesign& a = tuning.designs[i];
+    if (i > 0) {
+      const TunedDesign& b = tuning.designs[i - 1];
+      const auto rank = [](const TunedDesign& d) { return d.feasible ? d.comes_back ? 2 : 1 : 0; };
+      EXPECT_GE(rank(b), rank(a)) << a.name;
+    }
+    if (!a.feasible) continue;
+    EXPECT_GE(a.damping_latencies, 1.3 * 0.999) << a.name;
+    EXPECT_EQ(a.comes_back, a.lost.empty()) << a.name;
+    const auto variants = esokit::played_variants(tuning.model);
+    EXPECT_EQ(variants.size(), 5U);
+    const auto played = esokit::play(
+        variants[static_cast<std::size_t>(a.lost_on)].model,
+        variants[static_cast<std::size_t>(a.lost_on)].gain, a.controller,
+        a.comes_back ? esokit::play_events[0] : a.lost_in, a.settling_time, [](auto...) {});
+    EXPECT_EQ(played.back, a.comes_back) << a.name;
+  }
+}
+
+// A law whose k_1 / k_0 is a tenth of the latency is stable, keeps its margins, and is lost.
+TEST(PlayTest, TellsALoopThatSwingsForEver) {
+  TuneModel model = servo();
+  const esokit::TuneRules free{.damping_latencies = 0.0, .bandwidth_ratio = 0.0};
+  const auto fast =
+      tune(model, {.controller_bandwidth = 2.0 / (0.58 * model.latency())}, free).value();
+  const auto slow = tune(model, {.controller_bandwidth = 1.9 / (1.3 * model.latency())}).value();
+  const auto lost = [](const TunedDesign& design) { return !design.comes_back; };
+  EXPECT_GE(std::count_if(fast.designs.begin(), fast.designs.end(), lost), 5);
+  ASSERT_NE(slow.chosen(), nullptr);
+  EXPECT_TRUE(slow.chosen()->comes_back);
+}
+
+// What is played is what runs: Adrc on the plant of the model, sample by sample.
+TEST(PlayTest, IsTheRealController) {
+  TuneModel model = servo();
+  model.pole = 0.0;
+  const auto tuning = tune(model).value();
+  const TunedDesign& design = named(tuning, "LinearEso, free poles");
+  using Rigid = esokit::LinearPlant<2>;
+  const auto plant = with_lag(
+      Rigid::chain({.coefficients = {0.0, 0.0}, .input_gain = 80.0, .dead_time = 0.002}).value(),
+      0.004);
+  (void)esokit::with_controller<2>(model, design, [&](const auto& controller) {
+    using Controller = std::remove_cvref_t<decltype(controller)>;
+    using Eso = esokit::LinearEso<2, double, 1, esokit::PoleSet>;
+    if constexpr (std::is_same_v<Controller, esokit::Adrc<Eso>>) {
+      const double end = 10.0 * model.latency();
+      const double load = 1.5 * 80.0 * 5.0;
+      // The same noise as the play has.
+      esokit::sim::Gaussian gaussian(1);
+      std::vector<double> y, u;
+      const auto ran = esokit::sim::run(
+          plant.value(), controller,
+          {.duration = 0.5,
+           .disturbance =
+               [&](double t) { return t < 1e-3 * std::ceil(end / 1e-3) - 1e-6 ? load : 0.0; },
+           .sensor = [&](double, double exact) { return exact + model.noise * gaussian.next(); }},
+          [&](const auto& sample) {
+            y.push_back(sample.output);
+            u.push_back(sample.input);
+          });
+      ASSERT_TRUE(ran);
+      std::size_t k = 0, limited = 0;
+      (void)esokit::play(model, 1.0, design.controller, esokit::play_events[0],
+                         design.settling_time, [&](double, double, double output, double input) {
+                           if (k >= y.size()) return;
+                           EXPECT_NEAR(output, y[k], 1e-6) << k;
+                           EXPECT_NEAR(input, u[k], 1e-4) << k;
+                           limited += std::abs(input) >= 5.0 ? 1U : 0U;
+                           ++k;
+                         });
+      EXPECT_GT(k, 200U);
+      EXPECT_GT(limited, 50U);
+    }
+  });
+}
+
+// A stated law that breaks the rule is refused, with the nearest that keeps it.
+TEST(TuneTest, NamesTheNearestThatKeepsTheRule) {
+  const TuneModel model = servo();
+  const auto refused = tune(model, {.controller_bandwidth = 2.01 / (1.3 * model.latency())});
+  ASSERT_FALSE(refused);
+  EXPECT_STREQ(refused.error().field, "controller_bandwidth");
+  EXPECT_NEAR(refused.error().limit, 2.0 / (1.3 * model.latency()), 1e-9);
+  EXPECT_TRUE(tune(model, {.controller_bandwidth = refused.error().limit}));
+  const auto hasty = tune(model, {.settling_time = 0.02});
+  ASSERT_FALSE(hasty);
+  EXPECT_STREQ(hasty.error().field, "settling_time");
+  EXPECT_STREQ(hasty.error().rule,
+               "is so short for this latency that the loop would swing at its limits for ever; "
+               "must be at least");
+  EXPECT_TRUE(tune(model, {.settling_time = 1.001 * hasty.error().limit}));
+}
+
+// A log without disturbance: the floor stands for it, as far as the noise allows; a larger
+// disturbance is not touched.
+TEST(TuneTest, ReckonsWithAFloorOfTheDisturbance) {
+  TuneModel quiet = servo();
+  quiet.disturbance = quiet.disturbance_of(0.001 / quiet.latency());
+  const esokit::TuneRules plain_rules{.play = false};
+  const auto raised = tune(quiet, {.controller_bandwidth = 10.0}, plain_rules).value();
+  EXPECT_NEAR(raised.model.filter_bandwidth() * quiet.latency(), 0.1, 1e-9);
+  EXPECT_EQ(raised.given_disturbance, quiet.disturbance);
+  // The noise that it takes to cancel the disturbance grows by the power 2.5 of the bandwidth.
+  const double allowed = 4.0 * raised.least_noise;
+  const auto held = tune(quiet, {.control_noise = allowed}, plain_rules).value();
+  EXPECT_LT(held.model.filter_bandwidth() * quiet.latency(), 0.099);
+  EXPECT_GT(held.model.disturbance, quiet.disturbance);
+  EXPECT_EQ(tune(servo(), {.controller_bandwidth = 10.0}, plain_rules).value().model.disturbance,
+            servo().disturbance);
+  // The noise that is asked is kept by all that is feasible.
+  for (const TunedDesign& design : held.designs) {
+    if (design.feasible) {
+      EXPECT_LE(design.control_noise, 1.002 * allowed) << design.name;
+    }
+  }
+}
+
+// 5 % unless stated, also where cancelling the disturbance takes more: then it is refused.
+TEST(TuneTest, NeverRaisesWhatItMayAsk) {
+  TuneModel model = servo();
+  model.noise *= 100.0;
+  model.disturbance = model.disturbance_of(1.0 / model.latency());
+  const auto refused = tune(model);
+  ASSERT_FALSE(refused);
+  EXPECT_STREQ(refused.error().field, "control_noise");
+  EXPECT_EQ(refused.error().value, 0.5);
+  EXPECT_GT(refused.error().limit, 0.5);
+  const auto stated =
+      tune(model, {.control_noise = 1.5 * refused.error().limit}, {.play = false}).value();
+  const auto said = alarms(stated, stated.designs.front());
+  EXPECT_TRUE(std::any_of(said.begin(), said.end(), [](const esokit::TuneAlarm& alarm) {
+    return std::string(alarm.name) == "noise";
+  }));
+}
+
+// A design for more noise is not worse in everything.
+TEST(TuneTest, MoreNoiseIsNeverWorseInEverything) {
+  TuneModel model = servo();
+  model.noise *= 10.0;
+  TunedDesign before;
+  for (const double noise : {0.1, 0.4, 1.6}) {
+    const auto tuning = tune(model, {.control_noise = noise}, {.play = false});
+    if (!tuning || tuning->chosen() == nullptr) continue;
+    const TunedDesign& now = *tuning->chosen();
+    if (!before.name.empty()) {
+      EXPECT_FALSE(now.output_deviation > 1.005 * before.output_deviation &&
+                   now.load_peak > 1.005 * before.load_peak &&
+                   now.settling_time > 1.005 * before.settling_time &&
+                   now.modulus_margin < 0.995 * before.modulus_margin &&
+                   now.delay_margin < 0.995 * before.delay_margin)
+          << noise;
+    }
+    before = now;
+  }
+  EXPECT_FALSE(before.name.empty());
+}
+
+/// The rule named is the one that costs: without it J is smaller, without any other it is the same.
+TEST(TuneTest, NamesTheRuleThatLimits) {
+  TuneModel model = plain(1, 40.0);
+  model.lag = 0.01;
+  model.dead_time = 0.004;
+  const auto linear = [&](const TuneRules& rules) {
+    const auto tuning = tune(model, {.control_noise = 5.0}, rules).value();
+    for (const TunedDesign& d : tuning.designs) {
+      if (d.name == "LinearEso") return d;
+    }
+    return TunedDesign{};
+  };
+  const TuneRules loose{.modulus_margin = 0.1,
+                        .delay_samples = 0.1,
+                        .gain_factor = 1.0,
+                        .damping_latencies = 0.0,
+                        .bandwidth_ratio = 0.0,
+                        .filter_floor = 0.0,
+                        .play = false};
+  const double free = linear(loose).cost;
+  const std::pair<const char*, TuneRules> cases[] = {{"modulus margin",
+                                                      [&] {
+                                                        auto r = loose;
+                                                        r.modulus_margin = 0.75;
+                                                        return r;
+                                                      }()},
+                                                     {"delay margin",
+                                                      [&] {
+                                                        auto r = loose;
+                                                        r.delay_samples = 25.0;
+                                                        return r;
+                                                      }()},
+                                                     {"b0 wrong by a factor",
+                                                      [&] {
+                                                        auto r = loose;
+                                                        r.gain_factor = 4.0;
+                                                        return r;
+                                                      }()},
+                                                     {"phase margin", [&] {
+                                                        auto r = loose;
+                                                        r.phase_margin = 1.2;
+                                                        return r;
+                                                      }()}};
+  for (const auto& [name, rules] : cases) {
+    const TunedDesign d = linear(rules);
+    ASSERT_TRUE(d.feasible) << name;
+    EXPECT_EQ(d.constraint, name);
+    EXPECT_GT(d.cost, 1.002 * free) << name;
+  }
+}
+
 TEST(TuneTest, SimulatedItDoesWhatWasPredicted) {
   TuneModel model = plain(2, 20.0);
   model.input_gain = {2.0, 0.0};
@@ -545,7 +806,10 @@ TEST(TuneTest, RefusesWhatIsNoProblem) {
     return tuning ? std::string() : std::string(tuning.error().field) + " " + tuning.error().rule;
   };
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(refused([](TuneModel& m) { m.order = 4; }), "order must be 1, 2 or 3");
+  // The largest without an overflow, which the sanitizers see.
+  for (const int order : {0, 4, -1, std::numeric_limits<int>::max()}) {
+    EXPECT_EQ(refused([&](TuneModel& m) { m.order = order; }), "order must be 1, 2 or 3");
+  }
   EXPECT_EQ(refused([](TuneModel& m) { m.noise = 0.0; }), "noise must be finite and positive");
   EXPECT_EQ(refused([](TuneModel& m) { m.disturbance = nan; }),
             "disturbance must be finite and positive");
