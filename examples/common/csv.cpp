@@ -23,8 +23,12 @@ std::string csv_field(std::string_view text) {
 
 std::string csv_line(const CsvRow& row) {
   std::string line;
-  for (const std::string& field : row) line += (&field == &row[0] ? "" : ",") + csv_field(field);
-  return line + '\n';
+  for (const std::string& field : row) {
+    if (&field != &row[0]) line += ',';
+    line += csv_field(field);
+  }
+  line += '\n';
+  return line;
 }
 
 bool write_text(const std::string& file, std::string_view text) {

@@ -30,9 +30,9 @@ struct LogError : std::runtime_error {
 
 /// The wanted columns of a CSV file. Lines that begin with # or % or // are comments; the first
 /// line with a field that is no number is the header, or the last comment before the numbers if it
-/// has as many fields. Columns are named by it, by what follows the last / or . of a name where
-/// that is one column's alone, or by their number from 1. Where the separator is no comma, a comma
-/// in a number is a decimal one.
+/// has as many fields. Columns are named by it, by what follows the last / or . of a name or by its
+/// beginning where that is one column's alone, or by their number from 1. Where the separator is no
+/// comma, a comma in a number is a decimal one.
 class LogFile {
  public:
   /// Reads the header and the first row alone.
@@ -236,6 +236,11 @@ class LogFile {
         number <= count_) {
       return number - 1;
     }
+    std::vector<std::size_t> begins;
+    for (std::size_t i = 0; i < header_.size(); ++i) {
+      if (!name.empty() && header_[i].starts_with(name)) begins.push_back(i);
+    }
+    if (begins.size() == 1) return begins[0];
     std::string there;
     for (const std::string& column : header_) there += (there.empty() ? "" : ", ") + column;
     throw LogError(file_.string() + ": no column '" + name + "'; there " +

@@ -21,7 +21,9 @@ from urllib.parse import quote
 SUMMARY = ["case", "metric", "paper", "ours", "relative_error", "tolerance", "pass", "note"]
 CONTENTS = ["kind", "name", "text", "alt", "more", "figure"]
 MISSES = ("printed number missed", "the text does not describe what was simulated",
-          "a claim does not hold", "settings or data not published")  # miss_texts in report.cpp
+          "a claim does not hold", "settings or data not published",  # miss_texts in report.cpp
+          "doubtful", "does not reproduce")  # column_texts there
+COLUMN = "chi-square of the column"  # column_metric there
 WIDEST = 10  # columns of a table, then it is split
 Row = namedtuple("Row", "case metric paper ours error tolerance passed note outcome miss")
 Item = namedtuple("Item", CONTENTS + ["addition"])
@@ -126,19 +128,23 @@ def png_size(file):
 def counts(paper):
     """Printed numbers and own checks, never added up."""
     rows = [row for one in paper.examples for row in one.rows]
+    printed = [{"fail": "known_miss"}.get(row.outcome, row.outcome) for row in rows if row.paper]
+    columns = [row.miss or row.outcome for row in rows if row.metric == COLUMN]
+    own = [row.outcome for row in rows if not row.paper and row.metric != COLUMN]
 
-    text = ""
-    for words, printed, kinds in (
-            ("Printed numbers", True, {"pass": "met,", "known_miss": "missed,",
-                                       "reported": "not judged"}),
-            ("Own checks", False, {"pass": "passed,", "fail": "failed"})):
-        outcomes = [{"fail": "known_miss"}.get(row.outcome, row.outcome) if printed else row.outcome
-                    for row in rows if bool(row.paper) == printed]
+    text, classes = "", dict.fromkeys(("doubtful", "does not reproduce"), "known_miss")
+    for words, outcomes, kinds in (
+            ("Printed numbers", printed, {"pass": "met,", "known_miss": "missed,",
+                                          "reported": "not judged"}),
+            ("Their noisy columns", columns, {"pass": "reproduced,", "doubtful": "doubtful,",
+                                              "does not reproduce": "not reproduced,",
+                                              "reported": "not judged"}),
+            ("Own checks", own, {"pass": "passed,", "fail": "failed"})):
         numbers = [(outcomes.count(kind), name, kind) for kind, name in kinds.items()]
         if any(number for number, _, _ in numbers):
             text += f"<span>{words}:" + "".join(
-                f' <span class="{kind if number else "reported"}">{number} {name}</span>'
-                for number, name, kind in numbers) + "</span>\n"
+                f' <span class="{classes.get(kind, kind) if number else "reported"}">'
+                f"{number} {name}</span>" for number, name, kind in numbers) + "</span>\n"
     return ('<p class="counts">' +
             (text or '<span class="reported">These programs compare no numbers.</span>') + "</p>\n")
 
@@ -183,7 +189,7 @@ def misses(paper):
         # Where the example says it in words, its rows need not be listed one by one up here.
         said = said or [(row.miss, f"{esc(row.case)}, {esc(row.metric)}: paper {esc(row.paper)}, "
                          f"ours {esc(shown(row.ours))}.")
-                        for row in one.rows if row.outcome == "known_miss"]
+                        for row in one.rows if row.outcome == "known_miss" and row.paper]
         items += [f'<b>{kind}:</b> {text} <a href="#{one.anchor}">{esc(one.name)}</a>'
                   for kind, text in said]
     return boxed('<h2 id="misses">What does not reproduce</h2>', items)
@@ -272,7 +278,8 @@ def all_checks(example):
              cell(row.note.split(" ")[1] if row.note.startswith("reference ") else ""),
              cell(shown(row.ours)), cell(percent(row.error)),
              cell(percent(row.tolerance) if row.error else row.tolerance),
-             cell(marks[row.outcome][not row.paper], row.outcome), cell(row.note, "text"))
+             cell("≠ " + row.miss if row.metric == COLUMN and row.miss else
+                  marks[row.outcome][not row.paper], row.outcome), cell(row.note, "text"))
             for row in example.rows]
     file = quote((example.folder / "summary.csv").as_posix())
     return (f"<details>\n<summary>{esc(example.title)}: {len(rows)} rows "
@@ -301,7 +308,9 @@ def overview(out, papers):
 <p>The programs in examples/ reproduce five papers from their equations, and show what the \
 library does. Each card leads to a page with figures, tables and all numbers. Two kinds of \
 comparison are counted separately. A <b>printed number</b> is a number in a paper: it is met, \
-missed, or not judged (if no tolerance can be given). An <b>own check</b> compares one of our \
+missed, or not judged (if no tolerance can be given, or if noise is too large for a verdict). \
+Numbers of single noisy runs are judged together, too, a column at a time: it is reproduced, \
+doubtful or not reproduced. An <b>own check</b> compares one of our \
 numbers with a formula, with an independent program, or with a limit that it has to keep: it \
 passes or fails.</p>
 """

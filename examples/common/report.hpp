@@ -99,12 +99,61 @@ struct Measured {
   std::optional<double> deviation;
 };
 
+/// A printed number that is of one run with noise, beside ours over the seeds.
+struct SingleRun {
+  std::string case_name, metric;
+  double printed = 0.0;
+  Statistics ours;
+  std::string note = {};
+
+  /// Standard deviation of the difference: a single run's and that of our mean.
+  [[nodiscard]] double deviation() const;
+  /// z: the difference in these.
+  [[nodiscard]] double z() const { return (printed - ours.mean) / deviation(); }
+  /// A run scatters so much that being near would say nothing.
+  [[nodiscard]] bool too_wide() const;
+};
+
+/// How printed numbers of single runs are judged, for all papers; `rule` says it to a reader.
+///
+/// The numbers of a column (or of a table) are judged together, by chi-square = sum of z^2 with z
+/// the difference in standard deviations of a single run. `probability` is that of a larger sum if
+/// the numbers were independent. The runs of a paper may share their noise; then the sum scatters
+/// more, at most as if all z were one number, which is what `largest_rms` is for.
+struct PrintedColumn {
+  enum class Verdict { reproduced, doubtful, not_reproduced, not_judged };
+
+  static constexpr double within = 2.0;              ///< sd, of a single number that is met
+  static constexpr double widest = 0.2;              ///< share of a number that 3 sd may be
+  static constexpr double least_probability = 0.05;  ///< of a column that is reproduced
+  static constexpr double largest_rms = 2.0;         ///< of z in a column that is not refuted
+
+  /// `fitted`: how many quantities of our set-up were chosen such that these numbers come near.
+  PrintedColumn(const std::vector<SingleRun>& numbers, int fitted = 0);
+
+  [[nodiscard]] static std::string rule(std::size_t seeds);
+  [[nodiscard]] std::string verdict_text() const;
+
+  int judged = 0;  ///< numbers that are not too wide; only they are in the sum
+  int degrees_of_freedom = 0;
+  double chi_square = 0.0, probability = 1.0;
+  double rms = 0.0;  ///< of z: the root of chi-square over degrees of freedom
+  Verdict verdict = Verdict::not_judged;
+};
+
+/// Probability that chi-square is larger, for a whole number of degrees of freedom.
+[[nodiscard]] double chi_square_tail(double chi_square, int degrees_of_freedom);
+
 /// How far a number may be from the paper's. A plain number is a relative tolerance.
 struct Tolerance {
   Tolerance(double share) : relative(share) {}
   [[nodiscard]] static Tolerance absolute(double largest_difference);
   /// Within `factor` standard deviations of the seeds.
   [[nodiscard]] static Tolerance deviations(double factor, const Statistics& seeds);
+  /// Two means over seeds, ours and one over `other_count` seeds of another program: within
+  /// `factor` standard errors of their difference.
+  [[nodiscard]] static Tolerance means(double factor, const Statistics& seeds,
+                                       std::size_t other_count);
   /// This tolerance or a relative one, whichever is the wider.
   [[nodiscard]] Tolerance or_relative(double share) const;
 
@@ -137,11 +186,14 @@ class Report {
              const Measured& ours, const std::optional<Tolerance>& tolerance = std::nullopt,
              std::string_view note = {});
 
-  /// A printed number of one run is met if a single run of ours could give it: within three
-  /// standard deviations. Where those are more than the number itself, that would say nothing, and
-  /// it is not judged. `missed`: known to be missed, `note` says why.
-  void check_single_run(std::string_view case_name, std::string_view metric, double printed,
-                        const Statistics& ours, std::string_view note, bool missed = false);
+  /// Printed numbers of single runs, judged as a column and one by one (see PrintedColumn). A
+  /// number is met if it is near and its column is reproduced; one that is far is missed, which
+  /// does not fail the program. What fails it is a verdict on the column other than `expected`.
+  void check_column(const std::string& name, const std::vector<SingleRun>& numbers,
+                    PrintedColumn::Verdict expected, int fitted = 0);
+
+  /// The columns so far as a table, with the rule.
+  void columns(std::size_t seeds);
 
   /// Our number beside one that is not printed in the paper (an independent run, a closed form):
   /// it must reproduce. An own check: the paper's column stays empty, and the note begins with the
@@ -223,6 +275,7 @@ class Report {
   std::string name_, folder_;
   About about_;
   std::vector<Check> checks_;
+  std::vector<CsvRow> columns_;
   std::vector<CsvRow> contents_;  ///< kind, name, text, alt, more, figure
   std::vector<std::string> problems_;
 };

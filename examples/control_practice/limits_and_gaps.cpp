@@ -207,12 +207,17 @@ void bumps(Report& report, const std::string& name, MakeConfig&& make_config,
 // ---- periodic gaps
 
 template <int Order>
+auto observer_of(double omega_t) {
+  return esokit::LinearEso<Order>::make(
+             {.observer_bandwidth = omega_t, .input_gain = 1, .sample_time = 1})
+      .value();
+}
+
+template <int Order>
 double spectral_radius(double omega_t, int every, bool follow) {
   constexpr int size = Order + 1;
   using Chain = esokit::IntegratorChain<Order, double>;
-  auto observer = esokit::LinearEso<Order>::make(
-                      {.observer_bandwidth = omega_t, .input_gain = 1, .sample_time = 1})
-                      .value();
+  auto observer = observer_of<Order>(omega_t);
   for (int i = 0; i < (follow ? every : 1); ++i) observer.predict(0);
   observer.correct(1);
   esokit::EigenMatrix<double, size, size> error =
@@ -228,7 +233,9 @@ void gaps(Report& report, std::vector<CsvRow>& rows) {
     double largest = 0, nominal = 0;
     int diverging = 0;
     for (int every = 1; every <= 20; ++every) {
-      largest = std::max(largest, spectral_radius<Order>(omega_t, every, true));
+      if (every <= observer_of<Order>(omega_t).max_gap() + 1) {
+        largest = std::max(largest, spectral_radius<Order>(omega_t, every, true));
+      }
       const double radius = spectral_radius<Order>(omega_t, every, false);
       nominal = std::max(nominal, radius);
       diverging += radius > 1 ? 1 : 0;

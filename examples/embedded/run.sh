@@ -367,7 +367,7 @@ for core in cortex-m4f cortex-m7; do
   limit "$core: code bytes of LinearEso<2>" "$code" 200
   limit "$core: state bytes of LinearEso<2>" "$(value "$runs" size LinearEso 3)" 56
   limit "$core: instructions of CascadeEso<2, 3>" "$(value "$runs" count CascadeEso 4)" 110
-  limit "$core: bytes of the whole image" "$(text_bytes "$core" firmware)" 65536
+  limit "$core: bytes of the whole image" "$(text_bytes "$core" firmware)" 67584
 done
 
 # Only a complete table goes into the page.

@@ -232,10 +232,14 @@ sounds time-jump jump.csv
 verdict $? "the jump's line is not named: $said"
 sounds u-unit plain.csv --limits -0.06,0.06
 sounds u-unit plain.csv --limits 6000
-# A load that is constant says nothing of what to resist, however fine y is; one that hardly moves does.
+# A load that is constant says nothing of what to resist: a floor stands for it, and the page says so.
 servo noise=1e-5 wander=0 >rows.txt
 written t,y,u , t >quiet.csv
-sounds disturbance quiet.csv
+design=
+healthy quiet.csv
+design=--no-design
+[[ $said == *"reckons with a disturbance"* ]]
+verdict $? "quiet.csv: nothing is said of the floor: $said"
 servo noise=1e-5 wander=0.0005 >rows.txt
 written t,y,u , t >moving_little.csv
 healthy moving_little.csv

@@ -12,6 +12,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -29,7 +30,7 @@ constexpr const char* usage = R"(usage: from_log FILE.csv [options]
        from_log [--out DIR] [--data DIR]
 Writes FILE.html (or FILE-2.html, .. if it exists) and prints its path.
 
-columns, by their name, by the end of a name (position of /joint1/position) or by number:
+columns, by their name, by its end (position of /joint1/position) or beginning, or by number:
   --time COLUMN       time stamps from any origin; jitter and missing rows are allowed
   --u COLUMN          input that the actuator held from its row to the next
   --y COLUMN          measured output
@@ -41,13 +42,18 @@ columns, by their name, by the end of a name (position of /joint1/position) or b
   --sample-time S     seconds between rows, if there is no time column
   --separator C       one character, or the word tab (default: detected)
 the machine:
-  --order N           integrations from u to y, 1 to 3 (default: identified)
+  --order N           integrations from u to y, 1 to 3 (default: 1 for a speed, a temperature or a
+                      level by its name, else identified)
   --limits LOW,HIGH   of u, in the unit of the log (default: the range of u in the log)
   --b0 B              the input gain that you expect: an alarm if the log shows another one
 the requirement, one of:
   --noise PERCENT     standard deviation of u that noise may cause, % of its range (default 5)
   --settling S        settling time of a step of the reference, s
   --omega-c W         controller bandwidth, rad/s
+more margin than usual; every design is played within the limits, whatever its margins are:
+  --modulus M         modulus margin, smallest abs(1 + L), below 1 (default 0.5)
+  --delay N           delay margin in samples (default 2)
+  --phase DEGREES     phase margin (default: none beside the others)
 instead of a design, the log through an observer of your choice (page, and estimates as CSV):
   --observer NAME     linear, half-gain, reduced, cascade, algebraic, adjustable, nonlinear
   --bandwidth W       its bandwidth omega_o, rad/s; --order and --b0 are needed, too
@@ -61,7 +67,7 @@ that --data names (default: ../shared/data beside the repository).
 
 exit codes: 0 page with a design; 1 page not written; 2 file or options not understood; 3 log
 refused: the page says what was found and what to record instead; 4 page with an alarm, or no
-design keeps the margins
+design keeps the margins and comes back from an overload
 )";
 
 double number(const std::string& option, const std::string& text) {
@@ -135,6 +141,12 @@ Settings read_arguments(int argc, char** argv, std::filesystem::path& data) {
       {"settling",
        [&](const auto& text) { s.settling_time = positive("settling", text), ++wishes; }},
       {"omega-c", [&](const auto& text) { s.controller = positive("omega-c", text), ++wishes; }},
+      {"modulus", [&](const auto& text) { s.rules.modulus_margin = positive("modulus", text); }},
+      {"delay", [&](const auto& text) { s.rules.delay_samples = positive("delay", text); }},
+      {"phase",
+       [&](const auto& text) {
+         s.rules.phase_margin = positive("phase", text) * std::numbers::pi / 180;
+       }},
       {"observer", [&](const auto& text) { s.observer = text; }},
       {"bandwidth", [&](const auto& text) { s.bandwidth = positive("bandwidth", text); }},
       {"data", [&](const auto& text) { data = text; }},

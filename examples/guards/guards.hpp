@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <string>
 #include <utility>
 #include <vector>
@@ -25,6 +26,27 @@ inline esokit::examples::About about(std::string title, std::string description)
           .title = std::move(title),
           .description = std::move(description)};
 }
+
+/// Random numbers, the same on each machine.
+struct Random {
+  std::uint64_t state;
+  double operator()() {
+    state += 0x9e3779b97f4a7c15u;
+    std::uint64_t z = state;
+    z = (z ^ (z >> 30u)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27u)) * 0x94d049bb133111ebu;
+    return static_cast<double>((z ^ (z >> 31u)) >> 11u) * 0x1p-53;
+  }
+  double between(double low, double high) { return low + (high - low) * (*this)(); }
+  double logarithmic(double low, double high) {
+    return std::exp(between(std::log(low), std::log(high)));
+  }
+  double normal() {
+    double sum = -6;
+    for (int i = 0; i < 12; ++i) sum += (*this)();
+    return sum;
+  }
+};
 
 /// What happened, sample by sample.
 struct Trace {

@@ -232,9 +232,9 @@ void reproduce(Report& report) {
     report.known_miss(name, error_metric, table4_b[p].error,
                       statistics_of(b[p], &PvtolCriteria::error), 0.02, reason);
     report.check(name, control_metric, table4_b[p].control, control,
-                 Tolerance::deviations(3.0, control).or_relative(0.03));
+                 Tolerance::deviations(PrintedColumn::within, control).or_relative(0.02));
     report.check(name, estimate_metric, table4_b[p].estimate, estimate,
-                 Tolerance::deviations(3.0, estimate).or_relative(0.03));
+                 Tolerance::deviations(PrintedColumn::within, estimate).or_relative(0.02));
   }
 
   const double noisy_control = statistics_of(b[0], &PvtolCriteria::control).mean;
@@ -340,10 +340,12 @@ void show_step(Report& report) {
               below(table4_b[0].estimate, estimate.mean) + " % lower.",
           Miss::not_published);
       const std::string name = "Sim2B, p = 1, step 0.1 ms";
-      report.check_reference(name, control_metric, 23900.0, control,
-                             Tolerance::deviations(3.0, control).or_relative(0.03));
-      report.check_reference(name, estimate_metric, 1029.0, estimate,
-                             Tolerance::deviations(3.0, estimate).or_relative(0.03));
+      report.check_reference(
+          name, control_metric, 23900.0, control,
+          Tolerance::deviations(PrintedColumn::within, control).or_relative(0.02));
+      report.check_reference(
+          name, estimate_metric, 1029.0, estimate,
+          Tolerance::deviations(PrintedColumn::within, estimate).or_relative(0.02));
     }
   }
   report.table(

@@ -305,14 +305,14 @@ int main(int argc, char** argv) {
     const auto first = noisy.begin() + static_cast<std::ptrdiff_t>(setting * seeds);
     return statistics_of(std::vector<Run>(first, first + seeds), member);
   };
-  // One run each: a few standard deviations of the seeds.
+  // One run each.
   const auto linear_rms = of_setting(0, &Run::late_rms);
   const auto shifted_rms = of_setting(1, &Run::late_rms);
   report.check_reference("noise", "LESO, omega_o = 7: late rms of the disturbance", 1.53,
-                         linear_rms, Tolerance::deviations(3.0, linear_rms),
+                         linear_rms, Tolerance::deviations(PrintedColumn::within, linear_rms),
                          "independent run, one seed");
   report.check_reference("noise", "FSB, lambda = 1: late rms of the disturbance", 0.0146,
-                         shifted_rms, Tolerance::deviations(3.0, shifted_rms),
+                         shifted_rms, Tolerance::deviations(PrintedColumn::within, shifted_rms),
                          "independent run, one seed");
   std::vector<CsvRow> noise_lines{
       {"LESO, omega_o = 7", "", with_deviation(of_setting(0, &Run::peak)), "",

@@ -158,6 +158,7 @@ int main(int argc, char** argv) {
   };
 
   std::vector<CsvRow> lines;
+  std::vector<SingleRun> numbers_of_paper;
   for (std::size_t i = 0; i < cases.size(); ++i) {
     const auto own = runs_of(i);
     const Case& c = cases[i];
@@ -166,8 +167,7 @@ int main(int argc, char** argv) {
     for (std::size_t k = 0; k < 2; ++k) {
       const auto ours = statistics_of(own, numbers[k]);
       if (c.paper) {
-        report.check_single_run(c.name, names[k], (*c.paper)[k], ours,
-                                "in a setting of 17 quantities fitted to the 6 numbers");
+        numbers_of_paper.push_back({c.name, names[k], (*c.paper)[k], ours});
       } else {
         report.check(c.name, names[k], std::nullopt, ours);
       }
@@ -177,9 +177,16 @@ int main(int argc, char** argv) {
     for (std::size_t k = 0; k < 2 && c.paper; ++k) {
       const double mean = c.independent[2 * k];
       const double deviation = c.independent[2 * k + 1];
+      const auto both = Tolerance::means(3.0,
+                                         {.count = 60,
+                                          .standard_deviation = deviation,
+                                          .standard_error = deviation / std::sqrt(60.0)},
+                                         seeds);
+      // The unlimited gain chatters at the step of the integration, and a step of 1 ms for 2 ms
+      // changes scenario 2 by 6 %: two programs agree no better.
       report.check_reference(c.name, names[k] + ", independent run", mean,
-                             statistics_of(own, numbers[k]), Tolerance::absolute(2.0 * deviation),
-                             "an independent run in this setting, 2 sd");
+                             statistics_of(own, numbers[k]), both.or_relative(0.06),
+                             "an independent run in this setting");
     }
     const auto amplitude = statistics_of(own, &Criteria::amplitude);
     line.push_back(shown_text(amplitude.mean));
@@ -198,14 +205,15 @@ int main(int argc, char** argv) {
                     amplitude.mean < 0.1, "no limit cycle");
     }
   }
+  // More quantities are fitted than there are numbers, so being near says nothing.
+  report.check_column("Table 3", numbers_of_paper, PrintedColumn::Verdict::not_judged, 17);
   report.comparison(
       "3",
       "Table 3: ITAE = int t |r - x1| dt and ISU = int u^2 dt over 10 s. The paper prints the "
       "noise, the plant, the form of the control law and g of scenario 2; the other 17 quantities "
       "are fitted to these six numbers. Ours: mean (standard deviation) over " +
           std::to_string(seeds) +
-          " seeds; met: within 3 standard deviations of one run; not judged where those are more "
-          "than the number",
+          " seeds; not judged, because more is fitted than there are numbers",
       {cases[0].name, cases[1].name, cases[2].name}, {names[0], names[1]});
 
   report.add(draw("fig3",
@@ -248,7 +256,7 @@ int main(int argc, char** argv) {
                         "), the g_new that Table 2 prints cycles (" + both(3) + ")",
                 .figure = "cycle"});
   report.not_reproduced(
-      "Table 3 is reproduced with settings of which 17 quantities are fitted to its 6 numbers "
+      "Table 3 comes out near with settings of which 17 quantities are fitted to its 6 numbers "
       "(limit on u, bandwidths, fal, R, duration, step, g of scenario 3). They are consistent with "
       "the paper, but need not be those of the paper.",
       Miss::not_published);

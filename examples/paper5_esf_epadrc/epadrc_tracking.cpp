@@ -220,7 +220,7 @@ int main(int argc, char** argv) {
             return;
           }
           report.check_reference(name, metric_names[m].name, reference.value, ours,
-                                 Tolerance::deviations(3.0, ours).or_relative(relative));
+                                 Tolerance::means(3.0, ours, 50).or_relative(relative));
         };
         if (which < 3) {
           compare(sine_rows[which][kind][m]);

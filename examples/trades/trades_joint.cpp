@@ -41,7 +41,8 @@ struct Trace {
   std::vector<double> t, error, load, found;
 };
 
-/// @param wired 1, or -1: the wrong way round @param complaint if given, the first one ends the run
+/// @param wired 1, or -1: the wrong way round @param complaint if given, one about the sign ends
+/// the run
 Trace drive(Joint& joint, double seconds, double wired, std::string* complaint = nullptr) {
   Trace trace;
   double angle = 0;
@@ -56,7 +57,7 @@ Trace drive(Joint& joint, double seconds, double wired, std::string* complaint =
     trace.found.push_back(joint.load());
     if (complaint != nullptr && k % 20 == 0) {
       *complaint = joint.complaint();
-      if (!complaint->empty()) break;
+      if (complaint->find("sign") != std::string::npos) break;
     }
     for (int i = 0; i < fine; ++i) {
       speed += 1e-3 / fine * (wired * torque - load_torque(angle, speed)) / inertia;

@@ -32,7 +32,7 @@ std::vector<double> residual_of(const Identified& found, const FitData& rows, do
         esokit::detail::friction_speed(data, found.order, chosen.fit.noise, chosen.fit.at.latency);
     data = esokit::detail::with_friction(data, speed, chosen.friction_scale);
   }
-  InnovationsFit fit(data, chosen.model, esokit::detail::fit_bounds(data));
+  InnovationsFit fit(data, chosen.model, chosen.bounds);
   (void)fit.at(chosen.fit.at);
   return fit.residual();
 }

@@ -5,9 +5,11 @@
 #include <filesystem>
 #include <numbers>
 #include <string>
+#include <string_view>
 
 #include <esokit/analysis/loop_response.hpp>
 #include <esokit/analysis/margins.hpp>
+#include <esokit/control/tracking_differentiator.hpp>
 #include <esokit/core/error_text.hpp>
 #include <esokit/sim/gaussian.hpp>
 #include <esokit/sim/run.hpp>
@@ -191,6 +193,46 @@ std::string program(const Settings& settings, const Identified& found, const eso
 
 std::string percent(double share) { return number_text(100 * share, 3) + " %"; }
 
+/// What the pasted code does on a step of the reference, within the limits of u and without noise.
+struct StepOfCode {
+  double height = 0, settling = 0, overshoot = 0;
+};
+StepOfCode step_of_code(const esokit::Tuning& tuning, const esokit::TunedDesign& design) {
+  const esokit::TuneModel& model = tuning.model;
+  const int n = model.order;
+  const double half = 0.5 * (model.u_max - model.u_min);
+  const double T = model.sample_time;
+  StepOfCode step;
+  step.height = esokit::play_distance(model, 1.0, esokit::play_events.back());
+  auto told = esokit::detail::told_of_input(design.controller);
+  const double weight = told.r_to_u(0, 0) / design.settings.gains[0];
+  esokit::detail::PlayLoop loop(model, 1.0, told, half);
+  auto profile = esokit::TrackingDifferentiator<double>::make(
+                     {.acceleration = profile_acceleration(model), .sample_time = T})
+                     .value();
+  const auto samples = static_cast<long>(
+      std::min((10 * design.settling_time + 300 * model.latency()) / T, 200'000.0));
+  for (long k = 0; k < samples; ++k) {
+    double r = step.height, more = 0;
+    if (n == 2) {
+      profile.update(step.height);
+      const auto motion = profile.motion();
+      r = motion(0);
+      for (int i = 1; i <= 2; ++i) {
+        const auto at = static_cast<std::size_t>(i);
+        more += motion(i) * weight *
+                (at < design.settings.gains.size() ? design.settings.gains[at] : 1.0);
+      }
+    }
+    const double y = loop.output();
+    (void)loop(y, r, 0.0, more);
+    if (std::abs(y - step.height) > 0.02 * step.height)
+      step.settling = static_cast<double>(k + 1) * T;
+    step.overshoot = std::max(step.overshoot, y / step.height - 1);
+  }
+  return step;
+}
+
 }  // namespace
 
 double profile_acceleration(const esokit::TuneModel& model) {
@@ -198,7 +240,7 @@ double profile_acceleration(const esokit::TuneModel& model) {
 }
 
 Runner::Runner(const esokit::Tuning& tuning, const esokit::TunedDesign& design)
-    : form_(told_of_input(design.controller)),
+    : form_(esokit::detail::told_of_input(design.controller)),
       lower_(tuning.model.u_min),
       upper_(tuning.model.u_max),
       state_(static_cast<std::size_t>(form_.states())) {
@@ -228,21 +270,6 @@ double Runner::update(double y, const esokit::Vector<double, 3>& motion) {
   return u;
 }
 
-LinearController told_of_input(const LinearController& own) {
-  LinearController c = own;
-  double told = 0.0;
-  for (int i = 0; i < c.states(); ++i) told += std::abs(c.from_u(i, 0));
-  if (told > 0.0) return c;
-  // A reference reaches the states by u alone.
-  for (int i = 0; i < c.states(); ++i) {
-    c.from_u(i, 0) = own.from_r(i, 0) / own.r_to_u(0, 0);
-    c.from_r(i, 0) = 0.0;
-    c.from_y(i, 0) -= c.from_u(i, 0) * c.y_to_u(0, 0);
-    for (int j = 0; j < c.states(); ++j) c.a(i, j) -= c.from_u(i, 0) * c.to_u(0, j);
-  }
-  return c;
-}
-
 Design Design::make(const Settings& settings, const Input&, const Findings& findings) {
   Design design;
   const Identified& found = findings.found;
@@ -250,26 +277,37 @@ Design Design::make(const Settings& settings, const Input&, const Findings& find
   const auto limits = settings.limits.value_or(std::pair(*least, *largest));
   auto model = esokit::tune_model(found, limits.first, limits.second);
   const double range = limits.second - limits.first;
-  // Of a log that was refused nothing may be known: wanted --anyway.
-  model.input_gain.half_width =
-      std::min(model.input_gain.half_width, 0.5 * std::abs(model.input_gain.value));
   esokit::TuneWish wish;
   wish.settling_time = settings.settling_time;
   wish.controller_bandwidth = settings.controller;
   if (settings.noise_share > 0.0) wish.control_noise = settings.noise_share * range;
-  const auto tuning = compiled::tune(model, wish);
+  const auto tuning = compiled::tune(model, wish, settings.rules);
   if (!tuning) {
-    design.why_not_ = esokit::to_text(tuning.error());
+    const auto& error = tuning.error();
+    design.why_not_ = esokit::to_text(error);
+    if (std::string_view(error.field) == "control_noise") {
+      design.alarms_.push_back(
+          {"noise", "Noise may move u by " + percent(error.value / range) +
+                        " of its range (standard deviation), but cancelling the disturbance of "
+                        "this log alone needs " +
+                        percent(error.limit / range) +
+                        ". Measure y with less noise, or sample faster; with --noise and a larger "
+                        "number there is a design, and this alarm again."});
+    }
     return design;
   }
   design.tuning_ = *tuning;
   const auto rank = static_cast<std::size_t>(settings.rank - 1);
-  if (rank >= tuning->designs.size() || !tuning->designs[rank].feasible) {
-    design.why_not_ = rank == 0
-                          ? "No family keeps the margins; the table says which margin each one "
-                            "misses. Relax the requirement: --noise, --settling, --omega-c."
-                          : "There is no design of rank " + std::to_string(settings.rank) +
-                                " that keeps the margins.";
+  if (rank >= tuning->designs.size() || !tuning->designs[rank].feasible ||
+      (rank == 0 && tuning->chosen() == nullptr)) {
+    design.why_not_ =
+        rank > 0 ? "There is no design of rank " + std::to_string(settings.rank) +
+                       " that keeps the rules."
+        : tuning->designs.front().feasible
+            ? "No design is recommended: none comes back from an overload, see the figure. "
+              "Relax the requirement: --noise, --settling, --omega-c."
+            : "No family keeps the rules; the table says which rule each one misses. Relax the "
+              "requirement: --noise, --settling, --omega-c.";
     return design;
   }
   design.taken_ = rank;
@@ -282,17 +320,49 @@ Design Design::make(const Settings& settings, const Input&, const Findings& find
   design.loop_ = *loop;
   const double T = model.sample_time;
   design.code_ = program(settings, found, *tuning, taken);
+  for (const auto& alarm : esokit::alarms(*tuning, taken))
+    design.alarms_.push_back({alarm.name, alarm.text});
+  const StepOfCode step = step_of_code(*tuning, taken);
   design.summary_ = {
-      "Chosen: " + taken.name + ". A step of the reference settles in " +
-          number_text(taken.settling_time, 3) +
-          " s. A load step that takes a tenth of the range of u moves y by at most " +
+      "Chosen: " + taken.name + ". A step of the reference by " + number_text(step.height, 3) +
+          (found.order == 2 ? ", through the profile of the code," : "") + " settles in " +
+          number_text(step.settling, 3) + " s and overshoots by " + percent(step.overshoot) +
+          ", within the limits of u. A load step that takes a tenth of the range of u moves y by "
+          "at most " +
           number_text(0.1 * range * taken.load_peak, 3) +
           ". Noise causes a standard deviation of u of " + percent(taken.control_noise / range) +
           " of its range.",
       "The modulus margin is " + number_text(taken.modulus_margin, 2) + ", the delay margin " +
-          duration_text(taken.delay_margin) + ". Deviations of y and u are " +
+          duration_text(taken.delay_margin) + ", the phase margin " +
+          number_text(taken.phase_margin * 180 / std::numbers::pi, 3) +
+          "°, each the smallest over the intervals. Deviations of y and u are " +
           number_text(taken.excess, 3) +
           " times those of the best linear controller, which keeps no margins."};
+  if (settings.rules.play && taken.comes_back) {
+    design.summary_.push_back(
+        "It was played with limits and noise, on the model and at the ends of its intervals: it "
+        "comes back from " +
+        esokit::detail::in_words(esokit::play_events[0], model) + ", from " +
+        esokit::detail::in_words(esokit::play_events[1], model) + ", from " +
+        esokit::detail::in_words(esokit::play_events[2], model) + " and from " +
+        esokit::detail::in_words(esokit::play_events[3], model) + ".");
+  }
+  if (tuning->model.disturbance > 1.001 * tuning->given_disturbance) {
+    design.summary_.push_back(
+        "The disturbance of the log changes slowly: an observer with a bandwidth of " +
+        number_text(model.filter_bandwidth(), 3) +
+        " rad/s follows it. A log without loads does not show those of tomorrow, so the design "
+        "reckons with a disturbance for which it takes " +
+        number_text(tuning->model.filter_bandwidth(), 3) + " rad/s.");
+  }
+  if (taken.bandwidth_ratio > 1.0) {
+    design.summary_.push_back(
+        "The poles of the law are " + number_text(taken.bandwidth_ratio, 3) +
+        " times as fast as those of the observer (geometric means), where the rule of thumb has "
+        "the observer 5 to 10 times as fast. The loop has all these poles, whichever part they "
+        "belong to; a faster observer would pass more noise to u, and a slower law would give way "
+        "to loads.");
+  }
   if (!settings.limits) {
     design.summary_.push_back("The limits of u are those that the log shows, " +
                               number_text(limits.first, 4) + " to " +
@@ -375,21 +445,51 @@ Figure tradeoff_figure(const esokit::Tuning& tuning, std::size_t taken) {
   return figure;
 }
 
+/// The event that a design does not come back from.
+Figure lost_figure(const esokit::Tuning& tuning, const esokit::TunedDesign& design) {
+  Figure figure("overload", {.rows = 2, .columns = 1, .panel_height = 150});
+  figure.caption("This is why designs rank behind: " + design.name + " does not come back from " +
+                 design.lost + ". Played with limits and noise.");
+  const auto variants = esokit::played_variants(tuning.model);
+  const auto& variant = variants[static_cast<std::size_t>(design.lost_on)];
+  std::vector<double> t, y, u;
+  const auto played =
+      esokit::play(variant.model, variant.gain, design.controller, design.lost_in,
+                   design.settling_time, [&](double now, double, double output, double control) {
+                     t.push_back(now);
+                     y.push_back(output);
+                     u.push_back(control);
+                   });
+  // The event and what comes first tell it.
+  const auto rows = std::min<std::size_t>(
+      t.size(), static_cast<std::size_t>((5 * design.lost_in.latencies * tuning.model.latency() +
+                                          std::min(played.time, 5 * design.settling_time)) /
+                                         tuning.model.sample_time));
+  for (auto* column : {&t, &y, &u}) column->resize(rows);
+  figure.panel(0, 0).y_label("y").name("y").line(t, y, {.color = Color::blue, .column = "y"});
+  figure.panel(1, 0).x_label("t (s)").y_label("u").name("u").line(
+      t, u, {.color = Color::vermillion, .column = "u"});
+  return figure;
+}
+
 std::vector<CsvRow> ranking(const esokit::Tuning& tuning) {
   const double range = tuning.model.u_max - tuning.model.u_min;
   std::vector<CsvRow> rows{{"", "times the best", "the same without margins",
                             "standard deviation of y", "noise in u, % of its range",
-                            "y after a load of 10 %", "settling time (s)", "modulus margin",
-                            "delay margin (ms)", "instructions", "limited by"}};
+                            "y after a load of 10 %", "settling time of a small step (s)",
+                            "modulus margin", "delay margin (ms)", "instructions", "limited by"}};
   for (std::size_t i = 0; i < tuning.designs.size(); ++i) {
     const auto& d = tuning.designs[i];
-    rows.push_back(
-        {std::to_string(i + 1) + " " + d.name + (d.feasible ? "" : " (does not keep the margins)"),
-         number_text(d.excess, 3), number_text(d.free_excess, 3),
-         number_text(d.output_deviation, 3), number_text(100 * d.control_noise / range, 3),
-         number_text(0.1 * range * d.load_peak, 3), number_text(d.settling_time, 3),
-         number_text(d.modulus_margin, 2), number_text(1e3 * d.delay_margin, 3),
-         std::to_string(d.instructions), d.constraint});
+    rows.push_back({std::to_string(i + 1) + " " + d.name +
+                        (!d.feasible     ? " (does not keep the rules)"
+                         : !d.comes_back ? " (does not come back from an overload)"
+                                         : ""),
+                    number_text(d.excess, 3), number_text(d.free_excess, 3),
+                    number_text(d.output_deviation, 3),
+                    number_text(100 * d.control_noise / range, 3),
+                    number_text(0.1 * range * d.load_peak, 3), number_text(d.settling_time, 3),
+                    number_text(d.modulus_margin, 2), number_text(1e3 * d.delay_margin, 3),
+                    std::to_string(d.instructions), d.constraint});
   }
   return rows;
 }
@@ -406,6 +506,13 @@ void Design::show_on(Page& page, const Settings& settings, const Findings& findi
                "within 1 % the cheaper one comes first). The instructions are those of an update "
                "on a Cortex-M4F in float. --rank takes another row",
                ranking(*tuning_));
+  }
+  if (tuning_) {
+    for (const auto& design : tuning_->designs) {
+      if (!design.feasible || design.comes_back) continue;
+      page.figure(lost_figure(*tuning_, design));
+      break;
+    }
   }
   if (!made()) {
     if (!why_not_.empty()) page.box("No controller", {why_not_}, true);
@@ -432,13 +539,14 @@ void Design::show_on(Page& page, const Settings& settings, const Findings& findi
     phase.push_back(degrees);
   }
   const auto margins = esokit::margins(*loop_).value();
-  loop.caption("Left: loop gain L with the identified machine. The phase margin is " +
-               number_text(margins.phase.value * 180 / std::numbers::pi, 3) +
-               "°, the gain margin " + number_text(margins.gain_increase.value, 3) +
-               ", the modulus margin " + number_text(margins.modulus.value, 2) +
-               " (dashed: the frequencies where abs(L) is one and where the phase is -180°). "
-               "Middle: response to a step of the reference. Right: response to a load step that "
-               "takes a tenth of the range of u. Both hold while u is within its limits.");
+  loop.caption(
+      "Left: loop gain L with the identified machine, without its intervals. There the phase "
+      "margin is " +
+      number_text(margins.phase.value * 180 / std::numbers::pi, 3) + "°, the gain margin " +
+      number_text(margins.gain_increase.value, 3) +
+      " (dashed: the frequencies where abs(L) is one and where the phase is -180°). "
+      "Middle: response to a step of the reference. Right: response to a load step that "
+      "takes a tenth of the range of u. Both hold while u is within its limits.");
   double peak = 0.0;
   const auto bode = [&](Panel& panel) {
     if (margins.phase.limited()) panel.vertical_line(margins.phase.frequency);

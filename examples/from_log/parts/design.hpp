@@ -16,9 +16,6 @@
 
 namespace from_log {
 
-/// A controller that is told of its own u, as one that is told what the actuator held.
-[[nodiscard]] esokit::LinearController told_of_input(const esokit::LinearController& own);
-
 /// Half of what u can do, unit of y / s^2, of order 2.
 [[nodiscard]] double profile_acceleration(const esokit::TuneModel& model);
 
@@ -54,6 +51,8 @@ class Design {
   [[nodiscard]] bool made() const { return loop_.has_value(); }
   /// A few sentences.
   [[nodiscard]] std::vector<std::string> summary() const { return summary_; }
+  /// Why there is none; empty if there is one or none was wanted.
+  [[nodiscard]] const std::string& why_not() const { return why_not_; }
   /// C++ that compiles as it is.
   [[nodiscard]] const std::string& code() const { return code_; }
   /// The design that was taken.
@@ -61,7 +60,11 @@ class Design {
   /// The choice, its model and its rivals.
   [[nodiscard]] const esokit::Tuning& tuning() const { return *tuning_; }
   /// The controller as a linear system that is told what the actuator held.
-  [[nodiscard]] esokit::LinearController form() const { return told_of_input(taken().controller); }
+  [[nodiscard]] esokit::LinearController form() const {
+    return esokit::detail::told_of_input(taken().controller);
+  }
+  /// What speaks against it.
+  [[nodiscard]] const std::vector<Alarm>& alarms() const { return alarms_; }
 
   /// Sections of the page: observers, loop, replay, code.
   void show_on(Page& page, const Settings& settings, const Findings& findings) const;
@@ -73,6 +76,7 @@ class Design {
   std::vector<std::string> summary_;
   std::string code_;
   std::string why_not_;
+  std::vector<Alarm> alarms_;
   Replay replay_;
 };
 

@@ -104,8 +104,8 @@ void sound_alarms(const Settings& settings, const Input& input, Findings& all) {
                "resolution."});
     }
   }
-  // Of a log that does not tell b0 its sign means nothing.
-  if (!all.seen || all.refusal) return;
+  // Of a log that does not tell b0 its sign means nothing, unless a design is asked for anyway.
+  if (!all.seen || (all.refusal && !settings.anyway)) return;
   const double b0 = found.input_gain.value;
   const double expected = settings.expected_gain.value_or(std::abs(b0));
   const double ratio = b0 / expected;
@@ -120,20 +120,6 @@ void sound_alarms(const Settings& settings, const Input& input, Findings& all) {
              "recording and in the controller. If the sign found here is right, confirm it with "
              "--b0 " +
              number_text(b0, 3) + "."});
-  }
-  // The bandwidth at which an observer follows the disturbance above the noise. Of a slower one
-  // than some periods of the log next to nothing is seen, and a design for it gives no feedback.
-  const double bandwidth = found.disturbance_bandwidth();
-  const double slowest = 60.0 / found.log.duration;
-  if (bandwidth < slowest) {
-    all.alarms.push_back(
-        {"disturbance",
-         "The disturbance hardly changes in this log: an observer with a bandwidth of " +
-             number_text(bandwidth, 3) + " rad/s follows it, which must be at least " +
-             number_text(slowest, 3) + " rad/s, 60 over the duration of the log. A constant load " +
-             "does not tell how fast loads change in use, so a design from this log gives almost "
-             "no "
-             "feedback. Log the machine with the loads that it has to resist."});
   }
   const double size = std::abs(ratio);
   if (size > 3 || size < 1.0 / 3) {
@@ -152,7 +138,11 @@ Findings examine(const Settings& settings, const Input& input) {
   Findings all;
   all.alarms = input.alarms;
   esokit::IdentifyOptions options;
-  options.orders = settings.orders;
+  if (!settings.orders.empty()) {
+    options.orders = settings.orders;
+  } else if (input.first_order) {
+    options.orders = {1};
+  }
   const bool slow = input.log.y.size() > 200'000;
   if (slow) {
     options.progress = [](double share) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <esokit/identify/identify.hpp>
+#include <esokit/tune/problem.hpp>
 
 #include "common/csv.hpp"
 #include "common/figure.hpp"
@@ -24,7 +25,7 @@ enum Status {
   failed = 1,      ///< the page could not be written
   unreadable = 2,  ///< file or command line; stderr says where and what
   refused = 3,     ///< a page that says what was seen, and what to record instead; no design
-  alarmed = 4      ///< a page with a design, and an alarm that has to be looked at first
+  alarmed = 4      ///< an alarm that has to be looked at first, or no design to recommend
 };
 
 /// The command line.
@@ -35,12 +36,13 @@ struct Settings {
   std::string time_unit;           ///< s, ms, us or ns; empty: found out
   double sample_time = 0;          ///< s, where there is no time
   char separator = 0;              ///< 0: found out
-  std::vector<int> orders{1, 2, 3};
+  std::vector<int> orders{};  ///< empty: 1 for a speed, a temperature or a level, else found out
   std::optional<double> expected_gain;  ///< b0 as the user believes it to be
   std::optional<std::pair<double, double>> limits;
   double noise_share = 0;  ///< wish: deviation of u by noise, share of its range; 0: as tune has it
   double settling_time = 0;  ///< wish instead: s
   double controller = 0;     ///< wish instead: omega_c, rad/s
+  esokit::TuneRules rules;   ///< what the loop has to keep
   int rank = 1;              ///< which of the designs, the best is 1
   bool anyway = false;       ///< design for a refused log, too
   bool no_design = false;    ///< what was found, and no controller
@@ -65,6 +67,7 @@ struct Input {
   std::vector<std::size_t> line;  ///< of the file, for each row
   bool merged = false;            ///< topics with stamps of their own were brought together
   bool cut = false;               ///< the last line was cut
+  bool first_order = false;       ///< y is a speed, a temperature or a level by its name
   std::vector<Alarm> alarms;
 };
 

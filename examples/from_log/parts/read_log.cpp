@@ -2,6 +2,7 @@
 #include <array>
 #include <cctype>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <string>
@@ -81,6 +82,10 @@ double find_unit(const Settings& settings, Input& input, double first, double st
   double named = 0.0;
   const auto parts = words(input.time);
   if (parts.size() > 1) named = seconds_of(parts.back());
+  if (parts.back() == "millis") named = 1e-3;
+  if (parts.back() == "micros") named = 1e-6;
+  // t/ms: the unit follows the stroke.
+  if (named == 0.0 && input.time.find('/') != std::string::npos) named = seconds_of(parts.back());
   // Between 1998 and 2049; and a step that a controller can have.
   if (named == 0.0) {
     for (const double unit : {1.0, 1e-3, 1e-6, 1e-9}) {
@@ -164,20 +169,31 @@ Input read_log(const Settings& settings) {
   const bool timed = !(settings.sample_time > 0.0) || !settings.time.empty();
   std::vector<std::string> wanted = {
       guess(header, "u", settings.u,
-            {"u", "input", "torque", "effort", "command", "cmd", "pwm", "voltage", "current",
-             "force", "duty", "drive", "actuator", "control", "tau", "power", "heater"}),
+            {"u",        "input",    "torque",  "effort",  "command",     "cmd",
+             "pwm",      "voltage",  "current", "force",   "duty",        "drive",
+             "actuator", "control",  "tau",     "power",   "heater",      "volts",
+             "q1",       "spannung", "voltaje", "tension", "stellgroesse"}),
       guess(header, "y", settings.y,
-            {"y", "output", "position", "pos", "angle", "theta", "measurement", "meas",
-             "temperature", "temp", "speed", "velocity", "rate", "level", "height", "phi"})};
+            {"y",           "output",   "position",    "pos",        "angle",     "theta",
+             "measurement", "meas",     "temperature", "temp",       "speed",     "velocity",
+             "rate",        "level",    "height",      "phi",        "vel",       "t1",
+             "rpm",         "winkel",   "drehzahl",    "temperatur", "velocidad", "temperatura",
+             "vitesse",     "posicion", "niveau"})};
   if (timed) {
     wanted.push_back(guess(header, "time", settings.time,
                            {"t", "time", "stamp", "timestamp", "times", "secs", "seconds", "clock",
-                            "ticks", "millis", "micros"}));
+                            "ticks", "millis", "micros", "zeit", "tiempo", "temps"}));
   }
   wanted.insert(wanted.end(), settings.known.begin(), settings.known.end());
   const LogFile file(settings.file, wanted, settings.separator);
   input.u = file.name(0);
   input.y = file.name(1);
+  constexpr std::string_view first_order[] = {"temperature", "temp",       "speed",    "velocity",
+                                              "vel",         "rate",       "level",    "rpm",
+                                              "t1",          "gyro",       "drehzahl", "velocidad",
+                                              "temperatura", "temperatur", "vitesse",  "niveau"};
+  input.first_order =
+      std::ranges::find(first_order, words(input.y).front()) != std::end(first_order);
   input.cut = file.cut();
   input.log.u = file.column(0);
   input.log.y = file.column(1);

@@ -30,14 +30,20 @@ std::string advice(const std::string& field) {
        "reference that steps every few settling times, by as much as the machine may move. The "
        "controller may stay as it is."},
       {"excitation",
-       "u hardly moves y. Step the reference (or u itself) up and down by a tenth of its range, "
+       "Of the motion of y too little follows from u: a slow drift, a load or friction moves it as "
+       "much, u changes in a single step, or the dead time is longer than the moves. Step the "
+       "reference (or u itself) up and down by a tenth of its range, "
        "ten times or more, with pauses in which the machine settles. Or sweep it slowly up to the "
        "bandwidth that the controller should have."},
       {"correlation",
        "The machine behaves differently from a chain of integrators with a lag: something "
        "oscillates, y was filtered, or the logged u is not what the actuator held. Log the applied "
-       "u, y before its filters, and known effects (--known COLUMN). Remove loads that can swing, "
-       "or log motion below their frequency."},
+       "u, y before its filters, and known effects (--known COLUMN). Steps of u that last until y "
+       "settles let output error decide instead."},
+      {"second_opinion",
+       "From row to row y follows u by another b0 than over the whole log. Often the order is not "
+       "that of the machine (--order), the actuator saturates or is not linear, or u was logged "
+       "late. Log the u that the actuator held, and y without filters."},
       {"plateau",
        "b0 depends on the frequency. Log motion in the frequency band of the controller: faster "
        "steps, or a sweep."},
@@ -74,7 +80,8 @@ Figure log_figure(const Input& input, const Findings& findings) {
                          const Spectrum& spectrum, Color color) {
     figure.panel(row, 0).x_label("t (s)").y_label(name).name(name).line(
         t, values, {.color = color, .width = 1.0, .column = name});
-    if (spectrum.frequency.empty()) return;
+    // Of a constant there is none.
+    if (std::ranges::none_of(spectrum.density, [](double d) { return d > 0; })) return;
     figure.panel(row, 1)
         .x_label("w (rad/s)")
         .y_label(std::string("density of ") + name)
@@ -95,7 +102,8 @@ Figure model_figure(const Findings& findings) {
       "Left: b0 as a function of the bandwidth of the fit, with two standard errors; it was taken "
       "at the dashed line. It should be flat around this line. Middle: correlation of the residual "
       "with itself, over the distance in rows; for white noise 95 % of the points are between the "
-      "dashed lines, and beyond the dotted lines the log is refused. Right: spectrum of the "
+      "dashed lines; beyond the dotted lines output error has to confirm b0. Right: spectrum of "
+      "the "
       "residual; a peak means that something oscillates.");
   const auto& points = found.plateau.points;
   if (points.size() >= 3 && found.plateau.middle > 0) {
@@ -188,7 +196,7 @@ std::vector<CsvRow> model_table(const Findings& findings) {
       {"plateau", number_text(100 * found.plateau.spread, 3) + " %",
        number_text(found.plateau.from, 3) + " to " + number_text(found.plateau.to, 3) + " rad/s",
        "spread of b0 where it was taken; bandwidths at which it stays within 10 %"});
-  rows.push_back({"residual", number_text(found.correlation, 2), "0.1 at most",
+  rows.push_back({"residual", number_text(found.correlation, 2), "",
                   "largest correlation with itself: 0 if the model explains everything"});
   return rows;
 }
@@ -196,7 +204,11 @@ std::vector<CsvRow> model_table(const Findings& findings) {
 std::vector<CsvRow> log_table(const Input& input, const Findings& findings) {
   const esokit::LogReport& log = findings.found.log;
   std::vector<CsvRow> rows{{"", "in the log", "how it was read"}};
-  rows.push_back({"y", input.y, ""});
+  rows.push_back({"y", input.y,
+                  input.first_order
+                      ? "by its name a speed, a temperature or a level, so of order 1; --order "
+                        "sets another one"
+                      : ""});
   rows.push_back({"u", input.u, "held by the actuator from its row to the next"});
   rows.push_back({"time", input.time.empty() ? "none" : input.time,
                   input.time.empty() ? "equal steps, by --sample-time"
@@ -242,8 +254,19 @@ std::vector<std::string> in_short(const Findings& findings, const Design& design
                   duration_text(found.latency.value) + "; sampled every " +
                   duration_text(found.log.sample_time) + ".");
   }
+  const esokit::SecondOpinion& second = findings.found.second_opinion;
+  if (findings.seen && second.informative()) {
+    all.push_back("Output error, which believes u and the model alone, finds b0 = " +
+                  with_interval(second.input_gain) + ".");
+  }
+  if (findings.seen && findings.found.input_gain.share() > 0.1) {
+    all.push_back("Warning: b0 is known to " +
+                  number_text(100 * findings.found.input_gain.share(), 2) +
+                  " % only; a longer log or larger steps tell it better.");
+  }
   const auto more = design.summary();
   all.insert(all.end(), more.begin(), more.end());
+  if (!design.why_not().empty()) all.push_back("No controller: " + design.why_not());
   return all;
 }
 
@@ -355,8 +378,11 @@ Outcome work_out(const Settings& settings, const Input& input) {
   outcome.input = input;
   outcome.findings = examine(settings, input);
   const bool usable = outcome.findings.seen && (!outcome.findings.refusal || settings.anyway);
-  if (usable && !settings.no_design)
+  if (usable && !settings.no_design) {
     outcome.design = Design::make(settings, input, outcome.findings);
+    auto& alarms = outcome.findings.alarms;
+    alarms.insert(alarms.end(), outcome.design.alarms().begin(), outcome.design.alarms().end());
+  }
   outcome.status = outcome.findings.refusal ? refused
                    : !outcome.findings.alarms.empty() ||
                            (usable && !settings.no_design && !outcome.design.made())
