@@ -511,6 +511,26 @@ TEST(Health, RefusesBadSettings) {
   EXPECT_EQ(refused([](auto& c) { c.divider = 10; }), "accepted");
   EXPECT_EQ(refused([](auto& c) { c.divider = 11; }),
             "divider: is too large: omega_o T D must be at most");
+
+  // Both tell the limit that they end with.
+  const auto said = [&](auto change) {
+    HealthConfig<double> config = good;
+    change(config);
+    std::ostringstream words;
+    words << HealthMonitor<3>::make(config).error();
+    return words.str();
+  };
+  EXPECT_EQ(said([](auto& c) { c.memory = 0.07; }),
+            "memory = 0.07: must be at least 8 / omega_o, that is 0.08");
+  EXPECT_EQ(said([](auto& c) { c.divider = 11; }),
+            "divider = 11: is too large: omega_o T D must be at most 1");
+
+  // Unless told otherwise it remembers for a second and looks at every fourth sample.
+  const HealthConfig<double> standard{
+      .observer_bandwidth = 8, .sample_time = 0.03125, .input_range = 1};
+  EXPECT_TRUE(HealthMonitor<3>::make(standard));
+  EXPECT_EQ(standard.memory, 1.0);
+  EXPECT_EQ(standard.divider, 4);
 }
 
 /// After numbers of any kind it tells numbers, and the truth once the loop is well.
