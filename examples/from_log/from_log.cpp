@@ -18,6 +18,7 @@
 
 #include <esokit/core/error_text.hpp>
 
+#include "common/measured_data.hpp"
 #include "common/report.hpp"
 #include "from_log/parts/measured_sets.hpp"
 #include "from_log/parts/show.hpp"
@@ -27,7 +28,7 @@ using namespace from_log;
 namespace {
 
 constexpr const char* usage = R"(usage: from_log FILE.csv [options]
-       from_log [--out DIR] [--data DIR]
+       from_log --out DIR
 Writes FILE.html (or FILE-2.html, .. if it exists) and prints its path.
 
 columns, by their name, by its end (position of /joint1/position) or beginning, or by number:
@@ -62,8 +63,7 @@ other:
   --anyway            make a design even from a refused log
   --no-design         find only the model
   --out DIR           folder for the page (default: here)
-With --out or --data but without a file: example pages from records of real machines in the folder
-that --data names (default: ../shared/data beside the repository).
+With --out but without a file: example pages from the logs of real machines in examples/data.
 
 exit codes: 0 page with a design; 1 page not written; 2 file or options not understood; 3 log
 refused: the page says what was found and what to record instead; 4 page with an alarm, or no
@@ -106,7 +106,7 @@ std::string in_quotes(const std::string& text) {
   return "'" + text + "'";
 }
 
-Settings read_arguments(int argc, char** argv, std::filesystem::path& data) {
+Settings read_arguments(int argc, char** argv) {
   Settings s;
   s.command = "from_log";
   int wishes = 0;
@@ -149,7 +149,6 @@ Settings read_arguments(int argc, char** argv, std::filesystem::path& data) {
        }},
       {"observer", [&](const auto& text) { s.observer = text; }},
       {"bandwidth", [&](const auto& text) { s.bandwidth = positive("bandwidth", text); }},
-      {"data", [&](const auto& text) { data = text; }},
       {"rank",
        [&](const auto& text) {
          const double rank = number("rank", text);
@@ -214,7 +213,7 @@ esokit::examples::Report report_of(const std::string& out, const std::string& na
 
 /// What the results page shows: two real machines as from_log shows them, and observers over
 /// measured sets against what is independently known.
-int gallery(const std::string& out, const std::filesystem::path& data) {
+int gallery(const std::string& out) {
   int status = 0;
   struct Machine {
     const char *name, *title, *file, *text;
@@ -228,12 +227,8 @@ int gallery(const std::string& out, const std::filesystem::path& data) {
        "it as a disturbance.",
        10}};
   for (const Machine& machine : machines) {
-    if (!std::filesystem::exists(data / machine.file)) {
-      std::printf("skipped: there is no %s\n", machine.file);
-      continue;
-    }
     Settings settings;
-    settings.file = (data / machine.file).string();
+    settings.file = (esokit::examples::measured_data() / machine.file).string();
     settings.anyway = true;
     settings.limits = {-machine.limit, machine.limit};
     settings.command = std::string("from_log ") + machine.file + " --limits " +
@@ -254,9 +249,7 @@ int gallery(const std::string& out, const std::filesystem::path& data) {
                 "compared with what is known independently. Sampled observers whose gains follow "
                 "the irregular time stamps (VariableTime).",
                 3);
-  if (!measured_sets(report, data)) {
-    std::printf("none of the records is in %s; --data names their folder\n", data.c_str());
-  }
+  measured_sets(report);
   return status | report.finish();
 }
 
@@ -264,12 +257,9 @@ int gallery(const std::string& out, const std::filesystem::path& data) {
 
 int main(int argc, char** argv) {
   try {
-    // The sources are in examples/from_log of the repository.
-    const auto root = std::filesystem::path(__FILE__).parent_path().parent_path().parent_path();
-    std::filesystem::path data = (root / ".." / "shared" / "data").lexically_normal();
-    const Settings settings = read_arguments(argc, argv, data);
+    const Settings settings = read_arguments(argc, argv);
     if (argc == 1) throw LogError("no file is given; from_log --help shows the options");
-    if (settings.file.empty()) return gallery(settings.out, data);
+    if (settings.file.empty()) return gallery(settings.out);
     if (!settings.observer.empty()) {
       const std::string page = show_observer(settings, read_log(settings));
       if (page.empty()) return failed;

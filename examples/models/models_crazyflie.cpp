@@ -1,6 +1,5 @@
 // A nano quadrotor in free flight (Crazyflie): what the rate observer makes of the log with the
-// motor's lag ignored and in the model. The data lie beside the repository (../shared/data);
-// without them nothing is judged.
+// motor's lag ignored and in the model. The log is in examples/data.
 //
 // Way: sampled observers on a measured log, as it was logged.
 //
@@ -13,7 +12,6 @@
 // omega_o  observer     50         rad/s
 
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <numbers>
 #include <string>
@@ -23,6 +21,7 @@
 #include <esokit/observer/model_eso.hpp>
 
 #include "common/log_file.hpp"
+#include "common/measured_data.hpp"
 #include "common/report.hpp"
 #include "models/models.hpp"
 
@@ -157,14 +156,7 @@ int main(int argc, char** argv) {
                 about("A quadrotor's motors",
                       "Logs of a Crazyflie in free flight: the estimated disturbance if the lag of "
                       "the motors is ignored, and if it is in the model."));
-  const auto root = std::filesystem::path(__FILE__).parent_path().parent_path().parent_path();
-  const auto file = (root / ".." / "shared" / "data" / "crazyflie_motor_lag" / "roll_pitch.csv")
-                        .lexically_normal();
-  if (!std::filesystem::exists(file)) {
-    std::printf("skipped: there is no %s\n", file.c_str());
-    report.remark("The measured log was not available when this page was made.");
-    return report.finish();
-  }
+  const auto file = measured_data() / "crazyflie_motor_lag" / "roll_pitch.csv";
   std::vector<CsvRow> lines;
   Figure figure("crazyflie", {.rows = 2, .columns = 1, .panel_height = 200});
   figure.caption(

@@ -1,7 +1,6 @@
 // A geared DC servo that follows a sine (G. Keiel's log): what stands in the way comes back with
 // every period, friction above all, and a resonator at that frequency takes most of it out of the
-// disturbance that has to be found. The data lie beside the repository (../shared/data); without
-// them nothing is judged.
+// disturbance that has to be found. The log is in examples/data.
 //
 // Way: sampled observers on a measured log, as it was logged.
 //
@@ -15,8 +14,6 @@
 
 #include <array>
 #include <cmath>
-#include <cstdio>
-#include <filesystem>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -25,6 +22,7 @@
 #include <esokit/observer/model_eso.hpp>
 
 #include "common/log_file.hpp"
+#include "common/measured_data.hpp"
 #include "common/report.hpp"
 #include "models/models.hpp"
 
@@ -90,15 +88,7 @@ int main(int argc, char** argv) {
                 about("A servo that follows a sine",
                       "The log of a geared DC servo: how much of its disturbance repeats with "
                       "every period and is taken by a resonator."));
-  const auto root = std::filesystem::path(__FILE__).parent_path().parent_path().parent_path();
-  const auto file =
-      (root / ".." / "shared" / "data" / "servo_relay_pid" / "pid_sine.csv").lexically_normal();
-  if (!std::filesystem::exists(file)) {
-    std::printf("skipped: there is no %s\n", file.c_str());
-    report.remark("The measured log was not available when this page was made.");
-    return report.finish();
-  }
-  const LogFile log(file, {"u_pct", "y_deg"});
+  const LogFile log(measured_data() / "servo_relay_pid" / "pid_sine.csv", {"u_pct", "y_deg"});
   const Found none = found<0>(log, {});
   const Found one = found<1>(log, {frequency});
   const Found two = found<2>(log, {frequency, 3 * frequency});

@@ -1,15 +1,13 @@
 /// @file
-/// The measured sets beside the repository, with what is independently known of them. Numbers to
-/// compare with are those of the notes beside the data, from an independent program.
+/// Observers over logs of examples/data, beside what is independently known of the machines.
+/// Numbers to compare with are those of an independent program (numpy) over the same files.
 #pragma once
-
-#include <filesystem>
 
 #include "common/report.hpp"
 
 namespace from_log {
 
-/// All sets that are there; false if none is.
-bool measured_sets(esokit::examples::Report& report, const std::filesystem::path& data);
+/// Adds all sets to a page.
+void measured_sets(esokit::examples::Report& report);
 
 }  // namespace from_log
