@@ -38,8 +38,10 @@ columns, by their name, by its end (position of /joint1/position) or beginning, 
                       effort, pwm; y, position, angle, ..)
   --known COLUMN      a known effect that acts where the disturbance acts, e.g. the sine of the
                       angle for gravity; may be repeated
-  --time-unit UNIT    s, ms, us, ns (default: detected)
+  --time-unit UNIT    h, min, s, ms, us, ns (default: detected)
   --sample-time S     seconds between rows, if there is no time column
+  --wrap TURN         y is an angle that begins anew after a turn (360, 6.283185, 4096); 0: it does
+                      not (default: detected, with an alarm)
   --separator C       one character, or the word tab (default: detected)
 the machine:
   --order N           integrations from u to y, 1 to 3 (default: 1 for a speed, a temperature or a
@@ -117,6 +119,11 @@ Settings read_arguments(int argc, char** argv, std::filesystem::path& data) {
       {"known", [&](const auto& text) { s.known.push_back(text); }},
       {"time-unit", [&](const auto& text) { s.time_unit = text; }},
       {"sample-time", [&](const auto& text) { s.sample_time = positive("sample-time", text); }},
+      {"wrap",
+       [&](const auto& text) {
+         s.wrap = number("wrap", text);
+         if (*s.wrap < 0) throw LogError("--wrap: must not be negative");
+       }},
       {"separator",
        [&](const auto& text) {
          const std::string one = text == "tab" || text == "\\t" ? "\t" : text;

@@ -33,9 +33,10 @@ struct Settings {
   std::string file;
   std::string time, u, y;          ///< columns; empty: found by their names
   std::vector<std::string> known;  ///< columns of what else acts where the disturbance acts
-  std::string time_unit;           ///< s, ms, us or ns; empty: found out
+  std::string time_unit;           ///< h, min, s, ms, us or ns; empty: found out
   double sample_time = 0;          ///< s, where there is no time
   char separator = 0;              ///< 0: found out
+  std::optional<double> wrap;      ///< y begins anew after so much; 0: it does not; none: found out
   std::vector<int> orders{};  ///< empty: 1 for a speed, a temperature or a level, else found out
   std::optional<double> expected_gain;  ///< b0 as the user believes it to be
   std::optional<std::pair<double, double>> limits;
@@ -67,6 +68,7 @@ struct Input {
   std::vector<std::size_t> line;  ///< of the file, for each row
   bool merged = false;            ///< topics with stamps of their own were brought together
   bool cut = false;               ///< the last line was cut
+  double turn = 0;                ///< after which y began anew, before it was made continuous
   bool first_order = false;       ///< y is a speed, a temperature or a level by its name
   std::vector<Alarm> alarms;
 };

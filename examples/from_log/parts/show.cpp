@@ -209,6 +209,7 @@ std::vector<CsvRow> log_table(const Input& input, const Findings& findings) {
                       ? "by its name a speed, a temperature or a level, so of order 1; --order "
                         "sets another one"
                       : ""});
+  if (input.turn > 0) rows.push_back({"turn of y", number_text(input.turn, 7), "made continuous"});
   rows.push_back({"u", input.u, "held by the actuator from its row to the next"});
   rows.push_back({"time", input.time.empty() ? "none" : input.time,
                   input.time.empty() ? "equal steps, by --sample-time"
