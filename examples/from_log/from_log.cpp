@@ -16,8 +16,6 @@
 #include <string>
 #include <vector>
 
-#include <esokit/core/error_text.hpp>
-
 #include "common/report.hpp"
 #include "from_log/parts/measured_sets.hpp"
 #include "from_log/parts/show.hpp"
@@ -286,8 +284,10 @@ int main(int argc, char** argv) {
     const Outcome outcome = work_out(settings);
     for (const Alarm& alarm : outcome.findings.alarms)
       std::fprintf(stderr, "ALARM %s: %s\n", alarm.name.c_str(), alarm.text.c_str());
-    if (outcome.findings.refusal) {
-      std::fprintf(stderr, "refused: %s\n", esokit::to_text(*outcome.findings.refusal).c_str());
+    const char* mark = "refused: ";
+    for (const auto& line : why_refused(outcome.findings)) {
+      std::fprintf(stderr, "%s%s\n", mark, line.c_str());
+      mark = "  ";
     }
     for (const auto& line : in_short(outcome.findings, outcome.design))
       std::printf("%s\n", line.c_str());

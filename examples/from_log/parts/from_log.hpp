@@ -91,6 +91,7 @@ struct Findings {
   Spectrum u, y, residual;
   std::vector<double> residual_correlation;  ///< lags 1, 2, ..
   double correlation_band = 0;               ///< white ones stay within this, 95 %
+  std::vector<std::string> shown;            ///< what u, y and the residual show, in sentences
   std::vector<Alarm> alarms;
 };
 
@@ -99,7 +100,7 @@ struct Findings {
 
 /// The unit for a time of this size: units in a second, and its name.
 inline std::pair<double, const char*> unit_of(double seconds) {
-  if (seconds < 1) return {1e3, "ms"};
+  if (seconds < 0.9995) return {1e3, "ms"};
   return {1, "s"};
 }
 
