@@ -289,6 +289,12 @@ int main(int argc, char** argv) {
       std::fprintf(stderr, "%s%s\n", mark, line.c_str());
       mark = "  ";
     }
+    if (outcome.input.unit_assumed && outcome.findings.rows.sample_time > 0.5) {
+      std::printf(
+          "Nothing says in which unit %s is: it was read in seconds. If it is in another "
+          "one, set --time-unit.\n",
+          outcome.input.time.c_str());
+    }
     for (const auto& line : in_short(outcome.findings, outcome.design))
       std::printf("%s\n", line.c_str());
     const std::string page = outcome.page(settings).write(settings.out, stem_of(settings));

@@ -143,9 +143,11 @@ void say_moves(const Input& input, Findings& all) {
   const double step = 0.2 * (*high - *low);
   std::vector<double> at;
   double from = rows.u[0];
+  std::size_t gradual = 0;
   for (std::size_t k = 1; k < rows.u.size(); ++k) {
     if (std::abs(rows.u[k] - from) < step) continue;
     from = rows.u[k];
+    if (std::abs(rows.u[k] - rows.u[k - 1]) < 0.5 * step) ++gradual;
     at.push_back(static_cast<double>(k) * rows.sample_time);
   }
   const std::string range = number_text(*low, 4) + " to " + number_text(*high, 4);
@@ -163,7 +165,11 @@ void say_moves(const Input& input, Findings& all) {
   const double stay = esokit::detail::median(stays);
   all.shown.push_back("u (" + input.u + ") moves " + std::to_string(at.size()) +
                       " times by a fifth of its range, " + range + ", or more, every " +
-                      duration_text(stay) + " (median).");
+                      duration_text(stay) + " (median)" +
+                      (2 * gradual > at.size()
+                           ? ", " + std::to_string(gradual) +
+                                 " of them gradually, which tells b0 less than steps do."
+                           : "."));
   if (all.seen && all.found.latency.value > stay) {
     all.shown.push_back("Lag and dead time, " + duration_text(all.found.latency.value) +
                         ", are longer than that: u moves on before y has answered.");

@@ -136,11 +136,15 @@ std::string guess(const LogFile& file, const char* option, const std::string& gi
   if (!given.empty()) return given;
   std::string there = file.there();
   for (const auto& names : file.headers()) {
-    std::vector<std::size_t> fits;
+    std::vector<std::size_t> fits, whole;
     for (std::size_t i = 0; i < names.size(); ++i) {
       const Usual* line = usual(names[i]);
-      if (line != nullptr && line->column == option[0]) fits.push_back(i);
+      if (line == nullptr || line->column != option[0]) continue;
+      fits.push_back(i);
+      if (lower(names[i]) == words(names[i]).front()) whole.push_back(i);
     }
+    // y is y, where there is y_filtered, too.
+    if (whole.size() == 1) fits = whole;
     if (fits.size() == 1) return names[fits[0]];
     if (fits.empty()) continue;
     there.clear();

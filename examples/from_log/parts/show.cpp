@@ -75,8 +75,16 @@ Figure log_figure(const Input& input, const Findings& findings) {
   }
   const auto panel = [&](std::size_t row, const char* name, const std::vector<double>& values,
                          const Spectrum& spectrum, Color color) {
-    figure.panel(row, 0).x_label("t (s)").y_label(name).name(name).line(
+    auto& over_time = figure.panel(row, 0).x_label("t (s)").y_label(name).name(name).line(
         t, values, {.color = color, .width = 1.0, .column = name});
+    // Of a constant gnuplot would choose a range itself, with a warning.
+    const auto first = std::ranges::find_if(values, [](double v) { return std::isfinite(v); });
+    const bool constant = std::ranges::none_of(
+        values, [&](double v) { return std::isfinite(v) && (v < *first || v > *first); });
+    if (constant && first != values.end()) {
+      const double margin = std::max(0.1 * std::abs(*first), 1e-3);
+      over_time.y_range(*first - margin, *first + margin);
+    }
     // Of a constant there is none.
     if (std::ranges::none_of(spectrum.density, [](double d) { return d > 0; })) return;
     figure.panel(row, 1)
