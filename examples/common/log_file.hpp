@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "common/csv.hpp"
+#include "common/stamps.hpp"
 
 namespace esokit::examples {
 
@@ -28,11 +29,123 @@ struct LogError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The wanted columns of a CSV file. Lines that begin with # or % or // are comments; the first
-/// line with a field that is no number is the header, or the last comment before the numbers if it
-/// has as many fields. Columns are named by it, by what follows the last / or . of a name or by its
-/// beginning where that is one column's alone, or by their number from 1. Where the separator is no
-/// comma, a comma in a number is a decimal one.
+/// The lines of a text file as UTF-8, whatever ends them: \n, \r\n or \r. With a byte order mark
+/// the file may be UTF-16; what is no UTF-8 is taken for Latin-1.
+class TextLines {
+ public:
+  explicit TextLines(const std::filesystem::path& file) : stream_(file, std::ios::binary) {
+    if (!stream_) throw LogError("cannot read " + file.string());
+    bytes_ = stream_.rdbuf();
+    const int first = bytes_->sgetc();
+    if (first == 0xFF || first == 0xFE) {
+      bytes_->sbumpc();
+      const int second = bytes_->sbumpc();
+      if (first + second != 0xFF + 0xFE) throw LogError(file.string() + " is not a text file");
+      wide_ = first == 0xFF ? Wide::little : Wide::big;
+    }
+  }
+
+  /// The next line, without its end; false after the last.
+  bool next(std::string& line) {
+    line.clear();
+    whole_ = false;
+    bool any = false;
+    for (int c = character(); c >= 0; c = character()) {
+      any = true;
+      if (c == '\n' && after_return_) {
+        after_return_ = false;
+        any = false;
+        continue;
+      }
+      after_return_ = c == '\r';
+      if (c == '\n' || c == '\r') {
+        whole_ = true;
+        break;
+      }
+      if (wide_ == Wide::no) {
+        line += static_cast<char>(c);
+      } else {
+        add(line, static_cast<unsigned>(c));
+      }
+    }
+    if (any && number_++ == 0 && line.starts_with("\xEF\xBB\xBF")) line.erase(0, 3);
+    if (!is_utf8(line)) {
+      std::string text;
+      for (const char c : line) add(text, static_cast<unsigned char>(c));
+      line = text;
+    }
+    return any;
+  }
+  /// Whether the line had an end.
+  [[nodiscard]] bool whole() const { return whole_; }
+  /// Of the line, from 1.
+  [[nodiscard]] std::size_t number() const { return number_; }
+  /// Bytes that were read.
+  [[nodiscard]] std::size_t read() const { return read_; }
+
+ private:
+  enum class Wide { no, little, big };
+
+  int byte() {
+    const int c = bytes_->sbumpc();
+    if (c >= 0) ++read_;
+    return c;
+  }
+  int unit() {
+    const int one = byte(), two = byte();
+    if (two < 0) return -1;
+    return wide_ == Wide::little ? one + 256 * two : 256 * one + two;
+  }
+  int character() {
+    if (wide_ == Wide::no) return byte();
+    const int high = unit();
+    if (high < 0xD800 || high > 0xDBFF) return high;
+    const int low = unit();
+    return low < 0 ? -1 : 0x10000 + ((high & 0x3FF) << 10) + (low & 0x3FF);
+  }
+
+  static void add(std::string& text, unsigned c) {
+    const auto put = [&](unsigned first, int more) {
+      text += static_cast<char>(first | c >> (6 * more));
+      while (more-- > 0) text += static_cast<char>(0x80U | (c >> (6 * more) & 0x3FU));
+    };
+    if (c < 0x80) {
+      put(0, 0);
+    } else if (c < 0x800) {
+      put(0xC0, 1);
+    } else if (c < 0x10000) {
+      put(0xE0, 2);
+    } else {
+      put(0xF0, 3);
+    }
+  }
+  static bool is_utf8(const std::string& text) {
+    for (std::size_t i = 0; i < text.size(); ++i) {
+      const auto c = static_cast<unsigned char>(text[i]);
+      if (c < 0x80) continue;
+      int more = c >= 0xF0 && c < 0xF8 ? 3 : c >= 0xE0 ? 2 : c >= 0xC2 ? 1 : 0;
+      if (more == 0 || c >= 0xF8) return false;
+      for (; more > 0; --more) {
+        if (++i == text.size() || (static_cast<unsigned char>(text[i]) & 0xC0U) != 0x80U)
+          return false;
+      }
+    }
+    return true;
+  }
+
+  std::ifstream stream_;
+  std::streambuf* bytes_ = nullptr;
+  Wide wide_ = Wide::no;
+  bool whole_ = false, after_return_ = false;
+  std::size_t number_ = 0, read_ = 0;
+};
+
+/// The wanted columns of a CSV file. Lines that begin with # or % or // are comments. The numbers
+/// begin where a line looks like those further down; up to three lines directly above it name the
+/// columns (names, units), or the last comment, or a label before each number (u:1.5). Columns are
+/// named by them, by what follows the last / or . of a name or by its beginning where that is one
+/// column's alone, or by their number from 1. Where the separator is no comma, a comma in a number
+/// is a decimal one. What may be read in two ways is refused.
 class LogFile {
  public:
   /// Reads the header and the first row alone.
@@ -41,11 +154,11 @@ class LogFile {
     read({}, true);
   }
 
-  /// @param separator ',' ';' '\t' '|' or ' '; 0: the first of ; tab | , that the header has, else
-  ///        blanks
+  /// @param separator ',' ';' '\t' '|' or ' '; 0: the one that makes most numbers of the lines
+  /// @param stamps which of the wanted columns has time stamps, which then begin at zero
   LogFile(const std::filesystem::path& file, const std::vector<std::string>& wanted,
-          char separator = 0)
-      : file_(file), separator_(separator), columns_(wanted.size()) {
+          char separator = 0, std::optional<std::size_t> stamps = std::nullopt)
+      : file_(file), separator_(separator), stamps_(stamps), columns_(wanted.size()) {
     read(wanted, false);
   }
 
@@ -53,22 +166,54 @@ class LogFile {
   [[nodiscard]] std::size_t rows() const { return lines_.size(); }
   /// Line of the file that a row came from.
   [[nodiscard]] std::size_t line(std::size_t row) const { return lines_[row]; }
-  /// Names of all columns of the file; none without a header.
-  [[nodiscard]] const std::vector<std::string>& header() const { return header_; }
+  /// The lines of names, a name for each column; none without a header.
+  [[nodiscard]] const std::vector<std::vector<std::string>>& headers() const { return headers_; }
   /// How many columns the file has.
   [[nodiscard]] std::size_t columns() const { return count_; }
   /// Full name of a wanted column: as in the header, else its number.
   [[nodiscard]] std::string name(std::size_t i) const {
-    return header_.empty() ? std::to_string(places_[i] + 1) : header_[places_[i]];
+    return header_name(places_[i].header, places_[i].column);
+  }
+  /// What the lines of names below that of its name say of a wanted column: its unit, perhaps.
+  [[nodiscard]] std::string below(std::size_t i) const {
+    const std::size_t next = places_[i].header + 1;
+    return next < headers_.size() ? header_name(next, places_[i].column) : "";
   }
   /// "FILE, line 17: " of a row.
   [[nodiscard]] std::string where(std::size_t row) const { return at(lines_[row]); }
   /// Whether the last line was cut in the middle and left out.
   [[nodiscard]] bool cut() const { return cut_; }
+  /// The stamps: whether they are numbers, and the first.
+  [[nodiscard]] const StampReader& stamps() const { return reader_; }
+  /// All names, in words.
+  [[nodiscard]] std::string there() const {
+    if (headers_.empty()) return "numbers 1 to " + std::to_string(count_);
+    std::string text;
+    for (const auto& names : headers_) {
+      if (!text.empty()) text += "; also called ";
+      for (std::size_t i = 0; i < names.size(); ++i) text += (i == 0 ? "" : ", ") + names[i];
+    }
+    return text;
+  }
 
  private:
+  struct Place {
+    std::size_t column = 0, header = 0;
+  };
+  struct Head {
+    std::string text;
+    std::size_t number = 0;
+    bool comment = false, whole = false;
+  };
+  using Fields = std::vector<std::string_view>;
+
   [[nodiscard]] std::string at(std::size_t line) const {
     return file_.string() + ", line " + std::to_string(line) + ": ";
+  }
+  [[nodiscard]] std::string header_name(std::size_t header, std::size_t column) const {
+    return header < headers_.size() && column < headers_[header].size()
+               ? headers_[header][column]
+               : std::to_string(column + 1);
   }
 
   void read(const std::vector<std::string>& wanted, bool header_only) {
@@ -77,56 +222,200 @@ class LogFile {
       throw LogError(file_.string() + " is a folder");
     }
     const auto bytes = std::filesystem::file_size(file_, ignored);
-    std::ifstream stream(file_, std::ios::binary);
-    if (!stream) throw LogError("cannot read " + file_.string());
-    std::string line, comment;
-    std::vector<std::string_view> fields;
-    std::size_t number = 0, read = 0, shown = 0;
-    bool units = false;
-    while (std::getline(stream, line)) {
-      ++number;
-      read += line.size() + 1;
-      const bool whole = !stream.eof();
-      if (!line.empty() && line.back() == '\r') line.pop_back();
-      if (number == 1 && line.starts_with("\xEF\xBB\xBF")) line.erase(0, 3);
-      if (line.find_first_not_of(" \t,;|") == std::string::npos) continue;
-      if (const auto after = after_comment_mark(line)) {
-        if (lines_.empty()) comment = line.substr(*after);
-        continue;
-      }
-      if (separator_ == 0) separator_ = guess_separator(line);
-      split(line, fields);
-      if (places_.empty() && lines_.empty()) {
-        if (header_.empty() && !all_numbers(fields)) {
-          for (const auto& field : fields) header_.emplace_back(field);
-          count_ = header_.size();
-          continue;
+    TextLines lines(file_);
+    std::string line;
+    const auto next = [&](Head& head) {
+      while (lines.next(line)) {
+        if (line.find('\0') != std::string::npos) {
+          throw LogError(at(lines.number()) +
+                         "it has a zero byte: it is no text, or UTF-16 without its mark; save it "
+                         "as UTF-8");
         }
-        // A line of units below the header.
-        if (!header_.empty() && !units && no_numbers(fields)) {
-          units = true;
-          continue;
-        }
-        if (header_.empty()) take_comment(comment, fields.size());
-        count_ = header_.empty() ? fields.size() : header_.size();
-        if (header_only) return;
-        for (const std::string& name : wanted) places_.push_back(find_column(name));
+        if (line.find_first_not_of(" \t,;|") == std::string::npos) continue;
+        const auto after = after_comment_mark(line);
+        head = {after ? line.substr(*after) : line, lines.number(), after.has_value(),
+                lines.whole()};
+        return true;
       }
-      if (!whole && fields.size() < count_) {
+      return false;
+    };
+    // What numbers, names and separators are is told by the first lines together.
+    constexpr std::size_t ahead = 200;
+    std::vector<Head> heads;
+    std::size_t text_lines = 0;
+    for (Head head; text_lines < ahead && next(head);) {
+      text_lines += head.comment ? 0 : 1;
+      heads.push_back(std::move(head));
+    }
+    const std::size_t begin = understand(heads);
+    if (header_only) return;
+    for (const std::string& name : wanted) places_.push_back(find_column(name));
+    std::size_t shown = 0;
+    Fields fields;
+    const auto take = [&](const Head& head) {
+      if (head.comment) return;
+      split(head.text, separator_, fields);
+      if (!head.whole && fields.size() < count_) {
         cut_ = true;
-        break;
+        return;
       }
+      check_count(head.number, fields);
       for (std::size_t i = 0; i < places_.size(); ++i) {
-        columns_[i].push_back(value(number, fields, places_[i]));
+        columns_[i].push_back(value(head.number, fields, i));
       }
-      lines_.push_back(number);
-      if (read >= shown + 64'000'000) {
-        shown = read;
+      lines_.push_back(head.number);
+      if (lines.read() >= shown + 64'000'000) {
+        shown = lines.read();
         std::fprintf(stderr, "reading %s: %3.0f %%\n", file_.filename().c_str(),
-                     100.0 * static_cast<double>(read) / static_cast<double>(bytes));
+                     100.0 * static_cast<double>(shown) / static_cast<double>(bytes));
+      }
+    };
+    for (std::size_t i = begin; i < heads.size(); ++i) take(heads[i]);
+    for (Head head; next(head);) take(head);
+    if (lines_.empty()) throw LogError(file_.string() + ": no line with numbers");
+  }
+
+  /// Finds separator, names, and where the numbers begin.
+  std::size_t understand(const std::vector<Head>& heads) {
+    std::vector<std::size_t> text;
+    for (std::size_t i = 0; i < heads.size(); ++i) {
+      if (!heads[i].comment) text.push_back(i);
+    }
+    if (text.empty()) throw LogError(file_.string() + ": no line with numbers");
+    // The last third is numbers: no header is so long.
+    const std::size_t body = text.size() - std::max<std::size_t>(1, text.size() / 3);
+    if (separator_ == 0) {
+      int most = std::numeric_limits<int>::min();
+      for (const char c : {';', '\t', '|', ',', ' '}) {
+        const Shape shape = shape_of(heads, text, body, c);
+        const int score =
+            10'000 * shape.numbers - static_cast<int>(std::min<std::size_t>(shape.count, 9'999));
+        if (score > most) most = score, separator_ = c;
       }
     }
-    if (lines_.empty()) throw LogError(file_.string() + ": no line with numbers");
+    const Shape shape = shape_of(heads, text, body, separator_);
+    Fields fields;
+    std::size_t first = 0;
+    for (; first < text.size(); ++first) {
+      split(heads[text[first]].text, separator_, fields);
+      if (fields.size() >= shape.count && numbers_in(shape, fields) == Numbers::all) break;
+    }
+    if (first == text.size() || shape.numbers == 0) {
+      throw LogError(file_.string() + ": no line with numbers; line " +
+                     std::to_string(heads[text[0]].number) + " is '" +
+                     heads[text[0]].text.substr(0, 60) + "'");
+    }
+    const std::size_t begin = text[first];
+    const auto name_line = [&](const Head& head) {
+      while (!fields.empty() && fields.back().empty()) fields.pop_back();
+      if (!headers_.empty() && fields.size() != headers_[0].size()) return false;
+      headers_.emplace(headers_.begin(), fields.begin(), fields.end());
+      header_line_ = head.number;
+      return headers_.size() < 3;
+    };
+    for (std::size_t i = first; i-- > 0;) {
+      const Head& head = heads[text[i]];
+      split(head.text, separator_, fields);
+      const Numbers kind = numbers_in(shape, fields);
+      const auto words = std::count_if(fields.begin(), fields.end(),
+                                       [](std::string_view field) { return !field.empty(); });
+      if (words < 2 && shape.count > 1) break;
+      // A name may be a number, too. Below names it is a bad row.
+      if (kind != Numbers::none && headers_.empty() && (i > 0 || kind == Numbers::all))
+        refuse_row(head.number, shape, fields);
+      if ((kind != Numbers::none && i > 0) || !name_line(head)) break;
+    }
+    if (headers_.empty()) {
+      for (std::size_t i = begin; i-- > 0 && heads[i].comment;) {
+        split(heads[i].text, separator_, fields);
+        if (fields.size() == shape.count && !all_numbers(fields) && !name_line(heads[i])) break;
+      }
+    }
+    split(heads[begin].text, separator_, fields);
+    labelled_ = headers_.empty() && std::any_of(fields.begin(), fields.end(), [](auto field) {
+                  return !label_of(field).empty();
+                });
+    if (labelled_) {
+      headers_.emplace_back();
+      for (const auto& field : fields)
+        headers_[0].emplace_back(parse_stamp(field) ? "time" : label_of(field));
+    }
+    count_ = headers_.empty() ? shape.count : headers_[0].size();
+    if (!headers_.empty() && separator_ == ' ' && fields.size() != count_) {
+      throw LogError(at(heads[begin].number) + "it has " + std::to_string(fields.size()) +
+                     " fields, but line " + std::to_string(header_line_) + " has " +
+                     std::to_string(count_) +
+                     " names; between blanks a name must be one word, and each column has one");
+    }
+    return begin;
+  }
+
+  /// Of the lines that are numbers: how many fields, and which are numbers.
+  struct Shape {
+    std::size_t count = 0;
+    int numbers = 0;
+    std::vector<bool> number;
+  };
+  [[nodiscard]] Shape shape_of(const std::vector<Head>& heads, const std::vector<std::size_t>& text,
+                               std::size_t body, char separator) const {
+    std::vector<std::size_t> counts;
+    std::vector<int> filled, numbers;
+    Fields fields;
+    for (std::size_t i = body; i < text.size(); ++i) {
+      split(heads[text[i]].text, separator, fields);
+      counts.push_back(fields.size());
+      filled.resize(std::max(filled.size(), fields.size()));
+      numbers.resize(filled.size());
+      for (std::size_t c = 0; c < fields.size(); ++c) {
+        if (fields[c].empty()) continue;
+        ++filled[c];
+        if (is_number(fields[c], separator)) ++numbers[c];
+      }
+    }
+    Shape shape;
+    std::sort(counts.begin(), counts.end());
+    shape.count = counts[counts.size() / 2];
+    for (std::size_t c = 0; c < filled.size(); ++c) {
+      shape.number.push_back(c < shape.count && 2 * numbers[c] > filled[c]);
+      shape.numbers += shape.number.back() ? 1 : 0;
+    }
+    return shape;
+  }
+
+  enum class Numbers { none, some, all };
+  /// Of the fields that are to be numbers.
+  [[nodiscard]] Numbers numbers_in(const Shape& shape, const Fields& fields) const {
+    std::size_t are = 0, filled = 0;
+    for (std::size_t c = 0; c < std::min(fields.size(), shape.number.size()); ++c) {
+      if (!shape.number[c] || fields[c].empty()) continue;
+      ++filled;
+      if (is_number(fields[c], separator_)) ++are;
+    }
+    return are == 0 ? Numbers::none : are < filled ? Numbers::some : Numbers::all;
+  }
+
+  [[noreturn]] void refuse_row(std::size_t line, const Shape& shape, const Fields& fields) const {
+    for (std::size_t c = 0; c < std::min(fields.size(), shape.number.size()); ++c) {
+      if (shape.number[c] && !fields[c].empty() && !is_number(fields[c], separator_)) {
+        throw LogError(at(line) + "'" + std::string(fields[c]) + "' in column " +
+                       std::to_string(c + 1) + " is not a number");
+      }
+    }
+    throw LogError(at(line) + "it has " + std::to_string(fields.size()) +
+                   " fields, the lines below have " + std::to_string(shape.count));
+  }
+
+  /// More numbers than names: the names are shifted, or the comma is a decimal one.
+  void check_count(std::size_t line, const Fields& fields) const {
+    for (std::size_t i = count_; i < fields.size(); ++i) {
+      if (fields[i].empty() || !is_number(fields[i], separator_)) continue;
+      throw LogError(
+          at(line) + "it has " + std::to_string(fields.size()) + " fields, but " +
+          (headers_.empty() ? "the lines before have " + std::to_string(count_)
+                            : "line " + std::to_string(header_line_) + " has " +
+                                  std::to_string(count_) + " names") +
+          (separator_ == ',' ? "; with decimal commas the separator must be another one" : ""));
+    }
   }
 
   /// Where the text of a comment starts.
@@ -138,32 +427,30 @@ class LogFile {
     return std::min(line.size(), line.find_first_not_of("#%/ \t", from));
   }
 
-  /// The names are often in the last comment before the numbers.
-  void take_comment(const std::string& comment, std::size_t count) {
-    std::vector<std::string_view> fields;
-    if (comment.empty()) return;
-    split(comment, fields);
-    if (fields.size() != count || all_numbers(fields)) return;
-    for (const auto& field : fields) header_.emplace_back(field);
-  }
-
-  static char guess_separator(const std::string& line) {
-    for (const char c : {';', '\t', '|', ','}) {
-      if (line.find(c) != std::string::npos) return c;
-    }
-    return ' ';
-  }
-
   static std::string_view trimmed(std::string_view text) {
     const auto from = text.find_first_not_of(" \t\"");
     if (from == std::string_view::npos) return {};
     return text.substr(from, text.find_last_not_of(" \t\"") - from + 1);
   }
 
-  void split(std::string_view line, std::vector<std::string_view>& fields) const {
+  /// The u of u:1.5.
+  static std::string_view label_of(std::string_view field) {
+    if (field.empty() || field[0] < 'A') return {};
+    const auto colon = field.find(':');
+    return colon == std::string_view::npos ? std::string_view{} : field.substr(0, colon);
+  }
+
+  static void split(std::string_view line, char separator, Fields& fields) {
     fields.clear();
+    // The Arduino IDE writes "12:00:00.010 -> " before what it received.
+    if (const auto arrow = line.find(" -> "); arrow != std::string_view::npos) {
+      if (const auto stamp = trimmed(line.substr(0, arrow)); parse_stamp(stamp)) {
+        fields.push_back(stamp);
+        line.remove_prefix(arrow + 4);
+      }
+    }
     while (true) {
-      if (separator_ == ' ') {
+      if (separator == ' ') {
         const auto from = line.find_first_not_of(" \t");
         if (from == std::string_view::npos) return;
         line.remove_prefix(from);
@@ -174,7 +461,7 @@ class LogFile {
       const auto closing = quoted ? line.find('"', first + 1) : std::string_view::npos;
       const auto from = closing == std::string_view::npos ? 0 : closing;
       const auto end =
-          separator_ == ' ' ? line.find_first_of(" \t", from) : line.find(separator_, from);
+          separator == ' ' ? line.find_first_of(" \t", from) : line.find(separator, from);
       fields.push_back(trimmed(line.substr(0, end)));
       if (end == std::string_view::npos) return;
       line.remove_prefix(end + 1);
@@ -182,93 +469,147 @@ class LogFile {
   }
 
   /// A number, or NaN for an empty field and the usual words for one that is missing.
-  [[nodiscard]] std::optional<double> parse(std::string_view text) const {
-    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-    if (text.empty() || text == "nan" || text == "NaN" || text == "NAN" || text == "NA") return nan;
+  template <class Number = double>
+  [[nodiscard]] static std::optional<Number> parse(std::string_view text, char separator) {
+    constexpr Number nan = std::numeric_limits<Number>::quiet_NaN();
+    if (text.empty()) return nan;
+    if (text.front() > '9' || text.front() == '#' || text.front() == '-') {
+      for (const std::string_view word : {"nan", "NaN", "NAN", "NA", "N/A", "#N/A", "null", "NULL",
+                                          "None", "-nan", "-nan(ind)"}) {
+        if (text == word) return nan;
+      }
+    }
     if (text.front() == '+') text.remove_prefix(1);
     std::array<char, 64> point{};
     if (const auto comma = text.find(',');
-        separator_ != ',' && comma != std::string_view::npos && text.size() < point.size()) {
+        separator != ',' && comma != std::string_view::npos && text.size() < point.size()) {
+      // A separator of thousands, or of columns.
+      if (comma + 1 == text.size() || text.find('.') != std::string_view::npos) return std::nullopt;
       std::copy(text.begin(), text.end(), point.begin());
       point[comma] = '.';
       text = {point.data(), text.size()};
     }
-    double number = 0;
+    Number number = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
     if (end != text.data() + text.size()) return std::nullopt;
-    // Too small or too large for a double is a number nevertheless: zero or infinite.
+    // Too small or too large is a number nevertheless: zero or infinite.
     if (error == std::errc::result_out_of_range)
-      return std::strtod(std::string(text).c_str(), nullptr);
+      return static_cast<Number>(std::strtold(std::string(text).c_str(), nullptr));
     if (error != std::errc{}) return std::nullopt;
     return number;
   }
 
-  [[nodiscard]] bool all_numbers(const std::vector<std::string_view>& fields) const {
-    return std::all_of(fields.begin(), fields.end(),
-                       [&](std::string_view field) { return parse(field).has_value(); });
+  static bool is_number(std::string_view field, char separator) {
+    if (const auto label = label_of(field); !label.empty()) field.remove_prefix(label.size() + 1);
+    return parse(field, separator).has_value() || parse_stamp(field).has_value();
   }
-  [[nodiscard]] bool no_numbers(const std::vector<std::string_view>& fields) const {
-    return std::all_of(fields.begin(), fields.end(), [&](std::string_view field) {
-      return field.empty() || !parse(field).has_value();
-    });
+  [[nodiscard]] bool all_numbers(const Fields& fields) const {
+    return std::all_of(fields.begin(), fields.end(),
+                       [&](std::string_view field) { return is_number(field, separator_); });
   }
 
-  [[nodiscard]] std::size_t find_column(const std::string& name) const {
-    const auto exact = std::find(header_.begin(), header_.end(), name);
-    if (exact != header_.end()) return static_cast<std::size_t>(exact - header_.begin());
-    std::vector<std::size_t> ends;
-    for (std::size_t i = 0; i < header_.size(); ++i) {
-      const std::string& full = header_[i];
-      if (full.size() > name.size() && full.ends_with(name) && !name.empty() &&
-          (full[full.size() - name.size() - 1] == '/' ||
-           full[full.size() - name.size() - 1] == '.')) {
-        ends.push_back(i);
+  /// The column of which alone `fits` is true of a name, in the first line of names that has one.
+  template <class Fits>
+  [[nodiscard]] std::optional<Place> only(const std::string& name, const Fits& fits) const {
+    for (std::size_t h = 0; h < headers_.size(); ++h) {
+      std::vector<std::size_t> found;
+      for (std::size_t i = 0; i < headers_[h].size(); ++i) {
+        if (fits(headers_[h][i])) found.push_back(i);
+      }
+      if (found.size() == 1) return Place{found[0], h};
+      if (found.size() > 1) {
+        throw LogError(file_.string() + ": '" + name + "' is " + headers_[h][found[0]] + " and " +
+                       headers_[h][found[1]] + ", columns " + std::to_string(found[0] + 1) +
+                       " and " + std::to_string(found[1] + 1));
       }
     }
-    if (ends.size() == 1) return ends[0];
-    if (ends.size() > 1) {
-      throw LogError(file_.string() + ": '" + name + "' is " + header_[ends[0]] + " and " +
-                     header_[ends[1]]);
-    }
-    std::size_t number = 0;
-    const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), number);
-    if (error == std::errc{} && end == name.data() + name.size() && number >= 1 &&
-        number <= count_) {
-      return number - 1;
-    }
-    std::vector<std::size_t> begins;
-    for (std::size_t i = 0; i < header_.size(); ++i) {
-      if (!name.empty() && header_[i].starts_with(name)) begins.push_back(i);
-    }
-    if (begins.size() == 1) return begins[0];
-    std::string there;
-    for (const std::string& column : header_) there += (there.empty() ? "" : ", ") + column;
-    throw LogError(file_.string() + ": no column '" + name + "'; there " +
-                   (header_.empty() ? "is no header and are " + std::to_string(count_) + " columns"
-                                    : "are " + there));
+    return std::nullopt;
   }
 
-  [[nodiscard]] double value(std::size_t line, const std::vector<std::string_view>& fields,
-                             std::size_t place) const {
-    const std::string column =
-        header_.empty() ? std::to_string(place + 1) : "'" + header_[place] + "'";
+  [[nodiscard]] Place find_column(const std::string& name) const {
+    if (const auto exact = only(name, [&](const std::string& full) { return full == name; }))
+      return *exact;
+    const auto ends = only(name, [&](const std::string& full) {
+      if (!(full.size() > name.size() && full.ends_with(name) && !name.empty())) return false;
+      const char before = full[full.size() - name.size() - 1];
+      return before == '/' || before == '.';
+    });
+    if (ends) return *ends;
+    std::size_t number = 0;
+    const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), number);
+    if (error == std::errc{} && end == name.data() + name.size() && number >= 1 && number <= count_)
+      return {number - 1, 0};
+    const auto begins = only(
+        name, [&](const std::string& full) { return !name.empty() && full.starts_with(name); });
+    if (begins) return *begins;
+    throw LogError(file_.string() + ": no column '" + name + "'; there " +
+                   (headers_.empty() ? "is no header and are " + std::to_string(count_) + " columns"
+                                     : "are " + there()));
+  }
+
+  [[nodiscard]] double value(std::size_t line, const Fields& fields, std::size_t wanted) {
+    const std::size_t place = places_[wanted].column;
+    const auto column = [&] {
+      return headers_.empty() ? std::to_string(place + 1) : "'" + name(wanted) + "'";
+    };
     if (place >= fields.size()) {
       throw LogError(at(line) + "only " + std::to_string(fields.size()) + " fields, none for " +
-                     column);
+                     column());
     }
-    if (const auto number = parse(fields[place])) return *number;
-    throw LogError(at(line) + "'" + std::string(fields[place]) + "' in column " + column +
-                   " is not a number");
+    std::string_view field = fields[place];
+    const char* wrong = nullptr;
+    if (labelled_) {
+      const auto label = label_of(field);
+      if (label != headers_[0][place] && !parse_stamp(field))
+        wrong = "does not have the label of the first row";
+      if (!label.empty()) field.remove_prefix(label.size() + 1);
+    }
+    double found = 0;
+    if (stamps_ == wanted) {
+      if (const auto number = parse<long double>(field, separator_)) {
+        found =
+            std::isfinite(*number) ? reader_.number(*number, wrong) : static_cast<double>(*number);
+      } else if (const auto stamp = parse_stamp(field)) {
+        found = reader_.stamp(*stamp, wrong);
+      } else {
+        wrong = "is neither a number nor a time like 2024-03-01T12:00:00.01 or 12:00:00.01";
+      }
+    } else if (const auto number = parse(field, separator_)) {
+      found = *number;
+    } else {
+      wrong = "is not a number";
+    }
+    if (wrong != nullptr) {
+      throw LogError(at(line) + "'" + std::string(fields[place]) + "' in column " + column() + " " +
+                     wrong);
+    }
+    check_commas(line, field);
+    return found;
+  }
+
+  /// 1,234 is 1.234 or 1234: that others have a decimal point decides for neither.
+  void check_commas(std::size_t line, std::string_view field) {
+    const bool comma = field.find(',') != std::string_view::npos;
+    if (!comma && (field.find('.') == std::string_view::npos)) return;
+    if (field.find(':') != std::string_view::npos) return;
+    (comma ? comma_line_ : point_line_) = line;
+    if (comma_line_ == 0 || point_line_ == 0) return;
+    throw LogError(at(line) + "'" + std::string(field) + "' has a decimal " +
+                   (comma ? "comma" : "point") + ", the numbers before (line " +
+                   std::to_string(comma ? point_line_ : comma_line_) + ") have a " +
+                   (comma ? "point" : "comma"));
   }
 
   std::filesystem::path file_;
   char separator_;
-  std::size_t count_ = 0;
-  bool cut_ = false;
-  std::vector<std::string> header_;
-  std::vector<std::size_t> places_;
+  std::optional<std::size_t> stamps_;
+  std::size_t count_ = 0, header_line_ = 0, comma_line_ = 0, point_line_ = 0;
+  bool cut_ = false, labelled_ = false;
+  std::vector<std::vector<std::string>> headers_;
+  std::vector<Place> places_;
   std::vector<std::vector<double>> columns_;
   std::vector<std::size_t> lines_;
+  StampReader reader_;
 };
 
 /// Refuses times that do not rise.

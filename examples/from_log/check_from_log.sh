@@ -247,6 +247,17 @@ servo quantum=0.5 >rows.txt
 written t,y,u , t >coarse.csv
 sounds quantised coarse.csv
 
+# An angle that begins anew after a turn: named, made continuous, and confirmed.
+servo >rows.txt
+for turn in 6.283185307 360; do
+  awk -v turn="$turn" '{ y = $2 * turn * 0.35; y -= turn * int(y / turn); if (y < 0) y += turn
+    print $1 "," y "," $3 }' rows.txt | { echo t,y,u; cat; } >wrapped.csv
+  sounds wrapped wrapped.csv
+  truth=$(awk -v turn="$turn" 'BEGIN { print 50 * turn * 0.35 }')
+  healthy wrapped.csv --wrap "$turn"
+done
+truth=50
+
 # Real machines: most are refused, but nothing is wrong with their units, signs and clocks.
 data=$root/examples/data
 for log in servo_relay_pid/{relay,pid_sine}.csv dfki_simple_pendulum/{ddp,direct_collocation}.csv \
@@ -276,6 +287,12 @@ shows rows short.csv
 servo >rows.txt
 written t,y,u , t 'if (1) $3 = 1;' >constant.csv
 shows u constant.csv
+[[ $said != *arning* && $said == *"never changes"* ]]
+verdict $? "constant.csv: $said"
+written t,y,u , t 'if (1) { x += (u - x) / 100; u = NR > 900 ? 5 : 0; $2 = x; $3 = u }' >single_step.csv
+shows '' single_step.csv
+[[ $said == *"u (u, 0 to 5) moves once only, at 1.8 s"* ]]
+verdict $? "single_step.csv: $said"
 # A u that is not this machine's.
 written t,y,u , t '$3 = sin(NR * NR);' >foreign.csv
 shows '' foreign.csv
@@ -347,6 +364,56 @@ reads gaps.csv
 { echo t,y,u; table , | awk -F, 'NR % 7 != 3'; } >irregular.csv
 reads irregular.csv
 
+# ---- files as other people's loggers write them ----
+
+# The same log two seconds before midnight: $1 is an awk expression of d, the days since then, and c,
+# the second of the day; $2 of the whole row, of that stamp, $2 and $3.
+stamped() {
+  table , | awk -F, "function clock() { return sprintf(\"%02d:%02d:%06.3f\", c / 3600, c % 3600 / 60, c % 60) }
+    { s = 86398 + \$1; d = int(s / 86400); c = s - 86400 * d; stamp = $1; print ${2:-stamp \",\" \$2 \",\" \$3} }"
+}
+{ echo ,timestamp,y,u; stamped 'sprintf("2024-02-%d", 28 + d) "T" clock() "Z"' \
+  'NR - 1 "," stamp "," $2 "," $3'; } >index_and_iso.csv
+reads index_and_iso.csv
+{ echo time,y,u; stamped 'sprintf("2023-%s", d ? "03-01" : "02-28") " " clock() "+01:00"'; } >leap_day.csv
+reads leap_day.csv
+stamped 'clock() " -> "' 'stamp $2 "," $3' >serial_monitor.txt
+reads serial_monitor.txt --time 1 --y 2 --u 3
+{ echo time,y,u; stamped 'sprintf("03/04/2024 %02d:%s %s", 11, substr(sprintf("%02d:%06.3f", (c + 2) % 86400 / 60, (c + 2) % 60), 1), "PM")'; } >american.csv
+reads american.csv
+{ printf 'Messung vom 29.2.2024;;\nZeitstempel;Winkel;Stellgr\xf6\xdfe\n;rad;Nm\n'
+  stamped 'sprintf("%02d.%s.2024 ", d ? 1 : 29, d ? "03" : "02") clock()' 'stamp ";" $2 ";" $3' |
+    awk -F';' -v OFS=';' '{ sub(/\./, ",", $2); sub(/\./, ",", $3) } 1'; } >german.csv
+reads german.csv
+iconv -f LATIN1 -t UTF-16LE german.csv | { printf '\xff\xfe'; cat; } >little.csv
+reads little.csv
+iconv -f LATIN1 -t UTF-16BE german.csv | { printf '\xfe\xff'; cat; } | tr '\n' '\r' >big.csv
+reads big.csv
+table , | awk -F, '{ print "ms:" 1000 * $1 " u:" $3 " y:" $2 }' >labels.txt
+reads labels.txt --time ms
+{ printf 'Trace;PLC_1;Motor\nTime;MAIN.Angle;MAIN.Torque\nms;rad;Nm\n'
+  table ';' | awk -F';' -v OFS=';' '{ $1 *= 1000 } 1'; } >plc.csv
+reads plc.csv
+{ printf 'Model,M4\nSample Interval,0.01\n,\nLabels,CH1,CH2\nTIME,CH1,CH2\n'; table ,; } >scope.csv
+reads scope.csv --y CH1 --u CH2
+{ printf 'Writer_Version\t2\nDate\t2024/03/01\nX0\t0,0\t0,0\n***End***\t\t\nX_Value\tPosition\tTorque\tComment\n'
+  table '\t' | tr . ,; } >labview.lvm
+reads labview.lvm --time X_Value
+{ printf '#datatype,string,long\n,result,table,_time,position,torque\n'
+  table , | awk -F, '{ printf ",,0,%d%09d,%s,%s\n", 1700000000 + int($1), ($1 - int($1)) * 1e9 + 0.5, $2, $3 }'
+} >influx.csv
+reads influx.csv
+{ printf 't/ms;y/rad;u/Nm\n'; table ';' | awk -F';' -v OFS=';' '{ $1 *= 1000 } 1'; } >din.csv
+reads din.csv
+{ echo 'Zeit [min],Lage,Kraft'; table , | awk -F, -v OFS=, '{ $1 = sprintf("%.12g", $1 / 60) } 1'; } >minutes.csv
+reads minutes.csv
+{ echo time,header.stamp,y,y_filtered,u; table , | awk -F, '{ print $1 ",9," $2 ",9," $3 }'; } >whole_names.csv
+reads whole_names.csv
+table ' ' | tr . , >commas_and_blanks.txt
+reads commas_and_blanks.txt --time 1 --y 2 --u 3
+{ echo t,y_rad,y_raw,u_Nm; table , | awk -F, '{ print $1 "," $2 ",9," $3 }'; } >begins.csv
+reads begins.csv --y y_rad --u u_
+
 # A name of nothing but dots is no folder and no hidden file.
 for dots in ..csv ...csv; do
   cp plain.csv "$dots"
@@ -372,6 +439,39 @@ sed '9s/^[^,]*/0.06/' plain.csv >still.csv
 refuses "still.csv, line 9: time stands still in column t" still.csv
 sed '9s/^[^,]*//' plain.csv >timeless.csv
 refuses "timeless.csv, line 9: the time is missing in column t" timeless.csv
+stamped '"2024-02-28 " clock()' >one_day.csv  # the clock passes midnight, the date does not
+refuses "one_day.csv, line 201: time runs backwards in column 1" one_day.csv --time 1 --y 2 --u 3
+stamped 'sprintf("%02d/04/2024 ", 3 + d) clock()' >either.csv
+refuses "line 201: '04/04/2024 00:00:00.000' in column 1 may be day/month or month/day" either.csv \
+  --time 1 --y 2 --u 3
+stamped 'substr(clock(), 1, 5)' >hours.csv
+refuses "line 1: '23:59' in column 1 may be hours:minutes or minutes:seconds" hours.csv \
+  --time 1 --y 2 --u 3
+sed '9s/^[^,]*/2024-03-01 12:00:00/' plain.csv >other_stamp.csv
+refuses "line 9: '2024-03-01 12:00:00' in column 't' is not written as the stamps before" other_stamp.csv
+sed '9s/^[^,]*/noon/' plain.csv >noon.csv
+refuses "line 9: 'noon' in column 't' is neither a number nor a time" noon.csv
+{ echo t y u; table ' ' | awk '{ print NR, $0 }'; } >row_names.txt
+refuses "row_names.txt, line 2: it has 4 fields, but line 1 has 3 names" row_names.txt
+{ echo t,y,u; table ';' | tr .\; ,,; } >all_commas.csv
+refuses "fields, but line 1 has 3 names; with decimal commas the separator must be another" all_commas.csv
+{ echo 't;y;u'; table ';' | sed '9s/\./,/2'; } >mixed.csv
+refuses "line 10: '0,0128' has a decimal comma, the numbers before (line 10) have a point" mixed.csv
+refuses "'y' is y_rad and y_raw, columns 2 and 3" begins.csv --y y
+{ echo t,y,y,u; table , | sed 's/,/,9,/'; } >twice.csv
+refuses "'y' is y and y, columns 2 and 3" twice.csv --y y
+sed '5s/u:/y:/' labels.txt >swapped.txt
+refuses "line 5: 'y:0.5' in column 'u' does not have the label of the first row" swapped.txt --time ms
+tail -c +3 little.csv >no_mark.csv
+refuses "no_mark.csv, line 1: it has a zero byte" no_mark.csv
+sed '2s/.*/0.00,about 2,1/' plain.csv >first_word.csv
+refuses "first_word.csv, line 2: 'about 2' in column 2 is not a number" first_word.csv
+sed '2s/.*/0.00,1/' plain.csv >first_short.csv
+refuses "first_short.csv, line 2: it has 2 fields, the lines below have 3" first_short.csv
+echo '(17.5) can0 123#0E4C' >candump.log
+refuses "candump.log: no line with numbers; line 1 is '(17.5) can0" candump.log
+refuses "--wrap: must not be negative" plain.csv --wrap -360
+refuses "--wrap: y (y) covers" plain.csv "${settings[@]}" --wrap 1
 sed '402s/^4.00/9999/' plain.csv >leap.csv
 refuses "is too short or too long for the nominal sample time" leap.csv "${settings[@]}"
 echo t,y,u >empty.csv

@@ -16,8 +16,6 @@
 #include <string>
 #include <vector>
 
-#include <esokit/core/error_text.hpp>
-
 #include "common/measured_data.hpp"
 #include "common/report.hpp"
 #include "from_log/parts/measured_sets.hpp"
@@ -39,8 +37,10 @@ columns, by their name, by its end (position of /joint1/position) or beginning, 
                       effort, pwm; y, position, angle, ..)
   --known COLUMN      a known effect that acts where the disturbance acts, e.g. the sine of the
                       angle for gravity; may be repeated
-  --time-unit UNIT    s, ms, us, ns (default: detected)
+  --time-unit UNIT    h, min, s, ms, us, ns (default: detected)
   --sample-time S     seconds between rows, if there is no time column
+  --wrap TURN         y is an angle that begins anew after a turn (360, 6.283185, 4096); 0: it does
+                      not (default: detected, with an alarm)
   --separator C       one character, or the word tab (default: detected)
 the machine:
   --order N           integrations from u to y, 1 to 3 (default: 1 for a speed, a temperature or a
@@ -117,6 +117,11 @@ Settings read_arguments(int argc, char** argv) {
       {"known", [&](const auto& text) { s.known.push_back(text); }},
       {"time-unit", [&](const auto& text) { s.time_unit = text; }},
       {"sample-time", [&](const auto& text) { s.sample_time = positive("sample-time", text); }},
+      {"wrap",
+       [&](const auto& text) {
+         s.wrap = number("wrap", text);
+         if (*s.wrap < 0) throw LogError("--wrap: must not be negative");
+       }},
       {"separator",
        [&](const auto& text) {
          const std::string one = text == "tab" || text == "\\t" ? "\t" : text;
@@ -269,8 +274,16 @@ int main(int argc, char** argv) {
     const Outcome outcome = work_out(settings);
     for (const Alarm& alarm : outcome.findings.alarms)
       std::fprintf(stderr, "ALARM %s: %s\n", alarm.name.c_str(), alarm.text.c_str());
-    if (outcome.findings.refusal) {
-      std::fprintf(stderr, "refused: %s\n", esokit::to_text(*outcome.findings.refusal).c_str());
+    const char* mark = "refused: ";
+    for (const auto& line : why_refused(outcome.findings)) {
+      std::fprintf(stderr, "%s%s\n", mark, line.c_str());
+      mark = "  ";
+    }
+    if (outcome.input.unit_assumed && outcome.findings.rows.sample_time > 0.5) {
+      std::printf(
+          "Nothing says in which unit %s is: it was read in seconds. If it is in another "
+          "one, set --time-unit.\n",
+          outcome.input.time.c_str());
     }
     for (const auto& line : in_short(outcome.findings, outcome.design))
       std::printf("%s\n", line.c_str());

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -20,16 +21,25 @@ void require(bool holds, const char* text) {
   std::abort();
 }
 
-void read_as_log(std::string_view text, char separator) {
+void read_as_log(std::string_view text, char separator, bool stamps) {
   static const int file = memfd_create("log", 0);
   static const std::string path = "/proc/self/fd/" + std::to_string(file);
   require(ftruncate(file, 0) == 0, "ftruncate");
   require(pwrite(file, text.data(), text.size(), 0) == static_cast<ssize_t>(text.size()), "pwrite");
   try {
-    const esokit::examples::LogFile log(path, {"1", "y"}, separator);
+    const esokit::examples::LogFile log(
+        path, {"1", "y"}, separator,
+        stamps ? std::optional<std::size_t>(0) : std::optional<std::size_t>());
     require(log.rows() > 0, "a log without rows");
     require(log.column(0).size() == log.rows() && log.column(1).size() == log.rows(), "columns");
     for (std::size_t i = 1; i < log.rows(); ++i) require(log.line(i) > log.line(i - 1), "lines");
+    // Stamps begin at zero, whatever they are.
+    for (std::size_t i = 0; stamps && i < log.rows(); ++i) {
+      const double first = log.column(0)[i];
+      if (std::isnan(first)) continue;
+      require(!(first > 0) && !(first < 0), "the first stamp is not zero");
+      break;
+    }
     esokit::examples::check_time(log, log.column(0));
     const double step = esokit::examples::median_step(log.column(0));
     require(step > 0, "times that rise have a positive step");
@@ -42,6 +52,8 @@ void read_as_log(std::string_view text, char separator) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text(reinterpret_cast<const char*>(data), size);
-  for (const char separator : {'\0', ' '}) read_as_log(text, separator);
+  read_as_log(text, '\0', false);
+  read_as_log(text, '\0', true);
+  read_as_log(text, ' ', true);
   return 0;
 }

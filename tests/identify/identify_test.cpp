@@ -1015,6 +1015,24 @@ TEST(PrepareLog, TellsOutliersFromMotion) {
   EXPECT_NEAR(more->data.y[251], log.y[252], 0.1);
 }
 
+// So many that they are a large share of what is unusual; on either side, and three are motion.
+TEST(PrepareLog, FindsManyOutliers) {
+  const Log good = closed_loop(1, 3, 3000);
+  Log log = good;
+  for (std::size_t k = 20; k + 40 < log.y.size(); k += 40) {
+    log.y[k] += 50;
+    log.y[k + 20] -= 50;
+    log.y[k + 21] += k % 80 == 20 ? 40 : -60;
+  }
+  const auto prepared = esokit::prepare(log);
+  EXPECT_EQ(prepared->report.outliers, 3 * ((3000 - 60 + 39) / 40));
+  for (std::size_t k = 0; k < log.y.size(); ++k)
+    ASSERT_NEAR(prepared->data.y[k], good.y[k], 0.2) << k;
+  Log moved = good;
+  for (std::size_t k = 500; k < 503; ++k) moved.y[k] += 50;
+  EXPECT_EQ(esokit::prepare(moved)->report.outliers, 0u);
+}
+
 // An encoder's step is found, also written with few digits; noise has none.
 TEST(PrepareLog, TellsQuantisationFromNoise) {
   Log log = closed_loop(1, 3, 1000);

@@ -1,6 +1,8 @@
 #include "study.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <utility>
 
 namespace esokit::examples::compiled {
 
@@ -20,12 +22,11 @@ Fit minimised(const FitData& data, const FitModel& model, const FitBounds& bound
   return fit.minimise(start, false);
 }
 
-std::vector<double> residual_of(const Identified& found, const FitData& rows, double& sample_time) {
+Residual residual_of(const Identified& found, const FitData& rows) {
   const auto& chosen =
       *std::find_if(found.orders.begin(), found.orders.end(),
                     [&](const OrderFit& order) { return order.model.order == found.order; });
   FitData data = averaged(excerpt(rows, 60000), found.averaged);
-  sample_time = data.sample_time;
   if (found.position) esokit::detail::add_position(data);
   if (chosen.friction_scale > 0.0) {
     const auto speed =
@@ -34,7 +35,16 @@ std::vector<double> residual_of(const Identified& found, const FitData& rows, do
   }
   InnovationsFit fit(data, chosen.model, chosen.bounds);
   (void)fit.at(chosen.fit.at);
-  return fit.residual();
+  std::vector<double> values = fit.residual();
+  return {std::move(data), std::move(values)};
+}
+
+std::optional<double> line_of(const Residual& residual) {
+  const auto line = esokit::detail::highest_line(residual.rows, residual.values);
+  const double rows = static_cast<double>(residual.values.size());
+  // White noise exceeds h times its mean at one frequency with probability exp(-h).
+  if (!(line.height > 2.0 * std::log(rows))) return std::nullopt;
+  return line.frequency;
 }
 
 }  // namespace esokit::examples::compiled

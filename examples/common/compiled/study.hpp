@@ -3,6 +3,7 @@
 /// of compile in each otherwise.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include <esokit/identify/identify.hpp>
@@ -24,9 +25,15 @@ namespace esokit::examples::compiled {
 [[nodiscard]] Fit minimised(const FitData& data, const FitModel& model, const FitBounds& bounds,
                             const FitPoint& start);
 
-/// Innovations of the fit that was chosen, over the rows that it was fitted to, which are
-/// `sample_time` apart.
-[[nodiscard]] std::vector<double> residual_of(const Identified& found, const FitData& rows,
-                                              double& sample_time);
+/// Innovations of the fit that was chosen.
+struct Residual {
+  FitData rows{};                ///< that it was fitted to
+  std::vector<double> values{};  ///< one a row
+};
+[[nodiscard]] Residual residual_of(const Identified& found, const FitData& rows);
+
+/// What of them is periodic: the line of their spectrum that is highest above its neighbourhood, if
+/// it is higher than that of white noise is in all but one of as many logs as there are rows.
+[[nodiscard]] std::optional<double> line_of(const Residual& residual);
 
 }  // namespace esokit::examples::compiled

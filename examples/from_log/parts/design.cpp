@@ -281,7 +281,19 @@ Design Design::make(const Settings& settings, const Input&, const Findings& find
   wish.settling_time = settings.settling_time;
   wish.controller_bandwidth = settings.controller;
   if (settings.noise_share > 0.0) wish.control_noise = settings.noise_share * range;
-  const auto tuning = compiled::tune(model, wish, settings.rules);
+  auto tuning = compiled::tune(model, wish, settings.rules);
+  // A machine that settles sooner by itself need not be held back.
+  std::string sooner;
+  if (!tuning && std::string_view(tuning.error().field) == "settling_time" &&
+      wish.settling_time > tuning.error().limit) {
+    sooner = "A settling time of " + number_text(wish.settling_time, 3) +
+             " s is longer than this machine takes by itself, " +
+             number_text(tuning.error().limit, 3) +
+             " s, and no feedback is needed for it: so the design is that without a wish. To move "
+             "more slowly, let the reference move slowly.";
+    wish.settling_time = 0.0;
+    tuning = compiled::tune(model, wish, settings.rules);
+  }
   if (!tuning) {
     const auto& error = tuning.error();
     design.why_not_ = esokit::to_text(error);
@@ -304,10 +316,12 @@ Design Design::make(const Settings& settings, const Input&, const Findings& find
         rank > 0 ? "There is no design of rank " + std::to_string(settings.rank) +
                        " that keeps the rules."
         : tuning->designs.front().feasible
-            ? "No design is recommended: none comes back from an overload, see the figure. "
-              "Relax the requirement: --noise, --settling, --omega-c."
-            : "No family keeps the rules; the table says which rule each one misses. Relax the "
-              "requirement: --noise, --settling, --omega-c.";
+            ? "No design is recommended: none comes back from an overload, the first not from " +
+                  tuning->designs.front().lost +
+                  ". Relax the requirement: --noise, --settling, --omega-c."
+            : "No family keeps the rules; the nearest, " + tuning->designs.front().name +
+                  ", misses: " + tuning->designs.front().constraint +
+                  ". Relax the requirement: --noise, --settling, --omega-c.";
     return design;
   }
   design.taken_ = rank;
@@ -362,6 +376,12 @@ Design Design::make(const Settings& settings, const Input&, const Findings& find
         "the observer 5 to 10 times as fast. The loop has all these poles, whichever part they "
         "belong to; a faster observer would pass more noise to u, and a slower law would give way "
         "to loads.");
+  }
+  if (!sooner.empty()) design.summary_.push_back(sooner);
+  if (wish.settling_time > 0.0) {
+    design.summary_.push_back("A step that is so small that u stays within its limits settles in " +
+                              number_text(taken.settling_time, 3) + " s; asked for were " +
+                              number_text(wish.settling_time, 3) + " s.");
   }
   if (!settings.limits) {
     design.summary_.push_back("The limits of u are those that the log shows, " +

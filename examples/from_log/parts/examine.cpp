@@ -4,7 +4,10 @@
 #include <cstdio>
 #include <esokit/identify/spectrum.hpp>
 #include <numbers>
+#include <optional>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "common/compiled/study.hpp"
 #include "from_log/parts/from_log.hpp"
@@ -132,6 +135,108 @@ void sound_alarms(const Settings& settings, const Input& input, Findings& all) {
   }
 }
 
+/// How often u moves: a move ends a fifth of its range away from where the one before ended.
+void say_moves(const Input& input, Findings& all) {
+  const auto& rows = all.rows;
+  const auto [low, high] = std::minmax_element(rows.u.begin(), rows.u.end());
+  if (!(*high > *low)) return;
+  const double step = 0.2 * (*high - *low);
+  std::vector<double> at;
+  double from = rows.u[0];
+  std::size_t gradual = 0;
+  for (std::size_t k = 1; k < rows.u.size(); ++k) {
+    if (std::abs(rows.u[k] - from) < step) continue;
+    from = rows.u[k];
+    if (std::abs(rows.u[k] - rows.u[k - 1]) < 0.5 * step) ++gradual;
+    at.push_back(static_cast<double>(k) * rows.sample_time);
+  }
+  const std::string range = number_text(*low, 4) + " to " + number_text(*high, 4);
+  if (at.size() <= 3) {
+    std::string text = "u (" + input.u + ", " + range + ") moves ";
+    text += at.size() == 1 ? "once only, " : "only " + std::to_string(at.size()) + " times, first ";
+    all.shown.push_back(text + "at " + duration_text(at.empty() ? 0.0 : at[0]) +
+                        ": what follows from u cannot be told from a drift that begins at about "
+                        "that time.");
+    return;
+  }
+  // Moves in succession are one ramp; what is between the others is how long u stays.
+  std::vector<double> stays;
+  for (std::size_t i = 1; i < at.size(); ++i) stays.push_back(at[i] - at[i - 1]);
+  const double stay = esokit::detail::median(stays);
+  all.shown.push_back("u (" + input.u + ") moves " + std::to_string(at.size()) +
+                      " times by a fifth of its range, " + range + ", or more, every " +
+                      duration_text(stay) + " (median)" +
+                      (2 * gradual > at.size()
+                           ? ", " + std::to_string(gradual) +
+                                 " of them gradually, which tells b0 less than steps do."
+                           : "."));
+  if (all.seen && all.found.latency.value > stay) {
+    all.shown.push_back("Lag and dead time, " + duration_text(all.found.latency.value) +
+                        ", are longer than that: u moves on before y has answered.");
+  }
+}
+
+/// What is left when the model has explained what it can.
+void say_residual(const compiled::Residual& residual, Findings& all) {
+  const auto& e = residual.values;
+  const double T = residual.rows.sample_time, rows = static_cast<double>(e.size());
+  if (e.size() < 100) return;
+  // A few rows that no machine of this kind makes.
+  std::vector<double> sizes;
+  double square = 0.0;
+  for (const double value : e) sizes.push_back(std::abs(value)), square += value * value;
+  const double usual = esokit::detail::median(sizes) / 0.6745;
+  double held = 0.0, first = 0.0;
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < e.size(); ++k) {
+    if (sizes[k] < std::max(10 * usual, 1e-300)) continue;
+    held += e[k] * e[k];
+    if (count++ == 0) first = static_cast<double>(k) * T;
+  }
+  if (count > 0 && held > 0.5 * square && static_cast<double>(count) < 0.02 * rows) {
+    all.shown.push_back(std::to_string(count) + (count == 1 ? " row has " : " rows have ") +
+                        number_text(100 * held / square, 2) +
+                        " % of the squares of the residual, the first at " + duration_text(first) +
+                        ": y there does not follow from u. A value that came late or was wrong, a "
+                        "stop, or a machine of higher order?");
+    return;
+  }
+  if (const auto line = compiled::line_of(residual)) {
+    const double hertz = *line / (2 * std::numbers::pi);
+    all.shown.push_back("The residual has a peak at " + number_text(hertz, 3) +
+                        " Hz: something oscillates, or turns, at that frequency.");
+  }
+  const auto& w = all.residual.frequency;
+  const auto& density = all.residual.density;
+  if (w.size() >= 16) {
+    const double middle = esokit::detail::median(density);
+    const std::size_t part = w.size() / 16;
+    double slow = 0.0, fast = 0.0;
+    for (std::size_t i = 0; i < part; ++i) {
+      slow += density[i] / static_cast<double>(part);
+      fast += density[density.size() - 1 - i] / static_cast<double>(part);
+    }
+    if (slow > 8 * middle) {
+      all.shown.push_back("The residual is slow (most of it below " +
+                          number_text(w[part] / (2 * std::numbers::pi), 2) +
+                          " Hz): a drift, friction or another load moves y.");
+    } else if (fast > 8 * middle) {
+      all.shown.push_back("The residual is fast (most of it above " +
+                          number_text(w[w.size() - 1 - part] / (2 * std::numbers::pi), 2) +
+                          " Hz): noise of y, or a step of its resolution.");
+    }
+  }
+  if (all.residual_correlation[0] < -0.3) {
+    all.shown.push_back("The residual changes its sign from row to row (correlation " +
+                        number_text(all.residual_correlation[0], 2) +
+                        "), as of a speed from counts.");
+  }
+  if (rows < 600) {
+    all.shown.push_back("The log is short: " + std::to_string(e.size()) + " rows, " +
+                        duration_text(rows * T) + ".");
+  }
+}
+
 }  // namespace
 
 Findings examine(const Settings& settings, const Input& input) {
@@ -162,6 +267,7 @@ Findings examine(const Settings& settings, const Input& input) {
   const auto found = compiled::study(input.log, options);
   if (!found) {
     all.refusal = found.error();
+    say_moves(input, all);
     sound_alarms(settings, input, all);
     return all;
   }
@@ -169,17 +275,19 @@ Findings examine(const Settings& settings, const Input& input) {
   all.seen = true;
   if (const auto verdict = esokit::judge(*found, input.log, options); !verdict)
     all.refusal = verdict.error();
-  double T = 0.0;
-  const auto residual = compiled::residual_of(*found, all.rows, T);
+  const auto residual = compiled::residual_of(*found, all.rows);
+  const auto& e = residual.values;
   double square = 0.0;
-  for (const double e : residual) square += e * e;
-  for (std::size_t lag = 1; lag <= 40 && lag < residual.size(); ++lag) {
+  for (const double value : e) square += value * value;
+  for (std::size_t lag = 1; lag <= 40 && lag < e.size(); ++lag) {
     double sum = 0.0;
-    for (std::size_t k = lag; k < residual.size(); ++k) sum += residual[k] * residual[k - lag];
+    for (std::size_t k = lag; k < e.size(); ++k) sum += e[k] * e[k - lag];
     all.residual_correlation.push_back(sum / square);
   }
-  all.correlation_band = 1.96 / std::sqrt(static_cast<double>(residual.size()));
-  all.residual = spectrum(residual, T);
+  all.correlation_band = 1.96 / std::sqrt(static_cast<double>(e.size()));
+  all.residual = spectrum(e, residual.rows.sample_time);
+  say_moves(input, all);
+  say_residual(residual, all);
   sound_alarms(settings, input, all);
   return all;
 }

@@ -33,9 +33,10 @@ struct Settings {
   std::string file;
   std::string time, u, y;          ///< columns; empty: found by their names
   std::vector<std::string> known;  ///< columns of what else acts where the disturbance acts
-  std::string time_unit;           ///< s, ms, us or ns; empty: found out
+  std::string time_unit;           ///< h, min, s, ms, us or ns; empty: found out
   double sample_time = 0;          ///< s, where there is no time
   char separator = 0;              ///< 0: found out
+  std::optional<double> wrap;      ///< y begins anew after so much; 0: it does not; none: found out
   std::vector<int> orders{};  ///< empty: 1 for a speed, a temperature or a level, else found out
   std::optional<double> expected_gain;  ///< b0 as the user believes it to be
   std::optional<std::pair<double, double>> limits;
@@ -67,6 +68,7 @@ struct Input {
   std::vector<std::size_t> line;  ///< of the file, for each row
   bool merged = false;            ///< topics with stamps of their own were brought together
   bool cut = false;               ///< the last line was cut
+  double turn = 0;                ///< after which y began anew, before it was made continuous
   bool first_order = false;       ///< y is a speed, a temperature or a level by its name
   std::vector<Alarm> alarms;
 };
@@ -89,6 +91,7 @@ struct Findings {
   Spectrum u, y, residual;
   std::vector<double> residual_correlation;  ///< lags 1, 2, ..
   double correlation_band = 0;               ///< white ones stay within this, 95 %
+  std::vector<std::string> shown;            ///< what u, y and the residual show, in sentences
   std::vector<Alarm> alarms;
 };
 
@@ -97,7 +100,7 @@ struct Findings {
 
 /// The unit for a time of this size: units in a second, and its name.
 inline std::pair<double, const char*> unit_of(double seconds) {
-  if (seconds < 1) return {1e3, "ms"};
+  if (seconds < 0.9995) return {1e3, "ms"};
   return {1, "s"};
 }
 

@@ -5,6 +5,8 @@
 #include <iterator>
 #include <limits>
 #include <map>
+#include <numbers>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,10 +24,26 @@ std::string lower(std::string text) {
   return text;
 }
 
-/// Words of the last part of a name: /joint1/effort_Nm -> effort, nm.
-std::vector<std::string> words(const std::string& name) {
-  const auto slash = name.find_last_of("/.");
-  std::string text = lower(slash == std::string::npos ? name : name.substr(slash + 1));
+/// Seconds of a unit of time, 0 of any other word.
+double seconds_of(const std::string& unit) {
+  static const std::map<std::string, double> all = {
+      {"s", 1},         {"sec", 1},          {"secs", 1},         {"second", 1},
+      {"seconds", 1},   {"ms", 1e-3},        {"msec", 1e-3},      {"millis", 1e-3},
+      {"us", 1e-6},     {"\xc2\xb5s", 1e-6}, {"\xce\xbcs", 1e-6}, {"usec", 1e-6},
+      {"micros", 1e-6}, {"ns", 1e-9},        {"nsec", 1e-9},      {"min", 60},
+      {"h", 3600}};
+  const auto at = all.find(unit);
+  return at == all.end() ? 0.0 : at->second;
+}
+
+std::string unit_name(double seconds) {
+  for (const char* unit : {"h", "min", "s", "ms", "us"}) {
+    if (seconds > 0.5 * seconds_of(unit)) return unit;
+  }
+  return "ns";
+}
+
+std::vector<std::string> split_words(const std::string& text) {
   std::vector<std::string> all(1);
   for (const char c : text) {
     if (std::isalnum(static_cast<unsigned char>(c)) != 0 || static_cast<unsigned char>(c) > 127) {
@@ -38,54 +56,117 @@ std::vector<std::string> words(const std::string& name) {
   return all;
 }
 
-/// The only column whose first word is in the list.
-std::string guess(const LogFile& file, const char* option, const std::string& given,
-                  const std::vector<std::string>& known) {
+/// The words of a name, and its unit where it is told: /joint1/effort_Nm -> effort, nm; t/ms and
+/// t [ms] -> t, ms.
+std::vector<std::string> words(const std::string& name) {
+  std::string text = lower(name);
+  // A stroke is before a unit or between the parts of a topic.
+  const auto stroke = text.rfind('/');
+  if (stroke != std::string::npos && stroke > 0 && text.find('/') == stroke) {
+    constexpr std::string_view units[] = {"s",
+                                          "ms",
+                                          "us",
+                                          "\xc2\xb5s",
+                                          "ns",
+                                          "min",
+                                          "h",
+                                          "v",
+                                          "a",
+                                          "nm",
+                                          "n",
+                                          "w",
+                                          "%",
+                                          "rad",
+                                          "deg",
+                                          "\xc2\xb0",
+                                          "rpm",
+                                          "m",
+                                          "mm",
+                                          "k",
+                                          "\xc2\xb0"
+                                          "c",
+                                          "bar"};
+    if (std::ranges::find(units, text.substr(stroke + 1)) != std::end(units)) text[stroke] = ' ';
+  }
+  const auto bracket = text.find_first_of("[(");
+  const auto part = text.find_last_of("/.", bracket == std::string::npos ? text.size() : bracket);
+  return split_words(part == std::string::npos ? text : text.substr(part + 1));
+}
+
+/// What a column is by the first word of its name.
+struct Usual {
+  const char* words;  ///< between blanks
+  char column;        ///< t, u or y
+  bool first_order = false;
+};
+constexpr Usual usual_names[] = {
+    {" t time stamp timestamp datetime times secs seconds clock ticks millis micros ", 't'},
+    {" zeit uhrzeit zeitstempel temps heure horodatage tiempo hora tempo ", 't'},
+    {" u input torque effort command cmd pwm voltage volts current force duty drive actuator "
+     "control "
+     "tau power heater q1 ",
+     'u'},
+    {" spannung strom drehmoment moment kraft leistung eingang stellgroesse stellgr\xc3\xb6\xc3\x9f"
+     "e stellwert tension courant couple commande entr\xc3\xa9"
+     "e voltaje tensi\xc3\xb3n corriente par "
+     "entrada tensione corrente coppia ",
+     'u'},
+    {" y output position pos angle theta measurement meas height phi ", 'y'},
+    {" winkel lage weg ausgang messwert sortie posicion posici\xc3\xb3n \xc3\xa1ngulo angulo "
+     "salida "
+     "posizione angolo uscita ",
+     'y'},
+    {" temperature temp speed velocity vel rate level rpm t1 gyro ", 'y', true},
+    {" drehzahl geschwindigkeit temperatur f\xc3\xbcllstand fuellstand pegel vitesse temp\xc3\xa9"
+     "rature niveau velocidad temperatura nivel velocit\xc3\xa0 livello ",
+     'y', true}};
+
+/// What is usual about a name, if anything.
+const Usual* usual(const std::string& name) {
+  const std::string word = " " + words(name).front() + " ";
+  for (const Usual& line : usual_names) {
+    if (word.size() > 2 && std::string_view(line.words).find(word) != std::string_view::npos)
+      return &line;
+  }
+  return nullptr;
+}
+
+/// The only column whose first word is usual for it.
+std::string guess(const LogFile& file, const char* option, const std::string& given) {
   if (!given.empty()) return given;
-  std::vector<std::string> fits;
-  for (const std::string& name : file.header()) {
-    if (std::find(known.begin(), known.end(), words(name).front()) != known.end())
-      fits.push_back(name);
+  std::string there = file.there();
+  for (const auto& names : file.headers()) {
+    std::vector<std::size_t> fits, whole;
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      const Usual* line = usual(names[i]);
+      if (line == nullptr || line->column != option[0]) continue;
+      fits.push_back(i);
+      if (lower(names[i]) == words(names[i]).front()) whole.push_back(i);
+    }
+    // y is y, where there is y_filtered, too.
+    if (whole.size() == 1) fits = whole;
+    if (fits.size() == 1) return names[fits[0]];
+    if (fits.empty()) continue;
+    there.clear();
+    for (const std::size_t i : fits) there += (there.empty() ? "" : ", ") + names[i];
+    break;
   }
-  if (fits.size() == 1) return fits[0];
-  std::string there;
-  for (const std::string& name : fits.empty() ? file.header() : fits) {
-    there += (there.empty() ? "" : ", ") + name;
-  }
-  if (there.empty()) there = "numbers 1 to " + std::to_string(file.columns());
   throw LogError("which column is " + std::string(option) + "? Name it with --" + option +
                  " COLUMN; there are " + there);
 }
 
-/// Seconds of a unit of time.
-double seconds_of(const std::string& unit) {
-  static const std::map<std::string, double> all = {
-      {"s", 1},       {"sec", 1},     {"secs", 1},   {"seconds", 1},
-      {"ms", 1e-3},   {"msec", 1e-3}, {"us", 1e-6},  {"\xc2\xb5s", 1e-6},
-      {"usec", 1e-6}, {"ns", 1e-9},   {"nsec", 1e-9}};
-  const auto at = all.find(unit);
-  return at == all.end() ? 0.0 : at->second;
-}
-
-std::string unit_name(double seconds) {
-  return seconds > 0.5 ? "s" : seconds > 0.5e-3 ? "ms" : seconds > 0.5e-6 ? "us" : "ns";
-}
-
-/// Finds the unit of the stamps: as told, by the column's name, since 1970, or by what a step of a
-/// controller can be. Only the last is a guess, and an alarm.
-double find_unit(const Settings& settings, Input& input, double first, double step) {
+/// Finds the unit of the stamps: as told, by the column's name or the line of units, since 1970, or
+/// by what a step of a controller can be. Only the last is a guess, and an alarm.
+double find_unit(const Settings& settings, Input& input, const std::string& below, double first,
+                 double step) {
   if (!settings.time_unit.empty()) {
     const double unit = seconds_of(settings.time_unit);
     if (unit > 0.0) return unit;
-    throw LogError("--time-unit: '" + settings.time_unit + "' is none of s, ms, us, ns");
+    throw LogError("--time-unit: '" + settings.time_unit + "' is none of h, min, s, ms, us, ns");
   }
-  double named = 0.0;
   const auto parts = words(input.time);
-  if (parts.size() > 1) named = seconds_of(parts.back());
-  if (parts.back() == "millis") named = 1e-3;
-  if (parts.back() == "micros") named = 1e-6;
-  // t/ms: the unit follows the stroke.
-  if (named == 0.0 && input.time.find('/') != std::string::npos) named = seconds_of(parts.back());
+  double named = seconds_of(parts.back());
+  if (named == 0.0) named = seconds_of(split_words(lower(below)).front());
   // Between 1998 and 2049; and a step that a controller can have.
   if (named == 0.0) {
     for (const double unit : {1.0, 1e-3, 1e-6, 1e-9}) {
@@ -161,39 +242,85 @@ void merge(Input& input) {
   input.merged = true;
 }
 
+/// An angle that begins anew after a turn is no motion: made continuous, with an alarm unless the
+/// turn was told.
+void unwrap(const Settings& settings, Input& input) {
+  std::vector<double>& y = input.log.y;
+  if (settings.wrap && !(*settings.wrap > 0.0)) return;
+  double low = std::numeric_limits<double>::infinity(), high = -low, last = std::nan("");
+  std::vector<double> steps;
+  for (const double value : y) {
+    if (!std::isfinite(value)) continue;
+    if (std::isfinite(last)) steps.push_back(value - last);
+    low = std::min(low, value), high = std::max(high, value), last = value;
+  }
+  double turn = settings.wrap.value_or(0.0);
+  if (turn > 0.0 && high - low > 1.0001 * turn) {
+    throw LogError("--wrap: y (" + input.y + ") covers " + number_text(high - low, 4) +
+                   ", more than a turn of " + number_text(turn, 6));
+  }
+  // A turn fits if y nearly covers it, and if what are jumps of nearly a turn are, less the turn,
+  // steps as all others are.
+  for (const double known : {2 * std::numbers::pi, 360.0, 1.0, 400.0, 3600.0, 36000.0, 256.0,
+                             1024.0, 2048.0, 4096.0, 8192.0, 16384.0, 32768.0, 65536.0}) {
+    if (settings.wrap || high - low > 1.0001 * known || high - low < 0.9 * known) continue;
+    double usual = 0.0, behind = 0.0;
+    std::size_t jumps = 0, moving = 0;
+    for (const double step : steps) {
+      if (std::abs(step) > 0.7 * known) {
+        behind = std::max(behind, std::abs(std::abs(step) - known));
+        ++jumps;
+      } else {
+        usual = std::max(usual, std::abs(step));
+        moving += step != 0.0 ? 1 : 0;
+      }
+    }
+    if (jumps > 0 && moving > 10 * jumps && behind <= 1.5 * usual && usual < 0.3 * known)
+      turn = known;
+  }
+  if (!(turn > 0.0)) return;
+  double turns = 0.0;
+  std::size_t jumps = 0, first = 0;
+  last = std::nan("");
+  for (std::size_t k = 0; k < y.size(); ++k) {
+    if (!std::isfinite(y[k])) continue;
+    const double step = std::isfinite(last) ? y[k] - last : 0.0;
+    last = y[k];
+    if (std::abs(step) > 0.5 * turn) {
+      turns += step > 0.0 ? -1.0 : 1.0;
+      if (jumps++ == 0) first = k;
+    }
+    y[k] += turns * turn;
+  }
+  input.turn = turn;
+  if (settings.wrap || jumps == 0) return;
+  input.alarms.push_back(
+      {"wrapped",
+       "y (" + input.y + ") jumps by " + number_text(turn, 6) + " (first at line " +
+           std::to_string(input.line[first]) + ", " + std::to_string(jumps) +
+           (jumps == 1 ? " time" : " times") +
+           " in all), as an angle that begins anew after a turn. It was made "
+           "continuous; the controller needs it so, too (WrappedOutput). Confirm it with "
+           "--wrap " +
+           number_text(turn, 6) + ", or use --wrap 0 if y really jumps."});
+}
+
 }  // namespace
 
 Input read_log(const Settings& settings) {
   const LogFile header(settings.file, settings.separator);
   Input input;
   const bool timed = !(settings.sample_time > 0.0) || !settings.time.empty();
-  std::vector<std::string> wanted = {
-      guess(header, "u", settings.u,
-            {"u",        "input",    "torque",  "effort",  "command",     "cmd",
-             "pwm",      "voltage",  "current", "force",   "duty",        "drive",
-             "actuator", "control",  "tau",     "power",   "heater",      "volts",
-             "q1",       "spannung", "voltaje", "tension", "stellgroesse"}),
-      guess(header, "y", settings.y,
-            {"y",           "output",   "position",    "pos",        "angle",     "theta",
-             "measurement", "meas",     "temperature", "temp",       "speed",     "velocity",
-             "rate",        "level",    "height",      "phi",        "vel",       "t1",
-             "rpm",         "winkel",   "drehzahl",    "temperatur", "velocidad", "temperatura",
-             "vitesse",     "posicion", "niveau"})};
-  if (timed) {
-    wanted.push_back(guess(header, "time", settings.time,
-                           {"t", "time", "stamp", "timestamp", "times", "secs", "seconds", "clock",
-                            "ticks", "millis", "micros", "zeit", "tiempo", "temps"}));
-  }
+  std::vector<std::string> wanted = {guess(header, "u", settings.u),
+                                     guess(header, "y", settings.y)};
+  if (timed) wanted.push_back(guess(header, "time", settings.time));
   wanted.insert(wanted.end(), settings.known.begin(), settings.known.end());
-  const LogFile file(settings.file, wanted, settings.separator);
+  const LogFile file(settings.file, wanted, settings.separator,
+                     timed ? std::optional<std::size_t>(2) : std::nullopt);
   input.u = file.name(0);
   input.y = file.name(1);
-  constexpr std::string_view first_order[] = {"temperature", "temp",       "speed",    "velocity",
-                                              "vel",         "rate",       "level",    "rpm",
-                                              "t1",          "gyro",       "drehzahl", "velocidad",
-                                              "temperatura", "temperatur", "vitesse",  "niveau"};
-  input.first_order =
-      std::ranges::find(first_order, words(input.y).front()) != std::end(first_order);
+  const Usual* kind = usual(input.y);
+  input.first_order = kind != nullptr && kind->first_order;
   input.cut = file.cut();
   input.log.u = file.column(0);
   input.log.y = file.column(1);
@@ -205,36 +332,43 @@ Input read_log(const Settings& settings) {
   if (no_y > 0.999) throw LogError(settings.file + ": there are no numbers in column " + input.y);
   if (!timed) {
     input.log.sample_time = settings.sample_time;
+    unwrap(settings, input);
     return input;
   }
   input.time = file.name(2);
   std::vector<double> stamps = file.column(2);
   const bool merged = no_u > 0.2 || no_y > 0.2;
+  const double origin = file.stamps().origin();
+  const char* since = file.stamps().numbers() ? "" : " s after the first row";
   for (std::size_t i = 0; i < stamps.size(); ++i) {
     const std::string in = " in column " + input.time;
     if (!std::isfinite(stamps[i])) throw LogError(file.where(i) + "the time is missing" + in);
     if (i == 0 || stamps[i] > stamps[i - 1]) continue;
     if (stamps[i] < stamps[i - 1]) {
       throw LogError(file.where(i) + "time runs backwards" + in + ", from " +
-                     number_text(stamps[i - 1], 15) + " to " + number_text(stamps[i], 15) +
+                     number_text(origin + stamps[i - 1], 15) + " to " +
+                     number_text(origin + stamps[i], 15) + since +
                      ": the clock was set, or the file contains two recordings");
     }
     if (!merged) {
       throw LogError(file.where(i) + "time stands still" + in + " at " +
-                     number_text(stamps[i], 15));
+                     number_text(origin + stamps[i], 15) + since);
     }
   }
   std::vector<double> steps;
   for (std::size_t i = 1; i < stamps.size(); ++i) {
     if (stamps[i] > stamps[i - 1]) steps.push_back(stamps[i] - stamps[i - 1]);
   }
-  const double unit =
-      find_unit(settings, input, stamps[0], steps.empty() ? 1.0 : esokit::detail::median(steps));
+  // Dates and times of day are read in seconds.
+  const double unit = file.stamps().numbers()
+                          ? find_unit(settings, input, file.below(2), origin,
+                                      steps.empty() ? 1.0 : esokit::detail::median(steps))
+                          : 1.0;
   input.time_unit = unit_name(unit);
-  const double first = stamps[0];
-  for (double& stamp : stamps) stamp = (stamp - first) * unit;
+  for (double& stamp : stamps) stamp *= unit;
   input.log.time = std::move(stamps);
   if (merged) merge(input);
+  unwrap(settings, input);
   if (input.log.time.size() < 2) throw LogError(settings.file + ": the log has only one sample");
   // A gap is bridged or cut out; one so long is a clock that was set, or two recordings.
   const double T = esokit::examples::median_step(input.log.time);

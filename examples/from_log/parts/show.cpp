@@ -30,16 +30,13 @@ std::string advice(const std::string& field) {
        "reference that steps every few settling times, by as much as the machine may move. The "
        "controller may stay as it is."},
       {"excitation",
-       "Of the motion of y too little follows from u: a slow drift, a load or friction moves it as "
-       "much, u changes in a single step, or the dead time is longer than the moves. Step the "
-       "reference (or u itself) up and down by a tenth of its range, "
-       "ten times or more, with pauses in which the machine settles. Or sweep it slowly up to the "
-       "bandwidth that the controller should have."},
+       "Step u (or the reference) up and down by a tenth of its range or more, ten times or more, "
+       "with pauses in which the machine settles. Or sweep it slowly up to the bandwidth that the "
+       "controller should have."},
       {"correlation",
-       "The machine behaves differently from a chain of integrators with a lag: something "
-       "oscillates, y was filtered, or the logged u is not what the actuator held. Log the applied "
-       "u, y before its filters, and known effects (--known COLUMN). Steps of u that last until y "
-       "settles let output error decide instead."},
+       "Log the u that the actuator held, y before its filters, and known effects (--known "
+       "COLUMN). "
+       "Steps of u that last until y settles let output error decide instead."},
       {"second_opinion",
        "From row to row y follows u by another b0 than over the whole log. Often the order is not "
        "that of the machine (--order), the actuator saturates or is not linear, or u was logged "
@@ -78,8 +75,16 @@ Figure log_figure(const Input& input, const Findings& findings) {
   }
   const auto panel = [&](std::size_t row, const char* name, const std::vector<double>& values,
                          const Spectrum& spectrum, Color color) {
-    figure.panel(row, 0).x_label("t (s)").y_label(name).name(name).line(
+    auto& over_time = figure.panel(row, 0).x_label("t (s)").y_label(name).name(name).line(
         t, values, {.color = color, .width = 1.0, .column = name});
+    // Of a constant gnuplot would choose a range itself, with a warning.
+    const auto first = std::ranges::find_if(values, [](double v) { return std::isfinite(v); });
+    const bool constant = std::ranges::none_of(
+        values, [&](double v) { return std::isfinite(v) && (v < *first || v > *first); });
+    if (constant && first != values.end()) {
+      const double margin = std::max(0.1 * std::abs(*first), 1e-3);
+      over_time.y_range(*first - margin, *first + margin);
+    }
     // Of a constant there is none.
     if (std::ranges::none_of(spectrum.density, [](double d) { return d > 0; })) return;
     figure.panel(row, 1)
@@ -209,6 +214,7 @@ std::vector<CsvRow> log_table(const Input& input, const Findings& findings) {
                       ? "by its name a speed, a temperature or a level, so of order 1; --order "
                         "sets another one"
                       : ""});
+  if (input.turn > 0) rows.push_back({"turn of y", number_text(input.turn, 7), "made continuous"});
   rows.push_back({"u", input.u, "held by the actuator from its row to the next"});
   rows.push_back({"time", input.time.empty() ? "none" : input.time,
                   input.time.empty() ? "equal steps, by --sample-time"
@@ -244,22 +250,31 @@ std::string stem_of(const Settings& settings) {
   return stem.find_first_not_of('.') == std::string::npos ? "log" + stem : stem;
 }
 
+std::vector<std::string> why_refused(const Findings& findings) {
+  if (!findings.refusal) return {};
+  std::vector<std::string> lines{esokit::to_text(*findings.refusal)};
+  lines.insert(lines.end(), findings.shown.begin(), findings.shown.end());
+  if (const auto more = advice(findings.refusal->field); !more.empty()) lines.push_back(more);
+  return lines;
+}
+
 std::vector<std::string> in_short(const Findings& findings, const Design& design) {
   std::vector<std::string> all;
   const esokit::Identified& found = findings.found;
   if (findings.seen) {
-    all.push_back("The machine is of order " + std::to_string(found.order) +
-                  ", b0 = " + number_text(found.input_gain.value, 4) + " ± " +
-                  number_text(found.input_gain.half_width, 2) + ", lag and dead time " +
-                  duration_text(found.latency.value) + "; sampled every " +
-                  duration_text(found.log.sample_time) + ".");
+    all.push_back(
+        (findings.refusal ? "Seen, but not to be relied on: order " : "The machine is of order ") +
+        std::to_string(found.order) + ", b0 = " + number_text(found.input_gain.value, 4) + " ± " +
+        number_text(found.input_gain.half_width, 2) + ", lag and dead time " +
+        duration_text(found.latency.value) + "; sampled every " +
+        duration_text(found.log.sample_time) + ".");
   }
   const esokit::SecondOpinion& second = findings.found.second_opinion;
   if (findings.seen && second.informative()) {
     all.push_back("Output error, which believes u and the model alone, finds b0 = " +
                   with_interval(second.input_gain) + ".");
   }
-  if (findings.seen && findings.found.input_gain.share() > 0.1) {
+  if (findings.seen && !findings.refusal && findings.found.input_gain.share() > 0.1) {
     all.push_back("Warning: b0 is known to " +
                   number_text(100 * findings.found.input_gain.share(), 2) +
                   " % only; a longer log or larger steps tell it better.");
@@ -280,8 +295,7 @@ Page show(const Settings& settings, const Input& input, const Findings& findings
     page.box("Alarm: check this before you use any of the results", lines, true);
   }
   if (findings.refusal) {
-    std::vector<std::string> lines{esokit::to_text(*findings.refusal)};
-    if (const auto more = advice(findings.refusal->field); !more.empty()) lines.push_back(more);
+    std::vector<std::string> lines = why_refused(findings);
     if (findings.seen) lines.push_back("The numbers below are not reliable enough for a design.");
     page.box("Refused: this log cannot be used to design a controller. What to record instead",
              lines, true);

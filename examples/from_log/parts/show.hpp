@@ -11,6 +11,9 @@ namespace from_log {
 /// Name of the page without its ending.
 [[nodiscard]] std::string stem_of(const Settings& settings);
 
+/// Of a refused log: the reason, what u, y and the residual show, and what to record instead.
+[[nodiscard]] std::vector<std::string> why_refused(const Findings& findings);
+
 /// A few sentences: what was found, and what to take.
 [[nodiscard]] std::vector<std::string> in_short(const Findings& findings, const Design& design);
 

@@ -92,6 +92,54 @@ inline double quantisation_step(const std::vector<double>& y) {
   return fits * 10 >= differences.size() * 9 ? step : 0.0;
 }
 
+/// Puts what lies between their neighbours in the place of values, one or two in succession, that
+/// stand far away while their neighbours agree. @return how many
+inline std::size_t mend_outliers(std::vector<double>& y) {
+  const std::size_t count = y.size();
+  if (count < 10) return 0;
+  const auto stand_away = [&](std::size_t k, std::size_t length, double least) {
+    const double before = y[k - 1], after = y[k + length], middle = 0.5 * (before + after);
+    const double jump = std::min(std::abs(y[k] - middle), std::abs(y[k + length - 1] - middle));
+    return jump > least && std::abs(after - before) < 0.2 * jump;
+  };
+  // Distances from the middle of the neighbours, and which of them outliers may have made: these
+  // do not tell what is usual.
+  std::vector<double> distances, usual;
+  for (std::size_t k = 1; k + 1 < count; ++k)
+    distances.push_back(std::abs(y[k] - 0.5 * (y[k - 1] + y[k + 1])));
+  const auto quantile = [](std::vector<double> values, std::size_t percent) {
+    const auto at = values.begin() + static_cast<std::ptrdiff_t>(values.size() * percent / 100);
+    std::nth_element(values.begin(), at, values.end());
+    return *at;
+  };
+  std::vector<bool> suspect(count, false);
+  if (const double most = quantile(distances, 75); most > 0.0) {
+    for (std::size_t k = 2; k + 3 < count; ++k) {
+      for (const std::size_t length : {1, 2}) {
+        if (!stand_away(k, length, 8.0 * most)) continue;
+        for (std::size_t i = k - 1; i <= k + length; ++i) suspect[i] = true;
+      }
+    }
+  }
+  for (std::size_t k = 1; k + 1 < count; ++k) {
+    if (!suspect[k]) usual.push_back(distances[k - 1]);
+  }
+  const double least = usual.empty() ? 0.0 : 8.0 * quantile(usual, 99);
+  std::size_t found = 0;
+  if (!(least > 0.0)) return found;
+  for (const std::size_t length : {1, 2}) {
+    for (std::size_t k = 2; k + length + 1 < count; ++k) {
+      if (!stand_away(k, length, least)) continue;
+      const double before = y[k - 1],
+                   step = (y[k + length] - before) / static_cast<double>(length + 1);
+      for (std::size_t i = 0; i < length; ++i)
+        y[k + i] = before + static_cast<double>(i + 1) * step;
+      found += length;
+    }
+  }
+  return found;
+}
+
 }  // namespace detail
 
 /// Checks a log and converts it to a constant sample time. If the time stamps jitter by more than 2
@@ -178,38 +226,7 @@ inline double quantisation_step(const std::vector<double>& y) {
   report.sample_time = T;
   report.jitter = log.time.empty() ? log.jitter : std::sqrt(square / regular);
   report.duration = time.back();
-  // Finds single rows that fit neither of their neighbours.
-  std::vector<double> jumps;
-  for (std::size_t k = 1; k + 1 < y.size(); ++k) {
-    jumps.push_back(std::abs(y[k] - 0.5 * (y[k - 1] + y[k + 1])));
-  }
-  std::vector<double> sorted = jumps;
-  const auto tail = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() * 99 / 100);
-  std::nth_element(sorted.begin(), tail, sorted.end());
-  const double usual = *tail;
-  std::vector<bool> outlier(y.size(), false);
-  for (std::size_t k = 2; k + 2 < y.size(); ++k) {
-    const double jump = jumps[k - 1];
-    if (usual > 0.0 && jump > 8.0 * usual && std::abs(y[k + 1] - y[k - 1]) < 0.2 * jump) {
-      outlier[k] = true;
-      ++report.outliers;
-    }
-  }
-  for (std::size_t k = 1; k + 1 < y.size(); ++k) {
-    if (outlier[k]) y[k] = 0.5 * (y[k - 1] + y[k + 1]);
-  }
-  // Two bad rows in succession are as far from what is around them.
-  for (std::size_t k = 2; k + 3 < y.size(); ++k) {
-    const double before = y[k - 1], after = y[k + 2];
-    const double first = y[k] - 0.5 * (before + after), second = y[k + 1] - 0.5 * (before + after);
-    const double jump = std::min(std::abs(first), std::abs(second));
-    if (usual > 0.0 && first * second > 0.0 && jump > 8.0 * usual &&
-        std::abs(after - before) < 0.2 * jump) {
-      y[k] = before + (after - before) / 3.0;
-      y[k + 1] = after - (after - before) / 3.0;
-      report.outliers += 2;
-    }
-  }
+  report.outliers = detail::mend_outliers(y);
   const auto [least, largest] = std::minmax_element(u.begin(), u.end());
   const double reach = 1e-6 * (*largest - *least);
   std::size_t ends = 0;
