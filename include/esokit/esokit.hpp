@@ -103,6 +103,7 @@
 #include <esokit/gain/switching_certificate.hpp>
 #include <esokit/identify/fit.hpp>
 #include <esokit/identify/identify.hpp>
+#include <esokit/identify/input_checks.hpp>
 #include <esokit/identify/intervals.hpp>
 #include <esokit/identify/log.hpp>
 #include <esokit/identify/plateau.hpp>

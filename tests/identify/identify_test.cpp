@@ -750,6 +750,21 @@ TEST(Judge, RefusesByName) {
     bad.second_opinion = {{-50, half_width}, explained, 1.0};
     EXPECT_TRUE(said(esokit::judge(bad, log)).starts_with("correlation: ")) << half_width;
   }
+  // y before u: harmless if b0 is the same without it.
+  bad = good;
+  bad.lead = {T, -55};
+  EXPECT_EQ(said(esokit::judge(bad, log)), "accepted");
+  for (const double gain : {-55.1, -44.9, nan}) {
+    bad.lead.input_gain = gain;
+    EXPECT_EQ(said(esokit::judge(bad, log)),
+              "lead: is the time by which y moves before u: is u logged late?");
+  }
+  bad.lead = {T, -55};
+  bad.input_gain.half_width = 5.1;
+  EXPECT_TRUE(said(esokit::judge(bad, log)).starts_with("lead: "));
+  bad = good;
+  bad.at_once = true;
+  EXPECT_TRUE(said(esokit::judge(bad, log)).starts_with("at_once: "));
   // Jitter that the stamps tell was taken out.
   bad = good;
   bad.log.jitter = T;

@@ -110,6 +110,18 @@ void sound_alarms(const Settings& settings, const Input& input, Findings& all) {
   // Of a log that does not tell b0 its sign means nothing, unless a design is asked for anyway.
   if (!all.seen || (all.refusal && !settings.anyway)) return;
   const double b0 = found.input_gain.value;
+  if (const auto& sizes = found.by_size; sizes.differ()) {
+    all.alarms.push_back(
+        {"large-u", "b0 is " + number_text(sizes.small.value, 3) + " for u (" + input.u +
+                        ") up to " + number_text(sizes.knot, 3) + " and " +
+                        number_text(sizes.large.value, 3) +
+                        " beyond. Does the actuator saturate, stick, or act as the square of u? "
+                        "Record the u that it held, or correct u by its curve."});
+  }
+  if (found.lead.time > 0.0) {
+    all.alarms.push_back({"lead", "y (" + input.y + ") moves " + number_text(found.lead.time, 2) +
+                                      " s before u: is u logged late?"});
+  }
   const double expected = settings.expected_gain.value_or(std::abs(b0));
   const double ratio = b0 / expected;
   if (ratio < 0) {

@@ -22,6 +22,7 @@
 #include <memory>
 #include <numbers>
 #include <span>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -146,6 +147,9 @@ struct GainTable {
   double steady_variance = 1.0;   // of an innovation, divided by that of the noise
 };
 
+/// The tables of the last few points, the latest first: those beside one point share some.
+using GainTables = std::array<std::shared_ptr<const GainTable>, 3>;
+
 /// The Kalman filter for one point: transition, input weights, and gains from a diffuse start.
 template <int States>
 struct InnovationsFilter {
@@ -159,9 +163,9 @@ struct InnovationsFilter {
   std::ptrdiff_t delay = 0;
   std::shared_ptr<const GainTable> table{};
 
-  /// @param cached gains of the last filter, reused if they are the same; receives the new ones
+  /// @param cached gains of the last filters, reused if they are the same; receives the new ones
   static InnovationsFilter make(const FitData& data, const FitModel& model, const FitPoint& point,
-                                std::shared_ptr<const GainTable>& cached) {
+                                GainTables& cached) {
     InnovationsFilter f;
     const double T = data.sample_time;
     const double w = point.bandwidth;
@@ -234,14 +238,20 @@ struct InnovationsFilter {
       f.column[static_cast<std::size_t>(i)] =
           f.phi[static_cast<std::size_t>(i)][static_cast<std::size_t>(n)] / std::pow(w, n);
     }
-    if (cached == nullptr || cached->bandwidth != w || cached->pole != point.pole) {
+    const auto known = std::find_if(cached.begin(), cached.end(), [&](const auto& one) {
+      return one != nullptr && one->bandwidth == w && one->pole == point.pole;
+    });
+    // The one that was found, or else the oldest, becomes the first.
+    std::rotate(cached.begin(), known == cached.end() ? known - 1 : known,
+                std::min(known + 1, cached.end()));
+    if (known == cached.end()) {
       auto fresh = std::make_shared<GainTable>();
       fresh->bandwidth = w;
       fresh->pole = point.pole;
       f.find_gains(w * w * T * T, data.y.size(), *fresh);
-      cached = std::move(fresh);
+      cached.front() = std::move(fresh);
     }
-    f.table = cached;
+    f.table = cached.front();
     return f;
   }
 
@@ -681,12 +691,22 @@ class InnovationsFit {
       filter.template run<1>(data_, lead_, input, nothing, [](std::size_t) { return 1.0; }, nothing,
                              {columns_[next++].data()});
     }
-    for (const auto& column : data_.columns) {
-      filter.template run<1>(
+    // Several columns in parallel, too.
+    const std::size_t first = next;
+    const auto run_columns = [&]<int Runs>(std::integral_constant<int, Runs>) {
+      std::array<double*, static_cast<std::size_t>(Runs)> out{};
+      for (std::size_t run = 0; run < out.size(); ++run) out[run] = columns_[next + run].data();
+      filter.template run<Runs>(
           data_, lead_, data_.u, nothing, [](std::size_t) { return 0.0; },
-          [&](std::size_t, std::ptrdiff_t k) { return column[static_cast<std::size_t>(k)]; },
-          {columns_[next++].data()});
-    }
+          [&](std::size_t run, std::ptrdiff_t k) {
+            return data_.columns[next - first + run][static_cast<std::size_t>(k)];
+          },
+          out);
+      next += out.size();
+    };
+    while (next + 4 <= count) run_columns(std::integral_constant<int, 4>{});
+    while (next + 2 <= count) run_columns(std::integral_constant<int, 2>{});
+    if (next < count) run_columns(std::integral_constant<int, 1>{});
     const auto solve = [&] {
       std::vector<double> normal;
       normal_equations(std::span(columns_).subspan(1), columns_[0], normal, fit.linear);
@@ -723,7 +743,7 @@ class InnovationsFit {
   std::vector<std::vector<double>> kept_columns_{};
   std::vector<double> kept_residual_{};
   mutable std::vector<double> force_{}, combined_{};
-  mutable std::shared_ptr<const detail::GainTable> cached_{};
+  mutable detail::GainTables cached_{};
 };
 
 }  // namespace esokit

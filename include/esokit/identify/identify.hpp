@@ -10,6 +10,7 @@
 #include <esokit/core/error.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/identify/fit.hpp>
+#include <esokit/identify/input_checks.hpp>
 #include <esokit/identify/intervals.hpp>
 #include <esokit/identify/log.hpp>
 #include <esokit/identify/plateau.hpp>
@@ -106,6 +107,9 @@ struct Identified {
   double position_shift = 0;
   double correlation = 0;          ///< largest correlation of the innovations over lags 1 to 20
   SecondOpinion second_opinion{};  ///< b0 by output error
+  GainBySize by_size{};            ///< b0 at small and at large u
+  Lead lead{};                     ///< how early y moves before u, if it does
+  bool at_once = false;            ///< y follows u within the row, with nothing in between
   int averaged = 1;                ///< rows of the log that were averaged into one
   bool at_bound = false;           ///< a parameter is at a bound of its range at the plateau
   double excitation = 0;           ///< smallest relative standard error of b0
@@ -205,37 +209,6 @@ inline std::array<double, 20> correlations(const std::vector<double>& e) {
     found[lag - 1] = dot(e.data(), e.data() + lag, e.size() - lag) / square;
   }
   return found;
-}
-
-/// Share of u that does not follow from y_k, y_(k-1), u_(k-1): 0 if u comes from a controller whose
-/// reference never moves.
-inline double own_input(const FitData& data) {
-  const std::size_t rows = data.u.size();
-  std::vector<std::vector<double>> columns(4, std::vector<double>(rows, 0.0));
-  std::vector<double> right(rows, 0.0);
-  double mean_u = 0.0, mean_y = 0.0;
-  for (std::size_t k = 0; k < rows; ++k) {
-    mean_u += data.u[k] / static_cast<double>(rows);
-    mean_y += data.y[k] / static_cast<double>(rows);
-  }
-  for (std::size_t k = 1; k < rows; ++k) {
-    right[k] = data.u[k] - mean_u;
-    columns[0][k] = 1.0;
-    columns[1][k] = data.y[k] - mean_y;
-    columns[2][k] = data.y[k - 1] - data.y[k];
-    columns[3][k] = data.u[k - 1] - mean_u;
-  }
-  std::vector<double> normal, law;
-  InnovationsFit::normal_equations(columns, right, normal, law);
-  solve_normal(normal, law, 4);
-  double left = 0.0, all = 0.0;
-  for (std::size_t k = 1; k < rows; ++k) {
-    double rest = right[k];
-    for (std::size_t c = 0; c < 4; ++c) rest -= law[c] * columns[c][k];
-    left += rest * rest;
-    all += right[k] * right[k];
-  }
-  return std::sqrt(left / all);
 }
 
 /// Slope (derivative 1) or value (0) at each row of a parabola fitted to 2 half + 1 rows.
@@ -381,14 +354,18 @@ inline double criterion(const Fit& fit, int parameters) {
 }
 
 /// The best fit of one order, with friction if that improves it.
+/// @param before the fit of this order before sines were added, from which this one starts; or none
 inline OrderFit fit_order(const FitData& data, const IdentifyOptions& options, int order,
-                          const FitBounds& bounds) {
+                          const FitBounds& bounds, const OrderFit* before) {
+  const auto best_of = [&](InnovationsFit& fit, int starts) {
+    return before == nullptr ? best_fit(fit, starts) : fit.minimise(before->fit.at, true);
+  };
   OrderFit result;
   result.model = {order, 1, options.pole};
   result.bounds = bounds;
   const int columns = static_cast<int>(data.columns.size());
   InnovationsFit plain(data, result.model, bounds);
-  result.fit = best_fit(plain);
+  result.fit = best_of(plain, 3);
   (void)plain.at(result.fit.at);  // innovations of this fit, not of the last start
   result.criterion = criterion(result.fit, 5 + columns);
   result.correlation = innovations_correlation(plain.residual());
@@ -421,7 +398,7 @@ inline OrderFit fit_order(const FitData& data, const IdentifyOptions& options, i
   const FitData rubbed = with_friction(data, speed, best_scale);
   InnovationsFit fit(rubbed, result.model, bounds);
   // Further starts, because the missing friction may have misled the first fit.
-  Fit found = best_fit(fit, 2);
+  Fit found = best_of(fit, 2);
   if (best.mean_square < found.mean_square) found = fit.minimise(best.at, true);
   const double with = criterion(found, 6 + columns);
   if (with < result.criterion) {
@@ -463,11 +440,17 @@ inline void compare_orders(const FitData& data, std::vector<OrderFit>& orders) {
   }
 }
 
-/// The best fit of each requested order.
+/// The best fit of each requested order. @param before those before sines were added, or none
 inline std::vector<OrderFit> fit_orders(const FitData& data, const IdentifyOptions& options,
-                                        const FitBounds& bounds) {
+                                        const FitBounds& bounds,
+                                        const std::vector<OrderFit>& before = {}) {
   std::vector<OrderFit> orders;
-  for (const int order : options.orders) orders.push_back(fit_order(data, options, order, bounds));
+  for (const int order : options.orders) {
+    const auto known = std::find_if(before.begin(), before.end(),
+                                    [&](const OrderFit& fit) { return fit.model.order == order; });
+    orders.push_back(
+        fit_order(data, options, order, bounds, known == before.end() ? nullptr : &*known));
+  }
   compare_orders(data, orders);
   return orders;
 }
@@ -653,7 +636,7 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
     add_sine(rows, winner->model.order, frequency);
   }
   if (!sines.empty()) {
-    orders = fit_orders(rows, tried, bounds);
+    orders = fit_orders(rows, tried, bounds, orders);
     winner = best_order(orders);
   }
   const OrderFit chosen = *winner;
@@ -843,6 +826,10 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
         gain_found.half_width, std::abs(result.second_opinion.input_gain.value - gain_found.value));
   }
   result.at_bound = here.at_bound;
+  if (excitation < excitation_max) {
+    result.by_size = gain_by_size(used, model, bounds, here.fit.at);
+  }
+  result.lead = lead_of(used, model, bounds, here.fit);
   return result;
 }
 
@@ -912,6 +899,7 @@ inline bool better(const Identified& averaged, const Identified& plain, const Id
   if (!(*highest > *lowest))
     return E{"y", *lowest, "never changes: record a log in which the output moves"};
   result.own_input = detail::own_input(raw);
+  result.at_once = detail::at_once(raw);
   std::vector<int> folds = {1, 4, 8, 16};
   if (options.averaged > 0) folds = {options.averaged};
   // Once an order is chosen and at a bound, it alone is tried within wider ones.
@@ -975,6 +963,9 @@ inline bool better(const Identified& averaged, const Identified& plain, const Id
   rules.require(found.own_input > detail::own_input_min, "own_input", found.own_input,
                 "is the share of u that does not follow from y, which is too small: record a "
                 "moving reference");
+  rules.require(!found.at_once, "at_once", found.latency.value,
+                "is the latency found, but y follows u at once: is y an acceleration or a force? "
+                "Record its speed or position, or more rows per second");
   const bool excited = found.plateau.middle > 0 && found.excitation < detail::excitation_max;
   rules.require(excited, "excitation", found.plateau.middle > 0 ? found.excitation : 1.0,
                 "is the smallest relative error of b0 and too large, because too little of y "
@@ -982,6 +973,13 @@ inline bool better(const Identified& averaged, const Identified& plain, const Id
   if (!rules) return rules;
   const SecondOpinion& second = found.second_opinion;
   const bool informed = detail::informed(found);
+  const double widest = informed ? options.interval_agreed : options.interval_max;
+  // A lead does no harm if b0 is the same without it.
+  const double off = std::abs(found.lead.input_gain - found.input_gain.value);
+  rules.require(!(found.lead.time > 0.0) ||
+                    (off <= found.input_gain.half_width && found.input_gain.share() <= widest),
+                "lead", found.lead.time,
+                "is the time by which y moves before u: is u logged late?");
   rules.require(detail::white(found, options) || informed,
                 {"correlation", found.correlation,
                  "is the correlation of the innovations, so the model lacks something, and output "
@@ -1012,7 +1010,6 @@ inline bool better(const Identified& averaged, const Identified& plain, const Id
                  "is the change of b0 between two scales of friction in standard errors: record "
                  "faster motion; must be at most",
                  -1, options.friction_shift_max, true});
-  const double widest = informed ? options.interval_agreed : options.interval_max;
   rules.require(
       found.input_gain.share() <= widest,
       {"interval", found.input_gain.share(),

@@ -44,8 +44,8 @@ struct SecondOpinion {
   start.bandwidth = bandwidth;
   std::vector<Fit> starts{fit.at(fit.inside(start))};
   const double duration = data.sample_time * static_cast<double>(data.y.size());
-  for (const double latency : {0.01, 0.1, 0.4, 1.0}) {
-    for (const double pole : {0.0, 3.0, 10.0, 30.0, 100.0}) {
+  for (const double pole : {0.0, 3.0, 10.0, 30.0, 100.0}) {
+    for (const double latency : {0.01, 0.1, 0.4, 1.0}) {
       starts.push_back(
           fit.at(fit.inside({bandwidth, latency * bounds.latency_max, 0.7, pole / duration})));
     }

@@ -1,0 +1,138 @@
+// What a log tells about its u: each is told where it is, and not where it is not.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstddef>
+#include <esokit/identify/identify.hpp>
+#include <esokit/identify/input_checks.hpp>
+#include <esokit/sim/gaussian.hpp>
+#include <functional>
+#include <limits>
+#include <vector>
+
+namespace identify_input_checks_test {
+
+using esokit::GainBySize;
+using esokit::Identified;
+using esokit::Log;
+
+constexpr double T = 0.01, b0 = 20, pole = 3;
+
+// y' = b0 effect(u(t - 1.5 T)) - a y, steps of u between -size and size.
+Log machine(const std::function<double(double)>& effect, double size = 1) {
+  esokit::sim::Gaussian gaussian(11);
+  Log log;
+  log.sample_time = T;
+  double y = 0, u = 0, before = 0, earlier = 0;
+  for (int k = 0; k < 1500; ++k) {
+    if (k % 40 == 0) u = size * std::erf(gaussian.next());
+    log.u.push_back(u);
+    log.y.push_back(y + 0.02 * gaussian.next());
+    for (int i = 0; i < 20; ++i) y += T / 20 * (b0 * effect(i < 10 ? earlier : before) - pole * y);
+    earlier = before;
+    before = u;
+  }
+  return log;
+}
+
+double straight(double u) { return u; }
+
+Identified studied(const Log& log) {
+  esokit::IdentifyOptions options;
+  options.orders = {1};
+  options.averaged = 1;
+  return esokit::study(log, options).value();
+}
+
+TEST(GainBySize, TellsAnActuatorThatIsNotLinear) {
+  const auto linear = studied(machine(straight));
+  EXPECT_FALSE(linear.by_size.differ());
+  EXPECT_NEAR(linear.by_size.knot, 0.5, 0.1);
+  for (const auto& part : {linear.by_size.small, linear.by_size.large}) {
+    EXPECT_LT(std::abs(part.value - b0), part.half_width);
+    EXPECT_LT(part.share(), 0.1);
+  }
+  EXPECT_LT(std::abs(linear.input_gain.value - b0), linear.input_gain.half_width);
+
+  const auto saturated = studied(machine([](double u) { return std::clamp(u, -0.5, 0.5); }));
+  EXPECT_TRUE(saturated.by_size.differ());
+  EXPECT_NEAR(saturated.by_size.small.value, b0, 0.1 * b0);
+  EXPECT_NEAR(saturated.by_size.large.value, 0, 0.15 * b0);
+
+  const auto square = studied(machine([](double u) { return u * std::abs(u); }));
+  EXPECT_TRUE(square.by_size.differ());
+  EXPECT_NEAR(square.by_size.small.value / b0, 0.5, 0.2);
+  EXPECT_NEAR(square.by_size.large.value / b0, 1.5, 0.3);
+
+  // Of two levels there is nothing to tell.
+  for (const double low : {-1.0, 0.0}) {
+    Log log = machine([&](double u) { return u > 0 ? 1 : low; });
+    for (double& u : log.u) u = u > 0 ? 1 : low;
+    EXPECT_EQ(studied(log).by_size.knot, 0) << low;
+  }
+}
+
+TEST(GainBySize, DiffersByAQuarterAndByMoreThanTheIntervals) {
+  GainBySize found{1, {4, 0.5}, {2.9, 0.59}};
+  EXPECT_TRUE(found.differ());
+  found.large.half_width = 0.61;
+  EXPECT_FALSE(found.differ());
+  found.small.half_width = found.large.half_width = 0.01;
+  found.large.value = 3.01;
+  EXPECT_FALSE(found.differ());
+  found.large.value = 2.99;
+  EXPECT_TRUE(found.differ());
+  found = {1, {-2.99, 0.01}, {-4, 0.01}};
+  EXPECT_TRUE(found.differ());
+  found.knot = 0;
+  EXPECT_FALSE(found.differ());
+  found = {1, {4, std::numeric_limits<double>::quiet_NaN()}, {1, 0}};
+  EXPECT_FALSE(found.differ());
+}
+
+TEST(Lead, TellsThatUIsLate) {
+  const Log causal = machine(straight);
+  EXPECT_EQ(studied(causal).lead.time, 0);
+  for (const std::size_t rows : {3u, 7u}) {
+    Log late = causal;
+    late.y.erase(late.y.begin(), late.y.begin() + static_cast<std::ptrdiff_t>(rows));
+    late.u.resize(late.y.size());
+    const auto found = studied(late);
+    EXPECT_NEAR(found.lead.time, (static_cast<double>(rows) - 1.5) * T, 0.3 * T);
+    EXPECT_NEAR(found.lead.input_gain, b0, 0.03 * b0);
+  }
+}
+
+TEST(AtOnce, TellsAnAcceleration) {
+  Log log = machine(straight);
+  EXPECT_FALSE(studied(log).at_once);
+  esokit::sim::Gaussian gaussian(3);
+  for (std::size_t k = log.y.size(); k-- > 0;)
+    log.y[k] = 5 + 2 * log.u[k > 0 ? k - 1 : 0] + 0.02 * gaussian.next();
+  const auto found = studied(log);
+  EXPECT_TRUE(found.at_once);
+  const auto refused = esokit::judge(found, log);
+  ASSERT_FALSE(refused);
+  EXPECT_STREQ(refused.error().field, "at_once");
+
+  // Of three steps nothing is said.
+  esokit::FitData data;
+  data.sample_time = T;
+  const auto steps = [&](int changes) {
+    data.u.clear(), data.y.clear();
+    for (int k = 0; k < 600; ++k) {
+      data.u.push_back(std::min(k / 100, changes) % 2);
+      data.y.push_back(k > 0 ? data.u[static_cast<std::size_t>(k) - 1] : 0);
+    }
+    return esokit::detail::at_once(data);
+  };
+  EXPECT_FALSE(steps(3));
+  EXPECT_TRUE(steps(4));
+  // Nor of y that is its own, or that u explains by half.
+  steps(5);
+  for (double& y : data.y) y += gaussian.next();
+  EXPECT_FALSE(esokit::detail::at_once(data));
+}
+
+}  // namespace identify_input_checks_test
