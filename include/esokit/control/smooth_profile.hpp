@@ -26,7 +26,7 @@ template <int Order, PlainScalar S>
 [[nodiscard]] constexpr Vector<S, Order + 1> smooth_step(const S& x) noexcept {
   constexpr int degree = 2 * Order + 1;
   constexpr auto coefficients = [] {
-    std::array<S, degree + 1> c{};
+    std::array<S, static_cast<std::size_t>(degree) + 1> c{};
     for (int k = 0; k <= Order; ++k) {
       c[static_cast<std::size_t>(Order + 1 + k)] = static_cast<S>(
           (k % 2 == 0 ? 1 : -1) * binomial(Order + k, k) * binomial(degree, Order - k));
