@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include <esokit/control/smooth_profile.hpp>
 #include <esokit/tune/problem.hpp>
 
 namespace overload_example {
@@ -240,18 +241,15 @@ inline std::vector<Event> events(const Machine& m, Dice& dice) {
   return all;
 }
 
-/// (r, r', .., r^(n)) of a move from 0 to `far` whose y^(n) stays below 0.4 of half the range: the
-/// polynomial with n derivatives zero at both ends.
+/// (r, r', .., r^(n)) of a move from 0 to `far` whose y^(n) stays below 0.4 of half the range.
 class Profile {
  public:
-  Profile(const Machine& m, double far) : far_(far) {
-    // Largest n-th derivative of the smooth step of unit time: 1.5, 5.77, 52.5 (orders 3, 5, 7).
-    constexpr std::array<double, 3> peak{1.5, 5.7735, 52.5};
+  Profile(const Machine& m, double far) : far_(far), order_(m.order) {
     const double most = 0.4 * std::abs(m.b) * m.half_range;
-    power_ = m.order;
-    time_ = std::max(
-        std::pow(peak[static_cast<std::size_t>(m.order - 1)] * std::abs(far) / most, 1.0 / m.order),
-        4.0 * m.latency);
+    const double peak = m.order == 1   ? esokit::smooth_step_peaks<1>[0]
+                        : m.order == 2 ? esokit::smooth_step_peaks<2>[1]
+                                       : esokit::smooth_step_peaks<3>[2];
+    time_ = std::max(std::pow(peak * std::abs(far) / most, 1.0 / m.order), 4.0 * m.latency);
     // Pole, friction and gravity ask for u as well.
     for (int i = 0; i < 30 && !possible(m); ++i) time_ *= 1.3;
   }
@@ -269,30 +267,24 @@ class Profile {
   }
   [[nodiscard]] double duration() const { return time_; }
   [[nodiscard]] std::array<double, 4> at(double t) const {
+    return order_ == 1 ? scaled<1>(t) : order_ == 2 ? scaled<2>(t) : scaled<3>(t);
+  }
+
+ private:
+  template <int Order>
+  [[nodiscard]] std::array<double, 4> scaled(double t) const {
+    const auto step = esokit::smooth_step<Order>(t / time_);
     std::array<double, 4> r{};
-    if (t >= time_) {
-      r[0] = far_;
-      return r;
-    }
-    // s(x) = sum c_k x^k, as of orders 3, 5, 7.
-    constexpr std::array<std::array<double, 8>, 3> table{
-        {{0, 0, 3, -2}, {0, 0, 0, 10, -15, 6}, {0, 0, 0, 0, 35, -84, 70, -20}}};
-    auto c = table[static_cast<std::size_t>(power_ - 1)];
     double scale = far_;
-    for (int k = 0; k <= power_; ++k) {
-      double sum = 0.0;
-      for (int i = 7; i >= 0; --i) sum = sum * (t / time_) + c[static_cast<std::size_t>(i)];
-      r[static_cast<std::size_t>(k)] = scale * sum;
-      for (std::size_t i = 0; i < 7; ++i) c[i] = static_cast<double>(i + 1) * c[i + 1];
-      c[7] = 0.0;
+    for (int i = 0; i <= Order; ++i) {
+      r[static_cast<std::size_t>(i)] = scale * step(i);
       scale /= time_;
     }
     return r;
   }
 
- private:
   double far_, time_ = 1.0;
-  int power_ = 1;
+  int order_;
 };
 
 }  // namespace overload_example

@@ -27,7 +27,6 @@
 #include <utility>
 #include <vector>
 
-#include <esokit/control/tracking_differentiator.hpp>
 #include <esokit/sim/gaussian.hpp>
 #include <esokit/sim/run.hpp>
 
@@ -176,18 +175,18 @@ int main(int argc, char** argv) {
   // 3. The new loop on the true machine.
   const auto& tuning = outcome->design.tuning();
   const auto& taken = outcome->design.taken();
-  const double acceleration = from_log::profile_acceleration(tuning.model);
+  const auto& pasting = outcome->design.pasting();
   const auto steps = [](double t) { return t < 0.2 ? 0.0 : t < 2 ? 1.5 : -0.5; };
-  auto profile =
-      esokit::TrackingDifferentiator<double>::make({.acceleration = acceleration, .sample_time = T})
-          .value();
-  std::vector<esokit::Vector<double, 3>> plan;  // the profile is the same for both
+  // The profile of the code is the reference of both.
+  from_log::Runner planner(pasting, tuning, taken);
+  planner.start(0, 0);
+  std::vector<double> plan;
   for (int k = 0; k <= 6000; ++k) {
-    profile.update(steps(k * T));
-    plan.push_back(profile.motion());
+    (void)planner.update(0, steps(k * T));
+    plan.push_back(planner.motion()[0]);
   }
   const auto row = [](double t) { return static_cast<std::size_t>(std::lround(t / T)); };
-  const auto reference = [&](double t) { return plan[std::min<std::size_t>(row(t), 6000)](0); };
+  const auto reference = [&](double t) { return plan[std::min<std::size_t>(row(t), 6000)]; };
   const auto load = [](double t) { return t >= 3.5 && t < 5 ? 60.0 : 0.0; };
   const auto with_pid = [&](std::uint64_t seed) {
     auto controller = pid();
@@ -195,16 +194,12 @@ int main(int argc, char** argv) {
         6, seed, [&](double y, double r) { return controller.update(y, r); }, reference, load);
   };
   const auto with_new = [&](std::uint64_t seed) {
-    from_log::Runner controller(tuning, taken);
-    std::size_t k = 0;
+    from_log::Runner controller(pasting, tuning, taken);
+    controller.start(0, 0);
+    int k = 0;
     return simulate(
-        6, seed,
-        [&](double y, double) {
-          const double u = controller.update(y, plan[std::min<std::size_t>(k, 6000)]);
-          ++k;
-          return u;
-        },
-        reference, load);
+        6, seed, [&](double y, double) { return controller.update(y, steps(T * k++)); }, reference,
+        load);
   };
   const Run before = with_pid(2), after = with_new(2);
 

@@ -48,6 +48,7 @@
 #include <esokit/control/pid_conversion.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/control/scaled_law.hpp>
+#include <esokit/control/smooth_profile.hpp>
 #include <esokit/control/softening.hpp>
 #include <esokit/control/telemetry.hpp>
 #include <esokit/control/tracking_differentiator.hpp>

@@ -2,14 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <numbers>
 #include <string>
 #include <string_view>
 
 #include <esokit/analysis/loop_response.hpp>
 #include <esokit/analysis/margins.hpp>
-#include <esokit/control/tracking_differentiator.hpp>
 #include <esokit/core/error_text.hpp>
 #include <esokit/sim/gaussian.hpp>
 #include <esokit/sim/run.hpp>
@@ -35,43 +33,6 @@ auto with_plant(const Identified& found, F&& f) {
     default:
       return f(found.plant<3>());
   }
-}
-
-/// Rows through the observer of a controller, each piece from rest.
-Replay through(const LinearController& form, double input_gain, int order,
-               const esokit::FitData& rows) {
-  Replay replay;
-  const int n = form.states();
-  std::vector<double> z(static_cast<std::size_t>(n)), change(z.size());
-  std::size_t piece = 0;
-  double offset = 0.0;
-  const double direct = form.y_to_estimate(0, 0);
-  const auto estimate = [&](int row, double y) {
-    double sum = form.y_to_estimate(row, 0) * y;
-    for (int i = 0; i < n; ++i) sum += form.to_estimate(row, i) * z[static_cast<std::size_t>(i)];
-    return sum;
-  };
-  for (std::size_t k = 0; k < rows.y.size(); ++k) {
-    if (piece < rows.starts.size() && rows.starts[piece] == k) {
-      ++piece;
-      offset = rows.y[k];
-      std::fill(z.begin(), z.end(), 0.0);
-    }
-    const double y = rows.y[k] - offset;
-    const double corrected = estimate(0, y);
-    replay.t.push_back(static_cast<double>(k) * rows.sample_time);
-    replay.estimate.push_back(corrected + offset);
-    replay.load.push_back(estimate(order, y) / input_gain);
-    // The measurement that the observer had expected would not have moved it.
-    replay.innovation.push_back((y - corrected) / (1 - direct));
-    for (int i = 0; i < n; ++i) {
-      double sum = form.from_y(i, 0) * y + form.from_u(i, 0) * rows.u[k];
-      for (int j = 0; j < n; ++j) sum += form.a(i, j) * z[static_cast<std::size_t>(j)];
-      change[static_cast<std::size_t>(i)] = sum;
-    }
-    for (std::size_t i = 0; i < z.size(); ++i) z[i] += change[i];
-  }
-  return replay;
 }
 
 /// y of the machine that was found under the u of the log, with its noise and its disturbance.
@@ -108,174 +69,16 @@ esokit::FitData simulated(const Identified& found, const esokit::FitData& rows) 
   return out;
 }
 
-/// Those that count: not while the observer finds the state.
-std::vector<double> settled(const Replay& replay, const esokit::FitData& rows,
-                            std::size_t settling) {
-  std::vector<double> sizes;
-  std::size_t piece = 0, from = 0;
-  for (std::size_t k = 0; k < replay.innovation.size(); ++k) {
-    if (piece < rows.starts.size() && rows.starts[piece] == k) {
-      from = k + settling;
-      ++piece;
-    }
-    if (k >= from) sizes.push_back(std::abs(replay.innovation[k]));
-  }
-  return sizes;
-}
-
-/// What the code of a design includes.
-std::string includes_of(const std::string& code) {
-  struct Header {
-    const char *word, *file;
-  };
-  constexpr Header headers[] = {{"HalfGainPoles", "gain/half_gain.hpp"},
-                                {"PoleSet", "gain/pole_set.hpp"},
-                                {"CascadeEso<", "observer/cascade_eso.hpp"},
-                                {"ExtendedStateFilter<", "observer/extended_state_filter.hpp"},
-                                {"HalfGainEso<", "observer/half_gain_eso.hpp"},
-                                {"LinearEso<", "observer/linear_eso.hpp"},
-                                {"ModelEso<", "observer/model_eso.hpp"}};
-  std::string text;
-  for (const Header& header : headers) {
-    if (code.find(header.word) != std::string::npos)
-      text += std::string("#include <esokit/") + header.file + ">\n";
-  }
-  return text;
-}
-
-std::string program(const Settings& settings, const Identified& found, const esokit::Tuning& tuning,
-                    const esokit::TunedDesign& design) {
-  const std::string name = std::filesystem::path(settings.file).filename().string();
-  std::string text = "// From " + name + " by from_log: order " + std::to_string(found.order) +
-                     ", b0 = " + number_text(found.input_gain.value, 4) + " +- " +
-                     number_text(found.input_gain.half_width, 2) +
-                     ".\n// y and u in the units of the log, one update every " +
-                     number_text(1e3 * found.log.sample_time, 6) +
-                     " ms.\n#include <cstdio>\n#include <esokit/control/adrc.hpp>\n";
-  if (found.order == 2) text += "#include <esokit/control/tracking_differentiator.hpp>\n";
-  text += includes_of(design.code);
-  text += "\nint main() {\n";
-  std::string line;
-  for (const char c : design.code) {
-    if (c != '\n') {
-      line += c;
-      continue;
-    }
-    text += "  " + line + "\n";
-    line.clear();
-  }
-  // Of order 1 u moves y at once; of order 3 there is no ready profile.
-  const bool profiled = found.order == 2;
-  if (profiled) {
-    const auto& model = tuning.model;
-    text +=
-        "  // A reference that the machine can follow with half of the range of u.\n"
-        "  auto profile = esokit::TrackingDifferentiator<double>::make({.acceleration = " +
-        esokit::detail::source(profile_acceleration(model)) +
-        ", .sample_time = " + esokit::detail::source(model.sample_time) + "}).value();\n";
-  }
-  const std::string reference = profiled ? "profile.motion()" : "reference";
-  return text +
-         "  if (!controller) {  // says which setting breaks which rule\n"
-         "    std::printf(\"%s: %s\\n\", controller.error().field, controller.error().rule);\n"
-         "    return 1;\n"
-         "  }\n"
-         "  const double y = 0.0, u_now = 0.0, reference = 0.0;\n"
-         "  controller->start(y, u_now);  // once, while the machine is at rest\n" +
-         (profiled ? "  profile.reset(y);\n  profile.update(reference);  // then once a sample\n"
-                   : "") +
-         "  const double u = controller->update(y, " + reference + ");" +
-         (profiled ? "" : "  // then once a sample") +
-         "\n"
-         "  std::printf(\"u = %g\\n\", u);\n"
-         "}\n";
-}
-
 std::string percent(double share) { return number_text(100 * share, 3) + " %"; }
-
-/// What the pasted code does on a step of the reference, within the limits of u and without noise.
-struct StepOfCode {
-  double height = 0, settling = 0, overshoot = 0;
-};
-StepOfCode step_of_code(const esokit::Tuning& tuning, const esokit::TunedDesign& design) {
-  const esokit::TuneModel& model = tuning.model;
-  const int n = model.order;
-  const double half = 0.5 * (model.u_max - model.u_min);
-  const double T = model.sample_time;
-  StepOfCode step;
-  step.height = esokit::play_distance(model, 1.0, esokit::play_events.back());
-  auto told = esokit::detail::told_of_input(design.controller);
-  const double weight = told.r_to_u(0, 0) / design.settings.gains[0];
-  esokit::detail::PlayLoop loop(model, 1.0, told, half);
-  auto profile = esokit::TrackingDifferentiator<double>::make(
-                     {.acceleration = profile_acceleration(model), .sample_time = T})
-                     .value();
-  const auto samples = static_cast<long>(
-      std::min((10 * design.settling_time + 300 * model.latency()) / T, 200'000.0));
-  for (long k = 0; k < samples; ++k) {
-    double r = step.height, more = 0;
-    if (n == 2) {
-      profile.update(step.height);
-      const auto motion = profile.motion();
-      r = motion(0);
-      for (int i = 1; i <= 2; ++i) {
-        const auto at = static_cast<std::size_t>(i);
-        more += motion(i) * weight *
-                (at < design.settings.gains.size() ? design.settings.gains[at] : 1.0);
-      }
-    }
-    const double y = loop.output();
-    (void)loop(y, r, 0.0, more);
-    if (std::abs(y - step.height) > 0.02 * step.height)
-      step.settling = static_cast<double>(k + 1) * T;
-    step.overshoot = std::max(step.overshoot, y / step.height - 1);
-  }
-  return step;
-}
 
 }  // namespace
 
-double profile_acceleration(const esokit::TuneModel& model) {
-  return 0.25 * (model.u_max - model.u_min) * std::abs(model.input_gain.value);
-}
-
-Runner::Runner(const esokit::Tuning& tuning, const esokit::TunedDesign& design)
-    : form_(esokit::detail::told_of_input(design.controller)),
-      lower_(tuning.model.u_min),
-      upper_(tuning.model.u_max),
-      state_(static_cast<std::size_t>(form_.states())) {
-  const auto& gains = design.settings.gains;
-  // v = k0 (r - y) + k1 (r' - y') + ..: 1 is the factor of the highest derivative.
-  for (std::size_t i = 0; i < weights_.size(); ++i) {
-    if (i <= gains.size()) {
-      weights_[i] = form_.r_to_u(0, 0) * (i < gains.size() ? gains[i] : 1.0) / gains[0];
-    }
-  }
-}
-
-double Runner::update(double y, const esokit::Vector<double, 3>& motion) {
-  const double r = motion(0);
-  double u = form_.y_to_u(0, 0) * y;
-  for (int i = 0; i < 3; ++i) u += weights_[static_cast<std::size_t>(i)] * motion(i);
-  const int n = form_.states();
-  for (int i = 0; i < n; ++i) u += form_.to_u(0, i) * state_[static_cast<std::size_t>(i)];
-  u = std::clamp(u, lower_, upper_);
-  std::vector<double> next = state_;
-  for (int i = 0; i < n; ++i) {
-    double& sum = next[static_cast<std::size_t>(i)];
-    sum += form_.from_y(i, 0) * y + form_.from_r(i, 0) * r + form_.from_u(i, 0) * u;
-    for (int j = 0; j < n; ++j) sum += form_.a(i, j) * state_[static_cast<std::size_t>(j)];
-  }
-  state_ = next;
-  return u;
-}
-
-Design Design::make(const Settings& settings, const Input&, const Findings& findings) {
+Design Design::make(const Settings& settings, const Input& input, const Findings& findings) {
   Design design;
   const Identified& found = findings.found;
   const auto [least, largest] = std::minmax_element(findings.rows.u.begin(), findings.rows.u.end());
   const auto limits = settings.limits.value_or(std::pair(*least, *largest));
-  auto model = esokit::tune_model(found, limits.first, limits.second);
+  const auto model = as_printed(esokit::tune_model(found, limits.first, limits.second));
   const double range = limits.second - limits.first;
   esokit::TuneWish wish;
   wish.settling_time = settings.settling_time;
@@ -333,14 +136,21 @@ Design Design::make(const Settings& settings, const Input&, const Findings& find
   }
   design.loop_ = *loop;
   const double T = model.sample_time;
-  design.code_ = program(settings, found, *tuning, taken);
+  const LinearController form = design.form();
+  design.replay_ = through(form, found.input_gain.value, found.order, findings.rows);
+  design.pasting_ = Pasting::make(settings, input, found, model, design.replay_.load);
+  design.code_ = pasted_code(design.pasting_, *tuning, taken, findings.rows);
   for (const auto& alarm : esokit::alarms(*tuning, taken))
     design.alarms_.push_back({alarm.name, alarm.text});
-  const StepOfCode step = step_of_code(*tuning, taken);
+  // Of order 1 no further than u holds against the pole.
+  const StepOfCode step = step_of_code(
+      design.pasting_, *tuning, taken,
+      esokit::play_distance(model, 1.0, esokit::play_events.back()),
+      std::min(10 * taken.settling_time + 300 * model.latency(), 200'000.0 * T), 0.0, 0);
   design.summary_ = {
       "Chosen: " + taken.name + ". A step of the reference by " + number_text(step.height, 3) +
-          (found.order == 2 ? ", through the profile of the code," : "") + " settles in " +
-          number_text(step.settling, 3) + " s and overshoots by " + percent(step.overshoot) +
+          ", through the profile of the code, settles in " + number_text(step.settling, 3) +
+          " s and overshoots by " + percent(step.overshoot) +
           ", within the limits of u. A load step that takes a tenth of the range of u moves y by "
           "at most " +
           number_text(0.1 * range * taken.load_peak, 3) +
@@ -388,17 +198,12 @@ Design Design::make(const Settings& settings, const Input&, const Findings& find
                               number_text(limits.first, 4) + " to " +
                               number_text(limits.second, 4) + "; set others with --limits.");
   }
-  const LinearController form = design.form();
-  design.replay_ = through(form, found.input_gain.value, found.order, findings.rows);
   const esokit::FitData machine = simulated(found, findings.rows);
   const Replay expected = through(form, found.input_gain.value, found.order, machine);
   const auto settling = std::min<std::size_t>(
       static_cast<std::size_t>(taken.settling_time / T) + 20, findings.rows.y.size() / 4);
-  auto sizes = settled(expected, machine, settling);
-  const auto at = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() * 95 / 100);
-  std::nth_element(sizes.begin(), at, sizes.end());
-  design.replay_.band = *at;
-  const auto ours = settled(design.replay_, findings.rows, settling);
+  design.replay_.band = quantile(settled(expected.innovation, machine, settling), 0.95);
+  const auto ours = settled(design.replay_.innovation, findings.rows, settling);
   const auto inside =
       std::count_if(ours.begin(), ours.end(), [&](double e) { return e <= design.replay_.band; });
   design.replay_.inside =
@@ -516,7 +321,7 @@ std::vector<CsvRow> ranking(const esokit::Tuning& tuning) {
 
 }  // namespace
 
-void Design::show_on(Page& page, const Settings& settings, const Findings& findings) const {
+void Design::show_on(Page& page, const Findings& findings) const {
   if (tuning_) {
     page.heading("Which observer");
     page.figure(tradeoff_figure(*tuning_, taken_));
@@ -597,9 +402,7 @@ void Design::show_on(Page& page, const Settings& settings, const Findings& findi
   for (const double u : step.control[0]) peak = std::max(peak, std::abs(u));
   page.text("A step of the reference by more than " + number_text(0.5 * range / peak, 2) +
             " drives u to its limits" +
-            (found.order == 2 ? ". Pass larger steps through the profile in the code below, which "
-                                "needs at most half of the range of u."
-                              : "."));
+            ". The code below passes it through a profile that does not.");
 
   page.heading("The log through this observer");
   Figure replay("replay", {.rows = 3, .columns = 1, .panel_height = 150});
@@ -632,12 +435,17 @@ void Design::show_on(Page& page, const Settings& settings, const Findings& findi
 
   page.heading(findings.refusal ? "Paste this only if you know that the model is right"
                                 : "Paste this");
-  page.text("This program compiles as it is, with esokit on the include path: g++ -std=c++20 -O2.");
+  page.text(
+      "This program compiles as it is, with esokit on the include path: g++ -std=c++20 -O2. It "
+      "checks itself: that compiler, settings and copy give the u that from_log computed. It has "
+      "the controller, a profile for the reference within the limits of u, a monitor and guards, "
+      "with settings from the log" +
+      pasting_.used() + ".");
   page.code(code_);
   for (std::size_t i = 0; i < tuning_->designs.size(); ++i) {
     const auto& other = tuning_->designs[i];
     if (i == taken_ || !other.feasible) continue;
-    page.code(program(settings, found, *tuning_, other),
+    page.code(pasted_code(pasting_, *tuning_, other, findings.rows),
               "The code for number " + std::to_string(i + 1) + ", " + other.name);
   }
 }

@@ -2,7 +2,6 @@
 /// From what was found to a controller: the choice, what it does, and the log through its observer.
 #pragma once
 
-#include <array>
 #include <optional>
 #include <string>
 #include <utility>
@@ -13,32 +12,9 @@
 
 #include "from_log/parts/from_log.hpp"
 #include "from_log/parts/page.hpp"
+#include "from_log/parts/paste.hpp"
 
 namespace from_log {
-
-/// Half of what u can do, unit of y / s^2, of order 2.
-[[nodiscard]] double profile_acceleration(const esokit::TuneModel& model);
-
-/// A design as it runs, within its limits: what `Adrc` computes, whatever its type.
-class Runner {
- public:
-  Runner(const esokit::Tuning& tuning, const esokit::TunedDesign& design);
-  /// Once a sample. @param motion (r, r', r'') of the reference
-  double update(double y, const esokit::Vector<double, 3>& motion);
-
- private:
-  esokit::LinearController form_;
-  double lower_, upper_;
-  std::array<double, 3> weights_{};  ///< of r, r', r'' in u
-  std::vector<double> state_;
-};
-
-/// The log through an observer.
-struct Replay {
-  std::vector<double> t, estimate, load, innovation;  ///< load: dhat / b0
-  double band = 0;    ///< 95 % of the innovations are within this, says the model
-  double inside = 0;  ///< share of the log's that are
-};
 
 /// A choice, or why there is none.
 class Design {
@@ -63,11 +39,13 @@ class Design {
   [[nodiscard]] esokit::LinearController form() const {
     return esokit::detail::told_of_input(taken().controller);
   }
+  /// What its code has beside the design.
+  [[nodiscard]] const Pasting& pasting() const { return pasting_; }
   /// What speaks against it.
   [[nodiscard]] const std::vector<Alarm>& alarms() const { return alarms_; }
 
   /// Sections of the page: observers, loop, replay, code.
-  void show_on(Page& page, const Settings& settings, const Findings& findings) const;
+  void show_on(Page& page, const Findings& findings) const;
 
  private:
   std::optional<esokit::Tuning> tuning_;
@@ -75,6 +53,7 @@ class Design {
   std::optional<esokit::Loop> loop_;
   std::vector<std::string> summary_;
   std::string code_;
+  Pasting pasting_;
   std::string why_not_;
   std::vector<Alarm> alarms_;
   Replay replay_;

@@ -315,7 +315,7 @@ Page show(const Settings& settings, const Input& input, const Findings& findings
     page.table("model", "The machine", model_table(findings));
     if (!findings.residual_correlation.empty()) page.figure(model_figure(findings));
   }
-  design.show_on(page, settings, findings);
+  design.show_on(page, findings);
   page.text("Made by from_log of esokit " + std::to_string(ESOKIT_VERSION_MAJOR) + "." +
             std::to_string(ESOKIT_VERSION_MINOR) + "." + std::to_string(ESOKIT_VERSION_PATCH) +
             ": " + settings.command);

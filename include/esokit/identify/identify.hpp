@@ -24,6 +24,7 @@
 #include <limits>
 #include <numbers>
 #include <optional>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -79,20 +80,42 @@ struct GainInRange {
   Estimate input_gain{};  ///< b0 in the range
 };
 
+/// A force that depends on the position, such as gravity or a spring: a cubic of y as the log
+/// tells it, without its constant.
+struct PositionForce {
+  double middle = 0.0;                ///< mean y of the log
+  double size = 0.0;                  ///< rms of y - middle
+  double low = 0.0, high = 0.0;       ///< range of y in the log: it knows no more
+  std::array<Estimate, 3> factors{};  ///< of x, x^2, x^3 with x = (y - middle) / size; unit of
+                                      ///< y^(n)
+
+  /// Unit of y^(n), as it acts; beyond the range of the log it stays as at its end.
+  [[nodiscard]] double operator()(double y) const {
+    const double x = (std::clamp(y, low, high) - middle) / size;
+    return x * (factors[0].value + x * (factors[1].value + x * factors[2].value));
+  }
+  /// A bound on its error, 95 %, as if all factors were wrong together.
+  [[nodiscard]] double half_width(double y) const {
+    const double x = std::abs((std::clamp(y, low, high) - middle) / size);
+    return x * (factors[0].half_width + x * (factors[1].half_width + x * factors[2].half_width));
+  }
+};
+
 /// A model with error bars, and the evidence for it.
 struct Identified {
-  int order = 0;                        ///< n
-  int extension = 1;                    ///< m
-  Estimate input_gain{};                ///< b0, unit of y^(n) per unit of u
-  Estimate latency{};                   ///< lag plus dead time, s
-  Estimate lag{};                       ///< tau, s
-  Estimate dead_time{};                 ///< L, s
-  Estimate pole{};                      ///< a, 1/s
-  Estimate friction{};                  ///< Coulomb friction, unit of y^(n); 0 if not fitted
-  Estimate noise{};                     ///< standard deviation of the measurement noise, unit of y
-  double disturbance = 0;               ///< intensity of d^(m): variance of its increments per time
-  std::vector<Estimate> columns{};      ///< factors of the log's own columns
-  std::vector<Sinusoid> sinusoids{};    ///< sines in the disturbance, the largest first
+  int order = 0;                      ///< n
+  int extension = 1;                  ///< m
+  Estimate input_gain{};              ///< b0, unit of y^(n) per unit of u
+  Estimate latency{};                 ///< lag plus dead time, s
+  Estimate lag{};                     ///< tau, s
+  Estimate dead_time{};               ///< L, s
+  Estimate pole{};                    ///< a, 1/s
+  Estimate friction{};                ///< Coulomb friction, unit of y^(n); 0 if not fitted
+  double friction_scale = 0;          ///< v_s of friction tanh(v / v_s), unit of y / s (order 1: y)
+  Estimate noise{};                   ///< standard deviation of the measurement noise, unit of y
+  double disturbance = 0;             ///< intensity of d^(m): variance of its increments per time
+  std::vector<Estimate> columns{};    ///< factors of the log's own columns
+  std::vector<Sinusoid> sinusoids{};  ///< sines in the disturbance, the largest first
   std::vector<GainInRange> schedule{};  ///< b0 over the log's scheduling column
   Estimate schedule_slope{};  ///< slope of b0 over the scheduling column, from a straight line
   double schedule_shift = 0;  ///< largest difference of b0 over the column, divided by its interval
@@ -101,6 +124,7 @@ struct Identified {
   /// Whether y, y^2 and y^3 were fitted as columns. In `plant` and `model` this force is part of
   /// the disturbance.
   bool position = false;
+  PositionForce position_force{};  ///< what was fitted
 
   /// Change of b0 if they are added (if they are in the model: the next three powers), half widths
   /// of b0 (at least 1 % of b0), with its drift over one and a half octaves.
@@ -297,14 +321,20 @@ inline FitData with_friction(const FitData& data, const std::vector<double>& spe
 /// Without it b0 is wrong below the frequencies of the motion, by the same amount at every
 /// bandwidth there: a plateau at a wrong b0.
 constexpr std::size_t position_columns = 3;
-inline void add_position(FitData& data, std::size_t from = 1) {
-  // As measured: if it were smoothed, the future noise of y would make it differ from a column of
-  // the log.
+/// Mean of y, and rms of the rest.
+inline std::pair<double, double> position_scale(const FitData& data) {
   std::vector<double> y = data.y;
   double mean = 0.0;
   for (const double value : y) mean += value / static_cast<double>(y.size());
   for (double& value : y) value -= mean;
-  const double size = rms(y);
+  return {mean, rms(y)};
+}
+inline void add_position(FitData& data, std::size_t from = 1) {
+  // As measured: if it were smoothed, the future noise of y would make it differ from a column of
+  // the log.
+  const auto [mean, size] = position_scale(data);
+  std::vector<double> y = data.y;
+  for (double& value : y) value -= mean;
   std::vector<double> column(y.size(), 1.0);
   for (std::size_t power = 1; power < from + position_columns; ++power) {
     for (std::size_t k = 0; k < y.size(); ++k) column[k] *= size > 0.0 ? y[k] / size : 0.0;
@@ -784,7 +814,18 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
                     [c](const PlateauPoint& p) { return p.errors.linear[c]; }, 0.0);
   };
   for (std::size_t c = 1; c <= known; ++c) result.columns.push_back(linear(c));
-  if (chosen.friction_scale > 0.0) result.friction = linear(here.fit.linear.size() - 1);
+  if (chosen.friction_scale > 0.0) {
+    result.friction = linear(here.fit.linear.size() - 1);
+    result.friction_scale = chosen.friction_scale;
+  }
+  if (result.position) {
+    PositionForce& force = result.position_force;
+    std::tie(force.middle, force.size) = position_scale(rows);
+    const auto [low, high] = std::minmax_element(rows.y.begin(), rows.y.end());
+    force.low = *low;
+    force.high = *high;
+    for (std::size_t i = 0; i < position_columns; ++i) force.factors[i] = linear(known + 1 + i);
+  }
   for (std::size_t i = 0; i < sines.size(); ++i) {
     FitData rest = used;
     const auto pair =

@@ -24,6 +24,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
+#include <cstdlib>
 #include <esokit/core/expected.hpp>
 #include <esokit/tune/families.hpp>
 #include <esokit/tune/loop_cost.hpp>
@@ -160,6 +161,26 @@ inline std::string source(double value) {
   std::string number = text;
   if (number.find_first_of(".en") == std::string::npos) number += ".0";
   return number;
+}
+
+/// The number that stands in the source.
+inline double printed(double value) { return std::strtod(source(value).c_str(), nullptr); }
+
+/// The settings that stand in the source, so that what is said of a design is said of its code.
+inline TuneSettings as_printed(TuneSettings s) {
+  for (double* number :
+       {&s.observer_bandwidth, &s.bandwidth_factor, &s.disturbance_bound, &s.capture_bandwidth}) {
+    *number = printed(*number);
+  }
+  for (auto& pole : s.observer_poles) pole = {printed(pole.real()), printed(pole.imag())};
+  if (s.controller_bandwidth > 0.0) {
+    s.controller_bandwidth = printed(s.controller_bandwidth);
+    s.gains =
+        polynomial(std::vector<std::complex<double>>(s.gains.size(), -s.controller_bandwidth));
+  } else {
+    for (double& gain : s.gains) gain = printed(gain);
+  }
+  return s;
 }
 
 /// A family for a model, and how it is searched.
@@ -588,8 +609,21 @@ inline void fill_in(Contender& c, const TuneSearch& search, const LoopCost& fine
   if (d.feasible && search.rules.play) play_all(d, model);
 }
 
-/// Type and config of the controller as C++ source.
-inline std::string controller_source(const TunedDesign& d, const TuneModel& model) {
+/// The controller as C++ source, in its parts.
+struct ControllerSource {
+  std::string observer;  ///< its type
+  std::string config;    ///< of the observer, without its braces
+  std::string law;       ///< `.gains = ..` or `.controller_bandwidth = ..`
+
+  /// Type and config, to paste.
+  [[nodiscard]] std::string text(const TuneModel& model) const {
+    return "using Observer = " + observer + ";\n" +
+           "auto controller = esokit::Adrc<Observer>::make({.observer = {" + config + "},\n    " +
+           law + ",\n    .limits = {.lower = " + source(model.u_min) +
+           ", .upper = " + source(model.u_max) + "}});\n";
+  }
+};
+inline ControllerSource controller_source(const TunedDesign& d, const TuneModel& model) {
   const std::string n = std::to_string(model.order);
   const auto list = [](const std::vector<double>& numbers) {
     std::string text;
@@ -625,7 +659,7 @@ inline std::string controller_source(const TunedDesign& d, const TuneModel& mode
             : free                            ? "}, double, esokit::PoleSet>"
                                               : "}>";
     // The pole of the lag is kept.
-    config = free ? poles("{" + source(-1.0 / model.lag) + ", 0.0}")
+    config = free ? poles("{-1.0 / " + source(model.lag) + ", 0.0}")
                   : ".observer_bandwidth = " + source(d.settings.observer_bandwidth);
     config += ", .input_gain = " + source(model.input_gain.value) +
               ", .sample_time = " + source(model.sample_time) + ", .model = {" + parts + "}";
@@ -652,8 +686,8 @@ inline std::string controller_source(const TunedDesign& d, const TuneModel& mode
         type = "esokit::ExtendedStateFilter<" + n + ">";
         std::vector<double> bounds(static_cast<std::size_t>(model.order), 0.0);
         bounds.push_back(d.settings.disturbance_bound);
-        config = common + ", .measurement_variance = " + source(model.noise * model.noise) +
-                 ", .disturbance_bounds = {{" + list(bounds) +
+        config = common + ", .measurement_variance = " + source(model.noise) + " * " +
+                 source(model.noise) + ", .disturbance_bounds = {{" + list(bounds) +
                  "}}, .bound_factor = 1.0, .inflation_rule = esokit::InflationRule::none, "
                  ".mode = esokit::RiccatiMode::frozen";
         break;
@@ -664,13 +698,10 @@ inline std::string controller_source(const TunedDesign& d, const TuneModel& mode
         break;
     }
   }
-  const bool by_bandwidth = d.settings.controller_bandwidth > 0.0;
-  return "using Observer = " + type + ";\n" +
-         "auto controller = esokit::Adrc<Observer>::make({.observer = {" + config + "},\n" +
-         (by_bandwidth ? "    .controller_bandwidth = " + source(d.settings.controller_bandwidth)
-                       : "    .gains = {{" + list(d.settings.gains) + "}}") +
-         ",\n    .limits = {.lower = " + source(model.u_min) + ", .upper = " + source(model.u_max) +
-         "}});\n";
+  return {type, config,
+          d.settings.controller_bandwidth > 0.0
+              ? ".controller_bandwidth = " + source(d.settings.controller_bandwidth)
+              : ".gains = {{" + list(d.settings.gains) + "}}"};
 }
 
 /// All families for a model. A template, as `tune`, so that it costs compile time only where it is
@@ -942,9 +973,9 @@ template <class = void>
       }
       if (best.value > free.value + 2e-3) best = search.least(c, true, starts);
     }
-    c.design.settings = search.settings(c, best.at);
+    c.design.settings = detail::as_printed(search.settings(c, best.at));
     detail::fill_in(c, search, fine, tuning.optimum, std::exp(free.value));
-    c.design.code = detail::controller_source(c.design, model);
+    c.design.code = detail::controller_source(c.design, model).text(model);
   }
   for (detail::Contender& c : all) tuning.designs.push_back(std::move(c.design));
   // Ranks by J; among the remaining designs within 1 % of the smallest J, the cheapest update comes

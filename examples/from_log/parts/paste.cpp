@@ -1,0 +1,709 @@
+#include "from_log/parts/paste.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <limits>
+
+#include <esokit/adapter/guarded.hpp>
+#include <esokit/control/health.hpp>
+#include <esokit/core/version.hpp>
+#include <esokit/sim/gaussian.hpp>
+#include <esokit/sim/run.hpp>
+#include <esokit/tune/controller.hpp>
+
+namespace from_log {
+namespace {
+
+using esokit::TunedDesign;
+using esokit::TuneFamily;
+using esokit::TuneModel;
+using esokit::Tuning;
+using esokit::detail::printed;
+using esokit::detail::source;
+using esokit::examples::number_text;
+
+constexpr int checked = 100;  ///< samples of the self-check
+constexpr int still = 5;      ///< of them before the step
+
+std::string derivative_of(const std::string& of, int order) {
+  return of + std::string(static_cast<std::size_t>(order), '\'');
+}
+
+/// The machine that was found around rest at (start_y, start_u): (y, .., y^(n-1), v).
+template <int Order>
+auto machine(const Pasting& p, const TuneModel& model) {
+  using State = esokit::Vector<double, Order + 1>;
+  const double T = model.sample_time;
+  // A slope that the integrator can follow.
+  const double scale = std::max(p.friction_scale, 0.1 * p.friction * T);
+  const bool lagged = model.lag > 0.2 * T;
+  return esokit::sim::nonlinear_plant<Order + 1>(
+      [&p, &model, scale, lagged](double, const State& x, double u) {
+        const auto speed = [&](double y, double rate) { return Order == 1 ? y : rate; };
+        const double rate = Order == 2 ? x(1) : 0.0;
+        State change = State::Zero();
+        for (int i = 0; i + 1 < Order; ++i) change(i) = x(i + 1);
+        const double v = lagged ? x(Order) : u;
+        double top = p.input_gain * (v - p.start_u) -
+                     model.pole * (x(Order - 1) - (Order == 1 ? p.start_y : 0.0));
+        if (p.friction > 0.0) {
+          top -= p.friction *
+                 (std::tanh(speed(x(0), rate) / scale) - std::tanh(speed(p.start_y, 0.0) / scale));
+        }
+        if (p.by_position) top += p.force(x(0)) - p.force(p.start_y);
+        change(Order - 1) = top;
+        change(Order) = lagged ? (u - x(Order)) / model.lag : 0.0;
+        return change;
+      });
+}
+
+template <int Order>
+StepOfCode step_on(const Pasting& pasting, const Tuning& tuning, const TunedDesign& design,
+                   double height, double duration, double noise, int digits) {
+  const TuneModel& model = tuning.model;
+  const double T = model.sample_time;
+  Runner runner(pasting, tuning, design);
+  runner.start(pasting.start_y, pasting.start_u);
+  StepOfCode step;
+  step.height = height;
+  esokit::sim::Gaussian gaussian(7);
+  const auto controller = [&](double y, double) {
+    const bool on = static_cast<int>(step.y.size()) >= (digits > 0 ? still : 0);
+    step.y.push_back(y);
+    step.u.push_back(runner.update(y, pasting.start_y + (on ? height : 0.0)));
+    return step.u.back();
+  };
+  const auto plant = machine<Order>(pasting, model);
+  auto rest = esokit::Vector<double, Order + 1>::Zero();
+  rest(0) = pasting.start_y;
+  rest(Order) = pasting.start_u;
+  const auto result =
+      esokit::sim::run(plant, controller,
+                       {.duration = std::max(1.0, std::floor(duration / T)) * T,
+                        .sample_time = T,
+                        .sensor =
+                            [&](double, double y) {
+                              const double measured = y + noise * gaussian.next();
+                              if (digits == 0) return measured;
+                              char text[40];
+                              std::snprintf(text, sizeof text, "%.*g", digits, measured);
+                              return std::strtod(text, nullptr);
+                            },
+                        .dead_time = model.dead_time,
+                        .substeps = 8,
+                        .initial_input = pasting.start_u,
+                        .state = rest});
+  if (!result) return step;
+  for (std::size_t k = 0; k < step.y.size(); ++k) {
+    const double at = (step.y[k] - pasting.start_y) / height;
+    if (std::abs(at - 1) > 0.02) step.settling = static_cast<double>(k + 1) * T;
+    step.overshoot = std::max(step.overshoot, at - 1);
+  }
+  return step;
+}
+
+/// What the code watches, from the log and from what was played.
+struct Watch {
+  double threshold = 0;  ///< a larger innovation is an outlier, unit of y
+  double bound = 0;      ///< of dhat, unit of y^(n)
+  bool guarded = false;  ///< the design is proven with a bound
+  double bandwidth = 0;  ///< of the observer, rad/s
+  double noise = 0;      ///< that makes the innovations of the log, unit of y
+  double memory = 0;     ///< s
+  int divider = 1;
+};
+
+/// Whether an observer with these gains is proven with the bound.
+template <int Order>
+bool certified(const TuneModel& model, const TunedDesign& design, double bound) {
+  const auto made = [&](auto observer_config, auto type) {
+    using Guard = esokit::Guarded<typename decltype(type)::type>;
+    observer_config.input_gain = model.input_gain.value;
+    observer_config.sample_time = model.sample_time;
+    typename Guard::Config config;
+    config.observer = observer_config;
+    config.disturbance_bound = bound;
+    return Guard::make(config).has_value();
+  };
+  if (design.levels > 1) {
+    return esokit::detail::with_number<2, 3>(design.levels, [&](auto levels) {
+      using Observer = esokit::CascadeEso<Order, levels()>;
+      typename Observer::Config config;
+      config.observer_bandwidth = design.settings.observer_bandwidth;
+      config.bandwidth_factor = design.settings.bandwidth_factor;
+      return made(config, std::type_identity<Observer>{});
+    });
+  }
+  auto poles = esokit::detail::placed_poles<Order>(model, design);
+  if (design.knows.lag) {
+    using Observer = esokit::ModelEso<esokit::ModelParts{.order = Order, .actuator = 1}, double,
+                                      esokit::PoleSet>;
+    typename Observer::Config config;
+    config.model.actuator.time_constant = model.lag;
+    poles.insert(poles.begin(), -1.0 / model.lag);
+    std::copy_n(poles.begin(), config.poles.size(), config.poles.begin());
+    return made(config, std::type_identity<Observer>{});
+  }
+  return esokit::detail::with_number<1, 2>(design.extension, [&](auto extension) {
+    using Observer = esokit::LinearEso<Order, double, extension(), esokit::PoleSet>;
+    typename Observer::Config config;
+    std::copy_n(poles.begin(), config.poles.size(), config.poles.begin());
+    return made(config, std::type_identity<Observer>{});
+  });
+}
+
+Watch watch_of(const Tuning& tuning, const TunedDesign& design, const esokit::FitData& rows) {
+  const TuneModel& model = tuning.model;
+  const double b0 = model.input_gain.value;
+  const double T = model.sample_time;
+  const auto form = esokit::detail::told_of_input(design.controller);
+  const auto settling = std::min<std::size_t>(
+      static_cast<std::size_t>(design.settling_time / T) + 20, rows.y.size() / 4);
+  const Replay log = through(form, b0, model.order, rows);
+  const auto innovations = settled(log.innovation, rows, settling);
+  const auto loads = settled(log.load, rows, settling);
+  Watch watch;
+  // Single outliers of the log shall not count.
+  double innovation = std::max(quantile(innovations, 0.99), 4.0 * model.noise);
+  double load = quantile(loads, 0.99);
+  const double middle = std::abs(0.5 * (model.u_min + model.u_max));
+  for (const auto& event : esokit::play_events) {
+    esokit::FitData played;
+    played.sample_time = T;
+    (void)esokit::play(model, 1.0, design.controller, event, design.settling_time,
+                       [&](double, double, double y, double u) {
+                         played.y.push_back(y);
+                         played.u.push_back(u);
+                       });
+    const Replay seen = through(form, b0, model.order, played);
+    for (const double e : seen.innovation) {
+      innovation = std::max(innovation, std::abs(e) + 4.0 * model.noise);
+    }
+    for (const double l : seen.load) load = std::max(load, std::abs(l) + middle);
+  }
+  watch.threshold = printed(2.0 * innovation);
+  watch.bound = printed(2.0 * std::abs(b0) * load);
+  watch.guarded = design.family != TuneFamily::filter &&
+                  esokit::detail::with_number<1, 3>(model.order, [&](auto n) {
+                    return certified<n()>(model, design, watch.bound);
+                  });
+  const auto& gains = design.settings.gains;
+  watch.bandwidth =
+      esokit::detail::law_mean(gains, model.order) / std::max(design.bandwidth_ratio, 1e-9);
+  watch.bandwidth = printed(std::min(watch.bandwidth, 0.99 / T));
+  watch.divider = std::clamp(static_cast<int>(0.5 / (watch.bandwidth * T)), 1, 1000);
+  watch.memory = printed(200.0 / watch.bandwidth);
+  const double rms = std::max(quantile(innovations, 0.95) / 1.96, model.noise);
+  const double by_noise =
+      esokit::detail::with_number<2, 5>(model.order + design.extension, [&](auto size) {
+        const auto monitor =
+            esokit::HealthMonitor<size()>::make({.observer_bandwidth = watch.bandwidth,
+                                                 .sample_time = T,
+                                                 .input_range = 0.5 * (model.u_max - model.u_min),
+                                                 .noise = 1.0,
+                                                 .memory = watch.memory,
+                                                 .divider = watch.divider});
+        return monitor ? monitor->health().innovation_of_noise : 1.0;
+      });
+  watch.noise = printed(rms / std::max(by_noise, 1e-9));
+  return watch;
+}
+
+/// What the code of a design includes.
+std::string includes_of(const std::string& code) {
+  struct Header {
+    const char *word, *file;
+  };
+  constexpr Header headers[] = {{"Guarded<", "adapter/guarded.hpp"},
+                                {"OutlierGate<", "adapter/outlier_gate.hpp"},
+                                {"Adrc<", "control/adrc.hpp"},
+                                {"HealthMonitor<", "control/health.hpp"},
+                                {"SmoothProfile<", "control/smooth_profile.hpp"},
+                                {"HalfGainPoles", "gain/half_gain.hpp"},
+                                {"PoleSet", "gain/pole_set.hpp"},
+                                {"CascadeEso<", "observer/cascade_eso.hpp"},
+                                {"ExtendedStateFilter<", "observer/extended_state_filter.hpp"},
+                                {"HalfGainEso<", "observer/half_gain_eso.hpp"},
+                                {"LinearEso<", "observer/linear_eso.hpp"},
+                                {"ModelEso<", "observer/model_eso.hpp"}};
+  std::string text;
+  for (const Header& header : headers) {
+    if (code.find(header.word) != std::string::npos)
+      text += std::string("#include <esokit/") + header.file + ">\n";
+  }
+  return text;
+}
+
+/// Breaks lines of more than 99 columns after `at`.
+std::string wrapped(const std::string& text, const std::string& indent, const char* more = "",
+                    const char* at = ", ") {
+  std::string out, line = indent, word;
+  bool first = true;
+  const auto put = [&] {
+    if (!first && line.size() + word.size() > 99) {
+      while (line.ends_with(' ')) line.pop_back();
+      out += line + "\n";
+      line = indent + more;
+    }
+    line += word;
+    word.clear();
+    first = false;
+  };
+  for (const char c : text) {
+    word += c;
+    if (word.ends_with(at)) put();
+  }
+  put();
+  while (line.ends_with(' ')) line.pop_back();
+  return out + line + "\n";
+}
+
+std::string comment(const std::string& text, const std::string& indent = "") {
+  return wrapped("// " + text, indent, "// ", " ");
+}
+
+std::string list(const std::vector<double>& numbers) {
+  std::string text;
+  for (const double number : numbers) text += (text.empty() ? "" : ", ") + source(number);
+  return text;
+}
+
+}  // namespace
+
+Replay through(const esokit::LinearController& form, double input_gain, int order,
+               const esokit::FitData& rows) {
+  Replay replay;
+  const int n = form.states();
+  std::vector<double> z(static_cast<std::size_t>(n)), change(z.size());
+  std::size_t piece = 0;
+  double offset = 0.0;
+  const double direct = form.y_to_estimate(0, 0);
+  const auto estimate = [&](int row, double y) {
+    double sum = form.y_to_estimate(row, 0) * y;
+    for (int i = 0; i < n; ++i) sum += form.to_estimate(row, i) * z[static_cast<std::size_t>(i)];
+    return sum;
+  };
+  for (std::size_t k = 0; k < rows.y.size(); ++k) {
+    if (piece < rows.starts.size() && rows.starts[piece] == k) {
+      ++piece;
+      offset = rows.y[k];
+      std::fill(z.begin(), z.end(), 0.0);
+    }
+    const double y = rows.y[k] - offset;
+    const double corrected = estimate(0, y);
+    replay.t.push_back(static_cast<double>(k) * rows.sample_time);
+    replay.estimate.push_back(corrected + offset);
+    replay.load.push_back(estimate(order, y) / input_gain);
+    // The measurement that the observer had expected would not have moved it.
+    replay.innovation.push_back((y - corrected) / (1 - direct));
+    for (int i = 0; i < n; ++i) {
+      double sum = form.from_y(i, 0) * y + form.from_u(i, 0) * rows.u[k];
+      for (int j = 0; j < n; ++j) sum += form.a(i, j) * z[static_cast<std::size_t>(j)];
+      change[static_cast<std::size_t>(i)] = sum;
+    }
+    for (std::size_t i = 0; i < z.size(); ++i) z[i] += change[i];
+  }
+  return replay;
+}
+
+std::vector<double> settled(const std::vector<double>& values, const esokit::FitData& rows,
+                            std::size_t settling) {
+  std::vector<double> sizes;
+  std::size_t piece = 0, from = 0;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    if (piece < rows.starts.size() && rows.starts[piece] == k) {
+      from = k + settling;
+      ++piece;
+    }
+    if (k >= from) sizes.push_back(std::abs(values[k]));
+  }
+  return sizes;
+}
+
+double quantile(std::vector<double> values, double share) {
+  if (values.empty()) return 0.0;
+  const auto at =
+      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+TuneModel as_printed(TuneModel model) {
+  for (double* number : {&model.input_gain.value, &model.lag, &model.noise, &model.sample_time,
+                         &model.u_min, &model.u_max}) {
+    *number = printed(*number);
+  }
+  return model;
+}
+
+std::string Pasting::used() const {
+  std::string text;
+  if (friction > 0.0 || by_position) {
+    text = std::string("; ") + (friction > 0.0 ? "friction" : "") +
+           (friction > 0.0 && by_position ? " and " : "") +
+           (by_position ? "the force that depends on y" : "") +
+           (friction > 0.0 && by_position ? " are" : " is") +
+           " added to u along the reference, so that the observer has less to find";
+  }
+  if (!not_known.empty()) text += ". " + not_known.substr(0, not_known.size() - 1);
+  return text;
+}
+
+double Pasting::known(double r, double rate) const {
+  double sum = 0.0;
+  if (friction > 0.0) sum += friction * std::tanh((order == 1 ? r : rate) / friction_scale);
+  if (by_position) sum -= force(r);
+  return sum / input_gain;
+}
+
+std::vector<double> Pasting::limits(const TuneModel& model, std::size_t gains) const {
+  std::vector<double> all(gains, 0.0);
+  const auto n = static_cast<std::size_t>(order);
+  all[n - 1] = limit;
+  if (n >= 2) all[n - 2] = rate_limit;
+  // The lag asks for r^(n) + tau r^(n+1).
+  if (gains > n) all[n] = printed(0.6 * limit / model.lag);
+  return all;
+}
+
+Pasting Pasting::make(const Settings& settings, const Input& input, const esokit::Identified& found,
+                      const TuneModel& model, const std::vector<double>& load) {
+  Pasting p;
+  const std::string name = std::filesystem::path(settings.file).filename().string();
+  p.order = model.order;
+  p.input_gain = model.input_gain.value;
+  const double half = 0.5 * (model.u_max - model.u_min);
+  const double force = std::abs(p.input_gain) * half;
+  // Only what the log tells, and what u can still balance.
+  if (found.friction.low() > 0.0 && found.friction.value < 0.5 * force && p.order <= 2) {
+    p.friction = printed(found.friction.value);
+    p.friction_scale = printed(found.friction_scale);
+  }
+  if (found.position) {
+    p.force = found.position_force;
+    double squares = 0.0, errors = 0.0;
+    constexpr int points = 100;
+    for (int i = 0; i <= points; ++i) {
+      const double y = p.force.low + (p.force.high - p.force.low) * i / points;
+      squares += std::pow(p.force(y), 2);
+      errors += std::pow(p.force.half_width(y), 2);
+    }
+    p.by_position = squares > 4.0 * errors && std::sqrt(squares / points) < 0.5 * force;
+    for (double* number : {&p.force.middle, &p.force.size, &p.force.low, &p.force.high}) {
+      *number = printed(*number);
+    }
+    for (auto& factor : p.force.factors) factor.value = printed(factor.value);
+  }
+  // The range of u that the forces of the log leave, in both directions.
+  std::vector<double> needed;
+  for (const double l : load) needed.push_back(-l);
+  const double low = quantile(needed, 0.05), high = quantile(needed, 0.95);
+  const double room = std::clamp(std::min(model.u_max - high, low - model.u_min), 0.2 * half, half);
+  const double share = 0.5 * room * std::abs(p.input_gain);
+  p.limit = printed(share);
+  if (p.order >= 2 && std::abs(model.pole) > 0.0) {
+    p.rate_limit = printed(0.6 * share / std::abs(model.pole));
+  }
+  p.shortest = printed(4.0 * model.latency());
+  const auto& y = input.log.y;
+  double mean = 0.0, least = std::numeric_limits<double>::infinity(), most = -least;
+  std::size_t count = 0;
+  for (const double value : y) {
+    if (!std::isfinite(value)) continue;
+    mean += value;
+    ++count;
+    least = std::min(least, value);
+    most = std::max(most, value);
+  }
+  mean /= static_cast<double>(std::max<std::size_t>(count, 1));
+  if (least > 0.0 || most < 0.0) p.start_y = std::strtod(number_text(mean, 3).c_str(), nullptr);
+  if (model.u_min > -0.1 * half || model.u_max < 0.1 * half) {
+    p.start_u = printed(0.5 * (model.u_min + model.u_max));
+  }
+  const std::string highest = derivative_of("y", p.order);
+  p.head =
+      comment("From " + name + " by from_log of esokit " + std::to_string(ESOKIT_VERSION_MAJOR) +
+              "." + std::to_string(ESOKIT_VERSION_MINOR) + "." +
+              std::to_string(ESOKIT_VERSION_PATCH) + ": order " + std::to_string(p.order) +
+              ", b0 = " + number_text(found.input_gain.value, 4) + " +- " +
+              number_text(found.input_gain.half_width, 2) + ".") +
+      comment("y is '" + input.y + "' and u is '" + input.u +
+              "' in the units of the log, times are in s; b0 is " + highest +
+              " per unit of u, d and forces are in the unit of " + highest + ".") +
+      comment(
+          "This file checks itself: g++ -std=c++20 -O2 -I esokit/include FILE.cpp && ./a.out. "
+          "Then take main away, and call start once and update every " +
+          number_text(1e3 * model.sample_time, 6) + " ms.");
+  if (!settings.known.empty()) {
+    std::string columns;
+    for (const auto& column : settings.known) columns += (columns.empty() ? "" : ", ") + column;
+    p.not_known = "The known effects of the log (" + columns +
+                  ") are part of d: the code does not measure them.";
+  }
+  return p;
+}
+
+Runner::Runner(const Pasting& pasting, const Tuning& tuning, const TunedDesign& design)
+    : pasting_(&pasting),
+      form_(esokit::detail::told_of_input(design.controller)),
+      profile_(esokit::detail::with_number<1, 4>(
+          static_cast<int>(design.settings.gains.size()),
+          [&](auto order) -> Profile {
+            esokit::SmoothProfileConfig<order()> config{.shortest_time = pasting.shortest,
+                                                        .sample_time = tuning.model.sample_time};
+            const auto limits = pasting.limits(tuning.model, design.settings.gains.size());
+            std::copy(limits.begin(), limits.end(), config.limits.begin());
+            return esokit::SmoothProfile<order()>::make(config).value();
+          })),
+      lower_(tuning.model.u_min),
+      upper_(tuning.model.u_max),
+      state_(static_cast<std::size_t>(form_.states())) {
+  const auto& gains = design.settings.gains;
+  // v = k0 (r - y) + k1 (r' - y') + ..: 1 is the factor of the highest derivative.
+  for (std::size_t i = 0; i <= gains.size(); ++i) {
+    weights_[i] = form_.r_to_u(0, 0) * (i < gains.size() ? gains[i] : 1.0) / gains[0];
+  }
+}
+
+void Runner::start(double y, double u) {
+  std::fill(state_.begin(), state_.end(), 0.0);
+  std::visit([&](auto& profile) { profile.reset(y); }, profile_);
+  y_ = y;
+  u_ = u - pasting_->known(y, 0.0);
+}
+
+double Runner::update(double y, double target) {
+  motion_ = {};
+  std::visit(
+      [&](auto& profile) {
+        profile.update(target);
+        const auto motion = profile.motion();
+        for (int i = 0; i < motion.rows(); ++i) motion_[static_cast<std::size_t>(i)] = motion(i);
+      },
+      profile_);
+  const double from_rest = y - y_;
+  double u = u_ + form_.y_to_u(0, 0) * from_rest - weights_[0] * y_;
+  for (std::size_t i = 0; i < weights_.size(); ++i) u += weights_[i] * motion_[i];
+  const int n = form_.states();
+  for (int i = 0; i < n; ++i) u += form_.to_u(0, i) * state_[static_cast<std::size_t>(i)];
+  const double known = pasting_->known(motion_[0], motion_[1]);
+  u = std::clamp(std::clamp(u, lower_, upper_) + known, lower_, upper_);
+  std::vector<double> next = state_;
+  for (int i = 0; i < n; ++i) {
+    double& sum = next[static_cast<std::size_t>(i)];
+    // The observer is told of u without what is known.
+    sum += form_.from_y(i, 0) * from_rest + form_.from_u(i, 0) * (u - known - u_);
+    for (int j = 0; j < n; ++j) sum += form_.a(i, j) * state_[static_cast<std::size_t>(j)];
+  }
+  state_ = next;
+  return u;
+}
+
+StepOfCode step_of_code(const Pasting& pasting, const Tuning& tuning, const TunedDesign& design,
+                        double height, double duration, double noise, int digits) {
+  return esokit::detail::with_number<1, 3>(pasting.order, [&](auto order) {
+    return step_on<order()>(pasting, tuning, design, height, duration, noise, digits);
+  });
+}
+
+std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesign& design,
+                        const esokit::FitData& rows) {
+  const TuneModel& model = tuning.model;
+  const double T = model.sample_time;
+  const auto parts = esokit::detail::controller_source(design, model);
+  const Watch watch = watch_of(tuning, design, rows);
+  const std::string highest = derivative_of("y", p.order);
+  const auto gains = static_cast<int>(design.settings.gains.size());
+  const std::string limits_of_u =
+      ".limits = {.lower = " + source(model.u_min) + ", .upper = " + source(model.u_max) + "}";
+  const bool known = p.feeds_forward();
+
+  std::string body;
+  body += comment("The observer finds d of " + highest +
+                  " = b0 u + d: loads, friction, gravity, errors of b0. " + p.not_known);
+  std::string type = "esokit::OutlierGate<" + parts.observer + ">";
+  if (watch.guarded) type = "esokit::Guarded<" + type + ">";
+  body += wrapped("using Observer = " + type + ";", "", "    ");
+  body += "\nstruct Loop {\n";
+  body += "  esokit::Adrc<Observer> controller;\n";
+  body += "  esokit::SmoothProfile<" + std::to_string(gains) + "> profile;\n";
+  body +=
+      "  esokit::HealthMonitor<" + std::to_string(model.order + design.extension) + "> monitor;\n";
+  if (known)
+    body += "  double u = 0.0, fed = 0.0;  // the last u, and the part of it that is known\n";
+  body += "\n  // Once, at start-up. Nothing if a setting breaks a rule, which is printed.\n";
+  body += "  static std::optional<Loop> make() {\n";
+  body += "    const auto controller = esokit::Adrc<Observer>::make(\n";
+  const std::string gate = "{.observer = {" + parts.config + "},";
+  const std::string threshold = ".threshold = " + source(watch.threshold);
+  if (watch.guarded) {
+    body += "        {.observer =\n";
+    body += wrapped("{.observer = " + gate, "             ", " ");
+    body += comment(
+        "y: an innovation beyond it is an outlier; twice the largest of the log and "
+        "of the overloads that were played",
+        "              ");
+    body += "              " + threshold + "},\n";
+    body += comment(highest + ": dhat is not believed beyond it; twice the largest, as above",
+                    "             ");
+    body += "             .disturbance_bound = " + source(watch.bound) + "},\n";
+  } else {
+    body += "        {.observer =\n";
+    body += wrapped(gate, "             ", " ");
+    body += comment(
+        "y: an innovation beyond it is an outlier; twice the largest of the log and "
+        "of the overloads that were played. dhat has no bound: this observer is not "
+        "proven with one",
+        "              ");
+    body += "              " + threshold + "},\n";
+  }
+  body += wrapped(parts.law + ",", "         ", " ");
+  body += "         " + limits_of_u + "});  // u\n";
+  body += comment("From rest to rest, with all derivatives: largest abs(r'), .., abs(r" +
+                      std::string(static_cast<std::size_t>(gains), '\'') + "), 0 is none. " +
+                      highest + " needs half of what the forces of the log leave of u.",
+                  "    ");
+  body += "    const auto profile = esokit::SmoothProfile<" + std::to_string(gains) + ">::make(\n";
+  body += "        {.limits = {{" + list(p.limits(model, design.settings.gains.size())) +
+          "}}, .shortest_time = " + source(p.shortest) + ", .sample_time = " + source(T) + "});\n";
+  body += comment("The noise is that which makes the innovations of the log.", "    ");
+  body += "    const auto monitor = esokit::HealthMonitor<" +
+          std::to_string(model.order + design.extension) + ">::make(\n";
+  body += wrapped("{.observer_bandwidth = " + source(watch.bandwidth) +
+                      ", .sample_time = " + source(T) +
+                      ", .input_range = " + source(printed(0.5 * (model.u_max - model.u_min))) +
+                      ", .noise = " + source(watch.noise) + ", .memory = " + source(watch.memory) +
+                      ", .divider = " + std::to_string(watch.divider) + "});",
+                  "        ", " ");
+  body +=
+      "    const auto fails = [](const auto& made) {\n"
+      "      if (!made) std::printf(\"%s: %s\\n\", made.error().field, made.error().rule);\n"
+      "      return !made;\n"
+      "    };\n"
+      "    if (fails(controller) || fails(profile) || fails(monitor)) return {};\n"
+      "    return Loop{*controller, *profile, *monitor};\n"
+      "  }\n";
+  if (known) {
+    std::string what = p.friction > 0.0 ? "friction" : "";
+    if (p.by_position) what += std::string(what.empty() ? "" : " and ") + "the force by y";
+    body += "\n" + comment("What " + what +
+                               " needs of u along the reference. By the reference, not by y: so it "
+                               "changes no margin.",
+                           "  ");
+    body += "  static double known([[maybe_unused]] double r, [[maybe_unused]] double rate) {\n";
+    body += "    double force = 0.0;  // " + highest + "\n";
+    if (p.friction > 0.0) {
+      body += "    force += " + source(p.friction) + " * std::tanh(" +
+              (p.order == 1 ? "r" : "rate") + " / " + source(p.friction_scale) + ");\n";
+    }
+    if (p.by_position) {
+      // As printed, and as it is computed here.
+      body += "    const double x = (std::clamp(r, " + source(p.force.low) + ", " +
+              source(p.force.high) + ") - " +
+              (p.force.middle < 0 ? "(" + source(p.force.middle) + ")" : source(p.force.middle)) +
+              ") / " + source(p.force.size) + ";\n";
+      body += "    force -= x * (" + source(p.force.factors[0].value) + " + x * (" +
+              source(p.force.factors[1].value) + " + x * " + source(p.force.factors[2].value) +
+              "));\n";
+    }
+    body += "    return force / " + source(p.input_gain) + ";\n  }\n";
+  }
+  body += "\n  // Once, while the machine rests at y under u_now: takes over without a bump.\n";
+  body += std::string("  void start(double y, double u_now) {\n") + "    profile.reset(y);\n" +
+          (known ? "    u = u_now;\n    fed = known(y, 0.0);\n    controller.start(y, u - fed);\n"
+                 : "    controller.start(y, u_now);\n") +
+          "    monitor.clear();\n  }\n";
+  body +=
+      "\n" + comment(
+                 "Once a sample. y is measured, NaN where it is missing; target is where y shall "
+                 "go: a new one begins a move, at the end of the last. Returns u, to be held until "
+                 "the next call.",
+                 "  ");
+  body += "  double update(double y, double target) {\n    profile.update(target);\n";
+  if (known) {
+    body +=
+        "    const auto r = profile.motion();  // (r, r', ..)\n"
+        "    const double more = known(r(0), r(1));\n"
+        "    // If the actuator reports what it really held, give that in place of u.\n"
+        "    u = std::clamp(controller.update(y, r, u - fed) + more, " +
+        source(model.u_min) + ", " + source(model.u_max) +
+        ");\n"
+        "    fed = more;\n";
+  } else {
+    body +=
+        "    // If the actuator reports what it really held, give that as a third argument.\n"
+        "    const double u = controller.update(y, profile.motion());\n";
+  }
+  body +=
+      "    monitor.look(controller);\n"
+      "    // Now and then: esokit::diagnose(monitor.health()) is LoopFault::none, or names the\n"
+      "    // fault (advice of control/health_text.hpp says what to do). wrong_sign,\n"
+      "    // gain_too_small: set u to its safe value. measurements_rejected: look at the sensor.\n"
+      "    // controller.mode() is LoopMode::safe where measurements are missing for long.\n"
+      "    return u;\n  }\n};\n\n";
+
+  // The self-check: a step that takes about 60 samples, if u can hold its end.
+  double height = p.limit / esokit::smooth_step_peaks<1>[0];
+  const std::array<double, 3> peaks{esokit::smooth_step_peaks<1>[0],
+                                    esokit::smooth_step_peaks<2>[1],
+                                    esokit::smooth_step_peaks<3>[2]};
+  height = p.limit / peaks[static_cast<std::size_t>(p.order - 1)];
+  for (int i = 0; i < p.order; ++i) height *= 60 * T;
+  const double half = 0.5 * (model.u_max - model.u_min);
+  if (p.order == 1 && std::abs(model.pole) > 0.0) {
+    height = std::min(height, 0.2 * half * std::abs(p.input_gain / model.pole));
+  }
+  height = std::strtod(number_text(height, 3).c_str(), nullptr);
+  const double target = printed(p.start_y + height);
+  const auto played =
+      step_of_code(p, tuning, design, target - p.start_y, checked * T, model.noise, 9);
+  std::string samples;
+  for (std::size_t k = 0; k < checked && k < played.y.size(); ++k) {
+    char text[80];
+    std::snprintf(text, sizeof text, "{%.9g,%.9g}", played.y[k], played.u[k]);
+    samples += (k > 0 ? ", " : "") + std::string(text);
+  }
+  body += comment("The first " + std::to_string(checked) +
+                  " samples of a step on the machine that was found, as from_log played it: y with "
+                  "its noise, and u.");
+  body += "constexpr double samples[" + std::to_string(checked) + "][2] = {\n" +
+          wrapped(samples + "};", "    ");
+  body +=
+      "\n" + comment(
+                 "0 if this program computes the same u, else 1. A compiler may change the last "
+                 "digits (-ffast-math, fused instructions), which the observer makes up to a "
+                 "millionth of the range of u; a wrong digit of a setting does more.");
+  body +=
+      "int self_check() {\n"
+      "  auto loop = Loop::make();\n"
+      "  if (!loop) return 1;\n"
+      "  loop->start(" +
+      source(p.start_y) + ", " + source(p.start_u) +
+      ");\n"
+      "  for (int k = 0; k < " +
+      std::to_string(checked) +
+      "; ++k) {\n"
+      "    const double u = loop->update(samples[k][0], k < " +
+      std::to_string(still) + " ? " + source(p.start_y) + " : " + source(target) +
+      ");\n"
+      "    if (std::abs(u - samples[k][1]) < " +
+      source(2e-6 * half) +
+      ") continue;\n"
+      "    std::printf(\"self-check: sample %d: u is %.9g, not %.9g\\n\", k, u, "
+      "samples[k][1]);\n"
+      "    return 1;\n"
+      "  }\n"
+      "  std::puts(\"self-check: ok\");\n"
+      "  return 0;\n"
+      "}\n\n"
+      "int main() {\n"
+      "  return self_check();\n"
+      "}\n";
+  return p.head + "#include <algorithm>\n#include <cmath>\n#include <cstdio>\n" +
+         includes_of(body) + "#include <optional>\n\n" + body;
+}
+
+}  // namespace from_log

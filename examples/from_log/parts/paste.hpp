@@ -1,0 +1,114 @@
+/// @file
+/// The code that a page gives to paste: a design with its reference profile, what is known of the
+/// machine, guards and a self-check; and the same as from_log runs it.
+#pragma once
+
+#include <array>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include <esokit/control/smooth_profile.hpp>
+#include <esokit/tune/tune.hpp>
+
+#include "from_log/parts/from_log.hpp"
+
+namespace from_log {
+
+/// The log through an observer.
+struct Replay {
+  std::vector<double> t, estimate, load, innovation;  ///< load: dhat / b0
+  double band = 0;    ///< 95 % of the innovations are within this, says the model
+  double inside = 0;  ///< share of the log's that are
+};
+
+/// Rows through the observer of a controller, each piece from rest.
+[[nodiscard]] Replay through(const esokit::LinearController& form, double input_gain, int order,
+                             const esokit::FitData& rows);
+
+/// Absolute values of those that count: not while the observer finds the state.
+[[nodiscard]] std::vector<double> settled(const std::vector<double>& values,
+                                          const esokit::FitData& rows, std::size_t settling);
+
+/// The value that this share of them is below.
+[[nodiscard]] double quantile(std::vector<double> values, double share);
+
+/// The numbers as the code prints them, so that all that is said is said of the code.
+[[nodiscard]] esokit::TuneModel as_printed(esokit::TuneModel model);
+
+/// What the code has beside the design: the same for all designs of a page.
+struct Pasting {
+  std::string head;                 ///< the comment at its beginning
+  std::string not_known;            ///< a sentence about what remains part of d
+  int order = 1;                    ///< n
+  double input_gain = 1;            ///< b0
+  double friction = 0;              ///< Coulomb friction, unit of y^(n); 0: not used
+  double friction_scale = 1;        ///< tanh(speed / this)
+  bool by_position = false;         ///< the force by y is used
+  esokit::PositionForce force;      ///< it
+  double start_y = 0, start_u = 0;  ///< the machine rests there before the self-check
+  double limit = 0;                 ///< largest r^(n) of the profile
+  double rate_limit = 0;            ///< largest r^(n-1), by the pole; 0: none
+  double shortest = 0;              ///< no move of the profile is shorter, s
+
+  /// @param load of the log, unit of u, see Replay
+  [[nodiscard]] static Pasting make(const Settings& settings, const Input& input,
+                                    const esokit::Identified& found, const esokit::TuneModel& model,
+                                    const std::vector<double>& load);
+
+  /// Whether the code adds what is known of the machine to u.
+  [[nodiscard]] bool feeds_forward() const { return friction > 0.0 || by_position; }
+  /// What of the machine is used and what is not, after "with settings from the log".
+  [[nodiscard]] std::string used() const;
+  /// What friction and the force by y need of u along the reference.
+  [[nodiscard]] double known(double r, double rate) const;
+  /// Largest derivatives of the profile of a law with so many gains: n, or n + 1 where its observer
+  /// knows the lag.
+  [[nodiscard]] std::vector<double> limits(const esokit::TuneModel& model, std::size_t gains) const;
+};
+
+/// What the code computes, sample by sample, whatever its types: a design within its limits, with
+/// the profile and what is known.
+class Runner {
+ public:
+  Runner(const Pasting& pasting, const esokit::Tuning& tuning, const esokit::TunedDesign& design);
+  /// From rest at y under u.
+  void start(double y, double u);
+  /// Once a sample. @param target where y shall go
+  double update(double y, double target);
+  /// (r, r', ..) of the last sample.
+  [[nodiscard]] const std::array<double, 5>& motion() const { return motion_; }
+
+ private:
+  using Profile = std::variant<esokit::SmoothProfile<1>, esokit::SmoothProfile<2>,
+                               esokit::SmoothProfile<3>, esokit::SmoothProfile<4>>;
+
+  const Pasting* pasting_;
+  esokit::LinearController form_;
+  Profile profile_;
+  double lower_, upper_;
+  std::array<double, 5> weights_{};  ///< of r, r', .. in u
+  std::array<double, 5> motion_{};
+  std::vector<double> state_;
+  double y_ = 0, u_ = 0;  ///< where it started, without what is known
+};
+
+/// A step of the reference, as the machine that was found answers to the code, within the limits.
+struct StepOfCode {
+  double height = 0;
+  double settling = 0;   ///< s, to within 2 %
+  double overshoot = 0;  ///< share of the height
+  std::vector<double> y, u;
+};
+/// @param noise standard deviation @param digits of y: those that are printed; 0: all
+[[nodiscard]] StepOfCode step_of_code(const Pasting& pasting, const esokit::Tuning& tuning,
+                                      const esokit::TunedDesign& design, double height,
+                                      double duration, double noise, int digits);
+
+/// C++ that compiles as it is. @param rows the log
+[[nodiscard]] std::string pasted_code(const Pasting& pasting, const esokit::Tuning& tuning,
+                                      const esokit::TunedDesign& design,
+                                      const esokit::FitData& rows);
+
+}  // namespace from_log
