@@ -566,7 +566,10 @@ class LogFile {
     }
     double found = 0;
     if (stamps_ == wanted) {
-      if (const auto number = parse<long double>(field, separator_)) {
+      std::optional<long double> number = parse(field, separator_);
+      // More digits than a double has are those of nanoseconds since 1970.
+      if (number && field.size() > 15) number = parse<long double>(field, separator_);
+      if (number) {
         found =
             std::isfinite(*number) ? reader_.number(*number, wrong) : static_cast<double>(*number);
       } else if (const auto stamp = parse_stamp(field)) {

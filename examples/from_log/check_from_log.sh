@@ -366,8 +366,8 @@ reads irregular.csv
 
 # ---- files as other people's loggers write them ----
 
-# The same log two seconds before midnight: $1 is an awk expression of d, the days since then, and c,
-# the second of the day; $2 of the whole row, of that stamp, $2 and $3.
+# stamped STAMP [ROW]: the same log two seconds before midnight. STAMP is an awk expression of d, the
+# days since then, and c, the second of the day; ROW one of stamp, $2 and $3.
 stamped() {
   table , | awk -F, "function clock() { return sprintf(\"%02d:%02d:%06.3f\", c / 3600, c % 3600 / 60, c % 60) }
     { s = 86398 + \$1; d = int(s / 86400); c = s - 86400 * d; stamp = $1; print ${2:-stamp \",\" \$2 \",\" \$3} }"
@@ -379,7 +379,8 @@ reads index_and_iso.csv
 reads leap_day.csv
 stamped 'clock() " -> "' 'stamp $2 "," $3' >serial_monitor.txt
 reads serial_monitor.txt --time 1 --y 2 --u 3
-{ echo time,y,u; stamped 'sprintf("03/04/2024 %02d:%s %s", 11, substr(sprintf("%02d:%06.3f", (c + 2) % 86400 / 60, (c + 2) % 60), 1), "PM")'; } >american.csv
+{ echo time,y,u; stamped 'sprintf("03/04/2024 %d:%s %sM", d ? 12 : 11, substr(clock(), 4), d ? "P" : "A")'
+} >american.csv
 reads american.csv
 { printf 'Messung vom 29.2.2024;;\nZeitstempel;Winkel;Stellgr\xf6\xdfe\n;rad;Nm\n'
   stamped 'sprintf("%02d.%s.2024 ", d ? 1 : 29, d ? "03" : "02") clock()' 'stamp ";" $2 ";" $3' |

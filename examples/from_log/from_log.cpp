@@ -279,7 +279,8 @@ int main(int argc, char** argv) {
       std::fprintf(stderr, "%s%s\n", mark, line.c_str());
       mark = "  ";
     }
-    if (outcome.input.unit_assumed && outcome.findings.rows.sample_time > 0.5) {
+    if (outcome.input.unit_assumed && outcome.findings.seen &&
+        outcome.findings.rows.sample_time > 0.5) {
       std::printf(
           "Nothing says in which unit %s is: it was read in seconds. If it is in another "
           "one, set --time-unit.\n",

@@ -156,7 +156,8 @@ void say_moves(const Input& input, Findings& all) {
   std::vector<double> at;
   double from = rows.u[0];
   std::size_t gradual = 0;
-  for (std::size_t k = 1; k < rows.u.size(); ++k) {
+  // To one in the last rows y cannot answer.
+  for (std::size_t k = 1; k + rows.u.size() / 100 < rows.u.size(); ++k) {
     if (std::abs(rows.u[k] - from) < step) continue;
     from = rows.u[k];
     if (std::abs(rows.u[k] - rows.u[k - 1]) < 0.5 * step) ++gradual;
@@ -178,13 +179,13 @@ void say_moves(const Input& input, Findings& all) {
   all.shown.push_back("u (" + input.u + ") moves " + std::to_string(at.size()) +
                       " times by a fifth of its range, " + range + ", or more, every " +
                       duration_text(stay) + " (median)" +
-                      (2 * gradual > at.size()
-                           ? ", " + std::to_string(gradual) +
-                                 " of them gradually, which tells b0 less than steps do."
-                           : "."));
+                      (gradual > 0 ? ", " + std::to_string(gradual) +
+                                         " of them gradually, which tells b0 less than steps do."
+                                   : "."));
   if (all.seen && all.found.latency.value > stay) {
-    all.shown.push_back("Lag and dead time, " + duration_text(all.found.latency.value) +
-                        ", are longer than that: u moves on before y has answered.");
+    all.shown.push_back(
+        "Lag and dead time, " + duration_text(all.found.latency.value) +
+        " as they were found, are longer than that: u moves on before y has answered.");
   }
 }
 
@@ -242,6 +243,11 @@ void say_residual(const compiled::Residual& residual, Findings& all) {
     all.shown.push_back("The residual changes its sign from row to row (correlation " +
                         number_text(all.residual_correlation[0], 2) +
                         "), as of a speed from counts.");
+  }
+  if (all.residual_correlation[0] > 0.3) {
+    all.shown.push_back("The residual changes little from row to row (correlation " +
+                        number_text(all.residual_correlation[0], 2) +
+                        "), as of a y that was filtered, or a machine of higher order.");
   }
   if (rows < 600) {
     all.shown.push_back("The log is short: " + std::to_string(e.size()) + " rows, " +

@@ -55,9 +55,7 @@ std::string advice(const std::string& field) {
       {"saturated", "Log the u that the actuator really held."},
       {"rows",
        "Record at least 200 rows without a gap; 20 s at the sample rate of the controller are "
-       "better."},
-      {"u", "Log the input while it moves."},
-      {"y", "Log the output while it moves."}};
+       "better."}};
   const auto at = all.find(field);
   return at == all.end() ? "" : at->second;
 }

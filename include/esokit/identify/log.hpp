@@ -115,7 +115,7 @@ inline std::size_t mend_outliers(std::vector<double>& y) {
   std::vector<bool> suspect(count, false);
   if (const double most = quantile(distances, 75); most > 0.0) {
     for (std::size_t k = 2; k + 3 < count; ++k) {
-      for (const std::size_t length : {1, 2}) {
+      for (std::size_t length = 1; length <= 2; ++length) {
         if (!stand_away(k, length, 8.0 * most)) continue;
         for (std::size_t i = k - 1; i <= k + length; ++i) suspect[i] = true;
       }
@@ -127,7 +127,7 @@ inline std::size_t mend_outliers(std::vector<double>& y) {
   const double least = usual.empty() ? 0.0 : 8.0 * quantile(usual, 99);
   std::size_t found = 0;
   if (!(least > 0.0)) return found;
-  for (const std::size_t length : {1, 2}) {
+  for (std::size_t length = 1; length <= 2; ++length) {
     for (std::size_t k = 2; k + length + 1 < count; ++k) {
       if (!stand_away(k, length, least)) continue;
       const double before = y[k - 1],
