@@ -193,15 +193,17 @@ int main(int argc, char** argv) {
     return simulate(
         6, seed, [&](double y, double r) { return controller.update(y, r); }, reference, load);
   };
-  const auto with_new = [&](std::uint64_t seed) {
-    from_log::Runner controller(pasting, tuning, taken);
+  const auto with_new = [&](const from_log::Pasting& what, std::uint64_t seed) {
+    from_log::Runner controller(what, tuning, taken);
     controller.start(0, 0);
     int k = 0;
     return simulate(
         6, seed, [&](double y, double) { return controller.update(y, steps(T * k++)); }, reference,
         load);
   };
-  const Run before = with_pid(2), after = with_new(2);
+  auto bare = pasting;
+  bare.friction = 0;
+  const Run before = with_pid(2), after = with_new(pasting, 2), left_out = with_new(bare, 2);
 
   struct Measure {
     const char* name;
@@ -220,6 +222,7 @@ int main(int argc, char** argv) {
     const double pid_value = measure.of(before), value = measure.of(after);
     report.check("PID", measure.name, std::nullopt, pid_value);
     report.check("from the log", measure.name, std::nullopt, value);
+    report.check("without friction", measure.name, std::nullopt, measure.of(left_out));
     lines.push_back({measure.name, number_text(pid_value, 3), number_text(value, 3),
                      number_text(pid_value / value, 3)});
   }

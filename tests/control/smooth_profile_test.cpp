@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <esokit/control/smooth_profile.hpp>
@@ -44,7 +43,7 @@ TEST(SmoothStep, EqualsThePrintedPolynomials) {
 /// The peaks are those of the derivatives: none above in a scan, and reached.
 template <int Order>
 void expect_peaks() {
-  std::array<double, Order> most{};
+  esokit::Array<double, Order> most{};
   constexpr int points = 20000;
   for (int k = 0; k <= points; ++k) {
     const auto s = smooth_step<Order>(static_cast<double>(k) / points);
@@ -75,8 +74,8 @@ void expect_derivatives() {
   auto profile = SmoothProfile<Order>::make(config).value();
   ASSERT_TRUE(profile.reset(-0.4));
   typename SmoothProfile<Order>::Motion before = profile.motion(), now = before;
-  std::array<double, Order + 1> size{};
-  std::array<double, Order> wrong{};
+  esokit::Array<double, Order + 1> size{};
+  esokit::Array<double, Order> wrong{};
   do {
     ASSERT_TRUE(profile.update(1.1));
     const auto after = profile.motion();
@@ -126,7 +125,7 @@ void search(std::uint64_t seed) {
     for (int move = 0; move < 3; ++move) {
       const S target = static_cast<S>(unit * random.uniform(-1, 1));
       const S least = profile.duration(target);
-      std::array<S, Order> most{};
+      esokit::Array<S, Order> most{};
       int samples = 0;
       S last = from;
       do {

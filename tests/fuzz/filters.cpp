@@ -4,7 +4,6 @@
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/experiment.hpp>
 #include <esokit/control/nonlinear_feedback.hpp>
-#include <esokit/control/smooth_profile.hpp>
 #include <esokit/control/tracking_differentiator.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/mimo_extended_state_filter.hpp>
@@ -23,7 +22,6 @@ void add_filters(std::vector<Kind>& kinds) {
   KIND(Experiment<2, float>);
   KIND(TrackingDifferentiator<float>);
   KIND(SignTrackingDifferentiator<float>);
-  KIND(SmoothProfile<2, float>);
   KIND(NonlinearFeedback<2, float>);
 #ifndef ESOKIT_ONE_TYPE
   KIND(ExtendedStateFilter<2, double>);
@@ -32,7 +30,6 @@ void add_filters(std::vector<Kind>& kinds) {
   KIND(MimoExtendedStateFilter<ChainOrders<2, 2>, 1, double>);
   KIND(Experiment<1, double>);
   KIND(TrackingDifferentiator<double>);
-  KIND(SmoothProfile<3, double>);
 #endif
 }
 

@@ -189,6 +189,20 @@ TEST(Identify, AForceByPositionIsFoundOrMissed) {
   EXPECT_EQ(found->orders[1].model.order, 2);
   EXPECT_LT(std::abs(found->input_gain.value - b0), found->input_gain.half_width);
   EXPECT_LT(found->position_shift, 1);
+  // Its factors are those of the force, over the range of the log; beyond it nothing is known.
+  const esokit::PositionForce& force = found->position_force;
+  const auto [low, high] = std::minmax_element(log.y.begin(), log.y.end());
+  EXPECT_EQ(force.low, *low);
+  EXPECT_EQ(force.high, *high);
+  EXPECT_EQ(force(force.middle), 0);
+  for (int i = 0; i <= 20; ++i) {
+    const double y = force.low + (force.high - force.low) * i / 20;
+    const double truth = -30 * (std::sin(y) - std::sin(force.middle));
+    EXPECT_LT(std::abs(force(y) - truth), force.half_width(y) + 0.03 * 30) << y;
+    EXPECT_LT(std::abs(force(y) - truth), 0.2 * 30) << y;
+  }
+  EXPECT_EQ(force(force.high + 5), force(force.high));
+  EXPECT_EQ(force(force.low - 5), force(force.low));
 
   options = quick();
   options.position = false;

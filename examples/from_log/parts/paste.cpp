@@ -663,7 +663,7 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
   std::string samples;
   for (std::size_t k = 0; k < checked && k < played.y.size(); ++k) {
     char text[80];
-    std::snprintf(text, sizeof text, "{%.9g,%.9g}", played.y[k], played.u[k]);
+    std::snprintf(text, sizeof text, "{%.9g,%.10g}", played.y[k], played.u[k]);
     samples += (k > 0 ? ", " : "") + std::string(text);
   }
   body += comment("The first " + std::to_string(checked) +
@@ -671,11 +671,10 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
                   "its noise, and u.");
   body += "constexpr double samples[" + std::to_string(checked) + "][2] = {\n" +
           wrapped(samples + "};", "    ");
-  body +=
-      "\n" + comment(
-                 "0 if this program computes the same u, else 1. A compiler may change the last "
-                 "digits (-ffast-math, fused instructions), which the observer makes up to a "
-                 "millionth of the range of u; a wrong digit of a setting does more.");
+  body += "\n" + comment(
+                     "0 if this program computes the same u, else 1. Compilers may order and fuse "
+                     "operations otherwise (-ffast-math): that changes u by less than 1e-9 of its "
+                     "range. A wrong setting changes it more.");
   body +=
       "int self_check() {\n"
       "  auto loop = Loop::make();\n"
@@ -690,7 +689,7 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
       std::to_string(still) + " ? " + source(p.start_y) + " : " + source(target) +
       ");\n"
       "    if (std::abs(u - samples[k][1]) < " +
-      source(2e-6 * half) +
+      source(1e-8 * half) +
       ") continue;\n"
       "    std::printf(\"self-check: sample %d: u is %.9g, not %.9g\\n\", k, u, "
       "samples[k][1]);\n"

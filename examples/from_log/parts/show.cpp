@@ -185,8 +185,19 @@ std::vector<CsvRow> model_table(const Findings& findings) {
   rows.push_back({"pole", with_interval(found.pole), "1/s", "rate at which free motion decays"});
   rows.push_back(
       {"friction", with_interval(found.friction), "[" + highest + "]", "Coulomb friction"});
-  rows.push_back({"gravity or spring", found.position ? "found" : "none", "",
-                  "a force that depends on y; the controller treats it as a disturbance"});
+  std::string force = "none";
+  if (found.position) {
+    double low = 0.0, high = 0.0;
+    const auto& f = found.position_force;
+    for (int i = 0; i <= 100; ++i) {
+      const double at = f(f.low + (f.high - f.low) * i / 100);
+      low = std::min(low, at);
+      high = std::max(high, at);
+    }
+    force = number_text(low, 3) + " to " + number_text(high, 3);
+  }
+  rows.push_back({"gravity or spring", force, found.position ? "[" + highest + "]" : "",
+                  "a force that depends on y, over the range of the log"});
   for (std::size_t c = 0; c < found.columns.size(); ++c) {
     rows.push_back({"known column " + std::to_string(c + 1), with_interval(found.columns[c]),
                     "[" + highest + "] / its unit", "what one unit of it adds to " + highest});
