@@ -37,7 +37,8 @@ struct Outcome {
   std::string refusal;  // empty: accepted
   double error = 0;     // of b0, share
   bool covered = false;
-  bool wrong = false;  // of the other sign, or off by a factor of two
+  bool wrong = false;   // of the other sign, or off by a factor of two
+  bool warned = false;  // that b0 differs between small and large u, or that y is early
 };
 
 Outcome identified(std::uint64_t seed, Habit habit) {
@@ -57,6 +58,7 @@ Outcome identified(std::uint64_t seed, Habit habit) {
   outcome.error = std::abs(b0.value / made.truth.input_gain - 1);
   outcome.covered = b0.low() <= made.most && b0.high() >= made.least;
   outcome.wrong = !(b0.value > 0.5 * made.least && b0.value < 2 * made.most);
+  outcome.warned = found->by_size.differ() || found->lead.time > 0;
   return outcome;
 }
 
@@ -101,7 +103,7 @@ int main(int argc, char** argv) {
         kind.name, logs, [&](std::size_t i) { return identified(seed + i, kind.habit); });
     std::vector<double> errors;
     std::map<std::string, int> reasons;
-    double accepted = 0, covered = 0, wrong = 0;
+    double accepted = 0, covered = 0, wrong = 0, warned = 0;
     for (const Outcome& o : outcomes) {
       if (!o.refusal.empty()) {
         ++reasons[o.refusal];
@@ -110,6 +112,7 @@ int main(int argc, char** argv) {
       accepted += 1;
       covered += o.covered ? 1 : 0;
       wrong += o.wrong ? 1 : 0;
+      warned += o.warned ? 1 : 0;
       errors.push_back(o.error);
     }
     std::sort(errors.begin(), errors.end());
@@ -120,7 +123,8 @@ int main(int argc, char** argv) {
     lines.push_back({kind.name, std::to_string(logs), percent(accepted / all),
                      accepted > 0 && kind.machine ? percent(covered / accepted) : "",
                      errors.empty() || !kind.machine ? "" : percent(errors[errors.size() / 2]),
-                     kind.machine ? number_text(wrong, 4) : "", why});
+                     kind.machine ? number_text(wrong, 4) : "",
+                     accepted > 0 ? percent(warned / accepted) : "", why});
     if (kind.asked > 0) {
       // With few logs a share is only known to two standard errors.
       const double slack = count > 0 ? 0.0 : 2 * std::sqrt(kind.asked * (1 - kind.asked) / all);
@@ -132,9 +136,10 @@ int main(int argc, char** argv) {
                     wrong == 0, "none");
     }
   }
-  report.table("ordinary", "All logs, and why some were refused",
-               {"logs", "count", "accepted (%)", "b0 in its 95 % interval (%)",
-                "b0: median error (%)", "wrong by sign or a factor of two", "refused for"},
-               lines);
+  report.table(
+      "ordinary", "All logs, and why some were refused",
+      {"logs", "count", "accepted (%)", "b0 in its 95 % interval (%)", "b0: median error (%)",
+       "wrong by sign or a factor of two", "of the accepted, warned of (%)", "refused for"},
+      lines);
   return report.finish();
 }

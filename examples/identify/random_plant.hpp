@@ -33,11 +33,13 @@ struct Truth {
 struct RandomLog {
   Truth truth;
   std::vector<double> u, y;
+  std::vector<double> time = {};  ///< s; empty: a row each sample time
 };
 
-/// Of a log: as it is, with a flexible mode, with a reference that never moves, or of a joint under
-/// gravity, which the model does not have.
-enum class Kind { plain, flexible, unexcited, joint };
+/// Of a log: as it is, with a flexible mode, with a reference that never moves, of a joint under
+/// gravity, which the model does not have, or from an encoder with rows that last 0.9 to 1.1 T and
+/// 3 % of them missing.
+enum class Kind { plain, flexible, unexcited, joint, jittery };
 
 /// Same numbers with every standard library.
 class Random {
@@ -75,6 +77,8 @@ inline RandomLog random_log(std::uint64_t seed, Kind kind = Kind::plain, double 
   p.pole = random.coin() ? 0.0 : random.uniform(0, std::min(0.4 / latency, 20.0));
   p.encoder = random.coin();
   p.flexible = kind == Kind::flexible;
+  const bool jittery = kind == Kind::jittery;
+  p.encoder = p.encoder || jittery;
   const double friction_share = random.uniform(0, 0.5);
   const double drift_share = random.uniform(0, 0.5);
   const double wc = random.uniform(0.1, 0.28) / (latency + p.sample_time);
@@ -119,6 +123,12 @@ inline RandomLog random_log(std::uint64_t seed, Kind kind = Kind::plain, double 
   double square = 0;
   for (const double value : walk) square += value * value;
   const double walk_scale = 1.0 / std::sqrt(square / static_cast<double>(rows));
+  // Steps of the integrators in each row.
+  std::vector<int> steps_of(rows, inner);
+  if (jittery) {
+    for (int& count : steps_of)
+      count += static_cast<int>(std::lround(random.uniform(-0.1, 0.1) * inner));
+  }
   const double step = 1.0 / resolution;
   const double sd = p.encoder ? 0.0 : step * 0.5;
   double friction = 0, drift = 0;
@@ -146,7 +156,7 @@ inline RandomLog random_log(std::uint64_t seed, Kind kind = Kind::plain, double 
                        : (wc * wc * e * 0.7 - 1.6 * wc * slope) / p.input_gain;
       log.u[k] = u;
       log.y[k] = y;
-      for (int i = 0; i < inner; ++i) {
+      for (int i = 0; i < steps_of[k]; ++i) {
         line[at] = u;
         at = (at + 1) % line.size();
         const double delayed = line[at];
@@ -177,6 +187,19 @@ inline RandomLog random_log(std::uint64_t seed, Kind kind = Kind::plain, double 
       speed_scale = std::sqrt(speed_square / count);
       p.friction = friction;
     }
+  }
+  if (jittery) {
+    RandomLog kept{p, {}, {}};
+    double t = 0;
+    for (std::size_t k = 0; k < rows; ++k) {
+      if (random.uniform(0, 1) > 0.03) {
+        kept.time.push_back(t);
+        kept.u.push_back(log.u[k]);
+        kept.y.push_back(log.y[k]);
+      }
+      t += h * steps_of[k];
+    }
+    return kept;
   }
   return log;
 }

@@ -225,6 +225,42 @@ TEST(Identify, AForceByPositionIsFoundOrMissed) {
   EXPECT_LT(std::abs(known->columns[0].value + 30), known->columns[0].half_width);
 }
 
+// However sharp b0 is known: a force that changes it by less than a per cent does no harm.
+TEST(Identify, AForceThatChangesB0ByLessThanAPerCentDoesNoHarm) {
+  esokit::sim::Gaussian gaussian(12);
+  esokit::FitData data;
+  Log log;
+  log.sample_time = T;
+  double x0 = 0, x1 = 0, held = 0, filtered = 0;
+  for (int k = 0; k < 3000; ++k) {
+    const double y = x0 + 1e-5 * gaussian.next(), before = filtered;
+    filtered += 0.15 * (y - filtered);
+    const double reference = (k / 180) % 2 == 0 ? 1 : -1;
+    log.y.push_back(y);
+    log.u.push_back((30 * (reference - y) - 9 * (filtered - before) / T) / b0);
+    for (int i = 0; i < 8; ++i) {
+      x1 += T / 8 * (b0 * held - 0.5 * std::sin(x0));
+      x0 += T / 8 * x1;
+    }
+    held = log.u.back();
+  }
+  IdentifyOptions options = quick();
+  options.position = options.friction = false;
+  options.sinusoids = 0;
+  const auto found = esokit::study(log, options);
+  ASSERT_TRUE(found);
+  ASSERT_EQ(found->order, 2);
+  data = esokit::prepare(log)->data;
+  esokit::detail::add_position(data);
+  const auto& here = found->plateau.points[found->plateau.middle].fit;
+  esokit::InnovationsFit fit(data, {2, found->extension, true}, found->orders[0].bounds);
+  const double change = std::abs(fit.minimise(here.at, false, 5).linear[0] - here.linear[0]);
+  EXPECT_LT(found->plateau.error * esokit::student_95(19), 0.003 * b0);
+  EXPECT_NEAR(found->position_shift, change / (0.01 * found->input_gain.value),
+              1e-3 * found->position_shift);
+  EXPECT_GT(found->position_shift, 0);
+}
+
 std::string said(const esokit::Check<double>& check) {
   return check ? "accepted" : std::string(check.error().field) + ": " + check.error().rule;
 }
