@@ -89,11 +89,11 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
   std::string sooner;
   if (!tuning && std::string_view(tuning.error().field) == "settling_time" &&
       wish.settling_time > tuning.error().limit) {
-    sooner = "A settling time of " + number_text(wish.settling_time, 3) +
-             " s is longer than this machine takes by itself, " +
-             number_text(tuning.error().limit, 3) +
-             " s, and no feedback is needed for it: so the design is that without a wish. To move "
-             "more slowly, let the reference move slowly.";
+    sooner =
+        "A settling time of " + number_text(wish.settling_time, 3) +
+        " s is longer than this machine takes by itself, " + number_text(tuning.error().limit, 3) +
+        " s, so it cannot be asked of a feedback: the design is that without a wish. To move more "
+        "slowly, let the reference move slowly.";
     wish.settling_time = 0.0;
     tuning = compiled::tune(model, wish, settings.rules);
   }
@@ -188,10 +188,13 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
         "to loads.");
   }
   if (!sooner.empty()) design.summary_.push_back(sooner);
-  if (wish.settling_time > 0.0) {
+  if (settings.settling_time > 0.0) {
     design.summary_.push_back("A step that is so small that u stays within its limits settles in " +
                               number_text(taken.settling_time, 3) + " s; asked for were " +
-                              number_text(wish.settling_time, 3) + " s.");
+                              number_text(settings.settling_time, 3) + " s." +
+                              (taken.settling_time > 1.5 * settings.settling_time
+                                   ? " It is slower than that; --omega-c sets a faster law."
+                                   : ""));
   }
   if (!settings.limits) {
     design.summary_.push_back("The limits of u are those that the log shows, " +
