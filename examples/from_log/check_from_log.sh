@@ -153,11 +153,11 @@ compiles() {  # compiles PAGE: all its programs, in one, say that they check; th
 
 # servo [NAME=NUMBER...]: 8 s, y'' + 2 y' = b u(t - 4 ms) - load, rows "t y u r"; the reference steps.
 #   b input gain; scale of u; quantum of y; still=1: the reference does not move; noise of y; drift
-#   of the load a row
+#   of the load a row; friction
 servo() {
   local set=() pair
   for pair in "$@"; do set+=(-v "$pair"); done
-  awk -v b=50 -v scale=1 -v quantum=0 -v still=0 -v rows=4000 -v noise=1e-3 -v wander=0.02 "${set[@]}" '
+  awk -v b=50 -v scale=1 -v quantum=0 -v still=0 -v rows=4000 -v noise=1e-3 -v wander=0.02 -v friction=0 "${set[@]}" '
     function normal() {
       seed = (seed * 69069 + 12345) % 4294967296; first = (seed + 1) / 4294967297
       seed = (seed * 69069 + 12345) % 4294967296
@@ -178,6 +178,7 @@ servo() {
         drift += wander * normal()
         for (i = 0; i < 4; ++i) {  # u of 4 ms ago
           a = b * (i < 4 ? old2 : old1) - 2 * v + 5 + drift
+          if (friction > 0) a -= friction * (1 - 2 / (exp(40 * v) + 1))  # tanh(20 v)
           x += v * T / 4 + a * T * T / 32; v += a * T / 4
         }
         old2 = old1; old1 = u
@@ -216,6 +217,16 @@ healthy plain.csv --limits -6,6 --b0 60 --settling 0.5
 verdict $? "a second run wrote over the first page, $first"
 ! grep -qE '(src|href)="(https?:|/|file:)' "$first"
 verdict $? "$first needs other files"
+# Friction that is found is in the code, and in its self-check.
+servo friction=15 noise=2e-4 >rows.txt
+written t,y,u , t >rubbing.csv
+healthy rubbing.csv
+code_of "$page" | awk '/^\/\/ program$/ { ++n } n == 1' >rubbing.cpp
+grep -q 'force += .* \* std::tanh(rate / ' rubbing.cpp &&
+  "$compiler" -std=c++20 -I"$root/include" -Wall -Wextra -Wconversion -Werror rubbing.cpp -o rubbing &&
+  [[ $(./rubbing) == 'self-check: ok' ]]
+verdict $? "rubbing.csv: no friction in the code, or its self-check fails: $(cat rubbing.cpp)"
+servo >rows.txt
 design=--no-design  # the controller takes most of the time, and does not know where a row came from
 written '# recorded by hand
 t;y;u' ';' t | sed 's/$/\r/; s/\([0-9]\)\.\([0-9]\)/\1,\2/g' >excel.csv

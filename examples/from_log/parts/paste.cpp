@@ -162,8 +162,18 @@ Watch watch_of(const Tuning& tuning, const TunedDesign& design, const esokit::Fi
   const auto form = esokit::detail::told_of_input(design.controller);
   const auto settling = std::min<std::size_t>(
       static_cast<std::size_t>(design.settling_time / T) + 20, rows.y.size() / 4);
+  // Gate and monitor look at the innovation of level 1: of a LinearEso with its bandwidth.
+  const auto first =
+      design.levels > 1
+          ? esokit::detail::tuned_controller(
+                esokit::detail::chain_kind(model, TuneFamily::linear, design.extension, 1), T,
+                design.settings)
+          : std::nullopt;
+  const auto innovations_of = [&](const esokit::FitData& data, const Replay& replay) {
+    return first ? through(*first, b0, model.order, data).innovation : replay.innovation;
+  };
   const Replay log = through(form, b0, model.order, rows);
-  const auto innovations = settled(log.innovation, rows, settling);
+  const auto innovations = settled(innovations_of(rows, log), rows, settling);
   const auto loads = settled(log.load, rows, settling);
   Watch watch;
   // Single outliers of the log shall not count.
@@ -179,7 +189,7 @@ Watch watch_of(const Tuning& tuning, const TunedDesign& design, const esokit::Fi
                          played.u.push_back(u);
                        });
     const Replay seen = through(form, b0, model.order, played);
-    for (const double e : seen.innovation) {
+    for (const double e : innovations_of(played, seen)) {
       innovation = std::max(innovation, std::abs(e) + 4.0 * model.noise);
     }
     for (const double l : seen.load) load = std::max(load, std::abs(l) + middle);
@@ -191,8 +201,12 @@ Watch watch_of(const Tuning& tuning, const TunedDesign& design, const esokit::Fi
                     return certified<n()>(model, design, watch.bound);
                   });
   const auto& gains = design.settings.gains;
+  // Of a cascade the mean of its levels, with which b / b0 is found best.
   watch.bandwidth =
-      esokit::detail::law_mean(gains, model.order) / std::max(design.bandwidth_ratio, 1e-9);
+      design.levels > 1
+          ? design.settings.observer_bandwidth *
+                std::pow(design.settings.bandwidth_factor, 0.5 * (design.levels - 1))
+          : esokit::detail::law_mean(gains, model.order) / std::max(design.bandwidth_ratio, 1e-9);
   watch.bandwidth = printed(std::min(watch.bandwidth, 0.99 / T));
   watch.divider = std::clamp(static_cast<int>(0.5 / (watch.bandwidth * T)), 1, 1000);
   watch.memory = printed(200.0 / watch.bandwidth);
