@@ -64,6 +64,12 @@ TEST(SecondOpinion, FindsB0FromAnyStart) {
   const auto errors = esokit::jackknife(fit, fit.at(best.at), false);
   EXPECT_NEAR(near.input_gain.half_width, esokit::student_95(19) * errors.linear[0],
               0.02 * near.input_gain.half_width);
+  // Whatever the range of the bandwidth was before.
+  esokit::FitBounds high = bounds;
+  high.bandwidth_min = 30;
+  const SecondOpinion same =
+      esokit::second_opinion(data, {1, 1, true}, high, {1, 2 * T, 0.5, pole}, near.bandwidth);
+  EXPECT_NEAR(same.input_gain.value, near.input_gain.value, 1e-6 * b0);
   // Of what is left without u: the noise, and the load that the filter takes.
   FitData still = data;
   std::fill(still.u.begin(), still.u.end(), 0.0);

@@ -71,7 +71,8 @@ inline GainBySize gain_by_size(const FitData& data, const FitModel& model, const
       knot, {best.linear[0], t * errors.linear[0]}, {best.linear[large], t * errors.linear[large]}};
 }
 
-/// The lead of y, by a fit with u advanced by ten rows: it must explain y better than `here`.
+/// The lead of y, by a fit with u advanced by ten rows: it must leave less than three quarters of
+/// the mean square of `here`.
 inline Lead lead_of(const FitData& data, const FitModel& model, const FitBounds& bounds,
                     const Fit& here) {
   constexpr std::size_t rows = 10;
@@ -92,10 +93,8 @@ inline Lead lead_of(const FitData& data, const FitModel& model, const FitBounds&
     if (found.mean_square < best.mean_square) best = found;
   }
   const double lead = static_cast<double>(rows) * T - best.at.latency;
-  const double rise =
-      static_cast<double>(here.rows) * std::log(here.mean_square / best.mean_square);
-  // Twice the logarithm of the likelihood, as a parameter costs log(rows) of it.
-  if (!(rise > 20.0 && lead > 0.3 * T)) return {};
+  // A model error may look like a lead, but then the lead helps little.
+  if (!(best.mean_square < 0.75 * here.mean_square && lead > 0.3 * T)) return {};
   return {lead, best.input_gain()};
 }
 
