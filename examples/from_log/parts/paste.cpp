@@ -603,10 +603,11 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
   if (known) {
     std::string what = p.friction > 0.0 ? "friction" : "";
     if (p.by_position) what += std::string(what.empty() ? "" : " and ") + "the force by y";
-    body += "\n" + comment("What " + what +
-                               " needs of u along the reference. By the reference, not by y: so it "
-                               "changes no margin.",
-                           "  ");
+    body +=
+        "\n" + comment("What " + what + (p.friction > 0.0 && p.by_position ? " need" : " needs") +
+                           " of u along the reference. By the reference, not by y: so it "
+                           "changes no margin.",
+                       "  ");
     body += "  static double known([[maybe_unused]] double r, [[maybe_unused]] double rate) {\n";
     body += "    double force = 0.0;  // " + highest + "\n";
     if (p.friction > 0.0) {
