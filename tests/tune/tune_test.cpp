@@ -184,12 +184,6 @@ TEST(LqgTest, SolvesTheRiccatiEquation) {
       EXPECT_NEAR(axa(i, j) - axb(i, 0) * axb(j, 0) / size + q(i, j), x(i, j), 1e-12 * x(0, 0));
     }
   }
-  // A chain of one with two samples of dead time: y falls by the same factor in each sample.
-  TuneModel model = plain(1);
-  model.dead_time = 2e-3;
-  const Lqg lqg(model);
-  const double rho = 1e-3, factor = 1.0 - 1e-3 * lqg.feedback(rho)(0, 0);
-  EXPECT_DOUBLE_EQ(lqg.settling(rho), 1e-3 * (std::ceil(std::log(0.02) / std::log(factor)) + 2));
 }
 
 // scipy.linalg.solve_discrete_are and solve_discrete_lyapunov, R = 1e-6, T = 1 ms.
@@ -495,6 +489,18 @@ TuneModel servo() {
   return model;
 }
 
+// J says nothing of the reference: where it is flat, the law is the fast one.
+TEST(TuneTest, TakesAFastLawWhereItCostsNothing) {
+  // Order 1 with little noise: observer and law could be exchanged.
+  TuneModel quiet = plain(1, 1.0);
+  quiet.lag = 0.02;
+  quiet.noise = 1e-5;
+  const auto exchanged = tune(quiet).value();
+  ASSERT_NE(exchanged.chosen(), nullptr);
+  EXPECT_LE(exchanged.chosen()->excess, 1.01);
+  EXPECT_GT(exchanged.chosen()->bandwidth_ratio, 1.0);
+}
+
 // Without the rules for the limits the best loop swings between them for ever; with them it comes
 // back, for next to the same J.
 TEST(TuneTest, WhatIsChosenComesBackFromTheLimits) {
@@ -508,7 +514,8 @@ TEST(TuneTest, WhatIsChosenComesBackFromTheLimits) {
   model.noise = 4.3e-4;
   model.sample_time = 1.8e-3;
   model.disturbance = model.disturbance_of(0.2 / model.latency());
-  const esokit::TuneRules old{.damping_latencies = 0.0, .bandwidth_ratio = 0.0};
+  const esokit::TuneRules old{
+      .damping_latencies = 0.0, .bandwidth_ratio = 0.0, .play = esokit::TunePlay::all};
   const auto before = tune(model, {}, old).value();
   const TunedDesign& fast =
       *std::min_element(before.designs.begin(), before.designs.end(),
@@ -517,12 +524,11 @@ TEST(TuneTest, WhatIsChosenComesBackFromTheLimits) {
   EXPECT_LT(fast.damping_latencies, 1.0);
   EXPECT_FALSE(fast.comes_back);
   EXPECT_FALSE(fast.lost.empty());
-  const auto tuning = tune(model).value();
+  const auto tuning = tune(model, {}, {.play = esokit::TunePlay::all}).value();
   ASSERT_NE(tuning.chosen(), nullptr);
   EXPECT_TRUE(alarms(tuning, *tuning.chosen()).empty());
   const TunedDesign& chosen = *tuning.chosen();
   EXPECT_GE(chosen.damping_latencies, 1.3 * 0.999);
-  EXPECT_LE(chosen.bandwidth_ratio, 5.0 * 1.001);
   EXPECT_LE(chosen.cost, 1.02 * fast.cost);
   for (std::size_t i = 0; i < tuning.designs.size(); ++i) {
     const TunedDesign& a = tuning.designs[i];
@@ -531,6 +537,7 @@ TEST(TuneTest, WhatIsChosenComesBackFromTheLimits) {
       const auto rank = [](const TunedDesign& d) { return d.feasible ? d.comes_back ? 2 : 1 : 0; };
       EXPECT_GE(rank(b), rank(a)) << a.name;
     }
+    EXPECT_EQ(a.played, a.feasible) << a.name;
     if (!a.feasible) continue;
     EXPECT_GE(a.damping_latencies, 1.3 * 0.999) << a.name;
     EXPECT_EQ(a.comes_back, a.lost.empty()) << a.name;
@@ -547,7 +554,8 @@ TEST(TuneTest, WhatIsChosenComesBackFromTheLimits) {
 // A law whose k_1 / k_0 is a tenth of the latency is stable, keeps its margins, and is lost.
 TEST(PlayTest, TellsALoopThatSwingsForEver) {
   TuneModel model = servo();
-  const esokit::TuneRules free{.damping_latencies = 0.0, .bandwidth_ratio = 0.0};
+  const esokit::TuneRules free{
+      .damping_latencies = 0.0, .bandwidth_ratio = 0.0, .play = esokit::TunePlay::all};
   const auto fast =
       tune(model, {.controller_bandwidth = 2.0 / (0.58 * model.latency())}, free).value();
   const auto slow = tune(model, {.controller_bandwidth = 1.9 / (1.3 * model.latency())}).value();
@@ -555,6 +563,43 @@ TEST(PlayTest, TellsALoopThatSwingsForEver) {
   EXPECT_GE(std::count_if(fast.designs.begin(), fast.designs.end(), lost), 5);
   ASSERT_NE(slow.chosen(), nullptr);
   EXPECT_TRUE(slow.chosen()->comes_back);
+}
+
+// Played until one comes back: the same is chosen as of those that are all played, and of the
+// others nothing is said.
+TEST(PlayTest, PlaysUntilOneComesBack) {
+  TuneModel fast = servo();
+  for (const double law : {1.9 / (1.3 * fast.latency()), 2.0 / (0.58 * fast.latency())}) {
+    const auto made = [&](esokit::TunePlay play) {
+      const esokit::TuneRules free{.damping_latencies = 0.0, .bandwidth_ratio = 0.0, .play = play};
+      return tune(fast, {.controller_bandwidth = law}, free).value();
+    };
+    const auto first = made(esokit::TunePlay::first), all = made(esokit::TunePlay::all);
+    ASSERT_EQ(first.chosen() != nullptr, all.chosen() != nullptr);
+    if (first.chosen() != nullptr) {
+      EXPECT_EQ(first.chosen()->name, all.chosen()->name);
+    }
+    bool back = false;
+    for (const TunedDesign& design : first.designs) {
+      const TunedDesign& same = named(all, design.name);
+      EXPECT_EQ(design.cost, same.cost) << design.name;
+      if (!design.feasible) continue;
+      if (design.played) {
+        EXPECT_EQ(design.comes_back, same.comes_back) << design.name;
+        EXPECT_TRUE(&design == first.chosen() || !design.comes_back) << design.name;
+        back = back || design.comes_back;
+      } else {
+        EXPECT_NE(first.chosen(), nullptr) << design.name;
+        const auto said = alarms(first, design);
+        ASSERT_FALSE(said.empty()) << design.name;
+        EXPECT_EQ(std::string(said.front().name), "overload") << design.name;
+      }
+    }
+    EXPECT_EQ(back, first.chosen() != nullptr);
+    for (const TunedDesign& design : made(esokit::TunePlay::none).designs) {
+      EXPECT_FALSE(design.played) << design.name;
+    }
+  }
 }
 
 // What is played is what runs: Adrc on the plant of the model, sample by sample.
@@ -619,12 +664,43 @@ TEST(TuneTest, NamesTheNearestThatKeepsTheRule) {
   EXPECT_TRUE(tune(model, {.settling_time = 1.001 * hasty.error().limit}));
 }
 
+// What is asked is what the first design does, or there is an alarm.
+TEST(TuneTest, SettlesInTheTimeAsked) {
+  int held = 0;
+  for (int order = 1; order <= 2; ++order) {
+    TuneModel model = servo();
+    model.order = order;
+    model.disturbance = model.disturbance_of(0.2 / model.latency());
+    for (const double latencies : {40.0, 120.0}) {
+      const double wish = latencies * model.latency();
+      const auto tuning =
+          tune(model, {.settling_time = wish}, {.play = esokit::TunePlay::none}).value();
+      EXPECT_EQ(tuning.settling_time, wish);
+      ASSERT_NE(tuning.chosen(), nullptr) << order;
+      TunedDesign design = *tuning.chosen();
+      const auto late = [&] {
+        const auto said = alarms(tuning, design);
+        return std::any_of(said.begin(), said.end(), [](const esokit::TuneAlarm& alarm) {
+          return std::string(alarm.name) == "settling";
+        });
+      };
+      held += std::abs(design.settling_time / wish - 1.0) < 0.025 ? 1 : 0;
+      EXPECT_EQ(late(), design.settling_time > 1.05 * wish) << order << ' ' << latencies;
+      design.settling_time = 1.049 * wish;
+      EXPECT_FALSE(late());
+      design.settling_time = 1.051 * wish;
+      EXPECT_TRUE(late());
+    }
+  }
+  EXPECT_GE(held, 3);
+}
+
 // A log without disturbance: the floor stands for it, as far as the noise allows; a larger
 // disturbance is not touched.
 TEST(TuneTest, ReckonsWithAFloorOfTheDisturbance) {
   TuneModel quiet = servo();
   quiet.disturbance = quiet.disturbance_of(0.001 / quiet.latency());
-  const esokit::TuneRules plain_rules{.play = false};
+  const esokit::TuneRules plain_rules{.play = esokit::TunePlay::none};
   const auto raised = tune(quiet, {.controller_bandwidth = 10.0}, plain_rules).value();
   EXPECT_NEAR(raised.model.filter_bandwidth() * quiet.latency(), 0.1, 1e-9);
   EXPECT_EQ(raised.given_disturbance, quiet.disturbance);
@@ -654,7 +730,8 @@ TEST(TuneTest, NeverRaisesWhatItMayAsk) {
   EXPECT_EQ(refused.error().value, 0.5);
   EXPECT_GT(refused.error().limit, 0.5);
   const auto stated =
-      tune(model, {.control_noise = 1.5 * refused.error().limit}, {.play = false}).value();
+      tune(model, {.control_noise = 1.5 * refused.error().limit}, {.play = esokit::TunePlay::none})
+          .value();
   const auto said = alarms(stated, stated.designs.front());
   EXPECT_TRUE(std::any_of(said.begin(), said.end(), [](const esokit::TuneAlarm& alarm) {
     return std::string(alarm.name) == "noise";
@@ -667,7 +744,7 @@ TEST(TuneTest, MoreNoiseIsNeverWorseInEverything) {
   model.noise *= 10.0;
   TunedDesign before;
   for (const double noise : {0.1, 0.4, 1.6}) {
-    const auto tuning = tune(model, {.control_noise = noise}, {.play = false});
+    const auto tuning = tune(model, {.control_noise = noise}, {.play = esokit::TunePlay::none});
     if (!tuning || tuning->chosen() == nullptr) continue;
     const TunedDesign& now = *tuning->chosen();
     if (!before.name.empty()) {
@@ -701,7 +778,7 @@ TEST(TuneTest, NamesTheRuleThatLimits) {
                         .damping_latencies = 0.0,
                         .bandwidth_ratio = 0.0,
                         .filter_floor = 0.0,
-                        .play = false};
+                        .play = esokit::TunePlay::none};
   const double free = linear(loose).cost;
   const std::pair<const char*, TuneRules> cases[] = {{"modulus margin",
                                                       [&] {

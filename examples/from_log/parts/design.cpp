@@ -162,7 +162,7 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
           "°, each the smallest over the intervals. Deviations of y and u are " +
           number_text(taken.excess, 3) +
           " times those of the best linear controller, which keeps no margins."};
-  if (settings.rules.play && taken.comes_back) {
+  if (taken.played && taken.comes_back) {
     design.summary_.push_back(
         "It was played with limits and noise, on the model and at the ends of its intervals: it "
         "comes back from " +

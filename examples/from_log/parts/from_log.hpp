@@ -43,7 +43,8 @@ struct Settings {
   double noise_share = 0;  ///< wish: deviation of u by noise, share of its range; 0: as tune has it
   double settling_time = 0;  ///< wish instead: s
   double controller = 0;     ///< wish instead: omega_c, rad/s
-  esokit::TuneRules rules;   ///< what the loop has to keep
+  /// What the loop has to keep; the page says of every design whether it comes back.
+  esokit::TuneRules rules{.play = esokit::TunePlay::all};
   int rank = 1;              ///< which of the designs, the best is 1
   bool anyway = false;       ///< design for a refused log, too
   bool no_design = false;    ///< what was found, and no controller

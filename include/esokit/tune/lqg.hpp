@@ -137,31 +137,6 @@ class Lqg {
     return k;
   }
 
-  /// Time after which y stays within 2 % of a step, with known state, s.
-  [[nodiscard]] double settling(double rho) const {
-    const auto k = feedback(rho);
-    const int states = a_.rows();
-    auto closed = a_;
-    detail::add(closed, 0, 0, detail::product(b_, k), -1.0);
-    DynamicMatrix<double> x(states, 1);
-    // One in y and in the sensor, as at rest.
-    const bool direct = plant_.c(0, 0) != 0.0;
-    x(0, 0) = direct ? 1.0 / plant_.c(0, 0) : 0.0;
-    if (!direct) {
-      const int s = plant_.a.rows() - 1;
-      x(s, 0) = 1.0 / plant_.c(0, s);
-      x(0, 0) = -plant_.a(s, s) * x(s, 0) / plant_.a(s, 0);
-    }
-    int last = 0;
-    for (int i = 0; i < 1000000 && i <= 2 * last + 100; ++i) {
-      double y = 0.0;
-      for (int j = 0; j < plant_.a.rows(); ++j) y += plant_.c(0, j) * x(j, 0);
-      if (std::abs(y) > 0.02) last = i + 1;
-      x = detail::product(closed, x);
-    }
-    return plant_.sample_time * (last + whole_);
-  }
-
   /// The controller, with its own u as the applied u.
   [[nodiscard]] LinearController controller(double rho) const {
     using detail::add;

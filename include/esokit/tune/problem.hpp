@@ -157,9 +157,19 @@ struct TuneWish {
   /// Standard deviation of u that the measurement noise may cause, unit of u. If nothing is given:
   /// usual_control_noise of u_max - u_min.
   double control_noise = 0.0;
-  double settling_time = 0.0;  ///< s, to within 2 % after a step of the reference
+  /// s, to within 2 % after a step of the reference that stays within the limits. The law of orders
+  /// 1 and 2 is given by it, so that the recommended design settles in this time; there is an alarm
+  /// if it does not.
+  double settling_time = 0.0;
   double controller_bandwidth =
       0.0;  ///< omega_c, rad/s: the law is given, only the observer is chosen
+};
+
+/// Which designs are played within the limits of u, see tune/play.hpp.
+enum class TunePlay : unsigned char {
+  none,   ///< no design
+  first,  ///< in the order of the ranking, until one comes back: that one is recommended
+  all     ///< every design that keeps the rules: longer by a quarter
 };
 
 /// What a loop has to keep. Margins: for the nominal model, and with b0 at both ends of its
@@ -175,15 +185,14 @@ struct TuneRules {
   /// low gain a chain of two integrators whose u is late is stable only if k_1 / k_0 is above the
   /// latency. 0: not required.
   double damping_latencies = 1.3;
-  /// Largest omega_c / omega_o, the geometric means of the poles of law and observer: beyond it the
-  /// observer decides how fast the loop is. Three integrators are stable at no very low gain: there
-  /// it helps, and does not suffice. 0: not required.
+  /// Order 3: largest omega_c / omega_o, the geometric means of the poles of law and observer.
+  /// Three integrators are stable at no very low gain, so it helps and does not suffice. Below, it
+  /// adds nothing to damping_latencies. 0: not required.
   double bandwidth_ratio = 5.0;
   /// Smallest filter bandwidth that is reckoned with, in 1 / TuneModel::latency, as far as the
   /// control noise allows: a log without disturbances does not show the loads of tomorrow. 0: none.
   double filter_floor = 0.1;
-  /// Play every design within the limits of u, see tune/play.hpp.
-  bool play = true;
+  TunePlay play = TunePlay::first;  ///< what does not come back ranks behind
 };
 
 namespace detail {

@@ -13,10 +13,10 @@
 /// 3. J of that controller is J*, the smallest J of all linear controllers (tune/lqg.hpp).
 /// 4. For each family J is minimised at this rho under the rules; if it cannot keep them, the
 /// design says which one.
-/// 5. Every design is played within the limits of u: what does not come back from an overload ranks
-///    behind (tune/play.hpp).
-/// 6. Designs are ranked by J; those within 1 % by the cost of an update, then by the
+/// 5. Designs are ranked by J; those within 1 % by the cost of an update, then by the
 ///    modulus margin.
+/// 6. The first is played within the limits of u: if it does not come back from an overload, it
+///    ranks behind and the next is played (tune/play.hpp).
 #pragma once
 
 #include <algorithm>
@@ -50,6 +50,7 @@ struct TunedDesign {
   TuneSettings settings{};  ///< the chosen parameters
   bool feasible = false;    ///< keeps all rules: margins, noise in u, and what lets it come back
   std::string constraint;   ///< the rule that limits it, or that it cannot keep; or "none"
+  bool played = false;      ///< within the limits, see TuneRules::play
   bool comes_back = true;   ///< from all that was played; true if nothing was
   std::string lost;         ///< in words, what it does not come back from
   PlayEvent lost_in{};      ///< this event, on variant `lost_on` of the plant
@@ -81,6 +82,7 @@ struct Tuning {
   double given_disturbance = 0.0;  ///< that of the given model; model.disturbance may be larger
   double rho = 0.0;                ///< weight of var(b0 u~) in J
   double control_noise = 0.0;  ///< the required value, unit of u; 0 if something else was required
+  double settling_time = 0.0;  ///< the required value, s; 0 if something else was required
   double least_noise = 0.0;    ///< what cancelling the given disturbance alone needs, unit of u
   double optimum = 0.0;        ///< J*
   LoopNumbers lqg{};           ///< of the controller with J*
@@ -101,9 +103,9 @@ struct TuneAlarm {
   std::string text;       ///< a sentence
 };
 
-/// What speaks against a design that keeps its rules: noise in u above usual_control_noise, more
-/// than three times the deviations of the best linear controller, and what it does not come back
-/// from.
+/// What speaks against a design that keeps its rules: a settling time above the one asked, noise in
+/// u above usual_control_noise, more than three times the deviations of the best linear controller,
+/// and what it does not come back from, or that nothing was played.
 inline std::vector<TuneAlarm> alarms(const Tuning& tuning, const TunedDesign& design) {
   std::vector<TuneAlarm> all;
   const double range = tuning.model.u_max - tuning.model.u_min;
@@ -115,6 +117,17 @@ inline std::vector<TuneAlarm> alarms(const Tuning& tuning, const TunedDesign& de
   if (!design.comes_back) {
     all.push_back({"overload", "This design does not come back from " + design.lost +
                                    ": u goes from limit to limit, or stays at one."});
+  } else if (!design.played) {
+    all.push_back({"overload",
+                   "This design was not played within the limits of u: whether it "
+                   "comes back from an overload is not known."});
+  }
+  if (tuning.settling_time > 0.0 && design.settling_time > 1.05 * tuning.settling_time) {
+    all.push_back(
+        {"settling",
+         "A step of the reference settles in " + number(design.settling_time) + " s, asked was " +
+             number(tuning.settling_time) +
+             " s: its slowest poles are those of the observer, or the rules allow no faster law."});
   }
   if (design.control_noise > 1.001 * usual_control_noise * range) {
     all.push_back({"noise", "Noise moves u by " + number(100.0 * design.control_noise / range) +
@@ -203,11 +216,15 @@ struct TuneSearch {
   double most_noise;           ///< in u, 0 if something else is required
   const LoopCost* cost;
 
-  /// Of a point that was evaluated: log J, and what its rules lack.
+  /// Of a point that was evaluated: log J, what its rules lack, and log omega_c.
   struct Seen {
-    double value = 0.0, lack = 0.0;
+    double value = 0.0, lack = 0.0, speed = 0.0;
   };
   mutable std::map<std::vector<double>, Seen> seen{};  ///< of one contender
+
+  /// J says nothing of the reference, and is often the same for a slow law and a fast observer: a
+  /// law ten times as fast is worth 0.7 % of J.
+  static constexpr double worth_of_speed = 0.003;
 
   [[nodiscard]] double slowest() const {
     return 0.05 * std::min({reference_bandwidth, filter_bandwidth, 0.3 * possible_bandwidth});
@@ -300,7 +317,7 @@ struct TuneSearch {
                              : std::numeric_limits<double>::infinity(),
             n == 2 ? over(s.gains[1] / s.gains[0], rules.damping_latencies * model.latency())
                    : std::numeric_limits<double>::infinity(),
-            rules.bandwidth_ratio > 0.0
+            n == 3 && rules.bandwidth_ratio > 0.0
                 ? rules.bandwidth_ratio * observer_mean(c.design.family, c.kind, model, s) /
                       law_mean(s.gains, n)
                 : std::numeric_limits<double>::infinity()};
@@ -325,7 +342,7 @@ struct TuneSearch {
     // The search with rules comes back to the points of that without.
     auto [at, added] = seen.try_emplace(x);
     Seen& found = at->second;
-    if (!added) return found.value + price * found.lack;
+    if (!added) return found.value + price * found.lack - worth_of_speed * found.speed;
     const TuneSettings chosen = settings(c, x);
     const auto controller = tuned_controller(c.kind, model.sample_time, chosen);
     if (!controller) {
@@ -337,9 +354,12 @@ struct TuneSearch {
     if (!numbers.stable || !(j > 0.0) || !is_finite(j)) {
       found.value = 1e4;
     } else {
-      found = {std::log(j), lack(kept(c, chosen, numbers), 1.004)};
+      // Behind limits a slow law comes back more often, except of one integrator.
+      const auto& k = chosen.gains;
+      found = {std::log(j), lack(kept(c, chosen, numbers), 1.004),
+               model.order == 1 ? std::log(k[0]) / static_cast<double>(k.size()) : 0.0};
     }
-    return found.value + price * found.lack;
+    return found.value + price * found.lack - worth_of_speed * found.speed;
   }
 
   /// Whether variable `index` of the search is a damping; the others are factors or bandwidths.
@@ -537,6 +557,7 @@ inline std::string in_words(const PlayEvent& event, const TuneModel& model) {
 
 /// Plays all events on all variants of the plant, until one is lost.
 inline void play_all(TunedDesign& d, const TuneModel& model) {
+  d.played = true;
   const auto variants = played_variants(model);
   for (std::size_t v = 0; v < variants.size(); ++v) {
     for (const PlayEvent& event : play_events) {
@@ -606,7 +627,34 @@ inline void fill_in(Contender& c, const TuneSearch& search, const LoopCost& fine
   const int steps = static_cast<int>(std::min(12.0 / decay, 50000.0)) + 10;
   d.settling_time = step_answer(loop->system(), 0, 1.0, 1.0, steps).settling;
   d.load_peak = step_answer(loop->system(), 2, std::abs(model.input_gain.value), 0.0, steps).peak;
-  if (d.feasible && search.rules.play) play_all(d, model);
+}
+
+/// By J; among the remaining designs within 1 % of the smallest J, the cheapest update comes next.
+/// What does not come back is behind, what does not keep the rules last.
+inline void rank(std::vector<TunedDesign>& designs) {
+  std::stable_sort(designs.begin(), designs.end(), [](const TunedDesign& a, const TunedDesign& b) {
+    return a.feasible != b.feasible       ? a.feasible
+           : a.comes_back != b.comes_back ? a.comes_back
+                                          : a.cost < b.cost;
+  });
+  for (std::size_t i = 0; i < designs.size(); ++i) {
+    std::size_t best = i;
+    for (std::size_t j = i + 1; j < designs.size(); ++j) {
+      const TunedDesign& a = designs[best];
+      const TunedDesign& b = designs[j];
+      if (b.feasible != designs[i].feasible || b.comes_back != designs[i].comes_back ||
+          b.cost > 1.01 * designs[i].cost) {
+        break;
+      }
+      if (b.instructions < a.instructions ||
+          (b.instructions == a.instructions && b.modulus_margin > a.modulus_margin)) {
+        best = j;
+      }
+    }
+    std::rotate(designs.begin() + static_cast<std::ptrdiff_t>(i),
+                designs.begin() + static_cast<std::ptrdiff_t>(best),
+                designs.begin() + static_cast<std::ptrdiff_t>(best) + 1);
+  }
 }
 
 /// The controller as C++ source, in its parts.
@@ -872,6 +920,8 @@ template <class = void>
   const double damped = n == 2 && rules.damping_latencies > 0.0
                             ? 1.0 / (rules.damping_latencies * latency)
                             : std::numeric_limits<double>::infinity();
+  const double delay = model.lag + model.dead_time + model.sensor;
+  const double settled = std::array{3.912, 5.834, 7.517}[static_cast<std::size_t>(n - 1)];
   double w = 0.0;
   if (wish.controller_bandwidth > 0.0) {
     w = wish.controller_bandwidth;
@@ -886,24 +936,25 @@ template <class = void>
                   "must be at most",
                   -1, 2.0 * damped, true});
   } else if (wish.settling_time > 0.0) {
-    const auto settling = [&](double x) { return -lqg.settling(rho_of(x)); };
-    const double safe = std::min(fast, std::sqrt(2.0) * damped);
+    // Of n equal poles w, after the time that u and y need.
+    const auto shortest = [&](double x) { return delay + settled / x; };
+    const double safe = std::min(fast, 2.0 * damped);
     checks
-        .require(-settling(fast) <= wish.settling_time,
-                 {"settling_time", wish.settling_time,
-                  "is shorter than sample time and dead time allow, which is", -1, -settling(fast),
-                  true})
-        .require(-settling(safe) <= wish.settling_time,
+        .require(
+            shortest(fast) <= wish.settling_time,
+            {"settling_time", wish.settling_time,
+             "is shorter than sample time and dead time allow, which is", -1, shortest(fast), true})
+        .require(shortest(safe) <= wish.settling_time,
                  {"settling_time", wish.settling_time,
                   "is so short for this latency that the loop would swing at its limits for ever; "
                   "must be at least",
-                  -1, -settling(safe), true})
-        .require(
-            -settling(slow) >= wish.settling_time,
-            {"settling_time", wish.settling_time,
-             "is far slower than the disturbance; must be at most", -1, -settling(slow), true});
+                  -1, shortest(safe), true})
+        .require(shortest(slow) >= wish.settling_time,
+                 {"settling_time", wish.settling_time,
+                  "is far slower than the disturbance; must be at most", -1, shortest(slow), true});
     if (!checks) return checks.error();
-    w = detail::bandwidth_for(settling, -wish.settling_time, slow, fast);
+    tuning.settling_time = wish.settling_time;
+    w = settled / (wish.settling_time - delay);
   } else {
     checks.require(
         wanted > 1.001 * tuning.least_noise,
@@ -916,93 +967,93 @@ template <class = void>
     w = detail::bandwidth_for(noise, wanted, slow, fast);
   }
   if (!checks) return checks.error();
-  tuning.rho = rho_of(w);
+  // Of order 3 equal poles seldom keep the rules: there the law is searched for, at its rho.
+  const bool given_law = wish.controller_bandwidth > 0.0 || (wish.settling_time > 0.0 && n < 3);
+  // What the lag adds to the settling time depends on the design.
+  for (int corrections = 0;; ++corrections) {
+    tuning.rho = rho_of(w);
 
-  detail::TuneSearch search{model,
-                            rules,
-                            tuning.rho,
-                            wish.controller_bandwidth,
-                            w,
-                            filter_bandwidth,
-                            1.0 / (model.lag + model.dead_time + model.sensor + 1.5 * T),
-                            tuning.control_noise,
-                            nullptr};
-  // The search requires slightly larger margins, because its frequency grid is coarse.
-  TuneRules strict = rules;
-  strict.gain_factor *= 1.01;
-  const LoopCost cost(model, strict, search.slowest(), 14.0);
-  const LoopCost fine(model, rules, search.slowest(), 50.0);
-  search.cost = &cost;
-  // A sine of known frequency can be cancelled at no cost, so J* is computed without it.
-  TuneModel walking = model;
-  walking.swings.clear();
-  tuning.lqg = LoopCost(walking, rules, search.slowest(), 50.0)(lqg.controller(tuning.rho));
-  tuning.optimum = tuning.lqg.cost(tuning.rho, b0);
-  checks.require(tuning.lqg.stable && tuning.optimum > 0.0 && is_finite(tuning.optimum), "optimum",
-                 tuning.optimum, "cannot be computed: the numbers of this model are too far apart");
-  if (!checks) return checks.error();
-  std::vector<detail::Contender> all = detail::contenders(model, wish.controller_bandwidth > 0.0);
-  for (detail::Contender& c : all) {
-    search.seen.clear();
-    std::vector<std::vector<double>> starts;
-    if (c.design.family == TuneFamily::free_poles) {
-      starts.push_back(search.start(c, search.filter_bandwidth, w, true));
-      // Also from the results of the families that are special cases of this one.
-      for (const detail::Contender& other : all) {
-        const bool half = other.design.family == TuneFamily::half_gain;
-        if (other.design.knows == c.design.knows && other.design.extension == 1 &&
-            (half || other.design.family == TuneFamily::linear)) {
-          const TuneSettings& found = other.design.settings;
-          starts.push_back(
-              search.start(c, found.observer_bandwidth, found.controller_bandwidth, half));
+    detail::TuneSearch search{model,
+                              rules,
+                              tuning.rho,
+                              given_law ? w : 0.0,
+                              w,
+                              filter_bandwidth,
+                              1.0 / (model.lag + model.dead_time + model.sensor + 1.5 * T),
+                              tuning.control_noise,
+                              nullptr};
+    // The search requires slightly larger margins, because its frequency grid is coarse.
+    TuneRules strict = rules;
+    strict.gain_factor *= 1.01;
+    const LoopCost cost(model, strict, search.slowest(), 14.0);
+    const LoopCost fine(model, rules, search.slowest(), 50.0);
+    search.cost = &cost;
+    // A sine of known frequency can be cancelled at no cost, so J* is computed without it.
+    TuneModel walking = model;
+    walking.swings.clear();
+    tuning.lqg = LoopCost(walking, rules, search.slowest(), 50.0)(lqg.controller(tuning.rho));
+    tuning.optimum = tuning.lqg.cost(tuning.rho, b0);
+    checks.require(tuning.lqg.stable && tuning.optimum > 0.0 && is_finite(tuning.optimum),
+                   "optimum", tuning.optimum,
+                   "cannot be computed: the numbers of this model are too far apart");
+    if (!checks) return checks.error();
+    std::vector<detail::Contender> all = detail::contenders(model, given_law);
+    for (detail::Contender& c : all) {
+      search.seen.clear();
+      std::vector<std::vector<double>> starts;
+      if (c.design.family == TuneFamily::free_poles) {
+        starts.push_back(search.start(c, search.filter_bandwidth, w, true));
+        // Also from the results of the families that are special cases of this one.
+        for (const detail::Contender& other : all) {
+          const bool half = other.design.family == TuneFamily::half_gain;
+          if (other.design.knows == c.design.knows && other.design.extension == 1 &&
+              (half || other.design.family == TuneFamily::linear)) {
+            const TuneSettings& found = other.design.settings;
+            starts.push_back(
+                search.start(c, found.observer_bandwidth, found.controller_bandwidth, half));
+          }
         }
       }
-    }
-    const auto free = search.least(c, false, starts);
-    auto best = free;
-    best.value = search.value(c, free.at, 40.0);
-    if (best.value > free.value) {
-      if (c.design.family == TuneFamily::free_poles && c.law_numbers > 0) {
-        // Divided otherwise the same poles give nearly the same J and margins.
-        best.value = std::numeric_limits<double>::infinity();
-        for (auto& x : search.divisions(c, free.at)) {
-          const double value = search.value(c, x, 40.0);
-          if (value < best.value) best = {value, std::move(x)};
+      const auto free = search.least(c, false, starts);
+      auto best = free;
+      best.value = search.value(c, free.at, 40.0);
+      if (best.value > free.value) {
+        if (c.design.family == TuneFamily::free_poles && c.law_numbers > 0) {
+          // Divided otherwise the same poles give nearly the same J and margins.
+          best.value = std::numeric_limits<double>::infinity();
+          for (auto& x : search.divisions(c, free.at)) {
+            const double value = search.value(c, x, 40.0);
+            if (value < best.value) best = {value, std::move(x)};
+          }
+          if (best.value < 1e3) starts.insert(starts.begin(), best.at);
         }
-        if (best.value < 1e3) starts.insert(starts.begin(), best.at);
+        if (best.value > free.value + 2e-3) best = search.least(c, true, starts);
       }
-      if (best.value > free.value + 2e-3) best = search.least(c, true, starts);
+      c.design.settings = detail::as_printed(search.settings(c, best.at));
+      detail::fill_in(c, search, fine, tuning.optimum, std::exp(search.seen.at(free.at).value));
+      c.design.code = detail::controller_source(c.design, model).text(model);
     }
-    c.design.settings = detail::as_printed(search.settings(c, best.at));
-    detail::fill_in(c, search, fine, tuning.optimum, std::exp(free.value));
-    c.design.code = detail::controller_source(c.design, model).text(model);
-  }
-  for (detail::Contender& c : all) tuning.designs.push_back(std::move(c.design));
-  // Ranks by J; among the remaining designs within 1 % of the smallest J, the cheapest update comes
-  // next.
-  std::stable_sort(tuning.designs.begin(), tuning.designs.end(),
-                   [](const TunedDesign& a, const TunedDesign& b) {
-                     return a.feasible != b.feasible       ? a.feasible
-                            : a.comes_back != b.comes_back ? a.comes_back
-                                                           : a.cost < b.cost;
-                   });
-  for (std::size_t i = 0; i < tuning.designs.size(); ++i) {
-    std::size_t best = i;
-    for (std::size_t j = i + 1; j < tuning.designs.size(); ++j) {
-      const TunedDesign& a = tuning.designs[best];
-      const TunedDesign& b = tuning.designs[j];
-      if (b.feasible != tuning.designs[i].feasible ||
-          b.comes_back != tuning.designs[i].comes_back || b.cost > 1.01 * tuning.designs[i].cost) {
-        break;
-      }
-      if (b.instructions < a.instructions ||
-          (b.instructions == a.instructions && b.modulus_margin > a.modulus_margin)) {
-        best = j;
+    tuning.designs.clear();
+    for (detail::Contender& c : all) tuning.designs.push_back(std::move(c.design));
+    if (rules.play == TunePlay::all) {
+      for (TunedDesign& design : tuning.designs) {
+        if (design.feasible) detail::play_all(design, model);
       }
     }
-    std::rotate(tuning.designs.begin() + static_cast<std::ptrdiff_t>(i),
-                tuning.designs.begin() + static_cast<std::ptrdiff_t>(best),
-                tuning.designs.begin() + static_cast<std::ptrdiff_t>(best) + 1);
+    for (bool again = true; again;) {
+      detail::rank(tuning.designs);
+      TunedDesign& first = tuning.designs.front();
+      again = rules.play == TunePlay::first && first.feasible && !first.played;
+      if (again) detail::play_all(first, model);
+    }
+    const TunedDesign* chosen = tuning.chosen();
+    if (!(wish.settling_time > 0.0) || chosen == nullptr || corrections == (given_law ? 4 : 2) ||
+        std::abs(chosen->settling_time - wish.settling_time) <=
+            std::max(0.02 * wish.settling_time, T)) {
+      break;
+    }
+    w = std::clamp(w * chosen->settling_time / wish.settling_time, slow,
+                   std::min(fast, 2.0 * damped));
   }
   return tuning;
 }
