@@ -104,6 +104,30 @@ TEST(Lead, TellsThatUIsLate) {
   }
 }
 
+// A fit that is bad for another reason is no lead, nor is a lead that explains little.
+TEST(Lead, MustBeOneAndHelp) {
+  esokit::FitData data;
+  const auto lead_from = [&](const Log& log, double latency) {
+    data.sample_time = T;
+    data.u = log.u;
+    data.y = log.y;
+    const esokit::FitModel model{1, 1, true};
+    const auto bounds = esokit::detail::fit_bounds(data, false);
+    esokit::InnovationsFit fit(data, model, bounds);
+    const esokit::Fit here = fit.at(fit.inside({20, latency, 0.3, pole}));
+    return esokit::detail::lead_of(data, model, bounds, here).time;
+  };
+  const Log causal = machine(straight);
+  EXPECT_EQ(lead_from(causal, 20 * T), 0);
+  Log late = causal;
+  late.y.erase(late.y.begin(), late.y.begin() + 3);
+  late.u.resize(late.y.size());
+  EXPECT_NEAR(lead_from(late, 0), 1.5 * T, 0.3 * T);
+  esokit::sim::Gaussian gaussian(5);
+  for (double& y : late.y) y += 0.1 * gaussian.next();
+  EXPECT_EQ(lead_from(late, 0), 0);
+}
+
 TEST(AtOnce, TellsAnAcceleration) {
   Log log = machine(straight);
   EXPECT_FALSE(studied(log).at_once);
