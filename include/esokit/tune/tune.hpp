@@ -71,6 +71,7 @@ struct TunedDesign {
   int instructions = 0;            ///< per update of the observer, see update_instructions
   std::string code;                ///< C++ source of the controller, type and config, to paste
   LinearController controller{};   ///< for the analysis, see closed_loop(model, controller)
+  PlayedLaw law{};                 ///< of a design that softens at its limits, for `play`
 };
 
 /// The result of `tune`.
@@ -515,12 +516,15 @@ inline std::string in_words(const PlayEvent& event, const TuneModel& model) {
 }
 
 /// Plays all events on all variants of the plant, until one is lost.
-inline void play_all(TunedDesign& d, const TuneModel& model) {
+inline void play_all(TunedDesign& d, const TuneModel& model, const PlayedLaw& law) {
+  d.comes_back = true;
+  d.lost.clear();
   const auto variants = played_variants(model);
   for (std::size_t v = 0; v < variants.size(); ++v) {
     for (const PlayEvent& event : play_events) {
-      const Played played = play(variants[v].model, variants[v].gain, d.controller, event,
-                                 d.settling_time, [](double, double, double, double) {});
+      const Played played = play(
+          variants[v].model, variants[v].gain, d.controller, event, d.settling_time,
+          [](double, double, double, double) {}, law);
       if (played.back || !played.counts) continue;
       d.comes_back = false;
       d.lost_in = event;
@@ -552,6 +556,7 @@ inline void fill_in(Contender& c, const TuneSearch& search, const LoopCost& fine
   d.gain_tolerance = numbers.tolerance;
   d.phase_margin = numbers.phase;
   const auto& gains = d.settings.gains;
+  d.settings.soften = gains.size() > 2 && gains[0] > 0.0;
   d.damping_latencies = gains.size() > 1 ? gains[1] / gains[0] / model.latency() : 0.0;
   d.bandwidth_ratio =
       law_mean(gains, model.order) / observer_mean(d.family, c.kind, model, d.settings);
@@ -585,7 +590,14 @@ inline void fill_in(Contender& c, const TuneSearch& search, const LoopCost& fine
   const int steps = static_cast<int>(std::min(12.0 / decay, 50000.0)) + 10;
   d.settling_time = step_answer(loop->system(), 0, 1.0, 1.0, steps).settling;
   d.load_peak = step_answer(loop->system(), 2, std::abs(model.input_gain.value), 0.0, steps).peak;
-  if (d.feasible && search.rules.play) play_all(d, model);
+  if (!d.feasible || !search.rules.play) return;
+  // First the law as designed, which comes back faster; only what is lost with it is softened.
+  play_all(d, model, {});
+  d.settings.soften = !d.comes_back && gains[0] > 0.0;
+  if (!d.settings.soften) return;
+  const auto observer = tuned_observer(c.kind, model.sample_time, d.settings);
+  d.law = {gains, observer->input_gain, observer->to_estimate, observer->y_to_estimate};
+  play_all(d, model, d.law);
 }
 
 /// Type and config of the controller as C++ source.
@@ -670,7 +682,7 @@ inline std::string controller_source(const TunedDesign& d, const TuneModel& mode
          (by_bandwidth ? "    .controller_bandwidth = " + source(d.settings.controller_bandwidth)
                        : "    .gains = {{" + list(d.settings.gains) + "}}") +
          ",\n    .limits = {.lower = " + source(model.u_min) + ", .upper = " + source(model.u_max) +
-         "}});\n";
+         "}, .soften = " + (d.settings.soften ? "true" : "false") + "});\n";
 }
 
 /// All families for a model. A template, as `tune`, so that it costs compile time only where it is
@@ -948,12 +960,16 @@ template <class = void>
   }
   for (detail::Contender& c : all) tuning.designs.push_back(std::move(c.design));
   // Ranks by J; among the remaining designs within 1 % of the smallest J, the cheapest update comes
-  // next.
+  // next. What comes back without being softened comes back from more of what no model has: it may
+  // have deviations 1.25 times as large.
+  const auto ranked = [&](const TunedDesign& d) {
+    return d.cost * (rules.play && d.comes_back && d.settings.soften ? 1.5625 : 1.0);
+  };
   std::stable_sort(tuning.designs.begin(), tuning.designs.end(),
-                   [](const TunedDesign& a, const TunedDesign& b) {
+                   [&](const TunedDesign& a, const TunedDesign& b) {
                      return a.feasible != b.feasible       ? a.feasible
                             : a.comes_back != b.comes_back ? a.comes_back
-                                                           : a.cost < b.cost;
+                                                           : ranked(a) < ranked(b);
                    });
   for (std::size_t i = 0; i < tuning.designs.size(); ++i) {
     std::size_t best = i;
@@ -961,7 +977,8 @@ template <class = void>
       const TunedDesign& a = tuning.designs[best];
       const TunedDesign& b = tuning.designs[j];
       if (b.feasible != tuning.designs[i].feasible ||
-          b.comes_back != tuning.designs[i].comes_back || b.cost > 1.01 * tuning.designs[i].cost) {
+          b.comes_back != tuning.designs[i].comes_back ||
+          ranked(b) > 1.01 * ranked(tuning.designs[i])) {
         break;
       }
       if (b.instructions < a.instructions ||
