@@ -206,7 +206,7 @@ StepOfCode step_of_code(const esokit::Tuning& tuning, const esokit::TunedDesign&
   step.height = esokit::play_distance(model, 1.0, esokit::play_events.back());
   auto told = esokit::detail::told_of_input(design.controller);
   const double weight = told.r_to_u(0, 0) / design.settings.gains[0];
-  esokit::detail::PlayLoop loop(model, 1.0, told, half);
+  esokit::detail::PlayLoop loop(model, 1.0, told, half, design.law);
   auto profile = esokit::TrackingDifferentiator<double>::make(
                      {.acceleration = profile_acceleration(model), .sample_time = T})
                      .value();
@@ -453,13 +453,14 @@ Figure lost_figure(const esokit::Tuning& tuning, const esokit::TunedDesign& desi
   const auto variants = esokit::played_variants(tuning.model);
   const auto& variant = variants[static_cast<std::size_t>(design.lost_on)];
   std::vector<double> t, y, u;
-  const auto played =
-      esokit::play(variant.model, variant.gain, design.controller, design.lost_in,
-                   design.settling_time, [&](double now, double, double output, double control) {
-                     t.push_back(now);
-                     y.push_back(output);
-                     u.push_back(control);
-                   });
+  const auto played = esokit::play(
+      variant.model, variant.gain, design.controller, design.lost_in, design.settling_time,
+      [&](double now, double, double output, double control) {
+        t.push_back(now);
+        y.push_back(output);
+        u.push_back(control);
+      },
+      design.law);
   // The event and what comes first tell it.
   const auto rows = std::min<std::size_t>(
       t.size(), static_cast<std::size_t>((5 * design.lost_in.latencies * tuning.model.latency() +
