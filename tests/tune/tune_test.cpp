@@ -669,15 +669,14 @@ TEST(PlayTest, PlaysTheSoftenedLawAsItRuns) {
   EXPECT_LT(softest, 0.9);
 }
 
-// What is lost with the law as designed is softened, and counts with deviations 1.25 times as
-// large.
+// What is lost with the law as designed is softened, and ranks behind what is not.
 TEST(TuneTest, SoftensOnlyWhatIsLostWithoutIt) {
   TuneModel model = servo();
   model.order = 3;
   model.pole = 0.0;
   const auto tuning = tune(model).value();
   int plain = 0, soft = 0;
-  double before = 0.0;
+  bool softened = false;
   for (const TunedDesign& design : tuning.designs) {
     if (!design.feasible) continue;
     const auto alone = esokit::played_variants(tuning.model);
@@ -693,11 +692,10 @@ TEST(TuneTest, SoftensOnlyWhatIsLostWithoutIt) {
     EXPECT_EQ(design.law.gains.empty(), !lost) << design.name;
     ++(lost ? soft : plain);
     if (!design.comes_back) continue;
-    const double counts = design.cost * (lost ? 1.25 * 1.25 : 1.0);
-    EXPECT_GE(counts, before / 1.0101) << design.name;
-    before = std::max(before, counts);
+    EXPECT_TRUE(lost || !softened) << design.name;
+    softened = softened || lost;
   }
-  EXPECT_GT(plain + soft, 2);
+  EXPECT_GT(plain, 0);
   EXPECT_GT(soft, 0);
 }
 

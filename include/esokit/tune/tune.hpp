@@ -960,25 +960,21 @@ template <class = void>
   }
   for (detail::Contender& c : all) tuning.designs.push_back(std::move(c.design));
   // Ranks by J; among the remaining designs within 1 % of the smallest J, the cheapest update comes
-  // next. What comes back without being softened comes back from more of what no model has: it may
-  // have deviations 1.25 times as large.
-  const auto ranked = [&](const TunedDesign& d) {
-    return d.cost * (rules.play && d.comes_back && d.settings.soften ? 1.5625 : 1.0);
+  // next. What comes back as designed goes before what has to be softened: it comes back from more
+  // of what no model has.
+  const auto rank = [&](const TunedDesign& d) {
+    return !d.feasible ? 3 : !d.comes_back ? 2 : rules.play && d.settings.soften ? 1 : 0;
   };
   std::stable_sort(tuning.designs.begin(), tuning.designs.end(),
                    [&](const TunedDesign& a, const TunedDesign& b) {
-                     return a.feasible != b.feasible       ? a.feasible
-                            : a.comes_back != b.comes_back ? a.comes_back
-                                                           : ranked(a) < ranked(b);
+                     return rank(a) != rank(b) ? rank(a) < rank(b) : a.cost < b.cost;
                    });
   for (std::size_t i = 0; i < tuning.designs.size(); ++i) {
     std::size_t best = i;
     for (std::size_t j = i + 1; j < tuning.designs.size(); ++j) {
       const TunedDesign& a = tuning.designs[best];
       const TunedDesign& b = tuning.designs[j];
-      if (b.feasible != tuning.designs[i].feasible ||
-          b.comes_back != tuning.designs[i].comes_back ||
-          ranked(b) > 1.01 * ranked(tuning.designs[i])) {
+      if (rank(b) != rank(tuning.designs[i]) || b.cost > 1.01 * tuning.designs[i].cost) {
         break;
       }
       if (b.instructions < a.instructions ||
