@@ -5,12 +5,18 @@
 // design as the Adrc that runs, on a machine with friction, gravity, a second lag, a sensor's lag
 // and an encoder that the model does not have. A load pulse as large as u can balance is 100 %. An
 // event counts if u can hold its end, and where gravity lets the machine fall, if bang-bang with
-// the true state brings it back after one 1 / 0.6 times as large.
+// the true state brings it back after one 1 / 0.6 times as large. A PID by the rules of SIMC from
+// the same model, with the same limits and noise in u, goes through the same events.
 //
 // symbol   code                     value
 // back     -                        abs(y - r) below 2 % of its peak + 4 deviations of the noise
-// horizon  80 / omega_c             omega_c = k_0^(1/n); back after four, for the rest of it
-// limits
+// horizon  80 / omega_c             omega_c: mean of the law's n slowest poles (with a lag in the
+//                                   law, k_0^(1/(n+1)) is faster than the loop); back in the
+//                                   last of four
+// locked                            not back, and more than a fifth of the last horizon at a limit
+// hunting                           not back, and y swings by more than half of its error, off the
+//                                   limits
+// drifting                          else not back
 //
 // --machines N --seed S: so many machines, of another draw; the page shows the few that every run
 // has time for.
@@ -59,9 +65,27 @@ struct Held final : AnyController {
   Controller controller;
 };
 
+/// The generator's PID.
+struct HeldPid final : AnyController {
+  explicit HeldPid(const Pid& p) : pid(p) {}
+  double update(double y, const std::array<double, 4>& r) override { return pid.update(y, r[0]); }
+  void start(double y, double u) override { pid.start(y, u); }
+  [[nodiscard]] std::unique_ptr<AnyController> copy() const override {
+    return std::make_unique<HeldPid>(*this);
+  }
+  Pid pid;
+};
+
+enum class Kind { back, locked, hunting, drifting };
+constexpr std::array<const char*, 4> kinds{"back", "locked up", "hunting", "drifting"};
+
 struct Played {
-  bool back = false;
-  double peak = 0.0;  ///< largest abs(y - r)
+  Kind kind = Kind::back;
+  double peak = 0.0;        ///< largest abs(y - r)
+  double integral = 0.0;    ///< of abs(y - r)
+  double late = 0.0;        ///< largest abs(y - r) in the last horizon, in deviations of the noise
+  double late_share = 0.0;  ///< the same over the peak
+  double at_limits = 0.0;   ///< share of the last horizon
 };
 
 /// One event, from rest at 0.
@@ -80,7 +104,8 @@ Played played(const Machine& m, const AnyController& fresh, const Event& event, 
   controller->start(event.away != 0.0 ? 0.0 : start_y, event.away != 0.0 ? 0.0 : m.held_at(0.0));
   const double noise = std::hypot(m.noise, m.resolution / std::sqrt(12.0));
   Played result;
-  double late_peak = 0.0;
+  double late = 0.0, lowest = 0.0, highest = 0.0;
+  long limited = 0;
   const long begin = event.away != 0.0 ? 0 : first;
   for (long k = 0; k < begin + rest; ++k) {
     const double t = static_cast<double>(k - begin) * T;
@@ -97,11 +122,24 @@ Played played(const Machine& m, const AnyController& fresh, const Event& event, 
     if (on && t < event.off_time) u = 0.0;
     machine.sample(u, on && t < event.load_time ? event.load : 0.0);
     if (!on) continue;
-    const double e = std::abs(machine.y() - r[0]);
-    result.peak = std::max(result.peak, e);
-    if (k >= begin + rest - looked_at) late_peak = std::max(late_peak, e);
+    const double e = machine.y() - r[0];
+    result.peak = std::max(result.peak, std::abs(e));
+    result.integral += T * std::abs(e);
+    if (k < begin + rest - looked_at) continue;
+    const bool first_look = k == begin + rest - looked_at;
+    late = std::max(late, std::abs(e));
+    lowest = first_look ? e : std::min(lowest, e);
+    highest = first_look ? e : std::max(highest, e);
+    limited += u <= m.lower() || u >= m.upper() ? 1 : 0;
   }
-  result.back = late_peak <= 0.02 * result.peak + 4.0 * noise;
+  result.late = late / noise;
+  result.late_share = late / result.peak;
+  result.at_limits = static_cast<double>(limited) / static_cast<double>(looked_at);
+  if (!(late <= 0.02 * result.peak + 4.0 * noise)) {
+    result.kind = result.at_limits > 0.2                  ? Kind::locked
+                  : 0.5 * (highest - lowest) > 0.5 * late ? Kind::hunting
+                                                          : Kind::drifting;
+  }
   return result;
 }
 
@@ -109,18 +147,20 @@ Played played(const Machine& m, const AnyController& fresh, const Event& event, 
 bool counts(const Machine& m, const Event& event) {
   if (event.profile && !Profile(m, event.target).possible(m)) return false;
   for (const double y : {0.0, event.target, event.away}) {
-    if (m.order == 2 && std::abs(m.held_at(y) - m.middle) > 0.9 * m.half_range) return false;
+    // A speed is held against friction, too.
+    const double rubs = m.order == 1 && y != 0.0 ? m.friction / std::abs(m.b) : 0.0;
+    if (std::abs(m.held_at(y) - m.middle) + rubs > 0.9 * m.half_range) return false;
   }
   const double rate = m.falls(event.target);
   if (!(rate > 0.0)) return true;
-  // Bang-bang on y + y' / rate: the direction in which it falls.
+  // Bang-bang on the direction in which it falls.
   Running machine(m, event.away, 1);
   const auto samples = static_cast<long>((event.load_time + event.off_time + 20.0 / rate) / m.T);
   if (event.kick != 0.0) machine.kick(event.kick / 0.6);
   double start = 0.0, end = 0.0;
   for (long k = 0; k < samples; ++k) {
     const double t = static_cast<double>(k) * m.T;
-    const double z = machine.y() - event.target + machine.speed() / rate;
+    const double z = machine.falling(event.target, rate);
     double u = (z * m.b > 0.0 ? m.lower() : m.upper());
     if (t < event.off_time / 0.6) u = 0.0;
     machine.sample(u, t < event.load_time ? event.load / 0.6 : 0.0, true);
@@ -134,10 +174,11 @@ struct Outcome {
   int order = 0;
   bool designed = false;
   std::string design;
-  double ratio = 0.0;  ///< k_1 / k_0 over the latency
-  double lone = 0.0;   ///< latency of the model
+  double ratio = 0.0;                    ///< k_1 / k_0 over the latency
+  double friction = 0.0, gravity = 0.0;  ///< share of half the range (order 3: of 10 latencies)
   std::vector<std::string> names;
-  std::vector<int> back;  ///< 1, 0, or -1: does not count
+  std::vector<bool> counted;
+  std::vector<Played> own, pid;  ///< of the events that count, else empty ones
 };
 
 template <int Order>
@@ -147,18 +188,23 @@ Outcome with_order(const Drawn& all, const esokit::TunedDesign& design, std::uin
   outcome.designed = true;
   outcome.design = design.name;
   const auto& gains = design.settings.gains;
-  outcome.lone =
-      all.model.lag + all.model.dead_time + all.model.sensor + m.T + all.model.latency_half_width;
-  if (gains.size() > 1) outcome.ratio = gains[1] / gains[0] / outcome.lone;
-  const double omega_c = std::pow(gains[0], 1.0 / static_cast<double>(gains.size()));
+  outcome.ratio = design.damping_latencies;
+  const double most = std::abs(m.b) * m.half_range * (Order == 3 ? 10.0 * m.latency : 1.0);
+  outcome.friction = m.friction / most;
+  outcome.gravity = m.gravity / most;
+  const double omega_c = esokit::detail::law_mean(gains, Order);
   Dice dice(77 + number);
   const auto list = events(m, dice);
   const auto ok = esokit::with_controller<Order>(all.model, design, [&](const auto& controller) {
     const Held held(controller);
+    const HeldPid pid(
+        Pid(all.model, esokit::usual_control_noise * (all.model.u_max - all.model.u_min)));
     for (const Event& event : list) {
+      const bool is_counted = counts(m, event);
       outcome.names.push_back(event.name);
-      outcome.back.push_back(
-          !counts(m, event) ? -1 : (played(m, held, event, omega_c, number).back ? 1 : 0));
+      outcome.counted.push_back(is_counted);
+      outcome.own.push_back(is_counted ? played(m, held, event, omega_c, number) : Played{});
+      outcome.pid.push_back(is_counted ? played(m, pid, event, omega_c, number) : Played{});
     }
   });
   if (!ok) outcome.design += " (" + std::string(ok.error().field) + ")";
@@ -183,6 +229,12 @@ Outcome play(std::uint64_t seed, std::uint64_t number) {
   return outcome;
 }
 
+/// Pulses up to 100 %, and the profile.
+bool is_small(const std::string& name) {
+  return name == "profile" ||
+         (name.find("pulse") != std::string::npos && name.find("150") == std::string::npos);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -199,10 +251,14 @@ int main(int argc, char** argv) {
                       "a lost actuator."});
   const auto outcomes =
       run_parallel("machines", machines, [seed](std::size_t i) { return play(seed, i); });
-  // name -> order -> {counted, stuck}
-  std::map<std::string, std::array<std::array<int, 2>, 3>> table;
+  // name -> order -> {counted, stuck}, and the same of the PID
+  struct Cell {
+    int counted = 0, stuck = 0, pid = 0;
+  };
+  std::map<std::string, std::array<Cell, 3>> table;
   std::vector<std::string> names;
-  std::array<int, 3> designed{}, count{};
+  std::array<int, 3> designed{}, count{}, bad{}, better{}, compared{};
+  std::array<std::array<int, 4>, 3> of_kind{}, pid_too{};
   for (std::size_t i = 0; i < outcomes.size(); ++i) {
     const Outcome& o = outcomes[i];
     const auto n = static_cast<std::size_t>(o.order - 1);
@@ -212,37 +268,82 @@ int main(int argc, char** argv) {
       continue;
     }
     ++designed[n];
+    bool small_lost = false, worse = false, any = false;
     for (std::size_t e = 0; e < o.names.size(); ++e) {
       if (!table.contains(o.names[e])) names.push_back(o.names[e]);
       auto& cell = table[o.names[e]][n];
-      if (o.back[e] < 0) continue;
-      ++cell[0];
-      if (o.back[e] > 0) continue;
-      ++cell[1];
-      std::printf("  machine %zu, order %d, %s: not back after %s (k_1 / k_0 = %.3g latencies)\n",
-                  i, o.order, o.design.c_str(), o.names[e].c_str(), o.ratio);
+      if (!o.counted[e]) continue;
+      const Played& own = o.own[e];
+      const Played& pid = o.pid[e];
+      if (o.names[e].find("of 50 %") != std::string::npos) {
+        any = true;
+        worse = worse || own.peak > pid.peak || own.integral > pid.integral;
+      }
+      ++cell.counted;
+      cell.pid += pid.kind != Kind::back ? 1 : 0;
+      if (own.kind == Kind::back) continue;
+      ++cell.stuck;
+      ++of_kind[n][static_cast<std::size_t>(own.kind)];
+      if (pid.kind != Kind::back) ++pid_too[n][static_cast<std::size_t>(own.kind)];
+      small_lost = small_lost || is_small(o.names[e]);
+      std::printf(
+          "  machine %zu, order %d, %s: not back after %s: %s (%.2g of the horizon at a limit, "
+          "error %.3g deviations of the noise and %.2g of the peak; friction %.2g, gravity %.2g of "
+          "u; k_1 / k_0 = %.3g latencies); PID: %s, %.3g deviations\n",
+          i, o.order, o.design.c_str(), o.names[e].c_str(),
+          kinds[static_cast<std::size_t>(own.kind)], own.at_limits, own.late, own.late_share,
+          o.friction, o.gravity, o.ratio, kinds[static_cast<std::size_t>(pid.kind)], pid.late);
     }
+    bad[n] += small_lost ? 1 : 0;
+    compared[n] += any ? 1 : 0;
+    better[n] += any && !worse ? 1 : 0;
   }
   std::vector<CsvRow> rows;
-  std::array<int, 3> stuck{}, small{};
+  std::array<int, 3> stuck{}, small{}, runs_beyond{}, beyond{};
   for (const std::string& name : names) {
     CsvRow row{name};
     for (std::size_t n = 0; n < 3; ++n) {
-      const auto [counted, not_back] = table[name][n];
-      row.push_back(std::to_string(not_back) + " of " + std::to_string(counted));
-      stuck[n] += not_back;
-      const bool beyond = name.find("pulse") == std::string::npos && name != "profile";
-      if (!beyond && name.find("150") == std::string::npos) small[n] += not_back;
+      const Cell& cell = table[name][n];
+      row.push_back(std::to_string(cell.stuck) + " of " + std::to_string(cell.counted) + " (PID " +
+                    std::to_string(cell.pid) + ")");
+      stuck[n] += cell.stuck;
+      (is_small(name) ? small[n] : beyond[n]) += cell.stuck;
+      if (!is_small(name)) runs_beyond[n] += cell.counted;
     }
     rows.push_back(row);
   }
   report.table("overload", "Runs that did not come back, of those that count",
                {"event", "order 1", "order 2", "order 3"}, rows);
+  std::vector<CsvRow> explained;
+  for (std::size_t kind = 1; kind < kinds.size(); ++kind) {
+    CsvRow row{kinds[kind]};
+    for (std::size_t n = 0; n < 3; ++n) {
+      row.push_back(std::to_string(of_kind[n][kind]) + " (" + std::to_string(pid_too[n][kind]) +
+                    ")");
+    }
+    explained.push_back(row);
+  }
+  report.table("kinds", "How they did not; in brackets: nor did the PID",
+               {"kind", "order 1", "order 2", "order 3"}, explained);
   report.check("orders 1 and 2", "not back after pulses up to 100 % and after the profile", {},
                small[0] + small[1]);
-  report.check(
-      "all", "machines with a design (share)", {},
-      static_cast<double>(designed[0] + designed[1] + designed[2]) / static_cast<double>(machines));
+  const auto share = [](int part, int whole) {
+    return static_cast<double>(part) / static_cast<double>(std::max(whole, 1));
+  };
+  report.check("orders 1 and 2", "not back after the other events (share)", {},
+               share(beyond[0] + beyond[1], runs_beyond[0] + runs_beyond[1]));
+  report.check("order 3", "machines not back after pulses up to 100 % or the profile (share)", {},
+               share(bad[2], designed[2]));
+  report.check("all", "peak and IAE better than the PID, pulses of 50 % (share)", {},
+               share(better[0] + better[1] + better[2], compared[0] + compared[1] + compared[2]));
+  report.check("all", "machines with a design (share)", {},
+               share(designed[0] + designed[1] + designed[2], static_cast<int>(machines)));
   std::printf("not back in all, by order: %d %d %d\n", stuck[0], stuck[1], stuck[2]);
+  for (std::size_t n = 0; n < 3; ++n) {
+    std::printf(
+        "order %zu: %d of %d machines designed, %d with a small event lost; beyond %d of %d runs; "
+        "better than the PID %d of %d\n",
+        n + 1, designed[n], count[n], bad[n], beyond[n], runs_beyond[n], better[n], compared[n]);
+  }
   return report.finish();
 }

@@ -53,8 +53,10 @@ struct Machine {
   [[nodiscard]] double pull(double y) const {
     return gravity * std::sin(y / gravity_length + gravity_angle);
   }
-  /// The u that holds the machine at y.
-  [[nodiscard]] double held_at(double y) const { return order == 2 ? -pull(y) / b : 0.0; }
+  /// The u that holds the machine at y, without friction.
+  [[nodiscard]] double held_at(double y) const {
+    return order == 1 ? pole * y / b : -(order == 3 ? pole : 1.0) * pull(y) / b;
+  }
   [[nodiscard]] double upper() const { return middle + half_range; }
   [[nodiscard]] double lower() const { return middle - half_range; }
   /// How far half of the range moves the chain in 30 latencies.
@@ -152,7 +154,12 @@ class Running {
     return m_.resolution > 0.0 ? m_.resolution * std::round(y / m_.resolution) : y;
   }
   [[nodiscard]] double y() const { return x_[0]; }
-  [[nodiscard]] double speed() const { return x_[1]; }
+  /// How far the part of the state that falls at `rate` is from rest at y, in units of y: the left
+  /// eigenvector of the machine, linear about y, times its state.
+  [[nodiscard]] double falling(double y, double rate) const {
+    const double z = x_[0] - y + x_[1] / rate;
+    return m_.order == 3 ? z + (x_[2] + m_.pull(y)) / (rate * (rate + m_.pole)) : z;
+  }
   /// Moves y^(n-1) at once.
   void kick(double more) { x_[static_cast<std::size_t>(m_.order - 1)] += more; }
 
@@ -218,7 +225,7 @@ struct Event {
 
 /// The events of the page: sizes are shares of what u can balance in that direction.
 inline std::vector<Event> events(const Machine& m, Dice& dice) {
-  const double hold = m.order == 2 ? m.held_at(0.0) : 0.0;
+  const double hold = m.held_at(0.0);
   const double side = dice.sign();
   // A load of this sign is balanced by u towards the other limit.
   const bool to_upper = side * m.b < 0.0;
@@ -285,6 +292,84 @@ class Profile {
 
   double far_, time_ = 1.0;
   int order_;
+};
+
+/// A PID by the rules of Skogestad (SIMC, J. Process Control 2003) from the same model: closed-loop
+/// time constant equal to the latency, or as much longer as the noise in u demands; for order 3
+/// with one more zero. Integral with conditional clamping as anti-windup.
+class Pid {
+ public:
+  Pid(const esokit::TuneModel& model, double most_noise) : n_(model.order), T_(model.sample_time) {
+    lower_ = model.u_min;
+    upper_ = model.u_max;
+    // Half of the lag counts as dead time.
+    const double late = 0.5 * model.lag + model.dead_time + model.sensor + 0.5 * T_;
+    for (double slow = late; slow < 1e6 * late; slow *= 1.1) {
+      filter_ = 0.1 * slow;
+      const double sum = slow + late + filter_;
+      double gain = 0.0;
+      if (n_ == 1) {
+        gain = 1.0 / sum;
+        lead_ = 0.0;
+        integral_ = model.pole > 0.0 ? std::min(1.0 / model.pole, 4.0 * sum) : 4.0 * sum;
+      } else if (n_ == 2) {
+        lead_ = 4.0 * sum;
+        integral_ = lead_;
+        gain = 1.0 / (lead_ * lead_) * 4.0;
+      } else {
+        lead_ = 8.0 * sum;
+        integral_ = lead_;
+        // abs(L) = 1 at 1 / sum: the zeros three octaves below.
+        gain = 1.0 / (lead_ * lead_ * sum);
+      }
+      gain_ = gain / model.input_gain.value;
+      if (noise_in_u() * model.noise <= most_noise) break;
+    }
+  }
+
+  void start(double y, double u) {
+    state_.fill(y);
+    sum_ = u;
+  }
+
+  double update(double y, double r) {
+    // The leads see the measurement only, so that a step of r does not kick.
+    const double asked = gain_ * (r - filtered_lead(y)) + sum_;
+    const double u = std::clamp(asked, lower_, upper_);
+    const double more = gain_ * (r - y) * T_ / integral_;
+    if (asked == u || (asked > u) != (more > 0.0)) sum_ += more;
+    return u;
+  }
+
+ private:
+  /// (lead s + 1)^(n-1) / (filter s + 1)^n of y.
+  double filtered_lead(double y) {
+    const double keep = std::exp(-T_ / filter_);
+    for (int i = 0; i < n_; ++i) {
+      auto& x = state_[static_cast<std::size_t>(i)];
+      const double before = x;
+      x = y + (x - y) * keep;
+      y = i + 1 < n_ ? x + lead_ * (x - before) / T_ : x;
+    }
+    return y;
+  }
+  /// Deviation of u for noise of deviation 1, without the integral.
+  [[nodiscard]] double noise_in_u() const {
+    Pid tried = *this;
+    tried.state_.fill(0.0);
+    double sum = 0.0;
+    const int samples = static_cast<int>(std::min(20.0 * filter_ / T_, 1e5)) + 20;
+    for (int k = 0; k < samples; ++k) {
+      const double h = gain_ * tried.filtered_lead(k == 0 ? 1.0 : 0.0);
+      sum += h * h;
+    }
+    return std::sqrt(sum);
+  }
+
+  int n_;
+  double T_, gain_ = 0.0, lead_ = 0.0, integral_ = 1.0, filter_ = 1.0;
+  double lower_ = 0.0, upper_ = 0.0, sum_ = 0.0;
+  std::array<double, 3> state_{};
 };
 
 }  // namespace overload_example

@@ -281,13 +281,14 @@ Figure lost_figure(const esokit::Tuning& tuning, const esokit::TunedDesign& desi
   const auto variants = esokit::played_variants(tuning.model);
   const auto& variant = variants[static_cast<std::size_t>(design.lost_on)];
   std::vector<double> t, y, u;
-  const auto played =
-      esokit::play(variant.model, variant.gain, design.controller, design.lost_in,
-                   design.settling_time, [&](double now, double, double output, double control) {
-                     t.push_back(now);
-                     y.push_back(output);
-                     u.push_back(control);
-                   });
+  const auto played = esokit::play(
+      variant.model, variant.gain, design.controller, design.lost_in, design.settling_time,
+      [&](double now, double, double output, double control) {
+        t.push_back(now);
+        y.push_back(output);
+        u.push_back(control);
+      },
+      design.played_law());
   // The event and what comes first tell it.
   const auto rows = std::min<std::size_t>(
       t.size(), static_cast<std::size_t>((5 * design.lost_in.latencies * tuning.model.latency() +

@@ -531,8 +531,8 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
   const Watch watch = watch_of(tuning, design, rows);
   const std::string highest = derivative_of("y", p.order);
   const auto gains = static_cast<int>(design.settings.gains.size());
-  const std::string limits_of_u =
-      ".limits = {.lower = " + source(model.u_min) + ", .upper = " + source(model.u_max) + "}";
+  const std::string limits_of_u = ".limits = {.lower = " + source(model.u_min) +
+                                  ", .upper = " + source(model.u_max) + "}, " + parts.soften;
   const bool known = p.feeds_forward();
 
   std::string body;

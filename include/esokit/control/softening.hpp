@@ -22,7 +22,7 @@ namespace esokit {
 ///
 /// A law for the bandwidth s omega, and well damped: stable with any latency if s is small enough.
 /// While abs(u - middle) > 1.1 half the range, 1 / s grows by omega T a sample, else it shrinks by
-/// 0.03 omega T down to 1: ds/dt = -omega s^2, or 0.03 omega s^2. So the law slows down at its own
+/// 0.1 omega T down to 1: ds/dt = -omega s^2, or 0.1 omega s^2. So the law slows down at its own
 /// speed, and speeds up too slowly to swing again.
 template <int Order, Scalar S = double>
 class Softening {
@@ -149,7 +149,7 @@ class Softening {
   // Found with simulated machines that have latency, noise and limits.
   static constexpr double overload = 0.05;  ///< share of the range: 1.1 times its half
   static constexpr double damping = 0.9;
-  static constexpr double recovery = 0.03;
+  static constexpr double recovery = 0.1;
   static constexpr double slowest = 200.0;
 
   Array<S, Order - 1> damped_{};  ///< c_1 .. c_(n-1)

@@ -109,6 +109,7 @@ Check<double> with_controller(const TuneModel& model, const TunedDesign& design,
     std::copy_n(design.settings.gains.begin(), config.gains->size(), config.gains->begin());
     config.limits.lower = model.u_min;
     config.limits.upper = model.u_max;
+    config.soften = design.settings.soften;
     auto controller = detail::ControllerOf<Config>::make(config);
     if (!controller) return controller.error();
     visit(*controller);

@@ -56,6 +56,7 @@ struct TuneSettings {
   std::vector<std::complex<double>> observer_poles{};
   double disturbance_bound = 0.0;  ///< q_n of the filter, see ExtendedStateFilter
   std::vector<double> gains{};     ///< k_0 .. of the law
+  bool soften = false;             ///< as in AdrcConfig
 };
 
 namespace detail {
@@ -299,8 +300,8 @@ inline double law_mean(const std::vector<double>& gains, int order) {
   return std::exp(logarithm / order);
 }
 
-/// Observer and law as a controller, with its own u as the applied u.
-inline std::optional<LinearController> tuned_controller(const ObserverKind& kind, double T,
+/// The observer with its gains.
+inline std::optional<LinearObserverForm> tuned_observer(const ObserverKind& kind, double T,
                                                         const TuneSettings& settings) {
   std::vector<double> gains;
   if (!kind.gains(settings, gains)) return std::nullopt;
@@ -322,7 +323,16 @@ inline std::optional<LinearController> tuned_controller(const ObserverKind& kind
                 kind.state_of_row.data()},
                work.view(), form.a.view(), form.from_y.view(), form.from_u.view(),
                form.to_estimate.view(), form.y_to_estimate.view());
-  return closed_upon_itself(feedback_of(form, law_weights(settings.gains, kind.input_gain), false));
+  return form;
+}
+
+/// Observer and law as a controller, with its own u as the applied u.
+inline std::optional<LinearController> tuned_controller(const ObserverKind& kind, double T,
+                                                        const TuneSettings& settings) {
+  const auto form = tuned_observer(kind, T, settings);
+  if (!form) return std::nullopt;
+  return closed_upon_itself(
+      feedback_of(*form, law_weights(settings.gains, kind.input_gain), false));
 }
 
 }  // namespace detail

@@ -9,8 +9,10 @@
 #include <cstddef>
 #include <esokit/analysis/linear_controller.hpp>
 #include <esokit/analysis/loop.hpp>
+#include <esokit/control/softening.hpp>
 #include <esokit/sim/gaussian.hpp>
 #include <esokit/tune/problem.hpp>
+#include <functional>
 #include <utility>
 #include <vector>
 
@@ -45,6 +47,14 @@ struct Played {
   double beyond = 0.0;  ///< largest y - r beyond a step of the reference, share of the step
 };
 
+/// A law that softens at its limits, for a controller that is played: what Softening needs to know.
+struct PlayedLaw {
+  std::vector<double> gains{};          ///< k_0 ..; none: the linear law
+  double input_gain = 1.0;              ///< of the law
+  DynamicMatrix<double> to_estimate{};  ///< as in LinearObserverForm, with the controller's states
+  DynamicMatrix<double> y_to_estimate{};
+};
+
 /// The plants that a design is played on: the model, and what its intervals allow.
 inline std::vector<detail::PlantVariant> played_variants(const TuneModel& model) {
   std::vector<detail::PlantVariant> all{{model, 1.0}};
@@ -71,17 +81,67 @@ inline LinearController told_of_input(const LinearController& own) {
   return c;
 }
 
+/// u of the softened law, from u of the linear one, y, r and the states; empty for a linear law.
+using SoftenedInput =
+    std::function<double(double u, double y, double r, const std::vector<double>& z)>;
+
+template <int Order>
+SoftenedInput softened_input(const PlayedLaw& played, double T, double half) {
+  typename AdrcLaw<Order>::Config config{};
+  config.gains.emplace();
+  std::copy_n(played.gains.begin(), Order, config.gains->begin());
+  config.input_gain = played.input_gain;
+  const auto law = AdrcLaw<Order>::make(config);
+  const Limits<double> limits{.lower = -half, .upper = half};
+  const auto limiter = Limiter<double>::make(limits, T);
+  if (!law || !limiter) return {};
+  const auto made = Softening<Order>::make(*law, limits, true);
+  if (!made) return {};
+  return [played, T, law = *law, limiter = *limiter, soft = *made](
+             double u, double y, double r, const std::vector<double>& z) mutable {
+    if (soft.slowness() > 1.0) {
+      Vector<double, Order + 1> lacks{};
+      for (int i = 0; i <= Order; ++i) {
+        lacks(i) = (i == 0 ? r : 0.0) - played.y_to_estimate(i, 0) * y;
+        for (std::size_t j = 0; j < z.size(); ++j) {
+          lacks(i) -= played.to_estimate(i, static_cast<int>(j)) * z[j];
+        }
+      }
+      u = soft.control(law, lacks);
+    }
+    soft.judge(u, limiter, T);
+    return u;
+  };
+}
+
+inline SoftenedInput softened_input(const PlayedLaw& played, double T, double half) {
+  switch (played.gains.size()) {
+    case 1:
+      return softened_input<1>(played, T, half);
+    case 2:
+      return softened_input<2>(played, T, half);
+    case 3:
+      return softened_input<3>(played, T, half);
+    case 4:
+      return softened_input<4>(played, T, half);
+    default:
+      return {};
+  }
+}
+
 /// A controller and a plant within limits, sample by sample.
 class PlayLoop {
  public:
-  PlayLoop(const TuneModel& model, double gain, const LinearController& told, double half)
+  PlayLoop(const TuneModel& model, double gain, const LinearController& told, double half,
+           const PlayedLaw& law = {})
       : plant_(sampled_plant(dense_plant(model, gain), model.sample_time)),
         c_(told),
         half_(half),
         x_(static_cast<std::size_t>(plant_.a.rows())),
         z_(static_cast<std::size_t>(told.states())),
         next_(std::max(x_.size(), z_.size())),
-        held_(static_cast<std::size_t>(plant_.whole[0]) + 2) {}
+        held_(static_cast<std::size_t>(plant_.whole[0]) + 2),
+        soften_(softened_input(law, model.sample_time, half)) {}
 
   [[nodiscard]] double output() const {
     double y = 0.0;
@@ -90,12 +150,13 @@ class PlayLoop {
   }
 
   /// One sample. @param y as measured @param d unit of y^(n) @param more added to u, for the
-  /// derivatives of r @return u
+  /// derivatives of r (not softened) @return u
   double operator()(double y, double r, double d, double more = 0.0) {
-    double u = c_.y_to_u(0, 0) * y + c_.r_to_u(0, 0) * r + more;
+    double u = c_.y_to_u(0, 0) * y + c_.r_to_u(0, 0) * r;
     const int states = c_.states();
     for (int i = 0; i < states; ++i) u += c_.to_u(0, i) * z_[static_cast<std::size_t>(i)];
-    u = std::clamp(u, -half_, half_);
+    if (soften_) u = soften_(u, y, r, z_);
+    u = std::clamp(u + more, -half_, half_);
     advance(z_, c_.a,
             [&](int i) { return c_.from_y(i, 0) * y + c_.from_r(i, 0) * r + c_.from_u(i, 0) * u; });
     held_[at_] = u;
@@ -126,6 +187,7 @@ class PlayLoop {
   double half_;
   std::vector<double> x_, z_, next_, held_;
   std::size_t at_ = 0;
+  SoftenedInput soften_;
 };
 
 }  // namespace detail
@@ -146,9 +208,11 @@ inline double play_distance(const TuneModel& model, double gain, const PlayEvent
 /// @param gain factor on b0 of the plant, not of the controller
 /// @param settling_time of the linear loop, s
 /// @param on_sample called as on_sample(t, r, y, u) once a sample
+/// @param law of a controller that softens at its limits
 template <class Callback>
 Played play(const TuneModel& model, double gain, const LinearController& controller,
-            const PlayEvent& event, double settling_time, const Callback& on_sample) {
+            const PlayEvent& event, double settling_time, const Callback& on_sample,
+            const PlayedLaw& law = {}) {
   const double T = model.sample_time;
   const double latency = model.latency();
   const double half = 0.5 * (model.u_max - model.u_min);
@@ -166,7 +230,7 @@ Played play(const TuneModel& model, double gain, const LinearController& control
     result.counts = grown < 0.6;
     if (!result.counts) return result;
   }
-  detail::PlayLoop loop(model, gain, detail::told_of_input(controller), half);
+  detail::PlayLoop loop(model, gain, detail::told_of_input(controller), half, law);
   sim::Gaussian gaussian(1);
   const double r = event.kind == PlayKind::step ? play_distance(model, gain, event) : 0.0;
   const auto samples_of = [T](double time) {

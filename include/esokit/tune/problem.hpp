@@ -191,7 +191,7 @@ struct TuneRules {
   double bandwidth_ratio = 5.0;
   /// Smallest filter bandwidth that is reckoned with, in 1 / TuneModel::latency, as far as the
   /// control noise allows: a log without disturbances does not show the loads of tomorrow. 0: none.
-  double filter_floor = 0.1;
+  double filter_floor = 0.2;
   TunePlay play = TunePlay::first;  ///< what does not come back ranks behind
 };
 

@@ -73,6 +73,10 @@ struct TunedDesign {
   int instructions = 0;            ///< per update of the observer, see update_instructions
   std::string code;                ///< C++ source of the controller, type and config, to paste
   LinearController controller{};   ///< for the analysis, see closed_loop(model, controller)
+  PlayedLaw law{};                 ///< what softening has to know, see `played_law`
+
+  /// The law for `play`: none, that is the linear one, unless it softens at the limits.
+  [[nodiscard]] PlayedLaw played_law() const { return settings.soften ? law : PlayedLaw{}; }
 };
 
 /// The result of `tune`.
@@ -544,7 +548,8 @@ inline std::string in_words(const PlayEvent& event, const TuneModel& model) {
     return std::string(text);
   };
   const std::string share = number(100.0 * event.share) + " % of half the range of u";
-  const std::string time = number(1e3 * event.latencies * model.latency()) + " ms";
+  const double seconds = event.latencies * model.latency();
+  const std::string time = seconds < 1.0 ? number(1e3 * seconds) + " ms" : number(seconds) + " s";
   switch (event.kind) {
     case PlayKind::load:
       return "a load of " + share + " for " + time;
@@ -556,13 +561,16 @@ inline std::string in_words(const PlayEvent& event, const TuneModel& model) {
 }
 
 /// Plays all events on all variants of the plant, until one is lost.
-inline void play_all(TunedDesign& d, const TuneModel& model) {
-  d.played = true;
+inline void play_law(TunedDesign& d, const TuneModel& model) {
+  d.comes_back = true;
+  d.lost.clear();
+  const PlayedLaw law = d.played_law();
   const auto variants = played_variants(model);
   for (std::size_t v = 0; v < variants.size(); ++v) {
     for (const PlayEvent& event : play_events) {
-      const Played played = play(variants[v].model, variants[v].gain, d.controller, event,
-                                 d.settling_time, [](double, double, double, double) {});
+      const Played played = play(
+          variants[v].model, variants[v].gain, d.controller, event, d.settling_time,
+          [](double, double, double, double) {}, law);
       if (played.back || !played.counts) continue;
       d.comes_back = false;
       d.lost_in = event;
@@ -572,6 +580,17 @@ inline void play_all(TunedDesign& d, const TuneModel& model) {
       return;
     }
   }
+}
+
+/// Plays a design as it is, and softened if it does not come back: the law as designed comes back
+/// faster, and from more of what no model has.
+inline void play_all(TunedDesign& d, const TuneModel& model) {
+  d.played = true;
+  d.settings.soften = false;
+  play_law(d, model);
+  if (d.comes_back || !(d.settings.gains[0] > 0.0)) return;
+  d.settings.soften = true;
+  play_law(d, model);
 }
 
 /// Computes the results of a design from its settings.
@@ -594,6 +613,7 @@ inline void fill_in(Contender& c, const TuneSearch& search, const LoopCost& fine
   d.gain_tolerance = numbers.tolerance;
   d.phase_margin = numbers.phase;
   const auto& gains = d.settings.gains;
+  d.settings.soften = gains.size() > 2 && gains[0] > 0.0;
   d.damping_latencies = gains.size() > 1 ? gains[1] / gains[0] / model.latency() : 0.0;
   d.bandwidth_ratio =
       law_mean(gains, model.order) / observer_mean(d.family, c.kind, model, d.settings);
@@ -627,25 +647,26 @@ inline void fill_in(Contender& c, const TuneSearch& search, const LoopCost& fine
   const int steps = static_cast<int>(std::min(12.0 / decay, 50000.0)) + 10;
   d.settling_time = step_answer(loop->system(), 0, 1.0, 1.0, steps).settling;
   d.load_peak = step_answer(loop->system(), 2, std::abs(model.input_gain.value), 0.0, steps).peak;
+  const auto observer = tuned_observer(c.kind, model.sample_time, d.settings);
+  d.law = {gains, observer->input_gain, observer->to_estimate, observer->y_to_estimate};
 }
 
 /// By J; among the remaining designs within 1 % of the smallest J, the cheapest update comes next.
-/// What does not come back is behind, what does not keep the rules last.
+/// Behind is what has to be softened, then what does not come back, last what does not keep the
+/// rules.
 inline void rank(std::vector<TunedDesign>& designs) {
-  std::stable_sort(designs.begin(), designs.end(), [](const TunedDesign& a, const TunedDesign& b) {
-    return a.feasible != b.feasible       ? a.feasible
-           : a.comes_back != b.comes_back ? a.comes_back
-                                          : a.cost < b.cost;
+  const auto group = [](const TunedDesign& d) {
+    return !d.feasible ? 3 : !d.comes_back ? 2 : d.played && d.settings.soften ? 1 : 0;
+  };
+  std::stable_sort(designs.begin(), designs.end(), [&](const TunedDesign& a, const TunedDesign& b) {
+    return group(a) != group(b) ? group(a) < group(b) : a.cost < b.cost;
   });
   for (std::size_t i = 0; i < designs.size(); ++i) {
     std::size_t best = i;
     for (std::size_t j = i + 1; j < designs.size(); ++j) {
       const TunedDesign& a = designs[best];
       const TunedDesign& b = designs[j];
-      if (b.feasible != designs[i].feasible || b.comes_back != designs[i].comes_back ||
-          b.cost > 1.01 * designs[i].cost) {
-        break;
-      }
+      if (group(b) != group(designs[i]) || b.cost > 1.01 * designs[i].cost) break;
       if (b.instructions < a.instructions ||
           (b.instructions == a.instructions && b.modulus_margin > a.modulus_margin)) {
         best = j;
@@ -662,13 +683,14 @@ struct ControllerSource {
   std::string observer;  ///< its type
   std::string config;    ///< of the observer, without its braces
   std::string law;       ///< `.gains = ..` or `.controller_bandwidth = ..`
+  std::string soften;    ///< `.soften = ..`
 
   /// Type and config, to paste.
   [[nodiscard]] std::string text(const TuneModel& model) const {
     return "using Observer = " + observer + ";\n" +
            "auto controller = esokit::Adrc<Observer>::make({.observer = {" + config + "},\n    " +
            law + ",\n    .limits = {.lower = " + source(model.u_min) +
-           ", .upper = " + source(model.u_max) + "}});\n";
+           ", .upper = " + source(model.u_max) + "}, " + soften + "});\n";
   }
 };
 inline ControllerSource controller_source(const TunedDesign& d, const TuneModel& model) {
@@ -749,7 +771,8 @@ inline ControllerSource controller_source(const TunedDesign& d, const TuneModel&
   return {type, config,
           d.settings.controller_bandwidth > 0.0
               ? ".controller_bandwidth = " + source(d.settings.controller_bandwidth)
-              : ".gains = {{" + list(d.settings.gains) + "}}"};
+              : ".gains = {{" + list(d.settings.gains) + "}}",
+          std::string(".soften = ") + (d.settings.soften ? "true" : "false")};
 }
 
 /// All families for a model. A template, as `tune`, so that it costs compile time only where it is
@@ -1031,7 +1054,6 @@ template <class = void>
       }
       c.design.settings = detail::as_printed(search.settings(c, best.at));
       detail::fill_in(c, search, fine, tuning.optimum, std::exp(search.seen.at(free.at).value));
-      c.design.code = detail::controller_source(c.design, model).text(model);
     }
     tuning.designs.clear();
     for (detail::Contender& c : all) tuning.designs.push_back(std::move(c.design));
@@ -1054,6 +1076,9 @@ template <class = void>
     }
     w = std::clamp(w * chosen->settling_time / wish.settling_time, slow,
                    std::min(fast, 2.0 * damped));
+  }
+  for (TunedDesign& design : tuning.designs) {
+    design.code = detail::controller_source(design, model).text(model);
   }
   return tuning;
 }
