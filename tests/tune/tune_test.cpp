@@ -489,18 +489,6 @@ TuneModel servo() {
   return model;
 }
 
-// J says nothing of the reference: where it is flat, the law is the fast one.
-TEST(TuneTest, TakesAFastLawWhereItCostsNothing) {
-  // Order 1 with little noise: observer and law could be exchanged.
-  TuneModel quiet = plain(1, 1.0);
-  quiet.lag = 0.02;
-  quiet.noise = 1e-5;
-  const auto exchanged = tune(quiet).value();
-  ASSERT_NE(exchanged.chosen(), nullptr);
-  EXPECT_LE(exchanged.chosen()->excess, 1.01);
-  EXPECT_GT(exchanged.chosen()->bandwidth_ratio, 1.0);
-}
-
 // Without the rules for the limits the best loop swings between them for ever; with them it comes
 // back, for next to the same J.
 TEST(TuneTest, WhatIsChosenComesBackFromTheLimits) {
