@@ -45,13 +45,13 @@ struct Settings {
   double controller = 0;     ///< wish instead: omega_c, rad/s
   /// What the loop has to keep; the page says of every design whether it comes back.
   esokit::TuneRules rules{.play = esokit::TunePlay::all};
-  int rank = 1;              ///< which of the designs, the best is 1
-  bool anyway = false;       ///< design for a refused log, too
-  bool no_design = false;    ///< what was found, and no controller
-  std::string observer;      ///< typed in: nothing is found, the log runs through it
-  double bandwidth = 0;      ///< its omega_o, rad/s
-  std::string out = ".";     ///< folder of the page
-  std::string command;       ///< for the page
+  int rank = 1;            ///< which of the designs, the best is 1
+  bool anyway = false;     ///< design for a refused log, too
+  bool no_design = false;  ///< what was found, and no controller
+  std::string observer;    ///< typed in: nothing is found, the log runs through it
+  double bandwidth = 0;    ///< its omega_o, rad/s
+  std::string out = ".";   ///< folder of the page
+  std::string command;     ///< for the page
 };
 
 /// Something that has to be looked at before anything is pasted.
