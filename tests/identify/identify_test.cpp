@@ -802,8 +802,11 @@ TEST(Judge, RefusesByName) {
   }
   // y before u: harmless if b0 is the same without it.
   bad = good;
-  bad.lead = {T, -55};
-  EXPECT_EQ(said(esokit::judge(bad, log)), "accepted");
+  for (const double half_width : {1.0, 5.0}) {
+    bad.lead = {T, -54.9};
+    bad.input_gain.half_width = half_width;
+    EXPECT_EQ(said(esokit::judge(bad, log)), "accepted") << half_width;
+  }
   for (const double gain : {-55.1, -44.9, nan}) {
     bad.lead.input_gain = gain;
     EXPECT_EQ(said(esokit::judge(bad, log)),

@@ -1015,10 +1015,11 @@ inline bool better(const Identified& averaged, const Identified& plain, const Id
   const SecondOpinion& second = found.second_opinion;
   const bool informed = detail::informed(found);
   const double widest = informed ? options.interval_agreed : options.interval_max;
-  // A lead does no harm if b0 is the same without it.
+  // A lead does no harm if b0 is nearly the same without it. Feedback from y makes small ones up.
   const double off = std::abs(found.lead.input_gain - found.input_gain.value);
-  rules.require(!(found.lead.time > 0.0) ||
-                    (off <= found.input_gain.half_width && found.input_gain.share() <= widest),
+  const double harmless =
+      std::max(found.input_gain.half_width, 0.1 * std::abs(found.input_gain.value));
+  rules.require(!(found.lead.time > 0.0) || (off <= harmless && found.input_gain.share() <= widest),
                 "lead", found.lead.time,
                 "is the time by which y moves before u: is u logged late?");
   rules.require(detail::white(found, options) || informed,
