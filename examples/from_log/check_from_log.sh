@@ -335,7 +335,12 @@ for log in servo_relay_pid/{relay,pid_sine}.csv dfki_simple_pendulum/{ddp,direct
   dfki_pendulum_mass_change/energy_shaping{,_1kg}.csv; do
   run "$data/$log" --no-design
   status=$?
-  [[ ($status == 3 || $status == 0) && -z $alarms ]]
+  # The servo's drive does saturate.
+  if [[ $log == */pid_sine.csv ]]; then
+    [[ $status == 4 && $alarms == "large-u " ]]
+  else
+    [[ ($status == 3 || $status == 0) && -z $alarms ]]
+  fi
   verdict $? "$log: alarms '$alarms', status $status: $said"
 done
 
