@@ -85,7 +85,8 @@ struct GainInRange {
 struct PositionForce {
   double middle = 0.0;                ///< mean y of the log
   double size = 0.0;                  ///< rms of y - middle
-  double low = 0.0, high = 0.0;       ///< range of y in the log: it knows no more
+  double low = 0.0;                   ///< least y of the log, which knows no more
+  double high = 0.0;                  ///< largest y of the log
   std::array<Estimate, 3> factors{};  ///< of x, x^2, x^3 with x = (y - middle) / size; unit of
                                       ///< y^(n)
 
