@@ -49,9 +49,9 @@ struct Played {
 
 /// A law that softens at its limits, for a controller that is played: what Softening needs to know.
 struct PlayedLaw {
-  std::vector<double> gains{};            ///< k_0 ..; none: the linear law
-  double input_gain = 1.0;                ///< of the law
-  DynamicMatrix<double> to_estimate{};    ///< as in LinearObserverForm, with the controller's states
+  std::vector<double> gains{};          ///< k_0 ..; none: the linear law
+  double input_gain = 1.0;              ///< of the law
+  DynamicMatrix<double> to_estimate{};  ///< as in LinearObserverForm, with the controller's states
   DynamicMatrix<double> y_to_estimate{};  ///< as in LinearObserverForm
 };
 
