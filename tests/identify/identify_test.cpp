@@ -616,6 +616,39 @@ TEST(BestOrder, IsTheLikelihoodsUnlessAnotherIsFarBetterBelow) {
   EXPECT_EQ(esokit::detail::best_order(orders) - orders.begin(), 2);
 }
 
+// y'' = b0 u - a y' - friction is y' = b0 / a u with a lag of 1 / a but for friction at standstill:
+// order 1 may be better at low bandwidths, but is the same machine with less in it.
+TEST(BestOrder, OneThatIsAPartOfTheLikelyOneSaysNothingNew) {
+  std::vector<esokit::OrderFit> orders(2);
+  esokit::OrderFit &lower = orders[0], &likely = orders[1];
+  lower.model.order = 1, lower.slower = -2;
+  likely.model.order = 2, likely.criterion = -200, likely.friction_scale = 0.01;
+  const auto chosen = [&](double pole, double ratio, double latency) {
+    likely.fit.linear = {-50};
+    likely.fit.at.pole = pole;
+    likely.fit.at.latency = 0.05;
+    lower.fit.linear = {-50 / (pole * ratio)};
+    lower.fit.at.latency = latency * (1 / pole + 0.05);
+    return esokit::detail::best_order(orders)->model.order;
+  };
+  EXPECT_EQ(chosen(10, 1, 1), 2);
+  for (const double edge : {0.75, 1 / 0.75}) {
+    const double inside = edge < 1 ? 1.01 * edge : edge / 1.01;
+    const double outside = edge < 1 ? edge / 1.01 : 1.01 * edge;
+    EXPECT_EQ(chosen(10, inside, 1), 2) << edge;
+    EXPECT_EQ(chosen(10, outside, 1), 1) << edge;
+    EXPECT_EQ(chosen(10, 1, inside), 2) << edge;
+    EXPECT_EQ(chosen(10, 1, outside), 1) << edge;
+  }
+  EXPECT_EQ(chosen(10, -1, 1), 1);
+  EXPECT_EQ(chosen(-10, 1, 1), 1);
+  likely.model.order = 3;
+  EXPECT_EQ(chosen(10, 1, 1), 1);
+  likely.model.order = 2;
+  likely.friction_scale = 0;
+  EXPECT_EQ(chosen(10, 1, 1), 1);
+}
+
 // What was found goes into an observer, and the plant into simulation and analysis, in a call each.
 TEST(Identified, GoesStraightIntoAnObserverSimulationAndAnalysis) {
   Identified found;

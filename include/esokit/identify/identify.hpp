@@ -133,6 +133,7 @@ struct Identified {
   double correlation = 0;          ///< largest correlation of the innovations over lags 1 to 20
   SecondOpinion second_opinion{};  ///< b0 by output error
   GainBySize by_size{};            ///< b0 at small and at large u
+  GainInMotion in_motion{};        ///< b0 in motion and at standstill, of order 2
   Lead lead{};                     ///< how early y moves before u, if it does
   bool at_once = false;            ///< y follows u within the row, with nothing in between
   int averaged = 1;                ///< rows of the log that were averaged into one
@@ -486,9 +487,19 @@ inline std::vector<OrderFit> fit_orders(const FitData& data, const IdentifyOptio
   return orders;
 }
 
+/// Whether `lower` is `higher` without its friction at standstill: b0 / a as b0, and 1 / a in the
+/// latency. A machine that bends has such a `higher` one, too, but without friction.
+inline bool is_part_of(const OrderFit& lower, const OrderFit& higher) {
+  const double pole = higher.fit.at.pole;
+  if (lower.model.order + 1 != higher.model.order || !(higher.friction_scale > 0.0)) return false;
+  const auto near = [](double a, double b) { return 0.75 * b < a && a < b / 0.75; };
+  return near(higher.fit.linear[0] / pole / lower.fit.linear[0], 1.0) &&
+         near(1.0 / pole + higher.fit.at.latency, lower.fit.at.latency);
+}
+
 /// The order with the best likelihood, unless another one leaves less than 1 / e of the mean square
 /// at lower bandwidths: at its own bandwidth the likelihood depends on the fastest motion, which in
-/// a flexible machine is the bending.
+/// a flexible machine is the bending. One that is only a part of the likely one says nothing new.
 inline auto best_order(const std::vector<OrderFit>& orders) {
   const auto likely = std::min_element(
       orders.begin(), orders.end(),
@@ -496,7 +507,7 @@ inline auto best_order(const std::vector<OrderFit>& orders) {
   const auto slower =
       std::min_element(orders.begin(), orders.end(),
                        [](const OrderFit& a, const OrderFit& b) { return a.slower < b.slower; });
-  return slower->slower < likely->slower - 1.0 ? slower : likely;
+  return slower->slower < likely->slower - 1.0 && !is_part_of(*slower, *likely) ? slower : likely;
 }
 
 /// Whether a force that depends on position acts: it improves the likelihood by more than its
@@ -870,6 +881,16 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
   result.at_bound = here.at_bound;
   if (excitation < excitation_max) {
     result.by_size = gain_by_size(used, model, bounds, here.fit.at);
+    if (model.order == 2) {
+      if (speed.empty()) speed = friction_speed(rows, 2, chosen.fit.noise, chosen.fit.at.latency);
+      result.in_motion = gain_in_motion(used, model, bounds, here.fit.at, speed);
+    }
+  }
+  // Friction that holds the machine takes b0 down; that of the motion is nearer to the truth.
+  if (const auto& motion = result.in_motion; motion.differ()) {
+    const double b = gain_found.value, to = motion.moving.value;
+    const double end = to > b ? motion.moving.high() : motion.moving.low();
+    gain_found.half_width = std::max(gain_found.half_width, std::abs(end - b));
   }
   result.lead = lead_of(used, model, bounds, here.fit);
   return result;
