@@ -736,6 +736,41 @@ TEST(Identify, RefusesALogWithoutExcitation) {
 }
 
 // Each rule by its text and from both sides, on a study whose numbers are put there.
+// The interval of b0 beside what the rest of the log says.
+TEST(Widened, IsWhatTheOtherEvidenceAsksFor) {
+  Identified found;
+  found.input_gain = {-50, 2};
+  found.log.used = 10000;
+  found.log.sample_time = T;
+  found.latency.value = 3 * T;
+  found.correlation = 0.1;
+  found.second_opinion = {{-60, 1}, 0.9, 1};
+  const auto half = [&] { return esokit::detail::widened(found, {}).half_width; };
+  EXPECT_EQ(half(), 2);
+  found.input_gain.half_width = 5.1;  // beyond a tenth both may be right
+  EXPECT_EQ(half(), 10);
+  found.input_gain.half_width = 11;
+  EXPECT_EQ(half(), 11);
+  // Coloured: a per cent more, and both again.
+  found.input_gain.half_width = 2;
+  found.correlation = 0.11;
+  EXPECT_EQ(half(), 10);
+  found.second_opinion.explained = 0.5;
+  EXPECT_EQ(half(), 2.5);
+  found.second_opinion.explained = 0.9;
+  found.latency.value = 0.4 * T;
+  EXPECT_EQ(half(), 2.5);
+  // Friction holds: to the end of what the motion says, on either side.
+  found.correlation = 0.1;
+  found.in_motion = {0.4, {-70, 3}, {-20, 5}};
+  EXPECT_EQ(half(), 23);
+  found.input_gain.value = -90;
+  EXPECT_EQ(half(), 23);
+  found.in_motion.still = 0;
+  EXPECT_EQ(half(), 2);
+  EXPECT_EQ(esokit::detail::widened(found, {}).value, -90);
+}
+
 TEST(Judge, RefusesByName) {
   Log log, stamped;
   stamped.time = {0, T};

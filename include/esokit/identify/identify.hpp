@@ -639,6 +639,24 @@ inline bool informed(const Identified& found) {
          found.latency.value >= 0.5 * found.averaged * found.log.sample_time;
 }
 
+/// b0 with the interval that the other evidence asks for. Coloured innovations mean that the model
+/// is not exact, so b0 is not known better than to a per cent. Where output error may be right
+/// instead, the interval spans both. Friction that holds the machine takes b0 down, and that of the
+/// motion is nearer to the truth: the interval reaches to the end of its own.
+inline Estimate widened(const Identified& found, const IdentifyOptions& options) {
+  Estimate gain = found.input_gain;
+  const auto reach = [&](double to) {
+    gain.half_width = std::max(gain.half_width, std::abs(to - gain.value));
+  };
+  const bool coloured = !white(found, options);
+  if (coloured) gain.half_width += 0.01 * std::abs(gain.value);
+  if (informed(found) && (coloured || gain.share() > options.interval_max))
+    reach(found.second_opinion.input_gain.value);
+  const Estimate& moving = found.in_motion.moving;
+  if (found.in_motion.differ()) reach(moving.value > gain.value ? moving.high() : moving.low());
+  return gain;
+}
+
 /// The study of rows that were averaged by `fold`.
 /// @param rows without the scheduling column @param along the scheduling column, or empty
 /// @param result what is known of the log before; returned with the rest
@@ -869,15 +887,6 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
     result.second_opinion = second_opinion(used, model, bounds, here.fit.at, w);
     if (result.second_opinion.informative()) break;
   }
-  // Where one of the two may be wrong, the interval spans both. Coloured innovations mean that the
-  // model is not exact, so b0 is not known better than to a percent.
-  const bool coloured = !white(result, options);
-  Estimate& gain_found = result.input_gain;
-  if (coloured) gain_found.half_width += 0.01 * std::abs(gain_found.value);
-  if (informed(result) && (coloured || gain_found.share() > options.interval_max)) {
-    gain_found.half_width = std::max(
-        gain_found.half_width, std::abs(result.second_opinion.input_gain.value - gain_found.value));
-  }
   result.at_bound = here.at_bound;
   if (excitation < excitation_max) {
     result.by_size = gain_by_size(used, model, bounds, here.fit.at);
@@ -886,12 +895,7 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
       result.in_motion = gain_in_motion(used, model, bounds, here.fit.at, speed);
     }
   }
-  // Friction that holds the machine takes b0 down; that of the motion is nearer to the truth.
-  if (const auto& motion = result.in_motion; motion.differ()) {
-    const double b = gain_found.value, to = motion.moving.value;
-    const double end = to > b ? motion.moving.high() : motion.moving.low();
-    gain_found.half_width = std::max(gain_found.half_width, std::abs(end - b));
-  }
+  result.input_gain = widened(result, options);
   result.lead = lead_of(used, model, bounds, here.fit);
   return result;
 }
