@@ -416,6 +416,15 @@ reads no_header.csv --y 2 --u 3 --sample-time 0.01
 reads semicolons.csv
 { echo 't|y|u'; table '|'; } >bars.csv
 reads bars.csv
+# As LabVIEW writes it.
+{
+  printf 'LabVIEW Measurement\t\nWriter_Version\t2\nX_Columns\tOne\n***End_of_Header***\t\n\t\n'
+  printf 'Channels\t2\t\t\nSamples\t401\t401\t\n***End_of_Header***\t\t\t\nX_Value\ty\tu\tComment\n'
+  table $'\t' | sed 's/$/\t/'
+} >labview.lvm
+reads labview.lvm
+sed 's/X_Value/X_Other/' labview.lvm >labview_other.lvm
+refuses "which column is time?" labview_other.lvm "${settings[@]}"
 { echo 't;y;u'; table ';' | tr . ,; } >decimal_commas.csv
 reads decimal_commas.csv
 { echo '# logged by hand'; echo t,y,u; echo s,m,N; echo '// units above'; table ,; } >comments.csv

@@ -93,7 +93,7 @@ std::vector<std::string> words(const std::string& name) {
   return split_words(part == std::string::npos ? text : text.substr(part + 1));
 }
 
-/// What a column is by the first word of its name.
+/// What a column is by the first word of its name, or by all of it.
 struct Usual {
   const char* words;  ///< between blanks
   char column;        ///< t, u or y
@@ -101,7 +101,7 @@ struct Usual {
 };
 constexpr Usual usual_names[] = {
     {" t time stamp timestamp datetime times secs seconds clock ticks millis micros ", 't'},
-    {" zeit uhrzeit zeitstempel temps heure horodatage tiempo hora tempo ", 't'},
+    {" x_value zeit uhrzeit zeitstempel temps heure horodatage tiempo hora tempo ", 't'},
     {" u input torque effort command cmd pwm voltage volts current force duty drive actuator "
      "control "
      "tau power heater q1 ",
@@ -121,11 +121,12 @@ constexpr Usual usual_names[] = {
      "rature niveau velocidad temperatura nivel velocit\xc3\xa0 livello ",
      'y', true}};
 
-/// What is usual about a name, if anything.
+/// What is usual about a name, if anything. LabVIEW's X_Value is known as a whole: an x is none.
 const Usual* usual(const std::string& name) {
-  const std::string word = " " + words(name).front() + " ";
+  const std::string word = lower(name) == "x_value" ? "x_value" : words(name).front();
+  const std::string blank = " " + word + " ";
   for (const Usual& line : usual_names) {
-    if (word.size() > 2 && std::string_view(line.words).find(word) != std::string_view::npos)
+    if (!word.empty() && std::string_view(line.words).find(blank) != std::string_view::npos)
       return &line;
   }
   return nullptr;
