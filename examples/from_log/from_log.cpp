@@ -47,6 +47,8 @@ the machine:
                       level by its name, else identified)
   --limits LOW,HIGH   of u, in the unit of the log (default: the range of u in the log)
   --b0 B              the input gain that you expect: an alarm if the log shows another one
+  --friction F        order 3: Coulomb friction on y'', unit of y''; 0: none (default: not known, and
+                      only a design that comes back with friction is recommended)
 the requirement, one of:
   --noise PERCENT     standard deviation of u that noise may cause, % of its range (default 5)
   --settling S        settling time of a step of the reference, s
@@ -140,6 +142,11 @@ Settings read_arguments(int argc, char** argv) {
        [&](const auto& text) {
          s.expected_gain = number("b0", text);
          if (*s.expected_gain == 0) throw LogError("--b0: must not be zero");
+       }},
+      {"friction",
+       [&](const auto& text) {
+         s.friction = number("friction", text);
+         if (*s.friction < 0) throw LogError("--friction: must not be negative");
        }},
       {"noise",
        [&](const auto& text) { s.noise_share = 0.01 * positive("noise", text), ++wishes; }},

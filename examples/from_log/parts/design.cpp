@@ -71,6 +71,14 @@ esokit::FitData simulated(const Identified& found, const esokit::FitData& rows) 
 
 std::string percent(double share) { return number_text(100 * share, 3) + " %"; }
 
+/// Why there may be no design of order 3, and what to do.
+const std::string three_integrators =
+    "Friction acts as a large damping on small motions. Behind an actuator that integrates, it "
+    "leaves three integrators with that of the observer, and no law of this kind brings these to "
+    "rest. Measure what the actuator sets (force, pressure, speed), control it by an inner loop of "
+    "order 1, and y by an outer one of order 2; or, if the machine has no friction, say so: "
+    "--friction 0.";
+
 }  // namespace
 
 Design Design::make(const Settings& settings, const Input& input, const Findings& findings) {
@@ -78,7 +86,8 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
   const Identified& found = findings.found;
   const auto [least, largest] = std::minmax_element(findings.rows.u.begin(), findings.rows.u.end());
   const auto limits = settings.limits.value_or(std::pair(*least, *largest));
-  const auto model = as_printed(esokit::tune_model(found, limits.first, limits.second));
+  auto model = as_printed(esokit::tune_model(found, limits.first, limits.second));
+  model.friction = settings.friction;
   const double range = limits.second - limits.first;
   esokit::TuneWish wish;
   wish.settling_time = settings.settling_time;
@@ -121,7 +130,8 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
         : tuning->designs.front().feasible
             ? "No design is recommended: none comes back from an overload, the first not from " +
                   tuning->designs.front().lost +
-                  ". Relax the requirement: --noise, --settling, --omega-c."
+                  (model.may_rub() ? ". " + three_integrators
+                                   : ". Relax the requirement: --noise, --settling, --omega-c.")
             : "No family keeps the rules; the nearest, " + tuning->designs.front().name +
                   ", misses: " + tuning->designs.front().constraint +
                   ". Relax the requirement: --noise, --settling, --omega-c.";
@@ -282,7 +292,8 @@ Figure lost_figure(const esokit::Tuning& tuning, const esokit::TunedDesign& desi
   const auto& variant = variants[static_cast<std::size_t>(design.lost_on)];
   std::vector<double> t, y, u;
   const auto played = esokit::play(
-      variant.model, variant.gain, design.controller, design.lost_in, design.settling_time,
+      variant.model, variant.gain, design.controller, design.lost_in,
+      design.played_settling(variant.model),
       [&](double now, double, double output, double control) {
         t.push_back(now);
         y.push_back(output);
