@@ -266,7 +266,7 @@ class LogFile {
       lines_.push_back(head.number);
       if (lines.read() >= shown + 64'000'000) {
         shown = lines.read();
-        std::fprintf(stderr, "reading %s: %3.0f %%\n", file_.filename().c_str(),
+        std::fprintf(stderr, "reading %s: %3.0f %%\n", file_.filename().string().c_str(),
                      100.0 * static_cast<double>(shown) / static_cast<double>(bytes));
       }
     };

@@ -10,6 +10,8 @@
 #include <system_error>
 #include <utility>
 
+#include "system.hpp"
+
 namespace esokit::examples {
 namespace {
 
@@ -50,7 +52,7 @@ std::string output_folder(int argc, char** argv) {
       std::fprintf(help ? stdout : stderr,
                    "usage: %s [--out DIR | DIR]\nWrites its figures, tables and summary.csv below "
                    "DIR (default: out)\n",
-                   std::filesystem::path(argv[0]).filename().c_str());
+                   path_of(argv[0]).filename().string().c_str());
       std::exit(help ? 0 : 2);
     }
     folder = argument;

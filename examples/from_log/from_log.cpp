@@ -18,6 +18,7 @@
 
 #include "common/measured_data.hpp"
 #include "common/report.hpp"
+#include "common/system.hpp"
 #include "from_log/parts/measured_sets.hpp"
 #include "from_log/parts/show.hpp"
 
@@ -251,7 +252,8 @@ int gallery(const std::string& out) {
     page.add_to(report);
     const std::string file = page.write(report.folder(), machine.name);
     if (file.empty()) return failed;
-    report.link(std::filesystem::path(file).filename().string(), "The page as from_log writes it");
+    report.link(esokit::examples::path_of(file).filename().string(),
+                "The page as from_log writes it");
     report.check("log", "rows", std::nullopt, static_cast<double>(outcome.findings.found.log.rows));
     status |= report.finish();
   }
@@ -268,6 +270,7 @@ int gallery(const std::string& out) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  esokit::examples::print_utf8();
   try {
     const Settings settings = read_arguments(argc, argv);
     if (argc == 1) throw LogError("no file is given; from_log --help shows the options");

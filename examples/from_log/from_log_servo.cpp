@@ -31,6 +31,7 @@
 #include <esokit/sim/run.hpp>
 
 #include "common/report.hpp"
+#include "common/system.hpp"
 #include "control_practice/pid.hpp"
 #include "from_log/parts/show.hpp"
 
@@ -161,7 +162,7 @@ int main(int argc, char** argv) {
   }
   const std::string page = outcome->page(settings).write(settings.out, from_log::stem_of(settings));
   if (page.empty()) return 1;
-  report.link(std::filesystem::path(page).filename().string(), "The page that from_log writes");
+  report.link(esokit::examples::path_of(page).filename().string(), "The page that from_log writes");
   report.expect("log", "status", outcome->status, outcome->status == from_log::all_clear,
                 "0: there is a design and no alarm");
   if (!outcome->design.made()) return report.finish() | 1;

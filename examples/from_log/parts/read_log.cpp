@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "common/system.hpp"
 #include "from_log/parts/from_log.hpp"
 
 namespace from_log {
@@ -309,14 +310,14 @@ void unwrap(const Settings& settings, Input& input) {
 }  // namespace
 
 Input read_log(const Settings& settings) {
-  const LogFile header(settings.file, settings.separator);
+  const LogFile header(esokit::examples::path_of(settings.file), settings.separator);
   Input input;
   const bool timed = !(settings.sample_time > 0.0) || !settings.time.empty();
   std::vector<std::string> wanted = {guess(header, "u", settings.u),
                                      guess(header, "y", settings.y)};
   if (timed) wanted.push_back(guess(header, "time", settings.time));
   wanted.insert(wanted.end(), settings.known.begin(), settings.known.end());
-  const LogFile file(settings.file, wanted, settings.separator,
+  const LogFile file(esokit::examples::path_of(settings.file), wanted, settings.separator,
                      timed ? std::optional<std::size_t>(2) : std::nullopt);
   input.u = file.name(0);
   input.y = file.name(1);

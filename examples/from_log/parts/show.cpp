@@ -11,6 +11,7 @@
 #include <esokit/core/error_text.hpp>
 #include <esokit/core/version.hpp>
 
+#include "common/system.hpp"
 #include "from_log/parts/log_observer.hpp"
 
 namespace from_log {
@@ -255,7 +256,7 @@ std::vector<CsvRow> log_table(const Input& input, const Findings& findings) {
 
 std::string stem_of(const Settings& settings) {
   // A name of nothing but dots would be a hidden file.
-  const std::string stem = std::filesystem::path(settings.file).stem().string();
+  const std::string stem = esokit::examples::path_of(settings.file).stem().string();
   return stem.find_first_not_of('.') == std::string::npos ? "log" + stem : stem;
 }
 
@@ -296,7 +297,7 @@ std::vector<std::string> in_short(const Findings& findings, const Design& design
 
 Page show(const Settings& settings, const Input& input, const Findings& findings,
           const Design& design) {
-  const std::string name = std::filesystem::path(settings.file).filename().string();
+  const std::string name = esokit::examples::path_of(settings.file).filename().string();
   Page page("From " + name + " to a controller");
   if (!findings.alarms.empty()) {
     std::vector<std::string> lines;
@@ -354,7 +355,7 @@ std::string show_observer(const Settings& settings, const Input& input) {
     for (const auto& column : found.columns) text += ',' + number_text(column[k], 12);
     text += '\n';
   }
-  const std::filesystem::path file = settings.file;
+  const std::filesystem::path file = esokit::examples::path_of(settings.file);
   const std::string numbers = new_file(settings.out, stem_of(settings) + "-estimates", ".csv");
   if (numbers.empty() || !write_text(numbers, text)) return {};
   Page page(file.filename().string() + ", run through an observer");
@@ -389,8 +390,8 @@ std::string show_observer(const Settings& settings, const Input& input) {
       .line(t, input.log.u, {.name = "u", .color = Color::grey, .width = 1.0})
       .line(t, load, {.name = "dhat / b0", .color = Color::vermillion, .width = 1.1});
   page.figure(figure);
-  page.text("All estimates are in the file " + std::filesystem::path(numbers).filename().string() +
-            ".");
+  page.text("All estimates are in the file " +
+            esokit::examples::path_of(numbers).filename().string() + ".");
   return page.write(settings.out, stem_of(settings));
 }
 

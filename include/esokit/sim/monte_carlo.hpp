@@ -335,6 +335,31 @@ class MonteCarlo {
     return std::move(work.outcome);
   }
 
+  /// The same, and each run as a line of a table: run, and the number of each Measure under its
+  /// name; nan for a run that failed. `on_run` is called, too.
+  /// @param[out] csv the table, with a line of names; the finished runs if it was stopped
+  template <int Lanes = default_lanes<LaneScalar<typename Types::S>>, class... Reduce, class... F>
+  [[nodiscard]] Expected<Outcome, Error<Time>> run_to_csv(
+      std::string& csv, const Measure<Reduce, F>&... measures) const {
+    csv = "run";
+    const auto name = [&csv](const std::string& text) {
+      const bool plain = text.find_first_of(",\"\n") == std::string::npos;
+      csv += plain ? "," : ",\"";
+      for (const char c : text) csv.append(c == '"' ? 2 : 1, c);
+      if (!plain) csv += '"';
+    };
+    (name(measures.name), ...);
+    csv += '\n';
+    MonteCarlo study = *this;
+    study.config_.on_run = [&](std::int64_t run, std::span<const double> numbers) {
+      csv += std::to_string(run);
+      for (const double number : numbers) detail::append_number(csv += ',', number);
+      csv += '\n';
+      if (config_.on_run) config_.on_run(run, numbers);
+    };
+    return study.template run<Lanes>(measures...);
+  }
+
   /// What tells this study from others: its settings, the measures, the results of its first runs,
   /// and the kind of machine.
   template <int Lanes = default_lanes<LaneScalar<typename Types::S>>, class... Reduce, class... F>
