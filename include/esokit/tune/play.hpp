@@ -98,7 +98,8 @@ inline std::vector<PlayEvent> played_events(const TuneModel& variant) {
 /// amplitude A friction f acts as a damping 4 f / (pi A) (describing function), so the loop has to
 /// be stable with any: searched for from 1 / 100 to 3000 per TuneModel::latency.
 inline bool swings_with_friction(const TuneModel& model, const LinearController& controller) {
-  for (int i = -4; i <= 7; ++i) {
+  // Largest first: behind an actuator that integrates that tells it.
+  for (int i = 7; i >= -4; --i) {
     auto plant = detail::dense_plant(model);
     plant.a(1, 1) = -std::pow(10.0, 0.5 * i) / model.latency();
     const auto loop = Loop::make(plant, controller);
