@@ -294,37 +294,37 @@ class Profile {
   int order_;
 };
 
-/// A PID by the rules of Skogestad (SIMC, J. Process Control 2003) from the same model: closed-loop
-/// time constant equal to the latency, or as much longer as the noise in u demands; for order 3
-/// with one more zero. Integral with conditional clamping as anti-windup.
+/// A PID with conditional clamping as anti-windup; for order 3 with one more zero.
 class Pid {
  public:
-  Pid(const esokit::TuneModel& model, double most_noise) : n_(model.order), T_(model.sample_time) {
-    lower_ = model.u_min;
-    upper_ = model.u_max;
+  /// By the rules of Skogestad (SIMC, J. Process Control 2003) from a model: closed-loop time
+  /// constant equal to the latency, or as much longer as the noise in u demands.
+  static Pid simc(const esokit::TuneModel& model, double most_noise) {
+    Pid pid(model.order, model.sample_time, model.u_min, model.u_max);
     // Half of the lag counts as dead time.
-    const double late = 0.5 * model.lag + model.dead_time + model.sensor + 0.5 * T_;
+    const double late = 0.5 * model.lag + model.dead_time + model.sensor + 0.5 * pid.T_;
     for (double slow = late; slow < 1e6 * late; slow *= 1.1) {
-      filter_ = 0.1 * slow;
-      const double sum = slow + late + filter_;
-      double gain = 0.0;
-      if (n_ == 1) {
-        gain = 1.0 / sum;
-        lead_ = 0.0;
-        integral_ = model.pole > 0.0 ? std::min(1.0 / model.pole, 4.0 * sum) : 4.0 * sum;
-      } else if (n_ == 2) {
-        lead_ = 4.0 * sum;
-        integral_ = lead_;
-        gain = 1.0 / (lead_ * lead_) * 4.0;
-      } else {
-        lead_ = 8.0 * sum;
-        integral_ = lead_;
-        // abs(L) = 1 at 1 / sum: the zeros three octaves below.
-        gain = 1.0 / (lead_ * lead_ * sum);
-      }
-      gain_ = gain / model.input_gain.value;
-      if (noise_in_u() * model.noise <= most_noise) break;
+      pid.filter_ = 0.1 * slow;
+      pid.tune(slow + late + pid.filter_, model.pole, model.input_gain.value);
+      if (pid.noise_in_u() * model.noise <= most_noise) break;
     }
+    return pid;
+  }
+
+  /// As the loops of identify/random_plant.hpp and identify/ordinary_log.hpp are tuned that logs
+  /// are recorded in, by somebody who knows b: bandwidth w of 0.1 to 0.28 over what u and y need,
+  /// integral of the pole for order 1; order 2 has 0.7 w^2 and 1.6 w, and here an integral, too.
+  static Pid of_log(const Machine& m, Dice& dice) {
+    Pid pid(m.order, m.T, m.lower(), m.upper());
+    const double w = dice.between(0.1, 0.28) / (m.latency + m.T);
+    pid.filter_ = 1.0 / (6.0 * w);
+    pid.tune(1.0 / w, m.pole, m.b);
+    if (m.order == 2) {
+      pid.gain_ = 0.7 * w * w / m.b;
+      pid.lead_ = 1.6 / (0.7 * w);
+      pid.integral_ = 8.0 / w;
+    }
+    return pid;
   }
 
   void start(double y, double u) {
@@ -342,6 +342,16 @@ class Pid {
   }
 
  private:
+  Pid(int order, double T, double lower, double upper)
+      : n_(order), T_(T), lower_(lower), upper_(upper) {}
+
+  /// abs(L) = 1 at 1 / sum, the zeros two octaves below, for order 3 three.
+  void tune(double sum, double pole, double b) {
+    lead_ = n_ == 1 ? 0.0 : n_ == 2 ? 4.0 * sum : 8.0 * sum;
+    integral_ = n_ > 1 ? lead_ : pole > 0.0 ? std::min(1.0 / pole, 4.0 * sum) : 4.0 * sum;
+    gain_ = 1.0 / (b * sum);
+    for (int i = 1; i < n_; ++i) gain_ /= lead_;
+  }
   /// (lead s + 1)^(n-1) / (filter s + 1)^n of y.
   double filtered_lead(double y) {
     const double keep = std::exp(-T_ / filter_);
@@ -367,8 +377,8 @@ class Pid {
   }
 
   int n_;
-  double T_, gain_ = 0.0, lead_ = 0.0, integral_ = 1.0, filter_ = 1.0;
-  double lower_ = 0.0, upper_ = 0.0, sum_ = 0.0;
+  double T_, lower_, upper_;
+  double gain_ = 0.0, lead_ = 0.0, integral_ = 1.0, filter_ = 1.0, sum_ = 0.0;
   std::array<double, 3> state_{};
 };
 

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstddef>
 #include <esokit/control/smooth_profile.hpp>
+#include <esokit/core/pack.hpp>
+#include <esokit/core/snapshot.hpp>
 #include <limits>
 #include <string>
 #include <support/numbers.hpp>
@@ -242,6 +244,56 @@ TEST(SmoothProfile, BadTargets) {
   auto far = SmoothProfile<1>::make({.limits = {{1.5}}, .sample_time = 1}).value();
   EXPECT_TRUE(far.update(0x1p30 * (1 - 1e-9)));
 }
+
+/// A copy, and a snapshot of any sample, go on with the same bits.
+template <int Order, class S>
+void expect_same_life() {
+  Random random(17);
+  SmoothProfileConfig<Order, S> config{.sample_time = S(0.01)};
+  config.limits[Order - 1] = S(0.5);
+  using Profile = SmoothProfile<Order, S>;
+  auto profile = Profile::make(config).value();
+  S target(0);
+  int moved = 0;
+  for (int k = 0; k < 600; ++k) {
+    if (k % 97 == 0) target = static_cast<S>(random.uniform(-1, 1));
+    auto copy = profile;
+    auto restored = esokit::from_snapshot<Profile>(esokit::snapshot(profile));
+    ASSERT_TRUE(restored);
+    const bool taken = profile.update(target);
+    ASSERT_EQ(copy.update(target), taken);
+    ASSERT_EQ(restored->update(target), taken);
+    moved += profile.moving() ? 1 : 0;
+    for (const auto& other : {copy, *restored}) {
+      ASSERT_EQ(other.moving(), profile.moving());
+      for (int i = 0; i <= Order; ++i) {
+        ASSERT_TRUE(same_bits(other.motion()(i), profile.motion()(i))) << k << ' ' << i;
+      }
+    }
+  }
+  EXPECT_GT(moved, 100);
+  auto words = esokit::snapshot(profile);
+  using Other = SmoothProfile<Order == 4 ? 3 : Order + 1, S>;
+  if constexpr (sizeof(Other) == sizeof(Profile)) {
+    EXPECT_FALSE(esokit::from_snapshot<Other>(words));
+  }
+  words[1] ^= 1U;
+  EXPECT_FALSE(esokit::from_snapshot<Profile>(words));
+}
+TEST(SmoothProfile, GoesOnFromASnapshotWithTheSameBits) {
+  expect_same_life<1, float>();
+  expect_same_life<2, float>();
+  expect_same_life<3, double>();
+  expect_same_life<4, double>();
+}
+
+// Plain scalars only, and the type says so: the branches of a move are those of one reference.
+template <class S>
+concept HasProfile = requires {
+  typename SmoothProfile<2, S>;
+};
+static_assert(HasProfile<float> && HasProfile<double>);
+static_assert(!HasProfile<esokit::Pack<double, 2>>);
 
 TEST(SmoothProfile, RefusesByRule) {
   const SmoothProfileConfig<2> good{.limits = {{0, 1}}, .sample_time = 1e-3};

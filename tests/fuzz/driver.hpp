@@ -171,6 +171,16 @@ class Driver final : public Game {
     }
   }
 
+  /// The same of what `runs_on`: at rest. On the way each call goes on.
+  template <class Function>
+  void refusable_at_rest(Function&& call) {
+    const bool moved = object_->moving();
+    remember();
+    accepted_ = quietly(call);
+    if (!moved) return answered(accepted_);
+    if (!changed()) fail("a move does not go on");
+  }
+
   // ------------------------------------------------------------------ invariants of steps
   /// @param y null where none was given
   void stepped(StepStatus status, const S* y, const S* u) {
@@ -265,6 +275,7 @@ class Driver final : public Game {
     FINITE(blind_output())
     FINITE(value())
     FINITE(derivative())
+    FINITE(motion())
     FINITE(state())
     FINITE(last())
     FINITE(gains())
@@ -367,6 +378,10 @@ class Driver final : public Game {
     }
   }
 
+  static constexpr bool runs_on = [] {
+    if constexpr (requires { T::runs_on; }) return T::runs_on;
+    return false;
+  }();
   /// The second number of an experiment's update is no reference.
   static constexpr bool takes_applied_input = requires(const T& o) { o.rest_output(); };
 
@@ -902,7 +917,11 @@ class Driver final : public Game {
       for (int weight = 0; weight < 4; ++weight) {
         add(a, "update", [](Driver& d) {
           const S r = d.number();
-          d.refusable([&] { return d.object_->update(r); });
+          if constexpr (runs_on) {
+            d.refusable_at_rest([&] { return d.object_->update(r); });
+          } else {
+            d.refusable([&] { return d.object_->update(r); });
+          }
           if (!is_finite(r) && d.accepted_) d.fail("a bad reference is taken");
           if (d.calm_ && d.tape_->plain() && !d.accepted_) d.fail("a good reference is refused");
         });

@@ -4,6 +4,7 @@
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/experiment.hpp>
 #include <esokit/control/nonlinear_feedback.hpp>
+#include <esokit/control/smooth_profile.hpp>
 #include <esokit/control/tracking_differentiator.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/mimo_extended_state_filter.hpp>
@@ -23,6 +24,7 @@ void add_filters(std::vector<Kind>& kinds) {
   KIND(TrackingDifferentiator<float>);
   KIND(SignTrackingDifferentiator<float>);
   KIND(NonlinearFeedback<2, float>);
+  KIND(SmoothProfile<2, float>);
 #ifndef ESOKIT_ONE_TYPE
   KIND(ExtendedStateFilter<2, double>);
   KIND(WrappedOutput<ExtendedStateFilter<2, float>>);
@@ -30,6 +32,9 @@ void add_filters(std::vector<Kind>& kinds) {
   KIND(MimoExtendedStateFilter<ChainOrders<2, 2>, 1, double>);
   KIND(Experiment<1, double>);
   KIND(TrackingDifferentiator<double>);
+  KIND(SmoothProfile<1, float>);
+  KIND(SmoothProfile<4, float>);
+  KIND(SmoothProfile<3, double>);
 #endif
 }
 

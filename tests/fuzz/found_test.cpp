@@ -9,6 +9,7 @@
 #include <esokit/analysis/error_bound.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/dual_feedback.hpp>
+#include <esokit/control/smooth_profile.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
@@ -312,6 +313,15 @@ TEST(Found, ErrorBoundsAreNumbers) {
   EXPECT_EQ(refusal(esokit::cascade_error_bounds<2, 3, 2>(
                 {.observer_bandwidth = 1e120, .bandwidth_factor = 2, .input_gain = 1}, {5, 1e-3})),
             rule);
+}
+
+/// way / limit was 0 in float, so a move took one sample, and its fourth derivative was infinite.
+TEST(Found, ALimitHoldsForAVeryShortWay) {
+  esokit::SmoothProfileConfig<4, float> config{.sample_time = 1.80055185e-36f};
+  config.limits = {{9.81152152e-06f, 1790.18494f, 88859.0234f, 563835.125f}};
+  auto profile = esokit::SmoothProfile<4, float>::make(config).value();
+  (void)profile.update(-1.51432664e-38f);
+  for (const float value : profile.motion()) EXPECT_TRUE(esokit::is_finite(value));
 }
 
 }  // namespace fuzz_found_test

@@ -19,6 +19,7 @@
 #include <esokit/tune/tune.hpp>
 #include <limits>
 #include <string>
+#include <support/numbers.hpp>
 #include <support/refusal.hpp>
 #include <type_traits>
 #include <vector>
@@ -503,6 +504,13 @@ TEST(TuneTest, TakesTheFastLawWhereItCostsNothing) {
   }
 }
 
+/// Whether a design comes back without softening at its limits.
+bool back_as_designed(TunedDesign design, const TuneModel& model) {
+  design.settings.soften = false;
+  esokit::detail::play_law(design, model);
+  return design.comes_back;
+}
+
 // Without the rules for the limits the best loop swings between them for ever unless its law is
 // softened; with them it comes back, for next to the same J.
 TEST(TuneTest, WhatIsChosenComesBackFromTheLimits) {
@@ -525,21 +533,21 @@ TEST(TuneTest, WhatIsChosenComesBackFromTheLimits) {
   EXPECT_TRUE(fast.feasible);
   EXPECT_LT(fast.damping_latencies, 1.0);
   // It needs the softened law, and is lost without.
-  EXPECT_TRUE(fast.settings.soften);
+  EXPECT_FALSE(back_as_designed(fast, before.model));
   const auto tuning = tune(model, {}, {.play = esokit::TunePlay::all}).value();
   ASSERT_NE(tuning.chosen(), nullptr);
   EXPECT_TRUE(alarms(tuning, *tuning.chosen()).empty());
   const TunedDesign& chosen = *tuning.chosen();
-  EXPECT_FALSE(chosen.settings.soften);
-  EXPECT_NE(chosen.code.find(".soften = false"), std::string::npos);
+  EXPECT_TRUE(back_as_designed(chosen, tuning.model));
   EXPECT_GE(chosen.damping_latencies, 1.3 * 0.999);
-  EXPECT_LE(chosen.cost, 1.02 * fast.cost);
+  // sqrt(J) x 1.015; with the slower disturbance of a floor of 0.2 it was x 1.01.
+  EXPECT_LE(chosen.cost, 1.03 * fast.cost);
   for (std::size_t i = 0; i < tuning.designs.size(); ++i) {
     const TunedDesign& a = tuning.designs[i];
     if (i > 0) {
       const TunedDesign& b = tuning.designs[i - 1];
       const auto rank = [](const TunedDesign& d) {
-        return !d.feasible ? 0 : !d.comes_back ? 1 : d.settings.soften ? 2 : 3;
+        return !d.feasible ? 0 : !d.comes_back ? 1 : 2;
       };
       EXPECT_GE(rank(b), rank(a)) << a.name;
     }
@@ -566,12 +574,12 @@ TEST(PlayTest, TellsALoopThatSwingsForEver) {
   const auto fast =
       tune(model, {.controller_bandwidth = 2.0 / (0.58 * model.latency())}, free).value();
   const auto slow = tune(model, {.controller_bandwidth = 1.9 / (1.3 * model.latency())}).value();
-  const auto lost = [](const TunedDesign& design) {
-    return design.feasible && (design.settings.soften || !design.comes_back);
+  const auto lost = [&](const TunedDesign& design) {
+    return design.feasible && !back_as_designed(design, fast.model);
   };
   EXPECT_GE(std::count_if(fast.designs.begin(), fast.designs.end(), lost), 5);
   ASSERT_NE(slow.chosen(), nullptr);
-  EXPECT_FALSE(slow.chosen()->settings.soften);
+  EXPECT_TRUE(back_as_designed(*slow.chosen(), slow.model));
 }
 
 // Played until one comes back: the same is chosen as of those that are all played, and of the
@@ -618,7 +626,8 @@ TEST(PlayTest, IsTheRealController) {
   TuneModel model = servo();
   model.pole = 0.0;
   const auto tuning = tune(model).value();
-  const TunedDesign& design = named(tuning, "LinearEso, free poles");
+  TunedDesign design = named(tuning, "LinearEso, free poles");
+  design.settings.soften = false;
   using Rigid = esokit::LinearPlant<2>;
   const auto plant = with_lag(
       Rigid::chain({.coefficients = {0.0, 0.0}, .input_gain = 80.0, .dead_time = 0.002}).value(),
@@ -828,6 +837,30 @@ TEST(TuneTest, OrderThreeHasToStandFriction) {
   EXPECT_GT(kept, 0);
 }
 
+// Order 2 is softened, and as designed where only that comes back; neither ranks behind.
+TEST(TuneTest, SoftensOrderTwo) {
+  const auto tuning = tune(servo(), {}, {.play = esokit::TunePlay::all}).value();
+  int soft = 0;
+  for (const TunedDesign& design : tuning.designs) {
+    if (!design.feasible) continue;
+    TunedDesign again = design;
+    again.settings.soften = true;
+    esokit::detail::play_law(again, tuning.model);
+    EXPECT_EQ(design.settings.soften, again.comes_back) << design.name;
+    soft += design.settings.soften ? 1 : 0;
+  }
+  EXPECT_GT(soft, 0);
+  EXPECT_NE(tuning.designs.front().code.find(".soften = true"), std::string::npos);
+  std::vector<TunedDesign> two(2, tuning.designs.front());
+  two[1].settings.soften = false;
+  two[1].name = "dearer";
+  two[1].cost *= 1.5;
+  esokit::detail::rank(two, 2);
+  EXPECT_EQ(two[1].name, "dearer");
+  esokit::detail::rank(two, 3);
+  EXPECT_EQ(two[0].name, "dearer");
+}
+
 // A stated law that breaks the rule is refused, with the nearest that keeps it.
 TEST(TuneTest, NamesTheNearestThatKeepsTheRule) {
   const TuneModel model = servo();
@@ -883,15 +916,32 @@ TEST(TuneTest, ReckonsWithAFloorOfTheDisturbance) {
   quiet.disturbance = quiet.disturbance_of(0.001 / quiet.latency());
   const esokit::TuneRules plain_rules{.play = esokit::TunePlay::none};
   const auto raised = tune(quiet, {.controller_bandwidth = 10.0}, plain_rules).value();
-  EXPECT_NEAR(raised.model.filter_bandwidth() * quiet.latency(), 0.2, 1e-9);
+  EXPECT_NEAR(raised.model.filter_bandwidth() * quiet.latency(), 0.4, 1e-9);
   EXPECT_EQ(raised.given_disturbance, quiet.disturbance);
+  for (int order = 1; order <= 3; ++order) {
+    TuneModel other = quiet;
+    other.order = order;
+    other.disturbance = other.disturbance_of(0.01 / other.latency());
+    const auto bandwidth = [&](TuneRules rules) {
+      rules.play = esokit::TunePlay::none;
+      return tune(other, {.controller_bandwidth = 10.0}, rules).value().model.filter_bandwidth() *
+             other.latency();
+    };
+    EXPECT_NEAR(bandwidth({}), esokit::usual_filter_floor[static_cast<std::size_t>(order - 1)],
+                1e-9);
+    if (order > 1) continue;
+    EXPECT_NEAR(bandwidth({.filter_floor = 0.05}), 0.05, 1e-9);
+    EXPECT_NEAR(bandwidth({.filter_floor = 0.0}), 0.01, 1e-9);
+  }
   // The noise that it takes to cancel the disturbance grows by the power 2.5 of the bandwidth.
   const double allowed = 4.0 * raised.least_noise;
   const auto held = tune(quiet, {.control_noise = allowed}, plain_rules).value();
-  EXPECT_LT(held.model.filter_bandwidth() * quiet.latency(), 0.199);
+  EXPECT_LT(held.model.filter_bandwidth() * quiet.latency(), 0.399);
   EXPECT_GT(held.model.disturbance, quiet.disturbance);
-  EXPECT_EQ(tune(servo(), {.controller_bandwidth = 10.0}, plain_rules).value().model.disturbance,
-            servo().disturbance);
+  TuneModel moved = servo();
+  moved.disturbance = moved.disturbance_of(0.45 / moved.latency());
+  EXPECT_EQ(tune(moved, {.controller_bandwidth = 10.0}, plain_rules).value().model.disturbance,
+            moved.disturbance);
   // The noise that is asked is kept by all that is feasible.
   for (const TunedDesign& design : held.designs) {
     if (design.feasible) {
@@ -919,26 +969,46 @@ TEST(TuneTest, NeverRaisesWhatItMayAsk) {
   }));
 }
 
-// A design for more noise is not worse in everything.
+// A design for more noise is not worse in everything: in J of its own problem, noise, modulus
+// margin and peak of a load, of models and pairs of wishes that are drawn. More of them:
+// --gtest_filter=*MoreNoise* --gtest_shuffle --gtest_random_seed=1 --gtest_repeat=100
 TEST(TuneTest, MoreNoiseIsNeverWorseInEverything) {
-  TuneModel model = servo();
-  model.noise *= 10.0;
-  TunedDesign before;
-  for (const double noise : {0.1, 0.4, 1.6}) {
-    const auto tuning = tune(model, {.control_noise = noise}, {.play = esokit::TunePlay::none});
-    if (!tuning || tuning->chosen() == nullptr) continue;
-    const TunedDesign& now = *tuning->chosen();
-    if (!before.name.empty()) {
-      EXPECT_FALSE(now.output_deviation > 1.005 * before.output_deviation &&
-                   now.load_peak > 1.005 * before.load_peak &&
-                   now.settling_time > 1.005 * before.settling_time &&
-                   now.modulus_margin < 0.995 * before.modulus_margin &&
-                   now.delay_margin < 0.995 * before.delay_margin)
-          << noise;
-    }
-    before = now;
+  esokit_test::Random random(
+      static_cast<std::uint64_t>(testing::UnitTest::GetInstance()->random_seed()));
+  const TuneRules rules{.play = esokit::TunePlay::none};
+  int pairs = 0;
+  for (int order = 1; order <= 3; ++order) {
+    TuneModel model = plain(order);
+    model.input_gain = {random.log_uniform(0.1, 10.0), 0.0};
+    model.input_gain.half_width = model.input_gain.value * random.uniform(0.0, 0.15);
+    model.sample_time = random.log_uniform(0.05, 0.3);
+    model.lag = random.uniform(0.1, 0.9);
+    model.dead_time = 1.0 - model.lag;
+    model.latency_half_width = random.uniform(0.0, 0.1);
+    model.noise = random.log_uniform(1e-4, 1e-3);
+    model.disturbance = model.disturbance_of(random.log_uniform(0.003, 0.3) / model.latency());
+    const double less = random.log_uniform(0.01, 1.0);
+    const double more = less * random.log_uniform(1.1, 10.0);
+    const auto quiet = tune(model, {.control_noise = less}, rules);
+    if (!quiet || quiet->chosen() == nullptr) continue;
+    const auto loud = tune(model, {.control_noise = more}, rules);
+    ASSERT_TRUE(loud);
+    ASSERT_NE(loud->chosen(), nullptr);
+    ++pairs;
+    const TunedDesign& before = *quiet->chosen();
+    const TunedDesign& now = *loud->chosen();
+    const double slowest = 1e-3 * loud->model.filter_bandwidth();
+    const double j = LoopCost(loud->model, rules, slowest)(before.controller)
+                         .cost(loud->rho, model.input_gain.value);
+    EXPECT_FALSE(now.cost > 1.01 * j && now.control_noise > 1.005 * before.control_noise &&
+                 now.modulus_margin < 0.995 * before.modulus_margin &&
+                 now.load_peak > 1.005 * before.load_peak)
+        << "order " << order << ", " << less << " and " << more << ": J " << now.cost << " and "
+        << j << ", load " << now.load_peak << " and " << before.load_peak;
+    // What the smaller wish allows is allowed by the larger one.
+    EXPECT_LE(now.cost, 1.03 * j) << "order " << order << ", " << less << " and " << more;
   }
-  EXPECT_FALSE(before.name.empty());
+  EXPECT_GT(pairs, 0);
 }
 
 /// The rule named is the one that costs: without it J is smaller, without any other it is the same.

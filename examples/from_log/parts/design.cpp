@@ -380,11 +380,9 @@ void Design::show_on(Page& page, const Findings& findings) const {
   }
   const auto margins = esokit::margins(*loop_).value();
   loop.caption(
-      "Left: loop gain L with the identified machine, without its intervals. There the phase "
-      "margin is " +
-      number_text(margins.phase.value * 180 / std::numbers::pi, 3) + "°, the gain margin " +
-      number_text(margins.gain_increase.value, 3) +
-      " (dashed: the frequencies where abs(L) is one and where the phase is -180°). "
+      "Left: loop gain L with the identified machine, without its intervals (dashed: the "
+      "frequencies where abs(L) is one and where the phase is -180°; the margins above are the "
+      "smallest over the intervals). "
       "Middle: response to a step of the reference. Right: response to a load step that "
       "takes a tenth of the range of u. Both hold while u is within its limits.");
   double peak = 0.0;

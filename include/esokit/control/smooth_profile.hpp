@@ -87,6 +87,7 @@ template <int Order, PlainScalar S = double>
 class SmoothProfile {
  public:
   static constexpr int order = Order;            ///< n
+  static constexpr bool runs_on = true;          ///< a refused target does not stop a move
   using scalar_type = S;                         ///< type of signals and settings
   using Config = SmoothProfileConfig<Order, S>;  ///< settings of make
   using Motion = Vector<S, Order + 1>;           ///< (r, r', .., r^(n))
@@ -147,11 +148,8 @@ class SmoothProfile {
     for (int i = 1; i <= Order; ++i) {
       const S limit = config_.limits[static_cast<std::size_t>(i - 1)];
       if (!(limit > S(0))) continue;
-      const S needed = way / limit * peak(i);
-      const S least = i == 1   ? needed
-                      : i == 2 ? std::sqrt(needed)
-                      : i == 3 ? std::cbrt(needed)
-                               : std::sqrt(std::sqrt(needed));
+      // Roots first: the quotient may leave the scalar's range.
+      const S least = root(way, i) / root(limit, i) * root(peak(i), i);
       if (!(time >= least)) time = least;
     }
     return time;
@@ -170,6 +168,13 @@ class SmoothProfile {
 
   static constexpr S peak(int derivative) noexcept {
     return static_cast<S>(smooth_step_peaks<Order>[static_cast<std::size_t>(derivative - 1)]);
+  }
+
+  static S root(const S& x, int degree) noexcept {
+    return degree == 1   ? x
+           : degree == 2 ? std::sqrt(x)
+           : degree == 3 ? std::cbrt(x)
+                         : std::sqrt(std::sqrt(x));
   }
 
   /// Begins a move; false, and nothing changes, if it would take too long.

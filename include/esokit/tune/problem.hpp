@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <esokit/analysis/loop.hpp>
@@ -187,6 +188,11 @@ enum class TunePlay : unsigned char {
   all     ///< every design that keeps the rules: longer by a quarter
 };
 
+/// TuneRules::filter_floor of orders 1 to 3: with it load steps move y less than with a PID of the
+/// SIMC rule. One integrator is stable at any low gain, two come back from less the faster they
+/// are.
+inline constexpr std::array<double, 3> usual_filter_floor{0.7, 0.4, 0.2};
+
 /// What a loop has to keep. Margins: for the nominal model, and with b0 at both ends of its
 /// interval, the largest latency, and the largest and smallest share of lag in it.
 struct TuneRules {
@@ -206,8 +212,9 @@ struct TuneRules {
   /// adds nothing to damping_latencies. 0: not required.
   double bandwidth_ratio = 5.0;
   /// Smallest filter bandwidth that is reckoned with, in 1 / TuneModel::latency, as far as the
-  /// control noise allows: a log without disturbances does not show the loads of tomorrow. 0: none.
-  double filter_floor = 0.2;
+  /// control noise allows: a log without disturbances does not show the loads of tomorrow. Left
+  /// out: usual_filter_floor of the order; 0: none.
+  std::optional<double> filter_floor{};
   TunePlay play = TunePlay::first;  ///< what does not come back ranks behind
 };
 

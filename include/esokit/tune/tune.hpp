@@ -592,8 +592,9 @@ inline void play_law(TunedDesign& d, const TuneModel& model) {
   }
 }
 
-/// Plays a design as it is, and softened if it does not come back: the law as designed comes back
-/// faster, and from more of what no model has.
+/// Plays a design; one of order 2 softened, and as designed if it does not come back so, the others
+/// the other way round. Drawn machines behind friction and gravity came back from more and sooner
+/// like this (examples/choosing).
 inline void play_all(TunedDesign& d, const TuneModel& model) {
   d.played = true;
   if (model.may_rub() && swings_with_friction(model, d.controller)) {
@@ -603,10 +604,11 @@ inline void play_all(TunedDesign& d, const TuneModel& model) {
     d.lost = "friction on y'', however small: it acts as a damping, with which the loop swings";
     return;
   }
-  d.settings.soften = false;
+  const bool possible = d.settings.gains[0] > 0.0;
+  d.settings.soften = model.order == 2 && possible;
   play_law(d, model);
-  if (d.comes_back || !(d.settings.gains[0] > 0.0)) return;
-  d.settings.soften = true;
+  if (d.comes_back || !possible) return;
+  d.settings.soften = !d.settings.soften;
   play_law(d, model);
 }
 
@@ -630,7 +632,7 @@ inline void fill_in(Contender& c, const TuneSearch& search, const LoopCost& fine
   d.gain_tolerance = numbers.tolerance;
   d.phase_margin = numbers.phase;
   const auto& gains = d.settings.gains;
-  d.settings.soften = gains.size() > 2 && gains[0] > 0.0;
+  d.settings.soften = model.order > 1 && gains[0] > 0.0;
   d.damping_latencies = gains.size() > 1 ? gains[1] / gains[0] / model.latency() : 0.0;
   d.bandwidth_ratio =
       law_mean(gains, model.order) / observer_mean(d.family, c.kind, model, d.settings);
@@ -669,11 +671,11 @@ inline void fill_in(Contender& c, const TuneSearch& search, const LoopCost& fine
 }
 
 /// By J; among the remaining designs within 1 % of the smallest J, the cheapest update comes next.
-/// Behind is what has to be softened, then what does not come back, last what does not keep the
-/// rules.
-inline void rank(std::vector<TunedDesign>& designs) {
-  const auto group = [](const TunedDesign& d) {
-    return !d.feasible ? 3 : !d.comes_back ? 2 : d.played && d.settings.soften ? 1 : 0;
+/// Behind is what has to be softened beyond order 2, then what does not come back, last what does
+/// not keep the rules.
+inline void rank(std::vector<TunedDesign>& designs, int order) {
+  const auto group = [&](const TunedDesign& d) {
+    return !d.feasible ? 3 : !d.comes_back ? 2 : order > 2 && d.played && d.settings.soften ? 1 : 0;
   };
   std::stable_sort(designs.begin(), designs.end(), [&](const TunedDesign& a, const TunedDesign& b) {
     return group(a) != group(b) ? group(a) < group(b) : a.cost < b.cost;
@@ -903,9 +905,9 @@ template <class = void>
                "must be below 1.5 rad")
       .not_negative("damping_latencies", rules.damping_latencies)
       .not_negative("bandwidth_ratio", rules.bandwidth_ratio)
-      .not_negative("filter_floor", rules.filter_floor)
-      .require(!(rules.filter_floor > 1.0), "filter_floor", rules.filter_floor,
-               "must not be above 1");
+      .not_negative("filter_floor", rules.filter_floor.value_or(0.0))
+      .require(!(rules.filter_floor.value_or(0.0) > 1.0), "filter_floor",
+               rules.filter_floor.value_or(0.0), "must not be above 1");
   if (!checks) return checks.error();
   const int n = given.order;
   const double T = given.sample_time;
@@ -929,7 +931,8 @@ template <class = void>
                             ? wish.control_noise
                             : usual_control_noise * (given.u_max - given.u_min);
   TuneModel model = given;
-  const double floor = rules.filter_floor / latency;
+  const double floor =
+      rules.filter_floor.value_or(usual_filter_floor[static_cast<std::size_t>(n - 1)]) / latency;
   if (given.filter_bandwidth() < floor) {
     // No further than half of the noise that is allowed, which leaves as much for the law.
     const auto noise_at = [&](double bandwidth) {
@@ -1080,7 +1083,7 @@ template <class = void>
       }
     }
     for (bool again = true; again;) {
-      detail::rank(tuning.designs);
+      detail::rank(tuning.designs, n);
       TunedDesign& first = tuning.designs.front();
       again = rules.play == TunePlay::first && first.feasible && !first.played;
       if (again) detail::play_all(first, model);
