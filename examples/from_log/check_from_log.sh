@@ -319,7 +319,7 @@ verdict $? "quiet.csv: nothing is said of the floor: $said"
 servo noise=1e-5 wander=0.0005 >rows.txt
 written t,y,u , t >moving_little.csv
 healthy moving_little.csv
-servo noise=1e-5 wander=0 hold=45 >rows.txt
+servo noise=1e-4 wander=0 hold=50 rows=6000 >rows.txt
 written t,y,u , t >sticks.csv
 sounds sticks sticks.csv
 servo quantum=0.5 >rows.txt
