@@ -762,7 +762,7 @@ TEST(Widened, IsWhatTheOtherEvidenceAsksFor) {
   EXPECT_EQ(half(), 2.5);
   // Friction holds: to the end of what the motion says, on either side.
   found.correlation = 0.1;
-  found.in_motion = {0.4, {-70, 3}, {-20, 5}};
+  found.in_motion = {0.4, {-70, 3}, {-20, 5}, -50};
   EXPECT_EQ(half(), 23);
   found.input_gain.value = -90;
   EXPECT_EQ(half(), 23);

@@ -132,13 +132,17 @@ TEST(GainInMotion, TellsFrictionThatHolds) {
 }
 
 TEST(GainInMotion, DiffersIfStandstillIsSmaller) {
-  esokit::GainInMotion found{0.1, {-4, 0.5}, {-2.9, 0.59}};
+  esokit::GainInMotion found{0.1, {-4, 0.5}, {-2.9, 0.59}, -3.6};
+  EXPECT_TRUE(found.differ());
+  found.all = -3.65;  // a tenth matters
+  EXPECT_FALSE(found.differ());
+  found.all = -4.5;
   EXPECT_TRUE(found.differ());
   found.still = 0;
   EXPECT_FALSE(found.differ());
-  found = {0.1, {-2.9, 0.59}, {-4, 0.5}};
+  found = {0.1, {-2.9, 0.59}, {-4, 0.5}, -3.6};
   EXPECT_FALSE(found.differ());
-  found = {0.1, {-4, 0.5}, {-2.9, 0.61}};
+  found = {0.1, {-4, 0.5}, {-2.9, 0.61}, -3.6};
   EXPECT_FALSE(found.differ());
 }
 

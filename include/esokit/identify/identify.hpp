@@ -892,7 +892,7 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
     result.by_size = gain_by_size(used, model, bounds, here.fit.at);
     if (model.order == 2) {
       if (speed.empty()) speed = friction_speed(rows, 2, chosen.fit.noise, chosen.fit.at.latency);
-      result.in_motion = gain_in_motion(used, model, bounds, here.fit.at, speed);
+      result.in_motion = gain_in_motion(used, model, bounds, here.fit, speed);
     }
   }
   result.input_gain = widened(result, options);

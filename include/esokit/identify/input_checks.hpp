@@ -38,12 +38,14 @@ struct GainInMotion {
   double still = 0.0;   ///< share of the rows at standstill; 0: not tried
   Estimate moving{};    ///< b0 in motion
   Estimate standing{};  ///< b0 at standstill
+  double all = 0.0;     ///< b0 of all rows
 
-  /// Whether b0 is smaller at standstill, as by `GainBySize`: friction holds the machine against u
-  /// there, and b0 of all rows is too small.
+  /// Whether b0 is smaller at standstill, as by `GainBySize`, and that of all rows is a tenth off
+  /// that of the motion: friction holds the machine against u, and it matters.
   [[nodiscard]] bool differ() const {
     return still > 0.0 && GainBySize::differs(moving, standing) &&
-           std::abs(standing.value) < std::abs(moving.value);
+           std::abs(standing.value) < std::abs(moving.value) &&
+           std::abs(moving.value - all) > 0.1 * std::abs(all);
   }
 };
 
@@ -66,9 +68,9 @@ inline std::pair<Estimate, Estimate> two_gains(const FitData& data, const FitMod
   return {{best.linear[0], t * errors.linear[0]}, {best.linear[last], t * errors.linear[last]}};
 }
 
-/// b0 in motion and at standstill, at the bandwidth of `at`. @param speed of each row
+/// b0 in motion and at standstill, at the bandwidth of `here`. @param speed of each row
 inline GainInMotion gain_in_motion(const FitData& data, const FitModel& model,
-                                   const FitBounds& bounds, const FitPoint& at,
+                                   const FitBounds& bounds, const Fit& here,
                                    const std::vector<double>& speed) {
   double square = 0.0;
   for (const double v : speed) square += v * v;
@@ -81,8 +83,9 @@ inline GainInMotion gain_in_motion(const FitData& data, const FitModel& model,
   }
   if (rows == 0 || rows == held.size()) return {};
   split.inputs.push_back(std::move(held));
-  const auto [moving, standing] = two_gains(split, model, bounds, at);
-  return {static_cast<double>(rows) / static_cast<double>(speed.size()), moving, standing};
+  const auto [moving, standing] = two_gains(split, model, bounds, here.at);
+  return {static_cast<double>(rows) / static_cast<double>(speed.size()), moving, standing,
+          here.linear[0]};
 }
 
 /// b0 at small and at large u, at the bandwidth of `at`.
