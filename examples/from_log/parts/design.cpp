@@ -336,6 +336,8 @@ std::vector<CsvRow> ranking(const esokit::Tuning& tuning) {
                             "standard deviation of y", "noise in u, % of its range",
                             "y after a load of 10 %", "settling time of a small step (s)",
                             "modulus margin", "delay margin (ms)", "instructions", "limited by"}};
+  // Zero where a design was not played.
+  const auto played = [](double value) { return value > 0.0 ? number_text(value, 3) : "-"; };
   for (std::size_t i = 0; i < tuning.designs.size(); ++i) {
     const auto& d = tuning.designs[i];
     rows.push_back({std::to_string(i + 1) + " " + d.name +
@@ -345,7 +347,7 @@ std::vector<CsvRow> ranking(const esokit::Tuning& tuning) {
                     number_text(d.excess, 3), number_text(d.free_excess, 3),
                     number_text(d.output_deviation, 3),
                     number_text(100 * d.control_noise / range, 3),
-                    number_text(0.1 * range * d.load_peak, 3), number_text(d.settling_time, 3),
+                    played(0.1 * range * d.load_peak), played(d.settling_time),
                     number_text(d.modulus_margin, 2), number_text(1e3 * d.delay_margin, 3),
                     std::to_string(d.instructions), d.constraint});
   }
