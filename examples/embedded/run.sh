@@ -310,6 +310,7 @@ if diff <(sed -n 's/^open pasted //p' "$out/host.txt") \
 fi
 built=()
 for core in "${cores[@]}"; do
+  echo "building for $core, $((SECONDS - started)) s"
   # Without a floating-point unit nothing is fused, and there is one image.
   images=(firmware drive drive_make controllers)
   [[ $core == cortex-m0plus ]] || images+=(firmware_exact)

@@ -83,8 +83,10 @@ std::string html_of(const Figure& figure, const std::string& scratch) {
   if (!scratch.empty() && figure.write(scratch, "svg")) {
     std::ifstream file(scratch + "/" + figure.name() + ".svg", std::ios::binary);
     const std::string svg{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-    text += "<img src=\"data:image/svg+xml;base64," + base64(svg) + "\" alt=\"" +
-            escaped(figure.caption()) + "\">\n";
+    text +=
+        "<label class=\"zoom\"><input type=\"checkbox\" aria-label=\"larger\"><img "
+        "src=\"data:image/svg+xml;base64," +
+        base64(svg) + "\" alt=\"" + escaped(figure.caption()) + "\"></label>\n";
   } else {
     text += "<p>Not drawn: figures need gnuplot and Python 3.</p>\n";
   }

@@ -74,8 +74,11 @@ Figure log_figure(const Input& input, const Findings& findings) {
   }
   const auto panel = [&](std::size_t row, const char* name, const std::vector<double>& values,
                          const Spectrum& spectrum, Color color) {
-    auto& over_time = figure.panel(row, 0).x_label("t (s)").y_label(name).name(name).line(
-        t, values, {.color = color, .width = 1.0, .column = name});
+    auto& over_time = figure.panel(row, 0)
+                          .x_label("t (s)")
+                          .y_label(name + std::string(" (unit of the log)"))
+                          .name(name)
+                          .line(t, values, {.color = color, .width = 1.0, .column = name});
     // Of a constant gnuplot would choose a range itself, with a warning.
     const auto first = std::ranges::find_if(values, [](double v) { return std::isfinite(v); });
     const bool constant = std::ranges::none_of(
@@ -125,7 +128,7 @@ Figure model_figure(const Findings& findings) {
     if (w.size() >= 2) {
       figure.panel(0, 0)
           .x_label("w (rad/s)")
-          .y_label("b0")
+          .y_label("b0 (unit of y^{(n)} / u)")
           .log_x()
           .name("plateau")
           .band(w, low, high, {.color = Color::sky, .opacity = 0.3, .column = "b0 +- 2 se"})
@@ -374,7 +377,7 @@ std::string show_observer(const Settings& settings, const Input& input) {
   figure.caption(
       "Top: y and its estimate. Bottom: u, and the estimated total disturbance in units of u.");
   figure.panel(0, 0)
-      .y_label("y")
+      .y_label("y (unit of the log)")
       .legend(Legend::above)
       .name("output")
       .line(t, input.log.y, {.name = "y", .color = Color::grey, .width = 1.0})
@@ -384,7 +387,7 @@ std::string show_observer(const Settings& settings, const Input& input) {
     load.push_back(d / how.input_gain);
   figure.panel(1, 0)
       .x_label("t (s)")
-      .y_label("u, d / b0")
+      .y_label("u, d / b0 (unit of u)")
       .legend(Legend::above)
       .name("load")
       .line(t, input.log.u, {.name = "u", .color = Color::grey, .width = 1.0})

@@ -336,8 +336,9 @@ class MonteCarlo {
   }
 
   /// The same, and each run as a line of a table: run, and the number of each Measure under its
-  /// name; nan for a run that failed. `on_run` is called, too.
-  /// @param[out] csv the table, with a line of names; the finished runs if it was stopped
+  /// name; nan for a run that failed. `csv` becomes the table, with a line of names, and has the
+  /// finished runs if the study was stopped. `on_run` is called, too.
+  /// @return the outcome, or an error in the settings
   template <int Lanes = default_lanes<LaneScalar<typename Types::S>>, class... Reduce, class... F>
   [[nodiscard]] Expected<Outcome, Error<Time>> run_to_csv(
       std::string& csv, const Measure<Reduce, F>&... measures) const {
