@@ -1164,7 +1164,7 @@ TEST(TuneTest, RefusesWhatIsNoProblem) {
   // Numbers of an LQG controller that no double holds.
   EXPECT_EQ(refused([](TuneModel& m) { m.pole = -9e4; }),
             "optimum cannot be computed: the numbers of this model are too far apart");
-  for (const esokit::TuneRules rules :
+  for (const esokit::TuneRules& rules :
        {esokit::TuneRules{.modulus_margin = 1.0}, esokit::TuneRules{.gain_factor = 0.99}}) {
     EXPECT_EQ(esokit_test::refusal(tune(plain(1), {}, rules)),
               rules.gain_factor < 1.0 ? "gain_factor: must be finite and 1 or more"
