@@ -55,8 +55,8 @@ void add_all(const std::string& scalar) {
   add_parts<ModelParts{.order = 2, .sensor = 1}, S>("sensor/2", scalar, {.sensor = {5 * ms}});
   add_parts<ModelParts{.order = 2, .plant_poles = true}, S>("plant_poles/2", scalar,
                                                             {.plant = {S(4), S(3)}});
-  add_parts<ModelParts{.order = 2, .leaky = 1}, S>("leaky/2", scalar,
-                                                   {.leaky = {static_cast<S>(0.5)}});
+  add_parts<ModelParts{.order = 2, .first_order = 1}, S>("first_order/2", scalar,
+                                                         {.first_order = {static_cast<S>(0.5)}});
   add_parts<ModelParts{.order = 1, .resonators = 1}, S>("resonator/1", scalar,
                                                         {.resonators = {{{S(90)}}}});
   add_parts<ModelParts{.order = 2, .resonators = 1}, S>("resonator/2", scalar,

@@ -61,14 +61,14 @@ std::vector<Case> cases() {
   all.back().model.lag = 0.01;
   all.push_back({"n = 2, slow sine", plain(2)});
   TuneModel& swinging = all.back().model;
-  swinging.swings = {{5.0, 3.0 * std::sqrt(swinging.disturbance), 0.0}};
+  swinging.sinusoids = {{5.0, 3.0 * std::sqrt(swinging.disturbance), 0.0}};
   return all;
 }
 
 /// Noise in u of the LQG whose law has this bandwidth: the wish that leads to it.
 double wish_of(const TuneModel& model, double bandwidth) {
   TuneModel walking = model;
-  walking.swings.clear();
+  walking.sinusoids.clear();
   const LoopCost cost(walking, {}, 0.1 * bandwidth);
   return cost(Lqg(model).controller(std::pow(bandwidth, -2 * model.order))).control_noise;
 }
@@ -85,7 +85,7 @@ const std::map<std::string, Style>& styles() {
       {"LinearEso, free poles", {.name = "free poles", .color = Color::black, .width = 1.8}},
       {"LinearEso that knows the lag",
        {.name = "LESO, knows it", .color = Color::blue, .dash = Dash::dashed, .width = 1.8}},
-      {"LinearEso that knows the swing",
+      {"LinearEso that knows the sine",
        {.name = "LESO, knows it", .color = Color::blue, .dash = Dash::dashed, .width = 1.8}},
       {"LinearEso, free poles, that knows the lag",
        {.name = "free poles, knows it",

@@ -82,7 +82,7 @@ class AnyObserver {
   virtual StepStatus reset(double y) = 0;
   virtual StepStatus set_disturbance(double d) = 0;
   [[nodiscard]] virtual Reading read() const = 0;
-  [[nodiscard]] virtual std::vector<double> rest(double y, double u) const = 0;
+  [[nodiscard]] virtual std::vector<double> equilibrium(double y, double u) const = 0;
 
   // Nothing for a bare one; the first four nothing for one that does not gate.
   virtual void set_trust(double phi) = 0;
@@ -132,8 +132,8 @@ class Erased final : public AnyObserver {
     }
     return now;
   }
-  [[nodiscard]] std::vector<double> rest(double y, double u) const override {
-    return numbers(o_.rest(s(y), s(u)));
+  [[nodiscard]] std::vector<double> equilibrium(double y, double u) const override {
+    return numbers(o_.equilibrium(s(y), s(u)));
   }
 
   void set_trust([[maybe_unused]] double phi) override {

@@ -44,7 +44,7 @@ template <ModelParts Parts>
 constexpr bool bears = observer_traits<ModelEso<Parts>>.bears_guards;
 static_assert(bears<lag> && bears<all_parts> && bears<second_lag>);
 static_assert(bears<ModelParts{.order = 2, .sensor = 2}>);
-static_assert(!bears<ModelParts{.order = 1, .leaky = 1}>);
+static_assert(!bears<ModelParts{.order = 1, .first_order = 1}>);
 static_assert(!bears<ModelParts{.order = 1, .constants = 2}>);
 static_assert(!bears<ModelParts{.order = 1, .resonators = 1, .follows_speed = true}>);
 static_assert(!observer_traits<ModelCascadeEso<lag, 2>>.bears_guards);

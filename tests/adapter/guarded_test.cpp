@@ -133,7 +133,7 @@ void given_input_gain_is_exact(const guards::Type& type) {
     ASSERT_EQ(guarded->update(y, u), plain->update(y, u * before));
     before = ratio;
     ASSERT_TRUE(guards::same(guarded->read().estimate, plain->read().estimate)) << k;
-    ASSERT_EQ(guarded->rest(y, u), plain->rest(y, u * ratio));
+    ASSERT_EQ(guarded->equilibrium(y, u), plain->equilibrium(y, u * ratio));
   }
 }
 
@@ -557,7 +557,7 @@ TEST(Held, StandsStill) {
   (void)guarded.update(hidden_nan<double>(), guarded.hold(0.3));
   EXPECT_EQ(guarded.estimate(), (O::Estimate{before(0), 0, 0, before(3)}));
   guarded.release();
-  EXPECT_EQ(guarded.update(9, guarded.standing_input()), StepStatus::gap_bridged);
+  EXPECT_EQ(guarded.update(9, guarded.holding_input()), StepStatus::gap_bridged);
   EXPECT_NEAR(guarded.estimate<0>(), 9, 1e-12);
   EXPECT_EQ(guarded.estimate<1>(), 0);
   EXPECT_EQ(guarded.total_disturbance(), before(3));
@@ -626,7 +626,7 @@ TEST(GivenInputGain, InputsAreByTheGainOfNow) {
   ASSERT_TRUE(guarded.set_input_gain(2 * b0));
   for (int k = 0; k < 2; ++k) (void)guarded.update(2, 0.5);
   EXPECT_EQ(guarded.applied_input(), 0.5);
-  EXPECT_EQ(guarded.standing_input(), -guarded.total_disturbance() / (2 * b0));
+  EXPECT_EQ(guarded.holding_input(), -guarded.total_disturbance() / (2 * b0));
   // Where that u is beyond the scalar it is the one there was.
   auto config = settings<LinearEso<1>>();
   config.input_gain = 1e-3;
@@ -634,7 +634,7 @@ TEST(GivenInputGain, InputsAreByTheGainOfNow) {
   (void)weak.update(0, 0.25);
   ASSERT_EQ(weak.reset({0, 1e306}), StepStatus::ok);
   (void)weak.predict(0.25);
-  EXPECT_EQ(weak.standing_input(), 0.25);
+  EXPECT_EQ(weak.holding_input(), 0.25);
 }
 
 TEST(GivenInputGain, DhatKeepsItsUnit) {

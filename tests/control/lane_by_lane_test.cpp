@@ -103,8 +103,12 @@ struct KnownVarying {
 
 /// All parts, of a lag of second order the damping that is left out.
 struct Modelled {
-  static constexpr esokit::ModelParts parts{
-      .order = 1, .plant_poles = true, .actuator = 1, .sensor = 2, .resonators = 1, .leaky = 1};
+  static constexpr esokit::ModelParts parts{.order = 1,
+                                            .plant_poles = true,
+                                            .actuator = 1,
+                                            .sensor = 2,
+                                            .resonators = 1,
+                                            .first_order = 1};
   template <class T>
   using Type = esokit::ModelCascadeEso<parts, 2, T>;
   template <class T>
@@ -118,7 +122,7 @@ struct Modelled {
     config.model.actuator.time_constant = set<T>(lane, again, 0.05);
     config.model.sensor.frequency = set<T>(lane, again, 40);
     config.model.resonators[0].frequency = set<T>(lane, again, 15);
-    config.model.leaky[0] = set<T>(lane, again, 0.5);
+    config.model.first_order[0] = set<T>(lane, again, 0.5);
     config.max_gap = 4;
     return config;
   }
@@ -311,7 +315,7 @@ const auto observe = [](auto& o, const auto& x, int k) {
   const auto status = k % 11 == 7 ? o.predict(x[1]) : o.update(x[0], x[1]);
   return Answers(status, o.estimate(), o.template estimate<1>(), o.total_disturbance(), o.missed(),
                  o.restarts(), o.applied_input(), o.input_gain(), o.level_estimate(0),
-                 o.rest(x[0], x[1]));
+                 o.equilibrium(x[0], x[1]));
 };
 
 TEST(LaneByLane, DelayedInput) {
@@ -337,7 +341,7 @@ TEST(LaneByLane, Guards) {
     }
     const auto u = c.update(x[0], x[2]);
     const auto& o = c.observer();
-    return Answers(u, o.estimate(), o.bounded(), o.gated(), o.trust(), o.standing_input(),
+    return Answers(u, o.estimate(), o.bounded(), o.gated(), o.trust(), o.holding_input(),
                    o.input_factor(), o.present_input_gain(), o.applied_input());
   });
 }

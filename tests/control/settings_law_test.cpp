@@ -113,13 +113,13 @@ TEST(Settings, OfObserversAreAdopted) {
                                                                .actuator = 1,
                                                                .sensor = 2,
                                                                .resonators = 1,
-                                                               .leaky = 1}>>([](auto& c) {
+                                                               .first_order = 1}>>([](auto& c) {
                              c.max_gap = 3;
                              c.model.plant = {3};
                              c.model.actuator.time_constant = 0.05;
                              c.model.sensor = {.frequency = 40, .damping = 0.7};
                              c.model.resonators[0] = {.frequency = 15, .capture_bandwidth = 10};
-                             c.model.leaky[0] = 0.5;
+                             c.model.first_order[0] = 0.5;
                            })});
 }
 

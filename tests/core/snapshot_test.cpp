@@ -44,7 +44,7 @@ using SwingModel = AugmentedModel<ModelParts{.order = 2, .resonators = 1}, float
 using SwingFilter = ExtendedStateFilter<2, float, 3, NoNominalModel, 0, SwingModel>;
 using SensorModel = AugmentedModel<ModelParts{.order = 2, .sensor = 2}, float>;
 using SensorFilter = ExtendedStateFilter<2, float, 3, NoNominalModel, 0, SensorModel>;
-using FadingModel = AugmentedModel<ModelParts{.order = 2, .sensor = 1, .leaky = 1}, float>;
+using FadingModel = AugmentedModel<ModelParts{.order = 2, .sensor = 1, .first_order = 1}, float>;
 using FadingFilter = ExtendedStateFilter<2, float, 3, NoNominalModel, 0, FadingModel>;
 
 template <class Observer>

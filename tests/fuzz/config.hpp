@@ -213,7 +213,7 @@ class Filler {
     for (auto& resonance : model.resonators) {
       number("model.resonators", resonance.frequency, {0.02 / T, 0.5 / T, true});
     }
-    for (auto& tau : model.leaky) number("model.leaky", tau, {20 * T, 500 * T, true});
+    for (auto& tau : model.first_order) number("model.first_order", tau, {20 * T, 500 * T, true});
     // What is open loop, or captures by its frequency, decays by that.
     promise.slowest = std::min(promise.slowest, 0.02);
   }

@@ -1028,7 +1028,7 @@ class Driver final : public Game {
   template <class O>
   static double distance(const O& observer, const S& y) {
     const auto z = observer.estimate();
-    const auto rest = observer.rest(y, S(0));
+    const auto rest = observer.equilibrium(y, S(0));
     double worst = 0;
     double unit = 1;
     for (int r = 0; r < O::size; ++r) {

@@ -58,7 +58,7 @@ void add_observers(std::vector<Kind>& kinds) {
   KIND(KnownModel<LinearEso<2, float>, Friction<1, float>>);
   KIND(VariableTime<ModelEso<ModelParts{.order = 1, .plant_poles = true}, float>>);
   KIND(DelayedInput<OutlierGate<ModelEso<ModelParts{.order = 2, .plant_poles = true}, float>>, 3>);
-  KIND(ModelCascadeEso<ModelParts{.order = 1, .resonators = 1, .leaky = 1}, 2, float>);
+  KIND(ModelCascadeEso<ModelParts{.order = 1, .resonators = 1, .first_order = 1}, 2, float>);
   KIND(PlantCascadeEso<2, ModelParts{.order = 1}, 2, double>);
 #endif
 }

@@ -500,8 +500,8 @@ TEST(Identify, AveragedRowsMustAgreeWithPlainOnes) {
   }
 }
 
-// y' = b0 u - a (y - ambient) of a heater through a sensor, steps of u; `rest` rows before the
-// first.
+// y' = b0 u - a (y - ambient) of a heater through a sensor, steps of u; `equilibrium` rows before
+// the first.
 Log heater(double ambient, int rows, int rest, double power = 40) {
   esokit::sim::Gaussian gaussian(6);
   Log log;

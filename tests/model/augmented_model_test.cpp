@@ -34,14 +34,14 @@ constexpr ModelParts lag_parts{.order = 1, .actuator = 1};
 constexpr ModelParts poles_parts{.order = 2, .plant_poles = true};
 constexpr ModelParts sensor_parts{.order = 2, .sensor = 1};
 constexpr ModelParts swing_parts{.order = 2, .resonators = 2};
-constexpr ModelParts fading_parts{.order = 1, .leaky = 1};
+constexpr ModelParts fading_parts{.order = 1, .first_order = 1};
 constexpr ModelParts all_parts{.order = 2,
                                .plant_poles = true,
                                .actuator = 2,
                                .sensor = 2,
                                .constants = 3,
                                .resonators = 1,
-                               .leaky = 1};
+                               .first_order = 1};
 
 template <ModelParts parts>
 using Settings = typename AugmentedModel<parts>::Settings;
@@ -101,7 +101,7 @@ TEST(AugmentedModel, IsSampledExactly) {
   for (const double tau : {1e-5, 1e-3, 2e-2, 50.0}) {
     EXPECT_LT(sampling_error<lag_parts>({.actuator = {tau}}, kT), 1e-13) << tau;
     EXPECT_LT(sampling_error<sensor_parts>({.sensor = {tau}}, kT), 1e-13) << tau;
-    EXPECT_LT(sampling_error<fading_parts>({.leaky = {tau}}, kT), 1e-13) << tau;
+    EXPECT_LT(sampling_error<fading_parts>({.first_order = {tau}}, kT), 1e-13) << tau;
   }
   for (const double w : {0.1, 314.0, 3000.0}) {
     EXPECT_LT(sampling_error<swing_parts>({.resonators = {{{w}, {0.5 * w, 0.2}}}}, kT), 1e-13) << w;
@@ -115,7 +115,7 @@ TEST(AugmentedModel, IsSampledExactly) {
                                          .actuator = {fast, 0.4},
                                          .sensor = {slow, 1.0},
                                          .resonators = {{{700.0, 0.01}}},
-                                         .leaky = {0.3}},
+                                         .first_order = {0.3}},
                                         kT),
               1e-13)
         << fast << ", " << slow;
@@ -133,7 +133,7 @@ void poles_are_placed(double tolerance, const std::vector<double>& speeds) {
       const double rate = speed * bandwidth;
       if (rate * kT > 75) continue;
       Settings<parts> settings{};
-      Poles poles(static_cast<std::size_t>(parts.order + parts.constants + parts.leaky),
+      Poles poles(static_cast<std::size_t>(parts.order + parts.constants + parts.first_order),
                   std::complex<long double>(-static_cast<long double>(bandwidth), 0));
       const auto add = [&](const Poles& more) {
         poles.insert(poles.end(), more.begin(), more.end());
@@ -161,7 +161,8 @@ void poles_are_placed(double tolerance, const std::vector<double>& speeds) {
         const auto wide = static_cast<long double>(w);
         add({{-wide, wide}, {-wide, -wide}});
       }
-      for (int c = 0; c < parts.leaky; ++c) settings.leaky[size_t(c)] = 3 / bandwidth * (c + 1);
+      for (int c = 0; c < parts.first_order; ++c)
+        settings.first_order[size_t(c)] = 3 / bandwidth * (c + 1);
       if (!below_nyquist) continue;
       SCOPED_TRACE(::testing::Message() << "omega_o T " << product << ", rate / omega_o " << speed);
       const auto observer = ModelEso<parts>::make({.observer_bandwidth = bandwidth,
@@ -187,7 +188,8 @@ TEST(AugmentedModel, PutsThePolesWhereAsked) {
   poles_are_placed<ModelParts{.order = 3, .actuator = 1, .constants = 2, .resonators = 1}>(
       1e-9, {0.1, 1, 9});
   poles_are_placed<ModelParts{
-      .order = 2, .plant_poles = true, .actuator = 2, .sensor = 2, .leaky = 1}>(1e-9, {0.3, 1, 9});
+      .order = 2, .plant_poles = true, .actuator = 2, .sensor = 2, .first_order = 1}>(1e-9,
+                                                                                      {0.3, 1, 9});
 }
 
 TEST(AugmentedModel, InFloatDecaysWithinAQuarterOrIsRefused) {
@@ -295,12 +297,12 @@ TEST(AugmentedModel, WhatFollowsTheModelIsEstimatedToRounding) {
                              .sensor = 1,
                              .constants = 2,
                              .resonators = 1,
-                             .leaky = 1};
+                             .first_order = 1};
   const Settings<parts> settings{.plant = {12.0},
                                  .actuator = {0.02},
                                  .sensor = {0.004},
                                  .resonators = {{{150.0, 0.001}}},
-                                 .leaky = {0.5}};
+                                 .first_order = {0.5}};
   const AugmentedReference reference = reference_of<parts>(settings, 2.0);
   Truth truth(reference);
   truth[reference.c] = 3;
@@ -325,11 +327,12 @@ TEST(AugmentedModel, WhatFollowsTheModelIsEstimatedToRounding) {
       ASSERT_NEAR(z(row), truth.published(size_t(model.state_of_row(row))), 1e-6)
           << k << " " << row;
     }
-    const auto swing = model.swing(z, 0);
+    const auto swing = model.sinusoidal_disturbance(z, 0);
     ASSERT_NEAR(swing.amplitude * std::sin(swing.phase), static_cast<double>(truth[reference.q]),
                 1e-7);
     ASSERT_NEAR(model.constant(z), static_cast<double>(truth[reference.c]), 1e-7);
-    ASSERT_NEAR(model.fading(z, 0), static_cast<double>(truth[reference.fade]), 1e-7);
+    ASSERT_NEAR(model.first_order_disturbance(z, 0), static_cast<double>(truth[reference.fade]),
+                1e-7);
     ASSERT_NEAR(model.measured(z), truth.measured(), 1e-12);
   }
 }
@@ -339,12 +342,12 @@ TEST(AugmentedModel, RestIsWhereThePlantStands) {
                                      .actuator = {200.0},
                                      .sensor = {300.0},
                                      .resonators = {{{700.0}}},
-                                     .leaky = {0.3}};
+                                     .first_order = {0.3}};
   auto observer =
       ModelEso<all_parts>::make(
           {.observer_bandwidth = 200.0, .input_gain = -2.0, .sample_time = kT, .model = settings})
           .value();
-  ASSERT_EQ(observer.reset(observer.rest(5.0, 0.7)), StepStatus::ok);
+  ASSERT_EQ(observer.reset(observer.equilibrium(5.0, 0.7)), StepStatus::ok);
   const auto before = observer.estimate();
   EXPECT_EQ(before(0), 5.0);
   EXPECT_EQ(observer.model().measured(before), 5.0);
@@ -512,7 +515,7 @@ TEST(AugmentedModel, RefusesWhatMakesNoSense) {
                                  .actuator = {200.0},
                                  .sensor = {300.0},
                                  .resonators = {{{700.0}}},
-                                 .leaky = {0.3}};
+                                 .first_order = {0.3}};
   EXPECT_TRUE(AugmentedModel<all_parts>::make(good, 1.0, kT));
   const auto changed = [&](auto&& change) {
     auto settings = good;
@@ -529,8 +532,8 @@ TEST(AugmentedModel, RefusesWhatMakesNoSense) {
               "model.sensor.frequency: must be finite and positive");
     EXPECT_EQ(changed([&](auto& s) { s.resonators[0].frequency = bad; }),
               "model.resonators.frequency[0]: must be finite and positive");
-    EXPECT_EQ(changed([&](auto& s) { s.leaky[0] = bad; }),
-              "model.leaky[0]: must be finite and positive");
+    EXPECT_EQ(changed([&](auto& s) { s.first_order[0] = bad; }),
+              "model.first_order[0]: must be finite and positive");
   }
   EXPECT_EQ(changed([](auto& s) { s.sensor.frequency = 1.01e5; }),
             "model.sensor.frequency: must be at most a hundred times the sample rate");
@@ -549,9 +552,9 @@ TEST(AugmentedModel, RefusesWhatMakesNoSense) {
   }
   EXPECT_EQ(changed([](auto& s) { s.resonators[0].capture_bandwidth = -1; }),
             "model.resonators.capture_bandwidth[0]: must be finite and not negative");
-  EXPECT_EQ(changed([](auto& s) { s.leaky[0] = 1.01e-5; }), "accepted");
-  EXPECT_EQ(changed([](auto& s) { s.leaky[0] = 0.99e-5; }),
-            "model.leaky[0]: must be at least a hundredth of sample_time");
+  EXPECT_EQ(changed([](auto& s) { s.first_order[0] = 1.01e-5; }), "accepted");
+  EXPECT_EQ(changed([](auto& s) { s.first_order[0] = 0.99e-5; }),
+            "model.first_order[0]: must be at least a hundredth of sample_time");
   const auto sensor = [](double tau) {
     return refusal(AugmentedModel<sensor_parts>::make({.sensor = {tau}}, 1.0, kT));
   };
@@ -560,11 +563,12 @@ TEST(AugmentedModel, RefusesWhatMakesNoSense) {
             "model.sensor.time_constant: must be at least a hundredth of sample_time");
   EXPECT_EQ(sensor(-1.0), "model.sensor.time_constant: must be finite and positive");
   const auto fading = [](double first, double second) {
-    return refusal(AugmentedModel<ModelParts{.order = 1, .leaky = 2}>::make(
-        {.leaky = {first, second}}, 1.0, kT));
+    return refusal(AugmentedModel<ModelParts{.order = 1, .first_order = 2}>::make(
+        {.first_order = {first, second}}, 1.0, kT));
   };
   EXPECT_EQ(fading(0.3, 0.3004), "accepted");
-  EXPECT_EQ(fading(0.3, 0.3002), "model.leaky[1]: must differ by a thousandth of itself from");
+  EXPECT_EQ(fading(0.3, 0.3002),
+            "model.first_order[1]: must differ by a thousandth of itself from");
 
   const auto pair = [](double first, double second) {
     return AugmentedModel<swing_parts>::make({.resonators = {{{first}, {second}}}}, 1.0, kT);

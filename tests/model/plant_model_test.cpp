@@ -117,13 +117,13 @@ TEST(LinearPlantModel, FindsStatesThatAreNoneOfTheDerivatives) {
 template <int Sensor, class Lag>
 void equals_the_model_of_parts(const Lag& sensor) {
   constexpr ModelParts parts{
-      .order = 2, .sensor = Sensor, .constants = 2, .resonators = 2, .leaky = 1};
+      .order = 2, .sensor = Sensor, .constants = 2, .resonators = 2, .first_order = 1};
   constexpr ModelParts with_poles{.order = 2,
                                   .plant_poles = true,
                                   .sensor = Sensor,
                                   .constants = 2,
                                   .resonators = 2,
-                                  .leaky = 1};
+                                  .first_order = 1};
   const auto plant =
       LinearPlant<2>::chain({.coefficients = {-40.0, 7.0}, .input_gain = 3.0}).value();
   const std::array<esokit::Resonance<double>, 2> swings{{{50.0, 0.1, 30.0}, {120.0}}};
@@ -131,7 +131,7 @@ void equals_the_model_of_parts(const Lag& sensor) {
       {.observer_bandwidth = 80.0,
        .input_gain = 3.0,
        .sample_time = kT,
-       .model = {.plant = plant, .sensor = sensor, .resonators = swings, .leaky = {0.3}}});
+       .model = {.plant = plant, .sensor = sensor, .resonators = swings, .first_order = {0.3}}});
   ASSERT_TRUE(whole) << whole.error();
   auto made_of_parts = esokit::ModelEso<with_poles>::make({.observer_bandwidth = 80.0,
                                                            .input_gain = 3.0,
@@ -139,7 +139,7 @@ void equals_the_model_of_parts(const Lag& sensor) {
                                                            .model = {.plant = {-40.0, 7.0},
                                                                      .sensor = sensor,
                                                                      .resonators = swings,
-                                                                     .leaky = {0.3}}})
+                                                                     .first_order = {0.3}}})
                            .value();
   for (int i = 0; i < whole->size; ++i) {
     const auto at = static_cast<std::size_t>(i);
@@ -167,14 +167,15 @@ void equals_the_model_of_parts(const Lag& sensor) {
   const auto& model = made_of_parts.model();
   EXPECT_NEAR(whole->model().constant(z), model.constant(made_of_parts.estimate()),
               1e-7 * std::abs(whole->model().constant(z)));
-  EXPECT_NEAR(whole->model().swing(z, 1).amplitude,
-              model.swing(made_of_parts.estimate(), 1).amplitude,
-              1e-7 * whole->model().swing(z, 1).amplitude);
-  EXPECT_NEAR(whole->model().fading(z, 0), model.fading(made_of_parts.estimate(), 0),
-              1e-7 * std::abs(whole->model().fading(z, 0)));
+  EXPECT_NEAR(whole->model().sinusoidal_disturbance(z, 1).amplitude,
+              model.sinusoidal_disturbance(made_of_parts.estimate(), 1).amplitude,
+              1e-7 * whole->model().sinusoidal_disturbance(z, 1).amplitude);
+  EXPECT_NEAR(whole->model().first_order_disturbance(z, 0),
+              model.first_order_disturbance(made_of_parts.estimate(), 0),
+              1e-7 * std::abs(whole->model().first_order_disturbance(z, 0)));
   EXPECT_EQ(whole->model().measured(z), z(whole->size - std::max(Sensor, 1)));
-  const auto rest = whole->rest(3.0, 0.4);
-  const auto rest_of_parts = made_of_parts.rest(3.0, 0.4);
+  const auto rest = whole->equilibrium(3.0, 0.4);
+  const auto rest_of_parts = made_of_parts.equilibrium(3.0, 0.4);
   for (int i = 0; i < 3; ++i) EXPECT_NEAR(rest(i), rest_of_parts(i), 1e-12) << i;
   EXPECT_EQ(whole->model().measured(rest), 3.0);
 }
@@ -223,8 +224,11 @@ TEST(LinearPlantModel, FindsASwingAndAConstantThatEnterElsewhereBehindASensor) {
     for (int i = 0; i < 3; ++i) ASSERT_NEAR(state(i), x(i), 1e-7 * (1 + std::abs(x(i)))) << k;
     ASSERT_NEAR(model.constant(z), 7.0, 1e-5) << k;
     ASSERT_NEAR(model.disturbance(z), 7.0 + x(4), 1e-5) << k;
-    ASSERT_NEAR(model.swing(z, 0).amplitude, 3.0, 1e-5) << k;
-    ASSERT_NEAR(model.swing(z, 0).amplitude * std::sin(model.swing(z, 0).phase), x(4), 1e-5) << k;
+    ASSERT_NEAR(model.sinusoidal_disturbance(z, 0).amplitude, 3.0, 1e-5) << k;
+    ASSERT_NEAR(model.sinusoidal_disturbance(z, 0).amplitude *
+                    std::sin(model.sinusoidal_disturbance(z, 0).phase),
+                x(4), 1e-5)
+        << k;
     ASSERT_NEAR(observer.estimate()(0), (plant.c * state)(0), 1e-8) << k;
     ASSERT_NEAR(model.measured(z), x(6), 1e-8) << k;
   }
@@ -263,7 +267,7 @@ TEST(LinearPlantModel, AFilterFindsStatesAndDisturbance) {
     (void)filter->update((plant.c * state.head<3>())(0), 0.3);
   }
   EXPECT_NEAR(filter->model().disturbance(filter->estimate()), 7.0 + state(4), 1e-5);
-  EXPECT_NEAR(filter->model().swing(filter->estimate(), 0).amplitude, 3.0, 1e-5);
+  EXPECT_NEAR(filter->model().sinusoidal_disturbance(filter->estimate(), 0).amplitude, 3.0, 1e-5);
 }
 
 TEST(LinearPlantModel, AdrcTakesThePlantAsItIs) {
@@ -290,7 +294,7 @@ TEST(LinearPlantModel, RestIsWhereThePlantStands) {
                                  .sample_time = kT,
                                  .model = {plant}})
                       .value();
-  ASSERT_EQ(observer.reset(observer.rest(3.0, 0.4)), StepStatus::ok);
+  ASSERT_EQ(observer.reset(observer.equilibrium(3.0, 0.4)), StepStatus::ok);
   const auto before = observer.estimate();
   EXPECT_EQ(before(0), 3.0);
   EXPECT_NEAR(before(2), -0.4 * plant.input_gain(), 1e-12);
@@ -353,13 +357,13 @@ LinearPlant<3> with_notch(double w, double beside) {
 }
 
 TEST(LinearPlantModel, RefusesASwingBehindAZeroAtItsFrequency) {
-  using Model = LinearPlantModel<3, ModelParts{.order = 3, .resonators = 2, .leaky = 1}>;
+  using Model = LinearPlantModel<3, ModelParts{.order = 3, .resonators = 2, .first_order = 1}>;
   const double w = 30.0;
   const auto make = [&](double beside, double frequency, double damping = 0.0,
-                        double leaky = 0.123) {
+                        double first_order = 0.123) {
     return Model::make({.plant = with_notch(w, beside),
                         .resonators = {{{77.0}, {frequency, damping}}},
-                        .leaky = {leaky}},
+                        .first_order = {first_order}},
                        1.0, kT);
   };
   EXPECT_TRUE(make(0.0, 31.0));
@@ -387,7 +391,8 @@ TEST(LinearPlantModel, RefusesASwingBehindAZeroAtItsFrequency) {
                  .b;
   const auto swinging = [&](double damping) {
     return refusal(Model::make(
-        {.plant = damped, .resonators = {{{77.0}, {w, damping}}}, .leaky = {0.123}}, 1.0, kT));
+        {.plant = damped, .resonators = {{{77.0}, {w, damping}}}, .first_order = {0.123}}, 1.0,
+        kT));
   };
   EXPECT_EQ(swinging(0.2), refusal(answer));
   for (const double damping : {0.0, 0.19, 0.21}) EXPECT_EQ(swinging(damping), "accepted");
@@ -403,21 +408,22 @@ TEST(LinearPlantModel, RefusesASwingBehindAZeroAtItsFrequency) {
                 .value()
                 .b;
   const auto fading = [&](double tau) {
-    return Model::make({.plant = plant, .resonators = {{{77.0}, {20.0}}}, .leaky = {tau}}, 1.0, kT);
+    return Model::make({.plant = plant, .resonators = {{{77.0}, {20.0}}}, .first_order = {tau}},
+                       1.0, kT);
   };
   EXPECT_EQ(refusal(fading(0.25)),
-            "model.leaky[0]: hides a decaying disturbance behind a zero: the share that "
+            "model.first_order[0]: hides a decaying disturbance behind a zero: the share that "
             "y shows of it is below");
   EXPECT_TRUE(fading(0.26));
 }
 
 TEST(LinearPlantModel, RefusesPartsThatMakeNoSense) {
   using Model =
-      LinearPlantModel<3, ModelParts{.order = 2, .sensor = 2, .resonators = 2, .leaky = 1}>;
+      LinearPlantModel<3, ModelParts{.order = 2, .sensor = 2, .resonators = 2, .first_order = 1}>;
   Model::Settings settings{.plant = with_zero(),
                            .sensor = {200.0, 0.7},
                            .resonators = {{{20.0}, {40.0}}},
-                           .leaky = {0.5}};
+                           .first_order = {0.5}};
   const auto changed = [&](const auto& change) {
     auto other = settings;
     change(other);
@@ -432,8 +438,8 @@ TEST(LinearPlantModel, RefusesPartsThatMakeNoSense) {
             "model.resonators.frequency[0]: must be finite and positive");
   EXPECT_EQ(changed([](auto& s) { s.resonators[0].frequency = 3100.0; }),
             "model.resonators.frequency[0]: must be below half the sample rate");
-  EXPECT_EQ(changed([](auto& s) { s.leaky[0] = 0.9e-5; }),
-            "model.leaky[0]: must be at least a hundredth of sample_time");
+  EXPECT_EQ(changed([](auto& s) { s.first_order[0] = 0.9e-5; }),
+            "model.first_order[0]: must be at least a hundredth of sample_time");
   EXPECT_EQ(changed([](auto& s) { s.plant.a(1, 1) = std::nan(""); }), "a[4]: must be finite");
 }
 

@@ -62,7 +62,7 @@ enum class Without {
   estimate_of_row,
   total_disturbance,
   applied_input,
-  rest,
+  equilibrium,
   max_gap,
   input_gain,
   sample_time,
@@ -125,7 +125,9 @@ class Loop {
   S applied_input() const noexcept requires(W != Without::applied_input) {
     return truth_.applied_input();
   }
-  Estimate rest(S y, S u) const noexcept requires(W != Without::rest) { return truth_.rest(y, u); }
+  Estimate equilibrium(S y, S u) const noexcept requires(W != Without::equilibrium) {
+    return truth_.equilibrium(y, u);
+  }
   S input_gain() const noexcept requires(W != Without::input_gain) { return truth_.input_gain(); }
   S sample_time() const noexcept requires(W != Without::sample_time) {
     return truth_.sample_time();
@@ -250,7 +252,9 @@ class Predictable {
   S scaled_estimate() const noexcept requires(W != Without::scaled_estimate) {
     return truth_.scaled_estimate<Row>();
   }
-  Estimate rest(S y, S u) const noexcept requires(W != Without::rest) { return truth_.rest(y, u); }
+  Estimate equilibrium(S y, S u) const noexcept requires(W != Without::equilibrium) {
+    return truth_.equilibrium(y, u);
+  }
   S finite_probe(const esokit::Array<S, 3>& x) const noexcept { return truth_.finite_probe(x); }
   S input_gain() const noexcept requires(W != Without::input_gain) { return truth_.input_gain(); }
   S sample_time() const noexcept requires(W != Without::sample_time) {
@@ -326,7 +330,7 @@ static_assert(!LoopObserver<Loop<Without::estimate>>);
 static_assert(!LoopObserver<Loop<Without::estimate_of_row>>);
 static_assert(!LoopObserver<Loop<Without::total_disturbance>>);
 static_assert(!LoopObserver<Loop<Without::applied_input>>);
-static_assert(!LoopObserver<Loop<Without::rest>> && !LoopObserver<Loop<Without::max_gap>>);
+static_assert(!LoopObserver<Loop<Without::equilibrium>> && !LoopObserver<Loop<Without::max_gap>>);
 static_assert(!LoopObserver<Loop<Without::input_gain>>);
 static_assert(!LoopObserver<Loop<Without::sample_time>> && !LoopObserver<Loop<Without::missed>>);
 // An archetype is no more than its concept.

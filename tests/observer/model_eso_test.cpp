@@ -286,7 +286,7 @@ TEST(ModelSwing, BesideItsFrequencyItIsFarBelowAChainOfEqualNoise) {
 
 // ---- The parts of a disturbance.
 
-constexpr ModelParts read_parts{.order = 2, .constants = 2, .resonators = 2, .leaky = 1};
+constexpr ModelParts read_parts{.order = 2, .constants = 2, .resonators = 2, .first_order = 1};
 
 /// d = 3 + 0.5 t + 2 sin(90 t + 0.4) + 0.7 sin(25 t - 1) + 4 exp(-t / 0.8) on a double integrator:
 /// what `feed(y)` was fed with is what `disturbance_parts` of `reader` tells.
@@ -301,18 +301,18 @@ void reads_the_parts(const char* what, const Feed& feed, const Reader& reader, d
   }
   const auto parts = esokit::disturbance_parts(reader());
   EXPECT_NEAR(parts.constant, sign * (3 + 0.5 * t), 1e-5);
-  EXPECT_NEAR(parts.swings[0].amplitude, 2.0, 1e-6);
-  EXPECT_NEAR(parts.swings[1].amplitude, 0.7, 1e-6);
-  EXPECT_NEAR(std::sin(parts.swings[0].phase), sign * std::sin(90 * t + 0.4), 1e-6);
-  EXPECT_NEAR(std::cos(parts.swings[0].phase), sign * std::cos(90 * t + 0.4), 1e-6);
-  EXPECT_NEAR(std::sin(parts.swings[1].phase), sign * std::sin(25 * t - 1), 1e-6);
-  EXPECT_NEAR(parts.fading[0], sign * 4 * std::exp(-t / 0.8), 1e-5);
+  EXPECT_NEAR(parts.sinusoids[0].amplitude, 2.0, 1e-6);
+  EXPECT_NEAR(parts.sinusoids[1].amplitude, 0.7, 1e-6);
+  EXPECT_NEAR(std::sin(parts.sinusoids[0].phase), sign * std::sin(90 * t + 0.4), 1e-6);
+  EXPECT_NEAR(std::cos(parts.sinusoids[0].phase), sign * std::cos(90 * t + 0.4), 1e-6);
+  EXPECT_NEAR(std::sin(parts.sinusoids[1].phase), sign * std::sin(25 * t - 1), 1e-6);
+  EXPECT_NEAR(parts.first_order[0], sign * 4 * std::exp(-t / 0.8), 1e-5);
 }
 
 TEST(DisturbanceParts, AreReadThroughEveryObserverAdapterAndController) {
   using Model = AugmentedModel<read_parts>;
   using Eso = ModelEso<read_parts>;
-  const Model::Settings settings{.resonators = {{{90.0}, {25.0}}}, .leaky = {0.8}};
+  const Model::Settings settings{.resonators = {{{90.0}, {25.0}}}, .first_order = {0.8}};
   const Eso::Config config{
       .observer_bandwidth = 60.0, .input_gain = 1.0, .sample_time = kT, .model = settings};
   const auto check = [](const char* what, auto made) {
@@ -349,7 +349,7 @@ TEST(DisturbanceParts, AreReadThroughEveryObserverAdapterAndController) {
                                  .sample_time = kT,
                                  .model = {.plant = esokit::LinearPlant<2>::chain({}).value(),
                                            .resonators = settings.resonators,
-                                           .leaky = settings.leaky}}));
+                                           .first_order = settings.first_order}}));
   // A filter, which tells a ramp from what fades by its own weights only: their sum.
   using Filter =
       esokit::ExtendedStateFilter<2, double, Model::extension, esokit::NoNominalModel, 0, Model>;
@@ -365,8 +365,8 @@ TEST(DisturbanceParts, AreReadThroughEveryObserverAdapterAndController) {
   ASSERT_TRUE(recursive) << recursive.error();
   for (int k = 0; k < 300; ++k) (void)recursive->update(std::sin(0.1 * k), 0.3);
   const auto parts = esokit::disturbance_parts(*recursive);
-  double sum = parts.constant + parts.fading[0];
-  for (const auto& swing : parts.swings) sum += swing.amplitude * std::sin(swing.phase);
+  double sum = parts.constant + parts.first_order[0];
+  for (const auto& swing : parts.sinusoids) sum += swing.amplitude * std::sin(swing.phase);
   EXPECT_NEAR(sum, recursive->total_disturbance(), 1e-9 * std::abs(sum));
 }
 
@@ -699,7 +699,7 @@ TEST(ModelAnalysis, TheSystemIsTheObserver) {
 
 TEST(ModelSnapshots, KnowWhichModel) {
   EXPECT_NE(esokit::type_tag<Both>, esokit::type_tag<Lag>);
-  constexpr ModelParts other{.order = 1, .actuator = 1, .leaky = 1};  // of the size of Both
+  constexpr ModelParts other{.order = 1, .actuator = 1, .first_order = 1};  // of the size of Both
   static_assert(sizeof(ModelEso<other>) != 0);
   EXPECT_NE(esokit::type_tag<Both>, esokit::type_tag<ModelEso<other>>);
   EXPECT_NE((esokit::type_tag<AugmentedModel<both_parts, float>>),

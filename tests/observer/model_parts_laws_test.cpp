@@ -6,7 +6,8 @@
 
 namespace esokit_test {
 
-inline constexpr esokit::ModelParts lag_parts{.order = 1, .actuator = 1, .sensor = 1, .leaky = 1};
+inline constexpr esokit::ModelParts lag_parts{
+    .order = 1, .actuator = 1, .sensor = 1, .first_order = 1};
 inline constexpr esokit::ModelParts cascade_parts{
     .order = 1, .plant_poles = true, .actuator = 1, .sensor = 1};
 

@@ -59,7 +59,7 @@ struct ModelTraitsOf {
       config.input_gain = config.input_gain * static_cast<S>(lag);
     }
     if constexpr (parts.sensor == 1) config.model.sensor.time_constant = static_cast<S>(lag);
-    if constexpr (parts.leaky == 1) config.model.leaky = {S(1) / static_cast<S>(w)};
+    if constexpr (parts.first_order == 1) config.model.first_order = {S(1) / static_cast<S>(w)};
     return config;
   }
   /// What is measured, and stands where y does.

@@ -114,7 +114,7 @@ struct BigReference {
         size(of.size) {
     const std::size_t y = of.y, v = of.v, c = of.c, q = of.q, fade = of.fade;
     const std::size_t lf = y, n = v - y, la = c - v, order = n + la, m = q - c;
-    const std::size_t k = s.resonators.size(), l = s.leaky.size();
+    const std::size_t k = s.resonators.size(), l = s.first_order.size();
     if (lf == 1) {
       a[0][0] = -1 / Big(s.sensor[0]);
       a[0][y] = -a[0][0];
@@ -151,7 +151,7 @@ struct BigReference {
       a[q + 2 * i + 1][q + 2 * i] = -w;
       a[q + 2 * i + 1][q + 2 * i + 1] = -2 * w * Big(s.resonators[i][1]);
     }
-    for (std::size_t i = 0; i < l; ++i) a[fade + i][fade + i] = -1 / Big(s.leaky[i]);
+    for (std::size_t i = 0; i < l; ++i) a[fade + i][fade + i] = -1 / Big(s.first_order[i]);
 
     for (std::size_t i = 0; i < lf; ++i) published[i][i] = 1;
     BigMatrix row = big_zero(1, size + 1);
@@ -199,7 +199,7 @@ AugmentedReference::AugmentedReference(const esokit::ModelParts& parts, Augmente
       c(v + static_cast<std::size_t>(parts.actuator)),
       q(c + static_cast<std::size_t>(parts.constants)),
       fade(q + 2 * numbers.resonators.size()),
-      size(fade + numbers.leaky.size()),
+      size(fade + numbers.first_order.size()),
       parts_(parts),
       numbers_(std::move(numbers)),
       input_gain_(input_gain) {}

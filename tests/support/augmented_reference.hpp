@@ -20,7 +20,7 @@ using Table = std::vector<std::vector<long double>>;
 struct AugmentedNumbers {
   std::vector<double> plant, actuator, sensor;
   std::vector<std::array<double, 2>> resonators;  // frequency, damping
-  std::vector<double> leaky;
+  std::vector<double> first_order;
 };
 
 class AugmentedReference {
@@ -71,7 +71,7 @@ AugmentedReference reference_of(const esokit::PartsSettings<Parts, double>& sett
   for (const auto& swing : settings.resonators) {
     numbers.resonators.push_back({swing.frequency, swing.damping});
   }
-  numbers.leaky.assign(settings.leaky.begin(), settings.leaky.end());
+  numbers.first_order.assign(settings.first_order.begin(), settings.first_order.end());
   return AugmentedReference(Parts, numbers, input_gain);
 }
 

@@ -97,7 +97,7 @@ class ResonatorModel {
     }
     return sum;
   }
-  [[nodiscard]] Estimate rest(const S& y, const S& u) const noexcept {
+  [[nodiscard]] Estimate equilibrium(const S& y, const S& u) const noexcept {
     Estimate z = Estimate::Zero();
     z(0) = y;
     z(Order) = -(input_gain_ * u);

@@ -160,7 +160,7 @@ void step_observer(O& o, Signals& in, Played& out) {
   put(out, o.missed());
   put(out, o.max_gap());
   put(out, o.input_gain());
-  put(out, o.rest(S(1), S(2)));
+  put(out, o.equilibrium(S(1), S(2)));
   ESOKIT_ANSWER(restarts)
   ESOKIT_ANSWER(innovation)
   ESOKIT_ANSWER(gated)
@@ -307,7 +307,7 @@ Played play(T& object, const Calls& calls) {
     put(out, object.reset(S(0.25)));
   }
   for (int k = 0; k < 500; ++k) {
-    if constexpr (requires { object.rest(S(0), S(0)); }) {
+    if constexpr (requires { object.equilibrium(S(0), S(0)); }) {
       step_observer(object, in, out);
     } else {
       step_controller(object, in, out);

@@ -151,7 +151,7 @@ TEST(LoopCostTest, IsTheAnalysis) {
     }
     const double frequency = 30.0, amplitude = 3.0;
     auto swinging = model;
-    swinging.swings = {{frequency, amplitude, 0.0}};
+    swinging.sinusoids = {{frequency, amplitude, 0.0}};
     const auto swung = LoopCost(swinging, {}, 1.0, 200.0)(controller);
     const auto loop = closed_loop(model, controller).value();
     const auto response = frequency_response(loop.system(), frequency).value();
@@ -391,7 +391,7 @@ TEST(TuneTest, TheReadyControllerIsTheDesign) {
   };
   const std::string more = "knows: includes more than the lag: use the code of the design";
   EXPECT_EQ(refused([](TunedDesign& d) { d.knows.sensor = true; }), more);
-  EXPECT_EQ(refused([](TunedDesign& d) { d.knows.swing = true; }), more);
+  EXPECT_EQ(refused([](TunedDesign& d) { d.knows.sinusoid = true; }), more);
   const std::string alien = "design: was not made by tune for a model of this order";
   EXPECT_EQ(refused([](TunedDesign& d) { d = {}; }), alien);
   EXPECT_EQ(refused([](TunedDesign& d) { d.settings.gains.pop_back(); }), alien);
@@ -817,15 +817,15 @@ TEST(TuneTest, OrderThreeHasToStandFriction) {
   EXPECT_NE(tune(model).value().chosen(), nullptr);
   model.friction.reset();
   model.pole = 0.1 / model.latency();
-  const auto leaky = tune(model, {}, all).value();
+  const auto first_order = tune(model, {}, all).value();
   int kept = 0;
-  for (const TunedDesign& design : leaky.designs) {
+  for (const TunedDesign& design : first_order.designs) {
     if (!design.feasible) continue;
     EXPECT_GE(design.damping_latencies, 1.3 * 0.999 * 11.0) << design.name;
     if (!design.comes_back) continue;
     ++kept;
-    EXPECT_FALSE(esokit::swings_with_friction(leaky.model, design.controller)) << design.name;
-    for (const auto& variant : esokit::played_variants(leaky.model)) {
+    EXPECT_FALSE(esokit::swings_with_friction(first_order.model, design.controller)) << design.name;
+    for (const auto& variant : esokit::played_variants(first_order.model)) {
       for (const auto& event : esokit::played_events(variant.model)) {
         const auto played = esokit::play(
             variant.model, variant.gain, design.controller, event,
@@ -917,7 +917,7 @@ TEST(TuneTest, ReckonsWithAFloorOfTheDisturbance) {
   const esokit::TuneRules plain_rules{.play = esokit::TunePlay::none};
   const auto raised = tune(quiet, {.controller_bandwidth = 10.0}, plain_rules).value();
   EXPECT_NEAR(raised.model.filter_bandwidth() * quiet.latency(), 0.4, 1e-9);
-  EXPECT_EQ(raised.given_disturbance, quiet.disturbance);
+  EXPECT_EQ(raised.model_disturbance, quiet.disturbance);
   for (int order = 1; order <= 3; ++order) {
     TuneModel other = quiet;
     other.order = order;
@@ -1204,20 +1204,20 @@ TEST(TuneModelTest, RefusesWhatIsTooFarApart) {
     model.*c.member = c.bad;
     EXPECT_EQ(esokit_test::refusal(model.check()), c.rule);
   }
-  const auto swinging = [](const esokit::KnownSwing& swing) {
+  const auto swinging = [](const esokit::KnownSinusoid& swing) {
     TuneModel model = plain(1);
-    model.swings = {swing};
+    model.sinusoids = {swing};
     return esokit_test::refusal(model.check());
   };
   EXPECT_EQ(swinging({1e-6, 1e60, 0.0}), "accepted");
   EXPECT_EQ(swinging({0.9e-6, 1.0, 0.0}),
-            "swings.frequency[0]: must be at least 1e-9 of the sample rate");
+            "sinusoids.frequency[0]: must be at least 1e-9 of the sample rate");
   EXPECT_EQ(swinging({3101.0, 1.0, 0.0}),
-            "swings.frequency[0]: must be below half the sample rate");
-  EXPECT_EQ(swinging({1.0, 1.1e60, 0.0}), "swings.amplitude[0]: is too large: use another unit");
+            "sinusoids.frequency[0]: must be below half the sample rate");
+  EXPECT_EQ(swinging({1.0, 1.1e60, 0.0}), "sinusoids.amplitude[0]: is too large: use another unit");
   TuneModel two = plain(1);
-  two.swings.resize(2);
-  EXPECT_EQ(esokit_test::refusal(two.check()), "swings: must be one at most");
+  two.sinusoids.resize(2);
+  EXPECT_EQ(esokit_test::refusal(two.check()), "sinusoids: must be one at most");
   for (const double gain : {1e-20, -1e20, 0.9e-20, -1.1e20}) {
     TuneModel model = plain(1);
     model.input_gain = {gain, 0.0};

@@ -181,7 +181,7 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
         esokit::detail::in_words(esokit::play_events[2], model) + " and from " +
         esokit::detail::in_words(esokit::play_events[3], model) + ".");
   }
-  if (tuning->model.disturbance > 1.001 * tuning->given_disturbance) {
+  if (tuning->model.disturbance > 1.001 * tuning->model_disturbance) {
     design.summary_.push_back(
         "The disturbance of the log changes slowly: an observer with a bandwidth of " +
         number_text(model.filter_bandwidth(), 3) +

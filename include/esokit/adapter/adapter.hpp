@@ -82,8 +82,9 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
   }
   [[nodiscard]] constexpr int missed() const noexcept { return observer_.missed(); }
   [[nodiscard]] constexpr int max_gap() const noexcept { return observer_.max_gap(); }
-  [[nodiscard]] constexpr Estimate rest(const scalar_type& y, const scalar_type& u) const noexcept {
-    return observer_.rest(y, u);
+  [[nodiscard]] constexpr Estimate equilibrium(const scalar_type& y,
+                                               const scalar_type& u) const noexcept {
+    return observer_.equilibrium(y, u);
   }
 
   [[nodiscard]] constexpr bool restarts() const noexcept requires RestartingObserver<Observer> {

@@ -258,14 +258,15 @@ struct GuardedConfig {
 ///
 /// Requires a constant gain, on the chain or on an AugmentedModel with one constant, and must be
 /// the outermost adapter. KnownModel is excluded, because the proof does not cover fbar, and so are
-/// leaky parts (use `leak_time` instead), because a held constant next to a decaying one is
+/// first-order parts (use `leak_time` instead), because a held constant next to a decaying one is
 /// unstable.
 template <LoopObserver Observer>
 class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<Observer>> {
-  static_assert(observer_traits<Observer>.bears_guards,
-                "esokit: Guarded needs a constant gain on the chain of integrators: LinearEso, "
-                "CascadeEso and adapters of them, without KnownModel; or for LinearEso "
-                "with an AugmentedModel of one constant, without leaky parts or a varying speed");
+  static_assert(
+      observer_traits<Observer>.bears_guards,
+      "esokit: Guarded needs a constant gain on the chain of integrators: LinearEso, "
+      "CascadeEso and adapters of them, without KnownModel; or for LinearEso "
+      "with an AugmentedModel of one constant, without first-order parts or a varying speed");
   using Base = NamedAdapter<Guarded, Observer, GuardedConfig<Observer>>;
   friend Base;
   using Base::observer_;
@@ -427,13 +428,13 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
 
   /// Tells that something else holds the plant, until `release`: dhat is not corrected.
   /// @param u_applied the u that was held since the last sample
-  /// @return the u to give to the observer instead: on the chain `standing_input`; with a model the
+  /// @return the u to give to the observer instead: on the chain `holding_input`; with a model the
   ///         same u, for its actuator, while its prediction of y stands still
   S hold(const S& u_applied) noexcept requires gates {
     held_ = true;
     set_weights();
     if constexpr (on_chain) {
-      return standing_input();
+      return holding_input();
     } else {
       return u_applied;
     }
@@ -445,12 +446,12 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   }
 
   /// The u under which the plant would stand still if d were dhat.
-  [[nodiscard]] S standing_input() const noexcept requires gates {
+  [[nodiscard]] S holding_input() const noexcept requires gates {
     S from_d;
     if constexpr (on_chain) {
       from_d = -observer_.total_disturbance();
     } else {
-      from_d = detail::GuardAccess::innermost(observer_).model().standing_input(this->estimate());
+      from_d = detail::GuardAccess::innermost(observer_).model().holding_input(this->estimate());
     }
     const S u = from_d * (inverse_gain_ * input_factor_);
     return is_finite(u) ? u : applied_input();
@@ -581,8 +582,8 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     return detail::clipped(S(observer_.applied_input() * input_factor_));
   }
   /// The estimate for a plant at rest at y under a constant u, N x 1.
-  [[nodiscard]] Estimate rest(const S& y, const S& u) const noexcept {
-    return observer_.rest(y, S(u * gain_ratio_));
+  [[nodiscard]] Estimate equilibrium(const S& y, const S& u) const noexcept {
+    return observer_.equilibrium(y, S(u * gain_ratio_));
   }
   /// Sets the state as if `u` had been applied for a long time.
   template <class O = Observer>

@@ -442,7 +442,7 @@ class ControlLoop {
   template <class O>
   static void reset_to_rest(O& observer, const LaneScalar<S>& measured) noexcept {
     using One = LaneScalar<S>;
-    (void)observer.reset(observer.rest(measured, One(observer.applied_input())));
+    (void)observer.reset(observer.equilibrium(measured, One(observer.applied_input())));
   }
 
   void judge_missing() noexcept {

@@ -267,7 +267,7 @@ class MimoAdrc {
     // so that u does not jump.
     if (has(status, StepStatus::restarted)) [[unlikely]] {
       const S input = observer.applied_input();
-      (void)observer.reset(observer.rest(y, input));
+      (void)observer.reset(observer.equilibrium(y, input));
     }
   }
 

@@ -170,22 +170,22 @@ struct Identified {
   template <ModelParts Parts>
   [[nodiscard]] Expected<typename AugmentedModel<Parts>::Settings, Error<double>> model() const {
     static_assert(Parts.actuator <= 1, "esokit: identify finds a lag of first order");
-    static_assert(Parts.sensor == 0 && Parts.leaky == 0 && !Parts.follows_speed,
-                  "esokit: identify finds no sensor, no decaying parts and no speed");
+    static_assert(Parts.sensor == 0 && Parts.first_order == 0 && !Parts.follows_speed,
+                  "esokit: identify finds no sensor, no first-order disturbances and no speed");
     Rules<double> rules;
     rules.require(order == Parts.order,
                   {"order", static_cast<double>(order), "is not the requested order, which is", -1,
                    static_cast<double>(Parts.order), true});
-    const auto swings = static_cast<std::size_t>(Parts.resonators);
-    rules.require(sinusoids.size() >= swings, {"sinusoids", static_cast<double>(sinusoids.size()),
-                                               "were found, fewer than the requested resonators:",
-                                               -1, static_cast<double>(Parts.resonators), true});
+    const auto count = static_cast<std::size_t>(Parts.resonators);
+    rules.require(sinusoids.size() >= count, {"sinusoids", static_cast<double>(sinusoids.size()),
+                                              "were found, fewer than the requested resonators:",
+                                              -1, static_cast<double>(Parts.resonators), true});
     if (!rules) return rules.error();
     typename AugmentedModel<Parts>::Settings settings;
     if constexpr (Parts.plant_poles) settings.plant[Parts.order - 1] = pole.value;
     if constexpr (Parts.actuator == 1) settings.actuator.time_constant = lag.value;
     if constexpr (Parts.resonators > 0) {
-      for (std::size_t i = 0; i < swings; ++i) {
+      for (std::size_t i = 0; i < count; ++i) {
         settings.resonators[i].frequency = sinusoids[i].frequency.value;
       }
     }

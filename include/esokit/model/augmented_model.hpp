@@ -23,7 +23,8 @@ namespace detail {
 /// The order that a control law sees: that of the plant plus that of the actuator's lag.
 constexpr int law_order(const ModelParts& parts) noexcept { return parts.order + parts.actuator; }
 constexpr int model_size(const ModelParts& parts) noexcept {
-  return parts.sensor + law_order(parts) + parts.constants + 2 * parts.resonators + parts.leaky;
+  return parts.sensor + law_order(parts) + parts.constants + 2 * parts.resonators +
+         parts.first_order;
 }
 
 /// A state is its value in physical units times T^degree / degree!.
@@ -43,7 +44,7 @@ constexpr auto make_model_pattern() noexcept {
   constexpr auto m = static_cast<std::size_t>(Parts.constants);
   constexpr std::size_t order = n + la;
   constexpr std::size_t d = lf + order;
-  constexpr std::size_t first_leaky = d + m + 2 * static_cast<std::size_t>(Parts.resonators);
+  constexpr std::size_t first_decay = d + m + 2 * static_cast<std::size_t>(Parts.resonators);
   ModelPattern<static_cast<int>(size)> all{};
   auto& p = all.couples;
   // Nonzero elements of A and B.
@@ -56,10 +57,10 @@ constexpr auto make_model_pattern() noexcept {
   if (Parts.plant_poles || la > 0) p[d][size] = true;
   for (std::size_t j = d + 1; j < size; ++j) p[d][j] = j >= d + m || j <= d + la + 1;
   for (std::size_t i = 1; i + 1 < m; ++i) p[d + i][d + i + 1] = true;
-  for (std::size_t q = d + m; q < first_leaky; q += 2) {
+  for (std::size_t q = d + m; q < first_decay; q += 2) {
     p[q][q] = p[q][q + 1] = p[q + 1][q] = p[q + 1][q + 1] = true;
   }
-  for (std::size_t j = first_leaky; j < size; ++j) p[j][j] = true;
+  for (std::size_t j = first_decay; j < size; ++j) p[j][j] = true;
   // Elements that become nonzero in their powers.
   for (std::size_t k = 0; k < size; ++k) {
     for (std::size_t i = 0; i < size; ++i) {
@@ -128,12 +129,12 @@ struct PartsSettings {
   Lag<Parts.actuator, S> actuator{};                      ///< from u to v
   Lag<Parts.sensor, S> sensor{};                          ///< from y to what is measured
   Array<Resonance<S>, Parts.resonators> resonators{};     ///< the sines
-  Array<S, Parts.leaky> leaky{};               ///< time constants of the decaying parts, s
+  Array<S, Parts.first_order> first_order{};  ///< time constants of the first-order disturbances, s
   SpeedRange<Parts.follows_speed, S> speed{};  ///< of the resonators
 
   /// @cond
   static constexpr auto fields(auto& s) noexcept {
-    return detail::tie(s.plant, s.actuator, s.sensor, s.resonators, s.leaky, s.speed);
+    return detail::tie(s.plant, s.actuator, s.sensor, s.resonators, s.first_order, s.speed);
   }
   /// @endcond
 };
@@ -149,8 +150,8 @@ struct PartsSettings {
 /// with b = b0 / tau for a lag of first order, y^(n+2) = D + b u with b = b0 w^2 for one of second
 /// order. `estimate` is (y, .., y^(order-1), D, ..), where D is everything that a law cancels, so
 /// that any law works with it and omega_c keeps its meaning. After D come d', .. if there is more
-/// than one integrator, each sine q followed by q' / w, the decaying parts, and with a sensor the
-/// measured value (for order 2 also its derivative / w).
+/// than one integrator, each sine q followed by q' / w, the first-order disturbances, and with a
+/// sensor the measured value (for order 2 also its derivative / w).
 ///
 /// Poles: the actuator is simulated from u alone and never corrected, so it keeps its own poles; a
 /// sensor that is faster than omega_o also keeps its own; those of a sine go to -s +- j w0; all
@@ -170,7 +171,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   static_assert(n >= 1, "esokit: the plant order must be at least 1");
   static_assert(m >= 1, "esokit: at least one extended state is needed");
   static_assert(la >= 0 && la <= 2 && lf >= 0 && lf <= 2, "esokit: a lag has order 0, 1 or 2");
-  static_assert(Parts.resonators >= 0 && Parts.leaky >= 0,
+  static_assert(Parts.resonators >= 0 && Parts.first_order >= 0,
                 "esokit: the number of parts must not be negative");
 
  public:
@@ -188,7 +189,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
       .adds_levels = !Parts.plant_poles && lf == 0 && la == 0,
       .tells_disturbance = true,
       .corrects_part = true,
-      .tells_constant = m == 1 && Parts.leaky == 0 && !Parts.follows_speed,
+      .tells_constant = m == 1 && Parts.first_order == 0 && !Parts.follows_speed,
       .follows_speed = Parts.follows_speed,
   };
 
@@ -229,7 +230,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   [[nodiscard]] constexpr const Settings& settings() const noexcept { return settings_; }
 
   /// The estimate for a plant at rest at y under a constant u.
-  [[nodiscard]] constexpr Estimate rest(const S& y, const S& u) const noexcept {
+  [[nodiscard]] constexpr Estimate equilibrium(const S& y, const S& u) const noexcept {
     Estimate z = Estimate::Zero();
     z(0) = y;
     z(order) = -(input_gain_ * u);
@@ -289,23 +290,23 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   [[nodiscard]] static constexpr S measured(const Estimate& z) noexcept {
     return z(lf > 0 ? size - lf : 0);
   }
-  using Swing = esokit::Swing<S>;  ///< a sine by amplitude and phase
+  using Phasor = esokit::Phasor<S>;  ///< a sine by amplitude and phase
   /// The sine of resonator 0 .. k - 1.
-  [[nodiscard]] static Swing swing(const Estimate& z, int resonator) noexcept
+  [[nodiscard]] static Phasor sinusoidal_disturbance(const Estimate& z, int resonator) noexcept
       requires(Parts.resonators > 0) {
     const int q = order + m + 2 * resonator;
-    return detail::swing_of(z(q), z(q + 1));
+    return detail::phasor_of(z(q), z(q + 1));
   }
-  /// The decaying part 0 .. l - 1.
-  [[nodiscard]] static constexpr S fading(const Estimate& z, int part) noexcept
-      requires(Parts.leaky > 0) {
+  /// The first-order disturbance 0 .. l - 1.
+  [[nodiscard]] static constexpr S first_order_disturbance(const Estimate& z, int part) noexcept
+      requires(Parts.first_order > 0) {
     return z(order + m + 2 * Parts.resonators + part);
   }
   /// d, the sum of all its parts, unit of y^(n).
   [[nodiscard]] S disturbance(const Estimate& z) const noexcept {
     S sum = constant(z);
     for (int i = 0; i < Parts.resonators; ++i) sum = sum + z(order + m + 2 * i);
-    for (int i = 0; i < Parts.leaky; ++i) sum = sum + z(order + m + 2 * Parts.resonators + i);
+    for (int i = 0; i < Parts.first_order; ++i) sum = sum + z(order + m + 2 * Parts.resonators + i);
     return sum;
   }
   /// b0 v with the output v of the actuator, simulated from u; unit of y^(n).
@@ -392,7 +393,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   }
   /// b0 v under which the plant would stand still at its present y with the present d; unit of
   /// y^(n).
-  [[nodiscard]] S standing_input(const Estimate& z) const noexcept {
+  [[nodiscard]] S holding_input(const Estimate& z) const noexcept {
     S sum = -disturbance(z);
     if constexpr (Parts.plant_poles) sum = sum + settings_.plant[0] * z(0);
     return sum;
@@ -477,8 +478,8 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
         r = next_r;
       }
     }
-    for (int c = 0; c < Parts.leaky; ++c) {
-      const S rate = -time / settings.leaky[static_cast<std::size_t>(c)];
+    for (int c = 0; c < Parts.first_order; ++c) {
+      const S rate = -time / settings.first_order[static_cast<std::size_t>(c)];
       S power(1);
       for (int k = 0; k <= la + derivative; ++k) {
         if (k >= derivative) {
@@ -508,7 +509,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
     for (int j = d + 1; j < size; ++j)
       a(d, j) = others[static_cast<std::size_t>(j)] * detail::factorial_ratio<S>(n, order);
     for (int i = 1; i + 1 < m; ++i) a(d + i, d + i + 1) = number(n + i + 1);
-    detail::set_swing_rates(a, d + m, settings.resonators, settings.leaky, time);
+    detail::set_sinusoid_rates(a, d + m, settings.resonators, settings.first_order, time);
     return a;
   }
 
@@ -532,7 +533,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
                       "takes a resonator to half the sample rate");
       }
     }
-    detail::check_leaky(rules, settings.leaky, time);
+    detail::check_first_order(rules, settings.first_order, time);
     return rules;
   }
 
@@ -548,7 +549,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
     less.plant = settings_.plant;
     if constexpr (part_lf > 0) less.sensor = settings_.sensor;
     less.resonators = present().resonators;
-    less.leaky = settings_.leaky;
+    less.first_order = settings_.first_order;
     const auto with_input = Part::rates(less, sample_time_);
     Matrix<S, part_size, part_size> rates;
     for (int i = 0; i < part_size; ++i) {
@@ -638,6 +639,6 @@ class AugmentedModel<Parts, S> {
 template <ModelParts Parts, Scalar S>
 inline constexpr std::uint32_t type_tag<AugmentedModel<Parts, S>> =
     make_type_tag<S>("AugmentedModel", Parts.order, Parts.plant_poles, Parts.actuator, Parts.sensor,
-                     Parts.constants, Parts.resonators, Parts.leaky, Parts.follows_speed);
+                     Parts.constants, Parts.resonators, Parts.first_order, Parts.follows_speed);
 
 }  // namespace esokit

@@ -132,7 +132,7 @@ class ChainModel {
   }
 
   /// The estimate for a plant at rest at y under a constant u: (y, 0, .., 0, -b0 u, 0, ..).
-  [[nodiscard]] constexpr Estimate rest(const S& y, const S& u) const noexcept {
+  [[nodiscard]] constexpr Estimate equilibrium(const S& y, const S& u) const noexcept {
     Estimate state = Estimate::Zero();
     state(0) = y;
     state(Order) = -(input_gain_ * u);

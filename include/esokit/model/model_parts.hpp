@@ -20,7 +20,7 @@ struct ModelParts {
   int sensor = 0;              ///< order of the lag from y to the measured value: 0, 1 or 2
   int constants = 1;           ///< m: the disturbance has m integrators, at least one
   int resonators = 0;          ///< number of sines of known frequency in the disturbance
-  int leaky = 0;               ///< number of decaying parts, each with a time constant
+  int first_order = 0;         ///< number of first-order disturbances, each with a time constant
   bool follows_speed = false;  ///< one factor changes all frequencies of the resonators while
                                ///< running
 };
@@ -73,7 +73,7 @@ struct Resonance {
 
 /// A sine at the present time: q = amplitude sin(phase).
 template <PlainScalar S>
-struct Swing {
+struct Phasor {
   S amplitude;  ///< unit of the disturbance
   S phase;      ///< rad
 };
@@ -82,14 +82,14 @@ namespace detail {
 
 /// @param q the sine @param r the same sine a quarter period ahead
 template <PlainScalar S>
-Swing<S> swing_of(const S& q, const S& r) noexcept {
+Phasor<S> phasor_of(const S& q, const S& r) noexcept {
   return {std::hypot(q, r), std::atan2(q, r)};
 }
 
 /// Number of states of the disturbance: its integrators, two for each resonator, one for each
-/// decaying part.
+/// first-order disturbance.
 constexpr int disturbance_size(const ModelParts& parts) noexcept {
-  return parts.constants + 2 * parts.resonators + parts.leaky;
+  return parts.constants + 2 * parts.resonators + parts.first_order;
 }
 
 /// Coefficients of a lag of order l with denominator s^l + .. + a_0, in units of T: T^(l-i) a_i for
@@ -137,12 +137,12 @@ void set_sensor_rates(Matrix<S, Rows, Columns>& a, const Lag<Order, S>& sensor, 
   }
 }
 
-/// Writes T A of the resonators, two states each, and of the decaying parts, one each, from state
-/// `first` on.
-template <PlainScalar S, int Rows, int Columns, std::size_t Swings, std::size_t Leaks>
-void set_swing_rates(Matrix<S, Rows, Columns>& a, int first,
-                     const std::array<Resonance<S>, Swings>& resonators,
-                     const std::array<S, Leaks>& leaky, const S& time) {
+/// Writes T A of the resonators, two states each, and of the first-order disturbances, one each,
+/// from state `first` on.
+template <PlainScalar S, int Rows, int Columns, std::size_t Sines, std::size_t FirstOrders>
+void set_sinusoid_rates(Matrix<S, Rows, Columns>& a, int first,
+                        const std::array<Resonance<S>, Sines>& resonators,
+                        const std::array<S, FirstOrders>& first_order, const S& time) {
   int q = first;
   for (const auto& resonance : resonators) {
     const S w = resonance.frequency * time;
@@ -151,7 +151,7 @@ void set_swing_rates(Matrix<S, Rows, Columns>& a, int first,
     a(q + 1, q + 1) = S(-2) * resonance.damping * w;
     q += 2;
   }
-  for (const S& tau : leaky) {
+  for (const S& tau : first_order) {
     a(q, q) = -time / tau;
     ++q;
   }
@@ -189,11 +189,11 @@ Matrix<S, Order, Size> shown_by_sensor(const Lag<Order, S>& sensor, const S& tim
 }
 
 /// Real and imaginary part of the poles of the resonators, 1/s: -s +- j w0.
-template <PlainScalar S, std::size_t Swings>
-Array<Array<S, 2>, static_cast<int>(Swings)> own_pairs(
-    const std::array<Resonance<S>, Swings>& resonators) {
-  Array<Array<S, 2>, static_cast<int>(Swings)> pairs{};
-  for (std::size_t c = 0; c < Swings; ++c) {
+template <PlainScalar S, std::size_t Sines>
+Array<Array<S, 2>, static_cast<int>(Sines)> own_pairs(
+    const std::array<Resonance<S>, Sines>& resonators) {
+  Array<Array<S, 2>, static_cast<int>(Sines)> pairs{};
+  for (std::size_t c = 0; c < Sines; ++c) {
     const auto& resonance = resonators[c];
     const bool given = resonance.capture_bandwidth > S(0);
     pairs[c] = {-(given ? resonance.capture_bandwidth : resonance.frequency), resonance.frequency};
@@ -234,10 +234,10 @@ void check_sensor(Rules<S>& rules, const Lag<Order, S>& sensor, const S& time) {
             "model.sensor.damping", sensor, time);
 }
 
-template <PlainScalar S, std::size_t Swings>
-void check_resonators(Rules<S>& rules, const std::array<Resonance<S>, Swings>& resonators,
+template <PlainScalar S, std::size_t Sines>
+void check_resonators(Rules<S>& rules, const std::array<Resonance<S>, Sines>& resonators,
                       const S& time) {
-  for (std::size_t i = 0; i < Swings; ++i) {
+  for (std::size_t i = 0; i < Sines; ++i) {
     const auto& resonance = resonators[i];
     const auto c = static_cast<int>(i);
     rules.positive("model.resonators.frequency", resonance.frequency, c)
@@ -256,19 +256,20 @@ void check_resonators(Rules<S>& rules, const std::array<Resonance<S>, Swings>& r
   }
 }
 
-template <PlainScalar S, std::size_t Leaks>
-void check_leaky(Rules<S>& rules, const std::array<S, Leaks>& leaky, const S& time) {
-  for (std::size_t i = 0; i < Leaks; ++i) {
-    const S& tau = leaky[i];
+template <PlainScalar S, std::size_t FirstOrders>
+void check_first_order(Rules<S>& rules, const std::array<S, FirstOrders>& first_order,
+                       const S& time) {
+  for (std::size_t i = 0; i < FirstOrders; ++i) {
+    const S& tau = first_order[i];
     const auto c = static_cast<int>(i);
-    rules.positive("model.leaky", tau, c)
-        .require(tau * S(100) >= time, "model.leaky", tau,
+    rules.positive("model.first_order", tau, c)
+        .require(tau * S(100) >= time, "model.first_order", tau,
                  "must be at least a hundredth of sample_time", c);
     for (std::size_t before = 0; before < i; ++before) {
-      const S& other = leaky[before];
+      const S& other = first_order[before];
       rules.require(
           absolute(S(tau - other)) > S(1e-3) * tau,
-          {"model.leaky", tau, "must differ by a thousandth of itself from", c, other, true});
+          {"model.first_order", tau, "must differ by a thousandth of itself from", c, other, true});
     }
   }
 }

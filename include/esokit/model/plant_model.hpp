@@ -39,13 +39,13 @@ struct PlantShape {
     ModelPattern<size> all{};
     for (int i = 0; i < size; ++i) {
       for (int j = 0; j <= size; ++j) {
-        const int swing = first + Parts.constants;
-        const int fading = swing + 2 * Parts.resonators;
+        const int sinusoid = first + Parts.constants;
+        const int fading = sinusoid + 2 * Parts.resonators;
         bool couples = i < Parts.sensor || j >= Parts.sensor;
         if (i >= first + replaced) {
           couples = j < size && j >= first + replaced &&
-                    (i < swing    ? j > i && j < swing
-                     : i < fading ? j >= swing && (j - swing) / 2 == (i - swing) / 2
+                    (i < sinusoid ? j > i && j < sinusoid
+                     : i < fading ? j >= sinusoid && (j - sinusoid) / 2 == (i - sinusoid) / 2
                                   : j == i);
         }
         const auto row = static_cast<std::size_t>(i);
@@ -62,7 +62,7 @@ struct PlantShape {
 
 /// x' = A x + B u + E d, y = C x: a plant with zeros, known poles, or a disturbance that does not
 /// enter where u does (mismatched), sampled exactly. d is the sum of a constant (or polynomial),
-/// sines and decaying parts; y may be measured through a sensor with a lag.
+/// sines and first-order disturbances; y may be measured through a sensor with a lag.
 ///
 /// y^(n) = D + b u, where n is the relative degree from u to y. `estimate` is (y, .., y^(n-1), D,
 /// ..), where D is everything that a law cancels, so that `Adrc` works with it; `plant_state` and
@@ -73,7 +73,7 @@ struct PlantShape {
 /// DelayedInput; write an actuator into A. Poles: as for AugmentedModel, with all poles of the
 /// plant (an actuator, too) at exp(-omega_o T).
 /// @tparam States length of x @tparam Parts uses `order` (the relative degree from u to y),
-/// `sensor`, `constants`, `resonators` and `leaky`; everything else is in the plant
+/// `sensor`, `constants`, `resonators` and `first_order`; everything else is in the plant
 template <int States, ModelParts Parts, PlainScalar S = double>
 class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S> {
   using Shape = detail::PlantShape<States, Parts>;
@@ -84,7 +84,7 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
   static_assert(n >= 1 && n <= States, "esokit: the relative degree is 1 .. States");
   static_assert(Parts.constants >= 1, "esokit: at least one extended state is needed");
   static_assert(lf >= 0 && lf <= 2, "esokit: a lag has order 0, 1 or 2");
-  static_assert(Parts.resonators >= 0 && Parts.leaky >= 0,
+  static_assert(Parts.resonators >= 0 && Parts.first_order >= 0,
                 "esokit: the number of parts must not be negative");
   static_assert(Parts.actuator == 0 && !Parts.plant_poles,
                 "esokit: actuator and poles of a LinearPlantModel are in its plant");
@@ -107,7 +107,8 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
     LinearPlant<States, S> plant{};                      ///< A, B, C and, for d, E
     Lag<lf, S> sensor{};                                 ///< from y to what is measured
     Array<Resonance<S>, Parts.resonators> resonators{};  ///< sines of d
-    Array<S, Parts.leaky> leaky{};  ///< time constants of the decaying parts, s
+    Array<S, Parts.first_order>
+        first_order{};  ///< time constants of the first-order disturbances, s
   };
 
   /// Checks the plant and samples it with its disturbance.
@@ -127,7 +128,7 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
                  "must be 0: a delay of u is DelayedInput's");
     detail::check_sensor(rules, settings.sensor, sample_time);
     detail::check_resonators(rules, settings.resonators, sample_time);
-    detail::check_leaky(rules, settings.leaky, sample_time);
+    detail::check_first_order(rules, settings.first_order, sample_time);
     if (!rules) return rules.error();
     const S seen = shown_share(plant, sample_time);
     constexpr S least = S(1024) * std::numeric_limits<S>::epsilon();
@@ -150,10 +151,10 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
              "hides a sine behind a zero: the share that y shows of it is below", -(damping * w),
              w * std::sqrt(S(1) - damping * damping));
     }
-    for (std::size_t i = 0; i < settings.leaky.size(); ++i) {
-      passes("model.leaky", static_cast<int>(i),
+    for (std::size_t i = 0; i < settings.first_order.size(); ++i) {
+      passes("model.first_order", static_cast<int>(i),
              "hides a decaying disturbance behind a zero: the share that y shows of it is below",
-             S(-1) / settings.leaky[i], S(0));
+             S(-1) / settings.first_order[i], S(0));
     }
     if (!rules) return rules.error();
     LinearPlantModel model(settings, input_gain, sample_time);
@@ -169,7 +170,7 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
   [[nodiscard]] constexpr const Settings& settings() const noexcept { return settings_; }
 
   /// The estimate for a plant at rest at y under a constant u.
-  [[nodiscard]] Estimate rest(const S& y, const S& u) const noexcept {
+  [[nodiscard]] Estimate equilibrium(const S& y, const S& u) const noexcept {
     return rest_of_y_ * y + rest_of_u_ * u;
   }
 
@@ -188,21 +189,22 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
   [[nodiscard]] S disturbance(const Estimate& z) const noexcept {
     const auto natural = natural_of(z);
     S sum = natural(States);
-    for (int j = 0; j < Parts.resonators; ++j) sum = sum + natural(swings + 2 * j);
-    for (int j = 0; j < Parts.leaky; ++j) sum = sum + natural(swings + 2 * Parts.resonators + j);
+    for (int j = 0; j < Parts.resonators; ++j) sum = sum + natural(sinusoids + 2 * j);
+    for (int j = 0; j < Parts.first_order; ++j)
+      sum = sum + natural(sinusoids + 2 * Parts.resonators + j);
     return sum;
   }
   /// The constant (or polynomial) part of d.
   [[nodiscard]] S constant(const Estimate& z) const noexcept { return natural_of(z)(States); }
   /// The sine of resonator 0 .. k - 1 in d.
-  [[nodiscard]] static Swing<S> swing(const Estimate& z, int resonator) noexcept
+  [[nodiscard]] static Phasor<S> sinusoidal_disturbance(const Estimate& z, int resonator) noexcept
       requires(Parts.resonators > 0) {
-    return detail::swing_of(z(swings + 2 * resonator), z(swings + 2 * resonator + 1));
+    return detail::phasor_of(z(sinusoids + 2 * resonator), z(sinusoids + 2 * resonator + 1));
   }
-  /// The decaying part 0 .. l - 1 of d.
-  [[nodiscard]] static constexpr S fading(const Estimate& z, int part) noexcept
-      requires(Parts.leaky > 0) {
-    return z(swings + 2 * Parts.resonators + part);
+  /// The first-order disturbance 0 .. l - 1 of d.
+  [[nodiscard]] static constexpr S first_order_disturbance(const Estimate& z, int part) noexcept
+      requires(Parts.first_order > 0) {
+    return z(sinusoids + 2 * Parts.resonators + part);
   }
   /// @}
 
@@ -269,7 +271,7 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
   }
 
  private:
-  static constexpr int swings = States + Parts.constants;  ///< first row of the sines
+  static constexpr int sinusoids = States + Parts.constants;  ///< first row of the sines
   using Square = Matrix<S, inner, inner>;
 
   /// C adj(s I - A) E, whose roots are the zeros from d to y, and for each coefficient the sum of
@@ -330,12 +332,12 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
       for (int j = 0; j < States; ++j) a(i, j) = plant.a(i, j) * time;
       const S e = plant.e(i) * time;
       a(i, States) = e;
-      for (int j = 0; j < Parts.resonators; ++j) a(i, swings + 2 * j) = e;
-      for (int j = 0; j < Parts.leaky; ++j) a(i, swings + 2 * Parts.resonators + j) = e;
+      for (int j = 0; j < Parts.resonators; ++j) a(i, sinusoids + 2 * j) = e;
+      for (int j = 0; j < Parts.first_order; ++j) a(i, sinusoids + 2 * Parts.resonators + j) = e;
       a(i, inner) = plant.b(i) * scale * time;
     }
-    for (int i = States; i + 1 < swings; ++i) a(i, i + 1) = time;
-    detail::set_swing_rates(a, swings, settings.resonators, settings.leaky, time);
+    for (int i = States; i + 1 < sinusoids; ++i) a(i, i + 1) = time;
+    detail::set_sinusoid_rates(a, sinusoids, settings.resonators, settings.first_order, time);
     return a;
   }
 
@@ -522,6 +524,6 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
 template <int States, ModelParts Parts, PlainScalar S>
 inline constexpr std::uint32_t type_tag<LinearPlantModel<States, Parts, S>> =
     make_type_tag<S>("LinearPlantModel", States, Parts.order, Parts.sensor, Parts.constants,
-                     Parts.resonators, Parts.leaky);
+                     Parts.resonators, Parts.first_order);
 
 }  // namespace esokit

@@ -40,7 +40,7 @@ struct ModelTraits {
 
   /// The disturbance has one constant, which is separate from its other parts and from the effect
   /// of the actuator: `constant_row()`, `constant_column()`, `actuator_rows()`,
-  /// `scaled_constant(d)`, `standing_input(z)`, see AugmentedModel. Guarded holds, gates, bounds
+  /// `scaled_constant(d)`, `holding_input(z)`, see AugmentedModel. Guarded holds, gates, bounds
   /// and leaks this constant.
   bool tells_constant = false;
 
@@ -66,7 +66,7 @@ struct NoModelSettings {};
 /// - `physical(x)`, `physical<Row>(x)`, `scaled(estimate)`, `rescaled(x, before)`: conversions
 ///   (`before`: the model that was in use until now); `scaled_disturbance(d)`, `same_drive(before)`
 /// - `finite_probe(x)`: finite only if all estimates are finite
-/// - `rest(y, u)`: the estimate for a plant at rest at y under a constant u
+/// - `equilibrium(y, u)`: the estimate for a plant at rest at y under a constant u
 /// - `state_of_row(r)`: place of row r of the estimate among the states; state 0 is the measured
 ///   value (row 0, unless there is a sensor's lag)
 /// - `increment()`: Phi - I, N x N, for the design; `degree(r)`: the power of T in the scaling of
@@ -89,7 +89,7 @@ concept SampledModel = std::copyable<Model> && DeclaresTraits<Model, ModelTraits
   { model.scaled_disturbance(s) } -> std::convertible_to<S>;
   { model.same_drive(model) } -> std::same_as<bool>;
   { model.finite_probe(x) } -> std::convertible_to<S>;
-  { model.rest(s, s) } -> std::same_as<typename Model::Estimate>;
+  { model.equilibrium(s, s) } -> std::same_as<typename Model::Estimate>;
   { model.increment() } -> std::same_as<Matrix<S, Model::size, Model::size>>;
   { Model::degree(0) } -> std::same_as<int>;
   { Model::state_of_row(0) } -> std::same_as<int>;

@@ -286,7 +286,7 @@ concept LoopObserver = std::copyable<O> && PlainScalar<LaneScalar<typename O::sc
   { constant.template estimate<0>() } -> std::convertible_to<typename O::scalar_type>;
   { constant.total_disturbance() } -> std::convertible_to<typename O::scalar_type>;
   { constant.applied_input() } -> std::convertible_to<typename O::scalar_type>;
-  { constant.rest(s, s) } -> std::same_as<typename O::Estimate>;
+  { constant.equilibrium(s, s) } -> std::same_as<typename O::Estimate>;
   { constant.input_gain() } -> std::convertible_to<typename O::scalar_type>;
   { constant.sample_time() } -> std::convertible_to<typename O::scalar_type>;
   { constant.missed() } -> std::convertible_to<Lanes<int, typename O::scalar_type>>;
@@ -373,7 +373,7 @@ concept PredictableObserver = std::copyable<O> && Scalar<typename O::scalar_type
   { observer.reset(state) } -> std::same_as<StatusOf<typename O::scalar_type>>;
   { constant.estimate() } -> std::same_as<typename O::Estimate>;
   { constant.template scaled_estimate<0>() } -> std::convertible_to<typename O::scalar_type>;
-  { constant.rest(s, s) } -> std::same_as<typename O::Estimate>;
+  { constant.equilibrium(s, s) } -> std::same_as<typename O::Estimate>;
   { constant.input_gain() } -> std::convertible_to<typename O::scalar_type>;
   { constant.sample_time() } -> std::convertible_to<typename O::scalar_type>;
   { constant.missed() } -> std::convertible_to<Lanes<int, typename O::scalar_type>>;

@@ -122,9 +122,10 @@ template <class Model>
 struct DisturbanceParts {
   using S = std::remove_cvref_t<decltype(std::declval<const Model&>().sample_time())>;  ///< scalar
 
-  S constant{};                                     ///< the constant or polynomial part
-  Array<Swing<S>, Model::parts.resonators> swings;  ///< each sine: constant() + a sin(phase) + ..
-  Array<S, Model::parts.leaky> fading;              ///< the decaying parts
+  S constant{};  ///< the constant or polynomial part
+  Array<Phasor<S>, Model::parts.resonators>
+      sinusoids;                                   ///< each sine: constant() + a sin(phase) + ..
+  Array<S, Model::parts.first_order> first_order;  ///< the first-order disturbances
 };
 
 /// The parts of the disturbance, as estimated by an observer with a model of parts. The observer
@@ -146,12 +147,12 @@ template <class Observer>
     parts.constant = model.constant(z);
     if constexpr (Model::parts.resonators > 0) {
       for (int i = 0; i < Model::parts.resonators; ++i) {
-        parts.swings[static_cast<std::size_t>(i)] = model.swing(z, i);
+        parts.sinusoids[static_cast<std::size_t>(i)] = model.sinusoidal_disturbance(z, i);
       }
     }
-    if constexpr (Model::parts.leaky > 0) {
-      for (int i = 0; i < Model::parts.leaky; ++i) {
-        parts.fading[static_cast<std::size_t>(i)] = model.fading(z, i);
+    if constexpr (Model::parts.first_order > 0) {
+      for (int i = 0; i < Model::parts.first_order; ++i) {
+        parts.first_order[static_cast<std::size_t>(i)] = model.first_order_disturbance(z, i);
       }
     }
     return parts;

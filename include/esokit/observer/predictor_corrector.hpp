@@ -365,8 +365,8 @@ class PredictorCorrector {
 
   /// The estimate for a plant at rest at y under a constant u, N x 1, physical units: the start of
   /// a controller.
-  [[nodiscard]] constexpr Estimate rest(const S& y, const S& u) const noexcept {
-    return model_.rest(y, u);
+  [[nodiscard]] constexpr Estimate equilibrium(const S& y, const S& u) const noexcept {
+    return model_.equilibrium(y, u);
   }
 
   /// A number that is finite only if the estimate that belongs to x is finite. @param x scaled

@@ -14,7 +14,7 @@ StepStatus start_at_rest(Observer& observer, const S& y, const S& u) noexcept {
   if constexpr (observer_traits<Observer>.delays_input) next.fill_input(u);
   // Stores the input, which `revise_input` and a change of b0 need.
   (void)next.predict(u);
-  const StepStatus status = next.reset(next.rest(y, u));
+  const StepStatus status = next.reset(next.equilibrium(y, u));
   if (status == StepStatus::ok) observer = next;
   return status;
 }

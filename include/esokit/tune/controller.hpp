@@ -90,7 +90,7 @@ Check<double> with_controller(const TuneModel& model, const TunedDesign& design,
       .require(model.order == Order,
                {"order", static_cast<double>(model.order), "is not the requested order, which is",
                 -1, static_cast<double>(Order), true})
-      .require(!design.knows.sensor && !design.knows.swing, "knows", 1.0,
+      .require(!design.knows.sensor && !design.knows.sinusoid, "knows", 1.0,
                "includes more than the lag: use the code of the design")
       .require(
           static_cast<int>(design.settings.gains.size()) == Order + (design.knows.lag ? 1 : 0) &&

@@ -35,12 +35,12 @@ enum class TuneFamily : unsigned char {
 
 /// What the observer of a family knows besides the chain.
 struct TuneKnowledge {
-  bool lag = false;     ///< lag of the actuator
-  bool sensor = false;  ///< lag of the sensor
-  bool swing = false;   ///< the frequency of a sine in the disturbance
+  bool lag = false;       ///< lag of the actuator
+  bool sensor = false;    ///< lag of the sensor
+  bool sinusoid = false;  ///< the frequency of a sine in the disturbance
 
   /// True if it knows anything.
-  [[nodiscard]] constexpr bool any() const noexcept { return lag || sensor || swing; }
+  [[nodiscard]] constexpr bool any() const noexcept { return lag || sensor || sinusoid; }
   /// True if all members are equal.
   friend constexpr bool operator==(const TuneKnowledge&, const TuneKnowledge&) = default;
 };
@@ -185,7 +185,7 @@ typename AugmentedModel<Parts>::Settings model_settings(const TuneModel& model,
   if constexpr (Parts.actuator == 1) settings.actuator.time_constant = model.lag;
   if constexpr (Parts.sensor == 1) settings.sensor.time_constant = model.sensor;
   if constexpr (Parts.resonators == 1) {
-    settings.resonators[0] = {model.swings.front().frequency, 0.0, chosen.capture_bandwidth};
+    settings.resonators[0] = {model.sinusoids.front().frequency, 0.0, chosen.capture_bandwidth};
   }
   return settings;
 }

@@ -251,8 +251,8 @@ class LoopCost {
     }
     add(std::numbers::pi / T_, 0.0, 0.0);
     walked_ = points_.size();
-    for (const KnownSwing& swing : model.swings) {
-      add(swing.frequency, 0.0, 0.5 * swing.amplitude * swing.amplitude);
+    for (const KnownSinusoid& sinusoid : model.sinusoids) {
+      add(sinusoid.frequency, 0.0, 0.5 * sinusoid.amplitude * sinusoid.amplitude);
     }
   }
 

@@ -15,7 +15,7 @@
 namespace esokit {
 
 /// A sinusoidal disturbance of known frequency.
-struct KnownSwing {
+struct KnownSinusoid {
   double frequency = 0.0;          ///< w0, rad/s
   double amplitude = 0.0;          ///< unit of y^(n)
   double capture_bandwidth = 0.0;  ///< of an observer that knows it, see Resonance; 0: w0
@@ -27,20 +27,20 @@ struct KnownSwing {
 ///
 /// y_s is measured with white noise; d is a random walk, plus a sine if one is given.
 struct TuneModel {
-  int order = 1;                     ///< n, 1 to 3
-  Estimate input_gain{};             ///< b0 with its interval, unit of y^(n) per unit of u
-  double pole = 0.0;                 ///< a, 1/s
-  double lag = 0.0;                  ///< tau, s; 0: none
-  double dead_time = 0.0;            ///< L, s
-  double latency_half_width = 0.0;   ///< possible increase of tau + L, s
-  double lag_half_width = 0.0;       ///< possible error of tau at the same tau + L, s
-  double sensor = 0.0;               ///< tau_s, s; 0: none
-  double noise = 0.0;                ///< standard deviation of the measurement noise, unit of y
-  double disturbance = 0.0;          ///< q: variance of the increments of d per time
-  std::vector<KnownSwing> swings{};  ///< none or one
-  double sample_time = 0.0;          ///< T of the controller, s
-  double u_min = 0.0;                ///< limits of the actuator
-  double u_max = 0.0;                ///< upper limit, above u_min
+  int order = 1;                    ///< n, 1 to 3
+  Estimate input_gain{};            ///< b0 with its interval, unit of y^(n) per unit of u
+  double pole = 0.0;                ///< a, 1/s
+  double lag = 0.0;                 ///< tau, s; 0: none
+  double dead_time = 0.0;           ///< L, s
+  double latency_half_width = 0.0;  ///< possible increase of tau + L, s
+  double lag_half_width = 0.0;      ///< possible error of tau at the same tau + L, s
+  double sensor = 0.0;              ///< tau_s, s; 0: none
+  double noise = 0.0;               ///< standard deviation of the measurement noise, unit of y
+  double disturbance = 0.0;         ///< q: variance of the increments of d per time
+  std::vector<KnownSinusoid> sinusoids{};  ///< none or one
+  double sample_time = 0.0;                ///< T of the controller, s
+  double u_min = 0.0;                      ///< limits of the actuator
+  double u_max = 0.0;                      ///< upper limit, above u_min
   /// Order 3: Coulomb friction on y'', unit of y''; 0: none. Left out: not known, and the design is
   /// played with up to a quarter of what half the range of u makes of y'' in ten latencies.
   std::optional<double> friction{};
@@ -101,7 +101,7 @@ struct TuneModel {
         .require(is_finite(u_min), "u_min", u_min, "must be finite")
         .require(is_finite(u_max), "u_max", u_max, "must be finite")
         .require(u_min < u_max, "u_max", u_max, "must be above u_min")
-        .require(swings.size() <= 1, "swings", static_cast<double>(swings.size()),
+        .require(sinusoids.size() <= 1, "sinusoids", static_cast<double>(sinusoids.size()),
                  "must be one at most")
         .require(!(dead_time > 100.0 * sample_time), "dead_time", dead_time,
                  "must not be above 100 samples")
@@ -124,17 +124,17 @@ struct TuneModel {
     // Beyond this limit the criterion is a difference of numbers that agree to the last digit.
     rules.require(filter_bandwidth() * sample_time >= 1e-6, "disturbance", disturbance,
                   "is so small for this noise that an observer would need a million samples");
-    for (std::size_t i = 0; i < swings.size(); ++i) {
+    for (std::size_t i = 0; i < sinusoids.size(); ++i) {
       const int index = static_cast<int>(i);
-      rules.positive("swings.frequency", swings[i].frequency, index)
-          .require(swings[i].frequency * sample_time < 3.1, "swings.frequency", swings[i].frequency,
-                   "must be below half the sample rate", index)
-          .require(swings[i].frequency * sample_time >= 1e-9, "swings.frequency",
-                   swings[i].frequency, "must be at least 1e-9 of the sample rate", index)
-          .not_negative("swings.amplitude", swings[i].amplitude, index)
-          .require(!(swings[i].amplitude > 1e60), "swings.amplitude", swings[i].amplitude,
+      rules.positive("sinusoids.frequency", sinusoids[i].frequency, index)
+          .require(sinusoids[i].frequency * sample_time < 3.1, "sinusoids.frequency",
+                   sinusoids[i].frequency, "must be below half the sample rate", index)
+          .require(sinusoids[i].frequency * sample_time >= 1e-9, "sinusoids.frequency",
+                   sinusoids[i].frequency, "must be at least 1e-9 of the sample rate", index)
+          .not_negative("sinusoids.amplitude", sinusoids[i].amplitude, index)
+          .require(!(sinusoids[i].amplitude > 1e60), "sinusoids.amplitude", sinusoids[i].amplitude,
                    "is too large: use another unit", index)
-          .not_negative("swings.capture_bandwidth", swings[i].capture_bandwidth, index);
+          .not_negative("sinusoids.capture_bandwidth", sinusoids[i].capture_bandwidth, index);
     }
     return rules;
   }

@@ -89,7 +89,7 @@ struct TunedDesign {
 struct Tuning {
   TuneModel model{};               ///< as given, with at least the disturbance of the floor
   TuneRules rules{};               ///< as given
-  double given_disturbance = 0.0;  ///< that of the given model; model.disturbance may be larger
+  double model_disturbance = 0.0;  ///< that of the given model; model.disturbance may be larger
   double rho = 0.0;                ///< weight of var(b0 u~) in J
   double control_noise = 0.0;  ///< the required value, unit of u; 0 if something else was required
   double settling_time = 0.0;  ///< the required value, s; 0 if something else was required
@@ -165,13 +165,13 @@ inline int update_instructions(int order, TuneFamily family, int extension, int 
   const auto n = static_cast<std::size_t>(order - 1);
   constexpr int chain[3][2] = {{27, 39}, {39, 50}, {50, 63}};
   constexpr int cascade[3][2] = {{43, 57}, {58, 83}, {76, 115}};
-  constexpr int lag[3] = {45, 61, 80}, sensor[3] = {41, 56, 75}, swing[3] = {57, 74, 92};
-  constexpr int lag_sensor[3] = {63, 82, 102}, lag_swing[3] = {80, 103, 124};
+  constexpr int lag[3] = {45, 61, 80}, sensor[3] = {41, 56, 75}, sinusoid[3] = {57, 74, 92};
+  constexpr int lag_sensor[3] = {63, 82, 102}, lag_sinusoid[3] = {80, 103, 124};
   if (knows.lag && knows.sensor) return lag_sensor[n];
-  if (knows.lag && knows.swing) return lag_swing[n];
+  if (knows.lag && knows.sinusoid) return lag_sinusoid[n];
   if (knows.lag) return lag[n];
   if (knows.sensor) return sensor[n];
-  if (knows.swing) return swing[n];
+  if (knows.sinusoid) return sinusoid[n];
   if (levels > 1) return cascade[n][static_cast<std::size_t>(levels - 2)];
   return chain[n][static_cast<std::size_t>(extension - 1)] + (family == TuneFamily::filter ? 9 : 0);
 }
@@ -271,8 +271,8 @@ struct TuneSearch {
       s.observer_bandwidth = at(0);
     }
     if (c.design.family == TuneFamily::cascade) s.bandwidth_factor = 1.0 + at(1);
-    if (c.design.knows.swing) {
-      const double given = model.swings.front().capture_bandwidth;
+    if (c.design.knows.sinusoid) {
+      const double given = model.sinusoids.front().capture_bandwidth;
       s.capture_bandwidth = given > 0.0 ? given : at(1);
     }
     const int law = c.observer_numbers;
@@ -385,18 +385,18 @@ struct TuneSearch {
     return c.design.family == TuneFamily::cascade && i == 1;
   }
   [[nodiscard]] bool capture(const Contender& c, std::size_t i) const {
-    return c.design.knows.swing && c.observer_numbers == 2 && i == 1;
+    return c.design.knows.sinusoid && c.observer_numbers == 2 && i == 1;
   }
   [[nodiscard]] double low(const Contender& c, std::size_t i) const {
     return std::log(damping(c, i)   ? 0.2
                     : factor(c, i)  ? 0.1
-                    : capture(c, i) ? 0.003 * model.swings.front().frequency
+                    : capture(c, i) ? 0.003 * model.sinusoids.front().frequency
                                     : slowest());
   }
   [[nodiscard]] double high(const Contender& c, std::size_t i) const {
     return std::log(damping(c, i)   ? 4.0
                     : factor(c, i)  ? 8.0
-                    : capture(c, i) ? 3.0 * model.swings.front().frequency
+                    : capture(c, i) ? 3.0 * model.sinusoids.front().frequency
                                     : fastest());
   }
 
@@ -738,9 +738,9 @@ inline ControllerSource controller_source(const TunedDesign& d, const TuneModel&
       type += ", .sensor = 1";
       part(".sensor = {.time_constant = " + source(model.sensor) + "}");
     }
-    if (d.knows.swing) {
+    if (d.knows.sinusoid) {
       type += ", .resonators = 1";
-      part(".resonators = {{{.frequency = " + source(model.swings.front().frequency) +
+      part(".resonators = {{{.frequency = " + source(model.sinusoids.front().frequency) +
            ", .capture_bandwidth = " + source(d.settings.capture_bandwidth) + "}}}");
     }
     const bool free = d.family == TuneFamily::free_poles;
@@ -815,7 +815,8 @@ std::vector<Contender> contenders(const TuneModel& model, bool law_is_given) {
       c.observer_numbers = c.kind.placed;
       c.law_numbers = c.kind.order;
     }
-    if (knows.swing && !(model.swings.front().capture_bandwidth > 0.0)) c.observer_numbers = 2;
+    if (knows.sinusoid && !(model.sinusoids.front().capture_bandwidth > 0.0))
+      c.observer_numbers = 2;
     if (law_is_given) c.law_numbers = 0;
     all.push_back(std::move(c));
   };
@@ -842,7 +843,8 @@ std::vector<Contender> contenders(const TuneModel& model, bool law_is_given) {
       known(parts, TuneFamily::linear, "LinearEso", what, knows);
       known(parts, TuneFamily::half_gain, "HalfGainEso", what, knows);
     };
-    const bool lag = model.lag > 0.0, sensor = model.sensor > 0.0, swing = !model.swings.empty();
+    const bool lag = model.lag > 0.0, sensor = model.sensor > 0.0,
+               sinusoid = !model.sinusoids.empty();
     using L = std::integral_constant<ModelParts, ModelParts{.order = order, .actuator = 1}>;
     if (lag) {
       both(L{}, "the lag", {.lag = true});
@@ -851,13 +853,13 @@ std::vector<Contender> contenders(const TuneModel& model, bool law_is_given) {
     using F = std::integral_constant<ModelParts, ModelParts{.order = order, .sensor = 1}>;
     if (sensor) both(F{}, "the sensor", {.sensor = true});
     using Q = std::integral_constant<ModelParts, ModelParts{.order = order, .resonators = 1}>;
-    if (swing) both(Q{}, "the swing", {.swing = true});
+    if (sinusoid) both(Q{}, "the sine", {.sinusoid = true});
     using LF =
         std::integral_constant<ModelParts, ModelParts{.order = order, .actuator = 1, .sensor = 1}>;
     if (lag && sensor) both(LF{}, "lag and sensor", {.lag = true, .sensor = true});
     using LQ = std::integral_constant<ModelParts,
                                       ModelParts{.order = order, .actuator = 1, .resonators = 1}>;
-    if (lag && swing) both(LQ{}, "lag and swing", {.lag = true, .swing = true});
+    if (lag && sinusoid) both(LQ{}, "lag and sine", {.lag = true, .sinusoid = true});
     return 0;
   });
   return all;
@@ -914,7 +916,7 @@ template <class = void>
   const double b0 = given.input_gain.value;
   Tuning tuning;
   tuning.rules = rules;
-  tuning.given_disturbance = given.disturbance;
+  tuning.model_disturbance = given.disturbance;
   const double latency = given.latency();
   const double fast = 0.5 / T;
   const auto rho_of = [n](double x) { return std::pow(x, -2 * n); };
@@ -1033,7 +1035,7 @@ template <class = void>
     search.cost = &cost;
     // A sine of known frequency can be cancelled at no cost, so J* is computed without it.
     TuneModel walking = model;
-    walking.swings.clear();
+    walking.sinusoids.clear();
     tuning.lqg = LoopCost(walking, rules, search.slowest(), 50.0)(lqg.controller(tuning.rho));
     tuning.optimum = tuning.lqg.cost(tuning.rho, b0);
     checks.require(tuning.lqg.stable && tuning.optimum > 0.0 && is_finite(tuning.optimum),
