@@ -101,6 +101,25 @@ check_weight() {  # check_weight INCLUDE_DIR: by the compiler, which has no Eige
   return "$status"
 }
 
+# Of what GCC and Clang have beyond the language, nothing is left where neither is: the preprocessor
+# knows no compiler here. [[gnu::..]] is an attribute that others skip, and packs are for vector types.
+check_extensions() {  # check_extensions INCLUDE_DIR
+  local include_dir=$1 header found status=0
+  while IFS= read -r header; do
+    [[ $header != esokit/core/pack.hpp ]] || continue
+    if found=$(sed '/^ *# *include/d' "$include_dir/$header" | "${CXX:-g++}" -x c++ -E -undef -P -w - |
+      grep -m 1 -E '__attribute__|__builtin_|__extension__|\b(__)?(asm|typeof)\b|__restrict|__int128'); then
+      echo "$header: an extension of GCC without #if: $found"
+      status=1
+    fi
+  done < <(cd "$include_dir" && find esokit/{core,math,model,gain,observer,adapter,control} -name '*.hpp' | LC_ALL=C sort)
+  if grep -rlE 'include <esokit/core/pack.hpp>' "$include_dir"/esokit/{core,math,model,gain,observer,adapter,control}; then
+    echo "what runs in a controller may not include core/pack.hpp"
+    status=1
+  fi
+  return "$status"
+}
+
 self_test() {  # the check must be able to fail
   local folder case line
   folder=$(mktemp -d)
@@ -111,7 +130,7 @@ self_test() {  # the check must be able to fail
   printf '#include <cmath>\n#include <esokit/core/language.hpp>\n' >"$folder/esokit/core/a.hpp"
   echo '#include "esokit/core/a.hpp"' >"$folder/esokit/model/b.hpp"
   printf '#include <Eigen/Core>\n#include <esokit/model/b.hpp>\n' >"$folder/esokit/sim/c.hpp"
-  check "$folder" && check_weight "$folder" || { echo "self-test: a good tree is refused"; return 1; }
+  check "$folder" && check_weight "$folder" && check_extensions "$folder" || { echo "self-test: a good tree is refused"; return 1; }
   for line in '#include <esokit/sim/c.hpp>' '  # include "esokit/sim/c.hpp"' '#include "b.hpp"' \
     '#include "../core/a.hpp"' '#include <esokit/core/../core/a.hpp>' '#include <esokit/core/x.hpp>' \
     '#include <esokit/esokit.hpp>' '#include <boost/any.hpp>' '#include HEADER' '#include <Eigen/Core>'; do
@@ -127,6 +146,20 @@ self_test() {  # the check must be able to fail
     echo '#include <esokit/core/bad.hpp>' >"$folder/esokit/model/bad.hpp"
     if check_weight "$folder" >/dev/null; then
       echo "self-test: not refused by its weight: $line"
+      return 1
+    fi
+  done
+  echo '#include <esokit/core/language.hpp>' >"$folder/esokit/model/bad.hpp"
+  for line in 'inline int f(int x) { return __builtin_abs(x); }' 'typedef float V __attribute__((vector_size(16)));' \
+    '#include <esokit/core/pack.hpp>'; do
+    echo "$line" >"$folder/esokit/core/bad.hpp"
+    if check_extensions "$folder" >/dev/null; then
+      echo "self-test: not refused as an extension: $line"
+      return 1
+    fi
+    printf '#if defined(__GNUC__)\n%s\n#endif\n' "$line" >"$folder/esokit/core/bad.hpp"
+    if [[ $line != *pack.hpp* ]] && ! check_extensions "$folder"; then
+      echo "self-test: refused although it is guarded: $line"
       return 1
     fi
   done
@@ -155,5 +188,6 @@ case ${1:-} in
   *)
     check "${1:-$root/include}"
     check_weight "${1:-$root/include}"
+    check_extensions "${1:-$root/include}"
     ;;
 esac

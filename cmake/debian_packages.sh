@@ -2,14 +2,18 @@
 
 # What every build needs, what each kind of program needs on top.
 ESOKIT_BUILD_PACKAGES=(g++ cmake ninja-build libeigen3-dev)
-ESOKIT_TEST_PACKAGES=(libgtest-dev libboost-dev)
+ESOKIT_TEST_PACKAGES=(libgtest-dev libboost-dev librandom123-dev)
 ESOKIT_BENCHMARK_PACKAGES=(libbenchmark-dev python3)
 # Without a font gnuplot draws figures with no text, and reports no error.
 # Python makes the pages and tables and checks the numbers of the READMEs.
 ESOKIT_EXAMPLE_PACKAGES=(gnuplot-nox fontconfig fonts-dejavu-core python3)
+# For the parts of a study on many processes and machines (examples/monte_carlo/cluster).
+ESOKIT_CLUSTER_PACKAGES=(libopenmpi-dev openmpi-bin parallel)
 # picolibc is the C library of the RISC-V compiler; its C++ headers are those of libstdc++-arm-none-eabi.
 ESOKIT_FIRMWARE_PACKAGES=(gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib
   gcc-riscv64-unknown-elf picolibc-riscv64-unknown-elf qemu-system-arm qemu-system-misc)
+# Programs for Windows, and what runs them here; no graphics, hence not the package wine.
+ESOKIT_WINDOWS_PACKAGES=(g++-mingw-w64-x86-64-posix wine64)
 
 # require_packages [--no-install] package...
 # Installs the packages that are missing. With --no-install it only names them and returns 3.

@@ -50,6 +50,47 @@ try() {  # try SOURCE NAME
   fi
 }
 
+# read_results FILE: what its programs write is read as it says, in the languages that are here.
+read_results() {
+  local language reader block wrote=no status
+  grep -qE '^```(python|octave)$' "$1" || return 0
+  mkdir -p "$work/results"
+  for language in python octave; do
+    awk -v language="$language" '$0 == "```" language { inside = 1; next } /^```/ { inside = 0 } inside' "$1" \
+      >"$work/results/read.$language"
+    [[ -s $work/results/read.$language ]] || continue
+    reader=(octave-cli --quiet --norc)
+    [[ $language == octave ]] || reader=(/usr/bin/python3)
+    if ! command -v "${reader[0]}" >/dev/null || { [[ $language == python ]] && ! "${reader[0]}" -c 'import numpy' 2>/dev/null; }; then
+      echo "skipped: $1, what reads its results in $language: not installed"
+      continue
+    fi
+    for block in "$work"/block-*; do
+      [[ $wrote == no ]] && grep -q 'std::ofstream' "$block" && grep -q 'int main' "$block" || continue
+      "$compiler" -std=c++20 -O1 -Iinclude -isystem "$eigen" -x c++ "$block" -o "$work/results/program" -pthread &&
+        (cd "$work/results" && ./program) && wrote=yes
+    done
+    (cd "$work/results" && "${reader[@]}" "read.$language") >"$work/results/said" 2>&1
+    status=$?
+    # Each line of what is said has a number, and no number is missing.
+    if ((status == 0)) && grep -qE '[0-9]' "$work/results/said" && ! grep -qiE '\bnan\b|error' "$work/results/said"; then
+      passed=$((passed + 1))
+    else
+      failed=$((failed + 1))
+      echo "$1, $language: $(head -n 5 "$work/results/said")"
+    fi
+  done
+  if [[ $wrote == yes ]] && command -v gnuplot >/dev/null && [[ -s $work/results/run.gp ]]; then
+    (cd "$work/results" && gnuplot -d -e "set terminal svg size 900,900; set output 'run.svg'" run.gp) 2>"$work/errors"
+    if [[ ! -s $work/errors ]] && (($(grep -c '<path' "$work/results/run.svg") > 4)); then
+      passed=$((passed + 1))
+    else
+      failed=$((failed + 1))
+      echo "$1: its figure: $(head -n 5 "$work/errors")"
+    fi
+  fi
+}
+
 for file in "${files[@]}"; do
   rm -f "$work"/block-* "$work/loose.cpp"
   awk -v work="$work" '
@@ -57,6 +98,7 @@ for file in "${files[@]}"; do
     /^[ ]*```/ && inside { inside = 0; close(out) }
     inside { print > out }' "$file"
   loose=()
+  read_results "$file"
   for block in "$work"/block-*; do
     [[ -e $block ]] || continue
     if grep -q 'int main' "$block"; then

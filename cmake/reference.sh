@@ -1,15 +1,17 @@
 #!/usr/bin/env bash
-# cmake/reference.sh: writes the reference with Doxygen and prints where it is. Any warning is a
-# failure (1), and so is a name of the namespace detail on a page. Installs nothing: without Doxygen
-# it names the Debian package (3).
+# cmake/reference.sh [--no-install]: writes the reference with Doxygen and prints where it is. Any
+# warning is a failure (1), and so is a name of the namespace detail on a page. Installs Doxygen if it
+# is missing; with --no-install it only names the Debian package (3).
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 source cmake/debian_packages.sh
 
 if ! command -v doxygen >/dev/null 2>&1; then
-  require_packages --no-install doxygen
-  echo "doxygen is not on the PATH" >&2
-  exit 3
+  require_packages "$@" doxygen
+  if ! command -v doxygen >/dev/null 2>&1; then
+    echo "doxygen is not on the PATH" >&2
+    exit 3
+  fi
 fi
 
 log=build/reference/warnings.log

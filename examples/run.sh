@@ -101,16 +101,37 @@ if ! cmake -S "$root" -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release \
   cat "$build/configure.log" >&2
   exit 1
 fi
-cmake --build "$build" --target "${selected[@]}"
+# Of each step how many seconds are left, if the rest goes as fast as what is done.
+NINJA_STATUS='%f %t %e ' cmake --build "$build" --target "${selected[@]}" |
+  while IFS= read -r line; do
+    if [[ $line =~ ^([0-9]+)\ ([0-9]+)\ ([0-9]+)[0-9.]*\ (.*)$ ]]; then
+      finished=${BASH_REMATCH[1]} all=${BASH_REMATCH[2]} took=${BASH_REMATCH[3]} what=${BASH_REMATCH[4]}
+      line="[$finished/$all, about $((finished > 0 ? took * (all - finished) / finished : 0)) s left] $what"
+    fi
+    printf '%s\n' "$line"
+  done
 echo "built in $(seconds_since "$started")"
 
 # As many at a time as there are cores: much of a run is one thread's, and gnuplot's. What one says is
 # shown when all before it are done. choosing_cost takes the time of updates, and runs alone.
 alone=choosing_cost
 said=$(mktemp -d)
-trap 'rm -rf "$said"' EXIT
+(while sleep 5; do
+  running=
+  for began in "$said"/*.began; do
+    [[ -e $began ]] || continue
+    name=$(basename "$began" .began)
+    took=$((EPOCHSECONDS - $(<"$began")))
+    [[ -s $said/$name.status ]] || ((took < 5)) || running+=", $name for $took s"
+  done
+  [[ -z $running ]] || echo "running${running#,}"
+done) &
+watcher=$!
+disown "$watcher"
+trap 'kill "$watcher" 2>/dev/null; rm -rf "$said"' EXIT
 run_one() {
   local began=${EPOCHREALTIME/[.,]/} status=0
+  echo "$EPOCHSECONDS" >"$said/$1.began"
   "$build/examples/bin/$1" --out "$out" >"$said/$1" 2>&1 </dev/null || status=$?
   echo "$status $(seconds_since "$began")" >"$said/$1.status"
 }

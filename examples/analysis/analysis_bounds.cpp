@@ -257,7 +257,7 @@ int main(int argc, char** argv) {
       "The bounds are correct, but no basis for a design: that of the LESO is an order of "
       "magnitude too large, and each further level of a cascade makes it hundreds of times worse, "
       "because the bound of one level enters the next as if all components were at their worst at "
-      "all times. `peak_gain` computes the true worst case.");
+      "all times. peak_gain computes the true worst case.");
 
   Figure figure("bounds", {.rows = 1, .columns = 3, .panel_height = 230});
   figure.caption(

@@ -22,6 +22,11 @@
 //                                   limits
 // drifting                          else not back
 //
+// Order 3 is recommended only if it stands friction, which no model has: an actuator that
+// integrates, friction, and the integral of the observer swing for ever. What then is not
+// recommended is said with its reason, and the runs that a design without this rule would lose are
+// not counted.
+//
 // --machines N --seed S: so many machines, of another draw; the page shows the few that every run
 // has time for. --priced N: J without the rules of the first N.
 
@@ -218,6 +223,7 @@ struct Outcome {
   int order = 0;
   bool designed = false;
   std::string design;
+  std::string alarms;                    ///< their names; none: recommended
   double ratio = 0.0;                    ///< k_1 / k_0 over the latency
   double friction = 0.0, gravity = 0.0;  ///< share of half the range (order 3: of 10 latencies)
   std::vector<std::string> names;
@@ -311,8 +317,10 @@ Outcome play(std::uint64_t seed, std::uint64_t number, bool priced) {
   outcome.order = all.machine.order;
   const auto tuning = compiled::tune(all.model);
   if (!tuning || tuning->chosen() == nullptr) {
-    outcome.design =
-        tuning ? "none feasible" : std::string(tuning.error().field) + " " + tuning.error().rule;
+    outcome.design = !tuning ? std::string(tuning.error().field) + " " + tuning.error().rule
+                     : tuning->designs.front().feasible
+                         ? "none comes back, the first not from " + tuning->designs.front().lost
+                         : "none keeps the rules: " + tuning->designs.front().constraint;
     return outcome;
   }
   const auto& design = *tuning->chosen();
@@ -320,6 +328,9 @@ Outcome play(std::uint64_t seed, std::uint64_t number, bool priced) {
             : all.machine.order == 2 ? with_order<2>(all, design, number)
                                      : with_order<3>(all, design, number);
   outcome.order = all.machine.order;
+  for (const auto& alarm : esokit::alarms(*tuning, design)) {
+    outcome.alarms += (outcome.alarms.empty() ? "" : " ") + std::string(alarm.name);
+  }
   if (priced) outcome.price = price(all.model, *tuning);
   return outcome;
 }
@@ -360,7 +371,7 @@ int main(int argc, char** argv) {
   };
   std::map<std::string, std::array<Cell, 3>> table;
   std::vector<std::string> names;
-  std::array<int, 3> designed{}, count{}, bad{}, compared{};
+  std::array<int, 3> designed{}, alarmed{}, count{}, bad{}, compared{};
   std::array<std::array<int, kinds.size()>, 3> of_kind{}, pid_too{};
   // By order and rival.
   std::array<std::array<int, rivals.size()>, 3> better{};
@@ -376,6 +387,7 @@ int main(int argc, char** argv) {
       continue;
     }
     ++designed[n];
+    alarmed[n] += o.alarms.empty() ? 0 : 1;
     bool small_lost = false;
     for (std::size_t i = 0; i < rivals.size() && o.compared; ++i) {
       better[n][i] += o.peak[i] <= 1.0 && o.integral[i] <= 1.0 ? 1 : 0;
@@ -401,10 +413,11 @@ int main(int argc, char** argv) {
       if (pid.kind != Kind::back) ++pid_too[n][static_cast<std::size_t>(own.kind)];
       small_lost = small_lost || is_small(o.names[e]);
       std::printf(
-          "  machine %zu, order %d, %s: not back after %s: %s (%.2g of the horizon at a limit, "
+          "  machine %zu, order %d, %s%s: not back after %s: %s (%.2g of the horizon at a limit, "
           "error %.3g deviations of the noise and %.2g of the peak; friction %.2g, gravity %.2g of "
           "u; k_1 / k_0 = %.3g latencies); PID: %s, %.3g deviations\n",
-          i, o.order, o.design.c_str(), o.names[e].c_str(),
+          i, o.order, o.design.c_str(),
+          o.alarms.empty() ? "" : (" with an alarm (" + o.alarms + ")").c_str(), o.names[e].c_str(),
           kinds[static_cast<std::size_t>(own.kind)], own.at_limits, own.late, own.late_share,
           o.friction, o.gravity, o.ratio, kinds[static_cast<std::size_t>(pid.kind)], pid.late);
     }
@@ -478,13 +491,16 @@ int main(int argc, char** argv) {
   }
   report.check("order 2", "softening acts on noise alone, of those back from all (share)", {},
                share(acting, sound));
-  report.check("all", "machines with a design (share)", {},
-               share(designed[0] + designed[1] + designed[2], static_cast<int>(machines)));
+  report.check("orders 1 and 2", "machines with a design (share)", {},
+               share(designed[0] + designed[1], count[0] + count[1]));
+  report.check("order 3", "machines with a design that stands friction (share)", {},
+               share(designed[2], count[2]));
   std::printf("not back in all, by order: %d %d %d\n", stuck[0], stuck[1], stuck[2]);
   for (std::size_t n = 0; n < 3; ++n) {
     std::printf(
-        "order %zu: %d of %d machines designed, %d with a small event lost; beyond %d of %d runs\n",
-        n + 1, designed[n], count[n], bad[n], beyond[n], runs_beyond[n]);
+        "order %zu: %d of %d machines designed (%d with an alarm), %d with a small event lost; "
+        "beyond %d of %d runs\n",
+        n + 1, designed[n], count[n], alarmed[n], bad[n], beyond[n], runs_beyond[n]);
   }
   return report.finish();
 }

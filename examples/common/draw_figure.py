@@ -169,7 +169,10 @@ class Figure:
                          f"splot '{self.name}.csv' index {one.block} using 3:4:5\n"
                          "unset table; unset contour; set surface")
         self.place(*panel.box)
-        self.put("set autoscale xfix")
+        # No curve runs along the frame, as u at its limit would.
+        free = not (panel.get("y_log") or panel.limit or "y_range" in panel.settings)
+        self.put("set autoscale xfix; set autoscale " + ("yfix" if free else "y") +
+                 ("\nset offsets 0,0,graph 0.04,graph 0.04" if free else "\nunset offsets"))
         for which in "xy":
             self.axis(which, panel.settings.get(which + "_range", "**"),
                       panel.get(which + "_tick"), 11, "0,0", panel.get(which + "_label"),
@@ -261,7 +264,7 @@ class Figure:
                      "linecolor rgb '#909090' linewidth 0.8")
 
     def add_inset(self, panel, x, y, box):
-        self.put("\n# zoom")
+        self.put("\n# zoom\nset autoscale y; unset offsets")
         self.place(*box)
         # White behind the inset's numbers, but not over the panel's border.
         self.put("set object rectangle from " +

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <limits>
@@ -11,6 +10,7 @@
 #include <system_error>
 
 #include "csv.hpp"
+#include "system.hpp"
 
 namespace esokit::examples {
 namespace {
@@ -19,14 +19,11 @@ std::string text_of(double value) { return number_text(value, 12); }
 std::string text_of(std::optional<double> value) { return value ? text_of(*value) : "*"; }
 
 /// The script of the sources; an installed program has one beside it.
-std::string draw_command() {
+std::filesystem::path draw_script() {
   std::error_code none;
-  const auto program = std::filesystem::read_symlink("/proc/self/exe", none);
   const auto installed =
-      program.parent_path().parent_path() / "share" / "esokit" / "draw_figure.py";
-  const std::filesystem::path source = ESOKIT_DRAW_FIGURE;
-  return "python3 '" + (std::filesystem::exists(installed, none) ? installed : source).string() +
-         "'";
+      this_program().parent_path().parent_path() / "share" / "esokit" / "draw_figure.py";
+  return std::filesystem::exists(installed, none) ? installed : path_of(ESOKIT_DRAW_FIGURE);
 }
 
 /// Adds about `most` of the rows, so that the curve looks the same: of each part the lowest and the
@@ -224,12 +221,7 @@ bool Figure::write(const std::string& folder, const std::string& formats) const 
   }
   const std::string file = folder + "/" + name_ + ".csv";
   if (!write_text(file, numbers)) return false;
-  std::fflush(nullptr);
-  std::signal(SIGPIPE, SIG_IGN);  // where there is no Python: pclose says so
-  std::FILE* pipe = popen(draw_command().c_str(), "w");
-  if (pipe == nullptr) return false;
-  std::fwrite(description.data(), 1, description.size(), pipe);
-  return pclose(pipe) == 0;
+  return run_python(draw_script(), description);
 }
 
 }  // namespace esokit::examples

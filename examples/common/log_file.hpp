@@ -266,7 +266,7 @@ class LogFile {
       lines_.push_back(head.number);
       if (lines.read() >= shown + 64'000'000) {
         shown = lines.read();
-        std::fprintf(stderr, "reading %s: %3.0f %%\n", file_.filename().c_str(),
+        std::fprintf(stderr, "reading %s: %3.0f %%\n", file_.filename().string().c_str(),
                      100.0 * static_cast<double>(shown) / static_cast<double>(bytes));
       }
     };
@@ -288,8 +288,7 @@ class LogFile {
       int most = std::numeric_limits<int>::min();
       for (const char c : {';', '\t', '|', ',', ' '}) {
         const Shape shape = shape_of(heads, text, body, c);
-        const int score =
-            10'000 * shape.numbers - static_cast<int>(std::min<std::size_t>(shape.count, 9'999));
+        const int score = 10'000 * shape.numbers - std::min(shape.filled, 9'999);
         if (score > most) most = score, separator_ = c;
       }
     }
@@ -354,6 +353,7 @@ class LogFile {
   struct Shape {
     std::size_t count = 0;
     int numbers = 0;
+    int filled = 0;  // not those that are always empty, as after a separator at the end
     std::vector<bool> number;
   };
   [[nodiscard]] Shape shape_of(const std::vector<Head>& heads, const std::vector<std::size_t>& text,
@@ -378,6 +378,7 @@ class LogFile {
     for (std::size_t c = 0; c < filled.size(); ++c) {
       shape.number.push_back(c < shape.count && 2 * numbers[c] > filled[c]);
       shape.numbers += shape.number.back() ? 1 : 0;
+      shape.filled += c < shape.count && filled[c] > 0 ? 1 : 0;
     }
     return shape;
   }

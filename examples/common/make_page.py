@@ -91,7 +91,10 @@ def read_results(out):
                     if one.rows or any(item.kind != "remark" for item in one.items)]
         if examples:
             papers.append(Paper(folder.relative_to(out).as_posix(), examples))
-    return sorted(papers, key=lambda paper: not paper.link)
+    # What a visitor comes for, then the other topics, then the papers.
+    first = ["from_log", "guards", "trades", "control_practice", "choosing"]
+    return sorted(papers, key=lambda one: (bool(one.link), first.index(one.folder)
+                                           if one.folder in first else len(first)))
 
 
 # ---- pieces of a page ----
@@ -116,7 +119,16 @@ def shown(text):
 
 
 def percent(share):
-    return f"{100 * float(share):.3g} %" if share else ""
+    if not share:
+        return ""
+    value = 100 * float(share)
+    return f"{value:.0f} %" if 1000 <= abs(value) < 1e6 else f"{value:.3g} %"
+
+
+def plain(text):
+    """Powers of ten below a million written out: 1.1e+03 is 1100."""
+    return re.sub(r"(?<![\w.])(-?\d+(?:\.\d+)?)e\+0([1-5])(?!\d)",
+                  lambda found: f"{float(found[0]):.0f}", text)
 
 
 def png_size(file):
@@ -216,8 +228,9 @@ def corrections(paper):
 def figure(out, example, item):
     width, height = png_size(out / example.folder / (item.name + ".png"))
     stem = quote((example.folder / item.name).as_posix())
-    return (f'<figure>\n<a href="{stem}.svg"><img loading="lazy" src="{stem}.png" '
-            f'width="{width // 2}" height="{height // 2}" alt="{esc(item.alt)}"></a>\n'
+    return (f'<figure>\n<label class="zoom"><input type="checkbox" aria-label="larger">'
+            f'<img loading="lazy" src="{stem}.png" '
+            f'width="{width // 2}" height="{height // 2}" alt="{esc(item.alt)}"></label>\n'
             f'<figcaption>{esc(item.text)}<br>\n<a href="{stem}.svg">SVG</a> · '
             f'<a href="{stem}.gp">gnuplot script</a> · <a href="{stem}.csv">data</a>'
             "</figcaption>\n</figure>\n")
@@ -239,9 +252,12 @@ def shown_table(out, example, item):
         ahead = [end for end in ends if end > start]
         stop = max([end for end in ahead if end - start <= WIDEST] or ahead[:1])
         shown_columns = [c for c in range(start, stop) if not verdicts[c]]
+        # Of a metric that this table does not have, and of a row without a number, nothing is shown.
+        shown_columns = [c for c in shown_columns if any(row[c] for row in rows[1:])]
+        rows_here = [row for row in rows[1:] if any(row[c] for c in shown_columns)]
         body = [[f'<th scope="row">{esc(row[0])}</th>'] +
-                [f"<td>{esc(row[c])}{marks.get(row[c + 1], '') if verdicts[c + 1] else ''}</td>"
-                 for c in shown_columns] for row in rows[1:]]
+                [f"<td>{esc(plain(row[c]))}{marks.get(row[c + 1], '') if verdicts[c + 1] else ''}</td>"
+                 for c in shown_columns] for row in rows_here]
         text += table(item.text + (" (continued)" if text else ""),
                       [rows[0][0]] + [rows[0][c] for c in shown_columns], body)
         start = stop
@@ -291,22 +307,24 @@ def all_checks(example):
 # ---- pages ----
 
 def cover(out, paper):
-    """The top left panel of the paper's cover figure."""
+    """The paper's cover figure, whole."""
     wanted = next((item.name for _, item in paper.items("cover")), None)
     for one, item in paper.items("figure"):
         if wanted in (None, item.name):
             file = one.folder / (item.name + ".png")
             width, height = png_size(out / file)
             return (f'<svg role="img" aria-label="{esc(item.alt)}" viewBox="0 0 '
-                    f'{width // int(item.figure)} {height // int(item.more)}"><image '
+                    f'{width} {height}"><image '
                     f'href="{quote(file.as_posix())}" width="{width}" height="{height}"/></svg>\n')
     return ""
 
 
 def overview(out, papers):
-    header = """<h1>esokit: results of the examples</h1>
-<p>The programs in examples/ reproduce five papers from their equations, and show what the \
-library does. Each card leads to a page with figures, tables and all numbers. Two kinds of \
+    header = """<h1>esokit: what it does, and how well</h1>
+<p>Each card leads to a page with figures, tables and all numbers, made by the programs in \
+examples/.</p>
+"""
+    judging = """<p>The programs reproduce five papers from their equations. Two kinds of \
 comparison are counted separately. A <b>printed number</b> is a number in a paper: it is met, \
 missed, or not judged (if no tolerance can be given, or if noise is too large for a verdict). \
 Numbers of single noisy runs are judged together, too, a column at a time: it is reproduced, \
@@ -314,10 +332,16 @@ doubtful or not reproduced. An <b>own check</b> compares one of our \
 numbers with a formula, with an independent program, or with a limit that it has to keep: it \
 passes or fails.</p>
 """
-    cards = "".join(f'<li><a href="{paper.page}">{cover(out, paper)}<b>{esc(paper.title)}</b></a>\n'
-                    f"{counts(paper)}</li>\n" for paper in papers)
+    def cards(chosen):
+        return '<ul class="cards">\n' + "".join(
+            f'<li><a href="{paper.page}">{cover(out, paper)}<b>{esc(paper.title)}</b></a>\n'
+            f"{counts(paper)}</li>\n" for paper in chosen) + "</ul>\n"
+
+    topics = [paper for paper in papers if not paper.link]
+    printed = [paper for paper in papers if paper.link]
     return header, ("".join(failures(paper, paper.page) for paper in papers) +
-                    f'<ul class="cards">\n{cards}</ul>\n')
+                    (cards(topics) if topics else "") +
+                    (f'<h2 id="papers">Papers</h2>\n{judging}{cards(printed)}' if printed else ""))
 
 
 def one_paper(out, paper):
@@ -329,10 +353,11 @@ def one_paper(out, paper):
     if (out / paper.folder / "README.txt").exists():
         readme = f'<a href="{quote(paper.folder)}/README.txt">{readme}</a>'
     header += ('</p>\n<p class="quiet">What this is, when it helps and how to use it: '
-               f"{readme}</p>\n{counts(paper)}")
-    header += ('<p class="quiet">A <b>continuous simulation</b>, as in the papers, integrates plant '
-               "and observer as one differential equation. A <b>sampled observer</b> is updated once "
-               "per sample, as in a controller.</p>\n")
+               f"{readme}. A tap on a figure enlarges it.</p>\n{counts(paper)}")
+    if paper.link:
+        header += ('<p class="quiet">A <b>continuous simulation</b>, as in the papers, integrates '
+                   "plant and observer as one differential equation. A <b>sampled observer</b> is "
+                   "updated once per sample, as in a controller.</p>\n")
 
     main = failures(paper) + claims(paper) + misses(paper) + corrections(paper)
     main += '<nav aria-label="Contents">\n<ul>\n'

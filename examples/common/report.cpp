@@ -10,6 +10,8 @@
 #include <system_error>
 #include <utility>
 
+#include "system.hpp"
+
 namespace esokit::examples {
 namespace {
 
@@ -50,7 +52,7 @@ std::string output_folder(int argc, char** argv) {
       std::fprintf(help ? stdout : stderr,
                    "usage: %s [--out DIR | DIR]\nWrites its figures, tables and summary.csv below "
                    "DIR (default: out)\n",
-                   std::filesystem::path(argv[0]).filename().c_str());
+                   path_of(argv[0]).filename().string().c_str());
       std::exit(help ? 0 : 2);
     }
     folder = argument;
@@ -92,6 +94,10 @@ std::string mean_text(const Statistics& seeds) {
   const double deviation = seeds.standard_deviation;
   if (!std::isfinite(deviation) || deviation <= 0.0) return shown_text(seeds.mean);
   // The deviation with two digits, and as many decimals for both.
+  // Where it is nothing beside the mean, it says only that.
+  if (deviation < 1e-6 * std::abs(seeds.mean)) {
+    return shown_text(seeds.mean) + " (" + number_text(deviation, 2) + ")";
+  }
   const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(deviation))), 0, 17);
   return fixed(seeds.mean, decimals) + " (" + fixed(deviation, decimals) + ")";
 }
@@ -342,6 +348,10 @@ void Report::comparison(const std::string& name, const std::string& caption,
         return check.case_name == case_name && check.metric == metric;
       });
       rows.push_back(row == checks_.end() ? nullptr : &*row);
+    }
+    // A metric of other cases has no column here.
+    if (std::all_of(rows.begin(), rows.end(), [](const Check* row) { return row == nullptr; })) {
+      continue;
     }
     const auto column = [&](const char* heading, auto text, bool always) {
       if (!always && std::all_of(rows.begin(), rows.end(), [&](const Check* row) {

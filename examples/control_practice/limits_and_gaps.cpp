@@ -327,7 +327,7 @@ int main(int argc, char** argv) {
       "behaves as if the control law knew the true states; the overshoot is then caused by the "
       "saturation alone.");
   auto& output = figure.panel(0, 0).y_label("y (-)").legend(Legend::above).x_range(0, 8);
-  auto& input = figure.panel(1, 0).x_label("t (s)").y_label("u (V)").x_range(0, 8).y_range(-4, 4);
+  auto& input = figure.panel(1, 0).x_label("t (s)").y_label("u (-)").x_range(0, 8).y_range(-4, 4);
   output.name("output");
   input.name("input");
   const auto draw = [&](const StepRun& run, Style style) {

@@ -59,6 +59,10 @@ declare -A shown=([LinearEso]="LinearEso<2>" [CascadeEso]="CascadeEso<2, 3>"
   [NonlinearEso]="NonlinearEso<2> (m = 2)"
   [ExtendedStateFilter-frozen]="ExtendedStateFilter<2>, frozen"
   [ExtendedStateFilter-recursive]="ExtendedStateFilter<2>, recursive")
+controllers=(Adrc AdrcLimited MimoAdrc)
+shown+=([Adrc]="Adrc<LinearEso<2>>" [AdrcLimited]="the same, u limited in its rate, too"
+  [MimoAdrc]="MimoAdrc of two LinearEso<2>")
+clocks=(48 72 168)  # MHz
 
 out=$root/build/firmware
 mkdir -p "$out"
@@ -160,15 +164,16 @@ text_bytes() {
 
 # object PRESET NAME: of the image as built
 object() {
-  find "$root/build/$1/examples/embedded" -path "*firmware_o[bt]*" -name "$2.cpp.obj"
+  find "$root/build/$1/examples/embedded" \( -path "*firmware_o[bt]*" -o -path "*controllers.dir*" \
+    -name "controller*" \) -name "$2.cpp.obj"
 }
 
-# measures PRESET: a line "UPDATE code guarded stack deepest" for each update function. Code and stack
+# measures PRESET OBJECT: a line "UPDATE code guarded stack deepest" for each update function. Code and stack
 # are those of the function with all it calls, but for the guarded path of bad samples, which is the
 # second number and in the deepest stack. The C library and the soft-float helpers are in none.
 measures() {
   local updates
-  updates=$(object "$1" updates)
+  updates=$(object "$1" "$2")
   { "${binutils[$1]}nm" -S -t d "$updates" | awk 'NF == 4 { print "size", $4, $2 + 0 }'
     cat "${updates%.obj}.ci"; } | awk '
     function name(text) { sub(/^"/, "", text); sub(/"$/, "", text); sub(/.*:/, "", text); return text }
@@ -305,8 +310,9 @@ if diff <(sed -n 's/^open pasted //p' "$out/host.txt") \
 fi
 built=()
 for core in "${cores[@]}"; do
+  echo "building for $core, $((SECONDS - started)) s"
   # Without a floating-point unit nothing is fused, and there is one image.
-  images=(firmware drive drive_make)
+  images=(firmware drive drive_make controllers)
   [[ $core == cortex-m0plus ]] || images+=(firmware_exact)
   [[ $core != cortex-m4f ]] || images+=(firmware_others)
   if build "$core" "${images[@]}"; then
@@ -319,7 +325,7 @@ done
 echo "built in $((SECONDS - started)) s"
 
 for core in ${built[@]+"${built[@]}"}; do
-  for image in firmware firmware_exact drive drive_make; do
+  for image in firmware firmware_exact drive drive_make controllers; do
     [[ $core-$image != cortex-m0plus-firmware_exact ]] || continue
     if run "$core" "$image" "$out/$core-$image.txt"; then pass; else
       fail "$core, $image: status $? in the emulator; the end of what it said:"
@@ -333,11 +339,11 @@ for core in ${built[@]+"${built[@]}"}; do
     compare "$core" firmware
   fi
   for image in drive drive_make; do compare "$core" "$image"; done
-  for image in firmware drive drive_make; do
+  for image in firmware drive drive_make controllers; do
     check_links "$core" "$(image "$core" "$image").elf"
   done
   [[ $core != cortex-m4f ]] || check_links "$core" "$(object "$core" others)"
-  measures "$core" >"$out/$core.measures"
+  { measures "$core" updates; measures "$core" controller_updates; } >"$out/$core.measures"
 done
 
 {
@@ -356,6 +362,23 @@ done
         "$stack | $deepest | $(value "$runs" count "$observer" 3) | $(value "$runs" count "$observer" 4) |"
     done
   done
+  echo
+  echo "**Controllers**, the whole step: law, limits and observer. Microseconds are the most instructions" \
+    "by the clock (MHz), one a cycle"
+  echo
+  echo "| float, -O2 | code | guarded path | state | stack | deepest | instructions | at most |$(printf ' %s MHz |' "${clocks[@]}")"
+  echo "|---|---:|---:|---:|---:|---:|---:|---:|$(printf -- '---:|%.0s' "${clocks[@]}")"
+  for core in ${built[@]+"${built[@]}"}; do
+    runs=$out/$core-controllers.txt
+    for controller in "${controllers[@]}"; do
+      read -r _ code guarded stack deepest < <(grep "^update_$controller " "$out/$core.measures") ||
+        code=- guarded=- stack=- deepest=-
+      most=$(value "$runs" count "$controller" 4)
+      echo "| ${title[$core]}: ${shown[$controller]} | $code | $guarded | $(value "$runs" size "$controller" 3) |" \
+        "$stack | $deepest | $(value "$runs" count "$controller" 3) | $most |$(for clock in "${clocks[@]}"; do
+          awk -v n="$most" -v f="$clock" 'BEGIN { printf " %.3g us |", n / f }'; done)"
+    done
+  done
 } >"$out/table.md"
 cat "$out/table.md"
 echo
@@ -367,6 +390,8 @@ for core in cortex-m4f cortex-m7; do
   limit "$core: code bytes of LinearEso<2>" "$code" 200
   limit "$core: state bytes of LinearEso<2>" "$(value "$runs" size LinearEso 3)" 56
   limit "$core: instructions of CascadeEso<2, 3>" "$(value "$runs" count CascadeEso 4)" 110
+  limit "$core: instructions of Adrc<LinearEso<2>>" "$(value "$out/$core-controllers.txt" count Adrc 4)" 90
+  limit "$core: instructions of MimoAdrc" "$(value "$out/$core-controllers.txt" count MimoAdrc 4)" 210
   limit "$core: bytes of the whole image" "$(text_bytes "$core" firmware)" 67584
 done
 

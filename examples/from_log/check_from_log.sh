@@ -153,11 +153,11 @@ compiles() {  # compiles PAGE: all its programs, in one, say that they check; th
 
 # servo [NAME=NUMBER...]: 8 s, y'' + 2 y' = b u(t - 4 ms) - load, rows "t y u r"; the reference steps.
 #   b input gain; scale of u; quantum of y; still=1: the reference does not move; noise of y; drift
-#   of the load a row; friction
+#   of the load a row; friction; hold: friction that holds at standstill
 servo() {
   local set=() pair
   for pair in "$@"; do set+=(-v "$pair"); done
-  awk -v b=50 -v scale=1 -v quantum=0 -v still=0 -v rows=4000 -v noise=1e-3 -v wander=0.02 -v friction=0 "${set[@]}" '
+  awk -v b=50 -v scale=1 -v quantum=0 -v still=0 -v rows=4000 -v noise=1e-3 -v wander=0.02 -v friction=0 -v hold=0 "${set[@]}" '
     function normal() {
       seed = (seed * 69069 + 12345) % 4294967296; first = (seed + 1) / 4294967297
       seed = (seed * 69069 + 12345) % 4294967296
@@ -179,6 +179,11 @@ servo() {
         for (i = 0; i < 4; ++i) {  # u of 4 ms ago
           a = b * (i < 4 ? old2 : old1) - 2 * v + 5 + drift
           if (friction > 0) a -= friction * (1 - 2 / (exp(40 * v) + 1))  # tanh(20 v)
+          if (hold > 0) {
+            if (v == 0 && a * a <= hold * hold) continue
+            a -= (v != 0 ? v : a) > 0 ? hold : -hold
+            if (v * (v + a * T / 4) < 0) { v = 0; continue }
+          }
           x += v * T / 4 + a * T * T / 32; v += a * T / 4
         }
         old2 = old1; old1 = u
@@ -314,6 +319,9 @@ verdict $? "quiet.csv: nothing is said of the floor: $said"
 servo noise=1e-5 wander=0.0005 >rows.txt
 written t,y,u , t >moving_little.csv
 healthy moving_little.csv
+servo noise=1e-4 wander=0 hold=50 rows=6000 >rows.txt
+written t,y,u , t >sticks.csv
+sounds sticks sticks.csv
 servo quantum=0.5 >rows.txt
 written t,y,u , t >coarse.csv
 sounds quantised coarse.csv
@@ -416,6 +424,15 @@ reads no_header.csv --y 2 --u 3 --sample-time 0.01
 reads semicolons.csv
 { echo 't|y|u'; table '|'; } >bars.csv
 reads bars.csv
+# As LabVIEW writes it.
+{
+  printf 'LabVIEW Measurement\t\nWriter_Version\t2\nX_Columns\tOne\n***End_of_Header***\t\n\t\n'
+  printf 'Channels\t2\t\t\nSamples\t401\t401\t\n***End_of_Header***\t\t\t\nX_Value\ty\tu\tComment\n'
+  table $'\t' | sed 's/$/\t/'
+} >labview.lvm
+reads labview.lvm
+sed 's/X_Value/X_Other/' labview.lvm >labview_other.lvm
+refuses "which column is time?" labview_other.lvm "${settings[@]}"
 { echo 't;y;u'; table ';' | tr . ,; } >decimal_commas.csv
 reads decimal_commas.csv
 { echo '# logged by hand'; echo t,y,u; echo s,m,N; echo '// units above'; table ,; } >comments.csv

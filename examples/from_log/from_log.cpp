@@ -18,6 +18,7 @@
 
 #include "common/measured_data.hpp"
 #include "common/report.hpp"
+#include "common/system.hpp"
 #include "from_log/parts/measured_sets.hpp"
 #include "from_log/parts/show.hpp"
 
@@ -47,6 +48,8 @@ the machine:
                       level by its name, else identified)
   --limits LOW,HIGH   of u, in the unit of the log (default: the range of u in the log)
   --b0 B              the input gain that you expect: an alarm if the log shows another one
+  --friction F        order 3: Coulomb friction on y'', unit of y''; 0: none (default: not known, and
+                      only a design that comes back with friction is recommended)
 the requirement, one of:
   --noise PERCENT     standard deviation of u that noise may cause, % of its range (default 5)
   --settling S        settling time of a step of the reference, s
@@ -140,6 +143,11 @@ Settings read_arguments(int argc, char** argv) {
        [&](const auto& text) {
          s.expected_gain = number("b0", text);
          if (*s.expected_gain == 0) throw LogError("--b0: must not be zero");
+       }},
+      {"friction",
+       [&](const auto& text) {
+         s.friction = number("friction", text);
+         if (*s.friction < 0) throw LogError("--friction: must not be negative");
        }},
       {"noise",
        [&](const auto& text) { s.noise_share = 0.01 * positive("noise", text), ++wishes; }},
@@ -244,7 +252,8 @@ int gallery(const std::string& out) {
     page.add_to(report);
     const std::string file = page.write(report.folder(), machine.name);
     if (file.empty()) return failed;
-    report.link(std::filesystem::path(file).filename().string(), "The page as from_log writes it");
+    report.link(esokit::examples::path_of(file).filename().string(),
+                "The page as from_log writes it");
     report.check("log", "rows", std::nullopt, static_cast<double>(outcome.findings.found.log.rows));
     status |= report.finish();
   }
@@ -261,6 +270,7 @@ int gallery(const std::string& out) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  esokit::examples::print_utf8();
   try {
     const Settings settings = read_arguments(argc, argv);
     if (argc == 1) throw LogError("no file is given; from_log --help shows the options");

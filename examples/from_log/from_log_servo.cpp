@@ -31,6 +31,7 @@
 #include <esokit/sim/run.hpp>
 
 #include "common/report.hpp"
+#include "common/system.hpp"
 #include "control_practice/pid.hpp"
 #include "from_log/parts/show.hpp"
 
@@ -161,7 +162,7 @@ int main(int argc, char** argv) {
   }
   const std::string page = outcome->page(settings).write(settings.out, from_log::stem_of(settings));
   if (page.empty()) return 1;
-  report.link(std::filesystem::path(page).filename().string(), "The page that from_log writes");
+  report.link(esokit::examples::path_of(page).filename().string(), "The page that from_log writes");
   report.expect("log", "status", outcome->status, outcome->status == from_log::all_clear,
                 "0: there is a design and no alarm");
   if (!outcome->design.made()) return report.finish() | 1;
@@ -247,17 +248,17 @@ int main(int argc, char** argv) {
       .y_label("angle (rad)")
       .legend(Legend::above)
       .name("log")
-      .line(log.t, log.r, {.name = "reference", .color = Color::grey, .width = 1.0})
-      .line(log.t, log.y, {.name = "angle", .color = Color::blue, .width = 1.2});
+      .line(log.t, log.r, {.name = "reference", .color = Color::black, .width = 0.8})
+      .line(log.t, log.y, {.name = "angle, bad PID", .color = Color::grey, .width = 1.2});
   figure.panel(1, 0)
       .title("before and after")
       .x_label("t (s)")
       .y_label("angle (rad)")
       .legend(Legend::above)
       .name("angle")
-      .line(before.t, before.r, {.name = "reference", .color = Color::grey, .dash = Dash::dashed})
-      .line(before.t, before.y, {.name = "bad PID", .color = Color::blue})
-      .line(after.t, after.y, {.name = "from the log", .color = Color::vermillion});
+      .line(before.t, before.r, {.name = "reference", .color = Color::black, .dash = Dash::dashed})
+      .line(before.t, before.y, {.name = "bad PID", .color = Color::grey})
+      .line(after.t, after.y, {.name = "from the log", .color = Color::blue});
   const auto error = [](const Run& run) {
     std::vector<double> e;
     for (std::size_t k = 0; k < run.t.size(); ++k) e.push_back(1e3 * (run.r[k] - run.y[k]));
@@ -267,14 +268,14 @@ int main(int argc, char** argv) {
       .x_label("t (s)")
       .y_label("error (mrad)")
       .name("error")
-      .line(before.t, error(before), {.color = Color::blue, .column = "bad PID"})
-      .line(after.t, error(after), {.color = Color::vermillion, .column = "from the log"});
+      .line(before.t, error(before), {.color = Color::grey, .column = "bad PID"})
+      .line(after.t, error(after), {.color = Color::blue, .column = "from the log"});
   figure.panel(3, 0)
       .x_label("t (s)")
       .y_label("u (V)")
       .name("u")
-      .line(after.t, after.u, {.color = Color::vermillion, .width = 1.0, .column = "from the log"})
-      .line(before.t, before.u, {.color = Color::blue, .width = 1.2, .column = "bad PID"});
+      .line(after.t, after.u, {.color = Color::blue, .width = 1.0, .column = "from the log"})
+      .line(before.t, before.u, {.color = Color::grey, .width = 1.2, .column = "bad PID"});
   report.add(figure);
   report.cover("servo");
 

@@ -9,31 +9,55 @@
 #include <esokit/adapter/guarded.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/health.hpp>
+#include <esokit/core/check.hpp>
 #include <esokit/observer/model_eso.hpp>
 
 namespace guards {
 
 /// One axis. Call `rate` once a gyro sample, armed or not.
-class RateAxis {
+/// @tparam MostDelay samples that the gyro's filters may take: 64 are 8 ms at 8 kHz
+template <int MostDelay>
+class RateAxisOf {
   // The motor's lag is in the model: the guards hold and bound the disturbance, not what the motor
   // does. The gyro's filters take some samples: u is told to the observer that much later.
   using Lagging = esokit::ModelEso<esokit::ModelParts{.order = 1, .actuator = 1}, float>;
-  using Loop = esokit::Adrc<esokit::Guarded<esokit::DelayedInput<Lagging, 16>>>;
+  using Loop = esokit::Adrc<esokit::Guarded<esokit::DelayedInput<Lagging, MostDelay>>>;
   using Monitor = esokit::HealthMonitor<2, float>;
 
  public:
   struct Config {
-    float sample_time = 1e-3f;      // s
-    float hover_gain = 600;         // b0 at hover throttle, rad/s^2
-    float hover_throttle = 0.4f;    // 0 .. 1
-    float motor_lag = 0.02f;        // s
-    float gyro_delay = 2e-3f;       // s, of all filters at low frequencies; at most 16 samples
-    float most_disturbance = 0.6f;  // share of u that a disturbance may be given
+    float sample_time = 1e-3f;    // s
+    float hover_gain = 600;       // b0 at hover throttle, rad/s^2
+    float hover_throttle = 0.4f;  // 0 .. 1
+    float motor_lag = 0.02f;      // s
+    float gyro_delay = 2e-3f;     // s, of all filters at low frequencies; at most MostDelay samples
+    float controller_bandwidth = 75;  // rad/s: how fast the rate follows and a disturbance goes
+    float most_disturbance = 0.6f;    // share of u that a disturbance may be given
   };
 
-  static esokit::Expected<RateAxis, esokit::Error<float>> make(const Config& config) {
-    const float observer_bandwidth = 3 / config.motor_lag;
-    Loop::Config loop;
+  static esokit::Expected<RateAxisOf, esokit::Error<float>> make(const Config& config) {
+    // Within the two limits the modulus margin is 0.45 and more, with a motor 30 % faster or
+    // slower.
+    const float by_motor = 2.5f / config.motor_lag;
+    const float by_gyro = 0.4f / (config.gyro_delay + config.sample_time);
+    esokit::Rules<float> rules;
+    rules.positive("sample_time", config.sample_time)
+        .positive("motor_lag", config.motor_lag)
+        .not_negative("gyro_delay", config.gyro_delay)
+        .positive("controller_bandwidth", config.controller_bandwidth)
+        .require(
+            config.gyro_delay <= MostDelay * config.sample_time,
+            {"gyro_delay", config.gyro_delay, "must be at most MostDelay sample times, which is",
+             -1, MostDelay * config.sample_time, true})
+        .require(config.controller_bandwidth <= by_motor,
+                 {"controller_bandwidth", config.controller_bandwidth,
+                  "must be at most 2.5 / motor_lag, which is", -1, by_motor, true})
+        .require(config.controller_bandwidth <= by_gyro,
+                 {"controller_bandwidth", config.controller_bandwidth,
+                  "must be at most 0.4 / (gyro_delay + sample_time), which is", -1, by_gyro, true});
+    if (!rules) return rules.error();
+    const float observer_bandwidth = 2 * config.controller_bandwidth;
+    typename Loop::Config loop;
     loop.observer.observer.observer = {.observer_bandwidth = observer_bandwidth,
                                        .input_gain = config.hover_gain,
                                        .sample_time = config.sample_time,
@@ -43,7 +67,7 @@ class RateAxis {
     loop.observer.unit = esokit::DisturbanceUnit::input;
     // Until the motor has forgotten what the mixer made of u.
     loop.observer.release_samples = static_cast<int>(3 * config.motor_lag / config.sample_time);
-    loop.controller_bandwidth = observer_bandwidth / 2;
+    loop.controller_bandwidth = config.controller_bandwidth;
     loop.limits = {.lower = -1, .upper = 1};
     const auto made = Loop::make(loop);
     if (!made) return made.error();
@@ -51,7 +75,7 @@ class RateAxis {
                                         .sample_time = config.sample_time,
                                         .input_range = 1});
     if (!monitor) return monitor.error();
-    return RateAxis(config, *made, *monitor);
+    return RateAxisOf(config, *made, *monitor);
   }
 
   /// @param flying armed, and thrust beyond what lifts off @param mixer_at_limit of the last sample
@@ -81,7 +105,7 @@ class RateAxis {
   [[nodiscard]] const Loop& loop() const { return loop_; }
 
  private:
-  RateAxis(const Config& config, const Loop& loop, const Monitor& monitor)
+  RateAxisOf(const Config& config, const Loop& loop, const Monitor& monitor)
       : config_(config), loop_(loop), monitor_(monitor) {}
 
   Config config_;
@@ -89,5 +113,6 @@ class RateAxis {
   Monitor monitor_;
   float reference_ = 0;
 };
+using RateAxis = RateAxisOf<64>;
 
 }  // namespace guards

@@ -193,8 +193,9 @@ void bound(Report& report) {
                          hover * 0.3 * (1.0 / 25 + 1.0 / 200), steady, Tolerance(0.03),
                          "(d - bound) (1 / omega_c + 1 / (2 omega_o))");
   draw(report, "bound",
-       "A load of 0.8 b0 for 0.4 s, with dhat limited to 0.5 b0: the load above this bound causes "
-       "a steady error, and bounded() reports it.",
+       "A load of 0.8 b0 for 0.4 s. The bound is asked for: dhat may take at most 0.5 b0 of the "
+       "actuator, whatever the observer sees. What the load has beyond it stays as a steady error, "
+       "which bounded() reports; without the bound 0.96 of the actuator goes to the load.",
        bare, guarded, "rate (rad/s)", "dhat / b0", true);
 }
 

@@ -38,7 +38,7 @@ struct Outcome {
   double error = 0;     // of b0, share
   bool covered = false;
   bool wrong = false;   // of the other sign, or off by a factor of two
-  bool warned = false;  // that b0 differs between small and large u, or that y is early
+  bool warned = false;  // that b0 differs with u or at standstill, or that y is early
 };
 
 Outcome identified(std::uint64_t seed, Habit habit) {
@@ -58,7 +58,7 @@ Outcome identified(std::uint64_t seed, Habit habit) {
   outcome.error = std::abs(b0.value / made.truth.input_gain - 1);
   outcome.covered = b0.low() <= made.most && b0.high() >= made.least;
   outcome.wrong = !(b0.value > 0.5 * made.least && b0.value < 2 * made.most);
-  outcome.warned = found->by_size.differ() || found->lead.time > 0;
+  outcome.warned = found->by_size.differ() || found->in_motion.differ() || found->lead.time > 0;
   return outcome;
 }
 

@@ -27,73 +27,15 @@
 #include <string>
 #include <vector>
 
-#include <esokit/control/adrc.hpp>
-#include <esokit/observer/linear_eso.hpp>
-#include <esokit/sim/monte_carlo.hpp>
-
 #include "common/report.hpp"
+#include "monte_carlo/drives.hpp"
 
 using namespace esokit;
 using namespace esokit::examples;
+using namespace drives;
 
 namespace {
 
-constexpr double T = 1e-3;
-constexpr double input_gain = 50;
-constexpr double load = -400;
-
-using Controller = Adrc<LinearEso<2>>;
-using Drive = LinearPlant<3>;
-
-Drive drive(double b, double friction, double lag) {
-  return with_lag(LinearPlant<2>::chain({.coefficients = {0, friction}, .input_gain = b}).value(),
-                  lag)
-      .value();
-}
-
-Controller controller() {
-  return Controller::make(
-             {.observer = {.observer_bandwidth = 150, .input_gain = input_gain, .sample_time = T},
-              .controller_bandwidth = 20,
-              .limits = {.lower = -60, .upper = 60}})
-      .value();
-}
-
-/// What is drawn of a run.
-struct Machine {
-  double gain, friction, lag, noise;
-
-  explicit Machine(sim::Draw& draw)
-      : gain(draw.uniform_ratio(20, 125)),
-        friction(draw.uniform(0, 12)),
-        lag(draw.uniform(0.5e-3, 12e-3)),
-        noise(draw.uniform(0.1e-3, 0.5e-3)) {}
-};
-
-constexpr auto vary = [](auto& trial, sim::Draw& draw) {
-  const Machine machine(draw);
-  trial.plant = drive(machine.gain, machine.friction, machine.lag);
-  trial.noise = machine.noise;
-};
-
-sim::MonteCarloConfig<Drive, Controller> config(std::int64_t runs) {
-  return {.runs = runs,
-          .loop = {.duration = 1.0,
-                   .reference = 1.0,
-                   .disturbance = [](double t) { return t < 0.5 - T / 2 ? 0.0 : load; },
-                   .seed = 22}};
-}
-
-const auto position_error = [](const auto& s) { return s.output - s.reference; };
-const auto overshoot = sim::largest("overshoot (rad)", position_error, {.to = 0.5, .limit = 0.05});
-const auto settling = sim::settling_time("settling time to 2 % (s)", position_error, 0.02,
-                                         {.to = 0.5, .limit = 0.45});
-const auto dip =
-    sim::largest("dip under load (rad)", [](const auto& s) { return s.reference - s.output; },
-                 {.from = 0.5, .limit = 0.35});
-const auto chatter =
-    sim::root_mean_square("rms of u at rest", [](const auto& s) { return s.input; },
-                          {.from = 0.45, .to = 0.499, .limit = 1.5});
 constexpr std::size_t numbers = 4;
 constexpr std::array<const char*, numbers> wishes = {
     "overshoot above 0.05 rad", "not within 2 % by 0.45 s", "dips by more than 0.35 rad",

@@ -224,7 +224,7 @@ int main(int argc, char** argv) {
       return out;
     };
     const Style style{.name = p == 0 ? "LESO (p = 1)" : "cascade, p = 3",
-                      .color = p == 0 ? Color::vermillion : Color::blue};
+                      .color = p == 0 ? Color::blue : Color::green};
     const auto t = shown(noisy[p].t);
     piece.panel(0, 0)
         .x_label("t (s)")

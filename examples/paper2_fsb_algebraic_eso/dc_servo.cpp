@@ -374,7 +374,9 @@ int main(int argc, char** argv) {
       .name("velocity")
       .line(begin(t), begin(linear_drawn.v_estimate), leso)
       .line(begin(t), begin(shifted_drawn.v_estimate),
-            {.name = "AlgebraicEso", .color = Color::blue});
+            {.name = "AlgebraicEso", .color = Color::blue})
+      .line(begin(t), begin(shifted_drawn.v),
+            {.name = "true (FSB)", .color = Color::black, .dash = Dash::dotted});
   peak.panel(0, 1)
       .x_label("t (s)")
       .y_label("u (V)")

@@ -659,7 +659,7 @@ int main(int argc, char** argv) {
     Series series;
     (void)run(*kind, bandwidths[w7], 1, &series);
     const Style style{.name = kind == &leso ? "LESO" : "ABESO",
-                      .color = kind == &leso ? Color::vermillion : Color::blue};
+                      .color = kind == &leso ? Color::black : Color::blue};
     for (const std::size_t later : {0u, 1u}) {
       const double from = later == 0 ? 0.0 : 14.0, to = later == 0 ? 1.5 : 15.5;
       Curve shown;

@@ -372,7 +372,7 @@ int main(int argc, char** argv) {
           .legend(Legend::above)
           .name(column == 0 ? "quiet" : "noisy")
           .line(piece, {.name = name_of(kind),
-                        .color = kind == Kind::padrc ? Color::vermillion : Color::blue});
+                        .color = kind == Kind::padrc ? Color::blue : Color::vermillion});
     }
   }
   report.add(errors);

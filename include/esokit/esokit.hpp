@@ -165,6 +165,7 @@
 #include <esokit/sim/signals.hpp>
 #include <esokit/sim/statistics.hpp>
 #include <esokit/sim/step_response.hpp>
+#include <esokit/sim/study_records.hpp>
 #include <esokit/sim/trapezoid.hpp>
 #include <esokit/sim/window.hpp>
 #include <esokit/tune/controller.hpp>

@@ -11,6 +11,7 @@
 #include <esokit/core/error_text.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <limits>
+#include <numbers>
 #include <support/no_allocation.hpp>
 #include <support/numbers.hpp>
 #include <support/refusal.hpp>
@@ -120,7 +121,7 @@ TEST(Experiment, IsExactOnAChainWithDeadTime) {
     // What a lag could hide between the samples: (w T)^2 / 8.
     EXPECT_NEAR(one.result()->input_gain_half_width, 5 * 0.0314159 * 0.0314159 / 8, 1e-6);
     EXPECT_EQ(one.result()->windows, 4);
-    EXPECT_NEAR(one.result()->frequency, 2 * M_PI / 0.2, 1e-9);
+    EXPECT_NEAR(one.result()->frequency, 2 * std::numbers::pi / 0.2, 1e-9);
     const auto two = run<2>(steps(), Plant(2, 5, 0, 9, T, d));
     // The second difference of y loses y / (w T)^2 to rounding.
     EXPECT_NEAR(two.result()->input_gain, 5, 1e-6);

@@ -224,6 +224,19 @@ TEST(InnovationsFit, KeepsItsParametersWithinBounds) {
   EXPECT_LE(found.at.latency, 0.05);
 }
 
+// At a bound the other parameters go on as if it were known. When they counted on a step that the
+// bound does not let one take, the fit stayed at three times the mean square for a dozen steps.
+TEST(InnovationsFit, DoesNotStickAtABound) {
+  const FitData data = second_order(80, 0.015, 0.0062, 2, 1e-4);
+  InnovationsFit fit(data, {1, 1, true}, {0.5, 300, 1e-4, 0.012, 0.5});
+  const Fit few = fit.minimise({20, 0.012, 0.4, 0}, true, 8);
+  const Fit many = fit.minimise({20, 0.012, 0.4, 0}, true, 60);
+  EXPECT_EQ(many.at.latency, 0.012);
+  EXPECT_EQ(many.at.bandwidth, 300);
+  EXPECT_TRUE(many.converged);
+  EXPECT_LT(few.mean_square, 1.01 * many.mean_square);
+}
+
 // A line where u has one, too, may be an error of the model: it counts from a fifth of u's own on.
 TEST(FindSines, LeavesALineThatUMayHaveMade) {
   constexpr double gain = 2, swing = 0.5, w = 11;

@@ -616,6 +616,39 @@ TEST(BestOrder, IsTheLikelihoodsUnlessAnotherIsFarBetterBelow) {
   EXPECT_EQ(esokit::detail::best_order(orders) - orders.begin(), 2);
 }
 
+// y'' = b0 u - a y' - friction is y' = b0 / a u with a lag of 1 / a but for friction at standstill:
+// order 1 may be better at low bandwidths, but is the same machine with less in it.
+TEST(BestOrder, OneThatIsAPartOfTheLikelyOneSaysNothingNew) {
+  std::vector<esokit::OrderFit> orders(2);
+  esokit::OrderFit &lower = orders[0], &likely = orders[1];
+  lower.model.order = 1, lower.slower = -2;
+  likely.model.order = 2, likely.criterion = -200, likely.friction_scale = 0.01;
+  const auto chosen = [&](double pole, double ratio, double latency) {
+    likely.fit.linear = {-50};
+    likely.fit.at.pole = pole;
+    likely.fit.at.latency = 0.05;
+    lower.fit.linear = {-50 / (pole * ratio)};
+    lower.fit.at.latency = latency * (1 / pole + 0.05);
+    return esokit::detail::best_order(orders)->model.order;
+  };
+  EXPECT_EQ(chosen(10, 1, 1), 2);
+  for (const double edge : {0.75, 1 / 0.75}) {
+    const double inside = edge < 1 ? 1.01 * edge : edge / 1.01;
+    const double outside = edge < 1 ? edge / 1.01 : 1.01 * edge;
+    EXPECT_EQ(chosen(10, inside, 1), 2) << edge;
+    EXPECT_EQ(chosen(10, outside, 1), 1) << edge;
+    EXPECT_EQ(chosen(10, 1, inside), 2) << edge;
+    EXPECT_EQ(chosen(10, 1, outside), 1) << edge;
+  }
+  EXPECT_EQ(chosen(10, -1, 1), 1);
+  EXPECT_EQ(chosen(-10, 1, 1), 1);
+  likely.model.order = 3;
+  EXPECT_EQ(chosen(10, 1, 1), 1);
+  likely.model.order = 2;
+  likely.friction_scale = 0;
+  EXPECT_EQ(chosen(10, 1, 1), 1);
+}
+
 // What was found goes into an observer, and the plant into simulation and analysis, in a call each.
 TEST(Identified, GoesStraightIntoAnObserverSimulationAndAnalysis) {
   Identified found;
@@ -703,6 +736,41 @@ TEST(Identify, RefusesALogWithoutExcitation) {
 }
 
 // Each rule by its text and from both sides, on a study whose numbers are put there.
+// The interval of b0 beside what the rest of the log says.
+TEST(Widened, IsWhatTheOtherEvidenceAsksFor) {
+  Identified found;
+  found.input_gain = {-50, 2};
+  found.log.used = 10000;
+  found.log.sample_time = T;
+  found.latency.value = 3 * T;
+  found.correlation = 0.1;
+  found.second_opinion = {{-60, 1}, 0.9, 1};
+  const auto half = [&] { return esokit::detail::widened(found, {}).half_width; };
+  EXPECT_EQ(half(), 2);
+  found.input_gain.half_width = 5.1;  // beyond a tenth both may be right
+  EXPECT_EQ(half(), 10);
+  found.input_gain.half_width = 11;
+  EXPECT_EQ(half(), 11);
+  // Coloured: a per cent more, and both again.
+  found.input_gain.half_width = 2;
+  found.correlation = 0.11;
+  EXPECT_EQ(half(), 10);
+  found.second_opinion.explained = 0.5;
+  EXPECT_EQ(half(), 2.5);
+  found.second_opinion.explained = 0.9;
+  found.latency.value = 0.4 * T;
+  EXPECT_EQ(half(), 2.5);
+  // Friction holds: to the end of what the motion says, on either side.
+  found.correlation = 0.1;
+  found.in_motion = {0.4, {-70, 3}, {-20, 5}, -50};
+  EXPECT_EQ(half(), 23);
+  found.input_gain.value = -90;
+  EXPECT_EQ(half(), 23);
+  found.in_motion.still = 0;
+  EXPECT_EQ(half(), 2);
+  EXPECT_EQ(esokit::detail::widened(found, {}).value, -90);
+}
+
 TEST(Judge, RefusesByName) {
   Log log, stamped;
   stamped.time = {0, T};

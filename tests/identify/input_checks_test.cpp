@@ -91,6 +91,61 @@ TEST(GainBySize, DiffersByAQuarterAndByMoreThanTheIntervals) {
   EXPECT_FALSE(found.differ());
 }
 
+// y'' = b0 u - friction, which holds at standstill; steps of u, half of them below friction.
+TEST(GainInMotion, TellsFrictionThatHolds) {
+  const auto sticks = [](double friction) {
+    esokit::sim::Gaussian gaussian(7);
+    Log log;
+    log.sample_time = T;
+    double y = 0, v = 0, u = 0;
+    constexpr double h = T / 20;
+    for (int k = 0; k < 3000; ++k) {
+      if (k % 50 == 0) u = 1.5 * gaussian.next() - 0.05 * y;
+      log.u.push_back(u);
+      log.y.push_back(y + 1e-4 * gaussian.next());
+      for (int i = 0; i < 20; ++i) {
+        const double force = b0 * u - pole * v;
+        if (v == 0 && std::abs(force) <= friction) continue;
+        const double next = v + h * (force - std::copysign(friction, v != 0 ? v : force));
+        v = friction > 0 && v * next < 0 ? 0 : next;
+        y += h * v;
+      }
+    }
+    esokit::IdentifyOptions options;
+    options.orders = {2};
+    options.averaged = 1;
+    return esokit::study(log, options).value();
+  };
+  const auto smooth = sticks(0);
+  EXPECT_GT(smooth.in_motion.still, 0.005);
+  EXPECT_FALSE(smooth.in_motion.differ());
+  EXPECT_NEAR(smooth.in_motion.moving.value, b0, 0.03 * b0);
+  const auto held = sticks(25);
+  EXPECT_GT(held.in_motion.still, 0.3);
+  EXPECT_TRUE(held.in_motion.differ());
+  EXPECT_LT(std::abs(held.in_motion.standing.value), 0.7 * b0);
+  EXPECT_NEAR(held.in_motion.moving.value, b0, 0.2 * b0);
+  // The interval reaches to the end of that of the motion.
+  const auto& moving = held.in_motion.moving;
+  EXPECT_GE(held.input_gain.half_width,
+            std::max(moving.high() - held.input_gain.value, 0.0) * (1 - 1e-12));
+}
+
+TEST(GainInMotion, DiffersIfStandstillIsSmaller) {
+  esokit::GainInMotion found{0.1, {-4, 0.5}, {-2.9, 0.59}, -3.6};
+  EXPECT_TRUE(found.differ());
+  found.all = -3.65;  // a tenth matters
+  EXPECT_FALSE(found.differ());
+  found.all = -4.5;
+  EXPECT_TRUE(found.differ());
+  found.still = 0;
+  EXPECT_FALSE(found.differ());
+  found = {0.1, {-2.9, 0.59}, {-4, 0.5}, -3.6};
+  EXPECT_FALSE(found.differ());
+  found = {0.1, {-4, 0.5}, {-2.9, 0.61}, -3.6};
+  EXPECT_FALSE(found.differ());
+}
+
 TEST(Lead, TellsThatUIsLate) {
   const Log causal = machine(straight);
   EXPECT_EQ(studied(causal).lead.time, 0);

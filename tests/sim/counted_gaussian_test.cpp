@@ -1,5 +1,6 @@
 // CountedGaussian: the generator against its authors' known answers, the normal numbers against
 // long double and against the distribution that they should have, lanes against runs alone.
+#include <Random123/threefry.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -38,6 +39,21 @@ TEST(Threefry, GivesTheKnownAnswers) {
     esokit::sim::detail::Threefry(one.key[0], one.key[1])(first, second);
     EXPECT_EQ(first, one.answer[0]);
     EXPECT_EQ(second, one.answer[1]);
+  }
+}
+
+// The authors' own program (Debian: librandom123-dev), for any counters and keys.
+TEST(Threefry, IsThatOfItsAuthors) {
+  const esokit::sim::detail::Threefry dice(1, 2);
+  for (std::uint64_t i = 0; i < 20000; ++i) {
+    std::uint64_t word[4] = {i, 0, i, 1};
+    dice(word[0], word[1]);
+    dice(word[2], word[3]);
+    const auto theirs =
+        threefry2x64_R(13, threefry2x64_ctr_t{{word[0], word[1]}}, {{word[2], word[3]}});
+    esokit::sim::detail::Threefry(word[2], word[3])(word[0], word[1]);
+    ASSERT_EQ(word[0], theirs.v[0]) << i;
+    ASSERT_EQ(word[1], theirs.v[1]) << i;
   }
 }
 

@@ -17,6 +17,7 @@
 #include <esokit/sim/monte_carlo.hpp>
 #include <limits>
 #include <span>
+#include <sstream>
 #include <string>
 #include <support/refusal.hpp>
 #include <thread>
@@ -395,6 +396,37 @@ TEST(MonteCarlo, RunsWhatPacksCannot) {
   EXPECT_EQ(refusal(sim::run(packed, fourfold,
                              {.duration = 0.02, .sample_time = T, .jitter = 0.1, .number = 1})),
             "jitter: must be left out if packs run by number");
+}
+
+/// The table has each run with the numbers that `on_run` is told, all their digits.
+TEST(MonteCarlo, WritesATable) {
+  const auto own = [](double y, double r) { return 20 * (r - y); };
+  std::vector<double> numbers;
+  const auto study = sim::monte_carlo(
+      servo(), own,
+      {.runs = 300,
+       .loop = {.duration = 0.02, .sample_time = T, .reference = 1.0, .noise = 1e-3},
+       .on_run = [&](std::int64_t, std::span<const double> n) {
+         numbers.insert(numbers.end(), n.begin(), n.end());
+       }});
+  std::string csv;
+  const auto end = sim::final_value("the \"end\"", error);
+  const auto top = sim::largest("top, m", error);
+  const auto outcome = study.run_to_csv(csv, end, top, sim::average("plain", error)).value();
+  ASSERT_EQ(numbers.size(), 900u);
+  EXPECT_EQ(outcome.runs, 300);
+  std::istringstream lines(csv);
+  std::string line;
+  std::getline(lines, line);
+  EXPECT_EQ(line, "run,\"the \"\"end\"\"\",\"top, m\",plain");
+  for (std::size_t i = 0; i < 300; ++i) {
+    ASSERT_TRUE(std::getline(lines, line));
+    char* at = nullptr;
+    ASSERT_EQ(std::strtol(line.c_str(), &at, 10), static_cast<long>(i));
+    for (std::size_t k = 0; k < 3; ++k) ASSERT_EQ(std::strtod(at + 1, &at), numbers[3 * i + k]);
+    ASSERT_EQ(*at, '\0');
+  }
+  EXPECT_FALSE(std::getline(lines, line));
 }
 
 /// An observer of a user, who knows of no packs: what it inherits of them is not its own.

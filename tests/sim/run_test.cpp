@@ -472,6 +472,30 @@ TEST(Run, CallsBackAndStops) {
   EXPECT_EQ(end->controller.output(), hand.output());
 }
 
+/// Each curve takes the column of its name.
+TEST(Run, IsDrawnByOneText) {
+  const auto run = sim::run(servo(), adrc(), {.duration = 3 * T, .reference = 1.0}).value();
+  const std::string text = run.gnuplot("own");
+  EXPECT_NE(text.find("$run << END\n" + run.csv() + "END\n"), std::string::npos);
+  EXPECT_NE(text.find("layout 3,1 title 'own'"), std::string::npos);
+  const char* columns[] = {"t", "y", "measurement", "r", "u", "dhat"};
+  int curves = 0;
+  for (int i = 0; i < 6; ++i) {
+    const std::string curve =
+        "using 1:" + std::to_string(i + 1) + " with lines title '" + columns[i] + "'";
+    curves += text.find(curve) != std::string::npos ? 1 : 0;
+  }
+  EXPECT_EQ(curves, 4);
+  EXPECT_EQ(run.csv().substr(0, run.csv().find('\n')),
+            "t,y,measurement,reference,u,total_disturbance");
+  // Without an observer there is nothing to draw of it.
+  const auto bare = sim::run(servo(), [](double y, double r) { return 20 * (r - y); },
+                             {.duration = 3 * T, .sample_time = T})
+                        .value();
+  EXPECT_NE(bare.gnuplot().find("layout 2,1"), std::string::npos);
+  EXPECT_EQ(bare.gnuplot().find("dhat"), std::string::npos);
+}
+
 TEST(Run, IsWrittenWithAllDigits) {
   const auto run =
       sim::run(servo(), adrc(), {.duration = 3 * T, .reference = 1.0, .noise = 0.1}).value();

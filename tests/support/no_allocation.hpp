@@ -16,9 +16,21 @@ inline std::atomic<long> allocation_count{0};
 inline void* counted_allocation(std::size_t size, std::size_t alignment) {
   ++allocation_count;
   const std::size_t rounded = (size + alignment - 1) / alignment * alignment;
+#ifdef _WIN32
+  void* memory = _aligned_malloc(rounded == 0 ? alignment : rounded, alignment);
+#else
   void* memory = std::aligned_alloc(alignment, rounded == 0 ? alignment : rounded);
+#endif
   if (memory == nullptr) std::abort();
   return memory;
+}
+
+inline void free_allocation(void* memory) noexcept {
+#ifdef _WIN32
+  _aligned_free(memory);
+#else
+  std::free(memory);
+#endif
 }
 
 }  // namespace esokit_test
@@ -43,13 +55,17 @@ void* __wrap_realloc(void* memory, std::size_t size) {
 [[gnu::noinline]] void* operator new(std::size_t size, std::align_val_t alignment) {
   return esokit_test::counted_allocation(size, static_cast<std::size_t>(alignment));
 }
-[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
-[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory) noexcept {
+  esokit_test::free_allocation(memory);
+}
+[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept {
+  esokit_test::free_allocation(memory);
+}
 [[gnu::noinline]] void operator delete(void* memory, std::align_val_t) noexcept {
-  std::free(memory);
+  esokit_test::free_allocation(memory);
 }
 [[gnu::noinline]] void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
-  std::free(memory);
+  esokit_test::free_allocation(memory);
 }
 
 namespace esokit_test {

@@ -672,6 +672,7 @@ TEST(PlayTest, PlaysTheSoftenedLawAsItRuns) {
   TuneModel model = servo();
   model.order = 3;
   model.pole = 0.0;
+  model.friction = 0.0;
   const auto tuning = tune(model, {.controller_bandwidth = 0.3 / model.latency()},
                            {.bandwidth_ratio = 0.0, .play = esokit::TunePlay::all})
                           .value();
@@ -735,6 +736,7 @@ TEST(TuneTest, SoftensOnlyWhatIsLostWithoutIt) {
   TuneModel model = servo();
   model.order = 3;
   model.pole = 0.0;
+  model.friction = 0.0;
   const auto tuning = tune(model, {}, {.play = esokit::TunePlay::all}).value();
   int plain = 0, soft = 0;
   bool softened = false;
@@ -758,6 +760,81 @@ TEST(TuneTest, SoftensOnlyWhatIsLostWithoutIt) {
   }
   EXPECT_GT(plain, 0);
   EXPECT_GT(soft, 0);
+}
+
+// A load that grows moves the machine once it is above the friction: y = load (t - t0)^3 / 6, with
+// and without a sensor's lag, for which the states have other units. u is zero.
+TEST(PlayTest, FrictionHoldsUntilTheForceIsLarger) {
+  TuneModel model = servo();
+  model.order = 3;
+  model.pole = 0.0;
+  model.noise = 1e-60;
+  for (const double sensor : {0.0, 0.003}) {
+    model.sensor = sensor;
+    esokit::LinearController idle;
+    for (auto* matrix : {&idle.y_to_u, &idle.r_to_u}) *matrix = esokit::DynamicMatrix<double>(1, 1);
+    const double latency = model.latency();
+    const double load = 0.5 * 80.0 * 0.5 * (model.u_max - model.u_min);
+    // Half of the final force.
+    model.friction = load * 5.0 * latency;
+    const double whole = load * std::pow(5.0 * latency, 3) / 6.0;
+    double moved = 0.0;
+    (void)esokit::play(model, 1.0, idle, esokit::friction_events[0], 1.0,
+                       [&](double t, double, double y, double u) {
+                         EXPECT_EQ(u, 0.0);
+                         if (t > 10.0 * latency) return;
+                         const double since = std::max(t - 5.0 * latency, 0.0);
+                         moved = load * std::pow(since, 3) / 6.0;
+                         // The sensor is late by its lag.
+                         if (sensor > 0.0 && since < latency) return;
+                         EXPECT_NEAR(y, load * std::pow(since - sensor, 3) / 6.0, 0.03 * whole)
+                             << t;
+                       });
+    EXPECT_GT(moved, 0.9 * whole);
+  }
+}
+
+// Three integrators behind friction: nothing is recommended, unless there is none. With a pole of
+// the actuator there is a law that is slow enough.
+TEST(TuneTest, OrderThreeHasToStandFriction) {
+  TuneModel model = servo();
+  model.order = 3;
+  model.pole = 0.0;
+  const esokit::TuneRules all{.play = esokit::TunePlay::all};
+  const auto unknown = tune(model, {}, all).value();
+  EXPECT_EQ(unknown.chosen(), nullptr);
+  EXPECT_TRUE(unknown.designs.front().feasible);
+  for (const TunedDesign& design : unknown.designs) {
+    if (!design.feasible) continue;
+    EXPECT_NE(design.lost.find("friction"), std::string::npos) << design.name;
+    EXPECT_EQ(std::string(alarms(unknown, design).front().name), "overload") << design.name;
+    EXPECT_TRUE(esokit::swings_with_friction(unknown.model, design.controller)) << design.name;
+  }
+  model.friction = 1e-300;
+  EXPECT_TRUE(model.may_rub());
+  model.friction = 0.0;
+  EXPECT_FALSE(model.may_rub());
+  EXPECT_NE(tune(model).value().chosen(), nullptr);
+  model.friction.reset();
+  model.pole = 0.1 / model.latency();
+  const auto leaky = tune(model, {}, all).value();
+  int kept = 0;
+  for (const TunedDesign& design : leaky.designs) {
+    if (!design.feasible) continue;
+    EXPECT_GE(design.damping_latencies, 1.3 * 0.999 * 11.0) << design.name;
+    if (!design.comes_back) continue;
+    ++kept;
+    EXPECT_FALSE(esokit::swings_with_friction(leaky.model, design.controller)) << design.name;
+    for (const auto& variant : esokit::played_variants(leaky.model)) {
+      for (const auto& event : esokit::played_events(variant.model)) {
+        const auto played = esokit::play(
+            variant.model, variant.gain, design.controller, event,
+            design.played_settling(variant.model), [](auto...) {}, design.played_law());
+        EXPECT_TRUE(played.back || !played.counts) << design.name;
+      }
+    }
+  }
+  EXPECT_GT(kept, 0);
 }
 
 // Order 2 is softened, and as designed where only that comes back; neither ranks behind.
@@ -1065,6 +1142,10 @@ TEST(TuneTest, RefusesWhatIsNoProblem) {
   EXPECT_EQ(refused([](TuneModel& m) { m.noise = 0.0; }), "noise must be finite and positive");
   EXPECT_EQ(refused([](TuneModel& m) { m.disturbance = nan; }),
             "disturbance must be finite and positive");
+  for (const double friction : {-1e-300, nan, std::numeric_limits<double>::infinity()}) {
+    EXPECT_EQ(refused([&](TuneModel& m) { m.friction = friction; }),
+              "friction must be finite and not negative");
+  }
   EXPECT_EQ(refused([](TuneModel& m) { m.input_gain.half_width = 1.0; }),
             "input_gain.half_width must be below b0: the sign of b0 has to be known");
   EXPECT_EQ(refused([](TuneModel& m) { m.u_max = m.u_min; }), "u_max must be above u_min");
@@ -1084,7 +1165,7 @@ TEST(TuneTest, RefusesWhatIsNoProblem) {
   // Numbers of an LQG controller that no double holds.
   EXPECT_EQ(refused([](TuneModel& m) { m.pole = -9e4; }),
             "optimum cannot be computed: the numbers of this model are too far apart");
-  for (const esokit::TuneRules rules :
+  for (const esokit::TuneRules& rules :
        {esokit::TuneRules{.modulus_margin = 1.0}, esokit::TuneRules{.gain_factor = 0.99}}) {
     EXPECT_EQ(esokit_test::refusal(tune(plain(1), {}, rules)),
               rules.gain_factor < 1.0 ? "gain_factor: must be finite and 1 or more"

@@ -17,8 +17,6 @@ template <class Design>
 
 extern "C" {
 
-unsigned update_nothing(void*, float, float) { return 0; }
-
 unsigned update_LinearEso(void* observer, float y, float u_applied) {
   return update<Linear>(observer, y, u_applied);
 }

@@ -71,6 +71,14 @@ esokit::FitData simulated(const Identified& found, const esokit::FitData& rows) 
 
 std::string percent(double share) { return number_text(100 * share, 3) + " %"; }
 
+/// Why there may be no design of order 3, and what to do.
+const std::string three_integrators =
+    "Friction acts as a large damping on small motions. Behind an actuator that integrates, it "
+    "leaves three integrators with that of the observer, and no law of this kind brings these to "
+    "rest. Measure what the actuator sets (force, pressure, speed), control it by an inner loop of "
+    "order 1, and y by an outer one of order 2; or, if the machine has no friction, say so: "
+    "--friction 0.";
+
 }  // namespace
 
 Design Design::make(const Settings& settings, const Input& input, const Findings& findings) {
@@ -78,7 +86,8 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
   const Identified& found = findings.found;
   const auto [least, largest] = std::minmax_element(findings.rows.u.begin(), findings.rows.u.end());
   const auto limits = settings.limits.value_or(std::pair(*least, *largest));
-  const auto model = as_printed(esokit::tune_model(found, limits.first, limits.second));
+  auto model = as_printed(esokit::tune_model(found, limits.first, limits.second));
+  model.friction = settings.friction;
   const double range = limits.second - limits.first;
   esokit::TuneWish wish;
   wish.settling_time = settings.settling_time;
@@ -121,7 +130,8 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
         : tuning->designs.front().feasible
             ? "No design is recommended: none comes back from an overload, the first not from " +
                   tuning->designs.front().lost +
-                  ". Relax the requirement: --noise, --settling, --omega-c."
+                  (model.may_rub() ? ". " + three_integrators
+                                   : ". Relax the requirement: --noise, --settling, --omega-c.")
             : "No family keeps the rules; the nearest, " + tuning->designs.front().name +
                   ", misses: " + tuning->designs.front().constraint +
                   ". Relax the requirement: --noise, --settling, --omega-c.";
@@ -239,17 +249,40 @@ Figure tradeoff_figure(const esokit::Tuning& tuning, std::size_t taken) {
   }
   auto& panel = figure.panel(0, 0)
                     .x_label("standard deviation of u by noise (% of its range)")
-                    .y_label("standard deviation of y")
+                    .y_label("standard deviation of y (unit of y)")
                     .name("tradeoff");
   if (!noise.empty())
     panel.line(noise, output, {.name = "best linear controller (LQG)", .color = Color::grey});
+  // Of both, as the logarithm of the largest over the least.
+  const auto span = [](const std::vector<double>& a, const std::vector<double>& b) {
+    double least = a[0], largest = a[0];
+    for (const auto* values : {&a, &b}) {
+      for (const double value : *values) {
+        least = std::min(least, value);
+        largest = std::max(largest, value);
+      }
+    }
+    return std::log(largest / least);
+  };
   std::vector<double> x, y;
+  std::vector<std::string> labels;
   for (std::size_t i = 0; i < tuning.designs.size(); ++i) {
     const auto& design = tuning.designs[i];
     if (!(design.control_noise > 0.0)) continue;
     x.push_back(100 * design.control_noise / range);
     y.push_back(design.output_deviation);
-    panel.note(x.back() * 1.02, y.back(), " " + std::to_string(i + 1));
+    // Numbers that would stand on each other stand behind one another.
+    const auto near = [&](std::size_t k) {
+      return std::abs(std::log(x[k] / x.back())) < 0.05 * span(x, noise) &&
+             std::abs(std::log(y[k] / y.back())) < 0.06 * span(y, output);
+    };
+    std::size_t at = 0;
+    while (at + 1 < x.size() && !(labels[at].size() > 0 && near(at))) ++at;
+    labels.resize(x.size());
+    labels[at] += (labels[at].empty() ? " " : ", ") + std::to_string(i + 1);
+  }
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    if (!labels[k].empty()) panel.note(x[k] * 1.02, y[k], labels[k]);
   }
   if (!x.empty()) {
     panel.points(x, y, {.color = Color::blue, .marker = Marker::circle, .column = "designs"});
@@ -282,7 +315,8 @@ Figure lost_figure(const esokit::Tuning& tuning, const esokit::TunedDesign& desi
   const auto& variant = variants[static_cast<std::size_t>(design.lost_on)];
   std::vector<double> t, y, u;
   const auto played = esokit::play(
-      variant.model, variant.gain, design.controller, design.lost_in, design.settling_time,
+      variant.model, variant.gain, design.controller, design.lost_in,
+      design.played_settling(variant.model),
       [&](double now, double, double output, double control) {
         t.push_back(now);
         y.push_back(output);
@@ -295,9 +329,15 @@ Figure lost_figure(const esokit::Tuning& tuning, const esokit::TunedDesign& desi
                                           std::min(played.time, 5 * design.settling_time)) /
                                          tuning.model.sample_time));
   for (auto* column : {&t, &y, &u}) column->resize(rows);
-  figure.panel(0, 0).y_label("y").name("y").line(t, y, {.color = Color::blue, .column = "y"});
-  figure.panel(1, 0).x_label("t (s)").y_label("u").name("u").line(
-      t, u, {.color = Color::vermillion, .column = "u"});
+  figure.panel(0, 0)
+      .y_label("y (unit of the log)")
+      .name("y")
+      .line(t, y, {.color = Color::blue, .column = "y"});
+  figure.panel(1, 0)
+      .x_label("t (s)")
+      .y_label("u (unit of the log)")
+      .name("u")
+      .line(t, u, {.color = Color::vermillion, .column = "u"});
   return figure;
 }
 
@@ -307,6 +347,8 @@ std::vector<CsvRow> ranking(const esokit::Tuning& tuning) {
                             "standard deviation of y", "noise in u, % of its range",
                             "y after a load of 10 %", "settling time of a small step (s)",
                             "modulus margin", "delay margin (ms)", "instructions", "limited by"}};
+  // Zero where a design was not played.
+  const auto played = [](double value) { return value > 0.0 ? number_text(value, 3) : "-"; };
   for (std::size_t i = 0; i < tuning.designs.size(); ++i) {
     const auto& d = tuning.designs[i];
     rows.push_back({std::to_string(i + 1) + " " + d.name +
@@ -316,7 +358,7 @@ std::vector<CsvRow> ranking(const esokit::Tuning& tuning) {
                     number_text(d.excess, 3), number_text(d.free_excess, 3),
                     number_text(d.output_deviation, 3),
                     number_text(100 * d.control_noise / range, 3),
-                    number_text(0.1 * range * d.load_peak, 3), number_text(d.settling_time, 3),
+                    played(0.1 * range * d.load_peak), played(d.settling_time),
                     number_text(d.modulus_margin, 2), number_text(1e3 * d.delay_margin, 3),
                     std::to_string(d.instructions), d.constraint});
   }
@@ -415,20 +457,20 @@ void Design::show_on(Page& page, const Findings& findings) const {
       " % of the rows are within the dashed lines. If the machine equals the model, 95 % are.");
   const auto& t = replay_.t;
   replay.panel(0, 0)
-      .y_label("y")
+      .y_label("y (unit of the log)")
       .legend(Legend::above)
       .name("y")
       .line(t, findings.rows.y, {.name = "y", .color = Color::grey, .width = 1.0})
       .line(t, replay_.estimate, {.name = "estimate", .color = Color::blue, .width = 1.1});
   replay.panel(1, 0)
-      .y_label("u, d / b0")
+      .y_label("u, d / b0 (unit of u)")
       .legend(Legend::above)
       .name("u")
       .line(t, findings.rows.u, {.name = "u", .color = Color::grey, .width = 1.0})
       .line(t, replay_.load, {.name = "dhat / b0", .color = Color::vermillion, .width = 1.1});
   replay.panel(2, 0)
       .x_label("t (s)")
-      .y_label("innovation")
+      .y_label("innovation (unit of y)")
       .name("innovation")
       .line(t, replay_.innovation, {.color = Color::blue, .width = 0.8, .column = "innovation"})
       .horizontal_line(replay_.band)

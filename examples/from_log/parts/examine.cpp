@@ -118,6 +118,13 @@ void sound_alarms(const Settings& settings, const Input& input, Findings& all) {
                         " beyond. Does the actuator saturate, stick, or act as the square of u? "
                         "Record the u that it held, or correct u by its curve."});
   }
+  if (const auto& motion = found.in_motion; motion.differ()) {
+    all.alarms.push_back(
+        {"sticks", "Friction holds the machine: b0 is " + number_text(motion.moving.value, 3) +
+                       " in motion and " + number_text(motion.standing.value, 3) +
+                       " in the rows at standstill (" + number_text(100 * motion.still, 2) +
+                       " %). Record faster motion with larger u."});
+  }
   if (found.lead.time > 0.0) {
     all.alarms.push_back({"lead", "y (" + input.y + ") moves " + number_text(found.lead.time, 2) +
                                       " s before u: is u logged late?"});

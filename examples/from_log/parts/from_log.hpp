@@ -40,6 +40,7 @@ struct Settings {
   std::vector<int> orders{};  ///< empty: 1 for a speed, a temperature or a level, else found out
   std::optional<double> expected_gain;  ///< b0 as the user believes it to be
   std::optional<std::pair<double, double>> limits;
+  std::optional<double> friction;  ///< as in TuneModel; none: not known
   double noise_share = 0;  ///< wish: deviation of u by noise, share of its range; 0: as tune has it
   double settling_time = 0;  ///< wish instead: s
   double controller = 0;     ///< wish instead: omega_c, rad/s

@@ -13,6 +13,7 @@
 #include <system_error>
 #include <utility>
 
+#include "common/system.hpp"
 #include "from_log/page_template.hpp"  // common/page.html, by CMake
 
 namespace from_log {
@@ -20,6 +21,7 @@ namespace {
 
 using esokit::examples::CsvRow;
 using esokit::examples::Figure;
+using esokit::examples::path_of;
 
 std::string escaped(const std::string& text) {
   std::string out;
@@ -62,20 +64,17 @@ std::string base64(const std::string& bytes) {
 /// A folder that goes with it.
 class Scratch {
  public:
-  Scratch() {
-    std::string path = (std::filesystem::temp_directory_path() / "from_log.XXXXXX").string();
-    if (mkdtemp(path.data()) != nullptr) path_ = path;
-  }
+  Scratch() = default;
   ~Scratch() {
     std::error_code ignored;
-    if (!path_.empty()) std::filesystem::remove_all(path_, ignored);
+    if (!path_.empty()) std::filesystem::remove_all(path_of(path_), ignored);
   }
   Scratch(const Scratch&) = delete;
   Scratch& operator=(const Scratch&) = delete;
   [[nodiscard]] const std::string& path() const { return path_; }
 
  private:
-  std::string path_;
+  std::string path_ = esokit::examples::new_scratch_folder();
 };
 
 /// As an image that is in the page itself; what is said in its place without gnuplot.
@@ -84,8 +83,10 @@ std::string html_of(const Figure& figure, const std::string& scratch) {
   if (!scratch.empty() && figure.write(scratch, "svg")) {
     std::ifstream file(scratch + "/" + figure.name() + ".svg", std::ios::binary);
     const std::string svg{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-    text += "<img src=\"data:image/svg+xml;base64," + base64(svg) + "\" alt=\"" +
-            escaped(figure.caption()) + "\">\n";
+    text +=
+        "<label class=\"zoom\"><input type=\"checkbox\" aria-label=\"larger\"><img "
+        "src=\"data:image/svg+xml;base64," +
+        base64(svg) + "\" alt=\"" + escaped(figure.caption()) + "\"></label>\n";
   } else {
     text += "<p>Not drawn: figures need gnuplot and Python 3.</p>\n";
   }
@@ -129,16 +130,14 @@ void replace(std::string& text, const std::string& mark, const std::string& by) 
 std::string new_file(const std::string& folder, const std::string& stem,
                      const std::string& ending) {
   std::error_code problem;
-  std::filesystem::create_directories(folder, problem);
+  std::filesystem::create_directories(path_of(folder), problem);
   for (int number = 1; number < 100'000; ++number) {
-    const std::string file = (std::filesystem::path(folder) /
-                              (stem + (number > 1 ? "-" + std::to_string(number) : "") + ending))
-                                 .string();
-    // "x": two runs at the same time cannot take the same name.
-    if (std::FILE* made = std::fopen(file.c_str(), "wx")) {
-      std::fclose(made);
-      return file;
-    }
+    const std::string file =
+        (path_of(folder) /
+         path_of(stem + (number > 1 ? "-" + std::to_string(number) : "") + ending))
+            .string();
+    // Two runs at the same time cannot take the same name.
+    if (esokit::examples::create_new(file)) return file;
     if (errno != EEXIST) {
       std::fprintf(stderr, "from_log: cannot write %s: %s\n", file.c_str(), std::strerror(errno));
       break;
@@ -187,7 +186,7 @@ std::string Page::write(const std::string& folder, const std::string& stem) cons
   replace(html, "$main", main);
   const std::string file = new_file(folder, stem, ".html");
   if (file.empty() || !esokit::examples::write_text(file, html)) return {};
-  return std::filesystem::absolute(file).lexically_normal().string();
+  return std::filesystem::absolute(path_of(file)).lexically_normal().string();
 }
 
 void Page::add_to(esokit::examples::Report& report) const {

@@ -14,6 +14,8 @@
 #include <esokit/sim/run.hpp>
 #include <esokit/tune/controller.hpp>
 
+#include "common/system.hpp"
+
 namespace from_log {
 namespace {
 
@@ -386,7 +388,7 @@ std::vector<double> Pasting::limits(const TuneModel& model, std::size_t gains) c
 Pasting Pasting::make(const Settings& settings, const Input& input, const esokit::Identified& found,
                       const TuneModel& model, const std::vector<double>& load) {
   Pasting p;
-  const std::string name = std::filesystem::path(settings.file).filename().string();
+  const std::string name = esokit::examples::path_of(settings.file).filename().string();
   p.order = model.order;
   p.input_gain = model.input_gain.value;
   const double half = 0.5 * (model.u_max - model.u_min);

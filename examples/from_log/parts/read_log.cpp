@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+#include "common/system.hpp"
 #include "from_log/parts/from_log.hpp"
 
 namespace from_log {
@@ -93,7 +94,7 @@ std::vector<std::string> words(const std::string& name) {
   return split_words(part == std::string::npos ? text : text.substr(part + 1));
 }
 
-/// What a column is by the first word of its name.
+/// What a column is by the first word of its name, or by all of it.
 struct Usual {
   const char* words;  ///< between blanks
   char column;        ///< t, u or y
@@ -101,7 +102,7 @@ struct Usual {
 };
 constexpr Usual usual_names[] = {
     {" t time stamp timestamp datetime times secs seconds clock ticks millis micros ", 't'},
-    {" zeit uhrzeit zeitstempel temps heure horodatage tiempo hora tempo ", 't'},
+    {" x_value zeit uhrzeit zeitstempel temps heure horodatage tiempo hora tempo ", 't'},
     {" u input torque effort command cmd pwm voltage volts current force duty drive actuator "
      "control "
      "tau power heater q1 ",
@@ -121,11 +122,12 @@ constexpr Usual usual_names[] = {
      "rature niveau velocidad temperatura nivel velocit\xc3\xa0 livello ",
      'y', true}};
 
-/// What is usual about a name, if anything.
+/// What is usual about a name, if anything. LabVIEW's X_Value is known as a whole: an x is none.
 const Usual* usual(const std::string& name) {
-  const std::string word = " " + words(name).front() + " ";
+  const std::string word = lower(name) == "x_value" ? "x_value" : words(name).front();
+  const std::string blank = " " + word + " ";
   for (const Usual& line : usual_names) {
-    if (word.size() > 2 && std::string_view(line.words).find(word) != std::string_view::npos)
+    if (!word.empty() && std::string_view(line.words).find(blank) != std::string_view::npos)
       return &line;
   }
   return nullptr;
@@ -308,14 +310,14 @@ void unwrap(const Settings& settings, Input& input) {
 }  // namespace
 
 Input read_log(const Settings& settings) {
-  const LogFile header(settings.file, settings.separator);
+  const LogFile header(esokit::examples::path_of(settings.file), settings.separator);
   Input input;
   const bool timed = !(settings.sample_time > 0.0) || !settings.time.empty();
   std::vector<std::string> wanted = {guess(header, "u", settings.u),
                                      guess(header, "y", settings.y)};
   if (timed) wanted.push_back(guess(header, "time", settings.time));
   wanted.insert(wanted.end(), settings.known.begin(), settings.known.end());
-  const LogFile file(settings.file, wanted, settings.separator,
+  const LogFile file(esokit::examples::path_of(settings.file), wanted, settings.separator,
                      timed ? std::optional<std::size_t>(2) : std::nullopt);
   input.u = file.name(0);
   input.y = file.name(1);

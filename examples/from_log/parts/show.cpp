@@ -11,6 +11,7 @@
 #include <esokit/core/error_text.hpp>
 #include <esokit/core/version.hpp>
 
+#include "common/system.hpp"
 #include "from_log/parts/log_observer.hpp"
 
 namespace from_log {
@@ -73,8 +74,11 @@ Figure log_figure(const Input& input, const Findings& findings) {
   }
   const auto panel = [&](std::size_t row, const char* name, const std::vector<double>& values,
                          const Spectrum& spectrum, Color color) {
-    auto& over_time = figure.panel(row, 0).x_label("t (s)").y_label(name).name(name).line(
-        t, values, {.color = color, .width = 1.0, .column = name});
+    auto& over_time = figure.panel(row, 0)
+                          .x_label("t (s)")
+                          .y_label(name + std::string(" (unit of the log)"))
+                          .name(name)
+                          .line(t, values, {.color = color, .width = 1.0, .column = name});
     // Of a constant gnuplot would choose a range itself, with a warning.
     const auto first = std::ranges::find_if(values, [](double v) { return std::isfinite(v); });
     const bool constant = std::ranges::none_of(
@@ -124,7 +128,7 @@ Figure model_figure(const Findings& findings) {
     if (w.size() >= 2) {
       figure.panel(0, 0)
           .x_label("w (rad/s)")
-          .y_label("b0")
+          .y_label("b0 (unit of y^{(n)} / u)")
           .log_x()
           .name("plateau")
           .band(w, low, high, {.color = Color::sky, .opacity = 0.3, .column = "b0 +- 2 se"})
@@ -255,7 +259,7 @@ std::vector<CsvRow> log_table(const Input& input, const Findings& findings) {
 
 std::string stem_of(const Settings& settings) {
   // A name of nothing but dots would be a hidden file.
-  const std::string stem = std::filesystem::path(settings.file).stem().string();
+  const std::string stem = esokit::examples::path_of(settings.file).stem().string();
   return stem.find_first_not_of('.') == std::string::npos ? "log" + stem : stem;
 }
 
@@ -296,7 +300,7 @@ std::vector<std::string> in_short(const Findings& findings, const Design& design
 
 Page show(const Settings& settings, const Input& input, const Findings& findings,
           const Design& design) {
-  const std::string name = std::filesystem::path(settings.file).filename().string();
+  const std::string name = esokit::examples::path_of(settings.file).filename().string();
   Page page("From " + name + " to a controller");
   if (!findings.alarms.empty()) {
     std::vector<std::string> lines;
@@ -354,7 +358,7 @@ std::string show_observer(const Settings& settings, const Input& input) {
     for (const auto& column : found.columns) text += ',' + number_text(column[k], 12);
     text += '\n';
   }
-  const std::filesystem::path file = settings.file;
+  const std::filesystem::path file = esokit::examples::path_of(settings.file);
   const std::string numbers = new_file(settings.out, stem_of(settings) + "-estimates", ".csv");
   if (numbers.empty() || !write_text(numbers, text)) return {};
   Page page(file.filename().string() + ", run through an observer");
@@ -373,7 +377,7 @@ std::string show_observer(const Settings& settings, const Input& input) {
   figure.caption(
       "Top: y and its estimate. Bottom: u, and the estimated total disturbance in units of u.");
   figure.panel(0, 0)
-      .y_label("y")
+      .y_label("y (unit of the log)")
       .legend(Legend::above)
       .name("output")
       .line(t, input.log.y, {.name = "y", .color = Color::grey, .width = 1.0})
@@ -383,14 +387,14 @@ std::string show_observer(const Settings& settings, const Input& input) {
     load.push_back(d / how.input_gain);
   figure.panel(1, 0)
       .x_label("t (s)")
-      .y_label("u, d / b0")
+      .y_label("u, d / b0 (unit of u)")
       .legend(Legend::above)
       .name("load")
       .line(t, input.log.u, {.name = "u", .color = Color::grey, .width = 1.0})
       .line(t, load, {.name = "dhat / b0", .color = Color::vermillion, .width = 1.1});
   page.figure(figure);
-  page.text("All estimates are in the file " + std::filesystem::path(numbers).filename().string() +
-            ".");
+  page.text("All estimates are in the file " +
+            esokit::examples::path_of(numbers).filename().string() + ".");
   return page.write(settings.out, stem_of(settings));
 }
 

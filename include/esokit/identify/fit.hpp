@@ -427,28 +427,14 @@ class InnovationsFit {
     double damping = 1e-3;
     for (int step = 0; step < steps; ++step) {
       const auto [jacobian, free] = sensitivities(best, with_bandwidth);
-      const int count = static_cast<int>(free.size());
-      if (count == 0) return best;
-      const int all = static_cast<int>(jacobian.size());
+      if (free.empty()) return best;
       std::vector<double> normal, right;
       normal_equations(jacobian, residual_, normal, right);
       bool better = false;
-      while (damping < 1e8) {
-        std::vector<double> damped = normal;
-        for (int i = 0; i < all; ++i)
-          damped[static_cast<std::size_t>(i * all + i)] *= 1.0 + (i < count ? damping : 0.0);
-        std::vector<double> change = right;
-        detail::solve_normal(damped, change, all);
+      while (damping < 1e4) {
         std::array<double, 4> move{};
-        bool finite = true;
-        for (int i = 0; i < count; ++i) {
-          finite = finite && is_finite(change[static_cast<std::size_t>(i)]);
-          const int which = free[static_cast<std::size_t>(i)];
-          move[static_cast<std::size_t>(which)] = std::clamp(
-              -change[static_cast<std::size_t>(i)], -longest_step[static_cast<std::size_t>(which)],
-              longest_step[static_cast<std::size_t>(which)]);
-        }
-        if (!finite) break;  // more damping would not help
+        // None at a bound, or one that is not finite: more damping would not help.
+        if (!step_within(best.at, normal, right, free, damping, move)) break;
         const FitPoint trial_point = moved(best.at, move);
         std::swap(residual_, kept_residual_);
         std::swap(columns_, kept_columns_);
@@ -491,11 +477,11 @@ class InnovationsFit {
       double step = small_step[static_cast<std::size_t>(i)];
       move[static_cast<std::size_t>(i)] = step;
       FitPoint beside = moved(fit.at, move);
-      if (same(beside, fit.at)) {
+      if (numbers(beside) == numbers(fit.at)) {
         step = -step;
         move[static_cast<std::size_t>(i)] = step;
         beside = moved(fit.at, move);
-        if (same(beside, fit.at)) continue;
+        if (numbers(beside) == numbers(fit.at)) continue;
       }
       std::vector<double> residual(data_.y.size());
       with_filter(beside,
@@ -615,9 +601,8 @@ class InnovationsFit {
   static constexpr std::array<double, 4> longest_step = {1.0, 0.7, 0.4, 0.2};
   static constexpr std::array<double, 4> small_step = {1e-4, 1e-4, 1e-4, 1e-4};
 
-  static bool same(const FitPoint& a, const FitPoint& b) {
-    return a.bandwidth == b.bandwidth && a.latency == b.latency && a.lag_share == b.lag_share &&
-           a.pole == b.pole;
+  static std::array<double, 4> numbers(const FitPoint& p) {
+    return {p.bandwidth, p.latency, p.lag_share, p.pole};
   }
 
   [[nodiscard]] FitPoint moved(FitPoint p, const std::array<double, 4>& move) const {
@@ -632,6 +617,36 @@ class InnovationsFit {
     p = inside(p);
     if (move[1] == 0.0 && move[3] == 0.0) p.pole = before.pole;
     return p;
+  }
+
+  /// The damped Gauss-Newton step from `p`, limited. A parameter that is at a bound and would leave
+  /// its range stays, and the others move as if it were known: with steps that count on its move
+  /// the fit would get worse. @returns whether anything moves, by a finite step
+  bool step_within(const FitPoint& p, const std::vector<double>& normal, std::vector<double> right,
+                   const std::vector<int>& free, double damping,
+                   std::array<double, 4>& move) const {
+    const std::size_t all = right.size();
+    std::vector<double> damped = normal;
+    for (std::size_t i = 0; i < free.size(); ++i) damped[i * all + i] *= 1.0 + damping;
+    for (bool held = true; held;) {
+      std::vector<double> change = right;
+      detail::solve_normal(damped, change, static_cast<int>(all));
+      held = false;
+      move = {};
+      for (std::size_t i = 0; i < free.size(); ++i) {
+        if (!is_finite(change[i])) return false;
+        const auto which = static_cast<std::size_t>(free[i]);
+        move[which] = std::clamp(-change[i], -longest_step[which], longest_step[which]);
+        std::array<double, 4> alone{};
+        alone[which] = move[which];
+        if (move[which] == 0.0 || numbers(moved(p, alone))[which] != numbers(p)[which]) continue;
+        // A row and a column of zeros: its change is zero.
+        for (std::size_t j = 0; j < all; ++j) damped[i * all + j] = damped[j * all + i] = 0.0;
+        right[i] = 0.0;
+        held = true;
+      }
+    }
+    return move != std::array<double, 4>{};
   }
 
   template <class F>

@@ -133,6 +133,7 @@ struct Identified {
   double correlation = 0;          ///< largest correlation of the innovations over lags 1 to 20
   SecondOpinion second_opinion{};  ///< b0 by output error
   GainBySize by_size{};            ///< b0 at small and at large u
+  GainInMotion in_motion{};        ///< b0 in motion and at standstill, of order 2
   Lead lead{};                     ///< how early y moves before u, if it does
   bool at_once = false;            ///< y follows u within the row, with nothing in between
   int averaged = 1;                ///< rows of the log that were averaged into one
@@ -486,9 +487,19 @@ inline std::vector<OrderFit> fit_orders(const FitData& data, const IdentifyOptio
   return orders;
 }
 
+/// Whether `lower` is `higher` without its friction at standstill: b0 / a as b0, and 1 / a in the
+/// latency. A machine that bends has such a `higher` one, too, but without friction.
+inline bool is_part_of(const OrderFit& lower, const OrderFit& higher) {
+  const double pole = higher.fit.at.pole;
+  if (lower.model.order + 1 != higher.model.order || !(higher.friction_scale > 0.0)) return false;
+  const auto near = [](double a, double b) { return 0.75 * b < a && a < b / 0.75; };
+  return near(higher.fit.linear[0] / pole / lower.fit.linear[0], 1.0) &&
+         near(1.0 / pole + higher.fit.at.latency, lower.fit.at.latency);
+}
+
 /// The order with the best likelihood, unless another one leaves less than 1 / e of the mean square
 /// at lower bandwidths: at its own bandwidth the likelihood depends on the fastest motion, which in
-/// a flexible machine is the bending.
+/// a flexible machine is the bending. One that is only a part of the likely one says nothing new.
 inline auto best_order(const std::vector<OrderFit>& orders) {
   const auto likely = std::min_element(
       orders.begin(), orders.end(),
@@ -496,7 +507,7 @@ inline auto best_order(const std::vector<OrderFit>& orders) {
   const auto slower =
       std::min_element(orders.begin(), orders.end(),
                        [](const OrderFit& a, const OrderFit& b) { return a.slower < b.slower; });
-  return slower->slower < likely->slower - 1.0 ? slower : likely;
+  return slower->slower < likely->slower - 1.0 && !is_part_of(*slower, *likely) ? slower : likely;
 }
 
 /// Whether a force that depends on position acts: it improves the likelihood by more than its
@@ -626,6 +637,24 @@ inline bool white(const Identified& found, const IdentifyOptions& options) {
 inline bool informed(const Identified& found) {
   return found.second_opinion.informative() &&
          found.latency.value >= 0.5 * found.averaged * found.log.sample_time;
+}
+
+/// b0 with the interval that the other evidence asks for. Coloured innovations mean that the model
+/// is not exact, so b0 is not known better than to a per cent. Where output error may be right
+/// instead, the interval spans both. Friction that holds the machine takes b0 down, and that of the
+/// motion is nearer to the truth: the interval reaches to the end of its own.
+inline Estimate widened(const Identified& found, const IdentifyOptions& options) {
+  Estimate gain = found.input_gain;
+  const auto reach = [&](double to) {
+    gain.half_width = std::max(gain.half_width, std::abs(to - gain.value));
+  };
+  const bool coloured = !white(found, options);
+  if (coloured) gain.half_width += 0.01 * std::abs(gain.value);
+  if (informed(found) && (coloured || gain.share() > options.interval_max))
+    reach(found.second_opinion.input_gain.value);
+  const Estimate& moving = found.in_motion.moving;
+  if (found.in_motion.differ()) reach(moving.value > gain.value ? moving.high() : moving.low());
+  return gain;
 }
 
 /// The study of rows that were averaged by `fold`.
@@ -858,19 +887,15 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
     result.second_opinion = second_opinion(used, model, bounds, here.fit.at, w);
     if (result.second_opinion.informative()) break;
   }
-  // Where one of the two may be wrong, the interval spans both. Coloured innovations mean that the
-  // model is not exact, so b0 is not known better than to a percent.
-  const bool coloured = !white(result, options);
-  Estimate& gain_found = result.input_gain;
-  if (coloured) gain_found.half_width += 0.01 * std::abs(gain_found.value);
-  if (informed(result) && (coloured || gain_found.share() > options.interval_max)) {
-    gain_found.half_width = std::max(
-        gain_found.half_width, std::abs(result.second_opinion.input_gain.value - gain_found.value));
-  }
   result.at_bound = here.at_bound;
   if (excitation < excitation_max) {
     result.by_size = gain_by_size(used, model, bounds, here.fit.at);
+    if (model.order == 2) {
+      if (speed.empty()) speed = friction_speed(rows, 2, chosen.fit.noise, chosen.fit.at.latency);
+      result.in_motion = gain_in_motion(used, model, bounds, here.fit, speed);
+    }
   }
+  result.input_gain = widened(result, options);
   result.lead = lead_of(used, model, bounds, here.fit);
   return result;
 }

@@ -1,6 +1,6 @@
 /// @file
-/// What a log tells about its u: an actuator that is not linear, u logged late, y that follows at
-/// once.
+/// What a log tells about its u: an actuator that is not linear, friction that holds against it, u
+/// logged late, y that follows at once.
 #pragma once
 
 #include <algorithm>
@@ -9,6 +9,7 @@
 #include <esokit/identify/fit.hpp>
 #include <esokit/identify/intervals.hpp>
 #include <limits>
+#include <utility>
 #include <vector>
 
 namespace esokit {
@@ -22,10 +23,29 @@ struct GainBySize {
 
   /// Whether the two differ by a quarter, and by more than their intervals: the actuator saturates,
   /// or its effect is not proportional to u.
+  [[nodiscard]] bool differ() const { return knot > 0.0 && differs(small, large); }
+
+  /// Whether two numbers differ by a quarter, and by more than their intervals.
+  [[nodiscard]] static bool differs(const Estimate& a, const Estimate& b) {
+    const double apart = std::abs(a.value - b.value);
+    return apart > a.half_width + b.half_width &&
+           apart > 0.25 * std::max(std::abs(a.value), std::abs(b.value));
+  }
+};
+
+/// b0 in motion and at standstill, where the speed is below a tenth of its rms.
+struct GainInMotion {
+  double still = 0.0;   ///< share of the rows at standstill; 0: not tried
+  Estimate moving{};    ///< b0 in motion
+  Estimate standing{};  ///< b0 at standstill
+  double all = 0.0;     ///< b0 of all rows
+
+  /// Whether b0 is smaller at standstill, as by `GainBySize`, and that of all rows is a tenth off
+  /// that of the motion: friction holds the machine against u, and it matters.
   [[nodiscard]] bool differ() const {
-    const double apart = std::abs(small.value - large.value);
-    return knot > 0.0 && apart > small.half_width + large.half_width &&
-           apart > 0.25 * std::max(std::abs(small.value), std::abs(large.value));
+    return still > 0.0 && GainBySize::differs(moving, standing) &&
+           std::abs(standing.value) < std::abs(moving.value) &&
+           std::abs(moving.value - all) > 0.1 * std::abs(all);
   }
 };
 
@@ -36,6 +56,37 @@ struct Lead {
 };
 
 namespace detail {
+
+/// b0 and that of the further input of `data` alone, at the bandwidth of `at`.
+inline std::pair<Estimate, Estimate> two_gains(const FitData& data, const FitModel& model,
+                                               const FitBounds& bounds, const FitPoint& at) {
+  InnovationsFit fit(data, model, bounds);
+  const Fit best = fit.minimise(at, false, 8);
+  const FitErrors errors = jackknife(fit, best, false);
+  const double t = student_95(19);
+  const std::size_t last = data.inputs.size();
+  return {{best.linear[0], t * errors.linear[0]}, {best.linear[last], t * errors.linear[last]}};
+}
+
+/// b0 in motion and at standstill, at the bandwidth of `here`. @param speed of each row
+inline GainInMotion gain_in_motion(const FitData& data, const FitModel& model,
+                                   const FitBounds& bounds, const Fit& here,
+                                   const std::vector<double>& speed) {
+  double square = 0.0;
+  for (const double v : speed) square += v * v;
+  const double slow = 0.1 * std::sqrt(square / static_cast<double>(speed.size()));
+  FitData split = data;
+  std::vector<double> held(data.u.size(), 0.0);
+  std::size_t rows = 0;
+  for (std::size_t k = 0; k < held.size(); ++k) {
+    if (std::abs(speed[k]) < slow) std::swap(held[k], split.u[k]), ++rows;
+  }
+  if (rows == 0 || rows == held.size()) return {};
+  split.inputs.push_back(std::move(held));
+  const auto [moving, standing] = two_gains(split, model, bounds, here.at);
+  return {static_cast<double>(rows) / static_cast<double>(speed.size()), moving, standing,
+          here.linear[0]};
+}
 
 /// b0 at small and at large u, at the bandwidth of `at`.
 inline GainBySize gain_by_size(const FitData& data, const FitModel& model, const FitBounds& bounds,
@@ -62,13 +113,8 @@ inline GainBySize gain_by_size(const FitData& data, const FitModel& model, const
   const double alone = product(split.u, split.u) * product(beyond, beyond);
   if (!(both * both < 0.999 * alone)) return {};
   split.inputs.push_back(std::move(beyond));
-  InnovationsFit fit(split, model, bounds);
-  const Fit best = fit.minimise(at, false, 8);
-  const FitErrors errors = jackknife(fit, best, false);
-  const double t = student_95(19);
-  const std::size_t large = split.inputs.size();
-  return {
-      knot, {best.linear[0], t * errors.linear[0]}, {best.linear[large], t * errors.linear[large]}};
+  const auto [small, large] = two_gains(split, model, bounds, at);
+  return {knot, small, large};
 }
 
 /// The lead of y, by a fit with u advanced by ten rows: it must leave less than three quarters of

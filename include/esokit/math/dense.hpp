@@ -102,8 +102,9 @@ Matrix<S, Rows, Columns> plus_product_transposed(Matrix<S, Rows, Columns> c,
 }
 
 /// out = a b, all n x n, stored by columns; `out` is neither of them.
-template <class T>
-constexpr void multiply(const T* a, const T* b, T* out, int n) noexcept {
+/// @param n an int, or a constant (std::integral_constant) to have the loops unrolled for it
+template <class T, class N>
+constexpr void multiply(const T* a, const T* b, T* out, N n) noexcept {
   for (int j = 0; j < n; ++j) {
     for (int i = 0; i < n; ++i) out[j * n + i] = T(0.0);
     for (int k = 0; k < n; ++k) {
@@ -189,9 +190,9 @@ std::optional<Matrix<S, Size, Size>> solve_stein(Matrix<S, Size, Size> f, Matrix
 
 /// exp(a) - I in place: Taylor series of a / 2^k, then squared k times as 2 E + E^2. If a is not
 /// finite or too large, the result is not finite.
-/// @param a n x n @param work 2 n^2 numbers
-template <PlainScalar T>
-constexpr void exp_minus_identity(T* a, T* work, int n) noexcept {
+/// @param a n x n @param work 2 n^2 numbers @param n an int, or a constant: see `multiply`
+template <PlainScalar T, class N>
+constexpr void exp_minus_identity(T* a, T* work, N n) noexcept {
   T* const sum = work;
   T* const product = work + n * n;
   int squarings = 0;

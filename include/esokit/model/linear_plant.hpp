@@ -393,7 +393,8 @@ constexpr Expected<HeldPlant<States, S, Inputs>, Error<S>> held_plant(
         entry(i, States + Inputs + j) = detail::number_of_lane(plant.e(i, j), lane) * time;
       }
     }
-    detail::exp_minus_identity(stacked.data(), work.data(), size);
+    // Its loops unrolled: many runs sample as many plants.
+    detail::exp_minus_identity(stacked.data(), work.data(), std::integral_constant<int, size>{});
     for (int i = 0; i < States; ++i) {
       for (int j = 0; j < States; ++j) detail::set_lane(held.increment(i, j), entry(i, j), lane);
       for (int j = 0; j < Inputs; ++j) {

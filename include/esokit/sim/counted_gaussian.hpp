@@ -52,7 +52,13 @@ class Threefry {
 template <class Real>
 ESOKIT_INLINE Real square_root(const Real& x) noexcept {
   if constexpr (std::is_same_v<Real, double>) {
+#if defined(__SSE2__) && defined(_WIN32) && defined(__GNUC__)
+    // The sqrt of MinGW's library rounds twice: one root in 4,000 is not that of a register.
+    typedef double Two __attribute__((vector_size(16)));
+    return __builtin_ia32_sqrtpd(Two{x, x})[0];
+#else
     return std::sqrt(x);
+#endif
   } else {
     constexpr int lanes = sizeof(Real) / sizeof(double);
 #if defined(__AVX__)

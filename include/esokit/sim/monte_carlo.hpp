@@ -17,12 +17,15 @@
 #include <esokit/sim/counted_gaussian.hpp>
 #include <esokit/sim/run.hpp>
 #include <esokit/sim/statistics.hpp>
+#include <esokit/sim/study_records.hpp>
+#include <fstream>
 #include <functional>
 #include <limits>
 #include <map>
 #include <mutex>
 #include <optional>
 #include <span>
+#include <sstream>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -257,6 +260,7 @@ struct MonteCarloOutcome {
   std::int64_t runs = 0;               ///< number of finished runs; if stopped, the first so many
   std::int64_t failed = 0;             ///< number of failed runs, which are not in the statistics
   FailedRun<Time> first_failure{};     ///< the first failed run
+  std::vector<std::int64_t> failures;  ///< numbers of the first failed runs, at most 1000
   std::vector<RunStatistics> numbers;  ///< statistics of each Measure
   bool completed = true;               ///< false if it was stopped
   int threads = 1;                     ///< number of threads used
@@ -279,8 +283,8 @@ class MonteCarlo {
   using Config = MonteCarloConfig<P, C>;    ///< settings
   using Outcome = MonteCarloOutcome<Time>;  ///< the result
 
-  /// Number of runs that a thread takes at a time.
-  static constexpr std::int64_t block = 256;
+  /// Number of runs that a thread takes at a time, a part of a block.
+  static constexpr std::int64_t batch = 256;
 
   /// Stores its arguments; runs nothing yet.
   MonteCarlo(P plant, C controller, Config config, Vary vary)
@@ -326,87 +330,246 @@ class MonteCarlo {
   /// @return the outcome, or an error in the settings
   template <int Lanes = default_lanes<LaneScalar<typename Types::S>>, class... Reduce, class... F>
   [[nodiscard]] Expected<Outcome, Error<Time>> run(const Measure<Reduce, F>&... measures) const {
-    Rules<Time> rules;
-    rules.require(config_.runs >= 1, "runs", static_cast<Time>(config_.runs), "must be 1 or more")
-        .require(config_.threads >= 0 && config_.threads <= 4096, "threads",
-                 static_cast<Time>(config_.threads), "must be 0 .. 4096")
-        .require(!config_.loop.number, "loop.number",
-                 static_cast<Time>(config_.loop.number.value_or(0)), "must be left out");
-    if (!rules) return rules.error();
-    // Checks the settings by a run that ends at once, and counts its samples.
-    const auto first =
-        sim::run(plant_, controller_, config_.loop, [](const auto&) { return false; });
-    if (!first && is_setting(first.error().field)) return first.error();
-    const auto sample_time = detail::run_sample_time<P, C>(controller_, config_.loop);
-    const double end = static_cast<double>(config_.loop.start_time + config_.loop.duration -
-                                           *sample_time / Time(2));
-    (check(rules, measures, end), ...);
-    if (!rules) return rules.error();
-
-    using Packed = detail::InPacks<P, C, Lanes>;
-    bool in_packs = false;
-    if constexpr (Packed::possible) {
-      in_packs = !(config_.loop.jitter > Time(0)) && !config_.loop.step_time;
-    }
-    Work work(*this, sizeof...(measures));
-    work.outcome.lanes = in_packs ? Lanes : 1;
-    (work.outcome.numbers.emplace_back(measures.name, measures.options.limit), ...);
-    work.go([&](std::int64_t from, Results& results) {
-      if constexpr (Packed::possible) {
-        if (in_packs) {
-          run_in_packs<Packed>(from, results, measures...);
-          return;
-        }
-      }
-      for (std::int64_t i = from; i < from + results.count; ++i)
-        run_one(i, results, i - from, measures...);
-    });
+    Work work(*this, blocks_of({}), statistics(measures...));
+    if (const auto ok = compute<Lanes>(work, measures...); !ok) return ok.error();
     return std::move(work.outcome);
   }
 
+  /// The same, and each run as a line of a table: run, and the number of each Measure under its
+  /// name; nan for a run that failed. `csv` becomes the table, with a line of names, and has the
+  /// finished runs if the study was stopped. `on_run` is called, too.
+  /// @return the outcome, or an error in the settings
+  template <int Lanes = default_lanes<LaneScalar<typename Types::S>>, class... Reduce, class... F>
+  [[nodiscard]] Expected<Outcome, Error<Time>> run_to_csv(
+      std::string& csv, const Measure<Reduce, F>&... measures) const {
+    csv = "run";
+    const auto name = [&csv](const std::string& text) {
+      const bool plain = text.find_first_of(",\"\n") == std::string::npos;
+      csv += plain ? "," : ",\"";
+      for (const char c : text) csv.append(c == '"' ? 2 : 1, c);
+      if (!plain) csv += '"';
+    };
+    (name(measures.name), ...);
+    csv += '\n';
+    MonteCarlo study = *this;
+    study.config_.on_run = [&](std::int64_t run, std::span<const double> numbers) {
+      csv += std::to_string(run);
+      for (const double number : numbers) detail::append_number(csv += ',', number);
+      csv += '\n';
+      if (config_.on_run) config_.on_run(run, numbers);
+    };
+    return study.template run<Lanes>(measures...);
+  }
+
+  /// What tells this study from others: its settings, the measures, the results of its first runs,
+  /// and the kind of machine.
+  template <int Lanes = default_lanes<LaneScalar<typename Types::S>>, class... Reduce, class... F>
+  [[nodiscard]] Expected<StudyIdentity, Error<Time>> identity(
+      const Measure<Reduce, F>&... measures) const {
+    StudyIdentity of{0, machine_probe(), config_.runs, {}, {}};
+    detail::Hash hash;
+    for (const double x :
+         {static_cast<double>(config_.loop.duration), static_cast<double>(config_.loop.sample_time),
+          static_cast<double>(config_.loop.missing), static_cast<double>(config_.loop.jitter),
+          static_cast<double>(config_.loop.dead_time), static_cast<double>(config_.loop.start_time),
+          static_cast<double>(config_.loop.substeps)}) {
+      hash.add(x);
+    }
+    hash.add(config_.loop.seed);
+    const auto note = [&](const auto& measure) {
+      of.names.push_back(measure.name);
+      of.limits.push_back(measure.options.limit);
+      hash.add(measure.options.from);
+      hash.add(measure.options.to);
+    };
+    (note(measures), ...);
+    MonteCarlo some = *this;
+    some.config_.runs = std::min<std::int64_t>(config_.runs, 4);
+    some.config_.threads = 1;
+    some.config_.progress = {};
+    some.config_.on_run = [&](std::int64_t, std::span<const double> numbers) {
+      for (const double x : numbers) hash.add(is_finite(x) ? x : 0.0);
+    };
+    if (const auto ok = some.template run<Lanes>(measures...); !ok) return ok.error();
+    of.study = hash.value();
+    return of;
+  }
+
+  /// Computes one of several parts of the study, on this or another machine, and adds its records
+  /// to `records` (see StudyRecords): only the blocks that are not there yet. The config's
+  /// `progress` and `on_run` see the runs that are computed.
+  /// @param keep (const BlockRecord&), called with each new record, to write it at once; may be
+  /// left
+  ///        out
+  /// @return an error in the settings, or of records of another study; then nothing was computed
+  /// @{
+  template <int Lanes = default_lanes<LaneScalar<typename Types::S>>, class Keep, class... Reduce,
+            class... F>
+  requires std::invocable<Keep&, const BlockRecord&> Check<Time> run_part(
+      StudyRecords& records, const Part& part, Keep&& keep, const Measure<Reduce, F>&... measures)
+  const {
+    const auto own = identity<Lanes>(measures...);
+    if (!own) return own.error();
+    if (const auto ok = fits(*own, records, part); !ok) return ok.error();
+    if (records.identity().runs == 0) records = StudyRecords(*own);
+    Work work(*this, records.missing(part), statistics(measures...));
+    work.keep = [&](BlockRecord&& record) {
+      keep(std::as_const(record));
+      (void)records.add(std::move(record));  // its block was missing
+    };
+    return compute<Lanes>(work, measures...);
+  }
+  template <int Lanes = default_lanes<LaneScalar<typename Types::S>>, class... Reduce, class... F>
+  Check<Time> run_part(StudyRecords& records, const Part& part,
+                       const Measure<Reduce, F>&... measures) const {
+    return run_part<Lanes>(
+        records, part, [](const BlockRecord&) {}, measures...);
+  }
+  /// @}
+
+  /// The same into a file, block by block. If it is there, its records are kept and what is missing
+  /// is appended: so a part that was killed goes on where it was.
+  /// @return the records of the file, or an error, also of the field `file` if it cannot be written
+  template <int Lanes = default_lanes<LaneScalar<typename Types::S>>, class... Reduce, class... F>
+  [[nodiscard]] Expected<StudyRecords, Error<Time>> run_part(
+      const std::string& file, const Part& part, const Measure<Reduce, F>&... measures) const {
+    const auto own = identity<Lanes>(measures...);
+    if (!own) return own.error();
+    StudyRecords records(*own);
+    std::ostringstream head;
+    records.write_head(head);
+    std::stringstream there;
+    there << std::ifstream(file).rdbuf();
+    // Of a part that was killed at once not even the head may be whole.
+    const bool fresh = head.str().starts_with(there.str());
+    if (!fresh) {
+      auto read = StudyRecords::read(there);
+      if (!read) return detail::as_error<Time>(read.error());
+      records = *std::move(read);
+    }
+    if (const auto ok = fits(*own, records, part); !ok) return ok.error();
+    std::ofstream out(file, fresh ? std::ios::trunc : std::ios::app);
+    out << (fresh ? head.str() : "\n");  // ends a line that was cut off
+    out.flush();
+    const auto ok = run_part<Lanes>(
+        records, part,
+        [&](const BlockRecord& record) {
+          StudyRecords::write(out, record);
+          out.flush();
+        },
+        measures...);
+    if (!ok) return ok.error();
+    if (!out) return Error<Time>{"file", Time(0), "cannot be written"};
+    return records;
+  }
+
+  /// The outcome of all runs from their records, the same as that of `run`, bit for bit.
+  /// @return an error if records are of another study, or if one is missing
+  template <int Lanes = default_lanes<LaneScalar<typename Types::S>>, class... Reduce, class... F>
+  [[nodiscard]] Expected<Outcome, Error<Time>> outcome(
+      const StudyRecords& records, const Measure<Reduce, F>&... measures) const {
+    const auto own = identity<Lanes>(measures...);
+    if (!own) return own.error();
+    if (const auto ok = own->check(records.identity()); !ok) {
+      return detail::as_error<Time>(ok.error());
+    }
+    const auto missing = records.missing();
+    if (!missing.empty()) {
+      return Error<Time>{"records.block",
+                         static_cast<Time>(missing.front()),
+                         "is missing; blocks in all:",
+                         -1,
+                         static_cast<Time>(missing.size()),
+                         true};
+    }
+    Work work(*this, {}, statistics(measures...));
+    for (const auto& [block, record] : records.blocks()) {
+      work.join(record);
+      work.outcome.runs += runs_of(block);
+    }
+    Outcome all = std::move(work.outcome);
+    if (all.failed > 0) {  // the error itself, by its run
+      Results results{1, std::vector<double>(sizeof...(measures)), {}};
+      run_one(all.failures.front(), results, 0, measures...);
+      if (!results.failed.empty()) all.first_failure = results.failed.front();
+    }
+    return all;
+  }
+
  private:
-  /// The results of a block of runs.
+  /// The results of a batch of runs.
   struct Results {
     std::int64_t count;
     std::vector<double> numbers;  ///< those of run 0, then of run 1, ..
     std::vector<FailedRun<Time>> failed;
   };
 
-  /// The blocks in work: computed in any order, collected in sequence.
+  /// Runs that a thread computes at once.
+  struct Batch {
+    std::int64_t first, runs, block;
+    bool last;  ///< of its block
+  };
+
+  /// The blocks in work: their batches are computed in any order, and collected in sequence.
   struct Work {
-    Work(const MonteCarlo& of, std::size_t numbers) : study(of), measures(numbers) {}
+    Work(const MonteCarlo& of, std::vector<std::int64_t> of_blocks,
+         std::vector<RunStatistics> without_results)
+        : study(of),
+          blocks(std::move(of_blocks)),
+          empty(std::move(without_results)),
+          now{0, {}, empty} {
+      outcome.numbers = empty;
+      if (!blocks.empty()) {
+        const auto in_last = static_cast<std::size_t>(study.runs_of(blocks.back()));
+        batches = (blocks.size() - 1) * batches_of_a_block() + (in_last + batch - 1) / batch;
+      }
+    }
+    [[nodiscard]] std::size_t batches_of_a_block() const {
+      return static_cast<std::size_t>(runs_in_block(study.config_.runs) / batch);
+    }
+    [[nodiscard]] Batch batch_number(std::size_t i) const {
+      const std::int64_t block = blocks[i / batches_of_a_block()];
+      const std::int64_t from = static_cast<std::int64_t>(i % batches_of_a_block()) * batch;
+      const std::int64_t runs = study.runs_of(block);
+      return {block * runs_in_block(study.config_.runs) + from, std::min(batch, runs - from), block,
+              from + batch >= runs};
+    }
 
     template <class Compute>
     void go(const Compute& compute) {
       const auto cores = static_cast<int>(std::thread::hardware_concurrency());
-      const std::int64_t blocks = (study.config_.runs + block - 1) / block;
       const int wanted = study.config_.threads > 0 ? study.config_.threads : std::max(cores, 1);
-      outcome.threads = static_cast<int>(std::min<std::int64_t>(wanted, blocks));
-      const auto work = [&] { take_blocks(blocks, compute); };
+      outcome.threads = static_cast<int>(
+          std::min(static_cast<std::size_t>(wanted), std::max<std::size_t>(batches, 1)));
+      const auto work = [&] { take_batches(compute); };
       std::vector<std::thread> others;
       for (int i = 1; i < outcome.threads; ++i) others.emplace_back(work);
       work();
       for (auto& other : others) other.join();
+      if (!keep) join(now);  // of a block in which it was stopped
     }
 
     template <class Compute>
-    void take_blocks(std::int64_t blocks, const Compute& compute) {
+    void take_batches(const Compute& compute) {
       std::unique_lock lock(mutex);
       for (;;) {
         // Limits how far threads get ahead of a slow one, because waiting results take memory.
-        news.wait(lock,
-                  [&] { return stopped || next >= blocks || next < taken + 4 * outcome.threads; });
-        if (stopped || next >= blocks) return;
-        const std::int64_t mine = next++;
+        news.wait(lock, [&] {
+          return stopped || next >= batches ||
+                 next < taken + 4 * static_cast<std::size_t>(outcome.threads);
+        });
+        if (stopped || next >= batches) return;
+        const std::size_t mine = next++;
         lock.unlock();
-        Results results{std::min(block, study.config_.runs - mine * block), {}, {}};
-        results.numbers.assign(static_cast<std::size_t>(results.count) * measures,
+        const Batch own = batch_number(mine);
+        Results results{own.runs, {}, {}};
+        results.numbers.assign(static_cast<std::size_t>(results.count) * empty.size(),
                                std::numeric_limits<double>::quiet_NaN());
-        compute(mine * block, results);
+        compute(own.first, results);
         lock.lock();
         waiting.emplace(mine, std::move(results));
         while (!stopped && !waiting.empty() && waiting.begin()->first == taken) {
-          take(waiting.begin()->second);
+          take(batch_number(taken), waiting.begin()->second);
           waiting.erase(waiting.begin());
           ++taken;
         }
@@ -414,38 +577,61 @@ class MonteCarlo {
       }
     }
 
-    void take(const Results& results) {
+    void take(const Batch& of, const Results& results) {
+      now.block = of.block;
       for (const auto& failure : results.failed) {
-        if (outcome.failed++ == 0) outcome.first_failure = failure;
+        if (outcome.failures.empty() && now.failed.empty()) outcome.first_failure = failure;
+        now.failed.push_back(failure.run);
       }
       auto failure = results.failed.begin();
       for (std::int64_t i = 0; i < results.count; ++i) {
-        const std::int64_t run = outcome.runs + i;
+        const std::int64_t run = of.first + i;
         const std::span<const double> numbers(
-            results.numbers.data() + static_cast<std::size_t>(i) * measures, measures);
+            results.numbers.data() + static_cast<std::size_t>(i) * empty.size(), empty.size());
         if (failure != results.failed.end() && failure->run == run) {
           ++failure;
         } else {
-          for (std::size_t k = 0; k < measures; ++k) outcome.numbers[k].add(run, numbers[k]);
+          for (std::size_t k = 0; k < empty.size(); ++k) now.numbers[k].add(run, numbers[k]);
         }
         if (study.config_.on_run) study.config_.on_run(run, numbers);
       }
       outcome.runs += results.count;
+      if (of.last) {
+        if (keep) {
+          keep(std::move(now));
+        } else {
+          join(now);
+        }
+        now = {0, {}, empty};
+      }
       if (study.config_.progress && !study.config_.progress(outcome.runs)) {
         stopped = true;
-        outcome.completed = outcome.runs == study.config_.runs;
+        outcome.completed = taken + 1 == batches;
+      }
+    }
+
+    /// Adds a block to the outcome.
+    void join(const BlockRecord& record) {
+      for (std::size_t k = 0; k < empty.size(); ++k) outcome.numbers[k].join(record.numbers[k]);
+      outcome.failed += static_cast<std::int64_t>(record.failed.size());
+      for (const std::int64_t run : record.failed) {
+        if (outcome.failures.size() < 1000) outcome.failures.push_back(run);
       }
     }
 
     const MonteCarlo& study;
-    std::size_t measures;
+    std::vector<std::int64_t> blocks;
+    std::vector<RunStatistics> empty;           ///< statistics without results
+    std::function<void(BlockRecord&&)> keep{};  ///< takes the record of a block; left out: `join`
+    std::size_t batches = 0;
     Outcome outcome;
+    BlockRecord now;  ///< the block that is being collected
     std::mutex mutex;
     std::condition_variable news;
-    std::int64_t next = 0;   ///< next block that no thread has taken
-    std::int64_t taken = 0;  ///< number of blocks in the outcome
+    std::size_t next = 0;   ///< next batch that no thread has taken
+    std::size_t taken = 0;  ///< number of batches that were collected
     bool stopped = false;
-    std::map<std::int64_t, Results> waiting;
+    std::map<std::size_t, Results> waiting;
   };
 
   /// Accumulates one result per lane of a run or pack of runs.
@@ -485,6 +671,70 @@ class MonteCarlo {
     std::int64_t samples = 0;
     bool finite = true;
   };
+
+  /// Whether records may be those of a part of this study; they may be empty.
+  static Check<Time> fits(const StudyIdentity& own, const StudyRecords& records, const Part& part) {
+    auto ok = part.check();
+    if (ok && records.identity().runs != 0) ok = own.check(records.identity());
+    if (!ok) return detail::as_error<Time>(ok.error());
+    return {};
+  }
+
+  /// Statistics without results.
+  template <class... Measures>
+  static std::vector<RunStatistics> statistics(const Measures&... measures) {
+    return {RunStatistics(measures.name, measures.options.limit)...};
+  }
+
+  /// The blocks of a part.
+  [[nodiscard]] std::vector<std::int64_t> blocks_of(const Part& part) const {
+    return StudyRecords(StudyIdentity{0, 0, std::max<std::int64_t>(config_.runs, 0), {}, {}})
+        .missing(part);
+  }
+  /// Number of runs of a block.
+  [[nodiscard]] std::int64_t runs_of(std::int64_t block) const {
+    const std::int64_t size = runs_in_block(config_.runs);
+    return std::min(size, config_.runs - block * size);
+  }
+
+  /// Computes the blocks of `work`.
+  template <int Lanes, class... Reduce, class... F>
+  Check<Time> compute(Work& work, const Measure<Reduce, F>&... measures) const {
+    Rules<Time> rules;
+    rules.require(config_.runs >= 1, "runs", static_cast<Time>(config_.runs), "must be 1 or more")
+        .require(config_.threads >= 0 && config_.threads <= 4096, "threads",
+                 static_cast<Time>(config_.threads), "must be 0 .. 4096")
+        .require(!config_.loop.number, "loop.number",
+                 static_cast<Time>(config_.loop.number.value_or(0)), "must be left out");
+    if (!rules) return rules.error();
+    // Checks the settings by a run that ends at once, and counts its samples.
+    const auto first =
+        sim::run(plant_, controller_, config_.loop, [](const auto&) { return false; });
+    if (!first && is_setting(first.error().field)) return first.error();
+    const auto sample_time = detail::run_sample_time<P, C>(controller_, config_.loop);
+    const double end = static_cast<double>(config_.loop.start_time + config_.loop.duration -
+                                           *sample_time / Time(2));
+    (check(rules, measures, end), ...);
+    if (!rules) return rules.error();
+
+    using Packed = detail::InPacks<P, C, Lanes>;
+    bool in_packs = false;
+    if constexpr (Packed::possible) {
+      in_packs = !(config_.loop.jitter > Time(0)) && !config_.loop.step_time;
+    }
+    work.outcome.lanes = in_packs ? Lanes : 1;
+    work.go([&](std::int64_t from, Results& results) {
+      if constexpr (Packed::possible) {
+        if (in_packs) {
+          run_in_packs<Packed>(from, results, measures...);
+          return;
+        }
+      }
+      for (std::int64_t i = from; i < from + results.count; ++i)
+        run_one(i, results, i - from, measures...);
+    });
+    return {};
+  }
 
   static bool is_setting(std::string_view field) {
     // Errors that occur during a run; with another plant it may succeed.

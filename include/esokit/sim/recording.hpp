@@ -40,6 +40,13 @@ constexpr int outputs_of() {
   return 1;
 }
 
+/// All digits that it has.
+template <class S>
+void append_number(std::string& text, const S& value) {
+  char digits[64];
+  text.append(digits, std::to_chars(digits, digits + sizeof digits, value).ptr);
+}
+
 /// The scalar in which a controller computes; that of the plant if the controller does not declare
 /// one.
 template <class C, class PlantScalar>
@@ -161,10 +168,42 @@ struct RunRecord {
     name("u", input);
     name("total_disturbance", total_disturbance);
     for (std::size_t k = 0; k < t.size(); ++k) {
-      number((text += "\n"), t[k]);
-      for (const auto* column : columns) number((text += ","), (*column)[k]);
+      detail::append_number(text += "\n", t[k]);
+      for (const auto* column : columns) detail::append_number(text += ",", (*column)[k]);
     }
     return text += "\n";
+  }
+
+  /// A figure for gnuplot, with its numbers: y and r above, u below, then dhat if there is one.
+  /// `std::ofstream("run.gp") << run.gnuplot();` and `gnuplot -p run.gp`, or, without a screen,
+  /// `gnuplot -e "set terminal svg size 900,900; set output 'run.svg'" run.gp`.
+  /// @param title of the figure, without quotes
+  [[nodiscard]] std::string gnuplot(const std::string& title = {}) const requires PlainScalar<S> {
+    constexpr int ys = Types::outputs;
+    constexpr int us = Types::inputs;
+    const bool observes = total_disturbance.size() == t.size();
+    std::string text = "$run << END\n" + csv() + "END\nset datafile separator ','\nset grid\n";
+    text +=
+        "set multiplot layout " + std::to_string(observes ? 3 : 2) + ",1 title '" + title + "'\n";
+    const auto lines = [&text](const char* name, int first, int count) {
+      for (int i = 0; i < count; ++i) {
+        text += (i > 0 ? ", $run" : " $run");
+        text += " every ::1 using 1:" + std::to_string(first + i) + " with lines title '" + name;
+        if (count > 1) text += std::to_string(i + 1);
+        text += '\'';
+      }
+    };
+    text += "plot";
+    lines("r", 2 + 2 * ys, ys);
+    text += ',';
+    lines("y", 2, ys);
+    text += observes ? "\nplot" : "\nset xlabel 't (s)'\nplot";
+    lines("u", 2 + 3 * ys, us);
+    if (observes) {
+      text += "\nset xlabel 't (s)'\nplot";
+      lines("dhat", 2 + 3 * ys + us, 1);
+    }
+    return text += "\nunset multiplot\n";
   }
 
  private:
@@ -177,12 +216,6 @@ struct RunRecord {
         column[i].push_back(value(static_cast<int>(i)));
       }
     }
-  }
-
-  static void number(std::string& text, const S& value) {
-    char digits[64];
-    const auto end = std::to_chars(digits, digits + sizeof digits, value).ptr;
-    text.append(digits, end);
   }
 };
 

@@ -61,7 +61,7 @@ constexpr bool finite_throughout(const T& value) noexcept {
 
 /// Calls f(number) for each element.
 template <class T, class F>
-void each_number(T& value, const F& f) {
+ESOKIT_INLINE void each_number(T& value, const F& f) {
   if constexpr (std::is_invocable_v<const F&, T&>) {
     f(value);
   } else {
@@ -329,12 +329,15 @@ class RunChance {
       if (config.missing > Time(0)) losses_.emplace(config.seed + 1);
       if (config.jitter > Time(0)) jitter_.emplace(config.seed + 2);
     }
-    quiet_ = !noisy && !(config.missing > Time(0)) && !config.sensor;
+    const bool whole = !(config.missing > Time(0)) && !config.sensor;
+    quiet_ = !noisy && whole;
+    only_noise_ = config.number && noisy && whole;
   }
 
   /// The measurement of y that the controller gets.
   ESOKIT_INLINE Output measured(Time t, Output y) {
     if (quiet_) return y;
+    if (only_noise_) return with_counted_noise(y);
     return disturbed(t, y);
   }
 
@@ -350,14 +353,15 @@ class RunChance {
   }
 
  private:
+  ESOKIT_INLINE Output with_counted_noise(const Output& y) {
+    Output noise = config_.noise;
+    auto* random = counted_noise_.data();
+    each_number(noise, [&](S& deviation)
+                           ESOKIT_INLINE_LAMBDA { deviation = deviation * (random++)->next(); });
+    return y + noise;
+  }
   ESOKIT_COLD Output disturbed(Time t, Output y) {
-    Output measured = y;
-    if (!counted_noise_.empty()) {
-      Output noise = config_.noise;
-      auto random = counted_noise_.begin();
-      each_number(noise, [&](S& deviation) { deviation = deviation * (random++)->next(); });
-      measured = measured + noise;
-    }
+    Output measured = counted_noise_.empty() ? y : with_counted_noise(y);
     if (noise_) {
       Output noise = config_.noise;
       each_number(noise, [&](S& deviation) {
@@ -394,6 +398,7 @@ class RunChance {
 
   const RunConfig<P, C>& config_;
   bool quiet_ = false;
+  bool only_noise_ = false;  ///< counter-based; the usual case of many runs
   std::optional<Gaussian> noise_, losses_, jitter_;
   std::vector<CountedGaussian<S>> counted_noise_;  ///< one per output
   std::optional<CountedGaussian<S>> counted_losses_, counted_jitter_;

@@ -1,5 +1,6 @@
 /// @file
 /// Statistics of a result over many runs, in memory that does not grow with the number of runs.
+/// Those of consecutive blocks of runs can be joined.
 #pragma once
 
 #include <array>
@@ -14,6 +15,61 @@
 #include <utility>
 
 namespace esokit::sim {
+
+/// Sums of a result over consecutive runs.
+struct RunSums {
+  std::int64_t count = 0;            ///< number of results
+  std::int64_t kept = 0;             ///< number of results that are not above the limit
+  double mean = 0.0;                 ///< their mean
+  double squares = 0.0;              ///< sum of squared differences to the mean
+  double smallest = 0.0;             ///< the smallest result
+  double largest = 0.0;              ///< the largest result
+  std::int64_t run_of_smallest = 0;  ///< the first run that had the smallest
+  std::int64_t run_of_largest = 0;   ///< the first run that had the largest
+
+  /// Adds a result. @param value finite
+  void add(std::int64_t run, double value, double limit) noexcept {
+    const double step = value - mean;
+    mean += step / static_cast<double>(++count);
+    squares += step * (value - mean);
+    if (count == 1 || value < smallest) {
+      smallest = value;
+      run_of_smallest = run;
+    }
+    if (count == 1 || value > largest) {
+      largest = value;
+      run_of_largest = run;
+    }
+    if (value <= limit) ++kept;
+  }
+
+  /// Adds the sums of later runs (T. Chan, G. Golub, R. LeVeque, 1979). The last digits depend on
+  /// where the runs were cut.
+  void join(const RunSums& later) noexcept {
+    if (later.count == 0) return;
+    if (count == 0) {
+      *this = later;
+      return;
+    }
+    const auto before = static_cast<double>(count), more = static_cast<double>(later.count);
+    const double step = later.mean - mean;
+    count += later.count;
+    kept += later.kept;
+    mean += step * (more / static_cast<double>(count));
+    squares += later.squares + step * step * (before * more / static_cast<double>(count));
+    if (later.smallest < smallest) {
+      smallest = later.smallest;
+      run_of_smallest = later.run_of_smallest;
+    }
+    if (later.largest > largest) {
+      largest = later.largest;
+      run_of_largest = later.run_of_largest;
+    }
+  }
+
+  /// Whether all are equal.
+  friend bool operator==(const RunSums&, const RunSums&) = default;
+};
 
 /// Statistics of one result per run: mean, standard deviation, extremes with their run, quantiles,
 /// and how often a limit was kept.
@@ -30,50 +86,67 @@ class RunStatistics {
 
   /// Adds a result. @param run number of the run @param value finite
   void add(std::int64_t run, double value) {
-    ++count_;
-    const double step = value - mean_;
-    mean_ += step / static_cast<double>(count_);
-    squares_ += step * (value - mean_);
-    if (count_ == 1 || value < smallest_) {
-      smallest_ = value;
-      run_of_smallest_ = run;
+    sums_.add(run, value, limit_);
+    ++bin(in_order(value) >> 40u);
+  }
+
+  /// Adds the results of later runs.
+  void join(const RunStatistics& later) {
+    sums_.join(later.sums_);
+    for (const auto& [page, counts] : later.pages_) {
+      auto& here = pages_[page];
+      for (std::size_t i = 0; i < counts.size(); ++i) here[i] += counts[i];
     }
-    if (count_ == 1 || value > largest_) {
-      largest_ = value;
-      run_of_largest_ = run;
-    }
-    if (value <= limit_) ++kept_;
-    const std::uint64_t ordered = in_order(value);
-    ++pages_[ordered >> 52u][static_cast<std::size_t>((ordered >> 40u) & 4095u)];
   }
 
   /// Name of the result.
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
   /// Number of results.
-  [[nodiscard]] std::int64_t count() const noexcept { return count_; }
+  [[nodiscard]] std::int64_t count() const noexcept { return sums_.count; }
   /// Mean; zero without results.
-  [[nodiscard]] double mean() const noexcept { return mean_; }
+  [[nodiscard]] double mean() const noexcept { return sums_.mean; }
   /// Standard deviation, with count - 1 as divisor; zero for one result.
   [[nodiscard]] double deviation() const noexcept {
-    return count_ > 1 ? std::sqrt(squares_ / static_cast<double>(count_ - 1)) : 0.0;
+    return sums_.count > 1 ? std::sqrt(sums_.squares / static_cast<double>(sums_.count - 1)) : 0.0;
   }
   /// The extremes, and the first run that had them; zero without results.
   /// @{
-  [[nodiscard]] double smallest() const noexcept { return smallest_; }
-  [[nodiscard]] double largest() const noexcept { return largest_; }
-  [[nodiscard]] std::int64_t run_of_smallest() const noexcept { return run_of_smallest_; }
-  [[nodiscard]] std::int64_t run_of_largest() const noexcept { return run_of_largest_; }
+  [[nodiscard]] double smallest() const noexcept { return sums_.smallest; }
+  [[nodiscard]] double largest() const noexcept { return sums_.largest; }
+  [[nodiscard]] std::int64_t run_of_smallest() const noexcept { return sums_.run_of_smallest; }
+  [[nodiscard]] std::int64_t run_of_largest() const noexcept { return sums_.run_of_largest; }
   /// @}
   /// The limit; infinite if there is none.
   [[nodiscard]] double limit() const noexcept { return limit_; }
   /// Number of results that are not above the limit.
-  [[nodiscard]] std::int64_t kept() const noexcept { return kept_; }
+  [[nodiscard]] std::int64_t kept() const noexcept { return sums_.kept; }
+  /// All sums.
+  [[nodiscard]] const RunSums& sums() const noexcept { return sums_; }
+
+  /// Calls f(bin, count) for each bin that is not empty, from the least results to the largest.
+  /// @param f (std::uint64_t, std::uint64_t)
+  template <class F>
+  void each_bin(F&& f) const {
+    for (const auto& [page, counts] : pages_) {
+      for (std::size_t i = 0; i < counts.size(); ++i) {
+        if (counts[i] != 0) f((page << 12u) | i, counts[i]);
+      }
+    }
+  }
+  /// Puts back what `sums` and `each_bin` gave, into statistics without results.
+  /// @{
+  void set_sums(const RunSums& sums) noexcept { sums_ = sums; }
+  void set_bin(std::uint64_t number, std::uint64_t results) { bin(number) = results; }
+  /// @}
+
+  /// Whether name, limit, sums and bins are equal.
+  friend bool operator==(const RunStatistics&, const RunStatistics&) = default;
 
   /// The quantile: the value below which a share of all results lies, interpolated within a bin;
   /// zero without results.
   /// @param share 0 .. 1
   [[nodiscard]] double quantile(double share) const {
-    double below = share * static_cast<double>(count_);
+    double below = share * static_cast<double>(sums_.count);
     for (const auto& [page, counts] : pages_) {
       for (std::size_t i = 0; i < counts.size(); ++i) {
         const auto here = static_cast<double>(counts[i]);
@@ -82,15 +155,18 @@ class RunStatistics {
           const double low = number_of(first);
           const double high = number_of(first + ((std::uint64_t{1} << 40u) - 1u));
           const double inside = below > 0.0 ? below / here : 0.0;
-          return std::fmin(std::fmax(low + (high - low) * inside, smallest_), largest_);
+          return std::fmin(std::fmax(low + (high - low) * inside, sums_.smallest), sums_.largest);
         }
         below -= here;
       }
     }
-    return largest_;
+    return sums_.largest;
   }
 
  private:
+  std::uint64_t& bin(std::uint64_t number) {
+    return pages_[number >> 12u][static_cast<std::size_t>(number & 4095u)];
+  }
   /// Converts a number to bits that have the same order as whole numbers, and back.
   /// @{
   static std::uint64_t in_order(double value) noexcept {
@@ -105,12 +181,7 @@ class RunStatistics {
 
   std::string name_;
   double limit_;
-  std::int64_t count_ = 0;
-  std::int64_t kept_ = 0;
-  double mean_ = 0.0;
-  double squares_ = 0.0;  ///< sum of squared differences to the mean
-  double smallest_ = 0.0, largest_ = 0.0;
-  std::int64_t run_of_smallest_ = 0, run_of_largest_ = 0;
+  RunSums sums_;
   std::map<std::uint64_t, std::array<std::uint64_t, 4096>> pages_;  ///< bins by sign and exponent
 };
 

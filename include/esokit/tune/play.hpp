@@ -55,11 +55,57 @@ struct PlayedLaw {
   DynamicMatrix<double> y_to_estimate{};  ///< as in LinearObserverForm
 };
 
-/// The plants that a design is played on: the model, and what its intervals allow.
+/// Friction that is played where it is not known, shares of what half the range of u makes of y''
+/// in ten latencies.
+inline constexpr std::array<double, 5> played_frictions{0.05, 0.1, 0.15, 0.2, 0.25};
+
+/// The plants that a design is played on: the model, what its intervals allow, and for order 3 the
+/// model with friction.
 inline std::vector<detail::PlantVariant> played_variants(const TuneModel& model) {
-  std::vector<detail::PlantVariant> all{{model, 1.0}};
-  for (auto& variant : detail::plant_variants(model)) all.push_back(std::move(variant));
+  std::vector<detail::PlantVariant> all;
+  const auto take = [&](detail::PlantVariant variant, double friction) {
+    variant.model.friction = friction;
+    all.push_back(std::move(variant));
+  };
+  take({model, 1.0}, 0.0);
+  const auto ends = detail::plant_variants(model);
+  for (const auto& variant : ends) take(variant, 0.0);
+  if (!model.may_rub()) return all;
+  std::vector<double> frictions;
+  const double unit =
+      5.0 * (model.u_max - model.u_min) * std::abs(model.input_gain.value) * model.latency();
+  for (const double share : played_frictions) frictions.push_back(share * unit);
+  if (model.friction) frictions = {*model.friction};
+  for (const double friction : frictions) {
+    take({model, 1.0}, friction);
+    // Late, and with the least of b0.
+    if (ends.size() > 1) take(ends[1], friction);
+  }
   return all;
+}
+
+/// The events with friction: also what moves y so little that it sticks.
+inline constexpr std::array<PlayEvent, 3> friction_events{
+    {{PlayKind::load, 0.5, 10.0}, {PlayKind::load, 1.0, 10.0}, {PlayKind::step, 1.0, 30.0}}};
+
+/// The events of one of these plants.
+inline std::vector<PlayEvent> played_events(const TuneModel& variant) {
+  if (variant.friction.value_or(0.0) > 0.0) return {friction_events.begin(), friction_events.end()};
+  return {play_events.begin(), play_events.end()};
+}
+
+/// Order 3: whether friction, however small, makes the loop swing for ever. On a motion of y' of
+/// amplitude A friction f acts as a damping 4 f / (pi A) (describing function), so the loop has to
+/// be stable with any: searched for from 1 / 100 to 3000 per TuneModel::latency.
+inline bool swings_with_friction(const TuneModel& model, const LinearController& controller) {
+  // Largest first: behind an actuator that integrates that tells it.
+  for (int i = 7; i >= -4; --i) {
+    auto plant = detail::dense_plant(model);
+    plant.a(1, 1) = -std::pow(10.0, 0.5 * i) / model.latency();
+    const auto loop = Loop::make(plant, controller);
+    if (!loop || !loop->stable()) return true;
+  }
+  return false;
 }
 
 namespace detail {
@@ -141,7 +187,16 @@ class PlayLoop {
         z_(static_cast<std::size_t>(told.states())),
         next_(std::max(x_.size(), z_.size())),
         held_(static_cast<std::size_t>(plant_.whole[0]) + 2),
-        soften_(softened_input(law, model.sample_time, half)) {}
+        soften_(softened_input(law, model.sample_time, half)) {
+    if (model.order != 3 || !(model.friction.value_or(0.0) > 0.0)) return;
+    // The states of the sampled plant have other units.
+    const double T = model.sample_time;
+    const DensePlant plant = dense_plant(model, gain);
+    const auto d = held_for(plant.a, plant.e, T).input;
+    const auto unit = [&](int i) { return d(i, 0) / plant_.e(i, 0); };
+    rub_ = *model.friction * T / unit(1);
+    slid_ = 0.5 * T * unit(1) / unit(0);
+  }
 
   [[nodiscard]] double output() const {
     double y = 0.0;
@@ -166,6 +221,7 @@ class PlayLoop {
     advance(x_, plant_.a, [&](int i) {
       return plant_.now(i, 0) * now + plant_.before(i, 0) * before + plant_.e(i, 0) * d;
     });
+    if (rub_ > 0.0) rub();
     return u;
   }
 
@@ -182,9 +238,17 @@ class PlayLoop {
     for (std::size_t i = 0; i < x.size(); ++i) x[i] += next_[i];
   }
 
+  /// Coulomb friction over the sample, which takes from y' what it can, and from y half a sample
+  /// of it.
+  void rub() {
+    const double less = std::clamp(x_[1], -rub_, rub_);
+    x_[1] -= less;
+    x_[0] -= slid_ * less;
+  }
+
   SampledPlant plant_;
   LinearController c_;
-  double half_;
+  double half_, rub_ = 0.0, slid_ = 0.0;
   std::vector<double> x_, z_, next_, held_;
   std::size_t at_ = 0;
   SoftenedInput soften_;
@@ -204,7 +268,8 @@ inline double play_distance(const TuneModel& model, double gain, const PlayEvent
 
 /// Plays one event from rest, with u about the middle of its range and the noise of the model.
 /// Back is: y within 2 % of its peak and four deviations of the noise, and u mostly off its limits,
-/// for a settling time; this within 25 times the length of the event and 10 settling times.
+/// for a settling time; this within 25 times the length of the event and 10 settling times. With
+/// friction for two settling times, within 10.
 /// @param gain factor on b0 of the plant, not of the controller
 /// @param settling_time of the linear loop, s
 /// @param on_sample called as on_sample(t, r, y, u) once a sample
@@ -240,8 +305,13 @@ Played play(const TuneModel& model, double gain, const LinearController& control
                       : event.kind == PlayKind::kick ? 1
                                                      : 0;
   const double d = event.share * force * (event.kind == PlayKind::kick ? length / T : 1.0);
-  const long last = pushed + std::min(samples_of(25.0 * length + 10.0 * settling_time), 200000L);
-  const long quiet = std::min(samples_of(std::max(settling_time, 20.0 * latency)), 4000L);
+  // Friction holds for long, and then y moves again.
+  const bool rubs = model.friction.value_or(0.0) > 0.0;
+  const long last =
+      pushed + std::min(samples_of((rubs ? 0.0 : 25.0 * length) + 10.0 * settling_time), 200000L);
+  const long quiet =
+      std::min(samples_of((rubs ? 2.0 : 1.0) * std::max(settling_time, 20.0 * latency)),
+               rubs ? 16000L : 4000L);
   long since = 0, at_limits = 0;
   for (long k = 0; k < last; ++k) {
     const double y = loop.output();

@@ -41,6 +41,9 @@ struct TuneModel {
   double sample_time = 0.0;          ///< T of the controller, s
   double u_min = 0.0;                ///< limits of the actuator
   double u_max = 0.0;                ///< upper limit, above u_min
+  /// Order 3: Coulomb friction on y'', unit of y''; 0: none. Left out: not known, and the design is
+  /// played with up to a quarter of what half the range of u makes of y'' in ten latencies.
+  std::optional<double> friction{};
 
   /// (q / (N^2 T))^(1 / (2 n + 2)): the bandwidth of a Kalman filter for the chain, rad/s.
   [[nodiscard]] double filter_bandwidth() const {
@@ -55,6 +58,16 @@ struct TuneModel {
   /// The largest time by which u may be late, with the sample for which it is held, s.
   [[nodiscard]] double latency() const {
     return lag + dead_time + sensor + sample_time + latency_half_width;
+  }
+
+  /// Order 3: whether a design has to stand friction.
+  [[nodiscard]] bool may_rub() const { return order == 3 && !(friction && !(*friction > 0.0)); }
+
+  /// By how much u is late at a low gain, s, see TuneRules::damping_latencies; 0: this does not
+  /// matter, or no law is slow enough.
+  [[nodiscard]] double lateness() const {
+    if (order == 2) return latency();
+    return may_rub() && pole > 0.0 ? latency() + 1.0 / pole : 0.0;
   }
 
   /// An error for a number that is not allowed, or so large or small that nothing can be computed
@@ -81,6 +94,7 @@ struct TuneModel {
         .not_negative("latency_half_width", latency_half_width)
         .not_negative("lag_half_width", lag_half_width)
         .not_negative("sensor", sensor)
+        .not_negative("friction", friction.value_or(0.0))
         .positive("noise", noise)
         .positive("disturbance", disturbance)
         .positive("sample_time", sample_time)
@@ -190,7 +204,8 @@ struct TuneRules {
 
   /// Order 2: smallest k_1 / k_0, in TuneModel::latency. Limits act as a lower gain of u, and at a
   /// low gain a chain of two integrators whose u is late is stable only if k_1 / k_0 is above the
-  /// latency. 0: not required.
+  /// latency. Friction does the same to order 3, where the lag 1 / a of its actuator counts as
+  /// well. 0: not required.
   double damping_latencies = 1.3;
   /// Order 3: largest omega_c / omega_o, the geometric means of the poles of law and observer.
   /// Three integrators are stable at no very low gain, so it helps and does not suffice. Below, it

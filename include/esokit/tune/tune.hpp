@@ -77,6 +77,12 @@ struct TunedDesign {
 
   /// The law for `play`: none, that is the linear one, unless it softens at the limits.
   [[nodiscard]] PlayedLaw played_law() const { return settings.soften ? law : PlayedLaw{}; }
+  /// The settling time for `play` on one of `played_variants`, s: with friction 32 / omega_c.
+  [[nodiscard]] double played_settling(const TuneModel& variant) const {
+    return variant.friction.value_or(0.0) > 0.0
+               ? 32.0 / detail::law_mean(settings.gains, variant.order)
+               : settling_time;
+  }
 };
 
 /// The result of `tune`.
@@ -119,8 +125,9 @@ inline std::vector<TuneAlarm> alarms(const Tuning& tuning, const TunedDesign& de
     return std::string(text);
   };
   if (!design.comes_back) {
-    all.push_back({"overload", "This design does not come back from " + design.lost +
-                                   ": u goes from limit to limit, or stays at one."});
+    all.push_back(
+        {"overload", "This design does not come back from " + design.lost +
+                         ": u goes from limit to limit or stays at one, or y swings for ever."});
   } else if (!design.played) {
     all.push_back({"overload",
                    "This design was not played within the limits of u: whether it "
@@ -319,8 +326,8 @@ struct TuneSearch {
             over(numbers.phase, rules.phase_margin),
             most_noise > 0.0 ? most_noise / numbers.control_noise
                              : std::numeric_limits<double>::infinity(),
-            n == 2 ? over(s.gains[1] / s.gains[0], rules.damping_latencies * model.latency())
-                   : std::numeric_limits<double>::infinity(),
+            n > 1 ? over(s.gains[1] / s.gains[0], rules.damping_latencies * model.lateness())
+                  : std::numeric_limits<double>::infinity(),
             n == 3 && rules.bandwidth_ratio > 0.0
                 ? rules.bandwidth_ratio * observer_mean(c.design.family, c.kind, model, s) /
                       law_mean(s.gains, n)
@@ -567,16 +574,19 @@ inline void play_law(TunedDesign& d, const TuneModel& model) {
   const PlayedLaw law = d.played_law();
   const auto variants = played_variants(model);
   for (std::size_t v = 0; v < variants.size(); ++v) {
-    for (const PlayEvent& event : play_events) {
+    for (const PlayEvent& event : played_events(variants[v].model)) {
       const Played played = play(
-          variants[v].model, variants[v].gain, d.controller, event, d.settling_time,
-          [](double, double, double, double) {}, law);
+          variants[v].model, variants[v].gain, d.controller, event,
+          d.played_settling(variants[v].model), [](double, double, double, double) {}, law);
       if (played.back || !played.counts) continue;
       d.comes_back = false;
       d.lost_in = event;
       d.lost_on = static_cast<int>(v);
       d.lost = in_words(event, model) +
-               (v > 0 ? ", with b0 and the latency at the ends of their intervals" : "");
+               (*variants[v].model.friction > 0.0
+                    ? ", with friction of " + source(*variants[v].model.friction) + " on y''"
+                : v > 0 ? ", with b0 and the latency at the ends of their intervals"
+                        : "");
       return;
     }
   }
@@ -587,6 +597,13 @@ inline void play_law(TunedDesign& d, const TuneModel& model) {
 /// like this (examples/choosing).
 inline void play_all(TunedDesign& d, const TuneModel& model) {
   d.played = true;
+  if (model.may_rub() && swings_with_friction(model, d.controller)) {
+    d.comes_back = false;
+    d.lost_in = friction_events[0];
+    d.lost_on = static_cast<int>(played_variants(model).size()) - 1;
+    d.lost = "friction on y'', however small: it acts as a damping, with which the loop swings";
+    return;
+  }
   const bool possible = d.settings.gains[0] > 0.0;
   d.settings.soften = model.order == 2 && possible;
   play_law(d, model);

@@ -1,0 +1,404 @@
+/// @file
+/// What the runs of a MonteCarlo leave behind: one record for each block of runs, to be written to
+/// a file, sent, joined and continued. The parts of a study may come from many processes and
+/// machines; joined they give every figure as one process would, bit for bit.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <charconv>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <esokit/core/check.hpp>
+#include <esokit/core/expected.hpp>
+#include <esokit/sim/statistics.hpp>
+#include <istream>
+#include <limits>
+#include <map>
+#include <ostream>
+#include <sstream>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace esokit::sim {
+
+/// Part `index` of `count` equal parts of a study.
+struct Part {
+  std::int64_t index = 0;  ///< 0 .. count - 1
+  std::int64_t count = 1;  ///< 1 or more
+
+  /// From a text: `3/8` is part 3 of the parts 0 .. 7.
+  /// @return the part, or an error of the field `part`
+  static Expected<Part, Error<double>> parse(std::string_view text) {
+    Part part;
+    const char* end = text.data() + text.size();
+    const auto first = std::from_chars(text.data(), end, part.index);
+    const bool slash = first.ec == std::errc{} && first.ptr != end && *first.ptr == '/';
+    const auto second = slash ? std::from_chars(first.ptr + 1, end, part.count) : first;
+    if (!slash || second.ec != std::errc{} || second.ptr != end) {
+      return Error<double>{"part", 0.0, "must be two whole numbers, as in 3/8"};
+    }
+    if (const auto ok = part.check(); !ok) return ok.error();
+    return part;
+  }
+
+  /// Whether there is such a part.
+  [[nodiscard]] Check<double> check() const {
+    return Rules<double>{}
+        .require(1 <= count && count <= 1'000'000, "part.count", static_cast<double>(count),
+                 "must be 1 .. 1000000")
+        .require(0 <= index && index < count, "part.index", static_cast<double>(index),
+                 "must be 0 .. count - 1");
+  }
+};
+
+/// Number of runs in a block of a study with so many runs: 4096, or so many more (by powers of two)
+/// that there are at most 4096 blocks. A study is cut at the ends of blocks only.
+[[nodiscard]] constexpr std::int64_t runs_in_block(std::int64_t runs) noexcept {
+  std::int64_t size = 4096;
+  while ((runs - 1) / 4096 >= size) size *= 2;
+  return size;
+}
+
+/// Number of blocks.
+[[nodiscard]] constexpr std::int64_t block_count(std::int64_t runs) noexcept {
+  const std::int64_t size = runs_in_block(runs);
+  return runs / size + (runs % size != 0 ? 1 : 0);
+}
+
+namespace detail {
+
+/// FNV-1a of words of 64 bits.
+class Hash {
+ public:
+  void add(std::uint64_t word) noexcept {
+    for (int i = 0; i < 8; ++i) {
+      value_ = (value_ ^ (word & 255u)) * 0x100000001b3u;
+      word >>= 8u;
+    }
+  }
+  void add(double number) noexcept { add(std::bit_cast<std::uint64_t>(number)); }
+  void add(std::string_view text) noexcept {
+    add(static_cast<std::uint64_t>(text.size()));
+    for (const char c : text) add(static_cast<std::uint64_t>(static_cast<unsigned char>(c)));
+  }
+  [[nodiscard]] std::uint64_t value() const noexcept { return value_; }
+
+ private:
+  std::uint64_t value_ = 0xcbf29ce484222325u;
+};
+
+}  // namespace detail
+
+/// Tells machines apart that compute other bits: a hash of results of this C library's exp, sin, ..
+/// and of a product and sum that a compiler or processor may fuse.
+[[nodiscard]] inline std::uint64_t machine_probe() {
+  detail::Hash hash;
+  for (int i = 1; i <= 64; ++i) {
+    volatile double hidden = 0.37 * i - 9.0;  // so that the compiler does not compute them
+    const double x = hidden;
+    for (const double y :
+         {std::exp(x), std::sin(10.0 * x), std::cos(x), std::tanh(x), std::log(std::abs(x) + 0.1),
+          std::pow(std::abs(x) + 0.1, 0.3 * x), std::atan2(x, 1.7)}) {
+      hash.add(y);
+    }
+    volatile double product = -x * x;
+    hash.add(x * x + product);
+  }
+  return hash.value();
+}
+
+/// What records must have in common to be joined.
+struct StudyIdentity {
+  std::uint64_t study = 0;           ///< hash of settings, measures and results of the first runs
+  std::uint64_t machine = 0;         ///< `machine_probe()`
+  std::int64_t runs = 0;             ///< number of runs of the whole study
+  std::vector<std::string> names{};  ///< of the measures
+  std::vector<double> limits{};      ///< of the measures
+
+  /// Whether records of `other` may be joined to those of this study, else an error that says what
+  /// differs.
+  [[nodiscard]] Check<double> check(const StudyIdentity& other) const {
+    return Rules<double>{}
+        .require(runs == other.runs, {"records.runs", static_cast<double>(other.runs),
+                                      "must be the number of runs of the study, which is", -1,
+                                      static_cast<double>(runs), true})
+        .require(names == other.names && limits == other.limits, "records.measures",
+                 static_cast<double>(other.names.size()), "must be those of the study")
+        .require(machine == other.machine, "records.machine", static_cast<double>(other.machine),
+                 "is of another kind: its exp, sin or pow, or its sums of products, differ")
+        .require(study == other.study, "records.study", static_cast<double>(other.study),
+                 "is another one: other program, plant, controller, settings or seed");
+  }
+};
+
+/// The results of a block of runs.
+struct BlockRecord {
+  std::int64_t block = 0;                ///< number of the block, 0, 1, ..
+  std::vector<std::int64_t> failed{};    ///< numbers of the runs that failed, in order
+  std::vector<RunStatistics> numbers{};  ///< of each measure
+
+  /// Whether all results are equal.
+  friend bool operator==(const BlockRecord&, const BlockRecord&) = default;
+};
+
+/// Records of a study, of some of its blocks or of all.
+///
+/// As text: a line `esokit-runs`, one line for each measure, and for each block lines that begin
+/// with `block` and end with `end` and a hash. Numbers are written bit by bit. What was cut off or
+/// changed in a file is left out (`damaged`), so its blocks are missing and can be computed again.
+class StudyRecords {
+ public:
+  /// No records yet. @param identity that of the study
+  explicit StudyRecords(StudyIdentity identity = {}) : identity_(std::move(identity)) {}
+
+  /// What the study is.
+  [[nodiscard]] const StudyIdentity& identity() const noexcept { return identity_; }
+  /// The records by block.
+  [[nodiscard]] const std::map<std::int64_t, BlockRecord>& blocks() const noexcept {
+    return blocks_;
+  }
+  /// Number of records in a text that were cut off or changed, and were left out.
+  [[nodiscard]] int damaged() const noexcept { return damaged_; }
+
+  /// Adds a record. One that is there already is kept once.
+  /// @return an error if it is there with other results, or its block does not exist
+  Check<double> add(BlockRecord record) {
+    if (const auto ok = check(record); !ok) return ok.error();
+    blocks_.emplace(record.block, std::move(record));
+    return {};
+  }
+
+  /// Adds the records of another part of the same study; an error changes nothing.
+  Check<double> add(const StudyRecords& other) {
+    if (const auto ok = identity_.check(other.identity_); !ok) return ok.error();
+    for (const auto& [block, record] : other.blocks_) {
+      if (const auto ok = check(record); !ok) return ok.error();
+    }
+    for (const auto& [block, record] : other.blocks_) blocks_.emplace(block, record);
+    damaged_ += other.damaged_;
+    return {};
+  }
+
+  /// The blocks of a part for which there is no record.
+  [[nodiscard]] std::vector<std::int64_t> missing(const Part& part = {}) const {
+    std::vector<std::int64_t> none;
+    const std::int64_t all = block_count(identity_.runs);
+    for (std::int64_t i = all * part.index / part.count; i < all * (part.index + 1) / part.count;
+         ++i) {
+      if (!blocks_.contains(i)) none.push_back(i);
+    }
+    return none;
+  }
+
+  /// The first lines of a text of records.
+  void write_head(std::ostream& out) const {
+    out << "esokit-runs 1 " << hex(identity_.study) << ' ' << hex(identity_.machine) << ' '
+        << identity_.runs << ' ' << identity_.names.size() << '\n';
+    for (std::size_t k = 0; k < identity_.names.size(); ++k) {
+      out << "measure " << hex(identity_.limits[k]) << ' ' << in_a_line(identity_.names[k]) << '\n';
+    }
+  }
+  /// The lines of a record.
+  static void write(std::ostream& out, const BlockRecord& record) {
+    std::ostringstream text;
+    text << "block " << record.block << ' ' << record.failed.size();
+    for (const std::int64_t run : record.failed) text << ' ' << run;
+    text << '\n';
+    for (const RunStatistics& number : record.numbers) {
+      const RunSums& s = number.sums();
+      text << "sums " << s.count << ' ' << s.kept;
+      for (const double x : {s.mean, s.squares, s.smallest, s.largest}) text << ' ' << hex(x);
+      text << ' ' << s.run_of_smallest << ' ' << s.run_of_largest << "\nbins";
+      std::uint64_t last = 0;
+      number.each_bin([&](std::uint64_t bin, std::uint64_t count) {
+        text << ' ' << bin - last;
+        if (count > 1) text << '*' << count;
+        last = bin;
+      });
+      text << '\n';
+    }
+    const std::string lines = text.str();
+    detail::Hash hash;
+    hash.add(std::string_view(lines));
+    out << lines << "end " << hex(hash.value()) << '\n';
+  }
+  /// All of it.
+  void write(std::ostream& out) const {
+    write_head(out);
+    for (const auto& [block, record] : blocks_) write(out, record);
+  }
+
+  /// Reads what `write` wrote, perhaps cut off.
+  /// @return the records, or an error if the first lines are not those of such a text, or if a
+  /// block is there twice with other results
+  static Expected<StudyRecords, Error<double>> read(std::istream& in) {
+    StudyRecords all;
+    std::string line;
+    if (!all.read_head(in, line)) {
+      return Error<double>{"records", 0.0, "must begin as esokit wrote them: esokit-runs 1 .."};
+    }
+    std::string lines;
+    BlockRecord record;
+    std::size_t at = 0;  // lines of the record
+    const auto skip = [&] {
+      if (at > 0) ++all.damaged_;
+      at = 0;
+    };
+    while (std::getline(in, line)) {
+      if (line.starts_with("block ")) {
+        skip();
+        record = {};
+        lines.clear();
+        if (!read_block(line, record)) {
+          ++all.damaged_;
+          continue;
+        }
+        for (std::size_t k = 0; k < all.identity_.names.size(); ++k) {
+          record.numbers.emplace_back(all.identity_.names[k], all.identity_.limits[k]);
+        }
+      } else if (at == 0) {
+        continue;  // of a record that was left out
+      } else if (line.starts_with("end ")) {
+        detail::Hash hash;
+        hash.add(std::string_view(lines));
+        const bool whole =
+            at == 1 + 2 * record.numbers.size() && line == "end " + hex(hash.value());
+        if (!whole) {
+          skip();
+          continue;
+        }
+        at = 0;
+        if (const auto ok = all.add(std::move(record)); !ok) return ok.error();
+        continue;
+      } else {
+        const std::size_t measure = (at - 1) / 2;
+        if (measure >= record.numbers.size() ||
+            !(at % 2 == 1 ? read_sums(line, record.numbers[measure])
+                          : read_bins(line, record.numbers[measure]))) {
+          skip();
+          continue;
+        }
+      }
+      lines += line;
+      lines += '\n';
+      ++at;
+    }
+    skip();
+    return all;
+  }
+
+ private:
+  /// Whether a record may be added.
+  [[nodiscard]] Check<double> check(const BlockRecord& record) const {
+    const auto there = blocks_.find(record.block);
+    return Rules<double>{}
+        .require(0 <= record.block && record.block < block_count(identity_.runs), "records.block",
+                 static_cast<double>(record.block), "must be one of the study")
+        .require(there == blocks_.end() || there->second == record, "records.block",
+                 static_cast<double>(record.block), "is there twice, and differs");
+  }
+
+  static std::string hex(std::uint64_t word) {
+    char text[17] = {};
+    std::to_chars(text, text + 16, word, 16);
+    return text;
+  }
+  static std::string hex(double number) { return hex(std::bit_cast<std::uint64_t>(number)); }
+  static std::string in_a_line(std::string name) {
+    std::replace(name.begin(), name.end(), '\n', ' ');
+    return name;
+  }
+
+  /// Takes the next word of a line.
+  /// @{
+  static std::string_view word(std::string_view& line) {
+    const std::size_t from = std::min(line.find_first_not_of(' '), line.size());
+    const std::size_t to = std::min(line.find(' ', from), line.size());
+    const std::string_view found = line.substr(from, to - from);
+    line.remove_prefix(to);
+    return found;
+  }
+  template <class Whole>
+  static bool take(std::string_view& line, Whole& number, int base = 10) {
+    const std::string_view text = word(line);
+    const auto end = std::from_chars(text.data(), text.data() + text.size(), number, base);
+    return !text.empty() && end.ec == std::errc{} && end.ptr == text.data() + text.size();
+  }
+  static bool take(std::string_view& line, double& number) {
+    std::uint64_t bits = 0;
+    if (!take(line, bits, 16)) return false;
+    number = std::bit_cast<double>(bits);
+    return true;
+  }
+  /// @}
+
+  bool read_head(std::istream& in, std::string& line) {
+    if (!std::getline(in, line) || in.eof()) return false;  // without its end it is cut off
+    std::string_view rest(line);
+    std::size_t measures = 0;
+    if (word(rest) != "esokit-runs" || word(rest) != "1" || !take(rest, identity_.study, 16) ||
+        !take(rest, identity_.machine, 16) || !take(rest, identity_.runs) ||
+        !take(rest, measures) || identity_.runs < 1 || measures > 10'000) {
+      return false;
+    }
+    for (std::size_t k = 0; k < measures; ++k) {
+      double limit = 0.0;
+      if (!std::getline(in, line) || in.eof()) return false;
+      rest = line;
+      if (word(rest) != "measure" || !take(rest, limit)) return false;
+      if (!rest.empty()) rest.remove_prefix(1);
+      identity_.names.emplace_back(rest);
+      identity_.limits.push_back(limit);
+    }
+    return true;
+  }
+  static bool read_block(std::string_view line, BlockRecord& record) {
+    std::size_t failed = 0;
+    word(line);
+    if (!take(line, record.block) || !take(line, failed)) return false;
+    for (std::size_t i = 0; i < failed; ++i) {
+      std::int64_t run = 0;
+      if (!take(line, run)) return false;
+      record.failed.push_back(run);
+    }
+    return true;
+  }
+  static bool read_sums(std::string_view line, RunStatistics& number) {
+    RunSums s;
+    if (word(line) != "sums" || !take(line, s.count) || !take(line, s.kept) ||
+        !take(line, s.mean) || !take(line, s.squares) || !take(line, s.smallest) ||
+        !take(line, s.largest) || !take(line, s.run_of_smallest) || !take(line, s.run_of_largest)) {
+      return false;
+    }
+    number.set_sums(s);
+    return true;
+  }
+  static bool read_bins(std::string_view line, RunStatistics& number) {
+    if (word(line) != "bins") return false;
+    std::uint64_t bin = 0;
+    for (std::string_view one = word(line); !one.empty(); one = word(line)) {
+      std::uint64_t step = 0, count = 1;
+      auto end = std::from_chars(one.data(), one.data() + one.size(), step);
+      if (end.ec == std::errc{} && end.ptr != one.data() + one.size() && *end.ptr == '*') {
+        end = std::from_chars(end.ptr + 1, one.data() + one.size(), count);
+      }
+      bin += step;
+      if (end.ec != std::errc{} || end.ptr != one.data() + one.size() || bin >> 24u != 0) {
+        return false;
+      }
+      number.set_bin(bin, count);
+    }
+    return true;
+  }
+
+  StudyIdentity identity_;
+  std::map<std::int64_t, BlockRecord> blocks_;
+  int damaged_ = 0;
+};
+
+}  // namespace esokit::sim
