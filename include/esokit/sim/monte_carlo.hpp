@@ -398,11 +398,8 @@ class MonteCarlo {
   /// Computes one of several parts of the study, on this or another machine, and adds its records
   /// to `records` (see StudyRecords): only the blocks that are not there yet. The config's
   /// `progress` and `on_run` see the runs that are computed.
-  /// @param keep (const BlockRecord&), called with each new record, to write it at once; may be
-  /// left
-  ///        out
+  /// @param keep (const BlockRecord&), called with each new record, to write it at once
   /// @return an error in the settings, or of records of another study; then nothing was computed
-  /// @{
   template <int Lanes = default_lanes<LaneScalar<typename Types::S>>, class Keep, class... Reduce,
             class... F>
   requires std::invocable<Keep&, const BlockRecord&> Check<Time> run_part(
@@ -419,13 +416,14 @@ class MonteCarlo {
     };
     return compute<Lanes>(work, measures...);
   }
+
+  /// The same without `keep`.
   template <int Lanes = default_lanes<LaneScalar<typename Types::S>>, class... Reduce, class... F>
   Check<Time> run_part(StudyRecords& records, const Part& part,
                        const Measure<Reduce, F>&... measures) const {
     return run_part<Lanes>(
         records, part, [](const BlockRecord&) {}, measures...);
   }
-  /// @}
 
   /// The same into a file, block by block. If it is there, its records are kept and what is missing
   /// is appended: so a part that was killed goes on where it was.

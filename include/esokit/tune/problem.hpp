@@ -41,6 +41,7 @@ struct TuneModel {
   double sample_time = 0.0;                ///< T of the controller, s
   double u_min = 0.0;                      ///< limits of the actuator
   double u_max = 0.0;                      ///< upper limit, above u_min
+
   /// Order 3: Coulomb friction on y'', unit of y''; 0: none. Left out: not known, and the design is
   /// played with up to a quarter of what half the range of u makes of y'' in ten latencies.
   std::optional<double> friction{};
