@@ -389,16 +389,16 @@ int main(int argc, char** argv) {
     ++designed[n];
     alarmed[n] += o.alarms.empty() ? 0 : 1;
     bool small_lost = false;
-    for (std::size_t i = 0; i < rivals.size() && o.compared; ++i) {
-      better[n][i] += o.peak[i] <= 1.0 && o.integral[i] <= 1.0 ? 1 : 0;
-      peaks[n][i].push_back(o.peak[i]);
-      integrals[n][i].push_back(o.integral[i]);
-      noises[n][i].push_back(o.rival_noise[i] / o.noise);
+    for (std::size_t r = 0; r < rivals.size() && o.compared; ++r) {
+      better[n][r] += o.peak[r] <= 1.0 && o.integral[r] <= 1.0 ? 1 : 0;
+      peaks[n][r].push_back(o.peak[r]);
+      integrals[n][r].push_back(o.integral[r]);
+      noises[n][r].push_back(o.rival_noise[r] / o.noise);
     }
     compared[n] += o.compared ? 1 : 0;
     sound += o.acts ? 1 : 0;
     acting += o.acts.value_or(false) ? 1 : 0;
-    for (std::size_t i = 0; i < 3 && o.price; ++i) prices[n][i].push_back((*o.price)[i]);
+    for (std::size_t r = 0; r < 3 && o.price; ++r) prices[n][r].push_back((*o.price)[r]);
     for (std::size_t e = 0; e < o.names.size(); ++e) {
       if (!table.contains(o.names[e])) names.push_back(o.names[e]);
       auto& cell = table[o.names[e]][n];
