@@ -260,8 +260,9 @@ int main(int argc, char** argv) {
   const auto accepted = std::find_if(plain.begin(), plain.end(), [](const Outcome& o) {
     return o.accepted && o.order == 2 && o.truth.order == 2;
   });
-  const auto hidden =
-      std::find_if(flexible.begin(), flexible.end(), [](const Outcome& o) { return !o.accepted; });
+  const auto hidden = std::find_if(flexible.begin(), flexible.end(), [](const Outcome& o) {
+    return !o.accepted && !o.plateau.x.empty();
+  });
   if (accepted != plain.end() && hidden != flexible.end()) {
     Figure plateau("plateau", {.rows = 1, .columns = 2, .panel_height = 190});
     plateau.caption(
