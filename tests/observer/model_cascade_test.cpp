@@ -228,7 +228,7 @@ TEST(ModelCascade, WhatFollowsTheModelIsEstimatedToRounding) {
   using Model = AugmentedModel<all_parts>;
   EXPECT_NEAR(observer.estimate()(0), static_cast<double>(truth.x[1]), 1e-11);
   EXPECT_NEAR(observer.model().constant(observer.estimate()), 3.0, 1e-6);
-  EXPECT_NEAR(Model::swing(observer.estimate(), 0).amplitude, 2.0, 1e-6);
+  EXPECT_NEAR(Model::sinusoidal_disturbance(observer.estimate(), 0).amplitude, 2.0, 1e-6);
   EXPECT_NEAR(Model::measured(observer.estimate()), static_cast<double>(truth.x[0]), 1e-11);
 }
 
