@@ -78,7 +78,7 @@ ESOKIT_TEST_WITHOUT(rescaled);
 ESOKIT_TEST_WITHOUT(scaled_disturbance);
 ESOKIT_TEST_WITHOUT(same_drive);
 ESOKIT_TEST_WITHOUT(finite_probe);
-ESOKIT_TEST_WITHOUT(rest);
+ESOKIT_TEST_WITHOUT(equilibrium);
 ESOKIT_TEST_WITHOUT(increment);
 ESOKIT_TEST_WITHOUT(degree);
 ESOKIT_TEST_WITHOUT(state_of_row);
