@@ -554,6 +554,16 @@ TEST(LoopResponse, RefusesByRule) {
   wrong.b = {0.0, -2.5};
   EXPECT_EQ(refusal(reference_response(wrong, adrc, {.duration = 1e4 * T})),
             "duration: gives a response that the scalar cannot hold: the loop is not stable");
+  // A state that is finite, and an output that is not: u = 1e400.
+  LinearController strong(0, 1, 0, 0.0);
+  strong.y_to_u(0, 0) = -1.0;
+  strong.r_to_u(0, 0) = 1e200;
+  const auto weak = LinearPlant<1>::chain({.coefficients = {1.0}, .input_gain = 1e-150}).value();
+  EXPECT_EQ(refusal(reference_response(weak, strong,
+                                       {.duration = 1.0, .height = 1e200, .sample_time = 0.5})),
+            "duration: gives a response that the scalar cannot hold: the loop is not stable");
+  EXPECT_TRUE(
+      reference_response(weak, strong, {.duration = 1.0, .height = 1e100, .sample_time = 0.5}));
   for (const int channel : {-1, 1}) {
     EXPECT_EQ(refusal(reference_response(plant(), adrc, {.duration = 1.0, .channel = channel})),
               "channel: must be one that the loop has");

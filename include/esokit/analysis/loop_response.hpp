@@ -66,9 +66,11 @@ inline Expected<LoopResponse, Error<double>> respond(const Loop& loop, const Loo
   const auto samples = static_cast<long>(step.duration / T * (1.0 + 1e-12));
   for (long k = 0; k <= samples; ++k) {
     response.time.push_back(static_cast<double>(k) * T);
+    bool finite = true;  // also what a finite state gives may be too large
     for (int row = 0; row < outputs; ++row) {
       double sum = system.d(row, input) * step.height;
       for (int i = 0; i < n; ++i) sum += system.c(row, i) * x[static_cast<std::size_t>(i)];
+      finite = finite && is_finite(sum);
       record(row).push_back(sum);
     }
     for (int i = 0; i < n; ++i) {
@@ -77,7 +79,7 @@ inline Expected<LoopResponse, Error<double>> respond(const Loop& loop, const Loo
       rate[static_cast<std::size_t>(i)] = sum;
     }
     for (std::size_t i = 0; i < x.size(); ++i) x[i] += rate[i];
-    rules.require(is_finite(sum_of_magnitudes(x.data(), n)), "duration", step.duration,
+    rules.require(finite && is_finite(sum_of_magnitudes(x.data(), n)), "duration", step.duration,
                   "gives a response that the scalar cannot hold: the loop is not stable");
     if (!rules) return rules.error();
   }
