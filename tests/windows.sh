@@ -157,6 +157,7 @@ compile() {  # compile SOURCE OBJECT
 tests() {
   local i test program counts files=0 wrap
   ln -sfn /usr/include/boost "$out/tests/include/boost"
+  ln -sfn /usr/include/Random123 "$out/tests/include/Random123"
   rm -f "$out"/tests/*.{exe,o,log}
   cat >"$out/tests/gtest.cpp" <<'END'
 #include <src/gtest-all.cc>
