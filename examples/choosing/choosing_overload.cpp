@@ -463,7 +463,7 @@ int main(int argc, char** argv) {
     }
     const std::array<const char*, 3> of{"rules", "rules, with the floor",
                                         "rules and floor, under the disturbance of the log"};
-    for (std::size_t i = 0; i < of.size(); ++i) {
+    for (std::size_t i = 0; i < of.size() && !prices[n][i].empty(); ++i) {
       costs.push_back({order, of[i], std::to_string(prices[n][i].size()),
                        number_text(quantile(prices[n][i], 0.5), 4),
                        number_text(quantile(prices[n][i], 0.9), 4)});

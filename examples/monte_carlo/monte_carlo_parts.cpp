@@ -91,7 +91,7 @@ int main(int argc, char** argv) {
     for (std::size_t k = 0; k < whole.numbers.size(); ++k) {
       same = same && merged.numbers[k] == whole.numbers[k];
     }
-    report.expect("merged", std::to_string(parts) + " parts", same ? 1.0 : 0.0, same,
+    report.expect("merged", "parts: " + std::to_string(parts), same ? 1.0 : 0.0, same,
                   "all figures equal those of one process to the last bit");
     if (parts == 1) a_run = sum / static_cast<double>(runs);
     a_merge = std::max(merge - 2.0 * start_up, 0.0) / static_cast<double>(sim::block_count(runs));

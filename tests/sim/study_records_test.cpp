@@ -150,6 +150,53 @@ TEST(StudyRecords, AnyCutGivesTheWholeBitForBit) {
   }
 }
 
+/// Cut into three, by way of texts, and whole.
+template <class P, class C>
+void cuts_give_the_whole(const P& of_plant, const C& of_controller,
+                         const sim::MonteCarloConfig<P, C>& of, bool in_packs) {
+  const auto one = sim::monte_carlo(of_plant, of_controller, of);
+  const auto all = one.run(largest, mean_input);
+  ASSERT_TRUE(all) << refusal(all);
+  EXPECT_EQ(all->lanes > 1, in_packs && default_lanes<typename C::scalar_type> > 1);
+  std::ostringstream text;
+  for (int k = 0; k < 3; ++k) {
+    StudyRecords part;
+    ASSERT_TRUE(one.run_part(part, {k, 3}, largest, mean_input));
+    if (k == 0) part.write_head(text);
+    for (const auto& [block, record] : part.blocks()) StudyRecords::write(text, record);
+  }
+  const auto joined = one.outcome(read(text.str()).value(), largest, mean_input);
+  ASSERT_TRUE(joined) << refusal(joined);
+  EXPECT_EQ(joined->runs, all->runs);
+  for (std::size_t k = 0; k < 2; ++k) EXPECT_TRUE(joined->numbers[k] == all->numbers[k]);
+}
+
+// Also float, a negative b0, loops that run one by one, and one with all that may go wrong.
+TEST(StudyRecords, AnyKindOfStudyMayBeCut) {
+  using Float = Adrc<LinearEso<1, float>>;
+  using FloatPlant = LinearPlant<1, float>;
+  const auto in_float =
+      Float::make(
+          {.observer = {.observer_bandwidth = 20.0f, .input_gain = -2.0f, .sample_time = 0.01f},
+           .controller_bandwidth = 5.0f,
+           .limits = {.lower = -1.0f, .upper = 2.0f}})
+          .value();
+  cuts_give_the_whole(
+      FloatPlant::chain({.coefficients = {0.5f}, .input_gain = -2.0f}).value(), in_float,
+      {.runs = 9000,
+       .loop = {.duration = 0.05f, .reference = 1.0f, .noise = 0.01f, .missing = 0.2f}},
+      true);
+  Config of = config();
+  of.loop.jitter = 0.3;
+  cuts_give_the_whole(plant(), adrc(), of, false);
+  of = config();
+  of.loop.missing = 0.3;
+  of.loop.dead_time = 0.7 * T;
+  of.loop.sensor = [](double, double y) { return std::round(100.0 * y) / 100.0; };
+  of.loop.disturbance = [](double t) { return t < 2.5 * T ? 0.0 : 3.0; };
+  cuts_give_the_whole(plant(), adrc(), of, true);
+}
+
 // Wherever a file ends, its whole records are kept and no other.
 TEST(StudyRecords, KeepsWhatIsWholeOfATextThatIsCutOff) {
   const std::string text = text_of(all_records());
@@ -252,7 +299,9 @@ TEST(StudyRecords, NamesWhatIsMissing) {
   StudyRecords part;
   study().run_part(part, {1, 3}, largest, mean_input).value();
   EXPECT_EQ(part.missing(), (std::vector<std::int64_t>{0, 2}));
-  EXPECT_EQ(part.missing({1, 3}), (std::vector<std::int64_t>{}));
+  EXPECT_TRUE(part.missing({1, 3}).value().empty());
+  EXPECT_EQ(refusal(part.missing({1, 0})), "part.count: must be 1 .. 1000000");
+  EXPECT_EQ(refusal(part.missing({3, 3})), "part.index: must be 0 .. count - 1");
   const auto none = study().outcome(part, largest, mean_input);
   EXPECT_EQ(refusal(none), "records.block: is missing; blocks in all:");
   EXPECT_EQ(none.error().value, 0.0);
@@ -323,8 +372,9 @@ TEST(StudyRecords, RefusesABlockWithTwoResults) {
   sums.mean = std::nextafter(sums.mean, 9.0);
   block.numbers[1].set_sums(sums);
   EXPECT_EQ(refusal(records.add(block)), "records.block: is there twice, and differs");
+  // As many results, of other runs.
   block = records.blocks().at(1);
-  block.failed.push_back(8000);
+  block.failed.back() += 1;
   EXPECT_EQ(refusal(records.add(block)), "records.block: is there twice, and differs");
   for (const std::int64_t wrong : {-1, 3}) {
     block.block = wrong;
@@ -336,6 +386,8 @@ TEST(StudyRecords, RefusesABlockWithTwoResults) {
   StudyRecords::write(text, all_records().blocks().at(2));
   EXPECT_EQ(read(text.str())->blocks().size(), 3u);
   block = all_records().blocks().at(2);
+  sums = block.numbers[0].sums();
+  sums.mean = std::nextafter(sums.mean, 9.0);
   block.numbers[0].set_sums(sums);
   StudyRecords::write(text, block);
   EXPECT_EQ(refusal(read(text.str())), "records.block: is there twice, and differs");
@@ -360,6 +412,34 @@ TEST(Part, IsReadFromAText) {
             "part.index: must be 0 .. count - 1");
 }
 
+// A record that lacks a result would count as a whole block.
+TEST(StudyRecords, RefusesABlockThatIsNotWhole) {
+  StudyRecords none(all_records().identity());
+  const char* rule = "records.block: must have a result of each measure for each run";
+  const sim::BlockRecord whole_one = all_records().blocks().at(2);
+  sim::BlockRecord block = whole_one;
+  block.failed.push_back(8200);
+  EXPECT_EQ(refusal(none.add(block)), rule);
+  block = whole_one;
+  block.failed.pop_back();
+  EXPECT_EQ(refusal(none.add(block)), rule);
+  block = whole_one;
+  block.numbers.pop_back();
+  EXPECT_EQ(refusal(none.add(block)), rule);
+  block = whole_one;
+  std::swap(block.numbers[0], block.numbers[1]);
+  EXPECT_EQ(refusal(none.add(block)), rule);
+  block = whole_one;
+  block.numbers[0] = sim::RunStatistics(whole_one.numbers[0].name(), 0.1);
+  block.numbers[0].set_sums(whole_one.numbers[0].sums());
+  EXPECT_EQ(refusal(none.add(block)), rule);
+  block = whole_one;  // the short last block as another one
+  block.block = 0;
+  EXPECT_EQ(refusal(none.add(block)), rule);
+  EXPECT_TRUE(none.blocks().empty());
+  EXPECT_TRUE(none.add(whole_one));
+}
+
 // Every run is in one block, every block in one part, for any numbers.
 TEST(Blocks, CoverAllRuns) {
   EXPECT_EQ(sim::runs_in_block(1), 4096);
@@ -378,7 +458,7 @@ TEST(Blocks, CoverAllRuns) {
     const auto count = static_cast<std::int64_t>(1 + dice() % 9);
     std::int64_t next = 0;
     for (std::int64_t k = 0; k < count; ++k) {
-      for (const std::int64_t block : none.missing({k, count})) ASSERT_EQ(block, next++);
+      for (const std::int64_t block : none.missing({k, count}).value()) ASSERT_EQ(block, next++);
     }
     ASSERT_EQ(next, blocks);
   }

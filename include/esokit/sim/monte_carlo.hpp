@@ -330,7 +330,7 @@ class MonteCarlo {
   /// @return the outcome, or an error in the settings
   template <int Lanes = default_lanes<LaneScalar<typename Types::S>>, class... Reduce, class... F>
   [[nodiscard]] Expected<Outcome, Error<Time>> run(const Measure<Reduce, F>&... measures) const {
-    Work work(*this, blocks_of({}), statistics(measures...));
+    Work work(*this, all_blocks(), statistics(measures...));
     if (const auto ok = compute<Lanes>(work, measures...); !ok) return ok.error();
     return std::move(work.outcome);
   }
@@ -409,7 +409,7 @@ class MonteCarlo {
     if (!own) return own.error();
     if (const auto ok = fits(*own, records, part); !ok) return ok.error();
     if (records.identity().runs == 0) records = StudyRecords(*own);
-    Work work(*this, records.missing(part), statistics(measures...));
+    Work work(*this, records.missing(part).value(), statistics(measures...));
     work.keep = [&](BlockRecord&& record) {
       keep(std::as_const(record));
       (void)records.add(std::move(record));  // its block was missing
@@ -483,7 +483,7 @@ class MonteCarlo {
     Work work(*this, {}, statistics(measures...));
     for (const auto& [block, record] : records.blocks()) {
       work.join(record);
-      work.outcome.runs += runs_of(block);
+      work.outcome.runs += runs_of_block(block, config_.runs);
     }
     Outcome all = std::move(work.outcome);
     if (all.failed > 0) {  // the error itself, by its run
@@ -518,7 +518,8 @@ class MonteCarlo {
           now{0, {}, empty} {
       outcome.numbers = empty;
       if (!blocks.empty()) {
-        const auto in_last = static_cast<std::size_t>(study.runs_of(blocks.back()));
+        const auto in_last =
+            static_cast<std::size_t>(runs_of_block(blocks.back(), study.config_.runs));
         batches = (blocks.size() - 1) * batches_of_a_block() + (in_last + batch - 1) / batch;
       }
     }
@@ -528,7 +529,7 @@ class MonteCarlo {
     [[nodiscard]] Batch batch_number(std::size_t i) const {
       const std::int64_t block = blocks[i / batches_of_a_block()];
       const std::int64_t from = static_cast<std::int64_t>(i % batches_of_a_block()) * batch;
-      const std::int64_t runs = study.runs_of(block);
+      const std::int64_t runs = runs_of_block(block, study.config_.runs);
       return {block * runs_in_block(study.config_.runs) + from, std::min(batch, runs - from), block,
               from + batch >= runs};
     }
@@ -684,17 +685,10 @@ class MonteCarlo {
     return {RunStatistics(measures.name, measures.options.limit)...};
   }
 
-  /// The blocks of a part.
-  [[nodiscard]] std::vector<std::int64_t> blocks_of(const Part& part) const {
-    return StudyRecords(StudyIdentity{0, 0, std::max<std::int64_t>(config_.runs, 0), {}, {}})
-        .missing(part);
+  /// All blocks.
+  [[nodiscard]] std::vector<std::int64_t> all_blocks() const {
+    return StudyRecords({.runs = config_.runs}).missing();
   }
-  /// Number of runs of a block.
-  [[nodiscard]] std::int64_t runs_of(std::int64_t block) const {
-    const std::int64_t size = runs_in_block(config_.runs);
-    return std::min(size, config_.runs - block * size);
-  }
-
   /// Computes the blocks of `work`.
   template <int Lanes, class... Reduce, class... F>
   Check<Time> compute(Work& work, const Measure<Reduce, F>&... measures) const {

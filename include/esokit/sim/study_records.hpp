@@ -64,10 +64,15 @@ struct Part {
   return size;
 }
 
-/// Number of blocks.
+/// Number of blocks; none without runs.
 [[nodiscard]] constexpr std::int64_t block_count(std::int64_t runs) noexcept {
+  return runs > 0 ? (runs - 1) / runs_in_block(runs) + 1 : 0;
+}
+
+/// Number of runs of block 0, 1, ..: the last one may be short.
+[[nodiscard]] constexpr std::int64_t runs_of_block(std::int64_t block, std::int64_t runs) noexcept {
   const std::int64_t size = runs_in_block(runs);
-  return runs / size + (runs % size != 0 ? 1 : 0);
+  return std::min(size, runs - block * size);
 }
 
 namespace detail {
@@ -166,7 +171,8 @@ class StudyRecords {
   [[nodiscard]] int damaged() const noexcept { return damaged_; }
 
   /// Adds a record. One that is there already is kept once.
-  /// @return an error if it is there with other results, or its block does not exist
+  /// @return an error if it is there with other results, if its block does not exist, or if it does
+  ///         not have a result of each Measure for each run of the block that did not fail
   Check<double> add(BlockRecord record) {
     if (const auto ok = check(record); !ok) return ok.error();
     blocks_.emplace(record.block, std::move(record));
@@ -184,8 +190,9 @@ class StudyRecords {
     return {};
   }
 
-  /// The blocks of a part for which there is no record.
-  [[nodiscard]] std::vector<std::int64_t> missing(const Part& part = {}) const {
+  /// The blocks of a part for which there is no record, or the error of the part.
+  [[nodiscard]] Expected<std::vector<std::int64_t>, Error<double>> missing(const Part& part) const {
+    if (const auto ok = part.check(); !ok) return ok.error();
     std::vector<std::int64_t> none;
     const std::int64_t all = block_count(identity_.runs);
     for (std::int64_t i = all * part.index / part.count; i < all * (part.index + 1) / part.count;
@@ -194,6 +201,8 @@ class StudyRecords {
     }
     return none;
   }
+  /// The same of the whole study.
+  [[nodiscard]] std::vector<std::int64_t> missing() const { return missing(Part{}).value(); }
 
   /// The first lines of a text of records.
   void write_head(std::ostream& out) const {
@@ -296,9 +305,18 @@ class StudyRecords {
   /// Whether a record may be added.
   [[nodiscard]] Check<double> check(const BlockRecord& record) const {
     const auto there = blocks_.find(record.block);
+    bool fits = record.numbers.size() == identity_.names.size();
+    for (std::size_t k = 0; fits && k < record.numbers.size(); ++k) {
+      const RunStatistics& number = record.numbers[k];
+      fits = number.name() == identity_.names[k] && number.limit() == identity_.limits[k] &&
+             number.count() + static_cast<std::int64_t>(record.failed.size()) ==
+                 runs_of_block(record.block, identity_.runs);
+    }
     return Rules<double>{}
         .require(0 <= record.block && record.block < block_count(identity_.runs), "records.block",
                  static_cast<double>(record.block), "must be one of the study")
+        .require(fits, "records.block", static_cast<double>(record.block),
+                 "must have a result of each measure for each run")
         .require(there == blocks_.end() || there->second == record, "records.block",
                  static_cast<double>(record.block), "is there twice, and differs");
   }

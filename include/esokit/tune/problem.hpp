@@ -189,9 +189,10 @@ enum class TunePlay : unsigned char {
   all     ///< every design that keeps the rules: longer by a quarter
 };
 
-/// TuneRules::filter_floor of orders 1 to 3: with it load steps move y less than with a PID of the
-/// SIMC rule. One integrator is stable at any low gain, two come back from less the faster they
-/// are.
+/// TuneRules::filter_floor of orders 1 to 3: with it load steps mostly move y less than with a PID
+/// of the SIMC rule (85 to 100 of 100 drawn machines). Falls with the order: a loop around one
+/// integrator is stable at any low gain; around two or three, the faster it is, the less saturation
+/// it comes back from.
 inline constexpr std::array<double, 3> usual_filter_floor{0.7, 0.4, 0.2};
 
 /// What a loop has to keep. Margins: for the nominal model, and with b0 at both ends of its
