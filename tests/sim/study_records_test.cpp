@@ -440,6 +440,35 @@ TEST(StudyRecords, RefusesABlockThatIsNotWhole) {
   EXPECT_TRUE(none.add(whole_one));
 }
 
+// Joined are the results that there would be at once: counts, quantiles, and of equal extremes the
+// first run.
+TEST(RunStatistics, JoinedInPiecesEqualAddedAtOnce) {
+  std::mt19937_64 dice(3);
+  for (int trial = 0; trial < 200; ++trial) {
+    sim::RunStatistics whole("x", 0.5), joined("x", 0.5), piece("x", 0.5);
+    const auto results = static_cast<std::int64_t>(1 + dice() % 40);
+    for (std::int64_t run = 0; run < results; ++run) {
+      const double value = std::ldexp(static_cast<double>(dice() % 7) - 3.0, -2);  // many are equal
+      whole.add(run, value);
+      piece.add(run, value);
+      if (dice() % 5 == 0) {
+        joined.join(piece);
+        piece = sim::RunStatistics("x", 0.5);
+      }
+    }
+    joined.join(piece);
+    ASSERT_EQ(joined.count(), whole.count());
+    EXPECT_EQ(joined.kept(), whole.kept());
+    EXPECT_EQ(joined.smallest(), whole.smallest());
+    EXPECT_EQ(joined.run_of_smallest(), whole.run_of_smallest());
+    EXPECT_EQ(joined.largest(), whole.largest());
+    EXPECT_EQ(joined.run_of_largest(), whole.run_of_largest());
+    EXPECT_NEAR(joined.mean(), whole.mean(), 1e-14);
+    EXPECT_NEAR(joined.deviation(), whole.deviation(), 1e-13);
+    for (int k = 0; k <= 20; ++k) EXPECT_EQ(joined.quantile(k / 20.0), whole.quantile(k / 20.0));
+  }
+}
+
 // Every run is in one block, every block in one part, for any numbers.
 TEST(Blocks, CoverAllRuns) {
   EXPECT_EQ(sim::runs_in_block(1), 4096);
