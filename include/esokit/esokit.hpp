@@ -34,6 +34,7 @@
 #include <esokit/control/algebraic_filter.hpp>
 #include <esokit/control/control_loop.hpp>
 #include <esokit/control/controller.hpp>
+#include <esokit/control/cycle_analysis.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/dual_feedback.hpp>
 #include <esokit/control/experiment.hpp>

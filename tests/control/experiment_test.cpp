@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <esokit/control/adrc.hpp>
@@ -306,11 +306,12 @@ TEST(Experiment, MachineThatTurnsTheOtherWay) {
     wrong.amplitude = -1;
     const auto away = run<1>(wrong, Plant(1, 5, 0.01, 5, T));
     if (config.excitation == Excitation::relay) {
-      EXPECT_EQ(away.reason(), AbortReason::travel);
+      EXPECT_EQ(away.reason(), AbortReason::wrong_sign);
     } else {
       EXPECT_EQ(refusal(away.result()),
-                "latency: does not fit: friction or damping is too large for this amplitude, or "
-                "the order or the sign of amplitude is wrong");
+                "latency: does not fit: friction or damping is too large for this amplitude, the "
+                "cycle is too short (hysteresis, half_period), or the order or the sign of "
+                "amplitude is wrong");
     }
   }
 }
@@ -330,8 +331,8 @@ TEST(Experiment, StaysAroundTheOperatingPoint) {
   while (!experiment.finished()) {
     // In the rest it swings by what the mean takes out.
     const double swing = experiment.samples() >= 50      ? 0
-                         : experiment.samples() % 2 == 0 ? 0.2
-                                                         : -0.2;
+                         : experiment.samples() % 2 == 0 ? 0.03
+                                                         : -0.03;
     y.push_back(plant.y() + swing);
     u.push_back(experiment.update(y.back()));
     if (experiment.samples() > 1) rows.push_back(experiment.row());
@@ -368,7 +369,8 @@ TEST(Experiment, TravelEndsItFromBothSidesAndOnlyBeyond) {
     EXPECT_EQ(at_limit.reason(), AbortReason::none);
     EXPECT_EQ(at_limit.update(std::nextafter(2.0 + side * 10, side * 100)), 0.0);
     EXPECT_EQ(at_limit.phase(), ExperimentPhase::aborted);
-    EXPECT_EQ(at_limit.reason(), AbortReason::travel);
+    // u drove it up.
+    EXPECT_EQ(at_limit.reason(), side > 0 ? AbortReason::travel : AbortReason::wrong_sign);
     EXPECT_EQ(at_limit.update(2.0), 0.0);
     EXPECT_EQ(refusal(at_limit.result()), "phase: of the experiment has no result yet");
   }
@@ -579,8 +581,9 @@ TEST(Experiment, RefusesBadSettings) {
             "lead: must be left out: it is for a relay of order 2");
   // A latency of more than a quarter of the cycle.
   EXPECT_EQ(refusal(run<1>(steps(), Plant(1, 5, 0, 60, T)).result()),
-            "latency: does not fit: friction or damping is too large for this amplitude, or the "
-            "order or the sign of amplitude is wrong");
+            "latency: does not fit: friction or damping is too large for this amplitude, the cycle "
+            "is too short (hysteresis, half_period), or the order or the sign of amplitude is "
+            "wrong");
   // Too few samples a cycle: told by the result.
   auto quick = steps();
   quick.half_period = 0.011;
@@ -588,6 +591,362 @@ TEST(Experiment, RefusesBadSettings) {
             "cycle: (the shortest, in samples) must be at least");
   quick.half_period = 0.012;
   EXPECT_EQ(refusal(run<1>(quick, Plant(1, 5, 0, 1, T)).result()), "accepted");
+}
+
+/// A heater at rest at 20, 3 degrees a second at full power, 110 above in the end.
+struct Heater {
+  double temperature = 20, element = 0, ambient = 20;
+  double power = 3, loss = 3.0 / 110, lag = 1.5, load = 0;
+  std::array<double, 6> line{};
+  std::size_t at = 0;
+  void step(double u, double T_ = 0.1) {
+    line[at] = u;
+    at = (at + 1) % line.size();
+    element += -std::expm1(-T_ / lag) * (line[at] - element);
+    temperature += T_ * (power * element - loss * (temperature - ambient) + load);
+  }
+};
+
+ExperimentConfig<double> cold() {
+  return {.sample_time = 0.1,
+          .amplitude = 0.4,
+          .hysteresis = 0.5,
+          .rest = 2,
+          .approach = {{.input = 1, .output = 70}},
+          .response = 2,
+          .response_time = 12,
+          .travel = 20,
+          .lowest_output = 0,
+          .highest_output = 100,
+          .time_limit = 600,
+          .limits = {.lower = 0, .upper = 1}};
+}
+
+/// Runs it until it ends. @param fault (heater, y, u, time), changes what the experiment sees or
+/// what the heater gets
+template <class Fault>
+Experiment<1> heat(const ExperimentConfig<double>& config, Fault&& fault, Heater heater = {}) {
+  auto experiment = Experiment<1>::make(config).value();
+  for (double time = 0; !experiment.finished(); time += config.sample_time) {
+    double y = heater.temperature, u = 0;
+    fault(heater, y, u, time);
+    u = experiment.update(y);
+    EXPECT_TRUE(u >= config.limits.lower && u <= config.limits.upper);
+    double given = u;
+    fault(heater, y, given, time);
+    heater.step(given);
+    EXPECT_LE(time, config.time_limit + config.sample_time);
+  }
+  return experiment;
+}
+constexpr auto healthy = [](Heater&, double&, double&, double) {};
+
+/// One-sided, from rest: power, the u that holds, the latency; the same for a cooler.
+TEST(Experiment, FromColdItFindsWhatHolds) {
+  const auto found = heat(cold(), healthy);
+  ASSERT_EQ(found.phase(), ExperimentPhase::done);
+  const auto result = found.result().value();
+  EXPECT_NEAR(result.input_gain, 3, result.input_gain_half_width);
+  EXPECT_LT(result.input_gain_half_width, 0.3);
+  EXPECT_NEAR(result.latency, 2.0, 0.3);
+  EXPECT_NEAR(found.centre(), 50.0 / 110, 0.02);
+  EXPECT_EQ(found.rest_output(), 70);
+  EXPECT_LT(found.approach_slope(), 3);  // part of the power is lost
+  EXPECT_GT(found.approach_slope(), 2);
+  EXPECT_NEAR(found.approach_delay(), 2, 0.7);
+  EXPECT_EQ(found.output(), 0);
+  // The other way: y falls from 20 to -30, u from 0 to -1.
+  auto config = cold();
+  config.approach = {{.input = -1, .output = -30}};
+  config.lowest_output = -60;
+  config.highest_output = 40;
+  config.limits = {.lower = -1, .upper = 0};
+  const auto cooler = heat(config, healthy);
+  // Rounding moves some switches by a sample.
+  EXPECT_NEAR(cooler.result()->input_gain, result.input_gain, 0.01);
+  EXPECT_NEAR(cooler.centre(), -found.centre(), 0.01);
+  // And where u lowers y.
+  config.amplitude = -0.4;
+  config.approach->input = 1;
+  config.limits = {.lower = 0, .upper = 1};
+  Heater chiller;
+  chiller.power = -3;
+  const auto chilled = heat(config, healthy, chiller);
+  EXPECT_NEAR(chilled.result()->input_gain, -result.input_gain, 0.01);
+}
+
+/// A machine that is already warm: no approach; above the set point u0 lets it cool.
+TEST(Experiment, FromWarmItBeginsAtOnce) {
+  for (const double start : {60.0, 85.0}) {
+    Heater warm;
+    warm.temperature = start;
+    bool approached = false, on_above = false;
+    auto experiment = Experiment<1>::make(cold()).value();
+    while (!experiment.finished()) {
+      const double y = warm.temperature, u = experiment.update(y);
+      approached = approached || experiment.phase() == ExperimentPhase::approach;
+      on_above = on_above || (experiment.phase() == ExperimentPhase::centring && y > 71 && u > 0);
+      warm.step(u);
+    }
+    EXPECT_EQ(approached, start < 70) << start;
+    EXPECT_FALSE(on_above);
+    EXPECT_TRUE(experiment.result()) << start;
+  }
+}
+
+/// Where u rests y may take its time.
+TEST(Experiment, OnlyTheSideThatDrivesAwayIsWatched) {
+  Heater slow;
+  slow.temperature = 85;
+  slow.power = 0.5;
+  slow.loss = 0.002;  // 0.13 degrees a second, where 2 in 12 s are asked of full power
+  auto config = cold();
+  config.time_limit = 3000;
+  EXPECT_EQ(heat(config, healthy, slow).reason(), AbortReason::none);
+}
+
+/// Each fault ends with its name, in each phase, with the safe u, and y within its limits.
+TEST(Experiment, EveryEndHasANameAndTheSafeInput) {
+  auto config = cold();
+  config.safe_input = 0.01;
+  using R = AbortReason;
+  struct Case {
+    const char* name;
+    std::vector<R> reasons;
+    void (*fault)(Heater&, double& y, double& u, double before);
+  };
+  // On the side of the safe u only the time ends a sensor that stands still.
+  const Case cases[] = {
+      {"sensor stands still",
+       {R::no_response, R::time_limit, R::load_changed},
+       [](Heater&, double& y, double&, double before) { y = before; }},
+      {"sensor shows the room",
+       {R::no_response, R::load_changed, R::travel, R::wrong_sign},
+       [](Heater&, double& y, double&, double) { y = 20; }},
+      {"heater off",
+       {R::no_response, R::load_changed, R::wrong_sign},
+       [](Heater&, double&, double& u, double) { u = 0; }},
+      {"sensor lost",
+       {R::bad_sample},
+       [](Heater&, double& y, double&, double) { y = std::numeric_limits<double>::quiet_NaN(); }},
+      {"short circuit", {R::output_limit}, [](Heater&, double& y, double&, double) { y = 500; }},
+      {"a fan larger than the relay",
+       {R::load_changed, R::no_response, R::wrong_sign, R::travel, R::too_noisy},
+       [](Heater& heater, double&, double&, double) { heater.load = -4; }},
+  };
+  for (const Case& one : cases) {
+    for (const double since : {0.0, 3.0, 10.0, 25.0, 40.0, 60.0, 90.0}) {
+      double hottest = 0, before = 20;
+      const auto ended = heat(config, [&](Heater& heater, double& y, double& u, double time) {
+        hottest = std::max(hottest, heater.temperature);
+        if (time >= since) {
+          one.fault(heater, y, u, before);
+        } else {
+          before = y;
+        }
+      });
+      EXPECT_EQ(ended.phase(), ExperimentPhase::aborted) << one.name << since;
+      EXPECT_NE(std::find(one.reasons.begin(), one.reasons.end(), ended.reason()),
+                one.reasons.end())
+          << one.name << since << " " << static_cast<int>(ended.reason());
+      EXPECT_EQ(ended.output(), 0.01) << one.name << since;
+      EXPECT_FALSE(ended.result()) << one.name << since;
+      EXPECT_LT(hottest, 100) << one.name << since;
+    }
+  }
+  // From the beginning.
+  EXPECT_EQ(heat(config, [](Heater&, double&, double& u, double) { u = -u; }).reason(),
+            R::wrong_sign);
+  config.time_limit = 30;
+  EXPECT_EQ(heat(config, healthy).reason(), R::time_limit);
+}
+
+TEST(Experiment, LimitsOfTheOutputEndItFromBothSidesAndOnlyBeyond) {
+  for (const double side : {1.0, -1.0}) {
+    auto config = relay(1);
+    config.lowest_output = -1.5;
+    config.highest_output = 1.5;
+    auto experiment = Experiment<1>::make(config).value();
+    (void)experiment.update(0);
+    (void)experiment.update(side * 1.5);
+    EXPECT_EQ(experiment.reason(), AbortReason::none);
+    (void)experiment.update(std::nextafter(side * 1.5, side * 2));
+    // u drove it up until it was there.
+    EXPECT_EQ(experiment.reason(), side > 0 ? AbortReason::output_limit : AbortReason::wrong_sign);
+  }
+}
+
+/// y is watched to the sample and to the last bit.
+TEST(Experiment, ResponseIsAskedForFromBothSides) {
+  const auto after = [](double moved, int samples) {
+    auto experiment = Experiment<1>::make(cold()).value();
+    for (int k = 0; k <= 20; ++k) (void)experiment.update(20);
+    EXPECT_EQ(experiment.phase(), ExperimentPhase::approach);
+    for (int k = 1; k < samples; ++k) (void)experiment.update(20);
+    (void)experiment.update(20 + moved);
+    return experiment.reason();
+  };
+  const double less = std::nextafter(22.0, 0.0) - 20;
+  EXPECT_EQ(after(less, 119), AbortReason::none);
+  EXPECT_EQ(after(less, 120), AbortReason::no_response);
+  // Two degrees in one step is a sensor that cannot show half of that.
+  EXPECT_EQ(after(2, 120), AbortReason::resolution);
+  EXPECT_EQ(after(-less, 5), AbortReason::none);
+  EXPECT_EQ(after(-2, 5), AbortReason::wrong_sign);
+}
+
+/// What y still moves the old way in the latency is no missing response.
+TEST(Experiment, ResponseCountsFromWhereItTurns) {
+  auto config = relay(1);
+  config.response = config.response_time = 1;
+  auto experiment = Experiment<1>::make(config).value();
+  const auto feed = [&](double y, int samples) {
+    for (int k = 0; k < samples; ++k) (void)experiment.update(y);
+    return experiment.reason();
+  };
+  feed(0, 1);
+  EXPECT_EQ(feed(0.2, 1), AbortReason::none);  // u turns here
+  EXPECT_EQ(feed(1.5, 500), AbortReason::none);
+  EXPECT_EQ(feed(0.45, 600), AbortReason::none);
+  EXPECT_EQ(feed(0.45, 600), AbortReason::no_response);
+}
+
+TEST(Experiment, NoiseResolutionAndRoomFromBothSides) {
+  // y toggles by `step` a sample: its noise, as differences show it, is step / sqrt(2).
+  const auto rests = [](double step, double response) {
+    auto config = cold();
+    config.response = response;
+    auto experiment = Experiment<1>::make(config).value();
+    for (int k = 0; k <= 20; ++k) (void)experiment.update(20 + (k % 2) * step);
+    return experiment.reason();
+  };
+  const double most = 0.25 * std::sqrt(2.0) * std::sqrt(21.0 / 20);
+  EXPECT_EQ(rests(most * 0.999, 4), AbortReason::none);
+  EXPECT_EQ(rests(most * 1.001, 4), AbortReason::too_noisy);
+  EXPECT_EQ(rests(most * 0.999, 0.9), AbortReason::too_noisy);
+  for (const double step : {0.9, 1.1}) {
+    auto coarse = cold();
+    coarse.hysteresis = 4;
+    const auto ended = heat(coarse, [&](Heater&, double& y, double&, double) {
+      y = 20 + step * std::round((y - 20) / step);
+    });
+    EXPECT_EQ(ended.reason(), step > 1 ? AbortReason::resolution : AbortReason::none);
+  }
+  // The u that holds 70 is 0.4545: the limit next to it leaves a tenth of A or less.
+  for (const double room : {0.03, 0.05}) {
+    auto near = cold();
+    near.limits.upper = near.approach->input = 50.0 / 110 + room;
+    near.response_time = 60;
+    const auto ended = heat(near, healthy);
+    EXPECT_EQ(ended.reason(), room < 0.04 ? AbortReason::input_limit : AbortReason::none) << room;
+  }
+  // A relay whose overshoot would pass the limit is not begun.
+  auto low = cold();
+  low.highest_output = 72;
+  EXPECT_EQ(heat(low, healthy).reason(), AbortReason::output_limit);
+}
+
+TEST(Experiment, RefusesBadSettingsFromCold) {
+  using C = ExperimentConfig<double>;
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  const auto refused = [](auto change) {
+    auto config = cold();
+    change(config);
+    return refusal(Experiment<1>::make(config));
+  };
+  EXPECT_EQ(refused([](C&) {}), "accepted");
+  EXPECT_EQ(refused([](C& c) { c.approach->input = nan; }),
+            "approach.input: is above limits.upper, which is");
+  EXPECT_EQ(refused([](C& c) { c.approach->input = 1.01; }),
+            "approach.input: is above limits.upper, which is");
+  EXPECT_EQ(refused([](C& c) { c.approach->input = -0.01; }),
+            "approach.input: is below limits.lower, which is");
+  EXPECT_EQ(refused([](C& c) { c.input = -0.01; }), "input: is below limits.lower, which is");
+  EXPECT_EQ(refused([](C& c) { c.approach->input = 0; }), "approach.input: must not be input");
+  EXPECT_EQ(refused([](C& c) { c.approach->output = nan; }), "approach.output: must be finite");
+  const char* between =
+      "approach.output: must be between lowest_output and highest_output by more than the "
+      "hysteresis";
+  EXPECT_EQ(refused([](C& c) { c.approach->output = 99.5; }), between);
+  EXPECT_EQ(refused([](C& c) { c.approach->output = 99.4; }), "accepted");
+  EXPECT_EQ(refused([](C& c) { c.approach->output = 0.5; }), between);
+  EXPECT_EQ(refused([](C& c) { c.highest_output = C{}.highest_output; }),
+            "highest_output: must be given with an approach");
+  EXPECT_EQ(refused([](C& c) { c.lowest_output = C{}.lowest_output; }), "accepted");
+  EXPECT_EQ(refused([](C& c) { c.highest_output = nan; }), "highest_output: must be finite");
+  EXPECT_EQ(refused([](C& c) { c.lowest_output = -2 * c.highest_output / 0.0; }),
+            "lowest_output: must be finite");
+  EXPECT_EQ(refused([](C& c) { c.lowest_output = 100; }),
+            "lowest_output: must be below highest_output");
+  EXPECT_EQ(refused([](C& c) { c.response = 0; }), "response: must be finite and positive");
+  EXPECT_EQ(refused([](C& c) { c.response_time = nan; }),
+            "response_time: must be finite and not negative");
+  EXPECT_EQ(refused([](C& c) { c.response_time = 0; }),
+            "response: must be left out without response_time");
+  EXPECT_EQ(refused([](C& c) { c.response = c.response_time = 0; }),
+            "response_time: must be finite and positive");
+  EXPECT_EQ(refused([](C& c) { c.response_time = 0.04; }),
+            "response_time: must be at least one sample");
+  EXPECT_EQ(refused([](C& c) { c.response_time = 600; }),
+            "response_time: must be below time_limit");
+  EXPECT_EQ(refused([](C& c) { c.safe_input = 1.1; }),
+            "safe_input: is above limits.upper, which is");
+  EXPECT_EQ(refused([nan](C& c) { c.safe_input = nan; }),
+            "safe_input: is above limits.upper, which is");
+  EXPECT_EQ(refused([](C& c) {
+              c.excitation = Excitation::steps;
+              c.hysteresis = 0;
+              c.half_period = 10;
+            }),
+            "approach.input: must be left out: an approach needs a relay of order 1");
+  auto two = cold();
+  two.lead = 10;
+  EXPECT_EQ(refusal(Experiment<2>::make(two)),
+            "approach.input: must be left out: an approach needs a relay of order 1");
+}
+
+/// Any numbers from cold: u is within the limits, it ends in time, and results are finite.
+TEST(Experiment, GarbageFromColdChangesNoPromise) {
+  Random random(48);
+  const NoAllocation allocations;
+  int ends[12] = {};
+  for (int trial = 0; trial < 3000; ++trial) {
+    auto config = cold();
+    config.time_limit = 200;
+    config.cycles = 6;
+    config.hysteresis = random.uniform(0.1, 5);
+    config.response = random.uniform(0.1, 10);
+    config.response_time = random.uniform(0.1, 60);
+    config.travel = random.uniform(6, 50);
+    auto experiment = Experiment<1>::make(config).value();
+    Heater heater;
+    const double wild = std::pow(10.0, random.uniform(-5, -1));
+    int k = 0;
+    for (; !experiment.finished(); ++k) {
+      ASSERT_LE(k, 2001);
+      double y = heater.temperature + random.uniform(-0.1, 0.1);
+      if (random.uniform(0, 1) < wild) y = random.uniform(0, 100);
+      if (random.uniform(0, 1) < wild / 10) y = std::pow(10.0, random.uniform(-308, 308));
+      const double u = experiment.update(y);
+      ASSERT_TRUE(u >= 0 && u <= 1);
+      heater.step(random.uniform(0, 1) < wild ? random.uniform(0, 1) : u);
+    }
+    ++ends[static_cast<int>(experiment.reason())];
+    ASSERT_EQ(experiment.output(), 0);
+    if (const auto found = experiment.result()) {
+      ASSERT_TRUE(esokit::is_finite(found->input_gain));
+      ASSERT_GE(found->input_gain_half_width, 0.0);
+      ASSERT_LT(found->input_gain_half_width, std::abs(found->input_gain));
+    }
+  }
+  EXPECT_EQ(allocations.count(), 0);
+  // All ways but `stopped` and `input_limit`, and `bad_sample`, were taken.
+  for (const auto reason :
+       {AbortReason::none, AbortReason::travel, AbortReason::time_limit, AbortReason::no_response,
+        AbortReason::wrong_sign, AbortReason::load_changed, AbortReason::output_limit,
+        AbortReason::too_noisy}) {
+    EXPECT_GT(ends[static_cast<int>(reason)], 0) << static_cast<int>(reason);
+  }
 }
 
 /// The controller that was led along goes on with what its law asks of the true state; one that is

@@ -85,41 +85,14 @@ class CycleAnalysis {
     const S size = magnitude(one);
     const E unusable{"input_gain", size, "is not usable"};
     if (!is_finite(size) || !is_finite(third_.square) || !(size > S(0))) return unusable;
-    // Damping (order 1) and friction (order 2) turn H_1 in one direction, and H_3 less or in the
-    // other.
-    const Complex lost = Order == 1 ? Complex{one.im, -one.re} : rubbed_.mean;
-    const Complex lost_third =
-        Order == 1 ? Complex{three.im / S(3), -three.re / S(3)} : rubbed_third_.mean;
-    const S most = Order == 1 ? S(1.2f) : S(0.9f) * size;
-    Split at = split(one, three);
-    const S simple = at.gain();
-    S loss(0);
     const S scatter = student() * third_.error() / magnitude(three);
-    // Only if the misfit is larger than noise alone may cause.
-    if (at.misfit < S(0) && !(at.misfit > -scatter)) {
-      const auto without = [&](S share) {
-        return split(plus(one, lost, share), plus(three, lost_third, share));
-      };
-      constexpr int steps = 16;
-      S below(0), above(0);
-      for (int i = 1; i <= steps && !(above > S(0)); ++i) {
-        const S force = most * S(i) / S(steps);
-        (without(force).misfit < S(0) ? below : above) = force;
-      }
-      if (above > S(0)) {
-        for (int i = 0; i < 30; ++i) {
-          const S middle = (below + above) / S(2);
-          (without(middle).misfit < S(0) ? below : above) = middle;
-        }
-        loss = above;
-        at = without(loss);
-        at.misfit = S(0);
-      }
-    }
+    const Fit whole = fit(one, three, scatter, S(0));
+    const Split& at = whole.at;
+    const S loss = whole.loss;
     if (!(at.angle > S(0)) || at.angle > S(1.5)) {
       return E{"latency", at.angle / frequency_,
-               "does not fit: friction or damping is too large for this amplitude, or the order or "
-               "the sign of amplitude is wrong"};
+               "does not fit: friction or damping is too large for this amplitude, the cycle is too "
+               "short (hysteresis, half_period), or the order or the sign of amplitude is wrong"};
     }
     // Relative to b0 A, or to the frequency.
     const S share = Order == 1 ? loss : S(loss / at.gain());
@@ -158,7 +131,7 @@ class CycleAnalysis {
     // The uncertainty from this correction: a part of the change, and the effect of an error of the
     // estimated loss. Friction lowers b0 by about twice the square of its share, and was assumed to
     // act equally long in both directions.
-    const S changed = detail::absolute(middle - simple);
+    const S changed = detail::absolute(middle - split(one, three).gain());
     S rubbed;
     if constexpr (Order == 2) {
       const S off = unsure / S(4);
@@ -168,15 +141,25 @@ class CycleAnalysis {
       const S off = S(0.375f) * unsure;
       rubbed = changed / S(4) + middle * off * (share + off / S(2));
     }
+    // What a second lag of a quarter of the first would change.
+    const S second = middle - fit(one, three, scatter, at.x / S(4)).at.gain();
     ExperimentResult<S> found;
     found.input_gain = sign * middle;
     // The error of treating the lag between samples.
     const S turn = frequency_ * T_;
     const S sampled = middle * turn * turn / S(8);
     found.input_gain_half_width = std::sqrt(lag_or_dead * lag_or_dead + repeat * repeat +
-                                            rubbed * rubbed + sampled * sampled);
+                                            rubbed * rubbed + second * second + sampled * sampled);
     // Sums that only the interval has may have overflowed.
     if (!is_finite(found.input_gain_half_width)) return unusable;
+    if (!(found.input_gain_half_width < middle)) {
+      return E{"input_gain_half_width",
+               found.input_gain_half_width,
+               "is too large: noise or a load hides the motion by u; must be below",
+               -1,
+               middle,
+               true};
+    }
     found.least = at.size;
     found.largest = at.size * std::sqrt(S(1) + at.longest);
     found.latency = (at.dead + at.x) / frequency_;
@@ -240,6 +223,44 @@ class CycleAnalysis {
 
   static Complex plus(const Complex& a, const Complex& b, S factor) noexcept {
     return {a.re + factor * b.re, a.im + factor * b.im};
+  }
+
+  /// Lag and dead time without what turns H_1 in one direction, and H_3 less or in the other:
+  /// damping (order 1), relative to the frequency, or friction (order 2).
+  struct Fit {
+    Split at;
+    S loss{};
+  };
+
+  /// @param scatter of the angle of H_3 @param second w tau of a second lag that is known
+  [[nodiscard]] Fit fit(const Complex& one, const Complex& three, S scatter,
+                        S second) const noexcept {
+    const Complex lost = Order == 1 ? Complex{one.im, -one.re} : rubbed_.mean;
+    const Complex lost_third =
+        Order == 1 ? Complex{three.im / S(3), -three.re / S(3)} : rubbed_third_.mean;
+    const auto without = [&](S share) {
+      const Complex a = plus(one, lost, share), b = plus(three, lost_third, share);
+      return split({a.re - second * a.im, a.im + second * a.re},
+                   {b.re - S(3) * second * b.im, b.im + S(3) * second * b.re});
+    };
+    Fit found{without(S(0)), S(0)};
+    // Only if the misfit is larger than noise alone may cause.
+    if (!(found.at.misfit < S(0)) || found.at.misfit > -scatter) return found;
+    const S most = Order == 1 ? S(1.2f) : S(0.9f) * magnitude(one);
+    constexpr int steps = 16;
+    S below(0), above(0);
+    for (int i = 1; i <= steps && !(above > S(0)); ++i) {
+      const S force = most * S(i) / S(steps);
+      (without(force).misfit < S(0) ? below : above) = force;
+    }
+    if (!(above > S(0))) return found;
+    for (int i = 0; i < 30; ++i) {
+      const S middle = (below + above) / S(2);
+      (without(middle).misfit < S(0) ? below : above) = middle;
+    }
+    found = {without(above), above};
+    found.at.misfit = S(0);
+    return found;
   }
 
   /// Sums over two cycles.

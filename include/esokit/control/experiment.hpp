@@ -10,6 +10,7 @@
 #include <esokit/control/limiter.hpp>
 #include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
+#include <optional>
 
 namespace esokit {
 
@@ -20,28 +21,54 @@ enum class Excitation : unsigned char {
   steps   ///< u0 + A and u0 - A alternately for `half_period` each, the first one half as long
 };
 
+/// How an experiment gets from a cold machine to where it measures.
+template <PlainScalar S = double>
+struct ExperimentApproach {
+  S input{};   ///< u that drives y from rest to `output`, such as full power
+  S output{};  ///< y around which the relay then acts
+
+  /// @cond
+  static constexpr auto fields(auto& a) noexcept { return detail::tie(a.input, a.output); }
+  /// @endcond
+};
+
 /// Config of Experiment.
 template <PlainScalar S = double>
 struct ExperimentConfig {
   S sample_time{};                            ///< T, s
   Excitation excitation = Excitation::relay;  ///< relay: needs no knowledge of the machine
-  S input{};        ///< u0, unit of u: holds the machine at its start position
-  S amplitude{};    ///< A, unit of u; negative if a larger u lowers y
-  S hysteresis{};   ///< relay: unit of y, a few times the noise; leave out with steps
+  S input{};        ///< u0, unit of u: holds the machine where it starts; 0 of a cold heater
+  S amplitude{};    ///< A, unit of u; negative if a larger u lowers y. With an approach A is the
+                    ///< most: less if the u that holds y is nearer to a limit
+  S hysteresis{};   ///< relay: unit of y, a few times the noise; leave out with steps. After an
+                    ///< approach at least what y moves within the latency
   S lead{};         ///< relay, order 2: s, about five times lag plus dead time; else leave out
   S half_period{};  ///< steps: s, at least 8 samples; leave out with a relay
   S rest{};         ///< s, time with u0 at the start, in which y0 is measured; 0: y0 is the first y
-  S travel{};       ///< largest abs(y - y0), unit of y; beyond it the experiment stops
-  S time_limit{};   ///< longest total duration, s
-  S hand_over{};    ///< s: relay or steps continue for this time after the last measured cycle
-  int cycles = 8;   ///< number of measured cycles, after two to settle; even, 6 .. 200
+  /// First drive y to another place; a relay of order 1 only. Then `response`, `response_time` and
+  /// the limit of y on that side have to be given.
+  std::optional<ExperimentApproach<S>> approach{};
+  S response{};  ///< unit of y, several times noise and resolution of the sensor: while u drives
+                 ///< y away from where u0 holds it, y has to move by so much, the right way, ..
+  S response_time{};  ///< .. in each so many seconds, about three latencies and the time of such a
+                      ///< move; 0: is not watched. After an approach longer by the ratio of what u
+                      ///< was moved by then and is now
+  S travel{};         ///< largest abs(y - y0), with an approach abs(y - output) from the first
+                      ///< settling cycle on; beyond it the experiment is aborted
+  S lowest_output = Limits<S>{}.lower;   ///< least y; below it the experiment is aborted
+  S highest_output = Limits<S>{}.upper;  ///< largest y
+  std::optional<S> safe_input{};         ///< u after an abort; left out: u0
+  S time_limit{};                        ///< longest total duration, s
+  S hand_over{};       ///< s: relay or steps continue for this time after the last measured cycle
+  int cycles = 8;      ///< number of measured cycles, after two to settle; even, 6 .. 200
   Limits<S> limits{};  ///< of the actuator; u0 - A and u0 + A must be within
 
   /// @cond
   static constexpr auto fields(auto& c) noexcept {
     return detail::tie(c.sample_time, c.excitation, c.input, c.amplitude, c.hysteresis, c.lead,
-                       c.half_period, c.rest, c.travel, c.time_limit, c.hand_over, c.cycles,
-                       c.limits);
+                       c.half_period, c.rest, c.approach, c.response, c.response_time, c.travel,
+                       c.lowest_output, c.highest_output, c.safe_input, c.time_limit, c.hand_over,
+                       c.cycles, c.limits);
   }
   /// @endcond
 };
@@ -49,11 +76,13 @@ struct ExperimentConfig {
 /// The phase of an experiment.
 enum class ExperimentPhase : unsigned char {
   rest,       ///< u0; y0 is measured
+  approach,   ///< the approach's u, until y will reach its `output`
+  centring,   ///< relay between u0 and the approach's u: one cycle shows which u holds `output`
   settling,   ///< the first two cycles
   measuring,  ///< the cycles from which the result is computed
   hand_over,  ///< the result is ready; u continues, so that the controller's observer can converge
   done,       ///< u0
-  aborted     ///< u0; see `reason`
+  aborted     ///< the safe u; see `reason`
 };
 
 /// Has text.
@@ -63,18 +92,28 @@ inline constexpr bool has_text<ExperimentPhase> = true;
 /// Writes the name of the phase.
 template <class Stream, std::same_as<ExperimentPhase> Value>
 requires detail::WritesText<Stream> Stream& operator<<(Stream& out, Value phase) {
-  constexpr const char* names[] = {"rest", "settling", "measuring", "hand_over", "done", "aborted"};
+  constexpr const char* names[] = {"rest",      "approach",  "centring", "settling",
+                                   "measuring", "hand_over", "done",     "aborted"};
   out << names[static_cast<int>(phase)];
   return out;
 }
 
 /// Why an experiment was aborted.
 enum class AbortReason : unsigned char {
-  none,        ///< not aborted
-  travel,      ///< y moved further than `travel`
-  time_limit,  ///< it took too long: the relay does not switch, or switches slowly
-  bad_sample,  ///< y or the reported u was not finite
-  stopped      ///< by `stop`
+  none,          ///< not aborted
+  travel,        ///< y moved further than `travel`
+  time_limit,    ///< it took too long: the relay does not switch, or switches slowly
+  bad_sample,    ///< y or the reported u was not finite
+  stopped,       ///< by `stop`
+  no_response,   ///< y stands still although u moves it: sensor loose, actuator off, wrong channel,
+                 ///< or an actuator too weak to get there
+  wrong_sign,    ///< the first move of u, or a load meanwhile, drove y the wrong way
+  load_changed,  ///< u drives y no longer where it drove it before: a load larger than A, or an
+                 ///< actuator that failed
+  too_noisy,     ///< noise at rest above half the hysteresis or a quarter of `response`
+  resolution,    ///< the sensor's smallest step is above half the hysteresis or of `response`
+  output_limit,  ///< y beyond `lowest_output` or `highest_output`, or the relay would lead there
+  input_limit    ///< the u that holds y leaves less than a tenth of A to a limit of the actuator
 };
 
 /// Has text.
@@ -84,7 +123,9 @@ inline constexpr bool has_text<AbortReason> = true;
 /// Writes the reason.
 template <class Stream, std::same_as<AbortReason> Value>
 requires detail::WritesText<Stream> Stream& operator<<(Stream& out, Value reason) {
-  constexpr const char* names[] = {"none", "travel", "time_limit", "bad_sample", "stopped"};
+  constexpr const char* names[] = {"none",      "travel",      "time_limit",   "bad_sample",
+                                   "stopped",   "no_response", "wrong_sign",   "load_changed",
+                                   "too_noisy", "resolution",  "output_limit", "input_limit"};
   out << names[static_cast<int>(reason)];
   return out;
 }
@@ -119,6 +160,18 @@ struct ExperimentRow {
 /// On a machine of order 2 without damping a relay does not reach a stable cycle without `lead`.
 /// With it, the relay switches on y + 3 (y - f), where f is y behind a lag of a quarter of `lead`.
 ///
+/// From cold (order 1, `approach`): after `rest` u is the approach's until y, as it rises, will
+/// reach `output` within the time that its first `response` took. There the relay switches between
+/// u0 and the approach's u; the mean of u over a whole cycle is the u that holds `output`, and the
+/// measured cycles move u around that, with a hysteresis of at least what y moves in the latency.
+///
+/// Whatever happens ends within `time_limit` with a `reason`, and with the safe u. While u is on
+/// the side that drives y away from where the safe u leads, y has to follow it by `response` in
+/// each `response_time`: so a sensor that stands still is noticed within that time, in which u may
+/// move y by b0 A times it: leave as much room. On the other side only `time_limit` ends it. No u
+/// stops a machine of order 2 in its motion, nor holds one that was turned on by something else:
+/// that is for brakes and end stops.
+///
 /// Hand-over: from phase `hand_over` on the result is ready. Make the controller, call its
 /// `track(y, reference, u)` while the experiment still moves the machine, and continue with its
 /// `update` from phase `done` on. `examples/identify` shows this.
@@ -146,6 +199,12 @@ class Experiment {
         .nonzero("amplitude", config.amplitude)
         .not_negative("rest", config.rest)
         .positive("travel", config.travel)
+        .not_negative("response_time", config.response_time)
+        .finite("lowest_output", config.lowest_output)
+        .finite("highest_output", config.highest_output)
+        .require(config.lowest_output < config.highest_output,
+                 {"lowest_output", config.lowest_output, "must be below highest_output", -1,
+                  config.highest_output, true})
         .positive("time_limit", config.time_limit)
         .not_negative("hand_over", config.hand_over)
         .require(6 <= cycles && cycles <= 200 && cycles % 2 == 0, "cycles", static_cast<S>(cycles),
@@ -165,19 +224,17 @@ class Experiment {
     } else {
       rules.left_out("lead", config.lead, "must be left out: it is for a relay of order 2");
     }
+    if (config.response_time > S(0)) {
+      rules.positive("response", config.response);
+    } else {
+      rules.left_out("response", config.response, "must be left out without response_time");
+    }
     if (!rules) return rules.error();
     const auto limiter = Limiter<S>::make(config.limits, T);
     if (!limiter) return limiter.error();
-    const S high = config.input + detail::absolute(config.amplitude);
-    const S low = config.input - detail::absolute(config.amplitude);
     const S samples = config.time_limit / T;
+    check_levels(rules, config);
     rules
-        .require(is_finite(high) && !(high > config.limits.upper),
-                 {"amplitude", config.amplitude, "with input goes above limits.upper, which is", -1,
-                  config.limits.upper, true})
-        .require(is_finite(low) && !(low < config.limits.lower),
-                 {"amplitude", config.amplitude, "with input goes below limits.lower, which is", -1,
-                  config.limits.lower, true})
         .require(is_finite(samples) && samples < S(1 << 24), "time_limit", config.time_limit,
                  "must be below 2^24 samples")
         .require(config.rest < config.time_limit,
@@ -194,6 +251,14 @@ class Experiment {
           .require((std::round)(config.half_period / T) >= S(8), "half_period", config.half_period,
                    "must be at least 8 samples");
     }
+    if (config.response_time > S(0)) {
+      rules
+          .require((std::round)(config.response_time / T) >= S(1), "response_time",
+                   config.response_time, "must be at least one sample")
+          .require(config.response_time < config.time_limit,
+                   {"response_time", config.response_time, "must be below time_limit", -1,
+                    config.time_limit, true});
+    }
     const S power = Order == 1 ? T : S(T * T);
     rules.representable("sample_time", T, power, "has a power that the scalar cannot hold");
     if (!rules) return rules.error();
@@ -206,17 +271,24 @@ class Experiment {
   /// The same if the actuator reports what it held since the last sample.
   S update(S y, S u_applied) noexcept {
     if (is_finite(u_applied)) limiter_.track(u_applied);
-    if (finished()) return put_out(config_.input);
+    if (finished()) return put_out(end_input());
     if (!is_finite(y) || !is_finite(u_applied)) return abort(AbortReason::bad_sample);
     if (count_ > 0) last_row_ = {S(count_ - 1) * config_.sample_time, u_applied, y_[0]};
+    if (count_ == 0) rest_ = y;
     const S from_rest = y - rest_;
-    if (count_ == 0) {
-      rest_ = y;
-    } else if (!is_finite(from_rest) || detail::absolute(from_rest) > config_.travel) {
-      return abort(is_finite(from_rest) ? AbortReason::travel : AbortReason::bad_sample);
+    if (!is_finite(from_rest)) return abort(AbortReason::bad_sample);
+    if (y < config_.lowest_output || y > config_.highest_output) {
+      return abort(goes_wrong(from_rest) ? AbortReason::wrong_sign : AbortReason::output_limit);
+    }
+    const bool underway =
+        phase_ == ExperimentPhase::approach || phase_ == ExperimentPhase::centring;
+    if (!underway && detail::absolute(from_rest) > config_.travel) {
+      return abort(goes_wrong(from_rest) ? AbortReason::wrong_sign : AbortReason::travel);
     }
     if (count_ >= limit_samples_) return abort(AbortReason::time_limit);
     ++count_;
+    look_at_steps(y);
+    if (const AbortReason why = watched(y); why != AbortReason::none) return abort(why);
     if (cycle_.is_open()) measure(y, u_applied);
     y_[1] = y_[0];
     y_[0] = y;
@@ -224,7 +296,7 @@ class Experiment {
     return put_out(next(y));
   }
 
-  /// Ends the experiment: u0 from now on. @return u0
+  /// Ends the experiment: the safe u from now on. @return it
   S stop() noexcept { return finished() ? output() : abort(AbortReason::stopped); }
 
   /// b0 and latency, from phase `hand_over` on. @return the result, or an error that names the
@@ -241,14 +313,25 @@ class Experiment {
   [[nodiscard]] ExperimentPhase phase() const noexcept { return phase_; }
   /// Why the experiment was aborted.
   [[nodiscard]] AbortReason reason() const noexcept { return reason_; }
-  /// True if done or aborted; u is u0.
+  /// True if done or aborted; u is u0 or the safe u.
   [[nodiscard]] bool finished() const noexcept {
     return phase_ == ExperimentPhase::done || phase_ == ExperimentPhase::aborted;
   }
   /// The present u.
   [[nodiscard]] S output() const noexcept { return limiter_.last(); }
-  /// y0, the mean of y at rest.
+  /// y0, the mean of y at rest; after an approach its `output`.
   [[nodiscard]] S rest_output() const noexcept { return rest_; }
+  /// The u around which the relay or the steps move: u0; after an approach, the u that holds its
+  /// `output`.
+  [[nodiscard]] S centre() const noexcept { return centre_; }
+  /// Fastest abs(dy/dt) of the approach, unit of y per s; 0 without.
+  [[nodiscard]] S approach_slope() const noexcept { return fastest_; }
+  /// s from the approach's u to a y that moves, by that slope; 0 without.
+  [[nodiscard]] S approach_delay() const noexcept {
+    const S delay =
+        fastest_ > S(0) ? S(responded_) * config_.sample_time - config_.response / fastest_ : S(0);
+    return delay > S(0) ? delay : S(0);
+  }
   /// T, s.
   [[nodiscard]] S sample_time() const noexcept { return config_.sample_time; }
   /// Samples so far.
@@ -266,7 +349,11 @@ class Experiment {
         rest_samples_(to_samples(config.rest)),
         limit_samples_(to_samples(config.time_limit)),
         half_samples_(to_samples(config.half_period)),
-        hand_over_samples_(to_samples(config.hand_over)) {
+        hand_over_samples_(to_samples(config.hand_over)),
+        response_samples_(to_samples(config.response_time)),
+        centre_(config.input),
+        amplitude_(config.amplitude),
+        hysteresis_(config.hysteresis) {
     limiter_.track(config.input);
     if (config.lead > S(0)) follow_ = -std::expm1(S(-4) * config.sample_time / config.lead);
   }
@@ -275,10 +362,102 @@ class Experiment {
     return static_cast<std::int32_t>((std::round)(seconds / config_.sample_time));
   }
 
+  /// The levels of u: within the limits, and with an approach on the side that it needs.
+  static void check_levels(Rules<S>& rules, const Config& config) {
+    const auto within = [&](const char* field, const S& value, const S& level, const char* above,
+                            const char* below) {
+      rules
+          .require(is_finite(level) && !(level > config.limits.upper),
+                   {field, value, above, -1, config.limits.upper, true})
+          .require(is_finite(level) && !(level < config.limits.lower),
+                   {field, value, below, -1, config.limits.lower, true});
+    };
+    if (config.safe_input) {
+      within("safe_input", *config.safe_input, *config.safe_input,
+             "is above limits.upper, which is", "is below limits.lower, which is");
+    }
+    if (!config.approach) {
+      const S size = detail::absolute(config.amplitude);
+      constexpr const char* above = "with input goes above limits.upper, which is";
+      constexpr const char* below = "with input goes below limits.lower, which is";
+      within("amplitude", config.amplitude, config.input + size, above, below);
+      within("amplitude", config.amplitude, config.input - size, above, below);
+      return;
+    }
+    const ExperimentApproach<S>& approach = *config.approach;
+    within("input", config.input, config.input, "is above limits.upper, which is",
+           "is below limits.lower, which is");
+    within("approach.input", approach.input, approach.input, "is above limits.upper, which is",
+           "is below limits.lower, which is");
+    const bool rises = (approach.input > config.input) == (config.amplitude > S(0));
+    rules
+        .require(Order == 1 && config.excitation == Excitation::relay, "approach.input",
+                 approach.input, "must be left out: an approach needs a relay of order 1")
+        .require(detail::absolute(approach.input - config.input) > S(0), "approach.input",
+                 approach.input, "must not be input")
+        .positive("response_time", config.response_time)
+        .finite("approach.output", approach.output)
+        .require(rises ? config.highest_output < Limits<S>{}.upper
+                       : config.lowest_output > Limits<S>{}.lower,
+                 rises ? "highest_output" : "lowest_output",
+                 rises ? config.highest_output : config.lowest_output,
+                 "must be given with an approach")
+        .require(config.lowest_output < approach.output - config.hysteresis &&
+                     approach.output + config.hysteresis < config.highest_output,
+                 "approach.output", approach.output,
+                 "must be between lowest_output and highest_output by more than the hysteresis");
+  }
+
+  /// u after the end.
+  [[nodiscard]] S end_input() const noexcept {
+    return phase_ == ExperimentPhase::aborted ? config_.safe_input.value_or(config_.input)
+                                              : config_.input;
+  }
+
   S abort(AbortReason reason) noexcept {
     phase_ = ExperimentPhase::aborted;
     reason_ = reason;
-    return put_out(config_.input);
+    return put_out(end_input());
+  }
+
+  /// The way that u drives y: 1 or -1.
+  [[nodiscard]] S way() const noexcept { return side_ ? S(1) : S(-1); }
+  /// True if u has made its first move only, and y went the other way.
+  [[nodiscard]] bool goes_wrong(S from_rest) const noexcept {
+    return first_move_ && way() * from_rest < S(0);
+  }
+
+  /// Noise at rest, and the smallest step of y.
+  void look_at_steps(S y) noexcept {
+    const S step = count_ > 1 ? detail::absolute(S(y - y_[0])) : S(0);
+    if (step > S(0) && (!(smallest_step_ > S(0)) || step < smallest_step_)) smallest_step_ = step;
+    if (phase_ == ExperimentPhase::rest) noise_ += (step * step / S(2) - noise_) / S(count_);
+  }
+
+  /// u has moved: from here on y has to follow.
+  void watch_from(S y) noexcept {
+    watch_start_ = farthest_ = y;
+    watched_since_ = count_;
+    // On the side of the safe u nothing can run away.
+    const S safe = config_.safe_input.value_or(config_.input);
+    const S here = detail::absolute(S(moved(side_) - safe));
+    watching_ = response_samples_ > 0 && !(here < detail::absolute(S(moved(!side_) - safe)));
+  }
+
+  /// Why y does not follow u, if it does not.
+  AbortReason watched(S y) noexcept {
+    if (!watching_) return AbortReason::none;
+    const S back = way() * (y - watch_start_);
+    if (first_move_ && !(back > -config_.response)) return AbortReason::wrong_sign;
+    if (way() * (y - farthest_) < S(0)) farthest_ = y;
+    if (!(way() * (y - farthest_) < config_.response)) {
+      if (smallest_step_ > config_.response / S(2)) return AbortReason::resolution;
+      watch_start_ = farthest_ = y;
+      watched_since_ = count_;
+    } else if (count_ - watched_since_ >= response_samples_) {
+      return back > -config_.response ? AbortReason::no_response : AbortReason::load_changed;
+    }
+    return AbortReason::none;
   }
 
   S put_out(S wanted) noexcept { return limiter_(wanted); }
@@ -286,10 +465,10 @@ class Experiment {
   /// Adds a sample to the window.
   void measure(S y, S u_applied) noexcept {
     S difference = y - y_[0];
-    S input = u_applied - config_.input;
+    S input = u_applied - centre_;
     if constexpr (Order == 2) {
       difference -= y_[0] - y_[1];
-      input = (input + (u_last_ - config_.input)) / S(2);
+      input = (input + (u_last_ - centre_)) / S(2);
     }
     if (cycle_.add(difference, input) && 2 * cycle_.windows() >= config_.cycles) {
       phase_ = ExperimentPhase::hand_over;
@@ -299,33 +478,130 @@ class Experiment {
 
   /// u from this sample on.
   S next(S y) noexcept {
-    if (phase_ == ExperimentPhase::rest) {
+    using P = ExperimentPhase;
+    if (phase_ == P::rest) {
       rest_ += (y - rest_) / S(count_);
       if (count_ <= rest_samples_) return config_.input;
-      phase_ = ExperimentPhase::settling;
+      if (!quiet()) return abort(AbortReason::too_noisy);
       lagging_ = y - rest_;
-      side_ = true;
+      side_ = first_move_ = true;
       switched_ = count_ - half_samples_ / 2;
-      return moved();
+      phase_ = P::settling;
+      if (config_.approach) begin_approach(y);
+      watch_from(y);
+      return moved(side_);
     }
-    if (phase_ == ExperimentPhase::hand_over && count_ - phase_start_ >= hand_over_samples_) {
-      phase_ = ExperimentPhase::done;
+    if (phase_ == P::hand_over && count_ - phase_start_ >= hand_over_samples_) {
+      phase_ = P::done;
       return config_.input;
     }
-    if (switches(y - rest_)) {
+    if (phase_ == P::approach && !arrives(y)) return moved(side_);
+    if (phase_ == P::approach) {
+      if (way() * (config_.approach->output + way() * (config_.hysteresis + coast_)) >
+          way() * (side_ ? config_.highest_output : config_.lowest_output)) {
+        return abort(AbortReason::output_limit);
+      }
+      begin_relay(y, !side_);
+      return moved(side_);
+    }
+    if (phase_ == P::centring) add_to_mean();
+    // After the approach y arrives by itself.
+    const bool coasts =
+        phase_ == P::centring && cycles_ < 0 && side_ != rises_ && count_ - switched_ < responded_;
+    if (!coasts && switches(y - rest_)) {
       side_ = !side_;
-      const bool up = side_;
+      first_move_ = false;
       const std::int32_t cycle = count_ - up_;
       switched_ = count_;
-      if (up) {
+      if (side_) {
         up_ = count_;
         ++cycles_;
+        if (phase_ == P::centring && cycles_ == 2 && !centred()) {
+          return abort(AbortReason::input_limit);
+        }
         // The first of the settling cycles have no complete cycle before them.
-        if (phase_ == ExperimentPhase::settling && cycles_ > 2) phase_ = ExperimentPhase::measuring;
-        if (phase_ == ExperimentPhase::measuring && !cycle_.is_open()) cycle_.open(2 * cycle);
+        if (phase_ == P::settling && cycles_ > 2) phase_ = P::measuring;
+        if (phase_ == P::measuring && !cycle_.is_open()) cycle_.open(2 * cycle);
       }
+      watch_from(y);
     }
-    return moved();
+    return moved(side_);
+  }
+
+  /// True if noise at rest and resolution leave room for hysteresis and response.
+  [[nodiscard]] bool quiet() const noexcept {
+    if (count_ < 8) return true;
+    const S noise = std::sqrt(noise_);
+    return !(S(2) * noise > config_.hysteresis && config_.excitation == Excitation::relay) &&
+           !(S(4) * noise > config_.response && response_samples_ > 0);
+  }
+
+  /// Towards `output`, or, if y is already beyond it, straight to the relay.
+  void begin_approach(S y) noexcept {
+    const ExperimentApproach<S>& approach = *config_.approach;
+    rises_ = (approach.input > config_.input) == (config_.amplitude > S(0));
+    phase_ = ExperimentPhase::approach;
+    side_ = rises_;
+    start_output_ = y;
+    phase_start_ = count_;
+    if (!(way() * (approach.output - y) > S(0))) begin_relay(y, !side_);
+  }
+
+  /// True if y, as it moves, reaches `output` in the time that its first response took.
+  [[nodiscard]] bool arrives(S y) noexcept {
+    const S moved_by = way() * (y - start_output_);
+    if (responded_ == 0) {
+      if (moved_by < config_.response) return false;
+      responded_ = count_ - phase_start_;
+      slope_ = moved_by / S(responded_);
+    } else {
+      slope_ += (way() * (y - y_[1]) - slope_) / S(responded_);
+    }
+    coast_ = slope_ > S(0) ? slope_ * S(responded_) : S(0);
+    const S slope = slope_ / config_.sample_time;
+    if (slope > fastest_) fastest_ = slope;
+    return !(way() * (config_.approach->output - y) > coast_);
+  }
+
+  /// A relay between u0 and the approach's u, to find the u that holds `output`.
+  void begin_relay(S y, bool side) noexcept {
+    phase_ = ExperimentPhase::centring;
+    rest_ = config_.approach->output;
+    side_ = side;
+    first_move_ = false;
+    switched_ = count_;
+    cycles_ = -1;  // y may still be on its way: the first cycle is none
+    watch_from(y);
+  }
+
+  void add_to_mean() noexcept {
+    if (cycles_ != 1) return;
+    mean_ += (u_last_ - mean_) / S(count_ - up_);
+  }
+
+  /// The measured cycles move u around its mean. @return false if a limit is too near
+  [[nodiscard]] bool centred() noexcept {
+    const S below = mean_ - config_.limits.lower, above = config_.limits.upper - mean_;
+    const S room = below < above ? below : above;
+    const S wanted = detail::absolute(config_.amplitude);
+    if (!(room >= wanted / S(10))) return false;
+    centre_ = mean_;
+    if (room < wanted) amplitude_ = config_.amplitude > S(0) ? room : S(-room);
+    cycle_ = detail::CycleAnalysis<Order, S>(config_.sample_time, amplitude_);
+    // A smaller move of u takes longer.
+    const S longer = (config_.approach->input - mean_) / amplitude_;
+    const S samples = S(response_samples_) * detail::absolute(longer);
+    response_samples_ =
+        samples < S(limit_samples_) ? static_cast<std::int32_t>(samples) : limit_samples_;
+    if (response_samples_ < 1) response_samples_ = 1;
+    // Below what y moves within the latency, lag and dead time would not be told apart.
+    const S least = slope_ * (approach_delay() / config_.sample_time) / detail::absolute(longer);
+    const S up = config_.highest_output - rest_, down = rest_ - config_.lowest_output;
+    const bool fits = S(2) * least < up && S(2) * least < down && S(2) * least < config_.travel;
+    if (least > hysteresis_ && fits) hysteresis_ = least;
+    cycles_ = 0;
+    phase_ = ExperimentPhase::settling;
+    return true;
   }
 
   [[nodiscard]] bool switches(S deviation) noexcept {
@@ -336,17 +612,27 @@ class Experiment {
       seen += S(3) * (deviation - lagging_);
     }
     // With amplitude < 0 each side of u moves y the other way; `side_` already includes this.
-    return side_ ? seen > config_.hysteresis : seen < -config_.hysteresis;
+    return side_ ? seen > hysteresis_ : seen < -hysteresis_;
   }
 
-  [[nodiscard]] S moved() const noexcept {
-    return side_ ? config_.input + config_.amplitude : config_.input - config_.amplitude;
+  /// u of a side.
+  [[nodiscard]] S moved(bool side) const noexcept {
+    if (phase_ == ExperimentPhase::approach || phase_ == ExperimentPhase::centring) {
+      return side == rises_ ? config_.approach->input : config_.input;
+    }
+    return side ? centre_ + amplitude_ : centre_ - amplitude_;
   }
 
   Config config_;
   Limiter<S> limiter_;
   detail::CycleAnalysis<Order, S> cycle_;
-  std::int32_t rest_samples_, limit_samples_, half_samples_, hand_over_samples_;
+  std::int32_t rest_samples_, limit_samples_, half_samples_, hand_over_samples_, response_samples_;
+  S centre_, amplitude_, hysteresis_;
+  S smallest_step_{}, noise_{};
+  S watch_start_{}, farthest_{};
+  S start_output_{}, slope_{}, fastest_{}, coast_{}, mean_{};
+  std::int32_t watched_since_ = 0, responded_ = 0;
+  bool watching_ = false, first_move_ = false, rises_ = true;
   S follow_{};
   S u_last_{};
   S rest_{};
