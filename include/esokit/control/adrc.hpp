@@ -432,7 +432,7 @@ class Adrc {
   [[nodiscard]] S judged(const Given& given) noexcept {
     S u = command(given);
     if (all(!soft_.on())) return u;
-    if (const auto designed = soft_.slowness() <= S(1.0); !all(designed)) {
+    if (const auto designed = soft_.slowness() <= S(1.0); records<S> || !all(designed)) {
       const S eased = soft_.control(law_, lacks(filled(given)));
       u = select(designed, u, detail::by_present_gain(observer(), eased));
     }

@@ -395,7 +395,7 @@ class ControlLoop {
 
   ESOKIT_INLINE S limited(S wanted) noexcept {
     // A bad reference or an overflow in the law: keeps the last output.
-    if (const auto good = is_finite(wanted); !all(good)) [[unlikely]]
+    if (const auto good = is_finite(wanted); records<S> || !all(good)) [[unlikely]]
       wanted = select(good, wanted, limiter_.last());
     requested_ = wanted;
     return limiter_(wanted);
