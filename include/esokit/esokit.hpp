@@ -169,6 +169,7 @@
 #include <esokit/sim/study_records.hpp>
 #include <esokit/sim/trapezoid.hpp>
 #include <esokit/sim/window.hpp>
+#include <esokit/target/c_code.hpp>
 #include <esokit/target/recorder.hpp>
 #include <esokit/tune/controller.hpp>
 #include <esokit/tune/families.hpp>
