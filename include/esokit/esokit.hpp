@@ -170,6 +170,8 @@
 #include <esokit/sim/trapezoid.hpp>
 #include <esokit/sim/window.hpp>
 #include <esokit/target/c_code.hpp>
+#include <esokit/target/c_text.hpp>
+#include <esokit/target/c_writer.hpp>
 #include <esokit/target/recorder.hpp>
 #include <esokit/tune/controller.hpp>
 #include <esokit/tune/families.hpp>

@@ -476,6 +476,7 @@ class PredictorCorrector {
  private:
   friend struct detail::LaneAccess;
   friend struct detail::GuardAccess;
+  friend struct detail::RecordAccess;
 
   using LevelStates = Array<State, Levels>;
   using Plain = detail::PlainTwin<PredictorCorrector, S>;  ///< type of a lane

@@ -1,16 +1,16 @@
 /// @file
-/// to_c: a finished controller as C99, written from its recorded calls.
+/// to_c: a finished controller or observer as C99, written from its recorded calls.
 #pragma once
 
 #include <cctype>
-#include <cmath>
-#include <cstdio>
-#include <cstring>
+#include <cstddef>
 #include <esokit/control/adrc.hpp>
 #include <esokit/core/expected.hpp>
+#include <esokit/target/c_text.hpp>
+#include <esokit/target/c_writer.hpp>
 #include <esokit/target/recorder.hpp>
-#include <limits>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -31,7 +31,7 @@ struct CCode {
 
 namespace detail {
 
-/// What is private in a controller and is recorded apart.
+/// What is private in a controller and an observer, and is recorded apart.
 struct RecordAccess {
   template <class C>
   static auto& loop(C& c) noexcept {
@@ -82,630 +82,332 @@ struct RecordAccess {
             static_cast<double>(loop.hold_input_),
             static_cast<double>(loop.safe_input_)};
   }
+
+  /// The gain laws of all levels.
+  template <class O>
+  static auto& laws(O& o) noexcept {
+    return o.laws_;
+  }
 };
 
-/// A function of the C file: a recorded call with names.
-struct CFunction {
-  std::string name;
-  std::vector<std::string> arguments;
-  bool has_output = false;  ///< it writes *u
-};
+/// Whether all gains of an observer are constants that it keeps, and gaps are bridged by others.
+template <class Observer>
+concept GainIsKept = can_be_recorded<Observer> && requires(const Observer& o) {
+  { o.predicted_measurement() } -> std::same_as<const typename Observer::scalar_type&>;
+  RecordAccess::laws(o)[0].gap_gain(o.predicted_measurement(), 2u);
+} && std::is_lvalue_reference_v<
+    decltype(RecordAccess::laws(std::declval<const Observer&>())[0].gain_before_measurement())>;
 
-/// Writes recorded calls as functions of C.
-class CWriter {
+/// The parts of a file that an observer and a controller have in common.
+/// @tparam Subject the observer or controller @tparam Observer its observer
+template <class Subject, class Observer>
+class CBuilder {
  public:
-  CWriter(bool single, std::string prefix) : single_(single), prefix_(std::move(prefix)) {}
+  using V = typename Observer::scalar_type;
+  using Number = typename Recorder<Subject>::Number;
+  using Numbers = std::vector<Number>;
+  static constexpr int size = Observer::size;
+  static constexpr int gains = size * Observer::levels;
 
-  std::vector<std::string> members{};  ///< a name for each number of the object
-  std::vector<bool> live{};            ///< the numbers that the state needs
+  CBuilder(const Subject& subject, const CCodeOptions& options)
+      : writer(sizeof(V) == sizeof(float), options.name), options_(options), recorder_(subject) {}
 
-  [[nodiscard]] std::string real() const { return single_ ? "float" : "double"; }
-  /// The number, read back bit for bit.
-  [[nodiscard]] std::string number(double value) const {
-    char digits[40];
-    std::snprintf(digits, sizeof digits, single_ ? "%.9g" : "%.17g", value);
-    std::string text = digits;
-    if (text.find_first_of(".e") == std::string::npos) text += ".0";
-    return single_ ? text + "f" : text;
-  }
-
-  /// Which instructions are needed for checks, outputs and live numbers.
-  [[nodiscard]] std::vector<bool> needed(const RecordedCall& call) const {
-    std::vector<bool> need(call.list.instructions.size(), false);
-    const auto want = [&](int index) {
-      if (index >= 0) need[static_cast<std::size_t>(index)] = true;
+  /// The rules for the options.
+  [[nodiscard]] static Rules<V> checked(const CCodeOptions& options) {
+    const auto letter = [](char c) {
+      return std::isalpha(static_cast<unsigned char>(c)) != 0 || c == '_';
     };
-    for (const int check : call.list.checks) want(check);
-    for (const int output : call.outputs) want(output);
-    for (std::size_t i = 0; i < live.size(); ++i) {
-      if (live[i]) want(call.next[i]);
+    bool is_name = !options.name.empty() && letter(options.name[0]);
+    for (const char c : options.name) {
+      is_name = is_name && (letter(c) || std::isdigit(static_cast<unsigned char>(c)) != 0);
     }
-    for (std::size_t i = need.size(); i-- > 0;) {  // operands come before
-      const Instruction& one = call.list.instructions[i];
-      if (!need[i] || one.operation == Operation::argument) continue;
-      want(one.a);
-      want(one.b);
-      want(one.c);
-    }
-    return need;
+    Rules<V> rules;
+    rules.require(is_name, "name", V(0), "must be an identifier of C")
+        .require(1 <= options.self_test_samples && options.self_test_samples <= 10000,
+                 "self_test_samples", static_cast<V>(options.self_test_samples),
+                 "must be 1 .. 10000");
+    return rules;
   }
 
-  /// Adds the numbers that the calls read to the live ones.
-  void find_live(const RecordedObject& all) {
-    for (bool grew = true; grew;) {
-      grew = false;
-      for (const auto& lists : all.calls) {
-        const auto need = needed(lists[0]);
-        for (std::size_t i = 0; i < need.size(); ++i) {
-          const Instruction& one = lists[0].list.instructions[i];
-          const auto from = static_cast<std::size_t>(one.a);
-          if (!need[i] || one.operation != Operation::argument || from >= live.size()) continue;
-          if (!live[from]) live[from] = grew = true;
-        }
-      }
-    }
+  void add(const std::string& name, std::vector<std::string> arguments, bool has_output,
+           typename Recorder<Subject>::Call call) {
+    recorder_.add(static_cast<int>(arguments.size()), std::move(call));
+    functions_.push_back({name, std::move(arguments), has_output});
   }
 
-  /// `static int name(state *o, arguments, *u)`: 1, or 0 if a check does not hold; then nothing has
-  /// changed.
-  [[nodiscard]] std::string function(const CFunction& names, const RecordedCall& call) const {
-    const auto& list = call.list.instructions;
-    const auto need = needed(call);
-    std::string text = "static int " + names.name + "(" + prefix_ + "_state *o";
-    for (const auto& argument : names.arguments) text += ", " + real() + " " + argument;
-    if (names.has_output) text += ", " + real() + " *u_out";
-    text += ")\n{\n";
-
-    std::vector<int> uses(list.size(), 0);
-    const auto use = [&](int index, int times) {
-      if (index >= 0) uses[static_cast<std::size_t>(index)] += times;
-    };
-    for (std::size_t i = 0; i < list.size(); ++i) {
-      if (!need[i] || list[i].operation == Operation::argument) continue;
-      use(list[i].a, 1);
-      use(list[i].b, 1);
-      use(list[i].c, 1);
-    }
-    for (const int output : call.outputs) use(output, 2);
-    for (std::size_t i = 0; i < live.size(); ++i) {
-      if (live[i]) use(call.next[i], 2);
-    }
-
-    std::vector<std::string> of(list.size());
-    std::vector<int> depth(list.size(), 0);
-    std::vector<bool> given(names.arguments.size(), false);
-    int temporaries = 0;
-    for (std::size_t i = 0; i < list.size(); ++i) {
-      const Instruction& one = list[i];
-      if (!need[i]) continue;
-      if (one.operation == Operation::constant) {
-        of[i] = number(one.value);
-        if (one.value < 0) of[i] = "(" + of[i] + ")";
-        continue;
+  /// The calls of the observer. @param of the observer of a recorded subject
+  template <class Of>
+  void add_observer(const Of& of) {
+    add("predict_step", {"u"}, false, [of](auto& c, const Numbers& in) {
+      (void)of(c).predict(in[0]);
+      return Numbers{};
+    });
+    std::vector<std::string> arguments{"y"};
+    for (int i = 1; i <= gains; ++i) arguments.push_back("k" + std::to_string(i));
+    add("correct_step", arguments, false, [of](auto& c, const Numbers& in) {
+      // With gains that are arguments; the object is not constant, only their getter is.
+      auto& laws = RecordAccess::laws(of(c));
+      const auto nominal = laws;
+      std::size_t next = 1;
+      for (auto& law : laws) {
+        using Gain = std::remove_cvref_t<decltype(law.gain_before_measurement())>;
+        for (auto& k : const_cast<Gain&>(law.gain_before_measurement())) k = in[next++];
       }
-      if (one.operation == Operation::argument) {
-        const auto from = static_cast<std::size_t>(one.a);
-        if (from < members.size()) {
-          of[i] = members[from];
-          text += "  const " + real() + " " + of[i] + " = o->" + of[i] + ";\n";
-        } else {
-          of[i] = names.arguments[from - members.size()];
-          given[from - members.size()] = true;
-        }
-        continue;
-      }
-      const auto part = [&](int index) {
-        return index < 0 ? std::string() : of[static_cast<std::size_t>(index)];
-      };
-      int deep = 1;
-      for (const int index : {one.a, one.b, one.c}) {
-        if (index >= 0 && depth[static_cast<std::size_t>(index)] >= deep) {
-          deep = depth[static_cast<std::size_t>(index)] + 1;
-        }
-      }
-      const std::string expression =
-          this->expression(one.operation, part(one.a), part(one.b), part(one.c));
-      const bool in_place = uses[i] == 1 && deep < 4 && one.operation != Operation::choose;
-      if (in_place) {
-        of[i] = "(" + expression + ")";
-        depth[i] = deep;
-        continue;
-      }
-      for (std::size_t m = 0; m < live.size() && of[i].empty(); ++m) {
-        if (live[m] && call.next[m] == static_cast<int>(i)) of[i] = members[m] + "_next";
-      }
-      if (of[i].empty()) of[i] = "t" + std::to_string(++temporaries);
-      text += std::string("  const ") + (is_condition(one.operation) ? "int" : real()) + " " +
-              of[i] + " = " + expression + ";\n";
-    }
-    for (std::size_t i = 0; i < given.size(); ++i) {
-      if (!given[i]) text += "  (void)" + names.arguments[i] + ";\n";
-    }
-    const auto at = [&](int index) { return of[static_cast<std::size_t>(index)]; };
-    std::vector<bool> checked(list.size(), false);
-    for (const int check : call.list.checks) {
-      const auto index = static_cast<std::size_t>(check);
-      if (!checked[index]) text += "  if (!" + of[index] + ") return 0;\n";
-      checked[index] = true;
-    }
-    bool writes = false;
-    for (std::size_t i = 0; i < live.size(); ++i) {
-      if (!live[i] || call.next[i] < 0) continue;
-      text += "  o->" + members[i] + " = " + at(call.next[i]) + ";\n";
-      writes = true;
-    }
-    if (!writes) text += "  (void)o;\n";
-    for (const int output : call.outputs) text += "  *u_out = " + at(output) + ";\n";
-    return text + "  return 1;\n}\n\n";
+      (void)of(c).correct(in[0]);
+      laws = nominal;
+      return Numbers{};
+    });
+    add("restart_at", {"y"}, false, [of](auto& c, const Numbers& in) {
+      (void)of(c).reset(in[0]);
+      return Numbers{};
+    });
+    unroll<size>([&](auto row) {
+      add("estimate_" + std::to_string(int{row}), {}, true, [of](auto& c, const Numbers&) {
+        return Numbers{of(c).template estimate<int{decltype(row)::value}>()};
+      });
+    });
   }
+
+  /// Records all, names the numbers and writes what is common. @param name_of gives the name of a
+  /// number from its place behind z_1 of the observer, or ""
+  template <class Of, class NameOf>
+  [[nodiscard]] Check<V> record(const Subject& subject, const Of& of, const NameOf& name_of) {
+    const auto recorded = recorder_.record();
+    if (!recorded) return recorded.error();
+    auto object = Recorder<Subject>::as_recorded(subject);
+    const auto numbers = numbers_of<Number>(object);
+    const Number* first = &of(object).predicted_measurement();
+    writer.live.assign(numbers.size(), false);
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      const auto state = numbers[i] - first;
+      std::string name = name_of(object, numbers[i]);
+      if (numbers[i] == &of(object).applied_input()) name = "u_applied";
+      if (numbers[i] == &of(object).innovation()) name = "innovation";
+      if (0 <= state && state < gains) {
+        name = "z" + std::to_string(state % size + 1);
+        if (state >= size) name += "_level" + std::to_string(state / size + 1);
+      }
+      writer.live[i] = name[0] == 'z' || name == "u_applied" || name == "u_last";
+      writer.members.push_back(name.empty() ? "x" + std::to_string(i) : name);
+    }
+    writer.find_live(*recorded);
+    std::string members;
+    std::string init;
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      if (!writer.live[i]) continue;
+      members += "  " + writer.real() + " " + writer.members[i] + ";\n";
+      init += "  o->" + writer.members[i] + " = " + writer.number(recorded->numbers[i]) + ";\n";
+    }
+    for (std::size_t i = 0; i < functions_.size(); ++i) {
+      lists_ += writer.function(functions_[i], recorded->calls[i][0]);
+    }
+    common(of(subject), members, init);
+    return {};
+  }
+
+  /// The two files. @param words more words, filled in first
+  [[nodiscard]] CCode code(const char* header, const char* source, Words words) const {
+    words.insert(words.end(), words_.begin(), words_.end());
+    const auto text = [&](const char* from) { return filled(from, words); };
+    return {text(c_header_head) + text(header) + text(c_header_tail),
+            text(c_source_head) + lists_ + text(c_source_observer_part) + text(source) +
+                text(c_source_self_test)};
+  }
+
+  CWriter writer;
 
  private:
-  [[nodiscard]] std::string expression(Operation operation, const std::string& a,
-                                       const std::string& b, const std::string& c) const {
-    const auto called = [&](const char* name, const std::string& given) {
-      return name + std::string(single_ ? "f(" : "(") + given + ")";
-    };
-    switch (operation) {
-      case Operation::add:
-        return a + " + " + b;
-      case Operation::subtract:
-        return a + " - " + b;
-      case Operation::multiply:
-        return a + " * " + b;
-      case Operation::divide:
-        return a + " / " + b;
-      case Operation::negate:
-        return "-" + a;
-      case Operation::magnitude:
-        return called("fabs", a);
-      case Operation::square_root:
-        return called("sqrt", a);
-      case Operation::power:
-        return called("pow", a + ", " + b);
-      case Operation::exponential:
-        return called("exp", a);
-      case Operation::exponential_less_one:
-        return called("expm1", a);
-      case Operation::choose:
-        return a + " ? " + b + " : " + c;
-      case Operation::less:
-        return a + " < " + b;
-      case Operation::greater:
-        return a + " > " + b;
-      case Operation::at_most:
-        return a + " <= " + b;
-      case Operation::at_least:
-        return a + " >= " + b;
-      case Operation::finite:
-        return "is_finite(" + a + ")";
-      case Operation::both:
-        return a + " && " + b;
-      case Operation::either:
-        return a + " || " + b;
-      case Operation::opposite:
-        return "!" + a;
-      case Operation::constant:
-      case Operation::argument:
-        break;
+  void common(const Observer& observer, const std::string& members, const std::string& init) {
+    const int max_gap = observer.max_gap();
+    std::string table;
+    for (int elapsed = 1; elapsed <= max_gap + 1; ++elapsed) {
+      std::string row;
+      for (const auto& law : RecordAccess::laws(observer)) {
+        const auto gain = elapsed == 1 ? law.gain_before_measurement()
+                                       : law.gap_gain(V(0), static_cast<unsigned>(elapsed));
+        for (const V k : gain) {
+          row += (row.empty() ? "  {" : ", ") + writer.number(static_cast<double>(k));
+        }
+      }
+      table += row + "},\n";
     }
-    return a;
+    std::string call_gains;
+    for (int i = 0; i < gains; ++i) call_gains += ", k[" + std::to_string(i) + "]";
+    std::string rows;
+    for (int row = 0; row < size; ++row) {
+      const std::string number = std::to_string(row);
+      rows += "  case " + number + "u:\n    (void)estimate_" + number + "(o, &u);\n    break;\n";
+    }
+    std::string upper = options_.name;
+    for (char& c : upper) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+    constexpr bool single = sizeof(V) == sizeof(float);
+    words_ = {{"$include", "#include"},  // not written in the texts: scripts look for such lines
+              {"$MEMBERS", members},
+              {"$COMMENT", options_.comment.empty() ? "" : " * " + options_.comment + "\n"},
+              {"$TIME", writer.number(static_cast<double>(observer.sample_time()))},
+              {"$GAINS", call_gains},
+              {"$GAIN", writer.number(static_cast<double>(observer.input_gain()))},
+              {"$ROWS_OF_ESTIMATE", rows},
+              {"$ROWS", std::to_string(max_gap + 1)},
+              {"$LAST", std::to_string(size - 1)},
+              {"$GAP_GAINS", table},
+              {"$SIZE", std::to_string(gains)},
+              {"$INIT", init},
+              {"$SAMPLES", std::to_string(options_.self_test_samples)},
+              {"$word", single ? "uint32_t" : "uint64_t"},
+              {"$exponent", single ? "0x7f800000u" : "0x7ff0000000000000u"},
+              {"$fabs", single ? "fabsf" : "fabs"},
+              {"$real", writer.real()},
+              {"$NAME", upper},
+              {"$name", options_.name}};
   }
 
-  bool single_;
-  std::string prefix_;
+  CCodeOptions options_;
+  Recorder<Subject> recorder_;
+  std::vector<CFunction> functions_{};
+  std::string lists_{};
+  Words words_{};
 };
 
-/// `text` with each `$key` replaced.
-inline std::string filled(std::string text,
-                          const std::vector<std::pair<std::string, std::string>>& words) {
-  for (const auto& [key, word] : words) {
-    for (std::size_t at = 0; (at = text.find(key, at)) != std::string::npos; at += word.size()) {
-      text.replace(at, key.size(), word);
-    }
+/// Samples for the self-test: what y is does not matter. @param step gives the result for y and r
+template <class V, class Step>
+std::string self_test_samples(const CWriter& writer, int count, Step&& step) {
+  std::string text;
+  for (int k = 0; k < count; ++k) {
+    const V r = static_cast<V>((k / 10) % 2 == 0 ? 1.0 : -0.5);
+    const V y = static_cast<V>(0.25 * ((k * 37) % 16) - 1.5);
+    text += "    {" + writer.number(static_cast<double>(y)) + ", " +
+            writer.number(static_cast<double>(r)) + ", " +
+            writer.number(static_cast<double>(step(y, r))) + "},\n";
   }
   return text;
 }
 
-// What is integers is text of C, written once: the counterpart of PredictorCorrector::predict,
-// correct and of ControlLoop.
-inline constexpr const char* c_header = R"(#ifndef $NAME_H
-#define $NAME_H
-/* Written by esokit from a finished design; do not edit.
-$COMMENT * T = $TIME s, b0 = $GAIN, u within $LOWER .. $UPPER.
- *
- * Compile with -std=c99 or -ffp-contract=off: then it equals the C++ bit for bit. */
-
-$include <stdint.h>
-
-#ifdef __cplusplus
-extern "C" {
-#endif
-
-/* Flags of `status`; 0: all is well. */
-#define $NAME_MEASUREMENT_REJECTED 1u /* y was NaN, infinite or too large */
-#define $NAME_INPUT_REJECTED 2u /* u was too large: the last good one was used */
-#define $NAME_PREDICTION_DROPPED 4u /* the next good y restarts */
-#define $NAME_GAP_BRIDGED 8u /* samples were missing before this one */
-#define $NAME_RESTARTED 16u /* too many samples were missing */
-#define $NAME_STATE_REJECTED 32u /* start: y is not finite or too large */
-
-/* `mode`: what determines u. */
-#define $NAME_RUNNING 0u
-#define $NAME_START_HOLD 1u
-#define $NAME_SAFE 2u /* too many measurements are missing */
-
-typedef struct {
-$MEMBERS  uint32_t hold_left; /* samples of the start hold */
-  uint16_t gap; /* samples since the last measurement that was taken */
-  uint8_t mode;
-  uint8_t status;
-} $name_state;
-
-/* At rest at y = 0, u = 0. Call it before all else. */
-void $name_init($name_state *o);
-/* Takes over a plant at rest at y under u, with the reference at y. Returns a status. */
-unsigned $name_start($name_state *o, $real y, $real u);
-/* One sample: y (NaN if it is missing) and the reference; returns the u to be held until the next. */
-$real $name_update($name_state *o, $real y, $real r);
-/* The same without a measurement. */
-$real $name_update_without_measurement($name_state *o, $real r);
-/* What the actuator really held, before the next update; only if it differs from what update gave. */
-void $name_applied($name_state *o, $real u);
-
-#ifdef $NAME_SELF_TEST
-/* 0, or the number of the first sample whose u differs from that of the design by more than
- * `tolerance`; 0 asks for equal numbers. */
-int $name_self_test($real tolerance);
-#endif
-
-#ifdef __cplusplus
-}
-#endif
-#endif
-)";
-
-inline constexpr const char* c_head =
-    R"(/* Written by esokit from a finished design; do not edit. */
-$include "$name.h"
-
-$include <math.h>
-$include <string.h>
-
-/* By its bits, so that it holds under -ffast-math, too. */
-static int is_finite($real x)
-{
-  $word bits;
-  memcpy(&bits, &x, sizeof bits);
-  return (bits & $exponent) != $exponent;
-}
-
-/* ---- Recorded from the design: 0 if a result would not be finite; then nothing has changed. */
-
-)";
-
-inline constexpr const char* c_shell = R"(/* ---- What counts and chooses. */
-
-/* Of the correction after 1, 2, .. samples. */
-static const $real gains[$ROWS][$SIZE] = {
-$GAP_GAINS};
-
-static int restart($name_state *o, $real y)
-{
-  if (!is_finite(y) || !restart_at(o, y)) return 0;
-  o->gap = 0;
-  return 1;
-}
-
-static unsigned predict($name_state *o)
-{
-  const $real given = o->u_last;
-  const int good = predict_step(o, given);
-  if (o->gap < 65535u) ++o->gap;
-  if (good) return 0u;
-  if (!($fabs(given) > $fabs(o->u_applied))) { /* u is not the cause */
-    o->u_applied = given;
-    o->gap = 65535u;
-    return $NAME_PREDICTION_DROPPED;
-  }
-  if (predict_step(o, o->u_applied)) return $NAME_INPUT_REJECTED;
-  o->gap = 65535u;
-  return $NAME_INPUT_REJECTED | $NAME_PREDICTION_DROPPED;
-}
-
-static unsigned correct($name_state *o, $real y)
-{
-  const unsigned elapsed = o->gap > 1u ? o->gap : 1u;
-  const $real *k;
-  if (elapsed > $ROWSu) return restart(o, y) ? $NAME_RESTARTED : $NAME_MEASUREMENT_REJECTED;
-  k = gains[elapsed - 1u];
-  if (!correct_step(o, y$GAINS)) { /* perhaps the state is to blame */
-    return $fabs(y) < $fabs(o->z1) && restart(o, y) ? $NAME_RESTARTED : $NAME_MEASUREMENT_REJECTED;
-  }
-  o->gap = 0;
-  return elapsed > 1u ? $NAME_GAP_BRIDGED : 0u;
-}
-
-static void judge_missing($name_state *o)
-{
-  if (o->gap >= $MISSING_LIMITu) {
-    o->mode = $NAME_SAFE;
-  }$LEAVE_SAFE
-}
-
-static $real put_out($name_state *o, $real r)
-{
-  $real u;
-  if (o->mode == $NAME_RUNNING) {
-    (void)law(o, r, &u);
-  } else if (o->mode == $NAME_SAFE) {
-    u = $SAFE_INPUT;
-  } else {
-    --o->hold_left;
-    if (o->hold_left == 0u) o->mode = $NAME_RUNNING;
-    u = $HOLD_INPUT;
-  }
-  (void)limit(o, u, &u);
-  return u;
-}
-
-void $name_init($name_state *o)
-{
-$INIT  o->hold_left = $HOLD_LEFTu;
-  o->gap = 0;
-  o->mode = $MODE;
-  o->status = 0;
-}
-
-unsigned $name_start($name_state *o, $real y, $real u)
-{
-  const $real before = o->u_applied;
-  if (!is_finite(y)) return $NAME_STATE_REJECTED;
-  if (!is_finite(u)) return $NAME_INPUT_REJECTED;
-  o->u_applied = u;
-  if (!rest_at(o, y)) {
-    o->u_applied = before;
-    return $NAME_STATE_REJECTED;
-  }
-  (void)applied(o, u);
-$HARDEN  o->gap = 0;
-  o->mode = $NAME_RUNNING;
-  return 0u;
-}
-
-$real $name_update($name_state *o, $real y, $real r)
-{
-  unsigned status = 0u;
-  if (o->gap != 0u || !observe(o, y)) {
-    status = predict(o);
-    status |= correct(o, y);
-    if ((status & $NAME_RESTARTED) != 0u) (void)rest_at(o, y);
-  }
-  o->status = (uint8_t)status;
-  judge_missing(o);
-  return put_out(o, r);
-}
-
-$real $name_update_without_measurement($name_state *o, $real r)
-{
-  o->status = (uint8_t)predict(o);
-  judge_missing(o);
-  return put_out(o, r);
-}
-
-void $name_applied($name_state *o, $real u)
-{
-  (void)applied(o, u);
-}
-
-#ifdef $NAME_SELF_TEST
-int $name_self_test($real tolerance)
-{
-  static const $real samples[$SAMPLES][3] = { /* y, r, u */
-$VECTORS  };
-  $name_state o;
-  int i;
-  $name_init(&o);
-  for (i = 0; i < $SAMPLES; ++i) {
-    const $real u = $name_update(&o, samples[i][0], samples[i][1]);
-    if (!($fabs(u - samples[i][2]) <= tolerance)) return i + 1;
-  }
-  return 0;
-}
-#endif
-)";
-
 }  // namespace detail
 
-/// The controller as C99, two files without a library: state struct, init, start, update, and a
-/// self-test that compares with the C++ (compiled if `NAME_SELF_TEST` is defined). What the
-/// controller does at a good sample is recorded from its own `update`, so there is no second
-/// implementation; settings are constants. Bad and missing samples, gaps, restarts, the start hold
-/// and safe mode are those of the controller, too.
+/// The controller as C99, two files without a library: state struct, init, start, update, estimates
+/// in physical units, and a self-test that compares with the C++ (compiled if `NAME_SELF_TEST` is
+/// defined). What the controller does at a sample is recorded from its own calls, so there is no
+/// second implementation; settings are constants. Bad and missing samples, gaps, restarts, the
+/// start hold and safe mode are those of the controller, too.
 ///
 /// Compiled without contraction (-std=c99 in GCC) it equals the C++ bit for bit; where the law is
 /// softened for n >= 3, only with the same `pow`. A gap of each length has its gains in a table of
-/// max_gap times N numbers: choose `max_gap` as short as the machine allows.
+/// max_gap + 1 rows: choose `max_gap` as short as the machine allows.
+///
+/// The observer has constant gains: LinearEso, also with a set of poles, HalfGainEso,
+/// ReducedOrderEso, CascadeEso. Others do not compile.
 /// @param controller as `make` returned it: its state is that of `init`
 /// @return error for a name that is no identifier, a number of samples of the self-test out of
 ///         range, or a measurement_divider, which cannot be written yet
 template <LoopObserver Observer>
-requires can_be_recorded<Adrc<Observer>> Expected<CCode, Error<typename Observer::scalar_type>>
-to_c(const Adrc<Observer>& controller, const CCodeOptions& options = {}) {
-  static_assert(
-      requires { controller.observer().gain_law().gain_before_measurement(); },
-      "esokit: to_c writes observers of one level with a constant gain");
-  using V = typename Observer::scalar_type;
+requires detail::GainIsKept<Observer> Expected<CCode, Error<typename Observer::scalar_type>> to_c(
+    const Adrc<Observer>& controller, const CCodeOptions& options = {}) {
   using C = Adrc<Observer>;
+  using V = typename C::scalar_type;
   using Access = detail::RecordAccess;
-  using Number = typename Recorder<C>::Number;
-  using Numbers = std::vector<Number>;
-  constexpr bool single = sizeof(V) == sizeof(float);
-  constexpr int size = Observer::size;
+  using Builder = detail::CBuilder<C, Observer>;
+  using Number = typename Builder::Number;
+  using Numbers = typename Builder::Numbers;
 
-  const auto rules = Access::rules(Access::loop(controller));
-  bool is_name =
-      !options.name.empty() && std::isdigit(static_cast<unsigned char>(options.name[0])) == 0;
-  for (const char letter : options.name) {
-    is_name = is_name && (std::isalnum(static_cast<unsigned char>(letter)) != 0 || letter == '_');
-  }
-  Rules<V> checked;
-  checked.require(is_name, "name", V(0), "must be an identifier of C")
-      .require(1 <= options.self_test_samples && options.self_test_samples <= 10000,
-               "self_test_samples", static_cast<V>(options.self_test_samples), "must be 1 .. 10000")
-      .require(rules.divider == 1, "measurement_divider", static_cast<V>(rules.divider),
-               "must be 1: regular gaps cannot be written yet");
-  if (!checked) return checked.error();
+  const auto loop = Access::rules(Access::loop(controller));
+  auto rules = Builder::checked(options);
+  rules.require(loop.divider == 1, "measurement_divider", static_cast<V>(loop.divider),
+                "must be 1: regular gaps cannot be written yet");
+  if (!rules) return rules.error();
 
-  // The lists. The start hold is the shell's, so they are of a controller that runs.
-  Recorder<C> recorder(controller);
-  std::vector<detail::CFunction> functions;
-  const auto add = [&](const char* name, std::vector<std::string> arguments, bool has_output,
-                       typename Recorder<C>::Call call) {
-    recorder.add(static_cast<int>(arguments.size()), std::move(call));
-    functions.push_back({name, std::move(arguments), has_output});
-  };
-  std::vector<std::string> gains{"y"};
-  for (int r = 1; r <= size; ++r) gains.push_back("k" + std::to_string(r));
-  add("observe", {"y"}, false, [](auto& c, const Numbers& in) {
+  const auto of = [](auto& c) -> auto& { return c.observer(); };
+  const bool softens = Access::softens(controller);
+  Builder builder(controller, options);
+  builder.add("observe", {"y"}, false, [](auto& c, const Numbers& in) {
     (void)c.observer().update(in[0], Number(c.output()));
     return Numbers{};
   });
-  add("predict_step", {"u"}, false, [](auto& c, const Numbers& in) {
-    (void)c.observer().predict(in[0]);
-    return Numbers{};
-  });
-  add("correct_step", gains, false, [](auto& c, const Numbers& in) {
-    // With gains that are arguments; the object is not constant, only its getter is.
-    using Gain = std::remove_cvref_t<decltype(c.observer().gain_law().gain_before_measurement())>;
-    auto& gain = const_cast<Gain&>(c.observer().gain_law().gain_before_measurement());
-    const Gain nominal = gain;
-    for (std::size_t r = 0; r < size; ++r) gain[r] = in[r + 1];
-    (void)c.observer().correct(in[0]);
-    gain = nominal;
-    return Numbers{};
-  });
-  add("restart_at", {"y"}, false, [](auto& c, const Numbers& in) {
-    (void)c.observer().reset(in[0]);
-    return Numbers{};
-  });
-  add("rest_at", {"y"}, false, [](auto& c, const Numbers& in) {
+  builder.add_observer(of);
+  builder.add("rest_at", {"y"}, false, [](auto& c, const Numbers& in) {
     auto& o = c.observer();
     (void)o.reset(o.equilibrium(in[0], Number(o.applied_input())));
     return Numbers{};
   });
-  add("law", {"r"}, true,
-      [](auto& c, const Numbers& in) { return Numbers{Access::law(c, in[0])}; });
-  add("limit", {"u"}, true,
-      [](auto& c, const Numbers& in) { return Numbers{Access::limited(Access::loop(c), in[0])}; });
-  add("applied", {"u"}, false, [](auto& c, const Numbers& in) {
+  builder.add("law", {"r"}, true,
+              [](auto& c, const Numbers& in) { return Numbers{Access::law(c, in[0])}; });
+  builder.add("limit", {"u"}, true, [](auto& c, const Numbers& in) {
+    return Numbers{Access::limited(Access::loop(c), in[0])};
+  });
+  builder.add("applied", {"u"}, false, [](auto& c, const Numbers& in) {
     Access::report(Access::loop(c), in[0]);
     return Numbers{};
   });
-  const bool softens = Access::softens(controller);
   if (softens) {
-    add("harden", {}, false, [](auto& c, const Numbers&) {
+    builder.add("harden", {}, false, [](auto& c, const Numbers&) {
       Access::harden(c);
       return Numbers{};
     });
   }
-  const auto recorded = recorder.record();
-  if (!recorded) return recorded.error();
-
-  // Names of what the shell and a reader look for; the others are numbered.
-  detail::CWriter writer(single, options.name);
-  auto object = Recorder<C>::as_recorded(controller);
-  const auto numbers = detail::numbers_of<Number>(object);
-  writer.live.assign(numbers.size(), false);
-  for (std::size_t i = 0; i < numbers.size(); ++i) {
-    const Number* at = numbers[i];
+  const auto name_of = [](const auto& c, const Number* at) -> std::string {
     // The limiter keeps the bounds of the next output behind the last.
-    const auto from_last = at - &object.output();
-    const auto from_z1 = at - &object.observer().predicted_measurement();
-    std::string name = "x" + std::to_string(i);
-    if (0 <= from_z1 && from_z1 < size) name = "z" + std::to_string(from_z1 + 1);
-    if (from_last == 0) name = "u_last";
-    if (from_last == 1) name = "u_low";
-    if (from_last == 2) name = "u_high";
-    if (at == &object.requested()) name = "u_asked";
-    if (at == &object.observer().applied_input()) name = "u_applied";
-    if (at == &object.observer().innovation()) name = "innovation";
-    writer.members.push_back(name);
-    writer.live[i] = name[0] == 'z' || name == "u_last" || name == "u_applied";
-  }
-  writer.find_live(*recorded);
+    constexpr const char* names[] = {"u_last", "u_low", "u_high"};
+    const auto place = at - &c.output();
+    return 0 <= place && place < 3 ? names[place] : at == &c.requested() ? "u_asked" : "";
+  };
+  if (auto ok = builder.record(controller, of, name_of); !ok) return ok.error();
 
-  std::string members;
-  std::string init;
-  for (std::size_t i = 0; i < numbers.size(); ++i) {
-    if (!writer.live[i]) continue;
-    members += "  " + writer.real() + " " + writer.members[i] + ";\n";
-    init += "  o->" + writer.members[i] + " = " + writer.number(recorded->numbers[i]) + ";\n";
-  }
-  std::string lists;
-  for (std::size_t i = 0; i < functions.size(); ++i) {
-    lists += writer.function(functions[i], recorded->calls[i][0]);
-  }
-  const int max_gap = controller.observer().max_gap();
-  std::string table;
-  for (int elapsed = 1; elapsed <= max_gap + 1; ++elapsed) {
-    const auto& law = controller.observer().gain_law();
-    const auto gain = elapsed == 1 ? law.gain_before_measurement()
-                                   : law.gap_gain(V(0), static_cast<unsigned>(elapsed));
-    for (std::size_t r = 0; r < size; ++r) {
-      table += (r == 0 ? "  {" : ", ") + writer.number(static_cast<double>(gain[r]));
-    }
-    table += "},\n";
-  }
-  std::string vectors;
+  const auto& writer = builder.writer;
   C played = controller;
-  for (int k = 0; k < options.self_test_samples; ++k) {
-    // A reference that jumps, and a y that follows the last u roughly: what it is does not matter.
-    const V r = static_cast<V>((k / 10) % 2 == 0 ? 1.0 : -0.5);
-    const V y = static_cast<V>(0.25 * ((k * 37) % 16) - 1.5);
-    vectors += "    {" + writer.number(static_cast<double>(y)) + ", " +
-               writer.number(static_cast<double>(r)) + ", " +
-               writer.number(static_cast<double>(played.update(y, r))) + "},\n";
-  }
-  std::string call_gains;
-  for (int r = 0; r < size; ++r) call_gains += ", k[" + std::to_string(r) + "]";
-  std::string upper = options.name;
-  for (char& letter : upper) {
-    letter = static_cast<char>(std::toupper(static_cast<unsigned char>(letter)));
-  }
   const auto& limiter = controller.limiter();
-  const std::vector<std::pair<std::string, std::string>> words = {
-      {"$include", "#include"},  // not written above: scripts look for such lines
-      {"$MEMBERS", members},
-      {"$COMMENT", options.comment.empty() ? "" : " * " + options.comment + "\n"},
-      {"$TIME", writer.number(static_cast<double>(controller.sample_time()))},
-      {"$GAINS", call_gains},
-      {"$GAIN", writer.number(static_cast<double>(controller.observer().input_gain()))},
-      {"$LOWER", writer.number(static_cast<double>(limiter.lower()))},
-      {"$UPPER", writer.number(static_cast<double>(limiter.upper()))},
-      {"$ROWS", std::to_string(max_gap + 1)},
-      {"$SAFE_INPUT", rules.has_safe_input ? writer.number(rules.safe_input) : "o->u_last"},
-      {"$HOLD_INPUT", writer.number(rules.hold_input)},
-      {"$HARDEN", softens ? "  (void)harden(o);\n" : ""},
-      {"$GAP_GAINS", table},
-      {"$SIZE", std::to_string(size)},
-      {"$MISSING_LIMIT", std::to_string(rules.missing_limit)},
-      {"$LEAVE_SAFE", rules.stays_safe ? std::string()
+  return builder.code(
+      detail::c_header_controller, detail::c_source_controller,
+      {{"$LIMITS", ", u within " + writer.number(static_cast<double>(limiter.lower())) + " .. " +
+                       writer.number(static_cast<double>(limiter.upper()))},
+       {"$SAFE_INPUT", loop.has_safe_input ? writer.number(loop.safe_input) : "o->u_last"},
+       {"$HOLD_INPUT", writer.number(loop.hold_input)},
+       {"$HARDEN", softens ? "  (void)harden(o);\n" : ""},
+       {"$MISSING_LIMIT", std::to_string(loop.missing_limit)},
+       {"$LEAVE_SAFE", loop.stays_safe ? ""
                                        : " else if (o->mode == $NAME_SAFE && o->gap == 0u) {\n"
                                          "    o->mode = $NAME_RUNNING;\n  }"},
-      {"$INIT", init},
-      {"$HOLD_LEFT", std::to_string(rules.hold_left)},
-      {"$MODE", rules.hold_left > 0 ? "$NAME_START_HOLD" : "$NAME_RUNNING"},
-      {"$SAMPLES", std::to_string(options.self_test_samples)},
-      {"$VECTORS", vectors},
-      {"$word", single ? "uint32_t" : "uint64_t"},
-      {"$exponent", single ? "0x7f800000u" : "0x7ff0000000000000u"},
-      {"$fabs", single ? "fabsf" : "fabs"},
-      {"$real", writer.real()},
-      {"$NAME", upper},
-      {"$name", options.name}};
-  return CCode{
-      detail::filled(detail::c_header, words),
-      detail::filled(detail::c_head, words) + lists + detail::filled(detail::c_shell, words)};
+       {"$HOLD_LEFT", std::to_string(loop.hold_left)},
+       {"$MODE", loop.hold_left > 0 ? "$NAME_START_HOLD" : "$NAME_RUNNING"},
+       {"$COLUMNS", "y, r, u"},
+       {"$RESULT", "const $real result = $name_update(&o, samples[i][0], samples[i][1]);"},
+       {"$VECTORS", detail::self_test_samples<V>(writer, options.self_test_samples,
+                                                 [&](V y, V r) { return played.update(y, r); })}});
+}
+
+/// The same for an observer alone: init, reset, update, its halves predict and correct, and the
+/// estimates.
+template <LoopObserver Observer>
+requires detail::GainIsKept<Observer> Expected<CCode, Error<typename Observer::scalar_type>> to_c(
+    const Observer& observer, const CCodeOptions& options = {}) {
+  using V = typename Observer::scalar_type;
+  using Builder = detail::CBuilder<Observer, Observer>;
+  using Number = typename Builder::Number;
+  using Numbers = typename Builder::Numbers;
+
+  if (const auto rules = Builder::checked(options); !rules) return rules.error();
+  const auto of = [](auto& o) -> auto& { return o; };
+  Builder builder(observer, options);
+  builder.add("observe", {"y", "u"}, false, [](auto& o, const Numbers& in) {
+    (void)o.update(in[0], in[1]);
+    return Numbers{};
+  });
+  builder.add_observer(of);
+  const auto no_name = [](const auto&, const Number*) { return std::string(); };
+  if (auto ok = builder.record(observer, of, no_name); !ok) return ok.error();
+  Observer played = observer;
+  return builder.code(
+      detail::c_header_observer, detail::c_source_observer,
+      {{"$LIMITS", ""},
+       {"$COLUMNS", "y, u, the disturbance"},
+       {"$RESULT",
+        "const unsigned status = $name_update(&o, samples[i][0], samples[i][1]);\n"
+        "    const $real result = status == 0u ? $name_estimate(&o, $ORDERu) : samples[i][2] - 1;"},
+       {"$ORDER", std::to_string(Observer::order)},
+       {"$VECTORS",
+        detail::self_test_samples<V>(builder.writer, options.self_test_samples, [&](V y, V u) {
+          (void)played.update(y, u);
+          return played.total_disturbance();
+        })}});
 }
 
 }  // namespace esokit
