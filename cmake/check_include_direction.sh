@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Refuses every include in include/esokit that goes against
-#   core <- math <- model <- gain <- observer <- adapter <- control <- eigen.hpp <- sim <- analysis <- identify <- tune
+#   core <- math <- model <- gain <- observer <- adapter <- control <- target <- eigen.hpp <- sim <- analysis <- identify <- tune
 # and every header from core to control, what runs in a controller, that needs Eigen or another header
 # that costs more than a controller; an umbrella header that does not include every other header, and a header that reaches C++20 before
 # core/language.hpp, which says that it is needed.
@@ -22,7 +22,7 @@ check() {  # check INCLUDE_DIR
   fi
   (cd "$include_dir" && awk '
     BEGIN {
-      count = split("core math model gain observer adapter control eigen.hpp sim analysis identify tune", order, " ")
+      count = split("core math model gain observer adapter control target eigen.hpp sim analysis identify tune", order, " ")
       for (i = 1; i <= count; ++i) rank[order[i]] = i
       for (i = 1; i < ARGC; ++i) {
         known[ARGV[i]] = 1
@@ -77,8 +77,9 @@ check() {  # check INCLUDE_DIR
     }' "${headers[@]}")
 }
 
-# Included by those who want them alone: pole sets, and text for programs with a console.
-apart="esokit/gain/pole_set.hpp esokit/core/error_text.hpp esokit/core/snapshot_text.hpp"
+# Included by those who want them alone: pole sets, text for programs with a console, and the scalar
+# that records.
+apart="esokit/gain/pole_set.hpp esokit/core/error_text.hpp esokit/core/recording.hpp esokit/core/snapshot_text.hpp"
 heavy="algorithm complex deque fstream functional iomanip ios iostream istream iterator locale map memory"
 heavy+=" numeric ostream random ranges regex set span sstream string thread unordered_map vector"
 

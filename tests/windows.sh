@@ -121,7 +121,7 @@ start() {
   configure examples/start "$out/start" -DESOKIT_SOURCE_DIR="$root" >"$out/start.log" 2>&1 &&
     cmake --build "$out/start" --parallel "$jobs" >>"$out/start.log" 2>&1
   verdict $? "examples/start does not build: $(grep -m 3 'error' "$out/start.log")"
-  for program in observe control analyse member; do
+  for program in observe control analyse member to_c; do
     run "$out/start/$program.exe" >"$out/start/$program.txt" && [[ -s $out/start/$program.txt ]]
     verdict $? "examples/start: $program"
   done

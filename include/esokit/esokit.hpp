@@ -65,6 +65,7 @@
 #include <esokit/core/language.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/pack.hpp>
+#include <esokit/core/recording.hpp>
 #include <esokit/core/scalar.hpp>
 #include <esokit/core/snapshot.hpp>
 #include <esokit/core/snapshot_text.hpp>
@@ -169,6 +170,10 @@
 #include <esokit/sim/study_records.hpp>
 #include <esokit/sim/trapezoid.hpp>
 #include <esokit/sim/window.hpp>
+#include <esokit/target/c_code.hpp>
+#include <esokit/target/c_text.hpp>
+#include <esokit/target/c_writer.hpp>
+#include <esokit/target/recorder.hpp>
 #include <esokit/tune/controller.hpp>
 #include <esokit/tune/families.hpp>
 #include <esokit/tune/loop_cost.hpp>

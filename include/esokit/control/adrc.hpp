@@ -210,7 +210,7 @@ class Adrc {
   /// Takes over a plant at rest at y under u. @param reference r, used by the error-based form only
   /// @return ok, or input_rejected or state_rejected if u or y is not finite: nothing changes then
   Status start(S y, S u, S reference) noexcept {
-    if constexpr (PackScalar<S>) {
+    if constexpr (PackScalar<S> && !records<S>) {
       using Plain = detail::PlainTwin<Adrc, S>;
       Status status{};
       detail::for_each_lane<Plain>(
@@ -218,7 +218,7 @@ class Adrc {
       return status;
     } else {
       // Tested one by one: under -ffast-math a compiler may replace y - y by zero.
-      if (!is_finite(y) || !is_finite(reference)) return StepStatus::state_rejected;
+      if (!all(is_finite(y)) || !all(is_finite(reference))) return StepStatus::state_rejected;
       const Status status = loop_.start(measured(y, reference), u);
       if (status == StepStatus::ok) soft_.reset();
       return status;
@@ -290,6 +290,7 @@ class Adrc {
 
  private:
   friend struct detail::LaneAccess;
+  friend struct detail::RecordAccess;
   static constexpr auto fields(auto& o) noexcept {
     return detail::tie(o.loop_, o.law_, o.fast_law_, o.soft_, o.spec_);
   }
@@ -432,7 +433,7 @@ class Adrc {
   [[nodiscard]] S judged(const Given& given) noexcept {
     S u = command(given);
     if (all(!soft_.on())) return u;
-    if (const auto designed = soft_.slowness() <= S(1.0); !all(designed)) {
+    if (const auto designed = soft_.slowness() <= S(1.0); records<S> || !all(designed)) {
       const S eased = soft_.control(law_, lacks(filled(given)));
       u = select(designed, u, detail::by_present_gain(observer(), eased));
     }

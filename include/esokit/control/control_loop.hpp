@@ -244,15 +244,15 @@ class ControlLoop {
   /// Starts in the steady state at y under u, dhat = -b0 u. Ends the start hold and safe mode.
   /// @return ok, or input_rejected or state_rejected if u or y is not finite: nothing changes then
   Status start(S measured, S u) noexcept {
-    if constexpr (PackScalar<S>) {
+    if constexpr (PackScalar<S> && !records<S>) {
       Status status{};
       detail::for_each_lane<Plain>(
           *this, [&](Plain& lane, int i) { status[i] = lane.start(measured[i], u[i]); });
       return status;
     } else {
-      if (!is_finite(u)) return StepStatus::input_rejected;
-      if (!is_finite(measured)) return StepStatus::state_rejected;
-      const StepStatus status = detail::start_at_rest(observer_, measured, u);
+      if (!all(is_finite(u))) return StepStatus::input_rejected;
+      if (!all(is_finite(measured))) return StepStatus::state_rejected;
+      const Status status = detail::start_at_rest(observer_, measured, u);
       if (status == StepStatus::ok) {
         limiter_.track(u);
         requested_ = u;
@@ -318,6 +318,7 @@ class ControlLoop {
   template <LoopObserver Other>
   friend class ControlLoop;
   friend struct detail::LaneAccess;
+  friend struct detail::RecordAccess;
   struct Nothing {};
   static constexpr bool has_step_time = observer_traits<Observer>.varies_time;
   static constexpr int lanes = lane_count<S>;
@@ -395,7 +396,7 @@ class ControlLoop {
 
   ESOKIT_INLINE S limited(S wanted) noexcept {
     // A bad reference or an overflow in the law: keeps the last output.
-    if (const auto good = is_finite(wanted); !all(good)) [[unlikely]]
+    if (const auto good = is_finite(wanted); records<S> || !all(good)) [[unlikely]]
       wanted = select(good, wanted, limiter_.last());
     requested_ = wanted;
     return limiter_(wanted);

@@ -476,6 +476,7 @@ class PredictorCorrector {
  private:
   friend struct detail::LaneAccess;
   friend struct detail::GuardAccess;
+  friend struct detail::RecordAccess;
 
   using LevelStates = Array<State, Levels>;
   using Plain = detail::PlainTwin<PredictorCorrector, S>;  ///< type of a lane
@@ -652,7 +653,8 @@ class PredictorCorrector {
   /// If the sum of all squares is finite, so is the probe, unless 1/T is absurdly large. This test
   /// is cheaper, as squares need no absolute value and no weights. Not used for float with one
   /// level, which would grow by the flag.
-  static constexpr bool has_squares = PlainScalar<LaneScalar<S>> && model_traits<Model>.is_chain &&
+  static constexpr bool has_squares = PlainScalar<LaneScalar<S>> && !records<S> &&
+                                      model_traits<Model>.is_chain &&
                                       (Levels > 1 || sizeof(LaneScalar<S>) > sizeof(float));
   struct NoFlag {};
 
@@ -854,7 +856,7 @@ class PredictorCorrector {
   }
 
   Status reset_scaled(const State& state) noexcept {
-    if constexpr (PackScalar<S>) {
+    if constexpr (PackScalar<S> && !records<S>) {
       return each_lane([&](Plain& lane, int i) {
         auto lane_state = detail::LaneAccess::states(lane)[0];
         detail::copy_lane<false>(state, lane_state, i);

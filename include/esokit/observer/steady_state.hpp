@@ -9,12 +9,12 @@ namespace esokit::detail {
 /// Sets the observer to the steady state at y, as if u had been applied for a long time.
 /// @return ok, or state_rejected if something is not finite: nothing changes then
 template <class Observer, class S>
-StepStatus start_at_rest(Observer& observer, const S& y, const S& u) noexcept {
+auto start_at_rest(Observer& observer, const S& y, const S& u) noexcept {
   Observer next = observer;
   if constexpr (observer_traits<Observer>.delays_input) next.fill_input(u);
   // Stores the input, which `revise_input` and a change of b0 need.
   (void)next.predict(u);
-  const StepStatus status = next.reset(next.equilibrium(y, u));
+  const auto status = next.reset(next.equilibrium(y, u));
   if (status == StepStatus::ok) observer = next;
   return status;
 }

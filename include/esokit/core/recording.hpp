@@ -1,0 +1,302 @@
+/// @file
+/// RecordingScalar: a scalar that notes each operation, so that one call of a step gives the list
+/// of operations of which the step consists. For the workstation; `target/recorded.hpp` records
+/// whole objects with it.
+#pragma once
+
+#include <bit>
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <esokit/core/lanes.hpp>
+#include <esokit/core/scalar.hpp>
+#include <vector>
+
+namespace esokit {
+
+/// What an Instruction computes, from the results a, b and c of earlier ones.
+enum class Operation : unsigned char {
+  constant,              ///< the number `value`; of a condition 1 or 0
+  argument,              ///< argument number a of the list
+  add,                   ///< a + b
+  subtract,              ///< a - b
+  multiply,              ///< a b
+  divide,                ///< a / b
+  negate,                ///< -a
+  magnitude,             ///< abs(a)
+  square_root,           ///< sqrt(a)
+  power,                 ///< a to the power of b
+  exponential,           ///< e^a
+  exponential_less_one,  ///< e^a - 1
+  choose,                ///< b if the condition a holds, else c
+  less,                  ///< a < b; from here on a condition
+  greater,               ///< a > b
+  at_most,               ///< a <= b
+  at_least,              ///< a >= b
+  finite,                ///< neither NaN nor infinite
+  both,                  ///< a and b
+  either,                ///< a or b
+  opposite               ///< not a
+};
+
+/// True if an operation gives a condition, not a number.
+constexpr bool is_condition(Operation operation) noexcept { return operation >= Operation::less; }
+
+/// One line of an OperationList.
+struct Instruction {
+  Operation operation = Operation::constant;  ///< what is done
+  int a = -1;        ///< index of the first operand, or number of the argument; -1: none
+  int b = -1;        ///< index of the second operand
+  int c = -1;        ///< index of the third operand
+  double value = 0;  ///< of a constant; a double holds a float
+};
+
+/// The operations of one call, in their order. Equal operations are one.
+struct OperationList {
+  std::vector<Instruction> instructions{};  ///< an operand comes before what needs it
+  /// The conditions of which the call asked `all(condition)`: if one does not hold, the call takes
+  /// another way, of which this list knows nothing.
+  std::vector<int> checks{};
+  /// True if the call looked at a single lane of a number that is no constant. Then what it did
+  /// next may depend on the number, and the list is not the call.
+  bool was_looked_into = false;
+
+  /// Notes an operation. @return its index, that of an equal one if there is one
+  int note(const Instruction& given) {
+    for (std::size_t i = 0; i < instructions.size(); ++i) {
+      const Instruction& one = instructions[i];
+      if (one.operation == given.operation && one.a == given.a && one.b == given.b &&
+          one.c == given.c &&
+          std::bit_cast<std::uint64_t>(one.value) == std::bit_cast<std::uint64_t>(given.value)) {
+        return static_cast<int>(i);
+      }
+    }
+    instructions.push_back(given);
+    return static_cast<int>(instructions.size()) - 1;
+  }
+};
+
+namespace detail {
+
+/// What is known of a recorded number or condition: the list and its index there; without a list it
+/// is a constant.
+struct Noted {
+  OperationList* list = nullptr;
+  int index = -1;
+
+  [[nodiscard]] bool known() const noexcept { return list == nullptr; }
+  void look() const noexcept {
+    if (list != nullptr) list->was_looked_into = true;
+  }
+};
+
+/// The index of an operand; a constant is noted in `list`.
+inline int operand(OperationList& list, const Noted& noted, double value) {
+  return noted.known() ? list.note({.value = value}) : noted.index;
+}
+
+}  // namespace detail
+
+/// The result of a comparison of recording scalars.
+class RecordedCondition {
+ public:
+  /// @cond
+  constexpr explicit RecordedCondition(bool holds) noexcept : holds_(holds) {}
+  RecordedCondition(bool holds, const detail::Noted& noted) noexcept
+      : holds_(holds), noted_(noted) {}
+  [[nodiscard]] const detail::Noted& noted() const noexcept { return noted_; }
+  [[nodiscard]] bool holds() const noexcept { return holds_; }
+  /// @endcond
+
+  /// Whether it holds in a lane; the list says that it was looked into.
+  [[nodiscard]] bool operator[](int) const noexcept {
+    noted_.look();
+    return holds_;
+  }
+
+  /// Noted. @{
+  friend RecordedCondition operator&&(const RecordedCondition& a, const RecordedCondition& b) {
+    if (a.noted_.known()) return a.holds_ ? b : a;
+    if (b.noted_.known()) return b.holds_ ? a : b;
+    return a.with(Operation::both, b, a.holds_ && b.holds_);
+  }
+  friend RecordedCondition operator||(const RecordedCondition& a, const RecordedCondition& b) {
+    if (a.noted_.known()) return a.holds_ ? a : b;
+    if (b.noted_.known()) return b.holds_ ? b : a;
+    return a.with(Operation::either, b, a.holds_ || b.holds_);
+  }
+  friend RecordedCondition operator!(const RecordedCondition& a) {
+    if (a.noted_.known()) return RecordedCondition(!a.holds_);
+    OperationList& list = *a.noted_.list;
+    return {!a.holds_, {&list, list.note({.operation = Operation::opposite, .a = a.noted_.index})}};
+  }
+  /// @}
+
+  /// True, and a check of the list: in a step a condition that does not hold in every lane is a
+  /// fault. Of a constant condition what it is.
+  friend bool all(const RecordedCondition& condition) {
+    if (condition.noted_.known()) return condition.holds_;
+    condition.noted_.list->checks.push_back(condition.noted_.index);
+    return true;
+  }
+
+ private:
+  [[nodiscard]] RecordedCondition with(Operation operation, const RecordedCondition& b,
+                                       bool holds) const {
+    OperationList& list = *noted_.list;
+    return {holds,
+            {&list, list.note({.operation = operation, .a = noted_.index, .b = b.noted_.index})}};
+  }
+
+  bool holds_;
+  detail::Noted noted_;
+};
+
+/// A number that remembers how it was computed. Operations on constants are done at once, in V;
+/// all others are noted in the list from which their operands come.
+///
+/// To the library it is a pack of two equal lanes: whatever works on packs, by `select` instead of
+/// branches, can be recorded as it is.
+/// @tparam V float or double
+template <std::floating_point V>
+class RecordingScalar {
+  static_assert(sizeof(V) <= sizeof(double), "esokit: a recording scalar is of float or double");
+  using Self = RecordingScalar;
+
+ public:
+  using value_type = V;  ///< what it records
+
+  /// Zero.
+  constexpr RecordingScalar() noexcept = default;
+  /// A constant.
+  constexpr explicit RecordingScalar(double value) noexcept : value_(static_cast<V>(value)) {}
+  /// Argument number `number` of a list. @param value with which the constants beside it are made
+  RecordingScalar(OperationList& list, int number, V value)
+      : value_(value), noted_{&list, list.note({.operation = Operation::argument, .a = number})} {}
+
+  /// Whether it is a constant.
+  [[nodiscard]] bool is_constant() const noexcept { return noted_.known(); }
+  /// The constant.
+  [[nodiscard]] V value() const noexcept { return value_; }
+  /// Its index in a list; a constant is noted there.
+  [[nodiscard]] int index_in(OperationList& list) const {
+    return detail::operand(list, noted_, static_cast<double>(value_));
+  }
+
+  /// The number of a lane; if it is no constant, the list says that it was looked into. @{
+  [[nodiscard]] V& operator[](int) noexcept {
+    noted_.look();
+    return value_;
+  }
+  [[nodiscard]] const V& operator[](int) const noexcept {
+    noted_.look();
+    return value_;
+  }
+  /// @}
+
+  /// abs(x), noted.
+  [[nodiscard]] Self magnitude() const { return with(Operation::magnitude, std::fabs(value_)); }
+
+  /// Noted. @{
+  friend Self operator+(const Self& a, const Self& b) {
+    return a.with(Operation::add, b, a.value_ + b.value_);
+  }
+  friend Self operator-(const Self& a, const Self& b) {
+    return a.with(Operation::subtract, b, a.value_ - b.value_);
+  }
+  friend Self operator*(const Self& a, const Self& b) {
+    return a.with(Operation::multiply, b, a.value_ * b.value_);
+  }
+  friend Self operator/(const Self& a, const Self& b) {
+    return a.with(Operation::divide, b, a.value_ / b.value_);
+  }
+  friend Self operator-(const Self& a) { return a.with(Operation::negate, -a.value_); }
+  friend Self(abs)(const Self& a) { return a.magnitude(); }
+  friend Self sqrt(const Self& a) { return a.with(Operation::square_root, std::sqrt(a.value_)); }
+  friend Self exp(const Self& a) { return a.with(Operation::exponential, std::exp(a.value_)); }
+  friend Self expm1(const Self& a) {
+    return a.with(Operation::exponential_less_one, std::expm1(a.value_));
+  }
+  friend Self pow(const Self& a, const Self& b) {
+    return a.with(Operation::power, b, std::pow(a.value_, b.value_));
+  }
+  friend RecordedCondition operator<(const Self& a, const Self& b) {
+    return a.compared(Operation::less, b, a.value_ < b.value_);
+  }
+  friend RecordedCondition operator>(const Self& a, const Self& b) {
+    return a.compared(Operation::greater, b, a.value_ > b.value_);
+  }
+  friend RecordedCondition operator<=(const Self& a, const Self& b) {
+    return a.compared(Operation::at_most, b, a.value_ <= b.value_);
+  }
+  friend RecordedCondition operator>=(const Self& a, const Self& b) {
+    return a.compared(Operation::at_least, b, a.value_ >= b.value_);
+  }
+  friend RecordedCondition is_finite(const Self& a) {
+    const bool holds = esokit::is_finite(a.value_);
+    if (a.is_constant()) return RecordedCondition(holds);
+    OperationList& list = *a.noted_.list;
+    return {holds, {&list, list.note({.operation = Operation::finite, .a = a.noted_.index})}};
+  }
+  friend Self select(const RecordedCondition& condition, const Self& a, const Self& b) {
+    Self chosen = condition.holds() ? a : b;
+    if (condition.noted().known()) return chosen;
+    OperationList& list = *condition.noted().list;
+    const int first = a.index_in(list);
+    const int second = b.index_in(list);
+    const int index = first == second ? first
+                                      : list.note({.operation = Operation::choose,
+                                                   .a = condition.noted().index,
+                                                   .b = first,
+                                                   .c = second});
+    chosen.noted_ = {&list, index};
+    return chosen;
+  }
+  /// @}
+
+ private:
+  [[nodiscard]] Self with(Operation operation, V value) const {
+    Self result(static_cast<double>(value));
+    if (!is_constant()) {
+      result.noted_ = {noted_.list, noted_.list->note({.operation = operation, .a = noted_.index})};
+    }
+    return result;
+  }
+  [[nodiscard]] detail::Noted both(Operation operation, const Self& b) const {
+    if (is_constant() && b.is_constant()) return {};
+    OperationList& list = is_constant() ? *b.noted_.list : *noted_.list;
+    const int first = index_in(list);
+    const int second = b.index_in(list);
+    return {&list, list.note({.operation = operation, .a = first, .b = second})};
+  }
+  [[nodiscard]] Self with(Operation operation, const Self& b, V value) const {
+    Self result(static_cast<double>(value));
+    result.noted_ = both(operation, b);
+    return result;
+  }
+  [[nodiscard]] RecordedCondition compared(Operation operation, const Self& b, bool holds) const {
+    return {holds, both(operation, b)};
+  }
+
+  V value_{};
+  detail::Noted noted_;
+};
+
+/// To the library a pack of two lanes.
+template <class V>
+inline constexpr int lane_count<RecordingScalar<V>> = 2;
+
+/// Conditions that are shortcuts must not become checks.
+template <class V>
+inline constexpr bool records<RecordingScalar<V>> = true;
+
+namespace detail {
+
+template <class V>
+struct Absolute<RecordingScalar<V>> {
+  static RecordingScalar<V> of(const RecordingScalar<V>& value) { return value.magnitude(); }
+};
+
+}  // namespace detail
+}  // namespace esokit

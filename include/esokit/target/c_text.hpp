@@ -1,0 +1,293 @@
+/// @file
+/// What to_c writes around the recorded lists: what counts and chooses, as text of C, once.
+#pragma once
+
+#include <esokit/core/language.hpp>
+
+// The counterpart of PredictorCorrector::predict and correct, and of ControlLoop. Words with a
+// dollar are filled in.
+namespace esokit::detail {
+
+/// Both headers.
+inline constexpr const char* c_header_head = R"(#ifndef $NAME_H
+#define $NAME_H
+/* Written by esokit from a finished design; do not edit.
+$COMMENT * T = $TIME s, b0 = $GAIN$LIMITS.
+ *
+ * Compile with -std=c99 or -ffp-contract=off: then it equals the C++ bit for bit. */
+
+$include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Flags of `status`; 0: all is well. */
+#define $NAME_MEASUREMENT_REJECTED 1u /* y was NaN, infinite or too large */
+#define $NAME_INPUT_REJECTED 2u /* u was too large: the last good one was used */
+#define $NAME_PREDICTION_DROPPED 4u /* the next good y restarts */
+#define $NAME_GAP_BRIDGED 8u /* samples were missing before this one */
+#define $NAME_RESTARTED 16u /* too many samples were missing */
+#define $NAME_STATE_REJECTED 32u /* start: y is not finite or too large */
+
+)";
+
+/// The header of a controller.
+inline constexpr const char* c_header_controller = R"(/* `mode`: what determines u. */
+#define $NAME_RUNNING 0u
+#define $NAME_START_HOLD 1u
+#define $NAME_SAFE 2u /* too many measurements are missing */
+
+typedef struct {
+$MEMBERS  uint32_t hold_left; /* samples of the start hold */
+  uint16_t gap; /* samples since the last measurement that was taken */
+  uint8_t mode;
+  uint8_t status;
+} $name_state;
+
+/* At rest at y = 0, u = 0. Call it before all else. */
+void $name_init($name_state *o);
+/* Takes over a plant at rest at y under u, with the reference at y. Returns a status. */
+unsigned $name_start($name_state *o, $real y, $real u);
+/* One sample: y (NaN if it is missing) and the reference; returns the u to be held until the next. */
+$real $name_update($name_state *o, $real y, $real r);
+/* The same without a measurement. */
+$real $name_update_without_measurement($name_state *o, $real r);
+/* What the actuator really held, before the next update; only if it differs from what update gave. */
+void $name_applied($name_state *o, $real u);
+/* Estimate number 0 .. $LAST: y, y', .., and then the disturbance, in physical units. */
+$real $name_estimate($name_state *o, unsigned row);
+
+)";
+
+/// The header of an observer.
+inline constexpr const char* c_header_observer = R"(typedef struct {
+$MEMBERS  uint16_t gap; /* samples since the last measurement that was taken */
+} $name_state;
+
+/* At rest at zero. Call it before all else. */
+void $name_init($name_state *o);
+/* Restarts at (y, 0, .., 0). Returns a status. */
+unsigned $name_reset($name_state *o, $real y);
+/* One sample: y, and the u that the actuator held since the last one. Returns a status. */
+unsigned $name_update($name_state *o, $real y, $real u);
+/* Its halves; `predict` alone is a sample without a measurement. */
+unsigned $name_predict($name_state *o, $real u);
+unsigned $name_correct($name_state *o, $real y);
+/* Estimate number 0 .. $LAST: y, y', .., and then the disturbance, in physical units. */
+$real $name_estimate($name_state *o, unsigned row);
+
+)";
+
+/// Both headers.
+inline constexpr const char* c_header_tail = R"(#ifdef $NAME_SELF_TEST
+/* 0, or the number of the first sample whose result differs from that of the design by more than
+ * `tolerance`; 0 asks for equal numbers. */
+int $name_self_test($real tolerance);
+#endif
+
+#ifdef __cplusplus
+}
+#endif
+#endif
+)";
+
+/// Before the lists.
+inline constexpr const char* c_source_head =
+    R"(/* Written by esokit from a finished design; do not edit. */
+$include "$name.h"
+
+$include <math.h>
+$include <string.h>
+
+/* By its bits, so that it holds under -ffast-math, too. */
+static int is_finite($real x)
+{
+  $word bits;
+  memcpy(&bits, &x, sizeof bits);
+  return (bits & $exponent) != $exponent;
+}
+
+/* ---- Recorded from the design: 0 if a result would not be finite; then nothing has changed. */
+
+)";
+
+/// What an observer and the one in a controller do with bad and missing samples.
+inline constexpr const char* c_source_observer_part = R"(/* ---- What counts and chooses. */
+
+/* Of the correction after 1, 2, .. samples. */
+static const $real gains[$ROWS][$SIZE] = {
+$GAP_GAINS};
+
+static int restart($name_state *o, $real y)
+{
+  if (!is_finite(y) || !restart_at(o, y)) return 0;
+  o->gap = 0;
+  return 1;
+}
+
+static unsigned predict($name_state *o, $real given)
+{
+  const int good = predict_step(o, given);
+  if (o->gap < 65535u) ++o->gap;
+  if (good) return 0u;
+  if (is_finite(given) && !($fabs(given) > $fabs(o->u_applied))) { /* u is not the cause */
+    o->u_applied = given;
+    o->gap = 65535u;
+    return $NAME_PREDICTION_DROPPED;
+  }
+  if (predict_step(o, o->u_applied)) return $NAME_INPUT_REJECTED;
+  o->gap = 65535u;
+  return $NAME_INPUT_REJECTED | $NAME_PREDICTION_DROPPED;
+}
+
+static unsigned correct($name_state *o, $real y)
+{
+  const unsigned elapsed = o->gap > 1u ? o->gap : 1u;
+  const $real *k;
+  if (elapsed > $ROWSu) return restart(o, y) ? $NAME_RESTARTED : $NAME_MEASUREMENT_REJECTED;
+  k = gains[elapsed - 1u];
+  if (!correct_step(o, y$GAINS)) { /* perhaps the state is to blame */
+    return $fabs(y) < $fabs(o->z1) && restart(o, y) ? $NAME_RESTARTED : $NAME_MEASUREMENT_REJECTED;
+  }
+  o->gap = 0;
+  return elapsed > 1u ? $NAME_GAP_BRIDGED : 0u;
+}
+
+$real $name_estimate($name_state *o, unsigned row)
+{
+  $real u = 0;
+  switch (row) {
+$ROWS_OF_ESTIMATE  default:
+    break;
+  }
+  return u;
+}
+
+)";
+
+/// The functions of an observer.
+inline constexpr const char* c_source_observer = R"(void $name_init($name_state *o)
+{
+$INIT  o->gap = 0;
+}
+
+unsigned $name_reset($name_state *o, $real y)
+{
+  return restart(o, y) ? 0u : $NAME_STATE_REJECTED;
+}
+
+unsigned $name_predict($name_state *o, $real u)
+{
+  return predict(o, u);
+}
+
+unsigned $name_correct($name_state *o, $real y)
+{
+  return correct(o, y);
+}
+
+unsigned $name_update($name_state *o, $real y, $real u)
+{
+  unsigned status;
+  if (o->gap == 0u && observe(o, y, u)) return 0u;
+  status = predict(o, u);
+  return status | correct(o, y);
+}
+
+)";
+
+/// The functions of a controller.
+inline constexpr const char* c_source_controller = R"(static void judge_missing($name_state *o)
+{
+  if (o->gap >= $MISSING_LIMITu) {
+    o->mode = $NAME_SAFE;
+  }$LEAVE_SAFE
+}
+
+static $real put_out($name_state *o, $real r)
+{
+  $real u;
+  if (o->mode == $NAME_RUNNING) {
+    (void)law(o, r, &u);
+  } else if (o->mode == $NAME_SAFE) {
+    u = $SAFE_INPUT;
+  } else {
+    --o->hold_left;
+    if (o->hold_left == 0u) o->mode = $NAME_RUNNING;
+    u = $HOLD_INPUT;
+  }
+  (void)limit(o, u, &u);
+  return u;
+}
+
+void $name_init($name_state *o)
+{
+$INIT  o->hold_left = $HOLD_LEFTu;
+  o->gap = 0;
+  o->mode = $MODE;
+  o->status = 0;
+}
+
+unsigned $name_start($name_state *o, $real y, $real u)
+{
+  const $real before = o->u_applied;
+  if (!is_finite(y)) return $NAME_STATE_REJECTED;
+  if (!is_finite(u)) return $NAME_INPUT_REJECTED;
+  o->u_applied = u;
+  if (!rest_at(o, y)) {
+    o->u_applied = before;
+    return $NAME_STATE_REJECTED;
+  }
+  (void)applied(o, u);
+$HARDEN  o->gap = 0;
+  o->mode = $NAME_RUNNING;
+  return 0u;
+}
+
+$real $name_update($name_state *o, $real y, $real r)
+{
+  unsigned status = 0u;
+  if (o->gap != 0u || !observe(o, y)) {
+    status = predict(o, o->u_last);
+    status |= correct(o, y);
+    if ((status & $NAME_RESTARTED) != 0u) (void)rest_at(o, y);
+  }
+  o->status = (uint8_t)status;
+  judge_missing(o);
+  return put_out(o, r);
+}
+
+$real $name_update_without_measurement($name_state *o, $real r)
+{
+  o->status = (uint8_t)predict(o, o->u_last);
+  judge_missing(o);
+  return put_out(o, r);
+}
+
+void $name_applied($name_state *o, $real u)
+{
+  (void)applied(o, u);
+}
+
+)";
+
+/// Compares with samples of the design.
+inline constexpr const char* c_source_self_test = R"(#ifdef $NAME_SELF_TEST
+int $name_self_test($real tolerance)
+{
+  static const $real samples[$SAMPLES][3] = { /* $COLUMNS */
+$VECTORS  };
+  $name_state o;
+  int i;
+  $name_init(&o);
+  for (i = 0; i < $SAMPLES; ++i) {
+    $RESULT
+    if (!($fabs(result - samples[i][2]) <= tolerance)) return i + 1;
+  }
+  return 0;
+}
+#endif
+)";
+
+}  // namespace esokit::detail

@@ -1,0 +1,225 @@
+/// @file
+/// Recorder: the operations of a finished observer or controller, recorded from its own calls.
+#pragma once
+
+#include <cstddef>
+#include <cstring>
+#include <esokit/core/check.hpp>
+#include <esokit/core/expected.hpp>
+#include <esokit/core/lanes.hpp>
+#include <esokit/core/recording.hpp>
+#include <functional>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace esokit {
+
+/// One call of an object as a list of operations. The arguments of the list are first all numbers
+/// of the object, then the arguments of the call.
+struct RecordedCall {
+  OperationList list{};        ///< what is done; if a check does not hold, nothing is
+  std::vector<int> next{};     ///< for each number of the object the index of its next value; -1:
+                               ///< it stays as it is
+  std::vector<int> outputs{};  ///< indices of what the call returns
+};
+
+/// What a Recorder found.
+struct RecordedObject {
+  std::vector<double> numbers{};  ///< all numbers of the object when it was recorded
+  std::vector<bool> moves{};      ///< whether any call changes a number; the others are constants
+  /// In the order of Recorder::add; a call that goes through several states of the object's
+  /// counters has one list for each, in their order.
+  std::vector<std::vector<RecordedCall>> calls{};
+  /// What is no number, as bytes (counters, modes, statuses of the two lanes of a pack): before
+  /// call i goes by its list k it is `counters[i][k]`. For other counters the list is not valid.
+  std::vector<std::vector<std::vector<unsigned char>>> counters{};
+};
+
+namespace detail {
+
+/// Calls number(x) for each number of type S in `object`, and other(address, bytes) for all else.
+template <class S, class Object, class Number, class Other>
+void visit_members(Object& object, const Number& number, const Other& other) {
+  using T = std::remove_const_t<Object>;
+  const auto deeper = [&](auto& member) { visit_members<S>(member, number, other); };
+  if constexpr (std::is_empty_v<T>) {
+    return;
+  } else if constexpr (std::is_same_v<T, S>) {
+    number(object);
+  } else if constexpr (HoldsElements<T>) {
+    for (decltype(object.size()) k = 0; k < object.size(); ++k) deeper(object.data()[k]);
+  } else if constexpr (IsOptional<T>::value) {
+    if (object) deeper(*object);
+  } else if constexpr (IsTuple<T>::value) {
+    std::apply([&](auto&... member) { (deeper(member), ...); }, object);
+  } else if constexpr (LaneAccess::has_fields<T>) {
+    const auto each = [&]<int... I, class... F>(
+        const TiedFields<std::integer_sequence<int, I...>, F...>& fields) {
+      (deeper(static_cast<const TiedField<I, F>&>(fields).field), ...);
+    };
+    each(LaneAccess::fields(object));
+  } else {
+    other(&object, sizeof object);
+  }
+}
+
+/// All numbers of an object.
+template <class S, class Object>
+auto numbers_of(Object& object) {
+  std::vector<S*> numbers;
+  visit_members<S>(
+      object, [&](S& x) { numbers.push_back(&x); }, [](const void*, std::size_t) {});
+  return numbers;
+}
+
+/// All else in it, as bytes.
+template <class S, class Object>
+std::vector<unsigned char> counters_of(const Object& object) {
+  std::vector<unsigned char> bytes;
+  visit_members<S>(
+      object, [](const S&) {},
+      [&](const void* from, std::size_t size) {
+        const auto* first = static_cast<const unsigned char*>(from);
+        bytes.insert(bytes.end(), first, first + size);
+      });
+  return bytes;
+}
+
+}  // namespace detail
+
+/// Records calls of an object, for example the `update` of a controller, with its settings as
+/// constants. Nothing is written twice: what the object does is what is recorded.
+///
+/// What moves is found from the arguments: a number belongs to the state if any of the calls
+/// changes it. So add all calls that will be used before `record`.
+///
+/// The object runs on RecordingScalar, which is a pack: it needs `with_scalar` and `fields` (see
+/// core/lanes.hpp) and must not run lane by lane. `can_be_recorded` says this of a type.
+/// @tparam Object an observer or controller of float or double
+template <class Object>
+class Recorder {
+ public:
+  using V = typename Object::scalar_type;               ///< float or double
+  using Number = RecordingScalar<V>;                    ///< what the object is recorded with
+  using Recorded = detail::WithScalar<Object, Number>;  ///< the object that is recorded
+  using Arguments = std::vector<Number>;                ///< of a call
+  using Call = std::function<Arguments(Recorded&, const Arguments&)>;  ///< returns the outputs
+
+  static_assert(!detail::goes_lane_by_lane<Recorded>,
+                "esokit: a type that runs lane by lane cannot be recorded");
+
+  /// @param object as `make` returned it, or later; its state and settings are those recorded
+  explicit Recorder(const Object& object) : object_(as_recorded(object)) {}
+
+  /// Adds a call of which every good sample consists. It must leave all that is no number
+  /// (counters, modes) as it was, perhaps after some calls (the place in a ring): then each has a
+  /// list.
+  /// @param arguments how many arguments it has @param call calls the object
+  void add_step(int arguments, Call call) { calls_.push_back({arguments, std::move(call), true}); }
+
+  /// Adds a call of which only the numbers matter: whoever uses the list counts itself.
+  void add(int arguments, Call call) { calls_.push_back({arguments, std::move(call), false}); }
+
+  /// Records all calls.
+  /// @return the lists; an error if a call looked at single lanes, because it branches on a number,
+  ///         or if a step changes counters for ever
+  [[nodiscard]] Expected<RecordedObject, Error<V>> record() const {
+    Recorded first = object_;
+    RecordedObject all;
+    for (const Number* number : detail::numbers_of<Number>(first)) {
+      all.numbers.push_back(static_cast<double>(number->value()));
+    }
+    all.moves.assign(all.numbers.size(), false);
+    for (bool grew = true; grew;) {
+      grew = false;
+      all.calls.clear();
+      all.counters.clear();
+      for (const Entry& entry : calls_) {
+        all.calls.emplace_back();
+        all.counters.emplace_back();
+        Recorded object = object_;
+        const auto before = detail::counters_of<Number>(object);
+        do {
+          if (all.calls.back().size() == most_lists) {
+            return Error<V>{"step", V(0), "changes counters at each call, in too long a cycle"};
+          }
+          all.counters.back().push_back(detail::counters_of<Number>(object));
+          bool looked = false;
+          all.calls.back().push_back(record_one(object, entry, all.moves, grew, looked));
+          if (looked) return Error<V>{"step", V(0), "branches on a number of one lane"};
+        } while (entry.is_step && detail::counters_of<Number>(object) != before);
+      }
+    }
+    return all;
+  }
+
+  /// The object on recording scalars, all numbers constants.
+  [[nodiscard]] static Recorded as_recorded(const Object& object) {
+    auto recorded = detail::blank<Recorded>();
+    for (int lane = 0; lane < lane_count<Number>; ++lane) detail::set_lane(recorded, object, lane);
+    return recorded;
+  }
+
+ private:
+  struct Entry {
+    int arguments;
+    Call call;
+    bool is_step;
+  };
+  static constexpr std::size_t most_lists = 64;
+
+  /// Calls `object` with its numbers as they are in the beginning. @param grew becomes true if the
+  /// call changes a number that was thought constant
+  RecordedCall record_one(Recorded& object, const Entry& entry, std::vector<bool>& moves,
+                          bool& grew, bool& looked) const {
+    RecordedCall result;
+    Recorded beginning = object_;
+    const auto constants = detail::numbers_of<Number>(beginning);
+    const auto numbers = detail::numbers_of<Number>(object);
+    std::vector<int> before(numbers.size(), -1);
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      *numbers[i] = *constants[i];
+      if (!moves[i]) continue;
+      *numbers[i] = Number(result.list, static_cast<int>(i), constants[i]->value());
+      before[i] = numbers[i]->index_in(result.list);
+    }
+    Arguments arguments;
+    for (int i = 0; i < entry.arguments; ++i) {
+      arguments.emplace_back(result.list, static_cast<int>(numbers.size()) + i, V(0.125));
+    }
+    const Arguments outputs = entry.call(object, arguments);
+    result.next.assign(numbers.size(), -1);
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      const V was = constants[i]->value();
+      const V is = numbers[i]->value();
+      const bool differs = std::memcmp(&was, &is, sizeof(V)) != 0;
+      if (!moves[i] && (!numbers[i]->is_constant() || differs)) moves[i] = grew = true;
+      if (!moves[i]) continue;
+      const int next = numbers[i]->index_in(result.list);
+      if (next != before[i]) result.next[i] = next;
+    }
+    for (const Number& output : outputs) result.outputs.push_back(output.index_in(result.list));
+    looked = result.list.was_looked_into;
+    return result;
+  }
+
+  Recorded object_;
+  std::vector<Entry> calls_;
+};
+
+namespace detail {
+
+template <class Object>
+concept Recordable = requires {
+  typename WithScalar<Object, RecordingScalar<typename Object::scalar_type>>;
+}
+&&!goes_lane_by_lane<WithScalar<Object, RecordingScalar<typename Object::scalar_type>>>;
+
+}  // namespace detail
+
+/// Whether a Recorder takes the type: it works on packs, and not lane by lane.
+template <class Object>
+inline constexpr bool can_be_recorded = detail::Recordable<Object>;
+
+}  // namespace esokit
