@@ -200,7 +200,7 @@ struct RivalSearch {
             std::log(right(0, 0) / right(2, 0)), std::log(w), std::log(damping)};
   }
 
-  /// The best three starts: of PIDs of rules of thumb for many bandwidths, and of these.
+  /// The best two starts: of PIDs of rules of thumb for many bandwidths, and of these.
   [[nodiscard]] std::vector<std::vector<double>> starts(
       RivalKind kind, const std::vector<std::vector<double>>& more) const {
     std::vector<SearchPoint> all;
@@ -235,7 +235,7 @@ struct RivalSearch {
         for (std::size_t i = 0; i < n; ++i) apart = std::max(apart, std::abs(x[i] - point.at[i]));
         return apart < 0.1;
       };
-      if (best.size() < 3 && std::none_of(best.begin(), best.end(), same)) best.push_back(point.at);
+      if (best.size() < 2 && std::none_of(best.begin(), best.end(), same)) best.push_back(point.at);
     }
     return best;
   }
@@ -253,13 +253,13 @@ struct RivalSearch {
           simplex_search(f, start, std::vector<double>(n, step), evaluations * static_cast<int>(n));
       if (found.value < best.value) best = std::move(found);
     };
-    for (const auto& start : starts) from(start, 0.2, 60);
+    for (const auto& start : starts) from(start, 0.2, 40);
     for (int round = 0; round < (rules ? 4 : 1); ++round) {
       if (round > 0) price *= 4.0;
       best.value = f(best.at);
-      for (int again = 0; again < 8; ++again) {
+      for (int again = 0; again < 6; ++again) {
         const double before = best.value;
-        from(best.at, again % 2 == 0 ? 0.2 : -0.1, 40);
+        from(best.at, again % 2 == 0 ? 0.2 : -0.1, 30);
         if (!(best.value < before - 2e-5)) break;
       }
     }
