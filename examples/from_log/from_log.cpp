@@ -54,6 +54,10 @@ the requirement, one of:
   --noise PERCENT     standard deviation of u that noise may cause, % of its range (default 5)
   --settling S        settling time of a step of the reference, s
   --omega-c W         controller bandwidth, rad/s
+the controller that the machine has now:
+  --pid KP,KI,KD,TF[,TT]  u = KP e + KI int e + KD e', TF of the filter on e', s (0: none), TT of
+                      back-calculation, s (0 or left out: the integral stops at the limits): what
+                      you gain and lose by changing, and what the best PIDs do
 more margin than usual; every design is played within the limits, whatever its margins are:
   --modulus M         modulus margin, smallest abs(1 + L), below 1 (default 0.5)
   --delay N           delay margin in samples (default 2)
@@ -98,6 +102,22 @@ std::pair<double, double> limits(const std::string& text) {
   if (!(both.first < both.second))
     throw LogError("--limits: " + text + " is no range, the first number must be the smaller one");
   return both;
+}
+
+esokit::PlainPidConfig given_pid(const std::string& text) {
+  std::vector<double> all;
+  for (std::size_t at = 0; at <= text.size();) {
+    const auto comma = std::min(text.find(',', at), text.size());
+    all.push_back(number("pid", text.substr(at, comma - at)));
+    at = comma + 1;
+  }
+  if (all.size() < 4 || all.size() > 5)
+    throw LogError("--pid: " + text + " is not KP,KI,KD,TF or KP,KI,KD,TF,TT");
+  return {.proportional = all[0],
+          .integral = all[1],
+          .derivative = all[2],
+          .derivative_filter = all[3],
+          .tracking_time = all.size() > 4 ? all[4] : 0.0};
 }
 
 /// A shell would need quotes around some of it.
@@ -153,6 +173,7 @@ Settings read_arguments(int argc, char** argv) {
        [&](const auto& text) { s.noise_share = 0.01 * positive("noise", text), ++wishes; }},
       {"settling",
        [&](const auto& text) { s.settling_time = positive("settling", text), ++wishes; }},
+      {"pid", [&](const auto& text) { s.pid = given_pid(text); }},
       {"omega-c", [&](const auto& text) { s.controller = positive("omega-c", text), ++wishes; }},
       {"modulus", [&](const auto& text) { s.rules.modulus_margin = positive("modulus", text); }},
       {"delay", [&](const auto& text) { s.rules.delay_samples = positive("delay", text); }},

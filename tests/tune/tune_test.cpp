@@ -16,6 +16,7 @@
 #include <esokit/sim/gaussian.hpp>
 #include <esokit/sim/run.hpp>
 #include <esokit/tune/controller.hpp>
+#include <esokit/tune/rivals.hpp>
 #include <esokit/tune/tune.hpp>
 #include <limits>
 #include <string>
@@ -1227,6 +1228,269 @@ TEST(TuneModelTest, RefusesWhatIsTooFarApart) {
                   ? "accepted"
                   : "input_gain: must be between 1e-20 and 1e20: use another unit");
   }
+}
+
+using esokit::PlainPid;
+using esokit::PlainPidConfig;
+using esokit::RivalKind;
+using esokit::TunedRival;
+
+/// A PID of each structure.
+std::vector<PlainPidConfig> pids() {
+  const PlainPidConfig pi{.proportional = 3.0,
+                          .integral = 40.0,
+                          .reference_weight = 0.6,
+                          .tracking_time = 0.03,
+                          .lower = -2.0,
+                          .upper = 2.0,
+                          .sample_time = 0.01};
+  std::vector<PlainPidConfig> all(6, pi);
+  for (std::size_t i = 1; i < all.size(); ++i) all[i].derivative = 0.2;
+  all[2].derivative_filter = 0.02;
+  all[3].filter_frequency = 60.0;
+  all[4].filter_frequency = 60.0;
+  all[4].filter_damping = 1.7;
+  all[5].filter_frequency = 60.0;
+  all[5].derivative = 0.0;
+  return all;
+}
+
+// What is judged is what runs: sample by sample beside the form that is told the applied u, in and
+// out of the limits.
+TEST(RivalTest, ThePidIsItsLinearForm) {
+  for (const PlainPidConfig& config : pids()) {
+    const auto form = esokit::detail::pid_form(config);
+    auto pid = PlainPid::make(config).value();
+    pid.start(0.0, 0.0, 0.0);
+    std::vector<double> z(static_cast<std::size_t>(form.states()), 0.0);
+    esokit::sim::Gaussian gaussian(3);
+    int limited = 0;
+    for (int k = 0; k < 300; ++k) {
+      const double y = 0.3 * gaussian.next(), r = k < 100 ? 0.0 : 0.4 * gaussian.next();
+      double u = form.y_to_u(0, 0) * y + form.r_to_u(0, 0) * r;
+      for (int i = 0; i < form.states(); ++i) u += form.to_u(0, i) * z[static_cast<std::size_t>(i)];
+      const double applied = std::clamp(u, config.lower, config.upper);
+      limited += applied != u ? 1 : 0;
+      EXPECT_NEAR(pid.update(y, r), applied, 1e-9) << k;
+      auto next = z;
+      for (int i = 0; i < form.states(); ++i) {
+        double& x = next[static_cast<std::size_t>(i)];
+        x += form.from_y(i, 0) * y + form.from_r(i, 0) * r + form.from_u(i, 0) * applied;
+        for (int j = 0; j < form.states(); ++j) x += form.a(i, j) * z[static_cast<std::size_t>(j)];
+      }
+      z = next;
+    }
+    EXPECT_GT(limited, 10);
+    EXPECT_LT(limited, 290);
+  }
+}
+
+TEST(RivalTest, ThePidStopsItsIntegralOrFollowsTheLimit) {
+  PlainPidConfig config = pids()[0];
+  const auto left_after = [&](double tracking_time) {
+    config.tracking_time = tracking_time;
+    auto pid = PlainPid::make(config).value();
+    pid.start(0.0, 0.0, 0.0);
+    for (int k = 0; k < 500; ++k) EXPECT_LE(pid.update(0.0, 1.0), 2.0);
+    int samples = 0;
+    while (pid.update(1.1, 1.0) > 0.0 && samples < 1000) ++samples;
+    return samples;
+  };
+  EXPECT_LT(left_after(0.0), 60);
+  EXPECT_LT(left_after(0.03), 60);
+  EXPECT_EQ(left_after(1e9), 1000);  // winds up
+  // Goes on from u.
+  auto pid = PlainPid::make(config).value();
+  pid.start(0.5, 0.5, 1.25);
+  EXPECT_NEAR(pid.update(0.5, 0.5), 1.25, 1e-12);
+}
+
+TEST(RivalTest, RefusesWhatIsNoPid) {
+  const auto refused = [](auto change) {
+    PlainPidConfig config = pids()[3];
+    change(config);
+    return esokit_test::refusal(PlainPid::make(config));
+  };
+  EXPECT_EQ(refused([](auto&) {}), "accepted");
+  EXPECT_EQ(refused([](auto& c) { c.derivative = NAN; }), "derivative: must be finite");
+  EXPECT_EQ(refused([](auto& c) { c.upper = c.lower; }), "upper: must be above lower");
+  EXPECT_EQ(refused([](auto& c) { c.tracking_time = 0.5 * c.sample_time; }),
+            "tracking_time: must be 0 or at least a sample");
+  EXPECT_EQ(refused([](auto& c) { c.tracking_time = c.sample_time; }), "accepted");
+  EXPECT_EQ(refused([](auto& c) { c.filter_damping = 0.0; }),
+            "filter_damping: must be finite and positive");
+  EXPECT_EQ(refused([](auto& c) { c.sample_time = 0.0; }),
+            "sample_time: must be finite and positive");
+  esokit::Tuning none;
+  none.model = plain(1);
+  EXPECT_EQ(esokit_test::refusal(given_rival(none, pids()[0])),
+            "tuning.designs: must not be empty");
+  EXPECT_TRUE(tune_rivals(none).empty());
+}
+
+/// A tuning with nothing in it but its problem and one design, for the search of rivals.
+esokit::Tuning problem_of(const TuneModel& model, double bandwidth, const TuneRules& rules) {
+  esokit::Tuning tuning;
+  tuning.model = model;
+  tuning.rules = rules;
+  tuning.rho = std::pow(bandwidth, -2 * model.order);
+  tuning.optimum = 1.0;
+  tuning.designs.emplace_back();
+  return tuning;
+}
+
+const TunedRival& rival_of(const std::vector<TunedRival>& all, RivalKind kind) {
+  return *std::find_if(all.begin(), all.end(),
+                       [kind](const TunedRival& rival) { return rival.kind == kind; });
+}
+
+const TuneRules no_rules{.modulus_margin = 0.0,
+                         .delay_samples = 0.0,
+                         .gain_factor = 1.0,
+                         .damping_latencies = 0.0,
+                         .bandwidth_ratio = 0.0,
+                         .filter_floor = 0.0,
+                         .play = esokit::TunePlay::none};
+
+// scipy's simplex method on an own evaluation of J (Lyapunov equations of the loop, no frequency
+// grid), from starts of its own; equal to 0.25 %, in a flat valley of the filtered derivative.
+TEST(RivalTest, IsTheIndependentOptimum) {
+  const struct {
+    int order;
+    double input_gain, pole, lag, bandwidth;
+    std::vector<std::pair<RivalKind, double>> costs;
+  } cases[] = {{2,
+                3.0,
+                0.0,
+                0.0,
+                20.0,
+                {{RivalKind::derivative, 1.313489458e-06},
+                 {RivalKind::filtered, 4.663246774e-07},
+                 {RivalKind::freely_filtered, 4.663202933e-07}}},
+               {2,
+                -3.0,
+                2.0,
+                0.015,
+                15.0,
+                {{RivalKind::derivative, 1.135414727e-06},
+                 {RivalKind::filtered, 3.811867285e-07},
+                 {RivalKind::freely_filtered, 3.794139223e-07}}},
+               {1,
+                1.0,
+                1.0,
+                0.02,
+                20.0,
+                {{RivalKind::pi, 3.029533376e-07},
+                 {RivalKind::derivative, 3.029506154e-07},
+                 {RivalKind::filtered, 1.257341639e-07},
+                 {RivalKind::freely_filtered, 1.25511375e-07}}}};
+  for (const auto& c : cases) {
+    TuneModel model = plain(c.order);
+    model.input_gain = {c.input_gain, 0.0};
+    model.pole = c.pole;
+    model.lag = c.lag;
+    model.disturbance = model.disturbance_of(c.bandwidth);
+    model.u_min = -50.0;
+    model.u_max = 50.0;
+    const auto rivals = tune_rivals(problem_of(model, c.bandwidth, no_rules));
+    ASSERT_EQ(rivals.size(), 4U);
+    for (const auto& [kind, cost] : c.costs) {
+      EXPECT_NEAR(rival_of(rivals, kind).design.cost / cost, 1.0, 3e-3)
+          << c.order << ' ' << static_cast<int>(kind);
+    }
+  }
+}
+
+// The PID with a filter of second order is the free poles of order 2 where its loop around the
+// chain b0 / s^2 is stable, and never worse.
+TEST(RivalTest, ThePidIsTheFreePoles) {
+  esokit_test::Random random(47);
+  int stable = 0;
+  for (int i = 0; i < 3; ++i) {
+    TuneModel model = plain(2);
+    model.input_gain.value = i == 1 ? -2.0 : 5.0;
+    model.lag = i == 0 ? 0.0 : random.uniform(1e-3, 8e-3);
+    const double w = random.uniform(3.0, 20.0);
+    model.disturbance = model.disturbance_of(w);
+    const auto tuning = tune(model, {.controller_bandwidth = 0.0}, no_rules).value();
+    const auto rivals = tune_rivals(tuning);
+    const TunedRival& pid = rival_of(rivals, RivalKind::freely_filtered);
+    const auto free =
+        std::find_if(tuning.designs.begin(), tuning.designs.end(), [](const TunedDesign& design) {
+          return design.family == TuneFamily::free_poles && !design.knows.any();
+        });
+    EXPECT_LE(pid.design.cost, 1.0001 * free->cost) << i;
+    // The wish binds by the noise in u, where the two searches end apart: equal is what is free.
+    const double ratio = std::pow(pid.design.free_excess / free->free_excess, 2);
+    EXPECT_LE(ratio, 1.0001) << i;
+    TuneModel chain = model;
+    chain.lag = 0.0;
+    const auto loop = closed_loop(chain, pid.design.controller);
+    if (loop.value().stable()) {
+      ++stable;
+      EXPECT_GE(ratio, 0.999) << i;
+    }
+    // As a controller, too: the conversion of the design has its poles and zeros.
+    const esokit::detail::RivalSearch search(tuning);
+    const auto x = search.equal_to(free->controller);
+    ASSERT_EQ(x.size(), 5U);
+    const auto equal = esokit::detail::closed_upon_itself(
+        esokit::detail::pid_form(search.settings(RivalKind::freely_filtered, x)));
+    esokit::detail::FastResponse a(free->controller), b(equal);
+    for (const double v : {0.001, 0.01, 0.1, 1.0}) {
+      const auto there = std::polar(1.0, v) - 1.0;
+      EXPECT_LE(std::abs(a.at(there).gain / b.at(there).gain - 1.0), 1e-6) << v;
+    }
+  }
+  EXPECT_GE(stable, 2);
+}
+
+TEST(RivalTest, KeepsTheRulesOfTheFamilies) {
+  TuneModel model = servo();
+  const auto tuning = tune(model).value();
+  const auto rivals = tune_rivals(tuning);
+  ASSERT_EQ(rivals.size(), 4U);
+  const LoopCost cost(tuning.model, tuning.rules, 0.1);
+  bool all = true;
+  for (const TunedRival& rival : rivals) {
+    const TunedDesign& d = rival.design;
+    EXPECT_EQ(d.numbers, rival.kind == RivalKind::pi                ? 2
+                         : rival.kind == RivalKind::freely_filtered ? 5
+                                                                    : 4);
+    if (!d.feasible) {
+      all = false;
+      EXPECT_NE(d.constraint, "none") << d.name;
+      continue;
+    }
+    EXPECT_TRUE(all) << d.name << ": behind one that does not keep the rules";
+    const auto numbers = cost(esokit::detail::closed_upon_itself(d.controller));
+    EXPECT_GE(numbers.modulus, 0.498) << d.name;
+    EXPECT_GE(numbers.delay, 0.995 * 2.0 * model.sample_time) << d.name;
+    EXPECT_LE(numbers.control_noise, 1.002 * tuning.control_noise) << d.name;
+    EXPECT_NEAR(numbers.cost(tuning.rho, model.input_gain.value) / d.cost, 1.0, 2e-3) << d.name;
+    EXPECT_TRUE(d.played) << d.name;
+    EXPECT_NE(d.code.find("PlainPid::make({.proportional = "), std::string::npos);
+    // Given as it is, it is the same.
+    const auto given = given_rival(tuning, rival.pid).value();
+    EXPECT_EQ(given.design.cost, d.cost) << d.name;
+    EXPECT_EQ(given.design.comes_back, d.comes_back) << d.name;
+    const auto same = migration(tuning, rival, d);
+    EXPECT_TRUE(same.gains.empty() && same.losses.empty()) << d.name;
+    EXPECT_EQ(same.ties.size(), 8U) << d.name;
+  }
+  // A PID that is too weak in everything, and one that is not stable.
+  PlainPidConfig weak = rivals.front().pid;
+  weak.proportional *= 0.25;
+  weak.integral *= 0.05;
+  weak.derivative *= 0.25;
+  const auto change = migration(tuning, given_rival(tuning, weak).value(), *tuning.chosen());
+  EXPECT_FALSE(change.gains.empty());
+  EXPECT_FALSE(change.losses.empty());  // noise in u
+  EXPECT_NE(change.gains.front().find("load"), std::string::npos);
+  weak.proportional = -weak.proportional;
+  const auto lost = migration(tuning, given_rival(tuning, weak).value(), *tuning.chosen());
+  ASSERT_EQ(lost.gains.size(), 1U);
+  EXPECT_NE(lost.gains.front().find("not stable"), std::string::npos);
 }
 
 }  // namespace tune_tune_test

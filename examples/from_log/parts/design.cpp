@@ -71,6 +71,33 @@ esokit::FitData simulated(const Identified& found, const esokit::FitData& rows) 
 
 std::string percent(double share) { return number_text(100 * share, 3) + " %"; }
 
+/// Who wins, in words: J is what everything was tuned for.
+std::string against_pid(const std::vector<esokit::TunedRival>& rivals,
+                        const esokit::TunedDesign& taken) {
+  const esokit::TunedDesign& best = rivals.front().design;
+  if (!best.feasible) {
+    return "No PID keeps these rules; the nearest, " + best.name + ", misses: " + best.constraint +
+           ".";
+  }
+  const double ratio = best.cost / taken.cost;
+  const std::string what = best.name + " (" + std::to_string(best.numbers) +
+                           " tuned numbers; this design: " + std::to_string(taken.numbers) + ")";
+  // Of the deviations, as in the table: the root of J.
+  const std::string by = percent(std::abs(std::sqrt(ratio) - 1.0));
+  const std::string lost =
+      best.comes_back ? "" : " But it does not come back from " + best.lost + ".";
+  if (ratio > 1.01) {
+    return "The best PID under the same rules is the " + what + "; its deviations of y and u are " +
+           by + " larger." + lost;
+  }
+  if (ratio < 1.0 / 1.01) {
+    return "A PID does better here: the " + what + " has deviations of y and u that are " + by +
+           " smaller under the same rules. Its code is below." + lost;
+  }
+  return "A PID does as well here: the " + what +
+         ", tuned for the same under the same rules, is within 1 %. Its code is below." + lost;
+}
+
 /// Why there may be no design of order 3, and what to do.
 const std::string three_integrators =
     "Friction acts as a large damping on small motions. Behind an actuator that integrates, it "
@@ -172,6 +199,16 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
           "°, each the smallest over the intervals. Deviations of y and u are " +
           number_text(taken.excess, 3) +
           " times those of the best linear controller, which keeps no margins."};
+  design.rivals_ = compiled::tune_rivals(*tuning);
+  design.summary_.push_back(against_pid(design.rivals_, taken));
+  if (settings.pid) {
+    const auto given = compiled::given_rival(*tuning, *settings.pid);
+    if (!given) throw LogError("--pid: " + esokit::to_text(given.error()));
+    design.migration_ = esokit::migration(*tuning, *given, taken);
+    design.to_best_ = esokit::migration(*tuning, *given, design.rivals_.front().design);
+    design.migrates_ = true;
+    design.rivals_.push_back(*given);
+  }
   if (taken.played && taken.comes_back) {
     design.summary_.push_back(
         "It was played with limits and noise, on the model and at the ends of its intervals: it "
@@ -341,27 +378,30 @@ Figure lost_figure(const esokit::Tuning& tuning, const esokit::TunedDesign& desi
   return figure;
 }
 
-std::vector<CsvRow> ranking(const esokit::Tuning& tuning) {
+std::vector<CsvRow> ranking(const esokit::Tuning& tuning,
+                            const std::vector<esokit::TunedRival>& rivals) {
   const double range = tuning.model.u_max - tuning.model.u_min;
-  std::vector<CsvRow> rows{{"", "times the best", "the same without margins",
+  std::vector<CsvRow> rows{{"", "tuned numbers", "times the best", "the same without margins",
                             "standard deviation of y", "noise in u, % of its range",
                             "y after a load of 10 %", "settling time of a small step (s)",
                             "modulus margin", "delay margin (ms)", "instructions", "limited by"}};
   // Zero where a design was not played.
   const auto played = [](double value) { return value > 0.0 ? number_text(value, 3) : "-"; };
-  for (std::size_t i = 0; i < tuning.designs.size(); ++i) {
-    const auto& d = tuning.designs[i];
-    rows.push_back({std::to_string(i + 1) + " " + d.name +
+  const auto row = [&](const std::string& before, const esokit::TunedDesign& d) {
+    rows.push_back({before + d.name +
                         (!d.feasible     ? " (does not keep the rules)"
                          : !d.comes_back ? " (does not come back from an overload)"
                                          : ""),
-                    number_text(d.excess, 3), number_text(d.free_excess, 3),
-                    number_text(d.output_deviation, 3),
+                    d.numbers > 0 ? std::to_string(d.numbers) : "-", number_text(d.excess, 3),
+                    number_text(d.free_excess, 3), number_text(d.output_deviation, 3),
                     number_text(100 * d.control_noise / range, 3),
                     played(0.1 * range * d.load_peak), played(d.settling_time),
                     number_text(d.modulus_margin, 2), number_text(1e3 * d.delay_margin, 3),
-                    std::to_string(d.instructions), d.constraint});
-  }
+                    d.instructions > 0 ? std::to_string(d.instructions) : "-", d.constraint});
+  };
+  for (std::size_t i = 0; i < tuning.designs.size(); ++i)
+    row(std::to_string(i + 1) + " ", tuning.designs[i]);
+  for (const auto& rival : rivals) row("rival: ", rival.design);
   return rows;
 }
 
@@ -376,7 +416,36 @@ void Design::show_on(Page& page, const Findings& findings) const {
                "of y and u together, compared with the best linear controller (sqrt(J / J*); "
                "within 1 % the cheaper one comes first). The instructions are those of an update "
                "on a Cortex-M4F in float. --rank takes another row",
-               ranking(*tuning_));
+               ranking(*tuning_, rivals_));
+    if (!rivals_.empty()) {
+      page.text(
+          "Rivals are PIDs, each at its own optimum of the same J, under the same margins, "
+          "intervals and noise in u. J sees neither windup nor lost samples.");
+    }
+  }
+  if (migrates_) {
+    page.heading("From your PID to this design");
+    const auto list = [](const std::vector<std::string>& all) {
+      std::string text;
+      for (const auto& one : all) text += (text.empty() ? "" : "; ") + one;
+      return text.empty() ? std::string("nothing") : text;
+    };
+    page.text("You gain: " + list(migration_.gains) + ".");
+    page.text("You lose: " + list(migration_.losses) + ".");
+    page.text("The same within 1 %: " + list(migration_.ties) + ".");
+    if (migration_.equal) {
+      const auto& equal = *migration_.equal;
+      page.text("The gains of your PID are those of an ADRC with b0 = " +
+                number_text(equal.input_gain, 3) +
+                ", omega_c = " + number_text(equal.controller_bandwidth, 3) +
+                " rad/s and omega_o = " + number_text(equal.observer_bandwidth, 3) + " rad/s.");
+    }
+    if (!rivals_.front().design.feasible) {
+      page.text("No PID keeps the rules.");
+    } else {
+      page.text("Before you change: the best PID would do this by numbers alone: " +
+                list(to_best_.gains) + "; and lose: " + list(to_best_.losses) + ".");
+    }
   }
   if (tuning_) {
     for (const auto& design : tuning_->designs) {
@@ -491,6 +560,10 @@ void Design::show_on(Page& page, const Findings& findings) const {
     if (i == taken_ || !other.feasible) continue;
     page.code(pasted_code(pasting_, *tuning_, other, findings.rows),
               "The code for number " + std::to_string(i + 1) + ", " + other.name);
+  }
+  for (const auto& rival : rivals_) {
+    if (rival.design.feasible && rival.kind != esokit::RivalKind::given)
+      page.code(rival.design.code, "The code for the rival " + rival.design.name);
   }
 }
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include <esokit/analysis/loop.hpp>
-#include <esokit/tune/tune.hpp>
+#include <esokit/tune/rivals.hpp>
 
 #include "from_log/parts/from_log.hpp"
 #include "from_log/parts/page.hpp"
@@ -57,6 +57,10 @@ class Design {
   std::string why_not_;
   std::vector<Alarm> alarms_;
   Replay replay_;
+  std::vector<esokit::TunedRival> rivals_;  ///< the best PIDs, and the given one
+  esokit::Migration migration_;             ///< from the given PID
+  esokit::Migration to_best_;               ///< from it to the best PID
+  bool migrates_ = false;                   ///< there is one
 };
 
 }  // namespace from_log

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <esokit/identify/identify.hpp>
+#include <esokit/tune/plain_pid.hpp>
 #include <esokit/tune/problem.hpp>
 
 #include "common/csv.hpp"
@@ -44,6 +45,8 @@ struct Settings {
   double noise_share = 0;  ///< wish: deviation of u by noise, share of its range; 0: as tune has it
   double settling_time = 0;  ///< wish instead: s
   double controller = 0;     ///< wish instead: omega_c, rad/s
+  /// The PID that the machine has: what changes by going to the design?
+  std::optional<esokit::PlainPidConfig> pid{};
   /// What the loop has to keep; the page says of every design whether it comes back.
   esokit::TuneRules rules{.play = esokit::TunePlay::all};
   int rank = 1;            ///< which of the designs, the best is 1

@@ -46,6 +46,7 @@ struct TunedDesign {
   TuneFamily family{};      ///< how its gains are chosen
   int extension = 1;        ///< m
   int levels = 1;           ///< p
+  int numbers = 0;          ///< how many were chosen for J; what the model tells does not count
   TuneKnowledge knows{};    ///< what its observer knows
   TuneSettings settings{};  ///< the chosen parameters
   bool feasible = false;    ///< keeps all rules: margins, noise in u, and what lets it come back
@@ -77,9 +78,10 @@ struct TunedDesign {
 
   /// The law for `play`: none, that is the linear one, unless it softens at the limits.
   [[nodiscard]] PlayedLaw played_law() const { return settings.soften ? law : PlayedLaw{}; }
-  /// The settling time for `play` on one of `played_variants`, s: with friction 32 / omega_c.
+  /// The settling time for `play` on one of `played_variants`, s: with friction 32 / omega_c of a
+  /// law.
   [[nodiscard]] double played_settling(const TuneModel& variant) const {
-    return variant.friction.value_or(0.0) > 0.0
+    return variant.friction.value_or(0.0) > 0.0 && !settings.gains.empty()
                ? 32.0 / detail::law_mean(settings.gains, variant.order)
                : settling_time;
   }
@@ -308,30 +310,45 @@ struct TuneSearch {
     return gains;
   }
 
+  /// The cost for the search, which requires slightly larger margins, because its frequency grid is
+  /// coarse.
+  [[nodiscard]] LoopCost coarse() const {
+    TuneRules strict = rules;
+    strict.gain_factor *= 1.01;
+    return {model, strict, slowest(), 14.0};
+  }
+
   /// What the rules are about: of each the number that a design has, over the one that is required;
   /// infinite if nothing is.
   struct Kept {
     double modulus, delay, gain, phase, noise, damping, ratio;
   };
-  [[nodiscard]] Kept kept(const Contender& c, const TuneSettings& s,
-                          const LoopNumbers& numbers) const {
-    const auto over = [](double has, double required) {
-      return required > 0.0 ? has / required : std::numeric_limits<double>::infinity();
-    };
-    const int n = model.order;
+  [[nodiscard]] static double over(double has, double required) {
+    return required > 0.0 ? has / required : std::numeric_limits<double>::infinity();
+  }
+  /// Those that any controller has to keep.
+  [[nodiscard]] Kept kept(const LoopNumbers& numbers) const {
+    constexpr double any = std::numeric_limits<double>::infinity();
     return {over(numbers.modulus, rules.modulus_margin),
             over(numbers.delay, rules.delay_samples * model.sample_time),
             numbers.tolerant ? std::max(numbers.tolerance / rules.gain_factor, 1.0)
                              : std::min(numbers.tolerance / rules.gain_factor, 0.98),
             over(numbers.phase, rules.phase_margin),
-            most_noise > 0.0 ? most_noise / numbers.control_noise
-                             : std::numeric_limits<double>::infinity(),
-            n > 1 ? over(s.gains[1] / s.gains[0], rules.damping_latencies * model.lateness())
-                  : std::numeric_limits<double>::infinity(),
-            n == 3 && rules.bandwidth_ratio > 0.0
-                ? rules.bandwidth_ratio * observer_mean(c.design.family, c.kind, model, s) /
-                      law_mean(s.gains, n)
-                : std::numeric_limits<double>::infinity()};
+            most_noise > 0.0 ? most_noise / numbers.control_noise : any,
+            any,
+            any};
+  }
+  [[nodiscard]] Kept kept(const Contender& c, const TuneSettings& s,
+                          const LoopNumbers& numbers) const {
+    const int n = model.order;
+    Kept all = kept(numbers);
+    if (n > 1)
+      all.damping = over(s.gains[1] / s.gains[0], rules.damping_latencies * model.lateness());
+    if (n == 3 && rules.bandwidth_ratio > 0.0) {
+      all.ratio = rules.bandwidth_ratio * observer_mean(c.design.family, c.kind, model, s) /
+                  law_mean(s.gains, n);
+    }
+    return all;
   }
   /// How much is missing: the sum of shares, 0 if nothing is.
   [[nodiscard]] static double lack(const Kept& kept, double more = 1.0) {
@@ -520,6 +537,21 @@ struct TuneSearch {
   }
 };
 
+/// The search of a problem whose rho is known.
+inline TuneSearch search_for(const Tuning& tuning, bool given_law) {
+  const TuneModel& model = tuning.model;
+  const double w = std::pow(tuning.rho, -0.5 / model.order);
+  return {model,
+          tuning.rules,
+          tuning.rho,
+          given_law ? w : 0.0,
+          w,
+          model.filter_bandwidth(),
+          1.0 / (model.lag + model.dead_time + model.sensor + 1.5 * model.sample_time),
+          tuning.control_noise,
+          nullptr};
+}
+
 /// The response of y to a step: largest magnitude, and the time after which it stays within 2 % of
 /// `final`.
 struct StepAnswer {
@@ -592,35 +624,35 @@ inline void play_law(TunedDesign& d, const TuneModel& model) {
   }
 }
 
-/// Plays a design; one of order 2 softened, and as designed if it does not come back so, the others
-/// the other way round. Drawn machines behind friction and gravity came back from more and sooner
-/// like this (examples/choosing).
-inline void play_all(TunedDesign& d, const TuneModel& model) {
+/// Plays a controller as it is; false if no other way to act at its limits can help.
+inline bool play_as_is(TunedDesign& d, const TuneModel& model) {
   d.played = true;
   if (model.may_rub() && swings_with_friction(model, d.controller)) {
     d.comes_back = false;
     d.lost_in = friction_events[0];
     d.lost_on = static_cast<int>(played_variants(model).size()) - 1;
     d.lost = "friction on y'', however small: it acts as a damping, with which the loop swings";
-    return;
+    return false;
   }
+  play_law(d, model);
+  return true;
+}
+
+/// Plays a design; one of order 2 softened, and as designed if it does not come back so, the others
+/// the other way round. Drawn machines behind friction and gravity came back from more and sooner
+/// like this (examples/choosing).
+inline void play_all(TunedDesign& d, const TuneModel& model) {
   const bool possible = d.settings.gains[0] > 0.0;
   d.settings.soften = model.order == 2 && possible;
-  play_law(d, model);
-  if (d.comes_back || !possible) return;
+  if (!play_as_is(d, model) || d.comes_back || !possible) return;
   d.settings.soften = !d.settings.soften;
   play_law(d, model);
 }
 
-/// Computes the results of a design from its settings.
-inline void fill_in(Contender& c, const TuneSearch& search, const LoopCost& fine, double optimum,
-                    double free_cost) {
-  TunedDesign& d = c.design;
+/// What the loop of a design does, and the rule that limits it. @param kept by `numbers`
+inline void fill_in_loop(TunedDesign& d, const TuneSearch& search, const LoopNumbers& numbers,
+                         const TuneSearch::Kept& kept, double optimum, double free_cost) {
   const TuneModel& model = search.model;
-  const auto controller = tuned_controller(c.kind, model.sample_time, d.settings);
-  if (!controller) return;
-  d.controller = *controller;
-  const LoopNumbers numbers = fine(*controller);
   d.cost = numbers.cost(search.rho, model.input_gain.value);
   d.excess = std::sqrt(d.cost / optimum);
   d.free_excess = std::min(std::sqrt(free_cost / optimum), d.excess);
@@ -631,16 +663,12 @@ inline void fill_in(Contender& c, const TuneSearch& search, const LoopCost& fine
   d.delay_margin = numbers.delay;
   d.gain_tolerance = numbers.tolerance;
   d.phase_margin = numbers.phase;
-  const auto& gains = d.settings.gains;
-  d.settings.soften = model.order > 1 && gains[0] > 0.0;
-  d.damping_latencies = gains.size() > 1 ? gains[1] / gains[0] / model.latency() : 0.0;
-  d.bandwidth_ratio =
-      law_mean(gains, model.order) / observer_mean(d.family, c.kind, model, d.settings);
-  const auto kept = search.kept(c, d.settings, numbers);
   d.feasible = numbers.stable && search.lack(kept, 0.999) <= 0.0;
   if (!numbers.stable) {
     d.constraint = "stability";
-  } else if (d.feasible && d.cost < free_cost * 1.002) {
+    return;
+  }
+  if (d.feasible && d.cost < free_cost * 1.002) {
     d.constraint = "none";
   } else {
     const double gain = numbers.tolerant ? numbers.tolerance / search.rules.gain_factor : kept.gain;
@@ -654,8 +682,7 @@ inline void fill_in(Contender& c, const TuneSearch& search, const LoopCost& fine
           return a.first < b.first;
         })->second;
   }
-  if (!numbers.stable) return;
-  const auto loop = closed_loop(model, *controller);
+  const auto loop = closed_loop(model, d.controller);
   if (!loop || !loop->stable()) {
     // Stability is decided by the poles.
     d.feasible = false;
@@ -666,6 +693,24 @@ inline void fill_in(Contender& c, const TuneSearch& search, const LoopCost& fine
   const int steps = static_cast<int>(std::min(12.0 / decay, 50000.0)) + 10;
   d.settling_time = step_answer(loop->system(), 0, 1.0, 1.0, steps).settling;
   d.load_peak = step_answer(loop->system(), 2, std::abs(model.input_gain.value), 0.0, steps).peak;
+}
+
+/// Computes the results of a design from its settings.
+inline void fill_in(Contender& c, const TuneSearch& search, const LoopCost& fine, double optimum,
+                    double free_cost) {
+  TunedDesign& d = c.design;
+  const TuneModel& model = search.model;
+  const auto controller = tuned_controller(c.kind, model.sample_time, d.settings);
+  if (!controller) return;
+  d.controller = *controller;
+  const LoopNumbers numbers = fine(*controller);
+  const auto& gains = d.settings.gains;
+  d.settings.soften = model.order > 1 && gains[0] > 0.0;
+  d.damping_latencies = gains.size() > 1 ? gains[1] / gains[0] / model.latency() : 0.0;
+  d.bandwidth_ratio =
+      law_mean(gains, model.order) / observer_mean(d.family, c.kind, model, d.settings);
+  d.numbers = c.observer_numbers + c.law_numbers;
+  fill_in_loop(d, search, numbers, search.kept(c, d.settings, numbers), optimum, free_cost);
   const auto observer = tuned_observer(c.kind, model.sample_time, d.settings);
   d.law = {gains, observer->input_gain, observer->to_estimate, observer->y_to_estimate};
 }
@@ -957,7 +1002,6 @@ template <class = void>
         high > given.filter_bandwidth() ? given.disturbance_of(high) : given.disturbance;
   }
   tuning.model = model;
-  const double filter_bandwidth = model.filter_bandwidth();
   const Lqg lqg(model);
   const double slow = slowest_of(model);
   // What keeps order 2 from swinging at its limits: sqrt(2) / w is k_1 / k_0 of an LQR law, 2 / w
@@ -1018,19 +1062,8 @@ template <class = void>
   for (int corrections = 0;; ++corrections) {
     tuning.rho = rho_of(w);
 
-    detail::TuneSearch search{model,
-                              rules,
-                              tuning.rho,
-                              given_law ? w : 0.0,
-                              w,
-                              filter_bandwidth,
-                              1.0 / (model.lag + model.dead_time + model.sensor + 1.5 * T),
-                              tuning.control_noise,
-                              nullptr};
-    // The search requires slightly larger margins, because its frequency grid is coarse.
-    TuneRules strict = rules;
-    strict.gain_factor *= 1.01;
-    const LoopCost cost(model, strict, search.slowest(), 14.0);
+    detail::TuneSearch search = detail::search_for(tuning, given_law);
+    const LoopCost cost = search.coarse();
     const LoopCost fine(model, rules, search.slowest(), 50.0);
     search.cost = &cost;
     // A sine of known frequency can be cancelled at no cost, so J* is computed without it.
