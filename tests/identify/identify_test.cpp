@@ -769,6 +769,9 @@ TEST(Widened, IsWhatTheOtherEvidenceAsksFor) {
   found.in_motion.still = 0;
   EXPECT_EQ(half(), 2);
   EXPECT_EQ(esokit::detail::widened(found, {}).value, -90);
+  // Without u at standstill: a tenth more.
+  found.held = 0.2;
+  EXPECT_EQ(half(), 11);
 }
 
 TEST(Judge, RefusesByName) {

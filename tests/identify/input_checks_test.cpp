@@ -93,7 +93,7 @@ TEST(GainBySize, DiffersByAQuarterAndByMoreThanTheIntervals) {
 
 // y'' = b0 u - friction, which holds at standstill; steps of u, half of them below friction.
 TEST(GainInMotion, TellsFrictionThatHolds) {
-  const auto sticks = [](double friction) {
+  const auto sticks = [](double friction, bool known = true) {
     esokit::sim::Gaussian gaussian(7);
     Log log;
     log.sample_time = T;
@@ -114,13 +114,25 @@ TEST(GainInMotion, TellsFrictionThatHolds) {
     esokit::IdentifyOptions options;
     options.orders = {2};
     options.averaged = 1;
+    options.friction = known;
     return esokit::study(log, options).value();
   };
   const auto smooth = sticks(0);
+  EXPECT_EQ(smooth.held, 0);
   EXPECT_GT(smooth.in_motion.still, 0.005);
   EXPECT_FALSE(smooth.in_motion.differ());
   EXPECT_NEAR(smooth.in_motion.moving.value, b0, 0.03 * b0);
-  const auto held = sticks(25);
+  // Without u at standstill b0 is that of the motion, and nothing is left to differ.
+  const auto without = sticks(25);
+  EXPECT_GT(without.held, 0.3);
+  EXPECT_EQ(without.in_motion.still, 0);
+  EXPECT_NEAR(without.input_gain.value, b0, 0.1 * b0);
+  EXPECT_GT(without.input_gain.half_width, 0.1 * b0);
+  EXPECT_NEAR(without.friction.value, 25, 5);
+  // As it was without friction in the model.
+  const auto held = sticks(25, false);
+  EXPECT_EQ(held.held, 0);
+  EXPECT_NEAR(without.latency.value, held.latency.value, 0.05 * T);  // of all rows
   EXPECT_GT(held.in_motion.still, 0.3);
   EXPECT_TRUE(held.in_motion.differ());
   EXPECT_LT(std::abs(held.in_motion.standing.value), 0.7 * b0);

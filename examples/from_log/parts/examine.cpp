@@ -118,7 +118,12 @@ void sound_alarms(const Settings& settings, const Input& input, Findings& all) {
                         " beyond. Does the actuator saturate, stick, or act as the square of u? "
                         "Record the u that it held, or correct u by its curve."});
   }
-  if (const auto& motion = found.in_motion; motion.differ()) {
+  if (found.held > 0.0) {
+    all.alarms.push_back(
+        {"sticks", "Friction holds the machine in " + number_text(100 * found.held, 2) +
+                       " % of the rows: b0 is that of the motion, without u at standstill. A "
+                       "controller will stick there, too; record faster motion with larger u."});
+  } else if (const auto& motion = found.in_motion; motion.differ()) {
     all.alarms.push_back(
         {"sticks", "Friction holds the machine: b0 is " + number_text(motion.moving.value, 3) +
                        " in motion and " + number_text(motion.standing.value, 3) +

@@ -133,7 +133,12 @@ struct Identified {
   double correlation = 0;          ///< largest correlation of the innovations over lags 1 to 20
   SecondOpinion second_opinion{};  ///< b0 by output error
   GainBySize by_size{};            ///< b0 at small and at large u
-  GainInMotion in_motion{};        ///< b0 in motion and at standstill, of order 2
+  GainInMotion in_motion{};        ///< b0 in motion and at standstill, of order 2; not if `held`
+
+  /// Share of the rows at standstill in which friction holds the machine against u (order 2), so
+  /// that b0, pole and friction are fitted without u there; 0: it does not hold. Latency, lag and
+  /// dead time are of all rows.
+  double held = 0;
   Lead lead{};                     ///< how early y moves before u, if it does
   bool at_once = false;            ///< y follows u within the row, with nothing in between
   int averaged = 1;                ///< rows of the log that were averaged into one
@@ -510,6 +515,48 @@ inline auto best_order(const std::vector<OrderFit>& orders) {
   return slower->slower < likely->slower - 1.0 && !is_part_of(*slower, *likely) ? slower : likely;
 }
 
+/// A log without u where friction holds the machine.
+struct HeldLog {
+  FitData rows{};      ///< u is zero at standstill
+  double scale = 0.0;  ///< v_s of the friction in motion
+  double share = 0.0;  ///< of the rows, at standstill
+  Fit fit{};           ///< at the bandwidth of the plateau
+};
+
+/// Largest share of the rows at standstill: of more, too little motion is left, or a coarse encoder
+/// hides it.
+constexpr double held_max = 0.8;
+
+/// Friction that holds takes all of u at standstill, which no column of friction can follow: b0 of
+/// all rows is up to twice too small. So the fit at the plateau, `here`, is repeated without u
+/// there. It must leave less than 0.95 of the mean square: where nothing holds, u moves the machine
+/// also when its speed passes zero, and the fit gets worse.
+inline std::optional<HeldLog> held_log(const FitData& rows, const FitModel& model,
+                                       const FitBounds& bounds, const Fit& here,
+                                       const std::vector<double>& speed) {
+  const double size = rms(speed);
+  std::optional<HeldLog> best;
+  double least = 0.95 * here.mean_square;
+  for (const double still : {0.02, 0.1}) {
+    FitData cut = rows;
+    std::size_t count = 0;
+    for (std::size_t k = 0; k < speed.size(); ++k) {
+      if (std::abs(speed[k]) < still * size) cut.u[k] = 0.0, ++count;
+    }
+    const double share = static_cast<double>(count) / static_cast<double>(speed.size());
+    if (count == 0 || share > held_max) continue;
+    for (const double scale : {0.01 * size, 0.1 * size}) {
+      const FitData rubbed = with_friction(cut, speed, scale);
+      InnovationsFit fit(rubbed, model, bounds);
+      const Fit found = fit.minimise(here.at, false, 8);
+      if (!(found.mean_square < least)) continue;
+      least = found.mean_square;
+      best = HeldLog{cut, scale, share, found};
+    }
+  }
+  return best;
+}
+
 /// Whether a force that depends on position acts: it improves the likelihood by more than its
 /// parameters cost, or it leaves less than 1 / e of the mean square at a tenth of the bandwidth.
 /// (At the full bandwidth everything slow is attributed to the disturbance.)
@@ -650,6 +697,8 @@ inline Estimate widened(const Identified& found, const IdentifyOptions& options)
   };
   const bool coloured = !white(found, options);
   if (coloured) gain.half_width += 0.01 * std::abs(gain.value);
+  // When exactly the machine stands is not known, and that moves b0 by some per cent.
+  if (found.held > 0.0) gain.half_width += 0.1 * std::abs(gain.value);
   if (informed(found) && (coloured || gain.share() > options.interval_max))
     reach(found.second_opinion.input_gain.value);
   const Estimate& moving = found.in_motion.moving;
@@ -699,7 +748,7 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
     orders = fit_orders(rows, tried, bounds, orders);
     winner = best_order(orders);
   }
-  const OrderFit chosen = *winner;
+  OrderFit chosen = *winner;
   if (result.averaged == 1 && chosen.correlation < 0.3) raw_noise = chosen.noise;
   result.orders = std::move(of_speed);
   result.orders.insert(result.orders.end(), orders.begin(), orders.end());
@@ -756,6 +805,21 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
   }
   progress(0.5);
   result.plateau = find_plateau(fit, likely);
+  // When exactly the machine stands is known to some rows only: so times are those of all rows.
+  const Plateau of_all = result.plateau;
+  if (model.order == 2 && options.friction && of_all.middle > 0) {
+    const PlateauPoint& plain = of_all.points[of_all.middle];
+    if (speed.empty()) speed = friction_speed(rows, 2, chosen.fit.noise, chosen.fit.at.latency);
+    if (auto held = held_log(rows, model, bounds, plain.fit, speed)) {
+      result.lead = lead_of(used, model, bounds, plain.fit);
+      result.held = held->share;
+      rows = std::move(held->rows);
+      chosen.friction_scale = held->scale;
+      used = with_friction(rows, speed, held->scale);
+      InnovationsFit in_motion(used, model, bounds);
+      result.plateau = find_plateau(in_motion, held->fit);
+    }
+  }
   progress(0.8);
   if (result.plateau.middle == 0) {
     result.input_gain = {likely.linear[0], std::numeric_limits<double>::infinity()};
@@ -763,8 +827,6 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
   }
   const Plateau& plateau = result.plateau;
   const PlateauPoint& here = plateau.points[plateau.middle];
-  const PlateauPoint& below = plateau.points[plateau.middle - 1];
-  const PlateauPoint& above = plateau.points[plateau.middle + 1];
   // Friction with a smaller or larger scale, by more than the steps of the search.
   double friction_spread = 0.0;
   if (chosen.friction_scale > 0.0) {
@@ -790,29 +852,36 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
   // The interval combines the jackknife with the dependence on the bandwidth: between neighbours,
   // and over one and a half octaves to each side as far as the number is accurate there. `down` is
   // the number of points below, `resolved` the share to which a point counts at most.
-  const std::size_t last = std::min(plateau.middle + 3, plateau.points.size() - 1);
-  const auto estimate = [&](auto value, auto error, double more, std::size_t down = 3,
-                            double resolved = 0.0) {
-    const double x = value(here);
-    const std::size_t first = plateau.middle - std::min(plateau.middle, down);
+  const auto estimate_of = [&](const Plateau& of, auto value, auto error, double more,
+                               std::size_t down = 3, double resolved = 0.0) {
+    const PlateauPoint& middle = of.points[of.middle];
+    const PlateauPoint& below = of.points[of.middle - 1];
+    const PlateauPoint& above = of.points[of.middle + 1];
+    const double x = value(middle);
+    const std::size_t first = of.middle - std::min(of.middle, down);
+    const std::size_t last = std::min(of.middle + 3, of.points.size() - 1);
     const double spread =
         std::max({value(below), x, value(above)}) - std::min({value(below), x, value(above)});
     double squares = 0.0, weights = 0.0;
     for (std::size_t i = first; i <= last; ++i) {
-      const PlateauPoint& point = plateau.points[i];
+      const PlateauPoint& point = of.points[i];
       // A point that is more accurate than this one, or has no error, does not count more.
-      const double size = std::max({error(point), error(here), resolved * std::abs(x)});
+      const double size = std::max({error(point), error(middle), resolved * std::abs(x)});
       const double weight = size > 0.0 && !point.at_bound ? 1.0 / (size * size) : 0.0;
       squares += weight * (value(point) - x) * (value(point) - x);
       weights += weight;
     }
     const double drift = weights > 0.0 ? std::sqrt(squares / weights) : 0.0;
-    return Estimate{x, t * error(here) + 0.25 * spread + drift + more};
+    return Estimate{x, t * error(middle) + 0.25 * spread + drift + more};
+  };
+  const auto estimate = [&](auto value, auto error) {
+    return estimate_of(plateau, value, error, 0.0);
   };
   const auto gain = [&](std::size_t down, double resolved) {
-    return estimate([](const PlateauPoint& p) { return p.fit.linear[0]; },
-                    [](const PlateauPoint& p) { return p.errors.linear[0]; },
-                    0.25 * friction_spread, down, resolved);
+    return estimate_of(
+        plateau, [](const PlateauPoint& p) { return p.fit.linear[0]; },
+        [](const PlateauPoint& p) { return p.errors.linear[0]; }, 0.25 * friction_spread, down,
+        resolved);
   };
   // A flexible mode changes b0 over octaves, by more than the errors at each bandwidth: so b0 is
   // compared over three octaves below, where the machine is closer to the model, and to 2 %.
@@ -826,22 +895,23 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
   // A standard error is half of a half width.
   result.friction_shift = 2.0 * friction_spread / near;
   // The fit cannot distinguish times below a twentieth of a row.
-  const auto time = [&](Estimate found) {
+  const auto time = [&](auto value, auto error) {
+    Estimate found = estimate_of(of_all, value, error, 0.0);
     found.half_width = std::max(found.half_width, 0.05 * rows.sample_time);
     return found;
   };
-  result.latency = time(estimate([](const PlateauPoint& p) { return p.fit.at.latency; },
-                                 [](const PlateauPoint& p) { return p.errors.latency; }, 0.0));
-  result.lag = time(estimate([](const PlateauPoint& p) { return p.fit.at.lag(); },
-                             [](const PlateauPoint& p) { return p.errors.lag; }, 0.0));
-  result.dead_time = time(estimate([](const PlateauPoint& p) { return p.fit.at.dead_time(); },
-                                   [](const PlateauPoint& p) { return p.errors.dead_time; }, 0.0));
+  result.latency = time([](const PlateauPoint& p) { return p.fit.at.latency; },
+                        [](const PlateauPoint& p) { return p.errors.latency; });
+  result.lag = time([](const PlateauPoint& p) { return p.fit.at.lag(); },
+                    [](const PlateauPoint& p) { return p.errors.lag; });
+  result.dead_time = time([](const PlateauPoint& p) { return p.fit.at.dead_time(); },
+                          [](const PlateauPoint& p) { return p.errors.dead_time; });
   result.pole = estimate([](const PlateauPoint& p) { return p.fit.at.pole; },
-                         [](const PlateauPoint& p) { return p.errors.pole; }, 0.0);
+                         [](const PlateauPoint& p) { return p.errors.pole; });
   // The linear numbers: b0, the log's columns, sines, friction.
   const auto linear = [&](std::size_t c) {
     return estimate([c](const PlateauPoint& p) { return p.fit.linear[c]; },
-                    [c](const PlateauPoint& p) { return p.errors.linear[c]; }, 0.0);
+                    [c](const PlateauPoint& p) { return p.errors.linear[c]; });
   };
   for (std::size_t c = 1; c <= known; ++c) result.columns.push_back(linear(c));
   if (chosen.friction_scale > 0.0) {
@@ -887,16 +957,20 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
     result.second_opinion = second_opinion(used, model, bounds, here.fit.at, w);
     if (result.second_opinion.informative()) break;
   }
-  result.at_bound = here.at_bound;
+  result.at_bound = here.at_bound || of_all.points[of_all.middle].at_bound;
   if (excitation < excitation_max) {
     result.by_size = gain_by_size(used, model, bounds, here.fit.at);
-    if (model.order == 2) {
+    if (result.held > 0.0) {
+      // Where it holds, small u does little: that is known already.
+      GainBySize& sizes = result.by_size;
+      if (std::abs(sizes.small.value) < std::abs(sizes.large.value)) sizes = {};
+    } else if (model.order == 2) {
       if (speed.empty()) speed = friction_speed(rows, 2, chosen.fit.noise, chosen.fit.at.latency);
       result.in_motion = gain_in_motion(used, model, bounds, here.fit, speed);
     }
   }
   result.input_gain = widened(result, options);
-  result.lead = lead_of(used, model, bounds, here.fit);
+  if (!(result.held > 0.0)) result.lead = lead_of(used, model, bounds, here.fit);
   return result;
 }
 
