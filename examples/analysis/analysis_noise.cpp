@@ -181,12 +181,13 @@ int main(int argc, char** argv) {
                    .x_label("levels p")
                    .y_label("sd of u / sd of y (-)");
   left.log_y().x_range(0.7, 4.3).x_tick(1.0).y_range(1.0, 1e8).legend(Legend::top_right);
-  constexpr std::array colors = {Color::blue, Color::vermillion, Color::green};
+  // The colours are those of the levels in the other panels.
+  constexpr std::array dashes = {Dash::dotted, Dash::solid, Dash::dashed};
   for (std::size_t n = 0; n < 3; ++n) {
     const std::string name = "n = " + std::to_string(orders[n]);
-    left.line(levels, exact[n], {.name = name, .color = colors[n]});
+    left.line(levels, exact[n], {.name = name, .color = Color::grey, .dash = dashes[n]});
     left.points(levels, exact[n],
-                {.color = colors[n], .marker = Marker::circle, .column = name + " points"});
+                {.color = Color::grey, .marker = Marker::circle, .column = name + " points"});
   }
   std::vector<double> crosses;
   for (const Measurement& m : measured) crosses.push_back(std::sqrt(m.variance));

@@ -453,7 +453,7 @@ int main(int argc, char** argv) {
   std::vector<CsvRow> against, costs;
   for (std::size_t n = 0; n < 3; ++n) {
     const std::string order = std::to_string(n + 1);
-    for (std::size_t i = 0; i < rivals.size(); ++i) {
+    for (std::size_t i = 0; i < rivals.size() && compared[n] > 0; ++i) {
       against.push_back(
           {order, rivals[i], std::to_string(better[n][i]) + " of " + std::to_string(compared[n]),
            number_text(quantile(peaks[n][i], 0.5), 2), number_text(quantile(peaks[n][i], 0.9), 2),
@@ -463,7 +463,8 @@ int main(int argc, char** argv) {
     }
     const std::array<const char*, 3> of{"rules", "rules, with the floor",
                                         "rules and floor, under the disturbance of the log"};
-    for (std::size_t i = 0; i < of.size() && !prices[n][i].empty(); ++i) {
+    for (std::size_t i = 0; i < of.size(); ++i) {
+      if (prices[n][i].empty()) continue;
       costs.push_back({order, of[i], std::to_string(prices[n][i].size()),
                        number_text(quantile(prices[n][i], 0.5), 4),
                        number_text(quantile(prices[n][i], 0.9), 4)});

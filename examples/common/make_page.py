@@ -126,9 +126,12 @@ def percent(share):
 
 
 def plain(text):
-    """Powers of ten below a million written out: 1.1e+03 is 1100."""
-    return re.sub(r"(?<![\w.])(-?\d+(?:\.\d+)?)e\+0([1-5])(?!\d)",
-                  lambda found: f"{float(found[0]):.0f}", text)
+    """Powers of ten between 1e-6 and 1e8 written out: 1.1e+03 is 1100, 4.4e-05 is 0.000044."""
+    def written(found):
+        digits = len(found[1].lstrip("-").replace(".", ""))
+        power = int(found[2])
+        return f"{float(found[0]):.{max(0, digits - 1 - power)}f}"
+    return re.sub(r"(?<![\w.])(-?\d+(?:\.\d+)?)e(\+0[1-7]|-0[56])(?!\d)", written, text)
 
 
 def png_size(file):
@@ -161,12 +164,18 @@ def counts(paper):
             (text or '<span class="reported">These programs compare no numbers.</span>') + "</p>\n")
 
 
-def table(caption, headings, rows, text=False):
-    """`rows` hold finished cells, with their td or th; no table without them."""
+def of_words(column):
+    """Whether a column is read from the left: it has no cell that begins with a number."""
+    return not any(re.match(r"-?\d|-$", text) for text in column)
+
+
+def table(caption, headings, rows, text=()):
+    """`rows` hold finished cells, with their td or th; no table without them. `text`: which columns
+    are read from the left."""
     if not rows:
         return ""
-    head = "".join(f'<th class="text" scope="col">{esc(heading)}</th>' if text else
-                   f'<th scope="col">{esc(heading)}</th>' for heading in headings)
+    head = "".join(f'<th class="text" scope="col">{esc(heading)}</th>' if c < len(text) and text[c]
+                   else f'<th scope="col">{esc(heading)}</th>' for c, heading in enumerate(headings))
     body = "".join(f"<tr>{''.join(row)}</tr>\n" for row in rows)
     return (f'<figure class="tab"><figcaption>{esc(caption)}</figcaption>'
             f'<div class="table" tabindex="0"><table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n'
@@ -215,14 +224,14 @@ def claims(paper):
          f'<td class="text"><b class="{kinds.get(item.alt, "known_miss")}">{esc(item.alt)}.</b> '
          f"{esc(item.more)}</td>",
          f'<td class="text narrow"><a href="#{one.anchor}">{esc(item.figure or one.name)}</a></td>')
-        for one, item in paper.items("claim")], True)
+        for one, item in paper.items("claim")], [True] * 4)
 
 
 def corrections(paper):
     return table("Corrections of printed formulas",
                  ["where", "printed", "correct", "reason"], [
         (cell(item.name, "text narrow"), cell(item.text, "text"), cell(item.alt, "text"),
-         cell(item.more, "text")) for _, item in paper.items("correction")], True)
+         cell(item.more, "text")) for _, item in paper.items("correction")], [True] * 4)
 
 
 def figure(out, example, item):
@@ -255,11 +264,14 @@ def shown_table(out, example, item):
         # Of a metric that this table does not have, and of a row without a number, nothing is shown.
         shown_columns = [c for c in shown_columns if any(row[c] for row in rows[1:])]
         rows_here = [row for row in rows[1:] if any(row[c] for c in shown_columns)]
+        words = {c for c in shown_columns if of_words(row[c] for row in rows_here)}
         body = [[f'<th scope="row">{esc(row[0])}</th>'] +
-                [f"<td>{esc(plain(row[c]))}{marks.get(row[c + 1], '') if verdicts[c + 1] else ''}</td>"
+                [cell(plain(row[c]), "text narrow") if c in words else
+                 f"<td>{esc(plain(row[c]))}{marks.get(row[c + 1], '') if verdicts[c + 1] else ''}</td>"
                  for c in shown_columns] for row in rows_here]
         text += table(item.text + (" (continued)" if text else ""),
-                      [rows[0][0]] + [rows[0][c] for c in shown_columns], body)
+                      [rows[0][0]] + [rows[0][c] for c in shown_columns], body,
+                      [c in words for c in [0, *shown_columns]])
         start = stop
     return text
 
@@ -301,7 +313,7 @@ def all_checks(example):
     return (f"<details>\n<summary>{esc(example.title)}: {len(rows)} rows "
             f'(<a href="{file}">summary.csv</a>)</summary>\n' +
             table("", ["case", "metric", "paper", "reference", "ours", "error", "tolerance",
-                       "result", "note"], rows) + "</details>\n")
+                       "result", "note"], rows, [True, True] + 6 * [False] + [True]) + "</details>\n")
 
 
 # ---- pages ----

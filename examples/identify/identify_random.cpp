@@ -205,10 +205,15 @@ int main(int argc, char** argv) {
 
   std::vector<CsvRow> lines;
   const auto line = [&](const char* name, const Summary& s, std::size_t count) {
-    lines.push_back({name, std::to_string(count), percent(s.accepted), percent(s.median),
-                     percent(s.p95), percent(s.narrow_median), percent(s.narrow_p95),
-                     percent(s.cover), number_text(1e3 * s.latency, 3), percent(s.noise),
-                     percent(s.order), percent(s.wrongly_refused), percent(s.wrongly_accepted)});
+    const auto of_accepted = [&](const std::string& text) {
+      return s.accepted > 0 ? text : std::string();
+    };
+    lines.push_back({name, std::to_string(count), percent(s.accepted),
+                     of_accepted(percent(s.median)), of_accepted(percent(s.p95)),
+                     of_accepted(percent(s.narrow_median)), of_accepted(percent(s.narrow_p95)),
+                     of_accepted(percent(s.cover)), of_accepted(number_text(1e3 * s.latency, 3)),
+                     of_accepted(percent(s.noise)), percent(s.order), percent(s.wrongly_refused),
+                     percent(s.wrongly_accepted)});
   };
   line("random plants", found, plain.size());
   line("with a flexible mode", bending, flexible.size());

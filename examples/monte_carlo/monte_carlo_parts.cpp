@@ -134,7 +134,7 @@ int main(int argc, char** argv) {
       curve.add(cores, on_paper(size, std::floor(cores), start_up, a_run, a_merge));
     }
     char name[40];
-    std::snprintf(name, sizeof name, "%.0e runs", size);
+    std::snprintf(name, sizeof name, "10^%.0f runs", std::log10(size));
     paper.line(curve.x, curve.y, {.name = name, .color = color});
     const double one = on_paper(size, 1, start_up, a_run, a_merge);
     const double thousand = on_paper(size, 1000, start_up, a_run, a_merge);

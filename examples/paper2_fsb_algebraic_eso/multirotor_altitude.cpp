@@ -181,7 +181,7 @@ Figure bandwidth_figure(const std::string& name, const std::string& caption,
   figure.caption(caption);
   auto& z = figure.panel(0, 0).x_label("t (s)").y_label("z (m)").name("altitude");
   auto& d = figure.panel(0, 1).x_label("t (s)").y_label("disturbance estimate (m/s^2)");
-  d.name("disturbance").legend(Legend::above);
+  d.name("disturbance");
   z.x_range(0.0, shown).legend(legend);
   d.x_range(0.0, shown);
   z.horizontal_line(set_point);
@@ -194,9 +194,9 @@ Figure bandwidth_figure(const std::string& name, const std::string& caption,
     d.y_range(0.0, 1.25 * true_disturbance).y_tick(5.0);
   }
   for (std::size_t i = 0; i < runs.size(); ++i) {
-    const Style style{.name = symbol + " = " + number_text(bandwidths[i]), .color = colors[i]};
-    z.line(runs[i].t, runs[i].z, style);
-    d.line(runs[i].t, runs[i].d, style);
+    const std::string label = symbol + " = " + number_text(bandwidths[i]);
+    z.line(runs[i].t, runs[i].z, {.name = label, .color = colors[i]});
+    d.line(runs[i].t, runs[i].d, {.color = colors[i], .column = label});
   }
   return figure;
 }

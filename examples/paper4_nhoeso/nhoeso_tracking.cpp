@@ -87,8 +87,9 @@ struct Case {
 constexpr PowerSumGain<double> fitted_g{
     .gain_alpha = 0.1095, .alpha = 0.728, .gain_beta = 0.0582, .beta = 2.0};
 
+/// As in the ranking: linear observers in vermillion, nonlinear ones in blue.
 Figure draw(const std::string& name, const std::string& caption, const Case& scenario,
-            const Reference& tracked, bool with_quiet) {
+            const Reference& tracked, bool with_quiet, Color color = Color::blue) {
   Figure figure(name, {.rows = 2, .columns = 2, .panel_height = 210});
   figure.caption(caption);
   Series noisy, quiet;
@@ -96,21 +97,21 @@ Figure draw(const std::string& name, const std::string& caption, const Case& sce
   (void)scenario.run(0.0, 1, tracked, fitted_step, &quiet);
   auto& output = figure.panel(0, 0).x_label("t (s)").y_label("r, x_1 (-)").name("output");
   output.legend(Legend::above)
-      .line(noisy.t, noisy.x, {.name = "x_1", .color = Color::blue})
+      .line(noisy.t, noisy.x, {.name = "x_1", .color = color})
       .line(noisy.t, noisy.r, {.name = "r", .color = Color::black, .dash = Dash::dashed});
   auto& error = figure.panel(0, 1).x_label("t (s)").y_label("r − x_1 (-)").name("error");
   auto& control = figure.panel(1, 0).x_label("t (s)").y_label("u (-)").name("control");
   auto& estimate = figure.panel(1, 1).x_label("t (s)").y_label("d, z_3 (-)").name("disturbance");
   error.legend(Legend::above)
-      .line(noisy.t, noisy.error, {.name = "in noise", .color = Color::blue, .width = 1.2});
+      .line(noisy.t, noisy.error, {.name = "in noise", .color = color, .width = 1.2});
   control.legend(Legend::above)
-      .line(noisy.t, noisy.u, {.name = "in noise", .color = Color::blue, .width = 1.0});
+      .line(noisy.t, noisy.u, {.name = "in noise", .color = color, .width = 1.0});
   if (with_quiet) {
-    error.line(quiet.t, quiet.error, {.name = "without noise", .color = Color::vermillion});
-    control.line(quiet.t, quiet.u, {.name = "without noise", .color = Color::vermillion});
+    error.line(quiet.t, quiet.error, {.name = "without noise", .color = Color::grey});
+    control.line(quiet.t, quiet.u, {.name = "without noise", .color = Color::grey});
   }
   estimate.legend(Legend::above)
-      .line(noisy.t, noisy.estimate, {.name = "z_3", .color = Color::blue, .width = 1.0})
+      .line(noisy.t, noisy.estimate, {.name = "z_3", .color = color, .width = 1.0})
       .line(noisy.t, noisy.disturbance,
             {.name = "total disturbance", .color = Color::black, .dash = Dash::dashed});
   return figure;
@@ -219,7 +220,7 @@ int main(int argc, char** argv) {
   report.add(draw("fig3",
                   "Fig. 3, scenario 1: LESO with 101.66 rad/s, tuned without noise, with noise "
                   "(one seed) and without. With noise the control stays at its limits.",
-                  cases[0], tracked, true));
+                  cases[0], tracked, true, Color::vermillion));
   report.add(draw("fig4",
                   "Fig. 4, scenario 2: NHOESO with g of Table 2, tuned without noise, with noise "
                   "(one seed) and without.",
@@ -320,7 +321,7 @@ int main(int argc, char** argv) {
   report.add(draw("limited", "The same with the default limits of k: no limit cycle.", cases[4],
                   tracked, false));
   report.add(draw("fair", "A fair linear comparison: LESO with N = 4 at 4 rad/s.", cases[6],
-                  tracked, true));
+                  tracked, true, Color::vermillion));
 
   // For the README: all cases at a glance.
   Figure ranking("ranking", {.rows = 1, .columns = 1, .panel_height = 230});

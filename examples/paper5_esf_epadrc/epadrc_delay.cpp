@@ -201,7 +201,8 @@ int main(int argc, char** argv) {
   Figure figure("delay", {.rows = 1, .columns = 2, .panel_height = 260});
   figure.caption(
       "Left: delay that the loop tolerates, over omega_o. The predictor form uses measurements "
-      "that are one sample old, but loses less than one sample time. Dashed: EPADRC with its "
+      "that are one sample old, but loses less than one sample time. Dashed and dotted: EPADRC "
+      "with its "
       "steady-state gains. Right: spectral radius over omega_o; below one the loop is stable.");
   auto& margin_panel = figure.panel(0, 0)
                            .x_label("ω_o (rad/s)")
@@ -209,12 +210,14 @@ int main(int argc, char** argv) {
                            .x_range(0.0, 2000.0)
                            .legend(Legend::bottom_right)
                            .name("margin");
-  margin_panel.line(bandwidth, current, {.name = "PADRC"})
-      .line(bandwidth, late, {.name = "ADRC, predictor form"});
+  margin_panel.line(bandwidth, current, {.name = "PADRC", .color = Color::blue})
+      .line(bandwidth, late, {.name = "ADRC, predictor form", .color = Color::sky});
   for (const double deviation : {0.001, 0.01}) {
     margin_panel.line({0.0, 2000.0},
                       std::vector<double>(2, 1e3 * delay_margin(filter_gain(deviation), true)),
-                      {.name = "EPADRC, σ = " + number_text(deviation, 3), .dash = Dash::dashed});
+                      {.name = "EPADRC, σ = " + number_text(deviation, 3),
+                       .color = Color::vermillion,
+                       .dash = deviation < 0.005 ? Dash::dashed : Dash::dotted});
   }
   auto& radius = figure.panel(0, 1)
                      .x_label("ω_o (rad/s)")
@@ -231,8 +234,8 @@ int main(int argc, char** argv) {
       result.push_back(spectral_radius(linear_gain(w), delay, is_current));
     return result;
   };
-  radius.line(fine, radii(0.0, true), {.name = "PADRC"})
-      .line(fine, radii(0.0, false), {.name = "ADRC, predictor form"})
+  radius.line(fine, radii(0.0, true), {.name = "PADRC", .color = Color::blue})
+      .line(fine, radii(0.0, false), {.name = "ADRC, predictor form", .color = Color::sky})
       .line(fine, radii(sample_time, true),
             {.name = "PADRC, delay 1 ms", .color = Color::blue, .dash = Dash::dashed})
       .horizontal_line(1.0);

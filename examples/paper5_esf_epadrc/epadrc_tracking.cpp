@@ -152,9 +152,13 @@ Figure draw(const std::string& name, const std::string& caption, Reference refer
       } else {
         panel.y_range(-room, room);
       }
-      // Behind the peak of the start.
+      // Behind the peak of the start, and where no curve is.
       if (!apart && (estimation || (step && n == 2))) {
-        panel.inset({.left = 0.3, .bottom = 0.6, .width = 0.65, .height = 0.34, .x = {0.1, end}});
+        panel.inset({.left = 0.3,
+                     .bottom = estimation ? 0.09 : 0.65,
+                     .width = 0.65,
+                     .height = 0.26,
+                     .x = {0.1, end}});
       }
     }
   }

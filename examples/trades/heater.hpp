@@ -49,7 +49,12 @@ class Heater {
   /// Once a sample while someone else sets the power, and before the first `step`: from there the
   /// loop takes over without a jump.
   void manual(double temperature, double power) {
-    (void)loop_.track(temperature, temperature, power);
+    // Before the first sample the observer believes in 0 degC.
+    if (started_) {
+      (void)loop_.track(temperature, temperature, power);
+    } else {
+      started_ = loop_.start(temperature, power) == esokit::StepStatus::ok;
+    }
     log(temperature, temperature);
   }
 
@@ -80,6 +85,7 @@ class Heater {
   Loop loop_;
   std::ostream* log_ = nullptr;
   double time_ = 0;
+  bool started_ = false;
 };
 
 }  // namespace trades
