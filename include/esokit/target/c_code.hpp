@@ -296,8 +296,8 @@ std::string self_test_samples(const CWriter& writer, int count, Step&& step) {
 /// second implementation; settings are constants. Bad and missing samples, gaps, restarts, the
 /// start hold and safe mode are those of the controller, too.
 ///
-/// Compiled without contraction (-std=c99 in GCC) it equals the C++ bit for bit; where the law is
-/// softened for n >= 3, only with the same `pow`. A gap of each length has its gains in a table of
+/// Compiled without contraction (-std=c99 in GCC) it equals the C++ bit for bit, as far as tested:
+/// after any bad sample, gap, report or start. A gap of each length has its gains in a table of
 /// max_gap + 1 rows: choose `max_gap` as short as the machine allows.
 ///
 /// The observer has constant gains: LinearEso, also with a set of poles, HalfGainEso,
