@@ -5,11 +5,16 @@
 
 #include <cstdint>
 #include <cstdlib>
+#include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/gain/pole_set.hpp>
+#include <esokit/observer/adjustable_bandwidth_eso.hpp>
+#include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
+#include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/half_gain_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/model_eso.hpp>
 #include <esokit/observer/reduced_order_eso.hpp>
 #include <esokit/target/c_code.hpp>
 #include <filesystem>
@@ -59,6 +64,14 @@ auto config(double input_gain) {
   return config;
 }
 
+// What has gains of another kind, or runs lane by lane.
+static constexpr ModelParts parts{.order = 1, .actuator = 1};
+static_assert(detail::GainIsKept<LinearEso<2>> && detail::GainIsKept<CascadeEso<2, 3>>);
+static_assert(!detail::GainIsKept<AlgebraicEso<2>> && !detail::GainIsKept<ModelEso<parts>> &&
+              !detail::GainIsKept<AdjustableBandwidthEso<2>> &&
+              !detail::GainIsKept<ExtendedStateFilter<2>> &&
+              !detail::GainIsKept<OutlierGate<LinearEso<2>>>);
+
 #ifdef ESOKIT_LOADS_C
 
 /// A folder of this process, removed at the end.
@@ -92,7 +105,8 @@ constexpr const char* strict = " -Wall -Wextra -Wpedantic -Wconversion -Wshadow 
 template <class V>
 class InC {
  public:
-  InC(const Folder& folder, const CCode& code, bool is_controller) {
+  InC(const Folder& folder, const CCode& code, bool is_controller,
+      const std::string& compiler = "gcc -std=c99") {
     folder.write("loop.h", code.header);
     folder.write("loop.c", code.source);
     folder.write("probe.c", std::string("#include \"loop.h\"\n"
@@ -103,7 +117,7 @@ class InC {
                                 (is_controller ? "o->status + 256u * o->mode + " : "") +
                                 "65536u * o->gap; }\n");
     const std::string out = folder.file("loop" + std::to_string(count++) + ".so");
-    built_ = runs("gcc -std=c99 -O2 -shared -fPIC -DLOOP_SELF_TEST" + std::string(strict) + "-o " +
+    built_ = runs(compiler + " -O2 -shared -fPIC -DLOOP_SELF_TEST" + std::string(strict) + "-o " +
                   out + " " + folder.file("loop.c") + " " + folder.file("probe.c") + " -lm");
     if (!built_) return;
     handle_ = dlopen(out.c_str(), RTLD_NOW | RTLD_LOCAL);
@@ -247,7 +261,7 @@ Seen compare(const C& fresh, InC<typename C::scalar_type>& in_c, double input_ga
 }
 
 template <class Observer>
-void equals(int samples, std::uint64_t seed) {
+void equals(int samples, std::uint64_t seed, const std::string& compiler = "gcc -std=c99") {
   SCOPED_TRACE(testing::internal::GetTypeName<Observer>());
   using C = Adrc<Observer>;
   using V = typename C::scalar_type;
@@ -255,7 +269,7 @@ void equals(int samples, std::uint64_t seed) {
   for (const double input_gain : {8.0, -8.0}) {
     const C controller = C::make(config<C>(input_gain)).value();
     const CCode code = to_c(controller, {.name = "loop", .comment = "a test"}).value();
-    InC<V> in_c(folder, code, true);
+    InC<V> in_c(folder, code, true, compiler);
     ASSERT_TRUE(in_c.loaded());
     EXPECT_EQ(in_c.self_test(V(0)), 0);
     const Seen seen = compare(controller, in_c, input_gain, samples, seed++);
@@ -352,6 +366,39 @@ TEST(CCode, OfOtherObservers) {
   equals<CascadeEso<2, 3, double>>(30000, 91);
 }
 #endif
+
+TEST(CCode, ByClang) {
+  if (!there("clang")) GTEST_SKIP() << "no clang";
+  equals<LinearEso<2, float>>(20000, 131, "clang -std=c99 -ffp-contract=off");
+}
+
+/// Whatever the compiler may assume of numbers, bad ones never get into the state.
+TEST(CCode, RefusesBadNumbersUnderFastMath) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  const auto refuses = [&](auto v) {
+    using V = decltype(v);
+    using C = Adrc<LinearEso<2, V>>;
+    const Folder folder;
+    InC<V> in_c(folder, to_c(C::make(config<C>(8)).value(), {.name = "loop"}).value(), true,
+                "gcc -std=gnu99 -ffast-math -Wno-error");
+    ASSERT_TRUE(in_c.loaded());
+    EXPECT_EQ(in_c.self_test(V(1e-3)), 0);
+    for (const V bad : {hidden_nan<V>(), hidden_infinity<V>(), -hidden_infinity<V>()}) {
+      for (int k = 0; k < 20; ++k) EXPECT_EQ(is_finite(in_c.update(V(0.1), V(0.2))), true);
+      EXPECT_EQ(in_c.probe() % 256, 0u);
+      EXPECT_TRUE(is_finite(in_c.update(bad, V(0.2))));
+      EXPECT_EQ(in_c.probe() % 256, 1u) << "measurement_rejected";
+      EXPECT_TRUE(is_finite(in_c.update(V(0.1), bad)));
+      in_c.applied(bad);
+      EXPECT_TRUE(is_finite(in_c.update(V(0.1), V(0.2))));
+      EXPECT_NE(in_c.start(bad, V(0)), 0u);
+      EXPECT_NE(in_c.start(V(0), bad), 0u);
+      for (unsigned row = 0; row < 3; ++row) EXPECT_TRUE(is_finite(in_c.estimate(row)));
+    }
+  };
+  refuses(float{});
+  refuses(double{});
+}
 
 /// What else has to take it: an old C++, Clang, and the compiler of a microcontroller.
 TEST(CCode, CompilesWithOtherCompilers) {

@@ -55,6 +55,7 @@ struct Instruction {
 /// The operations of one call, in their order. Equal operations are one.
 struct OperationList {
   std::vector<Instruction> instructions{};  ///< an operand comes before what needs it
+
   /// The conditions of which the call asked `all(condition)`: if one does not hold, the call takes
   /// another way, of which this list knows nothing.
   std::vector<int> checks{};

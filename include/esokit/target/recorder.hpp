@@ -28,6 +28,7 @@ struct RecordedCall {
 struct RecordedObject {
   std::vector<double> numbers{};  ///< all numbers of the object when it was recorded
   std::vector<bool> moves{};      ///< whether any call changes a number; the others are constants
+
   /// In the order of Recorder::add; a call that goes through several states of the object's
   /// counters has one list for each, in their order.
   std::vector<std::vector<RecordedCall>> calls{};
