@@ -88,7 +88,7 @@ const std::map<std::string, Style>& styles() {
       {"LinearEso that knows the sine",
        {.name = "LESO, knows it", .color = Color::blue, .dash = Dash::dashed, .width = 1.8}},
       {"LinearEso, free poles, that knows the lag",
-       {.name = "free poles, knows it",
+       {.name = "free, knows it",
         .color = Color::black,
         .dash = Dash::dashed,
         .width = 1.8}}};
@@ -132,14 +132,14 @@ int main(int argc, char** argv) {
     Panel& panel = figure.panel(c / 2, c % 2).title(all[c].name);
     panel.name("case" + std::to_string(c + 1))
         .log_x()
-        .x_range(0.02, 2.5)  // room for the legend
+        .x_range(0.1, 2.5)
         .x_label("bandwidth of the law / of the filter")
         .y_label("root of J / J*")
-        .y_range(1.0, c == 0   ? 1.15
+        .y_range(1.0, c == 0   ? 1.08
                       : c == 1 ? 1.5
-                      : c == 2 ? 2.2
-                               : 3.5)
-        .legend(Legend::top_left);
+                      : c == 2 ? 3.0
+                               : 6.5)
+        .legend(Legend::above);
     for (const auto& [name, style] : styles()) {
       std::vector<double> x, y;
       for (std::size_t w = 0; w < wishes; ++w) {

@@ -264,9 +264,11 @@ def shown_table(out, example, item):
         # Of a metric that this table does not have, and of a row without a number, nothing is shown.
         shown_columns = [c for c in shown_columns if any(row[c] for row in rows[1:])]
         rows_here = [row for row in rows[1:] if any(row[c] for c in shown_columns)]
-        words = {c for c in shown_columns if of_words(row[c] for row in rows_here)}
+        # Of which how wide: a long text in a narrow column is tall on a phone.
+        words = {c: "text" if max(len(row[c]) for row in rows_here) > 16 else "text narrow"
+                 for c in shown_columns if of_words(row[c] for row in rows_here)}
         body = [[f'<th scope="row">{esc(row[0])}</th>'] +
-                [cell(plain(row[c]), "text narrow") if c in words else
+                [cell(plain(row[c]), words[c]) if c in words else
                  f"<td>{esc(plain(row[c]))}{marks.get(row[c + 1], '') if verdicts[c + 1] else ''}</td>"
                  for c in shown_columns] for row in rows_here]
         text += table(item.text + (" (continued)" if text else ""),

@@ -187,7 +187,9 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
   design.summary_ = {
       "Chosen: " + taken.name + ". A step of the reference by " + number_text(step.height, 3) +
           ", through the profile of the code, settles in " + number_text(step.settling, 3) +
-          " s and overshoots by " + percent(step.overshoot) +
+          " s and " +
+          (step.overshoot < 1e-4 ? "does not overshoot"
+                                 : "overshoots by " + percent(step.overshoot)) +
           ", within the limits of u. A load step that takes a tenth of the range of u moves y by "
           "at most " +
           number_text(0.1 * range * taken.load_peak, 3) +
@@ -490,7 +492,8 @@ void Design::show_on(Page& page, const Findings& findings) const {
     if (margins.phase.limited()) panel.vertical_line(margins.phase.frequency);
     if (margins.gain_increase.limited()) panel.vertical_line(margins.gain_increase.frequency);
   };
-  auto& upper = loop.panel(0, 0).x_label("w (rad/s)").y_label("abs L").log_x().log_y().name("gain");
+  auto& upper =
+      loop.panel(0, 0).x_label("w (rad/s)").y_label("abs L (-)").log_x().log_y().name("gain");
   upper.line(w, gain, {.color = Color::blue, .column = "gain"}).horizontal_line(1.0);
   bode(upper);
   auto& lower =
@@ -503,14 +506,21 @@ void Design::show_on(Page& page, const Findings& findings) const {
                                                    .height = 0.1 * range * found.input_gain.value})
                         .value();
   const auto answer = [&](std::size_t column, const esokit::LoopResponse& of, const char* title,
-                          const std::string& y, const std::string& u, Color color) {
-    loop.panel(0, column).title(title).x_label("t (s)").y_label(y).name(y).line(
-        of.time, of.output[0], {.color = color, .column = "y"});
-    loop.panel(1, column).x_label("t (s)").y_label(u).name(u).line(of.time, of.control[0],
-                                                                   {.color = color, .column = "u"});
+                          const std::string& after, Color color) {
+    loop.panel(0, column)
+        .title(title)
+        .x_label("t (s)")
+        .y_label("y (unit of y)")
+        .name("y" + after)
+        .line(of.time, of.output[0], {.color = color, .column = "y"});
+    loop.panel(1, column)
+        .x_label("t (s)")
+        .y_label("u (unit of u)")
+        .name("u" + after)
+        .line(of.time, of.control[0], {.color = color, .column = "u"});
   };
-  answer(1, step, "step of the reference by 1", "y", "u", Color::blue);
-  answer(2, load, "load step", "y after the load", "u after the load", Color::vermillion);
+  answer(1, step, "step of the reference by 1", "", Color::blue);
+  answer(2, load, "load step", " after the load", Color::vermillion);
   page.figure(loop);
   for (const double u : step.control[0]) peak = std::max(peak, std::abs(u));
   page.text("A step of the reference by more than " + number_text(0.5 * range / peak, 2) +

@@ -201,7 +201,8 @@ void Page::add_to(esokit::examples::Report& report) const {
       case Kind::box:
       case Kind::bad_box: {
         std::string text = item.text + ":";
-        for (const auto& line : item.rows[0]) text += ' ' + line + (line.ends_with('.') ? "" : ".");
+        for (const auto& line : item.rows[0])
+          text += ' ' + line + (line.ends_with('.') || line.ends_with('?') ? "" : ".");
         report.remark(text);
         break;
       }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <map>
@@ -20,7 +21,18 @@ namespace {
 using namespace esokit::examples;
 
 std::string with_interval(const esokit::Estimate& estimate, double unit = 1.0) {
-  return number_text(unit * estimate.value, 4) + " ± " + number_text(unit * estimate.half_width, 2);
+  const std::string value = number_text(unit * estimate.value, 4);
+  std::string half = number_text(unit * estimate.half_width, 2);
+  // Written out where the value is.
+  if (value.find('e') == std::string::npos && half.find("e-") != std::string::npos) {
+    std::array<char, 64> text{};
+    const auto decimals = 1 - static_cast<int>(std::floor(std::log10(unit * estimate.half_width)));
+    half.assign(text.data(),
+                std::to_chars(text.data(), text.data() + text.size(), unit * estimate.half_width,
+                              std::chars_format::fixed, std::min(decimals, 12))
+                    .ptr);
+  }
+  return value + " ± " + half;
 }
 
 /// At what to do about it: more than fits into the error.
@@ -241,7 +253,9 @@ std::vector<CsvRow> log_table(const Input& input, const Findings& findings) {
   if (input.cut) rows.push_back({"last line", "incomplete", "left out"});
   const auto [per_second, unit] = unit_of(log.sample_time);
   rows.push_back({"sample time", number_text(per_second * log.sample_time, 5) + " " + unit,
-                  "jitter " + number_text(1e3 * log.jitter, 3) + " ms"});
+                  log.jitter < 1e-9 * log.sample_time
+                      ? "no jitter"
+                      : "jitter " + number_text(1e3 * log.jitter, 3) + " ms"});
   rows.push_back({"duration", number_text(log.duration, 5) + " s",
                   std::to_string(log.pieces) + (log.pieces == 1 ? " piece" : " pieces")});
   rows.push_back({"missing rows", std::to_string(log.missing),
