@@ -774,6 +774,75 @@ TEST(Widened, IsWhatTheOtherEvidenceAsksFor) {
   EXPECT_EQ(half(), 11);
 }
 
+// A plateau at the lowest bandwidths, where every fit is the same one of output error, and b0
+// above.
+TEST(Plateau, AtTheLowestBandwidthsReachesToWhatIsAbove) {
+  esokit::Plateau plateau;
+  for (int i = 0; i < 14; ++i) {
+    esokit::PlateauPoint point;
+    point.fit.at.bandwidth = std::pow(2, 0.5 * i);
+    point.fit.linear = {-50};
+    point.fit.mean_square = 1;
+    point.errors.linear = {1};
+    plateau.points.push_back(point);
+  }
+  plateau.middle = 2;
+  const double t = esokit::student_95(19);
+  const auto reach = [&](double lowest = 0.6) {
+    return esokit::detail::reach_above(plateau, lowest);
+  };
+  EXPECT_EQ(reach(), 0);
+  auto& point = plateau.points[10];  // four octaves above
+  point.fit.linear = {-90};
+  EXPECT_EQ(reach(), 0);
+  point.fit.mean_square = 0.37;
+  EXPECT_EQ(reach(), 0);
+  point.fit.mean_square = 0.36;
+  EXPECT_DOUBLE_EQ(reach(), 40 - t);
+  EXPECT_EQ(reach(0.49), 0);  // more than two octaves above the lowest
+  EXPECT_DOUBLE_EQ(reach(0.51), 40 - t);
+  point.at_bound = true;
+  EXPECT_EQ(reach(), 0);
+  std::swap(plateau.points[10], plateau.points[11]);
+  plateau.points[11].at_bound = false;
+  EXPECT_EQ(reach(), 0);
+  // The farthest counts, less its own error.
+  plateau.points[4].fit = plateau.points[11].fit;
+  plateau.points[4].errors.linear = {3};
+  EXPECT_DOUBLE_EQ(reach(), 40 - 3 * t);
+}
+
+// y'' = 2 u - 0.3 y': of the two orders at a low bandwidth the right one leaves far less, from
+// either side.
+TEST(Rival, IsTheOtherOrderWhereB0WasFound) {
+  esokit::sim::Gaussian gaussian(5);
+  esokit::FitData data;
+  data.sample_time = T;
+  double y = 0, v = 0;
+  for (int k = 0; k < 1500; ++k) {
+    data.u.push_back(gaussian.next() > 0 ? 1 : -1);
+    data.y.push_back(y + 1e-4 * gaussian.next());
+    y += T * v;
+    v += T * (2 * data.u.back() - 0.3 * v);
+  }
+  std::vector<esokit::OrderFit> orders(2);
+  for (int i = 0; i < 2; ++i) {
+    auto& order = orders[static_cast<std::size_t>(i)];
+    order.model = {i + 1, 1, true};
+    order.bounds = esokit::detail::fit_bounds(data, false);
+    esokit::InnovationsFit fit(data, order.model, order.bounds);
+    order.fit = fit.minimise({1.0, 2 * T, 0.5, 0}, false);
+  }
+  const auto low = esokit::detail::rival_of(data, orders, 1, 1, orders[0].fit);
+  EXPECT_EQ(low.order, 2);
+  EXPECT_LT(low.left, 0.3);
+  const auto right = esokit::detail::rival_of(data, orders, 2, 1, orders[1].fit);
+  EXPECT_EQ(right.order, 1);
+  EXPECT_GT(right.left, 3);
+  orders.resize(1);
+  EXPECT_EQ(esokit::detail::rival_of(data, orders, 1, 1, orders[0].fit).order, 0);
+}
+
 TEST(Judge, RefusesByName) {
   Log log, stamped;
   stamped.time = {0, T};
@@ -889,6 +958,11 @@ TEST(Judge, RefusesByName) {
   bad = good;
   bad.at_once = true;
   EXPECT_TRUE(said(esokit::judge(bad, log)).starts_with("at_once: "));
+  bad = good;
+  bad.rival = {2, 0.37};
+  EXPECT_TRUE(esokit::judge(bad, log));
+  bad.rival.left = 0.36;
+  EXPECT_TRUE(said(esokit::judge(bad, log)).starts_with("order: "));
   // Jitter that the stamps tell was taken out.
   bad = good;
   bad.log.jitter = T;

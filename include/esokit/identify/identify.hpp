@@ -102,6 +102,12 @@ struct PositionForce {
   }
 };
 
+/// Another order at the bandwidth at which b0 was found.
+struct Rival {
+  int order = 0;      ///< that leaves the smallest mean square there; 0: none was tried
+  double left = 1.0;  ///< its mean square over that of the identified order
+};
+
 /// A model with error bars, and the evidence for it.
 struct Identified {
   int order = 0;                      ///< n
@@ -140,6 +146,7 @@ struct Identified {
   /// dead time are of all rows.
   double held = 0;
   Lead lead{};                     ///< how early y moves before u, if it does
+  Rival rival{};                   ///< the other order that explains the log best there
   bool at_once = false;            ///< y follows u within the row, with nothing in between
   int averaged = 1;                ///< rows of the log that were averaged into one
   bool at_bound = false;           ///< a parameter is at a bound of its range at the plateau
@@ -515,6 +522,32 @@ inline auto best_order(const std::vector<OrderFit>& orders) {
   return slower->slower < likely->slower - 1.0 && !is_part_of(*slower, *likely) ? slower : likely;
 }
 
+/// The other order that leaves least at the bandwidth of `here`, a fit of the order `chosen`. Lag
+/// and pole stand for each other in orders next to each other, so it starts from there, too.
+inline Rival rival_of(const FitData& data, const std::vector<OrderFit>& orders, int chosen,
+                      int extension, const Fit& here) {
+  Rival rival;
+  for (const OrderFit& other : orders) {
+    if (other.model.order == chosen) continue;
+    const FitData used = with_friction(data, other);
+    InnovationsFit fit(used, {other.model.order, extension, other.model.pole}, other.bounds);
+    FitPoint own = other.fit.at, exchanged = here.at;
+    own.bandwidth = here.at.bandwidth;
+    if (other.model.order > chosen) {
+      exchanged.pole = 1.0 / std::max(here.at.lag(), other.bounds.latency_min);
+      exchanged.latency = std::max(here.at.dead_time(), other.bounds.latency_min);
+    } else if (here.at.pole > 0.0) {
+      exchanged.pole = 0.0;
+      exchanged.latency += 1.0 / here.at.pole;
+    }
+    for (const FitPoint& start : {own, exchanged}) {
+      const double left = fit.minimise(start, false, 8).mean_square / here.mean_square;
+      if (rival.order == 0 || left < rival.left) rival = {other.model.order, left};
+    }
+  }
+  return rival;
+}
+
 /// A log without u where friction holds the machine.
 struct HeldLog {
   FitData rows{};      ///< u is zero at standstill
@@ -686,6 +719,24 @@ inline bool informed(const Identified& found) {
          found.latency.value >= 0.5 * found.averaged * found.log.sample_time;
 }
 
+/// Half width that b0 of a plateau within two octaves of the lowest bandwidth needs. There every
+/// fit is one of output error, so that neighbours agree tells nothing: b0 has to reach to the
+/// interval of that of up to four octaves above, where that leaves less than 1 / e of the mean
+/// square.
+inline double reach_above(const Plateau& plateau, double bandwidth_min) {
+  const Fit& here = plateau.points[plateau.middle].fit;
+  double reach = 0.0;
+  if (here.at.bandwidth > 4.0 * bandwidth_min) return reach;
+  const std::size_t high = std::min(plateau.middle + 8, plateau.points.size() - 1);
+  for (std::size_t i = plateau.middle + 1; i <= high; ++i) {
+    const PlateauPoint& point = plateau.points[i];
+    if (point.at_bound || !(point.fit.mean_square < here.mean_square / std::numbers::e)) continue;
+    const double apart = std::abs(point.fit.linear[0] - here.linear[0]);
+    reach = std::max(reach, apart - student_95(19) * point.errors.linear[0]);
+  }
+  return reach;
+}
+
 /// b0 with the interval that the other evidence asks for. Coloured innovations mean that the model
 /// is not exact, so b0 is not known better than to a per cent. Where output error may be right
 /// instead, the interval spans both. Friction that holds the machine takes b0 down, and that of the
@@ -805,6 +856,10 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
   }
   progress(0.5);
   result.plateau = find_plateau(fit, likely);
+  if (result.plateau.middle > 0) {
+    result.rival = rival_of(rows, orders, model.order, model.extension,
+                            result.plateau.points[result.plateau.middle].fit);
+  }
   // When exactly the machine stands is known to some rows only: so times are those of all rows.
   const Plateau of_all = result.plateau;
   if (model.order == 2 && options.friction && of_all.middle > 0) {
@@ -886,6 +941,8 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
   // A flexible mode changes b0 over octaves, by more than the errors at each bandwidth: so b0 is
   // compared over three octaves below, where the machine is closer to the model, and to 2 %.
   result.input_gain = gain(6, 0.02);
+  result.input_gain.half_width =
+      std::max(result.input_gain.half_width, reach_above(plateau, bounds.bandwidth_min));
   // What else could change b0 is compared with the interval of this plateau: a wider one would hide
   // it.
   const double near = gain(3, 0.0).half_width;
@@ -1111,6 +1168,10 @@ inline bool better(const Identified& averaged, const Identified& plain, const Id
   rules.require(excited, "excitation", found.plateau.middle > 0 ? found.excitation : 1.0,
                 "is the smallest relative error of b0 and too large, because too little of y "
                 "follows from u: record several steps that last until y settles, or a sweep");
+  rules.require(!(found.rival.left < 1.0 / std::numbers::e), "order",
+                static_cast<double>(found.order),
+                "is the order found, but where b0 was found another one leaves less than 1 / e of "
+                "the mean square: give the order (a position under a motor has 2)");
   if (!rules) return rules;
   const SecondOpinion& second = found.second_opinion;
   const bool informed = detail::informed(found);
