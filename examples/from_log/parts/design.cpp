@@ -380,6 +380,46 @@ Figure lost_figure(const esokit::Tuning& tuning, const esokit::TunedDesign& desi
   return figure;
 }
 
+/// C++ of a rival that compiles as it is and checks itself.
+std::string rival_program(const esokit::TunedRival& rival) {
+  const auto exact = [](double value) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.17g", value);
+    return std::string(text);
+  };
+  auto pid = esokit::PlainPid::make(rival.pid).value();
+  const double half = 0.5 * (rival.pid.upper - rival.pid.lower);
+  const double step = 0.02 * half / std::abs(rival.pid.proportional);
+  std::string wanted;
+  for (int k = 0; k < 12; ++k)
+    wanted += (k > 0 ? "," : "") + std::string(k % 4 == 0 ? "\n      " : " ") +
+              exact(pid.update(step * (k % 5), 10 * step));
+  return "// The rival " + rival.design.name + R"(, as from_log tuned it.
+#include <cmath>
+#include <cstdio>
+#include <esokit/tune/plain_pid.hpp>
+
+int main() {
+  )" + rival.design.code +
+         R"(  if (!controller) return 1;
+  // Self-check: the u that from_log computed.
+  const double wanted[] = {)" +
+         wanted + R"(};
+  for (int k = 0; k < 12; ++k) {
+    const double u = controller->update()" +
+         exact(step) + " * (k % 5), 10 * " + exact(step) + R"();
+    if (!(std::abs(u - wanted[k]) <= )" +
+         exact(1e-8 * half) + R"()) {
+      std::printf("self-check: sample %d: u is not that of from_log\n", k);
+      return 1;
+    }
+  }
+  std::puts("self-check: ok");
+  return 0;
+}
+)";
+}
+
 std::vector<CsvRow> ranking(const esokit::Tuning& tuning,
                             const std::vector<esokit::TunedRival>& rivals) {
   const double range = tuning.model.u_max - tuning.model.u_min;
@@ -573,7 +613,7 @@ void Design::show_on(Page& page, const Findings& findings) const {
   }
   for (const auto& rival : rivals_) {
     if (rival.design.feasible && rival.kind != esokit::RivalKind::given)
-      page.code(rival.design.code, "The code for the rival " + rival.design.name);
+      page.code(rival_program(rival), "The code for the rival " + rival.design.name);
   }
 }
 
