@@ -178,8 +178,8 @@
 #include <esokit/tune/families.hpp>
 #include <esokit/tune/loop_cost.hpp>
 #include <esokit/tune/lqg.hpp>
-#include <esokit/tune/play.hpp>
 #include <esokit/tune/plain_pid.hpp>
+#include <esokit/tune/play.hpp>
 #include <esokit/tune/problem.hpp>
 #include <esokit/tune/rivals.hpp>
 #include <esokit/tune/search.hpp>
