@@ -88,10 +88,7 @@ const std::map<std::string, Style>& styles() {
       {"LinearEso that knows the sine",
        {.name = "LESO, knows it", .color = Color::blue, .dash = Dash::dashed, .width = 1.8}},
       {"LinearEso, free poles, that knows the lag",
-       {.name = "free, knows it",
-        .color = Color::black,
-        .dash = Dash::dashed,
-        .width = 1.8}}};
+       {.name = "free, knows it", .color = Color::black, .dash = Dash::dashed, .width = 1.8}}};
   return all;
 }
 

@@ -90,9 +90,10 @@ class CycleAnalysis {
     const Split& at = whole.at;
     const S loss = whole.loss;
     if (!(at.angle > S(0)) || at.angle > S(1.5)) {
-      return E{"latency", at.angle / frequency_,
-               "does not fit: friction or damping is too large for this amplitude, the cycle is too "
-               "short (hysteresis, half_period), or the order or the sign of amplitude is wrong"};
+      return E{
+          "latency", at.angle / frequency_,
+          "does not fit: friction or damping is too large for this amplitude, the cycle is too "
+          "short (hysteresis, half_period), or the order or the sign of amplitude is wrong"};
     }
     // Relative to b0 A, or to the frequency.
     const S share = Order == 1 ? loss : S(loss / at.gain());
