@@ -47,7 +47,7 @@ struct ExperimentConfig {
   S rest{};         ///< s, time with u0 at the start, in which y0 is measured; 0: y0 is the first y
   /// First drive y to another place; a relay of order 1 only. Then `response`, `response_time` and
   /// the limit of y on that side have to be given.
-  std::optional<ExperimentApproach<S>> approach{};
+  std::optional<ExperimentApproach<S>> approach{};  ///< left out: y already is where it is wanted
   S response{};  ///< unit of y, several times noise and resolution of the sensor: while u drives
                  ///< y away from where u0 holds it, y has to move by so much, the right way, ..
   S response_time{};  ///< .. in each so many seconds, about three latencies and the time of such a

@@ -30,7 +30,9 @@ struct PlainPidConfig {
 
   /// The filter on y: yf[k] + a_1 yf[k-1] + a_0 yf[k-2] = g y[k], the poles as sampled.
   struct Filter {
-    double a1, a0, g;
+    double a1;  ///< of yf[k-1]
+    double a0;  ///< of yf[k-2]
+    double g;   ///< of y[k]
   };
   /// Its coefficients.
   [[nodiscard]] Filter filter() const {
@@ -72,7 +74,7 @@ struct PlainPidConfig {
 /// zeros from y to u as an Adrc with LinearEso<2>.
 class PlainPid {
  public:
-  using Config = PlainPidConfig;
+  using Config = PlainPidConfig;  ///< what it is made from
 
   /// @return error for a number that is not allowed
   [[nodiscard]] static Expected<PlainPid, Error<double>> make(const Config& config) {

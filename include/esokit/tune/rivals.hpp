@@ -427,7 +427,7 @@ struct Migration {
   std::vector<std::string> ties{};    ///< what stays
   /// The ADRC that has the gains of the PID, see adrc_from_pid; none for order 3, or if there is
   /// none.
-  std::optional<AdrcTuning<double>> equal{};
+  std::optional<AdrcTuning<double>> equal{};  ///< see above
 };
 
 /// From this PID to this design, both of one tuning.
