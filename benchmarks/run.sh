@@ -116,6 +116,7 @@ done
 # machine disturbs some bursts of each, and where a process puts its memory differs.
 processes=5
 result=0
+broken=()
 rm -f "$build"/results/*.json
 for program in "${programs[@]}"; do
   name=$(basename -- "$program")
@@ -126,7 +127,7 @@ for program in "${programs[@]}"; do
       --benchmark_out_format=json --benchmark_out="$build/results/$name.$process.json" \
       >/dev/null 2>"$build/results/$name.log"; then
       cat "$build/results/$name.log" >&2
-      echo "run.sh: $name failed" >&2
+      broken+=("$name, process $process: $(tail -n 1 "$build/results/$name.log" | cut -c1-200)")
       result=1
     fi
   done
@@ -140,4 +141,7 @@ case $verdict in
   4) [[ $strict == no ]] || result=1 ;;
   *) result=1 ;;
 esac
+# At the end, where a record of the output that is cut still has it.
+((${#broken[@]} == 0)) || printf 'run.sh: %s failed\n' "${broken[@]}" >&2
+((verdict == 0 || verdict == 4)) || echo "run.sh: table.py failed with $verdict, see above" >&2
 exit "$result"

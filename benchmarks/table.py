@@ -27,6 +27,8 @@ def least_times(report):
             raise SystemExit(f"error: {run['name']}: {run.get('error_message')}")
         name = run["run_name"].split("/repeats:")[0]
         time = run["cpu_time"] * {"ns": 1, "us": 1e3, "ms": 1e6, "s": 1e9}[run["time_unit"]]
+        if not time > 0:
+            continue  # a virtual machine's clock stood still: no measurement, and no divisor
         key = run["family_index"]
         if name not in rows or time < rows[name][1]:
             rows[name] = (key, time, run.get("label", ""))
@@ -42,14 +44,15 @@ def comparisons(label):
 
 def program_rows(processes, filtered):
     for name, (_, label) in processes[0].items():
-        times = [process[name][0] for process in processes]
+        times = [process[name][0] for process in processes if name in process]
         row = {"benchmark": name, "ns": min(times), "ratios": []}
         for base, sign, limit in comparisons(label):
             if base not in processes[0]:
                 if filtered:
                     continue  # a filter leaves baselines out; without one the label is wrong
                 raise SystemExit(f"error: {name} is compared with {base}, which did not run")
-            ratios = [process[name][0] / process[base][0] for process in processes]
+            ratios = [process[name][0] / process[base][0] for process in processes
+                      if name in process and base in process]
             ratio = statistics.median(ratios)
             if len(ratios) >= 5:
                 ratios = sorted(ratios)[1:-1]
