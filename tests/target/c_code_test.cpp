@@ -446,6 +446,13 @@ TEST(CCode, RefusesByName) {
   EXPECT_EQ(refusal(plain, {.self_test_samples = 1}), "");
   EXPECT_EQ(refusal(plain, {.self_test_samples = 10000}), "");
   EXPECT_EQ(refusal(plain, {.self_test_samples = 10001}), "self_test_samples: must be 1 .. 10000");
+  for (const char* comment : {"ends */ here", "begins /* here"}) {
+    EXPECT_EQ(refusal(plain, {.comment = comment}),
+              "comment: must not begin or end a comment of C");
+  }
+  const std::string odd = "$name, $TIME, $COMMENT * / 50 %";
+  const auto commented = to_c(C::make(plain).value(), {.comment = odd});
+  EXPECT_NE(commented->header.find(" * " + odd + "\n"), std::string::npos);
   plain.measurement_divider = 2;
   EXPECT_EQ(refusal(plain, {}),
             "measurement_divider: must be 1: regular gaps cannot be written yet");

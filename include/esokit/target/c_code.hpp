@@ -19,7 +19,8 @@ namespace esokit {
 /// How the C is to be written.
 struct CCodeOptions {
   std::string name = "controller";  ///< begins every name and the files: an identifier of C
-  std::string comment{};            ///< at the head of the header: which machine, which design
+  std::string comment{};            ///< at the head of the header: which machine, which design; no
+                                    ///< marks of a comment of C
   int self_test_samples = 100;      ///< samples of the self-test, 1 .. 10000
 };
 
@@ -130,7 +131,10 @@ class CBuilder {
     rules.require(is_name, "name", V(0), "must be an identifier of C")
         .require(1 <= options.self_test_samples && options.self_test_samples <= 10000,
                  "self_test_samples", static_cast<V>(options.self_test_samples),
-                 "must be 1 .. 10000");
+                 "must be 1 .. 10000")
+        .require(options.comment.find("*/") == std::string::npos &&
+                     options.comment.find("/*") == std::string::npos,
+                 "comment", V(0), "must not begin or end a comment of C");
     return rules;
   }
 
@@ -248,7 +252,6 @@ class CBuilder {
     constexpr bool single = sizeof(V) == sizeof(float);
     words_ = {{"$include", "#include"},  // not written in the texts: scripts look for such lines
               {"$MEMBERS", members},
-              {"$COMMENT", options_.comment.empty() ? "" : " * " + options_.comment + "\n"},
               {"$TIME", writer.number(static_cast<double>(observer.sample_time()))},
               {"$GAINS", call_gains},
               {"$GAIN", writer.number(static_cast<double>(observer.input_gain()))},
@@ -264,7 +267,9 @@ class CBuilder {
               {"$fabs", single ? "fabsf" : "fabs"},
               {"$real", writer.real()},
               {"$NAME", upper},
-              {"$name", options_.name}};
+              {"$name", options_.name},
+              // The last, so that no word in it is taken for a key.
+              {"$COMMENT", options_.comment.empty() ? "" : " * " + options_.comment + "\n"}};
   }
 
   CCodeOptions options_;
@@ -303,8 +308,9 @@ std::string self_test_samples(const CWriter& writer, int count, Step&& step) {
 /// The observer has constant gains: LinearEso, also with a set of poles, HalfGainEso,
 /// ReducedOrderEso, CascadeEso. Others do not compile.
 /// @param controller as `make` returned it: its state is that of `init`
-/// @return error for a name that is no identifier, a number of samples of the self-test out of
-///         range, or a measurement_divider, which cannot be written yet
+/// @return error for a name that is no identifier, a comment that would end the one it stands in, a
+///         number of samples of the self-test out of range, or a measurement_divider, which cannot
+///         be written yet
 template <LoopObserver Observer>
 requires detail::GainIsKept<Observer> Expected<CCode, Error<typename Observer::scalar_type>> to_c(
     const Adrc<Observer>& controller, const CCodeOptions& options = {}) {

@@ -2,6 +2,7 @@
 /// Recorded calls written as functions of C: the names and expressions of to_c.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdio>
 #include <esokit/target/recorder.hpp>
@@ -107,7 +108,7 @@ class CWriter {
       if (!need[i]) continue;
       if (one.operation == Operation::constant) {
         of[i] = number(one.value);
-        if (one.value < 0) of[i] = "(" + of[i] + ")";
+        if (std::signbit(one.value)) of[i] = "(" + of[i] + ")";
         continue;
       }
       if (one.operation == Operation::argument) {
