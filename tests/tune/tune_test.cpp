@@ -19,6 +19,7 @@
 #include <esokit/tune/rivals.hpp>
 #include <esokit/tune/tune.hpp>
 #include <limits>
+#include <random>
 #include <string>
 #include <support/numbers.hpp>
 #include <support/refusal.hpp>
@@ -1303,6 +1304,40 @@ TEST(RivalTest, ThePidStopsItsIntegralOrFollowsTheLimit) {
   auto pid = PlainPid::make(config).value();
   pid.start(0.5, 0.5, 1.25);
   EXPECT_NEAR(pid.update(0.5, 0.5), 1.25, 1e-12);
+}
+
+// What is pasted runs on a machine: a bad number keeps u, and changes nothing.
+TEST(RivalTest, ThePidKeepsItsOutputAtABadNumber) {
+  std::mt19937 random(11);
+  for (const PlainPidConfig& config : pids()) {
+    auto pid = PlainPid::make(config).value();
+    auto twin = pid;
+    const double bad[] = {NAN, INFINITY, -INFINITY};
+    const auto any_bad = [&] { return bad[random() % 3]; };
+    EXPECT_EQ(pid.update(NAN, 0.0), std::clamp(0.0, config.lower, config.upper));
+    double u = pid.update(0.1, 0.2);
+    EXPECT_EQ(u, twin.update(0.1, 0.2));
+    for (int k = 0; k < 400; ++k) {
+      const auto what = random() % 6;
+      if (what == 0) {
+        EXPECT_EQ(pid.update(any_bad(), 0.3), u);
+      }
+      if (what == 1) {
+        EXPECT_EQ(pid.update(0.3, any_bad()), u);
+      }
+      if (what == 2) {
+        EXPECT_EQ(pid.update(0.3, 0.3, any_bad()), u);
+      }
+      if (what == 3) pid.start(any_bad(), 0.0, 0.0);
+      if (what == 4) pid.start(0.0, 0.0, any_bad());
+      if (what == 5) {
+        EXPECT_EQ(pid.update(-std::numeric_limits<double>::max(), 1e308), u);
+      }
+      const double y = 1e-3 * static_cast<double>(random() % 1000);
+      u = pid.update(y, 0.5);
+      EXPECT_EQ(u, twin.update(y, 0.5)) << k << ", " << what;
+    }
+  }
 }
 
 TEST(RivalTest, RefusesWhatIsNoPid) {

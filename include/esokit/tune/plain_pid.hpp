@@ -6,6 +6,7 @@
 #include <cmath>
 #include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
+#include <esokit/core/scalar.hpp>
 
 namespace esokit {
 
@@ -82,41 +83,54 @@ class PlainPid {
     return PlainPid(config);
   }
 
-  /// u for the measurement y and the reference, within the limits. @param added to u, for a
-  /// reference whose derivatives are known
+  /// u for the measurement y and the reference, within the limits. A number that is not finite, or
+  /// too large for the sums, changes nothing: u is kept. @param added to u, for a reference whose
+  /// derivatives are known
   double update(double y, double reference, double added = 0.0) noexcept {
+    if (!(is_finite(y) && is_finite(reference) && is_finite(added))) return output_;
     if (!started_) start(y, reference, 0.0);
     const double filtered = filter_.g * y - filter_.a1 * last_ - filter_.a0 * before_;
-    slope_ = memory_ * slope_ + (1.0 - memory_) * (filtered - last_) / config_.sample_time;
-    before_ = last_;
-    last_ = filtered;
+    const double slope =
+        memory_ * slope_ + (1.0 - memory_) * (filtered - last_) / config_.sample_time;
     const double step = config_.integral * config_.sample_time * (reference - filtered);
     const double wanted = config_.proportional * (config_.reference_weight * reference - filtered) -
-                          config_.derivative * slope_ + integral_ + step + added;
+                          config_.derivative * slope + integral_ + step + added;
     const double u = std::clamp(wanted, config_.lower, config_.upper);
+    double integral = integral_;
     if (config_.tracking_time > 0.0) {
-      integral_ += step + config_.sample_time / config_.tracking_time * (u - wanted);
+      integral += step + config_.sample_time / config_.tracking_time * (u - wanted);
     } else if (u == wanted || (wanted - u) * step < 0.0) {
-      integral_ += step;
+      integral += step;
     }
-    return u;
+    if (!(is_finite(slope) && is_finite(wanted) && is_finite(integral))) return output_;
+    before_ = last_;
+    last_ = filtered;
+    slope_ = slope;
+    integral_ = integral;
+    return output_ = u;
   }
 
-  /// From rest at y: goes on from u at this reference.
+  /// From rest at y: goes on from u at this reference; what is not finite changes nothing.
   void start(double y, double reference, double u) noexcept {
+    const double integral = u - config_.proportional * (config_.reference_weight * reference - y);
+    if (!(is_finite(y) && is_finite(u) && is_finite(integral))) return;
     last_ = before_ = y;
     slope_ = 0.0;
-    integral_ = u - config_.proportional * (config_.reference_weight * reference - y);
+    integral_ = integral;
+    output_ = std::clamp(u, config_.lower, config_.upper);
     started_ = true;
   }
 
  private:
   explicit PlainPid(const Config& config)
-      : config_(config), filter_(config.filter()), memory_(config.derivative_memory()) {}
+      : config_(config),
+        filter_(config.filter()),
+        memory_(config.derivative_memory()),
+        output_(std::clamp(0.0, config.lower, config.upper)) {}
 
   Config config_;
   Config::Filter filter_;
-  double memory_, last_ = 0.0, before_ = 0.0, slope_ = 0.0, integral_ = 0.0;
+  double memory_, output_, last_ = 0.0, before_ = 0.0, slope_ = 0.0, integral_ = 0.0;
   bool started_ = false;
 };
 
