@@ -837,10 +837,44 @@ TEST(Rival, IsTheOtherOrderWhereB0WasFound) {
   EXPECT_EQ(low.order, 2);
   EXPECT_LT(low.left, 0.3);
   const auto right = esokit::detail::rival_of(data, orders, 2, 1, orders[1].fit);
-  EXPECT_EQ(right.order, 1);
   EXPECT_GT(right.left, 3);
-  orders.resize(1);
-  EXPECT_EQ(esokit::detail::rival_of(data, orders, 1, 1, orders[0].fit).order, 0);
+  // Of a force that depends on position there is no order 1.
+  EXPECT_EQ(esokit::detail::rival_of(data, orders, 2, 1, orders[1].fit, 2).order, 3);
+  // Orders that were not asked for are rivals, too: from the low side and from the high one.
+  const auto given = [&](const esokit::OrderFit& only) {
+    return esokit::detail::rival_of(data, {only}, only.model.order, 1, only.fit);
+  };
+  EXPECT_EQ(given(orders[0]).order, 2);
+  EXPECT_LT(given(orders[0]).left, 0.3);
+  EXPECT_GT(given(orders[1]).left, 3);
+}
+
+// The same machine with friction: an order that was given is refused like one that was found.
+TEST(Rival, RefusesAnOrderGivenTooHigh) {
+  esokit::sim::Gaussian gaussian(5);
+  Log log;
+  log.sample_time = 0.01;
+  double y = 0, v = 0, u = 1;
+  for (int k = 0; k < 1500; ++k) {
+    if (k % 20 == 0) u = gaussian.next() > 0 ? 1 : -1;
+    log.u.push_back(u);
+    log.y.push_back(y + 1e-4 * gaussian.next());
+    for (int i = 0; i < 10; ++i) {
+      y += 1e-3 * v;
+      v += 1e-3 * (2 * u - v - 0.5 * std::tanh(v / 0.02));
+    }
+  }
+  IdentifyOptions options;
+  options.orders = {3};
+  const auto found = esokit::study(log, options).value();
+  EXPECT_EQ(found.rival.order, 2);
+  EXPECT_LT(found.rival.left, 0.1);
+  EXPECT_TRUE(said(esokit::judge(found, log, options)).starts_with("order: "));
+  options.orders = {2};
+  const auto right = esokit::study(log, options).value();
+  EXPECT_GT(right.rival.left, 0.9);
+  EXPECT_EQ(said(esokit::judge(right, log, options)), "accepted");
+  EXPECT_NEAR(right.input_gain.value, 2, right.input_gain.half_width);
 }
 
 TEST(Judge, RefusesByName) {

@@ -104,7 +104,7 @@ struct PositionForce {
 
 /// Another order at the bandwidth at which b0 was found.
 struct Rival {
-  int order = 0;      ///< that leaves the smallest mean square there; 0: none was tried
+  int order = 0;      ///< of 1 to 3, the one that leaves the smallest mean square there; 0: none
   double left = 1.0;  ///< its mean square over that of the identified order
 };
 
@@ -523,12 +523,24 @@ inline auto best_order(const std::vector<OrderFit>& orders) {
 }
 
 /// The other order that leaves least at the bandwidth of `here`, a fit of the order `chosen`. Lag
-/// and pole stand for each other in orders next to each other, so it starts from there, too.
+/// and pole stand for each other in orders next to each other, so it starts from there, too. Orders
+/// from `lowest` on; one that was not studied, because the order was given, has no friction.
 inline Rival rival_of(const FitData& data, const std::vector<OrderFit>& orders, int chosen,
-                      int extension, const Fit& here) {
+                      int extension, const Fit& here, int lowest = 1) {
+  const auto of = [&](int order) {
+    return std::find_if(orders.begin(), orders.end(),
+                        [order](const OrderFit& fit) { return fit.model.order == order; });
+  };
   Rival rival;
-  for (const OrderFit& other : orders) {
-    if (other.model.order == chosen) continue;
+  for (int order = lowest; order <= 3; ++order) {
+    if (order == chosen) continue;
+    const bool studied = of(order) != orders.end();
+    OrderFit other = *of(studied ? order : chosen);
+    if (!studied) {
+      other.model.order = order;
+      other.friction_scale = 0.0;
+      other.fit.at.pole = 0.0;
+    }
     const FitData used = with_friction(data, other);
     InnovationsFit fit(used, {other.model.order, extension, other.model.pole}, other.bounds);
     FitPoint own = other.fit.at, exchanged = here.at;
@@ -858,7 +870,7 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
   result.plateau = find_plateau(fit, likely);
   if (result.plateau.middle > 0) {
     result.rival = rival_of(rows, orders, model.order, model.extension,
-                            result.plateau.points[result.plateau.middle].fit);
+                            result.plateau.points[result.plateau.middle].fit, position ? 2 : 1);
   }
   // When exactly the machine stands is known to some rows only: so times are those of all rows.
   const Plateau of_all = result.plateau;
@@ -1168,10 +1180,10 @@ inline bool better(const Identified& averaged, const Identified& plain, const Id
   rules.require(excited, "excitation", found.plateau.middle > 0 ? found.excitation : 1.0,
                 "is the smallest relative error of b0 and too large, because too little of y "
                 "follows from u: record several steps that last until y settles, or a sweep");
-  rules.require(!(found.rival.left < 1.0 / std::numbers::e), "order",
-                static_cast<double>(found.order),
-                "is the order found, but where b0 was found another one leaves less than 1 / e of "
-                "the mean square: give the order (a position under a motor has 2)");
+  rules.require(
+      !(found.rival.left < 1.0 / std::numbers::e), "order", static_cast<double>(found.order),
+      "is the order, but where b0 was found another one leaves less than 1 / e of the mean square: "
+      "give that one, or a y of this one (a position under a motor has order 2, a speed 1)");
   if (!rules) return rules;
   const SecondOpinion& second = found.second_opinion;
   const bool informed = detail::informed(found);
