@@ -12,8 +12,6 @@
 #include <esokit/sim/gaussian.hpp>
 #include <esokit/sim/run.hpp>
 
-#include "common/compiled/tune.hpp"
-
 namespace from_log {
 namespace {
 
@@ -21,6 +19,9 @@ using namespace esokit::examples;
 using esokit::Identified;
 using esokit::LinearController;
 using esokit::Loop;
+
+/// A machine that identify finds has no other part that an observer could know.
+constexpr auto tune_found = esokit::tune<esokit::TuneKnowledge{.lag = true}>;
 
 /// f(the plant that was found).
 template <class F>
@@ -120,7 +121,7 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
   wish.settling_time = settings.settling_time;
   wish.controller_bandwidth = settings.controller;
   if (settings.noise_share > 0.0) wish.control_noise = settings.noise_share * range;
-  auto tuning = compiled::tune(model, wish, settings.rules);
+  auto tuning = tune_found(model, wish, settings.rules);
   // A machine that settles sooner by itself need not be held back.
   std::string sooner;
   if (!tuning && std::string_view(tuning.error().field) == "settling_time" &&
@@ -131,7 +132,7 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
         " s, so it cannot be asked of a feedback: the design is that without a wish. To move more "
         "slowly, let the reference move slowly.";
     wish.settling_time = 0.0;
-    tuning = compiled::tune(model, wish, settings.rules);
+    tuning = tune_found(model, wish, settings.rules);
   }
   if (!tuning) {
     const auto& error = tuning.error();
@@ -201,10 +202,10 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
           "°, each the smallest over the intervals. Deviations of y and u are " +
           number_text(taken.excess, 3) +
           " times those of the best linear controller, which keeps no margins."};
-  design.rivals_ = compiled::tune_rivals(*tuning);
+  design.rivals_ = esokit::tune_rivals(*tuning);
   design.summary_.push_back(against_pid(design.rivals_, taken));
   if (settings.pid) {
-    const auto given = compiled::given_rival(*tuning, *settings.pid);
+    const auto given = esokit::given_rival(*tuning, *settings.pid);
     if (!given) throw LogError("--pid: " + esokit::to_text(given.error()));
     design.migration_ = esokit::migration(*tuning, *given, taken);
     design.to_best_ = esokit::migration(*tuning, *given, design.rivals_.front().design);

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -21,17 +22,45 @@ namespace {
 
 inline constexpr double widest_step = 1000;  ///< times the nominal one, and its inverse
 
+/// An observer without its type, so that what goes over the rows is compiled once.
+struct AnyObserver {
+  virtual ~AnyObserver() = default;
+  virtual esokit::StepStatus reset(double y) = 0;
+  virtual esokit::Check<double> set_step_time(double seconds) = 0;
+  virtual esokit::StepStatus update(double y, double u) = 0;
+  virtual double estimate(int row) const = 0;
+};
+
 template <class Observer>
-LogEstimates run(const typename Observer::Config& config, const LogSettings& settings,
+class Typed final : public AnyObserver {
+ public:
+  using Timed = esokit::VariableTime<Observer>;
+  explicit Typed(const Timed& observer) : observer_(observer) {}
+  esokit::StepStatus reset(double y) override { return observer_.reset(y); }
+  esokit::Check<double> set_step_time(double s) override { return observer_.set_step_time(s); }
+  esokit::StepStatus update(double y, double u) override { return observer_.update(y, u); }
+  double estimate(int row) const override { return observer_.estimate()(row); }
+
+ private:
+  Timed observer_;
+};
+
+[[noreturn]] void observer_refuses(const esokit::Error<double>& error) {
+  throw esokit::examples::LogError("the observer refuses: " + esokit::to_text(error));
+}
+
+template <class Observer>
+std::unique_ptr<AnyObserver> timed(const typename Observer::Config& config) {
+  const auto made = Typed<Observer>::Timed::make({.observer = config, .ratio = widest_step});
+  if (!made) observer_refuses(made.error());
+  return std::make_unique<Typed<Observer>>(*made);
+}
+
+LogEstimates run(AnyObserver& observer, const LogSettings& settings,
                  const std::vector<double>& time, const std::vector<double>& y,
                  const std::vector<double>& u) {
-  using Timed = esokit::VariableTime<Observer>;
-  auto made = Timed::make({.observer = config, .ratio = widest_step});
-  if (!made)
-    throw esokit::examples::LogError("the observer refuses: " + esokit::to_text(made.error()));
-  Timed observer = *made;
   LogEstimates result;
-  result.columns.resize(static_cast<std::size_t>(Observer::size));
+  result.columns.resize(static_cast<std::size_t>(settings.order + 1));
   bool started = false;
   for (std::size_t k = 0; k < y.size(); ++k) {
     if (!started) {
@@ -54,59 +83,52 @@ LogEstimates run(const typename Observer::Config& config, const LogSettings& set
       if (esokit::has(status, esokit::StepStatus::input_rejected)) ++result.inputs;
       if (esokit::has(status, esokit::StepStatus::restarted)) ++result.restarts;
     }
-    const auto estimate = observer.estimate();
-    for (int r = 0; r < Observer::size; ++r) {
+    for (int r = 0; r <= settings.order; ++r) {
       result.columns[static_cast<std::size_t>(r)].push_back(
-          started ? estimate(r) : std::numeric_limits<double>::quiet_NaN());
+          started ? observer.estimate(r) : std::numeric_limits<double>::quiet_NaN());
     }
   }
   return result;
 }
 
 template <int Order>
-LogEstimates run_order(const LogSettings& s, const std::vector<double>& time,
-                       const std::vector<double>& y, const std::vector<double>& u) {
+std::unique_ptr<AnyObserver> observer_of(const LogSettings& s) {
   const auto linear = [&](auto observer) {
     using Observer = typename decltype(observer)::type;
-    return run<Observer>({.observer_bandwidth = s.bandwidth,
-                          .input_gain = s.input_gain,
-                          .sample_time = s.sample_time},
-                         s, time, y, u);
+    return timed<Observer>({.observer_bandwidth = s.bandwidth,
+                            .input_gain = s.input_gain,
+                            .sample_time = s.sample_time});
   };
   if (s.observer == "linear") return linear(std::type_identity<esokit::LinearEso<Order>>{});
   if (s.observer == "half-gain") return linear(std::type_identity<esokit::HalfGainEso<Order>>{});
   if (s.observer == "reduced") return linear(std::type_identity<esokit::ReducedOrderEso<Order>>{});
   if (s.observer == "cascade") {
     // Level 1 a third of omega_o, which is that of the last level.
-    return run<esokit::CascadeEso<Order, 2>>({.observer_bandwidth = s.bandwidth / 3,
-                                              .bandwidth_factor = 3,
-                                              .input_gain = s.input_gain,
-                                              .sample_time = s.sample_time},
-                                             s, time, y, u);
+    return timed<esokit::CascadeEso<Order, 2>>({.observer_bandwidth = s.bandwidth / 3,
+                                                .bandwidth_factor = 3,
+                                                .input_gain = s.input_gain,
+                                                .sample_time = s.sample_time});
   }
   if (s.observer == "algebraic") {
-    return run<esokit::AlgebraicEso<Order>>({.observer_bandwidth = s.bandwidth,
-                                             .frequency_shift = s.bandwidth / 2,
-                                             .input_gain = s.input_gain,
-                                             .sample_time = s.sample_time},
-                                            s, time, y, u);
+    return timed<esokit::AlgebraicEso<Order>>({.observer_bandwidth = s.bandwidth,
+                                               .frequency_shift = s.bandwidth / 2,
+                                               .input_gain = s.input_gain,
+                                               .sample_time = s.sample_time});
   }
   if (s.observer == "adjustable") {
-    return run<esokit::AdjustableBandwidthEso<Order>>({.observer_bandwidth = s.bandwidth,
-                                                       .bandwidth_ratio = 0.75,
-                                                       .allow_uncertified_switching = true,
-                                                       .input_gain = s.input_gain,
-                                                       .sample_time = s.sample_time},
-                                                      s, time, y, u);
+    return timed<esokit::AdjustableBandwidthEso<Order>>({.observer_bandwidth = s.bandwidth,
+                                                         .bandwidth_ratio = 0.75,
+                                                         .allow_uncertified_switching = true,
+                                                         .input_gain = s.input_gain,
+                                                         .sample_time = s.sample_time});
   }
   if (s.observer == "nonlinear") {
-    return run<esokit::NonlinearEso<Order, double, 1>>(
+    return timed<esokit::NonlinearEso<Order, double, 1>>(
         {.observer_bandwidth = s.bandwidth,
          .shape = {.gain_alpha = 0.8, .alpha = 1, .gain_beta = 0.2, .beta = 1},
          .allow_uncertified_gain = true,
          .input_gain = s.input_gain,
-         .sample_time = s.sample_time},
-        s, time, y, u);
+         .sample_time = s.sample_time});
   }
   throw esokit::examples::LogError(
       "no observer '" + s.observer +
@@ -117,16 +139,12 @@ LogEstimates run_order(const LogSettings& s, const std::vector<double>& time,
 
 LogEstimates run_observer(const LogSettings& settings, const std::vector<double>& time,
                           const std::vector<double>& y, const std::vector<double>& u) {
-  switch (settings.order) {
-    case 1:
-      return run_order<1>(settings, time, y, u);
-    case 2:
-      return run_order<2>(settings, time, y, u);
-    case 3:
-      return run_order<3>(settings, time, y, u);
-    default:
-      throw esokit::examples::LogError("the order must be 1, 2 or 3");
-  }
+  if (settings.order < 1 || settings.order > 3)
+    throw esokit::examples::LogError("the order must be 1, 2 or 3");
+  const auto observer = settings.order == 1   ? observer_of<1>(settings)
+                        : settings.order == 2 ? observer_of<2>(settings)
+                                              : observer_of<3>(settings);
+  return run(*observer, settings, time, y, u);
 }
 
 }  // namespace from_log

@@ -34,77 +34,37 @@ std::string derivative_of(const std::string& of, int order) {
   return of + std::string(static_cast<std::size_t>(order), '\'');
 }
 
+/// Of a machine of order 3 with a lag: (y, y', y'', v).
+constexpr int most_states = 4;
+using MachineState = esokit::Vector<double, most_states>;
+
 /// The machine that was found around rest at (start_y, start_u): (y, .., y^(n-1), v).
-template <int Order>
+/// For any order n, so that it is compiled once: without derivatives from y^(n) on.
 auto machine(const Pasting& p, const TuneModel& model) {
-  using State = esokit::Vector<double, Order + 1>;
+  using State = MachineState;
+  const int order = model.order;
   const double T = model.sample_time;
   // A slope that the integrator can follow.
   const double scale = std::max(p.friction_scale, 0.1 * p.friction * T);
   const bool lagged = model.lag > 0.2 * T;
-  return esokit::sim::nonlinear_plant<Order + 1>(
-      [&p, &model, scale, lagged](double, const State& x, double u) {
-        const auto speed = [&](double y, double rate) { return Order == 1 ? y : rate; };
-        const double rate = Order == 2 ? x(1) : 0.0;
+  return esokit::sim::nonlinear_plant<most_states>(
+      [&p, &model, order, scale, lagged](double, const State& x, double u) {
+        const auto speed = [&](double y, double rate) { return order == 1 ? y : rate; };
+        const double rate = order == 2 ? x(1) : 0.0;
         State change = State::Zero();
-        for (int i = 0; i + 1 < Order; ++i) change(i) = x(i + 1);
-        const double v = lagged ? x(Order) : u;
+        for (int i = 0; i + 1 < order; ++i) change(i) = x(i + 1);
+        const double v = lagged ? x(most_states - 1) : u;
         double top = p.input_gain * (v - p.start_u) -
-                     model.pole * (x(Order - 1) - (Order == 1 ? p.start_y : 0.0));
+                     model.pole * (x(order - 1) - (order == 1 ? p.start_y : 0.0));
         if (p.friction > 0.0) {
           top -= p.friction *
                  (std::tanh(speed(x(0), rate) / scale) - std::tanh(speed(p.start_y, 0.0) / scale));
         }
         if (p.by_position) top += p.force(x(0)) - p.force(p.start_y);
-        change(Order - 1) = top;
-        change(Order) = lagged ? (u - x(Order)) / model.lag : 0.0;
+        change(order - 1) = top;
+        change(most_states - 1) = lagged ? (u - x(most_states - 1)) / model.lag : 0.0;
         return change;
       });
-}
-
-template <int Order>
-StepOfCode step_on(const Pasting& pasting, const Tuning& tuning, const TunedDesign& design,
-                   double height, double duration, double noise, int digits) {
-  const TuneModel& model = tuning.model;
-  const double T = model.sample_time;
-  Runner runner(pasting, tuning, design);
-  runner.start(pasting.start_y, pasting.start_u);
-  StepOfCode step;
-  step.height = height;
-  esokit::sim::Gaussian gaussian(7);
-  const auto controller = [&](double y, double) {
-    const bool on = static_cast<int>(step.y.size()) >= (digits > 0 ? still : 0);
-    step.y.push_back(y);
-    step.u.push_back(runner.update(y, pasting.start_y + (on ? height : 0.0)));
-    return step.u.back();
-  };
-  const auto plant = machine<Order>(pasting, model);
-  auto rest = esokit::Vector<double, Order + 1>::Zero();
-  rest(0) = pasting.start_y;
-  rest(Order) = pasting.start_u;
-  const auto result =
-      esokit::sim::run(plant, controller,
-                       {.duration = std::max(1.0, std::floor(duration / T)) * T,
-                        .sample_time = T,
-                        .sensor =
-                            [&](double, double y) {
-                              const double measured = y + noise * gaussian.next();
-                              if (digits == 0) return measured;
-                              char text[40];
-                              std::snprintf(text, sizeof text, "%.*g", digits, measured);
-                              return std::strtod(text, nullptr);
-                            },
-                        .dead_time = model.dead_time,
-                        .substeps = 8,
-                        .initial_input = pasting.start_u,
-                        .state = rest});
-  if (!result) return step;
-  for (std::size_t k = 0; k < step.y.size(); ++k) {
-    const double at = (step.y[k] - pasting.start_y) / height;
-    if (std::abs(at - 1) > 0.02) step.settling = static_cast<double>(k + 1) * T;
-    step.overshoot = std::max(step.overshoot, at - 1);
-  }
-  return step;
 }
 
 /// What the code watches, from the log and from what was played.
@@ -118,9 +78,11 @@ struct Watch {
   int divider = 1;
 };
 
-/// Whether an observer with these gains is proven with the bound.
+/// Whether an observer with these gains is proven with the bound. With a constant d and a slope
+/// there is nothing to prove, and each level of a cascade is proven by itself.
 template <int Order>
 bool certified(const TuneModel& model, const TunedDesign& design, double bound) {
+  if (design.extension > 1) return bound < std::numeric_limits<double>::infinity();
   const auto made = [&](auto observer_config, auto type) {
     using Guard = esokit::Guarded<typename decltype(type)::type>;
     observer_config.input_gain = model.input_gain.value;
@@ -130,15 +92,6 @@ bool certified(const TuneModel& model, const TunedDesign& design, double bound) 
     config.disturbance_bound = bound;
     return Guard::make(config).has_value();
   };
-  if (design.levels > 1) {
-    return esokit::detail::with_number<2, 3>(design.levels, [&](auto levels) {
-      using Observer = esokit::CascadeEso<Order, levels()>;
-      typename Observer::Config config;
-      config.observer_bandwidth = design.settings.observer_bandwidth;
-      config.bandwidth_factor = design.settings.bandwidth_factor;
-      return made(config, std::type_identity<Observer>{});
-    });
-  }
   auto poles = esokit::detail::placed_poles<Order>(model, design);
   if (design.knows.lag) {
     using Observer = esokit::ModelEso<esokit::ModelParts{.order = Order, .actuator = 1}, double,
@@ -149,12 +102,15 @@ bool certified(const TuneModel& model, const TunedDesign& design, double bound) 
     std::copy_n(poles.begin(), config.poles.size(), config.poles.begin());
     return made(config, std::type_identity<Observer>{});
   }
-  return esokit::detail::with_number<1, 2>(design.extension, [&](auto extension) {
-    using Observer = esokit::LinearEso<Order, double, extension(), esokit::PoleSet>;
-    typename Observer::Config config;
+  using Observer = esokit::LinearEso<Order, double, 1, esokit::PoleSet>;
+  typename Observer::Config config;
+  bool all = true;
+  for (int level = 0; level < design.levels; ++level) {
     std::copy_n(poles.begin(), config.poles.size(), config.poles.begin());
-    return made(config, std::type_identity<Observer>{});
-  });
+    all = all && made(config, std::type_identity<Observer>{});
+    for (auto& pole : poles) pole *= design.settings.bandwidth_factor;
+  }
+  return all;
 }
 
 Watch watch_of(const Tuning& tuning, const TunedDesign& design, const esokit::FitData& rows) {
@@ -520,9 +476,46 @@ double Runner::update(double y, double target) {
 
 StepOfCode step_of_code(const Pasting& pasting, const Tuning& tuning, const TunedDesign& design,
                         double height, double duration, double noise, int digits) {
-  return esokit::detail::with_number<1, 3>(pasting.order, [&](auto order) {
-    return step_on<order()>(pasting, tuning, design, height, duration, noise, digits);
-  });
+  const TuneModel& model = tuning.model;
+  const double T = model.sample_time;
+  Runner runner(pasting, tuning, design);
+  runner.start(pasting.start_y, pasting.start_u);
+  StepOfCode step;
+  step.height = height;
+  esokit::sim::Gaussian gaussian(7);
+  const auto controller = [&](double y, double) {
+    const bool on = static_cast<int>(step.y.size()) >= (digits > 0 ? still : 0);
+    step.y.push_back(y);
+    step.u.push_back(runner.update(y, pasting.start_y + (on ? height : 0.0)));
+    return step.u.back();
+  };
+  const auto plant = machine(pasting, model);
+  auto rest = MachineState::Zero();
+  rest(0) = pasting.start_y;
+  rest(most_states - 1) = pasting.start_u;
+  const auto result =
+      esokit::sim::run(plant, controller,
+                       {.duration = std::max(1.0, std::floor(duration / T)) * T,
+                        .sample_time = T,
+                        .sensor =
+                            [&](double, double y) {
+                              const double measured = y + noise * gaussian.next();
+                              if (digits == 0) return measured;
+                              char text[40];
+                              std::snprintf(text, sizeof text, "%.*g", digits, measured);
+                              return std::strtod(text, nullptr);
+                            },
+                        .dead_time = model.dead_time,
+                        .substeps = 8,
+                        .initial_input = pasting.start_u,
+                        .state = rest});
+  if (!result) return step;
+  for (std::size_t k = 0; k < step.y.size(); ++k) {
+    const double at = (step.y[k] - pasting.start_y) / height;
+    if (std::abs(at - 1) > 0.02) step.settling = static_cast<double>(k + 1) * T;
+    step.overshoot = std::max(step.overshoot, at - 1);
+  }
+  return step;
 }
 
 std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesign& design,

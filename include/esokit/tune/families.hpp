@@ -45,6 +45,9 @@ struct TuneKnowledge {
   friend constexpr bool operator==(const TuneKnowledge&, const TuneKnowledge&) = default;
 };
 
+/// All that an observer of `tune` may know.
+inline constexpr TuneKnowledge tune_knows_all{.lag = true, .sensor = true, .sinusoid = true};
+
 /// The parameters of a design within its family.
 struct TuneSettings {
   double observer_bandwidth = 0.0;    ///< omega_o, for a cascade that of level 1, rad/s
@@ -191,9 +194,9 @@ typename AugmentedModel<Parts>::Settings model_settings(const TuneModel& model,
 }
 
 /// Gains of a model's states for given poles of its corrected part, in physical units.
-/// @param specs the spec of the placement for the number of poles of the part
-template <class Placement, class Model, class Specs>
-bool model_gains(const Model& made, double bandwidth, const Specs& specs,
+/// @param factors the PoleFactors for the number of poles of the part
+template <class Model, class Factors>
+bool model_gains(const Model& made, double bandwidth, const Factors& factors,
                  std::vector<double>& gains) {
   const double T = made.sample_time();
   typename Model::State ones;
@@ -209,9 +212,7 @@ bool model_gains(const Model& made, double bandwidth, const Specs& specs,
     }
     const auto of_part =
         placed_gain(part.step, part.output, part.degrees,
-                    with_pairs(pole_factors(Placement::template sample<placed, double>(
-                                   specs(std::integral_constant<int, placed>{}), T)),
-                               own));
+                    with_pairs(factors(std::integral_constant<int, placed>{}), own));
     gains.resize(Model::size);
     for (int row = 0; row < Model::size; ++row) {
       const int i = Model::state_of_row(row);
@@ -249,21 +250,21 @@ std::optional<ObserverKind> known_kind(const TuneModel& model, TuneFamily family
     // The capture bandwidth is a setting of the model.
     const auto given = Parts.resonators > 0 ? make(s) : plain;
     if (!given) return false;
-    if (family == TuneFamily::free_poles) {
-      // The bandwidth is given as zero, so that a sensor counts as faster and keeps its pole.
-      return model_gains<PoleSet>(
-          *given, 0.0,
-          [&](auto number) {
-            Array<std::complex<double>, number()> poles{};
-            std::copy_n(s.observer_poles.begin(), number(), poles.begin());
-            return poles;
-          },
-          gains);
-    }
-    const auto bandwidth = [&](auto) { return s.observer_bandwidth; };
-    return family == TuneFamily::half_gain
-               ? model_gains<HalfGainPoles>(*given, s.observer_bandwidth, bandwidth, gains)
-               : model_gains<EqualPoles>(*given, s.observer_bandwidth, bandwidth, gains);
+    const bool free = family == TuneFamily::free_poles;
+    const double w = s.observer_bandwidth;
+    const auto factors = [&](auto number) {
+      constexpr int placed = number();
+      if (free) {
+        Array<std::complex<double>, placed> poles{};
+        std::copy_n(s.observer_poles.begin(), placed, poles.begin());
+        return pole_factors(PoleSet::sample<placed, double>(poles, model.sample_time));
+      }
+      return family == TuneFamily::half_gain
+                 ? pole_factors(HalfGainPoles::sample<placed, double>(w, model.sample_time))
+                 : pole_factors(EqualPoles::sample<placed, double>(w, model.sample_time));
+    };
+    // With free poles the bandwidth is zero, so that a sensor counts as faster and keeps its pole.
+    return model_gains(*given, free ? 0.0 : w, factors, gains);
   };
   return kind;
 }

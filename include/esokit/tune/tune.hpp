@@ -844,7 +844,7 @@ inline ControllerSource controller_source(const TunedDesign& d, const TuneModel&
 
 /// All families for a model. A template, as `tune`, so that it costs compile time only where it is
 /// called.
-template <class = void>
+template <TuneKnowledge Parts>
 std::vector<Contender> contenders(const TuneModel& model, bool law_is_given) {
   std::vector<Contender> all;
   const auto take = [&](TuneFamily family, std::string name, const TuneKnowledge& knows, int m,
@@ -893,21 +893,31 @@ std::vector<Contender> contenders(const TuneModel& model, bool law_is_given) {
     };
     const bool lag = model.lag > 0.0, sensor = model.sensor > 0.0,
                sinusoid = !model.sinusoids.empty();
-    using L = std::integral_constant<ModelParts, ModelParts{.order = order, .actuator = 1}>;
-    if (lag) {
-      both(L{}, "the lag", {.lag = true});
-      known(L{}, TuneFamily::free_poles, "LinearEso, free poles,", "the lag", {.lag = true});
+    if constexpr (Parts.lag) {
+      using L = std::integral_constant<ModelParts, ModelParts{.order = order, .actuator = 1}>;
+      if (lag) {
+        both(L{}, "the lag", {.lag = true});
+        known(L{}, TuneFamily::free_poles, "LinearEso, free poles,", "the lag", {.lag = true});
+      }
     }
-    using F = std::integral_constant<ModelParts, ModelParts{.order = order, .sensor = 1}>;
-    if (sensor) both(F{}, "the sensor", {.sensor = true});
-    using Q = std::integral_constant<ModelParts, ModelParts{.order = order, .resonators = 1}>;
-    if (sinusoid) both(Q{}, "the sine", {.sinusoid = true});
-    using LF =
-        std::integral_constant<ModelParts, ModelParts{.order = order, .actuator = 1, .sensor = 1}>;
-    if (lag && sensor) both(LF{}, "lag and sensor", {.lag = true, .sensor = true});
-    using LQ = std::integral_constant<ModelParts,
-                                      ModelParts{.order = order, .actuator = 1, .resonators = 1}>;
-    if (lag && sinusoid) both(LQ{}, "lag and sine", {.lag = true, .sinusoid = true});
+    if constexpr (Parts.sensor) {
+      using F = std::integral_constant<ModelParts, ModelParts{.order = order, .sensor = 1}>;
+      if (sensor) both(F{}, "the sensor", {.sensor = true});
+    }
+    if constexpr (Parts.sinusoid) {
+      using Q = std::integral_constant<ModelParts, ModelParts{.order = order, .resonators = 1}>;
+      if (sinusoid) both(Q{}, "the sine", {.sinusoid = true});
+    }
+    if constexpr (Parts.lag && Parts.sensor) {
+      using LF = std::integral_constant<ModelParts,
+                                        ModelParts{.order = order, .actuator = 1, .sensor = 1}>;
+      if (lag && sensor) both(LF{}, "lag and sensor", {.lag = true, .sensor = true});
+    }
+    if constexpr (Parts.lag && Parts.sinusoid) {
+      using LQ = std::integral_constant<ModelParts,
+                                        ModelParts{.order = order, .actuator = 1, .resonators = 1}>;
+      if (lag && sinusoid) both(LQ{}, "lag and sine", {.lag = true, .sinusoid = true});
+    }
     return 0;
   });
   return all;
@@ -927,14 +937,23 @@ double bandwidth_for(const Function& rises, double wanted, double low, double hi
 }  // namespace detail
 
 /// Finds designs for a model, the best one first.
-/// @return error for a model that `check` refuses, more than one requirement, or a requirement that
+/// @tparam Parts what a model may have that an observer could know: the fewer, the less is compiled
+/// @return error for a model that `check` refuses or with other parts, more than one requirement,
+/// or a requirement that
 ///         no controller can meet
-template <class = void>
+template <TuneKnowledge Parts = tune_knows_all>
 [[nodiscard]] Expected<Tuning, Error<double>> tune(const TuneModel& given,
                                                    const TuneWish& wish = {},
                                                    const TuneRules& rules = {}) {
   Rules<double> checks;
   checks.all_of(given.check())
+      .require(Parts.lag || !(given.lag > 0.0), "lag", given.lag,
+               "is not among the parts that this tune is compiled for")
+      .require(Parts.sensor || !(given.sensor > 0.0), "sensor", given.sensor,
+               "is not among the parts that this tune is compiled for")
+      .require(Parts.sinusoid || given.sinusoids.empty(), "sinusoids",
+               static_cast<double>(given.sinusoids.size()),
+               "are not among the parts that this tune is compiled for")
       .not_negative("control_noise", wish.control_noise)
       .not_negative("settling_time", wish.settling_time)
       .not_negative("controller_bandwidth", wish.controller_bandwidth)
@@ -1078,7 +1097,7 @@ template <class = void>
                    "optimum", tuning.optimum,
                    "cannot be computed: the numbers of this model are too far apart");
     if (!checks) return checks.error();
-    std::vector<detail::Contender> all = detail::contenders(model, given_law);
+    std::vector<detail::Contender> all = detail::contenders<Parts>(model, given_law);
     for (detail::Contender& c : all) {
       search.seen.clear();
       std::vector<std::vector<double>> starts;
