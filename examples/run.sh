@@ -10,7 +10,8 @@ usage() {
 usage: examples/run.sh [--out DIR] [--no-install] [NAME...]
 
 Builds the examples, runs them (or only those named: a program or a folder of examples/), and
-writes DIR/index.html with every figure and table beside the paper's numbers.
+writes DIR/index.html with every figure and table beside the paper's numbers. The name playground is
+DIR/playground.html alone, a page that runs the headers in a browser.
 
   --out DIR      where the results go (default: out/ in the repository)
   --no-install   do not install missing Debian packages, only name them

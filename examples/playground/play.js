@@ -103,7 +103,7 @@ class Plot {
     const left = 58, right = 12, top = 10, bottom = 38;
     const log10 = Math.log10;
     const xs = xlog ? Array.from(x, log10) : x;
-    const x0 = xs[0], x1 = xs[xs.length - 1];
+    const x0 = xs[0], x1 = xlog ? xs[xs.length - 1] : 2 * xs[xs.length - 1] - xs[xs.length - 2];
     let low = Infinity, high = -Infinity;
     for (const line of lines) {
       if (line.aside) continue;
@@ -119,7 +119,7 @@ class Plot {
     low -= pad; high += pad;
     const px = (v) => left + (v - x0) / (x1 - x0) * (width - left - right);
     const py = (v) => height - bottom - (v - low) / (high - low) * (height - top - bottom);
-    const clipped = (v) => Math.min(Math.max(v, -20), height + 20);
+    const clipped = (v) => Math.min(Math.max(v, -height), 2 * height);
     this.svg.replaceChildren();
     this.svg.setAttribute('viewBox', `0 0 ${width} ${height}`);
     const text = (px_, py_, words, anchor) => add(this.svg, 'text', { x: px_, y: py_, fill: 'var(--quiet)',
@@ -145,6 +145,9 @@ class Plot {
       add(this.svg, 'path', { d: `M${left} ${py(mark)}H${width - right}`, stroke: 'var(--quiet)',
         'stroke-dasharray': '2 4', fill: 'none' });
     }
+    const clip = 'clip-' + this.about.id;
+    add(add(this.svg, 'clipPath', { id: clip }), 'rect', { x: left, y: top - 2, width: width - left - right + 2,
+      height: height - top - bottom + 4 });
     const most = 2 * (width - left - right);
     for (const line of lines) {
       // Of many samples in a pixel the least and the largest: what is drawn is what there is.
@@ -168,7 +171,7 @@ class Plot {
         point(Math.min(a, b));
         if (a !== b) point(Math.max(a, b));
       }
-      add(this.svg, 'path', { d, fill: 'none', stroke: line.colour, 'stroke-width': line.width || 1.8,
+      add(this.svg, 'path', { d, 'clip-path': `url(#${clip})`, fill: 'none', stroke: line.colour, 'stroke-width': line.width || 1.8,
         'stroke-dasharray': line.dash || 'none', 'stroke-linejoin': 'round' });
     }
     const names = lines.map((line) => line.name).join('|');
@@ -191,14 +194,20 @@ const first = 'var(--first)', second = 'var(--second)', third = 'var(--third)', 
 const $ = (id) => document.getElementById(id);
 const last_of = (line) => shown(line.values[line.values.length - 1]);
 const says = (what) => (lines) => what + lines.map((line) => `${line.name} ends at ${last_of(line)}`).join('; ');
+// What the disturbance is for a few samples, while u is still on its way, must not hide the rest.
+function bulk(...all) {
+  const values = all.flatMap((one) => Array.from(one)).filter(Number.isFinite).sort((a, b) => a - b);
+  return [values[Math.floor(0.005 * values.length)], values[Math.ceil(0.995 * values.length) - 1]];
+}
+
 const plots = {
-  y: new Plot($('first'), { x: 't / s', y: 'unit of y', says: says('Output over time: ') }),
-  u: new Plot($('input'), { x: 't / s', y: 'unit of u', says: says('Input over time: ') }),
-  d: new Plot($('disturbance'), { x: 't / s', y: 'unit of y⁽ⁿ⁾', says: says('Disturbance over time: ') }),
-  l: new Plot($('bode'), { x: 'ω / (rad/s)', y: 'abs L', says: () => 'Magnitude of the loop gain over frequency' }),
-  a: new Plot($('bode'), { x: 'ω / (rad/s)', y: 'phase of L / degrees', says: () => 'Phase of the loop gain over frequency' }),
-  s: new Plot($('phase'), { x: 'ω / (rad/s)', y: 'abs S', says: () => 'Sensitivity over frequency' }),
-  n: new Plot($('phase'), { x: 'ω / (rad/s)', y: 'from noise to u', says: () => 'Gain from the noise of y to u over frequency' }),
+  y: new Plot($('first'), { id: 'y', x: 't / s', y: 'unit of y', says: says('Output over time: ') }),
+  u: new Plot($('input'), { id: 'u', x: 't / s', y: 'unit of u', says: says('Input over time: ') }),
+  d: new Plot($('disturbance'), { id: 'd', x: 't / s', y: 'unit of y⁽ⁿ⁾', says: says('Disturbance over time: ') }),
+  l: new Plot($('bode'), { id: 'l', x: 'ω / (rad/s)', y: 'abs L', says: () => 'Magnitude of the loop gain over frequency' }),
+  a: new Plot($('bode'), { id: 'a', x: 'ω / (rad/s)', y: 'phase of L / degrees', says: () => 'Phase of the loop gain over frequency' }),
+  s: new Plot($('phase'), { id: 's', x: 'ω / (rad/s)', y: 'abs S', says: () => 'Sensitivity over frequency' }),
+  n: new Plot($('phase'), { id: 'n', x: 'ω / (rad/s)', y: 'from noise to u', says: () => 'Gain from the noise of y to u over frequency' }),
 };
 
 function draw(result) {
@@ -210,9 +219,10 @@ function draw(result) {
   plots.y.draw(t, with_pid([{ name: 'reference', values: result.r, colour: plain, dash: '2 3', step: true },
     { name: pid ? 'y, ADRC' : 'y', values: result.y, colour: first }], result.pid_y, 'y, PID'));
   plots.u.draw(t, with_pid([{ name: pid ? 'u, ADRC' : 'u', values: result.u, colour: first, step: true,
-    width: 1.4 }], result.pid_u, 'u, PID'), { at: [] });
+    width: 1.4 }], result.pid_u, 'u, PID'));
   plots.d.draw(t, [{ name: 'disturbance', values: result.d, colour: plain, width: 1.4 },
-    { name: 'its estimate', values: result.found, colour: third, dash: '7 3' }]);
+    { name: 'its estimate', values: result.found, colour: third, dash: '7 3' }],
+    { bounds: bulk(result.d, result.found) });
   const w = result.w, log = { xlog: true, ylog: true };
   const degrees = (values) => values.map((v) => v * 180 / Math.PI);
   const adrc = pid ? 'ADRC' : 'L';
@@ -236,14 +246,14 @@ const rows = [
   ['phase margin', (n) => Number.isFinite(n.phase) ? shown(180 / Math.PI * n.phase) + '°' : shown(n.phase)],
   ['least abs(1 + L)', (n) => shown(n.modulus)],
   ['more delay until it swings', (n) => seconds(n.delay)],
-  ['crossover', (n) => Number.isFinite(n.crossover) ? shown(n.crossover) + ' rad/s' : '–'],
-  ['noise in u, std. deviation', (n) => shown(n.noise) + ' u'],
+  ['crossover', (n) => shown(n.crossover), 'rad/s'],
+  ['noise in u, standard deviation', (n) => shown(n.noise), 'u'],
   ['overshoot', (n) => shown(100 * n.overshoot) + ' %'],
   ['within 2 % after', (n) => seconds(n.settling)],
-  ['off after the load, at most', (n) => shown(n.load_peak) + ' y'],
-  ['area of this error', (n) => shown(n.load_area) + ' y s'],
-  ['largest u', (n) => shown(n.largest) + ' u'],
-  ['at the limits of u', (n) => shown(100 * n.at_limit) + ' % of samples'],
+  ['off after the load, at most', (n) => shown(n.load_peak), 'y'],
+  ['area of this error', (n) => shown(n.load_area), 'y s'],
+  ['largest u', (n) => shown(n.largest), 'u'],
+  ['samples at the limits of u', (n) => shown(100 * n.at_limit) + ' %'],
   ['measurements refused', (n) => String(n.refused)],
 ];
 
@@ -254,12 +264,17 @@ function tell_numbers(result) {
     for (const name in attributes) one.setAttribute(name, attributes[name]);
     return one;
   };
+  const heading = (name, unit) => {
+    const one = cell('th', name + (unit ? ' ' : ''), { scope: 'row' });
+    if (unit) one.append(cell('span', unit, { class: 'quiet' }));
+    return one;
+  };
   const row = (cells) => { const one = document.createElement('tr'); one.append(...cells); return one; };
   const shown_ones = result.has_pid ? [0, 1] : [0];
   $('numbers').querySelector('thead').replaceChildren(row([cell('th', '', { scope: 'col' }),
     ...shown_ones.map((i) => cell('th', ['ADRC', 'PID'][i], { scope: 'col' }))]));
-  $('numbers').querySelector('tbody').replaceChildren(...rows.map(([name, says_]) =>
-    row([cell('th', name, { scope: 'row' }), ...shown_ones.map((i) => {
+  $('numbers').querySelector('tbody').replaceChildren(...rows.map(([name, says_, unit]) =>
+    row([heading(name, unit), ...shown_ones.map((i) => {
       const one = cell('td', says_(result.numbers[i]));
       if (name === 'stable') one.className = result.numbers[i].stable ? 'pass' : 'fail';
       return one;
@@ -332,10 +347,10 @@ function build() {
     const box = document.createElement('div'), label = document.createElement('label');
     box.className = 'field';
     label.textContent = field.label + ' ';
-    label.title = field.hint;
     const unit = document.createElement('span');
     unit.className = 'quiet';
-    unit.textContent = (field.unit ? field.unit + ' · ' : '') + field.hint;
+    unit.textContent = field.unit;
+    box.title = field.hint;
     label.append(unit);
     const name = field.label + (field.unit ? ', ' + field.unit : '');
     const id = 'f-' + field.name;
@@ -374,6 +389,7 @@ function build() {
         slider.setAttribute('aria-valuetext', shown(state[field.name]) + ' ' + field.unit);
         if (document.activeElement !== number) number.value = state[field.name];
       };
+      slider.setAttribute('aria-description', field.hint);
       controls[field.name].bad = (bad) => number.setAttribute('aria-invalid', bad);
     }
     groups[field.group].append(box);
