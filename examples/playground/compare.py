@@ -62,6 +62,8 @@ def main():
     check(not console, "console: " + "".join(console[:5]))
     check("default-src 'none'" in open(page, encoding="utf-8").read(), "the page forbids no request")
     check(found, "the page gave no numbers")
+    problems = re.search(r'data-problems="([^"]*)"', dom)
+    check(problems and not problems[1], f"a visit: {problems[1] if problems else 'did not end'}")
     if found:
         theirs = groups(open(native, "rb").read())
         ours = groups(base64.b64decode(found[1]))

@@ -399,7 +399,7 @@ function build() {
     const field = fields.find((one) => one.name === name);
     const button = document.createElement('button');
     button.textContent = field.label;
-    button.onclick = () => { state[name] = state[name] > 0 ? 0 : 1; changed(true); };
+    button.onclick = () => { state[name] = 1 - state[name]; changed(true); };
     $('happens').append(button);
     controls[name] = () => button.setAttribute('aria-pressed', state[name] > 0);
   }
@@ -492,6 +492,62 @@ function svg() {
 
 // ---- the test of examples/playground/check.sh: every number of some settings ----
 
+// What a visitor does: each control has a name, each button tells a sentence and can be taken back, a
+// slider and a field change the figures, what is refused is said, and the page lives on.
+function visit() {
+  const problems = [];
+  const expect = (good, words) => { if (!good) problems.push(words); };
+  for (const one of document.querySelectorAll('button, input, select')) {
+    const name = one.getAttribute('aria-label') || (one.labels && one.labels[0] || one).textContent;
+    expect(name && name.trim(), `${one.outerHTML} has no name`);
+    expect(one.tabIndex >= 0, `${name} cannot be reached by keyboard`);
+  }
+  for (const one of document.querySelectorAll('svg.axes')) expect(one.getAttribute('aria-label'), 'a figure without a name');
+  read('');
+  for (const button of $('happens').querySelectorAll('button[aria-pressed]')) {
+    button.click();
+    update(true);
+    const told = $('said').children;
+    expect(told.length === 1 && /\d/.test(told[0].textContent) && !/undefined|–/.test(told[0].textContent),
+      `${button.textContent} tells: ${$('said').textContent}`);
+    expect(button.getAttribute('aria-pressed') === 'true', `${button.textContent} does not look pressed`);
+    expect(location.hash.includes('=1'), `${button.textContent} is not in the address`);
+    button.click();
+    update(true);
+    expect($('said').children.length === 0, `${button.textContent} cannot be taken back`);
+  }
+  for (const field of fields) {
+    const number = $('f-' + field.name);
+    if (!number || number.type !== 'number') continue;
+    read('');
+    update(true);
+    const slider = number.parentElement.querySelector('input[type=range]');
+    const before = state[field.name];
+    slider.value = Number(slider.value) + 30;
+    slider.dispatchEvent(new Event('input'));
+    update(true);
+    expect(state[field.name] > before, `the slider of ${field.name} does nothing`);
+    number.value = -1;
+    number.dispatchEvent(new Event('input'));
+    update(true);
+    expect($('refusal').textContent.includes(field.name), `-1 for ${field.name} is not refused`);
+    expect(number.getAttribute('aria-invalid') === 'true', `${field.name} is not marked`);
+    number.value = before;
+    number.dispatchEvent(new Event('input'));
+    update(true);
+    expect($('refusal').textContent === '', `${field.name} does not come back`);
+  }
+  read('order=7&samples=1e9&gain=x&other=3');
+  update(true);
+  expect($('refusal').textContent.includes('order'), 'an address that is wrong is not refused');
+  read('');
+  update(true);
+  expect(csv().split('\n').length === state.samples + 2, 'the CSV has other rows');
+  expect(new DOMParser().parseFromString(svg(), 'image/svg+xml').querySelectorAll('path').length > 50 &&
+    !svg().includes('var('), 'the SVG is not whole');
+  return problems;
+}
+
 function selftest() {
   const all = [];
   for (const line of JSON.parse($('settings').textContent)) {
@@ -510,14 +566,21 @@ function selftest() {
   }
   let written = '';
   for (let i = 0; i < bytes.length; i += 3000) written += btoa(String.fromCharCode(...bytes.subarray(i, i + 3000)));
+  let least = Infinity;
   read('');
-  const began = performance.now();
-  for (let i = 0; i < 20; ++i) { state.gain_factor = 1 + i / 20; update(false); }
-  document.body.dataset.frame = ((performance.now() - began) / 20).toFixed(2);
+  for (let i = 0; i < 20; ++i) {
+    const began = performance.now();
+    state.gain_factor = 1 + i / 20;
+    update(false);
+    least = Math.min(least, performance.now() - began);
+  }
+  const problems = visit().join('; ');
+  document.body.dataset.frame = least.toFixed(2);
+  document.body.dataset.problems = problems;
   const pre = document.createElement('pre');
   pre.id = 'selftest';
   pre.textContent = written;
-  document.body.replaceChildren(pre);
+  document.body.append(pre);
 }
 
 build();

@@ -31,7 +31,8 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 // By the order of Index.
 constexpr std::array<Field, field_count> all_fields{{
-    {"order", "integrations from u to y", "", "Machine", Kind::choice, 1, 3, 2, "1: torque to speed, heat to temperature;2: torque to angle;3: with a slow drive before it",
+    {"order", "integrations from u to y", "", "Machine", Kind::choice, 1, 3, 2,
+     "1: torque to speed, heat to temperature;2: torque to angle;3: with a slow drive before it",
      "torque to angle: 2, torque to speed: 1, heat to temperature: 1"},
     {"gain", "gain b\u2080", "y\u207d\u207f\u207e per u", "Machine", Kind::number, 1e-2, 1e4, 50,
      "", "what a unit of u adds to the highest derivative"},
