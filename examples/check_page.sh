@@ -37,7 +37,7 @@ for page in "${pages[@]}"; do
     fi
   done < <(grep -oE '(href|src)="[^"]*"' "$page" | sed 's/^[a-z]*="//; s/"$//' | sort -u)
 
-  elsewhere=$(grep -oE '(src="https?:[^"]*|<link [^>]*|<script[^>]*|url\([^)]*|@import[^;]*)' "$page")
+  elsewhere=$(grep -oE '(src="https?:[^"]*|<link [^>]*|<script[^>]* src=[^>]*|url\([^#)][^)]*|@import[^;]*)' "$page")
   verdict "$([[ -z $elsewhere ]] && echo 1 || echo 0)" "$page loads from elsewhere: $elsewhere"
 done
 

@@ -10,7 +10,8 @@ usage() {
 usage: examples/run.sh [--out DIR] [--no-install] [NAME...]
 
 Builds the examples, runs them (or only those named: a program or a folder of examples/), and
-writes DIR/index.html with every figure and table beside the paper's numbers.
+writes DIR/index.html with every figure and table beside the paper's numbers. The name playground is
+DIR/playground.html alone, a page that runs the headers in a browser.
 
   --out DIR      where the results go (default: out/ in the repository)
   --no-install   do not install missing Debian packages, only name them
@@ -66,8 +67,13 @@ if ((${#names[@]} == 0)); then
   exit 1
 fi
 selected=()
+playground=no  # a page of its own, no program
 for want in ${wanted[@]+"${wanted[@]}"}; do
   found=no
+  if [[ $want == playground ]]; then
+    playground=yes
+    continue
+  fi
   for i in "${!names[@]}"; do
     if [[ $want == "${names[i]}" || $want == "${folders[i]}" ]]; then
       selected+=("${names[i]}")
@@ -76,16 +82,24 @@ for want in ${wanted[@]+"${wanted[@]}"}; do
   done
   if [[ $found == no ]]; then
     echo "run.sh: there is no example $want; there are:" >&2
-    printf '  %s\n' "${names[@]}" >&2
+    printf '  %s\n' playground "${names[@]}" >&2
     exit 2
   fi
 done
-((${#selected[@]} > 0)) || selected=("${names[@]}")
+if ((${#wanted[@]} == 0)); then
+  selected=("${names[@]}")
+  playground=yes
+fi
 
 # shellcheck source=cmake/debian_packages.sh
 source "$root/cmake/debian_packages.sh"
 require_packages ${install_option[@]+"${install_option[@]}"} \
   "${ESOKIT_BUILD_PACKAGES[@]}" "${ESOKIT_EXAMPLE_PACKAGES[@]}"
+
+if [[ $playground == yes ]]; then
+  "$root/examples/playground/build.sh" ${install_option[@]+"${install_option[@]}"} "$out/playground.html"
+  if ((${#selected[@]} == 0)); then exit 0; fi
+fi
 
 seconds_since() {
   local microseconds=$((${EPOCHREALTIME/[.,]/} - $1))

@@ -333,6 +333,20 @@ def cover(out, paper):
     return ""
 
 
+def playground(out):
+    """The first card: a page that computes, where it could be built."""
+    if not (out / "playground.html").exists():
+        return ""
+    # No figure of a run but the step response of two equal poles, of omega_c = 10 and 4 rad/s.
+    lines = "".join(
+        f'<path d="M{" ".join(f"{20 + 3.6 * i} {180 - 130 * (1 - (1 + w * i / 80) * math.exp(-w * i / 80)):.1f}" for i in range(101))}" '
+        f'fill="none" stroke="{colour}" stroke-width="4"/>' for w, colour in ((4, "#c2500a"), (10, "#0067a5")))
+    return ('<li><a href="playground.html"><svg role="img" aria-label="Two step responses" '
+            f'viewBox="0 0 400 220"><path d="M20 50H380M20 180H380" stroke="#d8dce3"/>{lines}</svg>'
+            "<b>Playground: a machine and a controller in this browser</b></a>\n"
+            '<p class="quiet">Move a slider: responses, disturbance, margins, C++ to take home.</p></li>\n')
+
+
 def overview(out, papers):
     header = """<h1>esokit: what it does, and how well</h1>
 <p>Each card leads to a page with figures, tables and all numbers, made by the programs in \
@@ -346,15 +360,15 @@ doubtful or not reproduced. An <b>own check</b> compares one of our \
 numbers with a formula, with an independent program, or with a limit that it has to keep: it \
 passes or fails.</p>
 """
-    def cards(chosen):
-        return '<ul class="cards">\n' + "".join(
+    def cards(chosen, first=""):
+        return '<ul class="cards">\n' + first + "".join(
             f'<li><a href="{paper.page}">{cover(out, paper)}<b>{esc(paper.title)}</b></a>\n'
             f"{counts(paper)}</li>\n" for paper in chosen) + "</ul>\n"
 
     topics = [paper for paper in papers if not paper.link]
     printed = [paper for paper in papers if paper.link]
     return header, ("".join(failures(paper, paper.page) for paper in papers) +
-                    (cards(topics) if topics else "") +
+                    (cards(topics, playground(out)) if topics else "") +
                     (f'<h2 id="papers">Papers</h2>\n{judging}{cards(printed)}' if printed else ""))
 
 
