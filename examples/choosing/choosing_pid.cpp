@@ -584,7 +584,9 @@ int main(int argc, char** argv) {
                  nominal.name +
                      ": errors over those of the best PID (sqrt(Ti Td), holds y), "
                      "medians of " +
-                     std::to_string(count) + " drawn machines",
+                     std::to_string(count) +
+                     " drawn machines. A lag that is not told and a wrong order: over the load "
+                     "step of the PID that has the right model",
                  head, lines);
     report.expect(nominal.name, "root of J / J* of the best PID", rivals.front().design.excess,
                   rivals.front().design.feasible && rivals.front().design.comes_back,
