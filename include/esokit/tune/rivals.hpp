@@ -29,7 +29,7 @@ enum class RivalKind : unsigned char {
   pi,               ///< PI without a filter
   derivative,       ///< PID, filter of first order on the derivative
   filtered,         ///< PID, filter of second order on y, damping 0.707
-  freely_filtered,  ///< the same with any damping
+  freely_filtered,  ///< the same with any damping from 0.1 to 30
   given             ///< not tuned
 };
 
