@@ -332,7 +332,7 @@ TEST(TuneTest, EachFamilyIsAsGoodAsAGrid) {
   brute.cost = &cost;
   const double free = named(tuning, "LinearEso, free poles").cost;
   int compared = 0;
-  for (const auto& contender : esokit::detail::contenders(model, false)) {
+  for (const auto& contender : esokit::detail::contenders<esokit::tune_knows_all>(model, false)) {
     if (contender.observer_numbers + contender.law_numbers != 2) continue;
     brute.seen.clear();
     const auto value = [&](const std::vector<double>& x) { return brute.value(contender, x, 1e3); };
