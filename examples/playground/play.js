@@ -97,9 +97,13 @@ class Plot {
     this.svg = add(section, 'svg', { class: 'axes', role: 'img' });
     this.seen = '';
   }
+  measure() {
+    this.width = this.svg.clientWidth || 600;
+    this.height = this.svg.clientHeight || 240;
+  }
   // lines: {name, values, colour, dash, step, ylog}; x: values
   draw(x, lines, { xlog = false, ylog = false, at = [], bounds = null } = {}) {
-    const width = this.svg.clientWidth || 600, height = this.svg.clientHeight || 240;
+    const { width, height } = this;
     const left = 58, right = 12, top = 10, bottom = 38;
     const log10 = Math.log10;
     const xs = xlog ? Array.from(x, log10) : x;
@@ -211,6 +215,8 @@ const plots = {
 };
 
 function draw(result) {
+  // All before the first changes: else the page is laid out anew for each.
+  for (const name in plots) plots[name].measure();
   const pid = result.has_pid;
   const dots = '6 4';
   const with_pid = (lines, values, name) => pid ?

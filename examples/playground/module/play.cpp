@@ -429,13 +429,18 @@ Outcome pid_beside(const Settings& s, const Machine& machine, double step, doubl
       const auto edges = margins(*loop);
       return edges ? edges->modulus.value : 0.0;
     };
-    double low = 0.0, high = 0.0, factor = 1.0;
+    // Between the last factor that keeps more and the first that keeps less: by secants, the end
+    // that stays counted half (Illinois), and by halves while one end is not stable.
+    double low = 0.0, high = 0.0, above = 0.0, below = 0.0, factor = 1.0;
     for (int i = 0; i < 24 && (low == 0.0 || high == 0.0); ++i) {
-      if (modulus_of(factor) >= wanted_modulus) {
+      const double more = modulus_of(factor) - wanted_modulus;
+      if (more >= 0.0) {
         low = factor;
+        above = more;
         factor *= 1.25;
       } else {
         high = factor;
+        below = more;
         factor /= 1.25;
       }
     }
@@ -443,10 +448,28 @@ Outcome pid_beside(const Settings& s, const Machine& machine, double step, doubl
       result.pid_note = "No PID of this form has the margins of this ADRC.";
       return {};
     }
-    for (int i = 0; i < 14; ++i) {
-      const double middle = 0.5 * (low + high);
-      (modulus_of(middle) >= wanted_modulus ? low : high) = middle;
+    bool halves = below <= -wanted_modulus;
+    double lack = above;  // of the secant; that of `low` is `above`
+    int side = 0;
+    for (int i = 0; i < 20 && above > 1e-6 * wanted_modulus; ++i) {
+      const double share = halves ? 0.5 : lack / (lack - below);
+      const double middle = low + share * (high - low);
+      const double more = modulus_of(middle) - wanted_modulus;
+      if (more >= 0.0) {
+        low = middle;
+        above = lack = more;
+        if (side > 0) below *= 0.5;
+        side = 1;
+      } else {
+        high = middle;
+        below = more;
+        if (side < 0) lack *= 0.5;
+        side = -1;
+        halves = more <= -wanted_modulus;
+      }
     }
+    // To six digits, so that the last bit of a library of mathematics does not make another PID.
+    low = std::round(low * 1e6) / 1e6;
     const auto config = pid_of<Order>(s, low);
     if (!config) return config.error();
     const auto pid = esokit::PlainPid::make(*config);
