@@ -96,7 +96,7 @@ std::string mean_text(const Statistics& seeds) {
   // The deviation with two digits, and as many decimals for both.
   // Where it is nothing beside the mean, it says only that.
   if (deviation < 1e-6 * std::abs(seeds.mean)) {
-    return shown_text(seeds.mean) + " (" + number_text(deviation, 2) + ")";
+    return shown_text(seeds.mean) + " (nearly 0)";
   }
   const int decimals = std::clamp(1 - static_cast<int>(std::floor(std::log10(deviation))), 0, 17);
   return fixed(seeds.mean, decimals) + " (" + fixed(deviation, decimals) + ")";

@@ -85,7 +85,7 @@ int main(int argc, char** argv) {
       "hand-written observer never recovers; for esokit it is a missing sample.");
   figure.panel(0, 0)
       .x_label("t (s)")
-      .y_label("y")
+      .y_label("y (-)")
       .y_range(-0.05, 0.5)
       .legend(Legend::above)
       .line(bare.trace.t, bare.trace.y, {.name = "by hand", .color = Color::vermillion})

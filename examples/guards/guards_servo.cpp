@@ -53,14 +53,14 @@ void draw(Report& report, const std::string& name, const std::string& caption, c
   figure.caption(caption);
   figure.panel(0, 0)
       .x_label("t (s)")
-      .y_label("y")
+      .y_label("y (-)")
       .y_range(range)
       .legend(Legend::above)
       .line(bad.t, bad.y, {.name = bad_name, .color = Color::vermillion})
       .line(good.t, good.y, {.name = good_name, .color = Color::blue});
   figure.panel(0, 1)
       .x_label("t (s)")
-      .y_label(disturbance ? "dhat" : "u")
+      .y_label(disturbance ? "dhat (1/s²)" : "u (-)")
       .line(bad.t, disturbance ? bad.d : bad.u, {.color = Color::vermillion})
       .line(good.t, disturbance ? good.d : good.u, {.color = Color::blue});
   report.add(figure);

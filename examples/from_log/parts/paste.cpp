@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -10,6 +11,7 @@
 #include <esokit/adapter/guarded.hpp>
 #include <esokit/control/health.hpp>
 #include <esokit/core/version.hpp>
+#include <esokit/gain/gating_certificate.hpp>
 #include <esokit/sim/gaussian.hpp>
 #include <esokit/sim/run.hpp>
 #include <esokit/tune/controller.hpp>
@@ -78,39 +80,40 @@ struct Watch {
   int divider = 1;
 };
 
-/// Whether an observer with these gains is proven with the bound. With a constant d and a slope
-/// there is nothing to prove, and each level of a cascade is proven by itself.
+/// Whether `Guarded` proves an observer with these gains with the bound. What it computes for a
+/// chain is asked of each level, as its type for each kind of observer takes long to compile. With
+/// a slope of d there is nothing to prove.
 template <int Order>
 bool certified(const TuneModel& model, const TunedDesign& design, double bound) {
-  if (design.extension > 1) return bound < std::numeric_limits<double>::infinity();
-  const auto made = [&](auto observer_config, auto type) {
-    using Guard = esokit::Guarded<typename decltype(type)::type>;
-    observer_config.input_gain = model.input_gain.value;
-    observer_config.sample_time = model.sample_time;
-    typename Guard::Config config;
-    config.observer = observer_config;
-    config.disturbance_bound = bound;
-    return Guard::make(config).has_value();
-  };
+  if (!(bound < std::numeric_limits<double>::infinity())) return false;
+  if (design.extension > 1) return true;
+  constexpr int size = Order + 1;
   auto poles = esokit::detail::placed_poles<Order>(model, design);
   if (design.knows.lag) {
-    using Observer = esokit::ModelEso<esokit::ModelParts{.order = Order, .actuator = 1}, double,
-                                      esokit::PoleSet>;
-    typename Observer::Config config;
-    config.model.actuator.time_constant = model.lag;
+    using Guard =
+        esokit::Guarded<esokit::ModelEso<esokit::ModelParts{.order = Order, .actuator = 1}, double,
+                                         esokit::PoleSet>>;
+    typename Guard::Config config;
+    config.observer.input_gain = model.input_gain.value;
+    config.observer.sample_time = model.sample_time;
+    config.observer.model.actuator.time_constant = model.lag;
+    config.disturbance_bound = bound;
     poles.insert(poles.begin(), -1.0 / model.lag);
-    std::copy_n(poles.begin(), config.poles.size(), config.poles.begin());
-    return made(config, std::type_identity<Observer>{});
+    std::copy_n(poles.begin(), config.observer.poles.size(), config.observer.poles.begin());
+    return Guard::make(config).has_value();
   }
-  using Observer = esokit::LinearEso<Order, double, 1, esokit::PoleSet>;
-  typename Observer::Config config;
-  bool all = true;
   for (int level = 0; level < design.levels; ++level) {
-    std::copy_n(poles.begin(), config.poles.size(), config.poles.begin());
-    all = all && made(config, std::type_identity<Observer>{});
+    esokit::Array<std::complex<double>, size> placed{};
+    std::copy_n(poles.begin(), placed.size(), placed.begin());
+    const auto sampled =
+        esokit::SampledPoleSet<size, double>::from_continuous(placed, model.sample_time);
+    const auto gain = esokit::current_gain<size, double>(sampled.weights());
+    if (!esokit::gating_certified<size, double>(gain) ||
+        !esokit::holding(esokit::detail::ConstantLevel<size, double>(gain), false).stable)
+      return false;
     for (auto& pole : poles) pole *= design.settings.bandwidth_factor;
   }
-  return all;
+  return true;
 }
 
 Watch watch_of(const Tuning& tuning, const TunedDesign& design, const esokit::FitData& rows) {

@@ -844,7 +844,7 @@ inline ControllerSource controller_source(const TunedDesign& d, const TuneModel&
 
 /// All families for a model. A template, as `tune`, so that it costs compile time only where it is
 /// called.
-template <TuneKnowledge Parts>
+template <TuneKnowledge Parts = tune_knows_all>
 std::vector<Contender> contenders(const TuneModel& model, bool law_is_given) {
   std::vector<Contender> all;
   const auto take = [&](TuneFamily family, std::string name, const TuneKnowledge& knows, int m,
@@ -880,19 +880,20 @@ std::vector<Contender> contenders(const TuneModel& model, bool law_is_given) {
   chain(TuneFamily::filter, "frozen filter, LQR gains", 1, 1);
   chain(TuneFamily::free_poles, "LinearEso, free poles", 1, 1);
   with_number<1, 3>(model.order, [&](auto number) {
-    constexpr int order = number();
-    const auto known = [&](auto parts, TuneFamily family, const char* type, const char* what,
-                           const TuneKnowledge& knows) {
+    [[maybe_unused]] constexpr int order = number();
+    [[maybe_unused]] const auto known = [&](auto parts, TuneFamily family, const char* type,
+                                            const char* what, const TuneKnowledge& knows) {
       constexpr ModelParts p = decltype(parts)::value;
       take(family, std::string(type) + " that knows " + what, knows, 1, 1,
            known_kind<p>(model, family));
     };
-    const auto both = [&](auto parts, const char* what, const TuneKnowledge& knows) {
+    [[maybe_unused]] const auto both = [&](auto parts, const char* what,
+                                           const TuneKnowledge& knows) {
       known(parts, TuneFamily::linear, "LinearEso", what, knows);
       known(parts, TuneFamily::half_gain, "HalfGainEso", what, knows);
     };
-    const bool lag = model.lag > 0.0, sensor = model.sensor > 0.0,
-               sinusoid = !model.sinusoids.empty();
+    [[maybe_unused]] const bool lag = model.lag > 0.0, sensor = model.sensor > 0.0,
+                                sinusoid = !model.sinusoids.empty();
     if constexpr (Parts.lag) {
       using L = std::integral_constant<ModelParts, ModelParts{.order = order, .actuator = 1}>;
       if (lag) {
