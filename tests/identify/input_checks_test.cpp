@@ -143,6 +143,34 @@ TEST(GainInMotion, TellsFrictionThatHolds) {
             std::max(moving.high() - held.input_gain.value, 0.0) * (1 - 1e-12));
 }
 
+// A servo on a few steps, seen by an encoder: where it stands depends on y, and so does the
+// friction that holds it there. It is no spring.
+TEST(GainInMotion, FrictionThatHoldsIsNoForceByPosition) {
+  esokit::sim::Gaussian gaussian(7);
+  Log log;
+  log.sample_time = 0.01;
+  double y = 0, v = 0, r = 0;
+  for (int k = 0; k < 1500; ++k) {
+    if (k % 150 == 0) r = 4 * gaussian.next();
+    log.y.push_back(0.05 * std::round(y / 0.05));
+    log.u.push_back(0.3 * (r - log.y.back()) - 0.03 * v);
+    for (int i = 0; i < 20; ++i) {
+      const double force = 50 * log.u.back() - 2 * v;
+      if (v == 0 && std::abs(force) <= 12) continue;
+      const double next = v + 5e-4 * (force - std::copysign(12, v != 0 ? v : force));
+      v = v * next < 0 ? 0 : next;
+      y += 5e-4 * v;
+    }
+  }
+  esokit::IdentifyOptions options;
+  options.orders = {2};
+  options.averaged = 1;
+  const auto found = esokit::study(log, options).value();
+  EXPECT_FALSE(found.position);
+  EXPECT_TRUE(esokit::judge(found, log, options));
+  EXPECT_NEAR(found.input_gain.value, 50, found.input_gain.half_width);
+}
+
 TEST(GainInMotion, DiffersIfStandstillIsSmaller) {
   esokit::GainInMotion found{0.1, {-4, 0.5}, {-2.9, 0.59}, -3.6};
   EXPECT_TRUE(found.differ());

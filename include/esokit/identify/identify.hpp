@@ -605,19 +605,26 @@ inline std::optional<HeldLog> held_log(const FitData& rows, const FitModel& mode
 /// Whether a force that depends on position acts: it improves the likelihood by more than its
 /// parameters cost, or it leaves less than 1 / e of the mean square at a tenth of the bandwidth.
 /// (At the full bandwidth everything slow is attributed to the disturbance.)
-inline bool position_acts(const FitData& data, const OrderFit& order) {
+/// Friction that holds looks like such a force, as it takes most of u: not if it leaves less there.
+inline bool position_acts(const FitData& data, const OrderFit& order, bool friction) {
   FitData more = data;
   add_position(more);
   const FitData used = with_friction(more, order);
   InnovationsFit fit(used, order.model, order.bounds);
   const Fit found = fit.minimise(order.fit.at, true, 8);
-  if (criterion(found, static_cast<int>(position_columns)) < criterion(order.fit, 0)) return true;
   const FitData before = with_friction(data, order);
   InnovationsFit without(before, order.model, order.bounds);
   FitPoint slower = order.fit.at;
   slower.bandwidth *= 0.1;
-  const double left = without.minimise(slower, false, 8).mean_square;
-  return fit.minimise(slower, false, 8).mean_square < left / std::numbers::e;
+  const Fit left = without.minimise(slower, false, 8);
+  const double with = fit.minimise(slower, false, 8).mean_square;
+  const bool likely =
+      criterion(found, static_cast<int>(position_columns)) < criterion(order.fit, 0);
+  if (!likely && !(with < left.mean_square / std::numbers::e)) return false;
+  if (order.model.order != 2 || !friction) return true;
+  const auto speed = friction_speed(data, 2, order.fit.noise, order.fit.at.latency);
+  const auto held = held_log(data, order.model, order.bounds, left, speed);
+  return !held || !(held->fit.mean_square < with);
 }
 
 /// Computes b0 at the plateau for ranges of a scheduling column, and as a straight line over the
@@ -792,7 +799,7 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
       const int n = order.model.order;
       if (n > 1 && (simplest == nullptr || n < simplest->model.order)) simplest = &order;
     }
-    position = position_acts(rows, *simplest);
+    position = position_acts(rows, *simplest, options.friction);
     if (position) {
       std::copy_if(orders.begin(), orders.end(), std::back_inserter(of_speed),
                    [](const OrderFit& order) { return order.model.order == 1; });
