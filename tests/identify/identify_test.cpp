@@ -875,6 +875,10 @@ TEST(Rival, RefusesAnOrderGivenTooHigh) {
   EXPECT_GT(right.rival.left, 0.9);
   EXPECT_EQ(said(esokit::judge(right, log, options)), "accepted");
   EXPECT_NEAR(right.input_gain.value, 2, right.input_gain.half_width);
+  // A known column of y would show order 1 the y that it has to predict.
+  log.columns = {log.y};
+  options.position = false;
+  EXPECT_EQ(esokit::study(log, options).value().rival.order, 3);
 }
 
 TEST(Judge, RefusesByName) {

@@ -876,8 +876,10 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
   progress(0.5);
   result.plateau = find_plateau(fit, likely);
   if (result.plateau.middle > 0) {
+    // A column of y would show order 1 the y that it has to predict.
+    const int lowest = position || known > 0 ? 2 : 1;
     result.rival = rival_of(rows, orders, model.order, model.extension,
-                            result.plateau.points[result.plateau.middle].fit, position ? 2 : 1);
+                            result.plateau.points[result.plateau.middle].fit, lowest);
   }
   // When exactly the machine stands is known to some rows only: so times are those of all rows.
   const Plateau of_all = result.plateau;
