@@ -740,8 +740,8 @@ inline bool informed(const Identified& found) {
 
 /// Half width that b0 of a plateau within two octaves of the lowest bandwidth needs. There every
 /// fit is one of output error, so that neighbours agree tells nothing: b0 has to reach to the
-/// interval of that of up to four octaves above, where that leaves less than 1 / e of the mean
-/// square.
+/// interval of that of up to four octaves above, where the log is far more likely: by more than
+/// e^10.
 inline double reach_above(const Plateau& plateau, double bandwidth_min) {
   const Fit& here = plateau.points[plateau.middle].fit;
   double reach = 0.0;
@@ -749,7 +749,9 @@ inline double reach_above(const Plateau& plateau, double bandwidth_min) {
   const std::size_t high = std::min(plateau.middle + 8, plateau.points.size() - 1);
   for (std::size_t i = plateau.middle + 1; i <= high; ++i) {
     const PlateauPoint& point = plateau.points[i];
-    if (point.at_bound || !(point.fit.mean_square < here.mean_square / std::numbers::e)) continue;
+    const double gained = 0.5 * static_cast<double>(point.fit.rows) *
+                          std::log(here.mean_square / point.fit.mean_square);
+    if (point.at_bound || !(gained > 10.0)) continue;
     const double apart = std::abs(point.fit.linear[0] - here.linear[0]);
     reach = std::max(reach, apart - student_95(19) * point.errors.linear[0]);
   }
