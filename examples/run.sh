@@ -9,8 +9,8 @@ usage() {
   cat <<'END'
 usage: examples/run.sh [--out DIR] [--no-install] [NAME...]
 
-Builds the examples, runs them (or only those named: a program or a folder of examples/), and
-writes DIR/index.html with every figure and table beside the paper's numbers. The name playground is
+Builds the examples, runs them (or only those named: a program or a folder of examples/, with a
+slash behind it where a program has the same name), and writes DIR/index.html with every figure and table beside the paper's numbers. The name playground is
 DIR/playground.html alone, a page that runs the headers in a browser.
 
   --out DIR      where the results go (default: out/ in the repository)
@@ -75,7 +75,13 @@ for want in ${wanted[@]+"${wanted[@]}"}; do
     continue
   fi
   for i in "${!names[@]}"; do
-    if [[ $want == "${names[i]}" || $want == "${folders[i]}" ]]; then
+    if [[ $want == "${names[i]}" ]]; then
+      selected+=("$want")
+      found=yes
+    fi
+  done
+  [[ $found == no ]] && for i in "${!names[@]}"; do
+    if [[ ${want%/} == "${folders[i]}" ]]; then
       selected+=("${names[i]}")
       found=yes
     fi
