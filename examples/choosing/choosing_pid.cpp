@@ -145,10 +145,12 @@ std::vector<Row> rows_of(const Tuning& tuning, const std::vector<TunedRival>& ri
           for (int i = 0; i < all.rows(); ++i) all(i) = r[static_cast<std::size_t>(i)];
           if (!gap_gain && !std::isfinite(y)) {
             auto ahead = own;
-            ahead.update(y, all, applied);
+            ahead.applied(applied);
+            ahead.update(y, all);
             y = ahead.observer().estimate()(0);
           }
-          return own.update(y, all, applied);
+          own.applied(applied);
+          return own.update(y, all);
         };
       };
     };

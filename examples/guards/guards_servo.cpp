@@ -77,7 +77,8 @@ void scaled(Report& report) {
     double motor = 0;
     double held = 0;
     for (int k = 0; k < 2000; ++k) {
-      held = loop.update(mass.y, 0.2, told * held);
+      loop.applied(told * held);
+      held = loop.update(mass.y, 0.2);
       trace.add(k * T, mass.y, held, loop.observer().total_disturbance());
       for (int i = 0; i < 5; ++i) {
         motor += T / 5 / 0.005 * (held - motor);
@@ -247,7 +248,8 @@ Found watch(Wrong wrong, bool steps, std::uint64_t seed, double duration, Trace*
     const double t = k * T;
     const double r = steps ? (std::fmod(t, 2 * period) < period ? 0.3 : -0.3) : 0.0;
     const double y = mass.y + noise * random.normal();
-    u = stopped ? loop.track(y, r, 0) : loop.update(y, r, u);
+    loop.applied(u);
+    u = stopped ? loop.track(y, r, 0) : loop.update(y, r);
     if (probed && t > 1) u = probe.update(loop, y);
     monitor.look(loop);
     const auto& health = monitor.health();

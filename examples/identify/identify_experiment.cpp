@@ -168,7 +168,8 @@ int main(int argc, char** argv) {
         for (std::size_t i = 0; i < log.y.size(); ++i) {
           (void)whole.track(log.y[i], 0.0, i == 0 ? u0 : log.u[i - 1]);
         }
-        along = whole.update(measured, 0.0, held);
+        whole.applied(held);
+        along = whole.update(measured, 0.0);
         auto other = Controller::make(settings(experiment.result().value())).value();
         (void)other.start(measured, held);
         rested = other.update(measured, 0.0);

@@ -42,7 +42,6 @@
 #include <esokit/control/gain_probe.hpp>
 #include <esokit/control/health.hpp>
 #include <esokit/control/health_text.hpp>
-#include <esokit/control/incremental.hpp>
 #include <esokit/control/limiter.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/nonlinear_feedback.hpp>

@@ -113,7 +113,7 @@ List listed(const Estimate& estimate) {
   return list;
 }
 
-/// One with update(y, r, u_applied) and an observer.
+/// One with applied(u), update(y, r) and an observer.
 template <class Controller>
 void expect_is_linear(Controller controller, double share = 1e-11) {
   static_assert(AnalysedController<Controller>);
@@ -123,8 +123,8 @@ void expect_is_linear(Controller controller, double share = 1e-11) {
   expect_is(
       *form,
       [&](const List& y, const List& r, const List& u) -> List {
-        return {static_cast<double>(
-            controller.update(static_cast<S>(y[0]), static_cast<S>(r[0]), static_cast<S>(u[0])))};
+        controller.applied(static_cast<S>(u[0]));
+        return {static_cast<double>(controller.update(static_cast<S>(y[0]), static_cast<S>(r[0])))};
       },
       [&] { return listed(controller.observer().estimate()); }, share);
 }
@@ -135,7 +135,10 @@ void expect_adrc(const typename Observer::Config& config, double share = 1e-11, 
   using Controller = Adrc<Observer, Form>;
   using S = typename Controller::scalar_type;
   auto controller = Controller::make({.observer = config, .controller_bandwidth = S(4)}).value();
-  for (int k = 0; k < run; ++k) controller.update(S(0), S(0), S(0));
+  for (int k = 0; k < run; ++k) {
+    controller.applied(S(0));
+    controller.update(S(0), S(0));
+  }
   expect_is_linear(controller, share);
 }
 
@@ -310,7 +313,7 @@ TEST(LinearController, OfTwoPhases) {
     expect_is(
         form,
         [&](const List& y, const List& r, const List& u) -> List {
-          controller.report_applied(u[0]);
+          controller.applied(u[0]);
           controller.set_reference(r[0]);
           const double now = controller.control(y[0]);
           controller.prepare(0.0);
@@ -337,7 +340,8 @@ void expect_filter(const typename Controller::Config& config, double share) {
   expect_is(
       form,
       [&](const List& y, const List& r, const List& u) -> List {
-        return {controller.update(y[0], r[0], u[0])};
+        controller.applied(u[0]);
+        return {controller.update(y[0], r[0])};
       },
       {}, share);
 }
@@ -355,24 +359,6 @@ TEST(LinearController, OfTheFilterForms) {
                         .input_gain = 2.5,
                         .sample_time = T},
                        1e-11);
-}
-
-TEST(LinearController, OfIncrements) {
-  auto controller =
-      Incremental<Adrc<LinearEso<2>>>::make({.observer = linear, .controller_bandwidth = 4.0})
-          .value();
-  double sum = 0.0;        // of what was put out and of what it was reported to be
-  double increment = 0.0;  // the last one put out
-  expect_is(
-      linear_controller(controller).value(),
-      [&](const List& y, const List& r, const List& u) -> List {
-        // The actuator stands at u now; before the last increment it stood at `sum`.
-        const double applied = u[0] - sum;
-        increment = controller.update(y[0], r[0], applied);
-        sum = u[0];
-        return {sum + increment};
-      },
-      [&] { return listed(controller.controller().observer().estimate()); }, 1e-11);
 }
 
 /// A PI with a filtered derivative of the measurement, as a user has it.
@@ -421,7 +407,8 @@ TEST(LinearController, OfAControllerOfYoursAndACompensatorAroundIt) {
   expect_is(
       linear_controller(Compensated{compensator, base}).value(),
       [&](const List& y, const List& r, const List& u) -> List {
-        return {compensator.update(y[0], base.update(y[0], r[0]), u[0])};
+        compensator.applied(u[0]);
+        return {compensator.update(y[0], base.update(y[0], r[0]))};
       },
       [&] { return listed(compensator.observer().estimate()); }, 1e-11);
   // Its own description is told u0, what the compensator adds is not its own.
@@ -447,7 +434,8 @@ void expect_two_channels(const typename First::Config& first) {
   expect_is(
       linear_controller(controller),
       [&](const List& y, const List& r, const List& u) -> List {
-        return listed(controller.update({y[0], y[1]}, {r[0], r[1]}, {u[0], u[1]}));
+        controller.applied({u[0], u[1]});
+        return listed(controller.update({y[0], y[1]}, {r[0], r[1]}));
       },
       [&] {
         List all = listed(controller.template observer<0>().estimate());

@@ -7,7 +7,6 @@
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/dual_feedback.hpp>
-#include <esokit/control/incremental.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/nonlinear_feedback.hpp>
 #include <esokit/control/pid_conversion.hpp>
@@ -201,38 +200,6 @@ TEST(PredictiveAdrcAbsurd, OutputStaysWithinLimits) {
   predictive_stays_within_limits<CascadeEso<2, 3, float>>();
 }
 
-// ---- Incremental
-
-TEST(IncrementalAbsurd, IncrementsAreFinite) {
-  using Incremental = esokit::Incremental<Adrc<LinearEso<2, float>>>;
-  const float top = std::numeric_limits<float>::max();
-  const auto settings = config<Adrc<LinearEso<2, float>>>();
-  auto controller = Incremental::make(settings).value();
-  float sum = 0;
-  for (int k = 0; k < 200; ++k) {
-    const float increment = controller.update(k % 2 == 0 ? 1e34f : -1e34f, 0.0f);
-    ASSERT_TRUE(esokit::is_finite(increment)) << k;
-    sum += increment;
-    ASSERT_TRUE(esokit::is_finite(sum)) << k;
-    const float reported = controller.update(0.0f, 0.0f, k % 3 == 0 ? top : -top);
-    ASSERT_TRUE(esokit::is_finite(reported)) << k;
-    ASSERT_LE(std::abs(controller.controller().output()), top / 2);
-    sum = controller.controller().output();
-  }
-  EXPECT_EQ(controller.start(0.0f, top), StepStatus::input_rejected);
-  EXPECT_EQ(controller.start(0.0f, -top), StepStatus::input_rejected);
-  EXPECT_EQ(controller.start(0.0f, top / 2), StepStatus::ok);
-  // Limits are not repaired where they are bad, nor by retune.
-  auto bad = settings;
-  bad.limits.lower = -hidden_infinity<float>();
-  EXPECT_EQ(refusal(Incremental::make(bad)), "limits.lower: must be finite");
-  EXPECT_EQ(refusal(controller.retune(bad)), "limits.lower: must be finite");
-  bad.limits.lower = hidden_nan<float>();
-  EXPECT_EQ(refusal(Incremental::make(bad)), "limits.lower: must be finite");
-  EXPECT_TRUE(controller.retune(settings).has_value());
-  EXPECT_EQ(controller.controller().output(), top / 2);
-}
-
 // ---- retune after absurd numbers
 
 TEST(DualFeedbackAbsurd, RetuneKeepsTheOutput) {
@@ -267,7 +234,8 @@ TEST(MimoAbsurd, RetuneIsRefusedOrFinite) {
   settings.input_matrix = {{2, 1}, {0, 2}};
   auto controller = Mimo::make(settings).value();
   const double top = std::numeric_limits<double>::max();
-  (void)controller.update({0, 0}, {0, 0}, {0.9 * top, 0.9 * top});
+  controller.applied({0.9 * top, 0.9 * top});
+  (void)controller.update({0, 0}, {0, 0});
   for (const double scale : {1e-3, 1.0, 3.0}) {
     auto changed = settings;
     changed.input_matrix = {{2 * scale, -scale}, {0, -2 * scale}};

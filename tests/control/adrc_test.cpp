@@ -6,7 +6,6 @@
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
-#include <esokit/control/incremental.hpp>
 #include <esokit/control/tracking_differentiator.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/observer/linear_eso.hpp>
@@ -64,24 +63,12 @@ TEST(Adrc, TakesAListOfTheReferenceAndItsDerivatives) {
     EXPECT_EQ(listed.update(0.3, {r, r1, r2}),
               given.update(0.3, EigenMatrix<double, 3>(r, r1, r2)));
     EXPECT_EQ(listed.update(0.3, {r, r1}), given.update(0.3, EigenMatrix<double, 2>(r, r1)));
-    EXPECT_EQ(listed.update(0.3, {r, r1, 7}, 0.1),
-              given.update(0.3, EigenMatrix<double, 3>(r, r1, 7), 0.1));
+    listed.applied(0.1);
+    given.applied(0.1);
+    EXPECT_EQ(listed.update(0.3, {r, r1, 7}), given.update(0.3, EigenMatrix<double, 3>(r, r1, 7)));
     EXPECT_EQ(listed.update_without_measurement({r, r1}),
               given.update_without_measurement(EigenMatrix<double, 2>(r, r1)));
     EXPECT_NE(listed.output(), 0);
-  }
-}
-
-TEST(Adrc, IncrementalTakesAListToo) {
-  const double r = 0.5, r1 = 0.25, r2 = 7;
-  auto listed = esokit::Incremental<Linear>::make(base()).value();
-  auto given = listed;
-  for (int k = 0; k < 3; ++k) {
-    const double increment = given.update(0.3, EigenMatrix<double, 3>(r, r1, r2));
-    EXPECT_EQ(listed.update(0.3, {r, r1, r2}), increment);
-    EXPECT_NE(increment, 0);
-    EXPECT_EQ(listed.update(0.3, {r, r1}, 0.1),
-              given.update(0.3, EigenMatrix<double, 2>(r, r1), 0.1));
   }
 }
 
@@ -182,66 +169,6 @@ TEST(Adrc, FollowsATrackingDifferentiator) {
   EXPECT_NEAR(plant.output(), 2, 1e-5);
   EXPECT_LT(peak, 2.05);
   EXPECT_LT(fastest, 1.6 * 4 / 2);  // about the profile's acceleration, not the step's
-}
-
-TEST(Adrc, IncrementsAddUpToU) {
-  auto settings = base();
-  settings.limits = {.lower = -4, .upper = 3, .rate = 500};
-  auto position = Linear::make(settings).value();
-  auto velocity = esokit::Incremental<Linear>::make(settings).value();
-  auto reported = velocity;
-  ChainPlant plant(2, period, 2, -3);
-  double u = 0;
-  for (int k = 0; k < 1500; ++k) {
-    const double y = plant.output();
-    const double r = k % 500 < 250 ? 1 : 0;
-    const double wanted = position.update(y, r);
-    const double increment = velocity.update(y, r);
-    ASSERT_LE(std::abs(increment), 0.5 + 1e-12);
-    const double all = k == 0 ? reported.update(y, r) : reported.update(y, r, increment);
-    (void)all;
-    u += increment;
-    ASSERT_NEAR(u, wanted, 1e-9);
-    plant.step(u);
-  }
-}
-
-/// What the actuator reports is where u goes on from: beside a position controller that is told the
-/// position.
-TEST(Adrc, ReportedIncrementsAreThePosition) {
-  auto position = Linear::make(base()).value();
-  auto velocity = esokit::Incremental<Linear>::make(base()).value();
-  Random random(12);
-  double held = position.update(0.0, 0.0);
-  velocity.update(0.0, 0.0);
-  double applied = held;
-  for (int k = 0; k < 50; ++k) {
-    const double y = random.uniform(-1e-3, 1e-3);
-    const double u = position.update(y, 0.0, held);
-    const double increment = velocity.update(y, 0.0, applied);
-    ASSERT_NEAR(increment, u - held, 1e-9) << k;
-    applied = increment * random.uniform(0, 1.2);
-    held += applied;
-  }
-  velocity.update(0.0, 0.0, hidden_nan<double>());
-  EXPECT_TRUE(std::isfinite(velocity.controller().output()));
-}
-
-/// An actuator that loses every third increment, and an offset that nobody knows.
-TEST(Adrc, IncrementalWithALossyActuator) {
-  auto velocity = esokit::Incremental<Linear>::make(base()).value();
-  ChainPlant plant(2, period, 2, -3);
-  velocity.start(0);
-  double u = 5;  // the truth; the controller counts from zero
-  double applied = 0;
-  for (int k = 0; k < 6000; ++k) {
-    const double increment = velocity.update(plant.output(), 1.0, applied);
-    applied = k % 3 == 2 ? 0 : increment;
-    u += applied;
-    plant.step(u);
-  }
-  EXPECT_NEAR(plant.output(), 1, 1e-6);
-  EXPECT_NEAR(u, 1.5, 1e-4);
 }
 
 // ---- controller gains
@@ -362,8 +289,10 @@ TEST(Adrc, AsymmetricLimitsAndRateFromAReportedInput) {
   auto controller = Linear::make(settings).value();
   EXPECT_EQ(controller.update(0.0, 100.0), 1);  // one step of 1000 * 1 ms
   EXPECT_EQ(controller.update(0.0, -100.0), 0);
-  EXPECT_EQ(controller.update(0.0, 100.0, 6.0), 7);   // the rate counts from what is held
-  EXPECT_EQ(controller.update(0.0, 100.0, 20.0), 8);  // held beyond the limit: back to the limit
+  controller.applied(6.0);
+  EXPECT_EQ(controller.update(0.0, 100.0), 7);  // the rate counts from what is held
+  controller.applied(20.0);
+  EXPECT_EQ(controller.update(0.0, 100.0), 8);  // held beyond the limit: back to the limit
 }
 
 // ---- delay and angle
@@ -475,8 +404,8 @@ TEST(Adrc, AngleLoopNeverRunsAway) {
           const double before = plant.output();
           const double y = before - (fault == 0 && k == 500 ? 2.6 : 0);
           const double measured = y - turn * std::floor(y / turn);
-          const double u = fault == 1 && k == 500 ? controller.update(measured, 0.5, 4e6)
-                                                  : controller.update(measured, 0.5);
+          if (fault == 1 && k == 500) controller.applied(4e6);
+          const double u = controller.update(measured, 0.5);
           plant.step(u);
           fastest = std::max(fastest, std::abs(plant.output() - before) / 0.01);
         }

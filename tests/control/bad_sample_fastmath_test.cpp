@@ -42,7 +42,8 @@ void bad_samples(Controller controller) {
     if (!error_based<Controller>) {
       EXPECT_TRUE(same_bits(u, before));
     }
-    u = controller.update(half, half, bad);
+    controller.applied(bad);
+    u = controller.update(half, half);
     EXPECT_TRUE(esokit::is_finite(u));
     for (int k = 0; k < 5; ++k) u = controller.update(half, half);
     EXPECT_TRUE(esokit::is_finite(u));

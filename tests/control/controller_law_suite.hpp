@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <esokit/control/disturbance_compensator.hpp>
-#include <esokit/control/incremental.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/eigen.hpp>
 #include <functional>
@@ -51,7 +50,7 @@ class AnyController {
   virtual ~AnyController() = default;
   [[nodiscard]] virtual std::unique_ptr<AnyController> copy() const = 0;
   virtual double update(double y, double r) = 0;
-  virtual double update(double y, double r, double u_applied) = 0;
+  virtual void applied(double u) = 0;
   virtual double update_with_rate(double y, double r, double rate) = 0;
   virtual double update_without_measurement(double r) = 0;
   virtual double track(double y, double r, double u_applied) = 0;
@@ -75,7 +74,6 @@ struct ControllerType {
   bool bears_regular_gaps;  ///< ObserverTraits
   std::unique_ptr<AnyController> (*make)(const LoopSetup&);
   std::string (*refusal_of)(const LoopSetup&);  ///< "accepted", or the refusal
-  Form (*incremental)(const LoopSetup&);        ///< of y and r; the sum of its increments
   Form (*compensator)(const LoopSetup&);        ///< of y and the output of the base controller
   Form (*mimo)(const LoopSetup&);               ///< of y and r; one channel
 };
@@ -86,7 +84,6 @@ class ErasedController;
 template <class O, class F>
 class ErasedController<Adrc<O, F>> final : public AnyController {
   using Controller = Adrc<O, F>;
-  using Incremental = esokit::Incremental<Controller>;
   using Compensator = esokit::DisturbanceCompensator<O>;
   using Mimo = esokit::MimoAdrc<O>;
   using S = typename O::scalar_type;
@@ -99,9 +96,7 @@ class ErasedController<Adrc<O, F>> final : public AnyController {
     return std::make_unique<ErasedController>(*this);
   }
   double update(double y, double r) override { return d(c_.update(s(y), s(r))); }
-  double update(double y, double r, double u_applied) override {
-    return d(c_.update(s(y), s(r), s(u_applied)));
-  }
+  void applied(double u) override { c_.applied(s(u)); }
   double update_with_rate(double y, double r, double rate) override {
     return d(c_.update(s(y), esokit::EigenMatrix<S, 2>(s(r), s(rate))));
   }
@@ -137,13 +132,6 @@ class ErasedController<Adrc<O, F>> final : public AnyController {
     };
     type.refusal_of = [](const LoopSetup& setup) {
       return refusal(Controller::make(config(setup)));
-    };
-    type.incremental = [](const LoopSetup& setup) -> ControllerType::Form {
-      return [form = Incremental::make(config(setup)).value(), sum = S(0)](double y,
-                                                                           double r) mutable {
-        sum += form.update(s(y), s(r));
-        return d(sum);
-      };
     };
     // These two are fed y.
     if constexpr (!error_based) {

@@ -156,7 +156,8 @@ TEST(DisturbanceCompensator, LimitsMissingAndErrors) {
   auto compensator = Compensator::make(settings).value();
   for (int k = 0; k < 3; ++k) EXPECT_EQ(compensator.update(0, 9.0), 0.25);
   EXPECT_NEAR(compensator.update(0, 9.0), 0.35, 1e-12);
-  EXPECT_EQ(compensator.update(0, 9.0, 1.95), 2);
+  compensator.applied(1.95);
+  EXPECT_EQ(compensator.update(0, 9.0), 2);
   compensator.update(hidden_nan<double>(), 0.0);
   compensator.update_without_measurement(0.0);
   EXPECT_EQ(compensator.mode(), LoopMode::running);

@@ -13,7 +13,6 @@
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/dual_feedback.hpp>
-#include <esokit/control/incremental.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/nonlinear_feedback.hpp>
 #include <esokit/control/predictive_adrc.hpp>
@@ -140,7 +139,7 @@ struct GatedModel {
 template <class Kind>
 struct InAdrc {
   template <class T>
-  using Type = esokit::Incremental<esokit::Adrc<typename Kind::template Type<T>>>;
+  using Type = esokit::Adrc<typename Kind::template Type<T>>;
   template <class T>
   static typename Type<T>::Config config(int lane, bool again) {
     typename Type<T>::Config config{};
@@ -361,23 +360,22 @@ TEST(LaneByLane, ACascadeWithAModel) { expect_lanes<Modelled>(observe); }
 const auto control = [](auto& c, const auto& x, int k) {
   if (k % 113 == 50) (void)c.start(x[0], x[1]);
   if (k % 13 == 5) return c.update(x[0], {x[1], x[2]});
-  return k % 7 == 3 ? c.update(x[0], x[1], x[3]) : c.update(x[0], x[1]);
+  if (k % 7 == 3) c.applied(x[3]);
+  return c.update(x[0], x[1]);
 };
 
-TEST(LaneByLane, IncrementalAdrcOfAnAngle) {
+TEST(LaneByLane, AdrcOfAnAngle) {
   expect_lanes<InAdrc<GatedAngle>>([](auto& c, const auto& x, int k) {
     const auto u = control(c, x, k);
-    const auto& inner = c.controller();
-    return Answers(u, inner.output(), inner.requested(), inner.status(), inner.mode(),
-                   inner.gains(), inner.observer().estimate());
+    return Answers(u, c.output(), c.requested(), c.status(), c.mode(), c.gains(),
+                   c.observer().estimate());
   });
 }
 
 TEST(LaneByLane, AdrcOfAGatedModel) {
   expect_lanes<InAdrc<GatedModel>>([](auto& c, const auto& x, int k) {
     const auto u = control(c, x, k);
-    const auto& inner = c.controller();
-    return Answers(u, inner.status(), inner.mode(), inner.observer().estimate());
+    return Answers(u, c.status(), c.mode(), c.observer().estimate());
   });
 }
 
@@ -397,9 +395,9 @@ const auto predict_control = [](auto& c, const auto& x, int k) {
   if (k % 113 == 50) (void)c.start(x[0], x[1]);
   if (k % 113 == 90) (void)c.reset(x[0]);
   const auto u = k % 11 == 7 ? c.control_without_measurement() : c.control(x[0]);
-  if (k % 5 == 2) (void)c.report_applied(x[3]);
+  if (k % 5 == 2) (void)c.applied(x[3]);
   const auto status = k % 13 == 5 ? c.prepare({x[1], x[2]}) : c.prepare(x[1]);
-  if (k % 7 == 1) (void)c.report_applied(x[3]);
+  if (k % 7 == 1) (void)c.applied(x[3]);
   if (k % 17 == 3) c.set_reference(x[2]);
   return Answers(u, status, c.output(), c.blind_output(), c.status(), c.gains(),
                  c.observer().estimate());
@@ -413,8 +411,8 @@ TEST(LaneByLane, PredictiveAdrc) {
 TEST(LaneByLane, MimoAdrc) {
   expect_lanes<TwoChannels>([](auto& c, const auto& x, int k) {
     if (k % 113 == 50) (void)c.start({x[0], x[2]}, {x[1], x[3]});
-    const auto u = k % 7 == 3 ? c.update({x[0], x[2]}, {x[1], x[3]}, {x[3], x[1]})
-                              : c.update({x[0], x[2]}, {x[1], x[3]});
+    if (k % 7 == 3) c.applied({x[3], x[1]});
+    const auto u = c.update({x[0], x[2]}, {x[1], x[3]});
     return Answers(u, c.output(), c.status(0), c.status(1), c.template observer<0>().estimate(),
                    c.template observer<1>().estimate());
   });
@@ -442,7 +440,8 @@ TEST(LaneByLane, Differentiators) {
 
 const auto filter = [](auto& c, const auto& x, int k) {
   if (k % 113 == 50) (void)c.start(x[1], x[3]);
-  const auto u = k % 7 == 3 ? c.update(x[0], x[1], x[3]) : c.update(x[0], x[1]);
+  if (k % 7 == 3) c.applied(x[3]);
+  const auto u = c.update(x[0], x[1]);
   return Answers(u, c.output(), c.requested(), c.status());
 };
 

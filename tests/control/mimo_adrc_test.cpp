@@ -278,7 +278,8 @@ TEST(MimoAdrc, BadSamplesOfOneChannel) {
   const EigenMatrix<double, 2> before = controller.output();
   EXPECT_EQ(controller.update({0, 0.1}, {nan, nan}), before);
   EXPECT_TRUE(std::isfinite(controller.update({0, 0.1}, {0, 0}).sum()));
-  controller.update({0, 0.1}, {0, 0}, {nan, 0.5});
+  controller.applied({nan, 0.5});
+  controller.update({0, 0.1}, {0, 0});
   EXPECT_TRUE(std::isfinite(controller.output().sum()));
   {
     const NoAllocation guard;

@@ -172,7 +172,8 @@ class PairOf final : public Pair {
         case Call::update:
           return Answers(c.update(in(y), in(r)));
         case Call::report:
-          return Answers(c.update(in(y), in(r), in(u)));
+          c.applied(in(u));
+          return Answers(c.update(in(y), in(r)));
         case Call::miss:
           return Answers(c.update_without_measurement(in(r)));
         case Call::derive: {

@@ -509,9 +509,9 @@ void late_report(const typename Controller<Observer>::Config& config) {
   auto never = early;
   EXPECT_EQ(early.control(0.3), late.control(0.3));
   never.control(0.3);
-  early.report_applied(-2.5);
+  early.applied(-2.5);
   for (auto* controller : {&early, &late, &never}) controller->prepare(0.7);
-  EXPECT_EQ(late.report_applied(-2.5), StepStatus::ok);
+  EXPECT_EQ(late.applied(-2.5), StepStatus::ok);
   const auto a = early.observer().estimate();
   const auto b = late.observer().estimate();
   const auto c = never.observer().estimate();
@@ -528,7 +528,7 @@ void late_report(const typename Controller<Observer>::Config& config) {
   // A bad report is not taken.
   late.prepare(0.7);
   const auto before = late.observer().estimate();
-  EXPECT_EQ(late.report_applied(hidden_nan<double>()), StepStatus::input_rejected);
+  EXPECT_EQ(late.applied(hidden_nan<double>()), StepStatus::input_rejected);
   EXPECT_EQ(late.observer().estimate(), before);
 }
 
@@ -550,7 +550,7 @@ TEST(PredictiveAdrc, the_rate_limit_goes_on_from_what_was_reported) {
     controller.set_reference(1e6);
     EXPECT_EQ(controller.control(0), 1);
     if (late) controller.prepare(1e6);
-    controller.report_applied(-5);
+    controller.applied(-5);
     if (!late) controller.prepare(1e6);
     EXPECT_EQ(controller.control(0), -4);
     // Downwards as well.
@@ -667,7 +667,7 @@ TEST(PredictiveAdrc, start_tells_the_observer_its_input) {
       .controller_bandwidth = 5};
   auto controller = Controller<Observer>::make(config).value();
   ASSERT_EQ(controller.start(1, 5), StepStatus::ok);
-  ASSERT_EQ(controller.report_applied(5), StepStatus::ok);
+  ASSERT_EQ(controller.applied(5), StepStatus::ok);
   EXPECT_EQ(controller.observer().estimate(), Eigen::Vector2d(1, -5));
   config.observer.input_gain = 2;
   ASSERT_TRUE(controller.retune(config).has_value());
@@ -737,7 +737,7 @@ TEST(PredictiveAdrc, allocates_nothing) {
       sink += controller.control(0.1) + filter.control(0.1);
       controller.prepare(1.0);
       filter.prepare(esokit::EigenMatrix<double, 3>(1, 2, 3));
-      controller.report_applied(0.3);
+      controller.applied(0.3);
       sink += controller.control_without_measurement();
       controller.prepare(1.0);
       sink += controller.update(hidden_nan<double>(), 1.0);

@@ -43,7 +43,7 @@ class Loop {
  public:
   virtual ~Loop() = default;
   virtual double update(double y, double r) = 0;
-  virtual double update(double y, double r, double u_applied) = 0;
+  virtual void applied(double u) = 0;
   virtual double track(double y, double r, double u_applied) = 0;
   virtual void start(double y, double u) = 0;
   /// Guards of any kind, where there are some, and none of them.
@@ -70,9 +70,7 @@ class LoopOf final : public Loop {
     wraps = requires { c_.observer().wrap(S(0)); };
   }
   double update(double y, double r) override { return static_cast<double>(c_.update(s(y), s(r))); }
-  double update(double y, double r, double u) override {
-    return static_cast<double>(c_.update(s(y), s(r), s(u)));
-  }
+  void applied(double u) override { c_.applied(s(u)); }
   double track(double y, double r, double u) override {
     return static_cast<double>(c_.track(s(y), s(r), s(u)));
   }
@@ -137,7 +135,8 @@ void back_at_the_reference(Make make) {
           u = loop->track(any(), any(), any());
           break;
         case 2:
-          u = loop->update(angle(), r, any());
+          loop->applied(any());
+          u = loop->update(angle(), r);
           break;
         default:
           u = loop->update(any(), any());

@@ -10,7 +10,6 @@
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/dual_feedback.hpp>
-#include <esokit/control/incremental.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/gain/pole_set.hpp>
@@ -165,9 +164,8 @@ TEST(Settings, OfControllersAreAdopted) {
   using Guards = Adrc<Guarded<LinearEso<1>>, ErrorBased>;
   every_setting_is_adopted("Adrc<Guarded>",
                            {of<Guards>(), of<Guards>(by_gains), of<Guards>(softly)}, {15, 16});
-  using Steps = Incremental<Adrc<LinearEso<1>>>;
-  every_setting_is_adopted("Incremental", {of<Steps>(), of<Steps>(by_gains), of<Steps>(softly)},
-                           {11, 12});
+  using Plain = Adrc<LinearEso<1>>;
+  every_setting_is_adopted("Adrc", {of<Plain>(), of<Plain>(by_gains), of<Plain>(softly)}, {11, 12});
   using Predictive = PredictiveAdrc<LinearEso<2>>;
   every_setting_is_adopted("PredictiveAdrc", {of<Predictive>(), of<Predictive>(by_gains)});
   using Around = DisturbanceCompensator<LinearEso<1>>;

@@ -362,7 +362,8 @@ void finds_out(unsigned seed, double omega_T, int cases) {
           controller.update_without_measurement(held);
           break;
         case 1:
-          controller.update(y, held, anything<S>(random));
+          controller.applied(anything<S>(random));
+          controller.update(y, held);
           break;
         default:
           controller.update(y, held);

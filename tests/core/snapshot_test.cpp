@@ -14,7 +14,6 @@
 #include <esokit/control/algebraic_filter.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/dual_feedback.hpp>
-#include <esokit/control/incremental.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/core/snapshot.hpp>
 #include <esokit/core/snapshot_text.hpp>
@@ -250,7 +249,7 @@ TEST(Snapshot, EveryTypeHasATagOfItsOwn) {
            PredictorCorrector<2, float, 1, SwitchedGain<3, float>>,
            PredictorCorrector<2, float, 1, NonlinearGain<3, float>>, Adrc<Eso>,
            Adrc<Eso, ErrorBased>, Adrc<WrappedOutput<Eso>>, PredictiveAdrc<Eso>,
-           DisturbanceCompensator<Eso>, Incremental<Adrc<Eso>>, DualFeedbackAdrc<2, float>,
+           DisturbanceCompensator<Eso>, DualFeedbackAdrc<2, float>,
            DualFeedbackAdrc<2, float, 1, DeltaOperator>, TransferFunctionAdrc<2, float>,
            DualFeedbackAdrc<2, float, 1, ShiftOperator, LimitedFeedback, PoleSet>>();
   EXPECT_EQ(std::ranges::count(all, 0u), 0);

@@ -8,7 +8,6 @@
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/dual_feedback.hpp>
-#include <esokit/control/incremental.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/gain/pole_set.hpp>
@@ -37,7 +36,6 @@ void add_controllers(std::vector<Kind>& kinds) {
   KIND(Adrc<LinearEso<1, double>, ErrorBased>);
   KIND(Adrc<WrappedOutput<LinearEso<2, float>>, ErrorBased>);
   KIND(Adrc<VariableTime<LinearEso<2, float>>>);
-  KIND(Incremental<Adrc<LinearEso<1, float>>>);
   KIND(DisturbanceCompensator<LinearEso<2, float>>);
   KIND(PredictiveAdrc<CascadeEso<1, 2, double>>);
   KIND(PredictiveAdrc<AdjustableBandwidthEso<2, float>>);

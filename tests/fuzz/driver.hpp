@@ -56,7 +56,8 @@ constexpr int order_of() {
 /// requires-expression in a member to exist.
 template <class T>
 concept TakesReferences = requires(T& o, typename T::scalar_type s, typename T::Reference r) {
-  o.update(s, r, s);
+  o.update(s, r);
+  o.update_without_measurement(r);
 };
 
 /// The transfer-function form integrates what it is told, and is not told of limits: no way back.
@@ -454,10 +455,6 @@ class Driver final : public Game {
           const S y = d.number(), u = d.number(), r = d.number({1e-3, 1, true});
           d.stepped(d.quietly([&] { return d.object_->update_weighted(y, u, r); }), &y, &u);
         });
-        add(a, "correct_weighted", [](Driver& d) {
-          const S y = d.number(), r = d.number({1e-3, 1, true});
-          d.stepped(d.quietly([&] { return d.object_->correct_weighted(y, r); }), &y, nullptr);
-        });
       }
       if constexpr (requires(T & o, S s) { o.set_trust(s); }) {
         add(a, "set_trust", [](Driver& d) {
@@ -523,13 +520,16 @@ class Driver final : public Game {
         }
       }
       if constexpr (requires(T & o, S s) {
-                      { o.update(s, s, s) } -> std::same_as<S>;
-                      o.output();
+                      { o.update(s, s) } -> std::same_as<S>;
+                      o.applied(s);
                     }) {
         for (int weight = 0; weight < 2; ++weight) {
-          add(a, "update(y, r, u)", [](Driver& d) {
+          add(a, "applied(u), update(y, r)", [](Driver& d) {
             const S y = d.number(), r = d.number(), u = d.number();
-            d.control(&y, &u, [&] { return d.object_->update(y, r, u); });
+            d.control(&y, &u, [&] {
+              d.object_->applied(u);
+              return d.object_->update(y, r);
+            });
           });
         }
       }
@@ -539,11 +539,14 @@ class Driver final : public Game {
           const auto r = d.template state<typename T::Reference>();
           d.control(&y, nullptr, [&] { return d.object_->update(y, r); });
         });
-        add(a, "update(y, references, u)", [](Driver& d) {
+        add(a, "applied(u), update(y, references)", [](Driver& d) {
           const S y = d.number();
           const auto r = d.template state<typename T::Reference>();
           const S u = d.number();
-          d.control(&y, &u, [&] { return d.object_->update(y, r, u); });
+          d.control(&y, &u, [&] {
+            d.object_->applied(u);
+            return d.object_->update(y, r);
+          });
         });
         add(a, "update_without_measurement(references)", [](Driver& d) {
           const auto r = d.template state<typename T::Reference>();
@@ -614,7 +617,6 @@ class Driver final : public Game {
                       o.prepare(s);
                     })
         two_phases(a);
-      if constexpr (requires(const T& o) { o.controller(); }) increments(a);
       if constexpr (
           requires { T::channels; } || requires { T::outputs; })
         several(a);
@@ -707,19 +709,19 @@ class Driver final : public Game {
         (void)d.object_->prepare(r);
       }
     });
-    add(a, "control, report_applied, prepare(references)", [](Driver& d) {
+    add(a, "control, applied, prepare(references)", [](Driver& d) {
       const S y = d.number(), u = d.number();
       const auto r = d.template state<typename T::Reference>();
       const S from = d.object_->output();
       d.put_out(d.quietly([&] { return d.object_->control(y); }), from);
-      const StepStatus reported = d.quietly([&] { return d.object_->report_applied(u); });
+      const StepStatus reported = d.quietly([&] { return d.object_->applied(u); });
       if (!is_finite(u) && !has(reported, StepStatus::input_rejected))
         d.fail("a bad u is not reported");
       d.stepped(d.quietly([&] { return d.object_->prepare(r); }), &y, nullptr);
     });
-    add(a, "report_applied", [](Driver& d) {
+    add(a, "applied", [](Driver& d) {
       const S u = d.number();
-      (void)d.quietly([&] { return d.object_->report_applied(u); });
+      (void)d.quietly([&] { return d.object_->applied(u); });
     });
     add(a, "set_reference", [](Driver& d) {
       const S r = d.number();
@@ -733,38 +735,6 @@ class Driver final : public Game {
       const S y = d.number();
       d.refusable([&] { return d.object_->reset(y); });
     });
-  }
-
-  static void increments(std::vector<Action>& a) {
-    const auto step = [](Driver& d, auto&& call) {
-      const S change = d.quietly(call);
-      if (!is_finite(change)) return d.fail("the increment is not finite");
-      const S u = d.object_->controller().output();
-      if (u < d.config_.limits.lower || u > d.config_.limits.upper)
-        d.fail("the sum is outside of the limits");
-    };
-    static_cast<void>(step);
-    for (int weight = 0; weight < 3; ++weight) {
-      add(a, "increment", [](Driver& d) {
-        const S y = d.number(), r = d.number();
-        const S change = d.quietly([&] { return d.object_->update(y, r); });
-        d.incremented(change);
-      });
-    }
-    add(a, "increment, reported", [](Driver& d) {
-      const S y = d.number(), r = d.number(), applied = d.number();
-      const S change = d.quietly([&] { return d.object_->update(y, r, applied); });
-      d.incremented(change);
-    });
-  }
-
-  void incremented(S change) {
-    if (!is_finite(change)) return fail("the increment is not finite");
-    if constexpr (requires(const T& o) { o.controller().output(); }) {
-      const S u = object_->controller().output();
-      if (u < config_.limits.lower || u > config_.limits.upper)
-        fail("the sum is outside of the limits");
-    }
   }
 
   static void several(std::vector<Action>& a) {
@@ -781,7 +751,8 @@ class Driver final : public Game {
         for (int i = 0; i < from.size(); ++i) {
           if (is_finite(u(i))) from(i) = u(i);
         }
-        d.all_out(y, d.quietly([&] { return d.object_->update(y, r, u); }), from);
+        d.quietly([&] { d.object_->applied(u); });
+        d.all_out(y, d.quietly([&] { return d.object_->update(y, r); }), from);
       });
       add(a, "start", [](Driver& d) {
         const V y = d.template vector<V>(), u = d.template vector<V>();
@@ -829,11 +800,13 @@ class Driver final : public Game {
         d.all_seen(d.quietly([&] { return d.object_->correct(y); }), &y,
                    static_cast<const U*>(nullptr));
       });
-      add(a, "correct_some", [](Driver& d) {
-        const Y y = d.template vector<Y>();
-        esokit::Array<bool, T::outputs> present{};
-        for (bool& each : present) each = d.tape_->once_in(2);
-        (void)d.quietly([&] { return d.object_->correct_some(y, present); });
+      add(a, "correct, some missing", [](Driver& d) {
+        Y y = d.template vector<Y>();
+        for (int i = 0; i < T::outputs; ++i) {
+          if (d.tape_->once_in(2)) y(i) = esokit_test::hidden_nan<S>();
+        }
+        d.all_seen(d.quietly([&] { return d.object_->correct(y); }), &y,
+                   static_cast<const U*>(nullptr));
       });
       add(a, "reset(y)", [](Driver& d) {
         const Y y = d.template vector<Y>();
@@ -972,7 +945,7 @@ class Driver final : public Game {
       settle(
           [&](const S& y) {
             (void)object_->control(y);
-            (void)object_->report_applied(S(0));
+            (void)object_->applied(S(0));
             return object_->prepare(y);
           },
           [&](const S& y) { return distance(object_->observer(), y); });
@@ -987,7 +960,8 @@ class Driver final : public Game {
       }
       settle(
           [&](const S& y) {
-            (void)object_->update(y, y, S(0));
+            object_->applied(S(0));
+            (void)object_->update(y, y);
             return object_->mode() == LoopMode::running ? object_->status()
                                                         : StepStatus::prediction_dropped;
           },
@@ -1003,7 +977,8 @@ class Driver final : public Game {
     } else if constexpr (requires(const T& o) { o.form(); } && !winds_up<T>) {
       settle(
           [&](const S& y) {
-            (void)object_->update(y, y, S(0));
+            object_->applied(S(0));
+            (void)object_->update(y, y);
             return object_->status();
           },
           [&](const S&) {
@@ -1059,7 +1034,8 @@ class Driver final : public Game {
       settle(
           [&](const S& y) {
             const V all = V::Constant(y);
-            (void)object_->update(all, all, V::Zero());
+            object_->applied(V::Zero());
+            (void)object_->update(all, all);
             StepStatus status = StepStatus::ok;
             for (int i = 0; i < T::channels; ++i) status |= object_->status(i);
             return status;

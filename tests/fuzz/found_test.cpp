@@ -80,7 +80,8 @@ TEST(Found, FilterLeavesAStateThatLeadsNowhere) {
   ASSERT_EQ(controller.start(9.7300947854319415e+307, 0), StepStatus::ok);
   bool restarted = false;
   for (int k = 0; k < 2000; ++k) {
-    controller.update(1.25, 1.25, 0);
+    controller.applied(0);
+    controller.update(1.25, 1.25);
     restarted = restarted || has(controller.status(), StepStatus::restarted);
   }
   EXPECT_TRUE(restarted);
@@ -97,12 +98,19 @@ TEST(Found, FilterLeavesItForALargerMeasurementToo) {
                                       .sample_time = 0.1f})
                         .value();
   ASSERT_EQ(controller.start(0, 0), StepStatus::ok);
-  for (int k = 0; k < 20; ++k) controller.update(0, 0, largest<float>);
-  for (int k = 0; k < 2000; ++k) controller.update(1.25f, 1.25f, 0);
+  for (int k = 0; k < 20; ++k) {
+    controller.applied(largest<float>);
+    controller.update(0, 0);
+  }
+  for (int k = 0; k < 2000; ++k) {
+    controller.applied(0);
+    controller.update(1.25f, 1.25f);
+  }
   EXPECT_EQ(controller.status(), StepStatus::ok);
   EXPECT_NEAR(controller.requested(), 0, 1e-3);
   // An absurd measurement is still one to be rejected.
-  controller.update(largest<float>, 1.25f, 0);
+  controller.applied(0);
+  controller.update(largest<float>, 1.25f);
   EXPECT_EQ(controller.status(), StepStatus::measurement_rejected);
   EXPECT_NEAR(controller.requested(), 0, 1e-3);
 }

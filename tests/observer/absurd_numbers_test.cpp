@@ -206,13 +206,13 @@ TEST(FilterVariance, AnyIsHarmless) {
   any_variance_is_harmless<double>();
 }
 
-/// No measurement and P0 = 0: the least of variances has no inverse.
+/// P0 = 0 and a first measurement without noise: the least of variances has no inverse.
 TEST(FilterVariance, ZeroPriorAndTheLeastVariance) {
   auto config = filter_config<float>();
   eigen(config.initial_covariance).setZero();
   config.outlier_threshold = 0;
   auto filter = ExtendedStateFilter<2, float>::make(config).value();
-  filter.correct_weighted(1.0f, std::numeric_limits<float>::denorm_min());
+  filter.update_weighted(1.0f, 0.0f, std::numeric_limits<float>::denorm_min());
   EXPECT_TRUE(eigen(filter.gain()).allFinite());
   EXPECT_TRUE(eigen(filter.covariance()).allFinite());
   EXPECT_TRUE(eigen(filter.estimate()).allFinite());

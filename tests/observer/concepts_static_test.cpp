@@ -594,10 +594,6 @@ concept PreviewsCorrection = requires(const O& o) {
 || requires(const O& o) { o.correction_gain(S()); }
 || requires(const O& o) { o.gain_law(); };
 template <class O>
-concept CorrectsWeighted = requires(O& o) {
-  o.correct_weighted(S(), S());
-};
-template <class O>
 concept UpdatesWeighted = requires(O& o) {
   o.update_weighted(S(), S(), S());
 };
@@ -620,8 +616,6 @@ static_assert(!PreviewsCorrection<Gated> && !PredictableObserver<Gated>);
 static_assert(esokit::observer_traits<Gated>.publishes_chain);
 static_assert(LoopObserver<WrappedOutput<Gated>> && LoopObserver<DelayedInput<Gated, 2>>);
 using Filter = esokit::ExtendedStateFilter<2>;
-static_assert(CorrectsWeighted<DelayedInput<Filter, 2>> && CorrectsWeighted<VariableTime<Filter>>);
-static_assert(!CorrectsWeighted<WrappedOutput<Filter>> && !CorrectsWeighted<Delayed>);
 static_assert(!UpdatesWeighted<DelayedInput<Filter, 2>>, "it would skip the delay");
 static_assert(Rearms<VariableTime<esokit::AlgebraicEso<2>>> && !Rearms<Delayed>);
 // Nests hand on what an adapter in them is asked for.
@@ -839,7 +833,7 @@ void predictive_agrees() {
     }
     ASSERT_EQ(one.prepare(0.5), other.prepare(0.5));
     if (k == 30) {
-      ASSERT_EQ(one.report_applied(3), other.report_applied(3));
+      ASSERT_EQ(one.applied(3), other.applied(3));
     }
     if (k == 40) {
       ASSERT_EQ(one.start(0.5, 1), other.start(0.5, 1));

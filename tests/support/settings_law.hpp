@@ -231,16 +231,13 @@ void step_controller(C& o, Signals& in, Played& out) {
     if constexpr (requires { o.start(y(), u()); }) put(out, o.start(y(), u()));
   } else if constexpr (requires { o.prepare(in.u<S>()); }) {
     put(out, what == 6 ? o.control_without_measurement() : o.control(y()));
-    if (what == 7) put(out, o.report_applied(u()));
+    if (what == 7) put(out, o.applied(u()));
     put(out, o.prepare(in.u<S>()));
   } else if (what < 12) {
     const auto measured = y();
     const auto reference = u();
-    if constexpr (requires { o.update(measured, reference, u()); }) {
-      put(out, o.update(measured, reference, u()));
-    } else {
-      put(out, o.update(measured, reference));
-    }
+    if constexpr (requires { o.applied(u()); }) o.applied(u());
+    put(out, o.update(measured, reference));
   } else {
     const auto measured = y();
     put(out, o.update(measured, u()));

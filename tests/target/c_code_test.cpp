@@ -226,7 +226,8 @@ Seen compare(const C& fresh, InC<typename C::scalar_type>& in_c, double input_ga
     const V given = random.index(400) == 0 ? anything<V>(random) : r;
     if (random.index(30) == 0) {
       const V held = random.index(10) == 0 ? anything<V>(random) : static_cast<V>(0.9 * u);
-      controller.update(y, given, held);
+      controller.applied(held);
+      controller.update(y, given);
       in_c.applied(held);
       in_c.update(y, given);
     } else if (random.index(100) == 0) {

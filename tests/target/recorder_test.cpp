@@ -141,7 +141,8 @@ struct Reported {
   static constexpr int arguments = 3;
   template <class O, class T>
   static std::vector<T> call(O& o, const std::vector<T>& in, bool& fine) {
-    const T u = o.update(in[0], in[1], in[2]);
+    o.applied(in[2]);
+    const T u = o.update(in[0], in[1]);
     if constexpr (PlainScalar<T>) fine = o.status() == StepStatus::ok;
     return {u};
   }

@@ -131,11 +131,6 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
     o.revise_input(s);
   }
   { return observer_.revise_input(u_applied); }
-  StepStatus correct_weighted(const scalar_type& y, const scalar_type& variance) noexcept requires
-      requires(Observer& o, const scalar_type& s) {
-    o.correct_weighted(s, s);
-  }
-  { return observer_.correct_weighted(y, variance); }
   void rearm() noexcept requires requires(Observer& o) { o.rearm(); }
   { observer_.rearm(); }
   Check<scalar_type> set_speed(const scalar_type& factor) noexcept requires

@@ -595,8 +595,6 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     o.revise_input(s);
   }
   { return observer_.revise_input(S(u_applied * gain_ratio_)); }
-  /// Deleted, because it would bypass the guards.
-  StepStatus correct_weighted(const S&, const S&) noexcept = delete;
 
  private:
   Guarded(const Observer& observer, const Config& config) noexcept

@@ -79,9 +79,6 @@ class OutlierGate
     return open_after(observer_.reset(state));
   }
 
-  /// Deleted, because it would bypass the gate.
-  StepStatus correct_weighted(const S&, const S&) noexcept = delete;
-
   /// The innovation up to which a measurement is accepted if none is missing, unit of y.
   [[nodiscard]] S limit() const noexcept {
     const S running = running_factor_ * mean_;

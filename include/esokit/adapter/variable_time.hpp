@@ -137,14 +137,6 @@ class VariableTime
     return observer_.correct(y);
   }
 
-  /// The same with the noise variance of this measurement, see ExtendedStateFilter.
-  template <class B = Base>
-  requires requires(B& base, S s) { base.correct_weighted(s, s); }
-  StepStatus correct_weighted(S y, S variance) noexcept {
-    take_gap();
-    return observer_.correct_weighted(y, variance);
-  }
-
   /// True if so much time has passed that the next `correct` restarts the observer.
   [[nodiscard]] bool restarts() const noexcept { return is_too_long() || observer_.restarts(); }
 

@@ -120,9 +120,6 @@ class WrappedOutput
   /// Deleted, because the turns would no longer be those of y.
   StepStatus shift_output(const S&) noexcept = delete;
 
-  /// Deleted, because it would bypass the count of turns.
-  StepStatus correct_weighted(const S&, const S&) noexcept = delete;
-
   /// `angle` minus the nearest multiple of the period, in -period/2 .. period/2.
   [[nodiscard]] S wrap(const S& angle) const noexcept {
     if (detail::absolute(angle) <= half_period()) return angle;

@@ -22,7 +22,6 @@
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/control/dual_feedback.hpp>
-#include <esokit/control/incremental.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <utility>
@@ -36,7 +35,7 @@ template <class T>
 concept AnalysedObserver = detail::SaysObserver<T>;
 
 /// A controller that can be analysed: Adrc, PredictiveAdrc or DisturbanceCompensator with an
-/// AnalysedObserver, MimoAdrc, Incremental, ObserverWithLaw, Compensated, a LinearController, or
+/// AnalysedObserver, MimoAdrc, ObserverWithLaw, Compensated, a LinearController, or
 /// your own type with a function `linear_controller` in its namespace.
 template <class T>
 concept AnalysedController = detail::SaysController<T>;
@@ -283,13 +282,6 @@ requires detail::SaysObserver<Observer> && detail::SaysController<Base>
   const Expected<LinearController, Error<double>> base = linear_controller(both.base);
   if (!base) return base.error();
   return detail::compensated(*compensator, *base);
-}
-
-/// Incremental: that of the controller inside, because the actuator sums the increments to its u.
-template <class Controller>
-requires detail::SaysController<Controller> Expected<LinearController, Error<double>>
-linear_controller(const Incremental<Controller>& controller) {
-  return linear_controller(controller.controller());
 }
 
 /// A filter form. T and b0 are not stored in it, but in the config from which it was made.

@@ -47,7 +47,7 @@ struct AdrcConfig {
 ///
 /// Timing: `update` at sample k takes y[k] and the present reference and returns the u to be held
 /// until k + 1. The observer takes the limited u that `update` returned last as the input from k -
-/// 1 to k; if the actuator reports another value, pass it as `u_applied`.
+/// 1 to k; if the actuator reports another value, say `applied(u)` before `update`.
 ///
 /// Start: after `make` the controller is at y = 0, u = 0. `start(y, u)` takes over a plant at rest
 /// at y under u without a bump: with the reference at y, or a tracking differentiator reset to y,
@@ -76,7 +76,7 @@ struct AdrcConfig {
 /// have it.
 ///
 /// If the reference is not finite, u is kept (in the error-based form the measurement counts as
-/// missing). A u_applied that is not finite is replaced by the last output. No call allocates,
+/// missing). An applied u that is not finite is replaced by the last output. No call allocates,
 /// throws or locks.
 ///
 /// Delays, angles, a changing sample time and known nonlinear terms are handled by the observer:
@@ -123,12 +123,6 @@ class Adrc {
     return loop_.step(measured(y, r), Asked<S>{*this, r});
   }
 
-  /// The same if the actuator reports what it held since the last sample.
-  S update(S y, S reference, S u_applied) noexcept {
-    const S r = reference;
-    return loop_.step(measured(y, r), u_applied, Asked<S>{*this, r});
-  }
-
   /// With a moving reference. @param reference (r, r', ..), up to n + 1 elements, the others are
   /// zero. A tracking differentiator gives such a vector. The error-based form uses only r.
   template <detail::VectorOf<S> Given>
@@ -137,26 +131,24 @@ class Adrc {
     return loop_.step(measured(y, r(0)), Asked<Reference>{*this, r});
   }
 
-  /// With a moving reference and the u that the actuator held since the last sample.
-  template <detail::VectorOf<S> Given>
-  S update(S y, const Given& reference, S u_applied) noexcept {
-    const Reference r = filled(reference);
-    return loop_.step(measured(y, r(0)), u_applied, Asked<Reference>{*this, r});
-  }
-
   /// The same with a list: `update(y, {r, r1, r2})`. @{
   template <std::size_t Count>
   S update(S y, const S (&reference)[Count]) noexcept {
     return update(y, detail::listed(reference));
   }
   template <std::size_t Count>
-  S update(S y, const S (&reference)[Count], S u_applied) noexcept {
-    return update(y, detail::listed(reference), u_applied);
-  }
-  template <std::size_t Count>
   S update_without_measurement(const S (&reference)[Count]) noexcept {
     return update_without_measurement(detail::listed(reference));
   }
+  /// @}
+
+  /// What the actuator held since the last sample, if it was not the last output: say it before
+  /// `update`. A u that is not finite changes nothing. @{
+  void applied(S u) noexcept { loop_.applied(u); }
+  template <class Given>
+  S update(S y, const Given& reference, S u) = delete;  // call applied(u) before update
+  template <std::size_t Count>
+  S update(S y, const S (&reference)[Count], S u) = delete;  // call applied(u) before update
   /// @}
 
   /// One sample whose measurement is missing.

@@ -191,11 +191,15 @@ class ControlLoop {
     return step_driven(measured, limiter_.last(), law);
   }
 
-  /// The same if the actuator reports what it held from k - 1 to k.
-  template <class Law>
-  ESOKIT_INLINE S step(S measured, S u_applied, Law&& law) noexcept {
-    report_applied(u_applied);
-    return step(measured, law);
+  /// What the actuator held since the last step, if it was not the last output: before the step.
+  /// A u that is not finite changes nothing.
+  void applied(S u) noexcept {
+    if constexpr (PackScalar<S>) {
+      limiter_.track(select(is_finite(u), u, limiter_.last()));
+    } else {
+      if (is_finite(u)) [[likely]]
+        limiter_.track(u);
+    }
   }
 
   /// The same if something other than u drives the observer's chain.
@@ -225,7 +229,7 @@ class ControlLoop {
   /// Manual operation: the observer runs, the output is the operator's.
   /// @param u_applied what was held from k - 1 to k @return the same
   S track(S measured, S u_applied) noexcept {
-    report_applied(u_applied);
+    applied(u_applied);
     follow(measured, limiter_.last());
     return limiter_.last();
   }
@@ -235,7 +239,7 @@ class ControlLoop {
   template <class O = Observer>
   requires(observer_traits<O>.gates_disturbance) S hold(S measured, S u_applied)
   noexcept {
-    report_applied(u_applied);
+    applied(u_applied);
     follow(measured, observer_.hold(limiter_.last()));
     observer_.release();
     return limiter_.last();
@@ -359,15 +363,6 @@ class ControlLoop {
     }
     observe_specially(measured, drive);
     requested_ = limiter_.last();
-  }
-
-  void report_applied(S u_applied) noexcept {
-    if constexpr (PackScalar<S>) {
-      limiter_.track(select(is_finite(u_applied), u_applied, limiter_.last()));
-    } else {
-      if (is_finite(u_applied)) [[likely]]
-        limiter_.track(u_applied);
-    }
   }
 
   template <class Law>

@@ -82,12 +82,11 @@ class DisturbanceCompensator {
         y, [&]() ESOKIT_INLINE_LAMBDA { return base_output + unbounded_compensation(); });
   }
 
-  /// The same if the actuator reports what it held since the last sample.
-  S update(S y, S base_output, S u_applied) noexcept {
-    return loop_.step(y, u_applied, [&]() ESOKIT_INLINE_LAMBDA {
-      return base_output + unbounded_compensation();
-    });
-  }
+  /// What the actuator held since the last sample, if it was not the last output: say it before
+  /// `update`. A u that is not finite changes nothing. @{
+  void applied(S u) noexcept { loop_.applied(u); }
+  S update(S y, S base_output, S u) = delete;  // call applied(u) before update
+  /// @}
 
   /// The same if something other than u drives the observer's equation. Use it from `make` on,
   /// without `start` and `track`, which assume that u is the drive. Pass NaN if the measurement is

@@ -130,13 +130,12 @@ class DualFeedbackAdrc {
     return limiter_(step.wanted);
   }
 
-  /// The same if the actuator reports what it held since the last sample. The transfer-function
-  /// form uses it only for the rate limit.
-  S update(S y, S reference, S u_applied) noexcept {
-    const auto good = is_finite(u_applied);
-    limiter_.track(select(good, u_applied, limiter_.last()));
-    return update(y, reference);
-  }
+  /// What the actuator held since the last sample, if it was not the last output: say it before
+  /// `update`. The transfer-function form uses it only for the rate limit. A u that is not finite
+  /// changes nothing. @{
+  void applied(S u) noexcept { limiter_.track(select(is_finite(u), u, limiter_.last())); }
+  S update(S y, S reference, S u) = delete;  // call applied(u) before update
+  /// @}
 
   /// Takes over a plant at rest at y under u, with the reference at y, too. A y or u that is not
   /// finite changes nothing and is reported.

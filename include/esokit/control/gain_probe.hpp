@@ -43,8 +43,9 @@ struct GainProbeResult {
 /// load that drives u, which HealthMonitor cannot. Friction that keeps the plant at rest looks like
 /// a b0 that is too large.
 ///
-/// After each `u = loop.update(y, r, applied)`: `applied = probe.update(loop, y)` is the u to be
-/// held until the next sample. After the end or an abort it is the u of the loop.
+/// After each `loop.update(y, r)`: `applied = probe.update(loop, y)` is the u to be held until the
+/// next sample; before the next update tell the loop, `loop.applied(applied)`. After the end or an
+/// abort it is the u of the loop.
 /// @tparam Size N, number of states of the observer
 template <int Size, PlainScalar S = double>
 class GainProbe {
@@ -78,7 +79,7 @@ class GainProbe {
   }
 
   /// After each sample of the controller. @param y the measurement that the controller got
-  /// @return u to be held until the next sample; pass it to the controller as u_applied
+  /// @return u to be held until the next sample; then tell the controller by `applied(u)`
   template <class Controller>
   S update(const Controller& controller, const S& y) noexcept {
     const auto& observer = controller.observer();

@@ -95,8 +95,8 @@ class MimoAdrc {
   /// One sample. @param y q x 1, NaN for a missing element @param reference r, q x 1
   /// @return u, q x 1, to be held until the next sample, within the limits
   Output update(const Output& y, const Output& reference) noexcept {
-    const Output applied = output();
-    const Output drive = told_matrix_ * applied;
+    const Output before = output();
+    const Output drive = told_matrix_ * before;
     told_matrix_ = input_matrix_;
     Output wanted;
     detail::unroll<channels>([&](auto i) {
@@ -110,16 +110,21 @@ class MimoAdrc {
         r = estimate(0) + observer.wrap(r - estimate(0));
       const S v =
           detail::by_present_gain(observer, S(std::get<channel>(laws_).control(estimate, r)));
-      wanted(row) = is_finite(v) ? v : S((input_matrix_ * applied)(row));
+      wanted(row) = is_finite(v) ? v : S((input_matrix_ * before)(row));
     });
     return put_out(inverse_ * wanted);
   }
 
-  /// The same if the actuators report what they held since the last sample; NaN for an unknown one.
-  Output update(const Output& y, const Output& reference, const Output& u_applied) noexcept {
-    report_applied(u_applied);
-    return update(y, reference);
+  /// What the actuators held since the last sample, if it was not the last output: say it before
+  /// `update`. One that is not finite keeps its last output. @{
+  void applied(const Output& u) noexcept {
+    for (int i = 0; i < channels; ++i) {
+      if (is_finite(u(i))) limiters_[static_cast<std::size_t>(i)].track(u(i));
+    }
   }
+  Output update(const Output& y, const Output& reference,
+                const Output& u) = delete;  // call applied(u) before update
+  /// @}
 
   /// For a plant that is held by something else: the observers follow y, every dhat is kept, u is
   /// the caller's; see Guarded. On release begin with the reference at y.
@@ -128,7 +133,7 @@ class MimoAdrc {
   requires(observer_traits<Observers>.gates_disturbance&&...)  //
       Output hold(const Output& y, const Output& u_applied)
   noexcept {
-    report_applied(u_applied);
+    applied(u_applied);
     const Output drive = told_matrix_ * output();
     told_matrix_ = input_matrix_;
     detail::unroll<channels>([&](auto i) {
@@ -268,12 +273,6 @@ class MimoAdrc {
     if (has(status, StepStatus::restarted)) [[unlikely]] {
       const S input = observer.applied_input();
       (void)observer.reset(observer.equilibrium(y, input));
-    }
-  }
-
-  void report_applied(const Output& u_applied) noexcept {
-    for (int i = 0; i < channels; ++i) {
-      if (is_finite(u_applied(i))) limiters_[static_cast<std::size_t>(i)].track(u_applied(i));
     }
   }
 
@@ -445,9 +444,7 @@ class MimoAdrc<First, Rest...>
   Output update(const Output& y, const Output& reference) noexcept {
     return Base::update(y, reference);
   }
-  Output update(const Output& y, const Output& reference, const Output& u_applied) noexcept {
-    return Base::update(y, reference, u_applied);
-  }
+  void applied(const Output& u) noexcept { Base::applied(u); }
   StatusOf<S> start(const Output& y, const Output& u) noexcept { return Base::start(y, u); }
   /// @}
 

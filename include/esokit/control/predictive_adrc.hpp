@@ -64,7 +64,7 @@ struct PredictiveAdrcConfig {
 /// last u is kept.
 ///
 /// The actuator is assumed to hold what `control` returned. If it reports another value, before or
-/// after `prepare`, pass it to `report_applied`: the prediction is corrected by Gamma (u_reported -
+/// after `prepare`, say `applied(u)`: the prediction is corrected by Gamma (u_reported -
 /// u_assumed) before the next correction.
 ///
 /// Calls other than make and retune only multiply and add, except in the observer's gain law (the
@@ -194,12 +194,12 @@ class PredictiveAdrc {
     set_reference(detail::listed(next_reference));
   }
 
-  /// Reports what the actuator really held since the last `control`. A number that is not finite is
-  /// ignored.
-  StepStatus report_applied(S u_applied) noexcept {
-    const auto good = is_finite(u_applied);
-    const S u = select(good, u_applied, output_);
+  /// What the actuator held since the last `control`, if it was not its u. A number that is not
+  /// finite is ignored. @{
+  StepStatus applied(S u) noexcept {
+    const auto good = is_finite(u);
     StepStatus status = all(good) ? StepStatus::ok : StepStatus::input_rejected;
+    u = select(good, u, output_);
     output_ = u;
     if (phase_ == Phase::prepared) {
       limiter_.track(u);
@@ -208,6 +208,8 @@ class PredictiveAdrc {
     }
     return status;
   }
+  StepStatus report_applied(S u) noexcept = delete;  // its name is applied(u)
+  /// @}
 
   /// Takes over a plant at rest at y under u without a bump: with the reference at y the first
   /// output is this u.

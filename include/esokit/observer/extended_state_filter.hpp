@@ -203,8 +203,18 @@ class ExtendedStateFilter
   /// The same with the noise variance R of this measurement, unit of y squared. If it is negative
   /// or not finite, the measurement counts as missing.
   Status update_weighted(S y, S u_applied, S measurement_variance) noexcept {
-    const Status predicted = predict(u_applied);
-    return predicted | correct_weighted(y, measurement_variance);
+    if constexpr (PackScalar<S>) {
+      return each_lane([&](Plain& lane, int i) {
+        return lane.update_weighted(y[i], u_applied[i], measurement_variance[i]);
+      });
+    } else {
+      const Status predicted = predict(u_applied);
+      if (!all(is_finite(measurement_variance)) || !all(measurement_variance >= S(0.0))) {
+        return predicted | StepStatus::measurement_rejected;
+      }
+      law().set_measurement_variance(measurement_variance);
+      return predicted | correct(y);
+    }
   }
 
   /// Time update only: one sample without a measurement, or the first half of `update`.
@@ -231,20 +241,6 @@ class ExtendedStateFilter
       return StepStatus::outlier_rejected;
     }
     return Base::correct(y);
-  }
-
-  /// The same with the noise variance R of this measurement, unit of y squared.
-  Status correct_weighted(S y, S measurement_variance) noexcept {
-    if constexpr (PackScalar<S>) {
-      return each_lane(
-          [&](Plain& lane, int i) { return lane.correct_weighted(y[i], measurement_variance[i]); });
-    } else {
-      if (!all(is_finite(measurement_variance)) || !all(measurement_variance >= S(0.0))) {
-        return StepStatus::measurement_rejected;
-      }
-      law().set_measurement_variance(measurement_variance);
-      return correct(y);
-    }
   }
 
   /// False if the gate would reject y as an outlier. True for a y that is not finite, which

@@ -61,7 +61,7 @@ struct MimoExtendedStateFilterConfig {
 /// correlated (full R), and Q and P0 may couple the chains; if all three are block diagonal, this
 /// is p independent filters.
 ///
-/// If a measurement is missing (NaN, infinite, or not present in `correct_some`) or would make an
+/// If a measurement is missing (NaN or infinite) or would make an
 /// estimate infinite, its channel is left out of the sample; the others are used. After more than
 /// `max_gap` missing measurements in a row, or if it could not be predicted, a chain restarts from
 /// its next y.
@@ -172,18 +172,11 @@ class MimoExtendedStateFilter {
 
   /// Measurement update with all channels whose y is finite; `measurement_rejected` if any is not.
   StepStatus correct(const Output& y) noexcept {
-    Array<bool, outputs> present{};
-    present.fill(true);
-    return correct_some(y, present);
-  }
-
-  /// Measurement update with the channels that are present (and finite). @param present p x 1
-  StepStatus correct_some(const Output& y, const Array<bool, outputs>& present) noexcept {
     StepStatus status = StepStatus::ok;
-    Array<bool, outputs> used = present;
+    Array<bool, outputs> used{};
+    used.fill(true);
     Output e = Output::Zero();
     for (int i = 0; i < outputs; ++i) {
-      if (!used[index(i)]) continue;
       e(i) = y(i) - state_(first(i));
       const bool due = missed_[index(i)] > max_gap_ + 1;
       if (is_finite(e(i)) && !due) continue;

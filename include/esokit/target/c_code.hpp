@@ -58,10 +58,6 @@ struct RecordAccess {
   static void harden(C& c) noexcept {
     c.soft_.reset();
   }
-  template <class Loop, class S>
-  static void report(Loop& loop, const S& u_applied) noexcept {
-    loop.report_applied(u_applied);
-  }
 
   /// The rules of the loop: plain numbers.
   struct Rules {
@@ -346,7 +342,7 @@ requires detail::GainIsKept<Observer> Expected<CCode, Error<typename Observer::s
     return Numbers{Access::limited(Access::loop(c), in[0])};
   });
   builder.add("applied", {"u"}, false, [](auto& c, const Numbers& in) {
-    Access::report(Access::loop(c), in[0]);
+    Access::loop(c).applied(in[0]);
     return Numbers{};
   });
   if (softens) {
