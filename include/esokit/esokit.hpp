@@ -26,6 +26,7 @@
 #include <esokit/analysis/lyapunov.hpp>
 #include <esokit/analysis/lyapunov_matrix.hpp>
 #include <esokit/analysis/margins.hpp>
+#include <esokit/analysis/measured_response.hpp>
 #include <esokit/analysis/observer_system.hpp>
 #include <esokit/analysis/peak_gain.hpp>
 #include <esokit/analysis/poles.hpp>

@@ -139,6 +139,11 @@ class Measured : public NamedAdapter<Measured<Observer, Count, Delay>, Observer,
       model_traits<std::remove_cvref_t<decltype(std::declval<const Observer&>().model())>>.is_chain) {
     return observer_.total_disturbance() - told_;
   }
+  /// @cond
+  [[nodiscard]] const auto& path(int i) const noexcept {
+    return paths_[static_cast<std::size_t>(i)];
+  }
+  /// @endcond
   /// Samples in a row without a good w number `i`.
   [[nodiscard]] int lost(int i = 0) const noexcept { return lost_[static_cast<std::size_t>(i)]; }
   /// True if w number `i` has been lost for so long that it counts as zero.

@@ -31,6 +31,12 @@ namespace detail {
 template <PlainScalar S, int Capacity>
 class MeasuredPath {
  public:
+  /// What the lag does in a sample.
+  struct Course {
+    S mean;
+    S end;
+  };
+
   MeasuredPath() = default;
   /// Settings that `check` accepts.
   MeasuredPath(const MeasuredInput<S>& input, const S& time) noexcept : input_(input) {
@@ -90,6 +96,20 @@ class MeasuredPath {
   /// From k to k + 1.
   void advance() noexcept { lagged_ = course().end; }
 
+  /// The lag over a sample. @param lagged at k @param older w[k-D-1] @param newer w[k-D]
+  [[nodiscard]] Course course(const S& lagged, const S& older, const S& newer) const noexcept {
+    Course all{S(0), lagged};
+    for (std::size_t i = 0; i < 2; ++i) {
+      const S& w = i == 0 ? older : newer;
+      all.mean = all.mean + share_[i] * w + (all.end - w) * late_[i];
+      all.end = all.end + reached_[i] * (w - all.end);
+    }
+    return all;
+  }
+  [[nodiscard]] const MeasuredInput<S>& input() const noexcept { return input_; }
+  /// D, whole samples of the dead time.
+  [[nodiscard]] int whole() const noexcept { return whole_; }
+
   /// False for a w, one of `count`, whose effect might not be finite.
   [[nodiscard]] bool takes(const S& w, int count) const noexcept {
     const S most = S(4) * static_cast<S>(count) * w;
@@ -98,22 +118,10 @@ class MeasuredPath {
 
  private:
   static constexpr int length = Capacity + 2;
-  struct Course {
-    S mean;
-    S end;
-  };
-
   static S longest(const S& time) { return (static_cast<S>(Capacity) + S(1) / S(1024)) * time; }
 
-  /// The lag over a sample.
   [[nodiscard]] Course course() const noexcept {
-    Course all{S(0), lagged_};
-    for (std::size_t i = 0; i < 2; ++i) {
-      const S& w = before(whole_ + 1 - static_cast<int>(i));
-      all.mean = all.mean + share_[i] * w + (all.end - w) * late_[i];
-      all.end = all.end + reached_[i] * (w - all.end);
-    }
-    return all;
+    return course(lagged_, before(whole_ + 1), before(whole_));
   }
   [[nodiscard]] const S& before(int samples) const noexcept {
     const int at = newest_ - samples;
@@ -126,7 +134,7 @@ class MeasuredPath {
   Array<S, 2> share_{};          ///< of the sample, in which w[k-D-1] and w[k-D] arrive
   Array<S, 2> reached_{};        ///< the part of a step that passes the lag in that time
   Array<S, 2> late_{};           ///< what the lag takes from the mean
-  int whole_ = 0;                ///< D, whole samples of the dead time
+  int whole_ = 0;
   int newest_ = 0;
 };
 

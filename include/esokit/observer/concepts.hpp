@@ -60,6 +60,7 @@ struct ObserverTraits {
 
   bool wraps_output = false;  ///< y is an angle: `wrap(difference) const`
   bool delays_input = false;  ///< u acts late: `fill_input(u)`, as if u had been applied for long
+
   /// Disturbances are measured: `measured(w)` before each step, `revise_measured()`,
   /// `settle_measured()`, see Measured.
   bool takes_measured = false;
