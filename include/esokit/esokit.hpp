@@ -124,6 +124,7 @@
 #include <esokit/model/integrator_chain.hpp>
 #include <esokit/model/linear_plant.hpp>
 #include <esokit/model/matrix_model.hpp>
+#include <esokit/model/measured_input.hpp>
 #include <esokit/model/model_parts.hpp>
 #include <esokit/model/plant_model.hpp>
 #include <esokit/model/sampled_model.hpp>
