@@ -129,6 +129,10 @@ struct Identified {
 
   /// What the log's own columns add to y^(n).
   std::vector<MeasuredEffect> columns{};
+
+  /// `disturbance` if the columns were not measured, so that they are a part of d. Not of those
+  /// that are functions of y. 0 without columns.
+  double disturbance_unmeasured = 0;
   std::vector<Sinusoid> sinusoids{};    ///< sines in the disturbance, the largest first
   std::vector<GainInRange> schedule{};  ///< b0 over the log's scheduling column
   Estimate schedule_slope{};  ///< slope of b0 over the scheduling column, from a straight line
@@ -227,20 +231,26 @@ struct Identified {
   }
 
   /// Where the disturbance comes above the noise: the bandwidth of a Kalman filter for both, rad/s.
-  [[nodiscard]] double disturbance_bandwidth() const {
-    return std::pow(disturbance / (noise.value * noise.value * log.sample_time),
-                    0.5 / (order + extension));
-  }
+  [[nodiscard]] double disturbance_bandwidth() const { return bandwidth_of(disturbance); }
 
   /// Intensity of the random walk that stands for the disturbance, (unit of y^(n))^2 / s: of equal
   /// power at disturbance_bandwidth(). For m = 1 it is `disturbance`.
-  [[nodiscard]] double random_walk() const {
-    return disturbance / std::pow(disturbance_bandwidth(), 2 * (extension - 1));
-  }
+  [[nodiscard]] double random_walk() const { return walk_of(disturbance); }
+  /// The same without the columns, see `disturbance_unmeasured`.
+  [[nodiscard]] double random_walk_unmeasured() const { return walk_of(disturbance_unmeasured); }
 
   /// The dead time in samples, for DelayedInput. @param sample_time s, above 0
   [[nodiscard]] int delay(double sample_time) const {
     return static_cast<int>(std::lround(dead_time.value / sample_time));
+  }
+
+ private:
+  [[nodiscard]] double bandwidth_of(double intensity) const {
+    return std::pow(intensity / (noise.value * noise.value * log.sample_time),
+                    0.5 / (order + extension));
+  }
+  [[nodiscard]] double walk_of(double intensity) const {
+    return intensity / std::pow(bandwidth_of(intensity), 2 * (extension - 1));
   }
 };
 
@@ -880,6 +890,16 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
     result.correlation = innovations_correlation(fit.residual());
   }
   result.disturbance = likely.disturbance;
+  if (known > 0) {
+    FitData unmeasured = used;
+    for (std::size_t c = 0; c < known; ++c) {
+      // A column of zeros has no number.
+      if (share_left(unmeasured.columns[c], used.y) > follows)
+        std::fill(unmeasured.columns[c].begin(), unmeasured.columns[c].end(), 0.0);
+    }
+    result.disturbance_unmeasured =
+        InnovationsFit(unmeasured, model, bounds).minimise(likely.at, true, 8).disturbance;
+  }
   const FitErrors likely_errors = jackknife(fit, likely, true);
   const double rows_averaged = std::sqrt(static_cast<double>(result.averaged));
   const double t = student_95(19);
@@ -1025,6 +1045,7 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
     MeasuredEffect effect;
     effect.gain = linear(c + 1);
     effect.gain.value = fitted_there.linear[c + 1];
+    effect.follows_output = share_left(rows.columns[c], rows.y) < follows;
     if (!rows.timed.empty() && rows.timed[c].free) {
       const TimedColumn& column = there.timed[c];
       const auto late = [&](double at, auto value, auto error) {
@@ -1048,9 +1069,10 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
       effect.dead_time = late(
           column.dead_time(), [](const Times& x) { return x.latency - x.lag; },
           [&](const SplitCovariance& of) { return split(of).second; });
-      effect.timed = effect.gain.share() < 1.0 && effect.latency.half_width < bounds.latency_max;
+      effect.timed = effect.told() && effect.latency.half_width < bounds.latency_max;
       if (!effect.timed) effect.latency = effect.lag = effect.dead_time = {};
     }
+    effect.lost = result.log.lost[c];
     result.columns.push_back(effect);
   }
   if (chosen.friction_scale > 0.0) {
@@ -1178,6 +1200,9 @@ inline bool better(const Identified& averaged, const Identified& plain, const Id
   const auto [lowest, highest] = std::minmax_element(raw.y.begin(), raw.y.end());
   if (!(*highest > *lowest))
     return E{"y", *lowest, "never changes: record a log in which the output moves"};
+  for (std::size_t c = 0; c < log.columns.size(); ++c) {
+    if (auto told = detail::tells_itself(raw, c); !told) return told.error();
+  }
   result.own_input = detail::own_input(raw);
   result.at_once = detail::at_once(raw);
   std::vector<int> folds = {1, 4, 8, 16};

@@ -6,8 +6,11 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <esokit/core/check.hpp>
+#include <esokit/core/error.hpp>
 #include <esokit/identify/fit.hpp>
 #include <esokit/identify/timed_column.hpp>
+#include <esokit/model/measured_input.hpp>
 #include <limits>
 #include <span>
 #include <utility>
@@ -23,11 +26,21 @@ struct MeasuredEffect {
   Estimate dead_time{};  ///< s; w is a straight line between the rows, so one that is held from its
                          ///< row to the next comes half a row later
 
-  /// Whether the log tells the times: not of a column that is a function of y, nor of one whose
-  /// interval of the gain contains zero. Then lag and dead time are zero.
+  /// Whether the log tells the times: not of a column that is a function of y, nor of one that does
+  /// too little. Then lag and dead time are zero.
   bool timed = false;
-  double left = 1.0;     ///< rms of what remains of the disturbance with w, over that without it
-  std::size_t lost = 0;  ///< rows in which w was missing, and lies between its neighbours
+  bool follows_output = false;  ///< it is a function of y
+  std::size_t lost = 0;         ///< rows in which w was missing, and lies between its neighbours
+
+  /// Whether the log tells the gain: its interval does not contain zero.
+  [[nodiscard]] bool told() const { return gain.half_width < std::abs(gain.value); }
+  /// The same for a w that is held from its sample to the next, as a controller has it: of the same
+  /// latency, with half a sample less of dead time, or else of lag. @param sample_time s
+  [[nodiscard]] MeasuredInput<double> held(double sample_time) const {
+    const double half = 0.5 * sample_time;
+    return {gain.value, std::max(lag.value - std::max(half - dead_time.value, 0.0), 0.0),
+            std::max(dead_time.value - half, 0.0)};
+  }
 };
 
 namespace detail {
@@ -73,6 +86,30 @@ inline double share_beside(const std::vector<double>& values, const std::vector<
 
 /// A column that follows another one leaves less than this share of its squares.
 constexpr double follows = 1e-3;
+
+/// Whether column `c` of the log can be told from a constant, from u and from those before it.
+inline Check<double> tells_itself(const FitData& data, std::size_t c) {
+  const auto& column = data.columns[c];
+  const auto at = [&](double value, const char* rule, double limit = 0.0, bool limited = false) {
+    return Error<double>{"columns", value, rule, static_cast<int>(c), limit, limited};
+  };
+  const auto [low, high] = std::minmax_element(column.begin(), column.end());
+  Rules<double> rules;
+  rules.require(*high > *low,
+                at(*low, "never changes, so nothing can be told of it: leave it out"));
+  rules.require(share_beside(column, data.u) > follows,
+                at(share_beside(column, data.u),
+                   "is the share of its squares that does not follow u, so the two cannot be told "
+                   "apart: move it by itself, or leave it out; must be above",
+                   follows, true));
+  for (std::size_t other = 0; other < c; ++other) {
+    rules.require(share_beside(column, data.columns[other]) > 1e-3 * follows,
+                  at(static_cast<double>(other),
+                     "is the column that it follows, so the two cannot be told apart: leave one "
+                     "out"));
+  }
+  return rules;
+}
 
 /// Makes the first `count` columns timed ones, still at once.
 inline void make_timed(FitData& data, std::size_t count) {
@@ -124,7 +161,7 @@ inline void find_times(FitData& data, const FitModel& model, const FitBounds& bo
       TimedColumn& column = data.timed[c];
       if (!column.free) continue;
       InnovationsFit fit(data, model, bounds);
-      Fit best = fit.at(at);
+      const Fit best = fit.at(at);
       std::vector<std::vector<double>> parts = fit.parts();
       const std::size_t own = 2 + data.inputs.size() + c;
       // Mean square with this column, and the numbers of all.
@@ -195,6 +232,14 @@ inline void find_times(FitData& data, const FitModel& model, const FitBounds& bo
           damping *= better ? 0.2 : 8.0;
         }
         if (!better || !(before - least > 1e-6 * least)) break;
+      }
+      if (search) {
+        // The best of so many times makes something of nothing: without the column the likelihood
+        // has to be lower by more than the three numbers cost.
+        std::fill(parts[own].begin(), parts[own].end(), 0.0);
+        const double rows = static_cast<double>(best.rows);
+        column.free = rows * std::log(square(linear) / least) > 3.0 * std::log(rows);
+        if (!column.free) column.latency = column.lag_square = 0.0;
       }
       data.columns[c] = late(column, data.starts, T);
     }

@@ -16,8 +16,8 @@ struct TimedColumn {
   double latency = 0.0;            ///< lag plus dead time, s
   double lag_square = 0.0;         ///< square of the lag, s^2, at most that of the latency
 
-  /// Whether the times are fitted. Those of a function of y are not: a column that is late and a
-  /// pole look the same there.
+  /// Whether the times are fitted. Those of a function of y are not, as a column that is late and a
+  /// pole look the same there; nor those of a column that does nothing.
   bool free = true;
 
   /// The lag, s.
