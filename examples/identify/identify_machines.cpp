@@ -489,6 +489,7 @@ void acrobot(Report& report, Machines& machines) {
   options.orders = {2};
   options.pole = false;
   options.friction = false;
+  options.late_columns = false;  // gravity, Coriolis and friction act at once
   const auto found = run_parallel("acrobot", logs.size(), [&](std::size_t i) {
     return std::optional(compiled::study(logs[i], options));
   });

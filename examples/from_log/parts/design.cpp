@@ -127,7 +127,7 @@ std::string what_measuring_saves(const esokit::Tuning& tuning, const esokit::Tun
     Pasting played = pasting;
     played.friction = 0.0;
     played.by_position = false;
-    Measured measured{.force = force};
+    Acting measured{.force = force};
     for (Feed& feed : played.feeds) {
       measured.w.push_back(rows.columns[feed.column]);
       feed.rest = measured.w.back()[0];

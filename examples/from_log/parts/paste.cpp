@@ -43,7 +43,7 @@ using MachineState = esokit::Vector<double, most_states>;
 /// The machine that was found around rest at (start_y, start_u): (y, .., y^(n-1), v).
 /// For any order n, so that it is compiled once: without derivatives from y^(n) on.
 /// @param measured what else acts; may be null
-auto machine(const Pasting& p, const TuneModel& model, const Measured* measured) {
+auto machine(const Pasting& p, const TuneModel& model, const Acting* measured) {
   using State = MachineState;
   const int order = model.order;
   const double T = model.sample_time;
@@ -585,7 +585,7 @@ double Runner::update(double y, double target, const std::vector<double>& w) {
 
 StepOfCode step_of_code(const Pasting& pasting, const Tuning& tuning, const TunedDesign& design,
                         double height, double duration, double noise, int digits,
-                        const Measured* measured) {
+                        const Acting* measured) {
   const TuneModel& model = tuning.model;
   const double T = model.sample_time;
   Runner runner(pasting, tuning, design);

@@ -152,7 +152,7 @@ struct StepOfCode {
   std::vector<double> y, u;
 };
 /// Measured disturbances that act meanwhile.
-struct Measured {
+struct Acting {
   std::vector<std::vector<double>> w{};  ///< of each feed, one a sample
   std::vector<double> force{};           ///< what they add to y^(n), straight between the samples
 };
@@ -160,7 +160,7 @@ struct Measured {
 [[nodiscard]] StepOfCode step_of_code(const Pasting& pasting, const esokit::Tuning& tuning,
                                       const esokit::TunedDesign& design, double height,
                                       double duration, double noise, int digits,
-                                      const Measured* measured = nullptr);
+                                      const Acting* measured = nullptr);
 
 /// C++ that compiles as it is. @param rows the log, as of `told_rows`
 [[nodiscard]] std::string pasted_code(const Pasting& pasting, const esokit::Tuning& tuning,
