@@ -6,6 +6,7 @@
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
 #include <esokit/adapter/known_model.hpp>
+#include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
@@ -25,6 +26,7 @@
 #include <esokit/analysis/lyapunov.hpp>
 #include <esokit/analysis/lyapunov_matrix.hpp>
 #include <esokit/analysis/margins.hpp>
+#include <esokit/analysis/measured_response.hpp>
 #include <esokit/analysis/observer_system.hpp>
 #include <esokit/analysis/peak_gain.hpp>
 #include <esokit/analysis/poles.hpp>

@@ -7,6 +7,7 @@
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
 #include <esokit/adapter/known_model.hpp>
+#include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
@@ -59,6 +60,19 @@ struct Delayed {
   template <class T>
   static typename Type<T>::Config config(int lane, bool again) {
     return {.observer = linear<T>(lane, again), .delay = 2};
+  }
+};
+
+struct Told {
+  template <class T>
+  using Type = esokit::Measured<LinearEso<1, T>, 1, 4>;
+  template <class T>
+  static typename Type<T>::Config config(int lane, bool again) {
+    typename Type<T>::Config config{.observer = linear<T>(lane, again)};
+    config.inputs[0] = {.gain = set<T>(lane, again, -3),
+                        .lag = set<T>(lane, false, 0.05),
+                        .dead_time = set<T>(lane, false, 0.013)};
+    return config;
   }
 };
 
@@ -317,6 +331,13 @@ const auto observe = [](auto& o, const auto& x, int k) {
                  o.restarts(), o.applied_input(), o.input_gain(), o.level_estimate(0),
                  o.equilibrium(x[0], x[1]));
 };
+
+TEST(LaneByLane, Measured) {
+  expect_lanes<Told>([](auto& o, const auto& x, int k) {
+    if (k % 13 != 5) o.measured(x[2]);
+    return observe(o, x, k).and_also(o.known_part(), o.residual_disturbance());
+  });
+}
 
 TEST(LaneByLane, DelayedInput) {
   expect_lanes<Delayed>([](auto& o, const auto& x, int k) {

@@ -8,6 +8,7 @@
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
 #include <esokit/adapter/known_model.hpp>
+#include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
@@ -78,6 +79,12 @@ class Erased final : public AnyLoop {
     // A compensator helps a controller of the user.
     const double given = requires { controller_.gains(); }
     ? r : 2.5 * (r - filled(y));
+    // A w that never settles, is lost now and then, and does nothing to the plant: once its gain
+    // is zero again, d is what it was.
+    if constexpr (requires { controller_.measured(1.0); }) {
+      if (++measured_ % 7 != 0)
+        controller_.measured(measured_ < 1200 ? std::sin(0.1 * measured_) : 0.0);
+    }
     const double u = controller_.update(y, given);
     monitor_.look(controller_);
     return u;
@@ -129,6 +136,7 @@ class Erased final : public AnyLoop {
   C controller_;
   Monitor monitor_;
   double last_ = 0;
+  int measured_ = 0;
 };
 
 /// y' = 2 u + d in the loop, for so many samples; `each` may do something before a sample. The
@@ -223,6 +231,8 @@ void obeys() {
 template <class O>
 using Delayed = DelayedInput<O, 4>;
 template <class O>
+using Told = Measured<O, 1, 4>;
+template <class O>
 using Known = KnownModel<O, Friction<0, double>>;
 using Plain = LinearEso<1>;
 
@@ -277,6 +287,19 @@ TEST(Pairs, OfWrappedOutput) {
   around_all<WrappedOutput>();
   obeys<WrappedOutput<Delayed<Plain>>>();
   obeys<WrappedOutput<Known<Plain>>>();
+}
+TEST(Pairs, OfMeasured) {
+  around_all<Told>();
+  obeys<Told<Told<Plain>>>();
+  obeys<Told<Delayed<Plain>>>();
+  obeys<Told<Known<Plain>>>();
+  obeys<Told<WrappedOutput<Plain>>>();
+  obeys<Delayed<Told<Plain>>>();
+  obeys<OutlierGate<Told<Plain>>>();
+  obeys<Known<Told<Plain>>>();
+  obeys<WrappedOutput<Told<Plain>>>();
+  obeys<Guarded<Told<Plain>>>();
+  obeys_around<Told<Plain>>();
 }
 TEST(Pairs, OfGuarded) {
   around_all<Guarded>();

@@ -4,6 +4,7 @@
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
 #include <esokit/adapter/known_model.hpp>
+#include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
@@ -132,6 +133,7 @@ TEST(Settings, OfAdaptersAreAdopted) {
     c.observer.running_factor = 20;
   };
   every_setting_is_adopted("WrappedOutput<OutlierGate>", {of<Gated>(), of<Gated>(by_mean, false)});
+  every_setting_is_adopted(NAMED(Measured<LinearEso<1>, 1, 4>));
   every_setting_is_adopted(NAMED(VariableTime<KnownModel<LinearEso<1>, Friction<0, double>>>));
   every_setting_is_adopted(NAMED(Guarded<LinearEso<1>>));
   every_setting_is_adopted(

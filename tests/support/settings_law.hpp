@@ -104,6 +104,10 @@ void fill(Config& config) {
   if constexpr (requires { config.period; }) config.period = 6;
   if constexpr (requires { config.ratio; }) config.ratio = 3;
   if constexpr (requires { config.delay; }) config.delay = 2;
+  if constexpr (requires { config.most_lost; }) {
+    config.inputs.fill({.gain = 3, .lag = 0.05, .dead_time = 0.02});
+    config.most_lost = 2;
+  }
   if constexpr (requires { config.leak_time; }) {
     config.leak_time = 2;
     config.disturbance_bound = 3;
@@ -119,6 +123,11 @@ void fill(Config& config) {
 template <class O>
 void step_observer(O& o, Signals& in, Played& out) {
   using S = typename O::scalar_type;
+  if constexpr (requires { o.measured(S(0)); }) {
+    if (in.random.index(8) > 1) o.measured(in.u<S>());
+    if (in.random.index(9) == 0) o.revise_measured();
+    if (in.random.index(99) == 0) o.settle_measured();
+  }
   [[maybe_unused]] const S T = o.sample_time();
   const int what = in.random.index(24);
   if constexpr (requires { o.set_step_time(T); }) {
@@ -203,6 +212,9 @@ void step_controller(C& o, Signals& in, Played& out) {
       put(out, o.set_step_time(length).has_value());
     }
   }
+  if constexpr (requires { o.measured(in.u<S>()); }) {
+    if (in.random.index(8) > 1) o.measured(in.u<S>());
+  }
   if constexpr (requires { o.hold(y(), y(), u()); }) {
     if (what == 1) put(out, o.hold(y(), y(), u()));
   }
@@ -280,6 +292,11 @@ void let_go([[maybe_unused]] O& o) {
     for (int k = 0; k < 16; ++k) (void)o.update(S(0), S(0));
   }
   if constexpr (requires { o.fill_input(S(0)); }) o.fill_input(S(0));
+  if constexpr (requires { o.settle_measured(); }) {
+    o.measured(S(0));
+    (void)o.predict(S(0));
+    o.settle_measured();
+  }
 }
 
 /// What calls are played: so many, after a start or not. The seed says which.

@@ -106,6 +106,10 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
       ShiftableDisturbance<Observer> {
     return observer_.shift_disturbance(offset);
   }
+  constexpr StepStatus shift_load(const scalar_type& offset) noexcept requires
+      ShiftableLoad<Observer> {
+    return observer_.shift_load(offset);
+  }
   [[nodiscard]] constexpr scalar_type innovation() const noexcept requires
       requires(const Observer& o) {
     o.innovation();
@@ -153,6 +157,16 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
   }
   void fill_input(const scalar_type& u) noexcept requires(observer_traits<Observer>.delays_input) {
     observer_.fill_input(u);
+  }
+  template <class W>
+  void measured(const W& w) noexcept requires(observer_traits<Observer>.takes_measured) {
+    observer_.measured(w);
+  }
+  void revise_measured() noexcept requires(observer_traits<Observer>.takes_measured) {
+    observer_.revise_measured();
+  }
+  void settle_measured() noexcept requires(observer_traits<Observer>.takes_measured) {
+    observer_.settle_measured();
   }
   Check<scalar_type> set_step_time(const scalar_type& seconds) noexcept
       requires(observer_traits<Observer>.varies_time) {

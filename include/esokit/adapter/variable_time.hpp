@@ -47,6 +47,8 @@ class VariableTime
   friend Base;
   using Base::observer_;
   using S = typename Observer::scalar_type;
+  static_assert(!observer_traits<Observer>.takes_measured,
+                "esokit: put Measured around VariableTime, not inside it");
 
  public:
   /// What the adapter can do beyond LoopObserver.

@@ -14,6 +14,7 @@
 #include <cstddef>
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
+#include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
@@ -74,6 +75,11 @@ requires detail::SaysObserver<Observer> &&(!LinearObserver<WrappedOutput<Observe
 template <class Observer>
 requires detail::SaysObserver<Observer> &&(!LinearObserver<OutlierGate<Observer>>)  //
     LinearObserverForm linear_observer(const OutlierGate<Observer>& observer) {
+  return linear_observer(observer.observer());
+}
+template <class Observer, int Count, int Delay>
+requires detail::SaysObserver<Observer> &&(!LinearObserver<Measured<Observer, Count, Delay>>)  //
+    LinearObserverForm linear_observer(const Measured<Observer, Count, Delay>& observer) {
   return linear_observer(observer.observer());
 }
 template <class Observer>

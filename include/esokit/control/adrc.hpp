@@ -95,10 +95,12 @@ class Adrc {
   using Reference = Vector<S, order + 1>;              ///< (r, r', .., r^(n)), n + 1 x 1
 
   /// What the controller can do beyond `update(y, reference)`.
-  static constexpr ControllerTraits traits{.takes_derivatives = true,
-                                           .knows_sample_time = true,
-                                           .varies_time = observer_traits<Observer>.varies_time,
-                                           .observes = true};
+  static constexpr ControllerTraits traits{
+      .takes_derivatives = true,
+      .knows_sample_time = true,
+      .varies_time = observer_traits<Observer>.varies_time,
+      .takes_measured = observer_traits<Observer>.takes_measured,
+      .observes = true};
 
   using Config = AdrcConfig<Observer>;  ///< settings of make
   using Status = StatusOf<S>;           ///< StepStatus, for a pack one per lane
@@ -158,6 +160,21 @@ class Adrc {
     return update_without_measurement(detail::listed(reference));
   }
   /// @}
+
+  /// w[k], before the sample in which it is first used; for Adrc<Measured<..>>. @param w a number,
+  /// or a vector of several; NaN: lost
+  template <class W, class O = Observer>
+  requires(observer_traits<O>.takes_measured) void measured(const W& w) noexcept {
+    if constexpr (!error_based) {
+      observer().measured(w);
+    } else if constexpr (detail::vector_size<W> == 0) {
+      observer().measured(S(-w));
+    } else {
+      Vector<S, detail::vector_size<W>> opposite = w;
+      for (S& one : opposite) one = -one;
+      observer().measured(opposite);
+    }
+  }
 
   /// One sample whose measurement is missing.
   S update_without_measurement(S reference) noexcept {

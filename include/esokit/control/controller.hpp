@@ -23,6 +23,7 @@ struct ControllerTraits {
 
   bool knows_sample_time = false;  ///< `sample_time() const`, s
   bool varies_time = false;        ///< `set_step_time(seconds)`, before each step
+  bool takes_measured = false;     ///< `measured(w)` before each sample, see Measured
   bool observes = false;  ///< `observer() const`, with `total_disturbance()`; for one channel only
 };
 

@@ -56,9 +56,11 @@ class DisturbanceCompensator {
   using S = scalar_type;                               ///< the same type
 
   /// What the compensator can do beyond `update(y, base_output)`.
-  static constexpr ControllerTraits traits{.knows_sample_time = true,
-                                           .varies_time = observer_traits<Observer>.varies_time,
-                                           .observes = true};
+  static constexpr ControllerTraits traits{
+      .knows_sample_time = true,
+      .varies_time = observer_traits<Observer>.varies_time,
+      .takes_measured = observer_traits<Observer>.takes_measured,
+      .observes = true};
 
   using Config = DisturbanceCompensatorConfig<Observer>;  ///< settings of make
   template <class T>
@@ -96,6 +98,13 @@ class DisturbanceCompensator {
   /// b0
   S update_driven(S y, S base_output, S drive) noexcept {
     return loop_.step_driven(y, drive, [&] { return base_output + unbounded_compensation(); });
+  }
+
+  /// w[k], before the sample in which it is first used; for an observer that is Measured.
+  /// @param w a number, or a vector of several; NaN: lost
+  template <class W, class O = Observer>
+  requires(observer_traits<O>.takes_measured) void measured(const W& w) noexcept {
+    observer().measured(w);
   }
 
   /// One sample whose measurement is missing.

@@ -80,7 +80,11 @@ class PredictiveAdrc {
 
   /// What the controller can do beyond `update(y, reference)`.
   static constexpr ControllerTraits traits{
-      .two_phases = true, .takes_derivatives = true, .knows_sample_time = true, .observes = true};
+      .two_phases = true,
+      .takes_derivatives = true,
+      .knows_sample_time = true,
+      .takes_measured = observer_traits<Observer>.takes_measured,
+      .observes = true};
 
   using Config = PredictiveAdrcConfig<Observer>;  ///< settings of make
 
@@ -93,14 +97,14 @@ class PredictiveAdrc {
                                               .gains = config.gains,
                                               .input_gain = observer->input_gain()});
     if (!law) return law.error();
-    const auto limiter = Limiter<S>::make(config.limits, config.observer.sample_time);
+    const auto limiter = Limiter<S>::make(config.limits, observer->sample_time());
     if (!limiter) return limiter.error();
-    const auto hold = hold_samples(config.start_hold, config.observer.sample_time);
+    const auto hold = hold_samples(config.start_hold, observer->sample_time());
     if (!hold) return hold.error();
     PredictiveAdrc controller(*observer, *law, *limiter, *hold);
     for (const S& weight : controller.weights_) {
       if (!all(is_finite(weight))) {
-        return Error<S>{"observer.sample_time", config.observer.sample_time,
+        return Error<S>{"observer.sample_time", observer->sample_time(),
                         "with these gains gives a law that the scalar cannot hold"};
       }
     }
@@ -119,6 +123,15 @@ class PredictiveAdrc {
     output_ = limiter_.clamp(select(usable(y, raw), raw, blind_));
     phase_ = Phase::measured;
     return output_;
+  }
+
+  /// w of this sample, before `control`, for an observer that is Measured; computes the next u
+  /// anew. If it is left out, w is lost. @param w a number, or a vector of several; NaN: lost
+  template <class W, class O = Observer>
+  requires(observer_traits<O>.takes_measured) void measured(const W& w) noexcept {
+    observer_.measured(w);
+    observer_.revise_measured();
+    arm();
   }
 
   /// First phase of a sample without a measurement.

@@ -190,6 +190,10 @@ class LaneByLane : public detail::GoesLaneByLane {
   ESOKIT_EACH_LANE(release)
   ESOKIT_EACH_LANE(set_trust)
   ESOKIT_EACH_LANE(set_pin)
+  ESOKIT_EACH_LANE(measured)
+  ESOKIT_EACH_LANE(revise_measured)
+  ESOKIT_EACH_LANE(settle_measured)
+  ESOKIT_EACH_LANE(shift_load)
 
   ESOKIT_EACH_LANE(estimate)
   ESOKIT_EACH_LANE_ROW(estimate)

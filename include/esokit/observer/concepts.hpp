@@ -8,6 +8,7 @@
 /// | RestartingObserver | VariableTime |
 /// | ShiftableOutput | WrappedOutput |
 /// | ShiftableDisturbance | KnownModel, MimoAdrc |
+/// | ShiftableLoad | Measured |
 /// | PredictableObserver | PredictiveAdrc |
 /// | SampledLinearObserver | analysis |
 #pragma once
@@ -59,8 +60,12 @@ struct ObserverTraits {
 
   bool wraps_output = false;  ///< y is an angle: `wrap(difference) const`
   bool delays_input = false;  ///< u acts late: `fill_input(u)`, as if u had been applied for long
-  bool varies_time = false;   ///< `set_step_time(seconds)`, before each step, and (but for packs)
-                              ///< `step_time() const`, its present length
+
+  /// Disturbances are measured: `measured(w)` before each step, `revise_measured()`,
+  /// `settle_measured()`, see Measured.
+  bool takes_measured = false;
+  bool varies_time = false;  ///< `set_step_time(seconds)`, before each step, and (but for packs)
+                             ///< `step_time() const`, its present length
   bool gates_outliers =
       false;  ///< `accepts(y) const`: false if `correct` would reject y as an outlier
 
@@ -101,6 +106,7 @@ namespace detail {
 ESOKIT_MEMBER_NAME(wrap)
 ESOKIT_MEMBER_NAME(fill_input)
 ESOKIT_MEMBER_NAME(set_step_time)
+ESOKIT_MEMBER_NAME(revise_measured)
 ESOKIT_MEMBER_NAME(accepts)
 ESOKIT_MEMBER_NAME(blanked)
 ESOKIT_MEMBER_NAME(input_factor)
@@ -151,6 +157,12 @@ template <class O>
 concept DelaysInput = requires(O& o, const typename O::scalar_type& s) {
   o.fill_input(s);
 };
+template <class O>
+concept TakesMeasured = requires(O& o) {
+  o.revise_measured();
+  o.settle_measured();
+}
+&&(requires(O& o, const typename O::scalar_type& s) { o.measured(s); } || O::inputs > 1);
 template <class O>
 concept VariesTime = requires(O& o, const typename O::scalar_type& s) {
   { o.set_step_time(s) } -> std::same_as<Check<typename O::scalar_type>>;
@@ -214,6 +226,12 @@ concept DelaysInputAsDeclared = detail::observer_as_declared<O>(observer_traits<
                                                                 detail::names_fill_input<O>,
                                                                 detail::DelaysInput<O>);
 
+/// `measured(w)` and its neighbours exist if and only if `traits.takes_measured` declares them.
+template <class O>
+concept TakesMeasuredAsDeclared = detail::observer_as_declared<O>(observer_traits<O>.takes_measured,
+                                                                  detail::names_revise_measured<O>,
+                                                                  detail::TakesMeasured<O>);
+
 /// `set_step_time(seconds)` and `step_time() const` exist if and only if `traits.varies_time`
 /// declares them.
 template <class O>
@@ -255,8 +273,8 @@ concept HasNoMisspelledObserverHook =
 template <class O>
 concept ObserverAsDeclared = DeclaresTraits<O, ObserverTraits> && PublishesChainAsDeclared<O> &&
     ActsByGainAsDeclared<O> && AdaptsAsDeclared<O> && WrapsOutputAsDeclared<O> &&
-    DelaysInputAsDeclared<O> && VariesTimeAsDeclared<O> && GatesOutliersAsDeclared<O> &&
-    BlanksEstimateAsDeclared<O> && SchedulesInputGainAsDeclared<O> &&
+    DelaysInputAsDeclared<O> && TakesMeasuredAsDeclared<O> && VariesTimeAsDeclared<O> &&
+    GatesOutliersAsDeclared<O> && BlanksEstimateAsDeclared<O> && SchedulesInputGainAsDeclared<O> &&
     GatesDisturbanceAsDeclared<O> && HasNoMisspelledObserverHook<O>;
 
 /// A config with b0, T and the longest gap that is bridged.
@@ -325,6 +343,13 @@ concept ShiftableDisturbance = LoopObserver<O> &&
   { observer.shift_disturbance(s) } -> std::same_as<StatusOf<typename O::scalar_type>>;
 };
 
+/// An observer that can be told a load on the plant: `shift_load(offset)` adds to the constant part
+/// of the disturbance, unit of y^(n) with n of the plant. It returns the same as `shift_output`.
+template <class O>
+concept ShiftableLoad = LoopObserver<O> && requires(O& observer, const typename O::scalar_type& s) {
+  { observer.shift_load(s) } -> std::same_as<StatusOf<typename O::scalar_type>>;
+};
+
 namespace detail {
 
 /// The members that PredictiveAdrc needs for a kind of gain.
@@ -348,8 +373,8 @@ concept ForetellsByKind = kind == GainKind::general || requires(const O& o) {
 
 }  // namespace detail
 
-/// An observer whose next correction is known before the measurement. It is not an adapter, because
-/// adapters change y, u or the estimate. Packs are accepted.
+/// An observer whose next correction is known before the measurement. Adapters are not, because they
+/// change y, u or the estimate; but Measured, which only predicts more, is. Packs are accepted.
 ///
 /// It declares `traits.is_predictable` and the kind of its gain, see GainKind:
 /// - with one level `correction_gain(e) const` is the scaled gain of the next correction;
@@ -359,11 +384,10 @@ concept ForetellsByKind = kind == GainKind::general || requires(const O& o) {
 template <class O>
 concept PredictableObserver = std::copyable<O> && Scalar<typename O::scalar_type> &&
     ObserverAsDeclared<O> && observer_traits<O>
-.is_predictable && !observer_traits<O>.adapts &&
-    requires(O & observer, const O& constant, const typename O::scalar_type& s,
-             const typename O::Estimate& state, typename O::Config& config) {
+.is_predictable&& requires(O& observer, const O& constant, const typename O::scalar_type& s,
+                           const typename O::Estimate& state, typename O::Config& config) {
   requires O::order >= 1 && O::size > O::order&& O::levels >= 1;
-  { config } -> ChainSettings<typename O::scalar_type>;
+  { chain_config<O>(config) } -> ChainSettings<typename O::scalar_type>;
   { O::make(config) } -> std::same_as<Expected<O, Error<typename O::scalar_type>>>;
   { observer.adopt(constant) } -> std::same_as<Check<typename O::scalar_type>>;
   { observer.predict(s) } -> std::same_as<StatusOf<typename O::scalar_type>>;

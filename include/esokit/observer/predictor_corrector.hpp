@@ -414,6 +414,23 @@ class PredictorCorrector {
     return shift_to(next);
   }
 
+  /// Adds `offset` (unit of y^(n), n of the plant) to the load on the plant, for when it is known.
+  /// With an actuator in the model the load acts behind it, on y^(n). @return as for `shift_output`
+  constexpr Status shift_load(const S& offset) noexcept
+      requires(model_traits<Model>.is_chain || model_traits<Model>.tells_constant) {
+    if constexpr (model_traits<Model>.is_chain) {
+      return shift_disturbance(offset);
+    } else {
+      LevelStates next = states_;
+      const State column = model_.constant_column();
+      const S scaled = model_.scaled_constant(offset);
+      for (auto& state : next) {
+        for (std::size_t i = 0; i < column.size(); ++i) state[i] = state[i] + column[i] * scaled;
+      }
+      return shift_to(next);
+    }
+  }
+
   /// Takes over the settings of `fresh` and keeps the estimate: states are rescaled to its sample
   /// time, and a change of b0 is moved into the disturbance, dhat += (b0_old - b0_new) u, so that
   /// the control does not jump.

@@ -14,6 +14,7 @@ auto start_at_rest(Observer& observer, const S& y, const S& u) noexcept {
   if constexpr (observer_traits<Observer>.delays_input) next.fill_input(u);
   // Stores the input, which `revise_input` and a change of b0 need.
   (void)next.predict(u);
+  if constexpr (observer_traits<Observer>.takes_measured) next.settle_measured();
   const auto status = next.reset(next.equilibrium(y, u));
   if (status == StepStatus::ok) observer = next;
   return status;

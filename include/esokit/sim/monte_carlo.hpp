@@ -854,6 +854,7 @@ class MonteCarlo {
     loop.sample_time = plain.sample_time;
     loop.reference = plain.reference;
     loop.disturbance = plain.disturbance;
+    loop.measured = plain.measured;
     broadcast(loop.noise, plain.noise);
     if (plain.sensor) {
       using Output = typename RunTypes<Plant, Control>::Output;

@@ -114,6 +114,10 @@ struct RunConfig {
   /// plant; in other plants it is added to u.
   RunSignal<typename Types::S, Types::inputs> disturbance{};
 
+  /// w, a number or a function of t, told to a controller that takes one measured disturbance; NaN:
+  /// lost. What w does to the plant belongs into `disturbance` or the plant.
+  RunSignal<typename Types::S, 1> measured{};
+
   Output noise{};  ///< standard deviation of the white normal measurement noise, unit of y
 
   /// The sensor: a function of (t, y), where y includes noise; it may quantise or return NaN
@@ -525,6 +529,9 @@ class Run {
         if (const auto ok = controller.set_step_time(Own(passed)); !ok) {
           return as_error<Time>(ok.error());
         }
+      }
+      if constexpr (controller_traits<C>.takes_measured) {
+        controller.measured(in_scalar<Own>(config_.measured(t)(0)));
       }
       Input u;
       with(reference, [&](const auto& r) ESOKIT_INLINE_LAMBDA {

@@ -1,0 +1,254 @@
+/// @file
+/// Measured: tells an observer what measured disturbances do, so that it has to find only the rest.
+#pragma once
+
+#include <esokit/adapter/adapter.hpp>
+#include <esokit/core/type_tag.hpp>
+#include <esokit/model/measured_input.hpp>
+#include <esokit/model/sampled_model.hpp>
+#include <limits>
+
+namespace esokit {
+
+/// Config of Measured.
+template <LoopObserver Observer, int Count>
+struct MeasuredConfig {
+  using S = typename Observer::scalar_type;  ///< type of signals and settings
+
+  typename Observer::Config observer{};     ///< config of the observer
+  Array<MeasuredInput<S>, Count> inputs{};  ///< what each w does
+  int most_lost = 50;  ///< samples in a row without a good w for which the last one is held, 0 ..
+                       ///< 65535; after them it counts as zero, until there is a good one
+
+  /// @cond
+  static constexpr auto fields(auto& c) noexcept {
+    return detail::tie(c.observer, c.inputs, c.most_lost);
+  }
+  /// @endcond
+};
+
+/// Observer of y^(n) = f(w) + d + b0 u with disturbances w that are measured (a fan, a flow, the
+/// supply voltage, the torque of the next joint) and whose effect f is known, see MeasuredInput.
+/// The estimate is that of f + d, so a law cancels both, f without waiting for y.
+///
+/// Timing: `measured(w)` at sample k comes before `update(y, u)`; w[k] is taken to be held from k
+/// to k + 1, like the u that a controller returns at k. So dhat has f of the coming sample, and
+/// each prediction the f of the sample that it predicts. f is its exact mean over the sample. On
+/// the chain with n = 1, and for an f that does not change within a sample (no lag, whole samples
+/// of dead time), this is exact. Otherwise an error in y of order T^(n+1) f' / 12 remains a sample.
+///
+/// Before the first `measured`, and after `make`, w has been zero. A controller's `start(y, u)`
+/// takes the w given last to have been there for long; `reset` restarts f + d and leaves w's
+/// memory. Retuning keeps f + d and the memory of w, so u does not jump: d becomes what the new f
+/// does not explain.
+///
+/// A w that is not given before a step, is not finite, or is too large is lost: the last good one
+/// is held for `most_lost` samples, then dropped: it counts as zero, which passes lag and dead
+/// time like any w. The first good w ends this. `lost(i)` and `dropped(i)` tell.
+///
+/// A gain that is wrong by 30 % leaves 30 % of f to the observer, which finds it like any d.
+/// With an actuator in the model f acts on the plant behind the actuator, as it does in reality.
+/// What Guarded bounds and leaks is f + d. Put it around VariableTime, not inside: the dead time is
+/// then counted in the present steps.
+/// @tparam Count number of disturbances that are measured @tparam Delay longest dead time, samples;
+///         the memory is Delay + 2 scalars each
+template <ShiftableLoad Observer, int Count = 1, int Delay = 0>
+class Measured : public NamedAdapter<Measured<Observer, Count, Delay>, Observer,
+                                     MeasuredConfig<Observer, Count>> {
+  using Base = NamedAdapter<Measured, Observer, MeasuredConfig<Observer, Count>>;
+  friend Base;
+  using Base::observer_;
+  using S = typename Observer::scalar_type;
+  static_assert(Count >= 1, "esokit: something has to be measured");
+  static_assert(Delay >= 0, "esokit: Delay is the longest dead time, in samples");
+
+ public:
+  static constexpr int inputs = Count;  ///< number of disturbances that are measured
+
+  /// What the adapter can do beyond LoopObserver.
+  static constexpr ObserverTraits traits = [] {
+    constexpr ObserverTraits inside = observer_traits<Observer>;
+    ObserverTraits traits = Base::traits;
+    traits.takes_measured = true;
+    traits.is_predictable =
+        inside.is_predictable && !inside.blanks_estimate && !inside.gates_outliers;
+    return traits;
+  }();
+
+  /// w[k], before the step that ends at k. NaN: lost.
+  void measured(const S& w) noexcept requires(Count == 1) { given_[0] = w; }
+  /// The same for all of them, Count x 1; a lost one is NaN.
+  template <detail::VectorOf<S> Given>
+  void measured(const Given& w) noexcept {
+    static_assert(detail::vector_size<Given> == Count, "esokit: w has Count elements");
+    const Vector<S, Count>& all = w;
+    for (int i = 0; i < Count; ++i) given_[static_cast<std::size_t>(i)] = all(i);
+  }
+
+  /// Takes a w that was given after the prediction for its sample, before the correction; for
+  /// controllers that predict early.
+  void revise_measured() noexcept {
+    for (int i = 0; i < Count; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      if (paths_[at].takes(given_[at], Count)) paths_[at].replace(accepted(at));
+    }
+    forget();
+    tell();
+  }
+
+  /// As if the w of the last step had been there for long; f + d stays. For a start at rest.
+  void settle_measured() noexcept {
+    for (auto& path : paths_) path.settle();
+    told_ = sum();
+  }
+
+  /// One sample, see PredictorCorrector::update.
+  StepStatus update(S y, S u_applied) noexcept {
+    const StepStatus status = predict(u_applied);
+    return status | observer_.correct(y);
+  }
+
+  /// Time update only, see PredictorCorrector::predict.
+  StepStatus predict(S u_applied) noexcept {
+    // The length of the step may be another one than was thought.
+    if constexpr (observer_traits<Observer>.varies_time) tell();
+    const StepStatus status = observer_.predict(u_applied);
+    for (int i = 0; i < Count; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      paths_[at].advance();
+      paths_[at].push(accepted(at));
+    }
+    forget();
+    tell();
+    return status;
+  }
+
+  /// Sets the length of the next step, s, if the observer is VariableTime.
+  template <class O = Observer>
+  requires(observer_traits<O>.varies_time) Check<S> set_step_time(const S& seconds)
+  noexcept {
+    if (auto ok = observer_.set_step_time(seconds); !ok) return ok;
+    for (auto& path : paths_) path.set_time(seconds);
+    return {};
+  }
+
+  /// f, what all w add to y^(n) in the mean of the coming sample, unit of y^(n) (n of the plant).
+  [[nodiscard]] const S& known_part() const noexcept { return told_; }
+  /// dhat without f, unit of y^(n).
+  [[nodiscard]] S residual_disturbance() const noexcept requires(
+      model_traits<std::remove_cvref_t<decltype(std::declval<const Observer&>().model())>>.is_chain) {
+    return observer_.total_disturbance() - told_;
+  }
+  /// @cond
+  [[nodiscard]] const auto& path(int i) const noexcept {
+    return paths_[static_cast<std::size_t>(i)];
+  }
+  /// @endcond
+  /// Samples in a row without a good w number `i`.
+  [[nodiscard]] int lost(int i = 0) const noexcept { return lost_[static_cast<std::size_t>(i)]; }
+  /// True if w number `i` has been lost for so long that it counts as zero.
+  [[nodiscard]] bool dropped(int i = 0) const noexcept { return lost(i) > most_lost_; }
+
+  /// What PredictiveAdrc asks of the observer, see PredictableObserver.
+  /// @{
+  [[nodiscard]] auto correction_gain(const S& e) const noexcept requires
+      requires(const Observer& o) {
+    o.correction_gain(e);
+  }
+  { return observer_.correction_gain(e); }
+  [[nodiscard]] auto preview() const noexcept requires requires(const Observer& o) { o.preview(); }
+  { return observer_.preview(); }
+  template <class State>
+  [[nodiscard]] S finite_probe(const State& x) const noexcept {
+    return observer_.finite_probe(x);
+  }
+  [[nodiscard]] const auto& gain_law() const noexcept requires requires(const Observer& o) {
+    o.gain_law();
+  }
+  { return observer_.gain_law(); }
+  /// @}
+
+ private:
+  using Settings = MeasuredConfig<Observer, Count>;
+
+  Measured(const Observer& observer, const Settings& config) noexcept
+      : Base(observer), most_lost_(config.most_lost) {
+    const S time = chain_config<Observer>(config.observer).sample_time;
+    for (std::size_t i = 0; i < Count; ++i) paths_[i] = {config.inputs[i], time};
+    forget();
+  }
+
+  static Check<S> check(const Settings& config) {
+    const S time = chain_config<Observer>(config.observer).sample_time;
+    Rules<S> rules;
+    for (int i = 0; i < Count; ++i) {
+      rules.all_of(Path::check(config.inputs[static_cast<std::size_t>(i)], time, i));
+    }
+    return rules.require(0 <= config.most_lost && config.most_lost <= 65535, "most_lost",
+                         static_cast<S>(config.most_lost), "must be 0 .. 65535");
+  }
+
+  /// Keeps f + d and the memory of w.
+  void take(const Measured& fresh) noexcept {
+    for (std::size_t i = 0; i < Count; ++i) paths_[i].adopt(fresh.paths_[i]);
+    most_lost_ = fresh.most_lost_;
+    told_ = sum();
+  }
+
+  /// The w number `i` to be used, by the rule for lost ones.
+  S accepted(std::size_t i) noexcept {
+    if (paths_[i].takes(given_[i], Count)) {
+      last_[i] = given_[i];
+      lost_[i] = 0;
+    } else if (lost_[i] <= 65535) {
+      ++lost_[i];
+    }
+    return lost_[i] > most_lost_ ? S(0) : last_[i];
+  }
+
+  /// A w counts for one step.
+  void forget() noexcept { given_.fill(std::numeric_limits<S>::quiet_NaN()); }
+
+  [[nodiscard]] S sum() const noexcept {
+    S all(0);
+    for (const auto& path : paths_) all = all + path.mean();
+    return all;
+  }
+
+  /// Tells the observer the present f. If the estimate would not be finite, it is told later.
+  void tell() noexcept {
+    const S now = sum();
+    const S more = now - told_;
+    if (!(more < S(0)) && !(more > S(0))) return;
+    if (observer_.shift_load(more) == StepStatus::ok) told_ = now;
+  }
+
+  using Path = detail::MeasuredPath<S, Delay>;
+  Array<Path, Count> paths_{};
+  Array<S, Count> given_{};
+  Array<S, Count> last_{};  ///< the last good ones
+  Array<int, Count> lost_{};
+  int most_lost_;
+  S told_{};  ///< the f that is in the estimate
+};
+
+/// The same for packs, lane by lane.
+template <ShiftableLoad Observer, int Count, int Delay>
+requires PackScalar<typename Observer::scalar_type>
+class Measured<Observer, Count, Delay>
+    : public PackAdapter<Measured<Observer, Count, Delay>,
+                         Measured<detail::LaneOf<Observer>, Count, Delay>, Observer,
+                         MeasuredConfig<Observer, Count>> {
+ public:
+  using Measured::PackAdapter::PackAdapter;
+  template <class T>
+  using with_scalar =
+      Measured<detail::WithScalar<Observer, T>, Count, Delay>;  ///< the same with another scalar
+};
+
+/// Distinguishes the type in snapshots.
+template <ShiftableLoad Observer, int Count, int Delay>
+inline constexpr std::uint32_t type_tag<Measured<Observer, Count, Delay>> =
+    make_type_tag<Observer>("Measured", Count, Delay);
+
+}  // namespace esokit
