@@ -103,6 +103,10 @@ TEST(MeasuredColumns, GainLagAndDeadTimeOfEach) {
     const auto held = effect.held(T);
     EXPECT_EQ(held.gain, effect.gain.value);
     EXPECT_NEAR(held.lag + held.dead_time, effect.latency.value - 0.5 * T, 1e-12);
+    EXPECT_EQ(held.lag, effect.lag.value);
+    const auto sooner = effect.held(T, effect.dead_time.value);
+    EXPECT_EQ(sooner.dead_time, 0);
+    EXPECT_NEAR(sooner.lag, effect.lag.value - 0.5 * T, 1e-12);
   }
   // Without them there is more to find, and with their gains alone they are not right.
   EXPECT_GT(found->disturbance_unmeasured, 5 * found->disturbance);

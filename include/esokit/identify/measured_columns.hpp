@@ -34,12 +34,14 @@ struct MeasuredEffect {
 
   /// Whether the log tells the gain: its interval does not contain zero.
   [[nodiscard]] bool told() const { return gain.half_width < std::abs(gain.value); }
-  /// The same for a w that is held from its sample to the next, as a controller has it: of the same
-  /// latency, with half a sample less of dead time, or else of lag. @param sample_time s
-  [[nodiscard]] MeasuredInput<double> held(double sample_time) const {
-    const double half = 0.5 * sample_time;
-    return {gain.value, std::max(lag.value - std::max(half - dead_time.value, 0.0), 0.0),
-            std::max(dead_time.value - half, 0.0)};
+  /// The settings of `Measured`, where w is held from its sample to the next: half a sample less of
+  /// latency, first of dead time, then of lag.
+  /// @param sample_time s @param input_latency how much later u acts than the observer knows, s:
+  /// the law is told of w so much sooner
+  [[nodiscard]] MeasuredInput<double> held(double sample_time, double input_latency = 0.0) const {
+    const double less = 0.5 * sample_time + input_latency;
+    return {gain.value, std::max(lag.value - std::max(less - dead_time.value, 0.0), 0.0),
+            std::max(dead_time.value - less, 0.0)};
   }
 };
 

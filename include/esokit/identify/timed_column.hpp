@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <esokit/core/language.hpp>
 #include <vector>
 
 namespace esokit {
