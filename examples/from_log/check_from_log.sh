@@ -153,11 +153,12 @@ compiles() {  # compiles PAGE: all its programs, in one, say that they check; th
 
 # servo [NAME=NUMBER...]: 8 s, y'' + 2 y' = b u(t - 4 ms) - load, rows "t y u r"; the reference steps.
 #   b input gain; scale of u; quantum of y; still=1: the reference does not move; noise of y; drift
-#   of the load a row; friction; hold: friction that holds at standstill
+#   of the load a row; friction; hold: friction that holds at standstill; push: of a measured w, the
+#   last column, behind 10 ms of lag and 6 ms of dead time
 servo() {
   local set=() pair
   for pair in "$@"; do set+=(-v "$pair"); done
-  awk -v b=50 -v scale=1 -v quantum=0 -v still=0 -v rows=4000 -v noise=1e-3 -v wander=0.02 -v friction=0 -v hold=0 "${set[@]}" '
+  awk -v b=50 -v scale=1 -v quantum=0 -v still=0 -v rows=4000 -v noise=1e-3 -v wander=0.02 -v friction=0 -v hold=0 -v push=0 "${set[@]}" '
     function normal() {
       seed = (seed * 69069 + 12345) % 4294967296; first = (seed + 1) / 4294967297
       seed = (seed * 69069 + 12345) % 4294967296
@@ -174,10 +175,12 @@ servo() {
         u = sign * (3 * (r - y) - 0.25 * slope)
         if (u > 6) u = 6
         if (u < -6) u = -6
-        printf "%.3f %.7g %.7g %.7g\n", t, y, scale * u, r
+        if (push && k % 230 == 77) w = 3 + normal()
+        printf "%.3f %.7g %.7g %.7g%s\n", t, y, scale * u, r, push ? sprintf(" %.5g", w) : ""
         drift += wander * normal()
         for (i = 0; i < 4; ++i) {  # u of 4 ms ago
           a = b * (i < 4 ? old2 : old1) - 2 * v + 5 + drift
+          if (push) { late += (old_w3 - late) * 0.05; a += push * late }
           if (friction > 0) a -= friction * (1 - 2 / (exp(40 * v) + 1))  # tanh(20 v)
           if (hold > 0) {
             if (v == 0 && a * a <= hold * hold) continue
@@ -186,7 +189,7 @@ servo() {
           }
           x += v * T / 4 + a * T * T / 32; v += a * T / 4
         }
-        old2 = old1; old1 = u
+        old2 = old1; old1 = u; old_w3 = old_w2; old_w2 = old_w1; old_w1 = w
       }
     }'
 }
@@ -231,6 +234,63 @@ grep -q 'force += .* \* std::tanh(rate / ' rubbing.cpp &&
   "$compiler" -std=c++20 -I"$root/include" -Wall -Wextra -Wconversion -Werror rubbing.cpp -o rubbing &&
   [[ $(./rubbing) == 'self-check: ok' ]]
 verdict $? "rubbing.csv: no friction in the code, or its self-check fails: $(cat rubbing.cpp)"
+# A load that is measured: what is pasted measures it, too, and holds one that is lost.
+servo push=40 >rows.txt
+{ echo t,y,u,r,load; awk '{ print $1 "," $2 "," $3 "," $4 "," (NR % 50 == 9 ? "" : $5) }' rows.txt; } >pushed.csv
+healthy pushed.csv --measured load
+[[ $said == *'Measuring load saves'* ]] && grep -q '80 *<.*put between its neighbours' "$page" &&
+  grep -q 'load: dead time' "$page"
+verdict $? "pushed.csv: what was measured is not on $page: $said"
+code_of "$page" | awk '/^\/\/ program$/ { ++n } n == 1' >pushed.cpp
+cat >push.cpp <<'END'
+#define main pasted_main
+#include "pushed.cpp"
+#undef main
+#include <random>
+double largest(bool measures, bool loses) {
+  auto loop = Loop::make();
+  if (!loop) return 1e9;
+  std::mt19937_64 bits(1);
+  std::normal_distribution<double> normal;
+  double x = 0, v = 0, old1 = -1.5, old2 = -1.5, w = 2, w1 = 2, w2 = 2, w3 = 2, late = 2, most = 0;
+  if (measures) loop->measured(w);
+  loop->start(0, -1.7);
+  for (int k = 0; k < 5000; ++k) {
+    w = k < 2000 || k >= 3500 ? 2 : 4;
+    if (measures && !(loses && k >= 2500 && k < 3000)) loop->measured(w);
+    if (loses && k == 2999 && loop->feed1.lost != 499) return 1e9;
+    const double u = loop->update(x + 1e-3 * normal(bits), 0);
+    if (k > 1500) most = std::max(most, std::abs(x));
+    for (int i = 0; i < 4; ++i) {
+      late += (w3 - late) * 0.05;
+      const double a = 50 * old2 - 2 * v + 5 + 40 * late;
+      x += v * 5e-4 + a * 1.25e-7;
+      v += a * 5e-4;
+    }
+    old2 = old1;
+    old1 = u;
+    w3 = w2, w2 = w1, w1 = w;
+  }
+  return most;
+}
+int main() {
+  const double with = largest(true, false), lost = largest(true, true);
+  const double without = largest(false, false);
+  std::printf("with %g, lost %g, without %g\n", with, lost, without);
+  return with < 0.5 * without && lost == with ? 0 : 3;
+}
+END
+measuring=(-std=c++20 -I"$root/include" -Wall -Wextra -Wconversion -Werror)
+"$compiler" "${measuring[@]}" -O1 pushed.cpp -o pushed && [[ $(./pushed) == 'self-check: ok' ]] &&
+  "$compiler" "${measuring[@]}" -O1 push.cpp -o push && ./push >said_push
+verdict $? "pushed.csv: its code does not compile, check or hold the load: $(cat said_push pushed.cpp)"
+sed 's/,[^,]*$/,1/; 1s/1$/fan/' pushed.csv >idle.csv
+status=0
+run idle.csv --measured fan --no-design || status=$?
+[[ $status == 3 && $said == *'never changes'* && $said == *'Column 0 of --measured is fan.'* ]]
+verdict $? "idle.csv: a constant column is not refused by name: $status $said"
+refuses "--known is now --measured" pushed.csv --known load
+refuses "'load,,r' has an empty name" pushed.csv --measured load,,r
 servo >rows.txt
 design=--no-design  # the controller takes most of the time, and does not know where a row came from
 written '# recorded by hand

@@ -278,7 +278,7 @@ void pendulum(Report& report, Machines& machines, std::vector<Swing>& swings) {
                  1e3 * likely.latency, std::nullopt, "16 to 18 expected");
     report.check(title, "b0 there", std::nullopt, found.orders[1].fit.linear[0]);
     const double energy = b0_by_energy(file, file.rows(), true);
-    const double gravity = found.columns.empty() ? 0 : found.columns[0].value;
+    const double gravity = found.columns.empty() ? 0 : found.columns[0].gain.value;
     report.check(title, "m g l / J (1/s2)", std::nullopt, gravity, std::nullopt,
                  "20.0 by weighed parts");
     report.check(title, "b0 by the energy of the weighed pendulum", std::nullopt, energy);
@@ -318,7 +318,7 @@ void mass_change(Report& report, Machines& machines, std::vector<Swing>& swings)
     up.columns = {cut(whole.columns[0])};
     const Identified& found = machines.study(title + ", swing-up alone", up, known, options, true);
     b0[run] = found.input_gain.value;
-    const double gravity = found.columns.empty() ? 0 : found.columns[0].value;
+    const double gravity = found.columns.empty() ? 0 : found.columns[0].gain.value;
     report.check_reference(title, "swing-up: m g l / J (1/s2)", run == 0 ? 20.04 : 19.86, gravity,
                            0.1, "weighed parts, no torque in it");
     swings.push_back({title + ", swing-up", found.input_gain.value, found.input_gain.half_width,
@@ -489,6 +489,7 @@ void acrobot(Report& report, Machines& machines) {
   options.orders = {2};
   options.pole = false;
   options.friction = false;
+  options.late_columns = false;  // gravity, Coriolis and friction act at once
   const auto found = run_parallel("acrobot", logs.size(), [&](std::size_t i) {
     return std::optional(compiled::study(logs[i], options));
   });

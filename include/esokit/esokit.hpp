@@ -110,10 +110,12 @@
 #include <esokit/identify/input_checks.hpp>
 #include <esokit/identify/intervals.hpp>
 #include <esokit/identify/log.hpp>
+#include <esokit/identify/measured_columns.hpp>
 #include <esokit/identify/plateau.hpp>
 #include <esokit/identify/second_opinion.hpp>
 #include <esokit/identify/sinusoids.hpp>
 #include <esokit/identify/spectrum.hpp>
+#include <esokit/identify/timed_column.hpp>
 #include <esokit/math/combinatorics.hpp>
 #include <esokit/math/dense.hpp>
 #include <esokit/math/fal.hpp>

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <utility>
 
 namespace esokit::examples::compiled {
@@ -27,6 +28,11 @@ Residual residual_of(const Identified& found, const FitData& rows) {
       *std::find_if(found.orders.begin(), found.orders.end(),
                     [&](const OrderFit& order) { return order.model.order == found.order; });
   FitData data = averaged(excerpt(rows, 60000), found.averaged);
+  for (std::size_t c = 0; c < found.columns.size(); ++c) {
+    const auto& column = found.columns[c];
+    data.columns[c] = esokit::detail::late(data.columns[c], data.starts, data.sample_time,
+                                           column.lag.value, column.dead_time.value);
+  }
   if (found.position) esokit::detail::add_position(data);
   if (chosen.friction_scale > 0.0) {
     const auto speed =

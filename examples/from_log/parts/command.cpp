@@ -32,8 +32,9 @@ columns, by their name, by its end (position of /joint1/position) or beginning, 
   --y COLUMN          measured output
                       (default of these three: columns with usual names: t, time, stamp; u, torque,
                       effort, pwm; y, position, angle, ..)
-  --known COLUMN      a known effect that acts where the disturbance acts, e.g. the sine of the
-                      angle for gravity; may be repeated
+  --measured COLUMNS  disturbances that the controller will measure, too (fan,flow): their gain, lag
+                      and dead time are found; or a known effect (the sine of the angle for
+                      gravity); may be repeated
   --time-unit UNIT    h, min, s, ms, us, ns (default: detected)
   --sample-time S     seconds between rows, if there is no time column
   --wrap TURN         y is an angle that begins anew after a turn (360, 6.283185, 4096); 0: it does
@@ -133,7 +134,20 @@ Settings read_arguments(int argc, char** argv) {
       {"time", [&](const auto& text) { s.time = text; }},
       {"u", [&](const auto& text) { s.u = text; }},
       {"y", [&](const auto& text) { s.y = text; }},
-      {"known", [&](const auto& text) { s.known.push_back(text); }},
+      {"measured",
+       [&](const std::string& text) {
+         for (std::size_t at = 0; at <= text.size();) {
+           const auto comma = std::min(text.find(',', at), text.size());
+           s.measured.push_back(text.substr(at, comma - at));
+           if (s.measured.back().empty())
+             throw LogError("--measured: '" + text + "' has an empty name");
+           at = comma + 1;
+         }
+       }},
+      {"known",
+       [](const auto& text) {
+         throw LogError("--known is now --measured: write --measured " + in_quotes(text));
+       }},
       {"time-unit", [&](const auto& text) { s.time_unit = text; }},
       {"sample-time", [&](const auto& text) { s.sample_time = positive("sample-time", text); }},
       {"wrap",

@@ -99,6 +99,56 @@ std::string against_pid(const std::vector<esokit::TunedRival>& rivals,
          ", tuned for the same under the same rules, is within 1 %. Its code is below." + lost;
 }
 
+/// What the measured disturbances take of u in the log, what is left of d without them, and how far
+/// they would move y under the code, with and without measuring.
+std::string what_measuring_saves(const esokit::Tuning& tuning, const esokit::TunedDesign& taken,
+                                 const Pasting& pasting, const esokit::FitData& rows,
+                                 const Identified& found) {
+  const std::size_t count = rows.y.size();
+  const double T = rows.sample_time;
+  // As straight lines between the rows, and from rest.
+  std::vector<double> force(count, 0.0);
+  std::string names;
+  for (const Feed& feed : pasting.feeds) {
+    const auto& effect = found.columns[feed.column];
+    const auto late = esokit::detail::late(rows.columns[feed.column], {0}, T, effect.lag.value,
+                                           effect.dead_time.value);
+    for (std::size_t k = 0; k < count; ++k) force[k] += effect.gain.value * (late[k] - late[0]);
+    names += (names.empty() ? "" : " and ") + feed.name;
+  }
+  double sum = 0.0, square = 0.0;
+  for (const double f : force) sum += f, square += f * f;
+  const double rows_double = static_cast<double>(count);
+  const double deviation = std::sqrt(std::max(square - sum * sum / rows_double, 0.0) / rows_double);
+  esokit::Tuning wide = tuning;  // a machine that moves by more than its limits says nothing
+  wide.model.u_min = -1e9 * (tuning.model.u_max - tuning.model.u_min);
+  wide.model.u_max = -wide.model.u_min;
+  const auto largest = [&](bool measures) {
+    Pasting played = pasting;
+    played.friction = 0.0;
+    played.by_position = false;
+    Acting measured{.force = force};
+    for (Feed& feed : played.feeds) {
+      measured.w.push_back(rows.columns[feed.column]);
+      feed.rest = measured.w.back()[0];
+      if (!measures) feed.factor = 0.0;
+    }
+    double most = 0.0;
+    for (const double y :
+         step_of_code(played, wide, taken, 0.0, T * (rows_double - 1.0), 0.0, 0, &measured).y)
+      most = std::max(most, std::abs(y - played.start_y));
+    return most;
+  };
+  return "Measuring " + names + " saves: in this log it takes " +
+         percent(deviation / std::abs(found.input_gain.value) /
+                 (tuning.model.u_max - tuning.model.u_min)) +
+         " of the range of u (standard deviation); the rest of d grows at " +
+         percent(std::sqrt(found.random_walk() / found.random_walk_unmeasured())) +
+         " of the rate without it. Under this code what " + names +
+         " did in the log would move y by up to " + number_text(largest(true), 2) +
+         "; not measured, by up to " + number_text(largest(false), 2) + ".";
+}
+
 /// Why there may be no design of order 3, and what to do.
 const std::string three_integrators =
     "Friction acts as a large damping on small motions. Behind an actuator that integrates, it "
@@ -175,9 +225,13 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
   design.loop_ = *loop;
   const double T = model.sample_time;
   const LinearController form = design.form();
-  design.replay_ = through(form, found.input_gain.value, found.order, findings.rows);
-  design.pasting_ = Pasting::make(settings, input, found, model, design.replay_.load);
-  design.code_ = pasted_code(design.pasting_, *tuning, taken, findings.rows);
+  const Replay all = through(form, found.input_gain.value, found.order, findings.rows);
+  design.pasting_ = Pasting::make(settings, input, found, model, all.load,
+                                  Feed::make(input, found, model, findings.rows));
+  design.told_ = told_rows(design.pasting_.feeds, findings.rows);
+  const esokit::FitData& rows = design.told_;
+  design.replay_ = through(form, found.input_gain.value, found.order, rows);
+  design.code_ = pasted_code(design.pasting_, *tuning, taken, rows);
   for (const auto& alarm : esokit::alarms(*tuning, taken))
     design.alarms_.push_back({alarm.name, alarm.text});
   // Of order 1 no further than u holds against the pole.
@@ -237,6 +291,9 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
         "belong to; a faster observer would pass more noise to u, and a slower law would give way "
         "to loads.");
   }
+  if (!design.pasting_.feeds.empty())
+    design.summary_.push_back(
+        what_measuring_saves(*tuning, taken, design.pasting_, findings.rows, found));
   if (!sooner.empty()) design.summary_.push_back(sooner);
   if (settings.settling_time > 0.0) {
     design.summary_.push_back("A step that is so small that u stays within its limits settles in " +
@@ -251,12 +308,12 @@ Design Design::make(const Settings& settings, const Input& input, const Findings
                               number_text(limits.first, 4) + " to " +
                               number_text(limits.second, 4) + "; set others with --limits.");
   }
-  const esokit::FitData machine = simulated(found, findings.rows);
+  const esokit::FitData machine = simulated(found, rows);
   const Replay expected = through(form, found.input_gain.value, found.order, machine);
   const auto settling = std::min<std::size_t>(
       static_cast<std::size_t>(taken.settling_time / T) + 20, findings.rows.y.size() / 4);
   design.replay_.band = quantile(settled(expected.innovation, machine, settling), 0.95);
-  const auto ours = settled(design.replay_.innovation, findings.rows, settling);
+  const auto ours = settled(design.replay_.innovation, rows, settling);
   const auto inside =
       std::count_if(ours.begin(), ours.end(), [&](double e) { return e <= design.replay_.band; });
   design.replay_.inside =
@@ -609,7 +666,7 @@ void Design::show_on(Page& page, const Findings& findings) const {
   for (std::size_t i = 0; i < tuning_->designs.size(); ++i) {
     const auto& other = tuning_->designs[i];
     if (i == taken_ || !other.feasible) continue;
-    page.code(pasted_code(pasting_, *tuning_, other, findings.rows),
+    page.code(pasted_code(pasting_, *tuning_, other, told_),
               "The code for number " + std::to_string(i + 1) + ", " + other.name);
   }
   for (const auto& rival : rivals_) {

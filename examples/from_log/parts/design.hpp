@@ -57,6 +57,7 @@ class Design {
   std::string why_not_;
   std::vector<Alarm> alarms_;
   Replay replay_;
+  esokit::FitData told_;                    ///< the log as the observer is told of it
   std::vector<esokit::TunedRival> rivals_;  ///< the best PIDs, and the given one
   esokit::Migration migration_;             ///< from the given PID
   esokit::Migration to_best_;               ///< from it to the best PID

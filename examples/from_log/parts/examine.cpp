@@ -6,6 +6,7 @@
 #include <numbers>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -201,6 +202,14 @@ void say_moves(const Input& input, Findings& all) {
   }
 }
 
+/// The name of the column that was refused.
+void say_column(const Input& input, Findings& all) {
+  const int index = all.refusal->index;
+  if (std::string_view(all.refusal->field) != "columns" || index < 0) return;
+  all.shown.push_back("Column " + std::to_string(index) + " of --measured is " +
+                      input.measured[static_cast<std::size_t>(index)] + ".");
+}
+
 /// What is left when the model has explained what it can.
 void say_residual(const compiled::Residual& residual, Findings& all) {
   const auto& e = residual.values;
@@ -292,11 +301,13 @@ Findings examine(const Settings& settings, const Input& input) {
     all.y = spectrum(all.rows.y, T);
   } else {
     all.refusal = prepared.error();
+    say_column(input, all);
     return all;
   }
   const auto found = compiled::study(input.log, options);
   if (!found) {
     all.refusal = found.error();
+    say_column(input, all);
     say_moves(input, all);
     sound_alarms(settings, input, all);
     return all;

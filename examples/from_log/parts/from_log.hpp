@@ -32,13 +32,13 @@ enum Status {
 /// The command line.
 struct Settings {
   std::string file;
-  std::string time, u, y;          ///< columns; empty: found by their names
-  std::vector<std::string> known;  ///< columns of what else acts where the disturbance acts
-  std::string time_unit;           ///< h, min, s, ms, us or ns; empty: found out
-  double sample_time = 0;          ///< s, where there is no time
-  char separator = 0;              ///< 0: found out
-  std::optional<double> wrap;      ///< y begins anew after so much; 0: it does not; none: found out
-  std::vector<int> orders{};  ///< empty: 1 for a speed, a temperature or a level, else found out
+  std::string time, u, y;             ///< columns; empty: found by their names
+  std::vector<std::string> measured;  ///< columns of measured disturbances
+  std::string time_unit;              ///< h, min, s, ms, us or ns; empty: found out
+  double sample_time = 0;             ///< s, where there is no time
+  char separator = 0;                 ///< 0: found out
+  std::optional<double> wrap;  ///< y begins anew after so much; 0: it does not; none: found out
+  std::vector<int> orders{};   ///< empty: 1 for a speed, a temperature or a level, else found out
   std::optional<double> expected_gain;  ///< b0 as the user believes it to be
   std::optional<std::pair<double, double>> limits;
   std::optional<double> friction;  ///< as in TuneModel; none: not known
@@ -66,7 +66,8 @@ struct Alarm {
 
 /// The columns of a file, and what had to be found out about them.
 struct Input {
-  std::string time, u, y;  ///< names of the columns
+  std::string time, u, y;             ///< names of the columns
+  std::vector<std::string> measured;  ///< those of the measured disturbances
   std::string time_unit = "s";
   bool unit_assumed = false;      ///< nothing says that it is seconds
   esokit::Log log;                ///< s from the first stamp on; u held from its row to the next

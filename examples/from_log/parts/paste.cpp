@@ -42,7 +42,8 @@ using MachineState = esokit::Vector<double, most_states>;
 
 /// The machine that was found around rest at (start_y, start_u): (y, .., y^(n-1), v).
 /// For any order n, so that it is compiled once: without derivatives from y^(n) on.
-auto machine(const Pasting& p, const TuneModel& model) {
+/// @param measured what else acts; may be null
+auto machine(const Pasting& p, const TuneModel& model, const Acting* measured) {
   using State = MachineState;
   const int order = model.order;
   const double T = model.sample_time;
@@ -50,7 +51,7 @@ auto machine(const Pasting& p, const TuneModel& model) {
   const double scale = std::max(p.friction_scale, 0.1 * p.friction * T);
   const bool lagged = model.lag > 0.2 * T;
   return esokit::sim::nonlinear_plant<most_states>(
-      [&p, &model, order, scale, lagged](double, const State& x, double u) {
+      [&p, &model, order, scale, lagged, measured](double t, const State& x, double u) {
         const auto speed = [&](double y, double rate) { return order == 1 ? y : rate; };
         const double rate = order == 2 ? x(1) : 0.0;
         State change = State::Zero();
@@ -62,11 +63,26 @@ auto machine(const Pasting& p, const TuneModel& model) {
           top -= p.friction *
                  (std::tanh(speed(x(0), rate) / scale) - std::tanh(speed(p.start_y, 0.0) / scale));
         }
+        if (measured != nullptr) {
+          const auto& force = measured->force;
+          const double at =
+              std::clamp(t / model.sample_time, 0.0, static_cast<double>(force.size()) - 1.001);
+          const auto k = static_cast<std::size_t>(at);
+          top += force[k] + (at - std::floor(at)) * (force[k + 1] - force[k]);
+        }
         if (p.by_position) top += p.force(x(0)) - p.force(p.start_y);
         change(order - 1) = top;
         change(most_states - 1) = lagged ? (u - x(most_states - 1)) / model.lag : 0.0;
         return change;
       });
+}
+
+/// A measured disturbance in the self-check: it moves, is lost, moves while it is lost, and is
+/// back.
+constexpr int w_moves = 30, w_lost = 60, w_back = 65;
+double checked_w(const Feed& feed, int k) {
+  if (k >= w_lost && k < w_back) return std::nan("");
+  return k < w_moves || k >= w_back ? feed.rest : feed.rest + feed.swing;
 }
 
 /// What the code watches, from the log and from what was played.
@@ -323,8 +339,86 @@ std::string Pasting::used() const {
            (friction > 0.0 && by_position ? " are" : " is") +
            " added to u along the reference, so that the observer has less to find";
   }
+  for (const Feed& feed : feeds) text += (&feed == &feeds[0] ? "; " : ", ") + feed.name;
+  if (!feeds.empty()) {
+    text += std::string(feeds.size() > 1 ? " are" : " is") +
+            " measured, and what it asks of u is added at once (call measured before update)";
+  }
   if (!not_known.empty()) text += ". " + not_known.substr(0, not_known.size() - 1);
   return text;
+}
+
+std::vector<Feed> Feed::make(const Input& input, const esokit::Identified& found,
+                             const TuneModel& model, const esokit::FitData& rows) {
+  std::vector<Feed> feeds;
+  const double T = model.sample_time;
+  for (std::size_t c = 0; c < found.columns.size(); ++c) {
+    const esokit::MeasuredEffect& effect = found.columns[c];
+    if (!effect.told() || effect.follows_output) continue;
+    const auto& w = rows.columns[c];
+    double mean = 0.0;
+    for (const double value : w) mean += value / static_cast<double>(w.size());
+    Feed feed;
+    feed.name = input.measured[c];
+    feed.column = c;
+    feed.rest = std::strtod(number_text(mean, 3).c_str(), nullptr);
+    feed.factor = printed(-effect.gain.value / model.input_gain.value);
+    // u is held for a sample, that is, half a sample late.
+    const double later = std::max(effect.lag.value - model.lag, 0.0);
+    if (later > 0.2 * T) {
+      feed.at_once = printed(model.lag / effect.lag.value);
+      feed.decay = printed(std::exp(-T / effect.lag.value));
+    }
+    feed.delay = printed(
+        std::max(effect.latency.value - model.lag - model.dead_time - 0.5 * T - later, 0.0) / T);
+    for (const double value : w)
+      feed.reach = std::max(feed.reach, std::abs(feed.factor * (value - feed.rest)));
+    feed.reach = printed(feed.reach);
+    feed.swing = printed(feed.reach / std::abs(feed.factor));
+    feeds.push_back(feed);
+  }
+  return feeds;
+}
+
+void FeedPath::start(double w) {
+  held_ = w;
+  before_ = v_ = w - feed_->rest;
+  std::fill(past_.begin(), past_.end(), before_);
+}
+
+double FeedPath::update(double w) {
+  if (std::isfinite(w)) held_ = w;
+  std::copy_backward(past_.begin(), past_.end() - 1, past_.end());
+  past_[0] = held_ - feed_->rest;
+  const std::size_t n = past_.size();
+  const double part = feed_->delay - std::floor(feed_->delay);
+  const double x = (1.0 - part) * past_[n - 2] + part * past_[n - 1];
+  v_ = feed_->decay * v_ + (1.0 - feed_->decay) * 0.5 * (before_ + x);
+  before_ = x;
+  return feed_->factor * (feed_->at_once * x + (1.0 - feed_->at_once) * v_);
+}
+
+esokit::FitData told_rows(const std::vector<Feed>& feeds, const esokit::FitData& rows) {
+  esokit::FitData out = rows;
+  for (const Feed& feed : feeds) {
+    const auto& w = rows.columns[feed.column];
+    FeedPath path(feed);
+    std::size_t piece = 0;
+    for (std::size_t k = 0; k < w.size(); ++k) {
+      if (piece < rows.starts.size() && rows.starts[piece] == k) {
+        ++piece;
+        path.start(w[k]);
+      }
+      out.u[k] -= path.update(w[k]);
+    }
+  }
+  return out;
+}
+
+double Pasting::reach() const {
+  double sum = 0.0;
+  for (const Feed& feed : feeds) sum += feed.reach;
+  return printed(sum);
 }
 
 double Pasting::known(double r, double rate) const {
@@ -345,8 +439,10 @@ std::vector<double> Pasting::limits(const TuneModel& model, std::size_t gains) c
 }
 
 Pasting Pasting::make(const Settings& settings, const Input& input, const esokit::Identified& found,
-                      const TuneModel& model, const std::vector<double>& load) {
+                      const TuneModel& model, const std::vector<double>& load,
+                      std::vector<Feed> feeds) {
   Pasting p;
+  p.feeds = std::move(feeds);
   const std::string name = esokit::examples::path_of(settings.file).filename().string();
   p.order = model.order;
   p.input_gain = model.input_gain.value;
@@ -412,11 +508,15 @@ Pasting Pasting::make(const Settings& settings, const Input& input, const esokit
           "This file checks itself: g++ -std=c++20 -O2 -I esokit/include FILE.cpp && ./a.out. "
           "Then take main away, and call start once and update every " +
           number_text(1e3 * model.sample_time, 6) + " ms.");
-  if (!settings.known.empty()) {
-    std::string columns;
-    for (const auto& column : settings.known) columns += (columns.empty() ? "" : ", ") + column;
-    p.not_known = "The known effects of the log (" + columns +
-                  ") are part of d: the code does not measure them.";
+  std::string columns;
+  for (std::size_t c = 0; c < found.columns.size(); ++c) {
+    if (std::none_of(p.feeds.begin(), p.feeds.end(),
+                     [c](const Feed& feed) { return feed.column == c; }))
+      columns += (columns.empty() ? "" : ", ") + input.measured[c];
+  }
+  if (!columns.empty()) {
+    p.not_known = "What follows from y, or may do nothing (" + columns +
+                  "), is part of d: the code does not measure it.";
   }
   return p;
 }
@@ -433,6 +533,7 @@ Runner::Runner(const Pasting& pasting, const Tuning& tuning, const TunedDesign& 
             std::copy(limits.begin(), limits.end(), config.limits.begin());
             return esokit::SmoothProfile<order()>::make(config).value();
           })),
+      feeds_(pasting.feeds.begin(), pasting.feeds.end()),
       lower_(tuning.model.u_min),
       upper_(tuning.model.u_max),
       state_(static_cast<std::size_t>(form_.states())) {
@@ -448,9 +549,10 @@ void Runner::start(double y, double u) {
   std::visit([&](auto& profile) { profile.reset(y); }, profile_);
   y_ = y;
   u_ = u - pasting_->known(y, 0.0);
+  for (std::size_t i = 0; i < feeds_.size(); ++i) feeds_[i].start(pasting_->feeds[i].rest);
 }
 
-double Runner::update(double y, double target) {
+double Runner::update(double y, double target, const std::vector<double>& w) {
   motion_ = {};
   std::visit(
       [&](auto& profile) {
@@ -464,8 +566,12 @@ double Runner::update(double y, double target) {
   for (std::size_t i = 0; i < weights_.size(); ++i) u += weights_[i] * motion_[i];
   const int n = form_.states();
   for (int i = 0; i < n; ++i) u += form_.to_u(0, i) * state_[static_cast<std::size_t>(i)];
-  const double known = pasting_->known(motion_[0], motion_[1]);
-  u = std::clamp(std::clamp(u, lower_, upper_) + known, lower_, upper_);
+  fed_ = 0.0;
+  for (std::size_t i = 0; i < feeds_.size(); ++i)
+    fed_ += feeds_[i].update(i < w.size() ? w[i] : std::nan(""));
+  const double known = pasting_->known(motion_[0], motion_[1]) + fed_;
+  const double more = pasting_->reach();
+  u = std::clamp(std::clamp(u, lower_ - more, upper_ + more) + known, lower_, upper_);
   std::vector<double> next = state_;
   for (int i = 0; i < n; ++i) {
     double& sum = next[static_cast<std::size_t>(i)];
@@ -478,7 +584,8 @@ double Runner::update(double y, double target) {
 }
 
 StepOfCode step_of_code(const Pasting& pasting, const Tuning& tuning, const TunedDesign& design,
-                        double height, double duration, double noise, int digits) {
+                        double height, double duration, double noise, int digits,
+                        const Acting* measured) {
   const TuneModel& model = tuning.model;
   const double T = model.sample_time;
   Runner runner(pasting, tuning, design);
@@ -489,10 +596,17 @@ StepOfCode step_of_code(const Pasting& pasting, const Tuning& tuning, const Tune
   const auto controller = [&](double y, double) {
     const bool on = static_cast<int>(step.y.size()) >= (digits > 0 ? still : 0);
     step.y.push_back(y);
-    step.u.push_back(runner.update(y, pasting.start_y + (on ? height : 0.0)));
-    return step.u.back();
+    std::vector<double> w;
+    const std::size_t k = step.y.size() - 1;
+    for (std::size_t i = 0; i < pasting.feeds.size(); ++i) {
+      if (measured != nullptr) w.push_back(measured->w[i][std::min(k, measured->w[i].size() - 1)]);
+      if (digits > 0) w.push_back(checked_w(pasting.feeds[i], static_cast<int>(k)));
+    }
+    step.u.push_back(runner.update(y, pasting.start_y + (on ? height : 0.0), w));
+    // What is measured acts as u without it does.
+    return step.u.back() - (measured == nullptr ? runner.fed() : 0.0);
   };
-  const auto plant = machine(pasting, model);
+  const auto plant = machine(pasting, model, measured);
   auto rest = MachineState::Zero();
   rest(0) = pasting.start_y;
   rest(most_states - 1) = pasting.start_u;
@@ -502,10 +616,10 @@ StepOfCode step_of_code(const Pasting& pasting, const Tuning& tuning, const Tune
                         .sample_time = T,
                         .sensor =
                             [&](double, double y) {
-                              const double measured = y + noise * gaussian.next();
-                              if (digits == 0) return measured;
+                              const double seen = y + noise * gaussian.next();
+                              if (digits == 0) return seen;
                               char text[40];
-                              std::snprintf(text, sizeof text, "%.*g", digits, measured);
+                              std::snprintf(text, sizeof text, "%.*g", digits, seen);
                               return std::strtod(text, nullptr);
                             },
                         .dead_time = model.dead_time,
@@ -529,8 +643,9 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
   const Watch watch = watch_of(tuning, design, rows);
   const std::string highest = derivative_of("y", p.order);
   const auto gains = static_cast<int>(design.settings.gains.size());
-  const std::string limits_of_u = ".limits = {.lower = " + source(model.u_min) +
-                                  ", .upper = " + source(model.u_max) + "}, " + parts.soften;
+  const std::string limits_of_u = ".limits = {.lower = " + source(model.u_min - p.reach()) +
+                                  ", .upper = " + source(model.u_max + p.reach()) + "}, " +
+                                  parts.soften;
   const bool known = p.feeds_forward();
 
   std::string body;
@@ -539,6 +654,38 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
   std::string type = "esokit::OutlierGate<" + parts.observer + ">";
   if (watch.guarded) type = "esokit::Guarded<" + type + ">";
   body += wrapped("using Observer = " + type + ";", "", "    ");
+  if (!p.feeds.empty()) {
+    body +=
+        "\n" + comment(
+                   "What a measured disturbance asks of u: gain, lag and dead time beside those "
+                   "of u. One that is lost (NaN, or not given) is held.");
+    body +=
+        "template <int Samples>\n"
+        "struct Feed {\n"
+        "  double rest, factor, at_once, decay, part;\n"
+        "  double given = std::numeric_limits<double>::quiet_NaN();\n"
+        "  double held = rest, before = 0.0, v = 0.0;\n"
+        "  int lost = 0;  // samples in succession\n"
+        "  std::array<double, Samples> past{};\n\n"
+        "  void start() {\n"
+        "    if (esokit::is_finite(given)) held = given;\n"
+        "    before = v = held - rest;\n"
+        "    past.fill(before);\n"
+        "  }\n"
+        "  double update() {\n"
+        "    const bool good = esokit::is_finite(given);\n"
+        "    if (good) held = given;\n"
+        "    lost = good ? 0 : std::min(lost + 1, 65535);\n"
+        "    given = std::numeric_limits<double>::quiet_NaN();\n"
+        "    std::copy_backward(past.begin(), past.end() - 1, past.end());\n"
+        "    past[0] = held - rest;\n"
+        "    const double x = (1.0 - part) * past[Samples - 2] + part * past[Samples - 1];\n"
+        "    v = decay * v + (1.0 - decay) * 0.5 * (before + x);\n"
+        "    before = x;\n"
+        "    return factor * (at_once * x + (1.0 - at_once) * v);\n"
+        "  }\n"
+        "};\n";
+  }
   body += "\nstruct Loop {\n";
   body += "  esokit::Adrc<Observer> controller;\n";
   body += "  esokit::SmoothProfile<" + std::to_string(gains) + "> profile;\n";
@@ -546,6 +693,23 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
       "  esokit::HealthMonitor<" + std::to_string(model.order + design.extension) + "> monitor;\n";
   if (known)
     body += "  double u = 0.0, fed = 0.0;  // the last u, and the part of it that is known\n";
+  std::string fed, starts, gives, arguments, names;
+  for (std::size_t i = 0; i < p.feeds.size(); ++i) {
+    const Feed& feed = p.feeds[i];
+    const std::string number = std::to_string(i + 1), name = "feed" + number;
+    body +=
+        wrapped("Feed<" + std::to_string(feed.samples()) + "> " + name +
+                    "{.rest = " + source(feed.rest) + ", .factor = " + source(feed.factor) +
+                    ", .at_once = " + source(feed.at_once) + ", .decay = " + source(feed.decay) +
+                    ", .part = " + source(feed.delay - std::floor(feed.delay)) + "};  // of '" +
+                    feed.name + "'",
+                "  ", "    ");
+    fed += (fed.empty() ? "" : " + ") + name + ".update()";
+    starts += "    " + name + ".start();\n";
+    gives += "    " + name + ".given = w" + number + ";\n";
+    arguments += (arguments.empty() ? "double w" : ", double w") + number;
+    names += (names.empty() ? "'" : ", '") + feed.name + "'";
+  }
   body += "\n  // Once, at start-up. Nothing if a setting breaks a rule, which is printed.\n";
   body += "  static std::optional<Loop> make() {\n";
   body += "    const auto controller = esokit::Adrc<Observer>::make(\n";
@@ -598,7 +762,8 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
       "    if (fails(controller) || fails(profile) || fails(monitor)) return {};\n"
       "    return Loop{*controller, *profile, *monitor};\n"
       "  }\n";
-  if (known) {
+  const bool along = p.friction > 0.0 || p.by_position;
+  if (along) {
     std::string what = p.friction > 0.0 ? "friction" : "";
     if (p.by_position) what += std::string(what.empty() ? "" : " and ") + "the force by y";
     body +=
@@ -624,11 +789,25 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
     }
     body += "    return force / " + source(p.input_gain) + ";\n  }\n";
   }
+  if (!p.feeds.empty()) {
+    body += "\n" + comment("Before start and before each update: " + names +
+                               ". One that is NaN, or of a sample without this call, is lost: the "
+                               "last one is held, and lost counts.",
+                           "  ");
+    body += "  void measured(" + arguments + ") {\n" + gives + "  }\n";
+  }
   body += "\n  // Once, while the machine rests at y under u_now: takes over without a bump.\n";
-  body += std::string("  void start(double y, double u_now) {\n") + "    profile.reset(y);\n" +
-          (known ? "    u = u_now;\n    fed = known(y, 0.0);\n    controller.start(y, u - fed);\n"
-                 : "    controller.start(y, u_now);\n") +
-          "    monitor.clear();\n  }\n";
+  std::string fed_at_start = along ? "known(y, 0.0)" : "";
+  for (std::size_t i = 0; i < p.feeds.size(); ++i) {
+    const std::string name = "feed" + std::to_string(i + 1);
+    fed_at_start += (fed_at_start.empty() ? "" : " + ") + name + ".factor * " + name + ".before";
+  }
+  body +=
+      std::string("  void start(double y, double u_now) {\n") + "    profile.reset(y);\n" + starts +
+      (known
+           ? "    u = u_now;\n    fed = " + fed_at_start + ";\n    controller.start(y, u - fed);\n"
+           : "    controller.start(y, u_now);\n") +
+      "    monitor.clear();\n  }\n";
   body +=
       "\n" + comment(
                  "Once a sample. y is measured, NaN where it is missing; target is where y shall "
@@ -639,7 +818,10 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
   if (known) {
     body +=
         "    const auto r = profile.motion();  // (r, r', ..)\n"
-        "    const double more = known(r(0), r(1));\n"
+        "    const double more = " +
+        (along ? std::string("known(r(0), r(1))") : std::string()) +
+        (along && !fed.empty() ? " + " : "") + fed +
+        ";\n"
         "    // If the actuator reports what it really held, give that in place of u.\n"
         "    u = std::clamp(controller.update(y, r, u - fed) + more, " +
         source(model.u_min) + ", " + source(model.u_max) +
@@ -688,6 +870,16 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
                      "0 if this program computes the same u, else 1. Compilers may order and fuse "
                      "operations otherwise (-ffast-math): that changes u by less than 1e-9 of its "
                      "range. A wrong setting changes it more.");
+  std::string given;
+  for (const Feed& feed : p.feeds) {
+    given += (given.empty() ? "" : ", ") + std::string("k < ") + std::to_string(w_moves) +
+             " || k >= " + std::to_string(w_back) + " ? " + source(feed.rest) + " : " +
+             source(feed.rest + feed.swing);
+  }
+  if (!given.empty()) {
+    given = "    if (k < " + std::to_string(w_lost) + " || k >= " + std::to_string(w_back) +
+            ")  // else it is lost\n" + wrapped("loop->measured(" + given + ");", "      ", "  ");
+  }
   body +=
       "int self_check() {\n"
       "  auto loop = Loop::make();\n"
@@ -696,10 +888,9 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
       source(p.start_y) + ", " + source(p.start_u) +
       ");\n"
       "  for (int k = 0; k < " +
-      std::to_string(checked) +
-      "; ++k) {\n"
-      "    const double u = loop->update(samples[k][0], k < " +
-      std::to_string(still) + " ? " + source(p.start_y) + " : " + source(target) +
+      std::to_string(checked) + "; ++k) {\n" + given +
+      "    const double u = loop->update(samples[k][0], k < " + std::to_string(still) + " ? " +
+      source(p.start_y) + " : " + source(target) +
       ");\n"
       "    if (std::abs(u - samples[k][1]) < " +
       source(1e-8 * half) +
@@ -714,8 +905,9 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
       "int main() {\n"
       "  return self_check();\n"
       "}\n";
-  return p.head + "#include <algorithm>\n#include <cmath>\n#include <cstdio>\n" +
-         includes_of(body) + "#include <optional>\n\n" + body;
+  return p.head + "#include <algorithm>\n" + (p.feeds.empty() ? "" : "#include <array>\n") +
+         "#include <cmath>\n#include <cstdio>\n" + includes_of(body) +
+         (p.feeds.empty() ? "" : "#include <limits>\n") + "#include <optional>\n\n" + body;
 }
 
 }  // namespace from_log

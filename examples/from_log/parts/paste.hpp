@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <string>
 #include <utility>
 #include <variant>
@@ -15,6 +16,46 @@
 #include "from_log/parts/from_log.hpp"
 
 namespace from_log {
+
+/// What a measured disturbance asks of u: it acts on y^(n) later than u or sooner, so it goes to u
+/// through what is between the two.
+struct Feed {
+  std::string name;
+  std::size_t column = 0;  ///< of the log
+  double rest = 0;         ///< w at which it asks for nothing
+  double factor = 0;       ///< u per unit of w in the end
+  double at_once = 1;      ///< share of it that is not behind the lag
+  double decay = 0;        ///< of the lag in a sample
+  double delay = 0;        ///< samples
+  double reach = 0;        ///< its largest u in the log
+  double swing = 0;        ///< a usual move of w, for the self-check
+
+  /// Those of what the log tells, and of no function of y, which would change the margins.
+  [[nodiscard]] static std::vector<Feed> make(const Input& input, const esokit::Identified& found,
+                                              const esokit::TuneModel& model,
+                                              const esokit::FitData& rows);
+  /// Samples of w that it remembers.
+  [[nodiscard]] std::size_t samples() const { return static_cast<std::size_t>(delay) + 2; }
+};
+
+/// It at work.
+class FeedPath {
+ public:
+  explicit FeedPath(const Feed& feed) : feed_(&feed), past_(feed.samples()) { start(feed.rest); }
+  /// As if w had been there for long.
+  void start(double w);
+  /// Part of u. @param w NaN: lost, so the last one is held
+  double update(double w);
+
+ private:
+  const Feed* feed_;
+  std::vector<double> past_;
+  double held_ = 0, before_ = 0, v_ = 0;
+};
+
+/// Rows with the u that the observer is told: without what measured disturbances ask for.
+[[nodiscard]] esokit::FitData told_rows(const std::vector<Feed>& feeds,
+                                        const esokit::FitData& rows);
 
 /// The log through an observer.
 struct Replay {
@@ -51,14 +92,20 @@ struct Pasting {
   double limit = 0;                 ///< largest r^(n) of the profile
   double rate_limit = 0;            ///< largest r^(n-1), by the pole; 0: none
   double shortest = 0;              ///< no move of the profile is shorter, s
+  std::vector<Feed> feeds;          ///< of the measured disturbances
 
   /// @param load of the log, unit of u, see Replay
   [[nodiscard]] static Pasting make(const Settings& settings, const Input& input,
                                     const esokit::Identified& found, const esokit::TuneModel& model,
-                                    const std::vector<double>& load);
+                                    const std::vector<double>& load, std::vector<Feed> feeds);
 
   /// Whether the code adds what is known of the machine to u.
-  [[nodiscard]] bool feeds_forward() const { return friction > 0.0 || by_position; }
+  [[nodiscard]] bool feeds_forward() const {
+    return friction > 0.0 || by_position || !feeds.empty();
+  }
+  /// What measured disturbances may ask of u, together: by so much the limits of the law are wider
+  /// than those of u.
+  [[nodiscard]] double reach() const;
   /// What of the machine is used and what is not, after "with settings from the log".
   [[nodiscard]] std::string used() const;
   /// What friction and the force by y need of u along the reference.
@@ -75,8 +122,10 @@ class Runner {
   Runner(const Pasting& pasting, const esokit::Tuning& tuning, const esokit::TunedDesign& design);
   /// From rest at y under u.
   void start(double y, double u);
-  /// Once a sample. @param target where y shall go
-  double update(double y, double target);
+  /// Once a sample. @param target where y shall go @param w measured disturbances; NaN: lost
+  double update(double y, double target, const std::vector<double>& w = {});
+  /// What measured disturbances asked of u in the last sample.
+  [[nodiscard]] double fed() const { return fed_; }
   /// (r, r', ..) of the last sample.
   [[nodiscard]] const std::array<double, 5>& motion() const { return motion_; }
 
@@ -87,7 +136,8 @@ class Runner {
   const Pasting* pasting_;
   esokit::LinearController form_;
   Profile profile_;
-  double lower_, upper_;
+  std::vector<FeedPath> feeds_;
+  double lower_, upper_, fed_ = 0;
   std::array<double, 5> weights_{};  ///< of r, r', .. in u
   std::array<double, 5> motion_{};
   std::vector<double> state_;
@@ -101,12 +151,18 @@ struct StepOfCode {
   double overshoot = 0;  ///< share of the height
   std::vector<double> y, u;
 };
+/// Measured disturbances that act meanwhile.
+struct Acting {
+  std::vector<std::vector<double>> w{};  ///< of each feed, one a sample
+  std::vector<double> force{};           ///< what they add to y^(n), straight between the samples
+};
 /// @param noise standard deviation @param digits of y: those that are printed; 0: all
 [[nodiscard]] StepOfCode step_of_code(const Pasting& pasting, const esokit::Tuning& tuning,
                                       const esokit::TunedDesign& design, double height,
-                                      double duration, double noise, int digits);
+                                      double duration, double noise, int digits,
+                                      const Acting* measured = nullptr);
 
-/// C++ that compiles as it is. @param rows the log
+/// C++ that compiles as it is. @param rows the log, as of `told_rows`
 [[nodiscard]] std::string pasted_code(const Pasting& pasting, const esokit::Tuning& tuning,
                                       const esokit::TunedDesign& design,
                                       const esokit::FitData& rows);

@@ -316,7 +316,7 @@ Input read_log(const Settings& settings) {
   std::vector<std::string> wanted = {guess(header, "u", settings.u),
                                      guess(header, "y", settings.y)};
   if (timed) wanted.push_back(guess(header, "time", settings.time));
-  wanted.insert(wanted.end(), settings.known.begin(), settings.known.end());
+  wanted.insert(wanted.end(), settings.measured.begin(), settings.measured.end());
   const LogFile file(esokit::examples::path_of(settings.file), wanted, settings.separator,
                      timed ? std::optional<std::size_t>(2) : std::nullopt);
   input.u = file.name(0);
@@ -326,8 +326,12 @@ Input read_log(const Settings& settings) {
   input.cut = file.cut();
   input.log.u = file.column(0);
   input.log.y = file.column(1);
-  for (std::size_t c = timed ? 3 : 2; c < wanted.size(); ++c)
+  for (std::size_t c = timed ? 3 : 2; c < wanted.size(); ++c) {
+    input.measured.push_back(file.name(c));
     input.log.columns.push_back(file.column(c));
+    if (share_missing(input.log.columns.back()) > 0.999)
+      throw LogError(settings.file + ": there are no numbers in column " + input.measured.back());
+  }
   for (std::size_t k = 0; k < file.rows(); ++k) input.line.push_back(file.line(k));
   const double no_u = share_missing(input.log.u), no_y = share_missing(input.log.y);
   if (no_u > 0.999) throw LogError(settings.file + ": there are no numbers in column " + input.u);

@@ -47,7 +47,7 @@ std::string advice(const std::string& field) {
        "with pauses in which the machine settles. Or sweep it slowly up to the bandwidth that the "
        "controller should have."},
       {"correlation",
-       "Log the u that the actuator held, y before its filters, and known effects (--known "
+       "Log the u that the actuator held, y before its filters, and known effects (--measured "
        "COLUMN). "
        "Steps of u that last until y settles let output error decide instead."},
       {"second_opinion",
@@ -61,7 +61,7 @@ std::string advice(const std::string& field) {
       {"latency", "u changes too slowly to find lag and dead time: use steps instead of ramps."},
       {"position_shift",
        "If the force is gravity, add a column with the sine of the angle to the file, if it is a "
-       "spring, a column with y, and name the column with --known."},
+       "spring, a column with y, and name the column with --measured."},
       {"friction_shift",
        "Friction and b0 can only be separated by motion that is much faster than the speed at "
        "which the machine sticks."},
@@ -183,7 +183,7 @@ std::string derivative_of(int order) {
   return "y" + std::string(static_cast<std::size_t>(order), '\'');
 }
 
-std::vector<CsvRow> model_table(const Findings& findings) {
+std::vector<CsvRow> model_table(const Input& input, const Findings& findings) {
   const esokit::Identified& found = findings.found;
   std::vector<CsvRow> rows{{"quantity", "found, 95 % interval", "unit", "what it is"}};
   const std::string highest = derivative_of(found.order);
@@ -215,8 +215,24 @@ std::vector<CsvRow> model_table(const Findings& findings) {
   rows.push_back({"gravity or spring", force, found.position ? "[" + highest + "]" : "",
                   "a force that depends on y, over the range of the log"});
   for (std::size_t c = 0; c < found.columns.size(); ++c) {
-    rows.push_back({"known column " + std::to_string(c + 1), with_interval(found.columns[c]),
-                    "[" + highest + "] / its unit", "what one unit of it adds to " + highest});
+    const esokit::MeasuredEffect& effect = found.columns[c];
+    const std::string name = input.measured[c];
+    rows.push_back(
+        {name, with_interval(effect.gain), "[" + highest + "] / its unit",
+         "what one unit of it adds to " + highest + (effect.told() ? "" : "; it may be nothing")});
+    if (!effect.timed) {
+      rows.push_back({name + ": lag, dead time", "not told", "",
+                      effect.follows_output ? "it is a function of y, and acts at once"
+                                            : "it does too little"});
+      continue;
+    }
+    const auto [factor, of_time] = unit_of(effect.latency.value);
+    rows.push_back({name + ": lag", with_interval(effect.lag, factor), of_time,
+                    "through which it acts, first order"});
+    rows.push_back({name + ": dead time", with_interval(effect.dead_time, factor), of_time,
+                    "from a change of it to its first effect; straight lines between the rows"});
+    rows.push_back({name + ": lag and dead time", with_interval(effect.latency, factor), of_time,
+                    "the sum is more accurate than its parts"});
   }
   rows.push_back(
       {"noise", with_interval(found.noise), "[y]", "standard deviation of the measurement noise"});
@@ -261,6 +277,12 @@ std::vector<CsvRow> log_table(const Input& input, const Findings& findings) {
   rows.push_back({"missing rows", std::to_string(log.missing),
                   std::to_string(log.rejected) + " rows without a number, " +
                       std::to_string(log.outliers) + " single outliers"});
+  for (std::size_t c = 0; c < log.lost.size(); ++c) {
+    if (log.lost[c] == 0) continue;
+    rows.push_back({input.measured[c] + " lost", std::to_string(log.lost[c]),
+                    "rows without it, which was put between its neighbours; of more in succession "
+                    "the log is split"});
+  }
   rows.push_back(
       {"resolution of y", log.quantisation > 0 ? number_text(log.quantisation, 4) : "fine",
        log.quantisation > 0 ? "steps, as of an encoder or a converter" : "no steps can be seen"});
@@ -339,7 +361,7 @@ Page show(const Settings& settings, const Input& input, const Findings& findings
     page.text(
         "The model is a chain of integrators behind a lag and a dead time, with a pole, friction "
         "and a disturbance that is a random walk.");
-    page.table("model", "The machine", model_table(findings));
+    page.table("model", "The machine", model_table(input, findings));
     if (!findings.residual_correlation.empty()) page.figure(model_figure(findings));
   }
   design.show_on(page, findings);

@@ -17,6 +17,7 @@
 #include <complex>
 #include <cstddef>
 #include <esokit/identify/spectrum.hpp>
+#include <esokit/identify/timed_column.hpp>
 #include <esokit/math/dense.hpp>
 #include <limits>
 #include <memory>
@@ -55,6 +56,9 @@ struct FitData {
   /// Columns with known effects that enter where the disturbance does, each as long as y: friction,
   /// a known load.
   std::vector<std::vector<double>> columns{};
+
+  /// What the first of `columns` are made of, those whose effect may be late.
+  std::vector<TimedColumn> timed{};
 
   std::ptrdiff_t friction = -1;  ///< index of the column that is friction, whose number is not
                                  ///< negative; -1: none
@@ -458,16 +462,18 @@ class InnovationsFit {
     return best;
   }
 
-  /// Derivatives of the innovations with respect to the free parameters, then the linear ones, and
-  /// which parameters are free: 0 log w, 1 log(tau + L), 2 share squared, 3 a (tau + L).
+  /// Derivatives of the innovations with respect to the free parameters, then the linear ones, then
+  /// latency and squared lag of each timed column; and which parameters are free: 0 log w,
+  /// 1 log(tau + L), 2 share squared, 3 a (tau + L).
   struct Sensitivities {
     std::vector<std::vector<double>> columns;  ///< one for each parameter, each as long as the log
     std::vector<int> free;                     ///< the parameters to which the first of them belong
   };
 
   /// The sensitivities at the fit that `at` or `minimise` returned last. Parameters at a bound are
-  /// not free.
-  [[nodiscard]] Sensitivities sensitivities(const Fit& fit, bool with_bandwidth) {
+  /// not free. @param with_times those of the timed columns, too, which a fit keeps
+  [[nodiscard]] Sensitivities sensitivities(const Fit& fit, bool with_bandwidth,
+                                            bool with_times = false) {
     Sensitivities result;
     std::array<bool, 4> wanted = {with_bandwidth, true, true, model_.pole};
     const std::vector<double> base = residual_;
@@ -492,7 +498,53 @@ class InnovationsFit {
       result.free.push_back(i);
     }
     for (std::size_t c = 1; c < columns_.size(); ++c) result.columns.push_back(columns_[c]);
+    if (!with_times) return result;
+    for (std::size_t c = 0; c < data_.timed.size(); ++c) {
+      if (!data_.timed[c].free) continue;
+      auto moves = time_sensitivities(fit.at, c, fit.linear[1 + data_.inputs.size() + c]);
+      for (auto& column : moves) result.columns.push_back(std::move(column));
+    }
     return result;
+  }
+
+  /// Derivatives of the innovations with respect to latency and squared lag of timed column `c`,
+  /// whose number is `gain`.
+  [[nodiscard]] std::array<std::vector<double>, 2> time_sensitivities(const FitPoint& at,
+                                                                      std::size_t c, double gain) {
+    const TimedColumn& column = data_.timed[c];
+    const double T = data_.sample_time;
+    // A delay of less than half a row would see the corners of the straight lines.
+    const double step = 0.5 * T, square = std::max(0.1 * column.lag_square, 0.25 * T * T);
+    const auto slope = [&](const std::vector<double>& up, const std::vector<double>& down,
+                           double by) {
+      std::vector<double> change(up.size());
+      for (std::size_t k = 0; k < change.size(); ++k) change[k] = gain * (up[k] - down[k]) / by;
+      return column_innovations(at, change);
+    };
+    const auto late = [&](double longer, double more) {
+      return detail::late(column, data_.starts, T, longer, more);
+    };
+    const double less = std::min(square, column.lag_square);
+    return {slope(late(step, 0.0), late(-step, 0.0), 2.0 * step),
+            slope(late(0.0, square), late(0.0, -less), square + less)};
+  }
+
+  /// Innovations of y, then of u, the further inputs and the columns, each with the factor one, at
+  /// the fit that `at` or `minimise` returned last.
+  [[nodiscard]] const std::vector<std::vector<double>>& parts() const { return columns_; }
+
+  /// Innovations of one more column with the factor one.
+  [[nodiscard]] std::vector<double> column_innovations(const FitPoint& at,
+                                                       const std::vector<double>& column) const {
+    std::vector<double> out(column.size());
+    with_filter(at, [&](const auto& filter) {
+      filter.template run<1>(
+          data_, lead_, data_.u, [](std::size_t, std::ptrdiff_t) { return 0.0; },
+          [](std::size_t) { return 0.0; },
+          [&](std::size_t, std::ptrdiff_t k) { return column[static_cast<std::size_t>(k)]; },
+          {out.data()});
+    });
+    return out;
   }
 
   /// Innovations of the fit that `at` or `minimise` returned last; zero in the first rows of a

@@ -13,6 +13,7 @@
 #include <esokit/identify/input_checks.hpp>
 #include <esokit/identify/intervals.hpp>
 #include <esokit/identify/log.hpp>
+#include <esokit/identify/measured_columns.hpp>
 #include <esokit/identify/plateau.hpp>
 #include <esokit/identify/second_opinion.hpp>
 #include <esokit/identify/sinusoids.hpp>
@@ -46,6 +47,10 @@ struct IdentifyOptions {
 
   /// Whether u is what the actuator held. A command beyond its limits is not.
   bool applied = true;
+
+  /// Whether the effect of a column may be late: its lag and its dead time are found. A known
+  /// effect (gravity, friction of another joint) acts at once.
+  bool late_columns = true;
   double interval_max = 0.1;      ///< largest half width of the interval of b0, share of b0
   double interval_agreed = 0.35;  ///< the same if output error finds the same b0
   double plateau_max = 0.1;       ///< largest relative difference of b0 between three bandwidths
@@ -110,19 +115,25 @@ struct Rival {
 
 /// A model with error bars, and the evidence for it.
 struct Identified {
-  int order = 0;                      ///< n
-  int extension = 1;                  ///< m
-  Estimate input_gain{};              ///< b0, unit of y^(n) per unit of u
-  Estimate latency{};                 ///< lag plus dead time, s
-  Estimate lag{};                     ///< tau, s
-  Estimate dead_time{};               ///< L, s
-  Estimate pole{};                    ///< a, 1/s
-  Estimate friction{};                ///< Coulomb friction, unit of y^(n); 0 if not fitted
-  double friction_scale = 0;          ///< v_s of friction tanh(v / v_s), unit of y / s (order 1: y)
-  Estimate noise{};                   ///< standard deviation of the measurement noise, unit of y
-  double disturbance = 0;             ///< intensity of d^(m): variance of its increments per time
-  std::vector<Estimate> columns{};    ///< factors of the log's own columns
-  std::vector<Sinusoid> sinusoids{};  ///< sines in the disturbance, the largest first
+  int order = 0;              ///< n
+  int extension = 1;          ///< m
+  Estimate input_gain{};      ///< b0, unit of y^(n) per unit of u
+  Estimate latency{};         ///< lag plus dead time, s
+  Estimate lag{};             ///< tau, s
+  Estimate dead_time{};       ///< L, s
+  Estimate pole{};            ///< a, 1/s
+  Estimate friction{};        ///< Coulomb friction, unit of y^(n); 0 if not fitted
+  double friction_scale = 0;  ///< v_s of friction tanh(v / v_s), unit of y / s (order 1: y)
+  Estimate noise{};           ///< standard deviation of the measurement noise, unit of y
+  double disturbance = 0;     ///< intensity of d^(m): variance of its increments per time
+
+  /// What the log's own columns add to y^(n).
+  std::vector<MeasuredEffect> columns{};
+
+  /// `disturbance` if the columns were not measured, so that they are a part of d. Not of those
+  /// that are functions of y. 0 without columns.
+  double disturbance_unmeasured = 0;
+  std::vector<Sinusoid> sinusoids{};    ///< sines in the disturbance, the largest first
   std::vector<GainInRange> schedule{};  ///< b0 over the log's scheduling column
   Estimate schedule_slope{};  ///< slope of b0 over the scheduling column, from a straight line
   double schedule_shift = 0;  ///< largest difference of b0 over the column, divided by its interval
@@ -220,20 +231,26 @@ struct Identified {
   }
 
   /// Where the disturbance comes above the noise: the bandwidth of a Kalman filter for both, rad/s.
-  [[nodiscard]] double disturbance_bandwidth() const {
-    return std::pow(disturbance / (noise.value * noise.value * log.sample_time),
-                    0.5 / (order + extension));
-  }
+  [[nodiscard]] double disturbance_bandwidth() const { return bandwidth_of(disturbance); }
 
   /// Intensity of the random walk that stands for the disturbance, (unit of y^(n))^2 / s: of equal
   /// power at disturbance_bandwidth(). For m = 1 it is `disturbance`.
-  [[nodiscard]] double random_walk() const {
-    return disturbance / std::pow(disturbance_bandwidth(), 2 * (extension - 1));
-  }
+  [[nodiscard]] double random_walk() const { return walk_of(disturbance); }
+  /// The same without the columns, see `disturbance_unmeasured`.
+  [[nodiscard]] double random_walk_unmeasured() const { return walk_of(disturbance_unmeasured); }
 
   /// The dead time in samples, for DelayedInput. @param sample_time s, above 0
   [[nodiscard]] int delay(double sample_time) const {
     return static_cast<int>(std::lround(dead_time.value / sample_time));
+  }
+
+ private:
+  [[nodiscard]] double bandwidth_of(double intensity) const {
+    return std::pow(intensity / (noise.value * noise.value * log.sample_time),
+                    0.5 / (order + extension));
+  }
+  [[nodiscard]] double walk_of(double intensity) const {
+    return intensity / std::pow(bandwidth_of(intensity), 2 * (extension - 1));
   }
 };
 
@@ -791,6 +808,18 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
   auto orders = fit_orders(rows, options, bounds);
   progress(0.3);
   auto winner = best_order(orders);
+  make_timed(rows, options.late_columns ? known : 0);
+  // Times change what is best, and that the times.
+  const auto find_late = [&](const OrderFit& with, bool search) {
+    FitData used = with_friction(rows, with);
+    find_times(used, with.model, bounds, with.fit.at, search);
+    take_times(rows, used.timed);
+  };
+  if (!rows.timed.empty()) {
+    find_late(*winner, true);
+    orders = fit_orders(rows, options, bounds, orders);
+    winner = best_order(orders);
+  }
   bool& position = result.position;
   IdentifyOptions tried = options;
   std::vector<OrderFit> of_speed;  // fits for order 1, which has no position
@@ -820,6 +849,7 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
     orders = fit_orders(rows, tried, bounds, orders);
     winner = best_order(orders);
   }
+  if (!rows.timed.empty()) find_late(*winner, false);
   OrderFit chosen = *winner;
   if (result.averaged == 1 && chosen.correlation < 0.3) raw_noise = chosen.noise;
   result.orders = std::move(of_speed);
@@ -860,6 +890,16 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
     result.correlation = innovations_correlation(fit.residual());
   }
   result.disturbance = likely.disturbance;
+  if (known > 0) {
+    FitData unmeasured = used;
+    for (std::size_t c = 0; c < known; ++c) {
+      // A column of zeros has no number.
+      if (share_left(unmeasured.columns[c], used.y) > follows)
+        std::fill(unmeasured.columns[c].begin(), unmeasured.columns[c].end(), 0.0);
+    }
+    result.disturbance_unmeasured =
+        InnovationsFit(unmeasured, model, bounds).minimise(likely.at, true, 8).disturbance;
+  }
   const FitErrors likely_errors = jackknife(fit, likely, true);
   const double rows_averaged = std::sqrt(static_cast<double>(result.averaged));
   const double t = student_95(19);
@@ -975,11 +1015,12 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
   // A standard error is half of a half width.
   result.friction_shift = 2.0 * friction_spread / near;
   // The fit cannot distinguish times below a twentieth of a row.
-  const auto time = [&](auto value, auto error) {
-    Estimate found = estimate_of(of_all, value, error, 0.0);
+  const auto time_of = [&](const Plateau& of, auto value, auto error) {
+    Estimate found = estimate_of(of, value, error, 0.0);
     found.half_width = std::max(found.half_width, 0.05 * rows.sample_time);
     return found;
   };
+  const auto time = [&](auto value, auto error) { return time_of(of_all, value, error); };
   result.latency = time([](const PlateauPoint& p) { return p.fit.at.latency; },
                         [](const PlateauPoint& p) { return p.errors.latency; });
   result.lag = time([](const PlateauPoint& p) { return p.fit.at.lag(); },
@@ -993,7 +1034,47 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
     return estimate([c](const PlateauPoint& p) { return p.fit.linear[c]; },
                     [c](const PlateauPoint& p) { return p.errors.linear[c]; });
   };
-  for (std::size_t c = 1; c <= known; ++c) result.columns.push_back(linear(c));
+  // The times where the plateau is, and the gains with them.
+  FitData there = used;
+  Fit fitted_there = here.fit;
+  if (!there.timed.empty()) {
+    find_times(there, model, bounds, here.fit.at, false);
+    fitted_there = InnovationsFit(there, model, bounds).minimise(here.fit.at, false, 8);
+  }
+  for (std::size_t c = 0; c < known; ++c) {
+    MeasuredEffect effect;
+    effect.gain = linear(c + 1);
+    effect.gain.value = fitted_there.linear[c + 1];
+    effect.follows_output = share_left(rows.columns[c], rows.y) < follows;
+    if (!rows.timed.empty() && rows.timed[c].free) {
+      const TimedColumn& column = there.timed[c];
+      const auto late = [&](double at, auto value, auto error) {
+        Estimate found = time_of(
+            plateau, [&](const PlateauPoint& p) { return value(p.errors.times[c]); },
+            [&](const PlateauPoint& p) { return error(p.errors.times[c].covariance); });
+        return Estimate{at, found.half_width};
+      };
+      const auto latency_error = [](const SplitCovariance& of) { return std::sqrt(of.latency); };
+      const auto split = [&](const SplitCovariance& of) {
+        const double share = column.latency > 0.0 ? column.lag() / column.latency : 0.0;
+        return split_errors({0.0, column.latency, share, 0.0}, of, t,
+                            column.latency + t * latency_error(of));
+      };
+      using Times = FitErrors::Times;
+      effect.latency = late(
+          column.latency, [](const Times& x) { return x.latency; }, latency_error);
+      effect.lag = late(
+          column.lag(), [](const Times& x) { return x.lag; },
+          [&](const SplitCovariance& of) { return split(of).first; });
+      effect.dead_time = late(
+          column.dead_time(), [](const Times& x) { return x.latency - x.lag; },
+          [&](const SplitCovariance& of) { return split(of).second; });
+      effect.timed = effect.told() && effect.latency.half_width < bounds.latency_max;
+      if (!effect.timed) effect.latency = effect.lag = effect.dead_time = {};
+    }
+    effect.lost = result.log.lost[c];
+    result.columns.push_back(effect);
+  }
   if (chosen.friction_scale > 0.0) {
     result.friction = linear(here.fit.linear.size() - 1);
     result.friction_scale = chosen.friction_scale;
@@ -1119,6 +1200,9 @@ inline bool better(const Identified& averaged, const Identified& plain, const Id
   const auto [lowest, highest] = std::minmax_element(raw.y.begin(), raw.y.end());
   if (!(*highest > *lowest))
     return E{"y", *lowest, "never changes: record a log in which the output moves"};
+  for (std::size_t c = 0; c < log.columns.size(); ++c) {
+    if (auto told = detail::tells_itself(raw, c); !told) return told.error();
+  }
   result.own_input = detail::own_input(raw);
   result.at_once = detail::at_once(raw);
   std::vector<int> folds = {1, 4, 8, 16};

@@ -18,6 +18,13 @@
 
 namespace esokit {
 
+/// Variances of latency and squared lag, and their covariance.
+struct SplitCovariance {
+  double latency = 0.0;     ///< of tau + L, s^2
+  double lag_square = 0.0;  ///< of tau^2, s^4
+  double both = 0.0;        ///< their covariance, s^3
+};
+
 /// Standard errors of a fit.
 struct FitErrors {
   double bandwidth = 0.0;        ///< rad/s; 0 if w was given
@@ -27,6 +34,14 @@ struct FitErrors {
   double pole = 0.0;             ///< 1/s
   double noise = 0.0;            ///< unit of y
   std::vector<double> linear{};  ///< b0 and the columns
+
+  /// Latency and lag of a timed column, by one more step of all parameters.
+  struct Times {
+    double latency = 0.0;          ///< s
+    double lag = 0.0;              ///< s
+    SplitCovariance covariance{};  ///< of latency and squared lag
+  };
+  std::vector<Times> times{};  ///< of all timed columns; zeros of one whose times are not fitted
 };
 
 /// Student's t for a two-sided 95 % interval (Cornish-Fisher expansion from the normal). @param
@@ -38,23 +53,18 @@ struct FitErrors {
          (5.0 * std::pow(z, 5) + 16.0 * z * z * z + 3.0 * z) / (96.0 * n * n);
 }
 
-/// Variances of latency and squared lag, and their covariance.
-struct SplitCovariance {
-  double latency = 0.0;     ///< of tau + L, s^2
-  double lag_square = 0.0;  ///< of tau^2, s^4
-  double both = 0.0;        ///< their covariance, s^3
-};
-
 /// Standard errors of lag and dead time: the largest distance from the fit within the ellipse of
 /// latency and squared lag of which `t` standard errors are the 95 % interval, divided by `t`.
 ///
 /// The log determines latency and squared lag: in these the ellipse is right, also where the lag is
 /// at zero, the end of its range, and has no standard error of its own.
+/// @param longest the lag is below it, s, where this is not the latency
 [[nodiscard]] inline std::pair<double, double> split_errors(const FitPoint& at,
                                                             const SplitCovariance& covariance,
-                                                            double t) {
+                                                            double t, double longest = 0.0) {
   // The squared lag is between zero and the squared latency, so a larger error says nothing more.
-  const double square = std::min(at.latency * at.latency, t * std::sqrt(covariance.lag_square));
+  longest = std::max(longest, at.latency);
+  const double square = std::min(longest * longest, t * std::sqrt(covariance.lag_square));
   const double along = t * std::sqrt(covariance.latency);
   const double correlation =
       covariance.both / std::sqrt(covariance.latency * covariance.lag_square);
@@ -78,7 +88,7 @@ struct SplitCovariance {
 /// stretches at a time.
 [[nodiscard]] inline FitErrors jackknife(InnovationsFit& fit, const Fit& at, bool with_bandwidth,
                                          int stretches = 20) {
-  const auto sensitivities = fit.sensitivities(at, with_bandwidth);
+  const auto sensitivities = fit.sensitivities(at, with_bandwidth, true);
   const auto& jacobian = sensitivities.columns;
   const auto& residual = fit.residual();
   const std::size_t count = jacobian.size();
@@ -97,8 +107,16 @@ struct SplitCovariance {
     for (std::size_t i = 0; i < right.size(); ++i) right[i] += rights[s][i];
     square += squares[s];
   }
-  // The results without each stretch: w, latency, squared lag, pole, noise, linear.
-  const std::size_t quantities = 5 + at.linear.size();
+  // The results without each stretch: w, latency, squared lag, pole, noise, linear, times.
+  const std::size_t linear = free + at.linear.size();  // behind them
+  const std::size_t quantities = 5 + count - free;
+  const auto& timed = fit.data().timed;
+  const auto each_time = [&](const auto& use) {
+    std::size_t next = linear;
+    for (const TimedColumn& column : timed) {
+      if (column.free) use(column, next), next += 2;
+    }
+  };
   std::vector<std::vector<double>> values;
   for (std::size_t s = 0; s < normals.size(); ++s) {
     std::vector<double> without = normal, step = right;
@@ -133,6 +151,10 @@ struct SplitCovariance {
                              static_cast<double>(stretches - 1))};
     for (std::size_t i = 0; i < at.linear.size(); ++i)
       value.push_back(at.linear[i] - step[free + i]);
+    each_time([&](const TimedColumn& column, std::size_t i) {
+      value.push_back(column.latency - step[i]);
+      value.push_back(column.lag_square - step[i + 1]);
+    });
     values.push_back(std::move(value));
   }
   const double n = static_cast<double>(stretches);
@@ -148,8 +170,18 @@ struct SplitCovariance {
   const auto error = [&](std::size_t q) { return std::sqrt(covariance(q, q)); };
   const auto [lag, dead_time] = split_errors(
       at.at, {covariance(1, 1), covariance(2, 2), covariance(1, 2)}, student_95(stretches - 1));
-  FitErrors errors{error(0), error(1), lag, dead_time, error(3), error(4), {}};
-  for (std::size_t q = 5; q < quantities; ++q) errors.linear.push_back(error(q));
+  FitErrors errors{error(0), error(1), lag, dead_time, error(3), error(4), {}, {}};
+  for (std::size_t q = 5; q < 5 + at.linear.size(); ++q) errors.linear.push_back(error(q));
+  errors.times.resize(timed.size());
+  if (linear == count) return errors;
+  detail::solve_normal(normal, right, static_cast<int>(count));
+  each_time([&](const TimedColumn& column, std::size_t i) {
+    const std::size_t q = 5 + i - free;
+    FitErrors::Times& found = errors.times[static_cast<std::size_t>(&column - timed.data())];
+    found.latency = std::max(column.latency - right[i], 0.0);
+    found.lag = std::min(std::sqrt(std::max(column.lag_square - right[i + 1], 0.0)), found.latency);
+    found.covariance = {covariance(q, q), covariance(q + 1, q + 1), covariance(q, q + 1)};
+  });
   return errors;
 }
 

@@ -13,7 +13,8 @@
 
 namespace esokit {
 
-/// The columns of a log. Rows with a missing or non-finite u or y are left out.
+/// The columns of a log. Rows with a missing or non-finite u or y are left out; a missing number of
+/// another column lies between its neighbours.
 struct Log {
   std::vector<double> time{};  ///< time stamps, s, with any origin (also 1970); may be empty
   std::vector<double> u{};     ///< input that the actuator held from its row to the next
@@ -22,8 +23,9 @@ struct Log {
 
   /// Standard deviation of the clock jitter, s, if there are no time stamps.
   double jitter = 0.0;
-  /// Known effects that enter where the disturbance does (sin y of a pendulum, a known load), each
-  /// as long as y.
+  /// Measured disturbances (a fan, a flow, the torque of a load) and known effects that enter where
+  /// the disturbance does (sin y of a pendulum), each as long as y. Between rows each is a straight
+  /// line.
   std::vector<std::vector<double>> columns{};
   /// A quantity on which b0 may depend (throttle, position, battery voltage), as long as y; may be
   /// empty.
@@ -37,6 +39,9 @@ struct LogReport {
   std::size_t rejected = 0;  ///< rows with a number that is not finite
   std::size_t outliers =
       0;  ///< values of y, one or two in succession, that do not fit their neighbours
+
+  /// Rows in which a column had no finite number and was put between its neighbours, a column each.
+  std::vector<std::size_t> lost{};
   std::size_t missing = 0;    ///< rows that are missing according to the time stamps
   std::size_t pieces = 1;     ///< number of pieces between gaps too long to bridge
   double sample_time = 0.0;   ///< T: the mean step without gaps, s
@@ -140,6 +145,29 @@ inline std::size_t mend_outliers(std::vector<double>& y) {
   return found;
 }
 
+/// Puts what lies between its neighbours in the place of numbers of a column that are not finite:
+/// up to four in succession, or three times as many as usually lie between two that are (a column
+/// that is measured seldom). @return how many
+inline std::size_t bridge(std::vector<double>& column) {
+  std::vector<std::size_t> good;
+  std::vector<double> steps;
+  for (std::size_t k = 0; k < column.size(); ++k) {
+    if (!is_finite(column[k])) continue;
+    if (!good.empty()) steps.push_back(static_cast<double>(k - good.back()));
+    good.push_back(k);
+  }
+  const double longest = std::max(5.0, 3.0 * median(steps));
+  std::size_t found = 0;
+  for (std::size_t i = 1; i < good.size(); ++i) {
+    const std::size_t from = good[i - 1], to = good[i];
+    const double rows = static_cast<double>(to - from);
+    if (to == from + 1 || rows > longest) continue;
+    for (std::size_t k = from + 1; k < to; ++k, ++found)
+      column[k] = column[from] + (column[to] - column[from]) * static_cast<double>(k - from) / rows;
+  }
+  return found;
+}
+
 }  // namespace detail
 
 /// Checks a log and converts it to a constant sample time. If the time stamps jitter by more than 2
@@ -171,11 +199,13 @@ inline std::size_t mend_outliers(std::vector<double>& y) {
   PreparedLog prepared;
   LogReport& report = prepared.report;
   report.rows = count;
+  std::vector<std::vector<double>> bridged = log.columns;
+  for (auto& column : bridged) report.lost.push_back(detail::bridge(column));
   std::vector<std::size_t> good;
   for (std::size_t k = 0; k < count; ++k) {
     bool finite =
         is_finite(log.u[k]) && is_finite(log.y[k]) && (log.time.empty() || is_finite(log.time[k]));
-    for (const auto& column : log.columns) finite = finite && is_finite(column[k]);
+    for (const auto& column : bridged) finite = finite && is_finite(column[k]);
     if (finite) good.push_back(k);
   }
   report.rejected = count - good.size();
@@ -189,7 +219,7 @@ inline std::size_t mend_outliers(std::vector<double>& y) {
     time.push_back(log.time.empty() ? size(k) * log.sample_time : log.time[k] - log.time[good[0]]);
     u.push_back(log.u[k]);
     y.push_back(log.y[k]);
-    for (std::size_t c = 0; c < columns.size(); ++c) columns[c].push_back(log.columns[c][k]);
+    for (std::size_t c = 0; c < columns.size(); ++c) columns[c].push_back(bridged[c][k]);
   }
   std::vector<double> steps;
   for (std::size_t k = 1; k < time.size(); ++k) {
