@@ -373,8 +373,9 @@ concept ForetellsByKind = kind == GainKind::general || requires(const O& o) {
 
 }  // namespace detail
 
-/// An observer whose next correction is known before the measurement. Adapters are not, because they
-/// change y, u or the estimate; but Measured, which only predicts more, is. Packs are accepted.
+/// An observer whose next correction is known before the measurement. Adapters are not, because
+/// they change y, u or the estimate; but Measured, which only predicts more, is. Packs are
+/// accepted.
 ///
 /// It declares `traits.is_predictable` and the kind of its gain, see GainKind:
 /// - with one level `correction_gain(e) const` is the scaled gain of the next correction;
