@@ -5,6 +5,7 @@
 
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
+#include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
@@ -36,6 +37,8 @@ template class VariableTime<LinearEso<1>>;
 template class OutlierGate<LinearEso<1>>;
 template class WrappedOutput<OutlierGate<LinearEso<1>>>;
 template class DelayedInput<LinearEso<1>, 3>;
+template class Measured<LinearEso<1>, 1, 3>;
+template class PredictiveAdrc<Measured<LinearEso<1>, 1, 3>>;
 template class PredictiveAdrc<LinearEso<1>>;
 template class DisturbanceCompensator<LinearEso<1>>;
 template class MimoAdrc<LinearEso<1>, LinearEso<1>>;

@@ -4,6 +4,7 @@
 //
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
+#include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/observer/cascade_eso.hpp>
@@ -91,6 +92,17 @@ struct LoopTraits<esokit::Guarded<O>> {
   }
 };
 
+// Nothing is measured: it counts as zero.
+template <class O>
+struct LoopTraits<esokit::Measured<O, 1, 3>> {
+  static typename esokit::Measured<O, 1, 3>::Config config(double omega, double T, double b0) {
+    typename esokit::Measured<O, 1, 3>::Config config{};
+    config.observer = LoopTraits<O>::config(omega, T, b0);
+    config.inputs[0] = {3, static_cast<typename O::scalar_type>(T), 0};
+    return config;
+  }
+};
+
 // A model that is wrong: what it says more than the plant does is disturbance.
 template <class O>
 struct LoopTraits<esokit::KnownModel<O, Friction<1, double>>> {
@@ -105,6 +117,7 @@ using DecoratedControllers =
     TypeList<Adrc<esokit::DelayedInput<esokit::LinearEso<2>, 3>>,
              Adrc<esokit::WrappedOutput<esokit::CascadeEso<2, 2>>, ErrorBased>,
              Adrc<esokit::VariableTime<esokit::LinearEso<2>>>,
+             Adrc<esokit::Measured<esokit::LinearEso<2>, 1, 3>, ErrorBased>,
              Adrc<esokit::Guarded<esokit::CascadeEso<2, 2>>>,
              Adrc<esokit::Guarded<esokit::LinearEso<1, float>>, ErrorBased>,
              Adrc<esokit::Guarded<esokit::ModelEso<swinging>>>,

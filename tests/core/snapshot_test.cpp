@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
@@ -240,10 +241,11 @@ TEST(Snapshot, EveryTypeHasATagOfItsOwn) {
            AdjustableBandwidthEso<2, float, 1, SignReading::printed>, NonlinearEso<2, float>,
            NonlinearEso<2, float, 2, FalGain<float>>, ExtendedStateFilter<2, float>,
            ExtendedStateFilter<2, float, 1, NoNominalModel, 8>, SwingModel, SensorModel,
-           SwingFilter, SensorFilter, DelayedInput<Eso, 3>, DelayedInput<Eso, 4>,
-           WrappedOutput<Eso>, VariableTime<Eso>, KnownModel<Eso, esokit_test::Friction<1, float>>,
-           WrappedOutput<DelayedInput<Eso, 3>>, DelayedInput<WrappedOutput<Eso>, 3>,
-           PredictorCorrector<2, float, 1, Gain>, PredictorCorrector<2, float, 1, Gain, 2>,
+           SwingFilter, SensorFilter, DelayedInput<Eso, 3>, DelayedInput<Eso, 4>, Measured<Eso>,
+           Measured<Eso, 2>, Measured<Eso, 1, 2>, WrappedOutput<Eso>, VariableTime<Eso>,
+           KnownModel<Eso, esokit_test::Friction<1, float>>, WrappedOutput<DelayedInput<Eso, 3>>,
+           DelayedInput<WrappedOutput<Eso>, 3>, PredictorCorrector<2, float, 1, Gain>,
+           PredictorCorrector<2, float, 1, Gain, 2>,
            PredictorCorrector<2, float, 1, AlgebraicGain<3, float>>,
            PredictorCorrector<2, float, 1, RiccatiGain<3, float>>,
            PredictorCorrector<2, float, 1, SwitchedGain<3, float>>,

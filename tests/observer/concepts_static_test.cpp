@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
@@ -619,6 +620,24 @@ using Filter = esokit::ExtendedStateFilter<2>;
 static_assert(!UpdatesWeighted<DelayedInput<Filter, 2>>, "it would skip the delay");
 static_assert(Rearms<VariableTime<esokit::AlgebraicEso<2>>> && !Rearms<Delayed>);
 // Nests hand on what an adapter in them is asked for.
+using Told = esokit::Measured<LinearEso<2>, 1, 2>;
+static_assert(!is_its_observer<Told> && RevisesInput<Told> && TellsScaledEstimate<Told>);
+static_assert(esokit::observer_traits<DelayedInput<Told, 2>>.takes_measured);
+static_assert(!esokit::observer_traits<Delayed>.takes_measured);
+static_assert(PredictableObserver<Told> && !PredictableObserver<WrappedOutput<Told>>);
+// A filter with a gate knows its next correction only after y; what is not a chain with one
+// constant has no load to be told.
+static_assert(
+    !esokit::observer_traits<esokit::Measured<esokit::ExtendedStateFilter<2>>>.is_predictable);
+static_assert(esokit::ShiftableLoad<LinearEso<2>> && !esokit::ShiftableLoad<Loop<>>);
+struct ClaimsMeasured : LinearEso<2> {
+  static constexpr esokit::ObserverTraits traits{.takes_measured = true};
+};
+static_assert(!esokit::TakesMeasuredAsDeclared<ClaimsMeasured>);
+struct HidesMeasured : LinearEso<2> {
+  void revise_measured();
+};
+static_assert(!esokit::TakesMeasuredAsDeclared<HidesMeasured>);
 static_assert(esokit::observer_traits<DelayedInput<Timed, 2>>.varies_time);
 static_assert(esokit::observer_traits<VariableTime<WrappedOutput<Delayed>>>.wraps_output);
 static_assert(esokit::observer_traits<VariableTime<WrappedOutput<Delayed>>>.delays_input);
