@@ -29,7 +29,7 @@ enum class RivalKind : unsigned char {
   pi,               ///< PI without a filter
   derivative,       ///< PID, filter of first order on the derivative
   filtered,         ///< PID, filter of second order on y, damping 0.707
-  freely_filtered,  ///< the same with any damping from 0.1 to 30
+  freely_filtered,  ///< the same with any damping from 0.001 to 30
   given             ///< not tuned
 };
 
@@ -146,7 +146,7 @@ struct RivalSearch {
   [[nodiscard]] double value(RivalKind kind, const std::vector<double>& x, double price) const {
     const double slow = std::log(search.slowest()), fast = std::log(search.fastest());
     // A PID with a small or large part is one without this part.
-    const std::array<double, 5> low{slow - 2.0, slow - 6.0, slow - 3.0, slow, std::log(0.1)};
+    const std::array<double, 5> low{slow - 2.0, slow - 6.0, slow - 3.0, slow, std::log(0.001)};
     const std::array<double, 5> high{fast + 1.0, fast, fast + 5.0, fast + 2.0, std::log(30.0)};
     double outside = 0.0;
     for (std::size_t i = 0; i < x.size(); ++i)
@@ -378,6 +378,16 @@ template <class = void>
     // What the coarse grid took for enough, and is not.
     of.cost = &of.fine;
     if (of.lack(kind, best.at) > 0.0) best = of.least(kind, true, {best.at});
+    // Never worse than what is known to be one of these.
+    if (kind == RivalKind::freely_filtered) {
+      for (const auto& x : known) {
+        const bool keeps = of.lack(kind, best.at) <= 0.0;
+        if (of.lack(kind, x) <= 0.0 &&
+            (!keeps || of.value(kind, x, 0.0) < of.value(kind, best.at, 0.0))) {
+          best.at = x;
+        }
+      }
+    }
     of.cost = &of.coarse;
     known.push_back(best.at);
     TunedRival rival;

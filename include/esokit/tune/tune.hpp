@@ -376,7 +376,7 @@ struct TuneSearch {
     if (!added) return found.value + price * found.lack - worth_of_speed * found.speed;
     const TuneSettings chosen = settings(c, x);
     const auto controller = tuned_controller(c.kind, model.sample_time, chosen);
-    if (!controller) {
+    if (!controller || (c.design.family == TuneFamily::free_poles && runs_away(*controller))) {
       found.value = 1e5;
       return found.value;
     }
@@ -391,6 +391,22 @@ struct TuneSearch {
                model.order == 1 ? std::log(k[0]) / static_cast<double>(k.size()) : 0.0};
     }
     return found.value + price * found.lack - worth_of_speed * found.speed;
+  }
+
+  /// Whether a controller is not stable by itself, which poles of little damping can make of it;
+  /// its integrator may stand.
+  [[nodiscard]] static bool runs_away(const LinearController& controller) {
+    const auto poles = poles_of(controller.a);
+    return std::any_of(poles.begin(), poles.end(),
+                       [](const auto& pole) { return std::abs(1.0 + pole) > 1.0 + 1e-7; });
+  }
+
+  /// What a point lacks of the rules, by this cost.
+  [[nodiscard]] double lacks(const Contender& c, const std::vector<double>& x,
+                             const LoopCost& by) const {
+    const TuneSettings chosen = settings(c, x);
+    const auto controller = tuned_controller(c.kind, model.sample_time, chosen);
+    return controller ? lack(kept(c, chosen, by(*controller)), 0.9995) : 1e5;
   }
 
   /// Whether variable `index` of the search is a damping; the others are factors or bandwidths.
@@ -408,7 +424,7 @@ struct TuneSearch {
     return c.design.knows.sinusoid && c.observer_numbers == 2 && i == 1;
   }
   [[nodiscard]] double low(const Contender& c, std::size_t i) const {
-    return std::log(damping(c, i)   ? 0.2
+    return std::log(damping(c, i)   ? 0.001
                     : factor(c, i)  ? 0.1
                     : capture(c, i) ? 0.003 * model.sinusoids.front().frequency
                                     : slowest());
@@ -524,15 +540,21 @@ struct TuneSearch {
         from_here(start.at, 40);
       }
     }
-    for (const auto& start : starts) from_here(start, 60);
+    for (const auto& start : starts) from_here(start, 30);
     for (const double next : {price, 4.0 * price, 16.0 * price}) {
       price = next;
       best.value = f(best.at);
-      for (int again = 0; again < (rising ? 3 : 6); ++again) {
+      int in_vain = 0;
+      for (int again = 0; again < (rising ? 10 : 6) && in_vain < (rising ? 2 : 1); ++again) {
         const double before = best.value;
-        for (double& s : step) s = again % 2 == 0 ? 0.1 : -0.05;
+        for (std::size_t i = 0; i < numbers; ++i) {
+          // A simplex of another shape finds ways along an edge on which the last one collapsed.
+          const bool other_way = rising && (again / 2 >> i % 3 & 1) != 0;
+          step[i] =
+              (again % 2 == 0 ? 0.1 : -0.05) * (rising ? 2.0 : 1.0) * (other_way ? -1.0 : 1.0);
+        }
         from_here(best.at, 30);
-        if (!(best.value < before - 2e-4)) break;
+        in_vain = best.value < before - (rising ? 2e-5 : 2e-4) ? 0 : in_vain + 1;
       }
       if (!rising) break;
     }
@@ -1116,6 +1138,7 @@ template <TuneKnowledge Parts = tune_knows_all>
         }
       }
       const auto free = search.least(c, false, starts);
+      const double least_cost = search.seen.at(free.at).value;
       auto best = free;
       best.value = search.value(c, free.at, 40.0);
       if (best.value > free.value) {
@@ -1128,10 +1151,20 @@ template <TuneKnowledge Parts = tune_knows_all>
           }
           if (best.value < 1e3) starts.insert(starts.begin(), best.at);
         }
-        if (best.value > free.value + 2e-3) best = search.least(c, true, starts);
+        if (best.value > free.value + (starts.empty() ? 2e-3 : 2e-4)) {
+          best = search.least(c, true, starts);
+        }
+      }
+      // What the coarse grid took for enough, and is not.
+      if (search.lacks(c, best.at, cost) <= 0.0 && search.lacks(c, best.at, fine) > 0.0) {
+        search.seen.clear();
+        search.cost = &fine;
+        best = search.least(c, true, {best.at});
+        search.seen.clear();
+        search.cost = &cost;
       }
       c.design.settings = detail::as_printed(search.settings(c, best.at));
-      detail::fill_in(c, search, fine, tuning.optimum, std::exp(search.seen.at(free.at).value));
+      detail::fill_in(c, search, fine, tuning.optimum, std::exp(least_cost));
     }
     tuning.designs.clear();
     for (detail::Contender& c : all) tuning.designs.push_back(std::move(c.design));
