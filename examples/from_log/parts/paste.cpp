@@ -822,14 +822,16 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
         (along ? std::string("known(r(0), r(1))") : std::string()) +
         (along && !fed.empty() ? " + " : "") + fed +
         ";\n"
-        "    // If the actuator reports what it really held, give that in place of u.\n"
-        "    u = std::clamp(controller.update(y, r, u - fed) + more, " +
+        "    controller.applied(u - fed);  // if the actuator reports what it really held, in "
+        "place "
+        "of u\n"
+        "    u = std::clamp(controller.update(y, r) + more, " +
         source(model.u_min) + ", " + source(model.u_max) +
         ");\n"
         "    fed = more;\n";
   } else {
     body +=
-        "    // If the actuator reports what it really held, give that as a third argument.\n"
+        "    // If the actuator reports what it really held, say controller.applied(..) before.\n"
         "    const double u = controller.update(y, profile.motion());\n";
   }
   body +=
