@@ -48,8 +48,8 @@ struct MeasuredConfig {
 ///
 /// A gain that is wrong by 30 % leaves 30 % of f to the observer, which finds it like any d.
 /// With an actuator in the model f acts on the plant behind the actuator, as it does in reality.
-/// Guarded bounds and leaks f + d, and holds or scales what is found, not what is told. Put it
-/// around VariableTime, not inside: the dead time is then counted in the present steps.
+/// Guarded bounds and leaks f + d, and holds or scales what is found, not what is told.
+/// Measured goes around VariableTime, not inside: the dead time is then counted in present steps.
 /// @tparam Count number of disturbances that are measured @tparam Delay longest dead time, samples;
 ///         the memory is Delay + 2 scalars each
 template <ShiftableLoad Observer, int Count = 1, int Delay = 0>
