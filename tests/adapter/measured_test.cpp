@@ -329,6 +329,68 @@ TEST(Measured, ARetuneKeepsWhatIsCancelledAndTheMemory) {
   }
 }
 
+/// A gain that makes of a w in the memory more than the scalar holds is refused.
+TEST(Measured, ARetuneThatOverflowsIsRefused) {
+  using M = Measured<LinearEso<1>, 1, 5>;
+  auto settings = config<LinearEso<1>>({.input = {3, 0, 0.03}});
+  auto o = M::make(settings).value();
+  o.measured(1e200);
+  o.update(0, 0);
+  o.measured(0);
+  o.update(0, 0);
+  settings.inputs[0].gain = 1e150;
+  const auto refused = o.retune(settings);
+  ASSERT_FALSE(refused);
+  EXPECT_STREQ(refused.error().field, "inputs.gain");
+  EXPECT_EQ(o.known_part(), 0);
+  settings.inputs[0].gain = 1e50;
+  EXPECT_TRUE(o.retune(settings));
+  for (int k = 0; k < 9; ++k) o.update(0, 0);
+  EXPECT_TRUE(is_finite(o.total_disturbance()));
+}
+
+/// Guards scale what is found, not what is told: with no trust, pinned or held, dhat moves by f
+/// only.
+TEST(Measured, GuardsDoNotHoldWhatIsTold) {
+  const auto run = [](auto fresh) {
+    for (int kind = 0; kind < 3; ++kind) {
+      auto o = fresh;
+      for (int k = 0; k < 5; ++k) o.update(0, 0);
+      if (kind == 0) o.set_trust(0);
+      if (kind == 1) o.set_pin(Pin::upper);
+      double u = 0;
+      for (int k = 0; k < 40; ++k) {
+        const double w = moving(30 + k);
+        o.measured(w);
+        if (kind == 2) u = o.hold(u);
+        const double before = o.observer().known_part();
+        const double dhat = o.total_disturbance();
+        o.update(0, u);
+        const double found = o.total_disturbance() - dhat - (o.observer().known_part() - before);
+        // b0 > 0 at the upper limit: dhat may only rise.
+        if (kind == 1) {
+          EXPECT_GE(found, -1e-12) << k;
+        } else {
+          EXPECT_NEAR(found, 0, 1e-12) << kind << ' ' << k;
+        }
+      }
+    }
+  };
+  run(Guarded<Measured<LinearEso<1>, 1, 5>>::make(
+          {.observer = config<LinearEso<1>>({.input = {3, 0.1, 0.02}})})
+          .value());
+  run(Guarded<Measured<CascadeEso<1, 2>, 1, 5>>::make(
+          {.observer = config<CascadeEso<1, 2>>({.input = {3, 0.1, 0.02}})})
+          .value());
+  // The bound is one of f + d.
+  auto o = Guarded<Measured<LinearEso<1>, 1, 5>>::make(
+               {.observer = config<LinearEso<1>>({.input = {3, 0, 0}}), .disturbance_bound = 2})
+               .value();
+  o.measured(1);
+  o.predict(0);
+  EXPECT_EQ(o.total_disturbance(), 2);
+}
+
 /// A start at rest under w: u stays, whatever w is, and only its change is cancelled.
 TEST(Measured, AStartTakesThePlantAtRest) {
   using M = Measured<LinearEso<1>, 1, 5>;
@@ -359,6 +421,7 @@ TEST(Measured, BadSettingsAreRefused) {
   refused([](auto& c) { c.inputs[0].gain = infinite; }, "inputs.gain");
   refused([](auto& c) { c.inputs[0].lag = -1e-9; }, "inputs.lag");
   refused([](auto& c) { c.inputs[0].lag = infinite; }, "inputs.lag");
+  refused([](auto& c) { c.inputs[0].lag = 10'001; }, "inputs.lag");
   refused([](auto& c) { c.inputs[0].dead_time = -1e-9; }, "inputs.dead_time");
   refused([](auto& c) { c.inputs[0].dead_time = 0.0501; }, "inputs.dead_time");
   refused([](auto& c) { c.most_lost = -1; }, "most_lost");

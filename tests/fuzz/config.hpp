@@ -315,6 +315,16 @@ class Filler {
       }
       config.most_in_a_row = tape_.integer(1, 20, "most_in_a_row");
     }
+    if constexpr (requires { config.most_lost; }) {
+      for (auto& input : config.inputs) {
+        number("inputs.gain", input.gain, {-5 * unit, 5 * unit});
+        if (tape_.once_in(2)) number("inputs.lag", input.lag, {0.01 * T, 50 * T, true});
+        if (tape_.once_in(2)) number("inputs.dead_time", input.dead_time, {0, 2 * T});
+      }
+      config.most_lost = tape_.integer(0, 60, "most_lost");
+      promise.slowest = std::min(promise.slowest, 0.02);  // by the lag
+      promise.waiting += 64;
+    }
     MEMBER(ratio, number(text, member, {2, 4}))
     if constexpr (requires { config.model.coefficient; }) {
       number("model.coefficient", config.model.coefficient, {-0.01 / T, 0.01 / T});

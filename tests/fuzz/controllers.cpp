@@ -2,6 +2,7 @@
 // line.
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
+#include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
@@ -44,6 +45,8 @@ void add_controllers(std::vector<Kind>& kinds) {
   KIND(MimoAdrc<LinearEso<1, float>, LinearEso<2, float>>);
 #ifndef ESOKIT_ONE_TYPE
   KIND(Adrc<OutlierGate<LinearEso<2, float>>>);
+  KIND(Adrc<Measured<VariableTime<LinearEso<1, double>>, 1, 3>>);
+  KIND(PredictiveAdrc<Measured<LinearEso<2, double>, 1, 3>>);
   KIND(Adrc<Guarded<LinearEso<2, float>>>);
   KIND(Adrc<LinearEso<3, float>>);
   KIND(Adrc<ModelEso<ModelParts{.order = 1, .plant_poles = true, .actuator = 1}, double>>);

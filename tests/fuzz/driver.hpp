@@ -500,6 +500,20 @@ class Driver final : public Game {
           d.shift(x, [&] { d.object_->fill_input(x); });
         });
       }
+      if constexpr (requires(T & o, S s) { o.measured(s); }) {
+        for (int weight = 0; weight < 4; ++weight) {
+          add(a, "measured", [](Driver& d) {
+            const S w = d.number();
+            d.quietly([&] { d.object_->measured(w); });
+          });
+        }
+      }
+      if constexpr (requires(T & o) { o.revise_measured(); }) {
+        add(a, "revise_measured",
+            [](Driver& d) { d.quietly([&] { d.object_->revise_measured(); }); });
+        add(a, "settle_measured",
+            [](Driver& d) { d.quietly([&] { d.object_->settle_measured(); }); });
+      }
       if constexpr (requires(T & o, S s) { o.set_step_time(s); }) {
         add(a, "set_step_time", [](Driver& d) {
           const double t = d.promise_.sample_time;

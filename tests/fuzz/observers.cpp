@@ -1,6 +1,7 @@
 // Every observer and every adapter in its nestings; a new one joins by a line.
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
+#include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
@@ -39,6 +40,7 @@ void add_observers(std::vector<Kind>& kinds) {
   KIND(DelayedInput<KnownModel<WrappedOutput<CascadeEso<2, 2, double>>, Friction<1, double>>, 3>);
   KIND(WrappedOutput<ModelCascadeEso<poles_and_lags, 2, double>>);
   KIND(OutlierGate<LinearEso<2, float>>);
+  KIND(Measured<LinearEso<2, float>, 1, 3>);
   KIND(Guarded<LinearEso<2, float>>);
   KIND(Guarded<
        ModelEso<ModelParts{.order = 1, .actuator = 1, .sensor = 1, .resonators = 1}, float>>);

@@ -274,6 +274,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   static constexpr int n = Observer::order;
   using Model = std::remove_cvref_t<
       decltype(detail::GuardAccess::innermost(std::declval<const Observer&>()).model())>;
+  static constexpr bool takes_measured = observer_traits<Observer>.takes_measured;
   static constexpr bool on_chain = model_traits<Model>.is_chain;
   static_assert(on_chain || !observer_traits<Observer>.varies_time,
                 "esokit: with a model Guarded needs a fixed sample time: not with "
@@ -355,7 +356,8 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
 
   /// One sample, see PredictorCorrector::update.
   StepStatus update(S y, S u_applied) noexcept {
-    bool in_parts = acts_ && (held_ || unsettled_);
+    // What is measured moves dhat with the prediction, which is not to be guarded.
+    bool in_parts = takes_measured || (acts_ && (held_ || unsettled_));
     if constexpr (!on_chain) {
       in_parts = in_parts || told_ratio_ < gain_ratio_ || told_ratio_ > gain_ratio_;
     }
@@ -377,6 +379,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
         return predict_standing(u_applied);
     }
     const StepStatus status = observer_.predict(S(u_applied * told_ratio_));
+    if constexpr (takes_measured) keep_bound();
     take_gain();
     return status;
   }
@@ -577,6 +580,19 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
     return status;
   }
 
+  /// Adds `offset` to the load, limited to the bound, see PredictorCorrector.
+  StepStatus shift_load(const S& offset) noexcept requires ShiftableLoad<Observer> {
+    const StepStatus status = observer_.shift_load(offset);
+    if (status == StepStatus::ok) keep_bound();
+    return status;
+  }
+
+  /// As of Measured, with dhat limited to the bound.
+  void revise_measured() noexcept requires(observer_traits<Observer>.takes_measured) {
+    observer_.revise_measured();
+    keep_bound();
+  }
+
   /// The input that the last prediction used, converted to the present b0.
   [[nodiscard]] S applied_input() const noexcept {
     return detail::clipped(S(observer_.applied_input() * input_factor_));
@@ -750,6 +766,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
         for (std::size_t i = 0; i < y; ++i) states[0][i] = still[i] + (i == 0 ? turns : S(0));
       }
     }
+    if constexpr (takes_measured) keep_bound();
     take_gain();
     return status;
   }

@@ -48,8 +48,8 @@ struct MeasuredConfig {
 ///
 /// A gain that is wrong by 30 % leaves 30 % of f to the observer, which finds it like any d.
 /// With an actuator in the model f acts on the plant behind the actuator, as it does in reality.
-/// What Guarded bounds and leaks is f + d. Put it around VariableTime, not inside: the dead time is
-/// then counted in the present steps.
+/// Guarded bounds and leaks f + d, and holds or scales what is found, not what is told.
+/// Measured goes around VariableTime, not inside: the dead time is then counted in present steps.
 /// @tparam Count number of disturbances that are measured @tparam Delay longest dead time, samples;
 ///         the memory is Delay + 2 scalars each
 template <ShiftableLoad Observer, int Count = 1, int Delay = 0>
@@ -74,6 +74,26 @@ class Measured : public NamedAdapter<Measured<Observer, Count, Delay>, Observer,
         inside.is_predictable && !inside.blanks_estimate && !inside.gates_outliers;
     return traits;
   }();
+
+  /// Takes over the settings of `fresh`, as returned by `make`, without design work. f + d and the
+  /// memory of w are kept; d becomes what the new f does not explain.
+  /// @return error if the new gain times a w of the memory is more than the scalar can hold
+  Check<S> adopt(const Measured& fresh) {
+    Measured next = *this;
+    next.most_lost_ = fresh.most_lost_;
+    for (std::size_t i = 0; i < Count; ++i) {
+      next.paths_[i].adopt(fresh.paths_[i]);
+      const S& gain = fresh.paths_[i].input().gain;
+      if (!next.paths_[i].takes_memory(Count) || !next.paths_[i].takes(last_[i], Count)) {
+        return Error<S>{"inputs.gain", gain, "would make the effect of the present w not finite",
+                        static_cast<int>(i)};
+      }
+    }
+    if (auto ok = next.observer_.adopt(fresh.observer_); !ok) return ok;
+    next.told_ = next.sum();
+    *this = next;
+    return {};
+  }
 
   /// w[k], before the step that ends at k. NaN: lost.
   void measured(const S& w) noexcept requires(Count == 1) { given_[0] = w; }
@@ -134,10 +154,10 @@ class Measured : public NamedAdapter<Measured<Observer, Count, Delay>, Observer,
 
   /// f, what all w add to y^(n) in the mean of the coming sample, unit of y^(n) (n of the plant).
   [[nodiscard]] const S& known_part() const noexcept { return told_; }
-  /// dhat without f, unit of y^(n).
+  /// dhat without f, unit of y^(n); limited to the range of the scalar.
   [[nodiscard]] S residual_disturbance() const noexcept requires(
       model_traits<std::remove_cvref_t<decltype(std::declval<const Observer&>().model())>>.is_chain) {
-    return observer_.total_disturbance() - told_;
+    return detail::clipped(S(observer_.total_disturbance() - told_));
   }
   /// @cond
   [[nodiscard]] const auto& path(int i) const noexcept {
@@ -186,13 +206,6 @@ class Measured : public NamedAdapter<Measured<Observer, Count, Delay>, Observer,
     }
     return rules.require(0 <= config.most_lost && config.most_lost <= 65535, "most_lost",
                          static_cast<S>(config.most_lost), "must be 0 .. 65535");
-  }
-
-  /// Keeps f + d and the memory of w.
-  void take(const Measured& fresh) noexcept {
-    for (std::size_t i = 0; i < Count; ++i) paths_[i].adopt(fresh.paths_[i]);
-    most_lost_ = fresh.most_lost_;
-    told_ = sum();
   }
 
   /// The w number `i` to be used, by the rule for lost ones.

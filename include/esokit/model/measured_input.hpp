@@ -47,6 +47,9 @@ class MeasuredPath {
     return Rules<S>{}
         .finite("inputs.gain", input.gain, index)
         .not_negative("inputs.lag", input.lag, index)
+        .require(input.lag <= S(1e6) * time,
+                 {"inputs.lag", input.lag, "must be at most a million samples, s:", index,
+                  S(1e6) * time, true})
         .not_negative("inputs.dead_time", input.dead_time, index)
         .require(input.dead_time <= longest(time), {"inputs.dead_time", input.dead_time,
                                                     "must be at most Capacity samples, s:", index,
@@ -114,6 +117,13 @@ class MeasuredPath {
   [[nodiscard]] bool takes(const S& w, int count) const noexcept {
     const S most = S(4) * static_cast<S>(count) * w;
     return is_finite(most) && is_finite(S(input_.gain * most));
+  }
+  /// The same of all that it remembers.
+  [[nodiscard]] bool takes_memory(int count) const noexcept {
+    for (const S& w : arrivals_) {
+      if (!takes(w, count)) return false;
+    }
+    return takes(lagged_, count);
   }
 
  private:
