@@ -815,8 +815,12 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
     find_times(used, with.model, bounds, with.fit.at, search);
     take_times(rows, used.timed);
   };
-  if (!rows.timed.empty()) {
-    find_late(*winner, true);
+  const auto may_be_late = [&] {
+    return std::any_of(rows.timed.begin(), rows.timed.end(),
+                       [](const TimedColumn& column) { return column.free; });
+  };
+  if (may_be_late()) find_late(*winner, true);
+  if (may_be_late()) {
     orders = fit_orders(rows, options, bounds, orders);
     winner = best_order(orders);
   }
@@ -849,7 +853,7 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
     orders = fit_orders(rows, tried, bounds, orders);
     winner = best_order(orders);
   }
-  if (!rows.timed.empty()) find_late(*winner, false);
+  if (may_be_late()) find_late(*winner, false);
   OrderFit chosen = *winner;
   if (result.averaged == 1 && chosen.correlation < 0.3) raw_noise = chosen.noise;
   result.orders = std::move(of_speed);
@@ -1037,7 +1041,7 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
   // The times where the plateau is, and the gains with them.
   FitData there = used;
   Fit fitted_there = here.fit;
-  if (!there.timed.empty()) {
+  if (may_be_late()) {
     find_times(there, model, bounds, here.fit.at, false);
     fitted_there = InnovationsFit(there, model, bounds).minimise(here.fit.at, false, 8);
   }
