@@ -335,7 +335,12 @@ TEST(DisturbanceParts, AreReadThroughEveryObserverAdapterAndController) {
   const auto controls = [&](const char* what, auto made, double sign) {
     ASSERT_TRUE(made) << what << ": " << made.error();
     reads_the_parts(
-        what, [&](double y) { (void)made->update(y, 0.0, 0.0); }, [&] { return *made; }, sign);
+        what,
+        [&](double y) {
+          made->applied(0.0);
+          (void)made->update(y, 0.0);
+        },
+        [&] { return *made; }, sign);
   };
   controls("Adrc", Adrc<Eso>::make({.observer = config, .controller_bandwidth = 10.0}), 1);
   controls("error-based Adrc in a nest",
