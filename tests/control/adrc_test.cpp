@@ -208,6 +208,42 @@ TEST(Adrc, SampledPlacementHoldsForAnyBandwidth) {
   EXPECT_GT(final_error(TimeDomain::continuous), 1e3);
 }
 
+/// A divider whose measurements VariableTime would take for the end of too long a gap is refused:
+/// each one would restart the observer. Found by the fuzzer.
+TEST(Adrc, DividerIsBridgedAtTheLongestStep) {
+  using Variable = Adrc<esokit::VariableTime<LinearEso<2>>>;
+  int largest = 0, refused = 0;
+  for (int divider = 1; divider < 40; ++divider) {
+    const auto made = Variable::make({.observer = {.observer = {.observer_bandwidth = 760,
+                                                                .input_gain = 1,
+                                                                .sample_time = 3e-3,
+                                                                .max_gap = 38},
+                                                   .ratio = 2.25},
+                                      .controller_bandwidth = 8,
+                                      .measurement_divider = divider});
+    if (!made) {
+      // Beyond what the observer bridges at its own step time the other rule speaks.
+      if (refusal(made).find("max_gap") != std::string::npos) continue;
+      ++refused;
+      EXPECT_EQ(refusal(made),
+                "measurement_divider: must be so small that VariableTime bridges as many of its "
+                "longest steps");
+      continue;
+    }
+    largest = divider;
+    auto controller = *made;
+    ASSERT_TRUE(controller.set_step_time(3e-3 * 2.25).has_value());
+    bool restarted = false;
+    for (int k = 0; k < 400; ++k) {
+      controller.update(1.0, 1.0);
+      restarted |= k > 0 && has(controller.status(), StepStatus::restarted);
+    }
+    EXPECT_FALSE(restarted) << divider;
+  }
+  EXPECT_GT(largest, 1);
+  EXPECT_GT(refused, 1);
+}
+
 /// Gains in the sampled domain and the rate limit follow the step's length; a refused one changes
 /// nothing.
 TEST(Adrc, GainsAndRateFollowTheSampleTime) {

@@ -458,6 +458,7 @@ static_assert(!LoopObserver<FillUndeclared> && !LoopObserver<FillWithNothing>);
 ESOKIT_OBSERVER(Varies, {.varies_time = true}) {
   Check<S> set_step_time(S);
   S step_time() const;
+  bool bridges(int) const;
 };
 ESOKIT_OBSERVER(TimeMissing, {.varies_time = true}){};
 ESOKIT_OBSERVER(TimeNotSaid, {.varies_time = true}) { Check<S> set_step_time(S); };
@@ -465,6 +466,7 @@ ESOKIT_OBSERVER(TimeUndeclared, {}) { Check<S> set_step_time(S); };
 ESOKIT_OBSERVER(TimeTellsNothing, {.varies_time = true}) {
   void set_step_time(S);
   S step_time() const;
+  bool bridges(int) const;
 };
 static_assert(LoopObserver<Varies> && !LoopObserver<TimeMissing> && !LoopObserver<TimeNotSaid>);
 static_assert(!LoopObserver<TimeUndeclared> && !LoopObserver<TimeTellsNothing>);

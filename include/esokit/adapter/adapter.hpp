@@ -171,6 +171,10 @@ class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Ob
       requires(observer_traits<Observer>.varies_time) {
     return observer_.step_time();
   }
+  [[nodiscard]] bool bridges(int steps) const noexcept
+      requires(observer_traits<Observer>.varies_time) {
+    return observer_.bridges(steps);
+  }
   /// @}
 
  protected:

@@ -588,7 +588,8 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   }
 
   /// As of Measured, with dhat limited to the bound.
-  void revise_measured() noexcept requires(observer_traits<Observer>.takes_measured) {
+  template <class O = Observer>
+  requires(observer_traits<O>.takes_measured) void revise_measured() noexcept {
     observer_.revise_measured();
     keep_bound();
   }

@@ -144,6 +144,11 @@ class VariableTime
 
   /// Present length of the steps, s.
   [[nodiscard]] const S& step_time() const noexcept { return step_time_; }
+  /// Whether it never restarts if every `steps`-th step has a measurement, whatever their lengths.
+  [[nodiscard]] bool bridges(int steps) const noexcept {
+    const S nominal = chain_config<Observer>(config_.observer).sample_time;
+    return !(static_cast<S>(steps) * (nominal * config_.ratio) > longest_);
+  }
 
  private:
   VariableTime(const Observer& observer, const Config& config, const S& longest) noexcept

@@ -177,6 +177,14 @@ class ControlLoop {
       const auto checked = detail::check_loop(settings, observer.sample_time(), observer.max_gap(),
                                               observer_traits<Observer>.bears_regular_gaps);
       if (!checked) return checked.error();
+      if constexpr (has_step_time) {
+        const int divider = settings.measurement_divider;
+        Rules<S> rules;
+        rules.require(divider == 1 || observer.bridges(divider), "measurement_divider",
+                      static_cast<S>(divider),
+                      "must be so small that VariableTime bridges as many of its longest steps");
+        if (!rules) return rules.error();
+      }
       return ControlLoop(observer, checked->limiter, settings, checked->hold_samples, watched);
     }
   }

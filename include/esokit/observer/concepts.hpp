@@ -65,7 +65,8 @@ struct ObserverTraits {
   /// `settle_measured()`, see Measured.
   bool takes_measured = false;
   bool varies_time = false;  ///< `set_step_time(seconds)`, before each step, and (but for packs)
-                             ///< `step_time() const`, its present length
+                             ///< `step_time() const`, its present length, and `bridges(steps)
+                             ///< const`, see VariableTime
   bool gates_outliers =
       false;  ///< `accepts(y) const`: false if `correct` would reject y as an outlier
 
@@ -168,6 +169,7 @@ concept VariesTime = requires(O& o, const typename O::scalar_type& s) {
   { o.set_step_time(s) } -> std::same_as<Check<typename O::scalar_type>>;
   requires PackScalar<typename O::scalar_type> || requires {
     { std::as_const(o).step_time() } -> std::convertible_to<typename O::scalar_type>;
+    { std::as_const(o).bridges(1) } -> std::same_as<bool>;
   };
 };
 template <class O>
@@ -232,8 +234,8 @@ concept TakesMeasuredAsDeclared = detail::observer_as_declared<O>(observer_trait
                                                                   detail::names_revise_measured<O>,
                                                                   detail::TakesMeasured<O>);
 
-/// `set_step_time(seconds)` and `step_time() const` exist if and only if `traits.varies_time`
-/// declares them.
+/// `set_step_time(seconds)`, `step_time() const` and `bridges(steps) const` exist if and only if
+/// `traits.varies_time` declares them.
 template <class O>
 concept VariesTimeAsDeclared = detail::observer_as_declared<O>(observer_traits<O>.varies_time,
                                                                detail::names_set_step_time<O>,
