@@ -310,7 +310,8 @@ int main(int argc, char** argv) {
     double apart = 0, largest = 0;
     const Law both = [&, indi = Indi(design)](double y, double r, double v, double) mutable {
       const double mine = indi.update(y, r, v);
-      const double its = other.update(y, design.controller * (r - y) / gain, v);
+      other.applied(v);
+      const double its = other.update(y, design.controller * (r - y) / gain);
       apart = std::max(apart, std::abs(mine - its));
       largest = std::max(largest, std::abs(mine));
       return mine;
