@@ -26,10 +26,6 @@ template <PlainScalar S = double>
 struct ExperimentApproach {
   S input{};   ///< u that drives y from rest to `output`, such as full power
   S output{};  ///< y around which the relay then acts
-
-  /// @cond
-  static constexpr auto fields(auto& a) noexcept { return detail::tie(a.input, a.output); }
-  /// @endcond
 };
 
 /// Config of Experiment.
@@ -62,15 +58,6 @@ struct ExperimentConfig {
   S hand_over{};       ///< s: relay or steps continue for this time after the last measured cycle
   int cycles = 8;      ///< number of measured cycles, after two to settle; even, 6 .. 200
   Limits<S> limits{};  ///< of the actuator; u0 - A and u0 + A must be within
-
-  /// @cond
-  static constexpr auto fields(auto& c) noexcept {
-    return detail::tie(c.sample_time, c.excitation, c.input, c.amplitude, c.hysteresis, c.lead,
-                       c.half_period, c.rest, c.approach, c.response, c.response_time, c.travel,
-                       c.lowest_output, c.highest_output, c.safe_input, c.time_limit, c.hand_over,
-                       c.cycles, c.limits);
-  }
-  /// @endcond
 };
 
 /// The phase of an experiment.
@@ -185,8 +172,6 @@ class Experiment {
   using scalar_type = S;               ///< type of signals and settings
   using Config = ExperimentConfig<S>;  ///< settings of make
   using Result = ExperimentResult<S>;  ///< the result
-  template <class T>
-  using with_scalar = Experiment<Order, T>;  ///< the same with another scalar
 
   /// Checks the settings. @return the experiment before its first sample, or an error
   static Expected<Experiment, Error<S>> make(const Config& config) {

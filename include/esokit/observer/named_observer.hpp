@@ -33,8 +33,8 @@ namespace esokit {
 ///
 /// `design` returns the gain law (for a cascade all laws) as an Expected. It is called after b0, T
 /// and max_gap have been checked; for a continuous observer (`Base` a ContinuousObserver) its only
-/// argument is the config. For packs the observer also declares `with_scalar`, and its config
-/// `fields`.
+/// argument is the config. An observer whose packs compute all lanes at once also declares
+/// `with_scalar`, see core/packed.hpp.
 /// @tparam Self the observer itself @tparam Base PredictorCorrector or ContinuousObserver
 template <class Self, class Base>
 class NamedObserver : public Base {
@@ -57,9 +57,8 @@ class NamedObserver : public Base {
       const auto laws = O::design(config);
       if (!laws) return laws.error();
       return Self(config, config.input_gain, *laws);
-    } else if constexpr (PackScalar<scalar_type>) {
-      return detail::make_lanes<Self>(config);
     } else {
+      detail::refuse_packs<scalar_type>();
       using Model = typename Base::PlantModel;
       // The chain is checked first: laws divide by what it checks.
       if (auto ok = Base::check_chain({config.input_gain, config.sample_time, config.max_gap}); !ok)
