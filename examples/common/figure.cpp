@@ -10,6 +10,7 @@
 #include <system_error>
 
 #include "csv.hpp"
+#include "plain_figure.hpp"
 #include "system.hpp"
 
 namespace esokit::examples {
@@ -221,7 +222,11 @@ bool Figure::write(const std::string& folder, const std::string& formats) const 
   }
   const std::string file = folder + "/" + name_ + ".csv";
   if (!write_text(file, numbers)) return false;
-  return run_python(draw_script(), description);
+  // Where something is missing, this is said once.
+  static bool able = true;
+  able = (able || formats != "svg") && run_python(draw_script(), description);
+  return able || (formats == "svg" &&
+                  write_text(folder + "/" + name_ + ".svg", plain_svg(description, numbers)));
 }
 
 }  // namespace esokit::examples

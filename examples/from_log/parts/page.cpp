@@ -77,7 +77,7 @@ class Scratch {
   std::string path_ = esokit::examples::new_scratch_folder();
 };
 
-/// As an image that is in the page itself; what is said in its place without gnuplot.
+/// As an image that is in the page itself; what is said in its place if no file can be written.
 std::string html_of(const Figure& figure, const std::string& scratch) {
   std::string text = "<figure>\n";
   if (!scratch.empty() && figure.write(scratch, "svg")) {
@@ -88,7 +88,7 @@ std::string html_of(const Figure& figure, const std::string& scratch) {
         "src=\"data:image/svg+xml;base64," +
         base64(svg) + "\" alt=\"" + escaped(figure.caption()) + "\"></label>\n";
   } else {
-    text += "<p>Not drawn: figures need gnuplot and Python 3.</p>\n";
+    text += "<p>Not drawn: no file could be written.</p>\n";
   }
   return text + "<figcaption>" + escaped(figure.caption()) + "</figcaption>\n</figure>\n";
 }
