@@ -33,7 +33,6 @@
 #include <esokit/analysis/worst_case.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/adrc_law.hpp>
-#include <esokit/control/algebraic_filter.hpp>
 #include <esokit/control/control_loop.hpp>
 #include <esokit/control/controller.hpp>
 #include <esokit/control/cycle_analysis.hpp>
@@ -136,7 +135,6 @@
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/concepts.hpp>
-#include <esokit/observer/continuous_observer.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/half_gain_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
@@ -150,6 +148,8 @@
 #include <esokit/sim/butcher_tableau.hpp>
 #include <esokit/sim/closed_loop.hpp>
 #include <esokit/sim/combined_signals.hpp>
+#include <esokit/sim/continuous_gain_law.hpp>
+#include <esokit/sim/continuous_observer.hpp>
 #include <esokit/sim/counted_gaussian.hpp>
 #include <esokit/sim/disturbed_plant.hpp>
 #include <esokit/sim/dormand_prince.hpp>

@@ -6,7 +6,6 @@
 
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/algebraic_gain_design.hpp>
-#include <esokit/observer/continuous_observer.hpp>
 #include <esokit/observer/named_observer.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
 #include <optional>
@@ -274,35 +273,5 @@ class AlgebraicEso
 template <int Order, Scalar S, int Extension>
 inline constexpr std::uint32_t type_tag<AlgebraicEso<Order, S, Extension>> =
     make_type_tag<S>("AlgebraicEso", Order, Extension);
-
-/// AlgebraicEso as an ODE, z' = A z + B u + L(t) (y - z_1), for t > 0; see AlgebraicFilter for the
-/// form that is regular at t = 0.
-/// @tparam Order n @tparam S scalar @tparam Extension m
-template <int Order, Scalar S = double, int Extension = 1>
-class ContinuousAlgebraicEso
-    : public NamedObserver<
-          ContinuousAlgebraicEso<Order, S, Extension>,
-          ContinuousObserver<Order, S, Extension, ContinuousAlgebraicGain<Order + Extension, S>>> {
-  using Shell = typename ContinuousAlgebraicEso::NamedObserver;
-  friend Shell;
-  using Shell::Shell;
-
- public:
-  /// Settings of make.
-  struct Config {
-    S observer_bandwidth{};  ///< lambda >= 0, rad/s
-    S frequency_shift{};     ///< q >= 0, rad/s
-    S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero
-  };
-
- private:
-  static Expected<typename Shell::Law, Error<S>> design(const Config& config) {
-    Rules<S> rules;
-    rules.not_negative("observer_bandwidth", config.observer_bandwidth)
-        .not_negative("frequency_shift", config.frequency_shift);
-    if (!rules) return rules.error();
-    return typename Shell::Law(config.observer_bandwidth, config.frequency_shift);
-  }
-};
 
 }  // namespace esokit

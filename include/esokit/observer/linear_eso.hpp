@@ -5,7 +5,6 @@
 
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/constant_gain.hpp>
-#include <esokit/observer/continuous_observer.hpp>
 #include <esokit/observer/named_observer.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
 
@@ -86,41 +85,5 @@ class LinearEso
 template <int Order, Scalar S, int Extension, class Placement, class Model>
 inline constexpr std::uint32_t type_tag<LinearEso<Order, S, Extension, Placement, Model>> =
     make_type_tag<S, Placement, Model>("LinearEso", Order, Extension);
-
-/// Settings of ContinuousLinearEso by bandwidth.
-template <int Size, Scalar S, class Placement>
-struct ContinuousLinearEsoConfig {
-  S observer_bandwidth{};  ///< omega_o, rad/s: all poles at -omega_o, or as the placement says
-  S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero
-};
-
-/// Settings of ContinuousLinearEso by poles.
-template <int Size, Scalar S, ListsPoles Placement>
-struct ContinuousLinearEsoConfig<Size, S, Placement> {
-  /// p_i, 1/s, N poles in the left half plane, complex ones in conjugate pairs
-  typename Placement::template Spec<Size, S> poles{};
-  S input_gain{};  ///< b0, unit of y^(n) per unit of u; not zero
-};
-
-/// LinearEso as an ODE, z' = A z + B u + l (y - z_1), for simulation.
-/// @tparam Order n @tparam S scalar @tparam Extension m @tparam Placement as for LinearEso
-template <int Order, Scalar S = double, int Extension = 1, class Placement = EqualPoles>
-class ContinuousLinearEso
-    : public NamedObserver<
-          ContinuousLinearEso<Order, S, Extension, Placement>,
-          ContinuousObserver<Order, S, Extension,
-                             ContinuousConstantGain<Order + Extension, S, Placement>>> {
-  using Shell = typename ContinuousLinearEso::NamedObserver;
-  friend Shell;
-  using Shell::Shell;
-
- public:
-  using Config = ContinuousLinearEsoConfig<Order + Extension, S, Placement>;  ///< settings of make
-
- private:
-  static auto design(const Config& config) {
-    return detail::placed_law<typename Shell::Law>(config);
-  }
-};
 
 }  // namespace esokit
