@@ -161,7 +161,8 @@ struct ExperimentRow {
 ///
 /// Hand-over: from phase `hand_over` on the result is ready. Make the controller, call its
 /// `track(y, reference, u)` while the experiment still moves the machine, and continue with its
-/// `update` from phase `done` on. `examples/identify` shows this.
+/// `update` from phase `done` on, before the first of them `applied(u)` with the u that the
+/// experiment gave last. `examples/identify` shows this.
 /// @tparam Order n, 1 or 2
 template <int Order, PlainScalar S = double>
 class Experiment {
