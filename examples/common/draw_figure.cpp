@@ -3,6 +3,7 @@
 
 #include "csv.hpp"
 #include "figure.hpp"
+#include "plain_figure.hpp"
 #include "system.hpp"
 
 namespace esokit::examples {
@@ -20,8 +21,12 @@ std::filesystem::path draw_script() {
 
 bool Figure::write(const std::string& folder, const std::string& formats) const {
   const auto texts = text(folder, formats);
-  return texts && write_text(folder + "/" + name_ + ".csv", texts->numbers) &&
-         run_python(draw_script(), texts->description);
+  if (!texts || !write_text(folder + "/" + name_ + ".csv", texts->numbers)) return false;
+  // Where something is missing, this is said once.
+  static bool able = true;
+  able = (able || formats != "svg") && run_python(draw_script(), texts->description);
+  return able || (formats == "svg" && write_text(folder + "/" + name_ + ".svg",
+                                                 plain_svg(texts->description, texts->numbers)));
 }
 
 }  // namespace esokit::examples

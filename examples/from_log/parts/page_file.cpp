@@ -50,7 +50,7 @@ class Scratch {
   std::string path_ = esokit::examples::new_scratch_folder();
 };
 
-/// As an image that is in the page itself; what is said in its place without gnuplot.
+/// As an image that is in the page itself; what is said in its place if no file can be written.
 std::string image_of(const Figure& figure, const std::string& scratch) {
   if (!scratch.empty() && figure.write(scratch, "svg")) {
     std::ifstream file(scratch + "/" + figure.name() + ".svg", std::ios::binary);
@@ -59,7 +59,7 @@ std::string image_of(const Figure& figure, const std::string& scratch) {
            "src=\"data:image/svg+xml;base64," +
            base64(svg) + "\" alt=\"" + escaped(figure.caption()) + "\"></label>\n";
   }
-  return "<p>Not drawn: figures need gnuplot and Python 3.</p>\n";
+  return "<p>Not drawn: no file could be written.</p>\n";
 }
 
 void replace(std::string& text, const std::string& mark, const std::string& by) {
