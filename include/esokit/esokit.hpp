@@ -60,11 +60,11 @@
 #include <esokit/core/expected.hpp>
 #include <esokit/core/interval.hpp>
 #include <esokit/core/kernels.hpp>
-#include <esokit/core/lane_by_lane.hpp>
 #include <esokit/core/lanes.hpp>
 #include <esokit/core/language.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/pack.hpp>
+#include <esokit/core/packed.hpp>
 #include <esokit/core/recording.hpp>
 #include <esokit/core/scalar.hpp>
 #include <esokit/core/snapshot.hpp>

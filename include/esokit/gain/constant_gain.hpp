@@ -36,8 +36,7 @@ class ConstantGain {
   /// @param index element of `field` that the error names, -1: none
   /// @return error for a spec that the placement refuses, or a gain that the scalar cannot hold
   static Expected<ConstantGain, Error<S>> make(const char* field, const Spec& spec,
-                                               const S& sample_time,
-                                               int index = -1) requires(!PackScalar<S>) {
+                                               const S& sample_time, int index = -1) {
     Rules<S> rules;
     rules.all_of(Placement::template check<Size, S>(field, spec, index));
     if (!rules) return rules.error();

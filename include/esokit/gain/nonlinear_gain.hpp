@@ -105,12 +105,6 @@ struct PowerSumGain {
         .not_negative("shape.gain_beta", gain_beta)
         .not_negative("shape.beta", beta);
   }
-
-  /// @cond
-  static constexpr auto fields(auto& k) noexcept {
-    return detail::tie(k.gain_alpha, k.alpha, k.gain_beta, k.beta);
-  }
-  /// @endcond
 };
 
 /// Distinguishes the type in snapshots.
@@ -159,12 +153,6 @@ struct FalGain {
         .positive("shape.exponent", exponent)
         .positive("shape.linear_width", linear_width);
   }
-
-  /// @cond
-  static constexpr auto fields(auto& k) noexcept {
-    return detail::tie(k.gain, k.exponent, k.linear_width);
-  }
-  /// @endcond
 };
 
 /// Distinguishes the type in snapshots.

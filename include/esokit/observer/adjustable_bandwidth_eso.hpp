@@ -48,13 +48,6 @@ class AdjustableBandwidthEso
     S sample_time{};    ///< T, s
     int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts, see
                         ///< `max_gap()`
-
-    /// @cond
-    static constexpr auto fields(auto& c) noexcept {
-      return detail::tie(c.observer_bandwidth, c.bandwidth_ratio, c.rule,
-                         c.allow_uncertified_switching, c.input_gain, c.sample_time, c.max_gap);
-    }
-    /// @endcond
   };
   template <class T>
   using with_scalar =
@@ -63,7 +56,6 @@ class AdjustableBandwidthEso
   /// Takes over the settings of `fresh`, as returned by `make`, without design work. The estimate
   /// and the last innovation are kept.
   Check<S> adopt(AdjustableBandwidthEso fresh) {
-    if constexpr (PackScalar<S>) return detail::adopt_lanes(*this, fresh);
     std::get<0>(fresh.laws()).continue_from(std::get<0>(this->laws()));
     return Shell::adopt(fresh);
   }

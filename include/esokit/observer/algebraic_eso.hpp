@@ -71,14 +71,6 @@ class AlgebraicEso
     bool allow_vanishing_gain = false;  ///< accept lambda = 0 with q > 0: in the end y is ignored
     int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts, see
                         ///< `max_gap()`
-
-    /// @cond
-    static constexpr auto fields(auto& c) noexcept {
-      return detail::tie(c.observer_bandwidth, c.frequency_shift, c.input_gain, c.sample_time,
-                         c.blanking, c.measurement_noise, c.disturbance_noise, c.start_index,
-                         c.allow_vanishing_gain, c.max_gap);
-    }
-    /// @endcond
   };
 
   /// One sample, see PredictorCorrector::update.
@@ -100,21 +92,17 @@ class AlgebraicEso
   /// change of b0 is moved into the disturbance, also in blanked estimates. If the new blanking
   /// time has not passed yet, the present estimates are published until it has.
   Check<S> adopt(AlgebraicEso fresh) {
-    if constexpr (PackScalar<S>) {
-      return detail::adopt_lanes(*this, fresh);
-    } else {
-      Estimate published = estimate();
-      published(Order) =
-          published(Order) + (this->input_gain() - fresh.input_gain()) * this->applied_input();
-      if (!all(is_finite(published(Order)))) {
-        return Error<S>{"input_gain", fresh.input_gain(), "would make the estimate not finite"};
-      }
-      // A settled observer no longer knows its age, and stays settled.
-      fresh.law().resume(settled() ? Law::max_index : age());
-      if (auto ok = Base::adopt(fresh); !ok) return ok;
-      publish(published);
-      return {};
+    Estimate published = estimate();
+    published(Order) =
+        published(Order) + (this->input_gain() - fresh.input_gain()) * this->applied_input();
+    if (!all(is_finite(published(Order)))) {
+      return Error<S>{"input_gain", fresh.input_gain(), "would make the estimate not finite"};
     }
+    // A settled observer no longer knows its age, and stays settled.
+    fresh.law().resume(settled() ? Law::max_index : age());
+    if (auto ok = Base::adopt(fresh); !ok) return ok;
+    publish(published);
+    return {};
   }
 
   /// Call this after a known jump of the disturbance or of the state: restarts the schedule and

@@ -24,13 +24,6 @@ struct CascadeEsoConfig {
   [[no_unique_address]] Settings model{};  ///< what is known of the plant
   int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts; fewer
                       ///< if errors would not decay in any sequence of gaps, see `max_gap()`
-
-  /// @cond
-  static constexpr auto fields(auto& c) noexcept {
-    return detail::tie(c.observer_bandwidth, c.bandwidth_factor, c.level_bandwidths, c.input_gain,
-                       c.sample_time, c.model, c.max_gap);
-  }
-  /// @endcond
 };
 
 /// Settings of CascadeEso by poles.
@@ -42,12 +35,6 @@ struct CascadeEsoConfig<Size, Levels, S, Placement, Settings> {
   S sample_time{};                         ///< T, s
   [[no_unique_address]] Settings model{};  ///< what is known of the plant
   int max_gap = 100;                       ///< as by bandwidths
-
-  /// @cond
-  static constexpr auto fields(auto& c) noexcept {
-    return detail::tie(c.level_poles, c.input_gain, c.sample_time, c.model, c.max_gap);
-  }
-  /// @endcond
 };
 
 namespace detail {

@@ -21,12 +21,6 @@ struct LinearEsoConfig {
   [[no_unique_address]] Settings model{};  ///< what is known of the plant
   int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts; fewer
                       ///< if errors would not decay in any sequence of gaps, see `max_gap()`
-
-  /// @cond
-  static constexpr auto fields(auto& c) noexcept {
-    return detail::tie(c.observer_bandwidth, c.input_gain, c.sample_time, c.model, c.max_gap);
-  }
-  /// @endcond
 };
 
 /// Settings of LinearEso by poles.
@@ -39,12 +33,6 @@ struct LinearEsoConfig<Size, S, Placement, Settings> {
   S sample_time{};                         ///< T, s
   [[no_unique_address]] Settings model{};  ///< what is known of the plant
   int max_gap = 100;                       ///< as by bandwidth
-
-  /// @cond
-  static constexpr auto fields(auto& c) noexcept {
-    return detail::tie(c.poles, c.input_gain, c.sample_time, c.model, c.max_gap);
-  }
-  /// @endcond
 };
 
 /// Linear extended state observer of a plant y^(n) = d + b0 u, sampled exactly.

@@ -31,8 +31,8 @@ namespace esokit {
 ///     };
 ///
 /// `design` returns the gain law (for a cascade all laws) as an Expected. It is called after b0, T
-/// and max_gap have been checked. For packs the observer also declares `with_scalar`, and its
-/// config `fields`.
+/// and max_gap have been checked. An observer whose packs compute all lanes at once also declares
+/// `with_scalar`, see core/packed.hpp.
 /// @tparam Self the observer itself @tparam Base PredictorCorrector
 template <class Self, class Base>
 class NamedObserver : public Base {
@@ -47,9 +47,8 @@ class NamedObserver : public Base {
       // Nothing else is instantiated: further errors would hide this one.
       static_assert(Base::order >= 1, "esokit: the plant order must be at least 1");
       return Error<scalar_type>{};
-    } else if constexpr (PackScalar<scalar_type>) {
-      return detail::make_lanes<Self>(config);
     } else {
+      detail::refuse_packs<scalar_type>();
       using Model = typename Base::PlantModel;
       // The chain is checked first: laws divide by what it checks.
       if (auto ok = Base::check_chain({config.input_gain, config.sample_time, config.max_gap}); !ok)

@@ -54,14 +54,6 @@ class NonlinearEso
     S sample_time{};    ///< T, s
     int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts, see
                         ///< `max_gap()`
-
-    /// @cond
-    static constexpr auto fields(auto& c) noexcept {
-      return detail::tie(c.observer_bandwidth, c.shape, c.error_scale, c.gain_min, c.gain_max,
-                         c.allow_uncertified_gain, c.unlimited, c.input_gain, c.sample_time,
-                         c.max_gap);
-    }
-    /// @endcond
   };
   template <class T>
   using with_scalar =
