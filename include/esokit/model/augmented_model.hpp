@@ -193,7 +193,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
       .follows_speed = Parts.follows_speed,
   };
 
-  template <class T>
+  template <PlainScalar T>
   using with_scalar = AugmentedModel<Parts, T>;  ///< the same with another scalar
 
   using Settings = PartsSettings<Parts, S>;  ///< settings of make
@@ -618,21 +618,6 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
 
   Settings settings_;
   S speed_ = S(1);  ///< factor of the frequencies
-};
-
-/// For packs only sizes and settings: an observer of packs with such a model has one model for each
-/// lane.
-template <ModelParts Parts, PackScalar S>
-class AugmentedModel<Parts, S> {
-  using Plain = AugmentedModel<Parts, LaneScalar<S>>;
-
- public:
-  static constexpr int order = Plain::order;            ///< of the law
-  static constexpr int extension = Plain::extension;    ///< all rows besides the plant's
-  static constexpr ModelTraits traits = Plain::traits;  ///< what it is
-  using Settings = PartsSettings<Parts, S>;             ///< settings of make
-  template <class T>
-  using with_scalar = AugmentedModel<Parts, T>;  ///< the same with another scalar
 };
 
 /// Distinguishes the type in snapshots.
