@@ -659,7 +659,7 @@ program=./without run plain.csv --no-design
   base64 -d <<<"$one" | python3 -c '
 import sys, xml.etree.ElementTree as tree
 drawn = [e.tag.split("}")[1] for e in tree.fromstring(sys.stdin.read()).iter()]
-sys.exit(drawn.count("clipPath") == 0 or drawn.count("path") < 4 or drawn.count("text") < 8)'
+sys.exit(drawn.count("clipPath") == 0 or drawn.count("path") < 4 or drawn.count("text") < 8)' || exit 1
 done
 verdict $? "plain.csv without Python: $(drawn) of $many figures: $said"
 
