@@ -176,8 +176,11 @@
 #include <esokit/sim/window.hpp>
 #include <esokit/target/c_code.hpp>
 #include <esokit/target/c_text.hpp>
-#include <esokit/target/c_writer.hpp>
+#include <esokit/target/list_writer.hpp>
+#include <esokit/target/recorded_design.hpp>
 #include <esokit/target/recorder.hpp>
+#include <esokit/target/structured_text.hpp>
+#include <esokit/tune/c_code.hpp>
 #include <esokit/tune/controller.hpp>
 #include <esokit/tune/families.hpp>
 #include <esokit/tune/loop_cost.hpp>

@@ -44,7 +44,7 @@ class ModelLanes : public LaneByLane<Self, Plain, S, Settings> {
 
 /// LinearEso with a model, for packs.
 template <int Order, PackScalar S, int Extension, class Placement, class Model>
-requires(!model_traits<Model>.is_chain)  //
+requires(!model_traits<Model>.is_chain && has_lanes<S>)  //
     class LinearEso<Order, S, Extension, Placement, Model>
     : public detail::ModelLanes<
           LinearEso<Order, S, Extension, Placement, Model>,
@@ -60,7 +60,7 @@ requires(!model_traits<Model>.is_chain)  //
 
 /// CascadeEso with a model, for packs.
 template <int Order, int Levels, PackScalar S, int Extension, class Placement, class Model>
-requires(!model_traits<Model>.is_chain)  //
+requires(!model_traits<Model>.is_chain && has_lanes<S>)  //
     class CascadeEso<Order, Levels, S, Extension, Placement, Model>
     : public detail::ModelLanes<
           CascadeEso<Order, Levels, S, Extension, Placement, Model>,
@@ -105,12 +105,12 @@ using ModelCascadeEso =
 /// ```
 ///
 /// See LinearPlantModel.
-template <int States, ModelParts Parts, PlainScalar S = double, class Placement = EqualPoles>
+template <int States, ModelParts Parts, SingleScalar S = double, class Placement = EqualPoles>
 using PlantEso = LinearEso<Parts.order, S, LinearPlantModel<States, Parts, S>::extension, Placement,
                            LinearPlantModel<States, Parts, S>>;
 
 /// CascadeEso with the same model.
-template <int States, ModelParts Parts, int Levels, PlainScalar S = double,
+template <int States, ModelParts Parts, int Levels, SingleScalar S = double,
           class Placement = EqualPoles>
 using PlantCascadeEso =
     CascadeEso<Parts.order, Levels, S, LinearPlantModel<States, Parts, S>::extension, Placement,

@@ -39,7 +39,7 @@ inline constexpr const char* c_header_controller = R"(/* `mode`: what determines
 #define $NAME_SAFE 2u /* too many measurements are missing */
 
 typedef struct {
-$MEMBERS  uint32_t hold_left; /* samples of the start hold */
+$MEMBERS$PHASE_MEMBER  uint32_t hold_left; /* samples of the start hold */
   uint16_t gap; /* samples since the last measurement that was taken */
   uint8_t mode;
   uint8_t status;
@@ -47,16 +47,17 @@ $MEMBERS  uint32_t hold_left; /* samples of the start hold */
 
 /* At rest at y = 0, u = 0. Call it before all else. */
 void $name_init($name_state *o);
-/* Takes over a plant at rest at y under u, with the reference at y. Returns a status. */
+/* Takes over a plant at rest at y under u; begin with the reference at y. Returns a status. */
 unsigned $name_start($name_state *o, $real y, $real u);
-/* One sample: y (NaN if it is missing) and the reference; returns the u to be held until the next. */
+/* One sample: y (NaN if it is missing) and r, $REFERENCE; returns the u to be held
+ * until the next. */
 $real $name_update($name_state *o, $real y, $real r);
 /* The same without a measurement. */
 $real $name_update_without_measurement($name_state *o, $real r);
 /* What the actuator really held, before the next update; only if it differs from what update gave. */
 void $name_applied($name_state *o, $real u);
 /* Estimate number 0 .. $LAST: y, y', .., and then the disturbance, in physical units. */
-$real $name_estimate($name_state *o, unsigned row);
+$real $name_estimate(const $name_state *o, unsigned row);
 
 )";
 
@@ -75,7 +76,7 @@ unsigned $name_update($name_state *o, $real y, $real u);
 unsigned $name_predict($name_state *o, $real u);
 unsigned $name_correct($name_state *o, $real y);
 /* Estimate number 0 .. $LAST: y, y', .., and then the disturbance, in physical units. */
-$real $name_estimate($name_state *o, unsigned row);
+$real $name_estimate(const $name_state *o, unsigned row);
 
 )";
 
@@ -126,7 +127,7 @@ static int restart($name_state *o, $real y)
   return 1;
 }
 
-static unsigned predict($name_state *o, $real given)
+static unsigned base_predict($name_state *o, $real given)
 {
   const int good = predict_step(o, given);
   if (o->gap < 65535u) ++o->gap;
@@ -141,20 +142,28 @@ static unsigned predict($name_state *o, $real given)
   return $NAME_INPUT_REJECTED | $NAME_PREDICTION_DROPPED;
 }
 
-static unsigned correct($name_state *o, $real y)
+static unsigned base_correct($name_state *o, $real y)
 {
   const unsigned elapsed = o->gap > 1u ? o->gap : 1u;
   const $real *k;
   if (elapsed > $ROWSu) return restart(o, y) ? $NAME_RESTARTED : $NAME_MEASUREMENT_REJECTED;
   k = gains[elapsed - 1u];
-  if (!correct_step(o, y$GAINS)) { /* perhaps the state is to blame */
-    return $fabs(y) < $fabs(o->z1) && restart(o, y) ? $NAME_RESTARTED : $NAME_MEASUREMENT_REJECTED;
+  if (!$CORRECT) { /* perhaps the state is to blame */
+    return $fabs(y) < $fabs(o->$FIRST) && restart(o, y) ? $NAME_RESTARTED : $NAME_MEASUREMENT_REJECTED;
   }
   o->gap = 0;
   return elapsed > 1u ? $NAME_GAP_BRIDGED : 0u;
 }
 
-$real $name_estimate($name_state *o, unsigned row)
+static unsigned base_update($name_state *o, $real y, $real u)
+{
+  unsigned status;
+  if (o->gap == 0u && observe(o, y, u)) return 0u;
+  status = base_predict(o, u);
+  return status | base_correct(o, y);
+}
+
+$real $name_estimate(const $name_state *o, unsigned row)
 {
   $real u = 0;
   switch (row) {
@@ -162,6 +171,49 @@ $ROWS_OF_ESTIMATE  default:
     break;
   }
   return u;
+}
+
+)";
+
+/// DelayedInput around it.
+inline constexpr const char* c_source_delay = R"(static uint16_t delayed_after(uint16_t place)
+{
+  return (uint16_t)(place + 1u < $LENGTHu ? place + 1u : 0u);
+}
+
+/* The u that acts now, for one that acts later. */
+static unsigned delayed_push($name_state *o, $real *u)
+{
+  const $real last = o->line[o->newest];
+  const int good = is_finite(*u);
+  o->newest = delayed_after(o->newest);
+  o->line[o->newest] = good ? *u : last;
+  *u = o->line[delayed_after(o->newest)];
+  return good ? 0u : $NAME_INPUT_REJECTED;
+}
+
+static unsigned delayed_predict($name_state *o, $real u)
+{
+  $real acting = u;
+  const unsigned status = delayed_push(o, &acting);
+  return status | base_predict(o, acting);
+}
+
+static unsigned delayed_update($name_state *o, $real y, $real u)
+{
+  $real acting = u;
+  const unsigned status = delayed_push(o, &acting);
+  return status | base_update(o, y, acting);
+}
+
+)";
+
+/// Its start.
+inline constexpr const char* c_source_delay_fill =
+    R"(static void delayed_fill($name_state *o, $real u)
+{
+  unsigned i;
+  for (i = 0u; i < $LENGTHu; ++i) o->line[i] = u;
 }
 
 )";
@@ -179,20 +231,17 @@ unsigned $name_reset($name_state *o, $real y)
 
 unsigned $name_predict($name_state *o, $real u)
 {
-  return predict(o, u);
+  return $top_predict(o, u);
 }
 
 unsigned $name_correct($name_state *o, $real y)
 {
-  return correct(o, y);
+  return base_correct(o, y);
 }
 
 unsigned $name_update($name_state *o, $real y, $real u)
 {
-  unsigned status;
-  if (o->gap == 0u && observe(o, y, u)) return 0u;
-  status = predict(o, u);
-  return status | correct(o, y);
+  return $top_update(o, y, u);
 }
 
 )";
@@ -223,7 +272,7 @@ static $real put_out($name_state *o, $real r)
 
 void $name_init($name_state *o)
 {
-$INIT  o->hold_left = $HOLD_LEFTu;
+$INIT$PHASE_INIT  o->hold_left = $HOLD_LEFTu;
   o->gap = 0;
   o->mode = $MODE;
   o->status = 0;
@@ -231,12 +280,10 @@ $INIT  o->hold_left = $HOLD_LEFTu;
 
 unsigned $name_start($name_state *o, $real y, $real u)
 {
-  const $real before = o->u_applied;
-  if (!is_finite(y)) return $NAME_STATE_REJECTED;
-  if (!is_finite(u)) return $NAME_INPUT_REJECTED;
-  o->u_applied = u;
-  if (!rest_at(o, y)) {
-    o->u_applied = before;
+  const $name_state before = *o;
+$START_CHECKS$FILL  (void)$top_predict(o, u); /* keeps it as applied */
+  if (!rest_at(o, $AT_START, u)) {
+    *o = before;
     return $NAME_STATE_REJECTED;
   }
   (void)applied(o, u);
@@ -247,20 +294,17 @@ $HARDEN  o->gap = 0;
 
 $real $name_update($name_state *o, $real y, $real r)
 {
-  unsigned status = 0u;
-  if (o->gap != 0u || !observe(o, y)) {
-    status = predict(o, o->u_last);
-    status |= correct(o, y);
-    if ((status & $NAME_RESTARTED) != 0u) (void)rest_at(o, y);
-  }
-  o->status = (uint8_t)status;
+  unsigned status;
+$PHASE_BEFORE  status = $top_update(o, $MEASURED, o->u_last);
+  if ((status & $NAME_RESTARTED) != 0u) (void)rest_at(o, $MEASURED, o->u_applied);
+$PHASE_AFTER  o->status = (uint8_t)status;
   judge_missing(o);
   return put_out(o, r);
 }
 
 $real $name_update_without_measurement($name_state *o, $real r)
 {
-  o->status = (uint8_t)predict(o, o->u_last);
+$PHASE_NEXT  o->status = (uint8_t)$top_predict(o, o->u_last);
   judge_missing(o);
   return put_out(o, r);
 }
