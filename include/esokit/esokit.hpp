@@ -180,7 +180,6 @@
 #include <esokit/target/recorded_design.hpp>
 #include <esokit/target/recorder.hpp>
 #include <esokit/target/structured_text.hpp>
-#include <esokit/tune/c_code.hpp>
 #include <esokit/tune/controller.hpp>
 #include <esokit/tune/families.hpp>
 #include <esokit/tune/loop_cost.hpp>
@@ -191,3 +190,4 @@
 #include <esokit/tune/rivals.hpp>
 #include <esokit/tune/search.hpp>
 #include <esokit/tune/tune.hpp>
+#include <esokit/tune/tuned_code.hpp>

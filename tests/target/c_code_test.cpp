@@ -113,30 +113,43 @@ TEST(CCode, RefusesBadNumbersUnderFastMath) {
   refuses(double{});
 }
 
-/// What else has to take it: an old C++, Clang, and the compiler of a microcontroller.
+/// What else has to take it: an old C++, Clang, small compilers, and that of a microcontroller; and
+/// of MISRA C:2012 nothing is found but the deviations that the file names.
 TEST(CCode, CompilesWithOtherCompilers) {
-  using C = Adrc<LinearEso<2, float>>;
+  using C = Adrc<DelayedInput<LinearEso<2, float>, 4>>;
+  auto settings = config<C>(8);
+  settings.measurement_divider = 2;
   const CCode code =
-      to_c(C::make(config<C>(8)).value(), {.name = "loop", .self_test_samples = 10}).value();
+      to_c(C::make(settings).value(), {.name = "loop", .self_test_samples = 10}).value();
   const Folder folder;
   folder.write("loop.h", code.header);
   folder.write("loop.c", code.source);
   folder.write("loop.cpp", code.source);
-  const auto compiles = [&](const std::string& compiler, const std::string& file) {
-    return runs(compiler + strict + "-DLOOP_SELF_TEST -c -o " + folder.file("loop.o") + " " +
-                folder.file(file));
+  const auto compiles = [&](const std::string& compiler, const std::string& file,
+                            const std::string& options = strict) {
+    return !there(compiler.substr(0, compiler.find(' '))) ||
+           runs(compiler + " " + options + " -DLOOP_SELF_TEST -c -o " + folder.file("loop.o") +
+                " " + folder.file(file));
   };
-  if (there("g++")) {
-    EXPECT_TRUE(compiles("g++ -std=c++11", "loop.cpp"));
-  }
-  if (there("clang")) {
-    EXPECT_TRUE(compiles("clang -std=c99", "loop.c"));
-  }
-  if (there("arm-none-eabi-gcc")) {
-    EXPECT_TRUE(
-        compiles("arm-none-eabi-gcc -std=c99 -Os -mcpu=cortex-m4 -mthumb -mfloat-abi=hard "
-                 "-mfpu=fpv4-sp-d16 -Wdouble-promotion",
-                 "loop.c"));
+  EXPECT_TRUE(compiles("g++ -std=c++11", "loop.cpp"));
+  EXPECT_TRUE(compiles("clang -std=c99", "loop.c"));
+  EXPECT_TRUE(compiles("tcc", "loop.c", "-Wall -Werror"));
+  EXPECT_TRUE(compiles("sdcc -mstm8 --std-c99", "loop.c", ">/dev/null 2>&1"));
+  EXPECT_TRUE(
+      compiles("arm-none-eabi-gcc -std=c99 -Os -mcpu=cortex-m4 -mthumb -mfloat-abi=hard "
+               "-mfpu=fpv4-sp-d16 -Wdouble-promotion",
+               "loop.c"));
+  if (there("cppcheck")) {
+    const auto finds_nothing = [&](const std::string& deviations) {
+      return runs("cppcheck --addon=misra --std=c99 -q --error-exitcode=1 " + deviations +
+                  folder.file("loop.c") + " >/dev/null 2>&1");
+    };
+    std::string deviations = "--suppress=missingIncludeSystem ";
+    for (const char* rule : {"2.5", "15.5"}) {
+      deviations += std::string("--suppress=misra-c2012-") + rule + " ";
+    }
+    EXPECT_FALSE(finds_nothing(deviations)) << "it finds no deviation that is there";
+    EXPECT_TRUE(finds_nothing(deviations + "--suppress=misra-c2012-21.15 "));
   }
 }
 

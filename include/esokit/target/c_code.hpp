@@ -20,30 +20,31 @@ struct CCode {
 
 namespace detail {
 
-/// `static int name(state *o, arguments, *u)`: 1, or 0 if a check does not hold; then nothing has
-/// changed.
+/// `static bool name(state *o, arguments, *u)`: true, or false if a check does not hold; then
+/// nothing has changed.
 inline std::string c_function(const ListWriter& writer, const std::string& prefix,
                               const NamedCall& names, const RecordedCall& call) {
   const WrittenCall lines = writer.written(names, call);
-  std::string text = "static int " + names.name + "(" + (lines.results.empty() ? "const " : "") +
+  std::string text = "static bool " + names.name + "(" + (lines.results.empty() ? "const " : "") +
                      prefix + "_state *o";
   for (const auto& argument : names.arguments) text += ", " + writer.real() + " " + argument;
   if (names.has_output) text += ", " + writer.real() + " *u_out";
   text += ")\n{\n";
   for (const auto* part : {&lines.reads, &lines.lines}) {
     for (const auto& line : *part) {
-      text += std::string("  const ") + (line.is_condition ? "int" : writer.real()) + " " +
+      text += std::string("  const ") + (line.is_condition ? "bool" : writer.real()) + " " +
               line.name + " = " + line.expression + ";\n";
     }
   }
   for (const auto& argument : lines.unused) text += "  (void)" + argument + ";\n";
-  for (const auto& check : lines.checks) text += "  if (!" + check + ") return 0;\n";
+  for (const auto& check : lines.checks)
+    text += "  if (!" + check + ") {\n    return false;\n  }\n";
   for (const auto& [member, value] : lines.results) {
     text += "  o->" + member + " = " + value + ";\n";
   }
   if (lines.results.empty() && lines.reads.empty()) text += "  (void)o;\n";
   if (names.has_output) text += "  *u_out = " + lines.output + ";\n";
-  return text + "  return 1;\n}\n\n";
+  return text + "  return true;\n}\n\n";
 }
 
 /// What the texts need of any design.
@@ -68,7 +69,7 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
   std::string call_gains;
   for (const auto& gains : design.gap_gains) {
     std::string row;
-    for (const double k : gains) row += (row.empty() ? "  {" : ", ") + writer.number(k);
+    for (const double k : gains) row += (row.empty() ? "    {" : ", ") + writer.number(k);
     table += row + "},\n";
   }
   const std::string count = std::to_string(design.gap_gains[0].size());
@@ -94,7 +95,7 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
       {"$MEMBERS", members},
       {"$TIME", writer.number(design.sample_time)},
       {"$CORRECT",
-       design.gain_is_kept ? corrects : "(elapsed > 1u ? " + corrects + " : correct_step(o, y))"},
+       design.gain_is_kept ? corrects : "(elapsed > 1u) ? " + corrects + " : correct_step(o, y)"},
       {"$GAIN", writer.number(design.input_gain)},
       {"$ROWS_OF_ESTIMATE", rows},
       {"$ROWS", std::to_string(design.gap_gains.size())},
@@ -104,7 +105,10 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
       {"$SIZE", count},
       {"$INIT", init},
       {"$top", design.line.empty() ? "base" : "delayed"},
+      {"$ZERO", writer.number(0)},
+      {"$ONE", writer.number(1)},
       {"$LENGTH", length},
+      {"$NEWEST", std::to_string(design.line.empty() ? 0 : design.line.size() - 1)},
       {"$VECTORS", vectors},
       {"$SAMPLES", std::to_string(design.samples.size())},
       {"$word", writer.single() ? "uint32_t" : "uint64_t"},
@@ -122,52 +126,55 @@ inline Words c_loop_words(const RecordedDesign& design, const ListWriter& writer
   const LoopRules& loop = design.loop;
   const bool divides = loop.divider > 1;
   const std::string divider = std::to_string(loop.divider);
-  const std::string of_y = "  if (!is_finite(y)) return $NAME_STATE_REJECTED;\n";
-  const std::string of_u = "  if (!is_finite(u)) return $NAME_INPUT_REJECTED;\n";
-  return {
-      {"$LIMITS",
-       ", u within " + writer.number(design.lower) + " .. " + writer.number(design.upper)},
-      {"$REFERENCE",
-       design.compensates ? "the u0 of the controller that is helped" : "the reference"},
-      {"$PHASE_MEMBER", divides ? "  uint16_t phase; /* a measurement is due at 0 */\n" : ""},
-      {"$PHASE_INIT", divides ? "  o->phase = 0;\n" : ""},
-      {"$PHASE_NEXT",
-       divides ? "  o->phase = (uint16_t)(o->phase + 1u < " + divider + "u ? o->phase + 1u : 0u);\n"
-               : ""},
-      {"$PHASE_BEFORE",
-       divides ? "  const int planned = o->gap == " + std::to_string(loop.divider - 1) +
-                     "u;\n  if (o->phase != 0u) return $name_update_without_measurement(o, "
-                     "r);\n  o->phase = 1u;\n"
-               : ""},
-      {"$PHASE_AFTER",
-       divides ? "  if (planned && status == $NAME_GAP_BRIDGED) status = 0u;\n" : ""},
-      {"$DIVIDER", divider},
-      {"$MEASURED", design.error_based ? "r - y" : "y"},
-      {"$AT_START", design.error_based ? "0" : "y"},
-      {"$START_CHECKS", design.compensates ? of_u + of_y : of_y + of_u},
-      {"$FILL", design.line.empty() ? "" : "  delayed_fill(o, u);\n"},
-      {"$SAFE_INPUT", loop.has_safe_input ? writer.number(loop.safe_input) : "o->u_last"},
-      {"$HOLD_INPUT", writer.number(loop.hold_input)},
-      {"$HARDEN", design.softens ? "  (void)harden(o);\n" : ""},
-      {"$MISSING_LIMIT", std::to_string(loop.missing_limit)},
-      {"$LEAVE_SAFE", loop.stays_safe ? ""
-                                      : " else if (o->mode == $NAME_SAFE && o->gap < " + divider +
-                                            "u) {\n    o->mode = $NAME_RUNNING;\n  }"},
-      {"$HOLD_LEFT", std::to_string(loop.hold_left)},
-      {"$MODE", loop.hold_left > 0 ? "$NAME_START_HOLD" : "$NAME_RUNNING"},
-      {"$COLUMNS", "y, r, u"},
-      {"$RESULT", "const $real result = $name_update(&o, samples[i][0], samples[i][1]);"}};
+  const auto only = [](const std::string& condition, const std::string& then) {
+    return "  if (" + condition + ") {\n    " + then + ";\n  }\n";
+  };
+  const std::string of_y = only("!is_finite(y)", "return $NAME_STATE_REJECTED");
+  const std::string of_u = only("!is_finite(u)", "return $NAME_INPUT_REJECTED");
+  return {{"$LIMITS",
+           ", u within " + writer.number(design.lower) + " .. " + writer.number(design.upper)},
+          {"$REFERENCE",
+           design.compensates ? "the u0 of the controller that is helped" : "the reference"},
+          {"$PHASE_MEMBER", divides ? "  uint16_t phase; /* a measurement is due at 0 */\n" : ""},
+          {"$PHASE_INIT", divides ? "  o->phase = 0u;\n" : ""},
+          {"$PHASE_NEXT", divides ? "  o->phase = (uint16_t)(o->phase + 1u);\n" +
+                                        only("o->phase >= $DIVIDERu", "o->phase = 0u")
+                                  : ""},
+          {"$PHASE_BEFORE",
+           divides ? "  const bool planned = o->gap == $DUEu;\n" +
+                         only("o->phase != 0u", "return $name_update_without_measurement(o, r)") +
+                         "  o->phase = 1u;\n"
+                   : ""},
+          {"$PHASE_AFTER",
+           divides ? only("planned && (status == $NAME_GAP_BRIDGED)", "status = 0u") : ""},
+          {"$DUE", std::to_string(loop.divider - 1)},
+          {"$MEASURED", design.error_based ? "r - y" : "y"},
+          {"$AT_START", design.error_based ? "$ZERO" : "y"},
+          {"$START_CHECKS", design.compensates ? of_u + of_y : of_y + of_u},
+          {"$FILL", design.line.empty() ? "" : "  delayed_fill(o, u);\n"},
+          {"$SAFE_INPUT", loop.has_safe_input ? writer.number(loop.safe_input) : "o->u_last"},
+          {"$HOLD_INPUT", writer.number(loop.hold_input)},
+          {"$HARDEN", design.softens ? "  (void)harden(o);\n" : ""},
+          {"$MISSING_LIMIT", std::to_string(loop.missing_limit)},
+          {"$LEAVE_SAFE", loop.stays_safe ? ""
+                                          : only("(o->mode == $NAME_SAFE) && (o->gap < $DIVIDERu)",
+                                                 "o->mode = $NAME_RUNNING")},
+          {"$HOLD_LEFT", std::to_string(loop.hold_left)},
+          {"$MODE", loop.hold_left > 0 ? "$NAME_START_HOLD" : "$NAME_RUNNING"},
+          {"$DIVIDER", divider},
+          {"$COLUMNS", "y, r, u"},
+          {"$RESULT", "const $real result = $name_update(&o, samples[i][0], samples[i][1]);"}};
 }
 
 /// What the texts need of an observer.
 inline Words c_observer_words(const RecordedDesign& design) {
-  return {
-      {"$LIMITS", ""},
-      {"$COLUMNS", "y, u, the disturbance"},
-      {"$RESULT",
-       "const unsigned status = $name_update(&o, samples[i][0], samples[i][1]);\n"
-       "    const $real result = status == 0u ? $name_estimate(&o, $ORDERu) : samples[i][2] - 1;"},
-      {"$ORDER", std::to_string(design.order)}};
+  return {{"$LIMITS", ""},
+          {"$COLUMNS", "y, u, the disturbance"},
+          {"$RESULT",
+           "const unsigned status = $name_update(&o, samples[i][0], samples[i][1]);\n"
+           "    const $real result =\n"
+           "        (status == 0u) ? $name_estimate(&o, $ORDERu) : (samples[i][2] - $ONE);"},
+          {"$ORDER", std::to_string(design.order)}};
 }
 
 /// The two files of a design.

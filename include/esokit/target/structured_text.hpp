@@ -434,11 +434,14 @@ inline std::string structured_text(const RecordedDesign& design) {
       {"$name", design.options.name},
       {"$COMMENT", comment.empty() ? "" : "   " + comment + "\n"}};
   text = body.with_lists(filled(text, words));
-  for (std::size_t at = 0; (at = text.find('\n', at)) != std::string::npos; ++at) {
-    // Where nothing was put in.
+  // Lines in which nothing was put.
+  for (std::size_t at = 0; (at = text.find('\n', at)) != std::string::npos;) {
     const std::size_t next = text.find_first_not_of(' ', at + 1);
-    if (next != std::string::npos && next > at + 1 && text[next] == '\n')
-      text.erase(at--, next - at);
+    if (next != std::string::npos && next > at + 1 && text[next] == '\n') {
+      text.erase(at, next - at);
+    } else {
+      ++at;
+    }
   }
   const std::string head = std::string(st_head) +
                            (design.is_controller ? st_controller_variables : st_observer_variables);

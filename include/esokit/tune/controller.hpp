@@ -25,6 +25,12 @@ template <class Observer>
 struct ControllerOfConfig<AdrcConfig<Observer>> {
   using type = Adrc<Observer>;
 };
+template <class S>
+Error<double> as_double(const Error<S>& error) {
+  return {error.field, static_cast<double>(error.value), error.rule,
+          error.index, static_cast<double>(error.limit), error.has_limit};
+}
+
 template <class Config>
 using ControllerOf = typename ControllerOfConfig<Config>::type;
 
@@ -116,11 +122,7 @@ Check<double> with_controller(const TuneModel& model, const TunedDesign& design,
     config.limits.upper = static_cast<S>(model.u_max);
     config.soften = design.settings.soften;
     auto controller = detail::ControllerOf<Config>::make(config);
-    if (!controller) {
-      const auto& error = controller.error();
-      return Error<double>{error.field, static_cast<double>(error.value), error.rule,
-                           error.index, static_cast<double>(error.limit), error.has_limit};
-    }
+    if (!controller) return detail::as_double(controller.error());
     visit(*controller);
     return {};
   };
