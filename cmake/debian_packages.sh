@@ -15,7 +15,7 @@ ESOKIT_FIRMWARE_PACKAGES=(gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-ar
   gcc-riscv64-unknown-elf picolibc-riscv64-unknown-elf qemu-system-arm qemu-system-misc)
 # The same headers in a browser (examples/playground); nodejs is not needed.
 ESOKIT_WASM_PACKAGES=(clang-14 lld-14 wasi-libc libc++-14-dev-wasm32 libc++abi-14-dev-wasm32
-  libclang-rt-14-dev-wasm32)
+  libclang-rt-14-dev-wasm32 musl-dev)
 # Programs for Windows, and what runs them here; no graphics, hence not the package wine.
 ESOKIT_WINDOWS_PACKAGES=(g++-mingw-w64-x86-64-posix wine64)
 

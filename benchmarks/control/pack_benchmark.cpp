@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
-#include <esokit/core/pack.hpp>
+#include <esokit/core/packed.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/linear_eso.hpp>
@@ -49,13 +49,6 @@ struct HandWritten2 {
 };
 
 template <class S>
-struct Settings {
-  S bandwidth{60.0};
-  S input_gain{2.0};
-  S sample_time = S(1e-3);
-};
-
-template <class S>
 HandWritten2<S> hand_written() {
   using One = LaneScalar<S>;
   const auto gain =
@@ -70,56 +63,49 @@ HandWritten2<S> hand_written() {
 
 template <class S>
 LinearEso<2, S> linear() {
-  const Settings<S> s;
-  return LinearEso<2, S>::make({.observer_bandwidth = s.bandwidth,
-                                .input_gain = s.input_gain,
-                                .sample_time = s.sample_time})
+  return LinearEso<2, S>::make(
+             {.observer_bandwidth = S(60), .input_gain = S(2), .sample_time = S(1e-3)})
       .value();
 }
 
 template <class S>
 CascadeEso<2, 3, S> cascade() {
-  const Settings<S> s;
-  return CascadeEso<2, 3, S>::make({.observer_bandwidth = s.bandwidth,
-                                    .bandwidth_factor = S(2.0),
-                                    .input_gain = s.input_gain,
-                                    .sample_time = s.sample_time})
+  return CascadeEso<2, 3, S>::make({.observer_bandwidth = S(60),
+                                    .bandwidth_factor = S(2),
+                                    .input_gain = S(2),
+                                    .sample_time = S(1e-3)})
       .value();
 }
 
 template <class S>
 ExtendedStateFilter<2, S> filter(RiccatiMode mode) {
-  const Settings<S> s;
-  return ExtendedStateFilter<2, S>::make({.input_gain = s.input_gain,
-                                          .sample_time = s.sample_time,
+  return ExtendedStateFilter<2, S>::make({.input_gain = S(2),
+                                          .sample_time = S(1e-3),
                                           .measurement_variance = S(1e-4),
-                                          .disturbance_bounds = {S(0.0), S(0.0), S(1.0)},
+                                          .disturbance_bounds = {S(0), S(0), S(1)},
                                           .inflation = S(0.01),
                                           .mode = mode})
       .value();
 }
 
-/// Lane by lane.
+/// One by one.
 template <class S>
 Adrc<WrappedOutput<LinearEso<2, S>>> angle() {
-  const Settings<S> s;
   return Adrc<WrappedOutput<LinearEso<2, S>>>::make(
-             {.observer = {.observer = {.observer_bandwidth = s.bandwidth,
-                                        .input_gain = s.input_gain,
-                                        .sample_time = s.sample_time},
+             {.observer = {.observer = {.observer_bandwidth = S(60),
+                                        .input_gain = S(2),
+                                        .sample_time = S(1e-3)},
                            .period = S(6.25)},
-              .controller_bandwidth = S(5.0)})
+              .controller_bandwidth = S(5)})
       .value();
 }
 
 template <class S>
 Adrc<LinearEso<2, S>> adrc() {
-  const Settings<S> s;
-  return Adrc<LinearEso<2, S>>::make({.observer = {.observer_bandwidth = s.bandwidth,
-                                                   .input_gain = s.input_gain,
-                                                   .sample_time = s.sample_time},
-                                      .controller_bandwidth = S(5.0),
-                                      .limits = {S(-1e3), S(1e3), S(1e5)}})
+  return Adrc<LinearEso<2, S>>::make(
+             {.observer = {.observer_bandwidth = S(60), .input_gain = S(2), .sample_time = S(1e-3)},
+              .controller_bandwidth = S(5),
+              .limits = {S(-1e3), S(1e3), S(1e5)}})
       .value();
 }
 
@@ -171,34 +157,38 @@ void add_all(const std::string& scalar) {
     const std::string hand = bank + "hand_written/2/pack_of_" + scalar;
     add<P>(hand, hand_written<P>(), lanes, false, "");
     add<One>(bank + "linear_eso/2/" + scalar, linear<One>(), lanes, false, "");
-    add<P>(bank + "linear_eso/2/pack_of_" + scalar, linear<P>(), lanes, false,
-           beside("linear_eso/2", "; vs " + hand + (lanes == 64 ? " <= 1.10" : " <= 1.25")));
+    add<P>(bank + "linear_eso/2/pack_of_" + scalar, Packed<LinearEso<2, One>>(linear<One>()), lanes,
+           false, beside("linear_eso/2", "; vs " + hand + (lanes == 64 ? " <= 1.10" : " <= 1.25")));
     add<One>(bank + "cascade_eso/2x3/" + scalar, cascade<One>(), lanes, false, "");
-    add<P>(bank + "cascade_eso/2x3/pack_of_" + scalar, cascade<P>(), lanes, false,
+    add<P>(bank + "cascade_eso/2x3/pack_of_" + scalar,
+           Packed<CascadeEso<2, 3, One>>(cascade<One>()), lanes, false,
            beside("cascade_eso/2x3", ""));
     add<One>(bank + "adrc/2/" + scalar, adrc<One>(), lanes, false, "");
-    add<P>(bank + "adrc/2/pack_of_" + scalar, adrc<P>(), lanes, false, beside("adrc/2", ""));
+    add<P>(bank + "adrc/2/pack_of_" + scalar, Packed<Adrc<LinearEso<2, One>>>(adrc<One>()), lanes,
+           false, beside("adrc/2", ""));
   }
   // One of each that works on all lanes in its own way, and what goes lane by lane.
-  const auto both = [&](const std::string& name, const auto& plain, const auto& packed,
-                        const std::string& limit) {
+  const auto both = [&](const std::string& name, const auto& plain, const std::string& limit) {
+    const Packed<std::remove_cvref_t<decltype(plain)>> packed(plain);
     add<One>("bank64/" + name + "/" + scalar, plain, 64, false, "");
     add<P>("bank64/" + name + "/pack_of_" + scalar, packed, 64, false,
            "vs bank64/" + name + "/" + scalar + limit);
   };
   for (const bool frozen : {false, true}) {
     const auto mode = frozen ? RiccatiMode::frozen : RiccatiMode::recursive;
-    both(frozen ? "frozen_filter/2" : "filter/2", filter<One>(mode), filter<P>(mode), " <= 1.0");
+    both(frozen ? "frozen_filter/2" : "filter/2", filter<One>(mode), " <= 1.0");
   }
-  both("adrc_of_angle/2", angle<One>(), angle<P>(), "");
+  both("adrc_of_angle/2", angle<One>(), "");
   const std::string bad = "one_bad_lane/";
   const auto bad_label = [&](const std::string& what) {
     return "vs " + bad + what + "/" + scalar + "; vs bank64/" + what + "/" + scalar;
   };
   add<One>(bad + "linear_eso/2/" + scalar, linear<One>(), 64, true, "");
-  add<P>(bad + "linear_eso/2/pack_of_" + scalar, linear<P>(), 64, true, bad_label("linear_eso/2"));
+  add<P>(bad + "linear_eso/2/pack_of_" + scalar, Packed<LinearEso<2, One>>(linear<One>()), 64, true,
+         bad_label("linear_eso/2"));
   add<One>(bad + "adrc/2/" + scalar, adrc<One>(), 64, true, "");
-  add<P>(bad + "adrc/2/pack_of_" + scalar, adrc<P>(), 64, true, bad_label("adrc/2"));
+  add<P>(bad + "adrc/2/pack_of_" + scalar, Packed<Adrc<LinearEso<2, One>>>(adrc<One>()), 64, true,
+         bad_label("adrc/2"));
 }
 
 }  // namespace

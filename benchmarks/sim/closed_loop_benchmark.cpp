@@ -10,6 +10,7 @@
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/sim/closed_loop.hpp>
+#include <esokit/sim/continuous_observer.hpp>
 #include <esokit/sim/plant.hpp>
 #include <esokit/sim/runge_kutta.hpp>
 #include <string>

@@ -25,6 +25,7 @@
 #include <esokit/analysis/error_bound.hpp>
 #include <esokit/analysis/peak_gain.hpp>
 #include <esokit/eigen.hpp>
+#include <esokit/sim/continuous_observer.hpp>
 #include <esokit/sim/gaussian.hpp>
 #include <esokit/sim/runge_kutta.hpp>
 

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include <esokit/core/pack.hpp>
+#include <esokit/core/packed.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 
@@ -50,29 +50,35 @@ Timed measured(int place, const Observer& observer) {
           }};
 }
 
-template <int Order, class S>
-Timed linear() {
-  return measured(Order + 1,
-                  LinearEso<Order, S>::make(
-                      {.observer_bandwidth = S(60.0), .input_gain = S(2.0), .sample_time = S(1e-3)})
-                      .value());
+template <class Observer>
+Timed measured(int place, const Observer& observer, bool packed) {
+  return packed ? measured(place, Packed<Observer>(observer)) : measured(place, observer);
 }
-template <int Levels, class S>
-Timed cascade() {
-  return measured(Levels, CascadeEso<2, Levels, S>::make({.observer_bandwidth = S(60.0),
-                                                          .bandwidth_factor = S(1.5),
-                                                          .input_gain = S(2.0),
-                                                          .sample_time = S(1e-3)})
-                              .value());
+template <int Order>
+Timed linear(bool packed) {
+  return measured(
+      Order + 1,
+      LinearEso<Order>::make({.observer_bandwidth = 60.0, .input_gain = 2.0, .sample_time = 1e-3})
+          .value(),
+      packed);
+}
+template <int Levels>
+Timed cascade(bool packed) {
+  return measured(Levels,
+                  CascadeEso<2, Levels>::make({.observer_bandwidth = 60.0,
+                                               .bandwidth_factor = 1.5,
+                                               .input_gain = 2.0,
+                                               .sample_time = 1e-3})
+                      .value(),
+                  packed);
 }
 
-template <class S>
-std::vector<Timed> over_states() {
-  return {linear<1, S>(), linear<2, S>(), linear<3, S>(), linear<4, S>(), linear<5, S>()};
+std::vector<Timed> over_states(bool packed) {
+  return {linear<1>(packed), linear<2>(packed), linear<3>(packed), linear<4>(packed),
+          linear<5>(packed)};
 }
-template <class S>
-std::vector<Timed> over_levels() {
-  return {cascade<1, S>(), cascade<2, S>(), cascade<3, S>(), cascade<4, S>()};
+std::vector<Timed> over_levels(bool packed) {
+  return {cascade<1>(packed), cascade<2>(packed), cascade<3>(packed), cascade<4>(packed)};
 }
 
 }  // namespace
@@ -84,9 +90,8 @@ int main(int argc, char** argv) {
                  .description = "Time of an update over the number of states and of levels, with "
                                 "double and with packs of double, measured on this machine.",
                  .order = 2});
-  using Wide = Pack<double>;
-  std::vector<Timed> families[2][2] = {{over_states<double>(), over_states<Wide>()},
-                                       {over_levels<double>(), over_levels<Wide>()}};
+  std::vector<Timed> families[2][2] = {{over_states(false), over_states(true)},
+                                       {over_levels(false), over_levels(true)}};
   for (int round = 0; round < rounds; ++round) {
     for (auto& family : families) {
       for (auto& kind : family) {

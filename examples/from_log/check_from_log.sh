@@ -645,6 +645,24 @@ refuses "--noise, --settling, --omega-c: one of them" plain.csv --noise 3 --sett
 refuses "--time-unit: 'hours' is none of" plain.csv --time-unit hours
 refuses "no observer 'luenberger'; there are linear" plain.csv "${settings[@]}" --observer luenberger
 
+# Where Python and gnuplot are missing it draws the figures itself.
+drawn() { grep -o 'data:image/svg' "$page" | wc -l; }
+run plain.csv --no-design
+many=$(drawn)
+mkdir bare
+ln -s "$(command -v sh)" bare/sh
+printf '#!/bin/sh\nPATH="%s" exec "%s" "$@"\n' "$PWD/bare" "$program" >without
+chmod +x without
+program=./without run plain.csv --no-design
+(($(drawn) == many && many > 1)) && grep -o 'svg+xml;base64,[^"]*' "$page" | cut -d, -f2 | while IFS= read -r one; do
+  # Curves within the panels, and words.
+  base64 -d <<<"$one" | python3 -c '
+import sys, xml.etree.ElementTree as tree
+drawn = [e.tag.split("}")[1] for e in tree.fromstring(sys.stdin.read()).iter()]
+sys.exit(drawn.count("clipPath") == 0 or drawn.count("path") < 4 or drawn.count("text") < 8)'
+done
+verdict $? "plain.csv without Python: $(drawn) of $many figures: $said"
+
 # Half of what from_log takes to compile is to generate its code, so its amount is limited, before
 # linking: 1.47 MB in two units (1.74 MB before observers that no log asks for were left out). A limit
 # on time would depend on the machine.

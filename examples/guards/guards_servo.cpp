@@ -5,6 +5,8 @@
 // Way: sampled, the plant exactly (y'' = b u + d, held) but for stop and lag.
 //
 // symbol   code         value            unit
+// y        y            0 .. 2           rad
+// b        b0           200              rad/s^2 for u = 1, all that the drive can
 // T        sample_time  0.001, 0.005     s
 // omega_o  observer     60 .. 600        rad/s
 // omega_c  controller   omega_o / 3 .. 8 rad/s
@@ -53,14 +55,14 @@ void draw(Report& report, const std::string& name, const std::string& caption, c
   figure.caption(caption);
   figure.panel(0, 0)
       .x_label("t (s)")
-      .y_label("y (-)")
+      .y_label("y (rad)")
       .y_range(range)
       .legend(Legend::above)
       .line(bad.t, bad.y, {.name = bad_name, .color = Color::vermillion})
       .line(good.t, good.y, {.name = good_name, .color = Color::blue});
   figure.panel(0, 1)
       .x_label("t (s)")
-      .y_label(disturbance ? "dhat (1/s²)" : "u (-)")
+      .y_label(disturbance ? "dhat (rad/s²)" : "u (-)")
       .line(bad.t, disturbance ? bad.d : bad.u, {.color = Color::vermillion})
       .line(good.t, disturbance ? good.d : good.u, {.color = Color::blue});
   report.add(figure);
@@ -140,7 +142,7 @@ void euler(Report& report) {
   const double samples = static_cast<double>(bad.t.size());
   report.expect(name, "forward Euler: samples until the estimate is beyond 1e6", samples,
                 samples < 50, "diverges");
-  report.expect(name, "sampled exactly: error at the end", std::abs(good.y.back() - 0.1),
+  report.expect(name, "sampled exactly: error at the end (rad)", std::abs(good.y.back() - 0.1),
                 std::abs(good.y.back() - 0.1) < 1e-6, "none");
   draw(report, "euler",
        "omega_o = 600 rad/s at 200 Hz (omega_o T = 3) under a load. An observer by forward Euler "
@@ -174,12 +176,14 @@ void stop(Report& report) {
   const std::string name = "hard stop at speed";
   const double most_bad = peak(bad, bad.d, 0, 1.5);
   const double most = peak(good, good.d, 0, 1.5);
-  report.expect(name, "largest dhat without (b0 = 200)", most_bad, most_bad > 400, "above 2 b0");
-  report.expect(name, "largest dhat with a bound of b0 / 2", most, most < 100.001, "at the bound");
+  report.expect(name, "largest dhat without (rad/s²; b0 = 200)", most_bad, most_bad > 400,
+                "above 2 b0");
+  report.expect(name, "largest dhat with a bound of b0 / 2 (rad/s²)", most, most < 100.001,
+                "at the bound");
   const double swing_bad = 0.1 - *std::min_element(bad.y.begin() + 800, bad.y.end());
   const double swing = 0.1 - *std::min_element(good.y.begin() + 800, good.y.end());
-  report.expect(name, "undershoot on the way back without", swing_bad, true, "reported");
-  report.expect(name, "undershoot on the way back with it", swing, swing <= swing_bad + 1e-4,
+  report.expect(name, "undershoot on the way back without (rad)", swing_bad, true, "reported");
+  report.expect(name, "undershoot on the way back with it (rad)", swing, swing <= swing_bad + 1e-4,
                 "not more");
   draw(report, "stop",
        "The axis hits its stop at 0.3 at speed, is pressed against it until 0.8 s, and goes back. "
@@ -341,8 +345,8 @@ void find(Report& report) {
   const double away = peak(bad, bad.y, 0, 1.5);
   const double safe = peak(good, good.y, 0, 1.5);
   report.expect(name, "found after (s)", one.sign, one.sign > 0 && one.sign < 0.2, "below 0.2");
-  report.expect(name, "largest y without", away, away > 3 * safe, "runs away");
-  report.expect(name, "largest y with it", safe, true, "reported");
+  report.expect(name, "largest y without (rad)", away, away > 3 * safe, "runs away");
+  report.expect(name, "largest y with it (rad)", safe, true, "reported");
   draw(report, "safe",
        "A wrong sign of b0: the status is ok all the time, and the axis diverges. With the "
        "diagnosis u is set to zero; after that only bias and friction move the axis.",

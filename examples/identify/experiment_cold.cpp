@@ -387,6 +387,7 @@ void draw_one(Report& report) {
     }
     if (experiment.finished()) {
       if (hand_over == 0) hand_over = run.time();
+      controller->applied(held);
       next = controller->update(measured, 100.0);
       if (run.time() > hand_over + 60) worst = std::max(worst, std::abs(run.y() - 100));
     }

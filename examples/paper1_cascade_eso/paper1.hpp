@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <esokit/sim/continuous_observer.hpp>
 #include <memory>
 #include <string>
 #include <utility>

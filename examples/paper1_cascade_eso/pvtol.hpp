@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <esokit/sim/continuous_observer.hpp>
 #include <numbers>
 #include <optional>
 #include <vector>

@@ -7,12 +7,13 @@
 #pragma once
 
 #include <array>
-#include <esokit/control/algebraic_filter.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <esokit/sim/continuous_observer.hpp>
 #include <string>
 #include <utility>
 
+#include "algebraic_filter.hpp"
 #include "common/report.hpp"
 
 namespace paper2 {
@@ -40,7 +41,7 @@ inline esokit::examples::About about(std::string title, std::string description,
 template <int Order, int Extension = 1>
 class BlankedFilter {
  public:
-  using Filter = esokit::AlgebraicFilter<Order, double, Extension>;
+  using Filter = esokit::examples::AlgebraicFilter<Order, double, Extension>;
   static constexpr int size = Filter::size;
   static constexpr int states = size + 1;  ///< filter and clock
   using scalar_type = double;

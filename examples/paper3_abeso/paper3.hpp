@@ -9,6 +9,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <esokit/sim/continuous_observer.hpp>
 #include <numbers>
 #include <optional>
 #include <string>
@@ -18,7 +19,6 @@
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/gain/continuous_gain.hpp>
-#include <esokit/observer/continuous_observer.hpp>
 #include <esokit/sim/dormand_prince.hpp>
 #include <esokit/sim/noise.hpp>
 #include <esokit/sim/trapezoid.hpp>

@@ -31,6 +31,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <esokit/sim/continuous_observer.hpp>
 #include <functional>
 #include <optional>
 #include <string>

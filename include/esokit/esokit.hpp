@@ -33,7 +33,6 @@
 #include <esokit/analysis/worst_case.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/adrc_law.hpp>
-#include <esokit/control/algebraic_filter.hpp>
 #include <esokit/control/control_loop.hpp>
 #include <esokit/control/controller.hpp>
 #include <esokit/control/cycle_analysis.hpp>
@@ -61,11 +60,11 @@
 #include <esokit/core/expected.hpp>
 #include <esokit/core/interval.hpp>
 #include <esokit/core/kernels.hpp>
-#include <esokit/core/lane_by_lane.hpp>
 #include <esokit/core/lanes.hpp>
 #include <esokit/core/language.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/pack.hpp>
+#include <esokit/core/packed.hpp>
 #include <esokit/core/recording.hpp>
 #include <esokit/core/scalar.hpp>
 #include <esokit/core/snapshot.hpp>
@@ -136,7 +135,6 @@
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/concepts.hpp>
-#include <esokit/observer/continuous_observer.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/half_gain_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
@@ -150,6 +148,8 @@
 #include <esokit/sim/butcher_tableau.hpp>
 #include <esokit/sim/closed_loop.hpp>
 #include <esokit/sim/combined_signals.hpp>
+#include <esokit/sim/continuous_gain_law.hpp>
+#include <esokit/sim/continuous_observer.hpp>
 #include <esokit/sim/counted_gaussian.hpp>
 #include <esokit/sim/disturbed_plant.hpp>
 #include <esokit/sim/dormand_prince.hpp>

@@ -10,6 +10,7 @@
 #include <esokit/analysis/margins.hpp>
 #include <esokit/analysis/peak_gain.hpp>
 #include <esokit/observer/cascade_eso.hpp>
+#include <esokit/sim/continuous_observer.hpp>
 
 int main() {
   using namespace esokit;

@@ -1,6 +1,7 @@
 // Exact variances against sums of the squares of what an impulse makes of the observers, against
 // the integral of the frequency response, and against the closed forms that exist.
 #include <gtest/gtest.h>
+#include <esokit/sim/continuous_observer.hpp>
 
 #include <algorithm>
 #include <array>

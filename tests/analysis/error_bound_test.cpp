@@ -2,6 +2,7 @@
 // input of a run is the worst there is for a linear observer: the sign of the impulse response,
 // backwards. Printed: how loose a bound is.
 #include <gtest/gtest.h>
+#include <esokit/sim/continuous_observer.hpp>
 
 #include <algorithm>
 #include <array>

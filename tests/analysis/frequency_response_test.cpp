@@ -1,6 +1,7 @@
 // Responses against state spaces that were written from the papers' equations in 100 digits, and
 // against what the observers themselves do with an impulse.
 #include <gtest/gtest.h>
+#include <esokit/sim/continuous_observer.hpp>
 
 #include <array>
 #include <complex>

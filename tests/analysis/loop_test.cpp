@@ -1,6 +1,7 @@
 // The closed loop against a run of the real controller on a plant that is integrated in small
 // steps, and its transfer functions against their definitions.
 #include <gtest/gtest.h>
+#include <esokit/sim/continuous_observer.hpp>
 
 #include <cmath>
 #include <complex>

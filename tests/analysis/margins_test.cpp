@@ -1,6 +1,7 @@
 // Margins against brute force: a loop assembled anew from the equations, whose poles must reach the
 // edge with the computed gain, phase or delay, and must not before.
 #include <gtest/gtest.h>
+#include <esokit/sim/continuous_observer.hpp>
 
 #include <Eigen/Core>
 #include <cmath>

@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/health_text.hpp>
-#include <esokit/core/pack.hpp>
+#include <esokit/core/packed.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <sstream>
@@ -59,10 +59,10 @@ void rejects_all() {
 }
 
 void rejects_a_lane() {
-  auto observer = LinearEso<2, Pack<float>>::make({.observer_bandwidth = Pack<float>(50.0F),
-                                                   .input_gain = Pack<float>(1.0F),
-                                                   .sample_time = Pack<float>(0.001F)})
-                      .value();
+  Packed<LinearEso<2, float>> observer(
+      LinearEso<2, float>::make(
+          {.observer_bandwidth = 50.0F, .input_gain = 1.0F, .sample_time = 0.001F})
+          .value());
   Pack<float> y(1.0F);
   y[0] = esokit_test::hidden_nan<float>();
   const auto status = observer.update(y, Pack<float>(0.0F));

@@ -8,7 +8,7 @@
 #include <esokit/control/dual_feedback.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/predictive_adrc.hpp>
-#include <esokit/core/pack.hpp>
+#include <esokit/core/packed.hpp>
 #include <esokit/observer/linear_eso.hpp>
 
 namespace control_controller_static_test {
@@ -19,7 +19,8 @@ using Pair = Vector<double, 2>;
 
 static_assert(Controller<Adrc<Eso>, double> && Controller<Adrc<Eso, ErrorBased>, double>);
 static_assert(Controller<Adrc<LinearEso<2, float>>, float>);
-static_assert(Controller<Adrc<LinearEso<2, Pack<double, 4>>>, Pack<double, 4>>);
+static_assert(Controller<Packed<Adrc<Eso>, 4>, Pack<double, 4>>);
+static_assert(Controller<Packed<Adrc<VariableTime<Eso>>, 4>, Pack<double, 4>>);
 static_assert(Controller<Adrc<VariableTime<Eso>>, double>);
 static_assert(Controller<PredictiveAdrc<Eso>, double> && Controller<DualFeedbackAdrc<2>, double>);
 static_assert(Controller<DisturbanceCompensator<Eso>, double>);

@@ -1,5 +1,6 @@
 // What the fuzzer found, each as the shortest calls that show it.
 #include <gtest/gtest.h>
+#include <esokit/sim/continuous_observer.hpp>
 
 #include <cmath>
 #include <esokit/adapter/outlier_gate.hpp>

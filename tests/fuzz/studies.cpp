@@ -26,6 +26,7 @@
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
+#include <esokit/sim/continuous_observer.hpp>
 #include <esokit/sim/disturbed_plant.hpp>
 #include <esokit/sim/noise.hpp>
 #include <esokit/sim/plant.hpp>

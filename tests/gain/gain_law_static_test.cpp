@@ -1,5 +1,6 @@
 // What is a gain law and what is none: what is declared is there, what is there is declared.
 #include <gtest/gtest.h>
+#include <esokit/sim/continuous_observer.hpp>
 
 #include <esokit/gain/riccati_gain.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>

@@ -1,5 +1,6 @@
 // The seam: a gain law of each kind, written as a user would, through the one predictor-corrector.
 #include <gtest/gtest.h>
+#include <esokit/sim/continuous_observer.hpp>
 
 #include <cmath>
 #include <esokit/eigen.hpp>

@@ -135,7 +135,7 @@ TEST(GainInMotion, TellsFrictionThatHolds) {
   EXPECT_NEAR(without.latency.value, held.latency.value, 0.05 * T);  // of all rows
   EXPECT_GT(held.in_motion.still, 0.3);
   EXPECT_TRUE(held.in_motion.differ());
-  EXPECT_LT(std::abs(held.in_motion.standing.value), 0.7 * b0);
+  EXPECT_LT(std::abs(held.in_motion.at_rest.value), 0.7 * b0);
   EXPECT_NEAR(held.in_motion.moving.value, b0, 0.2 * b0);
   // The interval reaches to the end of that of the motion.
   const auto& moving = held.in_motion.moving;

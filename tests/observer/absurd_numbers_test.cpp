@@ -4,7 +4,7 @@
 
 #include <cmath>
 #include <esokit/adapter/known_model.hpp>
-#include <esokit/core/pack.hpp>
+#include <esokit/core/packed.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
@@ -340,10 +340,7 @@ TEST(Update, OfPacksIsFiniteAtAnyRate) {
         .value();
   };
   LinearEso<2> alone[] = {plain(0), plain(1)};
-  auto both = LinearEso<2, Two>::make({.observer_bandwidth = Two({1e2, 1e89}),
-                                       .input_gain = Two(2.0),
-                                       .sample_time = Two({1e-3, 1e-90})})
-                  .value();
+  esokit::Packed<LinearEso<2>, 2> both(plain);
   int refused = 0;
   double size = 1;
   for (int k = 0; k < 2000; ++k) {

@@ -1,6 +1,7 @@
 // AdjustableBandwidthEso: its identities, its switching rule against one written out by hand, what
 // `make` refuses, and how the sampled form tends to the continuous one.
 #include <gtest/gtest.h>
+#include <esokit/sim/continuous_observer.hpp>
 
 #include <cmath>
 #include <esokit/core/error_text.hpp>

@@ -2,6 +2,7 @@
 #include "law_suite.hpp"
 //
 #include <esokit/observer/algebraic_eso.hpp>
+#include <esokit/sim/continuous_observer.hpp>
 
 namespace esokit_test {
 

@@ -6,11 +6,11 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <esokit/control/algebraic_filter.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <limits>
+#include <paper2_fsb_algebraic_eso/algebraic_filter.hpp>
 #include <string>
 #include <support/dual.hpp>
 #include <support/gain_comparison.hpp>
@@ -825,7 +825,7 @@ void tends_to_the_continuous_form() {
   const auto output = [](double t) { return 0.4 + std::sin(1.3 * t); };
   const auto input = [](double t) { return t < 0.5 ? 1.0 : -0.4; };
   const auto filter =
-      esokit::AlgebraicFilter<Order, double, Extension>::make(
+      esokit::examples::AlgebraicFilter<Order, double, Extension>::make(
           {.observer_bandwidth = lambda, .frequency_shift = shift, .input_gain = input_gain})
           .value();
   using State = esokit::EigenMatrix<double, size>;

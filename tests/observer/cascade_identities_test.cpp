@@ -2,6 +2,7 @@
 // independently (K. Lakomy, R. Madonski, ISA Transactions 109 (2021), equations (23), (24)).
 #include <gtest/gtest.h>
 #include <esokit/gain/pole_set.hpp>
+#include <esokit/sim/continuous_observer.hpp>
 
 #include <cmath>
 #include <complex>

@@ -8,6 +8,7 @@
 #include <esokit/eigen.hpp>
 #include <esokit/model/augmented_model.hpp>
 #include <esokit/observer/extended_state_filter.hpp>
+#include <esokit/sim/continuous_observer.hpp>
 
 namespace esokit_test {
 

@@ -4,6 +4,7 @@
 #include <esokit/gain/pole_set.hpp>
 #include <esokit/observer/half_gain_eso.hpp>
 #include <esokit/observer/reduced_order_eso.hpp>
+#include <esokit/sim/continuous_observer.hpp>
 
 namespace esokit_test {
 

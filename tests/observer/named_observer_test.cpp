@@ -1,8 +1,8 @@
 // The shell of the named observers, by an observer that is written here: what its `design` is
 // asked, when, and what becomes of the answer.
 #include <gtest/gtest.h>
+#include <esokit/sim/continuous_observer.hpp>
 
-#include <esokit/observer/continuous_observer.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/named_observer.hpp>
 #include <limits>
@@ -14,6 +14,7 @@ using esokit::ContinuousObserver;
 using esokit::Error;
 using esokit::Expected;
 using esokit::LinearEso;
+using esokit::NamedContinuousObserver;
 using esokit::NamedObserver;
 using esokit::PredictorCorrector;
 using esokit_test::refusal;
@@ -43,9 +44,9 @@ class HertzEso
 
 /// Two levels of one bandwidth, as an ODE.
 class TwinEso
-    : public NamedObserver<
+    : public NamedContinuousObserver<
           TwinEso, ContinuousObserver<2, double, 1, esokit::ContinuousConstantGain<3, double>, 2>> {
-  using Shell = NamedObserver;
+  using Shell = NamedContinuousObserver;
   friend Shell;
   using Shell::Shell;
 

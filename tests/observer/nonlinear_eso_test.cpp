@@ -1,6 +1,7 @@
 // NonlinearEso: its identities, its gain against the formulas, its limits, and what `make` refuses
 // and reports.
 #include <gtest/gtest.h>
+#include <esokit/sim/continuous_observer.hpp>
 
 #include <cmath>
 #include <esokit/core/error_text.hpp>

@@ -5,6 +5,7 @@
 #include <esokit/control/adrc.hpp>
 #include <esokit/model/linear_plant.hpp>
 #include <esokit/observer/named_observer.hpp>
+#include <esokit/sim/continuous_observer.hpp>
 #include <esokit/sim/monte_carlo.hpp>
 
 namespace esokit_test {

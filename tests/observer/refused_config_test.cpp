@@ -1,6 +1,7 @@
 // Every bad config is refused with an error that names the field. Also compiled with -ffast-math,
 // where a comparison with NaN may go either way.
 #include <gtest/gtest.h>
+#include <esokit/sim/continuous_observer.hpp>
 
 #include <cmath>
 #include <complex>

@@ -1,6 +1,7 @@
 // Closed loops: the paper way against the exact solution, the deployment way against a hand-written
 // loop and against the paper way as T -> 0, refused configs.
 #include <gtest/gtest.h>
+#include <esokit/sim/continuous_observer.hpp>
 
 #include <algorithm>
 #include <cmath>

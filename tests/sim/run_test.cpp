@@ -12,7 +12,7 @@
 #include <esokit/control/dual_feedback.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/predictive_adrc.hpp>
-#include <esokit/core/pack.hpp>
+#include <esokit/core/packed.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/sim/filtered_step.hpp>
@@ -477,7 +477,8 @@ TEST(Run, IsDrawnByOneText) {
   const auto run = sim::run(servo(), adrc(), {.duration = 3 * T, .reference = 1.0}).value();
   const std::string text = run.gnuplot("own");
   EXPECT_NE(text.find("$run << END\n" + run.csv() + "END\n"), std::string::npos);
-  EXPECT_NE(text.find("layout 3,1 title 'own'"), std::string::npos);
+  EXPECT_NE(text.find("layout 3,1 "), std::string::npos);
+  EXPECT_NE(text.find("title 'own'\n"), std::string::npos);
   const char* columns[] = {"t", "y", "measurement", "r", "u", "dhat"};
   int curves = 0;
   for (int i = 0; i < 6; ++i) {
@@ -517,15 +518,16 @@ TEST(Run, OfPacksIsThatOfEachLane) {
   using Two = Pack<double, 2>;
   const auto plants = LinearPlant<2, Two>::chain(
       {.coefficients = {Two({7, 5}), Two({3, 1})}, .input_gain = Two({50, 45})});
-  const auto of = [](auto b, auto omega) {
-    using S = decltype(b);
-    return Adrc<LinearEso<2, S>>::make(
-               {.observer = {.observer_bandwidth = omega, .input_gain = b, .sample_time = S(T)},
-                .controller_bandwidth = S(8.0),
-                .limits = {.lower = S(-2.0), .upper = S(2.0)}})
+  const auto of = [](double b, double omega) {
+    return Adrc<LinearEso<2>>::make(
+               {.observer = {.observer_bandwidth = omega, .input_gain = b, .sample_time = T},
+                .controller_bandwidth = 8.0,
+                .limits = {.lower = -2.0, .upper = 2.0}})
         .value();
   };
-  const auto both = sim::run(*plants, of(Two({40, 50}), Two({80, 60})),
+  const Packed<Adrc<LinearEso<2>>, 2> controllers(
+      [&](int lane) { return lane == 0 ? of(40, 80) : of(50, 60); });
+  const auto both = sim::run(*plants, controllers,
                              {.duration = 1.0, .reference = Two(1.0), .disturbance = Two(-30.0)});
   for (int lane = 0; lane < 2; ++lane) {
     const bool first = lane == 0;

@@ -8,6 +8,7 @@
 #include <esokit/gain/pole_set.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <esokit/sim/continuous_observer.hpp>
 #include <type_traits>
 #include <vector>
 

@@ -440,21 +440,21 @@ TEST(NotRecorded, WhatRunsLaneByLane) {
   const struct {
     bool recorded;
     const char* reason;
-  } types[] = {
-      {can_be_recorded<ModelEso<follows>>, "its gains change with the speed"},
-      {can_be_recorded<DelayedInput<Plain, 4>>, "PackAdapter"},
-      {can_be_recorded<OutlierGate<Plain>>, "PackAdapter"},
-      {can_be_recorded<WrappedOutput<Plain>>, "PackAdapter"},
-      {can_be_recorded<Guarded<Plain>>, "PackAdapter"},
-      {can_be_recorded<VariableTime<Plain>>, "PackAdapter, and its gains change with the time"},
-      {can_be_recorded<KnownModel<Plain, Friction<0, double>>>, "PackAdapter"},
-      {can_be_recorded<Adrc<DelayedInput<Plain, 4>>>, "its observer"},
-      {can_be_recorded<DisturbanceCompensator<OutlierGate<Plain>>>, "its observer"},
-      {can_be_recorded<PredictiveAdrc<Plain>>, "two phases, lane by lane"},
-      {can_be_recorded<MimoAdrc<Plain, Plain>>, "several channels, lane by lane"},
-      {can_be_recorded<MimoExtendedStateFilter<ChainOrders<1>, 2>>, "lane by lane"},
-      {can_be_recorded<TrackingDifferentiator<>>, "branches, lane by lane"},
-      {can_be_recorded<SignTrackingDifferentiator<>>, "branches, lane by lane"}};
+  } types[] = {{can_be_recorded<ModelEso<follows>>, "its gains change with the speed"},
+               {can_be_recorded<DelayedInput<Plain, 4>>, "of plain scalars"},
+               {can_be_recorded<OutlierGate<Plain>>, "of plain scalars"},
+               {can_be_recorded<WrappedOutput<Plain>>, "of plain scalars"},
+               {can_be_recorded<Guarded<Plain>>, "of plain scalars"},
+               {can_be_recorded<VariableTime<Plain>>,
+                "of plain scalars, and its gains change with the time"},
+               {can_be_recorded<KnownModel<Plain, Friction<0, double>>>, "of plain scalars"},
+               {can_be_recorded<Adrc<DelayedInput<Plain, 4>>>, "its observer"},
+               {can_be_recorded<DisturbanceCompensator<OutlierGate<Plain>>>, "its observer"},
+               {can_be_recorded<PredictiveAdrc<Plain>>, "two phases, lane by lane"},
+               {can_be_recorded<MimoAdrc<Plain, Plain>>, "several channels, lane by lane"},
+               {can_be_recorded<MimoExtendedStateFilter<ChainOrders<1>, 2>>, "lane by lane"},
+               {can_be_recorded<TrackingDifferentiator<>>, "branches, lane by lane"},
+               {can_be_recorded<SignTrackingDifferentiator<>>, "branches, lane by lane"}};
   for (const auto& type : types) {
     EXPECT_FALSE(type.recorded) << type.reason << ": now it can be, so add it to the law above";
   }

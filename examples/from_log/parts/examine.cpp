@@ -127,7 +127,7 @@ void sound_alarms(const Settings& settings, const Input& input, Findings& all) {
   } else if (const auto& motion = found.in_motion; motion.differ()) {
     all.alarms.push_back(
         {"sticks", "Friction holds the machine: b0 is " + number_text(motion.moving.value, 3) +
-                       " in motion and " + number_text(motion.standing.value, 3) +
+                       " in motion and " + number_text(motion.at_rest.value, 3) +
                        " in the rows at standstill (" + number_text(100 * motion.still, 2) +
                        " %). Record faster motion with larger u."});
   }
@@ -287,8 +287,9 @@ Findings examine(const Settings& settings, const Input& input) {
   } else if (input.first_order) {
     options.orders = {1};
   }
-  const bool slow = input.log.y.size() > 200'000;
-  if (slow) {
+  if (settings.progress) {
+    options.progress = [&](double share) { settings.progress("finding the machine", share); };
+  } else if (input.log.y.size() > 200'000) {
     options.progress = [](double share) {
       std::fprintf(stderr, "identifying the model: %3.0f %%\n", 100 * share);
     };

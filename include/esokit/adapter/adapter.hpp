@@ -3,7 +3,6 @@
 /// derive from it.
 #pragma once
 
-#include <esokit/core/lane_by_lane.hpp>
 #include <esokit/observer/concepts.hpp>
 
 namespace esokit {
@@ -40,8 +39,9 @@ struct ExtensionOf<Observer> {
 template <LoopObserver Observer>
 class Adapter : public detail::LevelsOf<Observer>, public detail::ExtensionOf<Observer> {
   friend struct detail::GuardAccess;
-  static_assert(PlainScalar<typename Observer::scalar_type>,
-                "esokit: for packs use PackAdapter: one adapter of plain scalars for each lane");
+  static_assert(
+      PlainScalar<typename Observer::scalar_type>,
+      "esokit: an adapter is of plain scalars; for packs: Packed<DelayedInput<..>, lanes>");
 
  public:
   using Adapted = Observer;                            ///< what is adapted
@@ -237,31 +237,6 @@ class NamedAdapter : public Adapter<Observer> {
 
  protected:
   using Base::Base;
-};
-
-/// Base of the adapters for packs. Adapters branch on the measurement, so they run lane by lane.
-/// @tparam Self the adapter of packs @tparam Plain the adapter of a lane @tparam Settings its
-/// Config
-template <class Self, class Plain, LoopObserver Observer, class Settings>
-class PackAdapter : public LaneByLane<Self, Plain, typename Observer::scalar_type, Settings>,
-                    public detail::LevelsOf<Observer>,
-                    public detail::ExtensionOf<Observer> {
-  using Base = LaneByLane<Self, Plain, typename Observer::scalar_type, Settings>;
-
- public:
-  using Adapted = Observer;                                ///< what is adapted
-  using Estimate = typename Observer::Estimate;            ///< (y, .., y^(n-1), d, ..), N x 1
-  static constexpr int order = Observer::order;            ///< n, order of the plant
-  static constexpr int size = Observer::size;              ///< N
-  static constexpr ObserverTraits traits = Plain::traits;  ///< what it can do beyond LoopObserver
-
-  using Base::Base;
-
-  /// The adapted observer as one of packs, put together from the lanes.
-  [[nodiscard]] Observer observer() const noexcept {
-    return this->template gathered<Observer>(
-        [](const Plain& lane) -> const auto& { return lane.observer(); });
-  }
 };
 
 }  // namespace esokit

@@ -15,10 +15,6 @@ struct DelayedInputConfig {
 
   typename Observer::Config observer{};  ///< config of the observer
   int delay = 0;                         ///< d, samples, 0 .. Capacity
-
-  /// @cond
-  static constexpr auto fields(auto& c) noexcept { return detail::tie(c.observer, c.delay); }
-  /// @endcond
 };
 
 /// Passes u[k-d] instead of u[k] to the observer (for a delay of d sample times by bus, drive or
@@ -106,20 +102,6 @@ class DelayedInput : public NamedAdapter<DelayedInput<Observer, Capacity>, Obser
   Array<S, length> inputs_{};
   int delay_;
   int newest_ = 0;
-};
-
-/// The same for packs, lane by lane.
-template <LoopObserver Observer, int Capacity>
-requires PackScalar<typename Observer::scalar_type>
-class DelayedInput<Observer, Capacity>
-    : public PackAdapter<DelayedInput<Observer, Capacity>,
-                         DelayedInput<detail::LaneOf<Observer>, Capacity>, Observer,
-                         DelayedInputConfig<Observer>> {
- public:
-  using DelayedInput::PackAdapter::PackAdapter;
-  template <class T>
-  using with_scalar =
-      DelayedInput<detail::WithScalar<Observer, T>, Capacity>;  ///< the same with another scalar
 };
 
 /// Distinguishes the type in snapshots.

@@ -183,12 +183,6 @@ struct GuardedConfig {
   DisturbanceUnit unit = DisturbanceUnit::output;  ///< unit of dhat and its bound
   int release_samples = 0;  ///< measurements from the end of a pin until dhat is free, 0 .. 65000
   S leak_time{};            ///< time constant of the decay of dhat, s; 0: none
-
-  /// @cond
-  static constexpr auto fields(auto& c) noexcept {
-    return detail::tie(c.observer, c.disturbance_bound, c.unit, c.release_samples, c.leak_time);
-  }
-  /// @endcond
 };
 
 /// Guards dhat while the plant does not follow y^(n) = d + b0 u. Each guard is off by default.
@@ -977,17 +971,6 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
   std::uint16_t release_left_ = 0;
   int settling_samples_ = 0;  ///< see Holding
   int settling_left_ = 0;     ///< since the last sample held
-};
-
-/// The same for packs, lane by lane.
-template <LoopObserver Observer>
-requires PackScalar<typename Observer::scalar_type>
-class Guarded<Observer> : public PackAdapter<Guarded<Observer>, Guarded<detail::LaneOf<Observer>>,
-                                             Observer, GuardedConfig<Observer>> {
- public:
-  using Guarded::PackAdapter::PackAdapter;
-  template <class T>
-  using with_scalar = Guarded<detail::WithScalar<Observer, T>>;  ///< the same with another scalar
 };
 
 /// Distinguishes the type in snapshots.

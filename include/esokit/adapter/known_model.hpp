@@ -35,10 +35,6 @@ struct KnownModelConfig {
 
   typename Observer::Config observer{};  ///< config of the observer
   Model model{};                         ///< fbar
-
-  /// @cond
-  static constexpr auto fields(auto& c) noexcept { return detail::tie(c.observer, c.model); }
-  /// @endcond
 };
 
 /// Observer of y^(n) = fbar(y, ..) + d + b0 u with fbar known. The chain is driven by u + fbar/b0,
@@ -52,7 +48,7 @@ struct KnownModelConfig {
 ///
 /// The change of fbar within a step, O(T), remains in dhat. Because fbar is computed from the
 /// estimate, it is part of the error dynamics: omega_o should be well above the slopes of fbar.
-/// @tparam Model your function fbar(estimate); for packs it needs `with_scalar` and `fields`
+/// @tparam Model your function fbar(estimate)
 template <ShiftableDisturbance Observer, class Model>
 requires PlantModel<Model, Observer>
 class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
@@ -205,23 +201,6 @@ class KnownModel : public NamedAdapter<KnownModel<Observer, Model>, Observer,
   Model model_;
   S inverse_gain_;
   S applied_input_{};
-};
-
-/// The same for packs, lane by lane.
-template <ShiftableDisturbance Observer, class Model>
-requires PlantModel<Model, Observer> && PackScalar<typename Observer::scalar_type>
-class KnownModel<Observer, Model>
-    : public PackAdapter<KnownModel<Observer, Model>,
-                         KnownModel<detail::LaneOf<Observer>,
-                                    typename detail::ForScalar<
-                                        Model, LaneScalar<typename Observer::scalar_type>>::type>,
-                         Observer, KnownModelConfig<Observer, Model>> {
- public:
-  using KnownModel::PackAdapter::PackAdapter;
-  template <class T>
-  using with_scalar =
-      KnownModel<detail::WithScalar<Observer, T>,
-                 typename detail::ForScalar<Model, T>::type>;  ///< the same with another scalar
 };
 
 /// Distinguishes the type in snapshots.

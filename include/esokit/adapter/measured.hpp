@@ -19,12 +19,6 @@ struct MeasuredConfig {
   Array<MeasuredInput<S>, Count> inputs{};  ///< what each w does
   int most_lost = 50;  ///< samples in a row without a good w for which the last one is held, 0 ..
                        ///< 65535; after them it counts as zero, until there is a good one
-
-  /// @cond
-  static constexpr auto fields(auto& c) noexcept {
-    return detail::tie(c.observer, c.inputs, c.most_lost);
-  }
-  /// @endcond
 };
 
 /// Observer of y^(n) = f(w) + d + b0 u with disturbances w that are measured (a fan, a flow, the
@@ -243,20 +237,6 @@ class Measured : public NamedAdapter<Measured<Observer, Count, Delay>, Observer,
   Array<int, Count> lost_{};
   int most_lost_;
   S told_{};  ///< the f that is in the estimate
-};
-
-/// The same for packs, lane by lane.
-template <ShiftableLoad Observer, int Count, int Delay>
-requires PackScalar<typename Observer::scalar_type>
-class Measured<Observer, Count, Delay>
-    : public PackAdapter<Measured<Observer, Count, Delay>,
-                         Measured<detail::LaneOf<Observer>, Count, Delay>, Observer,
-                         MeasuredConfig<Observer, Count>> {
- public:
-  using Measured::PackAdapter::PackAdapter;
-  template <class T>
-  using with_scalar =
-      Measured<detail::WithScalar<Observer, T>, Count, Delay>;  ///< the same with another scalar
 };
 
 /// Distinguishes the type in snapshots.

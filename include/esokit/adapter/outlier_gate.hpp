@@ -18,12 +18,6 @@ struct OutlierGateConfig {
   S running_factor{};     ///< and those up to this times the running mean of abs(innovation)
                           ///< (0.8 standard deviations if Gaussian); 0: threshold only
   int most_in_a_row = 5;  ///< consecutive outliers that are rejected, 1 .. 65000
-
-  /// @cond
-  static constexpr auto fields(auto& c) noexcept {
-    return detail::tie(c.observer, c.threshold, c.running_factor, c.most_in_a_row);
-  }
-  /// @endcond
 };
 
 /// Rejects a measurement whose innovation is too large: the observer only predicts, and the next
@@ -167,19 +161,6 @@ class OutlierGate
   std::uint16_t most_in_a_row_;
   std::uint16_t count_ = 0;  ///< consecutive: rejected if closed, within the limit if open
   bool open_ = true;
-};
-
-/// The same for packs, lane by lane.
-template <LevelledObserver Observer>
-requires RestartingObserver<Observer> && PackScalar<typename Observer::scalar_type>
-class OutlierGate<Observer>
-    : public PackAdapter<OutlierGate<Observer>, OutlierGate<detail::LaneOf<Observer>>, Observer,
-                         OutlierGateConfig<Observer>> {
- public:
-  using OutlierGate::PackAdapter::PackAdapter;
-  template <class T>
-  using with_scalar =
-      OutlierGate<detail::WithScalar<Observer, T>>;  ///< the same with another scalar
 };
 
 /// Distinguishes the type in snapshots.

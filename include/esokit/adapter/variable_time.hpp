@@ -14,10 +14,6 @@ struct VariableTimeConfig {
 
   typename Observer::Config observer{};  ///< config of the observer, with the nominal sample time T
   S ratio = S(4);                        ///< above 1: steps may take T / ratio .. T ratio
-
-  /// @cond
-  static constexpr auto fields(auto& c) noexcept { return detail::tie(c.observer, c.ratio); }
-  /// @endcond
 };
 
 /// Before each step the observer is told how long the step took; model and gains follow exactly.
@@ -200,19 +196,6 @@ class VariableTime
   S current_;  ///< present sample time of the observer
   S elapsed_{};
   S longest_;  ///< time since the last correction that the next one may bridge
-};
-
-/// The same for packs, lane by lane.
-template <RestartingObserver Observer>
-requires PackScalar<typename Observer::scalar_type>
-class VariableTime<Observer>
-    : public PackAdapter<VariableTime<Observer>, VariableTime<detail::LaneOf<Observer>>, Observer,
-                         VariableTimeConfig<Observer>> {
- public:
-  using VariableTime::PackAdapter::PackAdapter;
-  template <class T>
-  using with_scalar =
-      VariableTime<detail::WithScalar<Observer, T>>;  ///< the same with another scalar
 };
 
 /// Distinguishes the type in snapshots.

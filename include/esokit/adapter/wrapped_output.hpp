@@ -18,10 +18,6 @@ struct WrappedOutputConfig {
 
   typename Observer::Config observer{};  ///< config of the observer
   S period{};                            ///< period of y in its unit: 2 pi, 360
-
-  /// @cond
-  static constexpr auto fields(auto& c) noexcept { return detail::tie(c.observer, c.period); }
-  /// @endcond
 };
 
 /// Counts the turns, so that a measurement in any branch (0 .. 2 pi, -180 .. 180) can be used
@@ -361,19 +357,6 @@ class WrappedOutput
   Count count_{};
   struct Nothing {};
   [[no_unique_address]] std::conditional_t<gated, Heard, Nothing> heard_{};
-};
-
-/// The same for packs, lane by lane.
-template <ShiftableOutput Observer>
-requires PackScalar<typename Observer::scalar_type>
-class WrappedOutput<Observer>
-    : public PackAdapter<WrappedOutput<Observer>, WrappedOutput<detail::LaneOf<Observer>>, Observer,
-                         WrappedOutputConfig<Observer>> {
- public:
-  using WrappedOutput::PackAdapter::PackAdapter;
-  template <class T>
-  using with_scalar =
-      WrappedOutput<detail::WithScalar<Observer, T>>;  ///< the same with another scalar
 };
 
 /// Distinguishes the type in snapshots.

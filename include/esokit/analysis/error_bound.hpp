@@ -9,6 +9,7 @@
 #include <esokit/math/combinatorics.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <esokit/sim/continuous_observer.hpp>
 
 namespace esokit {
 

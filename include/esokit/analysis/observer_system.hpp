@@ -15,6 +15,7 @@
 #include <esokit/model/integrator_chain.hpp>
 #include <esokit/model/sampled_model.hpp>
 #include <esokit/observer/concepts.hpp>
+#include <esokit/sim/continuous_observer.hpp>
 
 namespace esokit {
 

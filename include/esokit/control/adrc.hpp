@@ -9,7 +9,6 @@
 #include <esokit/control/controller.hpp>
 #include <esokit/control/scaled_law.hpp>
 #include <esokit/control/softening.hpp>
-#include <esokit/core/lane_by_lane.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/feedback_gain.hpp>
 #include <type_traits>
@@ -33,13 +32,6 @@ struct AdrcConfig {
                                 ///< y; 1 .. 1000, not above the observer's max_gap
   std::optional<bool> soften{};  ///< lower gains while u is at its limits, see Softening. Left out:
                                  ///< for n >= 3, if limits.lower and limits.upper are given
-
-  /// @cond
-  static constexpr auto fields(auto& c) noexcept {
-    return detail::tie(c.observer, c.controller_bandwidth, c.gains, c.domain, c.half_gain, c.limits,
-                       c.start_hold, c.missing, c.measurement_divider, c.soften);
-  }
-  /// @endcond
 };
 
 /// Active disturbance rejection control, u = (v - dhat) / b0, with an observer and within the
@@ -111,11 +103,20 @@ class Adrc {
   /// Checks the settings and does all the design work.
   /// @return the controller, or an error that names the field
   static Expected<Adrc, Error<S>> make(const Config& config) {
-    if constexpr (PackScalar<S>) {
-      return detail::make_lanes<Adrc>(config);
-    } else {
-      return make_one(config);
-    }
+    detail::refuse_packs<S>();
+    const auto observer = Observer::make(observer_config(config));
+    if (!observer) return observer.error();
+    const auto law = make_law(config, *observer);
+    if (!law) return law.error();
+    const auto scaled = FastLaw::make(*law, *observer);
+    if (!scaled) return scaled.error();
+    const auto soft = Soft::make(*law, config.limits, config.soften);
+    if (!soft) return soft.error();
+    const auto loop = Loop::make(
+        *observer, {config.limits, config.start_hold, config.missing, config.measurement_divider},
+        soft->on());
+    if (!loop) return loop.error();
+    return Adrc(*loop, *law, *scaled, *soft, config);
   }
 
   /// One sample. @param y measurement, NaN if missing @param reference r, constant
@@ -241,7 +242,6 @@ class Adrc {
   /// The same with the settings of `fresh`, as returned by `make`: without design work, so it may
   /// run in an interrupt.
   Check<S> adopt(const Adrc& fresh) {
-    if constexpr (PackScalar<S>) return detail::adopt_lanes(*this, fresh);
     if (auto ok = loop_.adopt(fresh.loop_); !ok) return ok;
     law_ = fresh.law_;
     fast_law_ = fresh.fast_law_;
@@ -302,22 +302,6 @@ class Adrc {
   friend struct detail::RecordAccess;
   static constexpr auto fields(auto& o) noexcept {
     return detail::tie(o.loop_, o.law_, o.fast_law_, o.soft_, o.spec_);
-  }
-
-  static Expected<Adrc, Error<S>> make_one(const Config& config) {
-    const auto observer = Observer::make(observer_config(config));
-    if (!observer) return observer.error();
-    const auto law = make_law(config, *observer);
-    if (!law) return law.error();
-    const auto scaled = FastLaw::make(*law, *observer);
-    if (!scaled) return scaled.error();
-    const auto soft = Soft::make(*law, config.limits, config.soften);
-    if (!soft) return soft.error();
-    const auto loop = Loop::make(
-        *observer, {config.limits, config.start_hold, config.missing, config.measurement_divider},
-        soft->on());
-    if (!loop) return loop.error();
-    return Adrc(*loop, *law, *scaled, *soft, config);
   }
 
   using Loop = ControlLoop<Observer>;
@@ -470,29 +454,6 @@ class Adrc {
   [[no_unique_address]] FastLaw fast_law_;
   Soft soft_;
   [[no_unique_address]] std::conditional_t<has_step_time, FeedbackSpec<S>, NoSpec> spec_;
-};
-
-/// The same with an observer that runs lane by lane.
-template <LoopObserver Observer, class Form>
-requires detail::goes_lane_by_lane<Observer>
-class Adrc<Observer, Form>
-    : public LaneByLane<Adrc<Observer, Form>, Adrc<detail::LaneOf<Observer>, Form>,
-                        typename Observer::scalar_type, AdrcConfig<Observer>> {
- public:
-  static constexpr int order = Observer::order;  ///< n, order of the plant
-  /** What it can do beyond `update(y, r)`. */
-  static constexpr ControllerTraits traits = Adrc<detail::LaneOf<Observer>, Form>::traits;
-  template <class T>
-  using with_scalar =
-      Adrc<detail::WithScalar<Observer, T>, Form>;  ///< the same with another scalar
-
-  using Adrc::LaneByLane::LaneByLane;
-
-  /// The observer, put together from the lanes.
-  [[nodiscard]] Observer observer() const noexcept {
-    return this->template gathered<Observer>(
-        [](const auto& lane) -> const auto& { return lane.observer(); });
-  }
 };
 
 /// Distinguishes the type in snapshots.

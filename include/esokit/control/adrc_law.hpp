@@ -47,12 +47,6 @@ class AdrcLaw {
     std::optional<Array<S, Order>>
         gains{};     ///< k_0 .. k_(n-1) for r - y, r' - y', ..; k_i in 1/s^(n-i)
     S input_gain{};  ///< b0 of the plant, not zero, negative is fine
-
-    /// @cond
-    static constexpr auto fields(auto& c) noexcept {
-      return detail::tie(c.controller_bandwidth, c.gains, c.input_gain);
-    }
-    /// @endcond
   };
   using scalar_type = S;  ///< type of signals and settings
   template <class T>
@@ -61,11 +55,36 @@ class AdrcLaw {
   /// Checks the settings and does all the design work.
   /// @return the law, or an error that names the field
   static Expected<AdrcLaw, Error<S>> make(const Config& config) {
-    if constexpr (PackScalar<S>) {
-      return detail::make_lanes<AdrcLaw>(config);
+    detail::refuse_packs<S>();
+    Rules<S> rules;
+    if (!rules.invertible("input_gain", config.input_gain)) return rules.error();
+    AdrcLaw law;
+    law.inverse_input_gain_ = S(1.0) / config.input_gain;
+    law.input_gain_ = config.input_gain;
+    if (config.gains) {
+      rules
+          .left_out("controller_bandwidth", config.controller_bandwidth,
+                    "must be left out if gains is given")
+          .finite("gains", *config.gains);
+      law.gains_ = *config.gains;
     } else {
-      return make_one(config);
+      rules.positive("controller_bandwidth", config.controller_bandwidth);
+      S power(1.0);
+      for (int i = Order - 1; i >= 0; --i) {
+        power = power * config.controller_bandwidth;
+        law.gains_[static_cast<std::size_t>(i)] =
+            S(binomial_table<Order, detail::TableScalar<S>>[Order][static_cast<std::size_t>(i)]) *
+            power;
+      }
+      rules.representable("controller_bandwidth", config.controller_bandwidth, law.gains_[0],
+                          "gives a gain that the scalar cannot hold");
     }
+    for (const S& gain : law.gains_) {
+      rules.require(all(is_finite(S(gain * law.inverse_input_gain_))), "input_gain",
+                    config.input_gain, "with these gains gives a law that the scalar cannot hold");
+    }
+    if (!rules) return rules.error();
+    return law;
   }
 
   /// v = r^(n) + sum_i k_i (r^(i) - yhat^(i)), unit of y^(n).
@@ -127,38 +146,6 @@ class AdrcLaw {
   friend struct detail::LaneAccess;
   static constexpr auto fields(auto& o) noexcept {
     return detail::tie(o.gains_, o.inverse_input_gain_, o.input_gain_);
-  }
-
-  static Expected<AdrcLaw, Error<S>> make_one(const Config& config) {
-    Rules<S> rules;
-    if (!rules.invertible("input_gain", config.input_gain)) return rules.error();
-    AdrcLaw law;
-    law.inverse_input_gain_ = S(1.0) / config.input_gain;
-    law.input_gain_ = config.input_gain;
-    if (config.gains) {
-      rules
-          .left_out("controller_bandwidth", config.controller_bandwidth,
-                    "must be left out if gains is given")
-          .finite("gains", *config.gains);
-      law.gains_ = *config.gains;
-    } else {
-      rules.positive("controller_bandwidth", config.controller_bandwidth);
-      S power(1.0);
-      for (int i = Order - 1; i >= 0; --i) {
-        power = power * config.controller_bandwidth;
-        law.gains_[static_cast<std::size_t>(i)] =
-            S(binomial_table<Order, detail::TableScalar<S>>[Order][static_cast<std::size_t>(i)]) *
-            power;
-      }
-      rules.representable("controller_bandwidth", config.controller_bandwidth, law.gains_[0],
-                          "gives a gain that the scalar cannot hold");
-    }
-    for (const S& gain : law.gains_) {
-      rules.require(all(is_finite(S(gain * law.inverse_input_gain_))), "input_gain",
-                    config.input_gain, "with these gains gives a law that the scalar cannot hold");
-    }
-    if (!rules) return rules.error();
-    return law;
   }
 
   AdrcLaw() = default;

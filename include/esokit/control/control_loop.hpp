@@ -19,10 +19,6 @@ template <Scalar S = double>
 struct StartHold {
   S time{};   ///< duration, s; 0: none. Rounded up to whole samples of nominal length
   S input{};  ///< u during the hold, within the limits
-
-  /// @cond
-  static constexpr auto fields(auto& hold) noexcept { return detail::tie(hold.time, hold.input); }
-  /// @endcond
 };
 
 /// What happens if measurements are missing (or NaN).
@@ -33,12 +29,6 @@ struct MissingRule {
   std::optional<S>
       input{};        ///< u in safe mode, approached within the rate limit; left out: the last u
   bool stay = false;  ///< true: safe mode lasts until start(); false: until a measurement
-
-  /// @cond
-  static constexpr auto fields(auto& rule) noexcept {
-    return detail::tie(rule.most, rule.input, rule.stay);
-  }
-  /// @endcond
 };
 
 /// Settings of a ControlLoop; a controller's config repeats them by name.
@@ -48,13 +38,6 @@ struct LoopSettings {
   StartHold<S> start_hold{};    ///< u at the start, while the observer converges
   MissingRule<S> missing{};     ///< what to do when measurements are missing
   int measurement_divider = 1;  ///< D: a measurement is due at every D-th step, 1 .. 1000
-
-  /// @cond
-  static constexpr auto fields(auto& settings) noexcept {
-    return detail::tie(settings.limits, settings.start_hold, settings.missing,
-                       settings.measurement_divider);
-  }
-  /// @endcond
 };
 
 namespace detail {
@@ -168,25 +151,18 @@ class ControlLoop {
   static Expected<ControlLoop, Error<S>> make(const Observer& observer,
                                               const LoopSettings<S>& settings,
                                               bool watched = false) {
-    if constexpr (PackScalar<S>) {
-      return detail::make_lanes<ControlLoop>([&](int i) {
-        return Plain::make(detail::get_lane<PlainObserver>(observer, i),
-                           detail::get_lane<LoopSettings<LaneScalar<S>>>(settings, i), watched);
-      });
-    } else {
-      const auto checked = detail::check_loop(settings, observer.sample_time(), observer.max_gap(),
-                                              observer_traits<Observer>.bears_regular_gaps);
-      if (!checked) return checked.error();
-      if constexpr (has_step_time) {
-        const int divider = settings.measurement_divider;
-        Rules<S> rules;
-        rules.require(divider == 1 || observer.bridges(divider), "measurement_divider",
-                      static_cast<S>(divider),
-                      "must be so small that VariableTime bridges as many of its longest steps");
-        if (!rules) return rules.error();
-      }
-      return ControlLoop(observer, checked->limiter, settings, checked->hold_samples, watched);
+    const auto checked = detail::check_loop(settings, observer.sample_time(), observer.max_gap(),
+                                            observer_traits<Observer>.bears_regular_gaps);
+    if (!checked) return checked.error();
+    if constexpr (has_step_time) {
+      const int divider = settings.measurement_divider;
+      Rules<S> rules;
+      rules.require(divider == 1 || observer.bridges(divider), "measurement_divider",
+                    static_cast<S>(divider),
+                    "must be so small that VariableTime bridges as many of its longest steps");
+      if (!rules) return rules.error();
     }
+    return ControlLoop(observer, checked->limiter, settings, checked->hold_samples, watched);
   }
 
   /// One sample: the observer's update with the last output of this loop, then the law.
@@ -277,7 +253,6 @@ class ControlLoop {
   /// Takes over the settings of `fresh`; state, output and mode are kept. If the observer refuses
   /// them, nothing changes.
   Check<S> adopt(const ControlLoop& fresh) {
-    if constexpr (PackScalar<S>) return detail::adopt_lanes(*this, fresh);
     if (auto ok = observer_.adopt(fresh.observer_); !ok) return ok;
     const S last = limiter_.last();
     limiter_ = fresh.limiter_;

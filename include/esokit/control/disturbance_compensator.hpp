@@ -4,7 +4,6 @@
 
 #include <esokit/control/control_loop.hpp>
 #include <esokit/control/controller.hpp>
-#include <esokit/core/lane_by_lane.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <limits>
 
@@ -21,13 +20,6 @@ struct DisturbanceCompensatorConfig {
   StartHold<S> start_hold{};             ///< u at the start, while the observer converges
   MissingRule<S> missing{};              ///< what to do when measurements are missing
   int measurement_divider = 1;           ///< D: a measurement is due at every D-th update
-
-  /// @cond
-  static constexpr auto fields(auto& c) noexcept {
-    return detail::tie(c.observer, c.compensation_gain, c.limits, c.start_hold, c.missing,
-                       c.measurement_divider);
-  }
-  /// @endcond
 };
 
 /// u = u0 + K dhat, with u0 from any controller (a PID, say) and K = -1/b0. That controller then
@@ -70,11 +62,21 @@ class DisturbanceCompensator {
   /// Checks the settings and does all the design work.
   /// @return the compensator, or an error that names the field
   static Expected<DisturbanceCompensator, Error<S>> make(const Config& config) {
-    if constexpr (PackScalar<S>) {
-      return detail::make_lanes<DisturbanceCompensator>(config);
-    } else {
-      return make_one(config);
+    detail::refuse_packs<S>();
+    const auto observer = Observer::make(config.observer);
+    if (!observer) return observer.error();
+    const S input_gain = observer->input_gain();
+    S gain = S(-1) / input_gain;
+    if (config.compensation_gain) {
+      gain = *config.compensation_gain;
+      if (Rules<S> rules; !rules.finite("compensation_gain", gain)) return rules.error();
+    } else if (!is_finite(gain)) {
+      return Error<S>{"input_gain", input_gain, "has an inverse that the scalar cannot hold"};
     }
+    const auto loop = Loop::make(
+        *observer, {config.limits, config.start_hold, config.missing, config.measurement_divider});
+    if (!loop) return loop.error();
+    return DisturbanceCompensator(*loop, gain);
   }
 
   /// One sample. @param y measurement, NaN if missing @param base_output u0 of the wrapped
@@ -135,7 +137,6 @@ class DisturbanceCompensator {
   /// The same with the settings of `fresh`, as returned by `make`: without design work, so it may
   /// run in an interrupt.
   Check<S> adopt(const DisturbanceCompensator& fresh) {
-    if constexpr (PackScalar<S>) return detail::adopt_lanes(*this, fresh);
     if (auto ok = loop_.adopt(fresh.loop_); !ok) return ok;
     gain_ = fresh.gain_;
     return {};
@@ -182,23 +183,6 @@ class DisturbanceCompensator {
   friend struct detail::RecordAccess;
   static constexpr auto fields(auto& o) noexcept { return detail::tie(o.loop_, o.gain_); }
 
-  static Expected<DisturbanceCompensator, Error<S>> make_one(const Config& config) {
-    const auto observer = Observer::make(config.observer);
-    if (!observer) return observer.error();
-    const S input_gain = observer->input_gain();
-    S gain = S(-1) / input_gain;
-    if (config.compensation_gain) {
-      gain = *config.compensation_gain;
-      if (Rules<S> rules; !rules.finite("compensation_gain", gain)) return rules.error();
-    } else if (!is_finite(gain)) {
-      return Error<S>{"input_gain", input_gain, "has an inverse that the scalar cannot hold"};
-    }
-    const auto loop = Loop::make(
-        *observer, {config.limits, config.start_hold, config.missing, config.measurement_divider});
-    if (!loop) return loop.error();
-    return DisturbanceCompensator(*loop, gain);
-  }
-
   using Loop = ControlLoop<Observer>;
 
   DisturbanceCompensator(const Loop& loop, S gain) noexcept : loop_(loop), gain_(gain) {}
@@ -215,30 +199,6 @@ class DisturbanceCompensator {
 
   Loop loop_;
   S gain_;
-};
-
-/// The same with an observer that runs lane by lane.
-template <LoopObserver Observer>
-requires detail::goes_lane_by_lane<Observer>
-class DisturbanceCompensator<Observer>
-    : public LaneByLane<DisturbanceCompensator<Observer>,
-                        DisturbanceCompensator<detail::LaneOf<Observer>>,
-                        typename Observer::scalar_type, DisturbanceCompensatorConfig<Observer>> {
- public:
-  /// What it can do beyond `update(y, r)`.
-  static constexpr ControllerTraits traits =
-      DisturbanceCompensator<detail::LaneOf<Observer>>::traits;
-  template <class T>
-  using with_scalar =
-      DisturbanceCompensator<detail::WithScalar<Observer, T>>;  ///< the same with another scalar
-
-  using DisturbanceCompensator::LaneByLane::LaneByLane;
-
-  /// The observer, put together from the lanes.
-  [[nodiscard]] Observer observer() const noexcept {
-    return this->template gathered<Observer>(
-        [](const auto& lane) -> const auto& { return lane.observer(); });
-  }
 };
 
 /// Distinguishes the type in snapshots.

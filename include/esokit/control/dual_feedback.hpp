@@ -83,13 +83,6 @@ class DualFeedbackAdrc {
     S input_gain{};                              ///< b0, not zero, negative is fine
     S sample_time{};                             ///< T, s
     Limits<S> limits{};                          ///< of the actuator
-
-    /// @cond
-    static constexpr auto fields(auto& c) noexcept {
-      return detail::tie(c.observer_bandwidth, c.controller_bandwidth, c.gains, c.domain,
-                         c.half_gain, c.input_gain, c.sample_time, c.limits);
-    }
-    /// @endcond
   };
   using Status = StatusOf<S>;  ///< StepStatus, for a pack one per lane
   template <class T>
@@ -99,11 +92,35 @@ class DualFeedbackAdrc {
   /// Checks the settings and does all the design work.
   /// @return the controller at rest at zero, or an error that names the field
   static Expected<DualFeedbackAdrc, Error<S>> make(const Config& config) {
-    if constexpr (PackScalar<S>) {
-      return detail::make_lanes<DualFeedbackAdrc>(config);
-    } else {
-      return make_one(config);
+    detail::refuse_packs<S>();
+    Rules<S> rules;
+    if (!rules.nonzero("input_gain", config.input_gain)) return rules.error();
+    const auto limiter = Limiter<S>::make(config.limits, config.sample_time);
+    if (!limiter) return limiter.error();
+    rules.all_of(
+        Placement::template check<size, S>("observer_bandwidth", config.observer_bandwidth));
+    if (!rules) return rules.error();
+    const auto gains = controller_gains(config);
+    if (!gains) return gains.error();
+    const auto poles =
+        Placement::template sample<size, S>(config.observer_bandwidth, config.sample_time);
+    Form form = delta_form<Order, size, S>(poles, *gains, config.input_gain, config.sample_time);
+    const S bandwidth = Placement::template representative<size, S>(config.observer_bandwidth);
+    // The last coefficient of D is prod(1 - rho_i), the smallest for slow poles.
+    rules.representable("observer_bandwidth", bandwidth, form.denominator[size],
+                        "times sample_time gives a filter the scalar cannot hold");
+    for (const S& coefficient : form.measurement) {
+      rules.require(is_finite(coefficient), "sample_time", config.sample_time,
+                    "gives a filter that the scalar cannot hold");
     }
+    if constexpr (!delta) {
+      const S unit = S(100) * detail::rounding<S>();
+      rules.require(unit < static_cast<S>(1e-3) * form.denominator[size], "observer_bandwidth",
+                    bandwidth, "times sample_time leaves too few digits in z; use DeltaOperator");
+      form = shift_form<size, S>(form);
+    }
+    if (!rules) return rules.error();
+    return DualFeedbackAdrc(form, *limiter);
   }
 
   /// One sample. @param y measurement @param reference r
@@ -158,7 +175,6 @@ class DualFeedbackAdrc {
   /// The same with the settings of `fresh`, as returned by `make`: without design work, so it may
   /// run in an interrupt.
   Check<S> adopt(DualFeedbackAdrc fresh) {
-    if constexpr (PackScalar<S>) return detail::adopt_lanes(*this, fresh);
     if (fresh.start(measured_, output()) != StepStatus::ok) {
       return Error<S>{"measurement", measured_,
                       "of the last sample has no steady state that the scalar can hold"};
@@ -200,37 +216,6 @@ class DualFeedbackAdrc {
 
   DualFeedbackAdrc(const Form& form, const Limiter<S>& limiter) noexcept
       : form_(form), limiter_(limiter), wanted_(limiter.last()) {}
-
-  static Expected<DualFeedbackAdrc, Error<S>> make_one(const Config& config) {
-    Rules<S> rules;
-    if (!rules.nonzero("input_gain", config.input_gain)) return rules.error();
-    const auto limiter = Limiter<S>::make(config.limits, config.sample_time);
-    if (!limiter) return limiter.error();
-    rules.all_of(
-        Placement::template check<size, S>("observer_bandwidth", config.observer_bandwidth));
-    if (!rules) return rules.error();
-    const auto gains = controller_gains(config);
-    if (!gains) return gains.error();
-    const auto poles =
-        Placement::template sample<size, S>(config.observer_bandwidth, config.sample_time);
-    Form form = delta_form<Order, size, S>(poles, *gains, config.input_gain, config.sample_time);
-    const S bandwidth = Placement::template representative<size, S>(config.observer_bandwidth);
-    // The last coefficient of D is prod(1 - rho_i), the smallest for slow poles.
-    rules.representable("observer_bandwidth", bandwidth, form.denominator[size],
-                        "times sample_time gives a filter the scalar cannot hold");
-    for (const S& coefficient : form.measurement) {
-      rules.require(is_finite(coefficient), "sample_time", config.sample_time,
-                    "gives a filter that the scalar cannot hold");
-    }
-    if constexpr (!delta) {
-      const S unit = S(100) * detail::rounding<S>();
-      rules.require(unit < static_cast<S>(1e-3) * form.denominator[size], "observer_bandwidth",
-                    bandwidth, "times sample_time leaves too few digits in z; use DeltaOperator");
-      form = shift_form<size, S>(form);
-    }
-    if (!rules) return rules.error();
-    return DualFeedbackAdrc(form, *limiter);
-  }
 
   StepStatus start_one(S y, S u) noexcept {
     const S c = u - form_.reference * y;

@@ -26,10 +26,6 @@ template <PlainScalar S = double>
 struct ExperimentApproach {
   S input{};   ///< u that drives y from rest to `output`, such as full power
   S output{};  ///< y around which the relay then acts
-
-  /// @cond
-  static constexpr auto fields(auto& a) noexcept { return detail::tie(a.input, a.output); }
-  /// @endcond
 };
 
 /// Config of Experiment.
@@ -62,15 +58,6 @@ struct ExperimentConfig {
   S hand_over{};       ///< s: relay or steps continue for this time after the last measured cycle
   int cycles = 8;      ///< number of measured cycles, after two to settle; even, 6 .. 200
   Limits<S> limits{};  ///< of the actuator; u0 - A and u0 + A must be within
-
-  /// @cond
-  static constexpr auto fields(auto& c) noexcept {
-    return detail::tie(c.sample_time, c.excitation, c.input, c.amplitude, c.hysteresis, c.lead,
-                       c.half_period, c.rest, c.approach, c.response, c.response_time, c.travel,
-                       c.lowest_output, c.highest_output, c.safe_input, c.time_limit, c.hand_over,
-                       c.cycles, c.limits);
-  }
-  /// @endcond
 };
 
 /// The phase of an experiment.
@@ -174,7 +161,8 @@ struct ExperimentRow {
 ///
 /// Hand-over: from phase `hand_over` on the result is ready. Make the controller, call its
 /// `track(y, reference, u)` while the experiment still moves the machine, and continue with its
-/// `update` from phase `done` on. `examples/identify` shows this.
+/// `update` from phase `done` on, before the first of them `applied(u)` with the u that the
+/// experiment gave last. `examples/identify` shows this.
 /// @tparam Order n, 1 or 2
 template <int Order, PlainScalar S = double>
 class Experiment {
@@ -185,8 +173,6 @@ class Experiment {
   using scalar_type = S;               ///< type of signals and settings
   using Config = ExperimentConfig<S>;  ///< settings of make
   using Result = ExperimentResult<S>;  ///< the result
-  template <class T>
-  using with_scalar = Experiment<Order, T>;  ///< the same with another scalar
 
   /// Checks the settings. @return the experiment before its first sample, or an error
   static Expected<Experiment, Error<S>> make(const Config& config) {

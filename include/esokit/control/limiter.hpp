@@ -15,12 +15,6 @@ struct Limits {
   S upper = S((std::numeric_limits<LaneScalar<S>>::max)());   ///< largest u, above lower
   S rate =
       S((std::numeric_limits<LaneScalar<S>>::max)());  ///< largest abs(du/dt), unit of u per s, > 0
-
-  /// @cond
-  static constexpr auto fields(auto& limits) noexcept {
-    return detail::tie(limits.lower, limits.upper, limits.rate);
-  }
-  /// @endcond
 };
 
 /// Limits a command in magnitude (also asymmetrically) and rate.
@@ -39,14 +33,17 @@ class Limiter {
   /// @return error for limits that are crossed or not finite, or a rate or sample time that is not
   ///         positive
   static Expected<Limiter, Error<S>> make(const Limits<S>& limits, const S& sample_time) {
-    if constexpr (PackScalar<S>) {
-      return detail::make_lanes<Limiter>([&](int i) {
-        return Limiter<LaneScalar<S>>::make(detail::get_lane<Limits<LaneScalar<S>>>(limits, i),
-                                            sample_time[i]);
-      });
-    } else {
-      return make_one(limits, sample_time);
-    }
+    detail::refuse_packs<S>();
+    Rules<S> rules;
+    rules.positive("sample_time", sample_time)
+        .finite("limits.lower", limits.lower)
+        .finite("limits.upper", limits.upper)
+        .require(
+            all(limits.lower < limits.upper),
+            {"limits.lower", limits.lower, "must be below limits.upper", -1, limits.upper, true})
+        .positive("limits.rate", limits.rate);
+    if (!rules) return rules.error();
+    return Limiter(limits, sample_time);
   }
 
   /// The output nearest to `command` within the limits; stored as the last output.
@@ -95,19 +92,6 @@ class Limiter {
 
   static constexpr auto fields(auto& o) noexcept {
     return detail::tie(o.lower_, o.upper_, o.step_, o.last_, o.low_, o.high_, o.rate_limited_);
-  }
-
-  static Expected<Limiter, Error<S>> make_one(const Limits<S>& limits, const S& sample_time) {
-    Rules<S> rules;
-    rules.positive("sample_time", sample_time)
-        .finite("limits.lower", limits.lower)
-        .finite("limits.upper", limits.upper)
-        .require(
-            all(limits.lower < limits.upper),
-            {"limits.lower", limits.lower, "must be below limits.upper", -1, limits.upper, true})
-        .positive("limits.rate", limits.rate);
-    if (!rules) return rules.error();
-    return Limiter(limits, sample_time);
   }
 
   Limiter(const Limits<S>& limits, const S& sample_time) noexcept

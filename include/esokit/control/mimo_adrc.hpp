@@ -6,7 +6,6 @@
 #include <esokit/control/control_loop.hpp>
 #include <esokit/control/controller.hpp>
 #include <esokit/control/limiter.hpp>
-#include <esokit/core/lane_by_lane.hpp>
 #include <esokit/core/unroll.hpp>
 #include <esokit/gain/feedback_gain.hpp>
 #include <esokit/math/dense.hpp>
@@ -40,13 +39,6 @@ struct MimoAdrcConfig {
   /// largest element of 1 so that units do not matter.
   S condition_limit = S(1000);
   Array<Limits<S>, channels> limits{};  ///< of each actuator
-
-  /// @cond
-  static constexpr auto fields(auto& c) noexcept {
-    return detail::tie(c.observers, c.controller_bandwidths, c.domain, c.half_gain, c.input_matrix,
-                       c.condition_limit, c.limits);
-  }
-  /// @endcond
 };
 
 /// Control of y_i^(n_i) = d_i + (B0 u)_i, i = 1..q, B0 square and invertible: each channel has an
@@ -227,7 +219,8 @@ class MimoAdrc {
     return std::get<static_cast<std::size_t>(Channel)>(observers_);
   }
 
-  /// The same, for its own members (trust and pin of Guarded).
+  /// The same, for its own members (trust and pin of Guarded; `measured(w)` of Measured, before
+  /// each `update`).
   template <int Channel>
   [[nodiscard]] ObserverOf<Channel>& observer() noexcept {
     return std::get<static_cast<std::size_t>(Channel)>(observers_);
@@ -418,44 +411,6 @@ class MimoAdrc {
   InputMatrix inverse_;
   S condition_limit_;
   Array<StepStatus, channels> statuses_{};
-};
-
-/// The same for packs, lane by lane.
-template <ShiftableDisturbance First, ShiftableDisturbance... Rest>
-requires PackScalar<typename First::scalar_type>
-class MimoAdrc<First, Rest...>
-    : public LaneByLane<
-          MimoAdrc<First, Rest...>, MimoAdrc<detail::LaneOf<First>, detail::LaneOf<Rest>...>,
-          typename MimoAdrcConfig<First, Rest...>::S, MimoAdrcConfig<First, Rest...>> {
-  using Base = typename MimoAdrc::LaneByLane;
-
- public:
-  static constexpr int channels = 1 + sizeof...(Rest);   ///< q
-  using S = typename MimoAdrcConfig<First, Rest...>::S;  ///< type of signals and settings
-  using Output = Vector<S, channels>;                    ///< y, or r, or u, q x 1
-  template <class T>
-  using with_scalar = MimoAdrc<detail::WithScalar<First, T>,
-                               detail::WithScalar<Rest, T>...>;  ///< with another scalar
-
-  using Base::Base;
-
-  /// As for plain scalars.
-  /// @{
-  Output update(const Output& y, const Output& reference) noexcept {
-    return Base::update(y, reference);
-  }
-  void applied(const Output& u) noexcept { Base::applied(u); }
-  StatusOf<S> start(const Output& y, const Output& u) noexcept { return Base::start(y, u); }
-  /// @}
-
-  /// Observer of a channel, put together from the lanes.
-  template <int Channel>
-  [[nodiscard]] auto observer() const noexcept {
-    using Observer =
-        std::tuple_element_t<static_cast<std::size_t>(Channel), std::tuple<First, Rest...>>;
-    return this->template gathered<Observer>(
-        [](const auto& lane) -> const auto& { return lane.template observer<Channel>(); });
-  }
 };
 
 }  // namespace esokit

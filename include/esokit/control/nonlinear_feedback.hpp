@@ -26,12 +26,6 @@ class NonlinearFeedback {
     Array<S, Order> exponents = filled(S(1.0));      ///< a_i > 0; 1 is linear
     Array<S, Order> linear_widths = filled(S(1.0));  ///< delta_i > 0, unit of y^(i)
     S input_gain{};  ///< b0 of the plant; not zero, negative is fine
-
-    /// @cond
-    static constexpr auto fields(auto& c) noexcept {
-      return detail::tie(c.gains, c.exponents, c.linear_widths, c.input_gain);
-    }
-    /// @endcond
   };
   using scalar_type = S;  ///< type of signals and settings
   template <class T>
@@ -40,11 +34,28 @@ class NonlinearFeedback {
   /// Checks the settings and does all the design work.
   /// @return the law, or an error that names the field
   static Expected<NonlinearFeedback, Error<S>> make(const Config& config) {
-    if constexpr (PackScalar<S>) {
-      return detail::make_lanes<NonlinearFeedback>(config);
-    } else {
-      return make_one(config);
+    detail::refuse_packs<S>();
+    Rules<S> rules;
+    for (int i = 0; i < Order; ++i) {
+      const auto row = static_cast<std::size_t>(i);
+      rules.not_negative("gains", config.gains[row], i)
+          .positive("exponents", config.exponents[row], i)
+          .positive("linear_widths", config.linear_widths[row], i);
     }
+    if (!rules.invertible("input_gain", config.input_gain)) return rules.error();
+    const NonlinearFeedback law(config, std::make_integer_sequence<int, Order>{});
+    for (int i = 0; i < Order; ++i) {
+      const auto row = static_cast<std::size_t>(i);
+      // The largest slope for a_i <= 1, that of the linear part.
+      const S slope = law.fal_[row].gain(S(0.0));
+      rules.require(
+          all(is_finite(slope)) &&
+              all(is_finite(S(config.gains[row] * slope * law.inverse_input_gain_))),
+          "linear_widths", config.linear_widths[row],
+          "with this exponent, gain and input_gain gives a slope that the scalar cannot hold", i);
+    }
+    if (!rules) return rules.error();
+    return law;
   }
 
   /// v = sum_i k_i fal(r_i - z_i), unit of y^(n).
@@ -89,30 +100,6 @@ class NonlinearFeedback {
   friend struct detail::LaneAccess;
   static constexpr auto fields(auto& o) noexcept {
     return detail::tie(o.gains_, o.fal_, o.inverse_input_gain_, o.input_gain_);
-  }
-
-  static Expected<NonlinearFeedback, Error<S>> make_one(const Config& config) {
-    Rules<S> rules;
-    for (int i = 0; i < Order; ++i) {
-      const auto row = static_cast<std::size_t>(i);
-      rules.not_negative("gains", config.gains[row], i)
-          .positive("exponents", config.exponents[row], i)
-          .positive("linear_widths", config.linear_widths[row], i);
-    }
-    if (!rules.invertible("input_gain", config.input_gain)) return rules.error();
-    const NonlinearFeedback law(config, std::make_integer_sequence<int, Order>{});
-    for (int i = 0; i < Order; ++i) {
-      const auto row = static_cast<std::size_t>(i);
-      // The largest slope for a_i <= 1, that of the linear part.
-      const S slope = law.fal_[row].gain(S(0.0));
-      rules.require(
-          all(is_finite(slope)) &&
-              all(is_finite(S(config.gains[row] * slope * law.inverse_input_gain_))),
-          "linear_widths", config.linear_widths[row],
-          "with this exponent, gain and input_gain gives a slope that the scalar cannot hold", i);
-    }
-    if (!rules) return rules.error();
-    return law;
   }
 
   static constexpr Array<S, Order> filled(const S& value) {

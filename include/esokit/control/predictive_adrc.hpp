@@ -10,7 +10,6 @@
 #include <esokit/control/controller.hpp>
 #include <esokit/control/limiter.hpp>
 #include <esokit/core/kernels.hpp>
-#include <esokit/core/lane_by_lane.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/gain_law.hpp>
 #include <esokit/gain/step_status.hpp>
@@ -32,12 +31,6 @@ struct PredictiveAdrcConfig {
   Limits<S> limits{};                      ///< of the actuator
   S start_hold{};  ///< t_u >= 0, s: time after the start with u = 0 (within the limits), while
                    ///< the observer settles; rounded up to whole samples
-
-  /// @cond
-  static constexpr auto fields(auto& c) noexcept {
-    return detail::tie(c.observer, c.controller_bandwidth, c.gains, c.limits, c.start_hold);
-  }
-  /// @endcond
 };
 
 /// u = (v - dhat) / b0, the same as AdrcLaw after the observer's correction, but written as u_k =
@@ -456,26 +449,6 @@ class PredictiveAdrc {
   StepStatus status_ = StepStatus::ok;
   std::uint32_t hold_left_;
   std::uint32_t hold_;
-};
-
-/// The same for packs, lane by lane.
-template <PredictableObserver Observer>
-requires PackScalar<typename Observer::scalar_type>
-class PredictiveAdrc<Observer>
-    : public LaneByLane<PredictiveAdrc<Observer>, PredictiveAdrc<detail::LaneOf<Observer>>,
-                        typename Observer::scalar_type, PredictiveAdrcConfig<Observer>> {
- public:
-  static constexpr int order = Observer::order;  ///< n, order of the plant
-  template <class T>
-  using with_scalar = PredictiveAdrc<detail::WithScalar<Observer, T>>;  ///< with another scalar
-
-  using PredictiveAdrc::LaneByLane::LaneByLane;
-
-  /// The observer, put together from the lanes.
-  [[nodiscard]] Observer observer() const noexcept {
-    return this->template gathered<Observer>(
-        [](const auto& lane) -> const auto& { return lane.observer(); });
-  }
 };
 
 /// Distinguishes the type in snapshots.

@@ -26,28 +26,19 @@ class ScaledLaw {
   template <class Observer>
   static Expected<ScaledLaw, Error<S>> make(const AdrcLaw<Order, S>& law,
                                             const Observer& observer) {
-    if constexpr (PackScalar<S>) {
-      using One = LaneScalar<S>;
-      return detail::make_lanes<ScaledLaw>([&](int i) {
-        return ScaledLaw<Order, One>::make(
-            detail::get_lane<AdrcLaw<Order, One>>(law, i),
-            detail::get_lane<detail::PlainTwin<Observer, S>>(observer, i));
-      });
-    } else {
-      const S rate = S(1) / observer.sample_time();
-      ScaledLaw scaled;
-      S unit = S(1) / law.input_gain();
-      for (int i = 0; i <= Order; ++i) {
-        if (i > 0) unit = unit * (static_cast<S>(i) * rate);
-        const auto row = static_cast<std::size_t>(i);
-        scaled.weights_[row] = i < Order ? law.gains()[row] * unit : unit;
-        if (!is_finite(scaled.weights_[row])) {
-          return Error<S>{"sample_time", observer.sample_time(),
-                          "with these gains gives a law that the scalar cannot hold"};
-        }
+    const S rate = S(1) / observer.sample_time();
+    ScaledLaw scaled;
+    S unit = S(1) / law.input_gain();
+    for (int i = 0; i <= Order; ++i) {
+      if (i > 0) unit = unit * (static_cast<S>(i) * rate);
+      const auto row = static_cast<std::size_t>(i);
+      scaled.weights_[row] = i < Order ? law.gains()[row] * unit : unit;
+      if (!is_finite(scaled.weights_[row])) {
+        return Error<S>{"sample_time", observer.sample_time(),
+                        "with these gains gives a law that the scalar cannot hold"};
       }
-      return scaled;
     }
+    return scaled;
   }
 
   /// Output-based form. @param error r - y

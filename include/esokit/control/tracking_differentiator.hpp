@@ -5,7 +5,6 @@
 #include <cmath>
 #include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
-#include <esokit/core/lane_by_lane.hpp>
 #include <esokit/core/matrix.hpp>
 
 namespace esokit {
@@ -60,12 +59,6 @@ struct TrackingDifferentiatorConfig {
   S acceleration{};  ///< R > 0, unit of the reference / s^2
   S sample_time{};   ///< h, s
   S filter_time{};   ///< h0 >= h, s: smooths a noisy reference; 0: h
-
-  /// @cond
-  static constexpr auto fields(auto& c) noexcept {
-    return detail::tie(c.acceleration, c.sample_time, c.filter_time);
-  }
-  /// @endcond
 };
 
 /// Tracking differentiator with fhan: r1 follows the reference as fast as |r1''| <= `acceleration`
@@ -78,6 +71,7 @@ class TrackingDifferentiator : public DifferentiatorState<S> {
   using State::r2_;
 
  public:
+  using scalar_type = S;                           ///< type of signals and settings
   using Config = TrackingDifferentiatorConfig<S>;  ///< settings of make
 
   /// Checks the settings and does all the design work.
@@ -132,28 +126,11 @@ class TrackingDifferentiator : public DifferentiatorState<S> {
   S change_ = S(0);  ///< r1'' that the last sample applied
 };
 
-/// The same for packs, lane by lane, because half of the time is spent on a root.
-template <PackScalar S>
-class TrackingDifferentiator<S>
-    : public LaneByLane<TrackingDifferentiator<S>, TrackingDifferentiator<LaneScalar<S>>, S,
-                        TrackingDifferentiatorConfig<S>> {
- public:
-  using TrackingDifferentiator::LaneByLane::LaneByLane;
-  template <class T>
-  using with_scalar = TrackingDifferentiator<T>;  ///< the same with another scalar
-};
-
 /// Config of SignTrackingDifferentiator.
 template <Scalar S>
 struct SignTrackingDifferentiatorConfig {
   S acceleration{};  ///< R > 0, unit of the reference / s^2
   S sample_time{};   ///< h of `update`, s; may be left out if only `rate` is used
-
-  /// @cond
-  static constexpr auto fields(auto& c) noexcept {
-    return detail::tie(c.acceleration, c.sample_time);
-  }
-  /// @endcond
 };
 
 /// Tracking differentiator with a sign function, r1' = r2, r2' = -R sign(r1 - r + r2 |r2| / (2R)):
@@ -166,6 +143,7 @@ class SignTrackingDifferentiator : public DifferentiatorState<S> {
   using State::r2_;
 
  public:
+  using scalar_type = S;                               ///< type of signals and settings
   using Config = SignTrackingDifferentiatorConfig<S>;  ///< settings of make
 
   /// Checks the settings and does all the design work.
@@ -201,17 +179,6 @@ class SignTrackingDifferentiator : public DifferentiatorState<S> {
   }
 
   Config config_;
-};
-
-/// The same for packs, lane by lane.
-template <PackScalar S>
-class SignTrackingDifferentiator<S>
-    : public LaneByLane<SignTrackingDifferentiator<S>, SignTrackingDifferentiator<LaneScalar<S>>, S,
-                        SignTrackingDifferentiatorConfig<S>> {
- public:
-  using SignTrackingDifferentiator::LaneByLane::LaneByLane;
-  template <class T>
-  using with_scalar = SignTrackingDifferentiator<T>;  ///< the same with another scalar
 };
 
 }  // namespace esokit

@@ -201,53 +201,12 @@ class [[nodiscard]] Rules {
 
 namespace detail {
 
-/// The error of lane `i`, as the error of the pack.
-template <Scalar S>
-Error<S> in_lane(const Error<LaneScalar<S>>& error, int i) {
-  Error<S> all{error.field, {}, error.rule, error.index, {}, error.has_limit, i};
-  all.value[i] = error.value;
-  all.limit[i] = error.limit;
-  return all;
-}
-
-/// An X of packs; `make(i)` designs lane i as an X of the plain scalar.
-template <class X, class Make>
-requires std::invocable<Make, int> Expected<X, Error<typename X::scalar_type>> make_lanes(
-    const Make& make) {
-  using S = typename X::scalar_type;
-  X all = blank<X>();
-  for (int i = 0; i < lane_count<S>; ++i) {
-    const auto lane = make(i);
-    if (!lane) return in_lane<S>(lane.error(), i);
-    set_lane(all, *lane, i);
-  }
-  return all;
-}
-
-/// `make` of an X of packs.
-template <class X>
-Expected<X, Error<typename X::scalar_type>> make_lanes(const typename X::Config& config) {
-  using Plain = PlainTwin<X, typename X::scalar_type>;
-  return make_lanes<X>([&](int i) {
-    typename Plain::Config one{};
-    copy_lane<false>(config, one, i);
-    return Plain::make(one);
-  });
-}
-
-/// `adopt` of an X of packs: all lanes or none.
-template <class X>
-Check<typename X::scalar_type> adopt_lanes(X& object, const X& fresh) {
-  using S = typename X::scalar_type;
-  using Plain = typename X::template with_scalar<LaneScalar<S>>;
-  X next = object;
-  for (int i = 0; i < lane_count<S>; ++i) {
-    Plain lane = get_lane<Plain>(object, i);
-    if (auto ok = lane.adopt(get_lane<Plain>(fresh, i)); !ok) return in_lane<S>(ok.error(), i);
-    set_lane(next, lane, i);
-  }
-  object = next;
-  return {};
+/// In a `make`: packs have another one.
+template <class S>
+constexpr void refuse_packs() noexcept {
+  static_assert(
+      !PackScalar<S>,
+      "esokit: packs are made lane by lane: Packed<LinearEso<2>, 4>::make (core/packed.hpp)");
 }
 
 /// `retune` of every type that has `make` and `adopt`.

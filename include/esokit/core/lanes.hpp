@@ -1,6 +1,6 @@
 /// @file
 /// The lanes of a pack and of objects made of packs: how an observer of packs is split into plain
-/// ones and put together again.
+/// ones and put together again. `Packed` (core/packed.hpp) is such an object for any type.
 ///
 /// In normal operation an observer of packs computes with packs. If one lane has a bad sample, a
 /// gap or a restart, each lane goes through the observer of the plain scalar: so fault handling is
@@ -131,14 +131,6 @@ struct LaneAccess {
 };
 
 struct RecordAccess;  // target/recorded_design.hpp: what is recorded apart
-
-/// Base of every LaneByLane, by which goes_lane_by_lane finds it.
-struct GoesLaneByLane {};
-
-/// Whether an observer or controller of packs consists of plain ones. An adapter around such a type
-/// must be lane by lane, too.
-template <class T>
-inline constexpr bool goes_lane_by_lane = std::is_base_of_v<GoesLaneByLane, T>;
 
 /// A std::array or a Matrix.
 template <class T>

@@ -162,9 +162,7 @@ class PackMask {
 /// `Count` floats or doubles, each of them (a lane) belonging to another plant: a scalar of the
 /// library that computes all lanes at once.
 ///
-/// An observer or controller of packs gives the same results as one plain object per lane, bit for
-/// bit with -ffp-contract=off (the compiler must not fuse products and sums). Each lane has its own
-/// settings, faults, gaps and status.
+/// Observers and controllers of packs: `Packed` (core/packed.hpp).
 /// @tparam S float or double @tparam Count a power of two; more than `default_lanes` take several
 ///         registers, fewer leave part of a register idle
 template <std::floating_point S, int Count = default_lanes<S>>

@@ -96,10 +96,6 @@ inline constexpr int lane_count = 1;
 template <class T>
 inline constexpr bool records = false;
 
-/// Whether S holds the numbers of several plants: a pack, but not a scalar that records.
-template <class S>
-inline constexpr bool has_lanes = lane_count<S> > 1 && !records<S>;
-
 /// A comparison gives a bool; or it gives a mask, and the type has specialised `lane_count`.
 template <class T>
 concept DeclaresItsLanes =
@@ -138,7 +134,7 @@ concept PackScalar = Scalar<S> &&(lane_count<S> > 1);
 
 /// A scalar of one plant: a plain one, or one that records its operations.
 template <class S>
-concept SingleScalar = Scalar<S> && !has_lanes<S>;
+concept SingleScalar = PlainScalar<S> ||(Scalar<S>&& records<S>);
 
 namespace detail {
 

@@ -36,8 +36,7 @@ class ConstantGain {
   /// @param index element of `field` that the error names, -1: none
   /// @return error for a spec that the placement refuses, or a gain that the scalar cannot hold
   static Expected<ConstantGain, Error<S>> make(const char* field, const Spec& spec,
-                                               const S& sample_time,
-                                               int index = -1) requires(!PackScalar<S>) {
+                                               const S& sample_time, int index = -1) {
     Rules<S> rules;
     rules.all_of(Placement::template check<Size, S>(field, spec, index));
     if (!rules) return rules.error();
@@ -160,38 +159,5 @@ auto placed_law(const Config& config, const Chain&... chain) {
 template <int Size, Scalar S, class Placement>
 inline constexpr std::uint32_t type_tag<ConstantGain<Size, S, Placement>> =
     make_type_tag<S, Placement>("ConstantGain", Size);
-
-/// Constant gain of a continuous observer, in physical units.
-template <int Size, Scalar S, class Placement = EqualPoles>
-class ContinuousConstantGain {
- public:
-  using Spec = typename Placement::template Spec<Size, S>;  ///< bandwidth or poles
-
-  /// The gain for a set of poles.
-  /// @param field name of the config member that holds `spec`, for the error
-  /// @param spec poles of the error, checked by the placement
-  /// @param index element of `field` that the error names, -1: none
-  /// @return error for a spec that the placement refuses, or a gain that the scalar cannot hold
-  static Expected<ContinuousConstantGain, Error<S>> make(const char* field, const Spec& spec,
-                                                         int index = -1) {
-    Rules<S> rules;
-    rules.all_of(Placement::template check<Size, S>(field, spec, index));
-    if (!rules) return rules.error();
-    ContinuousConstantGain law;
-    law.gain_ = Placement::template gain<Size, S>(spec);
-    rules.representable(field, Placement::template representative<Size, S>(spec),
-                        law.gain_(Size - 1), "gives a gain that the scalar cannot hold", index);
-    if (!rules) return rules.error();
-    return law;
-  }
-
-  /// l, N x 1, row i in 1/s^(i+1).
-  [[nodiscard]] const Vector<S, Size>& gain(const S&, const S&) const noexcept { return gain_; }
-
- private:
-  ContinuousConstantGain() = default;
-
-  Vector<S, Size> gain_;
-};
 
 }  // namespace esokit

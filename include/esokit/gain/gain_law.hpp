@@ -207,31 +207,4 @@ template <class Law, int Size, class S>
 concept PresetGainLaw = GainLaw<Law, Size, S> && gain_law_traits<Law>
 .kind == GainKind::preset;
 
-/// What a gain law of a continuous observer can do besides `gain(t, e)`, declared in a member
-/// `static constexpr ContinuousGainLawTraits traits{..}`.
-struct ContinuousGainLawTraits {
-  /// `begin_step(t, e)`, called at step boundaries of a simulation; the only place where a switched
-  /// law may change its mode.
-  bool begins_steps = false;
-};
-
-namespace detail {
-
-ESOKIT_MEMBER_NAME(begin_step)
-
-}  // namespace detail
-
-/// `begin_step(t, e)` exists if and only if `traits.begins_steps` declares it.
-template <class Law, class S>
-concept BeginsStepsAsDeclared = detail::as_declared(
-    detail::declared_traits<Law, ContinuousGainLawTraits>.begins_steps,
-    detail::names_begin_step<Law>, requires(Law& law, const S& x) { law.begin_step(x, x); });
-
-/// A gain law of a continuous observer: `gain(t, e) const` in physical units, N x 1. Everything
-/// else is declared, see ContinuousGainLawTraits.
-template <class Law, int Size, class S>
-concept ContinuousGainLaw = std::copyable<Law> && requires(const Law& law, const S& x) {
-  { law.gain(x, x) } -> std::convertible_to<Vector<S, Size>>;
-} && DeclaresTraits<Law, ContinuousGainLawTraits> && BeginsStepsAsDeclared<Law, S>;
-
 }  // namespace esokit

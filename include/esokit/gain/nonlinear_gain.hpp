@@ -105,12 +105,6 @@ struct PowerSumGain {
         .not_negative("shape.gain_beta", gain_beta)
         .not_negative("shape.beta", beta);
   }
-
-  /// @cond
-  static constexpr auto fields(auto& k) noexcept {
-    return detail::tie(k.gain_alpha, k.alpha, k.gain_beta, k.beta);
-  }
-  /// @endcond
 };
 
 /// Distinguishes the type in snapshots.
@@ -159,12 +153,6 @@ struct FalGain {
         .positive("shape.exponent", exponent)
         .positive("shape.linear_width", linear_width);
   }
-
-  /// @cond
-  static constexpr auto fields(auto& k) noexcept {
-    return detail::tie(k.gain, k.exponent, k.linear_width);
-  }
-  /// @endcond
 };
 
 /// Distinguishes the type in snapshots.
@@ -304,24 +292,5 @@ class NonlinearGain {
 template <int Size, Scalar S, class Shape>
 inline constexpr std::uint32_t type_tag<NonlinearGain<Size, S, Shape>> =
     make_type_tag<S, Shape>("NonlinearGain", Size);
-
-/// The same for a continuous observer, in physical units.
-template <int Size, Scalar S, class Shape = PowerSumGain<S>>
-requires EvenGain<Shape, S>
-class ContinuousNonlinearGain {
- public:
-  /// @param linear l for k = 1, N x 1, row i in 1/s^(i+1) @param shape k
-  /// @param error_scale > 0, unit of y @param gain_min, gain_max limits of k
-  ContinuousNonlinearGain(const Vector<S, Size>& linear, const Shape& shape, const S& error_scale,
-                          const S& gain_min, const S& gain_max)
-      : linear_(linear), factor_(shape, error_scale, gain_min, gain_max) {}
-
-  /// k(e) l, N x 1, row i in 1/s^(i+1).
-  [[nodiscard]] Vector<S, Size> gain(const S&, const S& e) const { return linear_ * factor_(e); }
-
- private:
-  Vector<S, Size> linear_;
-  detail::LimitedGain<S, Shape> factor_;
-};
 
 }  // namespace esokit

@@ -130,39 +130,4 @@ template <int Size, Scalar S, class Placement, SignReading Reading>
 inline constexpr std::uint32_t type_tag<SwitchedGain<Size, S, Placement, Reading>> =
     make_type_tag<S, Placement>("SwitchedGain", Size, Reading);
 
-/// The same for a continuous observer; the mode changes at step boundaries only.
-template <int Size, Scalar S>
-class ContinuousSwitchedGain {
- public:
-  static constexpr ContinuousGainLawTraits traits{.begins_steps =
-                                                      true};  ///< what it can do besides `gain`
-
-  /// @param shrinking, otherwise l, N x 1, row i in 1/s^(i+1)
-  ContinuousSwitchedGain(const Vector<S, Size>& shrinking, const Vector<S, Size>& otherwise,
-                         SignReading reading = SignReading::magnitude)
-      : shrinking_(shrinking),
-        otherwise_(otherwise),
-        previous_(detail::nothing_watched<S>(reading)),
-        reading_(reading) {}
-
-  /// Compares e with that of the last step and selects the gain set of this step.
-  void begin_step(const S&, const S& e) noexcept {
-    const S now = detail::watched(reading_, e);
-    is_shrinking_ = now < previous_;
-    previous_ = now;
-  }
-
-  /// l, N x 1, row i in 1/s^(i+1); constant over a whole step.
-  [[nodiscard]] const Vector<S, Size>& gain(const S&, const S&) const noexcept {
-    return is_shrinking_ ? shrinking_ : otherwise_;
-  }
-
- private:
-  Vector<S, Size> shrinking_;
-  Vector<S, Size> otherwise_;
-  S previous_;
-  SignReading reading_;
-  bool is_shrinking_ = false;
-};
-
 }  // namespace esokit

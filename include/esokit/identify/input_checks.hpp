@@ -35,16 +35,16 @@ struct GainBySize {
 
 /// b0 in motion and at standstill, where the speed is below a tenth of its rms.
 struct GainInMotion {
-  double still = 0.0;   ///< share of the rows at standstill; 0: not tried
-  Estimate moving{};    ///< b0 in motion
-  Estimate standing{};  ///< b0 at standstill
-  double all = 0.0;     ///< b0 of all rows
+  double still = 0.0;  ///< share of the rows at standstill; 0: not tried
+  Estimate moving{};   ///< b0 in motion
+  Estimate at_rest{};  ///< b0 at standstill
+  double all = 0.0;    ///< b0 of all rows
 
   /// Whether b0 is smaller at standstill, as by `GainBySize`, and that of all rows is a tenth off
   /// that of the motion: friction holds the machine against u, and it matters.
   [[nodiscard]] bool differ() const {
-    return still > 0.0 && GainBySize::differs(moving, standing) &&
-           std::abs(standing.value) < std::abs(moving.value) &&
+    return still > 0.0 && GainBySize::differs(moving, at_rest) &&
+           std::abs(at_rest.value) < std::abs(moving.value) &&
            std::abs(moving.value - all) > 0.1 * std::abs(all);
   }
 };
@@ -83,8 +83,8 @@ inline GainInMotion gain_in_motion(const FitData& data, const FitModel& model,
   }
   if (rows == 0 || rows == held.size()) return {};
   split.inputs.push_back(std::move(held));
-  const auto [moving, standing] = two_gains(split, model, bounds, here.at);
-  return {static_cast<double>(rows) / static_cast<double>(speed.size()), moving, standing,
+  const auto [moving, at_rest] = two_gains(split, model, bounds, here.at);
+  return {static_cast<double>(rows) / static_cast<double>(speed.size()), moving, at_rest,
           here.linear[0]};
 }
 

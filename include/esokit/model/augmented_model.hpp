@@ -194,7 +194,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   };
 
   /// The same with another scalar. A model that follows a speed branches on it and is not recorded.
-  template <class T>
+  template <SingleScalar T>
   requires(!(Parts.follows_speed && records<T>)) using with_scalar = AugmentedModel<Parts, T>;
 
   using Settings = PartsSettings<Parts, S>;  ///< settings of make
@@ -417,9 +417,10 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   template <ModelParts Other, Scalar T>
   friend class AugmentedModel;
   friend struct detail::LaneAccess;
+  /// What a step reads.
   static constexpr auto fields(auto& o) noexcept {
     return detail::tie(o.step_, o.rate_, o.input_gain_, o.sample_time_, o.scaled_input_gain_,
-                       o.settings_, o.speed_);
+                       o.settings_.plant);
   }
 
   static constexpr ModelParts without(bool actuator, bool sensor) noexcept {
@@ -624,22 +625,6 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
 
   Settings settings_;
   S speed_ = S(1);  ///< factor of the frequencies
-};
-
-/// For packs only sizes and settings: an observer of packs with such a model has one model for each
-/// lane.
-template <ModelParts Parts, PackScalar S>
-requires has_lanes<S>
-class AugmentedModel<Parts, S> {
-  using Plain = AugmentedModel<Parts, LaneScalar<S>>;
-
- public:
-  static constexpr int order = Plain::order;            ///< of the law
-  static constexpr int extension = Plain::extension;    ///< all rows besides the plant's
-  static constexpr ModelTraits traits = Plain::traits;  ///< what it is
-  using Settings = PartsSettings<Parts, S>;             ///< settings of make
-  template <class T>
-  using with_scalar = AugmentedModel<Parts, T>;  ///< the same with another scalar
 };
 
 /// Distinguishes the type in snapshots.

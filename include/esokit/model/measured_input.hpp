@@ -17,10 +17,6 @@ struct MeasuredInput {
   S gain{};       ///< what w = 1 adds to y^(n) in the end, unit of y^(n) per unit of w; either sign
   S lag{};        ///< time constant, s; 0: none
   S dead_time{};  ///< from w to the beginning of its effect, s; 0: none
-
-  /// @cond
-  static constexpr auto fields(auto& m) noexcept { return detail::tie(m.gain, m.lag, m.dead_time); }
-  /// @endcond
 };
 
 namespace detail {

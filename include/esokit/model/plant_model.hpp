@@ -109,12 +109,6 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
     Array<Resonance<S>, Parts.resonators> resonators{};  ///< sines of d
     Array<S, Parts.first_order>
         first_order{};  ///< time constants of the first-order disturbances, s
-
-    /// @cond
-    static constexpr auto fields(auto& s) noexcept {
-      return detail::tie(s.plant, s.sensor, s.resonators, s.first_order);
-    }
-    /// @endcond
   };
 
   /// Checks the plant and samples it with its disturbance.
@@ -278,9 +272,10 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
 
  private:
   friend struct detail::LaneAccess;
+  /// What a step reads.
   static constexpr auto fields(auto& o) noexcept {
     return detail::tie(o.step_, o.rate_, o.input_gain_, o.sample_time_, o.scaled_input_gain_,
-                       o.settings_, o.natural_, o.of_disturbance_, o.rest_of_y_, o.rest_of_u_);
+                       o.natural_, o.of_disturbance_, o.rest_of_y_, o.rest_of_u_);
   }
 
   static constexpr int sinusoids = States + Parts.constants;  ///< first row of the sines

@@ -8,7 +8,6 @@
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/switched_gain.hpp>
 #include <esokit/gain/switching_certificate.hpp>
-#include <esokit/observer/continuous_observer.hpp>
 #include <esokit/observer/named_observer.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
 
@@ -49,13 +48,6 @@ class AdjustableBandwidthEso
     S sample_time{};    ///< T, s
     int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts, see
                         ///< `max_gap()`
-
-    /// @cond
-    static constexpr auto fields(auto& c) noexcept {
-      return detail::tie(c.observer_bandwidth, c.bandwidth_ratio, c.rule,
-                         c.allow_uncertified_switching, c.input_gain, c.sample_time, c.max_gap);
-    }
-    /// @endcond
   };
   template <class T>
   using with_scalar =
@@ -64,7 +56,6 @@ class AdjustableBandwidthEso
   /// Takes over the settings of `fresh`, as returned by `make`, without design work. The estimate
   /// and the last innovation are kept.
   Check<S> adopt(AdjustableBandwidthEso fresh) {
-    if constexpr (PackScalar<S>) return detail::adopt_lanes(*this, fresh);
     std::get<0>(fresh.laws()).continue_from(std::get<0>(this->laws()));
     return Shell::adopt(fresh);
   }
@@ -96,47 +87,5 @@ class AdjustableBandwidthEso
 template <int Order, Scalar S, int Extension, SignReading Reading>
 inline constexpr std::uint32_t type_tag<AdjustableBandwidthEso<Order, S, Extension, Reading>> =
     make_type_tag<S>("AdjustableBandwidthEso", Order, Extension, Reading);
-
-/// AdjustableBandwidthEso as an ODE, for simulation; it switches at step boundaries.
-/// @tparam Order n @tparam S scalar @tparam Extension m
-template <int Order, Scalar S = double, int Extension = 1>
-class ContinuousAdjustableBandwidthEso
-    : public NamedObserver<
-          ContinuousAdjustableBandwidthEso<Order, S, Extension>,
-          ContinuousObserver<Order, S, Extension, ContinuousSwitchedGain<Order + Extension, S>>> {
-  using Shell = typename ContinuousAdjustableBandwidthEso::NamedObserver;
-  friend Shell;
-  using Shell::Shell;
-  using Law = typename Shell::Law;
-
- public:
-  /// Settings of make.
-  struct Config {
-    S observer_bandwidth{};                             ///< omega_o, rad/s
-    S bandwidth_ratio = S(1.0);                         ///< rho > 0
-    SwitchingRule rule = SwitchingRule::abeso;          ///< abeso or beso
-    SignReading sign_reading = SignReading::magnitude;  ///< printed: as in the paper's equation
-    bool allow_uncertified_switching = false;           ///< accept a ratio without a certificate
-    S input_gain{};  ///< b0, unit of y^(n) per unit of u; not zero
-  };
-
- private:
-  static Expected<Law, Error<S>> design(const Config& config) {
-    constexpr int size = Order + Extension;
-    const auto pair =
-        detail::bandwidth_pair<size, S>(config.observer_bandwidth, config.bandwidth_ratio,
-                                        config.rule, S(0.0), config.allow_uncertified_switching);
-    if (!pair) return pair.error();
-    const auto shrinking = continuous_gain<size, S>(pair->shrinking);
-    const auto otherwise = continuous_gain<size, S>(pair->otherwise);
-    Rules<S> rules;
-    for (const auto& gain : {shrinking, otherwise}) {
-      rules.representable("observer_bandwidth", config.observer_bandwidth, S(gain(size - 1)),
-                          "gives a gain that the scalar cannot hold");
-    }
-    if (!rules) return rules.error();
-    return Law(shrinking, otherwise, config.sign_reading);
-  }
-};
 
 }  // namespace esokit

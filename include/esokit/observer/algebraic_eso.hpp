@@ -6,7 +6,6 @@
 
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/algebraic_gain_design.hpp>
-#include <esokit/observer/continuous_observer.hpp>
 #include <esokit/observer/named_observer.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
 #include <optional>
@@ -72,14 +71,6 @@ class AlgebraicEso
     bool allow_vanishing_gain = false;  ///< accept lambda = 0 with q > 0: in the end y is ignored
     int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts, see
                         ///< `max_gap()`
-
-    /// @cond
-    static constexpr auto fields(auto& c) noexcept {
-      return detail::tie(c.observer_bandwidth, c.frequency_shift, c.input_gain, c.sample_time,
-                         c.blanking, c.measurement_noise, c.disturbance_noise, c.start_index,
-                         c.allow_vanishing_gain, c.max_gap);
-    }
-    /// @endcond
   };
 
   /// One sample, see PredictorCorrector::update.
@@ -101,21 +92,17 @@ class AlgebraicEso
   /// change of b0 is moved into the disturbance, also in blanked estimates. If the new blanking
   /// time has not passed yet, the present estimates are published until it has.
   Check<S> adopt(AlgebraicEso fresh) {
-    if constexpr (PackScalar<S>) {
-      return detail::adopt_lanes(*this, fresh);
-    } else {
-      Estimate published = estimate();
-      published(Order) =
-          published(Order) + (this->input_gain() - fresh.input_gain()) * this->applied_input();
-      if (!all(is_finite(published(Order)))) {
-        return Error<S>{"input_gain", fresh.input_gain(), "would make the estimate not finite"};
-      }
-      // A settled observer no longer knows its age, and stays settled.
-      fresh.law().resume(settled() ? Law::max_index : age());
-      if (auto ok = Base::adopt(fresh); !ok) return ok;
-      publish(published);
-      return {};
+    Estimate published = estimate();
+    published(Order) =
+        published(Order) + (this->input_gain() - fresh.input_gain()) * this->applied_input();
+    if (!all(is_finite(published(Order)))) {
+      return Error<S>{"input_gain", fresh.input_gain(), "would make the estimate not finite"};
     }
+    // A settled observer no longer knows its age, and stays settled.
+    fresh.law().resume(settled() ? Law::max_index : age());
+    if (auto ok = Base::adopt(fresh); !ok) return ok;
+    publish(published);
+    return {};
   }
 
   /// Call this after a known jump of the disturbance or of the state: restarts the schedule and
@@ -274,35 +261,5 @@ class AlgebraicEso
 template <int Order, Scalar S, int Extension>
 inline constexpr std::uint32_t type_tag<AlgebraicEso<Order, S, Extension>> =
     make_type_tag<S>("AlgebraicEso", Order, Extension);
-
-/// AlgebraicEso as an ODE, z' = A z + B u + L(t) (y - z_1), for t > 0; see AlgebraicFilter for the
-/// form that is regular at t = 0.
-/// @tparam Order n @tparam S scalar @tparam Extension m
-template <int Order, Scalar S = double, int Extension = 1>
-class ContinuousAlgebraicEso
-    : public NamedObserver<
-          ContinuousAlgebraicEso<Order, S, Extension>,
-          ContinuousObserver<Order, S, Extension, ContinuousAlgebraicGain<Order + Extension, S>>> {
-  using Shell = typename ContinuousAlgebraicEso::NamedObserver;
-  friend Shell;
-  using Shell::Shell;
-
- public:
-  /// Settings of make.
-  struct Config {
-    S observer_bandwidth{};  ///< lambda >= 0, rad/s
-    S frequency_shift{};     ///< q >= 0, rad/s
-    S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero
-  };
-
- private:
-  static Expected<typename Shell::Law, Error<S>> design(const Config& config) {
-    Rules<S> rules;
-    rules.not_negative("observer_bandwidth", config.observer_bandwidth)
-        .not_negative("frequency_shift", config.frequency_shift);
-    if (!rules) return rules.error();
-    return typename Shell::Law(config.observer_bandwidth, config.frequency_shift);
-  }
-};
 
 }  // namespace esokit

@@ -5,7 +5,6 @@
 
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/constant_gain.hpp>
-#include <esokit/observer/continuous_observer.hpp>
 #include <esokit/observer/named_observer.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
 #include <optional>
@@ -25,13 +24,6 @@ struct CascadeEsoConfig {
   [[no_unique_address]] Settings model{};  ///< what is known of the plant
   int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts; fewer
                       ///< if errors would not decay in any sequence of gaps, see `max_gap()`
-
-  /// @cond
-  static constexpr auto fields(auto& c) noexcept {
-    return detail::tie(c.observer_bandwidth, c.bandwidth_factor, c.level_bandwidths, c.input_gain,
-                       c.sample_time, c.model, c.max_gap);
-  }
-  /// @endcond
 };
 
 /// Settings of CascadeEso by poles.
@@ -43,29 +35,6 @@ struct CascadeEsoConfig<Size, Levels, S, Placement, Settings> {
   S sample_time{};                         ///< T, s
   [[no_unique_address]] Settings model{};  ///< what is known of the plant
   int max_gap = 100;                       ///< as by bandwidths
-
-  /// @cond
-  static constexpr auto fields(auto& c) noexcept {
-    return detail::tie(c.level_poles, c.input_gain, c.sample_time, c.model, c.max_gap);
-  }
-  /// @endcond
-};
-
-/// Settings of ContinuousCascadeEso by bandwidths.
-template <int Size, int Levels, Scalar S, class Placement>
-struct ContinuousCascadeEsoConfig {
-  S observer_bandwidth{};  ///< omega_o1 of level 1, rad/s
-  S bandwidth_factor{};    ///< alpha > 1: omega_oi = alpha omega_o(i-1); leave out for one level
-  std::optional<Array<S, Levels>> level_bandwidths{};  ///< omega_oi, rad/s; replaces the two above
-  S input_gain{};  ///< b0, unit of y^(n) per unit of u; not zero
-};
-
-/// Settings of ContinuousCascadeEso by poles.
-template <int Size, int Levels, Scalar S, ListsPoles Placement>
-struct ContinuousCascadeEsoConfig<Size, Levels, S, Placement> {
-  Array<typename Placement::template Spec<Size, S>, Levels>
-      level_poles{};  ///< p_i of each level, 1/s
-  S input_gain{};     ///< b0, unit of y^(n) per unit of u; not zero
 };
 
 namespace detail {
@@ -188,32 +157,5 @@ class CascadeEso : public NamedObserver<
 template <int Order, int Levels, Scalar S, int Extension, class Placement, class Model>
 inline constexpr std::uint32_t type_tag<CascadeEso<Order, Levels, S, Extension, Placement, Model>> =
     make_type_tag<S, Placement, Model>("CascadeEso", Order, Levels, Extension);
-
-/// CascadeEso as an ODE, equations (23), (24), for simulation.
-/// @tparam Order n @tparam Levels p @tparam S scalar @tparam Extension m
-/// @tparam Placement EqualPoles (config by bandwidths) or PoleSet (config by level_poles;
-/// gain/pole_set.hpp)
-template <int Order, int Levels, Scalar S = double, int Extension = 1, class Placement = EqualPoles>
-class ContinuousCascadeEso
-    : public NamedObserver<
-          ContinuousCascadeEso<Order, Levels, S, Extension, Placement>,
-          ContinuousObserver<Order, S, Extension,
-                             ContinuousConstantGain<Order + Extension, S, Placement>, Levels>> {
-  using Shell = typename ContinuousCascadeEso::NamedObserver;
-  friend Shell;
-  using Shell::Shell;
-
- public:
-  /// Settings of make.
-  using Config = ContinuousCascadeEsoConfig<Order + Extension, Levels, S, Placement>;
-
- private:
-  static auto design(const Config& config) {
-    return detail::level_laws<typename Shell::Law, Placement, Order + Extension, Levels, S>(
-        config, [](const char* field, const auto& spec, int index) {
-          return Shell::Law::make(field, spec, index);
-        });
-  }
-};
 
 }  // namespace esokit

@@ -64,7 +64,7 @@ struct ObserverTraits {
   /// Disturbances are measured: `measured(w)` before each step, `revise_measured()`,
   /// `settle_measured()`, see Measured.
   bool takes_measured = false;
-  bool varies_time = false;  ///< `set_step_time(seconds)`, before each step, and (but for packs)
+  bool varies_time = false;  ///< `set_step_time(seconds)`, before each step, and
                              ///< `step_time() const`, its present length, and `bridges(steps)
                              ///< const`, see VariableTime
   bool gates_outliers =
@@ -167,10 +167,8 @@ concept TakesMeasured = requires(O& o) {
 template <class O>
 concept VariesTime = requires(O& o, const typename O::scalar_type& s) {
   { o.set_step_time(s) } -> std::same_as<Check<typename O::scalar_type>>;
-  requires PackScalar<typename O::scalar_type> || requires {
-    { std::as_const(o).step_time() } -> std::convertible_to<typename O::scalar_type>;
-    { std::as_const(o).bridges(1) } -> std::same_as<bool>;
-  };
+  { std::as_const(o).step_time() } -> std::convertible_to<typename O::scalar_type>;
+  { std::as_const(o).bridges(1) } -> std::same_as<bool>;
 };
 template <class O>
 concept GatesOutliers = requires(const O& o, const typename O::scalar_type& s) {
@@ -193,12 +191,11 @@ concept GatesDisturbance = requires(O& o, const O& constant, const typename O::s
   o.release();
 };
 
-/// Like `as_declared`. An adapter, and a LaneByLane, has members for everything that it passes on,
-/// even if what it consists of has no such member.
+/// Like `as_declared`. An adapter has members for everything that it passes on, even if what it
+/// consists of has no such member.
 template <class O>
 constexpr bool observer_as_declared(bool declared, bool named, bool right) noexcept {
-  return as_declared(declared, observer_traits<O>.adapts || goes_lane_by_lane<O> ? right : named,
-                     right);
+  return as_declared(declared, observer_traits<O>.adapts ? right : named, right);
 }
 
 }  // namespace detail

@@ -143,15 +143,6 @@ class ExtendedStateFilter
     [[no_unique_address]] typename PlantModel::Settings plant_model{};
     int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts
 
-    /// @cond
-    static constexpr auto fields(auto& c) noexcept {
-      return detail::tie(c.input_gain, c.sample_time, c.measurement_variance, c.disturbance_bounds,
-                         c.bound_factor, c.process_covariance, c.initial_covariance,
-                         c.inflation_rule, c.inflation, c.allow_vanishing_gain, c.trace_weights,
-                         c.mode, c.outlier_threshold, c.model, c.plant_model, c.max_gap);
-    }
-    /// @endcond
-
     /// All weights one.
     static constexpr Array<S, N> equal_weights() noexcept {
       Array<S, N> weights{};
@@ -169,20 +160,16 @@ class ExtendedStateFilter
   /// Takes over the settings of `fresh`, as returned by `make`, without design work. As with
   /// `retune`, estimate and covariance are kept, and a change of b0 is moved into the disturbance.
   Check<S> adopt(ExtendedStateFilter fresh) {
-    if constexpr (PackScalar<S>) {
-      return detail::adopt_lanes(*this, fresh);
-    } else {
-      if (!fresh.law().continue_from(law(), S(fresh.sample_time() / this->sample_time()))) {
-        return Error<S>{"measurement_variance", fresh.law().measurement_variance(),
-                        "is too small, or sample_time changed too much, to carry over the present "
-                        "covariance: measure first"};
-      }
-      if (auto ok = Base::adopt(fresh); !ok) return ok;
-      nominal_model_ = fresh.nominal_model_;
-      outlier_threshold_ = fresh.outlier_threshold_;
-      change_bound_ = fresh.change_bound_;
-      return {};
+    if (!fresh.law().continue_from(law(), S(fresh.sample_time() / this->sample_time()))) {
+      return Error<S>{"measurement_variance", fresh.law().measurement_variance(),
+                      "is too small, or sample_time changed too much, to carry over the present "
+                      "covariance: measure first"};
     }
+    if (auto ok = Base::adopt(fresh); !ok) return ok;
+    nominal_model_ = fresh.nominal_model_;
+    outlier_threshold_ = fresh.outlier_threshold_;
+    change_bound_ = fresh.change_bound_;
+    return {};
   }
 
   /// One sample: `predict(u_applied)`, then `correct(y)`.

@@ -14,8 +14,4 @@ namespace esokit {
 template <int Order, Scalar S = double, int Extension = 1>
 using HalfGainEso = LinearEso<Order, S, Extension, HalfGainPoles>;
 
-/// The same as an ODE, with exactly half the gains.
-template <int Order, PlainScalar S = double, int Extension = 1>
-using ContinuousHalfGainEso = ContinuousLinearEso<Order, S, Extension, HalfGainPoles>;
-
 }  // namespace esokit

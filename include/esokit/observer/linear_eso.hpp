@@ -5,7 +5,6 @@
 
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/constant_gain.hpp>
-#include <esokit/observer/continuous_observer.hpp>
 #include <esokit/observer/named_observer.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
 
@@ -22,12 +21,6 @@ struct LinearEsoConfig {
   [[no_unique_address]] Settings model{};  ///< what is known of the plant
   int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts; fewer
                       ///< if errors would not decay in any sequence of gaps, see `max_gap()`
-
-  /// @cond
-  static constexpr auto fields(auto& c) noexcept {
-    return detail::tie(c.observer_bandwidth, c.input_gain, c.sample_time, c.model, c.max_gap);
-  }
-  /// @endcond
 };
 
 /// Settings of LinearEso by poles.
@@ -40,12 +33,6 @@ struct LinearEsoConfig<Size, S, Placement, Settings> {
   S sample_time{};                         ///< T, s
   [[no_unique_address]] Settings model{};  ///< what is known of the plant
   int max_gap = 100;                       ///< as by bandwidth
-
-  /// @cond
-  static constexpr auto fields(auto& c) noexcept {
-    return detail::tie(c.poles, c.input_gain, c.sample_time, c.model, c.max_gap);
-  }
-  /// @endcond
 };
 
 /// Linear extended state observer of a plant y^(n) = d + b0 u, sampled exactly.
@@ -86,41 +73,5 @@ class LinearEso
 template <int Order, Scalar S, int Extension, class Placement, class Model>
 inline constexpr std::uint32_t type_tag<LinearEso<Order, S, Extension, Placement, Model>> =
     make_type_tag<S, Placement, Model>("LinearEso", Order, Extension);
-
-/// Settings of ContinuousLinearEso by bandwidth.
-template <int Size, Scalar S, class Placement>
-struct ContinuousLinearEsoConfig {
-  S observer_bandwidth{};  ///< omega_o, rad/s: all poles at -omega_o, or as the placement says
-  S input_gain{};          ///< b0, unit of y^(n) per unit of u; not zero
-};
-
-/// Settings of ContinuousLinearEso by poles.
-template <int Size, Scalar S, ListsPoles Placement>
-struct ContinuousLinearEsoConfig<Size, S, Placement> {
-  /// p_i, 1/s, N poles in the left half plane, complex ones in conjugate pairs
-  typename Placement::template Spec<Size, S> poles{};
-  S input_gain{};  ///< b0, unit of y^(n) per unit of u; not zero
-};
-
-/// LinearEso as an ODE, z' = A z + B u + l (y - z_1), for simulation.
-/// @tparam Order n @tparam S scalar @tparam Extension m @tparam Placement as for LinearEso
-template <int Order, Scalar S = double, int Extension = 1, class Placement = EqualPoles>
-class ContinuousLinearEso
-    : public NamedObserver<
-          ContinuousLinearEso<Order, S, Extension, Placement>,
-          ContinuousObserver<Order, S, Extension,
-                             ContinuousConstantGain<Order + Extension, S, Placement>>> {
-  using Shell = typename ContinuousLinearEso::NamedObserver;
-  friend Shell;
-  using Shell::Shell;
-
- public:
-  using Config = ContinuousLinearEsoConfig<Order + Extension, S, Placement>;  ///< settings of make
-
- private:
-  static auto design(const Config& config) {
-    return detail::placed_law<typename Shell::Law>(config);
-  }
-};
 
 }  // namespace esokit

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <cmath>
-#include <esokit/core/lane_by_lane.hpp>
 #include <esokit/gain/covariance_factor.hpp>
 #include <esokit/gain/noise_settings.hpp>
 #include <esokit/gain/riccati.hpp>
@@ -45,15 +44,6 @@ struct MimoExtendedStateFilterConfig {
   bool allow_vanishing_gain = false;                    ///< see ExtendedStateFilter
   int max_gap = 100;  ///< missing samples of a channel in a row that a correction may bridge,
                       ///< 1 .. 65000; after more its chain restarts from the measurement
-
-  /// @cond
-  static constexpr auto fields(auto& c) noexcept {
-    return detail::tie(c.input_matrix, c.sample_time, c.measurement_covariance,
-                       c.disturbance_bounds, c.bound_factor, c.process_covariance,
-                       c.initial_covariance, c.inflation_rule, c.inflation, c.mode,
-                       c.allow_vanishing_gain, c.max_gap);
-  }
-  /// @endcond
 };
 
 /// Extended state filter of p plants y_i^(n_i) = d_i + sum_j B0_ij u_j, sampled exactly. Couplings
@@ -766,33 +756,6 @@ class MimoExtendedStateFilter {
   bool fresh_ = false;  ///< no step since a reset to the limit
   bool standing_ = false;
   bool has_limit_ = false;
-};
-
-/// For packs, lane by lane, because each lane may lack other channels.
-template <class Orders, int Inputs, PackScalar S, int Extension>
-class MimoExtendedStateFilter<Orders, Inputs, S, Extension>
-    : public LaneByLane<MimoExtendedStateFilter<Orders, Inputs, S, Extension>,
-                        MimoExtendedStateFilter<Orders, Inputs, LaneScalar<S>, Extension>, S,
-                        MimoExtendedStateFilterConfig<Orders, Inputs, S, Extension>> {
-  using Base = typename MimoExtendedStateFilter::LaneByLane;
-
- public:
-  using Output = Vector<S, Orders::count>;  ///< y, p x 1
-  using Input = Vector<S, Inputs>;          ///< u, q x 1
-  template <class T>
-  using with_scalar =
-      MimoExtendedStateFilter<Orders, Inputs, T, Extension>;  ///< with another scalar
-
-  using Base::Base;
-
-  /// As for plain scalars.
-  /// @{
-  StatusOf<S> update(const Output& y, const Input& u_applied) noexcept {
-    return Base::update(y, u_applied);
-  }
-  StatusOf<S> predict(const Input& u_applied) noexcept { return Base::predict(u_applied); }
-  StatusOf<S> correct(const Output& y) noexcept { return Base::correct(y); }
-  /// @}
 };
 
 }  // namespace esokit

@@ -2,7 +2,6 @@
 /// LinearEso and CascadeEso with a model composed of parts.
 #pragma once
 
-#include <esokit/core/lane_by_lane.hpp>
 #include <esokit/gain/model_gain.hpp>
 #include <esokit/gain/scheduled_gain.hpp>
 #include <esokit/model/augmented_model.hpp>
@@ -13,67 +12,6 @@
 #include <utility>
 
 namespace esokit {
-
-/// @cond
-namespace detail {
-
-/// An observer of packs with a model: one observer per lane, each bridging the gaps that its model
-/// allows.
-template <class Self, class Plain, PackScalar S, class Settings>
-class ModelLanes : public LaneByLane<Self, Plain, S, Settings> {
- public:
-  static constexpr int order = Plain::order;          ///< n, order of the plant
-  static constexpr int extension = Plain::extension;  ///< all rows besides the plant's
-  static constexpr int size = Plain::size;            ///< N
-  static constexpr int levels = Plain::levels;        ///< p
-  using Estimate = Vector<S, size>;                   ///< (y, .., y^(n-1), d, ..), N x 1
-
-  /// What it can do beyond LoopObserver. For analysis and prediction use a lane.
-  static constexpr ObserverTraits traits = [] {
-    ObserverTraits traits = Plain::traits;
-    traits.acts_by_gain = false;
-    traits.is_predictable = false;
-    return traits;
-  }();
-
-  using ModelLanes::LaneByLane::LaneByLane;
-};
-
-}  // namespace detail
-/// @endcond
-
-/// LinearEso with a model, for packs.
-template <int Order, PackScalar S, int Extension, class Placement, class Model>
-requires(!model_traits<Model>.is_chain && has_lanes<S>)  //
-    class LinearEso<Order, S, Extension, Placement, Model>
-    : public detail::ModelLanes<
-          LinearEso<Order, S, Extension, Placement, Model>,
-          LinearEso<Order, LaneScalar<S>, Extension, Placement,
-                    detail::WithScalar<Model, LaneScalar<S>>>,
-          S, LinearEsoConfig<Order + Extension, S, Placement, typename Model::Settings>> {
- public:
-  using LinearEso::ModelLanes::ModelLanes;
-  /// The same with another scalar.
-  template <class T>
-  using with_scalar = LinearEso<Order, T, Extension, Placement, detail::WithScalar<Model, T>>;
-};
-
-/// CascadeEso with a model, for packs.
-template <int Order, int Levels, PackScalar S, int Extension, class Placement, class Model>
-requires(!model_traits<Model>.is_chain && has_lanes<S>)  //
-    class CascadeEso<Order, Levels, S, Extension, Placement, Model>
-    : public detail::ModelLanes<
-          CascadeEso<Order, Levels, S, Extension, Placement, Model>,
-          CascadeEso<Order, Levels, LaneScalar<S>, Extension, Placement,
-                     detail::WithScalar<Model, LaneScalar<S>>>,
-          S, CascadeEsoConfig<Order + Extension, Levels, S, Placement, typename Model::Settings>> {
- public:
-  using CascadeEso::ModelLanes::ModelLanes;
-  /// The same with another scalar.
-  template <class T>
-  using with_scalar =
-      CascadeEso<Order, Levels, T, Extension, Placement, detail::WithScalar<Model, T>>;
-};
 
 /// LinearEso with a model of actuator, sensor, plant poles or the frequencies of the disturbance:
 ///

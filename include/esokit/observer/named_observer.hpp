@@ -1,6 +1,5 @@
 /// @file
-/// NamedObserver: the common base of all named observers, sampled and continuous: design from a
-/// config.
+/// NamedObserver: the common base of all named observers: design from a config.
 #pragma once
 
 #include <esokit/core/check.hpp>
@@ -11,7 +10,7 @@
 
 namespace esokit {
 
-/// Base of the named observers: `make`, and for sampled ones `retune`.
+/// Base of the named observers: `make` and `retune`.
 ///
 /// A named observer is a model, a law, a config and their documentation. Your own observer is
 ///
@@ -32,34 +31,24 @@ namespace esokit {
 ///     };
 ///
 /// `design` returns the gain law (for a cascade all laws) as an Expected. It is called after b0, T
-/// and max_gap have been checked; for a continuous observer (`Base` a ContinuousObserver) its only
-/// argument is the config. For packs the observer also declares `with_scalar`, and its config
-/// `fields`.
-/// @tparam Self the observer itself @tparam Base PredictorCorrector or ContinuousObserver
+/// and max_gap have been checked. An observer whose packs compute all lanes at once also declares
+/// `with_scalar`, see core/packed.hpp.
+/// @tparam Self the observer itself @tparam Base PredictorCorrector
 template <class Self, class Base>
 class NamedObserver : public Base {
-  static constexpr bool sampled = requires { typename Base::Status; };
-
  public:
   using scalar_type = typename Base::scalar_type;  ///< type of states and settings
 
   /// Checks the settings and does all the design work.
-  /// @return the observer (a sampled one at rest at zero), or an error that names the field
+  /// @return the observer (at rest at zero), or an error that names the field
   template <class O = Self>
   static Expected<Self, Error<scalar_type>> make(const typename O::Config& config) {
     if constexpr (Base::order < 1) {
       // Nothing else is instantiated: further errors would hide this one.
       static_assert(Base::order >= 1, "esokit: the plant order must be at least 1");
       return Error<scalar_type>{};
-    } else if constexpr (!sampled) {
-      if (Rules<scalar_type> rules; !rules.nonzero("input_gain", config.input_gain))
-        return rules.error();
-      const auto laws = O::design(config);
-      if (!laws) return laws.error();
-      return Self(config, config.input_gain, *laws);
-    } else if constexpr (PackScalar<scalar_type>) {
-      return detail::make_lanes<Self>(config);
     } else {
+      detail::refuse_packs<scalar_type>();
       using Model = typename Base::PlantModel;
       // The chain is checked first: laws divide by what it checks.
       if (auto ok = Base::check_chain({config.input_gain, config.sample_time, config.max_gap}); !ok)
@@ -75,7 +64,7 @@ class NamedObserver : public Base {
   /// New settings while running. The estimates of all levels are kept; a change of b0 is moved into
   /// the disturbance (of level 1). A refused config changes nothing.
   template <class O = Self>
-  requires sampled Check<scalar_type> retune(const typename O::Config& config) {
+  Check<scalar_type> retune(const typename O::Config& config) {
     return detail::retune(static_cast<Self&>(*this), config);
   }
 

@@ -6,7 +6,6 @@
 
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/nonlinear_gain_design.hpp>
-#include <esokit/observer/continuous_observer.hpp>
 #include <esokit/observer/named_observer.hpp>
 #include <esokit/observer/predictor_corrector.hpp>
 
@@ -55,14 +54,6 @@ class NonlinearEso
     S sample_time{};    ///< T, s
     int max_gap = 100;  ///< missing samples that a correction may bridge before it restarts, see
                         ///< `max_gap()`
-
-    /// @cond
-    static constexpr auto fields(auto& c) noexcept {
-      return detail::tie(c.observer_bandwidth, c.shape, c.error_scale, c.gain_min, c.gain_max,
-                         c.allow_uncertified_gain, c.unlimited, c.input_gain, c.sample_time,
-                         c.max_gap);
-    }
-    /// @endcond
   };
   template <class T>
   using with_scalar =
@@ -138,61 +129,5 @@ class NonlinearEso
 template <int Order, Scalar S, int Extension, class Shape>
 inline constexpr std::uint32_t type_tag<NonlinearEso<Order, S, Extension, Shape>> =
     make_type_tag<S, Shape>("NonlinearEso", Order, Extension);
-
-/// NonlinearEso as an ODE, for simulation. By default k is kept above gain_min = 1/2, which is
-/// certified without an upper limit in continuous time (from (N-1) / (2N) on).
-/// @tparam Order n @tparam S scalar @tparam Extension m @tparam Shape an EvenGain
-template <int Order, Scalar S = double, int Extension = 2, class Shape = PowerSumGain<S>>
-requires EvenGain<Shape, S>
-class ContinuousNonlinearEso
-    : public NamedObserver<
-          ContinuousNonlinearEso<Order, S, Extension, Shape>,
-          ContinuousObserver<Order, S, Extension,
-                             ContinuousNonlinearGain<Order + Extension, S, Shape>>> {
-  using Shell = typename ContinuousNonlinearEso::NamedObserver;
-  friend Shell;
-  using Shell::Shell;
-  using Law = typename Shell::Law;
-
- public:
-  /// Settings of make.
-  struct Config {
-    S observer_bandwidth{};               ///< omega_o, rad/s: the poles are at -omega_o for k = 1
-    Shape shape{};                        ///< k(|e| / error_scale)
-    S error_scale = S(1.0);               ///< unit of y: what counts as an error of one
-    std::optional<S> gain_min{};          ///< k is not less
-    std::optional<S> gain_max{};          ///< k is not more
-    bool allow_uncertified_gain = false;  ///< accept limits without the certificate
-    bool unlimited = false;               ///< no limits, no certificate
-    S input_gain{};                       ///< b0, unit of y^(n) per unit of u; not zero
-  };
-
- private:
-  static Expected<Law, Error<S>> design(const Config& config) {
-    constexpr int size = Order + Extension;
-    const auto linear =
-        ContinuousConstantGain<size, S>::make("observer_bandwidth", config.observer_bandwidth);
-    if (!linear) return linear.error();
-    Rules<S> rules;
-    rules.positive("error_scale", config.error_scale).all_of(detail::check_shape<S>(config.shape));
-    if (!rules) return rules.error();
-    const Vector<S, size> gain = linear->gain(S(0.0), S(0.0));
-    detail::GainLimits<S> asked{config.gain_min, config.gain_max, config.allow_uncertified_gain,
-                                config.unlimited};
-    constexpr double free_from = unbounded_certified_gain<size>();
-    Interval<S> limits{};
-    if (!asked.unlimited && !asked.upper &&
-        (!asked.lower || (is_finite(*asked.lower) && *asked.lower >= S(free_from)))) {
-      limits = {asked.lower ? *asked.lower : S(0.5),
-                S((std::numeric_limits<detail::TableScalar<S>>::max)())};
-    } else {
-      constexpr double least = least_certified_gain<size>();
-      const auto found = detail::find_limits<size, S>(asked, gain, S(least), S(1e6));
-      if (!found) return found.error();
-      limits = *found;
-    }
-    return Law(gain, config.shape, config.error_scale, limits.lower, limits.upper);
-  }
-};
 
 }  // namespace esokit

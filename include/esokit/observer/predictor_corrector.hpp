@@ -435,7 +435,6 @@ class PredictorCorrector {
   /// time, and a change of b0 is moved into the disturbance, dhat += (b0_old - b0_new) u, so that
   /// the control does not jump.
   Check<S> adopt(const PredictorCorrector& fresh) {
-    if constexpr (PackScalar<S>) return detail::adopt_lanes(*this, fresh);
     PredictorCorrector next = fresh;
     for (std::size_t i = 0; i < Levels; ++i) {
       next.states_[i] = next.model_.rescaled(states_[i], model_);

@@ -13,7 +13,7 @@
 #include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/lanes.hpp>
-#include <esokit/core/pack.hpp>
+#include <esokit/core/packed.hpp>
 #include <esokit/sim/counted_gaussian.hpp>
 #include <esokit/sim/run.hpp>
 #include <esokit/sim/statistics.hpp>
@@ -167,36 +167,21 @@ struct SettlingTime : FinalValue {
   double band;
 };
 
-/// Whether the plain form of `Packed` is One. A class that is derived from one of esokit inherits
-/// the packs of that one, which do what that one does.
-template <class Packed, class One, class S>
-concept PacksOf = std::same_as<typename Packed::template with_scalar<S>, One>;
-
-/// The types for `Lanes` runs at once.
+/// Whether all lanes of `Lanes` runs are computed at once.
 template <class P, class C, int Lanes>
-struct InPacks {
-  static constexpr bool possible = false;
-};
-template <class P, class C, int Lanes>
-requires(Lanes > 1 && esokit::detail::LaneAccess::has_fields<P> &&
-         esokit::detail::LaneAccess::has_fields<C> && requires {
-           typename P::template with_scalar<Pack<typename RunTypes<P, C>::S, Lanes>>;
-           typename C::template with_scalar<Pack<typename RunTypes<P, C>::S, Lanes>>;
-           requires std::same_as < typename RunTypes<P, C>::S,
-           typename C::scalar_type > ;
-         }) struct InPacks<P, C, Lanes> {
-  using S = Pack<typename RunTypes<P, C>::S, Lanes>;
-  using Plant = typename P::template with_scalar<S>;
-  using Control = typename C::template with_scalar<S>;
-  static constexpr bool possible = [] {
-    using One = LaneScalar<S>;
-    if constexpr (SampledPlant<Plant> && PacksOf<Plant, P, One> && PacksOf<Control, C, One>) {
-      return ControllerOf<Control, Plant> && std::is_trivially_copyable_v<Control>;
-    } else {
-      return false;
+inline constexpr bool runs_in_packs = [] {
+  using One = typename RunTypes<P, C>::S;
+  if constexpr (Lanes == 1) {
+    return false;
+  } else if constexpr (esokit::detail::ComputesPacks<P, Pack<One, Lanes>> &&
+                       esokit::detail::ComputesPacks<C, Pack<One, Lanes>>) {
+    if constexpr (std::same_as<One, typename C::scalar_type>) {
+      using Plants = typename Packed<P, Lanes>::Together;
+      return SampledPlant<Plants> && ControllerOf<Packed<C, Lanes>, Plants>;
     }
-  }();
-};
+  }
+  return false;
+}();
 
 }  // namespace detail
 
@@ -709,16 +694,13 @@ class MonteCarlo {
     (check(rules, measures, end), ...);
     if (!rules) return rules.error();
 
-    using Packed = detail::InPacks<P, C, Lanes>;
-    bool in_packs = false;
-    if constexpr (Packed::possible) {
-      in_packs = !(config_.loop.jitter > Time(0)) && !config_.loop.step_time;
-    }
+    constexpr bool possible = detail::runs_in_packs<P, C, Lanes>;
+    const bool in_packs = possible && !(config_.loop.jitter > Time(0)) && !config_.loop.step_time;
     work.outcome.lanes = in_packs ? Lanes : 1;
     work.go([&](std::int64_t from, Results& results) {
-      if constexpr (Packed::possible) {
+      if constexpr (possible) {
         if (in_packs) {
-          run_in_packs<Packed>(from, results, measures...);
+          run_in_packs<Lanes>(from, results, measures...);
           return;
         }
       }
@@ -801,22 +783,14 @@ class MonteCarlo {
     return {};
   }
 
-  template <class Packed, class... Measures>
+  template <int lanes, class... Measures>
   void run_in_packs(std::int64_t from, Results& results, const Measures&... measures) const {
-    using S = typename Packed::S;
-    constexpr int lanes = lane_count<S>;
-    auto plant = esokit::detail::blank<typename Packed::Plant>();
-    auto controller = esokit::detail::blank<typename Packed::Control>();
-    auto loop = packed_loop<typename Packed::Plant, typename Packed::Control>();
+    Packed<P, lanes> plants(plant_);
+    Packed<C, lanes> controllers(controller_);
+    auto loop = packed_loop<typename Packed<P, lanes>::Together, Packed<C, lanes>>();
     auto state = loop.state;
     auto noise = loop.noise;
     constexpr bool varied = !std::is_same_v<Vary, NoVariation>;
-    if constexpr (!varied) {
-      for (int i = 0; i < lanes; ++i) {
-        esokit::detail::set_lane(plant, plant_, i);
-        esokit::detail::set_lane(controller, controller_, i);
-      }
-    }
     for (std::int64_t at = 0; at < results.count; at += lanes) {
       bool good = at + lanes <= results.count;
       if constexpr (varied) {
@@ -824,15 +798,16 @@ class MonteCarlo {
           const auto one = trial(from + at + i);
           good = one.has_value();
           if (!good) break;
-          esokit::detail::set_lane(plant, one->plant, i);
-          esokit::detail::set_lane(controller, one->controller, i);
+          plants.set(i, one->plant);
+          controllers.set(i, one->controller);
           esokit::detail::set_lane(state, one->state, i);
           esokit::detail::set_lane(noise, one->noise, i);
         }
       }
       if (good) {
         set(loop, from + at, state, noise);
-        good = drive(plant, controller, loop, results, at, lanes, measures...).has_value();
+        good = drive(plants.together(), controllers, loop, results, at, lanes, measures...)
+                   .has_value();
       }
       // Repeated one by one to find out which of them failed.
       for (std::int64_t i = at; !good && i < std::min(at + lanes, results.count); ++i) {

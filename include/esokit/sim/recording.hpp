@@ -183,8 +183,9 @@ struct RunRecord {
     constexpr int us = Types::inputs;
     const bool observes = total_disturbance.size() == t.size();
     std::string text = "$run << END\n" + csv() + "END\nset datafile separator ','\nset grid\n";
-    text +=
-        "set multiplot layout " + std::to_string(observes ? 3 : 2) + ",1 title '" + title + "'\n";
+    // Panels of one width; their names beside them, where no curve is.
+    text += "set key outside samplen 2\nset multiplot layout " + std::to_string(observes ? 3 : 2) +
+            ",1 margins 0.1,0.82,0.1,0.92 spacing 0.05 title '" + title + "'\nset format x ''\n";
     const auto lines = [&text](const char* name, int first, int count) {
       for (int i = 0; i < count; ++i) {
         text += (i > 0 ? ", $run" : " $run");
@@ -197,10 +198,11 @@ struct RunRecord {
     lines("r", 2 + 2 * ys, ys);
     text += ',';
     lines("y", 2, ys);
-    text += observes ? "\nplot" : "\nset xlabel 't (s)'\nplot";
+    const char* const last = "\nset format x\nset xlabel 't (s)'\nplot";
+    text += observes ? "\nplot" : last;
     lines("u", 2 + 3 * ys, us);
     if (observes) {
-      text += "\nset xlabel 't (s)'\nplot";
+      text += last;
       lines("dhat", 2 + 3 * ys + us, 1);
     }
     return text += "\nunset multiplot\n";

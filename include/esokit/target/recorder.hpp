@@ -96,7 +96,7 @@ std::vector<unsigned char> counters_of(const Object& object) {
 /// changes it. So add all calls that will be used before `record`.
 ///
 /// The object runs on RecordingScalar, which is a pack: it needs `with_scalar` and `fields` (see
-/// core/lanes.hpp) and must not run lane by lane. `can_be_recorded` says this of a type.
+/// core/lanes.hpp). `can_be_recorded` says this of a type.
 /// @tparam Object an observer or controller of float or double
 template <class Object>
 class Recorder {
@@ -106,9 +106,6 @@ class Recorder {
   using Recorded = detail::WithScalar<Object, Number>;  ///< the object that is recorded
   using Arguments = std::vector<Number>;                ///< of a call
   using Call = std::function<Arguments(Recorded&, const Arguments&)>;  ///< returns the outputs
-
-  static_assert(!detail::goes_lane_by_lane<Recorded>,
-                "esokit: a type that runs lane by lane cannot be recorded");
 
   /// @param object as `make` returned it, or later; its state and settings are those recorded
   explicit Recorder(const Object& object) : object_(as_recorded(object)) {}
@@ -214,12 +211,11 @@ namespace detail {
 template <class Object>
 concept Recordable = requires {
   typename WithScalar<Object, RecordingScalar<typename Object::scalar_type>>;
-}
-&&!goes_lane_by_lane<WithScalar<Object, RecordingScalar<typename Object::scalar_type>>>;
+};
 
 }  // namespace detail
 
-/// Whether a Recorder takes the type: it works on packs, and not lane by lane.
+/// Whether a Recorder takes the type: it works on packs.
 template <class Object>
 inline constexpr bool can_be_recorded = detail::Recordable<Object>;
 

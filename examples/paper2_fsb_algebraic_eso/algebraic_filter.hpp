@@ -16,10 +16,11 @@
 #pragma once
 
 #include <cmath>
-#include <esokit/core/type_tag.hpp>
-#include <esokit/observer/algebraic_eso.hpp>
+#include <esokit/core/check.hpp>
+#include <esokit/core/expected.hpp>
+#include <esokit/sim/continuous_gain_law.hpp>
 
-namespace esokit {
+namespace esokit::examples {
 
 /// The filter's equations for simulation, to be stacked with those of a plant. It gives the same
 /// estimates as ContinuousAlgebraicEso but is regular at t = 0: its state always starts at zero, so
@@ -207,9 +208,4 @@ class AlgebraicFilter {
   Config config_;
 };
 
-/// Distinguishes the type in snapshots.
-template <int Order, Scalar S, int Extension>
-inline constexpr std::uint32_t type_tag<AlgebraicFilter<Order, S, Extension>> =
-    make_type_tag<S>("AlgebraicFilter", Order, Extension);
-
-}  // namespace esokit
+}  // namespace esokit::examples

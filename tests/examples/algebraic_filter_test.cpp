@@ -1,11 +1,12 @@
 // AlgebraicFilter against the matrices that the paper prints (J. Kasac, A. Pender, M. Pranjic,
 // D. Kotarski, Asian Journal of Control 23 (2021) 2171-2184), and against the chain form.
+#include <esokit/sim/continuous_observer.hpp>
 #include <gtest/gtest.h>
 
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <esokit/control/algebraic_filter.hpp>
+#include <paper2_fsb_algebraic_eso/algebraic_filter.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/gain/continuous_gain.hpp>
 #include <limits>
@@ -15,9 +16,9 @@
 #include <utility>
 
 namespace esokit_test {
-namespace control_algebraic_filter_test {
+namespace examples_algebraic_filter_test {
 
-using esokit::AlgebraicFilter;
+using esokit::examples::AlgebraicFilter;
 
 template <class T, std::size_t Rows, std::size_t Columns>
 using Table = std::array<std::array<T, Columns>, Rows>;
@@ -419,5 +420,5 @@ TEST(AlgebraicFilter, RefusesBadConfigByName) {
   }
 }
 
-}  // namespace control_algebraic_filter_test
+}  // namespace examples_algebraic_filter_test
 }  // namespace esokit_test

@@ -1,0 +1,305 @@
+/// @file
+/// Packed: as many objects of a type as a pack has lanes, as one object.
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+#include <esokit/core/check.hpp>
+#include <esokit/core/expected.hpp>
+#include <esokit/core/lanes.hpp>
+#include <esokit/core/matrix.hpp>
+#include <esokit/core/pack.hpp>
+#include <type_traits>
+#include <utility>
+
+namespace esokit {
+
+namespace detail {
+
+/// The type that holds one T for each lane of the pack S: numbers become packs, all else a PerLane.
+template <class T, class S>
+struct OfPacks {
+  using type = PerLane<T, lane_count<S>>;
+};
+template <class T, class S>
+requires std::same_as<T, LaneScalar<S>>
+struct OfPacks<T, S> {
+  using type = S;
+};
+template <class T, int Rows, int Columns, class S>
+struct OfPacks<Matrix<T, Rows, Columns>, S> {
+  using type = Matrix<typename OfPacks<T, S>::type, Rows, Columns>;
+};
+template <class T, std::size_t Count, class S>
+struct OfPacks<std::array<T, Count>, S> {
+  using type = std::array<typename OfPacks<T, S>::type, Count>;
+};
+
+/// The type of one lane of a T made of packs. What is neither made of packs nor a PerLane is common
+/// to all lanes.
+template <class T, class S>
+struct OfLane {
+  using type = T;
+};
+template <class S>
+struct OfLane<S, S> {
+  using type = LaneScalar<S>;
+};
+template <class T, int Count, class S>
+struct OfLane<PerLane<T, Count>, S> {
+  using type = T;
+};
+template <class T, int Rows, int Columns, class S>
+struct OfLane<Matrix<T, Rows, Columns>, S> {
+  using type = Matrix<typename OfLane<T, S>::type, Rows, Columns>;
+};
+template <class T, std::size_t Count, class S>
+struct OfLane<std::array<T, Count>, S> {
+  using type = std::array<typename OfLane<T, S>::type, Count>;
+};
+
+/// Lane `i` of an argument.
+template <class S, class T>
+constexpr typename OfLane<T, S>::type lane_of(const T& packed, int i) noexcept {
+  typename OfLane<T, S>::type plain{};
+  copy_lane<false>(packed, plain, i);
+  return plain;
+}
+
+/// The results of f(i) for each lane of S, put together as packs.
+template <class S, class Function>
+constexpr auto of_all_lanes(Function&& f) noexcept {
+  using Result = std::remove_cvref_t<decltype(f(0))>;
+  if constexpr (std::is_void_v<Result>) {
+    for (int i = 0; i < lane_count<S>; ++i) f(i);
+  } else {
+    typename OfPacks<Result, S>::type results{};
+    for (int i = 0; i < lane_count<S>; ++i) set_lane(results, f(i), i);
+    return results;
+  }
+}
+
+/// A T whose form on packs computes all lanes at once. A class that is derived from one of the
+/// library inherits the form of that one, which does what that one does: the form's plain one has
+/// to be T.
+template <class T, class S>
+concept ComputesPacks = LaneAccess::has_fields<T> && requires {
+  typename T::template with_scalar<S>;
+  requires std::same_as<typename T::template with_scalar<S>::template with_scalar<LaneScalar<S>>,
+                        T>;
+};
+
+/// One T for each lane.
+template <class T, class S>
+class OneByOne {
+ public:
+  using scalar_type = S;  ///< type of signals
+
+ protected:
+  using Plains = Array<T, lane_count<S>>;
+
+  constexpr explicit OneByOne(const Plains& lanes) noexcept : lanes_(lanes) {}
+
+  /// Whether each lane has a member function of this name.
+#define ESOKIT_EACH_LANE(name)                                                  \
+ public:                                                                        \
+  template <class... Given>                                                     \
+  auto name(const Given&... given) noexcept requires requires(T & lane) {       \
+    lane.name(std::declval<const typename OfLane<Given, S>::type&>()...);       \
+  }                                                                             \
+  {                                                                             \
+    return of_all_lanes<S>([&]([[maybe_unused]] int i) {                        \
+      return lanes_[static_cast<std::size_t>(i)].name(lane_of<S>(given, i)...); \
+    });                                                                         \
+  }
+
+  // Of observers and of controllers, what a loop needs; for all else there is `each`.
+  ESOKIT_EACH_LANE(update)
+  ESOKIT_EACH_LANE(update_without_measurement)
+  ESOKIT_EACH_LANE(predict)
+  ESOKIT_EACH_LANE(correct)
+  ESOKIT_EACH_LANE(control)
+  ESOKIT_EACH_LANE(prepare)
+  ESOKIT_EACH_LANE(applied)
+#undef ESOKIT_EACH_LANE
+
+ protected:
+  Plains lanes_;
+};
+
+template <class T, class S>
+struct PackedForm {
+  using type = OneByOne<T, S>;
+};
+template <class T, class S>
+requires ComputesPacks<T, S>
+struct PackedForm<T, S> {
+  using type = typename T::template with_scalar<S>;
+};
+
+}  // namespace detail
+
+/// `Lanes` objects of type T as one, each with its own settings, faults, gaps and status. Each lane
+/// gives the results of a T alone, bit for bit with -ffp-contract=off (the compiler must not fuse
+/// products and sums).
+///
+///     using Four = esokit::Packed<esokit::LinearEso<2>, 4>;
+///     auto four = Four::make([](int lane) {
+///       return esokit::LinearEso<2>::Config{.observer_bandwidth = 50.0 + 10.0 * lane,
+///                                           .input_gain = 1.0, .sample_time = 1e-3};
+///     }).value();
+///     const auto status = four.update(y, u);  // y and u are Pack<double, 4>, status[i] is of a
+///     lane
+///
+/// Where the type can, all lanes are computed at once (`at_once`): the linear, cascade, adjustable,
+/// nonlinear and algebraic observers, `ExtendedStateFilter`, `Adrc` and `DisturbanceCompensator` of
+/// these, `DualFeedbackAdrc`, laws, limiter and plants. Then it has all members of T that a good
+/// sample needs, of packs; if a lane has a bad sample or a gap, the lanes of this step go one by
+/// one. All other types go lane by lane: the adapters, `ModelEso`, `PredictiveAdrc`, `MimoAdrc`,
+/// `MimoExtendedStateFilter`, the differentiators, your own. A pack of them costs as much as its
+/// lanes together and has `update`, `predict`, `correct`, `control`, `prepare`, `applied`. What T
+/// has besides is called through `each`, of one lane through a copy of it, `packed[i]`.
+/// @tparam T type of a lane, of float or double @tparam Lanes see Pack
+template <class T, int Lanes = default_lanes<typename T::scalar_type>>
+class Packed : public detail::PackedForm<T, Pack<typename T::scalar_type, Lanes>>::type {
+  using One = typename T::scalar_type;
+  using Form = typename detail::PackedForm<T, Pack<One, Lanes>>::type;
+  using Indices = std::make_integer_sequence<int, Lanes>;
+
+ public:
+  using scalar_type = Pack<One, Lanes>;  ///< type of signals
+  using Plain = T;                       ///< type of a lane
+  static constexpr int lanes = Lanes;    ///< number of lanes
+
+  /// Whether all lanes are computed at once while all is well.
+  static constexpr bool at_once = detail::ComputesPacks<T, scalar_type>;
+
+  using Together = Form;  ///< all lanes as one object of packs; one by one an array of T
+
+  /// Takes the objects lane(0), lane(1), ..
+  template <class Function>
+  requires std::convertible_to<std::invoke_result_t<const Function&, int>, T>
+  explicit constexpr Packed(const Function& lane) noexcept : Packed(lane, Indices{}) {}
+
+  /// The same object in every lane.
+  explicit constexpr Packed(const T& one) noexcept
+      : Packed([&](int) -> const T& { return one; }, Indices{}) {}
+
+  /// Checks the settings and does all the design work, lane by lane.
+  /// @param config lane -> its Config @return the pack, or an error that names field and lane
+  template <class Function>
+  static Expected<Packed, Error<One>> make(const Function& config) {
+    return [&]<int... I>(std::integer_sequence<int, I...>)->Expected<Packed, Error<One>> {
+      const Array<Expected<T, Error<One>>, Lanes> made{T::make(config(I))...};
+      for (int i = 0; i < Lanes; ++i) {
+        if (const auto& one = made[static_cast<std::size_t>(i)]; !one) return of(one.error(), i);
+      }
+      return Packed([&](int i) -> const T& { return *made[static_cast<std::size_t>(i)]; });
+    }
+    (Indices{});
+  }
+
+  /// New settings while running: taken by all lanes or, on an error, by none.
+  /// @param config lane -> its Config
+  template <class Function>
+  Check<One> retune(const Function& config) {
+    return all_or_none([&](T& lane, int i) { return lane.retune(config(i)); });
+  }
+
+  /// The same with the settings of `fresh`, as returned by `make`.
+  Check<One> adopt(const Packed& fresh) {
+    return all_or_none([&](T& lane, int i) { return lane.adopt(fresh[i]); });
+  }
+
+  /// Calls f(lane, i) for each lane: of all lanes or, if one returns an error, of none.
+  template <class Function>
+  Check<One> all_or_none(const Function& f) {
+    Packed next = *this;
+    for (int i = 0; i < Lanes; ++i) {
+      T lane = next[i];
+      if (const auto ok = f(lane, i); !ok) return of(ok.error(), i);
+      next.set(i, lane);
+    }
+    *this = next;
+    return {};
+  }
+
+  /// A copy of lane `i`.
+  [[nodiscard]] constexpr T operator[](int i) const noexcept {
+    if constexpr (at_once) {
+      return detail::get_lane<T>(static_cast<const Form&>(*this), i);
+    } else {
+      return this->lanes_[static_cast<std::size_t>(i)];
+    }
+  }
+
+  /// Lane `i` becomes `one`.
+  constexpr void set(int i, const T& one) noexcept {
+    if constexpr (at_once) {
+      detail::set_lane(static_cast<Form&>(*this), one, i);
+    } else {
+      this->lanes_[static_cast<std::size_t>(i)] = one;
+    }
+  }
+
+  /// All lanes as one object of packs.
+  [[nodiscard]] constexpr const Together& together() const noexcept requires at_once {
+    return *this;
+  }
+
+  /// Calls f(lane, i) for each lane, one after the other. @return the results of all lanes:
+  /// numbers, vectors and matrices as those of packs, all else as a PerLane @{
+  template <class Function>
+  constexpr auto each(const Function& f) noexcept {
+    return detail::of_all_lanes<scalar_type>([&](int i) -> decltype(auto) {
+      struct Lane {
+        Packed& all;
+        int i;
+        T lane = all[i];
+        ~Lane() { all.set(i, lane); }
+      } one{*this, i};
+      return std::invoke_result_t<const Function&, T&, int>(f(one.lane, i));
+    });
+  }
+  template <class Function>
+  [[nodiscard]] constexpr auto each(const Function& f) const noexcept {
+    return detail::of_all_lanes<scalar_type>([&](int i) {
+      const T lane = (*this)[i];
+      return f(lane, i);
+    });
+  }
+  /// @}
+
+  /// As of T, in each lane. @{
+  template <class... Given>
+  auto start(const Given&... given) noexcept {
+    return each(
+        [&](auto& lane, int i) { return lane.start(detail::lane_of<scalar_type>(given, i)...); });
+  }
+  template <class State>
+  auto reset(const State& state) noexcept {
+    return each(
+        [&](auto& lane, int i) { return lane.reset(detail::lane_of<scalar_type>(state, i)); });
+  }
+  /// @}
+
+ private:
+  template <class Function, int... I>
+  constexpr Packed(const Function& lane, std::integer_sequence<int, I...>) noexcept
+      : Form([&] {
+          if constexpr (at_once) {
+            auto form = detail::blank<Form>();
+            (detail::set_lane(form, lane(I), I), ...);
+            return form;
+          } else {
+            return Array<T, Lanes>{lane(I)...};
+          }
+        }()) {}
+
+  static Error<One> of(Error<One> error, int lane) {
+    error.lane = lane;
+    return error;
+  }
+};
+
+}  // namespace esokit
