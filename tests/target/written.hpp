@@ -39,7 +39,11 @@ auto observer_config(double input_gain) {
   typename Observer::Config config{};
   if constexpr (requires { config.observer; }) {
     config.observer = observer_config<typename Observer::Adapted>(input_gain);
-    config.delay = 3;
+    if constexpr (requires { config.delay; }) config.delay = 3;
+    if constexpr (requires { config.threshold; }) {
+      config.threshold = V(0.05);
+      config.running_factor = V(6);
+    }
   } else {
     config.sample_time = V(0.0078125);
     config.input_gain = V(input_gain);
