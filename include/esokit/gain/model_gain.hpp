@@ -236,7 +236,9 @@ class ModelGain {
  public:
   /// What the law can do besides `gain`.
   static constexpr GainLawTraits traits{.kind = GainKind::preset, .bridges_gaps = true};
-  using Spec = typename Placement::template Spec<Size, S>;  ///< bandwidth or poles
+  using Spec = typename Placement::template Spec<Size, LaneScalar<S>>;  ///< bandwidth or poles
+  template <class T>
+  using with_scalar = ModelGain<Size, T, Placement, MostBridged>;  ///< the same with another scalar
 
   /// The gain for a set of poles.
   /// @param field name of the config member that holds `spec`, for the error
@@ -318,6 +320,9 @@ class ModelGain {
   }
 
  private:
+  friend struct detail::LaneAccess;
+  static constexpr auto fields(auto& o) noexcept { return detail::tie(o.gains_, o.longest_step_); }
+
   ModelGain() = default;
 
   template <int Part, int Pairs>
