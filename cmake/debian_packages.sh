@@ -2,7 +2,8 @@
 
 # What every build needs, what each kind of program needs on top.
 ESOKIT_BUILD_PACKAGES=(g++ cmake ninja-build libeigen3-dev)
-ESOKIT_TEST_PACKAGES=(libgtest-dev libboost-dev librandom123-dev)
+# The C and the Structured Text that are written: other compilers, MISRA, an interpreter.
+ESOKIT_TEST_PACKAGES=(libgtest-dev libboost-dev librandom123-dev tcc sdcc cppcheck python3)
 ESOKIT_BENCHMARK_PACKAGES=(libbenchmark-dev python3)
 # Without a font gnuplot draws figures with no text, and reports no error.
 # Python makes the pages and tables and checks the numbers of the READMEs.

@@ -25,9 +25,8 @@ bool Figure::write(const std::string& folder, const std::string& formats) const 
   // Where something is missing, this is said once.
   static bool able = true;
   able = (able || formats != "svg") && run_python(draw_script(), texts->description);
-  return able ||
-         (formats == "svg" && write_text(folder + "/" + name_ + ".svg",
-                                         plain_svg(texts->description, texts->numbers)));
+  return able || (formats == "svg" && write_text(folder + "/" + name_ + ".svg",
+                                                 plain_svg(texts->description, texts->numbers)));
 }
 
 }  // namespace esokit::examples

@@ -238,7 +238,7 @@ struct SignDifferentiator {
 template <class Operator, class Feedback>
 struct Filter {
   using Type = esokit::DualFeedbackAdrc<2, double, 1, Operator, Feedback>;
-  static Type::Config config(int lane, bool again) {
+  static typename Type::Config config(int lane, bool again) {
     return {.observer_bandwidth = set(lane, again, 30),
             .controller_bandwidth = set(lane, again, 5),
             .input_gain = set(lane, again, -2),

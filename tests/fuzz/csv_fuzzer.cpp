@@ -1,8 +1,5 @@
 // libFuzzer: any text through the log reader of the examples. What it refuses it must refuse by
 // LogError.
-#include <sys/mman.h>
-#include <unistd.h>
-
 #include <cmath>
 #include <cstdint>
 #include <cstdio>

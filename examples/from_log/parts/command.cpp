@@ -78,12 +78,12 @@ int gallery(const std::string& out) {
 
 }  // namespace
 
-int from_log::command(int argc, char** argv) {
+int from_log::command(int argc, char** argv, const Beside& beside) {
   esokit::examples::print_utf8();
   try {
     const Settings settings = read_arguments(argc, argv);
     if (argc == 1) throw LogError("no file is given; from_log --help shows the options");
-    if (settings.file.empty()) return gallery(settings.out);
+    if (settings.file.empty()) return beside ? int{all_clear} : gallery(settings.out);
     if (!settings.observer.empty()) {
       const std::string page = show_observer(settings, read_log(settings));
       if (page.empty()) return failed;
@@ -110,6 +110,7 @@ int from_log::command(int argc, char** argv) {
     const std::string page = outcome.page(settings).write(settings.out, stem_of(settings));
     if (page.empty()) return failed;
     std::printf("%s\n", page.c_str());
+    if (beside && outcome.design.made()) beside(outcome.design, page);
     return outcome.status;
   } catch (const LogError& error) {
     std::fprintf(stderr, "from_log: %s\n", error.what());

@@ -130,7 +130,7 @@ struct LaneAccess {
   }
 };
 
-struct RecordAccess;  // target/c_code.hpp: parts of a controller's step that are recorded apart
+struct RecordAccess;  // target/recorded_design.hpp: what is recorded apart
 
 /// A std::array or a Matrix.
 template <class T>
