@@ -297,6 +297,8 @@ design=--no-design  # the controller takes most of the time, and does not know w
 written '# recorded by hand
 t;y;u' ';' t | sed 's/$/\r/; s/\([0-9]\)\.\([0-9]\)/\1,\2/g' >excel.csv
 healthy excel.csv
+written t,T,u , t >temperature.csv  # T is the y that is named, so t is the time
+healthy temperature.csv --y T
 written t_ms,y,u , '1000 * t' >milliseconds.csv
 healthy milliseconds.csv
 written 'time (us),y,u' , 'sprintf("%d", 1e6 * t)' >microseconds.csv
