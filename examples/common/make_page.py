@@ -344,7 +344,7 @@ def playground(out):
     return ('<li><a href="playground.html"><svg role="img" aria-label="Two step responses" '
             f'viewBox="0 0 400 220"><path d="M20 50H380M20 180H380" stroke="#d8dce3"/>{lines}</svg>'
             "<b>Playground: a machine and a controller in this browser</b></a>\n"
-            '<p class="quiet">Move a slider: responses, disturbance, margins, C++ to take home.</p></li>\n')
+            '<p class="quiet">Move a slider: responses, disturbance, margins. Or drop a log: a model, a controller, C++ to take home.</p></li>\n')
 
 
 def overview(out, papers):

@@ -22,7 +22,7 @@ if ! require_packages ${install_option[@]+"${install_option[@]}"} "${ESOKIT_WASM
 fi
 
 mkdir -p "$build" "$(dirname -- "$page")"
-# Two modules: what is played with, at once; what reads a log, when there is one. The parts of from_log are
+# Two modules: what is played with, at once; what reads a log or writes C, when it is asked for. The parts of from_log are
 # compiled in two units, as native: one by one they take half as long again.
 examples=$root/examples
 unit() {  # NAME SOURCE..: only written where it changes
@@ -34,7 +34,7 @@ unit() {  # NAME SOURCE..: only written where it changes
 unit play playground/module/{play,wasm}.cpp
 unit log_reading common/{csv,figure}.cpp common/compiled/study.cpp \
   from_log/parts/{arguments,read_log,examine,page,show}.cpp playground/module/{log,log_wasm}.cpp
-unit log_designing from_log/parts/{design,paste}.cpp
+unit log_designing from_log/parts/{design,paste}.cpp playground/module/c_code.cpp
 
 # No unit catches: what is thrown ends the module (log_wasm.cpp). -O1: three quarters of the time to compile.
 compile() {

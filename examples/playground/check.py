@@ -11,6 +11,7 @@ import array
 import base64
 import json
 import math
+import re
 import sys
 import tempfile
 import time
@@ -68,6 +69,10 @@ def visit(page, check):
             study(page, path, "")
             says = page.value("$('logsays').textContent")
             check(words in says and len(says) < 400, f"{path.name}: the page says '{says}'")
+    code = page.value("read('observer=2'), c_of_state()")
+    check(code and "controller_update" in code["source"], "there is no C of a cascade")
+    check(not page.value("read('observer=1'), c_of_state()"), "there is C of what cannot be written")
+    page.value("read(''), update(true)")
     page.value("study(), cancel()")
     check("ancel" in page.value("$('logsays').textContent"), "it cannot be cancelled")
     for width in (390, 1300, 1920):
@@ -76,6 +81,33 @@ def visit(page, check):
             page.value(f"view('{part}')")
             wide = page.value("document.documentElement.scrollWidth")
             check(wide <= width, f"{part}: {wide} px wide in a window of {width} px")
+
+
+def taken_over(page, found, name, check):
+    """The design in the playground is that of the page: noise moves u by as much."""
+    page.value("$('toplay').click()")
+    check(page.value("$('refusal').textContent") == "", f"{name}: the playground refuses {found['address']}")
+    ours = page.value("100 * result.numbers[0].noise / (2 * state.limit)")
+    row = next(row for row in re.findall(r"<tr>.*?</tr>", found["main"], re.S)
+               if re.search(r"scope=.row.>\d+ " + re.escape(found["design"]) + "<", row))
+    says = float(re.findall(r"<td>([^<]*)</td>", row)[4])
+    check(abs(ours - says) < 0.006 * says, f"{name}: noise moves u by {ours:.4g} %, the page says {says:g} %")
+    page.value("view('log')")
+
+
+def by_keyboard(page, check):
+    """From the first tab to a log of the page, without a mouse."""
+    page.value("view('play'), $('tab-play').focus()")
+    page.key("ArrowRight")
+    check(page.value("!$('log').hidden && document.activeElement.id") == "tab-log", "no arrow leads to the other part")
+    for _ in range(20):
+        page.key("Tab")
+        if page.value("document.activeElement.dataset.log"):
+            break
+    page.value("window.before = show_log; window.answer = new Promise((done) => { show_log = (said) => "
+               "{ before(said); show_log = before; done(said.status); }; }); null")
+    page.key("Enter")
+    check(page.value("answer") == 0, "Enter on the first log gives no controller")
 
 
 def study(page, path, options):
@@ -141,6 +173,9 @@ def main():
                     first = next((f"'{a[:200]}' natively '{b[:200]}'" for a, b in
                                   zip(str(ours).split("\n"), str(native_one).split("\n")) if a != b), "")
                     check(ours == native_one, f"{name}: {key} differs: {first}")
+                if found.get("address"):
+                    taken_over(page, found, name, check)
+        by_keyboard(page, check)
         visit(page, check)
         check(not page.said, "console: " + "; ".join(page.said[:5]))
         asked = [one for one in page.requests if not one.startswith(("file:", "blob:", "about:"))]

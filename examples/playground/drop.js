@@ -174,9 +174,10 @@ class LogFigure {
       one.box = document.createElement('div');
       one.box.className = 'plot';
       place.append(one.box);
+      const label = (axis) => plain_marks((one.set[axis + '_label'] || [''])[0]);
+      add(one.box, 'p', { class: 'names quiet' }, label('y'));
       names_of(add(one.box, 'p', { class: 'names' }), one.drawn.filter((line) => line.name && one.set.legend));
       one.svg = add(one.box, 'svg', { class: 'axes', role: 'img' });
-      const label = (axis) => plain_marks((one.set[axis + '_label'] || [''])[0]);
       one.svg.setAttribute('aria-label', `${label('y')} over ${label('x') || 'the same axis as below'}`);
     }
   }
@@ -204,7 +205,7 @@ class LogFigure {
       }
       if (!(high >= low)) [low, high] = [0, 1];
       if (high === low) [low, high] = [low - 1, high + 1];
-      const pad = axis === 'y' ? 0.05 * (high - low) : 0;
+      const pad = axis === 'y' || drawn.some((one) => one.kind === 'points') ? 0.05 * (high - low) : 0;
       const [from, until] = (set[axis + '_range'] || ['*', '*']).map((v) => v === '*' ? NaN : to(Number(v)));
       return [Number.isFinite(from) ? from : low - pad, Number.isFinite(until) ? until : high + pad];
     };
@@ -214,7 +215,7 @@ class LogFigure {
     const [low, high] = range('y', Y, [...data.map((one) => one.y), ...flat,
       ...data.filter((one) => one.kind === 'band').map((one) => one.z)]);
     const { px, py, left, right, top, bottom, clip } = axes(svg, { width, height, x0, x1, low, high, xlog, ylog,
-      x: plain_marks((set.x_label || [''])[0]), y: plain_marks((set.y_label || [''])[0]) });
+      x: plain_marks((set.x_label || [''])[0]) });
     const near = (v) => Math.min(Math.max(v, -4 * height), 5 * height);
     for (const one of drawn) {
       const ink = { stroke: one.colour, 'stroke-width': one.width, 'stroke-dasharray': one.dash, fill: 'none',
@@ -264,6 +265,32 @@ class LogFigure {
 function draw_log() {
   if (log_result && !$('log').hidden) for (const figure of log_result.drawn) figure.draw();
 }
+
+// ---- the C of what is played with: from the module of the logs, which is there when it is asked for ----
+
+async function c_of_state() {
+  const none = new Proxy({}, { get: () => () => 8 });
+  const { exports } = await WebAssembly.instantiate(await log_module(), { page: none, wasi_snapshot_preview1: none });
+  exports._initialize();
+  const to = new Float64Array(exports.memory.buffer, exports.settings(), fields.length);
+  fields.forEach((field, i) => { to[i] = state[field.name]; });
+  const text_at = (at) => {
+    const bytes = new Uint8Array(exports.memory.buffer, at);
+    return new TextDecoder().decode(bytes.subarray(0, bytes.indexOf(0)));
+  };
+  const header = text_at(exports.c_header());
+  return header && { header, source: text_at(exports.c_source()) };
+}
+$('savec').onclick = async () => {
+  const code = await c_of_state();
+  if (!code) {
+    done('to_c writes C of LinearEso and CascadeEso without a known dead time; of this controller not yet.');
+    return;
+  }
+  save('controller.h', 'text/x-chdr', code.header);
+  save('controller.c', 'text/x-csrc', code.source);
+  done('controller.h and controller.c saved.');
+};
 
 // ---- the two parts of the page ----
 

@@ -368,7 +368,7 @@ const controls = {};
 function build() {
   const groups = {};
   for (const field of fields) {
-    if (field.group === 'What happens') continue;
+    if (field.group === 'What happens' || field.kind === 4) continue;
     if (!groups[field.group]) {
       groups[field.group] = document.createElement('fieldset');
       const legend = document.createElement('legend');
@@ -443,10 +443,10 @@ function build() {
 
 let result = null, waiting = 0, later = 0;
 function update(whole) {
-  for (const field of fields) controls[field.name]();
+  for (const name in controls) controls[name]();
   const now = play(state, whole);
   for (const field of fields) {
-    if (controls[field.name].bad) controls[field.name].bad(Boolean(now.refusal) && now.refusal.startsWith(field.name + ' '));
+    if (controls[field.name] && controls[field.name].bad) controls[field.name].bad(Boolean(now.refusal) && now.refusal.startsWith(field.name + ' '));
   }
   $('refusal').textContent = now.refusal ? 'Refused: ' + now.refusal + '. The figures show what was before.' : '';
   if (now.refusal) return;

@@ -37,7 +37,7 @@ onmessage = async ({ data: { module, file, words } }) => {
     const figures = [];
     for (let i = 0; i < api.figures(); ++i) figures.push({ description: text(api.description(i)), numbers: text(api.points(i)) });
     postMessage({ status, figures, header: text(api.header()), main: text(api.main_text()),
-      code: text(api.code()), address: text(api.address()), taken: text(api.taken()) });
+      code: text(api.code()), address: text(api.address()), taken: text(api.taken()), design: text(api.design()) });
   } catch (problem) {
     // Without memory it stops where it is.
     postMessage({ error: problem instanceof refusal ? problem.message :

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <tuple>
 
 #include "from_log/parts/show.hpp"
 
@@ -18,19 +19,31 @@ void take_over(const from_log::Outcome& outcome, LogResult& result) {
   const esokit::Tuning& tuning = outcome.design.tuning();
   const esokit::TunedDesign& chosen = outcome.design.taken();
   const esokit::TuneModel& model = tuning.model;
-  const auto choice_of = [](const esokit::TunedDesign& design) {
-    const bool plain = design.settings.controller_bandwidth > 0.0 && design.feasible;
-    const auto& knows = design.knows;
-    if (!plain || knows.sensor || knows.sinusoid) return -1;
-    if (design.family == esokit::TuneFamily::linear)
-      return knows.lag ? 3 : design.extension == 1 ? 0 : design.extension == 2 ? 1 : -1;
-    return -1;
+  const auto n = static_cast<std::size_t>(model.order);
+  const auto choice_of = [n](const esokit::TunedDesign& design) {
+    const auto& [settings, knows] = std::tie(design.settings, design.knows);
+    if (!design.feasible || knows.sensor || knows.sinusoid) return -1;
+    if (design.family == esokit::TuneFamily::linear && settings.controller_bandwidth > 0.0)
+      return knows.lag ? 3 : design.extension == 1 ? 0 : 1;
+    const bool free = design.family == esokit::TuneFamily::free_poles;
+    return free && settings.observer_poles.size() == n + 1 ? (knows.lag ? 5 : 4) : -1;
   };
   const esokit::TunedDesign* taken = choice_of(chosen) >= 0 ? &chosen : nullptr;
   for (const auto& design : tuning.designs) {
     if (taken == nullptr && choice_of(design) >= 0 && design.comes_back) taken = &design;
   }
   if (taken == nullptr) return;
+  // Of poles and gains the geometric means; what is over them goes with the sliders.
+  const auto& poles = taken->settings.observer_poles;
+  const auto& gains = taken->settings.gains;
+  const int choice = choice_of(*taken);
+  double slow = taken->settings.controller_bandwidth, fast = taken->settings.observer_bandwidth;
+  if (choice >= 4) {
+    slow = std::pow(gains[0], 1.0 / static_cast<double>(gains.size()));
+    fast = 1.0;
+    for (const auto& pole : poles)
+      fast *= std::pow(std::abs(pole), 1.0 / static_cast<double>(poles.size()));
+  }
   const double gain = std::abs(model.input_gain.value);
   const double half = 0.5 * (model.u_max - model.u_min);
   const auto set = [&](const char* name, double value) {
@@ -44,20 +57,34 @@ void take_over(const from_log::Outcome& outcome, LogResult& result) {
   set("lag", model.lag);
   set("dead_time", model.dead_time);
   set("friction", pasting.friction);
-  set("load", 0.1 * gain * half);
+  set("load", 0.2 * gain * half);  // a tenth of the range, as the page has it
   set("noise", model.noise);
   set("quantum", outcome.findings.found.log.quantisation);
-  set("observer", choice_of(*taken));
-  set("controller_bandwidth", taken->settings.controller_bandwidth);
-  set("observer_bandwidth", taken->settings.observer_bandwidth);
+  set("observer", choice);
+  set("controller_bandwidth", slow);
+  set("observer_bandwidth", fast);
+  const auto exactly = [&](const char* name, std::size_t i, double value) {
+    result.address +=
+        "&" + (name + std::to_string(i)) + "=" + esokit::examples::number_text(value, 12);
+  };
+  if (choice >= 4) {
+    for (std::size_t i = 0; i < poles.size(); ++i) {
+      exactly("pole", i + 1, poles[i].real() / fast);
+      exactly("swing", i + 1, poles[i].imag() / fast);
+    }
+    const auto count = static_cast<double>(gains.size());
+    for (std::size_t i = 0; i < gains.size(); ++i)
+      exactly("law", i, gains[i] / std::pow(slow, count - static_cast<double>(i)));
+  }
+  set("soften", taken->settings.soften ? 2 : 1);
   set("limit", half);
   set("sample_time", model.sample_time);
   // So that u may be at its limit for a moment, and in whole settling times.
-  const double power =
-      std::pow(taken->settings.controller_bandwidth, model.order + (taken->knows.lag ? 1 : 0));
+  const double power = std::pow(slow, model.order + (taken->knows.lag ? 1 : 0));
   set("reference", 0.9 * half * gain / power / (taken->knows.lag ? model.lag : 1.0));
   const double settling = std::max(taken->settling_time, 10 * model.latency());
   set("samples", std::clamp(std::round(8 * settling / model.sample_time), 200.0, 20000.0));
+  result.design = taken->name;
   result.taken = "The playground has the machine of " + outcome.input.y + " and " +
                  outcome.input.u + " with " + taken->name;
   if (taken == &chosen) {

@@ -19,6 +19,7 @@ struct LogResult {
   std::string code;     // C++ to paste; empty: no design
   std::string address;  // of the machine and the design in the playground; empty: no design
   std::string taken;    // what is taken there, in a sentence
+  std::string design;   // its name
 };
 
 // arguments: those of from_log, by zero bytes; throws LogError

@@ -55,7 +55,8 @@ int main(int argc, char** argv) {
     out << "{\"error\":" << json_text(error) << ",\"status\":" << result.status
         << ",\"header\":" << json_text(result.header) << ",\"main\":" << json_text(result.main)
         << ",\"code\":" << json_text(result.code) << ",\"address\":" << json_text(result.address)
-        << ",\"taken\":" << json_text(result.taken) << ",\"figures\":[";
+        << ",\"taken\":" << json_text(result.taken) << ",\"design\":" << json_text(result.design)
+        << ",\"figures\":[";
     const char* comma = "";
     for (const auto& figure : result.figures) {
       out << comma << "{\"description\":" << json_text(figure.description)

@@ -5,6 +5,7 @@
 #include <typeinfo>
 
 #include "log.hpp"
+#include "play.hpp"
 
 #define EXPORTED(name) extern "C" __attribute__((export_name(#name)))
 #define IMPORTED(name) extern "C" __attribute__((import_module("page"), import_name(#name)))
@@ -23,6 +24,8 @@ extern "C" [[noreturn]] void __cxa_throw(void* thrown, std::type_info*, void (*)
 namespace {
 std::string bytes, arguments;
 playground::LogResult result;
+playground::Settings settings{};
+std::array<std::string, 2> c_code;
 }  // namespace
 
 // Room for what the page writes.
@@ -43,6 +46,7 @@ EXPORTED(main_text) const char* main_text() { return result.main.c_str(); }
 EXPORTED(code) const char* code() { return result.code.c_str(); }
 EXPORTED(address) const char* address() { return result.address.c_str(); }
 EXPORTED(taken) const char* taken() { return result.taken.c_str(); }
+EXPORTED(design) const char* design() { return result.design.c_str(); }
 EXPORTED(figures) int figures() { return static_cast<int>(result.figures.size()); }
 EXPORTED(description) const char* description(int i) {
   return result.figures[static_cast<std::size_t>(i)].description.c_str();
@@ -50,3 +54,11 @@ EXPORTED(description) const char* description(int i) {
 EXPORTED(points) const char* points(int i) {
   return result.figures[static_cast<std::size_t>(i)].numbers.c_str();
 }
+
+// Of what is played with.
+EXPORTED(settings) double* settings_here() { return settings.data(); }
+EXPORTED(c_header) const char* c_header() {
+  c_code = playground::c_of(settings);
+  return c_code[0].c_str();
+}
+EXPORTED(c_source) const char* c_source() { return c_code[1].c_str(); }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <cstdio>
 #include <cstdlib>
 #include <esokit/adapter/delayed_input.hpp>
@@ -9,6 +10,7 @@
 #include <esokit/analysis/loop_noise.hpp>
 #include <esokit/analysis/margins.hpp>
 #include <esokit/control/adrc.hpp>
+#include <esokit/gain/pole_set.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/model_eso.hpp>
@@ -28,6 +30,10 @@ using esokit::LinearPlant;
 using Outcome = esokit::Check<double>;
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+constexpr Field hidden_field(const char* name, double standard) {
+  return {name, "", "", "", Kind::hidden, 0, 0, standard, "", ""};
+}
 
 // By the order of Index.
 constexpr std::array<Field, field_count> all_fields{{
@@ -54,8 +60,9 @@ constexpr std::array<Field, field_count> all_fields{{
      "standard deviation, white"},
     {"quantum", "step of the sensor", "y", "Machine", Kind::number_or_none, 1e-6, 10, 0, "",
      "least difference that it shows"},
-    {"observer", "observer", "", "Controller", Kind::choice, 0, 3, 0,
-     "LinearEso;LinearEso, extension 2;CascadeEso, 2 levels;ModelEso, knows the lag",
+    {"observer", "observer", "", "Controller", Kind::choice, 0, 5, 0,
+     "LinearEso;LinearEso, extension 2;CascadeEso, 2 levels;ModelEso, knows the lag;"
+     "LinearEso, poles of a log;ModelEso, knows the lag, poles of a log",
      "what estimates the state and the disturbance"},
     {"controller_bandwidth", "controller bandwidth \u03c9c", "rad/s", "Controller", Kind::number,
      0.05, 1e4, 10, "", "how fast y follows"},
@@ -80,6 +87,19 @@ constexpr std::array<Field, field_count> all_fields{{
     {"noisy", "Double the noise", "", "What happens", Kind::on_off, 0, 1, 0, "", ""},
     {"wrong", "b\u2080 off by two", "", "What happens", Kind::on_off, 0, 1, 0, "", ""},
     {"pid", "PID beside it", "", "What happens", Kind::on_off, 0, 1, 0, "", ""},
+    hidden_field("pole1", -1),
+    hidden_field("swing1", 0),
+    hidden_field("pole2", -1),
+    hidden_field("swing2", 0),
+    hidden_field("pole3", -1),
+    hidden_field("swing3", 0),
+    hidden_field("pole4", -1),
+    hidden_field("swing4", 0),
+    hidden_field("law0", 0),
+    hidden_field("law1", 0),
+    hidden_field("law2", 0),
+    hidden_field("law3", 0),
+    hidden_field("soften", 0),
 }};
 
 // The shortest text that reads back as this number.
@@ -204,11 +224,29 @@ double known_gain(const Settings& s) {
   return s[gain] * s[gain_factor] * (s[half_gain] > 0.0 ? 2.0 : 1.0);
 }
 
+// By poles and gains as a log gave them; the sliders of the bandwidths move all together.
+bool poles_of_log(const Settings& s) { return s[observer] >= 4.0; }
+bool law_of_log(const Settings& s) { return poles_of_log(s) && s[law] > 0.0; }
+bool knows_lag(const Settings& s) { return s[observer] == 3.0 || s[observer] == 5.0; }
+double law_gain(const Settings& s, std::size_t i, std::size_t count) {
+  return s[law + i] * std::pow(s[controller_bandwidth], static_cast<double>(count - i));
+}
+std::complex<double> pole(const Settings& s, std::size_t i) {
+  return s[observer_bandwidth] * std::complex<double>(s[poles + 2 * i], s[poles + 2 * i + 1]);
+}
+
 template <class Observer>
 AnyMade made(const Settings& s, const typename Observer::Config& observer) {
   typename esokit::Adrc<Observer>::Config config;
   config.observer = observer;
-  config.controller_bandwidth = s[controller_bandwidth];
+  if (law_of_log(s)) {
+    config.gains.emplace();
+    for (std::size_t i = 0; i < config.gains->size(); ++i)
+      (*config.gains)[i] = law_gain(s, i, config.gains->size());
+  } else {
+    config.controller_bandwidth = s[controller_bandwidth];
+  }
+  if (s[soften] > 0.0) config.soften = s[soften] > 1.0;
   config.limits.lower = -s[limit];
   config.limits.upper = s[limit];
   if (s[rate] > 0.0) config.limits.rate = s[rate];
@@ -219,7 +257,14 @@ AnyMade made(const Settings& s, const typename Observer::Config& observer) {
 
 template <class Observer>
 AnyMade perhaps_delayed(const Settings& s, typename Observer::Config config) {
-  config.observer_bandwidth = s[observer_bandwidth];
+  if constexpr (requires { config.poles; }) {
+    // The pole of a lag that it knows is kept.
+    const std::size_t kept = knows_lag(s) ? 1 : 0;
+    if (kept > 0) config.poles[0] = -1.0 / s[lag];
+    for (std::size_t i = kept; i < config.poles.size(); ++i) config.poles[i] = pole(s, i - kept);
+  } else {
+    config.observer_bandwidth = s[observer_bandwidth];
+  }
   config.input_gain = known_gain(s);
   config.sample_time = s[sample_time];
   const double delay_samples =
@@ -233,7 +278,11 @@ AnyMade perhaps_delayed(const Settings& s, typename Observer::Config config) {
 
 template <int Order>
 AnyMade controller_for(const Settings& s) {
-  using Lagging = esokit::ModelEso<esokit::ModelParts{.order = Order, .actuator = 1}>;
+  constexpr esokit::ModelParts with_actuator{.order = Order, .actuator = 1};
+  const auto lagging = [&](auto config) {
+    config.model.actuator.time_constant = s[lag];
+    return config;
+  };
   switch (static_cast<int>(s[observer])) {
     case 0:
       return perhaps_delayed<esokit::LinearEso<Order>>(s, {});
@@ -241,10 +290,15 @@ AnyMade controller_for(const Settings& s) {
       return perhaps_delayed<esokit::LinearEso<Order, double, 2>>(s, {});
     case 2:
       return perhaps_delayed<esokit::CascadeEso<Order, 2>>(s, {.bandwidth_factor = 2.0});
+    case 3: {
+      using Observer = esokit::ModelEso<with_actuator>;
+      return perhaps_delayed<Observer>(s, lagging(typename Observer::Config{}));
+    }
+    case 4:
+      return perhaps_delayed<esokit::LinearEso<Order, double, 1, esokit::PoleSet>>(s, {});
     default: {
-      typename Lagging::Config config;
-      config.model.actuator.time_constant = s[lag];
-      return perhaps_delayed<Lagging>(s, config);
+      using Observer = esokit::ModelEso<with_actuator, double, esokit::PoleSet>;
+      return perhaps_delayed<Observer>(s, lagging(typename Observer::Config{}));
     }
   }
 }
@@ -253,8 +307,10 @@ AnyMade controller_for(const Settings& s) {
 
 double stepped(const Settings& s, int law_order) {
   if (!(s[saturate] > 0.0)) return s[reference];
-  // So that the law asks at once for three times the limit: k_0 r / b0.
-  return 3.0 * s[limit] * std::abs(known_gain(s)) / std::pow(s[controller_bandwidth], law_order);
+  // So that the law asks at once for three times the limit: k_0 r / b0, times the lag that it
+  // knows.
+  return 3.0 * s[limit] * std::abs(known_gain(s)) / std::pow(s[controller_bandwidth], law_order) /
+         (law_of_log(s) ? s[law] : 1.0) / (knows_lag(s) ? s[lag] : 1.0);
 }
 
 struct Trace {
@@ -497,7 +553,7 @@ template <int Order>
 Outcome play_order(const Settings& s, bool whole, Result& result) {
   auto controller = controller_for<Order>(s);
   if (!controller) return controller.error();
-  const double step = stepped(s, Order + (s[observer] == 3.0 ? 1 : 0));
+  const double step = stepped(s, Order + (knows_lag(s) ? 1 : 0));
   const auto machine = machine_for<Order>(s);
   if (!machine) return machine.error();
   const auto form = (*controller)->linear();
@@ -521,17 +577,36 @@ Outcome play_order(const Settings& s, bool whole, Result& result) {
 std::string code_of(const Settings& s, double step) {
   const auto n = std::to_string(static_cast<int>(s[order]));
   const auto kind = static_cast<int>(s[observer]);
-  const char* header = kind == 2 ? "cascade_eso" : kind == 3 ? "model_eso" : "linear_eso";
-  std::string type =
-      kind == 0   ? "esokit::LinearEso<" + n + ">"
-      : kind == 1 ? "esokit::LinearEso<" + n + ", double, 2>"
-      : kind == 2 ? "esokit::CascadeEso<" + n + ", 2>"
-                  : "esokit::ModelEso<esokit::ModelParts{.order = " + n + ", .actuator = 1}>";
+  const char* header = kind == 2 ? "cascade_eso" : knows_lag(s) ? "model_eso" : "linear_eso";
+  const std::string parts = "esokit::ModelParts{.order = " + n + ", .actuator = 1}";
+  std::string type = kind == 0   ? "esokit::LinearEso<" + n + ">"
+                     : kind == 1 ? "esokit::LinearEso<" + n + ", double, 2>"
+                     : kind == 2 ? "esokit::CascadeEso<" + n + ", 2>"
+                     : kind == 3 ? "esokit::ModelEso<" + parts + ">"
+                     : kind == 4 ? "esokit::LinearEso<" + n + ", double, 1, esokit::PoleSet>"
+                                 : "esokit::ModelEso<" + parts + ", double, esokit::PoleSet>";
   std::string config = "{.observer_bandwidth = " + text_of(s[observer_bandwidth]);
+  std::string gains = ".controller_bandwidth = " + text_of(s[controller_bandwidth]);
+  if (poles_of_log(s)) {
+    config = "{.poles = {{";
+    if (kind == 5) config += "{" + text_of(-1.0 / s[lag]) + ", 0}, ";
+    for (std::size_t i = 0; i <= static_cast<std::size_t>(s[order]); ++i)
+      config += (i > 0 ? ", {" : "{") + text_of(pole(s, i).real()) + ", " +
+                text_of(pole(s, i).imag()) + "}";
+    config += "}}";
+  }
+  if (law_of_log(s)) {
+    const std::size_t count = static_cast<std::size_t>(s[order]) + (kind == 5 ? 1 : 0);
+    gains = ".gains = {{";
+    for (std::size_t i = 0; i < count; ++i)
+      gains += (i > 0 ? ", " : "") + text_of(law_gain(s, i, count));
+    gains += "}}";
+  }
+  if (s[soften] > 0.0) gains += std::string(", .soften = ") + (s[soften] > 1.0 ? "true" : "false");
   if (kind == 2) config += ", .bandwidth_factor = 2";
   config +=
       ", .input_gain = " + text_of(known_gain(s)) + ", .sample_time = " + text_of(s[sample_time]);
-  if (kind == 3) config += ", .model = {.actuator = {.time_constant = " + text_of(s[lag]) + "}}";
+  if (knows_lag(s)) config += ", .model = {.actuator = {.time_constant = " + text_of(s[lag]) + "}}";
   config += "}";
   const bool delayed = s[knows_dead_time] > 0.0;
   if (delayed) {
@@ -541,11 +616,11 @@ std::string code_of(const Settings& s, double step) {
   }
   std::string text = "#include <cstdio>\n";
   if (delayed) text += "#include <esokit/adapter/delayed_input.hpp>\n";
+  if (poles_of_log(s)) text += "#include <esokit/gain/pole_set.hpp>\n";
   text += "#include <esokit/control/adrc.hpp>\n#include <esokit/observer/" + std::string(header) +
           ".hpp>\n\nint main() {\n  using Observer = " + type +
           ";\n  auto controller = esokit::Adrc<Observer>::make(\n      {.observer = " + config +
-          ",\n       .controller_bandwidth = " + text_of(s[controller_bandwidth]) +
-          ",\n       .limits = {.lower = " + text_of(-s[limit]) +
+          ",\n       " + gains + ",\n       .limits = {.lower = " + text_of(-s[limit]) +
           ", .upper = " + text_of(s[limit]) +
           (s[rate] > 0.0 ? ", .rate = " + text_of(s[rate]) : "") +
           "}});\n  if (!controller) return 1;  // controller.error() names the field, the value "

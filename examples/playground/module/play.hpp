@@ -9,14 +9,15 @@
 namespace playground {
 
 // How a field is drawn and entered.
-enum class Kind { number, number_or_none, choice, on_off };
+enum class Kind { number, number_or_none, choice, on_off, hidden };
 
 struct Field {
   const char* name;     // in the page's address
   const char* label;    // for a reader
   const char* unit;     // empty: none
   const char* group;    // Machine, Controller, Run, What happens
-  Kind kind;            // number_or_none: 0 or within the range; both are drawn on a logarithm
+  Kind kind;            // number_or_none: 0 or within the range; both are drawn on a logarithm.
+                        // hidden: comes with a log, in the address alone
   double low, high;     // range of the slider; a typed number may leave it
   double standard;      // at the start
   const char* choices;  // of a choice, by semicolons, the first is 0
@@ -51,6 +52,9 @@ enum Index {
   twice_the_noise,
   half_gain,
   pid,
+  poles,             // four, real and imaginary part, over the observer bandwidth
+  law = poles + 8,   // k_0 .. k_3 over powers of the controller bandwidth; k_0 = 0: all poles there
+  soften = law + 4,  // 0: as the library has it, 1: no, 2: yes
   field_count
 };
 
@@ -113,6 +117,10 @@ struct Result {
   std::array<std::vector<double>, curve_count> curves;
   std::string code;  // C++ of it
 };
+
+// The controller as C99, header and source; empty where to_c cannot write it yet. Of the other
+// module, which is there only when it is asked for.
+std::array<std::string, 2> c_of(const Settings& settings);
 
 // whole: with the delay margin, which takes longer than all the rest.
 Result play(const Settings& settings, bool whole = true);
