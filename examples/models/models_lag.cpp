@@ -238,7 +238,7 @@ void gyro_filter(Report& report) {
                   after < 0.7 * before, "below 0.7");
     figure.panel(0, 0)
         .x_label("t (s)")
-        .y_label("rate after a load step")
+        .y_label("rate after a load step (rad/s)")
         .legend(Legend::top_right)
         .name("load")
         .line(time, slow, {.name = "ignored", .color = Color::vermillion})

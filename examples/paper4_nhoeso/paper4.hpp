@@ -17,7 +17,6 @@
 #include <vector>
 
 #include <esokit/control/nonlinear_feedback.hpp>
-#include <esokit/control/tracking_differentiator.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/sim/noise.hpp>
@@ -25,6 +24,7 @@
 #include <esokit/sim/trapezoid.hpp>
 
 #include "common/report.hpp"
+#include "sign_differentiator.hpp"
 
 namespace paper4 {
 
@@ -83,8 +83,7 @@ inline double reference(double t) { return std::cos(0.5 * t); }
 
 /// (r1, r2) at the steps: the sign form of the tracking differentiator, integrated at 1 ms or less.
 inline std::vector<EigenMatrix<double, 2>> tracked_reference(double step) {
-  const auto td =
-      esokit::SignTrackingDifferentiator<>::make({.acceleration = acceleration}).value();
+  const SignDifferentiator td{acceleration};
   const auto rate = [&](double t, const EigenMatrix<double, 2>& r) -> EigenMatrix<double, 2> {
     return td.rate(r, reference(t));
   };

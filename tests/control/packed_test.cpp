@@ -228,13 +228,6 @@ struct Differentiator {
   }
 };
 
-struct SignDifferentiator {
-  using Type = esokit::SignTrackingDifferentiator<>;
-  static Type::Config config(int lane, bool again) {
-    return {.acceleration = set(lane, again, 50), .sample_time = set(lane, false, 0.01)};
-  }
-};
-
 template <class Operator, class Feedback>
 struct Filter {
   using Type = esokit::DualFeedbackAdrc<2, double, 1, Operator, Feedback>;
@@ -451,7 +444,6 @@ TEST(Packed, Differentiators) {
   };
   const auto state = [](const auto& d) { return Answers(d.value(), d.derivative(), d.state()); };
   expect_lanes<Differentiator>(track, state);
-  expect_lanes<SignDifferentiator>(track, state);
 }
 
 TEST(Packed, FilterForm) {

@@ -12,7 +12,6 @@
 namespace esokit_test {
 namespace control_tracking_differentiator_test {
 
-using esokit::SignTrackingDifferentiator;
 using esokit::TrackingDifferentiator;
 
 /// fhan as Han's book prints it, with its intermediate names and signs.
@@ -125,48 +124,14 @@ TEST(TrackingDifferentiator, FilterTimeSmooths) {
   EXPECT_LT(roughness(0.02), 0.3 * roughness(0));
 }
 
-/// The paper's form by Runge-Kutta and its sampled form, against the time-optimal path.
-TEST(SignTrackingDifferentiator, ReachesTheReference) {
-  constexpr double R = 12.4;
-  constexpr double h = 1e-3;
-  auto td = SignTrackingDifferentiator<>::make({.acceleration = R, .sample_time = h}).value();
-  const double optimal = 2 * std::sqrt(1 / R);
-  for (int k = 1; k <= 1000; ++k) {
-    ASSERT_TRUE(td.update(1));
-    const double t = k * h;
-    const double path = t < optimal / 2 ? R * t * t / 2
-                        : t < optimal   ? 1 - R * (optimal - t) * (optimal - t) / 2
-                                        : 1;
-    EXPECT_NEAR(td.value(), path, 4 * R * h * optimal * 0.5 + 1e-6) << t;
-  }
-  EXPECT_NEAR(td.derivative(), 0, 2 * R * h);
-  const auto rate = td.rate({0.0, 0.5}, 1.0);
-  EXPECT_EQ(rate(0), 0.5);
-  EXPECT_EQ(rate(1), R);
-  EXPECT_EQ(td.rate({1.0, 0.5}, 1.0)(1), -R);
-  EXPECT_EQ(td.rate({1.0, 0.0}, 1.0)(1), 0.0);
-  // The switching curve: r1 - r = -r2^2 / (2 R).
-  EXPECT_EQ(td.rate({1 - 0.25 / (2 * R) - 1e-9, 0.5}, 1.0)(1), R);
-  EXPECT_EQ(td.rate({1 - 0.25 / (2 * R) + 1e-9, 0.5}, 1.0)(1), -R);
-}
-
 TEST(TrackingDifferentiator, BadReferenceChangesNothing) {
   auto td = TrackingDifferentiator<float>::make({.acceleration = 5, .sample_time = 1e-2f}).value();
-  auto sign =
-      SignTrackingDifferentiator<float>::make({.acceleration = 5, .sample_time = 1e-2f}).value();
-  for (int k = 0; k < 10; ++k) {
-    td.update(1);
-    sign.update(1);
-  }
+  for (int k = 0; k < 10; ++k) td.update(1);
   for (const float bad : {hidden_nan<float>(), hidden_infinity<float>()}) {
     const auto before = td.state();
-    const auto sign_before = sign.state();
     EXPECT_FALSE(td.update(bad));
-    EXPECT_FALSE(sign.update(bad));
     EXPECT_FALSE(td.reset(bad));
-    EXPECT_FALSE(sign.reset(bad));
     EXPECT_EQ(td.state(), before);
-    EXPECT_EQ(sign.state(), sign_before);
   }
   EXPECT_TRUE(td.reset(2));
   EXPECT_EQ(td.value(), 2);
@@ -186,11 +151,8 @@ TEST(TrackingDifferentiator, RefusesByName) {
   EXPECT_EQ(text(1, 0.01, 0.001),
             "filter_time = 0.001: must be 0 or not below sample_time, which is 0.01");
   EXPECT_EQ(text(1, 0.01, -1), "filter_time = -1: must be finite and not negative");
-  EXPECT_EQ(refusal(SignTrackingDifferentiator<>::make({.acceleration = -1})),
-            "acceleration: must be finite and positive");
   EXPECT_EQ(refusal(TrackingDifferentiator<>::make({.acceleration = 1e-300, .sample_time = 1e-10})),
             "acceleration: times sample_time squared leaves the scalar's range");
-  EXPECT_TRUE(SignTrackingDifferentiator<>::make({.acceleration = 1}).has_value());
 }
 
 }  // namespace control_tracking_differentiator_test

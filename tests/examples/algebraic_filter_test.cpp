@@ -1,15 +1,15 @@
 // AlgebraicFilter against the matrices that the paper prints (J. Kasac, A. Pender, M. Pranjic,
 // D. Kotarski, Asian Journal of Control 23 (2021) 2171-2184), and against the chain form.
-#include <esokit/sim/continuous_observer.hpp>
 #include <gtest/gtest.h>
+#include <esokit/sim/continuous_observer.hpp>
 
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <paper2_fsb_algebraic_eso/algebraic_filter.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/gain/continuous_gain.hpp>
 #include <limits>
+#include <paper2_fsb_algebraic_eso/algebraic_filter.hpp>
 #include <support/high_precision.hpp>
 #include <support/numbers.hpp>
 #include <support/refusal.hpp>

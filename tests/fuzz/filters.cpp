@@ -22,7 +22,6 @@ void add_filters(std::vector<Kind>& kinds) {
   KIND(MimoExtendedStateFilter<ChainOrders<1, 2>, 2, float>);
   KIND(Experiment<2, float>);
   KIND(TrackingDifferentiator<float>);
-  KIND(SignTrackingDifferentiator<float>);
   KIND(NonlinearFeedback<2, float>);
   KIND(SmoothProfile<2, float>);
 #ifndef ESOKIT_ONE_TYPE

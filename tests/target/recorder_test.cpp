@@ -453,8 +453,7 @@ TEST(NotRecorded, WhatRunsLaneByLane) {
                {can_be_recorded<PredictiveAdrc<Plain>>, "two phases, lane by lane"},
                {can_be_recorded<MimoAdrc<Plain, Plain>>, "several channels, lane by lane"},
                {can_be_recorded<MimoExtendedStateFilter<ChainOrders<1>, 2>>, "lane by lane"},
-               {can_be_recorded<TrackingDifferentiator<>>, "branches, lane by lane"},
-               {can_be_recorded<SignTrackingDifferentiator<>>, "branches, lane by lane"}};
+               {can_be_recorded<TrackingDifferentiator<>>, "branches, lane by lane"}};
   for (const auto& type : types) {
     EXPECT_FALSE(type.recorded) << type.reason << ": now it can be, so add it to the law above";
   }

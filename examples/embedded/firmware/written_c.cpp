@@ -48,8 +48,7 @@ bool agrees(const char* name, int failed) {
 
 int run_firmware() {
   using namespace firmware;
-  const bool fine =
-      agrees("eso", eso_self_test(0.0f)) && agrees("loop", loop_self_test(0.0f));
+  const bool fine = agrees("eso", eso_self_test(0.0f)) && agrees("loop", loop_self_test(0.0f));
   count<eso_state>("eso", eso_init, update_eso);
   count<loop_state>("loop", loop_init, update_loop);
   if (fine) Line("done");

@@ -137,8 +137,9 @@ const Usual* usual(const std::string& name) {
   return nullptr;
 }
 
-/// The only column whose first word is usual for it.
-std::string guess(const LogFile& file, const char* option, const std::string& given) {
+/// The only column whose first word is usual for it, of those that are not `taken` by a name.
+std::string guess(const LogFile& file, const char* option, const std::string& given,
+                  const std::vector<std::string>& taken) {
   if (!given.empty()) return given;
   std::string there = file.there();
   for (const auto& names : file.headers()) {
@@ -146,6 +147,7 @@ std::string guess(const LogFile& file, const char* option, const std::string& gi
     for (std::size_t i = 0; i < names.size(); ++i) {
       const Usual* line = usual(names[i]);
       if (line == nullptr || line->column != option[0]) continue;
+      if (std::find(taken.begin(), taken.end(), names[i]) != taken.end()) continue;
       fits.push_back(i);
       if (lower(names[i]) == words(names[i]).front()) whole.push_back(i);
     }
@@ -327,9 +329,11 @@ Input read_log(const Settings& settings) {
   const LogFile header(source, settings.separator);
   Input input;
   const bool timed = !(settings.sample_time > 0.0) || !settings.time.empty();
-  std::vector<std::string> wanted = {guess(header, "u", settings.u),
-                                     guess(header, "y", settings.y)};
-  if (timed) wanted.push_back(guess(header, "time", settings.time));
+  std::vector<std::string> taken = settings.measured;
+  taken.insert(taken.end(), {settings.u, settings.y, settings.time});
+  std::vector<std::string> wanted = {guess(header, "u", settings.u, taken),
+                                     guess(header, "y", settings.y, taken)};
+  if (timed) wanted.push_back(guess(header, "time", settings.time, taken));
   wanted.insert(wanted.end(), settings.measured.begin(), settings.measured.end());
   const LogFile file(source, wanted, settings.separator,
                      timed ? std::optional<std::size_t>(2) : std::nullopt);

@@ -1,5 +1,5 @@
 /// @file
-/// Tracking differentiators: a reference that the plant can follow, and its derivative.
+/// Tracking differentiator: a reference that the plant can follow, and its derivative.
 #pragma once
 
 #include <cmath>
@@ -26,33 +26,6 @@ template <PlainScalar S>
   return detail::absolute(a) > d ? -std::copysign(acceleration, a) : -acceleration * (a / d);
 }
 
-/// What a differentiator answers: the followed reference and its derivative.
-template <PlainScalar S>
-class DifferentiatorState {
- public:
-  /// r1, unit of the reference.
-  [[nodiscard]] S value() const noexcept { return r1_; }
-  /// r2 = r1', unit of the reference / s.
-  [[nodiscard]] S derivative() const noexcept { return r2_; }
-  /// (r1, r2).
-  [[nodiscard]] Vector<S, 2> state() const noexcept { return {r1_, r2_}; }
-
-  /// Restarts at rest at `value`; false, and nothing changes, if it is not finite.
-  bool reset(S value = S(0)) noexcept { return move_to(value, S(0)); }
-
- protected:
-  /// Sets the state. False, and nothing changes, if one of them is not finite.
-  bool move_to(S r1, S r2) noexcept {
-    if (!is_finite(r1) || !is_finite(r2)) return false;
-    r1_ = r1;
-    r2_ = r2;
-    return true;
-  }
-
-  S r1_ = S(0);  ///< value
-  S r2_ = S(0);  ///< its derivative
-};
-
 /// Config of TrackingDifferentiator.
 template <Scalar S>
 struct TrackingDifferentiatorConfig {
@@ -65,11 +38,7 @@ struct TrackingDifferentiatorConfig {
 /// allows, and r2 = r1'. Because it can always stop in time, it stays r2^2 / (2R) behind a moving
 /// reference.
 template <Scalar S = double>
-class TrackingDifferentiator : public DifferentiatorState<S> {
-  using State = DifferentiatorState<S>;
-  using State::r1_;
-  using State::r2_;
-
+class TrackingDifferentiator {
  public:
   using scalar_type = S;                           ///< type of signals and settings
   using Config = TrackingDifferentiatorConfig<S>;  ///< settings of make
@@ -97,22 +66,23 @@ class TrackingDifferentiator : public DifferentiatorState<S> {
   bool update(S reference) noexcept {
     const S change = fhan(r1_ - reference, r2_, acceleration_, width_);
     // Without this test an infinite reference would be treated as a distant one.
-    const bool moved = is_finite(reference) &&
-                       State::move_to(r1_ + sample_time_ * r2_, r2_ + sample_time_ * change);
-    if (moved) change_ = change;
-    return moved;
+    return is_finite(reference) &&
+           move_to(r1_ + sample_time_ * r2_, r2_ + sample_time_ * change, change);
   }
+
+  /// r1, unit of the reference.
+  [[nodiscard]] S value() const noexcept { return r1_; }
+  /// r2 = r1', unit of the reference / s.
+  [[nodiscard]] S derivative() const noexcept { return r2_; }
+  /// (r1, r2).
+  [[nodiscard]] Vector<S, 2> state() const noexcept { return {r1_, r2_}; }
 
   /// (r1, r1', r1''), 3 x 1: for a law that also takes the acceleration. r1'' is that of the last
   /// sample; its magnitude is at most `acceleration`.
   [[nodiscard]] Vector<S, 3> motion() const noexcept { return {r1_, r2_, change_}; }
 
   /// Restarts at rest at `value`; false, and nothing changes, if it is not finite.
-  bool reset(S value = S(0)) noexcept {
-    if (!State::reset(value)) return false;
-    change_ = S(0);
-    return true;
-  }
+  bool reset(S value = S(0)) noexcept { return move_to(value, S(0), S(0)); }
 
  private:
   explicit TrackingDifferentiator(const Config& config)
@@ -120,65 +90,21 @@ class TrackingDifferentiator : public DifferentiatorState<S> {
         sample_time_(config.sample_time),
         width_(config.filter_time > S(0) ? config.filter_time : config.sample_time) {}
 
+  /// False, and nothing changes, if one of them is not finite.
+  bool move_to(S r1, S r2, S change) noexcept {
+    if (!is_finite(r1) || !is_finite(r2)) return false;
+    r1_ = r1;
+    r2_ = r2;
+    change_ = change;
+    return true;
+  }
+
   S acceleration_;
   S sample_time_;
   S width_;
+  S r1_ = S(0);      ///< value
+  S r2_ = S(0);      ///< its derivative
   S change_ = S(0);  ///< r1'' that the last sample applied
-};
-
-/// Config of SignTrackingDifferentiator.
-template <Scalar S>
-struct SignTrackingDifferentiatorConfig {
-  S acceleration{};  ///< R > 0, unit of the reference / s^2
-  S sample_time{};   ///< h of `update`, s; may be left out if only `rate` is used
-};
-
-/// Tracking differentiator with a sign function, r1' = r2, r2' = -R sign(r1 - r + r2 |r2| / (2R)):
-/// the form in the papers. Available as an ODE for simulation, and sampled with the sign held over
-/// a sample. In the sampled form r2 chatters by R h, so prefer TrackingDifferentiator.
-template <Scalar S = double>
-class SignTrackingDifferentiator : public DifferentiatorState<S> {
-  using State = DifferentiatorState<S>;
-  using State::r1_;
-  using State::r2_;
-
- public:
-  using scalar_type = S;                               ///< type of signals and settings
-  using Config = SignTrackingDifferentiatorConfig<S>;  ///< settings of make
-
-  /// Checks the settings and does all the design work.
-  /// @return the differentiator at rest at zero, or an error that names the field
-  static Expected<SignTrackingDifferentiator, Error<S>> make(const Config& config) {
-    Rules<S> rules;
-    rules.positive("acceleration", config.acceleration)
-        .not_negative("sample_time", config.sample_time);
-    if (!rules) return rules.error();
-    return SignTrackingDifferentiator(config);
-  }
-
-  /// d/dt (r1, r2).
-  [[nodiscard]] Vector<S, 2> rate(const Vector<S, 2>& state, S reference) const noexcept {
-    return {state(1), acceleration(state(0), state(1), reference)};
-  }
-
-  /// One sample, exact for an acceleration that is held over it. False, and nothing changes, if the
-  /// reference is not finite.
-  bool update(S reference) noexcept {
-    const S a = acceleration(r1_, r2_, reference);
-    const S h = config_.sample_time;
-    return is_finite(reference) && State::move_to(r1_ + h * (r2_ + S(0.5) * h * a), r2_ + h * a);
-  }
-
- private:
-  explicit SignTrackingDifferentiator(const Config& config) : config_(config) {}
-
-  [[nodiscard]] S acceleration(S r1, S r2, S reference) const noexcept {
-    const S curve = r1 - reference + r2 * detail::absolute(r2) / (S(2) * config_.acceleration);
-    if (curve > S(0)) return -config_.acceleration;
-    return curve < S(0) ? config_.acceleration : S(0);
-  }
-
-  Config config_;
 };
 
 }  // namespace esokit
