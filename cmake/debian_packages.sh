@@ -2,7 +2,8 @@
 
 # What every build needs, what each kind of program needs on top.
 ESOKIT_BUILD_PACKAGES=(g++ cmake ninja-build libeigen3-dev)
-ESOKIT_TEST_PACKAGES=(libgtest-dev libboost-dev librandom123-dev)
+# The C and the Structured Text that are written: other compilers, MISRA, an interpreter.
+ESOKIT_TEST_PACKAGES=(libgtest-dev libboost-dev librandom123-dev tcc sdcc cppcheck python3)
 ESOKIT_BENCHMARK_PACKAGES=(libbenchmark-dev python3)
 # Without a font gnuplot draws figures with no text, and reports no error.
 # Python makes the pages and tables and checks the numbers of the READMEs.
@@ -14,7 +15,7 @@ ESOKIT_FIRMWARE_PACKAGES=(gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-ar
   gcc-riscv64-unknown-elf picolibc-riscv64-unknown-elf qemu-system-arm qemu-system-misc)
 # The same headers in a browser (examples/playground); nodejs is not needed.
 ESOKIT_WASM_PACKAGES=(clang-14 lld-14 wasi-libc libc++-14-dev-wasm32 libc++abi-14-dev-wasm32
-  libclang-rt-14-dev-wasm32)
+  libclang-rt-14-dev-wasm32 musl-dev)
 # Programs for Windows, and what runs them here; no graphics, hence not the package wine.
 ESOKIT_WINDOWS_PACKAGES=(g++-mingw-w64-x86-64-posix wine64)
 

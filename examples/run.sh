@@ -124,9 +124,9 @@ fi
 # What a step takes, in tenths of a CPU second when it was last measured: for the seconds that are left.
 weigh() {
   case $1 in
+    Linking* | ': '* | *nothing.cpp* | */from_log.cpp.o*) weight=4 ;;
     *esokit_from_log.dir/Unity/*) weight=160 ;;
-    *.gch*) weight=38 ;;
-    *nothing.cpp* | */from_log.cpp.o* | Linking* | ': '*) weight=4 ;;
+    *.gch* | *esokit_examples.dir/Unity/*) weight=38 ;;
     *) weight=60 ;;
   esac
 }

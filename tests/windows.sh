@@ -122,6 +122,9 @@ from_log() {
       verdict $? "$log: other reasons, or there is none: $(cat "$out"/pages/*.reason)"
       continue
     fi
+    # Wine has neither Python nor gnuplot.
+    [[ $(grep -o 'data:image/svg' "$out/pages/windows/$page" | wc -l) == $(grep -o 'data:image/svg' "$out/pages/linux/$page" | wc -l) ]]
+    verdict $? "$log: not as many figures as on Linux"
     same_numbers "$log" "$out/pages/windows/$page" "$out/pages/linux/$page"
     verdict $? "$log: the pages differ, or there is none: $(tail -n 3 "$out/pages/windows.err")"
   done

@@ -170,7 +170,8 @@ class Figure:
                          "unset table; unset contour; set surface")
         self.place(*panel.box)
         # No curve runs along the frame, as u at its limit would.
-        free = not (panel.get("y_log") or panel.limit or "y_range" in panel.settings)
+        free = not (panel.get("y_log") or panel.limit or
+                    panel.settings.get("y_range", ["*", "*"]) != ["*", "*"])
         self.put("set autoscale xfix; set autoscale " + ("yfix" if free else "y") +
                  ("\nset offsets 0,0,graph 0.04,graph 0.04" if free else "\nunset offsets"))
         for which in "xy":

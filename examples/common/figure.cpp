@@ -4,27 +4,16 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
 #include <limits>
 #include <set>
-#include <system_error>
 
 #include "csv.hpp"
-#include "system.hpp"
 
 namespace esokit::examples {
 namespace {
 
 std::string text_of(double value) { return number_text(value, 12); }
 std::string text_of(std::optional<double> value) { return value ? text_of(*value) : "*"; }
-
-/// The script of the sources; an installed program has one beside it.
-std::filesystem::path draw_script() {
-  std::error_code none;
-  const auto installed =
-      this_program().parent_path().parent_path() / "share" / "esokit" / "draw_figure.py";
-  return std::filesystem::exists(installed, none) ? installed : path_of(ESOKIT_DRAW_FIGURE);
-}
 
 /// Adds about `most` of the rows, so that the curve looks the same: of each part the lowest and the
 /// highest, so that noise keeps its envelope, those farthest left and right, and where a gap
@@ -168,7 +157,8 @@ Panel& Figure::panel(std::size_t row, std::size_t column, std::size_t row_span,
   return panel;
 }
 
-bool Figure::write(const std::string& folder, const std::string& formats) const {
+std::optional<FigureText> Figure::text(const std::string& folder,
+                                       const std::string& formats) const {
   // Two empty lines end a series, one is a gap in a line: so gnuplot reads this file too.
   std::string numbers = "panel,series,x,y,z\n";
   std::string description =
@@ -187,7 +177,7 @@ bool Figure::write(const std::string& folder, const std::string& formats) const 
           (!more.empty() && more.size() != curve.size())) {
         std::fprintf(stderr, "figure %s, panel %s: columns of no or different lengths\n",
                      name_.c_str(), panel.name_.c_str());
-        return false;
+        return std::nullopt;
       }
       numbers += "\n\n";
       std::vector<std::size_t> all(curve.size());
@@ -219,9 +209,7 @@ bool Figure::write(const std::string& folder, const std::string& formats) const 
       }
     }
   }
-  const std::string file = folder + "/" + name_ + ".csv";
-  if (!write_text(file, numbers)) return false;
-  return run_python(draw_script(), description);
+  return FigureText{std::move(description), std::move(numbers)};
 }
 
 }  // namespace esokit::examples

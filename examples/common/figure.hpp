@@ -145,6 +145,12 @@ struct Grid {
   double panel_height = 190.0;  ///< of a panel's axes, px; the figure is 900 px wide
 };
 
+/// A figure as draw_figure.py reads it: how it looks, and its numbers, thinned to what is seen.
+struct FigureText {
+  std::string description;
+  std::string numbers;
+};
+
 /// Panels in a grid.
 class Figure {
  public:
@@ -165,6 +171,10 @@ class Figure {
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] const Grid& grid() const { return grid_; }
   [[nodiscard]] const std::string& caption() const { return caption_; }
+
+  /// @return none if columns have no or different lengths; stderr says which
+  [[nodiscard]] std::optional<FigureText> text(const std::string& folder,
+                                               const std::string& formats) const;
 
   /// Writes NAME.csv, the numbers, and draws NAME.png and NAME.svg by a script NAME.gp. False if
   /// that failed; stderr says why.

@@ -9,15 +9,20 @@
 #include <cstddef>
 #include <cstdio>
 #include <cstdlib>
-#include <filesystem>
-#include <fstream>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <stdexcept>
+#include <streambuf>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
+#include <version>
+#ifndef __wasi__  // a page in a browser has no files
+#include <filesystem>
+#include <fstream>
+#endif
 
 #include "common/csv.hpp"
 #include "common/stamps.hpp"
@@ -29,18 +34,127 @@ struct LogError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// A file, or its bytes where they are there already, as on a page in a browser.
+class LogSource {
+ public:
+  /// @param bytes have to stay there for as long as they are read
+  LogSource(std::string name, std::string_view bytes) : name_(std::move(name)), bytes_(bytes) {}
+
+  /// Its path, for errors; its name without the folder.
+  [[nodiscard]] const std::string& path() const { return name_; }
+  [[nodiscard]] std::string file_name() const {
+    return name_.substr(name_.find_last_of(separators) + 1);
+  }
+
+#ifndef __wasi__
+  LogSource(const std::filesystem::path& file) : name_(file.string()), file_(file) {}
+
+  [[nodiscard]] std::unique_ptr<std::streambuf> open() const {
+    if (bytes_) return std::make_unique<Bytes>(*bytes_);
+    std::error_code ignored;
+    if (std::filesystem::is_directory(file_, ignored)) throw LogError(name_ + " is a folder");
+    auto stream = std::make_unique<std::filebuf>();
+    if (stream->open(file_, std::ios::in | std::ios::binary) == nullptr)
+      throw LogError("cannot read " + name_);
+    return stream;
+  }
+  [[nodiscard]] double size() const {
+    std::error_code ignored;
+    return bytes_ ? static_cast<double>(bytes_->size())
+                  : static_cast<double>(std::filesystem::file_size(file_, ignored));
+  }
+#else
+  [[nodiscard]] std::unique_ptr<std::streambuf> open() const {
+    return std::make_unique<Bytes>(*bytes_);
+  }
+  [[nodiscard]] double size() const { return static_cast<double>(bytes_->size()); }
+#endif
+
+ private:
+#ifdef _WIN32
+  static constexpr const char* separators = "/\\:";
+#else
+  static constexpr const char* separators = "/";
+#endif
+
+  struct Bytes : std::streambuf {
+    explicit Bytes(std::string_view bytes) {
+      char* const first = const_cast<char*>(bytes.data());  // nobody writes to it
+      setg(first, first, first + bytes.size());
+    }
+  };
+
+  std::string name_;
+  std::optional<std::string_view> bytes_;
+#ifndef __wasi__
+  std::filesystem::path file_;
+#endif
+};
+
+/// As std::from_chars, which not every library has for numbers that are not whole.
+template <class Number>
+std::from_chars_result number_from_chars(const char* first, const char* last, Number& number) {
+#ifdef __cpp_lib_to_chars
+  return std::from_chars(first, last, number);
+#else
+  // Digits of a whole number that is exact, over or times a power of ten that is: rounded once.
+  const char* at = first;
+  const bool negative = at != last && *at == '-';
+  if (negative) ++at;
+  double whole = 0;
+  int digits = 0, places = 0;
+  bool point = false;
+  for (;
+       at != last && (point ? *at >= '0' && *at <= '9' : *at == '.' || (*at >= '0' && *at <= '9'));
+       ++at) {
+    if (*at == '.') {
+      point = true;
+      continue;
+    }
+    whole = 10 * whole + (*at - '0');
+    ++digits;
+    places += point ? 1 : 0;
+  }
+  if (at == last && digits > 0 && digits <= 15) {
+    constexpr std::array tens = {1e0, 1e1, 1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
+                                 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15};
+    whole /= tens[static_cast<std::size_t>(places)];
+    if constexpr (sizeof(Number) > sizeof(double)) {
+      if (places == 0) {
+        number = negative ? -whole : whole;
+        return {last, std::errc{}};
+      }
+    } else {
+      number = negative ? -whole : whole;
+      return {last, std::errc{}};
+    }
+  }
+  // strto.. also takes blanks, a plus and hexadecimal digits.
+  const std::string text(first, last);
+  if (text.empty() || text.find_first_of(" \t\n\v\f\rxXpP+(") == 0 ||
+      text.find_first_of("xXpP(") != std::string::npos)
+    return {first, std::errc::invalid_argument};
+  char* end = nullptr;
+  if constexpr (sizeof(Number) > sizeof(double)) {
+    number = std::strtold(text.c_str(), &end);
+  } else {
+    number = std::strtod(text.c_str(), &end);
+  }
+  return {first + (end - text.c_str()),
+          end == text.c_str() ? std::errc::invalid_argument : std::errc{}};
+#endif
+}
+
 /// The lines of a text file as UTF-8, whatever ends them: \n, \r\n or \r. With a byte order mark
 /// the file may be UTF-16; what is no UTF-8 is taken for Latin-1.
 class TextLines {
  public:
-  explicit TextLines(const std::filesystem::path& file) : stream_(file, std::ios::binary) {
-    if (!stream_) throw LogError("cannot read " + file.string());
-    bytes_ = stream_.rdbuf();
+  explicit TextLines(const LogSource& file) : bytes_(file.open()) {
     const int first = bytes_->sgetc();
     if (first == 0xFF || first == 0xFE) {
       bytes_->sbumpc();
       const int second = bytes_->sbumpc();
-      if (first + second != 0xFF + 0xFE) throw LogError(file.string() + " is not a text file");
+      if (first + second != 0xFF + 0xFE) throw LogError(file.path() + " is not a text file");
       wide_ = first == 0xFF ? Wide::little : Wide::big;
     }
   }
@@ -133,8 +247,7 @@ class TextLines {
     return true;
   }
 
-  std::ifstream stream_;
-  std::streambuf* bytes_ = nullptr;
+  std::unique_ptr<std::streambuf> bytes_;
   Wide wide_ = Wide::no;
   bool whole_ = false, after_return_ = false;
   std::size_t number_ = 0, read_ = 0;
@@ -149,16 +262,16 @@ class TextLines {
 class LogFile {
  public:
   /// Reads the header and the first row alone.
-  explicit LogFile(const std::filesystem::path& file, char separator = 0)
-      : file_(file), separator_(separator) {
+  explicit LogFile(LogSource file, char separator = 0)
+      : file_(std::move(file)), separator_(separator) {
     read({}, true);
   }
 
   /// @param separator ',' ';' '\t' '|' or ' '; 0: the one that makes most numbers of the lines
   /// @param stamps which of the wanted columns has time stamps, which then begin at zero
-  LogFile(const std::filesystem::path& file, const std::vector<std::string>& wanted,
-          char separator = 0, std::optional<std::size_t> stamps = std::nullopt)
-      : file_(file), separator_(separator), stamps_(stamps), columns_(wanted.size()) {
+  LogFile(LogSource file, const std::vector<std::string>& wanted, char separator = 0,
+          std::optional<std::size_t> stamps = std::nullopt)
+      : file_(std::move(file)), separator_(separator), stamps_(stamps), columns_(wanted.size()) {
     read(wanted, false);
   }
 
@@ -208,7 +321,7 @@ class LogFile {
   using Fields = std::vector<std::string_view>;
 
   [[nodiscard]] std::string at(std::size_t line) const {
-    return file_.string() + ", line " + std::to_string(line) + ": ";
+    return file_.path() + ", line " + std::to_string(line) + ": ";
   }
   [[nodiscard]] std::string header_name(std::size_t header, std::size_t column) const {
     return header < headers_.size() && column < headers_[header].size()
@@ -217,11 +330,6 @@ class LogFile {
   }
 
   void read(const std::vector<std::string>& wanted, bool header_only) {
-    std::error_code ignored;
-    if (std::filesystem::is_directory(file_, ignored)) {
-      throw LogError(file_.string() + " is a folder");
-    }
-    const auto bytes = std::filesystem::file_size(file_, ignored);
     TextLines lines(file_);
     std::string line;
     const auto next = [&](Head& head) {
@@ -266,13 +374,13 @@ class LogFile {
       lines_.push_back(head.number);
       if (lines.read() >= shown + 64'000'000) {
         shown = lines.read();
-        std::fprintf(stderr, "reading %s: %3.0f %%\n", file_.filename().string().c_str(),
-                     100.0 * static_cast<double>(shown) / static_cast<double>(bytes));
+        std::fprintf(stderr, "reading %s: %3.0f %%\n", file_.file_name().c_str(),
+                     100.0 * static_cast<double>(shown) / file_.size());
       }
     };
     for (std::size_t i = begin; i < heads.size(); ++i) take(heads[i]);
     for (Head head; next(head);) take(head);
-    if (lines_.empty()) throw LogError(file_.string() + ": no line with numbers");
+    if (lines_.empty()) throw LogError(file_.path() + ": no line with numbers");
   }
 
   /// Finds separator, names, and where the numbers begin.
@@ -281,7 +389,7 @@ class LogFile {
     for (std::size_t i = 0; i < heads.size(); ++i) {
       if (!heads[i].comment) text.push_back(i);
     }
-    if (text.empty()) throw LogError(file_.string() + ": no line with numbers");
+    if (text.empty()) throw LogError(file_.path() + ": no line with numbers");
     // The last third is numbers: no header is so long.
     const std::size_t body = text.size() - std::max<std::size_t>(1, text.size() / 3);
     if (separator_ == 0) {
@@ -300,7 +408,7 @@ class LogFile {
       if (fields.size() >= shape.count && numbers_in(shape, fields) == Numbers::all) break;
     }
     if (first == text.size() || shape.numbers == 0) {
-      throw LogError(file_.string() + ": no line with numbers; line " +
+      throw LogError(file_.path() + ": no line with numbers; line " +
                      std::to_string(heads[text[0]].number) + " is '" +
                      heads[text[0]].text.substr(0, 60) + "'");
     }
@@ -491,7 +599,7 @@ class LogFile {
       text = {point.data(), text.size()};
     }
     Number number = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    const auto [end, error] = number_from_chars(text.data(), text.data() + text.size(), number);
     if (end != text.data() + text.size()) return std::nullopt;
     // Too small or too large is a number nevertheless: zero or infinite.
     if (error == std::errc::result_out_of_range)
@@ -519,7 +627,7 @@ class LogFile {
       }
       if (found.size() == 1) return Place{found[0], h};
       if (found.size() > 1) {
-        throw LogError(file_.string() + ": '" + name + "' is " + headers_[h][found[0]] + " and " +
+        throw LogError(file_.path() + ": '" + name + "' is " + headers_[h][found[0]] + " and " +
                        headers_[h][found[1]] + ", columns " + std::to_string(found[0] + 1) +
                        " and " + std::to_string(found[1] + 1));
       }
@@ -543,7 +651,7 @@ class LogFile {
     const auto begins = only(
         name, [&](const std::string& full) { return !name.empty() && full.starts_with(name); });
     if (begins) return *begins;
-    throw LogError(file_.string() + ": no column '" + name + "'; there " +
+    throw LogError(file_.path() + ": no column '" + name + "'; there " +
                    (headers_.empty() ? "is no header and are " + std::to_string(count_) + " columns"
                                      : "are " + there()));
   }
@@ -604,7 +712,7 @@ class LogFile {
                    (comma ? "point" : "comma"));
   }
 
-  std::filesystem::path file_;
+  LogSource file_;
   char separator_;
   std::optional<std::size_t> stamps_;
   std::size_t count_ = 0, header_line_ = 0, comma_line_ = 0, point_line_ = 0;

@@ -114,7 +114,7 @@ def shown(text):
     if size < 1e-30:
         return "-0 (above -1e-30)" if value < 0 else "0 (below 1e-30)"
     if size < 1e-4 or size >= 1e8:
-        return f"{value:.3g}"
+        return plain(f"{value:.3g}")
     return f"{value:.{max(0, 3 - math.floor(math.log10(size)))}f}"
 
 

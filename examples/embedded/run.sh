@@ -162,6 +162,14 @@ text_bytes() {
   "${binutils[$1]}size" "$file" | awk -v runtime="$(<"$out/runtime")" 'NR == 2 { print $1 - runtime }'
 }
 
+# written_bytes PRESET NAME: flash of a C file without its self-test
+written_bytes() {
+  find "$root/build/$1" -path '*written_objects*' -name "$2.c.obj" \
+    -exec "${binutils[$1]}size" -A {} + | awk '
+    ($1 ~ /^\.(text|rodata)/) && $1 !~ /self_test|samples/ { bytes += $2 }
+    END { print bytes + 0 }'
+}
+
 # object PRESET NAME: of the image as built
 object() {
   find "$root/build/$1/examples/embedded" \( -path "*firmware_o[bt]*" -o -path "*controllers.dir*" \
@@ -240,7 +248,9 @@ check_links() {
 }
 
 host_run() {
-  build firmware-host firmware_exact drive compare_runs &&
+  mkdir -p "$out/written" &&
+    build firmware-host firmware_exact drive compare_runs write_c &&
+    "$(image firmware-host write_c)" "$out/written" &&
     "$(image firmware-host firmware_exact)" >"$out/host.txt" </dev/null &&
     "$(image firmware-host drive)" >"$out/host-drive.txt" </dev/null
 }
@@ -312,7 +322,7 @@ built=()
 for core in "${cores[@]}"; do
   echo "building for $core, $((SECONDS - started)) s"
   # Without a floating-point unit nothing is fused, and there is one image.
-  images=(firmware drive drive_make controllers)
+  images=(firmware drive drive_make controllers written_c)
   [[ $core == cortex-m0plus ]] || images+=(firmware_exact)
   [[ $core != cortex-m4f ]] || images+=(firmware_others)
   if build "$core" "${images[@]}"; then
@@ -325,7 +335,7 @@ done
 echo "built in $((SECONDS - started)) s"
 
 for core in ${built[@]+"${built[@]}"}; do
-  for image in firmware firmware_exact drive drive_make controllers; do
+  for image in firmware firmware_exact drive drive_make controllers written_c; do
     [[ $core-$image != cortex-m0plus-firmware_exact ]] || continue
     if run "$core" "$image" "$out/$core-$image.txt"; then pass; else
       fail "$core, $image: status $? in the emulator; the end of what it said:"
@@ -339,7 +349,7 @@ for core in ${built[@]+"${built[@]}"}; do
     compare "$core" firmware
   fi
   for image in drive drive_make; do compare "$core" "$image"; done
-  for image in firmware drive drive_make controllers; do
+  for image in firmware drive drive_make controllers written_c; do
     check_links "$core" "$(image "$core" "$image").elf"
   done
   [[ $core != cortex-m4f ]] || check_links "$core" "$(object "$core" others)"
@@ -379,6 +389,20 @@ done
           awk -v n="$most" -v f="$clock" 'BEGIN { printf " %.3g us |", n / f }'; done)"
     done
   done
+  echo
+  echo "**The C of \`to_c\`**, -Os, \`max_gap\` 10: bytes of flash with all its functions, bytes of state, and" \
+    "instructions of \`update\`; 10,000 samples equal those of the host bit for bit"
+  echo
+  echo "| | LinearEso<2> | state | instructions | Adrc<LinearEso<2>> | state | instructions |"
+  echo "|---|---:|---:|---:|---:|---:|---:|"
+  for core in ${built[@]+"${built[@]}"}; do
+    row="| ${title[$core]} |"
+    for name in eso loop; do
+      row+=" $(written_bytes "$core" $name) | $(value "$out/$core-written_c.txt" size $name 3) |"
+      row+=" $(value "$out/$core-written_c.txt" count $name 3) |"
+    done
+    echo "$row"
+  done
 } >"$out/table.md"
 cat "$out/table.md"
 echo
@@ -392,6 +416,10 @@ for core in cortex-m4f cortex-m7; do
   limit "$core: instructions of CascadeEso<2, 3>" "$(value "$runs" count CascadeEso 4)" 110
   limit "$core: instructions of Adrc<LinearEso<2>>" "$(value "$out/$core-controllers.txt" count Adrc 4)" 90
   limit "$core: instructions of MimoAdrc" "$(value "$out/$core-controllers.txt" count MimoAdrc 4)" 210
+  limit "$core: bytes of the C of LinearEso<2>" "$(written_bytes "$core" eso)" 921
+  limit "$core: bytes of the C of Adrc<LinearEso<2>>" "$(written_bytes "$core" loop)" 1433
+  limit "$core: instructions of the C of LinearEso<2>" \
+    "$(value "$out/$core-written_c.txt" count eso 3)" 50
   limit "$core: bytes of the whole image" "$(text_bytes "$core" firmware)" 67584
 done
 

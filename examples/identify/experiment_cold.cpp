@@ -50,9 +50,10 @@ constexpr std::array<const char*, 9> faults{
     "none",          "sensor stands still", "sensor shows the start", "actuator off",
     "wrong sign",    "sensor lost (NaN)",   "sensor shorted",         "load of 20 to 100 % of u",
     "noise times 30"};
-constexpr std::array<const char*, 12> reasons{
-    "none",       "travel",       "time_limit", "bad_sample", "stopped",      "no_response",
-    "wrong_sign", "load_changed", "too_noisy",  "resolution", "output_limit", "input_limit"};
+constexpr std::array<const char*, 13> reasons{
+    "none",         "travel",      "time_limit",   "bad_sample", "stopped",
+    "no_response",  "wrong_sign",  "load_changed", "too_noisy",  "resolution",
+    "output_limit", "input_limit", "too_fast"};
 
 struct Machine {
   Kind kind{};
@@ -387,6 +388,7 @@ void draw_one(Report& report) {
     }
     if (experiment.finished()) {
       if (hand_over == 0) hand_over = run.time();
+      controller->applied(held);
       next = controller->update(measured, 100.0);
       if (run.time() > hand_over + 60) worst = std::max(worst, std::abs(run.y() - 100));
     }

@@ -174,6 +174,7 @@ int main(int argc, char** argv) {
         (void)other.start(measured, held);
         rested = other.update(measured, 0.0);
       }
+      controller->applied(held);
       next = controller->update(measured, r);
       if (hand_over == now) first = next;
     }

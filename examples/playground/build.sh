@@ -4,7 +4,7 @@
 # with 0: the page is skipped. examples/run.sh calls it.
 set -euo pipefail
 here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
-root=$here/../..
+root=$(cd -- "$here/../.." && pwd)
 build=$root/build/playground
 # shellcheck source=cmake/debian_packages.sh
 source "$root/cmake/debian_packages.sh"
@@ -22,15 +22,41 @@ if ! require_packages ${install_option[@]+"${install_option[@]}"} "${ESOKIT_WASM
 fi
 
 mkdir -p "$build" "$(dirname -- "$page")"
-# Nothing throws, and a reactor is a library: it has no main. -O1: three quarters of the time to compile.
-options=(--target=wasm32-wasi -std=c++20 -O1 -fno-exceptions -fno-rtti -Wall -Wextra -Wpedantic
-  -Wconversion -Wshadow -Werror -I "$root/include" -isystem /usr/include/eigen3)
-for name in play wasm; do
-  ${CMAKE_CXX_COMPILER_LAUNCHER:-} clang++-14 "${options[@]}" -c "$here/module/$name.cpp" -o "$build/$name.o"
-done
-clang++-14 --target=wasm32-wasi -fuse-ld=/usr/bin/wasm-ld-14 -mexec-model=reactor -Wl,--strip-all,--gc-sections \
-  "$build/play.o" "$build/wasm.o" -o "$build/play.wasm"
-python3 "$here/assemble.py" "$build/play.wasm" "$page"
+# Two modules: what is played with, at once; what reads a log, when there is one. The parts of from_log are
+# compiled in two units, as native: one by one they take half as long again.
+examples=$root/examples
+unit() {  # NAME SOURCE..: only written where it changes
+  local name=$1 text
+  shift
+  text=$(printf '#include "%s"\n' "$@")
+  [[ -e $build/$name.cpp && $(<"$build/$name.cpp") == "$text" ]] || printf '%s\n' "$text" >"$build/$name.cpp"
+}
+unit play playground/module/{play,wasm}.cpp
+unit log_reading common/{csv,figure}.cpp common/compiled/study.cpp \
+  from_log/parts/{arguments,read_log,examine,page,show}.cpp playground/module/{log,log_wasm}.cpp
+unit log_designing from_log/parts/{design,paste}.cpp
+
+# No unit catches: what is thrown ends the module (log_wasm.cpp). -O1: three quarters of the time to compile.
+compile() {
+  ${CMAKE_CXX_COMPILER_LAUNCHER:-} clang++-14 --target=wasm32-wasi -std=c++20 -O1 "$2" -fno-rtti \
+    -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror -I "$root/include" -I "$examples" -I "$examples/common" \
+    -isystem /usr/include/eigen3 -c "$build/$1.cpp" -o "$build/$1.o"
+}
+link() {  # NAME OBJECT..: a reactor is a library, it has no main; a megabyte of stack, which does not grow into what is below it
+  local name=$1
+  shift
+  clang++-14 --target=wasm32-wasi -fuse-ld=/usr/bin/wasm-ld-14 -mexec-model=reactor -Wl,--strip-all,--gc-sections \
+    -Wl,-z,stack-size=1048576,--stack-first "${@/%/.o}" -lc-printscan-long-double -o "$name.wasm"
+}
+compile log_designing -fignore-exceptions &
+designing=$!
+compile log_reading -fignore-exceptions
+compile play -fno-exceptions
+wait "$designing"
+cd "$build"
+link play play
+link log log_reading log_designing
+python3 "$here/assemble.py" play.wasm log.wasm "$page"
 size=$(stat -c %s "$page")
-echo "playground.html: $size bytes, of them $(stat -c %s "$build/play.wasm") of the module before base64"
+echo "playground.html: $size bytes; its modules are $(stat -c %s play.wasm) and $(stat -c %s log.wasm)"
 ((size < 2000000))

@@ -1,12 +1,11 @@
 #!/usr/bin/env bash
-# What the page computes is what a native program computes from the same lines:
-#   examples/playground/check.sh PAGE.html TWIN
-# Chromium plays settings.txt in the page, TWIN (playground_twin) plays it here. The page must say nothing on
-# its console; its policy forbids every request, and a forbidden one would be said there.
+# What the page computes is what native programs compute from the same lines:
+#   examples/playground/check.sh PAGE.html TWIN LOG_TWIN
+# Chromium plays settings.txt and studies logs.txt in the page, playground_twin and playground_log_twin do it
+# here. The page must say nothing on its console, and ask for nothing.
 set -euo pipefail
 here=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")" && pwd)
 page=$1
-twin=$2
 if [[ ! -e $page ]] || ! command -v chromium >/dev/null 2>&1; then
   echo "skipped: the playground is not compared, as there is no ${page##*/} or no Chromium"
   echo "0 passed, 0 failed"
@@ -14,9 +13,6 @@ if [[ ! -e $page ]] || ! command -v chromium >/dev/null 2>&1; then
 fi
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-"$twin" "$here/settings.txt" "$work/native"
-timeout 120 chromium --headless --no-sandbox --disable-gpu --disable-quic --no-first-run \
-  --disable-background-networking --disable-component-update --disable-sync --user-data-dir="$work/profile" \
-  --enable-logging=stderr --virtual-time-budget=20000 --dump-dom "file://$(realpath "$page")#selftest" \
-  >"$work/dom" 2>"$work/log"
-python3 "$here/compare.py" "$here/settings.txt" "$work/native" "$work/dom" "$work/log" "$page"
+"$2" "$here/settings.txt" "$work/settings"
+"$3" "$here/logs.txt" "$here/../data" "$work/logs"
+timeout 400 python3 "$here/check.py" "$page" "$work/settings" "$work/logs"

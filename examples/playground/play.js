@@ -90,6 +90,64 @@ function ticks(low, high, most) {
   return all;
 }
 
+let axes_drawn = 0;
+// Ends are logarithms where the axis is one; px and py take what the ends are.
+function axes(svg, { width, height, x0, x1, low, high, xlog, ylog, x, y }) {
+  const left = 58, right = 12, top = 10, bottom = 38;
+  const px = (v) => left + (v - x0) / (x1 - x0) * (width - left - right);
+  const py = (v) => height - bottom - (v - low) / (high - low) * (height - top - bottom);
+  svg.replaceChildren();
+  svg.setAttribute('viewBox', `0 0 ${width} ${height}`);
+  const text = (px_, py_, words, anchor) => add(svg, 'text', { x: px_, y: py_, fill: 'var(--quiet)',
+    'font-size': 12, 'font-family': 'system-ui, DejaVu Sans, sans-serif', 'text-anchor': anchor }, words);
+  const power = (v) => v >= -3 && v <= 4 ? String(+(10 ** v).toPrecision(1)) :
+    '10' + String(v).replace(/./g, (c) => '⁰¹²³⁴⁵⁶⁷⁸⁹'[c] || '⁻');
+  const minus = (v, digits) => {
+    const size = Math.abs(v);
+    return (size >= 1e5 || (size > 0 && size < 1e-3) ? String(+v.toPrecision(3)) : String(+v.toPrecision(digits))).replace('-', '−');
+  };
+  const whole = (a, b, most) => {
+    const step = Math.max(1, Math.ceil((b - a) / most)), all = [];
+    for (let v = Math.ceil(a / step) * step; v <= b; v += step) all.push(v);
+    return all;
+  };
+  // Less than a decade: 1, 2, 5.
+  const decades = (a, b, most) => {
+    const all = whole(a, b, most);
+    if (all.length > 1) return all.map((v) => [v, power(v)]);
+    const between = [];
+    for (let v = Math.floor(a); v <= b; ++v) for (const m of [1, 2, 5]) between.push(v + Math.log10(m));
+    return between.filter((v) => v >= a && v <= b).map((v) => [v, minus(10 ** v, 1)]);
+  };
+  const linear = (a, b, most, digits) => ticks(a, b, most).map((v) => [v, minus(v, digits)]);
+  for (const [v, words] of xlog ? decades(x0, x1, width / 60) : linear(x0, x1, Math.max(3, width / 90), 6)) {
+    add(svg, 'path', { d: `M${px(v)} ${top}V${height - bottom}`, stroke: 'var(--grid)', fill: 'none' });
+    text(px(v), height - bottom + 16, words, 'middle');
+  }
+  for (const [v, words] of ylog ? decades(low, high, height / 34) : linear(low, high, height / 45, 5)) {
+    add(svg, 'path', { d: `M${left} ${py(v)}H${width - right}`, stroke: 'var(--grid)', fill: 'none' });
+    text(left - 7, py(v) + 4, words, 'end');
+  }
+  if (x) text(width - right, height - 4, x, 'end');
+  if (y) text(left, height - 4, y, 'start');
+  svg.dataset.axes = svg.dataset.axes || ++axes_drawn;
+  const id = 'clip-' + svg.dataset.axes;
+  add(add(svg, 'clipPath', { id }), 'rect', { x: left, y: top - 2, width: width - left - right + 2,
+    height: height - top - bottom + 4 });
+  return { px, py, left, right, top, bottom, clip: `url(#${id})` };
+}
+
+function names_of(place, lines) {
+  place.replaceChildren();
+  for (const line of lines) {
+    const one = add(place, 'span', {});
+    const key = add(one, 'svg', { viewBox: '0 0 28 10', 'aria-hidden': 'true' });
+    add(key, 'path', { d: 'M0 5H28', stroke: line.colour, 'stroke-width': line.kind === 'band' ? 9 : line.width || 1.8,
+      'stroke-dasharray': line.dash || 'none', opacity: line.opacity || 1 });
+    one.append(line.name);
+  }
+}
+
 class Plot {
   constructor(section, about) {
     this.about = about;
@@ -104,7 +162,6 @@ class Plot {
   // lines: {name, values, colour, dash, step, ylog}; x: values
   draw(x, lines, { xlog = false, ylog = false, at = [], bounds = null } = {}) {
     const { width, height } = this;
-    const left = 58, right = 12, top = 10, bottom = 38;
     const log10 = Math.log10;
     const xs = xlog ? Array.from(x, log10) : x;
     const x0 = xs[0], x1 = xlog ? xs[xs.length - 1] : 2 * xs[xs.length - 1] - xs[xs.length - 2];
@@ -121,37 +178,13 @@ class Plot {
     if (!(high > low)) [low, high] = Number.isFinite(low) ? [low - 1, high + 1] : [0, 1];
     const pad = 0.06 * (high - low);
     low -= pad; high += pad;
-    const px = (v) => left + (v - x0) / (x1 - x0) * (width - left - right);
-    const py = (v) => height - bottom - (v - low) / (high - low) * (height - top - bottom);
     const clipped = (v) => Math.min(Math.max(v, -height), 2 * height);
-    this.svg.replaceChildren();
-    this.svg.setAttribute('viewBox', `0 0 ${width} ${height}`);
-    const text = (px_, py_, words, anchor) => add(this.svg, 'text', { x: px_, y: py_, fill: 'var(--quiet)',
-      'font-size': 12, 'font-family': 'system-ui, DejaVu Sans, sans-serif', 'text-anchor': anchor }, words);
-    const power = (v) => v >= -3 && v <= 4 ? String(+(10 ** v).toPrecision(1)) :
-      '10' + String(v).replace(/./g, (c) => '⁰¹²³⁴⁵⁶⁷⁸⁹'[c] || '⁻');
-    const whole = (a, b, most) => {
-      const step = Math.max(1, Math.ceil((b - a) / most)), all = [];
-      for (let v = Math.ceil(a / step) * step; v <= b; v += step) all.push(v);
-      return all;
-    };
-    for (const v of xlog ? whole(x0, x1, width / 60) : ticks(x0, x1, Math.max(3, width / 90))) {
-      add(this.svg, 'path', { d: `M${px(v)} ${top}V${height - bottom}`, stroke: 'var(--grid)', fill: 'none' });
-      text(px(v), height - bottom + 16, xlog ? power(v) : String(+v.toPrecision(6)), 'middle');
-    }
-    for (const v of ylog ? whole(low, high, height / 34) : ticks(low, high, height / 45)) {
-      add(this.svg, 'path', { d: `M${left} ${py(v)}H${width - right}`, stroke: 'var(--grid)', fill: 'none' });
-      text(left - 7, py(v) + 4, ylog ? power(v) : String(+v.toPrecision(5)).replace('-', '−'), 'end');
-    }
-    text(width - right, height - 4, this.about.x, 'end');
-    if (this.about.y) text(left, height - 4, this.about.y, 'start');
+    const axis = axes(this.svg, { width, height, x0, x1, low, high, xlog, ylog, x: this.about.x, y: this.about.y });
+    const { px, py, left, right, top, bottom, clip } = axis;
     for (const mark of at) {
       add(this.svg, 'path', { d: `M${left} ${py(mark)}H${width - right}`, stroke: 'var(--quiet)',
         'stroke-dasharray': '2 4', fill: 'none' });
     }
-    const clip = 'clip-' + this.about.id;
-    add(add(this.svg, 'clipPath', { id: clip }), 'rect', { x: left, y: top - 2, width: width - left - right + 2,
-      height: height - top - bottom + 4 });
     const most = 2 * (width - left - right);
     for (const line of lines) {
       // Of many samples in a pixel the least and the largest: what is drawn is what there is.
@@ -175,20 +208,13 @@ class Plot {
         point(Math.min(a, b));
         if (a !== b) point(Math.max(a, b));
       }
-      add(this.svg, 'path', { d, 'clip-path': `url(#${clip})`, fill: 'none', stroke: line.colour, 'stroke-width': line.width || 1.8,
+      add(this.svg, 'path', { d, 'clip-path': clip, fill: 'none', stroke: line.colour, 'stroke-width': line.width || 1.8,
         'stroke-dasharray': line.dash || 'none', 'stroke-linejoin': 'round' });
     }
     const names = lines.map((line) => line.name).join('|');
     if (names !== this.seen) {
       this.seen = names;
-      this.names.replaceChildren();
-      for (const line of lines) {
-        const one = add(this.names, 'span', {});
-        const key = add(one, 'svg', { viewBox: '0 0 28 10', 'aria-hidden': 'true' });
-        add(key, 'path', { d: 'M0 5H28', stroke: line.colour, 'stroke-width': line.width || 1.8,
-          'stroke-dasharray': line.dash || 'none' });
-        one.append(line.name);
-      }
+      names_of(this.names, lines);
     }
     this.svg.setAttribute('aria-label', this.about.says(lines));
   }
@@ -480,21 +506,22 @@ function csv() {
   for (let k = 0; k < result.t.length; ++k) lines.push(columns.map((c) => Number.isNaN(c[k]) ? '' : c[k]).join(','));
   return lines.join('\n') + '\n';
 }
-function svg() {
+// Figures below each other, each with its title, in the colours of the page.
+function stacked(figures) {
   const style = getComputedStyle(document.documentElement);
   let height = 0, width = 0, parts = '';
-  for (const name in plots) {
-    const one = plots[name].svg, w = one.clientWidth, h = one.clientHeight;
-    const title = plots[name].seen.replace(/\|/g, ', ');
-    parts += `<text x="58" y="${height + 16}" font-size="13" font-family="sans-serif" fill="var(--text)">${title}</text>` +
+  for (const [one, title] of figures) {
+    const h = one.clientHeight;
+    parts += `<text x="58" y="${height + 16}" font-size="13" font-family="sans-serif" fill="var(--text)">${title.replace(/[&<]/g, (c) => c === '&' ? '&amp;' : '&lt;')}</text>` +
       `<g transform="translate(0 ${height + 22})">${one.innerHTML}</g>`;
     height += h + 30;
-    width = Math.max(width, w);
+    width = Math.max(width, one.clientWidth);
   }
   parts = parts.replace(/var\((--[a-z]+)\)/g, (all, name) => style.getPropertyValue(name).trim());
   return `<svg xmlns="${NS}" width="${width}" height="${height}" viewBox="0 0 ${width} ${height}">` +
     `<rect width="100%" height="100%" fill="${style.getPropertyValue('--back').trim()}"/>${parts}</svg>\n`;
 }
+const svg = () => stacked(Object.values(plots).map((plot) => [plot.svg, plot.seen.replace(/\|/g, ', ')]));
 
 // ---- the test of examples/playground/check.sh: every number of some settings ----
 
@@ -506,7 +533,7 @@ function visit() {
   for (const one of document.querySelectorAll('button, input, select')) {
     const name = one.getAttribute('aria-label') || (one.labels && one.labels[0] || one).textContent;
     expect(name && name.trim(), `${one.outerHTML} has no name`);
-    expect(one.tabIndex >= 0, `${name} cannot be reached by keyboard`);
+    expect(one.tabIndex >= 0 || one.role === 'tab', `${name} cannot be reached by keyboard`);
   }
   for (const one of document.querySelectorAll('svg.axes')) expect(one.getAttribute('aria-label'), 'a figure without a name');
   read('');
@@ -554,9 +581,9 @@ function visit() {
   return problems;
 }
 
-function selftest() {
+function selftest(lines) {
   const all = [];
-  for (const line of JSON.parse($('settings').textContent)) {
+  for (const line of lines) {
     read(line);
     update(true);
     const numbers = [...SIGNALS.map((name) => result[name]),
@@ -580,13 +607,7 @@ function selftest() {
     update(false);
     least = Math.min(least, performance.now() - began);
   }
-  const problems = visit().join('; ');
-  document.body.dataset.frame = least.toFixed(2);
-  document.body.dataset.problems = problems;
-  const pre = document.createElement('pre');
-  pre.id = 'selftest';
-  pre.textContent = written;
-  document.body.append(pre);
+  return { numbers: written, frame: least, problems: visit() };
 }
 
 build();
@@ -599,10 +620,6 @@ addEventListener('hashchange', () => {
   read(location.hash.slice(1));
   update(true);
 });
-new ResizeObserver(() => { if (result) draw(result); }).observe($('desk'));
-if (location.hash === '#selftest') {
-  addEventListener('load', selftest);
-} else {
-  read(location.hash.slice(1));
-  update(true);
-}
+new ResizeObserver(() => { if (result && !$('play').hidden) draw(result); }).observe($('desk'));
+read(location.hash.slice(1));
+update(true);

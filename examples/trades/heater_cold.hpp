@@ -32,20 +32,34 @@ class ColdHeater {
   static esokit::Expected<ColdHeater, esokit::Error<double>> make(const Config& config) {
     const auto trial = Trial::make(config.trial);
     if (!trial) return trial.error();
+    if (!(config.trial.hand_over > 0)) {
+      return esokit::Error<double>{"trial.hand_over", config.trial.hand_over,
+                                   "must be positive: meanwhile the observer looks on"};
+    }
     return ColdHeater(config, *trial);
   }
 
   /// Once a sample. @param fan 0 .. 1, NaN where it is not known @return power, 0 .. 1
   double step(double temperature, double wanted, double fan) {
-    if (!trial_.finished()) {
-      power_ = trial_.update(temperature, power_);
-      if (trial_.phase() == esokit::ExperimentPhase::hand_over) follow(temperature);
-      if (!trial_.finished()) return power_;
+    const double held = power_;
+    if (!running()) {
+      power_ = trial_.update(temperature, held);
+      if (trial_.phase() == esokit::ExperimentPhase::hand_over) follow(temperature, held);
+      if (!running()) return power_;
     }
-    if (!loop_) return power_;  // the safe power: trial().reason() says why
+    loop_->applied(held);
     loop_->measured(fan * (temperature - config_.room));
     return power_ = loop_->update(temperature, wanted);
   }
+
+  /// Whether the loop controls. If it does not and the trial has finished, the power stays the safe
+  /// one, and trial().reason() says why or, where that is none, refused().
+  [[nodiscard]] bool running() const {
+    return loop_ && trial_.phase() == esokit::ExperimentPhase::done;
+  }
+  [[nodiscard]] const std::optional<esokit::Error<double>>& refused() const { return refused_; }
+  /// Samples in a row without the fan. It is held for 50, then counts as off.
+  [[nodiscard]] int fan_lost() const { return loop_ ? loop_->observer().observer().lost() : 0; }
 
   /// degC/s: what acts on the temperature besides the heater.
   [[nodiscard]] double load() const { return loop_ ? loop_->observer().total_disturbance() : 0; }
@@ -87,18 +101,26 @@ class ColdHeater {
   ColdHeater(const Config& config, const Trial& trial) : config_(config), trial_(trial) {}
 
   // While the relay still moves the heater, the observer looks on.
-  void follow(double temperature) {
+  void follow(double temperature, double held) {
     if (loop_) {
-      (void)loop_->track(temperature, temperature, power_);
-    } else if (const auto made = trial_.result() ? Loop::make(settings()) : Loop::make({})) {
+      (void)loop_->track(temperature, temperature, held);
+      return;
+    }
+    const auto found = trial_.result();
+    const auto made = found ? Loop::make(settings())
+                            : esokit::Expected<Loop, esokit::Error<double>>(found.error());
+    if (made) {
       loop_ = *made;
-      (void)loop_->start(temperature, power_);
+      (void)loop_->start(temperature, held);
+    } else {
+      refused_ = made.error();
     }
   }
 
   Config config_;
   Trial trial_;
   std::optional<Loop> loop_{};
+  std::optional<esokit::Error<double>> refused_{};
   double power_ = 0;
 };
 

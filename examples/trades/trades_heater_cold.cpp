@@ -81,13 +81,15 @@ struct Pulse {
 };
 
 /// The fan from 50 to 450 s, at rest before.
-Pulse pulse(const Law& law) {
+/// @param told what a fan adds to u, by the temperature shown
+Pulse pulse(const Law& law, const Law& told = nullptr) {
   Pulse pulse;
   Lab lab(wanted);
   const double rest = lab.holding();
   for (int k = 0; k < 8500; ++k) {
-    const double t = k * T;
-    const double u = std::clamp(rest + law(lab.shown() - wanted), 0.0, 1.0);
+    const double t = k * T, fan = t >= 50 && t < 450 ? 1 : 0;
+    const double known = told ? fan * told(lab.shown()) : 0;
+    const double u = std::clamp(rest + law(lab.shown() - wanted) + known, 0.0, 1.0);
     const double error = std::abs(lab.block() - wanted);
     pulse.most = std::max(pulse.most, error);
     pulse.area += T * error;
@@ -96,7 +98,7 @@ Pulse pulse(const Law& law) {
       pulse.y.push_back(lab.block());
       pulse.u.push_back(u);
     }
-    lab.step(u, t >= 50 && t < 450 ? 1 : 0);
+    lab.step(u, fan);
   }
   return pulse;
 }
@@ -297,6 +299,29 @@ int main(int argc, char** argv) {
     report.expect(way.name, "its area (degC s)", way.fan.area, true, "reported");
   }
 
+  // A sensor that stands still from 40 times of the trial on: where that ends it, the power stays
+  // off.
+  const double whole = heater.trial().samples() * T;
+  int ended = 0, heated = 0;
+  for (int i = 0; i < 40; ++i) {
+    heater = ColdHeater::make(settings()).value();
+    lab = Lab();
+    double shown = room, power = 0, after = -1;
+    for (int k = 0; after < 1000; ++k) {
+      if (k * T < (i + 0.5) / 40 * whole) shown = lab.shown();
+      power = heater.step(shown, wanted, 0);
+      if (heater.trial().phase() == esokit::ExperimentPhase::done) break;
+      if (heater.trial().finished()) after += 1;
+      if (after >= 0 && power > 0) ++heated;
+      lab.step(power, 0);
+    }
+    ended += after >= 0 ? 1 : 0;
+  }
+  report.expect("sensor stands still", "of 40 times, the trial is ended", ended, ended >= 30,
+                "else just before the end");
+  report.expect("sensor stands still", "samples with power after that", heated, heated == 0,
+                "none");
+
   // The class from cold: the fan at 400 s after the hand-over, and again each 800 s.
   auto config = settings();
   config.speed = ways[2].numbers.first;
@@ -359,6 +384,14 @@ int main(int argc, char** argv) {
                 "as if it were not told");
   report.expect("fan", "dip at 40 degC, told (degC)", dip[4], dip[4] < 0.3,
                 "what was found at 50 degC is true at 40");
+
+  // The others, told the same.
+  for (const Way& way : {ways[0], ways[1]}) {
+    const Pulse fan = pulse(played(way.form(way.numbers)),
+                            [&](double shown) { return cooling * (shown - room) / model.gain; });
+    report.expect(way.name, "dip, the fan fed forward (degC)", fan.most, true, "reported");
+    report.expect(way.name, "its area, the fan fed forward (degC s)", fan.area, true, "reported");
+  }
 
   Figure figure("heater_cold", {.rows = 2, .columns = 2, .panel_height = 190});
   figure.caption(

@@ -176,8 +176,10 @@
 #include <esokit/sim/window.hpp>
 #include <esokit/target/c_code.hpp>
 #include <esokit/target/c_text.hpp>
-#include <esokit/target/c_writer.hpp>
+#include <esokit/target/list_writer.hpp>
+#include <esokit/target/recorded_design.hpp>
 #include <esokit/target/recorder.hpp>
+#include <esokit/target/structured_text.hpp>
 #include <esokit/tune/controller.hpp>
 #include <esokit/tune/families.hpp>
 #include <esokit/tune/loop_cost.hpp>
@@ -188,3 +190,4 @@
 #include <esokit/tune/rivals.hpp>
 #include <esokit/tune/search.hpp>
 #include <esokit/tune/tune.hpp>
+#include <esokit/tune/tuned_code.hpp>

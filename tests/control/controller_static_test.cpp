@@ -1,6 +1,7 @@
 // What a controller has to offer: every controller of esokit and a lambda do, look-alikes do not.
 #include <gtest/gtest.h>
 
+#include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/controller.hpp>
@@ -27,6 +28,21 @@ static_assert(Controller<DisturbanceCompensator<Eso>, double>);
 static_assert(Controller<MimoAdrc<Eso, LinearEso<1>>, Pair>);
 static_assert(controller_traits<Adrc<VariableTime<Eso>>>.varies_time);
 static_assert(!controller_traits<Adrc<Eso>>.varies_time);
+
+// What was applied, or measured, is never a third argument: a plain number does not compile.
+template <class C, class Signal = double>
+constexpr bool takes_a_third = requires(C c, Signal y) {
+  c.update(y, y, y);
+}
+|| requires(C c, Signal y, double number) { c.update(y, y, number); }
+|| requires(C c, Signal y, int whole) { c.update(y, y, whole); }
+|| requires(C c, double y, Vector<double, 2> r) { c.update(y, r, y); }
+|| requires(C c, double y) { c.update(y, {y, y}, y); };
+using Told = Measured<Eso>;
+static_assert(!takes_a_third<Adrc<Told>> && !takes_a_third<Adrc<Told, ErrorBased>>);
+static_assert(!takes_a_third<Adrc<Eso>> && !takes_a_third<DualFeedbackAdrc<2>>);
+static_assert(!takes_a_third<PredictiveAdrc<Told>> && !takes_a_third<DisturbanceCompensator<Told>>);
+static_assert(!takes_a_third<MimoAdrc<Told, LinearEso<1>>, Pair>);
 
 // One's own: a function, a lambda, a class; the channels need not be as many.
 using Function = double (*)(double, double);

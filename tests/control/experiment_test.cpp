@@ -776,6 +776,66 @@ TEST(Experiment, LimitsOfTheOutputEndItFromBothSidesAndOnlyBeyond) {
   }
 }
 
+/// A steady motion above the limit is ended within two pieces, in either direction; one below it,
+/// noise included, is not.
+TEST(Experiment, SpeedOfTheOutputEndsIt) {
+  for (const double slope : {0.49, -0.49, 0.53, -0.53}) {
+    auto config = cold();
+    config.rest = 30;
+    config.fastest = 0.5;  // 2 degrees in 40 samples
+    auto experiment = Experiment<1>::make(config).value();
+    int k = 0;
+    for (; k < 250 && !experiment.finished(); ++k) {
+      (void)experiment.update(50 + slope * (k < 100 ? 0 : 0.1 * (k - 100)));
+    }
+    const bool fast = std::abs(slope) > 0.5;
+    EXPECT_EQ(experiment.reason(), fast ? AbortReason::too_fast : AbortReason::none) << slope;
+    EXPECT_EQ(experiment.output(), 0);
+    if (fast) {
+      EXPECT_LE(k, 100 + 80);
+    }
+  }
+  // Without the limit, and at once by one step.
+  const auto after = [](double fastest, double step) {
+    auto config = cold();
+    config.fastest = fastest;
+    auto experiment = Experiment<1>::make(config).value();
+    (void)experiment.update(20);
+    (void)experiment.update(20 + step);
+    return experiment.reason();
+  };
+  EXPECT_EQ(after(0.5, 2), AbortReason::none);
+  EXPECT_EQ(after(0.5, std::nextafter(2.01, 3)), AbortReason::too_fast);
+  EXPECT_EQ(after(0, 15), AbortReason::none);
+  // The machine whose motion is limited: as fast as it may be, and ended by less.
+  auto config = relay(2);
+  config.response = 0.01;
+  config.response_time = 1;
+  const Plant servo(2, 5, 0.015, 6, T);
+  double speed = 0;
+  {
+    auto free = Experiment<2>::make(config).value();
+    for (Plant one = servo; !free.finished();) {
+      one.step(free.update(one.y()));
+      speed = std::max(speed, std::abs(one.speed()));
+    }
+    EXPECT_EQ(free.reason(), AbortReason::none);
+  }
+  for (const double share : {1.01, 0.7}) {
+    config.fastest = share * speed;
+    Plant one = servo;
+    auto limited = Experiment<2>::make(config).value();
+    double most = 0;
+    while (!limited.finished()) {
+      one.step(limited.update(one.y()));
+      most = std::max(most, std::abs(one.speed()));
+    }
+    EXPECT_EQ(limited.reason(), share > 1 ? AbortReason::none : AbortReason::too_fast);
+    // What it gains in two pieces.
+    EXPECT_LT(most, config.fastest + 2 * 5 * config.response / config.fastest);
+  }
+}
+
 /// y is watched to the sample and to the last bit.
 TEST(Experiment, ResponseIsAskedForFromBothSides) {
   const auto after = [](double moved, int samples) {
@@ -889,6 +949,13 @@ TEST(Experiment, RefusesBadSettingsFromCold) {
             "response_time: must be at least one sample");
   EXPECT_EQ(refused([](C& c) { c.response_time = 600; }),
             "response_time: must be below time_limit");
+  EXPECT_EQ(refused([](C& c) { c.fastest = nan; }), "fastest: must be finite and not negative");
+  EXPECT_EQ(refused([](C& c) { c.fastest = 20.001; }),
+            "fastest: must be at most response in a sample:");
+  EXPECT_EQ(refused([](C& c) { c.fastest = 19.999; }), "accepted");
+  auto unwatched = relay(1);
+  unwatched.fastest = 1;
+  EXPECT_EQ(refusal(Experiment<1>::make(unwatched)), "fastest: must be left out without response");
   EXPECT_EQ(refused([](C& c) { c.safe_input = 1.1; }),
             "safe_input: is above limits.upper, which is");
   EXPECT_EQ(refused([nan](C& c) { c.safe_input = nan; }),
@@ -909,7 +976,7 @@ TEST(Experiment, RefusesBadSettingsFromCold) {
 TEST(Experiment, GarbageFromColdChangesNoPromise) {
   Random random(48);
   const NoAllocation allocations;
-  int ends[12] = {};
+  int ends[13] = {};
   for (int trial = 0; trial < 3000; ++trial) {
     auto config = cold();
     config.time_limit = 200;
@@ -918,6 +985,7 @@ TEST(Experiment, GarbageFromColdChangesNoPromise) {
     config.response = random.uniform(0.1, 10);
     config.response_time = random.uniform(0.1, 60);
     config.travel = random.uniform(6, 50);
+    if (trial % 4 == 0) config.fastest = config.response * random.uniform(0.01, 5);
     auto experiment = Experiment<1>::make(config).value();
     Heater heater;
     const double wild = std::pow(10.0, random.uniform(-5, -1));
@@ -944,7 +1012,7 @@ TEST(Experiment, GarbageFromColdChangesNoPromise) {
   for (const auto reason :
        {AbortReason::none, AbortReason::travel, AbortReason::time_limit, AbortReason::no_response,
         AbortReason::wrong_sign, AbortReason::load_changed, AbortReason::output_limit,
-        AbortReason::too_noisy}) {
+        AbortReason::too_noisy, AbortReason::too_fast}) {
     EXPECT_GT(ends[static_cast<int>(reason)], 0) << static_cast<int>(reason);
   }
 }

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
+#include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/mimo_adrc.hpp>
@@ -78,6 +79,41 @@ TEST(MimoAdrc, DecoratedChannelsAreThoseOfAdrc) {
   config.input_matrix(0, 0) = 2;
   ASSERT_TRUE(late.retune(config).has_value());
   for (int k = 0; k < 20; ++k) EXPECT_NEAR(late.update(Vector1(1.0), Vector1(1.0))(0), 5, 1e-9);
+}
+
+/// A disturbance that is measured is told to each channel that has it; a channel alone is Adrc.
+TEST(MimoAdrc, MeasuredChannels) {
+  using Told = esokit::Measured<LinearEso<1>, 1, 3>;
+  Told::Config channel{.observer = {.observer_bandwidth = 20, .sample_time = period}};
+  channel.inputs[0] = {-3, 0.05, 2 * period};
+  MimoAdrc<Told>::Config alone{.observers = {channel}, .controller_bandwidths = {5}};
+  alone.input_matrix(0, 0) = 2;
+  auto one = MimoAdrc<Told>::make(alone).value();
+  auto with_gain = channel;
+  with_gain.observer.input_gain = 2;
+  auto same = esokit::Adrc<Told>::make({.observer = with_gain, .controller_bandwidth = 5}).value();
+
+  MimoAdrc<Told, Told>::Config config{.observers = {channel, channel},
+                                      .controller_bandwidths = {5, 5}};
+  config.input_matrix = {{2, 1}, {0.5, -3}};
+  auto both = MimoAdrc<Told, Told>::make(config).value();
+  double most = 0;
+  for (int k = 0; k < 400; ++k) {
+    const double w = k < 50 ? 0 : 1 + std::sin(0.1 * k), y = 0.1 * std::cos(0.03 * k);
+    one.observer<0>().measured(w);
+    same.measured(w);
+    ASSERT_NEAR(one.update(EigenMatrix<double, 1>(y), EigenMatrix<double, 1>(0.5))(0),
+                same.update(y, 0.5), 1e-9);
+    // u cancels what w does to both, so neither moves.
+    both.observer<0>().measured(w);
+    both.observer<1>().measured(w);
+    const auto u = both.update({0, 0}, {0, 0});
+    const double f = both.observer<1>().known_part();
+    ASSERT_NEAR(2 * u(0) + u(1), -f, 1e-9);
+    ASSERT_NEAR(0.5 * u(0) - 3 * u(1), -f, 1e-9);
+    most = std::max(most, std::abs(f));
+  }
+  EXPECT_GT(most, 3);
 }
 
 /// After a gap that nothing bridges it begins in the steady state of its output, as Adrc does.

@@ -546,6 +546,55 @@ TEST(Identify, AShortStepTestIsEnough) {
 }
 
 // Friction that drives is none.
+// Single steps, each recorded from the step on: within a piece b0 u cannot be told from the load,
+// but one load goes through all of them. A load that is another in each piece is told as such.
+TEST(Identify, OneLoadGoesThroughThePieces) {
+  constexpr double gain = 20, pole = 6, lag = 0.02;
+  constexpr int inner = 20;
+  constexpr double h = T / inner;
+  esokit::sim::Gaussian gaussian(12);
+  const auto recorded = [&](std::size_t rest, bool loads) {
+    Log log;
+    double t = 0;
+    for (const double level : {3.0, 7.0, 1.5, 5.0, 2.0, 6.0}) {
+      double x = 0, v = 0;
+      const double load = loads ? 8 * std::sin(level * level) : 6;
+      for (std::size_t k = 0; k < 250; ++k) {
+        log.time.push_back(t);
+        log.u.push_back(k < rest ? 0 : level);
+        log.y.push_back(x + 0.02 * gaussian.next());
+        for (int i = 0; i < inner; ++i) {
+          const double before = v;
+          v += (1 - std::exp(-h / lag)) * (log.u.back() - v);
+          const double end = (0.5 * gain * (before + v) + load) / pole;
+          x = end + (x - end) * std::exp(-pole * h);
+        }
+        t += T;
+      }
+      t += 0.7;
+    }
+    IdentifyOptions options = quick();
+    options.orders = {1};
+    return esokit::study(log, options);
+  };
+  const auto from_the_step = recorded(0, false);
+  ASSERT_TRUE(from_the_step);
+  EXPECT_EQ(from_the_step->log.pieces, 6u);
+  const auto covers = [&](const Identified& found) {
+    // Of three intervals of 95 % one may miss.
+    EXPECT_LT(std::abs(found.input_gain.value - gain), 1.5 * found.input_gain.half_width);
+    EXPECT_LT(found.input_gain.share(), 0.1);
+  };
+  covers(*from_the_step);
+  EXPECT_NEAR(from_the_step->pole.value, pole, from_the_step->pole.half_width);
+  const auto with_rest = recorded(40, false), with_loads = recorded(40, true);
+  ASSERT_TRUE(with_rest && with_loads);
+  covers(*with_rest);
+  covers(*with_loads);
+  // Not as if there were one load.
+  EXPECT_GT(with_loads->input_gain.half_width, 3 * with_rest->input_gain.half_width);
+}
+
 TEST(Identify, FrictionIsNotNegative) {
   Log log = heater(0, 600, 60);
   for (std::size_t k = 0; k < log.y.size(); ++k) {
@@ -714,6 +763,27 @@ TEST(Identify, StampsMayJitterAndRowsMayBeMissing) {
   EXPECT_EQ(found->log.missing, clean.y.size() - log.y.size());
   EXPECT_NEAR(found->log.sample_time, T, 1e-6 * T + 1e-9);
   EXPECT_NEAR(found->input_gain.value, b0, 0.1 * b0);
+}
+
+// Straight lines between rows that jitter took a third of the noise away and coloured the rest.
+TEST(Identify, JitterTakesNoNoiseAway) {
+  const Log clean = closed_loop(1);
+  const auto without = esokit::study(clean, quick());
+  ASSERT_TRUE(without);
+  Log log = clean;
+  esokit::sim::Gaussian gaussian(8);
+  for (std::size_t k = 0; k < clean.y.size(); ++k) {
+    // Stamps of another clock: y of the time that they tell, which the rows around it know.
+    const double late = k == 0 || k + 1 == clean.y.size() ? 0.0 : 0.2 * std::tanh(gaussian.next());
+    log.time.push_back((static_cast<double>(k) + late) * T);
+    if (late != 0.0) log.y[k] += late * 0.5 * (clean.y[k + 1] - clean.y[k - 1]);
+  }
+  const auto found = esokit::study(log, quick());
+  ASSERT_TRUE(found);
+  EXPECT_GT(found->log.jitter, 0.1 * found->log.sample_time);
+  EXPECT_NEAR(found->noise.value, noise, 0.1 * noise);
+  EXPECT_LT(found->correlation, 0.1);
+  EXPECT_NEAR(found->input_gain.value, without->input_gain.value, without->input_gain.half_width);
 }
 
 TEST(Identify, RefusesALogWithoutExcitation) {
@@ -915,8 +985,9 @@ TEST(Judge, RefusesByName) {
        "own_input: is the share of u that does not follow from y, which is too small: record a "
        "moving reference"},
       {&bad.excitation, 0.151,
-       "excitation: is the smallest relative error of b0 and too large, because too little of y "
-       "follows from u: record several steps that last until y settles, or a sweep"},
+       "excitation: is the smallest relative error of b0 and too large: what of y follows from u "
+       "is "
+       "not told from the rest; record several steps that last until y settles, or a sweep"},
       {&bad.correlation, 0.101,
        "correlation: is the correlation of the innovations, so the model lacks something, and "
        "output error does not tell b0 either: record longer, with steps of u that last until y "
@@ -1332,6 +1403,50 @@ TEST(PrepareLog, BringsJitteryStampsToOneSampleTime) {
   }
   // The last row and what is left of a row are not in it.
   EXPECT_NEAR(found, area, 2 * 6 * T);
+}
+
+// What was measured stays as it was, with its time; u is also what rows without y tell.
+TEST(PrepareLog, KeepsWhatWasMeasured) {
+  Log log;
+  for (int k = 0; k < 400; ++k) {
+    log.time.push_back(9 + (k + (k % 10 == 3 ? 0.3 : 0.0)) * T);
+    log.u.push_back(k);
+    log.y.push_back(k % 20 == 5 ? std::nan("") : 0.5 * k * k);
+  }
+  log.u[41] = std::nan("");
+  auto prepared = esokit::prepare(log);
+  ASSERT_TRUE(prepared);
+  const auto& data = prepared->data;
+  ASSERT_EQ(data.measured.size(), data.y.size());
+  ASSERT_EQ(data.offsets.size(), data.y.size());
+  const double rows = T / data.sample_time;  // a step that begins or ends late counts
+  for (std::size_t k = 0; k < data.y.size(); ++k) {
+    const auto number = static_cast<double>(k);
+    if (k % 20 == 5 || k == 41) {
+      EXPECT_FALSE(data.has(k)) << k;
+    } else {
+      EXPECT_EQ(data.measured[k], 0.5 * number * number) << k;
+      const double at = (number + (k % 10 == 3 ? 0.3 : 0.0)) * rows - number;
+      EXPECT_NEAR(data.offsets[k], at * data.sample_time, 1e-9 * T) << k;
+    }
+    // u of the row without y, too; that of row 41 is lost.
+    if (k % 20 == 5) {
+      EXPECT_NEAR(data.u[k], number, 0.02 * number) << k;
+    }
+  }
+  EXPECT_NEAR(data.u[41], 40, 0.5);
+  const auto part = esokit::excerpt(data, 200);
+  ASSERT_EQ(part.measured.size(), part.y.size());
+  EXPECT_FALSE(part.has(5));
+  EXPECT_EQ(part.offsets[3], data.offsets[3]);
+  EXPECT_TRUE(esokit::averaged(data, 4).measured.empty());
+  // With a row each T there is nothing to keep.
+  for (std::size_t k = 0; k < 400; ++k) log.time[k] = 9 + static_cast<double>(k) * T;
+  for (std::size_t k = 0; k < 400; ++k) log.u[k] = log.y[k] = static_cast<double>(k);
+  prepared = esokit::prepare(log);
+  ASSERT_TRUE(prepared);
+  EXPECT_TRUE(prepared->data.measured.empty());
+  EXPECT_TRUE(prepared->data.has(5));
 }
 
 // A long log is read in twenty stretches, none across a gap.

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <complex>
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/variable_time.hpp>
@@ -755,6 +756,38 @@ TEST(ModelEso, LostSamplesCostNoMoreThanOnTheChain) {
                         0);
   EXPECT_EQ(constants.second, 0);
   EXPECT_LT(constants.first, 1.2 * chain.first);
+}
+
+/// Poles as `tune` lists them, that of the lag among them, which nothing corrects: gaps were 0 and
+/// 15 samples.
+TEST(ModelEso, AListedLagBridgesGaps) {
+  using Eso = ModelEso<ModelParts{.order = 1, .actuator = 1}, double, esokit::PoleSet>;
+  const auto longest = [](double lag, std::complex<double> pole) {
+    auto observer = Eso::make({.poles = {{{-1.0 / lag, 0.0}, pole, std::conj(pole)}},
+                               .input_gain = 1,
+                               .sample_time = 1,
+                               .model = {.actuator = {.time_constant = lag}}})
+                        .value();
+    // Errors decay: random gaps, and the shortest and the longest in turn.
+    esokit_test::Random random(47);
+    for (const bool turns : {false, true}) {
+      Eso::Estimate state;
+      for (int i = 0; i < Eso::size; ++i) state(i) = 1.0;
+      observer.reset(state);
+      for (int k = 0; k < 4000; ++k) {
+        int missing = random.index(observer.max_gap() + 1);
+        if (turns) missing = k % 2 == 0 ? 0 : observer.max_gap();
+        for (; missing >= 0; --missing) observer.predict(0);
+        EXPECT_FALSE(has(observer.correct(0), esokit::StepStatus::restarted));
+      }
+      for (int i = 0; i < Eso::size; ++i) {
+        EXPECT_LT(std::abs(observer.estimate()(i)), 1e-2) << turns << ' ' << i;
+      }
+    }
+    return observer.max_gap();
+  };
+  EXPECT_EQ(longest(30, {-0.0003053, 0.163}), 100);
+  EXPECT_EQ(longest(15, {-0.03746, 0.0584}), 100);
 }
 
 }  // namespace observer_model_eso_test

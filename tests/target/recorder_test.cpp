@@ -344,6 +344,28 @@ TYPED_TEST(Recorded, ObserversWithConstantGain) {
   obeys<CascadeEso<2, 3, V, 2>, Observe>(by_bandwidths);
 }
 
+TYPED_TEST(Recorded, ObserversWithModels) {
+  using V = TypeParam;
+  static constexpr ModelParts parts{.order = 1, .plant_poles = true, .actuator = 1, .sensor = 1};
+  const auto fill = [](auto& config) {
+    by_bandwidth(config);
+    config.model.plant[0] = V(0.5);
+    config.model.actuator.time_constant = V(0.05);
+    config.model.sensor.time_constant = V(0.03);
+  };
+  obeys<ModelEso<parts, V>, Observe>(fill);
+  obeys<ModelCascadeEso<parts, 2, V>, Observe>([&](auto& config) {
+    fill(config);
+    config.observer_bandwidth = 20;
+    config.bandwidth_factor = 1.5f;
+  });
+  obeys<PlantEso<2, ModelParts{.order = 2, .resonators = 1}, V>, Observe>([](auto& config) {
+    by_bandwidth(config);
+    config.model.plant = LinearPlant<2, V>::chain({.coefficients = {V(0.5), V(0.5)}}).value();
+    config.model.resonators[0].frequency = 25;
+  });
+}
+
 TYPED_TEST(Recorded, ObserversWithOtherGains) {
   using V = TypeParam;
   obeys<AdjustableBandwidthEso<2, V>, Observe>([](auto& config) {
@@ -414,25 +436,25 @@ TYPED_TEST(Recorded, Controllers) {
 /// Those whose pack is one plain object a lane: a recording scalar never gets into them.
 TEST(NotRecorded, WhatRunsLaneByLane) {
   using Plain = LinearEso<1>;
-  static constexpr ModelParts parts{.order = 1, .actuator = 1};
+  static constexpr ModelParts follows{.order = 1, .resonators = 1, .follows_speed = true};
   const struct {
     bool recorded;
     const char* reason;
-  } types[] = {
-      {can_be_recorded<ModelEso<parts>>, "MatrixModel is of plain scalars"},
-      {can_be_recorded<DelayedInput<Plain, 4>>, "of plain scalars"},
-      {can_be_recorded<OutlierGate<Plain>>, "of plain scalars"},
-      {can_be_recorded<WrappedOutput<Plain>>, "of plain scalars"},
-      {can_be_recorded<Guarded<Plain>>, "of plain scalars"},
-      {can_be_recorded<VariableTime<Plain>>, "of plain scalars, and its gains change with the time"},
-      {can_be_recorded<KnownModel<Plain, Friction<0, double>>>, "of plain scalars"},
-      {can_be_recorded<Adrc<DelayedInput<Plain, 4>>>, "its observer"},
-      {can_be_recorded<DisturbanceCompensator<OutlierGate<Plain>>>, "its observer"},
-      {can_be_recorded<PredictiveAdrc<Plain>>, "two phases, lane by lane"},
-      {can_be_recorded<MimoAdrc<Plain, Plain>>, "several channels, lane by lane"},
-      {can_be_recorded<MimoExtendedStateFilter<ChainOrders<1>, 2>>, "lane by lane"},
-      {can_be_recorded<TrackingDifferentiator<>>, "branches, lane by lane"},
-      {can_be_recorded<SignTrackingDifferentiator<>>, "branches, lane by lane"}};
+  } types[] = {{can_be_recorded<ModelEso<follows>>, "its gains change with the speed"},
+               {can_be_recorded<DelayedInput<Plain, 4>>, "of plain scalars"},
+               {can_be_recorded<OutlierGate<Plain>>, "of plain scalars"},
+               {can_be_recorded<WrappedOutput<Plain>>, "of plain scalars"},
+               {can_be_recorded<Guarded<Plain>>, "of plain scalars"},
+               {can_be_recorded<VariableTime<Plain>>,
+                "of plain scalars, and its gains change with the time"},
+               {can_be_recorded<KnownModel<Plain, Friction<0, double>>>, "of plain scalars"},
+               {can_be_recorded<Adrc<DelayedInput<Plain, 4>>>, "its observer"},
+               {can_be_recorded<DisturbanceCompensator<OutlierGate<Plain>>>, "its observer"},
+               {can_be_recorded<PredictiveAdrc<Plain>>, "two phases, lane by lane"},
+               {can_be_recorded<MimoAdrc<Plain, Plain>>, "several channels, lane by lane"},
+               {can_be_recorded<MimoExtendedStateFilter<ChainOrders<1>, 2>>, "lane by lane"},
+               {can_be_recorded<TrackingDifferentiator<>>, "branches, lane by lane"},
+               {can_be_recorded<SignTrackingDifferentiator<>>, "branches, lane by lane"}};
   for (const auto& type : types) {
     EXPECT_FALSE(type.recorded) << type.reason << ": now it can be, so add it to the law above";
   }

@@ -361,7 +361,7 @@ Figure tradeoff_figure(const esokit::Tuning& tuning, std::size_t taken) {
     }
     return std::log(largest / least);
   };
-  std::vector<double> x, y;
+  std::vector<double> x, y, beside;  // beside: where what a label stands for ends
   std::vector<std::string> labels;
   for (std::size_t i = 0; i < tuning.designs.size(); ++i) {
     const auto& design = tuning.designs[i];
@@ -376,23 +376,25 @@ Figure tradeoff_figure(const esokit::Tuning& tuning, std::size_t taken) {
     std::size_t at = 0;
     while (at + 1 < x.size() && !(labels[at].size() > 0 && near(at))) ++at;
     labels.resize(x.size());
+    beside.push_back(x.back());
+    beside[at] = std::max(beside[at], x.back());
     labels[at] += (labels[at].empty() ? " " : ", ") + std::to_string(i + 1);
   }
   for (std::size_t k = 0; k < x.size(); ++k) {
-    if (!labels[k].empty()) panel.note(x[k] * 1.02, y[k], labels[k]);
+    if (!labels[k].empty()) panel.note(beside[k] * 1.02, y[k], labels[k]);
   }
   if (!x.empty()) {
     panel.points(x, y, {.color = Color::blue, .marker = Marker::circle, .column = "designs"});
   }
-  // Numbers stand at decades: within one the axis is even.
-  const auto wide = [](const std::vector<double>& a, const std::vector<double>& b) {
-    std::vector<double> all = a;
-    all.insert(all.end(), b.begin(), b.end());
+  // Numbers stand at decades: within one the axis is even. No point on the frame.
+  if (!x.empty()) {
+    if (span(x, noise) > std::log(20)) panel.log_x();
+    if (span(y, output) > std::log(20)) panel.log_y();
+    auto all = x;
+    all.insert(all.end(), noise.begin(), noise.end());
     const auto [least, largest] = std::minmax_element(all.begin(), all.end());
-    return *largest > 20 * *least;
-  };
-  if (!x.empty() && wide(x, noise)) panel.log_x();
-  if (!x.empty() && wide(y, output)) panel.log_y();
+    panel.x_range(0.9 * *least, 1.05 * *largest);
+  }
   const auto& chosen = tuning.designs[taken];
   panel.points({100 * chosen.control_noise / range}, {chosen.output_deviation},
                {.name = chosen.name,

@@ -287,8 +287,9 @@ Findings examine(const Settings& settings, const Input& input) {
   } else if (input.first_order) {
     options.orders = {1};
   }
-  const bool slow = input.log.y.size() > 200'000;
-  if (slow) {
+  if (settings.progress) {
+    options.progress = [&](double share) { settings.progress("finding the machine", share); };
+  } else if (input.log.y.size() > 200'000) {
     options.progress = [](double share) {
       std::fprintf(stderr, "identifying the model: %3.0f %%\n", 100 * share);
     };

@@ -3,8 +3,10 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -32,11 +34,12 @@ enum Status {
 /// The command line.
 struct Settings {
   std::string file;
-  std::string time, u, y;             ///< columns; empty: found by their names
-  std::vector<std::string> measured;  ///< columns of measured disturbances
-  std::string time_unit;              ///< h, min, s, ms, us or ns; empty: found out
-  double sample_time = 0;             ///< s, where there is no time
-  char separator = 0;                 ///< 0: found out
+  std::optional<std::string_view> bytes{};  ///< of the file, where there is none on a disk
+  std::string time, u, y;                   ///< columns; empty: found by their names
+  std::vector<std::string> measured;        ///< columns of measured disturbances
+  std::string time_unit;                    ///< h, min, s, ms, us or ns; empty: found out
+  double sample_time = 0;                   ///< s, where there is no time
+  char separator = 0;                       ///< 0: found out
   std::optional<double> wrap;  ///< y begins anew after so much; 0: it does not; none: found out
   std::vector<int> orders{};   ///< empty: 1 for a speed, a temperature or a level, else found out
   std::optional<double> expected_gain;  ///< b0 as the user believes it to be
@@ -56,7 +59,15 @@ struct Settings {
   double bandwidth = 0;    ///< its omega_o, rad/s
   std::string out = ".";   ///< folder of the page
   std::string command;     ///< for the page
+  /// Called with what is done and the finished share of it, 0 to 1; below 0: not known.
+  std::function<void(const char*, double)> progress{};
 };
+
+/// The command line as settings; --help prints what there is, and ends the program.
+[[nodiscard]] Settings read_arguments(int argc, const char* const* argv);
+
+/// The file, or what it consists of.
+[[nodiscard]] esokit::examples::LogSource source_of(const Settings& settings);
 
 /// Something that has to be looked at before anything is pasted.
 struct Alarm {

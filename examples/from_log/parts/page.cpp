@@ -2,26 +2,10 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cerrno>
-#include <cstdint>
-#include <cstdio>
-#include <cstring>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <optional>
-#include <system_error>
-#include <utility>
-
-#include "common/system.hpp"
-#include "from_log/page_template.hpp"  // common/page.html, by CMake
 
 namespace from_log {
-namespace {
-
 using esokit::examples::CsvRow;
 using esokit::examples::Figure;
-using esokit::examples::path_of;
 
 std::string escaped(const std::string& text) {
   std::string out;
@@ -46,52 +30,7 @@ std::string escaped(const std::string& text) {
   return out;
 }
 
-std::string base64(const std::string& bytes) {
-  constexpr const char* digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string out;
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    std::uint32_t three = 0;
-    for (std::size_t j = i; j < i + 3; ++j) {
-      three = three << 8U | (j < bytes.size() ? static_cast<unsigned char>(bytes[j]) : 0U);
-    }
-    for (int j = 0; j < 4; ++j) out += digits[three >> (18 - 6 * j) & 63U];
-    if (i + 1 >= bytes.size()) out[out.size() - 2] = '=';
-    if (i + 2 >= bytes.size()) out[out.size() - 1] = '=';
-  }
-  return out;
-}
-
-/// A folder that goes with it.
-class Scratch {
- public:
-  Scratch() = default;
-  ~Scratch() {
-    std::error_code ignored;
-    if (!path_.empty()) std::filesystem::remove_all(path_of(path_), ignored);
-  }
-  Scratch(const Scratch&) = delete;
-  Scratch& operator=(const Scratch&) = delete;
-  [[nodiscard]] const std::string& path() const { return path_; }
-
- private:
-  std::string path_ = esokit::examples::new_scratch_folder();
-};
-
-/// As an image that is in the page itself; what is said in its place without gnuplot.
-std::string html_of(const Figure& figure, const std::string& scratch) {
-  std::string text = "<figure>\n";
-  if (!scratch.empty() && figure.write(scratch, "svg")) {
-    std::ifstream file(scratch + "/" + figure.name() + ".svg", std::ios::binary);
-    const std::string svg{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-    text +=
-        "<label class=\"zoom\"><input type=\"checkbox\" aria-label=\"larger\"><img "
-        "src=\"data:image/svg+xml;base64," +
-        base64(svg) + "\" alt=\"" + escaped(figure.caption()) + "\"></label>\n";
-  } else {
-    text += "<p>Not drawn: figures need gnuplot and Python 3.</p>\n";
-  }
-  return text + "<figcaption>" + escaped(figure.caption()) + "</figcaption>\n</figure>\n";
-}
+namespace {
 
 std::string html_of_table(const std::string& caption, const std::vector<CsvRow>& rows) {
   std::string text = "<figure class=\"tab\"><figcaption>" + escaped(caption) +
@@ -120,36 +59,12 @@ std::string html_of_table(const std::string& caption, const std::vector<CsvRow>&
   return text + "</tbody></table></div></figure>\n";
 }
 
-void replace(std::string& text, const std::string& mark, const std::string& by) {
-  const auto at = text.find(mark);
-  if (at != std::string::npos) text.replace(at, mark.size(), by);
-}
-
 }  // namespace
 
-std::string new_file(const std::string& folder, const std::string& stem,
-                     const std::string& ending) {
-  std::error_code problem;
-  std::filesystem::create_directories(path_of(folder), problem);
-  for (int number = 1; number < 100'000; ++number) {
-    const std::string file =
-        (path_of(folder) /
-         path_of(stem + (number > 1 ? "-" + std::to_string(number) : "") + ending))
-            .string();
-    // Two runs at the same time cannot take the same name.
-    if (esokit::examples::create_new(file)) return file;
-    if (errno != EEXIST) {
-      std::fprintf(stderr, "from_log: cannot write %s: %s\n", file.c_str(), std::strerror(errno));
-      break;
-    }
-  }
-  return {};
-}
+std::string Page::header() const { return "<h1>" + escaped(title_) + "</h1>\n"; }
 
-std::string Page::write(const std::string& folder, const std::string& stem) const {
-  const Scratch scratch;
-  std::string header, main;
-  header = "<h1>" + escaped(title_) + "</h1>\n";
+std::string Page::main(const std::function<std::string(const Figure&)>& drawn) const {
+  std::string main;
   for (const Item& item : items_) {
     switch (item.kind) {
       case Kind::heading:
@@ -170,7 +85,8 @@ std::string Page::write(const std::string& folder, const std::string& stem) cons
         main += html_of_table(item.text, item.rows);
         break;
       case Kind::figure:
-        main += html_of(item.figures[0], scratch.path());
+        main += "<figure>\n" + drawn(item.figures[0]) + "<figcaption>" +
+                escaped(item.figures[0].caption()) + "</figcaption>\n</figure>\n";
         break;
       case Kind::code:
         if (!item.name.empty())
@@ -180,36 +96,7 @@ std::string Page::write(const std::string& folder, const std::string& stem) cons
         break;
     }
   }
-  std::string html = page_template;
-  replace(html, "$title", escaped(title_) + " - esokit");
-  replace(html, "$header", header);
-  replace(html, "$main", main);
-  const std::string file = new_file(folder, stem, ".html");
-  if (file.empty() || !esokit::examples::write_text(file, html)) return {};
-  return std::filesystem::absolute(path_of(file)).lexically_normal().string();
-}
-
-void Page::add_to(esokit::examples::Report& report) const {
-  for (const Item& item : items_) {
-    switch (item.kind) {
-      case Kind::table:
-        report.table(item.name, item.text, item.rows[0], {item.rows.begin() + 1, item.rows.end()});
-        break;
-      case Kind::figure:
-        report.add(item.figures[0]);
-        break;
-      case Kind::box:
-      case Kind::bad_box: {
-        std::string text = item.text + ":";
-        for (const auto& line : item.rows[0])
-          text += ' ' + line + (line.ends_with('.') || line.ends_with('?') ? "" : ".");
-        report.remark(text);
-        break;
-      }
-      default:
-        break;
-    }
-  }
+  return main;
 }
 
 }  // namespace from_log

@@ -2,11 +2,17 @@
 /// One HTML file that needs no other: text, tables, figures, code.
 #pragma once
 
+#include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "common/csv.hpp"
 #include "common/figure.hpp"
-#include "common/report.hpp"
+
+namespace esokit::examples {
+class Report;
+}
 
 namespace from_log {
 
@@ -38,6 +44,12 @@ class Page {
     return add({.kind = Kind::code, .text = std::move(text), .name = std::move(heading)});
   }
 
+  /// Its heading, as HTML.
+  [[nodiscard]] std::string header() const;
+  /// All below it. @param drawn what shows a figure
+  [[nodiscard]] std::string main(
+      const std::function<std::string(const esokit::examples::Figure&)>& drawn) const;
+
   /// Writes FOLDER/STEM.html, or STEM-2.html and so on where that is there: never over a file.
   /// @return what was written; empty if that failed, stderr says why
   [[nodiscard]] std::string write(const std::string& folder, const std::string& stem) const;
@@ -63,6 +75,9 @@ class Page {
   std::string title_;
   std::vector<Item> items_;
 };
+
+/// Text as HTML has it.
+[[nodiscard]] std::string escaped(const std::string& text);
 
 /// A file FOLDER/STEM + ENDING that was not there before: STEM-2, STEM-3 where it was.
 [[nodiscard]] std::string new_file(const std::string& folder, const std::string& stem,

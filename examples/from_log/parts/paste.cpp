@@ -5,7 +5,6 @@
 #include <complex>
 #include <cstdio>
 #include <cstdlib>
-#include <filesystem>
 #include <limits>
 
 #include <esokit/adapter/guarded.hpp>
@@ -15,8 +14,6 @@
 #include <esokit/sim/gaussian.hpp>
 #include <esokit/sim/run.hpp>
 #include <esokit/tune/controller.hpp>
-
-#include "common/system.hpp"
 
 namespace from_log {
 namespace {
@@ -443,7 +440,7 @@ Pasting Pasting::make(const Settings& settings, const Input& input, const esokit
                       std::vector<Feed> feeds) {
   Pasting p;
   p.feeds = std::move(feeds);
-  const std::string name = esokit::examples::path_of(settings.file).filename().string();
+  const std::string name = source_of(settings).file_name();
   p.order = model.order;
   p.input_gain = model.input_gain.value;
   const double half = 0.5 * (model.u_max - model.u_min);

@@ -11,13 +11,16 @@
 #include <string_view>
 #include <vector>
 
-#include "common/system.hpp"
 #include "from_log/parts/from_log.hpp"
+#ifndef __wasi__
+#include "common/system.hpp"
+#endif
 
 namespace from_log {
 namespace {
 
 using esokit::examples::LogFile;
+using esokit::examples::LogSource;
 using esokit::examples::number_text;
 
 std::string lower(std::string text) {
@@ -87,7 +90,8 @@ std::vector<std::string> words(const std::string& name) {
                                           "\xc2\xb0"
                                           "c",
                                           "bar"};
-    if (std::ranges::find(units, text.substr(stroke + 1)) != std::end(units)) text[stroke] = ' ';
+    if (std::find(std::begin(units), std::end(units), text.substr(stroke + 1)) != std::end(units))
+      text[stroke] = ' ';
   }
   const auto bracket = text.find_first_of("[(");
   const auto part = text.find_last_of("/.", bracket == std::string::npos ? text.size() : bracket);
@@ -309,15 +313,25 @@ void unwrap(const Settings& settings, Input& input) {
 
 }  // namespace
 
+LogSource source_of(const Settings& settings) {
+#ifdef __wasi__
+  return {settings.file, settings.bytes.value_or("")};
+#else
+  if (settings.bytes) return {settings.file, *settings.bytes};
+  return esokit::examples::path_of(settings.file);
+#endif
+}
+
 Input read_log(const Settings& settings) {
-  const LogFile header(esokit::examples::path_of(settings.file), settings.separator);
+  const LogSource source = source_of(settings);
+  const LogFile header(source, settings.separator);
   Input input;
   const bool timed = !(settings.sample_time > 0.0) || !settings.time.empty();
   std::vector<std::string> wanted = {guess(header, "u", settings.u),
                                      guess(header, "y", settings.y)};
   if (timed) wanted.push_back(guess(header, "time", settings.time));
   wanted.insert(wanted.end(), settings.measured.begin(), settings.measured.end());
-  const LogFile file(esokit::examples::path_of(settings.file), wanted, settings.separator,
+  const LogFile file(source, wanted, settings.separator,
                      timed ? std::optional<std::size_t>(2) : std::nullopt);
   input.u = file.name(0);
   input.y = file.name(1);

@@ -4,16 +4,12 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <filesystem>
 #include <map>
 #include <string>
 #include <vector>
 
 #include <esokit/core/error_text.hpp>
 #include <esokit/core/version.hpp>
-
-#include "common/system.hpp"
-#include "from_log/parts/log_observer.hpp"
 
 namespace from_log {
 namespace {
@@ -92,15 +88,19 @@ Figure log_figure(const Input& input, const Findings& findings) {
                           .name(name)
                           .line(t, values, {.color = color, .width = 1.0, .column = name});
     // Of a constant gnuplot would choose a range itself, with a warning.
-    const auto first = std::ranges::find_if(values, [](double v) { return std::isfinite(v); });
-    const bool constant = std::ranges::none_of(
-        values, [&](double v) { return std::isfinite(v) && (v < *first || v > *first); });
+    const auto first =
+        std::find_if(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+    const bool constant = std::none_of(values.begin(), values.end(), [&](double v) {
+      return std::isfinite(v) && (v < *first || v > *first);
+    });
     if (constant && first != values.end()) {
       const double margin = std::max(0.1 * std::abs(*first), 1e-3);
       over_time.y_range(*first - margin, *first + margin);
     }
     // Of a constant there is none.
-    if (std::ranges::none_of(spectrum.density, [](double d) { return d > 0; })) return;
+    if (std::none_of(spectrum.density.begin(), spectrum.density.end(),
+                     [](double d) { return d > 0; }))
+      return;
     figure.panel(row, 1)
         .x_label("w (rad/s)")
         .y_label(std::string("density of ") + name)
@@ -293,12 +293,6 @@ std::vector<CsvRow> log_table(const Input& input, const Findings& findings) {
 
 }  // namespace
 
-std::string stem_of(const Settings& settings) {
-  // A name of nothing but dots would be a hidden file.
-  const std::string stem = esokit::examples::path_of(settings.file).stem().string();
-  return stem.find_first_not_of('.') == std::string::npos ? "log" + stem : stem;
-}
-
 std::vector<std::string> why_refused(const Findings& findings) {
   if (!findings.refusal) return {};
   std::vector<std::string> lines{esokit::to_text(*findings.refusal)};
@@ -336,7 +330,7 @@ std::vector<std::string> in_short(const Findings& findings, const Design& design
 
 Page show(const Settings& settings, const Input& input, const Findings& findings,
           const Design& design) {
-  const std::string name = esokit::examples::path_of(settings.file).filename().string();
+  const std::string name = source_of(settings).file_name();
   Page page("From " + name + " to a controller");
   if (!findings.alarms.empty()) {
     std::vector<std::string> lines;
@@ -371,69 +365,6 @@ Page show(const Settings& settings, const Input& input, const Findings& findings
   return page;
 }
 
-std::string show_observer(const Settings& settings, const Input& input) {
-  if (settings.orders.size() != 1) throw LogError("--observer: --order is missing");
-  if (!settings.expected_gain) throw LogError("--observer: --b0 is missing");
-  if (!(settings.bandwidth > 0)) throw LogError("--observer: --bandwidth is missing");
-  LogSettings how{.observer = settings.observer,
-                  .order = settings.orders[0],
-                  .input_gain = *settings.expected_gain,
-                  .bandwidth = settings.bandwidth,
-                  .sample_time = settings.sample_time};
-  const auto& time = input.log.time;
-  if (!(how.sample_time > 0)) how.sample_time = median_step(time);
-  const LogEstimates found = run_observer(how, time, input.log.y, input.log.u);
-  std::vector<double> t = time;
-  for (std::size_t k = t.size(); k < input.log.y.size(); ++k)
-    t.push_back(static_cast<double>(k) * how.sample_time);
-  std::string text = "t_s";
-  for (int r = 0; r < how.order; ++r) text += ",y" + std::string(static_cast<std::size_t>(r), '\'');
-  text += ",d\n";
-  for (std::size_t k = 0; k < t.size(); ++k) {
-    text += number_text(t[k], 15);
-    for (const auto& column : found.columns) text += ',' + number_text(column[k], 12);
-    text += '\n';
-  }
-  const std::filesystem::path file = esokit::examples::path_of(settings.file);
-  const std::string numbers = new_file(settings.out, stem_of(settings) + "-estimates", ".csv");
-  if (numbers.empty() || !write_text(numbers, text)) return {};
-  Page page(file.filename().string() + ", run through an observer");
-  page.text(
-      "Observer " + how.observer + ", order " + std::to_string(how.order) +
-      ", b0 = " + number_text(how.input_gain, 6) + ", omega_o = " + number_text(how.bandwidth, 6) +
-      " rad/s, T = " + number_text(how.sample_time, 6) + " s. The gains follow the time stamps.");
-  page.table(
-      "log", "The log",
-      {{"", "rows"},
-       {"in the log", std::to_string(t.size())},
-       {"measurements missing or bad, bridged by prediction", std::to_string(found.rejected)},
-       {"inputs missing or bad, replaced by the one before", std::to_string(found.inputs)},
-       {"restarts, because a gap was too long to bridge", std::to_string(found.restarts)}});
-  Figure figure("estimates", {.rows = 2, .panel_height = 170});
-  figure.caption(
-      "Top: y and its estimate. Bottom: u, and the estimated total disturbance in units of u.");
-  figure.panel(0, 0)
-      .y_label("y (unit of the log)")
-      .legend(Legend::above)
-      .name("output")
-      .line(t, input.log.y, {.name = "y", .color = Color::grey, .width = 1.0})
-      .line(t, found.columns[0], {.name = "estimate", .color = Color::blue, .width = 1.1});
-  std::vector<double> load;
-  for (const double d : found.columns[static_cast<std::size_t>(how.order)])
-    load.push_back(d / how.input_gain);
-  figure.panel(1, 0)
-      .x_label("t (s)")
-      .y_label("u, d / b0 (unit of u)")
-      .legend(Legend::above)
-      .name("load")
-      .line(t, input.log.u, {.name = "u", .color = Color::grey, .width = 1.0})
-      .line(t, load, {.name = "dhat / b0", .color = Color::vermillion, .width = 1.1});
-  page.figure(figure);
-  page.text("All estimates are in the file " +
-            esokit::examples::path_of(numbers).filename().string() + ".");
-  return page.write(settings.out, stem_of(settings));
-}
-
 Outcome work_out(const Settings& settings) { return work_out(settings, read_log(settings)); }
 
 Outcome work_out(const Settings& settings, const Input& input) {
@@ -442,6 +373,7 @@ Outcome work_out(const Settings& settings, const Input& input) {
   outcome.findings = examine(settings, input);
   const bool usable = outcome.findings.seen && (!outcome.findings.refusal || settings.anyway);
   if (usable && !settings.no_design) {
+    if (settings.progress) settings.progress("choosing a controller", -1.0);
     outcome.design = Design::make(settings, input, outcome.findings);
     auto& alarms = outcome.findings.alarms;
     alarms.insert(alarms.end(), outcome.design.alarms().begin(), outcome.design.alarms().end());

@@ -68,6 +68,7 @@ class DelayedInput : public NamedAdapter<DelayedInput<Observer, Capacity>, Obser
   [[nodiscard]] int delay() const noexcept { return delay_; }
 
  private:
+  friend struct detail::RecordAccess;
   static constexpr int length = Capacity + 1;
 
   DelayedInput(const Observer& observer, const DelayedInputConfig<Observer>& config) noexcept

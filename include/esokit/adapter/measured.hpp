@@ -38,7 +38,8 @@ struct MeasuredConfig {
 ///
 /// A w that is not given before a step, is not finite, or is too large is lost: the last good one
 /// is held for `most_lost` samples, then dropped: it counts as zero, which passes lag and dead
-/// time like any w. The first good w ends this. `lost(i)` and `dropped(i)` tell.
+/// time like any w. The first good w ends this. `lost(i)` and `dropped(i)` tell. Where the real w
+/// does not go to zero then, d steps by what it does, and an OutlierGate may reject y for a while.
 ///
 /// A gain that is wrong by 30 % leaves 30 % of f to the observer, which finds it like any d.
 /// With an actuator in the model f acts on the plant behind the actuator, as it does in reality.

@@ -82,8 +82,7 @@ class DisturbanceCompensator {
   /// One sample. @param y measurement, NaN if missing @param base_output u0 of the wrapped
   /// controller @return u to be held until the next sample, within the limits
   S update(S y, S base_output) noexcept {
-    return loop_.step(
-        y, [&]() ESOKIT_INLINE_LAMBDA { return base_output + unbounded_compensation(); });
+    return loop_.step(y, [&]() ESOKIT_INLINE_LAMBDA { return command(base_output); });
   }
 
   /// What the actuator held since the last sample, if it was not the last output: say it before
@@ -98,7 +97,7 @@ class DisturbanceCompensator {
   /// @param drive what drove the equation since the last sample in place of u, in units of y^(n) /
   /// b0
   S update_driven(S y, S base_output, S drive) noexcept {
-    return loop_.step_driven(y, drive, [&] { return base_output + unbounded_compensation(); });
+    return loop_.step_driven(y, drive, [&] { return command(base_output); });
   }
 
   /// w[k], before the sample in which it is first used; for an observer that is Measured.
@@ -110,7 +109,7 @@ class DisturbanceCompensator {
 
   /// One sample whose measurement is missing.
   S update_without_measurement(S base_output) noexcept {
-    return loop_.step_without_measurement([&] { return base_output + unbounded_compensation(); });
+    return loop_.step_without_measurement([&] { return command(base_output); });
   }
 
   /// Without compensation: the observer runs while u comes from elsewhere.
@@ -183,6 +182,7 @@ class DisturbanceCompensator {
 
  private:
   friend struct detail::LaneAccess;
+  friend struct detail::RecordAccess;
   static constexpr auto fields(auto& o) noexcept { return detail::tie(o.loop_, o.gain_); }
 
   using Loop = ControlLoop<Observer>;
@@ -205,6 +205,10 @@ class DisturbanceCompensator {
   [[nodiscard]] ESOKIT_INLINE S unbounded_compensation() const noexcept {
     return detail::by_present_gain(loop_.observer(),
                                    S(gain_ * loop_.observer().total_disturbance()));
+  }
+
+  [[nodiscard]] ESOKIT_INLINE S command(S base_output) const noexcept {
+    return base_output + unbounded_compensation();
   }
 
   Loop loop_;

@@ -49,8 +49,10 @@ struct ExperimentConfig {
   S response_time{};  ///< .. in each so many seconds, about three latencies and the time of such a
                       ///< move; 0: is not watched. After an approach longer by the ratio of what u
                       ///< was moved by then and is now
-  S travel{};         ///< largest abs(y - y0), with an approach abs(y - output) from the first
-                      ///< settling cycle on; beyond it the experiment is aborted
+  S fastest{};  ///< largest abs(dy/dt), unit of y per s, as the mean over the time in which y so
+                ///< moves by `response`; beyond it the experiment is aborted. 0: no limit
+  S travel{};   ///< largest abs(y - y0), with an approach abs(y - output) from the first
+                ///< settling cycle on; beyond it the experiment is aborted
   S lowest_output = Limits<S>{}.lower;   ///< least y; below it the experiment is aborted
   S highest_output = Limits<S>{}.upper;  ///< largest y
   std::optional<S> safe_input{};         ///< u after an abort; left out: u0
@@ -100,7 +102,8 @@ enum class AbortReason : unsigned char {
   too_noisy,     ///< noise at rest above half the hysteresis or a quarter of `response`
   resolution,    ///< the sensor's smallest step is above half the hysteresis or of `response`
   output_limit,  ///< y beyond `lowest_output` or `highest_output`, or the relay would lead there
-  input_limit    ///< the u that holds y leaves less than a tenth of A to a limit of the actuator
+  input_limit,   ///< the u that holds y leaves less than a tenth of A to a limit of the actuator
+  too_fast       ///< y moved faster than `fastest`
 };
 
 /// Has text.
@@ -112,7 +115,8 @@ template <class Stream, std::same_as<AbortReason> Value>
 requires detail::WritesText<Stream> Stream& operator<<(Stream& out, Value reason) {
   constexpr const char* names[] = {"none",      "travel",      "time_limit",   "bad_sample",
                                    "stopped",   "no_response", "wrong_sign",   "load_changed",
-                                   "too_noisy", "resolution",  "output_limit", "input_limit"};
+                                   "too_noisy", "resolution",  "output_limit", "input_limit",
+                                   "too_fast"};
   out << names[static_cast<int>(reason)];
   return out;
 }
@@ -152,7 +156,8 @@ struct ExperimentRow {
 /// u0 and the approach's u; the mean of u over a whole cycle is the u that holds `output`, and the
 /// measured cycles move u around that, with a hysteresis of at least what y moves in the latency.
 ///
-/// Whatever happens ends within `time_limit` with a `reason`, and with the safe u. While u is on
+/// Limits are those of y, of y' (`fastest`), of u and of time. Whatever happens ends within
+/// `time_limit` with a `reason`, and with the safe u. While u is on
 /// the side that drives y away from where the safe u leads, y has to follow it by `response` in
 /// each `response_time`: so a sensor that stands still is noticed within that time, in which u may
 /// move y by b0 A times it: leave as much room. On the other side only `time_limit` ends it. No u
@@ -161,7 +166,8 @@ struct ExperimentRow {
 ///
 /// Hand-over: from phase `hand_over` on the result is ready. Make the controller, call its
 /// `track(y, reference, u)` while the experiment still moves the machine, and continue with its
-/// `update` from phase `done` on. `examples/identify` shows this.
+/// `update` from phase `done` on, before the first of them `applied(u)` with the u that the
+/// experiment gave last. `examples/identify` shows this.
 /// @tparam Order n, 1 or 2
 template <int Order, PlainScalar S = double>
 class Experiment {
@@ -185,6 +191,7 @@ class Experiment {
         .not_negative("rest", config.rest)
         .positive("travel", config.travel)
         .not_negative("response_time", config.response_time)
+        .not_negative("fastest", config.fastest)
         .finite("lowest_output", config.lowest_output)
         .finite("highest_output", config.highest_output)
         .require(config.lowest_output < config.highest_output,
@@ -212,7 +219,8 @@ class Experiment {
     if (config.response_time > S(0)) {
       rules.positive("response", config.response);
     } else {
-      rules.left_out("response", config.response, "must be left out without response_time");
+      rules.left_out("response", config.response, "must be left out without response_time")
+          .left_out("fastest", config.fastest, "must be left out without response");
     }
     if (!rules) return rules.error();
     const auto limiter = Limiter<S>::make(config.limits, T);
@@ -244,6 +252,9 @@ class Experiment {
                    {"response_time", config.response_time, "must be below time_limit", -1,
                     config.time_limit, true});
     }
+    rules.require(!(config.fastest * T > config.response),
+                  {"fastest", config.fastest, "must be at most response in a sample:", -1,
+                   config.response / T, true});
     const S power = Order == 1 ? T : S(T * T);
     rules.representable("sample_time", T, power, "has a power that the scalar cannot hold");
     if (!rules) return rules.error();
@@ -273,6 +284,9 @@ class Experiment {
     if (count_ >= limit_samples_) return abort(AbortReason::time_limit);
     ++count_;
     look_at_steps(y);
+    if (too_fast(y)) {
+      return abort(goes_wrong(from_rest) ? AbortReason::wrong_sign : AbortReason::too_fast);
+    }
     if (const AbortReason why = watched(y); why != AbortReason::none) return abort(why);
     if (cycle_.is_open()) measure(y, u_applied);
     y_[1] = y_[0];
@@ -336,11 +350,18 @@ class Experiment {
         half_samples_(to_samples(config.half_period)),
         hand_over_samples_(to_samples(config.hand_over)),
         response_samples_(to_samples(config.response_time)),
+        piece_samples_(samples_of_a_piece(config)),
         centre_(config.input),
         amplitude_(config.amplitude),
         hysteresis_(config.hysteresis) {
     limiter_.track(config.input);
     if (config.lead > S(0)) follow_ = -std::expm1(S(-4) * config.sample_time / config.lead);
+  }
+
+  static std::int32_t samples_of_a_piece(const Config& config) noexcept {
+    if (!(config.fastest > S(0))) return 0;
+    const S samples = config.response / config.fastest / config.sample_time;
+    return samples < S(1 << 24) ? static_cast<std::int32_t>(samples) : 1 << 24;
   }
 
   [[nodiscard]] std::int32_t to_samples(S seconds) const noexcept {
@@ -417,6 +438,17 @@ class Experiment {
     const S step = count_ > 1 ? detail::absolute(S(y - y_[0])) : S(0);
     if (step > S(0) && (!(smallest_step_ > S(0)) || step < smallest_step_)) smallest_step_ = step;
     if (phase_ == ExperimentPhase::rest) noise_ += (step * step / S(2) - noise_) / S(count_);
+  }
+
+  /// Looks at y in pieces of the time in which it at most moves by `response`.
+  [[nodiscard]] bool too_fast(S y) noexcept {
+    if (!(config_.fastest > S(0))) return false;
+    const bool fast = count_ > 1 && detail::absolute(S(y - piece_start_)) > config_.response;
+    if (count_ == 1 || count_ - piece_since_ >= piece_samples_) {
+      piece_start_ = y;
+      piece_since_ = count_;
+    }
+    return fast;
   }
 
   /// u has moved: from here on y has to follow.
@@ -612,11 +644,12 @@ class Experiment {
   Limiter<S> limiter_;
   detail::CycleAnalysis<Order, S> cycle_;
   std::int32_t rest_samples_, limit_samples_, half_samples_, hand_over_samples_, response_samples_;
+  std::int32_t piece_samples_;
   S centre_, amplitude_, hysteresis_;
   S smallest_step_{}, noise_{};
-  S watch_start_{}, farthest_{};
+  S watch_start_{}, farthest_{}, piece_start_{};
   S start_output_{}, slope_{}, fastest_{}, coast_{}, mean_{};
-  std::int32_t watched_since_ = 0, responded_ = 0;
+  std::int32_t watched_since_ = 0, responded_ = 0, piece_since_ = 0;
   bool watching_ = false, first_move_ = false, rises_ = true;
   S follow_{};
   S u_last_{};

@@ -219,7 +219,8 @@ class MimoAdrc {
     return std::get<static_cast<std::size_t>(Channel)>(observers_);
   }
 
-  /// The same, for its own members (trust and pin of Guarded).
+  /// The same, for its own members (trust and pin of Guarded; `measured(w)` of Measured, before
+  /// each `update`).
   template <int Channel>
   [[nodiscard]] ObserverOf<Channel>& observer() noexcept {
     return std::get<static_cast<std::size_t>(Channel)>(observers_);

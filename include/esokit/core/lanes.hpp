@@ -132,7 +132,7 @@ struct LaneAccess {
 #undef ESOKIT_FOR_PACKS
 };
 
-struct RecordAccess;  // target/c_code.hpp: parts of a controller's step that are recorded apart
+struct RecordAccess;  // target/recorded_design.hpp: what is recorded apart
 
 /// A std::array or a Matrix.
 template <class T>

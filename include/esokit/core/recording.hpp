@@ -1,6 +1,6 @@
 /// @file
 /// RecordingScalar: a scalar that notes each operation, so that one call of a step gives the list
-/// of operations of which the step consists. For the workstation; `target/recorded.hpp` records
+/// of operations of which the step consists. For the workstation; `target/recorder.hpp` records
 /// whole objects with it.
 #pragma once
 

@@ -86,7 +86,7 @@ class ConstantGain {
   Lanes<typename Placement::template Sampled<Size, LaneScalar<S>>, S> poles_{};
 };
 
-template <int Size, Scalar S, class Placement = EqualPoles, int MostBridged = 16>
+template <int Size, Scalar S, class Placement = EqualPoles, int MostBridged = 101>
 class ModelGain;  // gain/model_gain.hpp, to be included with a model other than the chain
 
 template <int Size, Scalar S, class Placement = EqualPoles, int Count = 9, int MostBridged = 16>

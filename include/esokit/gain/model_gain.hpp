@@ -16,10 +16,26 @@ namespace esokit {
 
 namespace detail {
 
-/// The gains of a CorrectedPart: after one sample, and after each gap.
-template <int Size, Scalar S, int MostBridged>
+/// The first step, in samples, that has gain `index` of a table: 1, 2, 3, 4, 6, 8, 11, 14, 18, ..
+constexpr int first_step(int index) noexcept {
+  int samples = 1;
+  for (int i = 0; i < index; ++i) samples += 1 + samples / 4;
+  return samples;
+}
+
+/// The index of the gain for a step.
+constexpr int gain_of_step(unsigned samples) noexcept {
+  int i = 0;
+  for (unsigned next = 2; next <= samples; next += 1 + next / 4) ++i;
+  return i;
+}
+
+/// The gains of a CorrectedPart: after one sample, and after gaps, see first_step.
+/// @tparam Longest step, samples
+template <int Size, Scalar S, int Longest>
 struct PartDesign {
-  Array<ScaledGain<Size, S>, MostBridged> gains{};
+  static constexpr int count = gain_of_step(Longest) + 1;
+  Array<ScaledGain<Size, S>, count> gains{};
   int longest_step = 0;  ///< longest step that is bridged, samples; 0: the poles cannot be placed
 
   /// True if every error decays with this gain.
@@ -110,9 +126,11 @@ struct PartDesign {
                       const S& decay) {
     // In units in which the elements are of similar size.
     Array<S, Size> gain{};
+    S least(0.0);
     for (std::size_t i = 0; i < Size; ++i) {
       gain[i] = gains[0][i] / units[i];
       output[i] = output[i] * units[i];
+      least = least + S(1e-6) * gain[i] * gain[i];
       for (std::size_t j = 0; j < Size; ++j) {
         S& x = step(static_cast<int>(i), static_cast<int>(j));
         x = x * (units[j] / units[i]);
@@ -120,11 +138,13 @@ struct PartDesign {
     }
     const Square sample = corrected(step, output, gain);
     // Which V suits best depends on how far the poles are apart. A step in which it rises is added
-    // to the sum of which P consists; that lets V fall there, and rise elsewhere.
+    // to the sum of which P consists; that lets V fall there, and rise elsewhere. What the gain
+    // does not move, as a lag that is only computed, has an error all the same.
     constexpr int rounds = 8;
     for (const double share : {1.0, 0.2}) {
       Square spread = squared<Size, S>(gain);
-      for (int round = 0; round < rounds && longest_step < MostBridged; ++round) {
+      for (int i = 0; i < Size; ++i) spread(i, i) = spread(i, i) + least;
+      for (int round = 0; round < rounds && longest_step < Longest; ++round) {
         const S rate = S(share) * decay;
         const auto square = FallingSquare<Size, S>::make(sample, spread, rate);
         if (!square) break;
@@ -139,34 +159,48 @@ struct PartDesign {
   Square find_gap_gains(const FallingSquare<Size, S>& square, const Square& step,
                         const Array<S, Size>& output, const Array<S, Size>& units) {
     auto found = gains;
-    Square over = step;  // Phi^M - I
+    Square over = step;  // Phi^M - I of the last step that was looked at
     Square error;
     S noise(1.0);
-    for (int samples = 2; samples <= MostBridged; ++samples) {
-      over = joined(over, step);
-      const Square phi = plus_identity(over);
+    for (int i = 1; i < count; ++i) {
+      const int first = first_step(i),
+                next = first_step(i + 1) < Longest + 1 ? first_step(i + 1) : Longest + 1;
+      Square middle = over;
+      for (int samples = first; samples <= (first + next - 1) / 2; ++samples)
+        middle = joined(middle, step);
+      const Square phi = plus_identity(middle);
       const Square grown = phi * square.covariance() * phi.transpose();
-      auto& gain = found[static_cast<std::size_t>(samples - 1)];
-      // R is halved until V falls; at R = 0 it may rise, too.
-      for (int halvings = 0;; ++halvings, noise = noise * S(0.5)) {
-        if (halvings == 16) return plus_identity(error);
+      auto& gain = found[static_cast<std::size_t>(i)];
+      // R is halved until V falls in all steps with this gain; at R = 0 it may rise, too.
+      int samples = first;
+      for (int halvings = 0; samples < next; ++halvings, noise = noise * S(0.5)) {
+        if (halvings == 16) break;
         S innovation = noise;
-        for (std::size_t i = 0; i < Size; ++i) {
-          gain[i] = S(0.0);
+        for (std::size_t row = 0; row < Size; ++row) {
+          gain[row] = S(0.0);
           for (std::size_t j = 0; j < Size; ++j) {
-            gain[i] = gain[i] + grown(static_cast<int>(i), static_cast<int>(j)) * output[j];
+            gain[row] = gain[row] + grown(static_cast<int>(row), static_cast<int>(j)) * output[j];
           }
-          innovation = innovation + output[i] * gain[i];
+          innovation = innovation + output[row] * gain[row];
         }
         for (S& k : gain) k = k / innovation;
-        error = corrected(over, output, gain);
-        if (square.falls(error)) break;
+        Square longer = over;
+        for (samples = first; samples < next; ++samples) {
+          longer = joined(longer, step);
+          error = corrected(longer, output, gain);
+          if (!square.falls(error)) break;
+        }
+        if (samples == next) {
+          over = longer;
+          break;
+        }
       }
-      for (std::size_t i = 0; i < Size; ++i) gain[i] = gain[i] * units[i];
-      if (samples > longest_step) {
-        longest_step = samples;
+      for (std::size_t row = 0; row < Size; ++row) gain[row] = gain[row] * units[row];
+      if (samples - 1 > longest_step) {
+        longest_step = samples - 1;
         gains = found;
       }
+      if (samples < next) return plus_identity(error);
     }
     return error;
   }
@@ -194,14 +228,17 @@ struct PartDesign {
 /// V(e) = e' P^-1 e, which falls in each sample without a gap (gain/gap_certificate.hpp); R is the
 /// largest 2^-i for which V falls in the step over M samples, too. Gaps are bridged up to the
 /// longest for which there is such an R, so errors decay in any sequence of them. After longer gaps
-/// the observer restarts.
-/// @tparam MostBridged longest gap to be considered, samples; each sample costs N numbers
+/// the observer restarts. Steps of 5 samples and more share a gain with those up to a fourth longer
+/// (that of M in the middle), and V is tested in each of them: 16 gains last for 101 samples.
+/// @tparam MostBridged longest step to be considered, samples
 template <int Size, Scalar S, class Placement, int MostBridged>
 class ModelGain {
  public:
   /// What the law can do besides `gain`.
   static constexpr GainLawTraits traits{.kind = GainKind::preset, .bridges_gaps = true};
-  using Spec = typename Placement::template Spec<Size, S>;  ///< bandwidth or poles
+  using Spec = typename Placement::template Spec<Size, LaneScalar<S>>;  ///< bandwidth or poles
+  template <class T>
+  using with_scalar = ModelGain<Size, T, Placement, MostBridged>;  ///< the same with another scalar
 
   /// The gain for a set of poles.
   /// @param field name of the config member that holds `spec`, for the error
@@ -223,7 +260,7 @@ class ModelGain {
         return Error<S>{field, named, "gives poles that the scalar cannot place for this model",
                         index};
       }
-      for (std::size_t gap = 0; gap < MostBridged; ++gap) {
+      for (std::size_t gap = 0; gap < law.gains_.size(); ++gap) {
         for (int i = 0; i < Size; ++i) {
           S sum(0.0);
           for (std::size_t j = 0; j < design.gains[gap].size(); ++j) {
@@ -273,7 +310,8 @@ class ModelGain {
 
   /// k_M, the gain after a gap of M samples.
   [[nodiscard]] constexpr ScaledGain<Size, S> gap_gain(const S&, unsigned samples) const noexcept {
-    return gains_[samples < MostBridged ? samples - 1 : MostBridged - 1];
+    constexpr auto most = static_cast<unsigned>(MostBridged);
+    return gains_[static_cast<std::size_t>(detail::gain_of_step(samples < most ? samples : most))];
   }
 
   /// The largest number of missing samples that is bridged, at most `asked`.
@@ -282,6 +320,9 @@ class ModelGain {
   }
 
  private:
+  friend struct detail::LaneAccess;
+  static constexpr auto fields(auto& o) noexcept { return detail::tie(o.gains_, o.longest_step_); }
+
   ModelGain() = default;
 
   template <int Part, int Pairs>
@@ -290,7 +331,7 @@ class ModelGain {
     return {part.step, part.output, part.degrees, poles};
   }
 
-  Array<ScaledGain<Size, S>, MostBridged> gains_{};
+  Array<ScaledGain<Size, S>, detail::gain_of_step(MostBridged) + 1> gains_{};
   int longest_step_ = 1;
 };
 

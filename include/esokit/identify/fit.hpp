@@ -16,6 +16,7 @@
 #include <cmath>
 #include <complex>
 #include <cstddef>
+#include <esokit/core/scalar.hpp>
 #include <esokit/identify/spectrum.hpp>
 #include <esokit/identify/timed_column.hpp>
 #include <esokit/math/dense.hpp>
@@ -47,8 +48,22 @@ struct FitData {
   std::vector<double> y;               ///< output, measured at its row
   std::vector<std::size_t> starts{0};  ///< index of the first row of each piece without a gap
 
+  /// What was measured near each row, if not at it: `y` is then a straight line between these. NaN:
+  /// nothing. Empty: y itself.
+  std::vector<double> measured{};
+  std::vector<double> offsets{};  ///< how much later than its row it was measured, s, as `measured`
+
+  /// Whether something was measured in a row.
+  [[nodiscard]] bool has(std::size_t row) const {
+    return measured.empty() || is_finite(measured[row]);
+  }
+
   /// Times of these rows, s; empty: no gap in time.
   std::vector<double> start_times{};
+
+  /// Whether the disturbance, a random walk, goes on from piece to piece (with one integrator);
+  /// else it is unknown anew, as y is.
+  bool one_load = false;
 
   /// More inputs that reach the plant through the same lag and dead time, each as long as u.
   std::vector<std::vector<double>> inputs{};
@@ -142,13 +157,21 @@ inline double dot(const double* a, const double* b, std::size_t count) noexcept 
   return (sums[0] + sums[1]) + (sums[2] + sums[3]);
 }
 
+/// Of the rows from a start on, until steady.
+struct GainsFromStart {
+  std::vector<double> gains{};    // one per state in each row
+  std::vector<double> weights{};  // sqrt(steady variance / variance)
+};
+
 /// The result of the Riccati recursion; it depends on w and a only.
 struct GainTable {
   double bandwidth = 0.0;
   double pole = 0.0;
-  std::vector<double> gains{};    // one per state in each row, until steady
-  std::vector<double> weights{};  // sqrt(steady variance / variance)
-  double steady_variance = 1.0;   // of an innovation, divided by that of the noise
+  GainsFromStart first{};        // nothing is known
+  GainsFromStart next{};         // of the other pieces, if the load goes on from piece to piece
+  double steady_variance = 1.0;  // of an innovation, divided by that of the noise
+  // Variances of the steady state before a measurement, then after so many rows without one.
+  std::vector<std::vector<double>> waited{};
 };
 
 /// The tables of the last few points, the latest first: those beside one point share some.
@@ -165,6 +188,9 @@ struct InnovationsFilter {
   double lag_decay = 0.0, lag_previous = 0.0, lag_current = 0.0, lag_next = 0.0;
   Vector column{};  // from a column to x
   std::ptrdiff_t delay = 0;
+  double w = 0.0, pole = 0.0, tau = 0.0;
+  int order = 1;
+  bool goes_on = false;  // the load, a random walk, from piece to piece
   std::shared_ptr<const GainTable> table{};
 
   /// @param cached gains of the last filters, reused if they are the same; receives the new ones
@@ -176,6 +202,8 @@ struct InnovationsFilter {
     const int n = model.order;
     // The states are y^(i) / w^i, so that the entries are of similar size.
     const double tau = std::max(point.lag(), 0.05 * T);
+    f.w = w, f.pole = point.pole, f.tau = tau, f.order = n;
+    f.goes_on = data.one_load && data.starts.size() > 1 && N == n + 1;
     double dead = std::max(point.latency - tau, 0.0);
     if (data.averaged > 1) dead += 0.5 * T / data.averaged;
     f.delay = static_cast<std::ptrdiff_t>(std::floor(dead / T));
@@ -252,21 +280,79 @@ struct InnovationsFilter {
       auto fresh = std::make_shared<GainTable>();
       fresh->bandwidth = w;
       fresh->pole = point.pole;
-      f.find_gains(w * w * T * T, data.y.size(), *fresh);
+      f.find_gains(w * w * T * T, data, *fresh);
       cached.front() = std::move(fresh);
     }
     f.table = cached.front();
     return f;
   }
 
+  using Variances = std::array<Vector, static_cast<std::size_t>(N)>;
+
+  /// phi p phi'
+  [[nodiscard]] Variances pushed(const Variances& p) const {
+    Variances a{}, out{};
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      for (std::size_t j = 0; j < a.size(); ++j) {
+        double sum = 0.0;
+        for (std::size_t l = i; l < a.size(); ++l) sum += phi[i][l] * p[l][j];
+        a[i][j] = sum;
+      }
+    }
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      for (std::size_t j = i; j < a.size(); ++j) {
+        double sum = 0.0;
+        for (std::size_t l = j; l < a.size(); ++l) sum += a[i][l] * phi[j][l];
+        out[i][j] = out[j][i] = sum;
+      }
+    }
+    return out;
+  }
+
   /// Riccati recursion for noise of variance one; the last state is a random walk with variance q
   /// per row.
-  void find_gains(double q, std::size_t most, GainTable& found) const {
-    std::array<Vector, static_cast<std::size_t>(N)> p{};
+  void find_gains(double q, const FitData& data, GainTable& found) const {
+    Variances p{};
     // Infinite at any w: the states are divided by w^i.
-    for (std::size_t i = 0; i < p.size(); ++i) {
-      p[i][i] = 1e8 / std::min(std::pow(q, static_cast<double>(i)), 1.0);
+    const auto unknown = [q](std::size_t i) {
+      return 1e8 / std::min(std::pow(q, static_cast<double>(i)), 1.0);
+    };
+    for (std::size_t i = 0; i < p.size(); ++i) p[i][i] = unknown(i);
+    const std::vector<double> variances = recursion(q, data.y.size(), p, found.first.gains);
+    // Without a measurement: p = phi p phi' + q.
+    for (std::size_t rows = 0; rows < 6; ++rows) {
+      std::vector<double>& now = found.waited.emplace_back();
+      for (const Vector& line : p) now.insert(now.end(), line.begin(), line.end());
+      p = pushed(p);
+      p[p.size() - 1][p.size() - 1] += q;
     }
+    found.steady_variance = variances.back();
+    const auto weigh = [&](const std::vector<double>& of, std::size_t blind,
+                           std::vector<double>& weights) {
+      for (const double s : of) weights.push_back(std::sqrt(found.steady_variance / s));
+      std::fill_n(weights.begin(), std::min(of.size(), blind), 0.0);
+    };
+    weigh(variances, static_cast<std::size_t>(N), found.first.weights);
+    if (!goes_on) return;
+    // Rows between two pieces, on average: the load went on there.
+    double gap = 0.0;
+    if (data.start_times.size() == data.starts.size()) {
+      const double rows = (data.start_times.back() - data.start_times.front()) / data.sample_time;
+      gap = std::max(rows - static_cast<double>(data.starts.back()), 0.0) /
+            static_cast<double>(data.starts.size() - 1);
+    }
+    const double load = found.waited[0].back() + q * gap;
+    p = {};
+    for (std::size_t i = 0; i + 1 < p.size(); ++i) p[i][i] = unknown(i);
+    p[p.size() - 1][p.size() - 1] = load;
+    weigh(recursion(q, data.y.size(), p, found.next.gains), static_cast<std::size_t>(order),
+          found.next.weights);
+  }
+
+  /// The gains from p on, until steady, when p is what is known before a measurement.
+  /// @return the variances of the innovations
+  std::vector<double> recursion(double q, std::size_t most, Variances& p,
+                                std::vector<double>& gains) const {
     std::vector<double> variances;
     Vector before{};
     const double small = 1e-9 * std::sqrt(q);
@@ -279,38 +365,19 @@ struct InnovationsFilter {
         change = std::max(change, std::abs(k[i] - before[i]) / (std::abs(k[i]) + 1e-300));
       }
       before = k;
-      found.gains.insert(found.gains.end(), k.begin(), k.end());
+      gains.insert(gains.end(), k.begin(), k.end());
       variances.push_back(s);
       if (variances.size() > static_cast<std::size_t>(2 * N) && change < small) break;
       // p = phi (p - k k' s) phi' + q
-      std::array<Vector, static_cast<std::size_t>(N)> a{};
       for (std::size_t i = 1; i < k.size(); ++i) {
         for (std::size_t j = 1; j < k.size(); ++j) p[i][j] -= k[i] * k[j] * s;
       }
       // p - p^2 / (p + 1), computed directly, would cancel.
       for (std::size_t i = 0; i < k.size(); ++i) p[0][i] = p[i][0] = k[i];
-      for (std::size_t i = 0; i < k.size(); ++i) {
-        for (std::size_t j = 0; j < k.size(); ++j) {
-          double sum = 0.0;
-          for (std::size_t l = i; l < k.size(); ++l) sum += phi[i][l] * p[l][j];
-          a[i][j] = sum;
-        }
-      }
-      for (std::size_t i = 0; i < k.size(); ++i) {
-        for (std::size_t j = i; j < k.size(); ++j) {
-          double sum = 0.0;
-          for (std::size_t l = j; l < k.size(); ++l) sum += a[i][l] * phi[j][l];
-          p[i][j] = sum;
-          p[j][i] = sum;
-        }
-      }
+      p = pushed(p);
       p[k.size() - 1][k.size() - 1] += q;
     }
-    found.steady_variance = variances.back();
-    for (const double s : variances) found.weights.push_back(std::sqrt(variances.back() / s));
-    for (std::size_t i = 0; i < std::min<std::size_t>(variances.size(), N); ++i) {
-      found.weights[i] = 0.0;
-    }
+    return variances;
   }
 
   /// Power of the disturbance in y divided by that of the noise, at the frequency `part` times half
@@ -326,19 +393,56 @@ struct InnovationsFilter {
     return q * std::norm(x[0]);
   }
 
+  /// What a row measures, and what of it corrects the state.
+  struct Sight {
+    Vector seen{};      // y where it was measured: of the states,
+    double push = 0.0;  // and of what acts on y^(n)
+    Vector gain{};
+    double weight = 0.0;
+  };
+
+  /// @param late how much later than its row it was measured, s: short, so two terms of the series
+  /// are enough @param before number of measurements before it in the piece @param waited rows
+  /// without one since then
+  [[nodiscard]] Sight sight(const GainsFromStart& start, double late, std::size_t before,
+                            std::size_t waited) const {
+    Sight s;
+    const double half = 0.5 * late * late;
+    s.seen[0] = order == 1 ? 1.0 - pole * late + pole * pole * half : 1.0;
+    s.seen[1] = w * late - (order <= 2 ? pole * w * half : 0.0);
+    if constexpr (N > 2) s.seen[2] = w * w * half;
+    s.push = order == 1 ? late - pole * half : order == 2 ? half : 0.0;
+    if (before + 1 < start.weights.size()) {
+      for (std::size_t i = 0; i < s.gain.size(); ++i) s.gain[i] = start.gains[before * N + i];
+      s.weight = start.weights[before];
+      return s;
+    }
+    const auto& p = table->waited[std::min(waited, table->waited.size() - 1)];
+    double variance = 1.0;
+    for (std::size_t i = 0; i < s.gain.size(); ++i) {
+      for (std::size_t j = 0; j < s.gain.size(); ++j) s.gain[i] += p[i * N + j] * s.seen[j];
+      variance += s.seen[i] * s.gain[i];
+    }
+    for (double& gain : s.gain) gain /= variance;
+    s.weight = std::sqrt(table->steady_variance / variance);
+    return s;
+  }
+
   /// Computes innovations of y, u and the data's columns, each alone (one output for each), or of
   /// all of them together. `signal` is u or a replacement.
   ///
   /// The first rows of a piece, `lead` of them, only fill the lag and the dead time, because the
   /// input before is unknown.
-  /// @tparam Runs number of innovations; `output(k)`, `input(k)` and `column(k)` give the signals
-  /// of run r
+  /// @tparam Runs number of innovations; `output(r)` and `input(r)` give the factors of y and
+  /// `signal` in run r, `column_at(r, k)` its column
   template <int Runs, class Output, class Input, class Column>
   void run(const FitData& data, const std::vector<std::size_t>& lead,
            const std::vector<double>& signal, const Output& output, const Input& input,
            const Column& column_at,
            const std::array<double*, static_cast<std::size_t>(Runs)>& out) const {
-    const std::size_t steady = table->weights.size() - 1;
+    const bool regular = data.measured.empty();
+    std::array<Vector, static_cast<std::size_t>(Runs)> x{};
+    bool begun = false;
     for (std::size_t piece = 0; piece < data.starts.size(); ++piece) {
       const auto from = static_cast<std::ptrdiff_t>(data.starts[piece]);
       const auto to = static_cast<std::ptrdiff_t>(
@@ -357,17 +461,51 @@ struct InnovationsFilter {
         u_now = u_next;
       }
       if (begin == to) continue;
-      std::array<Vector, static_cast<std::size_t>(Runs)> x{};
+      const GainsFromStart& start = begun && goes_on ? table->next : table->first;
+      const std::size_t steady = start.weights.size() - 1;
+      begun = true;
       std::array<double, static_cast<std::size_t>(Runs)> r_now{};
       for (std::size_t run = 0; run < x.size(); ++run) {
-        x[run][0] = output(run, begin);
+        const double load = goes_on ? x[run][N - 1] : 0.0;
+        x[run] = {};
+        x[run][N - 1] = load;
+        x[run][0] = output(run) * data.y[static_cast<std::size_t>(begin)];
         r_now[run] = column_at(run, begin);
       }
+      double v_before = v;
+      std::size_t measurements = 0, waited = 0;  // of the piece, and rows without one since
+      Sight at;
+      at.seen[0] = 1.0;
       for (std::ptrdiff_t k = begin; k < to; ++k) {
         const std::size_t row = std::min(static_cast<std::size_t>(k - begin), steady);
-        const double* const gain = table->gains.data() + row * static_cast<std::size_t>(N);
-        const double weight = table->weights[row];
+        const double* gain = start.gains.data() + row * static_cast<std::size_t>(N);
+        double weight = start.weights[row];
+        double value = data.y[static_cast<std::size_t>(k)];
         const double u_next = u(k - delay + 1);
+        const double v_after =
+            lag_decay * v + lag_previous * u_before + lag_current * u_now + lag_next * u_next;
+        double v_late = v;  // its mean up to the measurement
+        bool seen = true;
+        // The gains of a start are those of measurements at their rows: other speeds than those
+        // between the rows would be wrong for long.
+        if (!regular && k - begin < 2 * N) {
+          ++measurements;
+        } else if (!regular && data.has(static_cast<std::size_t>(k))) {
+          const double late = data.offsets[static_cast<std::size_t>(k)];
+          at = sight(start, late, measurements++, std::exchange(waited, 0));
+          gain = at.gain.data();
+          weight = at.weight;
+          value = data.measured[static_cast<std::size_t>(k)];
+          if (order == 1 && late != 0.0) {
+            // v goes to where it would end.
+            const double row_from = late > 0.0 ? v : v_before, row_to = late > 0.0 ? v_after : v;
+            const double end = row_from + (row_to - row_from) / (1.0 - lag_decay);
+            v_late = end - (v - end) * std::expm1(-late / tau) * tau / late;
+          }
+        } else if (!regular) {
+          seen = false;
+          ++waited;
+        }
         const std::ptrdiff_t after = std::min(k + 1, to - 1);
         Vector pushed;
         for (std::size_t j = 0; j < pushed.size(); ++j) {
@@ -375,12 +513,17 @@ struct InnovationsFilter {
         }
         for (std::size_t run = 0; run < x.size(); ++run) {
           Vector& state = x[run];
-          const double e = output(run, k) - state[0];
+          const double b = input(run);
+          double e = output(run) * value - state[0];
+          if (!regular) {
+            e += state[0] - at.push * (b * v_late + r_now[run]);
+            for (std::size_t j = 0; j < state.size(); ++j) e -= at.seen[j] * state[j];
+            if (!seen) e = 0.0;
+          }
           out[run][k] = e * weight;
           for (std::size_t j = 0; j < state.size(); ++j) state[j] += gain[j] * e;
           const double r_next = column_at(run, after);
           const double r = 0.5 * (r_now[run] + r_next);
-          const double b = input(run);
           r_now[run] = r_next;
           for (std::size_t j = 0; j < state.size(); ++j) {
             double sum = b * pushed[j] + column[j] * r;
@@ -388,7 +531,8 @@ struct InnovationsFilter {
             state[j] = sum;
           }
         }
-        v = lag_decay * v + lag_previous * u_before + lag_current * u_now + lag_next * u_next;
+        v_before = v;
+        v = v_after;
         u_before = u_now;
         u_now = u_next;
       }
@@ -410,9 +554,12 @@ class InnovationsFit {
       const std::size_t to =
           piece + 1 < data.starts.size() ? data.starts[piece + 1] : data.y.size();
       lead_.push_back(lead(data.starts[piece], to));
-      const std::size_t blind = data.starts[piece] + lead_.back() +
-                                static_cast<std::size_t>(model.order + model.extension);
-      if (to > blind) rows_ += to - blind;
+      std::size_t seen = 0;
+      for (std::size_t k = data.starts[piece] + lead_.back(); k < to; ++k) seen += data.has(k);
+      // As the filter has it: the load of the first piece goes on.
+      const bool known = data.one_load && rows_ > 0 && model.extension == 1;
+      const auto blind = static_cast<std::size_t>(model.order + (known ? 0 : model.extension));
+      if (seen > blind) rows_ += seen - blind;
     }
   }
 
@@ -539,8 +686,7 @@ class InnovationsFit {
     std::vector<double> out(column.size());
     with_filter(at, [&](const auto& filter) {
       filter.template run<1>(
-          data_, lead_, data_.u, [](std::size_t, std::ptrdiff_t) { return 0.0; },
-          [](std::size_t) { return 0.0; },
+          data_, lead_, data_.u, [](std::size_t) { return 0.0; }, [](std::size_t) { return 0.0; },
           [&](std::size_t, std::ptrdiff_t k) { return column[static_cast<std::size_t>(k)]; },
           {out.data()});
     });
@@ -599,6 +745,10 @@ class InnovationsFit {
     // The median of a chi-square distribution is below its mean; neighbouring frequencies share a
     // third.
     const double freedom = 2.0 * static_cast<double>(quiet.size()) * 2.0 / 3.0;
+    // Rows without a measurement are zeros.
+    std::size_t seen = 0;
+    for (std::size_t k = 0; k < residual_.size(); ++k) seen += data_.has(k);
+    variance *= static_cast<double>(seen) / static_cast<double>(residual_.size());
     const double floor = std::sqrt(middle / (variance * (1.0 - 2.0 / (3.0 * freedom))));
     // The standard error of a median is 1.253 times that of the mean; the relative error of a root
     // is half as large.
@@ -731,9 +881,7 @@ class InnovationsFit {
     combined_.assign(data_.y.size(), 0.0);
     combine(combined_, data_.columns, linear, 1 + data_.inputs.size());
     filter.template run<1>(
-        data_, lead_, force_,
-        [&](std::size_t, std::ptrdiff_t k) { return data_.y[static_cast<std::size_t>(k)]; },
-        [](std::size_t) { return 1.0; },
+        data_, lead_, force_, [](std::size_t) { return 1.0; }, [](std::size_t) { return 1.0; },
         [&](std::size_t, std::ptrdiff_t k) { return combined_[static_cast<std::size_t>(k)]; },
         {out});
   }
@@ -745,17 +893,15 @@ class InnovationsFit {
     columns_.resize(count);
     for (auto& column : columns_) column.resize(rows);
     const auto nothing = [](std::size_t, std::ptrdiff_t) { return 0.0; };
+    const auto none = [](std::size_t) { return 0.0; };
     // y and u in parallel, because a processor can compute both at once.
     filter.template run<2>(
-        data_, lead_, data_.u,
-        [&](std::size_t run, std::ptrdiff_t k) {
-          return run == 0 ? data_.y[static_cast<std::size_t>(k)] : 0.0;
-        },
+        data_, lead_, data_.u, [](std::size_t run) { return run == 0 ? 1.0 : 0.0; },
         [](std::size_t run) { return run == 1 ? 1.0 : 0.0; }, nothing,
         {columns_[0].data(), columns_[1].data()});
     std::size_t next = 2;
     for (const auto& input : data_.inputs) {
-      filter.template run<1>(data_, lead_, input, nothing, [](std::size_t) { return 1.0; }, nothing,
+      filter.template run<1>(data_, lead_, input, none, [](std::size_t) { return 1.0; }, nothing,
                              {columns_[next++].data()});
     }
     // Several columns in parallel, too.
@@ -764,7 +910,7 @@ class InnovationsFit {
       std::array<double*, static_cast<std::size_t>(Runs)> out{};
       for (std::size_t run = 0; run < out.size(); ++run) out[run] = columns_[next + run].data();
       filter.template run<Runs>(
-          data_, lead_, data_.u, nothing, [](std::size_t) { return 0.0; },
+          data_, lead_, data_.u, none, none,
           [&](std::size_t run, std::ptrdiff_t k) {
             return data_.columns[next - first + run][static_cast<std::size_t>(k)];
           },

@@ -1277,8 +1277,9 @@ inline bool better(const Identified& averaged, const Identified& plain, const Id
                 "Record its speed or position, or more rows per second");
   const bool excited = found.plateau.middle > 0 && found.excitation < detail::excitation_max;
   rules.require(excited, "excitation", found.plateau.middle > 0 ? found.excitation : 1.0,
-                "is the smallest relative error of b0 and too large, because too little of y "
-                "follows from u: record several steps that last until y settles, or a sweep");
+                "is the smallest relative error of b0 and too large: what of y follows from u is "
+                "not told from the rest; record several steps that last until y settles, or a "
+                "sweep");
   rules.require(
       !(found.rival.left < 1.0 / std::numbers::e), "order", static_cast<double>(found.order),
       "is the order, but where b0 was found another one leaves less than 1 / e of the mean square: "

@@ -9,6 +9,7 @@
 #include <esokit/core/error.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/identify/fit.hpp>
+#include <limits>
 #include <vector>
 
 namespace esokit {
@@ -171,7 +172,9 @@ inline std::size_t bridge(std::vector<double>& column) {
 }  // namespace detail
 
 /// Checks a log and converts it to a constant sample time. If the time stamps jitter by more than 2
-/// % of T, y is interpolated linearly, and u is the mean of what the actuator held in the row.
+/// % of T, or rows are missing, u is the mean of what the actuator held in the row (also told by
+/// rows without y), y and the columns are interpolated linearly, and `FitData::measured` has y as
+/// and when it was measured.
 [[nodiscard]] inline Expected<PreparedLog, Error<double>> prepare(const Log& log) {
   using E = Error<double>;
   const std::size_t count = log.y.size();
@@ -221,6 +224,19 @@ inline std::size_t bridge(std::vector<double>& column) {
     y.push_back(log.y[k]);
     for (std::size_t c = 0; c < columns.size(); ++c) columns[c].push_back(bridged[c][k]);
   }
+  // What was held, of rows without y, too.
+  std::vector<double> held_time, held_u;
+  for (std::size_t i = 0; i < good.size(); ++i) {
+    held_time.push_back(time[i]);
+    held_u.push_back(u[i]);
+    for (std::size_t k = good[i] + 1; i + 1 < good.size() && k < good[i + 1]; ++k) {
+      const double at =
+          log.time.empty() ? size(k) * log.sample_time : log.time[k] - log.time[good[0]];
+      if (!is_finite(log.u[k]) || !(at > held_time.back() && at < time[i + 1])) continue;
+      held_time.push_back(at);
+      held_u.push_back(log.u[k]);
+    }
+  }
   std::vector<double> steps;
   for (std::size_t k = 1; k < time.size(); ++k) {
     if (!(time[k] > time[k - 1])) {
@@ -236,7 +252,7 @@ inline std::size_t bridge(std::vector<double>& column) {
         .require(!(*high > *low) || *high - *low >= 1e-60, field, *high - *low,
                  "is the range of its values, which is too small: use another unit", index);
   };
-  size_fits("u", u);
+  size_fits("u", held_u);
   size_fits("y", y);
   for (std::size_t c = 0; c < columns.size(); ++c) {
     size_fits("columns", columns[c], static_cast<int>(c));
@@ -271,12 +287,13 @@ inline std::size_t bridge(std::vector<double>& column) {
   data.starts.clear();
   data.columns.resize(columns.size());
   constexpr double longest_bridge = 5.5;  // rows
-  std::size_t from = 0;
+  bool as_logged = held_u.size() == u.size();
+  std::size_t from = 0, held_at = 0;
   while (from < time.size()) {
     std::size_t to = from + 1;
     while (to < time.size() && time[to] - time[to - 1] < longest_bridge * T) ++to;
     const std::size_t rows = to - from;
-    bool uniform = report.jitter < 0.02 * T;
+    bool uniform = report.jitter < 0.02 * T && held_u.size() == u.size();
     for (std::size_t k = from + 1; k < to; ++k)
       uniform = uniform && time[k] - time[k - 1] < 1.6 * T;
     if (rows >= 50) {
@@ -287,12 +304,16 @@ inline std::size_t bridge(std::vector<double>& column) {
                       u.begin() + static_cast<std::ptrdiff_t>(to));
         data.y.insert(data.y.end(), y.begin() + static_cast<std::ptrdiff_t>(from),
                       y.begin() + static_cast<std::ptrdiff_t>(to));
+        data.measured.insert(data.measured.end(), y.begin() + static_cast<std::ptrdiff_t>(from),
+                             y.begin() + static_cast<std::ptrdiff_t>(to));
+        data.offsets.resize(data.y.size(), 0.0);
         for (std::size_t c = 0; c < columns.size(); ++c) {
           data.columns[c].insert(data.columns[c].end(),
                                  columns[c].begin() + static_cast<std::ptrdiff_t>(from),
                                  columns[c].begin() + static_cast<std::ptrdiff_t>(to));
         }
       } else {
+        as_logged = false;
         std::size_t k = from;
         const auto grid = static_cast<std::size_t>(std::lround((time[to - 1] - time[from]) / T));
         report.missing += grid + 1 > rows ? grid + 1 - rows : 0;
@@ -301,16 +322,29 @@ inline std::size_t bridge(std::vector<double>& column) {
           while (k + 2 < to && time[k + 1] <= t) ++k;
           const double share = std::clamp((t - time[k]) / (time[k + 1] - time[k]), 0.0, 1.0);
           data.y.push_back(y[k] + share * (y[k + 1] - y[k]));
+          data.measured.push_back(std::numeric_limits<double>::quiet_NaN());
+          data.offsets.push_back(0.0);
           for (std::size_t c = 0; c < columns.size(); ++c) {
             data.columns[c].push_back(columns[c][k] + share * (columns[c][k + 1] - columns[c][k]));
           }
           double held = 0.0, at = t;
-          for (std::size_t j = k; at < t + T; ++j) {
-            const double end = j + 1 < to ? std::min(time[j + 1], t + T) : t + T;
-            held += u[std::min(j, to - 1)] * std::max(end - at, 0.0);
+          while (held_at + 1 < held_u.size() && held_time[held_at + 1] <= t) ++held_at;
+          for (std::size_t j = held_at; at < t + T; ++j) {
+            const double end = j + 1 < held_u.size() ? std::min(held_time[j + 1], t + T) : t + T;
+            held += held_u[j] * std::max(end - at, 0.0);
             at = std::max(end, at);
           }
           data.u.push_back(held / T);
+        }
+        // Each measurement to the nearest row, or the next if that has one.
+        for (std::size_t g = 0, i = from; i < to; ++i) {
+          const double rows_on = (time[i] - time[from]) / T;
+          const auto row = std::max(g, static_cast<std::size_t>(std::lround(rows_on)));
+          const double late = rows_on - size(row);
+          if (row >= grid || late < -0.75) continue;
+          data.measured[data.starts.back() + row] = y[i];
+          data.offsets[data.starts.back() + row] = late * T;
+          g = row + 1;
         }
       }
     }
@@ -320,7 +354,9 @@ inline std::size_t bridge(std::vector<double>& column) {
     }
     from = to;
   }
+  if (as_logged) data.measured = data.offsets = {};
   report.pieces = data.starts.size();
+  data.one_load = true;
   if (data.y.size() < 200)
     return E{"rows",
              size(data.y.size()),
@@ -331,7 +367,8 @@ inline std::size_t bridge(std::vector<double>& column) {
   return prepared;
 }
 
-/// Twenty evenly spread stretches of `most` rows in total; all data if they have no more rows.
+/// Twenty evenly spread stretches of `most` rows in total, each with a load of its own; all data if
+/// they have no more rows.
 [[nodiscard]] inline FitData excerpt(const FitData& data, std::size_t most) {
   if (data.y.size() <= most) return data;
   constexpr std::size_t stretches = 20;
@@ -362,6 +399,10 @@ inline std::size_t bridge(std::vector<double>& column) {
       }
       out.u.push_back(data.u[k]);
       out.y.push_back(data.y[k]);
+      if (!data.measured.empty()) {
+        out.measured.push_back(data.measured[k]);
+        out.offsets.push_back(data.offsets[k]);
+      }
       for (std::size_t c = 0; c < data.columns.size(); ++c) {
         out.columns[c].push_back(data.columns[c][k]);
       }
@@ -370,12 +411,14 @@ inline std::size_t bridge(std::vector<double>& column) {
   return out;
 }
 
-/// Means of `fold` rows each; the remaining rows of a piece are left out.
+/// Means of `fold` rows each; the remaining rows of a piece are left out, and so is when y was
+/// measured.
 [[nodiscard]] inline FitData averaged(const FitData& data, int fold) {
   if (fold <= 1) return data;
   FitData out;
   out.sample_time = data.sample_time * fold;
   out.averaged = data.averaged * fold;
+  out.one_load = data.one_load;
   out.starts.clear();
   out.columns.resize(data.columns.size());
   const auto by = static_cast<std::size_t>(fold);

@@ -98,7 +98,7 @@ struct PartsShape {
 };
 
 /// a! / b!.
-template <PlainScalar S>
+template <SingleScalar S>
 constexpr S factorial_ratio(int a, int b) noexcept {
   S ratio(1);
   for (int j = b + 1; j <= a; ++j) ratio = ratio * static_cast<S>(j);
@@ -193,8 +193,9 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
       .follows_speed = Parts.follows_speed,
   };
 
-  template <PlainScalar T>
-  using with_scalar = AugmentedModel<Parts, T>;  ///< the same with another scalar
+  /// The same with another scalar. A model that follows a speed branches on it and is not recorded.
+  template <SingleScalar T>
+  requires(!(Parts.follows_speed && records<T>)) using with_scalar = AugmentedModel<Parts, T>;
 
   using Settings = PartsSettings<Parts, S>;  ///< settings of make
 
@@ -415,6 +416,12 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
  private:
   template <ModelParts Other, Scalar T>
   friend class AugmentedModel;
+  friend struct detail::LaneAccess;
+  /// What a step reads.
+  static constexpr auto fields(auto& o) noexcept {
+    return detail::tie(o.step_, o.rate_, o.input_gain_, o.sample_time_, o.scaled_input_gain_,
+                       o.settings_.plant);
+  }
 
   static constexpr ModelParts without(bool actuator, bool sensor) noexcept {
     ModelParts less = Parts;

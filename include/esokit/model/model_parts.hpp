@@ -72,7 +72,7 @@ struct Resonance {
 };
 
 /// A sine at the present time: q = amplitude sin(phase).
-template <PlainScalar S>
+template <SingleScalar S>
 struct Phasor {
   S amplitude;  ///< unit of the disturbance
   S phase;      ///< rad

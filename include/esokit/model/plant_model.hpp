@@ -74,7 +74,7 @@ struct PlantShape {
 /// plant (an actuator, too) at exp(-omega_o T).
 /// @tparam States length of x @tparam Parts uses `order` (the relative degree from u to y),
 /// `sensor`, `constants`, `resonators` and `first_order`; everything else is in the plant
-template <int States, ModelParts Parts, PlainScalar S = double>
+template <int States, ModelParts Parts, SingleScalar S = double>
 class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S> {
   using Shape = detail::PlantShape<States, Parts>;
   using Base = MatrixModel<Shape, S>;
@@ -271,6 +271,13 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
   }
 
  private:
+  friend struct detail::LaneAccess;
+  /// What a step reads.
+  static constexpr auto fields(auto& o) noexcept {
+    return detail::tie(o.step_, o.rate_, o.input_gain_, o.sample_time_, o.scaled_input_gain_,
+                       o.natural_, o.of_disturbance_, o.rest_of_y_, o.rest_of_u_);
+  }
+
   static constexpr int sinusoids = States + Parts.constants;  ///< first row of the sines
   using Square = Matrix<S, inner, inner>;
 
@@ -521,7 +528,7 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
 };
 
 /// Distinguishes the type in snapshots.
-template <int States, ModelParts Parts, PlainScalar S>
+template <int States, ModelParts Parts, SingleScalar S>
 inline constexpr std::uint32_t type_tag<LinearPlantModel<States, Parts, S>> =
     make_type_tag<S>("LinearPlantModel", States, Parts.order, Parts.sensor, Parts.constants,
                      Parts.resonators, Parts.first_order);

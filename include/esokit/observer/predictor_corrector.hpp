@@ -686,6 +686,19 @@ class PredictorCorrector {
   template <bool NominalGain>
   ESOKIT_INLINE constexpr bool correct_levels(Correction& step, S y,
                                               unsigned elapsed) const noexcept {
+    return correct_by(step, y, [&](auto level, const S& e) ESOKIT_INLINE_LAMBDA -> decltype(auto) {
+      if constexpr (NominalGain) {
+        return laws_[level].gain(e);
+      } else {
+        return law_gain(laws_[level], e, elapsed);
+      }
+    });
+  }
+
+  /// The same with gains from elsewhere. @param gain_of gives that of a level for an innovation
+  template <class GainOf>
+  ESOKIT_INLINE constexpr bool correct_by(Correction& step, S y,
+                                          const GainOf& gain_of) const noexcept {
     constexpr GainLawTraits law_traits = gain_law_traits<Law>;
     constexpr bool law_looks =
         law_traits.kind != GainKind::preset && !law_traits.bears_any_innovation;
@@ -703,11 +716,7 @@ class PredictorCorrector {
           return;
         }
       }
-      if constexpr (NominalGain) {
-        correct_level(z, laws_[level].gain(e), e, found);
-      } else {
-        correct_level(z, law_gain(laws_[level], e, elapsed), e, found);
-      }
+      correct_level(z, gain_of(level, e), e, found);
       measured = z[0];
     });
     return fine;

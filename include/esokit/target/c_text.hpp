@@ -39,7 +39,7 @@ inline constexpr const char* c_header_controller = R"(/* `mode`: what determines
 #define $NAME_SAFE 2u /* too many measurements are missing */
 
 typedef struct {
-$MEMBERS  uint32_t hold_left; /* samples of the start hold */
+$MEMBERS$PHASE_MEMBER  uint32_t hold_left; /* samples of the start hold */
   uint16_t gap; /* samples since the last measurement that was taken */
   uint8_t mode;
   uint8_t status;
@@ -47,16 +47,17 @@ $MEMBERS  uint32_t hold_left; /* samples of the start hold */
 
 /* At rest at y = 0, u = 0. Call it before all else. */
 void $name_init($name_state *o);
-/* Takes over a plant at rest at y under u, with the reference at y. Returns a status. */
+/* Takes over a plant at rest at y under u; begin with the reference at y. Returns a status. */
 unsigned $name_start($name_state *o, $real y, $real u);
-/* One sample: y (NaN if it is missing) and the reference; returns the u to be held until the next. */
+/* One sample: y (NaN if it is missing) and r, $REFERENCE; returns the u to be held
+ * until the next. */
 $real $name_update($name_state *o, $real y, $real r);
 /* The same without a measurement. */
 $real $name_update_without_measurement($name_state *o, $real r);
 /* What the actuator really held, before the next update; only if it differs from what update gave. */
 void $name_applied($name_state *o, $real u);
 /* Estimate number 0 .. $LAST: y, y', .., and then the disturbance, in physical units. */
-$real $name_estimate($name_state *o, unsigned row);
+$real $name_estimate(const $name_state *o, unsigned row);
 
 )";
 
@@ -75,7 +76,7 @@ unsigned $name_update($name_state *o, $real y, $real u);
 unsigned $name_predict($name_state *o, $real u);
 unsigned $name_correct($name_state *o, $real y);
 /* Estimate number 0 .. $LAST: y, y', .., and then the disturbance, in physical units. */
-$real $name_estimate($name_state *o, unsigned row);
+$real $name_estimate(const $name_state *o, unsigned row);
 
 )";
 
@@ -98,65 +99,103 @@ inline constexpr const char* c_source_head =
 $include "$name.h"
 
 $include <math.h>
+$include <stdbool.h>
 $include <string.h>
 
+/* Deviations from MISRA C:2012: is_finite looks at the bits of a number by memcpy (21.15), as no
+ * test of its value holds under -ffast-math; functions leave early where a sample is refused (15.5,
+ * advisory); a header has macros that its source may not need (2.5, advisory). */
+
 /* By its bits, so that it holds under -ffast-math, too. */
-static int is_finite($real x)
+static bool is_finite($real x)
 {
   $word bits;
-  memcpy(&bits, &x, sizeof bits);
+  (void)memcpy(&bits, &x, sizeof bits);
   return (bits & $exponent) != $exponent;
 }
 
-/* ---- Recorded from the design: 0 if a result would not be finite; then nothing has changed. */
+/* ---- Recorded from the design: false if a result would not be finite; then nothing has changed. */
 
 )";
 
 /// What an observer and the one in a controller do with bad and missing samples.
 inline constexpr const char* c_source_observer_part = R"(/* ---- What counts and chooses. */
 
-/* Of the correction after 1, 2, .. samples. */
-static const $real gains[$ROWS][$SIZE] = {
-$GAP_GAINS};
-
-static int restart($name_state *o, $real y)
+static bool restart($name_state *o, $real y)
 {
-  if (!is_finite(y) || !restart_at(o, y)) return 0;
-  o->gap = 0;
-  return 1;
+  const bool good = is_finite(y) && restart_at(o, y);
+  if (good) {
+    o->gap = 0u;
+  }
+  return good;
 }
 
-static unsigned predict($name_state *o, $real given)
+static unsigned base_predict($name_state *o, $real given)
 {
-  const int good = predict_step(o, given);
-  if (o->gap < 65535u) ++o->gap;
-  if (good) return 0u;
+  unsigned status = 0u;
+  const bool good = predict_step(o, given);
+  if (o->gap < 65535u) {
+    o->gap = (uint16_t)(o->gap + 1u);
+  }
+  if (good) {
+    return status;
+  }
   if (is_finite(given) && !($fabs(given) > $fabs(o->u_applied))) { /* u is not the cause */
     o->u_applied = given;
     o->gap = 65535u;
-    return $NAME_PREDICTION_DROPPED;
+    status = $NAME_PREDICTION_DROPPED;
+  } else if (predict_step(o, o->u_applied)) {
+    status = $NAME_INPUT_REJECTED;
+  } else {
+    o->gap = 65535u;
+    status = $NAME_INPUT_REJECTED | $NAME_PREDICTION_DROPPED;
   }
-  if (predict_step(o, o->u_applied)) return $NAME_INPUT_REJECTED;
-  o->gap = 65535u;
-  return $NAME_INPUT_REJECTED | $NAME_PREDICTION_DROPPED;
+  return status;
 }
 
-static unsigned correct($name_state *o, $real y)
+static unsigned base_correct($name_state *o, $real y)
 {
-  const unsigned elapsed = o->gap > 1u ? o->gap : 1u;
-  const $real *k;
-  if (elapsed > $ROWSu) return restart(o, y) ? $NAME_RESTARTED : $NAME_MEASUREMENT_REJECTED;
-  k = gains[elapsed - 1u];
-  if (!correct_step(o, y$GAINS)) { /* perhaps the state is to blame */
-    return $fabs(y) < $fabs(o->z1) && restart(o, y) ? $NAME_RESTARTED : $NAME_MEASUREMENT_REJECTED;
+  static const $real gains[$ROWS][$SIZE] = { /* after 1, 2, .. samples */
+$GAP_GAINS  };
+  unsigned status = $NAME_MEASUREMENT_REJECTED;
+  unsigned elapsed = o->gap;
+  if (elapsed < 1u) {
+    elapsed = 1u;
   }
-  o->gap = 0;
-  return elapsed > 1u ? $NAME_GAP_BRIDGED : 0u;
+  if (elapsed > $ROWSu) {
+    if (restart(o, y)) {
+      status = $NAME_RESTARTED;
+    }
+  } else {
+    const $real *k = gains[elapsed - 1u];
+    if ($CORRECT) {
+      o->gap = 0u;
+      status = 0u;
+      if (elapsed > 1u) {
+        status = $NAME_GAP_BRIDGED;
+      }
+    } else if (($fabs(y) < $fabs(o->$FIRST)) && restart(o, y)) { /* the state was to blame */
+      status = $NAME_RESTARTED;
+    } else {
+      /* y is refused. */
+    }
+  }
+  return status;
 }
 
-$real $name_estimate($name_state *o, unsigned row)
+static unsigned base_update($name_state *o, $real y, $real u)
 {
-  $real u = 0;
+  unsigned status;
+  if ((o->gap == 0u) && observe(o, y, u)) {
+    return 0u;
+  }
+  status = base_predict(o, u);
+  return status | base_correct(o, y);
+}
+
+$real $name_estimate(const $name_state *o, unsigned row)
+{
+  $real u = $ZERO;
   switch (row) {
 $ROWS_OF_ESTIMATE  default:
     break;
@@ -166,10 +205,59 @@ $ROWS_OF_ESTIMATE  default:
 
 )";
 
+/// DelayedInput around it.
+inline constexpr const char* c_source_delay = R"(static uint16_t delayed_after(uint16_t place)
+{
+  uint16_t next = 0u;
+  if (place < $NEWESTu) {
+    next = (uint16_t)(place + 1u);
+  }
+  return next;
+}
+
+/* The u that acts now, for one that acts later. */
+static unsigned delayed_push($name_state *o, $real *u)
+{
+  const $real last = o->line[o->newest];
+  const bool good = is_finite(*u);
+  o->newest = delayed_after(o->newest);
+  o->line[o->newest] = good ? *u : last;
+  *u = o->line[delayed_after(o->newest)];
+  return good ? 0u : $NAME_INPUT_REJECTED;
+}
+
+static unsigned delayed_predict($name_state *o, $real u)
+{
+  $real acting = u;
+  const unsigned status = delayed_push(o, &acting);
+  return status | base_predict(o, acting);
+}
+
+static unsigned delayed_update($name_state *o, $real y, $real u)
+{
+  $real acting = u;
+  const unsigned status = delayed_push(o, &acting);
+  return status | base_update(o, y, acting);
+}
+
+)";
+
+/// Its start.
+inline constexpr const char* c_source_delay_fill =
+    R"(static void delayed_fill($name_state *o, $real u)
+{
+  unsigned i;
+  for (i = 0u; i < $LENGTHu; ++i) {
+    o->line[i] = u;
+  }
+}
+
+)";
+
 /// The functions of an observer.
 inline constexpr const char* c_source_observer = R"(void $name_init($name_state *o)
 {
-$INIT  o->gap = 0;
+$INIT  o->gap = 0u;
 }
 
 unsigned $name_reset($name_state *o, $real y)
@@ -179,31 +267,29 @@ unsigned $name_reset($name_state *o, $real y)
 
 unsigned $name_predict($name_state *o, $real u)
 {
-  return predict(o, u);
+  return $top_predict(o, u);
 }
 
 unsigned $name_correct($name_state *o, $real y)
 {
-  return correct(o, y);
+  return base_correct(o, y);
 }
 
 unsigned $name_update($name_state *o, $real y, $real u)
 {
-  unsigned status;
-  if (o->gap == 0u && observe(o, y, u)) return 0u;
-  status = predict(o, u);
-  return status | correct(o, y);
+  return $top_update(o, y, u);
 }
 
 )";
 
 /// The functions of a controller.
-inline constexpr const char* c_source_controller = R"(static void judge_missing($name_state *o)
+inline constexpr const char* c_source_controller =
+    R"(static void judge_missing($name_state *o)
 {
   if (o->gap >= $MISSING_LIMITu) {
     o->mode = $NAME_SAFE;
-  }$LEAVE_SAFE
-}
+  }
+$LEAVE_SAFE}
 
 static $real put_out($name_state *o, $real r)
 {
@@ -213,8 +299,10 @@ static $real put_out($name_state *o, $real r)
   } else if (o->mode == $NAME_SAFE) {
     u = $SAFE_INPUT;
   } else {
-    --o->hold_left;
-    if (o->hold_left == 0u) o->mode = $NAME_RUNNING;
+    o->hold_left = o->hold_left - 1u;
+    if (o->hold_left == 0u) {
+      o->mode = $NAME_RUNNING;
+    }
     u = $HOLD_INPUT;
   }
   (void)limit(o, u, &u);
@@ -223,44 +311,42 @@ static $real put_out($name_state *o, $real r)
 
 void $name_init($name_state *o)
 {
-$INIT  o->hold_left = $HOLD_LEFTu;
-  o->gap = 0;
+$INIT$PHASE_INIT  o->hold_left = $HOLD_LEFTu;
+  o->gap = 0u;
   o->mode = $MODE;
-  o->status = 0;
+  o->status = 0u;
 }
 
 unsigned $name_start($name_state *o, $real y, $real u)
 {
-  const $real before = o->u_applied;
-  if (!is_finite(y)) return $NAME_STATE_REJECTED;
-  if (!is_finite(u)) return $NAME_INPUT_REJECTED;
-  o->u_applied = u;
-  if (!rest_at(o, y)) {
-    o->u_applied = before;
+  $name_state before;
+$START_CHECKS  before = *o;
+$FILL  (void)$top_predict(o, u); /* keeps it as applied */
+  if (!rest_at(o, $AT_START, u)) {
+    *o = before;
     return $NAME_STATE_REJECTED;
   }
   (void)applied(o, u);
-$HARDEN  o->gap = 0;
+$HARDEN  o->gap = 0u;
   o->mode = $NAME_RUNNING;
   return 0u;
 }
 
 $real $name_update($name_state *o, $real y, $real r)
 {
-  unsigned status = 0u;
-  if (o->gap != 0u || !observe(o, y)) {
-    status = predict(o, o->u_last);
-    status |= correct(o, y);
-    if ((status & $NAME_RESTARTED) != 0u) (void)rest_at(o, y);
+  unsigned status;
+$PHASE_BEFORE  status = $top_update(o, $MEASURED, o->u_last);
+  if ((status & $NAME_RESTARTED) != 0u) {
+    (void)rest_at(o, $MEASURED, o->u_applied);
   }
-  o->status = (uint8_t)status;
+$PHASE_AFTER  o->status = (uint8_t)status;
   judge_missing(o);
   return put_out(o, r);
 }
 
 $real $name_update_without_measurement($name_state *o, $real r)
 {
-  o->status = (uint8_t)predict(o, o->u_last);
+$PHASE_NEXT  o->status = (uint8_t)$top_predict(o, o->u_last);
   judge_missing(o);
   return put_out(o, r);
 }
@@ -283,7 +369,9 @@ $VECTORS  };
   $name_init(&o);
   for (i = 0; i < $SAMPLES; ++i) {
     $RESULT
-    if (!($fabs(result - samples[i][2]) <= tolerance)) return i + 1;
+    if (!($fabs(result - samples[i][2]) <= tolerance)) {
+      return i + 1;
+    }
   }
   return 0;
 }

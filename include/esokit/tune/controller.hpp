@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <complex>
+#include <cstddef>
 #include <esokit/control/adrc.hpp>
 #include <esokit/gain/model_gain.hpp>
 #include <esokit/gain/pole_set.hpp>
@@ -24,6 +25,12 @@ template <class Observer>
 struct ControllerOfConfig<AdrcConfig<Observer>> {
   using type = Adrc<Observer>;
 };
+template <class S>
+Error<double> as_double(const Error<S>& error) {
+  return {error.field, static_cast<double>(error.value), error.rule,
+          error.index, static_cast<double>(error.limit), error.has_limit};
+}
+
 template <class Config>
 using ControllerOf = typename ControllerOfConfig<Config>::type;
 
@@ -82,7 +89,8 @@ std::vector<std::complex<double>> placed_poles(const TuneModel& model, const Tun
 /// design's `code` up to rounding. A cascade becomes a CascadeEso.
 /// @return error for a model of another order, for a design that knows more than the lag (use its
 ///         `code`), or from `make`
-template <int Order, class Visit>
+/// @tparam S scalar of the controller, double or float
+template <int Order, class S = double, class Visit>
 Check<double> with_controller(const TuneModel& model, const TunedDesign& design,
                               const Visit& visit) {
   Rules<double> rules;
@@ -103,37 +111,45 @@ Check<double> with_controller(const TuneModel& model, const TunedDesign& design,
   if (!rules) return rules.error();
   const auto run = [&](auto config) -> Check<double> {
     using Config = decltype(config);
-    config.observer.input_gain = model.input_gain.value;
-    config.observer.sample_time = model.sample_time;
+    config.observer.input_gain = static_cast<S>(model.input_gain.value);
+    config.observer.sample_time = static_cast<S>(model.sample_time);
     config.gains.emplace();
-    std::copy_n(design.settings.gains.begin(), config.gains->size(), config.gains->begin());
-    config.limits.lower = model.u_min;
-    config.limits.upper = model.u_max;
+    std::transform(
+        design.settings.gains.begin(),
+        design.settings.gains.begin() + static_cast<std::ptrdiff_t>(config.gains->size()),
+        config.gains->begin(), [](double gain) { return static_cast<S>(gain); });
+    config.limits.lower = static_cast<S>(model.u_min);
+    config.limits.upper = static_cast<S>(model.u_max);
     config.soften = design.settings.soften;
     auto controller = detail::ControllerOf<Config>::make(config);
-    if (!controller) return controller.error();
+    if (!controller) return detail::as_double(controller.error());
     visit(*controller);
     return {};
   };
   if (design.levels > 1) {
     return detail::with_number<2, 3>(design.levels, [&](auto levels) {
-      AdrcConfig<CascadeEso<Order, levels()>> config;
-      config.observer.observer_bandwidth = design.settings.observer_bandwidth;
-      config.observer.bandwidth_factor = design.settings.bandwidth_factor;
+      AdrcConfig<CascadeEso<Order, levels(), S>> config;
+      config.observer.observer_bandwidth = static_cast<S>(design.settings.observer_bandwidth);
+      config.observer.bandwidth_factor = static_cast<S>(design.settings.bandwidth_factor);
       return run(config);
     });
   }
   auto poles = detail::placed_poles<Order>(model, design);
+  const auto place = [&](auto& places) {
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      places[i] = {static_cast<S>(poles[i].real()), static_cast<S>(poles[i].imag())};
+    }
+  };
   if (design.knows.lag) {
-    AdrcConfig<ModelEso<ModelParts{.order = Order, .actuator = 1}, double, PoleSet>> config;
-    config.observer.model.actuator.time_constant = model.lag;
+    AdrcConfig<ModelEso<ModelParts{.order = Order, .actuator = 1}, S, PoleSet>> config;
+    config.observer.model.actuator.time_constant = static_cast<S>(model.lag);
     poles.insert(poles.begin(), -1.0 / model.lag);
-    std::copy_n(poles.begin(), config.observer.poles.size(), config.observer.poles.begin());
+    place(config.observer.poles);
     return run(config);
   }
   return detail::with_number<1, 2>(design.extension, [&](auto extension) {
-    AdrcConfig<LinearEso<Order, double, extension(), PoleSet>> config;
-    std::copy_n(poles.begin(), config.observer.poles.size(), config.observer.poles.begin());
+    AdrcConfig<LinearEso<Order, S, extension(), PoleSet>> config;
+    place(config.observer.poles);
     return run(config);
   });
 }

@@ -147,7 +147,8 @@ inline constexpr double interval_of_99 = 1.314;
 /// The model that was identified from a log, for a controller with the sample time of the log. The
 /// intervals of b0, lag and latency are widened from 95 % to 99 %, so that the margins hold on the
 /// machine. For a disturbance with a slope (m = 2) stands the random walk of equal power where it
-/// comes above the noise.
+/// comes above the noise. The log's columns count as measured: `disturbance` is what they leave,
+/// and found.random_walk_unmeasured() what it would be without them.
 /// @param u_min lower limit of the actuator, unit of u @param u_max above u_min
 inline TuneModel tune_model(const Identified& found, double u_min, double u_max) {
   TuneModel model;

@@ -1,0 +1,110 @@
+#include "log.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+
+#include "from_log/parts/show.hpp"
+
+namespace playground {
+namespace {
+
+// Three digits more than a slider has.
+std::string text_of(double value) { return esokit::examples::number_text(value, 6); }
+
+// The machine that was found, and the best design that the playground has sliders for.
+void take_over(const from_log::Outcome& outcome, LogResult& result) {
+  const esokit::Tuning& tuning = outcome.design.tuning();
+  const esokit::TunedDesign& chosen = outcome.design.taken();
+  const esokit::TuneModel& model = tuning.model;
+  const auto choice_of = [](const esokit::TunedDesign& design) {
+    const bool plain = design.settings.controller_bandwidth > 0.0 && design.feasible;
+    const auto& knows = design.knows;
+    if (!plain || knows.sensor || knows.sinusoid) return -1;
+    if (design.family == esokit::TuneFamily::linear)
+      return knows.lag ? 3 : design.extension == 1 ? 0 : design.extension == 2 ? 1 : -1;
+    return -1;
+  };
+  const esokit::TunedDesign* taken = choice_of(chosen) >= 0 ? &chosen : nullptr;
+  for (const auto& design : tuning.designs) {
+    if (taken == nullptr && choice_of(design) >= 0 && design.comes_back) taken = &design;
+  }
+  if (taken == nullptr) return;
+  const double gain = std::abs(model.input_gain.value);
+  const double half = 0.5 * (model.u_max - model.u_min);
+  const auto set = [&](const char* name, double value) {
+    result.address +=
+        (result.address.empty() ? "" : "&") + std::string(name) + "=" + text_of(value);
+  };
+  const from_log::Pasting& pasting = outcome.design.pasting();
+  set("order", model.order);
+  set("gain", gain);
+  set("damping", std::max(model.pole, 0.0));
+  set("lag", model.lag);
+  set("dead_time", model.dead_time);
+  set("friction", pasting.friction);
+  set("load", 0.1 * gain * half);
+  set("noise", model.noise);
+  set("quantum", outcome.findings.found.log.quantisation);
+  set("observer", choice_of(*taken));
+  set("controller_bandwidth", taken->settings.controller_bandwidth);
+  set("observer_bandwidth", taken->settings.observer_bandwidth);
+  set("limit", half);
+  set("sample_time", model.sample_time);
+  // So that u may be at its limit for a moment, and in whole settling times.
+  const double power =
+      std::pow(taken->settings.controller_bandwidth, model.order + (taken->knows.lag ? 1 : 0));
+  set("reference", 0.9 * half * gain / power / (taken->knows.lag ? model.lag : 1.0));
+  const double settling = std::max(taken->settling_time, 10 * model.latency());
+  set("samples", std::clamp(std::round(8 * settling / model.sample_time), 200.0, 20000.0));
+  result.taken = "The playground has the machine of " + outcome.input.y + " and " +
+                 outcome.input.u + " with " + taken->name;
+  if (taken == &chosen) {
+    result.taken += ", the design that was chosen.";
+  } else {
+    result.taken += ". Its sliders cannot hold the one that was chosen, " + chosen.name +
+                    ", whose deviations are " +
+                    esokit::examples::number_text(100 * (1.0 - chosen.excess / taken->excess), 2) +
+                    " % smaller.";
+  }
+  if (model.input_gain.value < 0.0) result.taken += " b0 is negative: there, u has the other sign.";
+  if (model.u_max + model.u_min != 0.0)
+    result.taken += " Its limits lie symmetrically, u counts from their middle.";
+}
+
+}  // namespace
+
+LogResult study_log(std::string_view arguments, std::string_view bytes,
+                    const std::function<void(const char*, double)>& progress) {
+  std::vector<std::string> words{"from_log"};
+  for (std::size_t at = 0; at < arguments.size();) {
+    const std::size_t end = std::min(arguments.find('\0', at), arguments.size());
+    words.emplace_back(arguments.substr(at, end - at));
+    at = end + 1;
+  }
+  std::vector<const char*> argv;
+  for (const auto& word : words) argv.push_back(word.c_str());
+  auto settings = from_log::read_arguments(static_cast<int>(argv.size()), argv.data());
+  settings.bytes = bytes;
+  settings.progress = progress;
+  progress("reading", -1.0);
+  const from_log::Outcome outcome = from_log::work_out(settings);
+  LogResult result;
+  result.status = outcome.status;
+  const from_log::Page page = outcome.page(settings);
+  result.header = page.header();
+  result.main = page.main([&](const esokit::examples::Figure& figure) -> std::string {
+    auto text = figure.text("", "svg");
+    if (!text) return "";
+    result.figures.push_back(*std::move(text));
+    return "<div class=\"drawn\"></div>\n";
+  });
+  if (outcome.design.made()) {
+    result.code = outcome.design.code();
+    take_over(outcome, result);
+  }
+  return result;
+}
+
+}  // namespace playground

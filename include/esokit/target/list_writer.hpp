@@ -1,0 +1,279 @@
+/// @file
+/// Recorded calls as lines of any language: the names and expressions of to_c and
+/// to_structured_text.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdio>
+#include <esokit/target/recorder.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace esokit::detail {
+
+/// Keys and what stands for them.
+using Words = std::vector<std::pair<std::string, std::string>>;
+
+/// `text` with each key replaced, in the order of the words.
+inline std::string filled(std::string text, const Words& words) {
+  for (const auto& [key, word] : words) {
+    for (std::size_t at = 0; (at = text.find(key, at)) != std::string::npos; at += word.size()) {
+      text.replace(at, key.size(), word);
+    }
+  }
+  return text;
+}
+
+/// A language: how it writes numbers and operations. `a`, `b`, `c` behind a dollar are operands.
+struct Language {
+  const char* real[2];             ///< double, float
+  const char* number_suffix[2];    ///< of a constant
+  const char* most[2];             ///< the largest number
+  const char* from_state;          ///< before the name of a number of the object
+  char exponent;                   ///< between mantissa and exponent
+  std::array<const char*, 21> of;  ///< each Operation
+};
+
+inline constexpr Language c_language{{"double", "float"},
+                                     {"", "f"},
+                                     {"", ""},
+                                     "o->",
+                                     'e',
+                                     {"",
+                                      "",
+                                      "$a + $b",
+                                      "$a - $b",
+                                      "$a * $b",
+                                      "$a / $b",
+                                      "-$a",
+                                      "fabs$f($a)",
+                                      "sqrt$f($a)",
+                                      "pow$f($a, $b)",
+                                      "exp$f($a)",
+                                      "expm1$f($a)",
+                                      "$a ? $b : $c",
+                                      "$a < $b",
+                                      "$a > $b",
+                                      "$a <= $b",
+                                      "$a >= $b",
+                                      "is_finite($a)",
+                                      "$a && $b",
+                                      "$a || $b",
+                                      "!$a"}};
+
+/// IEC 61131-3. ABS(x) <= the largest number is false for NaN and infinity.
+inline constexpr Language st_language{{"LREAL", "REAL"},
+                                      {"", ""},
+                                      {"1.7976931348623157E+308", "3.40282347E+38"},
+                                      "",
+                                      'E',
+                                      {"",
+                                       "",
+                                       "$a + $b",
+                                       "$a - $b",
+                                       "$a * $b",
+                                       "$a / $b",
+                                       "-$a",
+                                       "ABS($a)",
+                                       "SQRT($a)",
+                                       "EXPT($a, $b)",
+                                       "EXP($a)",
+                                       "EXP($a) - 1.0",
+                                       "SEL($a, $c, $b)",
+                                       "$a < $b",
+                                       "$a > $b",
+                                       "$a <= $b",
+                                       "$a >= $b",
+                                       "ABS($a) <= $most",
+                                       "$a AND $b",
+                                       "$a OR $b",
+                                       "NOT $a"}};
+
+/// A recorded call with names.
+struct NamedCall {
+  std::string name;
+  std::vector<std::string> arguments;
+  bool has_output = false;
+};
+
+/// A call as lines.
+struct WrittenCall {
+  struct Line {
+    std::string name;
+    std::string expression;
+    bool is_condition;
+  };
+  std::vector<Line> reads{};          ///< the numbers of the object that it needs
+  std::vector<Line> lines{};          ///< what is computed, in its order
+  std::vector<std::string> checks{};  ///< if one does not hold, the call changes nothing
+  std::vector<std::pair<std::string, std::string>> results{};  ///< a number, and what it becomes
+  std::string output{};                                        ///< what is returned, if anything
+  std::vector<std::string> unused{};                           ///< arguments
+};
+
+/// Writes recorded calls line by line.
+class ListWriter {
+ public:
+  ListWriter(const Language& language, bool single) : language_(&language), single_(single) {}
+
+  std::vector<std::string> members{};  ///< a name for each number of the object
+  std::vector<bool> live{};            ///< the numbers that the state needs
+
+  [[nodiscard]] std::string real() const { return language_->real[single_ ? 1 : 0]; }
+  [[nodiscard]] bool single() const { return single_; }
+  [[nodiscard]] std::string most() const { return language_->most[single_ ? 1 : 0]; }
+  /// The number, read back bit for bit.
+  [[nodiscard]] std::string number(double value) const {
+    char digits[40];
+    std::snprintf(digits, sizeof digits, single_ ? "%.9g" : "%.17g", value);
+    std::string text = digits;
+    const std::size_t power = text.find('e');
+    if (power != std::string::npos) {
+      text[power] = language_->exponent;
+      if (text.find('.') == std::string::npos) text.insert(power, ".0");
+    } else if (text.find('.') == std::string::npos) {
+      text += ".0";
+    }
+    return text + language_->number_suffix[single_ ? 1 : 0];
+  }
+
+  /// Which instructions are needed for checks, outputs and live numbers.
+  [[nodiscard]] std::vector<bool> needed(const RecordedCall& call) const {
+    std::vector<bool> need(call.list.instructions.size(), false);
+    const auto want = [&](int index) {
+      if (index >= 0) need[static_cast<std::size_t>(index)] = true;
+    };
+    for (const int check : call.list.checks) want(check);
+    for (const int output : call.outputs) want(output);
+    for (std::size_t i = 0; i < live.size(); ++i) {
+      if (live[i]) want(call.next[i]);
+    }
+    for (std::size_t i = need.size(); i-- > 0;) {  // operands come before
+      const Instruction& one = call.list.instructions[i];
+      if (!need[i] || one.operation == Operation::argument) continue;
+      want(one.a);
+      want(one.b);
+      want(one.c);
+    }
+    return need;
+  }
+
+  /// Adds the numbers that the calls read to the live ones.
+  void find_live(const RecordedObject& all) {
+    for (bool grew = true; grew;) {
+      grew = false;
+      for (const auto& lists : all.calls) {
+        const auto need = needed(lists[0]);
+        for (std::size_t i = 0; i < need.size(); ++i) {
+          const Instruction& one = lists[0].list.instructions[i];
+          const auto from = static_cast<std::size_t>(one.a);
+          if (!need[i] || one.operation != Operation::argument || from >= live.size()) continue;
+          if (!live[from]) live[from] = grew = true;
+        }
+      }
+    }
+  }
+
+  /// The lines of a call. @param prefix before each temporary, where they share a scope
+  [[nodiscard]] WrittenCall written(const NamedCall& names, const RecordedCall& call,
+                                    const std::string& prefix = "") const {
+    const auto& list = call.list.instructions;
+    const auto need = needed(call);
+    const std::vector<int> uses = counted(call, need);
+    WrittenCall text;
+    std::vector<std::string> of(list.size());
+    std::vector<int> depth(list.size(), 0);
+    std::vector<bool> given(names.arguments.size(), false);
+    int temporaries = 0;
+    for (std::size_t i = 0; i < list.size(); ++i) {
+      const Instruction& one = list[i];
+      if (!need[i]) continue;
+      if (one.operation == Operation::constant) {
+        of[i] = number(one.value);
+        if (std::signbit(one.value)) of[i] = "(" + of[i] + ")";
+        continue;
+      }
+      if (one.operation == Operation::argument) {
+        const auto from = static_cast<std::size_t>(one.a);
+        if (from < members.size()) {
+          of[i] = members[from];
+          text.reads.push_back({of[i], language_->from_state + of[i], false});
+        } else {
+          of[i] = names.arguments[from - members.size()];
+          given[from - members.size()] = true;
+        }
+        continue;
+      }
+      const auto part = [&](int index) {
+        return index < 0 ? std::string() : of[static_cast<std::size_t>(index)];
+      };
+      int deep = 1;
+      for (const int index : {one.a, one.b, one.c}) {
+        if (index >= 0 && depth[static_cast<std::size_t>(index)] >= deep) {
+          deep = depth[static_cast<std::size_t>(index)] + 1;
+        }
+      }
+      const std::string expression = filled(language_->of[static_cast<std::size_t>(one.operation)],
+                                            {{"$f", single_ ? "f" : ""},
+                                             {"$most", most()},
+                                             {"$a", part(one.a)},
+                                             {"$b", part(one.b)},
+                                             {"$c", part(one.c)}});
+      if (uses[i] == 1 && deep < 4 && one.operation != Operation::choose) {
+        of[i] = "(" + expression + ")";
+        depth[i] = deep;
+        continue;
+      }
+      for (std::size_t m = 0; m < live.size() && of[i].empty(); ++m) {
+        if (live[m] && call.next[m] == static_cast<int>(i)) of[i] = prefix + members[m] + "_next";
+      }
+      if (of[i].empty()) of[i] = prefix + "t" + std::to_string(++temporaries);
+      text.lines.push_back({of[i], expression, is_condition(one.operation)});
+    }
+    for (std::size_t i = 0; i < given.size(); ++i) {
+      if (!given[i]) text.unused.push_back(names.arguments[i]);
+    }
+    const auto at = [&](int index) { return of[static_cast<std::size_t>(index)]; };
+    std::vector<bool> checked(list.size(), false);
+    for (const int check : call.list.checks) {
+      const auto index = static_cast<std::size_t>(check);
+      if (!checked[index]) text.checks.push_back(of[index]);
+      checked[index] = true;
+    }
+    for (std::size_t i = 0; i < live.size(); ++i) {
+      if (live[i] && call.next[i] >= 0) text.results.emplace_back(members[i], at(call.next[i]));
+    }
+    for (const int output : call.outputs) text.output = at(output);
+    return text;
+  }
+
+ private:
+  /// How often each result is used; twice, if it needs a name.
+  [[nodiscard]] std::vector<int> counted(const RecordedCall& call,
+                                         const std::vector<bool>& need) const {
+    const auto& list = call.list.instructions;
+    std::vector<int> uses(list.size(), 0);
+    const auto use = [&](int index, int times) {
+      if (index >= 0) uses[static_cast<std::size_t>(index)] += times;
+    };
+    for (std::size_t i = 0; i < list.size(); ++i) {
+      if (!need[i] || list[i].operation == Operation::argument) continue;
+      use(list[i].a, 1);
+      use(list[i].b, 1);
+      use(list[i].c, 1);
+    }
+    for (const int output : call.outputs) use(output, 2);
+    for (std::size_t i = 0; i < live.size(); ++i) {
+      if (live[i]) use(call.next[i], 2);
+    }
+    return uses;
+  }
+
+  const Language* language_;
+  bool single_;
+};
+
+}  // namespace esokit::detail

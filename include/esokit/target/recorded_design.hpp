@@ -1,0 +1,489 @@
+/// @file
+/// RecordedDesign: all that a text of another language needs of a finished controller or observer,
+/// recorded from its own calls.
+#pragma once
+
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <cstddef>
+#include <esokit/adapter/delayed_input.hpp>
+#include <esokit/control/adrc.hpp>
+#include <esokit/control/disturbance_compensator.hpp>
+#include <esokit/core/expected.hpp>
+#include <esokit/target/list_writer.hpp>
+#include <esokit/target/recorder.hpp>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace esokit {
+
+/// How a text of another language is to be written.
+struct CodeOptions {
+  std::string name = "controller";  ///< begins every name and the files: an identifier of C
+  std::string comment{};            ///< at the head: which machine, which design; no marks of a
+                                    ///< comment
+  int self_test_samples = 100;      ///< samples of the self-test, 1 .. 10000
+};
+
+namespace detail {
+
+/// The rules of a loop: plain numbers.
+struct LoopRules {
+  unsigned hold_left = 0;
+  unsigned missing_limit = 0;
+  int divider = 1;
+  bool has_safe_input = false;
+  bool stays_safe = false;
+  double hold_input = 0;
+  double safe_input = 0;
+};
+
+/// A finished design as lists and counts, without its type.
+struct RecordedDesign {
+  CodeOptions options{};
+  bool single = false;         ///< float
+  bool is_controller = false;  ///< else an observer
+  std::vector<NamedCall> names{};
+  std::vector<RecordedCall> calls{};   ///< one for each name
+  std::vector<std::string> members{};  ///< a name for each number of the object
+  std::vector<bool> live{};            ///< whether its state needs it
+  std::vector<double> numbers{};       ///< what it is at first
+  int size = 0;                        ///< N: rows of the estimate
+  int order = 0;                       ///< the row of the disturbance
+  std::string first_state{};           ///< the predicted measurement
+  double sample_time = 0;
+  double input_gain = 0;
+  std::vector<std::vector<double>> gap_gains{};  ///< all gains after 1, 2, .. samples
+  bool gain_is_kept = true;    ///< without a gap they are the first row, else computed by the list
+  std::vector<double> line{};  ///< of DelayedInput: the inputs, the newest last
+  LoopRules loop{};
+  double lower = 0;
+  double upper = 0;
+  bool error_based = false;
+  bool softens = false;
+  bool compensates = false;                      ///< r is the output of another controller
+  std::vector<std::array<double, 3>> samples{};  ///< y, r or u, and the result
+};
+
+/// What is private in a controller and an observer, and is recorded apart.
+struct RecordAccess {
+  template <class C>
+  static auto& loop(C& c) noexcept {
+    return c.loop_;
+  }
+  /// u of the law for the present estimate, before the limits; as if no start hold were left.
+  template <class C, class S>
+  static S law(C& c, const S& reference) noexcept {
+    c.loop_.mode_ = LoopMode::running;
+    if constexpr (requires { c.judged(reference); }) {
+      return c.judged(reference);
+    } else {
+      return c.command(reference);
+    }
+  }
+  /// The output of the loop for a u that is wanted.
+  template <class Loop, class S>
+  static S limited(Loop& loop, const S& wanted) noexcept {
+    return loop.limited(wanted);
+  }
+  template <class C>
+  static bool softens(const C& c) noexcept {
+    if constexpr (requires { c.soft_; }) {
+      return c.soft_.on();
+    } else {
+      return false;
+    }
+  }
+  /// The law as designed again.
+  template <class C>
+  static void harden(C& c) noexcept {
+    if constexpr (requires { c.soft_; }) c.soft_.reset();
+  }
+  template <class Loop>
+  static LoopRules rules(const Loop& loop) noexcept {
+    return {loop.hold_left_,
+            loop.missing_limit_,
+            loop.divider_,
+            loop.has_safe_input_,
+            loop.stay_safe_,
+            static_cast<double>(loop.hold_input_),
+            static_cast<double>(loop.safe_input_)};
+  }
+
+  /// The gain laws of all levels.
+  template <class O>
+  static auto laws(O& o) noexcept -> decltype((o.laws_)) {
+    return o.laws_;
+  }
+  /// A correction with gains from elsewhere, `gains[level][row]`.
+  template <class O, class S, class Gains>
+  static void correct(O& o, const S& y, const Gains& gains) noexcept {
+    typename O::Correction step{o.states_};
+    const bool fine = o.correct_by(
+        step, y, [&](auto level, const S&) -> const auto& { return gains[std::size_t{level}]; });
+    if (fine && all(is_finite(o.probe(step.states)))) o.commit(step);
+  }
+
+  /// The inputs of a DelayedInput that are still needed, the newest last.
+  template <class O>
+  static std::vector<double> line(const O& o) {
+    std::vector<double> inputs;
+    const int length = static_cast<int>(o.inputs_.size());
+    for (int age = o.delay_; age >= 0; --age) {
+      const int at = (o.newest_ - age + length) % length;
+      inputs.push_back(static_cast<double>(o.inputs_[static_cast<std::size_t>(at)]));
+    }
+    return inputs;
+  }
+};
+
+// ---- Adapters: what they count and choose is text of each language; the lists are of what they
+// adapt.
+
+template <class Observer>
+struct IsDelayed : std::false_type {};
+template <class Observer, int Capacity>
+struct IsDelayed<DelayedInput<Observer, Capacity>> : std::true_type {};
+
+/// An observer without the adapter around it, and a controller around the observer without it.
+/// @{
+template <class Object>
+struct WithoutAdapter {
+  using type = Object;
+};
+template <class Observer, int Capacity>
+struct WithoutAdapter<DelayedInput<Observer, Capacity>> {
+  using type = Observer;
+};
+template <class Observer, class Form>
+struct WithoutAdapter<Adrc<Observer, Form>> {
+  using type = Adrc<typename WithoutAdapter<Observer>::type, Form>;
+};
+template <class Observer>
+struct WithoutAdapter<DisturbanceCompensator<Observer>> {
+  using type = DisturbanceCompensator<typename WithoutAdapter<Observer>::type>;
+};
+template <class Observer>
+struct WithoutAdapter<ControlLoop<Observer>> {
+  using type = ControlLoop<typename WithoutAdapter<Observer>::type>;
+};
+
+template <class To, class From>
+void take_off_adapter(To& to, const From& from);
+template <int... I, class... T, class... F>
+void take_off_adapters(const TiedFields<std::integer_sequence<int, I...>, T...>& to,
+                       const TiedFields<std::integer_sequence<int, I...>, F...>& from) {
+  (take_off_adapter(static_cast<const TiedField<I, T>&>(to).field,
+                    static_cast<const TiedField<I, F>&>(from).field),
+   ...);
+}
+template <class To, class From>
+void take_off_adapter(To& to, const From& from) {
+  if constexpr (std::is_same_v<To, From>) {
+    to = from;
+  } else if constexpr (IsDelayed<From>::value) {
+    to = from.observer();
+  } else if constexpr (!std::is_empty_v<To>) {
+    take_off_adapters(LaneAccess::fields(to), LaneAccess::fields(from));
+  }
+}
+/// @}
+
+// ---- What can be written.
+
+/// A law whose gain after a gap is a row of a table.
+template <class Law>
+concept GapGainsAreATable = gain_law_traits<Law>
+.bridges_gaps && !gain_law_traits<Law>.advances && requires { typename WithScalar<Law, float>; };
+
+/// An observer whose lists are recorded: PredictorCorrector with such laws.
+template <class Observer>
+concept HasLists = can_be_recorded<Observer> && requires(const Observer& o) {
+  requires GapGainsAreATable<std::remove_cvref_t<decltype(RecordAccess::laws(o)[0])>>;
+};
+
+/// The same, perhaps in an adapter.
+template <class Observer>
+concept WritableObserver = HasLists<typename WithoutAdapter<Observer>::type>;
+
+template <class C>
+struct ObserverOfController;
+template <class Observer, class Form>
+struct ObserverOfController<Adrc<Observer, Form>> {
+  using type = Observer;
+  static constexpr bool error_based = std::is_same_v<Form, ErrorBased>;
+};
+template <class Observer>
+struct ObserverOfController<DisturbanceCompensator<Observer>> {
+  using type = Observer;
+  static constexpr bool error_based = false;
+};
+/// A controller around such an observer.
+template <class C>
+concept WritableController = WritableObserver<typename ObserverOfController<C>::type>;
+
+/// Records a subject without its adapter.
+/// @tparam Subject the observer or controller @tparam Observer its observer, perhaps itself
+template <class Subject, class Observer>
+class DesignRecorder {
+ public:
+  using V = typename Observer::scalar_type;
+  using Number = typename Recorder<Subject>::Number;
+  using Numbers = std::vector<Number>;
+  static constexpr int size = Observer::size;
+  static constexpr int gains = size * Observer::levels;
+
+  DesignRecorder(const Subject& subject, const CodeOptions& options)
+      : subject_(subject), recorder_(subject) {
+    design.options = options;
+    design.single = sizeof(V) == sizeof(float);
+  }
+
+  RecordedDesign design;
+
+  /// The rules for the options.
+  [[nodiscard]] static Rules<V> checked(const CodeOptions& options) {
+    const auto letter = [](char c) {
+      return std::isalpha(static_cast<unsigned char>(c)) != 0 || c == '_';
+    };
+    bool is_name = !options.name.empty() && letter(options.name[0]);
+    for (const char c : options.name) {
+      is_name = is_name && (letter(c) || std::isdigit(static_cast<unsigned char>(c)) != 0);
+    }
+    bool ends = false;
+    for (const char* mark : {"/*", "*/", "(*", "*)"}) {
+      ends = ends || options.comment.find(mark) != std::string::npos;
+    }
+    Rules<V> rules;
+    rules.require(is_name, "name", V(0), "must be an identifier of C")
+        .require(1 <= options.self_test_samples && options.self_test_samples <= 10000,
+                 "self_test_samples", static_cast<V>(options.self_test_samples),
+                 "must be 1 .. 10000")
+        .require(!ends, "comment", V(0), "must not begin or end a comment");
+    return rules;
+  }
+
+  void add(const std::string& name, std::vector<std::string> arguments, bool has_output,
+           typename Recorder<Subject>::Call call) {
+    recorder_.add(static_cast<int>(arguments.size()), std::move(call));
+    design.names.push_back({name, std::move(arguments), has_output});
+  }
+
+  /// Records the calls of the observer, names the numbers. @param of the observer of a recorded
+  /// subject @param name_of gives the name of a number, or ""
+  template <class Of, class NameOf>
+  [[nodiscard]] Check<V> record(const Of& of, const NameOf& name_of) {
+    add_observer(of);
+    const auto recorded = recorder_.record();
+    if (!recorded) return recorded.error();
+    auto object = Recorder<Subject>::as_recorded(subject_);
+    const auto numbers = numbers_of<Number>(object);
+    const Number* first = &of(object).predicted_measurement();
+    using Model = typename Observer::PlantModel;
+    ListWriter writer(c_language, design.single);
+    writer.live.assign(numbers.size(), false);
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      const auto state = numbers[i] - first;
+      std::string name = name_of(object, numbers[i]);
+      if (numbers[i] == &of(object).applied_input()) name = "u_applied";
+      if (numbers[i] == &of(object).innovation()) name = "innovation";
+      for (int row = 0; row < size && 0 <= state && state < gains; ++row) {
+        if (Model::state_of_row(row) != state % size) continue;
+        name = "z" + std::to_string(row + 1);
+        if (state >= size) name += "_level" + std::to_string(state / size + 1);
+        if (state == 0) design.first_state = name;
+      }
+      writer.live[i] = name[0] == 'z' || name == "u_applied" || name == "u_last";
+      design.members.push_back(name.empty() ? "x" + std::to_string(i) : name);
+    }
+    writer.find_live(*recorded);
+    design.live = writer.live;
+    design.numbers = recorded->numbers;
+    for (const auto& call : recorded->calls) design.calls.push_back(call[0]);
+    return take_gains(of(subject_));
+  }
+
+ private:
+  template <class Of>
+  void add_observer(const Of& of) {
+    using Law =
+        std::remove_cvref_t<decltype(RecordAccess::laws(std::declval<const Observer&>())[0])>;
+    design.gain_is_kept = gain_law_traits<Law>.kind == GainKind::preset;
+    add("observe", {"y", "u"}, false, [of](auto& c, const Numbers& in) {
+      (void)of(c).update(in[0], in[1]);
+      return Numbers{};
+    });
+    add("predict_step", {"u"}, false, [of](auto& c, const Numbers& in) {
+      (void)of(c).predict(in[0]);
+      return Numbers{};
+    });
+    std::vector<std::string> arguments{"y"};
+    for (int i = 1; i <= gains; ++i) arguments.push_back("k" + std::to_string(i));
+    add("correct_by", arguments, false, [of](auto& c, const Numbers& in) {
+      Array<ScaledGain<size, Number>, Observer::levels> given{};
+      std::size_t next = 1;
+      for (auto& level : given) {
+        for (Number& k : level) k = in[next++];
+      }
+      RecordAccess::correct(of(c), in[0], given);
+      return Numbers{};
+    });
+    if (!design.gain_is_kept) {
+      add("correct_step", {"y"}, false, [of](auto& c, const Numbers& in) {
+        (void)of(c).correct(in[0]);
+        return Numbers{};
+      });
+    }
+    add("restart_at", {"y"}, false, [of](auto& c, const Numbers& in) {
+      (void)of(c).reset(in[0]);
+      return Numbers{};
+    });
+    unroll<size>([&](auto row) {
+      add("estimate_" + std::to_string(int{row}), {}, true, [of](auto& c, const Numbers&) {
+        return Numbers{of(c).template estimate<int{decltype(row)::value}>()};
+      });
+    });
+  }
+
+  [[nodiscard]] Check<V> take_gains(const Observer& observer) {
+    design.size = size;
+    design.order = Observer::order;
+    design.sample_time = static_cast<double>(observer.sample_time());
+    design.input_gain = static_cast<double>(observer.input_gain());
+    for (int elapsed = 1; elapsed <= observer.max_gap() + 1; ++elapsed) {
+      std::vector<double> row;
+      for (const auto& law : RecordAccess::laws(observer)) {
+        const auto gap = static_cast<unsigned>(elapsed);
+        const auto gain =
+            elapsed == 1 ? ScaledGain<size, V>(law.gain(V(0))) : law.gap_gain(V(0), gap);
+        const auto other = elapsed == 1 ? gain : law.gap_gain(V(1), gap);
+        for (std::size_t i = 0; i < gain.size(); ++i) {
+          row.push_back(static_cast<double>(gain[i]));
+          const bool same = !(gain[i] < other[i]) && !(gain[i] > other[i]);
+          if (!same) {
+            return Error<V>{"gap_gain", other[i],
+                            "depends on the innovation: no table can hold it"};
+          }
+        }
+      }
+      design.gap_gains.push_back(row);
+    }
+    return {};
+  }
+
+  Subject subject_;
+  Recorder<Subject> recorder_;
+};
+
+/// Samples for the self-test: what y is does not matter. @param step gives the result for y and r
+template <class V, class Step>
+std::vector<std::array<double, 3>> self_test_samples(int count, Step&& step) {
+  std::vector<std::array<double, 3>> samples;
+  for (int k = 0; k < count; ++k) {
+    const V r = static_cast<V>((k / 10) % 2 == 0 ? 1.0 : -0.5);
+    const V y = static_cast<V>(0.25 * ((k * 37) % 16) - 1.5);
+    samples.push_back(
+        {static_cast<double>(y), static_cast<double>(r), static_cast<double>(step(y, r))});
+  }
+  return samples;
+}
+
+template <class Object>
+auto without_adapter(const Object& object) {
+  auto bare = blank<typename WithoutAdapter<Object>::type>();
+  take_off_adapter(bare, object);
+  return bare;
+}
+
+/// The design of a controller.
+template <WritableController C>
+Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
+    const C& controller, const CodeOptions& options) {
+  using V = typename C::scalar_type;
+  using Access = RecordAccess;
+  using Of = ObserverOfController<C>;
+  using Bare = typename WithoutAdapter<C>::type;
+  using Maker = DesignRecorder<Bare, typename WithoutAdapter<typename Of::type>::type>;
+  using Number = typename Maker::Number;
+  using Numbers = typename Maker::Numbers;
+
+  if (const auto rules = Maker::checked(options); !rules) return rules.error();
+  const Bare bare = without_adapter(controller);
+  Maker maker(bare, options);
+  RecordedDesign& design = maker.design;
+  design.is_controller = true;
+  design.loop = Access::rules(Access::loop(bare));
+  design.error_based = Of::error_based;
+  design.softens = Access::softens(bare);
+  design.compensates = !requires { controller.gains(); };
+  design.lower = static_cast<double>(controller.limiter().lower());
+  design.upper = static_cast<double>(controller.limiter().upper());
+  if constexpr (IsDelayed<typename Of::type>::value) {
+    design.line = Access::line(controller.observer());
+  }
+
+  maker.add("rest_at", {"y", "u"}, false, [](auto& c, const Numbers& in) {
+    auto& o = c.observer();
+    (void)o.reset(o.equilibrium(in[0], in[1]));
+    return Numbers{};
+  });
+  maker.add("law", {"r"}, true,
+            [](auto& c, const Numbers& in) { return Numbers{Access::law(c, in[0])}; });
+  maker.add("limit", {"u"}, true, [](auto& c, const Numbers& in) {
+    return Numbers{Access::limited(Access::loop(c), in[0])};
+  });
+  maker.add("applied", {"u"}, false, [](auto& c, const Numbers& in) {
+    Access::loop(c).applied(in[0]);
+    return Numbers{};
+  });
+  if (design.softens) {
+    maker.add("harden", {}, false, [](auto& c, const Numbers&) {
+      Access::harden(c);
+      return Numbers{};
+    });
+  }
+  const auto name_of = [](const auto& c, const Number* at) -> std::string {
+    // The limiter keeps the bounds of the next output behind the last.
+    constexpr const char* names[] = {"u_last", "u_low", "u_high"};
+    const auto place = at - &c.output();
+    return 0 <= place && place < 3 ? names[place] : at == &c.requested() ? "u_asked" : "";
+  };
+  const auto of = [](auto& c) -> auto& { return c.observer(); };
+  if (auto ok = maker.record(of, name_of); !ok) return ok.error();
+  if (design.error_based) design.input_gain = -design.input_gain;
+  C played = controller;
+  design.samples = self_test_samples<V>(options.self_test_samples,
+                                        [&](V y, V r) { return played.update(y, r); });
+  return design;
+}
+
+/// The design of an observer.
+template <WritableObserver Observer>
+Expected<RecordedDesign, Error<typename Observer::scalar_type>> recorded_design(
+    const Observer& observer, const CodeOptions& options) {
+  using V = typename Observer::scalar_type;
+  using Bare = typename WithoutAdapter<Observer>::type;
+  using Maker = DesignRecorder<Bare, Bare>;
+
+  if (const auto rules = Maker::checked(options); !rules) return rules.error();
+  Maker maker(without_adapter(observer), options);
+  if constexpr (IsDelayed<Observer>::value) maker.design.line = RecordAccess::line(observer);
+  const auto of = [](auto& o) -> auto& { return o; };
+  const auto no_name = [](const auto&, const auto*) { return std::string(); };
+  if (auto ok = maker.record(of, no_name); !ok) return ok.error();
+  Observer played = observer;
+  maker.design.samples = self_test_samples<V>(options.self_test_samples, [&](V y, V u) {
+    (void)played.update(y, u);
+    return played.total_disturbance();
+  });
+  return maker.design;
+}
+
+template <class Object>
+concept Writable = WritableController<Object> || WritableObserver<Object>;
+
+}  // namespace detail
+}  // namespace esokit

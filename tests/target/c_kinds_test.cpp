@@ -1,0 +1,51 @@
+// The C of models, of gains that depend on the innovation, of delays and of other controllers
+// equals them bit for bit, as in c_code_test.cpp.
+#include <esokit/adapter/delayed_input.hpp>
+#include <esokit/control/disturbance_compensator.hpp>
+#include <esokit/gain/pole_set.hpp>
+#include <esokit/observer/adjustable_bandwidth_eso.hpp>
+#include <esokit/observer/model_eso.hpp>
+#include <esokit/observer/nonlinear_eso.hpp>
+#include <target/written.hpp>
+
+namespace esokit_test {
+namespace target_c_kinds_test {
+
+#ifdef ESOKIT_LOADS_C
+
+using namespace esokit;
+
+TEST(CKinds, OfModels) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  equals<ModelEso<lag, float>>(30000, 141);
+  equals<ModelEso<lag, double, PoleSet>>(30000, 151);
+  equals<ModelEso<everything, double>>(30000, 161);
+  equals<ModelCascadeEso<lag, 2, double>>(30000, 171);
+  equals<PlantEso<2, sine, float>>(30000, 181);
+  observes<PlantCascadeEso<2, sine, 2, double>>(30000, 191);
+  observes<ModelEso<everything, float>>(30000, 201);
+}
+
+TEST(CKinds, OfGainsThatDependOnTheInnovation) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  equals<AdjustableBandwidthEso<2, float>>(30000, 211);
+  equals<NonlinearEso<1, double>>(30000, 221);
+  observes<NonlinearEso<1, float, 1, FalGain<float>>>(30000, 231);
+}
+
+TEST(CKinds, OfDelaysAndOtherForms) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  using Delayed = DelayedInput<LinearEso<2, float>, 6>;
+  equals<Delayed>(30000, 241);
+  observes<DelayedInput<CascadeEso<1, 2, double>, 3>>(30000, 251);
+  equals_controller<Adrc<LinearEso<2, double>, ErrorBased>>(30000, 261);
+  equals_controller<Adrc<Delayed, ErrorBased>>(30000, 271);
+  equals_controller<DisturbanceCompensator<LinearEso<1, float>>>(30000, 281);
+  equals_controller<Adrc<LinearEso<2, float>>>(30000, 291, "gcc -std=c99", 3);
+  equals_controller<Adrc<DelayedInput<ModelEso<lag, double>, 3>>>(30000, 301, "gcc -std=c99", 2);
+}
+
+#endif  // ESOKIT_LOADS_C
+
+}  // namespace target_c_kinds_test
+}  // namespace esokit_test

@@ -1,0 +1,379 @@
+// The objects of the tests of written code, the C compiled and loaded, and both in the same loop.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <esokit/observer/model_eso.hpp>
+#include <esokit/target/c_code.hpp>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#if __has_include(<dlfcn.h>) && __has_include(<unistd.h>)
+#define ESOKIT_LOADS_C 1
+#include <dlfcn.h>
+#include <unistd.h>
+#endif
+
+#include <control/loop_traits.hpp>
+#include <support/numbers.hpp>
+
+namespace esokit_test {
+inline namespace written {
+
+using namespace esokit;
+
+template <class V>
+bool equal_bits(V a, V b) {
+  return std::memcmp(&a, &b, sizeof a) == 0;
+}
+
+/// The config of an observer; that of an adapter has one inside.
+template <class Observer>
+auto observer_config(double input_gain) {
+  using V = typename Observer::scalar_type;
+  typename Observer::Config config{};
+  if constexpr (requires { config.observer; }) {
+    config.observer = observer_config<typename Observer::Adapted>(input_gain);
+    config.delay = 3;
+  } else {
+    config.sample_time = V(0.0078125);
+    config.input_gain = V(input_gain);
+    config.max_gap = 5;
+    if constexpr (requires { config.bandwidth_factor; }) {
+      config.observer_bandwidth = V(15);
+      config.bandwidth_factor = V(1.5);
+    } else if constexpr (requires { config.observer_bandwidth; }) {
+      config.observer_bandwidth = Observer::order == 3 ? V(15) : V(30);
+    } else {
+      config.poles[0] = {-20, 5};
+      config.poles[1] = {-20, -5};
+      config.poles[2] = {-9, 0};
+    }
+    if constexpr (requires { config.bandwidth_ratio; }) config.bandwidth_ratio = V(0.75);
+    if constexpr (requires { config.gain_min; }) config.gain_min = V(0.55);
+    if constexpr (requires { config.shape.exponent; }) {
+      config.shape.exponent = V(0.5);
+      config.shape.linear_width = V(0.05);
+    } else if constexpr (requires { config.shape.gain_alpha; }) {
+      config.shape.gain_alpha = V(0.6);
+      config.shape.alpha = V(0.75);
+      config.shape.gain_beta = V(0.25);
+      config.shape.beta = V(0.5);
+    }
+    if constexpr (requires { config.model.plant.size(); }) {
+      config.model.plant.fill(V(0.5));
+    } else if constexpr (requires { config.model.plant; }) {
+      config.model.plant =
+          LinearPlant<2, V>::chain({.coefficients = {V(0.5), V(0.5)}, .input_gain = V(input_gain)})
+              .value();
+    }
+    if constexpr (requires { config.model.actuator.time_constant; }) {
+      config.model.actuator.time_constant = V(0.05);
+    }
+    if constexpr (requires { config.model.sensor.time_constant; }) {
+      config.model.sensor.time_constant = V(0.03);
+    }
+    if constexpr (requires { config.model.resonators; }) {
+      for (auto& resonance : config.model.resonators) resonance.frequency = V(25);
+    }
+    if constexpr (requires { config.model.first_order; }) config.model.first_order.fill(V(0.5));
+  }
+  return config;
+}
+
+template <class C>
+auto config(double input_gain) {
+  using V = typename C::scalar_type;
+  typename C::Config config{};
+  config.observer = observer_config<typename detail::ObserverOfController<C>::type>(input_gain);
+  if constexpr (requires { config.controller_bandwidth; }) {
+    config.controller_bandwidth = C::order == 3 ? V(1.5) : V(4);
+  }
+  config.limits = {V(-3), V(2.5), V(60)};
+  config.start_hold = {.time = V(0.1), .input = V(0.5)};
+  config.missing = {.most = 9, .input = V(-0.5)};
+  return config;
+}
+
+inline constexpr ModelParts lag{.order = 1, .actuator = 1};
+inline constexpr ModelParts everything{
+    .order = 1, .plant_poles = true, .actuator = 1, .sensor = 1, .resonators = 1, .first_order = 1};
+inline constexpr ModelParts sine{.order = 2, .resonators = 1};
+
+#ifdef ESOKIT_LOADS_C
+
+/// A folder of this process, removed at the end.
+class Folder {
+ public:
+  Folder()
+      : path_(std::filesystem::temp_directory_path() /
+              ("esokit_c_code_" + std::to_string(getpid()))) {
+    std::filesystem::create_directories(path_);
+  }
+  ~Folder() { std::filesystem::remove_all(path_); }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+  [[nodiscard]] std::string file(const std::string& name) const { return (path_ / name).string(); }
+  void write(const std::string& name, const std::string& text) const {
+    std::ofstream(file(name)) << text;
+  }
+
+ private:
+  std::filesystem::path path_;
+};
+
+inline bool runs(const std::string& command) { return std::system(command.c_str()) == 0; }
+inline bool there(const std::string& program) {
+  return runs("command -v " + program + " >/dev/null 2>&1");
+}
+
+inline constexpr const char* strict = " -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror ";
+
+/// The compiled C of a controller.
+template <class V>
+class InC {
+ public:
+  InC(const Folder& folder, const CCode& code, bool is_controller,
+      const std::string& compiler = "gcc -std=c99") {
+    folder.write("loop.h", code.header);
+    folder.write("loop.c", code.source);
+    folder.write("probe.c", std::string("#include \"loop.h\"\n"
+                                        "unsigned loop_size(void);\n"
+                                        "unsigned loop_size(void) { return sizeof(loop_state); }\n"
+                                        "unsigned loop_probe(const loop_state *o);\n"
+                                        "unsigned loop_probe(const loop_state *o) { return ") +
+                                (is_controller ? "o->status + 256u * o->mode + " : "") +
+                                "65536u * o->gap; }\n");
+    const std::string out = folder.file("loop" + std::to_string(count++) + ".so");
+    built_ = runs(compiler + " -O2 -shared -fPIC -DLOOP_SELF_TEST" + std::string(strict) + "-o " +
+                  out + " " + folder.file("loop.c") + " " + folder.file("probe.c") + " -lm");
+    if (!built_) return;
+    handle_ = dlopen(out.c_str(), RTLD_NOW | RTLD_LOCAL);
+    if (handle_ == nullptr) return;
+    find(init_, "loop_init");
+    find(update_, "loop_update");
+    find(estimate_, "loop_estimate");
+    find(probe_, "loop_probe");
+    find(self_test_, "loop_self_test");
+    if (is_controller) {
+      find(start_, "loop_start");
+      find(miss_, "loop_update_without_measurement");
+      find(applied_, "loop_applied");
+    } else {
+      find(observe_, "loop_update");
+      find(predict_, "loop_predict");
+      find(correct_, "loop_correct");
+      find(reset_, "loop_reset");
+    }
+    unsigned (*bytes)() = nullptr;
+    find(bytes, "loop_size");
+    state_.resize(bytes() / sizeof(std::uint64_t) + 1);
+    init_(state_.data());
+  }
+  ~InC() {
+    if (handle_ != nullptr) dlclose(handle_);
+  }
+  InC(const InC&) = delete;
+  InC& operator=(const InC&) = delete;
+
+  [[nodiscard]] bool loaded() const { return handle_ != nullptr; }
+  V update(V y, V r) { return update_(state_.data(), y, r); }
+  V miss(V r) { return miss_(state_.data(), r); }
+  void applied(V u) { applied_(state_.data(), u); }
+  unsigned start(V y, V u) { return start_(state_.data(), y, u); }
+  unsigned observe(V y, V u) { return observe_(state_.data(), y, u); }
+  unsigned predict(V u) { return predict_(state_.data(), u); }
+  unsigned correct(V y) { return correct_(state_.data(), y); }
+  unsigned reset(V y) { return reset_(state_.data(), y); }
+  V estimate(unsigned row) { return estimate_(state_.data(), row); }
+  /// status + 256 mode + 65536 gap
+  unsigned probe() { return probe_(state_.data()); }
+  int self_test(V tolerance) { return self_test_(tolerance); }
+
+ private:
+  template <class F>
+  void find(F& function, const char* name) {
+    function = reinterpret_cast<F>(dlsym(handle_, name));
+    ASSERT_NE(function, nullptr) << name;
+  }
+
+  static inline int count = 0;
+  bool built_ = false;
+  void* handle_ = nullptr;
+  std::vector<std::uint64_t> state_;
+  void (*init_)(void*) = nullptr;
+  unsigned (*start_)(void*, V, V) = nullptr;
+  V (*update_)(void*, V, V) = nullptr;
+  V (*miss_)(void*, V) = nullptr;
+  void (*applied_)(void*, V) = nullptr;
+  unsigned (*observe_)(void*, V, V) = nullptr;
+  unsigned (*predict_)(void*, V) = nullptr;
+  unsigned (*correct_)(void*, V) = nullptr;
+  unsigned (*reset_)(void*, V) = nullptr;
+  V (*estimate_)(void*, unsigned) = nullptr;
+  unsigned (*probe_)(const void*) = nullptr;
+  int (*self_test_)(V) = nullptr;
+};
+
+struct Seen {
+  int odd = 0, limited = 0, safe = 0;
+  int of_status[64] = {};
+};
+
+template <class Observer, class V>
+void compare_estimates(const Observer& observer, InC<V>& in_c, int k) {
+  detail::unroll<Observer::size>([&](auto row) {
+    EXPECT_TRUE(equal_bits(V(observer.template estimate<row>()), in_c.estimate(row)))
+        << "sample " << k << ", estimate " << row;
+  });
+}
+
+/// Both in the same loop, so many samples. @return what was met
+template <class C>
+Seen compare(const C& fresh, InC<typename C::scalar_type>& in_c, double input_gain, int samples,
+             std::uint64_t seed) {
+  using V = typename C::scalar_type;
+  C controller = fresh;
+  ChainPlant plant(C::order, 0.0078125, input_gain, 1.5);
+  Random random(seed);
+  Seen seen;
+  V r(1);
+  int lost = 0;
+  double u = 0;
+  for (int k = 0; k < samples; ++k) {
+    plant.set_disturbance(2 * std::sin(0.01 * k));
+    plant.step(u);
+    if (random.index(60) == 0) r = static_cast<V>(random.uniform(-4, 4));
+    if (k % 5000 == 0) plant.set_state(std::vector<double>(C::order, 0.0));
+    V y = static_cast<V>(plant.output() + 1e-3 * random.uniform(-1, 1));
+    constexpr int runs[] = {1, 2, 4, 6, 8, 12, 30};
+    if (lost > 0) --lost;
+    if (random.index(200) == 0) lost = runs[random.index(7)];
+    if (lost > 0 || random.index(300) == 0) y = hidden_nan<V>();
+    if (random.index(150) == 0) y = anything<V>(random);
+    V given = r;
+    if constexpr (!requires { controller.gains(); }) given = (r - y) / static_cast<V>(input_gain);
+    if (random.index(400) == 0) given = anything<V>(random);
+    if (random.index(30) == 0) {
+      const V held = random.index(10) == 0 ? anything<V>(random) : static_cast<V>(0.9 * u);
+      controller.applied(held);
+      controller.update(y, given);
+      in_c.applied(held);
+      in_c.update(y, given);
+    } else if (random.index(100) == 0) {
+      controller.update_without_measurement(given);
+      in_c.miss(given);
+    } else if (random.index(2000) == 0) {
+      const V at = random.index(4) == 0 ? anything<V>(random) : static_cast<V>(plant.output());
+      const V under = random.index(4) == 0 ? anything<V>(random) : static_cast<V>(u);
+      EXPECT_EQ(static_cast<unsigned>(controller.start(at, under)), in_c.start(at, under)) << k;
+      controller.update(y, given);
+      in_c.update(y, given);
+    } else {
+      const V mine = controller.update(y, given);
+      const V its = in_c.update(y, given);
+      EXPECT_TRUE(equal_bits(mine, its)) << "sample " << k << ": " << mine << ", C " << its;
+    }
+    u = static_cast<double>(controller.output());
+    const unsigned told = in_c.probe();
+    const auto status = static_cast<unsigned>(controller.status());
+    EXPECT_EQ(told % 256, status) << "sample " << k;
+    EXPECT_EQ(told / 256 % 256, static_cast<unsigned>(controller.mode())) << "sample " << k;
+    EXPECT_EQ(told / 65536, static_cast<unsigned>(controller.observer().missed()))
+        << "sample " << k;
+    compare_estimates(controller.observer(), in_c, k);
+    seen.odd += status != 0;
+    seen.limited += !equal_bits(controller.output(), controller.requested());
+    seen.safe += controller.mode() == LoopMode::safe;
+    ++seen.of_status[status % 64];
+    if (testing::Test::HasFailure()) return seen;
+  }
+  return seen;
+}
+
+template <class C>
+void equals_controller(int samples, std::uint64_t seed,
+                       const std::string& compiler = "gcc -std=c99", int divider = 1) {
+  SCOPED_TRACE(testing::internal::GetTypeName<C>());
+  using V = typename C::scalar_type;
+  const Folder folder;
+  for (const double input_gain : {8.0, -8.0}) {
+    auto settings = config<C>(input_gain);
+    settings.measurement_divider = divider;
+    const C controller = C::make(settings).value();
+    const CCode code = to_c(controller, {.name = "loop", .comment = "a test"}).value();
+    InC<V> in_c(folder, code, true, compiler);
+    ASSERT_TRUE(in_c.loaded());
+    EXPECT_EQ(in_c.self_test(V(0)), 0);
+    const Seen seen = compare(controller, in_c, input_gain, samples, seed++);
+    EXPECT_GT(seen.odd, samples / 100);
+    EXPECT_GT(seen.limited, samples / 10);
+    EXPECT_GT(seen.safe, samples / 500);
+    for (const StepStatus status :
+         {StepStatus::measurement_rejected, StepStatus::gap_bridged, StepStatus::restarted}) {
+      EXPECT_GT(seen.of_status[static_cast<int>(status)], samples / 2000);
+    }
+  }
+}
+
+template <class Observer>
+void equals(int samples, std::uint64_t seed, const std::string& compiler = "gcc -std=c99") {
+  equals_controller<Adrc<Observer>>(samples, seed, compiler);
+}
+
+/// An observer alone, with its halves, resets and gaps.
+template <class Observer>
+void observes(int samples, std::uint64_t seed) {
+  SCOPED_TRACE(testing::internal::GetTypeName<Observer>());
+  using V = typename Observer::scalar_type;
+  const Folder folder;
+  for (const double input_gain : {8.0, -8.0}) {
+    auto observer = Observer::make(observer_config<Observer>(input_gain)).value();
+    const CCode code = to_c(observer, {.name = "loop"}).value();
+    InC<V> in_c(folder, code, false);
+    ASSERT_TRUE(in_c.loaded());
+    EXPECT_EQ(in_c.self_test(V(0)), 0);
+    Random random(seed++);
+    const auto signal = [&] {
+      return random.index(20) == 0 ? anything<V>(random) : static_cast<V>(random.uniform(-1, 1));
+    };
+    int odd = 0;
+    for (int k = 0; k < samples && !testing::Test::HasFailure(); ++k) {
+      const V y = signal();
+      const V u = signal();
+      const int what = random.index(1000);
+      unsigned mine = 0;
+      unsigned its = 0;
+      if (what < 930) {
+        mine = static_cast<unsigned>(observer.update(y, u));
+        its = in_c.observe(y, u);
+      } else if (what < 970) {
+        for (int i = random.index(10); i >= 0; --i) {
+          mine = static_cast<unsigned>(observer.predict(u));
+          its = in_c.predict(u);
+        }
+      } else if (what < 995) {
+        mine = static_cast<unsigned>(observer.correct(y));
+        its = in_c.correct(y);
+      } else {
+        mine = static_cast<unsigned>(observer.reset(y));
+        its = in_c.reset(y);
+      }
+      EXPECT_EQ(mine, its) << "sample " << k << ", call " << what;
+      EXPECT_EQ(in_c.probe() / 65536, static_cast<unsigned>(observer.missed())) << "sample " << k;
+      compare_estimates(observer, in_c, k);
+      odd += mine != 0;
+    }
+    EXPECT_GT(odd, samples / 20);
+  }
+}
+
+#endif  // ESOKIT_LOADS_C
+
+}  // namespace written
+}  // namespace esokit_test
