@@ -1,4 +1,4 @@
-// Every type gives the bits that it gave when issue 45 began, whatever comes: NaN, infinity, 1e308,
+// Every type gives the bits of the commit in CMakeLists.txt, whatever comes: NaN, infinity, 1e308,
 // gaps, resets, retunes, guards switched. ESOKIT_ORACLE_SEED and ESOKIT_ORACLE_SAMPLES choose other
 // numbers than those of the test.
 #include <gtest/gtest.h>

@@ -191,11 +191,10 @@ class DisturbanceCompensator {
   /// @{
   ESOKIT_INLINE bool advance() noexcept { return loop_.advance(); }
   ESOKIT_INLINE bool step(S& u, const S& y, const S& base_output) noexcept {
-    return loop_.step_all(
-        u, y, [&]() ESOKIT_INLINE_LAMBDA { return base_output + unbounded_compensation(); });
+    return loop_.step_all(u, y, [&]() ESOKIT_INLINE_LAMBDA { return command(base_output); });
   }
   S update_advanced(const S& y, const S& base_output) noexcept {
-    return loop_.step_advanced(y, [&] { return base_output + unbounded_compensation(); });
+    return loop_.step_advanced(y, [&] { return command(base_output); });
   }
   /// @}
 
