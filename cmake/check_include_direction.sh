@@ -103,7 +103,7 @@ check_weight() {  # check_weight INCLUDE_DIR: by the compiler, which has no Eige
 }
 
 # Of what GCC and Clang have beyond the language, nothing is left where neither is: the preprocessor
-# knows no compiler here. [[gnu::..]] is an attribute that others skip, and packs are for vector types.
+# knows no compiler here. [[gnu::..]] is an attribute that others skip, and packs (core/packed.hpp puts objects into them) are for vector types.
 check_extensions() {  # check_extensions INCLUDE_DIR
   local include_dir=$1 header found status=0
   while IFS= read -r header; do
@@ -114,8 +114,8 @@ check_extensions() {  # check_extensions INCLUDE_DIR
       status=1
     fi
   done < <(cd "$include_dir" && find esokit/{core,math,model,gain,observer,adapter,control} -name '*.hpp' | LC_ALL=C sort)
-  if grep -rlE 'include <esokit/core/pack.hpp>' "$include_dir"/esokit/{core,math,model,gain,observer,adapter,control}; then
-    echo "what runs in a controller may not include core/pack.hpp"
+  if grep -rlE --exclude=packed.hpp 'include <esokit/core/pack(ed)?.hpp>' "$include_dir"/esokit/{core,math,model,gain,observer,adapter,control}; then
+    echo "what runs in a controller may not include core/pack.hpp or core/packed.hpp"
     status=1
   fi
   return "$status"
@@ -152,14 +152,14 @@ self_test() {  # the check must be able to fail
   done
   echo '#include <esokit/core/language.hpp>' >"$folder/esokit/model/bad.hpp"
   for line in 'inline int f(int x) { return __builtin_abs(x); }' 'typedef float V __attribute__((vector_size(16)));' \
-    '#include <esokit/core/pack.hpp>'; do
+    '#include <esokit/core/pack.hpp>' '#include <esokit/core/packed.hpp>'; do
     echo "$line" >"$folder/esokit/core/bad.hpp"
     if check_extensions "$folder" >/dev/null; then
       echo "self-test: not refused as an extension: $line"
       return 1
     fi
     printf '#if defined(__GNUC__)\n%s\n#endif\n' "$line" >"$folder/esokit/core/bad.hpp"
-    if [[ $line != *pack.hpp* ]] && ! check_extensions "$folder"; then
+    if [[ $line != *pack*.hpp* ]] && ! check_extensions "$folder"; then
       echo "self-test: refused although it is guarded: $line"
       return 1
     fi

@@ -234,9 +234,10 @@ grep -q 'force += .* \* std::tanh(rate / ' rubbing.cpp &&
   "$compiler" -std=c++20 -I"$root/include" -Wall -Wextra -Wconversion -Werror rubbing.cpp -o rubbing &&
   [[ $(./rubbing) == 'self-check: ok' ]]
 verdict $? "rubbing.csv: no friction in the code, or its self-check fails: $(cat rubbing.cpp)"
-# A load that is measured: what is pasted measures it, too, and holds one that is lost.
+# A load that is measured, a fifth of a unit each: what is pasted measures it, too, and holds one that
+# is lost.
 servo push=40 >rows.txt
-{ echo t,y,u,r,load; awk '{ print $1 "," $2 "," $3 "," $4 "," (NR % 50 == 9 ? "" : $5) }' rows.txt; } >pushed.csv
+{ echo t,y,u,r,load; awk '{ print $1 "," $2 "," $3 "," $4 "," (NR % 50 == 9 ? "" : $5 / 5) }' rows.txt; } >pushed.csv
 healthy pushed.csv --measured load
 [[ $said == *'Measuring load saves'* ]] && grep -q '80 *<.*put between its neighbours' "$page" &&
   grep -q 'load: dead time' "$page"
@@ -253,11 +254,11 @@ double largest(bool measures, bool loses) {
   std::mt19937_64 bits(1);
   std::normal_distribution<double> normal;
   double x = 0, v = 0, old1 = -1.5, old2 = -1.5, w = 2, w1 = 2, w2 = 2, w3 = 2, late = 2, most = 0;
-  if (measures) loop->measured(w);
+  if (measures) loop->measured(w / 5);
   loop->start(0, -1.7);
   for (int k = 0; k < 5000; ++k) {
     w = k < 2000 || k >= 3500 ? 2 : 4;
-    if (measures && !(loses && k >= 2500 && k < 3000)) loop->measured(w);
+    if (measures && !(loses && k >= 2500 && k < 3000)) loop->measured(w / 5);
     if (loses && k == 2999 && loop->feed1.lost != 499) return 1e9;
     const double u = loop->update(x + 1e-3 * normal(bits), 0);
     if (k > 1500) most = std::max(most, std::abs(x));

@@ -384,6 +384,21 @@ class Filler {
       }
       number("rest", config.rest, {0, 10 * T});
       number("travel", config.travel, {1, 10, true});
+      if (tape_.once_in(2, "watched")) {
+        number("response", config.response, {0.01, 1, true});
+        number("response_time", config.response_time, {2 * T, 90 * T, true});
+        if (tape_.once_in(2, "timed")) number("fastest", config.fastest, {0.01, 1 / T, true});
+      }
+      if (tape_.once_in(2, "limits of y")) {
+        number("lowest_output", config.lowest_output, {-10, -2});
+        number("highest_output", config.highest_output, {2, 10});
+        if (order_ == 1 && relay && tape_.once_in(2, "approach")) {
+          config.approach.emplace();
+          number("approach.input", config.approach->input, {0.6, 2});
+          number("approach.output", config.approach->output, {-1, 1});
+        }
+      }
+      number("safe_input", config.safe_input, {-0.5, 0.5});
       number("time_limit", config.time_limit, {100 * T, 5000 * T, true});
       number("hand_over", config.hand_over, {0, 20 * T});
       config.cycles = tape_.integer(6, 13, "cycles");

@@ -857,11 +857,17 @@ class Driver final : public Game {
     const S low = config_.input - config_.amplitude, high = config_.input + config_.amplitude;
     const bool at_once = !(config_.limits.rate < esokit::Limits<S>{}.rate);
     if (!is_finite(u)) fail("u is not finite");
-    if (at_once && !same(u, config_.input) && !same(u, low) && !same(u, high))
+    const bool aborted = object_->phase() == esokit::ExperimentPhase::aborted;
+    const S end = aborted ? config_.safe_input.value_or(config_.input) : config_.input;
+    if (config_.approach) {
+      if (u < config_.limits.lower || u > config_.limits.upper) fail("u is beyond its limits");
+    } else if (at_once && !same(u, config_.input) && !same(u, low) && !same(u, high) &&
+               !same(u, end)) {
       fail("u is another one");
+    }
     if (!same(u, object_->output())) fail("output() is not what was put out");
-    if (at_once && object_->finished() && !same(u, config_.input))
-      fail("finished, and not at rest");
+    if (at_once && object_->finished() && !same(u, end)) fail("finished, and not at rest");
+    if (aborted != (object_->reason() != esokit::AbortReason::none)) fail("no reason");
     const auto found = quietly([&] { return object_->result(); });
     if (!found) {
       explained(found.error().field, found.error().rule);

@@ -32,10 +32,11 @@ namespace target_c_code_test {
 static constexpr ModelParts follows{.order = 1, .resonators = 1, .follows_speed = true};
 using detail::Writable;
 static_assert(Writable<LinearEso<2>> && Writable<CascadeEso<2, 3>> &&
-              Writable<ModelEso<everything>> && Writable<DelayedInput<LinearEso<2>, 4>> &&
+              Writable<ModelEso<everything>> &&
+              Writable<DelayedInput<OutlierGate<LinearEso<2>>, 4>> &&
               Writable<Adrc<LinearEso<2>, ErrorBased>>);
 static_assert(!Writable<AlgebraicEso<2>> && !Writable<ExtendedStateFilter<2>> &&
-              !Writable<ModelEso<follows>> && !Writable<OutlierGate<LinearEso<2>>> &&
+              !Writable<ModelEso<follows>> && !Writable<OutlierGate<AlgebraicEso<2>>> &&
               !Writable<WrappedOutput<LinearEso<2>>> && !Writable<Guarded<LinearEso<2>>> &&
               !Writable<VariableTime<LinearEso<2>>> && !Writable<PredictiveAdrc<LinearEso<2>>> &&
               !Writable<MimoAdrc<LinearEso<1>, LinearEso<1>>> &&

@@ -1,6 +1,7 @@
 // The C of models, of gains that depend on the innovation, of delays and of other controllers
 // equals them bit for bit, as in c_code_test.cpp.
 #include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/gain/pole_set.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
@@ -11,7 +12,7 @@
 namespace esokit_test {
 namespace target_c_kinds_test {
 
-#ifdef ESOKIT_LOADS_C
+#if defined(ESOKIT_LOADS_C) && !defined(ESOKIT_ONE_TYPE)
 
 using namespace esokit;
 
@@ -38,6 +39,10 @@ TEST(CKinds, OfDelaysAndOtherForms) {
   using Delayed = DelayedInput<LinearEso<2, float>, 6>;
   equals<Delayed>(30000, 241);
   observes<DelayedInput<CascadeEso<1, 2, double>, 3>>(30000, 251);
+  equals<OutlierGate<LinearEso<2, float>>>(30000, 311);
+  observes<OutlierGate<DelayedInput<ModelEso<everything, double>, 3>>>(30000, 321);
+  equals_controller<Adrc<DelayedInput<OutlierGate<LinearEso<1, double>>, 3>, ErrorBased>>(30000,
+                                                                                          331);
   equals_controller<Adrc<LinearEso<2, double>, ErrorBased>>(30000, 261);
   equals_controller<Adrc<Delayed, ErrorBased>>(30000, 271);
   equals_controller<DisturbanceCompensator<LinearEso<1, float>>>(30000, 281);
@@ -45,7 +50,7 @@ TEST(CKinds, OfDelaysAndOtherForms) {
   equals_controller<Adrc<DelayedInput<ModelEso<lag, double>, 3>>>(30000, 301, "gcc -std=c99", 2);
 }
 
-#endif  // ESOKIT_LOADS_C
+#endif
 
 }  // namespace target_c_kinds_test
 }  // namespace esokit_test

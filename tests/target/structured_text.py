@@ -259,7 +259,7 @@ class Block:
             condition, if_false, if_true = arguments
             return lambda: if_true() if condition() else if_false()
         known = {"ABS": abs, "SQRT": lambda x: math.sqrt(x) if x >= 0.0 else math.nan,
-                 "EXP": math.exp, "EXPT": math.pow}
+                 "EXP": math.exp, "EXPT": math.pow, "UINT_TO_REAL": float, "UINT_TO_LREAL": float}
         if name not in known:
             sys.exit(f"{name} is no function of the subset")
 

@@ -3,6 +3,7 @@
 // samples, gaps, reported u and starts.
 #include <cstdio>
 #include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
@@ -145,6 +146,7 @@ TEST(StructuredText, OfControllers) {
   controls<Adrc<LinearEso<3, double>>>(3);  // it softens
   controls<Adrc<LinearEso<1, float>, ErrorBased>>(4, 3);
   controls<Adrc<DelayedInput<ModelEso<lag, float>, 4>>>(5);
+  controls<Adrc<OutlierGate<LinearEso<2, float>>>>(10);
   controls<DisturbanceCompensator<AdjustableBandwidthEso<1, double>>>(6);
 #endif
 }
@@ -155,6 +157,7 @@ TEST(StructuredText, OfObservers) {
 #ifndef ESOKIT_ONE_TYPE
   observes_in_text<DelayedInput<LinearEso<1, float>, 4>>(8);
   observes_in_text<AdjustableBandwidthEso<1, float>>(9);
+  observes_in_text<OutlierGate<LinearEso<1, double>>>(11);
 #endif
 }
 

@@ -79,7 +79,7 @@ auto machine(const Pasting& p, const TuneModel& model, const Acting* measured) {
 constexpr int w_moves = 30, w_lost = 60, w_back = 65;
 double checked_w(const Feed& feed, int k) {
   if (k >= w_lost && k < w_back) return std::nan("");
-  return k < w_moves || k >= w_back ? feed.rest : feed.rest + feed.swing;
+  return k < w_moves || k >= w_back ? feed.rest : printed(feed.rest + feed.swing);
 }
 
 /// What the code watches, from the log and from what was played.
@@ -873,7 +873,7 @@ std::string pasted_code(const Pasting& p, const Tuning& tuning, const TunedDesig
   for (const Feed& feed : p.feeds) {
     given += (given.empty() ? "" : ", ") + std::string("k < ") + std::to_string(w_moves) +
              " || k >= " + std::to_string(w_back) + " ? " + source(feed.rest) + " : " +
-             source(feed.rest + feed.swing);
+             source(checked_w(feed, w_moves));
   }
   if (!given.empty()) {
     given = "    if (k < " + std::to_string(w_lost) + " || k >= " + std::to_string(w_back) +

@@ -83,6 +83,7 @@ class OutlierGate
   [[nodiscard]] bool open() const noexcept { return open_; }
 
  private:
+  friend struct detail::RecordAccess;
   OutlierGate(const Observer& observer, const OutlierGateConfig<Observer>& config) noexcept
       : Base(observer),
         threshold_(config.threshold),

@@ -65,6 +65,16 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
     members += "  " + real + " line[" + length + "]; /* u, not yet acting */\n  uint16_t newest;\n";
     init += "  o->newest = " + std::to_string(design.line.size() - 1) + "u;\n";
   }
+  const GateNumbers& gate = design.gate;
+  const bool gated = gate.threshold > 0;
+  const bool delayed = !design.line.empty();
+  if (gated) {
+    members += "  " + real + " gate_mean; /* of abs(y - " + design.first_state + ") */\n" +
+               "  uint16_t gate_count;\n  uint8_t gate_open;\n";
+    init += "  o->gate_mean = " + writer.number(gate.mean) +
+            ";\n  o->gate_count = " + std::to_string(gate.count) +
+            "u;\n  o->gate_open = " + (gate.open ? "1u" : "0u") + ";\n";
+  }
   std::string table;
   std::string call_gains;
   for (const auto& gains : design.gap_gains) {
@@ -104,7 +114,20 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
       {"$GAP_GAINS", table},
       {"$SIZE", count},
       {"$INIT", init},
-      {"$top", design.line.empty() ? "base" : "delayed"},
+      {"$GATE_FLAG", gated ? "#define $NAME_OUTLIER_REJECTED 64u /* y was too far from what "
+                             "was expected */\n"
+                           : ""},
+      {"$GATE_OPEN", gated ? "    gate_set(o, true);\n" : ""},
+      {"$GATE_FACTOR", writer.number(gate.running_factor)},
+      {"$GATE_THRESHOLD", writer.number(gate.threshold)},
+      {"$GATE_MOST", std::to_string(gate.most_in_a_row)},
+      {"$SHARE", writer.number(1.0 / 64)},
+      {"$inner", gated ? "gated" : "base"},
+      {"correct_$top", gated ? "correct_gated" : "correct_base"},
+      {"predict_$top", delayed ? "predict_delayed" : "predict_base"},
+      {"update_$top", delayed ? "update_delayed"
+                      : gated ? "update_gated"
+                              : "update_base"},
       {"$ZERO", writer.number(0)},
       {"$ONE", writer.number(1)},
       {"$LENGTH", length},
@@ -131,39 +154,44 @@ inline Words c_loop_words(const RecordedDesign& design, const ListWriter& writer
   };
   const std::string of_y = only("!is_finite(y)", "return $NAME_STATE_REJECTED");
   const std::string of_u = only("!is_finite(u)", "return $NAME_INPUT_REJECTED");
-  return {{"$LIMITS",
-           ", u within " + writer.number(design.lower) + " .. " + writer.number(design.upper)},
-          {"$REFERENCE",
-           design.compensates ? "the u0 of the controller that is helped" : "the reference"},
-          {"$PHASE_MEMBER", divides ? "  uint16_t phase; /* a measurement is due at 0 */\n" : ""},
-          {"$PHASE_INIT", divides ? "  o->phase = 0u;\n" : ""},
-          {"$PHASE_NEXT", divides ? "  o->phase = (uint16_t)(o->phase + 1u);\n" +
-                                        only("o->phase >= $DIVIDERu", "o->phase = 0u")
-                                  : ""},
-          {"$PHASE_BEFORE",
-           divides ? "  const bool planned = o->gap == $DUEu;\n" +
-                         only("o->phase != 0u", "return $name_update_without_measurement(o, r)") +
-                         "  o->phase = 1u;\n"
-                   : ""},
-          {"$PHASE_AFTER",
-           divides ? only("planned && (status == $NAME_GAP_BRIDGED)", "status = 0u") : ""},
-          {"$DUE", std::to_string(loop.divider - 1)},
-          {"$MEASURED", design.error_based ? "r - y" : "y"},
-          {"$AT_START", design.error_based ? "$ZERO" : "y"},
-          {"$START_CHECKS", design.compensates ? of_u + of_y : of_y + of_u},
-          {"$FILL", design.line.empty() ? "" : "  delayed_fill(o, u);\n"},
-          {"$SAFE_INPUT", loop.has_safe_input ? writer.number(loop.safe_input) : "o->u_last"},
-          {"$HOLD_INPUT", writer.number(loop.hold_input)},
-          {"$HARDEN", design.softens ? "  (void)harden(o);\n" : ""},
-          {"$MISSING_LIMIT", std::to_string(loop.missing_limit)},
-          {"$LEAVE_SAFE", loop.stays_safe ? ""
-                                          : only("(o->mode == $NAME_SAFE) && (o->gap < $DIVIDERu)",
-                                                 "o->mode = $NAME_RUNNING")},
-          {"$HOLD_LEFT", std::to_string(loop.hold_left)},
-          {"$MODE", loop.hold_left > 0 ? "$NAME_START_HOLD" : "$NAME_RUNNING"},
-          {"$DIVIDER", divider},
-          {"$COLUMNS", "y, r, u"},
-          {"$RESULT", "const $real result = $name_update(&o, samples[i][0], samples[i][1]);"}};
+  return {
+      {"$LIMITS",
+       ", u within " + writer.number(design.lower) + " .. " + writer.number(design.upper)},
+      {"$REFERENCE",
+       design.compensates ? "the u0 of the controller that is helped" : "the reference"},
+      {"$PHASE_MEMBER", divides ? "  uint16_t phase; /* a measurement is due at 0 */\n" : ""},
+      {"$PHASE_INIT", divides ? "  o->phase = 0u;\n" : ""},
+      {"$PHASE_NEXT", divides ? "  o->phase = (uint16_t)(o->phase + 1u);\n" +
+                                    only("o->phase >= $DIVIDERu", "o->phase = 0u")
+                              : ""},
+      {"$PHASE_BEFORE",
+       divides ? "  const bool planned = o->gap == $DUEu;\n" +
+                     only("o->phase != 0u", "return $name_update_without_measurement(o, r)") +
+                     "  o->phase = 1u;\n"
+               : ""},
+      {"$PHASE_AFTER",
+       divides ? only("planned && (status == $NAME_GAP_BRIDGED)", "status = 0u") : ""},
+      {"$DUE", std::to_string(loop.divider - 1)},
+      {"$REST", design.gate.threshold > 0
+                    ? "if (rest_at(o, $MEASURED, o->u_applied)) {\n      gate_set(o, true);\n    }"
+                    : "(void)rest_at(o, $MEASURED, o->u_applied);"},
+      {"$MEASURED", design.error_based ? "r - y" : "y"},
+      {"$AT_START", design.error_based ? "$ZERO" : "y"},
+      {"$START_CHECKS", design.compensates ? of_u + of_y : of_y + of_u},
+      {"$FILL", design.line.empty() ? "" : "  fill_delayed(o, u);\n"},
+      {"$GATE_START", design.gate.threshold > 0 ? "  gate_set(o, true);\n" : ""},
+      {"$SAFE_INPUT", loop.has_safe_input ? writer.number(loop.safe_input) : "o->u_last"},
+      {"$HOLD_INPUT", writer.number(loop.hold_input)},
+      {"$HARDEN", design.softens ? "  (void)harden(o);\n" : ""},
+      {"$MISSING_LIMIT", std::to_string(loop.missing_limit)},
+      {"$LEAVE_SAFE", loop.stays_safe ? ""
+                                      : only("(o->mode == $NAME_SAFE) && (o->gap < $DIVIDERu)",
+                                             "o->mode = $NAME_RUNNING")},
+      {"$HOLD_LEFT", std::to_string(loop.hold_left)},
+      {"$MODE", loop.hold_left > 0 ? "$NAME_START_HOLD" : "$NAME_RUNNING"},
+      {"$DIVIDER", divider},
+      {"$COLUMNS", "y, r, u"},
+      {"$RESULT", "const $real result = $name_update(&o, samples[i][0], samples[i][1]);"}};
 }
 
 /// What the texts need of an observer.
@@ -184,6 +212,7 @@ inline CCode c_code(const RecordedDesign& design) {
   writer.live = design.live;
   std::string lists;
   for (std::size_t i = 0; i < design.names.size(); ++i) {
+    if (design.gate.threshold > 0 && design.names[i].name == "observe") continue;
     lists += c_function(writer, design.options.name, design.names[i], design.calls[i]);
   }
   const bool controls = design.is_controller;
@@ -192,8 +221,9 @@ inline CCode c_code(const RecordedDesign& design) {
   words.insert(words.end(), common.begin(), common.end());
   const auto text = [&](const char* from) { return filled(from, words); };
   std::string layer;
+  layer += text(design.gate.threshold > 0 ? c_source_gate : c_source_base_update);
   if (!design.line.empty()) {
-    layer = text(c_source_delay);
+    layer += text(c_source_delay);
     if (controls) layer += text(c_source_delay_fill);
   }
   return {text(c_header_head) + text(controls ? c_header_controller : c_header_observer) +
@@ -219,8 +249,8 @@ inline CCode c_code(const RecordedDesign& design) {
 ///
 /// Written are LinearEso, also with a set of poles, HalfGainEso, ReducedOrderEso, CascadeEso,
 /// AdjustableBandwidthEso, NonlinearEso, ModelEso, PlantEso and their cascades (not with
-/// `follows_speed`), these in DelayedInput, and Adrc of both forms and DisturbanceCompensator
-/// around them. Others do not compile.
+/// `follows_speed`), these in DelayedInput and OutlierGate, and Adrc of both forms and
+/// DisturbanceCompensator around them. Others do not compile.
 /// @param object as `make` returned it: its state is that of `init`
 /// @return error for a name that is no identifier, a comment that would end the one it stands in, a
 ///         number of samples of the self-test out of range, or a gain law of your own whose gain
@@ -239,8 +269,8 @@ void to_c(const Other&, const CodeOptions& = {}) {
   static_assert(detail::Writable<Other>,
                 "esokit: to_c writes LinearEso, HalfGainEso, ReducedOrderEso, CascadeEso, "
                 "AdjustableBandwidthEso, NonlinearEso, ModelEso and PlantEso, these in "
-                "DelayedInput, and Adrc and DisturbanceCompensator around them; no other gains, "
-                "adapters or controllers yet");
+                "DelayedInput and OutlierGate, and Adrc and DisturbanceCompensator around them; no "
+                "other gains, adapters or controllers yet");
 }
 
 }  // namespace esokit

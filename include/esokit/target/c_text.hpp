@@ -29,7 +29,7 @@ extern "C" {
 #define $NAME_GAP_BRIDGED 8u /* samples were missing before this one */
 #define $NAME_RESTARTED 16u /* too many samples were missing */
 #define $NAME_STATE_REJECTED 32u /* start: y is not finite or too large */
-
+$GATE_FLAG
 )";
 
 /// The header of a controller.
@@ -130,7 +130,7 @@ static bool restart($name_state *o, $real y)
   return good;
 }
 
-static unsigned base_predict($name_state *o, $real given)
+static unsigned predict_base($name_state *o, $real given)
 {
   unsigned status = 0u;
   const bool good = predict_step(o, given);
@@ -153,7 +153,7 @@ static unsigned base_predict($name_state *o, $real given)
   return status;
 }
 
-static unsigned base_correct($name_state *o, $real y)
+static unsigned correct_base($name_state *o, $real y)
 {
   static const $real gains[$ROWS][$SIZE] = { /* after 1, 2, .. samples */
 $GAP_GAINS  };
@@ -183,16 +183,6 @@ $GAP_GAINS  };
   return status;
 }
 
-static unsigned base_update($name_state *o, $real y, $real u)
-{
-  unsigned status;
-  if ((o->gap == 0u) && observe(o, y, u)) {
-    return 0u;
-  }
-  status = base_predict(o, u);
-  return status | base_correct(o, y);
-}
-
 $real $name_estimate(const $name_state *o, unsigned row)
 {
   $real u = $ZERO;
@@ -205,8 +195,83 @@ $ROWS_OF_ESTIMATE  default:
 
 )";
 
+/// A sample without a gate.
+inline constexpr const char* c_source_base_update =
+    R"(static unsigned update_base($name_state *o, $real y, $real u)
+{
+  unsigned status;
+  if ((o->gap == 0u) && observe(o, y, u)) {
+    return 0u;
+  }
+  status = predict_base(o, u);
+  return status | correct_base(o, y);
+}
+
+)";
+
+/// OutlierGate around it.
+inline constexpr const char* c_source_gate = R"(static void gate_set($name_state *o, bool open)
+{
+  o->gate_open = open ? 1u : 0u;
+  o->gate_count = 0u;
+}
+
+/* A y that is not finite, or after too long a gap, is left to the observer. */
+static bool gate_lets_in($name_state *o, $real y)
+{
+  const $real running = $GATE_FACTOR * o->gate_mean;
+  const $real limit = (running > $GATE_THRESHOLD) ? running : $GATE_THRESHOLD;
+  const $real innovation = y - o->$FIRST;
+  const $real distance = $fabs(innovation);
+  $real most = limit;
+  bool fits;
+  if (!is_finite(innovation)) {
+    return true;
+  }
+  if (o->gap > $ROWSu) {
+    gate_set(o, true);
+    return true;
+  }
+  if (o->gap > 1u) {
+    most = limit * ($real)o->gap;
+  }
+  fits = distance <= most;
+  if (!fits && (o->gate_open == 0u) && (o->gate_count < $GATE_MOSTu)) {
+    o->gate_count = (uint16_t)(o->gate_count + 1u);
+    return false;
+  }
+  o->gate_mean =
+    o->gate_mean + ((((distance < limit) ? distance : limit) - o->gate_mean) * $SHARE);
+  if ((o->gate_open != 0u) && fits) {
+    o->gate_count = (uint16_t)(o->gate_count + 1u);
+    if (o->gate_count >= $GATE_MOSTu) {
+      gate_set(o, false);
+    }
+  } else {
+    gate_set(o, !fits);
+  }
+  return true;
+}
+
+static unsigned correct_gated($name_state *o, $real y)
+{
+  unsigned status = $NAME_OUTLIER_REJECTED;
+  if (gate_lets_in(o, y)) {
+    status = correct_base(o, y);
+  }
+  return status;
+}
+
+static unsigned update_gated($name_state *o, $real y, $real u)
+{
+  const unsigned status = predict_base(o, u);
+  return status | correct_gated(o, y);
+}
+
+)";
+
 /// DelayedInput around it.
-inline constexpr const char* c_source_delay = R"(static uint16_t delayed_after(uint16_t place)
+inline constexpr const char* c_source_delay = R"(static uint16_t after_delayed(uint16_t place)
 {
   uint16_t next = 0u;
   if (place < $NEWESTu) {
@@ -216,35 +281,35 @@ inline constexpr const char* c_source_delay = R"(static uint16_t delayed_after(u
 }
 
 /* The u that acts now, for one that acts later. */
-static unsigned delayed_push($name_state *o, $real *u)
+static unsigned push_delayed($name_state *o, $real *u)
 {
   const $real last = o->line[o->newest];
   const bool good = is_finite(*u);
-  o->newest = delayed_after(o->newest);
+  o->newest = after_delayed(o->newest);
   o->line[o->newest] = good ? *u : last;
-  *u = o->line[delayed_after(o->newest)];
+  *u = o->line[after_delayed(o->newest)];
   return good ? 0u : $NAME_INPUT_REJECTED;
 }
 
-static unsigned delayed_predict($name_state *o, $real u)
+static unsigned predict_delayed($name_state *o, $real u)
 {
   $real acting = u;
-  const unsigned status = delayed_push(o, &acting);
-  return status | base_predict(o, acting);
+  const unsigned status = push_delayed(o, &acting);
+  return status | predict_base(o, acting);
 }
 
-static unsigned delayed_update($name_state *o, $real y, $real u)
+static unsigned update_delayed($name_state *o, $real y, $real u)
 {
   $real acting = u;
-  const unsigned status = delayed_push(o, &acting);
-  return status | base_update(o, y, acting);
+  const unsigned status = push_delayed(o, &acting);
+  return status | update_$inner(o, y, acting);
 }
 
 )";
 
 /// Its start.
 inline constexpr const char* c_source_delay_fill =
-    R"(static void delayed_fill($name_state *o, $real u)
+    R"(static void fill_delayed($name_state *o, $real u)
 {
   unsigned i;
   for (i = 0u; i < $LENGTHu; ++i) {
@@ -262,22 +327,26 @@ $INIT  o->gap = 0u;
 
 unsigned $name_reset($name_state *o, $real y)
 {
-  return restart(o, y) ? 0u : $NAME_STATE_REJECTED;
+  unsigned status = $NAME_STATE_REJECTED;
+  if (restart(o, y)) {
+$GATE_OPEN    status = 0u;
+  }
+  return status;
 }
 
 unsigned $name_predict($name_state *o, $real u)
 {
-  return $top_predict(o, u);
+  return predict_$top(o, u);
 }
 
 unsigned $name_correct($name_state *o, $real y)
 {
-  return base_correct(o, y);
+  return correct_$top(o, y);
 }
 
 unsigned $name_update($name_state *o, $real y, $real u)
 {
-  return $top_update(o, y, u);
+  return update_$top(o, y, u);
 }
 
 )";
@@ -321,13 +390,13 @@ unsigned $name_start($name_state *o, $real y, $real u)
 {
   $name_state before;
 $START_CHECKS  before = *o;
-$FILL  (void)$top_predict(o, u); /* keeps it as applied */
+$FILL  (void)predict_$top(o, u); /* keeps it as applied */
   if (!rest_at(o, $AT_START, u)) {
     *o = before;
     return $NAME_STATE_REJECTED;
   }
   (void)applied(o, u);
-$HARDEN  o->gap = 0u;
+$HARDEN$GATE_START  o->gap = 0u;
   o->mode = $NAME_RUNNING;
   return 0u;
 }
@@ -335,9 +404,9 @@ $HARDEN  o->gap = 0u;
 $real $name_update($name_state *o, $real y, $real r)
 {
   unsigned status;
-$PHASE_BEFORE  status = $top_update(o, $MEASURED, o->u_last);
+$PHASE_BEFORE  status = update_$top(o, $MEASURED, o->u_last);
   if ((status & $NAME_RESTARTED) != 0u) {
-    (void)rest_at(o, $MEASURED, o->u_applied);
+    $REST
   }
 $PHASE_AFTER  o->status = (uint8_t)status;
   judge_missing(o);
@@ -346,7 +415,7 @@ $PHASE_AFTER  o->status = (uint8_t)status;
 
 $real $name_update_without_measurement($name_state *o, $real r)
 {
-$PHASE_NEXT  o->status = (uint8_t)$top_predict(o, o->u_last);
+$PHASE_NEXT  o->status = (uint8_t)predict_$top(o, o->u_last);
   judge_missing(o);
   return put_out(o, r);
 }

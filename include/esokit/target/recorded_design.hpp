@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstddef>
 #include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/core/expected.hpp>
@@ -41,6 +42,16 @@ struct LoopRules {
   double safe_input = 0;
 };
 
+/// An OutlierGate: its settings, and what it has seen.
+struct GateNumbers {
+  double threshold = 0;  ///< 0: there is no gate
+  double running_factor = 0;
+  double mean = 0;
+  unsigned most_in_a_row = 0;
+  unsigned count = 0;
+  bool open = true;
+};
+
 /// A finished design as lists and counts, without its type.
 struct RecordedDesign {
   CodeOptions options{};
@@ -59,6 +70,7 @@ struct RecordedDesign {
   std::vector<std::vector<double>> gap_gains{};  ///< all gains after 1, 2, .. samples
   bool gain_is_kept = true;    ///< without a gap they are the first row, else computed by the list
   std::vector<double> line{};  ///< of DelayedInput: the inputs, the newest last
+  GateNumbers gate{};
   LoopRules loop{};
   double lower = 0;
   double upper = 0;
@@ -138,15 +150,40 @@ struct RecordAccess {
     }
     return inputs;
   }
+  template <class O>
+  static GateNumbers gate(const O& o) noexcept {
+    return {static_cast<double>(o.threshold_),
+            static_cast<double>(o.running_factor_),
+            static_cast<double>(o.mean_),
+            o.most_in_a_row_,
+            o.count_,
+            o.open_};
+  }
 };
 
 // ---- Adapters: what they count and choose is text of each language; the lists are of what they
 // adapt.
 
+// A delay acts on u and a gate on y, so that their order does not matter.
+
 template <class Observer>
 struct IsDelayed : std::false_type {};
 template <class Observer, int Capacity>
 struct IsDelayed<DelayedInput<Observer, Capacity>> : std::true_type {};
+template <class Observer>
+struct IsGate : std::false_type {};
+template <class Observer>
+struct IsGate<OutlierGate<Observer>> : std::true_type {};
+template <class Observer>
+inline constexpr bool is_adapter = IsDelayed<Observer>::value || IsGate<Observer>::value;
+
+/// What the adapters around an observer count and choose.
+template <class Observer>
+void take_adapters(RecordedDesign& design, const Observer& observer) {
+  if constexpr (IsDelayed<Observer>::value) design.line = RecordAccess::line(observer);
+  if constexpr (IsGate<Observer>::value) design.gate = RecordAccess::gate(observer);
+  if constexpr (is_adapter<Observer>) take_adapters(design, observer.observer());
+}
 
 /// An observer without the adapter around it, and a controller around the observer without it.
 /// @{
@@ -156,7 +193,11 @@ struct WithoutAdapter {
 };
 template <class Observer, int Capacity>
 struct WithoutAdapter<DelayedInput<Observer, Capacity>> {
-  using type = Observer;
+  using type = typename WithoutAdapter<Observer>::type;
+};
+template <class Observer>
+struct WithoutAdapter<OutlierGate<Observer>> {
+  using type = typename WithoutAdapter<Observer>::type;
 };
 template <class Observer, class Form>
 struct WithoutAdapter<Adrc<Observer, Form>> {
@@ -184,8 +225,8 @@ template <class To, class From>
 void take_off_adapter(To& to, const From& from) {
   if constexpr (std::is_same_v<To, From>) {
     to = from;
-  } else if constexpr (IsDelayed<From>::value) {
-    to = from.observer();
+  } else if constexpr (is_adapter<From>) {
+    take_off_adapter(to, from.observer());
   } else if constexpr (!std::is_empty_v<To>) {
     take_off_adapters(LaneAccess::fields(to), LaneAccess::fields(from));
   }
@@ -421,9 +462,7 @@ Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
   design.compensates = !requires { controller.gains(); };
   design.lower = static_cast<double>(controller.limiter().lower());
   design.upper = static_cast<double>(controller.limiter().upper());
-  if constexpr (IsDelayed<typename Of::type>::value) {
-    design.line = Access::line(controller.observer());
-  }
+  take_adapters(design, controller.observer());
 
   maker.add("rest_at", {"y", "u"}, false, [](auto& c, const Numbers& in) {
     auto& o = c.observer();
@@ -470,7 +509,7 @@ Expected<RecordedDesign, Error<typename Observer::scalar_type>> recorded_design(
 
   if (const auto rules = Maker::checked(options); !rules) return rules.error();
   Maker maker(without_adapter(observer), options);
-  if constexpr (IsDelayed<Observer>::value) maker.design.line = RecordAccess::line(observer);
+  take_adapters(maker.design, observer);
   const auto of = [](auto& o) -> auto& { return o; };
   const auto no_name = [](const auto&, const auto*) { return std::string(); };
   if (auto ok = maker.record(of, no_name); !ok) return ok.error();

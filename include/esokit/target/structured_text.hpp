@@ -55,17 +55,57 @@ line[newest] := acting;
 IF newest + 1 >= $LENGTH THEN acting := line[0]; ELSE acting := line[newest + 1]; END_IF;
 )";
 
+/// A step in one list; not with a gate, which looks at the prediction.
+inline constexpr const char* st_quick = R"(IF NOT skips AND (gap = 0) THEN
+  $[observe measured acting]
+  done := ok;
+END_IF;
+)";
+
+/// OutlierGate around it: `rejects`.
+inline constexpr const char* st_gate = R"(gate_distance := ABS(measured - $FIRST);
+IF NOT skips AND (gate_distance <= $MOST) THEN
+  IF gap > $ROWS THEN
+    gate_open := TRUE;
+    gate_count := 0;
+  ELSE
+    gate_limit := $GATE_FACTOR * gate_mean;
+    IF NOT (gate_limit > $GATE_THRESHOLD) THEN gate_limit := $GATE_THRESHOLD; END_IF;
+    gate_most := gate_limit;
+    IF gap > 1 THEN gate_most := gate_limit * UINT_TO_$REAL(gap); END_IF;
+    gate_fits := gate_distance <= gate_most;
+    IF NOT gate_fits AND NOT gate_open AND (gate_count < $GATE_IN_A_ROW) THEN
+      gate_count := gate_count + 1;
+      rejects := TRUE;
+      status := status + 64;
+    ELSE
+      IF NOT (gate_distance < gate_limit) THEN gate_distance := gate_limit; END_IF;
+      gate_mean := gate_mean + ((gate_distance - gate_mean) * $SHARE);
+      IF gate_open AND gate_fits THEN
+        gate_count := gate_count + 1;
+        IF gate_count >= $GATE_IN_A_ROW THEN
+          gate_open := FALSE;
+          gate_count := 0;
+        END_IF;
+      ELSE
+        gate_open := NOT gate_fits;
+        gate_count := 0;
+      END_IF;
+    END_IF;
+  END_IF;
+END_IF;
+)";
+
 /// A sample of the observer: `measured`, and `acting`, the u since the last one.
 inline constexpr const char* st_observe = R"(bad_u := FALSE;
 $DELAY
 done := FALSE;
-IF NOT skips AND (gap = 0) THEN
-  $[observe measured acting]
-  done := ok;
-END_IF;
+$QUICK
 IF NOT done THEN
   $PREDICT
-  IF NOT skips THEN
+  rejects := FALSE;
+  $OUTLIERS
+  IF NOT skips AND NOT rejects THEN
     elapsed := gap;
     IF elapsed < 1 THEN elapsed := 1; END_IF;
     again := elapsed > $ROWS;
@@ -152,6 +192,7 @@ inline constexpr const char* st_controller = R"(IF starts THEN
     IF ok THEN
       $[applied u_held]
       $HARDEN
+      $GATE_OPEN
       gap := 0;
       mode := 0;
     ELSE
@@ -176,6 +217,7 @@ acting := u_last;
 $OBSERVE
 IF restarted THEN
   $[rest_at measured u_applied]
+  $GATE_OPEN
 END_IF;
 IF ($DIVIDER > 1) AND planned AND (status = 8) THEN status := 0; END_IF;
 
@@ -204,6 +246,7 @@ IF resets THEN
     $[restart_at y]
   END_IF;
   IF ok THEN gap := 0; ELSE status := 32; END_IF;
+  $GATE_OPEN
 ELSE
   skips := no_y;
   measured := y;
@@ -345,7 +388,7 @@ inline std::string structured_text(const RecordedDesign& design) {
   }
   keep("gap", "UINT := 0");
   for (const char* name : {"old_gap", "tries", "elapsed"}) keep(name, "UINT");
-  for (const char* name : {"ok", "done", "again", "skips", "restarted", "bad_u"})
+  for (const char* name : {"ok", "done", "again", "skips", "restarted", "bad_u", "rejects"})
     keep(name, "BOOL");
   for (const char* name : {"measured", "acting", "wanted"}) keep(name, real);
   const std::string gains = std::to_string(design.gap_gains[0].size());
@@ -372,6 +415,15 @@ inline std::string structured_text(const RecordedDesign& design) {
     keep("old_newest", "UINT");
     save += "old_newest := newest;\n";
     restore += "newest := old_newest;\n";
+  }
+
+  const bool gated = design.gate.threshold > 0;
+  if (gated) {
+    keep("gate_mean", real + " := " + writer.number(design.gate.mean));
+    keep("gate_count", "UINT := " + std::to_string(design.gate.count));
+    keep("gate_open", std::string("BOOL := ") + (design.gate.open ? "TRUE" : "FALSE"));
+    keep("gate_fits", "BOOL");
+    for (const char* name : {"gate_distance", "gate_limit", "gate_most"}) keep(name, real);
   }
 
   std::string by = "$[correct_by measured";
@@ -402,6 +454,10 @@ inline std::string structured_text(const RecordedDesign& design) {
 
   std::string text = design.is_controller ? st_controller : st_observer;
   StBody::place(text, "$OBSERVE", st_observe);
+  StBody::place(text, "$QUICK", gated ? "" : st_quick);
+  StBody::place(text, "$GATE_OPEN",
+                gated ? "IF ok THEN\n  gate_open := TRUE;\n  gate_count := 0;\nEND_IF;\n" : "");
+  StBody::place(text, "$OUTLIERS", gated ? st_gate : "");
   StBody::place(text, "$PREDICT", st_predict);
   StBody::place(text, "$DELAY", delayed ? st_delay : "");
   StBody::place(text, "$CORRECT", corrects);
@@ -416,6 +472,10 @@ inline std::string structured_text(const RecordedDesign& design) {
       {"$AT_START", design.error_based ? "0.0" : "y"},
       {"$MEASURED", design.error_based ? "r - y" : "y"},
       {"$REFERENCE", design.compensates ? "u0 of the controller that is helped" : "the reference"},
+      {"$GATE_FACTOR", writer.number(design.gate.running_factor)},
+      {"$GATE_THRESHOLD", writer.number(design.gate.threshold)},
+      {"$GATE_IN_A_ROW", std::to_string(design.gate.most_in_a_row)},
+      {"$SHARE", writer.number(1.0 / 64)},
       {"$ESTIMATES", estimates},
       {"$ROWS", std::to_string(design.gap_gains.size())},
       {"$FIRST", design.first_state},
