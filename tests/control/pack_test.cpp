@@ -42,7 +42,7 @@ Config with_loop(Config config, int lane, bool again) {
   constexpr double most = (std::numeric_limits<S>::max)();
   config.limits = {but_one(-40, -most), but_one(30, most), but_one(500, most)};
   config.start_hold = {static_cast<S>(0.1 * (lane % 3)), by_lane<S>(lane, 0.5, 1)};
-  config.missing.most = 3;
+  config.missing.most = 3 + lane % 3;
   return config;
 }
 
@@ -102,6 +102,7 @@ struct Divided {
   static auto config(int lane, bool again) {
     auto config = with_loop<S>(typename Controller<S>::Config{}, lane, again);
     config.measurement_divider = 2;
+    config.missing.most = 3;
     config.domain = esokit::TimeDomain::sampled;
     return config;
   }
@@ -175,7 +176,11 @@ class PairOf final : public Pair {
           return Answers(c.update(in(y), esokit::Vector<T, 2>{in(r), in(u)}));
         }
         case Call::track:
-          return Answers(c.track(in(y), in(r), in(u)));
+          if constexpr (requires { c.together(); }) {
+            return Answers(c.each([&](auto& lane, int i) { return lane.track(y[i], r[i], u[i]); }));
+          } else {
+            return Answers(c.track(in(y), in(r), in(u)));
+          }
         case Call::start:
           return Answers(c.start(in(y), in(u)));
       }
@@ -209,7 +214,7 @@ class PairOf final : public Pair {
   }
 
   [[nodiscard]] int differs() const override {
-    const Answers mine = state(packed_);
+    const Answers mine = state(packed_.together());
     for (int i = 0; i < count; ++i) {
       if (mine.differs(i, state(lanes_[static_cast<std::size_t>(i)])) != -1) return i;
     }
@@ -350,8 +355,9 @@ TEST(PackOfALimiter, LimitsEachLaneByItsOwn) {
   for (const auto& of_lane : limits) {
     lanes.push_back(esokit::Limiter<double>::make(of_lane, 0.01).value());
   }
-  esokit::Packed<esokit::Limiter<double>, 4> packed(
+  const esokit::Packed<esokit::Limiter<double>, 4> all(
       [&](int i) { return lanes[static_cast<std::size_t>(i)]; });
+  auto packed = all.together();
   Random random(9);
   for (int k = 0; k < 500; ++k) {
     S wanted(0.0);

@@ -450,7 +450,7 @@ TEST(Packed, FilterForm) {
   const auto filter = [](auto& c, const auto& x, int k) {
     if (k % 113 == 50) (void)c.start(x[1], x[3]);
     if (k % 7 == 3) c.applied(x[3]);
-    return Answers(c.update(x[0], x[1]), c.output(), c.requested(), c.status());
+    return Answers(c.update(x[0], x[1]), c.output(), c.status());
   };
   const auto state = [](const auto& c) { return Answers(c.output(), c.requested(), c.status()); };
   expect_lanes<Filter<esokit::DeltaOperator, esokit::LimitedFeedback>>(filter, state);
@@ -465,7 +465,7 @@ TEST(Packed, NonlinearFeedback) {
   for (int k = 0; k < 1500; ++k) {
     const Vector<S, 3> z{next(), next(), next()};
     const Vector<S, 2> r{next(), next()};
-    const S u = packed.control(z, r);
+    const S u = packed.together().control(z, r);
     for (int i = 0; i < lanes; ++i) {
       ASSERT_TRUE(same_bits(u[i], plain[i].control(Vector<double, 3>{z[0][i], z[1][i], z[2][i]},
                                                    Vector<double, 2>{r[0][i], r[1][i]})));

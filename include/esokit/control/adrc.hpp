@@ -220,19 +220,11 @@ class Adrc {
   /// Takes over a plant at rest at y under u. @param reference r, used by the error-based form only
   /// @return ok, or input_rejected or state_rejected if u or y is not finite: nothing changes then
   Status start(S y, S u, S reference) noexcept {
-    if constexpr (PackScalar<S> && !records<S>) {
-      using Plain = detail::PlainTwin<Adrc, S>;
-      Status status{};
-      detail::for_each_lane<Plain>(
-          *this, [&](Plain& lane, int i) { status[i] = lane.start(y[i], u[i], reference[i]); });
-      return status;
-    } else {
-      // Tested one by one: under -ffast-math a compiler may replace y - y by zero.
-      if (!all(is_finite(y)) || !all(is_finite(reference))) return StepStatus::state_rejected;
-      const Status status = loop_.start(measured(y, reference), u);
-      if (status == StepStatus::ok) soft_.reset();
-      return status;
-    }
+    // Tested one by one: under -ffast-math a compiler may replace y - y by zero.
+    if (!all(is_finite(y)) || !all(is_finite(reference))) return StepStatus::state_rejected;
+    const Status status = loop_.start(measured(y, reference), u);
+    if (status == StepStatus::ok) soft_.reset();
+    return status;
   }
 
   /// New settings while running. A refused config changes nothing. A running start hold keeps its
@@ -295,13 +287,15 @@ class Adrc {
   /// s: the part of its bandwidth that the law has left, 1 unless it is softened, see Softening.
   [[nodiscard]] S softness() const noexcept { return S(1.0) / soft_.slowness(); }
   /// D: a measurement is due at every D-th update.
-  [[nodiscard]] int measurement_divider() const noexcept { return loop_.measurement_divider(); }
+  [[nodiscard]] Lanes<int, S> measurement_divider() const noexcept {
+    return loop_.measurement_divider();
+  }
 
  private:
   friend struct detail::LaneAccess;
   friend struct detail::RecordAccess;
   static constexpr auto fields(auto& o) noexcept {
-    return detail::tie(o.loop_, o.law_, o.fast_law_, o.soft_, o.spec_);
+    return detail::tie(o.loop_, o.law_, o.fast_law_, o.soft_);
   }
 
   using Loop = ControlLoop<Observer>;
@@ -430,16 +424,32 @@ class Adrc {
       const S eased = soft_.control(law_, lacks(filled(given)));
       u = select(designed, u, detail::by_present_gain(observer(), eased));
     }
-    const Soft before = soft_;
     soft_.judge(u, loop_.limiter(), step_time());
-    if constexpr (PackScalar<S>) {
-      for (int i = 0; i < lane_count<S>; ++i) {
-        if (loop_.mode()[i] == LoopMode::running) continue;
-        detail::set_lane(soft_, detail::get_lane<Softening<order, LaneScalar<S>>>(before, i), i);
-      }
-    }
     return u;
   }
+
+  /// For packs, see ControlLoop.
+  /// @{
+  ESOKIT_INLINE bool advance() noexcept { return loop_.advance(); }
+  template <class Given>
+  ESOKIT_INLINE bool step(S& u, const S& y, const Given& reference) noexcept {
+    if constexpr (std::is_same_v<Given, S>) {
+      return loop_.step_all(u, measured(y, reference), Asked<S>{*this, reference});
+    } else {
+      const Reference r = filled(reference);
+      return loop_.step_all(u, measured(y, r(0)), Asked<Reference>{*this, r});
+    }
+  }
+  template <class Given>
+  S update_advanced(const S& y, const Given& reference) noexcept {
+    if constexpr (std::is_same_v<Given, S>) {
+      return loop_.step_advanced(measured(y, reference), Asked<S>{*this, reference});
+    } else {
+      const Reference r = filled(reference);
+      return loop_.step_advanced(measured(y, r(0)), Asked<Reference>{*this, r});
+    }
+  }
+  /// @}
 
   [[nodiscard]] S step_time() const noexcept {
     if constexpr (has_step_time) {

@@ -175,6 +175,26 @@ class ControlLoop {
     return step_driven(measured, limiter_.last(), law);
   }
 
+  /// @cond
+  /// For packs: whether no lane needs more than the observer's step and the law; then this step.
+  ESOKIT_INLINE bool advance() noexcept {
+    const bool ordinary = special_ == false || (mode_ == LoopMode::running && divider_ == 1);
+    return ordinary && detail::LaneAccess::advance(observer_);
+  }
+  template <class Law>
+  ESOKIT_INLINE bool step_all(S& u, const S& measured, Law&& law) noexcept {
+    if (!detail::LaneAccess::step(observer_, measured, limiter_.last())) return false;
+    status_ = StepStatus::ok;
+    u = limited(special_ == false ? law() : asked(law));
+    return true;
+  }
+  /// Of a lane: `step` after `advance`.
+  template <class Law>
+  S step_advanced(S measured, Law&& law) noexcept {
+    return step_driven<true>(measured, limiter_.last(), law);
+  }
+  /// @endcond
+
   /// What the actuator held since the last step, if it was not the last output: before the step.
   /// A u that is not finite changes nothing.
   void applied(S u) noexcept {
@@ -188,19 +208,26 @@ class ControlLoop {
 
   /// The same if something other than u drives the observer's chain.
   /// @param drive what drove the chain from k - 1 to k, in place of u
-  template <class Law>
+  template <bool Advanced = false, class Law>
   ESOKIT_INLINE S step_driven(S measured, S drive, Law&& law) noexcept {
-    if (special_ != false) [[unlikely]] {
-      observe_specially(measured, drive);
-      return put_out(law);
+    if constexpr (records<S>) {
+      S u{};
+      if (!advance()) (void)measured[0];  // a mode, or a divider: branches
+      (void)step_all(u, measured, law);
+      return u;
+    } else {
+      if (special_) [[unlikely]] {
+        observe_specially<Advanced>(measured, drive);
+        return put_out(law);
+      }
+      const StepStatus status = observe<Advanced>(measured, drive);
+      status_ = status;
+      if (status != StepStatus::ok) [[unlikely]] {
+        after_trouble(measured);
+        return put_out(law);
+      }
+      return limited(law());
     }
-    const Status status = observer_.update(measured, drive);
-    status_ = status;
-    if (status != StepStatus::ok) [[unlikely]] {
-      after_trouble(measured);
-      return put_out(law);
-    }
-    return limited(law());
   }
 
   /// One sample without a measurement.
@@ -232,22 +259,15 @@ class ControlLoop {
   /// Starts in the steady state at y under u, dhat = -b0 u. Ends the start hold and safe mode.
   /// @return ok, or input_rejected or state_rejected if u or y is not finite: nothing changes then
   Status start(S measured, S u) noexcept {
-    if constexpr (PackScalar<S> && !records<S>) {
-      Status status{};
-      detail::for_each_lane<Plain>(
-          *this, [&](Plain& lane, int i) { status[i] = lane.start(measured[i], u[i]); });
-      return status;
-    } else {
-      if (!all(is_finite(u))) return StepStatus::input_rejected;
-      if (!all(is_finite(measured))) return StepStatus::state_rejected;
-      const Status status = detail::start_at_rest(observer_, measured, u);
-      if (status == StepStatus::ok) {
-        limiter_.track(u);
-        requested_ = u;
-        set_mode(LoopMode::running);
-      }
-      return status;
+    if (!all(is_finite(u))) return StepStatus::input_rejected;
+    if (!all(is_finite(measured))) return StepStatus::state_rejected;
+    const Status status = detail::start_at_rest(observer_, measured, u);
+    if (status == StepStatus::ok) {
+      limiter_.track(u);
+      requested_ = u;
+      set_mode(LoopMode::running);
     }
+    return status;
   }
 
   /// Takes over the settings of `fresh`; state, output and mode are kept. If the observer refuses
@@ -264,7 +284,7 @@ class ControlLoop {
     if (divider_ != fresh.divider_) phase_ = 0;
     divider_ = fresh.divider_;
     watched_ = fresh.watched_;
-    set_mode(detail::of_lane(mode_, 0));
+    set_mode(mode_);
     has_safe_input_ = fresh.has_safe_input_;
     stay_safe_ = fresh.stay_safe_;
     if constexpr (has_step_time) limits_ = fresh.limits_;
@@ -297,7 +317,7 @@ class ControlLoop {
   /// What determines the output at present.
   [[nodiscard]] Lanes<LoopMode, S> mode() const noexcept { return mode_; }
   /// D: a measurement is due at every D-th step.
-  [[nodiscard]] int measurement_divider() const noexcept { return divider_; }
+  [[nodiscard]] Lanes<int, S> measurement_divider() const noexcept { return divider_; }
   /// The limits, and the output that they last let through.
   [[nodiscard]] const Limiter<S>& limiter() const noexcept { return limiter_; }
 
@@ -308,14 +328,11 @@ class ControlLoop {
   friend struct detail::RecordAccess;
   struct Nothing {};
   static constexpr bool has_step_time = observer_traits<Observer>.varies_time;
-  static constexpr int lanes = lane_count<S>;
-  using PlainObserver = detail::PlainTwin<Observer, S>;  ///< observer of a lane
-  using Plain = detail::PlainTwin<ControlLoop, S>;       ///< type of a lane
 
   static constexpr auto fields(auto& o) noexcept {
     return detail::tie(o.observer_, o.limiter_, o.requested_, o.hold_input_, o.safe_input_,
                        o.hold_left_, o.missing_limit_, o.divider_, o.phase_, o.mode_, o.special_,
-                       o.watched_, o.has_safe_input_, o.stay_safe_, o.status_, o.limits_);
+                       o.watched_, o.has_safe_input_, o.stay_safe_, o.status_);
   }
 
   ControlLoop(const Observer& observer, const Limiter<S>& limiter, const LoopSettings<S>& settings,
@@ -333,7 +350,7 @@ class ControlLoop {
     missing_limit_ =
         static_cast<std::uint16_t>((settings.missing.most + 1) * settings.measurement_divider);
     if constexpr (has_step_time) limits_ = settings.limits;
-    set_mode(detail::of_lane(mode_, 0));
+    set_mode(mode_);
     // The output before the first step is the hold input, or the value nearest to it within the
     // limits.
     if (hold_samples > 0) limiter_.track(limiter_.within(hold_input_));
@@ -341,10 +358,8 @@ class ControlLoop {
 
   /// One sample with a u from elsewhere.
   void follow(S measured, S drive) noexcept {
-    for (int i = 0; i < lanes; ++i) {
-      if (mode(i) == LoopMode::start_hold) set_mode(LoopMode::running, i);
-    }
-    observe_specially(measured, drive);
+    if (mode_ == LoopMode::start_hold) set_mode(LoopMode::running);
+    observe_specially<false>(measured, drive);
     requested_ = limiter_.last();
   }
 
@@ -359,17 +374,7 @@ class ControlLoop {
 
   template <class Law>
   S put_out(Law&& law) noexcept {
-    if constexpr (PackScalar<S>) {
-      S wanted = asked(law);
-      if (mode_ != LoopMode::running) {
-        for (int i = 0; i < lanes; ++i) {
-          if (mode_[i] != LoopMode::running) wanted[i] = other_output(i);
-        }
-      }
-      return limited(wanted);
-    } else {
-      return limited(mode_ == LoopMode::running ? S(asked(law)) : other_output(0));
-    }
+    return limited(mode_ == LoopMode::running ? S(asked(law)) : other_output());
   }
 
   ESOKIT_INLINE S limited(S wanted) noexcept {
@@ -380,21 +385,27 @@ class ControlLoop {
     return limiter_(wanted);
   }
 
+  template <bool Advanced>
+  ESOKIT_INLINE StepStatus observe(S measured, S drive) noexcept {
+    if constexpr (Advanced) {
+      return detail::LaneAccess::update_advanced(observer_, measured, drive);
+    } else {
+      return observer_.update(measured, drive);
+    }
+  }
+
+  template <bool Advanced>
   ESOKIT_COLD void observe_specially(S measured, S drive) noexcept {
     if (phase_ != 0) {
       skip_measurement(drive);
       return;
     }
     phase_ = next_phase();
-    const Lanes<int, S> missed = observer_.missed();
-    status_ = observer_.update(measured, drive);
+    const bool as_planned = observer_.missed() == divider_ - 1;
+    status_ = observe<Advanced>(measured, drive);
     if (status_ == StepStatus::ok && mode_ == LoopMode::running) return;
     after_trouble(measured);
-    for (int i = 0; i < lanes; ++i) {
-      const bool as_planned = detail::of_lane(missed, i) == divider_ - 1;
-      StepStatus& status = detail::of_lane(status_, i);
-      if (as_planned && status == StepStatus::gap_bridged) status = StepStatus::ok;
-    }
+    if (as_planned && status_ == StepStatus::gap_bridged) status_ = StepStatus::ok;
   }
 
   void skip_measurement(S drive) noexcept {
@@ -407,51 +418,31 @@ class ControlLoop {
     // After a gap too long to bridge, the observer would restart with dhat = 0. The steady state
     // under the present u is a better guess and causes no bump.
     if (has(status_, StepStatus::restarted)) {
-      if constexpr (PackScalar<S>) {
-        detail::for_each_lane<PlainObserver>(observer_, [&](PlainObserver& lane, int i) {
-          if (has(status_[i], StepStatus::restarted)) reset_to_rest(lane, measured[i]);
-        });
-      } else {
-        reset_to_rest(observer_, measured);
-      }
+      (void)observer_.reset(observer_.equilibrium(measured, S(observer_.applied_input())));
     }
     judge_missing();
   }
 
-  template <class O>
-  static void reset_to_rest(O& observer, const LaneScalar<S>& measured) noexcept {
-    using One = LaneScalar<S>;
-    (void)observer.reset(observer.equilibrium(measured, One(observer.applied_input())));
-  }
-
   void judge_missing() noexcept {
-    const Lanes<int, S> all_missed = observer_.missed();
-    for (int i = 0; i < lanes; ++i) {
-      const int missed = detail::of_lane(all_missed, i);
-      if (missed >= missing_limit_) {
-        set_mode(LoopMode::safe, i);
-      } else if (mode(i) == LoopMode::safe && !stay_safe_ && missed < divider_) {
-        set_mode(LoopMode::running, i);
-      }
+    const int missed = observer_.missed();
+    if (missed >= missing_limit_) {
+      set_mode(LoopMode::safe);
+    } else if (mode_ == LoopMode::safe && !stay_safe_ && missed < divider_) {
+      set_mode(LoopMode::running);
     }
   }
 
-  /// The output of lane `i` if the law does not determine it.
-  [[nodiscard]] ESOKIT_COLD LaneScalar<S> other_output(int i) noexcept {
-    if (mode(i) == LoopMode::safe) {
-      return detail::number_of_lane(has_safe_input_ ? safe_input_ : limiter_.last(), i);
-    }
+  /// The output if the law does not determine it.
+  [[nodiscard]] ESOKIT_COLD S other_output() noexcept {
+    if (mode_ == LoopMode::safe) return has_safe_input_ ? safe_input_ : limiter_.last();
     // The step in which the hold ends is still held.
-    if (--detail::of_lane(hold_left_, i) == 0) set_mode(LoopMode::running, i);
-    return detail::number_of_lane(hold_input_, i);
+    if (--hold_left_ == 0) set_mode(LoopMode::running);
+    return hold_input_;
   }
 
-  [[nodiscard]] LoopMode mode(int i) const noexcept { return detail::of_lane(mode_, i); }
-
-  void set_mode(LoopMode mode, int i = 0) noexcept {
-    detail::of_lane(mode_, i) = mode;
-    detail::of_lane(special_, i) =
-        mode != LoopMode::running || divider_ != 1 || detail::of_lane(watched_, i);
+  void set_mode(Lanes<LoopMode, S> mode) noexcept {
+    mode_ = mode;
+    special_ = !(mode == LoopMode::running) || !(divider_ == 1) || watched_ == true;
   }
 
   [[nodiscard]] std::uint16_t next_phase() const noexcept {
@@ -464,15 +455,15 @@ class ControlLoop {
   S hold_input_;
   S safe_input_;
   Lanes<std::uint32_t, S> hold_left_;
-  std::uint16_t missing_limit_{};
-  std::uint16_t divider_;
-  std::uint16_t phase_ = 0;
+  Lanes<std::uint16_t, S> missing_limit_{};
+  Lanes<std::uint16_t, S> divider_;
+  Lanes<std::uint16_t, S> phase_{};
   Lanes<LoopMode, S> mode_;
   Lanes<bool, S> watched_{false};
   /// True if anything besides the law has to be done: one test in the hot path.
   Lanes<bool, S> special_{false};
-  bool has_safe_input_;
-  bool stay_safe_;
+  Lanes<bool, S> has_safe_input_;
+  Lanes<bool, S> stay_safe_;
   Status status_ = StepStatus::ok;
   [[no_unique_address]] std::conditional_t<has_step_time, Limits<S>, Nothing> limits_{};
 };

@@ -164,7 +164,9 @@ class DisturbanceCompensator {
   /// K, unit of u per unit of y^(n).
   [[nodiscard]] const S& compensation_gain() const noexcept { return gain_; }
   /// D: a measurement is due at every D-th update.
-  [[nodiscard]] int measurement_divider() const noexcept { return loop_.measurement_divider(); }
+  [[nodiscard]] Lanes<int, S> measurement_divider() const noexcept {
+    return loop_.measurement_divider();
+  }
   /// T, s.
   [[nodiscard]] S sample_time() const noexcept { return loop_.observer().sample_time(); }
   /// The present u, within the limits.
@@ -184,6 +186,17 @@ class DisturbanceCompensator {
   static constexpr auto fields(auto& o) noexcept { return detail::tie(o.loop_, o.gain_); }
 
   using Loop = ControlLoop<Observer>;
+
+  /// For packs, see ControlLoop.
+  /// @{
+  ESOKIT_INLINE bool advance() noexcept { return loop_.advance(); }
+  ESOKIT_INLINE bool step(S& u, const S& y, const S& base_output) noexcept {
+    return loop_.step_all(u, y, [&]() ESOKIT_INLINE_LAMBDA { return command(base_output); });
+  }
+  S update_advanced(const S& y, const S& base_output) noexcept {
+    return loop_.step_advanced(y, [&] { return command(base_output); });
+  }
+  /// @}
 
   DisturbanceCompensator(const Loop& loop, S gain) noexcept : loop_(loop), gain_(gain) {}
 

@@ -126,25 +126,11 @@ class DualFeedbackAdrc {
   /// One sample. @param y measurement @param reference r
   /// @return u to be held until the next sample, within the limits
   S update(S y, S reference) noexcept {
-    Step step = advance(y, limited ? limiter_.last() : wanted_);
-    step.wanted = step.control + form_.reference * reference;
-    // States stored one by one and loaded as a pair would stall the next step.
-    detail::keep_scalars(step.pending);
-    if (!all(is_finite(probe(step)))) [[unlikely]] {
-      if constexpr (PackScalar<S>) {
-        S u(0.0);
-        detail::for_each_lane<Plain>(
-            *this, [&](Plain& lane, int l) { u[l] = lane.update(y[l], reference[l]); });
-        return u;
-      } else {
-        return update_guarded(y, reference);
-      }
+    S u{};
+    if (!step(u, y, reference)) [[unlikely]] {
+      if constexpr (!records<S>) return update_guarded(y, reference);
     }
-    pending_ = step.pending;
-    measured_ = y;
-    wanted_ = step.wanted;
-    status_ = StepStatus::ok;
-    return limiter_(step.wanted);
+    return u;
   }
 
   /// What the actuator held since the last sample, if it was not the last output: say it before
@@ -157,14 +143,27 @@ class DualFeedbackAdrc {
   /// Takes over a plant at rest at y under u, with the reference at y, too. A y or u that is not
   /// finite changes nothing and is reported.
   Status start(S y, S u) noexcept {
-    if constexpr (PackScalar<S>) {
-      Status status{};
-      detail::for_each_lane<Plain>(*this,
-                                   [&](Plain& lane, int l) { status[l] = lane.start(y[l], u[l]); });
-      return status;
+    const S c = u - form_.reference * y;
+    States state{};
+    if constexpr (delta) {
+      state[0] = c + form_.measurement[0] * y;
+      for (std::size_t i = 1; i < size; ++i) state[i] = inflow(i, y, c) + form_.input[i] * u;
     } else {
-      return start_one(y, u);
+      for (std::size_t i = size; i >= 1; --i) {
+        state[i - 1] = (i < size ? state[i] : S(0)) - inflow(i, y, c) - form_.input[i] * u;
+      }
     }
+    S sum = u;
+    for (std::size_t i = 0; i < size; ++i) {
+      state[i] = state[i] + form_.input[i + 1] * u;
+      sum = sum + state[i];
+    }
+    if (!all(is_finite(sum))) return StepStatus::state_rejected;
+    pending_ = state;
+    measured_ = y;
+    wanted_ = u;
+    limiter_.track(u);
+    return StepStatus::ok;
   }
 
   /// New settings while running: restarts in the steady state for the last measurement and u,
@@ -202,13 +201,12 @@ class DualFeedbackAdrc {
   static constexpr auto fields(auto& o) noexcept {
     return detail::tie(o.form_, o.limiter_, o.pending_, o.measured_, o.wanted_, o.status_);
   }
-  using Plain = detail::PlainTwin<DualFeedbackAdrc, S>;  ///< type of a lane
   using Form = FilterForm<size, S>;
   using States = Array<S, size>;
   static constexpr bool delta = std::is_same_v<Operator, DeltaOperator>;
   static constexpr bool limited = std::is_same_v<Feedback, LimitedFeedback>;
 
-  struct Step {
+  struct Next {
     States pending;  ///< the next states without the contribution of u
     S control;       ///< c
     S wanted{};
@@ -216,30 +214,6 @@ class DualFeedbackAdrc {
 
   DualFeedbackAdrc(const Form& form, const Limiter<S>& limiter) noexcept
       : form_(form), limiter_(limiter), wanted_(limiter.last()) {}
-
-  StepStatus start_one(S y, S u) noexcept {
-    const S c = u - form_.reference * y;
-    States state{};
-    if constexpr (delta) {
-      state[0] = c + form_.measurement[0] * y;
-      for (std::size_t i = 1; i < size; ++i) state[i] = inflow(i, y, c) + form_.input[i] * u;
-    } else {
-      for (std::size_t i = size; i >= 1; --i) {
-        state[i - 1] = (i < size ? state[i] : S(0)) - inflow(i, y, c) - form_.input[i] * u;
-      }
-    }
-    S sum = u;
-    for (std::size_t i = 0; i < size; ++i) {
-      state[i] = state[i] + form_.input[i + 1] * u;
-      sum = sum + state[i];
-    }
-    if (!is_finite(sum)) return StepStatus::state_rejected;
-    pending_ = state;
-    measured_ = y;
-    wanted_ = u;
-    limiter_.track(u);
-    return StepStatus::ok;
-  }
 
   static Expected<Array<S, Order>, Error<S>> controller_gains(const Config& config) {
     if (!config.gains) {
@@ -253,16 +227,16 @@ class DualFeedbackAdrc {
     return law->gains();
   }
 
-  [[nodiscard]] ESOKIT_INLINE Step advance(S y, S u) const noexcept {
-    Step step;
+  [[nodiscard]] ESOKIT_INLINE Next next(S y, S u) const noexcept {
+    Next step;
     const States state = detail::subtract_scaled<1>(pending_, form_.input, u);
     step.control = state[0] - form_.measurement[0] * y;
     detail::unroll<size>([&](auto i) ESOKIT_INLINE_LAMBDA {
-      S next = -(std::get<i + 1>(form_.measurement) * y +
-                 std::get<i + 1>(form_.denominator) * step.control);
-      if constexpr (i + 1 < size) next = next + std::get<i + 1>(state);
-      if constexpr (delta) next = next + std::get<i>(state);
-      std::get<i>(step.pending) = next;
+      S z = -(std::get<i + 1>(form_.measurement) * y +
+              std::get<i + 1>(form_.denominator) * step.control);
+      if constexpr (i + 1 < size) z = z + std::get<i + 1>(state);
+      if constexpr (delta) z = z + std::get<i>(state);
+      std::get<i>(step.pending) = z;
     });
     return step;
   }
@@ -273,18 +247,38 @@ class DualFeedbackAdrc {
   }
 
   /// Finite only if all numbers of the step are finite.
-  [[nodiscard]] ESOKIT_INLINE static S probe(const Step& step) noexcept {
+  [[nodiscard]] ESOKIT_INLINE static S probe(const Next& step) noexcept {
     return detail::plus_all(step.wanted, step.pending);
   }
 
+  /// For packs and while all is well: one sample. False, and nothing has changed, otherwise.
+  /// @{
+  static constexpr bool advance() noexcept { return true; }
+  ESOKIT_INLINE bool step(S& u, const S& y, const S& reference) noexcept {
+    Next step = next(y, limited ? limiter_.last() : wanted_);
+    step.wanted = step.control + form_.reference * reference;
+    // States stored one by one and loaded as a pair would stall the next step.
+    detail::keep_scalars(step.pending);
+    if (!all(is_finite(probe(step)))) [[unlikely]]
+      return false;
+    pending_ = step.pending;
+    measured_ = y;
+    wanted_ = step.wanted;
+    status_ = StepStatus::ok;
+    u = limiter_(step.wanted);
+    return true;
+  }
+  S update_advanced(const S& y, const S& reference) noexcept { return update(y, reference); }
+  /// @}
+
   ESOKIT_COLD S update_guarded(S y, S reference) noexcept {
     const S u = limited ? limiter_.last() : wanted_;
-    Step step = advance(y, u);
+    Next step = next(y, u);
     status_ = StepStatus::ok;
     if (is_finite(probe(step))) {
       measured_ = y;
     } else {
-      const Step without = advance(measured_, u);
+      const Next without = next(measured_, u);
       // The state is the cause if the last measurement would also fail, or if this one is no
       // larger.
       const bool state_is_to_blame =
@@ -292,7 +286,7 @@ class DualFeedbackAdrc {
           (!is_finite(probe(without)) || detail::absolute(y) <= detail::absolute(measured_));
       if (state_is_to_blame && start(y, u) == StepStatus::ok) {
         status_ = StepStatus::restarted;
-        step = advance(y, u);
+        step = next(y, u);
       } else {
         status_ = StepStatus::measurement_rejected;
         step = without;

@@ -29,6 +29,11 @@ struct PerLane {
   constexpr PerLane() noexcept = default;
   /// The same in every lane.
   constexpr PerLane(T value) noexcept { values.fill(value); }
+  /// Converted.
+  template <class Other>
+  constexpr PerLane(const PerLane<Other, Count>& others) noexcept {
+    for (int i = 0; i < Count; ++i) (*this)[i] = others[i];
+  }
 
   /// The value of a lane.
   /// @{
@@ -103,31 +108,28 @@ struct LaneAccess {
     std::remove_const_t<Object>::fields(object);
   };
   template <class Object>
+  static constexpr bool steps = requires(Object& object) {
+    object.advance();
+  };
+  template <class Object>
   static constexpr auto fields(Object& object) noexcept {
     return std::remove_const_t<Object>::fields(object);
   }
-  // Not a constrained friend template: Clang 16 takes its constraints for those of another
+  // Not constrained friend templates: Clang 16 takes their constraints for those of another
   // template.
-  template <class Object, class S>
-  static constexpr auto update_advanced(Object& object, const S& y, const S& u) noexcept {
-    return object.update_advanced(y, u);
+#define ESOKIT_FOR_PACKS(name)                                                          \
+  template <class Object, class... Given>                                               \
+  ESOKIT_INLINE static constexpr auto name(Object& object, Given&&... given) noexcept { \
+    return object.name(given...);                                                       \
   }
-  template <class Object, class S>
-  static constexpr auto predict_rejecting(Object& object, const S& u) noexcept {
-    return object.predict_rejecting(u);
-  }
-  template <class Object>
-  static constexpr auto states(const Object& object) noexcept {
-    return object.states_;
-  }
-  template <class Object, class State>
-  static constexpr auto shift_to(Object& object, const State& state) noexcept {
-    return object.shift_to(state);
-  }
-  template <class Object, class State>
-  static constexpr auto reset_scaled(Object& object, const State& state) noexcept {
-    return object.reset_scaled(state);
-  }
+  ESOKIT_FOR_PACKS(advance)          // a form on packs: whether all lanes can go on with `step`
+  ESOKIT_FOR_PACKS(step)             // one sample of all lanes; false: it has changed nothing
+  ESOKIT_FOR_PACKS(update_advanced)  // of a lane: `update` after `advance`
+  ESOKIT_FOR_PACKS(advance_predict)  // the same for the time update ..
+  ESOKIT_FOR_PACKS(predict_all)
+  ESOKIT_FOR_PACKS(predict_advanced)
+  ESOKIT_FOR_PACKS(correct_all)  // .. and for the measurement update
+#undef ESOKIT_FOR_PACKS
 };
 
 struct RecordAccess;  // target/recorded_design.hpp: what is recorded apart

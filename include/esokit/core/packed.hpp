@@ -91,40 +91,8 @@ concept ComputesPacks = LaneAccess::has_fields<T> && requires {
 
 /// One T for each lane.
 template <class T, class S>
-class OneByOne {
- public:
-  using scalar_type = S;  ///< type of signals
-
- protected:
-  using Plains = Array<T, lane_count<S>>;
-
-  constexpr explicit OneByOne(const Plains& lanes) noexcept : lanes_(lanes) {}
-
-  /// Whether each lane has a member function of this name.
-#define ESOKIT_EACH_LANE(name)                                                  \
- public:                                                                        \
-  template <class... Given>                                                     \
-  auto name(const Given&... given) noexcept requires requires(T & lane) {       \
-    lane.name(std::declval<const typename OfLane<Given, S>::type&>()...);       \
-  }                                                                             \
-  {                                                                             \
-    return of_all_lanes<S>([&]([[maybe_unused]] int i) {                        \
-      return lanes_[static_cast<std::size_t>(i)].name(lane_of<S>(given, i)...); \
-    });                                                                         \
-  }
-
-  // Of observers and of controllers, what a loop needs; for all else there is `each`.
-  ESOKIT_EACH_LANE(update)
-  ESOKIT_EACH_LANE(update_without_measurement)
-  ESOKIT_EACH_LANE(predict)
-  ESOKIT_EACH_LANE(correct)
-  ESOKIT_EACH_LANE(control)
-  ESOKIT_EACH_LANE(prepare)
-  ESOKIT_EACH_LANE(applied)
-#undef ESOKIT_EACH_LANE
-
- protected:
-  Plains lanes_;
+struct OneByOne {
+  Array<T, lane_count<S>> lanes;
 };
 
 template <class T, class S>
@@ -135,6 +103,19 @@ template <class T, class S>
 requires ComputesPacks<T, S>
 struct PackedForm<T, S> {
   using type = typename T::template with_scalar<S>;
+};
+
+/// What a form declares.
+template <class Form>
+struct PackedTraits {};
+template <class Form>
+requires requires {
+  Form::traits;
+  Form::order;
+}
+struct PackedTraits<Form> {
+  static constexpr auto traits = Form::traits;  ///< as of T
+  static constexpr int order = Form::order;     ///< as of T
 };
 
 }  // namespace detail
@@ -153,15 +134,17 @@ struct PackedForm<T, S> {
 ///
 /// Where the type can, all lanes are computed at once (`at_once`): the linear, cascade, adjustable,
 /// nonlinear and algebraic observers, `ExtendedStateFilter`, `Adrc` and `DisturbanceCompensator` of
-/// these, `DualFeedbackAdrc`, laws, limiter and plants. Then it has all members of T that a good
-/// sample needs, of packs; if a lane has a bad sample or a gap, the lanes of this step go one by
-/// one. All other types go lane by lane: the adapters, `ModelEso`, `PredictiveAdrc`, `MimoAdrc`,
-/// `MimoExtendedStateFilter`, the differentiators, your own. A pack of them costs as much as its
-/// lanes together and has `update`, `predict`, `correct`, `control`, `prepare`, `applied`. What T
-/// has besides is called through `each`, of one lane through a copy of it, `packed[i]`.
+/// these, `DualFeedbackAdrc`, laws, limiter and plants. If a lane has a bad sample or a gap, a
+/// start hold or a measurement divider, the lanes of this step go one by one. All other types go
+/// lane by lane: the adapters, `ModelEso`, `PredictiveAdrc`, `MimoAdrc`, `MimoExtendedStateFilter`,
+/// the differentiators, your own. A pack of them costs as much as its lanes together.
+///
+/// What T has besides the members below is called through `each`, of one lane through a copy of it,
+/// `packed[i]`.
 /// @tparam T type of a lane, of float or double @tparam Lanes see Pack
 template <class T, int Lanes = default_lanes<typename T::scalar_type>>
-class Packed : public detail::PackedForm<T, Pack<typename T::scalar_type, Lanes>>::type {
+class Packed : public detail::PackedTraits<
+                   typename detail::PackedForm<T, Pack<typename T::scalar_type, Lanes>>::type> {
   using One = typename T::scalar_type;
   using Form = typename detail::PackedForm<T, Pack<One, Lanes>>::type;
   using Indices = std::make_integer_sequence<int, Lanes>;
@@ -174,7 +157,7 @@ class Packed : public detail::PackedForm<T, Pack<typename T::scalar_type, Lanes>
   /// Whether all lanes are computed at once while all is well.
   static constexpr bool at_once = detail::ComputesPacks<T, scalar_type>;
 
-  using Together = Form;  ///< all lanes as one object of packs; one by one an array of T
+  using Together = Form;  ///< all lanes as one object of packs, if they are computed at once
 
   /// Takes the objects lane(0), lane(1), ..
   template <class Function>
@@ -227,38 +210,33 @@ class Packed : public detail::PackedForm<T, Pack<typename T::scalar_type, Lanes>
   /// A copy of lane `i`.
   [[nodiscard]] constexpr T operator[](int i) const noexcept {
     if constexpr (at_once) {
-      return detail::get_lane<T>(static_cast<const Form&>(*this), i);
+      return detail::get_lane<T>(form_, i);
     } else {
-      return this->lanes_[static_cast<std::size_t>(i)];
+      return form_.lanes[static_cast<std::size_t>(i)];
     }
   }
 
   /// Lane `i` becomes `one`.
   constexpr void set(int i, const T& one) noexcept {
     if constexpr (at_once) {
-      detail::set_lane(static_cast<Form&>(*this), one, i);
+      detail::set_lane(form_, one, i);
     } else {
-      this->lanes_[static_cast<std::size_t>(i)] = one;
+      form_.lanes[static_cast<std::size_t>(i)] = one;
     }
-  }
-
-  /// All lanes as one object of packs.
-  [[nodiscard]] constexpr const Together& together() const noexcept requires at_once {
-    return *this;
   }
 
   /// Calls f(lane, i) for each lane, one after the other. @return the results of all lanes:
   /// numbers, vectors and matrices as those of packs, all else as a PerLane @{
   template <class Function>
   constexpr auto each(const Function& f) noexcept {
-    return detail::of_all_lanes<scalar_type>([&](int i) -> decltype(auto) {
-      struct Lane {
+    return detail::of_all_lanes<scalar_type>([&](int i) {
+      struct Changed {
         Packed& all;
         int i;
         T lane = all[i];
-        ~Lane() { all.set(i, lane); }
+        ~Changed() { all.set(i, lane); }
       } one{*this, i};
-      return std::invoke_result_t<const Function&, T&, int>(f(one.lane, i));
+      return f(one.lane, i);
     });
   }
   template <class Function>
@@ -270,36 +248,155 @@ class Packed : public detail::PackedForm<T, Pack<typename T::scalar_type, Lanes>
   }
   /// @}
 
-  /// As of T, in each lane. @{
+  /// One sample, as of T: of an observer (y, u), of a controller (y, reference). @{
   template <class... Given>
-  auto start(const Given&... given) noexcept {
-    return each(
-        [&](auto& lane, int i) { return lane.start(detail::lane_of<scalar_type>(given, i)...); });
+  ESOKIT_INLINE auto update(const Given&... given) noexcept requires requires(T& lane) {
+    lane.update(detail::lane_of<scalar_type>(given, 0)...);
   }
-  template <class State>
-  auto reset(const State& state) noexcept {
-    return each(
-        [&](auto& lane, int i) { return lane.reset(detail::lane_of<scalar_type>(state, i)); });
+  {
+    using Result =
+        ResultOf<decltype(std::declval<T&>().update(detail::lane_of<scalar_type>(given, 0)...))>;
+    if constexpr (steps) {
+      const bool advanced = Access::advance(form_);
+      if (advanced) [[likely]] {
+        Result result{};
+        if constexpr (std::is_same_v<Result, scalar_type>) {
+          if (Access::step(form_, result, given...)) [[likely]]
+            return result;
+        } else {
+          if (Access::step(form_, given...)) [[likely]]
+            return result;
+        }
+      }
+      return update_lanes(advanced, given...);
+    } else {
+      return each(
+          [&](T& lane, int i) { return lane.update(detail::lane_of<scalar_type>(given, i)...); });
+    }
   }
+  template <class... Given>
+  auto predict(const Given&... given) noexcept requires requires(T& lane) {
+    lane.predict(detail::lane_of<scalar_type>(given, 0)...);
+  }
+  {
+    using Result =
+        ResultOf<decltype(std::declval<T&>().predict(detail::lane_of<scalar_type>(given, 0)...))>;
+    if constexpr (steps) {
+      const bool advanced = Access::advance_predict(form_);
+      if (advanced && Access::predict_all(form_, given...)) [[likely]]
+        return Result{};
+      return each([&](T& lane, int i) {
+        return advanced ? Access::predict_advanced(lane, detail::lane_of<scalar_type>(given, i)...)
+                        : lane.predict(detail::lane_of<scalar_type>(given, i)...);
+      });
+    } else {
+      return each(
+          [&](T& lane, int i) { return lane.predict(detail::lane_of<scalar_type>(given, i)...); });
+    }
+  }
+  template <class... Given>
+  auto correct(const Given&... given) noexcept requires requires(T& lane) {
+    lane.correct(detail::lane_of<scalar_type>(given, 0)...);
+  }
+  {
+    using Result =
+        ResultOf<decltype(std::declval<T&>().correct(detail::lane_of<scalar_type>(given, 0)...))>;
+    if constexpr (steps) {
+      if (Access::correct_all(form_, given...)) [[likely]]
+        return Result{};
+    }
+    return each(
+        [&](T& lane, int i) { return lane.correct(detail::lane_of<scalar_type>(given, i)...); });
+  }
+  /// @}
+
+  /// As of T, in each lane.
+  /// @{
+#define ESOKIT_EACH_LANE(name)                                                                 \
+  template <class... Given>                                                                    \
+  auto name(const Given&... given) noexcept requires requires(T & lane) {                      \
+    lane.name(detail::lane_of<scalar_type>(given, 0)...);                                      \
+  }                                                                                            \
+  {                                                                                            \
+    return each(                                                                               \
+        [&](T& lane, int i) { return lane.name(detail::lane_of<scalar_type>(given, i)...); }); \
+  }
+  ESOKIT_EACH_LANE(update_without_measurement)
+  ESOKIT_EACH_LANE(control)
+  ESOKIT_EACH_LANE(prepare)
+  ESOKIT_EACH_LANE(applied)
+  ESOKIT_EACH_LANE(start)
+  ESOKIT_EACH_LANE(reset)
+#undef ESOKIT_EACH_LANE
+  /// @}
+
+  /// All lanes as one object of packs, to be read.
+  [[nodiscard]] constexpr const Together& together() const noexcept requires at_once {
+    return form_;
+  }
+  /// The observer of a controller, of packs.
+  [[nodiscard]] constexpr const auto& observer() const noexcept requires at_once &&
+      requires(const Together& form) {
+    form.observer();
+  }
+  { return form_.observer(); }
+
+  /// What all lanes say: numbers as packs, all else as a PerLane.
+  /// @{
+#define ESOKIT_OF_EACH_LANE(name)                                                       \
+  [[nodiscard]] decltype(auto) name() const noexcept requires requires(const T& lane) { \
+    lane.name();                                                                        \
+  }                                                                                     \
+  {                                                                                     \
+    if constexpr (at_once) {                                                            \
+      return form_.name();                                                              \
+    } else {                                                                            \
+      return each([](const T& lane, int) { return lane.name(); });                      \
+    }                                                                                   \
+  }
+  ESOKIT_OF_EACH_LANE(estimate)
+  ESOKIT_OF_EACH_LANE(total_disturbance)
+  ESOKIT_OF_EACH_LANE(missed)
+  ESOKIT_OF_EACH_LANE(output)
+  ESOKIT_OF_EACH_LANE(status)
+  ESOKIT_OF_EACH_LANE(mode)
+  ESOKIT_OF_EACH_LANE(sample_time)
+#undef ESOKIT_OF_EACH_LANE
   /// @}
 
  private:
   template <class Function, int... I>
   constexpr Packed(const Function& lane, std::integer_sequence<int, I...>) noexcept
-      : Form([&] {
+      : form_([&] {
           if constexpr (at_once) {
             auto form = detail::blank<Form>();
             (detail::set_lane(form, lane(I), I), ...);
             return form;
           } else {
-            return Array<T, Lanes>{lane(I)...};
+            return Form{{lane(I)...}};
           }
         }()) {}
+
+  using Access = detail::LaneAccess;
+  /// Your own type may have a form on packs without a step of its own: its lanes go one by one.
+  static constexpr bool steps = at_once && Access::steps<Form>;
+  template <class Result>
+  using ResultOf = typename detail::OfPacks<Result, scalar_type>::type;
+
+  template <class... Given>
+  ESOKIT_COLD auto update_lanes(bool advanced, const Given&... given) noexcept {
+    return each([&](T& lane, int i) {
+      return advanced ? Access::update_advanced(lane, detail::lane_of<scalar_type>(given, i)...)
+                      : lane.update(detail::lane_of<scalar_type>(given, i)...);
+    });
+  }
 
   static Error<One> of(Error<One> error, int lane) {
     error.lane = lane;
     return error;
   }
+
+  Form form_;
 };
 
 }  // namespace esokit

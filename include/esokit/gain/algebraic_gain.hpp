@@ -117,7 +117,7 @@ class AlgebraicGain {
     pending_ = false;
     settled_ = false;
     // Between samples the registers hold i = k + 1 .. k + N for the last sample k.
-    const std::uint32_t next = start_index_ + age;
+    const std::uint32_t next = common_start() + age;
     const std::uint32_t first = next > Size ? next - Size : 0u;
     anchor(first);
     for (int i = 0; i < Size; ++i) push();
@@ -126,27 +126,18 @@ class AlgebraicGain {
 
   /// The gain for the whole gap at the bandwidth of this place in the schedule.
   [[nodiscard]] ScaledGain<Size, S> gap_gain(const S&, unsigned samples) const noexcept {
-    if constexpr (PackScalar<S>) {
-      ScaledGain<Size, S> all;
-      for (int i = 0; i < lane_count<S>; ++i) {
-        using One = LaneScalar<S>;
-        detail::set_lane(all, detail::get_lane<Plain>(*this, i).gap_gain(One(0), samples), i);
-      }
-      return all;
-    } else {
-      if (settled_) return esokit::gap_gain<Size, S>(final_poles_, samples);
-      // Deadbeat for the longer step. Its first gain is also 1, so that N consecutive samples still
-      // make the estimate exact, and recurring gaps do not diverge.
-      if (deadbeat()) return esokit::gap_gain<Size, S>(EqualSampledPoles<Size, S>{S(1.0)}, samples);
-      const S a = final_poles_.contraction;
-      const S now = a + (S(1.0) - a) * (size_bracket_ * std::get<0>(ratios_u_));
-      return esokit::gap_gain<Size, S>(EqualSampledPoles<Size, S>{now}, samples);
-    }
+    if (settled_) return esokit::gap_gain<Size, S>(final_poles_, samples);
+    // Deadbeat for the longer step. Its first gain is also 1, so that N consecutive samples still
+    // make the estimate exact, and recurring gaps do not diverge.
+    if (deadbeat()) return esokit::gap_gain<Size, S>(EqualSampledPoles<Size, S>{S(1.0)}, samples);
+    const S a = final_poles_.contraction;
+    const S now = a + (S(1.0) - a) * (size_bracket_ * std::get<0>(ratios_u_));
+    return esokit::gap_gain<Size, S>(EqualSampledPoles<Size, S>{now}, samples);
   }
 
   /// The largest number of missing samples, at most `asked`, up to which errors decay in any
   /// sequence of gaps once the schedule has settled.
-  [[nodiscard]] constexpr int longest_gap(int asked) const noexcept requires(!PackScalar<S>) {
+  [[nodiscard]] constexpr int longest_gap(int asked) const noexcept {
     const int longest =
         detail::longest_step<Size, detail::equal_steps>(S(S(1.0) - final_poles_.contraction));
     return asked < longest ? asked : longest - 1;
@@ -175,7 +166,8 @@ class AlgebraicGain {
   /// all.
   template <class = S>
   [[nodiscard]] constexpr bool together() const noexcept {
-    return age_ == age_[0] && pending_ == pending_[0] && settled_ == false;
+    return age_ == age_[0] && pending_ == pending_[0] && settled_ == false &&
+           start_index_ == start_index_[0];
   }
   template <class = S>
   ESOKIT_COLD constexpr void advance_apart() noexcept {
@@ -184,6 +176,11 @@ class AlgebraicGain {
   /// Age of the lanes, if they are together.
   [[nodiscard]] constexpr std::uint32_t common_age() const noexcept {
     return detail::of_lane(age_, 0);
+  }
+
+  /// The same for the start of the schedule.
+  [[nodiscard]] constexpr std::uint32_t common_start() const noexcept {
+    return detail::of_lane(start_index_, 0);
   }
 
   static S decay(const S& shift, const S& sample_time) noexcept {
@@ -199,7 +196,7 @@ class AlgebraicGain {
     if (common_age() < max_index) age_ = common_age() + 1;
     if (deadbeat()) return;
     if (common_age() % anchor_interval == 0) [[unlikely]] {
-      anchor(start_index_ + common_age() - 1);
+      anchor(common_start() + common_age() - 1);
     }
     push();
     set_gain();
@@ -214,7 +211,7 @@ class AlgebraicGain {
 
   /// True up to sample N - 1 of the schedule.
   [[nodiscard]] constexpr bool deadbeat() const noexcept {
-    return start_index_ + common_age() <= Size;
+    return common_start() + common_age() <= Size;
   }
 
   static constexpr int coefficient_count = Size * (Size + 3) / 2;
@@ -361,7 +358,7 @@ class AlgebraicGain {
   S settled_below_{};                 ///< largest u at which the schedule counts as settled
   S power_{};                         ///< p^(i-N) of the next i
   S bracket_{};                       ///< [i-N] of the next i
-  std::uint32_t start_index_;
+  Count start_index_;
   Count least_age_;
   Count age_{0};
   Lanes<bool, S> pending_{false};

@@ -62,20 +62,12 @@ class ConstantGain {
 
   /// Gain for a gap: places the poles of the step over `samples` T at rho_i^samples, scaled with T.
   [[nodiscard]] ScaledGain<Size, S> gap_gain(const S&, unsigned samples) const noexcept {
-    if constexpr (PackScalar<S>) {
-      ScaledGain<Size, S> all;
-      for (int i = 0; i < lane_count<S>; ++i) {
-        detail::set_lane(all, esokit::gap_gain<Size, LaneScalar<S>>(poles_[i], samples), i);
-      }
-      return all;
-    } else {
-      return esokit::gap_gain<Size, S>(poles_, samples);
-    }
+    return esokit::gap_gain<Size, S>(poles_, samples);
   }
 
   /// The largest number of missing samples, at most `asked`, up to which errors decay in any
   /// sequence of gaps.
-  [[nodiscard]] constexpr int longest_gap(int asked) const noexcept requires(!PackScalar<S>) {
+  [[nodiscard]] constexpr int longest_gap(int asked) const noexcept {
     if constexpr (requires { Placement::template longest_step<Size, S>(poles_); }) {
       const int longest = Placement::template longest_step<Size, S>(poles_);
       return asked < longest ? asked : longest - 1;

@@ -98,7 +98,7 @@ template <class Law, int Size, class S>
 concept BridgesGaps = requires(const Law& law, const S& e, unsigned samples) {
   { law.gap_gain(e, samples) } -> GainOf<Size, S>;
   requires noexcept(law.gap_gain(e, samples));
-  requires PackScalar<S> || LimitsGaps<Law>;
+  requires LimitsGaps<Law>;
 };
 template <class Law, int Size, class S>
 concept Preset = requires(const Law& law) {

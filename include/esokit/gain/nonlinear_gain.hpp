@@ -262,7 +262,7 @@ class NonlinearGain {
   }
 
   /// The largest number of missing samples that is bridged, at most `asked`.
-  [[nodiscard]] constexpr int longest_gap(int asked) const noexcept requires(!PackScalar<S>) {
+  [[nodiscard]] constexpr int longest_gap(int asked) const noexcept {
     return detail::half_gap(linear_, asked);
   }
 

@@ -154,7 +154,8 @@ class RiccatiGain {
       if (since_ == since_[0] && bits > standing && (TableSize == 0 || place_ == done)) [[likely]] {
         note(standing);
       } else if (since_ == since_[0] && bits == corrected && mode_ == RiccatiMode::recursive &&
-                 rule_ != InflationRule::adaptive && diagonal_noise_ == diagonal_noise_[0]) {
+                 rule_ == rule_[0] && rule_[0] != InflationRule::adaptive &&
+                 diagonal_noise_ == diagonal_noise_[0]) {
         note(0);
         recur_from_correction();
       } else {
@@ -258,15 +259,14 @@ class RiccatiGain {
   /// Bound on the covariance of the error of the present estimate, N x N, scaled: after `advance`
   /// that of the prediction, after `accept` that of the corrected estimate.
   [[nodiscard]] Matrix<S, Size, Size> covariance() const noexcept {
-    if constexpr (PackScalar<S>) {
-      Matrix<S, Size, Size> all;
-      for (int i = 0; i < lane_count<S>; ++i) {
-        detail::set_lane(all, detail::get_lane<Plain>(*this, i).covariance(), i);
-      }
-      return all;
-    } else {
-      return covariance_of_one();
+    Factor factor = now_.factor;
+    if ((since_ & corrected) != 0) {
+      // (I - k C) P- (I - k C)' + k R k'. The recursion uses R/(1+theta) in place of R, because the
+      // inflation does not apply to the noise.
+      factor.set_variance(0, S(factor.variance(0) * now_.rest * now_.rest +
+                               now_.share * now_.share * current_measurement_));
     }
+    return factor.matrix() * unit_;
   }
 
   /// Variance of the innovation after the last prediction, C P- C' + R, unit of y squared.
@@ -336,17 +336,6 @@ class RiccatiGain {
   };
 
   static constexpr std::size_t index(int i) noexcept { return static_cast<std::size_t>(i); }
-
-  [[nodiscard]] Matrix<S, Size, Size> covariance_of_one() const noexcept {
-    Factor factor = now_.factor;
-    if ((since_ & corrected) != 0) {
-      // (I - k C) P- (I - k C)' + k R k'. The recursion uses R/(1+theta) in place of R, because the
-      // inflation does not apply to the noise.
-      factor.set_variance(0, S(factor.variance(0) * now_.rest * now_.rest +
-                               now_.share * now_.share * current_measurement_));
-    }
-    return factor.matrix() * unit_;
-  }
 
   /// True if gain and covariance times `room` are finite.
   [[nodiscard]] bool fits(const S& room) const noexcept;
@@ -484,7 +473,7 @@ class RiccatiGain {
   // Members that every step uses come first.
   Point now_{};
   Lanes<std::int8_t, S> since_{};
-  RiccatiMode mode_ = RiccatiMode::recursive;
+  Lanes<RiccatiMode, S> mode_ = RiccatiMode::recursive;
   Lanes<std::uint16_t, S> place_{};  ///< next place in the table; `done`: past the limit
   S current_measurement_{};          ///< R of the next correction
 
@@ -496,7 +485,7 @@ class RiccatiGain {
   S unit_;
   S noise_trace_{};
   Array<S, Size> trace_weights_;
-  InflationRule rule_;
+  Lanes<InflationRule, S> rule_;
   Lanes<bool, S> diagonal_noise_;
   Point limit_{};
   Array<Point, TableSize> table_{};

@@ -87,7 +87,7 @@ class SwitchedGain {
   }
 
   /// The largest number of missing samples that is bridged, at most `asked`.
-  [[nodiscard]] constexpr int longest_gap(int asked) const noexcept requires(!PackScalar<S>) {
+  [[nodiscard]] constexpr int longest_gap(int asked) const noexcept {
     return detail::half_gap(sets_[1], detail::half_gap(sets_[0], asked));
   }
 

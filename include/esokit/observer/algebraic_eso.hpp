@@ -164,15 +164,7 @@ class AlgebraicEso
 
   /// epsilon, s.
   [[nodiscard]] S blanking() const noexcept {
-    if constexpr (PackScalar<S>) {
-      S samples(0.0);
-      for (int i = 0; i < lane_count<S>; ++i) {
-        samples[i] = static_cast<LaneScalar<S>>(law().least_age()[i]);
-      }
-      return samples * this->sample_time();
-    } else {
-      return detail::integer<S>(law().least_age()) * this->sample_time();
-    }
+    return detail::integer<S>(law().least_age()) * this->sample_time();
   }
 
   /// Samples since the schedule began; the count stops when it settles.
@@ -208,25 +200,16 @@ class AlgebraicEso
     return blank_anew(Base::update(y, u_applied));
   }
 
+  /// The same after the law has advanced.
+  StepStatus update_advanced(const S& y, const S& u_applied) noexcept {
+    return blank_anew(Base::update_advanced(y, u_applied));
+  }
+
   ESOKIT_COLD Status after_trouble(const Status& status) noexcept { return blank_anew(status); }
 
   Status blank_after(const Status& status) noexcept {
-    if constexpr (PackScalar<S>) {
-      publish_where([&](int i) { return status[i] == StepStatus::ok; });
-    } else {
-      if (status == StepStatus::ok) publish(Base::estimate());
-    }
+    if (status == StepStatus::ok) publish(Base::estimate());
     return status;
-  }
-
-  /// For packs: publishes the present estimates in the given lanes.
-  template <class Where>
-  void publish_where(const Where& where) noexcept {
-    const Estimate now = Base::estimate();
-    for (int i = 0; i < lane_count<S>; ++i) {
-      if (!where(i)) continue;
-      for (int r = 0; r < N; ++r) published_[static_cast<std::size_t>(r)][i] = now(r)[i];
-    }
   }
 
   // For packs only. A template, because Clang 14 instantiates all other members of a class.
@@ -240,13 +223,8 @@ class AlgebraicEso
 
   /// After a restart because of a long gap, the estimates published before are too old.
   ESOKIT_INLINE Status blank_anew(const Status& status) noexcept {
-    if (has(status, StepStatus::restarted)) [[unlikely]] {
-      if constexpr (PackScalar<S>) {
-        publish_where([&](int i) { return has(status[i], StepStatus::restarted); });
-      } else {
-        publish(Base::estimate());
-      }
-    }
+    if (has(status, StepStatus::restarted)) [[unlikely]]
+      publish(Base::estimate());
     return status;
   }
 

@@ -174,10 +174,9 @@ class ExtendedStateFilter
 
   /// One sample: `predict(u_applied)`, then `correct(y)`.
   Status update(S y, S u_applied) noexcept {
-    if constexpr (PackScalar<S>) {
-      if (usual()) [[likely]]
-        return Base::update(y, u_applied);
-      return each_lane([&](Plain& lane, int i) { return lane.update(y[i], u_applied[i]); });
+    if constexpr (records<S>) {
+      if (!usual()) (void)y[0];  // branches on numbers
+      return Base::update(y, u_applied);
     } else {
       if constexpr (!has_model) {
         if (law().rests_unwatched()) [[likely]]
@@ -190,26 +189,18 @@ class ExtendedStateFilter
   /// The same with the noise variance R of this measurement, unit of y squared. If it is negative
   /// or not finite, the measurement counts as missing.
   Status update_weighted(S y, S u_applied, S measurement_variance) noexcept {
-    if constexpr (PackScalar<S>) {
-      return each_lane([&](Plain& lane, int i) {
-        return lane.update_weighted(y[i], u_applied[i], measurement_variance[i]);
-      });
-    } else {
-      const Status predicted = predict(u_applied);
-      if (!all(is_finite(measurement_variance)) || !all(measurement_variance >= S(0.0))) {
-        return predicted | StepStatus::measurement_rejected;
-      }
-      law().set_measurement_variance(measurement_variance);
-      return predicted | correct(y);
+    const Status predicted = predict(u_applied);
+    if (!all(is_finite(measurement_variance)) || !all(measurement_variance >= S(0.0))) {
+      return predicted | StepStatus::measurement_rejected;
     }
+    law().set_measurement_variance(measurement_variance);
+    return predicted | correct(y);
   }
 
   /// Time update only: one sample without a measurement, or the first half of `update`.
   Status predict(S u_applied) noexcept {
     if constexpr (!has_model) {
       return Base::predict(u_applied);
-    } else if constexpr (PackScalar<S>) {
-      return each_lane([&](Plain& lane, int i) { return lane.predict(u_applied[i]); });
     } else {
       const Estimate before = this->estimate();
       const StepStatus status = Base::predict(u_applied);
@@ -220,10 +211,8 @@ class ExtendedStateFilter
 
   /// Measurement update only.
   Status correct(S y) noexcept {
-    if constexpr (PackScalar<S>) {
-      if (law().any_watched()) {
-        return each_lane([&](Plain& lane, int i) { return lane.correct(y[i]); });
-      }
+    if constexpr (records<S>) {
+      if (law().any_watched()) (void)y[0];
     } else if (!accepts(y)) {
       return StepStatus::outlier_rejected;
     }
@@ -233,19 +222,11 @@ class ExtendedStateFilter
   /// False if the gate would reject y as an outlier. True for a y that is not finite, which
   /// `correct` rejects anyway.
   [[nodiscard]] Lanes<bool, S> accepts(const S& y) const noexcept {
-    if constexpr (PackScalar<S>) {
-      Lanes<bool, S> in;
-      for (int i = 0; i < lane_count<S>; ++i) {
-        in[i] = detail::get_lane<Plain>(*this, i).accepts(y[i]);
-      }
-      return in;
-    } else {
-      if (!gated() || this->restarts()) return true;
-      const S e = y - this->predicted_measurement();
-      // A square that overflows is above the threshold.
-      if (!all(is_finite(e))) return true;
-      return all(e * e <= outlier_threshold_ * innovation_variance());
-    }
+    if (!gated() || this->restarts()) return true;
+    const S e = y - this->predicted_measurement();
+    // A square that overflows is above the threshold.
+    if (!all(is_finite(e))) return true;
+    return all(e * e <= outlier_threshold_ * innovation_variance());
   }
 
   /// Restarts at (y, 0, .., 0) with P0.
@@ -313,18 +294,18 @@ class ExtendedStateFilter
     return detail::tie(static_cast<BaseOf&>(o), o.nominal_model_, o.outlier_threshold_,
                        o.change_bound_, o.sample_);
   }
-  using Plain = detail::PlainTwin<ExtendedStateFilter, S>;  ///< type of a lane
-
-  /// Calls `step` with the filter of each lane.
-  template <class Step>
-  ESOKIT_COLD Status each_lane(Step&& step) noexcept {
-    Status status{};
-    detail::for_each_lane<Plain>(*this, [&](Plain& lane, int i) { status[i] = step(lane, i); });
-    return status;
-  }
 
   /// True if no lane has anything to do besides the predictor-corrector's step.
   [[nodiscard]] bool usual() const noexcept { return !has_model && !law().any_watched(); }
+
+  /// For packs, see PredictorCorrector.
+  /// @{
+  ESOKIT_INLINE bool advance() noexcept { return usual() && Base::advance(); }
+  ESOKIT_INLINE bool advance_predict() noexcept { return !has_model && Base::advance_predict(); }
+  ESOKIT_INLINE bool correct_all(const S& y) noexcept {
+    return !law().any_watched() && Base::correct_all(y);
+  }
+  /// @}
 
   ExtendedStateFilter(const Config& config, const PlantModel& plant, const Law& law,
                       int max_gap) noexcept

@@ -117,17 +117,7 @@ class PredictorCorrector {
   /// One sample: `predict(u_applied)`, then `correct(y)`.
   /// @param y measurement at sample k
   /// @param u_applied input that the actuator held from k - 1 to k, after its limits
-  Status update(S y, S u_applied) noexcept requires(!PackScalar<S>) {
-    advance_laws();
-    return update_advanced(y, u_applied);
-  }
-
-  /// The same for packs.
-  // Inlined, because a call sets up a stack frame aligned for vectors, which takes a third of the
-  // step's time. A template, because Clang 14 would otherwise instantiate both in an explicit
-  // instantiation.
-  template <class T = S>
-  ESOKIT_INLINE Status update(const S& y, const S& u_applied) noexcept requires PackScalar<T> {
+  Status update(S y, S u_applied) noexcept {
     advance_laws();
     return update_advanced(y, u_applied);
   }
@@ -135,23 +125,16 @@ class PredictorCorrector {
   /// Time update only: one sample without a measurement, or the first half of `update`.
   Status predict(S u_applied) noexcept {
     advance_laws();
-    return predict_guarded(u_applied);
+    return predict_advanced(u_applied);
   }
 
   /// Measurement update only. After a gap it uses the gain for the time since the last correction.
   Status correct(S y) noexcept {
-    if constexpr (PackScalar<S>) {
-      if (gap_ == 1 || gap_ == 0) [[likely]] {
-        Correction step{states_};
-        if (correct_levels<true>(step, y, 1u) && all(is_finite(probe(step.states)))) [[likely]] {
-          commit(step);
-          gap_ = 0;
-          return StepStatus::ok;
-        }
-      }
-      return each_lane([&](Plain& lane, int i) { return lane.correct(y[i]); });
+    if constexpr (records<S>) {
+      (void)correct_all(y);
+      return StepStatus::ok;
     } else {
-      const unsigned elapsed = gap_ > 1 ? gap_ : 1u;
+      const unsigned elapsed = this->elapsed();
       if (elapsed > max_gap_ + 1u) [[unlikely]] {
         if (!is_finite(y) || reset(y) != StepStatus::ok) return StepStatus::measurement_rejected;
         return StepStatus::restarted;
@@ -222,15 +205,7 @@ class PredictorCorrector {
 
   /// Number of predictions since the last correction; 0 if up to date. 65535 if the state was too
   /// large to be predicted: then the next good y restarts the observer.
-  [[nodiscard]] constexpr Lanes<int, S> missed() const noexcept {
-    if constexpr (PackScalar<S>) {
-      Lanes<int, S> missed;
-      for (int i = 0; i < lane_count<S>; ++i) missed[i] = gap_[i];
-      return missed;
-    } else {
-      return gap_;
-    }
-  }
+  [[nodiscard]] constexpr Lanes<int, S> missed() const noexcept { return gap_; }
 
   /// The input that the last prediction used.
   [[nodiscard]] constexpr const S& applied_input() const noexcept { return applied_input_; }
@@ -245,21 +220,10 @@ class PredictorCorrector {
   /// Call this between `predict` and `correct`. For gain laws whose gain is known before the
   /// measurement.
   [[nodiscard]] Preview preview() const noexcept requires PresetGainLaw<Law, size, S> {
-    if constexpr (PackScalar<S>) {
-      if (!(gap_ == 1 || gap_ == 0)) {
-        Preview all;
-        for (int i = 0; i < lane_count<S>; ++i) {
-          const auto lane = detail::get_lane<Plain>(*this, i).preview();
-          detail::set_lane(all.offset, lane.offset, i);
-          detail::set_lane(all.slope, lane.slope, i);
-        }
-        return all;
-      }
-    }
     Correction slope{};
     for (State& state : slope.states) state.fill(S(0.0));
     Correction offset = slope;
-    if (due_to_restart()) [[unlikely]] {
+    if (restarts()) [[unlikely]] {
       for (auto& state : slope.states) state = standing(S(1.0));
     } else {
       offset.states = states_;
@@ -274,15 +238,6 @@ class PredictorCorrector {
   /// the gain for the gap. For gaps above `max_gap` it does not apply, because `correct` restarts.
   [[nodiscard]] ScaledGain<size, S> correction_gain(const S& e) const noexcept
       requires(Levels == 1) {
-    if constexpr (PackScalar<S>) {
-      if (!(gap_ == 1 || gap_ == 0)) {
-        ScaledGain<size, S> gain;
-        for (int i = 0; i < lane_count<S>; ++i) {
-          detail::set_lane(gain, detail::get_lane<Plain>(*this, i).correction_gain(e[i]), i);
-        }
-        return gain;
-      }
-    }
     return law_gain(laws_[0], e, elapsed());
   }
 
@@ -292,15 +247,7 @@ class PredictorCorrector {
   }
 
   /// True if so many samples are missing that the next `correct` restarts the observer.
-  [[nodiscard]] constexpr Lanes<bool, S> restarts() const noexcept {
-    if constexpr (PackScalar<S>) {
-      Lanes<bool, S> due;
-      for (int i = 0; i < lane_count<S>; ++i) due[i] = gap_[i] > max_gap_[i] + 1u;
-      return due;
-    } else {
-      return gap_ > max_gap_ + 1u;
-    }
-  }
+  [[nodiscard]] constexpr Lanes<bool, S> restarts() const noexcept { return gap_ > max_gap_ + 1u; }
 
   /// Call this between `predict` and `correct` if the actuator held `u_applied` instead of the u
   /// given to `predict`. Adds Gamma (u_applied - u_given) to the prediction. A u that is not
@@ -308,13 +255,8 @@ class PredictorCorrector {
   Status revise_input(S u_applied) noexcept {
     LevelStates next = states_;
     for (auto& state : next) state = model_.add_input(state, S(u_applied - applied_input_));
-    if (!all(is_finite(probe(next)))) [[unlikely]] {
-      if constexpr (PackScalar<S>) {
-        return each_lane([&](Plain& lane, int i) { return lane.revise_input(u_applied[i]); });
-      } else {
-        return StepStatus::input_rejected;
-      }
-    }
+    if (!all(is_finite(probe(next)))) [[unlikely]]
+      return StepStatus::input_rejected;
     states_ = next;
     applied_input_ = u_applied;
     return StepStatus::ok;
@@ -327,16 +269,8 @@ class PredictorCorrector {
   [[nodiscard]] constexpr const S& sample_time() const noexcept { return model_.sample_time(); }
 
   /// Missing samples that a correction bridges before it restarts: the config's number, or fewer if
-  /// errors would not decay in every sequence of gaps up to it; for a pack the least of its lanes.
-  [[nodiscard]] constexpr int max_gap() const noexcept {
-    if constexpr (PackScalar<S>) {
-      int least = max_gap_[0];
-      for (int i = 1; i < lane_count<S>; ++i) least = max_gap_[i] < least ? max_gap_[i] : least;
-      return least;
-    } else {
-      return max_gap_;
-    }
-  }
+  /// errors would not decay in every sequence of gaps up to it.
+  [[nodiscard]] constexpr int max_gap() const noexcept { return max_gap_; }
 
   /// What is known of the plant.
   [[nodiscard]] constexpr const Model& model() const noexcept { return model_; }
@@ -483,6 +417,66 @@ class PredictorCorrector {
   /// The gain laws, for changing them.
   [[nodiscard]] constexpr Laws& laws() noexcept { return laws_; }
 
+  /// For packs and while all is well: whether no lane needs more than `step`. Then the laws are one
+  /// sample on.
+  ESOKIT_INLINE bool advance() noexcept {
+    if (!may_be_quick()) [[unlikely]]
+      return false;
+    advance_laws();
+    return true;
+  }
+
+  /// One sample, after `advance`. False, and nothing has changed, if it is not a good one. One test
+  /// for all faults: a bad y or u makes the new state non-finite.
+  ESOKIT_INLINE bool step(const S& y, const S& u_applied) noexcept {
+    Correction next{predicted_levels(u_applied)};
+    const bool looked = correct_levels<true>(next, y, 1u);
+    detail::keep_scalars(next.states);
+    if (!looked || !surely_finite(next.states)) [[unlikely]]
+      return false;
+    commit(next);
+    applied_input_ = u_applied;
+    return true;
+  }
+
+  /// The halves of it, the first after `advance_predict`.
+  /// @{
+  ESOKIT_INLINE bool advance_predict() noexcept {
+    advance_laws();
+    return true;
+  }
+  ESOKIT_INLINE bool predict_all(const S& u_applied) noexcept {
+    const LevelStates next = predicted_levels(u_applied);
+    if (!all(is_finite(probe(next)))) [[unlikely]]
+      return false;
+    count_missed();
+    states_ = next;
+    applied_input_ = u_applied;
+    return true;
+  }
+  ESOKIT_INLINE bool correct_all(const S& y) noexcept {
+    if (!(gap_ == 1 || gap_ == 0)) [[unlikely]]
+      return false;
+    Correction next{states_};
+    if (!correct_levels<true>(next, y, 1u) || !all(is_finite(probe(next.states)))) [[unlikely]]
+      return false;
+    commit(next);
+    gap_ = 0;
+    return true;
+  }
+  /// @}
+
+  /// `update` after the laws have advanced, for derived observers.
+  ESOKIT_INLINE Status update_advanced(const S& y, const S& u_applied) noexcept {
+    if (may_be_quick() && step(y, u_applied)) [[likely]]
+      return StepStatus::ok;
+    if constexpr (records<S>) {
+      return StepStatus::ok;
+    } else {
+      return update_guarded(y, u_applied);
+    }
+  }
+
   /// All data members, for derived classes.
   static constexpr auto fields(auto& o) noexcept {
     return detail::tie(o.states_, o.laws_, o.model_, o.innovation_, o.applied_input_, o.gap_,
@@ -495,7 +489,6 @@ class PredictorCorrector {
   friend struct detail::RecordAccess;
 
   using LevelStates = Array<State, Levels>;
-  using Plain = detail::PlainTwin<PredictorCorrector, S>;  ///< type of a lane
 
   /// The states in the order of the estimate, as in `scaled_estimate`.
   [[nodiscard]] ESOKIT_INLINE static constexpr State by_rows(const State& states) noexcept {
@@ -546,13 +539,8 @@ class PredictorCorrector {
   }
 
   /// The gaps that the laws bridge, at most `asked`.
-  static constexpr Lanes<std::uint16_t, S> bridged(const Laws& laws, int asked) noexcept {
-    Lanes<std::uint16_t, S> gaps{};
-    for (int i = 0; i < lane_count<S>; ++i) {
-      detail::of_lane(gaps, i) = static_cast<std::uint16_t>(detail::bridged_gap(
-          detail::get_lane<Array<detail::PlainTwin<Law, S>, Levels>>(laws, i), asked));
-    }
-    return gaps;
+  static constexpr std::uint16_t bridged(const Laws& laws, int asked) noexcept {
+    return static_cast<std::uint16_t>(detail::bridged_gap(laws, asked));
   }
 
   /// A gap longer than any max_gap.
@@ -569,45 +557,15 @@ class PredictorCorrector {
         innovations{};
   };
 
-  /// Calls `step` with the observer of each lane.
-  template <class Step>
-  ESOKIT_COLD constexpr Status each_lane(Step&& step) noexcept {
-    Status status{};
-    detail::for_each_lane<Plain>(*this, [&](Plain& lane, int i) { status[i] = step(lane, i); });
-    return status;
-  }
-
   constexpr Status shift_to(const LevelStates& next) noexcept {
-    if (!all(is_finite(probe(next)))) [[unlikely]] {
-      if constexpr (PackScalar<S>) {
-        return each_lane([&](Plain& lane, int i) {
-          auto lane_next = detail::LaneAccess::states(lane);
-          detail::copy_lane<false>(next, lane_next, i);
-          return detail::LaneAccess::shift_to(lane, lane_next);
-        });
-      } else {
-        return StepStatus::state_rejected;
-      }
-    }
+    if (!all(is_finite(probe(next)))) [[unlikely]]
+      return StepStatus::state_rejected;
     states_ = next;
     return StepStatus::ok;
   }
 
-  /// Number of samples that the next correction bridges; for a pack with equal lanes.
-  [[nodiscard]] constexpr unsigned elapsed() const noexcept {
-    if constexpr (PackScalar<S>) {
-      return 1u;
-    } else {
-      return gap_ > 1 ? gap_ : 1u;
-    }
-  }
-  [[nodiscard]] constexpr bool due_to_restart() const noexcept {
-    if constexpr (PackScalar<S>) {
-      return false;
-    } else {
-      return restarts();
-    }
-  }
+  /// Number of samples that the next correction bridges.
+  [[nodiscard]] constexpr unsigned elapsed() const noexcept { return gap_ > 1 ? gap_ : 1u; }
 
   ESOKIT_INLINE constexpr void advance_laws() noexcept {
     if constexpr (gain_law_traits<Law>.advances) {
@@ -786,90 +744,48 @@ class PredictorCorrector {
     }
   }
 
-  /// `update` after the laws have advanced.
-  ESOKIT_INLINE Status update_advanced(const S& y, const S& u_applied) noexcept {
-    if (may_be_quick()) [[likely]] {
-      // One test for all faults: a bad y or u makes the new state non-finite. The state is then
-      // discarded, and update_guarded finds the cause.
-      Correction step{predicted_levels(u_applied)};
-      const bool looked = correct_levels<true>(step, y, 1u);
-      detail::keep_scalars(step.states);
-      if (looked && surely_finite(step.states)) [[likely]] {
-        commit(step);
-        applied_input_ = u_applied;
-        return StepStatus::ok;
-      }
-    }
-    return update_guarded(y, u_applied);
-  }
-
-  // Packs are passed by reference: by value every step would have to keep them in memory for this
-  // call.
-  using Given = std::conditional_t<PackScalar<S>, const S&, S>;
-  ESOKIT_COLD Status update_guarded(Given y, Given u_applied) noexcept {
-    if constexpr (PackScalar<S>) {
-      return each_lane([&](Plain& lane, int i) {
-        return detail::LaneAccess::update_advanced(lane, y[i], u_applied[i]);
-      });
-    } else {
-      if constexpr (has_squares) {
-        if (gap_ == 0) {  // perhaps only the squares overflowed
-          Correction step{predicted_levels(u_applied)};
-          if (correct_levels<true>(step, y, 1u) && is_finite(probe(step.states))) {
-            commit(step);
-            applied_input_ = u_applied;
-            return StepStatus::ok;
-          }
+  ESOKIT_COLD Status update_guarded(S y, S u_applied) noexcept {
+    if constexpr (has_squares) {
+      if (gap_ == 0) {  // perhaps only the squares overflowed
+        Correction step{predicted_levels(u_applied)};
+        if (correct_levels<true>(step, y, 1u) && is_finite(probe(step.states))) {
+          commit(step);
+          applied_input_ = u_applied;
+          return StepStatus::ok;
         }
       }
-      const StepStatus predicted = predict_guarded(u_applied);
-      return predicted | correct(y);
     }
+    const StepStatus predicted = predict_advanced(u_applied);
+    return predicted | correct(y);
   }
 
-  Status predict_guarded(S u_applied) noexcept {
-    const LevelStates next = predicted_levels(u_applied);
-    if (!all(is_finite(probe(next)))) [[unlikely]] {
-      if constexpr (PackScalar<S>) {
-        return each_lane([&](Plain& lane, int i) {
-          return detail::LaneAccess::predict_rejecting(lane, u_applied[i]);
-        });
-      } else {
-        return predict_rejecting(u_applied);
-      }
+  Status predict_advanced(S u_applied) noexcept {
+    if (predict_all(u_applied)) [[likely]]
+      return StepStatus::ok;
+    if constexpr (records<S>) {
+      return StepStatus::ok;
+    } else {
+      return predict_rejecting(u_applied);
     }
-    count_missed();
-    states_ = next;
-    applied_input_ = u_applied;
-    return StepStatus::ok;
   }
 
   constexpr void count_missed() noexcept {
-    if constexpr (PackScalar<S>) {
-      for (std::uint16_t& gap : gap_.values) {
-        gap = static_cast<std::uint16_t>(gap + (gap < restart_due ? 1 : 0));
-      }
-    } else {
-      if (gap_ < restart_due) ++gap_;
+    for (int i = 0; i < lane_count<S>; ++i) {
+      std::uint16_t& gap = detail::of_lane(gap_, i);
+      gap = static_cast<std::uint16_t>(gap + (gap < restart_due ? 1 : 0));
     }
   }
 
   /// Handles a u or a state so large that the prediction is not finite.
-  ESOKIT_COLD StepStatus predict_rejecting(S u_applied) noexcept requires(!PackScalar<S>) {
-    LevelStates next = predicted_levels(u_applied);
+  ESOKIT_COLD StepStatus predict_rejecting(S u_applied) noexcept {
     count_missed();
-    if (is_finite(probe(next))) {  // a pack in which another lane has the fault
-      states_ = next;
-      applied_input_ = u_applied;
-      return StepStatus::ok;
-    }
     if (is_finite(u_applied) && !(detail::absolute(u_applied) > detail::absolute(applied_input_))) {
       // u is no larger than the last one, so it is not the cause.
       applied_input_ = u_applied;
       gap_ = restart_due;
       return StepStatus::prediction_dropped;
     }
-    next = predicted_levels(applied_input_);
+    const LevelStates next = predicted_levels(applied_input_);
     if (!is_finite(probe(next))) {
       // The state itself cannot be predicted, and perhaps never can again: the next y restarts the
       // observer.
@@ -881,13 +797,6 @@ class PredictorCorrector {
   }
 
   Status reset_scaled(const State& state) noexcept {
-    if constexpr (PackScalar<S> && !records<S>) {
-      return each_lane([&](Plain& lane, int i) {
-        auto lane_state = detail::LaneAccess::states(lane)[0];
-        detail::copy_lane<false>(state, lane_state, i);
-        return detail::LaneAccess::reset_scaled(lane, lane_state);
-      });
-    }
     LevelStates states;
     for (auto& level : states) level = state;
     for (std::size_t i = 1; i < Levels && adds_up; ++i) {

@@ -167,6 +167,16 @@ struct SettlingTime : FinalValue {
   double band;
 };
 
+/// A controller as a Measure sees it.
+template <class C>
+const auto& seen(const C& controller) noexcept {
+  if constexpr (requires { controller.together(); }) {
+    return controller.together();
+  } else {
+    return controller;
+  }
+}
+
 /// Whether all lanes of `Lanes` runs are computed at once.
 template <class P, class C, int Lanes>
 inline constexpr bool runs_in_packs = [] {
@@ -623,8 +633,10 @@ class MonteCarlo {
   struct Meter {
     explicit Meter(const Measure<Reduce, F>& m) : measure(m), sum(Reduce::template start<S>()) {}
 
-    template <class Sample, class Now>
-    ESOKIT_INLINE void add(const Sample& sample, const Now& controller) {
+    template <class Sample, class Control>
+    ESOKIT_INLINE void add(const Sample& sample, const Control& given) {
+      const auto& controller = detail::seen(given);
+      using Now = std::remove_cvref_t<decltype(controller)>;
       using Seconds = LaneScalar<S>;
       // Whether a sample is used must not depend on the rounding of t.
       const double t = static_cast<double>(sample.t);
