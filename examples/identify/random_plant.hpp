@@ -33,7 +33,8 @@ struct Truth {
 struct RandomLog {
   Truth truth;
   std::vector<double> u, y;
-  std::vector<double> time = {};  ///< s; empty: a row each sample time
+  std::vector<double> time = {};       ///< s; empty: a row each sample time
+  std::vector<double> reference = {};  ///< of the loop, row by row
 };
 
 /// Of a log: as it is, with a flexible mode, with a reference that never moves, of a joint under
@@ -201,6 +202,7 @@ inline RandomLog random_log(std::uint64_t seed, Kind kind = Kind::plain, double 
     }
     return kept;
   }
+  log.reference = reference;
   return log;
 }
 
