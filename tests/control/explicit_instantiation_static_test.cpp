@@ -54,6 +54,7 @@ template class KnownModel<LinearEso<1>, esokit_test::Friction<0, double>>;
 template class DualFeedbackAdrc<1>;
 template class Adrc<WrappedOutput<LinearEso<1>>>;
 template class Adrc<VariableTime<LinearEso<1>>>;
+template class DisturbanceCompensator<WrappedOutput<LinearEso<1>>>;
 template class Adrc<AlgebraicEso<1>>;
 template class Adrc<ExtendedStateFilter<1>>;
 template class NonlinearFeedback<1>;

@@ -430,7 +430,10 @@ class Adrc {
 
   /// For packs, see ControlLoop.
   /// @{
-  ESOKIT_INLINE bool advance() noexcept { return loop_.advance(); }
+  template <class O = Observer>
+  requires(detail::LaneAccess::steps<O>) ESOKIT_INLINE bool advance() noexcept {
+    return loop_.advance();
+  }
   template <class Given>
   ESOKIT_INLINE bool step(S& u, const S& y, const Given& reference) noexcept {
     if constexpr (std::is_same_v<Given, S>) {

@@ -176,8 +176,10 @@ class ControlLoop {
   }
 
   /// @cond
-  /// For packs: whether no lane needs more than the observer's step and the law; then this step.
-  ESOKIT_INLINE bool advance() noexcept {
+  /// For packs: whether no lane needs more than the observer's step and the law; then this step. A
+  /// template, as an explicit instantiation would ask it of every observer.
+  template <class O = Observer>
+  requires(detail::LaneAccess::steps<O>) ESOKIT_INLINE bool advance() noexcept {
     const bool ordinary = special_ == false || (mode_ == LoopMode::running && divider_ == 1);
     return ordinary && detail::LaneAccess::advance(observer_);
   }

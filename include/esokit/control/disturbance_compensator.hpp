@@ -189,11 +189,18 @@ class DisturbanceCompensator {
 
   /// For packs, see ControlLoop.
   /// @{
-  ESOKIT_INLINE bool advance() noexcept { return loop_.advance(); }
-  ESOKIT_INLINE bool step(S& u, const S& y, const S& base_output) noexcept {
+  template <class O = Observer>
+  requires(detail::LaneAccess::steps<O>) ESOKIT_INLINE bool advance() noexcept {
+    return loop_.advance();
+  }
+  template <class O = Observer>
+  requires(detail::LaneAccess::steps<O>) ESOKIT_INLINE
+      bool step(S& u, const S& y, const S& base_output) noexcept {
     return loop_.step_all(u, y, [&]() ESOKIT_INLINE_LAMBDA { return command(base_output); });
   }
-  S update_advanced(const S& y, const S& base_output) noexcept {
+  template <class O = Observer>
+  requires(detail::LaneAccess::steps<O>) S update_advanced(const S& y, const S& base_output)
+  noexcept {
     return loop_.step_advanced(y, [&] { return command(base_output); });
   }
   /// @}
