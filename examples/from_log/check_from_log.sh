@@ -415,6 +415,23 @@ for log in servo_relay_pid/{relay,pid_sine}.csv dfki_simple_pendulum/{ddp,direct
   verdict $? "$log: alarms '$alarms', status $status: $said"
 done
 
+# What is known of some of them by other means (examples/data/README.md).
+known() {  # known LEAST MOST FILE [OPTION...]: accepted, with a b0 in between
+  local least=$1 most=$2 status=0 b0
+  shift 2
+  run "$data/$1" "${@:2}" --no-design || status=$?
+  b0=$(sed -n 's/.*b0 = \([-0-9.e+]*\).*/\1/p' <<<"$said" | head -n 1)
+  [[ $said != *refused:* && -n $b0 ]] && awk -v b="$b0" -v l="$least" -v m="$most" 'BEGIN { exit !(b >= l && b <= m) }'
+  verdict $? "$*: b0 has to be $least to $most, got status $status: $said"
+}
+known 0.116 0.152 xl330_pendulum/kp100_sine.csv --u pwm_885 --y position_rad --order 2 --measured sin_pos
+known 0.0024 0.0030 tclab_steps/step.csv
+for log in tclab_steps/constant.csv esp32_motor_step/step.csv; do
+  run "$data/$log" --no-design
+  [[ $? == 3 && $said == *refused:* ]]
+  verdict $? "$log tells nothing: $said"
+done
+
 # ---- refused: a page that says what to record instead ----
 
 shows() {  # shows FIELD FILE [OPTION...]

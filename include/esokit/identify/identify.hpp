@@ -748,11 +748,20 @@ inline bool white(const Identified& found, const IdentifyOptions& options) {
   return found.correlation <= correlation_limit(found, options);
 }
 
+/// Half a row, s: what takes less is not seen.
+inline double half_row(const Identified& found) {
+  return 0.5 * found.averaged * found.log.sample_time;
+}
+
 /// Whether output error tells b0. Where y follows u within half a row, no machine was seen between
-/// them (y may have been logged before u, or b0 is lost in the noise): then nothing is confirmed.
+/// them (y may have been logged before u, or b0 is lost in the noise): then it confirms nothing but
+/// what nearly all of y says of a position, which u has to move for many rows.
 inline bool informed(const Identified& found) {
-  return found.second_opinion.informative() &&
-         found.latency.value >= 0.5 * found.averaged * found.log.sample_time;
+  const SecondOpinion& second = found.second_opinion;
+  if (!second.informative()) return false;
+  return found.latency.value >= half_row(found) ||
+         (found.order >= 2 && second.explained >= 0.95 && !(found.lead.time > 0.0) &&
+          std::abs(second.input_gain.value / found.input_gain.value - 1.0) <= 0.1);
 }
 
 /// Half width that b0 of a plateau within two octaves of the lowest bandwidth needs. There every
@@ -1134,8 +1143,13 @@ inline Identified study_rows(FitData rows, const std::vector<double>& along,
       result.in_motion = gain_in_motion(used, model, bounds, here.fit, speed);
     }
   }
-  result.input_gain = widened(result, options);
   if (!(result.held > 0.0)) result.lead = lead_of(used, model, bounds, here.fit);
+  result.input_gain = widened(result, options);
+  // The margins of a design have to hold for it, too.
+  if (const double unseen = half_row(result) - result.latency.value;
+      unseen > 0.0 && !white(result, options) && informed(result)) {
+    result.latency.half_width = std::max(result.latency.half_width, unseen);
+  }
   return result;
 }
 
