@@ -5,6 +5,7 @@
 
 #include <esokit/adapter/guarded.hpp>
 #include <esokit/control/control_loop.hpp>
+#include <esokit/control/experiment.hpp>
 #include <esokit/core/snapshot.hpp>
 #include <esokit/core/unroll.hpp>
 #include <esokit/gain/step_status.hpp>
