@@ -57,9 +57,8 @@ void interprets(const std::string& block, const Samples& samples) {
   const Folder folder;
   folder.write("block.st", block);
   folder.write("samples", samples.text());
-  const std::string script =
-      (std::filesystem::path(__FILE__).parent_path() / "structured_text.py").string();
-  EXPECT_TRUE(runs("python3 " + script + " " + folder.file("block.st") + " " +
+  const std::string script = ESOKIT_STRUCTURED_TEXT_INTERPRETER;
+  EXPECT_TRUE(runs("python3 '" + script + "' " + folder.file("block.st") + " " +
                    folder.file("samples") + " >/dev/null"));
 }
 
