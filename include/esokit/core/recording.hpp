@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <esokit/core/lanes.hpp>
 #include <esokit/core/scalar.hpp>
+#include <type_traits>
 #include <vector>
 
 namespace esokit {
@@ -171,7 +172,9 @@ class RecordingScalar {
   /// Zero.
   constexpr RecordingScalar() noexcept = default;
   /// A constant.
-  constexpr explicit RecordingScalar(double value) noexcept : value_(static_cast<V>(value)) {}
+  template <class Number>
+  requires(std::is_arithmetic_v<Number>) constexpr explicit RecordingScalar(Number value) noexcept
+      : value_(static_cast<V>(value)) {}
   /// Argument number `number` of a list. @param value with which the constants beside it are made
   RecordingScalar(OperationList& list, int number, V value)
       : value_(value), noted_{&list, list.note({.operation = Operation::argument, .a = number})} {}
