@@ -115,8 +115,8 @@ struct LaneAccess {
   static constexpr auto fields(Object& object) noexcept {
     return std::remove_const_t<Object>::fields(object);
   }
-  // Not constrained friend templates: Clang 16 takes their constraints for those of another
-  // template.
+  /// Not constrained friend templates: Clang 16 takes their constraints for those of another
+  /// template.
 #define ESOKIT_FOR_PACKS(name)                                                          \
   template <class Object, class... Given>                                               \
   ESOKIT_INLINE static constexpr auto name(Object& object, Given&&... given) noexcept { \

@@ -439,8 +439,8 @@ class PredictorCorrector {
     return true;
   }
 
-  /// The halves of it, the first after `advance_predict`.
-  /// @{
+  /// @cond
+  // The halves of it, the first after `advance_predict`.
   ESOKIT_INLINE bool advance_predict() noexcept {
     advance_laws();
     return true;
@@ -464,7 +464,7 @@ class PredictorCorrector {
     gap_ = 0;
     return true;
   }
-  /// @}
+  /// @endcond
 
   /// `update` after the laws have advanced, for derived observers.
   ESOKIT_INLINE Status update_advanced(const S& y, const S& u_applied) noexcept {
