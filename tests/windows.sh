@@ -158,6 +158,7 @@ units=(
   "control/adrc_law control/nonlinear_feedback control/pid_conversion control/retune control/tracking_differentiator control/smooth_profile"
   "control/experiment"
   "sim/plant sim/noise sim/counted_gaussian sim/signals sim/metrics analysis/dense identify/input_checks"
+  "sim/runge_kutta model/linear_plant"
 )
 
 launcher=()
