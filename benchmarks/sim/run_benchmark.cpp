@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <esokit/control/adrc.hpp>
 #include <esokit/core/pack.hpp>
+#include <esokit/core/packed.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/sim/counted_gaussian.hpp>
 #include <esokit/sim/gaussian.hpp>
@@ -146,31 +147,31 @@ void normal(benchmark::State& state, Random random, int lanes, const char* label
 
 /// What a Monte Carlo does, a pack of runs with noise at a time; the time is that of a sample of a
 /// lane. With AVX: --flags "-O2 -march=x86-64-v3".
-template <class S>
-void noisy(benchmark::State& state, std::optional<std::uint64_t> number, const char* label) {
-  using C = Adrc<LinearEso<2, S>>;
-  const auto made =
-      C::make(
-          {.observer = {.observer_bandwidth = S(100.0), .input_gain = S(50.0), .sample_time = S(T)},
-           .controller_bandwidth = S(10.0),
-           .limits = {.lower = S(-5.0), .upper = S(5.0)}})
-          .value();
-  const auto plant =
-      LinearPlant<2, S>::chain({.coefficients = {S(2.0), S(3.0)}, .input_gain = S(50.0)}).value();
+template <class P, class C>
+void noisy(benchmark::State& state, const P& plant, const C& made,
+           std::optional<std::uint64_t> number, const char* label) {
+  using S = typename P::scalar_type;
   constexpr int steps = samples / 10;
   while (state.KeepRunningBatch(steps * lane_count<S>)) {
     S most(0.0);
     auto end = sim::run(
         plant, made,
-        {.duration = steps * LaneScalar<S>(T),
-         .reference = S(1.0),
-         .noise = S(1e-3),
-         .number = number},
+        {.duration = steps * T, .reference = S(1.0), .noise = S(1e-3), .number = number},
         [&](const auto& sample) { most = select(most < sample.output, sample.output, most); });
     benchmark::DoNotOptimize(end);
     benchmark::DoNotOptimize(most);
   }
   state.SetLabel(label);
+}
+
+void noisy_one(benchmark::State& state, std::optional<std::uint64_t> number, const char* label) {
+  noisy(state, linear(), controller(), number, label);
+}
+
+void noisy_pack(benchmark::State& state, const char* label) {
+  constexpr int lanes = default_lanes<double>;
+  const Packed<LinearPlant<2>, lanes> plants(linear());
+  noisy(state, plants.together(), Packed<decltype(controller()), lanes>(controller()), 1, label);
 }
 
 void add_normal() {
@@ -185,13 +186,12 @@ void add_normal() {
     normal(state, CountedGaussian<Pack<double>>(1, RandomStream::noise, 0), default_lanes<double>,
            "vs normal/gaussian; vs normal/counted");
   });
+  benchmark::RegisterBenchmark("noisy/gaussian",
+                               [](benchmark::State& state) { noisy_one(state, std::nullopt, ""); });
   benchmark::RegisterBenchmark(
-      "noisy/gaussian", [](benchmark::State& state) { noisy<double>(state, std::nullopt, ""); });
-  benchmark::RegisterBenchmark("noisy/counted", [](benchmark::State& state) {
-    noisy<double>(state, 1, "vs noisy/gaussian");
-  });
+      "noisy/counted", [](benchmark::State& state) { noisy_one(state, 1, "vs noisy/gaussian"); });
   benchmark::RegisterBenchmark("noisy/counted_pack", [](benchmark::State& state) {
-    noisy<Pack<double>>(state, 1, "vs noisy/gaussian; vs noisy/counted");
+    noisy_pack(state, "vs noisy/gaussian; vs noisy/counted");
   });
 }
 
