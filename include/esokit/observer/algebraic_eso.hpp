@@ -172,6 +172,7 @@ class AlgebraicEso
 
  private:
   friend struct detail::LaneAccess;
+  friend struct detail::RecordAccess;
   static constexpr auto fields(auto& o) noexcept {
     using BaseOf =
         std::conditional_t<std::is_const_v<std::remove_reference_t<decltype(o)>>, const Base, Base>;
