@@ -47,6 +47,22 @@ inline std::string c_function(const ListWriter& writer, const std::string& prefi
   return text + "  return true;\n}\n\n";
 }
 
+/// What any text needs.
+inline Words c_common_words(const ListWriter& writer, const CodeOptions& options) {
+  std::string upper = options.name;
+  for (char& c : upper) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  return {{"$ZERO", writer.number(0)},
+          {"$ONE", writer.number(1)},
+          {"$word", writer.single() ? "uint32_t" : "uint64_t"},
+          {"$exponent", writer.single() ? "0x7f800000u" : "0x7ff0000000000000u"},
+          {"$fabs", writer.single() ? "fabsf" : "fabs"},
+          {"$real", writer.real()},
+          {"$NAME", upper},
+          {"$name", options.name},
+          // The last, so that no word in it is taken for a key.
+          {"$COMMENT", options.comment.empty() ? "" : " * " + options.comment + "\n"}};
+}
+
 /// What the texts need of any design.
 inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
   const std::string real = writer.real();
@@ -87,6 +103,34 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
             "u;\n  o->gaps = " + std::to_string(wrap.gaps) +
             "u;\n  o->doubts = " + std::to_string(wrap.doubts) +
             "u;\n  o->begun = " + (wrap.begun ? "1u" : "0u") + ";\n";
+  }
+  const GuardNumbers& guard = design.guard;
+  std::string found;
+  std::string trusts;
+  std::string leaks;
+  std::string bounds;
+  if (guard.on) {
+    members += "  " + real + " trust; /* see $name_set_trust */\n";
+    init += "  o->trust = " + writer.number(guard.trust) + ";\n";
+    if (guard.bound > 0) {
+      bounds = "  const $real most = " + writer.number(guard.bound) +
+               ";\n  $real below = $ZERO;\n  $real sum;\n";
+    } else {
+      bounds = "  (void)o;\n";
+    }
+    for (int level = 0; level < guard.levels; ++level) {
+      const std::string d = "o->z" + std::to_string(design.order + 1) +
+                            (level > 0 ? "_level" + std::to_string(level + 1) : std::string());
+      const std::string before = "before[" + std::to_string(level) + "]";
+      found += (level > 0 ? ", " : "") + d;
+      trusts += "    " + d + " = " + before + " + (o->trust * (" + d + " - " + before + "));\n";
+      leaks += "    " + d + " = " + d + " - (" + writer.number(guard.leak) + " * " + d + ");\n";
+      if (guard.bound > 0) {
+        bounds += "  sum = below + " + d + ";\n  if ($fabs(sum) > most) {\n    " + d +
+                  " = ((sum > $ZERO) ? most : -most) - below;\n  }\n";
+        if (level + 1 < guard.levels) bounds += "  below = below + " + d + ";\n";
+      }
+    }
   }
   const LawNumbers& law = design.law;
   if (law.kind == RunningLaw::schedule) {
@@ -141,19 +185,28 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
     const std::string number = std::to_string(row);
     rows += "  case " + number + "u:\n    (void)estimate_" + number + "(o, &u);\n    break;\n";
   }
-  std::string upper = design.options.name;
-  for (char& c : upper) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
   std::string vectors;
   for (const auto& [y, r, result] : design.samples) {
     vectors += "    {" + writer.number(y) + ", " + writer.number(r) + ", " + writer.number(result) +
                "},\n";
   }
-  const auto& comment = design.options.comment;
-  return {
+  Words words = {
       {"$include", "#include"},  // not written in the texts: scripts look for such lines
       {"$MEMBERS", members},
       {"$TIME", writer.number(design.sample_time)},
       {"$CORRECT", corrects},
+      {"$OF_GUARD",
+       guard.on ? "/* From the next correction on, those of the disturbance count so much, 0 .. 1. "
+                  "*/\nvoid $name_set_trust($name_state *o, $real trust);\n\n"
+                : ""},
+      {"$KEEP_BOUND", bounds},
+      {"$TRUST", trusts},
+      {"$LEAKS", guard.leak > 0 ? "true" : "gated"},
+      {"$LEAK", leaks},
+      {"$REFUSED", gated ? "($NAME_MEASUREMENT_REJECTED | $NAME_OUTLIER_REJECTED)"
+                         : "$NAME_MEASUREMENT_REJECTED"},
+      {"$FOUND", found},
+      {"$LEVELS", std::to_string(guard.levels)},
       {"$TABLE", runs ? "" : table},
       {"$OF_TABLE", runs ? "" : "    const $real *k = gains[elapsed - 1u];\n"},
       {"$ACCEPT", accept},
@@ -193,20 +246,13 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
       {"$GATE_THRESHOLD", writer.number(gate.threshold)},
       {"$GATE_MOST", std::to_string(gate.most_in_a_row)},
       {"$SHARE", writer.number(1.0 / 64)},
-      {"$ZERO", writer.number(0)},
-      {"$ONE", writer.number(1)},
       {"$LENGTH", length},
       {"$NEWEST", std::to_string(design.line.empty() ? 0 : design.line.size() - 1)},
       {"$VECTORS", vectors},
-      {"$SAMPLES", std::to_string(design.samples.size())},
-      {"$word", writer.single() ? "uint32_t" : "uint64_t"},
-      {"$exponent", writer.single() ? "0x7f800000u" : "0x7ff0000000000000u"},
-      {"$fabs", writer.single() ? "fabsf" : "fabs"},
-      {"$real", real},
-      {"$NAME", upper},
-      {"$name", design.options.name},
-      // The last, so that no word in it is taken for a key.
-      {"$COMMENT", comment.empty() ? "" : " * " + comment + "\n"}};
+      {"$SAMPLES", std::to_string(design.samples.size())}};
+  const Words common = c_common_words(writer, design.options);
+  words.insert(words.end(), common.begin(), common.end());
+  return words;
 }
 
 /// What the texts need of a controller.
@@ -345,6 +391,15 @@ inline CCode c_code(const RecordedDesign& design) {
     if (controls) layers += c_source_delay_fill;
     predict = update = "delayed";
   }
+  if (design.guard.on) {  // the outermost
+    add(c_source_guarded);
+    if (!controls) add(c_source_guarded_correct);
+    correct = update = "guarded";
+    layers += filled(controls ? c_source_guarded_rest : c_source_guarded_restart,
+                     {{"$below_restart", restart}, {"$below_rest", rest}});
+    rest = "rest_guarded";
+    restart = "restart_guarded";
+  }
   words.insert(words.end(), {{"predict_$top", "predict_" + predict},
                              {"correct_$top", "correct_" + correct},
                              {"update_$top", "update_" + update},
@@ -381,8 +436,9 @@ inline CCode c_code(const RecordedDesign& design) {
 /// Written are LinearEso, also with a set of poles, HalfGainEso, ReducedOrderEso, CascadeEso,
 /// AdjustableBandwidthEso, NonlinearEso, ModelEso, PlantEso and their cascades (not with
 /// `follows_speed`), AlgebraicEso, ExtendedStateFilter (in its modes recursive and frozen, without
-/// a nominal model), these in DelayedInput and OutlierGate or WrappedOutput, and Adrc of both forms
-/// and DisturbanceCompensator around them. Others do not compile.
+/// a nominal model), these in DelayedInput and OutlierGate or WrappedOutput, LinearEso and
+/// CascadeEso in Guarded, too (bound, leak and trust; no pin, hold or changing b0), and Adrc of
+/// both forms and DisturbanceCompensator around them. Others do not compile.
 /// @param object as `make` returned it: its state is that of `init`
 /// @return error for a name that is no identifier, a comment that would end the one it stands in, a
 ///         number of samples of the self-test out of range, or a gain law of your own whose gain
@@ -398,12 +454,14 @@ Expected<CCode, Error<typename Object::scalar_type>> to_c(const Object& object,
 /// What cannot be written yet, by name.
 template <class Other>
 void to_c(const Other&, const CodeOptions& = {}) {
-  static_assert(detail::Writable<Other>,
-                "esokit: to_c writes LinearEso, HalfGainEso, ReducedOrderEso, CascadeEso, "
-                "AdjustableBandwidthEso, NonlinearEso, ModelEso, PlantEso, AlgebraicEso and "
-                "ExtendedStateFilter, these in DelayedInput and OutlierGate or WrappedOutput, and "
-                "Adrc and DisturbanceCompensator around them; no other gains, adapters or "
-                "controllers yet");
+  static_assert(
+      detail::Writable<Other>,
+      "esokit: to_c writes LinearEso, HalfGainEso, ReducedOrderEso, CascadeEso, "
+      "AdjustableBandwidthEso, NonlinearEso, ModelEso, PlantEso, AlgebraicEso and "
+      "ExtendedStateFilter, these in DelayedInput and OutlierGate or WrappedOutput, on the "
+      "chain with one extended state in Guarded, and "
+      "Adrc and DisturbanceCompensator around them; no other gains, adapters or "
+      "controllers yet");
 }
 
 }  // namespace esokit

@@ -83,7 +83,7 @@ $real $name_estimate(const $name_state *o, unsigned row);
 )";
 
 /// Both headers.
-inline constexpr const char* c_header_tail = R"(#ifdef $NAME_SELF_TEST
+inline constexpr const char* c_header_tail = R"($OF_GUARD#ifdef $NAME_SELF_TEST
 /* 0, or the number of the first sample whose result differs from that of the design by more than
  * `tolerance`; 0 asks for equal numbers. */
 int $name_self_test($real tolerance);
@@ -538,6 +538,74 @@ inline constexpr const char* c_source_running_rest =
   const bool good = rest_at(o, y, u);
   if (good) {
 $LAW_BEGIN  }
+  return good;
+}
+
+)";
+
+/// Guarded around it.
+inline constexpr const char* c_source_guarded = R"(/* Keeps the disturbance within its bound. */
+static void keep_bound($name_state *o)
+{
+$KEEP_BOUND}
+
+/* After a correction; before: what each level had found until then. */
+static void keep_guards($name_state *o, const $real before[$LEVELS], unsigned status)
+{
+  const bool gated = o->trust < $ONE;
+  if (gated && ((status & $NAME_RESTARTED) == 0u)) {
+$TRUST  }
+  if (($LEAKS) && ((status & $REFUSED) == 0u)) {
+$LEAK  }
+  keep_bound(o);
+}
+
+static unsigned update_guarded($name_state *o, $real y, $real u)
+{
+  const $real before[$LEVELS] = {$FOUND};
+  const unsigned status = update_$below(o, y, u);
+  keep_guards(o, before, status);
+  return status;
+}
+
+void $name_set_trust($name_state *o, $real trust)
+{
+  if (is_finite(trust)) {
+    o->trust = (trust < $ZERO) ? $ZERO : ((trust < $ONE) ? trust : $ONE);
+  }
+}
+
+)";
+/// Of an observer alone, too.
+inline constexpr const char* c_source_guarded_correct =
+    R"(static unsigned correct_guarded($name_state *o, $real y)
+{
+  const $real before[$LEVELS] = {$FOUND};
+  const unsigned status = correct_$below(o, y);
+  keep_guards(o, before, status);
+  return status;
+}
+
+)";
+/// Its starts.
+inline constexpr const char* c_source_guarded_rest =
+    R"(static bool rest_guarded($name_state *o, $real y, $real u)
+{
+  const bool good = $below_rest(o, y, u);
+  if (good) {
+    keep_bound(o);
+  }
+  return good;
+}
+
+)";
+inline constexpr const char* c_source_guarded_restart =
+    R"(static bool restart_guarded($name_state *o, $real y)
+{
+  const bool good = $below_restart(o, y);
+  if (good) {
+    keep_bound(o);
+  }
   return good;
 }
 

@@ -261,9 +261,11 @@ class ListWriter {
     };
     for (std::size_t i = 0; i < list.size(); ++i) {
       if (!need[i] || list[i].operation == Operation::argument) continue;
+      // What is chosen from has names: MISRA 12.1.
+      const int times = list[i].operation == Operation::choose ? 2 : 1;
       use(list[i].a, 1);
-      use(list[i].b, 1);
-      use(list[i].c, 1);
+      use(list[i].b, times);
+      use(list[i].c, times);
     }
     for (const int output : call.outputs) use(output, 2);
     for (std::size_t i = 0; i < live.size(); ++i) {
