@@ -176,7 +176,11 @@ class Library {
   template <class F>
   void find(F& function, const char* name) const {
     ASSERT_TRUE(has(name)) << name;
-    function = reinterpret_cast<F>(dlsym(handle_, name));
+    if constexpr (std::is_same_v<F, const void*>) {
+      function = dlsym(handle_, name);
+    } else {
+      function = reinterpret_cast<F>(dlsym(handle_, name));
+    }
   }
 
  private:

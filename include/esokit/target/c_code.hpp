@@ -2,8 +2,10 @@
 /// to_c: a finished controller or observer as C99, written from its recorded calls.
 #pragma once
 
+#include <algorithm>
 #include <cctype>
 #include <cstddef>
+#include <cstdint>
 #include <esokit/core/expected.hpp>
 #include <esokit/target/c_text.hpp>
 #include <esokit/target/list_writer.hpp>
@@ -16,6 +18,9 @@ namespace esokit {
 struct CCode {
   std::string header{};  ///< text of `name.h`
   std::string source{};  ///< text of `name.c`
+  /// With CodeOptions::settings_in_struct: text of the struct for a file of its own, where it is
+  /// not that of `name.c` but of another design, for `name_adopt`.
+  std::string settings{};
 };
 
 namespace detail {
@@ -68,8 +73,18 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
   const std::string real = writer.real();
   std::string members;
   std::string init;
+  const bool opens = design.options.settings_in_struct;
+  if (opens) {
+    members = "  const $name_settings *settings;\n";
+    init = "  o->settings = &$name_$SET;\n";
+  }
+  std::string settings;
   for (std::size_t i = 0; i < design.members.size(); ++i) {
     if (!design.live[i]) continue;
+    if (opens && design.settings[i]) {
+      settings += "  " + real + " " + design.members[i] + ";\n";
+      continue;
+    }
     members += "  " + real + " " + design.members[i] + ";\n";
     init += "  o->" + design.members[i] + " = " + writer.number(design.numbers[i]) + ";\n";
   }
@@ -155,8 +170,10 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
   if (!runs) {
     const std::size_t count = design.gap_gains[0].size();
     for (std::size_t i = 0; i < count; ++i) call_gains += ", k[" + std::to_string(i) + "]";
-    table = "  static const " + real + " gains[" + rows_of_table + "][" + std::to_string(count) +
-            "] = { /* after 1, 2, .. samples */\n" + table + "  };\n";
+    table = opens ? ""
+                  : "  static const " + real + " gains[" + rows_of_table + "][" +
+                        std::to_string(count) + "] = { /* after 1, 2, .. samples */\n" + table +
+                        "  };\n";
   }
   const std::string by_table = "correct_by(o, y" + call_gains + ")";
   const std::string corrects =
@@ -207,8 +224,16 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
                          : "$NAME_MEASUREMENT_REJECTED"},
       {"$FOUND", found},
       {"$LEVELS", std::to_string(guard.levels)},
+      {"$SETTINGS", settings},
+      {"$SET", design.options.settings_name},
+      {"$SIZE", std::to_string(runs ? 0 : design.gap_gains[0].size())},
+      {"$BOOL", opens ? "$include <stdbool.h>\n" : ""},
+      {"$ADOPT", opens ? c_header_adopt : ""},
+      {"$TRACK", design.is_controller ? "    (void)applied(o, o->u_last);\n" : ""},
       {"$TABLE", runs ? "" : table},
-      {"$OF_TABLE", runs ? "" : "    const $real *k = gains[elapsed - 1u];\n"},
+      {"$OF_TABLE", runs    ? ""
+                    : opens ? "    const $real *k = o->settings->gains[elapsed - 1u];\n"
+                            : "    const $real *k = gains[elapsed - 1u];\n"},
       {"$ACCEPT", accept},
       {"$LAW_BEGIN", runs ? "    law_begin(o);\n" : ""},
       {"$BLANKED", blanked},
@@ -280,8 +305,9 @@ inline Words c_loop_words(const RecordedDesign& design, const ListWriter& writer
   const std::string of_y = only("!is_finite(y)", "return $NAME_STATE_REJECTED");
   const std::string of_u = only("!is_finite(u)", "return $NAME_INPUT_REJECTED");
   return {
-      {"$LIMITS",
-       ", u within " + writer.number(design.lower) + " .. " + writer.number(design.upper)},
+      {"$LIMITS", design.options.settings_in_struct ? std::string()
+                                                    : ", u within " + writer.number(design.lower) +
+                                                          " .. " + writer.number(design.upper)},
       {"$REFERENCE",
        design.compensates ? "the u0 of the controller that is helped" : "the reference"},
       {"$PHASE_MEMBER", divides ? "  uint16_t phase; /* a measurement is due at 0 */\n" : ""},
@@ -331,10 +357,11 @@ inline Words c_observer_words(const RecordedDesign& design) {
 }
 
 /// The two files of a design.
-inline CCode c_code(const RecordedDesign& design) {
+inline CCode c_texts(const RecordedDesign& design, const std::string& mark) {
   ListWriter writer(c_language, design.single);
   writer.members = design.members;
   writer.live = design.live;
+  writer.settings = design.settings;
   std::string lists;
   for (std::size_t i = 0; i < design.names.size(); ++i) {
     const std::string& name = design.names[i].name;
@@ -411,11 +438,46 @@ inline CCode c_code(const RecordedDesign& design) {
   const char* law_text = design.law.kind == RunningLaw::schedule ? c_source_schedule
                          : runs                                  ? c_source_filter
                                                                  : "";
-  return {text(c_header_head) + text(controls ? c_header_controller : c_header_observer) +
-              text(c_header_tail),
-          text(c_source_head) + lists + text(law_text) + text(c_source_observer_part) +
+  const bool opens = design.options.settings_in_struct;
+  std::string set;
+  if (opens) {
+    set = "const $name_settings $name_$SET = {\n  $DESIGN";
+    for (std::size_t i = 0; i < design.members.size(); ++i) {
+      if (design.live[i] && design.settings[i]) set += ",\n  " + writer.number(design.numbers[i]);
+    }
+    set += ",\n  {\n";
+    for (const auto& row : design.gap_gains) {
+      std::string line;
+      for (const double k : row) line += (line.empty() ? "    {" : ", ") + writer.number(k);
+      set += line + "},\n";
+    }
+    set += "  }\n};\n\n";
+    words.insert(words.begin(), {"$DESIGN", mark});
+  }
+  set = text(set);
+  return {text(c_header_head) + (opens ? text(c_header_settings) : "") +
+              text(controls ? c_header_controller : c_header_observer) + text(c_header_tail),
+          text(c_source_head) + set + lists + text(law_text) + text(c_source_observer_part) +
               text(layers) + text(controls ? c_source_controller : c_source_observer) +
-              text(c_source_self_test)};
+              (opens ? text(c_source_adopt) : "") + text(c_source_self_test),
+          opens ? "#include \"" + design.options.name + ".h\"\n\n" + set : ""};
+}
+
+/// The texts; settings bear a mark of what else is in them.
+inline CCode c_code(const RecordedDesign& design) {
+  if (!design.options.settings_in_struct) return c_texts(design, "");
+  RecordedDesign rest = design;
+  for (double& number : rest.numbers) number = 0;
+  for (auto& row : rest.gap_gains) std::fill(row.begin(), row.end(), 0.0);
+  rest.samples.clear();
+  rest.options.comment = {};
+  rest.options.settings_name = {};
+  const CCode same = c_texts(rest, "");
+  std::uint32_t mark = 2166136261u;  // FNV-1a
+  for (const char c : same.header + same.source) {
+    mark = (mark ^ static_cast<unsigned char>(c)) * 16777619u;
+  }
+  return c_texts(design, std::to_string(mark) + "u");
 }
 
 }  // namespace detail
@@ -424,8 +486,9 @@ inline CCode c_code(const RecordedDesign& design) {
 /// estimates in physical units, and a self-test that compares with the C++ (compiled if
 /// `NAME_SELF_TEST` is defined); of a controller also start, of an observer reset, predict and
 /// correct. What is done at a sample is recorded from its own calls, so there is no second
-/// implementation; settings are constants. Bad and missing samples, gaps, restarts, the start hold
-/// and safe mode are those of the object, too.
+/// implementation; settings are constants, or, with `settings_in_struct`, gains and limits in a
+/// struct that `name_adopt` changes while it runs, as `adopt` does. Bad and missing samples, gaps,
+/// restarts, the start hold and safe mode are those of the object, too.
 ///
 /// Compiled without contraction (-std=c99 in GCC) it equals the C++ bit for bit, as far as tested:
 /// after any bad sample, gap, report or start. Where the design computes a power or an exponential

@@ -16,7 +16,7 @@ $COMMENT * T = $TIME s, b0 = $GAIN$LIMITS.
  *
  * Compile with -std=c99 or -ffp-contract=off: then it equals the C++ bit for bit. */
 
-$include <stdint.h>
+$BOOL$include <stdint.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -32,6 +32,35 @@ extern "C" {
 #define $NAME_RESTARTED 16u /* too many samples were missing */
 #define $NAME_STATE_REJECTED 32u /* start: y is not finite or too large */
 $GATE_FLAG
+)";
+
+/// Settings that can be changed while it runs.
+inline constexpr const char* c_header_settings =
+    R"(/* What may be changed while it runs, by $name_adopt. */
+typedef struct {
+  uint32_t design; /* of which text: others are refused */
+$SETTINGS  $real gains[$ROWS][$SIZE]; /* of the observer, after 1, 2, .. samples */
+} $name_settings;
+
+extern const $name_settings $name_$SET;
+
+)";
+inline constexpr const char* c_header_adopt =
+    R"(/* Other settings, of a design with the same sample time, b0 and structure, from now on; estimates
+ * and output are kept. False, and nothing changes, if they are of another text. */
+bool $name_adopt($name_state *o, const $name_settings *settings);
+
+)";
+inline constexpr const char* c_source_adopt =
+    R"(bool $name_adopt($name_state *o, const $name_settings *settings)
+{
+  const bool fits = settings->design == $DESIGN;
+  if (fits) {
+    o->settings = settings;
+$TRACK  }
+  return fits;
+}
+
 )";
 
 /// The header of a controller.
@@ -83,7 +112,7 @@ $real $name_estimate(const $name_state *o, unsigned row);
 )";
 
 /// Both headers.
-inline constexpr const char* c_header_tail = R"($OF_GUARD#ifdef $NAME_SELF_TEST
+inline constexpr const char* c_header_tail = R"($OF_GUARD$ADOPT#ifdef $NAME_SELF_TEST
 /* 0, or the number of the first sample whose result differs from that of the design by more than
  * `tolerance`; 0 asks for equal numbers. */
 int $name_self_test($real tolerance);

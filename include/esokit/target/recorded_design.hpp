@@ -33,6 +33,10 @@ struct CodeOptions {
   std::string comment{};            ///< at the head: which machine, which design; no marks of a
                                     ///< comment
   int self_test_samples = 100;      ///< samples of the self-test, 1 .. 10000
+  /// Gains, those of the law, and limits in a struct that can be changed while it runs, instead of
+  /// constants: in C, for gains that do not depend on the innovation or the time.
+  bool settings_in_struct = false;
+  std::string settings_name = "design";  ///< of that struct, behind `name`: an identifier
 };
 
 namespace detail {
@@ -111,6 +115,7 @@ struct RecordedDesign {
   std::vector<RecordedCall> calls{};   ///< one for each name
   std::vector<std::string> members{};  ///< a name for each number of the object
   std::vector<bool> live{};            ///< whether its state needs it
+  std::vector<bool> settings{};        ///< whether it is a setting, see CodeOptions; or empty
   std::vector<double> numbers{};       ///< what it is at first
   int size = 0;                        ///< N: rows of the estimate
   int order = 0;                       ///< the row of the disturbance
@@ -177,6 +182,26 @@ struct RecordAccess {
             loop.stay_safe_,
             static_cast<double>(loop.hold_input_),
             static_cast<double>(loop.safe_input_)};
+  }
+
+  /// Gains, those of the law, and limits. @param c a controller or an observer
+  template <class Number, class C>
+  static void find_settings(C& c, std::vector<const Number*>& found) {
+    const auto take = [&](auto& part) {
+      for (Number* one : numbers_of<Number>(part)) found.push_back(one);
+    };
+    if constexpr (requires { c.loop_; }) {
+      take(c.loop_.limiter_);
+      std::erase(found, &c.loop_.limiter_.last());
+      if constexpr (requires { c.law_; }) {
+        take(c.law_);
+        take(c.fast_law_);
+      }
+      if constexpr (requires { c.gain_; }) take(c.gain_);
+      find_settings(c.observer(), found);
+    } else {
+      for (auto& law : c.laws_) take(law);
+    }
   }
 
   /// The gain laws of all levels.
@@ -566,16 +591,21 @@ template <class V>
   const auto letter = [](char c) {
     return std::isalpha(static_cast<unsigned char>(c)) != 0 || c == '_';
   };
-  bool is_name = !options.name.empty() && letter(options.name[0]);
-  for (const char c : options.name) {
-    is_name = is_name && (letter(c) || std::isdigit(static_cast<unsigned char>(c)) != 0);
-  }
+  const auto is_identifier = [&](const std::string& name) {
+    bool fine = !name.empty() && letter(name[0]);
+    for (const char c : name) {
+      fine = fine && (letter(c) || std::isdigit(static_cast<unsigned char>(c)) != 0);
+    }
+    return fine;
+  };
   bool ends = false;
   for (const char* mark : {"/*", "*/", "(*", "*)"}) {
     ends = ends || options.comment.find(mark) != std::string::npos;
   }
   Rules<V> rules;
-  rules.require(is_name, "name", V(0), "must be an identifier of C")
+  rules.require(is_identifier(options.name), "name", V(0), "must be an identifier of C")
+      .require(is_identifier(options.settings_name), "settings_name", V(0),
+               "must be an identifier of C")
       .require(1 <= options.self_test_samples && options.self_test_samples <= 10000,
                "self_test_samples", static_cast<V>(options.self_test_samples), "must be 1 .. 10000")
       .require(!ends, "comment", V(0), "must not begin or end a comment");
@@ -612,8 +642,28 @@ class DesignRecorder {
   template <class Of, class NameOf>
   [[nodiscard]] Check<V> record(const Of& of, const NameOf& name_of) {
     add_observer(of);
-    const auto recorded = recorder_.record();
-    if (!recorded) return recorded.error();
+    const auto closed = recorder_.record();
+    if (!closed) return closed.error();
+    auto recorded = closed;
+    if (design.options.settings_in_struct) {
+      if (!design.gain_is_kept) {
+        return Error<V>{"settings_in_struct", V(1),
+                        "needs gains that depend neither on the innovation nor on the time"};
+      }
+      if (design.softens) {
+        return Error<V>{"settings_in_struct", V(1), "is not written for a law that softens"};
+      }
+      recorder_.keep_open([](auto& c) {
+        std::vector<const Number*> found;
+        RecordAccess::find_settings<Number>(c, found);
+        return found;
+      });
+      recorded = recorder_.record();
+      if (!recorded) return recorded.error();
+      for (std::size_t i = 0; i < closed->moves.size(); ++i) {
+        design.settings.push_back(recorded->moves[i] && !closed->moves[i]);
+      }
+    }
     auto object = Recorder<Subject>::as_recorded(subject_);
     const auto numbers = numbers_of<Number>(object);
     const Number* first = &of(object).predicted_measurement();
