@@ -105,11 +105,15 @@
 #include <esokit/gain/switched_gain.hpp>
 #include <esokit/gain/switching_certificate.hpp>
 #include <esokit/identify/fit.hpp>
+#include <esokit/identify/gain_evidence.hpp>
+#include <esokit/identify/identified.hpp>
 #include <esokit/identify/identify.hpp>
+#include <esokit/identify/innovations_filter.hpp>
 #include <esokit/identify/input_checks.hpp>
 #include <esokit/identify/intervals.hpp>
 #include <esokit/identify/log.hpp>
 #include <esokit/identify/measured_columns.hpp>
+#include <esokit/identify/order_fits.hpp>
 #include <esokit/identify/plateau.hpp>
 #include <esokit/identify/second_opinion.hpp>
 #include <esokit/identify/sinusoids.hpp>
@@ -181,6 +185,7 @@
 #include <esokit/target/recorder.hpp>
 #include <esokit/target/structured_text.hpp>
 #include <esokit/tune/controller.hpp>
+#include <esokit/tune/controller_source.hpp>
 #include <esokit/tune/families.hpp>
 #include <esokit/tune/loop_cost.hpp>
 #include <esokit/tune/lqg.hpp>
@@ -190,4 +195,6 @@
 #include <esokit/tune/rivals.hpp>
 #include <esokit/tune/search.hpp>
 #include <esokit/tune/tune.hpp>
+#include <esokit/tune/tune_search.hpp>
 #include <esokit/tune/tuned_code.hpp>
+#include <esokit/tune/tuning.hpp>
