@@ -161,13 +161,17 @@
 #include <esokit/sim/filtered_step.hpp>
 #include <esokit/sim/gaussian.hpp>
 #include <esokit/sim/loop_steps.hpp>
+#include <esokit/sim/measure.hpp>
 #include <esokit/sim/metrics.hpp>
 #include <esokit/sim/monte_carlo.hpp>
+#include <esokit/sim/monte_carlo_config.hpp>
 #include <esokit/sim/noise.hpp>
 #include <esokit/sim/peak.hpp>
 #include <esokit/sim/plant.hpp>
+#include <esokit/sim/plant_step.hpp>
 #include <esokit/sim/recording.hpp>
 #include <esokit/sim/run.hpp>
+#include <esokit/sim/run_config.hpp>
 #include <esokit/sim/run_signal.hpp>
 #include <esokit/sim/runge_kutta.hpp>
 #include <esokit/sim/series.hpp>
