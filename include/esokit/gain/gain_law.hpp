@@ -61,6 +61,7 @@ namespace detail {
 template <class Gain, int Size, class S>
 concept GainOf = std::convertible_to<Gain, ScaledGain<Size, S>>;
 
+/// @cond
 // clang-format off
 // The hooks. HOOK: its concept, what declares it, its name, its signature. MISTAKEN: a member
 // function that would never be called, as its name is almost that of the hook above.
@@ -115,6 +116,8 @@ concept HasNoMisspelledHook =
 template <class Law, int Size, class S>
 concept GainLawAsDeclared = DeclaresTraits<Law, GainLawTraits> ESOKIT_GAIN_LAW_HOOKS(
     ESOKIT_AND_GAIN_LAW_HOOK, ESOKIT_NOTHING);
+
+/// @endcond
 
 template <class Law, int Size, class S>
 concept Switched =

@@ -137,6 +137,7 @@ concept AdaptsAsDeclared = !observer_traits<O>.adapts || requires(typename O::Co
   { config.observer } -> std::same_as<typename O::Adapted::Config&>;
 };
 
+/// @cond
 // clang-format off
 // The hooks, as in gain/gain_law.hpp.
 #define ESOKIT_OBSERVER_HOOKS(HOOK, MISTAKEN)                                                     \
@@ -179,6 +180,8 @@ ESOKIT_OBSERVER_HOOKS(ESOKIT_OBSERVER_HOOK, ESOKIT_MEMBER_FUNCTION)
 
 #define ESOKIT_AND_OBSERVER_HOOK(Hook, ...) &&detail::Hook##AsDeclared<O>
 #define ESOKIT_AND_NOT_MISTAKEN_OBSERVER(name) &&!detail::calls_##name<O>
+/// @endcond
+
 }  // namespace detail
 
 /// The type has everything that `traits` declares, and nothing that it does not declare, nor a
