@@ -137,6 +137,12 @@ concept AdaptsAsDeclared = !observer_traits<O>.adapts || requires(typename O::Co
   { config.observer } -> std::same_as<typename O::Adapted::Config&>;
 };
 
+template <class O>
+concept TakesOneOrSeveral = requires(O& o, const typename O::scalar_type& s) {
+  o.measured(s);
+}
+|| O::inputs > 1;
+
 /// @cond
 // clang-format off
 // The hooks, as in gain/gain_law.hpp.
@@ -146,7 +152,7 @@ concept AdaptsAsDeclared = !observer_traits<O>.adapts || requires(typename O::Co
   HOOK(DelaysInput, delays_input, fill_input, o.fill_input(s);)                                   \
   MISTAKEN(fill_inputs)                                                                           \
   HOOK(TakesMeasured, takes_measured, revise_measured, o.revise_measured(); o.settle_measured();  \
-       requires O::inputs > 1 || requires { o.measured(s); };)                                    \
+       requires TakesOneOrSeveral<O>;)                                                            \
   HOOK(VariesTime, varies_time, set_step_time, { o.set_step_time(s) } -> std::same_as<Check<S>>;  \
        { fixed.step_time() } -> std::convertible_to<S>;                                           \
        { fixed.bridges(1) } -> std::same_as<bool>;)                                               \
