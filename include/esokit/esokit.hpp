@@ -48,6 +48,7 @@
 #include <esokit/control/nonlinear_feedback.hpp>
 #include <esokit/control/pid_conversion.hpp>
 #include <esokit/control/predictive_adrc.hpp>
+#include <esokit/control/reference.hpp>
 #include <esokit/control/scaled_law.hpp>
 #include <esokit/control/smooth_profile.hpp>
 #include <esokit/control/softening.hpp>

@@ -56,7 +56,7 @@ constexpr int order_of() {
 /// `update` takes (r, r', ..) too. A concept: Clang 14 wants every parameter of a
 /// requires-expression in a member to exist.
 template <class T>
-concept TakesReferences = requires(T& o, typename T::scalar_type s, typename T::Reference r) {
+concept TakesReferences = requires(T& o, typename T::scalar_type s, typename T::Reference::All r) {
   o.update(s, r);
   o.update_without_measurement(r);
 };
@@ -551,12 +551,12 @@ class Driver final : public Game {
       if constexpr (TakesReferences<T>) {
         add(a, "update(y, references)", [](Driver& d) {
           const S y = d.number();
-          const auto r = d.template state<typename T::Reference>();
+          const auto r = d.template state<typename T::Reference::All>();
           d.control(&y, nullptr, [&] { return d.object_->update(y, r); });
         });
         add(a, "applied(u), update(y, references)", [](Driver& d) {
           const S y = d.number();
-          const auto r = d.template state<typename T::Reference>();
+          const auto r = d.template state<typename T::Reference::All>();
           const S u = d.number();
           d.control(&y, &u, [&] {
             d.object_->applied(u);
@@ -564,7 +564,7 @@ class Driver final : public Game {
           });
         });
         add(a, "update_without_measurement(references)", [](Driver& d) {
-          const auto r = d.template state<typename T::Reference>();
+          const auto r = d.template state<typename T::Reference::All>();
           d.control(nullptr, nullptr, [&] { return d.object_->update_without_measurement(r); });
         });
       }
@@ -726,7 +726,7 @@ class Driver final : public Game {
     });
     add(a, "control, applied, prepare(references)", [](Driver& d) {
       const S y = d.number(), u = d.number();
-      const auto r = d.template state<typename T::Reference>();
+      const auto r = d.template state<typename T::Reference::All>();
       const S from = d.object_->output();
       d.put_out(d.quietly([&] { return d.object_->control(y); }), from);
       const StepStatus reported = d.quietly([&] { return d.object_->applied(u); });
@@ -743,7 +743,7 @@ class Driver final : public Game {
       d.quietly([&] { d.object_->set_reference(r); });
     });
     add(a, "set_reference(references)", [](Driver& d) {
-      const auto r = d.template state<typename T::Reference>();
+      const auto r = d.template state<typename T::Reference::All>();
       d.quietly([&] { d.object_->set_reference(r); });
     });
     add(a, "reset", [](Driver& d) {

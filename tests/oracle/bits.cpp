@@ -185,9 +185,8 @@ void call(Bits& bits, O& o, const Draw& draw, const Fill& fill) {
     if constexpr (requires { o.update_without_measurement(u); }) {
       if (c > 90) bits.add(o.update_without_measurement(u));
     }
-    if constexpr (requires(const S(&list)[2]) { o.update(x, list); }) {
-      const S moving[] = {u, v};
-      if (c > 80) bits.add(o.update(x, moving));
+    if constexpr (requires { o.update(x, {u, v}); }) {
+      if (c > 80) bits.add(o.update(x, {u, v}));
     }
     bits.add(o.update(x, u));
   }

@@ -151,8 +151,7 @@ struct Moving {
   static constexpr int arguments = 3;
   template <class O, class T>
   static std::vector<T> call(O& o, const std::vector<T>& in, bool& fine) {
-    const T reference[] = {in[1], in[2]};
-    const T u = o.update(in[0], reference);
+    const T u = o.update(in[0], {in[1], in[2]});
     if constexpr (PlainScalar<T>) fine = o.status() == StepStatus::ok;
     return {u};
   }
