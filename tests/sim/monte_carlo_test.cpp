@@ -368,7 +368,6 @@ template <class S>
 struct Pendulum {
   template <class T>
   using with_scalar = Pendulum<T>;
-  static constexpr auto fields(auto& pendulum) { return esokit::detail::tie(pendulum.rate); }
 
   Vector<S, 2> operator()(double, const Vector<S, 2>& x, const S& u) const {
     const S cubic = x(0) - x(0) * x(0) * x(0) * S(1.0 / 6);

@@ -156,11 +156,7 @@ class AlgebraicGain {
   friend struct detail::LaneAccess;
   using Plain = detail::PlainTwin<AlgebraicGain, S>;  ///< type of a lane
 
-  static constexpr auto fields(auto& o) noexcept {
-    return detail::tie(o.gain_, o.coefficients_, o.ratios_u_, o.ratios_h_, o.final_poles_, o.shift_,
-                       o.decay_, o.size_bracket_, o.settled_below_, o.power_, o.bracket_,
-                       o.start_index_, o.least_age_, o.age_, o.pending_, o.settled_);
-  }
+  static constexpr int data_members = 16;
 
   /// True if all lanes of a pack are at the same place of the schedule: then one recursion serves
   /// all.

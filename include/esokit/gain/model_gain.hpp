@@ -321,7 +321,7 @@ class ModelGain {
 
  private:
   friend struct detail::LaneAccess;
-  static constexpr auto fields(auto& o) noexcept { return detail::tie(o.gains_, o.longest_step_); }
+  static constexpr int data_members = 2;
 
   ModelGain() = default;
 

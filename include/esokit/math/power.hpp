@@ -67,7 +67,7 @@ class Power {
  private:
   using Kind = detail::PowerKind;
   friend struct detail::LaneAccess;
-  static constexpr auto fields(auto& o) noexcept { return detail::tie(o.exponent_, o.kind_); }
+  static constexpr int data_members = 2;
 
   [[nodiscard]] S raised(const S& x, Kind kind) const noexcept {
     using std::pow;

@@ -172,6 +172,10 @@ class MatrixModel {
     return !(change > S(0));
   }
 
+ private:
+  friend struct detail::LaneAccess;
+  static constexpr int data_members = 5;
+
  protected:
   /// @param input_gain b @param sample_time T, s
   MatrixModel(const S& input_gain, const S& sample_time) noexcept

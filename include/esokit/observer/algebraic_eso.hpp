@@ -136,7 +136,7 @@ class AlgebraicEso
     if constexpr (PackScalar<S>) {
       return published_row(Row, Base::template estimate<Row>(), blanked());
     } else {
-      return blanked() ? std::get<Row>(published_) : Base::template estimate<Row>();
+      return blanked() ? std::get<Row>(rest_.published) : Base::template estimate<Row>();
     }
   }
 
@@ -172,11 +172,6 @@ class AlgebraicEso
 
  private:
   friend struct detail::LaneAccess;
-  static constexpr auto fields(auto& o) noexcept {
-    using BaseOf =
-        std::conditional_t<std::is_const_v<std::remove_reference_t<decltype(o)>>, const Base, Base>;
-    return detail::tie(static_cast<BaseOf&>(o), o.published_);
-  }
 
   [[nodiscard]] const Law& law() const noexcept { return std::get<0>(this->laws()); }
   [[nodiscard]] Law& law() noexcept { return std::get<0>(this->laws()); }
@@ -186,11 +181,11 @@ class AlgebraicEso
   }
 
   void publish(const Estimate& estimate) noexcept {
-    for (int r = 0; r < N; ++r) published_[static_cast<std::size_t>(r)] = estimate(r);
+    for (int r = 0; r < N; ++r) rest_.published[static_cast<std::size_t>(r)] = estimate(r);
   }
   [[nodiscard]] Estimate published() const noexcept {
     Estimate estimate;
-    for (int r = 0; r < N; ++r) estimate(r) = published_[static_cast<std::size_t>(r)];
+    for (int r = 0; r < N; ++r) estimate(r) = rest_.published[static_cast<std::size_t>(r)];
     return estimate;
   }
 
@@ -216,7 +211,7 @@ class AlgebraicEso
   template <class Mask>
   [[nodiscard]] S published_row(int row, S computed, const Mask& blanked_now) const noexcept {
     for (int i = 0; i < lane_count<S>; ++i) {
-      if (blanked_now[i]) computed[i] = published_[static_cast<std::size_t>(row)][i];
+      if (blanked_now[i]) computed[i] = rest_.published[static_cast<std::size_t>(row)][i];
     }
     return computed;
   }
@@ -228,11 +223,13 @@ class AlgebraicEso
     return status;
   }
 
-  Array<S, N> published_ = [] {
-    Array<S, N> zero;
-    zero.fill(S(0.0));
-    return zero;
-  }();
+  struct {
+    Array<S, N> published = [] {
+      Array<S, N> zero;
+      zero.fill(S(0.0));
+      return zero;
+    }();
+  } rest_;
 };
 
 /// Distinguishes the type in snapshots.

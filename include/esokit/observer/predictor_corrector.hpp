@@ -478,10 +478,7 @@ class PredictorCorrector {
   }
 
   /// All data members, for derived classes.
-  static constexpr auto fields(auto& o) noexcept {
-    return detail::tie(o.states_, o.laws_, o.model_, o.innovation_, o.applied_input_, o.gap_,
-                       o.max_gap_, o.squares_suffice_);
-  }
+  static constexpr int data_members = 8;
 
  private:
   friend struct detail::LaneAccess;
