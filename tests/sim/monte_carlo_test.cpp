@@ -470,8 +470,8 @@ TEST(MonteCarlo, AsksEveryControllerForPacks) {
   using Swinging = ModelEso<ModelParts{.order = 2, .resonators = 1}>;
   const auto swing = [](auto& config) { config.observer.model.resonators[0].frequency = 20; };
   EXPECT_EQ(lanes_of<Adrc<LinearEso<2>>>(), 4);
-  EXPECT_EQ(lanes_of<Adrc<Swinging>>(swing), 1);
-  EXPECT_EQ(lanes_of<DisturbanceCompensator<Swinging>>(swing), 1);
+  EXPECT_EQ(lanes_of<Adrc<Swinging>>(swing), 4);
+  EXPECT_EQ(lanes_of<DisturbanceCompensator<Swinging>>(swing), 4);
   EXPECT_EQ(lanes_of<Adrc<Own>>(), 1);
   EXPECT_EQ(lanes_of<Adrc<Guarded<LinearEso<2>>>>(), 1);
   EXPECT_EQ((lanes_of<Adrc<DelayedInput<LinearEso<2>, 4>>>()), 1);
@@ -479,7 +479,7 @@ TEST(MonteCarlo, AsksEveryControllerForPacks) {
   EXPECT_EQ(lanes_of<Adrc<OutlierGate<LinearEso<2>>>>(), 1);
   EXPECT_EQ((lanes_of<Adrc<PlantEso<2, ModelParts{.order = 2}>>>(
                 [](auto& config) { config.observer.model.plant = servo(); })),
-            1);
+            4);
 }
 
 TEST(MonteCarlo, TakesNonlinearPlantsInPacks) {

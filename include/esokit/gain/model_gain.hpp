@@ -332,7 +332,7 @@ class ModelGain {
   }
 
   Array<ScaledGain<Size, S>, detail::gain_of_step(MostBridged) + 1> gains_{};
-  int longest_step_ = 1;
+  Lanes<int, S> longest_step_{1};
 };
 
 /// Distinguishes the type in snapshots.

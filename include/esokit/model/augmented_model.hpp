@@ -98,7 +98,7 @@ struct PartsShape {
 };
 
 /// a! / b!.
-template <SingleScalar S>
+template <PlainScalar S>
 constexpr S factorial_ratio(int a, int b) noexcept {
   S ratio(1);
   for (int j = b + 1; j <= a; ++j) ratio = ratio * static_cast<S>(j);
@@ -183,9 +183,10 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
       .follows_speed = Parts.follows_speed,
   };
 
-  /// The same with another scalar. A model that follows a speed branches on it and is not recorded.
-  template <SingleScalar T>
-  requires(!(Parts.follows_speed && records<T>)) using with_scalar = AugmentedModel<Parts, T>;
+  /// The same with another scalar. A model that follows a speed branches on it: it is not recorded,
+  /// and its packs go lane by lane.
+  template <Scalar T>
+  requires(!Parts.follows_speed || PlainScalar<T>) using with_scalar = AugmentedModel<Parts, T>;
 
   using Settings = PartsSettings<Parts, S>;  ///< settings of make
 
@@ -253,7 +254,8 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
           S& weight = std::get<i>(next);
           weight = -(last * std::get<i>(poles));
           if constexpr (i > 0) weight = weight + std::get<i - 1>(row);
-          of_plant = of_plant - weight * detail::factorial_ratio<S>(i, n + k) * std::get<lf + i>(x);
+          const S ratio(detail::factorial_ratio<LaneScalar<S>>(i, n + k));
+          of_plant = of_plant - weight * ratio * std::get<lf + i>(x);
         });
         row = next;
       });

@@ -29,7 +29,7 @@ struct ModelPattern {
 /// sensor come first.
 /// @tparam Shape `order`, `size`, `measured_rows` (states before y), `degree(state)`, and
 /// `pattern`, which elements are not zero
-template <class Shape, SingleScalar S>
+template <class Shape, Scalar S>
 class MatrixModel {
  public:
   static constexpr int order = Shape::order;                  ///< of the law

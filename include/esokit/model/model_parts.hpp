@@ -58,7 +58,7 @@ struct Resonance {
 };
 
 /// A sine at the present time: q = amplitude sin(phase).
-template <SingleScalar S>
+template <Scalar S>
 struct Phasor {
   S amplitude;  ///< unit of the disturbance
   S phase;      ///< rad

@@ -74,7 +74,7 @@ struct PlantShape {
 /// plant (an actuator, too) at exp(-omega_o T).
 /// @tparam States length of x @tparam Parts uses `order` (the relative degree from u to y),
 /// `sensor`, `constants`, `resonators` and `first_order`; everything else is in the plant
-template <int States, ModelParts Parts, SingleScalar S = double>
+template <int States, ModelParts Parts, Scalar S = double>
 class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S> {
   using Shape = detail::PlantShape<States, Parts>;
   using Base = MatrixModel<Shape, S>;
@@ -525,7 +525,7 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
 };
 
 /// Distinguishes the type in snapshots.
-template <int States, ModelParts Parts, SingleScalar S>
+template <int States, ModelParts Parts, Scalar S>
 inline constexpr std::uint32_t type_tag<LinearPlantModel<States, Parts, S>> =
     make_type_tag<S>("LinearPlantModel", States, Parts.order, Parts.sensor, Parts.constants,
                      Parts.resonators, Parts.first_order);
