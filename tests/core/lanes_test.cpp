@@ -130,8 +130,8 @@ TEST(Lanes, ArePutBackOneByOne) {
 TEST(Lanes, AreVisitedInOrder) {
   Packed all = packed();
   int calls = 0;
-  esokit::detail::for_each_lane<Plain>(all, [&](Plain& one, int i) {
-    EXPECT_EQ(i, calls++);
+  esokit::detail::for_each_lane<Plain>(all, [&](Plain& one) {
+    EXPECT_EQ(one.number, ++calls);
     one.number = -one.number;
   });
   EXPECT_EQ(calls, 4);

@@ -108,7 +108,7 @@ struct IsOptional<std::optional<T>> : std::true_type {};
 /// ways would be ambiguous.
 struct AnyMember {
   template <class T>
-  requires(!IsOptional<T>::value) constexpr operator T() const noexcept;
+  requires(!IsOptional<T>::value) operator T() const;
 };
 /// The number of data members of an aggregate.
 template <class T, class... Given>
@@ -391,13 +391,18 @@ template <class Plain, class Packed>
   return plain;
 }
 
-/// Calls f(plain, i) for each lane of `packed` and stores the changed `plain` in it.
+/// Calls f(plain) for each lane of `packed` and stores the changed `plain` in it. What is plain
+/// itself is its only lane.
 template <class Plain, class Packed, class Function>
-constexpr void for_each_lane(Packed& packed, Function&& f) noexcept {
-  for (int i = 0; i < lane_count<typename Packed::scalar_type>; ++i) {
-    Plain plain = get_lane<Plain>(packed, i);
-    f(plain, i);
-    set_lane(packed, plain, i);
+constexpr void for_each_lane(Packed& packed, const Function& f) noexcept {
+  if constexpr (std::is_same_v<Plain, Packed>) {
+    f(packed);
+  } else {
+    for (int i = 0; i < lane_count<typename Packed::scalar_type>; ++i) {
+      Plain plain = get_lane<Plain>(packed, i);
+      f(plain);
+      set_lane(packed, plain, i);
+    }
   }
 }
 

@@ -159,7 +159,7 @@ class RiccatiGain {
         note(0);
         recur_from_correction();
       } else {
-        detail::for_each_lane<Plain>(*this, [](Plain& lane, int) { lane.advance(); });
+        detail::for_each_lane<Plain>(*this, [](Plain& lane) { lane.advance(); });
       }
     } else {
       if (rests()) [[likely]] {
