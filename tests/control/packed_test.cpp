@@ -363,7 +363,10 @@ TEST(Packed, AKnownModelInVariableTime) {
       [](const auto& o) { return seen(o).and_also(o.step_time()); });
 }
 
-TEST(Packed, ACascadeWithAModel) { expect_lanes<Modelled>(observe, seen); }
+TEST(Packed, ACascadeWithAModel) {
+  static_assert(esokit::Packed<Modelled::Type, 4>::at_once);
+  expect_lanes<Modelled>(observe, seen);
+}
 
 const auto control = [](auto& c, const auto& x, int k) {
   using T = std::remove_cvref_t<decltype(x[0])>;

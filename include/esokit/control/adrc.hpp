@@ -267,9 +267,7 @@ class Adrc {
  private:
   friend struct detail::LaneAccess;
   friend struct detail::RecordAccess;
-  static constexpr auto fields(auto& o) noexcept {
-    return detail::tie(o.loop_, o.law_, o.fast_law_, o.soft_);
-  }
+  static constexpr int data_members = 5;
 
   using Loop = ControlLoop<Observer>;
   using Law = AdrcLaw<order, S>;

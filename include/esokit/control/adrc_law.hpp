@@ -137,9 +137,7 @@ class AdrcLaw {
 
  private:
   friend struct detail::LaneAccess;
-  static constexpr auto fields(auto& o) noexcept {
-    return detail::tie(o.gains_, o.inverse_input_gain_, o.input_gain_);
-  }
+  static constexpr int data_members = 3;
 
   AdrcLaw() = default;
 

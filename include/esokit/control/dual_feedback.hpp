@@ -198,9 +198,7 @@ class DualFeedbackAdrc {
   template <int OtherOrder, Scalar Other, int OtherExtension, class OtherOperator,
             class OtherFeedback, class OtherPlacement>
   friend class DualFeedbackAdrc;
-  static constexpr auto fields(auto& o) noexcept {
-    return detail::tie(o.form_, o.limiter_, o.pending_, o.measured_, o.wanted_, o.status_);
-  }
+  static constexpr int data_members = 6;
   using Form = FilterForm<size, S>;
   using States = Array<S, size>;
   static constexpr bool delta = std::is_same_v<Operator, DeltaOperator>;

@@ -37,12 +37,6 @@ struct FilterForm {
   Array<S, Size + 1> measurement{};  ///< N_y, unit of u per unit of y
   Array<S, Size + 1> input{};        ///< N_u, the first is zero
   S reference{};                     ///< k_r, unit of u per unit of y
-
-  /// @cond
-  static constexpr auto fields(auto& f) noexcept {
-    return detail::tie(f.denominator, f.measurement, f.input, f.reference);
-  }
-  /// @endcond
 };
 
 namespace detail {
