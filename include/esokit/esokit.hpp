@@ -37,9 +37,7 @@
 #include <esokit/control/controller.hpp>
 #include <esokit/control/cycle_analysis.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
-#include <esokit/control/dual_feedback.hpp>
 #include <esokit/control/experiment.hpp>
-#include <esokit/control/filter_form.hpp>
 #include <esokit/control/gain_probe.hpp>
 #include <esokit/control/health.hpp>
 #include <esokit/control/health_text.hpp>

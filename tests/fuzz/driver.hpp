@@ -61,10 +61,6 @@ concept TakesReferences = requires(T& o, typename T::scalar_type s, typename T::
   o.update_without_measurement(r);
 };
 
-/// The transfer-function form integrates what it is told, and is not told of limits: no way back.
-template <class T>
-inline constexpr bool winds_up = false;
-
 /// N of the observer, where an adapter or controller is around it.
 template <class T>
 struct Nonlinear {
@@ -993,19 +989,6 @@ class Driver final : public Game {
             } else {
               return distance(object_->observer(), y);
             }
-          });
-    } else if constexpr (requires(const T& o) { o.form(); } && !winds_up<T>) {
-      settle(
-          [&](const S& y) {
-            object_->applied(S(0));
-            (void)object_->update(y, y);
-            return object_->status();
-          },
-          [&](const S&) {
-            // What rounding of y makes of u.
-            double unit = std::abs(static_cast<double>(object_->form().reference));
-            for (const S& n : object_->form().measurement) unit += std::abs(static_cast<double>(n));
-            return std::abs(static_cast<double>(object_->requested())) / unit;
           });
     }
   }

@@ -15,7 +15,6 @@
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
-#include <esokit/control/dual_feedback.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
@@ -34,7 +33,6 @@
 #include <esokit_before/adapter/wrapped_output.hpp>
 #include <esokit_before/control/adrc.hpp>
 #include <esokit_before/control/disturbance_compensator.hpp>
-#include <esokit_before/control/dual_feedback.hpp>
 #include <esokit_before/control/predictive_adrc.hpp>
 #include <esokit_before/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit_before/observer/algebraic_eso.hpp>
@@ -366,13 +364,6 @@ const auto predictive = [](auto& c, double factor) {
   controller(c, factor);
 };
 ESOKIT_COMPARE(predictive_adrc, predictive, PredictiveAdrc<LinearEso<2>>)
-const auto dual = [](auto& c, double factor) {
-  c.observer_bandwidth = 20 * factor;
-  c.input_gain = 2 * factor;
-  c.sample_time = 0.01;
-  controller(c, factor);
-};
-ESOKIT_COMPARE(dual_feedback, dual, DualFeedbackAdrc<2>)
 
 }  // namespace oracle_bits
 }  // namespace esokit_test

@@ -15,7 +15,6 @@
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
-#include <esokit/control/dual_feedback.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/nonlinear_feedback.hpp>
 #include <esokit/control/predictive_adrc.hpp>
