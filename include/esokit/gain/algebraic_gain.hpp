@@ -89,16 +89,12 @@ class AlgebraicGain {
   /// Goes to the next sample of the schedule. If one of the first N samples is not corrected, the
   /// deadbeat property is lost, and the schedule restarts.
   ESOKIT_INLINE constexpr void advance() noexcept {
-    if constexpr (PackScalar<S>) {
-      if (settled_ == true) [[likely]]
-        return;
-      if (!together()) [[unlikely]] {
-        advance_apart();
-        return;
-      }
+    if (settled_ == true) [[likely]]
+      return;
+    if (together()) [[likely]] {
       advance_schedule();
     } else {
-      if (!settled_) advance_schedule();
+      advance_apart();
     }
   }
 
@@ -155,22 +151,16 @@ class AlgebraicGain {
   friend struct detail::RecordAccess;
   using Plain = detail::PlainTwin<AlgebraicGain, S>;  ///< type of a lane
 
-  static constexpr auto fields(auto& o) noexcept {
-    return detail::tie(o.gain_, o.coefficients_, o.ratios_u_, o.ratios_h_, o.final_poles_, o.shift_,
-                       o.decay_, o.size_bracket_, o.settled_below_, o.power_, o.bracket_,
-                       o.start_index_, o.least_age_, o.age_, o.pending_, o.settled_);
-  }
+  static constexpr int data_members = 16;
 
   /// True if all lanes of a pack are at the same place of the schedule: then one recursion serves
-  /// all.
-  template <class = S>
+  /// all. Always true of a plain one that has not settled.
   [[nodiscard]] constexpr bool together() const noexcept {
-    return age_ == age_[0] && pending_ == pending_[0] && settled_ == false &&
-           start_index_ == start_index_[0];
+    return age_ == common_age() && pending_ == detail::of_lane(pending_, 0) && settled_ == false &&
+           start_index_ == common_start();
   }
-  template <class = S>
   ESOKIT_COLD constexpr void advance_apart() noexcept {
-    detail::for_each_lane<Plain>(*this, [](Plain& lane, int) { lane.advance(); });
+    detail::for_each_lane<Plain>(*this, [](Plain& lane) { lane.advance(); });
   }
   /// Age of the lanes, if they are together.
   [[nodiscard]] constexpr std::uint32_t common_age() const noexcept {
@@ -199,13 +189,8 @@ class AlgebraicGain {
     }
     push();
     set_gain();
-    if constexpr (PackScalar<S>) {
-      if (!all(std::get<0>(ratios_u_) > settled_below_)) [[unlikely]]
-        settle_lanes();
-    } else {
-      if (all(settled_below_ >= std::get<0>(ratios_u_)) && age_ > least_age_) [[unlikely]]
-        settle();
-    }
+    if (!all(std::get<0>(ratios_u_) > settled_below_)) [[unlikely]]
+      detail::for_each_lane<Plain>(*this, [](Plain& lane) { lane.settle_if_due(); });
   }
 
   /// The poles at this place of the schedule, once it is no longer deadbeat.
@@ -340,20 +325,10 @@ class AlgebraicGain {
     gain_ = current_gain<Size, S>(weights);
   }
 
-  ESOKIT_COLD void settle() noexcept {
+  ESOKIT_COLD void settle_if_due() noexcept {
+    if (!all(settled_below_ >= std::get<0>(ratios_u_)) || age_ <= least_age_) return;
     settled_ = true;
     gain_ = current_gain<Size, S>(final_poles_.weights());
-  }
-
-  // For packs only. A template, because Clang 14 instantiates all other members of a class.
-  template <class = S>
-  ESOKIT_COLD void settle_lanes() noexcept {
-    for (int i = 0; i < lane_count<S>; ++i) {
-      if (!(settled_below_[i] >= std::get<0>(ratios_u_)[i]) || age_[i] <= least_age_[i]) continue;
-      Plain lane = detail::get_lane<Plain>(*this, i);
-      lane.settle();
-      detail::set_lane(*this, lane, i);
-    }
   }
 
   ScaledGain<Size, S> gain_{};

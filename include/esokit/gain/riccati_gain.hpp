@@ -159,7 +159,7 @@ class RiccatiGain {
         note(0);
         recur_from_correction();
       } else {
-        detail::for_each_lane<Plain>(*this, [](Plain& lane, int) { lane.advance(); });
+        detail::for_each_lane<Plain>(*this, [](Plain& lane) { lane.advance(); });
       }
     } else {
       if (rests()) [[likely]] {
@@ -299,13 +299,8 @@ class RiccatiGain {
 
  private:
   friend struct detail::LaneAccess;
+  static constexpr int data_members = 17;
   friend struct detail::RecordAccess;
-  static constexpr auto fields(auto& o) noexcept {
-    return detail::tie(o.now_, o.since_, o.mode_, o.place_, o.current_measurement_, o.transition_,
-                       o.measurement_, o.start_, o.noise_, o.start_inflation_, o.unit_,
-                       o.noise_trace_, o.trace_weights_, o.rule_, o.diagonal_noise_, o.limit_,
-                       o.table_);
-  }
   using Plain = detail::PlainTwin<RiccatiGain, S>;  ///< type of a lane
   template <int OtherSize, Scalar Other, int OtherTable, class OtherTransition>
   friend class RiccatiGain;
@@ -330,10 +325,6 @@ class RiccatiGain {
     S inflation{};    ///< theta
     S growth{1.0};    ///< 1 + theta
     S shrink{1.0};    ///< 1 / (1 + theta)
-
-    static constexpr auto fields(auto& p) noexcept {
-      return detail::tie(p.gain, p.factor, p.share, p.rest, p.inflation, p.growth, p.shrink);
-    }
   };
 
   static constexpr std::size_t index(int i) noexcept { return static_cast<std::size_t>(i); }

@@ -154,10 +154,6 @@ struct EqualSampledPoles {
     }
     return weights;
   }
-
-  /// @cond
-  static constexpr auto fields(auto& poles) noexcept { return detail::tie(poles.contraction); }
-  /// @endcond
 };
 
 /// Gain of a correction after `samples` sample times, scaled with one sample time.

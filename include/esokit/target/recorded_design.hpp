@@ -212,7 +212,7 @@ struct RecordAccess {
   /// A correction with gains from elsewhere, `gains[level][row]`.
   template <class O, class S, class Gains>
   static void correct(O& o, const S& y, const Gains& gains) noexcept {
-    typename O::Correction step{o.states_};
+    typename O::Correction step{o.kept_.states};
     const bool fine = o.correct_by(
         step, y, [&](auto level, const S&) -> const auto& { return gains[std::size_t{level}]; });
     if (fine && all(is_finite(o.probe(step.states)))) o.commit(step);
