@@ -216,7 +216,9 @@ void adopts(std::uint64_t seed) {
       EXPECT_TRUE(mine.adopt(set == 0 ? first : second));
       EXPECT_TRUE(adopt(state.data(), sets[set]));
     }
-    if (set == 2) EXPECT_FALSE(adopt(state.data(), sets[2]));
+    if (set == 2) {
+      EXPECT_FALSE(adopt(state.data(), sets[2]));
+    }
     V given = r;
     if constexpr (!requires { mine.gains(); }) given = (r - y) / V(8);
     const V u = mine.update(y, given);

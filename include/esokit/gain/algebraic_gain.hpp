@@ -328,8 +328,9 @@ class AlgebraicGain {
   ESOKIT_COLD void settle_if_due() noexcept {
     if (!all(settled_below_ >= std::get<0>(ratios_u_)) || age_ <= least_age_) return;
     settled_ = true;
-    gain_ = current_gain<Size, S>(final_poles_.weights());
+    stand();
   }
+  constexpr void stand() noexcept { gain_ = current_gain<Size, S>(final_poles_.weights()); }
 
   ScaledGain<Size, S> gain_{};
   Array<S, coefficient_count> coefficients_{};

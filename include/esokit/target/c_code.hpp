@@ -208,6 +208,7 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
                "},\n";
   }
   Words words = {
+      {"$BOOL", opens ? "$include <stdbool.h>\n" : ""},
       {"$include", "#include"},  // not written in the texts: scripts look for such lines
       {"$MEMBERS", members},
       {"$TIME", writer.number(design.sample_time)},
@@ -225,9 +226,7 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
       {"$FOUND", found},
       {"$LEVELS", std::to_string(guard.levels)},
       {"$SETTINGS", settings},
-      {"$SET", design.options.settings_name},
       {"$SIZE", std::to_string(runs ? 0 : design.gap_gains[0].size())},
-      {"$BOOL", opens ? "$include <stdbool.h>\n" : ""},
       {"$ADOPT", opens ? c_header_adopt : ""},
       {"$TRACK", design.is_controller ? "    (void)applied(o, o->u_last);\n" : ""},
       {"$TABLE", runs ? "" : table},
@@ -258,6 +257,7 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
       {"$LAST", std::to_string(design.size - 1)},
       {"$FIRST", design.first_state},
       {"$INIT", init},
+      {"$SET", design.options.settings_name},
       {"$GATE_FLAG",
        std::string(gated || law.watches
                        ? "#define $NAME_OUTLIER_REJECTED 64u /* y was too far from what "

@@ -36,7 +36,8 @@ $GATE_FLAG
 
 /// Settings that can be changed while it runs.
 inline constexpr const char* c_header_settings =
-    R"(/* What may be changed while it runs, by $name_adopt. */
+    R"(/* What may be changed while it runs, by $name_adopt. (MISRA C:2012 8.7, advisory: those of other
+ * designs are in other files.) */
 typedef struct {
   uint32_t design; /* of which text: others are refused */
 $SETTINGS  $real gains[$ROWS][$SIZE]; /* of the observer, after 1, 2, .. samples */

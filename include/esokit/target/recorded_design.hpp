@@ -184,23 +184,25 @@ struct RecordAccess {
             static_cast<double>(loop.safe_input_)};
   }
 
-  /// Gains, those of the law, and limits. @param c a controller or an observer
+  /// Gains, those of the law, and limits, with the beginning of their names. @param c a controller
+  /// or an observer
   template <class Number, class C>
-  static void find_settings(C& c, std::vector<const Number*>& found) {
-    const auto take = [&](auto& part) {
-      for (Number* one : numbers_of<Number>(part)) found.push_back(one);
+  static void find_settings(C& c, std::vector<std::pair<const Number*, const char*>>& found) {
+    const auto take = [&](auto& part, const char* name) {
+      for (Number* one : numbers_of<Number>(part)) found.emplace_back(one, name);
     };
     if constexpr (requires { c.loop_; }) {
-      take(c.loop_.limiter_);
-      std::erase(found, &c.loop_.limiter_.last());
+      take(c.loop_.limiter_, "limit");
+      const Number* last = &c.loop_.limiter_.last();
+      std::erase_if(found, [last](const auto& one) { return one.first == last; });
       if constexpr (requires { c.law_; }) {
-        take(c.law_);
-        take(c.fast_law_);
+        take(c.law_, "law");
+        take(c.fast_law_, "law");
       }
-      if constexpr (requires { c.gain_; }) take(c.gain_);
+      if constexpr (requires { c.gain_; }) take(c.gain_, "law");
       find_settings(c.observer(), found);
     } else {
-      for (auto& law : c.laws_) take(law);
+      for (auto& law : c.laws_) take(law, "gain");
     }
   }
 
@@ -293,7 +295,7 @@ struct RecordAccess {
         return nothing;
       });
       add("schedule_settle", {}, false, [=](Law& law, const auto&) {
-        if (all(law.settled_below_ >= std::get<0>(law.ratios_u_))) law.settle();
+        if (all(law.settled_below_ >= std::get<0>(law.ratios_u_))) law.stand();
         return nothing;
       });
       add("present_poles", {}, true,
@@ -321,16 +323,16 @@ struct RecordAccess {
   static auto law_for(C& c, const Numbers& in) noexcept {
     auto& o = c.observer();
     o.laws_[0].age_ = std::uint32_t{0};  // it publishes what it keeps
-    const auto kept = o.published_;
+    const auto kept = o.rest_.published;
     std::size_t next = 1;
-    for (auto& given : o.published_) given = in[next++];
+    for (auto& given : o.rest_.published) given = in[next++];
     const auto u = law(c, in[0]);
-    o.published_ = kept;
+    o.rest_.published = kept;
     return u;
   }
   template <class O>
   static constexpr bool blanks = requires(O& o) {
-    o.published_;
+    o.rest_.published;
   };
   /// An estimate as it is computed, whether it is published or not.
   template <int Row, class O>
@@ -346,8 +348,8 @@ struct RecordAccess {
   static int place_in_published(const O& o, const S* at) noexcept {
     int place = -1;
     if constexpr (blanks<O>) {
-      for (std::size_t i = 0; i < o.published_.size(); ++i) {
-        if (at == &o.published_[i]) place = static_cast<int>(i);
+      for (std::size_t i = 0; i < o.rest_.published.size(); ++i) {
+        if (at == &o.rest_.published[i]) place = static_cast<int>(i);
       }
     }
     return place;
@@ -365,7 +367,7 @@ struct RecordAccess {
   template <class O, class S>
   static void judge(O& o, const S& y) noexcept {
     const S e = y - o.predicted_measurement();
-    (void)all(e * e <= o.outlier_threshold_ * o.innovation_variance());
+    (void)all(e * e <= o.rest_.set.outlier_threshold * o.innovation_variance());
   }
 
   template <class O>
@@ -654,9 +656,11 @@ class DesignRecorder {
         return Error<V>{"settings_in_struct", V(1), "is not written for a law that softens"};
       }
       recorder_.keep_open([](auto& c) {
-        std::vector<const Number*> found;
+        std::vector<std::pair<const Number*, const char*>> found;
         RecordAccess::find_settings<Number>(c, found);
-        return found;
+        std::vector<const Number*> numbers;
+        for (const auto& [number, name] : found) numbers.push_back(number);
+        return numbers;
       });
       recorded = recorder_.record();
       if (!recorded) return recorded.error();
@@ -668,6 +672,8 @@ class DesignRecorder {
     const auto numbers = numbers_of<Number>(object);
     const Number* first = &of(object).predicted_measurement();
     using Model = typename Observer::PlantModel;
+    std::vector<std::pair<const Number*, const char*>> settings;
+    if (!design.settings.empty()) RecordAccess::find_settings<Number>(object, settings);
     ListWriter writer(c_language, design.single);
     writer.live.assign(numbers.size(), false);
     for (std::size_t i = 0; i < numbers.size(); ++i) {
@@ -684,6 +690,9 @@ class DesignRecorder {
       const int published = RecordAccess::place_in_published(of(object), numbers[i]);
       if (published >= 0) name = "published_" + std::to_string(published);
       writer.live[i] = name[0] == 'z' || name[0] == 'p' || name == "u_applied" || name == "u_last";
+      for (const auto& [number, begins] : settings) {
+        if (number == numbers[i] && name.empty()) name = begins + std::to_string(i);
+      }
       design.members.push_back(name.empty() ? "x" + std::to_string(i) : name);
     }
     writer.find_live(*recorded);
