@@ -33,6 +33,7 @@ struct CodeOptions {
   std::string comment{};            ///< at the head: which machine, which design; no marks of a
                                     ///< comment
   int self_test_samples = 100;      ///< samples of the self-test, 1 .. 10000
+  bool watched = false;  ///< keeps what a HealthMonitor looks at: innovation, and u that was asked
   /// Gains, those of the law, and limits in a struct that can be changed while it runs, instead of
   /// constants: in C, for gains that do not depend on the innovation or the time.
   bool settings_in_struct = false;
@@ -405,6 +406,33 @@ struct RecordAccess {
             static_cast<double>(o.leak_), static_cast<double>(o.trust_)};
   }
 
+  /// What a monitor computes from its settings alone, and of the controller that it watches.
+  template <class M, class C>
+  static auto health(const M& m, const C& c) noexcept {
+    using S = typename M::scalar_type;
+    struct Numbers {
+      S weight, hair, largest_square, range, pole, slow, middle, least_against, least, step, forget;
+      S input_gain, of_noise;
+      int divider;
+    } numbers;
+    const S b = c.observer().input_gain();
+    numbers.range = absolute(b) * m.range_;
+    numbers.weight = m.weight_;
+    numbers.hair = static_cast<S>(1e-4) * m.range_;
+    numbers.largest_square = m.largest_square();
+    numbers.pole = m.pole_;
+    numbers.slow = m.slow_;
+    numbers.middle = b * m.middle(c.limiter());
+    numbers.least_against = m.larger(static_cast<S>(0.02) * numbers.range, S(3) * m.least_);
+    numbers.least = m.least_;
+    numbers.step = m.step_;
+    numbers.forget = m.forget_;
+    numbers.input_gain = b;
+    numbers.of_noise = m.health_.innovation_of_noise;
+    numbers.divider = m.divider_;
+    return numbers;
+  }
+
   /// What a profile computes from its settings alone.
   template <class P>
   static auto profile(const P& p) noexcept {
@@ -689,7 +717,9 @@ class DesignRecorder {
       }
       const int published = RecordAccess::place_in_published(of(object), numbers[i]);
       if (published >= 0) name = "published_" + std::to_string(published);
-      writer.live[i] = name[0] == 'z' || name[0] == 'p' || name == "u_applied" || name == "u_last";
+      writer.live[i] = name[0] == 'z' || name[0] == 'p' || name == "u_applied" ||
+                       name == "u_last" ||
+                       (design.options.watched && (name == "innovation" || name == "u_asked"));
       for (const auto& [number, begins] : settings) {
         if (number == numbers[i] && name.empty()) name = begins + std::to_string(i);
       }
