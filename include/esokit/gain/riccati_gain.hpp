@@ -148,28 +148,16 @@ class RiccatiGain {
   /// One sample ahead: from the corrected covariance, or from the predicted one if there was no
   /// correction.
   ESOKIT_INLINE constexpr void advance() noexcept {
-    if constexpr (PackScalar<S>) {
-      // If all lanes are in the same, usual state, they are processed at once.
-      const int bits = since_[0] & ~watched;
-      if (since_ == since_[0] && bits > standing && (TableSize == 0 || place_ == done)) [[likely]] {
-        note(standing);
-      } else if (since_ == since_[0] && bits == corrected && mode_ == RiccatiMode::recursive &&
-                 rule_ == rule_[0] && rule_[0] != InflationRule::adaptive &&
-                 diagonal_noise_ == diagonal_noise_[0]) {
-        note(0);
-        recur_from_correction();
-      } else {
-        detail::for_each_lane<Plain>(*this, [](Plain& lane) { lane.advance(); });
-      }
+    // If all lanes are in the same, usual state, they are processed at once.
+    const int bits = detail::of_lane(since_, 0) & ~watched;
+    const bool alike = since_ == detail::of_lane(since_, 0);
+    if (alike && bits > standing && (TableSize == 0 || place_ == done)) [[likely]] {
+      note(standing);
+    } else if (lane_count<S> > 1 && alike && bits == corrected && recurs_alike()) {
+      note(0);
+      recur_from_correction();
     } else {
-      if (rests()) [[likely]] {
-        note(standing);
-        if constexpr (TableSize > 0) {
-          if (place_ <= TableSize) next_of_table();
-        }
-        return;
-      }
-      recur();
+      detail::for_each_lane<Plain>(*this, [](Plain& lane) { lane.advance_alone(); });
     }
   }
 
@@ -344,6 +332,24 @@ class RiccatiGain {
     for (int i = 0; i < Size; ++i) {
       if (!all(start_.variance(i) > least)) start_.set_variance(i, least);
     }
+  }
+
+  ESOKIT_INLINE constexpr void advance_alone() noexcept {
+    if (rests()) [[likely]] {
+      note(standing);
+      if constexpr (TableSize > 0) {
+        if (place_ <= TableSize) next_of_table();
+      }
+    } else {
+      recur();
+    }
+  }
+
+  /// True if the recursion of all lanes has the same terms.
+  [[nodiscard]] constexpr bool recurs_alike() const noexcept {
+    const InflationRule rule = detail::of_lane(rule_, 0);
+    return mode_ == RiccatiMode::recursive && rule_ == rule && rule != InflationRule::adaptive &&
+           diagonal_noise_ == detail::of_lane(diagonal_noise_, 0);
   }
 
   [[gnu::noinline]] constexpr void recur() noexcept {
