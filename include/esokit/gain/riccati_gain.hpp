@@ -92,8 +92,11 @@ template <int Size, Scalar S, int TableSize = 0, class Transition = PascalTransi
 class RiccatiGain {
  public:
   /// What the law can do besides `gain`.
-  static constexpr GainLawTraits traits{
-      .kind = GainKind::preset, .advances = true, .accepts = true, .resets = true};
+  static constexpr GainLawTraits traits{.kind = GainKind::preset,
+                                        .advances = true,
+                                        .accepts = true,
+                                        .resets = true,
+                                        .continues = true};
 
   using Factor = CovarianceFactor<Size, S>;     ///< P-, scaled
   using Settings = RiccatiSettings<Size, S>;    ///< settings of the constructor
@@ -221,10 +224,10 @@ class RiccatiGain {
   [[nodiscard]] constexpr S measurement_variance() const noexcept { return measurement_ * unit_; }
 
   /// Continues with the covariance of a law with other settings. @param time_ratio T_new / T_old
-  /// @return false if the scalar cannot hold that covariance in this law's unit
-  bool continue_from(const RiccatiGain& other, const S& time_ratio) noexcept {
+  /// @return an error if the scalar cannot hold that covariance in this law's unit
+  Check<S> continue_from(const RiccatiGain& other, const S& time_ratio) {
     // Both laws are at their limit: nothing to take over.
-    if (mode_ == RiccatiMode::frozen && other.stands()) return true;
+    if (mode_ == RiccatiMode::frozen && other.stands()) return {};
     now_.factor = other.now_.factor;
     now_.factor.rescale(time_ratio, S(other.unit_ / unit_), transition_);
     if (rule_ == InflationRule::adaptive) set_inflation(other.now_.inflation);
@@ -238,10 +241,12 @@ class RiccatiGain {
       if (!all(is_finite(now_.gain[index(i)])) ||
           !all(now_.factor.variance(i) < detail::largest_variance<S>()) ||
           !all(is_finite(now_.factor.variance(i)))) {
-        return false;
+        return Error<S>{"measurement_variance", measurement_variance(),
+                        "is too small, or sample_time changed too much, to carry over the present "
+                        "covariance: measure first"};
       }
     }
-    return true;
+    return {};
   }
 
   /// Bound on the covariance of the error of the present estimate, N x N, scaled: after `advance`

@@ -363,9 +363,15 @@ class PredictorCorrector {
 
   /// Takes over the settings of `fresh` and keeps the estimate: states are rescaled to its sample
   /// time, and a change of b0 is moved into the disturbance, dhat += (b0_old - b0_new) u, so that
-  /// the control does not jump.
+  /// the control does not jump. A law goes on with its memory, if it declares that it can.
   Check<S> adopt(const PredictorCorrector& fresh) {
     PredictorCorrector next = fresh;
+    if constexpr (gain_law_traits<Law>.continues) {
+      const S time_ratio = fresh.sample_time() / sample_time();
+      for (std::size_t i = 0; i < Levels; ++i) {
+        if (auto ok = next.laws_[i].continue_from(laws_[i], time_ratio); !ok) return ok;
+      }
+    }
     next.kept_ = kept_;
     next.gap_ = gap_;
     for (State& state : next.kept_.states) state = next.model_.rescaled(state, model_);
