@@ -90,6 +90,27 @@ TEST(Found, FilterLeavesAStateThatLeadsNowhere) {
   EXPECT_NEAR(controller.requested(), 0, 1e-9);
 }
 
+/// Its restart told the limiter of the u that the law had wanted, and u jumped beyond its rate.
+TEST(Found, TheTransferFunctionRestartsWithinTheRateLimit) {
+  using Controller = esokit::TransferFunctionAdrc<2, float>;
+  auto controller = Controller::make({.observer_bandwidth = 80.4771805f,
+                                      .gains = {{0.0f, -5.75564149e+20f}},
+                                      .input_gain = 323.354828f,
+                                      .sample_time = 0.01f,
+                                      .limits = {.lower = -4.45901442f, .upper = 1, .rate = 1}})
+                        .value();
+  ASSERT_EQ(controller.start(0, -17.3593121f), StepStatus::ok);
+  float before = controller.update(0, 0);
+  bool restarted = false;
+  for (int k = 0; k < 20; ++k) {
+    const float u = controller.update(0, 0);
+    EXPECT_NEAR(u, before, 0.01f + 1e-6f) << k;
+    restarted = restarted || has(controller.status(), StepStatus::restarted);
+    before = u;
+  }
+  EXPECT_TRUE(restarted);
+}
+
 /// The same where the last good measurement is smaller than the new one.
 TEST(Found, FilterLeavesItForALargerMeasurementToo) {
   using Controller = esokit::DualFeedbackAdrc<1, float>;

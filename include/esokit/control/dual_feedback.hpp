@@ -282,9 +282,9 @@ class DualFeedbackAdrc {
       const bool state_is_to_blame =
           is_finite(y) &&
           (!is_finite(probe(without)) || detail::absolute(y) <= detail::absolute(measured_));
-      if (state_is_to_blame && start(y, u) == StepStatus::ok) {
+      if (state_is_to_blame && start(y, limiter_.last()) == StepStatus::ok) {
         status_ = StepStatus::restarted;
-        step = next(y, u);
+        step = next(y, limiter_.last());
       } else {
         status_ = StepStatus::measurement_rejected;
         step = without;
