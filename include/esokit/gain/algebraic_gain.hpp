@@ -134,9 +134,7 @@ class AlgebraicGain {
     // Deadbeat for the longer step. Its first gain is also 1, so that N consecutive samples still
     // make the estimate exact, and recurring gaps do not diverge.
     if (deadbeat()) return esokit::gap_gain<Size, S>(EqualSampledPoles<Size, S>{S(1.0)}, samples);
-    const S a = final_poles_.contraction;
-    const S now = a + (S(1.0) - a) * (size_bracket_ * std::get<0>(ratios_u_));
-    return esokit::gap_gain<Size, S>(EqualSampledPoles<Size, S>{now}, samples);
+    return esokit::gap_gain<Size, S>(present_poles(), samples);
   }
 
   /// The largest number of missing samples, at most `asked`, up to which errors decay in any
@@ -158,6 +156,7 @@ class AlgebraicGain {
 
  private:
   friend struct detail::LaneAccess;
+  friend struct detail::RecordAccess;
   using Plain = detail::PlainTwin<AlgebraicGain, S>;  ///< type of a lane
 
   static constexpr int data_members = 16;
@@ -202,6 +201,12 @@ class AlgebraicGain {
       detail::for_each_lane<Plain>(*this, [](Plain& lane) { lane.settle_if_due(); });
   }
 
+  /// The poles at this place of the schedule, once it is no longer deadbeat.
+  [[nodiscard]] constexpr EqualSampledPoles<Size, S> present_poles() const noexcept {
+    const S a = final_poles_.contraction;
+    return {a + (S(1.0) - a) * (size_bracket_ * std::get<0>(ratios_u_))};
+  }
+
   /// True up to sample N - 1 of the schedule.
   [[nodiscard]] constexpr bool deadbeat() const noexcept {
     return common_start() + common_age() <= Size;
@@ -214,35 +219,39 @@ class AlgebraicGain {
 
   /// [count] = 1 + p + .. + p^(count-1).
   [[nodiscard]] constexpr S bracket(std::uint32_t count) const noexcept {
-    return bracket(count, shift_.power(count).contraction);
+    return bracket(detail::integer<S>(count), shift_.power(count).contraction);
   }
 
   /// The same, computed from 1 - p^count.
-  [[nodiscard]] constexpr S bracket(std::uint32_t count, const S& contraction) const noexcept {
+  [[nodiscard]] constexpr S bracket(const S& count, const S& contraction) const noexcept {
     const auto shifting = shift_.contraction > S(0.0);
     const S ratio = contraction / select(shifting, shift_.contraction, S(1.0));
-    return select(shifting, ratio, detail::integer<S>(count));
+    return select(shifting, ratio, count);
   }
 
   /// Sets the registers for a next push with i - N = count, accurate to a few units in the last
   /// place.
   ESOKIT_COLD constexpr void anchor(std::uint32_t count) noexcept {
     // Computes p^c and 1 - p^c together: each is obtained from the other where nothing cancels.
-    S power(1.0);
-    S contraction(0.0);
+    power_ = S(1.0);
+    bracket_ = S(0.0);
     S base_power = decay_;
     S base_contraction = shift_.contraction;
     for (std::uint32_t rest = count; rest != 0; rest >>= 1u) {
-      if ((rest & 1u) != 0) {
-        contraction = contraction + power * base_contraction;
-        power = power * base_power;
-      }
+      if ((rest & 1u) != 0) anchor_take(base_power, base_contraction);
       base_contraction = base_contraction + base_power * base_contraction;
-      base_power = select(base_contraction < S(0.5), S(S(1.0) - base_contraction),
-                          S(base_power * base_power));
+      base_power = squared(base_power, base_contraction);
     }
-    power_ = power;
-    bracket_ = bracket(count, contraction);
+    bracket_ = bracket(detail::integer<S>(count), bracket_);
+  }
+  /// One bit of it. Until the end 1 - p^c stands in the place of [c].
+  constexpr void anchor_take(const S& base_power, const S& base_contraction) noexcept {
+    bracket_ = bracket_ + power_ * base_contraction;
+    power_ = power_ * base_power;
+  }
+  /// The square of a power of p. @param contraction 1 minus this square
+  static constexpr S squared(const S& power, const S& contraction) noexcept {
+    return select(contraction < S(0.5), S(S(1.0) - contraction), S(power * power));
   }
 
   constexpr void set_coefficients() noexcept {
@@ -325,7 +334,9 @@ class AlgebraicGain {
   }
 
   ESOKIT_COLD void settle_if_due() noexcept {
-    if (!all(settled_below_ >= std::get<0>(ratios_u_)) || age_ <= least_age_) return;
+    if (all(settled_below_ >= std::get<0>(ratios_u_)) && !(age_ <= least_age_)) settle();
+  }
+  void settle() noexcept {
     settled_ = true;
     gain_ = current_gain<Size, S>(final_poles_.weights());
   }

@@ -162,6 +162,7 @@ class AlgebraicEso
 
  private:
   friend struct detail::LaneAccess;
+  friend struct detail::RecordAccess;
 
   [[nodiscard]] const Law& law() const noexcept { return std::get<0>(this->laws()); }
   [[nodiscard]] Law& law() noexcept { return std::get<0>(this->laws()); }

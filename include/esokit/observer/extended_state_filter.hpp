@@ -281,6 +281,7 @@ class ExtendedStateFilter
 
  private:
   friend struct detail::LaneAccess;
+  friend struct detail::RecordAccess;
 
   /// True if no lane has anything to do besides the predictor-corrector's step.
   [[nodiscard]] bool usual() const noexcept { return !has_model && !law().any_watched(); }
