@@ -326,7 +326,9 @@ class AlgebraicGain {
   }
 
   ESOKIT_COLD void settle_if_due() noexcept {
-    if (!all(settled_below_ >= std::get<0>(ratios_u_)) || age_ <= least_age_) return;
+    if (all(settled_below_ >= std::get<0>(ratios_u_)) && !(age_ <= least_age_)) settle();
+  }
+  void settle() noexcept {
     settled_ = true;
     gain_ = current_gain<Size, S>(final_poles_.weights());
   }

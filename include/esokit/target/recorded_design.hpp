@@ -284,16 +284,16 @@ struct RecordAccess {
   static auto law_for(C& c, const Numbers& in) noexcept {
     auto& o = c.observer();
     o.laws_[0].age_ = std::uint32_t{0};  // it publishes what it keeps
-    const auto kept = o.published_;
+    const auto kept = o.rest_.published;
     std::size_t next = 1;
-    for (auto& given : o.published_) given = in[next++];
+    for (auto& given : o.rest_.published) given = in[next++];
     const auto u = law(c, in[0]);
-    o.published_ = kept;
+    o.rest_.published = kept;
     return u;
   }
   template <class O>
   static constexpr bool blanks = requires(O& o) {
-    o.published_;
+    o.rest_.published;
   };
   /// An estimate as it is computed, whether it is published or not.
   template <int Row, class O>
@@ -309,8 +309,8 @@ struct RecordAccess {
   static int place_in_published(const O& o, const S* at) noexcept {
     int place = -1;
     if constexpr (blanks<O>) {
-      for (std::size_t i = 0; i < o.published_.size(); ++i) {
-        if (at == &o.published_[i]) place = static_cast<int>(i);
+      for (std::size_t i = 0; i < o.rest_.published.size(); ++i) {
+        if (at == &o.rest_.published[i]) place = static_cast<int>(i);
       }
     }
     return place;
@@ -328,7 +328,7 @@ struct RecordAccess {
   template <class O, class S>
   static void judge(O& o, const S& y) noexcept {
     const S e = y - o.predicted_measurement();
-    (void)all(e * e <= o.outlier_threshold_ * o.innovation_variance());
+    (void)all(e * e <= o.rest_.set.outlier_threshold * o.innovation_variance());
   }
 
   template <class O>
