@@ -47,7 +47,6 @@
 #include <esokit/control/pid_conversion.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/control/reference.hpp>
-#include <esokit/control/scaled_law.hpp>
 #include <esokit/control/smooth_profile.hpp>
 #include <esokit/control/softening.hpp>
 #include <esokit/control/telemetry.hpp>
