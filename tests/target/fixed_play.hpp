@@ -232,6 +232,45 @@ class FixedPlay {
     return largest;
   }
   [[nodiscard]] const std::vector<double>& exact() const { return exact_; }
+
+  /// The signs of y and u that bring a state where it can come, both ways, then gaps, numbers outside
+  /// the ranges and resets. @return for each state the largest share of its range
+  std::vector<double> to_the_edges(int horizon) {
+    std::vector<double> reached(n_, 0.0);
+    for (std::size_t target = 0; target < 2 * n_; ++target) {
+      begin();
+      std::vector<std::array<std::int32_t, 2>> inputs(static_cast<std::size_t>(horizon));
+      std::vector<double> row(n_, 0.0);
+      row[target % n_] = target < n_ ? 1.0 : -1.0;
+      for (std::size_t k = inputs.size(); k-- > 0;) {
+        double by_y = 0;
+        double by_u = 0;
+        std::vector<double> to(n_, 0.0);
+        for (std::size_t i = 0; i < n_; ++i) {
+          by_y += row[i] * w_.by[i];
+          by_u += row[i] * w_.bu[i];
+          for (std::size_t j = 0; j < n_; ++j) to[j] += row[i] * w_.a[i * n_ + j];
+        }
+        row = to;
+        inputs[k] = {by_y > 0 ? options_.y.most : -options_.y.most,
+                     by_u > 0 ? options_.u.most : -options_.u.most};
+      }
+      for (const auto& [y, u] : inputs) step(y, u);
+      reached[target % n_] = std::max(reached[target % n_],
+                                      std::fabs(value(target % n_)) / w_.most[target % n_]);
+      for (const auto& [y, u] : inputs) {  // from there again, with gaps
+        const int missing = random_.index(10) == 0 ? random_.index(9) : 0;
+        for (int i = 0; i < missing; ++i) (void)c_.predict(c_.state.data(), -u);
+        if (random_.index(20) == 0) {
+          (void)c_.update(c_.state.data(), static_cast<Y>(next_bits()),
+                          static_cast<std::int32_t>(next_bits()));
+        }
+        if (random_.index(500) == 0) (void)c_.reset(c_.state.data(), static_cast<Y>(next_bits()));
+        step(y, u);
+      }
+    }
+    return reached;
+  }
   int refused = 0;
 
  private:

@@ -96,6 +96,7 @@ TEST(FixedPoint, StaysWithinItsBounds) {
   EXPECT_GT((stays_within<std::int32_t>(observer<CascadeEso<2, 2>>(100, 1e-3), servo(), 7)), 0.3);
 
 
+  EXPECT_GT((stays_within<std::int32_t>(observer<LinearEso<3>>(60, 1e-3), servo(), 8)), 0.3);
   using Ramp = LinearEso<1, double, 2>;
   EXPECT_GT((stays_within<std::int32_t>(observer<Ramp>(60, 1e-3), servo(), 9)), 0.3);
 }
@@ -108,6 +109,62 @@ TEST(FixedPoint, OfASlowObserverAtAHighRate) {
   EXPECT_GT((stays_within<std::uint16_t>(slow, counter(), 12, many, 20000)), 0.3);
   const auto made = to_fixed_c(slow, counter());
   EXPECT_GT(made->written.left_over[2], 0);
+}
+
+/// Signed overflow, shifts and conversions trap, at the ends of all ranges and through gaps.
+TEST(FixedPoint, NothingIsUndefinedAtTheEdges) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  const auto at_edges = [](auto object, const FixedPointOptions& options, auto y, int horizon) {
+    const auto code = to_fixed_c(object, options).value();
+    const Folder folder;
+    FixedInC<decltype(y)> in_c(
+        folder, code.code,
+        "gcc -std=c99 -fsanitize=undefined -fsanitize-undefined-trap-on-error");
+    ASSERT_TRUE(in_c.loaded());
+    FixedPlay<decltype(y)> play(in_c, code, options, 21);
+    for (const double share : play.to_the_edges(horizon)) {
+      EXPECT_LE(share, 1);
+      EXPECT_GT(share, 0.98);
+    }
+    EXPECT_GT(play.refused, 10);
+  };
+  const auto fast = observer<LinearEso<2>>(100, 1e-3);
+  const auto slow = observer<LinearEso<2>>(10, 5e-5);
+  at_edges(fast, servo(), std::int32_t{}, 1000);
+  at_edges(fast, servo(16), std::int32_t{}, 1000);
+  at_edges(fast, counter(), std::uint16_t{}, 1000);
+  at_edges(slow, counter(), std::uint16_t{}, 60000);
+  at_edges(observer<LinearEso<3>>(60, 1e-3), servo(), std::int32_t{}, 2000);
+}
+
+/// One product floored that was to be rounded: the bound is broken, so it is none for that code.
+TEST(FixedPoint, AMutantBreaksTheBound) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  FixedPointOptions options = servo();
+  options.most_deviation = {0, 0, 2.5e-3};  // below what floors do: all are rounded
+  auto code = to_fixed_c(observer<LinearEso<2>>(100, 1e-3), options).value();
+  const std::string rounded = " + 32768u";
+  int broken = 0;
+  int products = 0;
+  for (std::size_t at = 0; (at = code.code.source.find(rounded, at)) != std::string::npos; ++at) {
+    CCode mutant = code.code;
+    mutant.source.replace(at, rounded.size(), "");
+    const Folder folder;
+    FixedInC<std::int32_t> in_c(folder, mutant);
+    ASSERT_TRUE(in_c.loaded());
+    EXPECT_NE(in_c.self_test(), 0);
+    FixedPlay<std::int32_t> play(in_c, code, options, 31);
+    double most = play.by_chance(100000);
+    std::printf("chance %g\n", most);
+    for (std::size_t row = 0; row < 3; ++row) {
+      most = std::max(most, play.by_adversary(row, 400, 256));
+    }
+    std::printf("mutant %g\n", most);
+    broken += most > 1;
+    ++products;
+  }
+  EXPECT_EQ(products, 3);
+  EXPECT_GT(broken, 0);
 }
 
 #endif  // ESOKIT_LOADS_C

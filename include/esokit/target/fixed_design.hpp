@@ -58,6 +58,7 @@ struct WrittenSystem {
   std::vector<double> law{};     ///< u in counts: for each state, then for the reference
   std::vector<int> scale{};      ///< state i is kept in 2^-scale counts
   std::vector<int> left_over{};  ///< and so many bits below
+  std::vector<double> most{};    ///< the largest that y and u can make of state i, in counts
 };
 
 namespace detail {
@@ -600,7 +601,7 @@ class FixedDesign {
       return high ? list->times_high(v, rounded, s, of->rounds_) : list->times(v, rounded, s);
     }
 
-    /// A term at its own scale, or near `scale`.
+    /// A term at its own scale, or near `scale`; three times a number is not finer than needed.
     Value term(const Term& one, int scale, bool full, bool& negative) {
       const auto* given = input_of(one.node);
       const double c = one.coefficient * (given == nullptr ? 1.0 : given->first);
@@ -612,7 +613,9 @@ class FixedDesign {
         Value shifted = v;
         shifted.scale -= exponent;
         for (double& x : shifted.form) x = std::ldexp(x, exponent);
-        return odd == 1 ? shifted : list->times(shifted, odd, shifted.scale);
+        if (odd == 1) return shifted;
+        const Value near = list->to_scale(shifted, std::min(shifted.scale, scale + 2), of->rounds_);
+        return list->times(near, odd, near.scale);
       }
       return product(c, v, given == nullptr ? 0 : given->second, scale, full, negative);
     }
@@ -933,6 +936,7 @@ class FixedDesign {
     for (std::size_t i = 0; i < n; ++i) {
       box.push_back(most_at(unit(i, n), nullptr) + std::ldexp(2.0, -written.scale[i]));
     }
+    written.most = box;
     reach.clear();
     for (std::size_t i = 0; i < n; ++i) {
       double free = 0;
