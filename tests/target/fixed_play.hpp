@@ -18,11 +18,13 @@ inline namespace fixed {
 
 using namespace esokit;
 
-/// The compiled C of an observer called "eso", with y in `Y` (uint16_t: of a counter).
+/// The compiled C of an observer or controller called "eso", with y in `Y` (uint16_t: of a
+/// counter).
 template <class Y>
 class FixedInC {
  public:
-  FixedInC(const Folder& folder, const CCode& code, const std::string& compiler = "gcc -std=c99") {
+  FixedInC(const Folder& folder, const CCode& code, const std::string& compiler = "gcc -std=c99",
+           bool controls = false) {
     static int count = 0;
     folder.write("eso.h", code.header);
     folder.write("eso.c", code.source);
@@ -34,9 +36,16 @@ class FixedInC {
     handle_ = dlopen(out.c_str(), RTLD_NOW | RTLD_LOCAL);
     if (handle_ == nullptr) return;
     find(init, "eso_init");
-    find(update, "eso_update");
-    find(predict, "eso_predict");
-    find(reset, "eso_reset");
+    if (controls) {
+      find(control, "eso_update");
+      find(miss, "eso_update_without_measurement");
+      find(applied, "eso_applied");
+      find(start, "eso_start");
+    } else {
+      find(update, "eso_update");
+      find(predict, "eso_predict");
+      find(reset, "eso_reset");
+    }
     find(estimate, "eso_estimate");
     find(self_test, "eso_self_test");
     init(state.data());
@@ -54,6 +63,11 @@ class FixedInC {
   unsigned (*reset)(void*, Y) = nullptr;
   std::int32_t (*estimate)(const void*, unsigned) = nullptr;
   int (*self_test)() = nullptr;
+  // Of a controller.
+  std::int32_t (*control)(void*, Y, Y) = nullptr;
+  std::int32_t (*miss)(void*, Y) = nullptr;
+  void (*applied)(void*, std::int32_t) = nullptr;
+  unsigned (*start)(void*, Y, std::int32_t) = nullptr;
   std::array<std::int32_t, 40> state{};
 
  private:
@@ -233,8 +247,8 @@ class FixedPlay {
   }
   [[nodiscard]] const std::vector<double>& exact() const { return exact_; }
 
-  /// The signs of y and u that bring a state where it can come, both ways, then gaps, numbers outside
-  /// the ranges and resets. @return for each state the largest share of its range
+  /// The signs of y and u that bring a state where it can come, both ways, then gaps, numbers
+  /// outside the ranges and resets. @return for each state the largest share of its range
   std::vector<double> to_the_edges(int horizon) {
     std::vector<double> reached(n_, 0.0);
     for (std::size_t target = 0; target < 2 * n_; ++target) {
@@ -256,8 +270,8 @@ class FixedPlay {
                      by_u > 0 ? options_.u.most : -options_.u.most};
       }
       for (const auto& [y, u] : inputs) step(y, u);
-      reached[target % n_] = std::max(reached[target % n_],
-                                      std::fabs(value(target % n_)) / w_.most[target % n_]);
+      reached[target % n_] =
+          std::max(reached[target % n_], std::fabs(value(target % n_)) / w_.most[target % n_]);
       for (const auto& [y, u] : inputs) {  // from there again, with gaps
         const int missing = random_.index(10) == 0 ? random_.index(9) : 0;
         for (int i = 0; i < missing; ++i) (void)c_.predict(c_.state.data(), -u);

@@ -95,7 +95,6 @@ TEST(FixedPoint, StaysWithinItsBounds) {
   EXPECT_GT((stays_within<std::int32_t>(observer<HalfGainEso<2>>(100, 1e-3), servo(), 6)), 0.3);
   EXPECT_GT((stays_within<std::int32_t>(observer<CascadeEso<2, 2>>(100, 1e-3), servo(), 7)), 0.3);
 
-
   EXPECT_GT((stays_within<std::int32_t>(observer<LinearEso<3>>(60, 1e-3), servo(), 8)), 0.3);
   using Ramp = LinearEso<1, double, 2>;
   EXPECT_GT((stays_within<std::int32_t>(observer<Ramp>(60, 1e-3), servo(), 9)), 0.3);
@@ -118,8 +117,7 @@ TEST(FixedPoint, NothingIsUndefinedAtTheEdges) {
     const auto code = to_fixed_c(object, options).value();
     const Folder folder;
     FixedInC<decltype(y)> in_c(
-        folder, code.code,
-        "gcc -std=c99 -fsanitize=undefined -fsanitize-undefined-trap-on-error");
+        folder, code.code, "gcc -std=c99 -fsanitize=undefined -fsanitize-undefined-trap-on-error");
     ASSERT_TRUE(in_c.loaded());
     FixedPlay<decltype(y)> play(in_c, code, options, 21);
     for (const double share : play.to_the_edges(horizon)) {
@@ -155,16 +153,160 @@ TEST(FixedPoint, AMutantBreaksTheBound) {
     EXPECT_NE(in_c.self_test(), 0);
     FixedPlay<std::int32_t> play(in_c, code, options, 31);
     double most = play.by_chance(100000);
-    std::printf("chance %g\n", most);
     for (std::size_t row = 0; row < 3; ++row) {
       most = std::max(most, play.by_adversary(row, 400, 256));
     }
-    std::printf("mutant %g\n", most);
     broken += most > 1;
     ++products;
   }
   EXPECT_EQ(products, 3);
   EXPECT_GT(broken, 0);
+}
+
+using Servo = Adrc<LinearEso<2>>;
+
+Servo::Config servo_loop(double rate = 0) {
+  Servo::Config config{};
+  config.observer = {
+      .observer_bandwidth = 100, .input_gain = 50, .sample_time = 1e-3, .max_gap = 5};
+  config.controller_bandwidth = 25;
+  config.limits = {.lower = -12, .upper = 12};
+  if (rate > 0) config.limits.rate = rate;
+  return config;
+}
+
+/// What the law asks for, before and after its limits.
+TEST(FixedPoint, TheInputOfAControllerStaysWithinItsBound) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  for (const int bits : {16, 32}) {
+    FixedPointOptions options = servo(bits);
+    const auto made = to_fixed_c(Servo::make(servo_loop()).value(), options).value();
+    const Folder folder;
+    FixedInC<std::int32_t> c(folder, made.code, "gcc -std=c99", true);
+    ASSERT_TRUE(c.loaded());
+    EXPECT_EQ(c.self_test(), 0);
+    const WrittenSystem& w = made.written;
+    std::array<double, 3> x{};
+    Random random(41);
+    std::int32_t u = 0;
+    std::int32_t y = 0;
+    std::int32_t r = 0;
+    double largest = 0;
+    int inside = 0;
+    for (int k = 0; k < 300000; ++k) {
+      // A machine that follows, with noise and jumps: else u is at a limit all the time.
+      y = std::clamp(static_cast<std::int32_t>(0.9 * y + 0.1 * r) + random.index(41) - 20, -2048,
+                     2048);
+      if (random.index(500) == 0) r = random.index(4097) - 2048;
+      if (random.index(3000) == 0) y = random.index(4097) - 2048;
+      std::array<double, 3> to{};
+      for (std::size_t i = 0; i < 3; ++i) {
+        to[i] = w.by[i] * y + w.bu[i] * u;
+        for (std::size_t j = 0; j < 3; ++j) to[i] += w.a[i * 3 + j] * x[j];
+      }
+      x = to;
+      const double wanted = w.law[0] * x[0] + w.law[1] * x[1] + w.law[2] * x[2] + w.law[3] * r;
+      u = c.control(c.state.data(), y, r);
+      largest = std::max(largest, std::fabs(u - std::clamp(wanted, -1000.0, 1000.0)));
+      inside += std::fabs(wanted) < 900;
+    }
+    EXPECT_LE(largest, made.input.deviation) << bits;
+    EXPECT_GT(largest, 0.3 * made.input.deviation) << bits;
+    EXPECT_GT(inside, 10000);
+  }
+}
+
+/// 0.1 counts a sample: u moves by a count at each tenth.
+TEST(FixedPoint, ALimitOfRateBelowOneCountKeepsItsRemainder) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  const auto made = to_fixed_c(Servo::make(servo_loop(1.2)).value(), servo()).value();
+  const Folder folder;
+  FixedInC<std::int32_t> c(folder, made.code, "gcc -std=c99", true);
+  ASSERT_TRUE(c.loaded());
+  std::int32_t u = 0;
+  for (int k = 1; k <= 5000; ++k) {
+    u = c.control(c.state.data(), 0, 2000);
+    // The step is rounded down to 2^-12 counts; of what it adds up to nothing is lost.
+    EXPECT_NEAR(u, k * 409.0 / 4096, 0.5 + 1e-9) << k;
+  }
+  c.applied(c.state.data(), 7);
+  EXPECT_NEAR(c.control(c.state.data(), 0, 2000), 7, 1);
+}
+
+/// Missing samples, against the C++ observer: what it does is done here, but for the rounding.
+TEST(FixedPoint, BridgesGapsAndRestarts) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  const auto options = servo();
+  auto in_double = observer<LinearEso<2>>(100, 1e-3);
+  const auto made = to_fixed_c(in_double, options).value();
+  const Folder folder;
+  FixedInC<std::int32_t> c(folder, made.code);
+  ASSERT_TRUE(c.loaded());
+  Random random(51);
+  int bridged = 0;
+  int restarted = 0;
+  for (int k = 0; k < 20000; ++k) {
+    const auto y = static_cast<std::int32_t>(1500 * std::sin(0.002 * k));
+    const std::int32_t u = random.index(401) - 200;
+    const int missing = random.index(20) == 0 ? random.index(9) : 0;
+    for (int i = 0; i < missing; ++i) {
+      (void)in_double.predict(u * options.u.unit);
+      const unsigned status = c.predict(c.state.data(), u);
+      EXPECT_EQ(status, 0u);
+    }
+    const auto mine = in_double.update(y * options.y.unit, u * options.u.unit);
+    const unsigned its = c.update(c.state.data(), y, u);
+    EXPECT_EQ(its, static_cast<unsigned>(mine)) << k;
+    bridged += its == 8;
+    restarted += its == 16;
+    for (unsigned row = 0; row < 3; ++row) {
+      const double unit =
+          made.written.estimates[row][row] * std::ldexp(1.0, -made.written.scale[row]);
+      const double wanted = row == 0   ? in_double.estimate<0>()
+                            : row == 1 ? in_double.estimate<1>()
+                                       : in_double.estimate<2>();
+      const FixedBound& bound = made.estimates[row];
+      EXPECT_NEAR(c.estimate(c.state.data(), row) * unit, wanted,
+                  2 * (bound.deviation + bound.by_gains))
+          << k << ", " << row;
+    }
+    if (testing::Test::HasFailure()) return;
+  }
+  EXPECT_GT(bridged, 100);
+  EXPECT_GT(restarted, 50);
+  EXPECT_EQ(c.update(c.state.data(), 2049, 0), 1u);
+  EXPECT_EQ(c.update(c.state.data(), 0, 1001), 2u | 8u);
+}
+
+/// A counter that wraps shows in no estimate.
+TEST(FixedPoint, ACounterWraps) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  FixedPointOptions options = counter();
+  options.y.counter_bits = 12;
+  const auto made = to_fixed_c(observer<LinearEso<2>>(100, 1e-3), options).value();
+  const Folder folder;
+  FixedInC<std::uint16_t> c(folder, made.code);
+  ASSERT_TRUE(c.loaded());
+  const double unit = made.written.estimates[1][1] * std::ldexp(1.0, -made.written.scale[1]);
+  const double d_unit = made.written.estimates[2][2] * std::ldexp(1.0, -made.written.scale[2]);
+  unsigned at = 4000;
+  EXPECT_EQ(c.reset(c.state.data(), static_cast<std::uint16_t>(at)), 0u);
+  for (int k = 0; k < 3000; ++k) {
+    at = (at + 25) % 4096;
+    if (k % 100 == 99) {  // samples are lost, also while it wraps
+      for (int i = 0; i < 4; ++i) {
+        EXPECT_EQ(c.predict(c.state.data(), 0), 0u);
+        at = (at + 25) % 4096;
+      }
+    }
+    const unsigned status = c.update(c.state.data(), static_cast<std::uint16_t>(at), 0);
+    EXPECT_EQ(status, k % 100 == 99 ? 8u : 0u) << k;
+    if (k < 300) continue;
+    EXPECT_NEAR(c.estimate(c.state.data(), 1) * unit, 25 * options.y.unit * 1000, 1e-3) << k;
+    EXPECT_NEAR(c.estimate(c.state.data(), 2) * d_unit, 0, 0.1) << k;
+  }
+  // Faster than declared is no measurement.
+  EXPECT_EQ(c.update(c.state.data(), static_cast<std::uint16_t>((at + 40) % 4096), 0), 1u);
 }
 
 #endif  // ESOKIT_LOADS_C
@@ -177,6 +319,55 @@ TEST(FixedPoint, RefusesByName) {
   options = servo();
   options.y.most = 0;
   EXPECT_EQ(refusal(options), "y.most = 0: must be 1 .. 2^24");
+  options = servo();
+  options.u.most = 1 << 25;
+  EXPECT_EQ(refusal(options), "u.most = 3.35544e+07: must be 1 .. 2^24");
+  options = servo();
+  options.u.counter_bits = 8;
+  EXPECT_EQ(refusal(options), "u.counter_bits = 8: must be 0: u is no counter");
+  options = counter();
+  options.y.counter_bits = 17;
+  EXPECT_EQ(refusal(options), "y.counter_bits = 17: must be 2 .. 16, or 0");
+  options.y.counter_bits = 5;
+  EXPECT_EQ(refusal(options).substr(0, 12), "y.most = 30:");
+  options = servo(24);
+  EXPECT_EQ(refusal(options), "innovation_bits = 24: must be 16 or 32");
+  // A bound above what is allowed says what would do.
+  options = servo(16);
+  options.most_deviation = {0, 0, 0.5};
+  const std::string text = refusal(options);
+  EXPECT_EQ(text.substr(0, 18), "most_deviation[2] ");
+  EXPECT_NE(text.find("32 bits of innovation_bits"), std::string::npos) << text;
+  EXPECT_NE(text.find("allowed is 0.5"), std::string::npos) << text;
+  options.innovation_bits = 32;
+  EXPECT_EQ(refusal(options), "");
+}
+
+/// Rounding and what is left over come in where the bound needs them.
+TEST(FixedPoint, TakesWhatTheBoundNeeds) {
+  const auto made = [](double most) {
+    FixedPointOptions options = servo();
+    options.most_deviation = {0, 0, most};
+    return to_fixed_c(observer<LinearEso<2>>(100, 1e-3), options);
+  };
+  const double floors = made(0)->estimates[2].deviation;
+  const double rounds = made(0.99 * floors)->estimates[2].deviation;
+  const double keeps = made(0.99 * rounds)->estimates[2].deviation;
+  EXPECT_LT(rounds, floors);
+  EXPECT_LT(keeps, rounds);
+  EXPECT_FALSE(made(1e-9));
+}
+
+TEST(FixedPoint, RefusesWhatIsNotLinear) {
+  AdjustableBandwidthEso<2>::Config config{};
+  config.observer_bandwidth = 100;
+  config.sample_time = 1e-3;
+  config.input_gain = 50;
+  config.max_gap = 2;
+  config.bandwidth_ratio = 0.5;
+  const auto code = to_fixed_c(AdjustableBandwidthEso<2>::make(config).value(), servo());
+  ASSERT_FALSE(code);
+  EXPECT_STREQ(code.error().field, "observer");
 }
 
 }  // namespace target_fixed_point_test

@@ -1187,6 +1187,17 @@ class FixedDesign {
   bool judges_input() {
     const double most = options_.most_input_deviation > 0 ? options_.most_input_deviation
                                                           : std::max(input.half_count, 1.0);
+    if (rate > 0 && std::ldexp(rate, law_scale) < 64) {
+      refusal = {
+          "limits.rate",
+          rate,
+          "is fewer counts of u a sample than are kept to a hundredth: choose a longer sample "
+          "time or smaller counts of u; the least is",
+          -1,
+          std::ldexp(64.0, -law_scale),
+          true};
+      return false;
+    }
     if (input.deviation <= most) return true;
     refusal = {"most_input_deviation",
                input.deviation,
