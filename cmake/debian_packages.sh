@@ -13,6 +13,8 @@ ESOKIT_CLUSTER_PACKAGES=(libopenmpi-dev openmpi-bin parallel)
 # picolibc is the C library of the RISC-V compiler; its C++ headers are those of libstdc++-arm-none-eabi.
 ESOKIT_FIRMWARE_PACKAGES=(gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib
   gcc-riscv64-unknown-elf picolibc-riscv64-unknown-elf qemu-system-arm qemu-system-misc)
+# HAL of LinuxCNC, for the C as one of its components.
+ESOKIT_LINUXCNC_PACKAGES=(linuxcnc-uspace-dev)
 # The same headers in a browser (examples/playground); nodejs is not needed.
 ESOKIT_WASM_PACKAGES=(clang-14 lld-14 wasi-libc libc++-14-dev-wasm32 libc++abi-14-dev-wasm32
   libclang-rt-14-dev-wasm32 musl-dev)

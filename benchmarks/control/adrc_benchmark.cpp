@@ -7,7 +7,6 @@
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
-#include <esokit/control/dual_feedback.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <optional>
@@ -84,25 +83,6 @@ Limits beside(const std::string& name, const std::string& limit = "") {
           against("latency", name, limit)};
 }
 
-template <class S, int Order>
-void add_filter_forms(const std::string& scalar) {
-  const std::string size = std::to_string(Order) + "/" + scalar;
-  const auto config = [&](auto filter) {
-    using Filter = decltype(filter);
-    return typename Filter::value_type::Config{.observer_bandwidth = bandwidth<S>,
-                                               .controller_bandwidth = S(40),
-                                               .input_gain = S(2),
-                                               .sample_time = sample_time<S>,
-                                               .limits = magnitudes<S>()};
-  };
-  using Shift = DualFeedbackAdrc<Order, S>;
-  using Delta = DualFeedbackAdrc<Order, S, 1, DeltaOperator>;
-  add<S>("dual_feedback/" + size, Shift::make(config(std::optional<Shift>{})).value(),
-         beside("adrc/" + size, " < 1"));
-  add<S>("dual_feedback_delta/" + size, Delta::make(config(std::optional<Delta>{})).value(),
-         beside("adrc/" + size));
-}
-
 template <class S>
 void add_all(const std::string& scalar) {
   const auto linear = observer_config<S, 2>();
@@ -119,8 +99,6 @@ void add_all(const std::string& scalar) {
   beside_both.latency += "; " + against("latency", "pid/" + scalar);
   add<S>("adrc/2/" + scalar, adrc<S, LinearEso<2, S>>(linear), beside_both);
   add<S>("adrc/3/" + scalar, adrc<S, LinearEso<3, S>>(observer_config<S, 3>()));
-  add_filter_forms<S, 2>(scalar);
-  add_filter_forms<S, 3>(scalar);
 
   const std::string baseline = "adrc/2/" + scalar;
   add<S>("adrc_with_rate_limit/2/" + scalar,

@@ -146,7 +146,7 @@ std::vector<Row> rows_of(const Tuning& tuning, const std::vector<TunedRival>& ri
       if (gap_gain) bridges = controller.observer().max_gap();
       start = [controller, gap_gain](bool) {
         return [own = controller, gap_gain](double y, const Motion& r, double applied) mutable {
-          typename std::remove_cvref_t<decltype(own)>::Reference all;
+          typename std::remove_cvref_t<decltype(own)>::Reference::All all;
           for (int i = 0; i < all.rows(); ++i) all(i) = r[static_cast<std::size_t>(i)];
           if (!gap_gain && !std::isfinite(y)) {
             auto ahead = own;

@@ -122,7 +122,6 @@ struct HandedOn {
   using scalar_type = S;
   template <class Other>
   using with_scalar = HandedOn<Other>;
-  static constexpr auto fields(auto&) { return esokit::detail::tie(); }
   S update(const S& noise, const S&) const { return noise; }
 };
 

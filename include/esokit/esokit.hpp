@@ -37,9 +37,7 @@
 #include <esokit/control/controller.hpp>
 #include <esokit/control/cycle_analysis.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
-#include <esokit/control/dual_feedback.hpp>
 #include <esokit/control/experiment.hpp>
-#include <esokit/control/filter_form.hpp>
 #include <esokit/control/gain_probe.hpp>
 #include <esokit/control/health.hpp>
 #include <esokit/control/health_text.hpp>
@@ -48,6 +46,7 @@
 #include <esokit/control/nonlinear_feedback.hpp>
 #include <esokit/control/pid_conversion.hpp>
 #include <esokit/control/predictive_adrc.hpp>
+#include <esokit/control/reference.hpp>
 #include <esokit/control/scaled_law.hpp>
 #include <esokit/control/smooth_profile.hpp>
 #include <esokit/control/softening.hpp>
@@ -105,11 +104,15 @@
 #include <esokit/gain/switched_gain.hpp>
 #include <esokit/gain/switching_certificate.hpp>
 #include <esokit/identify/fit.hpp>
+#include <esokit/identify/gain_evidence.hpp>
+#include <esokit/identify/identified.hpp>
 #include <esokit/identify/identify.hpp>
+#include <esokit/identify/innovations_filter.hpp>
 #include <esokit/identify/input_checks.hpp>
 #include <esokit/identify/intervals.hpp>
 #include <esokit/identify/log.hpp>
 #include <esokit/identify/measured_columns.hpp>
+#include <esokit/identify/order_fits.hpp>
 #include <esokit/identify/plateau.hpp>
 #include <esokit/identify/second_opinion.hpp>
 #include <esokit/identify/sinusoids.hpp>
@@ -157,13 +160,17 @@
 #include <esokit/sim/filtered_step.hpp>
 #include <esokit/sim/gaussian.hpp>
 #include <esokit/sim/loop_steps.hpp>
+#include <esokit/sim/measure.hpp>
 #include <esokit/sim/metrics.hpp>
 #include <esokit/sim/monte_carlo.hpp>
+#include <esokit/sim/monte_carlo_config.hpp>
 #include <esokit/sim/noise.hpp>
 #include <esokit/sim/peak.hpp>
 #include <esokit/sim/plant.hpp>
+#include <esokit/sim/plant_step.hpp>
 #include <esokit/sim/recording.hpp>
 #include <esokit/sim/run.hpp>
+#include <esokit/sim/run_config.hpp>
 #include <esokit/sim/run_signal.hpp>
 #include <esokit/sim/runge_kutta.hpp>
 #include <esokit/sim/series.hpp>
@@ -186,6 +193,7 @@
 #include <esokit/target/recorder.hpp>
 #include <esokit/target/structured_text.hpp>
 #include <esokit/tune/controller.hpp>
+#include <esokit/tune/controller_source.hpp>
 #include <esokit/tune/families.hpp>
 #include <esokit/tune/loop_cost.hpp>
 #include <esokit/tune/lqg.hpp>
@@ -195,4 +203,6 @@
 #include <esokit/tune/rivals.hpp>
 #include <esokit/tune/search.hpp>
 #include <esokit/tune/tune.hpp>
+#include <esokit/tune/tune_search.hpp>
 #include <esokit/tune/tuned_code.hpp>
+#include <esokit/tune/tuning.hpp>

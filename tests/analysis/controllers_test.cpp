@@ -331,36 +331,6 @@ TEST(LinearController, OfTwoPhases) {
           .value());
 }
 
-template <class Controller>
-void expect_filter(const typename Controller::Config& config, double share) {
-  auto controller = Controller::make(config).value();
-  const LinearController form = linear_controller(controller, config);
-  EXPECT_EQ(form.sample_time, config.sample_time);
-  EXPECT_EQ(form.input_gain, config.input_gain);
-  expect_is(
-      form,
-      [&](const List& y, const List& r, const List& u) -> List {
-        controller.applied(u[0]);
-        return {controller.update(y[0], r[0])};
-      },
-      {}, share);
-}
-
-TEST(LinearController, OfTheFilterForms) {
-  using Shift = DualFeedbackAdrc<2>;
-  using Delta = DualFeedbackAdrc<1, double, 2, DeltaOperator>;
-  expect_filter<Shift>({.observer_bandwidth = 20.0,
-                        .controller_bandwidth = 4.0,
-                        .input_gain = 2.5,
-                        .sample_time = T},
-                       1e-11);
-  expect_filter<Delta>({.observer_bandwidth = 20.0,
-                        .controller_bandwidth = 4.0,
-                        .input_gain = 2.5,
-                        .sample_time = T},
-                       1e-11);
-}
-
 /// A PI with a filtered derivative of the measurement, as a user has it.
 struct Pid {
   double proportional, integral, derivative, filter;
@@ -501,7 +471,6 @@ struct Saturating {
 static_assert(!AnalysedObserver<KnownModel<LinearEso<2>, Saturating>>);
 static_assert(!AnalysedController<int>);
 // A filter form knows neither T nor b0.
-static_assert(!AnalysedController<DualFeedbackAdrc<2>>);
 
 /// The state of a slow actuator (0.1 s) is computed from u and not corrected: the error decays by
 /// that, however fast the observer.

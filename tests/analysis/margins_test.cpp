@@ -508,12 +508,6 @@ TEST(Margins, AtTheEdgeTheRealControllerOscillates) {
           .controller_bandwidth = 4.0})
          .value());
   of(PredictiveAdrc<LinearEso<2>>::make({.observer = config, .controller_bandwidth = 4.0}).value());
-  const DualFeedbackAdrc<2>::Config filter{
-      .observer_bandwidth = 20.0, .controller_bandwidth = 4.0, .input_gain = 2.5, .sample_time = T};
-  const auto dual = DualFeedbackAdrc<2>::make(filter).value();
-  expect_edge(closed_loop(plant, linear_controller(dual, filter)).value(), [&] {
-    return [controller = dual](double y) mutable { return controller.update(y, 0.0); };
-  });
 }
 
 // One actuator of two, the other one as it is.

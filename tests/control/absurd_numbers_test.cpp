@@ -6,7 +6,6 @@
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
-#include <esokit/control/dual_feedback.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/nonlinear_feedback.hpp>
 #include <esokit/control/pid_conversion.hpp>
@@ -159,8 +158,6 @@ TEST(OutputAfterMake, IsWithinTheLimits) {
   auto predictive = config<PredictiveAdrc<LinearEso<2>>>();
   predictive.start_hold = 0.1;
   expect_output_within_limits<PredictiveAdrc<LinearEso<2>>>(predictive);
-  expect_output_within_limits<esokit::DualFeedbackAdrc<2>>(
-      {.observer_bandwidth = 50, .controller_bandwidth = 10, .input_gain = 2, .sample_time = 1e-3});
   using Mimo = esokit::MimoAdrc<LinearEso<1>>;
   Mimo::Config mimo{.observers = {{.observer_bandwidth = 50, .sample_time = 1e-3}},
                     .controller_bandwidths = {10}};
@@ -201,30 +198,6 @@ TEST(PredictiveAdrcAbsurd, OutputStaysWithinLimits) {
 }
 
 // ---- retune after absurd numbers
-
-TEST(DualFeedbackAbsurd, RetuneKeepsTheOutput) {
-  using Controller = esokit::DualFeedbackAdrc<2>;
-  Controller::Config settings{.observer_bandwidth = 50,
-                              .controller_bandwidth = 10,
-                              .input_gain = 2,
-                              .sample_time = 1e-3,
-                              .limits = {.lower = -3, .upper = 3}};
-  auto controller = Controller::make(settings).value();
-  controller.update(1e303, 0.0);
-  const double u = controller.output();
-  ASSERT_EQ(std::abs(u), 3);
-  settings.input_gain = 1e-4;
-  const auto refused = controller.retune(settings);
-  ASSERT_EQ(refusal(refused),
-            "measurement: of the last sample has no steady state that the scalar can hold");
-  EXPECT_EQ(refused.error().value, 1e303);
-  EXPECT_EQ(controller.output(), u);
-  // After a good sample it is taken.
-  controller.update(0.0, 0.0);
-  const double held = controller.output();
-  EXPECT_TRUE(controller.retune(settings).has_value());
-  EXPECT_EQ(controller.output(), held);
-}
 
 TEST(MimoAbsurd, RetuneIsRefusedOrFinite) {
   using Mimo = esokit::MimoAdrc<LinearEso<1>, LinearEso<2>>;

@@ -1,7 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <concepts>
 #include <esokit/control/adrc_law.hpp>
+#include <esokit/control/reference.hpp>
+#include <esokit/core/pack.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
@@ -40,10 +44,43 @@ TEST(AdrcLaw, LiteralControl) {
   EXPECT_EQ(law.control(estimate, reference), -15);
   // v = 3 (4 - 1) + 5 (0 - 2) = -1; u = (-1 - 7) / -2
   EXPECT_EQ(law.control(estimate, 4.0), 4);
+  // v = 3 (4 - 1) + 5 (6 - 2) = 29
+  EXPECT_EQ(law.control(estimate, {4.0, 6.0}), -11);
   // error-based: u = (7 + 3 + 10) / -2
   EXPECT_EQ(law.control_error_based(estimate), -10);
   // Any source of state estimates will do for the feedback, it need not know the disturbance.
   EXPECT_EQ(law.feedback(EigenMatrix<double, 2>(1, 2), reference), 37);
+}
+
+template <class S>
+void made_of_anything() {
+  using R = esokit::Reference<2, S>;
+  const auto rows = [](const R& r) {
+    return std::array<double, 4>{double(r.moves()), r(0), r(1), r(2)};
+  };
+  EXPECT_EQ(rows(S(3)), (std::array<double, 4>{0, 3, 0, 0}));
+  EXPECT_EQ(rows(3), (std::array<double, 4>{0, 3, 0, 0}));
+  EXPECT_EQ(rows({S(3)}), (std::array<double, 4>{0, 3, 0, 0}));
+  EXPECT_EQ(rows({S(3), 5}), (std::array<double, 4>{1, 3, 5, 0}));
+  EXPECT_EQ(rows({S(3), S(5), S(7)}), (std::array<double, 4>{1, 3, 5, 7}));
+  // A vector of one element moves: its other rows are known to be zero only by chance.
+  EXPECT_EQ(rows(esokit::Vector<S, 1>(S(3))), (std::array<double, 4>{1, 3, 0, 0}));
+  EXPECT_EQ(rows(esokit::Vector<S, 2>(S(3), S(5))), (std::array<double, 4>{1, 3, 5, 0}));
+  EXPECT_EQ(rows(EigenMatrix<S, 3>(3, 5, 7)), (std::array<double, 4>{1, 3, 5, 7}));
+  EXPECT_EQ(R({S(3), S(5)}).all(), (esokit::Vector<S, 3>(S(3), S(5), S(0))));
+  static_assert(!std::convertible_to<const char*, R> && !std::default_initializable<R>);
+}
+TEST(Reference, FromANumberAListOrAVector) {
+  made_of_anything<double>();
+  made_of_anything<float>();
+  using Two = esokit::Pack<double, 2>;
+  const esokit::Reference<2, Two> constant = Two(3), moving = {Two({3, 4}), Two(5)};
+  EXPECT_FALSE(constant.moves());
+  EXPECT_EQ(constant(0)[1], 3);
+  EXPECT_TRUE(moving.moves());
+  EXPECT_EQ(moving(0)[1], 4);
+  EXPECT_EQ(moving(1)[1], 5);
+  EXPECT_EQ(moving(2)[1], 0);
 }
 
 template <class S>

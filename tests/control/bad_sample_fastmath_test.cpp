@@ -5,7 +5,6 @@
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
-#include <esokit/control/dual_feedback.hpp>
 #include <esokit/control/experiment.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/observer/linear_eso.hpp>
@@ -71,12 +70,6 @@ void all_controllers() {
                   {.observer = {.observer = {.observer = {.observer = observer<S>(), .delay = 1},
                                              .period = S(7)}},
                    .controller_bandwidth = ten})
-                  .value());
-  bad_samples(esokit::DualFeedbackAdrc<2, S, 1, esokit::DeltaOperator>::make(
-                  {.observer_bandwidth = S(60),
-                   .controller_bandwidth = ten,
-                   .input_gain = S(2),
-                   .sample_time = static_cast<S>(1e-3)})
                   .value());
 }
 

@@ -6,7 +6,6 @@
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/controller.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
-#include <esokit/control/dual_feedback.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/core/packed.hpp>
@@ -23,7 +22,7 @@ static_assert(Controller<Adrc<LinearEso<2, float>>, float>);
 static_assert(Controller<Packed<Adrc<Eso>, 4>, Pack<double, 4>>);
 static_assert(Controller<Packed<Adrc<VariableTime<Eso>>, 4>, Pack<double, 4>>);
 static_assert(Controller<Adrc<VariableTime<Eso>>, double>);
-static_assert(Controller<PredictiveAdrc<Eso>, double> && Controller<DualFeedbackAdrc<2>, double>);
+static_assert(Controller<PredictiveAdrc<Eso>, double>);
 static_assert(Controller<DisturbanceCompensator<Eso>, double>);
 static_assert(Controller<MimoAdrc<Eso, LinearEso<1>>, Pair>);
 static_assert(controller_traits<Adrc<VariableTime<Eso>>>.varies_time);
@@ -40,7 +39,7 @@ constexpr bool takes_a_third = requires(C c, Signal y) {
 || requires(C c, double y) { c.update(y, {y, y}, y); };
 using Told = Measured<Eso>;
 static_assert(!takes_a_third<Adrc<Told>> && !takes_a_third<Adrc<Told, ErrorBased>>);
-static_assert(!takes_a_third<Adrc<Eso>> && !takes_a_third<DualFeedbackAdrc<2>>);
+static_assert(!takes_a_third<Adrc<Eso>>);
 static_assert(!takes_a_third<PredictiveAdrc<Told>> && !takes_a_third<DisturbanceCompensator<Told>>);
 static_assert(!takes_a_third<MimoAdrc<Told, LinearEso<1>>, Pair>);
 

@@ -11,7 +11,6 @@
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
-#include <esokit/control/dual_feedback.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/nonlinear_feedback.hpp>
 #include <esokit/control/predictive_adrc.hpp>
@@ -51,7 +50,6 @@ template class CascadeEso<1, 2>;
 template class AdjustableBandwidthEso<1>;
 template class NonlinearEso<1>;
 template class KnownModel<LinearEso<1>, esokit_test::Friction<0, double>>;
-template class DualFeedbackAdrc<1>;
 template class Adrc<WrappedOutput<LinearEso<1>>>;
 template class Adrc<VariableTime<LinearEso<1>>>;
 template class DisturbanceCompensator<WrappedOutput<LinearEso<1>>>;

@@ -13,7 +13,6 @@
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
-#include <esokit/control/dual_feedback.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/nonlinear_feedback.hpp>
 #include <esokit/control/predictive_adrc.hpp>
@@ -228,18 +227,6 @@ struct Differentiator {
   }
 };
 
-template <class Operator, class Feedback>
-struct Filter {
-  using Type = esokit::DualFeedbackAdrc<2, double, 1, Operator, Feedback>;
-  static typename Type::Config config(int lane, bool again) {
-    return {.observer_bandwidth = set(lane, again, 30),
-            .controller_bandwidth = set(lane, again, 5),
-            .input_gain = set(lane, again, -2),
-            .sample_time = set(lane, false, 0.01),
-            .limits = {set(lane, again, -40), set(lane, again, 30), 1e3}};
-  }
-};
-
 struct Feedback {
   using Type = esokit::NonlinearFeedback<2>;
   static Type::Config config(int lane, bool again) {
@@ -363,7 +350,10 @@ TEST(Packed, AKnownModelInVariableTime) {
       [](const auto& o) { return seen(o).and_also(o.step_time()); });
 }
 
-TEST(Packed, ACascadeWithAModel) { expect_lanes<Modelled>(observe, seen); }
+TEST(Packed, ACascadeWithAModel) {
+  static_assert(esokit::Packed<Modelled::Type, 4>::at_once);
+  expect_lanes<Modelled>(observe, seen);
+}
 
 const auto control = [](auto& c, const auto& x, int k) {
   using T = std::remove_cvref_t<decltype(x[0])>;
@@ -444,17 +434,6 @@ TEST(Packed, Differentiators) {
   };
   const auto state = [](const auto& d) { return Answers(d.value(), d.derivative(), d.state()); };
   expect_lanes<Differentiator>(track, state);
-}
-
-TEST(Packed, FilterForm) {
-  const auto filter = [](auto& c, const auto& x, int k) {
-    if (k % 113 == 50) (void)c.start(x[1], x[3]);
-    if (k % 7 == 3) c.applied(x[3]);
-    return Answers(c.update(x[0], x[1]), c.output(), c.status());
-  };
-  const auto state = [](const auto& c) { return Answers(c.output(), c.requested(), c.status()); };
-  expect_lanes<Filter<esokit::DeltaOperator, esokit::LimitedFeedback>>(filter, state);
-  expect_lanes<Filter<esokit::ShiftOperator, esokit::UnlimitedFeedback>>(filter, state);
 }
 
 TEST(Packed, NonlinearFeedback) {

@@ -8,7 +8,6 @@
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
-#include <esokit/control/dual_feedback.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
@@ -142,11 +141,6 @@ TEST(Retune, AdoptsWhatAnotherContextMade) {
   adopts_as_it_retunes<Adrc<Counted>>({.observer = first(), .controller_bandwidth = 5},
                                       {.observer = second(), .controller_bandwidth = 4},
                                       controlled<Adrc<Counted>>);
-  using Dual = esokit::DualFeedbackAdrc<2>;
-  adopts_as_it_retunes<Dual>(
-      {.observer_bandwidth = 40, .controller_bandwidth = 5, .input_gain = 5, .sample_time = 0.01},
-      {.observer_bandwidth = 25, .controller_bandwidth = 4, .input_gain = 7, .sample_time = 0.01},
-      controlled<Dual>);
   using Predictive = esokit::PredictiveAdrc<Counted>;
   adopts_as_it_retunes<Predictive>({.observer = first(), .controller_bandwidth = 5},
                                    {.observer = second(), .controller_bandwidth = 4},

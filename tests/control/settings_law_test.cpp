@@ -10,7 +10,6 @@
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
-#include <esokit/control/dual_feedback.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/gain/pole_set.hpp>
@@ -176,8 +175,6 @@ TEST(Settings, OfControllersAreAdopted) {
                            {9, 10});
   // b0 is that of the matrix, and all channels have one sample time.
   every_setting_is_adopted(NAMED(MimoAdrc<LinearEso<1>, LinearEso<2>>), {1, 2, 5, 6});
-  using Filter = DualFeedbackAdrc<2>;
-  every_setting_is_adopted("DualFeedbackAdrc", {of<Filter>(), of<Filter>(by_gains)});
 }
 
 /// What is held at the start is of what was just made: with u it hands over a state, so there is no

@@ -32,12 +32,35 @@ class Thing {
   std::optional<S> maybe{};
   Nothing nothing{};
   int common = 0;
+};
+
+/// The same with private data: it says how many they are.
+template <class S>
+class Closed {
+ public:
+  explicit Closed(const S& first) : first_(first) {}
+  [[nodiscard]] const S& first() const { return first_; }
+  [[nodiscard]] Lanes<int, S> second() const { return second_; }
 
  private:
   friend struct esokit::detail::LaneAccess;
-  static constexpr auto fields(auto& o) noexcept {
-    return esokit::detail::tie(o.number, o.numbers, o.count, o.maybe, o.nothing, o.common);
-  }
+  static constexpr int data_members = 2;
+  S first_;
+  Lanes<int, S> second_{3};
+};
+
+/// A class that has no data of its own, and one that adds some.
+template <class S>
+struct Named : Closed<S> {
+  using Closed<S>::Closed;
+};
+template <class S>
+struct Larger : Closed<S> {
+  using Base = Closed<S>;
+  using Base::Base;
+  struct {
+    S third{};
+  } rest_;
 };
 
 using Packed = Thing<Pack<double, 4>>;
@@ -69,6 +92,23 @@ TEST(Lanes, AreTakenOut) {
   EXPECT_EQ(esokit::detail::get_lane<Plain>(all, 2).maybe, 7);
 }
 
+TEST(Lanes, HaveAllDataOfAClassAndOfItsBase) {
+  using Four = Pack<double, 4>;
+  const Named<Four> named(Four({1, 2, 3, 4}));
+  const auto one = esokit::detail::get_lane<Named<double>>(named, 2);
+  EXPECT_EQ(one.first(), 3);
+  EXPECT_EQ(one.second(), 3);
+  Larger<Four> larger(Four({5, 6, 7, 8}));
+  larger.rest_.third = Four({9, 10, 11, 12});
+  auto lane = esokit::detail::get_lane<Larger<double>>(larger, 1);
+  EXPECT_EQ(lane.first(), 6);
+  EXPECT_EQ(lane.rest_.third, 10);
+  lane.rest_.third = 0.5;
+  esokit::detail::set_lane(larger, lane, 1);
+  EXPECT_EQ(larger.rest_.third[0], 9);
+  EXPECT_EQ(larger.rest_.third[1], 0.5);
+}
+
 TEST(Lanes, ArePutBackOneByOne) {
   for (int changed = 0; changed < 4; ++changed) {
     Packed all = packed();
@@ -90,8 +130,8 @@ TEST(Lanes, ArePutBackOneByOne) {
 TEST(Lanes, AreVisitedInOrder) {
   Packed all = packed();
   int calls = 0;
-  esokit::detail::for_each_lane<Plain>(all, [&](Plain& one, int i) {
-    EXPECT_EQ(i, calls++);
+  esokit::detail::for_each_lane<Plain>(all, [&](Plain& one) {
+    EXPECT_EQ(one.number, ++calls);
     one.number = -one.number;
   });
   EXPECT_EQ(calls, 4);

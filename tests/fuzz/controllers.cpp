@@ -8,7 +8,6 @@
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
-#include <esokit/control/dual_feedback.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/gain/pole_set.hpp>
@@ -29,10 +28,6 @@ namespace fuzz {
 
 using namespace esokit;
 
-template <int Order, class S, int Extension, class Operator, class Placement>
-inline constexpr bool
-    winds_up<DualFeedbackAdrc<Order, S, Extension, Operator, UnlimitedFeedback, Placement>> = true;
-
 void add_controllers(std::vector<Kind>& kinds) {
   KIND(Adrc<LinearEso<1, double>, ErrorBased>);
   KIND(Adrc<WrappedOutput<LinearEso<2, float>>, ErrorBased>);
@@ -41,7 +36,6 @@ void add_controllers(std::vector<Kind>& kinds) {
   KIND(PredictiveAdrc<CascadeEso<1, 2, double>>);
   KIND(PredictiveAdrc<AdjustableBandwidthEso<2, float>>);
   KIND(PredictiveAdrc<NonlinearEso<2, float, 1>>);
-  KIND(DualFeedbackAdrc<2, float>);
   KIND(MimoAdrc<LinearEso<1, float>, LinearEso<2, float>>);
 #ifndef ESOKIT_ONE_TYPE
   KIND(Adrc<OutlierGate<LinearEso<2, float>>>);
@@ -60,9 +54,6 @@ void add_controllers(std::vector<Kind>& kinds) {
   KIND(PredictiveAdrc<LinearEso<2, float>>);
   KIND(PredictiveAdrc<ExtendedStateFilter<1, double>>);
   KIND(PredictiveAdrc<AlgebraicEso<1, float>>);
-  KIND(DualFeedbackAdrc<1, double, 2, DeltaOperator>);
-  KIND(DualFeedbackAdrc<2, float, 1, DeltaOperator, LimitedFeedback, PoleSet>);
-  KIND(TransferFunctionAdrc<2, float>);
   KIND(MimoAdrc<WrappedOutput<LinearEso<1, double>>, DelayedInput<LinearEso<2, double>, 3>>);
   KIND(MimoAdrc<Guarded<ModelEso<ModelParts{.order = 1, .actuator = 1}, float>>,
                 Guarded<LinearEso<1, float>>>);

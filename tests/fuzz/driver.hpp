@@ -56,14 +56,10 @@ constexpr int order_of() {
 /// `update` takes (r, r', ..) too. A concept: Clang 14 wants every parameter of a
 /// requires-expression in a member to exist.
 template <class T>
-concept TakesReferences = requires(T& o, typename T::scalar_type s, typename T::Reference r) {
+concept TakesReferences = requires(T& o, typename T::scalar_type s, typename T::Reference::All r) {
   o.update(s, r);
   o.update_without_measurement(r);
 };
-
-/// The transfer-function form integrates what it is told, and is not told of limits: no way back.
-template <class T>
-inline constexpr bool winds_up = false;
 
 /// N of the observer, where an adapter or controller is around it.
 template <class T>
@@ -551,12 +547,12 @@ class Driver final : public Game {
       if constexpr (TakesReferences<T>) {
         add(a, "update(y, references)", [](Driver& d) {
           const S y = d.number();
-          const auto r = d.template state<typename T::Reference>();
+          const auto r = d.template state<typename T::Reference::All>();
           d.control(&y, nullptr, [&] { return d.object_->update(y, r); });
         });
         add(a, "applied(u), update(y, references)", [](Driver& d) {
           const S y = d.number();
-          const auto r = d.template state<typename T::Reference>();
+          const auto r = d.template state<typename T::Reference::All>();
           const S u = d.number();
           d.control(&y, &u, [&] {
             d.object_->applied(u);
@@ -564,7 +560,7 @@ class Driver final : public Game {
           });
         });
         add(a, "update_without_measurement(references)", [](Driver& d) {
-          const auto r = d.template state<typename T::Reference>();
+          const auto r = d.template state<typename T::Reference::All>();
           d.control(nullptr, nullptr, [&] { return d.object_->update_without_measurement(r); });
         });
       }
@@ -726,7 +722,7 @@ class Driver final : public Game {
     });
     add(a, "control, applied, prepare(references)", [](Driver& d) {
       const S y = d.number(), u = d.number();
-      const auto r = d.template state<typename T::Reference>();
+      const auto r = d.template state<typename T::Reference::All>();
       const S from = d.object_->output();
       d.put_out(d.quietly([&] { return d.object_->control(y); }), from);
       const StepStatus reported = d.quietly([&] { return d.object_->applied(u); });
@@ -743,7 +739,7 @@ class Driver final : public Game {
       d.quietly([&] { d.object_->set_reference(r); });
     });
     add(a, "set_reference(references)", [](Driver& d) {
-      const auto r = d.template state<typename T::Reference>();
+      const auto r = d.template state<typename T::Reference::All>();
       d.quietly([&] { d.object_->set_reference(r); });
     });
     add(a, "reset", [](Driver& d) {
@@ -993,19 +989,6 @@ class Driver final : public Game {
             } else {
               return distance(object_->observer(), y);
             }
-          });
-    } else if constexpr (requires(const T& o) { o.form(); } && !winds_up<T>) {
-      settle(
-          [&](const S& y) {
-            object_->applied(S(0));
-            (void)object_->update(y, y);
-            return object_->status();
-          },
-          [&](const S&) {
-            // What rounding of y makes of u.
-            double unit = std::abs(static_cast<double>(object_->form().reference));
-            for (const S& n : object_->form().measurement) unit += std::abs(static_cast<double>(n));
-            return std::abs(static_cast<double>(object_->requested())) / unit;
           });
     }
   }

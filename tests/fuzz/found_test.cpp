@@ -9,7 +9,6 @@
 #include <esokit/analysis/delay_margin.hpp>
 #include <esokit/analysis/error_bound.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
-#include <esokit/control/dual_feedback.hpp>
 #include <esokit/control/smooth_profile.hpp>
 #include <esokit/eigen.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
@@ -67,53 +66,6 @@ TEST(Found, CompensationIsFinite) {
   ASSERT_EQ(compensator.start(0, 2), StepStatus::ok);
   EXPECT_FLOAT_EQ(compensator.compensation(), -6);
   EXPECT_FLOAT_EQ(compensator.base_output(), 8);
-}
-
-/// A state from which no measurement leads on held the filter for good: every sample was replaced
-/// by the absurd one that had made the state.
-TEST(Found, FilterLeavesAStateThatLeadsNowhere) {
-  using Controller = esokit::DualFeedbackAdrc<1, double, 2, esokit::DeltaOperator>;
-  auto controller = Controller::make({.observer_bandwidth = 0.76714639086623826,
-                                      .controller_bandwidth = 0.18390397232617703,
-                                      .input_gain = 0.12892259702470901,
-                                      .sample_time = 0.079834541271102774})
-                        .value();
-  ASSERT_EQ(controller.start(9.7300947854319415e+307, 0), StepStatus::ok);
-  bool restarted = false;
-  for (int k = 0; k < 2000; ++k) {
-    controller.applied(0);
-    controller.update(1.25, 1.25);
-    restarted = restarted || has(controller.status(), StepStatus::restarted);
-  }
-  EXPECT_TRUE(restarted);
-  EXPECT_EQ(controller.status(), StepStatus::ok);
-  EXPECT_NEAR(controller.requested(), 0, 1e-9);
-}
-
-/// The same where the last good measurement is smaller than the new one.
-TEST(Found, FilterLeavesItForALargerMeasurementToo) {
-  using Controller = esokit::DualFeedbackAdrc<1, float>;
-  auto controller = Controller::make({.observer_bandwidth = 3,
-                                      .controller_bandwidth = 1,
-                                      .input_gain = 1,
-                                      .sample_time = 0.1f})
-                        .value();
-  ASSERT_EQ(controller.start(0, 0), StepStatus::ok);
-  for (int k = 0; k < 20; ++k) {
-    controller.applied(largest<float>);
-    controller.update(0, 0);
-  }
-  for (int k = 0; k < 2000; ++k) {
-    controller.applied(0);
-    controller.update(1.25f, 1.25f);
-  }
-  EXPECT_EQ(controller.status(), StepStatus::ok);
-  EXPECT_NEAR(controller.requested(), 0, 1e-3);
-  // An absurd measurement is still one to be rejected.
-  controller.applied(0);
-  controller.update(largest<float>, 1.25f);
-  EXPECT_EQ(controller.status(), StepStatus::measurement_rejected);
-  EXPECT_NEAR(controller.requested(), 0, 1e-3);
 }
 
 /// The bound of a covariance grows in a gap as samples^(2N-2), noise or not: in float it overflowed

@@ -1,10 +1,14 @@
-// The observers on a scalar that is no number of the machine: a dual number. Packs: pack_test.cpp.
+// The observers on scalars that are no numbers of the machine: a dual number, and one of three
+// bytes. Packs: pack_test.cpp.
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <esokit/control/adrc_law.hpp>
+#include <esokit/core/lanes.hpp>
+#include <esokit/gain/switched_gain.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/model_eso.hpp>
 #include <support/dual.hpp>
 #include <support/numbers.hpp>
 
@@ -94,6 +98,86 @@ TEST(Dual, BadDerivativeIsABadMeasurement) {
   eso.update(Dual(1), Dual(0));
   EXPECT_EQ(eso.update(Dual(1, hidden_nan<double>()), Dual(0)), StepStatus::measurement_rejected);
   EXPECT_TRUE(std::isfinite(eso.estimate()(1).derivative));
+}
+
+/// Of no other size and without alignment: no flag or count hides in the padding beside it.
+struct ThreeBytes {
+  unsigned char bytes[3];
+  ThreeBytes() = default;
+  explicit ThreeBytes(double);
+  friend ThreeBytes operator+(const ThreeBytes&, const ThreeBytes&);
+  friend ThreeBytes operator-(const ThreeBytes&, const ThreeBytes&);
+  friend ThreeBytes operator*(const ThreeBytes&, const ThreeBytes&);
+  friend ThreeBytes operator/(const ThreeBytes&, const ThreeBytes&);
+  friend ThreeBytes operator-(const ThreeBytes&);
+  friend bool operator<(const ThreeBytes&, const ThreeBytes&);
+  friend bool operator>(const ThreeBytes&, const ThreeBytes&);
+  friend bool operator<=(const ThreeBytes&, const ThreeBytes&);
+  friend bool operator>=(const ThreeBytes&, const ThreeBytes&);
+  friend bool is_finite(const ThreeBytes&);
+  friend ThreeBytes select(bool, const ThreeBytes&, const ThreeBytes&);
+};
+static_assert(sizeof(ThreeBytes) == 3 && alignof(ThreeBytes) == 1);
+static_assert(esokit::Scalar<ThreeBytes>);
+
+using esokit::detail::TiedField;
+using esokit::detail::TiedFields;
+
+/// Bytes of the scalars in an object.
+template <class T>
+std::size_t scalars_in(const T& object) {
+  if constexpr (std::is_same_v<T, ThreeBytes>) {
+    return sizeof object;
+  } else if constexpr (esokit::detail::HoldsElements<T>) {
+    std::size_t sum = 0;
+    for (decltype(object.size()) i = 0; i < object.size(); ++i) sum += scalars_in(object.data()[i]);
+    return sum;
+  } else if constexpr (std::is_empty_v<T>) {
+    return 0;
+  } else if constexpr (esokit::detail::LaneAccess::has_fields<T>) {
+    const auto sum =
+        []<int... I, class... F>(const TiedFields<std::integer_sequence<int, I...>, F...>& fields) {
+      return (scalars_in(static_cast<const TiedField<I, F>&>(fields).field) + ...);
+    };
+    return sum(esokit::detail::LaneAccess::fields(object));
+  } else {
+    return 0;
+  }
+}
+template <class T>
+void expect_numbers_only(const T& object = esokit::detail::blank<T>()) {
+  EXPECT_EQ(scalars_in(object), sizeof(T));
+}
+
+template <class T>
+const T& first(const TiedField<0, T>& fields) {
+  return fields.field;
+}
+/// What a good sample of an observer writes.
+template <class Observer>
+void expect_that_samples_write_numbers() {
+  const auto observer = esokit::detail::blank<Observer>();
+  EXPECT_LT(scalars_in(observer), sizeof observer);  // it counts gaps
+  const auto& kept = first(esokit::detail::LaneAccess::fields(observer));
+  EXPECT_GE(scalars_in(kept), 3 * (Observer::levels * Observer::size + 2));
+  expect_numbers_only(kept);
+}
+
+TEST(ThreeBytes, AreAllThatASampleWrites) {
+  using S = ThreeBytes;
+  expect_that_samples_write_numbers<LinearEso<2, S>>();
+  expect_that_samples_write_numbers<CascadeEso<2, 3, S>>();
+  constexpr esokit::ModelParts parts{.order = 2, .plant_poles = true, .actuator = 1};
+  expect_that_samples_write_numbers<esokit::ModelEso<parts, S>>();
+  expect_that_samples_write_numbers<esokit::ModelCascadeEso<parts, 2, S>>();
+}
+
+TEST(ThreeBytes, AreAllThatModelsAndConstantLawsHold) {
+  using S = ThreeBytes;
+  expect_numbers_only<esokit::ChainModel<2, S, 2>>();
+  expect_numbers_only<esokit::ConstantGain<3, S>>();
+  expect_numbers_only<esokit::SwitchedGain<3, S>>();
+  expect_numbers_only<esokit::AdrcLaw<2, S>>();
 }
 
 }  // namespace observer_archetype_scalars_test

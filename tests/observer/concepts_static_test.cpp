@@ -635,11 +635,11 @@ static_assert(esokit::ShiftableLoad<LinearEso<2>> && !esokit::ShiftableLoad<Loop
 struct ClaimsMeasured : LinearEso<2> {
   static constexpr esokit::ObserverTraits traits{.takes_measured = true};
 };
-static_assert(!esokit::TakesMeasuredAsDeclared<ClaimsMeasured>);
+static_assert(!esokit::ObserverAsDeclared<ClaimsMeasured>);
 struct HidesMeasured : LinearEso<2> {
   void revise_measured();
 };
-static_assert(!esokit::TakesMeasuredAsDeclared<HidesMeasured>);
+static_assert(!esokit::ObserverAsDeclared<HidesMeasured>);
 static_assert(esokit::observer_traits<DelayedInput<Timed, 2>>.varies_time);
 static_assert(esokit::observer_traits<VariableTime<WrappedOutput<Delayed>>>.wraps_output);
 static_assert(esokit::observer_traits<VariableTime<WrappedOutput<Delayed>>>.delays_input);

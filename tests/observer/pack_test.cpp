@@ -11,6 +11,7 @@
 #include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/half_gain_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
+#include <esokit/observer/model_eso.hpp>
 #include <esokit/observer/nonlinear_eso.hpp>
 #include <esokit/observer/reduced_order_eso.hpp>
 #include <functional>
@@ -112,6 +113,37 @@ struct CascadeByLevels {
     typename Observer<S>::Config config{};
     config.level_bandwidths = {static_cast<S>(bandwidth(lane, again)), static_cast<S>(30.0 + lane)};
     return with_chain<S>(config, lane, again);
+  }
+};
+
+/// With an actuator, a pole of the plant and a sine.
+struct Modelled {
+  template <class S>
+  using Observer = esokit::ModelEso<
+      esokit::ModelParts{.order = 1, .plant_poles = true, .actuator = 1, .resonators = 1}, S>;
+  template <class S>
+  static auto config(int lane, bool again) {
+    auto config = by_bandwidth<S, typename Observer<S>::Config>(lane, again);
+    config.model.plant = {static_cast<S>(1 + lane)};
+    config.model.actuator.time_constant = static_cast<S>(again ? 0.06 : 0.05);
+    config.model.resonators[0].frequency = static_cast<S>(15 + lane);
+    return config;
+  }
+};
+
+/// A disturbance that enters elsewhere than u, a zero, and a sensor.
+struct OfAPlant {
+  template <class S>
+  using Observer = esokit::PlantEso<2, esokit::ModelParts{.order = 1, .sensor = 1}, S>;
+  template <class S>
+  static auto config(int lane, bool again) {
+    auto config = by_bandwidth<S, typename Observer<S>::Config>(lane, again);
+    config.model.plant.a = {{S(0.0), S(1.0)}, {static_cast<S>(-3 - lane), S(-2.0)}};
+    config.model.plant.b = {S(1.0), S(0.5)};
+    config.model.plant.c = {{S(1.0), S(0.25)}};
+    config.model.plant.e = {S(0.0), S(1.0)};
+    config.model.sensor.time_constant = static_cast<S>(again ? 0.03 : 0.02);
+    return config;
   }
 };
 
@@ -387,7 +419,15 @@ class Of final : public Subject {
     return out(observer_.reset(state));
   }
   Statuses shift_output(const Numbers& y) override {
-    return each([](Plain& o, One x, One, One) { return o.shift_output(x); }, y);
+    return each(
+        [](Plain& o, One x, One, One) {
+          if constexpr (requires { o.shift_output(x); }) {
+            return o.shift_output(x);
+          } else {
+            return StepStatus::ok;
+          }
+        },
+        y);
   }
   Statuses shift_disturbance(const Numbers& d) override {
     return each([](Plain& o, One x, One, One) { return o.shift_disturbance(x); }, d);
@@ -675,15 +715,15 @@ using TwoRegisters = esokit::Pack<double, 2 * esokit::default_lanes<double>>;
 template <class... Kinds>
 using InFloat = TypeList<As<Kinds, esokit::Pack<float>>...>;
 using Cases = InFloat<Linear, ByPoles, HalfGain, Reduced, Cascade, CascadeByLevels,
-                      AdjustableBandwidth, PowerSum, FalShape, OwnShape, Algebraic>;
+                      AdjustableBandwidth, PowerSum, FalShape, OwnShape, Algebraic, Modelled>;
 #else
 using Cases =
     TypeList<As<Linear, TwoRegisters>, As<ByPoles, OneRegister>, As<HalfGain, OneRegister>,
              As<Reduced, OneRegister>, As<Cascade, TwoRegisters>, As<CascadeByLevels, OneRegister>,
              As<AdjustableBandwidth, TwoRegisters>, As<PowerSum, TwoRegisters>,
              As<FalShape, OneRegister>, As<OwnShape, OneRegister>, As<Algebraic, TwoRegisters>,
-             As<Riccati, OneRegister>, As<RiccatiTable, esokit::Pack<float>>,
-             As<GatedRiccati, OneRegister>>;
+             As<Riccati, OneRegister>, As<Modelled, TwoRegisters>, As<OfAPlant, OneRegister>,
+             As<RiccatiTable, esokit::Pack<float>>, As<GatedRiccati, OneRegister>>;
 #endif
 const bool all_registered = register_cases(Cases{});
 

@@ -15,7 +15,6 @@
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
-#include <esokit/control/dual_feedback.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
@@ -34,7 +33,6 @@
 #include <esokit_before/adapter/wrapped_output.hpp>
 #include <esokit_before/control/adrc.hpp>
 #include <esokit_before/control/disturbance_compensator.hpp>
-#include <esokit_before/control/dual_feedback.hpp>
 #include <esokit_before/control/predictive_adrc.hpp>
 #include <esokit_before/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit_before/observer/algebraic_eso.hpp>
@@ -185,9 +183,8 @@ void call(Bits& bits, O& o, const Draw& draw, const Fill& fill) {
     if constexpr (requires { o.update_without_measurement(u); }) {
       if (c > 90) bits.add(o.update_without_measurement(u));
     }
-    if constexpr (requires(const S(&list)[2]) { o.update(x, list); }) {
-      const S moving[] = {u, v};
-      if (c > 80) bits.add(o.update(x, moving));
+    if constexpr (requires { o.update(x, {u, v}); }) {
+      if (c > 80) bits.add(o.update(x, {u, v}));
     }
     bits.add(o.update(x, u));
   }
@@ -367,13 +364,6 @@ const auto predictive = [](auto& c, double factor) {
   controller(c, factor);
 };
 ESOKIT_COMPARE(predictive_adrc, predictive, PredictiveAdrc<LinearEso<2>>)
-const auto dual = [](auto& c, double factor) {
-  c.observer_bandwidth = 20 * factor;
-  c.input_gain = 2 * factor;
-  c.sample_time = 0.01;
-  controller(c, factor);
-};
-ESOKIT_COMPARE(dual_feedback, dual, DualFeedbackAdrc<2>)
 
 }  // namespace oracle_bits
 }  // namespace esokit_test

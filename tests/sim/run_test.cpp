@@ -9,7 +9,6 @@
 #include <esokit/adapter/variable_time.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
-#include <esokit/control/dual_feedback.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/core/packed.hpp>
@@ -111,16 +110,6 @@ TEST(Run, IsALoopByHandWithTheOthers) {
                                       return u;
                                     },
                                     500));
-
-  const auto filter = DualFeedbackAdrc<2>::make({.observer_bandwidth = 80,
-                                                 .controller_bandwidth = 8,
-                                                 .input_gain = b0,
-                                                 .sample_time = T,
-                                                 .limits = {.lower = -2, .upper = 2}})
-                          .value();
-  auto one = filter;
-  EXPECT_EQ(by_run(filter),
-            by_hand([&](int, double y, double r) { return one.update(y, r); }, 500));
 
   // A compensator around a controller that was there before.
   auto compensator = DisturbanceCompensator<Eso>::make(

@@ -18,8 +18,6 @@ struct Friction {
 
   S coefficient{};  ///< c
 
-  static constexpr auto fields(auto& m) noexcept { return esokit::detail::tie(m.coefficient); }
-
   [[nodiscard]] esokit::Check<S> check() const {
     return esokit::Rules<S>{}.finite("model.coefficient", coefficient);
   }

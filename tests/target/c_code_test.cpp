@@ -35,12 +35,18 @@ static_assert(Writable<LinearEso<2>> && Writable<CascadeEso<2, 3>> &&
               Writable<ModelEso<everything>> &&
               Writable<DelayedInput<OutlierGate<LinearEso<2>>, 4>> &&
               Writable<Adrc<LinearEso<2>, ErrorBased>>);
-static_assert(!Writable<AlgebraicEso<2>> && !Writable<ExtendedStateFilter<2>> &&
-              !Writable<ModelEso<follows>> && !Writable<OutlierGate<AlgebraicEso<2>>> &&
-              !Writable<WrappedOutput<LinearEso<2>>> && !Writable<Guarded<LinearEso<2>>> &&
+static_assert(Writable<AlgebraicEso<2>> && Writable<ExtendedStateFilter<2>> &&
+              Writable<DelayedInput<WrappedOutput<LinearEso<2>>, 4>>);
+struct NominalSpring {
+  double operator()(const Vector<double, 2>& x, double, double) const { return -x(0); }
+};
+static_assert(!Writable<ExtendedStateFilter<2, double, 1, NominalSpring>> &&
+              !Writable<ExtendedStateFilter<2, double, 1, NoNominalModel, 10>> &&
+              !Writable<WrappedOutput<OutlierGate<LinearEso<2>>>> &&
+              !Writable<DelayedInput<WrappedOutput<OutlierGate<LinearEso<2>>>, 4>> &&
+              !Writable<ModelEso<follows>> && !Writable<Guarded<LinearEso<2>>> &&
               !Writable<VariableTime<LinearEso<2>>> && !Writable<PredictiveAdrc<LinearEso<2>>> &&
-              !Writable<MimoAdrc<LinearEso<1>, LinearEso<1>>> &&
-              !Writable<DelayedInput<AlgebraicEso<2>, 4>>);
+              !Writable<MimoAdrc<LinearEso<1>, LinearEso<1>>>);
 
 #ifdef ESOKIT_LOADS_C
 

@@ -15,7 +15,6 @@
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
-#include <esokit/control/dual_feedback.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/nonlinear_feedback.hpp>
 #include <esokit/control/predictive_adrc.hpp>
@@ -151,8 +150,7 @@ struct Moving {
   static constexpr int arguments = 3;
   template <class O, class T>
   static std::vector<T> call(O& o, const std::vector<T>& in, bool& fine) {
-    const T reference[] = {in[1], in[2]};
-    const T u = o.update(in[0], reference);
+    const T u = o.update(in[0], {in[1], in[2]});
     if constexpr (PlainScalar<T>) fine = o.status() == StepStatus::ok;
     return {u};
   }

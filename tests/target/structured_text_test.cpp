@@ -4,8 +4,10 @@
 #include <cstdio>
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
+#include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
+#include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/model_eso.hpp>
@@ -161,6 +163,19 @@ TEST(StructuredText, OfObservers) {
 }
 
 #endif  // ESOKIT_LOADS_C
+
+TEST(StructuredText, RefusesByName) {
+  const auto refusal = [](const auto& object) {
+    const auto text = to_structured_text(object);
+    return text ? std::string() : text.error().field + std::string(": ") + text.error().rule;
+  };
+  using Algebraic = AlgebraicEso<1, double>;
+  using Angle = WrappedOutput<LinearEso<1, double>>;
+  EXPECT_EQ(refusal(Algebraic::make(observer_config<Algebraic>(8)).value()),
+            "observer: has a gain that goes on at each sample: not written in Structured Text");
+  EXPECT_EQ(refusal(Angle::make(observer_config<Angle>(8)).value()),
+            "period: of WrappedOutput is not written in Structured Text");
+}
 
 }  // namespace target_structured_text_test
 }  // namespace esokit_test

@@ -8,7 +8,6 @@
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
-#include <esokit/control/dual_feedback.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/control/tracking_differentiator.hpp>
@@ -51,7 +50,6 @@ template class Adrc<KnownModel<Observer, Pendulum>>;
 template class Adrc<ModelEso<ModelParts{.order = 2, .plant_poles = true}, float>>;
 
 template class DisturbanceCompensator<Observer>;
-template class DualFeedbackAdrc<2, float>;
 template class MimoAdrc<Observer, LinearEso<1, float>>;
 template class PredictiveAdrc<Predicting>;
 template class TrackingDifferentiator<float>;

@@ -37,7 +37,7 @@ struct GuardAccess {
   /// The scaled states of the observer, level by level.
   template <class O>
   static constexpr auto& states(O& o) noexcept {
-    return innermost(o).states_;
+    return innermost(o).kept_.states;
   }
   /// The share of the innovation by which the next correction moves the measured value.
   template <class O>

@@ -126,6 +126,7 @@ class WrappedOutput
   [[nodiscard]] const S& period() const noexcept { return period_; }
 
  private:
+  friend struct detail::RecordAccess;
   /// The state of the count of turns.
   struct Count {
     S y{};       ///< last measurement used, wrapped

@@ -22,7 +22,6 @@
 #include <esokit/analysis/observer_system.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
-#include <esokit/control/dual_feedback.hpp>
 #include <esokit/control/mimo_adrc.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <utility>
@@ -288,33 +287,6 @@ requires detail::SaysObserver<Observer> && detail::SaysController<Base>
   const Expected<LinearController, Error<double>> base = linear_controller(both.base);
   if (!base) return base.error();
   return detail::compensated(*compensator, *base);
-}
-
-/// A filter form. T and b0 are not stored in it, but in the config from which it was made.
-template <int Order, class S, int Extension, class Operator, class Feedback, class Placement>
-LinearController linear_controller(
-    const DualFeedbackAdrc<Order, S, Extension, Operator, Feedback, Placement>& controller,
-    const typename DualFeedbackAdrc<Order, S, Extension, Operator, Feedback, Placement>::Config&
-        config) {
-  constexpr int size = Order + Extension;
-  const auto& f = controller.form();
-  LinearController form(size, 1, 0, static_cast<double>(config.sample_time));
-  form.input_gain = static_cast<double>(config.input_gain);
-  // c = s_1 - n_0 y, s_i+ [- s_i] = s_(i+1) - n_i y - d_i c - m_i u
-  const auto first = static_cast<double>(f.measurement[0]);
-  form.to_u(0, 0) = 1.0;
-  form.y_to_u(0, 0) = -first;
-  form.r_to_u(0, 0) = static_cast<double>(f.reference);
-  for (int i = 0; i < size; ++i) {
-    const auto next = static_cast<std::size_t>(i + 1);
-    const auto d = static_cast<double>(f.denominator[next]);
-    if (i + 1 < size) form.a(i, i + 1) = 1.0;
-    if constexpr (std::is_same_v<Operator, ShiftOperator>) form.a(i, i) -= 1.0;
-    form.a(i, 0) -= d;
-    form.from_y(i, 0) = d * first - static_cast<double>(f.measurement[next]);
-    form.from_u(i, 0) = -static_cast<double>(f.input[next]);
-  }
-  return form;
 }
 
 /// MimoAdrc, all channels: observer i gets (B0 u)_i, and u = B0^-1 (v - dhat).

@@ -3,7 +3,6 @@
 /// limits, start, missing samples and retuning.
 #pragma once
 
-#include <cstddef>
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/control/control_loop.hpp>
 #include <esokit/control/controller.hpp>
@@ -84,7 +83,7 @@ class Adrc {
   static constexpr int order = Observer::order;        ///< n, order of the plant
   using scalar_type = typename Observer::scalar_type;  ///< type of signals and settings
   using S = scalar_type;                               ///< the same type
-  using Reference = Vector<S, order + 1>;              ///< (r, r', .., r^(n)), n + 1 x 1
+  using Reference = esokit::Reference<order, S>;       ///< r, `{r, r1}` or a vector
 
   /// What the controller can do beyond `update(y, reference)`.
   static constexpr ControllerTraits traits{
@@ -119,39 +118,19 @@ class Adrc {
     return Adrc(*loop, *law, *scaled, *soft, config);
   }
 
-  /// One sample. @param y measurement, NaN if missing @param reference r, constant
+  /// One sample. @param y measurement, NaN if missing
+  /// @param reference r, if it is constant; `{r, r1}` or a vector (r, r', ..) of up to n + 1
+  /// elements, if it moves. The error-based form uses only r
   /// @return u to be held until the next sample, within the limits
-  S update(S y, S reference) noexcept {
-    const S r = reference;
-    return loop_.step(measured(y, r), Asked<S>{*this, r});
+  ESOKIT_INLINE S update(S y, const Reference& reference) noexcept {
+    y = measured(y, reference(0));
+    return reference.moves() ? stepped(y, reference.all()) : stepped(y, reference(0));
   }
-
-  /// With a moving reference. @param reference (r, r', ..), up to n + 1 elements, the others are
-  /// zero. A tracking differentiator gives such a vector. The error-based form uses only r.
-  template <detail::VectorOf<S> Given>
-  S update(S y, const Given& reference) noexcept {
-    const Reference r = filled(reference);
-    return loop_.step(measured(y, r(0)), Asked<Reference>{*this, r});
-  }
-
-  /// The same with a list: `update(y, {r, r1, r2})`. @{
-  template <std::size_t Count>
-  S update(S y, const S (&reference)[Count]) noexcept {
-    return update(y, detail::listed(reference));
-  }
-  template <std::size_t Count>
-  S update_without_measurement(const S (&reference)[Count]) noexcept {
-    return update_without_measurement(detail::listed(reference));
-  }
-  /// @}
 
   /// What the actuator held since the last sample, if it was not the last output: say it before
   /// `update`. A u that is not finite changes nothing. @{
   void applied(S u) noexcept { loop_.applied(u); }
-  template <class Given>
-  S update(S y, const Given& reference, S u) = delete;  // call applied(u) before update
-  template <std::size_t Count>
-  S update(S y, const S (&reference)[Count], S u) = delete;  // call applied(u) before update
+  S update(S y, const Reference& reference, S u) = delete;  // call applied(u) before update
   /// @}
 
   /// w[k], before the sample in which it is first used; for Adrc<Measured<..>>. @param w a number,
@@ -170,15 +149,9 @@ class Adrc {
   }
 
   /// One sample whose measurement is missing.
-  S update_without_measurement(S reference) noexcept {
-    return loop_.step_without_measurement(Asked<S>{*this, reference});
-  }
-
-  /// The same with a moving reference.
-  template <detail::VectorOf<S> Given>
-  S update_without_measurement(const Given& reference) noexcept {
-    const Reference r = filled(reference);
-    return loop_.step_without_measurement(Asked<Reference>{*this, r});
+  S update_without_measurement(const Reference& reference) noexcept {
+    return reference.moves() ? loop_.step_without_measurement(asked(reference.all()))
+                             : loop_.step_without_measurement(asked(reference(0)));
   }
 
   /// Manual operation: the observer runs, u is the operator's.
@@ -294,9 +267,7 @@ class Adrc {
  private:
   friend struct detail::LaneAccess;
   friend struct detail::RecordAccess;
-  static constexpr auto fields(auto& o) noexcept {
-    return detail::tie(o.loop_, o.law_, o.fast_law_, o.soft_);
-  }
+  static constexpr int data_members = 5;
 
   using Loop = ControlLoop<Observer>;
   using Law = AdrcLaw<order, S>;
@@ -312,6 +283,10 @@ class Adrc {
     Adrc& controller;
     const Given& reference;
   };
+  template <class Given>
+  ESOKIT_INLINE Asked<Given> asked(const Given& given) noexcept {
+    return {*this, given};
+  }
   struct NoSpec {
     constexpr NoSpec() = default;
     constexpr explicit NoSpec(const FeedbackSpec<S>&) {}
@@ -367,15 +342,10 @@ class Adrc {
     }
   }
 
-  static Reference filled(const S& given) noexcept { return filled(Vector<S, 1>(given)); }
+  /// A sample, for a constant and for a moving reference.
   template <class Given>
-  static Reference filled(const Given& given) noexcept {
-    constexpr int Count = detail::vector_size<Given>;
-    const Vector<S, Count>& reference = given;
-    static_assert(Count >= 1 && Count <= order + 1, "esokit: the reference is (r, r', .., r^(n))");
-    Reference all = Reference::Zero();
-    for (int i = 0; i < Count; ++i) all(i) = reference(i);
-    return all;
+  S stepped(S y, Given reference) noexcept {
+    return loop_.step(y, asked(reference));
   }
 
   [[nodiscard]] ESOKIT_INLINE S command(S reference) const noexcept {
@@ -388,11 +358,11 @@ class Adrc {
         return detail::by_present_gain(observer(), fast_law_.control(observer(), error));
       }
     } else {
-      return command(filled(reference));
+      return command(Reference(reference).all());
     }
   }
 
-  [[nodiscard]] S command(Reference reference) const noexcept {
+  [[nodiscard]] S command(typename Reference::All reference) const noexcept {
     const auto estimate = observer().estimate();
     if constexpr (error_based) {
       return detail::by_present_gain(observer(), law_.control_error_based(estimate));
@@ -405,9 +375,9 @@ class Adrc {
   }
 
   /// The differences of which the law is the sum.
-  [[nodiscard]] Reference lacks(const Reference& reference) const noexcept {
+  [[nodiscard]] typename Reference::All lacks(const Reference& reference) const noexcept {
     const auto estimate = observer().estimate();
-    Reference e;
+    typename Reference::All e;
     for (int i = 0; i <= order; ++i) {
       e(i) = error_based ? S(estimate(i)) : S(reference(i) - estimate(i));
     }
@@ -421,7 +391,7 @@ class Adrc {
     S u = command(given);
     if (all(!soft_.on())) return u;
     if (const auto designed = soft_.slowness() <= S(1.0); records<S> || !all(designed)) {
-      const S eased = soft_.control(law_, lacks(filled(given)));
+      const S eased = soft_.control(law_, lacks(given));
       u = select(designed, u, detail::by_present_gain(observer(), eased));
     }
     soft_.judge(u, loop_.limiter(), step_time());
@@ -434,23 +404,19 @@ class Adrc {
   requires(detail::LaneAccess::steps<O>) ESOKIT_INLINE bool advance() noexcept {
     return loop_.advance();
   }
-  template <class Given>
-  ESOKIT_INLINE bool step(S& u, const S& y, const Given& reference) noexcept {
-    if constexpr (std::is_same_v<Given, S>) {
-      return loop_.step_all(u, measured(y, reference), Asked<S>{*this, reference});
-    } else {
-      const Reference r = filled(reference);
-      return loop_.step_all(u, measured(y, r(0)), Asked<Reference>{*this, r});
-    }
+  template <class O = Observer>
+  requires(detail::LaneAccess::steps<O>)  //
+      ESOKIT_INLINE bool step(S& u, S y, const Reference& reference) noexcept {
+    y = measured(y, reference(0));
+    return reference.moves() ? loop_.step_all(u, y, asked(reference.all()))
+                             : loop_.step_all(u, y, asked(reference(0)));
   }
-  template <class Given>
-  S update_advanced(const S& y, const Given& reference) noexcept {
-    if constexpr (std::is_same_v<Given, S>) {
-      return loop_.step_advanced(measured(y, reference), Asked<S>{*this, reference});
-    } else {
-      const Reference r = filled(reference);
-      return loop_.step_advanced(measured(y, r(0)), Asked<Reference>{*this, r});
-    }
+  template <class O = Observer>
+  requires(detail::LaneAccess::steps<O>) S update_advanced(S y, const Reference& reference)
+  noexcept {
+    y = measured(y, reference(0));
+    return reference.moves() ? loop_.step_advanced(y, asked(reference.all()))
+                             : loop_.step_advanced(y, asked(reference(0)));
   }
   /// @}
 

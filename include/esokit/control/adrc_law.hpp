@@ -3,6 +3,7 @@
 /// estimate.
 #pragma once
 
+#include <esokit/control/reference.hpp>
 #include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/core/matrix.hpp>
@@ -89,10 +90,10 @@ class AdrcLaw {
 
   /// v = r^(n) + sum_i k_i (r^(i) - yhat^(i)), unit of y^(n).
   /// @param given (y, .., y^(n-1), ..), at least n x 1
-  /// @param reference (r, r', .., r^(n)), n + 1 x 1
+  /// @param reference r, `{r, r1}` or a vector, see Reference
   template <detail::VectorOf<S> Estimate>
   [[nodiscard]] S feedback(const Estimate& given,
-                           const Vector<S, Order + 1>& reference) const noexcept {
+                           const Reference<Order, S>& reference) const noexcept {
     constexpr int Size = detail::vector_size<Estimate>;
     const Vector<S, Size>& estimate = given;
     static_assert(Size >= Order, "esokit: the estimate must hold the plant states");
@@ -105,22 +106,14 @@ class AdrcLaw {
 
   /// Output-based form: u = (v - dhat) / b0.
   /// @param given (y, .., y^(n-1), d, ..) of an observer with input gain b0
-  /// @param reference (r, r', .., r^(n)), n + 1 x 1
+  /// @param reference r, `{r, r1}` or a vector, see Reference
   template <detail::VectorOf<S> Estimate>
   [[nodiscard]] S control(const Estimate& given,
-                          const Vector<S, Order + 1>& reference) const noexcept {
+                          const Reference<Order, S>& reference) const noexcept {
     constexpr int Size = detail::vector_size<Estimate>;
     const Vector<S, Size>& estimate = given;
     static_assert(Size > Order, "esokit: the estimate must hold the disturbance");
     return (feedback(estimate, reference) - estimate(Order)) * inverse_input_gain_;
-  }
-
-  /// Output-based form for a reference without derivatives, r' = .. = r^(n) = 0.
-  template <detail::VectorOf<S> Estimate>
-  [[nodiscard]] S control(const Estimate& given, const S& reference) const noexcept {
-    Vector<S, Order + 1> all = Vector<S, Order + 1>::Zero();
-    all(0) = reference;
-    return control(given, all);
   }
 
   /// Error-based form: u = (dhat + sum_i k_i ehat^(i)) / b0; no reference derivative is needed.
@@ -144,9 +137,7 @@ class AdrcLaw {
 
  private:
   friend struct detail::LaneAccess;
-  static constexpr auto fields(auto& o) noexcept {
-    return detail::tie(o.gains_, o.inverse_input_gain_, o.input_gain_);
-  }
+  static constexpr int data_members = 3;
 
   AdrcLaw() = default;
 

@@ -331,11 +331,7 @@ class ControlLoop {
   struct Nothing {};
   static constexpr bool has_step_time = observer_traits<Observer>.varies_time;
 
-  static constexpr auto fields(auto& o) noexcept {
-    return detail::tie(o.observer_, o.limiter_, o.requested_, o.hold_input_, o.safe_input_,
-                       o.hold_left_, o.missing_limit_, o.divider_, o.phase_, o.mode_, o.special_,
-                       o.watched_, o.has_safe_input_, o.stay_safe_, o.status_);
-  }
+  static constexpr int data_members = 16;
 
   ControlLoop(const Observer& observer, const Limiter<S>& limiter, const LoopSettings<S>& settings,
               std::uint32_t hold_samples, bool watched) noexcept

@@ -183,7 +183,7 @@ class DisturbanceCompensator {
  private:
   friend struct detail::LaneAccess;
   friend struct detail::RecordAccess;
-  static constexpr auto fields(auto& o) noexcept { return detail::tie(o.loop_, o.gain_); }
+  static constexpr int data_members = 2;
 
   using Loop = ControlLoop<Observer>;
 

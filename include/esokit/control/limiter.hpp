@@ -90,9 +90,7 @@ class Limiter {
   template <Scalar Other>
   friend class Limiter;
 
-  static constexpr auto fields(auto& o) noexcept {
-    return detail::tie(o.lower_, o.upper_, o.step_, o.last_, o.low_, o.high_, o.rate_limited_);
-  }
+  static constexpr int data_members = 7;
 
   Limiter(const Limits<S>& limits, const S& sample_time) noexcept
       : lower_(limits.lower),

@@ -98,9 +98,7 @@ class NonlinearFeedback {
 
  private:
   friend struct detail::LaneAccess;
-  static constexpr auto fields(auto& o) noexcept {
-    return detail::tie(o.gains_, o.fal_, o.inverse_input_gain_, o.input_gain_);
-  }
+  static constexpr int data_members = 4;
 
   static constexpr Array<S, Order> filled(const S& value) {
     Array<S, Order> result{};

@@ -69,7 +69,7 @@ class PredictiveAdrc {
   using scalar_type = typename Observer::scalar_type;  ///< type of signals and settings
   using S = scalar_type;                               ///< the same type
   using Estimate = typename Observer::Estimate;        ///< (y, .., y^(n-1), d, ..), N x 1
-  using Reference = Vector<S, order + 1>;              ///< (r, r', .., r^(n)), n + 1 x 1
+  using Reference = esokit::Reference<order, S>;       ///< r, `{r, r1}` or a vector
 
   /// What the controller can do beyond `update(y, reference)`.
   static constexpr ControllerTraits traits{
@@ -134,17 +134,8 @@ class PredictiveAdrc {
     return output_;
   }
 
-  /// Second phase, for a constant reference. @param next_reference r of the next sample
-  StepStatus prepare(S next_reference) noexcept {
-    Reference reference = Reference::Zero();
-    reference(0) = next_reference;
-    return prepare(reference);
-  }
-
-  /// Second phase. @param next_reference (r, r', ..) of the next sample, up to n + 1 elements, the
-  /// others are zero
-  template <detail::VectorOf<S> Given>
-  StepStatus prepare(const Given& next_reference) noexcept {
+  /// Second phase. @param next_reference of the next sample: r, `{r, r1}` or a vector
+  StepStatus prepare(const Reference& next_reference) noexcept {
     StepStatus status = StepStatus::ok;
     if (phase_ == Phase::measured) status |= observer_.correct(measurement_);
     limiter_.track(output_);
@@ -157,47 +148,18 @@ class PredictiveAdrc {
   }
 
   /// Both phases at once, if the computing delay does not matter. @return u
-  template <class NextReference>
-  S update(S y, const NextReference& next_reference) noexcept {
+  S update(S y, const Reference& next_reference) noexcept {
     const S u = control(y);
     prepare(next_reference);
     return u;
   }
 
-  /// The second phase, and both, with a list: `update(y, {r, r1, r2})`. @{
-  template <std::size_t Count>
-  StepStatus prepare(const S (&next_reference)[Count]) noexcept {
-    return prepare(detail::listed(next_reference));
-  }
-  template <std::size_t Count>
-  S update(S y, const S (&next_reference)[Count]) noexcept {
-    return update(y, detail::listed(next_reference));
-  }
-  /// @}
-
   /// Changes the reference of the next sample, any time before it.
-  void set_reference(S next_reference) noexcept {
-    Reference reference = Reference::Zero();
-    reference(0) = next_reference;
-    set_reference(reference);
-  }
-
-  /// The same with derivatives. @param given as for `prepare`
-  template <detail::VectorOf<S> Given>
-  void set_reference(const Given& given) noexcept {
-    constexpr int Count = detail::vector_size<Given>;
-    const Vector<S, Count>& next_reference = given;
-    static_assert(Count >= 1 && Count <= order + 1, "esokit: the reference is (r, r', .., r^(n))");
+  void set_reference(const Reference& next_reference) noexcept {
     for (int i = 0; i <= order; ++i) {
-      reference_[static_cast<std::size_t>(i)] = i < Count ? S(next_reference(i)) : S(0.0);
+      reference_[static_cast<std::size_t>(i)] = next_reference(i);
     }
     arm();
-  }
-
-  /// The same with a list.
-  template <std::size_t Count>
-  void set_reference(const S (&next_reference)[Count]) noexcept {
-    set_reference(detail::listed(next_reference));
   }
 
   /// What the actuator held since the last `control`, if it was not its u. A number that is not
@@ -394,7 +356,7 @@ class PredictiveAdrc {
     if constexpr (observer_traits<Observer>.blanks_estimate) {
       if (observer_.blanked()) [[unlikely]] {
         // A blanked observer publishes the estimate from its start, so u does not depend on y.
-        Reference reference;
+        typename Reference::All reference;
         for (int i = 0; i <= order; ++i) reference(i) = reference_[static_cast<std::size_t>(i)];
         settle_for(law_.control(observer_.estimate(), reference));
       }

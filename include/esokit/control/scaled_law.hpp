@@ -55,7 +55,7 @@ class ScaledLaw {
 
  private:
   friend struct detail::LaneAccess;
-  static constexpr auto fields(auto& o) noexcept { return detail::tie(o.weights_); }
+  static constexpr int data_members = 1;
 
   ScaledLaw() = default;
 

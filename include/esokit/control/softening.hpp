@@ -111,9 +111,7 @@ class Softening {
 
  private:
   friend struct detail::LaneAccess;
-  static constexpr auto fields(auto& o) noexcept {
-    return detail::tie(o.damped_, o.bandwidth_, o.slowness_, o.owed_);
-  }
+  static constexpr int data_members = 4;
 
   /// x^(1/n); `pow` takes 2 KB of flash.
   static S root(const S& x) noexcept {

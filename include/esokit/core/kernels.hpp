@@ -57,6 +57,7 @@ template <int First, int Count, class W, class Observer>
                                                              const Observer& observer) noexcept {
   typename W::value_type sum = std::get<First>(w) * observer.template scaled_estimate<First>();
   unroll<Count - 1>([&](auto i) ESOKIT_INLINE_LAMBDA {
+    keep_scalar(sum);  // each estimate was stored alone
     sum = sum + std::get<First + i + 1>(w) * observer.template scaled_estimate<First + i + 1>();
   });
   return sum;

@@ -99,21 +99,98 @@ constexpr void copy_fields(const TiedFields<std::integer_sequence<int, I...>, T.
                            const TiedFields<std::integer_sequence<int, I...>, U...>& plain,
                            int i) noexcept;
 
-/// Access to the members by which a class is split into lanes: `with_scalar<T>`, the class with
-/// another scalar, and `fields(object)`, a tie of all its data members. Both may be private if this
-/// is a friend.
+template <class T>
+struct IsOptional : std::false_type {};
+template <class T>
+struct IsOptional<std::optional<T>> : std::true_type {};
+
+/// Converts to a member of any type. Not to an optional: that is made of what it holds, and both
+/// ways would be ambiguous.
+struct AnyMember {
+  template <class T>
+  requires(!IsOptional<T>::value) operator T() const;
+};
+/// The number of data members of an aggregate.
+template <class T, class... Given>
+consteval int count_members() {
+  constexpr bool takes_these = requires { T{std::declval<Given>()...}; };
+  constexpr bool takes_one_more = requires { T{std::declval<Given>()..., AnyMember{}}; };
+  if constexpr (takes_these && !takes_one_more) {
+    return sizeof...(Given);
+  } else {
+    return count_members<T, Given..., AnyMember>();
+  }
+}
+
+template <class Base, class Rest>
+struct WithRest : Base {
+  Rest rest;
+};
+
+/// Access to the data members of a class, so that it can be split into lanes. Nobody lists them:
+/// structured bindings name them, and do not compile if one is missing. An aggregate needs nothing
+/// for it. Any other class declares how many there are, `data_members`, and has this as a friend. A
+/// class that adds data to those of its `Base` has all of them in an aggregate `rest_`.
 struct LaneAccess {
   template <class Object>
-  static constexpr bool has_fields = requires(Object& object) {
-    std::remove_const_t<Object>::fields(object);
+  static constexpr bool adds_rest = requires(Object& object) {
+    object.rest_;
   };
+  template <class Object>
+  static constexpr bool counts = requires {
+    Object::data_members;
+  };
+  template <class Object>
+  static constexpr bool has_fields = counts<std::remove_const_t<Object>> ||
+                                     (std::is_aggregate_v<Object> && std::is_class_v<Object> &&
+                                      !requires(Object & object) { object[0]; });
   template <class Object>
   static constexpr bool steps = requires(Object& object) {
     object.advance();
   };
+  /// A tie of all data members.
   template <class Object>
   static constexpr auto fields(Object& object) noexcept {
-    return std::remove_const_t<Object>::fields(object);
+    using T = std::remove_const_t<Object>;
+    if constexpr (adds_rest<Object>) {
+      using Base =
+          std::conditional_t<std::is_const_v<Object>, const typename T::Base, typename T::Base>;
+      static_assert(sizeof(T) == sizeof(WithRest<typename T::Base, decltype(object.rest_)>),
+                    "esokit: all data that a class adds to its base belongs to `rest_`");
+      return detail::tie(static_cast<Base&>(object), object.rest_);
+    } else {
+      constexpr int count = [] {
+        if constexpr (counts<T>) {
+          return T::data_members;
+        } else {
+          return count_members<T>();
+        }
+      }();
+      static_assert(count <= 17, "esokit: a class of more data members needs more bindings here");
+#define ESOKIT_BIND(number, ...)     \
+  if constexpr (count == number) {   \
+    auto& [__VA_ARGS__] = object;    \
+    return detail::tie(__VA_ARGS__); \
+  }
+      ESOKIT_BIND(1, a)
+      ESOKIT_BIND(2, a, b)
+      ESOKIT_BIND(3, a, b, c)
+      ESOKIT_BIND(4, a, b, c, d)
+      ESOKIT_BIND(5, a, b, c, d, e)
+      ESOKIT_BIND(6, a, b, c, d, e, f)
+      ESOKIT_BIND(7, a, b, c, d, e, f, g)
+      ESOKIT_BIND(8, a, b, c, d, e, f, g, h)
+      ESOKIT_BIND(9, a, b, c, d, e, f, g, h, i)
+      ESOKIT_BIND(10, a, b, c, d, e, f, g, h, i, j)
+      ESOKIT_BIND(11, a, b, c, d, e, f, g, h, i, j, k)
+      ESOKIT_BIND(12, a, b, c, d, e, f, g, h, i, j, k, l)
+      ESOKIT_BIND(13, a, b, c, d, e, f, g, h, i, j, k, l, m)
+      ESOKIT_BIND(14, a, b, c, d, e, f, g, h, i, j, k, l, m, n)
+      ESOKIT_BIND(15, a, b, c, d, e, f, g, h, i, j, k, l, m, n, o)
+      ESOKIT_BIND(16, a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p)
+      ESOKIT_BIND(17, a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q)
+#undef ESOKIT_BIND
+    }
   }
   /// Not constrained friend templates: Clang 16 takes their constraints for those of another
   /// template.
@@ -143,11 +220,6 @@ template <class T>
 struct IsTuple : std::false_type {};
 template <class... T>
 struct IsTuple<std::tuple<T...>> : std::true_type {};
-template <class T>
-struct IsOptional : std::false_type {};
-template <class T>
-struct IsOptional<std::optional<T>> : std::true_type {};
-
 /// Copies lane `i` of `packed` to `plain`, or back (`Back`). What is neither a pack nor a PerLane
 /// is common to all lanes.
 template <bool Back, class Packed, class Plain>
@@ -225,7 +297,7 @@ struct PlainTwinOf<Object, S> {
   static_assert(
       requires { typename Object::template with_scalar<LaneScalar<S>>; },
       "esokit: a type for packs needs `template <class T> using with_scalar`, the type with "
-      "another scalar, and `fields(object)`, its members");
+      "another scalar");
   using type = WithScalar<Object, LaneScalar<S>>;
 };
 
@@ -319,13 +391,18 @@ template <class Plain, class Packed>
   return plain;
 }
 
-/// Calls f(plain, i) for each lane of `packed` and stores the changed `plain` in it.
+/// Calls f(plain) for each lane of `packed` and stores the changed `plain` in it. What is plain
+/// itself is its only lane.
 template <class Plain, class Packed, class Function>
-constexpr void for_each_lane(Packed& packed, Function&& f) noexcept {
-  for (int i = 0; i < lane_count<typename Packed::scalar_type>; ++i) {
-    Plain plain = get_lane<Plain>(packed, i);
-    f(plain, i);
-    set_lane(packed, plain, i);
+constexpr void for_each_lane(Packed& packed, const Function& f) noexcept {
+  if constexpr (std::is_same_v<Plain, Packed>) {
+    f(packed);
+  } else {
+    for (int i = 0; i < lane_count<typename Packed::scalar_type>; ++i) {
+      Plain plain = get_lane<Plain>(packed, i);
+      f(plain);
+      set_lane(packed, plain, i);
+    }
   }
 }
 

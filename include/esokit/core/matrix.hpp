@@ -358,17 +358,7 @@ class Matrix : public detail::MatrixBase<ScalarType, Rows, Columns> {
 template <class ScalarType, int Size>
 using Vector = Matrix<ScalarType, Size, 1>;
 
-namespace detail {
-
-/// The elements of a list.
-template <class ScalarType, std::size_t Count>
-Vector<ScalarType, static_cast<int>(Count)> listed(const ScalarType (&list)[Count]) noexcept {
-  Vector<ScalarType, static_cast<int>(Count)> all;
-  for (std::size_t i = 0; i < Count; ++i) all(static_cast<int>(i)) = list[i];
-  return all;
-}
-
-}  // namespace detail
+namespace detail {}  // namespace detail
 
 /// Row vector of `Size` elements.
 template <class ScalarType, int Size>

@@ -132,10 +132,6 @@ concept Scalar = std::copyable<T> && requires(const T a, const T b) {
 template <class S>
 concept PackScalar = Scalar<S> &&(lane_count<S> > 1);
 
-/// A scalar of one plant: a plain one, or one that records its operations.
-template <class S>
-concept SingleScalar = PlainScalar<S> ||(Scalar<S>&& records<S>);
-
 namespace detail {
 
 template <class S>

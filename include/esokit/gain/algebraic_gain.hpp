@@ -89,16 +89,12 @@ class AlgebraicGain {
   /// Goes to the next sample of the schedule. If one of the first N samples is not corrected, the
   /// deadbeat property is lost, and the schedule restarts.
   ESOKIT_INLINE constexpr void advance() noexcept {
-    if constexpr (PackScalar<S>) {
-      if (settled_ == true) [[likely]]
-        return;
-      if (!together()) [[unlikely]] {
-        advance_apart();
-        return;
-      }
+    if (settled_ == true) [[likely]]
+      return;
+    if (together()) [[likely]] {
       advance_schedule();
     } else {
-      if (!settled_) advance_schedule();
+      advance_apart();
     }
   }
 
@@ -130,9 +126,7 @@ class AlgebraicGain {
     // Deadbeat for the longer step. Its first gain is also 1, so that N consecutive samples still
     // make the estimate exact, and recurring gaps do not diverge.
     if (deadbeat()) return esokit::gap_gain<Size, S>(EqualSampledPoles<Size, S>{S(1.0)}, samples);
-    const S a = final_poles_.contraction;
-    const S now = a + (S(1.0) - a) * (size_bracket_ * std::get<0>(ratios_u_));
-    return esokit::gap_gain<Size, S>(EqualSampledPoles<Size, S>{now}, samples);
+    return esokit::gap_gain<Size, S>(present_poles(), samples);
   }
 
   /// The largest number of missing samples, at most `asked`, up to which errors decay in any
@@ -154,24 +148,19 @@ class AlgebraicGain {
 
  private:
   friend struct detail::LaneAccess;
+  friend struct detail::RecordAccess;
   using Plain = detail::PlainTwin<AlgebraicGain, S>;  ///< type of a lane
 
-  static constexpr auto fields(auto& o) noexcept {
-    return detail::tie(o.gain_, o.coefficients_, o.ratios_u_, o.ratios_h_, o.final_poles_, o.shift_,
-                       o.decay_, o.size_bracket_, o.settled_below_, o.power_, o.bracket_,
-                       o.start_index_, o.least_age_, o.age_, o.pending_, o.settled_);
-  }
+  static constexpr int data_members = 16;
 
   /// True if all lanes of a pack are at the same place of the schedule: then one recursion serves
-  /// all.
-  template <class = S>
+  /// all. Always true of a plain one that has not settled.
   [[nodiscard]] constexpr bool together() const noexcept {
-    return age_ == age_[0] && pending_ == pending_[0] && settled_ == false &&
-           start_index_ == start_index_[0];
+    return age_ == common_age() && pending_ == detail::of_lane(pending_, 0) && settled_ == false &&
+           start_index_ == common_start();
   }
-  template <class = S>
   ESOKIT_COLD constexpr void advance_apart() noexcept {
-    detail::for_each_lane<Plain>(*this, [](Plain& lane, int) { lane.advance(); });
+    detail::for_each_lane<Plain>(*this, [](Plain& lane) { lane.advance(); });
   }
   /// Age of the lanes, if they are together.
   [[nodiscard]] constexpr std::uint32_t common_age() const noexcept {
@@ -200,13 +189,14 @@ class AlgebraicGain {
     }
     push();
     set_gain();
-    if constexpr (PackScalar<S>) {
-      if (!all(std::get<0>(ratios_u_) > settled_below_)) [[unlikely]]
-        settle_lanes();
-    } else {
-      if (all(settled_below_ >= std::get<0>(ratios_u_)) && age_ > least_age_) [[unlikely]]
-        settle();
-    }
+    if (!all(std::get<0>(ratios_u_) > settled_below_)) [[unlikely]]
+      detail::for_each_lane<Plain>(*this, [](Plain& lane) { lane.settle_if_due(); });
+  }
+
+  /// The poles at this place of the schedule, once it is no longer deadbeat.
+  [[nodiscard]] constexpr EqualSampledPoles<Size, S> present_poles() const noexcept {
+    const S a = final_poles_.contraction;
+    return {a + (S(1.0) - a) * (size_bracket_ * std::get<0>(ratios_u_))};
   }
 
   /// True up to sample N - 1 of the schedule.
@@ -221,35 +211,39 @@ class AlgebraicGain {
 
   /// [count] = 1 + p + .. + p^(count-1).
   [[nodiscard]] constexpr S bracket(std::uint32_t count) const noexcept {
-    return bracket(count, shift_.power(count).contraction);
+    return bracket(detail::integer<S>(count), shift_.power(count).contraction);
   }
 
   /// The same, computed from 1 - p^count.
-  [[nodiscard]] constexpr S bracket(std::uint32_t count, const S& contraction) const noexcept {
+  [[nodiscard]] constexpr S bracket(const S& count, const S& contraction) const noexcept {
     const auto shifting = shift_.contraction > S(0.0);
     const S ratio = contraction / select(shifting, shift_.contraction, S(1.0));
-    return select(shifting, ratio, detail::integer<S>(count));
+    return select(shifting, ratio, count);
   }
 
   /// Sets the registers for a next push with i - N = count, accurate to a few units in the last
   /// place.
   ESOKIT_COLD constexpr void anchor(std::uint32_t count) noexcept {
     // Computes p^c and 1 - p^c together: each is obtained from the other where nothing cancels.
-    S power(1.0);
-    S contraction(0.0);
+    power_ = S(1.0);
+    bracket_ = S(0.0);
     S base_power = decay_;
     S base_contraction = shift_.contraction;
     for (std::uint32_t rest = count; rest != 0; rest >>= 1u) {
-      if ((rest & 1u) != 0) {
-        contraction = contraction + power * base_contraction;
-        power = power * base_power;
-      }
+      if ((rest & 1u) != 0) anchor_take(base_power, base_contraction);
       base_contraction = base_contraction + base_power * base_contraction;
-      base_power = select(base_contraction < S(0.5), S(S(1.0) - base_contraction),
-                          S(base_power * base_power));
+      base_power = squared(base_power, base_contraction);
     }
-    power_ = power;
-    bracket_ = bracket(count, contraction);
+    bracket_ = bracket(detail::integer<S>(count), bracket_);
+  }
+  /// One bit of it. Until the end 1 - p^c stands in the place of [c].
+  constexpr void anchor_take(const S& base_power, const S& base_contraction) noexcept {
+    bracket_ = bracket_ + power_ * base_contraction;
+    power_ = power_ * base_power;
+  }
+  /// The square of a power of p. @param contraction 1 minus this square
+  static constexpr S squared(const S& power, const S& contraction) noexcept {
+    return select(contraction < S(0.5), S(S(1.0) - contraction), S(power * power));
   }
 
   constexpr void set_coefficients() noexcept {
@@ -331,20 +325,12 @@ class AlgebraicGain {
     gain_ = current_gain<Size, S>(weights);
   }
 
-  ESOKIT_COLD void settle() noexcept {
+  ESOKIT_COLD void settle_if_due() noexcept {
+    if (all(settled_below_ >= std::get<0>(ratios_u_)) && !(age_ <= least_age_)) settle();
+  }
+  void settle() noexcept {
     settled_ = true;
     gain_ = current_gain<Size, S>(final_poles_.weights());
-  }
-
-  // For packs only. A template, because Clang 14 instantiates all other members of a class.
-  template <class = S>
-  ESOKIT_COLD void settle_lanes() noexcept {
-    for (int i = 0; i < lane_count<S>; ++i) {
-      if (!(settled_below_[i] >= std::get<0>(ratios_u_)[i]) || age_[i] <= least_age_[i]) continue;
-      Plain lane = detail::get_lane<Plain>(*this, i);
-      lane.settle();
-      detail::set_lane(*this, lane, i);
-    }
   }
 
   ScaledGain<Size, S> gain_{};

@@ -78,7 +78,7 @@ class ConstantGain {
 
  private:
   friend struct detail::LaneAccess;
-  static constexpr auto fields(auto& o) noexcept { return detail::tie(o.gain_, o.poles_); }
+  static constexpr int data_members = 2;
 
   ConstantGain() = default;
 

@@ -47,10 +47,6 @@ struct MatrixTransition {
 
   template <class T>
   using with_scalar = MatrixTransition<Size, T>;  ///< the same with another scalar
-  /// @cond
-  static constexpr auto fields(auto& t) noexcept { return detail::tie(t.phi, t.degrees); }
-  /// @endcond
-
   /// Phi of a model.
   template <class Model>
   static MatrixTransition of(const Model& model) noexcept {
@@ -260,7 +256,7 @@ class CovarianceFactor {
 
  private:
   friend struct detail::LaneAccess;
-  static constexpr auto fields(auto& o) noexcept { return detail::tie(o.variances_, o.lower_); }
+  static constexpr int data_members = 2;
 
   template <bool DiagonalNoise, bool Unrolled, class Transition>
   ESOKIT_INLINE constexpr void advance_by(const S& inflation, const CovarianceFactor& noise,

@@ -58,67 +58,72 @@ inline constexpr GainLawTraits gain_law_traits = detail::declared_traits<Law, Ga
 
 namespace detail {
 
-ESOKIT_MEMBER_NAME(advance)
-ESOKIT_MEMBER_NAME(accept)
-ESOKIT_MEMBER_NAME(reset)
-ESOKIT_MEMBER_NAME(gap_gain)
-ESOKIT_MEMBER_NAME(bears_any_innovation)
-ESOKIT_MEMBER_NAME(gain_before_measurement)
-ESOKIT_MEMBER_NAME(shrinking_gain)
-ESOKIT_MEMBER_NAME(otherwise_gain)
-ESOKIT_MEMBER_NAME(shrinks)
-ESOKIT_MEMBER_NAME(linear_gain)
-ESOKIT_MEMBER_NAME(factor)
-ESOKIT_MEMBER_FUNCTION(advances)
-ESOKIT_MEMBER_FUNCTION(accepts)
-ESOKIT_MEMBER_FUNCTION(accepted)
-ESOKIT_MEMBER_FUNCTION(resets)
-ESOKIT_MEMBER_FUNCTION(bridge_gap)
-ESOKIT_MEMBER_FUNCTION(gain_for_gap)
-ESOKIT_MEMBER_FUNCTION(preset_gain)
-ESOKIT_MEMBER_FUNCTION(shrink)
-ESOKIT_MEMBER_FUNCTION(factors)
-
 template <class Gain, int Size, class S>
 concept GainOf = std::convertible_to<Gain, ScaledGain<Size, S>>;
 
-// The required signatures of the hooks.
+/// @cond
+// clang-format off
+// The hooks. HOOK: its concept, what declares it, its name, its signature. MISTAKEN: a member
+// function that would never be called, as its name is almost that of the hook above.
+#define ESOKIT_GAIN_LAW_HOOKS(HOOK, MISTAKEN)                                                     \
+  HOOK(Advances, advances, advance, { law.advance() } noexcept;)                                  \
+  MISTAKEN(advances)                                                                              \
+  HOOK(Accepts, accepts, accept, { law.accept(e) } noexcept;)                                     \
+  MISTAKEN(accepts) MISTAKEN(accepted)                                                            \
+  HOOK(Resets, resets, reset, { law.reset() } noexcept;)                                          \
+  MISTAKEN(resets)                                                                                \
+  HOOK(BridgesGaps, bridges_gaps, gap_gain,                                                       \
+       { fixed.gap_gain(e, 1u) } noexcept -> GainOf<Size, S>;                                     \
+       { fixed.longest_gap(1) } noexcept -> std::same_as<int>;)                                   \
+  MISTAKEN(bridge_gap) MISTAKEN(gain_for_gap)                                                     \
+  HOOK(Preset, kind == GainKind::preset, gain_before_measurement,                                 \
+       { fixed.gain_before_measurement() } noexcept -> GainOf<Size, S>;)                          \
+  MISTAKEN(preset_gain)                                                                           \
+  HOOK(Shrinks, kind == GainKind::switched, shrinks, requires noexcept(fixed.shrinks(e));         \
+       { select(fixed.shrinks(e), e, e) } -> std::convertible_to<S>;)                             \
+  MISTAKEN(shrink)                                                                                \
+  HOOK(GainsIfShrinking, kind == GainKind::switched, shrinking_gain,                              \
+       { fixed.shrinking_gain() } noexcept -> GainOf<Size, S>;)                                   \
+  HOOK(GainsOtherwise, kind == GainKind::switched, otherwise_gain,                                \
+       { fixed.otherwise_gain() } noexcept -> GainOf<Size, S>;)                                   \
+  HOOK(Factors, kind == GainKind::factored, factor,                                               \
+       { fixed.factor(e) } noexcept -> std::convertible_to<S>;)                                   \
+  MISTAKEN(factors)                                                                               \
+  HOOK(GainsLinearly, kind == GainKind::factored, linear_gain,                                    \
+       { fixed.linear_gain() } noexcept -> GainOf<Size, S>;)
+// clang-format on
+
+#define ESOKIT_GAIN_LAW_HOOK(Hook, declared, name, ...)              \
+  ESOKIT_MEMBER_NAME(name)                                           \
+  template <class Law, int Size, class S>                            \
+  concept Hook = requires(Law & law, const Law& fixed, const S& e) { \
+    __VA_ARGS__                                                      \
+  };                                                                 \
+  template <class Law, int Size, class S>                            \
+  concept Hook##AsDeclared =                                         \
+      as_declared(gain_law_traits<Law>.declared, names_##name<Law>, Hook<Law, Size, S>);
+ESOKIT_GAIN_LAW_HOOKS(ESOKIT_GAIN_LAW_HOOK, ESOKIT_MEMBER_FUNCTION)
+ESOKIT_MEMBER_NAME(bears_any_innovation)
+
+#define ESOKIT_AND_GAIN_LAW_HOOK(Hook, ...) &&Hook##AsDeclared<Law, Size, S>
+#define ESOKIT_AND_NOT_MISTAKEN_LAW(name) &&!calls_##name<Law>
+#define ESOKIT_NOTHING(...)
 template <class Law>
-concept Advances = noexcept(std::declval<Law&>().advance());
-template <class Law, class S>
-concept Accepts = noexcept(std::declval<Law&>().accept(std::declval<const S&>()));
-template <class Law>
-concept Resets = noexcept(std::declval<Law&>().reset());
-template <class Law>
-concept LimitsGaps = requires(const Law& law) {
-  { law.longest_gap(1) } -> std::same_as<int>;
-  requires noexcept(law.longest_gap(1));
-};
+concept HasNoMisspelledHook =
+    // Formerly a constant of the law, now declared in `traits`.
+    !names_bears_any_innovation<Law> ESOKIT_GAIN_LAW_HOOKS(ESOKIT_NOTHING,
+                                                           ESOKIT_AND_NOT_MISTAKEN_LAW);
 template <class Law, int Size, class S>
-concept BridgesGaps = requires(const Law& law, const S& e, unsigned samples) {
-  { law.gap_gain(e, samples) } -> GainOf<Size, S>;
-  requires noexcept(law.gap_gain(e, samples));
-  requires LimitsGaps<Law>;
-};
+concept GainLawAsDeclared = DeclaresTraits<Law, GainLawTraits> ESOKIT_GAIN_LAW_HOOKS(
+    ESOKIT_AND_GAIN_LAW_HOOK, ESOKIT_NOTHING);
+
+/// @endcond
+
 template <class Law, int Size, class S>
-concept Preset = requires(const Law& law) {
-  { law.gain_before_measurement() } -> GainOf<Size, S>;
-  requires noexcept(law.gain_before_measurement());
-};
+concept Switched =
+    Shrinks<Law, Size, S> && GainsIfShrinking<Law, Size, S> && GainsOtherwise<Law, Size, S>;
 template <class Law, int Size, class S>
-concept Switched = requires(const Law& law, const S& e) {
-  { law.shrinking_gain() } -> GainOf<Size, S>;
-  { law.otherwise_gain() } -> GainOf<Size, S>;
-  { select(law.shrinks(e), e, e) } -> std::convertible_to<S>;
-  requires noexcept(law.shrinking_gain())&& noexcept(law.otherwise_gain());
-  requires noexcept(law.shrinks(e));
-};
-template <class Law, int Size, class S>
-concept Factored = requires(const Law& law, const S& e) {
-  { law.linear_gain() } -> GainOf<Size, S>;
-  { law.factor(e) } -> std::convertible_to<S>;
-  requires noexcept(law.linear_gain())&& noexcept(law.factor(e));
-};
+concept Factored = Factors<Law, Size, S> && GainsLinearly<Law, Size, S>;
 
 /// Missing samples that all laws bridge, at most `asked`.
 template <class Laws>
@@ -131,61 +136,6 @@ constexpr int bridged_gap(const Laws& laws, int asked) noexcept {
 
 }  // namespace detail
 
-/// `advance()` exists, noexcept, if and only if `traits.advances` declares it.
-template <class Law>
-concept AdvancesAsDeclared = detail::as_declared(gain_law_traits<Law>.advances,
-                                                 detail::names_advance<Law>, detail::Advances<Law>);
-
-/// `accept(e)` exists, noexcept, if and only if `traits.accepts` declares it.
-template <class Law, class S>
-concept AcceptsAsDeclared = detail::as_declared(gain_law_traits<Law>.accepts,
-                                                detail::names_accept<Law>, detail::Accepts<Law, S>);
-
-/// `reset()` exists, noexcept, if and only if `traits.resets` declares it.
-template <class Law>
-concept ResetsAsDeclared = detail::as_declared(gain_law_traits<Law>.resets,
-                                               detail::names_reset<Law>, detail::Resets<Law>);
-
-/// `gap_gain(e, samples) const` and `longest_gap(asked) const` exist, noexcept, if and only if
-/// `traits.bridges_gaps` declares them.
-template <class Law, int Size, class S>
-concept BridgesGapsAsDeclared = detail::as_declared(gain_law_traits<Law>.bridges_gaps,
-                                                    detail::names_gap_gain<Law>,
-                                                    detail::BridgesGaps<Law, Size, S>);
-
-/// `gain_before_measurement() const` exists, noexcept, if and only if `traits.kind` declares it.
-template <class Law, int Size, class S>
-concept PresetAsDeclared = detail::as_declared(gain_law_traits<Law>.kind == GainKind::preset,
-                                               detail::names_gain_before_measurement<Law>,
-                                               detail::Preset<Law, Size, S>);
-
-/// `shrinks(e) const`, `shrinking_gain() const` and `otherwise_gain() const` exist, noexcept, if
-/// and only if `traits.kind` declares them.
-template <class Law, int Size, class S>
-concept SwitchedAsDeclared = detail::as_declared(gain_law_traits<Law>.kind == GainKind::switched,
-                                                 detail::names_shrinks<Law> ||
-                                                     detail::names_shrinking_gain<Law> ||
-                                                     detail::names_otherwise_gain<Law>,
-                                                 detail::Switched<Law, Size, S>);
-
-/// `factor(e) const` and `linear_gain() const` exist, noexcept, if and only if `traits.kind`
-/// declares them.
-template <class Law, int Size, class S>
-concept FactoredAsDeclared = detail::as_declared(gain_law_traits<Law>.kind == GainKind::factored,
-                                                 detail::names_factor<Law> ||
-                                                     detail::names_linear_gain<Law>,
-                                                 detail::Factored<Law, Size, S>);
-
-/// No member function has a name that is almost that of a hook, because it would never be called.
-template <class Law>
-concept HasNoMisspelledHook =
-    !detail::calls_advances<Law> && !detail::calls_accepts<Law> && !detail::calls_accepted<Law> &&
-    !detail::calls_resets<Law> && !detail::calls_bridge_gap<Law> &&
-    !detail::calls_gain_for_gap<Law> && !detail::calls_preset_gain<Law> &&
-    !detail::calls_shrink<Law> && !detail::calls_factors<Law> &&
-    // Formerly a constant of the law, now declared in `traits`.
-    !detail::names_bears_any_innovation<Law>;
-
 /// A gain law of the sampled predictor-corrector.
 ///
 /// Required: `gain(e) const noexcept`, the scaled gain k (k_r = T^r / r! times the physical gain;
@@ -197,10 +147,7 @@ template <class Law, int Size, class S>
 concept GainLaw = std::copyable<Law> && requires(const Law& law, const S& innovation) {
   { law.gain(innovation) }
   noexcept->std::convertible_to<ScaledGain<Size, S>>;
-} && DeclaresTraits<Law, GainLawTraits> && AdvancesAsDeclared<Law> && AcceptsAsDeclared<Law, S> &&
-    ResetsAsDeclared<Law> && BridgesGapsAsDeclared<Law, Size, S> &&
-    PresetAsDeclared<Law, Size, S> && SwitchedAsDeclared<Law, Size, S> &&
-    FactoredAsDeclared<Law, Size, S> && HasNoMisspelledHook<Law>;
+} && detail::GainLawAsDeclared<Law, Size, S> && detail::HasNoMisspelledHook<Law>;
 
 /// A gain law whose gain is known before the measurement.
 template <class Law, int Size, class S>

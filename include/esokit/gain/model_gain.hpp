@@ -321,7 +321,7 @@ class ModelGain {
 
  private:
   friend struct detail::LaneAccess;
-  static constexpr auto fields(auto& o) noexcept { return detail::tie(o.gains_, o.longest_step_); }
+  static constexpr int data_members = 2;
 
   ModelGain() = default;
 
@@ -332,7 +332,7 @@ class ModelGain {
   }
 
   Array<ScaledGain<Size, S>, detail::gain_of_step(MostBridged) + 1> gains_{};
-  int longest_step_ = 1;
+  Lanes<int, S> longest_step_{1};
 };
 
 /// Distinguishes the type in snapshots.

@@ -81,9 +81,7 @@ struct PowerSumGain {
 
    private:
     friend struct detail::LaneAccess;
-    static constexpr auto fields(auto& o) noexcept {
-      return detail::tie(o.gain_alpha_, o.gain_beta_, o.alpha_, o.beta_);
-    }
+    static constexpr int data_members = 4;
 
     S gain_alpha_;
     S gain_beta_;
@@ -134,7 +132,7 @@ struct FalGain {
 
    private:
     friend struct detail::LaneAccess;
-    static constexpr auto fields(auto& o) noexcept { return detail::tie(o.gain_, o.fal_); }
+    static constexpr int data_members = 2;
 
     S gain_;
     Fal<S> fal_;
@@ -211,9 +209,7 @@ class LimitedGain {
 
  private:
   friend struct LaneAccess;
-  static constexpr auto fields(auto& o) noexcept {
-    return detail::tie(o.function_, o.inverse_scale_, o.low_, o.high_);
-  }
+  static constexpr int data_members = 4;
 
   Function function_;
   S inverse_scale_;
@@ -282,7 +278,7 @@ class NonlinearGain {
 
  private:
   friend struct detail::LaneAccess;
-  static constexpr auto fields(auto& o) noexcept { return detail::tie(o.linear_, o.factor_); }
+  static constexpr int data_members = 2;
 
   Linear linear_;
   detail::LimitedGain<S, Shape> factor_;

@@ -159,7 +159,7 @@ class RiccatiGain {
         note(0);
         recur_from_correction();
       } else {
-        detail::for_each_lane<Plain>(*this, [](Plain& lane, int) { lane.advance(); });
+        detail::for_each_lane<Plain>(*this, [](Plain& lane) { lane.advance(); });
       }
     } else {
       if (rests()) [[likely]] {
@@ -299,12 +299,8 @@ class RiccatiGain {
 
  private:
   friend struct detail::LaneAccess;
-  static constexpr auto fields(auto& o) noexcept {
-    return detail::tie(o.now_, o.since_, o.mode_, o.place_, o.current_measurement_, o.transition_,
-                       o.measurement_, o.start_, o.noise_, o.start_inflation_, o.unit_,
-                       o.noise_trace_, o.trace_weights_, o.rule_, o.diagonal_noise_, o.limit_,
-                       o.table_);
-  }
+  static constexpr int data_members = 17;
+  friend struct detail::RecordAccess;
   using Plain = detail::PlainTwin<RiccatiGain, S>;  ///< type of a lane
   template <int OtherSize, Scalar Other, int OtherTable, class OtherTransition>
   friend class RiccatiGain;
@@ -329,10 +325,6 @@ class RiccatiGain {
     S inflation{};    ///< theta
     S growth{1.0};    ///< 1 + theta
     S shrink{1.0};    ///< 1 / (1 + theta)
-
-    static constexpr auto fields(auto& p) noexcept {
-      return detail::tie(p.gain, p.factor, p.share, p.rest, p.inflation, p.growth, p.shrink);
-    }
   };
 
   static constexpr std::size_t index(int i) noexcept { return static_cast<std::size_t>(i); }
@@ -360,36 +352,49 @@ class RiccatiGain {
     const bool in_gap = since_ == gapped || since_ == (gapped | watched);
     note(had_correction ? 0 : gapped);
     if (in_gap && !all(now_.factor.variance(0) < ceiling())) [[unlikely]] {
-      now_.factor.advance_seldom(S(1.0), Factor{}, transition_);
-      // It still grows as samples^(2N-2) and would overflow. By now the gain is that for exact
-      // measurements, which a common factor on all variances does not change.
-      const S most = S(1024.0) * ceiling();
-      const S variance = now_.factor.variance(0);
-      if (!all(variance < most))
-        now_.factor.scale(select(variance < most, S(1.0), S(most / variance)));
+      recur_at_ceiling();
     } else {
-      Factor scaled;
-      const Factor* noise = &noise_;
-      if (rule_ == InflationRule::adaptive) [[unlikely]] {
-        scaled = adapt(had_correction);
-        noise = &scaled;
-      } else if (had_correction) [[likely]] {
-        now_.factor.set_variance(0, S(now_.factor.variance(0) * now_.rest));
-      }
-      advance_factor(*noise);
+      recur_usually(had_correction);
     }
-    current_measurement_ = measurement_;
-    set_gain();
     if (mode_ != RiccatiMode::recursive) [[unlikely]]
       stand_if_close();
+  }
+
+  constexpr void recur_at_ceiling() noexcept {
+    now_.factor.advance_seldom(S(1.0), Factor{}, transition_);
+    // It still grows as samples^(2N-2) and would overflow. By now the gain is that for exact
+    // measurements, which a common factor on all variances does not change.
+    const S most = S(1024.0) * ceiling();
+    const S variance = now_.factor.variance(0);
+    if (const auto fits = variance < most; records<S> || !all(fits)) {
+      now_.factor.scale(select(fits, S(1.0), S(most / variance)));
+    }
+    take_factor();
+  }
+
+  constexpr void recur_usually(bool had_correction) noexcept {
+    Factor scaled;
+    const Factor* noise = &noise_;
+    if (rule_ == InflationRule::adaptive) [[unlikely]] {
+      scaled = adapt(had_correction);
+      noise = &scaled;
+    } else if (had_correction) [[likely]] {
+      now_.factor.set_variance(0, S(now_.factor.variance(0) * now_.rest));
+    }
+    advance_factor(*noise);
+    take_factor();
+  }
+
+  ESOKIT_INLINE constexpr void take_factor() noexcept {
+    current_measurement_ = measurement_;
+    set_gain();
   }
 
   /// `recur` for the usual case, after a correction.
   [[gnu::noinline]] constexpr void recur_from_correction() noexcept {
     now_.factor.set_variance(0, S(now_.factor.variance(0) * now_.rest));
     advance_factor(noise_);
-    current_measurement_ = measurement_;
-    set_gain();
+    take_factor();
   }
 
   /// Sets theta^2 = tr W Q / tr W (A + K C) P- (A + K C)' and the covariance to be advanced, and

@@ -121,11 +121,14 @@ struct EqualSampledPoles {
     S base = contraction;
     S result(0.0);
     for (; samples != 0; samples >>= 1u) {
-      // 1 - (1-a)(1-b), without cancellation.
-      if ((samples & 1u) != 0) result = result + (S(1.0) - result) * base;
-      base = base + (S(1.0) - base) * base;
+      if ((samples & 1u) != 0) result = joined(result, base);
+      base = joined(base, base);
     }
     return {result};
+  }
+  /// 1 - (1-a)(1-b), without cancellation.
+  [[nodiscard]] static constexpr S joined(const S& a, const S& b) noexcept {
+    return a + (S(1.0) - a) * b;
   }
 
   /// beta_0 .. beta_N of prod_i (delta + a_i) = sum_j beta_j delta^(N-j).
@@ -151,24 +154,26 @@ struct EqualSampledPoles {
     }
     return weights;
   }
-
-  /// @cond
-  static constexpr auto fields(auto& poles) noexcept { return detail::tie(poles.contraction); }
-  /// @endcond
 };
 
-/// Gain of a correction after `samples` sample times, scaled with one sample time: it places the
-/// poles of the long step at rho_i^samples.
+/// Gain of a correction after `samples` sample times, scaled with one sample time.
+/// @param poles of the long step
 template <int Size, Scalar S, class Poles>
-constexpr ScaledGain<Size, S> gap_gain(const Poles& poles, unsigned samples) noexcept {
-  ScaledGain<Size, S> gain = current_gain<Size, S>(poles.power(samples).weights());
-  const S rate = S(1.0) / detail::integer<S>(samples);
+constexpr ScaledGain<Size, S> long_step_gain(const Poles& poles, const S& samples) noexcept {
+  ScaledGain<Size, S> gain = current_gain<Size, S>(poles.weights());
+  const S rate = S(1.0) / samples;
   S factor(1.0);
   for (std::size_t r = 1; r < Size; ++r) {
     factor = factor * rate;
     gain[r] = gain[r] * factor;
   }
   return gain;
+}
+
+/// The same with the poles of one step: it places those of the long step at rho_i^samples.
+template <int Size, Scalar S, class Poles>
+constexpr ScaledGain<Size, S> gap_gain(const Poles& poles, unsigned samples) noexcept {
+  return long_step_gain<Size, S>(poles.power(samples), detail::integer<S>(samples));
 }
 
 }  // namespace esokit

@@ -119,7 +119,7 @@ class SwitchedGain {
 
  private:
   friend struct detail::LaneAccess;
-  static constexpr auto fields(auto& o) noexcept { return detail::tie(o.sets_, o.previous_); }
+  static constexpr int data_members = 2;
 
   Array<Set, 2> sets_;  ///< {otherwise, shrinking}
   S previous_ = detail::nothing_watched<S>(Reading);

@@ -30,7 +30,7 @@ class Fal {
 
  private:
   friend struct detail::LaneAccess;
-  static constexpr auto fields(auto& o) noexcept { return detail::tie(o.power_, o.linear_width_); }
+  static constexpr int data_members = 2;
 
   Power<S> power_;
   S linear_width_;

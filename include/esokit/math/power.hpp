@@ -36,29 +36,24 @@ class Power {
  public:
   /// @param exponent p, any finite number
   constexpr explicit Power(const S& exponent) noexcept : exponent_(exponent) {
-    if constexpr (PackScalar<S>) {
-      for (int i = 0; i < lane_count<S>; ++i) {
-        kind_[i] = detail::power_kind(LaneScalar<S>(exponent[i]));
-      }
-    } else {
-      kind_ = detail::power_kind(exponent);
+    for (int i = 0; i < lane_count<S>; ++i) {
+      detail::of_lane(kind_, i) = detail::power_kind(detail::number_of_lane(exponent, i));
     }
   }
 
   /// x^p, x > 0.
   [[nodiscard]] S operator()(const S& x) const noexcept {
-    if constexpr (PackScalar<S>) {
-      if (!(kind_ == kind_[0])) [[unlikely]] {
-        S each = x;
-        for (int i = 0; i < lane_count<S>; ++i) {
-          each[i] = detail::get_lane<Power<LaneScalar<S>>>(*this, i)(x[i]);
-        }
-        return each;
-      }
-      return raised(x, kind_[0]);
-    } else {
-      return raised(x, kind_);
+    const Kind kind = detail::of_lane(kind_, 0);
+    if (kind_ == kind) [[likely]]
+      return raised(x, exponent_, kind);
+    S each = x;
+    for (int i = 0; i < lane_count<S>; ++i) {
+      detail::set_lane(each,
+                       raised(detail::number_of_lane(x, i), detail::number_of_lane(exponent_, i),
+                              detail::of_lane(kind_, i)),
+                       i);
     }
+    return each;
   }
 
   /// p.
@@ -67,14 +62,15 @@ class Power {
  private:
   using Kind = detail::PowerKind;
   friend struct detail::LaneAccess;
-  static constexpr auto fields(auto& o) noexcept { return detail::tie(o.exponent_, o.kind_); }
+  static constexpr int data_members = 2;
 
-  [[nodiscard]] S raised(const S& x, Kind kind) const noexcept {
+  template <class T>
+  [[nodiscard]] static T raised(const T& x, const T& exponent, Kind kind) noexcept {
     using std::pow;
     using std::sqrt;
     switch (kind) {
       case Kind::zero:
-        return S(1.0);
+        return T(1.0);
       case Kind::one:
         return x;
       case Kind::two:
@@ -82,11 +78,11 @@ class Power {
       case Kind::half:
         return sqrt(x);
       case Kind::minus_half:
-        return S(1.0) / sqrt(x);
+        return T(1.0) / sqrt(x);
       case Kind::general:
         break;
     }
-    return pow(x, exponent_);
+    return pow(x, exponent);
   }
 
   S exponent_;

@@ -98,7 +98,7 @@ struct PartsShape {
 };
 
 /// a! / b!.
-template <SingleScalar S>
+template <PlainScalar S>
 constexpr S factorial_ratio(int a, int b) noexcept {
   S ratio(1);
   for (int j = b + 1; j <= a; ++j) ratio = ratio * static_cast<S>(j);
@@ -116,10 +116,6 @@ template <Scalar S>
 struct SpeedRange<true, S> {
   S lowest{};   ///< above 0, 1 at most
   S highest{};  ///< 1 or more
-
-  /// @cond
-  static constexpr auto fields(auto& r) noexcept { return detail::tie(r.lowest, r.highest); }
-  /// @endcond
 };
 
 /// Settings of the parts of an AugmentedModel, in this order; members of absent parts are empty.
@@ -131,12 +127,6 @@ struct PartsSettings {
   Array<Resonance<S>, Parts.resonators> resonators{};     ///< the sines
   Array<S, Parts.first_order> first_order{};  ///< time constants of the first-order disturbances, s
   SpeedRange<Parts.follows_speed, S> speed{};  ///< of the resonators
-
-  /// @cond
-  static constexpr auto fields(auto& s) noexcept {
-    return detail::tie(s.plant, s.actuator, s.sensor, s.resonators, s.first_order, s.speed);
-  }
-  /// @endcond
 };
 
 /// Plant, actuator, sensor and disturbance as one model, sampled exactly:
@@ -193,9 +183,10 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
       .follows_speed = Parts.follows_speed,
   };
 
-  /// The same with another scalar. A model that follows a speed branches on it and is not recorded.
-  template <SingleScalar T>
-  requires(!(Parts.follows_speed && records<T>)) using with_scalar = AugmentedModel<Parts, T>;
+  /// The same with another scalar. A model that follows a speed branches on it: it is not recorded,
+  /// and its packs go lane by lane.
+  template <Scalar T>
+  requires(!Parts.follows_speed || PlainScalar<T>) using with_scalar = AugmentedModel<Parts, T>;
 
   using Settings = PartsSettings<Parts, S>;  ///< settings of make
 
@@ -222,13 +213,13 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
 
   /// b0 of the plant, without the lag: unit of y^(n) per unit of v.
   [[nodiscard]] constexpr S plant_gain() const noexcept {
-    S gain = input_gain_ / detail::scaled_lag(settings_.actuator, sample_time_)[0];
+    S gain = input_gain_ / detail::scaled_lag(rest_.settings.actuator, sample_time_)[0];
     for (int i = 0; i < la; ++i) gain = gain * sample_time_;
     return gain;
   }
 
   /// The settings, as they were given.
-  [[nodiscard]] constexpr const Settings& settings() const noexcept { return settings_; }
+  [[nodiscard]] constexpr const Settings& settings() const noexcept { return rest_.settings; }
 
   /// The estimate for a plant at rest at y under a constant u.
   [[nodiscard]] constexpr Estimate equilibrium(const S& y, const S& u) const noexcept {
@@ -249,7 +240,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
       Array<S, n> poles{};  // T^(n-i) a_i
       S power = sample_time_;
       detail::unroll<n>([&](auto i) ESOKIT_INLINE_LAMBDA {
-        std::get<n - 1 - i>(poles) = std::get<n - 1 - i>(settings_.plant) * power;
+        std::get<n - 1 - i>(poles) = std::get<n - 1 - i>(rest_.settings.plant) * power;
         power = power * sample_time_;
       });
       // y^(n) = -sum a_i y^(i) and its derivatives, as rows over y .. y^(n-1).
@@ -263,7 +254,8 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
           S& weight = std::get<i>(next);
           weight = -(last * std::get<i>(poles));
           if constexpr (i > 0) weight = weight + std::get<i - 1>(row);
-          of_plant = of_plant - weight * detail::factorial_ratio<S>(i, n + k) * std::get<lf + i>(x);
+          const S ratio(detail::factorial_ratio<LaneScalar<S>>(i, n + k));
+          of_plant = of_plant - weight * ratio * std::get<lf + i>(x);
         });
         row = next;
       });
@@ -273,14 +265,14 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
 
   /// The present factor of the frequencies.
   [[nodiscard]] constexpr const S& speed() const noexcept requires(Parts.follows_speed) {
-    return speed_;
+    return rest_.speed;
   }
 
   /// The same with all frequencies of the resonators multiplied by `factor`. Exact; it costs a
   /// matrix exponential, about 16 products of N x N.
   [[nodiscard]] AugmentedModel at_speed(const S& factor) const noexcept {
     AugmentedModel other = *this;
-    other.speed_ = factor;
+    other.rest_.speed = factor;
     other.sample();
     return other;
   }
@@ -314,7 +306,8 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   [[nodiscard]] S delivered(const Estimate& z) const noexcept requires(Parts.actuator > 0) {
     S sum = z(n) - disturbance(z);
     if constexpr (Parts.plant_poles) {
-      for (int i = 0; i < n; ++i) sum = sum + settings_.plant[static_cast<std::size_t>(i)] * z(i);
+      for (int i = 0; i < n; ++i)
+        sum = sum + rest_.settings.plant[static_cast<std::size_t>(i)] * z(i);
     }
     return sum;
   }
@@ -335,8 +328,8 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   /// The row by which the states x give the constant part of d times T^n / n!. Predictions do not
   /// change it (m = 1).
   [[nodiscard]] State constant_row() const noexcept {
-    const auto lag = detail::scaled_lag(settings_.actuator, sample_time_);
-    const auto alpha = denominator(settings_, sample_time_);
+    const auto lag = detail::scaled_lag(rest_.settings.actuator, sample_time_);
+    const auto alpha = denominator(rest_.settings, sample_time_);
     // act(s) d = D + sum_i alpha_i y^(i), in units of T^n / n!.
     State row = others_filtered(present(), sample_time_, 0);
     for (S& weight : row) weight = -weight;
@@ -396,7 +389,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   /// y^(n).
   [[nodiscard]] S holding_input(const Estimate& z) const noexcept {
     S sum = -disturbance(z);
-    if constexpr (Parts.plant_poles) sum = sum + settings_.plant[0] * z(0);
+    if constexpr (Parts.plant_poles) sum = sum + rest_.settings.plant[0] * z(0);
     return sum;
   }
   /// @}
@@ -406,7 +399,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   template <class Design>
   auto with_corrected_part(const S& bandwidth, const Design& design) const {
     if constexpr (lf > 0) {
-      if (detail::sensor_rate(settings_.sensor) > bandwidth) {
+      if (detail::sensor_rate(rest_.settings.sensor) > bandwidth) {
         return design(corrected_part<without(true, true)>());
       }
     }
@@ -417,11 +410,6 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   template <ModelParts Other, Scalar T>
   friend class AugmentedModel;
   friend struct detail::LaneAccess;
-  /// What a step reads.
-  static constexpr auto fields(auto& o) noexcept {
-    return detail::tie(o.step_, o.rate_, o.input_gain_, o.sample_time_, o.scaled_input_gain_,
-                       o.settings_.plant);
-  }
 
   static constexpr ModelParts without(bool actuator, bool sensor) noexcept {
     ModelParts less = Parts;
@@ -553,10 +541,10 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
     constexpr int part_lf = Part::lf;
     constexpr int part_d = part_lf + n;
     typename Part::Settings less{};
-    less.plant = settings_.plant;
-    if constexpr (part_lf > 0) less.sensor = settings_.sensor;
+    less.plant = rest_.settings.plant;
+    if constexpr (part_lf > 0) less.sensor = rest_.settings.sensor;
     less.resonators = present().resonators;
-    less.first_order = settings_.first_order;
+    less.first_order = rest_.settings.first_order;
     const auto with_input = Part::rates(less, sample_time_);
     Matrix<S, part_size, part_size> rates;
     for (int i = 0; i < part_size; ++i) {
@@ -587,7 +575,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
       for (int i = 0; i < lf; ++i) part.whole(i, i) = S(1);
     } else {
       // The sensor's error follows from the errors of the other states.
-      const auto shown = detail::shown_by_sensor(settings_.sensor, sample_time_, rates);
+      const auto shown = detail::shown_by_sensor(rest_.settings.sensor, sample_time_, rates);
       for (int j = 0; j < part_size; ++j) {
         part.output[static_cast<std::size_t>(j)] = shown(0, j);
         for (int i = 0; i < lf; ++i) part.whole(i, j) = shown(i, j);
@@ -598,7 +586,7 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
   }
 
   AugmentedModel(const Settings& settings, const S& input_gain, const S& sample_time) noexcept
-      : Base(input_gain, sample_time), settings_(settings) {
+      : Base(input_gain, sample_time), rest_{settings} {
     const auto lag = detail::scaled_lag(settings.actuator, sample_time);
     if constexpr (la > 0) {
       input_gain_ = input_gain_ * lag[0];
@@ -613,8 +601,8 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
 
   /// The settings with the present frequencies.
   [[nodiscard]] Settings present() const noexcept {
-    Settings now = settings_;
-    for (auto& resonance : now.resonators) resonance.frequency = resonance.frequency * speed_;
+    Settings now = rest_.settings;
+    for (auto& resonance : now.resonators) resonance.frequency = resonance.frequency * rest_.speed;
     return now;
   }
 
@@ -623,8 +611,10 @@ class AugmentedModel : public MatrixModel<detail::PartsShape<Parts>, S> {
     this->set_step(all);
   }
 
-  Settings settings_;
-  S speed_ = S(1);  ///< factor of the frequencies
+  struct {
+    Settings settings;
+    S speed{1};  ///< factor of the frequencies
+  } rest_;
 };
 
 /// Distinguishes the type in snapshots.

@@ -163,9 +163,7 @@ class ChainModel {
 
  private:
   friend struct detail::LaneAccess;
-  static constexpr auto fields(auto& o) noexcept {
-    return detail::tie(o.scaled_input_gain_, o.rate_, o.input_gain_, o.sample_time_);
-  }
+  static constexpr int data_members = 4;
 
   [[nodiscard]] constexpr bool same_time(const ChainModel& other) const noexcept {
     return !all(detail::absolute(S(rate_ - other.rate_)) > S(0.0));

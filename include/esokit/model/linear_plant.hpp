@@ -201,12 +201,6 @@ struct LinearPlant {
     return all;
   }
 
-  /// @cond
-  static constexpr auto fields(auto& plant) noexcept {
-    return detail::tie(plant.a, plant.b, plant.c, plant.e, plant.dead_time);
-  }
-  /// @endcond
-
  private:
   struct Reached {
     int degree;

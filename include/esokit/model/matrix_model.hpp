@@ -29,7 +29,7 @@ struct ModelPattern {
 /// sensor come first.
 /// @tparam Shape `order`, `size`, `measured_rows` (states before y), `degree(state)`, and
 /// `pattern`, which elements are not zero
-template <class Shape, SingleScalar S>
+template <class Shape, Scalar S>
 class MatrixModel {
  public:
   static constexpr int order = Shape::order;                  ///< of the law
@@ -171,6 +171,10 @@ class MatrixModel {
                      detail::absolute(S(rate_ - other.rate_));
     return !(change > S(0));
   }
+
+ private:
+  friend struct detail::LaneAccess;
+  static constexpr int data_members = 5;
 
  protected:
   /// @param input_gain b @param sample_time T, s

@@ -33,10 +33,6 @@ struct Lag {};
 template <Scalar S>
 struct Lag<1, S> {
   S time_constant{};  ///< tau, s
-
-  /// @cond
-  static constexpr auto fields(auto& l) noexcept { return detail::tie(l.time_constant); }
-  /// @endcond
 };
 
 /// v'' = w^2 (u - v) - 2 zeta w v'.
@@ -50,10 +46,6 @@ struct Lag<2, S> {
     const S root = std::sqrt(first * second);
     return {S(1) / root, (first + second) / (S(2) * root)};
   }
-
-  /// @cond
-  static constexpr auto fields(auto& l) noexcept { return detail::tie(l.frequency, l.damping); }
-  /// @endcond
 };
 
 /// A sinusoidal disturbance of known frequency.
@@ -63,16 +55,10 @@ struct Resonance {
   S damping{};            ///< damping ratio of the sine, 0 to below 1
   S capture_bandwidth{};  ///< s, rad/s: its poles go to -s +- j w0. Left out: w0. More captures it
                           ///< faster, and with more error in its frequency, at more noise
-
-  /// @cond
-  static constexpr auto fields(auto& r) noexcept {
-    return detail::tie(r.frequency, r.damping, r.capture_bandwidth);
-  }
-  /// @endcond
 };
 
 /// A sine at the present time: q = amplitude sin(phase).
-template <SingleScalar S>
+template <Scalar S>
 struct Phasor {
   S amplitude;  ///< unit of the disturbance
   S phase;      ///< rad

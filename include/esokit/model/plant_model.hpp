@@ -74,7 +74,7 @@ struct PlantShape {
 /// plant (an actuator, too) at exp(-omega_o T).
 /// @tparam States length of x @tparam Parts uses `order` (the relative degree from u to y),
 /// `sensor`, `constants`, `resonators` and `first_order`; everything else is in the plant
-template <int States, ModelParts Parts, SingleScalar S = double>
+template <int States, ModelParts Parts, Scalar S = double>
 class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S> {
   using Shape = detail::PlantShape<States, Parts>;
   using Base = MatrixModel<Shape, S>;
@@ -167,11 +167,11 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
   }
 
   /// The settings, as they were given.
-  [[nodiscard]] constexpr const Settings& settings() const noexcept { return settings_; }
+  [[nodiscard]] constexpr const Settings& settings() const noexcept { return rest_.settings; }
 
   /// The estimate for a plant at rest at y under a constant u.
   [[nodiscard]] Estimate equilibrium(const S& y, const S& u) const noexcept {
-    return rest_of_y_ * y + rest_of_u_ * u;
+    return rest_.rest_of_y * y + rest_.rest_of_u * u;
   }
 
   /// @name The parts of an estimate
@@ -214,11 +214,11 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
     for (int k = States; k < inner; ++k) {
       S element(0);
       for (int j = 0; j < inner; ++j) {
-        element = element + natural_(k, j) * x[static_cast<std::size_t>(lf + j)];
+        element = element + rest_.natural(k, j) * x[static_cast<std::size_t>(lf + j)];
       }
       for (int i = 0; i < inner; ++i) {
         S& row = part[static_cast<std::size_t>(lf + i)];
-        row = row + of_disturbance_(i, k - States) * element;
+        row = row + rest_.of_disturbance(i, k - States) * element;
       }
     }
     return part;
@@ -239,9 +239,9 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
   template <class Design>
   auto with_corrected_part(const S& bandwidth, const Design& design) const {
     if constexpr (lf > 0) {
-      if (detail::sensor_rate(settings_.sensor) > bandwidth) {
+      if (detail::sensor_rate(rest_.settings.sensor) > bandwidth) {
         CorrectedPart<inner, size, Parts.resonators, S> part;
-        const auto natural = inner_rates(settings_, this->sample_time_, S(0));
+        const auto natural = inner_rates(rest_.settings, this->sample_time_, S(0));
         const auto step = this->increment();
         Square rates;
         for (int i = 0; i < inner; ++i) {
@@ -250,7 +250,7 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
             part.step(i, j) = step(lf + i, lf + j);
           }
         }
-        const auto shown = detail::shown_by_sensor(settings_.sensor, this->sample_time_,
+        const auto shown = detail::shown_by_sensor(rest_.settings.sensor, this->sample_time_,
                                                    in_rows(rows_of(natural), rates));
         part.output.fill(S(0));
         part.whole = Matrix<S, size, inner>::Zero();
@@ -261,22 +261,17 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
           for (int i = 0; i < lf; ++i) part.whole(i, j) = shown(i, j);
           part.whole(lf + j, j) = S(1);
         }
-        part.pairs = detail::own_pairs(settings_.resonators);
+        part.pairs = detail::own_pairs(rest_.settings.resonators);
         return design(part);
       }
     }
     auto part = corrected_whole<Parts.resonators>(*this);
-    part.pairs = detail::own_pairs(settings_.resonators);
+    part.pairs = detail::own_pairs(rest_.settings.resonators);
     return design(part);
   }
 
  private:
   friend struct detail::LaneAccess;
-  /// What a step reads.
-  static constexpr auto fields(auto& o) noexcept {
-    return detail::tie(o.step_, o.rate_, o.input_gain_, o.sample_time_, o.scaled_input_gain_,
-                       o.natural_, o.of_disturbance_, o.rest_of_y_, o.rest_of_u_);
-  }
 
   static constexpr int sinusoids = States + Parts.constants;  ///< first row of the sines
   using Square = Matrix<S, inner, inner>;
@@ -352,7 +347,7 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
   /// elements of x that are least dependent on them, then the states of d.
   [[nodiscard]] Square rows_of(const Matrix<S, inner + 1, inner + 1>& natural) const noexcept {
     Square rows = Square::Zero();
-    for (int j = 0; j < States; ++j) rows(0, j) = settings_.plant.c(j);
+    for (int j = 0; j < States; ++j) rows(0, j) = rest_.settings.plant.c(j);
     for (int r = 1; r <= n; ++r) {
       for (int j = 0; j < inner; ++j) {
         S sum(0);
@@ -404,7 +399,7 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
   }
 
   LinearPlantModel(const Settings& settings, const S& input_gain, const S& sample_time) noexcept
-      : Base(input_gain, sample_time), settings_(settings) {
+      : Base(input_gain, sample_time), rest_{settings} {
     const auto& plant = settings.plant;
     const S scale = input_gain / plant.input_gain();
     const auto natural = inner_rates(settings, sample_time, scale);
@@ -444,12 +439,12 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
     this->set_step(all);
 
     for (int i = 0; i < inner; ++i) {
-      for (int k = States; k < inner; ++k) of_disturbance_(i, k - States) = rows(i, k);
+      for (int k = States; k < inner; ++k) rest_.of_disturbance(i, k - States) = rows(i, k);
     }
-    natural_ = Square::Identity();
+    rest_.natural = Square::Identity();
     Square eliminated = rows;
     detail::solve_in_place(detail::DenseView<S>{eliminated.data(), inner},
-                           detail::DenseView<S>{natural_.data(), inner, inner});
+                           detail::DenseView<S>{rest_.natural.data(), inner, inner});
 
     // At rest: A x + E d = -B u, C x = y.
     Matrix<S, States + 1, States + 1> still;
@@ -473,13 +468,13 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
         x[static_cast<std::size_t>(lf + i)] = sum;
       }
       if constexpr (lf > 0) x[0] = S(which == 0 ? 1 : 0);
-      (which == 0 ? rest_of_y_ : rest_of_u_) = this->physical(x);
+      (which == 0 ? rest_.rest_of_y : rest_.rest_of_u) = this->physical(x);
     }
     // D is what u has to balance and all derivatives are zero. Set exactly, without the rounding
     // error of the equations.
     for (int r = 0; r <= n; ++r) {
-      rest_of_y_(r) = S(r == 0 ? 1 : 0);
-      rest_of_u_(r) = r == n ? S(-input_gain) : S(0);
+      rest_.rest_of_y(r) = S(r == 0 ? 1 : 0);
+      rest_.rest_of_u(r) = r == n ? S(-input_gain) : S(0);
     }
   }
 
@@ -488,7 +483,7 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
     const State x = this->scaled(z);
     Vector<S, inner> state;
     for (int i = 0; i < inner; ++i) state(i) = x[static_cast<std::size_t>(lf + i)];
-    return natural_ * state;
+    return rest_.natural * state;
   }
 
   /// Smallest pivot of the rows C A^i, each normalised: 0 if a state is unobservable from y.
@@ -520,15 +515,17 @@ class LinearPlantModel : public MatrixModel<detail::PlantShape<States, Parts>, S
     return least;
   }
 
-  Settings settings_;
-  Square natural_;                                   ///< from the scaled states to (x, states of d)
-  Matrix<S, inner, inner - States> of_disturbance_;  ///< from the states of d to the model's states
-  Estimate rest_of_y_;
-  Estimate rest_of_u_;
+  struct {
+    Settings settings;
+    Square natural{};  ///< from the scaled states to (x, states of d)
+    Matrix<S, inner, inner - States> of_disturbance{};  ///< from the states of d to the model's
+    Estimate rest_of_y{};
+    Estimate rest_of_u{};
+  } rest_;
 };
 
 /// Distinguishes the type in snapshots.
-template <int States, ModelParts Parts, SingleScalar S>
+template <int States, ModelParts Parts, Scalar S>
 inline constexpr std::uint32_t type_tag<LinearPlantModel<States, Parts, S>> =
     make_type_tag<S>("LinearPlantModel", States, Parts.order, Parts.sensor, Parts.constants,
                      Parts.resonators, Parts.first_order);

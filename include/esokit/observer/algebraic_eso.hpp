@@ -123,21 +123,15 @@ class AlgebraicEso
     const auto blanked_now = blanked();
     if (blanked_now == true) return published();
     Estimate estimate = Base::estimate();
-    if constexpr (PackScalar<S>) {
-      if (blanked_now == false) return estimate;
-      for (int r = 0; r < N; ++r) estimate(r) = published_row(r, estimate(r), blanked_now);
-    }
+    if (blanked_now == false) return estimate;
+    for (int r = 0; r < N; ++r) estimate(r) = published_row(r, estimate(r), blanked_now);
     return estimate;
   }
 
   /// Published estimate of y^(Row), or of d^(Row - n) for Row >= n.
   template <int Row>
   [[nodiscard]] S estimate() const noexcept {
-    if constexpr (PackScalar<S>) {
-      return published_row(Row, Base::template estimate<Row>(), blanked());
-    } else {
-      return blanked() ? std::get<Row>(published_) : Base::template estimate<Row>();
-    }
+    return published_row(Row, Base::template estimate<Row>(), blanked());
   }
 
   /// Published dhat, unit of y^(n).
@@ -148,15 +142,13 @@ class AlgebraicEso
 
   /// True while the published estimates are those from the start.
   [[nodiscard]] Lanes<bool, S> blanked() const noexcept {
-    if constexpr (PackScalar<S>) {
-      const auto age = this->age();
-      const auto least = law().least_age();
-      Lanes<bool, S> blanked;
-      for (int i = 0; i < lane_count<S>; ++i) blanked[i] = age[i] <= least[i];
-      return blanked;
-    } else {
-      return age() <= law().least_age();
+    const auto age = this->age();
+    Lanes<bool, S> blanked{};
+    for (int i = 0; i < lane_count<S>; ++i) {
+      detail::of_lane(blanked, i) =
+          detail::of_lane(age, i) <= detail::of_lane(law().least_age(), i);
     }
+    return blanked;
   }
 
   /// True once the observer has become LinearEso with bandwidth lambda.
@@ -172,11 +164,7 @@ class AlgebraicEso
 
  private:
   friend struct detail::LaneAccess;
-  static constexpr auto fields(auto& o) noexcept {
-    using BaseOf =
-        std::conditional_t<std::is_const_v<std::remove_reference_t<decltype(o)>>, const Base, Base>;
-    return detail::tie(static_cast<BaseOf&>(o), o.published_);
-  }
+  friend struct detail::RecordAccess;
 
   [[nodiscard]] const Law& law() const noexcept { return std::get<0>(this->laws()); }
   [[nodiscard]] Law& law() noexcept { return std::get<0>(this->laws()); }
@@ -186,11 +174,11 @@ class AlgebraicEso
   }
 
   void publish(const Estimate& estimate) noexcept {
-    for (int r = 0; r < N; ++r) published_[static_cast<std::size_t>(r)] = estimate(r);
+    for (int r = 0; r < N; ++r) rest_.published[static_cast<std::size_t>(r)] = estimate(r);
   }
   [[nodiscard]] Estimate published() const noexcept {
     Estimate estimate;
-    for (int r = 0; r < N; ++r) estimate(r) = published_[static_cast<std::size_t>(r)];
+    for (int r = 0; r < N; ++r) estimate(r) = rest_.published[static_cast<std::size_t>(r)];
     return estimate;
   }
 
@@ -212,11 +200,12 @@ class AlgebraicEso
     return status;
   }
 
-  // For packs only. A template, because Clang 14 instantiates all other members of a class.
-  template <class Mask>
-  [[nodiscard]] S published_row(int row, S computed, const Mask& blanked_now) const noexcept {
+  [[nodiscard]] S published_row(int row, S computed,
+                                const Lanes<bool, S>& blanked_now) const noexcept {
+    const S& published = rest_.published[static_cast<std::size_t>(row)];
     for (int i = 0; i < lane_count<S>; ++i) {
-      if (blanked_now[i]) computed[i] = published_[static_cast<std::size_t>(row)][i];
+      if (!detail::of_lane(blanked_now, i)) continue;
+      detail::set_lane(computed, detail::number_of_lane(published, i), i);
     }
     return computed;
   }
@@ -228,11 +217,13 @@ class AlgebraicEso
     return status;
   }
 
-  Array<S, N> published_ = [] {
-    Array<S, N> zero;
-    zero.fill(S(0.0));
-    return zero;
-  }();
+  struct {
+    Array<S, N> published = [] {
+      Array<S, N> zero;
+      zero.fill(S(0.0));
+      return zero;
+    }();
+  } rest_;
 };
 
 /// Distinguishes the type in snapshots.

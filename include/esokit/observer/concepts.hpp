@@ -104,20 +104,6 @@ constexpr auto& chain_config(Config& config) noexcept {
 
 namespace detail {
 
-ESOKIT_MEMBER_NAME(wrap)
-ESOKIT_MEMBER_NAME(fill_input)
-ESOKIT_MEMBER_NAME(set_step_time)
-ESOKIT_MEMBER_NAME(revise_measured)
-ESOKIT_MEMBER_NAME(accepts)
-ESOKIT_MEMBER_NAME(blanked)
-ESOKIT_MEMBER_NAME(input_factor)
-ESOKIT_MEMBER_NAME(set_trust)
-ESOKIT_MEMBER_FUNCTION(wraps)
-ESOKIT_MEMBER_FUNCTION(fill_inputs)
-ESOKIT_MEMBER_FUNCTION(set_sample_time)
-ESOKIT_MEMBER_FUNCTION(accept)
-ESOKIT_MEMBER_FUNCTION(rearms)
-
 template <class Class, class Result>
 Class declaring_class(Result (Class::*)() const);
 template <class Class, class Result>
@@ -134,147 +120,83 @@ concept PublishesWhatItsChainHas = !requires {
                         decltype(declaring_class(&O::template scaled_estimate<O::order>))>;
 };
 
-// The required signatures of the members that belong to the traits.
+// What a type declares to have; another type may have it, too.
 template <class O>
-concept PublishesChain = PublishesWhatItsChainHas<O> && requires(const O& o) {
-  { o.template scaled_estimate<0>() } -> std::convertible_to<typename O::scalar_type>;
-  { o.template scaled_estimate<O::order>() } -> std::convertible_to<typename O::scalar_type>;
-};
+concept PublishesChainAsDeclared =
+    !observer_traits<O>.publishes_chain || (PublishesWhatItsChainHas<O> && requires(const O& o) {
+      { o.template scaled_estimate<0>() } -> std::convertible_to<typename O::scalar_type>;
+      { o.template scaled_estimate<O::order>() } -> std::convertible_to<typename O::scalar_type>;
+    });
 template <class O>
-concept ActsByGain = requires(const O& o) {
+concept ActsByGainAsDeclared = !observer_traits<O>.acts_by_gain || requires(const O& o) {
   { O::levels } -> std::convertible_to<int>;
   { o.level_gain(0) } -> GainOf<O::size, typename O::scalar_type>;
 };
 template <class O>
-concept Adapts = requires(typename O::Config config) {
-  typename O::Adapted;
+concept AdaptsAsDeclared = !observer_traits<O>.adapts || requires(typename O::Config config) {
   { config.observer } -> std::same_as<typename O::Adapted::Config&>;
 };
-template <class O>
-concept WrapsOutput = requires(const O& o, const typename O::scalar_type& s) {
-  { o.wrap(s) } -> std::convertible_to<typename O::scalar_type>;
-};
-template <class O>
-concept DelaysInput = requires(O& o, const typename O::scalar_type& s) {
-  o.fill_input(s);
-};
-template <class O>
-concept TakesMeasured = requires(O& o) {
-  o.revise_measured();
-  o.settle_measured();
-}
-&&(requires(O& o, const typename O::scalar_type& s) { o.measured(s); } || O::inputs > 1);
-template <class O>
-concept VariesTime = requires(O& o, const typename O::scalar_type& s) {
-  { o.set_step_time(s) } -> std::same_as<Check<typename O::scalar_type>>;
-  { std::as_const(o).step_time() } -> std::convertible_to<typename O::scalar_type>;
-  { std::as_const(o).bridges(1) } -> std::same_as<bool>;
-};
-template <class O>
-concept GatesOutliers = requires(const O& o, const typename O::scalar_type& s) {
-  { o.accepts(s) } -> std::same_as<Lanes<bool, typename O::scalar_type>>;
-};
-template <class O>
-concept BlanksEstimate = requires(const O& o) {
-  { o.blanked() } -> std::same_as<Lanes<bool, typename O::scalar_type>>;
-};
-template <class O>
-concept SchedulesInputGain = requires(O& o, const O& constant, const typename O::scalar_type& s) {
-  { o.set_input_gain(s) } -> std::same_as<Check<typename O::scalar_type>>;
-  { constant.input_factor() } -> std::convertible_to<typename O::scalar_type>;
-};
-template <class O>
-concept GatesDisturbance = requires(O& o, const O& constant, const typename O::scalar_type& s) {
-  o.set_trust(s);
-  { constant.trust() } -> std::convertible_to<typename O::scalar_type>;
-  { o.hold(s) } -> std::convertible_to<typename O::scalar_type>;
-  o.release();
-};
 
-/// Like `as_declared`. An adapter has members for everything that it passes on, even if what it
-/// consists of has no such member.
 template <class O>
-constexpr bool observer_as_declared(bool declared, bool named, bool right) noexcept {
-  return as_declared(declared, observer_traits<O>.adapts ? right : named, right);
+concept TakesOneOrSeveral = requires(O& o, const typename O::scalar_type& s) {
+  o.measured(s);
 }
+|| O::inputs > 1;
+
+/// @cond
+// clang-format off
+// The hooks, as in gain/gain_law.hpp.
+#define ESOKIT_OBSERVER_HOOKS(HOOK, MISTAKEN)                                                     \
+  HOOK(WrapsOutput, wraps_output, wrap, { fixed.wrap(s) } -> std::convertible_to<S>;)             \
+  MISTAKEN(wraps)                                                                                 \
+  HOOK(DelaysInput, delays_input, fill_input, o.fill_input(s);)                                   \
+  MISTAKEN(fill_inputs)                                                                           \
+  HOOK(TakesMeasured, takes_measured, revise_measured, o.revise_measured(); o.settle_measured();  \
+       requires TakesOneOrSeveral<O>;)                                                            \
+  HOOK(VariesTime, varies_time, set_step_time, { o.set_step_time(s) } -> std::same_as<Check<S>>;  \
+       { fixed.step_time() } -> std::convertible_to<S>;                                           \
+       { fixed.bridges(1) } -> std::same_as<bool>;)                                               \
+  MISTAKEN(set_sample_time)                                                                       \
+  HOOK(GatesOutliers, gates_outliers, accepts,                                                    \
+       { fixed.accepts(s) } -> std::same_as<Lanes<bool, S>>;)                                     \
+  MISTAKEN(accept)                                                                                \
+  HOOK(BlanksEstimate, blanks_estimate, blanked,                                                  \
+       { fixed.blanked() } -> std::same_as<Lanes<bool, S>>;)                                      \
+  HOOK(SchedulesInputGain, schedules_input_gain, input_factor,                                    \
+       { o.set_input_gain(s) } -> std::same_as<Check<S>>;                                         \
+       { fixed.input_factor() } -> std::convertible_to<S>;)                                       \
+  HOOK(GatesDisturbance, gates_disturbance, set_trust, o.set_trust(s); o.release();               \
+       { fixed.trust() } -> std::convertible_to<S>;                                               \
+       { o.hold(s) } -> std::convertible_to<S>;)
+// clang-format on
+
+// An adapter has members for everything that it passes on, even if what it consists of has no such
+// member.
+#define ESOKIT_OBSERVER_HOOK(Hook, declared, name, ...)        \
+  ESOKIT_MEMBER_NAME(name)                                     \
+  template <class O, class S = typename O::scalar_type>        \
+  concept Hook = requires(O & o, const O& fixed, const S& s) { \
+    __VA_ARGS__                                                \
+  };                                                           \
+  template <class O>                                           \
+  concept Hook##AsDeclared =                                   \
+      as_declared(observer_traits<O>.declared,                 \
+                  observer_traits<O>.adapts ? Hook<O> : names_##name<O>, Hook<O>);
+ESOKIT_OBSERVER_HOOKS(ESOKIT_OBSERVER_HOOK, ESOKIT_MEMBER_FUNCTION)
+
+#define ESOKIT_AND_OBSERVER_HOOK(Hook, ...) &&detail::Hook##AsDeclared<O>
+#define ESOKIT_AND_NOT_MISTAKEN_OBSERVER(name) &&!detail::calls_##name<O>
+/// @endcond
 
 }  // namespace detail
 
-/// `scaled_estimate<Row>() const` exists if `traits.publishes_chain` declares it, and no derived
-/// class publishes something else.
+/// The type has everything that `traits` declares, and nothing that it does not declare, nor a
+/// member function whose name is almost that of a hook.
 template <class O>
-concept PublishesChainAsDeclared = !observer_traits<O>.publishes_chain || detail::PublishesChain<O>;
-
-/// `levels` and `level_gain(level) const` exist if `traits.acts_by_gain` declares them.
-template <class O>
-concept ActsByGainAsDeclared = !observer_traits<O>.acts_by_gain || detail::ActsByGain<O>;
-
-/// `Adapted` and `Config::observer` exist if `traits.adapts` declares them.
-template <class O>
-concept AdaptsAsDeclared = !observer_traits<O>.adapts || detail::Adapts<O>;
-
-/// `wrap(difference) const` exists if and only if `traits.wraps_output` declares it.
-template <class O>
-concept WrapsOutputAsDeclared = detail::observer_as_declared<O>(observer_traits<O>.wraps_output,
-                                                                detail::names_wrap<O>,
-                                                                detail::WrapsOutput<O>);
-
-/// `fill_input(u)` exists if and only if `traits.delays_input` declares it.
-template <class O>
-concept DelaysInputAsDeclared = detail::observer_as_declared<O>(observer_traits<O>.delays_input,
-                                                                detail::names_fill_input<O>,
-                                                                detail::DelaysInput<O>);
-
-/// `measured(w)` and its neighbours exist if and only if `traits.takes_measured` declares them.
-template <class O>
-concept TakesMeasuredAsDeclared = detail::observer_as_declared<O>(observer_traits<O>.takes_measured,
-                                                                  detail::names_revise_measured<O>,
-                                                                  detail::TakesMeasured<O>);
-
-/// `set_step_time(seconds)`, `step_time() const` and `bridges(steps) const` exist if and only if
-/// `traits.varies_time` declares them.
-template <class O>
-concept VariesTimeAsDeclared = detail::observer_as_declared<O>(observer_traits<O>.varies_time,
-                                                               detail::names_set_step_time<O>,
-                                                               detail::VariesTime<O>);
-
-/// `accepts(y) const` exists if and only if `traits.gates_outliers` declares it.
-template <class O>
-concept GatesOutliersAsDeclared = detail::observer_as_declared<O>(observer_traits<O>.gates_outliers,
-                                                                  detail::names_accepts<O>,
-                                                                  detail::GatesOutliers<O>);
-
-/// `blanked() const` exists if and only if `traits.blanks_estimate` declares it.
-template <class O>
-concept BlanksEstimateAsDeclared = detail::observer_as_declared<O>(
-    observer_traits<O>.blanks_estimate, detail::names_blanked<O>, detail::BlanksEstimate<O>);
-
-/// `input_factor() const` and `set_input_gain(b)` exist if and only if
-/// `traits.schedules_input_gain` declares them.
-template <class O>
-concept SchedulesInputGainAsDeclared =
-    detail::observer_as_declared<O>(observer_traits<O>.schedules_input_gain,
-                                    detail::names_input_factor<O>, detail::SchedulesInputGain<O>);
-
-/// `set_trust(phi)`, `trust() const`, `hold(u)` and `release()` exist if and only if
-/// `traits.gates_disturbance` declares them.
-template <class O>
-concept GatesDisturbanceAsDeclared = detail::observer_as_declared<O>(
-    observer_traits<O>.gates_disturbance, detail::names_set_trust<O>, detail::GatesDisturbance<O>);
-
-/// No member function has a name that is almost that of a hook, because it would never be called.
-template <class O>
-concept HasNoMisspelledObserverHook =
-    !detail::calls_wraps<O> && !detail::calls_fill_inputs<O> && !detail::calls_set_sample_time<O> &&
-    !detail::calls_accept<O> && !detail::calls_rearms<O>;
-
-/// The type has everything that `traits` declares, and nothing that it does not declare.
-template <class O>
-concept ObserverAsDeclared = DeclaresTraits<O, ObserverTraits> && PublishesChainAsDeclared<O> &&
-    ActsByGainAsDeclared<O> && AdaptsAsDeclared<O> && WrapsOutputAsDeclared<O> &&
-    DelaysInputAsDeclared<O> && TakesMeasuredAsDeclared<O> && VariesTimeAsDeclared<O> &&
-    GatesOutliersAsDeclared<O> && BlanksEstimateAsDeclared<O> && SchedulesInputGainAsDeclared<O> &&
-    GatesDisturbanceAsDeclared<O> && HasNoMisspelledObserverHook<O>;
+concept ObserverAsDeclared = DeclaresTraits<O, ObserverTraits> &&
+    detail::PublishesChainAsDeclared<O> && detail::ActsByGainAsDeclared<O> &&
+    detail::AdaptsAsDeclared<O>
+        ESOKIT_OBSERVER_HOOKS(ESOKIT_AND_OBSERVER_HOOK, ESOKIT_AND_NOT_MISTAKEN_OBSERVER);
 
 /// A config with b0, T and the longest gap that is bridged.
 template <class Config, class S>

@@ -166,9 +166,7 @@ class ExtendedStateFilter
                       "covariance: measure first"};
     }
     if (auto ok = Base::adopt(fresh); !ok) return ok;
-    nominal_model_ = fresh.nominal_model_;
-    outlier_threshold_ = fresh.outlier_threshold_;
-    change_bound_ = fresh.change_bound_;
+    rest_.set = fresh.rest_.set;
     return {};
   }
 
@@ -226,7 +224,7 @@ class ExtendedStateFilter
     const S e = y - this->predicted_measurement();
     // A square that overflows is above the threshold.
     if (!all(is_finite(e))) return true;
-    return all(e * e <= outlier_threshold_ * innovation_variance());
+    return all(e * e <= rest_.set.outlier_threshold * innovation_variance());
   }
 
   /// Restarts at (y, 0, .., 0) with P0.
@@ -288,12 +286,7 @@ class ExtendedStateFilter
 
  private:
   friend struct detail::LaneAccess;
-  static constexpr auto fields(auto& o) noexcept {
-    using BaseOf =
-        std::conditional_t<std::is_const_v<std::remove_reference_t<decltype(o)>>, const Base, Base>;
-    return detail::tie(static_cast<BaseOf&>(o), o.nominal_model_, o.outlier_threshold_,
-                       o.change_bound_, o.sample_);
-  }
+  friend struct detail::RecordAccess;
 
   /// True if no lane has anything to do besides the predictor-corrector's step.
   [[nodiscard]] bool usual() const noexcept { return !has_model && !law().any_watched(); }
@@ -310,9 +303,7 @@ class ExtendedStateFilter
   ExtendedStateFilter(const Config& config, const PlantModel& plant, const Law& law,
                       int max_gap) noexcept
       : Base(config, plant, law, max_gap),
-        nominal_model_(config.model),
-        outlier_threshold_(config.outlier_threshold),
-        change_bound_(config.disturbance_bounds[Order]) {
+        rest_{{config.model, config.outlier_threshold, config.disturbance_bounds[Order]}} {
     std::get<0>(this->laws()).watch(all(config.outlier_threshold > S(0.0)));
   }
 
@@ -349,7 +340,7 @@ class ExtendedStateFilter
   Status restart_clock(Status status) noexcept {
     for (int i = 0; i < lane_count<S>; ++i) {
       if (has_model && detail::of_lane(status, i) == StepStatus::ok)
-        detail::of_lane(sample_, i) = 0;
+        detail::of_lane(rest_.sample, i) = 0;
     }
     return status;
   }
@@ -359,29 +350,34 @@ class ExtendedStateFilter
   void shift_by_model(const Estimate& before) noexcept {
     if constexpr (has_model) {
       const S time = this->sample_time();
-      const S t = detail::integer<S>(sample_) * time;
+      const S t = detail::integer<S>(rest_.sample) * time;
       const S u = this->applied_input();
       Vector<S, Order> x = before.template head<Order>();
-      const S now = nominal_model_(x, u, t);
+      const S now = rest_.set.nominal_model(x, u, t);
       // x+: predicted along the chain, with fbar in place of the estimated disturbance.
       Estimate start = before;
       start(Order) = now;
       const S drive = Chain::scaled_input_gain(this->input_gain(), time) * u;
       const auto ahead = Chain::template predict<1>(Chain::scaled(start, time), Array<S, 1>{drive});
       x = Chain::physical(ahead, S(S(1.0) / time)).template head<Order>();
-      const S change = nominal_model_(x, u, S(t + time)) - now;
-      const S low = select(change < -change_bound_, S(-change_bound_), change);
-      const S limited = select(change_bound_ < low, change_bound_, low);
+      const S change = rest_.set.nominal_model(x, u, S(t + time)) - now;
+      const S low = select(change < -rest_.set.change_bound, S(-rest_.set.change_bound), change);
+      const S limited = select(rest_.set.change_bound < low, rest_.set.change_bound, low);
       const S sum = this->total_disturbance() + limited;
       this->shift_disturbance(select(is_finite(sum), limited, S(0.0)));
-      ++sample_;
+      ++rest_.sample;
     }
   }
 
-  [[no_unique_address]] Model nominal_model_;
-  S outlier_threshold_;
-  S change_bound_;
-  Lanes<std::uint64_t, S> sample_{};
+  struct Set {
+    [[no_unique_address]] Model nominal_model;
+    S outlier_threshold;
+    S change_bound;
+  };
+  struct {
+    Set set;  ///< replaced by a retune
+    Lanes<std::uint64_t, S> sample{};
+  } rest_;
 };
 
 /// Distinguishes the type in snapshots.

@@ -43,13 +43,12 @@ using ModelCascadeEso =
 /// ```
 ///
 /// See LinearPlantModel.
-template <int States, ModelParts Parts, SingleScalar S = double, class Placement = EqualPoles>
+template <int States, ModelParts Parts, Scalar S = double, class Placement = EqualPoles>
 using PlantEso = LinearEso<Parts.order, S, LinearPlantModel<States, Parts, S>::extension, Placement,
                            LinearPlantModel<States, Parts, S>>;
 
 /// CascadeEso with the same model.
-template <int States, ModelParts Parts, int Levels, SingleScalar S = double,
-          class Placement = EqualPoles>
+template <int States, ModelParts Parts, int Levels, Scalar S = double, class Placement = EqualPoles>
 using PlantCascadeEso =
     CascadeEso<Parts.order, Levels, S, LinearPlantModel<States, Parts, S>::extension, Placement,
                LinearPlantModel<States, Parts, S>>;

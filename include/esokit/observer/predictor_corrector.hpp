@@ -139,11 +139,11 @@ class PredictorCorrector {
         if (!is_finite(y) || reset(y) != StepStatus::ok) return StepStatus::measurement_rejected;
         return StepStatus::restarted;
       }
-      Correction step{states_};
+      Correction step{kept_.states};
       if (!correct_levels<false>(step, y, elapsed) || !is_finite(probe(step.states))) {
         // A finite but absurdly large u can lead to a prediction from which no good y recovers.
         const bool state_is_to_blame =
-            is_finite(y) && detail::absolute(y) < detail::absolute(states_[0][0]);
+            is_finite(y) && detail::absolute(y) < detail::absolute(kept_.states[0][0]);
         if (state_is_to_blame && reset(y) == StepStatus::ok) return StepStatus::restarted;
         return StepStatus::measurement_rejected;
       }
@@ -157,7 +157,7 @@ class PredictorCorrector {
   /// disturbance summed over all levels.
   [[nodiscard]] Estimate estimate() const noexcept {
     if constexpr (Levels == 1) {
-      return model_.physical(states_[0]);
+      return model_.physical(kept_.states[0]);
     } else {
       return model_.physical(up_to_level<Levels - 1>());
     }
@@ -176,10 +176,10 @@ class PredictorCorrector {
   [[nodiscard]] ESOKIT_INLINE constexpr S scaled_estimate() const noexcept {
     static_assert(Row >= 0 && Row < size, "esokit: no such estimate");
     constexpr int state = Model::state_of_row(Row);
-    S sum = std::get<state>(states_[Levels - 1]);
+    S sum = std::get<state>(kept_.states[Levels - 1]);
     if constexpr (Row >= Order && adds_up) {
       detail::unroll<Levels - 1>(
-          [&](auto i) ESOKIT_INLINE_LAMBDA { sum = sum + std::get<state>(states_[i]); });
+          [&](auto i) ESOKIT_INLINE_LAMBDA { sum = sum + std::get<state>(kept_.states[i]); });
     }
     return sum;
   }
@@ -198,17 +198,19 @@ class PredictorCorrector {
   [[nodiscard]] constexpr S total_disturbance() const noexcept { return estimate<Order>(); }
 
   /// The expected next measurement.
-  [[nodiscard]] constexpr const S& predicted_measurement() const noexcept { return states_[0][0]; }
+  [[nodiscard]] constexpr const S& predicted_measurement() const noexcept {
+    return kept_.states[0][0];
+  }
 
   /// y - z_1 of the last correction, with the predicted z_1 (of level 1).
-  [[nodiscard]] constexpr const S& innovation() const noexcept { return innovation_; }
+  [[nodiscard]] constexpr const S& innovation() const noexcept { return kept_.innovation; }
 
   /// Number of predictions since the last correction; 0 if up to date. 65535 if the state was too
   /// large to be predicted: then the next good y restarts the observer.
   [[nodiscard]] constexpr Lanes<int, S> missed() const noexcept { return gap_; }
 
   /// The input that the last prediction used.
-  [[nodiscard]] constexpr const S& applied_input() const noexcept { return applied_input_; }
+  [[nodiscard]] constexpr const S& applied_input() const noexcept { return kept_.applied_input; }
 
   /// The estimate after the next `correct(y)` as a linear function of y, in scaled states (x_r =
   /// T^r z_r / r!). For a controller that computes before the measurement arrives.
@@ -226,7 +228,7 @@ class PredictorCorrector {
     if (restarts()) [[unlikely]] {
       for (auto& state : slope.states) state = standing(S(1.0));
     } else {
-      offset.states = states_;
+      offset.states = kept_.states;
       correct_levels<false>(offset, S(0.0), elapsed());
       correct_levels<false>(slope, S(1.0), elapsed());
     }
@@ -253,12 +255,12 @@ class PredictorCorrector {
   /// given to `predict`. Adds Gamma (u_applied - u_given) to the prediction. A u that is not
   /// finite, or would make the prediction not finite, changes nothing and is reported.
   Status revise_input(S u_applied) noexcept {
-    LevelStates next = states_;
-    for (auto& state : next) state = model_.add_input(state, S(u_applied - applied_input_));
+    LevelStates next = kept_.states;
+    for (auto& state : next) state = model_.add_input(state, S(u_applied - kept_.applied_input));
     if (!all(is_finite(probe(next)))) [[unlikely]]
       return StepStatus::input_rejected;
-    states_ = next;
-    applied_input_ = u_applied;
+    kept_.states = next;
+    kept_.applied_input = u_applied;
     return StepStatus::ok;
   }
 
@@ -332,7 +334,7 @@ class PredictorCorrector {
   constexpr Status shift_output(const S& offset) noexcept
       requires(model_traits<Model>.shifts_output) {
     constexpr auto y = static_cast<std::size_t>(Model::state_of_row(0));
-    LevelStates next = states_;
+    LevelStates next = kept_.states;
     for (auto& state : next) {
       state[0] = state[0] + offset;
       if constexpr (y > 0) state[y] = state[y] + offset;
@@ -343,7 +345,7 @@ class PredictorCorrector {
   /// Adds `offset` (unit of y^(n)) to dhat, for when another term takes over a part of y^(n).
   /// @return as for `shift_output`
   constexpr Status shift_disturbance(const S& offset) noexcept {
-    LevelStates next = states_;
+    LevelStates next = kept_.states;
     add_disturbance(next, model_.scaled_disturbance(offset));
     return shift_to(next);
   }
@@ -355,7 +357,7 @@ class PredictorCorrector {
     if constexpr (model_traits<Model>.is_chain) {
       return shift_disturbance(offset);
     } else {
-      LevelStates next = states_;
+      LevelStates next = kept_.states;
       const State column = model_.constant_column();
       const S scaled = model_.scaled_constant(offset);
       for (auto& state : next) {
@@ -370,19 +372,16 @@ class PredictorCorrector {
   /// the control does not jump.
   Check<S> adopt(const PredictorCorrector& fresh) {
     PredictorCorrector next = fresh;
-    for (std::size_t i = 0; i < Levels; ++i) {
-      next.states_[i] = next.model_.rescaled(states_[i], model_);
-    }
+    next.kept_ = kept_;
+    next.gap_ = gap_;
+    for (State& state : next.kept_.states) state = next.model_.rescaled(state, model_);
     if (!next.model_.same_drive(model_)) {
-      const S explained = (input_gain() - fresh.input_gain()) * applied_input_;
-      add_disturbance(next.states_, next.model_.scaled_disturbance(explained));
+      const S explained = (input_gain() - fresh.input_gain()) * kept_.applied_input;
+      add_disturbance(next.kept_.states, next.model_.scaled_disturbance(explained));
     }
-    if (!all(is_finite(next.probe(next.states_)))) {
+    if (!all(is_finite(next.probe(next.kept_.states)))) {
       return Error<S>{"input_gain", fresh.input_gain(), "would make the estimate not finite"};
     }
-    next.innovation_ = innovation_;
-    next.applied_input_ = applied_input_;
-    next.gap_ = gap_;
     *this = next;
     return {};
   }
@@ -394,7 +393,7 @@ class PredictorCorrector {
       : laws_(laws),
         model_(config.input_gain, config.sample_time),
         max_gap_(bridged(laws, config.max_gap)) {
-    for (State& state : states_) state.fill(S(0.0));
+    for (State& state : kept_.states) state.fill(S(0.0));
     look_at_squares();
   }
 
@@ -403,7 +402,7 @@ class PredictorCorrector {
   template <class Given>
   PredictorCorrector(const Model& model, const Given& laws, int max_gap) noexcept
       : laws_{laws}, model_(model), max_gap_(static_cast<std::uint16_t>(max_gap)) {
-    for (State& state : states_) state.fill(S(0.0));
+    for (State& state : kept_.states) state.fill(S(0.0));
     look_at_squares();
   }
 
@@ -435,7 +434,7 @@ class PredictorCorrector {
     if (!looked || !surely_finite(next.states)) [[unlikely]]
       return false;
     commit(next);
-    applied_input_ = u_applied;
+    kept_.applied_input = u_applied;
     return true;
   }
 
@@ -450,14 +449,14 @@ class PredictorCorrector {
     if (!all(is_finite(probe(next)))) [[unlikely]]
       return false;
     count_missed();
-    states_ = next;
-    applied_input_ = u_applied;
+    kept_.states = next;
+    kept_.applied_input = u_applied;
     return true;
   }
   ESOKIT_INLINE bool correct_all(const S& y) noexcept {
     if (!(gap_ == 1 || gap_ == 0)) [[unlikely]]
       return false;
-    Correction next{states_};
+    Correction next{kept_.states};
     if (!correct_levels<true>(next, y, 1u) || !all(is_finite(probe(next.states)))) [[unlikely]]
       return false;
     commit(next);
@@ -478,10 +477,7 @@ class PredictorCorrector {
   }
 
   /// All data members, for derived classes.
-  static constexpr auto fields(auto& o) noexcept {
-    return detail::tie(o.states_, o.laws_, o.model_, o.innovation_, o.applied_input_, o.gap_,
-                       o.max_gap_, o.squares_suffice_);
-  }
+  static constexpr int data_members = 6;
 
  private:
   friend struct detail::LaneAccess;
@@ -560,7 +556,7 @@ class PredictorCorrector {
   constexpr Status shift_to(const LevelStates& next) noexcept {
     if (!all(is_finite(probe(next)))) [[unlikely]]
       return StepStatus::state_rejected;
-    states_ = next;
+    kept_.states = next;
     return StepStatus::ok;
   }
 
@@ -576,17 +572,17 @@ class PredictorCorrector {
   [[nodiscard]] ESOKIT_INLINE constexpr LevelStates predicted_levels(const S& u) const noexcept {
     LevelStates next;
     const auto drive = model_.drive(u);
-    next[0] = model_.predict(states_[0], drive);
+    next[0] = model_.predict(kept_.states[0], drive);
     if constexpr (!adds_up) {
       detail::unroll<Levels - 1>([&](auto i) ESOKIT_INLINE_LAMBDA {
-        next[i + 1] = model_.predict(states_[i + 1], drive);
+        next[i + 1] = model_.predict(kept_.states[i + 1], drive);
       });
     } else {
-      auto joined = model_.joined(drive, states_[0]);
+      auto joined = model_.joined(drive, kept_.states[0]);
       detail::unroll<Levels - 1>([&](auto below) ESOKIT_INLINE_LAMBDA {
         constexpr int level = below + 1;
-        next[level] = model_.predict(states_[level], joined);
-        if constexpr (level + 1 < Levels) joined = model_.joined(joined, states_[level]);
+        next[level] = model_.predict(kept_.states[level], joined);
+        if constexpr (level + 1 < Levels) joined = model_.joined(joined, kept_.states[level]);
       });
     }
     return next;
@@ -595,7 +591,7 @@ class PredictorCorrector {
   /// Scaled state of a level, with the disturbances of the levels below it added to its own.
   template <int Level>
   [[nodiscard]] ESOKIT_INLINE constexpr State up_to_level() const noexcept {
-    return up_to_level<Level>(states_);
+    return up_to_level<Level>(kept_.states);
   }
 
   template <int Level>
@@ -736,8 +732,8 @@ class PredictorCorrector {
   }
 
   ESOKIT_INLINE constexpr void commit(const Correction& step) noexcept {
-    states_ = step.states;
-    detail::assign(innovation_, step.innovation);
+    kept_.states = step.states;
+    detail::assign(kept_.innovation, step.innovation);
     if constexpr (gain_law_traits<Law>.accepts) {
       detail::unroll<Levels>([&](auto i)
                                  ESOKIT_INLINE_LAMBDA { laws_[i].accept(step.innovations[i]); });
@@ -750,7 +746,7 @@ class PredictorCorrector {
         Correction step{predicted_levels(u_applied)};
         if (correct_levels<true>(step, y, 1u) && is_finite(probe(step.states))) {
           commit(step);
-          applied_input_ = u_applied;
+          kept_.applied_input = u_applied;
           return StepStatus::ok;
         }
       }
@@ -779,20 +775,21 @@ class PredictorCorrector {
   /// Handles a u or a state so large that the prediction is not finite.
   ESOKIT_COLD StepStatus predict_rejecting(S u_applied) noexcept {
     count_missed();
-    if (is_finite(u_applied) && !(detail::absolute(u_applied) > detail::absolute(applied_input_))) {
+    if (is_finite(u_applied) &&
+        !(detail::absolute(u_applied) > detail::absolute(kept_.applied_input))) {
       // u is no larger than the last one, so it is not the cause.
-      applied_input_ = u_applied;
+      kept_.applied_input = u_applied;
       gap_ = restart_due;
       return StepStatus::prediction_dropped;
     }
-    const LevelStates next = predicted_levels(applied_input_);
+    const LevelStates next = predicted_levels(kept_.applied_input);
     if (!is_finite(probe(next))) {
       // The state itself cannot be predicted, and perhaps never can again: the next y restarts the
       // observer.
       gap_ = restart_due;
       return StepStatus::input_rejected | StepStatus::prediction_dropped;
     }
-    states_ = next;
+    kept_.states = next;
     return StepStatus::input_rejected;
   }
 
@@ -803,8 +800,8 @@ class PredictorCorrector {
       for (std::size_t r = Order; r < size; ++r) states[i][r] = S(0.0);
     }
     if (!all(is_finite(probe(states)))) return StepStatus::state_rejected;
-    states_ = states;
-    innovation_ = S(0.0);
+    kept_.states = states;
+    kept_.innovation = S(0.0);
     gap_ = 0;
     if constexpr (gain_law_traits<Law>.resets) {
       for (Law& law : laws_) law.reset();
@@ -812,11 +809,14 @@ class PredictorCorrector {
     return StepStatus::ok;
   }
 
-  LevelStates states_{};
+  /// What a good sample writes: scalars only. It survives a retune, all else is replaced.
+  struct Numbers {
+    LevelStates states{};
+    S innovation = S(0.0);
+    S applied_input = S(0.0);
+  } kept_;
   Laws laws_;
   Model model_;
-  S innovation_ = S(0.0);
-  S applied_input_ = S(0.0);
   Lanes<std::uint16_t, S> gap_{};
   Lanes<std::uint16_t, S> max_gap_;
   [[no_unique_address]] std::conditional_t<has_squares, Lanes<bool, S>, NoFlag> squares_suffice_{};

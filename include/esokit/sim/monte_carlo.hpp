@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <concepts>
 #include <condition_variable>
 #include <cstddef>
@@ -14,7 +13,8 @@
 #include <esokit/core/expected.hpp>
 #include <esokit/core/lanes.hpp>
 #include <esokit/core/packed.hpp>
-#include <esokit/sim/counted_gaussian.hpp>
+#include <esokit/sim/measure.hpp>
+#include <esokit/sim/monte_carlo_config.hpp>
 #include <esokit/sim/run.hpp>
 #include <esokit/sim/statistics.hpp>
 #include <esokit/sim/study_records.hpp>
@@ -23,7 +23,6 @@
 #include <limits>
 #include <map>
 #include <mutex>
-#include <optional>
 #include <span>
 #include <sstream>
 #include <string>
@@ -35,238 +34,6 @@
 #include <vector>
 
 namespace esokit::sim {
-
-/// The vector instructions for which the program was compiled; they determine the width of packs.
-inline constexpr const char* instruction_set =
-#if defined(__AVX512F__)
-    "AVX-512";
-#elif defined(__AVX2__)
-    "AVX2";
-#elif defined(__AVX__)
-    "AVX";
-#elif defined(__SSE2__)
-    "SSE2";
-#elif defined(__ARM_NEON)
-    "NEON";
-#else
-    "none";
-#endif
-
-/// Random numbers to vary a run: a function of seed and run only.
-class Draw {
- public:
-  /// @param seed common to all runs
-  Draw(std::uint64_t seed, std::int64_t run) noexcept
-      : random_(seed, RandomStream::variation, static_cast<std::uint64_t>(run)), run_(run) {}
-
-  /// A normal number with mean 0 and variance 1.
-  double normal() noexcept { return random_.next(); }
-  /// A number uniform between two limits.
-  double uniform(double low, double high) noexcept {
-    return low + (high - low) * random_.uniform();
-  }
-  /// A number between two positive limits, uniform in its logarithm: a factor of 2 is as likely as
-  /// one of 1/2.
-  double uniform_ratio(double low, double high) noexcept {
-    return low * std::exp(std::log(high / low) * random_.uniform());
-  }
-  /// Number of the run, 0, 1, ..
-  [[nodiscard]] std::int64_t run() const noexcept { return run_; }
-
- private:
-  CountedGaussian<double> random_;
-  std::int64_t run_;
-};
-
-/// What may differ from run to run besides the random numbers of the loop.
-template <class P, class C>
-struct Trial {
-  P plant;                                ///< for speed use the same dead time in all runs
-  C controller;                           ///< newly designed, retuned or unchanged
-  typename RunTypes<P, C>::State state;   ///< x at the start
-  typename RunTypes<P, C>::Output noise;  ///< standard deviation of measurement noise
-};
-
-/// Varies nothing: the runs differ only by the random numbers of the loop.
-struct NoVariation {
-  /// Changes nothing.
-  template <class T>
-  void operator()(T&, Draw&) const noexcept {}
-};
-
-/// The samples that a Measure uses, and the limit for its result.
-struct MeasureOptions {
-  double from = 0.0;                                    ///< s, time of the first sample used
-  double to = std::numeric_limits<double>::infinity();  ///< s, time of the last sample used
-
-  /// The result must not be above this; finite, or left out.
-  double limit = std::numeric_limits<double>::infinity();
-};
-
-/// A criterion of a run, one number computed from `of(sample)` or `of(sample, controller)` at its
-/// samples.
-///
-/// The function must accept any scalar, because it is also called with packs of runs. Made by
-/// `largest`, `average`, `root_mean_square`, `final_value` and `settling_time`. A run fails if its
-/// result is not finite, if its window has no sample, or, for `largest` and `settling_time`, if
-/// of(sample) is not finite in the window.
-template <class Reduce, class F>
-struct Measure {
-  std::string name;        ///< name of the criterion
-  F of;                    ///< function of a sample
-  MeasureOptions options;  ///< window and limit
-  Reduce reduce{};         ///< reduces the numbers of all samples to one
-};
-
-namespace detail {
-
-struct Largest {
-  static constexpr bool needs_each = true;  ///< a comparison would ignore a NaN
-  template <class S>
-  static S start() {
-    return S(std::numeric_limits<LaneScalar<S>>::lowest());
-  }
-  template <class S>
-  ESOKIT_INLINE void add(S& sum, const S& value, const LaneScalar<S>&) const {
-    sum = select(sum < value, value, sum);
-  }
-  static double end(double sum, double) { return sum; }
-};
-struct Average {
-  static constexpr bool needs_each = false;
-  template <class S>
-  static S start() {
-    return S(0.0);
-  }
-  template <class S>
-  ESOKIT_INLINE void add(S& sum, const S& value, const LaneScalar<S>&) const {
-    sum = sum + value;
-  }
-  static double end(double sum, double samples) { return sum / samples; }
-};
-struct RootMeanSquare : Average {
-  template <class S>
-  ESOKIT_INLINE void add(S& sum, const S& value, const LaneScalar<S>&) const {
-    sum = sum + value * value;
-  }
-  static double end(double sum, double samples) { return std::sqrt(sum / samples); }
-};
-struct FinalValue : Average {
-  template <class S>
-  ESOKIT_INLINE void add(S& sum, const S& value, const LaneScalar<S>&) const {
-    sum = value;
-  }
-  static double end(double sum, double) { return sum; }
-};
-struct SettlingTime : FinalValue {
-  static constexpr bool needs_each = true;
-  template <class S>
-  ESOKIT_INLINE void add(S& sum, const S& value, const LaneScalar<S>& passed) const {
-    sum = select(esokit::detail::absolute(value) > S(band), S(static_cast<double>(passed)), sum);
-  }
-  double band;
-};
-
-/// A controller as a Measure sees it.
-template <class C>
-const auto& seen(const C& controller) noexcept {
-  if constexpr (requires { controller.together(); }) {
-    return controller.together();
-  } else {
-    return controller;
-  }
-}
-
-/// Whether all lanes of `Lanes` runs are computed at once.
-template <class P, class C, int Lanes>
-inline constexpr bool runs_in_packs = [] {
-  using One = typename RunTypes<P, C>::S;
-  if constexpr (Lanes == 1) {
-    return false;
-  } else if constexpr (esokit::detail::ComputesPacks<P, Pack<One, Lanes>> &&
-                       esokit::detail::ComputesPacks<C, Pack<One, Lanes>>) {
-    if constexpr (std::same_as<One, typename C::scalar_type>) {
-      using Plants = typename Packed<P, Lanes>::Together;
-      return SampledPlant<Plants> && ControllerOf<Packed<C, Lanes>, Plants>;
-    }
-  }
-  return false;
-}();
-
-}  // namespace detail
-
-/// The largest of(sample) in a run: for `s.output - s.reference` the overshoot.
-template <class F>
-Measure<detail::Largest, F> largest(std::string name, F of, MeasureOptions options = {}) {
-  return {std::move(name), std::move(of), options};
-}
-/// The mean of of(sample) over the samples of a run.
-template <class F>
-Measure<detail::Average, F> average(std::string name, F of, MeasureOptions options = {}) {
-  return {std::move(name), std::move(of), options};
-}
-/// The root mean square of of(sample).
-template <class F>
-Measure<detail::RootMeanSquare, F> root_mean_square(std::string name, F of,
-                                                    MeasureOptions options = {}) {
-  return {std::move(name), std::move(of), options};
-}
-/// of(sample) at the last sample.
-template <class F>
-Measure<detail::FinalValue, F> final_value(std::string name, F of, MeasureOptions options = {}) {
-  return {std::move(name), std::move(of), options};
-}
-/// The last time at which abs(of(sample)) was above `band`, s after `options.from`.
-/// @param band 0 or above
-template <class F>
-Measure<detail::SettlingTime, F> settling_time(std::string name, F of, double band,
-                                               MeasureOptions options = {}) {
-  return {std::move(name), std::move(of), options, {{}, band}};
-}
-
-/// A run that failed and gave no results.
-template <class Time>
-struct FailedRun {
-  std::int64_t run = 0;  ///< number of the run
-  Error<Time>
-      error{};  ///< error error of `vary` or of the loop, for example a state that is not finite
-};
-
-/// Settings of `monte_carlo`.
-template <class P, class C>
-struct MonteCarloConfig {
-  using Time = typename RunTypes<P, C>::Time;  ///< type of times
-
-  std::int64_t runs{};     ///< number of runs, 1 or more
-  RunConfig<P, C> loop{};  ///< settings of every run, with the common seed; leave out its `number`
-  int threads = 0;         ///< 0: one per core
-
-  /// Called from time to time with the number of finished runs, 0 .. runs - 1; false stops.
-  std::function<bool(std::int64_t done)> progress{};
-
-  /// Called with the results of each run, in the order of the runs, from one thread at a time; NaN
-  /// for a run that failed.
-  std::function<void(std::int64_t run, std::span<const double> numbers)> on_run{};
-};
-
-/// The result.
-template <class Time>
-struct MonteCarloOutcome {
-  std::int64_t runs = 0;               ///< number of finished runs; if stopped, the first so many
-  std::int64_t failed = 0;             ///< number of failed runs, which are not in the statistics
-  FailedRun<Time> first_failure{};     ///< the first failed run
-  std::vector<std::int64_t> failures;  ///< numbers of the first failed runs, at most 1000
-  std::vector<RunStatistics> numbers;  ///< statistics of each Measure
-  bool completed = true;               ///< false if it was stopped
-  int threads = 1;                     ///< number of threads used
-  int lanes = 1;                       ///< runs at once on each thread thread
-
-  /// The share of all runs that kept the limit of a Measure; failed runs count as not kept. @param
-  /// number index of the Measure
-  [[nodiscard]] double share_kept(std::size_t number) const {
-    return static_cast<double>(numbers[number].kept()) / static_cast<double>(runs);
-  }
-};
 
 /// Many runs of a loop, see monte_carlo.
 template <SampledPlant P, class C, class Vary = NoVariation>
@@ -628,46 +395,6 @@ class MonteCarlo {
     std::map<std::size_t, Results> waiting;
   };
 
-  /// Accumulates one result per lane of a run or pack of runs.
-  template <class S, class Reduce, class F>
-  struct Meter {
-    explicit Meter(const Measure<Reduce, F>& m) : measure(m), sum(Reduce::template start<S>()) {}
-
-    template <class Sample, class Control>
-    ESOKIT_INLINE void add(const Sample& sample, const Control& given) {
-      const auto& controller = detail::seen(given);
-      using Now = std::remove_cvref_t<decltype(controller)>;
-      using Seconds = LaneScalar<S>;
-      // Whether a sample is used must not depend on the rounding of t.
-      const double t = static_cast<double>(sample.t);
-      if (t < measure.options.from - 1e-9 || t > measure.options.to + 1e-9) return;
-      ++samples;
-      const auto passed = static_cast<Seconds>(t - measure.options.from);
-      const S value = [&] {
-        if constexpr (std::is_invocable_v<const F&, const Sample&, const Now&>) {
-          return S(measure.of(sample, controller));
-        } else {
-          return S(measure.of(sample));
-        }
-      }();
-      if constexpr (Reduce::needs_each) finite = finite && all(is_finite(value));
-      measure.reduce.add(sum, value, passed);
-    }
-    [[nodiscard]] double number(int lane) const {
-      return measure.reduce.end(static_cast<double>(esokit::detail::number_of_lane(sum, lane)),
-                                static_cast<double>(samples));
-    }
-    [[nodiscard]] const char* wrong(double number) const {
-      if (samples == 0) return "(its window) has no sample";
-      return finite && is_finite(number) ? nullptr : "(its number) is not finite";
-    }
-
-    const Measure<Reduce, F>& measure;
-    S sum;
-    std::int64_t samples = 0;
-    bool finite = true;
-  };
-
   /// Whether records may be those of a part of this study; they may be empty.
   static Check<Time> fits(const StudyIdentity& own, const StudyRecords& records, const Part& part) {
     auto ok = part.check();
@@ -771,7 +498,7 @@ class MonteCarlo {
                     const RunConfig<Plant, Control>& loop, Results& results, std::int64_t at,
                     int lanes, const Measure<Reduce, F>&... measures) const {
     using S = typename RunTypes<Plant, Control>::S;
-    std::tuple<Meter<S, Reduce, F>...> meters{Meter<S, Reduce, F>(measures)...};
+    std::tuple<detail::Meter<S, Reduce, F>...> meters{detail::Meter<S, Reduce, F>(measures)...};
     const auto end = sim::run(
         plant, controller, loop, [&](const auto& sample, const Control& now) ESOKIT_INLINE_LAMBDA {
           std::apply([&](auto&... meter) { (meter.add(sample, now), ...); }, meters);

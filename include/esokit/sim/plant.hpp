@@ -27,8 +27,8 @@ struct NonlinearPlant {
   using Output = ScalarOrVector<ScalarType, Outputs>;  ///< y; a number if it has one element
   using Time = LaneScalar<ScalarType>;                 ///< t, s
 
-  /// The same with another scalar. Functions that store numbers need a `with_scalar` and `fields`;
-  /// others must accept any scalar.
+  /// The same with another scalar. Functions that store numbers need a `with_scalar`; others
+  /// must accept any scalar.
   template <class T>
   requires(esokit::detail::has_other_scalars<F>&&
                esokit::detail::has_other_scalars<H>) using with_scalar =
@@ -45,12 +45,6 @@ struct NonlinearPlant {
   }
   /// y. @param t s
   Output output(const Time& t, const State& x) const { return h(t, x); }
-
-  /// @cond
-  static constexpr auto fields(auto& plant) noexcept {
-    return esokit::detail::tie(plant.f, plant.h);
-  }
-  /// @endcond
 };
 
 namespace detail {

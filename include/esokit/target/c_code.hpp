@@ -67,7 +67,6 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
   }
   const GateNumbers& gate = design.gate;
   const bool gated = gate.threshold > 0;
-  const bool delayed = !design.line.empty();
   if (gated) {
     members += "  " + real + " gate_mean; /* of abs(y - " + design.first_state + ") */\n" +
                "  uint16_t gate_count;\n  uint8_t gate_open;\n";
@@ -75,6 +74,32 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
             ";\n  o->gate_count = " + std::to_string(gate.count) +
             "u;\n  o->gate_open = " + (gate.open ? "1u" : "0u") + ";\n";
   }
+  const WrapNumbers& wrap = design.wrap;
+  if (wrap.period > 0) {
+    members += "  " + real + " angle; /* the last y, within half a period of zero */\n  " + real +
+               " turns;\n  " + real + " motion; /* of y in motion_samples */\n" +
+               "  uint16_t motion_samples;\n  uint8_t gaps;\n  uint8_t doubts;\n" +
+               "  uint8_t begun;\n";
+    init += "  o->angle = " + writer.number(wrap.y) +
+            ";\n  o->turns = " + writer.number(wrap.turns) +
+            ";\n  o->motion = " + writer.number(wrap.motion) +
+            ";\n  o->motion_samples = " + std::to_string(wrap.samples) +
+            "u;\n  o->gaps = " + std::to_string(wrap.gaps) +
+            "u;\n  o->doubts = " + std::to_string(wrap.doubts) +
+            "u;\n  o->begun = " + (wrap.begun ? "1u" : "0u") + ";\n";
+  }
+  const LawNumbers& law = design.law;
+  if (law.kind == RunningLaw::schedule) {
+    members += "  uint32_t age; /* samples of the schedule */\n  uint8_t pending;\n" +
+               std::string("  uint8_t settled;\n");
+    init += "  o->age = " + std::to_string(law.age) +
+            "u;\n  o->pending = " + (law.pending ? "1u" : "0u") +
+            ";\n  o->settled = " + (law.settled ? "1u" : "0u") + ";\n";
+  } else if (law.kind == RunningLaw::filter) {
+    members += "  uint8_t since; /* the last step of the gain */\n";
+    init += "  o->since = " + std::to_string(law.since) + "u;\n";
+  }
+  const bool runs = law.kind != RunningLaw::none;
   std::string table;
   std::string call_gains;
   for (const auto& gains : design.gap_gains) {
@@ -82,11 +107,35 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
     for (const double k : gains) row += (row.empty() ? "    {" : ", ") + writer.number(k);
     table += row + "},\n";
   }
-  const std::string count = std::to_string(design.gap_gains[0].size());
-  for (std::size_t i = 0; i < design.gap_gains[0].size(); ++i) {
-    call_gains += ", k[" + std::to_string(i) + "]";
+  const std::string rows_of_table = std::to_string(design.max_gap + 1);
+  if (!runs) {
+    const std::size_t count = design.gap_gains[0].size();
+    for (std::size_t i = 0; i < count; ++i) call_gains += ", k[" + std::to_string(i) + "]";
+    table = "  static const " + real + " gains[" + rows_of_table + "][" + std::to_string(count) +
+            "] = { /* after 1, 2, .. samples */\n" + table + "  };\n";
   }
-  const std::string corrects = "correct_by(o, y" + call_gains + ")";
+  const std::string by_table = "correct_by(o, y" + call_gains + ")";
+  const std::string corrects =
+      law.kind == RunningLaw::schedule ? "(elapsed > 1u) ? correct_over(o, y, elapsed) : "
+                                         "correct_step(o, y)"
+      : runs                           ? "correct_step(o, y)"
+      : design.gain_is_kept            ? by_table
+                                       : "(elapsed > 1u) ? " + by_table + " : correct_step(o, y)";
+  std::string accept;
+  if (law.kind == RunningLaw::schedule) accept = "    o->pending = 0u;\n";
+  if (law.kind == RunningLaw::filter) accept = "    o->since = (uint8_t)(o->since | 1u);\n";
+  std::string blanked;
+  std::string rows_of_published;
+  if (law.kind == RunningLaw::schedule) {
+    for (int row = 0; row < design.size; ++row) {
+      const std::string number = std::to_string(row);
+      rows_of_published +=
+          "    case " + number + "u:\n      u = o->published_" + number + ";\n      break;\n";
+    }
+    blanked = "  if (o->age <= " + std::to_string(law.least_age) +
+              "u) { /* too early: those of the start */\n    switch (row) {\n" + rows_of_published +
+              "    default:\n      break;\n    }\n    return u;\n  }\n";
+  }
   std::string rows;
   for (int row = 0; row < design.size; ++row) {
     const std::string number = std::to_string(row);
@@ -104,30 +153,46 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
       {"$include", "#include"},  // not written in the texts: scripts look for such lines
       {"$MEMBERS", members},
       {"$TIME", writer.number(design.sample_time)},
-      {"$CORRECT",
-       design.gain_is_kept ? corrects : "(elapsed > 1u) ? " + corrects + " : correct_step(o, y)"},
+      {"$CORRECT", corrects},
+      {"$TABLE", runs ? "" : table},
+      {"$OF_TABLE", runs ? "" : "    const $real *k = gains[elapsed - 1u];\n"},
+      {"$ACCEPT", accept},
+      {"$LAW_BEGIN", runs ? "    law_begin(o);\n" : ""},
+      {"$BLANKED", blanked},
+      {"$TO_LIMIT", law.returns ? "  if (filter_to_limit(o)) {\n    o->since = 8u;\n  }\n" : ""},
+      {"$LAW_STANDS", law.returns ? "10" : "0"},
+      {"$DECAY", writer.number(law.decay)},
+      {"$SHIFT", writer.number(law.shift)},
+      {"$CONTRACTION", writer.number(law.contraction)},
+      {"$STATES", std::to_string(design.size)},
+      {"$STARTu", std::to_string(law.start) + "u"},
+      {"$LEASTu", std::to_string(law.least_age) + "u"},
+      {"$PERIOD", writer.number(wrap.period)},
+      {"$INVERSE", writer.number(wrap.inverse_period)},
+      {"$HALF", writer.number(wrap.period * 0.5)},
+      {"$QUARTER", writer.number(wrap.period * 0.25)},
+      {"$MOST_TURNS", writer.number(wrap.most_turns)},
+      {"$EIGHTH", writer.number(0.125)},
+      {"$round", writer.single() ? "roundf" : "round"},
       {"$GAIN", writer.number(design.input_gain)},
       {"$ROWS_OF_ESTIMATE", rows},
-      {"$ROWS", std::to_string(design.gap_gains.size())},
+      {"$ROWS", rows_of_table},
       {"$LAST", std::to_string(design.size - 1)},
       {"$FIRST", design.first_state},
-      {"$GAP_GAINS", table},
-      {"$SIZE", count},
       {"$INIT", init},
-      {"$GATE_FLAG", gated ? "#define $NAME_OUTLIER_REJECTED 64u /* y was too far from what "
-                             "was expected */\n"
-                           : ""},
+      {"$GATE_FLAG",
+       std::string(gated || law.watches
+                       ? "#define $NAME_OUTLIER_REJECTED 64u /* y was too far from what "
+                         "was expected */\n"
+                       : "") +
+           (wrap.period > 0 ? "#define $NAME_TURN_ASSUMED 128u /* y moved otherwise than before: "
+                              "its turn is uncertain */\n"
+                            : "")},
       {"$GATE_OPEN", gated ? "    gate_set(o, true);\n" : ""},
       {"$GATE_FACTOR", writer.number(gate.running_factor)},
       {"$GATE_THRESHOLD", writer.number(gate.threshold)},
       {"$GATE_MOST", std::to_string(gate.most_in_a_row)},
       {"$SHARE", writer.number(1.0 / 64)},
-      {"$inner", gated ? "gated" : "base"},
-      {"correct_$top", gated ? "correct_gated" : "correct_base"},
-      {"predict_$top", delayed ? "predict_delayed" : "predict_base"},
-      {"update_$top", delayed ? "update_delayed"
-                      : gated ? "update_gated"
-                              : "update_base"},
       {"$ZERO", writer.number(0)},
       {"$ONE", writer.number(1)},
       {"$LENGTH", length},
@@ -152,6 +217,20 @@ inline Words c_loop_words(const RecordedDesign& design, const ListWriter& writer
   const auto only = [](const std::string& condition, const std::string& then) {
     return "  if (" + condition + ") {\n    " + then + ";\n  }\n";
   };
+  const std::string& angle = design.wrap.angle;
+  std::string call_law =
+      "    (void)law(o, " + (angle.empty() ? "r" : "wrapped(r - o->" + angle + ")") + ", &u);\n";
+  if (design.law.kind == RunningLaw::schedule) {
+    std::string estimates;
+    for (int row = 0; row < design.size; ++row) {
+      estimates += ", $name_estimate(o, " + std::to_string(row) + "u)";
+    }
+    const bool wraps = design.wrap.period > 0 && !design.error_based && !design.compensates;
+    const std::string first = "$name_estimate(o, 0u)";
+    call_law = "    (void)law(o, " +
+               (wraps ? first + " + wrapped(r - " + first + ")" : std::string("r")) + estimates +
+               ", &u);\n";
+  }
   const std::string of_y = only("!is_finite(y)", "return $NAME_STATE_REJECTED");
   const std::string of_u = only("!is_finite(u)", "return $NAME_INPUT_REJECTED");
   return {
@@ -173,8 +252,9 @@ inline Words c_loop_words(const RecordedDesign& design, const ListWriter& writer
        divides ? only("planned && (status == $NAME_GAP_BRIDGED)", "status = 0u") : ""},
       {"$DUE", std::to_string(loop.divider - 1)},
       {"$REST", design.gate.threshold > 0
-                    ? "if (rest_at(o, $MEASURED, o->u_applied)) {\n      gate_set(o, true);\n    }"
-                    : "(void)rest_at(o, $MEASURED, o->u_applied);"},
+                    ? "if ($rest(o, $MEASURED, o->u_applied)) {\n      gate_set(o, true);\n    }"
+                    : "(void)$rest(o, $MEASURED, o->u_applied);"},
+      {"$CALL_LAW", call_law},
       {"$MEASURED", design.error_based ? "r - y" : "y"},
       {"$AT_START", design.error_based ? "$ZERO" : "y"},
       {"$START_CHECKS", design.compensates ? of_u + of_y : of_y + of_u},
@@ -199,9 +279,8 @@ inline Words c_observer_words(const RecordedDesign& design) {
   return {{"$LIMITS", ""},
           {"$COLUMNS", "y, u, the disturbance"},
           {"$RESULT",
-           "const unsigned status = $name_update(&o, samples[i][0], samples[i][1]);\n"
-           "    const $real result =\n"
-           "        (status == 0u) ? $name_estimate(&o, $ORDERu) : (samples[i][2] - $ONE);"},
+           "$real result;\n    (void)$name_update(&o, samples[i][0], samples[i][1]);\n"
+           "    result = $name_estimate(&o, $ORDERu);"},
           {"$ORDER", std::to_string(design.order)}};
 }
 
@@ -212,24 +291,76 @@ inline CCode c_code(const RecordedDesign& design) {
   writer.live = design.live;
   std::string lists;
   for (std::size_t i = 0; i < design.names.size(); ++i) {
-    if (design.gate.threshold > 0 && design.names[i].name == "observe") continue;
+    const std::string& name = design.names[i].name;
+    if ((design.gate.threshold > 0 || design.law.watches) && name == "observe") continue;
+    if (name == "filter_to_limit" && !design.law.returns) continue;
     lists += c_function(writer, design.options.name, design.names[i], design.calls[i]);
   }
   const bool controls = design.is_controller;
   Words words = controls ? c_loop_words(design, writer) : c_observer_words(design);
+  // Layer by layer: each calls the one below.
+  std::string layers;
+  std::string predict = "base";
+  std::string correct = "base";
+  std::string update = "base";
+  std::string rest = "rest_at";
+  std::string restart = "restart";
+  const auto add = [&](const char* text) {
+    layers += filled(text, {{"predict_$below", "predict_" + predict},
+                            {"correct_$below", "correct_" + correct},
+                            {"update_$below", "update_" + update}});
+  };
+  const bool gated = design.gate.threshold > 0;
+  const bool runs = design.law.kind != RunningLaw::none;
+  const bool wraps = design.wrap.period > 0;
+  if (runs) {
+    add(c_source_running);
+    predict = "running";
+  }
+  if (design.law.watches) {
+    add(c_source_watched);
+    correct = update = "watched";
+  }
+  if (gated) {
+    add(c_source_gate);
+    correct = update = "gated";
+  } else if (!design.law.watches) {
+    add(c_source_base_update);
+    if (runs) {
+      add(c_source_running_update);
+      update = "running";
+    }
+  }
+  if (wraps) {
+    add(c_source_wrapped);
+    predict = correct = update = "wrapped";
+    restart = "restart_wrapped";
+  }
+  if (controls && (wraps || runs)) {
+    layers += wraps ? c_source_wrapped_rest : c_source_running_rest;
+    rest = wraps ? "rest_wrapped" : "rest_running";
+  }
+  if (!design.line.empty()) {
+    add(c_source_delay);
+    if (controls) layers += c_source_delay_fill;
+    predict = update = "delayed";
+  }
+  words.insert(words.end(), {{"predict_$top", "predict_" + predict},
+                             {"correct_$top", "correct_" + correct},
+                             {"update_$top", "update_" + update},
+                             {"$restart", restart},
+                             {"$rest", rest}});
   const Words common = c_words(design, writer);
   words.insert(words.end(), common.begin(), common.end());
-  const auto text = [&](const char* from) { return filled(from, words); };
-  std::string layer;
-  layer += text(design.gate.threshold > 0 ? c_source_gate : c_source_base_update);
-  if (!design.line.empty()) {
-    layer += text(c_source_delay);
-    if (controls) layer += text(c_source_delay_fill);
-  }
+  const auto text = [&](const std::string& from) { return filled(from, words); };
+  const char* law_text = design.law.kind == RunningLaw::schedule ? c_source_schedule
+                         : runs                                  ? c_source_filter
+                                                                 : "";
   return {text(c_header_head) + text(controls ? c_header_controller : c_header_observer) +
               text(c_header_tail),
-          text(c_source_head) + lists + text(c_source_observer_part) + layer +
-              text(controls ? c_source_controller : c_source_observer) + text(c_source_self_test)};
+          text(c_source_head) + lists + text(law_text) + text(c_source_observer_part) +
+              text(layers) + text(controls ? c_source_controller : c_source_observer) +
+              text(c_source_self_test)};
 }
 
 }  // namespace detail
@@ -249,8 +380,9 @@ inline CCode c_code(const RecordedDesign& design) {
 ///
 /// Written are LinearEso, also with a set of poles, HalfGainEso, ReducedOrderEso, CascadeEso,
 /// AdjustableBandwidthEso, NonlinearEso, ModelEso, PlantEso and their cascades (not with
-/// `follows_speed`), these in DelayedInput and OutlierGate, and Adrc of both forms and
-/// DisturbanceCompensator around them. Others do not compile.
+/// `follows_speed`), AlgebraicEso, ExtendedStateFilter (in its modes recursive and frozen, without
+/// a nominal model), these in DelayedInput and OutlierGate or WrappedOutput, and Adrc of both forms
+/// and DisturbanceCompensator around them. Others do not compile.
 /// @param object as `make` returned it: its state is that of `init`
 /// @return error for a name that is no identifier, a comment that would end the one it stands in, a
 ///         number of samples of the self-test out of range, or a gain law of your own whose gain
@@ -268,9 +400,10 @@ template <class Other>
 void to_c(const Other&, const CodeOptions& = {}) {
   static_assert(detail::Writable<Other>,
                 "esokit: to_c writes LinearEso, HalfGainEso, ReducedOrderEso, CascadeEso, "
-                "AdjustableBandwidthEso, NonlinearEso, ModelEso and PlantEso, these in "
-                "DelayedInput and OutlierGate, and Adrc and DisturbanceCompensator around them; no "
-                "other gains, adapters or controllers yet");
+                "AdjustableBandwidthEso, NonlinearEso, ModelEso, PlantEso, AlgebraicEso and "
+                "ExtendedStateFilter, these in DelayedInput and OutlierGate or WrappedOutput, and "
+                "Adrc and DisturbanceCompensator around them; no other gains, adapters or "
+                "controllers yet");
 }
 
 }  // namespace esokit

@@ -22,6 +22,8 @@ $include <stdint.h>
 extern "C" {
 #endif
 
+#define $NAME_SAMPLE_TIME $TIME /* s */
+
 /* Flags of `status`; 0: all is well. */
 #define $NAME_MEASUREMENT_REJECTED 1u /* y was NaN, infinite or too large */
 #define $NAME_INPUT_REJECTED 2u /* u was too large: the last good one was used */
@@ -118,6 +120,113 @@ static bool is_finite($real x)
 
 )";
 
+/// The schedule of AlgebraicEso.
+inline constexpr const char* c_source_schedule = R"(/* ---- The schedule of the gain. */
+
+static void law_begin($name_state *o)
+{
+  o->age = 0u;
+  o->pending = 0u;
+  o->settled = 0u;
+}
+
+/* Of that sample, from its number: no error of rounding adds up. */
+static void schedule_anchor($name_state *o, uint32_t count)
+{
+  $real power = $DECAY;
+  $real contraction = $SHIFT;
+  uint32_t rest = count;
+  (void)anchor_begin(o);
+  while (rest != 0u) {
+    if ((rest & 1u) != 0u) {
+      (void)anchor_take(o, power, contraction);
+    }
+    (void)anchor_contraction(o, power, contraction, &contraction);
+    (void)anchor_power(o, power, contraction, &power);
+    rest >>= 1u;
+  }
+  (void)anchor_end(o, ($real)count);
+}
+
+static void law_advance($name_state *o)
+{
+  if (o->settled != 0u) {
+    return;
+  }
+  if ((o->pending != 0u) && (($STARTu + o->age) <= $STATESu)) {
+    (void)schedule_restart(o);
+    law_begin(o);
+  }
+  o->pending = 1u;
+  if (o->age < 0x3fffffffu) {
+    o->age = o->age + 1u;
+  }
+  if (($STARTu + o->age) <= $STATESu) {
+    return; /* the estimate is exact in so few samples: it stays so */
+  }
+  if ((o->age % 256u) == 0u) {
+    schedule_anchor(o, ($STARTu + o->age) - 1u);
+  }
+  (void)schedule_next(o);
+  if ((o->age > $LEASTu) && schedule_settle(o)) {
+    o->settled = 1u;
+  }
+}
+
+/* The gain of so many samples at once, for the poles of now. */
+static bool correct_over($name_state *o, $real y, uint32_t samples)
+{
+  $real base = $ONE;
+  $real all = $ZERO;
+  uint32_t rest = samples;
+  if (o->settled != 0u) {
+    base = $CONTRACTION;
+  } else if (($STARTu + o->age) > $STATESu) {
+    (void)present_poles(o, &base);
+  } else {
+    /* All at zero. */
+  }
+  while (rest != 0u) {
+    if ((rest & 1u) != 0u) {
+      (void)joined_poles(o, all, base, &all);
+    }
+    (void)joined_poles(o, base, base, &base);
+    rest >>= 1u;
+  }
+  return correct_long(o, y, all, ($real)samples);
+}
+
+)";
+
+/// The recursion of ExtendedStateFilter.
+inline constexpr const char* c_source_filter = R"(/* ---- The recursion of the gain. */
+
+static void law_begin($name_state *o)
+{
+  o->since = $LAW_STANDSu;
+}
+
+/* since: 1 corrected, 2 nothing yet, 4 missed twice, 8 the gain stands. */
+static void law_advance($name_state *o)
+{
+  const uint8_t before = o->since;
+  if (before > 8u) {
+    o->since = 8u;
+    return;
+  }
+  if ((before & 1u) != 0u) {
+    o->since = 0u;
+    (void)filter_corrected(o);
+  } else {
+    o->since = 4u;
+    if (!((before == 4u) && filter_at_ceiling(o))) {
+      (void)filter_missed(o);
+    }
+  }
+$TO_LIMIT}
+
+)";
+
 /// What an observer and the one in a controller do with bad and missing samples.
 inline constexpr const char* c_source_observer_part = R"(/* ---- What counts and chooses. */
 
@@ -126,7 +235,7 @@ static bool restart($name_state *o, $real y)
   const bool good = is_finite(y) && restart_at(o, y);
   if (good) {
     o->gap = 0u;
-  }
+$LAW_BEGIN  }
   return good;
 }
 
@@ -155,9 +264,7 @@ static unsigned predict_base($name_state *o, $real given)
 
 static unsigned correct_base($name_state *o, $real y)
 {
-  static const $real gains[$ROWS][$SIZE] = { /* after 1, 2, .. samples */
-$GAP_GAINS  };
-  unsigned status = $NAME_MEASUREMENT_REJECTED;
+$TABLE  unsigned status = $NAME_MEASUREMENT_REJECTED;
   unsigned elapsed = o->gap;
   if (elapsed < 1u) {
     elapsed = 1u;
@@ -167,10 +274,9 @@ $GAP_GAINS  };
       status = $NAME_RESTARTED;
     }
   } else {
-    const $real *k = gains[elapsed - 1u];
-    if ($CORRECT) {
+$OF_TABLE    if ($CORRECT) {
       o->gap = 0u;
-      status = 0u;
+$ACCEPT      status = 0u;
       if (elapsed > 1u) {
         status = $NAME_GAP_BRIDGED;
       }
@@ -186,11 +292,253 @@ $GAP_GAINS  };
 $real $name_estimate(const $name_state *o, unsigned row)
 {
   $real u = $ZERO;
-  switch (row) {
+$BLANKED  switch (row) {
 $ROWS_OF_ESTIMATE  default:
     break;
   }
   return u;
+}
+
+)";
+
+/// A gain that goes on before each sample.
+inline constexpr const char* c_source_running =
+    R"(static unsigned predict_running($name_state *o, $real u)
+{
+  law_advance(o);
+  return predict_base(o, u);
+}
+
+)";
+inline constexpr const char* c_source_running_update =
+    R"(static unsigned update_running($name_state *o, $real y, $real u)
+{
+  law_advance(o);
+  return update_base(o, y, u);
+}
+
+)";
+
+/// The gate of ExtendedStateFilter.
+inline constexpr const char* c_source_watched =
+    R"(static unsigned correct_watched($name_state *o, $real y)
+{
+  const $real innovation = y - o->$FIRST;
+  unsigned status = $NAME_OUTLIER_REJECTED;
+  if ((o->gap > $ROWSu) || !is_finite(innovation) || fits(o, y)) {
+    status = correct_base(o, y);
+  }
+  return status;
+}
+
+static unsigned update_watched($name_state *o, $real y, $real u)
+{
+  const unsigned status = predict_$below(o, u);
+  return status | correct_watched(o, y);
+}
+
+)";
+
+/// WrappedOutput around it.
+inline constexpr const char* c_source_wrapped = R"(/* A measured angle. */
+typedef struct {
+  $real y; /* within half a period of zero */
+  $real turns;
+  $real step; /* since the last one, by the nearest turn */
+  uint32_t samples;
+  bool usable;
+  bool fits; /* it moved as before */
+  bool counted;
+} angle_reading;
+
+static $real wrapped($real angle)
+{
+  return ($fabs(angle) <= $HALF) ? angle : (angle - ($PERIOD * $round(angle * $INVERSE)));
+}
+
+static bool can_be_told($real y)
+{
+  const $real turns = y * $INVERSE;
+  return is_finite(turns) && ($fabs(turns) < $MOST_TURNS);
+}
+
+static void forget_turns($name_state *o)
+{
+  o->angle = $ZERO;
+  o->turns = $ZERO;
+  o->motion = $ZERO;
+  o->motion_samples = 65535u;
+  o->gaps = 0u;
+  o->doubts = 0u;
+  o->begun = 0u;
+}
+
+static bool restart_wrapped($name_state *o, $real y)
+{
+  const bool good = can_be_told(y) && restart(o, wrapped(y));
+  if (good) {
+    forget_turns(o);
+  }
+  return good;
+}
+
+static $real expected_motion(const $name_state *o, uint32_t samples)
+{
+  $real motion = o->motion;
+  if ((o->motion_samples == 65535u) || (samples == 0u)) {
+    motion = $ZERO;
+  } else if (samples != o->motion_samples) {
+    motion = o->motion * (($real)samples / ($real)o->motion_samples);
+  } else {
+    /* It is that of as many samples. */
+  }
+  return motion;
+}
+
+static angle_reading read_angle(const $name_state *o, $real y, uint32_t samples)
+{
+  angle_reading reading = {$ZERO, $ZERO, $ZERO, 0u, false, true, false};
+  if (can_be_told(y)) {
+    reading.usable = true;
+    reading.y = wrapped(y);
+    reading.samples = samples;
+  }
+  if (reading.usable && (o->begun != 0u)) {
+    const $real change = reading.y - o->angle;
+    const $real expected = expected_motion(o, samples);
+    const $real ahead = expected - change;
+    const $real crossed = ($fabs(ahead) <= $HALF) ? $ZERO : $round(ahead * $INVERSE);
+    const $real motion = change + (crossed * $PERIOD);
+    reading.step = wrapped(change);
+    if (o->motion_samples != 65535u) {
+      reading.fits = ($fabs(motion - expected) <= $QUARTER) &&
+        ((samples > o->motion_samples) || ($fabs(motion) <= $HALF));
+    }
+    reading.turns = o->turns + crossed;
+    reading.counted =
+      (reading.fits || (o->doubts >= 3u)) && is_finite(reading.turns * $PERIOD);
+  }
+  return reading;
+}
+
+/* Keeps the estimate within half a period of zero. */
+static void recentre($name_state *o)
+{
+  $real z = $ZERO;
+  (void)estimate_0(o, &z);
+  if (!($fabs(z) <= $HALF)) {
+    const $real turns = $round(z * $INVERSE);
+    if (shift(o, -(turns * $PERIOD))) {
+      o->turns = o->turns - turns;
+    }
+  }
+}
+
+static void learn_motion($name_state *o, const angle_reading *reading)
+{
+  if ((o->begun != 0u) && (reading->samples != 0u)) {
+    if (reading->samples > o->motion_samples) {
+      o->gaps = (uint8_t)(o->gaps + 1u);
+      if (o->gaps >= 8u) {
+        o->motion_samples = 65535u; /* after so many gaps it is not known */
+      }
+    } else {
+      o->gaps = 0u;
+      if ((reading->samples < o->motion_samples) || (o->doubts >= 3u)) {
+        o->motion = reading->step;
+        o->motion_samples = (uint16_t)reading->samples;
+      } else if (reading->fits) {
+        o->motion = o->motion + ((reading->step - o->motion) * $EIGHTH);
+      } else {
+        /* It says nothing. */
+      }
+    }
+  }
+}
+
+static unsigned restart_at_angle($name_state *o, $real y)
+{
+  return restart_wrapped(o, y) ? $NAME_RESTARTED : $NAME_MEASUREMENT_REJECTED;
+}
+
+/* After the correction. */
+static unsigned keep_angle($name_state *o, const angle_reading *reading, unsigned given)
+{
+  unsigned status = given;
+  if ((status & $NAME_MEASUREMENT_REJECTED) != 0u) { /* the state is to blame */
+    return restart_at_angle(o, reading->y) | (status & $NAME_INPUT_REJECTED);
+  }
+  learn_motion(o, reading);
+  o->angle = reading->y;
+  o->turns = reading->turns;
+  if (reading->fits) {
+    o->doubts = 0u;
+  } else {
+    status |= $NAME_TURN_ASSUMED;
+    if (o->doubts < 3u) {
+      o->doubts = (uint8_t)(o->doubts + 1u);
+    }
+  }
+  o->begun = 1u;
+  recentre(o);
+  return status;
+}
+
+static unsigned predict_wrapped($name_state *o, $real u)
+{
+  const unsigned status = predict_$below(o, u);
+  recentre(o);
+  return status;
+}
+
+static unsigned correct_wrapped($name_state *o, $real y)
+{
+  angle_reading reading = read_angle(o, y, o->gap);
+  if (!reading.usable) {
+    return $NAME_MEASUREMENT_REJECTED;
+  }
+  if (reading.fits && !is_finite(reading.turns * $PERIOD)) {
+    return restart_at_angle(o, reading.y);
+  }
+  if (!reading.counted) {
+    reading.turns = $round((o->$FIRST - reading.y) * $INVERSE);
+  }
+  return keep_angle(o, &reading, correct_$below(o, reading.y + (reading.turns * $PERIOD)));
+}
+
+static unsigned update_wrapped($name_state *o, $real y, $real u)
+{
+  const angle_reading reading = read_angle(o, y, (uint32_t)o->gap + 1u);
+  unsigned status;
+  if (reading.counted) {
+    status = update_$below(o, reading.y + (reading.turns * $PERIOD), u);
+    return keep_angle(o, &reading, status);
+  }
+  status = predict_wrapped(o, u);
+  return status | correct_wrapped(o, y);
+}
+
+)";
+/// Its start at rest.
+inline constexpr const char* c_source_wrapped_rest =
+    R"(static bool rest_wrapped($name_state *o, $real y, $real u)
+{
+  const bool good = can_be_told(y) && rest_at(o, y, u, wrapped(y));
+  if (good) {
+    forget_turns(o);
+$LAW_BEGIN  }
+  return good;
+}
+
+)";
+/// A start at rest where the gain goes on.
+inline constexpr const char* c_source_running_rest =
+    R"(static bool rest_running($name_state *o, $real y, $real u)
+{
+  const bool good = rest_at(o, y, u);
+  if (good) {
+$LAW_BEGIN  }
+  return good;
 }
 
 )";
@@ -201,7 +549,7 @@ inline constexpr const char* c_source_base_update =
 {
   unsigned status;
   if ((o->gap == 0u) && observe(o, y, u)) {
-    return 0u;
+$ACCEPT    return 0u;
   }
   status = predict_base(o, u);
   return status | correct_base(o, y);
@@ -264,7 +612,7 @@ static unsigned correct_gated($name_state *o, $real y)
 
 static unsigned update_gated($name_state *o, $real y, $real u)
 {
-  const unsigned status = predict_base(o, u);
+  const unsigned status = predict_$below(o, u);
   return status | correct_gated(o, y);
 }
 
@@ -295,14 +643,14 @@ static unsigned predict_delayed($name_state *o, $real u)
 {
   $real acting = u;
   const unsigned status = push_delayed(o, &acting);
-  return status | predict_base(o, acting);
+  return status | predict_$below(o, acting);
 }
 
 static unsigned update_delayed($name_state *o, $real y, $real u)
 {
   $real acting = u;
   const unsigned status = push_delayed(o, &acting);
-  return status | update_$inner(o, y, acting);
+  return status | update_$below(o, y, acting);
 }
 
 )";
@@ -328,7 +676,7 @@ $INIT  o->gap = 0u;
 unsigned $name_reset($name_state *o, $real y)
 {
   unsigned status = $NAME_STATE_REJECTED;
-  if (restart(o, y)) {
+  if ($restart(o, y)) {
 $GATE_OPEN    status = 0u;
   }
   return status;
@@ -364,8 +712,7 @@ static $real put_out($name_state *o, $real r)
 {
   $real u;
   if (o->mode == $NAME_RUNNING) {
-    (void)law(o, r, &u);
-  } else if (o->mode == $NAME_SAFE) {
+$CALL_LAW  } else if (o->mode == $NAME_SAFE) {
     u = $SAFE_INPUT;
   } else {
     o->hold_left = o->hold_left - 1u;
@@ -391,7 +738,7 @@ unsigned $name_start($name_state *o, $real y, $real u)
   $name_state before;
 $START_CHECKS  before = *o;
 $FILL  (void)predict_$top(o, u); /* keeps it as applied */
-  if (!rest_at(o, $AT_START, u)) {
+  if (!$rest(o, $AT_START, u)) {
     *o = before;
     return $NAME_STATE_REJECTED;
   }

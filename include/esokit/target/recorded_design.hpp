@@ -7,11 +7,15 @@
 #include <cctype>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
+#include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
 #include <esokit/core/expected.hpp>
+#include <esokit/gain/riccati_gain.hpp>
+#include <esokit/gain/sampled_gain.hpp>
 #include <esokit/target/list_writer.hpp>
 #include <esokit/target/recorder.hpp>
 #include <string>
@@ -52,6 +56,41 @@ struct GateNumbers {
   bool open = true;
 };
 
+/// A gain law that goes on at each sample, around lists of its own: the schedule of AlgebraicEso or
+/// the recursion of ExtendedStateFilter.
+enum class RunningLaw : unsigned char { none, schedule, filter };
+
+/// What such a law counts.
+struct LawNumbers {
+  RunningLaw kind = RunningLaw::none;
+  unsigned start = 0;      ///< of a schedule: its first sample,
+  unsigned least_age = 0;  ///< the samples before it may settle, and as long estimates are blanked,
+  unsigned age = 0;        ///< the samples so far,
+  bool pending = false;    ///< whether the last one was not corrected,
+  bool settled = false;    ///< whether it stands,
+  double decay = 0;        ///< p,
+  double shift = 0;        ///< 1 - p
+  double contraction = 0;  ///< and that of the poles in the end
+  unsigned since = 0;      ///< of a filter: what happened since the last step,
+  bool returns = false;    ///< whether the recursion ends at a limit,
+  bool watches = false;    ///< whether it refuses outliers
+};
+
+/// A WrappedOutput.
+struct WrapNumbers {
+  double period = 0;  ///< 0: there is none
+  double inverse_period = 0;
+  double most_turns = 0;  ///< more cannot be told apart
+  double y = 0;
+  double turns = 0;
+  double motion = 0;
+  unsigned samples = 0;
+  unsigned gaps = 0;
+  unsigned doubts = 0;
+  bool begun = false;
+  std::string angle{};  ///< the estimate that the law subtracts from the reference
+};
+
 /// A finished design as lists and counts, without its type.
 struct RecordedDesign {
   CodeOptions options{};
@@ -71,6 +110,9 @@ struct RecordedDesign {
   bool gain_is_kept = true;    ///< without a gap they are the first row, else computed by the list
   std::vector<double> line{};  ///< of DelayedInput: the inputs, the newest last
   GateNumbers gate{};
+  LawNumbers law{};
+  WrapNumbers wrap{};
+  int max_gap = 0;  ///< missing samples that are bridged
   LoopRules loop{};
   double lower = 0;
   double upper = 0;
@@ -133,10 +175,178 @@ struct RecordAccess {
   /// A correction with gains from elsewhere, `gains[level][row]`.
   template <class O, class S, class Gains>
   static void correct(O& o, const S& y, const Gains& gains) noexcept {
-    typename O::Correction step{o.states_};
+    typename O::Correction step{o.kept_.states};
     const bool fine = o.correct_by(
         step, y, [&](auto level, const S&) -> const auto& { return gains[std::size_t{level}]; });
     if (fine && all(is_finite(o.probe(step.states)))) o.commit(step);
+  }
+
+  // ---- Laws that run.
+
+  template <class Law>
+  static constexpr RunningLaw kind_of = [] {
+    if constexpr (requires(Law law) { law.least_age_; }) {
+      return RunningLaw::schedule;
+    } else if constexpr (requires(Law law) { law.now_.factor; }) {
+      return RunningLaw::filter;
+    } else {
+      return RunningLaw::none;
+    }
+  }();
+  template <class O>
+  using LawOf = std::remove_cvref_t<decltype(std::declval<O&>().laws_[0])>;
+
+  /// The law stands: no call moves it.
+  template <class O>
+  static O& at_rest(O& o) noexcept {
+    if constexpr (kind_of<LawOf<O>> == RunningLaw::schedule) o.laws_[0].settled_ = true;
+    if constexpr (kind_of<LawOf<O>> == RunningLaw::filter) o.laws_[0].since_ = std::int8_t{9};
+    return o;
+  }
+  template <class O>
+  static LawNumbers law_numbers(const O& o) noexcept {
+    LawNumbers numbers;
+    numbers.kind = kind_of<LawOf<O>>;
+    const auto& law = o.laws_[0];
+    if constexpr (kind_of<LawOf<O>> == RunningLaw::schedule) {
+      numbers.start = law.start_index_;
+      numbers.least_age = law.least_age_;
+      numbers.age = law.age_;
+      numbers.pending = law.pending_;
+      numbers.settled = law.settled_;
+      numbers.decay = static_cast<double>(law.decay_);
+      numbers.shift = static_cast<double>(law.shift_.contraction);
+      numbers.contraction = static_cast<double>(law.final_poles_.contraction);
+    } else if constexpr (kind_of<LawOf<O>> == RunningLaw::filter) {
+      numbers.since = static_cast<unsigned>(law.since_ & 127);
+      numbers.returns = law.mode_ != RiccatiMode::recursive;
+      numbers.watches = law.is_watched();
+    }
+    return numbers;
+  }
+  /// The lists around which its text goes. @param law a recorded law
+  template <class Law, class Add>
+  static void add_law(const Add& add) {
+    using S = typename Law::scalar_type;
+    if constexpr (kind_of<Law> == RunningLaw::schedule) {
+      constexpr int size =
+          std::tuple_size_v<std::remove_cvref_t<decltype(std::declval<Law>().gain_)>>;
+      using Poles = EqualSampledPoles<size, S>;
+      const auto nothing = S(0.0);
+      add("schedule_restart", {}, false,
+          [=](Law& law, const auto&) { return law.restart(), nothing; });
+      add("anchor_begin", {}, false, [=](Law& law, const auto&) {
+        law.power_ = S(1.0);
+        law.bracket_ = S(0.0);
+        return nothing;
+      });
+      add("anchor_take", {"power", "contraction"}, false,
+          [=](Law& law, const auto& in) { return law.anchor_take(in[0], in[1]), nothing; });
+      add("anchor_contraction", {"power", "contraction"}, true,
+          [](Law&, const auto& in) { return S(in[1] + in[0] * in[1]); });
+      add("anchor_power", {"power", "contraction"}, true,
+          [](Law& law, const auto& in) { return law.squared(in[0], in[1]); });
+      add("anchor_end", {"count"}, false, [=](Law& law, const auto& in) {
+        law.bracket_ = law.bracket(in[0], law.bracket_);
+        return nothing;
+      });
+      add("schedule_next", {}, false, [=](Law& law, const auto&) {
+        law.push();
+        law.set_gain();
+        return nothing;
+      });
+      add("schedule_settle", {}, false, [=](Law& law, const auto&) {
+        if (all(law.settled_below_ >= std::get<0>(law.ratios_u_))) law.settle();
+        return nothing;
+      });
+      add("present_poles", {}, true,
+          [](Law& law, const auto&) { return law.present_poles().contraction; });
+      add("joined_poles", {"a", "b"}, true,
+          [](Law&, const auto& in) { return Poles::joined(in[0], in[1]); });
+    } else if constexpr (kind_of<Law> == RunningLaw::filter) {
+      const auto nothing = S(0.0);
+      add("filter_corrected", {}, false,
+          [=](Law& law, const auto&) { return law.recur_usually(true), nothing; });
+      add("filter_missed", {}, false,
+          [=](Law& law, const auto&) { return law.recur_usually(false), nothing; });
+      add("filter_at_ceiling", {}, false, [=](Law& law, const auto&) {
+        if (all(!(law.now_.factor.variance(0) < law.ceiling()))) law.recur_at_ceiling();
+        return nothing;
+      });
+      add("filter_to_limit", {}, false, [=](Law& law, const auto&) {
+        if (law.now_.factor.near(law.limit_.factor, S(1e-3))) law.now_ = law.limit_;
+        return nothing;
+      });
+    }
+  }
+  /// u of the law for given estimates, where the observer does not always publish its own.
+  template <class C, class Numbers>
+  static auto law_for(C& c, const Numbers& in) noexcept {
+    auto& o = c.observer();
+    o.laws_[0].age_ = std::uint32_t{0};  // it publishes what it keeps
+    const auto kept = o.rest_.published;
+    std::size_t next = 1;
+    for (auto& given : o.rest_.published) given = in[next++];
+    const auto u = law(c, in[0]);
+    o.rest_.published = kept;
+    return u;
+  }
+  template <class O>
+  static constexpr bool blanks = requires(O& o) {
+    o.rest_.published;
+  };
+  /// An estimate as it is computed, whether it is published or not.
+  template <int Row, class O>
+  static auto estimate(const O& o) noexcept {
+    if constexpr (blanks<O>) {
+      return static_cast<const typename O::Base&>(o).template estimate<Row>();
+    } else {
+      return o.template estimate<Row>();
+    }
+  }
+  /// The place of a number among those that are published while estimates are blanked, or -1.
+  template <class O, class S>
+  static int place_in_published(const O& o, const S* at) noexcept {
+    int place = -1;
+    if constexpr (blanks<O>) {
+      for (std::size_t i = 0; i < o.rest_.published.size(); ++i) {
+        if (at == &o.rest_.published[i]) place = static_cast<int>(i);
+      }
+    }
+    return place;
+  }
+  /// Not written: a table of the first gains, a nominal model.
+  template <class O>
+  static constexpr bool is_plain = [] {
+    if constexpr (kind_of<LawOf<O>> == RunningLaw::filter) {
+      return LawOf<O>::table_size == 0 && !O::has_model;
+    } else {
+      return true;
+    }
+  }();
+  /// A y that the filter's gate accepts, as a check.
+  template <class O, class S>
+  static void judge(O& o, const S& y) noexcept {
+    const S e = y - o.predicted_measurement();
+    (void)all(e * e <= o.rest_.set.outlier_threshold * o.innovation_variance());
+  }
+
+  template <class O>
+  static WrapNumbers wrap(const O& o) noexcept {
+    using S = typename O::scalar_type;
+    const auto number = [](const S& x) { return static_cast<double>(x); };
+    WrapNumbers wrap;
+    wrap.period = number(o.period_);
+    wrap.inverse_period = number(o.inverse_period_);
+    wrap.most_turns = number(S(1) / (S(8) * rounding<S>()));
+    wrap.y = number(o.count_.y);
+    wrap.turns = number(o.count_.turns);
+    wrap.motion = number(o.count_.motion);
+    wrap.samples = o.count_.samples;
+    wrap.gaps = o.count_.gaps;
+    wrap.doubts = o.count_.doubts;
+    wrap.begun = o.count_.begun;
+    return wrap;
   }
 
   /// The inputs of a DelayedInput that are still needed, the newest last.
@@ -175,13 +385,30 @@ struct IsGate : std::false_type {};
 template <class Observer>
 struct IsGate<OutlierGate<Observer>> : std::true_type {};
 template <class Observer>
-inline constexpr bool is_adapter = IsDelayed<Observer>::value || IsGate<Observer>::value;
+struct IsWrapped : std::false_type {};
+template <class Observer>
+struct IsWrapped<WrappedOutput<Observer>> : std::true_type {};
+template <class Observer>
+inline constexpr bool is_adapter =
+    IsDelayed<Observer>::value || IsGate<Observer>::value || IsWrapped<Observer>::value;
+/// With a gate in it a WrappedOutput counts twice.
+template <class Observer>
+inline constexpr bool wraps_beside_gate = [] {
+  if constexpr (IsWrapped<Observer>::value) {
+    return observer_traits<typename Observer::Adapted>.rejects_outliers;
+  } else if constexpr (IsDelayed<Observer>::value) {
+    return wraps_beside_gate<typename Observer::Adapted>;
+  } else {
+    return false;
+  }
+}();
 
 /// What the adapters around an observer count and choose.
 template <class Observer>
 void take_adapters(RecordedDesign& design, const Observer& observer) {
   if constexpr (IsDelayed<Observer>::value) design.line = RecordAccess::line(observer);
   if constexpr (IsGate<Observer>::value) design.gate = RecordAccess::gate(observer);
+  if constexpr (IsWrapped<Observer>::value) design.wrap = RecordAccess::wrap(observer);
   if constexpr (is_adapter<Observer>) take_adapters(design, observer.observer());
 }
 
@@ -197,6 +424,10 @@ struct WithoutAdapter<DelayedInput<Observer, Capacity>> {
 };
 template <class Observer>
 struct WithoutAdapter<OutlierGate<Observer>> {
+  using type = typename WithoutAdapter<Observer>::type;
+};
+template <class Observer>
+struct WithoutAdapter<WrappedOutput<Observer>> {
   using type = typename WithoutAdapter<Observer>::type;
 };
 template <class Observer, class Form>
@@ -240,15 +471,19 @@ template <class Law>
 concept GapGainsAreATable = gain_law_traits<Law>
 .bridges_gaps && !gain_law_traits<Law>.advances && requires { typename WithScalar<Law, float>; };
 
-/// An observer whose lists are recorded: PredictorCorrector with such laws.
+/// An observer whose lists are recorded: PredictorCorrector with such laws, or with one that runs.
 template <class Observer>
 concept HasLists = can_be_recorded<Observer> && requires(const Observer& o) {
-  requires GapGainsAreATable<std::remove_cvref_t<decltype(RecordAccess::laws(o)[0])>>;
+  requires GapGainsAreATable<std::remove_cvref_t<decltype(RecordAccess::laws(o)[0])>> ||
+      (RecordAccess::kind_of<std::remove_cvref_t<decltype(RecordAccess::laws(o)[0])>> !=
+           RunningLaw::none &&
+       RecordAccess::is_plain<Observer>);
 };
 
 /// The same, perhaps in an adapter.
 template <class Observer>
-concept WritableObserver = HasLists<typename WithoutAdapter<Observer>::type>;
+concept WritableObserver =
+    HasLists<typename WithoutAdapter<Observer>::type> && !wraps_beside_gate<Observer>;
 
 template <class C>
 struct ObserverOfController;
@@ -337,22 +572,63 @@ class DesignRecorder {
         if (state >= size) name += "_level" + std::to_string(state / size + 1);
         if (state == 0) design.first_state = name;
       }
-      writer.live[i] = name[0] == 'z' || name == "u_applied" || name == "u_last";
+      const int published = RecordAccess::place_in_published(of(object), numbers[i]);
+      if (published >= 0) name = "published_" + std::to_string(published);
+      writer.live[i] = name[0] == 'z' || name[0] == 'p' || name == "u_applied" || name == "u_last";
       design.members.push_back(name.empty() ? "x" + std::to_string(i) : name);
     }
     writer.find_live(*recorded);
     design.live = writer.live;
     design.numbers = recorded->numbers;
     for (const auto& call : recorded->calls) design.calls.push_back(call[0]);
+    if (auto ok = take_angle(); !ok) return ok;
     return take_gains(of(subject_));
   }
 
  private:
-  template <class Of>
-  void add_observer(const Of& of) {
+  template <class OfAny>
+  void add_observer(const OfAny& of_any) {
     using Law =
         std::remove_cvref_t<decltype(RecordAccess::laws(std::declval<const Observer&>())[0])>;
-    design.gain_is_kept = gain_law_traits<Law>.kind == GainKind::preset;
+    constexpr RunningLaw runs = RecordAccess::kind_of<Law>;
+    const auto of = [of_any](auto& c) -> auto& { return RecordAccess::at_rest(of_any(c)); };
+    design.gain_is_kept = runs == RunningLaw::none && gain_law_traits<Law>.kind == GainKind::preset;
+    if constexpr (runs != RunningLaw::none) {
+      using Recorded = std::remove_cvref_t<decltype(RecordAccess::laws(
+          of_any(std::declval<typename Recorder<Subject>::Recorded&>()))[0])>;
+      RecordAccess::add_law<Recorded>(
+          [&](const char* name, std::vector<std::string> arguments, bool has_output, auto call) {
+            add(name, std::move(arguments), has_output, [=](auto& c, const Numbers& in) {
+              const Number output = call(RecordAccess::laws(of_any(c))[0], in);
+              return has_output ? Numbers{output} : Numbers{};
+            });
+          });
+    }
+    if constexpr (runs == RunningLaw::schedule) {
+      add("correct_long", {"y", "contraction", "samples"}, false, [of](auto& c, const Numbers& in) {
+        const EqualSampledPoles<size, Number> poles{in[1]};
+        RecordAccess::correct(
+            of(c), in[0],
+            Array<ScaledGain<size, Number>, 1>{long_step_gain<size, Number>(poles, in[2])});
+        return Numbers{};
+      });
+    }
+    if constexpr (runs == RunningLaw::filter) {
+      if (design.law.watches) {
+        add("fits", {"y"}, false, [of](auto& c, const Numbers& in) {
+          RecordAccess::judge(of(c), in[0]);
+          return Numbers{};
+        });
+      }
+    }
+    if constexpr (ShiftableOutput<Observer>) {
+      if (design.wrap.period > 0) {
+        add("shift", {"offset"}, false, [of](auto& c, const Numbers& in) {
+          (void)of(c).shift_output(in[0]);
+          return Numbers{};
+        });
+      }
+    }
     add("observe", {"y", "u"}, false, [of](auto& c, const Numbers& in) {
       (void)of(c).update(in[0], in[1]);
       return Numbers{};
@@ -363,15 +639,16 @@ class DesignRecorder {
     });
     std::vector<std::string> arguments{"y"};
     for (int i = 1; i <= gains; ++i) arguments.push_back("k" + std::to_string(i));
-    add("correct_by", arguments, false, [of](auto& c, const Numbers& in) {
-      Array<ScaledGain<size, Number>, Observer::levels> given{};
-      std::size_t next = 1;
-      for (auto& level : given) {
-        for (Number& k : level) k = in[next++];
-      }
-      RecordAccess::correct(of(c), in[0], given);
-      return Numbers{};
-    });
+    if constexpr (runs == RunningLaw::none)
+      add("correct_by", arguments, false, [of](auto& c, const Numbers& in) {
+        Array<ScaledGain<size, Number>, Observer::levels> given{};
+        std::size_t next = 1;
+        for (auto& level : given) {
+          for (Number& k : level) k = in[next++];
+        }
+        RecordAccess::correct(of(c), in[0], given);
+        return Numbers{};
+      });
     if (!design.gain_is_kept) {
       add("correct_step", {"y"}, false, [of](auto& c, const Numbers& in) {
         (void)of(c).correct(in[0]);
@@ -384,16 +661,70 @@ class DesignRecorder {
     });
     unroll<size>([&](auto row) {
       add("estimate_" + std::to_string(int{row}), {}, true, [of](auto& c, const Numbers&) {
-        return Numbers{of(c).template estimate<int{decltype(row)::value}>()};
+        return Numbers{RecordAccess::estimate<int{decltype(row)::value}>(of(c))};
       });
     });
   }
 
+  /// Where the law of an angle subtracts an estimate from the reference, the difference becomes its
+  /// argument: the text takes off whole turns.
+  [[nodiscard]] Check<V> take_angle() {
+    if (!(design.wrap.period > 0) || !design.is_controller || design.error_based ||
+        design.compensates) {
+      return {};
+    }
+    const Error<V> refused{"soften", V(1), "of an angle is not written for this observer"};
+    if constexpr (RecordAccess::blanks<Observer>) {
+      if (design.softens) return refused;
+      return {};
+    }
+    for (std::size_t i = 0; i < design.names.size(); ++i) {
+      if (design.names[i].name != "law") continue;
+      auto& list = design.calls[i].list.instructions;
+      const int of_call = static_cast<int>(design.members.size());
+      int reference = -1;
+      int difference = -1;
+      for (std::size_t k = 0; k < list.size(); ++k) {
+        const Instruction& one = list[k];
+        const int at = static_cast<int>(k);
+        if (one.operation == Operation::argument) {
+          if (one.a == of_call) reference = at;
+          continue;
+        }
+        if (reference < 0 || (one.a != reference && one.b != reference && one.c != reference)) {
+          continue;
+        }
+        const bool subtracts =
+            one.operation == Operation::subtract && one.a == reference &&
+            list[static_cast<std::size_t>(one.b)].operation == Operation::argument;
+        if (!subtracts || difference >= 0) return refused;
+        difference = at;
+      }
+      if (difference < 0) return refused;
+      Instruction& one = list[static_cast<std::size_t>(difference)];
+      design.wrap.angle =
+          design.members[static_cast<std::size_t>(list[static_cast<std::size_t>(one.b)].a)];
+      one = {.operation = Operation::argument, .a = of_call};
+      design.names[i].arguments[0] = "error";
+    }
+    return {};
+  }
+
   [[nodiscard]] Check<V> take_gains(const Observer& observer) {
     design.size = size;
+    design.max_gap = observer.max_gap();
     design.order = Observer::order;
     design.sample_time = static_cast<double>(observer.sample_time());
     design.input_gain = static_cast<double>(observer.input_gain());
+    if constexpr (RecordAccess::kind_of<
+                      std::remove_cvref_t<decltype(RecordAccess::laws(observer)[0])>> ==
+                  RunningLaw::none) {
+      return take_table(observer);
+    }
+    return {};
+  }
+
+  [[nodiscard]] Check<V> take_table(const Observer& observer) {
     for (int elapsed = 1; elapsed <= observer.max_gap() + 1; ++elapsed) {
       std::vector<double> row;
       for (const auto& law : RecordAccess::laws(observer)) {
@@ -463,14 +794,28 @@ Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
   design.lower = static_cast<double>(controller.limiter().lower());
   design.upper = static_cast<double>(controller.limiter().upper());
   take_adapters(design, controller.observer());
+  design.law = Access::law_numbers(bare.observer());
 
-  maker.add("rest_at", {"y", "u"}, false, [](auto& c, const Numbers& in) {
-    auto& o = c.observer();
-    (void)o.reset(o.equilibrium(in[0], in[1]));
+  const bool wraps = design.wrap.period > 0;
+  std::vector<std::string> of_rest{"y", "u"};
+  if (wraps) of_rest.push_back("angle");
+  maker.add("rest_at", of_rest, false, [wraps](auto& c, const Numbers& in) {
+    auto& o = Access::at_rest(c.observer());
+    auto state = o.equilibrium(in[0], in[1]);
+    if (wraps) state(0) = in[2];
+    (void)o.reset(state);
     return Numbers{};
   });
-  maker.add("law", {"r"}, true,
-            [](auto& c, const Numbers& in) { return Numbers{Access::law(c, in[0])}; });
+  using BareObserver = typename WithoutAdapter<typename Of::type>::type;
+  if constexpr (Access::blanks<BareObserver>) {
+    std::vector<std::string> of_law{"r"};
+    for (int i = 0; i < BareObserver::size; ++i) of_law.push_back("e" + std::to_string(i));
+    maker.add("law", of_law, true,
+              [](auto& c, const Numbers& in) { return Numbers{Access::law_for(c, in)}; });
+  } else {
+    maker.add("law", {"r"}, true,
+              [](auto& c, const Numbers& in) { return Numbers{Access::law(c, in[0])}; });
+  }
   maker.add("limit", {"u"}, true, [](auto& c, const Numbers& in) {
     return Numbers{Access::limited(Access::loop(c), in[0])};
   });
@@ -508,8 +853,10 @@ Expected<RecordedDesign, Error<typename Observer::scalar_type>> recorded_design(
   using Maker = DesignRecorder<Bare, Bare>;
 
   if (const auto rules = Maker::checked(options); !rules) return rules.error();
-  Maker maker(without_adapter(observer), options);
+  const Bare bare = without_adapter(observer);
+  Maker maker(bare, options);
   take_adapters(maker.design, observer);
+  maker.design.law = RecordAccess::law_numbers(bare);
   const auto of = [](auto& o) -> auto& { return o; };
   const auto no_name = [](const auto&, const auto*) { return std::string(); };
   if (auto ok = maker.record(of, no_name); !ok) return ok.error();

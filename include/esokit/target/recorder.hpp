@@ -95,8 +95,8 @@ std::vector<unsigned char> counters_of(const Object& object) {
 /// What moves is found from the arguments: a number belongs to the state if any of the calls
 /// changes it. So add all calls that will be used before `record`.
 ///
-/// The object runs on RecordingScalar, which is a pack: it needs `with_scalar` and `fields` (see
-/// core/lanes.hpp). `can_be_recorded` says this of a type.
+/// The object runs on RecordingScalar, which is a pack: it needs `with_scalar`.
+/// `can_be_recorded` says this of a type.
 /// @tparam Object an observer or controller of float or double
 template <class Object>
 class Recorder {

@@ -477,7 +477,7 @@ inline std::string structured_text(const RecordedDesign& design) {
       {"$GATE_IN_A_ROW", std::to_string(design.gate.most_in_a_row)},
       {"$SHARE", writer.number(1.0 / 64)},
       {"$ESTIMATES", estimates},
-      {"$ROWS", std::to_string(design.gap_gains.size())},
+      {"$ROWS", std::to_string(design.max_gap + 1)},
       {"$FIRST", design.first_state},
       {"$MOST", writer.most()},
       {"$LENGTH", std::to_string(design.line.size())},
@@ -514,12 +514,24 @@ inline std::string structured_text(const RecordedDesign& design) {
 /// no methods), REAL for float and LREAL for double, from the same lists as to_c and with the same
 /// meaning of bad and missing samples, gaps, restarts and safe mode. A call of the block is a
 /// sample. NaN and infinity are refused by ABS(x) <= the largest number, which every PLC has.
-/// @param object as for to_c @return the text of the block, or an error as for to_c
+///
+/// Not written are gains that go on at each sample (AlgebraicEso, ExtendedStateFilter) and angles
+/// (WrappedOutput): their text is that of C alone.
+/// @param object as for to_c @return the text of the block, or an error as for to_c, or for one of
+///        these
 template <detail::Writable Object>
 Expected<std::string, Error<typename Object::scalar_type>> to_structured_text(
     const Object& object, const CodeOptions& options = {}) {
   const auto design = detail::recorded_design(object, options);
   if (!design) return design.error();
+  using V = typename Object::scalar_type;
+  Rules<V> rules;
+  rules
+      .require(design->law.kind == detail::RunningLaw::none, "observer", V(0),
+               "has a gain that goes on at each sample: not written in Structured Text")
+      .require(!(design->wrap.period > 0), "period", static_cast<V>(design->wrap.period),
+               "of WrappedOutput is not written in Structured Text");
+  if (!rules) return rules.error();
   return detail::structured_text(*design);
 }
 

@@ -1,0 +1,86 @@
+// The C of gains that go on at each sample (the schedule of AlgebraicEso, the recursion of
+// ExtendedStateFilter) and of angles equals them bit for bit, as in c_code_test.cpp.
+#include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/outlier_gate.hpp>
+#include <esokit/adapter/wrapped_output.hpp>
+#include <esokit/control/disturbance_compensator.hpp>
+#include <esokit/observer/algebraic_eso.hpp>
+#include <esokit/observer/cascade_eso.hpp>
+#include <esokit/observer/extended_state_filter.hpp>
+#include <esokit/observer/linear_eso.hpp>
+#include <target/written.hpp>
+
+namespace esokit_test {
+namespace target_c_running_test {
+
+#if defined(ESOKIT_LOADS_C) && !defined(ESOKIT_ONE_TYPE)
+
+using namespace esokit;
+
+/// The config of the observer in a controller's, inside its adapters.
+template <class Config>
+auto& innermost(Config& config) {
+  if constexpr (requires { config.observer; }) {
+    return innermost(config.observer);
+  } else {
+    return config;
+  }
+}
+
+TEST(CRunning, OfASchedule) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  equals<AlgebraicEso<2, double>>(30000, 401);
+  equals<AlgebraicEso<1, float>>(30000, 411);
+  observes<AlgebraicEso<2, float>>(30000, 421);
+  equals<DelayedInput<OutlierGate<AlgebraicEso<1, double>>, 3>>(30000, 431);
+  const auto slow = [](auto& settings) {  // it never settles, and publishes late
+    auto& observer = innermost(settings);
+    observer.frequency_shift = {};
+    observer.blanking = decltype(observer.frequency_shift)(0.25);
+    observer.start_index = 2;
+  };
+  equals_changed<Adrc<AlgebraicEso<2, double>>>(30000, 441, "gcc -std=c99", slow);
+  equals_changed<Adrc<AlgebraicEso<1, float>, ErrorBased>>(30000, 451, "gcc -std=c99", slow);
+}
+
+TEST(CRunning, OfAFilter) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  equals<ExtendedStateFilter<2, double>>(30000, 461);
+  observes<ExtendedStateFilter<1, float>>(30000, 471);
+  const auto changed = [](RiccatiMode mode, InflationRule rule, double threshold) {
+    return [=](auto& settings) {
+      auto& filter = innermost(settings);
+      using V = decltype(filter.inflation);
+      filter.mode = mode;
+      filter.inflation_rule = rule;
+      if (rule != InflationRule::fixed) filter.inflation = V(0);
+      filter.outlier_threshold = V(threshold);
+      filter.max_gap = 12;
+      settings.limits = {V(-1.5), V(1.25), V(60)};  // so that it meets them as often as the others
+    };
+  };
+  const std::string gcc = "gcc -std=c99";
+  using Filter = Adrc<ExtendedStateFilter<1, float>>;
+  equals_changed<Filter>(30000, 481, gcc, changed(RiccatiMode::frozen, InflationRule::fixed, 0));
+  equals_changed<Filter>(30000, 491, gcc,
+                         changed(RiccatiMode::recursive, InflationRule::adaptive, 9));
+  equals_changed<Adrc<DelayedInput<ExtendedStateFilter<2, double>, 3>>>(
+      30000, 501, gcc, changed(RiccatiMode::frozen, InflationRule::none, 25));
+}
+
+TEST(CRunning, OfAnglesByTurns) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  equals<WrappedOutput<LinearEso<2, double>>>(30000, 511);
+  equals<WrappedOutput<LinearEso<2, float>>>(30000, 521);
+  equals<WrappedOutput<LinearEso<3, double>>>(30000, 531);  // it softens
+  observes<WrappedOutput<CascadeEso<1, 2, float>>>(30000, 541);
+  equals<DelayedInput<WrappedOutput<ModelEso<lag, double>>, 3>>(30000, 551);
+  equals<WrappedOutput<AlgebraicEso<1, double>>>(30000, 561);
+  equals_controller<Adrc<WrappedOutput<LinearEso<1, float>>, ErrorBased>>(30000, 571);
+  equals_controller<DisturbanceCompensator<WrappedOutput<LinearEso<1, double>>>>(30000, 581);
+}
+
+#endif
+
+}  // namespace target_c_running_test
+}  // namespace esokit_test
