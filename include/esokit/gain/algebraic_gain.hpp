@@ -49,6 +49,7 @@ class AlgebraicGain {
                                         .advances = true,
                                         .accepts = true,
                                         .resets = true,
+                                        .continues = true,
                                         .bridges_gaps = true};
 
   using scalar_type = S;  ///< type of gains
@@ -118,6 +119,13 @@ class AlgebraicGain {
     anchor(first);
     for (int i = 0; i < Size; ++i) push();
     set_gain();
+  }
+
+  /// Goes to the place of another law in its schedule. A settled one no longer knows its age, and
+  /// stays settled.
+  Check<S> continue_from(const AlgebraicGain& other, const S&) {
+    resume(other.settled_ ? max_index : other.age_);
+    return {};
   }
 
   /// The gain for the whole gap at the bandwidth of this place in the schedule.
@@ -326,7 +334,9 @@ class AlgebraicGain {
   }
 
   ESOKIT_COLD void settle_if_due() noexcept {
-    if (!all(settled_below_ >= std::get<0>(ratios_u_)) || age_ <= least_age_) return;
+    if (all(settled_below_ >= std::get<0>(ratios_u_)) && !(age_ <= least_age_)) settle();
+  }
+  void settle() noexcept {
     settled_ = true;
     stand();
   }

@@ -557,22 +557,16 @@ struct WithoutAdapter<ControlLoop<Observer>> {
 };
 
 template <class To, class From>
-void take_off_adapter(To& to, const From& from);
-template <int... I, class... T, class... F>
-void take_off_adapters(const TiedFields<std::integer_sequence<int, I...>, T...>& to,
-                       const TiedFields<std::integer_sequence<int, I...>, F...>& from) {
-  (take_off_adapter(static_cast<const TiedField<I, T>&>(to).field,
-                    static_cast<const TiedField<I, F>&>(from).field),
-   ...);
-}
-template <class To, class From>
 void take_off_adapter(To& to, const From& from) {
   if constexpr (std::is_same_v<To, From>) {
     to = from;
   } else if constexpr (is_adapter<From>) {
     take_off_adapter(to, from.observer());
   } else if constexpr (!std::is_empty_v<To>) {
-    take_off_adapters(LaneAccess::fields(to), LaneAccess::fields(from));
+    LaneAccess::with_members(to, [&](auto&... into) {
+      LaneAccess::with_members(
+          from, [&](const auto&... out_of) { (take_off_adapter(into, out_of), ...); });
+    });
   }
 }
 /// @}

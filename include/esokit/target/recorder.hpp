@@ -54,12 +54,8 @@ void visit_members(Object& object, const Number& number, const Other& other) {
     if (object) deeper(*object);
   } else if constexpr (IsTuple<T>::value) {
     std::apply([&](auto&... member) { (deeper(member), ...); }, object);
-  } else if constexpr (LaneAccess::has_fields<T>) {
-    const auto each = [&]<int... I, class... F>(
-        const TiedFields<std::integer_sequence<int, I...>, F...>& fields) {
-      (deeper(static_cast<const TiedField<I, F>&>(fields).field), ...);
-    };
-    each(LaneAccess::fields(object));
+  } else if constexpr (LaneAccess::has_members<T>) {
+    LaneAccess::with_members(object, [&](auto&... members) { (deeper(members), ...); });
   } else {
     other(&object, sizeof object);
   }
