@@ -352,6 +352,9 @@ class FixedDesign {
       return refuse("period", design_->wrap.period,
                     "of WrappedOutput is not written in fixed point: give y with counter_bits");
     }
+    if (design_->predictive) {
+      return refuse("controller", 0, "is PredictiveAdrc, which is not written in fixed point");
+    }
     if (design_->guard.on) {
       return refuse("observer", 0, "is in Guarded, which is not written in fixed point");
     }

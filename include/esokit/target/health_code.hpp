@@ -7,6 +7,7 @@
 #include <esokit/core/expected.hpp>
 #include <esokit/observer/concepts.hpp>
 #include <esokit/target/c_code.hpp>
+#include <esokit/target/c_text.hpp>
 #include <esokit/target/list_writer.hpp>
 #include <esokit/target/recorded_design.hpp>
 #include <string>
@@ -89,25 +90,7 @@ unsigned $name_diagnose(const $name_state *o);
 
 /// The counterpart of HealthMonitor::look and diagnose.
 inline constexpr const char* c_health_source =
-    R"(/* Written by esokit from a finished monitor; do not edit. */
-$include "$name.h"
-
-$include <math.h>
-$include <string.h>
-
-/* Deviations from MISRA C:2012: is_finite looks at the bits of a number by memcpy (21.15), as no
- * test of its value holds under -ffast-math; functions leave early (15.5, advisory); a header has
- * macros that its source may not need (2.5, advisory). */
-
-/* By its bits, so that it holds under -ffast-math, too. */
-static bool is_finite($real x)
-{
-  $word bits;
-  (void)memcpy(&bits, &x, sizeof bits);
-  return (bits & $exponent) != $exponent;
-}
-
-void $name_clear($name_state *o)
+    R"(void $name_clear($name_state *o)
 {
   (void)memset(o, 0, sizeof *o);
   o->gain_ratio = $ONE;
@@ -370,7 +353,7 @@ requires std::same_as<S, typename Controller::scalar_type> Expected<CCode, Error
   const detail::Words common = detail::c_common_words(writer, options);
   words.insert(words.end(), common.begin(), common.end());
   return CCode{detail::filled(detail::c_health_header, words),
-               detail::filled(detail::c_health_source, words)};
+               detail::filled(std::string(detail::c_source_head) + detail::c_health_source, words)};
 }
 
 }  // namespace esokit
