@@ -118,6 +118,13 @@ TEST(CPredictive, EqualsTheController) {
   predicts<PredictiveAdrc<ModelEso<lag, double>>>(831);
 }
 
+TEST(CPredictive, CompilesWithOtherCompilers) {
+  using C = PredictiveAdrc<LinearEso<2, float>>;
+  C::Config config{.observer = observer_config<LinearEso<2, float>>(8)};
+  config.controller_bandwidth = 4;
+  compiles_elsewhere(to_c(C::make(config).value(), {.name = "loop"}).value(), "loop");
+}
+
 #endif  // ESOKIT_LOADS_C
 
 }  // namespace target_c_predictive_test
