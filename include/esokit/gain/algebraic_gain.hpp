@@ -338,8 +338,9 @@ class AlgebraicGain {
   }
   void settle() noexcept {
     settled_ = true;
-    gain_ = current_gain<Size, S>(final_poles_.weights());
+    stand();
   }
+  constexpr void stand() noexcept { gain_ = current_gain<Size, S>(final_poles_.weights()); }
 
   ScaledGain<Size, S> gain_{};
   Array<S, coefficient_count> coefficients_{};
