@@ -164,7 +164,7 @@ text_bytes() {
 
 # written_bytes PRESET NAME: flash of a C file without its self-test
 written_bytes() {
-  find "$root/build/$1" -path '*written_objects*' -name "$2.c.obj" \
+  find "$root/build/$1" -path '*written_*objects*' -name "$2.c.obj" \
     -exec "${binutils[$1]}size" -A {} + | awk '
     ($1 ~ /^\.(text|rodata)/) && $1 !~ /self_test|samples/ { bytes += $2 }
     END { print bytes + 0 }'
@@ -322,7 +322,7 @@ built=()
 for core in "${cores[@]}"; do
   echo "building for $core, $((SECONDS - started)) s"
   # Without a floating-point unit nothing is fused, and there is one image.
-  images=(firmware drive drive_make controllers written_c)
+  images=(firmware drive drive_make controllers written_c written_fixed fixed_drive)
   [[ $core == cortex-m0plus ]] || images+=(firmware_exact)
   [[ $core != cortex-m4f ]] || images+=(firmware_others)
   if build "$core" "${images[@]}"; then
@@ -335,7 +335,8 @@ done
 echo "built in $((SECONDS - started)) s"
 
 for core in ${built[@]+"${built[@]}"}; do
-  for image in firmware firmware_exact drive drive_make controllers written_c; do
+  for image in firmware firmware_exact drive drive_make controllers written_c written_fixed \
+    fixed_drive; do
     [[ $core-$image != cortex-m0plus-firmware_exact ]] || continue
     if run "$core" "$image" "$out/$core-$image.txt"; then pass; else
       fail "$core, $image: status $? in the emulator; the end of what it said:"
@@ -349,7 +350,7 @@ for core in ${built[@]+"${built[@]}"}; do
     compare "$core" firmware
   fi
   for image in drive drive_make; do compare "$core" "$image"; done
-  for image in firmware drive drive_make controllers written_c; do
+  for image in firmware drive drive_make controllers written_c written_fixed fixed_drive; do
     check_links "$core" "$(image "$core" "$image").elf"
   done
   [[ $core != cortex-m4f ]] || check_links "$core" "$(object "$core" others)"
@@ -403,6 +404,18 @@ done
     done
     echo "$row"
   done
+  echo
+  echo "**The C of \`to_fixed_c\`**, in integers: y of 12 bits, u of 1000 counts, -Os, \`max_gap\` 10; bytes of" \
+    "flash, bytes of state, and instructions of \`update\`; each sample equals those of the host"
+  echo
+  echo "| | LinearEso<2> | state | instructions | with an innovation of 16 bits | Adrc<LinearEso<2>>, both limits | state | instructions |"
+  echo "|---|---:|---:|---:|---:|---:|---:|---:|"
+  for core in ${built[@]+"${built[@]}"}; do
+    runs=$out/$core-written_fixed.txt
+    echo "| ${title[$core]} | $(written_bytes "$core" eso_fixed) | $(value "$runs" size eso_fixed 3) |" \
+      "$(value "$runs" count eso_fixed 3) | $(value "$runs" count eso_fixed16 3) |" \
+      "$(written_bytes "$core" loop_fixed) | $(value "$runs" size loop_fixed 3) | $(value "$runs" count loop_fixed 3) |"
+  done
 } >"$out/table.md"
 cat "$out/table.md"
 echo
@@ -421,6 +434,18 @@ for core in cortex-m4f cortex-m7; do
   limit "$core: instructions of the C of LinearEso<2>" \
     "$(value "$out/$core-written_c.txt" count eso 3)" 50
   limit "$core: bytes of the whole image" "$(text_bytes "$core" firmware)" 67584
+done
+
+# The C in integers: LinearEso, with 16 bits, Adrc.
+declare -A most_fixed=([cortex-m4f]="50 50 170" [cortex-m7]="50 50 170" [cortex-m0plus]="70 50 170"
+  [riscv32]="70 70 170")
+for core in ${built[@]+"${built[@]}"}; do
+  read -r -a most <<<"${most_fixed[$core]}"
+  names=(eso_fixed eso_fixed16 loop_fixed)
+  for i in 0 1 2; do
+    limit "$core: instructions of ${names[i]}" \
+      "$(value "$out/$core-written_fixed.txt" count "${names[i]}" 3)" "${most[i]}"
+  done
 done
 
 # Only a complete table goes into the page.

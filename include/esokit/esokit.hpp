@@ -182,6 +182,11 @@
 #include <esokit/sim/window.hpp>
 #include <esokit/target/c_code.hpp>
 #include <esokit/target/c_text.hpp>
+#include <esokit/target/fixed_bounds.hpp>
+#include <esokit/target/fixed_design.hpp>
+#include <esokit/target/fixed_point.hpp>
+#include <esokit/target/fixed_text.hpp>
+#include <esokit/target/integer_list.hpp>
 #include <esokit/target/list_writer.hpp>
 #include <esokit/target/recorded_design.hpp>
 #include <esokit/target/recorder.hpp>

@@ -185,12 +185,7 @@ class ControlLoop {
   /// What the actuator held since the last step, if it was not the last output: before the step.
   /// A u that is not finite changes nothing.
   void applied(S u) noexcept {
-    if constexpr (PackScalar<S>) {
-      limiter_.track(select(is_finite(u), u, limiter_.last()));
-    } else {
-      if (is_finite(u)) [[likely]]
-        limiter_.track(u);
-    }
+    limiter_.track(select(is_finite(u), u, limiter_.last()));
   }
 
   /// One sample: the observer's update, then the law.

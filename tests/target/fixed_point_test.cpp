@@ -1,0 +1,374 @@
+// The integers that to_fixed_c writes stay within the bounds that it promises, with random and
+// adversarial input; a broken rounding does not. Nothing overflows at the ends of the ranges.
+#include <target/fixed_play.hpp>
+
+#include <esokit/control/adrc.hpp>
+#include <esokit/core/error_text.hpp>
+#include <esokit/observer/adjustable_bandwidth_eso.hpp>
+#include <esokit/observer/cascade_eso.hpp>
+#include <esokit/observer/half_gain_eso.hpp>
+#include <esokit/observer/linear_eso.hpp>
+#include <sstream>
+
+namespace esokit_test {
+namespace target_fixed_point_test {
+
+using namespace esokit;
+
+template <class Observer>
+Observer observer(double bandwidth, double sample_time) {
+  using V = typename Observer::scalar_type;
+  typename Observer::Config config{};
+  config.observer_bandwidth = static_cast<V>(bandwidth);
+  config.sample_time = static_cast<V>(sample_time);
+  config.input_gain = 50;
+  config.max_gap = 5;
+  if constexpr (requires { config.bandwidth_factor; }) config.bandwidth_factor = 1.5;
+  return Observer::make(config).value();
+}
+
+/// An encoder of 4096 counts a turn, within half a turn; 12 V in 1000 counts.
+FixedPointOptions servo(int bits = 32) {
+  FixedPointOptions options;
+  options.y = {2 * M_PI / 4096, 2048};
+  options.u = {12.0 / 1000, 1000};
+  options.innovation_bits = bits;
+  options.code.name = "eso";
+  return options;
+}
+/// The same as a counter of 16 bits, at most 30 counts a sample.
+FixedPointOptions counter(int bits = 32) {
+  FixedPointOptions options = servo(bits);
+  options.y.most = 30;
+  options.y.counter_bits = 16;
+  return options;
+}
+
+std::string refusal(const FixedPointOptions& options, double bandwidth = 100, double time = 1e-3) {
+  const auto code = to_fixed_c(observer<LinearEso<2>>(bandwidth, time), options);
+  if (code) return "";
+  std::ostringstream text;
+  text << code.error();
+  return text.str();
+}
+
+#ifdef ESOKIT_LOADS_C
+
+constexpr long many =
+#if defined(ESOKIT_ONE_TYPE)
+    20000;
+#else
+    1000000;  // in each of ten designs
+#endif
+
+/// @return the largest share of the bound that an adversary reached
+template <class Y, class Observer>
+double stays_within(const Observer& object, const FixedPointOptions& options, std::uint64_t seed,
+                    long steps = many, int horizon = 400) {
+  const auto made = to_fixed_c(object, options);
+  EXPECT_TRUE(made) << (made ? "" : made.error().rule);
+  if (!made) return 0;
+  const Folder folder;
+  FixedInC<Y> in_c(folder, made->code);
+  EXPECT_TRUE(in_c.loaded());
+  if (!in_c.loaded()) return 0;
+  EXPECT_EQ(in_c.self_test(), 0);
+  FixedPlay<Y> play(in_c, *made, options, seed);
+  EXPECT_LE(play.by_chance(steps), 1);
+  double most = 0;
+  for (std::size_t row = 0; row < made->estimates.size(); ++row) {
+    most = std::max(most, play.by_adversary(row, horizon, 64));
+  }
+  EXPECT_LE(most, 1);
+  EXPECT_EQ(play.refused, 0);
+  return most;
+}
+
+TEST(FixedPoint, StaysWithinItsBounds) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  using Second = LinearEso<2>;
+  EXPECT_GT((stays_within<std::int32_t>(observer<Second>(100, 1e-3), servo(), 1)), 0.3);
+  EXPECT_GT((stays_within<std::int32_t>(observer<Second>(100, 1e-3), servo(16), 2)), 0.3);
+  EXPECT_GT((stays_within<std::uint16_t>(observer<Second>(100, 1e-3), counter(), 3)), 0.3);
+  EXPECT_GT((stays_within<std::uint16_t>(observer<Second>(100, 1e-3), counter(16), 4)), 0.3);
+  EXPECT_GT((stays_within<std::int32_t>(observer<LinearEso<1>>(200, 1e-3), servo(), 5)), 0.3);
+  EXPECT_GT((stays_within<std::int32_t>(observer<HalfGainEso<2>>(100, 1e-3), servo(), 6)), 0.3);
+  EXPECT_GT((stays_within<std::int32_t>(observer<CascadeEso<2, 2>>(100, 1e-3), servo(), 7)), 0.3);
+
+  EXPECT_GT((stays_within<std::int32_t>(observer<LinearEso<3>>(60, 1e-3), servo(), 8)), 0.3);
+  using Ramp = LinearEso<1, double, 2>;
+  EXPECT_GT((stays_within<std::int32_t>(observer<Ramp>(60, 1e-3), servo(), 9)), 0.3);
+}
+
+/// 10 rad/s at 20 kHz: what is left over is kept.
+TEST(FixedPoint, OfASlowObserverAtAHighRate) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  const auto slow = observer<LinearEso<2>>(10, 5e-5);
+  EXPECT_GT((stays_within<std::int32_t>(slow, servo(), 11, many, 20000)), 0.3);
+  EXPECT_GT((stays_within<std::uint16_t>(slow, counter(), 12, many, 20000)), 0.3);
+  const auto made = to_fixed_c(slow, counter());
+  EXPECT_GT(made->written.left_over[2], 0);
+}
+
+/// Signed overflow, shifts and conversions trap, at the ends of all ranges and through gaps.
+TEST(FixedPoint, NothingIsUndefinedAtTheEdges) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  const auto at_edges = [](auto object, const FixedPointOptions& options, auto y, int horizon) {
+    const auto code = to_fixed_c(object, options).value();
+    const Folder folder;
+    FixedInC<decltype(y)> in_c(
+        folder, code.code, "gcc -std=c99 -fsanitize=undefined -fsanitize-undefined-trap-on-error");
+    ASSERT_TRUE(in_c.loaded());
+    FixedPlay<decltype(y)> play(in_c, code, options, 21);
+    for (const double share : play.to_the_edges(horizon)) {
+      EXPECT_LE(share, 1);
+      EXPECT_GT(share, 0.98);
+    }
+    EXPECT_GT(play.refused, 10);
+  };
+  const auto fast = observer<LinearEso<2>>(100, 1e-3);
+  const auto slow = observer<LinearEso<2>>(10, 5e-5);
+  at_edges(fast, servo(), std::int32_t{}, 1000);
+  at_edges(fast, servo(16), std::int32_t{}, 1000);
+  at_edges(fast, counter(), std::uint16_t{}, 1000);
+  at_edges(slow, counter(), std::uint16_t{}, 60000);
+  at_edges(observer<LinearEso<3>>(60, 1e-3), servo(), std::int32_t{}, 2000);
+}
+
+/// One product floored that was to be rounded: the bound is broken, so it is none for that code.
+TEST(FixedPoint, AMutantBreaksTheBound) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  FixedPointOptions options = servo();
+  options.most_deviation = {0, 0, 2.5e-3};  // below what floors do: all are rounded
+  auto code = to_fixed_c(observer<LinearEso<2>>(100, 1e-3), options).value();
+  const std::string rounded = " + 32768u";
+  int broken = 0;
+  int products = 0;
+  for (std::size_t at = 0; (at = code.code.source.find(rounded, at)) != std::string::npos; ++at) {
+    CCode mutant = code.code;
+    mutant.source.replace(at, rounded.size(), "");
+    const Folder folder;
+    FixedInC<std::int32_t> in_c(folder, mutant);
+    ASSERT_TRUE(in_c.loaded());
+    EXPECT_NE(in_c.self_test(), 0);
+    FixedPlay<std::int32_t> play(in_c, code, options, 31);
+    double most = play.by_chance(100000);
+    for (std::size_t row = 0; row < 3; ++row) {
+      most = std::max(most, play.by_adversary(row, 400, 256));
+    }
+    broken += most > 1;
+    ++products;
+  }
+  EXPECT_EQ(products, 3);
+  EXPECT_GT(broken, 0);
+}
+
+using Servo = Adrc<LinearEso<2>>;
+
+Servo::Config servo_loop(double rate = 0) {
+  Servo::Config config{};
+  config.observer = {
+      .observer_bandwidth = 100, .input_gain = 50, .sample_time = 1e-3, .max_gap = 5};
+  config.controller_bandwidth = 25;
+  config.limits = {.lower = -12, .upper = 12};
+  if (rate > 0) config.limits.rate = rate;
+  return config;
+}
+
+/// What the law asks for, before and after its limits.
+TEST(FixedPoint, TheInputOfAControllerStaysWithinItsBound) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  for (const int bits : {16, 32}) {
+    FixedPointOptions options = servo(bits);
+    const auto made = to_fixed_c(Servo::make(servo_loop()).value(), options).value();
+    const Folder folder;
+    FixedInC<std::int32_t> c(folder, made.code, "gcc -std=c99", true);
+    ASSERT_TRUE(c.loaded());
+    EXPECT_EQ(c.self_test(), 0);
+    const WrittenSystem& w = made.written;
+    std::array<double, 3> x{};
+    Random random(41);
+    std::int32_t u = 0;
+    std::int32_t y = 0;
+    std::int32_t r = 0;
+    double largest = 0;
+    int inside = 0;
+    for (int k = 0; k < 300000; ++k) {
+      // A machine that follows, with noise and jumps: else u is at a limit all the time.
+      y = std::clamp(static_cast<std::int32_t>(0.9 * y + 0.1 * r) + random.index(41) - 20, -2048,
+                     2048);
+      if (random.index(500) == 0) r = random.index(4097) - 2048;
+      if (random.index(3000) == 0) y = random.index(4097) - 2048;
+      std::array<double, 3> to{};
+      for (std::size_t i = 0; i < 3; ++i) {
+        to[i] = w.by[i] * y + w.bu[i] * u;
+        for (std::size_t j = 0; j < 3; ++j) to[i] += w.a[i * 3 + j] * x[j];
+      }
+      x = to;
+      const double wanted = w.law[0] * x[0] + w.law[1] * x[1] + w.law[2] * x[2] + w.law[3] * r;
+      u = c.control(c.state.data(), y, r);
+      largest = std::max(largest, std::fabs(u - std::clamp(wanted, -1000.0, 1000.0)));
+      inside += std::fabs(wanted) < 900;
+    }
+    EXPECT_LE(largest, made.input.deviation) << bits;
+    EXPECT_GT(largest, 0.3 * made.input.deviation) << bits;
+    EXPECT_GT(inside, 10000);
+  }
+}
+
+/// 0.1 counts a sample: u moves by a count at each tenth.
+TEST(FixedPoint, ALimitOfRateBelowOneCountKeepsItsRemainder) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  const auto made = to_fixed_c(Servo::make(servo_loop(1.2)).value(), servo()).value();
+  const Folder folder;
+  FixedInC<std::int32_t> c(folder, made.code, "gcc -std=c99", true);
+  ASSERT_TRUE(c.loaded());
+  std::int32_t u = 0;
+  for (int k = 1; k <= 5000; ++k) {
+    u = c.control(c.state.data(), 0, 2000);
+    // The step is rounded down to 2^-12 counts; of what it adds up to nothing is lost.
+    EXPECT_NEAR(u, k * 409.0 / 4096, 0.5 + 1e-9) << k;
+  }
+  c.applied(c.state.data(), 7);
+  EXPECT_NEAR(c.control(c.state.data(), 0, 2000), 7, 1);
+}
+
+/// Missing samples, against the C++ observer: what it does is done here, but for the rounding.
+TEST(FixedPoint, BridgesGapsAndRestarts) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  const auto options = servo();
+  auto in_double = observer<LinearEso<2>>(100, 1e-3);
+  const auto made = to_fixed_c(in_double, options).value();
+  const Folder folder;
+  FixedInC<std::int32_t> c(folder, made.code);
+  ASSERT_TRUE(c.loaded());
+  Random random(51);
+  int bridged = 0;
+  int restarted = 0;
+  for (int k = 0; k < 20000; ++k) {
+    const auto y = static_cast<std::int32_t>(1500 * std::sin(0.002 * k));
+    const std::int32_t u = random.index(401) - 200;
+    const int missing = random.index(20) == 0 ? random.index(9) : 0;
+    for (int i = 0; i < missing; ++i) {
+      (void)in_double.predict(u * options.u.unit);
+      const unsigned status = c.predict(c.state.data(), u);
+      EXPECT_EQ(status, 0u);
+    }
+    const auto mine = in_double.update(y * options.y.unit, u * options.u.unit);
+    const unsigned its = c.update(c.state.data(), y, u);
+    EXPECT_EQ(its, static_cast<unsigned>(mine)) << k;
+    bridged += its == 8;
+    restarted += its == 16;
+    for (unsigned row = 0; row < 3; ++row) {
+      const double unit =
+          made.written.estimates[row][row] * std::ldexp(1.0, -made.written.scale[row]);
+      const double wanted = row == 0   ? in_double.estimate<0>()
+                            : row == 1 ? in_double.estimate<1>()
+                                       : in_double.estimate<2>();
+      const FixedBound& bound = made.estimates[row];
+      EXPECT_NEAR(c.estimate(c.state.data(), row) * unit, wanted,
+                  2 * (bound.deviation + bound.by_gains))
+          << k << ", " << row;
+    }
+    if (testing::Test::HasFailure()) return;
+  }
+  EXPECT_GT(bridged, 100);
+  EXPECT_GT(restarted, 50);
+  EXPECT_EQ(c.update(c.state.data(), 2049, 0), 1u);
+  EXPECT_EQ(c.update(c.state.data(), 0, 1001), 2u | 8u);
+}
+
+/// A counter that wraps shows in no estimate.
+TEST(FixedPoint, ACounterWraps) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  FixedPointOptions options = counter();
+  options.y.counter_bits = 12;
+  const auto made = to_fixed_c(observer<LinearEso<2>>(100, 1e-3), options).value();
+  const Folder folder;
+  FixedInC<std::uint16_t> c(folder, made.code);
+  ASSERT_TRUE(c.loaded());
+  const double unit = made.written.estimates[1][1] * std::ldexp(1.0, -made.written.scale[1]);
+  const double d_unit = made.written.estimates[2][2] * std::ldexp(1.0, -made.written.scale[2]);
+  unsigned at = 4000;
+  EXPECT_EQ(c.reset(c.state.data(), static_cast<std::uint16_t>(at)), 0u);
+  for (int k = 0; k < 3000; ++k) {
+    at = (at + 25) % 4096;
+    if (k % 100 == 99) {  // samples are lost, also while it wraps
+      for (int i = 0; i < 4; ++i) {
+        EXPECT_EQ(c.predict(c.state.data(), 0), 0u);
+        at = (at + 25) % 4096;
+      }
+    }
+    const unsigned status = c.update(c.state.data(), static_cast<std::uint16_t>(at), 0);
+    EXPECT_EQ(status, k % 100 == 99 ? 8u : 0u) << k;
+    if (k < 300) continue;
+    EXPECT_NEAR(c.estimate(c.state.data(), 1) * unit, 25 * options.y.unit * 1000, 1e-3) << k;
+    EXPECT_NEAR(c.estimate(c.state.data(), 2) * d_unit, 0, 0.1) << k;
+  }
+  // Faster than declared is no measurement.
+  EXPECT_EQ(c.update(c.state.data(), static_cast<std::uint16_t>((at + 40) % 4096), 0), 1u);
+}
+
+#endif  // ESOKIT_LOADS_C
+
+TEST(FixedPoint, RefusesByName) {
+  EXPECT_EQ(refusal(servo()), "");
+  FixedPointOptions options = servo();
+  options.y.unit = 0;
+  EXPECT_EQ(refusal(options), "y.unit = 0: must be finite and positive");
+  options = servo();
+  options.y.most = 0;
+  EXPECT_EQ(refusal(options), "y.most = 0: must be 1 .. 2^24");
+  options = servo();
+  options.u.most = 1 << 25;
+  EXPECT_EQ(refusal(options), "u.most = 3.35544e+07: must be 1 .. 2^24");
+  options = servo();
+  options.u.counter_bits = 8;
+  EXPECT_EQ(refusal(options), "u.counter_bits = 8: must be 0: u is no counter");
+  options = counter();
+  options.y.counter_bits = 17;
+  EXPECT_EQ(refusal(options), "y.counter_bits = 17: must be 2 .. 16, or 0");
+  options.y.counter_bits = 5;
+  EXPECT_EQ(refusal(options).substr(0, 12), "y.most = 30:");
+  options = servo(24);
+  EXPECT_EQ(refusal(options), "innovation_bits = 24: must be 16 or 32");
+  // A bound above what is allowed says what would do.
+  options = servo(16);
+  options.most_deviation = {0, 0, 0.5};
+  const std::string text = refusal(options);
+  EXPECT_EQ(text.substr(0, 18), "most_deviation[2] ");
+  EXPECT_NE(text.find("32 bits of innovation_bits"), std::string::npos) << text;
+  EXPECT_NE(text.find("allowed is 0.5"), std::string::npos) << text;
+  options.innovation_bits = 32;
+  EXPECT_EQ(refusal(options), "");
+}
+
+/// Rounding and what is left over come in where the bound needs them.
+TEST(FixedPoint, TakesWhatTheBoundNeeds) {
+  const auto made = [](double most) {
+    FixedPointOptions options = servo();
+    options.most_deviation = {0, 0, most};
+    return to_fixed_c(observer<LinearEso<2>>(100, 1e-3), options);
+  };
+  const double floors = made(0)->estimates[2].deviation;
+  const double rounds = made(0.99 * floors)->estimates[2].deviation;
+  const double keeps = made(0.99 * rounds)->estimates[2].deviation;
+  EXPECT_LT(rounds, floors);
+  EXPECT_LT(keeps, rounds);
+  EXPECT_FALSE(made(1e-9));
+}
+
+TEST(FixedPoint, RefusesWhatIsNotLinear) {
+  AdjustableBandwidthEso<2>::Config config{};
+  config.observer_bandwidth = 100;
+  config.sample_time = 1e-3;
+  config.input_gain = 50;
+  config.max_gap = 2;
+  config.bandwidth_ratio = 0.5;
+  const auto code = to_fixed_c(AdjustableBandwidthEso<2>::make(config).value(), servo());
+  ASSERT_FALSE(code);
+  EXPECT_STREQ(code.error().field, "observer");
+}
+
+}  // namespace target_fixed_point_test
+}  // namespace esokit_test
