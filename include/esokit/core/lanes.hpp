@@ -142,6 +142,7 @@ struct LaneAccess {
         }
       }();
       static_assert(count <= 17, "esokit: a class of more data members needs more bindings here");
+/// @cond
 #define ESOKIT_BIND(number, ...)   \
   if constexpr (count == number) { \
     auto& [__VA_ARGS__] = object;  \
@@ -165,6 +166,7 @@ struct LaneAccess {
       ESOKIT_BIND(16, a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p)
       ESOKIT_BIND(17, a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q)
 #undef ESOKIT_BIND
+      /// @endcond
     }
   }
   /// Not constrained friend templates: Clang 16 takes their constraints for those of another

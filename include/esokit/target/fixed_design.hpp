@@ -34,6 +34,7 @@ struct FixedPointOptions {
   CountedSignal y{};         ///< the measurement
   CountedSignal u{};         ///< what the actuator held
   int innovation_bits = 32;  ///< 16 (fewer instructions) or 32
+
   /// For each estimate what rounding may do at most, in its unit; not given or zero: what half a
   /// count of y does.
   std::vector<double> most_deviation{};

@@ -33,6 +33,7 @@ struct CodeOptions {
   std::string comment{};            ///< at the head: which machine, which design; no marks of a
                                     ///< comment
   int self_test_samples = 100;      ///< samples of the self-test, 1 .. 10000
+
   /// Gains, those of the law, and limits in a struct that can be changed while it runs, instead of
   /// constants: in C, for gains that do not depend on the innovation or the time.
   bool settings_in_struct = false;
