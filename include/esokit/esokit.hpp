@@ -188,6 +188,7 @@
 #include <esokit/target/fixed_text.hpp>
 #include <esokit/target/integer_list.hpp>
 #include <esokit/target/list_writer.hpp>
+#include <esokit/target/profile_code.hpp>
 #include <esokit/target/recorded_design.hpp>
 #include <esokit/target/recorder.hpp>
 #include <esokit/target/structured_text.hpp>

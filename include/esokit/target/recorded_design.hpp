@@ -198,7 +198,7 @@ struct RecordAccess {
       std::erase_if(found, [last](const auto& one) { return one.first == last; });
       if constexpr (requires { c.law_; }) {
         take(c.law_, "law");
-        take(c.fast_law_, "law");
+        take(c.weights_, "law");
       }
       if constexpr (requires { c.gain_; }) take(c.gain_, "law");
       find_settings(c.observer(), found);
