@@ -184,9 +184,7 @@ class ControlLoop {
 
   /// What the actuator held since the last step, if it was not the last output: before the step.
   /// A u that is not finite changes nothing.
-  void applied(S u) noexcept {
-    limiter_.track(select(is_finite(u), u, limiter_.last()));
-  }
+  void applied(S u) noexcept { limiter_.track(select(is_finite(u), u, limiter_.last())); }
 
   /// One sample: the observer's update, then the law.
   /// @param measured measurement at sample k, NaN if missing
