@@ -177,12 +177,12 @@ struct RecordAccess {
   template <class Loop>
   static LoopRules rules(const Loop& loop) noexcept {
     return {loop.hold_left_,
-            loop.missing_limit_,
-            loop.divider_,
-            loop.has_safe_input_,
-            loop.stay_safe_,
-            static_cast<double>(loop.hold_input_),
-            static_cast<double>(loop.safe_input_)};
+            loop.set_.missing_limit,
+            loop.set_.divider,
+            loop.set_.has_safe_input,
+            loop.set_.stay_safe,
+            static_cast<double>(loop.set_.hold_input),
+            static_cast<double>(loop.set_.safe_input)};
   }
 
   /// Gains, those of the law, and limits, with the beginning of their names. @param c a controller
