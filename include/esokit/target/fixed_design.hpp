@@ -345,6 +345,23 @@ class FixedDesign {
       return refuse("observer", design_->gate.threshold,
                     "is in OutlierGate, which is not written in fixed point");
     }
+    if (design_->law.kind != RunningLaw::none) {
+      return refuse("observer", 0,
+                    "has a gain that goes on at each sample: not written in fixed point");
+    }
+    if (design_->wrap.period > 0) {
+      return refuse("period", design_->wrap.period,
+                    "of WrappedOutput is not written in fixed point: give y with counter_bits");
+    }
+    if (design_->predictive) {
+      return refuse("controller", 0, "is PredictiveAdrc, which is not written in fixed point");
+    }
+    if (design_->guard.on) {
+      return refuse("observer", 0, "is in Guarded, which is not written in fixed point");
+    }
+    if (design_->options.settings_in_struct) {
+      return refuse("settings_in_struct", 1, "is not written in fixed point");
+    }
     if (design_->loop.divider > 1) {
       return refuse("measurement_divider", design_->loop.divider, "must be 1 in fixed point");
     }
