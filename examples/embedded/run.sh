@@ -249,7 +249,7 @@ check_links() {
 
 host_run() {
   mkdir -p "$out/written" &&
-    build firmware-host firmware_exact drive compare_runs write_c &&
+    build firmware-host firmware_exact drive compare_runs write_c fixed_bounds &&
     "$(image firmware-host write_c)" "$out/written" &&
     "$(image firmware-host firmware_exact)" >"$out/host.txt" </dev/null &&
     "$(image firmware-host drive)" >"$out/host-drive.txt" </dev/null
@@ -416,6 +416,11 @@ done
       "$(value "$runs" count eso_fixed 3) | $(value "$runs" count eso_fixed16 3) |" \
       "$(written_bytes "$core" loop_fixed) | $(value "$runs" size loop_fixed 3) | $(value "$runs" count loop_fixed 3) |"
   done
+  echo
+  echo "**What rounding does at most** to the disturbance of \`LinearEso<2>\`, as a share of what half a count" \
+    "of y does"
+  echo
+  "$(image firmware-host fixed_bounds)"
 } >"$out/table.md"
 cat "$out/table.md"
 echo
