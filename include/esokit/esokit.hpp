@@ -47,7 +47,6 @@
 #include <esokit/control/pid_conversion.hpp>
 #include <esokit/control/predictive_adrc.hpp>
 #include <esokit/control/reference.hpp>
-#include <esokit/control/scaled_law.hpp>
 #include <esokit/control/smooth_profile.hpp>
 #include <esokit/control/softening.hpp>
 #include <esokit/control/telemetry.hpp>
@@ -189,6 +188,7 @@
 #include <esokit/target/fixed_text.hpp>
 #include <esokit/target/integer_list.hpp>
 #include <esokit/target/list_writer.hpp>
+#include <esokit/target/profile_code.hpp>
 #include <esokit/target/recorded_design.hpp>
 #include <esokit/target/recorder.hpp>
 #include <esokit/target/structured_text.hpp>

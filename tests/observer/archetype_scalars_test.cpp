@@ -120,8 +120,7 @@ struct ThreeBytes {
 static_assert(sizeof(ThreeBytes) == 3 && alignof(ThreeBytes) == 1);
 static_assert(esokit::Scalar<ThreeBytes>);
 
-using esokit::detail::TiedField;
-using esokit::detail::TiedFields;
+using esokit::detail::LaneAccess;
 
 /// Bytes of the scalars in an object.
 template <class T>
@@ -134,12 +133,9 @@ std::size_t scalars_in(const T& object) {
     return sum;
   } else if constexpr (std::is_empty_v<T>) {
     return 0;
-  } else if constexpr (esokit::detail::LaneAccess::has_fields<T>) {
-    const auto sum =
-        []<int... I, class... F>(const TiedFields<std::integer_sequence<int, I...>, F...>& fields) {
-      return (scalars_in(static_cast<const TiedField<I, F>&>(fields).field) + ...);
-    };
-    return sum(esokit::detail::LaneAccess::fields(object));
+  } else if constexpr (LaneAccess::has_members<T>) {
+    return LaneAccess::with_members(
+        object, [](const auto&... member) { return (scalars_in(member) + ...); });
   } else {
     return 0;
   }
@@ -149,18 +145,15 @@ void expect_numbers_only(const T& object = esokit::detail::blank<T>()) {
   EXPECT_EQ(scalars_in(object), sizeof(T));
 }
 
-template <class T>
-const T& first(const TiedField<0, T>& fields) {
-  return fields.field;
-}
 /// What a good sample of an observer writes.
 template <class Observer>
 void expect_that_samples_write_numbers() {
   const auto observer = esokit::detail::blank<Observer>();
   EXPECT_LT(scalars_in(observer), sizeof observer);  // it counts gaps
-  const auto& kept = first(esokit::detail::LaneAccess::fields(observer));
-  EXPECT_GE(scalars_in(kept), 3 * (Observer::levels * Observer::size + 2));
-  expect_numbers_only(kept);
+  LaneAccess::with_members(observer, [](const auto& kept, const auto&...) {
+    EXPECT_GE(scalars_in(kept), 3 * (Observer::levels * Observer::size + 2));
+    expect_numbers_only(kept);
+  });
 }
 
 TEST(ThreeBytes, AreAllThatASampleWrites) {

@@ -1,10 +1,12 @@
 // The shell of the named observers, by an observer that is written here: what its `design` is
 // asked, when, and what becomes of the answer.
 #include <gtest/gtest.h>
-#include <esokit/sim/continuous_observer.hpp>
 
+#include <cmath>
+#include <esokit/gain/switched_gain.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/observer/named_observer.hpp>
+#include <esokit/sim/continuous_observer.hpp>
 #include <limits>
 #include <support/refusal.hpp>
 
@@ -39,6 +41,32 @@ class HertzEso
   static auto design(const Config& config, const typename Shell::PlantModel& model) {
     constexpr S turn = S(6.283185307179586);
     return Shell::Law::make("hertz", S(turn * config.hertz), model);
+  }
+};
+
+/// Of a law that remembers the last innovation.
+class TwoSpeeds
+    : public NamedObserver<TwoSpeeds,
+                           PredictorCorrector<1, double, 1, esokit::SwitchedGain<2, double>>> {
+  using Shell = NamedObserver;
+  friend Shell;
+  using Shell::Shell;
+
+ public:
+  struct Config {
+    double slow{};
+    double fast{};
+    double input_gain{};
+    double sample_time{};
+    int max_gap = 100;
+  };
+
+ private:
+  static Expected<Law, Error<double>> design(const Config& config, const PlantModel& model) {
+    const auto slow = Law::Set::make("slow", config.slow, model);
+    const auto fast = Law::Set::make("fast", config.fast, model);
+    if (!slow || !fast) return slow ? fast.error() : slow.error();
+    return Law(*slow, *fast);
   }
 };
 
@@ -106,6 +134,22 @@ TEST(NamedObserver, RefusesWhatItsDesignRefuses) {
 }
 
 /// Of a cascade `design` gives all levels.
+/// The observer says nothing of it: the law declares that it continues.
+TEST(NamedObserver, KeepsTheMemoryOfItsLawInARetune) {
+  const TwoSpeeds::Config config{.slow = 5, .fast = 40, .input_gain = 1, .sample_time = 0.01};
+  auto kept = TwoSpeeds::make(config).value();
+  auto changed = kept;
+  for (int k = 0; k < 200; ++k) {
+    // At every sample: if the memory were lost, the next one would count as shrinking.
+    ASSERT_TRUE(changed.retune(config));
+    const double y = std::sin(0.1 * k);
+    kept.update(y, 0.5);
+    changed.update(y, 0.5);
+    ASSERT_EQ(kept.estimate()(0), changed.estimate()(0)) << k;
+    ASSERT_EQ(kept.estimate()(1), changed.estimate()(1)) << k;
+  }
+}
+
 TEST(NamedObserver, TakesTheLawsOfAllLevels) {
   const auto twin = TwinEso::make({.observer_bandwidth = 10, .input_gain = 2}).value();
   TwinEso::State z = TwinEso::State::Zero();

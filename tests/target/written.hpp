@@ -40,6 +40,10 @@ auto observer_config(double input_gain) {
   if constexpr (requires { config.observer; }) {
     config.observer = observer_config<typename Observer::Adapted>(input_gain);
     if constexpr (requires { config.delay; }) config.delay = 3;
+    if constexpr (requires { config.disturbance_bound; }) {
+      config.disturbance_bound = V(1.5);
+      config.leak_time = V(2);
+    }
     if constexpr (requires { config.period; }) config.period = V(2.5);
     if constexpr (requires { config.threshold; }) {
       config.threshold = V(0.05);
@@ -144,27 +148,62 @@ inline bool there(const std::string& program) {
 
 inline constexpr const char* strict = " -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror ";
 
-/// The compiled C of a controller.
+/// Compiled and loaded C, with what a test adds to it.
+class Library {
+ public:
+  Library(const Folder& folder, const CCode& code, const std::string& more,
+          const std::string& compiler = "gcc -std=c99") {
+    folder.write("loop.h", code.header);
+    folder.write("loop.c", code.source);
+    folder.write("probe.c", "#include \"loop.h\"\n" + more);
+    const std::string out = folder.file("loop" + std::to_string(count++) + ".so");
+    if (!runs(compiler + " -O2 -shared -fPIC -DLOOP_SELF_TEST" + std::string(strict) + "-o " + out +
+              " " + folder.file("loop.c") + " " + folder.file("probe.c") + " -lm")) {
+      return;
+    }
+    handle_ = dlopen(out.c_str(), RTLD_NOW | RTLD_LOCAL);
+  }
+  ~Library() {
+    if (handle_ != nullptr) dlclose(handle_);
+  }
+  Library(const Library&) = delete;
+  Library& operator=(const Library&) = delete;
+
+  [[nodiscard]] bool loaded() const { return handle_ != nullptr; }
+  [[nodiscard]] bool has(const char* name) const {
+    return loaded() && dlsym(handle_, name) != nullptr;
+  }
+  template <class F>
+  void find(F& function, const char* name) const {
+    ASSERT_TRUE(has(name)) << name;
+    if constexpr (std::is_same_v<F, const void*>) {
+      function = dlsym(handle_, name);
+    } else {
+      function = reinterpret_cast<F>(dlsym(handle_, name));
+    }
+  }
+
+ private:
+  static inline int count = 0;
+  void* handle_ = nullptr;
+};
+
+/// The compiled C of a controller or an observer.
 template <class V>
 class InC {
  public:
   InC(const Folder& folder, const CCode& code, bool is_controller,
-      const std::string& compiler = "gcc -std=c99") {
-    folder.write("loop.h", code.header);
-    folder.write("loop.c", code.source);
-    folder.write("probe.c", std::string("#include \"loop.h\"\n"
-                                        "unsigned loop_size(void);\n"
-                                        "unsigned loop_size(void) { return sizeof(loop_state); }\n"
-                                        "unsigned loop_probe(const loop_state *o);\n"
-                                        "unsigned loop_probe(const loop_state *o) { return ") +
-                                (is_controller ? "o->status + 256u * o->mode + " : "") +
-                                "65536u * o->gap; }\n");
-    const std::string out = folder.file("loop" + std::to_string(count++) + ".so");
-    built_ = runs(compiler + " -O2 -shared -fPIC -DLOOP_SELF_TEST" + std::string(strict) + "-o " +
-                  out + " " + folder.file("loop.c") + " " + folder.file("probe.c") + " -lm");
-    if (!built_) return;
-    handle_ = dlopen(out.c_str(), RTLD_NOW | RTLD_LOCAL);
-    if (handle_ == nullptr) return;
+      const std::string& compiler = "gcc -std=c99")
+      : library_(folder, code,
+                 std::string("unsigned loop_size(void);\n"
+                             "unsigned loop_size(void) { return sizeof(loop_state); }\n"
+                             "unsigned loop_probe(const loop_state *o);\n"
+                             "unsigned loop_probe(const loop_state *o) { return ") +
+                     (is_controller ? "o->status + 256u * o->mode + " : "") +
+                     "65536u * o->gap; }\n",
+                 compiler) {
+    if (!loaded()) return;
+    const auto find = [this](auto& function, const char* name) { library_.find(function, name); };
     find(init_, "loop_init");
     find(update_, "loop_update");
     find(estimate_, "loop_estimate");
@@ -180,20 +219,17 @@ class InC {
       find(correct_, "loop_correct");
       find(reset_, "loop_reset");
     }
+    if (library_.has("loop_set_trust")) find(trust_, "loop_set_trust");
     unsigned (*bytes)() = nullptr;
     find(bytes, "loop_size");
     state_.resize(bytes() / sizeof(std::uint64_t) + 1);
     init_(state_.data());
   }
-  ~InC() {
-    if (handle_ != nullptr) dlclose(handle_);
-  }
-  InC(const InC&) = delete;
-  InC& operator=(const InC&) = delete;
 
-  [[nodiscard]] bool loaded() const { return handle_ != nullptr; }
+  [[nodiscard]] bool loaded() const { return library_.loaded(); }
   V update(V y, V r) { return update_(state_.data(), y, r); }
   V miss(V r) { return miss_(state_.data(), r); }
+  void set_trust(V trust) { trust_(state_.data(), trust); }
   void applied(V u) { applied_(state_.data(), u); }
   unsigned start(V y, V u) { return start_(state_.data(), y, u); }
   unsigned observe(V y, V u) { return observe_(state_.data(), y, u); }
@@ -206,21 +242,14 @@ class InC {
   int self_test(V tolerance) { return self_test_(tolerance); }
 
  private:
-  template <class F>
-  void find(F& function, const char* name) {
-    function = reinterpret_cast<F>(dlsym(handle_, name));
-    ASSERT_NE(function, nullptr) << name;
-  }
-
-  static inline int count = 0;
-  bool built_ = false;
-  void* handle_ = nullptr;
+  Library library_;
   std::vector<std::uint64_t> state_;
   void (*init_)(void*) = nullptr;
   unsigned (*start_)(void*, V, V) = nullptr;
   V (*update_)(void*, V, V) = nullptr;
   V (*miss_)(void*, V) = nullptr;
   void (*applied_)(void*, V) = nullptr;
+  void (*trust_)(void*, V) = nullptr;
   unsigned (*observe_)(void*, V, V) = nullptr;
   unsigned (*predict_)(void*, V) = nullptr;
   unsigned (*correct_)(void*, V) = nullptr;
@@ -270,6 +299,13 @@ Seen compare(const C& fresh, InC<typename C::scalar_type>& in_c, double input_ga
     if (random.index(200) == 0) lost = runs[random.index(7)];
     if (lost > 0 || random.index(300) == 0) y = hidden_nan<V>();
     if (random.index(150) == 0) y = anything<V>(random);
+    if constexpr (requires { controller.observer().set_trust(y); }) {
+      if (random.index(50) == 0) {
+        const V trust = random.index(2) == 0 ? V(1) : static_cast<V>(random.uniform(-0.2, 1.2));
+        controller.observer().set_trust(trust);
+        in_c.set_trust(trust);
+      }
+    }
     V given = r;
     if constexpr (!requires { controller.gains(); }) given = (r - y) / static_cast<V>(input_gain);
     if (random.index(400) == 0) given = anything<V>(random);

@@ -263,6 +263,7 @@ class Guarded : public NamedAdapter<Guarded<Observer>, Observer, GuardedConfig<O
       "with an AugmentedModel of one constant, without first-order parts or a varying speed");
   using Base = NamedAdapter<Guarded, Observer, GuardedConfig<Observer>>;
   friend Base;
+  friend struct detail::RecordAccess;
   using Base::observer_;
   using S = typename Observer::scalar_type;
   static constexpr int n = Observer::order;

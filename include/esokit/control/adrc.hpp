@@ -6,8 +6,8 @@
 #include <esokit/control/adrc_law.hpp>
 #include <esokit/control/control_loop.hpp>
 #include <esokit/control/controller.hpp>
-#include <esokit/control/scaled_law.hpp>
 #include <esokit/control/softening.hpp>
+#include <esokit/core/kernels.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/gain/feedback_gain.hpp>
 #include <type_traits>
@@ -107,15 +107,15 @@ class Adrc {
     if (!observer) return observer.error();
     const auto law = make_law(config, *observer);
     if (!law) return law.error();
-    const auto scaled = FastLaw::make(*law, *observer);
-    if (!scaled) return scaled.error();
+    const auto weights = scaled(*law, *observer);
+    if (!weights) return weights.error();
     const auto soft = Soft::make(*law, config.limits, config.soften);
     if (!soft) return soft.error();
     const auto loop = Loop::make(
         *observer, {config.limits, config.start_hold, config.missing, config.measurement_divider},
         soft->on());
     if (!loop) return loop.error();
-    return Adrc(*loop, *law, *scaled, *soft, config);
+    return Adrc(*loop, *law, *weights, *soft, config);
   }
 
   /// One sample. @param y measurement, NaN if missing
@@ -209,7 +209,7 @@ class Adrc {
   Check<S> adopt(const Adrc& fresh) {
     if (auto ok = loop_.adopt(fresh.loop_); !ok) return ok;
     law_ = fresh.law_;
-    fast_law_ = fresh.fast_law_;
+    weights_ = fresh.weights_;
     soft_.adopt(fresh.soft_);
     spec_ = fresh.spec_;
     return {};
@@ -271,21 +271,17 @@ class Adrc {
 
   using Loop = ControlLoop<Observer>;
   using Law = AdrcLaw<order, S>;
-  using FastLaw = std::conditional_t<observer_traits<Observer>.publishes_chain, ScaledLaw<order, S>,
-                                     NoScaledLaw>;
+  struct Nothing {};
+  /// For a constant reference: w_i = k_i i! / (T^i b0) and w_n = n! / (T^n b0), a third of the
+  /// multiplications of the law on physical estimates.
+  static constexpr bool scales = observer_traits<Observer>.publishes_chain;
+  using Weights = std::conditional_t<scales, Array<S, order + 1>, Nothing>;
   using Soft = Softening<order, S>;
   /// u for a reference, as ControlLoop asks for it.
   template <class Given>
-  struct Asked {
-    ESOKIT_INLINE S operator()() const noexcept { return controller.command(reference); }
-    S in_general() const noexcept { return controller.judged(reference); }
-
-    Adrc& controller;
-    const Given& reference;
-  };
-  template <class Given>
-  ESOKIT_INLINE Asked<Given> asked(const Given& given) noexcept {
-    return {*this, given};
+  ESOKIT_INLINE auto asked(const Given& reference) noexcept {
+    return [this, &reference](bool special)
+               ESOKIT_INLINE_LAMBDA { return special ? judged(reference) : command(reference); };
   }
   struct NoSpec {
     constexpr NoSpec() = default;
@@ -294,9 +290,9 @@ class Adrc {
   static constexpr bool has_step_time = observer_traits<Observer>.varies_time;
   static constexpr bool wraps = observer_traits<Observer>.wraps_output;
 
-  Adrc(const Loop& loop, const Law& law, const FastLaw& fast_law, const Soft& soft,
+  Adrc(const Loop& loop, const Law& law, const Weights& weights, const Soft& soft,
        const Config& config) noexcept
-      : loop_(loop), law_(law), fast_law_(fast_law), soft_(soft), spec_(spec(config)) {}
+      : loop_(loop), law_(law), weights_(weights), soft_(soft), spec_(spec(config)) {}
 
   static FeedbackSpec<S> spec(const Config& config) noexcept {
     return {config.controller_bandwidth, config.domain, config.half_gain};
@@ -308,6 +304,24 @@ class Adrc {
     if constexpr (error_based)
       chain_config<Observer>(observer).input_gain = -chain_config<Observer>(observer).input_gain;
     return observer;
+  }
+
+  static Expected<Weights, Error<S>> scaled(const Law& law, const Observer& observer) {
+    Weights weights{};
+    if constexpr (scales) {
+      const S rate = S(1) / observer.sample_time();
+      S unit = S(1) / law.input_gain();
+      for (int i = 0; i <= order; ++i) {
+        if (i > 0) unit = unit * (static_cast<S>(i) * rate);
+        const auto row = static_cast<std::size_t>(i);
+        weights[row] = i < order ? law.gains()[row] * unit : unit;
+        if (!is_finite(weights[row])) {
+          return Error<S>{"sample_time", observer.sample_time(),
+                          "with these gains gives a law that the scalar cannot hold"};
+        }
+      }
+    }
+    return weights;
   }
 
   static Expected<Law, Error<S>> make_law(const Config& config, const Observer& observer) {
@@ -345,17 +359,20 @@ class Adrc {
   /// A sample, for a constant and for a moving reference.
   template <class Given>
   S stepped(S y, Given reference) noexcept {
-    return loop_.step(y, asked(reference));
+    return loop_.step(y, loop_.output(), asked(reference));
   }
 
   [[nodiscard]] ESOKIT_INLINE S command(S reference) const noexcept {
-    if constexpr (observer_traits<Observer>.publishes_chain) {
+    if constexpr (scales) {
+      // Apart from the first term, so that both are computed in parallel.
+      const S rest = detail::weighed_estimates<1, order>(weights_, observer());
+      const S x = observer().template scaled_estimate<0>();
       if constexpr (error_based) {
-        return detail::by_present_gain(observer(), fast_law_.control_error_based(observer()));
+        return detail::by_present_gain(observer(), S(weights_[0] * x + rest));
       } else {
-        S error = reference - observer().template scaled_estimate<0>();
+        S error = reference - x;
         if constexpr (wraps) error = observer().wrap(error);
-        return detail::by_present_gain(observer(), fast_law_.control(observer(), error));
+        return detail::by_present_gain(observer(), S(weights_[0] * error - rest));
       }
     } else {
       return command(Reference(reference).all());
@@ -415,8 +432,8 @@ class Adrc {
   requires(detail::LaneAccess::steps<O>) S update_advanced(S y, const Reference& reference)
   noexcept {
     y = measured(y, reference(0));
-    return reference.moves() ? loop_.step_advanced(y, asked(reference.all()))
-                             : loop_.step_advanced(y, asked(reference(0)));
+    return reference.moves() ? loop_.template step<true>(y, loop_.output(), asked(reference.all()))
+                             : loop_.template step<true>(y, loop_.output(), asked(reference(0)));
   }
   /// @}
 
@@ -430,7 +447,7 @@ class Adrc {
 
   Loop loop_;
   Law law_;
-  [[no_unique_address]] FastLaw fast_law_;
+  [[no_unique_address]] Weights weights_;
   Soft soft_;
   [[no_unique_address]] std::conditional_t<has_step_time, FeedbackSpec<S>, NoSpec> spec_;
 };

@@ -146,7 +146,7 @@ class ControlLoop {
 
   /// Checks the settings.
   /// @param observer as returned by its `make`
-  /// @param watched the law is asked by its `in_general` at every sample
+  /// @param watched the law is told at every sample that something is special
   /// @return the loop, with the observer in its present state, or an error that names the field
   static Expected<ControlLoop, Error<S>> make(const Observer& observer,
                                               const LoopSettings<S>& settings,
@@ -165,16 +165,6 @@ class ControlLoop {
     return ControlLoop(observer, checked->limiter, settings, checked->hold_samples, watched);
   }
 
-  /// One sample: the observer's update with the last output of this loop, then the law.
-  /// @param measured measurement at sample k, NaN if missing
-  /// @param law () -> S, the requested u, computed from the new estimate. If it also has
-  ///        `in_general`, this is called instead in samples in which something is special
-  /// @return u for k .. k+1
-  template <class Law>
-  ESOKIT_INLINE S step(S measured, Law&& law) noexcept {
-    return step_driven(measured, limiter_.last(), law);
-  }
-
   /// @cond
   /// For packs: whether no lane needs more than the observer's step and the law; then this step. A
   /// template, as an explicit instantiation would ask it of every observer.
@@ -187,31 +177,27 @@ class ControlLoop {
   ESOKIT_INLINE bool step_all(S& u, const S& measured, Law&& law) noexcept {
     if (!detail::LaneAccess::step(observer_, measured, limiter_.last())) return false;
     status_ = StepStatus::ok;
-    u = limited(special_ == false ? law() : asked(law));
+    u = limited(law(!(special_ == false)));
     return true;
-  }
-  /// Of a lane: `step` after `advance`.
-  template <class Law>
-  S step_advanced(S measured, Law&& law) noexcept {
-    return step_driven<true>(measured, limiter_.last(), law);
   }
   /// @endcond
 
   /// What the actuator held since the last step, if it was not the last output: before the step.
   /// A u that is not finite changes nothing.
   void applied(S u) noexcept {
-    if constexpr (PackScalar<S>) {
-      limiter_.track(select(is_finite(u), u, limiter_.last()));
-    } else {
-      if (is_finite(u)) [[likely]]
-        limiter_.track(u);
-    }
+    limiter_.track(select(is_finite(u), u, limiter_.last()));
   }
 
-  /// The same if something other than u drives the observer's chain.
-  /// @param drive what drove the chain from k - 1 to k, in place of u
+  /// One sample: the observer's update, then the law.
+  /// @param measured measurement at sample k, NaN if missing
+  /// @param drive what drove the observer's chain from k - 1 to k: the last output of this loop,
+  ///        unless something other than u does
+  /// @param law (bool) -> S, the requested u, computed from the new estimate. True in samples in
+  ///        which something is special
+  /// @tparam Advanced of a lane, after `advance`
+  /// @return u for k .. k+1
   template <bool Advanced = false, class Law>
-  ESOKIT_INLINE S step_driven(S measured, S drive, Law&& law) noexcept {
+  ESOKIT_INLINE S step(S measured, S drive, Law&& law) noexcept {
     if constexpr (records<S>) {
       S u{};
       if (!advance()) (void)measured[0];  // a mode, or a divider: branches
@@ -228,7 +214,7 @@ class ControlLoop {
         after_trouble(measured);
         return put_out(law);
       }
-      return limited(law());
+      return limited(law(false));
     }
   }
 
@@ -362,17 +348,8 @@ class ControlLoop {
   }
 
   template <class Law>
-  static S asked(Law& law) noexcept {
-    if constexpr (requires { law.in_general(); }) {
-      return law.in_general();
-    } else {
-      return law();
-    }
-  }
-
-  template <class Law>
   S put_out(Law&& law) noexcept {
-    return limited(mode_ == LoopMode::running ? S(asked(law)) : other_output());
+    return limited(mode_ == LoopMode::running ? S(law(true)) : other_output());
   }
 
   ESOKIT_INLINE S limited(S wanted) noexcept {

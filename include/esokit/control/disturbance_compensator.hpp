@@ -82,7 +82,7 @@ class DisturbanceCompensator {
   /// One sample. @param y measurement, NaN if missing @param base_output u0 of the wrapped
   /// controller @return u to be held until the next sample, within the limits
   S update(S y, S base_output) noexcept {
-    return loop_.step(y, [&]() ESOKIT_INLINE_LAMBDA { return command(base_output); });
+    return loop_.step(y, loop_.output(), asked(base_output));
   }
 
   /// What the actuator held since the last sample, if it was not the last output: say it before
@@ -97,7 +97,7 @@ class DisturbanceCompensator {
   /// @param drive what drove the equation since the last sample in place of u, in units of y^(n) /
   /// b0
   S update_driven(S y, S base_output, S drive) noexcept {
-    return loop_.step_driven(y, drive, [&] { return command(base_output); });
+    return loop_.step(y, drive, asked(base_output));
   }
 
   /// w[k], before the sample in which it is first used; for an observer that is Measured.
@@ -109,7 +109,7 @@ class DisturbanceCompensator {
 
   /// One sample whose measurement is missing.
   S update_without_measurement(S base_output) noexcept {
-    return loop_.step_without_measurement([&] { return command(base_output); });
+    return loop_.step_without_measurement(asked(base_output));
   }
 
   /// Without compensation: the observer runs while u comes from elsewhere.
@@ -196,13 +196,11 @@ class DisturbanceCompensator {
   template <class O = Observer>
   requires(detail::LaneAccess::steps<O>) ESOKIT_INLINE
       bool step(S& u, const S& y, const S& base_output) noexcept {
-    return loop_.step_all(u, y, [&]() ESOKIT_INLINE_LAMBDA { return command(base_output); });
+    return loop_.step_all(u, y, asked(base_output));
   }
   template <class O = Observer>
   requires(detail::LaneAccess::steps<O>) S update_advanced(const S& y, const S& base_output)
-  noexcept {
-    return loop_.step_advanced(y, [&] { return command(base_output); });
-  }
+  noexcept { return loop_.template step<true>(y, loop_.output(), asked(base_output)); }
   /// @}
 
   DisturbanceCompensator(const Loop& loop, S gain) noexcept : loop_(loop), gain_(gain) {}
@@ -215,6 +213,9 @@ class DisturbanceCompensator {
 
   [[nodiscard]] ESOKIT_INLINE S command(S base_output) const noexcept {
     return base_output + unbounded_compensation();
+  }
+  ESOKIT_INLINE auto asked(const S& base_output) const noexcept {
+    return [this, &base_output](bool) ESOKIT_INLINE_LAMBDA { return command(base_output); };
   }
 
   Loop loop_;

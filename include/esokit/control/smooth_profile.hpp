@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <esokit/core/check.hpp>
 #include <esokit/core/expected.hpp>
+#include <esokit/core/lanes.hpp>
 #include <esokit/core/matrix.hpp>
 #include <esokit/core/type_tag.hpp>
 #include <esokit/math/combinatorics.hpp>
@@ -164,7 +165,11 @@ class SmoothProfile {
   }
 
  private:
+  friend struct detail::RecordAccess;
   explicit SmoothProfile(const Config& config) noexcept : config_(config) {}
+
+  /// Longer by more than what rounding adds to the derivatives.
+  static constexpr S longer = S(1) + S(64) * std::numeric_limits<S>::epsilon();
 
   static constexpr S peak(int derivative) noexcept {
     return static_cast<S>(smooth_step_peaks<Order>[static_cast<std::size_t>(derivative - 1)]);
@@ -179,8 +184,6 @@ class SmoothProfile {
 
   /// Begins a move; false, and nothing changes, if it would take too long.
   bool plan(const S& target) noexcept {
-    // Longer by more than what rounding adds to the derivatives.
-    const S longer = S(1) + S(64) * std::numeric_limits<S>::epsilon();
     const S samples = duration(target) / config_.sample_time * longer;
     if (!is_finite(samples) || !(samples < S(1 << 30))) return false;
     const bool stays = !(samples > S(0)) && !(target < target_) && !(target > target_);

@@ -74,31 +74,6 @@ using Lanes = std::conditional_t<lane_count<S> == 1, T, PerLane<T, lane_count<S>
 
 namespace detail {
 
-/// References to fields. Not std::tie: a tuple takes many times as long to compile, and every class
-/// that works with packs has one.
-/// @{
-template <int Index, class T>
-struct TiedField {
-  T& field;
-};
-template <class Indices, class... T>
-struct TiedFields;
-template <int... I, class... T>
-struct TiedFields<std::integer_sequence<int, I...>, T...> : TiedField<I, T>... {};
-template <class... T>
-using Tied = TiedFields<std::make_integer_sequence<int, static_cast<int>(sizeof...(T))>, T...>;
-template <class... T>
-constexpr Tied<T...> tie(T&... fields) noexcept {
-  return {{fields}...};
-}
-/// @}
-
-/// Lane `i` of all fields, see copy_lane.
-template <bool Back, int... I, class... T, class... U>
-constexpr void copy_fields(const TiedFields<std::integer_sequence<int, I...>, T...>& packed,
-                           const TiedFields<std::integer_sequence<int, I...>, U...>& plain,
-                           int i) noexcept;
-
 template <class T>
 struct IsOptional : std::false_type {};
 template <class T>
@@ -141,23 +116,23 @@ struct LaneAccess {
     Object::data_members;
   };
   template <class Object>
-  static constexpr bool has_fields = counts<std::remove_const_t<Object>> ||
-                                     (std::is_aggregate_v<Object> && std::is_class_v<Object> &&
-                                      !requires(Object & object) { object[0]; });
+  static constexpr bool has_members = counts<std::remove_const_t<Object>> ||
+                                      (std::is_aggregate_v<Object> && std::is_class_v<Object> &&
+                                       !requires(Object & object) { object[0]; });
   template <class Object>
   static constexpr bool steps = requires(Object& object) {
     object.advance();
   };
-  /// A tie of all data members.
-  template <class Object>
-  static constexpr auto fields(Object& object) noexcept {
+  /// function(all data members).
+  template <class Object, class Function>
+  ESOKIT_INLINE static constexpr auto with_members(Object& object, const Function& function) {
     using T = std::remove_const_t<Object>;
     if constexpr (adds_rest<Object>) {
       using Base =
           std::conditional_t<std::is_const_v<Object>, const typename T::Base, typename T::Base>;
       static_assert(sizeof(T) == sizeof(WithRest<typename T::Base, decltype(object.rest_)>),
                     "esokit: all data that a class adds to its base belongs to `rest_`");
-      return detail::tie(static_cast<Base&>(object), object.rest_);
+      return function(static_cast<Base&>(object), object.rest_);
     } else {
       constexpr int count = [] {
         if constexpr (counts<T>) {
@@ -167,10 +142,10 @@ struct LaneAccess {
         }
       }();
       static_assert(count <= 17, "esokit: a class of more data members needs more bindings here");
-#define ESOKIT_BIND(number, ...)     \
-  if constexpr (count == number) {   \
-    auto& [__VA_ARGS__] = object;    \
-    return detail::tie(__VA_ARGS__); \
+#define ESOKIT_BIND(number, ...)   \
+  if constexpr (count == number) { \
+    auto& [__VA_ARGS__] = object;  \
+    return function(__VA_ARGS__);  \
   }
       ESOKIT_BIND(1, a)
       ESOKIT_BIND(2, a, b)
@@ -252,22 +227,17 @@ constexpr void copy_lane(Packed& packed, Plain& plain, int i) noexcept {
       (copy_lane<Back>(std::get<K>(packed), std::get<K>(plain), i), ...);
     }
     (std::make_index_sequence<count>{});
-  } else if constexpr (LaneAccess::has_fields<Packed>) {
-    copy_fields<Back>(LaneAccess::fields(packed), LaneAccess::fields(plain), i);
+  } else if constexpr (LaneAccess::has_members<Packed>) {
+    LaneAccess::with_members(packed, [&](auto&... of_packed) ESOKIT_INLINE_LAMBDA {
+      LaneAccess::with_members(plain, [&](auto&... of_plain) ESOKIT_INLINE_LAMBDA {
+        (copy_lane<Back>(of_packed, of_plain, i), ...);
+      });
+    });
   } else if constexpr (Back) {
     packed[i] = plain;
   } else {
     plain = packed[i];
   }
-}
-
-template <bool Back, int... I, class... T, class... U>
-constexpr void copy_fields(const TiedFields<std::integer_sequence<int, I...>, T...>& packed,
-                           const TiedFields<std::integer_sequence<int, I...>, U...>& plain,
-                           int i) noexcept {
-  (copy_lane<Back>(static_cast<const TiedField<I, T>&>(packed).field,
-                   static_cast<const TiedField<I, U>&>(plain).field, i),
-   ...);
 }
 
 /// Lane `i` of `packed` becomes `plain`.

@@ -83,7 +83,7 @@ constexpr auto of_all_lanes(Function&& f) noexcept {
 /// library inherits the form of that one, which does what that one does: the form's plain one has
 /// to be T.
 template <class T, class S>
-concept ComputesPacks = LaneAccess::has_fields<T> && requires {
+concept ComputesPacks = LaneAccess::has_members<T> && requires {
   typename T::template with_scalar<S>;
   requires std::same_as<typename T::template with_scalar<S>::template with_scalar<LaneScalar<S>>,
                         T>;

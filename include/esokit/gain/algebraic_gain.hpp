@@ -49,6 +49,7 @@ class AlgebraicGain {
                                         .advances = true,
                                         .accepts = true,
                                         .resets = true,
+                                        .continues = true,
                                         .bridges_gaps = true};
 
   using scalar_type = S;  ///< type of gains
@@ -118,6 +119,13 @@ class AlgebraicGain {
     anchor(first);
     for (int i = 0; i < Size; ++i) push();
     set_gain();
+  }
+
+  /// Goes to the place of another law in its schedule. A settled one no longer knows its age, and
+  /// stays settled.
+  Check<S> continue_from(const AlgebraicGain& other, const S&) {
+    resume(other.settled_ ? max_index : other.age_);
+    return {};
   }
 
   /// The gain for the whole gap at the bandwidth of this place in the schedule.
@@ -330,8 +338,9 @@ class AlgebraicGain {
   }
   void settle() noexcept {
     settled_ = true;
-    gain_ = current_gain<Size, S>(final_poles_.weights());
+    stand();
   }
+  constexpr void stand() noexcept { gain_ = current_gain<Size, S>(final_poles_.weights()); }
 
   ScaledGain<Size, S> gain_{};
   Array<S, coefficient_count> coefficients_{};

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <concepts>
+#include <esokit/core/check.hpp>
 #include <esokit/core/declared.hpp>
 #include <esokit/core/scalar.hpp>
 #include <esokit/gain/sampled_gain.hpp>
@@ -40,6 +41,11 @@ struct GainLawTraits {
   /// `reset()`: forget all history.
   bool resets = false;
 
+  /// `continue_from(before, time_ratio)`: goes on with the memory of the law `before` that a retune
+  /// replaces (time_ratio = T_new / T_old); an error refuses the retune. Without it the law begins
+  /// anew.
+  bool continues = false;
+
   /// `gap_gain(e, samples) const`: the gain if `samples` (unsigned) > 1 sample times have passed
   /// since the last correction, and `longest_gap(asked) const`: how many missing samples the law
   /// bridges, at most `asked`, so that errors decay in any sequence of gaps; after more the
@@ -72,6 +78,8 @@ concept GainOf = std::convertible_to<Gain, ScaledGain<Size, S>>;
   MISTAKEN(accepts) MISTAKEN(accepted)                                                            \
   HOOK(Resets, resets, reset, { law.reset() } noexcept;)                                          \
   MISTAKEN(resets)                                                                                \
+  HOOK(Continues, continues, continue_from,                                                       \
+       { law.continue_from(fixed, e) } -> std::same_as<Check<S>>;)                                \
   HOOK(BridgesGaps, bridges_gaps, gap_gain,                                                       \
        { fixed.gap_gain(e, 1u) } noexcept -> GainOf<Size, S>;                                     \
        { fixed.longest_gap(1) } noexcept -> std::same_as<int>;)                                   \

@@ -92,8 +92,11 @@ template <int Size, Scalar S, int TableSize = 0, class Transition = PascalTransi
 class RiccatiGain {
  public:
   /// What the law can do besides `gain`.
-  static constexpr GainLawTraits traits{
-      .kind = GainKind::preset, .advances = true, .accepts = true, .resets = true};
+  static constexpr GainLawTraits traits{.kind = GainKind::preset,
+                                        .advances = true,
+                                        .accepts = true,
+                                        .resets = true,
+                                        .continues = true};
 
   using Factor = CovarianceFactor<Size, S>;     ///< P-, scaled
   using Settings = RiccatiSettings<Size, S>;    ///< settings of the constructor
@@ -148,28 +151,16 @@ class RiccatiGain {
   /// One sample ahead: from the corrected covariance, or from the predicted one if there was no
   /// correction.
   ESOKIT_INLINE constexpr void advance() noexcept {
-    if constexpr (PackScalar<S>) {
-      // If all lanes are in the same, usual state, they are processed at once.
-      const int bits = since_[0] & ~watched;
-      if (since_ == since_[0] && bits > standing && (TableSize == 0 || place_ == done)) [[likely]] {
-        note(standing);
-      } else if (since_ == since_[0] && bits == corrected && mode_ == RiccatiMode::recursive &&
-                 rule_ == rule_[0] && rule_[0] != InflationRule::adaptive &&
-                 diagonal_noise_ == diagonal_noise_[0]) {
-        note(0);
-        recur_from_correction();
-      } else {
-        detail::for_each_lane<Plain>(*this, [](Plain& lane) { lane.advance(); });
-      }
+    // If all lanes are in the same, usual state, they are processed at once.
+    const int bits = detail::of_lane(since_, 0) & ~watched;
+    const bool alike = since_ == detail::of_lane(since_, 0);
+    if (alike && bits > standing && (TableSize == 0 || place_ == done)) [[likely]] {
+      note(standing);
+    } else if (lane_count<S> > 1 && alike && bits == corrected && recurs_alike()) {
+      note(0);
+      recur_from_correction();
     } else {
-      if (rests()) [[likely]] {
-        note(standing);
-        if constexpr (TableSize > 0) {
-          if (place_ <= TableSize) next_of_table();
-        }
-        return;
-      }
-      recur();
+      detail::for_each_lane<Plain>(*this, [](Plain& lane) { lane.advance_alone(); });
     }
   }
 
@@ -233,10 +224,10 @@ class RiccatiGain {
   [[nodiscard]] constexpr S measurement_variance() const noexcept { return measurement_ * unit_; }
 
   /// Continues with the covariance of a law with other settings. @param time_ratio T_new / T_old
-  /// @return false if the scalar cannot hold that covariance in this law's unit
-  bool continue_from(const RiccatiGain& other, const S& time_ratio) noexcept {
+  /// @return an error if the scalar cannot hold that covariance in this law's unit
+  Check<S> continue_from(const RiccatiGain& other, const S& time_ratio) {
     // Both laws are at their limit: nothing to take over.
-    if (mode_ == RiccatiMode::frozen && other.stands()) return true;
+    if (mode_ == RiccatiMode::frozen && other.stands()) return {};
     now_.factor = other.now_.factor;
     now_.factor.rescale(time_ratio, S(other.unit_ / unit_), transition_);
     if (rule_ == InflationRule::adaptive) set_inflation(other.now_.inflation);
@@ -250,10 +241,12 @@ class RiccatiGain {
       if (!all(is_finite(now_.gain[index(i)])) ||
           !all(now_.factor.variance(i) < detail::largest_variance<S>()) ||
           !all(is_finite(now_.factor.variance(i)))) {
-        return false;
+        return Error<S>{"measurement_variance", measurement_variance(),
+                        "is too small, or sample_time changed too much, to carry over the present "
+                        "covariance: measure first"};
       }
     }
-    return true;
+    return {};
   }
 
   /// Bound on the covariance of the error of the present estimate, N x N, scaled: after `advance`
@@ -345,6 +338,24 @@ class RiccatiGain {
     for (int i = 0; i < Size; ++i) {
       if (!all(start_.variance(i) > least)) start_.set_variance(i, least);
     }
+  }
+
+  ESOKIT_INLINE constexpr void advance_alone() noexcept {
+    if (rests()) [[likely]] {
+      note(standing);
+      if constexpr (TableSize > 0) {
+        if (place_ <= TableSize) next_of_table();
+      }
+    } else {
+      recur();
+    }
+  }
+
+  /// True if the recursion of all lanes has the same terms.
+  [[nodiscard]] constexpr bool recurs_alike() const noexcept {
+    const InflationRule rule = detail::of_lane(rule_, 0);
+    return mode_ == RiccatiMode::recursive && rule_ == rule && rule != InflationRule::adaptive &&
+           diagonal_noise_ == detail::of_lane(diagonal_noise_, 0);
   }
 
   [[gnu::noinline]] constexpr void recur() noexcept {

@@ -55,6 +55,7 @@ class SwitchedGain {
   static constexpr GainLawTraits traits{.kind = GainKind::switched,
                                         .accepts = true,
                                         .resets = true,
+                                        .continues = true,
                                         .bridges_gaps = true,
                                         .bears_any_innovation = true};
 
@@ -100,7 +101,10 @@ class SwitchedGain {
   constexpr void reset() noexcept { previous_ = detail::nothing_watched<S>(Reading); }
 
   /// Takes over the last innovation from another law.
-  constexpr void continue_from(const SwitchedGain& other) noexcept { previous_ = other.previous_; }
+  Check<S> continue_from(const SwitchedGain& other, const S&) {
+    previous_ = other.previous_;
+    return {};
+  }
 
   /// True (per lane) if gain(e) is `shrinking_gain`, else it is `otherwise_gain`.
   [[nodiscard]] ESOKIT_INLINE constexpr auto shrinks(const S& e) const noexcept {

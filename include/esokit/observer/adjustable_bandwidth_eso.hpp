@@ -53,13 +53,6 @@ class AdjustableBandwidthEso
   using with_scalar =
       AdjustableBandwidthEso<Order, T, Extension, Reading>;  ///< the same with another scalar
 
-  /// Takes over the settings of `fresh`, as returned by `make`, without design work. The estimate
-  /// and the last innovation are kept.
-  Check<S> adopt(AdjustableBandwidthEso fresh) {
-    std::get<0>(fresh.laws()).continue_from(std::get<0>(this->laws()));
-    return Shell::adopt(fresh);
-  }
-
  private:
   // For a ratio without the certificate, `limit` in the error is the end of the certified range.
   static Expected<Law, Error<S>> design(const Config& config, const typename Shell::PlantModel&) {

@@ -91,15 +91,13 @@ class AlgebraicEso
   /// `retune`, the estimate and the place in the schedule (counted in samples) are kept, and a
   /// change of b0 is moved into the disturbance, also in blanked estimates. If the new blanking
   /// time has not passed yet, the present estimates are published until it has.
-  Check<S> adopt(AlgebraicEso fresh) {
+  Check<S> adopt(const AlgebraicEso& fresh) {
     Estimate published = estimate();
     published(Order) =
         published(Order) + (this->input_gain() - fresh.input_gain()) * this->applied_input();
     if (!all(is_finite(published(Order)))) {
       return Error<S>{"input_gain", fresh.input_gain(), "would make the estimate not finite"};
     }
-    // A settled observer no longer knows its age, and stays settled.
-    fresh.law().resume(settled() ? Law::max_index : age());
     if (auto ok = Base::adopt(fresh); !ok) return ok;
     publish(published);
     return {};

@@ -159,12 +159,7 @@ class ExtendedStateFilter
 
   /// Takes over the settings of `fresh`, as returned by `make`, without design work. As with
   /// `retune`, estimate and covariance are kept, and a change of b0 is moved into the disturbance.
-  Check<S> adopt(ExtendedStateFilter fresh) {
-    if (!fresh.law().continue_from(law(), S(fresh.sample_time() / this->sample_time()))) {
-      return Error<S>{"measurement_variance", fresh.law().measurement_variance(),
-                      "is too small, or sample_time changed too much, to carry over the present "
-                      "covariance: measure first"};
-    }
+  Check<S> adopt(const ExtendedStateFilter& fresh) {
     if (auto ok = Base::adopt(fresh); !ok) return ok;
     rest_.set = fresh.rest_.set;
     return {};

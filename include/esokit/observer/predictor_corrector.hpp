@@ -156,11 +156,7 @@ class PredictorCorrector {
   /// All estimates after the last step, N x 1, in physical units: plant states of the last level,
   /// disturbance summed over all levels.
   [[nodiscard]] Estimate estimate() const noexcept {
-    if constexpr (Levels == 1) {
-      return model_.physical(kept_.states[0]);
-    } else {
-      return model_.physical(up_to_level<Levels - 1>());
-    }
+    return model_.physical(up_to_level<Levels - 1>());
   }
 
   /// Estimate of y^(Row), or of d^(Row - n) for Row >= n.
@@ -177,10 +173,8 @@ class PredictorCorrector {
     static_assert(Row >= 0 && Row < size, "esokit: no such estimate");
     constexpr int state = Model::state_of_row(Row);
     S sum = std::get<state>(kept_.states[Levels - 1]);
-    if constexpr (Row >= Order && adds_up) {
-      detail::unroll<Levels - 1>(
-          [&](auto i) ESOKIT_INLINE_LAMBDA { sum = sum + std::get<state>(kept_.states[i]); });
-    }
+    detail::unroll<(Row >= Order ? levels_below<Levels - 1> : 0)>(
+        [&](auto i) ESOKIT_INLINE_LAMBDA { sum = sum + std::get<state>(kept_.states[i]); });
     return sum;
   }
 
@@ -337,7 +331,7 @@ class PredictorCorrector {
     LevelStates next = kept_.states;
     for (auto& state : next) {
       state[0] = state[0] + offset;
-      if constexpr (y > 0) state[y] = state[y] + offset;
+      if (y > 0) state[y] = state[y] + offset;
     }
     return shift_to(next);
   }
@@ -369,9 +363,15 @@ class PredictorCorrector {
 
   /// Takes over the settings of `fresh` and keeps the estimate: states are rescaled to its sample
   /// time, and a change of b0 is moved into the disturbance, dhat += (b0_old - b0_new) u, so that
-  /// the control does not jump.
+  /// the control does not jump. A law goes on with its memory, if it declares that it can.
   Check<S> adopt(const PredictorCorrector& fresh) {
     PredictorCorrector next = fresh;
+    if constexpr (gain_law_traits<Law>.continues) {
+      const S time_ratio = fresh.sample_time() / sample_time();
+      for (std::size_t i = 0; i < Levels; ++i) {
+        if (auto ok = next.laws_[i].continue_from(laws_[i], time_ratio); !ok) return ok;
+      }
+    }
     next.kept_ = kept_;
     next.gap_ = gap_;
     for (State& state : next.kept_.states) state = next.model_.rescaled(state, model_);
@@ -505,6 +505,9 @@ class PredictorCorrector {
   /// also receives the corrections of the disturbance by the levels below. For the chain this would
   /// be equivalent.
   static constexpr bool adds_up = Levels > 1 && model_traits<Model>.is_chain;
+  /// The levels below one whose disturbance adds to its own.
+  template <int Level>
+  static constexpr int levels_below = adds_up ? Level : 0;
 
   /// Adds to the total disturbance of all levels.
   static constexpr void add_disturbance(LevelStates& states, const S& scaled) noexcept {
@@ -564,9 +567,8 @@ class PredictorCorrector {
   [[nodiscard]] constexpr unsigned elapsed() const noexcept { return gap_ > 1 ? gap_ : 1u; }
 
   ESOKIT_INLINE constexpr void advance_laws() noexcept {
-    if constexpr (gain_law_traits<Law>.advances) {
-      detail::unroll<Levels>([&](auto i) ESOKIT_INLINE_LAMBDA { laws_[i].advance(); });
-    }
+    detail::unroll<(gain_law_traits<Law>.advances ? Levels : 0)>(
+        [&](auto i) ESOKIT_INLINE_LAMBDA { laws_[i].advance(); });
   }
 
   [[nodiscard]] ESOKIT_INLINE constexpr LevelStates predicted_levels(const S& u) const noexcept {
@@ -598,11 +600,9 @@ class PredictorCorrector {
   [[nodiscard]] ESOKIT_INLINE static constexpr State up_to_level(
       const LevelStates& states) noexcept {
     State state = states[Level];
-    if constexpr (adds_up) {
-      detail::unroll<Level>([&](auto i) ESOKIT_INLINE_LAMBDA {
-        detail::add_rows<Order, size - Order>(state, states[i]);
-      });
-    }
+    detail::unroll<levels_below<Level>>([&](auto i) ESOKIT_INLINE_LAMBDA {
+      detail::add_rows<Order, size - Order>(state, states[i]);
+    });
     return state;
   }
 
@@ -734,10 +734,8 @@ class PredictorCorrector {
   ESOKIT_INLINE constexpr void commit(const Correction& step) noexcept {
     kept_.states = step.states;
     detail::assign(kept_.innovation, step.innovation);
-    if constexpr (gain_law_traits<Law>.accepts) {
-      detail::unroll<Levels>([&](auto i)
-                                 ESOKIT_INLINE_LAMBDA { laws_[i].accept(step.innovations[i]); });
-    }
+    detail::unroll<(gain_law_traits<Law>.accepts ? Levels : 0)>(
+        [&](auto i) ESOKIT_INLINE_LAMBDA { laws_[i].accept(step.innovations[i]); });
   }
 
   ESOKIT_COLD Status update_guarded(S y, S u_applied) noexcept {
@@ -803,9 +801,7 @@ class PredictorCorrector {
     kept_.states = states;
     kept_.innovation = S(0.0);
     gap_ = 0;
-    if constexpr (gain_law_traits<Law>.resets) {
-      for (Law& law : laws_) law.reset();
-    }
+    detail::unroll<(gain_law_traits<Law>.resets ? Levels : 0)>([&](auto i) { laws_[i].reset(); });
     return StepStatus::ok;
   }
 

@@ -2,8 +2,10 @@
 /// to_c: a finished controller or observer as C99, written from its recorded calls.
 #pragma once
 
+#include <algorithm>
 #include <cctype>
 #include <cstddef>
+#include <cstdint>
 #include <esokit/core/expected.hpp>
 #include <esokit/target/c_text.hpp>
 #include <esokit/target/list_writer.hpp>
@@ -16,6 +18,9 @@ namespace esokit {
 struct CCode {
   std::string header{};  ///< text of `name.h`
   std::string source{};  ///< text of `name.c`
+  /// With CodeOptions::settings_in_struct: text of the struct for a file of its own, where it is
+  /// not that of `name.c` but of another design, for `name_adopt`.
+  std::string settings{};
 };
 
 namespace detail {
@@ -47,13 +52,39 @@ inline std::string c_function(const ListWriter& writer, const std::string& prefi
   return text + "  return true;\n}\n\n";
 }
 
+/// What any text needs.
+inline Words c_common_words(const ListWriter& writer, const CodeOptions& options) {
+  std::string upper = options.name;
+  for (char& c : upper) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  return {{"$ZERO", writer.number(0)},
+          {"$ONE", writer.number(1)},
+          {"$word", writer.single() ? "uint32_t" : "uint64_t"},
+          {"$exponent", writer.single() ? "0x7f800000u" : "0x7ff0000000000000u"},
+          {"$fabs", writer.single() ? "fabsf" : "fabs"},
+          {"$real", writer.real()},
+          {"$NAME", upper},
+          {"$name", options.name},
+          // The last, so that no word in it is taken for a key.
+          {"$COMMENT", options.comment.empty() ? "" : " * " + options.comment + "\n"}};
+}
+
 /// What the texts need of any design.
 inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
   const std::string real = writer.real();
   std::string members;
   std::string init;
+  const bool opens = design.options.settings_in_struct;
+  if (opens) {
+    members = "  const $name_settings *settings;\n";
+    init = "  o->settings = &$name_$SET;\n";
+  }
+  std::string settings;
   for (std::size_t i = 0; i < design.members.size(); ++i) {
     if (!design.live[i]) continue;
+    if (opens && design.settings[i]) {
+      settings += "  " + real + " " + design.members[i] + ";\n";
+      continue;
+    }
     members += "  " + real + " " + design.members[i] + ";\n";
     init += "  o->" + design.members[i] + " = " + writer.number(design.numbers[i]) + ";\n";
   }
@@ -88,6 +119,34 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
             "u;\n  o->doubts = " + std::to_string(wrap.doubts) +
             "u;\n  o->begun = " + (wrap.begun ? "1u" : "0u") + ";\n";
   }
+  const GuardNumbers& guard = design.guard;
+  std::string found;
+  std::string trusts;
+  std::string leaks;
+  std::string bounds;
+  if (guard.on) {
+    members += "  " + real + " trust; /* see $name_set_trust */\n";
+    init += "  o->trust = " + writer.number(guard.trust) + ";\n";
+    if (guard.bound > 0) {
+      bounds = "  const $real most = " + writer.number(guard.bound) +
+               ";\n  $real below = $ZERO;\n  $real sum;\n";
+    } else {
+      bounds = "  (void)o;\n";
+    }
+    for (int level = 0; level < guard.levels; ++level) {
+      const std::string d = "o->z" + std::to_string(design.order + 1) +
+                            (level > 0 ? "_level" + std::to_string(level + 1) : std::string());
+      const std::string before = "before[" + std::to_string(level) + "]";
+      found += (level > 0 ? ", " : "") + d;
+      trusts += "    " + d + " = " + before + " + (o->trust * (" + d + " - " + before + "));\n";
+      leaks += "    " + d + " = " + d + " - (" + writer.number(guard.leak) + " * " + d + ");\n";
+      if (guard.bound > 0) {
+        bounds += "  sum = below + " + d + ";\n  if ($fabs(sum) > most) {\n    " + d +
+                  " = ((sum > $ZERO) ? most : -most) - below;\n  }\n";
+        if (level + 1 < guard.levels) bounds += "  below = below + " + d + ";\n";
+      }
+    }
+  }
   const LawNumbers& law = design.law;
   if (law.kind == RunningLaw::schedule) {
     members += "  uint32_t age; /* samples of the schedule */\n  uint8_t pending;\n" +
@@ -111,8 +170,10 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
   if (!runs) {
     const std::size_t count = design.gap_gains[0].size();
     for (std::size_t i = 0; i < count; ++i) call_gains += ", k[" + std::to_string(i) + "]";
-    table = "  static const " + real + " gains[" + rows_of_table + "][" + std::to_string(count) +
-            "] = { /* after 1, 2, .. samples */\n" + table + "  };\n";
+    table = opens ? ""
+                  : "  static const " + real + " gains[" + rows_of_table + "][" +
+                        std::to_string(count) + "] = { /* after 1, 2, .. samples */\n" + table +
+                        "  };\n";
   }
   const std::string by_table = "correct_by(o, y" + call_gains + ")";
   const std::string corrects =
@@ -141,21 +202,37 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
     const std::string number = std::to_string(row);
     rows += "  case " + number + "u:\n    (void)estimate_" + number + "(o, &u);\n    break;\n";
   }
-  std::string upper = design.options.name;
-  for (char& c : upper) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
   std::string vectors;
   for (const auto& [y, r, result] : design.samples) {
     vectors += "    {" + writer.number(y) + ", " + writer.number(r) + ", " + writer.number(result) +
                "},\n";
   }
-  const auto& comment = design.options.comment;
-  return {
+  Words words = {
+      {"$BOOL", opens ? "$include <stdbool.h>\n" : ""},
       {"$include", "#include"},  // not written in the texts: scripts look for such lines
       {"$MEMBERS", members},
       {"$TIME", writer.number(design.sample_time)},
       {"$CORRECT", corrects},
+      {"$OF_GUARD",
+       guard.on ? "/* From the next correction on, those of the disturbance count so much, 0 .. 1. "
+                  "*/\nvoid $name_set_trust($name_state *o, $real trust);\n\n"
+                : ""},
+      {"$KEEP_BOUND", bounds},
+      {"$TRUST", trusts},
+      {"$LEAKS", guard.leak > 0 ? "true" : "gated"},
+      {"$LEAK", leaks},
+      {"$REFUSED", gated ? "($NAME_MEASUREMENT_REJECTED | $NAME_OUTLIER_REJECTED)"
+                         : "$NAME_MEASUREMENT_REJECTED"},
+      {"$FOUND", found},
+      {"$LEVELS", std::to_string(guard.levels)},
+      {"$SETTINGS", settings},
+      {"$SIZE", std::to_string(runs ? 0 : design.gap_gains[0].size())},
+      {"$ADOPT", opens ? c_header_adopt : ""},
+      {"$TRACK", design.is_controller ? "    (void)applied(o, o->u_last);\n" : ""},
       {"$TABLE", runs ? "" : table},
-      {"$OF_TABLE", runs ? "" : "    const $real *k = gains[elapsed - 1u];\n"},
+      {"$OF_TABLE", runs    ? ""
+                    : opens ? "    const $real *k = o->settings->gains[elapsed - 1u];\n"
+                            : "    const $real *k = gains[elapsed - 1u];\n"},
       {"$ACCEPT", accept},
       {"$LAW_BEGIN", runs ? "    law_begin(o);\n" : ""},
       {"$BLANKED", blanked},
@@ -180,6 +257,7 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
       {"$LAST", std::to_string(design.size - 1)},
       {"$FIRST", design.first_state},
       {"$INIT", init},
+      {"$SET", design.options.settings_name},
       {"$GATE_FLAG",
        std::string(gated || law.watches
                        ? "#define $NAME_OUTLIER_REJECTED 64u /* y was too far from what "
@@ -193,20 +271,13 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
       {"$GATE_THRESHOLD", writer.number(gate.threshold)},
       {"$GATE_MOST", std::to_string(gate.most_in_a_row)},
       {"$SHARE", writer.number(1.0 / 64)},
-      {"$ZERO", writer.number(0)},
-      {"$ONE", writer.number(1)},
       {"$LENGTH", length},
       {"$NEWEST", std::to_string(design.line.empty() ? 0 : design.line.size() - 1)},
       {"$VECTORS", vectors},
-      {"$SAMPLES", std::to_string(design.samples.size())},
-      {"$word", writer.single() ? "uint32_t" : "uint64_t"},
-      {"$exponent", writer.single() ? "0x7f800000u" : "0x7ff0000000000000u"},
-      {"$fabs", writer.single() ? "fabsf" : "fabs"},
-      {"$real", real},
-      {"$NAME", upper},
-      {"$name", design.options.name},
-      // The last, so that no word in it is taken for a key.
-      {"$COMMENT", comment.empty() ? "" : " * " + comment + "\n"}};
+      {"$SAMPLES", std::to_string(design.samples.size())}};
+  const Words common = c_common_words(writer, design.options);
+  words.insert(words.end(), common.begin(), common.end());
+  return words;
 }
 
 /// What the texts need of a controller.
@@ -234,8 +305,9 @@ inline Words c_loop_words(const RecordedDesign& design, const ListWriter& writer
   const std::string of_y = only("!is_finite(y)", "return $NAME_STATE_REJECTED");
   const std::string of_u = only("!is_finite(u)", "return $NAME_INPUT_REJECTED");
   return {
-      {"$LIMITS",
-       ", u within " + writer.number(design.lower) + " .. " + writer.number(design.upper)},
+      {"$LIMITS", design.options.settings_in_struct ? std::string()
+                                                    : ", u within " + writer.number(design.lower) +
+                                                          " .. " + writer.number(design.upper)},
       {"$REFERENCE",
        design.compensates ? "the u0 of the controller that is helped" : "the reference"},
       {"$PHASE_MEMBER", divides ? "  uint16_t phase; /* a measurement is due at 0 */\n" : ""},
@@ -285,10 +357,11 @@ inline Words c_observer_words(const RecordedDesign& design) {
 }
 
 /// The two files of a design.
-inline CCode c_code(const RecordedDesign& design) {
+inline CCode c_texts(const RecordedDesign& design, const std::string& mark) {
   ListWriter writer(c_language, design.single);
   writer.members = design.members;
   writer.live = design.live;
+  writer.settings = design.settings;
   std::string lists;
   for (std::size_t i = 0; i < design.names.size(); ++i) {
     const std::string& name = design.names[i].name;
@@ -345,6 +418,15 @@ inline CCode c_code(const RecordedDesign& design) {
     if (controls) layers += c_source_delay_fill;
     predict = update = "delayed";
   }
+  if (design.guard.on) {  // the outermost
+    add(c_source_guarded);
+    if (!controls) add(c_source_guarded_correct);
+    correct = update = "guarded";
+    layers += filled(controls ? c_source_guarded_rest : c_source_guarded_restart,
+                     {{"$below_restart", restart}, {"$below_rest", rest}});
+    rest = "rest_guarded";
+    restart = "restart_guarded";
+  }
   words.insert(words.end(), {{"predict_$top", "predict_" + predict},
                              {"correct_$top", "correct_" + correct},
                              {"update_$top", "update_" + update},
@@ -356,11 +438,46 @@ inline CCode c_code(const RecordedDesign& design) {
   const char* law_text = design.law.kind == RunningLaw::schedule ? c_source_schedule
                          : runs                                  ? c_source_filter
                                                                  : "";
-  return {text(c_header_head) + text(controls ? c_header_controller : c_header_observer) +
-              text(c_header_tail),
-          text(c_source_head) + lists + text(law_text) + text(c_source_observer_part) +
+  const bool opens = design.options.settings_in_struct;
+  std::string set;
+  if (opens) {
+    set = "const $name_settings $name_$SET = {\n  $DESIGN";
+    for (std::size_t i = 0; i < design.members.size(); ++i) {
+      if (design.live[i] && design.settings[i]) set += ",\n  " + writer.number(design.numbers[i]);
+    }
+    set += ",\n  {\n";
+    for (const auto& row : design.gap_gains) {
+      std::string line;
+      for (const double k : row) line += (line.empty() ? "    {" : ", ") + writer.number(k);
+      set += line + "},\n";
+    }
+    set += "  }\n};\n\n";
+    words.insert(words.begin(), {"$DESIGN", mark});
+  }
+  set = text(set);
+  return {text(c_header_head) + (opens ? text(c_header_settings) : "") +
+              text(controls ? c_header_controller : c_header_observer) + text(c_header_tail),
+          text(c_source_head) + set + lists + text(law_text) + text(c_source_observer_part) +
               text(layers) + text(controls ? c_source_controller : c_source_observer) +
-              text(c_source_self_test)};
+              (opens ? text(c_source_adopt) : "") + text(c_source_self_test),
+          opens ? "#include \"" + design.options.name + ".h\"\n\n" + set : ""};
+}
+
+/// The texts; settings bear a mark of what else is in them.
+inline CCode c_code(const RecordedDesign& design) {
+  if (!design.options.settings_in_struct) return c_texts(design, "");
+  RecordedDesign rest = design;
+  for (double& number : rest.numbers) number = 0;
+  for (auto& row : rest.gap_gains) std::fill(row.begin(), row.end(), 0.0);
+  rest.samples.clear();
+  rest.options.comment = {};
+  rest.options.settings_name = {};
+  const CCode same = c_texts(rest, "");
+  std::uint32_t mark = 2166136261u;  // FNV-1a
+  for (const char c : same.header + same.source) {
+    mark = (mark ^ static_cast<unsigned char>(c)) * 16777619u;
+  }
+  return c_texts(design, std::to_string(mark) + "u");
 }
 
 }  // namespace detail
@@ -369,8 +486,9 @@ inline CCode c_code(const RecordedDesign& design) {
 /// estimates in physical units, and a self-test that compares with the C++ (compiled if
 /// `NAME_SELF_TEST` is defined); of a controller also start, of an observer reset, predict and
 /// correct. What is done at a sample is recorded from its own calls, so there is no second
-/// implementation; settings are constants. Bad and missing samples, gaps, restarts, the start hold
-/// and safe mode are those of the object, too.
+/// implementation; settings are constants, or, with `settings_in_struct`, gains and limits in a
+/// struct that `name_adopt` changes while it runs, as `adopt` does. Bad and missing samples, gaps,
+/// restarts, the start hold and safe mode are those of the object, too.
 ///
 /// Compiled without contraction (-std=c99 in GCC) it equals the C++ bit for bit, as far as tested:
 /// after any bad sample, gap, report or start. Where the design computes a power or an exponential
@@ -381,8 +499,9 @@ inline CCode c_code(const RecordedDesign& design) {
 /// Written are LinearEso, also with a set of poles, HalfGainEso, ReducedOrderEso, CascadeEso,
 /// AdjustableBandwidthEso, NonlinearEso, ModelEso, PlantEso and their cascades (not with
 /// `follows_speed`), AlgebraicEso, ExtendedStateFilter (in its modes recursive and frozen, without
-/// a nominal model), these in DelayedInput and OutlierGate or WrappedOutput, and Adrc of both forms
-/// and DisturbanceCompensator around them. Others do not compile.
+/// a nominal model), these in DelayedInput and OutlierGate or WrappedOutput, LinearEso and
+/// CascadeEso in Guarded, too (bound, leak and trust; no pin, hold or changing b0), and Adrc of
+/// both forms and DisturbanceCompensator around them. Others do not compile.
 /// @param object as `make` returned it: its state is that of `init`
 /// @return error for a name that is no identifier, a comment that would end the one it stands in, a
 ///         number of samples of the self-test out of range, or a gain law of your own whose gain
@@ -398,12 +517,14 @@ Expected<CCode, Error<typename Object::scalar_type>> to_c(const Object& object,
 /// What cannot be written yet, by name.
 template <class Other>
 void to_c(const Other&, const CodeOptions& = {}) {
-  static_assert(detail::Writable<Other>,
-                "esokit: to_c writes LinearEso, HalfGainEso, ReducedOrderEso, CascadeEso, "
-                "AdjustableBandwidthEso, NonlinearEso, ModelEso, PlantEso, AlgebraicEso and "
-                "ExtendedStateFilter, these in DelayedInput and OutlierGate or WrappedOutput, and "
-                "Adrc and DisturbanceCompensator around them; no other gains, adapters or "
-                "controllers yet");
+  static_assert(
+      detail::Writable<Other>,
+      "esokit: to_c writes LinearEso, HalfGainEso, ReducedOrderEso, CascadeEso, "
+      "AdjustableBandwidthEso, NonlinearEso, ModelEso, PlantEso, AlgebraicEso and "
+      "ExtendedStateFilter, these in DelayedInput and OutlierGate or WrappedOutput, on the "
+      "chain with one extended state in Guarded, and "
+      "Adrc and DisturbanceCompensator around them; no other gains, adapters or "
+      "controllers yet");
 }
 
 }  // namespace esokit

@@ -16,7 +16,7 @@ $COMMENT * T = $TIME s, b0 = $GAIN$LIMITS.
  *
  * Compile with -std=c99 or -ffp-contract=off: then it equals the C++ bit for bit. */
 
-$include <stdint.h>
+$BOOL$include <stdint.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -32,6 +32,36 @@ extern "C" {
 #define $NAME_RESTARTED 16u /* too many samples were missing */
 #define $NAME_STATE_REJECTED 32u /* start: y is not finite or too large */
 $GATE_FLAG
+)";
+
+/// Settings that can be changed while it runs.
+inline constexpr const char* c_header_settings =
+    R"(/* What may be changed while it runs, by $name_adopt. (MISRA C:2012 8.7, advisory: those of other
+ * designs are in other files.) */
+typedef struct {
+  uint32_t design; /* of which text: others are refused */
+$SETTINGS  $real gains[$ROWS][$SIZE]; /* of the observer, after 1, 2, .. samples */
+} $name_settings;
+
+extern const $name_settings $name_$SET;
+
+)";
+inline constexpr const char* c_header_adopt =
+    R"(/* Other settings, of a design with the same sample time, b0 and structure, from now on; estimates
+ * and output are kept. False, and nothing changes, if they are of another text. */
+bool $name_adopt($name_state *o, const $name_settings *settings);
+
+)";
+inline constexpr const char* c_source_adopt =
+    R"(bool $name_adopt($name_state *o, const $name_settings *settings)
+{
+  const bool fits = settings->design == $DESIGN;
+  if (fits) {
+    o->settings = settings;
+$TRACK  }
+  return fits;
+}
+
 )";
 
 /// The header of a controller.
@@ -83,7 +113,7 @@ $real $name_estimate(const $name_state *o, unsigned row);
 )";
 
 /// Both headers.
-inline constexpr const char* c_header_tail = R"(#ifdef $NAME_SELF_TEST
+inline constexpr const char* c_header_tail = R"($OF_GUARD$ADOPT#ifdef $NAME_SELF_TEST
 /* 0, or the number of the first sample whose result differs from that of the design by more than
  * `tolerance`; 0 asks for equal numbers. */
 int $name_self_test($real tolerance);
@@ -538,6 +568,74 @@ inline constexpr const char* c_source_running_rest =
   const bool good = rest_at(o, y, u);
   if (good) {
 $LAW_BEGIN  }
+  return good;
+}
+
+)";
+
+/// Guarded around it.
+inline constexpr const char* c_source_guarded = R"(/* Keeps the disturbance within its bound. */
+static void keep_bound($name_state *o)
+{
+$KEEP_BOUND}
+
+/* After a correction; before: what each level had found until then. */
+static void keep_guards($name_state *o, const $real before[$LEVELS], unsigned status)
+{
+  const bool gated = o->trust < $ONE;
+  if (gated && ((status & $NAME_RESTARTED) == 0u)) {
+$TRUST  }
+  if (($LEAKS) && ((status & $REFUSED) == 0u)) {
+$LEAK  }
+  keep_bound(o);
+}
+
+static unsigned update_guarded($name_state *o, $real y, $real u)
+{
+  const $real before[$LEVELS] = {$FOUND};
+  const unsigned status = update_$below(o, y, u);
+  keep_guards(o, before, status);
+  return status;
+}
+
+void $name_set_trust($name_state *o, $real trust)
+{
+  if (is_finite(trust)) {
+    o->trust = (trust < $ZERO) ? $ZERO : ((trust < $ONE) ? trust : $ONE);
+  }
+}
+
+)";
+/// Of an observer alone, too.
+inline constexpr const char* c_source_guarded_correct =
+    R"(static unsigned correct_guarded($name_state *o, $real y)
+{
+  const $real before[$LEVELS] = {$FOUND};
+  const unsigned status = correct_$below(o, y);
+  keep_guards(o, before, status);
+  return status;
+}
+
+)";
+/// Its starts.
+inline constexpr const char* c_source_guarded_rest =
+    R"(static bool rest_guarded($name_state *o, $real y, $real u)
+{
+  const bool good = $below_rest(o, y, u);
+  if (good) {
+    keep_bound(o);
+  }
+  return good;
+}
+
+)";
+inline constexpr const char* c_source_guarded_restart =
+    R"(static bool restart_guarded($name_state *o, $real y)
+{
+  const bool good = $below_restart(o, y);
+  if (good) {
+    keep_bound(o);
+  }
   return good;
 }
 

@@ -121,6 +121,7 @@ class ListWriter {
 
   std::vector<std::string> members{};  ///< a name for each number of the object
   std::vector<bool> live{};            ///< the numbers that the state needs
+  std::vector<bool> settings{};        ///< those of them that are settings
 
   [[nodiscard]] std::string real() const { return language_->real[single_ ? 1 : 0]; }
   [[nodiscard]] bool single() const { return single_; }
@@ -200,7 +201,10 @@ class ListWriter {
         const auto from = static_cast<std::size_t>(one.a);
         if (from < members.size()) {
           of[i] = members[from];
-          text.reads.push_back({of[i], language_->from_state + of[i], false});
+          const bool setting = !settings.empty() && settings[from];
+          text.reads.push_back(
+              {of[i], language_->from_state + std::string(setting ? "settings->" : "") + of[i],
+               false});
         } else {
           of[i] = names.arguments[from - members.size()];
           given[from - members.size()] = true;
@@ -261,9 +265,11 @@ class ListWriter {
     };
     for (std::size_t i = 0; i < list.size(); ++i) {
       if (!need[i] || list[i].operation == Operation::argument) continue;
+      // What is chosen from has names: MISRA 12.1.
+      const int times = list[i].operation == Operation::choose ? 2 : 1;
       use(list[i].a, 1);
-      use(list[i].b, 1);
-      use(list[i].c, 1);
+      use(list[i].b, times);
+      use(list[i].c, times);
     }
     for (const int output : call.outputs) use(output, 2);
     for (std::size_t i = 0; i < live.size(); ++i) {

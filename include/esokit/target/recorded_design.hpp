@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/guarded.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
@@ -18,6 +19,7 @@
 #include <esokit/gain/sampled_gain.hpp>
 #include <esokit/target/list_writer.hpp>
 #include <esokit/target/recorder.hpp>
+#include <limits>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -31,6 +33,10 @@ struct CodeOptions {
   std::string comment{};            ///< at the head: which machine, which design; no marks of a
                                     ///< comment
   int self_test_samples = 100;      ///< samples of the self-test, 1 .. 10000
+  /// Gains, those of the law, and limits in a struct that can be changed while it runs, instead of
+  /// constants: in C, for gains that do not depend on the innovation or the time.
+  bool settings_in_struct = false;
+  std::string settings_name = "design";  ///< of that struct, behind `name`: an identifier
 };
 
 namespace detail {
@@ -91,6 +97,15 @@ struct WrapNumbers {
   std::string angle{};  ///< the estimate that the law subtracts from the reference
 };
 
+/// A Guarded: its bound, in the scaling of the states, and its leak.
+struct GuardNumbers {
+  bool on = false;
+  int levels = 1;
+  double bound = 0;  ///< 0: there is none
+  double leak = 0;
+  double trust = 1;
+};
+
 /// A finished design as lists and counts, without its type.
 struct RecordedDesign {
   CodeOptions options{};
@@ -100,6 +115,7 @@ struct RecordedDesign {
   std::vector<RecordedCall> calls{};   ///< one for each name
   std::vector<std::string> members{};  ///< a name for each number of the object
   std::vector<bool> live{};            ///< whether its state needs it
+  std::vector<bool> settings{};        ///< whether it is a setting, see CodeOptions; or empty
   std::vector<double> numbers{};       ///< what it is at first
   int size = 0;                        ///< N: rows of the estimate
   int order = 0;                       ///< the row of the disturbance
@@ -112,6 +128,7 @@ struct RecordedDesign {
   GateNumbers gate{};
   LawNumbers law{};
   WrapNumbers wrap{};
+  GuardNumbers guard{};
   int max_gap = 0;  ///< missing samples that are bridged
   LoopRules loop{};
   double lower = 0;
@@ -165,6 +182,28 @@ struct RecordAccess {
             loop.stay_safe_,
             static_cast<double>(loop.hold_input_),
             static_cast<double>(loop.safe_input_)};
+  }
+
+  /// Gains, those of the law, and limits, with the beginning of their names. @param c a controller
+  /// or an observer
+  template <class Number, class C>
+  static void find_settings(C& c, std::vector<std::pair<const Number*, const char*>>& found) {
+    const auto take = [&](auto& part, const char* name) {
+      for (Number* one : numbers_of<Number>(part)) found.emplace_back(one, name);
+    };
+    if constexpr (requires { c.loop_; }) {
+      take(c.loop_.limiter_, "limit");
+      const Number* last = &c.loop_.limiter_.last();
+      std::erase_if(found, [last](const auto& one) { return one.first == last; });
+      if constexpr (requires { c.law_; }) {
+        take(c.law_, "law");
+        take(c.weights_, "law");
+      }
+      if constexpr (requires { c.gain_; }) take(c.gain_, "law");
+      find_settings(c.observer(), found);
+    } else {
+      for (auto& law : c.laws_) take(law, "gain");
+    }
   }
 
   /// The gain laws of all levels.
@@ -256,7 +295,7 @@ struct RecordAccess {
         return nothing;
       });
       add("schedule_settle", {}, false, [=](Law& law, const auto&) {
-        if (all(law.settled_below_ >= std::get<0>(law.ratios_u_))) law.settle();
+        if (all(law.settled_below_ >= std::get<0>(law.ratios_u_))) law.stand();
         return nothing;
       });
       add("present_poles", {}, true,
@@ -349,6 +388,43 @@ struct RecordAccess {
     return wrap;
   }
 
+  /// Whether it has a trust, and nothing but dhat itself to guard.
+  template <class O>
+  static constexpr bool guards_a_chain = [] {
+    if constexpr (requires { O::on_chain; }) {
+      return O::on_chain && O::gates;
+    } else {
+      return true;
+    }
+  }();
+  template <class O>
+  static GuardNumbers guard(const O& o) noexcept {
+    using S = typename O::scalar_type;
+    const bool bounds = o.limit_ < (std::numeric_limits<S>::max)();
+    return {true, O::levels, bounds ? static_cast<double>(o.limit_) : 0.0,
+            static_cast<double>(o.leak_), static_cast<double>(o.trust_)};
+  }
+
+  /// What a profile computes from its settings alone.
+  template <class P>
+  static auto profile(const P& p) noexcept {
+    using S = typename P::scalar_type;
+    struct Numbers {
+      std::array<S, P::order> limits{}, roots_of_limits{}, roots_of_peaks{};
+      S shortest_time, sample_time, longer;
+    } numbers;
+    for (int i = 1; i <= P::order; ++i) {
+      const auto row = static_cast<std::size_t>(i - 1);
+      numbers.limits[row] = p.config_.limits[row];
+      numbers.roots_of_limits[row] = p.root(p.config_.limits[row], i);
+      numbers.roots_of_peaks[row] = p.root(p.peak(i), i);
+    }
+    numbers.shortest_time = p.config_.shortest_time;
+    numbers.sample_time = p.config_.sample_time;
+    numbers.longer = p.longer;
+    return numbers;
+  }
+
   /// The inputs of a DelayedInput that are still needed, the newest last.
   template <class O>
   static std::vector<double> line(const O& o) {
@@ -389,14 +465,18 @@ struct IsWrapped : std::false_type {};
 template <class Observer>
 struct IsWrapped<WrappedOutput<Observer>> : std::true_type {};
 template <class Observer>
-inline constexpr bool is_adapter =
-    IsDelayed<Observer>::value || IsGate<Observer>::value || IsWrapped<Observer>::value;
+struct IsGuarded : std::false_type {};
+template <class Observer>
+struct IsGuarded<Guarded<Observer>> : std::true_type {};
+template <class Observer>
+inline constexpr bool is_adapter = IsDelayed<Observer>::value || IsGate<Observer>::value ||
+                                   IsWrapped<Observer>::value || IsGuarded<Observer>::value;
 /// With a gate in it a WrappedOutput counts twice.
 template <class Observer>
 inline constexpr bool wraps_beside_gate = [] {
   if constexpr (IsWrapped<Observer>::value) {
     return observer_traits<typename Observer::Adapted>.rejects_outliers;
-  } else if constexpr (IsDelayed<Observer>::value) {
+  } else if constexpr (IsDelayed<Observer>::value || IsGuarded<Observer>::value) {
     return wraps_beside_gate<typename Observer::Adapted>;
   } else {
     return false;
@@ -408,6 +488,7 @@ template <class Observer>
 void take_adapters(RecordedDesign& design, const Observer& observer) {
   if constexpr (IsDelayed<Observer>::value) design.line = RecordAccess::line(observer);
   if constexpr (IsGate<Observer>::value) design.gate = RecordAccess::gate(observer);
+  if constexpr (IsGuarded<Observer>::value) design.guard = RecordAccess::guard(observer);
   if constexpr (IsWrapped<Observer>::value) design.wrap = RecordAccess::wrap(observer);
   if constexpr (is_adapter<Observer>) take_adapters(design, observer.observer());
 }
@@ -430,6 +511,10 @@ template <class Observer>
 struct WithoutAdapter<WrappedOutput<Observer>> {
   using type = typename WithoutAdapter<Observer>::type;
 };
+template <class Observer>
+struct WithoutAdapter<Guarded<Observer>> {
+  using type = typename WithoutAdapter<Observer>::type;
+};
 template <class Observer, class Form>
 struct WithoutAdapter<Adrc<Observer, Form>> {
   using type = Adrc<typename WithoutAdapter<Observer>::type, Form>;
@@ -444,22 +529,16 @@ struct WithoutAdapter<ControlLoop<Observer>> {
 };
 
 template <class To, class From>
-void take_off_adapter(To& to, const From& from);
-template <int... I, class... T, class... F>
-void take_off_adapters(const TiedFields<std::integer_sequence<int, I...>, T...>& to,
-                       const TiedFields<std::integer_sequence<int, I...>, F...>& from) {
-  (take_off_adapter(static_cast<const TiedField<I, T>&>(to).field,
-                    static_cast<const TiedField<I, F>&>(from).field),
-   ...);
-}
-template <class To, class From>
 void take_off_adapter(To& to, const From& from) {
   if constexpr (std::is_same_v<To, From>) {
     to = from;
   } else if constexpr (is_adapter<From>) {
     take_off_adapter(to, from.observer());
   } else if constexpr (!std::is_empty_v<To>) {
-    take_off_adapters(LaneAccess::fields(to), LaneAccess::fields(from));
+    LaneAccess::with_members(to, [&](auto&... into) {
+      LaneAccess::with_members(
+          from, [&](const auto&... out_of) { (take_off_adapter(into, out_of), ...); });
+    });
   }
 }
 /// @}
@@ -483,7 +562,8 @@ concept HasLists = can_be_recorded<Observer> && requires(const Observer& o) {
 /// The same, perhaps in an adapter.
 template <class Observer>
 concept WritableObserver =
-    HasLists<typename WithoutAdapter<Observer>::type> && !wraps_beside_gate<Observer>;
+    HasLists<typename WithoutAdapter<Observer>::type> && !wraps_beside_gate<Observer> &&
+    RecordAccess::guards_a_chain<Observer>;
 
 template <class C>
 struct ObserverOfController;
@@ -500,6 +580,33 @@ struct ObserverOfController<DisturbanceCompensator<Observer>> {
 /// A controller around such an observer.
 template <class C>
 concept WritableController = WritableObserver<typename ObserverOfController<C>::type>;
+
+/// The rules for the options.
+template <class V>
+[[nodiscard]] Rules<V> checked_options(const CodeOptions& options) {
+  const auto letter = [](char c) {
+    return std::isalpha(static_cast<unsigned char>(c)) != 0 || c == '_';
+  };
+  const auto is_identifier = [&](const std::string& name) {
+    bool fine = !name.empty() && letter(name[0]);
+    for (const char c : name) {
+      fine = fine && (letter(c) || std::isdigit(static_cast<unsigned char>(c)) != 0);
+    }
+    return fine;
+  };
+  bool ends = false;
+  for (const char* mark : {"/*", "*/", "(*", "*)"}) {
+    ends = ends || options.comment.find(mark) != std::string::npos;
+  }
+  Rules<V> rules;
+  rules.require(is_identifier(options.name), "name", V(0), "must be an identifier of C")
+      .require(is_identifier(options.settings_name), "settings_name", V(0),
+               "must be an identifier of C")
+      .require(1 <= options.self_test_samples && options.self_test_samples <= 10000,
+               "self_test_samples", static_cast<V>(options.self_test_samples), "must be 1 .. 10000")
+      .require(!ends, "comment", V(0), "must not begin or end a comment");
+  return rules;
+}
 
 /// Records a subject without its adapter.
 /// @tparam Subject the observer or controller @tparam Observer its observer, perhaps itself
@@ -520,28 +627,6 @@ class DesignRecorder {
 
   RecordedDesign design;
 
-  /// The rules for the options.
-  [[nodiscard]] static Rules<V> checked(const CodeOptions& options) {
-    const auto letter = [](char c) {
-      return std::isalpha(static_cast<unsigned char>(c)) != 0 || c == '_';
-    };
-    bool is_name = !options.name.empty() && letter(options.name[0]);
-    for (const char c : options.name) {
-      is_name = is_name && (letter(c) || std::isdigit(static_cast<unsigned char>(c)) != 0);
-    }
-    bool ends = false;
-    for (const char* mark : {"/*", "*/", "(*", "*)"}) {
-      ends = ends || options.comment.find(mark) != std::string::npos;
-    }
-    Rules<V> rules;
-    rules.require(is_name, "name", V(0), "must be an identifier of C")
-        .require(1 <= options.self_test_samples && options.self_test_samples <= 10000,
-                 "self_test_samples", static_cast<V>(options.self_test_samples),
-                 "must be 1 .. 10000")
-        .require(!ends, "comment", V(0), "must not begin or end a comment");
-    return rules;
-  }
-
   void add(const std::string& name, std::vector<std::string> arguments, bool has_output,
            typename Recorder<Subject>::Call call) {
     recorder_.add(static_cast<int>(arguments.size()), std::move(call));
@@ -553,12 +638,36 @@ class DesignRecorder {
   template <class Of, class NameOf>
   [[nodiscard]] Check<V> record(const Of& of, const NameOf& name_of) {
     add_observer(of);
-    const auto recorded = recorder_.record();
-    if (!recorded) return recorded.error();
+    const auto closed = recorder_.record();
+    if (!closed) return closed.error();
+    auto recorded = closed;
+    if (design.options.settings_in_struct) {
+      if (!design.gain_is_kept) {
+        return Error<V>{"settings_in_struct", V(1),
+                        "needs gains that depend neither on the innovation nor on the time"};
+      }
+      if (design.softens) {
+        return Error<V>{"settings_in_struct", V(1), "is not written for a law that softens"};
+      }
+      recorder_.keep_open([](auto& c) {
+        std::vector<std::pair<const Number*, const char*>> found;
+        RecordAccess::find_settings<Number>(c, found);
+        std::vector<const Number*> numbers;
+        for (const auto& [number, name] : found) numbers.push_back(number);
+        return numbers;
+      });
+      recorded = recorder_.record();
+      if (!recorded) return recorded.error();
+      for (std::size_t i = 0; i < closed->moves.size(); ++i) {
+        design.settings.push_back(recorded->moves[i] && !closed->moves[i]);
+      }
+    }
     auto object = Recorder<Subject>::as_recorded(subject_);
     const auto numbers = numbers_of<Number>(object);
     const Number* first = &of(object).predicted_measurement();
     using Model = typename Observer::PlantModel;
+    std::vector<std::pair<const Number*, const char*>> settings;
+    if (!design.settings.empty()) RecordAccess::find_settings<Number>(object, settings);
     ListWriter writer(c_language, design.single);
     writer.live.assign(numbers.size(), false);
     for (std::size_t i = 0; i < numbers.size(); ++i) {
@@ -575,6 +684,9 @@ class DesignRecorder {
       const int published = RecordAccess::place_in_published(of(object), numbers[i]);
       if (published >= 0) name = "published_" + std::to_string(published);
       writer.live[i] = name[0] == 'z' || name[0] == 'p' || name == "u_applied" || name == "u_last";
+      for (const auto& [number, begins] : settings) {
+        if (number == numbers[i] && name.empty()) name = begins + std::to_string(i);
+      }
       design.members.push_back(name.empty() ? "x" + std::to_string(i) : name);
     }
     writer.find_live(*recorded);
@@ -782,7 +894,7 @@ Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
   using Number = typename Maker::Number;
   using Numbers = typename Maker::Numbers;
 
-  if (const auto rules = Maker::checked(options); !rules) return rules.error();
+  if (const auto rules = checked_options<V>(options); !rules) return rules.error();
   const Bare bare = without_adapter(controller);
   Maker maker(bare, options);
   RecordedDesign& design = maker.design;
@@ -852,7 +964,7 @@ Expected<RecordedDesign, Error<typename Observer::scalar_type>> recorded_design(
   using Bare = typename WithoutAdapter<Observer>::type;
   using Maker = DesignRecorder<Bare, Bare>;
 
-  if (const auto rules = Maker::checked(options); !rules) return rules.error();
+  if (const auto rules = checked_options<V>(options); !rules) return rules.error();
   const Bare bare = without_adapter(observer);
   Maker maker(bare, options);
   take_adapters(maker.design, observer);

@@ -54,12 +54,8 @@ void visit_members(Object& object, const Number& number, const Other& other) {
     if (object) deeper(*object);
   } else if constexpr (IsTuple<T>::value) {
     std::apply([&](auto&... member) { (deeper(member), ...); }, object);
-  } else if constexpr (LaneAccess::has_fields<T>) {
-    const auto each = [&]<int... I, class... F>(
-        const TiedFields<std::integer_sequence<int, I...>, F...>& fields) {
-      (deeper(static_cast<const TiedField<I, F>&>(fields).field), ...);
-    };
-    each(LaneAccess::fields(object));
+  } else if constexpr (LaneAccess::has_members<T>) {
+    LaneAccess::with_members(object, [&](auto&... members) { (deeper(members), ...); });
   } else {
     other(&object, sizeof object);
   }
@@ -119,6 +115,12 @@ class Recorder {
   /// Adds a call of which only the numbers matter: whoever uses the list counts itself.
   void add(int arguments, Call call) { calls_.push_back({arguments, std::move(call), false}); }
 
+  /// Numbers that are inputs of the lists though no call changes them: settings that something else
+  /// may change. @param chosen finds them in an object, by their addresses
+  void keep_open(std::function<std::vector<const Number*>(Recorded&)> chosen) {
+    chosen_ = std::move(chosen);
+  }
+
   /// Records all calls.
   /// @return the lists; an error if a call looked at single lanes, because it branches on a number,
   ///         or if a step changes counters for ever
@@ -129,6 +131,14 @@ class Recorder {
       all.numbers.push_back(static_cast<double>(number->value()));
     }
     all.moves.assign(all.numbers.size(), false);
+    if (chosen_) {
+      const auto numbers = detail::numbers_of<Number>(first);
+      for (const Number* open : chosen_(first)) {
+        for (std::size_t i = 0; i < numbers.size(); ++i) {
+          if (numbers[i] == open) all.moves[i] = true;
+        }
+      }
+    }
     for (bool grew = true; grew;) {
       grew = false;
       all.calls.clear();
@@ -204,6 +214,7 @@ class Recorder {
 
   Recorded object_;
   std::vector<Entry> calls_;
+  std::function<std::vector<const Number*>(Recorded&)> chosen_;
 };
 
 namespace detail {
