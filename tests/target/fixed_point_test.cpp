@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/core/error_text.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
@@ -457,6 +458,21 @@ TEST(FixedPoint, RefusesWhatIsNotLinear) {
   const auto code = to_fixed_c(AdjustableBandwidthEso<2>::make(config).value(), servo());
   ASSERT_FALSE(code);
   EXPECT_STREQ(code.error().field, "observer");
+  // What is not written says so, and what to take instead.
+  const auto refused = [](const auto& object, bool in_struct = false) {
+    FixedPointOptions options = servo();
+    options.code.settings_in_struct = in_struct;
+    const auto made = to_fixed_c(object, options);
+    return made ? std::string() : std::string(made.error().rule);
+  };
+  const auto linear = observer<LinearEso<2>>(100, 1e-3);
+  EXPECT_NE(refused(linear, true).find("not written in fixed point"), std::string::npos);
+  using Wrapped = WrappedOutput<LinearEso<2>>;
+  Wrapped::Config wrapped{};
+  wrapped.observer = {
+      .observer_bandwidth = 100, .input_gain = 50, .sample_time = 1e-3, .max_gap = 2};
+  wrapped.period = 6;
+  EXPECT_NE(refused(Wrapped::make(wrapped).value()).find("y.counter_bits"), std::string::npos);
 }
 
 }  // namespace target_fixed_point_test
