@@ -12,7 +12,8 @@ ESOKIT_EXAMPLE_PACKAGES=(gnuplot-nox fontconfig fonts-dejavu-core python3)
 ESOKIT_CLUSTER_PACKAGES=(libopenmpi-dev openmpi-bin parallel)
 # picolibc is the C library of the RISC-V compiler; its C++ headers are those of libstdc++-arm-none-eabi.
 ESOKIT_FIRMWARE_PACKAGES=(gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib
-  gcc-riscv64-unknown-elf picolibc-riscv64-unknown-elf qemu-system-arm qemu-system-misc)
+  gcc-riscv64-unknown-elf picolibc-riscv64-unknown-elf qemu-system-arm qemu-system-misc
+  gcc-avr avr-libc simavr)
 # HAL of LinuxCNC, for the C as one of its components.
 ESOKIT_LINUXCNC_PACKAGES=(linuxcnc-uspace-dev)
 # The same headers in a browser (examples/playground); nodejs is not needed.

@@ -249,7 +249,7 @@ check_links() {
 
 host_run() {
   mkdir -p "$out/written" &&
-    build firmware-host firmware_exact drive compare_runs write_c &&
+    build firmware-host firmware_exact drive compare_runs write_c fixed_bounds &&
     "$(image firmware-host write_c)" "$out/written" &&
     "$(image firmware-host firmware_exact)" >"$out/host.txt" </dev/null &&
     "$(image firmware-host drive)" >"$out/host-drive.txt" </dev/null
@@ -334,6 +334,18 @@ for core in "${cores[@]}"; do
 done
 echo "built in $((SECONDS - started)) s"
 
+# Without QEMU: an 8-bit core, whose int has 16 bits. simavr colours what comes by the serial port.
+if avr-gcc -mmcu=atmega328p -std=gnu99 -Os -DESO_FIXED_SELF_TEST -DESO_FIXED16_SELF_TEST \
+  -DLOOP_FIXED_SELF_TEST -I "$out/written/avr" -o "$out/avr.elf" "$folder/firmware/avr_fixed.c" \
+  "$out"/written/avr/{eso_fixed,eso_fixed16,loop_fixed}.c; then
+  pass
+  timeout 60 simavr -m atmega328p -f 16000000 "$out/avr.elf" 2>&1 |
+    sed 's/\x1b\[[0-9;]*m//g; s/\.$//' >"$out/avr.txt" || true
+else
+  fail "the C in integers for the AVR"
+  : >"$out/avr.txt"
+fi
+
 for core in ${built[@]+"${built[@]}"}; do
   for image in firmware firmware_exact drive drive_make controllers written_c written_fixed \
     fixed_drive; do
@@ -416,6 +428,14 @@ done
       "$(value "$runs" count eso_fixed 3) | $(value "$runs" count eso_fixed16 3) |" \
       "$(written_bytes "$core" loop_fixed) | $(value "$runs" size loop_fixed 3) | $(value "$runs" count loop_fixed 3) |"
   done
+  echo
+  echo "On an ATmega328P (\`max_gap\` 2, -Os, simavr): $(value "$out/avr.txt" count eso_fixed 3) cycles," \
+    "$(value "$out/avr.txt" count eso_fixed16 3) with 16 bits, $(value "$out/avr.txt" count loop_fixed 3) for the controller"
+  echo
+  echo "**What rounding does at most** to the disturbance of \`LinearEso<2>\`, as a share of what half a count" \
+    "of y does"
+  echo
+  "$(image firmware-host fixed_bounds)"
 } >"$out/table.md"
 cat "$out/table.md"
 echo
@@ -447,6 +467,9 @@ for core in ${built[@]+"${built[@]}"}; do
       "$(value "$out/$core-written_fixed.txt" count "${names[i]}" 3)" "${most[i]}"
   done
 done
+
+limit "AVR: cycles of eso_fixed" "$(value "$out/avr.txt" count eso_fixed 3)" 1100
+if grep -q '^done' "$out/avr.txt"; then pass; else fail "the C in integers differs on the AVR"; fi
 
 # Only a complete table goes into the page.
 if ((failed == 0)); then

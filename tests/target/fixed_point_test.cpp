@@ -2,6 +2,10 @@
 // adversarial input; a broken rounding does not. Nothing overflows at the ends of the ranges.
 #include <target/fixed_play.hpp>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/core/error_text.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
@@ -309,6 +313,92 @@ TEST(FixedPoint, ACounterWraps) {
   EXPECT_EQ(c.update(c.state.data(), static_cast<std::uint16_t>((at + 40) % 4096), 0), 1u);
 }
 
+/// What a run of a loop is judged by.
+struct Criteria {
+  double error = 0;      ///< integral of abs(r - y) over the steps of reference and load
+  double overshoot = 0;  ///< by the step
+  double input = 0;      ///< integral of abs(u)
+};
+
+/// A step of the reference to `size` and one of the load, y in counts to both. @param step gives u
+/// in physical units for y and r in counts
+template <class Step>
+Criteria judged(int order, double friction, double time, double gain, double unit,
+                std::int32_t size, double load, Step&& step) {
+  Criteria found;
+  double y = 0;
+  double v = 0;
+  double u = 0;
+  const int samples = 4000;
+  for (int k = 0; k < samples; ++k) {
+    const std::int32_t r = k < 50 ? 0 : size;
+    u = step(static_cast<std::int32_t>(std::lround(y / unit)), r);
+    for (int i = 0; i < 20; ++i) {
+      const double a = gain * u - (k > samples / 2 ? load : 0);
+      const double h = time / 20;
+      if (order == 2) {
+        y += h * v;
+        v += h * (a - friction * v);
+      } else {
+        y += h * (a - friction * y);
+      }
+    }
+    found.error += std::fabs(r * unit - y) * time;
+    found.overshoot = std::max(found.overshoot, y / (size * unit) - 1);
+    found.input += std::fabs(u) * time;
+  }
+  return found;
+}
+
+template <class C>
+void judges_the_same(const typename C::Config& config, const FixedPointOptions& options,
+                     double friction, double gain, std::int32_t size, double load) {
+  const auto made = to_fixed_c(C::make(config).value(), options).value();
+  const Folder folder;
+  FixedInC<std::int32_t> c(folder, made.code, "gcc -std=c99", true);
+  ASSERT_TRUE(c.loaded());
+  C in_double = C::make(config).value();
+  const double time = config.observer.sample_time;
+  const double unit = options.y.unit;
+  const Criteria wanted = judged(
+      C::order, friction, time, gain, unit, size, load,
+      [&](std::int32_t y, std::int32_t r) {  // The timer takes whole counts of this one, too.
+        const double u = in_double.update(y * unit, r * unit);
+        const double held = options.u.unit * std::round(u / options.u.unit);
+        in_double.applied(held);
+        return held;
+      });
+  const Criteria found =
+      judged(C::order, friction, time, gain, unit, size, load, [&](std::int32_t y, std::int32_t r) {
+        return c.control(c.state.data(), y, r) * options.u.unit;
+      });
+  EXPECT_NEAR(found.error, wanted.error, 0.01 * wanted.error);
+  // Half a count of the innovation, as 16 bits have it, is heard in u at rest: 4 % here.
+  const double share = options.innovation_bits == 16 ? 0.05 : 0.01;
+  EXPECT_NEAR(found.input, wanted.input, share * wanted.input);
+  EXPECT_NEAR(found.overshoot, wanted.overshoot, 0.01);
+}
+
+/// In the loop fixed point is as good as double, on a servo and on a rate loop.
+TEST(FixedPoint, InTheLoopIsAsGoodAsDouble) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  for (const int bits : {16, 32}) {
+    judges_the_same<Servo>(servo_loop(), servo(bits), 3, 60, 500, 100);
+    judges_the_same<Servo>(servo_loop(500), servo(bits), 3, 60, 500, 100);
+    using Rate = Adrc<LinearEso<1>>;
+    Rate::Config rate{};
+    rate.observer = {.observer_bandwidth = 250, .input_gain = 200, .sample_time = 1e-3};
+    rate.controller_bandwidth = 50;
+    rate.limits = {.lower = -1, .upper = 1};
+    FixedPointOptions counts;  // 2000 deg/s in 16 bits, a motor command in 2000 counts
+    counts.y = {35.0 / 32768, 32767};
+    counts.u = {1.0 / 2000, 2000};
+    counts.innovation_bits = bits;
+    counts.code.name = "eso";
+    if (bits == 32) judges_the_same<Rate>(rate, counts, 5, 180, 3000, 20);
+  }
+}
+
 #endif  // ESOKIT_LOADS_C
 
 TEST(FixedPoint, RefusesByName) {
@@ -368,6 +458,21 @@ TEST(FixedPoint, RefusesWhatIsNotLinear) {
   const auto code = to_fixed_c(AdjustableBandwidthEso<2>::make(config).value(), servo());
   ASSERT_FALSE(code);
   EXPECT_STREQ(code.error().field, "observer");
+  // What is not written says so, and what to take instead.
+  const auto refused = [](const auto& object, bool in_struct = false) {
+    FixedPointOptions options = servo();
+    options.code.settings_in_struct = in_struct;
+    const auto made = to_fixed_c(object, options);
+    return made ? std::string() : std::string(made.error().rule);
+  };
+  const auto linear = observer<LinearEso<2>>(100, 1e-3);
+  EXPECT_NE(refused(linear, true).find("not written in fixed point"), std::string::npos);
+  using Wrapped = WrappedOutput<LinearEso<2>>;
+  Wrapped::Config wrapped{};
+  wrapped.observer = {
+      .observer_bandwidth = 100, .input_gain = 50, .sample_time = 1e-3, .max_gap = 2};
+  wrapped.period = 6;
+  EXPECT_NE(refused(Wrapped::make(wrapped).value()).find("y.counter_bits"), std::string::npos);
 }
 
 }  // namespace target_fixed_point_test

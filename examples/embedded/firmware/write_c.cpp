@@ -6,6 +6,7 @@
 #include <esokit/observer/linear_eso.hpp>
 #include <esokit/target/c_code.hpp>
 #include <esokit/target/fixed_point.hpp>
+#include <filesystem>
 #include <fstream>
 #include <string>
 
@@ -31,9 +32,9 @@ bool write(const std::string& folder, const std::string& name, const Config& mad
 
 template <class Made>
 bool write_fixed(const std::string& folder, const std::string& name, const Made& made,
-                 esokit::FixedPointOptions options, int innovation_bits = 32) {
+                 esokit::FixedPointOptions options, int innovation_bits = 32, int samples = 1000) {
   if (!made) return false;
-  options.code = {.name = name, .self_test_samples = 1000};
+  options.code = {.name = name, .self_test_samples = samples};
   options.innovation_bits = innovation_bits;
   const auto code = esokit::to_fixed_c(*made, options);
   if (!code) {
@@ -71,6 +72,15 @@ int main(int argc, char** argv) {
                                      drive::position_counts()) &&
                          write_fixed(argv[1], "current", drive::Current::make(drive::current()),
                                      drive::current_counts());
-  if (!written || !in_counts) std::fputs("no C was written\n", stderr);
-  return written && in_counts ? 0 : 1;
+  // For an AVR, whose 2 KiB of RAM hold the tables: in a folder of their own.
+  auto small = config;
+  small.max_gap = 2;
+  limited.observer.max_gap = 2;
+  const std::string avr = std::string(argv[1]) + "/avr";
+  std::filesystem::create_directories(avr);
+  const bool for_avr = write_fixed(avr, "eso_fixed", Eso::make(small), counts, 32, 10) &&
+                       write_fixed(avr, "eso_fixed16", Eso::make(small), counts, 16, 10) &&
+                       write_fixed(avr, "loop_fixed", Loop::make(limited), counts, 32, 10);
+  if (!written || !in_counts || !for_avr) std::fputs("no C was written\n", stderr);
+  return written && in_counts && for_avr ? 0 : 1;
 }

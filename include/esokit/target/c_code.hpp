@@ -18,6 +18,7 @@ namespace esokit {
 struct CCode {
   std::string header{};  ///< text of `name.h`
   std::string source{};  ///< text of `name.c`
+
   /// With CodeOptions::settings_in_struct: text of the struct for a file of its own, where it is
   /// not that of `name.c` but of another design, for `name_adopt`.
   std::string settings{};

@@ -34,10 +34,11 @@ struct FixedPointOptions {
   CountedSignal y{};         ///< the measurement
   CountedSignal u{};         ///< what the actuator held
   int innovation_bits = 32;  ///< 16 (fewer instructions) or 32
+
   /// For each estimate what rounding may do at most, in its unit; not given or zero: what half a
   /// count of y does.
   std::vector<double> most_deviation{};
-  double most_input_deviation = 0;  ///< the same of u, in counts; 0: half a count, or what half a
+  double most_input_deviation = 0;  ///< the same of u, in counts; 0: a count, or what half a
                                     ///< count of y does
   CodeOptions code{};               ///< name and comment
 };
@@ -344,21 +345,23 @@ class FixedDesign {
       return refuse("observer", design_->gate.threshold,
                     "is in OutlierGate, which is not written in fixed point");
     }
-    if (design_->law.kind != RunningLaw::none) {
-      return refuse("observer", 0,
-                    "has a gain that goes on at each sample: not written in fixed point");
-    }
-    if (design_->wrap.period > 0) {
-      return refuse("period", design_->wrap.period,
-                    "of WrappedOutput is not written in fixed point: give y with counter_bits");
-    }
     if (design_->predictive) {
       return refuse("controller", 0, "is PredictiveAdrc, which is not written in fixed point");
     }
-    if (design_->guard.on) {
-      return refuse("observer", 0, "is in Guarded, which is not written in fixed point");
+    if (design_->wrap.period > 0) {
+      return refuse("observer", design_->wrap.period,
+                    "is in WrappedOutput: in fixed point take the observer without it, and "
+                    "y.counter_bits");
     }
-    if (design_->options.settings_in_struct) {
+    if (design_->guard.on) {
+      return refuse("observer", design_->guard.trust,
+                    "is in Guarded, which is not written in fixed point");
+    }
+    if (design_->law.kind != RunningLaw::none) {
+      return refuse("observer", static_cast<double>(design_->law.age),
+                    "has gains that go on: in fixed point take the LinearEso that it settles to");
+    }
+    if (!design_->settings.empty()) {
       return refuse("settings_in_struct", 1, "is not written in fixed point");
     }
     if (design_->loop.divider > 1) {

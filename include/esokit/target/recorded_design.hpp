@@ -35,6 +35,7 @@ struct CodeOptions {
                                     ///< comment
   int self_test_samples = 100;      ///< samples of the self-test, 1 .. 10000
   bool watched = false;  ///< keeps what a HealthMonitor looks at: innovation, and u that was asked
+
   /// Gains, those of the law, and limits in a struct that can be changed while it runs, instead of
   /// constants: in C, for gains that do not depend on the innovation or the time.
   bool settings_in_struct = false;
@@ -180,12 +181,12 @@ struct RecordAccess {
   template <class Loop>
   static LoopRules rules(const Loop& loop) noexcept {
     return {loop.hold_left_,
-            loop.missing_limit_,
-            loop.divider_,
-            loop.has_safe_input_,
-            loop.stay_safe_,
-            static_cast<double>(loop.hold_input_),
-            static_cast<double>(loop.safe_input_)};
+            loop.set_.missing_limit,
+            loop.set_.divider,
+            loop.set_.has_safe_input,
+            loop.set_.stay_safe,
+            static_cast<double>(loop.set_.hold_input),
+            static_cast<double>(loop.set_.safe_input)};
   }
 
   /// Gains, those of the law, and limits, with the beginning of their names. @param c a controller
