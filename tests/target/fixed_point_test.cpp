@@ -399,6 +399,40 @@ TEST(FixedPoint, InTheLoopIsAsGoodAsDouble) {
   }
 }
 
+/// Other compilers take it, and of MISRA C:2012 nothing is found but the deviations that the file
+/// names.
+TEST(FixedPoint, CompilesWithOtherCompilers) {
+  for (const FixedPointOptions& options : {servo(), counter()}) {
+    const auto made = to_fixed_c(Servo::make(servo_loop(500)).value(), options).value();
+    const Folder folder;
+    folder.write("eso.h", made.code.header);
+    folder.write("eso.c", made.code.source);
+    folder.write("eso.cpp", made.code.source);
+    const auto compiles = [&](const std::string& compiler, const std::string& file,
+                              const std::string& flags = strict) {
+      return !there(compiler.substr(0, compiler.find(' '))) ||
+             runs(compiler + " " + flags + " -DESO_SELF_TEST -c -o " + folder.file("eso.o") + " " +
+                  folder.file(file));
+    };
+    EXPECT_TRUE(compiles("g++ -std=c++11", "eso.cpp"));
+    EXPECT_TRUE(compiles("clang -std=c99", "eso.c"));
+    EXPECT_TRUE(compiles("tcc", "eso.c", "-Wall -Werror"));
+    EXPECT_TRUE(compiles("sdcc -mstm8 --std-c99", "eso.c", ">/dev/null 2>&1"));
+    EXPECT_TRUE(compiles("avr-gcc -std=c99 -Os -mmcu=atmega328p", "eso.c"));
+    if (!there("cppcheck")) continue;
+    const auto finds_nothing = [&](const std::string& deviations) {
+      return runs("cppcheck --addon=misra --std=c99 -q --error-exitcode=1 " + deviations +
+                  folder.file("eso.c") + " >/dev/null 2>&1");
+    };
+    std::string deviations = "--suppress=missingIncludeSystem ";
+    for (const char* rule : {"2.3", "2.5", "15.5"}) {
+      deviations += std::string("--suppress=misra-c2012-") + rule + " ";
+    }
+    EXPECT_FALSE(finds_nothing(deviations)) << "it finds no deviation that is there";
+    EXPECT_TRUE(finds_nothing(deviations + "--suppress=misra-c2012-10.1 "));
+  }
+}
+
 #endif  // ESOKIT_LOADS_C
 
 TEST(FixedPoint, RefusesByName) {
