@@ -9,6 +9,7 @@
 #include <esokit/control/adrc.hpp>
 #include <esokit/core/error_text.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
+#include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
 #include <esokit/observer/half_gain_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
@@ -102,6 +103,26 @@ TEST(FixedPoint, StaysWithinItsBounds) {
   EXPECT_GT((stays_within<std::int32_t>(observer<LinearEso<3>>(60, 1e-3), servo(), 8)), 0.3);
   using Ramp = LinearEso<1, double, 2>;
   EXPECT_GT((stays_within<std::int32_t>(observer<Ramp>(60, 1e-3), servo(), 9)), 0.3);
+}
+
+/// AlgebraicEso as it is once it has settled.
+TEST(FixedPoint, OfASettledAlgebraicObserver) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  AlgebraicEso<2>::Config config{};
+  config.observer_bandwidth = 100;
+  config.frequency_shift = 50;
+  config.sample_time = 1e-3;
+  config.input_gain = 50;
+  auto object = AlgebraicEso<2>::make(config).value();
+  EXPECT_FALSE(to_fixed_c(object, servo()));
+  for (int k = 0; k < 100000 && !object.settled(); ++k) (void)object.update(0.0, 0.0);
+  ASSERT_TRUE(object.settled());
+  EXPECT_GT((stays_within<std::int32_t>(object, servo(), 13)), 0.3);
+  const auto linear = to_fixed_c(observer<LinearEso<2>>(100, 1e-3), servo()).value();
+  const auto settled = to_fixed_c(object, servo()).value();
+  for (std::size_t i = 0; i < linear.written.a.size(); ++i) {
+    EXPECT_NEAR(settled.written.a[i], linear.written.a[i], 1e-4);
+  }
 }
 
 /// 10 rad/s at 20 kHz: what is left over is kept.

@@ -299,10 +299,7 @@ class FixedText {
     std::string correct_m;
     std::string correct_p;
     for (int row = 0; row < d_.table_rows(); ++row) {
-      std::vector<double> given{FixedDesign::column};
-      for (const double k : design_.gap_gains[static_cast<std::size_t>(row)]) given.push_back(k);
-      auto rows = d_.rows_of("correct_by", given);
-      for (const std::size_t i : d_.first_of_level) rows[i][n] -= 1;
+      const auto rows = d_.correction_rows(row + 1);
       correct_m += "    {\n";
       correct_p += "    {\n";
       matrix(rows, 1, correct_m, correct_p, "      ");
@@ -496,7 +493,8 @@ class FixedText {
 /// estimate. After a gap they hold again as the state that it left decays.
 ///
 /// Written are observers whose update is linear (LinearEso, also with a set of poles, HalfGainEso,
-/// CascadeEso) and Adrc around them up to order 2. A limit of rate may be below one count a sample.
+/// CascadeEso, and AlgebraicEso once it has settled: it stays so, and restarts after any gap) and
+/// Adrc around them up to order 2. A limit of rate may be below one count a sample.
 /// @param object as `make` returned it; the C begins at rest at zero
 /// @return error, with what would do, for ranges that 32 bits cannot hold, a bound above what is
 ///         allowed, and designs that are not linear or have what is not written in fixed point
