@@ -186,6 +186,7 @@
 #include <esokit/target/fixed_design.hpp>
 #include <esokit/target/fixed_point.hpp>
 #include <esokit/target/fixed_text.hpp>
+#include <esokit/target/health_code.hpp>
 #include <esokit/target/integer_list.hpp>
 #include <esokit/target/list_writer.hpp>
 #include <esokit/target/profile_code.hpp>

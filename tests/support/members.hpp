@@ -6,6 +6,7 @@
 #include <array>
 #include <complex>
 #include <cstddef>
+#include <esokit/core/lanes.hpp>
 #include <esokit/core/matrix.hpp>
 #include <limits>
 #include <optional>
@@ -22,55 +23,12 @@ struct IsOptional : std::false_type {};
 template <class T>
 struct IsOptional<std::optional<T>> : std::true_type {};
 
-/// Converts to a member of any type. Not to an optional itself: that is made of what it holds, and
-/// both ways would be ambiguous.
-struct Anything {
-  template <class T>
-  requires(!IsOptional<T>::value) operator T() const;
-};
-
-template <class T, class... Given>
-constexpr std::size_t count(Given... given) {
-  static_assert(sizeof...(given) < 20, "a config of more members needs more bindings below");
-  if constexpr (requires { T{given..., Anything{}}; }) {
-    return count<T>(given..., Anything{});
-  } else {
-    return sizeof...(given);
-  }
-}
-
 }  // namespace members
 
-/// f(member) for each direct member of an aggregate. If they were counted wrong, the bindings do
-/// not compile.
+/// f(member) for each direct member of an aggregate, as the library finds them for packs.
 template <class T, class F>
 void each_member(T& o, const F& f) {
-  constexpr std::size_t count = members::count<std::remove_const_t<T>>();
-#define ESOKIT_BINDINGS(number, ...)                   \
-  if constexpr (count == number) {                     \
-    auto& [__VA_ARGS__] = o;                           \
-    [&](auto&... all) { (f(all), ...); }(__VA_ARGS__); \
-  }
-  ESOKIT_BINDINGS(1, a)
-  ESOKIT_BINDINGS(2, a, b)
-  ESOKIT_BINDINGS(3, a, b, c)
-  ESOKIT_BINDINGS(4, a, b, c, d)
-  ESOKIT_BINDINGS(5, a, b, c, d, e)
-  ESOKIT_BINDINGS(6, a, b, c, d, e, g)
-  ESOKIT_BINDINGS(7, a, b, c, d, e, g, h)
-  ESOKIT_BINDINGS(8, a, b, c, d, e, g, h, i)
-  ESOKIT_BINDINGS(9, a, b, c, d, e, g, h, i, j)
-  ESOKIT_BINDINGS(10, a, b, c, d, e, g, h, i, j, k)
-  ESOKIT_BINDINGS(11, a, b, c, d, e, g, h, i, j, k, l)
-  ESOKIT_BINDINGS(12, a, b, c, d, e, g, h, i, j, k, l, m)
-  ESOKIT_BINDINGS(13, a, b, c, d, e, g, h, i, j, k, l, m, n)
-  ESOKIT_BINDINGS(14, a, b, c, d, e, g, h, i, j, k, l, m, n, p)
-  ESOKIT_BINDINGS(15, a, b, c, d, e, g, h, i, j, k, l, m, n, p, q)
-  ESOKIT_BINDINGS(16, a, b, c, d, e, g, h, i, j, k, l, m, n, p, q, r)
-  ESOKIT_BINDINGS(17, a, b, c, d, e, g, h, i, j, k, l, m, n, p, q, r, s)
-  ESOKIT_BINDINGS(18, a, b, c, d, e, g, h, i, j, k, l, m, n, p, q, r, s, t)
-  ESOKIT_BINDINGS(19, a, b, c, d, e, g, h, i, j, k, l, m, n, p, q, r, s, t, u)
-#undef ESOKIT_BINDINGS
+  esokit::detail::LaneAccess::with_members(o, [&](auto&... all) { (f(all), ...); });
 }
 
 /// What a setting of one number may be changed to: its neighbours, or what other settings are.

@@ -46,7 +46,7 @@ static_assert(!Writable<ExtendedStateFilter<2, double, 1, NominalSpring>> &&
               !Writable<DelayedInput<WrappedOutput<OutlierGate<LinearEso<2>>>, 4>> &&
               !Writable<ModelEso<follows>> && !Writable<Guarded<LinearEso<2, double, 2>>> &&
               !Writable<Guarded<ModelEso<lag>>> && !Writable<VariableTime<LinearEso<2>>> &&
-              !Writable<PredictiveAdrc<LinearEso<2>>> &&
+              !Writable<PredictiveAdrc<AlgebraicEso<2>>> &&
               !Writable<MimoAdrc<LinearEso<1>, LinearEso<1>>>);
 
 #ifdef ESOKIT_LOADS_C

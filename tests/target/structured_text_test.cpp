@@ -3,6 +3,7 @@
 // samples, gaps, reported u and starts.
 #include <cstdio>
 #include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/guarded.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
@@ -175,6 +176,14 @@ TEST(StructuredText, RefusesByName) {
             "observer: has a gain that goes on at each sample: not written in Structured Text");
   EXPECT_EQ(refusal(Angle::make(observer_config<Angle>(8)).value()),
             "period: of WrappedOutput is not written in Structured Text");
+  using Held = Guarded<LinearEso<1, double>>;
+  EXPECT_EQ(refusal(Held::make(observer_config<Held>(8)).value()),
+            "guarded: is not written in Structured Text");
+  using Ahead = PredictiveAdrc<LinearEso<1, double>>;
+  Ahead::Config ahead{.observer = observer_config<LinearEso<1, double>>(8)};
+  ahead.controller_bandwidth = 3;
+  EXPECT_EQ(refusal(Ahead::make(ahead).value()),
+            "PredictiveAdrc: is not written in Structured Text");
 }
 
 }  // namespace target_structured_text_test

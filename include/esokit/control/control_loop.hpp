@@ -170,7 +170,7 @@ class ControlLoop {
   /// template, as an explicit instantiation would ask it of every observer.
   template <class O = Observer>
   requires(detail::LaneAccess::steps<O>) ESOKIT_INLINE bool advance() noexcept {
-    const bool ordinary = special_ == false || (mode_ == LoopMode::running && divider_ == 1);
+    const bool ordinary = special_ == false || (mode_ == LoopMode::running && set_.divider == 1);
     return ordinary && detail::LaneAccess::advance(observer_);
   }
   template <class Law>
@@ -184,9 +184,7 @@ class ControlLoop {
 
   /// What the actuator held since the last step, if it was not the last output: before the step.
   /// A u that is not finite changes nothing.
-  void applied(S u) noexcept {
-    limiter_.track(select(is_finite(u), u, limiter_.last()));
-  }
+  void applied(S u) noexcept { limiter_.track(select(is_finite(u), u, limiter_.last())); }
 
   /// One sample: the observer's update, then the law.
   /// @param measured measurement at sample k, NaN if missing
@@ -265,17 +263,10 @@ class ControlLoop {
     const S last = limiter_.last();
     limiter_ = fresh.limiter_;
     limiter_.track(last);
-    hold_input_ = fresh.hold_input_;
-    safe_input_ = fresh.safe_input_;
-    missing_limit_ = fresh.missing_limit_;
     // After a change of the divider the next update is one with a measurement.
-    if (divider_ != fresh.divider_) phase_ = 0;
-    divider_ = fresh.divider_;
-    watched_ = fresh.watched_;
+    if (set_.divider != fresh.set_.divider) phase_ = 0;
+    set_ = fresh.set_;
     set_mode(mode_);
-    has_safe_input_ = fresh.has_safe_input_;
-    stay_safe_ = fresh.stay_safe_;
-    if constexpr (has_step_time) limits_ = fresh.limits_;
     return {};
   }
 
@@ -285,7 +276,7 @@ class ControlLoop {
   requires(observer_traits<O>.varies_time) Check<S> set_step_time(const S& seconds)
   noexcept {
     if (auto ok = observer_.set_step_time(seconds); !ok) return ok;
-    auto limiter = Limiter<S>::make(limits_, seconds);
+    auto limiter = Limiter<S>::make(set_.limits, seconds);
     if (!limiter) return limiter.error();
     limiter->track(limiter_.last());
     limiter_ = *limiter;
@@ -305,7 +296,7 @@ class ControlLoop {
   /// What determines the output at present.
   [[nodiscard]] Lanes<LoopMode, S> mode() const noexcept { return mode_; }
   /// D: a measurement is due at every D-th step.
-  [[nodiscard]] Lanes<int, S> measurement_divider() const noexcept { return divider_; }
+  [[nodiscard]] Lanes<int, S> measurement_divider() const noexcept { return set_.divider; }
   /// The limits, and the output that they last let through.
   [[nodiscard]] const Limiter<S>& limiter() const noexcept { return limiter_; }
 
@@ -314,30 +305,42 @@ class ControlLoop {
   friend class ControlLoop;
   friend struct detail::LaneAccess;
   friend struct detail::RecordAccess;
-  struct Nothing {};
   static constexpr bool has_step_time = observer_traits<Observer>.varies_time;
-
-  static constexpr int data_members = 16;
+  static constexpr int data_members = 9;
+  struct NoLimits {
+    constexpr NoLimits() = default;
+    constexpr explicit NoLimits(const Limits<S>&) {}
+  };
+  /// What a retune replaces.
+  struct Set {
+    S hold_input{};
+    S safe_input{};
+    Lanes<std::uint16_t, S> missing_limit{};
+    Lanes<std::uint16_t, S> divider{};
+    Lanes<bool, S> watched{};
+    Lanes<bool, S> has_safe_input{};
+    Lanes<bool, S> stay_safe{};
+    [[no_unique_address]] std::conditional_t<has_step_time, Limits<S>, NoLimits> limits{};
+  };
 
   ControlLoop(const Observer& observer, const Limiter<S>& limiter, const LoopSettings<S>& settings,
               std::uint32_t hold_samples, bool watched) noexcept
       : observer_(observer),
         limiter_(limiter),
-        hold_input_(settings.start_hold.input),
-        safe_input_(settings.missing.input.value_or(S(0))),
+        set_{settings.start_hold.input,
+             settings.missing.input.value_or(S(0)),
+             static_cast<std::uint16_t>((settings.missing.most + 1) * settings.measurement_divider),
+             static_cast<std::uint16_t>(settings.measurement_divider),
+             watched,
+             settings.missing.input.has_value(),
+             settings.missing.stay,
+             decltype(Set::limits)(settings.limits)},
         hold_left_(hold_samples),
-        divider_(static_cast<std::uint16_t>(settings.measurement_divider)),
-        mode_(hold_samples > 0 ? LoopMode::start_hold : LoopMode::running),
-        watched_(watched),
-        has_safe_input_(settings.missing.input.has_value()),
-        stay_safe_(settings.missing.stay) {
-    missing_limit_ =
-        static_cast<std::uint16_t>((settings.missing.most + 1) * settings.measurement_divider);
-    if constexpr (has_step_time) limits_ = settings.limits;
+        mode_(hold_samples > 0 ? LoopMode::start_hold : LoopMode::running) {
     set_mode(mode_);
     // The output before the first step is the hold input, or the value nearest to it within the
     // limits.
-    if (hold_samples > 0) limiter_.track(limiter_.within(hold_input_));
+    if (hold_samples > 0) limiter_.track(limiter_.within(set_.hold_input));
   }
 
   /// One sample with a u from elsewhere.
@@ -376,7 +379,7 @@ class ControlLoop {
       return;
     }
     phase_ = next_phase();
-    const bool as_planned = observer_.missed() == divider_ - 1;
+    const bool as_planned = observer_.missed() == set_.divider - 1;
     status_ = observe<Advanced>(measured, drive);
     if (status_ == StepStatus::ok && mode_ == LoopMode::running) return;
     after_trouble(measured);
@@ -400,47 +403,40 @@ class ControlLoop {
 
   void judge_missing() noexcept {
     const int missed = observer_.missed();
-    if (missed >= missing_limit_) {
+    if (missed >= set_.missing_limit) {
       set_mode(LoopMode::safe);
-    } else if (mode_ == LoopMode::safe && !stay_safe_ && missed < divider_) {
+    } else if (mode_ == LoopMode::safe && !set_.stay_safe && missed < set_.divider) {
       set_mode(LoopMode::running);
     }
   }
 
   /// The output if the law does not determine it.
   [[nodiscard]] ESOKIT_COLD S other_output() noexcept {
-    if (mode_ == LoopMode::safe) return has_safe_input_ ? safe_input_ : limiter_.last();
+    if (mode_ == LoopMode::safe) return set_.has_safe_input ? set_.safe_input : limiter_.last();
     // The step in which the hold ends is still held.
     if (--hold_left_ == 0) set_mode(LoopMode::running);
-    return hold_input_;
+    return set_.hold_input;
   }
 
   void set_mode(Lanes<LoopMode, S> mode) noexcept {
     mode_ = mode;
-    special_ = !(mode == LoopMode::running) || !(divider_ == 1) || watched_ == true;
+    special_ = !(mode == LoopMode::running) || !(set_.divider == 1) || set_.watched == true;
   }
 
   [[nodiscard]] std::uint16_t next_phase() const noexcept {
-    return static_cast<std::uint16_t>(phase_ + 1 == divider_ ? 0 : phase_ + 1);
+    return static_cast<std::uint16_t>(phase_ + 1 == set_.divider ? 0 : phase_ + 1);
   }
 
   Observer observer_;
   Limiter<S> limiter_;
   S requested_{};
-  S hold_input_;
-  S safe_input_;
+  [[no_unique_address]] Set set_;  // its padding holds what is next
+  Status status_ = StepStatus::ok;
   Lanes<std::uint32_t, S> hold_left_;
-  Lanes<std::uint16_t, S> missing_limit_{};
-  Lanes<std::uint16_t, S> divider_;
   Lanes<std::uint16_t, S> phase_{};
   Lanes<LoopMode, S> mode_;
-  Lanes<bool, S> watched_{false};
   /// True if anything besides the law has to be done: one test in the hot path.
   Lanes<bool, S> special_{false};
-  Lanes<bool, S> has_safe_input_;
-  Lanes<bool, S> stay_safe_;
-  Status status_ = StepStatus::ok;
-  [[no_unique_address]] std::conditional_t<has_step_time, Limits<S>, Nothing> limits_{};
 };
 
 }  // namespace esokit

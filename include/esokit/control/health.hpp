@@ -264,6 +264,7 @@ class HealthMonitor {
   }
 
  private:
+  friend struct detail::RecordAccess;
   explicit HealthMonitor(const Config& config) noexcept
       : range_(config.input_range), divider_(config.divider) {
     const S x = config.observer_bandwidth * config.sample_time;

@@ -19,6 +19,13 @@
 
 namespace esokit {
 
+namespace detail {
+
+/// What was told of the present sample.
+enum class PredictivePhase : unsigned char { prepared, measured, missing };
+
+}  // namespace detail
+
 /// Config of PredictiveAdrc. Give `controller_bandwidth` or `gains`, not both.
 template <PredictableObserver Observer>
 struct PredictiveAdrcConfig {
@@ -69,7 +76,10 @@ class PredictiveAdrc {
   using scalar_type = typename Observer::scalar_type;  ///< type of signals and settings
   using S = scalar_type;                               ///< the same type
   using Estimate = typename Observer::Estimate;        ///< (y, .., y^(n-1), d, ..), N x 1
-  using Reference = esokit::Reference<order, S>;       ///< r, `{r, r1}` or a vector
+  template <class T>
+  using with_scalar =
+      PredictiveAdrc<detail::WithScalar<Observer, T>>;  ///< the same with another scalar
+  using Reference = esokit::Reference<order, S>;        ///< r, `{r, r1}` or a vector
 
   /// What the controller can do beyond `update(y, reference)`.
   static constexpr ControllerTraits traits{
@@ -236,7 +246,10 @@ class PredictiveAdrc {
 
  private:
   using Weights = Array<S, order + 1>;
-  enum class Phase : unsigned char { prepared, measured, missing };
+  using Phase = detail::PredictivePhase;
+  friend struct detail::LaneAccess;
+  friend struct detail::RecordAccess;
+  static constexpr int data_members = 21;
 
   /// What is known about the gain before the measurement.
   static constexpr GainKind kind = observer_traits<Observer>.gain_kind;
@@ -329,19 +342,12 @@ class PredictiveAdrc {
   /// Computes all parts of the next u that do not need the measurement.
   void arm() noexcept {
     settled_ = false;
-    feed_ = detail::weighed<0, order + 1>(feeds_, reference_);
-    const S tail = detail::weighed_estimates<1, order>(weights_, observer_);
-    const S ahead = detail::weighed<1, order>(feeds_, reference_);
-    blind_ =
-        weights_[0] * (reference_[0] - observer_.template scaled_estimate<0>()) + (ahead - tail);
+    look_ahead();
     if constexpr (preset) {
       if (Observer::levels > 1 || !measures_first_row || observer_.restarts()) {
-        arm_by_preview();
+        arm_by(observer_.preview());
       } else if constexpr (Observer::levels == 1) {
-        const auto gain = observer_.correction_gain(S(0.0));
-        slope_ = weigh(gain);
-        offset_ = blind_ + slope_ * observer_.template scaled_estimate<0>();
-        guard_ = observer_.finite_probe(gain);
+        arm_by(observer_.correction_gain(S(0.0)));
       }
     } else {
       offset_ = observer_.template scaled_estimate<0>();
@@ -364,17 +370,39 @@ class PredictiveAdrc {
     if (hold_left_ > 0) [[unlikely]]
       settle_for(S(0.0));
     // If this is not finite, u would be NaN with a measurement, and a NaN passes the limits.
-    const auto good = is_finite(blind_);
-    if (!all(good) || !all(is_finite(offset_)) || !all(is_finite(slope_))) [[unlikely]]
-      settle_for(select(good, blind_, limiter_.last()));
+    if (!all(is_finite(blind_)) || !all(is_finite(offset_)) || !all(is_finite(slope_)))
+        [[unlikely]] {
+      settle_for_blind();
+    }
+  }
+
+  /// u without a measurement.
+  void look_ahead() noexcept {
+    feed_ = detail::weighed<0, order + 1>(feeds_, reference_);
+    const S tail = detail::weighed_estimates<1, order>(weights_, observer_);
+    const S ahead = detail::weighed<1, order>(feeds_, reference_);
+    blind_ =
+        weights_[0] * (reference_[0] - observer_.template scaled_estimate<0>()) + (ahead - tail);
+  }
+
+  /// For the gain of the next correction.
+  void arm_by(const ScaledGain<Observer::size, S>& gain) noexcept {
+    slope_ = weigh(gain);
+    offset_ = blind_ + slope_ * observer_.template scaled_estimate<0>();
+    guard_ = observer_.finite_probe(gain);
   }
 
   /// For cascades, and if the observer will restart.
-  void arm_by_preview() noexcept {
-    const auto next = observer_.preview();
+  template <class Preview>
+  requires requires(const Preview& next) { next.slope; }
+  void arm_by(const Preview& next) noexcept {
     slope_ = weigh(next.slope);
     offset_ = feed_ - weigh(next.offset);
     guard_ = observer_.finite_probe(next.slope);
+  }
+
+  void settle_for_blind() noexcept {
+    settle_for(select(is_finite(blind_), blind_, limiter_.last()));
   }
 
   /// The next u does not depend on y.

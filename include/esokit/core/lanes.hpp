@@ -141,7 +141,9 @@ struct LaneAccess {
           return count_members<T>();
         }
       }();
-      static_assert(count <= 17, "esokit: a class of more data members needs more bindings here");
+      static_assert(count <= 19 || count == 21,
+                    "esokit: a class of more data members needs more bindings here");
+/// @cond
 #define ESOKIT_BIND(number, ...)   \
   if constexpr (count == number) { \
     auto& [__VA_ARGS__] = object;  \
@@ -164,7 +166,11 @@ struct LaneAccess {
       ESOKIT_BIND(15, a, b, c, d, e, f, g, h, i, j, k, l, m, n, o)
       ESOKIT_BIND(16, a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p)
       ESOKIT_BIND(17, a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q)
+      ESOKIT_BIND(18, a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r)
+      ESOKIT_BIND(19, a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s)
+      ESOKIT_BIND(21, a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t, u)
 #undef ESOKIT_BIND
+      /// @endcond
     }
   }
   /// Not constrained friend templates: Clang 16 takes their constraints for those of another

@@ -47,6 +47,7 @@ struct MatrixTransition {
 
   template <class T>
   using with_scalar = MatrixTransition<Size, T>;  ///< the same with another scalar
+
   /// Phi of a model.
   template <class Model>
   static MatrixTransition of(const Model& model) noexcept {

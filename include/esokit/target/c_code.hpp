@@ -18,6 +18,7 @@ namespace esokit {
 struct CCode {
   std::string header{};  ///< text of `name.h`
   std::string source{};  ///< text of `name.c`
+
   /// With CodeOptions::settings_in_struct: text of the struct for a file of its own, where it is
   /// not that of `name.c` but of another design, for `name_adopt`.
   std::string settings{};
@@ -166,6 +167,7 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
     for (const double k : gains) row += (row.empty() ? "    {" : ", ") + writer.number(k);
     table += row + "},\n";
   }
+  const std::string gains_of_table = table;
   const std::string rows_of_table = std::to_string(design.max_gap + 1);
   if (!runs) {
     const std::size_t count = design.gap_gains[0].size();
@@ -229,6 +231,9 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
       {"$SIZE", std::to_string(runs ? 0 : design.gap_gains[0].size())},
       {"$ADOPT", opens ? c_header_adopt : ""},
       {"$TRACK", design.is_controller ? "    (void)applied(o, o->u_last);\n" : ""},
+      {"$GAP_GAINS", gains_of_table},
+      {"$ARM_GAINS", call_gains},
+      {"$HOLDu", std::to_string(design.hold) + "u"},
       {"$TABLE", runs ? "" : table},
       {"$OF_TABLE", runs    ? ""
                     : opens ? "    const $real *k = o->settings->gains[elapsed - 1u];\n"
@@ -348,12 +353,14 @@ inline Words c_loop_words(const RecordedDesign& design, const ListWriter& writer
 
 /// What the texts need of an observer.
 inline Words c_observer_words(const RecordedDesign& design) {
-  return {{"$LIMITS", ""},
-          {"$COLUMNS", "y, u, the disturbance"},
-          {"$RESULT",
-           "$real result;\n    (void)$name_update(&o, samples[i][0], samples[i][1]);\n"
-           "    result = $name_estimate(&o, $ORDERu);"},
-          {"$ORDER", std::to_string(design.order)}};
+  return {
+      {"$LIMITS", ""},
+      {"$COLUMNS", design.predictive ? "y, next r, u" : "y, u, the disturbance"},
+      {"$RESULT", design.predictive
+                      ? "const $real result = $name_update(&o, samples[i][0], samples[i][1]);"
+                      : "$real result;\n    (void)$name_update(&o, samples[i][0], samples[i][1]);\n"
+                        "    result = $name_estimate(&o, $ORDERu);"},
+      {"$ORDER", std::to_string(design.order)}};
 }
 
 /// The two files of a design.
@@ -365,7 +372,10 @@ inline CCode c_texts(const RecordedDesign& design, const std::string& mark) {
   std::string lists;
   for (std::size_t i = 0; i < design.names.size(); ++i) {
     const std::string& name = design.names[i].name;
-    if ((design.gate.threshold > 0 || design.law.watches) && name == "observe") continue;
+    if ((design.gate.threshold > 0 || design.law.watches || design.predictive) &&
+        name == "observe") {
+      continue;
+    }
     if (name == "filter_to_limit" && !design.law.returns) continue;
     lists += c_function(writer, design.options.name, design.names[i], design.calls[i]);
   }
@@ -397,7 +407,7 @@ inline CCode c_texts(const RecordedDesign& design, const std::string& mark) {
   if (gated) {
     add(c_source_gate);
     correct = update = "gated";
-  } else if (!design.law.watches) {
+  } else if (!design.law.watches && !design.predictive) {
     add(c_source_base_update);
     if (runs) {
       add(c_source_running_update);
@@ -456,9 +466,15 @@ inline CCode c_texts(const RecordedDesign& design, const std::string& mark) {
   }
   set = text(set);
   return {text(c_header_head) + (opens ? text(c_header_settings) : "") +
-              text(controls ? c_header_controller : c_header_observer) + text(c_header_tail),
-          text(c_source_head) + set + lists + text(law_text) + text(c_source_observer_part) +
-              text(layers) + text(controls ? c_source_controller : c_source_observer) +
+              text(controls            ? c_header_controller
+                   : design.predictive ? c_header_predictive
+                                       : c_header_observer) +
+              text(c_header_tail),
+          text(c_source_head) + c_source_recorded + set + lists + text(law_text) +
+              text(c_source_observer_part) + text(layers) +
+              text(controls            ? c_source_controller
+                   : design.predictive ? c_source_predictive
+                                       : c_source_observer) +
               (opens ? text(c_source_adopt) : "") + text(c_source_self_test),
           opens ? "#include \"" + design.options.name + ".h\"\n\n" + set : ""};
 }
@@ -501,7 +517,9 @@ inline CCode c_code(const RecordedDesign& design) {
 /// `follows_speed`), AlgebraicEso, ExtendedStateFilter (in its modes recursive and frozen, without
 /// a nominal model), these in DelayedInput and OutlierGate or WrappedOutput, LinearEso and
 /// CascadeEso in Guarded, too (bound, leak and trust; no pin, hold or changing b0), and Adrc of
-/// both forms and DisturbanceCompensator around them. Others do not compile.
+/// both forms and DisturbanceCompensator around them, and PredictiveAdrc around one of a single
+/// level with constant gains and no sensor in its model, without an adapter. Others do not compile.
+/// SmoothProfile and HealthMonitor: target/profile_code.hpp and target/health_code.hpp.
 /// @param object as `make` returned it: its state is that of `init`
 /// @return error for a name that is no identifier, a comment that would end the one it stands in, a
 ///         number of samples of the self-test out of range, or a gain law of your own whose gain
@@ -523,8 +541,8 @@ void to_c(const Other&, const CodeOptions& = {}) {
       "AdjustableBandwidthEso, NonlinearEso, ModelEso, PlantEso, AlgebraicEso and "
       "ExtendedStateFilter, these in DelayedInput and OutlierGate or WrappedOutput, on the "
       "chain with one extended state in Guarded, and "
-      "Adrc and DisturbanceCompensator around them; no other gains, adapters or "
-      "controllers yet");
+      "Adrc and DisturbanceCompensator around them, and PredictiveAdrc around one with constant "
+      "gains; no other gains, adapters or controllers yet");
 }
 
 }  // namespace esokit

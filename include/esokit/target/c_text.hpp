@@ -93,6 +93,170 @@ $real $name_estimate(const $name_state *o, unsigned row);
 
 )";
 
+/// The header of a controller in two phases.
+inline constexpr const char* c_header_predictive = R"(typedef struct {
+$MEMBERS  $real measurement;
+  uint32_t hold_left; /* samples of the start hold */
+  uint16_t gap; /* samples since the last measurement that was taken */
+  uint8_t phase; /* 1: y was told, 2: it is missing */
+  uint8_t status;
+} $name_state;
+
+/* At rest at y = 0, u = 0, the reference 0. Call it before all else. */
+void $name_init($name_state *o);
+/* Takes over a plant at rest at y under u; the reference is y. Returns a status. */
+unsigned $name_start($name_state *o, $real y, $real u);
+/* Restarts at (y, 0, .., 0), and the start hold. Returns a status. */
+unsigned $name_reset($name_state *o, $real y);
+/* At the sample: y (NaN if it is missing); returns the u to be held until the next. */
+$real $name_control($name_state *o, $real y);
+/* The same without a measurement. */
+$real $name_control_without_measurement($name_state *o);
+/* The rest, any time before the next sample, whose reference is given. Returns a status. */
+unsigned $name_prepare($name_state *o, $real next_r);
+/* Both at once. */
+$real $name_update($name_state *o, $real y, $real next_r);
+/* What the actuator really holds; only if it is not what control gave. Returns a status. */
+unsigned $name_applied($name_state *o, $real u);
+/* Estimate number 0 .. $LAST: y, y', .., and then the disturbance, in physical units. */
+$real $name_estimate(const $name_state *o, unsigned row);
+
+)";
+/// Its functions.
+inline constexpr const char* c_source_predictive =
+    R"(/* What of the next u does not need its measurement. */
+static void arm($name_state *o)
+{
+  static const $real gains[$ROWS][$SIZE] = { /* after 1, 2, .. samples */
+$GAP_GAINS  };
+  bool good;
+  if (o->hold_left > 0u) {
+    (void)arm_hold(o);
+    return;
+  }
+  if (o->gap > $ROWSu) {
+    good = arm_restart(o);
+  } else {
+    const $real *k = gains[(o->gap > 1u) ? (o->gap - 1u) : 0u];
+    good = arm_by(o$ARM_GAINS);
+  }
+  if (!good) {
+    (void)arm_blind(o);
+  }
+}
+
+void $name_init($name_state *o)
+{
+$INIT  o->measurement = $ZERO;
+  o->hold_left = $HOLDu;
+  o->gap = 0u;
+  o->phase = 0u;
+  o->status = 0u;
+}
+
+unsigned $name_start($name_state *o, $real y, $real u)
+{
+  const $name_state before = *o;
+  (void)predict_base(o, u); /* keeps it as applied */
+  if (!rest_at(o, y, u)) {
+    *o = before;
+    return $NAME_STATE_REJECTED;
+  }
+  o->gap = 0u;
+  o->hold_left = 0u;
+  (void)take_output(o, u);
+  (void)track(o);
+  o->phase = 0u;
+  (void)refer(o, y);
+  arm(o);
+  return 0u;
+}
+
+unsigned $name_reset($name_state *o, $real y)
+{
+  unsigned status = $NAME_STATE_REJECTED;
+  if (restart(o, y)) {
+    o->hold_left = $HOLDu;
+    o->phase = 0u;
+    arm(o);
+    status = 0u;
+  }
+  return status;
+}
+
+static $real control($name_state *o, $real y)
+{
+  $real u = $ZERO;
+  (void)control_by(o, y, &u);
+  o->measurement = y;
+  o->phase = 1u;
+  return u;
+}
+
+$real $name_control_without_measurement($name_state *o)
+{
+  $real u = $ZERO;
+  (void)control_blind(o, &u);
+  o->phase = 2u;
+  return u;
+}
+
+static unsigned prepare($name_state *o, $real next_r)
+{
+  unsigned status = 0u;
+  if (o->phase == 1u) {
+    status = correct_base(o, o->measurement);
+  }
+  (void)track(o);
+  status |= predict_base(o, o->u_last);
+  o->phase = 0u;
+  if (o->hold_left > 0u) {
+    o->hold_left = o->hold_left - 1u;
+  }
+  (void)refer(o, next_r);
+  arm(o);
+  o->status = (uint8_t)status;
+  return status;
+}
+
+$real $name_control($name_state *o, $real y)
+{
+  return control(o, y);
+}
+
+unsigned $name_prepare($name_state *o, $real next_r)
+{
+  return prepare(o, next_r);
+}
+
+$real $name_update($name_state *o, $real y, $real next_r)
+{
+  const $real u = control(o, y);
+  (void)prepare(o, next_r);
+  return u;
+}
+
+unsigned $name_applied($name_state *o, $real u)
+{
+  unsigned status = 0u;
+  $real held = u;
+  if (!is_finite(u)) {
+    status = $NAME_INPUT_REJECTED;
+    held = o->u_last;
+  }
+  (void)take_output(o, held);
+  if (o->phase == 0u) {
+    (void)track(o);
+    if (!revise(o, held)) {
+      status = $NAME_INPUT_REJECTED;
+    }
+    arm(o);
+  }
+  return status;
+}
+
+)";
+
 /// The header of an observer.
 inline constexpr const char* c_header_observer = R"(typedef struct {
 $MEMBERS  uint16_t gap; /* samples since the last measurement that was taken */
@@ -125,7 +289,7 @@ int $name_self_test($real tolerance);
 #endif
 )";
 
-/// Before the lists.
+/// The head of any source.
 inline constexpr const char* c_source_head =
     R"(/* Written by esokit from a finished design; do not edit. */
 $include "$name.h"
@@ -146,7 +310,11 @@ static bool is_finite($real x)
   return (bits & $exponent) != $exponent;
 }
 
-/* ---- Recorded from the design: false if a result would not be finite; then nothing has changed. */
+)";
+
+/// Before what is recorded.
+inline constexpr const char* c_source_recorded =
+    R"(/* ---- Recorded from the design: false if a result would not be finite; then nothing has changed. */
 
 )";
 

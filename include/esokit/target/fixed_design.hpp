@@ -365,6 +365,9 @@ class FixedDesign {
       return refuse("observer", design_->gate.threshold,
                     "is in OutlierGate, which is not written in fixed point");
     }
+    if (design_->predictive) {
+      return refuse("controller", 0, "is PredictiveAdrc, which is not written in fixed point");
+    }
     if (design_->wrap.period > 0) {
       return refuse("observer", design_->wrap.period,
                     "is in WrappedOutput: in fixed point take the observer without it, and "

@@ -8,6 +8,7 @@
 #include <esokit/control/smooth_profile.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/target/c_code.hpp>
+#include <esokit/target/c_text.hpp>
 #include <esokit/target/list_writer.hpp>
 #include <esokit/target/recorded_design.hpp>
 #include <string>
@@ -65,25 +66,7 @@ int $name_self_test($real tolerance);
 
 /// The counterpart of SmoothProfile and smooth_step.
 inline constexpr const char* c_profile_source =
-    R"(/* Written by esokit from a finished profile; do not edit. */
-$include "$name.h"
-
-$include <math.h>
-$include <string.h>
-
-/* Deviations from MISRA C:2012: is_finite looks at the bits of a number by memcpy (21.15), as no
- * test of its value holds under -ffast-math; functions leave early where a sample is refused (15.5,
- * advisory); a header has macros that its source may not need (2.5, advisory). */
-
-/* By its bits, so that it holds under -ffast-math, too. */
-static bool is_finite($real x)
-{
-  $word bits;
-  (void)memcpy(&bits, &x, sizeof bits);
-  return (bits & $exponent) != $exponent;
-}
-
-/* From 0 to 1 while x does; of the second half by symmetry. */
+    R"(/* From 0 to 1 while x does; of the second half by symmetry. */
 static void smooth_step($real x, $real all[$COUNT])
 {
   static const $real polynomials[$COUNT][$TERMS] = { /* s, s', .. */
@@ -296,8 +279,9 @@ Expected<CCode, Error<S>> to_c(const SmoothProfile<Order, S>& profile,
                       {"$HALF", number(static_cast<S>(0.5))}};
   const detail::Words common = detail::c_common_words(writer, options);
   words.insert(words.end(), common.begin(), common.end());
-  return CCode{detail::filled(detail::c_profile_header, words),
-               detail::filled(detail::c_profile_source, words)};
+  return CCode{
+      detail::filled(detail::c_profile_header, words),
+      detail::filled(std::string(detail::c_source_head) + detail::c_profile_source, words)};
 }
 
 }  // namespace esokit

@@ -14,6 +14,7 @@
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
+#include <esokit/control/predictive_adrc.hpp>
 #include <esokit/core/expected.hpp>
 #include <esokit/gain/riccati_gain.hpp>
 #include <esokit/gain/sampled_gain.hpp>
@@ -33,6 +34,8 @@ struct CodeOptions {
   std::string comment{};            ///< at the head: which machine, which design; no marks of a
                                     ///< comment
   int self_test_samples = 100;      ///< samples of the self-test, 1 .. 10000
+  bool watched = false;  ///< keeps what a HealthMonitor looks at: innovation, and u that was asked
+
   /// Gains, those of the law, and limits in a struct that can be changed while it runs, instead of
   /// constants: in C, for gains that do not depend on the innovation or the time.
   bool settings_in_struct = false;
@@ -136,6 +139,8 @@ struct RecordedDesign {
   bool error_based = false;
   bool softens = false;
   bool compensates = false;                      ///< r is the output of another controller
+  bool predictive = false;                       ///< in two phases
+  unsigned hold = 0;                             ///< of one of these: samples of its start hold
   std::vector<std::array<double, 3>> samples{};  ///< y, r or u, and the result
 };
 
@@ -176,12 +181,12 @@ struct RecordAccess {
   template <class Loop>
   static LoopRules rules(const Loop& loop) noexcept {
     return {loop.hold_left_,
-            loop.missing_limit_,
-            loop.divider_,
-            loop.has_safe_input_,
-            loop.stay_safe_,
-            static_cast<double>(loop.hold_input_),
-            static_cast<double>(loop.safe_input_)};
+            loop.set_.missing_limit,
+            loop.set_.divider,
+            loop.set_.has_safe_input,
+            loop.set_.stay_safe,
+            static_cast<double>(loop.set_.hold_input),
+            static_cast<double>(loop.set_.safe_input)};
   }
 
   /// Gains, those of the law, and limits, with the beginning of their names. @param c a controller
@@ -201,9 +206,82 @@ struct RecordAccess {
       }
       if constexpr (requires { c.gain_; }) take(c.gain_, "law");
       find_settings(c.observer(), found);
-    } else {
+    } else if constexpr (requires { c.laws_; }) {
       for (auto& law : c.laws_) take(law, "gain");
     }
+  }
+
+  // ---- A controller in two phases.
+
+  /// The lists around which its text goes.
+  template <class Number, int Size, class Add>
+  static void add_phases(const Add& add) {
+    using Numbers = std::vector<Number>;
+    const auto armed = [](auto& c) {
+      (void)(all(is_finite(c.blind_)) && all(is_finite(c.offset_)) && all(is_finite(c.slope_)));
+      return Numbers{};
+    };
+    add("control_by", {"y"}, true,
+        [](auto& c, const auto& in) { return Numbers{c.control(in[0])}; });
+    add("control_blind", {}, true,
+        [](auto& c, const auto&) { return Numbers{c.control_without_measurement()}; });
+    add("refer", {"r"}, false, [](auto& c, const auto& in) {
+      for (Number& one : c.reference_) one = Number(0.0);
+      c.reference_[0] = in[0];
+      return Numbers{};
+    });
+    add("take_output", {"u"}, false, [](auto& c, const auto& in) {
+      c.output_ = in[0];
+      return Numbers{};
+    });
+    add("track", {}, false, [](auto& c, const auto&) {
+      c.limiter_.track(c.output_);
+      return Numbers{};
+    });
+    add("revise", {"u"}, false, [](auto& c, const auto& in) {
+      (void)c.observer_.revise_input(in[0]);
+      return Numbers{};
+    });
+    add("arm_restart", {}, false, [armed](auto& c, const auto&) {
+      using O = std::remove_cvref_t<decltype(c.observer_)>;
+      typename O::Preview next{};
+      for (Number& one : next.offset) one = Number(0.0);
+      next.slope = O::by_rows(O::standing(Number(1.0)));
+      c.look_ahead();
+      c.arm_by(next);
+      return armed(c);
+    });
+    add("arm_hold", {}, false, [](auto& c, const auto&) {
+      c.look_ahead();
+      c.settle_for(Number(0.0));
+      return Numbers{};
+    });
+    add("arm_blind", {}, false, [](auto& c, const auto&) {
+      c.look_ahead();
+      c.settle_for_blind();
+      return Numbers{};
+    });
+    std::vector<std::string> gains;
+    for (int i = 1; i <= Size; ++i) gains.push_back("k" + std::to_string(i));
+    add("arm_by", gains, false, [armed](auto& c, const auto& in) {
+      ScaledGain<Size, Number> gain{};
+      for (std::size_t i = 0; i < gain.size(); ++i) gain[i] = in[i];
+      c.look_ahead();
+      c.arm_by(gain);
+      return armed(c);
+    });
+  }
+  template <class C>
+  static unsigned hold_left(const C& c) noexcept {
+    return c.hold_left_;
+  }
+  template <class C>
+  static const auto& limiter(const C& c) noexcept {
+    return c.limiter_;
+  }
+  template <class C>
+  static auto& observer_of(C& c) noexcept {
+    return c.observer_;
   }
 
   /// The gain laws of all levels.
@@ -403,6 +481,33 @@ struct RecordAccess {
     const bool bounds = o.limit_ < (std::numeric_limits<S>::max)();
     return {true, O::levels, bounds ? static_cast<double>(o.limit_) : 0.0,
             static_cast<double>(o.leak_), static_cast<double>(o.trust_)};
+  }
+
+  /// What a monitor computes from its settings alone, and of the controller that it watches.
+  template <class M, class C>
+  static auto health(const M& m, const C& c) noexcept {
+    using S = typename M::scalar_type;
+    struct Numbers {
+      S weight, hair, largest_square, range, pole, slow, middle, least_against, least, step, forget;
+      S input_gain, of_noise;
+      int divider;
+    } numbers;
+    const S b = c.observer().input_gain();
+    numbers.range = absolute(b) * m.range_;
+    numbers.weight = m.weight_;
+    numbers.hair = static_cast<S>(1e-4) * m.range_;
+    numbers.largest_square = m.largest_square();
+    numbers.pole = m.pole_;
+    numbers.slow = m.slow_;
+    numbers.middle = b * m.middle(c.limiter());
+    numbers.least_against = m.larger(static_cast<S>(0.02) * numbers.range, S(3) * m.least_);
+    numbers.least = m.least_;
+    numbers.step = m.step_;
+    numbers.forget = m.forget_;
+    numbers.input_gain = b;
+    numbers.of_noise = m.health_.innovation_of_noise;
+    numbers.divider = m.divider_;
+    return numbers;
   }
 
   /// What a profile computes from its settings alone.
@@ -608,6 +713,24 @@ template <class V>
   return rules;
 }
 
+/// A controller in two phases around one that has a table of gains and one level.
+template <class C>
+struct PredictiveOf {};
+template <class Observer>
+struct PredictiveOf<PredictiveAdrc<Observer>> {
+  using type = Observer;
+};
+template <class C>
+concept WritablePredictive = HasLists<typename PredictiveOf<C>::type> && requires {
+  requires PredictiveOf<C>::type::levels == 1;
+  requires observer_traits<typename PredictiveOf<C>::type>
+  .gain_kind == GainKind::preset;
+  requires observer_traits<typename PredictiveOf<C>::type>
+  .measures_first_row;
+  requires !observer_traits<typename PredictiveOf<C>::type>.blanks_estimate;
+  requires !observer_traits<typename PredictiveOf<C>::type>.gates_outliers;
+};
+
 /// Records a subject without its adapter.
 /// @tparam Subject the observer or controller @tparam Observer its observer, perhaps itself
 template <class Subject, class Observer>
@@ -683,7 +806,9 @@ class DesignRecorder {
       }
       const int published = RecordAccess::place_in_published(of(object), numbers[i]);
       if (published >= 0) name = "published_" + std::to_string(published);
-      writer.live[i] = name[0] == 'z' || name[0] == 'p' || name == "u_applied" || name == "u_last";
+      writer.live[i] = name[0] == 'z' || name[0] == 'p' || name == "u_applied" ||
+                       name == "u_last" ||
+                       (design.options.watched && (name == "innovation" || name == "u_asked"));
       for (const auto& [number, begins] : settings) {
         if (number == numbers[i] && name.empty()) name = begins + std::to_string(i);
       }
@@ -980,8 +1105,50 @@ Expected<RecordedDesign, Error<typename Observer::scalar_type>> recorded_design(
   return maker.design;
 }
 
+/// The design of a controller in two phases.
+template <WritablePredictive C>
+Expected<RecordedDesign, Error<typename C::scalar_type>> recorded_design(
+    const C& controller, const CodeOptions& options) {
+  using V = typename C::scalar_type;
+  using Observer = typename PredictiveOf<C>::type;
+  using Maker = DesignRecorder<C, Observer>;
+  using Number = typename Maker::Number;
+  using Numbers = typename Maker::Numbers;
+
+  Rules<V> rules = checked_options<V>(options);
+  rules.require(!options.settings_in_struct, "settings_in_struct", V(1),
+                "is not written for PredictiveAdrc");
+  if (!rules) return rules.error();
+  Maker maker(controller, options);
+  RecordedDesign& design = maker.design;
+  design.predictive = true;
+  design.hold = RecordAccess::hold_left(controller);
+  design.lower = static_cast<double>(RecordAccess::limiter(controller).lower());
+  design.upper = static_cast<double>(RecordAccess::limiter(controller).upper());
+  const auto of = [](auto& c) -> auto& { return RecordAccess::observer_of(c); };
+  maker.add("rest_at", {"y", "u"}, false, [of](auto& c, const Numbers& in) {
+    auto& o = of(c);
+    (void)o.reset(o.equilibrium(in[0], in[1]));
+    return Numbers{};
+  });
+  RecordAccess::add_phases<Number, Observer::size>(
+      [&](const char* name, std::vector<std::string> arguments, bool has_output, auto call) {
+        maker.add(name, std::move(arguments), has_output,
+                  [call](auto& c, const Numbers& in) { return call(c, in); });
+      });
+  const auto name_of = [](const auto& c, const Number* at) -> std::string {
+    return at == &c.output() ? "u_last" : "";
+  };
+  if (auto ok = maker.record(of, name_of); !ok) return ok.error();
+  C played = controller;
+  design.samples = self_test_samples<V>(options.self_test_samples,
+                                        [&](V y, V r) { return played.update(y, r); });
+  return design;
+}
+
 template <class Object>
-concept Writable = WritableController<Object> || WritableObserver<Object>;
+concept Writable =
+    WritableController<Object> || WritableObserver<Object> || WritablePredictive<Object>;
 
 }  // namespace detail
 }  // namespace esokit

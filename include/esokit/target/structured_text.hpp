@@ -531,6 +531,9 @@ Expected<std::string, Error<typename Object::scalar_type>> to_structured_text(
                "has a gain that goes on at each sample: not written in Structured Text")
       .require(!(design->wrap.period > 0), "period", static_cast<V>(design->wrap.period),
                "of WrappedOutput is not written in Structured Text")
+      .require(!options.settings_in_struct, "settings_in_struct", V(1),
+               "is not written in Structured Text")
+      .require(!design->predictive, "PredictiveAdrc", V(0), "is not written in Structured Text")
       .require(!design->guard.on, "guarded", V(0), "is not written in Structured Text");
   if (!rules) return rules.error();
   return detail::structured_text(*design);

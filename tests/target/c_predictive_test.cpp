@@ -1,0 +1,124 @@
+// The C of a controller in two phases equals it bit for bit: u, estimates and status, with bad and
+// missing samples, gaps, reported u before and after `prepare`, starts and resets.
+#include <esokit/control/predictive_adrc.hpp>
+#include <esokit/observer/cascade_eso.hpp>
+#include <esokit/observer/half_gain_eso.hpp>
+#include <esokit/observer/linear_eso.hpp>
+#include <target/written.hpp>
+
+namespace esokit_test {
+namespace target_c_predictive_test {
+
+using namespace esokit;
+
+static_assert(detail::Writable<PredictiveAdrc<LinearEso<2>>> &&
+              !detail::Writable<PredictiveAdrc<CascadeEso<2, 2>>>);
+
+#ifdef ESOKIT_LOADS_C
+
+template <class C>
+void predicts(std::uint64_t seed, int samples = 30000) {
+  SCOPED_TRACE(testing::internal::GetTypeName<C>());
+  using V = typename C::scalar_type;
+  using Observer = std::remove_cvref_t<decltype(std::declval<C>().observer())>;
+  samples = static_cast<int>(asked("ESOKIT_WRITTEN_SAMPLES", static_cast<std::uint64_t>(samples)));
+  seed += asked("ESOKIT_WRITTEN_SEED", 0);
+  const Folder folder;
+  for (const double input_gain : {8.0, -8.0}) {
+    typename C::Config config{};
+    config.observer = observer_config<Observer>(input_gain);
+    config.controller_bandwidth = V(4);
+    config.limits = {V(-3), V(2.5), V(60)};
+    config.start_hold = V(0.1);
+    C mine = C::make(config).value();
+    const Library library(folder, to_c(mine, {.name = "loop"}).value(),
+                          "unsigned loop_size(void);\n"
+                          "unsigned loop_size(void) { return sizeof(loop_state); }\n");
+    ASSERT_TRUE(library.loaded());
+    void (*init)(void*) = nullptr;
+    V (*control)(void*, V) = nullptr;
+    V (*without)(void*) = nullptr;
+    V (*estimate)(const void*, unsigned) = nullptr;
+    unsigned (*start)(void*, V, V) = nullptr;
+    unsigned (*reset)(void*, V) = nullptr;
+    unsigned (*prepare)(void*, V) = nullptr;
+    unsigned (*applied)(void*, V) = nullptr;
+    unsigned (*size)() = nullptr;
+    int (*self_test)(V) = nullptr;
+    library.find(init, "loop_init");
+    library.find(control, "loop_control");
+    library.find(without, "loop_control_without_measurement");
+    library.find(estimate, "loop_estimate");
+    library.find(start, "loop_start");
+    library.find(reset, "loop_reset");
+    library.find(prepare, "loop_prepare");
+    library.find(applied, "loop_applied");
+    library.find(size, "loop_size");
+    library.find(self_test, "loop_self_test");
+    EXPECT_EQ(self_test(V(0)), 0);
+    std::vector<std::uint64_t> state(size() / sizeof(std::uint64_t) + 1);
+    void* its = state.data();
+    init(its);
+    ChainPlant plant(C::order, 0.0078125, input_gain, 1.5);
+    Random random(seed++);
+    V r(1);
+    int lost = 0;
+    int limited = 0;
+    int of_status[64] = {};
+    for (int k = 0; k < samples && !testing::Test::HasFailure(); ++k) {
+      plant.set_disturbance(2 * std::sin(0.01 * k));
+      plant.step(static_cast<double>(mine.output()));
+      if (random.index(60) == 0) r = static_cast<V>(random.uniform(-4, 4));
+      if (k % 5000 == 0) plant.set_state(std::vector<double>(C::order, 0.0));
+      V y = static_cast<V>(plant.output() + 1e-3 * random.uniform(-1, 1));
+      if (lost > 0) --lost;
+      if (random.index(200) == 0) lost = 1 + random.index(12);
+      if (random.index(100) == 0) y = random.index(2) == 0 ? hidden_nan<V>() : anything<V>(random);
+      const V held =
+          random.index(10) == 0 ? anything<V>(random) : static_cast<V>(random.uniform(-2, 2));
+      const auto report = [&] {
+        if (random.index(40) != 0) return;
+        EXPECT_EQ(static_cast<unsigned>(mine.applied(held)), applied(its, held)) << k;
+      };
+      const V u = lost > 0 ? mine.control_without_measurement() : mine.control(y);
+      const V of_c = lost > 0 ? without(its) : control(its, y);
+      EXPECT_TRUE(equal_bits(u, of_c)) << "sample " << k << ": " << u << ", C " << of_c;
+      limited += u <= V(-3) || u >= V(2.5);
+      report();
+      const V next = random.index(400) == 0 ? anything<V>(random) : r;
+      const auto status = static_cast<unsigned>(mine.prepare(next));
+      EXPECT_EQ(status, prepare(its, next)) << k;
+      ++of_status[status % 64];
+      report();
+      if (random.index(2000) == 0) {
+        EXPECT_EQ(static_cast<unsigned>(mine.start(y, held)), start(its, y, held)) << k;
+      }
+      if (random.index(2000) == 0) {
+        EXPECT_EQ(static_cast<unsigned>(mine.reset(y)), reset(its, y)) << k;
+      }
+      detail::unroll<Observer::size>([&](auto row) {
+        EXPECT_TRUE(
+            equal_bits(V(mine.observer().template estimate<row>()), estimate(its, unsigned{row})))
+            << "sample " << k << ", estimate " << row;
+      });
+    }
+    EXPECT_GT(limited, samples / 50);
+    for (const StepStatus status :
+         {StepStatus::measurement_rejected, StepStatus::gap_bridged, StepStatus::restarted}) {
+      EXPECT_GT(of_status[static_cast<int>(status)], samples / 2000);
+    }
+  }
+}
+
+TEST(CPredictive, EqualsTheController) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  predicts<PredictiveAdrc<LinearEso<2, double>>>(801);
+  predicts<PredictiveAdrc<LinearEso<1, float>>>(811);
+  predicts<PredictiveAdrc<HalfGainEso<2, float>>>(821);
+  predicts<PredictiveAdrc<ModelEso<lag, double>>>(831);
+}
+
+#endif  // ESOKIT_LOADS_C
+
+}  // namespace target_c_predictive_test
+}  // namespace esokit_test

@@ -1,0 +1,176 @@
+// The C of a monitor, fed by the C of its controller, equals the C++ of both bit for bit: on a
+// sound loop, with a b0 of the wrong sign or several times too small, and with bad measurements.
+#include <array>
+#include <esokit/control/health.hpp>
+#include <esokit/observer/cascade_eso.hpp>
+#include <esokit/observer/linear_eso.hpp>
+#include <esokit/target/health_code.hpp>
+#include <target/written.hpp>
+
+namespace esokit_test {
+namespace target_health_code_test {
+
+using namespace esokit;
+
+template <class C>
+auto monitor(typename C::scalar_type noise) {
+  using V = typename C::scalar_type;
+  constexpr int size = detail::ObserverOfController<C>::type::size;
+  return HealthMonitor<size, V>::make({.observer_bandwidth = V(30),
+                                       .sample_time = V(0.0078125),
+                                       .input_range = V(2.5),
+                                       .noise = noise})
+      .value();
+}
+
+#ifdef ESOKIT_LOADS_C
+
+/// The loop and its monitor in C, in one library.
+constexpr const char* both = R"(
+unsigned loop_size(void);
+unsigned loop_size(void) { return sizeof(loop_state) + sizeof(health_state); }
+void both_init(loop_state *o, health_state *h);
+void both_init(loop_state *o, health_state *h) { loop_init(o); health_clear(h); }
+void both_look(const loop_state *o, health_state *h);
+void both_look(const loop_state *o, health_state *h)
+{
+  health_sample s;
+  s.innovation = o->innovation;
+  s.asked = o->u_asked;
+  s.held = o->u_last;
+  s.applied = o->u_applied;
+  s.disturbance = loop_estimate(o, ORDER);
+  s.missed = o->gap;
+  s.status = o->status;
+  s.runs = o->mode == 0u;
+  health_look(h, &s);
+}
+)";
+
+/// What is public of the C state.
+template <class V>
+struct Found {
+  std::uint32_t samples, rejected, bridged, unsafe;
+  V saturated, side, innovation, gain_ratio, response, evidence, opposed;
+};
+
+/// @param plant_gain over b0 @return how often which fault was named
+template <class C>
+std::array<int, 8> watches(double plant_gain, double bad, std::uint64_t seed) {
+  SCOPED_TRACE(testing::internal::GetTypeName<C>());
+  using V = typename C::scalar_type;
+  std::array<int, 8> named{};
+  auto settings = config<C>(8);
+  settings.limits.rate = std::numeric_limits<V>::max();
+  C mine = C::make(settings).value();
+  auto watch = monitor<C>(V(1e-3));
+  const CCode code = to_c(mine, {.name = "loop", .watched = true}).value();
+  const CCode health = to_c(watch, mine, {.name = "health", .comment = "a test"}).value();
+  const Folder folder;
+  folder.write("health.h", health.header);
+  folder.write("health.c", health.source);
+  const Library library(
+      folder, code,
+      "#define ORDER " + std::to_string(C::order) + "u\n#include \"health.c\"\n" + both);
+  if (!library.loaded()) {
+    ADD_FAILURE() << "does not compile";
+    return named;
+  }
+  std::vector<std::uint64_t> loop(1000);
+  std::vector<std::uint64_t> its(1000);
+  void (*init)(void*, void*) = nullptr;
+  V (*update)(void*, V, V) = nullptr;
+  void (*look)(const void*, void*) = nullptr;
+  unsigned (*diagnoses)(const void*) = nullptr;
+  library.find(init, "both_init");
+  library.find(update, "loop_update");
+  library.find(look, "both_look");
+  library.find(diagnoses, "health_diagnose");
+  init(loop.data(), its.data());
+  ChainPlant plant(C::order, 0.0078125, 8 * plant_gain, 1.5);
+  Random random(seed);
+  V r(1);
+  for (int k = 0; k < 20000; ++k) {
+    plant.set_disturbance(std::sin(0.01 * k));
+    plant.step(static_cast<double>(mine.output()));
+    if (k % 3000 == 0) plant.set_state(std::vector<double>(C::order, 0.0));
+    if (random.index(60) == 0) r = static_cast<V>(random.uniform(-1, 1));
+    V y = static_cast<V>(plant.output() + 1e-3 * random.uniform(-1, 1));
+    if (random.uniform(0, 1) < bad)
+      y = random.index(2) == 0 ? hidden_nan<V>() : anything<V>(random);
+    (void)mine.update(y, r);
+    (void)update(loop.data(), y, r);
+    watch.look(mine);
+    look(loop.data(), its.data());
+    const auto& of_cpp = watch.health();
+    Found<V> of_c;
+    std::memcpy(&of_c, its.data(), sizeof of_c);
+    EXPECT_EQ(of_cpp.samples, of_c.samples);
+    EXPECT_EQ(of_cpp.rejected, of_c.rejected) << k;
+    EXPECT_EQ(of_cpp.bridged, of_c.bridged) << k;
+    EXPECT_EQ(of_cpp.unsafe, of_c.unsafe) << k;
+    EXPECT_TRUE(equal_bits(of_cpp.saturated, of_c.saturated)) << k;
+    EXPECT_TRUE(equal_bits(of_cpp.side, of_c.side)) << k;
+    EXPECT_TRUE(equal_bits(of_cpp.innovation, of_c.innovation)) << k;
+    EXPECT_TRUE(equal_bits(of_cpp.gain_ratio, of_c.gain_ratio)) << k;
+    EXPECT_TRUE(equal_bits(of_cpp.response, of_c.response)) << k;
+    EXPECT_TRUE(equal_bits(of_cpp.evidence, of_c.evidence)) << k;
+    EXPECT_TRUE(equal_bits(of_cpp.opposed, of_c.opposed)) << k;
+    const auto fault = static_cast<unsigned>(diagnose(of_cpp));
+    EXPECT_EQ(fault, diagnoses(its.data())) << k;
+    ++named[fault];
+  }
+  return named;
+}
+
+TEST(HealthCode, EqualsTheMonitor) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  using C = Adrc<LinearEso<2, double>>;
+  using Small = Adrc<LinearEso<1, float>>;
+  using Cascade = Adrc<CascadeEso<1, 2, float>>;
+  const auto often = [](const std::array<int, 8>& named, LoopFault fault) {
+    EXPECT_GT(named[static_cast<std::size_t>(fault)], 300)
+        << static_cast<int>(fault) << " of " << testing::PrintToString(named);
+  };
+  often(watches<C>(1, 0.02, 1), LoopFault::none);
+  often(watches<C>(-1, 0, 2), LoopFault::wrong_sign);
+  often(watches<Small>(6, 0, 3), LoopFault::innovation_too_large);
+  often(watches<Cascade>(1, 0.3, 4), LoopFault::measurements_rejected);
+}
+
+TEST(HealthCode, CompilesWithOtherCompilers) {
+  using C = Adrc<LinearEso<2, float>>;
+  const C controller = C::make(config<C>(8)).value();
+  const CCode code = to_c(monitor<C>(0.001f), controller).value();
+  const Folder folder;
+  folder.write("health.h", code.header);
+  folder.write("health.c", code.source);
+  folder.write("health.cpp", code.source);
+  for (const std::string compiler : {"g++ -std=c++11 health.cpp", "clang -std=c99 health.c",
+                                     "tcc health.c", "gcc -std=c99 -Wdouble-promotion health.c"}) {
+    if (!there(compiler.substr(0, compiler.find(' ')))) continue;
+    EXPECT_TRUE(runs("cd " + folder.file("") + " && " + compiler + " -c -o health.o" +
+                     (compiler[0] == 't' ? " -Wall -Werror" : strict)))
+        << compiler;
+  }
+  if (there("cppcheck")) {
+    EXPECT_TRUE(
+        runs("cppcheck --addon=misra --std=c99 -q --error-exitcode=1 "
+             "--suppress=missingIncludeSystem --suppress=misra-c2012-2.5 "
+             "--suppress=misra-c2012-15.5 --suppress=misra-c2012-21.15 " +
+             folder.file("health.c") + " >/dev/null 2>&1"));
+  }
+}
+
+#endif  // ESOKIT_LOADS_C
+
+TEST(HealthCode, RefusesByName) {
+  using C = Adrc<LinearEso<2, float>>;
+  const C controller = C::make(config<C>(8)).value();
+  const auto code = to_c(monitor<C>(0.001f), controller, {.name = "a b"});
+  ASSERT_FALSE(code);
+  EXPECT_STREQ(code.error().field, "name");
+}
+
+}  // namespace target_health_code_test
+}  // namespace esokit_test
