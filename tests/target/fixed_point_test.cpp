@@ -11,6 +11,7 @@
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
+#include <esokit/observer/extended_state_filter.hpp>
 #include <esokit/observer/half_gain_eso.hpp>
 #include <esokit/observer/linear_eso.hpp>
 #include <sstream>
@@ -123,6 +124,39 @@ TEST(FixedPoint, OfASettledAlgebraicObserver) {
   for (std::size_t i = 0; i < linear.written.a.size(); ++i) {
     EXPECT_NEAR(settled.written.a[i], linear.written.a[i], 1e-4);
   }
+}
+
+/// The frozen filter has a constant gain, too; one that goes on is refused.
+TEST(FixedPoint, OfAFrozenFilter) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  ExtendedStateFilter<2>::Config config{};
+  config.sample_time = 1e-3;
+  config.input_gain = 50;
+  config.measurement_variance = 2e-7;
+  config.disturbance_bounds[2] = 30;
+  config.inflation = 0.05;
+  config.mode = RiccatiMode::frozen;
+  const auto frozen = ExtendedStateFilter<2>::make(config).value();
+  EXPECT_GT((stays_within<std::int32_t>(frozen, servo(), 14)), 0.3);
+  // Its gains are those of the filter.
+  auto played = frozen;
+  const auto made = to_fixed_c(frozen, servo()).value();
+  const WrittenSystem& w = made.written;
+  std::array<double, 3> x{};
+  Random random(15);
+  for (int k = 0; k < 2000; ++k) {
+    const int y = random.index(4097) - 2048;
+    (void)played.update(y * servo().y.unit, 0.0);
+    std::array<double, 3> to{};
+    for (std::size_t i = 0; i < 3; ++i) {
+      to[i] = w.by[i] * y;
+      for (std::size_t j = 0; j < 3; ++j) to[i] += w.a[i * 3 + j] * x[j];
+    }
+    x = to;
+    EXPECT_NEAR(w.estimates[2][2] * x[2], played.total_disturbance(), made.estimates[2].by_gains);
+  }
+  config.mode = RiccatiMode::recursive;
+  EXPECT_FALSE(to_fixed_c(ExtendedStateFilter<2>::make(config).value(), servo()));
 }
 
 /// 10 rad/s at 20 kHz: what is left over is kept.

@@ -378,9 +378,12 @@ class FixedDesign {
                     "is in Guarded, which is not written in fixed point");
     }
     if (design_->law.kind != RunningLaw::none && !design_->law.settled) {
-      return refuse(
-          "observer", static_cast<double>(design_->law.age),
-          "has gains that go on: let it settle first (AlgebraicEso), or take a LinearEso");
+      return refuse("observer", static_cast<double>(design_->law.age),
+                    "has gains that go on: let it settle first (AlgebraicEso), freeze the filter "
+                    "(RiccatiMode::frozen), or take a LinearEso");
+    }
+    if (design_->law.watches) {
+      return refuse("outlier_threshold", 1, "is not written in fixed point");
     }
     if (!design_->settings.empty()) {
       return refuse("settings_in_struct", 1, "is not written in fixed point");

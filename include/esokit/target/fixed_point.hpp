@@ -493,8 +493,9 @@ class FixedText {
 /// estimate. After a gap they hold again as the state that it left decays.
 ///
 /// Written are observers whose update is linear (LinearEso, also with a set of poles, HalfGainEso,
-/// CascadeEso, and AlgebraicEso once it has settled: it stays so, and restarts after any gap) and
-/// Adrc around them up to order 2. A limit of rate may be below one count a sample.
+/// CascadeEso; AlgebraicEso once it has settled and the frozen ExtendedStateFilter, which restart
+/// after any gap with the gains of then) and Adrc around them up to order 2. A limit of rate may be
+/// below one count a sample.
 /// @param object as `make` returned it; the C begins at rest at zero
 /// @return error, with what would do, for ranges that 32 bits cannot hold, a bound above what is
 ///         allowed, and designs that are not linear or have what is not written in fixed point
