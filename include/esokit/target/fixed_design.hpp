@@ -228,13 +228,33 @@ class FixedDesign {
   [[nodiscard]] double reference_most() const {
     return wraps_ ? std::ldexp(1.0, options_.y.counter_bits - 1) : options_.y.most;
   }
-  /// So many samples after the last measurement the next can still be used.
+  /// So many samples after the last measurement the next can still be used: one, if the design has
+  /// no table of gains, because they would go on.
   [[nodiscard]] int table_rows() const {
-    int rows = static_cast<int>(design_->gap_gains.size());
+    int rows = std::max(1, static_cast<int>(design_->gap_gains.size()));
     if (wraps_) {
       const int half = (1 << (options_.y.counter_bits - 1)) - 1;
       rows = std::min(rows, half / options_.y.most);
     }
+    return rows;
+  }
+  /// The correction so many samples after the last, in counts: states, y.
+  [[nodiscard]] std::vector<LinearForm> correction_rows(int elapsed) const {
+    std::vector<LinearForm> rows;
+    if (design_->gap_gains.empty()) {  // of one level: x + k (y - x_1)
+      for (std::size_t i = 0; i < states(); ++i) {
+        rows.push_back(unit(i, states() + 1));
+        rows[i][states()] = plain_by_[i];
+        rows[i][0] -= plain_by_[i];
+      }
+    } else {
+      std::vector<double> given{column};
+      for (const double k : design_->gap_gains[static_cast<std::size_t>(elapsed - 1)]) {
+        given.push_back(k);
+      }
+      rows = rows_of("correct_by", given);
+    }
+    for (const std::size_t i : first_of_level) rows[i][states()] -= 1;
     return rows;
   }
   /// A call as it moves the states, in counts: a row for each state, its columns states, arguments.
@@ -357,9 +377,13 @@ class FixedDesign {
       return refuse("observer", design_->guard.trust,
                     "is in Guarded, which is not written in fixed point");
     }
-    if (design_->law.kind != RunningLaw::none) {
+    if (design_->law.kind != RunningLaw::none && !design_->law.settled) {
       return refuse("observer", static_cast<double>(design_->law.age),
-                    "has gains that go on: in fixed point take the LinearEso that it settles to");
+                    "has gains that go on: let it settle first (AlgebraicEso), freeze the filter "
+                    "(RiccatiMode::frozen), or take a LinearEso");
+    }
+    if (design_->law.watches) {
+      return refuse("outlier_threshold", 1, "is not written in fixed point");
     }
     if (!design_->settings.empty()) {
       return refuse("settings_in_struct", 1, "is not written in fixed point");

@@ -299,10 +299,7 @@ class FixedText {
     std::string correct_m;
     std::string correct_p;
     for (int row = 0; row < d_.table_rows(); ++row) {
-      std::vector<double> given{FixedDesign::column};
-      for (const double k : design_.gap_gains[static_cast<std::size_t>(row)]) given.push_back(k);
-      auto rows = d_.rows_of("correct_by", given);
-      for (const std::size_t i : d_.first_of_level) rows[i][n] -= 1;
+      const auto rows = d_.correction_rows(row + 1);
       correct_m += "    {\n";
       correct_p += "    {\n";
       matrix(rows, 1, correct_m, correct_p, "      ");
@@ -329,8 +326,8 @@ class FixedText {
         (void)std::frexp(c, &exponent);
         const int power = std::clamp(28 - exponent, 0, 62);
         sum += (sum.empty() ? "" : " + ") + std::string("((") + (input == 0 ? "y" : "u") +
-               " * (int64_t)" +
-               text_of(static_cast<std::int64_t>(std::nearbyint(std::ldexp(c, power)))) + ") >> " +
+               " * ((int64_t)" +
+               text_of(static_cast<std::int64_t>(std::nearbyint(std::ldexp(c, power)))) + ")) >> " +
                std::to_string(power) + ")";
       }
       const std::string number = std::to_string(i);
@@ -347,12 +344,15 @@ class FixedText {
     const std::string y_twice = std::to_string(2 * options.y.most);
     const std::string half = std::to_string(wraps ? 1 << (options.y.counter_bits - 1) : 0);
     const std::string mask = std::to_string(wraps ? (1 << options.y.counter_bits) - 1 : 0);
-    const auto change = [&](const std::string& now) {
-      return "(int32_t)((((uint32_t)" + now + " - o->y_last) & " + mask + "u) ^ " + half + "u) - " +
-             half;
+    // The change of a counter, and of a reference from it.
+    const auto change = [&](const std::string& of, const std::string& kind,
+                            const std::string& now) {
+      return "  const uint32_t " + of + "_bits = (((uint32_t)" + now + " - o->y_last) & " + mask +
+             "u) ^ " + half + "u;\n  " + kind + of + " = (int32_t)" + of + "_bits - " + half +
+             ";\n";
     };
     const std::string of_y =
-        wraps ? "  const int32_t y = " + change("given") + ";\n" : "  const int32_t y = given;\n";
+        wraps ? change("y", "const int32_t ", "given") : "  const int32_t y = given;\n";
     const std::string in_range = "((uint32_t)y + " + y_most + "u) <= " + y_twice + "u";
 
     std::string vectors;
@@ -412,7 +412,8 @@ class FixedText {
               {"$AT_REST", wraps ? "the counter 0" : "y = 0"},
               {"$Y_TYPE", type},
               {"$LAST", std::to_string(design_.size - 1)},
-              {"$RELATIVE_R", wraps ? change("reference") : "reference"},
+              {"$OF_R",
+               wraps ? change("r", "const int32_t ", "reference") : "  int32_t r = reference;\n"},
               {"$RELATIVE", wraps ? " less the last counter" : ""},
               {"$FORGET", forget},
               {"$REST_AT", rest_at},
@@ -492,7 +493,9 @@ class FixedText {
 /// estimate. After a gap they hold again as the state that it left decays.
 ///
 /// Written are observers whose update is linear (LinearEso, also with a set of poles, HalfGainEso,
-/// CascadeEso) and Adrc around them up to order 2. A limit of rate may be below one count a sample.
+/// CascadeEso; AlgebraicEso once it has settled and the frozen ExtendedStateFilter, which restart
+/// after any gap with the gains of then) and Adrc around them up to order 2. A limit of rate may be
+/// below one count a sample.
 /// @param object as `make` returned it; the C begins at rest at zero
 /// @return error, with what would do, for ranges that 32 bits cannot hold, a bound above what is
 ///         allowed, and designs that are not linear or have what is not written in fixed point

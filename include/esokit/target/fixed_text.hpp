@@ -303,8 +303,7 @@ $NAME_APART static int32_t put_out_held($name_state *o)
 
 static int32_t put_out($name_state *o, $Y_TYPE reference)
 {
-  int32_t r = $RELATIVE_R;
-  if (o->mode != $NAME_RUNNING) {
+$OF_R  if (o->mode != $NAME_RUNNING) {
     return put_out_held(o);
   }
 $CLAMP_R  return limited(o, law(o, r));
@@ -328,7 +327,7 @@ $INIT  (void)rest_at(o, 0, 0);
   o->status = 0u;
 }
 
-void $name_applied($name_state *o, int32_t u)
+static void take_held($name_state *o, int32_t u)
 {
   int32_t held = u;
   if (held > $U_MOST) {
@@ -348,7 +347,7 @@ $OF_Y_RESET$REFUSE_Y  if (((uint32_t)u + $U_MOSTu) > $U_TWICEu) {
     return $NAME_INPUT_REJECTED;
   }
   status = rest_at(o, $Y_ABSOLUTE, u);
-$NEW_Y  $name_applied(o, u);
+$NEW_Y  take_held(o, u);
   o->mode = $NAME_RUNNING;
   return status;
 }
@@ -361,6 +360,11 @@ $OF_Y  if ((o->gap != 0u) || $Y_OUT) {
   observe(o, y, o->u_held);
 $NEW_Y  o->status = 0u;
 $LEAVE_SAFE  return put_out(o, r);
+}
+
+void $name_applied($name_state *o, int32_t u)
+{
+  take_held(o, u);
 }
 
 int32_t $name_update_without_measurement($name_state *o, $Y_TYPE r)

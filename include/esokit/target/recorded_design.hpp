@@ -76,7 +76,7 @@ struct LawNumbers {
   unsigned least_age = 0;  ///< the samples before it may settle, and as long estimates are blanked,
   unsigned age = 0;        ///< the samples so far,
   bool pending = false;    ///< whether the last one was not corrected,
-  bool settled = false;    ///< whether it stands,
+  bool settled = false;    ///< whether it stands, for ever if no sample is missing,
   double decay = 0;        ///< p,
   double shift = 0;        ///< 1 - p
   double contraction = 0;  ///< and that of the poles in the end
@@ -337,6 +337,7 @@ struct RecordAccess {
     } else if constexpr (kind_of<LawOf<O>> == RunningLaw::filter) {
       numbers.since = static_cast<unsigned>(law.since_ & 127);
       numbers.returns = law.mode_ != RiccatiMode::recursive;
+      numbers.settled = law.mode_ == RiccatiMode::frozen && law.stands();
       numbers.watches = law.is_watched();
     }
     return numbers;
