@@ -41,6 +41,10 @@ auto observer_config(double input_gain) {
   if constexpr (requires { config.observer; }) {
     config.observer = observer_config<typename Observer::Adapted>(input_gain);
     if constexpr (requires { config.delay; }) config.delay = 3;
+    if constexpr (requires { config.inputs; }) {
+      config.inputs[0] = {V(-3), V(0.03), V(0.02)};
+      config.most_lost = 7;
+    }
     if constexpr (requires { config.disturbance_bound; }) {
       config.disturbance_bound = V(1.5);
       config.leak_time = V(2);
@@ -247,6 +251,7 @@ class InC {
       find(correct_, "loop_correct");
       find(reset_, "loop_reset");
     }
+    if (library_.has("loop_measured")) find(measured_, "loop_measured");
     if (library_.has("loop_set_trust")) find(trust_, "loop_set_trust");
     unsigned (*bytes)() = nullptr;
     find(bytes, "loop_size");
@@ -257,6 +262,7 @@ class InC {
   [[nodiscard]] bool loaded() const { return library_.loaded(); }
   V update(V y, V r) { return update_(state_.data(), y, r); }
   V miss(V r) { return miss_(state_.data(), r); }
+  void measured(V w) { measured_(state_.data(), w); }
   void set_trust(V trust) { trust_(state_.data(), trust); }
   void applied(V u) { applied_(state_.data(), u); }
   unsigned start(V y, V u) { return start_(state_.data(), y, u); }
@@ -278,6 +284,7 @@ class InC {
   V (*miss_)(void*, V) = nullptr;
   void (*applied_)(void*, V) = nullptr;
   void (*trust_)(void*, V) = nullptr;
+  void (*measured_)(void*, V) = nullptr;
   unsigned (*observe_)(void*, V, V) = nullptr;
   unsigned (*predict_)(void*, V) = nullptr;
   unsigned (*correct_)(void*, V) = nullptr;
@@ -305,6 +312,18 @@ void compare_estimates(const Observer& observer, InC<V>& in_c, int k) {
     EXPECT_TRUE(equal_bits(V(observer.template estimate<row>()), in_c.estimate(row)))
         << "sample " << k << ", estimate " << row;
   });
+}
+
+/// Tells both a measured w, if the object takes one: mostly a good one, none for a while, bad ones.
+template <class Object, class V>
+void tell_measured(Object& object, InC<V>& in_c, Random& random, int k) {
+  if constexpr (requires { object.measured(V()); }) {
+    if (random.index(40) == 0 || k % 100 > 85) return;
+    V w = static_cast<V>(std::sin(0.02 * k) + 0.1 * random.uniform(-1, 1));
+    if (random.index(50) == 0) w = random.index(2) == 0 ? hidden_nan<V>() : anything<V>(random);
+    object.measured(w);
+    in_c.measured(w);
+  }
 }
 
 /// Both in the same loop, so many samples. @return what was met
@@ -341,6 +360,7 @@ Seen compare(const C& fresh, InC<typename C::scalar_type>& in_c, double input_ga
         in_c.set_trust(trust);
       }
     }
+    tell_measured(controller, in_c, random, k);
     V given = r;
     if constexpr (!requires { controller.gains(); }) given = (r - y) / static_cast<V>(input_gain);
     if (random.index(400) == 0) given = anything<V>(random);
@@ -445,6 +465,7 @@ void observes(int samples, std::uint64_t seed) {
     for (int k = 0; k < samples && !testing::Test::HasFailure(); ++k) {
       const V y = signal();
       const V u = signal();
+      tell_measured(observer, in_c, random, k);
       const int what = random.index(1000);
       unsigned mine = 0;
       unsigned its = 0;

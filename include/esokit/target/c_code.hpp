@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <esokit/core/expected.hpp>
+#include <esokit/target/c_adapter_text.hpp>
 #include <esokit/target/c_text.hpp>
 #include <esokit/target/list_writer.hpp>
 #include <esokit/target/recorded_design.hpp>
@@ -120,6 +121,27 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
             "u;\n  o->doubts = " + std::to_string(wrap.doubts) +
             "u;\n  o->begun = " + (wrap.begun ? "1u" : "0u") + ";\n";
   }
+  const MeasuredNumbers& measured = design.measured;
+  const auto pair = [&](const std::array<double, 2>& two) {
+    return writer.number(two[0]) + ", " + writer.number(two[1]);
+  };
+  const std::string newest_w = std::to_string(measured.on ? measured.memory.size() - 1 : 0) + "u";
+  if (measured.on) {
+    members += "  " + real + " w[" + std::to_string(measured.memory.size()) +
+               "]; /* measured, a ring */\n  " + real + " w_given; /* by $name_measured */\n  " +
+               real + " w_last; /* the last good one */\n  " + real +
+               " w_lagged; /* behind dead time and lag */\n  " + real +
+               " w_told; /* its part of the disturbance */\n  uint32_t w_lost;\n" +
+               "  uint16_t newest_w;\n  uint8_t w_is_new;\n";
+    for (std::size_t i = 0; i < measured.memory.size(); ++i) {
+      init += "  o->w[" + std::to_string(i) + "] = " + writer.number(measured.memory[i]) + ";\n";
+    }
+    init += "  o->w_given = $ZERO;\n  o->w_last = " + writer.number(measured.last) +
+            ";\n  o->w_lagged = " + writer.number(measured.lagged) +
+            ";\n  o->w_told = " + writer.number(measured.told) +
+            ";\n  o->w_lost = " + std::to_string(measured.lost) +
+            "u;\n  o->newest_w = " + newest_w + ";\n  o->w_is_new = 0u;\n";
+  }
   const GuardNumbers& guard = design.guard;
   std::string found;
   std::string trusts;
@@ -215,6 +237,21 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
       {"$MEMBERS", members},
       {"$TIME", writer.number(design.sample_time)},
       {"$CORRECT", corrects},
+      {"$OF_MEASURED",
+       measured.on
+           ? "/* w, measured, before the sample at which it begins to act; without it, or if "
+             "it is not finite,\n * the last good one counts for $W_MOST samples, then zero. "
+             "*/\nvoid $name_measured($name_state *o, $real w);\n\n"
+           : ""},
+      {"$W_GAIN", writer.number(measured.gain)},
+      {"$W_SHARE", pair(measured.share)},
+      {"$W_LATE", pair(measured.late)},
+      {"$W_REACHED", pair(measured.reached)},
+      {"$W_NEWESTu", newest_w},
+      {"$W_MOST", std::to_string(measured.most_lost)},
+      {"$W_SIGN", design.error_based ? "-" : ""},
+      {"$FOUR", writer.number(4)},
+      {"$SETTLE_W", measured.on && design.is_controller ? "  settle_w(o);\n" : ""},
       {"$OF_GUARD",
        guard.on ? "/* From the next correction on, those of the disturbance count so much, 0 .. 1. "
                   "*/\nvoid $name_set_trust($name_state *o, $real trust);\n\n"
@@ -372,7 +409,8 @@ inline CCode c_texts(const RecordedDesign& design, const std::string& mark) {
   std::string lists;
   for (std::size_t i = 0; i < design.names.size(); ++i) {
     const std::string& name = design.names[i].name;
-    if ((design.gate.threshold > 0 || design.law.watches || design.predictive) &&
+    if ((design.gate.threshold > 0 || design.law.watches || design.predictive ||
+         design.measured.on) &&
         name == "observe") {
       continue;
     }
@@ -400,6 +438,13 @@ inline CCode c_texts(const RecordedDesign& design, const std::string& mark) {
     add(c_source_running);
     predict = "running";
   }
+  const bool measures = design.measured.on;
+  if (measures) {
+    add(c_source_measured);
+    if (!gated && !design.law.watches) add(c_source_measured_update);
+    if (controls) add(c_source_measured_settle);
+    predict = "measured";
+  }
   if (design.law.watches) {
     add(c_source_watched);
     correct = update = "watched";
@@ -407,6 +452,8 @@ inline CCode c_texts(const RecordedDesign& design, const std::string& mark) {
   if (gated) {
     add(c_source_gate);
     correct = update = "gated";
+  } else if (measures && !design.law.watches) {
+    update = "measured";
   } else if (!design.law.watches && !design.predictive) {
     add(c_source_base_update);
     if (runs) {
@@ -515,7 +562,8 @@ inline CCode c_code(const RecordedDesign& design) {
 /// Written are LinearEso, also with a set of poles, HalfGainEso, ReducedOrderEso, CascadeEso,
 /// AdjustableBandwidthEso, NonlinearEso, ModelEso, PlantEso and their cascades (not with
 /// `follows_speed`), AlgebraicEso, ExtendedStateFilter (in its modes recursive and frozen, without
-/// a nominal model), these in DelayedInput and OutlierGate or WrappedOutput, LinearEso and
+/// a nominal model), these in DelayedInput and OutlierGate or WrappedOutput, in Measured with one
+/// disturbance (around no WrappedOutput, but inside it, and not in Guarded), LinearEso and
 /// CascadeEso in Guarded, too (bound, leak and trust; no pin, hold or changing b0), and Adrc of
 /// both forms and DisturbanceCompensator around them, and PredictiveAdrc around one of a single
 /// level with constant gains and no sensor in its model, without an adapter. Others do not compile.
@@ -539,8 +587,8 @@ void to_c(const Other&, const CodeOptions& = {}) {
       detail::Writable<Other>,
       "esokit: to_c writes LinearEso, HalfGainEso, ReducedOrderEso, CascadeEso, "
       "AdjustableBandwidthEso, NonlinearEso, ModelEso, PlantEso, AlgebraicEso and "
-      "ExtendedStateFilter, these in DelayedInput and OutlierGate or WrappedOutput, on the "
-      "chain with one extended state in Guarded, and "
+      "ExtendedStateFilter, these in DelayedInput and OutlierGate or WrappedOutput, in Measured "
+      "with one disturbance, on the chain with one extended state in Guarded, and "
       "Adrc and DisturbanceCompensator around them, and PredictiveAdrc around one with constant "
       "gains; no other gains, adapters or controllers yet");
 }

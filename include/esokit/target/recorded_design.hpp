@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
+#include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
@@ -109,6 +110,21 @@ struct GuardNumbers {
   double trust = 1;
 };
 
+/// A Measured of one disturbance.
+struct MeasuredNumbers {
+  bool on = false;
+  double gain = 0;
+  std::array<double, 2> share{};  ///< of a sample in which the older and the newer w arrive,
+  std::array<double, 2> late{};   ///< and what the lag does in these
+  std::array<double, 2> reached{};
+  unsigned most_lost = 0;
+  std::vector<double> memory{};  ///< the newest last
+  double lagged = 0;
+  double last = 0;
+  double told = 0;
+  unsigned lost = 0;
+};
+
 /// A finished design as lists and counts, without its type.
 struct RecordedDesign {
   CodeOptions options{};
@@ -132,6 +148,7 @@ struct RecordedDesign {
   LawNumbers law{};
   WrapNumbers wrap{};
   GuardNumbers guard{};
+  MeasuredNumbers measured{};
   int max_gap = 0;  ///< missing samples that are bridged
   LoopRules loop{};
   double lower = 0;
@@ -484,6 +501,53 @@ struct RecordAccess {
             static_cast<double>(o.leak_), static_cast<double>(o.trust_)};
   }
 
+  /// Where a load acts in the states of a model, which takes design work.
+  template <class O>
+  static auto load_column(const O& o) noexcept {
+    if constexpr (model_traits<typename O::PlantModel>.is_chain) {
+      return Empty{};
+    } else {
+      return o.model_.constant_column();
+    }
+  }
+  /// `shift_load` with it.
+  template <class O, class Column, class S>
+  static void load(O& o, const Column& column, const S& offset) noexcept {
+    if constexpr (std::is_same_v<Column, Empty>) {
+      (void)o.shift_load(offset);
+    } else {
+      auto next = o.kept_.states;
+      const S scaled = o.model_.scaled_constant(offset);
+      for (auto& state : next) {
+        for (std::size_t i = 0; i < column.size(); ++i) state[i] = state[i] + S(column[i]) * scaled;
+      }
+      (void)o.shift_to(next);
+    }
+  }
+  struct Empty {};
+  template <class O>
+  static MeasuredNumbers measured(const O& o) {
+    MeasuredNumbers numbers;
+    const auto& path = o.paths_[0];
+    const auto number = [](const auto& x) { return static_cast<double>(x); };
+    numbers.on = true;
+    numbers.gain = number(path.input_.gain);
+    for (std::size_t i = 0; i < 2; ++i) {
+      numbers.share[i] = number(path.share_[i]);
+      numbers.late[i] = number(path.late_[i]);
+      numbers.reached[i] = number(path.reached_[i]);
+    }
+    numbers.most_lost = static_cast<unsigned>(o.most_lost_);
+    for (int age = path.whole_ + 1; age >= 0; --age) {
+      numbers.memory.push_back(number(path.before(age)));
+    }
+    numbers.lagged = number(path.lagged_);
+    numbers.last = number(o.last_[0]);
+    numbers.told = number(o.told_);
+    numbers.lost = static_cast<unsigned>(o.lost_[0]);
+    return numbers;
+  }
+
   /// What a monitor computes from its settings alone, and of the controller that it watches.
   template <class M, class C>
   static auto health(const M& m, const C& c) noexcept {
@@ -575,14 +639,34 @@ struct IsGuarded : std::false_type {};
 template <class Observer>
 struct IsGuarded<Guarded<Observer>> : std::true_type {};
 template <class Observer>
-inline constexpr bool is_adapter = IsDelayed<Observer>::value || IsGate<Observer>::value ||
-                                   IsWrapped<Observer>::value || IsGuarded<Observer>::value;
+struct IsMeasured : std::false_type {};
+template <class Observer, int Count, int Delay>
+struct IsMeasured<Measured<Observer, Count, Delay>> : std::true_type {};
+template <class Observer>
+inline constexpr bool is_adapter =
+    IsDelayed<Observer>::value || IsGate<Observer>::value || IsWrapped<Observer>::value ||
+    IsGuarded<Observer>::value || IsMeasured<Observer>::value;
+/// One disturbance, told once and inside a WrappedOutput: around it the angle is read otherwise.
+template <class Observer>
+inline constexpr bool measures_plainly = [] {
+  if constexpr (IsMeasured<Observer>::value) {
+    using Inside = typename Observer::Adapted;
+    return Observer::inputs == 1 && !observer_traits<Inside>.takes_measured &&
+           !observer_traits<Inside>.wraps_output && measures_plainly<Inside>;
+  } else if constexpr (IsGuarded<Observer>::value) {
+    return !observer_traits<typename Observer::Adapted>.takes_measured;
+  } else if constexpr (is_adapter<Observer>) {
+    return measures_plainly<typename Observer::Adapted>;
+  } else {
+    return true;
+  }
+}();
 /// With a gate in it a WrappedOutput counts twice.
 template <class Observer>
 inline constexpr bool wraps_beside_gate = [] {
   if constexpr (IsWrapped<Observer>::value) {
     return observer_traits<typename Observer::Adapted>.rejects_outliers;
-  } else if constexpr (IsDelayed<Observer>::value || IsGuarded<Observer>::value) {
+  } else if constexpr (is_adapter<Observer>) {
     return wraps_beside_gate<typename Observer::Adapted>;
   } else {
     return false;
@@ -596,6 +680,7 @@ void take_adapters(RecordedDesign& design, const Observer& observer) {
   if constexpr (IsGate<Observer>::value) design.gate = RecordAccess::gate(observer);
   if constexpr (IsGuarded<Observer>::value) design.guard = RecordAccess::guard(observer);
   if constexpr (IsWrapped<Observer>::value) design.wrap = RecordAccess::wrap(observer);
+  if constexpr (IsMeasured<Observer>::value) design.measured = RecordAccess::measured(observer);
   if constexpr (is_adapter<Observer>) take_adapters(design, observer.observer());
 }
 
@@ -619,6 +704,10 @@ struct WithoutAdapter<WrappedOutput<Observer>> {
 };
 template <class Observer>
 struct WithoutAdapter<Guarded<Observer>> {
+  using type = typename WithoutAdapter<Observer>::type;
+};
+template <class Observer, int Count, int Delay>
+struct WithoutAdapter<Measured<Observer, Count, Delay>> {
   using type = typename WithoutAdapter<Observer>::type;
 };
 template <class Observer, class Form>
@@ -669,7 +758,7 @@ concept HasLists = can_be_recorded<Observer> && requires(const Observer& o) {
 template <class Observer>
 concept WritableObserver =
     HasLists<typename WithoutAdapter<Observer>::type> && !wraps_beside_gate<Observer> &&
-    RecordAccess::guards_a_chain<Observer>;
+    measures_plainly<Observer> && RecordAccess::guards_a_chain<Observer>;
 
 template <class C>
 struct ObserverOfController;
@@ -869,6 +958,15 @@ class DesignRecorder {
       if (design.wrap.period > 0) {
         add("shift", {"offset"}, false, [of](auto& c, const Numbers& in) {
           (void)of(c).shift_output(in[0]);
+          return Numbers{};
+        });
+      }
+    }
+    if constexpr (ShiftableLoad<Observer>) {
+      if (design.measured.on) {
+        const auto column = RecordAccess::load_column(of_any(subject_));
+        add("load", {"offset"}, false, [of, column](auto& c, const Numbers& in) {
+          RecordAccess::load(of(c), column, in[0]);
           return Numbers{};
         });
       }
