@@ -44,6 +44,26 @@ TEST(CGuarded, OfAMeasuredDisturbance) {
                                                                         3);
 }
 
+/// Pin, hold, release and a changing b0, which every comparison of a Guarded has, with a bound in
+/// the unit of u and a time after a pin.
+TEST(CGuarded, OfPinHoldAndGain) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  const auto by_input = [](auto& settings) {
+    settings.observer.unit = DisturbanceUnit::input;
+    settings.observer.disturbance_bound = 1;
+    settings.observer.release_samples = 20;
+    settings.observer.leak_time = 0;
+  };
+  equals_changed<Adrc<Guarded<OutlierGate<CascadeEso<1, 2, double>>>>>(30000, 901, "gcc -std=c99",
+                                                                       by_input);
+  equals_changed<Adrc<Guarded<LinearEso<2, float>>, ErrorBased>>(30000, 911, "gcc -std=c99",
+                                                                 [&](auto& settings) {
+                                                                   by_input(settings);
+                                                                   settings.measurement_divider = 2;
+                                                                 });
+  equals<Guarded<LinearEso<3, double>>>(30000, 921);  // it softens: no changing b0
+}
+
 /// As of others, see c_code_test.cpp.
 template <class C>
 void compiles() {
@@ -53,6 +73,7 @@ void compiles() {
 
 TEST(CGuarded, CompilesWithOtherCompilers) {
   compiles<Adrc<Late<LinearEso<2, float>>>>();
+  compiles<Adrc<Guarded<DelayedInput<WrappedOutput<CascadeEso<2, 2, float>>, 3>>>>();
   compiles<DisturbanceCompensator<DelayedInput<OutlierGate<Late<LinearEso<1, double>>>, 3>>>();
 }
 

@@ -108,6 +108,25 @@ struct GuardNumbers {
   double bound = 0;  ///< 0: there is none
   double leak = 0;
   double trust = 1;
+  double bound_as_given = 0;  ///< of `by_input`
+  bool by_input = false;      ///< unit of u: the bound follows b0
+  double gain = 1;            ///< b0 of the observer
+  double inverse_gain = 1;
+  double gain_ratio = 1;  ///< see Guarded, as what follows
+  double told_ratio = 1;
+  double input_factor = 1;
+  double weight_up = 1;
+  double weight_down = 1;
+  unsigned release_samples = 0;
+  unsigned release_left = 0;
+  unsigned settling_samples = 0;
+  unsigned settling_left = 0;
+  unsigned pin = 0;
+  unsigned side = 0;  ///< 1: upper, 2: lower
+  bool held = false;
+  bool unsettled = false;
+  bool gated = false;
+  bool frozen = false;
 };
 
 /// A Measured of one disturbance.
@@ -497,10 +516,62 @@ struct RecordAccess {
   static GuardNumbers guard(const O& o) noexcept {
     using S = typename O::scalar_type;
     const bool bounds = o.limit_ < (std::numeric_limits<S>::max)();
-    return {true, O::levels, bounds ? static_cast<double>(o.limit_) : 0.0,
-            static_cast<double>(o.leak_), static_cast<double>(o.trust_)};
+    const auto number = [](const S& x) { return static_cast<double>(x); };
+    return {true,
+            O::levels,
+            bounds ? number(o.limit_) : 0.0,
+            number(o.leak_),
+            number(o.trust_),
+            number(o.bound_),
+            o.unit_ == DisturbanceUnit::input,
+            number(o.configured_gain()),
+            number(o.inverse_gain_),
+            number(o.gain_ratio_),
+            number(o.told_ratio_),
+            number(o.input_factor_),
+            number(o.weight_up_),
+            number(o.weight_down_),
+            o.release_samples_,
+            o.release_left_,
+            static_cast<unsigned>(o.settling_samples_),
+            static_cast<unsigned>(o.settling_left_),
+            static_cast<unsigned>(o.pin_),
+            o.side_ > 0   ? 1u
+            : o.side_ < 0 ? 2u
+                          : 0u,
+            o.held_,
+            o.unsettled_,
+            o.gated_,
+            o.frozen_};
   }
 
+  /// What Guarded does with the states on the chain: y of a prediction, a plant that stands at y
+  /// with the disturbance of each level, a disturbance in the unit of u under another b0.
+  /// @{
+  template <class O, class Numbers>
+  static auto predicted_y(const O& o, const Numbers& in) noexcept {
+    typename O::State x{};
+    for (std::size_t i = 0; i < x.size(); ++i) x[i] = in[i];
+    return o.model_.predict(x, o.model_.drive(in[x.size()]))[0];
+  }
+  template <class O, class Numbers>
+  static void stand_at(O& o, const Numbers& in) noexcept {
+    auto still = o.kept_.states;
+    std::size_t next = 1;
+    for (auto& level : still) {
+      for (auto& x : level) x = std::remove_cvref_t<decltype(x)>(0.0);
+      level[0] = in[0];
+      level[O::order] = in[next++];
+    }
+    (void)o.shift_to(still);
+  }
+  template <class O, class S>
+  static void scale_found(O& o, const S& change) noexcept {
+    auto scaled = o.kept_.states;
+    for (auto& level : scaled) level[O::order] = level[O::order] * change;
+    (void)o.shift_to(scaled);
+  }
+  /// @}
   /// Where a load acts in the states of a model, which takes design work.
   template <class O>
   static auto load_column(const O& o) noexcept {
@@ -904,7 +975,8 @@ class DesignRecorder {
       if (published >= 0) name = "published_" + std::to_string(published);
       writer.live[i] = name[0] == 'z' || name[0] == 'p' || name == "u_applied" ||
                        name == "u_last" ||
-                       (design.options.watched && (name == "innovation" || name == "u_asked"));
+                       (design.options.watched && (name == "innovation" || name == "u_asked")) ||
+                       (design.guard.on && name == "innovation");
       for (const auto& [number, begins] : settings) {
         if (number == numbers[i] && name.empty()) name = begins + std::to_string(i);
       }
@@ -969,6 +1041,32 @@ class DesignRecorder {
           RecordAccess::load(of(c), column, in[0]);
           return Numbers{};
         });
+      }
+    }
+    if constexpr (model_traits<typename Observer::PlantModel>.is_chain &&
+                  size == Observer::order + 1) {
+      if (design.guard.on) {
+        std::vector<std::string> states;
+        for (int i = 1; i <= size; ++i) states.push_back("x" + std::to_string(i));
+        states.push_back("u");
+        add("predicted_y", states, true, [of](auto& c, const Numbers& in) {
+          return Numbers{RecordAccess::predicted_y(of(c), in)};
+        });
+        std::vector<std::string> found{"y"};
+        for (int i = 1; i <= Observer::levels; ++i) found.push_back("d" + std::to_string(i));
+        add("stand_at", found, false, [of](auto& c, const Numbers& in) {
+          RecordAccess::stand_at(of(c), in);
+          return Numbers{};
+        });
+        if (design.guard.by_input) {
+          add("scale_found", {"change"}, false, [of](auto& c, const Numbers& in) {
+            RecordAccess::scale_found(of(c), in[0]);
+            return Numbers{};
+          });
+          add("scaled_bound", {"bound"}, true, [of](auto& c, const Numbers& in) {
+            return Numbers{of(c).model().scaled_disturbance(in[0])};
+          });
+        }
       }
     }
     add("observe", {"y", "u"}, false, [of](auto& c, const Numbers& in) {
