@@ -332,8 +332,9 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
       {"$STOOD", stood},
       {"$GAINS_BY_GAP", opens ? "o->settings->gains" : "gains"},
       {"$ORDER", std::to_string(design.order)},
-      {"$LARGEST", writer.number(writer.single() ? double{(std::numeric_limits<float>::max)()}
-                                                 : (std::numeric_limits<double>::max)())},
+      {"$LARGEST",
+       writer.number(writer.single() ? static_cast<double>((std::numeric_limits<float>::max)())
+                                     : (std::numeric_limits<double>::max)())},
       {"$TABLE_OF_FILE", table_of_file},
       {"$TRUST", trusts},
       {"$LEAK", leaks},
