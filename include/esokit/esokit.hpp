@@ -180,6 +180,7 @@
 #include <esokit/sim/study_records.hpp>
 #include <esokit/sim/trapezoid.hpp>
 #include <esokit/sim/window.hpp>
+#include <esokit/target/c_adapter_text.hpp>
 #include <esokit/target/c_code.hpp>
 #include <esokit/target/c_text.hpp>
 #include <esokit/target/fixed_bounds.hpp>

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/core/error_text.hpp>
@@ -563,6 +564,9 @@ TEST(FixedPoint, RefusesWhatIsNotLinear) {
       .observer_bandwidth = 100, .input_gain = 50, .sample_time = 1e-3, .max_gap = 2};
   wrapped.period = 6;
   EXPECT_NE(refused(Wrapped::make(wrapped).value()).find("y.counter_bits"), std::string::npos);
+  using Told = Measured<LinearEso<2>>;
+  EXPECT_NE(refused(Told::make({.observer = wrapped.observer}).value()).find("is in Measured"),
+            std::string::npos);
 }
 
 }  // namespace target_fixed_point_test

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
+#include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/disturbance_compensator.hpp>
@@ -179,6 +180,9 @@ TEST(StructuredText, RefusesByName) {
   using Held = Guarded<LinearEso<1, double>>;
   EXPECT_EQ(refusal(Held::make(observer_config<Held>(8)).value()),
             "guarded: is not written in Structured Text");
+  using Told = Measured<LinearEso<1, double>, 1, 4>;
+  EXPECT_EQ(refusal(Told::make(observer_config<Told>(8)).value()),
+            "measured: is not written in Structured Text");
   using Ahead = PredictiveAdrc<LinearEso<1, double>>;
   Ahead::Config ahead{.observer = observer_config<LinearEso<1, double>>(8)};
   ahead.controller_bandwidth = 3;

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
+#include <esokit/adapter/guarded.hpp>
 #include <esokit/observer/model_eso.hpp>
 #include <esokit/target/c_code.hpp>
 #include <filesystem>
@@ -41,6 +42,10 @@ auto observer_config(double input_gain) {
   if constexpr (requires { config.observer; }) {
     config.observer = observer_config<typename Observer::Adapted>(input_gain);
     if constexpr (requires { config.delay; }) config.delay = 3;
+    if constexpr (requires { config.inputs; }) {
+      config.inputs[0] = {V(-3), V(0.03), V(0.02)};
+      config.most_lost = 7;
+    }
     if constexpr (requires { config.disturbance_bound; }) {
       config.disturbance_bound = V(1.5);
       config.leak_time = V(2);
@@ -247,7 +252,16 @@ class InC {
       find(correct_, "loop_correct");
       find(reset_, "loop_reset");
     }
-    if (library_.has("loop_set_trust")) find(trust_, "loop_set_trust");
+    if (library_.has("loop_measured")) find(measured_, "loop_measured");
+    if (library_.has("loop_set_trust")) {
+      find(trust_, "loop_set_trust");
+      find(pin_, "loop_set_pin");
+      find(hold_, "loop_hold");
+      find(hold_observer_, "loop_hold");
+      find(hold_with_, "loop_hold");
+      if (library_.has("loop_release")) find(release_, "loop_release");
+      if (library_.has("loop_set_input_gain")) find(gain_, "loop_set_input_gain");
+    }
     unsigned (*bytes)() = nullptr;
     find(bytes, "loop_size");
     state_.resize(bytes() / sizeof(std::uint64_t) + 1);
@@ -257,6 +271,14 @@ class InC {
   [[nodiscard]] bool loaded() const { return library_.loaded(); }
   V update(V y, V r) { return update_(state_.data(), y, r); }
   V miss(V r) { return miss_(state_.data(), r); }
+  void measured(V w) { measured_(state_.data(), w); }
+  void set_pin(Pin where) { pin_(state_.data(), static_cast<std::uint8_t>(where)); }
+  V hold(V y, V u) { return hold_(state_.data(), y, u); }
+  V hold(V y, V r, V u) { return hold_with_(state_.data(), y, r, u); }
+  V hold() { return hold_observer_(state_.data()); }
+  void release() { release_(state_.data()); }
+  bool takes_gain() const { return gain_ != nullptr; }
+  bool set_input_gain(V b) { return gain_(state_.data(), b); }
   void set_trust(V trust) { trust_(state_.data(), trust); }
   void applied(V u) { applied_(state_.data(), u); }
   unsigned start(V y, V u) { return start_(state_.data(), y, u); }
@@ -278,6 +300,13 @@ class InC {
   V (*miss_)(void*, V) = nullptr;
   void (*applied_)(void*, V) = nullptr;
   void (*trust_)(void*, V) = nullptr;
+  void (*pin_)(void*, std::uint8_t) = nullptr;
+  V (*hold_)(void*, V, V) = nullptr;
+  V (*hold_with_)(void*, V, V, V) = nullptr;
+  V (*hold_observer_)(void*) = nullptr;
+  void (*release_)(void*) = nullptr;
+  bool (*gain_)(void*, V) = nullptr;
+  void (*measured_)(void*, V) = nullptr;
   unsigned (*observe_)(void*, V, V) = nullptr;
   unsigned (*predict_)(void*, V) = nullptr;
   unsigned (*correct_)(void*, V) = nullptr;
@@ -307,6 +336,33 @@ void compare_estimates(const Observer& observer, InC<V>& in_c, int k) {
   });
 }
 
+/// Tells both a measured w, if the object takes one: mostly a good one, none for a while, bad ones.
+template <class Object, class V>
+void tell_measured(Object& object, InC<V>& in_c, Random& random, int k) {
+  if constexpr (requires { object.measured(V()); }) {
+    if (random.index(40) == 0 || k % 100 > 85) return;
+    V w = static_cast<V>(std::sin(0.02 * k) + 0.1 * random.uniform(-1, 1));
+    if (random.index(50) == 0) w = random.index(2) == 0 ? hidden_nan<V>() : anything<V>(random);
+    object.measured(w);
+    in_c.measured(w);
+  }
+}
+
+/// Pin and b0 of both, now and then. @param gain b0 @param guarded the observer
+template <class Object, class Guard, class V>
+void tell_guard(Object& object, Guard& guarded, InC<V>& in_c, Random& random, double gain) {
+  if (random.index(60) == 0) {
+    const Pin where = random.index(2) == 0 ? Pin::free : static_cast<Pin>(random.index(4));
+    guarded.set_pin(where);
+    in_c.set_pin(where);
+  }
+  if (in_c.takes_gain() && random.index(150) == 0) {
+    const V b = random.index(5) == 0 ? anything<V>(random)
+                                     : static_cast<V>(gain * random.uniform(0.7, 1.5));
+    EXPECT_EQ(static_cast<bool>(object.set_input_gain(b)), in_c.set_input_gain(b)) << b;
+  }
+}
+
 /// Both in the same loop, so many samples. @return what was met
 template <class C>
 Seen compare(const C& fresh, InC<typename C::scalar_type>& in_c, double input_gain, int samples,
@@ -318,6 +374,7 @@ Seen compare(const C& fresh, InC<typename C::scalar_type>& in_c, double input_ga
   Seen seen;
   V r(1);
   int lost = 0;
+  int held = 0;
   double u = 0;
   for (int k = 0; k < samples; ++k) {
     plant.set_disturbance(2 * std::sin(0.01 * k));
@@ -340,15 +397,32 @@ Seen compare(const C& fresh, InC<typename C::scalar_type>& in_c, double input_ga
         controller.observer().set_trust(trust);
         in_c.set_trust(trust);
       }
+      tell_guard(controller, controller.observer(), in_c, random, input_gain);
+      if (random.index(100) == 0) held = random.index(6);
     }
+    tell_measured(controller, in_c, random, k);
     V given = r;
     if constexpr (!requires { controller.gains(); }) given = (r - y) / static_cast<V>(input_gain);
     if (random.index(400) == 0) given = anything<V>(random);
-    if (random.index(30) == 0) {
-      const V held = random.index(10) == 0 ? anything<V>(random) : static_cast<V>(0.9 * u);
-      controller.applied(held);
+    if (held > 0) {
+      --held;
+      const V under = random.index(10) == 0 ? anything<V>(random) : static_cast<V>(0.9 * u);
+      V mine{};
+      V its{};
+      if constexpr (requires { controller.hold(y, given, under); }) {
+        mine = controller.hold(y, given, under);
+        its = detail::ObserverOfController<C>::error_based ? in_c.hold(y, given, under)
+                                                           : in_c.hold(y, under);
+      } else if constexpr (requires { controller.hold(y, under); }) {
+        mine = controller.hold(y, under);
+        its = in_c.hold(y, under);
+      }
+      EXPECT_TRUE(equal_bits(mine, its)) << "sample " << k << ", held";
+    } else if (random.index(30) == 0) {
+      const V told = random.index(10) == 0 ? anything<V>(random) : static_cast<V>(0.9 * u);
+      controller.applied(told);
       controller.update(y, given);
-      in_c.applied(held);
+      in_c.applied(told);
       in_c.update(y, given);
     } else if (random.index(100) == 0) {
       controller.update_without_measurement(given);
@@ -445,6 +519,17 @@ void observes(int samples, std::uint64_t seed) {
     for (int k = 0; k < samples && !testing::Test::HasFailure(); ++k) {
       const V y = signal();
       const V u = signal();
+      tell_measured(observer, in_c, random, k);
+      if constexpr (requires { observer.set_pin(Pin::free); }) {
+        tell_guard(observer, observer, in_c, random, input_gain);
+        if (random.index(50) == 0) {
+          EXPECT_TRUE(equal_bits(observer.hold(u), in_c.hold())) << "sample " << k;
+        }
+        if (random.index(20) == 0) {
+          observer.release();
+          in_c.release();
+        }
+      }
       const int what = random.index(1000);
       unsigned mine = 0;
       unsigned its = 0;

@@ -52,6 +52,7 @@ class Measured : public NamedAdapter<Measured<Observer, Count, Delay>, Observer,
                                      MeasuredConfig<Observer, Count>> {
   using Base = NamedAdapter<Measured, Observer, MeasuredConfig<Observer, Count>>;
   friend Base;
+  friend struct detail::RecordAccess;
   using Base::observer_;
   using S = typename Observer::scalar_type;
   static_assert(Count >= 1, "esokit: something has to be measured");

@@ -123,6 +123,7 @@ class MeasuredPath {
   }
 
  private:
+  friend struct RecordAccess;
   static constexpr int length = Capacity + 2;
   static S longest(const S& time) { return (static_cast<S>(Capacity) + S(1) / S(1024)) * time; }
 

@@ -7,9 +7,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <esokit/core/expected.hpp>
+#include <esokit/target/c_adapter_text.hpp>
 #include <esokit/target/c_text.hpp>
 #include <esokit/target/list_writer.hpp>
 #include <esokit/target/recorded_design.hpp>
+#include <limits>
 #include <string>
 
 namespace esokit {
@@ -120,17 +122,75 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
             "u;\n  o->doubts = " + std::to_string(wrap.doubts) +
             "u;\n  o->begun = " + (wrap.begun ? "1u" : "0u") + ";\n";
   }
+  const MeasuredNumbers& measured = design.measured;
+  const auto pair = [&](const std::array<double, 2>& two) {
+    return writer.number(two[0]) + ", " + writer.number(two[1]);
+  };
+  const std::string newest_w = std::to_string(measured.on ? measured.memory.size() - 1 : 0) + "u";
+  if (measured.on) {
+    members += "  " + real + " w[" + std::to_string(measured.memory.size()) +
+               "]; /* measured, a ring */\n  " + real + " w_given; /* by $name_measured */\n  " +
+               real + " w_last; /* the last good one */\n  " + real +
+               " w_lagged; /* behind dead time and lag */\n  " + real +
+               " w_told; /* its part of the disturbance */\n  uint32_t w_lost;\n" +
+               "  uint16_t newest_w;\n  uint8_t w_is_new;\n";
+    for (std::size_t i = 0; i < measured.memory.size(); ++i) {
+      init += "  o->w[" + std::to_string(i) + "] = " + writer.number(measured.memory[i]) + ";\n";
+    }
+    init += "  o->w_given = $ZERO;\n  o->w_last = " + writer.number(measured.last) +
+            ";\n  o->w_lagged = " + writer.number(measured.lagged) +
+            ";\n  o->w_told = " + writer.number(measured.told) +
+            ";\n  o->w_lost = " + std::to_string(measured.lost) +
+            "u;\n  o->newest_w = " + newest_w + ";\n  o->w_is_new = 0u;\n";
+  }
   const GuardNumbers& guard = design.guard;
   std::string found;
   std::string trusts;
   std::string leaks;
   std::string bounds;
+  std::string standing;
+  std::string stood;
+  std::string rows_of_first;
+  std::string rows_of_x;
+  for (int row = 0; row < design.size; ++row) {
+    rows_of_first += (row > 0 ? ", o->z" : "o->z") + std::to_string(row + 1);
+    rows_of_x += ", x[" + std::to_string(row) + "]";
+  }
   if (guard.on) {
     members += "  " + real + " trust; /* see $name_set_trust */\n";
     init += "  o->trust = " + writer.number(guard.trust) + ";\n";
+    const auto also = [&](const char* name, double value) {
+      members += "  " + real + " " + name + ";\n";
+      init += std::string("  o->") + name + " = " + writer.number(value) + ";\n";
+    };
+    also("weight_up", guard.weight_up);
+    also("weight_down", guard.weight_down);
+    also("gain_ratio", guard.gain_ratio);
+    also("told_ratio", guard.told_ratio);
+    also("input_factor", guard.input_factor);
+    const auto counts = [&](const char* type, const char* name, unsigned value) {
+      members += std::string("  ") + type + " " + name + ";\n";
+      init += std::string("  o->") + name + " = " + std::to_string(value) + "u;\n";
+    };
+    counts("uint32_t", "settling_left", guard.settling_left);
+    counts("uint16_t", "release_left", guard.release_left);
+    counts("uint8_t", "pin", guard.pin);
+    counts("uint8_t", "side", guard.side);
+    counts("uint8_t", "held", guard.held ? 1 : 0);
+    counts("uint8_t", "unsettled", guard.unsettled ? 1 : 0);
+    counts("uint8_t", "frozen", guard.frozen ? 1 : 0);
+    counts("uint8_t", "gated", guard.gated ? 1 : 0);
     if (guard.bound > 0) {
-      bounds = "  const $real most = " + writer.number(guard.bound) +
-               ";\n  $real below = $ZERO;\n  $real sum;\n";
+      bounds = (guard.by_input
+                    ? "  const $real bound = " + writer.number(guard.bound_as_given) +
+                          " * $fabs($GAIN_OF_GUARD * o->gain_ratio);\n  $real most = $LARGEST;\n"
+                    : "  const $real most = " + writer.number(guard.bound) + ";\n") +
+               "  $real below = $ZERO;\n  $real sum;\n" +
+               (guard.by_input
+                    ? "  if ((bound > $ZERO) && is_finite(bound)) {\n    (void)scaled_bound(o, "
+                      "bound, &most);\n    if (!is_finite(most)) {\n      most = "
+                      "$LARGEST;\n    }\n  }\n"
+                    : "");
     } else {
       bounds = "  (void)o;\n";
     }
@@ -139,8 +199,12 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
                             (level > 0 ? "_level" + std::to_string(level + 1) : std::string());
       const std::string before = "before[" + std::to_string(level) + "]";
       found += (level > 0 ? ", " : "") + d;
-      trusts += "    " + d + " = " + before + " + (o->trust * (" + d + " - " + before + "));\n";
-      leaks += "    " + d + " = " + d + " - (" + writer.number(guard.leak) + " * " + d + ");\n";
+      trusts += "    moved = " + d + " - " + before + ";\n    " + d + " = " + before +
+                " + (((moved > $ZERO) ? o->weight_up : o->weight_down) * moved);\n";
+      standing += ", " + d;
+      stood += ", " + before;
+      if (guard.leak > 0)
+        leaks += "    " + d + " = " + d + " - (" + writer.number(guard.leak) + " * " + d + ");\n";
       if (guard.bound > 0) {
         bounds += "  sum = below + " + d + ";\n  if ($fabs(sum) > most) {\n    " + d +
                   " = ((sum > $ZERO) ? most : -most) - below;\n  }\n";
@@ -169,6 +233,7 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
   }
   const std::string gains_of_table = table;
   const std::string rows_of_table = std::to_string(design.max_gap + 1);
+  std::string table_of_file;
   if (!runs) {
     const std::size_t count = design.gap_gains[0].size();
     for (std::size_t i = 0; i < count; ++i) call_gains += ", k[" + std::to_string(i) + "]";
@@ -176,6 +241,7 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
                   : "  static const " + real + " gains[" + rows_of_table + "][" +
                         std::to_string(count) + "] = { /* after 1, 2, .. samples */\n" + table +
                         "  };\n";
+    if (guard.on && !opens) table_of_file.swap(table);  // two functions read it
   }
   const std::string by_table = "correct_by(o, y" + call_gains + ")";
   const std::string corrects =
@@ -210,18 +276,67 @@ inline Words c_words(const RecordedDesign& design, const ListWriter& writer) {
                "},\n";
   }
   Words words = {
-      {"$BOOL", opens ? "$include <stdbool.h>\n" : ""},
+      {"$BOOL", opens || guard.on ? "$include <stdbool.h>\n" : ""},
       {"$include", "#include"},  // not written in the texts: scripts look for such lines
       {"$MEMBERS", members},
       {"$TIME", writer.number(design.sample_time)},
       {"$CORRECT", corrects},
+      {"$KEEP_BOUND", bounds},
+      {"$OF_MEASURED",
+       measured.on
+           ? "/* w, measured, before the sample at which it begins to act; without it, or if "
+             "it is not finite,\n * the last good one counts for $W_MOST samples, then zero. "
+             "*/\nvoid $name_measured($name_state *o, $real w);\n\n"
+           : ""},
+      {"$W_GAIN", writer.number(measured.gain)},
+      {"$W_SHARE", pair(measured.share)},
+      {"$W_LATE", pair(measured.late)},
+      {"$W_REACHED", pair(measured.reached)},
+      {"$W_NEWESTu", newest_w},
+      {"$W_MOST", std::to_string(measured.most_lost)},
+      {"$W_SIGN", design.error_based ? "-" : ""},
+      {"$FOUR", writer.number(4)},
+      {"$SETTLE_W", measured.on && design.is_controller ? "  settle_w(o);\n" : ""},
       {"$OF_GUARD",
        guard.on ? "/* From the next correction on, those of the disturbance count so much, 0 .. 1. "
                   "*/\nvoid $name_set_trust($name_state *o, $real trust);\n\n"
+                  "/* At which limit an actuator of unknown output is. */\n"
+                  "#define $NAME_PIN_FREE 0u\n#define $NAME_PIN_UPPER 1u\n"
+                  "#define $NAME_PIN_LOWER 2u\n#define $NAME_PIN_EITHER 3u /* by the sign of u */\n"
+                  "void $name_set_pin($name_state *o, uint8_t where);\n\n$OF_HOLD$OF_GAIN"
                 : ""},
-      {"$KEEP_BOUND", bounds},
+      {"$OF_HOLD",
+       design.is_controller
+           ? "/* Instead of update, for a plant that something else holds under u: y is followed, "
+             "the\n * disturbance stays; returns u. On release begin with the reference at y. */\n"
+             "$real $name_hold($name_state *o, $real y, $HOLD_R$real u);\n\n"
+           : "/* Something else holds the plant, until `release`; returns the u to give to the "
+             "observer. */\n$real $name_hold($name_state *o);\nvoid $name_release($name_state "
+             "*o);\n\n"},
+      {"$HOLD_R", design.error_based ? "$real r, " : ""},
+      {"$OF_GAIN", design.softens ? ""
+                                  : "/* Another b0 from the next sample on; false, and nothing "
+                                    "changes, if it has another sign\n * or is too far away. "
+                                    "*/\nbool $name_set_input_gain($name_state *o, $real b);\n\n"},
+      {"$B_SIGN", design.error_based ? "-" : ""},
+      {"$SCALES", guard.by_input ? " &&\n    scale_found(o, ratio * o->input_factor)" : ""},
+      {"$GAIN_OF_GUARD", writer.number(guard.gain)},
+      {"$INVERSE_GAIN", writer.number(guard.inverse_gain)},
+      {"$UP_SIDE", guard.gain > 0 ? "1" : "2"},
+      {"$DOWN_SIDE", guard.gain > 0 ? "2" : "1"},
+      {"$SETTLING", std::to_string(guard.settling_samples)},
+      {"$RELEASE", std::to_string(guard.release_samples)},
+      {"$ROWS_OF_FIRST", rows_of_first},
+      {"$ROWS_OF_X", rows_of_x},
+      {"$STANDING", standing},
+      {"$STOOD", stood},
+      {"$GAINS_BY_GAP", opens ? "o->settings->gains" : "gains"},
+      {"$ORDER", std::to_string(design.order)},
+      {"$LARGEST",
+       writer.number(writer.single() ? static_cast<double>((std::numeric_limits<float>::max)())
+                                     : (std::numeric_limits<double>::max)())},
+      {"$TABLE_OF_FILE", table_of_file},
       {"$TRUST", trusts},
-      {"$LEAKS", guard.leak > 0 ? "true" : "gated"},
       {"$LEAK", leaks},
       {"$REFUSED", gated ? "($NAME_MEASUREMENT_REJECTED | $NAME_OUTLIER_REJECTED)"
                          : "$NAME_MEASUREMENT_REJECTED"},
@@ -307,6 +422,12 @@ inline Words c_loop_words(const RecordedDesign& design, const ListWriter& writer
                (wraps ? first + " + wrapped(r - " + first + ")" : std::string("r")) + estimates +
                ", &u);\n";
   }
+  const bool guards = design.guard.on;
+  if (guards && design.compensates) {
+    call_law = "    (void)law(o, -$ZERO, &u);\n    u = r + (u * o->input_factor);\n";
+  } else if (guards && !design.softens) {
+    call_law += "    u = u * o->input_factor;\n";
+  }
   const std::string of_y = only("!is_finite(y)", "return $NAME_STATE_REJECTED");
   const std::string of_u = only("!is_finite(u)", "return $NAME_INPUT_REJECTED");
   return {
@@ -325,17 +446,28 @@ inline Words c_loop_words(const RecordedDesign& design, const ListWriter& writer
                      only("o->phase != 0u", "return $name_update_without_measurement(o, r)") +
                      "  o->phase = 1u;\n"
                : ""},
+      {"$PHASE_PLAN", divides ? "  const bool planned = o->gap == $DUEu;\n" : ""},
+      {"$PHASE_SKIP",
+       divides ? "  if (o->phase != 0u) {\n    o->phase = (uint16_t)(o->phase + 1u);\n    if "
+                 "(o->phase >= $DIVIDERu) {\n      o->phase = 0u;\n    }\n    o->status = "
+                 "(uint8_t)predict_$top(o, drive);\n    judge_missing(o);\n    release_guards(o);\n"
+                 "    return o->u_last;\n  }\n  o->phase = 1u;\n"
+               : ""},
       {"$PHASE_AFTER",
        divides ? only("planned && (status == $NAME_GAP_BRIDGED)", "status = 0u") : ""},
       {"$DUE", std::to_string(loop.divider - 1)},
       {"$REST", design.gate.threshold > 0
-                    ? "if ($rest(o, $MEASURED, o->u_applied)) {\n      gate_set(o, true);\n    }"
-                    : "(void)$rest(o, $MEASURED, o->u_applied);"},
+                    ? "if ($rest(o, $MEASURED, $U_APPLIED)) {\n      gate_set(o, true);\n    }"
+                    : "(void)$rest(o, $MEASURED, $U_APPLIED);"},
+      {"$U_APPLIED", guards ? "applied_by_present(o)" : "o->u_applied"},
+      {"$ASKED", design.options.watched ? "  o->u_asked = o->u_last;\n" : ""},
       {"$CALL_LAW", call_law},
       {"$MEASURED", design.error_based ? "r - y" : "y"},
       {"$AT_START", design.error_based ? "$ZERO" : "y"},
       {"$START_CHECKS", design.compensates ? of_u + of_y : of_y + of_u},
-      {"$FILL", design.line.empty() ? "" : "  fill_delayed(o, u);\n"},
+      {"$FILL", design.line.empty() ? ""
+                : guards            ? "  fill_delayed(o, u * o->gain_ratio);\n"
+                                    : "  fill_delayed(o, u);\n"},
       {"$GATE_START", design.gate.threshold > 0 ? "  gate_set(o, true);\n" : ""},
       {"$SAFE_INPUT", loop.has_safe_input ? writer.number(loop.safe_input) : "o->u_last"},
       {"$HOLD_INPUT", writer.number(loop.hold_input)},
@@ -372,7 +504,8 @@ inline CCode c_texts(const RecordedDesign& design, const std::string& mark) {
   std::string lists;
   for (std::size_t i = 0; i < design.names.size(); ++i) {
     const std::string& name = design.names[i].name;
-    if ((design.gate.threshold > 0 || design.law.watches || design.predictive) &&
+    if ((design.gate.threshold > 0 || design.law.watches || design.predictive ||
+         design.measured.on) &&
         name == "observe") {
       continue;
     }
@@ -400,6 +533,13 @@ inline CCode c_texts(const RecordedDesign& design, const std::string& mark) {
     add(c_source_running);
     predict = "running";
   }
+  const bool measures = design.measured.on;
+  if (measures) {
+    add(c_source_measured);
+    if (!gated && !design.law.watches) add(c_source_measured_update);
+    if (controls) add(c_source_measured_settle);
+    predict = "measured";
+  }
   if (design.law.watches) {
     add(c_source_watched);
     correct = update = "watched";
@@ -407,6 +547,8 @@ inline CCode c_texts(const RecordedDesign& design, const std::string& mark) {
   if (gated) {
     add(c_source_gate);
     correct = update = "gated";
+  } else if (measures && !design.law.watches) {
+    update = "measured";
   } else if (!design.law.watches && !design.predictive) {
     add(c_source_base_update);
     if (runs) {
@@ -430,8 +572,9 @@ inline CCode c_texts(const RecordedDesign& design, const std::string& mark) {
   }
   if (design.guard.on) {  // the outermost
     add(c_source_guarded);
-    if (!controls) add(c_source_guarded_correct);
-    correct = update = "guarded";
+    if (!design.softens) add(c_source_guarded_gain);
+    if (!controls) add(c_source_guarded_hold);
+    predict = correct = update = "guarded";
     layers += filled(controls ? c_source_guarded_rest : c_source_guarded_restart,
                      {{"$below_restart", restart}, {"$below_rest", rest}});
     rest = "rest_guarded";
@@ -471,10 +614,11 @@ inline CCode c_texts(const RecordedDesign& design, const std::string& mark) {
                                        : c_header_observer) +
               text(c_header_tail),
           text(c_source_head) + c_source_recorded + set + lists + text(law_text) +
-              text(c_source_observer_part) + text(layers) +
+              text("$TABLE_OF_FILE") + text(c_source_observer_part) + text(layers) +
               text(controls            ? c_source_controller
                    : design.predictive ? c_source_predictive
                                        : c_source_observer) +
+              (controls && design.guard.on ? text(c_source_guarded_hold_sample) : "") +
               (opens ? text(c_source_adopt) : "") + text(c_source_self_test),
           opens ? "#include \"" + design.options.name + ".h\"\n\n" + set : ""};
 }
@@ -515,8 +659,9 @@ inline CCode c_code(const RecordedDesign& design) {
 /// Written are LinearEso, also with a set of poles, HalfGainEso, ReducedOrderEso, CascadeEso,
 /// AdjustableBandwidthEso, NonlinearEso, ModelEso, PlantEso and their cascades (not with
 /// `follows_speed`), AlgebraicEso, ExtendedStateFilter (in its modes recursive and frozen, without
-/// a nominal model), these in DelayedInput and OutlierGate or WrappedOutput, LinearEso and
-/// CascadeEso in Guarded, too (bound, leak and trust; no pin, hold or changing b0), and Adrc of
+/// a nominal model), these in DelayedInput and OutlierGate or WrappedOutput, in Measured with one
+/// disturbance (around no WrappedOutput, but inside it, and not in Guarded), LinearEso and
+/// CascadeEso in Guarded, too (a changing b0 unless the law softens), and Adrc of
 /// both forms and DisturbanceCompensator around them, and PredictiveAdrc around one of a single
 /// level with constant gains and no sensor in its model, without an adapter. Others do not compile.
 /// SmoothProfile and HealthMonitor: target/profile_code.hpp and target/health_code.hpp.
@@ -539,8 +684,8 @@ void to_c(const Other&, const CodeOptions& = {}) {
       detail::Writable<Other>,
       "esokit: to_c writes LinearEso, HalfGainEso, ReducedOrderEso, CascadeEso, "
       "AdjustableBandwidthEso, NonlinearEso, ModelEso, PlantEso, AlgebraicEso and "
-      "ExtendedStateFilter, these in DelayedInput and OutlierGate or WrappedOutput, on the "
-      "chain with one extended state in Guarded, and "
+      "ExtendedStateFilter, these in DelayedInput and OutlierGate or WrappedOutput, in Measured "
+      "with one disturbance, on the chain with one extended state in Guarded, and "
       "Adrc and DisturbanceCompensator around them, and PredictiveAdrc around one with constant "
       "gains; no other gains, adapters or controllers yet");
 }

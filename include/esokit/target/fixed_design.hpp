@@ -377,6 +377,10 @@ class FixedDesign {
       return refuse("observer", design_->guard.trust,
                     "is in Guarded, which is not written in fixed point");
     }
+    if (design_->measured.on) {
+      return refuse("observer", design_->measured.gain,
+                    "is in Measured, which is not written in fixed point");
+    }
     if (design_->law.kind != RunningLaw::none && !design_->law.settled) {
       return refuse("observer", static_cast<double>(design_->law.age),
                     "has gains that go on: let it settle first (AlgebraicEso), freeze the filter "

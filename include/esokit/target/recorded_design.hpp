@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <esokit/adapter/delayed_input.hpp>
 #include <esokit/adapter/guarded.hpp>
+#include <esokit/adapter/measured.hpp>
 #include <esokit/adapter/outlier_gate.hpp>
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
@@ -107,6 +108,40 @@ struct GuardNumbers {
   double bound = 0;  ///< 0: there is none
   double leak = 0;
   double trust = 1;
+  double bound_as_given = 0;  ///< of `by_input`
+  bool by_input = false;      ///< unit of u: the bound follows b0
+  double gain = 1;            ///< b0 of the observer
+  double inverse_gain = 1;
+  double gain_ratio = 1;  ///< see Guarded, as what follows
+  double told_ratio = 1;
+  double input_factor = 1;
+  double weight_up = 1;
+  double weight_down = 1;
+  unsigned release_samples = 0;
+  unsigned release_left = 0;
+  unsigned settling_samples = 0;
+  unsigned settling_left = 0;
+  unsigned pin = 0;
+  unsigned side = 0;  ///< 1: upper, 2: lower
+  bool held = false;
+  bool unsettled = false;
+  bool gated = false;
+  bool frozen = false;
+};
+
+/// A Measured of one disturbance.
+struct MeasuredNumbers {
+  bool on = false;
+  double gain = 0;
+  std::array<double, 2> share{};  ///< of a sample in which the older and the newer w arrive,
+  std::array<double, 2> late{};   ///< and what the lag does in these
+  std::array<double, 2> reached{};
+  unsigned most_lost = 0;
+  std::vector<double> memory{};  ///< the newest last
+  double lagged = 0;
+  double last = 0;
+  double told = 0;
+  unsigned lost = 0;
 };
 
 /// A finished design as lists and counts, without its type.
@@ -132,6 +167,7 @@ struct RecordedDesign {
   LawNumbers law{};
   WrapNumbers wrap{};
   GuardNumbers guard{};
+  MeasuredNumbers measured{};
   int max_gap = 0;  ///< missing samples that are bridged
   LoopRules loop{};
   double lower = 0;
@@ -480,8 +516,107 @@ struct RecordAccess {
   static GuardNumbers guard(const O& o) noexcept {
     using S = typename O::scalar_type;
     const bool bounds = o.limit_ < (std::numeric_limits<S>::max)();
-    return {true, O::levels, bounds ? static_cast<double>(o.limit_) : 0.0,
-            static_cast<double>(o.leak_), static_cast<double>(o.trust_)};
+    const auto number = [](const S& x) { return static_cast<double>(x); };
+    return {true,
+            O::levels,
+            bounds ? number(o.limit_) : 0.0,
+            number(o.leak_),
+            number(o.trust_),
+            number(o.bound_),
+            o.unit_ == DisturbanceUnit::input,
+            number(o.configured_gain()),
+            number(o.inverse_gain_),
+            number(o.gain_ratio_),
+            number(o.told_ratio_),
+            number(o.input_factor_),
+            number(o.weight_up_),
+            number(o.weight_down_),
+            o.release_samples_,
+            o.release_left_,
+            static_cast<unsigned>(o.settling_samples_),
+            static_cast<unsigned>(o.settling_left_),
+            static_cast<unsigned>(o.pin_),
+            o.side_ > 0   ? 1u
+            : o.side_ < 0 ? 2u
+                          : 0u,
+            o.held_,
+            o.unsettled_,
+            o.gated_,
+            o.frozen_};
+  }
+
+  /// What Guarded does with the states on the chain: y of a prediction, a plant that stands at y
+  /// with the disturbance of each level, a disturbance in the unit of u under another b0.
+  /// @{
+  template <class O, class Numbers>
+  static auto predicted_y(const O& o, const Numbers& in) noexcept {
+    typename O::State x{};
+    for (std::size_t i = 0; i < x.size(); ++i) x[i] = in[i];
+    return o.model_.predict(x, o.model_.drive(in[x.size()]))[0];
+  }
+  template <class O, class Numbers>
+  static void stand_at(O& o, const Numbers& in) noexcept {
+    auto still = o.kept_.states;
+    std::size_t next = 1;
+    for (auto& level : still) {
+      for (auto& x : level) x = std::remove_cvref_t<decltype(x)>(0.0);
+      level[0] = in[0];
+      level[O::order] = in[next++];
+    }
+    (void)o.shift_to(still);
+  }
+  template <class O, class S>
+  static void scale_found(O& o, const S& change) noexcept {
+    auto scaled = o.kept_.states;
+    for (auto& level : scaled) level[O::order] = level[O::order] * change;
+    (void)o.shift_to(scaled);
+  }
+  /// @}
+  /// Where a load acts in the states of a model, which takes design work.
+  template <class O>
+  static auto load_column(const O& o) noexcept {
+    if constexpr (model_traits<typename O::PlantModel>.is_chain) {
+      return Empty{};
+    } else {
+      return o.model_.constant_column();
+    }
+  }
+  /// `shift_load` with it.
+  template <class O, class Column, class S>
+  static void load(O& o, const Column& column, const S& offset) noexcept {
+    if constexpr (std::is_same_v<Column, Empty>) {
+      (void)o.shift_load(offset);
+    } else {
+      auto next = o.kept_.states;
+      const S scaled = o.model_.scaled_constant(offset);
+      for (auto& state : next) {
+        for (std::size_t i = 0; i < column.size(); ++i) state[i] = state[i] + S(column[i]) * scaled;
+      }
+      (void)o.shift_to(next);
+    }
+  }
+  struct Empty {};
+  template <class O>
+  static MeasuredNumbers measured(const O& o) {
+    MeasuredNumbers numbers;
+    const auto& path = o.paths_[0];
+    const auto number = [](const auto& x) { return static_cast<double>(x); };
+    numbers.on = true;
+    numbers.gain = number(path.input_.gain);
+    for (std::size_t i = 0; i < 2; ++i) {
+      numbers.share[i] = number(path.share_[i]);
+      numbers.late[i] = number(path.late_[i]);
+      numbers.reached[i] = number(path.reached_[i]);
+    }
+    numbers.most_lost = static_cast<unsigned>(o.most_lost_);
+    for (int age = path.whole_ + 1; age >= 0; --age) {
+      numbers.memory.push_back(number(path.before(age)));
+    }
+    numbers.lagged = number(path.lagged_);
+    numbers.last = number(o.last_[0]);
+    numbers.told = number(o.told_);
+    numbers.lost = static_cast<unsigned>(o.lost_[0]);
+    return numbers;
   }
 
   /// What a monitor computes from its settings alone, and of the controller that it watches.
@@ -575,14 +710,34 @@ struct IsGuarded : std::false_type {};
 template <class Observer>
 struct IsGuarded<Guarded<Observer>> : std::true_type {};
 template <class Observer>
-inline constexpr bool is_adapter = IsDelayed<Observer>::value || IsGate<Observer>::value ||
-                                   IsWrapped<Observer>::value || IsGuarded<Observer>::value;
+struct IsMeasured : std::false_type {};
+template <class Observer, int Count, int Delay>
+struct IsMeasured<Measured<Observer, Count, Delay>> : std::true_type {};
+template <class Observer>
+inline constexpr bool is_adapter =
+    IsDelayed<Observer>::value || IsGate<Observer>::value || IsWrapped<Observer>::value ||
+    IsGuarded<Observer>::value || IsMeasured<Observer>::value;
+/// One disturbance, told once and inside a WrappedOutput: around it the angle is read otherwise.
+template <class Observer>
+inline constexpr bool measures_plainly = [] {
+  if constexpr (IsMeasured<Observer>::value) {
+    using Inside = typename Observer::Adapted;
+    return Observer::inputs == 1 && !observer_traits<Inside>.takes_measured &&
+           !observer_traits<Inside>.wraps_output && measures_plainly<Inside>;
+  } else if constexpr (IsGuarded<Observer>::value) {
+    return !observer_traits<typename Observer::Adapted>.takes_measured;
+  } else if constexpr (is_adapter<Observer>) {
+    return measures_plainly<typename Observer::Adapted>;
+  } else {
+    return true;
+  }
+}();
 /// With a gate in it a WrappedOutput counts twice.
 template <class Observer>
 inline constexpr bool wraps_beside_gate = [] {
   if constexpr (IsWrapped<Observer>::value) {
     return observer_traits<typename Observer::Adapted>.rejects_outliers;
-  } else if constexpr (IsDelayed<Observer>::value || IsGuarded<Observer>::value) {
+  } else if constexpr (is_adapter<Observer>) {
     return wraps_beside_gate<typename Observer::Adapted>;
   } else {
     return false;
@@ -596,6 +751,7 @@ void take_adapters(RecordedDesign& design, const Observer& observer) {
   if constexpr (IsGate<Observer>::value) design.gate = RecordAccess::gate(observer);
   if constexpr (IsGuarded<Observer>::value) design.guard = RecordAccess::guard(observer);
   if constexpr (IsWrapped<Observer>::value) design.wrap = RecordAccess::wrap(observer);
+  if constexpr (IsMeasured<Observer>::value) design.measured = RecordAccess::measured(observer);
   if constexpr (is_adapter<Observer>) take_adapters(design, observer.observer());
 }
 
@@ -619,6 +775,10 @@ struct WithoutAdapter<WrappedOutput<Observer>> {
 };
 template <class Observer>
 struct WithoutAdapter<Guarded<Observer>> {
+  using type = typename WithoutAdapter<Observer>::type;
+};
+template <class Observer, int Count, int Delay>
+struct WithoutAdapter<Measured<Observer, Count, Delay>> {
   using type = typename WithoutAdapter<Observer>::type;
 };
 template <class Observer, class Form>
@@ -669,7 +829,7 @@ concept HasLists = can_be_recorded<Observer> && requires(const Observer& o) {
 template <class Observer>
 concept WritableObserver =
     HasLists<typename WithoutAdapter<Observer>::type> && !wraps_beside_gate<Observer> &&
-    RecordAccess::guards_a_chain<Observer>;
+    measures_plainly<Observer> && RecordAccess::guards_a_chain<Observer>;
 
 template <class C>
 struct ObserverOfController;
@@ -815,7 +975,8 @@ class DesignRecorder {
       if (published >= 0) name = "published_" + std::to_string(published);
       writer.live[i] = name[0] == 'z' || name[0] == 'p' || name == "u_applied" ||
                        name == "u_last" ||
-                       (design.options.watched && (name == "innovation" || name == "u_asked"));
+                       (design.options.watched && (name == "innovation" || name == "u_asked")) ||
+                       (design.guard.on && name == "innovation");
       for (const auto& [number, begins] : settings) {
         if (number == numbers[i] && name.empty()) name = begins + std::to_string(i);
       }
@@ -871,6 +1032,41 @@ class DesignRecorder {
           (void)of(c).shift_output(in[0]);
           return Numbers{};
         });
+      }
+    }
+    if constexpr (ShiftableLoad<Observer>) {
+      if (design.measured.on) {
+        const auto column = RecordAccess::load_column(of_any(subject_));
+        add("load", {"offset"}, false, [of, column](auto& c, const Numbers& in) {
+          RecordAccess::load(of(c), column, in[0]);
+          return Numbers{};
+        });
+      }
+    }
+    if constexpr (model_traits<typename Observer::PlantModel>.is_chain &&
+                  size == Observer::order + 1) {
+      if (design.guard.on) {
+        std::vector<std::string> states;
+        for (int i = 1; i <= size; ++i) states.push_back("x" + std::to_string(i));
+        states.push_back("u");
+        add("predicted_y", states, true, [of](auto& c, const Numbers& in) {
+          return Numbers{RecordAccess::predicted_y(of(c), in)};
+        });
+        std::vector<std::string> found{"y"};
+        for (int i = 1; i <= Observer::levels; ++i) found.push_back("d" + std::to_string(i));
+        add("stand_at", found, false, [of](auto& c, const Numbers& in) {
+          RecordAccess::stand_at(of(c), in);
+          return Numbers{};
+        });
+        if (design.guard.by_input) {
+          add("scale_found", {"change"}, false, [of](auto& c, const Numbers& in) {
+            RecordAccess::scale_found(of(c), in[0]);
+            return Numbers{};
+          });
+          add("scaled_bound", {"bound"}, true, [of](auto& c, const Numbers& in) {
+            return Numbers{of(c).model().scaled_disturbance(in[0])};
+          });
+        }
       }
     }
     add("observe", {"y", "u"}, false, [of](auto& c, const Numbers& in) {

@@ -1,0 +1,101 @@
+// The C of guards and of measured disturbances equals them bit for bit, as in c_code_test.cpp.
+#include <esokit/adapter/delayed_input.hpp>
+#include <esokit/adapter/guarded.hpp>
+#include <esokit/adapter/measured.hpp>
+#include <esokit/adapter/outlier_gate.hpp>
+#include <esokit/adapter/wrapped_output.hpp>
+#include <esokit/control/disturbance_compensator.hpp>
+#include <esokit/observer/algebraic_eso.hpp>
+#include <esokit/observer/cascade_eso.hpp>
+#include <esokit/observer/extended_state_filter.hpp>
+#include <esokit/observer/linear_eso.hpp>
+#include <target/written.hpp>
+
+namespace esokit_test {
+namespace target_c_guarded_test {
+
+using namespace esokit;
+using detail::Writable;
+template <class Observer>
+using Late = Measured<Observer, 1, 4>;
+
+// Several disturbances, two of them, and one around an angle.
+static_assert(Writable<Measured<LinearEso<2>>> && !Writable<Measured<LinearEso<2>, 2>> &&
+              !Writable<Measured<Measured<LinearEso<2>>>> &&
+              !Writable<Measured<WrappedOutput<LinearEso<2>>>> &&
+              !Writable<Guarded<Measured<LinearEso<2>>>>);
+
+#if defined(ESOKIT_LOADS_C) && !defined(ESOKIT_ONE_TYPE)
+
+TEST(CGuarded, OfAMeasuredDisturbance) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  equals<Late<LinearEso<2, double>>>(30000, 801);
+  equals_changed<Adrc<Measured<LinearEso<1, float>>>>(
+      30000, 811, "gcc -std=c99", [](auto& settings) {  // no dead time, no lag
+        settings.observer.inputs[0] = {.gain = -3.0F};
+      });
+  observes<Late<CascadeEso<1, 2, float>>>(30000, 821);
+  equals<DelayedInput<OutlierGate<Late<ModelEso<lag, double>>>, 3>>(30000, 831);
+  equals<WrappedOutput<Late<LinearEso<2, double>>>>(30000, 841);
+  equals<Late<DelayedInput<AlgebraicEso<1, double>, 3>>>(30000, 851);
+  equals<Late<ExtendedStateFilter<2, double>>>(30000, 861);
+  equals_controller<Adrc<Late<OutlierGate<LinearEso<1, float>>>, ErrorBased>>(30000, 871);
+  equals_controller<DisturbanceCompensator<Late<LinearEso<1, double>>>>(30000, 881, "gcc -std=c99",
+                                                                        3);
+}
+
+/// Pin, hold, release and a changing b0, which every comparison of a Guarded has, with a bound in
+/// the unit of u and a time after a pin.
+TEST(CGuarded, OfPinHoldAndGain) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  const auto by_input = [](auto& settings) {
+    settings.observer.unit = DisturbanceUnit::input;
+    settings.observer.disturbance_bound = 1;
+    settings.observer.release_samples = 20;
+    settings.observer.leak_time = 0;
+  };
+  equals_changed<Adrc<Guarded<OutlierGate<CascadeEso<1, 2, double>>>>>(30000, 901, "gcc -std=c99",
+                                                                       by_input);
+  equals_changed<Adrc<Guarded<LinearEso<2, float>>, ErrorBased>>(30000, 911, "gcc -std=c99",
+                                                                 [&](auto& settings) {
+                                                                   by_input(settings);
+                                                                   settings.measurement_divider = 2;
+                                                                 });
+  equals<Guarded<LinearEso<3, double>>>(30000, 921);  // it softens: no changing b0
+}
+
+/// As of others, see c_code_test.cpp.
+template <class C>
+void compiles() {
+  SCOPED_TRACE(testing::internal::GetTypeName<C>());
+  compiles_elsewhere(to_c(C::make(config<C>(8)).value(), {.name = "loop"}).value(), "loop");
+}
+
+TEST(CGuarded, CompilesWithOtherCompilers) {
+  compiles<Adrc<Late<LinearEso<2, float>>>>();
+  compiles<Adrc<Guarded<DelayedInput<WrappedOutput<CascadeEso<2, 2, float>>, 3>>>>();
+  compiles<DisturbanceCompensator<DelayedInput<OutlierGate<Late<LinearEso<1, double>>>, 3>>>();
+}
+
+/// A w that is not finite is lost, whatever the compiler assumes of it.
+TEST(CGuarded, RefusesABadMeasuredDisturbanceUnderFastMath) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  using C = Adrc<Late<LinearEso<2, float>>>;
+  const Folder folder;
+  InC<float> in_c(folder, to_c(C::make(config<C>(8)).value(), {.name = "loop"}).value(), true,
+                  "gcc -std=gnu99 -ffast-math -Wno-error");
+  ASSERT_TRUE(in_c.loaded());
+  for (const float bad : {hidden_nan<float>(), hidden_infinity<float>(), -1e38F}) {
+    for (int k = 0; k < 30; ++k) {
+      in_c.measured(k < 10 ? bad : 0.5F);
+      EXPECT_TRUE(is_finite(in_c.update(0.1F, 0.2F)));
+      EXPECT_TRUE(is_finite(in_c.estimate(2)));
+      EXPECT_EQ(in_c.probe() % 256, 0u);
+    }
+  }
+}
+
+#endif
+
+}  // namespace target_c_guarded_test
+}  // namespace esokit_test
