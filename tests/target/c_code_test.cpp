@@ -175,6 +175,9 @@ TEST(CCode, RefusesByName) {
   for (const char* name : {"", "2nd", "a-b", "a b"}) {
     EXPECT_EQ(refusal(plain, {.name = name}), "name: must be an identifier of C");
   }
+  EXPECT_EQ(refusal(plain, {.settings_in_struct = true, .settings_name = "a-b"}),
+            "settings_name: must be an identifier of C");
+  EXPECT_EQ(refusal(plain, {.settings_in_struct = true, .settings_name = "slow"}), "");
   EXPECT_EQ(refusal(plain, {.name = "_a2"}), "");
   EXPECT_EQ(refusal(plain, {.self_test_samples = 0}), "self_test_samples: must be 1 .. 10000");
   EXPECT_EQ(refusal(plain, {.self_test_samples = 1}), "");

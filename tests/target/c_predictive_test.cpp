@@ -118,6 +118,17 @@ TEST(CPredictive, EqualsTheController) {
   predicts<PredictiveAdrc<ModelEso<lag, double>>>(831);
 }
 
+TEST(CPredictive, CompilesWithOtherCompilers) {
+  using C = PredictiveAdrc<LinearEso<2, float>>;
+  C::Config config{.observer = observer_config<LinearEso<2, float>>(8)};
+  config.controller_bandwidth = 4;
+  const C controller = C::make(config).value();
+  compiles_elsewhere(to_c(controller, {.name = "loop"}).value(), "loop");
+  const auto refused = to_c(controller, {.settings_in_struct = true});
+  ASSERT_FALSE(refused);
+  EXPECT_STREQ(refused.error().field, "settings_in_struct");
+}
+
 #endif  // ESOKIT_LOADS_C
 
 }  // namespace target_c_predictive_test

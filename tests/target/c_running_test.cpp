@@ -100,25 +100,7 @@ template <class C>
 void compiles() {
   SCOPED_TRACE(testing::internal::GetTypeName<C>());
   const CCode code = to_c(C::make(config<C>(8)).value(), {.name = "loop"}).value();
-  const Folder folder;
-  folder.write("loop.h", code.header);
-  folder.write("loop.c", code.source);
-  folder.write("loop.cpp", code.source);
-  for (const std::string compiler : {"g++ -std=c++11", "clang -std=c99", "tcc"}) {
-    const std::string name = compiler.substr(0, compiler.find(' '));
-    if (!there(name)) continue;
-    EXPECT_TRUE(runs(compiler + (name == "tcc" ? " -Wall -Werror" : strict) +
-                     " -DLOOP_SELF_TEST -c -o " + folder.file("loop.o") + " " +
-                     folder.file(name == "g++" ? "loop.cpp" : "loop.c")))
-        << compiler;
-  }
-  if (there("cppcheck")) {
-    EXPECT_TRUE(
-        runs("cppcheck --addon=misra --std=c99 -q --error-exitcode=1 "
-             "--suppress=missingIncludeSystem --suppress=misra-c2012-2.5 "
-             "--suppress=misra-c2012-15.5 --suppress=misra-c2012-21.15 " +
-             folder.file("loop.c") + " >/dev/null 2>&1"));
-  }
+  compiles_elsewhere(code, "loop");
 }
 
 TEST(CRunning, CompilesWithOtherCompilers) {

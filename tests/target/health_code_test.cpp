@@ -142,24 +142,7 @@ TEST(HealthCode, CompilesWithOtherCompilers) {
   using C = Adrc<LinearEso<2, float>>;
   const C controller = C::make(config<C>(8)).value();
   const CCode code = to_c(monitor<C>(0.001f), controller).value();
-  const Folder folder;
-  folder.write("health.h", code.header);
-  folder.write("health.c", code.source);
-  folder.write("health.cpp", code.source);
-  for (const std::string compiler : {"g++ -std=c++11 health.cpp", "clang -std=c99 health.c",
-                                     "tcc health.c", "gcc -std=c99 -Wdouble-promotion health.c"}) {
-    if (!there(compiler.substr(0, compiler.find(' ')))) continue;
-    EXPECT_TRUE(runs("cd " + folder.file("") + " && " + compiler + " -c -o health.o" +
-                     (compiler[0] == 't' ? " -Wall -Werror" : strict)))
-        << compiler;
-  }
-  if (there("cppcheck")) {
-    EXPECT_TRUE(
-        runs("cppcheck --addon=misra --std=c99 -q --error-exitcode=1 "
-             "--suppress=missingIncludeSystem --suppress=misra-c2012-2.5 "
-             "--suppress=misra-c2012-15.5 --suppress=misra-c2012-21.15 " +
-             folder.file("health.c") + " >/dev/null 2>&1"));
-  }
+  compiles_elsewhere(code, "health");
 }
 
 #endif  // ESOKIT_LOADS_C

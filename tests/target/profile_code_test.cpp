@@ -88,25 +88,7 @@ TEST(ProfileCode, EqualsTheProfile) {
 TEST(ProfileCode, CompilesWithOtherCompilers) {
   const CCode code = to_c(profile<2, float>(), {.name = "move", .comment = "of the axis"}).value();
   EXPECT_NE(code.header.find(" * of the axis\n"), std::string::npos);
-  const Folder folder;
-  folder.write("move.h", code.header);
-  folder.write("move.c", code.source);
-  folder.write("move.cpp", code.source);
-  for (const std::string compiler :
-       {"g++ -std=c++11 move.cpp", "clang -std=c99 move.c", "tcc move.c", "gcc -std=c99 move.c"}) {
-    if (!there(compiler.substr(0, compiler.find(' ')))) continue;
-    EXPECT_TRUE(runs("cd " + folder.file("") + " && " + compiler +
-                     " -DMOVE_SELF_TEST -c -o move.o" +
-                     (compiler[0] == 't' ? " -Wall -Werror" : strict)))
-        << compiler;
-  }
-  if (there("cppcheck")) {
-    EXPECT_TRUE(
-        runs("cppcheck --addon=misra --std=c99 -q --error-exitcode=1 "
-             "--suppress=missingIncludeSystem --suppress=misra-c2012-2.5 "
-             "--suppress=misra-c2012-15.5 --suppress=misra-c2012-21.15 " +
-             folder.file("move.c") + " >/dev/null 2>&1"));
-  }
+  compiles_elsewhere(code, "move");
 }
 
 #endif  // ESOKIT_LOADS_C

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cctype>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
@@ -147,6 +148,33 @@ inline bool there(const std::string& program) {
 }
 
 inline constexpr const char* strict = " -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Werror ";
+
+/// Of C that is named `name`: by an old C++, Clang, small compilers, and that MISRA C:2012 finds
+/// nothing in it but the deviations that the file names.
+inline void compiles_elsewhere(const CCode& code, const std::string& name) {
+  const Folder folder;
+  folder.write(name + ".h", code.header);
+  folder.write(name + ".c", code.source);
+  folder.write(name + ".cpp", code.source);
+  std::string upper = name;
+  for (char& c : upper) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  for (const std::string compiler :
+       {"g++ -std=c++11", "clang -std=c99", "tcc", "gcc -std=c99 -Wdouble-promotion"}) {
+    const std::string program = compiler.substr(0, compiler.find(' '));
+    if (!there(program)) continue;
+    EXPECT_TRUE(runs(compiler + (program == "tcc" ? " -Wall -Werror" : strict) + " -D" + upper +
+                     "_SELF_TEST -c -o " + folder.file("other.o") + " " +
+                     folder.file(name + (program == "g++" ? ".cpp" : ".c"))))
+        << compiler;
+  }
+  if (there("cppcheck")) {
+    EXPECT_TRUE(
+        runs("cppcheck --addon=misra --std=c99 -q --error-exitcode=1 "
+             "--suppress=missingIncludeSystem --suppress=misra-c2012-2.5 "
+             "--suppress=misra-c2012-15.5 --suppress=misra-c2012-21.15 " +
+             folder.file(name + ".c") + " >/dev/null 2>&1"));
+  }
+}
 
 /// Compiled and loaded C, with what a test adds to it.
 class Library {

@@ -76,10 +76,7 @@ class PredictiveAdrc {
   using scalar_type = typename Observer::scalar_type;  ///< type of signals and settings
   using S = scalar_type;                               ///< the same type
   using Estimate = typename Observer::Estimate;        ///< (y, .., y^(n-1), d, ..), N x 1
-  template <class T>
-  using with_scalar =
-      PredictiveAdrc<detail::WithScalar<Observer, T>>;  ///< the same with another scalar
-  using Reference = esokit::Reference<order, S>;        ///< r, `{r, r1}` or a vector
+  using Reference = esokit::Reference<order, S>;       ///< r, `{r, r1}` or a vector
 
   /// What the controller can do beyond `update(y, reference)`.
   static constexpr ControllerTraits traits{

@@ -714,6 +714,12 @@ template <class V>
   return rules;
 }
 
+/// For recording alone: packs of them run one by one.
+template <class Observer, class T>
+struct WithScalarOf<PredictiveAdrc<Observer>, T> {
+  using type = PredictiveAdrc<WithScalar<Observer, T>>;
+};
+
 /// A controller in two phases around one that has a table of gains and one level.
 template <class C>
 struct PredictiveOf {};
