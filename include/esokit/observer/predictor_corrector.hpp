@@ -155,7 +155,7 @@ class PredictorCorrector {
 
   /// All estimates after the last step, N x 1, in physical units: plant states of the last level,
   /// disturbance summed over all levels.
-  [[nodiscard]] Estimate estimate() const noexcept {
+  [[nodiscard]] ESOKIT_INLINE Estimate estimate() const noexcept {
     return model_.physical(up_to_level<Levels - 1>());
   }
 
