@@ -8,6 +8,7 @@
 #include <esokit/adapter/wrapped_output.hpp>
 #include <esokit/control/adrc.hpp>
 #include <esokit/core/error_text.hpp>
+#include <esokit/gain/pole_set.hpp>
 #include <esokit/observer/adjustable_bandwidth_eso.hpp>
 #include <esokit/observer/algebraic_eso.hpp>
 #include <esokit/observer/cascade_eso.hpp>
@@ -124,6 +125,25 @@ TEST(FixedPoint, OfASettledAlgebraicObserver) {
   for (std::size_t i = 0; i < linear.written.a.size(); ++i) {
     EXPECT_NEAR(settled.written.a[i], linear.written.a[i], 1e-4);
   }
+}
+
+/// A complex pair and a real pole; the written system has their product as its determinant.
+TEST(FixedPoint, OfAPoleSet) {
+  if (!there("gcc")) GTEST_SKIP() << "no gcc";
+  using Placed = LinearEso<2, double, 1, PoleSet>;
+  Placed::Config config{};
+  config.poles = {{{-70, 40}, {-70, -40}, {-150, 0}}};
+  config.sample_time = 1e-3;
+  config.input_gain = 50;
+  config.max_gap = 5;
+  const auto object = Placed::make(config).value();
+  EXPECT_GT((stays_within<std::int32_t>(object, servo(), 16)), 0.3);
+  const WrittenSystem w = to_fixed_c(object, servo())->written;
+  const auto a = [&](std::size_t i, std::size_t j) { return w.a[3 * i + j]; };
+  const double determinant = a(0, 0) * (a(1, 1) * a(2, 2) - a(1, 2) * a(2, 1)) -
+                             a(0, 1) * (a(1, 0) * a(2, 2) - a(1, 2) * a(2, 0)) +
+                             a(0, 2) * (a(1, 0) * a(2, 1) - a(1, 1) * a(2, 0));
+  EXPECT_NEAR(determinant, std::exp(-(70 + 70 + 150) * 1e-3), 1e-4);  // gains of 12 bits and more
 }
 
 /// The frozen filter has a constant gain, too; one that goes on is refused.
